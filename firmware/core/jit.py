@@ -1,0 +1,123 @@
+"""How kernels are compiled: one decorator, one cache that notices every change.
+
+Numba's own disk cache does not see a change in a kernel that a cached kernel calls, so the cache directory carries a
+hash over every file that may hold kernels (the `core` folders and the effects). A kernel file elsewhere would escape
+the hash; tests/unit/test_jit.py holds the rule.
+
+Set GLIDER_JIT=0 to run every kernel as plain Python (slow, for reading and stepping through).
+"""
+
+import hashlib
+import os
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+PACKAGES_DIR = Path(__file__).resolve().parents[2]
+KERNEL_DIRS = ("firmware/core", "sim_backend/core", "sim_backend/effects", "tools/gap/core")
+KEEP_CACHES = 3
+
+
+def kernel_files() -> list[Path]:
+    """Every source file whose kernels the cache key covers, in a fixed order."""
+    return [path for folder in KERNEL_DIRS for path in sorted((PACKAGES_DIR / folder).glob("*.py"))]
+
+
+def kernels_digest() -> str:
+    """Hash of every kernel file's bytes, 16 hex digits."""
+    digest = hashlib.sha256()
+    for path in kernel_files():
+        digest.update(path.name.encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def cache_root() -> Path:
+    """Folder of all compiled-kernel caches: GLIDER_CACHE_DIR, else the user's cache folder, else a temporary one."""
+    wanted = os.environ.get("GLIDER_CACHE_DIR")
+    if wanted:
+        candidates = [Path(wanted)]
+    else:
+        base = os.environ.get("XDG_CACHE_HOME")
+        candidates = [Path(base) / "glider" if base else Path.home() / ".cache" / "glider"]
+        candidates.append(Path(tempfile.gettempdir()) / f"glider-cache-{os.getuid()}")
+    for candidate in candidates:
+        try:
+            candidate.mkdir(parents=True, exist_ok=True)
+        except OSError:
+            continue
+        if os.access(candidate, os.W_OK):
+            return candidate
+    raise OSError(f"no writable folder for compiled kernels among {', '.join(map(str, candidates))}: set GLIDER_CACHE_DIR")
+
+
+def _prune(root: Path, current: Path) -> None:
+    """Remove all but the newest caches of earlier kernel versions."""
+    old = [path for path in root.glob("kernels-*") if path != current]
+    old.sort(key=lambda path: path.stat().st_mtime, reverse=True)
+    for path in old[KEEP_CACHES - 1 :]:
+        shutil.rmtree(path, ignore_errors=True)
+
+
+def _configure() -> Path | None:
+    if os.environ.get("GLIDER_JIT", "1") == "0":
+        os.environ["NUMBA_DISABLE_JIT"] = "1"
+        return None
+    root = cache_root()
+    directory = root / f"kernels-{kernels_digest()}-py{sys.version_info.major}{sys.version_info.minor}"
+    fresh = not directory.exists()
+    directory.mkdir(parents=True, exist_ok=True)
+    # Before numba is imported: it reads the variable once. Everything this process compiles with cache=True lands here.
+    os.environ["NUMBA_CACHE_DIR"] = str(directory)
+    if fresh:
+        _prune(root, directory)
+    return directory
+
+
+CACHE_DIR = _configure()
+
+import numba  # noqa: E402  (the cache folder has to be set first)
+
+if CACHE_DIR is not None:
+    numba.config.CACHE_DIR = str(CACHE_DIR)
+
+# Contraction (fused multiply-add) is what a C compiler does by default; NaN and Inf keep their meaning.
+_OPTIONS = dict(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+_KERNELS: list = []
+
+
+def kernel(function):
+    """Compile a pure function of float64 scalars and arrays; results go to tuples or the caller's `out`."""
+    dispatcher = numba.njit(**_OPTIONS)(function)
+    _KERNELS.append(dispatcher)
+    return dispatcher
+
+
+def parallel_kernel(function):
+    """Compile a kernel whose `prange` loop is shared out over all cores."""
+    dispatcher = numba.njit(**_OPTIONS, parallel=True)(function)
+    _KERNELS.append(dispatcher)
+    return dispatcher
+
+
+prange = numba.prange
+
+
+def compiled_signatures() -> int:
+    """Number of compiled specialisations of all kernels imported so far: constant while nothing compiles."""
+    return sum(len(getattr(dispatcher, "signatures", ())) for dispatcher in _KERNELS)
+
+
+def freeze_kernels() -> None:
+    """Turn any further compilation into an error: called once the loop is armed."""
+    for dispatcher in _KERNELS:
+        if hasattr(dispatcher, "disable_compile"):
+            dispatcher.disable_compile(True)
+
+
+def thaw_kernels() -> None:
+    """Allow compilation again: after a flight, for whatever else the process does."""
+    for dispatcher in _KERNELS:
+        if hasattr(dispatcher, "disable_compile"):
+            dispatcher.disable_compile(False)

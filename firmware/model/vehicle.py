@@ -1,0 +1,160 @@
+"""The vehicle: what a vehicle file holds, and its way into the kernels' parameter vector."""
+
+from typing import Annotated
+
+import msgspec
+import numpy as np
+
+from firmware.core import layout
+from firmware.model.strict import Table, decode
+
+Positive = Annotated[float, msgspec.Meta(gt=0.0)]
+NonNegative = Annotated[float, msgspec.Meta(ge=0.0)]
+Triple = tuple[float, float, float]
+PositiveTriple = tuple[Positive, Positive, Positive]
+NonNegativeTriple = tuple[NonNegative, NonNegative, NonNegative]
+# No glider of this class is outside these; a file that is has its units wrong.
+Mass = Annotated[float, msgspec.Meta(gt=0.0, le=5000.0)]
+Length = Annotated[float, msgspec.Meta(ge=-10.0, le=10.0)]
+Coefficient = Annotated[float, msgspec.Meta(ge=-1e6, le=1e6)]
+
+
+class MassTable(Table):
+    """[mass]: kg, m, kg m2 (MODEL.md, Mass)."""
+
+    m_t: Mass
+    m_r: Mass
+    m_s: Mass
+    x_r: Length
+    R_r: Annotated[float, msgspec.Meta(ge=0.0, le=10.0)]
+    r_sx0: Length
+    R_s: Annotated[float, msgspec.Meta(ge=0.0, le=10.0)]
+    x_b: Length
+    J: PositiveTriple
+    added_mass: NonNegativeTriple
+    added_inertia: NonNegativeTriple
+
+    def __post_init__(self):
+        if self.m_r + self.m_s >= self.m_t:
+            raise ValueError(f"m_r + m_s = {self.m_r + self.m_s} kg is not less than the whole mass m_t = {self.m_t} kg")
+
+
+class HydrodynamicsTable(Table):
+    """[hydrodynamics]: the twelve coefficients of equation (4), and which lift law they belong to (ledger L4)."""
+
+    K_D0: NonNegative
+    K_D: NonNegative
+    K_L0: Coefficient
+    K_L: Coefficient
+    K_beta: Coefficient
+    K_MR: Coefficient
+    K_p: Coefficient
+    K_M0: Coefficient
+    K_M: Coefficient
+    K_q: Coefficient
+    K_MY: Coefficient
+    K_r: Coefficient
+    lift_law: str = "linear"
+
+    def __post_init__(self):
+        if self.lift_law not in ("linear", "printed"):
+            raise ValueError(f"lift_law: expected 'linear' or 'printed', got {self.lift_law!r}")
+
+
+class ActuatorTable(Table):
+    """One actuator: range, rate (per second) and time constant (s), in its own unit (rad, m, kg)."""
+
+    range: tuple[float, float]
+    rate: Positive
+    time_constant: Positive
+
+    def __post_init__(self):
+        low, high = self.range
+        if not low < high:
+            raise ValueError(f"range: expected [low, high] with low < high, got [{low}, {high}]")
+        if not low <= 0.0 <= high:
+            raise ValueError(f"range: expected 0 (neutral) inside, got [{low}, {high}]")
+
+
+class BallastTable(ActuatorTable):
+    plunger_area: Positive  # m2
+
+
+class ActuatorsTable(Table):
+    servo: ActuatorTable
+    slider: ActuatorTable
+    ballast: BallastTable
+
+
+class SensorTable(Table):
+    """White noise and constant bias, both 1 sigma, in the sensor's own unit."""
+
+    noise: NonNegative
+    bias: NonNegative = 0.0
+
+
+class SensorsTable(Table):
+    attitude: SensorTable
+    gyro: SensorTable
+    depth: SensorTable
+    slider: SensorTable
+    ballast: SensorTable
+    mocap_position: SensorTable
+    mocap_attitude: SensorTable
+
+
+class DisturbanceTable(Table):
+    """Acceleration noise, 1 sigma, held 0.1 s on every axis: m/s2 and rad/s2."""
+
+    linear: NonNegative
+    angular: NonNegative
+
+
+class UncertaintyTable(Table):
+    """1 sigma of what identification leaves; K, mass, added relative, net_mass in kg, cg in m."""
+
+    K: NonNegative
+    mass: NonNegative
+    added: NonNegative
+    net_mass: NonNegative
+    cg: NonNegative
+
+
+class Vehicle(Table):
+    """A vehicle file (MODEL.md, roughie.toml)."""
+
+    format: Annotated[int, msgspec.Meta(ge=1, le=1)]
+    name: Annotated[str, msgspec.Meta(min_length=1, max_length=100)]
+    mass: MassTable
+    hydrodynamics: HydrodynamicsTable
+    actuators: ActuatorsTable
+    sensors: SensorsTable
+    disturbance: DisturbanceTable
+    uncertainty: UncertaintyTable
+
+    def vector(self) -> np.ndarray:
+        """The parameter vector P of the kernels, shape (layout.N_P,), SI."""
+        P = np.zeros(layout.N_P)
+        mass, water, actuators = self.mass, self.hydrodynamics, self.actuators
+        for name in ("m_t", "m_r", "m_s", "x_r", "R_r", "r_sx0", "R_s", "x_b"):
+            P[getattr(layout, name.upper())] = getattr(mass, name)
+        P[layout.J_XX : layout.J_ZZ + 1] = mass.J
+        P[layout.A_X : layout.A_Z + 1] = mass.added_mass
+        P[layout.B_X : layout.B_Z + 1] = mass.added_inertia
+        for name in COEFFICIENTS:
+            P[getattr(layout, name.upper())] = getattr(water, name)
+        P[layout.LIFT_PRINTED] = float(water.lift_law == "printed")
+        for name in ("servo", "slider", "ballast"):
+            start = getattr(layout, f"{name.upper()}_MIN")
+            table = getattr(actuators, name)
+            P[start : start + 4] = (*table.range, table.rate, table.time_constant)
+        P[layout.PLUNGER_AREA] = actuators.ballast.plunger_area
+        return P
+
+
+COEFFICIENTS = ("K_D0", "K_D", "K_L0", "K_L", "K_beta", "K_MR", "K_p", "K_M0", "K_M", "K_q", "K_MY", "K_r")
+
+
+def decode_vehicle(text: str, source: str) -> Vehicle:
+    """A vehicle file's text as a Vehicle; raises ConfigError with file, line and key."""
+    return decode(text, Vehicle, source)

@@ -1,0 +1,98 @@
+"""What all commands share: exit codes, results on standard output, messages and progress on standard error."""
+
+import contextlib
+import math
+import sys
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import click
+
+DONE, FAILED, BAD_INPUT = 0, 1, 2
+
+json_option = click.option("--json", "as_json", is_flag=True, help="Print the result alone, as JSON.")
+
+
+def say(message: str) -> None:
+    """A message for the person at the terminal, on standard error."""
+    click.echo(message, err=True)
+
+
+def fail(message: str) -> None:
+    """End with exit code 1: the thing asked about failed."""
+    say(message)
+    raise SystemExit(FAILED)
+
+
+def _plain(value: Any) -> Any:
+    """Numbers and arrays as JSON knows them; what is not finite becomes null."""
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if hasattr(value, "tolist"):
+        return _plain(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def print_json(result: Any) -> None:
+    """The result, and nothing else, on standard output."""
+    import json
+
+    click.echo(json.dumps(_plain(result), indent=1))
+
+
+@contextlib.contextmanager
+def progress(label: str, total: int) -> Iterator[Callable[[int], None]]:
+    """A progress bar on a terminal, plain lines at every tenth elsewhere; yields advance(n)."""
+    if sys.stderr.isatty():
+        from rich.console import Console
+        from rich.progress import Progress
+
+        with Progress(console=Console(stderr=True), transient=True) as bar:
+            task = bar.add_task(label, total=total)
+            yield lambda n=1: bar.update(task, advance=n)
+        return
+    done, shown = 0, 0
+
+    def advance(n: int = 1) -> None:
+        nonlocal done, shown
+        done += n
+        tenth = 10 * done // max(total, 1)
+        if tenth > shown:
+            shown = tenth
+            say(f"{label}: {done}/{total}")
+
+    yield advance
+
+
+def report_errors(command: click.Command) -> int:
+    """Run the command line; turn what a user can cause into one line and exit code 2."""
+    from firmware.model.strict import ConfigError
+    from tools.errors import InputError, MissingExtra
+
+    try:
+        command(standalone_mode=False)
+    except click.exceptions.Exit as error:
+        return error.exit_code
+    except click.ClickException as error:
+        error.show()
+        return BAD_INPUT
+    except click.Abort:
+        say("stopped")
+        return FAILED
+    except (ConfigError, InputError, MissingExtra) as error:
+        say(f"glider: {error}")
+        return BAD_INPUT
+    except OSError as error:
+        if error.filename is None:
+            raise
+        say(f"glider: {error.filename}: {error.strerror}")
+        return BAD_INPUT
+    except BrokenPipeError:
+        return DONE
+    except SystemExit as error:
+        return int(error.code or 0) if not isinstance(error.code, str) else FAILED
+    return DONE

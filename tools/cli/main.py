@@ -1,0 +1,51 @@
+"""`glider`: the one entry point. Commands are imported when called, so that --help stays quick."""
+
+import importlib
+import sys
+
+import click
+
+from tools.cli.common import report_errors
+
+# name -> (module, attribute, one line). The line stands here so that --help need not import the command.
+COMMANDS = {
+    "fly": ("tools.cli.fly", "fly", "fly a mission, in simulation or on a board"),
+    "missions": ("tools.cli.missions", "missions", "list the missions"),
+    "check": ("tools.cli.check", "check", "check vehicle, board and mission files"),
+    "log": ("tools.cli.log", "log", "export, look into or repair an onboard log"),
+    "import": ("tools.cli.import_", "import_", "bring other recordings into run data"),
+    "gap": ("tools.cli.gap", "gap", "measure and predict: where simulation and sea disagree"),
+    "simulate": ("tools.cli.simulate", "simulate", "open-loop nominal flight from a file of commands"),
+    "benchmark": ("tools.cli.benchmark", "benchmark", "the speed figures, each as a ratio in one run"),
+}
+
+
+class LazyGroup(click.Group):
+    """A group whose commands are imported only when they run."""
+
+    def list_commands(self, ctx):
+        return list(COMMANDS)
+
+    def get_command(self, ctx, name):
+        if name not in COMMANDS:
+            return None
+        module, attribute, _ = COMMANDS[name]
+        return getattr(importlib.import_module(module), attribute)
+
+    def format_commands(self, ctx, formatter):
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, line) for name, (_, _, line) in COMMANDS.items()])
+
+
+@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.version_option(package_name="glider")
+def cli():
+    """Fly an underwater glider, in the sea or in simulation, and find out why the two disagree."""
+
+
+def main() -> None:
+    sys.exit(report_errors(cli))
+
+
+if __name__ == "__main__":
+    main()

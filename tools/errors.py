@@ -1,0 +1,17 @@
+"""The errors a user can cause: one line saying what and where. Anything else is a defect and shows its traceback."""
+
+
+class InputError(ValueError):
+    """Input that cannot be used; str() is the one line the user sees, `file:line: what` as far as it is known."""
+
+    def __init__(self, message: str, *, source: object = None, line: int | None = None, column: str | None = None):
+        where = "" if source is None else (f"{source}:{line}" if line else f"{source}")
+        parts = [part for part in (where, column, message) if part]
+        super().__init__(": ".join(parts))
+
+
+class MissingExtra(RuntimeError):
+    """A command needs packages that the base install leaves out."""
+
+    def __init__(self, package: str, extra: str = "analysis"):
+        super().__init__(f"this command needs {package}: pip install 'glider[{extra}]'")

@@ -1,0 +1,42 @@
+"""From what a user types, a name or a path, to a decoded file."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
+from firmware.model.library import shipped
+from firmware.model.vehicle import Vehicle, decode_vehicle
+from tools.errors import InputError
+
+T = TypeVar("T")
+
+
+def read_text(path: Path) -> str:
+    """A text file's content; InputError where it cannot be read."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise InputError(f"not UTF-8 text (byte {error.start})", source=path) from None
+    except OSError as error:
+        raise InputError(error.strerror or str(error), source=path) from None
+
+
+def name_or_path(wanted: str, kind: str, folder: str, base: Path | None = None) -> tuple[str, str]:
+    """Text and source of a shipped name or of a path (relative to `base` first, then to the working directory)."""
+    library = shipped(folder)
+    if wanted in library:
+        return library[wanted], f"{wanted} (shipped)"
+    for candidate in ([base / wanted] if base else []) + [Path(wanted)]:
+        if candidate.is_file():
+            return read_text(candidate), str(candidate)
+    raise InputError(f"no {kind} '{wanted}': neither a file nor one of {', '.join(library) or 'none'}")
+
+
+def _load(wanted: str, kind: str, folder: str, decode: Callable[[str, str], T], base: Path | None) -> T:
+    text, source = name_or_path(wanted, kind, folder, base)
+    return decode(text, source)
+
+
+def load_vehicle(wanted: str, base: Path | None = None) -> Vehicle:
+    """A vehicle by shipped name or path; `base` is the folder of the file that names it."""
+    return _load(wanted, "vehicle", "model/vehicles", decode_vehicle, base)
