@@ -2,8 +2,18 @@
 
 from firmware.core.jit import kernel
 from firmware.core.layout import (
-    BALLAST_MAX, BALLAST_MIN, BALLAST_RATE, BALLAST_TAU, SERVO_MAX, SERVO_MIN, SERVO_RATE, SERVO_TAU, SLIDER_MAX,
-    SLIDER_MIN, SLIDER_RATE, SLIDER_TAU,
+    BALLAST_MAX,
+    BALLAST_MIN,
+    BALLAST_RATE,
+    BALLAST_TAU,
+    SERVO_MAX,
+    SERVO_MIN,
+    SERVO_RATE,
+    SERVO_TAU,
+    SLIDER_MAX,
+    SLIDER_MIN,
+    SLIDER_RATE,
+    SLIDER_TAU,
 )  # fmt: skip
 
 

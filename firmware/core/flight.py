@@ -15,7 +15,7 @@ from firmware.core.rotations import quaternion_rate, rotation_nb
 
 @kernel
 def nominal_derivative(P, x, cmd_servo, cmd_slider, cmd_ballast, water_n, water_e, water_d, out):
-    """dx/dt of the nominal vehicle, into out[0:16], in water moving uniformly at water_n, water_e, water_d (m/s, NED)."""
+    """dx/dt of the nominal vehicle, into out[0:16], in water moving uniformly at water_n.. (m/s, NED)."""
     q0, q1, q2, q3 = x[3], x[4], x[5], x[6]
     u, v, w, p, q, r = x[7], x[8], x[9], x[10], x[11], x[12]
     servo, slider, ballast = x[13], x[14], x[15]

@@ -16,12 +16,14 @@ from pathlib import Path
 
 PACKAGES_DIR = Path(__file__).resolve().parents[2]
 KERNEL_DIRS = ("firmware/core", "sim_backend/core", "sim_backend/effects", "tools/gap/core")
+CONSTANT_FILES = ("hal/ports.py",)  # no kernels, but places in the frame that the kernels freeze
 KEEP_CACHES = 3
 
 
 def kernel_files() -> list[Path]:
     """Every source file whose kernels the cache key covers, in a fixed order."""
-    return [path for folder in KERNEL_DIRS for path in sorted((PACKAGES_DIR / folder).glob("*.py"))]
+    kernels = [path for folder in KERNEL_DIRS for path in sorted((PACKAGES_DIR / folder).glob("*.py"))]
+    return kernels + [PACKAGES_DIR / name for name in CONSTANT_FILES]
 
 
 def kernels_digest() -> str:
@@ -49,7 +51,8 @@ def cache_root() -> Path:
             continue
         if os.access(candidate, os.W_OK):
             return candidate
-    raise OSError(f"no writable folder for compiled kernels among {', '.join(map(str, candidates))}: set GLIDER_CACHE_DIR")
+    tried = ", ".join(map(str, candidates))
+    raise OSError(f"no writable folder for compiled kernels among {tried}: set GLIDER_CACHE_DIR")
 
 
 def _prune(root: Path, current: Path) -> None:

@@ -4,7 +4,27 @@ import math
 
 from firmware.core.jit import kernel
 from firmware.core.layout import (
-    A_X, A_Y, A_Z, B_X, B_Y, B_Z, CG_X, CG_Y, CG_Z, J_XX, J_YY, J_ZZ, M_R, M_S, M_T, NET_MASS, R_R, R_S, R_SX0, X_B, X_R,
+    A_X,
+    A_Y,
+    A_Z,
+    B_X,
+    B_Y,
+    B_Z,
+    CG_X,
+    CG_Y,
+    CG_Z,
+    J_XX,
+    J_YY,
+    J_ZZ,
+    M_R,
+    M_S,
+    M_T,
+    NET_MASS,
+    R_R,
+    R_S,
+    R_SX0,
+    X_B,
+    X_R,
 )  # fmt: skip
 
 
@@ -43,7 +63,7 @@ def translational_mass(P, ballast):
 
 @kernel
 def inertia(P, servo, slider, ballast):
-    """Jt about the origin, kg m2: J_xx, J_yy, J_zz, J_xy, J_xz, J_yz (off-diagonal entries as they stand in the matrix).
+    """Jt about the origin, kg m2: J_xx, J_yy, J_zz, J_xy, J_xz, J_yz (off-diagonal as in the matrix).
 
     Jt = diag(J) + diag(added_inertia) + sum over rail and slider of m (|r|^2 I - r r^T) + m_b x_b^2 diag(0, 1, 1).
     """

@@ -5,7 +5,7 @@ symmetric 3 x 3 system for the rotations (Schur complement).
 """
 
 from firmware.core.jit import kernel
-from firmware.core.layout import G, NET_MASS
+from firmware.core.layout import NET_MASS, G
 from firmware.core.mass import first_moment, first_moment_rate, inertia, translational_mass
 from firmware.core.water import water_wrench
 

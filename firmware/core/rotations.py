@@ -25,7 +25,7 @@ def quaternion_from_euler(phi, theta, psi):
 
 @kernel
 def euler_from_quaternion(q0, q1, q2, q3):
-    """ZYX Euler angles phi, theta, psi in rad; psi in (-pi, pi]. At theta = +-90 deg phi is set by the quaternion's noise."""
+    """ZYX Euler angles phi, theta, psi in rad, psi in (-pi, pi]; at theta = +-90 deg only psi -+ phi means anything."""
     s = 2.0 * (q0 * q2 - q3 * q1)
     s = min(1.0, max(-1.0, s))
     phi = math.atan2(2.0 * (q0 * q1 + q2 * q3), 1.0 - 2.0 * (q1 * q1 + q2 * q2))
@@ -77,8 +77,5 @@ def euler_rates(phi, theta, p, q, r):
 
 @kernel
 def wrap_angle(angle):
-    """Angle in (-pi, pi]."""
-    wrapped = math.fmod(angle + math.pi, 2.0 * math.pi)
-    if wrapped <= 0.0:
-        wrapped += 2.0 * math.pi
-    return wrapped - math.pi
+    """Angle in (-pi, pi]; one that is there already comes back as it is."""
+    return angle - 2.0 * math.pi * math.ceil((angle - math.pi) / (2.0 * math.pi))

@@ -4,7 +4,19 @@ import math
 
 from firmware.core.jit import kernel
 from firmware.core.layout import (
-    K_BETA, K_D, K_D0, K_L, K_L0, K_M, K_M0, K_MR, K_MY, K_P, K_Q, K_R, LIFT_PRINTED,
+    K_BETA,
+    K_D,
+    K_D0,
+    K_L,
+    K_L0,
+    K_M,
+    K_M0,
+    K_MR,
+    K_MY,
+    K_P,
+    K_Q,
+    K_R,
+    LIFT_PRINTED,
 )  # fmt: skip
 
 STILL = 1e-6  # m/s; below this the flow has no direction and alpha = beta = 0
@@ -40,8 +52,9 @@ def flow_to_body(u, v, w, a, b, c):
 def water_wrench(P, u, v, w, p, q, r):
     """Force (N) and moment (N m) of the water in body axes, F1 F2 F3 T1 T2 T3, for velocities relative to the water.
 
-    D = (K_D0 + K_D alpha^2) V^2, SF = K_beta beta V^2, L = (K_L0 + K_L alpha) V^2 (ledger L4; with LIFT_PRINTED
-    K_L alpha^2), T_DL1 = (K_MR beta + K_p p) V^2, T_DL2 = (K_M0 + K_M alpha + K_q q) V^2, T_DL3 = (K_MY beta + K_r r) V^2.
+    D = (K_D0 + K_D alpha^2) V^2, SF = K_beta beta V^2, L = (K_L0 + K_L alpha) V^2 (ledger L4; K_L alpha^2 with
+    LIFT_PRINTED), T_DL1 = (K_MR beta + K_p p) V^2, T_DL2 = (K_M0 + K_M alpha + K_q q) V^2,
+    T_DL3 = (K_MY beta + K_r r) V^2.
     """
     alpha, beta, v_squared = flow_angles(u, v, w)
     drag = (P[K_D0] + P[K_D] * alpha * alpha) * v_squared

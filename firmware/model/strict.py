@@ -36,7 +36,8 @@ class Table(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=Tru
 
 def _split_path(path: str) -> list[str | int]:
     """`$.leg[2].depth_m` as ['leg', 2, 'depth_m']."""
-    return [int(index) if index else name for name, index in re.findall(r"\.([^.\[]+)|\[(\d+|\.\.\.)\]", path) if index != "..."]
+    found = re.findall(r"\.([^.\[]+)|\[(\d+|\.\.\.)\]", path)
+    return [int(index) if index else name for name, index in found if index != "..."]
 
 
 def _parts(dotted: str) -> list[str]:
@@ -78,7 +79,8 @@ def _dotted(path: list[str | int]) -> str:
 
 def _refuse_nonfinite(value: Any, path: list[str | int], text: str, source: str) -> None:
     if len(path) > MAX_DEPTH:
-        raise ConfigError(source, f"tables nested deeper than {MAX_DEPTH}", key=_dotted(path[:3]), line=locate(text, path))
+        key = _dotted(path[:3])
+        raise ConfigError(source, f"tables nested deeper than {MAX_DEPTH}", key=key, line=locate(text, path))
     if isinstance(value, float) and not math.isfinite(value):
         raise ConfigError(source, f"expected a finite number, got {value}", key=_dotted(path), line=locate(text, path))
     if isinstance(value, dict):

@@ -5,6 +5,7 @@ from typing import Annotated
 import msgspec
 import numpy as np
 
+from firmware.control.gains import Control
 from firmware.core import layout
 from firmware.model.strict import Table, decode
 
@@ -36,7 +37,7 @@ class MassTable(Table):
 
     def __post_init__(self):
         if self.m_r + self.m_s >= self.m_t:
-            raise ValueError(f"m_r + m_s = {self.m_r + self.m_s} kg is not less than the whole mass m_t = {self.m_t} kg")
+            raise ValueError(f"m_r + m_s = {self.m_r + self.m_s} kg is not less than the whole m_t = {self.m_t} kg")
 
 
 class HydrodynamicsTable(Table):
@@ -131,6 +132,7 @@ class Vehicle(Table):
     sensors: SensorsTable
     disturbance: DisturbanceTable
     uncertainty: UncertaintyTable
+    control: Control | None = None
 
     def vector(self) -> np.ndarray:
         """The parameter vector P of the kernels, shape (layout.N_P,), SI."""

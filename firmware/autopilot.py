@@ -1,0 +1,110 @@
+"""The autopilot: tick(frame, t) -> commands, pure but for its own memory. The readable face of core/autopilot."""
+
+import math
+
+import numpy as np
+
+from firmware.control.gains import Control
+from firmware.core import autopilot as core
+from firmware.core import control_layout as layout
+from firmware.guidance.mission import Mission
+from firmware.model.strict import ConfigError
+from firmware.model.vehicle import Vehicle
+from hal.ports import empty_frame
+
+MODES = {layout.WAITING: "waiting", layout.FLYING: "flying", layout.COMPLETED: "completed", layout.ABORTED: "aborted"}
+REASONS = {
+    layout.REASON_NONE: "",
+    layout.REASON_LEG_TIME: "leg over its time limit",
+    layout.REASON_MISSION_TIME: "mission over its time limit",
+    layout.REASON_IMU: "no attitude",
+    layout.REASON_BEACON: "no depth",
+    layout.REASON_TOO_DEEP: "deeper than the site",
+}
+STANDARD_PRESSURE = 101325.0  # Pa
+
+
+def configuration(
+    vehicle: Vehicle,
+    mission: Mission,
+    *,
+    dt: float,
+    periods: dict[str, float],
+    surface_pressure: float = STANDARD_PRESSURE,
+    abort_age: float = 1.0,
+) -> np.ndarray:
+    """The configuration vector C, shape (layout.N_C,).
+
+    Gains come from the mission, else the vehicle, else the defaults. `periods` are the sensors' sample periods in s
+    (imu, beacon, wires): a sample older than three of them, plus a tick, is not used.
+    """
+    control = mission.control or vehicle.control or Control()
+    C = np.zeros(layout.N_C)
+    C[layout.DT] = dt
+    for name, gains in (("PITCH", control.pitch), ("DEPTH", control.depth)):
+        C[getattr(layout, f"{name}_KP")] = gains.kp
+        C[getattr(layout, f"{name}_KI")] = gains.ki
+        C[getattr(layout, f"{name}_KD")] = gains.kd
+    C[layout.ROLL_KP], C[layout.ROLL_KD] = control.roll.kp, control.roll.kd
+    for name, gains in (("PITCH", control.pitch), ("DEPTH", control.depth), ("ROLL", control.roll)):
+        wn = gains.reference.wn
+        if wn * dt > 0.5:
+            raise ConfigError(mission.name, f"{wn} rad/s is too fast for a step of {dt} s", key="reference.wn")
+        C[getattr(layout, f"{name}_WN")] = gains.reference.wn
+        C[getattr(layout, f"{name}_ZETA")] = gains.reference.zeta
+    C[layout.DEPTH_FILTER_WN] = control.depth.rate_bandwidth
+    C[layout.MAX_AGE_IMU] = 3.0 * periods["imu"] + dt
+    C[layout.MAX_AGE_BEACON] = 3.0 * periods["beacon"] + dt
+    C[layout.MAX_AGE_WIRE] = 3.0 * periods["wires"] + dt
+    C[layout.ABORT_AGE] = abort_age
+    C[layout.SALINITY] = mission.site.salinity
+    C[layout.SURFACE_PRESSURE] = surface_pressure
+    C[layout.SITE_DEPTH] = mission.site.depth_m
+    C[layout.MISSION_TIME_LIMIT] = mission.time_limit_s
+    return C
+
+
+class Autopilot:
+    """Flies one mission with one vehicle. All memory is allocated here; `tick` only writes into it."""
+
+    def __init__(self, vehicle: Vehicle, mission: Mission, C: np.ndarray, source: str = "mission"):
+        self.P = vehicle.vector()
+        self.C = C
+        self.legs = mission.matrix(vehicle, source)
+        self.frame = empty_frame()
+        self.est = np.zeros(layout.N_EST)
+        self.ap = np.zeros(layout.N_AP)
+        self.commands = np.zeros(3)
+        core.reset(self.est, self.ap)
+
+    def tick(self, t: float) -> np.ndarray:
+        """Take self.frame at time t (s) and return the commands: servo rad, slider m, ballast kg (its own array)."""
+        core.tick(self.P, self.C, self.legs, self.frame, self.est, self.ap, self.commands, t)
+        return self.commands
+
+    @property
+    def mode(self) -> str:
+        return MODES[float(self.ap[layout.MODE])]
+
+    @property
+    def reason(self) -> str:
+        """Why the dive was given up, with the leg; empty if it was not."""
+        reason = REASONS[float(self.ap[layout.REASON])]
+        if self.ap[layout.REASON] == layout.REASON_LEG_TIME:
+            row = int(self.ap[layout.LEG])
+            target = self.legs[row, layout.LEG_DEPTH]
+            limit = self.legs[row, layout.LEG_TIME_LIMIT]
+            return f"leg {row + 1}: not at {target:g} m within {limit:g} s"
+        return reason
+
+    @property
+    def finished(self) -> bool:
+        """True once the mission is completed or given up."""
+        return bool(self.ap[layout.MODE] >= layout.COMPLETED)
+
+    def leg_text(self) -> str:
+        """The leg being flown, for a person."""
+        row = int(self.ap[layout.LEG])
+        depth = self.legs[row, layout.LEG_DEPTH]
+        to = f"to {depth:g} m" if math.isfinite(depth) else f"for {self.legs[row, layout.LEG_DURATION]:g} s"
+        return f"leg {row + 1}/{len(self.legs)} {to}"

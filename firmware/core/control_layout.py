@@ -1,0 +1,60 @@
+"""Where things stand in the autopilot's vectors: C its configuration, est what it believes, ap what it remembers.
+
+Missions come as a matrix, one row a leg. SI and radians.
+"""
+
+# --- C: configuration -----------------------------------------------------------------------------------------------
+DT = 0                                               # s, the loop's step
+PITCH_KP, PITCH_KI, PITCH_KD = 1, 2, 3               # m/rad, m/(rad s), m s/rad
+DEPTH_KP, DEPTH_KI, DEPTH_KD = 4, 5, 6               # kg/m, kg/(m s), kg s/m
+ROLL_KP, ROLL_KD = 7, 8                              # rad/rad, s
+PITCH_WN, PITCH_ZETA = 9, 10                         # rad/s, 1: reference filters
+DEPTH_WN, DEPTH_ZETA = 11, 12
+ROLL_WN, ROLL_ZETA = 13, 14
+DEPTH_FILTER_WN = 15                                 # rad/s, bandwidth of the depth rate observer
+MAX_AGE_IMU, MAX_AGE_BEACON, MAX_AGE_WIRE = 16, 17, 18   # s, older samples are not used
+ABORT_AGE = 19                                       # s without IMU or beacon before the dive is given up
+SALINITY = 20                                        # PSU
+SURFACE_PRESSURE = 21                                # Pa
+SITE_DEPTH = 22                                      # m; 0: unknown
+MISSION_TIME_LIMIT = 23                              # s
+N_C = 24
+
+# --- est: the estimate ----------------------------------------------------------------------------------------------
+EST_DEPTH, EST_DEPTH_RATE = 0, 1
+EST_ROLL, EST_PITCH, EST_YAW = 2, 3, 4
+EST_P, EST_Q, EST_R = 5, 6, 7
+EST_SLIDER, EST_BALLAST = 8, 9
+EST_DENSITY = 10
+EST_IMU_TIME, EST_BEACON_TIME = 11, 12               # time of the newest sample used
+EST_SLIDER_TIME, EST_PLUNGER_TIME = 13, 14
+EST_STARTED = 15                                     # 1 once IMU and beacon have both been seen
+EST_DEPTH_MEASURED = 16                              # m, of the newest beacon sample, before any filter
+N_EST = 17
+
+# --- legs: one row each ---------------------------------------------------------------------------------------------
+LEG_DEPTH = 0                                        # m, target; NaN: the leg lasts LEG_DURATION
+LEG_PITCH, LEG_ROLL = 1, 2                           # rad
+LEG_BALLAST = 3                                      # kg held; NaN: the depth loop commands it
+LEG_TIME_LIMIT = 4                                   # s
+LEG_HOLD = 5                                         # s at the depth before the leg is done
+LEG_TOLERANCE = 6                                    # m
+LEG_DURATION = 7                                     # s; NaN for a depth leg
+N_LEG = 8
+
+# --- ap: the autopilot's memory -------------------------------------------------------------------------------------
+MODE, LEG, LEG_START, REACHED = 0, 1, 2, 3
+REF_DEPTH, REF_DEPTH_RATE, REF_DEPTH_ACC = 4, 5, 6
+REF_PITCH, REF_PITCH_RATE, REF_PITCH_ACC = 7, 8, 9
+REF_ROLL, REF_ROLL_RATE, REF_ROLL_ACC = 10, 11, 12
+INT_PITCH, INT_DEPTH = 13, 14                        # integrators, m and kg
+SENT_SERVO, SENT_SLIDER, SENT_BALLAST = 15, 16, 17   # last commands sent
+REASON = 18
+LEG_DEPTH_START = 19                                 # m, depth at which the leg began
+MISSION_START = 20                                   # s
+N_AP = 24
+
+# --- modes and reasons ----------------------------------------------------------------------------------------------
+WAITING, FLYING, COMPLETED, ABORTED = 0.0, 1.0, 2.0, 3.0
+REASON_NONE, REASON_LEG_TIME, REASON_MISSION_TIME = 0.0, 1.0, 2.0
+REASON_IMU, REASON_BEACON, REASON_TOO_DEEP = 3.0, 4.0, 5.0

@@ -1,0 +1,132 @@
+"""The fixed step: read the ports, tick the autopilot, command the actuators, hand over to the recorder.
+
+Deadlines are absolute, so a late tick does not shift those after it. Time comes from the board's clock, real or
+simulated; the code is the same. Nothing is allocated inside a tick but a few boxed numbers that live as long as it.
+"""
+
+import copy
+import gc
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from firmware.autopilot import Autopilot
+from firmware.core import telemetry as record
+from firmware.core.jit import freeze_kernels, thaw_kernels
+from hal.ports import SLOTS, Board
+
+HISTOGRAM_EDGES = np.array([0.0, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, np.inf])  # s
+
+
+@dataclass
+class Timing:
+    """How punctual the loop was."""
+
+    ticks: int = 0
+    missed: int = 0
+    worst_s: float = 0.0
+    counts: np.ndarray = field(default_factory=lambda: np.zeros(len(HISTOGRAM_EDGES) - 1, dtype=np.int64))
+
+    def histogram(self) -> dict[str, int]:
+        """Ticks by lateness, keys the upper edges in s."""
+        return {f"<{edge:g}": int(n) for edge, n in zip(HISTOGRAM_EDGES[1:], self.counts, strict=True)}
+
+
+class Runtime:
+    """Runs an autopilot on a board. `tick` is one step; `run` steps until the mission ends."""
+
+    def __init__(
+        self, board: Board, autopilot: Autopilot, channel: Any, *, extras: tuple[Callable[[float], None], ...] = ()
+    ):
+        self.board, self.autopilot, self.channel = board, autopilot, channel
+        self.dt = 1.0 / board.loop_hz
+        self.timing = Timing()
+        self.extras = extras
+        self._clock = board.clock
+        frame = autopilot.frame
+        self._reads = tuple(
+            (port.read, frame[slot.all])
+            for name, slot in SLOTS.items()
+            if (port := getattr(board, name)) is not None
+        )
+        self._send = (board.servo.command, board.slider.command, board.ballast.command)
+        self._edges = HISTOGRAM_EDGES[1:-1].tolist()
+        self._counts = self.timing.counts
+        self._deadline = 0.0
+        self._last_duration = 0.0
+
+    def arm(self) -> None:
+        """Make everything that a flight needs exist: kernels loaded, collector off, no compilation from here on."""
+        rehearsal = copy.deepcopy(self.autopilot)
+        rehearsal.tick(0.0)
+        scratch = np.zeros(record.N_RECORD)
+        record.fill_record(
+            rehearsal.frame, rehearsal.est, rehearsal.ap, rehearsal.commands, 0.0, 0.0, 0.0, scratch
+        )
+        freeze_kernels()
+        gc.collect()
+        gc.freeze()
+        gc.disable()
+        self._deadline = self._clock.now()
+
+    def disarm(self) -> None:
+        """Give the process back its collector and compiler."""
+        gc.enable()
+        gc.unfreeze()
+        thaw_kernels()
+
+    def tick(self) -> None:
+        """Wait for the deadline, then do one step."""
+        clock, autopilot, channel = self._clock, self.autopilot, self.channel
+        deadline = self._deadline
+        clock.sleep_until(deadline)
+        t = clock.now()
+        lateness = t - deadline
+        for read, slot in self._reads:
+            read(slot)
+        commands = autopilot.tick(t)
+        for i in (0, 1, 2):
+            commands[i] = self._send[i](commands[i])
+        record.fill_record(
+            autopilot.frame, autopilot.est, autopilot.ap, commands, t, lateness, self._last_duration, channel.values
+        )
+        channel.commit(t)
+        for extra in self.extras:
+            extra(t)
+        self._count(lateness)
+        self._last_duration = clock.now() - t
+        self._deadline = deadline + self.dt
+        if lateness > self.dt:
+            self._skip(t)
+
+    def _count(self, lateness: float) -> None:
+        timing = self.timing
+        timing.ticks += 1
+        if lateness > timing.worst_s:
+            timing.worst_s = lateness
+        bin_ = 0
+        for edge in self._edges:
+            if lateness < edge:
+                break
+            bin_ += 1
+        self._counts[bin_] += 1
+
+    def _skip(self, t: float) -> None:
+        """Pass over the deadlines that are gone, and count them as missed."""
+        behind = int((t - self._deadline) / self.dt) + 1
+        if behind > 0:
+            self.timing.missed += behind
+            self._deadline += behind * self.dt
+
+    def run(self, *, until: float = float("inf"), on_second: Callable[[float], None] | None = None) -> Timing:
+        """Tick until the mission is completed or given up, or until `until` (s); on_second(t) once a second."""
+        autopilot = self.autopilot
+        shown = 0.0
+        while not autopilot.finished and self._deadline < until:
+            self.tick()
+            if on_second is not None and self._deadline >= shown:
+                on_second(self._deadline)
+                shown += 1.0
+        return self.timing

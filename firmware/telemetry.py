@@ -1,0 +1,49 @@
+"""Names, units and meaning of what a flight records each tick. The places are those of core/telemetry."""
+
+from hal.recorder.schema import Field, RecordSpec
+
+from firmware.core.telemetry import N_RECORD
+
+_FIELDS = (
+    ("t_s", "s", "time since the start of the flight, onboard clock"),
+    ("cmd_servo_rad", "rad", "servo command sent"),
+    ("cmd_slider_m", "m", "slider command sent"),
+    ("cmd_ballast_kg", "kg", "ballast command sent"),
+    ("slider_m", "m", "slider draw-wire, new samples only"),
+    ("ballast_kg", "kg", "net ballast mass from the plunger's draw-wire and the water's density"),
+    ("roll_rad", "rad", "IMU roll"),
+    ("pitch_rad", "rad", "IMU pitch"),
+    ("yaw_rad", "rad", "IMU yaw"),
+    ("p_rad_s", "rad/s", "gyro about x"),
+    ("q_rad_s", "rad/s", "gyro about y"),
+    ("r_rad_s", "rad/s", "gyro about z"),
+    ("depth_m", "m", "depth from pressure"),
+    ("est_depth_m", "m", "filtered depth"),
+    ("est_depth_rate_m_s", "m/s", "filtered depth rate"),
+    ("ref_depth_m", "m", "reference depth"),
+    ("ref_depth_rate_m_s", "m/s", "reference depth rate"),
+    ("ref_pitch_rad", "rad", "reference pitch"),
+    ("ref_pitch_rate_rad_s", "rad/s", "reference pitch rate"),
+    ("ref_roll_rad", "rad", "reference roll"),
+    ("ref_roll_rate_rad_s", "rad/s", "reference roll rate"),
+    ("int_pitch_m", "m", "integrator of the pitch loop"),
+    ("int_depth_kg", "kg", "integrator of the depth loop"),
+    ("mode", "1", "0 waiting, 1 flying, 2 completed, 3 aborted"),
+    ("leg", "1", "leg being flown, from 0"),
+    ("reason", "1", "why the dive was given up; firmware/core/control_layout.py"),
+    ("lateness_s", "s", "start of the tick after its deadline"),
+    ("duration_s", "s", "time the tick before this one took"),
+    ("density_kg_m3", "kg/m3", "water density from pressure and temperature"),
+    ("pressure_pa", "Pa", "absolute pressure at the beacon"),
+    ("temperature_c", "deg C", "water temperature at the beacon"),
+    ("imu_time_s", "s", "time of the newest IMU sample"),
+    ("beacon_time_s", "s", "time of the newest beacon sample"),
+    ("slider_time_s", "s", "time of the newest slider draw-wire sample"),
+    ("plunger_time_s", "s", "time of the newest plunger draw-wire sample"),
+)
+
+TICK = RecordSpec(
+    "/tick", "glider/Tick", tuple(Field(name, unit=unit, description=text) for name, unit, text in _FIELDS)
+)
+
+assert len(_FIELDS) == N_RECORD

@@ -1,0 +1,135 @@
+"""The ports between the flight software and whatever carries it: narrow protocols, one sample frame, a clock.
+
+Every sensor port writes its newest sample into a slot of the frame, a preallocated float64 vector that belongs to the
+loop. A slot is [time, validity, value ...]: the time of the measurement on the board's clock (s), a Validity, then the
+values in SI. Nothing is allocated to read, and the compiled autopilot takes the frame as it is. A device that is
+unplugged in flight writes its validity and never raises; it raises when it is opened.
+"""
+
+from enum import IntEnum
+from typing import NamedTuple, Protocol, runtime_checkable
+
+import numpy as np
+
+
+class Validity(IntEnum):
+    """What a sample is worth. Stored as a float in the frame."""
+
+    MISSING = 0  # the device has not answered yet
+    VALID = 1
+    STALE = 2  # the last answer is older than the device's period allows
+    FAULT = 3  # the device answers, but says that its value is wrong
+
+
+class Slot(NamedTuple):
+    """A port's place in the frame: start, names of its values and their units."""
+
+    start: int
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+
+    @property
+    def time(self) -> int:
+        return self.start
+
+    @property
+    def validity(self) -> int:
+        return self.start + 1
+
+    @property
+    def values(self) -> slice:
+        return slice(self.start + 2, self.start + 2 + len(self.names))
+
+    @property
+    def all(self) -> slice:
+        return slice(self.start, self.start + 2 + len(self.names))
+
+
+# Where each slot begins: plain integers, because the kernels freeze them.
+IMU, BEACON, SLIDER_WIRE, PLUNGER_WIRE, LEAK, BATTERY = 0, 8, 12, 15, 18, 21
+FRAME_SIZE = 24
+
+SLOTS = {
+    "imu": Slot(IMU, ("roll", "pitch", "yaw", "p", "q", "r"), ("rad",) * 3 + ("rad/s",) * 3),
+    "beacon": Slot(BEACON, ("pressure", "temperature_c"), ("Pa", "deg C")),
+    "slider_wire": Slot(SLIDER_WIRE, ("slider",), ("m",)),
+    "plunger_wire": Slot(PLUNGER_WIRE, ("plunger",), ("m",)),
+    "leak": Slot(LEAK, ("wet",), ("1",)),
+    "battery": Slot(BATTERY, ("voltage",), ("V",)),
+}
+
+
+def empty_frame() -> np.ndarray:
+    """A frame in which every sample is missing, shape (FRAME_SIZE,)."""
+    frame = np.full(FRAME_SIZE, np.nan)
+    for slot in SLOTS.values():
+        frame[slot.validity] = Validity.MISSING
+    return frame
+
+
+@runtime_checkable
+class SensorPort(Protocol):
+    """A sensor: IMU (roll, pitch, yaw, p, q, r), beacon (pressure, temperature), a draw-wire, leak, battery."""
+
+    def read(self, out: np.ndarray) -> None:
+        """Write the newest sample [time, validity, values ...] into `out`, the port's slot of the frame."""
+
+
+@runtime_checkable
+class ActuatorPort(Protocol):
+    """Servo (rad), slider (m) or ballast pump (kg of net mass, from which the driver makes plunger travel)."""
+
+    def command(self, value: float) -> float:
+        """Ask for a position; returns what was really sent after the device's own limits."""
+
+
+@runtime_checkable
+class Clock(Protocol):
+    """Time is a device too: real, or simulated and then moved by whoever waits."""
+
+    def now(self) -> float:
+        """Seconds since the board was opened, never running back."""
+
+    def sleep_until(self, deadline: float) -> None:
+        """Wait until `deadline` on this clock."""
+
+
+@runtime_checkable
+class DropWeight(Protocol):
+    def release(self) -> None:
+        """Let the drop weight go. Cannot be taken back."""
+
+
+@runtime_checkable
+class HardwareWatchdog(Protocol):
+    def feed(self) -> None:
+        """Hold off the hardware watchdog for one more of its periods."""
+
+
+class Board(Protocol):
+    """A vehicle's hardware, or what stands in for it. Optional devices are None."""
+
+    name: str
+    loop_hz: float
+    clock: Clock
+    imu: SensorPort
+    beacon: SensorPort
+    slider_wire: SensorPort
+    plunger_wire: SensorPort
+    leak: SensorPort | None
+    battery: SensorPort | None
+    servo: ActuatorPort
+    slider: ActuatorPort
+    ballast: ActuatorPort
+    drop_weight: DropWeight | None
+    watchdog: HardwareWatchdog | None
+
+    def open(self) -> None:
+        """Open the devices; raises BoardError naming the device that does not answer."""
+
+    def close(self) -> None:
+        """Close the devices. Never raises."""
+
+
+class BoardError(RuntimeError):
+    """A board or one of its devices cannot be used; str() names the device and what is wrong."""

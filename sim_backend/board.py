@@ -1,0 +1,160 @@
+"""The simulated board: the ports of a real one, moved by the plant. Its `world` is the way in for tests and physics."""
+
+from typing import Annotated, Any
+
+import msgspec
+import numpy as np
+from hal.recorder.schema import Field, RecordSpec
+
+from firmware.core.rotations import euler_from_quaternion
+from firmware.model.strict import Table, decode
+from hal.board import BoardRequest
+from hal.clocks import MonotonicClock
+from hal.ports import SLOTS
+from sim_backend.world import Environment, SampledSensors, Start, World, build_world
+
+TRUTH = RecordSpec(
+    "/truth",
+    "glider/Truth",
+    tuple(
+        Field(name, unit=unit, description=text)
+        for name, unit, text in (
+            ("t_s", "s", "time of the simulated world"),
+            ("true_x_m", "m", "north"),
+            ("true_y_m", "m", "east"),
+            ("true_z_m", "m", "down"),
+            ("true_roll_rad", "rad", "roll"),
+            ("true_pitch_rad", "rad", "pitch"),
+            ("true_yaw_rad", "rad", "yaw"),
+            ("true_u_m_s", "m/s", "surge through the water"),
+            ("true_v_m_s", "m/s", "sway through the water"),
+            ("true_w_m_s", "m/s", "heave through the water"),
+            ("true_p_rad_s", "rad/s", "roll rate"),
+            ("true_q_rad_s", "rad/s", "pitch rate"),
+            ("true_r_rad_s", "rad/s", "yaw rate"),
+            ("true_servo_rad", "rad", "servo angle"),
+            ("true_slider_m", "m", "slider position"),
+            ("true_ballast_kg", "kg", "net ballast mass"),
+        )
+    ),
+)
+
+
+class SimBoardFile(Table):
+    """A board file of kind "sim"."""
+
+    format: Annotated[int, msgspec.Meta(ge=1, le=1)]
+    kind: str
+    loop_hz: Annotated[float, msgspec.Meta(gt=0.0, le=100.0)] = 50.0
+    sensors: SampledSensors = SampledSensors()
+    environment: Environment = Environment()
+    start: Start = Start()
+    effects: dict[str, dict[str, float]] = msgspec.field(default_factory=dict)
+
+
+class SimulatedSensor:
+    """A sensor whose newest delivered sample the world keeps in its frame."""
+
+    def __init__(self, slot: np.ndarray):
+        self._slot = slot
+
+    def read(self, out: np.ndarray) -> None:
+        out[:] = self._slot
+
+
+class SimulatedActuator:
+    """An actuator of the plant: takes a command within its range and says what it took."""
+
+    def __init__(self, commands: np.ndarray, index: int, limits: tuple[float, float]):
+        self._commands, self._index = commands, index
+        self._low, self._high = limits
+
+    def command(self, value: float) -> float:
+        if value < self._low:
+            value = self._low
+        elif value > self._high:
+            value = self._high
+        self._commands[self._index] = value
+        return value
+
+
+class SimulatedClock:
+    """Time is the plant's: waiting moves the world."""
+
+    def __init__(self, world: World):
+        self._world = world
+        self._now = 0.0
+
+    def now(self) -> float:
+        return self._now
+
+    def sleep_until(self, deadline: float) -> None:
+        if deadline > self._now:
+            self._now = self._world.advance(deadline)
+
+
+class PacedClock(MonotonicClock):
+    """Real time that takes the simulated world with it."""
+
+    def __init__(self, world: World):
+        super().__init__()
+        self._world = world
+
+    def sleep_until(self, deadline: float) -> None:
+        super().sleep_until(deadline)
+        self._world.advance(deadline)
+
+
+class SimBoard:
+    """All devices of the nominal vehicle, simulated. Leak, battery, drop weight and watchdog are not fitted."""
+
+    leak = battery = drop_weight = watchdog = None
+
+    def __init__(self, file: SimBoardFile, world: World, vehicle: Any, *, realtime: bool):
+        self.name = "sim"
+        self.file, self.world, self.loop_hz = file, world, file.loop_hz
+        self.periods = {
+            "imu": 1.0 / file.sensors.imu.rate_hz,
+            "beacon": 1.0 / file.sensors.beacon.rate_hz,
+            "wires": 1.0 / min(file.sensors.slider_wire.rate_hz, file.sensors.plunger_wire.rate_hz),
+        }
+        self.surface_pressure = 101325.0
+        self.realtime = realtime
+        self.clock: SimulatedClock | PacedClock = SimulatedClock(world)
+        for name in ("imu", "beacon", "slider_wire", "plunger_wire"):
+            setattr(self, name, SimulatedSensor(world.frame[SLOTS[name].all]))
+        for index, name in enumerate(("servo", "slider", "ballast")):
+            setattr(self, name, SimulatedActuator(world.cmd, index, getattr(vehicle.actuators, name).range))
+
+    def open(self) -> None:
+        """Start the clock."""
+        if self.realtime:
+            self.clock = PacedClock(self.world)
+
+    def close(self) -> None:
+        """Nothing to close."""
+
+    def truth_recorder(self, channel):
+        """A function for the runtime that records the plant's true state into a channel of TRUTH, once a tick."""
+        x, values = self.world.x, channel.values
+
+        def record(t: float) -> None:
+            values[0] = t
+            values[1:4] = x[0:3]
+            values[4], values[5], values[6] = euler_from_quaternion(x[3], x[4], x[5], x[6])
+            values[7:16] = x[7:16]
+            channel.commit(t)
+
+        record(0.0)
+        return record
+
+
+def build_board(request: BoardRequest) -> SimBoard:
+    """A simulated board from its file's text; floor and salinity are the mission site's where the file has none."""
+    file = decode(request.text, SimBoardFile, request.source)
+    environment = file.environment
+    if environment.floor_m == 0.0 and request.site_depth:
+        environment = msgspec.structs.replace(environment, floor_m=request.site_depth)
+    effects = {**file.effects, **request.effects}
+    world = build_world(request.vehicle, environment, file.sensors, file.start, request.seed, effects)
+    return SimBoard(file, world, request.vehicle, realtime=request.realtime)

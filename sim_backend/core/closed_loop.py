@@ -1,0 +1,72 @@
+"""Whole closed-loop flights in compiled code: world, sensors, autopilot and limits, one flight or many over all cores.
+
+The kernels are the ones that the real runtime calls; only the Python around them is gone.
+"""
+
+import numpy as np
+
+from firmware.core import control_layout as ctl
+from firmware.core.autopilot import reset, tick
+from firmware.core.jit import kernel, parallel_kernel, prange
+from firmware.core.layout import N_X
+from hal.ports import FRAME_SIZE
+from sim_backend.core import layout as at
+from sim_backend.core.world import advance, sample_sensors
+
+# what is kept of each logged tick
+TRACE = ("t", "depth", "pitch", "roll", "ref_depth", "ref_pitch", "ref_roll", "servo", "slider", "ballast")
+N_TRACE = 10
+# what is kept of each flight
+END_MODE, END_REASON, END_TIME, END_LEG = 0, 1, 2, 3
+N_END = 4
+
+
+@kernel
+def write_trace(t, est, ap, cmd, out):
+    """One logged tick: estimates, references and commands, in the order of TRACE."""
+    out[0] = t
+    out[1], out[2], out[3] = est[ctl.EST_DEPTH], est[ctl.EST_PITCH], est[ctl.EST_ROLL]
+    out[4], out[5], out[6] = ap[ctl.REF_DEPTH], ap[ctl.REF_PITCH], ap[ctl.REF_ROLL]
+    out[7], out[8], out[9] = cmd[0], cmd[1], cmd[2]
+
+
+@kernel
+def fly(P_plant, P, C, legs, E, waves, sensors, errors, seed, x, dt, max_ticks, every, trace, end):
+    """Fly one mission from state x (in place) until it ends or max_ticks are over; returns the ticks flown.
+
+    P_plant is the vehicle in the water, P the one the autopilot believes in. Every `every`-th tick goes into trace
+    (rows, N_TRACE) while it has rows; end (N_END,) says how the flight ended.
+    """
+    cmd, acc, frame = np.zeros(3), np.zeros(6), np.full(FRAME_SIZE, np.nan)
+    frame[:] = 0.0
+    counters = np.zeros(at.N_C, dtype=np.int64)
+    counters[at.C_HOLD] = -1
+    ring = np.zeros((at.N_SENSORS, at.RING, at.RING_WIDTH))
+    work = np.zeros((5, N_X))
+    est, ap = np.zeros(ctl.N_EST), np.zeros(ctl.N_AP)
+    reset(est, ap)
+    sample_sensors(P_plant, E, sensors, errors, seed, x, 0.0, counters, ring)
+    ticks, t = 0, 0.0
+    while ticks < max_ticks and ap[ctl.MODE] < ctl.COMPLETED:
+        t = ticks * C[ctl.DT]
+        advance(P_plant, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, frame, work, dt, t)
+        tick(P, C, legs, frame, est, ap, cmd, t)
+        if ticks % every == 0 and ticks // every < trace.shape[0]:
+            write_trace(t, est, ap, cmd, trace[ticks // every])
+        ticks += 1
+    end[END_MODE], end[END_REASON], end[END_TIME], end[END_LEG] = ap[ctl.MODE], ap[ctl.REASON], t, ap[ctl.LEG]
+    return ticks
+
+
+@parallel_kernel
+def fly_many(P_plants, P, C, legs, Es, waves, sensors, errors, seeds, xs, dt, max_ticks, every, traces, ends, ticks):
+    """`fly` for every row of P_plants, Es, errors, seeds and xs, shared out over all cores.
+
+    Shapes: P_plants (n, N_P), Es (n, N_E), errors (n, 2, N_ERRORS), seeds (n,) uint64, xs (n, N_X), traces
+    (n, rows, N_TRACE), ends (n, N_END), ticks (n,) int64. A flight does not depend on how many fly beside it.
+    """
+    for i in prange(P_plants.shape[0]):
+        ticks[i] = fly(
+            P_plants[i], P, C, legs, Es[i], waves, sensors, errors[i], seeds[i], xs[i], dt, max_ticks, every,
+            traces[i], ends[i],
+        )  # fmt: skip

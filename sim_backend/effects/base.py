@@ -1,0 +1,77 @@
+"""Effects: differences between the plant and the nominal vehicle, each a small file in this folder.
+
+A file defines EFFECT: its label and place as in the catalogue of causes, its parameters with unit and range, and
+`apply(world, **values)`, which adds it to a world. Effects go together in any number. `docs/EFFECTS.md` says how to add
+one.
+"""
+
+import importlib
+import pkgutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of an effect: 0 (or `default`) is no effect; `spread` is a plausible size, 1 sigma."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    spread: float
+    default: float = 0.0
+
+
+@dataclass(frozen=True)
+class Effect:
+    """An unmodelled effect: what it is called, where it sits, what sizes it, and how it changes a world."""
+
+    label: str
+    subsystem: str
+    element: str
+    summary: str
+    parameters: tuple[Parameter, ...]
+    apply: Callable[..., None]
+
+
+class EffectError(ValueError):
+    """An effect or one of its parameters is not known or not possible."""
+
+
+@cache
+def catalogue() -> dict[str, Effect]:
+    """All effects by label, found in this folder."""
+    package = importlib.import_module("sim_backend.effects")
+    found = {}
+    for info in pkgutil.iter_modules(package.__path__):
+        if info.name == "base":
+            continue
+        effect = importlib.import_module(f"sim_backend.effects.{info.name}").EFFECT
+        found[effect.label] = effect
+    return dict(sorted(found.items()))
+
+
+def check_values(label: str, values: dict[str, float]) -> dict[str, float]:
+    """The effect's parameters with defaults filled in; EffectError names what is wrong."""
+    effects = catalogue()
+    if label not in effects:
+        raise EffectError(f"no effect '{label}'; known: {', '.join(effects)}")
+    known = {parameter.name: parameter for parameter in effects[label].parameters}
+    for name, value in values.items():
+        if name not in known:
+            raise EffectError(f"effect {label} has no parameter '{name}'; it has {', '.join(known)}")
+        parameter = known[name]
+        if not parameter.low <= value <= parameter.high:
+            raise EffectError(
+                f"effect {label}: {name} = {value} is outside {parameter.low} to {parameter.high} {parameter.unit}"
+            )
+    return {name: values.get(name, parameter.default) for name, parameter in known.items()}
+
+
+def apply_effects(world: Any, effects: dict[str, dict[str, float]]) -> None:
+    """Add the effects to a world that has not begun to move."""
+    for label, values in effects.items():
+        catalogue()[label].apply(world, **check_values(label, values))

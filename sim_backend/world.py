@@ -1,0 +1,176 @@
+"""A simulated world: a vehicle that may differ from its file, an environment, sensors with noise, rate and delay."""
+
+import math
+from dataclasses import dataclass, field
+from typing import Annotated
+
+import msgspec
+import numpy as np
+
+from firmware.core.layout import N_X, X_ACT, X_NU, X_POS, X_QUAT
+from firmware.core.rotations import quaternion_from_euler
+from firmware.core.seawater import water_density
+from firmware.model.strict import Table
+from firmware.model.vehicle import Vehicle
+from hal.ports import empty_frame
+from sim_backend.core import layout
+from sim_backend.core import world as core
+from sim_backend.effects.base import apply_effects
+
+GRAVITY = 9.80665
+PLANT_STEP = 0.01  # s
+SpeedPair = tuple[float, float]
+
+
+class Wave(Table):
+    """One component of the sea: height crest to trough (m), period (s), the direction it runs to (deg from north)."""
+
+    height_m: Annotated[float, msgspec.Meta(ge=0.0, le=20.0)]
+    period_s: Annotated[float, msgspec.Meta(gt=0.5, le=60.0)]
+    direction_deg: float = 0.0
+    phase_deg: float = 0.0
+
+
+class Environment(Table):
+    """[environment] of a simulated board. The disturbance is the vehicle file's unless one is given."""
+
+    current_m_s: SpeedPair = (0.0, 0.0)  # north, east, at the surface
+    shear_1_s: SpeedPair = (0.0, 0.0)  # change with depth
+    wave: list[Wave] = msgspec.field(default_factory=list)
+    surface: bool = True
+    floor_m: Annotated[float, msgspec.Meta(ge=0.0, le=12000.0)] = 0.0  # 0: none
+    temperature_c: Annotated[float, msgspec.Meta(ge=-2.0, le=40.0)] = 20.0
+    salinity: Annotated[float, msgspec.Meta(ge=0.0, le=42.0)] = 0.0
+    disturbance_linear: Annotated[float, msgspec.Meta(ge=0.0)] | None = None
+    disturbance_angular: Annotated[float, msgspec.Meta(ge=0.0)] | None = None
+
+
+class SampledSensor(Table):
+    """Rate (Hz) and delay (s) with which a sensor's samples arrive."""
+
+    rate_hz: Annotated[float, msgspec.Meta(gt=0.0, le=100.0)]
+    delay_s: Annotated[float, msgspec.Meta(ge=0.0, le=0.5)] = 0.0
+
+
+class SampledSensors(Table):
+    """[sensors] of a simulated board."""
+
+    imu: SampledSensor = SampledSensor(rate_hz=100.0, delay_s=0.01)
+    beacon: SampledSensor = SampledSensor(rate_hz=25.0, delay_s=0.02)
+    slider_wire: SampledSensor = SampledSensor(rate_hz=25.0, delay_s=0.02)
+    plunger_wire: SampledSensor = SampledSensor(rate_hz=25.0, delay_s=0.02)
+
+
+class Start(Table):
+    """[start]: where the simulated vehicle begins. Depth m, angles deg, surge m/s."""
+
+    depth_m: Annotated[float, msgspec.Meta(ge=0.0, le=10000.0)] = 0.3
+    pitch_deg: Annotated[float, msgspec.Meta(ge=-80.0, le=80.0)] = 0.0
+    heading_deg: float = 0.0
+    surge_m_s: float = 0.0
+
+
+def _wave_rows(waves: list[Wave]) -> np.ndarray:
+    rows = np.zeros((len(waves), layout.N_WAVE))
+    for row, wave in zip(rows, waves, strict=True):
+        omega = 2.0 * math.pi / wave.period_s
+        k = omega * omega / GRAVITY  # deep water
+        direction = math.radians(wave.direction_deg)
+        row[:] = (
+            0.5 * wave.height_m, omega, k * math.cos(direction), k * math.sin(direction), math.radians(wave.phase_deg),
+        )  # fmt: skip
+    return rows
+
+
+@dataclass
+class World:
+    """Arrays of one world; `advance` moves them. Everything random comes from `seed`, by counting."""
+
+    P: np.ndarray
+    E: np.ndarray
+    waves: np.ndarray
+    sensors: np.ndarray
+    errors: np.ndarray
+    seed: np.uint64
+    x: np.ndarray
+    dt: float = PLANT_STEP
+    cmd: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    acc: np.ndarray = field(default_factory=lambda: np.zeros(6))
+    counters: np.ndarray = field(default_factory=lambda: np.zeros(layout.N_C, dtype=np.int64))
+    ring: np.ndarray = field(
+        default_factory=lambda: np.zeros((layout.N_SENSORS, layout.RING, layout.RING_WIDTH))
+    )
+    frame: np.ndarray = field(default_factory=empty_frame)
+    work: np.ndarray = field(default_factory=lambda: np.zeros((5, N_X)))
+
+    def __post_init__(self):
+        self.counters[layout.C_HOLD] = -1
+        self.counters[layout.C_SAMPLES] = 0
+        core.sample_sensors(
+            self.P, self.E, self.sensors, self.errors, self.seed, self.x, 0.0, self.counters, self.ring
+        )
+
+    @property
+    def time(self) -> float:
+        return float(self.counters[layout.C_STEP]) * self.dt
+
+    def advance(self, t_end: float) -> float:
+        """Move to t_end (s), under the commands in self.cmd; samples that have arrived are in self.frame."""
+        return core.advance(
+            self.P, self.E, self.waves, self.sensors, self.errors, self.seed, self.x, self.cmd, self.acc,
+            self.counters, self.ring, self.frame, self.work, self.dt, t_end,
+        )  # fmt: skip
+
+
+def start_state(start: Start) -> np.ndarray:
+    """Plant state (N_X,) of a vehicle at rest or gliding ahead, actuators neutral."""
+    x = np.zeros(N_X)
+    x[X_POS + 2] = start.depth_m
+    x[X_QUAT : X_QUAT + 4] = quaternion_from_euler(0.0, math.radians(start.pitch_deg), math.radians(start.heading_deg))
+    x[X_NU] = start.surge_m_s
+    x[X_ACT : X_ACT + 3] = 0.0
+    return x
+
+
+def sensor_errors(vehicle: Vehicle, rng: np.random.Generator) -> np.ndarray:
+    """Bias (drawn, row 0) and white noise (row 1) of the nine measured values, shape (2, N_ERRORS)."""
+    tables = vehicle.sensors
+    rows = [tables.attitude] * 3 + [tables.gyro] * 3 + [tables.depth, tables.slider, tables.ballast]
+    errors = np.zeros((2, layout.N_ERRORS))
+    errors[0] = [table.bias * rng.standard_normal() for table in rows]
+    errors[1] = [table.noise for table in rows]
+    return errors
+
+
+def build_world(
+    vehicle: Vehicle,
+    environment: Environment,
+    sensors: SampledSensors,
+    start: Start,
+    seed: int,
+    effects: dict[str, dict[str, float]] | None = None,
+) -> World:
+    """A world from its description; the same arguments give the same flight, bit for bit on one machine."""
+    rng = np.random.default_rng(np.random.SeedSequence([seed, 1]))
+    E = np.zeros(layout.N_E)
+    E[layout.CURRENT_N], E[layout.CURRENT_E] = environment.current_m_s
+    E[layout.SHEAR_N], E[layout.SHEAR_E] = environment.shear_1_s
+    E[layout.SURFACE_HEIGHT] = 0.16 if environment.surface else 0.0
+    E[layout.FLOOR_DEPTH] = environment.floor_m
+    linear, angular = environment.disturbance_linear, environment.disturbance_angular
+    E[layout.ACC_LINEAR] = vehicle.disturbance.linear if linear is None else linear
+    E[layout.ACC_ANGULAR] = vehicle.disturbance.angular if angular is None else angular
+    E[layout.TEMPERATURE_C], E[layout.SALINITY] = environment.temperature_c, environment.salinity
+    E[layout.SURFACE_PRESSURE] = 101325.0
+    E[layout.WATER_DENSITY] = water_density(0.0, environment.temperature_c, environment.salinity)
+    table = np.zeros((layout.N_SENSORS, layout.N_SENSOR_FIELDS))
+    for row, name in ((layout.S_IMU, "imu"), (layout.S_BEACON, "beacon"), (layout.S_SLIDER, "slider_wire"),
+                      (layout.S_PLUNGER, "plunger_wire")):  # fmt: skip
+        sensor = getattr(sensors, name)
+        table[row] = 1.0 / sensor.rate_hz, sensor.delay_s
+    world = World(
+        P=vehicle.vector(), E=E, waves=_wave_rows(environment.wave), sensors=table,
+        errors=sensor_errors(vehicle, rng), seed=np.uint64(rng.integers(0, 2**63)), x=start_state(start),
+    )  # fmt: skip
+    apply_effects(world, effects or {})
+    return world
