@@ -1,0 +1,268 @@
+"""The recorder, seen from the flight: start it, fill and commit records, close it.
+
+The file is written by a process of its own (writer.py); the flight hands its records over through shared memory and
+never waits for a disk. What is on the disk is at most half a second and one fsync behind.
+"""
+
+import contextlib
+import json
+import os
+import select
+import subprocess
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from hal.recorder import ring
+from hal.recorder.producer import Channel, Producer
+from hal.recorder.schema import RecordSpec, specs_to_json
+
+SLOTS = 2048  # twenty seconds of a hundred records a second
+SYNC_PERIOD_S = 0.5  # with the time an fsync takes, at most a second is lost when the power goes
+START_TIMEOUT_S = 20.0
+CLOSE_TIMEOUT_S = 20.0
+
+
+@dataclass(frozen=True)
+class RecorderReport:
+    """How a recording ended. `complete`: every record handed over is in a file that is closed and on the disk."""
+
+    written: int = 0
+    dropped: int = 0  # found no room
+    damaged: int = 0  # never became whole in the shared memory
+    disk_errors: int = 0
+    error: str = ""  # what the disk said last, if it did not recover
+    bytes: int = 0
+    complete: bool = True
+
+
+@dataclass(frozen=True)
+class RecorderHealth:
+    """A look at a recording under way."""
+
+    pending: int  # records handed over and not yet taken
+    written: int
+    dropped: int
+    damaged: int
+    disk_errors: int
+    errno: int  # 0 while the disk is well
+    alive: bool  # the recording process runs
+
+
+class Recorder:
+    """Records to a new file `path`; one thread calls it. A context manager: starts on entry, closes on exit."""
+
+    def __init__(
+        self,
+        path: str | os.PathLike,
+        specs: Sequence[RecordSpec],
+        *,
+        attachments: Mapping[str, str] | None = None,
+        metadata: Mapping[str, str] | None = None,
+        epoch_ns: int = 0,
+        slots: int = SLOTS,
+        sync_period_s: float = SYNC_PERIOD_S,
+    ):
+        """`attachments`: name -> text; `metadata`: name -> text; `epoch_ns` is the log time of t = 0.
+
+        ValueError where two specs share a topic.
+        """
+        self.path = Path(path)
+        specs = tuple(specs)
+        if len({spec.topic for spec in specs}) < len(specs):
+            raise ValueError("two kinds of record share a topic")
+        payload = max([ring.MIN_PAYLOAD, *(spec.width for spec in specs)])
+        layout = ring.Layout(slots, payload)
+        self._fd: int | None = ring.create_shared(layout.size)
+        self._producer = Producer(self._fd, layout, specs)
+        self._config = {
+            "path": os.path.abspath(self.path),
+            "fd": self._fd,
+            "slots": layout.slots,
+            "payload": layout.payload,
+            "specs": specs_to_json(specs),
+            "attachments": dict(attachments or {}),
+            "metadata": {str(key): str(value) for key, value in (metadata or {}).items()},
+            "epoch_ns": epoch_ns,
+            "period_s": sync_period_s,
+        }
+        self._process: subprocess.Popen[bytes] | None = None
+        self._ready = False
+        self._report: RecorderReport | None = None
+
+    def channel(self, topic: str) -> Channel:
+        """The channel of a spec's topic; KeyError for another."""
+        return self._producer.channels[topic]
+
+    def event(self, time_s: float, severity: int, text: str) -> bool:
+        """Record a line of text, with a severity of schema.py; False where there was no room."""
+        return self._producer.event(time_s, severity, text)
+
+    def start(self, wait: bool = True) -> None:
+        """Start the recording process and wait until the file is there (or call wait_ready later, and do other things
+        meanwhile); OSError where it cannot be written, FileExistsError where it is there already."""
+        if self._fd is None:
+            raise RuntimeError("this recorder was started before")
+        root = Path(__file__).resolve().parents[2]
+        paths = [str(root), *filter(None, [os.environ.get("PYTHONPATH")])]
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "hal.recorder.writer"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            pass_fds=(self._fd,),
+            start_new_session=True,  # what a terminal sends to the flight does not reach it
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+        )
+        os.close(self._fd)  # both sides have it mapped, or inherited
+        self._fd = None
+        assert self._process.stdin is not None
+        try:
+            self._process.stdin.write(json.dumps({**self._config, "parent": os.getpid()}).encode() + b"\n")
+            self._process.stdin.flush()
+        except BrokenPipeError:
+            pass  # wait_ready says so
+        if wait:
+            self.wait_ready()
+
+    def wait_ready(self) -> None:
+        """Wait until the file is there; OSError as `start`."""
+        if self._ready:
+            return
+        result = self._answer(START_TIMEOUT_S)
+        if result is None:
+            self._end_process()
+            raise OSError(0, "the recording process did not start", str(self.path))
+        if "error" in result:
+            self._end_process()
+            raise OSError(result["error"], result["message"], str(self.path))
+        self._ready = True
+
+    def health(self) -> RecorderHealth:
+        """How it goes; a few system calls, not for every tick."""
+        control = self._producer.control
+        return RecorderHealth(
+            pending=control[ring.HEAD] - control[ring.TAIL],
+            written=control[ring.WRITTEN],
+            dropped=control[ring.DROPPED],
+            damaged=control[ring.DAMAGED],
+            disk_errors=control[ring.DISK_ERRORS],
+            errno=control[ring.LAST_ERRNO],
+            alive=self._process is not None and self._process.poll() is None,
+        )
+
+    def close(self, ending: Mapping[str, str] | None = None) -> RecorderReport:
+        """Have everything written and the log closed, with how the flight ended; a second call answers the same."""
+        if self._report is not None:
+            return self._report
+        if self._process is None or not self._ready:
+            self._report = RecorderReport(complete=False, error="never started")
+            self._end_process()
+            return self._report
+        assert self._process.stdin is not None
+        try:
+            texts = {str(key): str(value) for key, value in (ending or {}).items()}
+            self._process.stdin.write(json.dumps(texts).encode() + b"\n")
+            self._process.stdin.flush()
+        except BrokenPipeError:
+            pass  # it is dead: no answer will come
+        result = self._answer(CLOSE_TIMEOUT_S)
+        health = self.health()
+        self._end_process()
+        if result is None:
+            self._report = RecorderReport(
+                written=health.written,
+                dropped=health.dropped + health.pending,
+                damaged=health.damaged,
+                disk_errors=health.disk_errors,
+                error="the recording process died or hung",
+                complete=False,
+            )
+        else:
+            self._report = RecorderReport(**result)
+        return self._report
+
+    def _answer(self, timeout_s: float) -> dict | None:
+        """The next line from the recording process; None where it died or is silent for too long."""
+        assert self._process is not None
+        assert self._process.stdout is not None
+        fd, data = self._process.stdout.fileno(), b""
+        deadline = time.monotonic() + timeout_s
+        while not data.endswith(b"\n"):
+            ready, _, _ = select.select([fd], [], [], max(0.0, deadline - time.monotonic()))
+            piece = os.read(fd, 65_536) if ready else b""
+            if not piece:
+                return None
+            data += piece
+        return json.loads(data)
+
+    def _end_process(self) -> None:
+        if self._fd is not None:
+            os.close(self._fd)
+            self._fd = None
+        if self._process is None:
+            return
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        for pipe in (self._process.stdin, self._process.stdout):
+            with contextlib.suppress(BrokenPipeError):
+                pipe.close()
+        try:
+            self._process.wait(2.0)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    def __enter__(self) -> "Recorder":
+        self.start()
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+
+class NullChannel:
+    """A channel to nowhere."""
+
+    def __init__(self, spec: RecordSpec):
+        self.spec = spec
+        self.values = np.full(spec.width, np.nan)
+
+    def commit(self, time_s: float) -> bool:
+        return True
+
+
+class NullRecorder:
+    """A recorder that records nothing, for flights without a log."""
+
+    path: Path | None = None
+
+    def __init__(self, specs: Sequence[RecordSpec]):
+        self._channels = {spec.topic: NullChannel(spec) for spec in specs}
+
+    def channel(self, topic: str) -> NullChannel:
+        return self._channels[topic]
+
+    def event(self, time_s: float, severity: int, text: str) -> bool:
+        return True
+
+    def start(self, wait: bool = True) -> None:
+        return
+
+    def wait_ready(self) -> None:
+        return
+
+    def health(self) -> RecorderHealth:
+        return RecorderHealth(pending=0, written=0, dropped=0, damaged=0, disk_errors=0, errno=0, alive=True)
+
+    def close(self, ending: Mapping[str, str] | None = None) -> RecorderReport:
+        return RecorderReport()
+
+    def __enter__(self) -> "NullRecorder":
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        return
