@@ -20,8 +20,10 @@ REASONS = {
     layout.REASON_IMU: "no attitude",
     layout.REASON_BEACON: "no depth",
     layout.REASON_TOO_DEEP: "deeper than the site",
+    layout.REASON_OPERATOR: "asked to by the operator",
 }
 STANDARD_PRESSURE = 101325.0  # Pa
+SURFACED = 0.3  # m; shallower than this counts as at the surface
 
 
 def configuration(
@@ -101,6 +103,28 @@ class Autopilot:
     def finished(self) -> bool:
         """True once the mission is completed or given up."""
         return bool(self.ap[layout.MODE] >= layout.COMPLETED)
+
+    @property
+    def surfaced(self) -> bool:
+        """True where the vehicle is at the surface, by its own depth."""
+        return bool(self.est[layout.EST_DEPTH] < SURFACED)
+
+    def give_up(self) -> None:
+        """Abort, as the operator wishes: ballast out, nose up, to the surface."""
+        core.abort(self.ap, layout.REASON_OPERATOR)
+
+    def rms_errors(self) -> dict[str, float | None]:
+        """Root mean square of estimate less reference while flying: depth_m, pitch_rad, roll_rad (None: not controlled)."""
+        depth, attitude = self.ap[layout.COUNT_DEPTH], self.ap[layout.COUNT_ATTITUDE]
+
+        def rms(total: float, count: float) -> float | None:
+            return math.sqrt(total / count) if count else None
+
+        return {
+            "depth_m": rms(self.ap[layout.SUM_DEPTH], depth),
+            "pitch_rad": rms(self.ap[layout.SUM_PITCH], attitude),
+            "roll_rad": rms(self.ap[layout.SUM_ROLL], attitude),
+        }
 
     def leg_text(self) -> str:
         """The leg being flown, for a person."""

@@ -6,6 +6,7 @@ simulated; the code is the same. Nothing is allocated inside a tick but a few bo
 
 import copy
 import gc
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -18,6 +19,7 @@ from firmware.core.jit import freeze_kernels, thaw_kernels
 from hal.ports import SLOTS, Board
 
 HISTOGRAM_EDGES = np.array([0.0, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, np.inf])  # s
+ASCENT_LIMIT = 180.0  # s
 
 
 @dataclass
@@ -120,13 +122,21 @@ class Runtime:
             self.timing.missed += behind
             self._deadline += behind * self.dt
 
-    def run(self, *, until: float = float("inf"), on_second: Callable[[float], None] | None = None) -> Timing:
-        """Tick until the mission is completed or given up, or until `until` (s); on_second(t) once a second."""
+    def run(self, *, on_second: Callable[[float], None] | None = None, ascent_limit: float = ASCENT_LIMIT) -> Timing:
+        """Tick until the mission has ended, well or not, and the vehicle is at the surface.
+
+        on_second(t) is called once a second. After the mission's end the ascent has ascent_limit s.
+        """
         autopilot = self.autopilot
         shown = 0.0
-        while not autopilot.finished and self._deadline < until:
+        ended = math.inf
+        while True:
             self.tick()
-            if on_second is not None and self._deadline >= shown:
-                on_second(self._deadline)
-                shown += 1.0
-        return self.timing
+            now = self._deadline
+            if autopilot.finished:
+                ended = min(ended, now)
+                if autopilot.surfaced or now - ended > ascent_limit:
+                    return self.timing
+            if on_second is not None and now >= shown:
+                on_second(now)
+                shown = math.floor(now) + 1.0

@@ -43,7 +43,7 @@ _FIELDS = (
 )
 
 TICK = RecordSpec(
-    "/tick", "glider/Tick", tuple(Field(name, unit=unit, description=text) for name, unit, text in _FIELDS)
+    "/tick", "glider/msg/Tick", tuple(Field(name, unit=unit, description=text) for name, unit, text in _FIELDS)
 )
 
 assert len(_FIELDS) == N_RECORD

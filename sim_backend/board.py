@@ -15,7 +15,7 @@ from sim_backend.world import Environment, SampledSensors, Start, World, build_w
 
 TRUTH = RecordSpec(
     "/truth",
-    "glider/Truth",
+    "glider/msg/Truth",
     tuple(
         Field(name, unit=unit, description=text)
         for name, unit, text in (
@@ -37,6 +37,7 @@ TRUTH = RecordSpec(
             ("true_ballast_kg", "kg", "net ballast mass"),
         )
     ),
+    spare=True,
 )
 
 
@@ -127,7 +128,8 @@ class SimBoard:
             setattr(self, name, SimulatedActuator(world.cmd, index, getattr(vehicle.actuators, name).range))
 
     def open(self) -> None:
-        """Start the clock."""
+        """Load the world's kernels and start the clock."""
+        self.world.advance(0.0)
         if self.realtime:
             self.clock = PacedClock(self.world)
 

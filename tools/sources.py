@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
+from firmware.guidance.mission import Mission, decode_mission
 from firmware.model.library import shipped
 from firmware.model.vehicle import Vehicle, decode_vehicle
 from tools.errors import InputError
@@ -40,3 +41,9 @@ def _load(wanted: str, kind: str, folder: str, decode: Callable[[str, str], T], 
 def load_vehicle(wanted: str, base: Path | None = None) -> Vehicle:
     """A vehicle by shipped name or path; `base` is the folder of the file that names it."""
     return _load(wanted, "vehicle", "model/vehicles", decode_vehicle, base)
+
+
+def load_mission(wanted: str) -> tuple[str, str, Mission]:
+    """A mission by shipped name or path: its text, its source, and the mission."""
+    text, source = name_or_path(wanted, "mission", "guidance/missions")
+    return text, source, decode_mission(text, source)

@@ -154,6 +154,17 @@ def steer(P, C, legs, est, ap):
 
 
 @kernel
+def score(legs, est, ap):
+    """Add this tick's tracking errors up; depth only where the depth loop commands the ballast."""
+    if math.isnan(legs[int(ap[at.LEG]), at.LEG_BALLAST]):
+        ap[at.SUM_DEPTH] += (est[at.EST_DEPTH] - ap[at.REF_DEPTH]) ** 2
+        ap[at.COUNT_DEPTH] += 1.0
+    ap[at.SUM_PITCH] += (est[at.EST_PITCH] - ap[at.REF_PITCH]) ** 2
+    ap[at.SUM_ROLL] += (est[at.EST_ROLL] - ap[at.REF_ROLL]) ** 2
+    ap[at.COUNT_ATTITUDE] += 1.0
+
+
+@kernel
 def limit_commands(P, ap, servo, slider, ballast, dt, cmd):
     """Limits last: into cmd (3,) what may be sent, and into the memory what was."""
     cmd[0] = limited(servo, ap[at.SENT_SERVO], P[SERVO_MIN], P[SERVO_MAX], P[SERVO_RATE], dt)
@@ -174,6 +185,7 @@ def tick(P, C, legs, frame, est, ap, cmd, t):
     if ap[at.MODE] == at.FLYING:
         follow(C, legs, ap)
         servo, slider, ballast = steer(P, C, legs, est, ap)
+        score(legs, est, ap)
     elif ap[at.MODE] == at.WAITING:
         servo, slider, ballast = ap[at.SENT_SERVO], ap[at.SENT_SLIDER], ap[at.SENT_BALLAST]
     else:

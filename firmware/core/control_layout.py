@@ -52,9 +52,11 @@ SENT_SERVO, SENT_SLIDER, SENT_BALLAST = 15, 16, 17   # last commands sent
 REASON = 18
 LEG_DEPTH_START = 19                                 # m, depth at which the leg began
 MISSION_START = 20                                   # s
-N_AP = 24
+SUM_DEPTH, SUM_PITCH, SUM_ROLL = 21, 22, 23          # squared tracking errors added up while flying, m2, rad2
+COUNT_DEPTH, COUNT_ATTITUDE = 24, 25                 # ticks in those sums
+N_AP = 26
 
 # --- modes and reasons ----------------------------------------------------------------------------------------------
 WAITING, FLYING, COMPLETED, ABORTED = 0.0, 1.0, 2.0, 3.0
 REASON_NONE, REASON_LEG_TIME, REASON_MISSION_TIME = 0.0, 1.0, 2.0
-REASON_IMU, REASON_BEACON, REASON_TOO_DEEP = 3.0, 4.0, 5.0
+REASON_IMU, REASON_BEACON, REASON_TOO_DEEP, REASON_OPERATOR = 3.0, 4.0, 5.0, 6.0

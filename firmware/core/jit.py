@@ -113,14 +113,14 @@ def compiled_signatures() -> int:
 
 
 def freeze_kernels() -> None:
-    """Turn any further compilation into an error: called once the loop is armed."""
+    """Turn a call with unforeseen types of any kernel that has been called into an error: once the loop is armed."""
     for dispatcher in _KERNELS:
-        if hasattr(dispatcher, "disable_compile"):
+        if getattr(dispatcher, "signatures", ()):
             dispatcher.disable_compile(True)
 
 
 def thaw_kernels() -> None:
     """Allow compilation again: after a flight, for whatever else the process does."""
     for dispatcher in _KERNELS:
-        if hasattr(dispatcher, "disable_compile"):
+        if getattr(dispatcher, "signatures", ()):
             dispatcher.disable_compile(False)

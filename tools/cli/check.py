@@ -1,0 +1,64 @@
+"""`glider check`: are the files of a flight fit to fly with?"""
+
+import click
+
+from tools.cli.common import DONE, FAILED, json_option, print_json
+
+
+@click.command()
+@click.option("--vehicle", default="roughie", show_default=True, help="Vehicle: shipped name or file.")
+@click.option("--mission", default="sawtooth", show_default=True, help="Mission: shipped name or file.")
+@click.option("--board", default="sim", show_default=True, help="Board: shipped name or file.")
+@json_option
+def check(vehicle: str, mission: str, board: str, as_json: bool) -> None:
+    """Check vehicle, mission and board files, and that they go together.
+
+    Exit code 0: all fit to fly with; 1: something is not; each finding in a line of its own.
+    """
+    from firmware.core.jit import CACHE_DIR
+    from firmware.model.strict import ConfigError
+    from hal.ports import BoardError
+    from tools.compose import build_flight, load_board_file
+    from tools.errors import InputError
+    from tools.sources import load_mission, load_vehicle
+
+    findings: list[dict] = []
+
+    def look(name: str, work) -> bool:
+        try:
+            said = work()
+        except (ConfigError, InputError, BoardError) as error:
+            findings.append({"check": name, "pass": False, "message": str(error)})
+            return False
+        findings.append({"check": name, "pass": True, "message": said})
+        return True
+
+    def see_vehicle() -> str:
+        found = load_vehicle(vehicle)
+        return f"{found.name}: {found.mass.m_t:g} kg, ballast {found.actuators.ballast.range[0]:+g} to " + (
+            f"{found.actuators.ballast.range[1]:+g} kg"
+        )
+
+    def see_mission() -> str:
+        _, _, found = load_mission(mission)
+        return f"{found.name}: {len(found.leg)} legs, site {found.site.name}, {found.site.depth_m:g} m deep"
+
+    def see_board() -> str:
+        found = load_board_file(board)
+        return f"{found.source}: kind {found.kind}"
+
+    def see_all() -> str:
+        flight = build_flight(mission=mission, vehicle=vehicle, board=board)
+        return f"a loop of {flight.board.loop_hz:g} Hz"
+
+    good = [look("vehicle", see_vehicle), look("mission", see_mission), look("board", see_board)]
+    if all(good):
+        good.append(look("together", see_all))
+    kernels = "plain Python (GLIDER_JIT=0)" if CACHE_DIR is None else str(CACHE_DIR)
+    findings.append({"check": "kernels", "pass": True, "message": f"compiled into {kernels}"})
+    if as_json:
+        print_json({"pass": all(good), "findings": findings})
+    else:
+        for finding in findings:
+            click.echo(f"{'ok  ' if finding['pass'] else 'FAIL'}  {finding['check']:<9} {finding['message']}")
+    raise SystemExit(DONE if all(good) else FAILED)

@@ -1,0 +1,141 @@
+"""`glider fly`: one mission, in simulation or on a board."""
+
+import math
+import signal
+import time
+from pathlib import Path
+
+import click
+
+from tools.cli.common import DONE, FAILED, json_option, print_json, progress, say
+
+ROOM = 512  # records on their way to the disk, past which a simulated flight waits
+
+
+def next_log(mission: str) -> Path:
+    """The first name <mission>-NNN.mcap that is free in the working directory."""
+    for number in range(1, 100_000):
+        path = Path(f"{mission}-{number:03d}.mcap")
+        if not path.exists():
+            return path
+    raise FileExistsError(f"{mission}-NNN.mcap: no number left")
+
+
+@click.command()
+@click.option("--mission", default="sawtooth", show_default=True, help="Mission: shipped name or file.")
+@click.option("--vehicle", default="roughie", show_default=True, help="Vehicle: shipped name or file.")
+@click.option("--board", default="sim", show_default=True, help="Board: shipped name or file.")
+@click.option("--log", "log_file", type=click.Path(path_type=Path), help="Log to write.  [default: MISSION-NNN.mcap]")
+@click.option("--no-log", is_flag=True, help="Record nothing.")
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Seed of everything random.")
+@click.option("--realtime", is_flag=True, help="Fly the simulated board at the speed of the clock on the wall.")
+@click.option("--effect", "effects", multiple=True, metavar="LABEL:NAME=VALUE", help="Add an effect to the plant.")
+@json_option
+def fly(mission, vehicle, board, log_file, no_log, seed, realtime, effects, as_json) -> None:
+    """Fly a mission and record it.
+
+    The first Ctrl-C gives the dive up and surfaces, the second stops at once. Exit code 1: the flight did not complete.
+    """
+    from hal.ports import BoardError
+    from hal.recorder.recorder import NullRecorder, Recorder
+    from tools.compose import build_flight, log_metadata, parse_effects, record_specs
+    from tools.errors import InputError
+
+    wanted = parse_effects(effects)
+    try:
+        flight = build_flight(
+            mission=mission, vehicle=vehicle, board=board, seed=seed, realtime=realtime, effects=wanted
+        )
+    except BoardError as error:
+        raise InputError(str(error), source=board) from None
+    specs = record_specs(flight)
+    path = None if no_log else (log_file or next_log(flight.mission.name))
+    if path is not None and path.exists():
+        raise InputError("is there already; a log is never written over", source=path)
+    metadata = log_metadata(flight, seed=seed, effects=wanted)
+    recorder = NullRecorder(specs) if path is None else Recorder(path, specs, attachments=flight.texts, metadata=metadata)
+
+    presses = 0
+
+    def on_interrupt(*_):
+        nonlocal presses
+        presses += 1
+        if presses > 1:
+            raise KeyboardInterrupt
+        flight.autopilot.give_up()
+
+    before = signal.signal(signal.SIGINT, on_interrupt)
+    try:
+        with recorder, progress(f"flying {flight.mission.name}", len(flight.mission.leg)) as advance:
+            timing, seconds = _run(flight, recorder, realtime, advance)
+            report = recorder.close(ending={"ended": flight.autopilot.mode, "reason": flight.autopilot.reason})
+    except KeyboardInterrupt:
+        raise click.Abort from None
+    finally:
+        signal.signal(signal.SIGINT, before)
+    completed = flight.autopilot.mode == "completed" and flight.autopilot.surfaced
+    reason = flight.autopilot.reason or ("" if completed else "not at the surface after the mission")
+    result = {
+        "completed": completed,
+        "seconds": seconds,
+        "reason": reason,
+        "log": None if path is None else str(path),
+        "rms_error": flight.autopilot.rms_errors(),
+        "surfaced": flight.autopilot.surfaced,
+        "ticks": timing.ticks,
+        "missed_ticks": timing.missed,
+        "lateness": timing.histogram(),
+        "records": {"written": report.written, "dropped": report.dropped, "complete": report.complete},
+    }
+    if as_json:
+        print_json(result)
+    else:
+        _tell(result)
+    raise SystemExit(DONE if completed else FAILED)
+
+
+def _run(flight, recorder, realtime, advance):
+    """Open, arm, fly, disarm; returns the timing and the flight's length in s."""
+    from firmware.core.control_layout import LEG
+    from tools.compose import build_runtime
+
+    flight.board.open()
+    runtime = build_runtime(flight, recorder)
+    done = 0
+
+    def on_second(t: float) -> None:
+        nonlocal done
+        leg = int(flight.autopilot.ap[LEG])
+        if leg > done:
+            advance(leg - done)
+            done = leg
+        while not realtime and recorder.health().pending > ROOM and recorder.health().alive:
+            time.sleep(0.001)  # simulated time is quicker than a disk
+
+    try:
+        runtime.arm()
+        timing = runtime.run(on_second=on_second)
+        advance(len(flight.mission.leg) - done)
+        return timing, flight.board.clock.now()
+    finally:
+        runtime.disarm()
+        flight.board.close()
+
+
+def _tell(result: dict) -> None:
+    """The flight in a few lines, for a person."""
+    say(f"{'completed' if result['completed'] else 'NOT completed: ' + result['reason']} after {result['seconds']:.1f} s")
+    errors = result["rms_error"]
+    parts = []
+    if errors["depth_m"] is not None:
+        parts.append(f"depth {100 * errors['depth_m']:.1f} cm")
+    for name in ("pitch_rad", "roll_rad"):
+        if errors[name] is not None:
+            parts.append(f"{name[:-4]} {math.degrees(errors[name]):.2f} deg")
+    say(f"rms against the reference: {', '.join(parts)}")
+    if result["missed_ticks"]:
+        say(f"{result['missed_ticks']} of {result['ticks']} ticks missed")
+    if not result["records"]["complete"]:
+        say(f"the log is not complete: {result['records']['dropped']} records dropped")
+    if result["log"]:
+        click.echo(result["log"])
