@@ -79,6 +79,11 @@ class Runtime:
         gc.unfreeze()
         thaw_kernels()
 
+    @property
+    def deadline(self) -> float:
+        """When the next tick is due, s on the board's clock."""
+        return self._deadline
+
     def tick(self) -> None:
         """Wait for the deadline, then do one step."""
         clock, autopilot, channel = self._clock, self.autopilot, self.channel

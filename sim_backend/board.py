@@ -6,11 +6,11 @@ import msgspec
 import numpy as np
 from hal.recorder.schema import Field, RecordSpec
 
-from firmware.core.rotations import euler_from_quaternion
 from firmware.model.strict import Table, decode
 from hal.board import BoardRequest
 from hal.clocks import MonotonicClock
 from hal.ports import SLOTS
+from sim_backend.core.world import write_truth
 from sim_backend.world import Environment, SampledSensors, Start, World, build_world
 
 TRUTH = RecordSpec(
@@ -60,7 +60,7 @@ class SimulatedSensor:
         self._slot = slot
 
     def read(self, out: np.ndarray) -> None:
-        out[:] = self._slot
+        out[...] = self._slot  # [:] would make a view
 
 
 class SimulatedActuator:
@@ -141,10 +141,7 @@ class SimBoard:
         x, values = self.world.x, channel.values
 
         def record(t: float) -> None:
-            values[0] = t
-            values[1:4] = x[0:3]
-            values[4], values[5], values[6] = euler_from_quaternion(x[3], x[4], x[5], x[6])
-            values[7:16] = x[7:16]
+            write_truth(t, x, values)
             channel.commit(t)
 
         record(0.0)

@@ -21,19 +21,19 @@ class ReferenceTable(Table):
 class PitchGains(Table):
     """Slider (m) against pitch error (rad). Defaults set on the nominal vehicle."""
 
-    kp: NonNegative = 0.15
-    ki: NonNegative = 0.02
-    kd: NonNegative = 0.25
+    kp: NonNegative = 0.2
+    ki: NonNegative = 0.03
+    kd: NonNegative = 0.35
     reference: ReferenceTable = ReferenceTable(wn=0.4)
 
 
 class DepthGains(Table):
     """Ballast (kg) against depth error (m)."""
 
-    kp: NonNegative = 0.15
-    ki: NonNegative = 0.002
-    kd: NonNegative = 0.6
-    reference: ReferenceTable = ReferenceTable(wn=0.12)
+    kp: NonNegative = 0.4
+    ki: NonNegative = 0.01
+    kd: NonNegative = 1.5
+    reference: ReferenceTable = ReferenceTable(wn=0.1)
     rate_bandwidth: Bandwidth = 2.0  # rad/s, of the observer that makes depth rate from depth
 
 

@@ -82,6 +82,17 @@ def deliver(sensors, t, counters, ring, frame):
 
 
 @kernel
+def write_truth(t, x, out):
+    """Time, position, Euler angles, nu and actuators of the plant, into out (16,)."""
+    out[0] = t
+    for i in range(3):
+        out[1 + i] = x[i]
+    out[4], out[5], out[6] = euler_from_quaternion(x[3], x[4], x[5], x[6])
+    for i in range(9):
+        out[7 + i] = x[7 + i]
+
+
+@kernel
 def advance(P, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, frame, work, dt, t_end):
     """Move the world to t_end in steps of dt, sampling on the way, then deliver what has arrived. Returns its time."""
     t = counters[at.C_STEP] * dt
