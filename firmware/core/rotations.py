@@ -10,6 +10,14 @@ from firmware.core.jit import kernel
 
 
 @kernel
+def wrap_angle(angle):
+    """Angle in (-pi, pi]; one that is there already comes back as it is."""
+    if -math.pi < angle <= math.pi:
+        return angle
+    return math.pi - (math.pi - angle) % (2.0 * math.pi)
+
+
+@kernel
 def quaternion_from_euler(phi, theta, psi):
     """Unit quaternion (body to NED) of ZYX Euler angles in rad."""
     cf, sf = math.cos(0.5 * phi), math.sin(0.5 * phi)
@@ -25,12 +33,16 @@ def quaternion_from_euler(phi, theta, psi):
 
 @kernel
 def euler_from_quaternion(q0, q1, q2, q3):
-    """ZYX Euler angles phi, theta, psi in rad, psi in (-pi, pi]; at theta = +-90 deg only psi -+ phi means anything."""
-    s = 2.0 * (q0 * q2 - q3 * q1)
-    s = min(1.0, max(-1.0, s))
-    phi = math.atan2(2.0 * (q0 * q1 + q2 * q3), 1.0 - 2.0 * (q1 * q1 + q2 * q2))
-    psi = math.atan2(2.0 * (q0 * q3 + q1 * q2), 1.0 - 2.0 * (q2 * q2 + q3 * q3))
-    return phi, math.asin(s), psi
+    """ZYX Euler angles phi, theta, psi in rad, phi and psi in (-pi, pi], of a unit quaternion.
+
+    By half sums and differences: (phi - psi)/2 has the tangent (q1 - q3)/(q0 + q2), (phi + psi)/2 the tangent
+    (q1 + q3)/(q0 - q2). At theta = +90 (-90) deg only phi - psi (phi + psi) means anything, and stays exact, so that
+    the three angles always give the attitude back.
+    """
+    a, b, c, d = q0 + q2, q1 - q3, q0 - q2, q1 + q3
+    difference, total = math.atan2(b, a), math.atan2(d, c)
+    theta = 2.0 * math.atan2(math.sqrt(a * a + b * b), math.sqrt(c * c + d * d)) - 0.5 * math.pi
+    return wrap_angle(total + difference), theta, wrap_angle(total - difference)
 
 
 @kernel
@@ -73,9 +85,3 @@ def euler_rates(phi, theta, p, q, r):
     cf, sf = math.cos(phi), math.sin(phi)
     ct, tt = math.cos(theta), math.tan(theta)
     return p + sf * tt * q + cf * tt * r, cf * q - sf * r, (sf * q + cf * r) / ct
-
-
-@kernel
-def wrap_angle(angle):
-    """Angle in (-pi, pi]; one that is there already comes back as it is."""
-    return angle - 2.0 * math.pi * math.ceil((angle - math.pi) / (2.0 * math.pi))

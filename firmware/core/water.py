@@ -29,7 +29,8 @@ def flow_angles(u, v, w):
     speed = math.sqrt(v_squared)
     if speed < STILL:
         return 0.0, 0.0, v_squared
-    return math.atan2(w, u), math.asin(min(1.0, max(-1.0, v / speed))), v_squared
+    # + 0.0 makes -0.0 a zero like any other: atan2(0, -0.0) is pi, and flow_to_body knows no such flow
+    return math.atan2(w, u + 0.0), math.asin(min(1.0, max(-1.0, v / speed))), v_squared
 
 
 @kernel
