@@ -16,7 +16,7 @@ MAX_DEPTH = 8
 MAX_BYTES = 1_000_000
 _AT_LINE = re.compile(r"\(at line (\d+), column (\d+)\)|\(at end of document\)")
 _AT_PATH = re.compile(r" - at `(\$[^`]*)`$")
-_FIELD = re.compile(r"(unknown|required) field `([^`]*)`")
+_FIELD = re.compile(r"(unknown|required) field `(.*)`", re.DOTALL)
 _HEADER = re.compile(r"^\s*(\[\[?)\s*([^\]]+?)\s*\]\]?\s*(#.*)?$")
 _KEY = re.compile(r"""^\s*((?:[A-Za-z0-9_-]+|"[^"]*"|'[^']*')(?:\s*\.\s*(?:[A-Za-z0-9_-]+|"[^"]*"|'[^']*'))*)\s*=""")
 
@@ -27,7 +27,9 @@ class ConfigError(ValueError):
     def __init__(self, source: str, message: str, *, key: str = "", line: int | None = None):
         self.source, self.key, self.line, self.message = source, key, line, message
         where = f"{source}:{line}" if line else source
-        super().__init__(f"{where}: {key}: {message}" if key else f"{where}: {message}")
+        whole = f"{where}: {key}: {message}" if key else f"{where}: {message}"
+        # a key may hold any character; the error stays one line
+        super().__init__("".join(char if char.isprintable() else repr(char)[1:-1] for char in whole))
 
 
 class Table(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
@@ -49,7 +51,7 @@ def locate(text: str, path: list[str | int]) -> int | None:
     best: tuple[int, int] | None = None
     table: list[str | int] = []
     arrays: dict[str, int] = {}
-    for number, line in enumerate(text.splitlines(), start=1):
+    for number, line in enumerate(text.split("\n"), start=1):  # lines as TOML counts them
         header, key = _HEADER.match(line), _KEY.match(line)
         if header:
             table = list(_parts(header.group(2)))
@@ -101,6 +103,10 @@ def decode(text: str, kind: type[T], source: str) -> T:
         found = _AT_LINE.search(str(error))
         line = int(found.group(1)) if found and found.group(1) else max(1, len(text.splitlines()))
         raise ConfigError(source, f"not TOML: {_AT_LINE.sub('', str(error)).strip()}", line=line) from None
+    except ValueError:  # tomllib lets Python's own limit on the digits of an integer through
+        lines = text.split("\n")
+        longest = max(range(len(lines)), key=lambda index: len(lines[index]))
+        raise ConfigError(source, "not TOML: a number with too many digits", line=longest + 1) from None
     except RecursionError:
         raise ConfigError(source, f"tables nested deeper than {MAX_DEPTH}") from None
     _refuse_nonfinite(raw, [], text, source)
