@@ -4,6 +4,11 @@ from pathlib import Path
 
 import pytest
 
+
+def pytest_addoption(parser):
+    parser.addoption("--board", default="sim", help="the board that the contract tests run on: shipped name or file")
+
+
 ROOT = Path(__file__).resolve().parents[1]
 
 

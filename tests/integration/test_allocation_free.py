@@ -1,4 +1,4 @@
-"""The loop allocates nothing: shown over 100,000 ticks of the real runtime with the real recorder, and shown to be shown."""
+"""The loop allocates nothing: over 100,000 ticks of the real runtime with the real recorder, and the proof can fail."""
 
 import numpy as np
 import pytest

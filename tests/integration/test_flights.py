@@ -1,0 +1,159 @@
+"""Whole flights: missions complete, repeat bit for bit, and fly the same compiled as under the real runtime."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from firmware.core.control_layout import LEG
+from hal.recorder.recorder import NullRecorder
+from sim_backend.core.closed_loop import N_END, N_TRACE, fly
+from tools.compose import build_flight, build_runtime, record_specs
+
+
+def flown(mission, seed=0, effects=None):
+    """Fly under the real runtime; returns the flight and what the recorder was given, (ticks, fields)."""
+    flight = build_flight(mission=mission, seed=seed, effects=effects)
+    recorder = NullRecorder(record_specs(flight))
+    rows = []
+    channel = recorder.channel("/tick")
+    channel.commit = lambda t: rows.append(channel.values.copy())
+    flight.board.open()
+    runtime = build_runtime(flight, recorder)
+    runtime.arm()
+    try:
+        runtime.run()
+    finally:
+        runtime.disarm()
+    return flight, np.array(rows)
+
+
+@pytest.mark.parametrize("mission", ["sawtooth", "spiral"])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_shipped_missions_complete_and_surface(mission, seed):
+    flight, _ = flown(mission, seed)
+    assert flight.autopilot.mode == "completed"
+    assert flight.autopilot.surfaced
+    errors = flight.autopilot.rms_errors()
+    assert errors["pitch_rad"] < np.radians(3.0)
+    assert errors["roll_rad"] < np.radians(3.0)
+    if mission == "sawtooth":
+        assert errors["depth_m"] < 0.25
+
+
+def test_a_seed_repeats_bit_for_bit_and_another_differs():
+    _, first = flown("spiral", 5)
+    _, again = flown("spiral", 5)
+    _, other = flown("spiral", 6)
+    steady = [i for i in range(first.shape[1]) if i not in (26, 27)]  # lateness and duration are the machine's
+    assert np.array_equal(first[:, steady], again[:, steady], equal_nan=True)
+    assert not np.array_equal(first[:100, steady], other[:100, steady], equal_nan=True)
+
+
+@pytest.mark.parametrize("mission", ["sawtooth", "spiral"])
+def test_compiled_flight_is_the_runtimes_flight(mission):
+    """The campaign's compiled loop and the real runtime give the same numbers to the last bit."""
+    reference, rows = flown(mission, 2)
+    flight = build_flight(mission=mission, seed=2)
+    world, pilot = flight.board.world, flight.autopilot
+    trace, end = np.zeros((len(rows), N_TRACE)), np.zeros(N_END)
+    ticks = fly(
+        world.P, pilot.P, pilot.C, pilot.legs, world.E, world.waves, world.sensors, world.errors, world.seed, world.x,
+        world.dt, len(rows), 1, trace, end,
+    )  # fmt: skip
+    assert end[0] == reference.autopilot.ap[0]
+    assert end[3] == reference.autopilot.ap[LEG]
+    assert np.array_equal(trace[:ticks, 7:10], rows[:ticks, 1:4])  # commands
+    assert np.array_equal(trace[:ticks, 1], rows[:ticks, 13])  # depth estimate
+
+
+def test_a_hidden_difference_shows_in_the_flight():
+    _, nominal = flown("spiral", 3)
+    _, heavy = flown("spiral", 3, {"net_buoyancy": {"mass": 0.03}})
+    n = min(len(nominal), len(heavy))
+    assert np.nanmax(np.abs(nominal[:n, 13] - heavy[:n, 13])) > 0.2
+
+
+def glider(*arguments, cwd, **options):
+    command = [sys.executable, "-m", "tools.cli.main", *arguments]
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=120, **options)
+
+
+def test_fly_as_a_user_types_it(tmp_path):
+    done = glider("fly", "--mission", "spiral", "--json", cwd=tmp_path)
+    result = json.loads(done.stdout)
+    assert done.returncode == 0
+    assert result["completed"]
+    assert result["log"] == "spiral-001.mcap"
+    assert result["records"]["dropped"] == 0
+    assert result["records"]["complete"]
+    assert (tmp_path / "spiral-001.mcap").stat().st_size > 100_000
+    assert glider("fly", "--mission", "spiral", "--json", "--log", "spiral-001.mcap", cwd=tmp_path).returncode == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("fly", "--mission", "nope"), "no mission 'nope': neither a file nor one of sawtooth, spiral"),
+        (("fly", "--vehicle", "nope"), "no vehicle 'nope'"),
+        (("fly", "--board", "nope"), "no board 'nope'"),
+        (("fly", "--effect", "drag:scale=much"), "expected label:parameter=number"),
+        (("fly", "--effect", "gremlins"), "no effect 'gremlins'; known: drag"),
+        (("fly", "--log", "no/such/folder/x.mcap"), "no/such/folder/x.mcap"),
+        (("fly", "--seed", "-1"), "-1"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(arguments, said, tmp_path):
+    done = glider(*arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stdout == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_mission_that_cannot_be_flown_ends_with_exit_code_1(tmp_path):
+    (tmp_path / "short.toml").write_text(
+        'format = 1\nname = "short"\ntime_limit_s = 60.0\n[site]\nname = "pool"\ndepth_m = 6.0\n'
+        "[[leg]]\ndepth_m = 5.0\npitch_deg = -20.0\ntime_limit_s = 5.0\n"
+    )
+    done = glider("fly", "--mission", "short.toml", "--json", cwd=tmp_path)
+    result = json.loads(done.stdout)
+    assert done.returncode == 1
+    assert not result["completed"]
+    assert result["reason"] == "leg 1: not at 5 m within 5 s"
+    assert result["surfaced"]
+
+
+def test_ctrl_c_gives_the_dive_up_and_the_log_is_whole(tmp_path):
+    flight = subprocess.Popen(
+        [sys.executable, "-m", "tools.cli.main", "fly", "--realtime", "--json"],
+        cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ},
+    )  # fmt: skip
+    log = tmp_path / "sawtooth-001.mcap"
+    deadline = time.monotonic() + 60
+    while not (log.exists() and log.stat().st_size > 60_000) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    flight.send_signal(signal.SIGINT)
+    out, err = flight.communicate(timeout=60)
+    result = json.loads(out)
+    assert flight.returncode == 1, err
+    assert result["reason"] == "asked to by the operator"
+    assert result["surfaced"]
+    assert result["records"]["complete"]
+
+
+def test_check_tells_what_is_wrong(tmp_path):
+    assert glider("check", cwd=tmp_path).returncode == 0
+    (tmp_path / "v.toml").write_text("format = 1\n")
+    done = glider("check", "--vehicle", "v.toml", "--json", cwd=tmp_path)
+    assert done.returncode == 1
+    findings = {f["check"]: f for f in json.loads(done.stdout)["findings"]}
+    assert not findings["vehicle"]["pass"]
+    assert "v.toml" in findings["vehicle"]["message"]
+    assert findings["mission"]["pass"]
