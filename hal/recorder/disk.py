@@ -69,3 +69,10 @@ def create(path: str) -> int:
     finally:
         os.close(folder)
     return fd
+
+
+def close(fd: int, path: str, *, keep: bool) -> None:
+    """Close a file of `create`; one that is not worth keeping disappears."""
+    os.close(fd)
+    if not keep:
+        os.unlink(path)

@@ -11,6 +11,7 @@ import struct
 import sys
 import zlib
 from collections.abc import Mapping
+from typing import Any
 
 from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, Writer
 
@@ -24,10 +25,10 @@ CRC_KEY = "crc32"
 _LAST_NS = 2**63 - 1
 
 
-def metadata_crc(entries: Mapping[str, str]) -> str:
-    """The checksum of a metadata record's other entries."""
+def metadata_crc(name: str, entries: Mapping[str, str]) -> str:
+    """The checksum of a metadata record: of its name and its other entries."""
     rest = sorted((key, value) for key, value in entries.items() if key != CRC_KEY)
-    return f"{zlib.crc32(json.dumps(rest).encode()):08x}"
+    return f"{zlib.crc32(json.dumps([name, rest]).encode()):08x}"
 
 
 def encode_event(log_ns: int, severity: int, text: str) -> bytes:
@@ -52,12 +53,21 @@ def decode_event(data: bytes) -> tuple[int, str]:
     return severity, text.decode("utf-8")
 
 
+def start_writer(stream: Any) -> Writer:
+    """An MCAP writer with all its checksums, its head written; `stream` takes write, tell and flush."""
+    writer = Writer(
+        stream, chunk_size=CHUNK_BYTES, compression=CompressionType.NONE, enable_crcs=True, enable_data_crcs=True
+    )
+    writer.start(profile="ros2", library=f"glider; {LIBRARY_IDENTIFIER}")
+    return writer
+
+
 class LogFile:
-    """Writes one log. `stream` takes write and tell; nothing is on the disk before its owner sees to it."""
+    """Writes one log. `stream` is a DiskFile or the like; nothing is on the disk before its owner sees to it."""
 
     def __init__(
         self,
-        stream,
+        stream: Any,
         specs: list[RecordSpec] | tuple[RecordSpec, ...],
         *,
         attachments: Mapping[str, str],
@@ -68,10 +78,7 @@ class LogFile:
             raise RuntimeError("logs are written as the numbers lie in memory, and this machine's are big-endian")
         self._epoch_ns = epoch_ns
         self._last_ns = epoch_ns
-        self._writer = Writer(
-            stream, chunk_size=CHUNK_BYTES, compression=CompressionType.NONE, enable_crcs=True, enable_data_crcs=True
-        )
-        self._writer.start(profile="ros2", library=f"glider; {LIBRARY_IDENTIFIER}")
+        self._writer = start_writer(stream)
         self._metadata(START, {**metadata, "epoch_ns": str(epoch_ns)})
         for name, text in {**attachments, SCHEMAS_ATTACHMENT: schema.specs_to_json(specs)}.items():
             kind = "application/json" if name.endswith(".json") else "text/plain"
@@ -91,7 +98,7 @@ class LogFile:
 
     def _metadata(self, name: str, entries: Mapping[str, str]) -> None:
         texts = {str(key): str(value) for key, value in entries.items()}
-        self._writer.add_metadata(name, {**texts, CRC_KEY: metadata_crc(texts)})
+        self._writer.add_metadata(name, {**texts, CRC_KEY: metadata_crc(name, texts)})
 
     def _log_ns(self, time_s: float) -> int:
         # A record with a time that is none is still a record; it keeps its neighbour's place.

@@ -6,6 +6,7 @@ counted; nothing ever waits. One thread only.
 
 import mmap
 import zlib
+from typing import Any
 
 import numpy as np
 
@@ -23,8 +24,8 @@ class Channel:
         self._ring, self._limit = producer, limit
         # One buffer, seen three ways: as an array to copy from, as scalars to write, as bytes to sum over.
         self._buffer = np.zeros(ring.RECORD_HEAD + spec.width)
-        self._numbers = memoryview(self._buffer)
-        self._bytes = memoryview(self._buffer).cast("B")
+        self._numbers: Any = memoryview(self._buffer.data)
+        self._bytes = memoryview(self._buffer.data).cast("B")
         self._buffer[ring.CHANNEL] = number
         self.values = self._buffer[ring.RECORD_HEAD :]
         self.values[:] = np.nan

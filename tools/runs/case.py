@@ -4,7 +4,7 @@ import itertools
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import msgspec
 
@@ -16,6 +16,7 @@ from tools.runs.run import Run, load_run, run_name, write_run
 from tools.sources import load_vehicle, read_text
 
 CASE_FILE = "case.toml"
+VEHICLE_FILE = "vehicle.toml"  # beside it, where the vehicle is not a shipped one
 _RUN_FILE = re.compile(r"run.*\.csv(\.gz)?\Z")
 _NUMBER = re.compile(r"\d+")
 
@@ -111,9 +112,14 @@ def _assemble(folder: Path, table: CaseTable, runs: list[Run]) -> Case:
     )
 
 
-def _replaced(whole, part):
-    given = {name: value for name, value in msgspec.structs.asdict(part).items() if value is not None}
-    return msgspec.structs.replace(whole, **given)
+def _given(part: Table | None) -> dict[str, Any]:
+    """The entries of a table that are there."""
+    whole = {} if part is None else msgspec.structs.asdict(part)
+    return {name: value for name, value in whole.items() if value is not None}
+
+
+def _replaced(whole: Any, part: Table) -> Any:
+    return msgspec.structs.replace(whole, **_given(part))
 
 
 def load_case(folder: Path | str) -> Case:
@@ -164,16 +170,14 @@ def case_text(
         f"motion_capture = {str(bool(motion_capture)).lower()}",
         f"runs = {runs}",
     ]
-    if sensors is not None:
-        lines += ["", "[sensors]"]
-        for name, entry in msgspec.structs.asdict(sensors).items():
-            if entry is not None:
-                lines.append(f"{name} = {{ noise = {entry.noise!r}, bias = {entry.bias!r} }}")
-    if disturbance is not None:
-        lines += ["", "[disturbance]"]
-        for name, value in msgspec.structs.asdict(disturbance).items():
-            if value is not None:
-                lines.append(f"{name} = {value!r}")
+    entries = [
+        f"{name} = {{ noise = {entry.noise!r}, bias = {entry.bias!r} }}" for name, entry in _given(sensors).items()
+    ]
+    if entries:
+        lines += ["", "[sensors]", *entries]
+    entries = [f"{name} = {value!r}" for name, value in _given(disturbance).items()]
+    if entries:
+        lines += ["", "[disturbance]", *entries]
     text = "\n".join(lines) + "\n"
     decode(text, CaseTable, CASE_FILE)
     return text
@@ -184,6 +188,7 @@ def write_case(
     runs: list[Run],
     *,
     vehicle: str,
+    vehicle_text: str | None = None,
     site: str,
     log_rate_hz: float,
     water_density_kg_m3: float,
@@ -195,14 +200,15 @@ def write_case(
 ) -> list[Path]:
     """Write runs as a case, run00 on, and return the run files; case.toml comes last, so that a cut one is no case.
 
-    `motion_capture` is, if not given, whether any run has it. InputError where the folder already holds a case: runs
-    of two cases in one folder could not be told apart.
+    `vehicle` is a shipped name or a path from the case's folder; with `vehicle_text`, that file is written too, as
+    vehicle.toml. `motion_capture` is, if not given, whether any run has it. InputError where the folder already holds a
+    case: runs of two cases in one folder could not be told apart.
     """
     folder = Path(folder)
     if motion_capture is None:
         motion_capture = any(run.has_mocap for run in runs)
     text = case_text(
-        vehicle=vehicle,
+        vehicle=vehicle if vehicle_text is None else VEHICLE_FILE,
         site=site,
         log_rate_hz=log_rate_hz,
         water_density_kg_m3=water_density_kg_m3,
@@ -218,5 +224,7 @@ def write_case(
     for number, run in enumerate(runs):
         files.append(folder / f"run{number:02d}{suffix}")
         write_run(files[-1], run, decimals=decimals)
+    if vehicle_text is not None:
+        csvfile.write_bytes(folder / VEHICLE_FILE, vehicle_text.encode("utf-8"))
     csvfile.write_bytes(folder / CASE_FILE, text.encode("utf-8"))
     return files

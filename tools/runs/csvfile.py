@@ -8,6 +8,7 @@ import math
 import os
 import zlib
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
@@ -36,15 +37,32 @@ def _read_bounded(path: Path) -> bytes:
     return data
 
 
-class Table:
-    """A CSV file's header and its fields, still text, by column."""
+@dataclass(frozen=True)
+class Dialect:
+    """How a table is written: as run data by default, as other loggers do if told."""
 
-    def __init__(self, path: Path, data: bytes):
+    delimiter: str = ","
+    decimal: str = "."
+    encoding: str = "utf-8"
+    skip_lines: int = 0  # above the header
+    header: tuple[str, ...] = ()  # for files that have none
+    missing: frozenset[str] = frozenset()  # what stands for a missing sample, beside nothing
+    drop_broken_rows: bool = False
+
+
+class Table:
+    """A CSV file's header and its fields, still text, by column. `dropped` counts the broken rows left out."""
+
+    def __init__(self, path: Path, data: bytes, dialect: Dialect = Dialect()):
         self.path = path
-        self._data = data
+        self._dialect = dialect
+        self._text, self._above = self._decoded(data)
+        self.dropped = 0
+        self._numbers_of_rows: list[int] | None = None  # of the rows that are left, where some were dropped
         rows = self._rows()
         try:
-            self.header = [name.strip() for name in next(rows)]
+            header = list(dialect.header) or next(rows)
+            self.header = [name.strip() for name in header]
             body = list(rows)
         except StopIteration:
             raise self.error("the file is empty") from None
@@ -53,29 +71,51 @@ class Table:
         self._check_header()
         if not body:
             raise self.error("no samples below the header")
-        width = len(self.header)
         # One pass in C for the usual case; the slow search for the line only once something is known to be wrong.
-        if set(map(len, body)) != {width}:
-            number = next(index for index, row in enumerate(body) if len(row) != width)
+        if set(map(len, body)) != {len(self.header)}:
+            body = self._without_broken(body)
+        self._columns = dict(zip(self.header, zip(*body, strict=True), strict=True))
+
+    def _without_broken(self, body: list[list[str]]) -> list[list[str]]:
+        width = len(self.header)
+        good = [number for number, row in enumerate(body) if len(row) == width]
+        if not self._dialect.drop_broken_rows or not good:
+            number = next(number for number, row in enumerate(body) if len(row) != width)
             got = len(body[number])
             few = "too few" if got < width else "too many"
             raise self.error(f"{few} fields: expected {width}, got {got}", row=number)
-        self._columns = dict(zip(self.header, zip(*body, strict=True), strict=True))
+        self.dropped = len(body) - len(good)
+        self._numbers_of_rows = good
+        return [body[number] for number in good]
+
+    def _decoded(self, data: bytes) -> tuple[str, int]:
+        """The text from the header on, and the number of lines above it."""
+        encoding = "utf-8-sig" if self._dialect.encoding == "utf-8" else self._dialect.encoding
+        try:
+            text = data.decode(encoding)
+        except UnicodeDecodeError as error:
+            line = data.count(b"\n", 0, error.start) + 1
+            raise InputError(f"not UTF-8 text (byte {error.start})", source=self.path, line=line) from None
+        for number in range(self._dialect.skip_lines):
+            _, newline, text = text.partition("\n")
+            if not newline:
+                raise self.error(f"{self._dialect.skip_lines} lines above the header expected, {number} found")
+        return text, self._dialect.skip_lines
 
     def _rows(self) -> Iterator[list[str]]:
-        text = self._data.decode("utf-8-sig")
+        text, delimiter = self._text, self._dialect.delimiter
         if not text:
             return
         if '"' not in text:
             # No quotes, so no field spans lines or hides a comma: splitting is the same as csv and twice as fast.
             lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-            yield from [line.split(",") for line in lines]
+            yield from [line.split(delimiter) for line in lines]
             return
-        reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+        reader = csv.reader(io.StringIO(text, newline=""), strict=True, delimiter=delimiter)
         try:
             yield from reader
         except csv.Error as error:
-            raise InputError(f"not CSV: {error}", source=self.path, line=reader.line_num) from None
+            raise InputError(f"not CSV: {error}", source=self.path, line=self._above + reader.line_num) from None
 
     def _check_header(self) -> None:
         seen: set[str] = set()
@@ -86,13 +126,15 @@ class Table:
 
     def _line(self, row: int) -> int:
         """Line (from 1) on which a row (from 0, below the header) ends; fields in quotes may span lines."""
-        text = self._data.decode("utf-8-sig")
-        if '"' not in text:
-            return row + 2
-        reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-        for _ in range(row + 2):
+        if self._numbers_of_rows is not None:
+            row = self._numbers_of_rows[row]
+        rows = row + (1 if self._dialect.header else 2)
+        if '"' not in self._text:
+            return self._above + rows
+        reader = csv.reader(io.StringIO(self._text, newline=""), strict=True, delimiter=self._dialect.delimiter)
+        for _ in range(rows):
             next(reader)
-        return reader.line_num
+        return self._above + reader.line_num
 
     def error(self, message: str, *, row: int | None = None, column: str | None = None, line: int | None = None):
         """An InputError of this file: `row` counts from 0 below the header."""
@@ -108,7 +150,7 @@ class Table:
 
     def numbers(self, column: str) -> np.ndarray:
         """A column as float64, shape (rows,); NaN for an empty field; InputError for anything but a finite number."""
-        fields = self._columns[column]
+        fields = self._plain(self._columns[column])
         joined = ",".join(fields)
         if "n" not in joined:  # a field 'null' is not a missing sample
             if "" in fields:
@@ -120,6 +162,14 @@ class Table:
                 if len(values) == len(fields):
                     return values
         return np.array([self._number(field.strip(), row, column) for row, field in enumerate(fields)])
+
+    def _plain(self, fields: tuple[str, ...]) -> tuple[str, ...]:
+        """Fields as run data would have them."""
+        if self._dialect.decimal != ".":
+            fields = tuple(field.replace(self._dialect.decimal, ".") for field in fields)
+        if self._dialect.missing:
+            fields = tuple("" if field.strip() in self._dialect.missing else field for field in fields)
+        return fields
 
     def _number(self, field: str, row: int, column: str) -> float:
         if not field:
@@ -149,15 +199,9 @@ class Table:
             raise self.error(message, row=row, column=column)
 
 
-def read_table(path: Path) -> Table:
+def read_table(path: Path, dialect: Dialect = Dialect()) -> Table:
     """A CSV or .csv.gz file as text columns; InputError where it is none, is damaged or is too long."""
-    data = _read_bounded(path)
-    try:
-        data.decode("utf-8")
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        raise InputError(f"not UTF-8 text (byte {error.start})", source=path, line=line) from None
-    return Table(path, data)
+    return Table(path, _read_bounded(path), dialect)
 
 
 def as_texts(name: str, values: np.ndarray, places: int | None = None) -> list[str]:
@@ -175,15 +219,20 @@ def as_texts(name: str, values: np.ndarray, places: int | None = None) -> list[s
     return texts
 
 
-def write_table(path: Path, columns: dict[str, list[str]]) -> None:
-    """Columns of text as CSV (gzipped by the name), through a temporary file beside it, so whole or not at all."""
+def encode_table(columns: dict[str, list[str]]) -> bytes:
+    """Columns of text as CSV, UTF-8; ValueError where they are of unequal length, or none."""
     if len({len(values) for values in columns.values()}) != 1:
-        raise ValueError(f"{path}: columns of unequal length, or none")
+        raise ValueError("columns of unequal length, or none")
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
     writer.writerows(zip(*columns.values(), strict=True))
-    data = text.getvalue().encode("utf-8")
+    return text.getvalue().encode("utf-8")
+
+
+def write_table(path: Path, columns: dict[str, list[str]]) -> None:
+    """Columns of text as CSV (gzipped by the name), through a temporary file beside it, so whole or not at all."""
+    data = encode_table(columns)
     if path.name.endswith(".gz"):
         data = gzip.compress(data, compresslevel=6, mtime=0)  # no time inside: equal runs are equal files
     write_bytes(path, data)

@@ -75,8 +75,8 @@ def write_run(path: Path | str, run: Run, *, decimals: dict[str, int] | None = N
     for name, values in run.columns.items():
         places = None if decimals is None else decimals.get(name)
         texts[name] = csvfile.as_texts(name, values, places)
-    for name, values in run.extra.items():
+    for name, words in run.extra.items():
         if name in texts:
             raise ValueError(f"{run.name}: column {name} stands twice")
-        texts[name] = list(values)
+        texts[name] = list(words)
     csvfile.write_table(Path(path), texts)
