@@ -79,6 +79,18 @@ def test_water_carries_the_flight_along(simulate):
         np.testing.assert_allclose(moving[name], still[name], atol=1e-9)
 
 
+def test_another_vehicle_flies_another_way(simulate, tmp_path):
+    shipped = Path(__file__).resolve().parents[2] / "firmware" / "model" / "vehicles" / "roughie.toml"
+    heavy_nosed = tmp_path / "other.toml"
+    heavy_nosed.write_text(shipped.read_text(encoding="utf-8").replace("K_M = -17.0", "K_M = -12.0"), encoding="utf-8")
+    text = FLIGHT.read_text(encoding="utf-8")
+    usual, same, other = (
+        simulate(text, *options)[2] for options in ((), ("--vehicle", str(shipped)), ("--vehicle", str(heavy_nosed)))
+    )
+    assert (usual == same).all()
+    assert abs(usual["theta"] - other["theta"]).max() > 0.01
+
+
 def test_rows_between_steps_and_a_single_row(simulate):
     text = f"{HEADER}\n{START}\n0.0333,0,-0.02,0.1\n0.1,0,-0.02,0.1\n"
     even = f"{HEADER}\n{START}\n{ROW}\n"
