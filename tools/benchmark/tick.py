@@ -10,14 +10,16 @@ import time
 import tracemalloc
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from firmware.core.jit import compiled_signatures
 from firmware.runtime import Runtime
 from tools.benchmark.allocations import blocks_asked_for
+from tools.benchmark.registry import Settings
 
 WARM_UP = 2000
 TICKS = 100_000
@@ -158,3 +160,8 @@ def measure_tick(ticks: int = TICKS) -> TickFigures:
         largest_block_bytes=max(asked, default=0),
         blocks_by_size=asked,
     )
+
+
+def measure(settings: Settings) -> dict[str, Any]:
+    """TickFigures as JSON: median_us, p99_us, allocated_blocks, collections, compiled, peak_bytes, ..."""
+    return asdict(measure_tick())

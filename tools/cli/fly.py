@@ -21,6 +21,16 @@ def next_log(mission: str) -> Path:
     raise FileExistsError(f"{mission}-NNN.mcap: no number left")
 
 
+def peak_rss_mb() -> float | None:
+    """Largest resident memory of this process so far, MB; None where the system does not say."""
+    try:
+        status = Path("/proc/self/status").read_text()
+    except OSError:
+        return None
+    lines = [line.split() for line in status.splitlines() if line.startswith("VmHWM:")]
+    return int(lines[0][1]) * 1024 / 1e6 if lines else None
+
+
 @click.command()
 @click.option("--mission", default="sawtooth", show_default=True, help="Mission: shipped name or file.")
 @click.option("--vehicle", default="roughie", show_default=True, help="Vehicle: shipped name or file.")
@@ -85,6 +95,7 @@ def fly(mission, vehicle, board, log_file, no_log, seed, realtime, effects, as_j
         "ticks": timing.ticks,
         "missed_ticks": timing.missed,
         "lateness": timing.histogram(),
+        "peak_rss_mb": peak_rss_mb(),
         "records": {"written": report.written, "dropped": report.dropped, "complete": report.complete},
     }
     if as_json:
