@@ -1,0 +1,166 @@
+"""The estimator's measurements: gate, update and what happens to what does not fit (see firmware/core/estimator)."""
+
+import math
+
+from firmware.core.actuators import clip
+from firmware.core.estimator_layout import (
+    COS_PITCH_MIN,
+    E_ACT,
+    E_ATT,
+    E_ERR,
+    E_GYRO,
+    E_NU,
+    E_POS,
+    GATE,
+    LARGEST,
+    N_E,
+    N_Z,
+    PATIENCE,
+    RATE_LIMIT,
+    S_R,
+    SPEED_LIMIT,
+    STRESS_GROWTH,
+    STRESS_MAX,
+    W_SCRATCH,
+    X_ERR,
+    X_GYRO,
+    Z_BALLAST,
+    Z_DEPTH,
+    Z_MOCAP_ROLL,
+    Z_R,
+    Z_YAW,
+)
+from firmware.core.flight import normalise_attitude
+from firmware.core.jit import kernel
+from firmware.core.layout import SERVO_MAX, SERVO_MIN, X_ACT, X_NU
+from firmware.core.rotations import euler_from_quaternion, wrap_angle
+
+
+@kernel
+def widen(cov, column, h0, h1, h2, grow):
+    """cov += grow h h', h on error[column : column + 3]."""
+    for i in range(3):
+        a = h0 if i == 0 else (h1 if i == 1 else h2)
+        cov[column + i, column] += grow * a * h0
+        cov[column + i, column + 1] += grow * a * h1
+        cov[column + i, column + 2] += grow * a * h2
+
+
+@kernel
+def update_scalar(cov, dx, column, h0, h1, h2, other, innovation, R, beyond, dt, v, K):
+    """One measurement, h . error[column : column + 3] + error[other] = innovation, variance R, into dx and cov.
+
+    `other` is a gyro's bias, 0 for the sensors that have none in the state. `beyond` is for how long (s) this sensor
+    has been out of the gate. Returns the innovation in sigma and the new `beyond`. v, K (N_E) are scratch.
+    """
+    for i in range(N_E):
+        v[i] = h0 * cov[i, column] + h1 * cov[i, column + 1] + h2 * cov[i, column + 2]
+        if other > 0:
+            v[i] += cov[i, other]
+    seen = h0 * v[column] + h1 * v[column + 1] + h2 * v[column + 2]
+    left = innovation - (h0 * dx[column] + h1 * dx[column + 1] + h2 * dx[column + 2])
+    if other > 0:
+        seen += v[other]
+        left -= dx[other]
+    S = seen + R
+    score = left / math.sqrt(S)
+    if abs(score) > GATE:
+        beyond += dt
+        if beyond < PATIENCE or other > 0:
+            return score, beyond
+        # the measured quantity may have jumped: cov + grow h h' is positive definite, and hardly moves anything else
+        h = h0 * h0 + h1 * h1 + h2 * h2
+        wanted = (left / GATE) ** 2 - R
+        grow = (wanted - seen) / (h * h)
+        v[column] += grow * h * h0
+        v[column + 1] += grow * h * h1
+        v[column + 2] += grow * h * h2
+        widen(cov, column, h0, h1, h2, grow)
+        seen, S = wanted, wanted + R
+    for i in range(N_E):
+        K[i] = v[i] / S
+        dx[i] += K[i] * left
+    # (I - K H) cov (I - K H)' + K R K', written out for one row H
+    for i in range(N_E):
+        a, b = K[i], R * K[i] - (v[i] - K[i] * seen)
+        for j in range(N_E):
+            cov[i, j] += b * K[j] - a * v[j]
+    return score, 0.0
+
+
+@kernel
+def symmetrise(cov):
+    """What rounding has set apart on both sides of the diagonal becomes one again."""
+    for i in range(N_E):
+        for j in range(i):
+            cov[i, j] = 0.5 * (cov[i, j] + cov[j, i])
+            cov[j, i] = cov[i, j]
+
+
+@kernel
+def inject(P, x, dx):
+    """Move x by the error state dx; the attitude by the small rotation q * [1, dtheta / 2]."""
+    for i in range(3):
+        x[i] += dx[E_POS + i]
+    a, b, c = 0.5 * dx[E_ATT], 0.5 * dx[E_ATT + 1], 0.5 * dx[E_ATT + 2]
+    q0, q1, q2, q3 = x[3], x[4], x[5], x[6]
+    x[3] = q0 - q1 * a - q2 * b - q3 * c
+    x[4] = q1 + q0 * a + q2 * c - q3 * b
+    x[5] = q2 + q0 * b - q1 * c + q3 * a
+    x[6] = q3 + q0 * c + q1 * b - q2 * a
+    normalise_attitude(x)
+    for i in range(6):
+        x[X_NU + i] += dx[E_NU + i]
+    for i in range(E_ERR, N_E):
+        x[X_ERR + i - E_ERR] += dx[i]
+    for i in range(3):
+        x[X_NU + i] = clip(x[X_NU + i], -SPEED_LIMIT, SPEED_LIMIT)
+        x[X_NU + 3 + i] = clip(x[X_NU + 3 + i], -RATE_LIMIT, RATE_LIMIT)
+        x[X_ACT + i] += dx[E_ACT + i]
+    x[X_ACT] = clip(x[X_ACT], P[SERVO_MIN], P[SERVO_MAX])
+
+
+@kernel
+def estimator_update(P, settings, x, cov, stress, z, beyond, scores, dt, work):
+    """Take the measurements z (N_Z, NaN = none) into x and cov, one after the other, about the same x.
+
+    dt is the time since the last update; beyond (N_Z) is kept between calls. scores (N_Z) gets each innovation in
+    sigma, NaN where there was no measurement.
+    """
+    dx, v, K = work[W_SCRATCH], work[W_SCRATCH + 1], work[W_SCRATCH + 2]
+    for i in range(N_E):
+        dx[i] = 0.0
+    phi, theta, psi = euler_from_quaternion(x[3], x[4], x[5], x[6])
+    sf, cf, st, ct = math.sin(phi), math.cos(phi), math.sin(theta), math.cos(theta)
+    for m in range(N_Z):
+        scores[m] = math.nan
+        if not abs(z[m]) < LARGEST:
+            continue
+        axis = m % 3
+        column, h0, h1, h2, other = E_NU + 3 + axis, 1.0, 0.0, 0.0, 0
+        if m <= Z_YAW or m >= Z_MOCAP_ROLL:
+            column = E_ATT
+            if axis == 1:
+                h0, h1, h2, innovation = 0.0, cf, -sf, z[m] - theta
+            elif ct < COS_PITCH_MIN:
+                continue
+            elif axis == 0:
+                h1, h2, innovation = sf * st / ct, cf * st / ct, wrap_angle(z[m] - phi)
+            else:
+                h0, h1, h2, innovation = 0.0, sf / ct, cf / ct, wrap_angle(z[m] - psi)
+        elif m <= Z_R:
+            other, innovation = E_GYRO + axis, z[m] - x[X_NU + 3 + axis] - x[X_GYRO + axis]
+        elif m == Z_DEPTH:
+            column, innovation = E_POS + 2, z[m] - x[2]
+        elif m <= Z_BALLAST:
+            column, innovation = E_ACT + m - Z_DEPTH, z[m] - x[X_ACT + m - Z_DEPTH]
+        else:
+            column, innovation = E_POS + axis, z[m] - x[axis]
+        scores[m], beyond[m] = update_scalar(
+            cov, dx, column, h0, h1, h2, other, innovation, settings[S_R + m], beyond[m], dt, v, K
+        )
+        if column < E_ACT and abs(scores[m]) > GATE:
+            n = 0 if column < E_ATT else 1
+            stress[n] = min(stress[n] * math.exp(STRESS_GROWTH * dt), STRESS_MAX)
+    symmetrise(cov)
+    inject(P, x, dx)

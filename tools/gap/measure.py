@@ -1,0 +1,75 @@
+"""The gap between measured and predicted, channel by channel (GAP.md, Measures)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tools.gap.channels import CHANNELS, Channel, channels_of, measured
+from tools.gap.windows import Window
+from tools.runs.run import Run
+
+
+@dataclass
+class RunGap:
+    """One run's gaps, in tolerances."""
+
+    name: str
+    channels: dict[str, float]
+    total: float
+    windows: int  # scored ones
+
+
+def wrap(angles: np.ndarray) -> np.ndarray:
+    """Angles in rad brought to [-pi, pi)."""
+    return (angles + np.pi) % (2.0 * np.pi) - np.pi
+
+
+def scored_rows(listed: list[Window], rows: int) -> np.ndarray:
+    """Which rows of a run are scored, bool of shape (rows,)."""
+    mask = np.zeros(rows, dtype=bool)
+    for window in listed:
+        if window.scored:
+            mask[window.start : window.end] = True
+    return mask
+
+
+def errors(channel: Channel, table: np.ndarray, Y: np.ndarray) -> np.ndarray:
+    """(measured - predicted) / tolerance of a channel, shape (rows, columns); NaN where nothing was measured."""
+    columns = list(channel.columns)
+    difference = table[:, columns] - Y[:, columns]
+    if channel.wrapped:
+        difference = wrap(difference)
+    return difference / channel.tolerance
+
+
+def mean_square(channel: Channel, error: np.ndarray) -> float:
+    """Mean square of a channel's errors, NaN if there are none; a distance's components add up in each row."""
+    if channel.joint:
+        error = np.sqrt((error**2).sum(axis=1))
+    valid = error[np.isfinite(error)]
+    return float(np.mean(valid**2)) if valid.size else float("nan")
+
+
+def run_gap(run: Run, Y: np.ndarray, listed: list[Window]) -> RunGap:
+    """The gap of a run against its prediction Y (rows, N_Y). Channels without a scored sample are left out."""
+    rows, table = scored_rows(listed, run.rows), measured(run)
+    squares = {
+        channel.name: mean_square(channel, errors(channel, table, Y)[rows]) for channel in channels_of(run)
+    }
+    gaps = {name: float(np.sqrt(value)) for name, value in squares.items() if np.isfinite(value)}
+    return RunGap(run.name, gaps, root_mean_square(gaps.values()), sum(window.scored for window in listed))
+
+
+def root_mean_square(values) -> float:
+    """Root mean square of what is finite; NaN of nothing."""
+    finite = np.array([value for value in values if np.isfinite(value)])
+    return float(np.sqrt(np.mean(finite**2))) if finite.size else float("nan")
+
+
+def case_channels(gaps: list[RunGap]) -> dict[str, float]:
+    """Each channel's rms over the runs that have it."""
+    return {
+        channel.name: root_mean_square([gap.channels[channel.name] for gap in gaps if channel.name in gap.channels])
+        for channel in CHANNELS
+        if any(channel.name in gap.channels for gap in gaps)
+    }
