@@ -48,12 +48,16 @@ def configuration(
         C[getattr(layout, f"{name}_KI")] = gains.ki
         C[getattr(layout, f"{name}_KD")] = gains.kd
     C[layout.ROLL_KP], C[layout.ROLL_KD] = control.roll.kp, control.roll.kd
-    for name, gains in (("PITCH", control.pitch), ("DEPTH", control.depth), ("ROLL", control.roll)):
-        wn = gains.reference.wn
+    for name, reference in (
+        ("PITCH", control.pitch.reference),
+        ("DEPTH", control.depth.reference),
+        ("ROLL", control.roll.reference),
+    ):
+        wn = reference.wn
         if wn * dt > 0.5:
             raise ConfigError(mission.name, f"{wn} rad/s is too fast for a step of {dt} s", key="reference.wn")
-        C[getattr(layout, f"{name}_WN")] = gains.reference.wn
-        C[getattr(layout, f"{name}_ZETA")] = gains.reference.zeta
+        C[getattr(layout, f"{name}_WN")] = wn
+        C[getattr(layout, f"{name}_ZETA")] = reference.zeta
     C[layout.DEPTH_FILTER_WN] = control.depth.rate_bandwidth
     C[layout.MAX_AGE_IMU] = 3.0 * periods["imu"] + dt
     C[layout.MAX_AGE_BEACON] = 3.0 * periods["beacon"] + dt
@@ -114,7 +118,7 @@ class Autopilot:
         core.abort(self.ap, layout.REASON_OPERATOR)
 
     def rms_errors(self) -> dict[str, float | None]:
-        """Root mean square of estimate less reference while flying: depth_m, pitch_rad, roll_rad (None: not controlled)."""
+        """Rms of estimate less reference while flying: depth_m, pitch_rad, roll_rad; None where not controlled."""
         depth, attitude = self.ap[layout.COUNT_DEPTH], self.ap[layout.COUNT_ATTITUDE]
 
         def rms(total: float, count: float) -> float | None:

@@ -1,8 +1,7 @@
 """Names, units and meaning of what a flight records each tick. The places are those of core/telemetry."""
 
-from hal.recorder.schema import Field, RecordSpec
-
 from firmware.core.telemetry import N_RECORD
+from hal.recorder.schema import Field, RecordSpec
 
 _FIELDS = (
     ("t_s", "s", "time since the start of the flight, onboard clock"),

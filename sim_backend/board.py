@@ -4,12 +4,12 @@ from typing import Annotated, Any
 
 import msgspec
 import numpy as np
-from hal.recorder.schema import Field, RecordSpec
 
 from firmware.model.strict import Table, decode
 from hal.board import BoardRequest
 from hal.clocks import MonotonicClock
 from hal.ports import SLOTS
+from hal.recorder.schema import Field, RecordSpec
 from sim_backend.core.world import write_truth
 from sim_backend.world import Environment, SampledSensors, Start, World, build_world
 

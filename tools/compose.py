@@ -14,7 +14,7 @@ from firmware.model.vehicle import Vehicle
 from firmware.runtime import Runtime
 from firmware.telemetry import TICK
 from hal.board import BoardRequest, board_builder, board_kinds
-from hal.ports import Board, BoardError
+from hal.ports import BoardError
 from tools.errors import InputError
 from tools.sources import load_mission, load_vehicle, read_text
 
@@ -40,7 +40,7 @@ class Flight:
 
     vehicle: Vehicle
     mission: Mission
-    board: Board
+    board: Any  # hal.ports.Board, and of a simulated one its world and truth
     autopilot: Autopilot
     texts: dict[str, str]
 
@@ -150,7 +150,7 @@ def record_specs(flight: Flight) -> tuple:
 
 def build_runtime(flight: Flight, recorder: Any) -> Runtime:
     """The loop, recording into `recorder`; the board is open, for that is when a real clock starts."""
-    extras = ()
+    extras: tuple = ()
     if hasattr(flight.board, "truth_recorder"):
         extras = (flight.board.truth_recorder(recorder.channel("/truth")),)
     return Runtime(flight.board, flight.autopilot, recorder.channel("/tick"), extras=extras)

@@ -83,7 +83,7 @@ CACHE_DIR = _configure()
 import numba  # noqa: E402  (the cache folder has to be set first)
 
 if CACHE_DIR is not None:
-    numba.config.CACHE_DIR = str(CACHE_DIR)
+    numba.config.CACHE_DIR = str(CACHE_DIR)  # type: ignore[attr-defined]  # made at run time
 
 # Contraction (fused multiply-add) is what a C compiler does by default; NaN and Inf keep their meaning.
 _OPTIONS = dict(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})

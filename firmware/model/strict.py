@@ -7,7 +7,7 @@ expected, in one line.
 import math
 import re
 import tomllib
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import msgspec
 
@@ -32,8 +32,15 @@ class ConfigError(ValueError):
         super().__init__("".join(char if char.isprintable() else repr(char)[1:-1] for char in whole))
 
 
-class Table(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
-    """Base of every table read from a file: no unknown keys, no change after reading."""
+if TYPE_CHECKING:
+    # msgspec hands `frozen` down to subclasses, a type checker wants it said again at each of them.
+    class Table(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
+        """As below."""
+
+else:
+
+    class Table(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
+        """Base of every table read from a file: no unknown keys, no change after reading."""
 
 
 def _split_path(path: str) -> list[str | int]:

@@ -9,6 +9,7 @@ request is seen with its size. A boxed float takes 24 bytes, a NumPy scalar 32, 
 import ctypes
 from collections.abc import Callable
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -62,7 +63,7 @@ def _hooks(domain: int) -> tuple[_Allocator, _Allocator, np.ndarray, list]:
         by_size[min(n, LARGEST)] += 1
         return realloc(0, p, n)
 
-    wrappers = [counting_malloc, counting_calloc, counting_realloc]
+    wrappers: list[Any] = [counting_malloc, counting_calloc, counting_realloc]
     counting = _Allocator(counts.ctypes.data, *(wrapper.address for wrapper in wrappers), original.free)
     return original, counting, counts, [*wrappers, malloc, calloc, realloc]
 
@@ -96,7 +97,7 @@ def _count(function: Callable[[], object], times: int) -> np.ndarray:
     finally:
         for domain, (original, _, _, _) in hooks.items():
             setter(domain, ctypes.byref(original))
-    return sum(counts for _, _, counts, _ in hooks.values())
+    return np.sum([counts for _, _, counts, _ in hooks.values()], axis=0)
 
 
 def largest_block(function: Callable[[], object], times: int = 200) -> int:

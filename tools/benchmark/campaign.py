@@ -38,7 +38,7 @@ def fly_all(threads: int) -> tuple[float, int]:
 
 def measure(settings: Settings) -> dict[str, Any]:
     """flights_per_s on all cores, speedup against one core in the same run, cores, flights."""
-    cores = numba.config.NUMBA_NUM_THREADS
+    cores = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]  # made at run time
     fly_all(cores)
     alone, together = alternate(settings.repeats, lambda: fly_all(1), lambda: fly_all(cores))
     ratios = [many[0] / one[0] for one, many in zip(alone, together, strict=True)]

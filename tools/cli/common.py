@@ -1,6 +1,7 @@
 """What all commands share: exit codes, results on standard output, messages and progress on standard error."""
 
 import contextlib
+import functools
 import math
 import sys
 from collections.abc import Callable, Iterator
@@ -44,6 +45,10 @@ def print_json(result: Any) -> None:
     click.echo(json.dumps(_plain(result), indent=1))
 
 
+def _advance_bar(bar: Any, task: Any, n: int = 1) -> None:
+    bar.update(task, advance=n)
+
+
 @contextlib.contextmanager
 def progress(label: str, total: int) -> Iterator[Callable[[int], None]]:
     """A progress bar on a terminal, plain lines at every tenth elsewhere; yields advance(n)."""
@@ -53,7 +58,7 @@ def progress(label: str, total: int) -> Iterator[Callable[[int], None]]:
 
         with Progress(console=Console(stderr=True), transient=True) as bar:
             task = bar.add_task(label, total=total)
-            yield lambda n=1: bar.update(task, advance=n)
+            yield functools.partial(_advance_bar, bar, task)
         return
     done, shown = 0, 0
 

@@ -63,7 +63,11 @@ def fly(mission, vehicle, board, log_file, no_log, seed, realtime, effects, as_j
     if path is not None and path.exists():
         raise InputError("is there already; a log is never written over", source=path)
     metadata = log_metadata(flight, seed=seed, effects=wanted)
-    recorder = NullRecorder(specs) if path is None else Recorder(path, specs, attachments=flight.texts, metadata=metadata)
+    recorder: Recorder | NullRecorder
+    if path is None:
+        recorder = NullRecorder(specs)
+    else:
+        recorder = Recorder(path, specs, attachments=flight.texts, metadata=metadata)
 
     presses = 0
 
@@ -135,7 +139,8 @@ def _run(flight, recorder, realtime, advance):
 
 def _tell(result: dict) -> None:
     """The flight in a few lines, for a person."""
-    say(f"{'completed' if result['completed'] else 'NOT completed: ' + result['reason']} after {result['seconds']:.1f} s")
+    ended = "completed" if result["completed"] else f"NOT completed: {result['reason']}"
+    say(f"{ended} after {result['seconds']:.1f} s")
     errors = result["rms_error"]
     parts = []
     if errors["depth_m"] is not None:
