@@ -6,13 +6,14 @@ docs/IMPORT.md explains every key with an example.
 """
 
 import math
+import tomllib
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Literal
 
 import msgspec
 
-from firmware.model.strict import ConfigError, Table, decode
+from firmware.model.strict import ConfigError, Table, decode, locate
 from tools.errors import InputError
 from tools.runs import columns as names
 from tools.sources import read_text
@@ -152,9 +153,26 @@ def _check(mapping: MapTable, source: str) -> None:
 
 def decode_map(text: str, source: str) -> MapTable:
     """A mapping file's text; raises ConfigError with file, line and key."""
-    mapping = decode(text, MapTable, source)
+    try:
+        mapping = decode(text, MapTable, source)
+    except ConfigError as error:
+        raise _with_column(error, text, source) from None
     _check(mapping, source)
     return mapping
+
+
+def _with_column(error: ConfigError, text: str, source: str) -> ConfigError:
+    """An error inside [columns] or [extra] with the column's name, which the decoder leaves out for tables by name."""
+    group, *rest = error.key.split(".")
+    if group not in ("columns", "extra"):
+        return error
+    for name, table in tomllib.loads(text)[group].items():
+        try:
+            msgspec.convert(table, ColumnTable, strict=True)
+        except msgspec.ValidationError:
+            path: list[str | int] = [group, name, *rest]
+            return ConfigError(source, error.message, key=".".join(map(str, path)), line=locate(text, path))
+    return error
 
 
 def load_map(wanted: str) -> tuple[MapTable, Path]:

@@ -109,14 +109,15 @@ def opened(path: Path) -> Iterator[bytes | mmap.mmap]:
     if not path.is_file():
         raise InputError("not a file" if path.exists() else "no such file", source=path)
     try:
-        with path.open("rb") as file:
-            if path.stat().st_size == 0:
-                yield b""
-                return
-            with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
-                yield data
+        file = path.open("rb")
     except OSError as error:
         raise InputError(error.strerror or str(error), source=path) from None
+    with file:
+        if path.stat().st_size == 0:
+            yield b""
+            return
+        with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+            yield data
 
 
 class Definitions:

@@ -35,7 +35,7 @@ from tools.runs.run import Run
 from tools.sources import name_or_path
 
 TICK, TRUTH = "/tick", "/truth"
-EXTRA_FILE = "extra.csv"  # an imported run's columns that are no numbers
+EXTRA_FILE = "extra.csv"  # an imported run's columns that are no numbers, behind its time
 # Metadata of a log that was made from run data: there a column of gaps was recorded, elsewhere it was not.
 SOURCE, RUN_DATA = "source", "run data"
 _UNITS = (("_rad_s", "rad/s"), ("_rad", "rad"), ("_kg", "kg"), ("_m", "m"), ("_s", "s"))
@@ -115,10 +115,11 @@ def run_of(log: Log, name: str = "run00") -> Exported:
     if EXTRA_FILE in log.attachments:
         table = csvfile.Table(log.path / EXTRA_FILE, log.attachments[EXTRA_FILE].encode("utf-8"))
         if table.rows == tick.count:
-            rows = np.flatnonzero(keep)
-            extra |= {column: [table.texts(column)[row] for row in rows] for column in table.header}
+            for column in table.header[1:]:
+                words = table.texts(column)
+                extra[column] = [words[row] for row in np.flatnonzero(keep)]
         else:
-            notes.append(f"{', '.join(table.header)} left out: the log is cut and they are no numbers")
+            notes.append(f"{', '.join(table.header[1:])} left out: they are no numbers, and the log is cut")
     return Exported(Run(name=name, path=None, columns=numbers, extra=extra), notes)
 
 
@@ -242,6 +243,7 @@ def write_log(path: Path | str, case: Case, run: Run) -> Path:
         ),
     }
     if texts:
+        texts = {names.TIME: _exact_texts(run.t), **texts}
         attachments[EXTRA_FILE] = csvfile.encode_table(texts).decode("utf-8")
     metadata = {
         SOURCE: RUN_DATA,

@@ -10,7 +10,7 @@ import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, Literal
 
 import msgspec
 import numpy as np
@@ -223,11 +223,18 @@ def encode_table(columns: dict[str, list[str]]) -> bytes:
     """Columns of text as CSV, UTF-8; ValueError where they are of unequal length, or none."""
     if len({len(values) for values in columns.values()}) != 1:
         raise ValueError("columns of unequal length, or none")
+    text = _as_csv(columns, csv.QUOTE_MINIMAL)
+    if "\r" in text:  # the csv module leaves a lone carriage return without quotes
+        text = _as_csv(columns, csv.QUOTE_ALL)
+    return text.encode("utf-8")
+
+
+def _as_csv(columns: dict[str, list[str]], quoting: Literal[0, 1]) -> str:
     text = io.StringIO(newline="")
-    writer = csv.writer(text, lineterminator="\n")
+    writer = csv.writer(text, lineterminator="\n", quoting=quoting)
     writer.writerow(columns)
     writer.writerows(zip(*columns.values(), strict=True))
-    return text.getvalue().encode("utf-8")
+    return text.getvalue()
 
 
 def write_table(path: Path, columns: dict[str, list[str]]) -> None:

@@ -1,0 +1,284 @@
+"""Foreign CSV logs by mapping files: a synthetic logger, the real logs of 2015, and everything that can be wrong."""
+
+import gzip
+import json
+import math
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from firmware.model.strict import ConfigError
+from tools.cli.import_ import import_
+from tools.errors import InputError
+from tools.importers.csvlog import import_csv
+from tools.importers.mapping import UNITS, decode_map, load_map
+from tools.runs.case import load_case
+
+MAP = """\
+format = 1
+vehicle = "roughie"
+site = "lake"
+water_density_kg_m3 = 1000.0
+rate_hz = 10.0
+max_gap_s = 0.3
+
+[time]
+column = "millis"
+unit = "ms"
+
+[columns.depth_m]
+source = "adc"
+unit = "ft"
+zero = 100
+scale = 0.04
+
+[columns.pitch_rad]
+source = "pitch"
+unit = "deg"
+sign = -1
+
+[columns.yaw_rad]
+source = "yaw"
+unit = "deg"
+
+[extra.adc_counts]
+source = "adc"
+decimals = 1
+
+[[cut]]
+file = "a*"
+start_s = 1.0
+end_s = 3.0
+"""
+
+
+def synthetic(seconds=5.0, hole=(2.0, 2.2)):
+    """A log as a small logger writes it: uneven, whole numbers, yaw that wraps, one hole."""
+    rng = np.random.default_rng(3)
+    t = np.cumsum(rng.uniform(0.01, 0.03, size=int(seconds / 0.02)))
+    t = t[(t < hole[0]) | (t > hole[1])]
+    yaw = (170.0 + 8.0 * t + 180.0) % 360.0 - 180.0
+    lines = ["millis,adc,pitch,yaw"]
+    for moment, heading in zip(t, yaw, strict=True):
+        lines.append(f"{777_000 + round(1000 * moment)},{round(100 + 20 * moment)},{-3.0 * moment:.4f},{heading:.4f}")
+    return "\n".join(lines) + "\n"
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "a.csv").write_text(synthetic())
+    (tmp_path / "map.toml").write_text(MAP)
+    return tmp_path
+
+
+def _import(folder, *files, out="out", text=None):
+    if text is not None:
+        (folder / "map.toml").write_text(text)
+    return import_csv([folder / name for name in files or ("a.csv",)], str(folder / "map.toml"), folder / out)
+
+
+def test_a_synthetic_log_becomes_run_data(folder):
+    imported = _import(folder)
+    case = load_case(folder / "out")
+    assert (case.site, case.log_rate_hz, case.water_density_kg_m3) == ("lake", 10.0, 1000.0)
+    (run,) = case.runs
+    np.testing.assert_allclose(run.t, np.arange(20) / 10)
+    first = float(synthetic().splitlines()[1].split(",")[0]) / 1000 - 777.0
+    t = run.t + 1.0 + first  # the mapping counts from the file's first row
+    np.testing.assert_allclose(run.columns["pitch_rad"], np.deg2rad(3.0 * t), atol=2e-3)
+    np.testing.assert_allclose(run.columns["depth_m"], 0.3048 * 0.04 * 20 * t, atol=0.01)
+    yaw = np.deg2rad((170.0 + 8.0 * t + 180.0) % 360.0 - 180.0)
+    assert np.abs((run.columns["yaw_rad"] - yaw + np.pi) % (2 * np.pi) - np.pi).max() < 5e-3
+    assert np.abs(run.columns["yaw_rad"]).max() <= np.pi
+    assert not np.isnan(run.columns["depth_m"]).any()  # the hole is shorter than max_gap_s
+    assert set(run.extra) == {"adc_counts"}
+    assert imported.notes == []
+
+
+def test_a_hole_longer_than_allowed_is_missing(folder):
+    _import(folder, text=MAP.replace("max_gap_s = 0.3", "max_gap_s = 0.1"))
+    depth = load_case(folder / "out").runs[0].columns["depth_m"]
+    assert np.isnan(depth).sum() in (1, 2)
+
+
+def test_without_a_rate_the_rows_are_taken_as_they_are(folder):
+    imported = _import(folder, text=MAP.replace("rate_hz = 10.0\nmax_gap_s = 0.3\n", ""))
+    (run,) = load_case(folder / "out").runs
+    lines = [line.split(",") for line in synthetic().splitlines()[1:]]
+    logged = np.array([(int(line[0]) - int(lines[0][0])) / 1000 for line in lines])
+    use = (logged >= 1.0) & (logged < 3.0)
+    np.testing.assert_array_equal(run.t, logged[use] - 1.0)
+    assert "row by row" in imported.notes[0]
+
+
+def test_two_files_are_two_runs_each_with_its_cut(folder):
+    (folder / "b.csv.gz").write_bytes(gzip.compress(synthetic().encode()))
+    _import(folder, "a.csv", "b.csv.gz")
+    first, second = load_case(folder / "out").runs
+    assert first.rows == 20
+    assert second.rows == pytest.approx(50, abs=2)
+
+
+def test_rates_out_of_attitude(folder):
+    extra = '[columns.roll_rad]\nsource = "pitch"\nunit = "deg"\nscale = 1e-9\n'
+    text = MAP.replace("max_gap_s", "rates_from_attitude = true\nmax_gap_s").replace("[extra.", extra + "[extra.")
+    _import(folder, text=text)
+    (run,) = load_case(folder / "out").runs
+    assert run.has("p_rad_s", "q_rad_s", "r_rad_s")
+    assert np.median(run.columns["q_rad_s"]) == pytest.approx(np.deg2rad(3.0), rel=0.05)
+    with pytest.raises(ConfigError, match="rates_from_attitude"):
+        decode_map(MAP.replace("max_gap_s", "rates_from_attitude = true\nmax_gap_s"), "m")
+
+
+def test_a_semicolon_log_with_decimal_commas_and_marks_for_missing(folder):
+    text = MAP.replace("[time]", '[text]\ndelimiter = ";"\ndecimal = ","\nmissing = ["-999"]\nskip_lines = 2\n[time]')
+    lines = synthetic().replace(",", ";").replace(".", ",").splitlines()
+    lines[70] = ";".join([*lines[70].split(";")[:2], "-999", "-999"])
+    (folder / "a.csv").write_text("Logger 3\nserial; 7\n" + "\n".join(lines))
+    (folder / "plain.csv").write_text(synthetic())
+    _import(folder, text=text)
+    _import(folder, "plain.csv", out="plain", text=MAP.replace('file = "a*"', 'file = "p*"'))
+    first, second = load_case(folder / "out").runs[0], load_case(folder / "plain").runs[0]
+    np.testing.assert_array_equal(first.columns["depth_m"], second.columns["depth_m"])
+    assert np.abs(first.columns["pitch_rad"] - second.columns["pitch_rad"]).max() < 0.01
+
+
+def test_a_log_without_header_and_with_broken_rows(folder):
+    lines = synthetic().splitlines()[1:]
+    lines[10] = lines[10][:9]
+    (folder / "a.csv").write_text("\n".join(lines))
+    names = 'header = ["millis", "adc", "pitch", "yaw"]'
+    with pytest.raises(InputError, match=r"a.csv:11: too few fields"):
+        _import(folder, text=MAP.replace("[time]", f"[text]\n{names}\n[time]"))
+    text = MAP.replace("[time]", f'[text]\n{names}\nbroken_rows = "drop"\n[time]')
+    imported = _import(folder, text=text)
+    assert "1 broken rows" in imported.notes[0]
+    # Lines are still the file's own where rows before them were left out.
+    lines[20] = "x,1,2,3"
+    (folder / "a.csv").write_text("\n".join(lines))
+    with pytest.raises(InputError, match=r"a.csv:21: millis: not a number"):
+        _import(folder, out="other", text=text)
+
+
+def test_times_that_do_not_go_on(folder):
+    lines = synthetic().splitlines()
+    lines[30] = lines[20]
+    (folder / "a.csv").write_text("\n".join(lines))
+    with pytest.raises(InputError, match=r"a.csv:31: millis: time does not go on"):
+        _import(folder)
+    imported = _import(folder, text=MAP.replace('unit = "ms"', 'unit = "ms"\nnot_increasing = "drop"'))
+    assert "1 rows left out" in imported.notes[0]
+
+
+def test_dates_are_times_too(folder):
+    stamps = [f"2015-07-23T10:00:{second:06.3f}" for second in np.arange(0.0, 5.0, 0.05)]
+    rows = [f"{stamp},{number},1,2" for number, stamp in enumerate(stamps)]
+    (folder / "a.csv").write_text("\n".join(["millis,adc,pitch,yaw", *rows]))
+    text = MAP.replace('unit = "ms"', 'unit = "iso8601"')
+    _import(folder, text=text)
+    assert load_case(folder / "out").runs[0].rows == 20
+    (folder / "a.csv").write_text("\n".join(["millis,adc,pitch,yaw", *rows, "yesterday,1,1,1"]))
+    with pytest.raises(InputError, match="not a date"):
+        _import(folder, out="other", text=text)
+
+
+def test_pressure_becomes_depth_of_this_water(folder):
+    text = MAP.replace('unit = "ft"', 'unit = "kPa"').replace("scale = 0.04", "scale = 0.5")
+    _import(folder, text=text)
+    run = load_case(folder / "out").runs[0]
+    counts = np.array([float(word) for word in run.extra["adc_counts"]])
+    np.testing.assert_allclose(run.columns["depth_m"], (counts - 100) * 500 / (1000 * 9.80665), atol=0.003)
+
+
+def test_values_that_cannot_be_are_missing(folder):
+    _import(folder, text=MAP.replace("max_gap_s = 0.3\n", "").replace("scale = 0.04", "scale = 0.04\nvalid = [0, 0.4]"))
+    depth = load_case(folder / "out").runs[0].columns["depth_m"]
+    assert np.nanmax(depth) <= 0.4
+    assert np.isnan(depth).any()
+
+
+def test_a_vehicle_file_beside_the_mapping_goes_with_the_case(folder):
+    from firmware.model.library import shipped
+
+    (folder / "mine.toml").write_text(shipped("model/vehicles")["roughie"].replace("m_t = 13.0", "m_t = 12.0"))
+    _import(folder, text=MAP.replace('"roughie"', '"mine.toml"'))
+    assert load_case(folder / "out").vehicle.mass.m_t == 12.0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("rate_hz = 10.0", "rate = 10.0", "rate: unknown key"),
+        ("zero = 100", "zeros = 100", "columns.depth_m.zeros: unknown key"),
+        ("[columns.depth_m]", "[columns.height_m]", "columns.height_m: no column of run data"),
+        ("[columns.depth_m]", "[columns.t_s]", "columns.t_s: no column of run data"),
+        ("[extra.adc_counts]", "[extra.q_rad_s]", "extra.q_rad_s: the name is taken"),
+        ('unit = "ft"', 'unit = "furlong"', "unit: expected one of"),
+        ('unit = "ft"', 'unit = "deg"', "columns.depth_m.unit: 'deg' is no unit of length"),
+        ("sign = -1", "sign = 2", "columns.pitch_rad.sign"),
+        ("scale = 0.04", "scale = 0.0", "scale"),
+        ("scale = 0.04", "scale = 0.04\nvalid = [1, 0]", "valid"),
+        ("end_s = 3.0", "end_s = 0.5", "end_s"),
+        ('unit = "ms"', 'unit = "days"', "unit"),
+        ("rate_hz = 10.0\n", "", "max_gap_s: needs rate_hz"),
+        ("format = 1", "format = 1\nformat = 1", "not TOML"),
+    ],
+)
+def test_mappings_are_strict(old, new, said):
+    assert old in MAP
+    with pytest.raises(ConfigError) as error:
+        decode_map(MAP.replace(old, new), "map.toml")
+    assert said in str(error.value)
+    assert str(error.value).startswith("map.toml")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('source = "adc"', 'source = "ADC"', "no column 'ADC'; it has millis, adc, pitch, yaw"),
+        ("start_s = 1.0\nend_s = 3.0", "start_s = 100.0", "nothing between 100 s"),
+        ('unit = "ms"', 'unit = "h"', "is the time's unit right"),
+    ],
+)
+def test_logs_that_do_not_fit_their_mapping(folder, old, new, said):
+    with pytest.raises(InputError) as error:
+        _import(folder, text=MAP.replace(old, new).replace("end_s = 3.0\n", ""))
+    assert said in str(error.value)
+    assert not (folder / "out").exists()
+
+
+def test_units_are_what_they_say():
+    assert UNITS["deg"][1] == math.radians(1)
+    assert UNITS["psi"][1] == pytest.approx(0.45359237 * 9.80665 / 0.0254**2)
+
+
+def test_the_command_and_the_shipped_mapping(folder):
+    mapping, _ = load_map("roughie2015")
+    assert mapping.rate_hz == 10.0
+    with pytest.raises(InputError, match="no mapping 'nothing'"):
+        load_map("nothing")
+    arguments = ["csv", str(folder / "a.csv"), "--map", str(folder / "map.toml"), "--json"]
+    result = CliRunner().invoke(import_, arguments, catch_exceptions=False)
+    assert json.loads(result.stdout)["rows"] == [20]
+    assert load_case(folder / "a.case").runs[0].rows == 20
+
+
+def test_the_flights_of_2015_are_reproduced(shared, tmp_path):
+    """Exact but for the last digit of the second flight, and for two samples of the first that lie just between two
+    rows: which of them takes such a sample is the rounding of a time that the given files counted from elsewhere."""
+    given = shared / "data" / "roughie2015"
+    raw = [given / "raw" / "flight1.csv.gz", given / "raw" / "flight2.csv.gz"]
+    import_csv(raw, "roughie2015", tmp_path / "out")
+    assert (tmp_path / "out" / "case.toml").read_text() == (given / "case.toml").read_text()
+    ours, theirs = load_case(tmp_path / "out"), load_case(given)
+    between = {0: 4, 1: 0}
+    for number, (mine, wanted) in enumerate(zip(ours.runs, theirs.runs, strict=True)):
+        assert list(mine.columns) == list(wanted.columns)
+        assert list(mine.extra) == list(wanted.extra)
+        wrong = np.zeros(wanted.rows, dtype=bool)
+        for name, values in wanted.columns.items():
+            np.testing.assert_array_equal(np.isnan(mine.columns[name]), np.isnan(values))
+            wrong |= np.abs(mine.columns[name] - values) > 1.01e-5
+            np.testing.assert_allclose(mine.columns[name], values, atol=0.01)
+        assert np.count_nonzero(wrong) == between[number]
