@@ -163,7 +163,8 @@ def main() -> int:
         file, specs, attachments=config["attachments"], metadata=config["metadata"], epoch_ns=config["epoch_ns"]
     )
     recording = Recording(reader, log, file, config["path"], config["period_s"])
-    if not recording.sync():
+    if not recording.sync():  # no flight starts without room for its log
+        disk.close(fd, config["path"], keep=False)
         answer({"error": file.last_errno, "message": os.strerror(file.last_errno)})
         return 1
     answer({"ready": True})

@@ -108,9 +108,7 @@ def _to_case(source: Path, out: Path | None, vehicle: str | None) -> dict[str, A
     from tools.log.rundata import export_case
 
     the_log = read_log(source)
-    folder = (
-        source.with_name(source.name.removesuffix(".mcap") + ("" if source.suffix else ".case")) if out is None else out
-    )
+    folder = _case_beside(source) if out is None else out
     exported = export_case(the_log, folder, vehicle=vehicle)
     notes = list(exported.notes) if the_log.whole else [_state(the_log), *exported.notes]
     return {
@@ -119,6 +117,11 @@ def _to_case(source: Path, out: Path | None, vehicle: str | None) -> dict[str, A
         "rows": exported.run.rows,
         "notes": notes,
     }
+
+
+def _case_beside(source: Path) -> Path:
+    name = source.name.removesuffix(".mcap")
+    return source.with_name(f"{name}.case" if name == source.name else name)
 
 
 def _to_logs(source: Path, out: Path | None) -> list[Path]:

@@ -82,7 +82,11 @@ def import_run(path: Path, mapping: MapTable, name: str, notes: list[str]) -> Ru
         if column not in table.header:
             raise InputError(f"no column '{column}'; it has {', '.join(table.header)}", source=path)
     t, keep = _times(table, mapping, path, notes)
-    cut = _cut_of(path, mapping)
+    cut = next((cut for cut in mapping.cut if fnmatch.fnmatch(path.name, cut.file)), None)
+    if cut is None:
+        cut = CutTable()
+        if mapping.cut:
+            notes.append(f"{path}: no [[cut]] is for a file of this name; it is taken whole")
     density = mapping.water_density_kg_m3
     values = {
         target: _converted(table.numbers(item.source)[keep], item, density) for target, item in everything.items()
@@ -135,10 +139,6 @@ def _iso_seconds(table: csvfile.Table, column: str) -> np.ndarray:
         except (ValueError, TypeError):  # no date, or some with and some without a time zone
             raise table.error(f"not a date and time: {text[:40]!r}", row=row, column=column) from None
     return seconds
-
-
-def _cut_of(path: Path, mapping: MapTable) -> CutTable:
-    return next((cut for cut in mapping.cut if fnmatch.fnmatch(path.name, cut.file)), CutTable())
 
 
 def _converted(logged: np.ndarray, item: ColumnTable, density: float) -> np.ndarray:

@@ -1,8 +1,9 @@
 """What of an MCAP file can be trusted: its records up to a cut, past damage, and never one whose checksum fails.
 
 Chunks and attachments carry MCAP's checksums, metadata the one that the recorder adds; records under none (messages
-outside chunks, indexes) are not delivered. After damage the next whole chunk is searched for, so that a flipped bit
-costs the chunk it is in and not the rest of the flight.
+outside chunks, indexes) are not delivered, and their lengths not relied on: where the next record makes no sense, the
+search for one that can be proved starts behind the last one that was. So a flipped bit costs the chunk it is in and not
+the rest of the flight.
 """
 
 import re
@@ -25,8 +26,8 @@ _RECORD = struct.Struct("<BQ")
 _CHUNK = struct.Struct("<QQQII")  # start, end, size unpacked, checksum, length of the compression's name
 _MESSAGE = struct.Struct("<HIQQ")
 _OPCODES = frozenset(int(opcode) for opcode in Opcode)
-# A chunk as the recorder writes it: uncompressed, under 16 MB.
-_CHUNK_START = re.compile(rb"\x06.{3}\x00{5}.{16}.{3}\x00{5}.{4}\x00{4}.{3}\x00{5}", re.DOTALL)
+# How a record under a checksum begins: a chunk, an attachment or metadata of less than 16 MB.
+_START = re.compile(rb"[\x06\x09\x0c].{3}\x00{5}", re.DOTALL)
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,8 @@ class Scan:
         self.complete = False  # closed by its writer, down to the last byte
         self.end = 0  # bytes understood; what lies behind is the torn rest of a cut
         self.damages: list[Damage] = []
+        # The last search and what it found: a file of damage alone is still searched once.
+        self._searched: tuple[int, int | None] = (self._size + 1, None)
 
     @property
     def recognised(self) -> bool:
@@ -55,57 +58,67 @@ class Scan:
 
     def records(self) -> Iterator[bytes | Attachment | Metadata]:
         """Contents of chunks, attachments and metadata, in order, each with its checksum proved. Never raises."""
-        place = len(MCAP0_MAGIC)
+        place = proved = len(MCAP0_MAGIC)  # `proved`: the end of what is certain
         if not self.recognised:
-            found = self._next_chunk(0)
+            found = self._next_proved(0)
             if found is None:
                 return
             self._damage(0, found, "the file's first bytes")
             place = found
-        while place + _RECORD.size <= self._size:
-            opcode, length = _RECORD.unpack(self._data[place : place + _RECORD.size])
-            after = place + _RECORD.size + length
-            if opcode not in _OPCODES or after > self._size:
-                found = self._next_chunk(place + 1)
+        while True:
+            head = self._head(place)
+            if head is None:
+                found = self._next_proved(proved)
                 if found is None:
                     break
-                self._damage(place, found - place, "records that make no sense")
-                place = found
+                self._damage(proved, found - proved, "records that make no sense")
+                place = proved = found
                 continue
+            opcode, after = head
             if opcode == Opcode.DATA_END:
                 self._finish(place, after)
                 return
-            body = self._data[place + _RECORD.size : after]
-            item, wrong = _checked(opcode, body)
+            item, wrong = _checked(opcode, self._data[place + _RECORD.size : after])
             if wrong:
                 after = self._after_damage(place, after)
                 self._damage(place, after - place, wrong)
             elif item is not None:
                 yield item
+                proved = after
             place = after
         self.end = min(place, self._size)
+
+    def _head(self, place: int) -> tuple[int, int] | None:
+        """Opcode and end of the record at a place; None where there is no record that could be one."""
+        if place + _RECORD.size > self._size:
+            return None
+        opcode, length = _RECORD.unpack(self._data[place : place + _RECORD.size])
+        after = place + _RECORD.size + length
+        return (opcode, after) if opcode in _OPCODES and after <= self._size else None
 
     def _damage(self, offset: int, length: int, what: str) -> None:
         self.damages.append(Damage(offset, length, what))
 
     def _after_damage(self, place: int, after: int) -> int:
         """Where to go on behind a damaged record: its length may be what is damaged."""
-        found = self._next_chunk(place + 1)
-        plausible = after == self._size
-        if after + _RECORD.size <= self._size:
-            opcode, length = _RECORD.unpack(self._data[after : after + _RECORD.size])
-            plausible = opcode in _OPCODES and after + _RECORD.size + length <= self._size
-        if found is not None and (found < after or not plausible):
+        found = self._next_proved(place + 1)
+        if found is not None and (found < after or self._head(after) is None):
             return found
         return after
 
-    def _next_chunk(self, place: int) -> int | None:
-        """The first whole chunk from a place on."""
-        while match := _CHUNK_START.search(self._data, place):
+    def _next_proved(self, place: int) -> int | None:
+        """The first record from a place on that its checksum proves."""
+        searched, found = self._searched
+        if searched > place or (found is not None and found < place):
+            found = self._search(place)
+            self._searched = (place, found)
+        return found
+
+    def _search(self, place: int) -> int | None:
+        while match := _START.search(self._data, place):
             start = match.start()
-            _, length = _RECORD.unpack(self._data[start : start + _RECORD.size])
-            body = self._data[start + _RECORD.size : start + _RECORD.size + length]
-            if len(body) == length and not _chunk(body)[1]:
+            head = self._head(start)
+            if head is not None and _checked(head[0], self._data[start + _RECORD.size : head[1]])[0] is not None:
                 return start
             place = start + 1
         return None
@@ -144,10 +157,14 @@ def _checked(opcode: int, body: bytes) -> tuple[bytes | Attachment | Metadata | 
         if opcode == Opcode.CHUNK:
             return _chunk(body)
         if opcode == Opcode.ATTACHMENT:
+            if not _lengths_fit(body, 16, 2, 8, 4):
+                return None, "an attachment's head"
             if struct.unpack("<I", body[-4:]) != (zlib.crc32(body[:-4]),):
                 return None, "an attachment"
             return Attachment.read(ReadDataStream(BytesIO(body))), ""
         if opcode == Opcode.METADATA:
+            if not _lengths_fit(body, 0, 1, 4, 0):
+                return None, "metadata"
             metadata = Metadata.read(ReadDataStream(BytesIO(body)))
             if metadata.metadata.get(CRC_KEY) != metadata_crc(metadata.name, metadata.metadata):
                 return None, "metadata"
@@ -157,6 +174,15 @@ def _checked(opcode: int, body: bytes) -> tuple[bytes | Attachment | Metadata | 
     except (struct.error, EndOfFile, UnicodeDecodeError, MemoryError, OverflowError):
         return None, "a record that makes no sense"
     return None, ""
+
+
+def _lengths_fit(body: bytes, skipped: int, strings: int, size_bytes: int, behind: int) -> bool:
+    """Whether a body is as long as it says: `skipped` bytes, strings, one block with its size ahead, `behind` bytes."""
+    place = skipped
+    for _ in range(strings):
+        place += 4 + int.from_bytes(body[place : place + 4], "little")
+    place += size_bytes + int.from_bytes(body[place : place + size_bytes], "little")
+    return place + behind == len(body)
 
 
 def _chunk(body: bytes) -> tuple[bytes | None, str]:

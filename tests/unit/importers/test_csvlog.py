@@ -3,6 +3,7 @@
 import gzip
 import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -246,6 +247,22 @@ def test_logs_that_do_not_fit_their_mapping(folder, old, new, said):
         _import(folder, text=MAP.replace(old, new).replace("end_s = 3.0\n", ""))
     assert said in str(error.value)
     assert not (folder / "out").exists()
+
+
+def test_the_example_of_the_documentation_works(tmp_path):
+    """Its mapping, on a log as it describes one."""
+    guide = (Path(__file__).parents[3] / "docs" / "IMPORT.md").read_text()
+    (tmp_path / "map.toml").write_text(guide.split("```toml\n")[1].split("```")[0])
+    lines = ["two lines of", "the logger's own"]
+    lines += [f"{20 * row};{138 + row / 10:.1f};0,5;-999;{90 - row / 100:.2f}".replace(".", ",") for row in range(7000)]
+    (tmp_path / "flight1.csv").write_bytes("\n".join(lines).encode("latin-1"))
+    import_csv([tmp_path / "flight1.csv"], str(tmp_path / "map.toml"), tmp_path / "out")
+    (run,) = load_case(tmp_path / "out").runs
+    assert run.rows == 840
+    np.testing.assert_allclose(run.columns["depth_m"], 0.1 * (run.t + 40) / 0.02 * 0.0423062 * 0.3048, atol=0.004)
+    np.testing.assert_allclose(run.columns["yaw_rad"], np.deg2rad((run.t + 40) / 2), atol=2e-4)
+    assert np.isnan(run.columns["pitch_rad"]).all()
+    assert run.has("p_rad_s", "q_rad_s", "r_rad_s")
 
 
 def test_units_are_what_they_say():

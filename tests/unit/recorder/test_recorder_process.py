@@ -85,6 +85,17 @@ def test_files_that_cannot_be_written_are_refused_at_the_start(tmp_path):
     assert error.value.filename.endswith("x.mcap")
 
 
+def test_a_disk_that_is_full_at_the_start_is_an_error_and_leaves_no_file(tmp_path):
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, hard))  # the recording process inherits it
+    try:
+        with pytest.raises(OSError, match="too large"):
+            Recorder(tmp_path / "x.mcap", [TICK]).start()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_an_exception_in_flight_still_closes_the_log(tmp_path):
     def crash():
         with Recorder(tmp_path / "x.mcap", [TICK]) as recorder:
