@@ -16,8 +16,8 @@ N_RECORD = 35
 
 @kernel
 def fresh(value, time, seen):
-    """The value if its sample is newer than the one recorded last, else NaN: a repeated sample is not a second one."""
-    return value if time > seen else math.nan
+    """The value if its sample is newer than the one recorded last (NaN: none yet), else NaN: once is enough."""
+    return value if time >= 0.0 and not time <= seen else math.nan
 
 
 @kernel
