@@ -7,6 +7,7 @@ import numpy as np
 from firmware.control.gains import Control
 from firmware.core import autopilot as core
 from firmware.core import control_layout as layout
+from firmware.core.guidance import abort
 from firmware.guidance.mission import Mission
 from firmware.model.strict import ConfigError
 from firmware.model.vehicle import Vehicle
@@ -48,6 +49,7 @@ def configuration(
         C[getattr(layout, f"{name}_KI")] = gains.ki
         C[getattr(layout, f"{name}_KD")] = gains.kd
     C[layout.ROLL_KP], C[layout.ROLL_KD] = control.roll.kp, control.roll.kd
+    C[layout.HEADING_KP], C[layout.HEADING_KD] = control.heading.kp, control.heading.kd
     for name, reference in (
         ("PITCH", control.pitch.reference),
         ("DEPTH", control.depth.reference),
@@ -98,9 +100,10 @@ class Autopilot:
         reason = REASONS[float(self.ap[layout.REASON])]
         if self.ap[layout.REASON] == layout.REASON_LEG_TIME:
             row = int(self.ap[layout.LEG])
-            target = self.legs[row, layout.LEG_DEPTH]
+            target, turn = self.legs[row, layout.LEG_DEPTH], self.legs[row, layout.LEG_TURNED]
             limit = self.legs[row, layout.LEG_TIME_LIMIT]
-            return f"leg {row + 1}: not at {target:g} m within {limit:g} s"
+            missed = f"not at {target:g} m" if math.isfinite(target) else f"not turned by {math.degrees(turn):g} deg"
+            return f"leg {row + 1}: {missed} within {limit:g} s"
         return reason
 
     @property
@@ -115,7 +118,7 @@ class Autopilot:
 
     def give_up(self) -> None:
         """Abort, as the operator wishes: ballast out, nose up, to the surface."""
-        core.abort(self.ap, layout.REASON_OPERATOR)
+        abort(self.ap, layout.REASON_OPERATOR)
 
     def rms_errors(self) -> dict[str, float | None]:
         """Rms of estimate less reference while flying: depth_m, pitch_rad, roll_rad; None where not controlled."""
@@ -129,10 +132,3 @@ class Autopilot:
             "pitch_rad": rms(self.ap[layout.SUM_PITCH], attitude),
             "roll_rad": rms(self.ap[layout.SUM_ROLL], attitude),
         }
-
-    def leg_text(self) -> str:
-        """The leg being flown, for a person."""
-        row = int(self.ap[layout.LEG])
-        depth = self.legs[row, layout.LEG_DEPTH]
-        to = f"to {depth:g} m" if math.isfinite(depth) else f"for {self.legs[row, layout.LEG_DURATION]:g} s"
-        return f"leg {row + 1}/{len(self.legs)} {to}"

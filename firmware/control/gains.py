@@ -45,9 +45,17 @@ class RollGains(Table):
     reference: ReferenceTable = ReferenceTable(wn=0.8)
 
 
+class HeadingGains(Table):
+    """Roll (rad) against heading error (rad) and yaw rate (rad/s), for legs that hold a heading."""
+
+    kp: NonNegative = 1.0
+    kd: NonNegative = 2.0
+
+
 class Control(Table):
-    """[control]: gains of the three loops; what is left out keeps its default."""
+    """[control]: gains of the loops; what is left out keeps its default."""
 
     pitch: PitchGains = PitchGains()
     depth: DepthGains = DepthGains()
     roll: RollGains = RollGains()
+    heading: HeadingGains = HeadingGains()

@@ -18,7 +18,8 @@ SALINITY = 20                                        # PSU
 SURFACE_PRESSURE = 21                                # Pa
 SITE_DEPTH = 22                                      # m; 0: unknown
 MISSION_TIME_LIMIT = 23                              # s
-N_C = 24
+HEADING_KP, HEADING_KD = 24, 25                      # rad of roll per rad of heading error, and per rad/s
+N_C = 26
 
 # --- est: the estimate ----------------------------------------------------------------------------------------------
 EST_DEPTH, EST_DEPTH_RATE = 0, 1
@@ -33,14 +34,17 @@ EST_DEPTH_MEASURED = 16                              # m, of the newest beacon s
 N_EST = 17
 
 # --- legs: one row each ---------------------------------------------------------------------------------------------
-LEG_DEPTH = 0                                        # m, target; NaN: the leg lasts LEG_DURATION
+LEG_DEPTH = 0                                        # m, target; NaN: the leg ends by time or turn
 LEG_PITCH, LEG_ROLL = 1, 2                           # rad
 LEG_BALLAST = 3                                      # kg held; NaN: the depth loop commands it
 LEG_TIME_LIMIT = 4                                   # s
 LEG_HOLD = 5                                         # s at the depth before the leg is done
 LEG_TOLERANCE = 6                                    # m
-LEG_DURATION = 7                                     # s; NaN for a depth leg
-N_LEG = 8
+LEG_DURATION = 7                                     # s; NaN for a leg to a depth or through a turn
+LEG_TURN = 8                                         # +1 to starboard, -1 to port; NaN: LEG_ROLL as it stands
+LEG_HEADING = 9                                      # rad, held by roll up to LEG_ROLL; NaN: not held
+LEG_TURNED = 10                                      # rad through which the leg turns before it is done; NaN
+N_LEG = 11
 
 # --- ap: the autopilot's memory -------------------------------------------------------------------------------------
 MODE, LEG, LEG_START, REACHED = 0, 1, 2, 3
@@ -54,7 +58,8 @@ LEG_DEPTH_START = 19                                 # m, depth at which the leg
 MISSION_START = 20                                   # s
 SUM_DEPTH, SUM_PITCH, SUM_ROLL = 21, 22, 23          # squared tracking errors added up while flying, m2, rad2
 COUNT_DEPTH, COUNT_ATTITUDE = 24, 25                 # ticks in those sums
-N_AP = 26
+TURNED, YAW_BEFORE = 26, 27                          # rad turned in this leg, starboard positive; yaw a tick ago
+N_AP = 28
 
 # --- modes and reasons ----------------------------------------------------------------------------------------------
 WAITING, FLYING, COMPLETED, ABORTED = 0.0, 1.0, 2.0, 3.0

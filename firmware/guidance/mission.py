@@ -1,7 +1,7 @@
 """Missions: legs of depth or time with pitch, roll and ballast, as a strict file and as the kernels' matrix."""
 
 import math
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 import numpy as np
@@ -27,11 +27,18 @@ class Site(Table):
 
 
 class Leg(Table):
-    """One leg: to a depth (depth_m, time_limit_s) or for a time (duration_s). Angles in degrees, nose up positive."""
+    """One leg: to a depth (depth_m), for a time (duration_s) or through a turn (turned_deg). Degrees, nose up positive.
+
+    A leg rolls by roll_deg; with `turn` it rolls to whichever side turns the vehicle that way, diving or climbing; with
+    heading_deg it holds that heading by rolling up to roll_deg either way.
+    """
 
     pitch_deg: PitchAngle
     roll_deg: RollAngle = 0.0
+    turn: Literal["starboard", "port"] | None = None
+    heading_deg: Annotated[float, msgspec.Meta(ge=-360.0, le=360.0)] | None = None
     depth_m: Depth | None = None
+    turned_deg: Annotated[float, msgspec.Meta(gt=0.0, le=7200.0)] | None = None
     time_limit_s: Seconds | None = None
     duration_s: Seconds | None = None
     ballast_kg: float | None = None  # held; without it the depth loop commands the ballast
@@ -39,14 +46,25 @@ class Leg(Table):
     tolerance_m: Annotated[float, msgspec.Meta(gt=0.0, le=10.0)] = 0.2
 
     def __post_init__(self):
-        if (self.depth_m is None) == (self.duration_s is None):
-            raise ValueError("expected depth_m (a leg to a depth) or duration_s (a leg for a time), and not both")
-        if self.depth_m is not None and self.time_limit_s is None:
-            raise ValueError("time_limit_s: a leg to a depth needs one; past it the dive is given up")
+        ends = [name for name in ("depth_m", "duration_s", "turned_deg") if getattr(self, name) is not None]
+        if len(ends) != 1:
+            raise ValueError(
+                "expected one of depth_m (a leg to a depth), duration_s (for a time), turned_deg (through a turn), "
+                f"got {' and '.join(ends) or 'none of them'}"
+            )
+        if self.duration_s is None and self.time_limit_s is None:
+            raise ValueError("time_limit_s: a leg to a depth or through a turn needs one; past it the dive is given up")
         if self.duration_s is not None and self.time_limit_s is not None:
             raise ValueError("time_limit_s: a leg for a time has its duration_s, and no limit beside it")
-        if self.duration_s is not None and self.hold_s:
+        if self.depth_m is None and self.hold_s:
             raise ValueError("hold_s: belongs to a leg to a depth")
+        if self.turn is not None and self.heading_deg is not None:
+            raise ValueError("turn, heading_deg: a leg turns or holds a heading, not both")
+        steers = self.turn is not None or self.heading_deg is not None
+        if steers and self.roll_deg <= 0.0:
+            raise ValueError("roll_deg: a leg that turns or holds a heading needs one above 0, the most it may roll")
+        if self.turned_deg is not None and (self.heading_deg is not None or not self.roll_deg):
+            raise ValueError("turned_deg: a leg through a turn needs a roll_deg and holds no heading")
 
 
 class Mission(Table):
@@ -68,7 +86,7 @@ class Mission(Table):
                     f"leg[{number}].depth_m: {leg.depth_m} m is deeper than the site allows "
                     f"({self.site.depth_m} m less {self.site.clearance_m} m clearance)"
                 )
-        if all(leg.duration_s is not None and leg.ballast_kg is None for leg in self.leg):
+        if all(leg.depth_m is None and leg.ballast_kg is None for leg in self.leg):
             raise ValueError("no leg has a depth_m or a ballast_kg: the mission would go nowhere")
 
     def matrix(self, vehicle: Vehicle, source: str) -> np.ndarray:
@@ -88,6 +106,9 @@ class Mission(Table):
                 (layout.LEG_BALLAST, leg.ballast_kg),
                 (layout.LEG_TIME_LIMIT, leg.time_limit_s),
                 (layout.LEG_DURATION, leg.duration_s),
+                (layout.LEG_TURN, None if leg.turn is None else (1.0 if leg.turn == "starboard" else -1.0)),
+                (layout.LEG_HEADING, None if leg.heading_deg is None else math.radians(leg.heading_deg)),
+                (layout.LEG_TURNED, None if leg.turned_deg is None else math.radians(leg.turned_deg)),
             ):
                 if value is not None:
                     legs[row, index] = value

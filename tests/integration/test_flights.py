@@ -99,7 +99,7 @@ def test_fly_as_a_user_types_it(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("fly", "--mission", "nope"), "no mission 'nope': neither a file nor one of sawtooth, spiral"),
+        (("fly", "--mission", "nope"), "no mission 'nope': neither a file nor one of circle_to_s, sawtooth, spiral"),
         (("fly", "--vehicle", "nope"), "no vehicle 'nope'"),
         (("fly", "--board", "nope"), "no board 'nope'"),
         (("fly", "--effect", "drag:scale=much"), "expected label:parameter=number"),
