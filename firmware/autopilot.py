@@ -7,7 +7,9 @@ import numpy as np
 from firmware.control.gains import Control
 from firmware.core import autopilot as core
 from firmware.core import control_layout as layout
+from firmware.core.estimator_layout import COMMANDED
 from firmware.core.guidance import abort
+from firmware.estimation.settings import estimator_settings, first_spread, parameter_sigma
 from firmware.guidance.mission import Mission
 from firmware.model.strict import ConfigError
 from firmware.model.vehicle import Vehicle
@@ -23,6 +25,7 @@ REASONS = {
     layout.REASON_TOO_DEEP: "deeper than the site",
     layout.REASON_OPERATOR: "asked to by the operator",
 }
+ESTIMATORS = {"measured": layout.MEASURED, "filter": layout.FILTERED}
 STANDARD_PRESSURE = 101325.0  # Pa
 SURFACED = 0.3  # m; shallower than this counts as at the surface
 
@@ -69,7 +72,21 @@ def configuration(
     C[layout.SURFACE_PRESSURE] = surface_pressure
     C[layout.SITE_DEPTH] = mission.site.depth_m
     C[layout.MISSION_TIME_LIMIT] = mission.time_limit_s
+    C[layout.ESTIMATOR] = ESTIMATORS[control.estimator]
     return C
+
+
+def filter_memory(vehicle: Vehicle) -> np.ndarray:
+    """The Kalman filter's vector nav, shape (layout.N_NAV,), with what the vehicle file says of sensors and errors."""
+    P = vehicle.vector()
+    nav = np.zeros(layout.N_NAV)
+    for start, values in (
+        (layout.NAV_SETTINGS, estimator_settings(vehicle.sensors, vehicle.disturbance)),
+        (layout.NAV_SIGMA, parameter_sigma(P, vehicle.uncertainty)),
+        (layout.NAV_SPREAD, first_spread(P, COMMANDED, (True, True, True))),
+    ):
+        nav[start : start + len(values)] = values
+    return nav
 
 
 class Autopilot:
@@ -82,12 +99,13 @@ class Autopilot:
         self.frame = empty_frame()
         self.est = np.zeros(layout.N_EST)
         self.ap = np.zeros(layout.N_AP)
+        self.nav = filter_memory(vehicle)
         self.commands = np.zeros(3)
-        core.reset(self.est, self.ap)
+        core.reset(self.est, self.ap, self.nav)
 
     def tick(self, t: float) -> np.ndarray:
         """Take self.frame at time t (s) and return the commands: servo rad, slider m, ballast kg (its own array)."""
-        core.tick(self.P, self.C, self.legs, self.frame, self.est, self.ap, self.commands, t)
+        core.tick(self.P, self.C, self.legs, self.frame, self.est, self.ap, self.nav, self.commands, t)
         return self.commands
 
     @property

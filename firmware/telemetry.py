@@ -39,6 +39,23 @@ _FIELDS = (
     ("beacon_time_s", "s", "time of the newest beacon sample"),
     ("slider_time_s", "s", "time of the newest slider draw-wire sample"),
     ("plunger_time_s", "s", "time of the newest plunger draw-wire sample"),
+    ("est_roll_rad", "rad", "estimated roll"),
+    ("est_pitch_rad", "rad", "estimated pitch"),
+    ("est_yaw_rad", "rad", "estimated yaw"),
+    ("est_u_m_s", "m/s", "estimated surge through the water"),
+    ("est_v_m_s", "m/s", "estimated sway through the water"),
+    ("est_w_m_s", "m/s", "estimated heave through the water"),
+    ("est_servo_rad", "rad", "estimated servo angle"),
+    ("est_slider_m", "m", "estimated slider position"),
+    ("est_ballast_kg", "kg", "estimated net ballast mass"),
+    ("est_x_m", "m", "north of the start, by dead reckoning"),
+    ("est_y_m", "m", "east of the start, by dead reckoning"),
+    ("est_water_n_m_s", "m/s", "estimated current, north"),
+    ("est_water_e_m_s", "m/s", "estimated current, east"),
+    ("sd_depth_rate_m_s", "m/s", "1 sigma of the estimated depth rate"),
+    ("sd_pitch_rad", "rad", "1 sigma of the estimated pitch"),
+    ("sd_u_m_s", "m/s", "1 sigma of the estimated surge"),
+    ("activity", "1", "mean square of the filter's scores, 1 where all is as modelled"),
 )
 
 TICK = RecordSpec(

@@ -1,6 +1,6 @@
 """Gains of the baseline controllers: read from the vehicle or the mission file, the mission's word counting first."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 
@@ -59,3 +59,4 @@ class Control(Table):
     depth: DepthGains = DepthGains()
     roll: RollGains = RollGains()
     heading: HeadingGains = HeadingGains()
+    estimator: Literal["measured", "filter"] = "filter"

@@ -25,7 +25,8 @@ from firmware.core.layout import (
     SLIDER_RATE,
     X_B,
 )  # fmt: skip
-from firmware.core.sensing import sense
+from firmware.core.navigation import navigate
+from firmware.core.sensing import sense, take_as_measured
 
 
 @kernel
@@ -81,13 +82,17 @@ def limit_commands(P, ap, servo, slider, ballast, dt, cmd):
 
 
 @kernel
-def tick(P, C, legs, frame, est, ap, cmd, t):
+def tick(P, C, legs, frame, est, ap, nav, cmd, t):
     """One tick at time t (s): frame (FRAME_SIZE,) in, cmd (3,) servo rad, slider m, ballast kg out.
 
-    est (N_EST,) and ap (N_AP,) are the autopilot's memory. Waiting: actuators stay where they are. Completed or
-    aborted: ballast to its light end, mass aft for nose up, servo centred, so that the vehicle surfaces.
+    est (N_EST,), ap (N_AP,) and nav (N_NAV,) are the autopilot's memory. Waiting: actuators stay where they are.
+    Completed or aborted: ballast to its light end, mass aft for nose up, servo centred, so that the vehicle surfaces.
     """
     sense(P, C, frame, est, t)
+    if C[at.ESTIMATOR] == at.FILTERED:
+        navigate(P, C, nav, est, ap, t)
+    else:
+        take_as_measured(est)
     sequence(C, legs, est, ap, t)
     if ap[at.MODE] == at.FLYING:
         follow(C, legs, est, ap)
@@ -101,8 +106,9 @@ def tick(P, C, legs, frame, est, ap, cmd, t):
 
 
 @kernel
-def reset(est, ap):
-    """Forget everything: no sample seen, nothing commanded, waiting for the first samples."""
+def reset(est, ap, nav):
+    """Forget everything: no sample seen, nothing commanded, the filter not started, waiting for the first samples."""
+    nav[at.NAV_RUNNING] = 0.0
     est[:] = 0.0
     est[at.EST_IMU_TIME : at.EST_BEACON_TIME + 3] = -1.0
     ap[:] = 0.0

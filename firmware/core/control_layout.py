@@ -1,7 +1,10 @@
 """Where things stand in the autopilot's vectors: C its configuration, est what it believes, ap what it remembers.
 
-Missions come as a matrix, one row a leg. SI and radians.
+Missions come as a matrix, one row a leg; nav is the estimator's own memory. SI and radians.
 """
+
+from firmware.core.estimator_layout import N_E, N_S, N_W, N_WORK_ROWS, N_XE, N_Z
+from firmware.core.layout import N_P
 
 # --- C: configuration -----------------------------------------------------------------------------------------------
 DT = 0                                               # s, the loop's step
@@ -19,7 +22,9 @@ SURFACE_PRESSURE = 21                                # Pa
 SITE_DEPTH = 22                                      # m; 0: unknown
 MISSION_TIME_LIMIT = 23                              # s
 HEADING_KP, HEADING_KD = 24, 25                      # rad of roll per rad of heading error, and per rad/s
-N_C = 26
+ESTIMATOR = 26                                       # MEASURED or FILTERED
+N_C = 27
+MEASURED, FILTERED = 0.0, 1.0                        # samples as they come, or through the Kalman filter
 
 # --- est: the estimate ----------------------------------------------------------------------------------------------
 EST_DEPTH, EST_DEPTH_RATE = 0, 1
@@ -30,8 +35,31 @@ EST_DENSITY = 10
 EST_IMU_TIME, EST_BEACON_TIME = 11, 12               # time of the newest sample used
 EST_SLIDER_TIME, EST_PLUNGER_TIME = 13, 14
 EST_STARTED = 15                                     # 1 once IMU and beacon have both been seen
-EST_DEPTH_MEASURED = 16                              # m, of the newest beacon sample, before any filter
-N_EST = 17
+NEW_DEPTH = 16                                       # the newest samples as measured, before any filter
+NEW_ROLL, NEW_PITCH, NEW_YAW = 17, 18, 19
+NEW_P, NEW_Q, NEW_R = 20, 21, 22
+NEW_SLIDER, NEW_BALLAST = 23, 24
+EST_U, EST_V, EST_W = 25, 26, 27                     # m/s through the water; 0 unless FILTERED
+EST_SERVO = 28                                       # rad
+EST_X, EST_Y = 29, 30                                # m north and east of the start, by dead reckoning
+EST_WATER_N, EST_WATER_E = 31, 32                    # m/s
+SD_DEPTH_RATE, SD_PITCH, SD_U = 33, 34, 35           # 1 sigma: m/s, rad, m/s
+ACTIVITY = 36                                        # mean square of the filter's scores, 1 where all is as modelled
+N_EST = 37
+
+# --- nav: the Kalman filter's memory, one vector ---------------------------------------------------------------------
+NAV_RUNNING, NAV_TIME, NAV_USED = 0, 1, 2            # started; s; 2..5 times of the samples used, by sensor
+NAV_SETTINGS = 6
+NAV_SIGMA = NAV_SETTINGS + N_S
+NAV_SPREAD = NAV_SIGMA + N_P
+NAV_X = NAV_SPREAD + N_E
+NAV_STRESS = NAV_X + N_XE
+NAV_Z = NAV_STRESS + 2
+NAV_BEYOND = NAV_Z + N_Z
+NAV_SCORES = NAV_BEYOND + N_Z
+NAV_COV = NAV_SCORES + N_Z
+NAV_WORK = NAV_COV + N_E * N_E
+N_NAV = NAV_WORK + N_WORK_ROWS * N_W
 
 # --- legs: one row each ---------------------------------------------------------------------------------------------
 LEG_DEPTH = 0                                        # m, target; NaN: the leg ends by time or turn

@@ -11,7 +11,8 @@ T, CMD, SLIDER, BALLAST, ATTITUDE, RATES, DEPTH = 0, 1, 4, 5, 6, 9, 12
 DEPTH_EST, DEPTH_RATE, REFERENCES, INTEGRATORS = 13, 14, 15, 21
 MODE_, LEG_, REASON_, LATENESS, DURATION = 23, 24, 25, 26, 27
 DENSITY, PRESSURE, TEMPERATURE, SAMPLE_TIMES = 28, 29, 30, 31
-N_RECORD = 35
+ESTIMATE, SPREADS = 35, 48
+N_RECORD = 52
 
 
 @kernel
@@ -27,17 +28,17 @@ def fill_record(frame, est, ap, cmd, t, lateness, duration, out):
     out[CMD], out[CMD + 1], out[CMD + 2] = cmd[0], cmd[1], cmd[2]
     imu, beacon = est[at.EST_IMU_TIME], est[at.EST_BEACON_TIME]
     slider, plunger = est[at.EST_SLIDER_TIME], est[at.EST_PLUNGER_TIME]
-    out[SLIDER] = fresh(est[at.EST_SLIDER], slider, out[SAMPLE_TIMES + 2])
-    out[BALLAST] = fresh(est[at.EST_BALLAST], plunger, out[SAMPLE_TIMES + 3])
+    out[SLIDER] = fresh(est[at.NEW_SLIDER], slider, out[SAMPLE_TIMES + 2])
+    out[BALLAST] = fresh(est[at.NEW_BALLAST], plunger, out[SAMPLE_TIMES + 3])
     seen = out[SAMPLE_TIMES]
-    out[ATTITUDE] = fresh(est[at.EST_ROLL], imu, seen)
-    out[ATTITUDE + 1] = fresh(est[at.EST_PITCH], imu, seen)
-    out[ATTITUDE + 2] = fresh(est[at.EST_YAW], imu, seen)
-    out[RATES] = fresh(est[at.EST_P], imu, seen)
-    out[RATES + 1] = fresh(est[at.EST_Q], imu, seen)
-    out[RATES + 2] = fresh(est[at.EST_R], imu, seen)
+    out[ATTITUDE] = fresh(est[at.NEW_ROLL], imu, seen)
+    out[ATTITUDE + 1] = fresh(est[at.NEW_PITCH], imu, seen)
+    out[ATTITUDE + 2] = fresh(est[at.NEW_YAW], imu, seen)
+    out[RATES] = fresh(est[at.NEW_P], imu, seen)
+    out[RATES + 1] = fresh(est[at.NEW_Q], imu, seen)
+    out[RATES + 2] = fresh(est[at.NEW_R], imu, seen)
     seen = out[SAMPLE_TIMES + 1]
-    out[DEPTH] = fresh(est[at.EST_DEPTH_MEASURED], beacon, seen)
+    out[DEPTH] = fresh(est[at.NEW_DEPTH], beacon, seen)
     out[PRESSURE] = fresh(frame[BEACON + 2], beacon, seen)
     out[TEMPERATURE] = fresh(frame[BEACON + 3], beacon, seen)
     out[DEPTH_EST], out[DEPTH_RATE] = est[at.EST_DEPTH], est[at.EST_DEPTH_RATE]
@@ -50,3 +51,10 @@ def fill_record(frame, est, ap, cmd, t, lateness, duration, out):
     out[DENSITY] = est[at.EST_DENSITY]
     out[SAMPLE_TIMES], out[SAMPLE_TIMES + 1] = imu, beacon
     out[SAMPLE_TIMES + 2], out[SAMPLE_TIMES + 3] = slider, plunger
+    for i in range(3):
+        out[ESTIMATE + i] = est[at.EST_ROLL + i]
+        out[ESTIMATE + 3 + i] = est[at.EST_U + i]
+    out[ESTIMATE + 6], out[ESTIMATE + 7], out[ESTIMATE + 8] = est[at.EST_SERVO], est[at.EST_SLIDER], est[at.EST_BALLAST]
+    for i in range(4):
+        out[ESTIMATE + 9 + i] = est[at.EST_X + i]
+        out[SPREADS + i] = est[at.SD_DEPTH_RATE + i]

@@ -31,10 +31,11 @@ def write_trace(t, est, ap, cmd, out):
 
 
 @kernel
-def fly(P_plant, P, C, legs, E, waves, sensors, errors, seed, x, dt, max_ticks, every, trace, end):
+def fly(P_plant, P, C, legs, nav, E, waves, sensors, errors, seed, x, dt, max_ticks, every, trace, end):
     """Fly one mission from state x (in place) until it ends or max_ticks are over; returns the ticks flown.
 
-    P_plant is the vehicle in the water, P the one the autopilot believes in. Every `every`-th tick goes into trace
+    P_plant is the vehicle in the water, P the one the autopilot believes in; nav (N_NAV,) is as Autopilot makes it and
+    is not changed. Every `every`-th tick goes into trace
     (rows, N_TRACE) while it has rows; end (N_END,) says how the flight ended.
     """
     cmd, acc, frame = np.zeros(3), np.zeros(6), np.full(FRAME_SIZE, np.nan)
@@ -44,13 +45,14 @@ def fly(P_plant, P, C, legs, E, waves, sensors, errors, seed, x, dt, max_ticks, 
     ring = np.zeros((at.N_SENSORS, at.RING, at.RING_WIDTH))
     work = np.zeros((5, N_X))
     est, ap = np.zeros(ctl.N_EST), np.zeros(ctl.N_AP)
-    reset(est, ap)
+    memory = nav.copy()
+    reset(est, ap, memory)
     sample_sensors(P_plant, E, sensors, errors, seed, x, 0.0, counters, ring)
     ticks, t = 0, 0.0
     while ticks < max_ticks and ap[ctl.MODE] < ctl.COMPLETED:
         t = ticks * C[ctl.DT]
         advance(P_plant, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, frame, work, dt, t)
-        tick(P, C, legs, frame, est, ap, cmd, t)
+        tick(P, C, legs, frame, est, ap, memory, cmd, t)
         if ticks % every == 0 and ticks // every < trace.shape[0]:
             write_trace(t, est, ap, cmd, trace[ticks // every])
         ticks += 1
@@ -59,7 +61,9 @@ def fly(P_plant, P, C, legs, E, waves, sensors, errors, seed, x, dt, max_ticks, 
 
 
 @parallel_kernel
-def fly_many(P_plants, P, C, legs, Es, waves, sensors, errors, seeds, xs, dt, max_ticks, every, traces, ends, ticks):
+def fly_many(
+    P_plants, P, C, legs, nav, Es, waves, sensors, errors, seeds, xs, dt, max_ticks, every, traces, ends, ticks
+):
     """`fly` for every row of P_plants, Es, errors, seeds and xs, shared out over all cores.
 
     Shapes: P_plants (n, N_P), Es (n, N_E), errors (n, 2, N_ERRORS), seeds (n,) uint64, xs (n, N_X), traces
@@ -67,6 +71,6 @@ def fly_many(P_plants, P, C, legs, Es, waves, sensors, errors, seeds, xs, dt, ma
     """
     for i in prange(P_plants.shape[0]):
         ticks[i] = fly(
-            P_plants[i], P, C, legs, Es[i], waves, sensors, errors[i], seeds[i], xs[i], dt, max_ticks, every,
+            P_plants[i], P, C, legs, nav, Es[i], waves, sensors, errors[i], seeds[i], xs[i], dt, max_ticks, every,
             traces[i], ends[i],
         )  # fmt: skip

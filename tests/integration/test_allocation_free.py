@@ -81,10 +81,10 @@ def test_an_object_made_every_fiftieth_tick_is_caught(monkeypatch):
 
 
 @njit
-def _many_ticks(n, P, C, legs, frame, est, ap, cmd, out):
+def _many_ticks(n, P, C, legs, frame, est, ap, nav, cmd, out):
     for i in range(n):
         t = 0.02 * i
-        core.tick(P, C, legs, frame, est, ap, cmd, t)
+        core.tick(P, C, legs, frame, est, ap, nav, cmd, t)
         fill_record(frame, est, ap, cmd, t, 0.0, 0.0, out)
 
 
@@ -106,7 +106,8 @@ def test_the_compiled_tick_allocates_nothing():
     with harness() as flown:
         flown.run(50)
         pilot = flown.runtime.autopilot
-        arguments = (pilot.P, pilot.C, pilot.legs, pilot.frame, pilot.est, pilot.ap, pilot.commands, np.zeros(N_RECORD))
+        arguments = (pilot.P, pilot.C, pilot.legs, pilot.frame, pilot.est, pilot.ap)
+        arguments += (pilot.nav, pilot.commands, np.zeros(N_RECORD))
         _many_ticks(1, *arguments)
         assert _allocations(lambda: _many_ticks(1000, *arguments)) == _allocations(lambda: _many_ticks(1, *arguments))
 

@@ -63,8 +63,8 @@ def test_compiled_flight_is_the_runtimes_flight(mission):
     world, pilot = flight.board.world, flight.autopilot
     trace, end = np.zeros((len(rows), N_TRACE)), np.zeros(N_END)
     ticks = fly(
-        world.P, pilot.P, pilot.C, pilot.legs, world.E, world.waves, world.sensors, world.errors, world.seed, world.x,
-        world.dt, len(rows), 1, trace, end,
+        world.P, pilot.P, pilot.C, pilot.legs, pilot.nav, world.E, world.waves, world.sensors, world.errors, world.seed,
+        world.x, world.dt, len(rows), 1, trace, end,
     )  # fmt: skip
     assert end[0] == reference.autopilot.ap[0]
     assert end[3] == reference.autopilot.ap[LEG]

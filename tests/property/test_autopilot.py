@@ -67,10 +67,10 @@ def test_an_old_or_repeated_sample_is_not_a_new_one():
     feed(pilot, 0.0, pitch=0.1)
     pilot.frame[IMU + 3] = 0.5  # the same time: not a new sample
     pilot.tick(0.02)
-    assert pilot.est[at.EST_PITCH] == 0.1
+    assert pilot.est[at.NEW_PITCH] == 0.1
     pilot.frame[IMU] = 0.04
     pilot.tick(0.04 + pilot.C[at.MAX_AGE_IMU] + 0.01)  # too old when it is seen
-    assert pilot.est[at.EST_PITCH] == 0.1
+    assert pilot.est[at.NEW_PITCH] == 0.1
 
 
 @pytest.mark.parametrize(("dead", "reason"), [(IMU, "no attitude"), (BEACON, "no depth")])
@@ -113,8 +113,8 @@ def test_net_ballast_mass_follows_from_travel_and_density():
     feed(pilot, 0.0)
     feed(pilot, 0.02, depth=2.0, plunger=0.01)
     area = VEHICLE.actuators.ballast.plunger_area
-    assert pilot.est[at.EST_BALLAST] == pytest.approx(998.2 * area * 0.01, rel=1e-4)
-    assert pilot.est[at.EST_DEPTH_MEASURED] == pytest.approx(2.0, abs=1e-3)
+    assert pilot.est[at.NEW_BALLAST] == pytest.approx(998.2 * area * 0.01, rel=1e-4)
+    assert pilot.est[at.NEW_DEPTH] == pytest.approx(2.0, abs=1e-3)
 
 
 @pytest.mark.parametrize("name", shipped("guidance/missions"))

@@ -27,7 +27,7 @@ def fly_all(threads: int) -> tuple[float, int]:
     try:
         before = time.perf_counter()
         fly_many(
-            stacked["P"], pilot.P, pilot.C, pilot.legs, stacked["E"], worlds[0].waves, worlds[0].sensors,
+            stacked["P"], pilot.P, pilot.C, pilot.legs, pilot.nav, stacked["E"], worlds[0].waves, worlds[0].sensors,
             stacked["errors"], stacked["seed"], stacked["x"], worlds[0].dt, LONGEST, LONGEST,
             np.zeros((FLIGHTS, 1, N_TRACE)), np.zeros((FLIGHTS, N_END)), ticks,
         )  # fmt: skip

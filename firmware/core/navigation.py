@@ -1,0 +1,137 @@
+"""The estimator aboard: the Kalman filter stepped once a tick with whatever samples are new.
+
+A sample is older than the tick by its delay; it is carried forward by the filter's own rates before it is compared, so
+that a slow beacon does not drag the depth behind. What is missing, late or refused is simply not there this tick.
+"""
+
+import math
+
+from firmware.core import control_layout as at
+from firmware.core.estimator import estimator_start, estimator_step
+from firmware.core.estimator_layout import (
+    COMMANDED,
+    E_ATT,
+    E_NU,
+    N_E,
+    N_S,
+    N_W,
+    N_WORK_ROWS,
+    N_XE,
+    N_Z,
+    X_WATER,
+    Z_BALLAST,
+    Z_DEPTH,
+    Z_SLIDER,
+)
+from firmware.core.jit import kernel
+from firmware.core.layout import N_P, X_ACT, X_NU, X_QUAT
+from firmware.core.rotations import euler_from_quaternion, euler_rates, quaternion_from_euler, rotation_nb
+
+ACTIVITY_TIME = 2.0  # s, over which the scores are averaged
+STEEP = 1.4  # rad; beyond it Euler rates mean nothing and samples are taken as they are
+
+
+@kernel
+def new_samples(est, x, nav, t):
+    """The measurements of this tick into nav's z, NaN where nothing is new, each carried forward over its age."""
+    z = nav[at.NAV_Z : at.NAV_Z + N_Z]
+    for i in range(N_Z):
+        z[i] = math.nan
+    if est[at.EST_IMU_TIME] > nav[at.NAV_USED]:
+        age = t - est[at.EST_IMU_TIME]
+        nav[at.NAV_USED] = est[at.EST_IMU_TIME]
+        phi, theta, _ = euler_from_quaternion(x[3], x[4], x[5], x[6])
+        phi_rate, theta_rate, psi_rate = 0.0, 0.0, 0.0
+        if abs(theta) < STEEP:
+            phi_rate, theta_rate, psi_rate = euler_rates(phi, theta, x[X_NU + 3], x[X_NU + 4], x[X_NU + 5])
+        z[0] = est[at.NEW_ROLL] + phi_rate * age
+        z[1] = est[at.NEW_PITCH] + theta_rate * age
+        z[2] = est[at.NEW_YAW] + psi_rate * age
+        for i in range(3):
+            z[3 + i] = est[at.NEW_P + i]
+    if est[at.EST_BEACON_TIME] > nav[at.NAV_USED + 1]:
+        nav[at.NAV_USED + 1] = est[at.EST_BEACON_TIME]
+        z[Z_DEPTH] = est[at.NEW_DEPTH] + est[at.EST_DEPTH_RATE] * (t - est[at.EST_BEACON_TIME])
+    if est[at.EST_SLIDER_TIME] > nav[at.NAV_USED + 2]:
+        nav[at.NAV_USED + 2] = est[at.EST_SLIDER_TIME]
+        z[Z_SLIDER] = est[at.NEW_SLIDER]
+    if est[at.EST_PLUNGER_TIME] > nav[at.NAV_USED + 3]:
+        nav[at.NAV_USED + 3] = est[at.EST_PLUNGER_TIME]
+        z[Z_BALLAST] = est[at.NEW_BALLAST]
+
+
+@kernel
+def start_filter(P, nav, est, t, x, cov, work):
+    """The first state: at rest, attitude and depth as first measured, actuators where the draw-wires say."""
+    for i in range(N_XE):
+        x[i] = 0.0
+    x[2] = est[at.NEW_DEPTH]
+    x[X_QUAT], x[X_QUAT + 1], x[X_QUAT + 2], x[X_QUAT + 3] = quaternion_from_euler(
+        est[at.NEW_ROLL], est[at.NEW_PITCH], est[at.NEW_YAW]
+    )
+    x[X_ACT + 1], x[X_ACT + 2] = est[at.NEW_SLIDER], est[at.NEW_BALLAST]
+    nav[at.NAV_STRESS], nav[at.NAV_STRESS + 1] = 1.0, 1.0
+    for i in range(N_Z):
+        nav[at.NAV_BEYOND + i] = 0.0
+    for i in range(4):
+        nav[at.NAV_USED + i] = -1.0
+    spread = nav[at.NAV_SPREAD : at.NAV_SPREAD + N_E]
+    estimator_start(P, nav[at.NAV_SETTINGS : at.NAV_SETTINGS + N_S], nav[at.NAV_SIGMA : at.NAV_SIGMA + N_P], x, cov,
+                    spread, work)  # fmt: skip
+    nav[at.NAV_RUNNING], nav[at.NAV_TIME] = 1.0, t
+    est[at.ACTIVITY] = 1.0
+
+
+@kernel
+def write_estimate(x, cov, est):
+    """The filter's state as the rest of the autopilot reads it."""
+    est[at.EST_X], est[at.EST_Y], est[at.EST_DEPTH] = x[0], x[1], x[2]
+    est[at.EST_ROLL], est[at.EST_PITCH], est[at.EST_YAW] = euler_from_quaternion(x[3], x[4], x[5], x[6])
+    _, _, _, _, _, _, r31, r32, r33 = rotation_nb(x[3], x[4], x[5], x[6])
+    u, v, w = x[X_NU], x[X_NU + 1], x[X_NU + 2]
+    est[at.EST_U], est[at.EST_V], est[at.EST_W] = u, v, w
+    est[at.EST_DEPTH_RATE] = r31 * u + r32 * v + r33 * w
+    for i in range(3):
+        est[at.EST_P + i] = x[X_NU + 3 + i]
+    est[at.EST_SERVO], est[at.EST_SLIDER], est[at.EST_BALLAST] = x[X_ACT], x[X_ACT + 1], x[X_ACT + 2]
+    est[at.EST_WATER_N], est[at.EST_WATER_E] = x[X_WATER], x[X_WATER + 1]
+    est[at.SD_DEPTH_RATE] = math.sqrt(
+        r31 * r31 * cov[E_NU, E_NU] + r33 * r33 * cov[E_NU + 2, E_NU + 2] + 2.0 * r31 * r33 * cov[E_NU, E_NU + 2]
+    )
+    est[at.SD_PITCH] = math.sqrt(cov[E_ATT + 1, E_ATT + 1])
+    est[at.SD_U] = math.sqrt(cov[E_NU, E_NU])
+
+
+@kernel
+def note_activity(est, scores, dt):
+    """Average the squared scores of attitude and gyro: above 1, the water or the vehicle does more than is modelled."""
+    total, count = 0.0, 0
+    for i in range(6):
+        if not math.isnan(scores[i]):
+            total += scores[i] * scores[i]
+            count += 1
+    if count > 0:
+        est[at.ACTIVITY] += min(1.0, dt / ACTIVITY_TIME) * (total / count - est[at.ACTIVITY])
+
+
+@kernel
+def navigate(P, C, nav, est, ap, t):
+    """One step of the filter at time t (s): the commands sent last, this tick's samples, the estimate into est."""
+    if est[at.EST_STARTED] == 0.0:
+        return
+    x = nav[at.NAV_X : at.NAV_X + N_XE]
+    cov = nav[at.NAV_COV : at.NAV_COV + N_E * N_E].reshape(N_E, N_E)
+    work = nav[at.NAV_WORK : at.NAV_WORK + N_WORK_ROWS * N_W].reshape(N_WORK_ROWS, N_W)
+    if nav[at.NAV_RUNNING] == 0.0:
+        start_filter(P, nav, est, t, x, cov, work)
+    new_samples(est, x, nav, t)
+    dt = t - nav[at.NAV_TIME]
+    nav[at.NAV_TIME] = t
+    scores = nav[at.NAV_SCORES : at.NAV_SCORES + N_Z]
+    estimator_step(
+        P, nav[at.NAV_SETTINGS : at.NAV_SETTINGS + N_S], nav[at.NAV_SIGMA : at.NAV_SIGMA + N_P], x, cov,
+        nav[at.NAV_STRESS : at.NAV_STRESS + 2], COMMANDED, ap[at.SENT_SERVO], ap[at.SENT_SLIDER], ap[at.SENT_BALLAST],
+        dt, nav[at.NAV_Z : at.NAV_Z + N_Z], nav[at.NAV_BEYOND : at.NAV_BEYOND + N_Z], scores, work,
+    )  # fmt: skip
+    write_estimate(x, cov, est)
+    note_activity(est, scores, dt)
