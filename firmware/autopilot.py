@@ -26,6 +26,7 @@ REASONS = {
     layout.REASON_OPERATOR: "asked to by the operator",
 }
 ESTIMATORS = {"measured": layout.MEASURED, "filter": layout.FILTERED}
+CONTROLLERS = {"pid": layout.PID, "law": layout.LAW, "hybrid": layout.HYBRID, "law+": layout.LAW_PLUS}
 STANDARD_PRESSURE = 101325.0  # Pa
 SURFACED = 0.3  # m; shallower than this counts as at the surface
 
@@ -73,6 +74,16 @@ def configuration(
     C[layout.SITE_DEPTH] = mission.site.depth_m
     C[layout.MISSION_TIME_LIMIT] = mission.time_limit_s
     C[layout.ESTIMATOR] = ESTIMATORS[control.estimator]
+    C[layout.CONTROLLER] = CONTROLLERS[control.controller]
+    C[layout.FORM] = layout.PAPER if control.law.form == "paper" else layout.EXACT
+    C[layout.OBSERVER_SHARE] = control.law.observer_share
+    for name, law in (("PITCH", control.law.pitch), ("DEPTH", control.law.depth)):
+        for gain in ("k1", "k2", "k3", "eps"):
+            C[getattr(layout, f"{name}_{gain.upper()}")] = getattr(law, gain)
+    for gain in ("activity", "pitch", "depth"):
+        for edge in ("on", "off"):
+            C[getattr(layout, f"HYBRID_{gain}_{edge}".upper())] = getattr(control.hybrid, f"{gain}_{edge}")
+    C[layout.HYBRID_DWELL] = control.hybrid.dwell_s
     return C
 
 

@@ -52,6 +52,44 @@ class HeadingGains(Table):
     kd: NonNegative = 2.0
 
 
+Gain = Annotated[float, msgspec.Meta(gt=0.0, le=1e3)]
+
+
+class LawGains(Table):
+    """One axis of the law: k1, k3 in 1/s, k2 in the actuator's unit (m, kg), eps in the unit of s (rad/s, m/s)."""
+
+    k1: Gain
+    k2: Gain
+    k3: Gain
+    eps: Gain
+
+
+class HybridTable(Table):
+    """When the hybrid hands over to the law, and back; angles in rad, depths in m, activity 1 where all is calm."""
+
+    activity_on: Gain = 2.5
+    activity_off: Gain = 1.6
+    pitch_on: Gain = 0.06
+    pitch_off: Gain = 0.02
+    depth_on: Gain = 0.6
+    depth_off: Gain = 0.2
+    dwell_s: NonNegative = 3.0
+
+    def __post_init__(self):
+        for name in ("activity", "pitch", "depth"):
+            if not getattr(self, f"{name}_off") < getattr(self, f"{name}_on"):
+                raise ValueError(f"{name}_off: expected less than {name}_on, or the hybrid would chatter")
+
+
+class Law(Table):
+    """[control.law]: gains of both axes, the form of the model, and law+'s share of the observed model error."""
+
+    pitch: LawGains = LawGains(k1=0.8, k2=0.004, k3=0.8, eps=0.1)
+    depth: LawGains = LawGains(k1=0.25, k2=0.02, k3=0.25, eps=0.1)
+    form: Literal["exact", "paper"] = "exact"
+    observer_share: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)] = 0.0
+
+
 class Control(Table):
     """[control]: gains of the loops; what is left out keeps its default."""
 
@@ -60,3 +98,10 @@ class Control(Table):
     roll: RollGains = RollGains()
     heading: HeadingGains = HeadingGains()
     estimator: Literal["measured", "filter"] = "filter"
+    controller: Literal["pid", "law", "hybrid", "law+"] = "pid"
+    law: Law = Law()
+    hybrid: HybridTable = HybridTable()
+
+    def __post_init__(self):
+        if self.controller != "pid" and self.estimator == "measured":
+            raise ValueError(f"controller {self.controller!r} needs body velocities: estimator = 'filter'")

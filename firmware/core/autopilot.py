@@ -6,59 +6,23 @@
 import math
 
 from firmware.core import control_layout as at
-from firmware.core.control import limited, pid, pitch_feedforward, roll_law
+from firmware.core.control import limited
 from firmware.core.guidance import follow, sequence
 from firmware.core.jit import kernel
 from firmware.core.layout import (
     BALLAST_MAX,
     BALLAST_MIN,
     BALLAST_RATE,
-    M_R,
-    M_S,
-    R_R,
-    R_S,
     SERVO_MAX,
     SERVO_MIN,
     SERVO_RATE,
     SLIDER_MAX,
     SLIDER_MIN,
     SLIDER_RATE,
-    X_B,
 )  # fmt: skip
 from firmware.core.navigation import navigate
 from firmware.core.sensing import sense, take_as_measured
-
-
-@kernel
-def steer(P, C, legs, est, ap):
-    """Wanted servo, slider and ballast from references and estimate, before the limits."""
-    dt = C[at.DT]
-    row = int(ap[at.LEG])
-    roll, pitch = est[at.EST_ROLL], est[at.EST_PITCH]
-    cf, sf = math.cos(roll), math.sin(roll)
-    ct = max(math.cos(pitch), 0.1)
-    turn = sf * est[at.EST_Q] + cf * est[at.EST_R]
-    roll_rate = est[at.EST_P] + turn * math.sin(pitch) / ct
-    pitch_rate = cf * est[at.EST_Q] - sf * est[at.EST_R]
-
-    servo = roll_law(ap[at.REF_ROLL], ap[at.REF_ROLL_RATE], roll, roll_rate, C[at.ROLL_KP], C[at.ROLL_KD])
-
-    if math.isnan(legs[row, at.LEG_BALLAST]):
-        ballast, ap[at.INT_DEPTH] = pid(
-            ap[at.REF_DEPTH] - est[at.EST_DEPTH], ap[at.REF_DEPTH_RATE] - est[at.EST_DEPTH_RATE], ap[at.INT_DEPTH], 0.0,
-            C[at.DEPTH_KP], C[at.DEPTH_KI], C[at.DEPTH_KD], P[BALLAST_MIN], P[BALLAST_MAX], dt,
-        )  # fmt: skip
-    else:
-        ballast = legs[row, at.LEG_BALLAST]
-
-    # a mass moved forward lowers the nose: the loop's sign is turned here, not in the gains
-    sr = P[M_R] * P[R_R] + P[M_S] * P[R_S]
-    forward = pitch_feedforward(sr, P[M_S], P[X_B], ap[at.REF_PITCH], est[at.EST_BALLAST], P[SLIDER_MIN], P[SLIDER_MAX])
-    slider, ap[at.INT_PITCH] = pid(
-        pitch - ap[at.REF_PITCH], pitch_rate - ap[at.REF_PITCH_RATE], ap[at.INT_PITCH], forward,
-        C[at.PITCH_KP], C[at.PITCH_KI], C[at.PITCH_KD], P[SLIDER_MIN], P[SLIDER_MAX], dt,
-    )  # fmt: skip
-    return servo, slider, ballast
+from firmware.core.steering import steer
 
 
 @kernel
@@ -96,7 +60,7 @@ def tick(P, C, legs, frame, est, ap, nav, cmd, t):
     sequence(C, legs, est, ap, t)
     if ap[at.MODE] == at.FLYING:
         follow(C, legs, est, ap)
-        servo, slider, ballast = steer(P, C, legs, est, ap)
+        servo, slider, ballast = steer(P, C, legs, est, ap, t)
         score(legs, est, ap)
     elif ap[at.MODE] == at.WAITING:
         servo, slider, ballast = ap[at.SENT_SERVO], ap[at.SENT_SLIDER], ap[at.SENT_BALLAST]

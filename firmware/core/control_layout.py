@@ -23,7 +23,17 @@ SITE_DEPTH = 22                                      # m; 0: unknown
 MISSION_TIME_LIMIT = 23                              # s
 HEADING_KP, HEADING_KD = 24, 25                      # rad of roll per rad of heading error, and per rad/s
 ESTIMATOR = 26                                       # MEASURED or FILTERED
-N_C = 27
+CONTROLLER, FORM = 27, 28                            # PID, LAW, HYBRID, LAW_PLUS; EXACT or PAPER
+PITCH_K1, PITCH_K2, PITCH_K3, PITCH_EPS = 29, 30, 31, 32     # 1/s, m, 1/s, rad/s
+DEPTH_K1, DEPTH_K2, DEPTH_K3, DEPTH_EPS = 33, 34, 35, 36     # 1/s, kg, 1/s, m/s
+HYBRID_ACTIVITY_ON, HYBRID_ACTIVITY_OFF = 37, 38     # activity of the filter past which the law takes over, and back
+HYBRID_PITCH_ON, HYBRID_PITCH_OFF = 39, 40           # rad still to go to the pitch target
+HYBRID_DEPTH_ON, HYBRID_DEPTH_OFF = 41, 42           # m still to go to the depth target
+HYBRID_DWELL = 43                                    # s for which a choice stands at least
+OBSERVER_SHARE = 44                                  # of the filter's model error that the law counts on, 0..1
+N_C = 45
+PID, LAW, HYBRID, LAW_PLUS = 0.0, 1.0, 2.0, 3.0
+EXACT, PAPER = 0.0, 1.0
 MEASURED, FILTERED = 0.0, 1.0                        # samples as they come, or through the Kalman filter
 
 # --- est: the estimate ----------------------------------------------------------------------------------------------
@@ -45,7 +55,8 @@ EST_X, EST_Y = 29, 30                                # m north and east of the s
 EST_WATER_N, EST_WATER_E = 31, 32                    # m/s
 SD_DEPTH_RATE, SD_PITCH, SD_U = 33, 34, 35           # 1 sigma: m/s, rad, m/s
 ACTIVITY = 36                                        # mean square of the filter's scores, 1 where all is as modelled
-N_EST = 37
+MODEL_ERROR = 37                                     # 37..42 accelerations beside the model's, body axes, m/s2, rad/s2
+N_EST = 43
 
 # --- nav: the Kalman filter's memory, one vector ---------------------------------------------------------------------
 NAV_RUNNING, NAV_TIME, NAV_USED = 0, 1, 2            # started; s; 2..5 times of the samples used, by sensor
@@ -87,7 +98,12 @@ MISSION_START = 20                                   # s
 SUM_DEPTH, SUM_PITCH, SUM_ROLL = 21, 22, 23          # squared tracking errors added up while flying, m2, rad2
 COUNT_DEPTH, COUNT_ATTITUDE = 24, 25                 # ticks in those sums
 TURNED, YAW_BEFORE = 26, 27                          # rad turned in this leg, starboard positive; yaw a tick ago
-N_AP = 28
+ACTIVE, ACTIVE_SINCE = 28, 29                        # controller at work, PID or LAW; s
+LAW_STATUS = 30                                      # of the last law evaluated: law.OK, STEEP, NOT_FINITE
+BUMP_SLIDER, BUMP_BALLAST = 31, 32                   # m, kg, what a switch left over, fading
+S_PITCH, S_DEPTH = 33, 34                            # rad/s, m/s, the sliding variables
+LAW_RAN = 35                                         # 1 if the law ran in the tick before
+N_AP = 36
 
 # --- modes and reasons ----------------------------------------------------------------------------------------------
 WAITING, FLYING, COMPLETED, ABORTED = 0.0, 1.0, 2.0, 3.0

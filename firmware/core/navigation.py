@@ -18,6 +18,7 @@ from firmware.core.estimator_layout import (
     N_WORK_ROWS,
     N_XE,
     N_Z,
+    X_ERR,
     X_WATER,
     Z_BALLAST,
     Z_DEPTH,
@@ -95,6 +96,8 @@ def write_estimate(x, cov, est):
         est[at.EST_P + i] = x[X_NU + 3 + i]
     est[at.EST_SERVO], est[at.EST_SLIDER], est[at.EST_BALLAST] = x[X_ACT], x[X_ACT + 1], x[X_ACT + 2]
     est[at.EST_WATER_N], est[at.EST_WATER_E] = x[X_WATER], x[X_WATER + 1]
+    for i in range(6):
+        est[at.MODEL_ERROR + i] = x[X_ERR + i]
     est[at.SD_DEPTH_RATE] = math.sqrt(
         r31 * r31 * cov[E_NU, E_NU] + r33 * r33 * cov[E_NU + 2, E_NU + 2] + 2.0 * r31 * r33 * cov[E_NU, E_NU + 2]
     )
