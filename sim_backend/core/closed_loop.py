@@ -8,7 +8,7 @@ import numpy as np
 from firmware.core import control_layout as ctl
 from firmware.core.autopilot import reset, tick
 from firmware.core.jit import kernel, parallel_kernel, prange
-from firmware.core.layout import N_X
+from firmware.core.layout import N_X, X_ACT
 from hal.ports import FRAME_SIZE
 from sim_backend.core import layout as at
 from sim_backend.core.world import advance, sample_sensors
@@ -16,9 +16,11 @@ from sim_backend.core.world import advance, sample_sensors
 # what is kept of each logged tick
 TRACE = ("t", "depth", "pitch", "roll", "ref_depth", "ref_pitch", "ref_roll", "servo", "slider", "ballast")
 N_TRACE = 10
-# what is kept of each flight
+# what is kept of each flight: how it ended, and over the time flown
 END_MODE, END_REASON, END_TIME, END_LEG = 0, 1, 2, 3
-N_END = 4
+END_ERROR_DEPTH, END_ERROR_ROLL, END_ERROR_PITCH = 4, 5, 6  # mean |measured - reference|, m and rad; 0: never flew
+END_TRAVEL_SERVO, END_TRAVEL_SLIDER, END_TRAVEL_BALLAST = 7, 8, 9  # way that the actuators went, rad, m, kg
+N_END = 10
 
 
 @kernel
@@ -31,12 +33,23 @@ def write_trace(t, est, ap, cmd, out):
 
 
 @kernel
+def add_up(est, ap, x, last, end):
+    """One tick into the sums of end: errors against the newest samples, ways from last (3,), which is moved on."""
+    end[END_ERROR_DEPTH] += abs(est[ctl.NEW_DEPTH] - ap[ctl.REF_DEPTH])
+    end[END_ERROR_ROLL] += abs(est[ctl.NEW_ROLL] - ap[ctl.REF_ROLL])
+    end[END_ERROR_PITCH] += abs(est[ctl.NEW_PITCH] - ap[ctl.REF_PITCH])
+    for i in range(3):
+        end[END_TRAVEL_SERVO + i] += abs(x[X_ACT + i] - last[i])
+        last[i] = x[X_ACT + i]
+
+
+@kernel
 def fly(P_plant, P, C, legs, nav, E, waves, sensors, errors, seed, x, dt, max_ticks, every, trace, end):
     """Fly one mission from state x (in place) until it ends or max_ticks are over; returns the ticks flown.
 
     P_plant is the vehicle in the water, P the one the autopilot believes in; nav (N_NAV,) is as Autopilot makes it and
-    is not changed. Every `every`-th tick goes into trace
-    (rows, N_TRACE) while it has rows; end (N_END,) says how the flight ended.
+    is not changed. Every `every`-th tick goes into trace (rows, N_TRACE) while it has rows; end (N_END,) says how the
+    flight ended and how well it kept to its references.
     """
     cmd, acc, frame = np.zeros(3), np.zeros(6), np.full(FRAME_SIZE, np.nan)
     frame[:] = 0.0
@@ -48,29 +61,37 @@ def fly(P_plant, P, C, legs, nav, E, waves, sensors, errors, seed, x, dt, max_ti
     memory = nav.copy()
     reset(est, ap, memory)
     sample_sensors(P_plant, E, sensors, errors, seed, x, 0.0, counters, ring)
-    ticks, t = 0, 0.0
+    last = x[X_ACT : X_ACT + 3].copy()
+    end[:] = 0.0
+    ticks, flown, t = 0, 0, 0.0
     while ticks < max_ticks and ap[ctl.MODE] < ctl.COMPLETED:
         t = ticks * C[ctl.DT]
         advance(P_plant, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, frame, work, dt, t)
         tick(P, C, legs, frame, est, ap, memory, cmd, t)
+        if ap[ctl.MODE] == ctl.FLYING:
+            add_up(est, ap, x, last, end)
+            flown += 1
         if ticks % every == 0 and ticks // every < trace.shape[0]:
             write_trace(t, est, ap, cmd, trace[ticks // every])
         ticks += 1
     end[END_MODE], end[END_REASON], end[END_TIME], end[END_LEG] = ap[ctl.MODE], ap[ctl.REASON], t, ap[ctl.LEG]
+    for i in range(END_ERROR_DEPTH, END_TRAVEL_SERVO):
+        end[i] /= max(flown, 1)
     return ticks
 
 
 @parallel_kernel
 def fly_many(
-    P_plants, P, C, legs, nav, Es, waves, sensors, errors, seeds, xs, dt, max_ticks, every, traces, ends, ticks
+    P_plants, P, Cs, legs, nav, Es, waves, sensors, errors, seeds, xs, dt, max_ticks, every, traces, ends, ticks
 ):
-    """`fly` for every row of P_plants, Es, errors, seeds and xs, shared out over all cores.
+    """`fly` for every row of P_plants, Cs, legs, Es, errors, seeds and xs, shared out over all cores.
 
-    Shapes: P_plants (n, N_P), Es (n, N_E), errors (n, 2, N_ERRORS), seeds (n,) uint64, xs (n, N_X), traces
-    (n, rows, N_TRACE), ends (n, N_END), ticks (n,) int64. A flight does not depend on how many fly beside it.
+    Shapes: P_plants (n, N_P), Cs (n, N_C), legs (n, rows, N_LEG), Es (n, N_E), errors (n, 2, N_ERRORS), seeds (n,)
+    uint64, xs (n, N_X), traces (n, rows, N_TRACE), ends (n, N_END), ticks (n,) int64; P, nav, waves and sensors are
+    every flight's. A flight does not depend on how many fly beside it.
     """
     for i in prange(P_plants.shape[0]):
         ticks[i] = fly(
-            P_plants[i], P, C, legs, nav, Es[i], waves, sensors, errors[i], seeds[i], xs[i], dt, max_ticks, every,
-            traces[i], ends[i],
+            P_plants[i], P, Cs[i], legs[i], nav, Es[i], waves, sensors, errors[i], seeds[i], xs[i], dt, max_ticks,
+            every, traces[i], ends[i],
         )  # fmt: skip

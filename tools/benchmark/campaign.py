@@ -21,13 +21,14 @@ def fly_all(threads: int) -> tuple[float, int]:
     flights = [build_flight(mission=MISSION, seed=seed) for seed in range(FLIGHTS)]
     worlds, pilot = [flight.board.world for flight in flights], flights[0].autopilot
     stacked = {name: np.array([getattr(world, name) for world in worlds]) for name in ("P", "E", "errors", "seed", "x")}
+    Cs, legs = (np.array([getattr(flight.autopilot, name) for flight in flights]) for name in ("C", "legs"))
     ticks = np.zeros(FLIGHTS, dtype=np.int64)
     before_threads = numba.get_num_threads()
     numba.set_num_threads(threads)
     try:
         before = time.perf_counter()
         fly_many(
-            stacked["P"], pilot.P, pilot.C, pilot.legs, pilot.nav, stacked["E"], worlds[0].waves, worlds[0].sensors,
+            stacked["P"], pilot.P, Cs, legs, pilot.nav, stacked["E"], worlds[0].waves, worlds[0].sensors,
             stacked["errors"], stacked["seed"], stacked["x"], worlds[0].dt, LONGEST, LONGEST,
             np.zeros((FLIGHTS, 1, N_TRACE)), np.zeros((FLIGHTS, N_END)), ticks,
         )  # fmt: skip
