@@ -82,16 +82,17 @@ def fly(P_plant, P, C, legs, nav, E, waves, sensors, errors, seed, x, dt, max_ti
 
 @parallel_kernel
 def fly_many(
-    P_plants, P, Cs, legs, nav, Es, waves, sensors, errors, seeds, xs, dt, max_ticks, every, traces, ends, ticks
+    P_plants, P, Cs, legs, rows, nav, Es, waves, sensors, errors, seeds, xs, dt, max_ticks, every, traces, ends, ticks
 ):
-    """`fly` for every row of P_plants, Cs, legs, Es, errors, seeds and xs, shared out over all cores.
+    """`fly` for n flights, shared out over all cores; a flight does not depend on how many fly beside it.
 
-    Shapes: P_plants (n, N_P), Cs (n, N_C), legs (n, rows, N_LEG), Es (n, N_E), errors (n, 2, N_ERRORS), seeds (n,)
-    uint64, xs (n, N_X), traces (n, rows, N_TRACE), ends (n, N_END), ticks (n,) int64; P, nav, waves and sensors are
-    every flight's. A flight does not depend on how many fly beside it.
+    Shared: P and nav (what the autopilots believe), dt, max_ticks, every. Of each flight: P_plants (n, N_P), Cs (n, N_C)
+    legs (n, most, N_LEG) of which rows (n,) count, Es (n, N_E), waves (n, components, N_WAVE), sensors (n, N_SENSORS,
+    N_SENSOR_FIELDS), errors (n, 2, N_ERRORS), seeds (n,) uint64, xs (n, N_X) in place, traces (n, lines, N_TRACE), ends
+    (n, N_END), ticks (n,) int64.
     """
     for i in prange(P_plants.shape[0]):
         ticks[i] = fly(
-            P_plants[i], P, Cs[i], legs[i], nav, Es[i], waves, sensors, errors[i], seeds[i], xs[i], dt, max_ticks,
-            every, traces[i], ends[i],
+            P_plants[i], P, Cs[i], legs[i, : rows[i]], nav, Es[i], waves[i], sensors[i], errors[i], seeds[i], xs[i], dt,
+            max_ticks, every, traces[i], ends[i],
         )  # fmt: skip

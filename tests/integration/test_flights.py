@@ -13,6 +13,7 @@ import pytest
 from firmware.core.control_layout import LEG
 from hal.recorder.recorder import NullRecorder
 from sim_backend.core.closed_loop import N_END, N_TRACE, fly
+from sim_backend.fleet import fly_fleet
 from tools.compose import build_flight, build_runtime, record_specs
 
 
@@ -157,3 +158,15 @@ def test_check_tells_what_is_wrong(tmp_path):
     assert not findings["vehicle"]["pass"]
     assert "v.toml" in findings["vehicle"]["message"]
     assert findings["mission"]["pass"]
+
+
+def test_a_fleet_flies_as_its_flights_do_alone():
+    flights = [build_flight(mission=mission, seed=seed) for mission in ("sawtooth", "spiral") for seed in (4, 5)]
+    worlds, pilots = [flight.board.world for flight in flights], [flight.autopilot for flight in flights]
+    together = fly_fleet(worlds, pilots, max_seconds=200.0, trace_every=1.0)
+    assert together.completed.all()
+    for i in range(len(flights)):
+        alone = fly_fleet(worlds[i : i + 1], pilots[i : i + 1], max_seconds=200.0, trace_every=1.0)
+        assert np.array_equal(alone.traces[0], together.traces[i], equal_nan=True)
+        assert np.array_equal(alone.states[0], together.states[i])
+        assert alone.seconds[0] == together.seconds[i]

@@ -1,0 +1,67 @@
+"""Many closed-loop flights from one compiled call: worlds and autopilots stacked, flown, and what came of them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from firmware.autopilot import Autopilot
+from firmware.core.control_layout import COMPLETED, N_LEG
+from sim_backend.core.closed_loop import END_LEG, END_MODE, END_REASON, END_TIME, N_END, N_TRACE, TRACE, fly_many
+from sim_backend.core.layout import N_WAVE
+from sim_backend.world import World
+
+
+@dataclass
+class FleetResult:
+    """What came of n flights: how each ended, its last state, and its trace."""
+
+    modes: np.ndarray  # (n,) control_layout WAITING .. ABORTED
+    reasons: np.ndarray  # (n,)
+    seconds: np.ndarray  # (n,)
+    legs: np.ndarray  # (n,) the last leg flown, from 0
+    ticks: np.ndarray  # (n,)
+    states: np.ndarray  # (n, N_X) of the plant at the end
+    traces: np.ndarray  # (n, lines, N_TRACE), NaN behind a flight's end
+
+    @property
+    def completed(self) -> np.ndarray:
+        """True for each flight that completed its mission, shape (n,)."""
+        return self.modes == COMPLETED
+
+    def column(self, name: str) -> np.ndarray:
+        """One column of the traces by its name in TRACE, shape (n, lines)."""
+        return self.traces[:, :, TRACE.index(name)]
+
+
+def fly_fleet(
+    worlds: Sequence[World], pilots: Sequence[Autopilot], *, max_seconds: float, trace_every: float = 0.0
+) -> FleetResult:
+    """Fly pilot i in world i, for all i at once over all cores. The worlds do not move; their states are copied.
+
+    All pilots believe in the same vehicle and run at the same step. trace_every in s; 0 keeps no trace.
+    """
+    n, first = len(worlds), pilots[0]
+    step = float(first.C[0])
+    every = max(1, round(trace_every / step)) if trace_every else 1
+    lines = int(max_seconds / step) // every + 1 if trace_every else 0
+    rows = np.array([len(pilot.legs) for pilot in pilots])
+    legs = np.full((n, rows.max(), N_LEG), np.nan)
+    waves = np.zeros((n, max(len(world.waves) for world in worlds), N_WAVE))
+    waves[:, :, 1] = waves[:, :, 2] = 1.0  # a wave of no height still needs a length
+    for i, (world, pilot) in enumerate(zip(worlds, pilots, strict=True)):
+        legs[i, : rows[i]] = pilot.legs
+        waves[i, : len(world.waves)] = world.waves
+    states = np.array([world.x for world in worlds])
+    traces, ends = np.full((n, lines, N_TRACE), np.nan), np.zeros((n, N_END))
+    ticks = np.zeros(n, dtype=np.int64)
+    fly_many(
+        np.array([world.P for world in worlds]), first.P, np.array([pilot.C for pilot in pilots]), legs, rows,
+        first.nav, np.array([world.E for world in worlds]), waves, np.array([world.sensors for world in worlds]),
+        np.array([world.errors for world in worlds]), np.array([world.seed for world in worlds]), states,
+        worlds[0].dt, int(max_seconds / step), every, traces, ends, ticks,
+    )  # fmt: skip
+    return FleetResult(
+        modes=ends[:, END_MODE], reasons=ends[:, END_REASON], seconds=ends[:, END_TIME],
+        legs=ends[:, END_LEG].astype(int), ticks=ticks, states=states, traces=traces,
+    )  # fmt: skip
