@@ -53,10 +53,10 @@ def tick(P, C, legs, frame, est, ap, nav, cmd, t):
     Completed or aborted: ballast to its light end, mass aft for nose up, servo centred, so that the vehicle surfaces.
     """
     sense(P, C, frame, est, t)
-    if C[at.ESTIMATOR] == at.FILTERED:
-        navigate(P, C, nav, est, ap, t)
-    else:
+    if C[at.ESTIMATOR] == at.MEASURED:
         take_as_measured(est)
+    else:
+        navigate(P, C, nav, est, ap, t)
     sequence(C, legs, est, ap, t)
     if ap[at.MODE] == at.FLYING:
         follow(C, legs, est, ap)

@@ -4,7 +4,7 @@ Missions come as a matrix, one row a leg; nav is the estimator's own memory. SI 
 """
 
 from firmware.core.estimator_layout import N_E, N_S, N_W, N_WORK_ROWS, N_XE, N_Z
-from firmware.core.layout import N_P
+from firmware.core.layout import N_P, N_X
 
 # --- C: configuration -----------------------------------------------------------------------------------------------
 DT = 0                                               # s, the loop's step
@@ -22,7 +22,7 @@ SURFACE_PRESSURE = 21                                # Pa
 SITE_DEPTH = 22                                      # m; 0: unknown
 MISSION_TIME_LIMIT = 23                              # s
 HEADING_KP, HEADING_KD = 24, 25                      # rad of roll per rad of heading error, and per rad/s
-ESTIMATOR = 26                                       # MEASURED or FILTERED
+ESTIMATOR = 26                                       # MEASURED, FILTERED or GIVEN
 CONTROLLER, FORM = 27, 28                            # PID, LAW, HYBRID, LAW_PLUS; EXACT or PAPER
 PITCH_K1, PITCH_K2, PITCH_K3, PITCH_EPS = 29, 30, 31, 32     # 1/s, m, 1/s, rad/s
 DEPTH_K1, DEPTH_K2, DEPTH_K3, DEPTH_EPS = 33, 34, 35, 36     # 1/s, kg, 1/s, m/s
@@ -34,7 +34,7 @@ OBSERVER_SHARE = 44                                  # of the filter's model err
 N_C = 45
 PID, LAW, HYBRID, LAW_PLUS = 0.0, 1.0, 2.0, 3.0
 EXACT, PAPER = 0.0, 1.0
-MEASURED, FILTERED = 0.0, 1.0                        # samples as they come, or through the Kalman filter
+MEASURED, FILTERED, GIVEN = 0.0, 1.0, 2.0            # samples as they come; the Kalman filter; a state from outside
 
 # --- est: the estimate ----------------------------------------------------------------------------------------------
 EST_DEPTH, EST_DEPTH_RATE = 0, 1
@@ -68,7 +68,8 @@ NAV_STRESS = NAV_X + N_XE
 NAV_Z = NAV_STRESS + 2
 NAV_BEYOND = NAV_Z + N_Z
 NAV_SCORES = NAV_BEYOND + N_Z
-NAV_COV = NAV_SCORES + N_Z
+NAV_GIVEN = NAV_SCORES + N_Z                         # N_X, the state from outside (GIVEN): motion capture, or the plant's
+NAV_COV = NAV_GIVEN + N_X
 NAV_WORK = NAV_COV + N_E * N_E
 N_NAV = NAV_WORK + N_WORK_ROWS * N_W
 

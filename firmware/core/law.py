@@ -86,6 +86,8 @@ def solve_inputs(
         return 0.0, 0.0, NOT_FINITE
     if not (math.isfinite(demand_t) and math.isfinite(demand_z)):
         return 0.0, 0.0, NOT_FINITE
+    if not (slider_low <= slider_high and ballast_low <= ballast_high):
+        return 0.0, 0.0, NOT_FINITE
     if abs(cos_pitch) < COS_PITCH_MIN or abs(determinant) <= DEGENERATE * (abs(first) + abs(second)) or first == 0.0:
         return 0.0, 0.0, STEEP
     u_s = (g_zb * demand_t - g_tb * demand_z) / determinant

@@ -25,7 +25,7 @@ from firmware.core.estimator_layout import (
     Z_SLIDER,
 )
 from firmware.core.jit import kernel
-from firmware.core.layout import N_P, X_ACT, X_NU, X_QUAT
+from firmware.core.layout import N_P, N_X, X_ACT, X_NU, X_QUAT
 from firmware.core.rotations import euler_from_quaternion, euler_rates, quaternion_from_euler, rotation_nb
 
 ACTIVITY_TIME = 2.0  # s, over which the scores are averaged
@@ -84,8 +84,8 @@ def start_filter(P, nav, est, t, x, cov, work):
 
 
 @kernel
-def write_estimate(x, cov, est):
-    """The filter's state as the rest of the autopilot reads it."""
+def write_state(x, est):
+    """A state (N_X or longer) as the rest of the autopilot reads it."""
     est[at.EST_X], est[at.EST_Y], est[at.EST_DEPTH] = x[0], x[1], x[2]
     est[at.EST_ROLL], est[at.EST_PITCH], est[at.EST_YAW] = euler_from_quaternion(x[3], x[4], x[5], x[6])
     _, _, _, _, _, _, r31, r32, r33 = rotation_nb(x[3], x[4], x[5], x[6])
@@ -95,6 +95,12 @@ def write_estimate(x, cov, est):
     for i in range(3):
         est[at.EST_P + i] = x[X_NU + 3 + i]
     est[at.EST_SERVO], est[at.EST_SLIDER], est[at.EST_BALLAST] = x[X_ACT], x[X_ACT + 1], x[X_ACT + 2]
+
+
+@kernel
+def write_errors(x, cov, est):
+    """What the filter knows beside the state: current, model error, and how sure it is."""
+    _, _, _, _, _, _, r31, _, r33 = rotation_nb(x[3], x[4], x[5], x[6])
     est[at.EST_WATER_N], est[at.EST_WATER_E] = x[X_WATER], x[X_WATER + 1]
     for i in range(6):
         est[at.MODEL_ERROR + i] = x[X_ERR + i]
@@ -136,5 +142,6 @@ def navigate(P, C, nav, est, ap, t):
         nav[at.NAV_STRESS : at.NAV_STRESS + 2], COMMANDED, ap[at.SENT_SERVO], ap[at.SENT_SLIDER], ap[at.SENT_BALLAST],
         dt, nav[at.NAV_Z : at.NAV_Z + N_Z], nav[at.NAV_BEYOND : at.NAV_BEYOND + N_Z], scores, work,
     )  # fmt: skip
-    write_estimate(x, cov, est)
+    write_state(nav[at.NAV_GIVEN : at.NAV_GIVEN + N_X] if C[at.ESTIMATOR] == at.GIVEN else x, est)
+    write_errors(x, cov, est)
     note_activity(est, scores, dt)
