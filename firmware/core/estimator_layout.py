@@ -46,6 +46,7 @@ STRESS_GROWTH, STRESS_TIME, STRESS_MAX = 14.0, 5.0, 1e4  # 1/s (fourfold in 0.1 
 ERROR_LINEAR, ERROR_ANGULAR = 0.1, 0.3  # m/s2, rad/s2
 GYRO_WANDER = 0.2  # 1/s
 SPEED_LIMIT, RATE_LIMIT = 1.5, 3.0  # m/s, rad/s
+STOP_MARGIN = 0.25  # share of an actuator's range
 COS_PITCH_MIN = 0.1
 LARGEST = 1e6  # a reading beyond it, or an infinite one, is none
 

@@ -19,6 +19,7 @@ from firmware.core.estimator_layout import (
     RATE_LIMIT,
     S_R,
     SPEED_LIMIT,
+    STOP_MARGIN,
     STRESS_GROWTH,
     STRESS_MAX,
     W_SCRATCH,
@@ -116,8 +117,10 @@ def inject(P, x, dx):
     for i in range(3):
         x[X_NU + i] = clip(x[X_NU + i], -SPEED_LIMIT, SPEED_LIMIT)
         x[X_NU + 3 + i] = clip(x[X_NU + 3 + i], -RATE_LIMIT, RATE_LIMIT)
-        x[X_ACT + i] += dx[E_ACT + i]
-    x[X_ACT] = clip(x[X_ACT], P[SERVO_MIN], P[SERVO_MAX])
+        # a draw-wire may read a little beyond the stops, for it has a bias, but no more
+        low, high = P[SERVO_MIN + 4 * i], P[SERVO_MAX + 4 * i]
+        margin = 0.0 if i == 0 else STOP_MARGIN * (high - low)
+        x[X_ACT + i] = clip(x[X_ACT + i] + dx[E_ACT + i], low - margin, high + margin)
 
 
 @kernel

@@ -21,7 +21,6 @@ UNSEEN_SERVO_WALK = 0.2  # rad per square root of a second: a servo turns where 
 # Before the first measurement: recordings begin at rest, at a launch or within a glide. One linearisation does not
 # reach from one to the other, so forward speeds are tried one by one, each with SPEED_SPREAD.
 START_SPEEDS = (0.0, 0.1, 0.2, 0.3, 0.45, 0.6)  # m/s
-USUAL_SPEED, USUAL_SPREAD = 0.2, 0.2  # m/s, what is taken where the measurements do not tell
 
 # 1 sigma before the first measurement
 POSITION_SPREAD, ATTITUDE_SPREAD = 1.0, 0.3  # m, rad, about the first readings
@@ -78,9 +77,3 @@ def first_spread(P: np.ndarray, mode: int, seen: tuple[bool, bool, bool]) -> np.
         actuators[0] = max(actuators[0], 0.1)
     moving = [*3 * [POSITION_SPREAD], *3 * [ATTITUDE_SPREAD], *SPEED_SPREAD, *3 * [RATE_SPREAD], *actuators]
     return np.array([*moving, *6 * [0.0], *3 * [GYRO_SPREAD], *2 * [WATER_SPREAD]])
-
-
-def start_speeds() -> tuple[np.ndarray, np.ndarray]:
-    """Forward speeds to begin with (m/s), and what each adds to its squared scores, both shape (speeds,)."""
-    speeds = np.array(START_SPEEDS)
-    return speeds, ((speeds - USUAL_SPEED) / USUAL_SPREAD) ** 2

@@ -1,17 +1,36 @@
 """What the model says a recorded flight should have been: every window flown on from its start (GAP.md, Measures)."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from firmware.core.layout import X_ACT
 from tools.gap import start
 from tools.gap.channels import INSTEAD, ONBOARD
-from tools.gap.core.flights import N_Y, fly_windows, observe_rows
+from tools.gap.core.flights import N_EXTRAS, N_Y, fly_windows, observe_rows
 from tools.gap.model import Model
 from tools.gap.windows import Window, windows
 from tools.runs.case import Case
 from tools.runs.run import Run
+
+
+@dataclass
+class Inputs:
+    """What drives the windows: as recorded, or with something in it changed."""
+
+    modes: np.ndarray  # (runs,)
+    values: np.ndarray  # (rows, 3)
+    starts: np.ndarray  # (windows, N_XE) state at row first - 1
+    shaken: np.ndarray | None = None  # (rows, 6) accelerations from each row on
+
+
+@dataclass
+class Variant:
+    """One model flown: parameters, extras (tools/gap/core/flights) and inputs."""
+
+    P: np.ndarray
+    inputs: Inputs
+    extras: np.ndarray = field(default_factory=lambda: np.zeros(N_EXTRAS))
 
 
 @dataclass
@@ -25,7 +44,7 @@ class Flown:
     last: np.ndarray  # (windows,) one past the last
     run_of: np.ndarray  # (windows,)
     scored: np.ndarray  # (windows,) bool
-    starts: np.ndarray  # (windows, N_XE) state at row first - 1
+    inputs: Inputs  # as recorded
 
 
 def prepare(case: Case, model: Model, runs: list[Run]) -> Flown:
@@ -44,18 +63,36 @@ def prepare(case: Case, model: Model, runs: list[Run]) -> Flown:
         at = recording.drawn[first - 1, i]
         starts[:, X_ACT + 1 + i] = np.where(np.isfinite(at), at, starts[:, X_ACT + 1 + i])
     scored = np.array([window.scored for _, window in flat], dtype=bool)
-    return Flown(recording, estimates, found, first, last, run_of, scored, starts)
+    inputs = Inputs(recording.modes, recording.inputs, starts)
+    return Flown(recording, estimates, found, first, last, run_of, scored, inputs)
 
 
-def fly(flown: Flown, P: np.ndarray) -> np.ndarray:
-    """Predictions (models, rows, N_Y) of models P (models, N_P); the windows' first 2 s hold the filter's estimate."""
-    Y = np.empty((len(P), len(flown.recording.t), N_Y))
+def fly(flown: Flown, models: list[Variant]) -> np.ndarray:
+    """Predictions (models, rows, N_Y); the windows' first 2 s hold the filter's estimate."""
+    recording = flown.recording
+    rows = len(recording.t)
+    Y = np.empty((len(models), rows, N_Y))
     observe_rows(flown.estimates.x, Y[0])
     Y[1:] = Y[0]
+    begins = np.repeat(recording.t[recording.bounds[:-1]], np.diff(recording.bounds))
+    # Variants that share their inputs share one copy: the list may be long and the rows many.
+    kinds = list({id(model.inputs): model.inputs for model in models}.values())
+    which = np.array([next(n for n, kind in enumerate(kinds) if kind is model.inputs) for model in models])
     fly_windows(
-        P, flown.recording.modes, flown.recording.t, flown.recording.inputs, flown.starts, flown.first, flown.last,
-        flown.run_of, Y,
-    )  # fmt: skip
+        np.array([model.P for model in models]),
+        np.array([model.extras for model in models]),
+        which,
+        np.array([kind.modes for kind in kinds]),
+        recording.t,
+        recording.t - begins,
+        np.array([kind.values for kind in kinds]),
+        np.array([np.zeros((rows, 6)) if kind.shaken is None else kind.shaken for kind in kinds]),
+        np.array([kind.starts for kind in kinds]),
+        flown.first,
+        flown.last,
+        flown.run_of,
+        Y,
+    )
     return Y
 
 
@@ -75,6 +112,6 @@ def as_run(run: Run, Y: np.ndarray) -> Run:
 def predict(case: Case, model: Model, runs: list[Run]) -> list[np.ndarray]:
     """A prediction (rows, N_Y) for every run."""
     flown = prepare(case, model, runs)
-    Y = fly(flown, model.P[None, :])[0]
+    Y = fly(flown, [Variant(model.P, flown.inputs)])[0]
     bounds = flown.recording.bounds
     return [Y[bounds[n] : bounds[n + 1]] for n in range(len(runs))]

@@ -7,7 +7,7 @@ import numpy as np
 from firmware.core import estimator_layout as est
 from firmware.core.estimator_layout import N_E
 from firmware.core.rotations import quaternion_from_euler
-from firmware.estimation.settings import estimator_settings, first_spread, start_speeds
+from firmware.estimation.settings import START_SPEEDS, estimator_settings, first_spread
 from tools.gap.channels import measured, recorded
 from tools.gap.core.flights import estimate_runs
 from tools.gap.model import Model
@@ -53,7 +53,7 @@ def held(values: np.ndarray) -> np.ndarray:
 
 
 def drawn_position(t: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Draw-wire positions with the missing ones drawn in straight; the nearest one beyond the first and last."""
+    """Draw-wire positions (one reading at least) with the missing ones drawn in straight; constant beyond the ends."""
     given = np.isfinite(values)
     return np.interp(t, t[given], values[given])
 
@@ -145,6 +145,6 @@ def estimate(recording: Recording, model: Model) -> Estimates:
     X, sd = np.empty((rows, est.N_XE)), np.empty((rows, N_E))
     estimate_runs(
         model.P, recording.settings, model.sigma, recording.modes, recording.bounds, recording.early, recording.t,
-        recording.inputs, recording.z, recording.starts, *start_speeds(), recording.spreads, X, sd,
+        recording.inputs, recording.z, recording.starts, np.array(START_SPEEDS), recording.spreads, X, sd,
     )  # fmt: skip
     return Estimates(X, sd)

@@ -8,11 +8,20 @@ import math
 import numpy as np
 
 from firmware.core.estimator import estimator_predict, estimator_start, estimator_update, flight_derivative
-from firmware.core.estimator_layout import GATE, MAX_STEP, N_E, N_W, N_WORK_ROWS, N_XE, N_Z
+from firmware.core.estimator_layout import GATE, MAX_STEP, N_E, N_W, N_WORK_ROWS, N_XE, N_Z, X_ERR, X_WATER
 from firmware.core.flight import normalise_attitude
 from firmware.core.jit import kernel, parallel_kernel, prange
-from firmware.core.layout import N_X
+from firmware.core.layout import CG_X, M_S, M_T, N_X, NET_MASS, X_B
+from firmware.core.mass import inertia
 from firmware.core.rotations import euler_from_quaternion
+
+# extras: what a model may have beside the vehicle file's parameters
+ROLL_TRIM, YAW_TRIM = 0, 1  # moment over squared speed, kg
+BALLAST_SCALE, SLIDER_SCALE = 2, 3  # share by which tank and slider do more than their draw-wires say
+NET_DEPTH, NET_TIME = 4, 5  # net mass, kg/m of depth, kg/s of run
+WATER_N, WATER_E = 6, 7  # m/s
+SHEAR_N, SHEAR_E = 8, 9  # m/s per m of depth
+N_EXTRAS = 10
 
 # columns of a prediction Y: as z (firmware/core/estimator) up to the ballast, then the horizontal position
 Y_X, Y_Y = 9, 10
@@ -83,13 +92,13 @@ def estimate_rows(P, S, sigma, mode, t, inputs, z, first, last, x, spread, X, sd
 
 
 @parallel_kernel
-def estimate_runs(P, settings, sigma, modes, bounds, early, t, inputs, z, starts, speeds, penalties, spreads, X, sd):
+def estimate_runs(P, settings, sigma, modes, bounds, early, t, inputs, z, starts, speeds, spreads, X, sd):
     """The filter over every run: X (rows, N_XE) its state and sd (rows, N_E) its 1 sigma after each row's measurements.
 
     P (N_P), settings (runs, N_S), sigma (N_P), modes (runs), t (rows), inputs (rows, 3), z (rows, N_Z),
     starts (runs, N_XE), spreads (runs, N_E). Of the initial forward speeds (m/s) the one is taken whose squared
-    scores over the rows below early (runs), with its penalty, add up to the least: one linearisation does not reach
-    from a vehicle at rest to one that glides.
+    scores over the rows below early (runs) add up to the least: one linearisation does not reach from a vehicle at
+    rest to one that glides.
     """
     for run in prange(len(bounds) - 1):
         work, cov = np.zeros((N_WORK_ROWS, N_W)), np.empty((N_E, N_E))
@@ -103,26 +112,55 @@ def estimate_runs(P, settings, sigma, modes, bounds, early, t, inputs, z, starts
                 P, settings[run], sigma, modes[run], t, inputs, z, bounds[run], last, x, spreads[run], X, sd,
                 work, cov, stress, beyond, scores,
             )  # fmt: skip
-            if n < len(speeds) and misfit + penalties[n] < least:
-                least, speed = misfit + penalties[n], speeds[n]
+            if n < len(speeds) and misfit < least:
+                least, speed = misfit, speeds[n]
+
+
+@kernel
+def apply_extras(P, extras, x, since, Pw):
+    """What the vehicle file has no entry for, at x: into Pw, a copy of P, and into x's model error and water.
+
+    Masses and centres of gravity that follow the state are entries of P held over a step; trims are moments growing
+    with the square of the speed; the water is uniform or sheared. since (s) counts from the run's start.
+    """
+    Pw[NET_MASS] = P[NET_MASS] + extras[BALLAST_SCALE] * x[15] + extras[NET_DEPTH] * x[2] + extras[NET_TIME] * since
+    shift = extras[SLIDER_SCALE] * P[M_S] * x[14] + extras[BALLAST_SCALE] * x[15] * P[X_B]
+    Pw[CG_X] = P[CG_X] + shift / P[M_T]
+    i1, _, i3, _, _, _ = inertia(P, x[13], x[14], x[15])
+    v_squared = x[7] * x[7] + x[8] * x[8] + x[9] * x[9]
+    x[X_ERR + 3] += extras[ROLL_TRIM] * v_squared / i1
+    x[X_ERR + 5] += extras[YAW_TRIM] * v_squared / i3
+    x[X_WATER] = extras[WATER_N] + extras[SHEAR_N] * x[2]
+    x[X_WATER + 1] = extras[WATER_E] + extras[SHEAR_E] * x[2]
 
 
 @parallel_kernel
-def fly_windows(P, modes, t, inputs, starts, first, last, run_of, Y):
+def fly_windows(P, extras, which, modes, t, since, inputs, shaken, starts, first, last, run_of, Y):
     """Fly every window with every model on: Y (models, rows, N_Y) for rows first[w] .. last[w] - 1.
 
-    P (models, N_P), modes (runs), starts (windows, N_XE): the state at row first[w] - 1, flown on without model error.
+    P (models, N_P), extras (models, N_EXTRAS); which (models): the variant of modes (variants, runs), inputs
+    (variants, rows, 3), shaken (variants, rows, 6): accelerations added from each row on, and starts (variants,
+    windows, N_XE): the state at row first[w] - 1, flown on without the filter's model error.
     """
     models, windows = P.shape[0], len(first)
     for n in prange(models * windows):
         m, w = n // windows, n % windows
-        work = np.zeros((5, N_XE))
-        x = starts[w].copy()
+        v = which[m]
+        work, Pw = np.zeros((5, N_XE)), P[m].copy()
+        x, kept = starts[v, w].copy(), np.empty(N_XE)
         x[N_X:] = 0.0
-        mode = modes[run_of[w]]
+        mode = modes[v, run_of[w]]
         for i in range(first[w], last[w]):
             dt = t[i] - t[i - 1]
             steps = max(1, math.ceil(dt / MAX_STEP - 1e-9))
-            for _ in range(steps):
-                flight_step(P[m], x, mode, inputs[i - 1, 0], inputs[i - 1, 1], inputs[i - 1, 2], dt / steps, work)
+            servo, slider, ballast = inputs[v, i - 1, 0], inputs[v, i - 1, 1], inputs[v, i - 1, 2]
+            for k in range(steps):
+                for j in range(6):
+                    x[X_ERR + j] = shaken[v, i - 1, j]
+                apply_extras(P[m], extras[m], x, since[i - 1] + k * dt / steps, Pw)
+                kept[:] = x
+                flight_step(Pw, x, mode, servo, slider, ballast, dt / steps, work)
+                # A model far from any vehicle may fly to where no number is: it stays where it was.
+                if not math.isfinite(x.sum()):
+                    x[:] = kept
             observe(x, Y[m, i])

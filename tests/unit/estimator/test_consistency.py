@@ -1,0 +1,69 @@
+"""Is the filter as sure as it may be: normalised squared errors over seeded flights within chi-square bounds."""
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+from support.estimating import Filter, state_error
+from support.flights import World, fly
+
+from firmware.core import estimator_layout as at
+
+# Depth, attitude and nu; position north and east is dead reckoning, actuators are known but for their noise.
+KEPT = [2, *range(at.E_ATT, at.E_ACT)]
+EVERY, AFTER = 50, 100  # rows: once in 5 s, from 10 s on, when one launch no longer colours the next sample
+
+
+def squared_errors(world: World, seeds: range, uncertain: bool) -> np.ndarray:
+    """e' P^-1 e of the kept errors, one for each look at each flight."""
+    found = []
+    for seed in seeds:
+        flight = fly(world, seed)
+        columns, t = flight.run.columns, flight.run.t
+        z = np.full((len(t), at.N_Z), np.nan)
+        for slot, name in enumerate(
+            ("roll_rad", "pitch_rad", "yaw_rad", "p_rad_s", "q_rad_s", "r_rad_s", "depth_m", "slider_m", "ballast_kg")
+        ):
+            z[:, slot] = columns[name]
+        commands = np.column_stack([columns[f"cmd_{n}"] for n in ("servo_rad", "slider_m", "ballast_kg")])
+        filtered = Filter(uncertain=uncertain).start(z[0, 6], z[0, :3], world.start_speed)
+        filtered.take(z[0])
+        for i in range(1, len(t)):
+            filtered.predict(0.1, commands[i - 1])
+            filtered.take(z[i])
+            if i >= AFTER and i % EVERY == 0:
+                error = state_error(flight.truth[i], filtered.x)[KEPT]
+                cov = filtered.cov[np.ix_(KEPT, KEPT)]
+                found.append(error @ np.linalg.solve(cov, error))
+    return np.array(found)
+
+
+def test_with_disturbance_alone_errors_are_as_large_as_the_filter_says():
+    world = World(uncertainty=0.0, bias=0.0, start_speed=0.3)
+    found = squared_errors(world, range(12), uncertain=False)
+    n, k = len(found), len(KEPT)
+    assert n >= 100
+    low, high = chi2.ppf([0.0005, 0.9995], n * k) / n
+    assert low * 0.9 < found.mean() < high * 1.1  # a tenth for what linearising leaves out
+
+
+def test_with_uncertain_parameters_it_is_not_too_sure():
+    found = squared_errors(World(bias=0.0, start_speed=0.3), range(12), uncertain=True)
+    n, k = len(found), len(KEPT)
+    assert found.mean() < 1.1 * chi2.ppf(0.9995, n * k) / n
+    assert found.mean() > 0.5 * k  # nor uselessly unsure
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.2, 0.5])
+def test_the_launch_is_found_whether_at_rest_or_gliding(speed):
+    from support.flights import fly_case
+
+    from tools.gap.model import nominal_model
+    from tools.gap.predict import prepare
+
+    errors = []
+    for seed in range(6):
+        case, flights = fly_case(World(mocap=True, start_speed=speed, seconds=20.0), seed, runs=1)
+        flown = prepare(case, nominal_model(case), case.runs)
+        row = flown.first[0] - 1
+        errors.append(flown.estimates.x[row, 7] - flights[0].truth[row, 7])
+    assert np.sqrt(np.mean(np.square(errors))) < 0.04

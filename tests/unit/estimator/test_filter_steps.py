@@ -1,0 +1,223 @@
+"""One prediction, one measurement: against the textbook's matrices, and what does not fit."""
+
+import math
+
+import numba
+import numpy as np
+import pytest
+from support.estimating import Filter
+
+from firmware.core import estimator_layout as at
+from firmware.core.estimator import estimator_step
+from firmware.core.flight import nominal_run
+from firmware.core.layout import N_X
+from firmware.core.linearise import linearise
+
+HERE = dict(roll=0.0, pitch=-0.2, yaw=0.5, p=0.0, q=0.0, r=0.0, depth=2.0, slider=0.0, ballast=0.0)
+
+
+def test_prediction_follows_the_nominal_flight():
+    filtered = Filter().start()
+    x, work = filtered.x[:N_X].copy(), np.zeros((5, N_X))
+    for _ in range(50):
+        filtered.predict(0.1, (0.3, 0.02, 0.15))
+    nominal_run(filtered.P, x, 0.3, 0.02, 0.15, 0.0, 0.0, 0.0, 0.02, 250, work)
+    np.testing.assert_allclose(filtered.x[:N_X], x, atol=2e-4)
+
+
+def test_prediction_of_the_covariance_is_f_p_f_plus_q():
+    filtered = Filter(uncertain=False).start()
+    rng = np.random.default_rng(2)
+    root = rng.standard_normal((at.N_E, at.N_E))
+    filtered.cov[:] = root @ root.T
+    before, x = filtered.cov.copy(), filtered.x.copy()
+    A, y = np.zeros((at.N_MOVING, at.N_COUPLED)), np.zeros(at.N_W)
+    linearise(filtered.P, x, 0.0, 0.0, 0.0, A, y)
+    dt, F = 0.02, np.eye(at.N_E)
+    F[: at.N_MOVING, : at.N_COUPLED] += dt * A
+    F[0, at.E_WATER] = F[1, at.E_WATER + 1] = dt
+    for i in range(6):
+        F[at.E_NU + i, at.E_ERR + i] = dt
+        F[at.E_ERR + i, at.E_ERR + i] = math.exp(-dt / filtered.settings[at.S_ERROR_TIME])
+    for i, tau in enumerate((0.10, 0.15, 0.30)):
+        F[at.E_ACT + i, at.E_ACT + i] = math.exp(-dt / tau)
+    filtered.predict(dt)
+    Q = np.zeros(at.N_E)
+    disturbance = filtered.vehicle.disturbance
+    Q[at.E_NU : at.E_ACT] = np.repeat([disturbance.linear**2, disturbance.angular**2], 3) * 0.1 * dt
+    Q[at.E_ACT : at.E_ERR] = filtered.settings[at.S_SERVO : at.S_BALLAST + 1] * dt
+    Q[at.E_GYRO : at.E_WATER] = filtered.settings[at.S_GYRO] * dt
+    Q[at.E_WATER :] = filtered.settings[at.S_WATER] * dt
+    np.testing.assert_allclose(filtered.cov, F @ before @ F.T + np.diag(Q), rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["roll", "pitch", "yaw", "q", "depth", "slider", "mocap_y", "mocap_yaw"])
+def test_an_update_is_the_textbooks(name):
+    filtered = Filter().start(euler=(0.5, -0.4, 1.0))
+    rng = np.random.default_rng(3)
+    root = 0.01 * rng.standard_normal((at.N_E, at.N_E))
+    filtered.cov[:] = root @ root.T
+    before, x = filtered.cov.copy(), filtered.x.copy()
+    f, th = 0.5, -0.4
+    rows = {
+        "roll": [1.0, math.sin(f) * math.tan(th), math.cos(f) * math.tan(th)],
+        "pitch": [0.0, math.cos(f), -math.sin(f)],
+        "yaw": [0.0, math.sin(f) / math.cos(th), math.cos(f) / math.cos(th)],
+    }
+    H = np.zeros(at.N_E)
+    places = {"q": [at.E_NU + 4, at.E_GYRO + 1], "depth": [2], "slider": [at.E_ACT + 1], "mocap_y": [1]}
+    now = {"roll": f, "pitch": th, "yaw": 1.0, "mocap_yaw": 1.0, "depth": 2.0}.get(name, 0.0)
+    if name in places:
+        H[places[name]] = 1.0
+    else:
+        H[at.E_ATT : at.E_NU] = rows[name.removeprefix("mocap_")]
+    R = filtered.settings[at.S_R + getattr(at, f"Z_{name.upper()}")]
+    S = H @ before @ H + R
+    K = before @ H / S
+    innovation = 2.0 * math.sqrt(S)
+    scores = filtered.update(**{name: now + innovation})
+    assert scores[getattr(at, f"Z_{name.upper()}")] == pytest.approx(2.0)
+    IKH = np.eye(at.N_E) - np.outer(K, H)
+    np.testing.assert_allclose(filtered.cov, IKH @ before @ IKH.T + R * np.outer(K, K), rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(filtered.x[7:13] - x[7:13], (K * innovation)[at.E_NU : at.E_ACT], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(filtered.x[:3] - x[:3], (K * innovation)[:3], rtol=1e-9, atol=1e-12)
+
+
+def test_what_is_missing_or_no_number_changes_nothing():
+    filtered = Filter().start()
+    x, cov = filtered.x.copy(), filtered.cov.copy()
+    for value in (math.nan, math.inf, -math.inf, 1e30):
+        scores = filtered.take(np.full(at.N_Z, value))
+        assert np.isnan(scores).all()
+    np.testing.assert_array_equal(filtered.x, x)
+    np.testing.assert_array_equal(filtered.cov, cov)
+
+
+def settle(filtered: Filter, seconds: float = 5.0) -> None:
+    """Readings that agree with the filter itself, for a while."""
+    for _ in range(round(seconds / 0.1)):
+        filtered.predict(0.1)
+        filtered.update(depth=filtered.x[2], **{k: v for k, v in readings(filtered).items() if k != "depth"})
+
+
+def readings(filtered: Filter) -> dict[str, float]:
+    from firmware.core.rotations import euler_from_quaternion
+
+    angles = euler_from_quaternion(*filtered.x[3:7])
+    values = (*angles, *filtered.x[10:13], filtered.x[2], filtered.x[14], filtered.x[15])
+    return dict(zip(HERE, map(float, values), strict=True))
+
+
+def test_a_spike_moves_nothing():
+    filtered = Filter().start()
+    settle(filtered)
+    filtered.predict(0.1)
+    x = filtered.x.copy()
+    scores = filtered.update(depth=x[2] + 5.0)
+    assert scores[at.Z_DEPTH] > at.GATE
+    np.testing.assert_allclose(filtered.x, x, rtol=1e-14, atol=0.0)
+
+
+def test_a_sensor_that_stays_away_is_followed_in_the_end():
+    filtered = Filter().start()
+    settle(filtered)
+    speed = filtered.x[7:10].copy()
+    jump = filtered.x[2] + 0.5
+    for _ in range(round(at.PATIENCE / 0.1) + 3):
+        filtered.predict(0.1)
+        filtered.update(**{**readings(filtered), "depth": jump})
+        assert filtered.positive_definite()
+    assert filtered.x[2] == pytest.approx(jump, abs=0.05)
+    # the depth jumped, the vehicle did not speed off
+    np.testing.assert_allclose(filtered.x[7:10], speed, atol=0.1)
+
+
+def test_a_gyro_that_disagrees_with_the_attitude_is_not_believed():
+    filtered = Filter().start()
+    settle(filtered)
+    for _ in range(100):
+        filtered.predict(0.1)
+        filtered.update(**{**readings(filtered), "q": 0.5})
+    assert abs(filtered.x[11]) < 0.05
+
+
+def test_a_biased_gyro_is_found_out_by_the_attitude():
+    filtered = Filter().start(spread=None)
+    for _ in range(200):
+        filtered.predict(0.1)
+        seen = readings(filtered)
+        filtered.update(**{**seen, "r": 0.01, "yaw": 0.5})
+    assert filtered.x[at.X_GYRO + 2] == pytest.approx(0.01, abs=0.003)
+    assert abs(filtered.x[12]) < 0.004
+
+
+def test_yaw_is_taken_the_short_way_round():
+    filtered = Filter().start(euler=(0.0, 0.0, math.pi - 0.01))
+    for _ in range(20):
+        filtered.update(yaw=-math.pi + 0.01)
+    assert abs(readings(filtered)["yaw"]) > math.pi - 0.02
+
+
+def test_near_the_vertical_only_pitch_is_taken():
+    filtered = Filter().start(euler=(0.3, 1.52, 0.2))
+    scores = filtered.update(roll=0.3, pitch=1.52, yaw=0.2)
+    assert np.isfinite(scores[at.Z_PITCH])
+    assert np.isnan(scores[[at.Z_ROLL, at.Z_YAW]]).all()
+    assert np.isfinite(filtered.x).all()
+
+
+def test_a_long_step_is_many_short_ones():
+    one, many = Filter().start(), Filter().start()
+    one.predict(0.1, (0.4, 0.01, 0.1))
+    for _ in range(5):
+        many.predict(0.02, (0.4, 0.01, 0.1))
+    np.testing.assert_allclose(one.x, many.x, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(one.cov, many.cov, rtol=1e-9, atol=1e-15)
+
+
+def test_an_unseen_servo_is_found_from_the_motion():
+    mode = at.SERVO_DRIVEN | at.SLIDER_DRIVEN | at.BALLAST_DRIVEN
+    truth, filtered = Filter().start(speed=0.4), Filter(mode=mode).start(speed=0.4)
+    rng = np.random.default_rng(4)
+    for _ in range(100):
+        truth.predict(0.1, (0.5, 0.0, 0.0))
+        filtered.predict(0.1, (0.0, 0.0, 0.0))
+        seen = {name: value + 0.002 * rng.standard_normal() for name, value in readings(truth).items()}
+        filtered.update(**seen)
+    assert filtered.x[13] == pytest.approx(0.5, abs=0.05)
+
+
+@numba.njit
+def many_steps(count, P, settings, sigma, x, cov, stress, z, beyond, scores, work):
+    for _ in range(count):
+        estimator_step(P, settings, sigma, x, cov, stress, 0, 0.1, 0.01, 0.1, 0.02, z, beyond, scores, work)
+
+
+def test_a_step_allocates_nothing():
+    from numba.core.runtime import _nrt_python, rtsys
+
+    _nrt_python.memsys_enable_stats()
+    filtered = Filter().start()
+    z = np.full(at.N_Z, 0.1)
+
+    def allocated(count: int) -> int:
+        before = rtsys.get_allocation_stats().alloc
+        arrays = (filtered.P, filtered.settings, filtered.sigma, filtered.x, filtered.cov, filtered.stress)
+        many_steps(count, *arrays, z, filtered.beyond, filtered.scores, filtered.work)
+        return rtsys.get_allocation_stats().alloc - before
+
+    allocated(1)
+    assert allocated(1000) == allocated(1)  # what is left is the call's own arguments
+
+
+def test_the_covariance_stays_sound_under_nonsense():
+    filtered = Filter().start()
+    rng = np.random.default_rng(5)
+    for _ in range(2000):
+        filtered.predict(0.02, rng.normal(0.0, 0.3, 3))
+        z = rng.normal(0.0, 3.0, at.N_Z)
+        z[rng.random(at.N_Z) < 0.3] = np.nan
+        filtered.take(z, 0.02)
+    assert np.isfinite(filtered.x).all()
+    assert np.isfinite(filtered.cov).all()
+    assert filtered.positive_definite()

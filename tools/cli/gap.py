@@ -1,0 +1,86 @@
+"""`glider gap`: where simulation and sea disagree."""
+
+from pathlib import Path
+
+import click
+
+from tools.cli.common import json_option, print_json, progress, say
+
+
+@click.group()
+def gap():
+    """Measure and predict: where simulation and sea disagree."""
+
+
+@gap.command()
+@click.argument("case", type=click.Path(path_type=Path))
+@click.option("--report", type=click.Path(path_type=Path, dir_okay=False), help="Where the report (HTML) goes.")
+@json_option
+def measure(case: Path, report: Path | None, as_json: bool) -> None:
+    """The gap of CASE per run and channel, and how it is spread over the parts of the model.
+
+    Gaps are root mean square errors in tolerances: at 1 the simulator is off by as much as may be. Without --json a
+    report is written too, to <case>-gap.html in the working directory unless --report names a file.
+    """
+    from tools.gap.assess import assess
+    from tools.runs.case import load_case
+
+    with progress("gap", 3) as advance:
+        loaded = load_case(case)
+        advance(1)
+        found = assess(loaded)
+        advance(1)
+        if report is None and not as_json:
+            report = Path(f"{case.resolve().name}-gap.html")
+        if report is not None:
+            from tools.report.gap import write_report
+
+            write_report(report, found)
+        advance(1)
+    if as_json:
+        print_json(found.plain())
+    else:
+        _print_table(found)
+    if report is not None:
+        say(f"report: {report}")
+
+
+def _print_table(found) -> None:
+    """Runs by channels, then the parts, on standard output."""
+    names = list(found.channels)
+    width = max(8, *(len(name) + 2 for name in names))
+    first = max(8, *(len(run.name) + 2 for run in found.runs))
+
+    def line(head: str, cells: list[str]) -> None:
+        click.echo(head.ljust(first) + "".join(cell.rjust(width) for cell in cells))
+
+    line("", [*names, "total"])
+    for run in found.runs:
+        cells = [f"{run.channels[name]:.2f}" if name in run.channels else "-" for name in names]
+        line(run.name, [*cells, f"{run.total:.2f}"])
+    line("all", [*(f"{found.channels[name]:.2f}" for name in names), f"{found.total:.2f}"])
+    click.echo("\nshare of the squared gap")
+    for share in found.where:
+        name = share.subsystem if share.subsystem == share.element else f"{share.subsystem} {share.element}"
+        click.echo(f"  {100.0 * share.share:5.1f} %  {name}")
+
+
+@gap.command()
+@click.argument("run", type=click.Path(path_type=Path))
+@click.option("--model", default="nominal", show_default=True, help="`nominal`, a shipped vehicle or a vehicle file.")
+@click.option("--out", required=True, type=click.Path(path_type=Path, dir_okay=False), help="Predicted run (CSV).")
+def predict(run: Path, model: str, out: Path) -> None:
+    """Predict RUN (a run file beside its case.toml): its rows and columns, no gaps, window by window."""
+    from tools.errors import InputError
+    from tools.gap.model import load_model
+    from tools.gap.predict import as_run
+    from tools.gap.predict import predict as predict_runs
+    from tools.runs.case import load_case_of_run
+    from tools.runs.run import write_run
+
+    case, recorded = load_case_of_run(run)
+    if out.exists() and run.exists() and out.samefile(run):
+        raise InputError("would overwrite the run itself: name another file", source=out, column="--out")
+    predicted = predict_runs(case, load_model(model, case), [recorded])[0]
+    write_run(out, as_run(recorded, predicted))
+    say(f"predicted {recorded.rows} rows of {recorded.name} with {model}: {out}")

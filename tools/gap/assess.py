@@ -1,0 +1,54 @@
+"""A whole case measured: gaps of its runs, their total, and where they sit."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tools.errors import InputError
+from tools.gap.measure import RunGap, case_channels, root_mean_square, run_gap
+from tools.gap.model import Model, nominal_model
+from tools.gap.predict import Flown, Variant, fly, prepare
+from tools.gap.where import Share, where
+from tools.runs.case import Case
+
+
+@dataclass
+class CaseGap:
+    """What `glider gap measure` found, and what its pictures are drawn from."""
+
+    case: Case
+    model: Model
+    flown: Flown
+    predictions: list[np.ndarray]  # by run, (rows, N_Y)
+    runs: list[RunGap]
+    channels: dict[str, float]  # rms over the runs
+    total: float
+    where: list[Share]
+
+    def plain(self) -> dict[str, Any]:
+        """The result as `--json` prints it."""
+        return {
+            "runs": [
+                {"name": run.name, "channels": run.channels, "total": run.total, "windows": run.windows}
+                for run in self.runs
+            ],
+            "channels": self.channels,
+            "total": self.total,
+            "where": [{"subsystem": s.subsystem, "element": s.element, "share": s.share} for s in self.where],
+        }
+
+
+def assess(case: Case, model: Model | None = None) -> CaseGap:
+    """Measure a case against a model (nominal, if none is given); InputError where no sample can be scored."""
+    model = nominal_model(case) if model is None else model
+    flown = prepare(case, model, case.runs)
+    Y = fly(flown, [Variant(model.P, flown.inputs)])[0]
+    bounds = flown.recording.bounds
+    predictions = [Y[bounds[n] : bounds[n + 1]] for n in range(len(case.runs))]
+    gaps = [run_gap(run, predictions[n], flown.windows[n]) for n, run in enumerate(case.runs)]
+    total = root_mean_square([gap.total for gap in gaps])
+    if not np.isfinite(total):
+        raise InputError("nothing to score: no run has a measured channel beyond the first 2 s", source=case.folder)
+    shares = where(case, model, flown, Y)
+    return CaseGap(case, model, flown, predictions, gaps, case_channels(gaps), total, shares)

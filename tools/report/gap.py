@@ -1,0 +1,144 @@
+"""The report of a measured gap: one HTML file that opens offline, on a phone too."""
+
+import math
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tools.errors import MissingExtra
+from tools.gap.assess import CaseGap
+from tools.gap.channels import CHANNELS, Channel, channels_of, measured
+from tools.gap.windows import START, Window
+from tools.report.charts import Band, Chart, Line, svg
+
+MOST_RUNS = 12  # with pictures; of a longer case those with the largest gaps
+RATE_NAMES = ("roll rate p", "pitch rate q", "yaw rate r")
+# What a part's name says to a reader who has not read the contract.
+PARTS = {
+    "allowed": "what noise, disturbance and parameter uncertainty leave anyway",
+    "unexplained": "what no part explains",
+}
+
+
+def _lines(t: np.ndarray, seen: np.ndarray, said: np.ndarray, listed: list[Window], unwrap: bool) -> list[Line]:
+    """The measured line and the predicted one, which starts anew with each window."""
+    if unwrap:
+        valid = np.isfinite(seen)
+        seen = seen.copy()
+        seen[valid] = np.unwrap(seen[valid])
+        # bring each predicted sample to the turn of the measured one next to it
+        near = np.interp(t, t[valid], seen[valid]) if valid.any() else np.zeros_like(t)
+        said = near + (said - near + np.pi) % (2.0 * np.pi) - np.pi
+    begins = [window.first for window in listed[1:]]
+    return [
+        Line(t, seen, "measured"),
+        Line(np.insert(t, begins, t[begins]), np.insert(said, begins, np.nan), "predicted"),
+    ]
+
+
+def _bands(t: np.ndarray, listed: list[Window]) -> list[Band]:
+    """The 2 s in which each window finds its start, and what is left unscored."""
+    bands = []
+    for window in listed:
+        first, last = t[window.first], t[window.end - 1]
+        if window.scored:
+            bands.append(Band(first, min(first + START, last), "start"))
+        else:
+            bands.append(Band(first, last, "unscored"))
+    return bands
+
+
+def _charts(found: CaseGap, n: int) -> list[dict[str, Any]]:
+    """The pictures of one run: title, gap and SVG."""
+    run, Y, listed = found.case.runs[n], found.predictions[n], found.flown.windows[n]
+    table, gaps, t = measured(run), found.runs[n].channels, run.t
+    drawn: list[dict[str, Any]] = []
+
+    def add(channel: Channel, chart: Chart, least: float) -> None:
+        drawn.append({"title": chart.title, "gap": gaps.get(channel.name), "svg": svg(chart, least)})
+
+    for channel in channels_of(run):
+        if channel.joint:
+            continue
+        for k, column in enumerate(channel.columns):
+            title = f"{RATE_NAMES[k] if channel.name == 'rates' else channel.name}, {channel.unit}"
+            unwrap = channel.name == "yaw"
+            lines = _lines(t, table[:, column], Y[:, column], listed, unwrap)
+            for line in lines:
+                line.y = line.y * channel.scale
+            chart = Chart(title, "s", lines, _bands(t, listed), down=channel.name == "depth")
+            add(channel, chart, 4.0 * channel.tolerance * channel.scale)
+    for channel in channels_of(run):
+        if channel.joint:
+            north, east = channel.columns
+            begins = [window.first for window in listed[1:]]
+            x, y = np.insert(Y[:, east], begins, np.nan), np.insert(Y[:, north], begins, np.nan)
+            lines = [Line(table[:, east], table[:, north], "measured"), Line(x, y, "predicted")]
+            add(channel, Chart("plan, north up, m", "east", lines, square=True), 1.0)
+    return drawn
+
+
+def _heat(value: float | None) -> int:
+    """Shade of a table cell, 0 (none) to 5: twice the gap is one shade more."""
+    if value is None or not math.isfinite(value) or value < 0.5:
+        return 0
+    return min(5, 1 + int(math.log2(value / 0.5)))
+
+
+def _context(found: CaseGap) -> dict[str, Any]:
+    names = list(found.channels)
+    order = sorted(range(len(found.runs)), key=lambda n: -np.nan_to_num(found.runs[n].total))
+    shown = sorted(order[:MOST_RUNS])
+
+    def cells(channels: dict[str, float], total: float) -> list[dict[str, Any]]:
+        values = [*(channels.get(name) for name in names), total]
+        return [{"value": value, "heat": _heat(value)} for value in values]
+
+    shares = [
+        {
+            "name": PARTS.get(s.subsystem, f"{s.subsystem}: {s.element}"),
+            "percent": 100.0 * s.share,
+            "kind": s.subsystem if s.subsystem in PARTS else "part",
+        }
+        for s in found.where
+    ]
+    tolerances = [
+        {"name": c.name, "tolerance": f"{c.tolerance * c.scale:g} {c.unit}"} for c in CHANNELS if c.name in names
+    ]
+    return {
+        "case": found.case.folder.resolve().name,
+        "vehicle": found.case.vehicle.name,
+        "site": found.case.site,
+        "rate": found.case.log_rate_hz,
+        "mocap": found.case.motion_capture,
+        "model": found.model.name,
+        "total": found.total,
+        "names": names,
+        "runs": [{"name": run.name, "cells": cells(run.channels, run.total)} for run in found.runs],
+        "all": cells(found.channels, found.total),
+        "shares": shares,
+        "tolerances": tolerances,
+        "pictures": [
+            {"name": found.runs[n].name, "total": found.runs[n].total, "charts": _charts(found, n)} for n in shown
+        ],
+        "left_out": len(found.runs) - len(shown),
+        "commands": all(run.has_commands for run in found.case.runs),
+    }
+
+
+def report_html(found: CaseGap) -> str:
+    """The page's text; MissingExtra without jinja2."""
+    try:
+        from jinja2 import Environment, StrictUndefined
+    except ImportError:
+        raise MissingExtra("jinja2") from None
+    template = files("tools.report").joinpath("gap.html").read_text(encoding="utf-8")
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    return environment.from_string(template).render(_context(found))
+
+
+def write_report(path: Path, found: CaseGap) -> None:
+    """Write the page to a file."""
+    path.write_text(report_html(found), encoding="utf-8")
