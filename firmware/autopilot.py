@@ -25,7 +25,7 @@ REASONS = {
     layout.REASON_TOO_DEEP: "deeper than the site",
     layout.REASON_OPERATOR: "asked to by the operator",
 }
-ESTIMATORS = {"measured": layout.MEASURED, "filter": layout.FILTERED}
+ESTIMATORS = {"measured": layout.MEASURED, "filter": layout.FILTERED, "given": layout.GIVEN}
 CONTROLLERS = {"pid": layout.PID, "law": layout.LAW, "hybrid": layout.HYBRID, "law+": layout.LAW_PLUS}
 STANDARD_PRESSURE = 101325.0  # Pa
 SURFACED = 0.3  # m; shallower than this counts as at the surface

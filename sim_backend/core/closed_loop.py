@@ -9,13 +9,17 @@ from firmware.core import control_layout as ctl
 from firmware.core.autopilot import reset, tick
 from firmware.core.jit import kernel, parallel_kernel, prange
 from firmware.core.layout import N_X, X_ACT
+from firmware.core.rotations import euler_from_quaternion
 from hal.ports import FRAME_SIZE
 from sim_backend.core import layout as at
 from sim_backend.core.world import advance, sample_sensors
 
 # what is kept of each logged tick
-TRACE = ("t", "depth", "pitch", "roll", "ref_depth", "ref_pitch", "ref_roll", "servo", "slider", "ballast")
-N_TRACE = 10
+TRACE = (
+    "t", "depth", "pitch", "roll", "ref_depth", "ref_pitch", "ref_roll", "servo", "slider", "ballast",
+    "true_x", "true_y", "true_depth", "true_pitch", "true_roll", "true_yaw", "controller", "leg",
+)  # fmt: skip
+N_TRACE = 18
 # what is kept of each flight: how it ended, and over the time flown
 END_MODE, END_REASON, END_TIME, END_LEG = 0, 1, 2, 3
 END_ERROR_DEPTH, END_ERROR_ROLL, END_ERROR_PITCH = 4, 5, 6  # mean |measured - reference|, m and rad; 0: never flew
@@ -24,12 +28,15 @@ N_END = 10
 
 
 @kernel
-def write_trace(t, est, ap, cmd, out):
-    """One logged tick: estimates, references and commands, in the order of TRACE."""
+def write_trace(t, est, ap, cmd, x, out):
+    """One logged tick: estimates, references, commands and the plant's truth, in the order of TRACE."""
     out[0] = t
     out[1], out[2], out[3] = est[ctl.EST_DEPTH], est[ctl.EST_PITCH], est[ctl.EST_ROLL]
     out[4], out[5], out[6] = ap[ctl.REF_DEPTH], ap[ctl.REF_PITCH], ap[ctl.REF_ROLL]
     out[7], out[8], out[9] = cmd[0], cmd[1], cmd[2]
+    out[10], out[11], out[12] = x[0], x[1], x[2]
+    out[14], out[13], out[15] = euler_from_quaternion(x[3], x[4], x[5], x[6])
+    out[16], out[17] = ap[ctl.ACTIVE], ap[ctl.LEG]
 
 
 @kernel
@@ -67,12 +74,14 @@ def fly(P_plant, P, C, legs, nav, E, waves, sensors, errors, seed, x, dt, max_ti
     while ticks < max_ticks and ap[ctl.MODE] < ctl.COMPLETED:
         t = ticks * C[ctl.DT]
         advance(P_plant, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, frame, work, dt, t)
+        if C[ctl.ESTIMATOR] == ctl.GIVEN:
+            memory[ctl.NAV_GIVEN : ctl.NAV_GIVEN + N_X] = x
         tick(P, C, legs, frame, est, ap, memory, cmd, t)
         if ap[ctl.MODE] == ctl.FLYING:
             add_up(est, ap, x, last, end)
             flown += 1
         if ticks % every == 0 and ticks // every < trace.shape[0]:
-            write_trace(t, est, ap, cmd, trace[ticks // every])
+            write_trace(t, est, ap, cmd, x, trace[ticks // every])
         ticks += 1
     end[END_MODE], end[END_REASON], end[END_TIME], end[END_LEG] = ap[ctl.MODE], ap[ctl.REASON], t, ap[ctl.LEG]
     for i in range(END_ERROR_DEPTH, END_TRAVEL_SERVO):
@@ -86,10 +95,10 @@ def fly_many(
 ):
     """`fly` for n flights, shared out over all cores; a flight does not depend on how many fly beside it.
 
-    Shared: P and nav (what the autopilots believe), dt, max_ticks, every. Of each flight: P_plants (n, N_P), Cs (n, N_C)
-    legs (n, most, N_LEG) of which rows (n,) count, Es (n, N_E), waves (n, components, N_WAVE), sensors (n, N_SENSORS,
-    N_SENSOR_FIELDS), errors (n, 2, N_ERRORS), seeds (n,) uint64, xs (n, N_X) in place, traces (n, lines, N_TRACE), ends
-    (n, N_END), ticks (n,) int64.
+    Shared: P and nav (what the autopilots believe), dt, max_ticks, every. Of each flight: P_plants (n, N_P),
+    Cs (n, N_C), legs (n, most, N_LEG) of which rows (n,) count, Es (n, N_E), waves (n, components, N_WAVE),
+    sensors (n, N_SENSORS, N_SENSOR_FIELDS), errors (n, 2, N_ERRORS), seeds (n,) uint64, xs (n, N_X) in place,
+    traces (n, lines, N_TRACE), ends (n, N_END), ticks (n,) int64.
     """
     for i in prange(P_plants.shape[0]):
         ticks[i] = fly(
