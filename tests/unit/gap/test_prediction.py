@@ -22,8 +22,9 @@ def total(case, predictions=None) -> float:
 
 
 @pytest.mark.parametrize("mocap", [False, True])
-@pytest.mark.parametrize(("speed", "most"), [(0.0, 1.6), (0.2, 1.3), (0.5, 1.2)])  # from rest a touch decides the course
+@pytest.mark.parametrize(("speed", "most"), [(0.0, 1.6), (0.2, 1.3), (0.5, 1.2)])
 def test_the_start_is_found_nearly_as_good_as_known(mocap, speed, most):
+    """From rest a touch decides the course."""
     found, known = [], []
     for seed in range(5):
         case, flights = fly_case(World(mocap=mocap, start_speed=speed), seed, runs=2)
