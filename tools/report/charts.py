@@ -121,7 +121,8 @@ def svg(chart: Chart, least: float = 1e-3) -> str:
         out.append(f'<path class="notch" d="M{x:.1f} {TOP + box_h}v4"/>')
         # a long label at the right edge would be cut off in the middle
         x, anchor = (WIDTH - 1.0, "end") if x + 4.0 * len(text) > WIDTH else (x, "middle")
-        out.append(f'<text class="tick" x="{x:.1f}" y="{TOP + box_h + 18}" text-anchor="{anchor}">{escape(text)}</text>')
+        at = f'x="{x:.1f}" y="{TOP + box_h + 18}" text-anchor="{anchor}"'
+        out.append(f'<text class="tick" {at}>{escape(text)}</text>')
     for line in chart.lines:
         thin_x, thin_y = _thin(line)
         out.append(f'<path class="line {line.style}" d="{_path(px(thin_x), py(thin_y))}"/>')
