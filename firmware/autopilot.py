@@ -80,7 +80,7 @@ def configuration(
     for name, law in (("PITCH", control.law.pitch), ("DEPTH", control.law.depth)):
         for gain in ("k1", "k2", "k3", "eps"):
             C[getattr(layout, f"{name}_{gain.upper()}")] = getattr(law, gain)
-    for gain in ("activity", "pitch", "depth"):
+    for gain in ("roughness", "pitch", "depth"):
         for edge in ("on", "off"):
             C[getattr(layout, f"HYBRID_{gain}_{edge}".upper())] = getattr(control.hybrid, f"{gain}_{edge}")
     C[layout.HYBRID_DWELL] = control.hybrid.dwell_s

@@ -55,7 +55,7 @@ _FIELDS = (
     ("sd_depth_rate_m_s", "m/s", "1 sigma of the estimated depth rate"),
     ("sd_pitch_rad", "rad", "1 sigma of the estimated pitch"),
     ("sd_u_m_s", "m/s", "1 sigma of the estimated surge"),
-    ("activity", "1", "mean square of the filter's scores, 1 where all is as modelled"),
+    ("roughness", "1", "disturbance seen over the one in the vehicle file, 1 or more"),
 )
 
 TICK = RecordSpec(

@@ -21,6 +21,7 @@ class FleetResult:
     seconds: np.ndarray  # (n,)
     legs: np.ndarray  # (n,) the last leg flown, from 0
     ticks: np.ndarray  # (n,)
+    ends: np.ndarray  # (n, N_END) all that closed_loop keeps of a flight
     states: np.ndarray  # (n, N_X) of the plant at the end
     traces: np.ndarray  # (n, lines, N_TRACE), NaN behind a flight's end
 
@@ -63,5 +64,5 @@ def fly_fleet(
     )  # fmt: skip
     return FleetResult(
         modes=ends[:, END_MODE], reasons=ends[:, END_REASON], seconds=ends[:, END_TIME],
-        legs=ends[:, END_LEG].astype(int), ticks=ticks, states=states, traces=traces,
+        legs=ends[:, END_LEG].astype(int), ticks=ticks, ends=ends, states=states, traces=traces,
     )  # fmt: skip

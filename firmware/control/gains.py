@@ -65,10 +65,13 @@ class LawGains(Table):
 
 
 class HybridTable(Table):
-    """When the hybrid hands over to the law, and back; angles in rad, depths in m, activity 1 where all is calm."""
+    """When the hybrid hands over to the law, and back; angles in rad, depths in m.
 
-    activity_on: Gain = 2.5
-    activity_off: Gain = 1.6
+    Roughness is the disturbance that the filter sees over the one in the vehicle file, 1 in calm water.
+    """
+
+    roughness_on: Gain = 8.0
+    roughness_off: Gain = 4.0
     pitch_on: Gain = 0.06
     pitch_off: Gain = 0.02
     depth_on: Gain = 0.6
@@ -76,7 +79,7 @@ class HybridTable(Table):
     dwell_s: NonNegative = 3.0
 
     def __post_init__(self):
-        for name in ("activity", "pitch", "depth"):
+        for name in ("roughness", "pitch", "depth"):
             if not getattr(self, f"{name}_off") < getattr(self, f"{name}_on"):
                 raise ValueError(f"{name}_off: expected less than {name}_on, or the hybrid would chatter")
 

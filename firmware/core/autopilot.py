@@ -7,6 +7,7 @@ import math
 
 from firmware.core import control_layout as at
 from firmware.core.control import limited
+from firmware.core.estimator_layout import S_ANGULAR, S_LINEAR
 from firmware.core.guidance import follow, sequence
 from firmware.core.jit import kernel
 from firmware.core.layout import (
@@ -72,6 +73,8 @@ def tick(P, C, legs, frame, est, ap, nav, cmd, t):
 @kernel
 def reset(est, ap, nav):
     """Forget everything: no sample seen, nothing commanded, the filter not started, waiting for the first samples."""
+    if nav[at.NAV_RUNNING] == 1.0:
+        nav[at.NAV_SETTINGS + S_LINEAR], nav[at.NAV_SETTINGS + S_ANGULAR] = nav[at.NAV_CALM], nav[at.NAV_CALM + 1]
     nav[at.NAV_RUNNING] = 0.0
     est[:] = 0.0
     est[at.EST_IMU_TIME : at.EST_BEACON_TIME + 3] = -1.0

@@ -26,7 +26,7 @@ ESTIMATOR = 26                                       # MEASURED, FILTERED or GIV
 CONTROLLER, FORM = 27, 28                            # PID, LAW, HYBRID, LAW_PLUS; EXACT or PAPER
 PITCH_K1, PITCH_K2, PITCH_K3, PITCH_EPS = 29, 30, 31, 32     # 1/s, m, 1/s, rad/s
 DEPTH_K1, DEPTH_K2, DEPTH_K3, DEPTH_EPS = 33, 34, 35, 36     # 1/s, kg, 1/s, m/s
-HYBRID_ACTIVITY_ON, HYBRID_ACTIVITY_OFF = 37, 38     # activity of the filter past which the law takes over, and back
+HYBRID_ROUGHNESS_ON, HYBRID_ROUGHNESS_OFF = 37, 38     # roughness past which the law takes over, and back
 HYBRID_PITCH_ON, HYBRID_PITCH_OFF = 39, 40           # rad still to go to the pitch target
 HYBRID_DEPTH_ON, HYBRID_DEPTH_OFF = 41, 42           # m still to go to the depth target
 HYBRID_DWELL = 43                                    # s for which a choice stands at least
@@ -54,13 +54,15 @@ EST_SERVO = 28                                       # rad
 EST_X, EST_Y = 29, 30                                # m north and east of the start, by dead reckoning
 EST_WATER_N, EST_WATER_E = 31, 32                    # m/s
 SD_DEPTH_RATE, SD_PITCH, SD_U = 33, 34, 35           # 1 sigma: m/s, rad, m/s
-ACTIVITY = 36                                        # mean square of the filter's scores, 1 where all is as modelled
+ROUGHNESS = 36                                       # disturbance seen over the one in the vehicle file, 1 or more
 MODEL_ERROR = 37                                     # 37..42 accelerations beside the model's, body axes, m/s2, rad/s2
 N_EST = 43
 
 # --- nav: the Kalman filter's memory, one vector ---------------------------------------------------------------------
 NAV_RUNNING, NAV_TIME, NAV_USED = 0, 1, 2            # started; s; 2..5 times of the samples used, by sensor
-NAV_SETTINGS = 6
+NAV_ROUGHNESS = 6                                    # disturbance seen over the one in the vehicle file, 1 or more
+NAV_CALM = 7                                         # 7, 8 the spectral densities of the vehicle file's disturbance
+NAV_SETTINGS = 9
 NAV_SIGMA = NAV_SETTINGS + N_S
 NAV_SPREAD = NAV_SIGMA + N_P
 NAV_X = NAV_SPREAD + N_E

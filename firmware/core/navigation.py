@@ -18,6 +18,8 @@ from firmware.core.estimator_layout import (
     N_WORK_ROWS,
     N_XE,
     N_Z,
+    S_ANGULAR,
+    S_LINEAR,
     X_ERR,
     X_WATER,
     Z_BALLAST,
@@ -28,7 +30,8 @@ from firmware.core.jit import kernel
 from firmware.core.layout import N_P, N_X, X_ACT, X_NU, X_QUAT
 from firmware.core.rotations import euler_from_quaternion, euler_rates, quaternion_from_euler, rotation_nb
 
-ACTIVITY_TIME = 2.0  # s, over which the scores are averaged
+ROUGHNESS_TIME = 0.7  # s, in which the roughness follows scores that are twice (or half) what they should be
+ROUGHEST = 300.0  # times the vehicle file's disturbance
 STEEP = 1.4  # rad; beyond it Euler rates mean nothing and samples are taken as they are
 
 
@@ -80,7 +83,9 @@ def start_filter(P, nav, est, t, x, cov, work):
     estimator_start(P, nav[at.NAV_SETTINGS : at.NAV_SETTINGS + N_S], nav[at.NAV_SIGMA : at.NAV_SIGMA + N_P], x, cov,
                     spread, work)  # fmt: skip
     nav[at.NAV_RUNNING], nav[at.NAV_TIME] = 1.0, t
-    est[at.ACTIVITY] = 1.0
+    nav[at.NAV_ROUGHNESS] = 1.0
+    nav[at.NAV_CALM] = nav[at.NAV_SETTINGS + S_LINEAR]
+    nav[at.NAV_CALM + 1] = nav[at.NAV_SETTINGS + S_ANGULAR]
 
 
 @kernel
@@ -112,15 +117,26 @@ def write_errors(x, cov, est):
 
 
 @kernel
-def note_activity(est, scores, dt):
-    """Average the squared scores of attitude and gyro: above 1, the water or the vehicle does more than is modelled."""
+def follow_roughness(nav, scores, dt):
+    """Let the filter's disturbance follow the water: the gyro's squared scores are 1 on average where it is right.
+
+    A filter that believes in calm water lags behind rough water, and one that believes in rough water hands the gyro's
+    noise on. Roughness multiplies the disturbance's strength, and its square the spectral densities; it moves by the
+    scores' logarithm, so that one wild sample does little, and never below what the vehicle file says.
+    """
     total, count = 0.0, 0
-    for i in range(6):
+    for i in range(3, 6):
         if not math.isnan(scores[i]):
             total += scores[i] * scores[i]
             count += 1
-    if count > 0:
-        est[at.ACTIVITY] += min(1.0, dt / ACTIVITY_TIME) * (total / count - est[at.ACTIVITY])
+    if count == 0:
+        return
+    step = min(total / count, 4.0) - 1.0
+    roughness = nav[at.NAV_ROUGHNESS] * math.exp(step * dt / ROUGHNESS_TIME)
+    roughness = min(max(roughness, 1.0), ROUGHEST)
+    nav[at.NAV_ROUGHNESS] = roughness
+    nav[at.NAV_SETTINGS + S_LINEAR] = nav[at.NAV_CALM] * roughness * roughness
+    nav[at.NAV_SETTINGS + S_ANGULAR] = nav[at.NAV_CALM + 1] * roughness * roughness
 
 
 @kernel
@@ -144,4 +160,5 @@ def navigate(P, C, nav, est, ap, t):
     )  # fmt: skip
     write_state(nav[at.NAV_GIVEN : at.NAV_GIVEN + N_X] if C[at.ESTIMATOR] == at.GIVEN else x, est)
     write_errors(x, cov, est)
-    note_activity(est, scores, dt)
+    follow_roughness(nav, scores, dt)
+    est[at.ROUGHNESS] = nav[at.NAV_ROUGHNESS]

@@ -157,13 +157,13 @@ def choose(C, legs, est, ap, t):
         depth_left = 0.0
     if ap[at.ACTIVE] == at.LAW:
         calm = (
-            est[at.ACTIVITY] < C[at.HYBRID_ACTIVITY_OFF]
+            est[at.ROUGHNESS] < C[at.HYBRID_ROUGHNESS_OFF]
             and pitch_left < C[at.HYBRID_PITCH_OFF]
             and depth_left < C[at.HYBRID_DEPTH_OFF]
         )
         return at.PID if calm else at.LAW
     rough = (
-        est[at.ACTIVITY] > C[at.HYBRID_ACTIVITY_ON]
+        est[at.ROUGHNESS] > C[at.HYBRID_ROUGHNESS_ON]
         or pitch_left > C[at.HYBRID_PITCH_ON]
         or depth_left > C[at.HYBRID_DEPTH_ON]
     )

@@ -15,6 +15,7 @@ COMMANDS = {
     "log": ("tools.cli.log", "log", "export, look into or repair an onboard log"),
     "import": ("tools.cli.import_", "import_", "bring other recordings into run data"),
     "gap": ("tools.cli.gap", "gap", "measure and predict: where simulation and sea disagree"),
+    "reproduce": ("tools.cli.reproduce", "reproduce", "the paper's figures flown again: pictures and numbers"),
     "simulate": ("tools.cli.simulate", "simulate", "open-loop nominal flight from a file of commands"),
     "benchmark": ("tools.cli.benchmark", "benchmark", "the speed figures, each as a ratio in one run"),
 }
