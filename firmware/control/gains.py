@@ -65,7 +65,7 @@ class LawGains(Table):
 
 
 class HybridTable(Table):
-    """When the hybrid hands over to the law, and back; angles in rad, depths in m.
+    """When the hybrid hands over to the law, and back: pitch still to go (rad), depth off its reference (m).
 
     Roughness is the disturbance that the filter sees over the one in the vehicle file, 1 in calm water.
     """
@@ -74,8 +74,8 @@ class HybridTable(Table):
     roughness_off: Gain = 4.0
     pitch_on: Gain = 0.06
     pitch_off: Gain = 0.02
-    depth_on: Gain = 0.6
-    depth_off: Gain = 0.2
+    depth_on: Gain = 0.3
+    depth_off: Gain = 0.1
     dwell_s: NonNegative = 3.0
 
     def __post_init__(self):
@@ -87,8 +87,8 @@ class HybridTable(Table):
 class Law(Table):
     """[control.law]: gains of both axes, the form of the model, and law+'s share of the observed model error."""
 
-    pitch: LawGains = LawGains(k1=0.8, k2=0.004, k3=0.8, eps=0.1)
-    depth: LawGains = LawGains(k1=0.25, k2=0.02, k3=0.25, eps=0.1)
+    pitch: LawGains = LawGains(k1=1.23, k2=0.005, k3=1.46, eps=0.185)
+    depth: LawGains = LawGains(k1=0.17, k2=0.05, k3=0.95, eps=0.14)
     form: Literal["exact", "paper"] = "exact"
     observer_share: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)] = 0.0
 

@@ -81,3 +81,4 @@ def reset(est, ap, nav):
     ap[:] = 0.0
     ap[at.MODE] = at.WAITING
     ap[at.REACHED] = -1.0
+    ap[at.ACTIVE_SINCE] = -math.inf

@@ -147,25 +147,27 @@ def law_inputs(P, C, legs, est, ap, pitch_rate):
 
 @kernel
 def choose(C, legs, est, ap, t):
-    """The hybrid's choice, PID or LAW: the law in transitions and in rough water, with hysteresis and a dwell time."""
+    """The hybrid's choice, PID or LAW, with hysteresis and a dwell time.
+
+    The law's are transitions (the pitch reference is still on its way to the leg's target), a depth that has come off
+    its reference, and rough water; steady flight is the PID's.
+    """
     if t - ap[at.ACTIVE_SINCE] < C[at.HYBRID_DWELL]:
         return ap[at.ACTIVE]
     row = int(ap[at.LEG])
     pitch_left = abs(legs[row, at.LEG_PITCH] - ap[at.REF_PITCH])
-    depth_left = abs(legs[row, at.LEG_DEPTH] - ap[at.REF_DEPTH]) if depth_is_held(legs, ap) else 0.0
-    if math.isnan(depth_left):
-        depth_left = 0.0
+    depth_off = abs(est[at.EST_DEPTH] - ap[at.REF_DEPTH]) if depth_is_held(legs, ap) else 0.0
     if ap[at.ACTIVE] == at.LAW:
         calm = (
             est[at.ROUGHNESS] < C[at.HYBRID_ROUGHNESS_OFF]
             and pitch_left < C[at.HYBRID_PITCH_OFF]
-            and depth_left < C[at.HYBRID_DEPTH_OFF]
+            and depth_off < C[at.HYBRID_DEPTH_OFF]
         )
         return at.PID if calm else at.LAW
     rough = (
         est[at.ROUGHNESS] > C[at.HYBRID_ROUGHNESS_ON]
         or pitch_left > C[at.HYBRID_PITCH_ON]
-        or depth_left > C[at.HYBRID_DEPTH_ON]
+        or depth_off > C[at.HYBRID_DEPTH_ON]
     )
     return at.LAW if rough else at.PID
 

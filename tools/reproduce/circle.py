@@ -70,7 +70,7 @@ def summary(circles: Circles, controller: str) -> list[dict[str, Any]]:
     """One entry a strength: completed, closure of the circle, and whether it turned one way throughout."""
     rows = []
     for strength in np.unique(circles.strengths):
-        flights = np.flatnonzero(circles.strengths == strength)
+        flights = np.flatnonzero(circles.strengths == strength).tolist()
         gaps = np.array([closure(circles.result, i) for i in flights])
         finished = gaps[np.isfinite(gaps)]
         rows.append(

@@ -1,0 +1,110 @@
+"""The hybrid: it switches where it should, keeps its choice, and no switch makes a step."""
+
+import numpy as np
+import pytest
+
+from firmware.control.gains import Control, HybridTable
+from firmware.core import control_layout as at
+from firmware.core import law, layout
+from firmware.model.strict import ConfigError, decode
+from tools.compose import build_flight
+
+RATES = {"servo": layout.SERVO_RATE, "slider": layout.SLIDER_RATE, "ballast": layout.BALLAST_RATE}
+
+
+def flown(controller, noise, seed=1, mission="sawtooth", seconds=200.0):
+    """Every tick of a flight: time, controller at work, commands, status of the law."""
+    flight = build_flight(mission=mission, seed=seed)
+    world, pilot = flight.board.world, flight.autopilot
+    pilot.C[at.CONTROLLER] = controller
+    world.E[6] = world.E[7] = noise
+    rows = []
+    for tick in range(int(seconds / 0.02)):
+        world.advance(0.02 * tick)
+        pilot.frame[...] = world.frame
+        pilot.tick(0.02 * tick)
+        world.cmd[...] = pilot.commands
+        rows.append((0.02 * tick, pilot.ap[at.ACTIVE], *pilot.commands, pilot.ap[at.LAW_STATUS]))
+        if pilot.finished:
+            break
+    return pilot, np.array(rows)
+
+
+def test_transitions_are_the_laws_and_steady_flight_the_pids():
+    pilot, rows = flown(at.HYBRID, 0.003)
+    assert pilot.mode == "completed"
+    share = rows[:, 1].mean()
+    assert 0.1 < share < 0.95  # both are at work
+    assert rows[100:150, 1].mean() == 1.0  # two seconds into the first leg: a transition
+
+
+def test_rough_water_is_the_laws():
+    _, calm = flown(at.HYBRID, 0.003)
+    _, rough = flown(at.HYBRID, 0.1)
+    assert rough[:, 1].mean() > calm[:, 1].mean()
+    assert rough[500:, 1].mean() > 0.9
+
+
+@pytest.mark.parametrize("noise", [0.003, 0.03, 0.1])
+def test_a_choice_stands_for_its_dwell_time(noise):
+    pilot, rows = flown(at.HYBRID, noise)
+    switches = rows[1:, 0][np.diff(rows[:, 1]) != 0.0]
+    assert (np.diff(switches) >= pilot.C[at.HYBRID_DWELL] - 0.02).all()
+
+
+@pytest.mark.parametrize("noise", [0.003, 0.1])
+def test_no_switch_makes_a_step_larger_than_the_actuators_rate(noise):
+    pilot, rows = flown(at.HYBRID, noise)
+    switched = np.flatnonzero(np.diff(rows[:, 1]) != 0.0)
+    assert switched.size
+    limit = pilot.P[list(RATES.values())] * 0.02
+    steps = np.abs(np.diff(rows[:, 2:5], axis=0))
+    assert (steps <= limit * (1 + 1e-9)).all()
+
+
+def test_a_switch_is_bumpless_where_the_water_is_calm():
+    """At a switch, the slider moves no more than it does within a second around it without one."""
+    _, rows = flown(at.HYBRID, 0.0)
+    slider = rows[:, 3]
+    for i in np.flatnonzero(np.diff(rows[:, 1]) != 0.0):
+        around = np.abs(np.diff(slider[max(i - 50, 0) : i])).max(initial=0.0)
+        assert abs(slider[i + 1] - slider[i]) <= around + 1e-4
+
+
+@pytest.mark.parametrize("controller", [at.LAW, at.LAW_PLUS])
+def test_the_law_flies_the_mission_alone(controller):
+    pilot, rows = flown(controller, 0.003)
+    assert pilot.mode == "completed"
+    assert (rows[1:, 1] == at.LAW).all()
+    assert (rows[:, 5] == law.OK).all()
+
+
+def test_where_the_law_has_no_answer_the_pid_takes_over():
+    """A body rate that is no number gives NOT_FINITE, and the commands stay finite and within range."""
+    flight = build_flight(mission="sawtooth")
+    world, pilot = flight.board.world, flight.autopilot
+    pilot.C[at.CONTROLLER], pilot.C[at.ESTIMATOR] = at.LAW, at.GIVEN
+    seen = set()
+    for tick in range(300):
+        world.advance(0.02 * tick)
+        pilot.frame[...] = world.frame
+        given = pilot.nav[at.NAV_GIVEN : at.NAV_GIVEN + layout.N_X]
+        given[...] = world.x
+        if 100 <= tick < 150:
+            given[layout.X_NU] = np.nan
+        sent = pilot.tick(0.02 * tick)
+        assert np.isfinite(sent).all()
+        world.cmd[...] = sent
+        seen.add(int(pilot.ap[at.LAW_STATUS]))
+    assert law.NOT_FINITE in seen
+    assert pilot.ap[at.LAW_STATUS] == law.OK
+
+
+def test_thresholds_without_hysteresis_are_refused():
+    with pytest.raises(ConfigError, match="pitch_off: expected less than pitch_on"):
+        decode("pitch_on = 0.1\npitch_off = 0.1\n", HybridTable, "m.toml")
+
+
+def test_the_law_without_body_velocities_is_refused():
+    with pytest.raises(ConfigError, match="needs body velocities"):
+        decode('controller = "law"\nestimator = "measured"\n', Control, "m.toml")
