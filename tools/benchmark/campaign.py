@@ -1,42 +1,40 @@
-"""Many flights at once from one compiled call: flights a second on all cores, and against one."""
+"""Many flights at once as `glider campaign` flies them: flights a second in a process for each core, and against one."""
 
 import time
 from typing import Any
 
-import numba
-
-from sim_backend.fleet import fly_fleet
 from tools.benchmark.registry import Settings
 from tools.benchmark.timing import alternate, median
-from tools.compose import build_flight
+from tools.campaign.plan import Plan, build_plan, load_campaign, with_options
+from tools.campaign.run import fly_campaign
+from tools.errors import MissingExtra
 
-MISSION = "sawtooth"
-FLIGHTS = 200
-LONGEST = 600.0  # s
+OPTIONS = {"missions": ["sawtooth"], "controllers": ["pid", "law"], "seeds": 60}
+CHUNK = 10  # flights: many enough chunks that no core is left alone at the end
 
 
-def fly_all(threads: int) -> float:
-    """Fly FLIGHTS seeds on a number of threads; flights a second."""
-    flights = [build_flight(mission=MISSION, seed=seed) for seed in range(FLIGHTS)]
-    worlds, pilots = [flight.board.world for flight in flights], [flight.autopilot for flight in flights]
-    before_threads = numba.get_num_threads()
-    numba.set_num_threads(threads)
-    try:
-        before = time.perf_counter()
-        fly_fleet(worlds, pilots, max_seconds=LONGEST)
-        return FLIGHTS / (time.perf_counter() - before)
-    finally:
-        numba.set_num_threads(before_threads)
+def fly_all(plan: Plan, jobs: int) -> float:
+    """Fly the whole plan in a number of processes, keeping nothing; flights a second."""
+    before = time.perf_counter()
+    flown = fly_campaign(plan, jobs=jobs, chunk=CHUNK)
+    return len(flown.table) / (time.perf_counter() - before)
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """flights_per_s on all cores, speedup against one core in the same run, cores, flights."""
-    cores = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]  # made at run time
-    fly_all(cores)
-    alone, together = alternate(settings.repeats, lambda: fly_all(1), lambda: fly_all(cores))
+    """flights_per_s in a process for each core, speedup against one process in the same run, cores, flights.
+
+    The processes are there before: a campaign of minutes starts them once.
+    """
+    try:
+        import joblib
+    except ImportError:
+        raise MissingExtra("joblib", "campaign") from None
+    plan, cores = build_plan(with_options(load_campaign("robustness")[0], OPTIONS)), joblib.cpu_count()
+    fly_all(plan, cores)
+    alone, together = alternate(settings.repeats, lambda: fly_all(plan, 1), lambda: fly_all(plan, cores))
     return {
         "flights_per_s": median(together),
         "speedup": median([many / one for one, many in zip(alone, together, strict=True)]),
         "cores": cores,
-        "flights": FLIGHTS,
+        "flights": plan.flights,
     }

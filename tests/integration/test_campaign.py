@@ -1,0 +1,161 @@
+"""`glider campaign` as it is typed: the same numbers from every backend, interrupted or not; one line for bad input."""
+
+import contextlib
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from tools.campaign.plan import build_plan, load_campaign, with_options
+from tools.campaign.run import fly_campaign
+
+SMALL = ("--mission", "spiral", "--seeds", "3", "--controller", "law", "--controller", "pid")
+
+
+@pytest.fixture(scope="module")
+def plan():
+    options = {"missions": ["spiral"], "seeds": 3, "controllers": ["law", "pid"]}
+    return build_plan(with_options(load_campaign("robustness")[0], options))
+
+
+@pytest.fixture(scope="module")
+def alone(plan):
+    """The campaign flown in one process, in one chunk."""
+    return fly_campaign(plan, jobs=1, chunk=1000).table
+
+
+def glider(*arguments, cwd, **options):
+    command = [sys.executable, "-m", "tools.cli.main", "campaign", *arguments]
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=120, **options)
+
+
+@contextlib.contextmanager
+def dask_cluster(folder, workers=2):
+    """Address of a real scheduler on loopback with worker processes of their own, as a user would start them."""
+    dask = [sys.executable, "-m", "dask"]
+    quiet = {"stdout": subprocess.DEVNULL, "cwd": folder, "text": True, "stderr": subprocess.PIPE}
+    with contextlib.ExitStack() as stack:
+
+        def start(*arguments):
+            process = subprocess.Popen([*dask, *arguments], **quiet)
+            stack.callback(process.wait, 20)
+            stack.callback(process.terminate)
+            return process
+
+        scheduler = start("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--no-show")
+        address = None
+        for line in scheduler.stderr:
+            found = re.search(r"Scheduler at:\s+(tcp://\S+)", line)
+            if found:
+                address = found.group(1)
+                break
+        assert address, "the scheduler did not start"
+        for _ in range(workers):
+            start("worker", address, "--nthreads", "1", "--no-dashboard", "--host", "127.0.0.1", "--no-nanny")
+        yield address
+
+
+@pytest.mark.parametrize("chunk", [1, 4])
+def test_two_processes_and_any_chunks_give_the_same_bits(plan, alone, chunk):
+    assert np.array_equal(fly_campaign(plan, jobs=2, chunk=chunk).table, alone, equal_nan=True)
+
+
+def test_a_dask_cluster_gives_the_same_bits(plan, alone, tmp_path):
+    with dask_cluster(tmp_path) as address:
+        table = fly_campaign(plan, dask=address, chunk=2).table
+        assert np.array_equal(table, alone, equal_nan=True)
+        done = glider(*SMALL, "--dask", address, "--chunk", "2", "--json", "--out", "far", cwd=tmp_path)
+        from distributed import Client
+
+        with Client(address, set_as_default=False) as client:
+            names = client.run(os.getpid)
+    assert len(set(names.values())) == 2  # two processes, neither of them this one
+    assert os.getpid() not in names.values()
+    assert done.returncode == 0, done.stderr
+    near = glider(*SMALL, "--jobs", "1", "--json", "--out", "near", cwd=tmp_path)
+    assert (tmp_path / "far" / "flights.csv").read_bytes() == (tmp_path / "near" / "flights.csv").read_bytes()
+    assert json.loads(done.stdout)["controllers"] == json.loads(near.stdout)["controllers"]
+
+
+def test_interrupted_and_resumed_is_the_same_as_flown_through(plan, alone, tmp_path):
+    command = [sys.executable, "-m", "tools.cli.main", "campaign", *SMALL, "--jobs", "2", "--chunk", "2", "--out", "c"]
+    process = subprocess.Popen(
+        command, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
+    )
+    folder, deadline = tmp_path / "c", time.monotonic() + 60
+    while not list(folder.glob("chunk-*.npy")) and process.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.01)
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the workers too
+    out, err = process.communicate(timeout=60)
+    kept = len(list(folder.glob("chunk-*.npy")))
+    assert kept >= 1
+    if process.returncode != 0:  # else it was done before the signal came
+        assert process.returncode == 1
+        assert "the same command goes on" in err
+        assert "Traceback" not in err
+        assert out == ""
+    done = glider(*SMALL, "--out", "c", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["flown_now"] == 6 - 2 * kept
+    again = fly_campaign(plan, folder)
+    assert again.fresh == 0
+    assert np.array_equal(again.table, alone, equal_nan=True)
+
+
+def test_what_a_person_sees(tmp_path):
+    done = glider(*SMALL, "--jobs", "1", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("controller mission")
+    assert len(done.stdout.splitlines()) == 4
+    assert "campaign robustness: 6/6" in done.stderr
+    names = {path.name for path in (tmp_path / "robustness-campaign").iterdir()}
+    assert names == {"campaign.json", "campaign.html", "chunk-000000.npy", "flights.csv", "summary.json"}
+    other = glider(*SMALL, "--spread", "2.5", cwd=tmp_path)
+    assert other.returncode == 2
+    assert other.stderr.count("\n") == 1
+    assert "robustness-campaign: holds flights of another campaign" in other.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("nope",), "no campaign 'nope': neither a file nor one of robustness"),
+        (("--mission", "nope"), "no mission 'nope'"),
+        (("--controller", "nope"), "nope"),
+        (("--seeds", "0"), "seeds"),
+        (("--waves", "nan"), "expected a finite number"),
+        (("--depth", "2", "1"), "depth_m: expected [low, high]"),
+        (("--jobs", "-1"), "-1"),
+        (("--dask", "127.0.0.1:1"), "no Dask scheduler there"),
+        (("--dask", "nonsense"), "no Dask scheduler there"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(arguments, said, tmp_path):
+    done = glider(*arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stdout == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_its_packages_the_command_says_what_to_install(plan, monkeypatch):
+    from tools.campaign.picture import check_installed
+    from tools.errors import MissingExtra
+
+    for name in ("joblib", "distributed.comm.addressing", "jinja2"):
+        monkeypatch.setitem(sys.modules, name, None)
+    for call in (
+        lambda: fly_campaign(plan, jobs=2),
+        lambda: fly_campaign(plan, dask="127.0.0.1:8786"),
+        check_installed,
+    ):
+        with pytest.raises(MissingExtra, match=r"pip install 'glider\[campaign\]'"):
+            call()
