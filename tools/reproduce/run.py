@@ -12,41 +12,45 @@ SHOWN_EVERY = 0.2  # s
 CONTROLLERS = ("law", "hybrid", "pid", "pid_tuned", "law+")
 
 
+def counted(figure: tracking.Figure) -> tuple[float, ...]:
+    """The targets that the means are over: the paper's larger pitch angles, every depth but the one held."""
+    return tracking.BIG if figure is tracking.FIG5 else tuple(target for target in figure.targets if target)
+
+
 def _table(rows: list[dict[str, Any]], figure: tracking.Figure) -> list[dict[str, Any]]:
-    """Mean tracking error (%) over the targets that count, a line a strength."""
-    big = tracking.BIG if figure is tracking.FIG5 else tuple(t for t in figure.targets if t)
-    strengths = sorted({row["noise"] for row in rows})
-    return [{"noise": s, **{c: tracking.average(rows, c, s, big) for c in CONTROLLERS}} for s in strengths]
+    """A line a strength: mean tracking error (%) over the targets that count and, for depths, the share completed."""
+    table = []
+    for strength in sorted({row["noise"] for row in rows}):
+        line = {"noise": strength}
+        for name in CONTROLLERS:
+            line[name] = tracking.average(rows, name, strength, counted(figure))
+        if figure is tracking.FIG6:
+            for name in CONTROLLERS:
+                line[f"completed_{name}"] = tracking.average(rows, name, strength, counted(figure), "completed")
+        table.append(line)
+    return table
 
 
-def _says(figure: tracking.Figure, table: list[dict], marked: float | None, here: list[dict]) -> str:
-    def mean(controller: str, key: str) -> float:
-        picked = [row[key] for row in here if row["controller"] == controller and row["state"] == "estimated"]
-        return sum(picked) / len(picked)
-
-    where = (
-        f"the ruled PID reaches the paper's {tracking.PAPER_PID_ERROR:g} % at a noise of {marked:.3g}"
-        if marked is not None
-        else f"no noise up to {table[-1]['noise']:g} brings the ruled PID to the paper's {tracking.PAPER_PID_ERROR:g} %"
+def _says(figure: tracking.Figure, rows: list[dict], marked: float | None, table: list[dict]) -> str:
+    """What the sweep says of the paper's claim, in a sentence."""
+    if marked is None:
+        strongest = table[-1]["noise"]
+        return f"no noise up to {strongest:g} brings the ruled PID to the paper's {tracking.PAPER_PID_ERROR:g} %"
+    there = ", ".join(
+        f"{name} {tracking.error_at(rows, name, counted(figure), marked):.1f} %" for name in CONTROLLERS
     )
-    there = ", ".join(f"{name} {mean(name, 'tracking_error_pct'):.1f} %" for name in CONTROLLERS)
-    said = f"{where}; mean over all targets at the noise of the JSON: {there}"
-    if figure is tracking.FIG6:
-        said += "; completed: " + ", ".join(f"{name} {100 * mean(name, 'completed'):.0f} %" for name in CONTROLLERS)
-    return said
+    return f"where the ruled PID has the paper's {tracking.PAPER_PID_ERROR:g} %, at a noise of {marked:.3g}: {there}"
 
 
 def reproduce_tracking(name: str, vehicle: Vehicle, seeds: int, noise: float | None, out: Path) -> dict[str, Any]:
     """Figure 5 or 6: error against strength for all controllers; cases at one strength, on estimated and true states.
 
-    Without `noise` that strength is where the ruled PID has the paper's 13 %, or the vehicle's own disturbance where it
-    never does.
+    Without `noise` that strength is ROUGH times the vehicle file's disturbance.
     """
     figure = FIGURES[name]
     swept = tracking.summary(figure, tracking.fly_figure(figure, vehicle, tracking.STRENGTHS, seeds, ("estimated",)))
-    big = tracking.BIG if figure is tracking.FIG5 else tuple(t for t in figure.targets if t)
-    marked = tracking.strength_at(swept, "pid", big, tracking.PAPER_PID_ERROR)
-    chosen = noise if noise is not None else (marked if marked is not None else vehicle.disturbance.linear)
+    marked = tracking.strength_at(swept, "pid", counted(figure), tracking.PAPER_PID_ERROR)
+    chosen = noise if noise is not None else tracking.ROUGH * vehicle.disturbance.linear
     cases = tracking.summary(figure, tracking.fly_figure(figure, vehicle, (chosen,), seeds, ("estimated", "true")))
     legs = {target: figure.leg(target) for target in figure.targets}
     shown = fly_design(vehicle, legs, tracking.variants(vehicle), [chosen], range(1), trace_every=SHOWN_EVERY)
@@ -60,7 +64,7 @@ def reproduce_tracking(name: str, vehicle: Vehicle, seeds: int, noise: float | N
         "noise_where_pid_has_13_pct": marked,
         "sweep": swept,
         "table": table,
-        "says": _says(figure, table, marked, cases),
+        "says": _says(figure, swept, marked, table),
         "picture": str(picture),
     }
 

@@ -22,7 +22,8 @@ from tools.reproduce.design import (
     pitch_leg,
 )  # fmt: skip
 
-STRENGTHS = (0.0, 0.003, 0.01, 0.03, 0.06, 0.1, 0.2, 0.3)  # m/s2 and rad/s2
+STRENGTHS = (0.0, 0.003, 0.01, 0.03, 0.06, 0.1, 0.2, 0.3, 0.5)  # m/s2 and rad/s2
+ROUGH = 10.0  # times the vehicle file's disturbance: the strength of the JSON unless one is given
 COMPLETE_WITHIN = 0.2  # m of the target depth at the end
 BIG = (30.0, -30.0, 45.0, -45.0)  # deg, the paper's "larger target final values"
 PAPER_PID_ERROR = 13.0  # % that the paper prints for its PID there
@@ -103,12 +104,14 @@ def summary(figure: Figure, batch: Batch) -> list[dict[str, Any]]:
     return rows
 
 
-def average(rows: list[dict], controller: str, noise: float, targets: tuple[float, ...], state="estimated") -> float:
-    """Mean tracking error (%) of a controller over some targets at one strength."""
+def average(
+    rows: list[dict], controller: str, noise: float, targets: tuple[float, ...], key="tracking_error_pct"
+) -> float:
+    """Mean tracking error (%), or another entry, of a controller over some targets at one strength, estimated states."""
     picked = [
-        row["tracking_error_pct"]
+        row[key]
         for row in rows
-        if (row["controller"], row["noise"], row["state"]) == (controller, noise, state) and row["target"] in targets
+        if (row["controller"], row["noise"], row["state"]) == (controller, noise, "estimated") and row["target"] in targets
     ]
     return float(np.mean(picked))
 
@@ -125,6 +128,12 @@ def strength_at(rows: list[dict], controller: str, targets: tuple[float, ...], e
         if v0 < error <= v1:
             return s0 + (error - v0) / (v1 - v0) * (s1 - s0)
     return None
+
+
+def error_at(rows: list[dict], controller: str, targets: tuple[float, ...], strength: float) -> float:
+    """Mean error (%) of a controller at a strength between measured ones."""
+    strengths = sorted({row["noise"] for row in rows})
+    return float(np.interp(strength, strengths, [average(rows, controller, s, targets) for s in strengths]))
 
 
 def fly_figure(
