@@ -12,6 +12,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from law_flights import (
     SLIDER,
+    STANDING,
     Gains,
     Law,
     NeverSettled,
@@ -30,6 +31,17 @@ from firmware.core import layout
 from firmware.core.law import k2_by_29, k2_to_cover
 
 
+def settle(law: Law, x, references, speeds=STANDING) -> None:
+    """Put the actuators where the law wants them; a state at which there is no such place is none of the examples.
+
+    There are such states: a mass far out turns the nose, but is itself to be turned.
+    """
+    try:
+        law.settle(x, references, speeds)
+    except NeverSettled:
+        assume(False)
+
+
 @settings(repeatable, max_examples=300)
 @given(st.data(), trimmed_vehicles(), st.sampled_from(["joint", "present"]), st.sampled_from([None, 0.1, 0.5]))
 def test_V_falls_as_the_law_says_with_both_inputs_applied(data, vehicle, counting_on, share):
@@ -40,7 +52,7 @@ def test_V_falls_as_the_law_says_with_both_inputs_applied(data, vehicle, countin
     """
     x, speeds, references, pitch, depth = data.draw(closed_loops(vehicle, flying(flows=forward)))
     law = Law(vehicle, pitch, depth, counting_on, share)
-    law.settle(x, references, speeds)
+    settle(law, x, references, speeds)
     command = x[layout.X_ACT :] + speeds * TAU
     np.testing.assert_allclose(plant_rates(vehicle, x, command)[layout.X_ACT :], speeds, atol=1e-12)
     _, s, g = law(x, references, speeds)
@@ -57,10 +69,9 @@ def test_V_falls_as_the_law_says_with_both_inputs_applied(data, vehicle, countin
 @given(st.data(), trimmed_vehicles())
 def test_jointly_or_by_present_positions_settled_actuators_are_the_same(data, vehicle):
     x, speeds, references, pitch, depth = data.draw(closed_loops(vehicle, flying(flows=forward)))
-    other = x.copy()
-    Law(vehicle, pitch, depth, "joint").settle(x, references, speeds)
-    Law(vehicle, pitch, depth, "present").settle(other, references, speeds)
-    np.testing.assert_allclose(other[SLIDER:], x[SLIDER:], rtol=1e-10, atol=1e-11)
+    settle(Law(vehicle, pitch, depth, "joint"), x, references, speeds)
+    wanted = Law(vehicle, pitch, depth, "present")(x, references, speeds)[0]
+    np.testing.assert_allclose(wanted, x[SLIDER:], rtol=1e-11, atol=1e-11)
 
 
 @settings(repeatable, max_examples=300)
@@ -147,10 +158,7 @@ def test_a_k2_that_covers_keeps_V_falling_in_every_vehicle_of_the_box(data, true
     strength, eps = np.array([d_pitch, d_depth]), np.array([pitch.eps, depth.eps])
     for _ in range(30):  # k2 moves the inputs, and they the bound
         law = Law(believed, pitch, depth)
-        try:
-            law.settle(x, references)
-        except NeverSettled:
-            assume(False)
+        settle(law, x, references)
         _, s, g = law(x, references)
         bound = law.error_bound(x, SPREAD)
         needed = [k2_to_cover(*numbers) for numbers in zip(bound, strength, g, eps, strict=True)]
