@@ -13,7 +13,7 @@ FIGURES = ("fig5", "fig6", "fig7")
 @click.argument("figures", nargs=-1, required=True, type=click.Choice(FIGURES), metavar="[fig5|fig6|fig7]...")
 @click.option("--vehicle", default="roughie", show_default=True, help="Vehicle: shipped name or file.")
 @click.option("--seeds", default=8, show_default=True, type=click.IntRange(2, 1000), help="Seeds a case.")
-@click.option("--noise", type=click.FloatRange(0.0, 5.0), help="Strength of the JSON.  [default: 10 times the vehicle's]")
+@click.option("--noise", type=click.FloatRange(0.0, 5.0), help="Strength of the JSON.  [default: 10 x vehicle's]")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("."), help="Folder for the pictures.")
 @json_option
 def reproduce(figures, vehicle, seeds, noise, out, as_json) -> None:

@@ -107,11 +107,12 @@ def summary(figure: Figure, batch: Batch) -> list[dict[str, Any]]:
 def average(
     rows: list[dict], controller: str, noise: float, targets: tuple[float, ...], key="tracking_error_pct"
 ) -> float:
-    """Mean tracking error (%), or another entry, of a controller over some targets at one strength, estimated states."""
+    """Mean tracking error (%), or another entry, of a controller at one strength over targets, on estimated states."""
     picked = [
         row[key]
         for row in rows
-        if (row["controller"], row["noise"], row["state"]) == (controller, noise, "estimated") and row["target"] in targets
+        if (row["controller"], row["noise"], row["state"]) == (controller, noise, "estimated")
+        and row["target"] in targets
     ]
     return float(np.mean(picked))
 

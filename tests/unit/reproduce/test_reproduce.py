@@ -34,12 +34,12 @@ def test_a_seed_is_the_same_vehicle_for_every_controller():
 
 
 def test_tracking_error_is_the_mean_distance_to_the_reference(pitched):
-    """Against the trace of every tick: measured and estimated pitch differ by no more than the sensor's noise."""
+    """Against the trace of every tick: measured and estimated pitch differ by the sensor's noise and bias."""
     errors = tracking.tracking_error(tracking.FIG5, pitched)
     pitch, reference = pitched.result.column("pitch"), pitched.result.column("ref_pitch")
     for i, key in enumerate(pitched.keys):
         plain = 100 * np.nanmean(np.abs(pitch[i] - reference[i])) / np.radians(abs(key["target"]))
-        assert errors[i] == pytest.approx(plain, abs=100 * 0.003 / np.radians(30.0))
+        assert errors[i] == pytest.approx(plain, abs=100 * 0.01 / np.radians(30.0))
 
 
 def test_final_error_is_taken_at_the_end(pitched):
