@@ -83,7 +83,20 @@ def test_a_dask_cluster_gives_the_same_bits(plan, alone, tmp_path):
     assert json.loads(done.stdout)["controllers"] == json.loads(near.stdout)["controllers"]
 
 
-def test_interrupted_and_resumed_is_the_same_as_flown_through(plan, alone, tmp_path):
+def gone(group, seconds=20.0):
+    """True once no process of a group is left."""
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        try:
+            os.killpg(group, 0)
+        except ProcessLookupError:
+            return True
+        time.sleep(0.05)
+    return False
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_interrupted_and_resumed_is_the_same_as_flown_through(plan, alone, tmp_path, terminal):
     command = [sys.executable, "-m", "tools.cli.main", "campaign", *SMALL, "--jobs", "2", "--chunk", "2", "--out", "c"]
     process = subprocess.Popen(
         command, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
@@ -92,8 +105,12 @@ def test_interrupted_and_resumed_is_the_same_as_flown_through(plan, alone, tmp_p
     while not list(folder.glob("chunk-*.npy")) and process.poll() is None and time.monotonic() < deadline:
         time.sleep(0.01)
     with contextlib.suppress(ProcessLookupError):
-        os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the workers too
+        if terminal:
+            os.killpg(process.pid, signal.SIGINT)  # Ctrl-C reaches the workers too
+        else:
+            process.terminate()
     out, err = process.communicate(timeout=60)
+    assert gone(process.pid), "processes of it are left"
     kept = len(list(folder.glob("chunk-*.npy")))
     assert kept >= 1
     if process.returncode != 0:  # else it was done before the signal came
@@ -101,12 +118,10 @@ def test_interrupted_and_resumed_is_the_same_as_flown_through(plan, alone, tmp_p
         assert "the same command goes on" in err
         assert "Traceback" not in err
         assert out == ""
-    done = glider(*SMALL, "--out", "c", "--json", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout)["flown_now"] == 6 - 2 * kept
-    again = fly_campaign(plan, folder)
-    assert again.fresh == 0
-    assert np.array_equal(again.table, alone, equal_nan=True)
+    resumed = fly_campaign(plan, folder, jobs=1)
+    assert resumed.fresh == 6 - 2 * kept
+    assert np.array_equal(resumed.table, alone, equal_nan=True)
+    assert fly_campaign(plan, folder).fresh == 0
 
 
 def test_what_a_person_sees(tmp_path):

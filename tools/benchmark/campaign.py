@@ -1,4 +1,4 @@
-"""Many flights as `glider campaign` flies them: flights a second with a process for each core, and against one."""
+"""Many flights at once as `glider campaign` flies them: flights a second with a process a core, and against one."""
 
 import time
 from typing import Any

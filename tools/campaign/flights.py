@@ -1,5 +1,6 @@
 """A chunk of flights: what a worker does, whatever started it. Single-threaded; the same numbers wherever it runs."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,6 +34,7 @@ COLUMNS = (
     "depth_error_m", "pitch_error_rad", "roll_error_rad",                # mean |measured - reference| while flying
     "servo_travel_rad", "slider_travel_m", "ballast_travel_kg",          # ways of the plant's actuators
     "deepest_m", "over_range", "over_rate",                              # true depth; share of the range, of the rate
+    "worst_attitude_rad",                                                # most that true pitch or roll was off
 )  # fmt: skip
 ENDINGS = {
     ctl.REASON_NONE: "completed",
@@ -44,8 +46,10 @@ ENDINGS = {
     100.0: "deeper than the site, unseen",
     101.0: "a command past its limits",
     102.0: "no ending: still flying",
+    103.0: "tumbled",
 }
-UNSEEN_DEPTH, PAST_LIMITS, STILL_FLYING = 100.0, 101.0, 102.0
+UNSEEN_DEPTH, PAST_LIMITS, STILL_FLYING, TUMBLED = 100.0, 101.0, 102.0, 103.0
+TUMBLING = math.radians(60.0)  # off its reference in pitch or roll: a glide has been lost, even if depths are reached
 MOST_LINES = 31_000  # of a flight's trace: every tick of a mission of 10 minutes at 50 Hz, fewer of a longer one
 ROUNDING = 1e-9  # in a difference of two commands
 CHUNK = 60  # flights
@@ -101,7 +105,13 @@ def _past_limits(P: np.ndarray, commands: np.ndarray, seconds: float) -> tuple[f
     return float(np.maximum(0.0, range_.max())), float(np.maximum(0.0, speed.max()))
 
 
-def _ending(end: np.ndarray, deepest: float, site: float, over: tuple[float, float]) -> float:
+def _worst_attitude(flown: np.ndarray) -> float:
+    """Most (rad) that the plant's pitch or roll is off its reference in the lines of a trace; NaN if one is NaN."""
+    off = [flown[:, TRACE.index(f"true_{name}")] - flown[:, TRACE.index(f"ref_{name}")] for name in ("pitch", "roll")]
+    return float(np.abs(np.angle(np.exp(1j * np.array(off)))).max())
+
+
+def _ending(end: np.ndarray, deepest: float, site: float, over: tuple[float, float], attitude: float) -> float:
     """How a flight ended, a key of ENDINGS."""
     if end[END_MODE] == ctl.ABORTED:
         return float(end[END_REASON])
@@ -111,6 +121,8 @@ def _ending(end: np.ndarray, deepest: float, site: float, over: tuple[float, flo
         return UNSEEN_DEPTH
     if not (over[0] <= 0.0 and over[1] <= ROUNDING):
         return PAST_LIMITS
+    if not attitude <= TUMBLING:
+        return TUMBLED
     return ctl.REASON_NONE
 
 
@@ -153,7 +165,8 @@ def fly_chunk(job: Job, chunk: Chunk) -> np.ndarray:
             flown = trace[: (ticks - 1) // every + 1]
             over = _past_limits(pilot.P, flown[:, command : command + 3], every * plan.step)
             deepest = float(flown[:, depth].max())
-            ended = _ending(end, deepest, site, over)
+            attitude = _worst_attitude(flown)
+            ended = _ending(end, deepest, site, over, attitude)
             rows.append(
                 (
                     chunk.mission, number, seed,
@@ -162,7 +175,7 @@ def fly_chunk(job: Job, chunk: Chunk) -> np.ndarray:
                     end[END_LEG], end[END_TIME],
                     np.nan if held else end[END_ERROR_DEPTH], end[END_ERROR_PITCH], end[END_ERROR_ROLL],
                     *end[END_TRAVEL_SERVO : END_TRAVEL_SERVO + 3],
-                    deepest, *over,
+                    deepest, *over, attitude,
                 )
             )  # fmt: skip
     return np.array(rows, dtype=np.float64)

@@ -193,7 +193,7 @@ def fingerprint(plan: Plan) -> str:
     """Hash over the campaign, this software, and the arrays that flights are made of, 16 hex digits.
 
     Gains, references, a vehicle's numbers or the way worlds are drawn may change with nothing changed in the campaign:
-    the arrays tell.
+    the arrays tell, and the files that draw and count.
     """
     from tools.campaign.worlds import draw_world
 
@@ -201,6 +201,8 @@ def fingerprint(plan: Plan) -> str:
     for part in (plan.campaign, plan.board):
         digest.update(msgspec.json.encode(part))
     digest.update(f"{software()} {kernels_digest()}".encode())
+    for name in ("flights.py", "worlds.py"):  # what is counted, and how worlds are drawn
+        digest.update(Path(__file__).with_name(name).read_bytes())
     for number, mission in enumerate(plan.missions):
         for controller in plan.campaign.controllers:
             pilot = plan.pilot(number, controller)

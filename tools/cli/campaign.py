@@ -1,5 +1,6 @@
 """`glider campaign`: many simulated flights at once, on all cores or on a Dask cluster."""
 
+import signal
 from pathlib import Path
 from typing import Any
 
@@ -66,12 +67,15 @@ def campaign(campaign, out, jobs, dask, chunk, as_json, **options) -> None:
     wanted = with_options(wanted, given)
     plan = build_plan(wanted, base)
     folder = out or Path(f"{wanted.name}-campaign")
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)  # or its processes would outlive it
     try:
         with progress(f"campaign {wanted.name}", plan.flights) as advance:
             flown = fly_campaign(plan, folder, jobs=jobs, dask=dask, chunk=chunk, advance=advance)
     except KeyboardInterrupt:
         say(f"the same command goes on with what is in {folder}")
         raise click.Abort from None
+    finally:
+        signal.signal(signal.SIGTERM, before)
     write_flights(folder / FLIGHTS_FILE, flown)
     write_page(folder / "campaign.html", flown)
     result = {**summarise(flown), "folder": str(folder), "picture": str(folder / "campaign.html")}

@@ -7,15 +7,18 @@ import numpy as np
 import pytest
 
 from firmware.core import control_layout as ctl
+from sim_backend.core.closed_loop import TRACE
 from sim_backend.fleet import fly_fleet
 from tools.campaign.flights import (
     COLUMNS,
     PAST_LIMITS,
     STILL_FLYING,
+    TUMBLED,
     UNSEEN_DEPTH,
     Job,
     _ending,
     _past_limits,
+    _worst_attitude,
     cut,
     fly_chunk,
     trace_every,
@@ -63,20 +66,34 @@ def end(mode, reason=ctl.REASON_NONE):
 
 
 @pytest.mark.parametrize(
-    ("flight", "deepest", "over", "ending"),
+    ("flight", "deepest", "over", "attitude", "ending"),
     [
-        (end(ctl.COMPLETED), 5.0, (0.0, 0.0), ctl.REASON_NONE),
-        (end(ctl.COMPLETED), 6.1, (0.0, 0.0), UNSEEN_DEPTH),
-        (end(ctl.COMPLETED), np.nan, (0.0, 0.0), UNSEEN_DEPTH),
-        (end(ctl.COMPLETED), 5.0, (1e-3, 0.0), PAST_LIMITS),
-        (end(ctl.COMPLETED), 5.0, (0.0, 1e-3), PAST_LIMITS),
-        (end(ctl.COMPLETED), 5.0, (np.nan, 0.0), PAST_LIMITS),
-        (end(ctl.ABORTED, ctl.REASON_LEG_TIME), 9.0, (0.0, 0.0), ctl.REASON_LEG_TIME),
-        (end(ctl.FLYING), 5.0, (0.0, 0.0), STILL_FLYING),
+        (end(ctl.COMPLETED), 5.0, (0.0, 0.0), 0.3, ctl.REASON_NONE),
+        (end(ctl.COMPLETED), 6.1, (0.0, 0.0), 0.3, UNSEEN_DEPTH),
+        (end(ctl.COMPLETED), np.nan, (0.0, 0.0), 0.3, UNSEEN_DEPTH),
+        (end(ctl.COMPLETED), 5.0, (1e-3, 0.0), 0.3, PAST_LIMITS),
+        (end(ctl.COMPLETED), 5.0, (0.0, 1e-3), 0.3, PAST_LIMITS),
+        (end(ctl.COMPLETED), 5.0, (np.nan, 0.0), 0.3, PAST_LIMITS),
+        (end(ctl.COMPLETED), 5.0, (0.0, 0.0), 1.1, TUMBLED),
+        (end(ctl.COMPLETED), 5.0, (0.0, 0.0), np.nan, TUMBLED),
+        (end(ctl.COMPLETED), 6.1, (0.0, 0.0), 3.0, UNSEEN_DEPTH),
+        (end(ctl.ABORTED, ctl.REASON_LEG_TIME), 9.0, (0.0, 0.0), 3.0, ctl.REASON_LEG_TIME),
+        (end(ctl.FLYING), 5.0, (0.0, 0.0), 0.3, STILL_FLYING),
     ],
 )
-def test_endings(flight, deepest, over, ending):
-    assert _ending(flight, deepest, 6.0, over) == ending
+def test_endings(flight, deepest, over, attitude, ending):
+    assert _ending(flight, deepest, 6.0, over, attitude) == ending
+
+
+def test_a_roll_through_half_a_turn_is_measured_the_short_way():
+    flown = np.zeros((3, len(TRACE)))
+    flown[:, TRACE.index("ref_roll")] = 3.1
+    flown[:, TRACE.index("true_roll")] = [3.0, -3.1, -3.0]
+    assert _worst_attitude(flown) == pytest.approx(2.0 * np.pi - 6.1)
+    flown[1, TRACE.index("true_pitch")] = -1.2
+    assert _worst_attitude(flown) == pytest.approx(1.2)
+    flown[2, TRACE.index("true_pitch")] = np.nan
+    assert np.isnan(_worst_attitude(flown))
 
 
 def test_commands_past_range_or_rate_are_seen(plan_of):
