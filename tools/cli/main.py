@@ -17,6 +17,7 @@ COMMANDS = {
     "gap": ("tools.cli.gap", "gap", "measure and predict: where simulation and sea disagree"),
     "reproduce": ("tools.cli.reproduce", "reproduce", "the paper's figures flown again: pictures and numbers"),
     "campaign": ("tools.cli.campaign", "campaign", "many simulated flights at once, on all cores or on a Dask cluster"),
+    "tune": ("tools.cli.tune", "tune", "gains of the pitch and depth PID, by rule or by search"),
     "simulate": ("tools.cli.simulate", "simulate", "open-loop nominal flight from a file of commands"),
     "benchmark": ("tools.cli.benchmark", "benchmark", "the speed figures, each as a ratio in one run"),
 }

@@ -1,0 +1,24 @@
+"""Fixtures for the tuning's tests."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from firmware.model.strict import decode
+from sim_backend.board import SimBoardFile
+from tools.compose import load_board_file
+from tools.sources import load_vehicle
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+
+@pytest.fixture(scope="session")
+def vehicle():
+    return load_vehicle("roughie")
+
+
+@pytest.fixture(scope="session")
+def board():
+    file = load_board_file("sim")
+    return decode(file.text, SimBoardFile, file.source)
