@@ -1,6 +1,9 @@
 """The errors a user can cause: one line saying what and where. Anything else is a defect and shows its traceback."""
 
 
+from importlib.util import find_spec
+
+
 class InputError(ValueError):
     """Input that cannot be used; str() is the one line the user sees, `file:line: what` as far as it is known."""
 
@@ -15,3 +18,10 @@ class MissingExtra(RuntimeError):
 
     def __init__(self, package: str, extra: str = "analysis"):
         super().__init__(f"this command needs {package}: pip install 'glider[{extra}]'")
+
+
+def need(*packages: str, extra: str = "analysis") -> None:
+    """MissingExtra for the first of the packages that is not installed: said before any work is done."""
+    for package in packages:
+        if find_spec(package) is None:
+            raise MissingExtra(package, extra)

@@ -54,7 +54,7 @@ def test_what_is_not_finite_keeps_the_last_command(wanted):
 
 
 @repeatable
-@given(finite, finite, finite, finite)
+@given(finite, finite, st.floats(-0.2, 0.2), finite)
 def test_pid_stays_in_range_and_does_not_wind_up(error, error_rate, integral, feedforward):
     out, new_integral = pid(error, error_rate, integral, feedforward, 1.0, 0.5, 0.1, -0.2, 0.2, 0.02)
     assert -0.2 <= out <= 0.2

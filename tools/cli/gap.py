@@ -22,9 +22,11 @@ def measure(case: Path, report: Path | None, as_json: bool) -> None:
     Gaps are root mean square errors in tolerances: at 1 the simulator is off by as much as may be. Without --json a
     report is written too, to <case>-gap.html in the working directory unless --report names a file.
     """
+    from tools.errors import need
     from tools.gap.assess import assess
     from tools.runs.case import load_case
 
+    need("scipy", "jinja2")
     with progress("gap", 3) as advance:
         loaded = load_case(case)
         advance(1)
