@@ -37,9 +37,12 @@ N_S = S_R + N_Z
 
 # mode, a sum: actuators that are not known to follow a command but move at a given speed (0 where nothing is known)
 COMMANDED, SERVO_DRIVEN, SLIDER_DRIVEN, BALLAST_DRIVEN = 0, 1, 2, 4
+FRESH = 8  # in that sum too: linearise at every sub-step and hold nothing, where time does not press
 
 # --- constants ------------------------------------------------------------------------------------------------------
 MAX_STEP = 0.02  # s
+HOLD, HOLD_ERROR = 0.1, 0.2  # s, for which equation (1) linearised and the covariance of the model's error serve,
+MOVED_SHARE, MOVED_RATE = 0.015, 0.025  # of the speed, and rad/s: past such a change they do not
 GATE = 5.0  # sigma
 PATIENCE = 1.0  # s
 STRESS_GROWTH, STRESS_TIME, STRESS_MAX = 14.0, 5.0, 1e4  # 1/s (fourfold in 0.1 s), s, of the variance
@@ -51,7 +54,12 @@ COS_PITCH_MIN = 0.1
 LARGEST = 1e6  # a reading beyond it, or an infinite one, is none
 
 # --- rows of `work` (N_WORK_ROWS, N_W) ------------------------------------------------------------------------------
+# The first of them hold the linearised flight from step to step; the others are scratch.
 N_W = 48
-W_A, W_T, W_C = 0, N_MOVING, N_MOVING + N_E
-W_SCRATCH = W_C + 6
+W_HELD = 0  # [s for which A still serves, s for which C does]
+W_POINT = 1  # what linearise leaves
+W_A, W_TURNED = 2, 2 + N_MOVING  # A, and its columns from E_ATT on as rows
+W_C = W_TURNED + N_COUPLED - E_ATT
+W_DRIVE, W_T, W_K = W_C + 6, W_C + 12, W_C + 12 + N_MOVING
+W_SCRATCH = W_K + N_Z + 2  # two more rows of W_K than measurements: those are taken in threes
 N_WORK_ROWS = W_SCRATCH + 5

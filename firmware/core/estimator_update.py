@@ -22,6 +22,7 @@ from firmware.core.estimator_layout import (
     STOP_MARGIN,
     STRESS_GROWTH,
     STRESS_MAX,
+    W_K,
     W_SCRATCH,
     X_ERR,
     X_GYRO,
@@ -42,33 +43,36 @@ def widen(cov, column, h0, h1, h2, grow):
     """cov += grow h h', h on error[column : column + 3]."""
     for i in range(3):
         a = h0 if i == 0 else (h1 if i == 1 else h2)
-        cov[column + i, column] += grow * a * h0
-        cov[column + i, column + 1] += grow * a * h1
-        cov[column + i, column + 2] += grow * a * h2
+        cov[column + i, column] += grow * (a * h0)
+        cov[column + i, column + 1] += grow * (a * h1)
+        cov[column + i, column + 2] += grow * (a * h2)
 
 
 @kernel
-def update_scalar(cov, dx, column, h0, h1, h2, other, innovation, R, beyond, dt, v, K):
-    """One measurement, h . error[column : column + 3] + error[other] = innovation, variance R, into dx and cov.
+def update_scalar(cov, taken, n, dx, column, h0, h1, h2, other, innovation, R, beyond, dt):
+    """One measurement, h . error[column : column + 3] + error[other] = innovation, variance R, into dx and row n of
+    `taken`: the covariance is cov less the sum of r r' over rows r of `taken`, and cov itself waits.
 
     `other` is a gyro's bias, 0 for the sensors that have none in the state. `beyond` is for how long (s) this sensor
-    has been out of the gate. Returns the innovation in sigma and the new `beyond`. v, K (N_E) are scratch.
+    has been out of the gate. Returns the innovation in sigma, the new `beyond`, and how many rows there are now.
     """
+    v = taken[n]
+    bias = 1.0 if other > 0 else 0.0
     for i in range(N_E):
-        v[i] = h0 * cov[i, column] + h1 * cov[i, column + 1] + h2 * cov[i, column + 2]
-        if other > 0:
-            v[i] += cov[i, other]
-    seen = h0 * v[column] + h1 * v[column + 1] + h2 * v[column + 2]
-    left = innovation - (h0 * dx[column] + h1 * dx[column + 1] + h2 * dx[column + 2])
-    if other > 0:
-        seen += v[other]
-        left -= dx[other]
+        v[i] = h0 * cov[column, i] + h1 * cov[column + 1, i] + h2 * cov[column + 2, i] + bias * cov[other, i]
+    for k in range(n):
+        r = taken[k]
+        along = h0 * r[column] + h1 * r[column + 1] + h2 * r[column + 2] + bias * r[other]
+        for i in range(N_E):
+            v[i] -= along * r[i]
+    seen = h0 * v[column] + h1 * v[column + 1] + h2 * v[column + 2] + bias * v[other]
+    left = innovation - (h0 * dx[column] + h1 * dx[column + 1] + h2 * dx[column + 2] + bias * dx[other])
     S = seen + R
     score = left / math.sqrt(S)
     if abs(score) > GATE:
         beyond += dt
         if beyond < PATIENCE or other > 0:
-            return score, beyond
+            return score, beyond, n
         # the measured quantity may have jumped: cov + grow h h' is positive definite, and hardly moves anything else
         h = h0 * h0 + h1 * h1 + h2 * h2
         wanted = (left / GATE) ** 2 - R
@@ -77,24 +81,29 @@ def update_scalar(cov, dx, column, h0, h1, h2, other, innovation, R, beyond, dt,
         v[column + 1] += grow * h * h1
         v[column + 2] += grow * h * h2
         widen(cov, column, h0, h1, h2, grow)
-        seen, S = wanted, wanted + R
+        S = wanted + R
+    scale = 1.0 / math.sqrt(S)
     for i in range(N_E):
-        K[i] = v[i] / S
-        dx[i] += K[i] * left
-    # (I - K H) cov (I - K H)' + K R K', written out for one row H
-    for i in range(N_E):
-        a, b = K[i], R * K[i] - (v[i] - K[i] * seen)
-        for j in range(N_E):
-            cov[i, j] += b * K[j] - a * v[j]
-    return score, 0.0
+        v[i] *= scale
+        dx[i] += v[i] * (left * scale)
+    return score, 0.0, n + 1
 
 
 @kernel
-def symmetrise(cov):
-    """What rounding has set apart on both sides of the diagonal becomes one again."""
+def subtract_taken(cov, taken, n):
+    """cov less r r' for the first n rows r of `taken`, three in one go over cov."""
+    for k in range(n, n + 2):
+        for i in range(N_E):
+            taken[k, i] = 0.0
+    for k in range(0, n, 3):
+        r0, r1, r2 = taken[k], taken[k + 1], taken[k + 2]
+        for i in range(N_E):
+            a, b, c, row = r0[i], r1[i], r2[i], cov[i]
+            for j in range(N_E):
+                row[j] -= a * r0[j] + b * r1[j] + c * r2[j]
+    # rounding may differ between the two sides of the diagonal
     for i in range(N_E):
         for j in range(i):
-            cov[i, j] = 0.5 * (cov[i, j] + cov[j, i])
             cov[j, i] = cov[i, j]
 
 
@@ -130,7 +139,7 @@ def estimator_update(P, settings, x, cov, stress, z, beyond, scores, dt, work):
     dt is the time since the last update; beyond (N_Z) is kept between calls. scores (N_Z) gets each innovation in
     sigma, NaN where there was no measurement.
     """
-    dx, v, K = work[W_SCRATCH], work[W_SCRATCH + 1], work[W_SCRATCH + 2]
+    dx, taken, n = work[W_SCRATCH], work[W_K : W_K + N_Z + 2], 0
     for i in range(N_E):
         dx[i] = 0.0
     phi, theta, psi = euler_from_quaternion(x[3], x[4], x[5], x[6])
@@ -159,11 +168,11 @@ def estimator_update(P, settings, x, cov, stress, z, beyond, scores, dt, work):
             column, innovation = E_ACT + m - Z_DEPTH, z[m] - x[X_ACT + m - Z_DEPTH]
         else:
             column, innovation = E_POS + axis, z[m] - x[axis]
-        scores[m], beyond[m] = update_scalar(
-            cov, dx, column, h0, h1, h2, other, innovation, settings[S_R + m], beyond[m], dt, v, K
+        scores[m], beyond[m], n = update_scalar(
+            cov, taken, n, dx, column, h0, h1, h2, other, innovation, settings[S_R + m], beyond[m], dt
         )
         if column < E_ACT and abs(scores[m]) > GATE:
-            n = 0 if column < E_ATT else 1
-            stress[n] = min(stress[n] * math.exp(STRESS_GROWTH * dt), STRESS_MAX)
-    symmetrise(cov)
+            which = 0 if column < E_ATT else 1
+            stress[which] = min(stress[which] * math.exp(STRESS_GROWTH * dt), STRESS_MAX)
+    subtract_taken(cov, taken, n)
     inject(P, x, dx)

@@ -10,6 +10,7 @@ from firmware.core.motion import accelerations
 from firmware.core.rotations import rotation_nb
 
 _STEP = 1e-5  # of the differences, in SI: truncation and rounding are both below 1e-6 of what is differentiated
+GRAVITY = 12  # in y: d(nu_dot)/dk, six numbers for each of k's three
 
 
 @kernel
@@ -22,12 +23,8 @@ def acceleration_at(P, y, servo_rate, slider_rate, ballast_rate):
 
 
 @kernel
-def linearise(P, x, servo_rate, slider_rate, ballast_rate, A, y):
-    """d(rate of the error state)/d(error state) into A (N_MOVING, N_COUPLED), at x; y (12) is left for model_error.
-
-    Attitude errors turn gravity (k + k x dtheta) and the way through the water; the accelerations' derivatives are
-    forward differences of equation (1), the actuators' speeds held.
-    """
+def linearise_motion(x, y, A):
+    """Position's and attitude's rows of A at x, and how attitude errors turn gravity; y as linearise left it."""
     r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation_nb(x[3], x[4], x[5], x[6])
     u, v, w, p, q, r = x[7], x[8], x[9], x[10], x[11], x[12]
     # position: R v, and d(R v) = -R [v x] dtheta
@@ -42,7 +39,20 @@ def linearise(P, x, servo_rate, slider_rate, ballast_rate, A, y):
     A[4, 3], A[4, 4], A[4, 5] = -r, 0.0, p
     A[5, 3], A[5, 4], A[5, 5] = q, -p, 0.0
     A[3, 9], A[4, 10], A[5, 11] = 1.0, 1.0, 1.0
-    y[0], y[1], y[2] = r31, r32, r33
+    # d/dtheta from d/dk by dk = k x dtheta
+    for i in range(6):
+        g0, g1, g2 = y[GRAVITY + i], y[GRAVITY + 6 + i], y[GRAVITY + 12 + i]
+        A[6 + i, 3], A[6 + i, 4], A[6 + i, 5] = g1 * r33 - g2 * r32, g2 * r31 - g0 * r33, g0 * r32 - g1 * r31
+
+
+@kernel
+def linearise(P, x, servo_rate, slider_rate, ballast_rate, A, y):
+    """d(rate of the error state)/d(error state) into A (N_MOVING, N_COUPLED), at x; y (30) is left for model_error.
+
+    Attitude errors turn gravity (k + k x dtheta) and the way through the water; the accelerations' derivatives are
+    forward differences of equation (1), the actuators' speeds held.
+    """
+    _, _, _, _, _, _, y[0], y[1], y[2] = rotation_nb(x[3], x[4], x[5], x[6])
     for i in range(9):
         y[3 + i] = x[7 + i]
     a0, a1, a2, a3, a4, a5 = acceleration_at(P, y, servo_rate, slider_rate, ballast_rate)
@@ -54,12 +64,14 @@ def linearise(P, x, servo_rate, slider_rate, ballast_rate, A, y):
         b0, b1, b2, b3, b4, b5 = acceleration_at(P, y, servo_rate, slider_rate, ballast_rate)
         y[j] = kept
         h = 1.0 / h
-        A[6, 3 + j], A[7, 3 + j], A[8, 3 + j] = (b0 - a0) * h, (b1 - a1) * h, (b2 - a2) * h
-        A[9, 3 + j], A[10, 3 + j], A[11, 3 + j] = (b3 - a3) * h, (b4 - a4) * h, (b5 - a5) * h
-    # columns 3..5 hold d/dk so far: d/dtheta by dk = k x dtheta
-    for i in range(6, 12):
-        g0, g1, g2 = A[i, 3], A[i, 4], A[i, 5]
-        A[i, 3], A[i, 4], A[i, 5] = g1 * r33 - g2 * r32, g2 * r31 - g0 * r33, g0 * r32 - g1 * r31
+        if j < 3:
+            to = GRAVITY + 6 * j
+            y[to], y[to + 1], y[to + 2] = b0 - a0, b1 - a1, b2 - a2
+            y[to + 3], y[to + 4], y[to + 5] = b3 - a3, b4 - a4, b5 - a5
+        else:
+            A[6, 3 + j], A[7, 3 + j], A[8, 3 + j] = (b0 - a0) * h, (b1 - a1) * h, (b2 - a2) * h
+            A[9, 3 + j], A[10, 3 + j], A[11, 3 + j] = (b3 - a3) * h, (b4 - a4) * h, (b5 - a5) * h
+    linearise_motion(x, y, A)
 
 
 @kernel

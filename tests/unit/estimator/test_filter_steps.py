@@ -5,7 +5,7 @@ import math
 import numba
 import numpy as np
 import pytest
-from support.estimating import Filter
+from support.estimating import Filter, state_error
 
 from firmware.core import estimator_layout as at
 from firmware.core.estimator import estimator_step
@@ -221,3 +221,18 @@ def test_the_covariance_stays_sound_under_nonsense():
     assert np.isfinite(filtered.x).all()
     assert np.isfinite(filtered.cov).all()
     assert filtered.positive_definite()
+
+
+def test_a_linearised_flight_that_is_held_serves_as_well_as_a_fresh_one():
+    held, fresh = Filter().start(), Filter(mode=at.FRESH).start()
+    rng = np.random.default_rng(6)
+    for i in range(1500):
+        commands = (0.5 * math.sin(0.002 * i), 0.02 * math.sin(0.005 * i), 0.15 * math.cos(0.004 * i))
+        fresh.predict(0.02, commands)
+        seen = {name: value + 0.003 * rng.standard_normal() for name, value in readings(fresh).items()}
+        fresh.update(0.02, **seen)
+        held.predict(0.02, commands)
+        held.update(0.02, **seen)
+    sure = np.sqrt(np.diag(fresh.cov))[: at.E_ERR]
+    np.testing.assert_allclose(np.sqrt(np.diag(held.cov))[: at.E_ERR], sure, rtol=0.05)
+    assert (np.abs(state_error(fresh.x, held.x)) < 0.2 * sure).all()

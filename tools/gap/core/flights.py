@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from firmware.core.estimator import estimator_predict, estimator_start, estimator_update, flight_derivative
-from firmware.core.estimator_layout import GATE, MAX_STEP, N_E, N_W, N_WORK_ROWS, N_XE, N_Z, X_ERR, X_WATER
+from firmware.core.estimator_layout import FRESH, GATE, MAX_STEP, N_E, N_W, N_WORK_ROWS, N_XE, N_Z, X_ERR, X_WATER
 from firmware.core.flight import normalise_attitude
 from firmware.core.jit import kernel, parallel_kernel, prange
 from firmware.core.layout import CG_X, M_S, M_T, N_X, NET_MASS, X_B
@@ -79,7 +79,7 @@ def estimate_rows(P, S, sigma, mode, t, inputs, z, first, last, x, spread, X, sd
         if i > first:
             dt = t[i] - t[i - 1]
             servo, slider, ballast = inputs[i - 1, 0], inputs[i - 1, 1], inputs[i - 1, 2]
-            estimator_predict(P, S, sigma, x, cov, stress, mode, servo, slider, ballast, dt, work)
+            estimator_predict(P, S, sigma, x, cov, stress, mode | FRESH, servo, slider, ballast, dt, work)
         estimator_update(P, S, x, cov, stress, z[i], beyond, scores, dt, work)
         for j in range(N_Z):
             if not math.isnan(scores[j]):
