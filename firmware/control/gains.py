@@ -94,10 +94,10 @@ class HybridTable(Table):
 class Law(Table):
     """[control.law]: gains of both axes, the form of the model, and law+'s share of the observed model error."""
 
-    pitch: LawGains = LawGains(k1=1.23, k2=0.005, k3=1.46, eps=0.185)
+    pitch: LawGains = LawGains(k1=0.8, k2=0.004, k3=0.8, eps=0.1)
     depth: LawGains = LawGains(k1=0.17, k2=0.05, k3=0.95, eps=0.14)
     form: Literal["exact", "paper"] = "exact"
-    observer_share: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)] = 0.0
+    observer_share: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)] = 1.0
 
 
 class Control(Table):
