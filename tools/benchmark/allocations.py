@@ -73,7 +73,7 @@ def blocks_asked_for(function: Callable[[], object], times: int = 200) -> dict[i
 
     Sizes of LARGEST bytes and more are counted as LARGEST. A block that only some calls ask for shows as a fraction.
     """
-    function()
+    _count(function, 10)  # the interpreter settles into a call it has not seen counted before
     counting_alone = _count(_nothing, times)
     per_call = (_count(function, times) - counting_alone) / times
     return {int(size): float(per_call[size]) for size in np.flatnonzero(per_call > 0.0)}
