@@ -86,3 +86,23 @@ def predict(run: Path, model: str, out: Path) -> None:
     predicted = predict_runs(case, load_model(model, case), [recorded])[0]
     write_run(out, as_run(recorded, predicted))
     say(f"predicted {recorded.rows} rows of {recorded.name} with {model}: {out}")
+
+
+@gap.command()
+@click.argument("case", type=click.Path(path_type=Path))
+@click.option("--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Folder of the answer.")
+@json_option
+def diagnose(case: Path, out: Path, as_json: bool) -> None:
+    """Where the simulator is wrong about CASE, which effect causes it, and how far the gap shrinks with it."""
+    from tools.errors import need
+    from tools.gap.diagnose import diagnose as run_diagnosis
+    from tools.gap.diagnose import plain, write
+    from tools.runs.case import load_case
+
+    need("scipy", "jinja2")
+    loaded = load_case(case)
+    found = run_diagnosis(loaded, say)
+    write(found, out)
+    if as_json:
+        print_json(plain(found))
+    say(f"answer: {out / 'diagnosis.json'}")

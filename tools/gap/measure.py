@@ -50,9 +50,12 @@ def mean_square(channel: Channel, error: np.ndarray) -> float:
     return float(np.mean(valid**2)) if valid.size else float("nan")
 
 
-def run_gap(run: Run, Y: np.ndarray, listed: list[Window]) -> RunGap:
-    """The gap of a run against its prediction Y (rows, N_Y). Channels without a scored sample are left out."""
-    rows, table = scored_rows(listed, run.rows), measured(run)
+def run_gap(run: Run, Y: np.ndarray, listed: list[Window], table: np.ndarray | None = None) -> RunGap:
+    """The gap of a run against its prediction Y (rows, N_Y). Channels without a scored sample are left out.
+
+    `table` (rows, N_Y or more) stands in the place of what the run measured.
+    """
+    rows, table = scored_rows(listed, run.rows), measured(run) if table is None else table
     squares = {
         channel.name: mean_square(channel, errors(channel, table, Y)[rows]) for channel in channels_of(run)
     }

@@ -9,7 +9,9 @@ from tools.gap import start
 from tools.gap.channels import INSTEAD, ONBOARD
 from tools.gap.core.flights import N_EXTRAS, N_Y, fly_windows, observe_rows
 from tools.gap.model import Model
+from sim_backend.core import effect_layout as ef
 from tools.gap.windows import Window, windows
+from tools.runs import columns as names
 from tools.runs.case import Case
 from tools.runs.run import Run
 
@@ -103,7 +105,9 @@ def as_run(run: Run, Y: np.ndarray) -> Run:
         if name in ONBOARD:
             columns[name] = Y[:, ONBOARD.index(name)]
         elif name in INSTEAD:
-            columns[name] = Y[:, INSTEAD.index(name)]
+            # motion capture beside onboard sensors, where the prediction tells them apart
+            own = ef.Y_MOCAP_X + (*names.MOCAP_POSITION, *names.MOCAP_ATTITUDE).index(name)
+            columns[name] = Y[:, own if own < Y.shape[1] else INSTEAD.index(name)]
         else:  # time and commands are not predicted, only without gaps
             columns[name] = start.held(values)
     return replace(run, columns=columns, path=None)
@@ -111,7 +115,22 @@ def as_run(run: Run, Y: np.ndarray) -> Run:
 
 def predict(case: Case, model: Model, runs: list[Run]) -> list[np.ndarray]:
     """A prediction (rows, N_Y) for every run."""
+    if model.F is not None:
+        return predict_effects(case, model, runs)
     flown = prepare(case, model, runs)
     Y = fly(flown, [Variant(model.P, flown.inputs)])[0]
     bounds = flown.recording.bounds
+    return [Y[bounds[n] : bounds[n + 1]] for n in range(len(runs))]
+
+
+def predict_effects(case: Case, model: Model, runs: list[Run]) -> list[np.ndarray]:
+    """The same for a model with effects: each window starts where that model's own filter stands."""
+    from tools.gap import problem as whole
+
+    posed = whole.pose(case, model, runs)
+    gains = posed.filter(model.P, model.F, begin=True)
+    scored = whole.cut(posed)
+    Y = whole.estimated(posed, model.F, gains)
+    whole.fly_on(posed, scored, model.P, model.F, gains, Y)
+    bounds = posed.recording.bounds
     return [Y[bounds[n] : bounds[n + 1]] for n in range(len(runs))]

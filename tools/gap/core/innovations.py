@@ -21,7 +21,7 @@ from sim_backend.core.effect_plant import effect_step, fold, read, wrapped
 
 N_ERR = 15
 N_Y = ef.N_Y
-MAX_STEP = 0.05  # s
+MAX_STEP = 0.1  # s
 NUDGE = 1e-5  # of the state's unit, for derivatives
 LARGEST_SPEED = 20.0  # m/s, rad/s: a model that flies faster has left every vehicle, and is held where it was
 
@@ -183,8 +183,8 @@ def linear_step(Pw, F, x, mode, t, inputs, i, begin, zero, work, kept, moved, ba
 def filter_run(P, F, spectral, R, mode, t, inputs, z, begin, end, start, spread, X, path, E, W, K):
     """The Kalman filter over rows begin .. end - 1. Returns -2 log likelihood without its constant.
 
-    P (N_P), F (N_F); spectral (9): spectral densities of the accelerations ((m/s2)2 s, (rad/s2)2 s) and walks of
-    servo, slider and ballast (per s); R (N_Y) measurements' variances; start (N_XF), spread (N_ERR).
+    P (N_P), F (N_F); spectral (12): spectral densities of the accelerations ((m/s2)2 s, (rad/s2)2 s), walks of
+    servo, slider and ballast and of the position (per s); R (N_Y) measurements' variances; start (N_XF), spread (N_ERR).
     Out: X (rows, N_XF) the state and path (rows, 6) after each row, E (rows, N_Y) whitened innovations, NaN where
     nothing was measured, W (rows, N_Y, N_Y) what whitens a row's innovations and K (rows, N_ERR, N_Y) what corrects
     the state by the whitened ones.
@@ -220,6 +220,7 @@ def filter_run(P, F, spectral, R, mode, t, inputs, z, begin, end, start, spread,
                         cov[a, b] += s * Gam[a, j] * Gam[b, j]
             for j in range(3):
                 cov[12 + j, 12 + j] += spectral[6 + j] * dt
+                cov[j, j] += spectral[9 + j] * dt
         read_row(F, x, t, path, i, begin, y)
         missed(z[i], y, d)
         for j in range(N_ERR):
@@ -398,3 +399,37 @@ def fly_windows(Ps, Fs, modes, bounds, t, inputs, X, paths, first, last, run_of,
             propagate(Pw, F, x, modes[run], t, inputs, i, begin, acc, zero, work, kept)
             log_path(x, before, path, i - begin, 0)
             read_row(F, x, t[begin:], path, i - begin, 0, Y[m, i])
+
+
+@parallel_kernel
+def simulate_runs(P, F, spectral, R, modes, bounds, t, inputs, starts, shaken, noise, Z):
+    """What would be measured, were (P, F) the truth: Z (rows, N_Y).
+
+    shaken (rows, 6) and noise (rows, N_Y): standard normal deviates of the disturbance and of the sensors.
+    """
+    for run in prange(len(bounds) - 1):
+        begin = bounds[run]
+        Pw, x = np.empty(N_P), starts[run].copy()
+        fold(P, F, Pw)
+        work, kept = np.zeros((6, ef.N_XF)), np.empty(ef.N_XF)
+        zero, before, acc = np.zeros(3), np.empty(6), np.zeros(6)
+        path = np.zeros((bounds[run + 1] - begin, 6))
+        for i in range(begin, bounds[run + 1]):
+            if i > begin:
+                for j in range(6):
+                    acc[j] = math.sqrt(spectral[j] / (t[i] - t[i - 1])) * shaken[i, j]
+                stand(x, before)
+                propagate(Pw, F, x, modes[run], t, inputs, i, begin, acc, zero, work, kept)
+                log_path(x, before, path, i - begin, 0)
+            read_row(F, x, t[begin:], path, i - begin, 0, Z[i])
+            for m in range(N_Y):
+                Z[i, m] += math.sqrt(R[run, m]) * noise[i, m]
+
+
+@parallel_kernel
+def read_rows(F, X, path, t, bounds, Y):
+    """What would be read at every row's state, into Y (rows, N_Y)."""
+    for run in prange(len(bounds) - 1):
+        begin, end = bounds[run], bounds[run + 1]
+        for i in range(begin, end):
+            read_row(F, X[i], t[begin:end], path[begin:end], i - begin, 0, Y[i])

@@ -1,0 +1,83 @@
+"""`corrected.toml`: a nominal vehicle with its parameters refitted and effects added, as `glider gap predict` takes it."""
+
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import numpy as np
+
+from firmware.core import layout
+from firmware.model.strict import ConfigError, Table, decode
+from sim_backend.core import effect_layout as ef
+from sim_backend.effects.base import EffectError, catalogue, check_values
+from tools.gap.model import Model
+from tools.sources import read_text
+
+BIASES = ("roll", "pitch", "yaw", "p", "q", "r", "depth", "slider", "ballast")
+NAMES = {name.lower(): getattr(layout, name) for name in dir(layout) if name.isupper() and isinstance(getattr(layout, name), int)}
+PARAMETERS = {name: index for name, index in NAMES.items() if not name.startswith(("n_", "x_pos", "x_quat", "x_nu", "x_act"))}
+Finite = Annotated[float, msgspec.Meta(ge=-1e6, le=1e6)]
+
+
+class CorrectedTable(Table):
+    """corrected.toml."""
+
+    format: Annotated[int, msgspec.Meta(ge=1, le=1)]
+    corrected: bool
+    vehicle: str
+    parameters: dict[str, Finite] = {}
+    bias: dict[str, Finite] = {}
+    effects: dict[str, dict[str, Finite]] = {}
+
+
+def is_corrected(text: str) -> bool:
+    """Whether a file says of itself that it is a corrected model."""
+    return any(line.split("=")[0].strip() == "corrected" for line in text.splitlines() if "=" in line)
+
+
+def load_corrected(path: Path | str, nominal: Model) -> Model:
+    """The model of a corrected.toml on top of a case's nominal vehicle; ConfigError, one line, where it cannot be used."""
+    source = str(path)
+    table = decode(read_text(Path(path)), CorrectedTable, source)
+    if not table.corrected:
+        raise ConfigError("must be true", source=source, key="corrected")
+    P, F = nominal.P.copy(), np.zeros(ef.N_F)
+    for name, value in table.parameters.items():
+        if name not in PARAMETERS:
+            raise ConfigError("no such parameter", source=source, key=f"parameters.{name}")
+        P[PARAMETERS[name]] = value
+    for name, value in table.bias.items():
+        if name not in BIASES:
+            raise ConfigError(f"no such reading; known: {', '.join(BIASES)}", source=source, key=f"bias.{name}")
+        F[ef.BIAS + BIASES.index(name)] = value
+    for label, values in table.effects.items():
+        try:
+            checked = check_values(label, values)
+        except EffectError as error:
+            raise ConfigError(str(error), source=source, key=f"effects.{label}") from None
+        for parameter in catalogue()[label].parameters:
+            if parameter.entry >= 0:
+                F[parameter.entry] += checked[parameter.name]
+    return Model(source, P, nominal.sigma, F)
+
+
+def corrected_text(vehicle: str, nominal: np.ndarray, P: np.ndarray, F: np.ndarray, effects: dict[str, dict[str, float]]) -> str:
+    """The text of a corrected.toml: what differs from the nominal P (N_P), biases out of F, and effects by label."""
+    lines = [
+        "# A corrected model: the nominal vehicle, its parameters refitted within their uncertainty, effects added.",
+        "# Fly it over a run with `glider gap predict RUN --model corrected.toml --out FILE`.",
+        "format = 1",
+        "corrected = true",
+        f"vehicle = {msgspec.json.encode(vehicle).decode()}",
+        "",
+        "[parameters]  # SI",
+    ]
+    by_index: dict[int, str] = {}
+    for name, index in PARAMETERS.items():
+        by_index.setdefault(index, name)
+    lines += [f"{by_index[int(i)]} = {float(P[i])!r}" for i in np.flatnonzero(P != nominal)]
+    lines += ["", "[bias]  # of what is read, SI, rad"]
+    lines += [f"{name} = {float(F[ef.BIAS + n])!r}" for n, name in enumerate(BIASES) if F[ef.BIAS + n] != 0.0]
+    for label, values in effects.items():
+        lines += ["", f"[effects.{label}]", *(f"{name} = {float(value)!r}" for name, value in values.items())]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,206 @@
+"""A case as the diagnosis sees it: recordings, noise, and flights of any model along them (core/innovations)."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from firmware.core import estimator_layout as est
+from firmware.estimation.settings import DISTURBANCE_HOLD, UNSEEN_SERVO_WALK
+from sim_backend.core import effect_layout as ef
+from tools.gap import start
+from tools.gap.channels import measured
+from tools.gap.core.innovations import N_ERR, N_Y, filter_runs, fly_windows, follow_runs, read_rows, simulate_runs
+from tools.gap.model import Model, nominal_model
+from tools.gap.windows import Window, windows
+from tools.runs import columns as names
+from tools.runs.case import Case
+from tools.runs.run import Run
+
+START_SPEEDS = (0.03, 0.2, 0.4)  # m/s, tried; each with SPEED_SPREAD
+SPEED_SPREAD = (0.1, 0.03, 0.03)  # m/s
+POSITION_SPREAD, DEPTH_SPREAD, ATTITUDE_SPREAD, RATE_SPREAD = 0.05, 0.05, 0.05, 0.05  # m, m, rad, rad/s about readings
+ACTUATOR_SPREAD = (1e-4, 3e-4, 5e-4)  # rad, m, kg: where commanded, they begin at 0 and at the draw-wires
+UNSEEN_SPREAD = 0.3  # rad, of a servo without command
+ROUGH_WALK = (1e-6, 4e-10, 2.5e-9)  # per s, times the roughness squared, of filters that are not to trust the model
+WALK = (1e-8, 1e-12, 1e-12)  # per s; commanded actuators go as the model says
+
+
+@dataclass
+class Gains:
+    """What a filter leaves behind, by row: whitening, corrections, and the innovations of its own model."""
+
+    W: np.ndarray  # (rows, N_Y, N_Y)
+    K: np.ndarray  # (rows, N_ERR, N_Y)
+    X: np.ndarray  # (rows, N_XF) states
+    path: np.ndarray  # (rows, 6)
+    E: np.ndarray  # (rows, N_Y) whitened innovations, NaN where nothing was measured
+    misfit: np.ndarray  # (runs,) -2 log likelihood without its constant
+
+
+@dataclass
+class Problem:
+    """Runs behind each other in one table, ready for the kernels."""
+
+    case: Case
+    model: Model
+    runs: list[Run]
+    recording: start.Recording
+    z: np.ndarray  # (rows, N_Y) measured
+    starts: np.ndarray  # (runs, N_XF)
+    spreads: np.ndarray  # (runs, N_ERR)
+    spectral: np.ndarray  # (12,) of accelerations, of actuators' walks and of the water's
+    R: np.ndarray  # (runs, N_Y)
+    valid: np.ndarray  # (rows, N_Y) bool
+    run_of: np.ndarray  # (rows,)
+
+    def filter(
+        self, P: np.ndarray, F: np.ndarray, roughness: float = 1.0, begin: bool = False, more=None, doubt=None
+    ) -> Gains:
+        """The filter of a model over all runs; `roughness` multiplies the disturbance; `begin` seeks the first speed.
+
+        more (12,) is added to the spectral densities, doubt (N_Y,) to the variances of the measurements.
+        """
+        rows, runs = len(self.z), len(self.runs)
+        made = Gains(
+            np.empty((rows, N_Y, N_Y)), np.empty((rows, N_ERR, N_Y)), np.empty((rows, ef.N_XF)), np.empty((rows, 6)),
+            np.empty((rows, N_Y)), np.empty(runs),
+        )  # fmt: skip
+        spectral = self.spectral.copy()
+        spectral[:6] *= roughness**2
+        if roughness > 1.0:
+            spectral[6:9] += np.array(ROUGH_WALK) * roughness**2
+        if more is not None:
+            spectral += more
+        R = self.R if doubt is None else self.R + doubt
+        r = self.recording
+        filter_runs(
+            P, F, spectral, R, r.modes, r.bounds, r.early, r.t, r.inputs, self.z, self.starts,
+            np.array(START_SPEEDS if begin else ()), self.spreads, made.X, made.path, made.E, made.W, made.K,
+            made.misfit,
+        )  # fmt: skip
+        return made
+
+    def follow(self, models: list[tuple[np.ndarray, np.ndarray]], gains: Gains) -> np.ndarray:
+        """Whitened innovations of models (P, F) with kept gains, (models, valid samples)."""
+        r, out = self.recording, []
+        block = max(1, int(2e7 // self.z.size))
+        for n in range(0, len(models), block):
+            part = models[n : n + block]
+            E = np.empty((len(part), *self.z.shape))
+            follow_runs(
+                np.array([P for P, _ in part]), np.array([F for _, F in part]), r.modes, r.bounds, r.t, r.inputs,
+                self.z, self.starts, gains.W, gains.K, E,
+            )  # fmt: skip
+            out.append(E[:, self.valid])
+        return np.concatenate(out)
+
+
+    def part(self, run: int) -> "Problem":
+        """One of its runs as a problem of its own."""
+        r = self.recording
+        at = slice(r.bounds[run], r.bounds[run + 1])
+        recording = replace(
+            r, bounds=np.array([0, r.bounds[run + 1] - r.bounds[run]]), early=r.early[run : run + 1] - r.bounds[run],
+            modes=r.modes[run : run + 1], settings=r.settings[run : run + 1], t=r.t[at], inputs=r.inputs[at],
+            drawn=r.drawn[at], z=r.z[at], starts=r.starts[run : run + 1], spreads=r.spreads[run : run + 1],
+        )  # fmt: skip
+        return replace(
+            self, runs=[self.runs[run]], recording=recording, z=self.z[at], starts=self.starts[run : run + 1].copy(),
+            spreads=self.spreads[run : run + 1], R=self.R[run : run + 1], valid=self.valid[at],
+            run_of=np.zeros(at.stop - at.start, dtype=np.int64),
+        )  # fmt: skip
+
+    def simulated(self, P: np.ndarray, F: np.ndarray, starts: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """What would have been measured, were (P, F) the truth: (rows, N_Y), NaN where nothing was."""
+        r, Z = self.recording, np.empty_like(self.z)
+        rows = len(Z)
+        simulate_runs(
+            P, F, self.spectral, self.R, r.modes, r.bounds, r.t, r.inputs, starts, rng.standard_normal((rows, 6)),
+            rng.standard_normal((rows, N_Y)), Z,
+        )  # fmt: skip
+        Z[~self.valid] = np.nan
+        return Z
+
+
+def measured_all(run: Run) -> np.ndarray:
+    """Everything that was measured, (rows, N_Y): onboard, and motion capture's pose beside it."""
+    table = np.full((run.rows, N_Y), np.nan)
+    table[:, : ef.Y_ONBOARD] = measured(run)[:, : ef.Y_ONBOARD]
+    for onboard, mocap in zip(names.ATTITUDE, names.MOCAP_ATTITUDE, strict=True):
+        if onboard not in run.columns and mocap in run.columns:
+            table[:, names.ATTITUDE.index(onboard)] = np.nan
+    if names.DEPTH not in run.columns:
+        table[:, ef.Y_DEPTH] = np.nan
+    for n, name in enumerate((*names.MOCAP_POSITION, *names.MOCAP_ATTITUDE)):
+        if name in run.columns:
+            table[:, ef.Y_MOCAP_X + n] = run.columns[name]
+    return table
+
+
+def pose(case: Case, model: Model | None = None, runs: list[Run] | None = None) -> Problem:
+    """The problem of a case (all of its runs, if none are named)."""
+    model = nominal_model(case) if model is None else model
+    runs = case.runs if runs is None else runs
+    recording = start.record(case, model, runs)
+    count = len(runs)
+    z = np.concatenate([measured_all(run) for run in runs])
+    starts, spreads = np.zeros((count, ef.N_XF)), np.zeros((count, N_ERR))
+    starts[:, :16] = recording.starts[:, :16]
+    starts[:, 7], starts[:, 10:13] = 0.2, 0.0
+    starts[:, ef.X_GEAR_SERVO], starts[:, ef.X_GEAR_SLIDER] = starts[:, 13], starts[:, 14]
+    walk = np.array(WALK)
+    for n in range(count):
+        actuators = np.array(ACTUATOR_SPREAD)
+        if recording.modes[n] & est.SERVO_DRIVEN:
+            actuators[0], walk[0] = UNSEEN_SPREAD, UNSEEN_SERVO_WALK**2
+        spreads[n] = [
+            POSITION_SPREAD, POSITION_SPREAD, DEPTH_SPREAD, *3 * [ATTITUDE_SPREAD], *SPEED_SPREAD, *3 * [RATE_SPREAD],
+            *actuators,
+        ]  # fmt: skip
+        # A position that drives the model is no measurement beside it.
+        driven = recording.drawn[recording.bounds[n] : recording.bounds[n + 1]]
+        z[recording.bounds[n] : recording.bounds[n + 1], ef.Y_SLIDER : ef.Y_BALLAST + 1][np.isfinite(driven)] = np.nan
+    d = case.disturbance
+    spectral = np.array([*3 * [d.linear**2 * DISTURBANCE_HOLD], *3 * [d.angular**2 * DISTURBANCE_HOLD], *walk, *3 * [0.0]])
+    run_of = np.repeat(np.arange(count), np.diff(recording.bounds))
+    R = recording.settings[:, est.S_R :].copy()
+    return Problem(case, model, runs, recording, z, starts, spreads, spectral, R, np.isfinite(z), run_of)
+
+
+@dataclass
+class Scored:
+    """Windows of the runs as GAP.md cuts them, in rows of the table."""
+
+    listed: list[list[Window]]
+    first: np.ndarray
+    last: np.ndarray
+    run_of: np.ndarray
+
+
+def cut(problem: Problem) -> Scored:
+    """The windows of all runs."""
+    listed = [windows(run.t) for run in problem.runs]
+    flat = [(n, window) for n, found in enumerate(listed) for window in found if window.start < window.end]
+    offset = problem.recording.bounds[:-1]
+    return Scored(
+        listed,
+        np.array([offset[n] + window.start for n, window in flat], dtype=np.int64),
+        np.array([offset[n] + window.end for n, window in flat], dtype=np.int64),
+        np.array([n for n, _ in flat], dtype=np.int64),
+    )
+
+
+def estimated(problem: Problem, F: np.ndarray, gains: Gains) -> np.ndarray:
+    """What the sensors would read where the filter stands, (rows, N_Y)."""
+    Y = np.empty_like(problem.z)
+    read_rows(F, gains.X, gains.path, problem.recording.t, problem.recording.bounds, Y)
+    return Y
+
+
+def fly_on(problem: Problem, scored: Scored, P: np.ndarray, F: np.ndarray, gains: Gains, Y: np.ndarray) -> None:
+    """Fly every window on from where the filter stands, into Y (rows, N_Y)."""
+    r = problem.recording
+    fly_windows(
+        P[None], F[None], r.modes, r.bounds, r.t, r.inputs, gains.X[None], gains.path[None], scored.first, scored.last,
+        scored.run_of, Y[None],
+    )  # fmt: skip

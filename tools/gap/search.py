@@ -1,0 +1,187 @@
+"""The search for the cause: every label tried, the likely ones fitted, more than one where one does not do.
+
+The data's weight is let in by degrees. At first the filter is told of a disturbance many times the vehicle's, so that
+it holds any model to the course flown and the misfit is nearly a parabola however large the effect; then of less, and
+at last of what the vehicle file says. Candidates that fall behind by far are dropped on the way.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from tools.gap.candidates import Free, allowed, candidates, place
+from tools.gap.fit import Course, Fitter
+from tools.gap.problem import Gains, Problem
+
+ROUGHNESS = (100.0, 10.0)  # times the disturbance, before the vehicle's own
+TRIED, KEPT, LEFT = 20, 12, 8  # candidates: after the screen, after the first rung, after the second
+FAR = 60.0  # half misfits behind the best, and then no longer worth a flight, beside a share of all that was gained
+SHARE = 0.5
+ENOUGH = 0.05  # half misfits; a candidate that gains less has arrived
+MOST_EFFECTS = 3
+SECONDS = 5  # further effects tried beside each of the leading candidates
+LEADING = 3
+SHOWN = 1.0  # squared sigma: a spread of an effect that moves nothing by as much cannot be seen in these runs
+EARNED = 5.0  # nat that a further effect must promise
+NEAR = 30.0  # misfit a sample, within which labels are tried again at full weight
+POLISHED, WARM = 3, 1.05
+CLEAN = 5.0  # sigma of the misfit, above which something is still missing
+
+
+@dataclass
+class Search:
+    """Where a search stands."""
+
+    problem: Problem
+    allowed: list[Free]
+    candidates: dict[str, list[Free]]
+    fitter: Fitter
+    null: Course
+    courses: list[Course]
+    gains: Gains
+
+    def free(self, labels: tuple[str, ...]) -> list[Free]:
+        return [f for label in labels for f in self.candidates[label]]
+
+    def model(self, course: Course) -> tuple[np.ndarray, np.ndarray]:
+        return place(self.problem, [*self.allowed, *course.free], np.concatenate([course.allowed, course.values]))
+
+    def ranked(self) -> list[Course]:
+        return sorted(self.courses, key=lambda c: -c.log_evidence(self.fitter))
+
+    @property
+    def best(self) -> Course:
+        return self.ranked()[0]
+
+
+def settle(fitter: Fitter, course: Course, steps: int = 6) -> None:
+    """A candidate to its least misfit."""
+    for _ in range(steps):
+        fitter.advance([course])
+        if course.gained < 2.0 * ENOUGH:
+            break
+
+
+def prune(courses: list[Course], worst: float, most: int, least_kept: int = 4) -> list[Course]:
+    """The candidates that may still win: `worst` is the misfit of no effect."""
+    courses = sorted(courses, key=lambda c: c.misfit)
+    least = courses[0].misfit
+    margin = max(2.0 * FAR, SHARE * (worst - least))
+    return [c for n, c in enumerate(courses) if n < least_kept or c.misfit - least <= margin][:most]
+
+
+def improve(fitter: Fitter, courses: list[Course], worst: float, most: int, steps: int) -> list[Course]:
+    """Candidates led on and thinned out."""
+    for _ in range(steps):
+        moving = [c for c in courses if c.gained >= 2.0 * ENOUGH]
+        if not moving:
+            break
+        fitter.advance(moving)
+        courses = prune(courses, worst, most)
+    return courses
+
+
+def carried(fitter: Fitter, courses: list[Course]) -> list[Course]:
+    """Candidates taken over to another fitter, with where they stand."""
+    return [fitter.course(c.labels, c.free, c.values, c.allowed) for c in courses]
+
+
+def screen(search: Search, beside: Course, most: int) -> list[Course]:
+    """The labels that should gain most beside a candidate, were everything linear: as candidates before a step."""
+    fitter, tried = search.fitter, []
+    for label, free in search.candidates.items():
+        if label in beside.labels or {f.entry for f in free} & {f.entry for f in beside.free}:
+            continue
+        values = np.concatenate([beside.values, np.zeros(len(free))])
+        course = fitter.course((*beside.labels, label), [*beside.free, *free], values, beside.allowed)
+        course.settle(beside.e, fitter.tight)
+        course.known = beside.columns if len(beside.free) else course.known
+        tried.append(course)
+    fitter.linearise(tried, coarse=True)
+    new = len(beside.free)
+    shown = [c for c in tried if (c.columns[new:] ** 2).sum() > SHOWN]
+    return sorted(shown, key=lambda course: -course.promise())[:most]
+
+
+def excess(search: Search, course: Course) -> float:
+    """How far a candidate's misfit is above that of white innovations, in sigma."""
+    e = course.e / search.fitter.cool
+    return float((e @ e - len(e)) / np.sqrt(2.0 * len(e)))
+
+
+def refilter(search: Search, at: Course, roughness: float) -> None:
+    """New gains and a new fitter at a candidate; all candidates are taken over."""
+    problem = search.problem
+    search.gains = problem.filter(*search.model(at), roughness=roughness, begin=True)
+    search.fitter = Fitter(problem, search.gains, search.allowed, at, temper=True)
+    search.courses = carried(search.fitter, search.courses)
+    search.null = carried(search.fitter, [search.null])[0]
+    search.fitter.measure(search.courses)
+    settle(search.fitter, search.null)
+
+
+def run(problem: Problem, say: Callable[[str], None] = lambda text: None) -> Search:
+    """The search over a problem's runs."""
+    free, known = allowed(problem), candidates(problem)
+    P, F = place(problem, free, np.zeros(len(free)))
+    gains = problem.filter(P, F, roughness=ROUGHNESS[0], begin=True)
+    fitter = Fitter(problem, gains, free, temper=True)
+    null = fitter.course((), [])
+    fitter.measure([null])
+    search = Search(problem, free, known, fitter, null, [], gains)
+    fitter.linearise([null])
+    tried = screen(search, null, TRIED)
+    settle(fitter, null)
+    say(f"screened {len(known)} labels")
+    fitter.move(tried)
+    search.courses = improve(fitter, prune(tried, null.misfit, KEPT, KEPT), null.misfit, KEPT, 3)
+    refilter(search, min([*search.courses, search.null], key=lambda c: c.misfit), ROUGHNESS[1])
+    search.courses = improve(search.fitter, search.courses, search.null.misfit, LEFT, 3)
+    polish(search)
+    rescreen(search)
+    say(f"one effect: {' '.join(search.best.labels) or 'none'}")
+    for count in range(2, MOST_EFFECTS + 1):
+        if len(search.best.labels) < count - 1 or not widen(search, count):
+            break
+        polish(search)
+        say(f"{count} effects: {' '.join(search.best.labels)}")
+    return search
+
+
+def rescreen(search: Search) -> None:
+    """Labels tried again at full weight beside no effect: weak effects do not show in a filter told to doubt."""
+    if search.fitter.tight > NEAR or search.null.misfit / len(search.null.e) > NEAR:
+        return
+    search.fitter.linearise([search.null])
+    there = {c.labels for c in search.courses}
+    new = [c for c in screen(search, search.null, LEFT) if c.labels not in there]
+    if not new:
+        return
+    search.fitter.move(new)
+    search.courses = improve(search.fitter, [*search.courses, *new], search.null.misfit, 2 * LEFT, 3)
+
+
+def polish(search: Search) -> None:
+    """Gains and columns at the best candidate, and all candidates led on; again while that candidate is far away."""
+    for _ in range(POLISHED):
+        refilter(search, min([*search.courses, search.null], key=lambda c: c.misfit), 1.0)
+        search.courses = improve(search.fitter, search.courses, search.null.misfit, 2 * LEFT, 3)
+        if search.fitter.tight < WARM:
+            break
+
+
+def widen(search: Search, count: int) -> bool:
+    """Further effects beside the leading candidates of one effect less; False where none promises to earn its place."""
+    leading = [c for c in search.ranked() if len(c.labels) == count - 1][:LEADING]
+    search.fitter.linearise(leading)
+    more: dict[tuple[str, ...], Course] = {}
+    for n, course in enumerate(leading):
+        tried = screen(search, course, SECONDS)
+        if n == 0 and (not tried or tried[0].promise() - course.promise() < EARNED):
+            return False
+        more |= {tuple(sorted(c.labels)): c for c in tried}
+    found = list(more.values())
+    search.fitter.move(found)
+    search.courses += improve(search.fitter, found, min(c.misfit for c in leading), LEFT, 3)
+    return True
