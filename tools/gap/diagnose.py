@@ -10,6 +10,7 @@ import numpy as np
 
 from sim_backend.effects.base import catalogue
 from tools.gap.corrected import corrected_text
+from tools.gap.next_run import propose
 from tools.gap.problem import pose
 from tools.gap.search import Search, run
 from tools.gap.shrink import AFTER, BEFORE, FLOOR, RECALIBRATED, Shrinkage, shrink
@@ -28,6 +29,8 @@ class Diagnosis:
     search: Search
     answer: Answer
     shrinkage: Shrinkage
+    next_run: dict[str, Any]
+    mission: str  # its file's text
 
     @property
     def verdict(self) -> str:
@@ -38,8 +41,10 @@ def diagnose(case: Case, say: Callable[[str], None] = lambda text: None) -> Diag
     """Diagnose a case; `say` is told where the search stands."""
     search = run(pose(case), say)
     answer = conclude(search)
+    search = answer.search
     say(f"verdict: {answer.main}")
-    return Diagnosis(case, search, answer, shrink(search, answer.course))
+    entry, mission = propose(search)
+    return Diagnosis(case, search, answer, shrink(search, answer.course), entry, mission)
 
 
 def parameters(diagnosis: Diagnosis, label: str) -> dict[str, dict[str, Any]]:
@@ -101,7 +106,7 @@ def plain(diagnosis: Diagnosis) -> dict[str, Any]:
         "selected": [] if diagnosis.verdict == "none" else selected,
         "gap": gap_table(diagnosis.shrinkage, answer),
         "left": [{"channel": f.channel, "goes_with": f.test, "sigma": f.sigma} for f in answer.findings[:8]],
-        "next_run": {},
+        "next_run": diagnosis.next_run,
     }
 
 
@@ -122,5 +127,6 @@ def write(diagnosis: Diagnosis, out: Path) -> None:
     search, course = diagnosis.search, diagnosis.answer.course
     P, F = search.model(course)
     text = corrected_text(diagnosis.case.vehicle_name, search.problem.model.P, P, F, effects_of(diagnosis))
+    (out / "next_run.toml").write_text(diagnosis.mission, encoding="utf-8")
     (out / "corrected.toml").write_text(text, encoding="utf-8")
     (out / "diagnosis.json").write_text(json.dumps(_plain(plain(diagnosis)), indent=1) + "\n", encoding="utf-8")
