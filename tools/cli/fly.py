@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from tools.cli.common import DONE, FAILED, json_option, print_json, progress, say
+from tools.cli.common import DONE, FAILED, fail, json_option, print_json, progress, say
 
 ROOM = 512  # records on their way to the disk, past which a simulated flight waits
 
@@ -85,6 +85,8 @@ def fly(mission, vehicle, board, log_file, no_log, seed, realtime, effects, as_j
             report = recorder.close(ending={"ended": flight.autopilot.mode, "reason": flight.autopilot.reason})
     except KeyboardInterrupt:
         raise click.Abort from None
+    except BoardError as error:
+        fail(f"glider: {board}: not armed: {error}")
     finally:
         signal.signal(signal.SIGINT, before)
     completed = flight.autopilot.mode == "completed" and flight.autopilot.surfaced
@@ -102,11 +104,21 @@ def fly(mission, vehicle, board, log_file, no_log, seed, realtime, effects, as_j
         "peak_rss_mb": peak_rss_mb(),
         "records": {"written": report.written, "dropped": report.dropped, "complete": report.complete},
     }
+    if hasattr(flight.board, "health"):
+        result["devices"] = {name: device_summary(health) for name, health in flight.board.health().items()}
+    if hasattr(flight.board, "state"):
+        result["truth"] = flight.board.state()
     if as_json:
         print_json(result)
     else:
         _tell(result)
     raise SystemExit(DONE if completed else FAILED)
+
+
+def device_summary(health) -> dict:
+    """A device's counts and what has changed about it."""
+    counts = {name: getattr(health, name) for name in ("samples", "unfit", "timeouts", "exceptions", "damaged")}
+    return {**counts, "error": health.error, "notes": [note for _, note in health.notes]}
 
 
 def _run(flight, recorder, realtime, advance):
@@ -116,6 +128,7 @@ def _run(flight, recorder, realtime, advance):
 
     flight.board.open()
     runtime = build_runtime(flight, recorder)
+    simulated = not realtime and hasattr(flight.board, "world")
     done = 0
 
     def on_second(t: float) -> None:
@@ -124,7 +137,7 @@ def _run(flight, recorder, realtime, advance):
         if leg > done:
             advance(leg - done)
             done = leg
-        while not realtime and recorder.health().pending > ROOM and recorder.health().alive:
+        while simulated and recorder.health().pending > ROOM and recorder.health().alive:
             time.sleep(0.001)  # simulated time is quicker than a disk
 
     try:
@@ -151,6 +164,9 @@ def _tell(result: dict) -> None:
     say(f"rms against the reference: {', '.join(parts)}")
     if result["missed_ticks"]:
         say(f"{result['missed_ticks']} of {result['ticks']} ticks missed")
+    for name, device in result.get("devices", {}).items():
+        if device["notes"]:
+            say(f"{name}: {'; '.join(device['notes'])}")
     if not result["records"]["complete"]:
         say(f"the log is not complete: {result['records']['dropped']} records dropped")
     if result["log"]:
