@@ -8,6 +8,8 @@ from typing import Annotated, Any
 import msgspec
 
 from firmware.autopilot import Autopilot, configuration
+from firmware.control.cover import Cover, k2_cover
+from firmware.control.gains import Control
 from firmware.core.seawater import water_density
 from firmware.guidance.mission import Mission
 from firmware.model.strict import ConfigError
@@ -44,6 +46,16 @@ class Flight:
     board: Any  # hal.ports.Board, and of a simulated one its world and truth
     autopilot: Autopilot
     texts: dict[str, str]
+
+    @property
+    def cover(self) -> tuple[Cover, Cover]:
+        """The law's k2 of pitch and depth against what this vehicle's [uncertainty] asks for."""
+        return k2_cover(self.vehicle, self.control)
+
+    @property
+    def control(self) -> Control:
+        """The gains that count: the mission's, else the vehicle's, else the defaults."""
+        return self.mission.control or self.vehicle.control or Control()
 
 
 def load_board_file(wanted: str) -> BoardFile:

@@ -1,5 +1,7 @@
 """`glider check`: are the files of a flight fit to fly with?"""
 
+from dataclasses import asdict
+
 import click
 
 from tools.cli.common import DONE, FAILED, json_option, print_json
@@ -13,8 +15,10 @@ from tools.cli.common import DONE, FAILED, json_option, print_json
 def check(vehicle: str, mission: str, board: str, as_json: bool) -> None:
     """Check vehicle, mission and board files, and that they go together.
 
-    Exit code 0: all fit to fly with; 1: something is not; each finding in a line of its own.
+    Of the law it says whether its k2 covers the vehicle's [uncertainty] and [disturbance]; that it does not is a
+    warning. Exit code 0: all fit to fly with; 1: something is not; each finding in a line of its own.
     """
+    from firmware.control.cover import Cover
     from firmware.core.jit import CACHE_DIR
     from firmware.model.strict import ConfigError
     from hal.ports import BoardError
@@ -23,6 +27,7 @@ def check(vehicle: str, mission: str, board: str, as_json: bool) -> None:
     from tools.sources import load_mission, load_vehicle
 
     findings: list[dict] = []
+    covers: list[Cover] = []
 
     def look(name: str, work) -> bool:
         try:
@@ -49,16 +54,21 @@ def check(vehicle: str, mission: str, board: str, as_json: bool) -> None:
 
     def see_all() -> str:
         flight = build_flight(mission=mission, vehicle=vehicle, board=board)
-        return f"a loop of {flight.board.loop_hz:g} Hz"
+        covers.extend(flight.cover)
+        return f"a loop of {flight.board.loop_hz:g} Hz, controller {flight.control.controller}"
 
     good = [look("vehicle", see_vehicle), look("mission", see_mission), look("board", see_board)]
     if all(good):
         good.append(look("together", see_all))
+    for cover in covers:  # a warning at most: the law flies all the same, only that V falls is then not promised
+        finding = {"check": "law", "pass": True, "warning": not cover.covered, "message": str(cover)}
+        findings.append({**finding, **asdict(cover)})
     kernels = "plain Python (GLIDER_JIT=0)" if CACHE_DIR is None else str(CACHE_DIR)
     findings.append({"check": "kernels", "pass": True, "message": f"compiled into {kernels}"})
     if as_json:
         print_json({"pass": all(good), "findings": findings})
     else:
         for finding in findings:
-            click.echo(f"{'ok  ' if finding['pass'] else 'FAIL'}  {finding['check']:<9} {finding['message']}")
+            word = "FAIL" if not finding["pass"] else "warn" if finding.get("warning") else "ok  "
+            click.echo(f"{word}  {finding['check']:<9} {finding['message']}")
     raise SystemExit(DONE if all(good) else FAILED)

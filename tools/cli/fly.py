@@ -58,6 +58,10 @@ def fly(mission, vehicle, board, log_file, no_log, seed, realtime, effects, as_j
         )
     except BoardError as error:
         raise InputError(str(error), source=board) from None
+    if flight.control.controller != "pid":
+        for axis in flight.cover:
+            if not axis.covered:
+                say(f"warning: {axis}")
     specs = record_specs(flight)
     path = None if no_log else (log_file or next_log(flight.mission.name))
     if path is not None and path.exists():
