@@ -78,7 +78,7 @@ def k2_asked(vehicle: Vehicle, eps: tuple[float, float], sigmas: float) -> np.nd
 
 def k2_cover(vehicle: Vehicle, control: Control) -> tuple[Cover, Cover]:
     """Pitch and depth of a vehicle under the law of `control`."""
-    tables: tuple[LawGains, LawGains] = (control.law.pitch, control.law.depth)
+    tables: tuple[LawGains, LawGains] = (control.law_flown.pitch, control.law_flown.depth)
     eps = (tables[0].eps, tables[1].eps)
     one, three = (k2_asked(vehicle, eps, sigmas) for sigmas in (1.0, 3.0))
     pitch, depth = (
