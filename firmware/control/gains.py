@@ -136,6 +136,6 @@ class Control(Table):
 # The best-tuned PID: gains that track the paper's manoeuvres under noise best, whatever their margins.
 # First values, from a search over the Kalman filter as it was on 2026-11-21.
 BEST_TUNED = Control(
-    pitch=PitchGains(kp=0.207, ki=0.0483, kd=0.296),
+    pitch=PitchGains(kp=0.214, ki=0.0652, kd=0.279),
     depth=DepthGains(kp=0.8, ki=0.1, kd=2.0),
 )

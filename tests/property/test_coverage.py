@@ -95,7 +95,7 @@ def test_the_need_is_the_model_error_bound_and_the_disturbance_seen():
     assert looked > 100
 
 
-def test_rough_water_asks_for_more_and_promises_less():
+def test_rough_water_asks_for_more_and_leaves_less():
     need, margin = [], []
     for strength in (0.003, 0.1):
         world, pilot = flight(at.LAW)
@@ -107,9 +107,9 @@ def test_rough_water_asks_for_more_and_promises_less():
             rows.append(pilot.ap[VALUES].copy())
         rows = np.array(rows)[1000:]
         need.append(np.nanmedian(rows[:, 0]))
-        margin.append(np.nanmean(rows[:, 2] > 0.0))
+        margin.append(np.nanmedian(rows[:, 2]))
     assert need[1] > 3.0 * need[0]
-    assert margin[1] < margin[0]
+    assert margin[1] < margin[0] < 0.0  # in the layer, where flights that keep to their references are
 
 
 def test_it_is_silent_where_the_law_does_not_fly_and_of_an_axis_the_leg_holds():

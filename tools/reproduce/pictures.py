@@ -69,9 +69,7 @@ def circle_picture(flown: circle.Circles, path: Path) -> None:
     sheet = _figure(figsize=(4.0 * len(strengths), 8.0))
     for n, strength in enumerate(strengths):
         i = int(np.flatnonzero(flown.strengths == strength)[0])
-        north, east, down, leg = (
-            flown.result.column(name)[i] for name in ("true_x", "true_y", "true_depth", "leg")
-        )
+        north, east, down, leg = (flown.result.column(name)[i] for name in ("true_x", "true_y", "true_depth", "leg"))
         top = sheet.add_subplot(2, len(strengths), n + 1)
         space = sheet.add_subplot(2, len(strengths), len(strengths) + n + 1, projection="3d")
         for part, colour, name in (
