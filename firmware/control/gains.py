@@ -133,9 +133,8 @@ class Control(Table):
         return self.law_plus if self.controller == "law+" else self.law
 
 
-# The best-tuned PID: gains that track the paper's manoeuvres under noise best, whatever their margins.
-# First values, from a search over the Kalman filter as it was on 2026-11-21.
+# The best-tuned PID: gains that track the paper's manoeuvres under noise best, whatever their margins (docs/TUNING.md).
 BEST_TUNED = Control(
     pitch=PitchGains(kp=0.214, ki=0.0652, kd=0.279),
-    depth=DepthGains(kp=0.8, ki=0.1, kd=2.0),
+    depth=DepthGains(kp=0.949, ki=0.00112, kd=2.84),
 )

@@ -55,6 +55,7 @@ def tracking_picture(
         error.axvline(marked, color="#999999", lw=0.8, ls=":")
         error.axhline(tracking.PAPER_PID_ERROR, color="#999999", lw=0.8, ls=":")
     error.set_xscale("symlog", linthresh=0.003)
+    error.set_xlim(left=0.0)
     error.set_title("tracking error, % of target", fontsize=9)
     error.set_xlabel("noise, m/s2 and rad/s2", fontsize=8)
     error.tick_params(labelsize=7)
