@@ -4,6 +4,7 @@ from pathlib import Path
 
 import click
 
+from tools.cli.challenge import challenge
 from tools.cli.common import json_option, print_json, progress, say
 
 
@@ -86,3 +87,6 @@ def predict(run: Path, model: str, out: Path) -> None:
     predicted = predict_runs(case, load_model(model, case), [recorded])[0]
     write_run(out, as_run(recorded, predicted))
     say(f"predicted {recorded.rows} rows of {recorded.name} with {model}: {out}")
+
+
+gap.add_command(challenge)
