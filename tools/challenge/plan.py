@@ -41,12 +41,11 @@ class CasePlan:
 
 def _turns(rng: np.random.Generator, forms: tuple[Form, ...], count: int) -> list[tuple[Form, bool]]:
     """`count` forms, all as often as can be, each weak and strong in turn."""
-    found = []
-    while len(found) < count:
-        turn = len(found) // len(forms)
-        start = rng.random(len(forms)) < 0.5 if turn % 2 == 0 else ~start  # noqa: F821
-        for n in rng.permutation(len(forms)):
-            found.append((forms[n], bool(start[n])))
+    found: list[tuple[Form, bool]] = []
+    weak = np.zeros(len(forms), dtype=bool)
+    for turn in range(-(-count // len(forms))):
+        weak = rng.random(len(forms)) < 0.5 if turn % 2 == 0 else ~weak
+        found += [(forms[n], bool(weak[n])) for n in rng.permutation(len(forms))]
     return found[:count]
 
 
