@@ -7,7 +7,7 @@ import numpy as np
 from firmware.core.actuators import clip
 from firmware.core.jit import kernel
 from firmware.core.layout import N_P
-from firmware.core.rotations import euler_from_quaternion, rotation_nb
+from firmware.core.rotations import euler_from_quaternion, quaternion_from_euler, rotation_nb
 from sim_backend.core import foreign_layout as fo
 from sim_backend.core.foreign import foreign_step, gusts, settled
 from sim_backend.core.noise import gaussian, uniform
@@ -160,6 +160,16 @@ def fly_on(P, F, waves, seed, commands, X, first, last, Xw, Yw):
             for i in range(fo.N_FX):
                 Xw[n, row - first[n], i] = x[i]
             read_sensors(F, x, row * fo.ROW, Yw[n, row - first[n]])
+
+
+@kernel
+def start_from_readings(F, X, rows):
+    """Put depth and attitude of states X (rows, N_FX), in place, at what sensors under effects F make of them."""
+    y = np.empty(fo.N_R)
+    for i in rows:
+        read_sensors(F, X[i], i * fo.ROW, y)
+        X[i, 2] = y[fo.R_DEPTH]
+        X[i, 3], X[i, 4], X[i, 5], X[i, 6] = quaternion_from_euler(y[fo.R_ROLL], y[fo.R_PITCH], y[fo.R_YAW])
 
 
 @kernel

@@ -28,7 +28,9 @@ def evidence(trial: Trial, flights: list[Flight], F: np.ndarray, floor: dict[str
     def residual(shift: np.ndarray, effects: np.ndarray, plain: bool) -> np.ndarray:
         P = trial.P.copy()
         P[which] += sigma[which] * shift
-        return np.concatenate([_errors(flight, trial.predict(flight, P, effects, plain), floor) for flight in flights])
+        return np.concatenate(
+            [_errors(flight, trial.predict(flight, P, effects, plain, seen=plain), floor) for flight in flights]
+        )
 
     still = np.zeros(len(which))
     base = residual(still, trial.shapes, True)

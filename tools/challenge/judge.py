@@ -8,14 +8,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from tools.challenge.diagnosis import FILE, MODEL, TIMING, read_diagnosis
 from tools.challenge.score import Score, Scored, score
 from tools.challenge.seal import Answers, check_seal, folder_digest, open_answers, read_manifest
+from tools.challenge.trial import total
 from tools.errors import InputError
-from tools.gap.channels import CHANNELS
-from tools.gap.measure import run_gap
+from tools.gap.channels import measured as table
+from tools.gap.measure import root_mean_square, run_gap
 from tools.gap.windows import windows
 from tools.runs.run import Run, load_run
 
@@ -88,8 +87,6 @@ def _predicted(run: Path, model: str | Path, out: Path) -> Run:
 
 def run_total(measured: Run, predicted: Run) -> float:
     """Total gap of a prediction in run data: rms over its channels."""
-    from tools.gap.channels import measured as table
-
     return run_gap(measured, table(predicted), windows(measured.t)).total
 
 
@@ -119,14 +116,12 @@ def held_total(runs: list[Path], model: str | Path) -> float:
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "predicted.csv"
         totals = [run_total(load_run(path), _predicted(path, model, out)) for path in runs]
-    return float(np.sqrt(np.mean(np.square(totals))))
+    return root_mean_square(totals)
 
 
 def perfect_total(truth: dict[str, Any]) -> float:
     """A perfect model's total gap over the held runs."""
-    known = [channel.name for channel in CHANNELS]
-    runs = [[gap for name, gap in run.items() if name in known] for run in truth["oracle"][truth["runs"] :]]
-    return float(np.sqrt(np.mean([np.mean(np.square(gaps)) for gaps in runs])))
+    return total(truth["oracle"][truth["runs"] :])
 
 
 def judge(

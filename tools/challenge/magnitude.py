@@ -48,7 +48,7 @@ def visible(trial: Trial, form: Form, sizes: np.ndarray, strength: float) -> flo
     if form.scatter:
         calm = trial.fly(trial.shapes, FITTED)
         return perfect / total(trial.channels(calm, trial.P, trial.shapes, plain=False))
-    return total(trial.channels(flights, trial.P, trial.shapes, plain=True)) / perfect
+    return total(trial.channels(flights, trial.P, trial.shapes, plain=True, seen=True)) / perfect
 
 
 def find_strength(value: Callable[[float], float], target: float, most: float) -> float:
@@ -85,7 +85,7 @@ def measure(trial: Trial, form: Form, sizes: np.ndarray, strength: float) -> Mag
     F = with_effect(trial.shapes, form, sizes, strength)
     flights = trial.fly(F, FITTED)
     gaps = trial.channels(flights, trial.P, predictable(F), plain=False)
-    nominal = total(trial.channels(flights, trial.vehicle.vector(), trial.shapes, plain=True)) / total(gaps)
+    nominal = total(trial.channels(flights, trial.vehicle.vector(), trial.shapes, plain=True, seen=True)) / total(gaps)
     evidence = None if form.scatter else weigh(trial, flights[:WEIGHED], F, by_channel(gaps))
     return Magnitude(form, sizes, strength, seen, evidence, nominal)
 
@@ -121,4 +121,4 @@ def allowed(trial: Trial) -> float:
     """Gap of the nominal model over a perfect one's where there is no effect: what [uncertainty] does."""
     flights = trial.fly(trial.shapes, FITTED)
     perfect = total(trial.channels(flights, trial.P, trial.shapes, plain=False))
-    return total(trial.channels(flights, trial.vehicle.vector(), trial.shapes, plain=True)) / perfect
+    return total(trial.channels(flights, trial.vehicle.vector(), trial.shapes, plain=True, seen=True)) / perfect

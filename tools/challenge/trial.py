@@ -8,19 +8,19 @@ import numpy as np
 from firmware.core.layout import N_X, X_ACT
 from firmware.model.vehicle import Vehicle
 from sim_backend.core import foreign_layout as fo
-from sim_backend.core.foreign_flight import fly_foreign, fly_on, pose_rows
+from sim_backend.core.foreign_flight import fly_foreign, fly_on, pose_rows, start_from_readings
 from sim_backend.uncertainty import draw_parameters
 from sim_backend.world import sensor_errors
 from tools.challenge.design import STYLES, RunDesign, Site, draw_run, draw_runs
 from tools.challenge.forms import Form, draw_shapes, draw_waves
-from tools.gap.measure import run_gap
+from tools.gap.core.flights import N_Y
+from tools.gap.measure import root_mean_square, run_gap, wrap
 from tools.gap.windows import Window, windows
 from tools.runs import columns as names
 from tools.runs.run import Run
 
 EXTRA = 40  # rows flown past the end: a fast motion capture clock looks ahead
 TUMBLED_PITCH, TUMBLED_ROLL, TOO_FAST = 1.31, 1.57, 1.5  # rad, rad, m/s
-N_Y = 11
 
 
 @dataclass
@@ -28,6 +28,7 @@ class Flight:
     """One run flown: truth and record."""
 
     design: RunDesign
+    F: np.ndarray  # the effects it was flown with
     commands: np.ndarray  # (rows + EXTRA, 3)
     X: np.ndarray  # (rows + EXTRA, N_FX)
     run: Run
@@ -67,10 +68,10 @@ class Trial:
         places = (fo.R_SLIDER, fo.R_BALLAST, *range(7))
         columns |= {name: Y[: design.rows, place] for name, place in zip(order, places, strict=True)}
         for name in names.ATTITUDE:
-            columns[name] = _wrapped(columns[name])
+            columns[name] = wrap(columns[name])
         if self.site.mocap:
             columns |= self._mocap(F, number, X, design.rows)
-        return Flight(design, commands, X, Run(f"run{number:02d}", None, columns))
+        return Flight(design, F, commands, X, Run(f"run{number:02d}", None, columns))
 
     def _mocap(self, F: np.ndarray, number: int, X: np.ndarray, rows: int) -> dict[str, np.ndarray]:
         """Motion capture's columns: at its own time, with noise and short blind spells."""
@@ -78,15 +79,18 @@ class Trial:
         pose = mocap_pose(F, poses(X), np.arange(rows))
         sensors = self.vehicle.sensors
         pose[:, :3] += sensors.mocap_position.noise * rng.standard_normal((rows, 3))
-        pose[:, 3:] = _wrapped(pose[:, 3:] + sensors.mocap_attitude.noise * rng.standard_normal((rows, 3)))
+        pose[:, 3:] = wrap(pose[:, 3:] + sensors.mocap_attitude.noise * rng.standard_normal((rows, 3)))
         for first in np.flatnonzero(rng.random(rows) < 0.004):
             pose[first : first + rng.integers(1, 5)] = np.nan
         return dict(zip(names.MOCAP, pose.T, strict=True))
 
-    def predict(self, flight: Flight, P: np.ndarray, F: np.ndarray, plain: bool = False) -> np.ndarray:
+    def predict(
+        self, flight: Flight, P: np.ndarray, F: np.ndarray, plain: bool = False, seen: bool = False
+    ) -> np.ndarray:
         """The flight's windows flown on from the truth with another model, (rows, N_Y); plain: of nominal form.
 
-        A model of nominal form takes the slider to be where its wire is, and knows of nothing that effects remember.
+        A model of nominal form takes the slider to be where its wire is, and knows of nothing that effects remember;
+        seen: without motion capture it also starts at the depth and attitude that its sensors show, noise apart.
         """
         rows, found = flight.run.rows, [w for w in flight.windows if w.scored and w.start < w.end]
         truth = poses(flight.X)
@@ -98,6 +102,8 @@ class Trial:
         X, Xw, Yw = flight.X, np.zeros((len(found), longest, fo.N_FX)), np.zeros((len(found), longest, fo.N_R))
         if plain:
             X = X.copy()
+            if seen and not self.site.mocap:
+                start_from_readings(flight.F, X, first - 1)
             X[:, X_ACT + 1] -= X[:, fo.X_SLIDER_Z]
             X[:, N_X:] = 0.0
         fly_on(P, F, flight.design.waves, flight.design.seed, flight.commands, X, first, last, Xw, Yw)
@@ -105,18 +111,16 @@ class Trial:
             here = slice(window.start, window.end)
             Y[here, :9] = Yw[n, : window.end - window.start]
             if self.site.mocap:
-                seen = truth.copy()
-                seen[window.start : window.end + beyond] = poses(Xw[n, : last[n] - first[n]])
-                Y[here, 9:] = mocap_pose(F, seen, np.arange(window.start, window.end))[:, :2]
+                watched = truth.copy()
+                watched[window.start : window.end + beyond] = poses(Xw[n, : last[n] - first[n]])
+                Y[here, 9:] = mocap_pose(F, watched, np.arange(window.start, window.end))[:, :2]
         return Y
 
-    def channels(self, flights: list[Flight], P: np.ndarray, F: np.ndarray, plain: bool) -> list[dict[str, float]]:
+    def channels(
+        self, flights: list[Flight], P: np.ndarray, F: np.ndarray, plain: bool, seen: bool = False
+    ) -> list[dict[str, float]]:
         """Channel gaps of every flight for a model."""
-        return [run_gap(f.run, self.predict(f, P, F, plain), f.windows).channels for f in flights]
-
-
-def _wrapped(angles: np.ndarray) -> np.ndarray:
-    return (angles + np.pi) % (2.0 * np.pi) - np.pi
+        return [run_gap(f.run, self.predict(f, P, F, plain, seen), f.windows).channels for f in flights]
 
 
 def poses(X: np.ndarray) -> np.ndarray:
@@ -165,7 +169,7 @@ def flyable(flights: list[Flight], site: Site) -> bool:
         X = flight.X
         if not np.isfinite(X).all():
             return False
-        angles = np.abs(_wrapped(poses(X)[:, 3:5])).max(axis=0)
+        angles = np.abs(wrap(poses(X)[:, 3:5])).max(axis=0)
         low, high = site.limits
         if angles[0] > TUMBLED_ROLL or angles[1] > TUMBLED_PITCH or np.abs(X[:, 7:10]).max() > TOO_FAST:
             return False
@@ -176,12 +180,12 @@ def flyable(flights: list[Flight], site: Site) -> bool:
 
 def total(gaps: list[dict[str, float]]) -> float:
     """A case's total gap: rms over runs of the rms over channels."""
-    return float(np.sqrt(np.mean([np.mean(np.square(list(run.values()))) for run in gaps])))
+    return root_mean_square([root_mean_square(run.values()) for run in gaps])
 
 
 def by_channel(gaps: list[dict[str, float]]) -> dict[str, float]:
     """Each channel's rms over the runs."""
-    return {name: float(np.sqrt(np.mean([run[name] ** 2 for run in gaps]))) for name in gaps[0]}
+    return {name: root_mean_square([run[name] for run in gaps]) for name in gaps[0]}
 
 
 def with_effect(F: np.ndarray, form: Form, sizes: np.ndarray, strength: float) -> np.ndarray:
