@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tools.challenge.diagnosis import Diagnosis
+from tools.challenge.diagnosis import Cause, Diagnosis
 from tools.challenge.plan import NONE, PAIR, SINGLE, UNKNOWN
 
 LEAST_PROBABILITY = 1e-6  # what a cause without an entry counts as
@@ -68,17 +68,18 @@ class Scored:
     def called_unknown(self) -> bool:
         return self.verdict() == "unknown"
 
-    def _hedged(self) -> bool:
-        return self.said is None or len(self.said.causes[0].group) > LARGEST_GROUP
+    def _main(self) -> Cause | None:
+        """The most probable cause; None where nothing was said, or so large a group that nothing was."""
+        cause = None if self.said is None else self.said.causes[0]
+        return None if cause is None or len(cause.group) > LARGEST_GROUP else cause
 
     def first(self) -> bool:
-        return not self._hedged() and self.said.causes[0].label in self.answers  # type: ignore[union-attr]
+        cause = self._main()
+        return cause is not None and cause.label in self.answers
 
     def grouped(self) -> bool:
-        if self._hedged():
-            return False
-        cause = self.said.causes[0]  # type: ignore[union-attr]
-        return bool({cause.label, *cause.group} & set(self.answers))
+        cause = self._main()
+        return cause is not None and bool({cause.label, *cause.group} & set(self.answers))
 
     def first_three(self) -> bool:
         return self.said is not None and any(cause.label in self.answers for cause in self.said.causes[:3])
