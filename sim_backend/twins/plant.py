@@ -77,7 +77,10 @@ class TwinPlant:
 
     def imu(self) -> tuple[float, ...]:
         """Roll, pitch, yaw (rad), p, q, r (rad/s)."""
-        return tuple(self.world.frame[IMU + 2 : IMU + 8].tolist())
+        values = self.world.frame[IMU + 2 : IMU + 8].copy()
+        if not self.free:  # the stand holds it; what it would turn in one step is no motion
+            values[3:] -= self.world.x[X_NU + 3 : X_NU + 6]
+        return tuple(values.tolist())
 
     def pressure(self) -> tuple[float, float]:
         """Absolute pressure (Pa) and temperature (deg C)."""

@@ -10,7 +10,9 @@ import json
 import math
 import os
 import random
-from collections.abc import Callable
+import stat
+import sys
+from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from typing import Any
 
@@ -144,6 +146,8 @@ class TwinService:
 
     def _command(self, words: list[str]) -> str:
         verb, rest = words[0], words[1:]
+        if verb == "help":
+            return HELP
         if verb == "fault":
             self._fault(rest[0], parse_fault(" ".join(rest[1:])))
         elif verb == "pose":
@@ -192,17 +196,27 @@ class TwinService:
 
     async def obey_stdin(self, *, end_stops: bool, answer: Callable[[str], None] | None) -> None:
         """Commands from standard input; its end stops everything, if that is agreed."""
-        reader = asyncio.StreamReader()
-        with contextlib.suppress(ValueError, OSError):
-            await asyncio.get_running_loop().connect_read_pipe(
-                lambda: asyncio.StreamReaderProtocol(reader), os.fdopen(os.dup(0), "rb", 0)
-            )
-            while line := await reader.readline():
-                said = self.command(line.decode("utf-8", "replace")) if line.strip() else ""
-                if said and answer is not None:
-                    answer(said)
-            if end_stops:
-                self.stop()
+        async for line in _stdin_lines():
+            said = self.command(line.decode("utf-8", "replace")) if line.strip() else ""
+            if said and answer is not None:
+                answer(said)
+        if end_stops:
+            self.stop()
+
+
+async def _stdin_lines() -> AsyncIterator[bytes]:
+    """Standard input, line by line: a pipe or terminal as it comes, a file at once."""
+    kind = os.fstat(0).st_mode
+    if not (stat.S_ISFIFO(kind) or stat.S_ISSOCK(kind) or os.isatty(0)):
+        for line in sys.stdin.buffer:
+            yield line
+        return
+    reader = asyncio.StreamReader()
+    await asyncio.get_running_loop().connect_read_pipe(
+        lambda: asyncio.StreamReaderProtocol(reader), os.fdopen(os.dup(0), "rb", 0)
+    )
+    while line := await reader.readline():
+        yield line
 
 
 def replaced_ports(file: Any, folder: Path) -> Any:
