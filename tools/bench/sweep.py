@@ -14,6 +14,7 @@ import numpy as np
 
 REVERSALS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6)  # deg, mm
 REST_S = 1.0
+HOLD_S = 0.9  # at either end of a reversal
 UPDATE_S = 0.04  # between two targets of a ramp
 SHARE = 0.8  # of the way between the limits
 
@@ -83,8 +84,8 @@ def plan(low: float, high: float, speed: float) -> SweepPlan:
     go(middle, travel + REST_S)
     for size in REVERSALS:
         begin = now
-        go(middle + size, 2.0 * REST_S)
-        go(middle, 2.0 * REST_S)
+        go(middle + size, HOLD_S)
+        go(middle, HOLD_S)
         parts[f"reversal {size:g}"] = begin, now
     return SweepPlan(targets, parts)
 
@@ -156,8 +157,8 @@ def _dead_band(sweep: SweepPlan, t: np.ndarray, position: np.ndarray) -> float:
     largest = 0.0
     for size in REVERSALS:
         begin, end = sweep.parts[f"reversal {size:g}"]
-        out = position[(t > begin + 1.2 * REST_S) & (t < begin + 2.0 * REST_S)]
-        back = position[(t > end - 0.8 * REST_S) & (t < end)]
+        out = position[(t > begin + 0.6 * HOLD_S) & (t < begin + HOLD_S)]
+        back = position[(t > end - 0.4 * HOLD_S) & (t < end)]
         if len(out) > 3 and len(back) > 3 and abs(float(np.mean(out) - np.mean(back))) < 0.5 * size:
             largest = size
     return largest

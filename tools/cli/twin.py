@@ -29,9 +29,8 @@ def twin(board, vehicle, folder, seed, stand, faults, print_sim) -> None:
     from hal.board import BoardError
     from sim_backend.twins.boardfile import decode_twin_file, simulated_text
     from sim_backend.twins.service import TwinService, replaced_ports
-    from tools.bench.boardtext import set_ports
     from tools.compose import load_board_file
-    from tools.errors import InputError
+    from tools.errors import InputError, need
     from tools.sources import load_vehicle
 
     found = load_board_file(board)
@@ -41,6 +40,9 @@ def twin(board, vehicle, folder, seed, stand, faults, print_sim) -> None:
     if print_sim:
         click.echo(simulated_text(file), nl=False)
         return
+    need("tomlkit", extra="bench")
+    from tools.bench.boardtext import set_ports
+
     the_vehicle = load_vehicle(vehicle)
     folder = Path(tempfile.mkdtemp(prefix="glider-twin-")) if folder is None else folder
     folder.mkdir(parents=True, exist_ok=True)
