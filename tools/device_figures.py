@@ -115,8 +115,8 @@ def _quaternions(angles: np.ndarray) -> np.ndarray:
 
 # --- lateness -------------------------------------------------------------------------------------------------------
 @main.command("lateness")
-@click.option("--block", default=4.0, show_default=True, help="Seconds of a block; disturbed and not take turns.")
-@click.option("--turns", default=5, show_default=True, help="Blocks of each kind for each fault.")
+@click.option("--block", default=1.0, show_default=True, help="Seconds of a block; disturbed and not take turns.")
+@click.option("--turns", default=15, show_default=True, help="Blocks of each kind for each fault.")
 def lateness(block: float, turns: int) -> None:
     """The tick's lateness with one device disturbed over that of the undisturbed blocks between."""
     rows = measure_lateness(block, turns, FAULTS)
@@ -165,9 +165,9 @@ def _run_ticks(runtime: Any, channel: Any, ticks: int) -> np.ndarray:
 def _one_fault(
     board: Any, runtime: Any, channel: Any, device: str, fault: str, ticks: int, turns: int, advance: Any
 ) -> dict[str, Any]:
-    """Lateness (s) of disturbed and undisturbed blocks in turns; the first half second of each is not counted."""
+    """Lateness (s) of disturbed and undisturbed blocks in turns; the first 0.3 s of each are not counted."""
     late: dict[bool, list[np.ndarray]] = {False: [], True: []}
-    settle = round(0.5 / runtime.dt)
+    settle = round(0.3 / runtime.dt)
     for _ in range(turns):
         for disturbed in (False, True):
             board.control(f"fault {device} {fault if disturbed else 'none'}")

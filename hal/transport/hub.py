@@ -1,7 +1,7 @@
 """All lines served in the time that the loop has left: one `select`, bounded work, nothing ever waits for a device.
 
-A Link is a port with the handler that speaks its protocol: it reconnects by itself, and takes no more bytes between two
-ticks than twice what its speed can bring. The Hub serves all links until a deadline.
+A Link is a port with the handler that speaks its protocol: it reconnects by itself, and takes no more bytes than twice
+what its speed can bring in the time. The Hub serves all links until a deadline.
 """
 
 import contextlib
@@ -15,7 +15,7 @@ from hal.transport.port import SerialPort, Unplugged
 RETRY_S = 0.5  # between two tries to open a lost port
 OUT_LIMIT = 1024  # bytes on their way out, past which a line takes no more
 ABSENT_S = 0.2  # a hub that nobody ran for so long finds old bytes, and drops them
-SPARE = 256  # bytes a link may take between two ticks beside twice its line rate
+SPARE = 256  # bytes a link may take beside twice its line rate
 
 
 class LineHandler(Protocol):
@@ -130,17 +130,18 @@ class Hub:
     def __init__(self, links: Sequence[Link], now: Callable[[], float]):
         self.links = tuple(links)
         self._now = now
-        self._allowance = {id(link): SPARE for link in self.links}
+        self._period = 0.0
+        self._begun = 0.0
         self._served = math.inf
 
     def set_period(self, period: float) -> None:
-        """The time between two ticks, s: from it comes how many bytes a link may take in between."""
-        for link in self.links:
-            self._allowance[id(link)] = SPARE + int(0.2 * link.port.baud * period)
+        """The time between two ticks, s, in which bytes may have piled up."""
+        self._period = period
 
     def serve(self, until: float) -> None:
         """Serve all links until `until` (s on the board's clock), and once at least."""
-        absent = self._now() - self._served > ABSENT_S
+        self._begun = self._now()
+        absent = self._begun - self._served > ABSENT_S
         for link in self.links:
             link.spent = 0
             if absent:
@@ -160,7 +161,8 @@ class Hub:
 
     def _wait(self, seconds: float) -> None:
         """Wait for bytes or room for them, and take or send them."""
-        readers = [link for link in self.links if link.up and link.spent < self._allowance[id(link)]]
+        passed = self._now() - self._begun + self._period
+        readers = [link for link in self.links if link.up and link.spent < SPARE + 0.2 * link.port.baud * passed]
         writers = [link for link in self.links if link.up and link.waits_to_write]
         try:
             readable, writable, _ = select.select(
