@@ -229,8 +229,9 @@ def check(file: DeviceFile, source: str) -> None:
         users.setdefault(table.port, []).append(name)  # type: ignore[attr-defined]
     for port, names in users.items():
         alone = [name for name in names if name in ("imu", "servo")]
-        if alone and len(names) > 1:
-            raise ConfigError(source, f"shares port '{port}' with {', '.join(names)}", key=f"{alone[0]}.port")
+        others = [name for name in names if name != alone[0]] if alone else []
+        if others:
+            raise ConfigError(source, f"shares port '{port}' with {', '.join(others)}", key=f"{alone[0]}.port")
     for name in file.port:
         if name not in users:
             raise ConfigError(source, "no device is on it", key=f"port.{name}")

@@ -82,7 +82,7 @@ class Drive:
         self.health.error = self.fault = ""
         self.stalls = 0
         self._mover.clears = 0
-        self._watch.restart(math.nan, 0.0)
+        self._watch.forget(0.0)
 
     def age(self, now: float) -> None:
         """Say that the drive is gone once its position has not come for a while."""
@@ -139,13 +139,16 @@ class Drive:
     def _look(self, now: float) -> None:
         """Does it move where it was sent?"""
         assert self.target is not None
-        verdict = self._watch.look(self.target, self.measured(), now)
+        verdict = self._watch.look(self.target, self.position(), now)
+        wire = self._wire
+        if not verdict and wire is not None and wire.validity == Validity.VALID:
+            verdict = self._watch.compare(self.counts / self.table.counts_per_m, wire.values[0])
         if not verdict:
             return
         self.stalls += 1
         self._mover.stop_wanted = True
         self._mover.rest_until = now + REST_S
-        self._watch.restart(math.nan, now)
+        self._watch.forget(now)
         if verdict == "runs the wrong way" or self.stalls > STALL_TRIES:
             self._fail(now, verdict)
 
@@ -160,17 +163,26 @@ class Drive:
 
 
 class Watch:
-    """Sees a stall: a target away from the position, and no progress towards it."""
+    """Sees a stall: no progress towards a target that is away; or a drive that counts on while its wire stands.
+
+    The wire is judged by how far it moves, not by where it is: a wrong zero is no stall.
+    """
 
     def __init__(self, least_m: float, patience_s: float):
         self._least, self._patience = least_m, patience_s
         self._from, self._since, self._way = math.nan, 0.0, 0.0
+        self._mark = (math.nan, math.nan)
 
     def restart(self, position: float, now: float, way: float = 0.0) -> None:
         self._from, self._since, self._way = position, now, way
 
+    def forget(self, now: float) -> None:
+        """Begin anew, after a verdict or a reset."""
+        self.restart(math.nan, now)
+        self._mark = (math.nan, math.nan)
+
     def look(self, target: float, position: float, now: float) -> str:
-        """What is wrong, in words; empty while nothing is."""
+        """What is wrong with the drive's own progress, in words; empty while nothing is."""
         left = target - position
         way = 0.0 if abs(left) < self._least else math.copysign(1.0, left)
         progress = way * (position - self._from)
@@ -180,6 +192,17 @@ class Watch:
         if progress < -self._least:
             return "runs the wrong way"
         return "stalled" if now - self._since > self._patience else ""
+
+    def compare(self, counted: float, wire: float) -> str:
+        """What is wrong between the drive's way and its wire's, m; empty while nothing is."""
+        moved = counted - self._mark[0]
+        if abs(moved) < 2.0 * self._least:
+            return ""
+        shown = math.copysign(1.0, moved) * (wire - self._mark[1])
+        self._mark = (counted, wire)
+        if shown < -0.25 * abs(moved):
+            return "runs the wrong way"
+        return "stalled" if shown < 0.25 * abs(moved) else ""
 
 
 class Mover:

@@ -160,8 +160,9 @@ class DriveTwin(RegisterTwin):
         if address == word["auxiliary"] and values == [command["clear_alarm"]]:
             self.alarm = 0
         elif address == word["control"] and values == [command["quick_stop"]]:
-            self._target, self._going = self._profile, False
-            self._speed = 0.0
+            self._profile = self._target = self._counts()
+            self._speed, self._going = 0.0, False
+            self._plant.drive(self._index, self._plant.actuator(self._index))
         elif address == word["control"] and values == [command["set_zero"]]:
             self._shift(-self._counts())
             self._homed = True

@@ -244,6 +244,8 @@ async def _serve(config: dict) -> None:
 
 
 def main() -> None:
+    with contextlib.suppress(AttributeError, OSError):  # never at a flight's real-time priority
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
     line = b""
     while not line.endswith(b"\n"):  # unbuffered: what follows belongs to the commands
         byte = os.read(0, 1)

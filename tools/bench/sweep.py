@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 REVERSALS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6)  # deg, mm
-REST_S = 1.0
-HOLD_S = 0.9  # at either end of a reversal
+REST_S = 0.8
+HOLD_S = 0.7  # at either end of a reversal
 UPDATE_S = 0.04  # between two targets of a ramp
 SHARE = 0.8  # of the way between the limits
 

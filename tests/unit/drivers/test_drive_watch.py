@@ -49,6 +49,30 @@ def test_the_wrong_way_is_seen_as_soon_as_it_shows():
     assert verdicts == ["runs the wrong way"]
 
 
+def compare(watch, ways):
+    return [verdict for counted, wire in ways if (verdict := watch.compare(counted, wire))]
+
+
+def test_a_wire_that_goes_along_is_well_wherever_its_zero_is():
+    assert compare(Watch(0.002, 1.0), [(0.0005 * i, 0.03 + 0.00045 * i) for i in range(100)]) == []
+
+
+def test_a_wire_may_lag():
+    there = [0.0005 * i for i in range(60)]
+    places = [*there, *reversed(there)]
+    lagging = [places[max(i - 2, 0)] for i in range(len(places))]
+    assert compare(Watch(0.002, 1.0), list(zip(places, lagging, strict=True))) == []
+
+
+def test_a_wire_that_stands_while_the_drive_counts_is_a_stall():
+    assert compare(Watch(0.002, 1.0), [(0.0005 * i, 0.01) for i in range(10)]) == ["stalled"]
+
+
+def test_a_wire_that_goes_the_other_way_is_seen_within_twice_the_least_way():
+    verdicts = compare(Watch(0.002, 1.0), [(0.0005 * i, -0.0005 * i) for i in range(10)])
+    assert verdicts == ["runs the wrong way"]
+
+
 def test_limits_are_the_tighter_of_file_and_vehicle():
     item, _ = drive()
     assert item.limits == (-0.05, 0.04)
