@@ -20,7 +20,7 @@ from hal.ports import BoardError
 from sim_backend.twins.boardfile import TwinFile, decode_twin_file
 from sim_backend.twins.service import replaced_ports
 
-START_S = 60.0  # for the twins to be there, their kernels compiled
+START_S = 180.0  # for the twins to be there, their kernels compiled
 
 
 class TwinBoard(DeviceBoard):

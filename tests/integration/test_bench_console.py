@@ -1,5 +1,6 @@
 """The bench: typed at a terminal, from a pipe and a script, and what happens when it dies."""
 
+import json
 import os
 import signal
 import subprocess
@@ -159,3 +160,45 @@ def test_check_talks_to_every_device(twins):
     assert done.returncode == 1
     assert "model VN-100T-CR" in done.stdout
     assert "FAIL  beacon" in done.stdout
+
+
+def lead(twins, board, actuators):
+    """`glider check --signs` with a person who turns the stand when asked to; its findings."""
+    command = [sys.executable, "-m", "tools.cli.main", "check", "--board", str(board), "--signs", "--json"]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    process = subprocess.Popen(command, text=True, **pipes)
+    poses = {"level": "0 0 40 0.3", "nose by": "0 15 40 0.3", "side down": "15 0 40 0.3", "nose to": "0 0 55 0.3"}
+    poses["Lower"] = "0 0 40 0.4"
+    for line in process.stderr:
+        for asked, pose in poses.items():
+            if asked in line:
+                assert twins.tell(f"pose {pose}") == "ok"
+                time.sleep(0.15)
+        if line.strip():
+            process.stdin.write("yes\n" if actuators or "clear?" not in line else "no\n")
+            process.stdin.flush()
+        if "swing" in line or ("clear?" in line and not actuators):
+            break
+    output, _ = process.communicate(timeout=30)
+    twins.tell("pose 0 0 0 0.3")
+    return {item["check"]: item for item in json.loads(output)["findings"]}
+
+
+SIGNS = ("nose up", "roll to starboard", "turn to starboard", "deeper", "mass forward", "pump in", "servo to starboard")
+
+
+def test_check_leads_through_signs_and_axes(twins):
+    found = lead(twins, twins.board, actuators=True)
+    assert {name: found[name]["pass"] for name in SIGNS} == dict.fromkeys(SIGNS, True), found
+    assert "pitch +15" in found["nose up"]["message"]
+
+
+def test_check_finds_an_imu_that_looks_aft(twins, tmp_path):
+    wrong = tmp_path / "board.toml"
+    wrong.write_text(twins.board.read_text().replace("mount_deg = [0.0, 0.0, 0.0]", "mount_deg = [0.0, 0.0, 180.0]"))
+    found = lead(twins, wrong, actuators=False)
+    assert not found["nose up"]["pass"]
+    assert not found["roll to starboard"]["pass"]
+    assert found["turn to starboard"]["pass"]
+    assert "WRONG SIGN: see imu.mount_deg" in found["nose up"]["message"]
+    assert not found["calibration"]["pass"]
