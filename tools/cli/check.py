@@ -18,8 +18,8 @@ def check(vehicle: str, mission: str, board: str, signs: bool, as_json: bool) ->
     """Check vehicle, mission and board files, and that they go together.
 
     A board of devices (or of their twins) is talked to: every device says what it has, and its calibration is the one
-    that was accepted. With --signs a person helps: nose up, roll to starboard, mass forward, pump in. Of the law it says
-    whether its k2 covers the vehicle's [uncertainty] and [disturbance]; that it does not is a warning.
+    that was accepted. With --signs a person helps: nose up, roll to starboard, mass forward, pump in. Of the law it
+    says whether its k2 covers the vehicle's [uncertainty] and [disturbance]; that it does not is a warning.
 
     Exit code 0: all fit to fly with; 1: something is not; each finding in a line of its own.
     """
