@@ -34,7 +34,7 @@ def peak_rss_mb() -> float | None:
 @click.command()
 @click.option("--mission", default="sawtooth", show_default=True, help="Mission: shipped name or file.")
 @click.option("--vehicle", default="roughie", show_default=True, help="Vehicle: shipped name or file.")
-@click.option("--board", default="sim", show_default=True, help="Board: shipped name or file.")
+@click.option("--board", default="sim", show_default=True, help="Board: sim, twin or a board file.")
 @click.option("--log", "log_file", type=click.Path(path_type=Path), help="Log to write.  [default: MISSION-NNN.mcap]")
 @click.option("--no-log", is_flag=True, help="Record nothing.")
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Seed of everything random.")
