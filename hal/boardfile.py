@@ -36,7 +36,7 @@ class PortTable(Table):
 
     path: Name
     baud: Annotated[int, msgspec.Meta(ge=1200, le=1_000_000)] = 115_200
-    timeout_s: Annotated[float, msgspec.Meta(gt=0.0, le=1.0)] = 0.03
+    timeout_s: Annotated[float, msgspec.Meta(gt=0.0, le=1.0)] = 0.05
     longest_s: Annotated[float, msgspec.Meta(gt=0.0, le=2.0)] = 0.1
 
 

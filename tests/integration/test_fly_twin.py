@@ -97,3 +97,15 @@ def test_a_tick_on_devices_gains_no_memory():
         tracemalloc.stop()
     finally:
         board.close()
+
+
+def test_a_board_that_does_not_arm_says_why_in_a_line_and_leaves_no_log(tmp_path):
+    """The example is nobody's vehicle: nobody has looked its calibration through."""
+    import subprocess
+
+    command = [sys.executable, "-m", "tools.cli.main", "fly", "--board", "roughie"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 1
+    assert "not armed: roughie (shipped): never calibrated" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert list(tmp_path.iterdir()) == []

@@ -15,6 +15,7 @@ from tools.errors import InputError
 
 BEAT_S = 0.5
 THERE, STANDS = 0.3, 0.03  # mm from the goal; mm in 0.1 s
+PATIENCE_S = 1.0  # with a device that does not answer, before a move is given up
 SERVO_S = 0.5  # for the servo to get anywhere
 
 
@@ -30,6 +31,7 @@ class Bench:
         self._process: subprocess.Popen[bytes] | None = None
         self._lock = threading.Lock()
         self._closing = threading.Event()
+        self._trouble_since: dict[str, float] = {}
 
     # --- the process ------------------------------------------------------------------------------------------------
     def __enter__(self) -> "Bench":
@@ -126,6 +128,15 @@ class Bench:
         value = item.get("measured", item["target"] or 0.0)
         return from_port(name, value, state["kg_per_m"])
 
+    def raise_trouble(self, name: str, item: dict) -> None:
+        """BenchError for a fault that stays, at once, and for any other trouble that has lasted PATIENCE_S."""
+        now = time.monotonic()
+        if not item["error"]:
+            self._trouble_since.pop(name, None)
+        elif item.get("fault") or now - self._trouble_since.setdefault(name, now) > PATIENCE_S:
+            self._trouble_since.pop(name, None)
+            raise BenchError(f"{name}: {item['error']}")
+
     def wait_there(self, name: str, goal: float, timeout_s: float, interrupted: Any = None) -> bool:
         """Until the actuator is at its goal (deg, mm) or stands; False where it did not get there."""
         end, before = time.monotonic() + timeout_s, math.inf
@@ -135,8 +146,7 @@ class Bench:
                 raise BenchError("stopped")
             state = self.snapshot()
             item = state["actuators"][name]
-            if item["error"]:
-                raise BenchError(f"{name}: {item['error']}")
+            self.raise_trouble(name, item)
             if name == "servo":
                 time.sleep(SERVO_S)
                 return True

@@ -200,10 +200,11 @@ class Commands:
                 if self.pressed():
                     self.bench.stop()
                     raise BenchError("stopped")
-                error = self.bench.snapshot()["actuators"][actuator]["error"]
-                if error:
+                try:
+                    self.bench.raise_trouble(actuator, self.bench.snapshot()["actuators"][actuator])
+                except BenchError:
                     self.bench.stop()
-                    raise BenchError(f"{actuator}: {error}")
+                    raise
                 time.sleep(0.1)
         finally:
             rows = self.bench.ask("record", on=False)

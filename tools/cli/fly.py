@@ -1,5 +1,6 @@
 """`glider fly`: one mission, in simulation or on a board."""
 
+import contextlib
 import math
 import signal
 import time
@@ -84,7 +85,12 @@ def fly(mission, vehicle, board, log_file, no_log, seed, realtime, effects, as_j
 
     before = signal.signal(signal.SIGINT, on_interrupt)
     try:
-        with recorder, progress(f"flying {flight.mission.name}", len(flight.mission.leg)) as advance:
+        flight.board.open()  # what does not arm leaves no log
+        with (
+            contextlib.closing(flight.board),
+            recorder,
+            progress(f"flying {flight.mission.name}", len(flight.mission.leg)) as advance,
+        ):
             timing, seconds = _run(flight, recorder, realtime, advance)
             report = recorder.close(ending={"ended": flight.autopilot.mode, "reason": flight.autopilot.reason})
     except KeyboardInterrupt:
@@ -126,11 +132,10 @@ def device_summary(health) -> dict:
 
 
 def _run(flight, recorder, realtime, advance):
-    """Open, arm, fly, disarm; returns the timing and the flight's length in s."""
+    """Arm, fly, disarm; returns the timing and the flight's length in s."""
     from firmware.core.control_layout import LEG
     from tools.compose import build_runtime
 
-    flight.board.open()
     runtime = build_runtime(flight, recorder)
     simulated = not realtime and hasattr(flight.board, "world")
     done = 0
@@ -146,9 +151,10 @@ def _run(flight, recorder, realtime, advance):
 
     try:
         runtime.arm()
+        began = runtime.deadline
         timing = runtime.run(on_second=on_second)
         advance(len(flight.mission.leg) - done)
-        return timing, flight.board.clock.now()
+        return timing, flight.board.clock.now() - began
     finally:
         runtime.disarm()
         flight.board.close()
