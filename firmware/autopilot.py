@@ -75,11 +75,12 @@ def configuration(
     C[layout.MISSION_TIME_LIMIT] = mission.time_limit_s
     C[layout.ESTIMATOR] = ESTIMATORS[control.estimator]
     C[layout.CONTROLLER] = CONTROLLERS[control.controller]
-    C[layout.FORM] = layout.PAPER if control.law.form == "paper" else layout.EXACT
-    C[layout.OBSERVER_SHARE] = control.law.observer_share
-    for name, law in (("PITCH", control.law.pitch), ("DEPTH", control.law.depth)):
+    law = control.law_flown
+    C[layout.FORM] = layout.PAPER if law.form == "paper" else layout.EXACT
+    C[layout.OBSERVER_SHARE] = law.observer_share
+    for name, table in (("PITCH", law.pitch), ("DEPTH", law.depth)):
         for gain in ("k1", "k2", "k3", "eps"):
-            C[getattr(layout, f"{name}_{gain.upper()}")] = getattr(law, gain)
+            C[getattr(layout, f"{name}_{gain.upper()}")] = getattr(table, gain)
     for gain in ("roughness", "pitch", "depth"):
         for edge in ("on", "off"):
             C[getattr(layout, f"HYBRID_{gain}_{edge}".upper())] = getattr(control.hybrid, f"{gain}_{edge}")

@@ -49,9 +49,7 @@ class Runtime:
         self._clock = board.clock
         frame = autopilot.frame
         self._reads = tuple(
-            (port.read, frame[slot.all])
-            for name, slot in SLOTS.items()
-            if (port := getattr(board, name)) is not None
+            (port.read, frame[slot.all]) for name, slot in SLOTS.items() if (port := getattr(board, name)) is not None
         )
         self._send = (board.servo.command, board.slider.command, board.ballast.command)
         self._edges = HISTOGRAM_EDGES[1:-1].tolist()
@@ -64,9 +62,7 @@ class Runtime:
         rehearsal = copy.deepcopy(self.autopilot)
         rehearsal.tick(0.0)
         scratch = np.zeros(record.N_RECORD)
-        record.fill_record(
-            rehearsal.frame, rehearsal.est, rehearsal.ap, rehearsal.commands, 0.0, 0.0, 0.0, scratch
-        )
+        record.fill_record(rehearsal.frame, rehearsal.est, rehearsal.ap, rehearsal.commands, 0.0, 0.0, 0.0, scratch)
         freeze_kernels()
         gc.collect()
         gc.freeze()

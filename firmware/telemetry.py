@@ -56,6 +56,18 @@ _FIELDS = (
     ("sd_pitch_rad", "rad", "1 sigma of the estimated pitch"),
     ("sd_u_m_s", "m/s", "1 sigma of the estimated surge"),
     ("roughness", "1", "disturbance seen over the one in the vehicle file, 1 or more"),
+    (
+        "k2_need_pitch_m",
+        "m",
+        "k2 of pitch that covers one sigma of [uncertainty] and the disturbance seen; NaN: no law",
+    ),
+    ("k2_need_depth_kg", "kg", "k2 of depth, likewise"),
+    (
+        "margin_pitch_rad_s2",
+        "rad/s2",
+        "by how much V of pitch is sure to fall, over |s|; not positive: nothing is sure",
+    ),
+    ("margin_depth_m_s2", "m/s2", "V of depth, likewise"),
 )
 
 TICK = RecordSpec(

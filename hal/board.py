@@ -20,6 +20,7 @@ class BoardRequest:
     seed: int = 0
     realtime: bool = False
     site_depth: float = 0.0  # m; 0: unknown
+    water_density: float = 998.2  # kg/m3, by which net ballast mass is plunger travel
     effects: dict[str, dict[str, float]] = field(default_factory=dict)
 
 

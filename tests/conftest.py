@@ -6,7 +6,7 @@ import pytest
 
 
 def pytest_addoption(parser):
-    parser.addoption("--board", default="sim", help="the board that the contract tests run on: shipped name or file")
+    parser.addoption("--board", help="run the contract tests on this board alone: shipped name or file")
 
 
 ROOT = Path(__file__).resolve().parents[1]

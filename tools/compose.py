@@ -8,6 +8,9 @@ from typing import Annotated, Any
 import msgspec
 
 from firmware.autopilot import Autopilot, configuration
+from firmware.control.cover import Cover, k2_cover
+from firmware.control.gains import Control
+from firmware.core.seawater import water_density
 from firmware.guidance.mission import Mission
 from firmware.model.strict import ConfigError
 from firmware.model.vehicle import Vehicle
@@ -44,18 +47,32 @@ class Flight:
     autopilot: Autopilot
     texts: dict[str, str]
 
+    @property
+    def cover(self) -> tuple[Cover, Cover]:
+        """The law's k2 of pitch and depth against what this vehicle's [uncertainty] asks for."""
+        return k2_cover(self.vehicle, self.control)
+
+    @property
+    def control(self) -> Control:
+        """The gains that count: the mission's, else the vehicle's, else the defaults."""
+        return self.mission.control or self.vehicle.control or Control()
+
 
 def load_board_file(wanted: str) -> BoardFile:
     """A board by shipped name ("sim") or path."""
     from firmware.model.strict import decode
 
-    shipped = files("sim_backend").joinpath("boards", f"{wanted}.toml")
-    if shipped.is_file():
-        text, source = shipped.read_text(encoding="utf-8"), f"{wanted} (shipped)"
+    folders = [files("sim_backend").joinpath("boards"), files("hal").joinpath("boards")]
+    shipped = [file for folder in folders if (file := folder.joinpath(f"{wanted}.toml")).is_file()]
+    if shipped and "/" not in wanted:
+        text, source = shipped[0].read_text(encoding="utf-8"), f"{wanted} (shipped)"
     elif Path(wanted).is_file():
         text, source = read_text(Path(wanted)), wanted
     else:
-        raise InputError(f"no board '{wanted}': neither a file nor one of {', '.join(board_kinds())}")
+        names = sorted(
+            entry.name.removesuffix(".toml") for folder in folders for entry in folder.iterdir() if "." in entry.name
+        )
+        raise InputError(f"no board '{wanted}': neither a file nor one of {', '.join(names)}")
     kind = decode(text, BoardKind, source).kind
     if kind not in board_kinds():
         raise ConfigError(source, f"no board of kind '{kind}'; installed: {', '.join(board_kinds())}", key="kind")
@@ -99,7 +116,8 @@ def build_flight(
     board_file = load_board_file(board)
     request = BoardRequest(
         text=board_file.text, source=board_file.source, vehicle=the_vehicle, seed=seed, realtime=realtime,
-        site_depth=the_mission.site.depth_m, effects=effects or {},
+        site_depth=the_mission.site.depth_m, water_density=water_density(0.0, 20.0, the_mission.site.salinity),
+        effects=effects or {},
     )  # fmt: skip
     the_board: Any = board_builder(board_file.kind)(request)
     C = configuration(
@@ -122,8 +140,6 @@ def load_vehicle_text(wanted: str) -> tuple[str, Vehicle]:
 def log_metadata(flight: Flight, *, seed: int, effects: dict[str, dict[str, float]]) -> dict[str, str]:
     """What a log says of itself; what the simulation hides from the vehicle is not in it, but for the seed."""
     from importlib.metadata import version
-
-    from firmware.core.seawater import water_density
 
     site = flight.mission.site
     return {

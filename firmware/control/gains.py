@@ -92,12 +92,22 @@ class HybridTable(Table):
 
 
 class Law(Table):
-    """[control.law]: gains of both axes, the form of the model, and law+'s share of the observed model error."""
+    """[control.law] and [control.law_plus]: gains of both axes, the form of the model, the share of the observed error.
 
-    pitch: LawGains = LawGains(k1=0.8, k2=0.004, k3=0.8, eps=0.1)
-    depth: LawGains = LawGains(k1=0.17, k2=0.05, k3=0.95, eps=0.14)
+    Defaults by a search over the paper's pitch manoeuvres and rough water (docs/TUNING.md).
+    """
+
+    pitch: LawGains = LawGains(k1=1.55, k2=0.0045, k3=0.8, eps=0.1)
+    depth: LawGains = LawGains(k1=0.2, k2=0.05, k3=0.9, eps=0.14)
     form: Literal["exact", "paper"] = "exact"
     observer_share: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)] = 1.0
+
+
+class LawPlus(Law):
+    """[control.law_plus]: what braking lets law+ afford."""
+
+    pitch: LawGains = LawGains(k1=1.5, k2=0.008, k3=1.8, eps=0.1)
+    depth: LawGains = LawGains(k1=0.6, k2=0.05, k3=0.8, eps=0.2)
 
 
 class Control(Table):
@@ -110,16 +120,21 @@ class Control(Table):
     estimator: Literal["measured", "filter"] = "filter"
     controller: Literal["pid", "law", "hybrid", "law+"] = "pid"
     law: Law = Law()
+    law_plus: LawPlus = LawPlus()
     hybrid: HybridTable = HybridTable()
 
     def __post_init__(self):
         if self.controller != "pid" and self.estimator == "measured":
             raise ValueError(f"controller {self.controller!r} needs body velocities: estimator = 'filter'")
 
+    @property
+    def law_flown(self) -> Law:
+        """The law's gains under this controller."""
+        return self.law_plus if self.controller == "law+" else self.law
 
-# The best-tuned PID: gains that track the paper's manoeuvres under noise best, whatever their margins.
-# First values, from a search over the Kalman filter as it was on 2026-11-21.
+
+# The best-tuned PID: gains that track the paper's manoeuvres under noise best, whatever their margins (docs/TUNING.md).
 BEST_TUNED = Control(
-    pitch=PitchGains(kp=0.207, ki=0.0483, kd=0.296),
-    depth=DepthGains(kp=0.8, ki=0.1, kd=2.0),
+    pitch=PitchGains(kp=0.214, ki=0.0652, kd=0.279),
+    depth=DepthGains(kp=0.949, ki=0.00112, kd=2.84),
 )

@@ -7,6 +7,7 @@ import math
 
 from firmware.core import control_layout as at
 from firmware.core.control import limited
+from firmware.core.coverage import forget_coverage, watch
 from firmware.core.estimator_layout import S_ANGULAR, S_LINEAR
 from firmware.core.guidance import follow, sequence
 from firmware.core.jit import kernel
@@ -67,6 +68,7 @@ def tick(P, C, legs, frame, est, ap, nav, cmd, t):
         servo, slider, ballast = ap[at.SENT_SERVO], ap[at.SENT_SLIDER], ap[at.SENT_BALLAST]
     else:
         servo, slider, ballast = 0.0, P[SLIDER_MIN], P[BALLAST_MIN]
+    watch(P, C, legs, nav, est, ap, t)
     limit_commands(P, ap, servo, slider, ballast, C[at.DT], cmd)
 
 
@@ -82,3 +84,4 @@ def reset(est, ap, nav):
     ap[at.MODE] = at.WAITING
     ap[at.REACHED] = -1.0
     ap[at.ACTIVE_SINCE] = -math.inf
+    forget_coverage(ap)

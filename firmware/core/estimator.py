@@ -321,9 +321,7 @@ def estimator_predict(P, settings, sigma, x, cov, stress, mode, c_servo, c_slide
 
 
 @kernel
-def estimator_step(
-    P, settings, sigma, x, cov, stress, mode, c_servo, c_slider, c_ballast, dt, z, beyond, scores, work
-):
+def estimator_step(P, settings, sigma, x, cov, stress, mode, c_servo, c_slider, c_ballast, dt, z, beyond, scores, work):
     """One step of the filter: dt (s) under the commands in force, then the measurements z at its end."""
     estimator_predict(P, settings, sigma, x, cov, stress, mode, c_servo, c_slider, c_ballast, dt, work)
     estimator_update(P, settings, x, cov, stress, z, beyond, scores, dt, work)

@@ -18,21 +18,21 @@ N_MOVING = E_ACT  # rows of the linearised flight's matrix A: position, attitude
 N_COUPLED = E_ERR  # its columns: what they hang on
 
 # --- z: what is measured --------------------------------------------------------------------------------------------
-Z_ROLL, Z_PITCH, Z_YAW = 0, 1, 2                    # rad
-Z_P, Z_Q, Z_R = 3, 4, 5                             # rad/s
-Z_DEPTH, Z_SLIDER, Z_BALLAST = 6, 7, 8              # m, m, kg
-Z_MOCAP_X, Z_MOCAP_Y, Z_MOCAP_Z = 9, 10, 11         # m, NED
+Z_ROLL, Z_PITCH, Z_YAW = 0, 1, 2  # rad
+Z_P, Z_Q, Z_R = 3, 4, 5  # rad/s
+Z_DEPTH, Z_SLIDER, Z_BALLAST = 6, 7, 8  # m, m, kg
+Z_MOCAP_X, Z_MOCAP_Y, Z_MOCAP_Z = 9, 10, 11  # m, NED
 Z_MOCAP_ROLL, Z_MOCAP_PITCH, Z_MOCAP_YAW = 12, 13, 14
 N_Z = 15
 
 # --- settings: spectral densities (variance per second), times, biases, and the measurements' variances -------------
-S_LINEAR, S_ANGULAR = 0, 1                          # (m/s2)2 s, (rad/s2)2 s
-S_SERVO, S_SLIDER, S_BALLAST = 2, 3, 4              # rad2/s, m2/s, kg2/s
-S_SPEED_ERROR = 5                                   # (share of an actuator's speed that may be wrong)2 s
-S_ERROR_TIME = 6                                    # s
-S_SLIDER_BIAS, S_BALLAST_BIAS = 7, 8                # variances: m2, kg2
-S_GYRO, S_WATER = 9, 10                             # (rad/s)2/s, (m/s)2/s
-S_R = 11                                            # N_Z variances
+S_LINEAR, S_ANGULAR = 0, 1  # (m/s2)2 s, (rad/s2)2 s
+S_SERVO, S_SLIDER, S_BALLAST = 2, 3, 4  # rad2/s, m2/s, kg2/s
+S_SPEED_ERROR = 5  # (share of an actuator's speed that may be wrong)2 s
+S_ERROR_TIME = 6  # s
+S_SLIDER_BIAS, S_BALLAST_BIAS = 7, 8  # variances: m2, kg2
+S_GYRO, S_WATER = 9, 10  # (rad/s)2/s, (m/s)2/s
+S_R = 11  # N_Z variances
 N_S = S_R + N_Z
 
 # mode, a sum: actuators that are not known to follow a command but move at a given speed (0 where nothing is known)
@@ -41,6 +41,7 @@ FRESH = 8  # in that sum too: linearise at every sub-step and hold nothing, wher
 
 # --- constants ------------------------------------------------------------------------------------------------------
 MAX_STEP = 0.02  # s
+DISTURBANCE_HOLD = 0.1  # s; held that long, an acceleration a is white noise of spectral density a^2 DISTURBANCE_HOLD
 HOLD, HOLD_ERROR = 0.1, 0.2  # s, for which equation (1) linearised and the covariance of the model's error serve,
 MOVED_SHARE, MOVED_RATE = 0.015, 0.025  # of the speed, and rad/s: past such a change they do not
 GATE = 5.0  # sigma

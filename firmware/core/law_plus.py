@@ -1,17 +1,15 @@
-"""What the law's actuator-aware version, `law+`, has beside the law: how far an actuator gets, and an observer.
+"""What the law's actuator-aware version, `law+`, has beside the law: how far an actuator gets, and how it brakes.
 
-law+ is pitch_depth_law with the bounds of `reach` over a short horizon (the slider's time constant and a tick), with
-jerk = SHARE |g| rate of the axis' actuator, and with the observed disturbance added to f. The observer is driven by
-where the actuators are, not by where they should be: a saturated actuator is in the model, and since the law itself
-integrates nothing, nothing winds up.
+law+ is pitch_depth_law with the bounds of `reach` over a short horizon (the slider's time constant and a tick) and with
+jerk = SHARE |g| rate of the axis' actuator.
 
-The estimator's own accelerations of model error (x[X_ERR:]) may take the observer's place: `on_outputs` turns them into
-the two axes.
+Both law and law+ have a disturbance observer: the estimator's own accelerations of model error (x[X_ERR:]), which
+`on_outputs` turns into the two axes, are added to f. The filter is driven by where the actuators are, not by where they
+should be: a saturated actuator is in the model, and since the law itself integrates nothing, nothing winds up.
 """
 
 import math
 
-from firmware.core.actuators import clip
 from firmware.core.input_forms import level
 from firmware.core.jit import kernel
 
@@ -29,21 +27,6 @@ def reach(position, low, high, rate, time_constant, horizon):
     share, travel = 1.0 - math.exp(-horizon / time_constant), rate * horizon
     down, up = max(-travel, share * min(low - position, 0.0)), min(travel, share * max(high - position, 0.0))
     return position + down, position + up
-
-
-@kernel
-def observe(estimate, rate, rate_before, modelled, bandwidth, bound, dt):
-    """Acceleration that the form does not explain, rad/s2 or m/s2, within +-bound: x_dd - (f + G u) through a low pass.
-
-    rate, rate_before: theta_dot or Z_dot now and dt ago; modelled: f + G u in between, with u where the actuators were.
-    bandwidth in rad/s. A constant d is found as 1 - exp(-bandwidth t); of a changing one |d_dot|/bandwidth is missed.
-    What is not finite leaves the estimate as it is.
-    """
-    share = 1.0 - math.exp(-bandwidth * dt)
-    found = estimate + share * ((rate - rate_before) / dt - modelled - estimate)
-    if not math.isfinite(found):
-        return estimate
-    return clip(found, -bound, bound)
 
 
 @kernel

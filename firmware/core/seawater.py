@@ -42,9 +42,5 @@ def water_density(gauge_pressure, temperature_c, salinity):
         + S * (2.2838e-3 + T * (-1.0981e-5 - T * 1.6078e-6))
         + 1.91075e-4 * S * root
     )
-    B = (
-        8.50935e-5
-        + T * (-6.12293e-6 + T * 5.2787e-8)
-        + S * (-9.9348e-7 + T * (2.0816e-8 + T * 9.1697e-10))
-    )
+    B = 8.50935e-5 + T * (-6.12293e-6 + T * 5.2787e-8) + S * (-9.9348e-7 + T * (2.0816e-8 + T * 9.1697e-10))
     return rho / (1.0 - p / (bulk + p * (A + p * B)))

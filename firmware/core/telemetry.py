@@ -12,7 +12,8 @@ DEPTH_EST, DEPTH_RATE, REFERENCES, INTEGRATORS = 13, 14, 15, 21
 MODE_, LEG_, REASON_, LATENESS, DURATION = 23, 24, 25, 26, 27
 DENSITY, PRESSURE, TEMPERATURE, SAMPLE_TIMES = 28, 29, 30, 31
 ESTIMATE, SPREADS = 35, 48
-N_RECORD = 52
+COVERAGE = 52
+N_RECORD = 56
 
 
 @kernel
@@ -58,3 +59,4 @@ def fill_record(frame, est, ap, cmd, t, lateness, duration, out):
     for i in range(4):
         out[ESTIMATE + 9 + i] = est[at.EST_X + i]
         out[SPREADS + i] = est[at.SD_DEPTH_RATE + i]
+        out[COVERAGE + i] = ap[at.K2_NEED_PITCH + i]

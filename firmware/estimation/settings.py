@@ -6,8 +6,6 @@ from firmware.core import estimator_layout as est
 from firmware.core import layout
 from firmware.model.vehicle import COEFFICIENTS, DisturbanceTable, SensorsTable, UncertaintyTable
 
-DISTURBANCE_HOLD = 0.1  # s; held that long, an acceleration a is white noise of spectral density a^2 DISTURBANCE_HOLD
-
 # Errors of parameters stay, but the accelerations they cause turn with the flight: with each dive, climb or turn.
 ERROR_TIME = 10.0  # s
 # Nothing in a vehicle file says how far actuators are from their model: a tenth of the way they go in a second, and
@@ -49,8 +47,8 @@ def parameter_sigma(P: np.ndarray, uncertainty: UncertaintyTable) -> np.ndarray:
 def estimator_settings(sensors: SensorsTable, disturbance: DisturbanceTable, mode: int = 0) -> np.ndarray:
     """The settings vector of firmware/core/estimator, shape (N_S,); `mode` says which actuators are not commanded."""
     S = np.zeros(est.N_S)
-    S[est.S_LINEAR] = disturbance.linear**2 * DISTURBANCE_HOLD
-    S[est.S_ANGULAR] = disturbance.angular**2 * DISTURBANCE_HOLD
+    S[est.S_LINEAR] = disturbance.linear**2 * est.DISTURBANCE_HOLD
+    S[est.S_ANGULAR] = disturbance.angular**2 * est.DISTURBANCE_HOLD
     S[est.S_SERVO] = (UNSEEN_SERVO_WALK if mode & est.SERVO_DRIVEN else SERVO_WALK) ** 2
     S[est.S_SLIDER] = SLIDER_WALK**2
     S[est.S_BALLAST] = BALLAST_WALK**2

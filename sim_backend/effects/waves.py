@@ -7,6 +7,7 @@ import numpy as np
 
 from sim_backend.core.noise import uniform
 from sim_backend.effects.base import Effect, Parameter
+
 STREAM_WAVES = 900
 wave_row = None
 

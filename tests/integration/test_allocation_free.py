@@ -6,6 +6,7 @@ from numba import njit
 from numba.core.runtime import _nrt_python, rtsys
 
 from firmware.core import autopilot as core
+from firmware.core import control_layout as at
 from firmware.core.telemetry import N_RECORD, fill_record
 from tools.benchmark.allocations import BOXED, largest_block
 from tools.benchmark.tick import harness, measure_tick
@@ -101,11 +102,30 @@ def _allocations(function) -> int:
     return rtsys.get_allocation_stats().alloc - before
 
 
-def test_the_compiled_tick_allocates_nothing():
+LAW_FLIES = """
+format = 1
+name = "deep"
+time_limit_s = 86400.0
+[site]
+name = "deep water"
+depth_m = 900.0
+[[leg]]
+depth_m = 800.0
+pitch_deg = -25.0
+time_limit_s = 80000.0
+[control]
+controller = "{}"
+"""
+
+
+@pytest.mark.parametrize("controller", ["pid", "law", "law+", "hybrid"])
+def test_the_compiled_tick_allocates_nothing(controller):
     """Numba's own counter: a thousand ticks inside one compiled call cost what one does (the call's own arguments)."""
-    with harness() as flown:
+    with harness(LAW_FLIES.format(controller)) as flown:
         flown.run(50)
         pilot = flown.runtime.autopilot
+        law_at_work = pilot.ap[at.LAW_RAN] == 1.0 and np.isfinite(pilot.ap[at.MARGIN_DEPTH])
+        assert law_at_work == (controller != "pid")
         arguments = (pilot.P, pilot.C, pilot.legs, pilot.frame, pilot.est, pilot.ap)
         arguments += (pilot.nav, pilot.commands, np.zeros(N_RECORD))
         _many_ticks(1, *arguments)

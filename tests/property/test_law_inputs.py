@@ -1,4 +1,4 @@
-"""What the law makes of whatever comes in: inputs within reach, the observer, flags in place of commands."""
+"""What the law makes of whatever comes in: inputs within reach, flags in place of commands."""
 
 import math
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from law_flights import SLIDER, advance, down, form_at, outputs
+from law_flights import SLIDER, down, form_at
 from law_states import flying, gains, unit
 from model_states import HIGH, LOW, RATE, TAU, P, repeatable, state
 
@@ -15,7 +15,7 @@ from firmware.core.actuators import actuator_rate
 from firmware.core.control import limited
 from firmware.core.input_forms import exact_form, paper_form
 from firmware.core.law import NOT_FINITE, OK, STEEP, axis_demand, k2_by_29, k2_to_cover, pitch_depth_law, solve_inputs
-from firmware.core.law_plus import observe, reach
+from firmware.core.law_plus import reach
 
 
 @repeatable
@@ -53,35 +53,6 @@ def test_no_command_takes_an_actuator_out_of_reach(where, command, horizon, whic
     # and the command that asks for most gets most of the way there
     if command == 1.0:
         assert position - begin >= 0.6 * (most - begin) - slack
-
-
-@repeatable
-@given(st.floats(-0.05, 0.05), st.floats(0.2, 2.0), st.floats(-0.3, 0.3))
-def test_observer_finds_a_constant_disturbance_at_its_bandwidth(d, bandwidth, modelled):
-    rate, estimate, dt = 0.2, 0.0, 0.02
-    for k in range(1, 301):
-        before, rate = rate, rate + dt * (modelled + d)
-        estimate = observe(estimate, rate, before, modelled, bandwidth, 0.1, dt)
-        assert estimate == pytest.approx(d * (1.0 - math.exp(-bandwidth * k * dt)), abs=1e-10)
-    assert observe(0.0, 5.0, 0.0, 0.0, bandwidth, 0.1, dt) == 0.1
-    assert observe(estimate, math.nan, rate, modelled, bandwidth, 0.1, dt) == estimate
-
-
-def test_observer_does_not_wind_up_behind_an_actuator_at_its_stop():
-    """Slider at its end and a pitch wanted that it cannot hold: the observer finds the disturbance, not the failure."""
-    x, work, acc = state((0.0, -0.3, 0.0), (0.3, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, HIGH[1], 0.1)), np.zeros((5, 16)), 0.02
-    estimate, dt = 0.0, 0.02
-    disturbance = np.array([0.0, 0.0, 0.0, 0.0, acc, 0.0])
-    for _ in range(400):
-        before, modelled = outputs(x)[1], pitch_model(x)
-        advance(P, x, (0.0, 1.0, 0.1), disturbance, dt, work)
-        estimate = observe(estimate, outputs(x)[1], before, 0.5 * (modelled + pitch_model(x)), 1.0, 0.1, dt)
-    assert estimate == pytest.approx(acc, abs=2e-4)
-
-
-def pitch_model(x: np.ndarray) -> float:
-    f_t, _, g_ts, g_tb, _, _ = form_at(P, x)
-    return f_t + g_ts * x[SLIDER] + g_tb * x[SLIDER + 1]
 
 
 # --- whatever comes in ----------------------------------------------------------------------------------------------

@@ -33,7 +33,7 @@ from firmware.core.actuators import actuator_rates
 from firmware.core.control import limited, roll_law
 from firmware.core.input_forms import exact_form, paper_form
 from firmware.core.law import decrease_margin, k2_to_cover
-from firmware.core.law_plus import SHARE, observe, on_outputs
+from firmware.core.law_plus import SHARE, on_outputs
 from firmware.core.rotations import euler_from_quaternion
 from firmware.estimation.settings import parameter_sigma
 from firmware.model.vehicle import decode_vehicle
@@ -134,7 +134,6 @@ MODERATE = Gains(0.8, 0.01, 0.8, 0.1), Gains(0.3, 0.05, 0.4, 0.05)
 FAST = Gains(1.5, 0.02, 2.0, 0.05), Gains(0.5, 0.2, 1.0, 0.03)
 SUB_STEPS = 4  # plant steps in a tick
 LEGS = ((0.0, -0.5, 4.0, 0.0), (30.0, 0.5, 1.0, 0.4))  # from s, pitch rad, depth m, roll rad
-OBSERVER_BANDWIDTH, OBSERVER_BOUND = 0.5, 0.1  # rad/s; rad/s2 and m/s2
 
 
 @dataclass
@@ -171,7 +170,7 @@ class Watch:
 
 
 def real_flight(
-    law: Law, seed: int, *, observer=False, form=exact_form, strength=0.003, watch=None,
+    law: Law, seed: int, *, form=exact_form, strength=0.003, watch=None,
     seconds=60.0, missed=(0.0, 0.0),
 ):  # fmt: skip
     """Pitch and depth errors tick by tick, (n, 2), and commands, (n, 3), of a dive and a climb of 30 s each.
@@ -185,7 +184,7 @@ def real_flight(
     work = np.zeros((5, layout.N_X))
     x = state(nu=(0.2, 0.0, 0.0, 0.0, 0.0, 0.0), position=(0.0, 0.0, 1.0))
     references = Reference(-missed[0]), Reference(1.0 - missed[1])
-    command, found, before = np.zeros(3), np.zeros(2), None
+    command = np.zeros(3)
     errors, commands = [], []
     for tick in range(round(seconds / TICK)):
         if tick % 5 == 0:
@@ -193,18 +192,9 @@ def real_flight(
         _, pitch, depth, roll = [leg for leg in LEGS if leg[0] <= tick * TICK + 1e-9][-1]
         references = references[0].step(pitch, 0.4, TICK), references[1].step(depth, 0.1, TICK)
         speeds = actuator_rates(P, *x[layout.X_ACT :], *command)
-        theta, theta_rate, Z, Z_rate = outputs(x)
-        f_t, f_z, *G = form_at(law.vehicle, x, speeds, form)
-        modelled = np.array([f_t, f_z]) + np.reshape(G, (2, 2)) @ x[SLIDER:]
-        if observer and before is not None:
-            for axis, rate in enumerate((theta_rate, Z_rate)):
-                between = 0.5 * (before[1][axis] + modelled[axis])
-                found[axis] = observe(
-                    found[axis], rate, before[0][axis], between, OBSERVER_BANDWIDTH, OBSERVER_BOUND, TICK
-                )
-        before = (theta_rate, Z_rate), modelled
+        theta, _, Z, _ = outputs(x)
         try:
-            inputs = law(x, references, speeds, found, form)[0]
+            inputs = law(x, references, speeds, form=form)[0]
         except NoInputs:
             inputs = command[1:]
         rolled = euler_from_quaternion(*x[3:7])[0]
@@ -247,12 +237,10 @@ VARIANTS = {
     "moderate, present": (MODERATE, dict(counting_on="present"), {}),
     "moderate, present, paper form": (MODERATE, dict(counting_on="present"), dict(form=paper_form)),
     "moderate, reach": (MODERATE, dict(counting_on="reach"), {}),
-    "moderate, law+": (MODERATE, dict(counting_on="reach", share=SHARE), dict(observer=True)),
-    "moderate, law+, paper form": (
-        MODERATE, dict(counting_on="reach", share=SHARE), dict(observer=True, form=paper_form)
-    ),
+    "moderate, law+": (MODERATE, dict(counting_on="reach", share=SHARE), {}),
+    "moderate, law+, paper form": (MODERATE, dict(counting_on="reach", share=SHARE), dict(form=paper_form)),
     "fast, present": (FAST, dict(counting_on="present"), {}),
-    "fast, law+": (FAST, dict(counting_on="reach", share=SHARE), dict(observer=True)),
+    "fast, law+": (FAST, dict(counting_on="reach", share=SHARE), {}),
 }  # fmt: skip
 
 
@@ -287,12 +275,6 @@ def test_gains_past_the_actuators_lose_the_vehicle_and_law_plus_keeps_it(figures
     assert figures["fast, present"][0] > 0.2
     assert figures["fast, law+"][0] < 0.02
     assert figures["fast, law+"][1] < 0.05
-
-
-def test_observer_takes_the_final_error_away(figures):
-    without, plus = figures["moderate, reach"], figures["moderate, law+"]
-    assert (plus[2:4] < 0.5 * without[2:4]).all()
-    assert (plus[:2] < 1.15 * without[:2]).all()
 
 
 def test_paper_form_costs_the_law_tracking_of_pitch(figures):

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from firmware.control.gains import Control, HybridTable
 from firmware.core import control_layout as at
@@ -69,6 +71,41 @@ def test_a_switch_is_bumpless_where_the_water_is_calm():
     for i in np.flatnonzero(np.diff(rows[:, 1]) != 0.0):
         around = np.abs(np.diff(slider[max(i - 50, 0) : i])).max(initial=0.0)
         assert abs(slider[i + 1] - slider[i]) <= around + 1e-4
+
+
+switches = st.lists(st.integers(1, 400), min_size=1, max_size=8)  # ticks from one to the next
+
+
+@settings(deadline=None, derandomize=True, max_examples=25)
+@given(switches, st.sampled_from([at.LAW, at.LAW_PLUS]), st.floats(0.0, 0.1), st.integers(0, 1000))
+def test_a_switch_at_any_moment_sends_on_what_was_sent(gaps, law_kind, noise, seed):
+    """Whatever the water and the moment, either way: the first command of the other controller is the last of the one.
+
+    Where integrator or bump would have to be larger than the actuator's range, it is within rate and range only.
+    """
+    flight = build_flight(mission="sawtooth", seed=seed)
+    world, pilot = flight.board.world, flight.autopilot
+    world.E[6] = world.E[7] = noise
+    limit = pilot.P[list(RATES.values())] * 0.02
+    moments, kinds = set(np.cumsum(gaps)), (at.PID, law_kind)
+    seen = 0
+    for tick in range(int(np.sum(gaps)) + 5):
+        if tick in moments:
+            pilot.C[at.CONTROLLER] = kinds[seen % 2 == 0]
+            seen += 1
+        before = pilot.commands.copy()
+        world.advance(0.02 * tick)
+        pilot.frame[...] = world.frame
+        sent = pilot.tick(0.02 * tick)
+        world.cmd[...] = sent
+        assert (np.abs(sent - before) <= limit * (1 + 1e-9)).all()
+        if tick in moments and pilot.mode == "flying":
+            most = 0.98 * pilot.P[[layout.SLIDER_MAX, layout.BALLAST_MAX]]
+            left = pilot.ap[[at.BUMP_SLIDER, at.BUMP_BALLAST]]
+            whole = (np.abs(pilot.ap[[at.INT_PITCH, at.INT_DEPTH]]) < most) & (np.abs(left) < most)
+            step = np.abs(sent - before)[1:]
+            assert (step[whole] <= 0.02 * limit[1:][whole]).all()
+    assert seen == len(moments)
 
 
 @pytest.mark.parametrize("controller", [at.LAW, at.LAW_PLUS])

@@ -1,20 +1,29 @@
 """`glider check`: are the files of a flight fit to fly with?"""
 
+import sys
+from dataclasses import asdict
+
 import click
 
-from tools.cli.common import DONE, FAILED, json_option, print_json
+from tools.cli.common import DONE, FAILED, json_option, print_json, say
 
 
 @click.command()
 @click.option("--vehicle", default="roughie", show_default=True, help="Vehicle: shipped name or file.")
 @click.option("--mission", default="sawtooth", show_default=True, help="Mission: shipped name or file.")
 @click.option("--board", default="sim", show_default=True, help="Board: shipped name or file.")
+@click.option("--signs", is_flag=True, help="Lead through signs and axes of a board's devices, step by step.")
 @json_option
-def check(vehicle: str, mission: str, board: str, as_json: bool) -> None:
+def check(vehicle: str, mission: str, board: str, signs: bool, as_json: bool) -> None:
     """Check vehicle, mission and board files, and that they go together.
+
+    A board of devices (or of their twins) is talked to: every device says what it has, and its calibration is the one
+    that was accepted. With --signs a person helps: nose up, roll to starboard, mass forward, pump in. Of the law it
+    says whether its k2 covers the vehicle's [uncertainty] and [disturbance]; that it does not is a warning.
 
     Exit code 0: all fit to fly with; 1: something is not; each finding in a line of its own.
     """
+    from firmware.control.cover import Cover
     from firmware.core.jit import CACHE_DIR
     from firmware.model.strict import ConfigError
     from hal.ports import BoardError
@@ -23,6 +32,7 @@ def check(vehicle: str, mission: str, board: str, as_json: bool) -> None:
     from tools.sources import load_mission, load_vehicle
 
     findings: list[dict] = []
+    covers: list[Cover] = []
 
     def look(name: str, work) -> bool:
         try:
@@ -49,16 +59,55 @@ def check(vehicle: str, mission: str, board: str, as_json: bool) -> None:
 
     def see_all() -> str:
         flight = build_flight(mission=mission, vehicle=vehicle, board=board)
-        return f"a loop of {flight.board.loop_hz:g} Hz"
+        covers.extend(flight.cover)
+        return f"a loop of {flight.board.loop_hz:g} Hz, controller {flight.control.controller}"
 
     good = [look("vehicle", see_vehicle), look("mission", see_mission), look("board", see_board)]
     if all(good):
         good.append(look("together", see_all))
+    for cover in covers:  # a warning at most: the law flies all the same, only that V falls is then not promised
+        finding = {"check": "law", "pass": True, "warning": not cover.covered, "message": str(cover)}
+        findings.append({**finding, **asdict(cover)})
+    if all(good) and load_board_file(board).kind != "sim":
+        found = talk(board, vehicle, signs)
+        findings += found
+        good += [finding["pass"] for finding in found]
     kernels = "plain Python (GLIDER_JIT=0)" if CACHE_DIR is None else str(CACHE_DIR)
     findings.append({"check": "kernels", "pass": True, "message": f"compiled into {kernels}"})
     if as_json:
         print_json({"pass": all(good), "findings": findings})
     else:
         for finding in findings:
-            click.echo(f"{'ok  ' if finding['pass'] else 'FAIL'}  {finding['check']:<9} {finding['message']}")
+            word = "FAIL" if not finding["pass"] else "warn" if finding.get("warning") else "ok  "
+            click.echo(f"{word}  {finding['check']:<12} {finding['message']}")
     raise SystemExit(DONE if all(good) else FAILED)
+
+
+def talk(board: str, vehicle: str, signs: bool) -> list[dict]:
+    """Findings of a board's devices; ports are given back and actuators stopped before this returns."""
+    from hal.boardfile import DeviceFile, calibration_hash, decode_device_file
+    from sim_backend.twins.boardfile import decode_twin_file
+    from tools.bench.client import Bench, BenchError
+    from tools.bench.signs import Finding, Signs, look
+    from tools.compose import load_board_file
+
+    found = load_board_file(board)
+    read = decode_twin_file if found.kind == "twin" else decode_device_file
+    file: DeviceFile = read(found.text, found.source)
+    accepted = file.calibration == calibration_hash(file)
+    said = "as accepted" if accepted else "not the one accepted, or never accepted; see glider bench, `accept`"
+    items = [Finding("calibration", accepted, said)]
+    try:
+        with Bench(found.text, found.source, found.kind, vehicle, None) as bench:
+            items += look(bench)
+            if signs:
+                items += Signs(bench, say, _ask).run()
+    except BenchError as error:
+        items.append(Finding("devices", False, str(error)))
+    return [{"check": item.check, "pass": item.passed, "message": item.message} for item in items]
+
+
+def _ask(question: str) -> str:
+    """A person's answer, or the next line of a pipe."""
+    click.echo(question, err=True, nl=sys.stdin.isatty() is False)
+    return sys.stdin.readline().strip()

@@ -1,5 +1,6 @@
 """`glider fly`: one mission, in simulation or on a board."""
 
+import contextlib
 import math
 import signal
 import time
@@ -7,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from tools.cli.common import DONE, FAILED, json_option, print_json, progress, say
+from tools.cli.common import DONE, FAILED, fail, json_option, print_json, progress, say
 
 ROOM = 512  # records on their way to the disk, past which a simulated flight waits
 
@@ -34,7 +35,7 @@ def peak_rss_mb() -> float | None:
 @click.command()
 @click.option("--mission", default="sawtooth", show_default=True, help="Mission: shipped name or file.")
 @click.option("--vehicle", default="roughie", show_default=True, help="Vehicle: shipped name or file.")
-@click.option("--board", default="sim", show_default=True, help="Board: shipped name or file.")
+@click.option("--board", default="sim", show_default=True, help="Board: sim, twin or a board file.")
 @click.option("--log", "log_file", type=click.Path(path_type=Path), help="Log to write.  [default: MISSION-NNN.mcap]")
 @click.option("--no-log", is_flag=True, help="Record nothing.")
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Seed of everything random.")
@@ -58,6 +59,10 @@ def fly(mission, vehicle, board, log_file, no_log, seed, realtime, effects, as_j
         )
     except BoardError as error:
         raise InputError(str(error), source=board) from None
+    if flight.control.controller != "pid":
+        for axis in flight.cover:
+            if not axis.covered:
+                say(f"warning: {axis}")
     specs = record_specs(flight)
     path = None if no_log else (log_file or next_log(flight.mission.name))
     if path is not None and path.exists():
@@ -80,11 +85,18 @@ def fly(mission, vehicle, board, log_file, no_log, seed, realtime, effects, as_j
 
     before = signal.signal(signal.SIGINT, on_interrupt)
     try:
-        with recorder, progress(f"flying {flight.mission.name}", len(flight.mission.leg)) as advance:
+        flight.board.open()  # what does not arm leaves no log
+        with (
+            contextlib.closing(flight.board),
+            recorder,
+            progress(f"flying {flight.mission.name}", len(flight.mission.leg)) as advance,
+        ):
             timing, seconds = _run(flight, recorder, realtime, advance)
             report = recorder.close(ending={"ended": flight.autopilot.mode, "reason": flight.autopilot.reason})
     except KeyboardInterrupt:
         raise click.Abort from None
+    except BoardError as error:
+        fail(f"glider: {board}: not armed: {error}")
     finally:
         signal.signal(signal.SIGINT, before)
     completed = flight.autopilot.mode == "completed" and flight.autopilot.surfaced
@@ -102,6 +114,10 @@ def fly(mission, vehicle, board, log_file, no_log, seed, realtime, effects, as_j
         "peak_rss_mb": peak_rss_mb(),
         "records": {"written": report.written, "dropped": report.dropped, "complete": report.complete},
     }
+    if hasattr(flight.board, "health"):
+        result["devices"] = {name: device_summary(health) for name, health in flight.board.health().items()}
+    if hasattr(flight.board, "state"):
+        result["truth"] = flight.board.state()
     if as_json:
         print_json(result)
     else:
@@ -109,13 +125,19 @@ def fly(mission, vehicle, board, log_file, no_log, seed, realtime, effects, as_j
     raise SystemExit(DONE if completed else FAILED)
 
 
+def device_summary(health) -> dict:
+    """A device's counts and what has changed about it."""
+    counts = {name: getattr(health, name) for name in ("samples", "unfit", "timeouts", "exceptions", "damaged")}
+    return {**counts, "error": health.error, "notes": [note for _, note in health.notes]}
+
+
 def _run(flight, recorder, realtime, advance):
-    """Open, arm, fly, disarm; returns the timing and the flight's length in s."""
+    """Arm, fly, disarm; returns the timing and the flight's length in s."""
     from firmware.core.control_layout import LEG
     from tools.compose import build_runtime
 
-    flight.board.open()
     runtime = build_runtime(flight, recorder)
+    simulated = not realtime and hasattr(flight.board, "world")
     done = 0
 
     def on_second(t: float) -> None:
@@ -124,14 +146,15 @@ def _run(flight, recorder, realtime, advance):
         if leg > done:
             advance(leg - done)
             done = leg
-        while not realtime and recorder.health().pending > ROOM and recorder.health().alive:
+        while simulated and recorder.health().pending > ROOM and recorder.health().alive:
             time.sleep(0.001)  # simulated time is quicker than a disk
 
     try:
         runtime.arm()
+        began = runtime.deadline
         timing = runtime.run(on_second=on_second)
         advance(len(flight.mission.leg) - done)
-        return timing, flight.board.clock.now()
+        return timing, flight.board.clock.now() - began
     finally:
         runtime.disarm()
         flight.board.close()
@@ -151,6 +174,9 @@ def _tell(result: dict) -> None:
     say(f"rms against the reference: {', '.join(parts)}")
     if result["missed_ticks"]:
         say(f"{result['missed_ticks']} of {result['ticks']} ticks missed")
+    for name, device in result.get("devices", {}).items():
+        if device["notes"]:
+            say(f"{name}: {'; '.join(device['notes'])}")
     if not result["records"]["complete"]:
         say(f"the log is not complete: {result['records']['dropped']} records dropped")
     if result["log"]:

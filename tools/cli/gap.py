@@ -4,6 +4,7 @@ from pathlib import Path
 
 import click
 
+from tools.cli.challenge import challenge
 from tools.cli.common import json_option, print_json, progress, say
 
 
@@ -106,3 +107,6 @@ def diagnose(case: Path, out: Path, as_json: bool) -> None:
     if as_json:
         print_json(plain(found))
     say(f"answer: {out / 'diagnosis.json'}")
+
+
+gap.add_command(challenge)

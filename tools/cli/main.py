@@ -12,6 +12,8 @@ COMMANDS = {
     "fly": ("tools.cli.fly", "fly", "fly a mission, in simulation or on a board"),
     "missions": ("tools.cli.missions", "missions", "list the missions"),
     "check": ("tools.cli.check", "check", "check vehicle, board and mission files"),
+    "bench": ("tools.cli.bench", "bench", "bench console: read, jog, sweep, calibrate a board's devices"),
+    "twin": ("tools.cli.twin", "twin", "twins of a board's devices on virtual serial ports"),
     "log": ("tools.cli.log", "log", "export, look into or repair an onboard log"),
     "import": ("tools.cli.import_", "import_", "bring other recordings into run data"),
     "gap": ("tools.cli.gap", "gap", "measure and predict: where simulation and sea disagree"),

@@ -14,8 +14,14 @@ from tools.gap.model import Model
 from tools.sources import read_text
 
 BIASES = ("roll", "pitch", "yaw", "p", "q", "r", "depth", "slider", "ballast")
-NAMES = {name.lower(): getattr(layout, name) for name in dir(layout) if name.isupper() and isinstance(getattr(layout, name), int)}
-PARAMETERS = {name: index for name, index in NAMES.items() if not name.startswith(("n_", "x_pos", "x_quat", "x_nu", "x_act"))}
+NAMES = {
+    name.lower(): getattr(layout, name)
+    for name in dir(layout)
+    if name.isupper() and isinstance(getattr(layout, name), int)
+}
+PARAMETERS = {
+    name: index for name, index in NAMES.items() if not name.startswith(("n_", "x_pos", "x_quat", "x_nu", "x_act"))
+}
 Finite = Annotated[float, msgspec.Meta(ge=-1e6, le=1e6)]
 
 
@@ -61,7 +67,9 @@ def load_corrected(path: Path | str, nominal: Model) -> Model:
     return Model(source, P, nominal.sigma, F)
 
 
-def corrected_text(vehicle: str, nominal: np.ndarray, P: np.ndarray, F: np.ndarray, effects: dict[str, dict[str, float]]) -> str:
+def corrected_text(
+    vehicle: str, nominal: np.ndarray, P: np.ndarray, F: np.ndarray, effects: dict[str, dict[str, float]]
+) -> str:
     """The text of a corrected.toml: what differs from the nominal P (N_P), biases out of F, and effects by label."""
     lines = [
         "# A corrected model: the nominal vehicle, its parameters refitted within their uncertainty, effects added.",
@@ -75,7 +83,7 @@ def corrected_text(vehicle: str, nominal: np.ndarray, P: np.ndarray, F: np.ndarr
     by_index: dict[int, str] = {}
     for name, index in PARAMETERS.items():
         by_index.setdefault(index, name)
-    lines += [f"{by_index[int(i)]} = {float(P[i])!r}" for i in np.flatnonzero(P != nominal)]
+    lines += [f"{by_index[int(i)]} = {float(P[i])!r}" for i in np.flatnonzero(nominal != P)]
     lines += ["", "[bias]  # of what is read, SI, rad"]
     lines += [f"{name} = {float(F[ef.BIAS + n])!r}" for n, name in enumerate(BIASES) if F[ef.BIAS + n] != 0.0]
     for label, values in effects.items():

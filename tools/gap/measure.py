@@ -56,9 +56,7 @@ def run_gap(run: Run, Y: np.ndarray, listed: list[Window], table: np.ndarray | N
     `table` (rows, N_Y or more) stands in the place of what the run measured.
     """
     rows, table = scored_rows(listed, run.rows), measured(run) if table is None else table
-    squares = {
-        channel.name: mean_square(channel, errors(channel, table, Y)[rows]) for channel in channels_of(run)
-    }
+    squares = {channel.name: mean_square(channel, errors(channel, table, Y)[rows]) for channel in channels_of(run)}
     gaps = {name: float(np.sqrt(value)) for name, value in squares.items() if np.isfinite(value)}
     return RunGap(run.name, gaps, root_mean_square(gaps.values()), sum(window.scored for window in listed))
 

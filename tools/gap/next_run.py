@@ -125,5 +125,11 @@ def propose(search: Search) -> tuple[dict, str]:
     for _ in range(best.count):
         text += LEG.format(depth=deep, pitch=-best.pitch, roll=best.roll[0], ballast=best.ballast)
         text += LEG.format(depth=1.0, pitch=best.pitch, roll=best.roll[1], ballast=-best.ballast)
-    entry = {"manoeuvre": best.name, "description": best.text, "parts": names, "distance": apart, "mission": "next_run.toml"}
+    entry = {
+        "manoeuvre": best.name,
+        "description": best.text,
+        "parts": names,
+        "distance": apart,
+        "mission": "next_run.toml",
+    }
     return entry, text

@@ -5,11 +5,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from firmware.core.layout import X_ACT
+from sim_backend.core import effect_layout as ef
 from tools.gap import start
 from tools.gap.channels import INSTEAD, ONBOARD
 from tools.gap.core.flights import N_EXTRAS, N_Y, fly_windows, observe_rows
 from tools.gap.model import Model
-from sim_backend.core import effect_layout as ef
 from tools.gap.windows import Window, windows
 from tools.runs import columns as names
 from tools.runs.case import Case

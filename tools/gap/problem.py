@@ -94,7 +94,6 @@ class Problem:
             out.append(E[:, self.valid])
         return np.concatenate(out)
 
-
     def part(self, run: int) -> "Problem":
         """One of its runs as a problem of its own."""
         r = self.recording
@@ -161,7 +160,9 @@ def pose(case: Case, model: Model | None = None, runs: list[Run] | None = None) 
         driven = recording.drawn[recording.bounds[n] : recording.bounds[n + 1]]
         z[recording.bounds[n] : recording.bounds[n + 1], ef.Y_SLIDER : ef.Y_BALLAST + 1][np.isfinite(driven)] = np.nan
     d = case.disturbance
-    spectral = np.array([*3 * [d.linear**2 * DISTURBANCE_HOLD], *3 * [d.angular**2 * DISTURBANCE_HOLD], *walk, *3 * [0.0]])
+    spectral = np.array(
+        [*3 * [d.linear**2 * DISTURBANCE_HOLD], *3 * [d.angular**2 * DISTURBANCE_HOLD], *walk, *3 * [0.0]]
+    )
     run_of = np.repeat(np.arange(count), np.diff(recording.bounds))
     R = recording.settings[:, est.S_R :].copy()
     return Problem(case, model, runs, recording, z, starts, spreads, spectral, R, np.isfinite(z), run_of)

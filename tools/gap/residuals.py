@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
-from sim_backend.core import effect_layout as ef
 from tools.gap.problem import Gains, Problem
 
 CHANNELS = (
@@ -68,7 +67,9 @@ def tests(problem: Problem, gains: Gains) -> list[Finding]:
         filled = np.where(ok, e, 0.0)
         found.append(Finding(channel, "variance", float(((filled**2).sum() - count) / np.sqrt(2.0 * count))))
         # mean of each run: N(0, 1) each
-        means = [filled[a:b].sum() / np.sqrt(max(1, ok[a:b].sum())) for a, b in zip(bounds[:-1], bounds[1:], strict=True)]
+        means = [
+            filled[a:b].sum() / np.sqrt(max(1, ok[a:b].sum())) for a, b in zip(bounds[:-1], bounds[1:], strict=True)
+        ]
         found.append(Finding(channel, "mean", chi(np.array(means))))
         for low, high in LAGS:
             z = np.array([lagged(filled, ok, bounds, lag) for lag in range(low, high + 1)])

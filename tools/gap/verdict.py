@@ -53,7 +53,9 @@ def drop(search: Search, course: Course, label: str) -> Course:
     if not labels:
         return search.null
     keep = np.array([f.label != label for f in course.free])
-    less = search.fitter.course(labels, [f for f in course.free if f.label != label], course.values[keep], course.allowed)
+    less = search.fitter.course(
+        labels, [f for f in course.free if f.label != label], course.values[keep], course.allowed
+    )
     search.fitter.measure([less])
     settle(search.fitter, less, 4)
     search.courses.append(less)
@@ -204,7 +206,19 @@ def conclude(search: Search, noise: Probed | None = None) -> Answer:
     if noise is not None:
         selected, groups = [main, *selected], {main: [main]}
     return Answer(
-        search, selected, top, chances, groups, course, search.null, findings, unclean, unexplained, gained, freed, noise
+        search,
+        selected,
+        top,
+        chances,
+        groups,
+        course,
+        search.null,
+        findings,
+        unclean,
+        unexplained,
+        gained,
+        freed,
+        noise,
     )
 
 
@@ -226,5 +240,6 @@ def grouped(logs: dict[str, float]) -> dict[str, list[str]]:
     """For every label, those whose evidence these data cannot part from its own."""
     labels = sorted(logs, key=lambda name: -logs[name])
     return {
-        label: [label, *(o for o in labels if o != label and abs(logs[o] - logs[label]) < TIE)][:MOST_GROUP] for label in labels
+        label: [label, *(o for o in labels if o != label and abs(logs[o] - logs[label]) < TIE)][:MOST_GROUP]
+        for label in labels
     }

@@ -55,6 +55,7 @@ def tracking_picture(
         error.axvline(marked, color="#999999", lw=0.8, ls=":")
         error.axhline(tracking.PAPER_PID_ERROR, color="#999999", lw=0.8, ls=":")
     error.set_xscale("symlog", linthresh=0.003)
+    error.set_xlim(left=0.0)
     error.set_title("tracking error, % of target", fontsize=9)
     error.set_xlabel("noise, m/s2 and rad/s2", fontsize=8)
     error.tick_params(labelsize=7)
@@ -69,9 +70,7 @@ def circle_picture(flown: circle.Circles, path: Path) -> None:
     sheet = _figure(figsize=(4.0 * len(strengths), 8.0))
     for n, strength in enumerate(strengths):
         i = int(np.flatnonzero(flown.strengths == strength)[0])
-        north, east, down, leg = (
-            flown.result.column(name)[i] for name in ("true_x", "true_y", "true_depth", "leg")
-        )
+        north, east, down, leg = (flown.result.column(name)[i] for name in ("true_x", "true_y", "true_depth", "leg"))
         top = sheet.add_subplot(2, len(strengths), n + 1)
         space = sheet.add_subplot(2, len(strengths), len(strengths) + n + 1, projection="3d")
         for part, colour, name in (

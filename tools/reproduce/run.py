@@ -17,6 +17,14 @@ def counted(figure: tracking.Figure) -> tuple[float, ...]:
     return tracking.BIG if figure is tracking.FIG5 else tuple(target for target in figure.targets if target)
 
 
+def groups(figure: tracking.Figure) -> dict[str, tuple[float, ...]]:
+    """Targets that are compared together, by name."""
+    if figure is tracking.FIG5:
+        return {"45 deg": (45.0, -45.0), "30 and 45 deg": tracking.BIG}
+    changes = counted(figure)
+    return {"changes": changes, "ascents": tuple(change for change in changes if change < 0.0)}
+
+
 def _table(rows: list[dict[str, Any]], figure: tracking.Figure) -> list[dict[str, Any]]:
     """A line a strength: mean tracking error (%) over the targets that count and, for depths, the share completed."""
     table = []
@@ -36,9 +44,7 @@ def _says(figure: tracking.Figure, rows: list[dict], marked: float | None, table
     if marked is None:
         strongest = table[-1]["noise"]
         return f"no noise up to {strongest:g} brings the ruled PID to the paper's {tracking.PAPER_PID_ERROR:g} %"
-    there = ", ".join(
-        f"{name} {tracking.error_at(rows, name, counted(figure), marked):.1f} %" for name in CONTROLLERS
-    )
+    there = ", ".join(f"{name} {tracking.error_at(rows, name, counted(figure), marked):.1f} %" for name in CONTROLLERS)
     return f"where the ruled PID has the paper's {tracking.PAPER_PID_ERROR:g} %, at a noise of {marked:.3g}: {there}"
 
 
@@ -48,10 +54,12 @@ def reproduce_tracking(name: str, vehicle: Vehicle, seeds: int, noise: float | N
     Without `noise` that strength is ROUGH times the vehicle file's disturbance.
     """
     figure = FIGURES[name]
-    swept = tracking.summary(figure, tracking.fly_figure(figure, vehicle, tracking.STRENGTHS, seeds, ("estimated",)))
+    sweep = tracking.fly_figure(figure, vehicle, tracking.STRENGTHS, seeds, ("estimated",))
+    swept = tracking.summary(figure, sweep)
     marked = tracking.strength_at(swept, "pid", counted(figure), tracking.PAPER_PID_ERROR)
     chosen = noise if noise is not None else tracking.ROUGH * vehicle.disturbance.linear
-    cases = tracking.summary(figure, tracking.fly_figure(figure, vehicle, (chosen,), seeds, ("estimated", "true")))
+    both = tracking.fly_figure(figure, vehicle, (chosen,), seeds, ("estimated", "true"))
+    cases = tracking.summary(figure, both)
     legs = {target: figure.leg(target) for target in figure.targets}
     shown = fly_design(vehicle, legs, tracking.variants(vehicle), [chosen], range(1), trace_every=SHOWN_EVERY)
     picture = out / f"{name}.png"
@@ -63,6 +71,10 @@ def reproduce_tracking(name: str, vehicle: Vehicle, seeds: int, noise: float | N
         "noise": chosen,
         "noise_where_pid_has_13_pct": marked,
         "sweep": swept,
+        "compared": {
+            name: tracking.compare(figure, sweep, targets) + tracking.compare(figure, both, targets)
+            for name, targets in groups(figure).items()
+        },
         "table": table,
         "says": _says(figure, swept, marked, table),
         "picture": str(picture),

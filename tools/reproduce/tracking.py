@@ -104,6 +104,40 @@ def summary(figure: Figure, batch: Batch) -> list[dict[str, Any]]:
     return rows
 
 
+def compare(figure: Figure, batch: Batch, targets: tuple[float, ...]) -> list[dict[str, Any]]:
+    """One entry a strength, state and controller, over several targets together: means and 90 % intervals over seeds.
+
+    A seed is the same vehicle, water and sensors for all controllers, so `less_pid_tuned_ci90`, the interval of what a
+    controller has less the best-tuned PID (% of the target), is one of differences in pairs. `completed`: share.
+    """
+    errors, finals, rng = tracking_error(figure, batch), final_error(figure, batch), np.random.default_rng(0)
+    groups: dict[tuple, dict[int, list[int]]] = {}
+    for i, key in enumerate(batch.keys):
+        if key["target"] in targets:
+            seeds = groups.setdefault((key["noise"], key["state"], key["controller"]), {})
+            seeds.setdefault(key["seed"], []).append(i)
+    means = {group: np.array([errors[i].mean() for i in seeds.values()]) for group, seeds in groups.items()}
+    rows = []
+    for (noise, state, controller), seeds in groups.items():
+        of_seed, members = means[noise, state, controller], np.concatenate(list(seeds.values()))
+        best = means.get((noise, state, "pid_tuned"), of_seed)
+        rows.append(
+            {
+                "noise": noise,
+                "state": state,
+                "controller": controller,
+                "targets": list(targets),
+                "tracking_error_pct": float(of_seed.mean()),
+                "tracking_error_ci90": interval(of_seed, rng),
+                "less_pid_tuned_ci90": interval(of_seed - best, rng),
+                "final_error": float(finals[members].mean()),
+                "completed": float((finals[members] <= COMPLETE_WITHIN).mean()) if figure is FIG6 else None,
+                "seeds": len(of_seed),
+            }
+        )
+    return rows
+
+
 def average(
     rows: list[dict], controller: str, noise: float, targets: tuple[float, ...], key="tracking_error_pct"
 ) -> float:

@@ -10,7 +10,7 @@ import pytest
 from firmware.control.gains import Control
 from sim_backend.core.closed_loop import TRACE
 from tools.reproduce import circle, tracking
-from tools.reproduce.design import LAST, Variant, fly_design, mission_of
+from tools.reproduce.design import LAST, Batch, Variant, fly_design, mission_of
 from tools.sources import load_vehicle
 
 VEHICLE = load_vehicle("roughie")
@@ -58,6 +58,34 @@ def test_every_case_has_its_fields_and_interval(pitched):
         assert low <= row["tracking_error_pct"] <= high
         assert row["seeds"] == 2
         assert row["state"] in ("estimated", "true")
+
+
+def test_targets_together_are_compared_in_pairs_of_seeds(pitched):
+    errors = tracking.tracking_error(tracking.FIG5, pitched)
+    for row in tracking.compare(tracking.FIG5, pitched, (30.0, -30.0)):
+        own = [row["controller"], row["noise"], row["state"]]
+        of = [i for i, key in enumerate(pitched.keys) if [key["controller"], key["noise"], key["state"]] == own]
+        assert row["tracking_error_pct"] == pytest.approx(errors[of].mean())
+        low, high = row["tracking_error_ci90"]
+        assert low <= row["tracking_error_pct"] <= high
+        assert row["seeds"] == 2
+    # the interval of differences from the best-tuned PID, here played by the law's own flights
+    batch = Batch([{**key, "controller": key["controller"].replace("law", "pid_tuned")} for key in pitched.keys])
+    batch.result = pitched.result
+    for row in tracking.compare(tracking.FIG5, batch, (30.0,)):
+        if row["controller"] == "pid_tuned":
+            assert row["less_pid_tuned_ci90"] == (0.0, 0.0)
+        else:
+            pairs = []
+            for seed in range(2):
+                at = {
+                    k["controller"]: i
+                    for i, k in enumerate(batch.keys)
+                    if (k["target"], k["seed"], k["noise"], k["state"]) == (30.0, seed, row["noise"], row["state"])
+                }
+                pairs.append(errors[at["pid"]] - errors[at["pid_tuned"]])
+            low, high = row["less_pid_tuned_ci90"]
+            assert min(pairs) - 1e-9 <= low <= np.mean(pairs) <= high <= max(pairs) + 1e-9
 
 
 def test_strength_is_found_between_the_measured_ones():

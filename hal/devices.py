@@ -1,0 +1,232 @@
+"""A board of real devices: drivers on their ports, served in the time that the loop has left. Nothing is opened at
+import.
+
+Between two ticks `sleep_until` serves the ports and then sleeps the last millisecond; `read` and `command` only touch
+memory. So a slow, silent or babbling device costs the tick nothing.
+"""
+
+import time
+from typing import Any
+
+from hal import boardfile
+from hal.board import BoardRequest
+from hal.clocks import MonotonicClock
+from hal.drivers.drive import Drive
+from hal.drivers.maestro import Servo
+from hal.drivers.modbus_sensors import AnalogModule, Beacon, EncoderWire, Input, battery, leak, wire
+from hal.drivers.samples import Health, Sensor
+from hal.drivers.vn100 import Vn100
+from hal.ports import BoardError, Validity
+from hal.transport.hub import Hub, LineHandler, Link
+from hal.transport.modbus_bus import ModbusBus
+from hal.transport.port import SerialPort, Unplugged
+
+GUARD_S = 0.001  # before a deadline, in which ports are left alone
+FIRST_ANSWER_S = 4.0  # for every device to answer after opening
+STOPPING_S = 0.15
+SENSORS = ("imu", "beacon", "slider_wire", "plunger_wire", "leak", "battery")
+ACTUATORS = ("servo", "slider", "ballast")
+
+
+class ServingClock(MonotonicClock):
+    """Real time; waiting serves the ports."""
+
+    def __init__(self, board: "DeviceBoard"):
+        super().__init__()
+        self._board = board
+
+    def start(self, now: float) -> None:
+        """The board's time begins at `now` of the monotonic clock."""
+        self._start = now
+
+    def sleep_until(self, deadline: float) -> None:
+        self._board.serve(self._start + deadline - GUARD_S)
+        super().sleep_until(deadline)
+
+
+class DeviceBoard:
+    """Every device of a board file. Drop weight and watchdog are not fitted."""
+
+    drop_weight = watchdog = None
+    imu: Vn100
+    beacon: Beacon
+    slider_wire: Input
+    plunger_wire: Input
+    leak: Input | None
+    battery: Input | None
+    servo: Servo
+    slider: Drive
+    ballast: Drive
+
+    def __init__(self, file: boardfile.DeviceFile, source: str, vehicle: Any, water_density: float):
+        self.name, self.file, self.source, self.loop_hz = file.name, file, source, file.loop_hz
+        self.surface_pressure = file.beacon.surface_pa
+        self.periods = {
+            "imu": 1.0 / file.imu.rate_hz,
+            "beacon": 1.0 / file.beacon.rate_hz,
+            "wires": 1.0 / min(file.slider_wire.rate_hz, file.plunger_wire.rate_hz),
+        }
+        self.buses: dict[str, ModbusBus] = {}
+        self._build(file, source, vehicle, water_density)
+        self.sensors: dict[str, Sensor] = {name: port for name in SENSORS if (port := getattr(self, name)) is not None}
+        self.actuators: dict[str, Servo | Drive] = {name: getattr(self, name) for name in ACTUATORS}
+        self.links = {name: self._link(name) for name in file.port}
+        self.hub = Hub(list(self.links.values()), time.monotonic)
+        self.hub.set_period(1.0 / file.loop_hz)
+        self.clock = ServingClock(self)
+
+    # --- building ---------------------------------------------------------------------------------------------------
+    def _build(self, file: boardfile.DeviceFile, source: str, vehicle: Any, density: float) -> None:
+        presets = {
+            name: boardfile.preset_of(file, name, source) for name in boardfile.ROLES if getattr(file, name) is not None
+        }
+        self.imu = Vn100(file.imu, file.port[file.imu.port].baud)
+        self.beacon = Beacon(file.beacon, presets["beacon"])
+        self._bus(file.beacon.port).add(self.beacon.poll)
+        self.slider_wire, self.plunger_wire = (
+            wire(name, getattr(file, name)) for name in ("slider_wire", "plunger_wire")
+        )
+        self.leak = None if file.leak is None else leak(file.leak)
+        self.battery = None if file.battery is None else battery(file.battery)
+        self._build_inputs(presets)
+        self.servo = Servo(file.servo, vehicle.actuators.servo.range)
+        kg_per_m = density * vehicle.actuators.ballast.plunger_area
+        for name, unit, feedback in (("slider", 1.0, self.slider_wire), ("ballast", kg_per_m, self.plunger_wire)):
+            table, limits = getattr(file, name), getattr(vehicle.actuators, name).range
+            drive = Drive(name, table, presets[name], unit, limits, feedback)
+            drive.join(self._bus(table.port))
+            setattr(self, name, drive)
+
+    def _build_inputs(self, presets: dict) -> None:
+        """Draw-wires, leak and battery: those on one analog module share its reads."""
+        modules: dict[tuple[str, int], list[tuple[int, Input]]] = {}
+        maps = {}
+        for name in ("slider_wire", "plunger_wire", "leak", "battery"):
+            table, item = getattr(self.file, name), getattr(self, name)
+            if item is None:
+                continue
+            if presets[name].role == "encoder":
+                self._bus(table.port).add(EncoderWire(table.id, presets[name], item).poll)
+            else:
+                modules.setdefault((table.port, table.id), []).append((table.channel, item))
+                maps[table.port, table.id] = presets[name]
+        self.modules = [AnalogModule(key[1], maps[key], inputs) for key, inputs in modules.items()]
+        for key, module in zip(modules, self.modules, strict=True):
+            self._bus(key[0]).add(module.poll)
+
+    def _bus(self, port: str) -> ModbusBus:
+        if port not in self.buses:
+            table = self.file.port[port]
+            self.buses[port] = ModbusBus(table.baud, timeout_s=table.timeout_s, longest_s=table.longest_s)
+        return self.buses[port]
+
+    def _link(self, name: str) -> Link:
+        table = self.file.port[name]
+        handlers: dict[str, LineHandler] = {
+            self.file.imu.port: self.imu,
+            self.file.servo.port: self.servo,
+            **self.buses,
+        }
+        return Link(name, SerialPort(table.path, table.baud), handlers[name])
+
+    # --- opening and closing ----------------------------------------------------------------------------------------
+    def open(self) -> None:
+        """For a flight: calibration as looked through, every port open, every device answering; then time begins."""
+        self.check_calibration()
+        self.connect()
+        silent = self.wait_for_answers(FIRST_ANSWER_S)
+        if silent:
+            self.close()
+            raise BoardError("; ".join(silent))
+        self.enable(True)
+        self.start()
+
+    def check_calibration(self) -> None:
+        """BoardError where the file is not as it was when someone last looked it through."""
+        found = boardfile.calibration_hash(self.file)
+        if not self.file.calibration:
+            raise BoardError(f"{self.source}: never calibrated; look it through with glider bench, then `accept`")
+        if found != self.file.calibration:
+            raise BoardError(
+                f"{self.source}: calibration: changed since it was looked through (is {found}, was "
+                f"{self.file.calibration}); look it through with glider bench, then `accept`"
+            )
+
+    def connect(self) -> None:
+        """Open every port; BoardError names the one that cannot be, and its devices."""
+        for name, link in self.links.items():
+            try:
+                link.open(time.monotonic())
+            except Unplugged as error:
+                self.close()
+                raise BoardError(f"port {name} ({', '.join(self.devices_on(name))}): {error}") from None
+
+    def devices_on(self, port: str) -> list[str]:
+        return [name for name, table in boardfile.devices_of(self.file).items() if table.port == port]  # type: ignore
+
+    def wait_for_answers(self, seconds: float) -> list[str]:
+        """Serve until every device has answered, at most so long; a line for each that has not."""
+        end = time.monotonic() + seconds
+        while True:
+            self.serve(time.monotonic() + 0.02)
+            silent = self.silent()
+            if not silent or time.monotonic() > end:
+                return silent
+
+    def silent(self) -> list[str]:
+        """A line for each device that gives nothing, or nothing good."""
+        now, found = time.monotonic(), []
+        for name, table in boardfile.devices_of(self.file).items():
+            port = getattr(self, name)
+            good = port.validity == Validity.VALID if isinstance(port, Sensor) else port.answering(now)
+            if not good:
+                place = f"port {table.port}" + (f", id {table.id}" if hasattr(table, "id") else "")  # type: ignore
+                found.append(f"{name} ({table.device}, {place}): {port.health.error or 'does not answer'}")  # type: ignore
+        return found
+
+    def enable(self, on: bool) -> None:
+        """Let actuators be moved, or not."""
+        for actuator in self.actuators.values():
+            actuator.enabled = on
+            if not on:
+                actuator.target = None
+
+    def start(self) -> None:
+        """The board's time begins."""
+        now = time.monotonic()
+        self.clock.start(now)
+        for sensor in self.sensors.values():
+            sensor.start(now)
+
+    def stop(self) -> None:
+        """Stop all actuators, at once as far as their lines go."""
+        for actuator in self.actuators.values():
+            actuator.stop()
+
+    def close(self) -> None:
+        """Stop the actuators and give the ports back. Never raises; twice does no harm."""
+        if any(link.up for link in self.links.values()):
+            self.stop()
+            self.serve(time.monotonic() + STOPPING_S)
+        for link in self.links.values():
+            link.port.close()
+
+    # --- running ----------------------------------------------------------------------------------------------------
+    def serve(self, until: float) -> None:
+        """Serve all ports until `until` of the monotonic clock; then say what has grown old."""
+        self.hub.serve(until)
+        now = time.monotonic()
+        for sensor in self.sensors.values():
+            sensor.age(now)
+        self.slider.age(now)
+        self.ballast.age(now)
+
+    def health(self) -> dict[str, Health]:
+        """How every device does."""
+        return {name: port.health for name, port in (*self.sensors.items(), *self.actuators.items())}
+
+
+def build_board(request: BoardRequest) -> DeviceBoard:
+    """A board of real devices from its file's text."""
+    file = boardfile.decode_device_file(request.text, request.source)
+    return DeviceBoard(file, request.source, request.vehicle, request.water_density)

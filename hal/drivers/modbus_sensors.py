@@ -1,0 +1,105 @@
+"""Sensors on Modbus lines: the beacon's pressure, draw-wires, leak and battery inputs."""
+
+from collections.abc import Callable
+
+from hal.boardfile import BatteryTable, BeaconTable, LeakTable, WireTable
+from hal.drivers.poll import Poll
+from hal.drivers.samples import Health, Sensor
+from hal.ports import SLOTS
+from hal.protocols import modbus
+from hal.protocols.modbus import Request
+from hal.protocols.registers import RegisterMap, value_of
+
+PA_PER_BAR = 1e5
+TEMPERATURES = (-10.0, 60.0)  # deg C, past which the transmitter is not in water
+
+
+class Beacon(Sensor):
+    """Absolute pressure (Pa) and water temperature (deg C)."""
+
+    def __init__(self, table: BeaconTable, registers: RegisterMap):
+        super().__init__("beacon", SLOTS["beacon"], 1.0 / table.rate_hz, (table.range_pa, TEMPERATURES))
+        self._zero, self._map = table.zero_pa, registers
+        self._temperature = 15.0
+        variants = [registers.read(table.id, "all"), registers.read(table.id, "pressure")]
+        self.poll = Poll(variants, self.period, self._taken, self.health)
+
+    def _taken(self, request: Request, registers: list[int], asked_at: float, now: float) -> None:
+        block = self._map.block["all" if len(registers) == 4 else "pressure"]
+        if len(registers) == 4:
+            self._temperature = value_of(block, "temperature", registers)
+        pressure = value_of(block, "pressure", registers) * PA_PER_BAR
+        self.put(asked_at, (pressure - self._zero, self._temperature), now)
+
+
+class Input(Sensor):
+    """A sensor of one number that is made of one reading: draw-wire, leak, battery."""
+
+    def __init__(self, name: str, period: float, limits: tuple[float, float], convert: Callable[[float], float]):
+        super().__init__(name, SLOTS[name], period, (limits,))
+        self._convert = convert
+        self.reading = float("nan")  # as the device gave it
+
+    def take(self, reading: float, asked_at: float, now: float) -> None:
+        self.reading = reading
+        self.put(asked_at, (self._convert(reading),), now)
+
+
+def wire(name: str, table: WireTable) -> Input:
+    """A draw-wire: metres from readings; a broken wire reads NaN."""
+    floor = table.broken_below
+
+    def convert(reading: float) -> float:
+        if floor is not None and reading < floor:
+            return float("nan")
+        return (reading - table.zero) / table.per_m
+
+    return Input(name, 1.0 / table.rate_hz, table.range_m, convert)
+
+
+def leak(table: LeakTable) -> Input:
+    """1 where it is wet, 0 where it is not."""
+    return Input("leak", 1.0 / table.rate_hz, (0.0, 1.0), lambda x: float((x > table.wet_above) != table.inverted))
+
+
+def battery(table: BatteryTable) -> Input:
+    return Input("battery", 1.0 / table.rate_hz, table.range_v, lambda x: x / table.per_volt)
+
+
+class AnalogModule:
+    """An analog module: one read brings all its channels to the inputs on them."""
+
+    def __init__(self, device: int, registers: RegisterMap, inputs: list[tuple[int, Input]]):
+        self._inputs = inputs
+        self.health = Health(f"analog module {device}")
+        block = registers.block["all"]
+        last = max(channel for channel, _ in inputs)
+        counts = range(block.count, max(last, block.count - 3) - 1, -1)
+        variants = [modbus.read(device, block.function, block.address, count) for count in counts]
+        self.poll = Poll(variants, min(item.period for _, item in inputs), self._taken, self.health)
+
+    def _taken(self, request: Request, registers: list[int], asked_at: float, now: float) -> None:
+        for channel, item in self._inputs:
+            item.take(float(registers[channel - 1]), asked_at, now)
+
+
+class EncoderWire:
+    """A draw-wire with an absolute encoder of its own."""
+
+    def __init__(self, device: int, registers: RegisterMap, item: Input):
+        self._item, self._map = item, registers
+        self._count = 0
+        self._poll_low = registers.read(device, "low")
+        self.poll = Poll([registers.read(device, "all"), self._poll_low], item.period, self._taken, item.health)
+
+    def _taken(self, request: Request, registers: list[int], asked_at: float, now: float) -> None:
+        if request is self._poll_low:
+            self._count = nearest(registers[0], self._count)
+        else:
+            self._count = int(value_of(self._map.block["all"], "count", registers))
+        self._item.take(float(self._count), asked_at, now)
+
+
+def nearest(low_word: int, last: int) -> int:
+    """The number nearest to `last` whose low 16 bits are low_word."""
+    return last + ((low_word - last + 0x8000) & 0xFFFF) - 0x8000

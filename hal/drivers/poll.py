@@ -1,0 +1,49 @@
+"""Asking a Modbus device for its registers, again and again."""
+
+from collections.abc import Callable, Sequence
+
+from hal.drivers.samples import Health
+from hal.protocols.modbus import Frame, Request
+from hal.transport.modbus_bus import Failure
+
+CONFIGURATION_FAULTS = (1, 2, 3)  # illegal function, address, value: asking again does not help
+WAIT_AFTER_FAULT_S = 1.0
+EXCEPTIONS = {
+    1: "illegal function", 2: "illegal address", 3: "illegal value", 4: "device failure", 5: "acknowledge",
+    6: "device busy", 8: "memory parity", 10: "gateway path", 11: "gateway no response",
+}  # fmt: skip
+
+
+def exception_text(code: int) -> str:
+    return f"exception {code} ({EXCEPTIONS.get(code, 'unknown')})"
+
+
+class Poll:
+    """A periodic read. `variants` are requests of different lengths for the same thing, the best first."""
+
+    def __init__(
+        self,
+        variants: Sequence[Request],
+        period: float,
+        taken: Callable[[Request, list[int], float, float], None],
+        health: Health,
+    ):
+        self.device, self.period, self.due = variants[0].device, period, 0.0
+        self._variants, self._taken, self._health = tuple(variants), taken, health
+
+    def requests(self, now: float) -> Sequence[Request]:
+        self.due = max(self.due + self.period, now)
+        return self._variants
+
+    def answered(self, request: Request, reply: Frame, asked_at: float, now: float) -> None:
+        self._taken(request, reply.registers, asked_at, now)
+
+    def failed(self, request: Request, failure: Failure, exception: int, now: float) -> None:
+        health = self._health
+        if failure is Failure.EXCEPTION:
+            health.exceptions += 1
+            health.say(now, exception_text(exception))
+            wait = WAIT_AFTER_FAULT_S if exception in CONFIGURATION_FAULTS else 4.0 * self.period
+            self.due = max(self.due, now + wait)
+        elif failure is Failure.TIMEOUT:
+            health.timeouts += 1

@@ -1,0 +1,97 @@
+"""What all sensor drivers share: the newest sample, what makes one unfit, and how old it may get."""
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hal.ports import Slot, Validity
+
+FAULTY_AFTER = 5  # unfit samples running, past which the device is in error
+STALE_PERIODS = 3.0
+
+
+@dataclass
+class Health:
+    """How a device does."""
+
+    name: str
+    samples: int = 0
+    unfit: int = 0  # not finite or out of range
+    timeouts: int = 0
+    exceptions: int = 0
+    damaged: int = 0
+    error: str = ""  # what is wrong now; empty: nothing
+    notes: deque = field(default_factory=lambda: deque(maxlen=20))
+
+    def say(self, now: float, text: str) -> None:
+        """A change in the device's state, for logs and the bench."""
+        self.error = text
+        self.notes.append((now, text or "well again"))
+
+
+class Sensor:
+    """A sensor port: the newest sample in a slot of its own, copied out by `read` without allocation."""
+
+    def __init__(self, name: str, slot: Slot, period: float, ranges: Sequence[tuple[float, float]]):
+        self.name, self.period = name, period
+        self.health = Health(name)
+        self._ranges = tuple(ranges)
+        self._slot = np.full(2 + len(slot.names), np.nan)
+        self._slot[1] = Validity.MISSING
+        self._running_unfit = 0
+        self._taken_at = -math.inf
+        self.epoch = 0.0  # s, when the board's time began, on the clock that `put` is told
+
+    def start(self, epoch: float) -> None:
+        """The board's time begins: what was read before is forgotten."""
+        self.epoch, self._taken_at = epoch, max(self._taken_at, epoch)
+        self._slot[:] = np.nan
+        self._slot[1] = Validity.MISSING
+
+    def read(self, out: np.ndarray) -> None:
+        """Copy [time, validity, values ...] into `out`."""
+        out[...] = self._slot
+
+    @property
+    def time(self) -> float:
+        """When the newest sample was taken, s of the board's time; NaN before the first."""
+        return float(self._slot[0])
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        return tuple(self._slot[2:].tolist())
+
+    @property
+    def validity(self) -> Validity:
+        return Validity(int(self._slot[1]))
+
+    def put(self, taken_at: float, values: Sequence[float], now: float) -> bool:
+        """Take a sample, if it is finite, in range and newer than the last; False if it is not fit."""
+        health = self.health
+        for value, (low, high) in zip(values, self._ranges, strict=True):
+            if not (math.isfinite(value) and low <= value <= high):
+                health.unfit += 1
+                self._running_unfit += 1
+                if self._running_unfit >= FAULTY_AFTER and self._slot[1] != Validity.FAULT:
+                    self._slot[1] = Validity.FAULT
+                    health.say(now, f"reads {value:g}, outside {low:g} to {high:g}")
+                return False
+        if taken_at <= self._taken_at:
+            return True
+        self._running_unfit = 0
+        if health.error:
+            health.say(now, "")
+        health.samples += 1
+        self._taken_at = taken_at
+        self._slot[0], self._slot[1] = taken_at - self.epoch, Validity.VALID
+        self._slot[2:] = values
+        return True
+
+    def age(self, now: float) -> None:
+        """Say that the sample is stale once it is older than three periods."""
+        if self._slot[1] == Validity.VALID and now - self._taken_at > STALE_PERIODS * self.period:
+            self._slot[1] = Validity.STALE
+            self.health.say(now, f"no sample for {STALE_PERIODS:g} periods")

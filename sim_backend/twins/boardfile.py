@@ -1,0 +1,72 @@
+"""Board files of kind "twin": the devices of a real board, and the sea in which the plant behind them flies."""
+
+import msgspec
+
+from hal import boardfile
+from hal.boardfile import DeviceFile
+from hal.drivers.vn100 import BITS
+from hal.protocols.vn100 import FLIGHT_MASK, payload_size
+from hal.strict import ConfigError, decode
+from sim_backend.twins.modbus_line import TURNAROUND_S
+from sim_backend.world import Environment, SampledSensor, Start
+
+PLANT_HZ = 100.0
+
+
+class TwinFile(DeviceFile):
+    """A device file with the plant's [environment], [start] and [effects]; paths of ports are only names here."""
+
+    environment: Environment = Environment()
+    start: Start = Start()
+    effects: dict[str, dict[str, float]] = msgspec.field(default_factory=dict)
+
+
+def decode_twin_file(text: str, source: str) -> TwinFile:
+    """A board file of kind "twin" or "devices" as one that twins can be made of."""
+    file = decode(text, TwinFile, source)
+    boardfile.check(file, source)
+    if file.imu.rate_hz > PLANT_HZ:
+        raise ConfigError(source, f"the plant makes no more than {PLANT_HZ:g} samples a second", key="imu.rate_hz")
+    return file
+
+
+def _exchange_s(baud: int, reply: int) -> float:
+    """From a request's end, which is the sample's time, to the whole reply."""
+    return TURNAROUND_S + reply * BITS / baud
+
+
+def simulated_sensors(file: DeviceFile) -> dict[str, SampledSensor]:
+    """Rates and delays of a simulated board whose samples come as this board's lines bring them."""
+    imu_line = file.port[file.imu.port].baud
+    sensors = {
+        "imu": SampledSensor(rate_hz=file.imu.rate_hz, delay_s=(6 + payload_size(FLIGHT_MASK)) * BITS / imu_line)
+    }
+    for name, reply in (("beacon", 13), ("slider_wire", 21), ("plunger_wire", 21)):
+        table = getattr(file, name)
+        sensors[name] = SampledSensor(rate_hz=table.rate_hz, delay_s=_exchange_s(file.port[table.port].baud, reply))
+    return sensors
+
+
+def simulated_text(file: TwinFile) -> str:
+    """The board file of kind "sim" with the same rates, delays and sea: what a twin's flight is compared with."""
+    lines = ["format = 1", 'kind = "sim"', f"loop_hz = {file.loop_hz!r}", "", "[sensors]"]
+    for name, sensor in simulated_sensors(file).items():
+        lines.append(f"{name} = {{ rate_hz = {sensor.rate_hz!r}, delay_s = {sensor.delay_s:.6f} }}")
+    for table in ("environment", "start"):
+        lines += ["", f"[{table}]"]
+        for key, value in msgspec.to_builtins(getattr(file, table)).items():
+            if isinstance(value, bool):
+                lines.append(f"{key} = {str(value).lower()}")
+            elif isinstance(value, int | float):
+                lines.append(f"{key} = {float(value)!r}")
+            elif isinstance(value, list | tuple) and all(isinstance(item, float) for item in value) and value:
+                lines.append(f"{key} = {[float(item) for item in value]!r}")
+            elif value:
+                lines += [f"{key} = [" + ", ".join(_inline(item) for item in value) + "]"]
+    for label, values in file.effects.items():
+        lines += ["", f"[effects.{label}]", *(f"{key} = {value!r}" for key, value in values.items())]
+    return "\n".join(lines) + "\n"
+
+
+def _inline(table: dict) -> str:
+    return "{ " + ", ".join(f"{key} = {value!r}" for key, value in table.items()) + " }"

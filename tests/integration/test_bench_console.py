@@ -1,0 +1,204 @@
+"""The bench: typed at a terminal, from a pipe and a script, and what happens when it dies."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from hal.boardfile import calibration_hash, decode_device_file
+from tests.support.bench_session import Twins, session
+
+
+def glider(*arguments, lines=(), **options):
+    command = [sys.executable, "-m", "tools.cli.main", *(str(item) for item in arguments)]
+    text = "".join(f"{line}\n" for line in lines)
+    return subprocess.run(command, input=text, capture_output=True, text=True, timeout=120, **options)
+
+
+@pytest.fixture(scope="module")
+def twins(tmp_path_factory):
+    twins = Twins(tmp_path_factory.mktemp("twins"))
+    yield twins
+    twins.end()
+
+
+def bench(twins, *lines, out="."):
+    return glider("bench", "--board", twins.board, "--out", out, lines=lines)
+
+
+def test_a_session_at_a_terminal(tmp_path):
+    """Calibrate with a ruler, sweep, stop by a key and by Ctrl-C, pull the cable and put it in again."""
+    _, found = session(tmp_path, sweep=False)
+    assert "nothing moves before `enable`" in found["not enabled"]
+    file = decode_device_file(found["board"], "board.toml")
+    assert file.calibration == calibration_hash(file)
+    assert file.slider.counts_per_m == pytest.approx(2_000_000, rel=0.01)
+    assert file.slider_wire.per_m == pytest.approx(80_000, rel=0.03)
+    assert (tmp_path / "p" / "board.toml.1").read_text() != found["board"]
+    assert found["slider_m"] == pytest.approx(0.008, abs=0.0003)  # by the truth, not by the wire
+    assert found["key"].rstrip().endswith("stopped\nbench>")
+    assert found["stop"].rstrip().endswith("stopped\nbench>")
+    first, second = found["stopped_m"]
+    assert first == pytest.approx(second, abs=0.0002)
+    assert second > -0.0085
+    assert "stale" in found["unplugged"]
+    assert "port sensors   NOT OPEN" in found["unplugged health"]
+    assert "valid" in found["plugged"]
+    assert found["exit"] == 0
+
+
+def test_a_pipe_runs_commands_and_says_what_it_does(twins):
+    done = bench(
+        twins, "# a comment", "read beacon", "enable", "goto slider 5", "jog slider -10", "limits", "watch 0.1"
+    )
+    assert done.returncode == 0, done.stderr
+    assert "> goto slider 5" in done.stdout
+    assert "servo    -60.00 to 60.00 deg" in done.stdout
+    assert twins.state()["slider_m"] == pytest.approx(-0.005, abs=0.0005)
+
+
+@pytest.mark.parametrize(
+    ("lines", "code", "said"),
+    [
+        (["goto slider 5"], 1, "goto slider 5: nothing moves before `enable`"),
+        (["dance"], 2, "no command 'dance'; `help` lists them"),
+        (["goto slider"], 2, "usage: goto ACTUATOR POSITION"),
+        (["raw sensors 01 03 01 00 00 04", "no"], 1, "not sent"),
+        (["raw sensors 01 63 01", "yes"], 1, "not one whole Modbus request"),
+        (["zero slider_wire"], 1, "no line left to answer: write"),
+        (["enable", "sweep slider 5 900"], 1, "expected LOW < HIGH within -60.00 to 60.00 mm"),
+        (["limits slider 10 -10"], 1, "would not be a good board file"),
+    ],
+)
+def test_a_script_ends_at_the_first_command_that_fails(twins, tmp_path, lines, code, said):
+    before = twins.board.read_text()
+    script = tmp_path / "script"
+    script.write_text("\n".join([*lines, "read"]) if code == 2 or len(lines) == 1 else "\n".join(lines))
+    if "zero" in lines[0]:
+        script.write_text(lines[0])
+    done = glider("bench", "--board", twins.board, "--script", script)
+    assert done.returncode == code, done.stdout + done.stderr
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+    assert twins.board.read_text() == before
+
+
+def test_limits_hold_whatever_is_asked(twins):
+    done = bench(twins, "enable", "goto servo 200", "goto ballast -3", "goto slider 0")
+    assert done.returncode == 0, done.stderr
+    assert "servo: limited to 60.00 deg" in done.stdout
+    state = twins.state()
+    assert state["servo_rad"] == pytest.approx(1.0472, abs=0.001)
+    assert state["ballast_kg"] == pytest.approx(-0.003 * 998.2 * 0.0062, abs=0.004)
+
+
+def test_raw_bytes_and_their_answers(twins):
+    done = bench(twins, "raw imu VNRRG,01", "yes", "raw sensors 01 04 00 00 00 08", "yes")
+    assert "$VNRRG,01,VN-100T-CR" in done.stdout
+    assert done.returncode == 1  # the transmitter has no input registers
+    assert "exception 2" in done.stderr
+
+
+def test_a_sweep_leaves_run_data_and_a_picture(twins, tmp_path):
+    from tools.runs.case import load_case
+
+    done = bench(twins, "enable", "goto slider 0", "sweep slider -2 2", out=tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "travel time" in done.stdout
+    (run,) = load_case(tmp_path / "sweep-slider-001").runs
+    assert run.columns["cmd_slider_m"].max() == pytest.approx(0.002)
+    assert (tmp_path / "sweep-slider-001" / "sweep-slider.png").stat().st_size > 10_000
+
+
+def start(twins):
+    """A console on a pipe that is left open, with the slider on its way from end to end."""
+    command = [sys.executable, "-m", "tools.cli.main", "bench", "--board", str(twins.board)]
+    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
+    process.stdin.write("enable\ngoto slider -55\ngoto slider 55\n")
+    process.stdin.flush()
+    end = time.monotonic() + 20.0
+    while twins.state()["slider_m"] > -0.045:
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    while twins.state()["slider_m"] < -0.03:
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    return process
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
+def test_losing_the_console_stops_the_actuators(twins, how):
+    process = start(twins)
+    os.kill(process.pid, how)
+    try:
+        time.sleep(0.8 if how != signal.SIGSTOP else 3.6)  # one that is stopped is missed after three seconds
+        place = twins.state()["slider_m"]
+        time.sleep(0.4)
+        assert twins.state()["slider_m"] == pytest.approx(place, abs=2e-4)
+        assert place < 0.053
+    finally:
+        process.kill()
+        process.stdin.close()
+        process.wait()
+        time.sleep(0.3)
+
+
+def test_the_bench_refuses_what_has_no_devices():
+    done = glider("bench", "--board", "sim")
+    assert done.returncode == 2
+    assert "no devices" in done.stderr
+
+
+def test_check_talks_to_every_device(twins):
+    twins.tell("fault beacon silent")
+    done = glider("check", "--board", twins.board)
+    twins.tell("fault beacon none")
+    assert done.returncode == 1
+    assert "model VN-100T-CR" in done.stdout
+    assert "FAIL  beacon" in done.stdout
+
+
+def lead(twins, board, actuators):
+    """`glider check --signs` with a person who turns the stand when asked to; its findings."""
+    command = [sys.executable, "-m", "tools.cli.main", "check", "--board", str(board), "--signs", "--json"]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    process = subprocess.Popen(command, text=True, **pipes)
+    poses = {"level": "0 0 40 0.3", "nose by": "0 15 40 0.3", "side down": "15 0 40 0.3", "nose to": "0 0 55 0.3"}
+    poses["Lower"] = "0 0 40 0.4"
+    for line in process.stderr:
+        for asked, pose in poses.items():
+            if asked in line:
+                assert twins.tell(f"pose {pose}") == "ok"
+                time.sleep(0.15)
+        if line.strip():
+            process.stdin.write("yes\n" if actuators or "clear?" not in line else "no\n")
+            process.stdin.flush()
+        if "swing" in line or ("clear?" in line and not actuators):
+            break
+    output, _ = process.communicate(timeout=30)
+    twins.tell("pose 0 0 0 0.3")
+    return {item["check"]: item for item in json.loads(output)["findings"]}
+
+
+SIGNS = ("nose up", "roll to starboard", "turn to starboard", "deeper", "mass forward", "pump in", "servo to starboard")
+
+
+def test_check_leads_through_signs_and_axes(twins):
+    found = lead(twins, twins.board, actuators=True)
+    assert {name: found[name]["pass"] for name in SIGNS} == dict.fromkeys(SIGNS, True), found
+    assert "pitch +15" in found["nose up"]["message"]
+
+
+def test_check_finds_an_imu_that_looks_aft(twins, tmp_path):
+    wrong = tmp_path / "board.toml"
+    wrong.write_text(twins.board.read_text().replace("mount_deg = [0.0, 0.0, 0.0]", "mount_deg = [0.0, 0.0, 180.0]"))
+    found = lead(twins, wrong, actuators=False)
+    assert not found["nose up"]["pass"]
+    assert not found["roll to starboard"]["pass"]
+    assert found["turn to starboard"]["pass"]
+    assert "WRONG SIGN: see imu.mount_deg" in found["nose up"]["message"]
+    assert not found["calibration"]["pass"]

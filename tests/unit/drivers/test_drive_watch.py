@@ -1,0 +1,149 @@
+"""The drive: stalls and wrong ways are seen, limits hold, the wire carries the zero along."""
+
+import math
+
+import pytest
+
+from hal.boardfile import DriveTable
+from hal.drivers.drive import Drive, Watch
+from hal.drivers.maestro import Servo
+from hal.drivers.samples import Sensor
+from hal.ports import SLOTS
+from hal.protocols.registers import preset
+
+SERVO = {"device": "maestro", "port": "p", "channel": 0, "us_per_rad": 600.0, "zero_us": 1500.0}
+
+
+def drive(follow="drive", counts_per_m=2e6, **more):
+    table = DriveTable(
+        device="leadshine-cs2rs", port="p", id=7, counts_per_m=counts_per_m, limits_m=(-0.05, 0.06), speed_m_s=0.03,
+        follow=follow, **more,
+    )  # fmt: skip
+    wire = Sensor("slider_wire", SLOTS["slider_wire"], 0.04, ((-0.1, 0.1),))
+    return Drive("slider", table, preset("leadshine-cs2rs"), 1.0, (-0.06, 0.04), wire), wire
+
+
+def move(watch, places, target, step=0.1):
+    return [verdict for i, place in enumerate(places) if (verdict := watch.look(target, place, step * i))]
+
+
+def test_a_move_that_shows_is_no_stall():
+    assert move(Watch(0.002, 1.0), [0.001 * i for i in range(51)], 0.05) == []
+
+
+def test_standing_at_the_target_is_no_stall():
+    assert move(Watch(0.002, 1.0), [0.0195] * 100, 0.02) == []
+
+
+def test_standing_away_from_the_target_is_a_stall_after_the_patience():
+    verdicts = move(Watch(0.002, 1.0), [0.0] * 12, 0.02)
+    assert verdicts == ["stalled"]
+
+
+def test_creeping_is_a_stall():
+    assert "stalled" in move(Watch(0.002, 1.0), [0.00002 * i for i in range(30)], 0.02)
+
+
+def test_the_wrong_way_is_seen_as_soon_as_it_shows():
+    verdicts = move(Watch(0.002, 1.0), [0.0, -0.001, -0.0025], 0.02)
+    assert verdicts == ["runs the wrong way"]
+
+
+def compare(watch, ways):
+    return [verdict for counted, wire in ways if (verdict := watch.compare(counted, wire))]
+
+
+def test_a_wire_that_goes_along_is_well_wherever_its_zero_is():
+    assert compare(Watch(0.002, 1.0), [(0.0005 * i, 0.03 + 0.00045 * i) for i in range(100)]) == []
+
+
+def test_a_wire_may_lag():
+    there = [0.0005 * i for i in range(60)]
+    places = [*there, *reversed(there)]
+    lagging = [places[max(i - 2, 0)] for i in range(len(places))]
+    assert compare(Watch(0.002, 1.0), list(zip(places, lagging, strict=True))) == []
+
+
+def test_a_wire_that_stands_while_the_drive_counts_is_a_stall():
+    assert compare(Watch(0.002, 1.0), [(0.0005 * i, 0.01) for i in range(10)]) == ["stalled"]
+
+
+def test_a_wire_that_goes_the_other_way_is_seen_within_twice_the_least_way():
+    verdicts = compare(Watch(0.002, 1.0), [(0.0005 * i, -0.0005 * i) for i in range(10)])
+    assert verdicts == ["runs the wrong way"]
+
+
+def test_limits_are_the_tighter_of_file_and_vehicle():
+    item, _ = drive()
+    assert item.limits == (-0.05, 0.04)
+    assert item.command(1.0) == 0.04
+    assert item.command(-1.0) == -0.05
+    assert item.command(math.nan) == -0.05
+    assert item.target == -0.05
+
+
+@pytest.mark.parametrize("counts_per_m", [2e6, -2e6])
+def test_no_count_past_the_files_limits_is_ever_asked_for(counts_per_m):
+    item, _ = drive(counts_per_m=counts_per_m)
+    for metres in (-10.0, 10.0):
+        assert item.counts_for(metres) / counts_per_m == pytest.approx(-0.05 if metres < 0 else 0.06)
+
+
+def test_nothing_is_written_before_enable_or_without_a_command():
+    item, _ = drive()
+    item._took_position(None, [0, 0], 1.0, 1.0)
+    assert item._mover.due == math.inf
+    item.command(0.01)
+    assert item._mover.due == math.inf
+    item.enabled = True
+    assert item._mover.due < math.inf
+    item.stop()
+    (stop, other) = item._mover.requests(2.0)
+    assert stop.frame.hex(" ") == "07 06 60 02 00 40 37 9c"
+    assert other.function == 16
+
+
+def test_the_wire_carries_the_zero_along():
+    """The drive has lost 3 mm: with follow = "wire" its counts are corrected, while its own position was wrong."""
+    item, wire = drive(follow="wire")
+    for i in range(100):
+        wire.put(1.0 + 0.04 * i, (0.007,), 1.0 + 0.04 * i)
+        item._took_position(None, [0, 20_000], 1.0 + 0.04 * i, 1.0 + 0.04 * i)
+    assert item.position() == pytest.approx(0.007, abs=1e-6)
+    assert item.counts_for(0.007) == pytest.approx(20_000, abs=1)
+
+
+def test_without_a_good_wire_the_drive_counts_on():
+    item, _ = drive(follow="wire")
+    item._took_position(None, [0xFFFF, 0xFFFF - 19_999], 1.0, 1.0)
+    assert item.counts == -20_000
+    assert item.measured() == pytest.approx(-0.01)
+
+
+def test_servo_pulses_stay_within_the_files_limits():
+    from hal.boardfile import ServoTable
+
+    servo = Servo(ServoTable(limits_us=(1000.0, 2100.0), **SERVO), (-1.0472, 1.0472))
+    assert servo.limits == pytest.approx((-500 / 600, 1.0))
+    assert servo.command(5.0) == pytest.approx(1.0)
+    assert servo.quarter_us(5.0) == 4 * 2100
+    assert servo.command(math.nan) == pytest.approx(1.0)
+
+
+def test_the_servo_sends_nothing_before_enable_and_repeats_itself_after():
+    from hal.boardfile import ServoTable
+
+    servo, sent = Servo(ServoTable(limits_us=(1000.0, 2100.0), **SERVO), (-1.0, 1.0)), []
+    servo.attach(lambda data: sent.append(data) or True)
+    servo.connected(0.0)
+    servo.command(0.1)
+    servo.service(0.0)
+    assert [data[0] for data in sent] == [0xA1]
+    servo.enabled = True
+    for i in range(100):
+        servo.service(0.01 * i)
+    assert 8 <= sum(data[0] == 0x84 for data in sent) <= 12
+    servo.stop()
+    before = len(sent)
+    servo.service(1.0)
+    assert all(data[0] == 0xA1 for data in sent[before:])

@@ -1,0 +1,46 @@
+"""What the bench recorded, as run data: a case folder that every other command reads."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from tools.bench.worker import ROW
+from tools.errors import InputError
+
+KEPT = tuple(name for name in ROW if name != "t_s")
+
+
+def table(rows: list[list[float | None]]) -> np.ndarray:
+    """Rows as numbers, missing ones NaN, time from 0, (n, columns of ROW)."""
+    data = np.array([[math.nan if value is None else value for value in row] for row in rows], dtype=float)
+    data = data.reshape(-1, len(ROW))
+    if len(data):
+        data[:, 0] -= data[0, 0]
+    return data
+
+
+def free_folder(base: Path, name: str) -> Path:
+    """The first of name-001, name-002, ... that is not there."""
+    for number in range(1, 10_000):
+        folder = base / f"{name}-{number:03d}"
+        if not folder.exists():
+            return folder
+    raise InputError(f"no number left for {name}-NNN", source=base)
+
+
+def write_case(folder: Path, data: np.ndarray, vehicle: str, site: str = "bench") -> Path:
+    """A case of one run; the run's path. Columns that nothing was recorded in are left out."""
+    folder.mkdir(parents=True)
+    rate = 1.0 / float(np.median(np.diff(data[:, 0]))) if len(data) > 2 else 100.0
+    (folder / "case.toml").write_text(
+        f'format = 1\nvehicle = "{vehicle}"\nsite = "{site}"\nlog_rate_hz = {round(rate, 1)}\n'
+        "water_density_kg_m3 = 998.2\nmotion_capture = false\nruns = 1\n"
+    )
+    columns = [index for index in range(len(ROW)) if np.isfinite(data[:, index]).any()]
+    lines = [",".join(ROW[index] for index in columns)]
+    for row in data:
+        lines.append(",".join("" if math.isnan(row[i]) else repr(float(row[i])) for i in columns))
+    path = folder / "run00.csv"
+    path.write_text("\n".join(lines) + "\n")
+    return path

@@ -1,0 +1,132 @@
+"""`glider gap challenge`: a blind test of the diagnosis, made, run and scored."""
+
+from pathlib import Path
+
+import click
+
+from tools.cli.common import fail, json_option, print_json, progress, say
+
+folder = click.Path(path_type=Path, file_okay=False)
+
+
+@click.group()
+def challenge():
+    """A blind test: sealed cases with unknown effects, and the score of answers to them."""
+
+
+@challenge.command()
+@click.option("--out", required=True, type=folder, help="Folder for cases, held, answers.zip and manifest.json.")
+@click.option("--seed", required=True, type=click.IntRange(0, 2**63 - 1), help="All cases follow from it.")
+@click.option("--single", default=100, show_default=True, type=click.IntRange(0, 1000), help="Cases with one effect.")
+@click.option("--none", "none", default=60, show_default=True, type=click.IntRange(0, 1000), help="Without a gap.")
+@click.option("--pairs", default=30, show_default=True, type=click.IntRange(0, 1000), help="With two effects.")
+@click.option("--unknown", default=30, show_default=True, type=click.IntRange(0, 1000), help="Outside the catalogue.")
+@click.option("--answers", type=click.Path(path_type=Path, dir_okay=False), help="Where the sealed answers go.")
+@click.option("--jobs", default=0, type=click.IntRange(0, 256), help="Processes; one a core by default.")
+def make(
+    out: Path, seed: int, single: int, none: int, pairs: int, unknown: int, answers: Path | None, jobs: int
+) -> None:
+    """Draw, fly and seal a blind test. Cases that are there are kept: call again to go on after a stop."""
+    from tools.challenge.make import Order
+    from tools.challenge.make import make as make_all
+    from tools.challenge.plan import Counts
+    from tools.challenge.seal import ARCHIVE, MANIFEST, read_manifest
+
+    counts = Counts(single, none, pairs, unknown)
+    total = single + none + pairs + unknown
+    if not total:
+        raise click.UsageError("no cases: all counts are 0")
+    order = Order(out, seed, counts, answers or out / ARCHIVE)
+    with progress("cases", total) as advance:
+        made, wrong = make_all(order, jobs, advance)
+    if wrong:
+        fail("\n".join([*wrong, "nothing sealed: take another seed, or other counts"]))
+    say(f"{made} cases made, {total - made} were there: {out}")
+    say(f"SHA-256 of {order.archive}: {read_manifest(out / MANIFEST)['answers']['sha256']}")
+
+
+@challenge.command()
+@click.option("--cases", required=True, type=folder, help="A blind test's folder, or a folder of cases.")
+@click.option("--out", required=True, type=folder, help="Where the diagnoses go, one folder a case.")
+@click.option("--only", multiple=True, metavar="CASE", help="This case only; may be given again.")
+@click.option("--jobs", default=1, show_default=True, type=click.IntRange(1, 256), help="Cases at a time.")
+@click.argument("extra", nargs=-1, type=click.UNPROCESSED)
+def run(cases: Path, out: Path, only: tuple[str, ...], jobs: int, extra: tuple[str, ...]) -> None:
+    """Run `glider gap diagnose` on every case; those that have a diagnosis are kept.
+
+    What stands after `--` is handed on to `gap diagnose`. A case's time counts its whole process.
+    """
+    from tools.challenge.run import count_cases
+    from tools.challenge.run import run as run_all
+
+    with progress("diagnosed", len(set(only)) or count_cases(cases)) as advance:
+        done, wrong = run_all(cases, out, extra, jobs, advance, only)
+    say(f"{done} diagnosed: {out}")
+    if wrong:
+        fail("\n".join(wrong))
+
+
+@challenge.command()
+@click.option("--cases", required=True, type=folder, help="The blind test's folder, or its folder of cases.")
+@click.option("--answers", required=True, type=click.Path(path_type=Path), help="answers.zip, or a folder of *.json.")
+@click.option("--diagnoses", required=True, type=folder, help="Folder of <case>/diagnosis.json.")
+@click.option("--manifest", type=click.Path(path_type=Path, dir_okay=False), help="As published; else the one there.")
+@click.option("--partial", is_flag=True, help="Score answered cases only; else a case without an answer is wrong.")
+@click.option("--no-closed", is_flag=True, help="Do not fly the corrected models on the held runs.")
+@json_option
+def score(
+    cases: Path,
+    answers: Path,
+    diagnoses: Path,
+    manifest: Path | None,
+    partial: bool,
+    no_closed: bool,
+    as_json: bool,
+) -> None:
+    """Open the sealed answers, check them against the manifest, and score the diagnoses by GAP.md's figures."""
+    from tools.challenge.judge import judge
+    from tools.errors import InputError, need
+
+    need("scipy")
+    if manifest is not None and not manifest.is_file():
+        raise InputError("no such file", source=manifest, column="--manifest")
+    with progress("scored", _answered(cases)) as advance:
+        found = judge(
+            cases, answers, diagnoses, manifest=manifest, partial=partial, closing=not no_closed, advance=advance
+        )
+    if as_json:
+        print_json(found.plain())
+    else:
+        _print_score(found)
+
+
+def _answered(cases: Path) -> int:
+    from tools.challenge.run import count_cases
+
+    return count_cases(cases)
+
+
+def _print_score(found) -> None:
+    """The figures, then the labels, on standard output."""
+    for figure in found.figures:
+        bound = "<=" if figure.at_most else ">="
+        if figure.count is None:
+            value, target = "-" if figure.value is None else f"{figure.value:.2f}", f"{bound} {figure.target:g}"
+            counted = f"{figure.of} cases"
+        else:
+            value = "-" if figure.value is None else f"{100.0 * figure.value:.1f} %"
+            target = f"{bound} {100.0 * figure.target:.0f} %"
+            low, high = figure.interval
+            counted = f"{figure.count} of {figure.of}, {100.0 * low:.1f} to {100.0 * high:.1f} %"
+        mark = {None: "", True: "met", False: "missed"}[figure.met]
+        click.echo(f"{figure.name:46}{value:>9}  {target:8} {mark:7} {counted}")
+    unanswered = sum(case.said is None for case in found.cases)
+    if unanswered:
+        click.echo(f"{unanswered} cases without an answer count as wrong")
+    heads = "".join(head.rjust(6) for head in ("cases", "seen", "first", "group", "three", "place"))
+    click.echo(f"\n{'label':24}{heads}{'closed':>8}  called")
+    for label, row in found.plain()["labels"].items():
+        counts = "".join(f"{row[key]:6d}" for key in ("cases", "seen", "first", "group", "three", "subsystem"))
+        closed = "-" if row["closed"] is None else f"{row['closed']:.2f}"
+        wrong = ", ".join(f"{name} {count}" for name, count in sorted(row["called"].items()))
+        click.echo(f"{label:24}{counts}{closed:>8}  {wrong}")
