@@ -97,18 +97,14 @@ class World:
     cmd: np.ndarray = field(default_factory=lambda: np.zeros(3))
     acc: np.ndarray = field(default_factory=lambda: np.zeros(6))
     counters: np.ndarray = field(default_factory=lambda: np.zeros(layout.N_C, dtype=np.int64))
-    ring: np.ndarray = field(
-        default_factory=lambda: np.zeros((layout.N_SENSORS, layout.RING, layout.RING_WIDTH))
-    )
+    ring: np.ndarray = field(default_factory=lambda: np.zeros((layout.N_SENSORS, layout.RING, layout.RING_WIDTH)))
     frame: np.ndarray = field(default_factory=empty_frame)
     work: np.ndarray = field(default_factory=lambda: np.zeros((5, N_X)))
 
     def __post_init__(self):
         self.counters[layout.C_HOLD] = -1
         self.counters[layout.C_SAMPLES] = 0
-        core.sample_sensors(
-            self.P, self.E, self.sensors, self.errors, self.seed, self.x, 0.0, self.counters, self.ring
-        )
+        core.sample_sensors(self.P, self.E, self.sensors, self.errors, self.seed, self.x, 0.0, self.counters, self.ring)
 
     @property
     def time(self) -> float:

@@ -98,7 +98,7 @@ def extra_wrench(P, F, kz, u, v, w):
     kz is the third component of the unit vector down's first body axis, -sin(theta): positive in a dive.
     """
     X, Y, Z, K, M, N = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    alpha, beta, v_squared = flow_angles(u, v, w)
+    alpha, _, v_squared = flow_angles(u, v, w)
     drag, lift = 0.0, 0.0
     if F[ef.CLIMB_DIVE] != 0.0:
         drag += F[ef.CLIMB_DIVE] * math.tanh(-kz / ef.REST_PITCH) * (P[K_D0] + P[K_D] * alpha * alpha) * v_squared

@@ -17,8 +17,8 @@ from typing import Any
 class Parameter:
     """A parameter of an effect: 0 (or `default`) is no effect.
 
-    `spread` is the prior's 1 sigma: half of the cases that are worth a diagnosis lie within. `entry` is its place in the
-    effect vector F (sim_backend/core/effect_layout), -1 where `apply` of the effect sets the world otherwise.
+    `spread` is the prior's 1 sigma: how far cases that are worth a diagnosis are likely to go. `entry` is its place in
+    the effect vector F (sim_backend/core/effect_layout), -1 where `apply` of the effect sets the world otherwise.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""`corrected.toml`: a nominal vehicle with its parameters refitted and effects added, as `glider gap predict` takes it."""
+"""`corrected.toml`: a nominal vehicle, its parameters refitted, effects added; `glider gap predict` takes it."""
 
 from pathlib import Path
 from typing import Annotated
@@ -31,9 +31,9 @@ class CorrectedTable(Table):
     format: Annotated[int, msgspec.Meta(ge=1, le=1)]
     corrected: bool
     vehicle: str
-    parameters: dict[str, Finite] = {}
-    bias: dict[str, Finite] = {}
-    effects: dict[str, dict[str, Finite]] = {}
+    parameters: dict[str, Finite] = msgspec.field(default_factory=dict)
+    bias: dict[str, Finite] = msgspec.field(default_factory=dict)
+    effects: dict[str, dict[str, Finite]] = msgspec.field(default_factory=dict)
 
 
 def is_corrected(text: str) -> bool:
@@ -42,7 +42,7 @@ def is_corrected(text: str) -> bool:
 
 
 def load_corrected(path: Path | str, nominal: Model) -> Model:
-    """The model of a corrected.toml on top of a case's nominal vehicle; ConfigError, one line, where it cannot be used."""
+    """The model of a corrected.toml on top of a case's nominal vehicle; ConfigError where it cannot be used."""
     source = str(path)
     table = decode(read_text(Path(path)), CorrectedTable, source)
     if not table.corrected:

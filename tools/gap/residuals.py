@@ -4,6 +4,7 @@ Each test is a number of standard deviations, normal under the true model; the l
 many there are (Bonferroni). Spectrum and correlations are taken run by run and pooled, gaps in the data count as 0.
 """
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -67,9 +68,7 @@ def tests(problem: Problem, gains: Gains) -> list[Finding]:
         filled = np.where(ok, e, 0.0)
         found.append(Finding(channel, "variance", float(((filled**2).sum() - count) / np.sqrt(2.0 * count))))
         # mean of each run: N(0, 1) each
-        means = [
-            filled[a:b].sum() / np.sqrt(max(1, ok[a:b].sum())) for a, b in zip(bounds[:-1], bounds[1:], strict=True)
-        ]
+        means = [filled[a:b].sum() / np.sqrt(max(1, ok[a:b].sum())) for a, b in itertools.pairwise(bounds)]
         found.append(Finding(channel, "mean", chi(np.array(means))))
         for low, high in LAGS:
             z = np.array([lagged(filled, ok, bounds, lag) for lag in range(low, high + 1)])
@@ -89,7 +88,7 @@ def chi(z: np.ndarray) -> float:
 def lagged(e: np.ndarray, ok: np.ndarray, bounds: np.ndarray, lag: int) -> float:
     """Correlation with itself `lag` samples before, within runs, as a normal deviate."""
     total, pairs = 0.0, 0
-    for a, b in zip(bounds[:-1], bounds[1:], strict=True):
+    for a, b in itertools.pairwise(bounds):
         if b - a > lag:
             total += float(e[a + lag : b] @ e[a : b - lag])
             pairs += int((ok[a + lag : b] & ok[a : b - lag]).sum())
@@ -99,7 +98,7 @@ def lagged(e: np.ndarray, ok: np.ndarray, bounds: np.ndarray, lag: int) -> float
 def peak(e: np.ndarray, bounds: np.ndarray) -> float:
     """The highest line of the periodogram of all runs, as a normal deviate of the same probability (Fisher)."""
     highest, lines = 0.0, 0
-    for a, b in zip(bounds[:-1], bounds[1:], strict=True):
+    for a, b in itertools.pairwise(bounds):
         power = np.abs(np.fft.rfft(e[a:b])[1:]) ** 2 / max(1.0, float((e[a:b] ** 2).sum()))
         highest, lines = max(highest, float(power.max(initial=0.0))), lines + len(power)
     chance = -np.expm1(lines * np.log1p(-np.exp(-min(highest, 700.0)))) if highest < 700.0 else 0.0
@@ -109,7 +108,7 @@ def peak(e: np.ndarray, bounds: np.ndarray) -> float:
 def goes_with(e: np.ndarray, ok: np.ndarray, values: np.ndarray, bounds: np.ndarray) -> float:
     """Correlation with a feature, each run's means taken off, as a normal deviate."""
     total, weight = 0.0, 0.0
-    for a, b in zip(bounds[:-1], bounds[1:], strict=True):
+    for a, b in itertools.pairwise(bounds):
         part = values[a:b][ok[a:b]]
         if len(part) < 2:
             continue

@@ -19,6 +19,7 @@ PRIOR_NONE = 0.5  # before anything was measured; the labels share the rest
 UNCLEAN = 6.0  # sigma, corrected for the number of tests
 LEFT_OVER, LEFT_WIDTH = 0.2, 0.6  # share left, at which unknown is as likely as not, and the width in e-folds
 EVEN = 0.25  # of what the first axis brings: turbulence brings at least as much on a second
+MOSTLY = 0.9  # of all that can be explained, for turbulence or waves to be the cause
 SHOWN = 0.7  # of the gap that is left: an effect beside another must move predictions by as much
 EARNED = 12.0  # nat of evidence that an effect brings, or it is left out (docs/DIAGNOSIS.md, Thresholds)
 TIE = 6.0  # nat within which two labels are not told apart: what a change of prior spreads can move
@@ -184,10 +185,11 @@ def conclude(search: Search, noise: Probed | None = None) -> Answer:
     unexplained = 0.0
     if unclean >= UNCLEAN:
         brought, left, freed = gaps_left(search, course)
+        brought = max(brought, 0.0) + (noise.gain if noise is not None else 0.0)
         unexplained = float(np.clip(left / max(left + brought, 1e-9), 0.0, 1.0))
         if noise is None and unexplained > LEFT_OVER:
             found = scatter(search)
-            if found is not None and found.gain > brought + left:
+            if found is not None and found.gain > MOSTLY * (brought + left):
                 more, doubt = raised(search.problem, found.probe, found.scale)
                 rough = replace(search.problem, spectral=search.problem.spectral + more)
                 return conclude(run(rough), found)

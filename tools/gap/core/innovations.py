@@ -147,14 +147,13 @@ def missed(z, y, d):
     """z - y into d (N_Y), angles wrapped; NaN where nothing was measured."""
     for j in range(N_Y):
         d[j] = z[j] - y[j]
-        if j < 3 or j >= ef.Y_MOCAP_ROLL:
-            if not math.isnan(d[j]):
-                d[j] = wrapped(d[j])
+        if (j < 3 or j >= ef.Y_MOCAP_ROLL) and not math.isnan(d[j]):
+            d[j] = wrapped(d[j])
 
 
 @kernel
 def linear_step(Pw, F, x, mode, t, inputs, i, begin, zero, work, kept, moved, base, error, Phi, Gam):
-    """Fly x to row i and differentiate the step: Phi (N_ERR, N_ERR) by the state, Gam (N_ERR, 6) by held accelerations."""
+    """Fly x to row i; Phi (N_ERR, N_ERR) is the step's derivative by the state, Gam (N_ERR, 6) by accelerations."""
     acc = np.zeros(6)
     base[:] = x
     propagate(Pw, F, base, mode, t, inputs, i, begin, acc, zero, work, kept)
@@ -184,7 +183,8 @@ def filter_run(P, F, spectral, R, mode, t, inputs, z, begin, end, start, spread,
     """The Kalman filter over rows begin .. end - 1. Returns -2 log likelihood without its constant.
 
     P (N_P), F (N_F); spectral (12): spectral densities of the accelerations ((m/s2)2 s, (rad/s2)2 s), walks of
-    servo, slider and ballast and of the position (per s); R (N_Y) measurements' variances; start (N_XF), spread (N_ERR).
+    servo, slider and ballast and of the position (per s); R (N_Y) measurements' variances; start (N_XF), spread
+    (N_ERR).
     Out: X (rows, N_XF) the state and path (rows, 6) after each row, E (rows, N_Y) whitened innovations, NaN where
     nothing was measured, W (rows, N_Y, N_Y) what whitens a row's innovations and K (rows, N_ERR, N_Y) what corrects
     the state by the whitened ones.
@@ -366,7 +366,7 @@ def follow_run(P, F, mode, t, inputs, z, begin, end, start, W, K, X, path, E):
 @parallel_kernel
 def follow_runs(Ps, Fs, modes, bounds, t, inputs, z, starts, W, K, E):
     """Whitened innovations E (models, rows, N_Y) of models Ps (models, N_P), Fs (models, N_F) with kept gains."""
-    runs, rows = len(bounds) - 1, len(t)
+    runs = len(bounds) - 1
     for n in prange(Ps.shape[0] * runs):
         m, run = n // runs, n % runs
         begin, end = bounds[run], bounds[run + 1]
