@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from firmware.core import estimator_layout as est
-from firmware.estimation.settings import DISTURBANCE_HOLD, UNSEEN_SERVO_WALK
+from firmware.estimation.settings import UNSEEN_SERVO_WALK
 from sim_backend.core import effect_layout as ef
+from sim_backend.core.layout import DISTURBANCE_HOLD
 from tools.gap import start
 from tools.gap.channels import measured
 from tools.gap.core.innovations import N_ERR, N_Y, filter_runs, fly_windows, follow_runs, read_rows, simulate_runs
