@@ -46,21 +46,21 @@ def load_corrected(path: Path | str, nominal: Model) -> Model:
     source = str(path)
     table = decode(read_text(Path(path)), CorrectedTable, source)
     if not table.corrected:
-        raise ConfigError("must be true", source=source, key="corrected")
+        raise ConfigError(source, "must be true", key="corrected")
     P, F = nominal.P.copy(), np.zeros(ef.N_F)
     for name, value in table.parameters.items():
         if name not in PARAMETERS:
-            raise ConfigError("no such parameter", source=source, key=f"parameters.{name}")
+            raise ConfigError(source, "no such parameter", key=f"parameters.{name}")
         P[PARAMETERS[name]] = value
     for name, value in table.bias.items():
         if name not in BIASES:
-            raise ConfigError(f"no such reading; known: {', '.join(BIASES)}", source=source, key=f"bias.{name}")
+            raise ConfigError(source, f"no such reading; known: {', '.join(BIASES)}", key=f"bias.{name}")
         F[ef.BIAS + BIASES.index(name)] = value
     for label, values in table.effects.items():
         try:
             checked = check_values(label, values)
         except EffectError as error:
-            raise ConfigError(str(error), source=source, key=f"effects.{label}") from None
+            raise ConfigError(source, str(error), key=f"effects.{label}") from None
         for parameter in catalogue()[label].parameters:
             if parameter.entry >= 0:
                 F[parameter.entry] += checked[parameter.name]

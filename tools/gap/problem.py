@@ -7,7 +7,6 @@ import numpy as np
 from firmware.core import estimator_layout as est
 from firmware.estimation.settings import UNSEEN_SERVO_WALK
 from sim_backend.core import effect_layout as ef
-from sim_backend.core.layout import DISTURBANCE_HOLD
 from tools.gap import start
 from tools.gap.channels import measured
 from tools.gap.core.innovations import N_ERR, N_Y, filter_runs, fly_windows, follow_runs, read_rows, simulate_runs
@@ -162,7 +161,7 @@ def pose(case: Case, model: Model | None = None, runs: list[Run] | None = None) 
         z[recording.bounds[n] : recording.bounds[n + 1], ef.Y_SLIDER : ef.Y_BALLAST + 1][np.isfinite(driven)] = np.nan
     d = case.disturbance
     spectral = np.array(
-        [*3 * [d.linear**2 * DISTURBANCE_HOLD], *3 * [d.angular**2 * DISTURBANCE_HOLD], *walk, *3 * [0.0]]
+        [*3 * [d.linear**2 * est.DISTURBANCE_HOLD], *3 * [d.angular**2 * est.DISTURBANCE_HOLD], *walk, *3 * [0.0]]
     )
     run_of = np.repeat(np.arange(count), np.diff(recording.bounds))
     R = recording.settings[:, est.S_R :].copy()

@@ -6,7 +6,6 @@ import numpy as np
 from scipy.stats import norm
 
 from sim_backend.effects.base import catalogue
-from tools.gap.candidates import place
 from tools.gap.fit import Course
 from tools.gap.measure import root_mean_square, run_gap
 from tools.gap.probes import TURBULENCE, WAVES, Probed, probe_model, probes, raised
@@ -17,10 +16,10 @@ from tools.gap.search import Search, run, settle
 NONE, UNKNOWN = "none", "unknown"
 PRIOR_NONE = 0.5  # before anything was measured; the labels share the rest
 UNCLEAN = 6.0  # sigma, corrected for the number of tests
-LEFT_OVER, LEFT_WIDTH = 0.2, 0.6  # share left, at which unknown is as likely as not, and the width in e-folds
-EVEN = 0.25  # of what the first axis brings: turbulence brings at least as much on a second
+LEFT_OVER, LEFT_WIDTH = 0.11, 0.5  # share left, at which unknown is as likely as not, and the width in e-folds
+ONE_AXIS = 0.65  # of what all axes bring together: where one alone brings as much, it is no turbulence
 MOSTLY = 0.9  # of all that can be explained, for turbulence or waves to be the cause
-SHOWN = 0.7  # of the gap that is left: an effect beside another must move predictions by as much
+SHOWN = 0.3  # of the gap that is left: an effect beside another must move predictions by as much
 EARNED = 12.0  # nat of evidence that an effect brings, or it is left out (docs/DIAGNOSIS.md, Thresholds)
 TIE = 6.0  # nat within which two labels are not told apart: what a change of prior spreads can move
 MOST_GROUP = 3
@@ -64,7 +63,7 @@ def drop(search: Search, course: Course, label: str) -> Course:
 
 
 def shown(search: Search, course: Course) -> dict[str, float]:
-    """How far each effect alone moves the windows' predictions, over what the candidate leaves of the gap.
+    """How far dropping each effect, and fitting the rest anew, moves the windows' predictions, over what gap is left.
 
     Both in tolerances, root mean square over channels and runs, from the same starts. An effect below SHOWN is a
     detail that the data can see and nobody needs: the wrong form of another one, a sample's worth of delay.
@@ -77,9 +76,8 @@ def shown(search: Search, course: Course) -> dict[str, float]:
     left = max(apart(problem, scored, whole, problem.z), 1e-6)
     found = {}
     for label in course.labels:
-        without = [v * (f.label != label) for f, v in zip(course.free, course.values, strict=True)]
-        P0, F0 = place(problem, [*search.allowed, *course.free], np.concatenate([course.allowed, without]))
-        found[label] = apart(problem, scored, whole, flight(problem, scored, P0, F0, gains)) / left
+        without = flight(problem, scored, *search.model(drop(search, course, label)), gains)
+        found[label] = apart(problem, scored, whole, without) / left
     return found
 
 
@@ -161,14 +159,14 @@ def gaps_left(search: Search, course: Course) -> tuple[float, float, list[Probed
 def scatter(search: Search) -> Probed | None:
     """Turbulence or waves, where water in disorder explains the recalibrated model's misfit better than any one link.
 
-    Turbulence shakes every axis: where one axis brings far more than the next, something else shakes that axis.
+    Turbulence shakes every axis: where one alone brings most of it, something else shakes that axis.
     """
     freed = probe_model(search.problem, *search.model(search.null), probes(search.problem))
     first = freed[0]
     if first.probe.name == WAVES:
         return first
     axes = sorted((p.gain for p in freed if p.probe.stage == "force" and p.probe.name != TURBULENCE), reverse=True)
-    return first if first.probe.name == TURBULENCE and axes[1] > EVEN * axes[0] else None
+    return first if first.probe.name == TURBULENCE and axes[0] < ONE_AXIS * first.gain else None
 
 
 def conclude(search: Search, noise: Probed | None = None) -> Answer:
