@@ -18,6 +18,7 @@ from tools.gap.verdict import NONE, UNKNOWN, Answer, conclude
 from tools.runs.case import Case
 
 UNPREDICTABLE = ("waves", "turbulence")
+UNFIT = 5.0  # tolerances that the best explanation still misses by: unknown effects of the blind test left up to 3
 WORTH = 0.001  # a smaller probability is not written down
 
 
@@ -31,6 +32,11 @@ class Diagnosis:
     shrinkage: Shrinkage
     next_run: dict[str, Any]
     mission: str  # its file's text
+
+    @property
+    def identify_first(self) -> bool:
+        """Whether the log fits the vehicle file so badly that no cause can be asked for yet."""
+        return self.verdict == "unknown" and self.shrinkage.after > UNFIT
 
     @property
     def verdict(self) -> str:
@@ -106,6 +112,7 @@ def plain(diagnosis: Diagnosis) -> dict[str, Any]:
         "selected": [] if diagnosis.verdict == "none" else selected,
         "gap": gap_table(diagnosis.shrinkage, answer),
         "left": [{"channel": f.channel, "goes_with": f.test, "sigma": f.sigma} for f in answer.findings[:8]],
+        "identify_first": diagnosis.identify_first,
         "next_run": diagnosis.next_run,
     }
 

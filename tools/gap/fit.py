@@ -7,6 +7,7 @@ approximation around the least misfit gives the evidence.
 """
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from tools.gap.candidates import Free, place
 from tools.gap.problem import Gains, Problem
@@ -105,19 +106,14 @@ class Fitter:
 
 
 def within(normal: np.ndarray, slope: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """The step that minimises slope d + d normal d / 2 with low <= d <= high: what would go beyond is held there."""
-    step, held = np.zeros(len(slope)), np.zeros(len(slope), dtype=bool)
-    for _ in range(len(slope) + 1):
-        go = ~held
-        if not go.any():
-            break
-        step[go] = -np.linalg.solve(normal[np.ix_(go, go)], slope[go] + normal[np.ix_(go, held)] @ step[held])
-        beyond = go & ((step < low - 1e-9) | (step > high + 1e-9))
-        if not beyond.any():
-            break
-        step[beyond] = np.clip(step, low, high)[beyond]
-        held |= beyond
-    return step
+    """The step d that minimises slope d + d normal d / 2 with low <= d <= high (low <= 0 <= high, normal definite)."""
+    step = -np.linalg.solve(normal, slope) if len(slope) else np.zeros(0)
+    if (step >= low).all() and (step <= high).all():
+        return step
+    root = np.linalg.cholesky(normal)
+    aim = -np.linalg.solve(root, slope)
+    found = lsq_linear(root.T, aim, (low - 1e-12, high + 1e-12), method="bvls")
+    return np.clip(found.x, low, high)
 
 
 class Course:
@@ -188,7 +184,8 @@ class Course:
         """By Laplace's approximation, up to a constant of the data and the gains."""
         doubled = 2.0 * np.log(2.0) * sum(f.kinked for f in self.free)  # half of a prior lies on one side
         logdet = float(np.linalg.slogdet(self.precision)[1]) if len(self.free) else 0.0
-        return -0.5 * (self.misfit + fitter.occam + logdet - doubled)
+        value = -0.5 * (self.misfit + fitter.occam + logdet - doubled)
+        return float(value) if np.isfinite(value) else -np.inf
 
     def promise(self) -> float:
         """Log evidence that one step is foreseen to gain, less what the new parameters cost."""

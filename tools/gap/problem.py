@@ -22,6 +22,7 @@ POSITION_SPREAD, DEPTH_SPREAD, ATTITUDE_SPREAD, RATE_SPREAD = 0.05, 0.05, 0.05, 
 ACTUATOR_SPREAD = (1e-4, 3e-4, 5e-4)  # rad, m, kg: where commanded, they begin at 0 and at the draw-wires
 UNSEEN_SPREAD = 0.3  # rad, of a servo without command
 ROUGH_WALK = (1e-6, 4e-10, 2.5e-9)  # per s, times the roughness squared, of filters that are not to trust the model
+LOST = 1e6  # sigma; innovations of a model that has left every vehicle
 WALK = (1e-8, 1e-12, 1e-12)  # per s; commanded actuators go as the model says
 
 
@@ -91,7 +92,7 @@ class Problem:
                 np.array([P for P, _ in part]), np.array([F for _, F in part]), r.modes, r.bounds, r.t, r.inputs,
                 self.z, self.starts, gains.W, gains.K, E,
             )  # fmt: skip
-            out.append(E[:, self.valid])
+            out.append(np.clip(np.nan_to_num(E[:, self.valid], nan=LOST), -LOST, LOST))
         return np.concatenate(out)
 
     def part(self, run: int) -> "Problem":
