@@ -6,9 +6,7 @@ error or of a delay, so that effects of the catalogue count for their links too,
 Shares do not add up: an error of the pump can be taken up by its own speed, and by the draw-wire that measures it.
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -59,14 +57,6 @@ def stage_of(subsystem: str, element: str) -> str:
     if (subsystem, element) == ("mass", "inertia"):
         return MOTION
     return STAGE_OF_PLACE[subsystem]
-
-
-def by_stage(places: Iterable[dict[str, Any]]) -> dict[str, float]:
-    """Probability of each stage from that of places (subsystem, element, probability)."""
-    chances = dict.fromkeys(STAGES, 0.0)
-    for place in places:
-        chances[stage_of(place["subsystem"], place["element"])] += place["probability"]
-    return chances
 
 
 def links(search: Search, without: Course, best: Course) -> list[Link]:

@@ -82,9 +82,10 @@ def number(value: float) -> str:
     """Three digits that count, with a true minus."""
     if not math.isfinite(value):
         return DASH
-    digits = 0 if value == 0.0 else max(0, 2 - math.floor(math.log10(abs(value))))
-    text = f"{value:.{min(digits, 8)}f}"
-    return text.replace("-", MINUS) if float(text) != 0.0 else text.lstrip("-")
+    if abs(value) < 1e-8:
+        return "0"
+    digits = min(max(0, 2 - math.floor(math.log10(abs(value)))), 9)
+    return f"{value:.{digits}f}".replace("-", MINUS)
 
 
 def percent(share: float) -> str:
@@ -227,7 +228,7 @@ def _unknown(diagnosis: Diagnosis) -> str:
     strongest, goes = strongest_left(answer.findings)
     if strongest is not None:
         said += f", strongest in measured {channel(strongest.channel)}"
-    if goes is not None:
+    if strongest is not None and goes is not None:
         elsewhere = f", in measured {channel(goes.channel)}," if goes.channel != strongest.channel else ""
         said += f" and{elsewhere} going with {goes.test}"
     likely = places(answer)[:1]
