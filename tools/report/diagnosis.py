@@ -204,7 +204,7 @@ def _context(diagnosis: Diagnosis) -> dict[str, Any]:
     return {
         "data": _data(diagnosis),
         "verdict": diagnosis.verdict,
-        "sentence": words.sentence(diagnosis).replace(" %", "\N{NO-BREAK SPACE}%"),
+        "sentence": words.sentence(diagnosis),
         "chain": chain_svg([] if none else places(answer), certain, diagnosis.verdict == "unknown"),
         "panels": _panels(diagnosis),
         "ranking": _ranking(diagnosis),
@@ -231,7 +231,7 @@ def _context(diagnosis: Diagnosis) -> dict[str, Any]:
 
 def report_html(diagnosis: Diagnosis) -> str:
     """The page's text; MissingExtra without jinja2."""
-    return render("diagnosis.html", _context(diagnosis))
+    return render("diagnosis.html", _context(diagnosis)).replace(" %", "\N{NO-BREAK SPACE}%")
 
 
 def write_report(path: Path, diagnosis: Diagnosis) -> None:
