@@ -12,7 +12,8 @@ import numpy as np
 
 from sim_backend.effects.base import catalogue
 from tools.gap.fit import Course
-from tools.gap.probes import TURBULENCE, WAVES, Probe, Probed, probe_model, probes, raised
+from tools.gap.probes import TURBULENCE, WAVES, Probe, Probed, probe_model, probes
+from tools.gap.problem import pose
 from tools.gap.search import Search
 from tools.gap.verdict import instead
 
@@ -110,14 +111,15 @@ def ordered(shared: list[Link]) -> list[Link]:
     return sorted(most.values(), key=lambda link: (STAGES.index(link.stage), -link.share))
 
 
-def calm(search: Search, noise: Probed) -> Search:
+def calm(search: Search) -> Search:
     """A search that was told of turbulence or waves, with the case's own disturbance again."""
-    more, _ = raised(search.problem, noise.probe, noise.scale)
-    return replace(search, problem=replace(search.problem, spectral=search.problem.spectral - more))
+    problem = search.problem
+    own = pose(problem.case, problem.model, problem.runs)
+    return replace(search, problem=replace(problem, spectral=own.spectral))
 
 
-def scatter(search: Search, null: Course, noise: Probed) -> Scatter:
+def scatter(search: Search, null: Course) -> Scatter:
     """How much of the scatter the turbulence or the waves that a search was told of explain, at a model."""
     model = search.model(null)
-    both = (calm(search, noise).problem, search.problem)
+    both = (calm(search).problem, search.problem)
     return Scatter(*(float(np.nanmean(problem.filter(*model).E ** 2)) for problem in both))

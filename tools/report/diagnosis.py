@@ -50,7 +50,7 @@ def _panels(diagnosis: Diagnosis) -> list[dict[str, Any]]:
         return [_panel(f"Of what is left{beyond}", shared_out(answer.freed, 0.0))]
     fitted = [label for label in answer.selected if label in answer.course.labels][:PANELS]
     if answer.noise is not None or not fitted:
-        seen = search if answer.noise is None else calm(search, answer.noise)
+        seen = search if answer.noise is None else calm(search)
         return [_panel("Of what the likeliest link brings", links(seen, search.null, search.null))]
     panels = []
     for label in fitted:
@@ -67,7 +67,7 @@ def _ranking(diagnosis: Diagnosis) -> list[dict[str, Any]]:
         {
             "label": label,
             "place": words.place(label) if label in effects else "",
-            "means": words.PLAIN.get(label, {"none": "no gap", "unknown": "a gap of another kind"}.get(label, "")),
+            "means": words.MEANS.get(label) or words.PLAIN[label],
             "percent": 100.0 * p,
             "shown": words.small_percent(p),
         }
@@ -84,7 +84,9 @@ def _effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     for label in diagnosis.answer.selected:
         rows = []
         for name, entry in parameters(diagnosis, label).items():
-            values, unit = words.scaled([float(entry["estimate"]), *map(float, entry["ci90"])], entry["unit"])
+            mass = catalogue()[label].subsystem in ("mass", "actuation")
+            values = [float(entry["estimate"]), *map(float, entry["ci90"])]
+            values, unit = words.scaled(values, entry["unit"], mass)
             rows.append(
                 {
                     "name": name,
@@ -104,7 +106,7 @@ def _scatter(diagnosis: Diagnosis) -> dict[str, str] | None:
     noise = diagnosis.answer.noise
     if noise is None:
         return None
-    found = scatter(diagnosis.search, diagnosis.search.null, noise)
+    found = scatter(diagnosis.search, diagnosis.search.null)
     return {"name": noise.probe.name, "calm": words.number(found.calm), "rough": words.number(found.rough)}
 
 

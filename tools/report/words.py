@@ -8,7 +8,7 @@ from tools.gap.diagnose import Diagnosis, places
 from tools.gap.probes import TURBULENCE, WAVES
 from tools.gap.residuals import Finding
 from tools.gap.shrink import Shrinkage
-from tools.gap.verdict import UNCLEAN, UNKNOWN
+from tools.gap.verdict import UNCLEAN
 
 MINUS, DASH = "\N{MINUS SIGN}", "\N{EN DASH}"
 PLAIN = {
@@ -74,6 +74,8 @@ AXES = {
     "mocap y": "horizontal", "mocap z": "vertical", "mocap roll": "roll axis",
     "mocap pitch": "pitch axis", "mocap yaw": "yaw axis",
 }  # fmt: skip
+SURE, LITTLE = 0.8, 0.02  # below the first the next answer is named, unless it is below the second
+MEANS = {"none": "no gap", "unknown": "a gap of another kind"}
 SHAPES = ("variance", "mean", "lag", "spectrum")  # tests of a channel by itself; the others go with something
 READABLE = {"rad": ("deg", 180.0 / math.pi), "rad/s": ("deg/s", 180.0 / math.pi), "1/rad": ("1/deg", math.pi / 180.0)}
 
@@ -109,13 +111,13 @@ def nats(value: float) -> str:
     return "more than 1000 nat" if value > 1000.0 else f"{value:.0f} nat"
 
 
-def scaled(values: list[float], unit: str) -> tuple[list[float], str]:
-    """SI values in the unit that is easiest to read."""
+def scaled(values: list[float], unit: str, mass: bool = True) -> tuple[list[float], str]:
+    """SI values in the unit that is easiest to read; a trim's kg is no mass (N m over m2/s2) and stays."""
     if unit in READABLE:
         shown, factor = READABLE[unit]
         return [factor * value for value in values], shown
     largest = max(abs(value) for value in values)
-    if unit.startswith("kg") and largest < 1.0:
+    if mass and unit.startswith("kg") and largest < 1.0:
         return [1000.0 * value for value in values], unit[1:]
     if unit == "m" and largest < 0.1:
         return [1000.0 * value for value in values], "mm"
@@ -171,6 +173,17 @@ def alone(s: Shrinkage) -> str:
     return f"makes it {percent(-share)} larger" if share < -0.005 else f"shrinks it by {percent(max(share, 0.0))}"
 
 
+def how_sure(diagnosis: Diagnosis) -> str:
+    """`97 % sure`; where that is little, what else it may be."""
+    answer = diagnosis.answer
+    p = answer.probabilities[answer.main]
+    others = {label: chance for label, chance in answer.probabilities.items() if label != answer.main}
+    second = max(others, key=lambda label: others[label])
+    if p >= SURE or others[second] < LITTLE:
+        return f"{sure(p)} sure"
+    return f"only {sure(p)} sure, else {MEANS.get(second, second)} at {sure(others[second])}"
+
+
 def sentence(diagnosis: Diagnosis) -> str:
     """The verdict in one plain sentence: what, where, how sure, how far."""
     if diagnosis.verdict == "none":
@@ -183,12 +196,12 @@ def sentence(diagnosis: Diagnosis) -> str:
 
 
 def _none(diagnosis: Diagnosis) -> str:
-    s, p = diagnosis.shrinkage, diagnosis.answer.probabilities["none"]
+    s = diagnosis.shrinkage
     return (
-        f"No gap: noise, disturbance and parameters within their uncertainty explain these runs ({sure(p)} sure); "
-        f"on runs left out of the fit the total stands at {number(s.before)} tolerances with the nominal model and at "
-        f"{number(s.recalibrated)} with its parameters refitted, where noise and disturbance alone leave "
-        f"{number(s.floor)}."
+        "No gap: noise, disturbance and parameters within their uncertainty explain these runs "
+        f"({how_sure(diagnosis)}); on runs left out of the fit the total stands at {number(s.before)} tolerances with "
+        f"the nominal model and at {number(s.recalibrated)} with its parameters refitted, where noise and disturbance "
+        f"alone leave {number(s.floor)}."
     )
 
 
@@ -196,7 +209,7 @@ def _causes(diagnosis: Diagnosis) -> str:
     answer = diagnosis.answer
     others = [label for label in answer.selected if label != answer.main]
     alike = [label for label in answer.groups.get(answer.main, []) if label != answer.main]
-    said = f"{PLAIN[answer.main]} ({answer.main}, {place(answer.main)}; {sure(answer.probabilities[answer.main])} sure)"
+    said = f"{PLAIN[answer.main]} ({answer.main}, {place(answer.main)}; {how_sure(diagnosis)})"
     if alike:
         said += f", which these data cannot tell from {joined(alike)}"
     if others:
@@ -212,11 +225,11 @@ def _scatter(diagnosis: Diagnosis) -> str:
     main, noise = answer.main, answer.noise
     size = ""
     if main == TURBULENCE and noise is not None:
-        size = f", about {number(noise.scale)} times as rough"
+        size = f", about {noise.scale:.2g} times as rough"
     others = [label for label in answer.selected if label != main]
     beside = f", and beside it {joined([f'{PLAIN[o]} ({o}, {place(o)})' for o in others])}" if others else ""
     return (
-        f"{upper(PLAIN[main])}{size} ({main}, {place(main)}; {sure(answer.probabilities[main])} sure){beside}; its "
+        f"{upper(PLAIN[main])}{size} ({main}, {place(main)}; {how_sure(diagnosis)}){beside}; its "
         f"course cannot be predicted, so that knowing it shrinks no gap, and on runs left out of the fit refitting the "
         f"nominal parameters {alone(s)}, to {number(s.recalibrated)} tolerances."
     )
@@ -224,7 +237,7 @@ def _scatter(diagnosis: Diagnosis) -> str:
 
 def _unknown(diagnosis: Diagnosis) -> str:
     answer = diagnosis.answer
-    said = f"A gap that no effect of the catalogue explains ({sure(answer.probabilities[UNKNOWN])} sure)"
+    said = f"A gap that no effect of the catalogue explains ({how_sure(diagnosis)})"
     strongest, goes = strongest_left(answer.findings)
     if strongest is not None:
         said += f", strongest in measured {channel(strongest.channel)}"

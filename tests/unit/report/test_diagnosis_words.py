@@ -41,7 +41,14 @@ def test_one_cause_says_what_where_how_sure_and_how_far():
 
 def test_what_cannot_be_told_apart_is_in_the_sentence():
     said = words.sentence(diagnosis({"drag": 0.6, "tether": 0.4}, ["drag"], {"drag": ["drag", "tether"]}))
-    assert "60 % sure), which these data cannot tell from tether; with that" in said
+    assert "only 60 % sure, else tether at 40 %), which these data cannot tell from tether; with that" in said
+
+
+def test_doubt_names_the_next_answer():
+    said = words.sentence(diagnosis({"none": 0.51, "unknown": 0.49}))
+    assert "(only 51 % sure, else a gap of another kind at 49 %)" in said
+    said = words.sentence(diagnosis({"unknown": 0.7, "none": 0.3}))
+    assert "(only 70 % sure, else no gap at 30 %)" in said
 
 
 def test_two_effects_are_both_named():
@@ -93,9 +100,7 @@ def test_an_unknown_gap_that_goes_with_something_elsewhere_says_where():
 def test_scatter_claims_no_shrinkage():
     probe = Probe(TURBULENCE, "force", "environment", "water", (0, 1, 2, 3, 4, 5))
     said = words.sentence(diagnosis({"turbulence": 0.96}, ["turbulence"], noise=Probed(probe, 900.0, 3.6)))
-    assert said.startswith(
-        "The water is rougher than the vehicle file says, about 3.60 times as rough (turbulence, env"
-    )
+    assert said.startswith("The water is rougher than the vehicle file says, about 3.6 times as rough (turbulence, env")
     assert "its course cannot be predicted, so that knowing it shrinks no gap" in said
     assert "88 %" not in said
     waves = Probe("waves", "water", "environment", "water", (9, 10, 11))
