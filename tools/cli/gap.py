@@ -7,6 +7,8 @@ import click
 from tools.cli.challenge import challenge
 from tools.cli.common import json_option, print_json, progress, say
 
+STEPS = 7  # of a diagnosis: screen, up to three effects, verdict, how far, report
+
 
 @click.group()
 def gap():
@@ -98,15 +100,31 @@ def diagnose(case: Path, out: Path, as_json: bool) -> None:
     from tools.errors import need
     from tools.gap.diagnose import diagnose as run_diagnosis
     from tools.gap.diagnose import plain, write
+    from tools.report.diagnosis import write_report
+    from tools.report.words import sentence
     from tools.runs.case import load_case
 
     need("scipy", "jinja2")
     loaded = load_case(case)
-    found = run_diagnosis(loaded, say)
-    write(found, out)
+    done = 0
+    with progress("diagnose", STEPS) as advance:
+
+        def step(text: str) -> None:
+            nonlocal done
+            say(text)
+            if done < STEPS - 2:
+                done += 1
+                advance(1)
+
+        found = run_diagnosis(loaded, step)
+        advance(STEPS - 1 - done)
+        write(found, out)
+        write_report(out / "report.html", found)
+        advance(1)
     if as_json:
         print_json(plain(found))
-    say(f"answer: {out / 'diagnosis.json'}")
+    say(sentence(found))
+    say(f"answer: {out / 'diagnosis.json'}, report: {out / 'report.html'}")
 
 
 gap.add_command(challenge)

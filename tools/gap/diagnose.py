@@ -63,7 +63,8 @@ def parameters(diagnosis: Diagnosis, label: str) -> dict[str, dict[str, Any]]:
     for n, free in enumerate(course.free):
         if free.label == label:
             value, sd = course.values[n] * free.spread, 1.645 * spread[n] * free.spread
-            found[free.name] = {"estimate": value, "ci90": [value - sd, value + sd], "unit": free.unit}
+            low, high = max(value - sd, free.low * free.spread), min(value + sd, free.high * free.spread)
+            found[free.name] = {"estimate": value, "ci90": [low, high], "unit": free.unit}
     return found
 
 

@@ -80,7 +80,9 @@ def raised(problem: Problem, probe: Probe, scale: float) -> tuple[np.ndarray, np
     return more, doubt
 
 
-def probe_model(problem: Problem, P: np.ndarray, F: np.ndarray, wanted: list[Probe]) -> list[Probed]:
+def probe_model(
+    problem: Problem, P: np.ndarray, F: np.ndarray, wanted: list[Probe], scales=SCALES, finer=FINER
+) -> list[Probed]:
     """Every probe of a model, the one that gains most first."""
     bare = float(problem.filter(P, F).misfit.sum())
     found = []
@@ -93,13 +95,13 @@ def probe_model(problem: Problem, P: np.ndarray, F: np.ndarray, wanted: list[Pro
             tried[s] = 0.5 * (bare - float(problem.filter(P, F, more=more, doubt=doubt).misfit.sum()))
             return tried[s]
 
-        for s in SCALES:
+        for s in scales:
             value = gain(s)
             if not np.isfinite(value) or value < best:
                 break
             best, scale = value, s
         if best > 0.0:
-            for s in (scale * FINER[0], scale * FINER[1]):
+            for s in (scale * step for step in finer):
                 value = gain(s)
                 if np.isfinite(value) and value > best:
                     best, scale = value, s

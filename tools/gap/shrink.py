@@ -33,6 +33,7 @@ class Shrinkage:
     ci90: tuple[float, float]
     closed: float
     closed_ci90: tuple[float, float]
+    predictions: dict[str, list[np.ndarray]]  # by model and run, (rows, N_Y); not of the floor
 
     def channels(self, which: str) -> dict[str, float]:
         """Each channel's rms over the runs, and the total."""
@@ -65,9 +66,11 @@ def left_out(search: Search, course: Course) -> list[tuple[np.ndarray, np.ndarra
     return models
 
 
-def gaps(problem: Problem, models: list[tuple[np.ndarray, np.ndarray]], z: np.ndarray | None = None) -> list[RunGap]:
-    """The gap of each run against its own model's prediction; `z` (rows, N_Y) in the place of what was measured."""
-    found = []
+def gaps(
+    problem: Problem, models: list[tuple[np.ndarray, np.ndarray]], z: np.ndarray | None = None
+) -> tuple[list[RunGap], list[np.ndarray]]:
+    """Each run's own model's gap and prediction (rows, N_Y); `z` (rows, N_Y) in the place of what was measured."""
+    found, flown = [], []
     for n, (P, F) in enumerate(models):
         part = problem.part(n)
         table = None
@@ -79,7 +82,8 @@ def gaps(problem: Problem, models: list[tuple[np.ndarray, np.ndarray]], z: np.nd
         Y = estimated(part, F, gains)
         fly_on(part, scored, P, F, gains, Y)
         found.append(run_gap(part.runs[0], Y[:, : ef.Y_MOCAP_Z], scored.listed[0], table))
-    return found
+        flown.append(Y)
+    return found, flown
 
 
 def floor(search: Search, course: Course, rng: np.random.Generator) -> list[RunGap]:
@@ -90,7 +94,7 @@ def floor(search: Search, course: Course, rng: np.random.Generator) -> list[RunG
     draws = []
     for _ in range(DRAWS):
         Z = problem.simulated(*model, starts, rng)
-        draws.append(gaps(problem, [model] * len(problem.runs), Z))
+        draws.append(gaps(problem, [model] * len(problem.runs), Z)[0])
     mean = []
     for n, run in enumerate(problem.runs):
         names = draws[0][n].channels
@@ -106,12 +110,15 @@ def shrink(search: Search, course: Course) -> Shrinkage:
     nominal = Model(problem.model.name, problem.model.P, problem.model.sigma)
     flown = predict_nominal(problem.case, nominal, problem.runs)
     listed = cut(problem).listed
+    refitted, Y_refitted = gaps(problem, left_out(search, search.null))
+    after, Y_after = gaps(problem, left_out(search, course)) if course.labels else (refitted, Y_refitted)
     runs = {
         BEFORE: [run_gap(run, flown[n], listed[n]) for n, run in enumerate(problem.runs)],
-        RECALIBRATED: gaps(problem, left_out(search, search.null)),
+        RECALIBRATED: refitted,
+        AFTER: after,
         FLOOR: floor(search, course, rng),
     }
-    runs[AFTER] = gaps(problem, left_out(search, course)) if course.labels else runs[RECALIBRATED]
+    predictions = {BEFORE: flown, RECALIBRATED: Y_refitted, AFTER: Y_after}
     total = {name: np.array([gap.total for gap in found]) ** 2 for name, found in runs.items()}
 
     def of(pick: np.ndarray) -> tuple[float, float]:
@@ -125,5 +132,5 @@ def shrink(search: Search, course: Course) -> Shrinkage:
     mean = {name: float(np.sqrt(values.mean())) for name, values in total.items()}
     return Shrinkage(
         runs, mean[BEFORE], mean[RECALIBRATED], mean[AFTER], mean[FLOOR], shrunk, (float(low[0]), float(high[0])),
-        closed, (float(low[1]), float(high[1])),
+        closed, (float(low[1]), float(high[1])), predictions,
     )  # fmt: skip

@@ -1,17 +1,16 @@
 """The report of a measured gap: one HTML file that opens offline, on a phone too."""
 
 import math
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tools.errors import MissingExtra
 from tools.gap.assess import CaseGap
 from tools.gap.channels import CHANNELS, Channel, channels_of, measured
-from tools.gap.windows import START, Window
-from tools.report.charts import Band, Chart, Line, svg
+from tools.report.charts import Chart, Line, svg
+from tools.report.lines import bands, broken, near, unwrapped
+from tools.report.page import render
 
 MOST_RUNS = 12  # with pictures; of a longer case those with the largest gaps
 RATE_NAMES = ("roll rate p", "pitch rate q", "yaw rate r")
@@ -20,34 +19,6 @@ PARTS = {
     "allowed": "what noise, disturbance and parameter uncertainty leave anyway",
     "unexplained": "what no part explains",
 }
-
-
-def _lines(t: np.ndarray, seen: np.ndarray, said: np.ndarray, listed: list[Window], unwrap: bool) -> list[Line]:
-    """The measured line and the predicted one, which starts anew with each window."""
-    if unwrap:
-        valid = np.isfinite(seen)
-        seen = seen.copy()
-        seen[valid] = np.unwrap(seen[valid])
-        # bring each predicted sample to the turn of the measured one next to it
-        near = np.interp(t, t[valid], seen[valid]) if valid.any() else np.zeros_like(t)
-        said = near + (said - near + np.pi) % (2.0 * np.pi) - np.pi
-    begins = [window.first for window in listed[1:]]
-    return [
-        Line(t, seen, "measured"),
-        Line(np.insert(t, begins, t[begins]), np.insert(said, begins, np.nan), "predicted"),
-    ]
-
-
-def _bands(t: np.ndarray, listed: list[Window]) -> list[Band]:
-    """The 2 s in which each window finds its start, and what is left unscored."""
-    bands = []
-    for window in listed:
-        first, last = t[window.first], t[window.end - 1]
-        if window.scored:
-            bands.append(Band(first, min(first + START, last), "start"))
-        else:
-            bands.append(Band(first, last, "unscored"))
-    return bands
 
 
 def _charts(found: CaseGap, n: int) -> list[dict[str, Any]]:
@@ -64,18 +35,21 @@ def _charts(found: CaseGap, n: int) -> list[dict[str, Any]]:
             continue
         for k, column in enumerate(channel.columns):
             title = f"{RATE_NAMES[k] if channel.name == 'rates' else channel.name}, {channel.unit}"
-            unwrap = channel.name == "yaw"
-            lines = _lines(t, table[:, column], Y[:, column], listed, unwrap)
-            for line in lines:
-                line.y = line.y * channel.scale
-            chart = Chart(title, "s", lines, _bands(t, listed), down=channel.name == "depth")
+            seen, said = table[:, column], Y[:, column]
+            if channel.name == "yaw":
+                seen = unwrapped(seen)
+                said = near(t, seen, said)
+            lines = [
+                Line(t, seen * channel.scale, "measured"),
+                broken(t, said * channel.scale, listed, "predicted"),
+            ]
+            chart = Chart(title, "s", lines, bands(t, listed), down=channel.name == "depth")
             add(channel, chart, 4.0 * channel.tolerance * channel.scale)
     for channel in channels_of(run):
         if channel.joint:
             north, east = channel.columns
-            begins = [window.first for window in listed[1:]]
-            x, y = np.insert(Y[:, east], begins, np.nan), np.insert(Y[:, north], begins, np.nan)
-            lines = [Line(table[:, east], table[:, north], "measured"), Line(x, y, "predicted")]
+            lines = [Line(table[:, east], table[:, north], "measured")]
+            lines.append(broken(Y[:, east], Y[:, north], listed, "predicted"))
             add(channel, Chart("plan, north up, m", "east", lines, square=True), 1.0)
     return drawn
 
@@ -130,13 +104,7 @@ def _context(found: CaseGap) -> dict[str, Any]:
 
 def report_html(found: CaseGap) -> str:
     """The page's text; MissingExtra without jinja2."""
-    try:
-        from jinja2 import Environment, StrictUndefined
-    except ImportError:
-        raise MissingExtra("jinja2") from None
-    template = files("tools.report").joinpath("gap.html").read_text(encoding="utf-8")
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    return environment.from_string(template).render(_context(found))
+    return render("gap.html", _context(found))
 
 
 def write_report(path: Path, found: CaseGap) -> None:

@@ -1,0 +1,19 @@
+"""Pages: a template of this folder with the common style, filled in; one HTML file that needs nothing else."""
+
+from importlib.resources import files
+from typing import Any
+
+from tools.errors import MissingExtra
+
+
+def render(template: str, context: dict[str, Any]) -> str:
+    """The text of a page; MissingExtra without jinja2. Every name that the template uses must be in the context."""
+    try:
+        from jinja2 import Environment, StrictUndefined
+    except ImportError:
+        raise MissingExtra("jinja2") from None
+    folder = files("tools.report")
+    text = folder.joinpath(template).read_text(encoding="utf-8")
+    style = folder.joinpath("page.css").read_text(encoding="utf-8")
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    return environment.from_string(text).render(context | {"style": style})
