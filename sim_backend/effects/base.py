@@ -15,7 +15,11 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of an effect: 0 (or `default`) is no effect; `spread` is a plausible size, 1 sigma."""
+    """A parameter of an effect: 0 (or `default`) is no effect.
+
+    `spread` is the prior's 1 sigma: half of the cases that are worth a diagnosis lie within. `entry` is its place in the
+    effect vector F (sim_backend/core/effect_layout), -1 where `apply` of the effect sets the world otherwise.
+    """
 
     name: str
     unit: str
@@ -23,6 +27,7 @@ class Parameter:
     high: float
     spread: float
     default: float = 0.0
+    entry: int = -1
 
 
 @dataclass(frozen=True)
@@ -34,7 +39,15 @@ class Effect:
     element: str
     summary: str
     parameters: tuple[Parameter, ...]
-    apply: Callable[..., None]
+    apply: Callable[..., None] | None = None  # where the effect vector is not all
+
+    def add(self, world: Any, values: dict[str, float]) -> None:
+        """Add the effect to a world (or to anything with an effect vector F)."""
+        for parameter in self.parameters:
+            if parameter.entry >= 0:
+                world.F[parameter.entry] += values[parameter.name]
+        if self.apply is not None:
+            self.apply(world, **values)
 
 
 class EffectError(ValueError):
@@ -74,4 +87,4 @@ def check_values(label: str, values: dict[str, float]) -> dict[str, float]:
 def apply_effects(world: Any, effects: dict[str, dict[str, float]]) -> None:
     """Add the effects to a world that has not begun to move."""
     for label, values in effects.items():
-        catalogue()[label].apply(world, **check_values(label, values))
+        catalogue()[label].add(world, check_values(label, values))

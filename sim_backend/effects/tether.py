@@ -1,0 +1,12 @@
+"""tether: a line drags at the tail."""
+
+from sim_backend.core import effect_layout as ef
+from sim_backend.effects.base import Effect, Parameter
+
+EFFECT = Effect(
+    label="tether",
+    subsystem="hydrodynamics",
+    element="surge",
+    summary="force -k |V| V at the tail, at the tail's own velocity",
+    parameters=(Parameter("k", "kg/m", 0.0, 20.0, spread=1.0, entry=ef.TETHER),),
+)

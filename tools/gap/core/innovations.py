@@ -1,0 +1,400 @@
+"""Kernels of the diagnosis: what a model with effects fails to foresee of a recording, row by row.
+
+A Kalman filter follows each run with a given model; what its one-step predictions miss, divided by how much they may
+miss, are the whitened innovations: for the true model white, of unit variance, whatever the disturbance did to the
+course. Its gains are kept, and any other model is then flown along the same data with those gains: its innovations
+differ smoothly with its parameters however long the run, because the data hold every flight to the course flown.
+
+Runs stand one behind the other in tables of all rows; `bounds` (runs + 1) says where each begins. Errors of the state
+(N_ERR): position (NED), attitude (rotation vector, body), nu, servo, slider, ballast.
+"""
+
+import math
+
+import numpy as np
+
+from firmware.core.jit import kernel, parallel_kernel, prange
+from firmware.core.layout import N_P
+from firmware.core.rotations import euler_from_quaternion
+from sim_backend.core import effect_layout as ef
+from sim_backend.core.effect_plant import effect_step, fold, read, wrapped
+
+N_ERR = 15
+N_Y = ef.N_Y
+MAX_STEP = 0.05  # s
+NUDGE = 1e-5  # of the state's unit, for derivatives
+LARGEST_SPEED = 20.0  # m/s, rad/s: a model that flies faster has left every vehicle, and is held where it was
+
+
+@kernel
+def correct(x, error):
+    """Add an error (N_ERR) to a state, in place."""
+    for i in range(3):
+        x[i] += error[i]
+    a, b, c = 0.5 * error[3], 0.5 * error[4], 0.5 * error[5]
+    q0, q1, q2, q3 = x[3], x[4], x[5], x[6]
+    n0 = q0 - q1 * a - q2 * b - q3 * c
+    n1 = q1 + q0 * a + q2 * c - q3 * b
+    n2 = q2 + q0 * b + q3 * a - q1 * c
+    n3 = q3 + q0 * c + q1 * b - q2 * a
+    scale = 1.0 / math.sqrt(n0 * n0 + n1 * n1 + n2 * n2 + n3 * n3)
+    x[3], x[4], x[5], x[6] = n0 * scale, n1 * scale, n2 * scale, n3 * scale
+    for i in range(6):
+        x[7 + i] += error[6 + i]
+    for i in range(3):
+        x[13 + i] += error[12 + i]
+    x[ef.X_GEAR_SERVO] += error[12]
+    x[ef.X_GEAR_SLIDER] += error[13]
+
+
+@kernel
+def difference(x, y, error):
+    """The small error (N_ERR) that takes y to x, into error."""
+    for i in range(3):
+        error[i] = x[i] - y[i]
+    a0, a1, a2, a3 = y[3], -y[4], -y[5], -y[6]
+    b0, b1, b2, b3 = x[3], x[4], x[5], x[6]
+    sign = 2.0 if a0 * b0 - a1 * b1 - a2 * b2 - a3 * b3 >= 0.0 else -2.0
+    error[3] = sign * (a0 * b1 + a1 * b0 + a2 * b3 - a3 * b2)
+    error[4] = sign * (a0 * b2 + a2 * b0 + a3 * b1 - a1 * b3)
+    error[5] = sign * (a0 * b3 + a3 * b0 + a1 * b2 - a2 * b1)
+    for i in range(6):
+        error[6 + i] = x[7 + i] - y[7 + i]
+    for i in range(3):
+        error[12 + i] = x[13 + i] - y[13 + i]
+
+
+@kernel
+def mean_input(t, inputs, column, i, begin, since, until):
+    """Mean over since..until (s) of an input held from each row on; before row `begin` its first value holds."""
+    if until <= since:
+        since = until - 1e-9
+    j = i
+    while j > begin and t[j] > since:
+        j -= 1
+    total, at = 0.0, since
+    while True:
+        end = until if j + 1 > i or t[j + 1] >= until else t[j + 1]
+        if end > at:
+            total += inputs[j, column] * (end - at)
+            at = end
+        if at >= until or j + 1 > i:
+            break
+        j += 1
+    return total / (until - since)
+
+
+@kernel
+def propagate(Pw, F, x, mode, t, inputs, i, begin, acc, zero, work, kept):
+    """Fly from row i - 1 to row i, in place; acc (6) added to nu_dot; kept (N_XF), zero (3), work are scratch."""
+    dt = t[i] - t[i - 1]
+    steps = max(1, math.ceil(dt / MAX_STEP - 1e-9))
+    h, delay = dt / steps, F[ef.COMMAND_DELAY]
+    for k in range(steps):
+        if delay > 0.0:
+            a = t[i - 1] + k * h - delay
+            c0 = mean_input(t, inputs, 0, i - 1, begin, a, a + h)
+            c1 = mean_input(t, inputs, 1, i - 1, begin, a, a + h)
+            c2 = mean_input(t, inputs, 2, i - 1, begin, a, a + h)
+        else:
+            c0, c1, c2 = inputs[i - 1, 0], inputs[i - 1, 1], inputs[i - 1, 2]
+        kept[:] = x
+        since = t[i - 1] - t[begin] + k * h
+        effect_step(Pw, F, x, mode, c0, c1, c2, since, acc, 0.0, zero, h, work)
+        worst = 0.0
+        for n in range(7, 13):
+            worst = max(worst, abs(x[n]))
+        if not worst < LARGEST_SPEED:
+            x[:] = kept
+
+
+@kernel
+def log_path(x, before, path, i, begin):
+    """Add to the path (rows, 6: position, roll, pitch, yaw, without the filter's corrections) the step to row i."""
+    roll, pitch, yaw = euler_from_quaternion(x[3], x[4], x[5], x[6])
+    for n in range(3):
+        path[i, n] = path[i - 1, n] + x[n] - before[n]
+    path[i, 3] = path[i - 1, 3] + wrapped(roll - before[3])
+    path[i, 4] = path[i - 1, 4] + wrapped(pitch - before[4])
+    path[i, 5] = path[i - 1, 5] + wrapped(yaw - before[5])
+
+
+@kernel
+def stand(x, before):
+    """Position and Euler angles of x, into before (6)."""
+    before[0], before[1], before[2] = x[0], x[1], x[2]
+    before[3], before[4], before[5] = euler_from_quaternion(x[3], x[4], x[5], x[6])
+
+
+@kernel
+def read_row(F, x, t, path, i, begin, y):
+    """What is read at row i, into y (N_Y); motion capture at its own time, along the path flown."""
+    read(F, x, y)
+    late = F[ef.MOCAP_DELAY] + F[ef.CLOCK_SKEW] * (t[i] - t[begin])
+    if late == 0.0 or i == begin:
+        return
+    at = t[i] - late
+    j = i
+    while j > begin + 1 and t[j - 1] > at:
+        j -= 1
+    share = (t[j] - at) / (t[j] - t[j - 1])
+    for n in range(6):
+        y[ef.Y_MOCAP_X + n] -= path[i, n] - path[j, n] + share * (path[j, n] - path[j - 1, n])
+
+
+@kernel
+def missed(z, y, d):
+    """z - y into d (N_Y), angles wrapped; NaN where nothing was measured."""
+    for j in range(N_Y):
+        d[j] = z[j] - y[j]
+        if j < 3 or j >= ef.Y_MOCAP_ROLL:
+            if not math.isnan(d[j]):
+                d[j] = wrapped(d[j])
+
+
+@kernel
+def linear_step(Pw, F, x, mode, t, inputs, i, begin, zero, work, kept, moved, base, error, Phi, Gam):
+    """Fly x to row i and differentiate the step: Phi (N_ERR, N_ERR) by the state, Gam (N_ERR, 6) by held accelerations."""
+    acc = np.zeros(6)
+    base[:] = x
+    propagate(Pw, F, base, mode, t, inputs, i, begin, acc, zero, work, kept)
+    for j in range(N_ERR):
+        for n in range(N_ERR):
+            error[n] = 0.0
+        error[j] = NUDGE
+        moved[:] = x
+        correct(moved, error)
+        propagate(Pw, F, moved, mode, t, inputs, i, begin, acc, zero, work, kept)
+        difference(moved, base, error)
+        for n in range(N_ERR):
+            Phi[n, j] = error[n] / NUDGE
+    for j in range(6):
+        acc[j] = NUDGE
+        moved[:] = x
+        propagate(Pw, F, moved, mode, t, inputs, i, begin, acc, zero, work, kept)
+        acc[j] = 0.0
+        difference(moved, base, error)
+        for n in range(N_ERR):
+            Gam[n, j] = error[n] / NUDGE
+    x[:] = base
+
+
+@kernel
+def filter_run(P, F, spectral, R, mode, t, inputs, z, begin, end, start, spread, X, path, E, W, K):
+    """The Kalman filter over rows begin .. end - 1. Returns -2 log likelihood without its constant.
+
+    P (N_P), F (N_F); spectral (9): spectral densities of the accelerations ((m/s2)2 s, (rad/s2)2 s) and walks of
+    servo, slider and ballast (per s); R (N_Y) measurements' variances; start (N_XF), spread (N_ERR).
+    Out: X (rows, N_XF) the state and path (rows, 6) after each row, E (rows, N_Y) whitened innovations, NaN where
+    nothing was measured, W (rows, N_Y, N_Y) what whitens a row's innovations and K (rows, N_ERR, N_Y) what corrects
+    the state by the whitened ones.
+    """
+    Pw, x = np.empty(N_P), start.copy()
+    fold(P, F, Pw)
+    work, kept, moved, base = np.zeros((6, ef.N_XF)), np.empty(ef.N_XF), np.empty(ef.N_XF), np.empty(ef.N_XF)
+    error, zero, before = np.empty(N_ERR), np.zeros(3), np.empty(6)
+    Phi, Gam, cov, temp = (
+        np.empty((N_ERR, N_ERR)),
+        np.empty((N_ERR, 6)),
+        np.zeros((N_ERR, N_ERR)),
+        np.empty((N_ERR, N_ERR)),
+    )
+    H, L, y, y2, d = np.empty((N_Y, N_ERR)), np.empty((N_Y, N_Y)), np.empty(N_Y), np.empty(N_Y), np.empty(N_Y)
+    for j in range(N_ERR):
+        cov[j, j] = spread[j] * spread[j]
+    misfit = 0.0
+    for n in range(6):
+        path[begin, n] = 0.0
+    for i in range(begin, end):
+        if i > begin:
+            dt = t[i] - t[i - 1]
+            stand(x, before)
+            linear_step(Pw, F, x, mode, t, inputs, i, begin, zero, work, kept, moved, base, error, Phi, Gam)
+            log_path(x, before, path, i, begin)
+            temp[:] = Phi @ cov
+            cov[:] = temp @ Phi.T
+            for j in range(6):
+                s = spectral[j] / dt
+                for a in range(N_ERR):
+                    for b in range(N_ERR):
+                        cov[a, b] += s * Gam[a, j] * Gam[b, j]
+            for j in range(3):
+                cov[12 + j, 12 + j] += spectral[6 + j] * dt
+        read_row(F, x, t, path, i, begin, y)
+        missed(z[i], y, d)
+        for j in range(N_ERR):
+            for n in range(N_ERR):
+                error[n] = 0.0
+            error[j] = NUDGE
+            moved[:] = x
+            correct(moved, error)
+            read_row(F, moved, t, path, i, begin, y2)
+            for m in range(N_Y):
+                change = y2[m] - y[m]
+                if m < 3 or m >= ef.Y_MOCAP_ROLL:
+                    change = wrapped(change)
+                H[m, j] = change / NUDGE
+        # S = H cov H' + R of what was measured, its Cholesky factor L, and W = L^-1; K~ = cov H' L^-T
+        for m in range(N_Y):
+            if math.isnan(d[m]):
+                for j in range(N_ERR):
+                    H[m, j] = 0.0
+        HC = H @ cov
+        S = HC @ H.T
+        for m in range(N_Y):
+            if math.isnan(d[m]):
+                S[m, m] = 1.0
+            else:
+                S[m, m] += R[m]
+        for m in range(N_Y):
+            for n in range(m + 1):
+                total = S[m, n]
+                for k in range(n):
+                    total -= L[m, k] * L[n, k]
+                if m == n:
+                    L[m, m] = math.sqrt(max(total, 1e-18))
+                else:
+                    L[m, n] = total / L[n, n]
+        for m in range(N_Y):  # W = L^-1, lower triangular
+            for n in range(N_Y):
+                W[i, m, n] = 0.0
+            W[i, m, m] = 1.0 / L[m, m]
+            for n in range(m):
+                total = 0.0
+                for k in range(n, m):
+                    total -= L[m, k] * W[i, k, n]
+                W[i, m, n] = total / L[m, m]
+        for a in range(N_ERR):
+            for m in range(N_Y):
+                total = 0.0
+                for n in range(m + 1):
+                    total += HC[n, a] * W[i, m, n]
+                K[i, a, m] = total
+        for a in range(N_ERR):
+            for b in range(N_ERR):
+                total = 0.0
+                for m in range(N_Y):
+                    total += K[i, a, m] * K[i, b, m]
+                cov[a, b] -= total
+        for a in range(N_ERR):
+            for b in range(a):
+                mean = 0.5 * (cov[a, b] + cov[b, a])
+                cov[a, b] = mean
+                cov[b, a] = mean
+        for m in range(N_Y):
+            if not math.isnan(d[m]):
+                misfit += 2.0 * math.log(L[m, m])
+        misfit += use_row(W[i], K[i], d, x, error, E[i])
+        for n in range(ef.N_XF):
+            X[i, n] = x[n]
+    return misfit
+
+
+@kernel
+def use_row(W, K, d, x, error, e):
+    """Whiten a row's innovations d into e, correct x by them, return their sum of squares."""
+    total = 0.0
+    for m in range(N_Y):
+        if math.isnan(d[m]):
+            e[m] = math.nan
+            continue
+        value = 0.0
+        for n in range(m + 1):
+            if not math.isnan(d[n]):
+                value += W[m, n] * d[n]
+        e[m] = value
+        total += value * value
+    for a in range(N_ERR):
+        value = 0.0
+        for m in range(N_Y):
+            if not math.isnan(e[m]):
+                value += K[a, m] * e[m]
+        error[a] = value
+    correct(x, error)
+    return total
+
+
+@parallel_kernel
+def filter_runs(
+    P, F, spectral, R, modes, bounds, early, t, inputs, z, starts, speeds, spreads, X, path, E, W, K, misfit
+):
+    """filter_run for every run, from the one of the forward speeds (m/s) that explains the rows below early best.
+
+    misfit (runs) gets -2 log likelihood; starts (runs, N_XF) the speed taken.
+    """
+    for run in prange(len(bounds) - 1):
+        begin, end = bounds[run], bounds[run + 1]
+        least, speed = math.inf, starts[run, 7]
+        start = starts[run].copy()
+        for n in range(len(speeds)):
+            start[7] = speeds[n]
+            found = filter_run(
+                P, F, spectral, R[run], modes[run], t, inputs, z, begin, early[run], start, spreads[run],
+                X, path, E, W, K,
+            )  # fmt: skip
+            if found < least:
+                least, speed = found, speeds[n]
+        starts[run, 7] = speed
+        misfit[run] = filter_run(
+            P, F, spectral, R[run], modes[run], t, inputs, z, begin, end, starts[run], spreads[run], X, path, E, W, K
+        )
+
+
+@kernel
+def follow_run(P, F, mode, t, inputs, z, begin, end, start, W, K, X, path, E):
+    """A model flown along rows begin .. end - 1 with the gains of filter_run: X, path and E as there."""
+    Pw, x = np.empty(N_P), start.copy()
+    fold(P, F, Pw)
+    work, kept = np.zeros((6, ef.N_XF)), np.empty(ef.N_XF)
+    error, zero, before, acc = np.empty(N_ERR), np.zeros(3), np.empty(6), np.zeros(6)
+    y, d = np.empty(N_Y), np.empty(N_Y)
+    for n in range(6):
+        path[begin, n] = 0.0
+    for i in range(begin, end):
+        if i > begin:
+            stand(x, before)
+            propagate(Pw, F, x, mode, t, inputs, i, begin, acc, zero, work, kept)
+            log_path(x, before, path, i, begin)
+        read_row(F, x, t, path, i, begin, y)
+        missed(z[i], y, d)
+        use_row(W[i], K[i], d, x, error, E[i])
+        for n in range(ef.N_XF):
+            X[i, n] = x[n]
+
+
+@parallel_kernel
+def follow_runs(Ps, Fs, modes, bounds, t, inputs, z, starts, W, K, E):
+    """Whitened innovations E (models, rows, N_Y) of models Ps (models, N_P), Fs (models, N_F) with kept gains."""
+    runs, rows = len(bounds) - 1, len(t)
+    for n in prange(Ps.shape[0] * runs):
+        m, run = n // runs, n % runs
+        begin, end = bounds[run], bounds[run + 1]
+        # scratch of this run alone; indices count from its first row
+        X, path = np.empty((end - begin, ef.N_XF)), np.empty((end - begin, 6))
+        follow_run(
+            Ps[m], Fs[m], modes[run], t[begin:end], inputs[begin:end], z[begin:end], 0, end - begin, starts[run],
+            W[begin:end], K[begin:end], X, path, E[m, begin:end],
+        )  # fmt: skip
+
+
+@parallel_kernel
+def fly_windows(Ps, Fs, modes, bounds, t, inputs, X, paths, first, last, run_of, Y):
+    """Fly every window with every model from where its filter stands: Y (models, rows, N_Y), rows first .. last - 1.
+
+    X (models, rows, N_XF) and paths (models, rows, 6) as filter_runs leaves them; nothing measured is looked at.
+    """
+    windows = len(first)
+    for n in prange(Ps.shape[0] * windows):
+        m, w = n // windows, n % windows
+        P, F, run = Ps[m], Fs[m], run_of[w]
+        begin = bounds[run]
+        Pw, x = np.empty(N_P), X[m, first[w] - 1].copy()
+        fold(P, F, Pw)
+        work, kept = np.zeros((6, ef.N_XF)), np.empty(ef.N_XF)
+        zero, before, acc = np.zeros(3), np.empty(6), np.zeros(6)
+        path = paths[m, begin : last[w]].copy()
+        for i in range(first[w], last[w]):
+            stand(x, before)
+            propagate(Pw, F, x, modes[run], t, inputs, i, begin, acc, zero, work, kept)
+            log_path(x, before, path, i - begin, 0)
+            read_row(F, x, t[begin:], path, i - begin, 0, Y[m, i])
