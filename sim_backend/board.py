@@ -11,6 +11,7 @@ from hal.clocks import MonotonicClock
 from hal.ports import SLOTS
 from hal.recorder.schema import Field, RecordSpec
 from sim_backend.core.world import write_truth
+from sim_backend.effects.base import check_board
 from sim_backend.world import Environment, SampledSensors, Start, World, build_world
 
 TRUTH = RecordSpec(
@@ -151,6 +152,7 @@ class SimBoard:
 def build_board(request: BoardRequest) -> SimBoard:
     """A simulated board from its file's text; floor and salinity are the mission site's where the file has none."""
     file = decode(request.text, SimBoardFile, request.source)
+    check_board(file.effects, request.source)
     environment = file.environment
     if environment.floor_m == 0.0 and request.site_depth:
         environment = msgspec.structs.replace(environment, floor_m=request.site_depth)

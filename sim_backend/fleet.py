@@ -22,7 +22,7 @@ class FleetResult:
     legs: np.ndarray  # (n,) the last leg flown, from 0
     ticks: np.ndarray  # (n,)
     ends: np.ndarray  # (n, N_END) all that closed_loop keeps of a flight
-    states: np.ndarray  # (n, N_X) of the plant at the end
+    states: np.ndarray  # (n, N_XF) of the plant at the end, what effects remember behind it
     traces: np.ndarray  # (n, lines, N_TRACE), NaN behind a flight's end
 
     @property
@@ -58,7 +58,8 @@ def fly_fleet(
     ticks = np.zeros(n, dtype=np.int64)
     fly_many(
         np.array([world.P for world in worlds]), first.P, np.array([pilot.C for pilot in pilots]), legs, rows,
-        first.nav, np.array([world.E for world in worlds]), waves, np.array([world.sensors for world in worlds]),
+        first.nav, np.array([world.E for world in worlds]), np.array([world.F for world in worlds]), waves,
+        np.array([world.sensors for world in worlds]),
         np.array([world.errors for world in worlds]), np.array([world.seed for world in worlds]), states,
         worlds[0].dt, int(max_seconds / step), every, traces, ends, ticks,
     )  # fmt: skip

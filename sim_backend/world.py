@@ -7,17 +7,17 @@ from typing import Annotated
 import msgspec
 import numpy as np
 
-from firmware.core.layout import N_X, X_ACT, X_NU, X_POS, X_QUAT
+from firmware.core.layout import N_P, X_ACT, X_NU, X_POS, X_QUAT
 from firmware.core.rotations import quaternion_from_euler
 from firmware.core.seawater import water_density
 from firmware.model.strict import Table
 from firmware.model.vehicle import Vehicle
 from hal.ports import empty_frame
-from sim_backend.core import layout
+from sim_backend.core import effect_layout, layout
 from sim_backend.core import world as core
 from sim_backend.effects.base import apply_effects
+from sim_backend.waves import wave_row
 
-GRAVITY = 9.80665
 PLANT_STEP = 0.01  # s
 SpeedPair = tuple[float, float]
 
@@ -73,18 +73,17 @@ class Start(Table):
 def _wave_rows(waves: list[Wave]) -> np.ndarray:
     rows = np.zeros((len(waves), layout.N_WAVE))
     for row, wave in zip(rows, waves, strict=True):
-        omega = 2.0 * math.pi / wave.period_s
-        k = omega * omega / GRAVITY  # deep water
-        direction = math.radians(wave.direction_deg)
-        row[:] = (
-            0.5 * wave.height_m, omega, k * math.cos(direction), k * math.sin(direction), math.radians(wave.phase_deg),
-        )  # fmt: skip
+        direction, phase = math.radians(wave.direction_deg), math.radians(wave.phase_deg)
+        row[:] = wave_row(0.5 * wave.height_m, 2.0 * math.pi / wave.period_s, direction, phase)
     return rows
 
 
 @dataclass
 class World:
-    """Arrays of one world; `advance` moves them. Everything random comes from `seed`, by counting."""
+    """Arrays of one world; `advance` moves them. Everything random comes from `seed`, by counting.
+
+    P (N_P,) and F (N_F,): the vehicle and what is wrong with it, to be set before the world moves.
+    """
 
     P: np.ndarray
     E: np.ndarray
@@ -94,17 +93,18 @@ class World:
     seed: np.uint64
     x: np.ndarray
     dt: float = PLANT_STEP
+    F: np.ndarray = field(default_factory=lambda: np.zeros(effect_layout.N_F))
     cmd: np.ndarray = field(default_factory=lambda: np.zeros(3))
     acc: np.ndarray = field(default_factory=lambda: np.zeros(6))
     counters: np.ndarray = field(default_factory=lambda: np.zeros(layout.N_C, dtype=np.int64))
     ring: np.ndarray = field(default_factory=lambda: np.zeros((layout.N_SENSORS, layout.RING, layout.RING_WIDTH)))
     frame: np.ndarray = field(default_factory=empty_frame)
-    work: np.ndarray = field(default_factory=lambda: np.zeros((5, N_X)))
+    folded: np.ndarray = field(default_factory=lambda: np.zeros(N_P))
+    work: np.ndarray = field(default_factory=lambda: np.zeros((layout.N_WORK, layout.WORK_WIDTH)))
 
     def __post_init__(self):
         self.counters[layout.C_HOLD] = -1
-        self.counters[layout.C_SAMPLES] = 0
-        core.sample_sensors(self.P, self.E, self.sensors, self.errors, self.seed, self.x, 0.0, self.counters, self.ring)
+        self.queue = np.zeros((math.ceil(layout.LONGEST_DELAY / self.dt) + 2, 3))  # commands of the past
 
     @property
     def time(self) -> float:
@@ -113,14 +113,14 @@ class World:
     def advance(self, t_end: float) -> float:
         """Move to t_end (s), under the commands in self.cmd; samples that have arrived are in self.frame."""
         return core.advance(
-            self.P, self.E, self.waves, self.sensors, self.errors, self.seed, self.x, self.cmd, self.acc,
-            self.counters, self.ring, self.frame, self.work, self.dt, t_end,
+            self.P, self.F, self.E, self.waves, self.sensors, self.errors, self.seed, self.x, self.cmd, self.acc,
+            self.counters, self.ring, self.queue, self.frame, self.folded, self.work, self.dt, t_end,
         )  # fmt: skip
 
 
 def start_state(start: Start) -> np.ndarray:
-    """Plant state (N_X,) of a vehicle at rest or gliding ahead, actuators neutral."""
-    x = np.zeros(N_X)
+    """State (N_XF,) of a vehicle at rest or gliding ahead, actuators neutral, plays centred, no reading behind."""
+    x = np.zeros(effect_layout.N_XF)
     x[X_POS + 2] = start.depth_m
     x[X_QUAT : X_QUAT + 4] = quaternion_from_euler(0.0, math.radians(start.pitch_deg), math.radians(start.heading_deg))
     x[X_NU] = start.surge_m_s

@@ -81,7 +81,7 @@ def load_board_file(wanted: str) -> BoardFile:
 
 def parse_effects(items: tuple[str, ...]) -> dict[str, dict[str, float]]:
     """`label:parameter=value,...` items as a dictionary; InputError says which item is wrong."""
-    from sim_backend.effects.base import EffectError, check_values
+    from sim_backend.effects.base import EffectError, check_flown
 
     effects: dict[str, dict[str, float]] = {}
     for item in items:
@@ -94,7 +94,7 @@ def parse_effects(items: tuple[str, ...]) -> dict[str, dict[str, float]]:
             except ValueError:
                 raise InputError(f"expected label:parameter=number, got '{item}'", source="--effect") from None
         try:
-            check_values(label, values)
+            check_flown(label, values)
         except EffectError as error:
             raise InputError(str(error), source="--effect") from None
         effects[label] = values

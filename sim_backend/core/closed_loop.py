@@ -8,11 +8,13 @@ import numpy as np
 from firmware.core import control_layout as ctl
 from firmware.core.autopilot import reset, tick
 from firmware.core.jit import kernel, parallel_kernel, prange
-from firmware.core.layout import N_X, X_ACT
+from firmware.core.layout import N_P, N_X, X_ACT
 from firmware.core.rotations import euler_from_quaternion
 from hal.ports import FRAME_SIZE
+from sim_backend.core import effect_layout as ef
 from sim_backend.core import layout as at
-from sim_backend.core.world import advance, sample_sensors
+from sim_backend.core.effect_world import set_effects
+from sim_backend.core.world import deliver, move, move_with_effects
 
 # what is kept of each logged tick
 TRACE = (
@@ -51,31 +53,38 @@ def add_up(est, ap, x, last, end):
 
 
 @kernel
-def fly(P_plant, P, C, legs, nav, E, waves, sensors, errors, seed, x, dt, max_ticks, every, trace, end):
-    """Fly one mission from state x (in place) until it ends or max_ticks are over; returns the ticks flown.
+def fly(P_plant, P, C, legs, nav, E, F, waves, sensors, errors, seed, x, dt, max_ticks, every, trace, end):
+    """Fly one mission from state x (N_XF, in place) until it ends or max_ticks are over; returns the ticks flown.
 
-    P_plant is the vehicle in the water, P the one the autopilot believes in; nav (N_NAV,) is as Autopilot makes it and
-    is not changed. Every `every`-th tick goes into trace (rows, N_TRACE) while it has rows; end (N_END,) says how the
-    flight ended and how well it kept to its references.
+    P_plant is the vehicle in the water, with effects F (N_F,), P the one the autopilot believes in; nav (N_NAV,) is as
+    Autopilot makes it and is not changed. Every `every`-th tick goes into trace (rows, N_TRACE) while it has rows; end
+    (N_END,) says how the flight ended and how well it kept to its references.
     """
     cmd, acc, frame = np.zeros(3), np.zeros(6), np.full(FRAME_SIZE, np.nan)
     frame[:] = 0.0
     counters = np.zeros(at.N_C, dtype=np.int64)
     counters[at.C_HOLD] = -1
     ring = np.zeros((at.N_SENSORS, at.RING, at.RING_WIDTH))
-    work = np.zeros((5, N_X))
+    queue = np.zeros((int(F[ef.COMMAND_DELAY] / dt) + 3, 3))
+    folded, work = np.zeros(N_P), np.zeros((at.N_WORK, at.WORK_WIDTH))
+    effects = set_effects(P_plant, F, folded)
     est, ap = np.zeros(ctl.N_EST), np.zeros(ctl.N_AP)
     memory = nav.copy()
     reset(est, ap, memory)
-    sample_sensors(P_plant, E, sensors, errors, seed, x, 0.0, counters, ring)
     last = x[X_ACT : X_ACT + 3].copy()
     end[:] = 0.0
     ticks, flown, t = 0, 0, 0.0
     while ticks < max_ticks and ap[ctl.MODE] < ctl.COMPLETED:
         t = ticks * C[ctl.DT]
-        advance(P_plant, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, frame, work, dt, t)
+        if effects:
+            move_with_effects(
+                P_plant, folded, F, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, queue, work, dt, t
+            )  # fmt: skip
+        else:
+            move(P_plant, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, work, dt, t)
+        deliver(sensors, counters[at.C_STEP] * dt, counters, ring, frame)
         if C[ctl.ESTIMATOR] == ctl.GIVEN:
-            memory[ctl.NAV_GIVEN : ctl.NAV_GIVEN + N_X] = x
+            memory[ctl.NAV_GIVEN : ctl.NAV_GIVEN + N_X] = x[:N_X]
         tick(P, C, legs, frame, est, ap, memory, cmd, t)
         if ap[ctl.MODE] == ctl.FLYING:
             add_up(est, ap, x, last, end)
@@ -91,17 +100,19 @@ def fly(P_plant, P, C, legs, nav, E, waves, sensors, errors, seed, x, dt, max_ti
 
 @parallel_kernel
 def fly_many(
-    P_plants, P, Cs, legs, rows, nav, Es, waves, sensors, errors, seeds, xs, dt, max_ticks, every, traces, ends, ticks
-):
+    P_plants, P, Cs, legs, rows, nav, Es, Fs, waves, sensors, errors, seeds, xs, dt, max_ticks, every, traces, ends,
+    ticks,
+):  # fmt: skip
     """`fly` for n flights, shared out over all cores; a flight does not depend on how many fly beside it.
 
     Shared: P and nav (what the autopilots believe), dt, max_ticks, every. Of each flight: P_plants (n, N_P),
-    Cs (n, N_C), legs (n, most, N_LEG) of which rows (n,) count, Es (n, N_E), waves (n, components, N_WAVE),
-    sensors (n, N_SENSORS, N_SENSOR_FIELDS), errors (n, 2, N_ERRORS), seeds (n,) uint64, xs (n, N_X) in place,
+    Cs (n, N_C), legs (n, most, N_LEG) of which rows (n,) count, Es (n, N_E), Fs (n, N_F),
+    waves (n, components, N_WAVE), sensors (n, N_SENSORS, N_SENSOR_FIELDS), errors (n, 2, N_ERRORS),
+    seeds (n,) uint64, xs (n, N_XF) in place,
     traces (n, lines, N_TRACE), ends (n, N_END), ticks (n,) int64.
     """
     for i in prange(P_plants.shape[0]):
         ticks[i] = fly(
-            P_plants[i], P, Cs[i], legs[i, : rows[i]], nav, Es[i], waves[i], sensors[i], errors[i], seeds[i], xs[i], dt,
-            max_ticks, every, traces[i], ends[i],
+            P_plants[i], P, Cs[i], legs[i, : rows[i]], nav, Es[i], Fs[i], waves[i], sensors[i], errors[i], seeds[i],
+            xs[i], dt, max_ticks, every, traces[i], ends[i],
         )  # fmt: skip

@@ -28,6 +28,7 @@ from firmware.core.layout import (
     K_MY,
     K_Q,
     K_R,
+    LIFT_PRINTED,
     N_P,
     N_X,
     SERVO_MAX,
@@ -58,8 +59,9 @@ def fold(P, F, out):
         out[i] = P[i]
     out[SERVO_RATE] *= math.exp(-F[ef.SERVO_RATE_LOG])
     out[SERVO_TAU] *= math.exp(F[ef.SERVO_LAG_LOG])
-    out[SERVO_MIN] += F[ef.SERVO_LIMIT]
-    out[SERVO_MAX] -= F[ef.SERVO_LIMIT]
+    middle = 0.5 * (P[SERVO_MIN] + P[SERVO_MAX])
+    out[SERVO_MIN] = min(P[SERVO_MIN] + F[ef.SERVO_LIMIT], middle)  # a loss of more than there is leaves one place
+    out[SERVO_MAX] = max(P[SERVO_MAX] - F[ef.SERVO_LIMIT], middle)
     out[SLIDER_RATE] *= math.exp(-F[ef.SLIDER_RATE_LOG])
     out[SLIDER_TAU] *= math.exp(F[ef.SLIDER_LAG_LOG])
     out[BALLAST_RATE] *= math.exp(-F[ef.PUMP_RATE_LOG])
@@ -103,7 +105,9 @@ def extra_wrench(P, F, kz, u, v, w):
     if F[ef.CLIMB_DIVE] != 0.0:
         drag += F[ef.CLIMB_DIVE] * math.tanh(-kz / ef.REST_PITCH) * (P[K_D0] + P[K_D] * alpha * alpha) * v_squared
     if F[ef.STALL] > 0.0:
-        lift += P[K_L] * (clip(alpha, -1.0 / F[ef.STALL], 1.0 / F[ef.STALL]) - alpha) * v_squared
+        held = clip(alpha, -1.0 / F[ef.STALL], 1.0 / F[ef.STALL])
+        lost = held * held - alpha * alpha if P[LIFT_PRINTED] != 0.0 else held - alpha
+        lift += P[K_L] * lost * v_squared
     if drag != 0.0 or lift != 0.0:
         X, Y, Z = flow_to_body(u, v, w, -drag, 0.0, -lift)
     if F[ef.LINEAR_DRAG] != 0.0:

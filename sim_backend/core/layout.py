@@ -1,6 +1,7 @@
 """Where things stand in the vectors of the simulated world.
 
-E is the environment, SENSOR a table of the sensors, and WORLD_STATE what a flight remembers beside the plant's state.
+E is the environment, SENSOR a table of the sensors, and C what a flight counts.
+The effects' vector F and the extended state have a layout of their own, effect_layout.
 """
 
 # --- E: the environment, SI, NED ------------------------------------------------------------------------------------
@@ -35,10 +36,16 @@ N_ERRORS = 9
 # --- streams of random numbers --------------------------------------------------------------------------------------
 STREAM_DISTURBANCE = 0  # 0..5
 STREAM_SENSORS = 16  # + index of the value
+STREAM_WAVES = 32  # phase, frequency
 
 # --- delay line: each sensor has RING slots of [delivery time, measurement time, values ...] ------------------------
 RING = 64
 RING_WIDTH = 8
+
+# --- memory of effects and scratch -----------------------------------------------------------------------------------
+LONGEST_DELAY = 6.0  # s, of commands; a world keeps those of the steps so far back
+W_READ, W_WATER = 6, 7  # rows of scratch behind the step's: what is read; water (3), late commands (3)
+N_WORK, WORK_WIDTH = 8, 24  # rows, columns: N_XF and what makes rows whole cache lines
 
 # --- C: counters of a world (int64) ---------------------------------------------------------------------------------
 C_STEP = 0  # plant steps done

@@ -3,32 +3,38 @@
 import numpy as np
 
 from firmware.core.jit import kernel, parallel_kernel, prange
-from firmware.core.layout import N_X
+from firmware.core.layout import N_P, N_X
+from sim_backend.core import effect_layout as ef
 from sim_backend.core import layout as at
+from sim_backend.core.effect_world import effect_world_step, set_effects
 from sim_backend.core.plant import hold_disturbance, rk4_step
 
 
 @kernel
-def fly_open_loop(P, E, waves, seed, x, commands, dt, steps_per_row, out):
-    """Fly from x (in place) under commands (rows, 3), each held for steps_per_row steps of dt; out (rows, N_X).
+def fly_open_loop(P, E, F, waves, seed, x, commands, dt, steps_per_row, out):
+    """Fly from x (N_XF, in place) under commands (rows, 3), each held for steps_per_row steps of dt; out (rows, N_X).
 
     out[i] is the state when row i's commands come into force.
     """
-    acc, work = np.zeros(6), np.zeros((5, N_X))
+    acc, work, folded = np.zeros(6), np.zeros((at.N_WORK, at.WORK_WIDTH)), np.zeros(N_P)
+    queue = np.zeros((int(F[ef.COMMAND_DELAY] / dt) + 3, 3))
     counters = np.zeros(at.N_C, dtype=np.int64)
     counters[at.C_HOLD] = -1
-    step = 0
+    effects, step = set_effects(P, F, folded), 0
     for row in range(commands.shape[0]):
-        out[row] = x
+        out[row] = x[:N_X]
         for _ in range(steps_per_row):
-            t = step * dt
-            hold_disturbance(E, seed, counters, t, acc)
-            rk4_step(P, E, waves, x, commands[row], t, dt, acc, work)
+            hold_disturbance(E, seed, counters, step * dt, acc)
+            if effects:
+                effect_world_step(folded, F, E, waves, x, commands[row], step, dt, acc, queue, work)
+            else:
+                rk4_step(P, E, waves, x, commands[row], step * dt, dt, acc, work)
             step += 1
 
 
 @parallel_kernel
-def fly_open_loop_many(Ps, Es, waves, seeds, xs, commands, dt, steps_per_row, out):
-    """`fly_open_loop` for every row of Ps (n, N_P), Es (n, N_E), seeds (n,), xs (n, N_X), commands (n, rows, 3)."""
+def fly_open_loop_many(Ps, Es, Fs, waves, seeds, xs, commands, dt, steps_per_row, out):
+    """`fly_open_loop` for every row of Ps (n, N_P), Es (n, N_E), Fs (n, N_F), seeds (n,), xs (n, N_XF) and commands
+    (n, rows, 3)."""
     for i in prange(Ps.shape[0]):
-        fly_open_loop(Ps[i], Es[i], waves, seeds[i], xs[i], commands[i], dt, steps_per_row, out[i])
+        fly_open_loop(Ps[i], Es[i], Fs[i], waves, seeds[i], xs[i], commands[i], dt, steps_per_row, out[i])

@@ -8,7 +8,10 @@ from firmware.core.jit import kernel
 from firmware.core.layout import PLUNGER_AREA, G
 from firmware.core.rotations import euler_from_quaternion
 from hal.ports import BEACON, IMU, PLUNGER_WIRE, SLIDER_WIRE
+from sim_backend.core import effect_layout as ef
 from sim_backend.core import layout as at
+from sim_backend.core.effect_plant import read
+from sim_backend.core.effect_world import effect_world_step, set_effects
 from sim_backend.core.noise import gaussian
 from sim_backend.core.plant import hold_disturbance, rk4_step
 
@@ -23,37 +26,79 @@ def measured(errors, seed, value, index, count):
 
 
 @kernel
-def take_sample(P, E, errors, seed, x, t, sensor, count, slot):
-    """Write the values of sample number `count` of a sensor behind slot's two times."""
-    if sensor == at.S_IMU:
-        phi, theta, psi = euler_from_quaternion(x[3], x[4], x[5], x[6])
-        slot[2] = measured(errors, seed, phi, 0, count)
-        slot[3] = measured(errors, seed, theta, 1, count)
-        slot[4] = measured(errors, seed, psi, 2, count)
-        for i in range(3):
-            slot[5 + i] = measured(errors, seed, x[10 + i], 3 + i, count)
-    elif sensor == at.S_BEACON:
-        depth = measured(errors, seed, x[2], at.E_DEPTH, count)
-        slot[2] = E[at.SURFACE_PRESSURE] + E[at.WATER_DENSITY] * G * depth
-        slot[3] = E[at.TEMPERATURE_C]
-    elif sensor == at.S_SLIDER:
-        slot[2] = measured(errors, seed, x[14], at.E_SLIDER, count)
-    elif sensor == at.S_PLUNGER:
-        slot[2] = measured(errors, seed, x[15], at.E_BALLAST, count) / (E[at.WATER_DENSITY] * P[PLUNGER_AREA])
+def write_imu(errors, seed, roll, pitch, yaw, p, q, r, count, slot):
+    """Sample number `count` of the IMU behind slot's two times."""
+    slot[2] = measured(errors, seed, roll, at.E_ROLL, count)
+    slot[3] = measured(errors, seed, pitch, at.E_PITCH, count)
+    slot[4] = measured(errors, seed, yaw, at.E_YAW, count)
+    slot[5] = measured(errors, seed, p, at.E_P, count)
+    slot[6] = measured(errors, seed, q, at.E_Q, count)
+    slot[7] = measured(errors, seed, r, at.E_R, count)
+
+
+@kernel
+def write_beacon(E, errors, seed, depth, count, slot):
+    """The same of the beacon: pressure and temperature."""
+    depth = measured(errors, seed, depth, at.E_DEPTH, count)
+    slot[2] = E[at.SURFACE_PRESSURE] + E[at.WATER_DENSITY] * G * depth
+    slot[3] = E[at.TEMPERATURE_C]
+
+
+@kernel
+def write_plunger(P, E, errors, seed, ballast, count, slot):
+    """The same of the plunger's draw-wire, which sees the ballast's mass as a length."""
+    slot[2] = measured(errors, seed, ballast, at.E_BALLAST, count) / (E[at.WATER_DENSITY] * P[PLUNGER_AREA])
+
+
+@kernel
+def due_slot(sensors, sensor, t, counters, ring):
+    """Number of the sample that a sensor has to take now, its slot stamped; -1: it is not time."""
+    count = counters[at.C_SAMPLES + sensor]
+    if t < count * sensors[sensor, at.SENSOR_PERIOD] - 1e-9:
+        return -1
+    counters[at.C_SAMPLES + sensor] = count + 1
+    slot = count % at.RING
+    ring[sensor, slot, 0] = t + sensors[sensor, at.SENSOR_DELAY]
+    ring[sensor, slot, 1] = t
+    return count
 
 
 @kernel
 def sample_sensors(P, E, sensors, errors, seed, x, t, counters, ring):
-    """Sample every sensor whose time has come into its delay line."""
+    """Sample every sensor whose time has come into its delay line, no effect being set."""
     for sensor in range(at.N_SENSORS):
-        count = counters[at.C_SAMPLES + sensor]
-        if t < count * sensors[sensor, at.SENSOR_PERIOD] - 1e-9:
+        count = due_slot(sensors, sensor, t, counters, ring)
+        if count < 0:
             continue
-        counters[at.C_SAMPLES + sensor] = count + 1
         slot = ring[sensor, count % at.RING]
-        slot[0] = t + sensors[sensor, at.SENSOR_DELAY]
-        slot[1] = t
-        take_sample(P, E, errors, seed, x, t, sensor, count, slot)
+        if sensor == at.S_IMU:
+            phi, theta, psi = euler_from_quaternion(x[3], x[4], x[5], x[6])
+            write_imu(errors, seed, phi, theta, psi, x[10], x[11], x[12], count, slot)
+        elif sensor == at.S_BEACON:
+            write_beacon(E, errors, seed, x[2], count, slot)
+        elif sensor == at.S_SLIDER:
+            slot[2] = measured(errors, seed, x[14], at.E_SLIDER, count)
+        elif sensor == at.S_PLUNGER:
+            write_plunger(P, E, errors, seed, x[15], count, slot)
+
+
+@kernel
+def sample_with_effects(P, F, E, sensors, errors, seed, x, t, counters, ring, y):
+    """The same with effects F: what `read` says; y (at least N_Y) is scratch."""
+    for sensor in range(at.N_SENSORS):
+        count = due_slot(sensors, sensor, t, counters, ring)
+        if count < 0:
+            continue
+        slot = ring[sensor, count % at.RING]
+        read(F, x, y)
+        if sensor == at.S_IMU:
+            write_imu(errors, seed, y[0], y[1], y[2], y[3], y[4], y[5], count, slot)
+        elif sensor == at.S_BEACON:
+            write_beacon(E, errors, seed, y[ef.Y_DEPTH], count, slot)
+        elif sensor == at.S_SLIDER:
+            slot[2] = measured(errors, seed, y[ef.Y_SLIDER], at.E_SLIDER, count)
+        elif sensor == at.S_PLUNGER:
+            write_plunger(P, E, errors, seed, y[ef.Y_BALLAST], count, slot)
 
 
 @kernel
@@ -93,14 +138,51 @@ def write_truth(t, x, out):
 
 
 @kernel
-def advance(P, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, frame, work, dt, t_end):
-    """Move the world to t_end in steps of dt, sampling on the way, then deliver what has arrived. Returns its time."""
+def move(P, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, work, dt, t_end):
+    """Step and sample to t_end, no effect being set: kept apart, for it is what most flights are. Returns the time."""
     t = counters[at.C_STEP] * dt
+    if counters[at.C_STEP] == 0:
+        sample_sensors(P, E, sensors, errors, seed, x, t, counters, ring)
     while t < t_end - 0.5 * dt:
         hold_disturbance(E, seed, counters, t, acc)
         rk4_step(P, E, waves, x, cmd, t, dt, acc, work)
         counters[at.C_STEP] += 1
         t = counters[at.C_STEP] * dt
         sample_sensors(P, E, sensors, errors, seed, x, t, counters, ring)
+    return t
+
+
+@kernel
+def move_with_effects(
+    P, folded, F, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, queue, work, dt, t_end
+):  # fmt: skip
+    """The same with effects F, folded (N_P) being what holds throughout."""
+    t = counters[at.C_STEP] * dt
+    if counters[at.C_STEP] == 0:
+        sample_with_effects(P, F, E, sensors, errors, seed, x, t, counters, ring, work[at.W_READ])
+    while t < t_end - 0.5 * dt:
+        hold_disturbance(E, seed, counters, t, acc)
+        effect_world_step(folded, F, E, waves, x, cmd, counters[at.C_STEP], dt, acc, queue, work)
+        counters[at.C_STEP] += 1
+        t = counters[at.C_STEP] * dt
+        sample_with_effects(P, F, E, sensors, errors, seed, x, t, counters, ring, work[at.W_READ])
+    return t
+
+
+@kernel
+def advance(
+    P, F, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, queue, frame, folded, work, dt, t_end
+):  # fmt: skip
+    """Move the world to t_end in steps of dt, sampling on the way, then deliver what has arrived. Returns its time.
+
+    x (N_XF); queue (rows, 3) commands of the past; folded (N_P) and work (N_WORK, WORK_WIDTH) scratch. Vehicle and
+    effects may have been changed since the last call.
+    """
+    if set_effects(P, F, folded):
+        t = move_with_effects(
+            P, folded, F, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, queue, work, dt, t_end
+        )  # fmt: skip
+    else:
+        t = move(P, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, work, dt, t_end)
     deliver(sensors, t, counters, ring, frame)
     return t

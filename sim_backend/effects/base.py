@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
+from hal.strict import ConfigError
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -78,13 +80,32 @@ def check_values(label: str, values: dict[str, float]) -> dict[str, float]:
             raise EffectError(f"effect {label} has no parameter '{name}'; it has {', '.join(known)}")
         parameter = known[name]
         if not parameter.low <= value <= parameter.high:
+            unit = "" if parameter.unit == "1" else f" {parameter.unit}"
             raise EffectError(
-                f"effect {label}: {name} = {value} is outside {parameter.low} to {parameter.high} {parameter.unit}"
+                f"effect {label}: {name} = {value:g} is outside {parameter.low:g} to {parameter.high:g}{unit}"
             )
     return {name: values.get(name, parameter.default) for name, parameter in known.items()}
+
+
+def check_flown(label: str, values: dict[str, float]) -> dict[str, float]:
+    """The same for an effect that is to be flown: EffectError also for one of motion capture, which no flight has."""
+    checked = check_values(label, values)
+    effect = catalogue()[label]
+    if (effect.subsystem, effect.element) == ("timing", "mocap"):
+        raise EffectError(f"effect {label} is one of motion capture's clock: no flight aboard has motion capture")
+    return checked
+
+
+def check_board(effects: dict[str, dict[str, float]], source: str) -> None:
+    """The [effects] of a board file; ConfigError says which is wrong."""
+    for label, values in effects.items():
+        try:
+            check_flown(label, values)
+        except EffectError as error:
+            raise ConfigError(source, str(error), key=f"effects.{label}") from None
 
 
 def apply_effects(world: Any, effects: dict[str, dict[str, float]]) -> None:
     """Add the effects to a world that has not begun to move."""
     for label, values in effects.items():
-        catalogue()[label].add(world, check_values(label, values))
+        catalogue()[label].add(world, check_flown(label, values))

@@ -7,6 +7,6 @@ EFFECT = Effect(
     label="lift",
     subsystem="hydrodynamics",
     element="heave",
-    summary="K_L times 1 + scale",
+    summary="K_L0 and K_L times 1 + scale",
     parameters=(Parameter("scale", "1", -0.95, 4.0, spread=0.3, entry=ef.LIFT),),
 )

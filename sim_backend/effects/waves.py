@@ -5,11 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from sim_backend.core.layout import STREAM_WAVES
 from sim_backend.core.noise import uniform
 from sim_backend.effects.base import Effect, Parameter
-
-STREAM_WAVES = 900
-wave_row = None
+from sim_backend.waves import wave_row
 
 COMPONENTS = 5  # of a narrow spectrum
 SPACING = 0.05  # between their frequencies, of the middle one

@@ -7,6 +7,7 @@ from hal.boardfile import DeviceFile
 from hal.drivers.vn100 import BITS
 from hal.protocols.vn100 import FLIGHT_MASK, payload_size
 from hal.strict import ConfigError, decode
+from sim_backend.effects.base import check_board
 from sim_backend.twins.modbus_line import TURNAROUND_S
 from sim_backend.world import Environment, SampledSensor, Start
 
@@ -25,6 +26,7 @@ def decode_twin_file(text: str, source: str) -> TwinFile:
     """A board file of kind "twin" or "devices" as one that twins can be made of."""
     file = decode(text, TwinFile, source)
     boardfile.check(file, source)
+    check_board(file.effects, source)
     if file.imu.rate_hz > PLANT_HZ:
         raise ConfigError(source, f"the plant makes no more than {PLANT_HZ:g} samples a second", key="imu.rate_hz")
     return file

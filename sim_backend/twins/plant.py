@@ -13,6 +13,7 @@ from firmware.core.layout import X_ACT, X_NU, X_POS, X_QUAT
 from firmware.core.rotations import quaternion_from_euler
 from hal.ports import BEACON, IMU, PLUNGER_WIRE, SLIDER_WIRE
 from sim_backend.core import layout
+from sim_backend.core.effect_layout import X_LAG
 from sim_backend.world import Environment, SampledSensor, SampledSensors, Start, World, build_world
 
 AT_ONCE = SampledSensor(rate_hz=100.0, delay_s=0.0)  # the lines add the delays
@@ -57,7 +58,7 @@ class TwinPlant:
         """Let it go where it stands, its actuators as they are."""
         stand, self.world = self.world, self._flight
         self._released_at = stand.time
-        self.world.x[X_ACT : X_ACT + 3] = stand.x[X_ACT : X_ACT + 3]
+        self.world.x[X_ACT:X_LAG] = stand.x[X_ACT:X_LAG]  # and what hangs behind their play
         self.world.cmd[:] = stand.cmd
         self.world.advance(0.0)
         self.free = True

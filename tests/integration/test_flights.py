@@ -16,6 +16,19 @@ from sim_backend.core.closed_loop import N_END, N_TRACE, fly
 from sim_backend.fleet import fly_fleet
 from tools.compose import build_flight, build_runtime, record_specs
 
+MANY = {
+    "command_delay": {"delay": 0.355},
+    "slider_backlash": {"width": 0.004},
+    "servo_backlash": {"width": 0.1},
+    "ballast_leak": {"rate": 0.0001},
+    "drag": {"scale": 0.2},
+    "current_shear": {"north": 0.02},
+    "waves": {"amplitude": 0.05, "period": 4.0},
+    "attitude_lag": {"time": 0.1},
+    "depth_lag": {"time": 0.3},
+    "compass": {"s1": 0.1},
+}
+
 
 def flown(mission, seed=0, effects=None):
     """Fly under the real runtime; returns the flight and what the recorder was given, (ticks, fields)."""
@@ -56,16 +69,19 @@ def test_a_seed_repeats_bit_for_bit_and_another_differs():
     assert not np.array_equal(first[:100, steady], other[:100, steady], equal_nan=True)
 
 
-@pytest.mark.parametrize("mission", ["sawtooth", "spiral"])
-def test_compiled_flight_is_the_runtimes_flight(mission):
-    """The campaign's compiled loop and the real runtime give the same numbers to the last bit."""
-    reference, rows = flown(mission, 2)
-    flight = build_flight(mission=mission, seed=2)
+@pytest.mark.parametrize(
+    ("mission", "effects"),
+    [("sawtooth", None), ("spiral", None), ("sawtooth", MANY), ("spiral", {"waves": MANY["waves"]})],
+)
+def test_compiled_flight_is_the_runtimes_flight(mission, effects):
+    """The campaign's compiled loop and the real runtime give the same numbers to the last bit, effects and all."""
+    reference, rows = flown(mission, 2, effects)
+    flight = build_flight(mission=mission, seed=2, effects=effects)
     world, pilot = flight.board.world, flight.autopilot
     trace, end = np.zeros((len(rows), N_TRACE)), np.zeros(N_END)
     ticks = fly(
-        world.P, pilot.P, pilot.C, pilot.legs, pilot.nav, world.E, world.waves, world.sensors, world.errors, world.seed,
-        world.x, world.dt, len(rows), 1, trace, end,
+        world.P, pilot.P, pilot.C, pilot.legs, pilot.nav, world.E, world.F, world.waves, world.sensors,
+        world.errors, world.seed, world.x, world.dt, len(rows), 1, trace, end,
     )  # fmt: skip
     assert end[0] == reference.autopilot.ap[0]
     assert end[3] == reference.autopilot.ap[LEG]
@@ -104,7 +120,9 @@ def test_fly_as_a_user_types_it(tmp_path):
         (("fly", "--vehicle", "nope"), "no vehicle 'nope'"),
         (("fly", "--board", "nope"), "no board 'nope'"),
         (("fly", "--effect", "drag:scale=much"), "expected label:parameter=number"),
-        (("fly", "--effect", "gremlins"), "no effect 'gremlins'; known: drag"),
+        (("fly", "--effect", "gremlins"), "no effect 'gremlins'; known: added_mass, attitude_lag,"),
+        (("fly", "--effect", "depth_lag:time=9"), "--effect: effect depth_lag: time = 9 is outside 0 to 8 s"),
+        (("fly", "--effect", "mocap_delay:delay=0.4"), "effect mocap_delay is one of motion capture's clock"),
         (("fly", "--log", "no/such/folder/x.mcap"), "no/such/folder/x.mcap"),
         (("fly", "--seed", "-1"), "-1"),
     ],
@@ -160,11 +178,18 @@ def test_check_tells_what_is_wrong(tmp_path):
     assert findings["mission"]["pass"]
 
 
-def test_a_fleet_flies_as_its_flights_do_alone():
-    flights = [build_flight(mission=mission, seed=seed) for mission in ("sawtooth", "spiral") for seed in (4, 5)]
+@pytest.mark.parametrize("effects", [({}, {}), ({}, MANY)], ids=["nominal", "one in two with effects"])
+def test_a_fleet_flies_as_its_flights_do_alone(effects):
+    flights = [
+        build_flight(mission=mission, seed=seed, effects=effects[seed % 2])
+        for mission in ("sawtooth", "spiral")
+        for seed in (4, 5)
+    ]
     worlds, pilots = [flight.board.world for flight in flights], [flight.autopilot for flight in flights]
     together = fly_fleet(worlds, pilots, max_seconds=200.0, trace_every=1.0)
     assert together.completed.all()
+    for world, state in zip(worlds, together.states, strict=True):
+        assert not np.array_equal(world.x, state)  # worlds stay where they are
     for i in range(len(flights)):
         alone = fly_fleet(worlds[i : i + 1], pilots[i : i + 1], max_seconds=200.0, trace_every=1.0)
         assert np.array_equal(alone.traces[0], together.traces[i], equal_nan=True)

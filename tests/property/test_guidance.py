@@ -22,8 +22,8 @@ def end_state(tmp_path, legs, seed=0):
     world.x[2] = 30.0
     trace, end = np.zeros((1, N_TRACE)), np.zeros(N_END)
     fly(
-        world.P, pilot.P, pilot.C, pilot.legs, pilot.nav, world.E, world.waves, world.sensors, world.errors, world.seed,
-        world.x, world.dt, 30_000, 30_000, trace, end,
+        world.P, pilot.P, pilot.C, pilot.legs, pilot.nav, world.E, world.F, world.waves, world.sensors,
+        world.errors, world.seed, world.x, world.dt, 30_000, 30_000, trace, end,
     )  # fmt: skip
     assert end[0] == at.COMPLETED
     x = world.x

@@ -126,7 +126,7 @@ def test_where_the_law_has_no_answer_the_pid_takes_over():
         world.advance(0.02 * tick)
         pilot.frame[...] = world.frame
         given = pilot.nav[at.NAV_GIVEN : at.NAV_GIVEN + layout.N_X]
-        given[...] = world.x
+        given[...] = world.x[: layout.N_X]
         if 100 <= tick < 150:
             given[layout.X_NU] = np.nan
         sent = pilot.tick(0.02 * tick)

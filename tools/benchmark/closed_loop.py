@@ -27,8 +27,8 @@ def one_flight(seed: int, controller: str = "pid") -> tuple[int, float]:
     trace, end = np.zeros((1, N_TRACE)), np.zeros(N_END)
     before = time.thread_time()
     ticks = fly(
-        world.P, pilot.P, pilot.C, pilot.legs, pilot.nav, world.E, world.waves, world.sensors, world.errors, world.seed,
-        world.x, world.dt, LONGEST, LONGEST, trace, end,
+        world.P, pilot.P, pilot.C, pilot.legs, pilot.nav, world.E, world.F, world.waves, world.sensors,
+        world.errors, world.seed, world.x, world.dt, LONGEST, LONGEST, trace, end,
     )  # fmt: skip
     return ticks, time.thread_time() - before
 

@@ -130,8 +130,8 @@ def compile_loop(plan: Plan) -> None:
     """Compile the loop into the kernels' cache, or find it there, before processes that would each do it themselves."""
     pilot, world = plan.pilot(0, plan.campaign.controllers[0]), draw_world(plan, 0, plan.campaign.first_seed).world
     fly(
-        world.P, pilot.P, pilot.C, pilot.legs, pilot.nav, world.E, world.waves, world.sensors, world.errors,
-        world.seed, world.x, world.dt, 0, 1, np.zeros((1, N_TRACE)), np.zeros(N_END),
+        world.P, pilot.P, pilot.C, pilot.legs, pilot.nav, world.E, world.F, world.waves, world.sensors,
+        world.errors, world.seed, world.x, world.dt, 0, 1, np.zeros((1, N_TRACE)), np.zeros(N_END),
     )  # fmt: skip
 
 
@@ -159,8 +159,8 @@ def fly_chunk(job: Job, chunk: Chunk) -> np.ndarray:
         world = drawn.world
         for number, pilot in enumerate(pilots):
             ticks = fly(
-                world.P, pilot.P, pilot.C, pilot.legs, pilot.nav, world.E, world.waves, world.sensors, world.errors,
-                world.seed, world.x.copy(), world.dt, most_ticks, every, trace, end,
+                world.P, pilot.P, pilot.C, pilot.legs, pilot.nav, world.E, world.F, world.waves, world.sensors,
+                world.errors, world.seed, world.x.copy(), world.dt, most_ticks, every, trace, end,
             )  # fmt: skip
             flown = trace[: (ticks - 1) // every + 1]
             over = _past_limits(pilot.P, flown[:, command : command + 3], every * plan.step)

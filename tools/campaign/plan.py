@@ -19,6 +19,7 @@ from firmware.guidance.mission import Mission, decode_mission
 from firmware.model.strict import Table, decode
 from firmware.model.vehicle import Vehicle
 from sim_backend.board import SimBoardFile
+from sim_backend.effects.base import check_board
 from tools.compose import load_board_file
 from tools.errors import InputError
 from tools.sources import load_vehicle, name_or_path, read_text
@@ -177,6 +178,7 @@ def build_plan(campaign: Campaign, base: Path | None = None) -> Plan:
     if board.kind != "sim":
         raise InputError(f"a campaign flies in simulation, board '{campaign.board}' is of kind '{board.kind}'")
     file = decode(board.text, SimBoardFile, board.source)
+    check_board(file.effects, board.source)
     plan = Plan(campaign, load_vehicle(campaign.vehicle, base), tuple(missions), file)
     for number in range(len(missions)):
         for controller in campaign.controllers:
@@ -210,6 +212,8 @@ def fingerprint(plan: Plan) -> str:
                 digest.update(array.tobytes())
         digest.update(mission.name.encode())
         world = draw_world(plan, number, plan.campaign.first_seed).world
-        for array in (world.P, world.E, world.waves, world.sensors, world.errors, np.array(world.seed), world.x):
+        for array in (
+            world.P, world.E, world.F, world.waves, world.sensors, world.errors, np.array(world.seed), world.x,
+        ):  # fmt: skip
             digest.update(array.tobytes())
     return digest.hexdigest()[:16]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
+from sim_backend.effects.base import apply_effects
 from sim_backend.uncertainty import draw_parameters
 from sim_backend.world import Wave, World, build_world
 from tools.campaign.plan import Plan
@@ -60,8 +61,5 @@ def draw_world(plan: Plan, mission: int, seed: int) -> DrawnWorld:
     world.P[:] = drawn
     world.errors[0] *= campaign.spread.sensor_bias
     world.errors[1] *= campaign.spread.sensor_noise
-    if plan.board.effects:
-        from sim_backend.effects.base import apply_effects
-
-        apply_effects(world, plan.board.effects)  # on top of the drawn vehicle
+    apply_effects(world, plan.board.effects)  # on top of the drawn vehicle
     return DrawnWorld(world, current, height, period, disturbance, depth)

@@ -1,14 +1,19 @@
 """Worlds of a campaign: paired, within their limits, and moved only by what is changed."""
 
+import dataclasses
+
+import msgspec
 import numpy as np
 import pytest
 
 from sim_backend.core import layout as at
+from sim_backend.core.effect_layout import DRAG_0
+from tools.campaign.plan import fingerprint
 from tools.campaign.worlds import draw_world
 
 
 def arrays(world):
-    return (world.P, world.E, world.waves, world.sensors, world.errors, np.array(world.seed), world.x)
+    return (world.P, world.E, world.F, world.waves, world.sensors, world.errors, np.array(world.seed), world.x)
 
 
 def test_a_seed_is_a_world(plan_of):
@@ -67,3 +72,14 @@ def test_spreads_scale(plan_of):
     np.testing.assert_allclose(b.P - nominal, 3.0 * (a.P - nominal), atol=1e-12)
     np.testing.assert_allclose(b.errors[0], 2.0 * a.errors[0])
     assert not b.errors[1].any()
+
+
+def test_effects_of_the_board_come_on_top_of_the_drawn_vehicle(plan_of):
+    plain, plan = plan_of(), plan_of()
+    effects = {"drag": {"scale": 0.2}, "turbulence": {"scale": 1.0}}
+    plan = dataclasses.replace(plan, board=msgspec.structs.replace(plan.board, effects=effects))
+    a, b = draw_world(plain, 0, 0).world, draw_world(plan, 0, 0).world
+    assert np.array_equal(a.P, b.P)
+    assert np.flatnonzero(b.F).tolist() == [DRAG_0]
+    assert b.E[at.ACC_LINEAR] == 2.0 * a.E[at.ACC_LINEAR] > 0.0
+    assert fingerprint(plan) != fingerprint(plain)

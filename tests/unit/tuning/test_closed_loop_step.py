@@ -34,8 +34,8 @@ def flown(vehicle, board, trim, leg, column):
     ticks = round(SECONDS / 0.02)
     trace = np.zeros((ticks, N_TRACE))
     fly(
-        world.P, pilot.P, pilot.C, pilot.legs, pilot.nav, world.E, world.waves, world.sensors, world.errors, world.seed,
-        world.x, world.dt, ticks, 1, trace, np.zeros(N_END),
+        world.P, pilot.P, pilot.C, pilot.legs, pilot.nav, world.E, world.F, world.waves, world.sensors,
+        world.errors, world.seed, world.x, world.dt, ticks, 1, trace, np.zeros(N_END),
     )  # fmt: skip
     return trace[:, TRACE.index(column)]
 

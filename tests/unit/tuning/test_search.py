@@ -79,8 +79,8 @@ def test_the_sums_kept_of_a_flight_are_those_of_its_trace():
     ticks = 1500
     trace, end = np.zeros((ticks, N_TRACE)), np.zeros(N_END)
     fly(
-        world.P, pilot.P, pilot.C, pilot.legs, pilot.nav, world.E, world.waves, world.sensors, world.errors, world.seed,
-        world.x, world.dt, ticks, 1, trace, end,
+        world.P, pilot.P, pilot.C, pilot.legs, pilot.nav, world.E, world.F, world.waves, world.sensors,
+        world.errors, world.seed, world.x, world.dt, ticks, 1, trace, end,
     )  # fmt: skip
     column = {name: trace[1:, TRACE.index(name)] for name in TRACE}  # the first tick waits for the first depth
     assert end[END_ERROR_PITCH] == pytest.approx(np.abs(column["pitch"] - column["ref_pitch"]).mean(), rel=1e-9)

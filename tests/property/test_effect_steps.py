@@ -1,0 +1,105 @@
+"""The plant with effects: without any it is the plain plant, and effects go together in any number and order."""
+
+import numpy as np
+from effect_flights import FLOWN
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from model_states import actuators, repeatable, states, vehicles
+
+from firmware.core import layout
+from sim_backend.core import effect_layout as ef
+from sim_backend.core import layout as at
+from sim_backend.core.effect_plant import effect_step, fold, play
+from sim_backend.core.plant import rk4_step
+from sim_backend.effects.base import catalogue
+
+NO_WAVES = np.zeros((0, at.N_WAVE))
+STILL = np.zeros(at.N_E)
+IN_F = [label for label, effect in catalogue().items() if effect.apply is None]
+
+
+@st.composite
+def chosen(draw):
+    """Labels with values within their ranges."""
+    picked = {}
+    for label in draw(st.lists(st.sampled_from(IN_F), unique=True, max_size=8)):
+        parameters = catalogue()[label].parameters
+        picked[label] = {p.name: draw(st.floats(p.low, p.high)) for p in parameters}
+    return picked
+
+
+class Plain:
+    def __init__(self, effects):
+        self.F = np.zeros(ef.N_F)
+        for label, values in effects.items():
+            catalogue()[label].add(self, values)
+
+
+def extended(x):
+    whole = np.zeros(ef.N_XF)
+    whole[: layout.N_X] = x
+    whole[ef.X_GEAR_SERVO], whole[ef.X_GEAR_SLIDER] = x[13], x[14]
+    return whole
+
+
+@settings(repeatable)
+@given(vehicles(), states(), actuators, st.lists(st.floats(-0.05, 0.05), min_size=6, max_size=6))
+def test_without_effects_a_step_is_the_plain_step(vehicle, x, command, acc):
+    P, F, acc = np.zeros(layout.N_P), np.zeros(ef.N_F), np.array(acc)
+    fold(vehicle, F, P)
+    np.testing.assert_array_equal(P, vehicle)
+    plain, other, work = extended(x), extended(x), np.zeros((at.N_WORK, at.WORK_WIDTH))
+    rk4_step(vehicle, STILL, NO_WAVES, plain, np.array(command), 0.0, 0.01, acc, work)
+    effect_step(P, F, other, 0, *command, 0.0, acc, 0.0, np.zeros(3), 0.01, work)
+    size = 1.0 + np.abs(plain[: layout.N_X])
+    assert (np.abs(plain - other)[: layout.N_X] <= 1e-14 * size).all()
+
+
+@settings(repeatable)
+@given(chosen(), st.randoms(use_true_random=False))
+def test_effects_in_any_order_are_the_same_vector(effects, random):
+    order = list(effects)
+    random.shuffle(order)
+    np.testing.assert_array_equal(Plain(effects).F, Plain({label: effects[label] for label in order}).F)
+
+
+@settings(repeatable)
+@given(chosen())
+def test_effects_together_are_the_sum_of_each_alone(effects):
+    alone = sum((Plain({label: values}).F for label, values in effects.items()), np.zeros(ef.N_F))
+    np.testing.assert_array_equal(Plain(effects).F, alone)
+
+
+@settings(repeatable, max_examples=60)
+@given(chosen(), states(), actuators)
+def test_any_effects_within_their_ranges_leave_a_vehicle_a_vehicle(effects, x, command):
+    """For a second: numbers stay numbers, the attitude a rotation, plays within their widths."""
+    from model_states import P as vehicle
+
+    F, P = Plain(effects).F, np.zeros(layout.N_P)
+    fold(vehicle, F, P)
+    state, work = extended(x), np.zeros((at.N_WORK, at.WORK_WIDTH))
+    speed = max(0.6, float(np.abs(state[7:13]).max()))
+    state[7:13] *= 0.6 / speed
+    for k in range(100):
+        effect_step(P, F, state, 0, *command, 0.01 * k, np.zeros(6), 0.0, np.zeros(3), 0.01, work)
+    assert np.isfinite(state).all()
+    assert abs(np.linalg.norm(state[3:7]) - 1.0) < 1e-12
+    for place, gear, width in ((13, ef.X_GEAR_SERVO, F[ef.SERVO_PLAY]), (14, ef.X_GEAR_SLIDER, F[ef.SLIDER_PLAY])):
+        assert abs(state[place] - state[gear]) <= 0.5 * width + 1e-12
+
+
+@settings(repeatable)
+@given(st.floats(0.001, 1.0), st.lists(st.floats(-2.0, 2.0), min_size=1, max_size=30))
+def test_play_never_lets_go_and_never_moves_more_than_its_leader(width, way):
+    follower, last = 0.0, 0.0
+    for leader in way:
+        moved = play(follower, leader, width)
+        assert abs(moved - leader) <= 0.5 * width + 1e-12
+        assert abs(moved - follower) <= abs(leader - last) + 1e-12
+        follower, last = moved, leader
+
+
+def test_every_label_but_waves_and_turbulence_stands_in_the_vector():
+    assert set(catalogue()) - set(IN_F) == {"waves", "turbulence"}
+    assert set(IN_F) & set(FLOWN)
