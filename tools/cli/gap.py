@@ -1,5 +1,6 @@
 """`glider gap`: where simulation and sea disagree."""
 
+import sys
 from pathlib import Path
 
 import click
@@ -111,7 +112,7 @@ def diagnose(case: Path, out: Path, as_json: bool) -> None:
 
         def step(text: str) -> None:
             nonlocal done
-            say(text)
+            print(text, file=sys.stderr)  # not by click, which would write past the bar into its line
             if done < STEPS - 2:
                 done += 1
                 advance(1)
