@@ -120,7 +120,7 @@ def start(twins):
     process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
     process.stdin.write("enable\ngoto slider -55\ngoto slider 55\n")
     process.stdin.flush()
-    end = time.monotonic() + 20.0
+    end = time.monotonic() + 60.0
     while twins.state()["slider_m"] > -0.045:
         assert time.monotonic() < end
         time.sleep(0.05)
