@@ -179,7 +179,7 @@ def lead(twins, board, actuators):
             process.stdin.flush()
         if "swing" in line or ("clear?" in line and not actuators):
             break
-    output, _ = process.communicate(timeout=30)
+    output, _ = process.communicate(timeout=90)
     twins.tell("pose 0 0 0 0.3")
     return {item["check"]: item for item in json.loads(output)["findings"]}
 
