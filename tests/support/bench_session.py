@@ -51,7 +51,7 @@ class Twins:
 
     def end(self) -> None:
         self.tell("quit")
-        self.process.wait(10)
+        self.process.wait(60)
         for pipe in (self.process.stdout, self.process.stderr):
             pipe.close()
 
