@@ -1,6 +1,5 @@
 """The errors a user can cause: one line saying what and where. Anything else is a defect and shows its traceback."""
 
-
 from importlib.util import find_spec
 
 

@@ -10,7 +10,6 @@ from tools.gap.problem import Problem, pose
 from tools.runs import columns as names
 from tools.runs.case import Case, load_case, write_case
 from tools.runs.run import Run
-from tools.sources import load_vehicle
 
 RATE = 10.0  # Hz
 SECONDS = 45.0
@@ -40,7 +39,6 @@ def _blank(rng: np.random.Generator, name: str, mocap: bool) -> Run:
 def make_case(folder: Path, F: np.ndarray, *, seed: int, runs: int = 3, mocap: bool = False) -> Case:
     """A case in `folder` whose vehicle has the effects F (N_F), its parameters and biases drawn as allowed."""
     rng = np.random.default_rng(seed)
-    vehicle = load_vehicle("roughie")
     blank = [_blank(rng, f"run{n:02d}", mocap) for n in range(runs)]
     about = dict(vehicle="roughie", site="made", log_rate_hz=RATE, water_density_kg_m3=998.0, motion_capture=mocap)
     write_case(folder / "blank", blank, **about)

@@ -46,7 +46,7 @@ class Diagnosis:
 def diagnose(case: Case, say: Callable[[str], None] = lambda text: None) -> Diagnosis:
     """Diagnose a case; `say` is told where the search stands."""
     search = run(pose(case), say)
-    answer = conclude(search)
+    answer = conclude(search, say)
     search = answer.search
     say(f"verdict: {answer.main}")
     entry, mission = propose(search)
@@ -69,16 +69,23 @@ def parameters(diagnosis: Diagnosis, label: str) -> dict[str, dict[str, Any]]:
 
 
 def places(answer: Answer) -> list[dict[str, Any]]:
-    """Where, most probable first: labels' probabilities by place; what is unknown lies where its likenesses lie."""
+    """Where, most probable first: labels' probabilities by place; what is unknown lies where a freed link gains."""
     weight: dict[tuple[str, str], float] = {}
     effects = catalogue()
+
+    def add(place: tuple[str, str], share: float) -> None:
+        weight[place] = weight.get(place, 0.0) + share
+
     known = {label: p for label, p in answer.probabilities.items() if label in effects}
     total = sum(known.values())
     doubt = answer.probabilities[UNKNOWN]
+    links = [f for f in answer.freed if f.probe.name not in UNPREDICTABLE and f.gain > 0.0]
+    gained = sum(f.gain for f in links)
+    for link in links:
+        add((link.probe.subsystem, link.probe.element), doubt * link.gain / gained)
     for label, p in known.items():
-        share = p + doubt * (p / total if total > 0.0 else 0.0)
-        place = (effects[label].subsystem, effects[label].element)
-        weight[place] = weight.get(place, 0.0) + share
+        likeness = 0.0 if links or total <= 0.0 else doubt * p / total
+        add((effects[label].subsystem, effects[label].element), p + likeness)
     for label in answer.selected:
         place = (effects[label].subsystem, effects[label].element)
         weight[place] = max(weight.get(place, 0.0), WORTH)

@@ -1,5 +1,6 @@
 """From fits to an answer: which effects earn their place, how probable each label is, and what cannot be told apart."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -169,7 +170,7 @@ def scatter(search: Search) -> Probed | None:
     return first if first.probe.name == TURBULENCE and axes[0] < ONE_AXIS * first.gain else None
 
 
-def conclude(search: Search, noise: Probed | None = None) -> Answer:
+def conclude(search: Search, say: Callable[[str], None] = lambda text: None, noise: Probed | None = None) -> Answer:
     """The answer of a finished search; its gains are taken anew at the selected model.
 
     `noise` is turbulence or waves that the search was already told of.
@@ -190,7 +191,7 @@ def conclude(search: Search, noise: Probed | None = None) -> Answer:
             if found is not None and found.gain > MOSTLY * (brought + left):
                 more, doubt = raised(search.problem, found.probe, found.scale)
                 rough = replace(search.problem, spectral=search.problem.spectral + more)
-                return conclude(run(rough), found)
+                return conclude(run(rough, say), say, found)
     main = max(gained, key=lambda label: gained[label]) if gained else ""
     chances = posterior(search, course, main)
     if noise is not None:
