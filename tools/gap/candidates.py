@@ -36,7 +36,7 @@ def allowed(problem: Problem) -> list[Free]:
     free = [Free(ALLOWED, f"P[{i}]", "P", int(i), float(sigma[i])) for i in np.flatnonzero(sigma > 0.0)]
     s = problem.case.sensors
     bias = [*3 * [s.attitude.bias], *3 * [s.gyro.bias], s.depth.bias, s.slider.bias, s.ballast.bias]
-    seen = problem.valid.any(axis=0)
+    seen = problem.seen
     for j, size in enumerate(bias):
         if seen[j] and size > 0.0:
             free.append(Free(ALLOWED, f"bias[{j}]", "F", ef.BIAS + j, size))
@@ -54,7 +54,7 @@ def of_effect(effect: Effect) -> list[Free]:
 
 def candidates(problem: Problem) -> dict[str, list[Free]]:
     """Every label whose effect these runs could show, with its parameters."""
-    seen = problem.valid.any(axis=0)
+    seen = problem.seen
     mocap = bool(seen[ef.Y_ONBOARD :].any())
     commands = all(run.has_commands for run in problem.runs)
     found = {}

@@ -56,7 +56,7 @@ class Fitter:
 
     def measure(self, courses: list["Course"]) -> None:
         """Innovations of candidates that have none yet."""
-        new = [course for course in courses if course.e is None]
+        new = [course for course in courses if not len(course.e)]
         for course, e in zip(new, self.flown([(c.free, c.values, c.allowed) for c in new]), strict=True):
             course.settle(e, self.tight)
 
@@ -123,7 +123,7 @@ class Course:
         self.labels, self.free, self.values, self.allowed = labels, free, values, allowed
         self.low = np.array([f.low for f in free])
         self.high = np.array([f.high for f in free])
-        self.e: np.ndarray | None = None
+        self.e: np.ndarray = np.empty(0)
         self.misfit, self.gained = np.inf, np.inf
         self.known = np.empty((0, 0))  # columns of the first parameters, where they are known already
 

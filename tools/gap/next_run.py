@@ -93,7 +93,7 @@ def flown(problem: Problem, models: list, manoeuvre: Manoeuvre) -> np.ndarray:
 
 def distance(problem: Problem, a: np.ndarray, b: np.ndarray) -> float:
     """How far two predictions lie apart: root mean square over the channels recorded, in tolerances."""
-    seen = problem.valid.any(axis=0)
+    seen = problem.seen
     squares = []
     for channel in CHANNELS:
         columns = [c for c in channel.columns if seen[c]]

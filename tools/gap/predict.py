@@ -127,6 +127,7 @@ def predict_effects(case: Case, model: Model, runs: list[Run]) -> list[np.ndarra
     """The same for a model with effects: each window starts where that model's own filter stands."""
     from tools.gap import problem as whole
 
+    assert model.F is not None
     posed = whole.pose(case, model, runs)
     gains = posed.filter(model.P, model.F, begin=True)
     scored = whole.cut(posed)

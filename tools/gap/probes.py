@@ -52,7 +52,7 @@ def probes(problem: Problem) -> list[Probe]:
         Probe("ballast wire", "sensor", "actuation", "ballast", (), (8,), s.ballast.noise),
         Probe("motion capture", "sensor", "timing", "mocap", (), (9, 10, 11, 12, 13, 14), s.mocap_position.noise),
     ]
-    seen = problem.valid.any(axis=0)
+    seen = problem.seen
     return [p for p in every if not p.reading or seen[list(p.reading)].any()]
 
 

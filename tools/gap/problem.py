@@ -54,6 +54,11 @@ class Problem:
     valid: np.ndarray  # (rows, N_Y) bool
     run_of: np.ndarray  # (rows,)
 
+    @property
+    def seen(self) -> np.ndarray:
+        """Which readings these runs have at all, bool of shape (N_Y,)."""
+        return np.asarray(self.valid.any(axis=0))
+
     def filter(
         self, P: np.ndarray, F: np.ndarray, roughness: float = 1.0, begin: bool = False, more=None, doubt=None
     ) -> Gains:

@@ -17,7 +17,7 @@ from tools.gap.search import Search, run, settle
 NONE, UNKNOWN = "none", "unknown"
 PRIOR_NONE = 0.5  # before anything was measured; the labels share the rest
 UNCLEAN = 6.0  # sigma, corrected for the number of tests
-LEFT_OVER, LEFT_WIDTH = 0.11, 0.5  # share left, at which unknown is as likely as not, and the width in e-folds
+LEFT_OVER, LEFT_WIDTH = 0.2, 0.8  # share left at which unknown is as likely as not, and the width in e-folds
 ONE_AXIS = 0.65  # of what all axes bring together: where one alone brings as much, it is no turbulence
 MOSTLY = 0.9  # of all that can be explained, for turbulence or waves to be the cause
 SHOWN = 0.3  # of the gap that is left: an effect beside another must move predictions by as much
@@ -197,8 +197,8 @@ def conclude(search: Search, say: Callable[[str], None] = lambda text: None, noi
     if noise is not None:
         main = noise.probe.name
         chances = {name: 0.0 for name in chances} | {main: 1.0}
-    doubt = unknown_chance(unclean, unexplained)
-    chances = {name: value * (1.0 - doubt) for name, value in chances.items()} | {UNKNOWN: doubt}
+    unknown = unknown_chance(unclean, unexplained)
+    chances = {name: value * (1.0 - unknown) for name, value in chances.items()} | {UNKNOWN: unknown}
     for label in catalogue():
         chances.setdefault(label, 0.0)
     top = max(chances, key=lambda name: chances[name])
