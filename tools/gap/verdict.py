@@ -189,7 +189,7 @@ def conclude(search: Search, say: Callable[[str], None] = lambda text: None, noi
         if noise is None and unexplained > LEFT_OVER:
             found = scatter(search)
             if found is not None and found.gain > MOSTLY * (brought + left):
-                more, doubt = raised(search.problem, found.probe, found.scale)
+                more, _ = raised(search.problem, found.probe, found.scale)
                 rough = replace(search.problem, spectral=search.problem.spectral + more)
                 return conclude(run(rough, say), say, found)
     main = max(gained, key=lambda label: gained[label]) if gained else ""

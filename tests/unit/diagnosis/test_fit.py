@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
+from support.cases import make_case
 
 from sim_backend.core import effect_layout as ef
-from tests.support.cases import make_case
 from tools.gap.candidates import allowed, candidates, place
 from tools.gap.fit import Fitter, within
 from tools.gap.problem import pose

@@ -1,0 +1,88 @@
+"""`glider gap diagnose` from a shell's point of view: files written, models flown, none said where there is none."""
+
+import json
+
+import numpy as np
+import pytest
+from support.cases import make_case
+
+from sim_backend.core import effect_layout as ef
+from tools.cli.common import report_errors
+from tools.cli.main import cli
+from tools.gap.model import load_model
+from tools.gap.predict import predict
+from tools.runs import columns as names
+
+
+def glider(*words: object) -> int:
+    """The command line's exit code."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sys.argv", ["glider", *map(str, words)])
+        return report_errors(cli)
+
+
+@pytest.fixture(scope="module")
+def lateral(tmp_path_factory):
+    F = np.zeros(ef.N_F)
+    F[ef.CG_Y] = 0.0015
+    folder = tmp_path_factory.mktemp("lateral")
+    case = make_case(folder, F, seed=11)
+    assert glider("gap", "diagnose", case.folder, "--out", folder / "out") == 0
+    return case, folder / "out", json.loads((folder / "out" / "diagnosis.json").read_text())
+
+
+def test_the_cause_is_found_and_its_size(lateral):
+    _, out, answer = lateral
+    assert answer["verdict"] == "cause"
+    assert "cg_lateral" in answer["causes"][0]["group"]
+    assert answer["causes"][0]["label"] == "cg_lateral"
+    offset = answer["causes"][0]["parameters"]["offset"]
+    assert offset["estimate"] == pytest.approx(0.0015, abs=3e-4)
+    assert offset["unit"] == "m"
+    assert sum(c["probability"] for c in answer["causes"]) == pytest.approx(1.0, abs=1e-6)
+    assert answer["where"][0] | {"probability": 0} == {"subsystem": "mass", "element": "lateral", "probability": 0}
+    assert (out / "report.html").stat().st_size > 10_000
+
+
+def test_the_gap_shrinks_on_runs_left_out(lateral):
+    _, _, answer = lateral
+    gap = answer["gap"]
+    assert gap["after"]["total"] < 0.3 * gap["before"]["total"]
+    assert gap["after"]["total"] < gap["recalibrated"]["total"]
+    assert gap["closed"]["value"] > 0.9
+    low, high = gap["shrinkage"]["ci90"]
+    assert low <= gap["shrinkage"]["value"] <= high
+
+
+def test_the_corrected_model_predicts_without_looking_ahead(lateral):
+    case, out, _ = lateral
+    model = load_model(str(out / "corrected.toml"), case)
+    run = case.runs[0]
+    whole = predict(case, model, [run])[0]
+    late = run.t - run.t[0] > 22.5
+    for name in (*names.ATTITUDE, *names.RATES, names.DEPTH, *names.DRAW_WIRES):
+        run.columns[name] = np.where(late, np.nan, run.columns[name])
+    blanked = predict(case, model, [run])[0]
+    second = (run.t - run.t[0] >= 22.0) & (run.t - run.t[0] < 40.0)
+    scored = [0, 1, 2, 3, 4, 5, 6, 7, 8]
+    assert np.array_equal(whole[second][:, scored], blanked[second][:, scored])
+
+
+def test_the_next_run_is_a_mission_that_check_accepts(lateral):
+    _, out, answer = lateral
+    assert answer["next_run"]["mission"] == "next_run.toml"
+    assert glider("check", "--mission", out / "next_run.toml") == 0
+
+
+def test_no_effect_is_called_none(tmp_path, capsys):
+    case = make_case(tmp_path, np.zeros(ef.N_F), seed=12)
+    assert glider("gap", "diagnose", case.folder, "--out", tmp_path / "out", "--json") == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["verdict"] == "none"
+    assert answer["selected"] == []
+
+
+def test_a_case_that_is_not_there_is_one_line_and_exit_2(tmp_path, capsys):
+    assert glider("gap", "diagnose", tmp_path / "nothing", "--out", tmp_path / "out") == 2
+    assert len(capsys.readouterr().err.strip().splitlines()) == 1
+    assert not (tmp_path / "out").exists()
