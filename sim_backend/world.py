@@ -97,9 +97,7 @@ class World:
     cmd: np.ndarray = field(default_factory=lambda: np.zeros(3))
     acc: np.ndarray = field(default_factory=lambda: np.zeros(6))
     counters: np.ndarray = field(default_factory=lambda: np.zeros(layout.N_C, dtype=np.int64))
-    ring: np.ndarray = field(
-        default_factory=lambda: np.zeros((layout.N_SENSORS, layout.RING, layout.RING_WIDTH))
-    )
+    ring: np.ndarray = field(default_factory=lambda: np.zeros((layout.N_SENSORS, layout.RING, layout.RING_WIDTH)))
     frame: np.ndarray = field(default_factory=empty_frame)
     folded: np.ndarray = field(default_factory=lambda: np.zeros(N_P))
     work: np.ndarray = field(default_factory=lambda: np.zeros((layout.N_WORK, layout.WORK_WIDTH)))

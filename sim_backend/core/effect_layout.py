@@ -42,5 +42,5 @@ Y_ONBOARD = 9
 Y_MOCAP_X, Y_MOCAP_Y, Y_MOCAP_Z, Y_MOCAP_ROLL, Y_MOCAP_PITCH, Y_MOCAP_YAW = 9, 10, 11, 12, 13, 14
 N_Y = 15
 
-TAIL = 0.6  # m, from the origin back to where a line is tied
+TAIL_TOP = 0.06  # m, above the axis: where a line is tied at the tail
 REST_PITCH = 0.05  # rad, about level, over which a climb becomes a dive

@@ -94,7 +94,7 @@ def play(follower, leader, width):
 
 
 @kernel
-def extra_wrench(P, F, kz, u, v, w, q, r):
+def extra_wrench(P, F, kz, u, v, w):
     """Forces (N) and moments (N m) in body axes that equation (4) has not: X, Y, Z, K, M, N.
 
     kz is the third component of the unit vector down's first body axis, -sin(theta): positive in a dive.
@@ -115,13 +115,9 @@ def extra_wrench(P, F, kz, u, v, w, q, r):
         Y -= F[ef.LINEAR_DRAG] * v
         Z -= F[ef.LINEAR_DRAG] * w
     if F[ef.TETHER] != 0.0:
-        tv, tw = v - r * ef.TAIL, w + q * ef.TAIL
-        speed = F[ef.TETHER] * math.sqrt(u * u + tv * tv + tw * tw)
-        X -= speed * u
-        Y -= speed * tv
-        Z -= speed * tw
-        M -= ef.TAIL * speed * tw
-        N += ef.TAIL * speed * tv
+        pull = F[ef.TETHER] * abs(u) * u
+        X -= pull
+        M += ef.TAIL_TOP * pull
     if F[ef.ROLL_TRIM] != 0.0 or F[ef.YAW_TRIM] != 0.0:
         K1, M1, N1 = flow_to_body(u, v, w, F[ef.ROLL_TRIM] * v_squared, 0.0, F[ef.YAW_TRIM] * v_squared)
         K += K1
@@ -170,7 +166,7 @@ def effect_derivative(P, F, x, mode, c_servo, c_slider, c_ballast, since, acc, f
     scale = 1.0 + F[ef.SLIDER_SCALE]
     tank = x[15] * (1.0 + F[ef.BALLAST_SCALE]) + F[ef.LEAK] * since
     tank_rate = db * (1.0 + F[ef.BALLAST_SCALE]) + F[ef.LEAK]
-    X, Y, Z, K, M, N = extra_wrench(P, F, r31, u, v, w, q, r)
+    X, Y, Z, K, M, N = extra_wrench(P, F, r31, u, v, w)
     net = P[P_NET_MASS]
     P[P_NET_MASS] = net + F[ef.MASS_PER_DEPTH] * x[2]
     ud, vd, wd, pd, qd, rd = accelerations(

@@ -5,19 +5,19 @@ The effects' vector F and the extended state have a layout of their own, effect_
 """
 
 # --- E: the environment, SI, NED ------------------------------------------------------------------------------------
-CURRENT_N, CURRENT_E = 0, 1          # m/s at the surface
-SHEAR_N, SHEAR_E = 2, 3              # 1/s, change of the current with depth
-SURFACE_HEIGHT = 4                   # m, hull height over which buoyancy is lost above the surface; 0: no surface
-FLOOR_DEPTH = 5                      # m; 0: no floor
-ACC_LINEAR, ACC_ANGULAR = 6, 7       # m/s2, rad/s2, 1 sigma of the held disturbance
+CURRENT_N, CURRENT_E = 0, 1  # m/s at the surface
+SHEAR_N, SHEAR_E = 2, 3  # 1/s, change of the current with depth
+SURFACE_HEIGHT = 4  # m, hull height over which buoyancy is lost above the surface; 0: no surface
+FLOOR_DEPTH = 5  # m; 0: no floor
+ACC_LINEAR, ACC_ANGULAR = 6, 7  # m/s2, rad/s2, 1 sigma of the held disturbance
 TEMPERATURE_C, SALINITY = 8, 9
-SURFACE_PRESSURE = 10                # Pa
-WATER_DENSITY = 11                   # kg/m3, the plant's own
+SURFACE_PRESSURE = 10  # Pa
+WATER_DENSITY = 11  # kg/m3, the plant's own
 N_E = 12
 
-DISTURBANCE_HOLD = 0.1               # s (MODEL.md)
-FLOOR_STIFFNESS = 2000.0             # N/m
-FLOOR_DAMPING = 300.0                # N s/m
+DISTURBANCE_HOLD = 0.1  # s (MODEL.md)
+FLOOR_STIFFNESS = 2000.0  # N/m
+FLOOR_DAMPING = 300.0  # N s/m
 
 # --- waves: one row a component -------------------------------------------------------------------------------------
 WAVE_AMPLITUDE, WAVE_OMEGA, WAVE_K_N, WAVE_K_E, WAVE_PHASE = 0, 1, 2, 3, 4
@@ -26,7 +26,7 @@ N_WAVE = 5
 # --- SENSOR: one row a sensor ---------------------------------------------------------------------------------------
 S_IMU, S_BEACON, S_SLIDER, S_PLUNGER = 0, 1, 2, 3
 N_SENSORS = 4
-SENSOR_PERIOD, SENSOR_DELAY = 0, 1   # s
+SENSOR_PERIOD, SENSOR_DELAY = 0, 1  # s
 N_SENSOR_FIELDS = 2
 
 # --- ERROR: bias (row 0) and white noise (row 1) of each measured value, SI ------------------------------------------
@@ -34,22 +34,22 @@ E_ROLL, E_PITCH, E_YAW, E_P, E_Q, E_R, E_DEPTH, E_SLIDER, E_BALLAST = 0, 1, 2, 3
 N_ERRORS = 9
 
 # --- streams of random numbers --------------------------------------------------------------------------------------
-STREAM_DISTURBANCE = 0               # 0..5
-STREAM_SENSORS = 16                  # + index of the value
-STREAM_WAVES = 32                    # phase, frequency
+STREAM_DISTURBANCE = 0  # 0..5
+STREAM_SENSORS = 16  # + index of the value
+STREAM_WAVES = 32  # phase, frequency
 
 # --- delay line: each sensor has RING slots of [delivery time, measurement time, values ...] ------------------------
 RING = 64
 RING_WIDTH = 8
 
 # --- memory of effects and scratch -----------------------------------------------------------------------------------
-LONGEST_DELAY = 6.0                  # s, of commands; a world keeps those of the steps so far back
-W_READ, W_WATER = 6, 7               # rows of scratch behind the step's: what is read; water (3), late commands (3)
-N_WORK, WORK_WIDTH = 8, 24            # rows, columns: N_XF and what makes rows whole cache lines
+LONGEST_DELAY = 6.0  # s, of commands; a world keeps those of the steps so far back
+W_READ, W_WATER = 6, 7  # rows of scratch behind the step's: what is read; water (3), late commands (3)
+N_WORK, WORK_WIDTH = 8, 24  # rows, columns: N_XF and what makes rows whole cache lines
 
 # --- C: counters of a world (int64) ---------------------------------------------------------------------------------
-C_STEP = 0                           # plant steps done
-C_HOLD = 1                           # index of the disturbance's hold, -1 before the first
-C_SAMPLES = 2                        # 2..5 samples taken, by sensor
-C_TAKEN = 6                          # 6..9 samples delivered, by sensor
+C_STEP = 0  # plant steps done
+C_HOLD = 1  # index of the disturbance's hold, -1 before the first
+C_SAMPLES = 2  # 2..5 samples taken, by sensor
+C_TAKEN = 6  # 6..9 samples delivered, by sensor
 N_C = 10

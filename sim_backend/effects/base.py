@@ -19,8 +19,8 @@ from hal.strict import ConfigError
 class Parameter:
     """A parameter of an effect: 0 (or `default`) is no effect.
 
-    `spread` is the prior's 1 sigma about the default. `entry` is its place in the effect vector F
-    (sim_backend/core/effect_layout), -1 where `apply` of the effect sets the world otherwise.
+    `spread` is the prior's 1 sigma: how far cases that are worth a diagnosis are likely to go. `entry` is its place in
+    the effect vector F (sim_backend/core/effect_layout), -1 where `apply` of the effect sets the world otherwise.
     """
 
     name: str

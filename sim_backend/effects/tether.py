@@ -7,6 +7,6 @@ EFFECT = Effect(
     label="tether",
     subsystem="hydrodynamics",
     element="surge",
-    summary="force -k |V| V at the tail, at the tail's own velocity",
+    summary="force -k |u| u along the hull, 6 cm above its axis",
     parameters=(Parameter("k", "kg/m", 0.0, 20.0, spread=1.0, entry=ef.TETHER),),
 )
