@@ -25,6 +25,13 @@ FAULTS = (
     ("imu", "unplug"), ("servo", "unplug"),
 )  # fmt: skip
 FIFO_PRIORITY = 50
+FIFO = click.option("--fifo", is_flag=True, help="At real-time priority, as a flight should be; needs the right to it.")
+
+
+def take_priority(fifo: bool) -> None:
+    """Real-time priority for this process and those it starts."""
+    if fifo:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(FIFO_PRIORITY))
 
 
 @click.group()
@@ -36,8 +43,10 @@ def main() -> None:
 @main.command("same-flight")
 @click.option("--mission", default="sawtooth", show_default=True)
 @click.option("--seed", default=1, show_default=True)
-def same_flight(mission: str, seed: int) -> None:
+@FIFO
+def same_flight(mission: str, seed: int, fifo: bool) -> None:
     """Fly a mission on the twin at real time and on its simulated board; compare the ends and the attitudes."""
+    take_priority(fifo)
     with tempfile.TemporaryDirectory() as folder:
         result = compare_flights(mission, seed, Path(folder))
     print_json(result)
@@ -62,7 +71,7 @@ def compare_flights(mission: str, seed: int, folder: Path) -> dict[str, Any]:
     rms = attitude_rms_deg(ticks["sim"], ticks["twin"])
     return {
         "mission": mission, "seed": seed, "completed": twin["completed"] and sim["completed"],
-        "seconds": {"twin": float(ticks["twin"].column("t_s")[-1]), "sim": float(ticks["sim"].column("t_s")[-1])},
+        "seconds": {name: float(np.ptp(topic.column("t_s"))) for name, topic in ticks.items()},
         "end_apart_m": apart, "end_m": {"sim": end, "twin": there}, "attitude_rms_deg": rms,
         "missed_ticks": twin["missed_ticks"], "ticks": twin["ticks"],
         "pass": bool(apart < POSITION_LIMIT_M and rms["flying"] < ATTITUDE_LIMIT_DEG and twin["completed"]),
@@ -118,11 +127,10 @@ def _quaternions(angles: np.ndarray) -> np.ndarray:
 @main.command("lateness")
 @click.option("--block", default=0.6, show_default=True, help="Seconds of a block; disturbed and not take turns.")
 @click.option("--turns", default=40, show_default=True, help="Blocks of each kind for each fault.")
-@click.option("--fifo", is_flag=True, help="Under real-time priority, as a flight should be; needs the right to it.")
+@FIFO
 def lateness(block: float, turns: int, fifo: bool) -> None:
     """The tick's lateness with one device disturbed over that of the undisturbed blocks between."""
-    if fifo:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(FIFO_PRIORITY))
+    take_priority(fifo)
     rows = measure_lateness(block, turns, FAULTS)
     result = {"fifo": fifo, "faults": rows, "ratio_limit": RATIO_LIMIT, "pass": all(row["pass"] for row in rows)}
     print_json(result)

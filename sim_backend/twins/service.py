@@ -244,8 +244,10 @@ async def _serve(config: dict) -> None:
 
 
 def main() -> None:
-    with contextlib.suppress(AttributeError, OSError):  # never at a flight's real-time priority
-        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+    with contextlib.suppress(AttributeError, OSError):  # under a real-time flight: below it, above all the rest
+        if os.sched_getscheduler(0) == os.SCHED_FIFO:
+            below = max(1, os.sched_getparam(0).sched_priority - 10)
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(below))
     line = b""
     while not line.endswith(b"\n"):  # unbuffered: what follows belongs to the commands
         byte = os.read(0, 1)

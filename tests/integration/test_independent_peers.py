@@ -37,7 +37,7 @@ def ports(tmp_path_factory):
     else:
         pytest.fail("the twins did not start")
     yield folder
-    process.communicate(b"quit\n", timeout=10)
+    process.communicate(b"quit\n", timeout=60)
     assert process.returncode == 0
 
 
