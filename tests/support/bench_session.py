@@ -158,8 +158,12 @@ def session(folder: Path, *, sweep: bool) -> tuple[str, dict]:
         terminal.ready()
         found["key"] = terminal.text()
         terminal.type("goto slider 8")
-        terminal.start("goto slider -9")
-        terminal.look(0.35)
+        if sweep:
+            terminal.start("goto slider -9")
+            terminal.look(0.35)
+        else:  # half a minute of motion: Ctrl-C is in time on the busiest machine
+            terminal.start("sweep slider")
+            terminal.look(1.5)
         terminal.child.sendintr()
         terminal.ready()
         found["stop"] = terminal.text()

@@ -234,9 +234,7 @@ def test_stall_caps_the_lift_and_only_the_lift(alpha, printed):
     speed, most = 0.4, 1.0 / 15.0
     u, w = speed * math.cos(alpha), speed * math.sin(alpha)
     F = vector(stall={"inverse": 15.0})
-    force = np.array(water_wrench(vehicle, u, 0.0, w, 0.0, 0.0, 0.0)) + extra_wrench(
-        vehicle, F, 0.0, u, 0.0, w, 0.0, 0.0
-    )
+    force = np.array(water_wrench(vehicle, u, 0.0, w, 0.0, 0.0, 0.0)) + extra_wrench(vehicle, F, 0.0, u, 0.0, w)
     lift = force[0] * math.sin(alpha) - force[2] * math.cos(alpha)
     drag = -force[0] * math.cos(alpha) - force[2] * math.sin(alpha)
     held_ = max(-most, min(most, alpha))

@@ -9,7 +9,7 @@ from test_plant import flight_state
 
 from firmware.autopilot import Autopilot, configuration
 from firmware.control.gains import Control
-from firmware.core.layout import X_POS
+from firmware.core.layout import N_X, X_POS
 from firmware.guidance.mission import Leg, Mission, Site
 from sim_backend.core.closed_loop import N_END, N_TRACE, TRACE, fly
 from sim_backend.world import Environment, Start, build_world
@@ -29,7 +29,7 @@ def flown(vehicle, board, trim, leg, column):
     pilot = Autopilot(vehicle, mission, configuration(vehicle, mission, dt=0.02, periods=PERIODS))
     world = build_world(vehicle, QUIET, board.sensors, Start(depth_m=30.0), 0)
     world.errors[:] = 0.0
-    world.x[:] = flight_state(steady_glide(world.P, trim))
+    world.x[:N_X] = flight_state(steady_glide(world.P, trim))
     world.x[X_POS + 2] = 30.0
     ticks = round(SECONDS / 0.02)
     trace = np.zeros((ticks, N_TRACE))
