@@ -61,7 +61,7 @@ def fault(board):
 def test_imu_faults_are_seen_at_once(board, fault, kind):
     samples = board.beacon.health.samples
     fault("imu", kind)
-    assert until(board, lambda: board.imu.validity in (Validity.STALE, Validity.FAULT), 1.0)
+    assert until(board, lambda: board.imu.validity in (Validity.STALE, Validity.FAULT), 3.0)
     assert board.imu.health.error
     assert until(board, lambda: board.beacon.health.samples - samples > 5)  # the others go on
 

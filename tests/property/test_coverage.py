@@ -33,7 +33,7 @@ def step(world, pilot, tick, given=False):
     pilot.frame[...] = world.frame
     if given:
         pilot.C[at.ESTIMATOR] = at.GIVEN
-        pilot.nav[at.NAV_GIVEN : at.NAV_GIVEN + layout.N_X] = world.x
+        pilot.nav[at.NAV_GIVEN : at.NAV_GIVEN + layout.N_X] = world.x[: layout.N_X]
     sent = pilot.commands.copy()
     pilot.tick(t)
     return sent

@@ -19,7 +19,7 @@ def diagnosis(probabilities, selected=(), groups=None, findings=(), noise=None, 
     main = max(probabilities, key=lambda name: probabilities[name])
     answer = SimpleNamespace(
         main=main, selected=list(selected), probabilities={"none": 0.0, "unknown": 0.0} | probabilities,
-        groups=groups or {}, findings=list(findings), noise=noise,
+        groups=groups or {}, findings=list(findings), noise=noise, freed=[],
     )  # fmt: skip
     case = SimpleNamespace(log_rate_hz=10.0)
     return Diagnosis(case, None, answer, SimpleNamespace(**FAR | far), {}, "")
