@@ -59,6 +59,7 @@ def fault(board):
 
 @pytest.mark.parametrize("kind", ["silent", "bad_crc", "nan", "babble", "unplug"])
 def test_imu_faults_are_seen_at_once(board, fault, kind):
+    assert until(board, lambda: board.imu.validity == Validity.VALID)  # it was set up before it fell silent
     samples = board.beacon.health.samples
     fault("imu", kind)
     assert until(board, lambda: board.imu.validity in (Validity.STALE, Validity.FAULT), 3.0)
