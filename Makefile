@@ -19,7 +19,8 @@ demo: setup
 	@$(BIN)/python -m tools.demo
 
 test: setup
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 2 -m 'not realtime'
+	$(BIN)/python -m pytest -m realtime
 
 check: setup lint types contract test
 

@@ -13,6 +13,8 @@ import pytest
 from hal.boardfile import calibration_hash, decode_device_file
 from tests.support.bench_session import Twins, session
 
+pytestmark = pytest.mark.realtime
+
 
 def glider(*arguments, lines=(), **options):
     command = [sys.executable, "-m", "tools.cli.main", *(str(item) for item in arguments)]

@@ -8,6 +8,8 @@ from tools.device_figures import ATTITUDE_LIMIT_DEG, POSITION_LIMIT_M, compare_f
 from tools.log.reader import read_log
 from tools.log.rundata import export_case
 
+pytestmark = pytest.mark.realtime
+
 SHORT = """
 format = 1
 name = "dip"

@@ -9,6 +9,8 @@ from hal.ports import BoardError, Validity
 from tools.compose import load_board_file
 from tools.sources import load_vehicle
 
+pytestmark = pytest.mark.realtime
+
 FILE = load_board_file("twin")
 REQUEST = BoardRequest(text=FILE.text, source=FILE.source, vehicle=load_vehicle("roughie"), site_depth=5.0)
 
