@@ -64,7 +64,7 @@ def test_imu_faults_are_seen_at_once(board, fault, kind):
     assert until(board, lambda: board.imu.validity == Validity.VALID)  # it was set up before it fell silent
     samples = board.beacon.health.samples
     fault("imu", kind)
-    assert until(board, lambda: board.imu.validity in (Validity.STALE, Validity.FAULT), 3.0)
+    assert until(board, lambda: board.imu.validity in (Validity.STALE, Validity.FAULT), 1.0)
     assert board.imu.health.error
     assert until(board, lambda: board.beacon.health.samples - samples > 5)  # the others go on
 

@@ -121,8 +121,10 @@ class Signs:
     def _move(self, name: str, what: str, question: str) -> Finding:
         high = self._bench.limits(name)[1]
         wire = WIRES.get(name)
-        before = self._wire(wire)
         try:
+            # From the middle: from beyond the goal it would move the other way.
+            self._bench.wait_there(name, self._bench.target(name, 0.0), MOVE_S)
+            before = self._wire(wire)
             sent = self._bench.target(name, SHARE * high)
             there = self._bench.wait_there(name, sent, MOVE_S)
             moved = self._wire(wire) - before
