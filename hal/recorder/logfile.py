@@ -22,6 +22,7 @@ CHUNK_BYTES = 16_384
 START, END = "glider", "glider_end"  # metadata records
 SCHEMAS_ATTACHMENT = "glider_schemas.json"
 CRC_KEY = "crc32"
+PART = "part"  # metadata entry of a log that goes on where another one broke off: its number, from 2
 _LAST_NS = 2**63 - 1
 
 

@@ -1,7 +1,8 @@
 """The recorder, seen from the flight: start it, fill and commit records, close it.
 
 The file is written by a process of its own (writer.py); the flight hands its records over through shared memory and
-never waits for a disk. What is on the disk is at most half a second and one fsync behind.
+never waits for a disk. What is on the disk is at most half a second and one fsync behind. A recording process that dies
+or hangs is replaced by one that writes on into a further file, NAME-part2.mcap and so on (`watch`).
 """
 
 import contextlib
@@ -18,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from hal.recorder import ring
+from hal.recorder.condition import FIRST_RETRY_S, HUNG_S, LONGEST_RETRY_S, Condition, Level
 from hal.recorder.producer import Channel, Producer
 from hal.recorder.schema import RecordSpec, specs_to_json
 
@@ -25,6 +27,14 @@ SLOTS = 2048  # twenty seconds of a hundred records a second
 SYNC_PERIOD_S = 0.5  # with the time an fsync takes, at most a second is lost when the power goes
 START_TIMEOUT_S = 20.0
 CLOSE_TIMEOUT_S = 20.0
+
+
+def _shared_text(text: str) -> int:
+    """A descriptor of memory that holds a text."""
+    data = text.encode()
+    fd = ring.create_shared(len(data))
+    os.pwrite(fd, data, 0)
+    return fd
 
 
 @dataclass(frozen=True)
@@ -38,6 +48,7 @@ class RecorderReport:
     error: str = ""  # what the disk said last, if it did not recover
     bytes: int = 0
     complete: bool = True
+    parts: int = 1  # files; more than one where a recording process had to be replaced
 
 
 @dataclass(frozen=True)
@@ -79,9 +90,7 @@ class Recorder:
         layout = ring.Layout(slots, payload)
         self._fd: int | None = ring.create_shared(layout.size)
         self._producer = Producer(self._fd, layout, specs)
-        self._config = {
-            "path": os.path.abspath(self.path),
-            "fd": self._fd,
+        config = {
             "slots": layout.slots,
             "payload": layout.payload,
             "specs": specs_to_json(specs),
@@ -90,9 +99,15 @@ class Recorder:
             "epoch_ns": epoch_ns,
             "period_s": sync_period_s,
         }
+        self._config_fd: int | None = _shared_text(json.dumps(config))
         self._process: subprocess.Popen[bytes] | None = None
         self._ready = False
         self._report: RecorderReport | None = None
+        self.condition = Condition()
+        self._part = 1
+        self._heard = b""  # of its answers
+        self._retry_at, self._retry_s = 0.0, FIRST_RETRY_S
+        self._started_at = 0.0
 
     def channel(self, topic: str) -> Channel:
         """The channel of a spec's topic; KeyError for another."""
@@ -105,28 +120,41 @@ class Recorder:
     def start(self, wait: bool = True) -> None:
         """Start the recording process and wait until the file is there (or call wait_ready later, and do other things
         meanwhile); OSError where it cannot be written, FileExistsError where it is there already."""
-        if self._fd is None:
+        if self._process is not None or self._report is not None:
             raise RuntimeError("this recorder was started before")
+        self._launch()
+        if wait:
+            self.wait_ready()
+
+    def _launch(self) -> None:
+        """Start a recording process for the current part; a few milliseconds."""
+        assert self._fd is not None
+        assert self._config_fd is not None
         root = Path(__file__).resolve().parents[2]
         paths = [str(root), *filter(None, [os.environ.get("PYTHONPATH")])]
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-m", "hal.recorder.writer"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            pass_fds=(self._fd,),
+            pass_fds=(self._fd, self._config_fd),
             start_new_session=True,  # what a terminal sends to the flight does not reach it
             env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
         )
-        os.close(self._fd)  # both sides have it mapped, or inherited
-        self._fd = None
+        self._started_at = time.monotonic()
         assert self._process.stdin is not None
+        start = {
+            "path": os.path.abspath(self._part_path(self._part)), "fd": self._fd, "config_fd": self._config_fd,
+            "part": self._part, "parent": os.getpid(),
+        }  # fmt: skip
         try:
-            self._process.stdin.write(json.dumps({**self._config, "parent": os.getpid()}).encode() + b"\n")
+            self._process.stdin.write(json.dumps(start).encode() + b"\n")
             self._process.stdin.flush()
         except BrokenPipeError:
-            pass  # wait_ready says so
-        if wait:
-            self.wait_ready()
+            pass  # whoever waits for it says so
+
+    def _part_path(self, part: int) -> Path:
+        """The file of a part: the first is `path` itself."""
+        return self.path if part == 1 else self.path.with_name(f"{self.path.stem}-part{part}{self.path.suffix}")
 
     def wait_ready(self) -> None:
         """Wait until the file is there; OSError as `start`."""
@@ -154,11 +182,59 @@ class Recorder:
             alive=self._process is not None and self._process.poll() is None,
         )
 
+    def watch(self) -> Condition:
+        """Look at the recording and replace its process where that died or hangs; returns `condition`, updated.
+
+        For once a second: some system calls, and where a process is started a few milliseconds.
+        """
+        control, condition = self._producer.control, self.condition
+        process = self._process
+        alive = process is not None and process.poll() is None
+        now = time.monotonic()
+        dropped = control[ring.DROPPED]
+        condition.pending = control[ring.HEAD] - control[ring.TAIL]
+        condition.written, condition.damaged = control[ring.WRITTEN], control[ring.DAMAGED]
+        condition.disk_errors, condition.errno = control[ring.DISK_ERRORS], control[ring.LAST_ERRNO]
+        condition.beat_ns = control[ring.BEAT]
+        silent_s = now - max(condition.beat_ns / 1e9, self._started_at)
+        if process is None or not (self._ready or self._part > 1) or self._report is not None:
+            condition.level = int(Level.FAILED)
+        elif not alive or silent_s > HUNG_S:
+            condition.level = int(Level.FAILED)
+            self._replace(process, alive, now)
+        elif condition.errno or dropped > condition.dropped or condition.beat_ns < self._started_at * 1e9:
+            condition.level = int(Level.DROPPING)
+        else:
+            condition.level = int(Level.OK)
+            if now - self._started_at > LONGEST_RETRY_S:
+                self._retry_s = FIRST_RETRY_S
+        condition.dropped = dropped
+        return condition
+
+    def _replace(self, process: subprocess.Popen[bytes], alive: bool, now: float) -> None:
+        """A new process for a dead or hanging one, never beside it: it has to be gone first."""
+        if alive:
+            process.kill()  # gone by the next look, unless the system holds it
+            return
+        if now < self._retry_at:
+            return
+        for pipe in (process.stdin, process.stdout):
+            assert pipe is not None
+            with contextlib.suppress(OSError):
+                pipe.close()
+        self._retry_at, self._retry_s = now + self._retry_s, min(2.0 * self._retry_s, LONGEST_RETRY_S)
+        self._part += 1
+        self._heard = b""
+        self.condition.restarts += 1
+        # A refusing disk is not held against the new process before it has tried.
+        self._producer.control[ring.LAST_ERRNO] = 0
+        self._launch()
+
     def close(self, ending: Mapping[str, str] | None = None) -> RecorderReport:
         """Have everything written and the log closed, with how the flight ended; a second call answers the same."""
         if self._report is not None:
             return self._report
-        if self._process is None or not self._ready:
+        if self._process is None or not (self._ready or self._part > 1):
             self._report = RecorderReport(complete=False, error="never started")
             self._end_process()
             return self._report
@@ -167,12 +243,14 @@ class Recorder:
             texts = {str(key): str(value) for key, value in (ending or {}).items()}
             self._process.stdin.write(json.dumps(texts).encode() + b"\n")
             self._process.stdin.flush()
-        except BrokenPipeError:
+        except (BrokenPipeError, ValueError):
             pass  # it is dead: no answer will come
         result = self._answer(CLOSE_TIMEOUT_S)
+        if result == {"ready": True}:  # of a part that nobody waited for
+            result = self._answer(CLOSE_TIMEOUT_S)
         health = self.health()
         self._end_process()
-        if result is None:
+        if result is None or "written" not in result:
             self._report = RecorderReport(
                 written=health.written,
                 dropped=health.dropped + health.pending,
@@ -180,29 +258,36 @@ class Recorder:
                 disk_errors=health.disk_errors,
                 error="the recording process died or hung",
                 complete=False,
+                parts=self._part,
             )
         else:
-            self._report = RecorderReport(**result)
+            # What a process that died had taken and not yet brought to the disk is lost, half a second at most.
+            complete = result["complete"] and self._part == 1
+            self._report = RecorderReport(**{**result, "complete": complete}, parts=self._part)
         return self._report
 
     def _answer(self, timeout_s: float) -> dict | None:
         """The next line from the recording process; None where it died or is silent for too long."""
         assert self._process is not None
         assert self._process.stdout is not None
-        fd, data = self._process.stdout.fileno(), b""
+        if self._process.stdout.closed:
+            return None
+        fd = self._process.stdout.fileno()
         deadline = time.monotonic() + timeout_s
-        while not data.endswith(b"\n"):
+        while b"\n" not in self._heard:
             ready, _, _ = select.select([fd], [], [], max(0.0, deadline - time.monotonic()))
             piece = os.read(fd, 65_536) if ready else b""
             if not piece:
                 return None
-            data += piece
-        return json.loads(data)
+            self._heard += piece
+        line, _, self._heard = self._heard.partition(b"\n")
+        return json.loads(line)
 
     def _end_process(self) -> None:
-        if self._fd is not None:
-            os.close(self._fd)
-            self._fd = None
+        for fd in (self._fd, self._config_fd):
+            if fd is not None:
+                os.close(fd)
+        self._fd = self._config_fd = None
         if self._process is None:
             return
         assert self._process.stdin is not None
@@ -242,6 +327,7 @@ class NullRecorder:
 
     def __init__(self, specs: Sequence[RecordSpec]):
         self._channels = {spec.topic: NullChannel(spec) for spec in specs}
+        self.condition = Condition()
 
     def channel(self, topic: str) -> NullChannel:
         return self._channels[topic]
@@ -257,6 +343,9 @@ class NullRecorder:
 
     def health(self) -> RecorderHealth:
         return RecorderHealth(pending=0, written=0, dropped=0, damaged=0, disk_errors=0, errno=0, alive=True)
+
+    def watch(self) -> Condition:
+        return self.condition
 
     def close(self, ending: Mapping[str, str] | None = None) -> RecorderReport:
         return RecorderReport()

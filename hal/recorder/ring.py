@@ -26,6 +26,7 @@ WRITTEN = 9  # records given to the log file
 DAMAGED = 10  # records that never became whole
 DISK_ERRORS = 11
 LAST_ERRNO = 12  # 0 while the disk is well
+BEAT = 13  # when it last looked at the ring, ns of the monotonic clock
 CONTROL_WORDS = 16
 
 # The head of a record, float64 like the rest (whole numbers are exact up to 2**53).

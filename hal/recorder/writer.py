@@ -1,8 +1,10 @@
 """The recording process: `python -m hal.recorder.writer`, started by recorder.py.
 
-Standard input brings one line of JSON (the configuration), later one more (how the flight ended); its end without that
-means that the flight is dead. Standard output answers {"ready": true} or {"error": ...}, and with a report at the end.
-Signals that ask programs to stop are ignored: the flight decides, and goes on to be recorded while it comes up.
+Standard input brings one line of JSON (which shared memory, which configuration, also in shared memory), later one more
+(how the flight ended); its end without that means that the flight is dead. Standard output answers {"ready": true} or
+{"error": ...}, and with a report at the end. A process that replaces another (`part` above 1) waits for a disk that
+refuses, since the flight is under way; the first one says so instead, and does not start. Signals that ask programs to
+stop are ignored: the flight decides, and goes on to be recorded while it comes up.
 """
 
 import json
@@ -13,7 +15,7 @@ import sys
 import time
 
 from hal.recorder import disk, ring
-from hal.recorder.logfile import LogFile
+from hal.recorder.logfile import PART, LogFile
 from hal.recorder.schema import specs_from_json
 
 POLL_S = 0.01
@@ -79,6 +81,7 @@ class Recording:
                 break
             self._write(taken)
         now = time.monotonic()
+        self._reader.control[ring.BEAT] = time.monotonic_ns()
         if now >= self._next_sync:
             self._next_sync = now + self._period_s
             self._log.flush()
@@ -140,6 +143,13 @@ def _become_background() -> None:
         return
 
 
+def read_config(start: dict) -> dict:
+    """The configuration: the line's own, and what lies in the shared memory that it names."""
+    with os.fdopen(start["config_fd"], "rb") as file:
+        size = os.fstat(file.fileno()).st_size
+        return {**json.loads(os.pread(file.fileno(), size, 0)), **start}
+
+
 def main() -> int:
     """Exit 0 with the log complete, 1 otherwise."""
     _become_background()
@@ -149,7 +159,7 @@ def main() -> int:
         line = source.line(1.0)
     if line is None:
         return 1
-    config = json.loads(line)
+    config = read_config(json.loads(line))
     specs = specs_from_json(config["specs"])
     layout = ring.Layout(config["slots"], config["payload"])
     reader = ring.RingReader(config["fd"], layout, [spec.width for spec in specs])
@@ -159,11 +169,10 @@ def main() -> int:
         answer({"error": error.errno, "message": error.strerror})
         return 1
     file = disk.DiskFile(fd)
-    log = LogFile(
-        file, specs, attachments=config["attachments"], metadata=config["metadata"], epoch_ns=config["epoch_ns"]
-    )
+    metadata = {**config["metadata"], **({PART: str(config["part"])} if config["part"] > 1 else {})}
+    log = LogFile(file, specs, attachments=config["attachments"], metadata=metadata, epoch_ns=config["epoch_ns"])
     recording = Recording(reader, log, file, config["path"], config["period_s"])
-    if not recording.sync():  # no flight starts without room for its log
+    if not recording.sync() and config["part"] == 1:  # no flight starts without room for its log
         disk.close(fd, config["path"], keep=False)
         answer({"error": file.last_errno, "message": os.strerror(file.last_errno)})
         return 1

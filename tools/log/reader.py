@@ -35,6 +35,7 @@ class Topic:
     times_ns: np.ndarray  # int64, log time, shape (count,)
     sequences: np.ndarray  # int64, number among its kind, from 1
     data: np.ndarray | None  # float64, shape (count, width)
+    first: int = 1  # number of the first record that belongs here; in a log that goes on, the first there is
 
     @property
     def count(self) -> int:
@@ -43,7 +44,7 @@ class Topic:
     @property
     def missing(self) -> int:
         """Records before the last one that are not there: dropped in flight, or damaged since."""
-        return int(self.sequences[-1]) - self.count if self.count else 0
+        return int(self.sequences[-1]) - self.first + 1 - self.count if self.count else 0
 
     def column(self, name: str) -> np.ndarray:
         """A field's values, shape (count,) or, for an array field, (count, n); KeyError if there is none."""
@@ -161,6 +162,8 @@ def read_log(path: Path | str) -> Log:
         topic = log.topics.get(gathered.topic)
         if topic is None:
             log.topics[gathered.topic] = _topic(gathered)
+            if logfile.PART in log.metadata and gathered.sequences:
+                log.topics[gathered.topic].first = gathered.sequences[0]
     return log
 
 

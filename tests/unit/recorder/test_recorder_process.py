@@ -13,6 +13,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
+from hal.recorder.condition import Level
 from hal.recorder.recorder import NullRecorder, Recorder
 from hal.recorder.schema import ERROR, INFO, Field, RecordSpec
 from tools.log.reader import read_log
@@ -86,11 +87,12 @@ def test_files_that_cannot_be_written_are_refused_at_the_start(tmp_path):
 
 
 def test_a_disk_that_is_full_at_the_start_is_an_error_and_leaves_no_file(tmp_path):
+    recorder = Recorder(tmp_path / "x.mcap", [TICK])
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (100, hard))  # the recording process inherits it
     try:
         with pytest.raises(OSError, match="too large"):
-            Recorder(tmp_path / "x.mcap", [TICK]).start()
+            recorder.start()
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert list(tmp_path.iterdir()) == []
@@ -178,6 +180,7 @@ def test_a_recording_process_that_dies_does_not_stop_the_flight(tmp_path):
 
 FLIGHT = """
 import sys, time, json
+from hal.recorder.condition import Level
 from hal.recorder.recorder import Recorder
 from hal.recorder.schema import Field, RecordSpec
 spec = RecordSpec("/tick", "glider/msg/Tick", (Field("t_s", "s", "time"), Field("n", "1", "number")))
@@ -260,3 +263,79 @@ def test_recording_nothing_has_the_same_surface(tmp_path):
 def test_two_specs_of_one_topic_are_refused(tmp_path):
     with pytest.raises(ValueError, match="share a topic"):
         Recorder(tmp_path / "x.mcap", [TICK, TICK])
+
+
+def _watch_until(recorder, condition):
+    _await(lambda: condition(recorder.watch()))
+
+
+def test_a_recording_process_that_dies_is_replaced_and_nothing_handed_over_later_is_lost(tmp_path):
+    path = tmp_path / "x.mcap"
+    recorder = Recorder(path, [TICK], sync_period_s=0.05)
+    recorder.start()
+    assert recorder.watch().level in (Level.OK, Level.DROPPING)  # it may not have looked at the ring yet
+    _fly(recorder, 100)
+    _await(lambda: recorder.health().written == 100)
+    _watch_until(recorder, lambda condition: condition.level == Level.OK)
+    time.sleep(0.3)  # so that these are on the disk
+    recorder._process.kill()
+    _await(lambda: not recorder.health().alive)
+    _fly(recorder, 50, start=100)
+    assert recorder.watch().level == Level.FAILED
+    _watch_until(recorder, lambda condition: condition.level == Level.OK and condition.pending == 0)
+    _fly(recorder, 50, start=150)
+    report = recorder.close({"reason": "done"})
+    assert (report.parts, report.complete, report.dropped) == (2, False, 0)
+    assert recorder.condition.restarts == 1
+    first, second = read_log(path), read_log(tmp_path / "x-part2.mcap")
+    assert not first.complete
+    assert second.whole
+    assert second.ending["reason"] == "done"
+    times = np.concatenate([log.topics["/tick"].column("t_s") for log in (first, second)])
+    np.testing.assert_array_equal(times, np.arange(200) / 50)
+    assert second.topics["/tick"].missing == 0
+    assert second.metadata["part"] == "2"
+
+
+def test_a_recording_process_that_hangs_is_replaced(tmp_path, monkeypatch):
+    monkeypatch.setattr("hal.recorder.recorder.HUNG_S", 0.5)
+    with Recorder(tmp_path / "x.mcap", [TICK]) as recorder:
+        _await(lambda: recorder.watch().level == Level.OK)
+        os.kill(recorder._process.pid, signal.SIGSTOP)
+        _watch_until(recorder, lambda condition: condition.level == Level.FAILED)
+        _watch_until(recorder, lambda condition: condition.level == Level.OK)
+        assert recorder.close().parts == 2
+
+
+def test_a_folder_that_is_gone_is_tried_again_ever_more_seldom(tmp_path, monkeypatch):
+    monkeypatch.setattr("hal.recorder.recorder.FIRST_RETRY_S", 0.1)
+    folder = tmp_path / "card"
+    folder.mkdir()
+    recorder = Recorder(folder / "x.mcap", [TICK])
+    recorder.start()
+    folder.rename(tmp_path / "gone")  # the card is pulled: the open file may live on, a new one cannot be made
+    recorder._process.kill()
+    _watch_until(recorder, lambda condition: condition.restarts >= 2)
+    assert recorder.condition.level == Level.FAILED
+    folder.mkdir()
+    _watch_until(recorder, lambda condition: condition.level == Level.OK)
+    assert recorder.close().parts == recorder.condition.restarts + 1
+
+
+def test_a_refusing_disk_and_a_full_ring_are_seen_as_dropping(tmp_path):
+    path = tmp_path / "x.mcap"
+    with Recorder(path, [TICK], sync_period_s=0.05) as recorder:
+        _watch_until(recorder, lambda condition: condition.level == Level.OK)
+        pid = recorder._process.pid
+        _, hard = resource.prlimit(pid, resource.RLIMIT_FSIZE)
+        resource.prlimit(pid, resource.RLIMIT_FSIZE, (path.stat().st_size + 10, hard))
+        _fly(recorder, 100)
+        _watch_until(recorder, lambda condition: condition.level == Level.DROPPING and condition.errno)
+        resource.prlimit(pid, resource.RLIMIT_FSIZE, (hard, hard))
+        _watch_until(recorder, lambda condition: condition.level == Level.OK)
+        os.kill(pid, signal.SIGSTOP)
+        _fly(recorder, 3000)
+        condition = recorder.watch()
+        os.kill(pid, signal.SIGCONT)
+        assert condition.level == Level.DROPPING
+        assert condition.dropped > 0
