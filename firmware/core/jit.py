@@ -15,7 +15,7 @@ import tempfile
 from pathlib import Path
 
 PACKAGES_DIR = Path(__file__).resolve().parents[2]
-KERNEL_DIRS = ("firmware/core", "sim_backend/core", "sim_backend/effects", "tools/gap/core")
+KERNEL_DIRS = ("firmware/core", "sim_backend/core", "sim_backend/effects", "tools/gap/core", "tools/identify/core")
 CONSTANT_FILES = ("hal/ports.py",)  # no kernels, but places in the frame that the kernels freeze
 KEEP_CACHES = 3
 

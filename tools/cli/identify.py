@@ -1,0 +1,40 @@
+"""`glider identify`: parameters and their distribution from runs."""
+
+import sys
+from pathlib import Path
+
+import click
+
+from tools.cli.common import json_option, print_json, say
+
+
+@click.command()
+@click.argument("case", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Folder for vehicle file and report.")
+@click.option("--seed", type=click.IntRange(0, 2**31), default=1, show_default=True, help="Of the chains.")
+@json_option
+def identify(case: Path, out: Path | None, seed: int, as_json: bool) -> None:
+    """Identify the vehicle of CASE from its runs: the twelve coefficients and their distribution, by MCMC."""
+    from tools.errors import need
+    from tools.identify.run import identify as run_identification
+    from tools.runs.case import load_case
+
+    need("scipy")
+    need("arviz", extra="identify")
+    found = run_identification(load_case(case), seed, lambda text: print(text, file=sys.stderr))
+    for one in found.left_out:
+        say(f"left out: {one}")
+    if as_json:
+        print_json(found.plain())
+    else:
+        _tell(found)
+
+
+def _tell(found) -> None:
+    """The coefficients, for a person."""
+    click.echo(f"{'':<6} {'mean':>10} {'sd':>9}   {'90 % interval':<22} {'R-hat':>6} {'ESS':>7}  unit")
+    for one in found.coefficients:
+        low, high = one.ci90
+        interval = f"{low:.4g} to {high:.4g}"
+        figures = f"{one.name:<6} {one.mean:>10.4g} {one.sd:>9.2g}   {interval:<22}"
+        click.echo(f"{figures} {one.rhat:>6.3f} {one.ess:>7.0f}  {one.unit}")

@@ -1,0 +1,69 @@
+"""Equation (1) as it is linear in the twelve coefficients: momentum, its known rate of change, and the K's columns.
+
+The terms are those that the plant flies with (firmware/core); nothing of equation (1) is written twice.
+"""
+
+import numpy as np
+
+from firmware.core.actuators import clip
+from firmware.core.jit import kernel
+from firmware.core.layout import K_D0, K_R, N_P
+from firmware.core.mass import first_moment, inertia, translational_mass
+from firmware.core.motion import momentum_rate
+from firmware.core.rotations import rotation_nb_euler
+from firmware.core.water import water_wrench
+
+N_K = K_R - K_D0 + 1
+
+
+@kernel
+def momentum(P, u, v, w, p, q, r, servo, slider, ballast):
+    """M nu, six numbers, kg m/s and kg m2/s."""
+    m1, m2, m3 = translational_mass(P, ballast)
+    S1, S2, S3 = first_moment(P, servo, slider, ballast)
+    I1, I2, I3, I12, I13, I23 = inertia(P, servo, slider, ballast)
+    return (
+        m1 * u + q * S3 - r * S2,
+        m2 * v + r * S1 - p * S3,
+        m3 * w + p * S2 - q * S1,
+        I1 * p + I12 * q + I13 * r + S2 * w - S3 * v,
+        I12 * p + I2 * q + I23 * r + S3 * u - S1 * w,
+        I13 * p + I23 * q + I3 * r + S1 * v - S2 * u,
+    )
+
+
+@kernel
+def momentum_rows(P, attitude, nu, actuators, M, N, K):
+    """Rows of d(M nu)/dt = N + K k: M (rows, 6), N (rows, 6), K (rows, 6, 12), k the coefficients of equation (4).
+
+    attitude (rows, 3) roll, pitch, yaw; nu (rows, 6); actuators (rows, 3) servo, slider, ballast. -M_dot nu stands on
+    the left here, as part of the momentum's change.
+    """
+    unit = np.empty(N_P)
+    for i in range(len(nu)):
+        u, v, w, p, q, r = nu[i, 0], nu[i, 1], nu[i, 2], nu[i, 3], nu[i, 4], nu[i, 5]
+        servo, slider, ballast = actuators[i, 0], actuators[i, 1], actuators[i, 2]
+        R = rotation_nb_euler(attitude[i, 0], attitude[i, 1], attitude[i, 2])
+        M[i, 0], M[i, 1], M[i, 2], M[i, 3], M[i, 4], M[i, 5] = momentum(P, u, v, w, p, q, r, servo, slider, ballast)
+        N[i, 0], N[i, 1], N[i, 2], N[i, 3], N[i, 4], N[i, 5] = momentum_rate(
+            P, R[6], R[7], R[8], u, v, w, p, q, r, servo, slider, ballast, 0.0, 0.0, 0.0
+        )
+        for k in range(N_K):
+            unit[:] = P
+            unit[K_D0 : K_R + 1] = 0.0
+            unit[K_D0 + k] = 1.0
+            F = water_wrench(unit, u, v, w, p, q, r)
+            K[i, 0, k], K[i, 1, k], K[i, 2, k], K[i, 3, k], K[i, 4, k], K[i, 5, k] = F
+
+
+@kernel
+def flown_servo(t, commands, low, high, rate, time_constant, out):
+    """The nominal servo under its commands from 0 on, out (rows,), rad: it has no sensor (MODEL.md, Actuators)."""
+    at = 0.0
+    for i in range(len(t)):
+        out[i] = at
+        if i + 1 < len(t):
+            steps = max(1, int(np.ceil((t[i + 1] - t[i]) / 0.01 - 1e-9)))
+            h = (t[i + 1] - t[i]) / steps
+            for _ in range(steps):
+                at += h * clip((clip(commands[i], low, high) - at) / time_constant, -rate, rate)

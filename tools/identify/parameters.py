@@ -1,0 +1,132 @@
+"""What is free in an identification, and what was believed of it before: priors out of the vehicle file.
+
+The twelve coefficients of equation (4) are what is looked for. Beside them everything is free that the recordings
+could mistake for them: weighed and estimated masses, trim, constant errors of the sensors, and how the capture's body
+sits on the vehicle and its clock beside the onboard one.
+"""
+
+from dataclasses import dataclass
+from math import inf
+
+import numpy as np
+
+from firmware.core import layout
+from firmware.model.vehicle import COEFFICIENTS
+from sim_backend.core import effect_layout as ef
+from tools.gap.candidates import Free
+from tools.gap.problem import Problem
+
+# 1 sigma before any flight. [uncertainty] says what is left after one: these are what a first vehicle file may be off.
+K_SHARE = 0.5  # of a coefficient's size
+CAMBER, TRIM_ANGLE = 0.025, 0.03  # rad of attack by which lift and pitch moment may be displaced where a file says 0
+ADDED_SHARE, NET_MASS, CG = 0.15, 0.01, 0.0005  # of added mass and inertia; kg; m
+FIRST = 10.0  # times these trims, and WIRE_SCALE, where no motion capture holds the flight
+WIRE_SCALE = 0.03  # of what a draw-wire says, without motion capture
+FRAME_TURN, FRAME_OFFSET = 0.02, 0.02  # rad, m: capture's body against the vehicle's
+CLOCK = 0.05  # s, capture's clock behind the onboard one
+FRAME = "frame"  # the vector of what is no part of the model but of how the capture sees it
+FRAME_NAMES = ("capture_roll", "capture_pitch", "capture_yaw", "capture_x", "capture_y", "capture_z")
+MASSES = {"m_t": layout.M_T, "m_r": layout.M_R, "m_s": layout.M_S}
+ADDED = {
+    "added_mass_x": layout.A_X, "added_mass_y": layout.A_Y, "added_mass_z": layout.A_Z,
+    "added_inertia_x": layout.B_X, "added_inertia_y": layout.B_Y, "added_inertia_z": layout.B_Z,
+}  # fmt: skip
+CENTRE = {"cg_x": layout.CG_X, "cg_y": layout.CG_Y, "cg_z": layout.CG_Z}
+K_UNITS = {
+    "K_D0": "kg/m", "K_D": "kg/m/rad2", "K_L0": "kg/m", "K_L": "kg/m/rad", "K_beta": "kg/m/rad", "K_MR": "kg/rad",
+    "K_p": "kg s/rad", "K_M0": "kg", "K_M": "kg/rad", "K_q": "kg s/rad", "K_MY": "kg/rad", "K_r": "kg s/rad",
+}  # fmt: skip
+BIASES = ("roll", "pitch", "yaw", "p", "q", "r", "depth", "slider", "ballast")
+BIAS_UNITS = (*3 * ["rad"], *3 * ["rad/s"], "m", "m", "kg")
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """Everything free, the coefficients first. `nominal` (n,): the vehicle file's values, 0 where it names none."""
+
+    free: list[Free]
+    nominal: np.ndarray
+
+    @property
+    def names(self) -> list[str]:
+        return [f.name for f in self.free]
+
+    @property
+    def spreads(self) -> np.ndarray:
+        """1 sigma of the priors, (n,), SI."""
+        return np.array([f.spread for f in self.free])
+
+    def si(self, values: np.ndarray) -> np.ndarray:
+        """Values (..., n) in units of the priors as SI."""
+        return self.nominal + values * self.spreads
+
+    def place(self, P0: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The model at values (n,): parameters P, effects F, and the capture's frame (6,)."""
+        P, F, frame = P0.copy(), np.zeros(ef.N_F), np.zeros(6)
+        vectors = {"P": P, "F": F, FRAME: frame}
+        for f, value in zip(self.free, values, strict=True):
+            vectors[f.vector][f.entry] += f.spread * value
+        return P, F, frame
+
+
+def coefficient_sizes(P: np.ndarray) -> np.ndarray:
+    """How large each of the twelve coefficients is likely to be, (12,): its nominal value, or where that may be 0 the
+    lift of CAMBER and the pitch moment of TRIM_ANGLE."""
+    size = np.array([abs(P[getattr(layout, name.upper())]) for name in COEFFICIENTS])
+    size[COEFFICIENTS.index("K_L0")] = max(abs(P[layout.K_L0]), CAMBER * abs(P[layout.K_L]))
+    size[COEFFICIENTS.index("K_M0")] = max(abs(P[layout.K_M0]), TRIM_ANGLE * abs(P[layout.K_M]))
+    return np.maximum(size, 1e-3)
+
+
+def _coefficients(P: np.ndarray) -> list[Free]:
+    found = []
+    for name, size in zip(COEFFICIENTS, coefficient_sizes(P), strict=True):
+        entry = getattr(layout, name.upper())
+        spread = K_SHARE * size
+        low = -P[entry] / spread if name in ("K_D0", "K_D") else -inf  # drag does not push
+        found.append(Free("", name, "P", entry, spread, low, inf, K_UNITS[name]))
+    return found
+
+
+def _masses(problem: Problem, scale: float) -> list[Free]:
+    P, u = problem.model.P, problem.case.vehicle.uncertainty
+    found = [Free("", name, "P", entry, u.mass * P[entry], unit="kg") for name, entry in MASSES.items()]
+    share = max(u.added, ADDED_SHARE)
+    for name, entry in ADDED.items():
+        found.append(Free("", name, "P", entry, share * P[entry], unit="kg m2" if "inertia" in name else "kg"))
+    found.append(Free("", "net_mass", "P", layout.NET_MASS, max(u.net_mass, scale * NET_MASS), unit="kg"))
+    for name, entry in CENTRE.items():
+        found.append(Free("", name, "P", entry, max(u.cg, scale * CG), unit="m"))
+    return [f for f in found if f.spread > 0.0]
+
+
+def _biases(problem: Problem) -> list[Free]:
+    s, seen = problem.case.sensors, problem.seen
+    size = [*3 * [s.attitude.bias], *3 * [s.gyro.bias], s.depth.bias, s.slider.bias, s.ballast.bias]
+    return [
+        Free("", f"{BIASES[j]}_bias", "F", ef.BIAS + j, size[j], unit=BIAS_UNITS[j])
+        for j in range(len(BIASES))
+        if seen[j] and size[j] > 0.0
+    ]
+
+
+def _capture(problem: Problem) -> list[Free]:
+    """The capture's frame and clock; which way its x axis lies along the vehicle's is free only with its attitude."""
+    if not problem.seen[ef.Y_MOCAP_ROLL :].all():
+        return []
+    spreads = [*3 * [FRAME_TURN], *3 * [FRAME_OFFSET]]
+    found = [Free("", name, FRAME, n, spreads[n], unit="rad" if n < 3 else "m") for n, name in enumerate(FRAME_NAMES)]
+    return [*found, Free("", "capture_delay", "F", ef.MOCAP_DELAY, CLOCK, unit="s")]
+
+
+def parameters(problem: Problem) -> Parameters:
+    """What is free for these recordings."""
+    mocap = bool(problem.seen[ef.Y_MOCAP_X])
+    free = [*_coefficients(problem.model.P), *_masses(problem, 1.0 if mocap else FIRST), *_biases(problem)]
+    if mocap:
+        free += _capture(problem)
+    else:
+        free.append(Free("", "ballast_scale", "F", ef.BALLAST_SCALE, FIRST * WIRE_SCALE))
+        free.append(Free("", "slider_scale", "F", ef.SLIDER_SCALE, FIRST * WIRE_SCALE))
+    nominal = np.array([problem.model.P[f.entry] if f.vector == "P" else 0.0 for f in free])
+    return Parameters(free, nominal)
