@@ -36,10 +36,10 @@ _TEXT_AT, TEXT_BYTES = 1024, 256
 class Status(IntEnum):
     """What the flight says of itself."""
 
-    STARTING = 0
-    FLYING = 1
-    TAKE_OVER = 2  # it wants the out-of-band process to bring the vehicle up
-    DONE = 3  # it ended in order: nobody is to take over
+    DONE = 0  # it ended in order, or has not begun: nobody is to take over
+    STARTING = 1
+    FLYING = 2
+    TAKE_OVER = 3  # it wants the out-of-band process to bring the vehicle up
 
 
 class Guard(IntEnum):
@@ -88,9 +88,13 @@ class Heartbeat:
         if path.parent.stat().st_uid not in (0, os.getuid()):  # under /tmp anybody may have made it
             raise PermissionError(1, "belongs to somebody else", str(path.parent))
         fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o640)
-        try:
-            fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
+        for _ in range(5):  # a watcher's look takes the lock for microseconds
+            try:
+                fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except BlockingIOError:
+                time.sleep(0.02)
+        else:
             os.close(fd)
             with contextlib.suppress(OSError, ValueError):
                 raise Held(f"{path}: a flight is under way (process {cls.open(folder).words[W_PID]})") from None
@@ -138,6 +142,16 @@ class Heartbeat:
     def flight(self) -> str:
         """The flight's name."""
         return bytes(self._text).rstrip(b"\0").decode("utf-8", "replace")
+
+    def held(self) -> bool:
+        """For the watching side: whether a flight's process holds this heartbeat. A dead one does not, however it died;
+        one that is stopped or hangs does."""
+        try:
+            fcntl.flock(self._fd, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+        fcntl.flock(self._fd, fcntl.LOCK_UN)
+        return False
 
     def look(self) -> Pulse:
         """The pulse now. Words that make no sense read as the worst they could mean."""

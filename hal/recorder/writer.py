@@ -14,6 +14,7 @@ import signal
 import sys
 import time
 
+from hal.realtime import leave_real_time
 from hal.recorder import disk, ring
 from hal.recorder.logfile import PART, LogFile
 from hal.recorder.schema import specs_from_json
@@ -136,8 +137,8 @@ def _become_background() -> None:
     for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGXFSZ"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
+    leave_real_time()
     try:
-        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
         os.nice(5)
     except (AttributeError, OSError):
         return

@@ -11,6 +11,7 @@ import click
 from tools.cli.common import DONE, FAILED, fail, json_option, print_json, progress, say
 
 ROOM = 512  # records on their way to the disk, past which a simulated flight waits
+SURE_S = 5.0  # of ascent before a flight that was brought up only may count as surfaced
 
 
 def next_log(mission: str) -> Path:
@@ -40,15 +41,30 @@ def peak_rss_mb() -> float | None:
 @click.option("--no-log", is_flag=True, help="Record nothing.")
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Seed of everything random.")
 @click.option("--realtime", is_flag=True, help="Fly the simulated board at the speed of the clock on the wall.")
+@click.option(
+    "--state",
+    "state_folder",
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Folder of the vehicle's state and heartbeat, on devices.",
+)
+@click.option("--acknowledge", is_flag=True, help="A person has looked after a flight that was given up or broke off.")
+@click.option("--priority", type=click.IntRange(1, 90), help="Real-time priority (SCHED_FIFO); 50 is usual.")
+@click.option("--lock-memory", is_flag=True, help="Keep all memory resident (mlockall).")
+@click.option("--core", type=click.IntRange(0, 255), help="Keep the loop on one processor core.")
 @click.option("--effect", "effects", multiple=True, metavar="LABEL:NAME=VALUE", help="Add an effect to the plant.")
 @json_option
-def fly(mission, vehicle, board, log_file, no_log, seed, realtime, effects, as_json) -> None:
+def fly(
+    mission, vehicle, board, log_file, no_log, seed, realtime, state_folder, acknowledge, priority, lock_memory, core,
+    effects, as_json,
+) -> None:  # fmt: skip
     """Fly a mission and record it.
 
-    The first Ctrl-C gives the dive up and surfaces, the second stops at once. Exit code 1: the flight did not complete.
+    The first Ctrl-C gives the dive up and surfaces, the second stops at once. On devices, a flight that broke off is
+    never resumed: the next start only brings the vehicle up. Exit code 1: the flight did not complete.
     """
     from hal.ports import BoardError
     from hal.recorder.recorder import NullRecorder, Recorder
+    from hal.state_file import Phase
     from tools.compose import build_flight, log_metadata, parse_effects, record_specs
     from tools.errors import InputError
 
@@ -74,6 +90,17 @@ def fly(mission, vehicle, board, log_file, no_log, seed, realtime, effects, as_j
     else:
         recorder = Recorder(path, specs, attachments=flight.texts, metadata=metadata)
 
+    wishes = Wishes(priority, lock_memory, core)
+    try:
+        keeper = keep(flight, recorder, path, state_folder, acknowledge)
+    except BoardError as error:
+        fail(f"glider: {board}: not armed: {error}")
+    if keeper is not None and keeper.life.before.phase == Phase.HELD:
+        fail(f"glider: not armed: {keeper.life.reason}; look at it, then --acknowledge")
+    if keeper is not None and keeper.life.ascent_only:
+        say(f"ascending only: {keeper.life.reason}")
+        flight.autopilot.give_up()
+
     presses = 0
 
     def on_interrupt(*_):
@@ -85,14 +112,20 @@ def fly(mission, vehicle, board, log_file, no_log, seed, realtime, effects, as_j
 
     before = signal.signal(signal.SIGINT, on_interrupt)
     try:
-        flight.board.open()  # what does not arm leaves no log
-        with (
-            contextlib.closing(flight.board),
-            recorder,
-            progress(f"flying {flight.mission.name}", len(flight.mission.leg)) as advance,
-        ):
-            timing, seconds = _run(flight, recorder, realtime, advance)
-            report = recorder.close(ending={"ended": flight.autopilot.mode, "reason": flight.autopilot.reason})
+        with keeper or contextlib.nullcontext():
+            if keeper is not None:
+                keeper.prepare()
+            flight.board.open()  # what does not arm leaves no log
+            with (
+                contextlib.closing(flight.board),
+                recorder,
+                progress(f"flying {flight.mission.name}", len(flight.mission.leg)) as advance,
+            ):
+                timing, seconds = _run(flight, recorder, realtime, advance, keeper, wishes)
+                if keeper is not None:
+                    orderly = flight.autopilot.mode == "completed" or presses > 0
+                    keeper.end(surfaced=flight.autopilot.surfaced, orderly=orderly, reason=flight.autopilot.reason)
+                report = recorder.close(ending={"ended": flight.autopilot.mode, "reason": flight.autopilot.reason})
     except KeyboardInterrupt:
         raise click.Abort from None
     except BoardError as error:
@@ -100,7 +133,13 @@ def fly(mission, vehicle, board, log_file, no_log, seed, realtime, effects, as_j
     finally:
         signal.signal(signal.SIGINT, before)
     completed = flight.autopilot.mode == "completed" and flight.autopilot.surfaced
-    reason = flight.autopilot.reason or ("" if completed else "not at the surface after the mission")
+    if keeper is not None and keeper.life.ascent_only:
+        completed = False
+    reason = (
+        (keeper.life.reason if keeper is not None else "")
+        or flight.autopilot.reason
+        or ("" if completed else "not at the surface after the mission")
+    )
     result = {
         "completed": completed,
         "seconds": seconds,
@@ -112,7 +151,13 @@ def fly(mission, vehicle, board, log_file, no_log, seed, realtime, effects, as_j
         "missed_ticks": timing.missed,
         "lateness": timing.histogram(),
         "peak_rss_mb": peak_rss_mb(),
-        "records": {"written": report.written, "dropped": report.dropped, "complete": report.complete},
+        "records": {
+            "written": report.written,
+            "dropped": report.dropped,
+            "complete": report.complete,
+            "parts": report.parts,
+        },
+        "real_time": wishes.said,
     }
     if hasattr(flight.board, "health"):
         result["devices"] = {name: device_summary(health) for name, health in flight.board.health().items()}
@@ -125,13 +170,51 @@ def fly(mission, vehicle, board, log_file, no_log, seed, realtime, effects, as_j
     raise SystemExit(DONE if completed else FAILED)
 
 
+class Wishes:
+    """What the flight asks of the system to be punctual, and what came of it."""
+
+    def __init__(self, priority: int | None, lock_memory: bool, core: int | None):
+        self._priority, self._lock_memory, self._core = priority, lock_memory, core
+        self.said: list[str] = []
+
+    def grant(self) -> None:
+        """Ask, just before the loop: what the flight has started keeps its own ways. Said where anything was asked."""
+        from hal import realtime
+
+        if self._core is not None:
+            self.said.append(realtime.pin_to_core(self._core))
+        if self._priority is not None:
+            self.said.append(realtime.take_priority(self._priority))
+        if self._lock_memory:
+            self.said.append(realtime.lock_memory())
+        if self.said:
+            say(f"{', '.join(self.said)}, collector frozen")
+
+
+def keep(flight, recorder, path, folder, acknowledge):
+    """What stands around a flight on devices (tools/unattended.py); None in simulation. The state before it is read."""
+    from hal.state_file import Phase
+    from tools.unattended import Keeper
+
+    if not hasattr(flight.board, "links"):
+        return None
+    name = flight.mission.name if path is None else path.stem
+    keeper = Keeper(flight, recorder, name=name, folder=folder, twin=flight.board.name == "twin")
+    keeper.claim()
+    if acknowledge and not keeper.life.before.may_start:
+        say(f"acknowledged: {keeper.life.reason}")
+        keeper.life.file.write(Phase.ASHORE, reason="acknowledged")
+        keeper.life.before = keeper.life.file.read()
+    return keeper
+
+
 def device_summary(health) -> dict:
     """A device's counts and what has changed about it."""
     counts = {name: getattr(health, name) for name in ("samples", "unfit", "timeouts", "exceptions", "damaged")}
     return {**counts, "error": health.error, "notes": [note for _, note in health.notes]}
 
 
-def _run(flight, recorder, realtime, advance):
+def _run(flight, recorder, realtime, advance, keeper, wishes):
     """Arm, fly, disarm; returns the timing and the flight's length in s."""
     from firmware.core.control_layout import LEG
     from tools.compose import build_runtime
@@ -148,9 +231,20 @@ def _run(flight, recorder, realtime, advance):
             done = leg
         while simulated and recorder.health().pending > ROOM and recorder.health().alive:
             time.sleep(0.001)  # simulated time is quicker than a disk
+        if keeper is not None:
+            keeper.second(runtime.timing)
 
     try:
+        if keeper is not None:
+            keeper.begin()
+            runtime.extras = (*runtime.extras, keeper.beat)
+        wishes.grant()
         runtime.arm()
+        if keeper is not None:
+            keeper.flying()
+            if keeper.life.ascent_only:  # long enough to know the depth before asking whether this is the surface
+                for _ in range(round(SURE_S / runtime.dt)):
+                    runtime.tick()
         began = runtime.deadline
         timing = runtime.run(on_second=on_second)
         advance(len(flight.mission.leg) - done)

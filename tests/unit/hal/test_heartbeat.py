@@ -15,7 +15,7 @@ def test_what_the_loop_stamps_another_map_sees(tmp_path):
     pulse = Heartbeat.create(tmp_path, 0.02, "sawtooth-001")
     watcher = Heartbeat.open(tmp_path)
     first = watcher.look()
-    assert (first.pid, first.status, first.period_s, first.ticks) == (os.getpid(), Status.STARTING, 0.02, 0)
+    assert (first.pid, first.status, first.period_s, first.ticks) == (os.getpid(), Status.DONE, 0.02, 0)
     assert first.age_s == float("inf")
     assert watcher.flight == "sawtooth-001"
     pulse.say(Status.FLYING)

@@ -34,7 +34,8 @@ def test_a_write_cut_at_any_byte_never_reads_better_than_both(state, before, aft
     state.write(before, flight="a flight")
     old, new = state.paths[0].read_bytes(), encode(FlightState(after, "a flight", "why", 2))
     least = min(before, after)
-    for place in range(BLOCK + 1):
+    every = 1 if (before, after) == (Phase.ASHORE, Phase.ARMED) else 32  # each byte once, the others by samples
+    for place in range(0, BLOCK + 1, every):
         torn = new[:place] + old[place:]
         for first, second in ((torn, old), (new, torn)):
             write_raw(state, 0, first)

@@ -1,0 +1,125 @@
+"""The small file written at arming: read back as written, and nothing else is believed."""
+
+import json
+import subprocess
+import sys
+import zlib
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hal.board import BoardRequest, board_builder
+from hal.outofband.make import make_plan
+from hal.outofband.plan import PlanError, read_plan, write_plan
+from tools.compose import load_board_file
+from tools.sources import load_vehicle
+
+
+@pytest.fixture(scope="module")
+def plan():
+    file = load_board_file("roughie")
+    board = board_builder("devices")(
+        BoardRequest(text=file.text, source=file.source, vehicle=load_vehicle("roughie"), water_density=1000.0)
+    )
+    return make_plan(board, flight="sawtooth-001", watchdog="/dev/watchdog")
+
+
+def test_the_plan_is_what_the_board_file_says(plan):
+    pump, slider = plan.axes
+    assert (pump.name, pump.id, pump.counts_per_m, pump.path, pump.status) == ("pump", 8, 5e6, 0x6200, 0x1003)
+    assert (slider.name, slider.id, slider.wire) == ("slider", 7, None)
+    assert pump.wire is not None
+    assert (pump.wire.id, pump.wire.function, pump.wire.address) == (2, 4, 1)
+    area = load_vehicle("roughie").actuators.ballast
+    assert pump.end_m == pytest.approx(max(-0.034, area.range[0] / (1000.0 * area.plunger_area)))
+    assert slider.end_m == pytest.approx(max(-0.062, load_vehicle("roughie").actuators.slider.range[0]))
+    assert pump.end_m < 0.0 > slider.end_m
+    assert plan.servo is not None
+    assert plan.servo.quarter_us == 6000
+    # A broken wire reads below 3.8 mA: what is not believed begins there.
+    assert pump.wire.low_m == pytest.approx(max(-0.045, (3800 - 12000) / 160000))
+
+
+def test_it_reads_back_as_written(plan, tmp_path):
+    write_plan(tmp_path / "deep" / "plan.json", plan)
+    assert read_plan(tmp_path / "deep" / "plan.json") == plan
+    assert [path.name for path in (tmp_path / "deep").iterdir()] == ["plan.json"]
+
+
+def test_cut_anywhere_or_with_a_flipped_bit_it_is_refused(plan, tmp_path):
+    path = tmp_path / "plan.json"
+    write_plan(path, plan)
+    whole = path.read_bytes()
+    for place in range(0, len(whole) - 1, 7):  # without its last newline it is whole
+        path.write_bytes(whole[:place])
+        with pytest.raises(PlanError):
+            read_plan(path)
+    refused = 0
+    places = range(0, len(whole) - 1, 7)
+    for place in places:
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
+        try:
+            assert read_plan(path) == plan  # a bit of white space
+        except PlanError:
+            refused += 1
+    assert refused > 0.99 * len(places)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda table: table.update(axes=[]),
+        lambda table: table.pop("servo"),
+        lambda table: table.update(extra=1),
+        lambda table: table["axes"][0].update(counts_per_m=0.0),
+        lambda table: table["axes"][0].update(id="8"),
+        lambda table: table["axes"][0].update(id=True),
+        lambda table: table["axes"][0].update(end_m=float("nan")),
+        lambda table: table["axes"][0].update(end_m=float("inf")),
+        lambda table: table["axes"][0]["wire"].update(per_m=0.0),
+        lambda table: table["axes"][0].update(wire=[]),
+        lambda table: table.update(axes=None),
+    ],
+)
+def test_what_makes_no_sense_is_refused_though_its_sum_is_right(plan, tmp_path, change):
+    path = tmp_path / "plan.json"
+    write_plan(path, plan)
+    table = json.loads(json.loads(path.read_text())["plan"])
+    change(table)
+    body = json.dumps(table)
+    path.write_text(json.dumps({"format": 1, "crc32": f"{zlib.crc32(body.encode()):08x}", "plan": body}))
+    with pytest.raises(PlanError, match=r"plan\.json: "):
+        read_plan(path)
+
+
+@settings(max_examples=200, deadline=None)
+@given(data=st.binary(max_size=300) | st.recursive(st.none() | st.integers() | st.text(), st.lists).map(
+    lambda value: json.dumps(value).encode()))  # fmt: skip
+def test_any_bytes_are_refused_in_one_line(tmp_path_factory, data):
+    path = tmp_path_factory.getbasetemp() / "any.json"
+    path.write_bytes(data)
+    with pytest.raises(PlanError):
+        read_plan(path)
+
+
+def test_a_missing_or_endless_file_is_refused(tmp_path):
+    with pytest.raises(PlanError, match="No such file"):
+        read_plan(tmp_path / "none.json")
+    (tmp_path / "long.json").write_bytes(b"[" * 1_000_000)
+    with pytest.raises(PlanError, match="too long"):
+        read_plan(tmp_path / "long.json")
+
+
+def test_the_process_loads_the_standard_library_and_pyserial_alone():
+    code = "import sys, hal.outofband.guard; print(*sorted({m.split('.')[0] for m in sys.modules}))"
+    done = subprocess.run([sys.executable, "-S", "-c", PATHS + code], capture_output=True, check=True, text=True)
+    loaded = set(done.stdout.split())
+    assert loaded - set(sys.stdlib_module_names) <= {"__main__", "hal", "serial", "sitecustomize"}
+    mine = "import sys, hal.outofband.guard; print(*sorted(m for m in sys.modules if m.startswith('hal.')))"
+    done = subprocess.run([sys.executable, "-c", mine], capture_output=True, check=True, text=True)
+    wanted = {"hal.heartbeat", "hal.notify", "hal.realtime", "hal.state_file"}
+    assert {name for name in done.stdout.split() if not name.startswith("hal.outofband")} == wanted
+
+
+PATHS = f"import sys; sys.path[:] = {sys.path!r}; "
