@@ -13,6 +13,7 @@ from firmware.estimation.settings import estimator_settings, first_spread, param
 from firmware.guidance.mission import Mission
 from firmware.model.strict import ConfigError
 from firmware.model.vehicle import Vehicle
+from firmware.supervisor.table import FAULTS
 from hal.ports import empty_frame
 
 MODES = {layout.WAITING: "waiting", layout.FLYING: "flying", layout.COMPLETED: "completed", layout.ABORTED: "aborted"}
@@ -127,7 +128,11 @@ class Autopilot:
     @property
     def reason(self) -> str:
         """Why the dive was given up, with the leg; empty if it was not."""
-        reason = REASONS[float(self.ap[layout.REASON])]
+        code = float(self.ap[layout.REASON])
+        if code > layout.REASON_FAULT:
+            row = int(code - layout.REASON_FAULT)
+            return f"fault {row}: {FAULTS[row].name}"
+        reason = REASONS[code]
         if self.ap[layout.REASON] == layout.REASON_LEG_TIME:
             row = int(self.ap[layout.LEG])
             target, turn = self.legs[row, layout.LEG_DEPTH], self.legs[row, layout.LEG_TURNED]

@@ -1,4 +1,4 @@
-"""The fixed step: read the ports, tick the autopilot, command the actuators, hand over to the recorder.
+"""The fixed step: read the ports, screen, tick the autopilot, guard, command the actuators, hand over to the recorder.
 
 Deadlines are absolute, so a late tick does not shift those after it. Time comes from the board's clock, real or
 simulated; the code is the same. Nothing is allocated inside a tick but a few boxed numbers that live as long as it.
@@ -7,19 +7,26 @@ simulated; the code is the same. Nothing is allocated inside a tick but a few bo
 import copy
 import gc
 import math
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from firmware.autopilot import Autopilot
+from firmware.core import supervisor_layout as sup
 from firmware.core import telemetry as record
 from firmware.core.jit import freeze_kernels, thaw_kernels
+from firmware.supervisor.supervisor import Supervisor
+from firmware.supervisor.table import Reaction
 from hal.ports import SLOTS, Board
 
 HISTOGRAM_EDGES = np.array([0.0, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, np.inf])  # s
 ASCENT_LIMIT = 180.0  # s
+SHED = 10  # of so many records one is kept while the loop is late
+RESOURCES_S = 10.0  # between two looks at memory and handles
 
 
 @dataclass
@@ -36,16 +43,35 @@ class Timing:
         return {f"<{edge:g}": int(n) for edge, n in zip(HISTOGRAM_EDGES[1:], self.counts, strict=True)}
 
 
+def resources_used() -> tuple[float, int]:
+    """Resident memory of this process (MB) and its open handles; zeros where the system does not say."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text().split()[1])
+        return pages * os.sysconf("SC_PAGE_SIZE") / 1e6, len(os.listdir("/proc/self/fd"))
+    except OSError:
+        return 0.0, 0
+
+
 class Runtime:
     """Runs an autopilot on a board. `tick` is one step; `run` steps until the mission ends."""
 
     def __init__(
-        self, board: Board, autopilot: Autopilot, channel: Any, *, extras: tuple[Callable[[float], None], ...] = ()
-    ):
-        self.board, self.autopilot, self.channel = board, autopilot, channel
+        self, board: Board, autopilot: Autopilot, supervisor: Supervisor, channel: Any, *,
+        extras: tuple[Callable[[float], None], ...] = (), on_news: Callable[[float, Reaction, str], Any] | None = None,
+        resources: Callable[[], tuple[float, int]] = resources_used,
+    ):  # fmt: skip
+        """channel: where ticks are recorded; extras: called with the time once a tick; on_news(t, reaction, text): a
+        row of the fault table asks for more than before; resources(): resident memory (MB) and open handles."""
+        self.board, self.autopilot, self.supervisor, self.channel = board, autopilot, supervisor, channel
         self.dt = 1.0 / board.loop_hz
         self.timing = Timing()
         self.extras = extras
+        self._on_news, self._resources = on_news, resources
+        self._at_arming = (0.0, 0)
+        self._looked_at = -math.inf
+        self._shed = 0
+        self._hardware_called = False
+        self._G = supervisor.G
         self._clock = board.clock
         frame = autopilot.frame
         self._reads = tuple(
@@ -59,14 +85,17 @@ class Runtime:
 
     def arm(self) -> None:
         """Make everything that a flight needs exist: kernels loaded, collector off, no compilation from here on."""
-        rehearsal = copy.deepcopy(self.autopilot)
+        rehearsal, supervisor = copy.deepcopy((self.autopilot, self.supervisor))
+        supervisor.screen(0.0)
         rehearsal.tick(0.0)
+        supervisor.guard(0.0)
         scratch = np.zeros(record.N_RECORD)
         record.fill_record(rehearsal.frame, rehearsal.est, rehearsal.ap, rehearsal.commands, 0.0, 0.0, 0.0, scratch)
         freeze_kernels()
         gc.collect()
         gc.freeze()
         gc.disable()
+        self._at_arming = self._resources()
         self._deadline = self._clock.now()
 
     def disarm(self) -> None:
@@ -82,27 +111,55 @@ class Runtime:
 
     def tick(self) -> None:
         """Wait for the deadline, then do one step."""
-        clock, autopilot, channel = self._clock, self.autopilot, self.channel
+        clock, autopilot, supervisor, channel = self._clock, self.autopilot, self.supervisor, self.channel
         deadline = self._deadline
         clock.sleep_until(deadline)
         t = clock.now()
         lateness = t - deadline
         for read, slot in self._reads:
             read(slot)
+        G = self._G
+        G[sup.LATENESS] = lateness
+        supervisor.screen(t)
         commands = autopilot.tick(t)
+        supervisor.guard(t)
         for i in (0, 1, 2):
             commands[i] = self._send[i](commands[i])
         record.fill_record(
             autopilot.frame, autopilot.est, autopilot.ap, commands, t, lateness, self._last_duration, channel.values
         )
-        channel.commit(t)
+        self._shed = (self._shed + 1) % SHED if G[sup.ASKED + 24] >= sup.HOLD else 0
+        if not self._shed:
+            channel.commit(t)
         for extra in self.extras:
             extra(t)
+        if G[sup.CHANGED]:
+            self._react(t)
         self._count(lateness)
         self._last_duration = clock.now() - t
         self._deadline = deadline + self.dt
         if lateness > self.dt:
             self._skip(t)
+
+    def _react(self, t: float) -> None:
+        """What is rare: say what is new, call on the out-of-band process and on the hardware."""
+        supervisor, board = self.supervisor, self.board
+        if self._on_news is not None:
+            for reaction, text in supervisor.news():
+                self._on_news(t, reaction, text)
+        if supervisor.reaction >= Reaction.OOB and board.out_of_band is not None:
+            board.out_of_band.ascend()
+        if supervisor.reaction >= Reaction.HW and board.drop_weight is not None and not self._hardware_called:
+            self._hardware_called = True
+            board.drop_weight.release()
+
+    def look_at_resources(self, t: float) -> None:
+        """Row 33, between two ticks: how much memory and how many handles were taken since arming."""
+        self._looked_at = t
+        megabytes, handles = self._resources()
+        table = self.supervisor.table
+        share = max((megabytes - self._at_arming[0]) / table.memory_mb, (handles - self._at_arming[1]) / table.handles)
+        self._G[sup.GROWTH] = 2.0 if share >= 1.0 else 1.0 if share >= 0.5 else 0.0
 
     def _count(self, lateness: float) -> None:
         timing = self.timing
@@ -134,9 +191,12 @@ class Runtime:
         while True:
             self.tick()
             now = self._deadline
+            if now - self._looked_at >= RESOURCES_S:
+                self.look_at_resources(now)
             if autopilot.finished:
                 ended = min(ended, now)
-                if autopilot.surfaced or now - ended > ascent_limit:
+                known = self.supervisor.depth_known
+                if (autopilot.surfaced and known) or now - ended > ascent_limit:
                     return self.timing
             if on_second is not None and now >= shown:
                 on_second(now)

@@ -29,7 +29,7 @@ _FIELDS = (
     ("int_depth_kg", "kg", "integrator of the depth loop"),
     ("mode", "1", "0 waiting, 1 flying, 2 completed, 3 aborted"),
     ("leg", "1", "leg being flown, from 0"),
-    ("reason", "1", "why the dive was given up; firmware/core/control_layout.py"),
+    ("reason", "1", "why the dive was given up; firmware/core/control_layout.py; past 100 the row of the fault table"),
     ("lateness_s", "s", "start of the tick after its deadline"),
     ("duration_s", "s", "time the tick before this one took"),
     ("density_kg_m3", "kg/m3", "water density from pressure and temperature"),
@@ -68,6 +68,8 @@ _FIELDS = (
         "by how much V of pitch is sure to fall, over |s|; not positive: nothing is sure",
     ),
     ("margin_depth_m_s2", "m/s2", "V of depth, likewise"),
+    ("reaction", "1", "supervisor: 0 nothing, 1 log, 2 warn, 3 hold, 4 abort, 5 out-of-band, 6 hardware"),
+    ("fault", "1", "row of the fault table that asked for it; docs/SUPERVISOR.md"),
 )
 
 TICK = RecordSpec(

@@ -45,9 +45,9 @@ class ServingClock(MonotonicClock):
 
 
 class DeviceBoard:
-    """Every device of a board file. Drop weight and watchdog are not fitted."""
+    """Every device of a board file. Drop weight, watchdog and a way to the out-of-band process are not fitted."""
 
-    drop_weight = watchdog = None
+    drop_weight = watchdog = out_of_band = None
     imu: Vn100
     beacon: Beacon
     slider_wire: Input
@@ -195,8 +195,8 @@ class DeviceBoard:
         """The board's time begins."""
         now = time.monotonic()
         self.clock.start(now)
-        for sensor in self.sensors.values():
-            sensor.start(now)
+        for port in (*self.sensors.values(), *self.actuators.values()):
+            port.start(now)
 
     def stop(self) -> None:
         """Stop all actuators, at once as far as their lines go."""

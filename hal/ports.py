@@ -1,9 +1,10 @@
 """The ports between the flight software and whatever carries it: narrow protocols, one sample frame, a clock.
 
-Every sensor port writes its newest sample into a slot of the frame, a preallocated float64 vector that belongs to the
-loop. A slot is [time, validity, value ...]: the time of the measurement on the board's clock (s), a Validity, then the
-values in SI. Nothing is allocated to read, and the compiled autopilot takes the frame as it is. A device that is
-unplugged in flight writes its validity and never raises; it raises when it is opened.
+Every sensor port writes its newest sample into a slot of the frame, and every actuator how it does: the frame is a
+preallocated float64 vector that belongs to the loop. A slot is [time, validity, value ...]: the time of the measurement
+on the board's clock (s), a Validity, then the values in SI. Nothing is allocated to read, and the compiled autopilot
+takes the frame as it is. A device that is unplugged in flight writes its validity and never raises; it raises when it is
+opened.
 """
 
 from enum import IntEnum
@@ -45,9 +46,22 @@ class Slot(NamedTuple):
         return slice(self.start, self.start + 2 + len(self.names))
 
 
+class Condition(IntEnum):
+    """How an actuator does. Stored as a float in the frame; one that does not answer lets its time grow old."""
+
+    WELL = 0
+    ALARM = 1  # its drive is in alarm, which is being cleared
+    ALARM_KEPT = 2  # the alarm came back; kept still
+    RETRYING = 3  # did not move when sent; tried again
+    GIVEN_UP = 4  # did not move at any try; kept still
+    WRONG_WAY = 5  # ran the wrong way; kept still
+    MISCONFIGURED = 6  # refuses what it is asked: address, function or value
+
+
 # Where each slot begins: plain integers, because the kernels freeze them.
 IMU, BEACON, SLIDER_WIRE, PLUNGER_WIRE, LEAK, BATTERY = 0, 8, 12, 15, 18, 21
-FRAME_SIZE = 24
+SERVO, SLIDER, BALLAST = 24, 27, 30
+FRAME_SIZE = 33
 
 SLOTS = {
     "imu": Slot(IMU, ("roll", "pitch", "yaw", "p", "q", "r"), ("rad",) * 3 + ("rad/s",) * 3),
@@ -56,6 +70,9 @@ SLOTS = {
     "plunger_wire": Slot(PLUNGER_WIRE, ("plunger",), ("m",)),
     "leak": Slot(LEAK, ("wet",), ("1",)),
     "battery": Slot(BATTERY, ("voltage",), ("V",)),
+    "servo": Slot(SERVO, ("condition",), ("1",)),
+    "slider": Slot(SLIDER, ("condition",), ("1",)),
+    "ballast": Slot(BALLAST, ("condition",), ("1",)),
 }
 
 
@@ -80,7 +97,10 @@ class ActuatorPort(Protocol):
     """Servo (rad), slider (m) or ballast pump (kg of net mass, from which the driver makes plunger travel)."""
 
     def command(self, value: float) -> float:
-        """Ask for a position; returns what was really sent after the device's own limits."""
+        """Ask for a position; returns what was really sent after the device's own limits. NaN changes nothing."""
+
+    def read(self, out: np.ndarray) -> None:
+        """Write [time of its last answer, validity, Condition] into `out`, the actuator's slot of the frame."""
 
 
 @runtime_checkable
@@ -98,6 +118,12 @@ class Clock(Protocol):
 class DropWeight(Protocol):
     def release(self) -> None:
         """Let the drop weight go. Cannot be taken back."""
+
+
+@runtime_checkable
+class OutOfBand(Protocol):
+    def ascend(self) -> None:
+        """Have the out-of-band process take the pump and bring the vehicle up. Cannot be taken back."""
 
 
 @runtime_checkable
@@ -122,6 +148,7 @@ class Board(Protocol):
     slider: ActuatorPort
     ballast: ActuatorPort
     drop_weight: DropWeight | None
+    out_of_band: OutOfBand | None
     watchdog: HardwareWatchdog | None
 
     def open(self) -> None:

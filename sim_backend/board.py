@@ -8,7 +8,7 @@ import numpy as np
 from firmware.model.strict import Table, decode
 from hal.board import BoardRequest
 from hal.clocks import MonotonicClock
-from hal.ports import SLOTS
+from hal.ports import SLOTS, Condition, Validity
 from hal.recorder.schema import Field, RecordSpec
 from sim_backend.core.world import write_truth
 from sim_backend.effects.base import check_board
@@ -65,14 +65,19 @@ class SimulatedSensor:
 
 
 class SimulatedActuator:
-    """An actuator of the plant: takes a command within its range and says what it took."""
+    """An actuator of the plant: takes a command within its range and says what it took, and that it is well."""
 
-    def __init__(self, commands: np.ndarray, index: int, limits: tuple[float, float]):
-        self._commands, self._index = commands, index
+    def __init__(self, world: World, index: int, limits: tuple[float, float]):
+        self._world, self._commands, self._index = world, world.cmd, index
         self._low, self._high = limits
 
+    def read(self, out: np.ndarray) -> None:
+        out[0], out[1], out[2] = self._world.time, Validity.VALID, Condition.WELL
+
     def command(self, value: float) -> float:
-        if value < self._low:
+        if value != value:
+            value = self._commands[self._index]
+        elif value < self._low:
             value = self._low
         elif value > self._high:
             value = self._high
@@ -108,9 +113,9 @@ class PacedClock(MonotonicClock):
 
 
 class SimBoard:
-    """All devices of the nominal vehicle, simulated. Leak, battery, drop weight and watchdog are not fitted."""
+    """All devices of the nominal vehicle, simulated. Leak, battery, drop weight and the like are not fitted."""
 
-    leak = battery = drop_weight = watchdog = None
+    leak = battery = drop_weight = watchdog = out_of_band = None
 
     def __init__(self, file: SimBoardFile, world: World, vehicle: Any, *, realtime: bool):
         self.name = "sim"
@@ -126,7 +131,7 @@ class SimBoard:
         for name in ("imu", "beacon", "slider_wire", "plunger_wire"):
             setattr(self, name, SimulatedSensor(world.frame[SLOTS[name].all]))
         for index, name in enumerate(("servo", "slider", "ballast")):
-            setattr(self, name, SimulatedActuator(world.cmd, index, getattr(vehicle.actuators, name).range))
+            setattr(self, name, SimulatedActuator(world, index, getattr(vehicle.actuators, name).range))
 
     def open(self) -> None:
         """Load the world's kernels and start the clock."""

@@ -15,11 +15,16 @@ from firmware.guidance.mission import Mission
 from firmware.model.strict import ConfigError
 from firmware.model.vehicle import Vehicle
 from firmware.runtime import Runtime
+from firmware.supervisor.supervisor import Supervisor
+from firmware.supervisor.table import Reaction
 from firmware.telemetry import TICK
 from hal.board import BoardRequest, board_builder, board_kinds
 from hal.ports import BoardError
+from hal.recorder.schema import DEBUG, ERROR, FATAL, INFO, WARN
 from tools.errors import InputError
 from tools.sources import load_mission, load_vehicle, read_text
+
+SEVERITIES = dict(zip(Reaction, (DEBUG, INFO, WARN, WARN, ERROR, FATAL, FATAL), strict=True))
 
 
 class BoardKind(msgspec.Struct):
@@ -45,6 +50,7 @@ class Flight:
     mission: Mission
     board: Any  # hal.ports.Board, and of a simulated one its world and truth
     autopilot: Autopilot
+    supervisor: Supervisor
     texts: dict[str, str]
 
     @property
@@ -125,8 +131,9 @@ def build_flight(
         surface_pressure=the_board.surface_pressure,
     )  # fmt: skip
     autopilot = Autopilot(the_vehicle, the_mission, C, mission_source)
+    supervisor = Supervisor(autopilot, the_vehicle, the_mission, dt=1.0 / the_board.loop_hz, periods=the_board.periods)
     texts = {"vehicle.toml": vehicle_text, "mission.toml": mission_text, "board.toml": board_file.text}
-    return Flight(the_vehicle, the_mission, the_board, autopilot, texts)
+    return Flight(the_vehicle, the_mission, the_board, autopilot, supervisor, texts)
 
 
 def load_vehicle_text(wanted: str) -> tuple[str, Vehicle]:
@@ -169,7 +176,13 @@ def build_runtime(flight: Flight, recorder: Any) -> Runtime:
     extras: tuple = ()
     if hasattr(flight.board, "truth_recorder"):
         extras = (flight.board.truth_recorder(recorder.channel("/truth")),)
-    return Runtime(flight.board, flight.autopilot, recorder.channel("/tick"), extras=extras)
+
+    def on_news(t: float, reaction: Reaction, text: str) -> None:
+        recorder.event(t, SEVERITIES[reaction], text)
+
+    return Runtime(
+        flight.board, flight.autopilot, flight.supervisor, recorder.channel("/tick"), extras=extras, on_news=on_news
+    )
 
 
 __all__ = ["BoardError", "Flight", "build_flight", "build_runtime", "load_board_file", "parse_effects", "record_specs"]

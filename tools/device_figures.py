@@ -151,7 +151,7 @@ def measure_lateness(block: float, turns: int, faults: Any) -> list[dict[str, An
         flight = build_flight(mission=str(mission), board="twin")
     flight.board.open()
     channel = NullRecorder((TICK,)).channel("/tick")
-    runtime = Runtime(flight.board, flight.autopilot, channel)
+    runtime = Runtime(flight.board, flight.autopilot, flight.supervisor, channel)
     runtime.arm()
     try:
         ticks = round(block / runtime.dt)

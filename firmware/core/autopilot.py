@@ -69,6 +69,7 @@ def tick(P, C, legs, frame, est, ap, nav, cmd, t):
     else:
         servo, slider, ballast = 0.0, P[SLIDER_MIN], P[BALLAST_MIN]
     watch(P, C, legs, nav, est, ap, t)
+    ap[at.WANTED_SERVO], ap[at.WANTED_SLIDER], ap[at.WANTED_BALLAST] = servo, slider, ballast
     limit_commands(P, ap, servo, slider, ballast, C[at.DT], cmd)
 
 

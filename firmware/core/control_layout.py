@@ -109,9 +109,13 @@ LAW_RAN = 35  # 1 if the law ran in the tick before
 WATCHED = 36  # s, when coverage was looked at last
 K2_NEED_PITCH, K2_NEED_DEPTH = 37, 38  # m, kg: the k2 that covers; NaN where the law does not fly
 MARGIN_PITCH, MARGIN_DEPTH = 39, 40  # rad/s2, m/s2: positive, V is sure to fall
-N_AP = 41
+WANTED_SERVO, WANTED_SLIDER, WANTED_BALLAST = 41, 42, 43  # what the controller wants, before any limit
+CAUTIOUS = 44  # 1: the PID flies, whatever controller is chosen
+REACTION, FAULT_ROW = 45, 46  # the supervisor's, and the row of the fault table that asked for it
+N_AP = 47
 
 # --- modes and reasons ----------------------------------------------------------------------------------------------
 WAITING, FLYING, COMPLETED, ABORTED = 0.0, 1.0, 2.0, 3.0
 REASON_NONE, REASON_LEG_TIME, REASON_MISSION_TIME = 0.0, 1.0, 2.0
 REASON_IMU, REASON_BEACON, REASON_TOO_DEEP, REASON_OPERATOR = 3.0, 4.0, 5.0, 6.0
+REASON_FAULT = 100.0  # and the row of the fault table added to it

@@ -197,7 +197,9 @@ def steer(P, C, legs, est, ap, t):
     roll_rate, pitch_rate = angle_rates(est)
     servo = roll_law(ap[at.REF_ROLL], ap[at.REF_ROLL_RATE], est[at.EST_ROLL], roll_rate, C[at.ROLL_KP], C[at.ROLL_KD])
     controller = at.PID
-    if C[at.CONTROLLER] == at.HYBRID:
+    if ap[at.CAUTIOUS] == 1.0:
+        controller = at.PID
+    elif C[at.CONTROLLER] == at.HYBRID:
         controller = choose(C, legs, est, ap, t)
     elif C[at.CONTROLLER] != at.PID:
         controller = at.LAW

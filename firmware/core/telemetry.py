@@ -13,7 +13,8 @@ MODE_, LEG_, REASON_, LATENESS, DURATION = 23, 24, 25, 26, 27
 DENSITY, PRESSURE, TEMPERATURE, SAMPLE_TIMES = 28, 29, 30, 31
 ESTIMATE, SPREADS = 35, 48
 COVERAGE = 52
-N_RECORD = 56
+REACTION, FAULT_ROW = 56, 57
+N_RECORD = 58
 
 
 @kernel
@@ -60,3 +61,4 @@ def fill_record(frame, est, ap, cmd, t, lateness, duration, out):
         out[ESTIMATE + 9 + i] = est[at.EST_X + i]
         out[SPREADS + i] = est[at.SD_DEPTH_RATE + i]
         out[COVERAGE + i] = ap[at.K2_NEED_PITCH + i]
+    out[REACTION], out[FAULT_ROW] = ap[at.REACTION], ap[at.FAULT_ROW]

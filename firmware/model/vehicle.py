@@ -8,6 +8,7 @@ import numpy as np
 from firmware.control.gains import Control
 from firmware.core import layout
 from firmware.model.strict import Table, decode
+from firmware.supervisor.settings import Limits, SupervisorTable
 
 Positive = Annotated[float, msgspec.Meta(gt=0.0)]
 NonNegative = Annotated[float, msgspec.Meta(ge=0.0)]
@@ -133,6 +134,8 @@ class Vehicle(Table):
     disturbance: DisturbanceTable
     uncertainty: UncertaintyTable
     control: Control | None = None
+    limits: Limits | None = None
+    supervisor: SupervisorTable = SupervisorTable()
 
     def vector(self) -> np.ndarray:
         """The parameter vector P of the kernels, shape (layout.N_P,), SI."""

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from hal.boardfile import DriveTable
 from hal.drivers.modbus_sensors import nearest
 from hal.drivers.poll import Poll, exception_text
-from hal.drivers.samples import Health, Sensor
-from hal.ports import Validity
+from hal.drivers.samples import Health, Sensor, State
+from hal.ports import SLOTS, Condition, Validity
 from hal.protocols import modbus
 from hal.protocols.modbus import Frame, Request
 from hal.protocols.registers import RegisterMap, to_registers
@@ -25,6 +25,8 @@ CARRY_STANDING, CARRY_MOVING = 0.1, 0.01  # shares of the wire's disagreement ta
 STALL_TRIES = 2
 REST_S = 0.3  # between a stall and the next try
 LOST_AFTER_S = 0.5  # without its position
+STALLED, WRONG_WAY, ALARM = "stalled", "runs the wrong way", "drive alarm"
+CONDITIONS = {STALLED: Condition.GIVEN_UP, WRONG_WAY: Condition.WRONG_WAY, ALARM: Condition.ALARM_KEPT}
 
 
 class Drive:
@@ -56,6 +58,8 @@ class Drive:
         self._position = Poll(position, 1.0 / table.rate_hz, self._took_position, self.health)
         self._status = Poll([registers.read(table.id, "status")], STATUS_S, self._took_status, self.health)
         self._mover = Mover(self)
+        self._state = State(SLOTS[name])
+        self.start, self.read = self._state.start, self._state.read
 
     def join(self, bus: ModbusBus) -> None:
         """Take part in a line."""
@@ -92,8 +96,17 @@ class Drive:
     def answering(self, now: float) -> bool:
         return now - self.counts_at < LOST_AFTER_S
 
+    def _condition(self) -> Condition:
+        """How it does, as the supervisor asks."""
+        if self.fault:
+            return CONDITIONS[self.fault]
+        if self.status & FAULT:
+            return Condition.ALARM
+        return Condition.RETRYING if self.stalls else Condition.WELL
+
     def _fail(self, now: float, what: str) -> None:
         self.fault = what
+        self._state.say(CONDITIONS[what])
         self.health.say(now, what)
 
     def position(self) -> float:
@@ -118,6 +131,7 @@ class Drive:
             raw = registers[0] << 16 | registers[1]
             self.counts = raw - (1 << 32) if raw & 0x80000000 else raw
         self.counts_at = asked_at
+        self._state.answered(now, self._condition())
         if self.health.error != self.fault:
             self.health.say(now, self.fault)
         if self.table.follow == "wire":
@@ -149,7 +163,7 @@ class Drive:
         self._mover.stop_wanted = True
         self._mover.rest_until = now + REST_S
         self._watch.forget(now)
-        if verdict == "runs the wrong way" or self.stalls > STALL_TRIES:
+        if verdict == WRONG_WAY or self.stalls > STALL_TRIES:
             self._fail(now, verdict)
 
     def _took_status(self, request: Request, registers: list[int], asked_at: float, now: float) -> None:
@@ -159,7 +173,7 @@ class Drive:
         if self._mover.clears == 0:
             self._mover.clear_wanted = True
         elif not self._mover.clear_wanted and not self.fault:
-            self._fail(now, "drive alarm")
+            self._fail(now, ALARM)
 
 
 class Watch:
@@ -190,8 +204,8 @@ class Watch:
             self.restart(position, now, way)
             return ""
         if progress < -self._least:
-            return "runs the wrong way"
-        return "stalled" if now - self._since > self._patience else ""
+            return WRONG_WAY
+        return STALLED if now - self._since > self._patience else ""
 
     def compare(self, counted: float, wire: float) -> str:
         """What is wrong between the drive's way and its wire's, m; empty while nothing is."""
@@ -201,8 +215,8 @@ class Watch:
         shown = math.copysign(1.0, moved) * (wire - self._mark[1])
         self._mark = (counted, wire)
         if shown < -0.25 * abs(moved):
-            return "runs the wrong way"
-        return "stalled" if shown < 0.25 * abs(moved) else ""
+            return WRONG_WAY
+        return STALLED if shown < 0.25 * abs(moved) else ""
 
 
 class Mover:

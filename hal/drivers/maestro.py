@@ -8,7 +8,8 @@ import math
 from collections.abc import Callable
 
 from hal.boardfile import ServoTable
-from hal.drivers.samples import Health
+from hal.drivers.samples import Health, State
+from hal.ports import SLOTS, Condition
 from hal.protocols import maestro
 
 RESEND_S = 0.1
@@ -37,6 +38,8 @@ class Servo:
         self._sent_at = self._asked_at = -math.inf
         self._waiting = False
         self._unanswered = 0
+        state = State(SLOTS["servo"])
+        self.start, self.read, self._answered = state.start, state.read, state.answered
 
     def command(self, value: float) -> float:
         """Ask for an angle (rad); returns what is sent after limits. NaN changes nothing."""
@@ -114,6 +117,7 @@ class Servo:
         if self.answers and self._unanswered >= LOST_AFTER:
             self.health.say(now, "")
         self.answers += 1
+        self._answered(now, Condition.WELL)
         self._unanswered = 0
         errors = maestro.MaestroError(word) & ~EXPECTED
         if errors & ~self.errors:

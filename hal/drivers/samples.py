@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hal.ports import Slot, Validity
+from hal.ports import Condition, Slot, Validity
 
 FAULTY_AFTER = 5  # unfit samples running, past which the device is in error
 STALE_PERIODS = 3.0
@@ -30,6 +30,34 @@ class Health:
         """A change in the device's state, for logs and the bench."""
         self.error = text
         self.notes.append((now, text or "well again"))
+
+
+class State:
+    """How an actuator does, in a slot of its own: when it last answered, and its Condition."""
+
+    def __init__(self, slot: Slot):
+        self._slot = np.full(2 + len(slot.names), np.nan)
+        self._slot[1] = Validity.MISSING
+        self._answered_at = -math.inf
+        self.epoch = 0.0
+
+    def start(self, epoch: float) -> None:
+        """The board's time begins."""
+        self.epoch = epoch
+        self.answered(max(self._answered_at, epoch), Condition.WELL)
+
+    def answered(self, at: float, condition: Condition) -> None:
+        """The actuator said something at this time of the monotonic clock."""
+        self._answered_at = at
+        self._slot[0], self._slot[1], self._slot[2] = at - self.epoch, Validity.VALID, condition
+
+    def say(self, condition: Condition) -> None:
+        """It does otherwise, whether it answers or not."""
+        self._slot[2] = condition
+
+    def read(self, out: np.ndarray) -> None:
+        """Copy [time, validity, condition] into `out`."""
+        out[...] = self._slot
 
 
 class Sensor:

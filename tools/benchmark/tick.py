@@ -26,23 +26,28 @@ TICKS = 100_000
 TRACED = 500
 ROOM = 512  # records on their way to the disk, past which the measurement waits (simulated time is quicker)
 
-ENDLESS = """
+ENDLESS = (
+    """
 format = 1
 name = "endless"
 time_limit_s = 86400.0
 [site]
 name = "deep water"
 depth_m = 900.0
+"""
+    + 100
+    * """
 [[leg]]
-duration_s = 86400.0
+depth_m = 30.0
 pitch_deg = -15.0
 roll_deg = 20.0
-ballast_kg = 0.0
+time_limit_s = 600.0
 [[leg]]
 depth_m = 3.0
 pitch_deg = 15.0
 time_limit_s = 600.0
 """
+)
 
 
 @dataclass

@@ -1,0 +1,78 @@
+"""The supervisor of one flight: screens samples before the autopilot's tick, has the last word after it.
+
+The readable face of core/screening and core/supervisor, which do the work without allocation.
+"""
+
+import math
+
+import numpy as np
+
+from firmware.autopilot import Autopilot
+from firmware.core import supervisor_layout as at
+from firmware.core.screening import screen
+from firmware.core.supervisor import guard
+from firmware.guidance.mission import Mission
+from firmware.model.vehicle import Vehicle
+from firmware.supervisor.settings import Limits, settings_vector
+from firmware.supervisor.table import FAULTS, Reaction
+
+
+class Supervisor:
+    """Watches one autopilot. `G` is its whole memory; the runtime writes LATENESS, RECORDER and GROWTH into it."""
+
+    def __init__(
+        self, autopilot: Autopilot, vehicle: Vehicle, mission: Mission, *, dt: float, periods: dict[str, float],
+        restarted: bool = False,
+    ):  # fmt: skip
+        self.autopilot = autopilot
+        self.G = settings_vector(
+            vehicle.limits or Limits(), vehicle.supervisor, dt=dt, periods=periods, site_depth=mission.site.depth_m,
+            mission_time=mission.time_limit_s, restarted=restarted,
+        )  # fmt: skip
+        self.table = vehicle.supervisor
+        self._told = np.zeros(at.N_ROWS)
+
+    def screen(self, t: float) -> None:
+        """Before the autopilot's tick at time t (s): what is not fit is marked in its frame."""
+        screen(self.autopilot.P, self.G, self.autopilot.frame, t)
+
+    def guard(self, t: float) -> None:
+        """After it: the autopilot's commands become what may be sent; NaN: an actuator is left alone."""
+        pilot = self.autopilot
+        guard(pilot.P, pilot.C, self.G, pilot.frame, pilot.est, pilot.ap, pilot.commands, t)
+
+    @property
+    def reaction(self) -> Reaction:
+        """What is done now."""
+        return Reaction(int(self.G[at.REACTION]))
+
+    @property
+    def row(self) -> int:
+        """Row of the fault table that asked for it; 0: none."""
+        return int(self.G[at.ROW])
+
+    def noticed(self, row: int) -> float | None:
+        """When a row asked for anything for the first time, s; None: never."""
+        first = float(self.G[at.FIRST + row])
+        return None if first < 0.0 else first
+
+    def worst(self, row: int) -> Reaction:
+        """The highest reaction that a row ever asked for."""
+        return Reaction(int(self.G[at.WORST + row]))
+
+    def disable(self, row: int) -> None:
+        """Switch a row's detector off: to show that it is what notices the fault."""
+        self.G[at.ENABLED + row] = 0.0
+
+    def news(self) -> list[tuple[Reaction, str]]:
+        """Rows that ask for more than when this was last called, with their names."""
+        worst = self.G[at.WORST : at.WORST + at.N_ROWS]
+        rows = np.flatnonzero(worst > self._told)
+        self._told[:] = worst
+        return [(Reaction(int(worst[row])), f"fault {row}: {FAULTS[int(row)].name}") for row in rows]
+
+    @property
+    def depth_known(self) -> bool:
+        """False once the beacon has had nothing fit to say for too long."""
+        last = float(self.G[at.TAKEN + at.S_BEACON])
+        return math.isfinite(last) and self.worst(2) == Reaction.NOTHING
