@@ -3,8 +3,8 @@
 Every sensor port writes its newest sample into a slot of the frame, and every actuator how it does: the frame is a
 preallocated float64 vector that belongs to the loop. A slot is [time, validity, value ...]: the time of the measurement
 on the board's clock (s), a Validity, then the values in SI. Nothing is allocated to read, and the compiled autopilot
-takes the frame as it is. A device that is unplugged in flight writes its validity and never raises; it raises when it is
-opened.
+takes the frame as it is. A device that is unplugged in flight writes its validity and never raises; it raises when it
+is opened.
 """
 
 from enum import IntEnum

@@ -225,6 +225,7 @@ def watch_ascent(G, est, ap, t):
     if not blind and (depth < G[at.SURFACE_DEPTH] or depth < G[at.ASCENT_MARK] - G[at.ASCENT_STEP]):
         G[at.ASCENT_MARK], G[at.ASCENT_SINCE] = depth, t
         return
+    G[at.ASCENT_MARK] = max(G[at.ASCENT_MARK], depth)  # it may sink on until the ballast is out
     if t - G[at.ASCENT_SINCE] <= G[at.ASCENT_TIME]:
         return
     if math.isnan(G[at.OOB_SINCE]):

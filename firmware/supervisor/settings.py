@@ -81,7 +81,7 @@ class SupervisorTable(Table):
 _OVER = 0.2  # rad that bias and noise carry an angle past where it goes round
 _IMU = [(-PI - _OVER, PI + _OVER), (-PI / 2 - _OVER, PI / 2 + _OVER), (-PI - _OVER, PI + _OVER), *3 * [(-10.0, 10.0)]]
 _JUMPS = [0.3, 0.3, 0.3, 2.0, 2.0, 2.0, 15_000.0, 5.0, 0.01, 0.01, 1.0, 10.0]
-_JUMP_RATES = [3.0, 3.0, 3.0, 20.0, 20.0, 20.0, 30_000.0, 1.0, 0.05, 0.05, 0.0, 10.0]
+_JUMP_RATES = [3.0, 3.0, 3.0, 20.0, 20.0, 20.0, 30_000.0, 1.0, 0.05, 0.05, 1.0, 10.0]
 _DEEPEST_PA = 1.2e8
 _OTHERS = [(50_000.0, _DEEPEST_PA), (-10.0, 60.0), (-0.5, 0.5), (-0.5, 0.5), (0.0, 1.0), (0.0, 100.0)]
 

@@ -1,0 +1,174 @@
+"""Of all reactions asked for the highest wins: every pair of rows, every level, every reaction before; and the limits."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from firmware.core import control_layout as ctl
+from firmware.core import supervisor_layout as at
+from firmware.core.supervisor import highest
+from firmware.supervisor.table import FAULTS, Reaction
+from tests.support.watchman import BALLAST_RANGE, DT, SLIDER_RANGE, Watchman
+
+LEVELS = [float(level) for level in Reaction]
+ON = np.ones(at.N_ROWS)
+
+
+def expected(asked: dict[int, float], before: float) -> float:
+    """The rule, said once more: the highest, and never below what was latched from ABORT on."""
+    top = max(asked.values(), default=0.0)
+    return max(top, before) if before >= Reaction.ABORT else top
+
+
+def test_every_pair_of_rows_at_every_level_over_every_reaction_before():
+    asked = np.zeros(at.N_ROWS)
+    for first, second in itertools.combinations(range(1, at.N_ROWS), 2):
+        for a, b in itertools.product(LEVELS, LEVELS):
+            asked[first], asked[second] = a, b
+            for before in LEVELS:
+                reaction, row = highest(asked, ON, before)
+                assert reaction == expected({first: a, second: b}, before)
+                if reaction > before or (before < Reaction.ABORT and reaction > 0.0):
+                    assert row == (first if a >= b else second)
+                else:
+                    assert row == 0
+        asked[first] = asked[second] = 0.0
+
+
+@settings(derandomize=True, max_examples=300, deadline=None)
+@given(st.lists(st.sampled_from(LEVELS), min_size=34, max_size=34), st.lists(st.booleans(), min_size=34, max_size=34),
+       st.sampled_from(LEVELS))  # fmt: skip
+def test_any_rows_at_once_and_rows_switched_off(levels, on, before):
+    asked, enabled = np.array([6.0, *levels]), np.array([1.0, *map(float, on)])
+    reaction, row = highest(asked, enabled, before)
+    heard = {i: asked[i] for i in range(1, at.N_ROWS) if enabled[i]}
+    assert reaction == expected(heard, before)
+    assert row == 0 or asked[row] == reaction
+
+
+def test_the_table_has_every_row_of_the_contract(shared):
+    lines = (shared / "FAULTS.md").read_text().splitlines()
+    rows = [line.split("|")[1:-1] for line in lines if line.startswith("| ") and line[2].isdigit()]
+    assert [int(row[0]) for row in rows] == list(FAULTS)
+    for row in rows:
+        for word in ("HOLD", "ABORT", "OOB", "HW", "refuse", "WARN"):
+            if word in row[3]:
+                assert word in FAULTS[int(row[0])].reaction, row
+
+
+@settings(derandomize=True, max_examples=60, deadline=None)
+@given(st.lists(st.tuples(st.sampled_from(LEVELS), st.lists(st.floats(width=64), min_size=3, max_size=3)),
+                min_size=2, max_size=40))  # fmt: skip
+def test_whatever_is_wanted_and_asked_for_what_is_sent_is_finite_within_range_and_rate(story):
+    man = Watchman()
+    man.step(5)
+    low = np.array([-math.pi / 3, SLIDER_RANGE[0], BALLAST_RANGE[0]])
+    rate = np.array([1.0, 0.02, 0.03])
+    last = man.commands.copy()
+    for level, wanted in story:
+        man.G[at.GROWTH] = {4.0: 2.0, 2.0: 1.0}.get(level, 0.0)
+        man.wanted = list(wanted)
+        man.step()
+        sent = man.commands
+        assert np.isfinite(sent).all()
+        assert (sent >= low * (1 + 1e-4)).all()
+        assert (sent <= -low * (1 + 1e-4)).all()
+        assert (np.abs(sent - last) <= rate * DT * (1 + 1e-9)).all()
+        assert man.ap[ctl.SENT_SERVO : ctl.SENT_SERVO + 3] == pytest.approx(sent, abs=0)
+        last = sent.copy()
+
+
+def test_abort_stays_and_keeps_who_asked():
+    man = Watchman()
+    man.step(5)
+    man.G[at.GROWTH] = 2.0
+    assert man.step() == Reaction.ABORT
+    man.G[at.GROWTH] = 0.0
+    man.silence.add("beacon")
+    man.seconds(2.0)
+    assert man.supervisor.row in (33, 2)
+    assert man.pilot.reason == "fault 33: memory or file handles grow"
+    assert man.ap[ctl.REACTION] == Reaction.ABORT
+    assert man.ap[ctl.FAULT_ROW] == man.supervisor.row
+
+
+def test_a_completed_mission_stays_completed():
+    man = Watchman(mode=ctl.COMPLETED)
+    man.G[at.GROWTH] = 2.0
+    man.step(2)
+    assert man.ap[ctl.MODE] == ctl.COMPLETED
+    assert man.supervisor.reaction == Reaction.ABORT
+
+
+def test_a_row_switched_off_asks_for_nothing():
+    for row, place, value in ((33, at.GROWTH, 2.0), (27, at.RECORDER, 1.0), (25, at.RESTARTED, 1.0)):
+        man = Watchman()
+        man.supervisor.disable(row)
+        man.G[place] = value
+        assert man.step(3) == Reaction.NOTHING
+        assert man.supervisor.noticed(row) is None
+
+
+def test_news_are_told_once():
+    man = Watchman()
+    man.step(5)
+    man.G[at.RECORDER] = 1.0
+    man.step()
+    assert man.supervisor.news() == [(Reaction.LOG, "fault 27: disk full, read-only, I/O error")]
+    assert man.G[at.CHANGED] == 1.0
+    man.step()
+    assert man.supervisor.news() == []
+    assert man.G[at.CHANGED] == 0.0
+    assert man.supervisor.noticed(27) == pytest.approx(0.1)
+
+
+# --- waiting --------------------------------------------------------------------------------------------------------
+def test_waiting_leaves_actuators_where_they_stand():
+    man = Watchman(mode=ctl.WAITING)
+    man.follows = False
+    man.places = [0.03, -0.1]
+    man.silence |= {"slider_wire", "plunger_wire"}
+    man.step(3)
+    assert np.isnan(man.commands).all()  # nobody knows where they are
+    man.silence.clear()
+    man.step(2)
+    assert math.isnan(man.commands[0])
+    man.wanted = [0.0, 0.03, -0.1]  # as the autopilot does: what was sent last
+    man.step(2)
+    assert man.commands[1:] == pytest.approx([0.03, -0.1], abs=1e-3)
+    man.ap[ctl.MODE] = ctl.FLYING
+    man.wanted = [0.0, 0.0, 0.0]
+    man.step()
+    assert man.commands == pytest.approx([0.0, 0.03 - 0.02 * DT, -0.1 + 0.03 * DT], abs=1e-3)
+
+
+@pytest.mark.parametrize("place", [0.001, -0.001])
+def test_what_stands_at_neutral_begins_at_neutral(place):
+    man = Watchman(mode=ctl.WAITING)
+    man.follows = False
+    man.places = [place, place]
+    man.step(2)
+    assert (man.commands[1:] == 0.0).all()
+
+
+def test_without_wires_actuators_begin_from_what_was_sent_after_a_while():
+    man = Watchman()
+    man.silence |= {"slider_wire", "plunger_wire"}
+    man.step(20)
+    assert np.isnan(man.commands[1:]).all()
+    man.step(10)
+    assert np.isfinite(man.commands).all()
+
+
+def test_an_abort_while_waiting_moves_everything_at_once():
+    man = Watchman(mode=ctl.WAITING)
+    man.step(3)
+    man.G[at.GROWTH] = 2.0
+    assert man.step() == Reaction.ABORT
+    assert man.ap[ctl.MODE] == ctl.ABORTED
+    man.seconds(15.0)
+    assert man.commands == pytest.approx([0.0, SLIDER_RANGE[0], BALLAST_RANGE[0]])

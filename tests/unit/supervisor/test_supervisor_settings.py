@@ -1,0 +1,99 @@
+"""[limits] and [supervisor] of a vehicle file: read strictly, defaults where nothing is said."""
+
+import math
+
+import pytest
+
+from firmware.core import supervisor_layout as at
+from firmware.model.library import shipped
+from firmware.model.strict import ConfigError
+from firmware.model.vehicle import decode_vehicle
+from firmware.supervisor.settings import Limits, SupervisorTable, settings_vector
+from hal.ports import SLOTS
+
+TEXT = shipped("model/vehicles")["roughie"]
+PERIODS = {"imu": 0.02, "beacon": 0.04, "wires": 0.1}
+
+
+def vector(limits=None, dt=0.02, site=6.0, **table):
+    return settings_vector(
+        limits or Limits(), SupervisorTable(**table), dt=dt, periods=PERIODS, site_depth=site, mission_time=600.0
+    )
+
+
+def test_a_vehicle_file_may_say_nothing_of_them():
+    vehicle = decode_vehicle(TEXT, "roughie")
+    assert vehicle.limits is None
+    assert vehicle.supervisor == SupervisorTable()
+
+
+def test_a_vehicle_file_may_say_all_of_it():
+    more = "\n[limits]\nworking_depth_m = 50\nlow_voltage = 12.0\nleast_voltage = 11.0\n[supervisor]\nhold_s = 0.5\n"
+    vehicle = decode_vehicle(TEXT + more, "v.toml")
+    assert vehicle.limits == Limits(working_depth_m=50.0, low_voltage=12.0, least_voltage=11.0)
+    assert vehicle.supervisor.hold_s == 0.5
+    assert vehicle.supervisor.imu_s == SupervisorTable().imu_s
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ("[limits]\nworking_depth = 5", "limits.working_depth: unknown key"),
+        ("[limits]\nworking_depth_m = -1.0", "limits.working_depth_m: expected `float` > 0.0"),
+        ("[limits]\nat_risk_depth_m = 9.0", "at_risk_depth_m: expected a working_depth_m, and more than that"),
+        ("[limits]\nworking_depth_m = 9.0\nat_risk_depth_m = 9.0", "and more than that"),
+        ("[limits]\nleast_voltage = 9.0", "least_voltage: expected a low_voltage, and less than that"),
+        ("[limits]\nlow_voltage = 9.0\nleast_voltage = 9.0", "and less than that"),
+        ("[supervisor]\nimu_s = 0.0", "supervisor.imu_s: expected `float` > 0.0"),
+        ("[supervisor]\nimu_s = nan", "supervisor.imu_s: expected a finite number"),
+        ("[supervisor]\nleak_samples = 1.5", "supervisor.leak_samples: expected `int`"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_by_name(more, said):
+    with pytest.raises(ConfigError, match=said.replace("(", "\\(")) as error:
+        decode_vehicle(f"{TEXT}\n{more}\n", "v.toml")
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("limits", "site", "working", "risk"),
+    [
+        (Limits(), 6.0, 6.0, 6.6),
+        (Limits(), 0.0, math.inf, math.inf),
+        (Limits(working_depth_m=50.0), 0.0, 50.0, 55.0),
+        (Limits(working_depth_m=50.0), 6.0, 6.0, 6.6),
+        (Limits(working_depth_m=5.0), 6.0, 5.0, 5.5),
+        (Limits(working_depth_m=5.0, at_risk_depth_m=5.2), 6.0, 5.0, 5.2),
+        (Limits(working_depth_m=5.0, at_risk_depth_m=9.0), 6.0, 5.0, 6.6),
+    ],
+)
+def test_the_shallower_of_hull_and_site_counts(limits, site, working, risk):
+    G = vector(limits, site=site)
+    assert G[at.WORKING_DEPTH] == pytest.approx(working)
+    assert G[at.RISK_DEPTH] == pytest.approx(risk)
+
+
+@pytest.mark.parametrize(("dt", "ticks", "delay"), [(0.02, 12, 30), (0.01, 24, 60), (0.1, 2, 6), (0.001, 63, 63)])
+def test_times_become_ticks_within_the_ring(dt, ticks, delay):
+    G = vector(dt=dt)
+    assert (G[at.WRONG_TICKS], G[at.DELAY_TICKS]) == (ticks, delay)
+    assert G[at.TICK] == dt
+
+
+def test_the_layout_follows_the_frame():
+    names = ("imu", "beacon", "slider_wire", "plunger_wire", "leak", "battery")
+    assert at.STARTS == tuple(SLOTS[name].start for name in names)
+    assert at.WIDTHS == tuple(len(SLOTS[name].names) for name in names)
+    assert at.PLACES == tuple(sum(at.WIDTHS[:i]) for i in range(6))
+    assert sum(at.WIDTHS) == at.N_VALUES
+    assert at.STATES == tuple(SLOTS[name].start for name in ("servo", "slider", "ballast"))
+    assert all(len(SLOTS[name].names) == 1 for name in ("servo", "slider", "ballast"))
+
+
+def test_places_in_the_vector_do_not_overlap():
+    G = vector()
+    assert list(G[at.PERIOD : at.PERIOD + at.N_SENSORS]) == [0.02, 0.04, 0.1, 0.1, 0.2, 0.2]
+    assert (G[at.ENABLED : at.ENABLED + at.N_ROWS] == 1.0).all()
+    assert (G[at.HIGH : at.HIGH + at.N_VALUES] > G[at.LOW : at.LOW + at.N_VALUES]).all()
+    singles = [value for name, value in vars(at).items() if name.isupper() and isinstance(value, int)]
+    assert max(singles) == at.N_G == len(G)
