@@ -151,6 +151,7 @@ def test_a_mission_that_cannot_be_flown_ends_with_exit_code_1(tmp_path):
     assert result["surfaced"]
 
 
+@pytest.mark.realtime
 def test_ctrl_c_gives_the_dive_up_and_the_log_is_whole(tmp_path):
     flight = subprocess.Popen(
         [sys.executable, "-m", "tools.cli.main", "fly", "--realtime", "--json"],

@@ -1,6 +1,6 @@
 """A supervisor on its own: healthy samples tick by tick, and whatever a test changes about them.
 
-No plant and no filter: what the autopilot believes and is at is written down, so that every detector is looked at alone.
+No plant and no filter: what the autopilot believes and is at is written down, so that a detector is looked at alone.
 """
 
 import math

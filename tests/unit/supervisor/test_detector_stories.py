@@ -142,9 +142,15 @@ def test_conditions_ask_for_their_rows(name, condition, row, reaction):
 
 
 def test_the_layout_says_what_the_ports_say():
-    assert [at.WELL, at.ALARM, at.ALARM_KEPT, at.RETRYING, at.GIVEN_UP, at.WRONG_WAY, at.MISCONFIGURED] == list(
-        Condition
-    )
+    assert list(Condition) == [
+        at.WELL,
+        at.ALARM,
+        at.ALARM_KEPT,
+        at.RETRYING,
+        at.GIVEN_UP,
+        at.WRONG_WAY,
+        at.MISCONFIGURED,
+    ]
     assert (at.VALID, at.FAULT) == (Validity.VALID, Validity.FAULT)
 
 
@@ -573,7 +579,7 @@ def test_no_ascent_goes_out_of_band_then_to_the_hardware(mode):
     man.ap[ctl.MODE] = mode
     man.sinks = 0.0
     took = man.until(OOB, 30.0 + TWO_TICKS)
-    assert 29.0 < took
+    assert took > 29.0
     assert man.supervisor.row == 18
     man.seconds(25.0)
     assert man.supervisor.reaction == OOB
@@ -606,14 +612,14 @@ def test_an_ascent_that_stops_halfway_is_noticed():
     man.G[at.JUMP + 1] = 10.0
     man.seconds(5.0)
     man.sinks = 0.0
-    assert 28.0 < man.until(OOB, 30.0 + 1.5)
+    assert man.until(OOB, 30.0 + 1.5) > 28.0
 
 
 def test_blind_the_out_of_band_process_is_called_but_the_weight_stays_for_long():
     man = flying()
     man.silence.add("beacon")
     man.until(ABORT, 0.5)
-    assert 29.0 < man.until(OOB, 30.5)
+    assert man.until(OOB, 30.5) > 29.0
     man.seconds(250.0)
     assert man.supervisor.reaction == OOB
     man.until(HW, 60.0)
@@ -623,7 +629,7 @@ def test_blind_the_out_of_band_process_is_called_but_the_weight_stays_for_long()
 def test_the_same_depth_for_too_long_aborts():
     man = flying()
     man.sinks = 0.0
-    assert 115.0 < man.until(ABORT, 121.0)
+    assert man.until(ABORT, 121.0) > 115.0
     assert man.supervisor.row == 19
 
 
@@ -682,14 +688,14 @@ def test_a_leak_aborts_within_a_second():
 def test_under_voltage_warns_then_aborts():
     man = flying(fitted=("battery",), limits=Limits(low_voltage=12.0, least_voltage=11.0))
     man.say["battery"] = (11.5,)
-    assert 8.0 < man.until(WARN, 10.0)
+    assert man.until(WARN, 10.0) > 8.0
     assert man.supervisor.row == 23
     assert man.seconds(20.0) == WARN
     man.say["battery"] = (13.0,)
     man.seconds(0.5)
     assert man.supervisor.reaction == NOTHING
     man.say["battery"] = (10.5,)
-    assert 8.0 < man.until(ABORT, 10.0)
+    assert man.until(ABORT, 10.0) > 8.0
 
 
 def test_a_dip_of_voltage_is_no_under_voltage():
@@ -714,7 +720,7 @@ def test_too_steep_or_rolling_over_flies_the_pid_then_aborts(what, side):
     assert man.step() == WARN
     assert man.supervisor.row == 21
     assert man.ap[ctl.CAUTIOUS] == 1.0
-    assert 1.5 < man.until(ABORT, 2.0)
+    assert man.until(ABORT, 2.0) > 1.5
     assert man.supervisor.row == 21
 
 

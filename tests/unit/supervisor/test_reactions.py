@@ -1,4 +1,4 @@
-"""Of all reactions asked for the highest wins: every pair of rows, every level, every reaction before; and the limits."""
+"""Of all reactions asked for the highest wins: every pair of rows, every level, every reaction before; the limits."""
 
 import itertools
 import math

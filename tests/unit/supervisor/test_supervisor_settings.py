@@ -82,11 +82,11 @@ def test_times_become_ticks_within_the_ring(dt, ticks, delay):
 
 def test_the_layout_follows_the_frame():
     names = ("imu", "beacon", "slider_wire", "plunger_wire", "leak", "battery")
-    assert at.STARTS == tuple(SLOTS[name].start for name in names)
-    assert at.WIDTHS == tuple(len(SLOTS[name].names) for name in names)
-    assert at.PLACES == tuple(sum(at.WIDTHS[:i]) for i in range(6))
+    assert tuple(SLOTS[name].start for name in names) == at.STARTS
+    assert tuple(len(SLOTS[name].names) for name in names) == at.WIDTHS
+    assert tuple(sum(at.WIDTHS[:i]) for i in range(6)) == at.PLACES
     assert sum(at.WIDTHS) == at.N_VALUES
-    assert at.STATES == tuple(SLOTS[name].start for name in ("servo", "slider", "ballast"))
+    assert tuple(SLOTS[name].start for name in ("servo", "slider", "ballast")) == at.STATES
     assert all(len(SLOTS[name].names) == 1 for name in ("servo", "slider", "ballast"))
 
 
