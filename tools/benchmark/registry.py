@@ -38,6 +38,7 @@ MEASURES = {
     "closed_loop": Measure("tools.benchmark.closed_loop", "measure", "compiled loop of plant, sensors and autopilot"),
     "tick": Measure("tools.benchmark.tick", "measure", "the real runtime's tick: time, and that it allocates nothing"),
     "campaign": Measure("tools.benchmark.campaign", "measure", "many flights at once, all cores against one"),
+    "identify": Measure("tools.benchmark.identify", "measure", "effective samples a second, beside emcee and NUTS"),
     "memory": Measure("tools.benchmark.memory", "measure", "memory of the flying process"),
     "startup": Measure("tools.benchmark.startup", "measure", "from the shell to the first word"),
 }

@@ -12,16 +12,24 @@ from tools.cli.common import json_option, print_json, say
 @click.argument("case", type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Folder for vehicle file and report.")
 @click.option("--seed", type=click.IntRange(0, 2**31), default=1, show_default=True, help="Of the chains.")
+@click.option(
+    "--likelihood", type=click.Choice(["flights", "accelerations"]), default="flights", show_default=True,
+    help="Flights held to the recordings, or the paper's: equation (1) along smoothed motion capture.",
+)  # fmt: skip
 @json_option
-def identify(case: Path, out: Path | None, seed: int, as_json: bool) -> None:
-    """Identify the vehicle of CASE from its runs: the twelve coefficients and their distribution, by MCMC."""
+def identify(case: Path, out: Path | None, seed: int, likelihood: str, as_json: bool) -> None:
+    """Identify the vehicle of CASE from its runs: the twelve coefficients and their distribution, by MCMC.
+
+    Runs that cannot be fitted are named and left out. With --out: identified.toml (a vehicle file that says where it
+    comes from), report.html, posterior.nc (ArviZ).
+    """
     from tools.errors import need
     from tools.identify.run import identify as run_identification
     from tools.runs.case import load_case
 
     need("scipy")
     need("arviz", extra="identify")
-    found = run_identification(load_case(case), seed, lambda text: print(text, file=sys.stderr))
+    found = run_identification(load_case(case), seed, likelihood, lambda text: print(text, file=sys.stderr))
     for one in found.left_out:
         say(f"left out: {one}")
     if as_json:

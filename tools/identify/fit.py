@@ -16,6 +16,8 @@ from tools.runs.case import Case
 from tools.runs.run import Run
 
 ROUGHNESS = (100.0, 10.0, 3.0, 1.0)  # the filter is told of so many times the disturbance, one step at each
+FROM_START = (10.0, 1.0)  # where the accelerations have given first values
+LOOK = 10.0  # of them, the one at which runs that do not belong are looked for
 FIRST_ROWS, LEVEL_ROWS, MOST_ROWS = 9_000, 5_000, 90_000
 ODD = 3.0  # times the runs' median of squared innovations, beyond which a run does not belong
 BLOCK = 3.0  # s, stretches of runs whose slopes are compared for the heat
@@ -71,30 +73,42 @@ def settle(
     """First values from some runs, the filter told to doubt the model less and less; runs that do not belong."""
     problem = pose(case, model, runs)
     flights = Flights(problem, parameters(problem))
-    values = np.zeros(len(flights.free.free)) if values is None else values
-    out: list[LeftOut] = []
-    for roughness in ROUGHNESS:
+    stages = ROUGHNESS if values is None else FROM_START
+    begin = np.zeros(len(flights.free.free))
+    if values is not None:
+        begin[: len(values)] = values
+    at, values, out = None, begin, []
+    for roughness in stages:
         at = flights.linear(values, roughness)
         values = flights.step(at)
-        if roughness != ROUGHNESS[1] or len(runs) < 4:
+        if roughness != LOOK or len(runs) < 4:
             continue
         out = odd_runs(problem, flights.follow([values], at.gains)[0])
         if out and len(out) <= len(runs) // 2:
             gone = {one.run for one in out}
             kept = [run for run in runs if run.name not in gone]
-            again, values, more = settle(case, model, kept)
+            again, values, more = settle(case, model, kept, None)
             return again, values, out + more
     return flights, values, out if len(out) <= len(runs) // 2 else []
 
 
-def fit(case: Case, model: Model, runs: list[Run], say: Callable[[str], None] = lambda text: None) -> Fit:
-    """Fit a case's runs: coefficients, everything else that is free, and the levels of the noise."""
+def fit(
+    case: Case,
+    model: Model,
+    runs: list[Run],
+    begin: np.ndarray | None = None,
+    say: Callable[[str], None] = lambda text: None,
+) -> Fit:
+    """Fit a case's runs: coefficients, everything else that is free, and the levels of the noise.
+
+    begin: first values of the coefficients in units of their priors, if something is known of them.
+    """
     notes: list[str] = []
     if sum(run.rows for run in runs) > MOST_ROWS:
         runs = [runs[n] for n in some(runs, MOST_ROWS)]
         notes.append(f"{len(runs)} of the runs were fitted, evenly chosen: more rows would tell little and cost time")
     say("first values")
-    first, values, left_out = settle(case, model, [runs[n] for n in some(runs, FIRST_ROWS)])
+    first, values, left_out = settle(case, model, [runs[n] for n in some(runs, FIRST_ROWS)], begin)
     say("noise")
     part = pose(case, model, [first.problem.runs[n] for n in some(first.problem.runs, LEVEL_ROWS)])
     levels = noise.estimate(part, lambda p: first.filter(values, problem=p), noise.named(part))

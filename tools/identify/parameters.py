@@ -78,7 +78,8 @@ def coefficient_sizes(P: np.ndarray) -> np.ndarray:
     return np.maximum(size, 1e-3)
 
 
-def _coefficients(P: np.ndarray) -> list[Free]:
+def coefficients(P: np.ndarray) -> list[Free]:
+    """The twelve, with priors about the vehicle file's values."""
     found = []
     for name, size in zip(COEFFICIENTS, coefficient_sizes(P), strict=True):
         entry = getattr(layout, name.upper())
@@ -122,7 +123,7 @@ def _capture(problem: Problem) -> list[Free]:
 def parameters(problem: Problem) -> Parameters:
     """What is free for these recordings."""
     mocap = bool(problem.seen[ef.Y_MOCAP_X])
-    free = [*_coefficients(problem.model.P), *_masses(problem, 1.0 if mocap else FIRST), *_biases(problem)]
+    free = [*coefficients(problem.model.P), *_masses(problem, 1.0 if mocap else FIRST), *_biases(problem)]
     if mocap:
         free += _capture(problem)
     else:

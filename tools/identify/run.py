@@ -10,14 +10,20 @@ import numpy as np
 from firmware.model.vehicle import COEFFICIENTS
 from tools.errors import InputError
 from tools.gap.model import nominal_model
+from tools.gap.problem import Problem
+from tools.identify.accelerations import fit_accelerations, suited
 from tools.identify.fit import Fit, fit
 from tools.identify.flights import Flights
+from tools.identify.levels import Levels
+from tools.identify.parameters import Parameters
 from tools.identify.sampler import Chains, Summary, sample, summarise
 from tools.identify.screen import LeftOut, despiked, screen
+from tools.identify.statistics import Quadratic
 from tools.runs.case import Case
+from tools.runs.run import Run
 
 CHECKED = 24  # draws at which the whole likelihood is compared with its linearisation
-SEED = 1
+FLIGHTS, ACCELERATIONS = "flights", "accelerations"
 
 
 @dataclass(frozen=True)
@@ -34,41 +40,78 @@ class Identified:
     """What was found."""
 
     case: Case
-    fit: Fit
+    likelihood: str
+    runs: list[Run]  # that were fitted, without spikes
+    free: Parameters
+    quadratic: Quadratic
     chains: Chains
     summaries: list[Summary]  # of everything free, the coefficients first
     left_out: list[LeftOut]
-    check: Check
     spikes: int
+    notes: list[str]
     seconds: float
+    fit: Fit | None = None  # of the flights
+    check: Check | None = None
+    accelerations: Quadratic | None = (
+        None  # the other likelihood's statistics of the coefficients, where it could be had
+    )
 
     @property
     def coefficients(self) -> list[Summary]:
         return self.summaries[: len(COEFFICIENTS)]
 
+    @property
+    def problem(self) -> Problem | None:
+        return None if self.fit is None else self.fit.problem
+
+    @property
+    def levels(self) -> Levels | None:
+        return None if self.fit is None else self.fit.levels
+
+    @property
+    def means(self) -> np.ndarray:
+        """Posterior means in units of the priors, (n,)."""
+        return np.asarray(self.chains.flat.mean(axis=0))
+
+    def compared(self) -> list[dict[str, Any]]:
+        """The coefficients by the accelerations' likelihood, beside this one's."""
+        if self.accelerations is None:
+            return []
+        count = len(COEFFICIENTS)
+        spread = self.free.spreads[:count]
+        mean = self.free.nominal[:count] + self.accelerations.mode * spread
+        sd = np.sqrt(np.diag(self.accelerations.covariance)) * spread
+        return [
+            {"name": one.name, "mean": m, "sd": s, "difference_in_sd": (m - one.mean) / float(np.hypot(s, one.sd))}
+            for one, m, s in zip(self.coefficients, mean.tolist(), sd.tolist(), strict=True)
+        ]
+
     def plain(self) -> dict[str, Any]:
         """The result as `--json` prints it."""
-        return {
+        result: dict[str, Any] = {
             "parameters": [one.plain() for one in self.coefficients],
             "seconds": self.seconds,
             "acceptance": float(self.chains.acceptance.mean()),
             "divergent_runs": [{"run": one.run, "reason": str(one)} for one in self.left_out],
+            "likelihood": self.likelihood,
             "also_free": [one.plain() for one in self.summaries[len(COEFFICIENTS) :]],
-            "noise": {
-                name: {"factor": float(np.exp(log)), "sd_of_log": float(sd)}
-                for name, log, sd in zip(
-                    self.fit.levels.names, self.fit.levels.log, self.fit.levels.sd, strict=True
-                )
-            },
-            "runs": [run.name for run in self.fit.problem.runs],
-            "heat": self.fit.quadratic.heat,
-            "linearised": {
-                "draws": self.check.draws, "spread_nat": self.check.spread, "effective_share": self.check.share
-            },
+            "runs": [run.name for run in self.runs],
+            "heat": self.quadratic.heat,
             "spikes_removed": self.spikes,
             "seed": self.chains.seed,
-            "notes": self.fit.notes,
-        }  # fmt: skip
+            "notes": self.notes,
+        }
+        if self.levels is not None:
+            levels = zip(self.levels.names, self.levels.log, self.levels.sd, strict=True)
+            result["noise"] = {name: {"factor": np.exp(log), "sd_of_log": sd} for name, log, sd in levels}
+        if self.check is not None:
+            check = self.check
+            result["linearised"] = {
+                "draws": check.draws, "spread_nat": check.spread, "effective_share": check.share
+            }  # fmt: skip
+        if self.accelerations is not None:
+            result["accelerations"] = self.compared()
+        return result
 
 
 def check_linearised(found: Fit, chains: Chains, draws: int = CHECKED) -> Check:
@@ -82,7 +125,7 @@ def check_linearised(found: Fit, chains: Chains, draws: int = CHECKED) -> Check:
     return Check(draws, float(log.std(ddof=1)), float(weights.sum() ** 2 / (weights @ weights) / draws))
 
 
-def usable(case: Case) -> tuple[list, list[LeftOut], int]:
+def usable(case: Case) -> tuple[list[Run], list[LeftOut], int]:
     """Runs that may be fitted, without their spikes; InputError, naming the first, where there is none."""
     kept, left_out = screen(case.runs, case.motion_capture)
     if not kept:
@@ -94,16 +137,32 @@ def usable(case: Case) -> tuple[list, list[LeftOut], int]:
     return [run for run, _ in cleaned], left_out, sum(count for _, count in cleaned)
 
 
-def identify(case: Case, seed: int = SEED, say: Callable[[str], None] = lambda text: None) -> Identified:
+def identify(
+    case: Case, seed: int = 1, likelihood: str = FLIGHTS, say: Callable[[str], None] = lambda text: None
+) -> Identified:
     """Identify the vehicle of a case from its runs."""
     began = time.perf_counter()
     runs, left_out, spikes = usable(case)
-    found = fit(case, nominal_model(case), runs, say)
+    model = nominal_model(case)
+    first = None
+    if likelihood == ACCELERATIONS or suited(runs):
+        say("accelerations")
+        first, free = fit_accelerations(model, runs)
+    if likelihood == ACCELERATIONS:
+        assert first is not None
+        chains = sample(first, seed)
+        summaries = summarise(free.names, [f.unit for f in free.free], free.si(chains.values))
+        took = time.perf_counter() - began
+        return Identified(
+            case, likelihood, runs, free, first, chains, summaries, left_out, spikes, [], took
+        )  # fmt: skip
+    found = fit(case, model, runs, None if first is None else first.mode, say)
     say("chains")
     chains = sample(found.quadratic, seed)
     free = found.free
     summaries = summarise(free.names, [f.unit for f in free.free], free.si(chains.values))
     check = check_linearised(found, chains)
     return Identified(
-        case, found, chains, summaries, left_out + found.left_out, check, spikes, time.perf_counter() - began
-    )
+        case, likelihood, found.problem.runs, free, found.quadratic, chains, summaries, left_out + found.left_out,
+        spikes, found.notes, time.perf_counter() - began, found, check, first,
+    )  # fmt: skip
