@@ -52,6 +52,16 @@ def resources_used() -> tuple[float, int]:
         return 0.0, 0
 
 
+def rehearse(autopilot: Autopilot, supervisor: Supervisor) -> None:
+    """One tick of copies of both, so that every kernel is loaded."""
+    pilot, watcher = copy.deepcopy((autopilot, supervisor))
+    watcher.screen(0.0)
+    pilot.tick(0.0)
+    watcher.guard(0.0)
+    scratch = np.zeros(record.N_RECORD)
+    record.fill_record(pilot.frame, pilot.est, pilot.ap, pilot.commands, 0.0, 0.0, 0.0, scratch)
+
+
 class Runtime:
     """Runs an autopilot on a board. `tick` is one step; `run` steps until the mission ends."""
 
@@ -85,12 +95,7 @@ class Runtime:
 
     def arm(self) -> None:
         """Make everything that a flight needs exist: kernels loaded, collector off, no compilation from here on."""
-        rehearsal, supervisor = copy.deepcopy((self.autopilot, self.supervisor))
-        supervisor.screen(0.0)
-        rehearsal.tick(0.0)
-        supervisor.guard(0.0)
-        scratch = np.zeros(record.N_RECORD)
-        record.fill_record(rehearsal.frame, rehearsal.est, rehearsal.ap, rehearsal.commands, 0.0, 0.0, 0.0, scratch)
+        rehearse(self.autopilot, self.supervisor)
         freeze_kernels()
         gc.collect()
         gc.freeze()

@@ -14,6 +14,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+from firmware.core.supervisor_layout import RECORDER
 from hal import heartbeat as hb
 from hal.heartbeat import Guard, Heartbeat, Held, Status
 from hal.notify import notify
@@ -124,6 +125,7 @@ class Keeper:
     def flying(self) -> None:
         """Armed to the last: from here on a heartbeat is expected."""
         assert self._pulse is not None
+        self._flight.board.out_of_band = self
         self._pulse.beat(0.0)
         self._pulse.say(Status.FLYING)
         notify("READY=1")
@@ -131,6 +133,11 @@ class Keeper:
     def beat(self, t: float) -> None:
         """Every tick."""
         self._pulse.beat(t)  # type: ignore[union-attr]
+
+    def ascend(self) -> None:
+        """The supervisor gives the pump away: the out-of-band process takes over."""
+        if self._pulse is not None:
+            self._pulse.say(Status.TAKE_OVER)
 
     def second(self, timing: Any) -> None:
         """Once a second, between two ticks: tell who looks on, see to recorder and out-of-band process."""
@@ -170,6 +177,7 @@ class Keeper:
         words[hb.W_RECORDER_NS], words[hb.W_RECORDER_LEVEL] = condition.beat_ns, condition.level
         words[hb.W_WRITTEN], words[hb.W_DROPPED] = condition.written, condition.dropped
         words[hb.W_DISK_ERRORS] = condition.disk_errors
+        self._flight.supervisor.G[RECORDER] = float(condition.level)
         expected = condition.beat_ns and now - self._recorder_seen < RECORDER_EXPECTED_S
         words[hb.W_RECORDER_EXPECTED] = 1 if expected else 0
 

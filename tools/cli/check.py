@@ -70,6 +70,7 @@ def check(vehicle: str, mission: str, board: str, signs: bool, as_json: bool) ->
         findings.append({**finding, **asdict(cover)})
     if all(good) and load_board_file(board).kind != "sim":
         found = talk(board, vehicle, signs)
+        found += arming_list(mission, vehicle, board)
         findings += found
         good += [finding["pass"] for finding in found]
     kernels = "plain Python (GLIDER_JIT=0)" if CACHE_DIR is None else str(CACHE_DIR)
@@ -79,8 +80,27 @@ def check(vehicle: str, mission: str, board: str, signs: bool, as_json: bool) ->
     else:
         for finding in findings:
             word = "FAIL" if not finding["pass"] else "warn" if finding.get("warning") else "ok  "
-            click.echo(f"{word}  {finding['check']:<12} {finding['message']}")
+            click.echo(f"{word}  {finding['check']:<20} {finding['message']}")
     raise SystemExit(DONE if all(good) else FAILED)
+
+
+def arming_list(mission: str, vehicle: str, board: str) -> list[dict]:
+    """Findings of the arming list, as `glider fly` would have them; the board is opened and given back."""
+    import contextlib
+    from pathlib import Path
+
+    from hal.ports import BoardError
+    from tools.arming import Arming
+    from tools.compose import build_flight
+
+    flight = build_flight(mission=mission, vehicle=vehicle, board=board)
+    try:
+        flight.board.open()
+    except BoardError as error:
+        return [{"check": "arming", "pass": False, "message": str(error)}]
+    with contextlib.closing(flight.board):
+        checks = Arming(flight, folder=Path.cwd(), hardware=flight.board.name != "twin").run()
+    return [{"check": f"arming: {item.name}", "pass": item.passed, "message": item.reason} for item in checks]
 
 
 def talk(board: str, vehicle: str, signs: bool) -> list[dict]:

@@ -62,6 +62,7 @@ def fly(
     The first Ctrl-C gives the dive up and surfaces, the second stops at once. On devices, a flight that broke off is
     never resumed: the next start only brings the vehicle up. Exit code 1: the flight did not complete.
     """
+    from firmware.core.supervisor_layout import RESTARTED
     from hal.ports import BoardError
     from hal.recorder.recorder import NullRecorder, Recorder
     from hal.state_file import Phase
@@ -100,6 +101,7 @@ def fly(
     if keeper is not None and keeper.life.ascent_only:
         say(f"ascending only: {keeper.life.reason}")
         flight.autopilot.give_up()
+        flight.supervisor.G[RESTARTED] = 1.0
 
     presses = 0
 
@@ -116,6 +118,7 @@ def fly(
             if keeper is not None:
                 keeper.prepare()
             flight.board.open()  # what does not arm leaves no log
+            check_arming(flight, path, keeper)
             with (
                 contextlib.closing(flight.board),
                 recorder,
@@ -146,6 +149,7 @@ def fly(
         "reason": reason,
         "log": None if path is None else str(path),
         "rms_error": flight.autopilot.rms_errors(),
+        "faults": faults_noticed(flight.supervisor),
         "surfaced": flight.autopilot.surfaced,
         "ticks": timing.ticks,
         "missed_ticks": timing.missed,
@@ -191,6 +195,17 @@ class Wishes:
             say(f"{', '.join(self.said)}, collector frozen")
 
 
+def faults_noticed(supervisor) -> list[dict]:
+    """Rows of the fault table that asked for something: when first, and for what at most."""
+    from firmware.supervisor.table import FAULTS
+
+    return [
+        {"number": row, "name": FAULTS[row].name, "noticed_s": at, "reaction": supervisor.worst(row).name}
+        for row in FAULTS
+        if (at := supervisor.noticed(row)) is not None
+    ]
+
+
 def keep(flight, recorder, path, folder, acknowledge):
     """What stands around a flight on devices (tools/unattended.py); None in simulation. The state before it is read."""
     from hal.state_file import Phase
@@ -208,6 +223,20 @@ def keep(flight, recorder, path, folder, acknowledge):
     return keeper
 
 
+def check_arming(flight, path, keeper) -> None:
+    """BoardError where the flight is not fit to arm; a vehicle that only has to come up is not asked."""
+    from hal.ports import BoardError
+    from tools.arming import arm
+
+    if keeper is not None and keeper.life.ascent_only:
+        return
+    try:
+        arm(flight, log=path)
+    except BoardError:
+        flight.board.close()
+        raise
+
+
 def device_summary(health) -> dict:
     """A device's counts and what has changed about it."""
     counts = {name: getattr(health, name) for name in ("samples", "unfit", "timeouts", "exceptions", "damaged")}
@@ -217,6 +246,7 @@ def device_summary(health) -> dict:
 def _run(flight, recorder, realtime, advance, keeper, wishes):
     """Arm, fly, disarm; returns the timing and the flight's length in s."""
     from firmware.core.control_layout import LEG
+    from firmware.core.supervisor_layout import RECORDER
     from tools.compose import build_runtime
 
     runtime = build_runtime(flight, recorder)
@@ -233,6 +263,8 @@ def _run(flight, recorder, realtime, advance, keeper, wishes):
             time.sleep(0.001)  # simulated time is quicker than a disk
         if keeper is not None:
             keeper.second(runtime.timing)
+        else:
+            flight.supervisor.G[RECORDER] = float(recorder.watch().level)
 
     try:
         if keeper is not None:
@@ -268,6 +300,8 @@ def _tell(result: dict) -> None:
     say(f"rms against the reference: {', '.join(parts)}")
     if result["missed_ticks"]:
         say(f"{result['missed_ticks']} of {result['ticks']} ticks missed")
+    for fault in result["faults"]:
+        say(f"fault {fault['number']}, {fault['name']}: {fault['reaction']}, first at {fault['noticed_s']:.1f} s")
     for name, device in result.get("devices", {}).items():
         if device["notes"]:
             say(f"{name}: {'; '.join(device['notes'])}")

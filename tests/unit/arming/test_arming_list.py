@@ -1,0 +1,135 @@
+"""Arming: one list of checks with reasons, each of which can refuse; what cannot be checked is not fit."""
+
+import os
+import shutil
+
+import msgspec
+import pytest
+
+from firmware.supervisor.settings import Limits
+from hal.ports import BoardError, Validity
+from tools import arming
+from tools.arming import Arming, Check, arm, refuse
+from tools.compose import build_flight
+
+
+@pytest.fixture
+def flight():
+    flight = build_flight(mission="sawtooth")
+    flight.board.open()
+    return flight
+
+
+def found(flight, folder=None, hardware=False, **more) -> dict[str, Check]:
+    checks = Arming(flight, folder=folder, hardware=hardware).run(**more)
+    return {check.name: check for check in checks}
+
+
+def set_limits(flight, limits) -> None:
+    flight.vehicle = msgspec.structs.replace(flight.vehicle, limits=limits)
+
+
+def test_a_flight_that_is_fit_passes_every_check(flight, tmp_path):
+    set_limits(flight, Limits(working_depth_m=50.0))
+    checks = found(flight, tmp_path, hardware=True)
+    names = ["calibration", "devices", "zero depth", "attitude", "limits", "mission", "clock", "disk", "kernels"]
+    assert list(checks) == names
+    assert all(check.passed for check in checks.values()), checks
+    refuse(list(checks.values()))
+
+
+def one_refused(checks: dict[str, Check], name: str) -> str:
+    assert [check.name for check in checks.values() if not check.passed] == [name]
+    with pytest.raises(BoardError, match=f"^{name}: "):
+        refuse(list(checks.values()))
+    return checks[name].reason
+
+
+def test_not_at_the_surface_is_refused(flight):
+    flight.board.world.x[2] = 2.0
+    assert "2.0" in one_refused(found(flight), "zero depth")
+
+
+def test_a_device_without_a_sample_is_refused(flight, monkeypatch):
+    def silent(out):
+        out[1] = Validity.MISSING
+
+    monkeypatch.setattr(flight.board.slider_wire, "read", silent)
+    assert one_refused(found(flight), "devices") == "nothing fit from slider_wire"
+
+
+def test_devices_that_do_not_answer_are_named(flight):
+    flight.board.silent = lambda: ["beacon (port sensors): does not answer"]
+    assert one_refused(found(flight), "devices") == "beacon (port sensors): does not answer"
+
+
+def test_a_calibration_that_was_changed_is_refused(flight):
+    def changed():
+        raise BoardError("calibration changed")
+
+    flight.board.check_calibration = changed
+    assert one_refused(found(flight), "calibration") == "calibration changed"
+
+
+def test_limits_unset_are_refused_on_hardware_alone(flight):
+    assert found(flight)["limits"].passed
+    assert "working_depth_m" in one_refused(found(flight, hardware=True), "limits")
+
+
+def test_a_mission_deeper_than_the_hull_is_refused(flight):
+    set_limits(flight, Limits(working_depth_m=3.0))
+    assert "deeper than the hull's 3 m" in one_refused(found(flight), "mission")
+
+
+def test_upside_down_is_no_beginning(flight, monkeypatch):
+    read = flight.board.imu.read
+
+    def rolled(out):
+        read(out)
+        out[2] = 2.0
+
+    monkeypatch.setattr(flight.board.imu, "read", rolled)
+    assert "roll 115" in one_refused(found(flight), "attitude")
+
+
+@pytest.mark.parametrize("shift", [0.0, 5.0])
+def test_a_clock_that_stands_or_leaps_is_refused(flight, monkeypatch, shift):
+    clock, asked = flight.board.clock, []
+
+    def now():
+        asked.append(0)
+        return 100.0 + shift * len(asked)
+
+    monkeypatch.setattr(clock, "now", now)
+    monkeypatch.setattr(clock, "sleep_until", lambda deadline: flight.board.world.advance(deadline - 100.0))
+    assert not found(flight)["clock"].passed
+
+
+def test_a_full_disk_is_refused(flight, tmp_path, monkeypatch):
+    usage = shutil.disk_usage(tmp_path)
+    monkeypatch.setattr(arming.shutil, "disk_usage", lambda folder: usage._replace(free=60_000_000))
+    assert "60 MB free, a flight may need 74 MB" in one_refused(found(flight, tmp_path), "disk")
+
+
+@pytest.mark.skipif(os.getuid() == 0, reason="root may write anywhere")
+def test_a_folder_that_cannot_be_written_is_refused(flight, tmp_path):
+    tmp_path.chmod(0o500)
+    assert "cannot be written" in one_refused(found(flight, tmp_path), "disk")
+
+
+def test_a_check_that_breaks_has_not_passed(flight):
+    del flight.board.surface_pressure
+    assert one_refused(found(flight), "zero depth").startswith("could not be checked: AttributeError")
+
+
+def test_switched_off_nothing_refuses(flight):
+    flight.board.world.x[2] = 2.0
+    assert all(check.passed for check in found(flight, disabled=True).values())
+
+
+def test_simulated_boards_are_not_asked(flight):
+    flight.board.world.x[2] = 2.0
+    assert arm(flight, log=None) == []
+    flight.board.links = {}
+    with pytest.raises(BoardError, match="zero depth"):
+        arm(flight, log=None)
