@@ -236,10 +236,10 @@ class Keeper:
         self._close(Status.DONE if self._twin or person or not dived else Status.TAKE_OVER)
 
 
-def resident_bytes() -> int:
-    """Resident memory of this process; 0 where the system does not say."""
+def resident_bytes(pid: int | str = "self") -> int:
+    """Resident memory of a process; 0 where the system does not say."""
     try:
-        with open("/proc/self/statm", "rb") as file:
+        with open(f"/proc/{pid}/statm", "rb") as file:
             return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
     except OSError:
         return 0

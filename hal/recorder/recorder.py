@@ -126,6 +126,11 @@ class Recorder:
         if wait:
             self.wait_ready()
 
+    @property
+    def pid(self) -> int:
+        """The recording process's; 0 before it starts."""
+        return self._process.pid if self._process is not None else 0
+
     def _launch(self) -> None:
         """Start a recording process for the current part; a few milliseconds."""
         assert self._fd is not None
@@ -324,6 +329,7 @@ class NullRecorder:
     """A recorder that records nothing, for flights without a log."""
 
     path: Path | None = None
+    pid = 0
 
     def __init__(self, specs: Sequence[RecordSpec]):
         self._channels = {spec.topic: NullChannel(spec) for spec in specs}

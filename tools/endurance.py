@@ -1,0 +1,158 @@
+"""A long flight on twins at real time beside load: missed ticks, lateness, memory, descriptors.
+
+All that flies on devices is there: drivers, wires, twins, recorder, heartbeat, state, out-of-band process. The load is
+a process that never waits, on another core than the loop's.
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tools.cli.common import progress
+
+WARM_UP_S = 20.0
+SAMPLE_S = 10.0
+RSS_LIMIT_BYTES = 1_000_000
+BLOCKS_A_TICK = 0.5  # gained over the whole flight, divided by its ticks: less than one block a tick is none
+LEG_S = 45.0  # about what one leg takes
+
+
+def mission_text(seconds: float) -> str:
+    """A sawtooth for so long."""
+    legs = 2 * (int(seconds / (2 * LEG_S)) + 4)
+    head = f"""
+format = 1
+name = "endurance"
+time_limit_s = {seconds + 3600.0}
+[site]
+name = "pool"
+depth_m = 6.0
+"""
+    leg = "[[leg]]\ndepth_m = {}\npitch_deg = {}\ntime_limit_s = 120.0\n"
+    return head + "".join(leg.format(*((4.0, -20.0), (1.0, 20.0))[number % 2]) for number in range(legs))
+
+
+def measure(seconds: float, *, fifo: bool, load: bool) -> dict[str, Any]:
+    """Fly for so long, then give up and surface; the figures of the loop's process."""
+    cores = sorted(os.sched_getaffinity(0))
+    with tempfile.TemporaryDirectory() as place:
+        mission = Path(place, "endurance.toml")
+        mission.write_text(mission_text(seconds))
+        busy = _load(cores[0]) if load and len(cores) > 1 else None
+        try:
+            found = _fly(mission, Path(place), seconds, fifo, cores[-1])
+        finally:
+            if busy is not None:
+                busy.kill()
+                busy.wait()
+    return {**found, "cores": len(cores), "load_on_other_core": busy is not None, "fifo": fifo}
+
+
+def _load(core: int) -> subprocess.Popen[bytes]:
+    code = f"import os; os.sched_setaffinity(0, {{{core}}})\nwhile True: pass"
+    return subprocess.Popen([sys.executable, "-c", code])
+
+
+def _fly(mission: Path, folder: Path, seconds: float, fifo: bool, core: int) -> dict[str, Any]:
+    from hal import realtime
+    from hal.recorder.recorder import Recorder
+    from tools.compose import build_flight, build_runtime, log_metadata, record_specs
+    from tools.unattended import Keeper
+
+    flight = build_flight(mission=str(mission), board="twin")
+    metadata = log_metadata(flight, seed=0, effects={})
+    recorder = Recorder(folder / "log.mcap", record_specs(flight), attachments=flight.texts, metadata=metadata)
+    keeper = Keeper(flight, recorder, name="endurance", folder=folder / "state", twin=True)
+    keeper.claim()
+    with keeper:
+        if fifo:  # before the twins start: they follow, ten below
+            realtime.take_priority(50)
+        keeper.prepare()
+        flight.board.open()
+        try:
+            with recorder:
+                runtime = build_runtime(flight, recorder)
+                keeper.begin()
+                runtime.extras = (*runtime.extras, keeper.beat)
+                said = [realtime.pin_to_core(core)] + ([realtime.lock_memory()] if fifo else [])
+                try:
+                    runtime.arm()
+                    keeper.flying()
+                    samples = Samples(seconds)
+                    _ticks(runtime, keeper, recorder, samples, seconds)
+                finally:
+                    runtime.disarm()
+                    realtime.unlock_memory()
+                report = recorder.close({"reason": "long enough"})
+        finally:
+            flight.board.close()
+        autopilot = flight.autopilot
+        keeper.end(surfaced=autopilot.surfaced, orderly=True, reason="long enough")
+    return {**_figures(runtime, samples, seconds), "real_time": said, "mode_at_the_end": autopilot.mode,
+            "reason": autopilot.reason,
+            "records": {"written": report.written, "dropped": report.dropped, "complete": report.complete}}  # fmt: skip
+
+
+class Samples:
+    """What is looked at now and then, in memory that is there from the start: time (s), blocks, resident bytes,
+    descriptors, the recording process's resident bytes."""
+
+    def __init__(self, seconds: float):
+        self.rows = np.zeros((int(seconds / SAMPLE_S) + 8, 5))
+        self.count = 0
+
+    def take(self, t: float, recorder_pid: int) -> None:
+        """One row; the interpreter's blocks first, so that the looking itself is not in them."""
+        from tools.unattended import open_files, resident_bytes
+
+        blocks = sys.getallocatedblocks()
+        self.rows[self.count] = (t, blocks, resident_bytes(), open_files(), resident_bytes(recorder_pid))
+        self.count += 1
+
+
+def _ticks(runtime: Any, keeper: Any, recorder: Any, samples: Samples, seconds: float) -> None:
+    """Tick for so long; once a second what a flight does then, and samples after the warm-up."""
+    pid = recorder.pid
+    begin, next_second, next_sample = runtime.deadline, 0.0, min(WARM_UP_S, seconds / 4)
+    with progress("minutes", max(1, round(seconds / 60.0))) as advance:
+        minute = 60.0
+        while (passed := runtime.deadline - begin) < seconds:
+            runtime.tick()
+            if passed >= next_second:
+                keeper.second(runtime.timing)
+                next_second = passed + 1.0
+            elif passed >= next_sample:
+                samples.take(passed, pid)
+                next_sample += min(SAMPLE_S, seconds / 10)
+            elif passed >= minute:
+                advance(1)
+                minute += 60.0
+    samples.take(seconds, pid)
+
+
+def _figures(runtime: Any, samples: Samples, seconds: float) -> dict[str, Any]:
+    rows, timing = samples.rows[: samples.count], runtime.timing
+    first, last = rows[0], rows[-1]
+    ticks = (last[0] - first[0]) / runtime.dt
+    blocks = (last[1] - first[1]) / ticks
+    grown = last[2] - first[2]
+    return {
+        "seconds": seconds,
+        "ticks": timing.ticks,
+        "missed": timing.missed,
+        "worst_late_s": timing.worst_s,
+        "lateness": timing.histogram(),
+        "blocks_gained": int(last[1] - first[1]),
+        "blocks_a_tick": round(blocks),
+        "resident_bytes": int(last[2]),
+        "resident_growth_bytes": int(grown),
+        "descriptors": [int(first[3]), int(rows[:, 3].max()), int(last[3])],
+        "recorder_growth_bytes": int(last[4] - first[4]),
+        "measured_from_s": float(first[0]),
+        "pass": timing.missed == 0 and abs(blocks) < BLOCKS_A_TICK and grown < RSS_LIMIT_BYTES and last[3] <= first[3],
+    }
