@@ -93,7 +93,9 @@ def _fly(mission: Path, folder: Path, seconds: float, fifo: bool, core: int) -> 
             flight.board.close()
         autopilot = flight.autopilot
         keeper.end(surfaced=autopilot.surfaced, orderly=True, reason="long enough")
-    return {**_figures(runtime, samples, seconds), "real_time": said, "mode_at_the_end": autopilot.mode,
+    figures = _figures(runtime, samples, seconds)
+    figures["pass"] = figures["pass"] and autopilot.mode == "flying"
+    return {**figures, "real_time": said, "mode_at_the_end": autopilot.mode,
             "reason": autopilot.reason,
             "records": {"written": report.written, "dropped": report.dropped, "complete": report.complete}}  # fmt: skip
 
@@ -127,6 +129,7 @@ def _ticks(runtime: Any, keeper: Any, recorder: Any, samples: Samples, seconds: 
                 keeper.second(runtime.timing)
                 next_second = passed + 1.0
             elif passed >= next_sample:
+                runtime.look_at_resources(passed)
                 samples.take(passed, pid)
                 next_sample += min(SAMPLE_S, seconds / 10)
             elif passed >= minute:

@@ -114,6 +114,7 @@ def measure_kills(count: int, seed: int) -> dict[str, Any]:
 
 def _warm(flight: Any) -> None:
     """Everything compiled and loaded before the first fork."""
+    import tools.unattended  # noqa: F401
     from hal.recorder.recorder import NullRecorder
     from tools.compose import build_runtime, record_specs
 

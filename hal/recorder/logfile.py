@@ -16,6 +16,7 @@ from typing import Any
 from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, Writer
 
 from hal.recorder import schema
+from hal.recorder.chunk_list import keep_small
 from hal.recorder.schema import RecordSpec
 
 CHUNK_BYTES = 16_384
@@ -59,6 +60,7 @@ def start_writer(stream: Any) -> Writer:
     writer = Writer(
         stream, chunk_size=CHUNK_BYTES, compression=CompressionType.NONE, enable_crcs=True, enable_data_crcs=True
     )
+    keep_small(writer)
     writer.start(profile="ros2", library=f"glider; {LIBRARY_IDENTIFIER}")
     return writer
 

@@ -2,6 +2,8 @@
 
 import sys
 from dataclasses import asdict
+from pathlib import Path
+from typing import NoReturn
 
 import click
 
@@ -13,16 +15,29 @@ from tools.cli.common import DONE, FAILED, json_option, print_json, say
 @click.option("--mission", default="sawtooth", show_default=True, help="Mission: shipped name or file.")
 @click.option("--board", default="sim", show_default=True, help="Board: shipped name or file.")
 @click.option("--signs", is_flag=True, help="Lead through signs and axes of a board's devices, step by step.")
+@click.option("--live", is_flag=True, help="Health page of the flight under way.")
+@click.option("--compile", "compile_", is_flag=True, help="Compile every kernel that a flight needs, ahead of it.")
+@click.option("--acknowledge", is_flag=True, help="A person has looked at the flight before: the next may begin.")
+@click.option(
+    "--state", "state", type=click.Path(path_type=Path, file_okay=False), help="Folder of state and heartbeat."
+)
 @json_option
-def check(vehicle: str, mission: str, board: str, signs: bool, as_json: bool) -> None:
+def check(
+    vehicle: str, mission: str, board: str, signs: bool, live: bool, compile_: bool, acknowledge: bool,
+    state: Path | None, as_json: bool,
+) -> None:  # fmt: skip
     """Check vehicle, mission and board files, and that they go together.
 
     A board of devices (or of their twins) is talked to: every device says what it has, and its calibration is the one
     that was accepted. With --signs a person helps: nose up, roll to starboard, mass forward, pump in. Of the law it
     says whether its k2 covers the vehicle's [uncertainty] and [disturbance]; that it does not is a warning.
 
+    With --live, --compile or --acknowledge it does that alone (docs/UNATTENDED.md).
+
     Exit code 0: all fit to fly with; 1: something is not; each finding in a line of its own.
     """
+    if live or compile_ or acknowledge:
+        _stand_by(live, compile_, acknowledge, state, as_json)
     from firmware.control.cover import Cover
     from firmware.core.jit import CACHE_DIR
     from firmware.model.strict import ConfigError
@@ -84,10 +99,40 @@ def check(vehicle: str, mission: str, board: str, signs: bool, as_json: bool) ->
     raise SystemExit(DONE if all(good) else FAILED)
 
 
+def _stand_by(live: bool, compile_: bool, acknowledge: bool, state: Path | None, as_json: bool) -> NoReturn:
+    """The options that are commands of their own; ends with the exit code."""
+    from hal.heartbeat import state_folder
+    from hal.state_file import Phase, StateFile
+
+    if compile_:
+        from tools.kernels import compile_all
+
+        done = compile_all()
+        if as_json:
+            print_json(done)
+        else:
+            say(f"{done['kernels']} kernels in {done['folder']}, {done['seconds']:.0f} s")
+    if acknowledge:
+        from tools.unattended import told
+
+        file = StateFile(state or state_folder())
+        say(f"acknowledged: {told(file.read())}")
+        file.write(Phase.ASHORE, reason="acknowledged")
+    if live:
+        from tools.live import find_folder, show, snapshot
+
+        folder = find_folder(state)
+        if as_json:
+            print_json(snapshot(folder))
+        else:
+            show(folder)
+        raise SystemExit(FAILED if snapshot(folder)["problems"] else DONE)
+    raise SystemExit(DONE)
+
+
 def arming_list(mission: str, vehicle: str, board: str) -> list[dict]:
     """Findings of the arming list, as `glider fly` would have them; the board is opened and given back."""
     import contextlib
-    from pathlib import Path
 
     from hal.ports import BoardError
     from tools.arming import Arming

@@ -1,0 +1,97 @@
+"""`glider check --live`, `--acknowledge`, `--compile`: what a person sees and does beside a flight."""
+
+import json
+import time
+
+import pytest
+from click.testing import CliRunner
+
+from hal import heartbeat as hb
+from hal.heartbeat import Guard, Heartbeat, Status
+from hal.recorder.condition import Level
+from hal.state_file import Phase, StateFile
+from tools.cli.check import check
+from tools.live import find_folder, lines, snapshot
+
+
+@pytest.fixture
+def pulse(tmp_path):
+    """A heartbeat as a flight leaves it once a second."""
+    found = Heartbeat.create(tmp_path, 0.02, "sawtooth-001")
+    found.words[hb.W_MODE], found.words[hb.W_LEG], found.words[hb.W_LEGS] = 1, 1, 4
+    found.words[hb.W_RECORDER_NS] = time.monotonic_ns()
+    found.words[hb.W_GUARD_STATUS], found.words[hb.W_GUARD_NS] = Guard.WATCHING, time.monotonic_ns()
+    found.values[hb.V_DEPTH_M], found.values[hb.V_PITCH_RAD] = 2.5, -0.35
+    found.beat(12.0)
+    found.say(Status.FLYING)
+    yield found
+    found.close()
+
+
+def test_a_good_flight_is_all_well(pulse, tmp_path):
+    found = snapshot(tmp_path)
+    assert found["problems"] == []
+    assert (found["flight"], found["mode"], found["leg"], found["depth_m"]) == ("sawtooth-001", "flying", 2, 2.5)
+    page = dict(lines(found))
+    assert page["flight"] == "sawtooth-001: flying, flying, leg 2 of 4"
+    assert "depth 2.50 m, pitch -20.1 deg" in page["vehicle"]
+    done = CliRunner().invoke(check, ["--live", "--state", str(tmp_path)])
+    assert done.exit_code == 0
+    assert "all well" in done.output
+
+
+@pytest.mark.parametrize(
+    ("word", "value", "said"),
+    [
+        (hb.W_BEAT_NS, 1, "no heartbeat for"),
+        (hb.W_MISSED, 3, "3 ticks missed"),
+        (hb.W_RECORDER_LEVEL, Level.FAILED, "recorder: failed"),
+        (hb.W_RECORDER_LEVEL, 77, "recorder: ?"),
+        (hb.W_DROPPED, 5, "5 records dropped"),
+        (hb.W_GUARD_NS, 1, "no out-of-band process watches"),
+        (hb.W_GUARD_STATUS, Guard.ASCENDING, "bringing the vehicle up"),
+        (hb.W_STATUS, Status.DONE, "no flight is under way"),
+    ],
+)
+def test_what_is_wrong_is_said_and_is_exit_1(pulse, tmp_path, word, value, said):
+    pulse.words[word] = value
+    assert any(said in problem for problem in snapshot(tmp_path)["problems"])
+    done = CliRunner().invoke(check, ["--live", "--json", "--state", str(tmp_path)])
+    assert done.exit_code == 1
+    assert said in " ".join(json.loads(done.stdout)["problems"])
+
+
+def test_a_dead_flight_is_seen(pulse, tmp_path):
+    pulse.close()
+    second = Heartbeat.open(tmp_path)
+    assert "the flight's process is gone" in snapshot(tmp_path)["problems"]
+    pulse.__init__(second._fd, second.path)  # for the fixture to close
+
+
+def test_without_a_heartbeat_it_says_where_it_looked(tmp_path, monkeypatch):
+    monkeypatch.setenv("GLIDER_RUN_DIR", str(tmp_path / "run"))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    from tools.errors import InputError
+
+    with pytest.raises(InputError, match="run: no flight has left a heartbeat"):
+        find_folder(None)
+    (tmp_path / "glider-run-x").mkdir()
+    Heartbeat.create(tmp_path / "glider-run-x", 0.02).close()
+    assert find_folder(None) == tmp_path / "glider-run-x"
+
+
+def test_acknowledging_sets_the_state_back(tmp_path):
+    StateFile(tmp_path).write(Phase.HELD, flight="dive-007", reason="no depth")
+    done = CliRunner().invoke(check, ["--acknowledge", "--state", str(tmp_path)])
+    assert done.exit_code == 0
+    assert "dive-007): given up, and ended at the surface; no depth" in done.stderr
+    assert StateFile(tmp_path).read().may_start
+
+
+def test_compiled_ahead_means_compiled(tmp_path):
+    """A second run of it finds everything in the cache: quick, and the same kernels."""
+    runner = CliRunner()
+    first = json.loads(runner.invoke(check, ["--compile", "--json"]).stdout)
+    second = json.loads(runner.invoke(check, ["--compile", "--json"]).stdout)
+    assert second["kernels"] >= first["kernels"] > 0
+    assert second["seconds"] < 20.0
