@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: setup demo test check lint types contract benchmark clean
+.PHONY: setup demo test check lint types contract benchmark deploy clean
 
 setup: $(STAMP)
 
@@ -35,6 +35,12 @@ contract: setup
 
 benchmark: setup
 	$(BIN)/glider benchmark
+
+# HOST: where ssh reaches the glider's computer. What is committed is installed, with its kernels compiled there.
+deploy:
+	@test -n "$(HOST)" || { echo 'make deploy HOST=user@glider' >&2; exit 2; }
+	git archive HEAD | ssh $(HOST) 'rm -rf glider-src && mkdir glider-src && tar x -C glider-src'
+	ssh -t $(HOST) 'sudo sh glider-src/tools/deploy/install.sh'
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis

@@ -1,0 +1,97 @@
+"""What is put on the glider's computer: units that systemd understands, a script that refuses what it cannot serve."""
+
+import configparser
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from hal.heartbeat import run_folder, state_folder
+
+ROOT = Path(__file__).resolve().parents[3]
+DEPLOY = ROOT / "tools" / "deploy"
+UNITS = ("glider-outofband.service", "glider-flight@.service")
+
+
+def unit(name):
+    parser = configparser.RawConfigParser(strict=False, interpolation=None)
+    parser.optionxform = str
+    parser.read_string((DEPLOY / name).read_text())
+    return parser
+
+
+@pytest.mark.parametrize("name", UNITS)
+def test_systemd_finds_nothing_wrong_with_a_unit(name, tmp_path):
+    if shutil.which("systemd-analyze") is None:
+        pytest.skip("no systemd here")
+    for other in UNITS:
+        text = (DEPLOY / other).read_text()
+        for program in ("/opt/glider/bin/python", "/opt/glider/bin/glider"):
+            text = text.replace(program, sys.executable)
+        (tmp_path / other.replace("@.", "@x.")).write_text(text)
+    file = tmp_path / name.replace("@.", "@x.")
+    done = subprocess.run(["systemd-analyze", "verify", "--man=no", str(file)], capture_output=True, text=True)
+    assert "glider" not in done.stderr, done.stderr
+
+
+def test_both_units_mean_the_same_folders_and_user(monkeypatch):
+    watch, flight = (unit(name)["Service"] for name in UNITS)
+    for key in ("User", "RuntimeDirectory", "PrivateNetwork", "NoNewPrivileges"):
+        assert watch[key] == flight[key]
+    for section in (watch, flight):
+        settings = dict(item.split("=", 1) for item in section["Environment"].split())
+        monkeypatch.setenv("GLIDER_RUN_DIR", settings["GLIDER_RUN_DIR"])
+        monkeypatch.setenv("GLIDER_STATE_DIR", settings["GLIDER_STATE_DIR"])
+        assert (str(run_folder()), str(state_folder())) == ("/run/glider", "/var/lib/glider")
+
+
+def test_a_flight_is_never_started_by_itself():
+    """No restart, nothing that pulls it in at boot; the watch is, always."""
+    flight, watch = unit(UNITS[1]), unit(UNITS[0])
+    assert flight["Service"]["Restart"] == "no"
+    assert not flight.has_section("Install")
+    assert watch["Service"]["Restart"] == "always"
+    assert watch["Install"]["WantedBy"] == "multi-user.target"
+
+
+def test_the_units_options_exist():
+    from tools.cli.fly import fly
+
+    names = {name for option in fly.params for name in option.opts}
+    words = unit(UNITS[1])["Service"]["ExecStart"].split()
+    assert {word for word in words if word.startswith("--")} <= names
+
+
+def test_the_script_is_good_shell_and_refuses_an_old_python(tmp_path):
+    script = DEPLOY / "install.sh"
+    assert subprocess.run(["sh", "-n", str(script)]).returncode == 0
+    old = tmp_path / "python3"
+    old.write_text("#!/bin/sh\nexit 1\n")
+    old.chmod(0o755)
+    done = subprocess.run(
+        ["sh", str(script)], env={**os.environ, "PYTHON": str(old), "DESTDIR": str(tmp_path / "root")},
+        capture_output=True, text=True,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert done.stderr == "install: Python 3.11 or newer is needed\n"
+    assert not (tmp_path / "root").exists()
+
+
+def test_the_wishes_are_reported_whatever_comes_of_them():
+    """Each is optional: in a process without the right to it, it is said and nothing else happens."""
+    code = (
+        "import os, resource\n"
+        "from hal import realtime as r\n"
+        "os.setuid(65534) if os.getuid() == 0 else None\n"
+        "resource.setrlimit(resource.RLIMIT_MEMLOCK, (0, 0))\n"
+        "print(r.take_priority(50)); print(r.lock_memory()); print(r.pin_to_core(9999)); print(r.pin_to_core(0))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True)
+    said = done.stdout.splitlines()
+    assert said[0].startswith("ordinary priority (")
+    assert said[1].startswith("memory not locked (")
+    assert said[2].startswith("not pinned to core 9999 (")
+    assert said[3] in ("core 0", "not pinned to core 0 (Invalid argument)")
