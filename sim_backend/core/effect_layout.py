@@ -29,7 +29,15 @@ DEPTH_OFFSET, DEPTH_SCALE, DEPTH_LAG, DEPTH_LEVER = 52, 53, 54, 55  # m, 1, s, m
 COMMAND_DELAY, MOCAP_DELAY, CLOCK_SKEW = 56, 57, 58  # s, s, 1
 # allowed: a constant error of each onboard reading, in the order of y below
 BIAS = 59  # 59..67
-N_F = 68
+# a data-driven correction (tools/gap/correction): the link at which it enters, and its coefficients
+LINK, SHAPE = 68, 69  # 69..79, in the link's unit
+FORCE_LINKS, ACTUATOR_LINKS = 6, 9  # links 1-6: X Y Z K M N (N, N m); 7-9: servo, slider, ballast; then the readings
+SHAPES = (
+    "constant", "speed squared", "depth", "angle of attack", "sideslip", "roll rate", "pitch rate", "yaw rate",
+    "pump running", "time", "climb or dive",
+)  # fmt: skip
+N_SHAPES = 11
+N_F = SHAPE + N_SHAPES
 
 # --- x: behind the plant's state, what effects remember --------------------------------------------------------------
 X_GEAR_SERVO, X_GEAR_SLIDER = N_X, N_X + 1  # behind the play: rad, m

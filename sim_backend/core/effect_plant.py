@@ -127,6 +127,24 @@ def extra_wrench(P, F, kz, u, v, w):
 
 
 @kernel
+def correction(F, x, since, pump):
+    """What a data-driven correction adds at its link: SHAPE's coefficients times shapes of about 1 in a glide.
+
+    x (N_XF); since (s) from the run's start; pump (kg/s), positive when taking in water.
+    """
+    u, v, w = x[7], x[8], x[9]
+    squared = u * u + v * v + w * w
+    speed = max(math.sqrt(squared), 0.05)
+    dive = 2.0 * (x[6] * x[4] - x[3] * x[5])
+    value = F[ef.SHAPE] + F[ef.SHAPE + 1] * squared / 0.09 + F[ef.SHAPE + 2] * x[2] / 5.0
+    value += F[ef.SHAPE + 3] * 10.0 * w / speed + F[ef.SHAPE + 4] * 10.0 * v / speed
+    for i in range(3):
+        value += F[ef.SHAPE + 5 + i] * 10.0 * x[10 + i]
+    value += F[ef.SHAPE + 8] * pump / 0.03 + F[ef.SHAPE + 9] * since / 60.0
+    return value + F[ef.SHAPE + 10] * math.tanh(dive / ef.REST_PITCH)
+
+
+@kernel
 def effect_speeds(P, F, x, mode, c_servo, c_slider, c_ballast):
     """Speeds of the actuators' motors (rad/s, m/s, kg/s) under commands, or as given where `mode` drives them."""
     ds, dl, db = c_servo, c_slider, c_ballast
@@ -167,11 +185,25 @@ def effect_derivative(P, F, x, mode, c_servo, c_slider, c_ballast, since, acc, f
     tank = x[15] * (1.0 + F[ef.BALLAST_SCALE]) + F[ef.LEAK] * since
     tank_rate = db * (1.0 + F[ef.BALLAST_SCALE]) + F[ef.LEAK]
     X, Y, Z, K, M, N = extra_wrench(P, F, r31, u, v, w)
+    servo += F[ef.SERVO_OFFSET]
+    slider *= scale
+    link = int(F[ef.LINK])
+    if 0 < link <= ef.ACTUATOR_LINKS:
+        more = correction(F, x, since, db)
+        X += more if link == 1 else 0.0
+        Y += more if link == 2 else 0.0
+        Z += more if link == 3 else 0.0
+        K += more if link == 4 else 0.0
+        M += more if link == 5 else 0.0
+        N += more if link == 6 else 0.0
+        servo += more if link == 7 else 0.0
+        slider += more if link == 8 else 0.0
+        tank += more if link == 9 else 0.0
     net = P[P_NET_MASS]
     P[P_NET_MASS] = net + F[ef.MASS_PER_DEPTH] * x[2]
     ud, vd, wd, pd, qd, rd = accelerations(
         P, r31, r32, r33, u, v, w, p, q, r,
-        servo + F[ef.SERVO_OFFSET], slider * scale, tank, gear_rate, screw_rate * scale, tank_rate,
+        servo, slider, tank, gear_rate, screw_rate * scale, tank_rate,
         X + force * r31, Y + force * r32, Z + force * r33, K, M, N,
     )  # fmt: skip
     P[P_NET_MASS] = net

@@ -43,6 +43,11 @@ class Effect:
     parameters: tuple[Parameter, ...]
     apply: Callable[..., None] | None = None  # where the effect vector is not all
 
+    @property
+    def place(self) -> tuple[str, str]:
+        """Subsystem and element."""
+        return self.subsystem, self.element
+
     def add(self, world: Any, values: dict[str, float]) -> None:
         """Add the effect to a world (or to anything with an effect vector F)."""
         for parameter in self.parameters:

@@ -9,8 +9,11 @@ from support.cases import make_case
 from sim_backend.core import effect_layout as ef
 from tools.cli.common import report_errors
 from tools.cli.main import cli
+from tools.gap.corrected import LINKS
+from tools.gap.measure import run_gap
 from tools.gap.model import load_model
 from tools.gap.predict import predict
+from tools.gap.windows import windows
 from tools.runs import columns as names
 
 
@@ -86,3 +89,41 @@ def test_a_case_that_is_not_there_is_one_line_and_exit_2(tmp_path, capsys):
     assert glider("gap", "diagnose", tmp_path / "nothing", "--out", tmp_path / "out") == 2
     assert len(capsys.readouterr().err.strip().splitlines()) == 1
     assert not (tmp_path / "out").exists()
+
+
+@pytest.fixture(scope="module")
+def pushed(tmp_path_factory):
+    """The running pump pitches the hull, which no effect of the catalogue does."""
+    F = np.zeros(ef.N_F)
+    F[ef.LINK], F[ef.SHAPE + ef.SHAPES.index("pump running")] = 1 + LINKS.index("pitch moment"), 0.15
+    folder = tmp_path_factory.mktemp("pushed")
+    case = make_case(folder, F, seed=21, runs=3)
+    assert glider("gap", "diagnose", case.folder, "--out", folder / "out") == 0
+    return case, folder / "out", json.loads((folder / "out" / "diagnosis.json").read_text())
+
+
+def test_an_effect_outside_the_catalogue_is_unknown_and_described(pushed):
+    _, _, answer = pushed
+    assert answer["verdict"] == "unknown"
+    assert answer["causes"][0]["label"] == "unknown"
+    found = answer["unknown"]["correction"]
+    assert found["link"] == "pitch moment"
+    assert next(iter(found["goes_with"])) == "pump running"
+    assert found["coefficients"]["pump running"] == pytest.approx(0.15, rel=0.1)
+
+
+def test_a_correction_learned_from_the_data_shrinks_the_gap_of_runs_left_out(pushed):
+    case, out, answer = pushed
+    found = answer["unknown"]["correction"]
+    assert found["gap"]["total"] < 0.4 * answer["gap"]["before"]["total"]
+    assert found["gap"]["total"] < answer["gap"]["after"]["total"]
+    model = load_model(str(out / found["model"]), case)
+    flown = [
+        run_gap(run, Y, windows(run.t)).total for run, Y in zip(case.runs, predict(case, model, case.runs), strict=True)
+    ]
+    assert max(flown) < answer["gap"]["before"]["total"]
+
+
+def test_what_is_selected_beside_the_unknown_does_not_make_it_worse(pushed):
+    _, _, answer = pushed
+    assert answer["gap"]["after"]["total"] <= answer["gap"]["recalibrated"]["total"]

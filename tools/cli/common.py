@@ -2,12 +2,13 @@
 
 import contextlib
 import functools
-import math
 import sys
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import click
+
+from tools.plain import as_plain
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 
@@ -25,24 +26,11 @@ def fail(message: str) -> None:
     raise SystemExit(FAILED)
 
 
-def _plain(value: Any) -> Any:
-    """Numbers and arrays as JSON knows them; what is not finite becomes null."""
-    if isinstance(value, dict):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if hasattr(value, "tolist"):
-        return _plain(value.tolist())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
-
-
 def print_json(result: Any) -> None:
     """The result, and nothing else, on standard output."""
     import json
 
-    click.echo(json.dumps(_plain(result), indent=1))
+    click.echo(json.dumps(as_plain(result), indent=1))
 
 
 def _advance_bar(bar: Any, task: Any, n: int = 1) -> None:

@@ -95,12 +95,17 @@ def predict(run: Path, model: str, out: Path) -> None:
 @gap.command()
 @click.argument("case", type=click.Path(path_type=Path))
 @click.option("--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Folder of the answer.")
+@click.option(
+    "--without", type=click.Choice(["nuisance", "splice", "whiteness", "evidence"]),
+    help="Leave one idea of the diagnosis out, to see what it is worth (docs/DIAGNOSIS.md).",
+)  # fmt: skip
 @json_option
-def diagnose(case: Path, out: Path, as_json: bool) -> None:
+def diagnose(case: Path, out: Path, without: str | None, as_json: bool) -> None:
     """Where the simulator is wrong about CASE, which effect causes it, and how far the gap shrinks with it."""
     from tools.errors import need
     from tools.gap.diagnose import diagnose as run_diagnosis
     from tools.gap.diagnose import plain, write
+    from tools.gap.rules import Rules
     from tools.report.diagnosis import write_report
     from tools.report.words import sentence
     from tools.runs.case import load_case
@@ -117,13 +122,15 @@ def diagnose(case: Path, out: Path, as_json: bool) -> None:
                 done += 1
                 advance(1)
 
-        found = run_diagnosis(loaded, step)
+        found = run_diagnosis(loaded, step, Rules() if without is None else Rules().without(without))
         advance(STEPS - 1 - done)
         write(found, out)
         write_report(out / "report.html", found)
         advance(1)
     if as_json:
         print_json(plain(found))
+    for caution in found.cautions:
+        say(f"note: {caution}")
     say(sentence(found))
     say(f"answer: {out / 'diagnosis.json'}, report: {out / 'report.html'}")
 

@@ -32,6 +32,8 @@ class Free:
 
 def allowed(problem: Problem) -> list[Free]:
     """What the nominal model allows for: parameters within [uncertainty], and a constant bias of each sensor."""
+    if not problem.rules.nuisance:
+        return []
     sigma = problem.model.sigma
     free = [Free(ALLOWED, f"P[{i}]", "P", int(i), float(sigma[i])) for i in np.flatnonzero(sigma > 0.0)]
     s = problem.case.sensors
@@ -72,7 +74,8 @@ def candidates(problem: Problem) -> dict[str, list[Free]]:
 
 def place(problem: Problem, free: list[Free], values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The model (P, F) with these parameters at `values` (in their spreads)."""
-    P, F = problem.model.P.copy(), np.zeros(ef.N_F)
+    P = problem.model.P.copy()
+    F = np.zeros(ef.N_F) if problem.model.F is None else problem.model.F.copy()
     for parameter, value in zip(free, values, strict=True):
         (P if parameter.vector == "P" else F)[parameter.entry] += parameter.spread * value
     return P, F

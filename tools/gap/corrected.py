@@ -13,6 +13,10 @@ from sim_backend.effects.base import EffectError, catalogue, check_values
 from tools.gap.model import Model
 from tools.sources import read_text
 
+LINKS = (
+    "surge force", "sway force", "heave force", "roll moment", "pitch moment", "yaw moment", "servo", "slider",
+    "ballast", "roll", "pitch", "yaw", "roll rate", "pitch rate", "yaw rate", "depth", "slider wire", "ballast wire",
+)  # fmt: skip
 BIASES = ("roll", "pitch", "yaw", "p", "q", "r", "depth", "slider", "ballast")
 NAMES = {
     name.lower(): getattr(layout, name)
@@ -25,6 +29,13 @@ PARAMETERS = {
 Finite = Annotated[float, msgspec.Meta(ge=-1e6, le=1e6)]
 
 
+class CorrectionTable(Table):
+    """[correction]: the link at which it enters, and its coefficients by shape, in the link's unit."""
+
+    link: str
+    shapes: dict[str, Finite]
+
+
 class CorrectedTable(Table):
     """corrected.toml."""
 
@@ -34,6 +45,7 @@ class CorrectedTable(Table):
     parameters: dict[str, Finite] = msgspec.field(default_factory=dict)
     bias: dict[str, Finite] = msgspec.field(default_factory=dict)
     effects: dict[str, dict[str, Finite]] = msgspec.field(default_factory=dict)
+    correction: CorrectionTable | None = None
 
 
 def is_corrected(text: str) -> bool:
@@ -64,7 +76,19 @@ def load_corrected(path: Path | str, nominal: Model) -> Model:
         for parameter in catalogue()[label].parameters:
             if parameter.entry >= 0:
                 F[parameter.entry] += checked[parameter.name]
+    if table.correction is not None:
+        _correct(F, table.correction, source)
     return Model(source, P, nominal.sigma, F)
+
+
+def _correct(F: np.ndarray, table: CorrectionTable, source: str) -> None:
+    if table.link not in LINKS:
+        raise ConfigError(source, f"no such link; known: {', '.join(LINKS)}", key="correction.link")
+    F[ef.LINK] = 1.0 + LINKS.index(table.link)
+    for name, value in table.shapes.items():
+        if name not in ef.SHAPES:
+            raise ConfigError(source, f"no such shape; known: {', '.join(ef.SHAPES)}", key=f"correction.shapes.{name}")
+        F[ef.SHAPE + ef.SHAPES.index(name)] = value
 
 
 def corrected_text(
@@ -88,4 +112,9 @@ def corrected_text(
     lines += [f"{name} = {float(F[ef.BIAS + n])!r}" for n, name in enumerate(BIASES) if F[ef.BIAS + n] != 0.0]
     for label, values in effects.items():
         lines += ["", f"[effects.{label}]", *(f"{name} = {float(value)!r}" for name, value in values.items())]
+    if F[ef.LINK] > 0.0:
+        lines += ["", "[correction]  # no cause: what these runs ask for at this link, tools/gap/correction"]
+        lines += [f'link = "{LINKS[int(F[ef.LINK]) - 1]}"', "", "[correction.shapes]"]
+        shapes = F[ef.SHAPE : ef.SHAPE + ef.N_SHAPES]
+        lines += [f'"{name}" = {float(v)!r}' for name, v in zip(ef.SHAPES, shapes, strict=True) if v != 0.0]
     return "\n".join(lines) + "\n"

@@ -9,16 +9,22 @@ from typing import Any
 import numpy as np
 
 from sim_backend.effects.base import catalogue
+from tools.gap.cautions import cautions, not_asked
 from tools.gap.corrected import corrected_text
+from tools.gap.correction import Correction, correct
+from tools.gap.doubt import UNFIT
+from tools.gap.fit import Course
 from tools.gap.next_run import propose
-from tools.gap.problem import pose
+from tools.gap.problem import ALL, pose
+from tools.gap.rules import Rules
 from tools.gap.search import Search, run
-from tools.gap.shrink import AFTER, BEFORE, FLOOR, RECALIBRATED, Shrinkage, shrink
-from tools.gap.verdict import NONE, UNKNOWN, Answer, conclude
+from tools.gap.shrink import AFTER, BEFORE, FLOOR, RECALIBRATED, Further, Shrinkage, by_channel, shrink_further
+from tools.gap.verdict import NONE, UNKNOWN, Answer, conclude, strongest_left
+from tools.plain import as_plain
 from tools.runs.case import Case
 
 UNPREDICTABLE = ("waves", "turbulence")
-UNFIT = 5.0  # tolerances that the best explanation still misses by: unknown effects of the blind test left up to 3
+CORRECTION_FILE = "data_driven.toml"
 WORTH = 0.001  # a smaller probability is not written down
 
 
@@ -32,25 +38,72 @@ class Diagnosis:
     shrinkage: Shrinkage
     next_run: dict[str, Any]
     mission: str  # its file's text
+    correction: Correction | None = None  # of an unknown gap
+    further: Further | None = None  # with that correction
 
     @property
     def identify_first(self) -> bool:
         """Whether the log fits the vehicle file so badly that no cause can be asked for yet."""
-        return self.verdict == "unknown" and self.shrinkage.after > UNFIT
+        return self.shrinkage.after > UNFIT
+
+    @property
+    def cautions(self) -> list[str]:
+        """What these runs cannot say, a line each."""
+        found = cautions(self.answer.search.problem)
+        if self.identify_first:
+            found.insert(0, (
+                f"the vehicle file misses these runs by {self.shrinkage.after:.1f} tolerances whatever is added to it: "
+                "check vehicle, units and calibrations, identify the vehicle first"
+            ))  # fmt: skip
+        return found
 
     @property
     def verdict(self) -> str:
         return {NONE: "none", UNKNOWN: "unknown"}.get(self.answer.main, "cause")
 
 
-def diagnose(case: Case, say: Callable[[str], None] = lambda text: None) -> Diagnosis:
+def diagnose(case: Case, say: Callable[[str], None] = lambda text: None, rules: Rules = ALL) -> Diagnosis:
     """Diagnose a case; `say` is told where the search stands."""
-    search = run(pose(case), say)
+    search = run(pose(case, rules=rules), say)
     answer = conclude(search, say)
     search = answer.search
     say(f"verdict: {answer.main}")
     entry, mission = propose(search)
-    return Diagnosis(case, search, answer, shrink(search, answer.course), entry, mission)
+    found = Diagnosis(case, search, answer, answer.shrinkage, entry, mission)
+    if found.verdict == "unknown":
+        learn(found, say)
+    return found
+
+
+def learn(diagnosis: Diagnosis, say: Callable[[str], None]) -> None:
+    """What an unknown gap does, as a correction, and how far it shrinks the gap; nothing where that would not help."""
+    answer, shrinkage = diagnosis.answer, diagnosis.shrinkage
+    correction = correct(answer.search, answer.course, answer.freed, say)
+    if correction is None:
+        return
+    further = shrink_further(correction.search, correction.course, shrinkage.runs[BEFORE])
+    if further.after < shrinkage.after:
+        diagnosis.correction, diagnosis.further = correction, further
+
+
+def unexplained(diagnosis: Diagnosis) -> dict[str, Any] | None:
+    """The `unknown` entry of diagnosis.json: channel, axis and what the gap goes with, and its correction."""
+    if diagnosis.verdict != "unknown":
+        return None
+    strongest, goes = strongest_left(diagnosis.answer.findings)
+    found: dict[str, Any] = {
+        "channel": None if strongest is None else strongest.channel,
+        "goes_with": None if goes is None else {"channel": goes.channel, "what": goes.test, "sigma": goes.sigma},
+        "correction": None,
+    }
+    if diagnosis.correction is not None and diagnosis.further is not None:
+        further = diagnosis.further
+        found["correction"] = diagnosis.correction.plain() | {
+            "model": CORRECTION_FILE,
+            "gap": by_channel(further.runs),
+            "shrinkage": {"value": further.shrinkage, "ci90": list(further.ci90)},
+        }
+    return found
 
 
 def parameters(diagnosis: Diagnosis, label: str) -> dict[str, dict[str, Any]]:
@@ -120,28 +173,34 @@ def plain(diagnosis: Diagnosis) -> dict[str, Any]:
         "selected": [] if diagnosis.verdict == "none" else selected,
         "gap": gap_table(diagnosis.shrinkage, answer),
         "left": [{"channel": f.channel, "goes_with": f.test, "sigma": f.sigma} for f in answer.findings[:8]],
+        "unknown": unexplained(diagnosis),
+        "cautions": diagnosis.cautions,
+        "not_asked": not_asked(diagnosis.answer.search.problem),
         "identify_first": diagnosis.identify_first,
         "next_run": diagnosis.next_run,
     }
 
 
-def effects_of(diagnosis: Diagnosis) -> dict[str, dict[str, float]]:
-    """The selected effects with their values, as a corrected model holds them."""
+def effects_of(course: Course) -> dict[str, dict[str, float]]:
+    """A candidate's effects with their values, as a corrected model holds them."""
     found: dict[str, dict[str, float]] = {}
-    course = diagnosis.answer.course
     for free, value in zip(course.free, course.values, strict=True):
-        found.setdefault(free.label, {})[free.name] = float(value * free.spread)
+        if free.label in catalogue():
+            found.setdefault(free.label, {})[free.name] = float(value * free.spread)
     return found
 
 
 def write(diagnosis: Diagnosis, out: Path) -> None:
     """diagnosis.json and corrected.toml into a folder."""
-    from tools.cli.common import _plain
-
     out.mkdir(parents=True, exist_ok=True)
-    search, course = diagnosis.search, diagnosis.answer.course
-    P, F = search.model(course)
-    text = corrected_text(diagnosis.case.vehicle_name, search.problem.model.P, P, F, effects_of(diagnosis))
+
+    def model(search: Search, course: Course) -> str:
+        P, F = search.model(course)
+        return corrected_text(diagnosis.case.vehicle_name, search.problem.model.P, P, F, effects_of(course))
+
     (out / "next_run.toml").write_text(diagnosis.mission, encoding="utf-8")
-    (out / "corrected.toml").write_text(text, encoding="utf-8")
-    (out / "diagnosis.json").write_text(json.dumps(_plain(plain(diagnosis)), indent=1) + "\n", encoding="utf-8")
+    (out / "corrected.toml").write_text(model(diagnosis.search, diagnosis.answer.course), encoding="utf-8")
+    if diagnosis.correction is not None:
+        text = model(diagnosis.correction.search, diagnosis.correction.course)
+        (out / CORRECTION_FILE).write_text(text, encoding="utf-8")
+    (out / "diagnosis.json").write_text(json.dumps(as_plain(plain(diagnosis)), indent=1) + "\n", encoding="utf-8")

@@ -9,8 +9,10 @@ from firmware.estimation.settings import UNSEEN_SERVO_WALK
 from sim_backend.core import effect_layout as ef
 from tools.gap import start
 from tools.gap.channels import measured
-from tools.gap.core.innovations import N_ERR, N_Y, filter_runs, fly_windows, follow_runs, read_rows, simulate_runs
+from tools.gap.core.flown import fly_windows, read_rows, simulate_runs
+from tools.gap.core.innovations import N_ERR, N_Y, filter_runs, follow_runs
 from tools.gap.model import Model, nominal_model
+from tools.gap.rules import Rules
 from tools.gap.windows import Window, windows
 from tools.runs import columns as names
 from tools.runs.case import Case
@@ -22,6 +24,7 @@ POSITION_SPREAD, DEPTH_SPREAD, ATTITUDE_SPREAD, RATE_SPREAD = 0.05, 0.05, 0.05, 
 ACTUATOR_SPREAD = (1e-4, 3e-4, 5e-4)  # rad, m, kg: where commanded, they begin at 0 and at the draw-wires
 UNSEEN_SPREAD = 0.3  # rad, of a servo without command
 ROUGH_WALK = (1e-6, 4e-10, 2.5e-9)  # per s, times the roughness squared, of filters that are not to trust the model
+ALL = Rules()
 LOST = 1e6  # sigma; innovations of a model that has left every vehicle
 WALK = (1e-8, 1e-12, 1e-12)  # per s; commanded actuators go as the model says
 
@@ -53,6 +56,7 @@ class Problem:
     R: np.ndarray  # (runs, N_Y)
     valid: np.ndarray  # (rows, N_Y) bool
     run_of: np.ndarray  # (rows,)
+    rules: Rules = ALL
 
     @property
     def seen(self) -> np.ndarray:
@@ -85,6 +89,14 @@ class Problem:
             made.misfit,
         )  # fmt: skip
         return made
+
+    def unheld(self, gains: Gains) -> Gains:
+        """Gains with which windows fly on commands alone, from their first 2 s on."""
+        scored = cut(self)
+        K = gains.K.copy()
+        for first, last in zip(scored.first, scored.last, strict=True):
+            K[first:last] = 0.0
+        return replace(gains, K=K)
 
     def follow(self, models: list[tuple[np.ndarray, np.ndarray]], gains: Gains) -> np.ndarray:
         """Whitened innovations of models (P, F) with kept gains, (models, valid samples)."""
@@ -142,7 +154,7 @@ def measured_all(run: Run) -> np.ndarray:
     return table
 
 
-def pose(case: Case, model: Model | None = None, runs: list[Run] | None = None) -> Problem:
+def pose(case: Case, model: Model | None = None, runs: list[Run] | None = None, rules: Rules = ALL) -> Problem:
     """The problem of a case (all of its runs, if none are named)."""
     model = nominal_model(case) if model is None else model
     runs = case.runs if runs is None else runs
@@ -171,7 +183,7 @@ def pose(case: Case, model: Model | None = None, runs: list[Run] | None = None) 
     )
     run_of = np.repeat(np.arange(count), np.diff(recording.bounds))
     R = recording.settings[:, est.S_R :].copy()
-    return Problem(case, model, runs, recording, z, starts, spreads, spectral, R, np.isfinite(z), run_of)
+    return Problem(case, model, runs, recording, z, starts, spreads, spectral, R, np.isfinite(z), run_of, rules)
 
 
 @dataclass

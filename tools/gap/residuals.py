@@ -33,7 +33,7 @@ def features(problem: Problem, gains: Gains) -> dict[str, np.ndarray]:
     x, t = gains.X, problem.recording.t
     began = problem.recording.t[problem.recording.bounds[:-1]][problem.run_of]
     speed = np.sqrt((x[:, 7:10] ** 2).sum(axis=1))
-    moving = np.gradient(x[:, 15]) / np.maximum(np.gradient(t), 1e-6)
+    moving = pump_speed(problem, gains)
     pitch = np.arcsin(np.clip(2.0 * (x[:, 3] * x[:, 5] - x[:, 6] * x[:, 4]), -1.0, 1.0))
     return {
         "speed": speed,
@@ -51,6 +51,15 @@ def features(problem: Problem, gains: Gains) -> dict[str, np.ndarray]:
         "pump running": (np.abs(moving) > 0.003).astype(float),
         "pump expelling": (moving < -0.003).astype(float),
     }
+
+
+def pump_speed(problem: Problem, gains: Gains) -> np.ndarray:
+    """Speed of the ballast, kg/s, where the filter stands, (rows,)."""
+    speed = np.zeros(len(gains.X))
+    for a, b in itertools.pairwise(problem.recording.bounds):
+        if b - a > 1:
+            speed[a:b] = np.gradient(gains.X[a:b, 15], problem.recording.t[a:b])
+    return speed
 
 
 def tests(problem: Problem, gains: Gains) -> list[Finding]:
@@ -124,6 +133,3 @@ def worst(found: list[Finding]) -> float:
         return 0.0
     chance = 2.0 * norm.sf(max(abs(f.sigma) for f in found)) * len(found)
     return float(norm.isf(min(max(chance, 1e-300), 1.0 - 1e-9)))
-
-
-__all__ = ["CHANNELS", "Finding", "features", "tests", "worst"]

@@ -25,8 +25,8 @@ LEADING = 3
 SHOWN = 1.0  # squared sigma: a spread of an effect that moves nothing by as much cannot be seen in these runs
 EARNED = 5.0  # nat that a further effect must promise
 NEAR = 30.0  # misfit a sample, within which labels are tried again at full weight
-POLISHED, WARM = 3, 1.05
-CLEAN = 5.0  # sigma of the misfit, above which something is still missing
+POLISHED = (3, 2, 1)  # times at most, by the number of effects
+COOL = 1.05  # times the weight of white innovations: the best candidate is near the truth
 
 
 @dataclass
@@ -104,16 +104,16 @@ def screen(search: Search, beside: Course, most: int) -> list[Course]:
     return sorted(shown, key=lambda course: -course.promise())[:most]
 
 
-def excess(search: Search, course: Course) -> float:
-    """How far a candidate's misfit is above that of white innovations, in sigma."""
-    e = course.e / search.fitter.cool
-    return float((e @ e - len(e)) / np.sqrt(2.0 * len(e)))
+def gains_at(problem: Problem, model: tuple[np.ndarray, np.ndarray], roughness: float) -> Gains:
+    """Gains of a filter with a model."""
+    gains = problem.filter(*model, roughness=roughness, begin=True)
+    return gains if problem.rules.splice else problem.unheld(gains)
 
 
 def refilter(search: Search, at: Course, roughness: float) -> None:
     """New gains and a new fitter at a candidate; all candidates are taken over."""
     problem = search.problem
-    search.gains = problem.filter(*search.model(at), roughness=roughness, begin=True)
+    search.gains = gains_at(problem, search.model(at), roughness)
     search.fitter = Fitter(problem, search.gains, search.allowed, at, temper=True)
     search.courses = carried(search.fitter, search.courses)
     search.null = carried(search.fitter, [search.null])[0]
@@ -125,7 +125,7 @@ def run(problem: Problem, say: Callable[[str], None] = lambda text: None) -> Sea
     """The search over a problem's runs."""
     free, known = allowed(problem), candidates(problem)
     P, F = place(problem, free, np.zeros(len(free)))
-    gains = problem.filter(P, F, roughness=ROUGHNESS[0], begin=True)
+    gains = gains_at(problem, (P, F), ROUGHNESS[0])
     fitter = Fitter(problem, gains, free, temper=True)
     null = fitter.course((), [])
     fitter.measure([null])
@@ -138,13 +138,13 @@ def run(problem: Problem, say: Callable[[str], None] = lambda text: None) -> Sea
     search.courses = improve(fitter, prune(tried, null.misfit, KEPT, KEPT), null.misfit, KEPT, 3)
     refilter(search, min([*search.courses, search.null], key=lambda c: c.misfit), ROUGHNESS[1])
     search.courses = improve(search.fitter, search.courses, search.null.misfit, LEFT, 3)
-    polish(search)
+    polish(search, POLISHED[0])
     rescreen(search)
     say(f"one effect: {' '.join(search.best.labels) or 'none'}")
     for count in range(2, MOST_EFFECTS + 1):
         if len(search.best.labels) < count - 1 or not widen(search, count):
             break
-        polish(search)
+        polish(search, POLISHED[count - 1])
         say(f"{count} effects: {' '.join(search.best.labels)}")
     return search
 
@@ -162,12 +162,12 @@ def rescreen(search: Search) -> None:
     search.courses = improve(search.fitter, [*search.courses, *new], search.null.misfit, 2 * LEFT, 3)
 
 
-def polish(search: Search) -> None:
+def polish(search: Search, times: int) -> None:
     """Gains and columns at the best candidate, and all candidates led on; again while that candidate is far away."""
-    for _ in range(POLISHED):
+    for _ in range(times):
         refilter(search, min([*search.courses, search.null], key=lambda c: c.misfit), 1.0)
         search.courses = improve(search.fitter, search.courses, search.null.misfit, 2 * LEFT, 3)
-        if search.fitter.tight < WARM:
+        if search.fitter.tight < COOL:
             break
 
 

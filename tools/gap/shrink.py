@@ -1,5 +1,6 @@
 """How far the gap shrinks: windows of runs that were left out of the fit, flown by four models (GAP.md, Measures)."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,7 +8,7 @@ import numpy as np
 from sim_backend.core import effect_layout as ef
 from tools.gap.candidates import place
 from tools.gap.channels import CHANNELS
-from tools.gap.fit import Course, within
+from tools.gap.fit import MOST, Course, within
 from tools.gap.measure import RunGap, root_mean_square, run_gap
 from tools.gap.model import Model
 from tools.gap.predict import predict as predict_nominal
@@ -37,16 +38,26 @@ class Shrinkage:
 
     def channels(self, which: str) -> dict[str, float]:
         """Each channel's rms over the runs, and the total."""
-        found = {}
-        for channel in CHANNELS:
-            values = [gap.channels[channel.name] for gap in self.runs[which] if channel.name in gap.channels]
-            if values:
-                found[channel.name] = root_mean_square(values)
-        return found | {"total": root_mean_square([gap.total for gap in self.runs[which]])}
+        return by_channel(self.runs[which])
+
+
+def by_channel(runs: list[RunGap]) -> dict[str, float]:
+    """Each channel's rms over the runs, and the total."""
+    found = {}
+    for channel in CHANNELS:
+        values = [gap.channels[channel.name] for gap in runs if channel.name in gap.channels]
+        if values:
+            found[channel.name] = root_mean_square(values)
+    return found | {"total": root_mean_square([gap.total for gap in runs])}
 
 
 def left_out(search: Search, course: Course) -> list[tuple[np.ndarray, np.ndarray]]:
-    """A candidate's models, each fitted without one run: the step that the other runs ask for, to first order."""
+    """A candidate's models, each fitted without one run: the step that the other runs ask for, to first order.
+
+    Of a single run nothing can be left out: its model is fitted to it.
+    """
+    if len(search.problem.runs) == 1:
+        return [search.model(course)]
     fitter, problem = search.fitter, search.problem
     fitter.linearise([course])
     columns = np.vstack([fitter.J, course.columns]) if len(course.free) else fitter.J
@@ -54,8 +65,8 @@ def left_out(search: Search, course: Course) -> list[tuple[np.ndarray, np.ndarra
     run = np.broadcast_to(problem.run_of[:, None], problem.valid.shape)[problem.valid]
     count = len(course.allowed)
     at = np.concatenate([course.allowed, course.values])
-    low = np.concatenate([np.minimum(-3.5, course.allowed), course.low]) - at
-    high = np.concatenate([np.maximum(3.5, course.allowed), course.high]) - at
+    low = np.concatenate([np.minimum(-MOST, course.allowed), course.low]) - at
+    high = np.concatenate([np.maximum(MOST, course.allowed), course.high]) - at
     models = []
     for n in range(len(problem.runs)):
         own = columns[:, run == n]
@@ -103,6 +114,53 @@ def floor(search: Search, course: Course, rng: np.random.Generator) -> list[RunG
     return mean
 
 
+def squares(found: list[RunGap]) -> np.ndarray:
+    """Squared total gaps by run, (runs,)."""
+    return np.array([gap.total for gap in found]) ** 2
+
+
+def rms(values: np.ndarray, pick: np.ndarray) -> float:
+    """Root mean of squares over picked runs."""
+    return float(np.sqrt(values[pick].mean()))
+
+
+def over_runs(
+    value: Callable[[np.ndarray], float], rng: np.random.Generator, count: int
+) -> tuple[float, tuple[float, float]]:
+    """A figure of picked runs: over all, and its 90 % interval by bootstrap."""
+    whole = np.arange(count)
+    if count == 1:
+        return value(whole), (np.nan, np.nan)
+    drawn = np.array([value(rng.choice(whole, count)) for _ in range(BOOTSTRAP)])
+    low, high = np.quantile(drawn, [0.05, 0.95])
+    return value(whole), (float(low), float(high))
+
+
+def left_out_gap(search: Search, course: Course) -> float:
+    """The total gap of a candidate on runs left out, over the runs."""
+    runs, _ = gaps(search.problem, left_out(search, course))
+    return float(np.sqrt(squares(runs).mean()))
+
+
+@dataclass
+class Further:
+    """How far the gap shrinks with something that is no effect, on runs left out."""
+
+    runs: list[RunGap]
+    after: float
+    shrinkage: float
+    ci90: tuple[float, float]
+
+
+def shrink_further(search: Search, course: Course, before: list[RunGap]) -> Further:
+    """The gap with another model fitted to the same runs, against the gaps before."""
+    runs, _ = gaps(search.problem, left_out(search, course))
+    b, a = squares(before), squares(runs)
+    rng = np.random.default_rng(SEED)
+    shrunk, ci90 = over_runs(lambda pick: 1.0 - rms(a, pick) / rms(b, pick), rng, len(runs))
+    return Further(runs, float(np.sqrt(a.mean())), shrunk, ci90)
+
+
 def shrink(search: Search, course: Course) -> Shrinkage:
     """The gap before, recalibrated, after, and its floor, on runs left out of the fit."""
     problem = search.problem
@@ -119,18 +177,16 @@ def shrink(search: Search, course: Course) -> Shrinkage:
         FLOOR: floor(search, course, rng),
     }
     predictions = {BEFORE: flown, RECALIBRATED: Y_refitted, AFTER: Y_after}
-    total = {name: np.array([gap.total for gap in found]) ** 2 for name, found in runs.items()}
+    total = {name: squares(found) for name, found in runs.items()}
+    shrunk, ci90 = over_runs(lambda pick: 1.0 - rms(total[AFTER], pick) / rms(total[BEFORE], pick), rng, len(listed))
 
-    def of(pick: np.ndarray) -> tuple[float, float]:
-        b, a, f = (float(np.sqrt(total[name][pick].mean())) for name in (BEFORE, AFTER, FLOOR))
-        return 1.0 - a / b, (b - a) / max(b - f, 1e-9)
+    def closed_of(pick: np.ndarray) -> float:
+        b, a, f = (rms(total[name], pick) for name in (BEFORE, AFTER, FLOOR))
+        return (b - a) / max(b - f, 1e-9)
 
-    whole = np.arange(len(problem.runs))
-    drawn = np.array([of(rng.choice(whole, len(whole))) for _ in range(BOOTSTRAP)])
-    low, high = np.quantile(drawn, [0.05, 0.95], axis=0)
-    shrunk, closed = of(whole)
+    closed, closed_ci90 = over_runs(closed_of, rng, len(listed))
     mean = {name: float(np.sqrt(values.mean())) for name, values in total.items()}
     return Shrinkage(
-        runs, mean[BEFORE], mean[RECALIBRATED], mean[AFTER], mean[FLOOR], shrunk, (float(low[0]), float(high[0])),
-        closed, (float(low[1]), float(high[1])), predictions,
+        runs, mean[BEFORE], mean[RECALIBRATED], mean[AFTER], mean[FLOOR], shrunk, ci90, closed, closed_ci90,
+        predictions,
     )  # fmt: skip

@@ -4,26 +4,23 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import norm
 
 from sim_backend.effects.base import catalogue
+from tools.gap.doubt import UNCLEAN, disorder, doubt, left_share, what_is_left
 from tools.gap.fit import Course
-from tools.gap.measure import root_mean_square, run_gap
-from tools.gap.probes import TURBULENCE, WAVES, Probed, probe_model, probes, raised
-from tools.gap.problem import Gains, Problem, Scored, cut, fly_on
+from tools.gap.probes import Probed, raised
 from tools.gap.residuals import Finding, tests, worst
 from tools.gap.search import Search, run, settle
+from tools.gap.shrink import Shrinkage, left_out_gap, shrink
 
 NONE, UNKNOWN = "none", "unknown"
 PRIOR_NONE = 0.5  # before anything was measured; the labels share the rest
-UNCLEAN = 6.0  # sigma, corrected for the number of tests
-LEFT_OVER, LEFT_WIDTH = 0.2, 0.8  # share left at which unknown is as likely as not, and the width in e-folds
-ONE_AXIS = 0.65  # of what all axes bring together: where one alone brings as much, it is no turbulence
-MOSTLY = 0.9  # of all that can be explained, for turbulence or waves to be the cause
-SHOWN = 0.3  # of the gap that is left: an effect beside another must move predictions by as much
+SHOWN = 0.3  # of the gap that is left on runs left out: an effect beside another must close as much more
 EARNED = 12.0  # nat of evidence that an effect brings, or it is left out (docs/DIAGNOSIS.md, Thresholds)
 TIE = 6.0  # nat within which two labels are not told apart: what a change of prior spreads can move
 MOST_GROUP = 3
+CERTAIN = 0.9  # of the recalibrated gap: effects beside an unknown one that leave more are not certain
+SHAPES = ("variance", "mean", "lag", "spectrum")  # tests of a channel by itself; the others go with something
 
 
 @dataclass
@@ -39,10 +36,11 @@ class Answer:
     null: Course  # recalibrated
     findings: list[Finding]
     unclean: float  # sigma of what is left, corrected for the number of tests
-    unexplained: float  # share of what can be explained that the selected effects leave to an unknown one
+    unexplained: float  # of the squared gap beyond the floor, the share that the selected effects leave
     gained: dict[str, float]  # nat that each selected effect brings
     freed: list[Probed]  # links of the chain, beyond the selected effects; empty where nothing is left
     noise: Probed | None  # turbulence or waves, where they are the cause
+    shrinkage: Shrinkage
 
 
 def drop(search: Search, course: Course, label: str) -> Course:
@@ -63,40 +61,18 @@ def drop(search: Search, course: Course, label: str) -> Course:
     return less
 
 
-def shown(search: Search, course: Course) -> dict[str, float]:
-    """How far dropping each effect, and fitting the rest anew, moves the windows' predictions, over what gap is left.
+def earned_outside(search: Search, course: Course) -> dict[str, float]:
+    """By how much the gap on runs left out grows without each effect, the rest fitted anew, over the gap with it.
 
-    Both in tolerances, root mean square over channels and runs, from the same starts. An effect below SHOWN is a
-    detail that the data can see and nobody needs: the wrong form of another one, a sample's worth of delay.
+    The root of the difference of squares; 0 where it does not grow. An effect below SHOWN is a detail that the data can
+    see and nobody needs: the wrong form of another one, a sample's worth of delay.
     """
-    problem = search.problem
-    scored = cut(problem)
-    P, F = search.model(course)
-    gains = problem.filter(P, F, begin=True)
-    whole = flight(problem, scored, P, F, gains)
-    left = max(apart(problem, scored, whole, problem.z), 1e-6)
+    whole = left_out_gap(search, course)
     found = {}
     for label in course.labels:
-        without = flight(problem, scored, *search.model(drop(search, course, label)), gains)
-        found[label] = apart(problem, scored, whole, without) / left
+        without = left_out_gap(search, drop(search, course, label))
+        found[label] = float(np.sqrt(max(without**2 - whole**2, 0.0)) / max(whole, 1e-6))
     return found
-
-
-def flight(problem: Problem, scored: Scored, P: np.ndarray, F: np.ndarray, gains: Gains) -> np.ndarray:
-    """The windows flown by a model from where the gains' filter stands; (rows, N_Y), NaN outside."""
-    Y = np.full_like(problem.z, np.nan)
-    fly_on(problem, scored, P, F, gains, Y)
-    return Y
-
-
-def apart(problem: Problem, scored: Scored, a: np.ndarray, b: np.ndarray) -> float:
-    """The total gap between two tables (rows, N_Y), over the runs."""
-    bounds = problem.recording.bounds
-    totals = [
-        run_gap(run, a[bounds[n] : bounds[n + 1]], scored.listed[n], b[bounds[n] : bounds[n + 1]]).total
-        for n, run in enumerate(problem.runs)
-    ]
-    return root_mean_square(totals)
 
 
 def thin(search: Search) -> tuple[Course, dict[str, float]]:
@@ -111,12 +87,19 @@ def thin(search: Search) -> tuple[Course, dict[str, float]]:
         if gains[weakest] >= EARNED:
             if len(course.labels) == 1:
                 return course, gains
-            visible = shown(search, course)
-            weakest = min(visible, key=lambda label: visible[label])
-            if visible[weakest] >= SHOWN:
+            outside = earned_outside(search, course)
+            weakest = min(outside, key=lambda label: outside[label])
+            if outside[weakest] >= SHOWN:
                 return course, gains
         course = drop(search, course, weakest)
     return course, {}
+
+
+def by_error(search: Search) -> tuple[Course, dict[str, float]]:
+    """The candidate of one effect, or of none, with the least gap on runs left out: what evidence is compared with."""
+    tried = [search.null, *(course for course in search.courses if len(course.labels) == 1)]
+    best = min(tried, key=lambda course: left_out_gap(search, course))
+    return best, {label: best.log_evidence(search.fitter) for label in best.labels}
 
 
 def instead(search: Search, course: Course, main: str) -> dict[str, float]:
@@ -140,87 +123,45 @@ def softmax(logs: dict[str, float]) -> dict[str, float]:
     return {name: weight / total for name, weight in weights.items()}
 
 
-def unknown_chance(unclean: float, unexplained: float) -> float:
-    """Probability that what is left is a gap of its own (docs/DIAGNOSIS.md, Thresholds)."""
-    if unclean < UNCLEAN:
-        return 0.002
-    z = (np.log(max(unexplained, 1e-6)) - np.log(LEFT_OVER)) / LEFT_WIDTH
-    return float(np.clip(norm.cdf(z), 0.005, 0.995))
-
-
-def gaps_left(search: Search, course: Course) -> tuple[float, float, list[Probed]]:
-    """Nat that the selected effects bring over no effect, that a freed link would bring beyond them, and all links."""
-    problem = search.problem
-    null = float(problem.filter(*search.model(search.null), begin=True).misfit.sum())
-    own = float(search.gains.misfit.sum())
-    freed = probe_model(problem, *search.model(course), probes(problem))
-    return 0.5 * (null - own), freed[0].gain, freed
-
-
-def scatter(search: Search) -> Probed | None:
-    """Turbulence or waves, where water in disorder explains the recalibrated model's misfit better than any one link.
-
-    Turbulence shakes every axis: where one alone brings most of it, something else shakes that axis.
-    """
-    freed = probe_model(search.problem, *search.model(search.null), probes(search.problem))
-    first = freed[0]
-    if first.probe.name == WAVES:
-        return first
-    axes = sorted((p.gain for p in freed if p.probe.stage == "force" and p.probe.name != TURBULENCE), reverse=True)
-    return first if first.probe.name == TURBULENCE and axes[0] < ONE_AXIS * first.gain else None
-
-
 def conclude(search: Search, say: Callable[[str], None] = lambda text: None, noise: Probed | None = None) -> Answer:
     """The answer of a finished search; its gains are taken anew at the selected model.
 
     `noise` is turbulence or waves that the search was already told of.
     """
-    course, gained = thin(search)
+    problem = search.problem
+    course, gained = thin(search) if problem.rules.evidence else by_error(search)
     search.courses = [c for c in search.courses if c is not course] + ([course] if course.labels else [])
-    search.gains = search.problem.filter(*search.model(course), begin=True)
-    findings = tests(search.problem, search.gains)
+    search.gains = problem.filter(*search.model(course), begin=True)
+    findings = tests(problem, search.gains)
     unclean = worst(findings)
-    freed: list[Probed] = []
-    unexplained = 0.0
-    if unclean >= UNCLEAN:
-        brought, left, freed = gaps_left(search, course)
-        brought = max(brought, 0.0) + (noise.gain if noise is not None else 0.0)
-        unexplained = float(np.clip(left / max(left + brought, 1e-9), 0.0, 1.0))
-        if noise is None and unexplained > LEFT_OVER:
-            found = scatter(search)
-            if found is not None and found.gain > MOSTLY * (brought + left):
-                more, _ = raised(search.problem, found.probe, found.scale)
-                rough = replace(search.problem, spectral=search.problem.spectral + more)
-                return conclude(run(rough, say), say, found)
+    left = None
+    if unclean >= UNCLEAN and problem.rules.whiteness:
+        left = what_is_left(search, course, noise)
+        found = disorder(search, left) if noise is None else None
+        if found is not None:
+            more, _ = raised(problem, found.probe, found.scale)
+            return conclude(run(replace(problem, spectral=problem.spectral + more), say), say, found)
     main = max(gained, key=lambda label: gained[label]) if gained else ""
-    chances = posterior(search, course, main)
+    chances = posterior(search, course, main) if problem.rules.evidence else {main or NONE: 1.0}
+    shrinkage = shrink(search, course)
+    unknown = doubt(search, main, shrinkage, left, noise is not None)
     if noise is not None:
         main = noise.probe.name
         chances = {name: 0.0 for name in chances} | {main: 1.0}
-    unknown = unknown_chance(unclean, unexplained)
     chances = {name: value * (1.0 - unknown) for name, value in chances.items()} | {UNKNOWN: unknown}
-    for label in catalogue():
-        chances.setdefault(label, 0.0)
+    chances = {label: 0.0 for label in catalogue()} | chances
     top = max(chances, key=lambda name: chances[name])
     selected = sorted(gained, key=lambda label: -gained[label])
-    groups = grouped(rivals(search, course, main))
+    groups = grouped(rivals(search, course, main)) if noise is None else {main: [main]}
+    if top == UNKNOWN and course.labels and shrinkage.after > CERTAIN * shrinkage.recalibrated:
+        course, selected, gained, shrinkage = search.null, [], {}, shrink(search, search.null)
     if noise is not None:
-        selected, groups = [main, *selected], {main: [main]}
+        selected = [main, *selected]
     return Answer(
-        search,
-        selected,
-        top,
-        chances,
-        groups,
-        course,
-        search.null,
-        findings,
-        unclean,
-        unexplained,
-        gained,
-        freed,
-        noise,
-    )
+        search=search, selected=selected, main=top, probabilities=chances, groups=groups, course=course,
+        null=search.null, findings=findings, unclean=unclean, unexplained=left_share(shrinkage), gained=gained,
+        freed=[] if left is None else left.freed, noise=noise, shrinkage=shrinkage,
+    )  # fmt: skip
 
 
 def rivals(search: Search, course: Course, main: str) -> dict[str, float]:
@@ -244,3 +185,18 @@ def grouped(logs: dict[str, float]) -> dict[str, list[str]]:
         label: [label, *(o for o in labels if o != label and abs(logs[o] - logs[label]) < TIE)][:MOST_GROUP]
         for label in labels
     }
+
+
+def strongest_left(findings: list[Finding]) -> tuple[Finding | None, Finding | None]:
+    """The strongest finding, and the strongest that says what it goes with, in the same channel if that has one.
+
+    None where they are too weak.
+    """
+    strong = [f for f in findings if abs(f.sigma) >= UNCLEAN]
+    if not strong:
+        return None, None
+    goes = sorted(
+        (f for f in strong if not f.test.startswith(SHAPES)),
+        key=lambda f: (f.channel != strong[0].channel, -abs(f.sigma)),
+    )
+    return strong[0], goes[0] if goes else None

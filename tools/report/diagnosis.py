@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from sim_backend.effects.base import catalogue
+from tools.gap import doubt
 from tools.gap import verdict as rules
 from tools.gap.chain import Link, by_effects, calm, links, ordered, scatter, shared_out
 from tools.gap.channels import CHANNELS, channels_of, measured
-from tools.gap.diagnose import UNPREDICTABLE, Diagnosis, parameters, places
+from tools.gap.diagnose import CORRECTION_FILE, UNPREDICTABLE, Diagnosis, parameters, places
 from tools.gap.shrink import AFTER, BEFORE, FLOOR, RECALIBRATED
 from tools.gap.verdict import drop
 from tools.gap.windows import windows
@@ -187,6 +188,19 @@ def _data(diagnosis: Diagnosis) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def _correction(diagnosis: Diagnosis) -> dict[str, str] | None:
+    """What a data-driven correction of an unknown gap is like, and does."""
+    found, further = diagnosis.correction, diagnosis.further
+    if found is None or further is None:
+        return None
+    shapes = [f"{name} ({words.quantity(rms, found.unit)} rms)" for name, rms in found.carried.items()]
+    return {
+        "link": found.link, "shapes": words.joined(shapes), "file": CORRECTION_FILE,
+        "far": f"{words.change(further.shrinkage)} ({words.interval(*further.ci90)})",
+        "after": words.number(further.after),
+    }  # fmt: skip
+
+
 def _version() -> str:
     try:
         return version("glider")
@@ -221,6 +235,8 @@ def _context(diagnosis: Diagnosis) -> dict[str, Any]:
         "predictable": answer.main not in UNPREDICTABLE,
         "tolerances": [f"{c.name} {c.tolerance * c.scale:g} {c.unit}" for c in CHANNELS if c.name in recorded],
         "groups": _groups(diagnosis),
+        "cautions": [words.upper(line) for line in diagnosis.cautions],
+        "correction": _correction(diagnosis),
         "left": left[:MOST_LEFT],
         "left_more": max(0, len(left) - MOST_LEFT),
         "tests": len(answer.findings),
@@ -228,6 +244,7 @@ def _context(diagnosis: Diagnosis) -> dict[str, Any]:
         "next_run": diagnosis.next_run,
         "version": _version(),
         "rules": rules,
+        "doubt": doubt,
     }
 
 

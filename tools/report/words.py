@@ -5,10 +5,11 @@ from typing import Any
 
 from sim_backend.effects.base import catalogue
 from tools.gap.diagnose import Diagnosis, places
+from tools.gap.doubt import UNCLEAN
 from tools.gap.probes import TURBULENCE, WAVES
 from tools.gap.residuals import Finding
 from tools.gap.shrink import Shrinkage
-from tools.gap.verdict import UNCLEAN
+from tools.gap.verdict import SHAPES, strongest_left
 
 MINUS, DASH = "\N{MINUS SIGN}", "\N{EN DASH}"
 PLAIN = {
@@ -76,7 +77,6 @@ AXES = {
 }  # fmt: skip
 SURE, LITTLE = 0.8, 0.02  # below the first the next answer is named, unless it is below the second
 MEANS = {"none": "no gap", "unknown": "a gap of another kind"}
-SHAPES = ("variance", "mean", "lag", "spectrum")  # tests of a channel by itself; the others go with something
 READABLE = {"rad": ("deg", 180.0 / math.pi), "rad/s": ("deg/s", 180.0 / math.pi), "1/rad": ("1/deg", math.pi / 180.0)}
 
 
@@ -122,6 +122,12 @@ def scaled(values: list[float], unit: str, mass: bool = True) -> tuple[list[floa
     if unit == "m" and largest < 0.1:
         return [1000.0 * value for value in values], "mm"
     return values, "" if unit == "1" else unit
+
+
+def quantity(value: float, unit: str) -> str:
+    """A number with its unit, the one that is easiest to read."""
+    values, shown = scaled([value], unit)
+    return f"{number(values[0])} {shown}".strip()
 
 
 def place(label: str) -> str:
@@ -250,22 +256,17 @@ def _unknown(diagnosis: Diagnosis) -> str:
     known = "with nothing added to the model"
     if answer.selected:
         known = f"with the nearest known effects in the model ({joined(answer.selected)})"
-    return f"{said}; {how_far(diagnosis, known)}."
-
-
-def strongest_left(findings: list[Finding]) -> tuple[Finding | None, Finding | None]:
-    """The strongest finding, and the strongest that says what it goes with, in the same channel if that has one.
-
-    None where they are too weak.
-    """
-    strong = [f for f in findings if abs(f.sigma) >= UNCLEAN]
-    if not strong:
-        return None, None
-    goes = sorted(
-        (f for f in strong if not f.test.startswith(SHAPES)),
-        key=lambda f: (f.channel != strong[0].channel, -abs(f.sigma)),
-    )
-    return strong[0], goes[0] if goes else None
+    said += f"; {how_far(diagnosis, known)}"
+    if diagnosis.correction is not None and diagnosis.further is not None:
+        said += (
+            (
+                f"; a data-driven correction of the {diagnosis.correction.link}, going with "
+                f"{joined(list(diagnosis.correction.carried))}, {change(diagnosis.further.shrinkage)}"
+            )
+            .replace("shrinks by", "would shrink it by")
+            .replace("grows by", "would make it larger by")
+        )
+    return f"{said}."
 
 
 def finding(found: Finding, rate_hz: float) -> str:

@@ -6,7 +6,7 @@ import pytest
 from firmware.core import layout
 from firmware.model.strict import ConfigError
 from sim_backend.core import effect_layout as ef
-from tools.gap.corrected import corrected_text, load_corrected
+from tools.gap.corrected import LINKS, corrected_text, load_corrected
 from tools.gap.model import Model
 from tools.sources import load_vehicle
 
@@ -47,3 +47,24 @@ def test_what_is_wrong_is_named(nominal, tmp_path, text, key):
         load_corrected(path, nominal)
     assert "corrected.toml" in str(caught.value)
     assert key.rsplit(".", maxsplit=1)[-1] in str(caught.value)
+
+
+def test_a_correction_reads_back_bit_for_bit(nominal, tmp_path):
+    F = np.zeros(ef.N_F)
+    F[ef.LINK] = 1.0 + LINKS.index("slider wire")
+    F[ef.SHAPE], F[ef.SHAPE + ef.SHAPES.index("angle of attack")] = 1.0 / 3.0, -0.7e-3
+    path = tmp_path / "data_driven.toml"
+    path.write_text(corrected_text("roughie", nominal.P, nominal.P, F, {}))
+    assert np.array_equal(load_corrected(path, nominal).F, F)
+
+
+@pytest.mark.parametrize(("text", "key"), [
+    ('[correction]\nlink = "keel"\nshapes = {}\n', "correction.link"),
+    ('[correction]\nlink = "servo"\nshapes = { moon = 1.0 }\n', "correction.shapes.moon"),
+])  # fmt: skip
+def test_a_correction_that_is_none_is_named(nominal, tmp_path, text, key):
+    path = tmp_path / "data_driven.toml"
+    path.write_text(f'format = 1\ncorrected = true\nvehicle = "roughie"\n{text}')
+    with pytest.raises(ConfigError) as error:
+        load_corrected(path, nominal)
+    assert error.value.key == key

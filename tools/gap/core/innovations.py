@@ -15,9 +15,9 @@ import numpy as np
 
 from firmware.core.jit import kernel, parallel_kernel, prange
 from firmware.core.layout import N_P
-from firmware.core.rotations import euler_from_quaternion
+from firmware.core.rotations import euler_from_quaternion, rotation_nb
 from sim_backend.core import effect_layout as ef
-from sim_backend.core.effect_plant import effect_step, fold, read, wrapped
+from sim_backend.core.effect_plant import correction, effect_step, fold, read, wrapped
 
 N_ERR = 15
 N_Y = ef.N_Y
@@ -130,6 +130,9 @@ def stand(x, before):
 def read_row(F, x, t, path, i, begin, y):
     """What is read at row i, into y (N_Y); motion capture at its own time, along the path flown."""
     read(F, x, y)
+    link = int(F[ef.LINK])
+    if link > ef.ACTUATOR_LINKS:
+        y[link - ef.ACTUATOR_LINKS - 1] += correction(F, x, t[i] - t[begin], 0.0)
     late = F[ef.MOCAP_DELAY] + F[ef.CLOCK_SKEW] * (t[i] - t[begin])
     if late == 0.0 or i == begin:
         return
@@ -152,30 +155,57 @@ def missed(z, y, d):
 
 
 @kernel
+def nudged(x, j, error, moved):
+    """x with its error j at NUDGE, into moved; error (N_ERR) is scratch."""
+    for n in range(N_ERR):
+        error[n] = 0.0
+    error[j] = NUDGE
+    moved[:] = x
+    correct(moved, error)
+
+
+@kernel
+def pushed(x, dt, Gam):
+    """What accelerations held over a step of dt to x leave, Gam (N_ERR, 6): speeds, and half as much way and turn."""
+    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation_nb(x[3], x[4], x[5], x[6])
+    half = 0.5 * dt * dt
+    Gam[:] = 0.0
+    Gam[0, 0], Gam[0, 1], Gam[0, 2] = half * r11, half * r12, half * r13
+    Gam[1, 0], Gam[1, 1], Gam[1, 2] = half * r21, half * r22, half * r23
+    Gam[2, 0], Gam[2, 1], Gam[2, 2] = half * r31, half * r32, half * r33
+    for j in range(3):
+        Gam[3 + j, 3 + j] = half
+    for j in range(6):
+        Gam[6 + j, j] = dt
+
+
+@kernel
 def linear_step(Pw, F, x, mode, t, inputs, i, begin, zero, work, kept, moved, base, error, Phi, Gam):
     """Fly x to row i; Phi (N_ERR, N_ERR) is the step's derivative by the state, Gam (N_ERR, 6) by accelerations."""
     acc = np.zeros(6)
     base[:] = x
     propagate(Pw, F, base, mode, t, inputs, i, begin, acc, zero, work, kept)
     for j in range(N_ERR):
-        for n in range(N_ERR):
-            error[n] = 0.0
-        error[j] = NUDGE
-        moved[:] = x
-        correct(moved, error)
+        nudged(x, j, error, moved)
         propagate(Pw, F, moved, mode, t, inputs, i, begin, acc, zero, work, kept)
         difference(moved, base, error)
         for n in range(N_ERR):
             Phi[n, j] = error[n] / NUDGE
-    for j in range(6):
-        acc[j] = NUDGE
-        moved[:] = x
-        propagate(Pw, F, moved, mode, t, inputs, i, begin, acc, zero, work, kept)
-        acc[j] = 0.0
-        difference(moved, base, error)
-        for n in range(N_ERR):
-            Gam[n, j] = error[n] / NUDGE
+    pushed(base, t[i] - t[i - 1], Gam)
     x[:] = base
+
+
+@kernel
+def linear_reading(F, x, t, path, i, begin, moved, error, y, y2, H):
+    """H (N_Y, N_ERR), the derivative of what is read at row i, y (N_Y), by the state."""
+    for j in range(N_ERR):
+        nudged(x, j, error, moved)
+        read_row(F, moved, t, path, i, begin, y2)
+        for m in range(N_Y):
+            change = y2[m] - y[m]
+            if m < 3 or m >= ef.Y_MOCAP_ROLL:
+                change = wrapped(change)
+            H[m, j] = change / NUDGE
 
 
 @kernel
@@ -223,18 +253,7 @@ def filter_run(P, F, spectral, R, mode, t, inputs, z, begin, end, start, spread,
                 cov[j, j] += spectral[9 + j] * dt
         read_row(F, x, t, path, i, begin, y)
         missed(z[i], y, d)
-        for j in range(N_ERR):
-            for n in range(N_ERR):
-                error[n] = 0.0
-            error[j] = NUDGE
-            moved[:] = x
-            correct(moved, error)
-            read_row(F, moved, t, path, i, begin, y2)
-            for m in range(N_Y):
-                change = y2[m] - y[m]
-                if m < 3 or m >= ef.Y_MOCAP_ROLL:
-                    change = wrapped(change)
-                H[m, j] = change / NUDGE
+        linear_reading(F, x, t, path, i, begin, moved, error, y, y2, H)
         # S = H cov H' + R of what was measured, its Cholesky factor L, and W = L^-1; K~ = cov H' L^-T
         for m in range(N_Y):
             if math.isnan(d[m]):
@@ -376,60 +395,3 @@ def follow_runs(Ps, Fs, modes, bounds, t, inputs, z, starts, W, K, E):
             Ps[m], Fs[m], modes[run], t[begin:end], inputs[begin:end], z[begin:end], 0, end - begin, starts[run],
             W[begin:end], K[begin:end], X, path, E[m, begin:end],
         )  # fmt: skip
-
-
-@parallel_kernel
-def fly_windows(Ps, Fs, modes, bounds, t, inputs, X, paths, first, last, run_of, Y):
-    """Fly every window with every model from where its filter stands: Y (models, rows, N_Y), rows first .. last - 1.
-
-    X (models, rows, N_XF) and paths (models, rows, 6) as filter_runs leaves them; nothing measured is looked at.
-    """
-    windows = len(first)
-    for n in prange(Ps.shape[0] * windows):
-        m, w = n // windows, n % windows
-        P, F, run = Ps[m], Fs[m], run_of[w]
-        begin = bounds[run]
-        Pw, x = np.empty(N_P), X[m, first[w] - 1].copy()
-        fold(P, F, Pw)
-        work, kept = np.zeros((6, ef.N_XF)), np.empty(ef.N_XF)
-        zero, before, acc = np.zeros(3), np.empty(6), np.zeros(6)
-        path = paths[m, begin : last[w]].copy()
-        for i in range(first[w], last[w]):
-            stand(x, before)
-            propagate(Pw, F, x, modes[run], t, inputs, i, begin, acc, zero, work, kept)
-            log_path(x, before, path, i - begin, 0)
-            read_row(F, x, t[begin:], path, i - begin, 0, Y[m, i])
-
-
-@parallel_kernel
-def simulate_runs(P, F, spectral, R, modes, bounds, t, inputs, starts, shaken, noise, Z):
-    """What would be measured, were (P, F) the truth: Z (rows, N_Y).
-
-    shaken (rows, 6) and noise (rows, N_Y): standard normal deviates of the disturbance and of the sensors.
-    """
-    for run in prange(len(bounds) - 1):
-        begin = bounds[run]
-        Pw, x = np.empty(N_P), starts[run].copy()
-        fold(P, F, Pw)
-        work, kept = np.zeros((6, ef.N_XF)), np.empty(ef.N_XF)
-        zero, before, acc = np.zeros(3), np.empty(6), np.zeros(6)
-        path = np.zeros((bounds[run + 1] - begin, 6))
-        for i in range(begin, bounds[run + 1]):
-            if i > begin:
-                for j in range(6):
-                    acc[j] = math.sqrt(spectral[j] / (t[i] - t[i - 1])) * shaken[i, j]
-                stand(x, before)
-                propagate(Pw, F, x, modes[run], t, inputs, i, begin, acc, zero, work, kept)
-                log_path(x, before, path, i - begin, 0)
-            read_row(F, x, t[begin:], path, i - begin, 0, Z[i])
-            for m in range(N_Y):
-                Z[i, m] += math.sqrt(R[run, m]) * noise[i, m]
-
-
-@parallel_kernel
-def read_rows(F, X, path, t, bounds, Y):
-    """What would be read at every row's state, into Y (rows, N_Y)."""
-    for run in prange(len(bounds) - 1):
-        begin, end = bounds[run], bounds[run + 1]
-        for i in range(begin, end):
-            read_row(F, X[i], t[begin:end], path[begin:end], i - begin, 0, Y[i])

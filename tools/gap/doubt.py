@@ -1,0 +1,107 @@
+"""Whether what the selected effects leave is an effect that nobody knows, or disorder: turbulence or waves."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import norm
+
+from sim_backend.effects.base import catalogue
+from tools.gap.fit import Course
+from tools.gap.probes import TURBULENCE, WAVES, Probed, probe_model, probes
+from tools.gap.search import Search
+from tools.gap.shrink import Shrinkage
+
+UNCLEAN = 6.0  # sigma, corrected for the number of tests
+# Share of the squared gap beyond the floor, on runs left out, at which unknown is as likely as not: where what is left
+# enters at the very place of the effect found, it is more probably that effect in another form. Width in e-folds.
+LEFT_OVER, LEFT_AT_HOME, LEFT_WIDTH = 0.35, 0.5, 0.35
+NOISY, NOISY_WIDTH = 0.2, 0.8  # share of the explainable misfit that is left: disorder is looked for; width in e-folds
+UNFIT = 5.0  # tolerances that the best explanation still misses by: no effect of the catalogue does that
+LOOSE = 3.0  # times the floor, and one tolerance, that no vehicle without a gap is off
+ONE_AXIS = 0.65  # of what all axes bring together: where one alone brings as much, it is no turbulence
+MOSTLY = 0.9  # of all that can be explained, for turbulence or waves to be the cause
+LEAST_DOUBT, MORE_DOUBT = 0.002, 0.005  # probability of an unknown effect where nothing is left, and where something is
+RIVALS = 4  # links asked beside water and axes
+
+
+def chance(share: float, middle: float, width: float) -> float:
+    """Probability that what is left is a gap of its own (docs/DIAGNOSIS.md, Thresholds)."""
+    z = (np.log(max(share, 1e-6)) - np.log(middle)) / width
+    return float(np.clip(norm.cdf(z), MORE_DOUBT, 1.0 - MORE_DOUBT))
+
+
+def left_share(shrinkage: Shrinkage) -> float:
+    """Of the recalibrated model's squared gap beyond the floor, the share that the selected effects leave."""
+    beyond = shrinkage.recalibrated**2 - shrinkage.floor**2
+    left = shrinkage.after**2 - shrinkage.floor**2
+    return float(np.clip(left / beyond, 0.0, 1.0)) if beyond > 0.0 else 0.0
+
+
+def at_home(freed: list[Probed], main: str) -> bool:
+    """Whether what is left enters where the main effect sits: the link that gains most when freed, water apart."""
+    links = [found.probe for found in freed if found.probe.name not in (TURBULENCE, WAVES)]
+    effect = catalogue().get(main)
+    return bool(links) and effect is not None and (links[0].subsystem, links[0].element) == effect.place
+
+
+@dataclass
+class Left:
+    """What the selected effects leave: nat, by links freed one at a time."""
+
+    brought: float  # by the selected effects over none
+    left: float  # by the link that gains most when freed
+    freed: list[Probed]
+
+    @property
+    def share(self) -> float:
+        return float(np.clip(self.left / max(self.left + self.brought, 1e-9), 0.0, 1.0))
+
+
+def what_is_left(search: Search, course: Course, noise: Probed | None) -> Left:
+    """Links freed at a candidate, beside what its effects bring; `noise` is brought too."""
+    problem = search.problem
+    null = float(problem.filter(*search.model(search.null), begin=True).misfit.sum())
+    own = float(search.gains.misfit.sum())
+    freed = probe_model(problem, *search.model(course), probes(problem))
+    brought = max(0.5 * (null - own), 0.0) + (noise.gain if noise is not None else 0.0)
+    return Left(brought, freed[0].gain, freed)
+
+
+def scatter(search: Search, freed: list[Probed]) -> Probed | None:
+    """Turbulence or waves, where water in disorder explains the recalibrated model's misfit better than any one link.
+
+    Turbulence shakes every axis: where one alone brings most of it, something else shakes that axis. `freed`: the links
+    at the selected model; those that gain most there are asked beside water and axes.
+    """
+    rivals = [found.probe for found in freed[:RIVALS]]
+    asked = [p for p in probes(search.problem) if p in rivals or p.stage in ("force", "water")]
+    found = probe_model(search.problem, *search.model(search.null), asked)
+    first = found[0]
+    if first.probe.name == WAVES:
+        return first
+    axes = sorted((p.gain for p in found if p.probe.stage == "force" and p.probe.name != TURBULENCE), reverse=True)
+    return first if first.probe.name == TURBULENCE and axes[0] < ONE_AXIS * first.gain else None
+
+
+def disorder(search: Search, left: Left) -> Probed | None:
+    """Turbulence or waves, if they are the cause: of all that can be explained, they explain MOSTLY."""
+    if left.share <= NOISY:
+        return None
+    found = scatter(search, left.freed)
+    return found if found is not None and found.gain > MOSTLY * (left.brought + left.left) else None
+
+
+def doubt(search: Search, main: str, shrinkage: Shrinkage, left: Left | None, noise: bool) -> float:
+    """Probability that the gap is none of the catalogue's, or that there is one where none shows otherwise.
+
+    main: the main effect, or "" without; noise: turbulence or waves is the cause, which no window's gap tells of.
+    """
+    if left is None:  # what is left was not asked about, or nothing is
+        loose = not main and not noise and shrinkage.after > max(LOOSE * shrinkage.floor, 1.0)
+        unfit = search.problem.rules.whiteness and (loose or shrinkage.after > UNFIT)
+        return 1.0 - MORE_DOUBT if unfit else LEAST_DOUBT
+    if shrinkage.after > UNFIT or not (main or noise):
+        return 1.0 - MORE_DOUBT
+    if noise:
+        return chance(left.share, NOISY, NOISY_WIDTH)
+    return chance(left_share(shrinkage), LEFT_AT_HOME if at_home(left.freed, main) else LEFT_OVER, LEFT_WIDTH)
