@@ -127,3 +127,32 @@ def test_a_correction_learned_from_the_data_shrinks_the_gap_of_runs_left_out(pus
 def test_what_is_selected_beside_the_unknown_does_not_make_it_worse(pushed):
     _, _, answer = pushed
     assert answer["gap"]["after"]["total"] <= answer["gap"]["recalibrated"]["total"]
+
+
+def test_a_vehicle_that_does_not_fit_is_to_be_identified_first(tmp_path, capsys):
+    """One run of another vehicle, without commands: not `none`, and no cause either."""
+    F = np.zeros(ef.N_F)
+    F[ef.CG_X], F[ef.NET_MASS], F[ef.DRAG_0], F[ef.PITCH_TRIM], F[ef.LIFT] = 0.004, 0.08, 2.0, 1.5, -0.8
+    case = make_case(tmp_path, F, seed=14, runs=1)
+    run = case.folder / "run00.csv"
+    lines = [line.split(",") for line in run.read_text().splitlines()]
+    keep = [n for n, name in enumerate(lines[0]) if not name.startswith("cmd_")]
+    run.write_text("".join(",".join(line[n] for n in keep) + "\n" for line in lines))
+    assert glider("gap", "diagnose", case.folder, "--out", tmp_path / "out", "--json") == 0
+    said = capsys.readouterr()
+    answer = json.loads(said.out)
+    assert answer["verdict"] != "none"
+    assert "note: no commands" in said.err
+    assert "note: one run only" in said.err
+    assert answer["gap"]["shrinkage"]["ci90"] == [None, None]
+
+
+def test_time_that_runs_back_is_one_line_with_its_place(tmp_path, capsys):
+    case = make_case(tmp_path, np.zeros(ef.N_F), seed=15, runs=1)
+    run = case.folder / "run00.csv"
+    lines = run.read_text().splitlines()
+    lines[50], lines[51] = lines[51], lines[50]
+    run.write_text("\n".join(lines) + "\n")
+    assert glider("gap", "diagnose", case.folder, "--out", tmp_path / "out") == 2
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert "run00.csv:52: t_s" in line

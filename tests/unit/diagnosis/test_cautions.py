@@ -1,0 +1,70 @@
+"""What a case cannot say is said: columns that are not there, holes, one run, no commands."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.cases import make_case
+
+from sim_backend.core import effect_layout as ef
+from tools.gap.cautions import cautions, not_asked
+from tools.gap.problem import pose
+from tools.runs import columns as names
+from tools.runs.case import Case
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory) -> Case:
+    return make_case(tmp_path_factory.mktemp("plain"), np.zeros(ef.N_F), seed=31, runs=2, mocap=True)
+
+
+def changed(case: Case, *drop: str, **columns: np.ndarray) -> Case:
+    """The case with columns of its first run left out, or others in their place."""
+    first, second = case.runs
+    kept = {name: values for name, values in first.columns.items() if name not in drop} | columns
+    return replace(case, runs=[replace(first, columns=kept), second])
+
+
+def test_whole_runs_with_everything_recorded_need_no_caution(case):
+    assert cautions(pose(case)) == []
+    assert not_asked(pose(case)) == []
+
+
+@pytest.mark.parametrize(("drop", "said"), [
+    ((names.DEPTH,), "no depth in run00: errors of the pressure sensor"),
+    (names.RATES, "no gyro in run00"),
+    (names.DRAW_WIRES, "no draw-wires in run00"),
+    (names.RATES[:1], "run00: column p_rad_s is missing"),
+    (names.COMMANDS, "no commands in run00: the flights are driven by the draw-wires, the servo is guessed"),
+])  # fmt: skip
+def test_a_missing_column_is_named_and_what_it_costs(case, drop, said):
+    (line,) = cautions(pose(changed(case, *drop)))
+    assert line.startswith(said)
+
+
+def test_a_long_hole_is_named_with_its_column_and_length(case):
+    depth = case.runs[0].columns[names.DEPTH].copy()
+    depth[100:180] = np.nan
+    (line,) = cautions(pose(changed(case, **{names.DEPTH: depth})))
+    assert line == "run00: depth_m (18 % missing, up to 8 s): less can be seen there"
+
+
+def test_short_blind_spells_are_usual(case):
+    x = case.runs[0].columns["mocap_x_m"].copy()
+    x[100:110] = np.nan
+    assert cautions(pose(changed(case, mocap_x_m=x))) == []
+
+
+def test_one_run_leaves_nothing_out(case):
+    (line,) = cautions(pose(replace(case, runs=case.runs[:1])))
+    assert line.startswith("one run only")
+
+
+def test_labels_that_these_runs_cannot_show_are_not_asked(case):
+    onboard = [
+        replace(run, columns={n: v for n, v in run.columns.items() if not n.startswith(("mocap", "cmd"))})
+        for run in case.runs
+    ]
+    left_out = not_asked(pose(replace(case, runs=onboard)))
+    assert {"mocap_delay", "clock_skew", "servo_slow", "pump_slow"} <= set(left_out)
+    assert not {"drag", "ballast_leak", "waves"} & set(left_out)
