@@ -40,11 +40,17 @@ class PortTable(Table):
     longest_s: Annotated[float, msgspec.Meta(gt=0.0, le=2.0)] = 0.1
 
 
-class ImuTable(Table):
+class DeviceTable(Table):
+    """What every device has: what it is, and the port that it is on."""
+
+    device: Name
+    port: Name
+
+
+class ImuTable(DeviceTable):
     """[imu]. `mount_deg`: roll, pitch and yaw of the sensor in a level hull; `output`: the sensor's serial port."""
 
     device: Literal["vn100"]
-    port: Name
     rate_hz: Annotated[float, msgspec.Meta(ge=1.0, le=200.0)] = 100.0
     output: Literal[1, 2, 3] = 2
     mount_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -56,11 +62,9 @@ class ImuTable(Table):
             raise ValueError(f"rate_hz: expected a divisor of the sensor's 800 Hz, got {self.rate_hz:g}")
 
 
-class BeaconTable(Table):
+class BeaconTable(DeviceTable):
     """[beacon]: absolute pressure. `zero_pa` is taken off; `range_pa` is what the transmitter can read."""
 
-    device: Name
-    port: Name
     id: DeviceId = 1
     rate_hz: Rate = 25.0
     zero_pa: Annotated[float, msgspec.Meta(ge=-50_000.0, le=50_000.0)] = 0.0
@@ -71,11 +75,9 @@ class BeaconTable(Table):
         _ordered("range_pa", self.range_pa)
 
 
-class WireTable(Table):
+class WireTable(DeviceTable):
     """[slider_wire], [plunger_wire]: metres = (reading - zero) / per_m; readings in uA, mV or counts."""
 
-    device: Name
-    port: Name
     per_m: float
     zero: float
     id: DeviceId = 1
@@ -89,11 +91,9 @@ class WireTable(Table):
         _not_zero("per_m", self.per_m)
 
 
-class LeakTable(Table):
+class LeakTable(DeviceTable):
     """[leak]: wet where the reading is above `wet_above` (or below, with `inverted`)."""
 
-    device: Name
-    port: Name
     channel: Channel
     wet_above: float
     id: DeviceId = 1
@@ -101,11 +101,9 @@ class LeakTable(Table):
     rate_hz: Rate = 5.0
 
 
-class BatteryTable(Table):
+class BatteryTable(DeviceTable):
     """[battery]: volts = reading / per_volt."""
 
-    device: Name
-    port: Name
     channel: Channel
     per_volt: float
     id: DeviceId = 1
@@ -117,11 +115,10 @@ class BatteryTable(Table):
         _not_zero("per_volt", self.per_volt)
 
 
-class ServoTable(Table):
+class ServoTable(DeviceTable):
     """[servo]: pulse in us = zero_us + us_per_rad * angle, within limits_us."""
 
     device: Literal["maestro"]
-    port: Name
     channel: Annotated[int, msgspec.Meta(ge=0, le=23)]
     us_per_rad: float
     zero_us: Annotated[float, msgspec.Meta(ge=500.0, le=2500.0)]
@@ -136,15 +133,13 @@ class ServoTable(Table):
             raise ValueError("limits_us: expected zero_us inside, and both within 400 to 2600 us")
 
 
-class DriveTable(Table):
+class DriveTable(DeviceTable):
     """[slider], [ballast]: counts = zero_counts + counts_per_m * metres (slider position, plunger travel).
 
     follow = "wire": a slow loop on the draw-wire carries the zero along, so that lost steps and slip do not stay;
     "drive": the drive's own count is trusted. A move that does not show for stall_s is a stall.
     """
 
-    device: Name
-    port: Name
     counts_per_m: float
     limits_m: Pair
     speed_m_s: Positive
@@ -196,7 +191,7 @@ ROLES = {
 }  # fmt: skip
 
 
-def devices_of(file: DeviceFile) -> dict[str, Table]:
+def devices_of(file: DeviceFile) -> dict[str, DeviceTable]:
     """The tables of the devices that are fitted, by their place on the board."""
     return {name: table for name in DEVICES if (table := getattr(file, name)) is not None}
 
@@ -224,9 +219,9 @@ def check(file: DeviceFile, source: str) -> None:
     """What no single table can see: ports that are not there, shared by what cannot share, addresses used twice."""
     users: dict[str, list[str]] = {}
     for name, table in devices_of(file).items():
-        if table.port not in file.port:  # type: ignore[attr-defined]
-            raise ConfigError(source, f"no [port.{table.port}]", key=f"{name}.port")  # type: ignore[attr-defined]
-        users.setdefault(table.port, []).append(name)  # type: ignore[attr-defined]
+        if table.port not in file.port:
+            raise ConfigError(source, f"no [port.{table.port}]", key=f"{name}.port")
+        users.setdefault(table.port, []).append(name)
     for port, names in users.items():
         alone = [name for name in names if name in ("imu", "servo")]
         others = [name for name in names if name != alone[0]] if alone else []
@@ -235,10 +230,10 @@ def check(file: DeviceFile, source: str) -> None:
     for name in file.port:
         if name not in users:
             raise ConfigError(source, "no device is on it", key=f"port.{name}")
-    paths = [table.path for table in file.port.values()]
-    for name, table in file.port.items():
-        if paths.count(table.path) > 1:
-            raise ConfigError(source, f"{table.path} is another port's path too", key=f"port.{name}.path")
+    paths = [line.path for line in file.port.values()]
+    for name, line in file.port.items():
+        if paths.count(line.path) > 1:
+            raise ConfigError(source, f"{line.path} is another port's path too", key=f"port.{name}.path")
     taken: dict[tuple, tuple[str, str]] = {}
     for name in ROLES:
         table = getattr(file, name)

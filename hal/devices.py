@@ -162,7 +162,7 @@ class DeviceBoard:
                 raise BoardError(f"port {name} ({', '.join(self.devices_on(name))}): {error}") from None
 
     def devices_on(self, port: str) -> list[str]:
-        return [name for name, table in boardfile.devices_of(self.file).items() if table.port == port]  # type: ignore
+        return [name for name, table in boardfile.devices_of(self.file).items() if table.port == port]
 
     def wait_for_answers(self, seconds: float) -> list[str]:
         """Serve until every device has answered, at most so long; a line for each that has not."""
@@ -180,8 +180,9 @@ class DeviceBoard:
             port = getattr(self, name)
             good = port.validity == Validity.VALID if isinstance(port, Sensor) else port.answering(now)
             if not good:
-                place = f"port {table.port}" + (f", id {table.id}" if hasattr(table, "id") else "")  # type: ignore
-                found.append(f"{name} ({table.device}, {place}): {port.health.error or 'does not answer'}")  # type: ignore
+                number = getattr(table, "id", None)
+                place = f"port {table.port}" + ("" if number is None else f", id {number}")
+                found.append(f"{name} ({table.device}, {place}): {port.health.error or 'does not answer'}")
         return found
 
     def enable(self, on: bool) -> None:

@@ -291,7 +291,7 @@ class Mover:
         else:
             self._written = self._asked_for
 
-    def failed(self, request: Request, failure: Failure, exception: int, now: float) -> None:
+    def failed(self, request: Request | None, failure: Failure, exception: int, now: float) -> None:
         health = self._drive.health
         if failure is Failure.EXCEPTION:
             health.exceptions += 1

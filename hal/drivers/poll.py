@@ -38,7 +38,7 @@ class Poll:
     def answered(self, request: Request, reply: Frame, asked_at: float, now: float) -> None:
         self._taken(request, reply.registers, asked_at, now)
 
-    def failed(self, request: Request, failure: Failure, exception: int, now: float) -> None:
+    def failed(self, request: Request | None, failure: Failure, exception: int, now: float) -> None:
         health = self._health
         if failure is Failure.EXCEPTION:
             health.exceptions += 1

@@ -45,7 +45,7 @@ class Job(Protocol):
     def answered(self, request: Request, reply: Frame, asked_at: float, now: float) -> None:
         """The reply; asked_at is when the request had left."""
 
-    def failed(self, request: Request, failure: Failure, exception: int, now: float) -> None:
+    def failed(self, request: Request | None, failure: Failure, exception: int, now: float) -> None:
         """No reply, or an exception (its code)."""
 
 
@@ -76,7 +76,7 @@ class Ask:
     def answered(self, request: Request, reply: Frame, asked_at: float, now: float) -> None:
         self._done(reply, 0)
 
-    def failed(self, request: Request, failure: Failure, exception: int, now: float) -> None:
+    def failed(self, request: Request | None, failure: Failure, exception: int, now: float) -> None:
         self._done(None, exception)
 
 
@@ -131,7 +131,7 @@ class ModbusBus:
         self._up = False
         self._end(Failure.DISCONNECTED, 0, now)
         while self._asks:
-            self._asks.popleft().failed(None, Failure.DISCONNECTED, 0, now)  # type: ignore[arg-type]
+            self._asks.popleft().failed(None, Failure.DISCONNECTED, 0, now)
 
     # --- receiving --------------------------------------------------------------------------------------------------
     def feed(self, data: bytes, now: float) -> None:

@@ -5,6 +5,7 @@ written.
 """
 
 import math
+from abc import ABC, abstractmethod
 from typing import Any
 
 from pymodbus.constants import ExcCodes
@@ -18,7 +19,7 @@ from sim_backend.twins.plant import TwinPlant
 PA_PER_BAR = 1e5
 
 
-class RegisterTwin:
+class RegisterTwin(ABC):
     """A device with registers. `extra` are further addresses, with their counts, that it has."""
 
     def __init__(self, device: int, registers: RegisterMap, extra: tuple[tuple[int, int], ...] = ()):
@@ -48,15 +49,15 @@ class RegisterTwin:
         """A fault is over."""
         self._held.clear()
 
+    @abstractmethod
     def fill(self) -> dict[int, int]:
         """Address -> register, as of now."""
-        raise NotImplementedError
 
     def written(self, address: int, values: list[int], stored: Any) -> ExcCodes | None:
         """Registers were written; an exception refuses them."""
         return ExcCodes.ILLEGAL_ADDRESS
 
-    def step(self, t: float, step: int) -> None:
+    def step(self, t: float, step: int) -> None:  # noqa: B027 (most devices do not move)
         """A plant step has been made."""
 
     def _place(self, block: str, name: str, number: float) -> dict[int, int]:

@@ -4,11 +4,11 @@ import json
 import re
 import shutil
 import subprocess
-from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
 from support.flights import World, fly_case
+from support.pages import assert_offline
 
 from firmware.core import layout as at
 from tools.cli.common import report_errors
@@ -77,24 +77,8 @@ def test_the_cause_is_found_and_said(folder, said):
     assert low < HEAVY < high or abs(found["causes"][0]["parameters"]["mass"]["estimate"] - HEAVY) < 0.02
 
 
-class Tags(HTMLParser):
-    def __init__(self):
-        super().__init__()
-        self.tags: list[tuple[str, dict]] = []
-
-    def handle_starttag(self, tag, attrs):
-        self.tags.append((tag, dict(attrs)))
-
-
 def test_it_opens_offline_and_without_script(page):
-    parser = Tags()
-    parser.feed(page)
-    for tag, attributes in parser.tags:
-        assert tag not in ("script", "link", "img", "iframe", "object")
-        assert not {"src", "href", "srcset"} & set(attributes)
-    assert "url(" not in page
-    assert "@import" not in page
-    assert "://" not in page
+    assert_offline(page)
 
 
 def test_sections_stand_in_order_with_the_answer_in_them(page, folder):

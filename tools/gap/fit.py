@@ -73,14 +73,20 @@ class Fitter:
                 moved[k] += size
                 points.append((course.free, moved, course.allowed))
         E = iter(self.flown(points))
+        tables = []
         for course, sizes in zip(courses, nudges, strict=True):
-            columns = np.empty((len(sizes), len(self.e0)))
-            if len(course.known):
-                columns[: len(course.known)] = course.known
-            for k in range(len(course.known), len(sizes)):
-                columns[k] = (next(E) - course.e) / sizes[k]
+            known = len(course.known)
+            table = np.empty((len(sizes) + 1, len(self.e0)))  # columns, and the innovations where it stands
+            table[:known] = course.known if known else 0.0
+            for k in range(known, len(sizes)):
+                table[k] = (next(E) - course.e) / sizes[k]
+            table[-1] = course.e
             course.known = np.empty((0, 0))
-            course.foresee(self, columns)
+            tables.append(table)
+        projected = self.J @ np.concatenate(tables).T  # all at once: the data are many, and are read once
+        places = np.cumsum([0, *(len(table) for table in tables)])
+        for course, table, first, last in zip(courses, tables, places, places[1:], strict=False):
+            course.foresee(self, table, projected[:, first:last])
 
     def move(self, courses: list["Course"]) -> None:
         """The foreseen step of every candidate, or where that is too far the share of it that does best."""
@@ -140,15 +146,19 @@ class Course:
         ])  # fmt: skip
         return np.where(self.values + sizes > self.high, -sizes, sizes)
 
-    def foresee(self, fitter: Fitter, columns: np.ndarray) -> None:
-        """Normal equations of what is allowed and the effects' parameters together, and the step they ask for."""
-        count = len(fitter.base)
-        C = fitter.J @ columns.T
-        D = columns @ columns.T + np.eye(len(columns))
+    def foresee(self, fitter: Fitter, table: np.ndarray, projected: np.ndarray) -> None:
+        """Normal equations of what is allowed and the effects' parameters together, and the step they ask for.
+
+        table (parameters + 1, samples): the columns, and the innovations; projected: the same on what is allowed.
+        """
+        count, columns = len(fitter.base), table[:-1]
+        C = projected[:, :-1]
+        own = columns @ table.T
+        D = own[:, :-1] + np.eye(len(columns))
         self.columns = columns
         self.precision = D - C.T @ fitter.solve(C)  # with what is allowed projected out
         self.normal = np.block([[fitter.A, C], [C.T, D]])
-        self.slope = np.concatenate([fitter.J @ self.e + fitter.tight * self.allowed, columns @ self.e + self.values])
+        self.slope = np.concatenate([projected[:, -1] + fitter.tight * self.allowed, own[:, -1] + self.values])
         at = np.concatenate([self.allowed, self.values])
         low = np.concatenate([np.minimum(-MOST, self.allowed), self.low])
         high = np.concatenate([np.maximum(MOST, self.allowed), self.high])

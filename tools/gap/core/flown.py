@@ -29,7 +29,7 @@ def fly_windows(Ps, Fs, modes, bounds, t, inputs, X, paths, first, last, run_of,
         path = paths[m, begin : last[w]].copy()
         for i in range(first[w], last[w]):
             stand(x, before)
-            propagate(Pw, F, x, modes[run], t, inputs, i, begin, acc, zero, work, kept)
+            propagate(Pw, F, x, modes[run], t, inputs, i, begin, acc, zero, work, kept, False)
             log_path(x, before, path, i - begin, 0)
             read_row(F, x, t[begin:], path, i - begin, 0, Y[m, i])
 
@@ -52,7 +52,7 @@ def simulate_runs(P, F, spectral, R, modes, bounds, t, inputs, starts, shaken, n
                 for j in range(6):
                     acc[j] = math.sqrt(spectral[j] / (t[i] - t[i - 1])) * shaken[i, j]
                 stand(x, before)
-                propagate(Pw, F, x, modes[run], t, inputs, i, begin, acc, zero, work, kept)
+                propagate(Pw, F, x, modes[run], t, inputs, i, begin, acc, zero, work, kept, False)
                 log_path(x, before, path, i - begin, 0)
             read_row(F, x, t[begin:], path, i - begin, 0, Z[i])
             for m in range(N_Y):

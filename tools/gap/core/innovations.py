@@ -17,7 +17,7 @@ from firmware.core.jit import kernel, parallel_kernel, prange
 from firmware.core.layout import N_P
 from firmware.core.rotations import euler_from_quaternion, rotation_nb
 from sim_backend.core import effect_layout as ef
-from sim_backend.core.effect_plant import correction, effect_step, fold, read, wrapped
+from sim_backend.core.effect_plant import correction, effect_midpoint, effect_step, fold, read, wrapped
 
 N_ERR = 15
 N_Y = ef.N_Y
@@ -85,8 +85,11 @@ def mean_input(t, inputs, column, i, begin, since, until):
 
 
 @kernel
-def propagate(Pw, F, x, mode, t, inputs, i, begin, acc, zero, work, kept):
-    """Fly from row i - 1 to row i, in place; acc (6) added to nu_dot; kept (N_XF), zero (3), work are scratch."""
+def propagate(Pw, F, x, mode, t, inputs, i, begin, acc, zero, work, kept, quick):
+    """Fly from row i - 1 to row i, in place; acc (6) added to nu_dot; kept (N_XF), zero (3), work are scratch.
+
+    quick: by the midpoint rule.
+    """
     dt = t[i] - t[i - 1]
     steps = max(1, math.ceil(dt / MAX_STEP - 1e-9))
     h, delay = dt / steps, F[ef.COMMAND_DELAY]
@@ -100,7 +103,10 @@ def propagate(Pw, F, x, mode, t, inputs, i, begin, acc, zero, work, kept):
             c0, c1, c2 = inputs[i - 1, 0], inputs[i - 1, 1], inputs[i - 1, 2]
         kept[:] = x
         since = t[i - 1] - t[begin] + k * h
-        effect_step(Pw, F, x, mode, c0, c1, c2, since, acc, 0.0, zero, h, work)
+        if quick:
+            effect_midpoint(Pw, F, x, mode, c0, c1, c2, since, acc, 0.0, zero, h, work)
+        else:
+            effect_step(Pw, F, x, mode, c0, c1, c2, since, acc, 0.0, zero, h, work)
         worst = 0.0
         for n in range(7, 13):
             worst = max(worst, abs(x[n]))
@@ -181,18 +187,24 @@ def pushed(x, dt, Gam):
 
 @kernel
 def linear_step(Pw, F, x, mode, t, inputs, i, begin, zero, work, kept, moved, base, error, Phi, Gam):
-    """Fly x to row i; Phi (N_ERR, N_ERR) is the step's derivative by the state, Gam (N_ERR, 6) by accelerations."""
+    """Fly x to row i; Phi (N_ERR, N_ERR) is the step's derivative by the state, Gam (N_ERR, 6) by accelerations.
+
+    Nothing of a step depends on the place north and east that it starts from.
+    """
     acc = np.zeros(6)
     base[:] = x
-    propagate(Pw, F, base, mode, t, inputs, i, begin, acc, zero, work, kept)
-    for j in range(N_ERR):
+    propagate(Pw, F, base, mode, t, inputs, i, begin, acc, zero, work, kept, True)
+    for j in range(2):
+        Phi[:, j] = 0.0
+        Phi[j, j] = 1.0
+    for j in range(2, N_ERR):
         nudged(x, j, error, moved)
-        propagate(Pw, F, moved, mode, t, inputs, i, begin, acc, zero, work, kept)
+        propagate(Pw, F, moved, mode, t, inputs, i, begin, acc, zero, work, kept, True)
         difference(moved, base, error)
         for n in range(N_ERR):
             Phi[n, j] = error[n] / NUDGE
-    pushed(base, t[i] - t[i - 1], Gam)
-    x[:] = base
+    propagate(Pw, F, x, mode, t, inputs, i, begin, acc, zero, work, kept, False)
+    pushed(x, t[i] - t[i - 1], Gam)
 
 
 @kernel
@@ -373,7 +385,7 @@ def follow_run(P, F, mode, t, inputs, z, begin, end, start, W, K, X, path, E):
     for i in range(begin, end):
         if i > begin:
             stand(x, before)
-            propagate(Pw, F, x, mode, t, inputs, i, begin, acc, zero, work, kept)
+            propagate(Pw, F, x, mode, t, inputs, i, begin, acc, zero, work, kept, False)
             log_path(x, before, path, i, begin)
         read_row(F, x, t, path, i, begin, y)
         missed(z[i], y, d)
