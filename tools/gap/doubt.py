@@ -12,9 +12,11 @@ from tools.gap.search import Search
 from tools.gap.shrink import Shrinkage
 
 UNCLEAN = 6.0  # sigma, corrected for the number of tests
-# Share of the squared gap beyond the floor, on runs left out, at which unknown is as likely as not: where what is left
-# enters at the very place of the effect found, it is more probably that effect in another form. Width in e-folds.
+# Share that is left at which unknown is as likely as not: of the squared gap beyond the floor on runs left out, which
+# counts by the power BY_GAP, and of the misfit that can be explained, by the rest. Where what is left enters at the
+# place of the effect found, it is more probably that effect in another form. Width in e-folds.
 LEFT_OVER, LEFT_AT_HOME, LEFT_WIDTH = 0.35, 0.5, 0.35
+BY_GAP = 2.0 / 3.0
 NOISY, NOISY_WIDTH = 0.2, 0.8  # share of the explainable misfit that is left: disorder is looked for; width in e-folds
 UNFIT = 5.0  # tolerances that the best explanation still misses by: no effect of the catalogue does that
 LOOSE = 3.0  # times the floor, and one tolerance, that no vehicle without a gap is off
@@ -103,5 +105,8 @@ def doubt(search: Search, main: str, shrinkage: Shrinkage, left: Left | None, no
     if shrinkage.after > UNFIT or not (main or noise):
         return 1.0 - MORE_DOUBT
     if noise:
-        return chance(left.share, NOISY, NOISY_WIDTH)
-    return chance(left_share(shrinkage), LEFT_AT_HOME if at_home(left.freed, main) else LEFT_OVER, LEFT_WIDTH)
+        return chance(left.share, BY_GAP = 2.0 / 3.0
+NOISY, NOISY_WIDTH)
+    share = left.share ** (1.0 - BY_GAP) * left_share(shrinkage) ** BY_GAP
+    middle = LEFT_AT_HOME if at_home(left.freed, main) else LEFT_OVER
+    return chance(share, middle, LEFT_WIDTH)

@@ -24,6 +24,7 @@ SECONDS = 5  # further effects tried beside each of the leading candidates
 LEADING = 3
 SHOWN = 1.0  # squared sigma: a spread of an effect that moves nothing by as much cannot be seen in these runs
 EARNED = 5.0  # nat that a further effect must promise
+LEAPS = (-10.0, -5.0, -2.0, 2.0, 5.0, 10.0)  # spreads of a parameter, tried as starts
 NEAR = 30.0  # misfit a sample, within which labels are tried again at full weight
 POLISHED = (3, 2, 1)  # times at most, by the number of effects
 COOL = 1.05  # times the weight of white innovations: the best candidate is near the truth
@@ -104,6 +105,23 @@ def screen(search: Search, beside: Course, most: int) -> list[Course]:
     return sorted(shown, key=lambda course: -course.promise())[:most]
 
 
+def leap(fitter: Fitter, courses: list[Course]) -> None:
+    """Further starts: each parameter of a candidate alone far out, where that does better; a delay is not linear."""
+    points = []
+    for course in courses:
+        for k in range(len(course.free)):
+            for far in LEAPS:
+                values = course.values.copy()
+                values[k] = far
+                if course.low[k] <= far <= course.high[k]:
+                    points.append((course, values))
+    flown = fitter.flown([(course.free, values, course.allowed) for course, values in points])
+    for (course, values), e in zip(points, flown, strict=True):
+        course.consider(e, values, course.allowed, fitter.tight)
+    for course in courses:
+        course.accept()
+
+
 def gains_at(problem: Problem, model: tuple[np.ndarray, np.ndarray], roughness: float) -> Gains:
     """Gains of a filter with a model."""
     gains = problem.filter(*model, roughness=roughness, begin=True)
@@ -135,6 +153,7 @@ def run(problem: Problem, say: Callable[[str], None] = lambda text: None) -> Sea
     settle(fitter, null)
     say(f"screened {len(known)} labels")
     fitter.move(tried)
+    leap(fitter, tried)
     search.courses = improve(fitter, prune(tried, null.misfit, KEPT, KEPT), null.misfit, KEPT, 3)
     refilter(search, min([*search.courses, search.null], key=lambda c: c.misfit), ROUGHNESS[1])
     search.courses = improve(search.fitter, search.courses, search.null.misfit, LEFT, 3)
