@@ -105,8 +105,7 @@ def doubt(search: Search, main: str, shrinkage: Shrinkage, left: Left | None, no
     if shrinkage.after > UNFIT or not (main or noise):
         return 1.0 - MORE_DOUBT
     if noise:
-        return chance(left.share, BY_GAP = 2.0 / 3.0
-NOISY, NOISY_WIDTH)
+        return chance(left.share, NOISY, NOISY_WIDTH)
     share = left.share ** (1.0 - BY_GAP) * left_share(shrinkage) ** BY_GAP
     middle = LEFT_AT_HOME if at_home(left.freed, main) else LEFT_OVER
     return chance(share, middle, LEFT_WIDTH)
