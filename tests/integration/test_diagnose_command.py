@@ -156,3 +156,21 @@ def test_time_that_runs_back_is_one_line_with_its_place(tmp_path, capsys):
     assert glider("gap", "diagnose", case.folder, "--out", tmp_path / "out") == 2
     (line,) = capsys.readouterr().err.strip().splitlines()
     assert "run00.csv:52: t_s" in line
+
+
+def test_without_a_test_of_what_is_left_nothing_is_unknown(pushed, tmp_path):
+    case, _, whole = pushed
+    assert glider("gap", "diagnose", case.folder, "--out", tmp_path, "--without", "whiteness") == 0
+    answer = json.loads((tmp_path / "diagnosis.json").read_text())
+    assert whole["verdict"] == "unknown"
+    assert answer["verdict"] == "cause"
+
+
+@pytest.mark.parametrize("part", ["nuisance", "splice", "evidence"])
+def test_a_part_left_out_leaves_a_diagnosis(lateral, tmp_path, part):
+    case, _, whole = lateral
+    assert glider("gap", "diagnose", case.folder, "--out", tmp_path, "--without", part) == 0
+    answer = json.loads((tmp_path / "diagnosis.json").read_text())
+    assert answer["verdict"] in ("none", "cause", "unknown")
+    assert answer["gap"]["before"] == whole["gap"]["before"]
+    assert answer["causes"] != whole["causes"]

@@ -91,6 +91,14 @@ class Scored:
         probability = 0.0 if self.said is None else self.said.probability(*self.answers)
         return -math.log(min(1.0, max(probability, LEAST_PROBABILITY)))
 
+    def odds(self) -> float | None:
+        """Nat by which the likeliest label is more probable than `none`; None where one of them has no probability."""
+        if self.said is None:
+            return None
+        none = self.said.probability("none")
+        label = max((c.probability for c in self.said.causes if c.label not in ("none", "unknown")), default=0.0)
+        return math.log(label / none) if label > 0.0 and none > 0.0 else None
+
     def _named(self) -> set[str]:
         if self.said is None or len(self.said.selected) > MOST_SELECTED:
             return set()
@@ -214,6 +222,7 @@ def _plain_case(case: Scored) -> dict[str, Any]:
         "probability": None if said is None else said.causes[0].probability,
         "selected": None if said is None else said.selected,
         "log_loss": case.log_loss(),
+        "odds": case.odds(),
         "closed": case.closed,
         "seconds": case.seconds,
     }

@@ -145,3 +145,10 @@ def test_what_is_no_json_says_so(tmp_path):
     path.write_bytes(b"\xff{")
     with pytest.raises(InputError):
         read_diagnosis(path)
+
+
+def test_odds_are_of_the_likeliest_label_against_none(cases):
+    found = [case.odds() for case in cases]
+    assert found[:2] == pytest.approx([math.log(0.1 / 0.9), math.log(0.85 / 0.15)])
+    assert found[2] is None  # none has no probability
+    assert Scored("k", truth(), None).odds() is None
