@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sim_backend.core import effect_layout as ef
 from tools.gap.model import Model
 from tools.gap.problem import Problem, pose
 from tools.identify import levels as noise
@@ -15,9 +16,14 @@ from tools.identify.statistics import Quadratic, collect, heat
 from tools.runs.case import Case
 from tools.runs.run import Run
 
-ROUGHNESS = (100.0, 10.0, 3.0, 1.0)  # the filter is told of so many times the disturbance, one step at each
-FROM_START = (10.0, 1.0)  # where the accelerations have given first values
+LEVELS = 0.0  # in a schedule: the noise's levels are estimated
+# The filter is told of so many times the disturbance, one step at each: less and less as the model comes closer.
+SCHEDULE = (100.0, 10.0, 3.0, 1.0, LEVELS)
+FROM_START = (10.0, 1.0, LEVELS)  # where the accelerations have given first values
+UNSEEN = (100.0, 30.0, LEVELS, 10.0, LEVELS, 3.0, 1.0, LEVELS, 1.0, 1.0, LEVELS, 1.0, 1.0)  # without motion capture
+AGAIN = (1.0, LEVELS, 1.0)  # where the noise is not what the case says
 LOOK = 10.0  # of them, the one at which runs that do not belong are looked for
+UNLIKE = 0.3  # logarithm of a level
 FIRST_ROWS, LEVEL_ROWS, MOST_ROWS = 9_000, 5_000, 90_000
 ODD = 3.0  # times the runs' median of squared innovations, beyond which a run does not belong
 BLOCK = 3.0  # s, stretches of runs whose slopes are compared for the heat
@@ -67,29 +73,57 @@ def odd_runs(problem: Problem, e: np.ndarray) -> list[LeftOut]:
     return found
 
 
-def settle(
-    case: Case, model: Model, runs: list[Run], values: np.ndarray | None = None
-) -> tuple[Flights, np.ndarray, list]:
-    """First values from some runs, the filter told to doubt the model less and less; runs that do not belong."""
+@dataclass
+class First:
+    """First values, from some of the runs."""
+
+    problem: Problem  # as the case has it
+    free: Parameters
+    values: np.ndarray
+    levels: noise.Levels
+    left_out: list[LeftOut]
+
+
+def flights(first: First, problem: Problem | None = None) -> Flights:
+    """Its flights with noise at its levels; of another problem of the same vehicle, if one is given."""
+    return Flights(first.levels.applied(first.problem if problem is None else problem), first.free)
+
+
+def level(case: Case, first: First) -> noise.Levels:
+    """The noise's levels with the model at its present values, from as many runs as that takes."""
+    runs = first.problem.runs
+    part = pose(case, first.problem.model, [runs[n] for n in some(runs, LEVEL_ROWS)])
+    return noise.estimate(part, lambda p: flights(first).filter(first.values, problem=p), first.levels)
+
+
+def settle(case: Case, model: Model, runs: list[Run], begin: np.ndarray | None) -> First:
+    """First values from these runs, the filter told to doubt the model less and less; names runs that do not belong."""
     problem = pose(case, model, runs)
-    flights = Flights(problem, parameters(problem))
-    stages = ROUGHNESS if values is None else FROM_START
-    begin = np.zeros(len(flights.free.free))
-    if values is not None:
-        begin[: len(values)] = values
-    at, values, out = None, begin, []
-    for roughness in stages:
-        at = flights.linear(values, roughness)
-        values = flights.step(at)
-        if roughness != LOOK or len(runs) < 4:
+    free = parameters(problem)
+    first = First(problem, free, np.zeros(len(free.free)), noise.named(problem), [])
+    if begin is not None:
+        first.values[: len(begin)] = begin
+    mocap = bool(problem.seen[ef.Y_MOCAP_X])
+    stages = list((FROM_START if begin is not None else SCHEDULE) if mocap else UNSEEN)
+    while stages:
+        roughness = stages.pop(0)
+        if roughness == LEVELS:
+            before, first.levels = first.levels, level(case, first)
+            if not stages and np.abs(first.levels.log - before.log).max() > UNLIKE:
+                stages = list(AGAIN)
             continue
-        out = odd_runs(problem, flights.follow([values], at.gains)[0])
-        if out and len(out) <= len(runs) // 2:
-            gone = {one.run for one in out}
-            kept = [run for run in runs if run.name not in gone]
-            again, values, more = settle(case, model, kept, None)
-            return again, values, out + more
-    return flights, values, out if len(out) <= len(runs) // 2 else []
+        flown = flights(first)
+        at = flown.linear(first.values, roughness)
+        first.values = flown.step(at)
+        if roughness != LOOK or len(runs) < 4 or first.left_out:
+            continue
+        odd = odd_runs(problem, flown.follow([first.values], at.gains)[0])
+        if odd and len(odd) <= len(runs) // 2:
+            gone = {one.run for one in odd}
+            again = settle(case, model, [run for run in runs if run.name not in gone], None)
+            again.left_out += odd
+            return again
+    return first
 
 
 def fit(
@@ -107,35 +141,31 @@ def fit(
     if sum(run.rows for run in runs) > MOST_ROWS:
         runs = [runs[n] for n in some(runs, MOST_ROWS)]
         notes.append(f"{len(runs)} of the runs were fitted, evenly chosen: more rows would tell little and cost time")
-    say("first values")
-    first, values, left_out = settle(case, model, [runs[n] for n in some(runs, FIRST_ROWS)], begin)
-    say("noise")
-    part = pose(case, model, [first.problem.runs[n] for n in some(first.problem.runs, LEVEL_ROWS)])
-    levels = noise.estimate(part, lambda p: first.filter(values, problem=p), noise.named(part))
-    gone = {one.run for one in left_out}
+    say("first values and noise")
+    first = settle(case, model, [runs[n] for n in some(runs, FIRST_ROWS)], begin)
+    gone = {one.run for one in first.left_out}
     runs = [run for run in runs if run.name not in gone]
     say(f"{len(runs)} runs")
-    flights = Flights(levels.applied(pose(case, model, runs)), first.free)
-    at = flights.linear(values)
-    more = odd_runs(flights.problem, at.e) if len(runs) >= 4 else []
+    whole = flights(first, pose(case, model, runs))
+    at = whole.linear(first.values)
+    left_out, more = first.left_out, odd_runs(whole.problem, at.e) if len(runs) >= 4 else []
     if more and len(more) <= len(runs) // 2:
         left_out, gone = left_out + more, {one.run for one in more}
-        runs = [run for run in runs if run.name not in gone]
-        flights = Flights(levels.applied(pose(case, model, runs)), first.free)
-        at = flights.linear(flights.step(flights.linear(values)))
-    statistics = gather(flights, at)
+        whole = flights(first, pose(case, model, [run for run in runs if run.name not in gone]))
+        at = whole.linear(whole.step(whole.linear(first.values)))
+    statistics = gather(whole, at)
     if np.abs((statistics.mode - at.values) / np.sqrt(np.diag(statistics.covariance))).max() > FAR:
         say("a last step")
-        at = flights.linear(flights.step(at))
-        statistics = gather(flights, at)
-    return Fit(flights.problem, first.free, at, statistics, levels, left_out, notes)
+        at = whole.linear(whole.step(at))
+        statistics = gather(whole, at)
+    return Fit(whole.problem, first.free, at, statistics, first.levels, left_out, notes)
 
 
-def gather(flights: Flights, at: Linear) -> Quadratic:
+def gather(flown: Flights, at: Linear) -> Quadratic:
     """Sufficient statistics at a point, cooled where errors along the runs are correlated."""
-    problem = flights.problem
+    problem = flown.problem
     group = np.broadcast_to(noise.group_of_reading(), problem.z.shape)[problem.valid]
-    statistics = collect(at.values, flights.low, at.e, at.J, group, tuple(noise.SENSORS))
+    statistics = collect(at.values, flown.low, at.e, at.J, group, tuple(noise.SENSORS))
     e = at.e + (statistics.mode - at.values) @ at.J
     found = heat(e, at.J, blocks(problem))
     return statistics.cooled(found) if found > 1.0 else statistics

@@ -16,9 +16,9 @@ SENSORS = {
     "attitude": slice(0, 3), "gyro": slice(3, 6), "depth": slice(6, 7), "slider": slice(7, 8), "ballast": slice(8, 9),
     "mocap_position": slice(ef.Y_MOCAP_X, ef.Y_MOCAP_ROLL), "mocap_attitude": slice(ef.Y_MOCAP_ROLL, ef.N_Y),
 }  # fmt: skip
-WIDTH = 1.0  # prior 1 sigma of a level's logarithm
+WIDTH = 2.0  # prior 1 sigma of a level's logarithm
 NUDGE, LARGEST_STEP, CLOSE = 0.05, 0.8, 0.02
-ROUNDS = 6
+ROUNDS = 8
 
 
 @dataclass(frozen=True)

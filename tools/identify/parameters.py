@@ -20,8 +20,8 @@ from tools.gap.problem import Problem
 K_SHARE = 0.5  # of a coefficient's size
 CAMBER, TRIM_ANGLE = 0.025, 0.03  # rad of attack by which lift and pitch moment may be displaced where a file says 0
 ADDED_SHARE, NET_MASS, CG = 0.15, 0.01, 0.0005  # of added mass and inertia; kg; m
-FIRST = 10.0  # times these trims, and WIRE_SCALE, where no motion capture holds the flight
-WIRE_SCALE = 0.03  # of what a draw-wire says, without motion capture
+FIRST = 10.0  # times these trims, where no motion capture holds the flight
+WIRE_SCALE = 0.5  # of what a draw-wire says, there: a first calibration may be far off
 FRAME_TURN, FRAME_OFFSET = 0.02, 0.02  # rad, m: capture's body against the vehicle's
 CLOCK = 0.05  # s, capture's clock behind the onboard one
 FRAME = "frame"  # the vector of what is no part of the model but of how the capture sees it
@@ -127,7 +127,7 @@ def parameters(problem: Problem) -> Parameters:
     if mocap:
         free += _capture(problem)
     else:
-        free.append(Free("", "ballast_scale", "F", ef.BALLAST_SCALE, FIRST * WIRE_SCALE))
-        free.append(Free("", "slider_scale", "F", ef.SLIDER_SCALE, FIRST * WIRE_SCALE))
+        free.append(Free("", "ballast_scale", "F", ef.BALLAST_SCALE, WIRE_SCALE))
+        free.append(Free("", "slider_scale", "F", ef.SLIDER_SCALE, WIRE_SCALE))
     nominal = np.array([problem.model.P[f.entry] if f.vector == "P" else 0.0 for f in free])
     return Parameters(free, nominal)

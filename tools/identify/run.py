@@ -14,6 +14,7 @@ from tools.gap.problem import Problem
 from tools.identify.accelerations import fit_accelerations, suited
 from tools.identify.fit import Fit, fit
 from tools.identify.flights import Flights
+from tools.identify.held import Held, hold_out
 from tools.identify.levels import Levels
 from tools.identify.parameters import Parameters
 from tools.identify.sampler import Chains, Summary, sample, summarise
@@ -23,6 +24,7 @@ from tools.runs.case import Case
 from tools.runs.run import Run
 
 CHECKED = 24  # draws at which the whole likelihood is compared with its linearisation
+ROUGH = 0.3  # effective share of the draws, below which intervals are called rough
 FLIGHTS, ACCELERATIONS = "flights", "accelerations"
 
 
@@ -51,6 +53,7 @@ class Identified:
     notes: list[str]
     seconds: float
     fit: Fit | None = None  # of the flights
+    held: Held | None = None
     check: Check | None = None
     accelerations: Quadratic | None = (
         None  # the other likelihood's statistics of the coefficients, where it could be had
@@ -109,6 +112,8 @@ class Identified:
             result["linearised"] = {
                 "draws": check.draws, "spread_nat": check.spread, "effective_share": check.share
             }  # fmt: skip
+        if self.held is not None:
+            result["held_out"] = self.held.plain()
         if self.accelerations is not None:
             result["accelerations"] = self.compared()
         return result
@@ -138,9 +143,13 @@ def usable(case: Case) -> tuple[list[Run], list[LeftOut], int]:
 
 
 def identify(
-    case: Case, seed: int = 1, likelihood: str = FLIGHTS, say: Callable[[str], None] = lambda text: None
+    case: Case,
+    seed: int = 1,
+    likelihood: str = FLIGHTS,
+    say: Callable[[str], None] = lambda text: None,
+    leave_out: bool = False,
 ) -> Identified:
-    """Identify the vehicle of a case from its runs."""
+    """Identify the vehicle of a case from its runs; with `leave_out`, predict runs that were left out, too."""
     began = time.perf_counter()
     runs, left_out, spikes = usable(case)
     model = nominal_model(case)
@@ -162,7 +171,16 @@ def identify(
     free = found.free
     summaries = summarise(free.names, [f.unit for f in free.free], free.si(chains.values))
     check = check_linearised(found, chains)
+    if check.share < ROUGH:
+        found.notes.append(
+            "the posterior is not normal: its linearisation misses the whole likelihood "
+            f"(effective share of draws {check.share:.2f}); intervals are rough, the vehicle file may be far off"
+        )
+    held = None
+    if leave_out:
+        say("flights left out")
+        held = hold_out(case, model, found, say)
     return Identified(
         case, likelihood, found.problem.runs, free, found.quadratic, chains, summaries, left_out + found.left_out,
-        spikes, found.notes, time.perf_counter() - began, found, check, first,
+        spikes, found.notes, time.perf_counter() - began, found, held, check, first,
     )  # fmt: skip

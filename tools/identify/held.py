@@ -1,0 +1,100 @@
+"""Flights left out of the fit, predicted by the nominal and by the identified model (GAP.md's measure)."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from sim_backend.core import effect_layout as ef
+from tools.gap.measure import RunGap, case_channels, root_mean_square, run_gap
+from tools.gap.model import Model
+from tools.gap.problem import cut, estimated, fly_on, pose
+from tools.identify.fit import Fit, fit
+from tools.identify.parameters import Parameters
+from tools.runs.case import Case
+from tools.runs.run import Run
+
+MOST = 12  # runs that are predicted; of a longer case evenly chosen ones
+FEW = 3  # runs, up to which each is left out of a fit of its own
+EARLY = "the fit without the run, by one step from the fit with all"
+ALONE = "a fit of the other runs alone"
+
+
+@dataclass
+class Held:
+    """Gaps of runs that the predicting model has not seen, in tolerances, and the predictions."""
+
+    runs: list[Run]
+    before: list[RunGap]
+    after: list[RunGap]
+    nominal: list[np.ndarray]  # (rows, N_Y)
+    identified: list[np.ndarray]
+    how: str
+
+    def total(self, gaps: list[RunGap]) -> float:
+        return root_mean_square([gap.total for gap in gaps])
+
+    def plain(self) -> dict[str, Any]:
+        return {
+            "before": {"total": self.total(self.before), **case_channels(self.before)},
+            "after": {"total": self.total(self.after), **case_channels(self.after)},
+            "runs": [
+                {"run": run.name, "before": a.total, "after": b.total}
+                for run, a, b in zip(self.runs, self.before, self.after, strict=True)
+            ],
+            "how": self.how,
+        }
+
+
+def predicted(case: Case, model: Model, run: Run, P: np.ndarray, F: np.ndarray) -> tuple[RunGap, np.ndarray]:
+    """The gap of one run under (P, F), each window started where the model's own filter stands; and the prediction."""
+    problem = pose(case, model, [run])
+    gains = problem.filter(P, F, begin=True)
+    scored = cut(problem)
+    Y = estimated(problem, F, gains)
+    fly_on(problem, scored, P, F, gains, Y)
+    return run_gap(run, Y, scored.listed[0]), Y
+
+
+def without(found: Fit, run: int) -> np.ndarray:
+    """The most probable values without one of the runs, by one step from the fit with all."""
+    of = np.broadcast_to(found.problem.run_of[:, None], found.problem.z.shape)[found.problem.valid]
+    kept = np.flatnonzero(of == run)
+    J, e = found.at.J[:, kept], found.at.e[kept]
+    q, scale = found.quadratic, 1.0 / found.quadratic.heat
+    normal = q.normal - scale * (J @ J.T)
+    low = np.array([f.low for f in found.free.free])
+    return np.maximum(q.at - np.linalg.solve(normal, q.slope - scale * (J @ e)), low)
+
+
+def model_of(model: Model, free: Parameters, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """P and F at values, without the sensors' constant errors of this case."""
+    P, F, _ = free.place(model.P, values)
+    F[ef.BIAS :] = 0.0
+    return P, F
+
+
+def hold_out(case: Case, model: Model, found: Fit, say: Callable[[str], None] = lambda text: None) -> Held | None:
+    """Predict runs left out, before and after; None where there is one run alone."""
+    runs = found.problem.runs
+    if len(runs) < 2:
+        return None
+    picked = np.unique(np.linspace(0, len(runs) - 1, min(MOST, len(runs))).astype(int)).tolist()
+    made = Held([runs[n] for n in picked], [], [], [], [], ALONE if len(runs) <= FEW else EARLY)
+    nominal = replace(model, F=None)
+    for n in picked:
+        if len(runs) <= FEW:
+            say(f"without {runs[n].name}")
+            other = fit(case, model, [run for m, run in enumerate(runs) if m != n])
+            values = np.maximum(other.quadratic.mode, other.quadratic.low)
+        else:
+            values = without(found, n)
+        for (P, F), gaps, flown in (
+            ((nominal.P, np.zeros(ef.N_F)), made.before, made.nominal),
+            (model_of(model, found.free, values), made.after, made.identified),
+        ):
+            gap, Y = predicted(case, model, runs[n], P, F)
+            gaps.append(gap)
+            flown.append(Y)
+    return made
