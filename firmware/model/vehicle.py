@@ -21,6 +21,17 @@ Length = Annotated[float, msgspec.Meta(ge=-10.0, le=10.0)]
 Coefficient = Annotated[float, msgspec.Meta(ge=-1e6, le=1e6)]
 
 
+COEFFICIENTS = ("K_D0", "K_D", "K_L0", "K_L", "K_beta", "K_MR", "K_p", "K_M0", "K_M", "K_q", "K_MY", "K_r")
+# names of [identified] -> places in P
+PLACES = {
+    **{name: getattr(layout, name.upper()) for name in COEFFICIENTS},
+    "m_t": layout.M_T, "m_r": layout.M_R, "m_s": layout.M_S,
+    **{f"added_mass_{axis}": layout.A_X + n for n, axis in enumerate("xyz")},
+    **{f"added_inertia_{axis}": layout.B_X + n for n, axis in enumerate("xyz")},
+    "net_mass": layout.NET_MASS, **{f"cg_{axis}": layout.CG_X + n for n, axis in enumerate("xyz")},
+}  # fmt: skip
+
+
 class MassTable(Table):
     """[mass]: kg, m, kg m2 (MODEL.md, Mass)."""
 
@@ -122,6 +133,46 @@ class UncertaintyTable(Table):
     cg: NonNegative
 
 
+class TrimTable(Table):
+    """[trim]: what identification found beside the nominal trim; kg, m (MODEL.md, beside the nominal)."""
+
+    net_mass: Annotated[float, msgspec.Meta(ge=-100.0, le=100.0)] = 0.0
+    cg: tuple[Length, Length, Length] = (0.0, 0.0, 0.0)
+
+
+class IdentifiedTable(Table):
+    """[identified]: where a vehicle file's numbers come from, and how sure they are, together.
+
+    `parameters` names the rows of `covariance` (n, n), SI: the coefficients, mass.*, trim.*.
+    """
+
+    data: Annotated[str, msgspec.Meta(max_length=100)]  # hash over the runs
+    runs: Annotated[int, msgspec.Meta(ge=1)]
+    revision: Annotated[str, msgspec.Meta(max_length=100)]  # of the software
+    date: Annotated[str, msgspec.Meta(max_length=40)]
+    from_vehicle: Annotated[str, msgspec.Meta(max_length=1000)]
+    parameters: list[str]
+    covariance: list[list[float]]
+
+    def __post_init__(self):
+        unknown = next((name for name in self.parameters if name not in PLACES), None)
+        if unknown is not None:
+            raise ValueError(f"parameters: no such parameter: {unknown!r}")
+        C = np.array(self.covariance, dtype=np.float64) if len(self.covariance) else np.zeros((0, 0))
+        count = len(self.parameters)
+        if any(len(row) != count for row in self.covariance) or C.shape != (count, count):
+            raise ValueError(f"covariance: expected {count} rows of {count}, one for each of the parameters")
+        if len(set(self.parameters)) < count:
+            raise ValueError("parameters: one stands there twice")
+        if count and (not np.allclose(C, C.T) or np.linalg.eigvalsh(C)[0] < -1e-9 * np.abs(C).max()):
+            raise ValueError("covariance: not symmetric and positive")
+
+    @property
+    def places(self) -> np.ndarray:
+        """Where the parameters stand in P, (n,)."""
+        return np.array([PLACES[name] for name in self.parameters], dtype=np.int64)
+
+
 class Vehicle(Table):
     """A vehicle file (MODEL.md, roughie.toml)."""
 
@@ -134,6 +185,8 @@ class Vehicle(Table):
     disturbance: DisturbanceTable
     uncertainty: UncertaintyTable
     control: Control | None = None
+    trim: TrimTable = TrimTable()
+    identified: IdentifiedTable | None = None
     limits: Limits | None = None
     supervisor: SupervisorTable = SupervisorTable()
 
@@ -154,10 +207,9 @@ class Vehicle(Table):
             table = getattr(actuators, name)
             P[start : start + 4] = (*table.range, table.rate, table.time_constant)
         P[layout.PLUNGER_AREA] = actuators.ballast.plunger_area
+        P[layout.NET_MASS] = self.trim.net_mass
+        P[layout.CG_X : layout.CG_Z + 1] = self.trim.cg
         return P
-
-
-COEFFICIENTS = ("K_D0", "K_D", "K_L0", "K_L", "K_beta", "K_MR", "K_p", "K_M0", "K_M", "K_q", "K_MY", "K_r")
 
 
 def decode_vehicle(text: str, source: str) -> Vehicle:

@@ -27,11 +27,23 @@ def identify(case: Path, out: Path | None, seed: int, likelihood: str, as_json: 
     from tools.identify.run import identify as run_identification
     from tools.runs.case import load_case
 
-    need("scipy")
-    need("arviz", extra="identify")
-    found = run_identification(load_case(case), seed, likelihood, lambda text: print(text, file=sys.stderr))
+    need("scipy", "arviz", extra="identify")
+    if out is not None:
+        need("jinja2", "matplotlib", extra="identify")
+    found = run_identification(
+        load_case(case), seed, likelihood, lambda text: print(text, file=sys.stderr), leave_out=out is not None
+    )
     for one in found.left_out:
         say(f"left out: {one}")
+    for note in found.notes:
+        say(note)
+    if out is not None:
+        from tools.identify.files import VEHICLE, write
+        from tools.report.identified import write_report
+
+        write(found, out)
+        write_report(out / "report.html", found)
+        say(f"vehicle: {out / VEHICLE}, report: {out / 'report.html'}")
     if as_json:
         print_json(found.plain())
     else:
@@ -39,10 +51,16 @@ def identify(case: Path, out: Path | None, seed: int, likelihood: str, as_json: 
 
 
 def _tell(found) -> None:
-    """The coefficients, for a person."""
+    """The coefficients, and what the runs cannot tell, for a person."""
+    from tools.identify.telling import blind, sentences
+
     click.echo(f"{'':<6} {'mean':>10} {'sd':>9}   {'90 % interval':<22} {'R-hat':>6} {'ESS':>7}  unit")
     for one in found.coefficients:
         low, high = one.ci90
         interval = f"{low:.4g} to {high:.4g}"
         figures = f"{one.name:<6} {one.mean:>10.4g} {one.sd:>9.2g}   {interval:<22}"
         click.echo(f"{figures} {one.rhat:>6.3f} {one.ess:>7.0f}  {one.unit}")
+    for line in sentences(found.free, found.chains.flat):
+        click.echo(line)
+    for combination in blind(found.free, found.chains.flat):
+        click.echo(f"  {combination.sentence()}")

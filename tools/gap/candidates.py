@@ -23,6 +23,7 @@ class Free:
     low: float = -np.inf
     high: float = np.inf
     unit: str = ""
+    along: tuple[tuple[int, float], ...] = ()  # entries of P that move together, in place of `entry`
 
     @property
     def kinked(self) -> bool:
@@ -34,8 +35,14 @@ def allowed(problem: Problem) -> list[Free]:
     """What the nominal model allows for: parameters within [uncertainty], and a constant bias of each sensor."""
     if not problem.rules.nuisance:
         return []
-    sigma = problem.model.sigma
-    free = [Free(ALLOWED, f"P[{i}]", "P", int(i), float(sigma[i])) for i in np.flatnonzero(sigma > 0.0)]
+    sigma, spread = problem.model.sigma.copy(), problem.model.spread
+    free = []
+    if spread is not None:  # as identification left them, together
+        sigma[np.abs(spread).max(axis=0) > 0.0] = 0.0
+        for n, row in enumerate(spread):
+            along = tuple((int(i), float(row[i])) for i in np.flatnonzero(row))
+            free.append(Free(ALLOWED, f"identified[{n}]", "P", -1, 1.0, along=along))
+    free += [Free(ALLOWED, f"P[{i}]", "P", int(i), float(sigma[i])) for i in np.flatnonzero(sigma > 0.0)]
     s = problem.case.sensors
     bias = [*3 * [s.attitude.bias], *3 * [s.gyro.bias], s.depth.bias, s.slider.bias, s.ballast.bias]
     seen = problem.seen
@@ -77,5 +84,6 @@ def place(problem: Problem, free: list[Free], values: np.ndarray) -> tuple[np.nd
     P = problem.model.P.copy()
     F = np.zeros(ef.N_F) if problem.model.F is None else problem.model.F.copy()
     for parameter, value in zip(free, values, strict=True):
-        (P if parameter.vector == "P" else F)[parameter.entry] += parameter.spread * value
+        for entry, size in parameter.along or ((parameter.entry, parameter.spread),):
+            (P if parameter.vector == "P" else F)[entry] += size * value
     return P, F

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from firmware.estimation.settings import parameter_sigma
+from firmware.model.vehicle import Vehicle
 from tools.runs.case import Case
 from tools.sources import load_vehicle, read_text
 
@@ -20,12 +21,29 @@ class Model:
     P: np.ndarray
     sigma: np.ndarray
     F: np.ndarray | None = None
+    spread: np.ndarray | None = (
+        None  # (n, N_P): independent directions of what identification left; sigma covers the rest
+    )
 
 
 def nominal_model(case: Case) -> Model:
     """The case's own vehicle."""
-    P = case.vehicle.vector()
-    return Model(NOMINAL, P, parameter_sigma(P, case.vehicle.uncertainty))
+    return vehicle_model(NOMINAL, case.vehicle)
+
+
+def vehicle_model(name: str, vehicle: Vehicle) -> Model:
+    """A vehicle as a model: what is uncertain as [uncertainty] says, or where it was identified as its covariance."""
+    P = vehicle.vector()
+    sigma = parameter_sigma(P, vehicle.uncertainty)
+    found = vehicle.identified
+    if found is None or not found.parameters:
+        return Model(name, P, sigma)
+    C = np.array(found.covariance)
+    sigma[found.places] = np.sqrt(np.maximum(np.diag(C), 0.0))
+    values, vectors = np.linalg.eigh(C)
+    spread = np.zeros((len(values), len(P)))
+    spread[:, found.places] = (vectors * np.sqrt(np.maximum(values, 0.0))).T
+    return Model(name, P, sigma, spread=spread[np.abs(spread).max(axis=1) > 0.0])
 
 
 def load_model(wanted: str, case: Case) -> Model:
@@ -36,6 +54,4 @@ def load_model(wanted: str, case: Case) -> Model:
         return nominal_model(case)
     if Path(wanted).is_file() and is_corrected(read_text(Path(wanted))):
         return load_corrected(wanted, nominal_model(case))
-    vehicle = load_vehicle(wanted)
-    P = vehicle.vector()
-    return Model(wanted, P, parameter_sigma(P, vehicle.uncertainty))
+    return vehicle_model(wanted, load_vehicle(wanted))

@@ -20,6 +20,7 @@ from tools.identify.parameters import Parameters
 from tools.identify.sampler import Chains, Summary, sample, summarise
 from tools.identify.screen import LeftOut, despiked, screen
 from tools.identify.statistics import Quadratic
+from tools.identify.telling import blind
 from tools.runs.case import Case
 from tools.runs.run import Run
 
@@ -103,6 +104,7 @@ class Identified:
             "spikes_removed": self.spikes,
             "seed": self.chains.seed,
             "notes": self.notes,
+            "not_told": [one.plain() for one in blind(self.free, self.chains.flat)],
         }
         if self.levels is not None:
             levels = zip(self.levels.names, self.levels.log, self.levels.sd, strict=True)

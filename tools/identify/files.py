@@ -1,0 +1,149 @@
+"""What an identification leaves behind: a vehicle file that says where it comes from, the posterior for others."""
+
+import datetime
+import hashlib
+import json
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from firmware.core import layout
+from firmware.core.jit import kernels_digest
+from firmware.model.vehicle import COEFFICIENTS, PLACES, Vehicle, decode_vehicle
+from sim_backend.effects.base import catalogue
+from tools.gap.corrected import corrected_text
+from tools.gap.model import nominal_model
+from tools.identify.levels import DISTURBANCE
+from tools.identify.run import Identified
+from tools.runs.case import CASE_FILE
+from tools.runs.csvfile import write_bytes
+from tools.tomltext import toml_text
+
+VEHICLE, CORRECTED, POSTERIOR, RESULT = "identified.toml", "corrected.toml", "posterior.nc", "identified.json"
+WIRES = ("ballast_scale", "slider_scale")  # effects, of what the draw-wires say
+DIGITS = 10  # of a covariance
+
+
+def data_hash(found: Identified) -> str:
+    """Over case.toml and every run's samples that were fitted, 16 hex digits."""
+    digest = hashlib.sha256()
+    path = found.case.folder / CASE_FILE
+    if path.is_file():
+        digest.update(path.read_bytes())
+    for run in found.runs:
+        digest.update(run.name.encode())
+        for name, values in sorted(run.columns.items()):
+            digest.update(name.encode())
+            digest.update(np.ascontiguousarray(values).tobytes())
+    return digest.hexdigest()[:16]
+
+
+def provenance(found: Identified) -> dict[str, Any]:
+    """[identified]: names and covariance in SI of everything that stands in a vehicle file."""
+    listed = [n for n, name in enumerate(found.free.names) if name in PLACES]
+    draws = found.free.si(found.chains.flat)[:, listed]
+    C = np.cov(draws.T)
+    rounded = [[float(f"{value:.{DIGITS}g}") for value in row] for row in 0.5 * (C + C.T)]
+    return {
+        "data": data_hash(found),
+        "runs": len(found.runs),
+        "revision": f"glider {version('glider')} {kernels_digest()}",
+        "date": datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%MZ"),
+        "from_vehicle": found.case.vehicle_name,
+        "parameters": [found.free.names[n] for n in listed],
+        "covariance": rounded,
+    }
+
+
+def _uncertainty(found: Identified, old: dict[str, float]) -> dict[str, float]:
+    """[uncertainty]: what is left, as far as five numbers can say it; [identified] has it all."""
+    by_name = {one.name: one for one in found.summaries}
+
+    def relative(names: list[str], fallback: float) -> float:
+        shares = [by_name[n].sd / abs(by_name[n].mean) for n in names if n in by_name and by_name[n].mean != 0.0]
+        return float(f"{max(shares):.3g}") if shares else fallback
+
+    steady = [name for name in COEFFICIENTS if name not in ("K_L0", "K_M0")]  # those two may be near 0
+    return {
+        "K": relative(steady, old["K"]),
+        "mass": relative(["m_t", "m_r", "m_s"], old["mass"]),
+        "added": relative([f"added_{what}_{axis}" for what in ("mass", "inertia") for axis in "yz"], old["added"]),
+        "net_mass": by_name["net_mass"].sd if "net_mass" in by_name else old["net_mass"],
+        "cg": max((by_name[f"cg_{axis}"].sd for axis in "xyz" if f"cg_{axis}" in by_name), default=old["cg"]),
+    }
+
+
+def vehicle_table(found: Identified) -> dict[str, Any]:
+    """The vehicle file's content: the case's vehicle with the posterior's means in place."""
+    vehicle = found.case.vehicle
+    table: dict[str, Any] = msgspec.to_builtins(vehicle)
+    P = vehicle.vector()
+    for one in found.summaries:
+        if one.name in PLACES:
+            P[PLACES[one.name]] = one.mean
+    table["hydrodynamics"] |= {name: float(P[PLACES[name]]) for name in COEFFICIENTS}
+    table["mass"] |= {name: float(P[PLACES[name]]) for name in ("m_t", "m_r", "m_s")}
+    table["mass"]["added_mass"] = P[layout.A_X : layout.A_Z + 1].tolist()
+    table["mass"]["added_inertia"] = P[layout.B_X : layout.B_Z + 1].tolist()
+    table["trim"] = {"net_mass": float(P[layout.NET_MASS]), "cg": P[layout.CG_X : layout.CG_Z + 1].tolist()}
+    if found.levels is not None:
+        for name, log in zip(found.levels.names, found.levels.log.tolist(), strict=True):
+            if name in DISTURBANCE:
+                axis = name.removeprefix("disturbance_")
+                table["disturbance"][axis] = getattr(found.case.disturbance, axis) * float(np.exp(log))
+    table["uncertainty"] = _uncertainty(found, table["uncertainty"])
+    table["identified"] = provenance(found)
+    return table
+
+
+def vehicle_text(found: Identified) -> str:
+    """identified.toml; checked by reading it back."""
+    text = (
+        "# A vehicle identified by `glider identify`; [identified] says from what, and how sure the numbers are.\n"
+        + toml_text(vehicle_table(found), inline=("sensors",))
+    )
+    decode_vehicle(text, VEHICLE)
+    return text
+
+
+def corrected(found: Identified) -> str | None:
+    """A model for `glider gap predict` where a vehicle file cannot hold what was found: the draw-wires' scales."""
+    if not any(name in WIRES for name in found.free.names):
+        return None
+    P0 = nominal_model(found.case).P
+    P, F, _ = found.free.place(P0, found.means)
+    effects: dict[str, dict[str, float]] = {}
+    for name in WIRES:
+        parameter = next(p for p in catalogue()[name].parameters if p.entry >= 0)
+        low, high = parameter.low, parameter.high
+        effects[name] = {parameter.name: float(np.clip(F[parameter.entry], low, high))}
+    return corrected_text(found.case.vehicle_name, P0, P, F, effects)
+
+
+def write_posterior(found: Identified, path: Path) -> None:
+    """The draws, SI, as ArviZ's InferenceData in netCDF."""
+    import arviz
+
+    draws = found.free.si(found.chains.values)
+    posterior = {name: draws[:, :, n] for n, name in enumerate(found.free.names)}
+    posterior |= {f"log_noise_{name}": found.chains.levels[:, :, g] for g, name in enumerate(found.chains.groups)}
+    data = arviz.from_dict(posterior=posterior, attrs={"likelihood": found.likelihood, "seed": found.chains.seed})
+    data.to_netcdf(str(path))
+
+
+def write(found: Identified, out: Path) -> Vehicle:
+    """All files but the report into a folder; returns the vehicle as it will be read."""
+    from tools.cli.common import _plain
+
+    out.mkdir(parents=True, exist_ok=True)
+    text = vehicle_text(found)
+    write_bytes(out / VEHICLE, text.encode("utf-8"))
+    model = corrected(found)
+    if model is not None:
+        write_bytes(out / CORRECTED, model.encode("utf-8"))
+    write_posterior(found, out / POSTERIOR)
+    write_bytes(out / RESULT, (json.dumps(_plain(found.plain()), indent=1) + "\n").encode("utf-8"))
+    return decode_vehicle(text, VEHICLE)

@@ -1,0 +1,88 @@
+"""What these runs cannot tell: combinations of parameters as wide as they were believed, and what would help."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from firmware.model.vehicle import COEFFICIENTS
+from tools.identify.parameters import Parameters
+
+WIDE = 0.5  # of the prior's sigma: a combination that stays wider is not told by these runs
+LOADING = 0.3  # of a combination, for a parameter to be named in it
+WORDS = {
+    "K_D0": "drag at no angle", "K_D": "drag growing with the angle of attack", "K_L0": "lift at no angle",
+    "K_L": "lift slope", "K_beta": "side force", "K_MR": "rolling moment of sideslip", "K_p": "roll damping",
+    "K_M0": "pitch moment at no angle", "K_M": "pitch moment's slope", "K_q": "pitch damping",
+    "K_MY": "weathercock moment", "K_r": "yaw damping", "ballast_scale": "what the ballast's draw-wire means",
+    "slider_scale": "what the slider's draw-wire means", "net_mass": "trim (net mass)",
+}  # fmt: skip
+HELP = {
+    "K_D0": "straight glides at several ballasts, pitch held shallow", "K_D": "steep and shallow glides in turn",
+    "K_L0": "dives and climbs at the same angle", "K_L": "glides at several pitch angles with motion capture",
+    "K_beta": "spirals at full servo with motion capture", "K_MR": "servo steps from side to side at speed",
+    "K_p": "quick servo steps at full ballast", "K_M0": "dives and climbs at the same slider setting",
+    "K_M": "slider held at three settings on either side", "K_q": "quick slider steps at full ballast",
+    "K_MY": "spirals at two servo angles", "K_r": "servo reversals at full ballast",
+    "ballast_scale": "a weighing of the tank against its draw-wire",
+    "slider_scale": "a ruler along the slider against its draw-wire",
+    "net_mass": "a minute of neutral buoyancy at rest",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Blind:
+    """A combination that is not told: its width over the prior's, its parameters with their shares, what would help."""
+
+    width: float
+    parts: tuple[tuple[str, float], ...]
+    help: str
+
+    def plain(self) -> dict[str, Any]:
+        return {"width": self.width, "parts": dict(self.parts), "would_help": self.help}
+
+    def sentence(self) -> str:
+        names = " with ".join(f"{name} ({share:+.2f})" for name, share in self.parts)
+        return f"{names}: stays at {100 * self.width:.0f} % of what was believed before. Would help: {self.help}."
+
+
+def looked_for(free: Parameters) -> list[int]:
+    """The parameters that an identification is for: coefficients, trim, and what draw-wires mean."""
+    return [n for n, name in enumerate(free.names) if name in WORDS]
+
+
+def blind(free: Parameters, draws: np.ndarray) -> list[Blind]:
+    """Combinations wider than WIDE of the prior, widest first. draws (k, n), in units of the priors."""
+    listed = looked_for(free)
+    values, vectors = np.linalg.eigh(np.cov(draws[:, listed].T))
+    found = []
+    for value, vector in sorted(zip(values, vectors.T, strict=True), key=lambda pair: -pair[0]):
+        width = float(np.sqrt(max(value, 0.0)))
+        if width < WIDE:
+            break
+        order = np.argsort(-np.abs(vector))
+        parts = [(free.names[listed[i]], float(vector[i])) for i in order if abs(vector[i]) >= LOADING]
+        parts = parts or [(free.names[listed[order[0]]], float(vector[order[0]]))]
+        if parts[0][1] < 0.0:
+            parts = [(name, -share) for name, share in parts]
+        found.append(Blind(width, tuple(parts), HELP[parts[0][0]]))
+    return found
+
+
+def sentences(free: Parameters, draws: np.ndarray) -> list[str]:
+    """In plain words, coefficient by coefficient: what the runs tell and what not."""
+    spread = draws.std(axis=0)
+    known = [n for n in looked_for(free) if spread[n] < WIDE]
+    unknown = [n for n in looked_for(free) if spread[n] >= WIDE]
+
+    def words(which: list[int]) -> str:
+        return ", ".join(f"{WORDS[free.names[n]]} ({free.names[n]})" for n in which)
+
+    told = [f"These runs tell: {words(known)}."] if known else []
+    if unknown:
+        told.append(
+            f"They do not tell: {words(unknown)}; what is printed for these is mostly what was believed before."
+        )
+    elif len(known) >= len(COEFFICIENTS):
+        told.append("No coefficient is left to belief.")
+    return told

@@ -1,0 +1,177 @@
+"""The report of an identification: marginals as in the paper's Fig. 4, corner plot, residuals, flights left out."""
+
+import base64
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from firmware.model.vehicle import COEFFICIENTS
+from tools.gap.channels import measured
+from tools.gap.windows import windows
+from tools.identify.levels import SENSORS, group_of_reading
+from tools.identify.run import Identified
+from tools.identify.telling import blind, sentences
+from tools.report.charts import Chart, Line, svg
+from tools.report.lines import broken, near, unwrapped
+from tools.report.page import render
+
+INK, TRUTH, SOFT = "#1d3f72", "#d9480f", "#8a94a3"
+SHOWN = 4  # flights left out with pictures: those whose gap was largest before
+POINTS = 1500  # of the chains, in a corner plot
+CHANNELS = ((6, "depth, m", 1.0, True), (1, "pitch, deg", 180 / np.pi, False), (0, "roll, deg", 180 / np.pi, False))
+
+
+def png(figure) -> str:
+    """A figure as a data URI; closed afterwards."""
+    import matplotlib.pyplot as plt
+
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=110)
+    plt.close(figure)
+    return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode()
+
+
+def marginals(found: Identified, truth: dict[str, float] | None = None):
+    """Histograms of the twelve coefficients, mean and 90 % interval marked, the truth where it is known."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    draws = found.free.si(found.chains.flat)
+    figure, axes = plt.subplots(3, 4, figsize=(11, 7), layout="constrained")
+    for n, (axis, one) in enumerate(zip(axes.flat, found.coefficients, strict=True)):
+        axis.hist(draws[:, n], bins=50, density=True, color=INK, alpha=0.55)
+        axis.axvspan(*one.ci90, color=SOFT, alpha=0.2)
+        axis.axvline(one.mean, color=INK)
+        if truth is not None:
+            axis.axvline(truth[one.name], color=TRUTH, linestyle="--")
+        axis.set_title(f"{one.name} = {one.mean:.4g}, sd {one.sd:.2g} {one.unit}", fontsize=8)
+        axis.set_yticks([])
+        axis.tick_params(labelsize=7)
+    return figure
+
+
+def corner(found: Identified):
+    """Pairs of coefficients: draws below the diagonal, marginals on it, correlations above."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    flat = found.free.si(found.chains.flat)[:, : len(COEFFICIENTS)]
+    correlation = np.corrcoef(flat.T)
+    few = flat[:: max(1, len(flat) // POINTS)]
+    count = len(COEFFICIENTS)
+    figure, axes = plt.subplots(count, count, figsize=(11, 11))
+    figure.subplots_adjust(0.05, 0.05, 0.99, 0.99, 0.06, 0.06)
+    for i in range(count):
+        for j in range(count):
+            axis = axes[i, j]
+            axis.set_xticks([])
+            axis.set_yticks([])
+            if i == j:
+                axis.hist(flat[:, i], bins=30, color=INK, alpha=0.6)
+            elif j < i:
+                axis.plot(few[:, j], few[:, i], ",", color=INK, alpha=0.4)
+            else:
+                shade = abs(correlation[i, j])
+                axis.set_facecolor((0.85, 0.28, 0.06, 0.7 * shade))
+                axis.text(0.5, 0.5, f"{correlation[i, j]:+.2f}", ha="center", va="center", fontsize=7,
+                          transform=axis.transAxes)  # fmt: skip
+            if i == count - 1:
+                axis.set_xlabel(COEFFICIENTS[j], fontsize=7)
+            if j == 0:
+                axis.set_ylabel(COEFFICIENTS[i], fontsize=7)
+    return figure
+
+
+def residual_rows(found: Identified) -> list[dict[str, Any]]:
+    """Whitened innovations by sensor: mean square, and correlation with themselves a sample later."""
+    if found.fit is None:
+        return []
+    E, rows = found.fit.at.gains.E, []
+    for g, name in enumerate(SENSORS):
+        columns = np.flatnonzero(group_of_reading() == g)
+        e = E[:, columns]
+        if not np.isfinite(e).any():
+            continue
+        same = found.fit.problem.run_of[1:] == found.fit.problem.run_of[:-1]
+        product = (e[1:] * e[:-1])[same]
+        rows.append({
+            "name": name.replace("_", " "), "square": float(np.nanmean(e**2)), "count": int(np.isfinite(e).sum()),
+            "next": float(np.nanmean(product)) / max(float(np.nanmean(e**2)), 1e-12),
+        })  # fmt: skip
+    return rows
+
+
+def residual_chart(found: Identified) -> str | None:
+    """Distribution of all whitened innovations beside the normal one."""
+    if found.fit is None:
+        return None
+    edges = np.linspace(-5.0, 5.0, 61)
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    density, _ = np.histogram(found.fit.at.e, edges, density=True)
+    normal = np.exp(-0.5 * middle**2) / np.sqrt(2.0 * np.pi)
+    return svg(
+        Chart("whitened innovations", "sigma", [Line(middle, density, "measured"), Line(middle, normal, "predicted")])
+    )
+
+
+def flights(found: Identified) -> list[dict[str, Any]]:
+    """Pictures of flights left out of the fit: measured, nominal, identified."""
+    held = found.held
+    if held is None:
+        return []
+    order = np.argsort([-gap.total for gap in held.before])[:SHOWN]
+    shown = []
+    for n in sorted(order.tolist()):
+        run, listed = held.runs[n], windows(held.runs[n].t)
+        table, charts = measured(run), []
+        for column, title, scale, down in CHANNELS:
+            if not np.isfinite(table[:, column]).any():
+                continue
+            seen, said = table[:, column], [held.nominal[n][:, column], held.identified[n][:, column]]
+            if not down:
+                seen = unwrapped(seen)
+                said = [near(run.t, seen, one) for one in said]
+            lines = [
+                Line(run.t, seen * scale, "measured"), broken(run.t, said[0] * scale, listed, "nominal"),
+                broken(run.t, said[1] * scale, listed, "corrected"),
+            ]  # fmt: skip
+            charts.append({"title": title, "svg": svg(Chart(title, "s", lines, down=down), 0.05)})
+        shown.append(
+            {"name": run.name, "before": held.before[n].total, "after": held.after[n].total, "charts": charts}
+        )  # fmt: skip
+    return shown
+
+
+def report_html(found: Identified, truth: dict[str, float] | None = None) -> str:
+    """The page's text; MissingExtra without jinja2."""
+    held = None if found.held is None else found.held.plain()
+    context = {
+        "case": found.case.folder.resolve().name, "vehicle": found.case.vehicle.name, "site": found.case.site,
+        "runs": len(found.runs), "seconds": found.seconds, "likelihood": found.likelihood,
+        "summaries": [one.plain() for one in found.coefficients],
+        "others": [one.plain() for one in found.summaries[len(COEFFICIENTS) :]],
+        "told": sentences(found.free, found.chains.flat),
+        "blind": [one.sentence() for one in blind(found.free, found.chains.flat)],
+        "left_out": [str(one) for one in found.left_out], "spikes": found.spikes, "notes": found.notes,
+        "marginals": png(marginals(found, truth)), "corner": png(corner(found)), "truth": truth is not None,
+        "levels": [] if found.levels is None else [
+            {"name": name.replace("_", " "), "factor": float(np.exp(log))}
+            for name, log in zip(found.levels.names, found.levels.log, strict=True)
+        ],
+        "heat": found.quadratic.heat, "check": found.check, "residuals": residual_rows(found),
+        "residual_chart": residual_chart(found), "held": held, "flights": flights(found),
+        "compared": found.compared(), "acceptance": float(found.chains.acceptance.mean()),
+        "chains": found.chains.values.shape[0], "draws": found.chains.values.shape[1],
+    }  # fmt: skip
+    return render("identified.html", context)
+
+
+def write_report(path: Path, found: Identified, truth: dict[str, float] | None = None) -> None:
+    """Write the page to a file."""
+    path.write_text(report_html(found, truth), encoding="utf-8")
