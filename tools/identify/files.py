@@ -136,7 +136,7 @@ def write_posterior(found: Identified, path: Path) -> None:
 
 def write(found: Identified, out: Path) -> Vehicle:
     """All files but the report into a folder; returns the vehicle as it will be read."""
-    from tools.cli.common import _plain
+    from tools.cli.common import as_plain
 
     out.mkdir(parents=True, exist_ok=True)
     text = vehicle_text(found)
@@ -145,5 +145,5 @@ def write(found: Identified, out: Path) -> Vehicle:
     if model is not None:
         write_bytes(out / CORRECTED, model.encode("utf-8"))
     write_posterior(found, out / POSTERIOR)
-    write_bytes(out / RESULT, (json.dumps(_plain(found.plain()), indent=1) + "\n").encode("utf-8"))
+    write_bytes(out / RESULT, (json.dumps(as_plain(found.plain()), indent=1) + "\n").encode("utf-8"))
     return decode_vehicle(text, VEHICLE)
