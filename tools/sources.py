@@ -10,12 +10,17 @@ from firmware.model.vehicle import Vehicle, decode_vehicle
 from tools.errors import InputError
 
 T = TypeVar("T")
+LONGEST = 256_000_000  # characters of any text file
 
 
 def read_text(path: Path) -> str:
     """A text file's content; InputError where it cannot be read."""
     try:
-        return path.read_text(encoding="utf-8")
+        with path.open(encoding="utf-8") as file:
+            text = file.read(LONGEST + 1)
+        if len(text) > LONGEST:
+            raise InputError(f"longer than {LONGEST} characters", source=path)
+        return text
     except UnicodeDecodeError as error:
         raise InputError(f"not UTF-8 text (byte {error.start})", source=path) from None
     except OSError as error:

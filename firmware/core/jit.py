@@ -10,6 +10,7 @@ Set GLIDER_JIT=0 to run every kernel as plain Python (slow, for reading and step
 import hashlib
 import os
 import shutil
+import stat
 import sys
 import tempfile
 from pathlib import Path
@@ -46,13 +47,19 @@ def cache_root() -> Path:
         candidates.append(Path(tempfile.gettempdir()) / f"glider-cache-{os.getuid()}")
     for candidate in candidates:
         try:
-            candidate.mkdir(parents=True, exist_ok=True)
+            candidate.mkdir(parents=True, exist_ok=True, mode=0o755)
         except OSError:
             continue
-        if os.access(candidate, os.W_OK):
+        if os.access(candidate, os.W_OK) and _is_ours(candidate):
             return candidate
     tried = ", ".join(map(str, candidates))
-    raise OSError(f"no writable folder for compiled kernels among {tried}: set GLIDER_CACHE_DIR")
+    raise OSError(f"no writable folder of one's own for compiled kernels among {tried}: set GLIDER_CACHE_DIR")
+
+
+def _is_ours(folder: Path) -> bool:
+    """Compiled kernels are code: a folder that somebody else owns, or may write into, is not read from."""
+    found = folder.stat()
+    return found.st_uid in (0, os.getuid()) and not found.st_mode & stat.S_IWOTH
 
 
 def _prune(root: Path, current: Path) -> None:

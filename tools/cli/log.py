@@ -16,6 +16,11 @@ def log() -> None:
     """Export, look into or repair an onboard log."""
 
 
+def _show(line: str) -> None:
+    """A line that holds what a file says: nothing in it steers the terminal."""
+    click.echo("".join(letter if letter.isprintable() else "\ufffd" for letter in line))
+
+
 def _file(path: Path) -> Path:
     from tools.errors import InputError
 
@@ -68,18 +73,18 @@ def info(file: Path, as_json: bool) -> None:
     if as_json:
         print_json(_summary(the_log))
         return
-    click.echo(f"{file}: {_state(the_log)}; {the_log.duration_s:.2f} s")
+    _show(f"{file}: {_state(the_log)}; {the_log.duration_s:.2f} s")
     for name, topic in the_log.topics.items():
         missing = f", {topic.missing} missing" if topic.missing else ""
-        click.echo(f"  {name:<10} {topic.count} records{missing} ({topic.schema_name}, {len(topic.fields)} numbers)")
+        _show(f"  {name:<10} {topic.count} records{missing} ({topic.schema_name}, {len(topic.fields)} numbers)")
     for name, text in the_log.attachments.items():
-        click.echo(f"  {name:<20} {len(text.encode())} bytes")
+        _show(f"  {name:<20} {len(text.encode())} bytes")
     for name, text in {**the_log.metadata, **the_log.ending}.items():
-        click.echo(f"  {name:<20} {text}")
+        _show(f"  {name:<20} {text}")
     for event in the_log.events[:_SHOWN_EVENTS]:
-        click.echo(f"  {event.time_s:9.2f} s  {LEVELS.get(event.severity, event.severity):<5} {event.text}")
+        _show(f"  {event.time_s:9.2f} s  {LEVELS.get(event.severity, event.severity):<5} {event.text}")
     if len(the_log.events) > _SHOWN_EVENTS:
-        click.echo(f"  and {len(the_log.events) - _SHOWN_EVENTS} more events (--json has them all)")
+        _show(f"  and {len(the_log.events) - _SHOWN_EVENTS} more events (--json has them all)")
 
 
 @log.command()

@@ -24,6 +24,8 @@ from hal.recorder.schema import (
 from tools.errors import InputError
 from tools.log.framing import Damage, Scan, chunk_records
 
+_LAST_NS = 2**63 - 1
+
 
 @dataclass
 class Topic:
@@ -195,7 +197,7 @@ def _take(message: Message, definitions: Definitions, found: dict[int, _Gathered
         float64s = schema.encoding == SCHEMA_ENCODING and channel.message_encoding == MESSAGE_ENCODING
         fields = parse_fields(schema.data.decode("utf-8", "replace")) if float64s else None
         gathered = found[message.channel_id] = _Gathered(schema.name, fields, channel.topic)
-    gathered.times.append(message.log_time)
+    gathered.times.append(min(message.log_time, _LAST_NS))
     gathered.sequences.append(message.sequence)
     if gathered.fields is not None:
         gathered.data.append(message.data)
@@ -204,8 +206,16 @@ def _take(message: Message, definitions: Definitions, found: dict[int, _Gathered
             severity, text = logfile.decode_event(message.data)
         except (struct.error, ValueError, IndexError):
             return
-        epoch = int(log.metadata.get("epoch_ns", "0"))
+        epoch = _epoch_ns(log)
         log.events.append(Event((message.log_time - epoch) / 1e9, severity, text))
+
+
+def _epoch_ns(log: Log) -> int:
+    try:
+        epoch = int(log.metadata.get("epoch_ns", "0"))
+    except ValueError:
+        return 0
+    return epoch if abs(epoch) <= _LAST_NS else 0
 
 
 def _topic(gathered: _Gathered) -> Topic:

@@ -1,0 +1,116 @@
+"""What docs/SECURITY.md promises and no other test holds: no network, no code out of data, no stranger's kernels."""
+
+import ast
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[3]
+
+FLY = """
+import sys
+seen = []
+sys.addaudithook(lambda name, args: seen.append((name, repr(args)[:200])) if name.startswith("socket.") else None)
+from tools.cli.main import cli
+try:
+    cli(["fly", "--mission", sys.argv[1], "--log", sys.argv[2], "--json"], standalone_mode=False)
+except SystemExit as end:
+    assert end.code == 0, end.code
+import hal.outofband.guard, hal.recorder.writer, hal.devices
+print(*seen, sep="\\n")
+"""
+DIP = """
+format = 1
+name = "dip"
+time_limit_s = 60.0
+[site]
+name = "pool"
+depth_m = 6.0
+[[leg]]
+duration_s = 2.0
+pitch_deg = -10.0
+ballast_kg = 0.02
+"""
+
+
+def test_a_flight_opens_no_socket(tmp_path):
+    (tmp_path / "dip.toml").write_text(DIP)
+    done = subprocess.run(
+        [sys.executable, "-c", FLY, str(tmp_path / "dip.toml"), str(tmp_path / "x.mcap")],
+        capture_output=True, text=True, cwd=ROOT,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert [line for line in done.stdout.splitlines() if line.startswith("('socket.")] == []
+
+
+def _calls(tree):
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call):
+            yield ast.unparse(node.func), {keyword.arg: ast.unparse(keyword.value) for keyword in node.keywords}
+
+
+@pytest.mark.parametrize("package", ["hal", "firmware", "sim_backend", "tools"])
+def test_no_code_is_made_out_of_data(package):
+    """No eval, exec, pickle, shell: data stays data. Kernels are compiled from the project's own files."""
+    wrong = []
+    for path in sorted((ROOT / package).rglob("*.py")):
+        for name, keywords in _calls(ast.parse(path.read_text())):
+            bad = name in ("eval", "exec", "compile", "os.system", "os.popen", "__import__")
+            bad |= name.split(".")[0] in ("pickle", "marshal", "shelve", "dill", "yaml")
+            bad |= keywords.get("shell") == "True" or keywords.get("allow_pickle") == "True"
+            if bad:
+                wrong.append(f"{path.relative_to(ROOT)}: {name}")
+    assert wrong == []
+
+
+def test_a_cache_that_others_may_write_into_is_not_read(tmp_path):
+    folder = tmp_path / "cache"
+    folder.mkdir()
+    code = "from firmware.core.jit import cache_root; print(cache_root())"
+    command = [sys.executable, "-c", code]
+    place = {**os.environ, "GLIDER_CACHE_DIR": str(folder)}
+    done = subprocess.run(command, env=place, cwd=ROOT, capture_output=True, text=True)
+    assert done.stdout.strip() == str(folder)
+    folder.chmod(0o777)
+    done = subprocess.run(command, env=place, cwd=ROOT, capture_output=True, text=True)
+    assert "no writable folder of one's own" in done.stderr
+    if os.getuid() == 0:
+        folder.chmod(0o755)
+        os.chown(folder, 12345, 12345)
+        done = subprocess.run(command, env=place, cwd=ROOT, capture_output=True, text=True)
+        assert "no writable folder of one's own" in done.stderr
+
+
+def test_a_heartbeats_folder_of_somebody_else_is_refused(tmp_path):
+    from hal.heartbeat import Heartbeat
+
+    if os.getuid() != 0:
+        pytest.skip("only root can give a folder away")
+    os.chown(tmp_path, 12345, 12345)
+    code = "import os, sys\nfrom hal.heartbeat import Heartbeat\nos.setuid(54321)\nHeartbeat.create(sys.argv[1], 0.02)"
+    tmp_path.chmod(0o777)
+    for parent in tmp_path.parents[:2]:
+        parent.chmod(parent.stat().st_mode | 0o011)
+    done = subprocess.run([sys.executable, "-c", code, str(tmp_path)], cwd=ROOT, capture_output=True, text=True)
+    assert "belongs to somebody else" in done.stderr
+    (tmp_path / "elsewhere").write_text("precious")
+    (tmp_path / "heartbeat").symlink_to(tmp_path / "elsewhere")
+    os.chown(tmp_path, 0, 0)
+    with pytest.raises(OSError, match="symbolic links"):
+        Heartbeat.create(tmp_path, 0.02)
+    assert (tmp_path / "elsewhere").read_text() == "precious"
+
+
+def test_a_text_file_without_end_is_not_read_to_it(tmp_path, monkeypatch):
+    from tools.errors import InputError
+    from tools.sources import read_text
+
+    path = tmp_path / "x.toml"
+    with path.open("wb") as file:
+        file.truncate(2**40)  # a terabyte of nothing
+    monkeypatch.setattr("tools.sources.LONGEST", 1_000_000)
+    with pytest.raises(InputError, match=r"x\.toml: longer than 1000000 characters"):
+        read_text(path)
