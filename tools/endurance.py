@@ -13,12 +13,14 @@ from typing import Any
 
 import numpy as np
 
+from firmware.core.telemetry import LATENESS
 from tools.cli.common import progress
 
 WARM_UP_S = 20.0
 SAMPLE_S = 10.0
 RSS_LIMIT_BYTES = 1_000_000
 BLOCKS_A_TICK = 0.5  # gained over the whole flight, divided by its ticks: less than one block a tick is none
+LATE_S, LATE_KEPT = 0.005, 200
 LEG_S = 45.0  # about what one leg takes
 
 
@@ -107,6 +109,14 @@ class Samples:
     def __init__(self, seconds: float):
         self.rows = np.zeros((int(seconds / SAMPLE_S) + 8, 5))
         self.count = 0
+        self.late = np.zeros((LATE_KEPT, 2))  # when and by how much, s
+        self.late_count = 0
+
+    def note_late(self, t: float, lateness: float) -> None:
+        """A tick that was late enough to ask why."""
+        if self.late_count < LATE_KEPT:
+            self.late[self.late_count] = t, lateness
+        self.late_count += 1
 
     def take(self, t: float, recorder_pid: int) -> None:
         """One row; the interpreter's blocks first, so that the looking itself is not in them."""
@@ -119,12 +129,15 @@ class Samples:
 
 def _ticks(runtime: Any, keeper: Any, recorder: Any, samples: Samples, seconds: float) -> None:
     """Tick for so long; once a second what a flight does then, and samples after the warm-up."""
-    pid = recorder.pid
+    pid, values = recorder.pid, runtime.channel.values
     begin, next_second, next_sample = runtime.deadline, 0.0, min(WARM_UP_S, seconds / 4)
     with progress("minutes", max(1, round(seconds / 60.0))) as advance:
         minute = 60.0
         while (passed := runtime.deadline - begin) < seconds:
             runtime.tick()
+            lateness = values[LATENESS]
+            if lateness > LATE_S:
+                samples.note_late(passed, lateness)
             if passed >= next_second:
                 keeper.second(runtime.timing)
                 next_second = passed + 1.0
@@ -156,6 +169,7 @@ def _figures(runtime: Any, samples: Samples, seconds: float) -> dict[str, Any]:
         "resident_growth_bytes": int(grown),
         "descriptors": [int(first[3]), int(rows[:, 3].max()), int(last[3])],
         "recorder_growth_bytes": int(last[4] - first[4]),
+        "late_at_s": [[round(float(t), 2), round(float(late), 4)] for t, late in samples.late[: samples.late_count]],
         "measured_from_s": float(first[0]),
         "pass": timing.missed == 0 and abs(blocks) < BLOCKS_A_TICK and grown < RSS_LIMIT_BYTES and last[3] <= first[3],
     }
