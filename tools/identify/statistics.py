@@ -79,13 +79,18 @@ def heat(e: np.ndarray, J: np.ndarray, block: np.ndarray) -> float:
     """How much more the likelihood's slope varies from block to block of the recordings than independent errors would.
 
     1 for white residuals of unit variance. `block` (samples,) numbers stretches of runs. In coordinates in which the
-    normal matrix is the identity, the mean square of the blocks' slopes over what their own normal matrices foresee:
-    the block bootstrap's variance of the estimate, averaged over all directions.
+    normal matrix is the identity, the mean square of the blocks' slopes over what their own normal matrices foresee
+    once the parameters are fitted to these same residuals: the block bootstrap's variance of the estimate, averaged
+    over all directions. Samples of a block stand together.
     """
     count = int(block.max()) + 1
     slopes = np.array([np.bincount(block, row * e, count) for row in J])  # (n, blocks)
     values, vectors = np.linalg.eigh(J @ J.T)
     known = values > 1e-6 * values[-1]
-    slopes = (vectors[:, known] / np.sqrt(values[known])).T @ slopes
-    lost = known.sum() / max(known.sum() + 1, len(np.unique(block)))  # parameters fitted to these same slopes
-    return float(np.square(slopes).sum() / known.sum() / max(1.0 - lost, 0.3))
+    W = (vectors[:, known] / np.sqrt(values[known])).T
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(block)) + 1, [len(block)]])
+    fitted = 0.0  # sum of tr(S S) over the blocks' shares S of the normal matrix
+    for first, last in zip(edges[:-1], edges[1:], strict=True):
+        share = W @ (J[:, first:last] @ J[:, first:last].T) @ W.T
+        fitted += float(np.square(share).sum())
+    return float(np.square(W @ slopes).sum() / max(known.sum() - fitted, 0.1 * known.sum()))

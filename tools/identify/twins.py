@@ -19,7 +19,7 @@ from tools.identify.run import identify
 from tools.runs.case import load_case
 from tools.sources import load_vehicle
 
-RUNS = 9  # of the 45, drawn anew for each data set
+RUNS = 5  # of the 45, drawn anew for each data set
 
 
 def one(vehicle: Vehicle, seed: int, runs: int = RUNS) -> dict[str, dict[str, float]]:
