@@ -1,6 +1,7 @@
 """Sufficient statistics of a linearised likelihood: what the sampler needs of the recordings, and no more."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -90,7 +91,7 @@ def heat(e: np.ndarray, J: np.ndarray, block: np.ndarray) -> float:
     W = (vectors[:, known] / np.sqrt(values[known])).T
     edges = np.concatenate([[0], np.flatnonzero(np.diff(block)) + 1, [len(block)]])
     fitted = 0.0  # sum of tr(S S) over the blocks' shares S of the normal matrix
-    for first, last in zip(edges[:-1], edges[1:], strict=True):
+    for first, last in pairwise(edges):
         share = W @ (J[:, first:last] @ J[:, first:last].T) @ W.T
         fitted += float(np.square(share).sum())
     return float(np.square(W @ slopes).sum() / max(known.sum() - fitted, 0.1 * known.sum()))
