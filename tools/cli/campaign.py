@@ -29,6 +29,10 @@ KEYS = {
 
 @click.command()
 @click.argument("campaign", default="robustness", metavar="[CAMPAIGN]")
+@click.option(
+    "--design", type=click.Choice(["identification"]),
+    help="Make run data instead: the paper's 45 captured runs of a vehicle drawn with --first-seed, for `identify`.",
+)  # fmt: skip
 @click.option("--mission", multiple=True, help="Mission: shipped name or file. Again for more.")
 @click.option("--controller", multiple=True, help="pid, pid_tuned, law, hybrid or law+. Again for more.")
 @click.option("--vehicle", help="Vehicle: shipped name or file.")
@@ -47,12 +51,15 @@ KEYS = {
 @click.option("--dask", metavar="ADDRESS", help="Fly on this Dask cluster instead: tcp://HOST:PORT of its scheduler.")
 @click.option("--chunk", type=click.IntRange(1, 100_000), default=60, show_default=True, help="Flights a chunk.")
 @json_option
-def campaign(campaign, out, jobs, dask, chunk, as_json, **options) -> None:
+def campaign(campaign, design, out, jobs, dask, chunk, as_json, **options) -> None:
     """Fly CAMPAIGN, a shipped name (robustness) or a file; options stand in for what it says.
 
     Every world is flown by every controller. Flights are kept in a folder as they are done: stopped by Ctrl-C or a
     power cut, the same command goes on where it was. Numbers do not depend on processes, chunks or cluster.
     """
+    if design is not None:
+        _make_runs(out or Path(f"{design}-runs"), options, as_json)
+        return
     import msgspec
 
     from tools.campaign.picture import check_installed, write_page
@@ -84,6 +91,29 @@ def campaign(campaign, out, jobs, dask, chunk, as_json, **options) -> None:
         print_json(result)
     else:
         _tell(result)
+
+
+def _make_runs(folder: Path, options: dict[str, Any], as_json: bool) -> None:
+    """The identification design as a case; the truth goes beside it as truth.json."""
+    import json
+
+    from tools.errors import InputError, need
+    from tools.identify.design import grid, truth, write_design
+    from tools.sources import load_vehicle
+
+    need("scipy")
+    given = [
+        name for name, value in options.items() if value not in (None, ()) and name not in ("vehicle", "first_seed")
+    ]
+    if given:
+        raise InputError(f"--{given[0].replace('_', '-')} means nothing with --design", source="options")
+    wanted, seed = options["vehicle"] or "roughie", options["first_seed"] or 0
+    world = write_design(folder, wanted, load_vehicle(wanted), seed)
+    (folder / "truth.json").write_text(json.dumps(truth(world), indent=1) + "\n", encoding="utf-8")
+    if as_json:
+        print_json({"case": str(folder), "runs": len(grid()), "seed": seed, "truth": truth(world)})
+    else:
+        click.echo(folder)
 
 
 def _pair(found: dict, scale: float) -> str:

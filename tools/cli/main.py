@@ -17,6 +17,7 @@ COMMANDS = {
     "log": ("tools.cli.log", "log", "export, look into or repair an onboard log"),
     "import": ("tools.cli.import_", "import_", "bring other recordings into run data"),
     "gap": ("tools.cli.gap", "gap", "measure and predict: where simulation and sea disagree"),
+    "vehicle": ("tools.cli.vehicle", "vehicle", "a first vehicle file by question and answer; a vehicle at a glance"),
     "identify": ("tools.cli.identify", "identify", "parameters and their distribution from runs (MCMC)"),
     "reproduce": ("tools.cli.reproduce", "reproduce", "the paper's figures flown again: pictures and numbers"),
     "campaign": ("tools.cli.campaign", "campaign", "many simulated flights at once, on all cores or on a Dask cluster"),

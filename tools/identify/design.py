@@ -7,7 +7,7 @@ setting says little about damping.
 """
 
 import itertools
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -157,8 +157,10 @@ def write_design(
 ) -> World:
     """The design as a case in `folder`; the truth is returned, not written."""
     runs, world = make_runs(vehicle, seed, picked)
+    own = Path(vehicle_name)
+    text = own.read_text(encoding="utf-8") if own.is_file() else None  # a file of the user's goes with the case
     write_case(
-        folder, [replace(run) for run in runs], vehicle=vehicle_name, site="pool", log_rate_hz=RATE,
+        folder, runs, vehicle=vehicle_name, vehicle_text=text, site="pool", log_rate_hz=RATE,
         water_density_kg_m3=998.0, motion_capture=True, sensors=CAPTURE, suffix=".csv.gz", decimals=DECIMALS,
     )  # fmt: skip
     return world
