@@ -25,9 +25,11 @@ def sea(tmp_path):
         yield found
 
 
-def dive(sea, tmp_path):
-    """Arm, and be well under water."""
-    until(lambda: sea.state()["z_m"] > DEEP_M, 120.0)
+def dive(sea, tmp_path, flight):
+    """Arm, and be well under water; time enough for a busy machine, on which overruns may abort it (row 24)."""
+    until(lambda: sea.state()["z_m"] > DEEP_M or flight.poll() is not None, 300.0)
+    if flight.poll() is not None and "fault 24" in (tmp_path / "stdout").read_text():
+        pytest.skip("too busy a machine for real time: aborted over its overruns")
     assert StateFile(tmp_path / "state").read().phase == Phase.DIVING
 
 
@@ -44,7 +46,7 @@ def comes_up(sea, tmp_path, began):
 @pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_flight_that_is_killed_or_hangs_is_brought_up(sea, tmp_path, end):
     with flying(sea.board, tmp_path / "dive.toml", tmp_path) as flight:
-        dive(sea, tmp_path)
+        dive(sea, tmp_path, flight)
         os.kill(flight.pid, end)
         pulse = Heartbeat.open(tmp_path / "state")
         # Row 25: noticed within 2 s (and a little for a busy machine).
@@ -71,7 +73,7 @@ def test_a_flight_that_is_killed_or_hangs_is_brought_up(sea, tmp_path, end):
 def test_with_the_watch_killed_too_the_next_service_brings_it_up(sea, tmp_path):
     """Everything dies at once, as when the power goes; then the service starts and finds the state."""
     with flying(sea.board, tmp_path / "dive.toml", tmp_path) as flight:
-        dive(sea, tmp_path)
+        dive(sea, tmp_path, flight)
         os.kill(guard_pid(tmp_path / "state"), signal.SIGKILL)
         flight.kill()
         flight.wait()
@@ -87,7 +89,7 @@ def test_with_the_watch_killed_too_the_next_service_brings_it_up(sea, tmp_path):
 
 def test_a_watch_that_is_killed_in_flight_is_replaced(sea, tmp_path):
     with flying(sea.board, tmp_path / "dive.toml", tmp_path) as flight:
-        dive(sea, tmp_path)
+        dive(sea, tmp_path, flight)
         first = guard_pid(tmp_path / "state")
         os.kill(first, signal.SIGKILL)
         until(lambda: guard_pid(tmp_path / "state") != first, 10.0)
@@ -98,7 +100,7 @@ def test_a_watch_that_is_killed_in_flight_is_replaced(sea, tmp_path):
 
 def test_an_orderly_end_leaves_nobody_watching_and_the_next_may_start(sea, tmp_path):
     with flying(sea.board, tmp_path / "dive.toml", tmp_path) as flight:
-        dive(sea, tmp_path)
+        dive(sea, tmp_path, flight)
         guard = guard_pid(tmp_path / "state")
         flight.send_signal(signal.SIGINT)  # given up by a person
         assert flight.wait(180.0) == 1
@@ -110,7 +112,7 @@ def test_an_orderly_end_leaves_nobody_watching_and_the_next_may_start(sea, tmp_p
 
 def test_a_second_flight_on_the_same_vehicle_is_refused(sea, tmp_path):
     with flying(sea.board, tmp_path / "dive.toml", tmp_path) as flight:
-        dive(sea, tmp_path)
+        dive(sea, tmp_path, flight)
         command = [sys.executable, "-m", "tools.cli.main", "fly", "--board", str(sea.board), "--no-log"]
         done = subprocess.run(
             [*command, "--state", str(tmp_path / "state"), "--acknowledge"], capture_output=True, text=True, timeout=60
