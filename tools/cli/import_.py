@@ -33,3 +33,30 @@ def csv(files: tuple[Path, ...], mapping: str, out: Path | None, as_json: bool) 
     else:
         for path in imported.files:
             click.echo(path)
+
+
+@import_.command("qualisys")
+@click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--log", type=click.Path(path_type=Path), help="Case of the onboard logs, a run for each file in turn.")
+@click.option("--body", help="Rigid body.  [default: the first]")
+@click.option("--vehicle", default="roughie", show_default=True, help="Without --log: shipped name or file.")
+@click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder for the case.")
+@json_option
+def qualisys(files, log, body, vehicle, out, as_json) -> None:
+    """Turn 6DOF exports (TSV) of Qualisys into a case, aligned in time with the onboard logs of another case."""
+    from tools.errors import need
+    from tools.importers.captured import import_qualisys
+
+    need("scipy")
+    written, offsets = import_qualisys(list(files), log, body, vehicle, out)
+    for path, offset in zip(files, offsets, strict=True):
+        if offset is not None:
+            say(f"{path}: {offset.seconds:+.3f} s to the log's clock (1 sigma {offset.sd:.3f} s)")
+    if as_json:
+        rows = [
+            {"offset_s": None, "sd_s": None} if o is None else {"offset_s": o.seconds, "sd_s": o.sd} for o in offsets
+        ]
+        print_json({"case": str(out), "files": [str(path) for path in written], "clocks": rows})
+    else:
+        for path in written:
+            click.echo(path)

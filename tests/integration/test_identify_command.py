@@ -1,0 +1,90 @@
+"""`glider identify` on a small captured case: truth held, bad runs named, files that others read."""
+
+import json
+import os
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from firmware.model.vehicle import COEFFICIENTS, decode_vehicle
+from tools.cli.identify import identify
+from tools.identify.design import CAPTURE, make_runs
+from tools.identify.parameters import coefficient_sizes
+from tools.runs import columns as names
+from tools.runs.case import write_case
+from tools.sources import load_vehicle
+
+ABOUT = dict(vehicle="roughie", site="pool", log_rate_hz=50.0, water_density_kg_m3=998.0, sensors=CAPTURE)
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    """A case of seven runs, the capture of one 4 s behind, one in millimetres: result, folder, truth."""
+    folder = tmp_path_factory.mktemp("identify")
+    runs, world = make_runs(load_vehicle("roughie"), 6, [0, 6, 12, 18, 24, 31, 37])
+    late = {name: np.concatenate([np.repeat(np.nan, 200), runs[2].columns[name][:-200]]) for name in names.MOCAP}
+    runs[2] = replace(runs[2], columns=runs[2].columns | late)
+    longer = {name: 1000.0 * runs[4].columns[name] for name in names.MOCAP_POSITION}
+    runs[4] = replace(runs[4], columns=runs[4].columns | longer)
+    write_case(folder / "case", runs, **ABOUT)
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    ran = CliRunner().invoke(identify, [str(folder / "case"), "--out", str(folder / "out"), "--json"])
+    assert ran.exit_code == 0, ran.output
+    return json.loads(ran.stdout), folder / "out", world.coefficients()
+
+
+def test_the_truth_is_held_and_close(found):
+    result, _, truth = found
+    sizes = dict(zip(COEFFICIENTS, coefficient_sizes(load_vehicle("roughie").vector()), strict=True))
+    assert [p["name"] for p in result["parameters"]] == list(COEFFICIENTS)
+    assert np.median([abs(p["mean"] - truth[p["name"]]) / sizes[p["name"]] for p in result["parameters"]]) < 0.02
+    assert sum(p["ci90"][0] <= truth[p["name"]] <= p["ci90"][1] for p in result["parameters"]) >= 8
+    assert all(p["rhat"] <= 1.01 and p["ess"] >= 400 for p in result["parameters"])
+    assert 0.3 < result["acceptance"] < 0.6
+
+
+def test_runs_that_cannot_be_fitted_are_named(found):
+    result, _, _ = found
+    reasons = {entry["run"]: entry["reason"] for entry in result["divergent_runs"]}
+    assert set(reasons) == {"run02", "run04"}
+    assert "millimetres?" in reasons["run04"]
+    assert "misses every model" in reasons["run02"]
+
+
+def test_flights_left_out_are_predicted_better(found):
+    held = found[0]["held_out"]
+    assert held["after"]["total"] < 0.5 * held["before"]["total"]
+
+
+def test_files_are_there_and_others_read_them(found):
+    import arviz
+
+    result, out, _ = found
+    vehicle = decode_vehicle((out / "identified.toml").read_text(encoding="utf-8"), "identified.toml")
+    assert vehicle.hydrodynamics.K_L == pytest.approx(result["parameters"][3]["mean"])
+    assert vehicle.identified.runs == 5
+    C = np.array(vehicle.identified.covariance)
+    assert np.sqrt(C[3, 3]) == pytest.approx(result["parameters"][3]["sd"], rel=0.05)
+    posterior = arviz.from_netcdf(str(out / "posterior.nc")).posterior
+    assert float(posterior["K_L"].mean()) == pytest.approx(result["parameters"][3]["mean"])
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "data:image/png;base64" in page
+    assert "run04" in page
+    assert 'src="http' not in page
+
+
+def test_a_case_of_nothing_but_bad_runs_is_one_line(tmp_path):
+    from tools.errors import InputError
+
+    runs, _ = make_runs(load_vehicle("roughie"), 6, [0, 6])
+    bad = [
+        replace(run, columns=run.columns | {n: np.degrees(run.columns[n]) for n in names.MOCAP_ATTITUDE})
+        for run in runs
+    ]
+    write_case(tmp_path / "case", bad, **ABOUT)
+    ran = CliRunner().invoke(identify, [str(tmp_path / "case")])
+    assert isinstance(ran.exception, InputError)
+    assert "none of 2 runs can be used" in str(ran.exception)
+    assert "run00.csv" in str(ran.exception)

@@ -1,0 +1,51 @@
+"""The paper's likelihood in weak form: it finds what was flown, and a capture without noise leaves little error."""
+
+import numpy as np
+import pytest
+
+from firmware.model.vehicle import COEFFICIENTS
+from tools.errors import InputError
+from tools.gap.model import Model
+from tools.identify.accelerations import bandwidth, fit_accelerations, kinematics
+from tools.identify.design import make_runs
+from tools.identify.parameters import coefficient_sizes
+from tools.runs.run import Run
+from tools.sources import load_vehicle
+
+
+def test_coefficients_are_found_within_two_percent_of_their_size():
+    vehicle = load_vehicle("roughie")
+    runs, world = make_runs(vehicle, 2)
+    P = vehicle.vector()
+    statistics, free = fit_accelerations(Model("nominal", P, np.zeros_like(P)), runs)
+    found, truth = free.si(statistics.mode), world.coefficients()
+    error = np.abs(found - [truth[name] for name in COEFFICIENTS]) / coefficient_sizes(P)
+    assert np.median(error) < 0.01
+    # the capture's clock, up to 20 ms late, is not free here: dampings pay for it
+    assert error.max() < 0.08
+    start = np.abs(free.nominal - [truth[name] for name in COEFFICIENTS]) / coefficient_sizes(P)
+    assert np.median(error) < 0.2 * np.median(start)
+
+
+def test_velocities_are_those_flown():
+    vehicle = load_vehicle("roughie")
+    runs, world = make_runs(vehicle, 3, [0])
+    motion = kinematics(runs[0], vehicle.vector())
+    speed = np.linalg.norm(motion.nu[50:-50, :3], axis=1)
+    path = np.column_stack([runs[0].columns[name] for name in ("mocap_x_m", "mocap_y_m", "mocap_z_m")])
+    ends = path[np.isfinite(path).all(axis=1)]
+    assert np.all(speed < 1.0)
+    assert speed.mean() * 18.0 > np.linalg.norm(ends[-1] - ends[0])  # no path is shorter than a straight line
+    assert world.P.shape == vehicle.vector().shape
+
+
+def test_bandwidth_is_as_stated():
+    assert bandwidth(50.0) == pytest.approx(2.3, abs=0.05)
+
+
+def test_runs_without_capture_are_refused():
+    vehicle = load_vehicle("roughie")
+    P = vehicle.vector()
+    run = Run("run00", None, {"t_s": np.arange(10.0)})
+    with pytest.raises(InputError, match="needs motion capture"):
+        fit_accelerations(Model("nominal", P, np.zeros_like(P)), [run])
