@@ -7,7 +7,7 @@ setting says little about damping.
 """
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -133,10 +133,17 @@ def captured(X: np.ndarray, world: World, sensors: SensorsPart, rng: np.random.G
     return pose
 
 
-def make_runs(vehicle: Vehicle, seed: int, picked: list[int] | None = None) -> tuple[list[Run], World]:
-    """Runs of a vehicle drawn with `seed` (all 45, or some by number), as recorded, and the truth."""
+def make_runs(
+    vehicle: Vehicle, seed: int, picked: list[int] | None = None, square: bool = False
+) -> tuple[list[Run], World]:
+    """Runs of a vehicle drawn with `seed` (all 45, or some by number), as recorded, and the truth.
+
+    square: the capture's body sits on the vehicle's axes and its clock is the onboard one.
+    """
     rng = np.random.default_rng(np.random.SeedSequence([seed, 45]))
     world = draw_world(vehicle, rng)
+    if square:
+        world = replace(world, frame=np.zeros(6), delay=0.0)
     commanded = commands(vehicle, rng, list(range(len(grid()))) if picked is None else picked)
     X = fly(vehicle, world, rng, commanded)
     runs = []

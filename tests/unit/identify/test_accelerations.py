@@ -13,18 +13,25 @@ from tools.runs.run import Run
 from tools.sources import load_vehicle
 
 
-def test_coefficients_are_found_within_two_percent_of_their_size():
+def errors(seed: int, square: bool) -> np.ndarray:
+    """Errors of the coefficients in their sizes, (12,), from all 45 runs."""
     vehicle = load_vehicle("roughie")
-    runs, world = make_runs(vehicle, 2)
+    runs, world = make_runs(vehicle, seed, square=square)
     P = vehicle.vector()
     statistics, free = fit_accelerations(Model("nominal", P, np.zeros_like(P)), runs)
-    found, truth = free.si(statistics.mode), world.coefficients()
-    error = np.abs(found - [truth[name] for name in COEFFICIENTS]) / coefficient_sizes(P)
-    assert np.median(error) < 0.01
-    # the capture's clock, up to 20 ms late, is not free here: dampings pay for it
-    assert error.max() < 0.08
-    start = np.abs(free.nominal - [truth[name] for name in COEFFICIENTS]) / coefficient_sizes(P)
-    assert np.median(error) < 0.2 * np.median(start)
+    truth = [world.coefficients()[name] for name in COEFFICIENTS]
+    return np.abs(free.si(statistics.mode) - truth) / coefficient_sizes(P)
+
+
+def test_coefficients_are_found_where_the_capture_sits_square():
+    found = errors(2, square=True)
+    assert np.median(found) < 0.01
+    assert found.max() < 0.05
+
+
+def test_a_capture_that_sits_askew_and_late_biases_this_likelihood():
+    found = errors(2, square=False)  # what the trajectory likelihood is for
+    assert 0.01 < np.median(found) < 0.1
 
 
 def test_velocities_are_those_flown():
