@@ -6,7 +6,6 @@
 import math
 
 from firmware.core import control_layout as at
-from firmware.core.control import limited
 from firmware.core.coverage import forget_coverage, watch
 from firmware.core.estimator_layout import S_ANGULAR, S_LINEAR
 from firmware.core.guidance import follow, sequence
@@ -22,6 +21,7 @@ from firmware.core.layout import (
     SLIDER_MIN,
     SLIDER_RATE,
 )  # fmt: skip
+from firmware.core.limits import limited
 from firmware.core.navigation import navigate
 from firmware.core.sensing import sense, take_as_measured
 from firmware.core.steering import steer

@@ -1,4 +1,4 @@
-"""The baseline controllers: PID for pitch and depth, feedforward/PD for roll (37), reference filters, limits."""
+"""The baseline controllers: PID for pitch and depth, feedforward/PD for roll (37), reference filters."""
 
 import math
 
@@ -49,14 +49,3 @@ def roll_law(roll_ref, roll_rate_ref, roll, roll_rate, kp, kd):
 def pitch_feedforward(sr, m_s, x_b, pitch, ballast, low, high):
     """Slider position (m) at which gravity alone holds a pitch (rad): m_s dr_s + m_b x_b = -sr tan(theta)."""
     return clip(-(sr * math.tan(clip(pitch, -1.3, 1.3)) + ballast * x_b) / m_s, low, high)
-
-
-@kernel
-def limited(wanted, last, low, high, rate, dt):
-    """The last word on a command: finite, within its range, and no further from the last than its rate allows.
-
-    A wanted value that is not finite keeps the last command; rounding never carries the result past the range.
-    """
-    if not math.isfinite(wanted):
-        return last
-    return clip(clip(wanted, last - rate * dt, last + rate * dt), low, high)

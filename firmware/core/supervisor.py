@@ -7,7 +7,6 @@ import math
 
 from firmware.core import control_layout as ctl
 from firmware.core import supervisor_layout as at
-from firmware.core.control import limited
 from firmware.core.detectors import (
     ABSURD,
     ask,
@@ -33,6 +32,7 @@ from firmware.core.layout import (
     SLIDER_RATE,
     SLIDER_TAU,
 )
+from firmware.core.limits import limited
 from firmware.core.screening import start_place
 
 MINS, RATES = (SERVO_MIN, SLIDER_MIN, BALLAST_MIN), (SERVO_RATE, SLIDER_RATE, BALLAST_RATE)

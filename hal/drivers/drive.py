@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from hal.boardfile import DriveTable
 from hal.drivers.modbus_sensors import nearest
-from hal.drivers.poll import Poll, exception_text
+from hal.drivers.poll import Poll, Refusals, exception_text
 from hal.drivers.samples import Health, Sensor, State
 from hal.ports import SLOTS, Condition, Validity
 from hal.protocols import modbus
@@ -55,8 +55,10 @@ class Drive:
         self._watch = Watch(table.stall_m, table.stall_s)
         self._low = registers.read(table.id, "position_low")
         position = [registers.read(table.id, "position"), self._low]
-        self._position = Poll(position, 1.0 / table.rate_hz, self._took_position, self.health)
-        self._status = Poll([registers.read(table.id, "status")], STATUS_S, self._took_status, self.health)
+        self._position = Poll(position, 1.0 / table.rate_hz, self._took_position, self.health, in_error=self.refused)
+        self._status = Poll(
+            [registers.read(table.id, "status")], STATUS_S, self._took_status, self.health, in_error=self.refused
+        )
         self._mover = Mover(self)
         self._state = State(SLOTS[name])
         self.start, self.read = self._state.start, self._state.read
@@ -95,6 +97,10 @@ class Drive:
 
     def answering(self, now: float) -> bool:
         return now - self.counts_at < LOST_AFTER_S
+
+    def refused(self, now: float, what: str) -> None:
+        """It answers, and refuses what it is asked, for good."""
+        self._state.answered(now, Condition.MISCONFIGURED)
 
     def _condition(self) -> Condition:
         """How it does, as the supervisor asks."""
@@ -228,6 +234,7 @@ class Mover:
         self.stop_wanted = self.clear_wanted = False
         self.clears = 0
         self.rest_until = -math.inf
+        self._refusals = Refusals()
         self._written: float | None = None
         self._next = -math.inf
         self._stopping = False
@@ -281,6 +288,7 @@ class Mover:
         return whole, modbus.write_many(self.device, address + 1, words[1:])
 
     def answered(self, request: Request, reply: Frame, asked_at: float, now: float) -> None:
+        self._refusals.running = 0
         if request in self._stops:
             self.stop_wanted = False
             self._written = None
@@ -297,6 +305,8 @@ class Mover:
             health.exceptions += 1
             health.say(now, exception_text(exception))
             self._next = now + 0.1
-        elif failure is Failure.TIMEOUT:
+            if self._refusals.refused(exception):
+                self._drive.refused(now, exception_text(exception))
+        elif failure in (Failure.TIMEOUT, Failure.DAMAGED):
             health.timeouts += 1
             self._written = None

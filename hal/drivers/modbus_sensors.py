@@ -22,7 +22,7 @@ class Beacon(Sensor):
         self._zero, self._map = table.zero_pa, registers
         self._temperature = 15.0
         variants = [registers.read(table.id, "all"), registers.read(table.id, "pressure")]
-        self.poll = Poll(variants, self.period, self._taken, self.health)
+        self.poll = Poll(variants, self.period, self._taken, self.health, in_error=self.fail, damaged=self.damage)
 
     def _taken(self, request: Request, registers: list[int], asked_at: float, now: float) -> None:
         block = self._map.block["all" if len(registers) == 4 else "pressure"]
@@ -76,7 +76,18 @@ class AnalogModule:
         last = max(channel for channel, _ in inputs)
         counts = range(block.count, max(last, block.count - 3) - 1, -1)
         variants = [modbus.read(device, block.function, block.address, count) for count in counts]
-        self.poll = Poll(variants, min(item.period for _, item in inputs), self._taken, self.health)
+        self.poll = Poll(
+            variants, min(item.period for _, item in inputs), self._taken, self.health,
+            in_error=self._fail, damaged=self._damage,
+        )  # fmt: skip
+
+    def _fail(self, now: float, what: str) -> None:
+        for _, item in self._inputs:
+            item.fail(now, what)
+
+    def _damage(self, now: float) -> None:
+        for _, item in self._inputs:
+            item.damage(now)
 
     def _taken(self, request: Request, registers: list[int], asked_at: float, now: float) -> None:
         for channel, item in self._inputs:
@@ -90,7 +101,10 @@ class EncoderWire:
         self._item, self._map = item, registers
         self._count = 0
         self._poll_low = registers.read(device, "low")
-        self.poll = Poll([registers.read(device, "all"), self._poll_low], item.period, self._taken, item.health)
+        self.poll = Poll(
+            [registers.read(device, "all"), self._poll_low], item.period, self._taken, item.health,
+            in_error=item.fail, damaged=item.damage,
+        )  # fmt: skip
 
     def _taken(self, request: Request, registers: list[int], asked_at: float, now: float) -> None:
         if request is self._poll_low:

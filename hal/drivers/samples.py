@@ -11,6 +11,8 @@ from hal.ports import Condition, Slot, Validity
 
 FAULTY_AFTER = 5  # unfit samples running, past which the device is in error
 STALE_PERIODS = 3.0
+DAMAGES = 5  # damaged frames in DAMAGE_S, past which the device is in error, until there were fewer
+DAMAGE_S = 60.0
 
 
 @dataclass
@@ -71,6 +73,7 @@ class Sensor:
         self._slot[1] = Validity.MISSING
         self._running_unfit = 0
         self._taken_at = -math.inf
+        self._damages: deque[float] = deque(maxlen=DAMAGES + 1)
         self.epoch = 0.0  # s, when the board's time began, on the clock that `put` is told
 
     def start(self, epoch: float) -> None:
@@ -109,6 +112,8 @@ class Sensor:
                 return False
         if taken_at <= self._taken_at:
             return True
+        if self._distrusted(now):
+            return False
         self._running_unfit = 0
         if health.error:
             health.say(now, "")
@@ -117,6 +122,23 @@ class Sensor:
         self._slot[0], self._slot[1] = taken_at - self.epoch, Validity.VALID
         self._slot[2:] = values
         return True
+
+    def fail(self, now: float, what: str) -> None:
+        """The device is in error, until it has a fit sample again."""
+        self._slot[1] = Validity.FAULT
+        if self.health.error != what:
+            self.health.say(now, what)
+
+    def damage(self, now: float, frames: int = 1) -> None:
+        """So many frames failed their check sum: dropped and counted; too many in a minute are an error."""
+        self.health.damaged += frames
+        for _ in range(min(frames, DAMAGES + 1)):
+            self._damages.append(now)
+        if self._distrusted(now):
+            self.fail(now, f"more than {DAMAGES} damaged frames in {DAMAGE_S:g} s")
+
+    def _distrusted(self, now: float) -> bool:
+        return len(self._damages) > DAMAGES and now - self._damages[0] <= DAMAGE_S
 
     def age(self, now: float) -> None:
         """Say that the sample is stale once it is older than three periods."""

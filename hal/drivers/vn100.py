@@ -49,7 +49,7 @@ class Vn100(Sensor):
         self._R_bd = None if level else rotation(*(math.radians(angle) for angle in table.mount_deg))
         self.decoder = vn100.Vn100Decoder()
         self.model = ""
-        self.errors = 0
+        self.errors = self._bad = 0
         self._send: Callable[[bytes], bool] = lambda data: False
         self._heard_at = self._asked_at = -math.inf
 
@@ -84,7 +84,9 @@ class Vn100(Sensor):
                 self.model = ",".join(message.fields[1:])
             elif message.header == "VNERR":
                 self.errors += 1
-        self.health.damaged = self.decoder.bad
+        if self.decoder.bad > self._bad:
+            self.damage(now, self.decoder.bad - self._bad)
+            self._bad = self.decoder.bad
         if newest is not None:
             self._heard_at = now
             self.put(now - self._delay, self._to_body(newest), now)

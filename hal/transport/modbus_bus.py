@@ -29,6 +29,7 @@ class Failure(Enum):
     """Why a request was not answered."""
 
     TIMEOUT = "no answer"
+    DAMAGED = "damaged answer"  # as a timeout, but something came whose check sum failed
     EXCEPTION = "exception"
     DISCONNECTED = "line lost"
 
@@ -191,11 +192,12 @@ class ModbusBus:
         for frame in listener.feed(bytes(self._window)):
             self.counts.wrong += 1
             self._missing.pop(looks_of(frame), None)
-        self.counts.damaged += self._decoder.bad > 0
+        damaged = self._decoder.bad > 0
+        self.counts.damaged += damaged
         self._missing[request.looks] = now + self.forget_s
         self.silent[request.device] = self.silent.get(request.device, 0) + 1
         self._quiet_until = max(now, self._asked_at + self.longest_s + request.reply_size * self.byte_s)
-        self._end(Failure.TIMEOUT, 0, now)
+        self._end(Failure.DAMAGED if damaged else Failure.TIMEOUT, 0, now)
 
     # --- asking -----------------------------------------------------------------------------------------------------
     def service(self, now: float) -> float:

@@ -3,6 +3,7 @@
 No plant and no filter: what the autopilot believes and is at is written down, so that a detector is looked at alone.
 """
 
+import copy
 import math
 
 import msgspec
@@ -18,7 +19,6 @@ from hal.ports import SLOTS, Validity
 from tools.sources import load_mission, load_vehicle
 
 DT = 0.02
-PERIODS = {"imu": 0.02, "beacon": 0.04, "wires": 0.04}
 SLIDER_RANGE, BALLAST_RANGE = (-0.06, 0.06), (-0.20, 0.20)
 KG_PER_M = 998.2 * 0.0062
 
@@ -31,20 +31,21 @@ class Watchman:
     """
 
     def __init__(self, *, limits: Limits | None = None, mode: float = ctl.FLYING, fitted: tuple = (),
-                 site: float = 1000.0, **settings):  # fmt: skip
+                 site: float = 1000.0, dt: float = DT, **settings):  # fmt: skip
+        self.dt, periods = dt, {"imu": dt, "beacon": 2 * dt, "wires": 2 * dt}
         vehicle = load_vehicle("roughie")
         if limits is not None or settings:
             table = msgspec.structs.replace(vehicle.supervisor, **settings)
             vehicle = msgspec.structs.replace(vehicle, limits=limits, supervisor=table)
         _, source, mission = load_mission("sawtooth")
         mission = msgspec.structs.replace(mission, site=msgspec.structs.replace(mission.site, depth_m=site))
-        C = configuration(vehicle, mission, dt=DT, periods=PERIODS)
+        C = configuration(vehicle, mission, dt=dt, periods=periods)
         self.pilot = Autopilot(vehicle, mission, C, source)
-        self.supervisor = Supervisor(self.pilot, vehicle, mission, dt=DT, periods=PERIODS)
-        self.G, self.est, self.ap = self.supervisor.G, self.pilot.est, self.pilot.ap
-        self.frame, self.commands = self.pilot.frame, self.pilot.commands
+        self.supervisor = Supervisor(self.pilot, vehicle, mission, dt=dt, periods=periods)
+        self.slow = max(1, round(0.2 / dt))  # ticks between two samples of leak and battery
+        self._share()
         self.fitted = ("imu", "beacon", "slider_wire", "plunger_wire", "servo", "slider", "ballast", *fitted)
-        self.t, self.number = -DT, 0
+        self.t, self.number = -dt, 0
         self.depth, self.pitch, self.roll = 2.0, -0.3, 0.0
         self.sinks = 0.2  # m/s
         self.places = [0.0, 0.0]  # slider m, ballast kg
@@ -58,6 +59,17 @@ class Watchman:
         self.est[ctl.EST_DENSITY] = 998.2
         self._raw = np.full(len(self.frame), np.nan)
         self._spoken: set[str] = set()
+
+    def copy(self) -> "Watchman":
+        """Another of the same, at the same moment."""
+        other = copy.deepcopy(self)
+        other._share()
+        return other
+
+    def _share(self) -> None:
+        """Arrays that supervisor, autopilot and this have in common."""
+        self.G, self.est, self.ap = self.supervisor.G, self.pilot.est, self.pilot.ap
+        self.frame, self.commands = self.pilot.frame, self.pilot.commands
 
     def values(self, name: str) -> tuple:
         """What a healthy sensor says now, never the same twice."""
@@ -84,10 +96,10 @@ class Watchman:
     def step(self, ticks: int = 1) -> Reaction:
         """So many ticks; the reaction after the last."""
         for _ in range(ticks):
-            self.t = round(self.t + DT, 9)
-            self.depth += self.sinks * DT
+            self.t = round(self.t + self.dt, 9)
+            self.depth += self.sinks * self.dt
             for name in self.fitted:
-                due = {"imu": 1, "leak": 10, "battery": 10}.get(name, 2)
+                due = {"imu": 1, "leak": self.slow, "battery": self.slow}.get(name, 2)
                 if self.number % due == 0:
                     self._sample(name)
             for name in self._spoken:
@@ -111,7 +123,7 @@ class Watchman:
             self.est[ctl.EST_BEACON_TIME] = self.t
 
     def seconds(self, seconds: float) -> Reaction:
-        return self.step(round(seconds / DT))
+        return self.step(round(seconds / self.dt))
 
     def until(self, reaction: Reaction, most: float) -> float:
         """Seconds until this reaction or a higher one; fails past `most`."""

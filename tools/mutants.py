@@ -1,0 +1,58 @@
+"""`python -m tools.mutants FOLDER`: are the tests of supervisor and limits any good? Mutants of their code, by mutmut.
+
+mutmut leaves decorated functions alone, and a compiled kernel shows it nothing: the copy that it works on has no
+`@kernel`, which is what GLIDER_JIT=0 makes of it anyway. Needs `pip install mutmut`; takes some minutes.
+"""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import click
+
+ROOT = Path(__file__).resolve().parents[1]
+MUTATED = (
+    "firmware/core/supervisor.py", "firmware/core/detectors.py", "firmware/core/screening.py",
+    "firmware/core/limits.py", "firmware/supervisor/settings.py",
+)  # fmt: skip
+PARTS = ("firmware", "hal", "sim_backend", "tools", "tests/support", "tests/unit/supervisor", "tests/conftest.py")
+CONFIG = """
+[tool.mutmut]
+source_paths = {mutated}
+also_copy = ["firmware", "hal", "sim_backend", "tools", "tests"]
+pytest_add_cli_args_test_selection = ["tests/unit/supervisor"]
+max_children = {children}
+
+[tool.pytest.ini_options]
+addopts = "-q -p no:cacheprovider"
+"""
+
+
+@click.command()
+@click.argument("folder", type=click.Path(path_type=Path, file_okay=False))
+@click.option("--children", default=2, show_default=True, help="Processes at once.")
+def main(folder: Path, children: int) -> None:
+    """Make a copy in FOLDER, which is emptied, and try every mutant of supervisor and limits on their tests."""
+    shutil.rmtree(folder, ignore_errors=True)
+    for part in PARTS:
+        target = folder / part
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if (ROOT / part).is_dir():
+            shutil.copytree(ROOT / part, target, ignore=shutil.ignore_patterns("__pycache__"))
+        else:
+            shutil.copy(ROOT / part, target)
+    for name in MUTATED:
+        path = folder / name
+        path.write_text(re.sub(r"^@kernel\n", "", path.read_text(), flags=re.MULTILINE))
+    (folder / "pyproject.toml").write_text(CONFIG.format(mutated=list(MUTATED), children=children))
+    environment = {**os.environ, "GLIDER_JIT": "0", "PYTHONPATH": ""}
+    command = [sys.executable, "-m", "mutmut"]
+    subprocess.run([*command, "run"], cwd=folder, env=environment, check=False)
+    raise SystemExit(subprocess.run([*command, "results"], cwd=folder, env=environment, check=False).returncode)
+
+
+if __name__ == "__main__":
+    main()
