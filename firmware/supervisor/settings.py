@@ -47,7 +47,7 @@ class SupervisorTable(Table):
     frozen_s: Short = 0.12
     stuck_s: Short = 1.8
     unfit_run: Count = 5
-    disagree_s: Short = 4.8
+    disagree_s: Short = 4.2
     disagree_pitch_deg: Angle = 8.0
     disagree_rate_m_s: Annotated[float, msgspec.Meta(gt=0.0, le=2.0)] = 0.05
     deep_s: Short = 0.5

@@ -9,7 +9,8 @@ import numpy as np
 
 from firmware.core import control_layout as ctl
 from firmware.core import supervisor_layout as at
-from firmware.core.layout import CG_X, CG_Y, X_ACT
+from firmware.core.layout import CG_X, CG_Y, X_ACT, X_QUAT
+from firmware.core.rotations import euler_from_quaternion
 from firmware.supervisor.settings import Limits
 from firmware.supervisor.table import Reaction
 from tools.faults.cases import ALL, MOVING, UNDER_WAY, Case
@@ -171,11 +172,17 @@ def lateness(pattern):
     return begin
 
 
-def plant(place: int, value: float):
-    """The vehicle itself changes: a parameter of the plant."""
+def tipped(place: int, metres: float):
+    """A mass in the hull comes loose; time counts from when the vehicle is past 60 deg of pitch or 75 of roll."""
 
     def begin(scene: Scene) -> None:
-        scene.world.P[place] += value
+        def past(scene: Scene, t: float) -> None:
+            roll, pitch, _ = euler_from_quaternion(*scene.world.x[X_QUAT : X_QUAT + 4])
+            if "past" not in scene.notes and (abs(pitch) > math.radians(60.0) or abs(roll) > math.radians(75.0)):
+                scene.notes["past"] = scene.since = t
+
+        scene.world.P[place] += metres
+        scene.each_tick = past
 
     return begin
 
@@ -268,7 +275,7 @@ def conditions() -> list[Case]:
     risk = Limits(working_depth_m=1.99, at_risk_depth_m=2.0)
     drift = {"drift": (-4_000.0, 0.0)}
     cases = [
-        Case(13, "pressure drifts", device("beacon", "wrong", **drift), WARN, 5.0 + 2.0, ("descent",)),
+        Case(13, "pressure drifts", device("beacon", "wrong", **drift), WARN, 5.0, ("descent",)),
         Case(15, "past the slider's range", controller(0.09), LOG, 0.0, UNDER_WAY),
         Case(15, "past the servo's range", controller(-2.0, index=0), LOG, 0.0, UNDER_WAY),
         Case(15, "past the ballast's range", controller(0.5, index=2), LOG, 0.0, ("descent",)),
@@ -276,13 +283,13 @@ def conditions() -> list[Case]:
         Case(17, "deeper than the at-risk depth", too_deep(2.0), OOB, 0.2, ("descent",), Setting(limits=risk)),
         Case(18, "pump hears nothing", pump_fails_in_abort("silent"), OOB, 30.0, ("descent",)),
         Case(18, "pump jams", pump_fails_in_abort("stuck"), HW, 30.0, ("descent",)),
-        Case(19, "too light to dive", nothing, ABORT, 121.0, ("waiting",),
+        Case(19, "too light to dive", nothing, ABORT, 120.0, ("waiting",),
              Setting(effects={"net_buoyancy": {"mass": -0.3}})),
         Case(19, "mission overtime", nothing, ABORT, 41.0, ("waiting",), Setting(mission_s=40.0)),
         Case(20, "leak, one sample", leak(1), WARN, 1.0),
         Case(20, "leak", leak(1000), ABORT, 1.0),
-        Case(21, "mass shifted forward", plant(CG_X, 0.04), ABORT, 2.0 + 8.0, MOVING),
-        Case(21, "mass shifted to the side", plant(CG_Y, 0.05), ABORT, 2.0 + 8.0, UNDER_WAY),
+        Case(21, "mass shifted forward", tipped(CG_X, 0.04), ABORT, 2.0, MOVING),
+        Case(21, "mass shifted to the side", tipped(CG_Y, 0.05), ABORT, 2.0, UNDER_WAY),
         Case(22, "no number, once", controller(math.nan, 1), WARN, 0.0, UNDER_WAY),
         Case(22, "no number", controller(math.nan), ABORT, 0.0, UNDER_WAY),
         Case(22, "beyond all measure", controller(1e6), ABORT, 0.0, UNDER_WAY),

@@ -283,17 +283,20 @@ def torn_state(disabled: bool, folder: Path) -> Came:
     believed = 0
     for old, new in ((Phase.ASHORE, Phase.DIVING), (Phase.DIVING, Phase.ASHORE)):
         for copy in (0, 1):
-            for cut in range(0, state_file.BLOCK, 3):
+            for cut in range(0, state_file.BLOCK, 7):
                 file = StateFile(folder)
                 before = file.write(old)
                 block = state_file.encode(FlightState(new, sequence=before.sequence + 1))
                 for path in file.paths[:copy]:
                     path.write_bytes(block)
                 kept = file.paths[copy].read_bytes()
-                file.paths[copy].write_bytes(block[:cut] + (b"" if cut % 2 else kept[cut:]))
+                torn = block[:cut] + (b"" if cut % 2 else kept[cut:])
+                file.paths[copy].write_bytes(torn)
                 with _patched(disabled, "hal.state_file.decode", trusting):
                     found = file.read()
-                believed += found.phase < Phase.DIVING and not (cut == 0 and old == Phase.ASHORE and copy == 0)
+                untouched = old == Phase.ASHORE and copy == 0 and torn == kept  # nothing of it has changed yet
+                finished = new == Phase.ASHORE and copy == 1 and torn == block  # all of it has
+                believed += found.phase < Phase.DIVING and not (untouched or finished)
     return (
         (None if believed else 0.0),
         "the worse wins" if not believed else f"{believed} believed",
@@ -358,7 +361,7 @@ def full_disk(disabled: bool, folder: Path) -> Came:
 
 
 def cut_log(disabled: bool, folder: Path) -> Came:
-    """A log cut at 300 places, a torn sector behind each cut: what is read has to be what was written."""
+    """A log with a torn sector at 300 places: what is read has to be what was written, all of it up to there."""
     from firmware.telemetry import TICK
     from hal.recorder import disk
     from hal.recorder.logfile import LogFile
@@ -366,27 +369,30 @@ def cut_log(disabled: bool, folder: Path) -> Came:
 
     path = folder / "whole.mcap"
     fd = disk.create(str(path))
-    log, rows = LogFile(disk.DiskFile(fd), [TICK], attachments={}, metadata={}), 2000
+    file, rows = disk.DiskFile(fd), 2000
+    log = LogFile(file, [TICK], attachments={}, metadata={})
     for number in range(rows):
         log.record(0, number + 1, 0.02 * number, np.full(TICK.width, float(number)).tobytes())
         if number % 25 == 24:
             log.flush()
     log.finish({})
+    file.sync()
     disk.close(fd, str(path), keep=True)
     whole, rng, wrong, lost = path.read_bytes(), random.Random(5), 0, 0.0
     torn = folder / "torn.mcap"
     for cut in np.linspace(400, len(whole), 300).astype(int):
-        tail = bytearray(whole[cut : cut + 512])
+        tail = bytearray(whole[cut : cut + 40_000])
         for _ in range(3):
             if tail:
-                tail[rng.randrange(len(tail))] ^= 1 << rng.randrange(8)
+                tail[rng.randrange(min(512, len(tail)))] ^= 1 << rng.randrange(8)
         torn.write_bytes(whole[:cut] + tail)
         with _patched(disabled, "tools.log.framing._chunk", _unchecked):
             topic = _ticks(read_log, torn)
-        values = topic.column("t_s") if topic is not None else np.zeros(0)
-        wrong += int(np.any(values != np.arange(len(values))))
-        there = np.searchsorted(_ends(whole), cut)
-        lost = max(lost, 0.02 * (25 * there - len(values)))
+        data = np.zeros((0, TICK.width)) if topic is None else topic.data
+        first = data[:, 0]
+        wrong += int(np.any(data != np.round(data[:, :1])) or np.any(np.diff(first) <= 0.0))
+        there = 25 * int(np.searchsorted(_ends(whole), cut, side="right"))
+        lost = max(lost, 0.02 * (there - int(np.sum(first < there))))
     good = wrong == 0 and lost <= 1.0
     return (
         (0.0 if good else None),
@@ -396,10 +402,12 @@ def cut_log(disabled: bool, folder: Path) -> Came:
 
 
 def _ticks(read_log: Any, path: Path) -> Any:
+    """The log's ticks; None where nothing of them is there."""
     try:
-        return read_log(path).topics.get("/tick")
+        topic = read_log(path).topics.get("/tick")
     except InputError:  # cut before anything of it was there
         return None
+    return topic if topic is not None and topic.data is not None else None
 
 
 def _unchecked(body: bytes) -> tuple[bytes | None, str]:
@@ -557,8 +565,8 @@ def shows() -> list[Show]:
         Show(25, "restart", restart, "ascent only", 2.0),
         Show(26, "an hour on and back", wall_clock, "no effect", 0.0),
         Show(27, "disk full", full_disk, "LOG", 1.0),
-        Show(28, "cut at 300 places", cut_log, "valid prefix", 0.0),
-        Show(29, "torn at every third byte", torn_state, "the worse wins", 0.0),
+        Show(28, "torn at 300 places", cut_log, "valid prefix", 0.0),
+        Show(29, "torn at every seventh byte", torn_state, "the worse wins", 0.0),
         Show(30, "files", bad_files, "refused", 0.0),
         Show(31, "random and mutated bytes", hostile_bytes, "back in step", 1.0),
         Show(32, "garbage", console, "no effect", 0.0),
