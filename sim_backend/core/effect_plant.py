@@ -247,14 +247,20 @@ def remember(F, x, before, dt):
 
 
 @kernel
-def effect_step(P, F, x, mode, c_servo, c_slider, c_ballast, since, acc, force, water, dt, work):
-    """One classical Runge-Kutta step of (P folded, F), in place; x (N_XF), work (6, N_XF) scratch."""
-    k1, k2, k3, k4, y, before = work[0], work[1], work[2], work[3], work[4], work[5]
+def begin_step(F, x, before, y):
+    """What `remember` wants of a step's start, into before, and what effects remember, into y."""
     if F[ef.ATTITUDE_LAG] > 0.0:
         before[0], before[1], before[2] = euler_from_quaternion(x[3], x[4], x[5], x[6])
     before[3] = x[2]
     for i in range(N_X, ef.N_XF):
         y[i] = x[i]
+
+
+@kernel
+def effect_step(P, F, x, mode, c_servo, c_slider, c_ballast, since, acc, force, water, dt, work):
+    """One classical Runge-Kutta step of (P folded, F), in place; x (N_XF), work (6, N_XF) scratch."""
+    k1, k2, k3, k4, y, before = work[0], work[1], work[2], work[3], work[4], work[5]
+    begin_step(F, x, before, y)
     half = 0.5 * dt
     effect_derivative(P, F, x, mode, c_servo, c_slider, c_ballast, since, acc, force, water, k1)
     for i in range(N_X):
@@ -276,11 +282,7 @@ def effect_step(P, F, x, mode, c_servo, c_slider, c_ballast, since, acc, force, 
 def effect_midpoint(P, F, x, mode, c_servo, c_slider, c_ballast, since, acc, force, water, dt, work):
     """The same by the midpoint rule, at half the price: for derivatives by the state, not for flights."""
     k1, y, before = work[0], work[4], work[5]
-    if F[ef.ATTITUDE_LAG] > 0.0:
-        before[0], before[1], before[2] = euler_from_quaternion(x[3], x[4], x[5], x[6])
-    before[3] = x[2]
-    for i in range(N_X, ef.N_XF):
-        y[i] = x[i]
+    begin_step(F, x, before, y)
     half = 0.5 * dt
     effect_derivative(P, F, x, mode, c_servo, c_slider, c_ballast, since, acc, force, water, k1)
     for i in range(N_X):

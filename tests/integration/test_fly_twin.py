@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from tools.device_figures import ATTITUDE_LIMIT_DEG, POSITION_LIMIT_M, compare_flights
+from tools.figures.devices import ATTITUDE_LIMIT_DEG, POSITION_LIMIT_M, compare_flights
 from tools.log.reader import read_log
 from tools.log.rundata import export_case
 

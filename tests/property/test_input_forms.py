@@ -19,7 +19,7 @@ from firmware.core.input_forms import exact_form, paper_form
 from firmware.core.jit import PACKAGES_DIR
 from firmware.core.law import OK, STEEP, solve_inputs
 from firmware.core.law_plus import on_outputs
-from tools import law_figures
+from tools.figures import law
 
 
 def scaled_glider(factors) -> tuple[Glider, np.ndarray]:
@@ -110,8 +110,8 @@ def test_derivative_of_the_plant_is_the_nominal_one_here():
 
 
 def test_figures_of_the_document_are_those_measured(capsys):
-    """The two tables that `python -m tools.law_figures` prints stand in docs/CONTROL.md, row by row."""
-    law_figures.main()
+    """The two tables that `python -m tools.figures.law` prints stand in docs/CONTROL.md, row by row."""
+    law.main()
     printed = [line.split("|") for line in capsys.readouterr().out.splitlines() if line.startswith("|")]
     document = (PACKAGES_DIR / "docs" / "CONTROL.md").read_text(encoding="utf-8").splitlines()
     rows = {line.split("|")[1]: line.split("|") for line in document if line.startswith("|")}

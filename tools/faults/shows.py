@@ -468,7 +468,7 @@ def bad_files(disabled: bool, folder: Path) -> Came:
 # --- row 31: hostile bytes --------------------------------------------------------------------------------------------
 def hostile_bytes(disabled: bool, folder: Path) -> Came:
     """Damage through every codec: back in step within a longest frame, no exception, nothing made up, little kept."""
-    from tools.codec_fuzz import codecs, run_codec
+    from tools.figures.codecs import codecs, run_codec
 
     bad, made_up = 0, 0
     crc = _patched(disabled, "hal.protocols.vn100.crc_hqx", lambda data, start: 0)

@@ -1,4 +1,4 @@
-"""`python -m tools.unattended_figures`: what is claimed of flights that nobody watches, measured, as JSON.
+"""`python -m tools.figures.unattended`: what is claimed of flights that nobody watches, measured, as JSON.
 
 kills: a flight killed (-9) at random instants and started again, by the rule that `glider fly` goes by (tools/
 unattended.py Life): how many dives were resumed. power-cuts: a log of a flight cut at every byte: what is read of it.
@@ -319,7 +319,7 @@ def _repairs(repair: Any, read_log: Any, path: Path, cut: Any) -> bool:
 @click.option("--no-load", is_flag=True, help="Without the busy process on the other core.")
 def endurance(minutes: float, fifo: bool, no_load: bool) -> None:
     """Fly on twins at real time beside load: missed ticks, lateness, memory, descriptors."""
-    from tools.endurance import measure
+    from tools.figures.endurance import measure
 
     result = measure(minutes * 60.0, fifo=fifo, load=not no_load)
     print_json(result)

@@ -1,4 +1,4 @@
-"""`python -m tools.codec_fuzz`: random and mutated bytes through every codec; prints what came of them as JSON.
+"""`python -m tools.figures.codecs`: random and mutated bytes through every codec; prints what came of them as JSON.
 
 Each round feeds damage (random bytes; good frames with bits flipped, bytes lost, put in, doubled; frames cut short), in
 chunks of any size, then good frames back to back. A codec is back in step if every good frame that starts one longest
