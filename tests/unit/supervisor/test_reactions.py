@@ -12,6 +12,7 @@ from firmware.core import control_layout as ctl
 from firmware.core import supervisor_layout as at
 from firmware.core.supervisor import highest
 from firmware.supervisor.table import FAULTS, Reaction
+from hal.ports import SLOTS, Validity
 from tests.support.watchman import BALLAST_RANGE, DT, SLIDER_RANGE, Watchman
 
 LEVELS = [float(level) for level in Reaction]
@@ -172,3 +173,36 @@ def test_an_abort_while_waiting_moves_everything_at_once():
     assert man.ap[ctl.MODE] == ctl.ABORTED
     man.seconds(15.0)
     assert man.commands == pytest.approx([0.0, SLIDER_RANGE[0], BALLAST_RANGE[0]])
+
+
+@pytest.mark.parametrize("row", [6, 10])
+def test_a_sample_is_used_as_it_comes_with_its_row_switched_off(row):
+    man = Watchman()
+    man.step(10)
+    man.supervisor.disable(row)
+    man.say["beacon"] = (2e8, 20.0)
+    man.late["beacon"] = 0.3 if row == 6 else 0.0
+    if row == 6:
+        man.say.clear()
+    man.step(2)
+    assert man.frame[SLOTS["beacon"].validity] == Validity.VALID
+    assert man.supervisor.noticed(row) is None
+
+
+def test_before_the_first_depth_nothing_is_said_of_it():
+    man = Watchman(mode=ctl.WAITING)
+    man.silence.add("beacon")
+    man.est[ctl.EST_BEACON_TIME] = -1.0
+    man.est[ctl.NEW_DEPTH] = 5000.0
+    man.step(20)
+    assert man.supervisor.worst(17) == Reaction.NOTHING
+    assert not man.supervisor.depth_known
+
+
+def test_depth_is_known_until_the_beacon_is_lost():
+    man = Watchman()
+    man.step(5)
+    assert man.supervisor.depth_known
+    man.silence.add("beacon")
+    man.seconds(1.0)
+    assert not man.supervisor.depth_known
