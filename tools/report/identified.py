@@ -50,6 +50,7 @@ def marginals(found: Identified, truth: dict[str, float] | None = None):
             axis.axvline(truth[one.name], color=TRUTH, linestyle="--")
         axis.set_title(f"{one.name} = {one.mean:.4g}, sd {one.sd:.2g} {one.unit}", fontsize=8)
         axis.set_yticks([])
+        axis.locator_params(axis="x", nbins=5)
         axis.tick_params(labelsize=7)
     return figure
 
