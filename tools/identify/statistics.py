@@ -52,6 +52,12 @@ class Quadratic:
             self.heat * heat,
         )  # fmt: skip
 
+    def centred(self) -> "Quadratic":
+        """The same with its mode at `at` itself: Laplace's approximation about the best values that were found."""
+        b = np.zeros_like(self.b)
+        b[0] = -self.at
+        return Quadratic(self.at, self.low, self.A, b, self.c, self.count, self.groups, self.heat)
+
     def misfit(self, values: np.ndarray) -> np.ndarray:
         """The likelihood's part of -2 log posterior at values (k, n), noise levels of 1: (k,)."""
         d = values - self.at

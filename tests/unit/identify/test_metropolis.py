@@ -83,3 +83,10 @@ def test_heat_is_one_for_white_errors_and_more_for_errors_that_last():
     lasting = np.convolve(rng.standard_normal(samples + 9), np.ones(10) / np.sqrt(10.0), "valid")
     assert heat(white, J, block) == pytest.approx(1.0, abs=0.25)
     assert heat(lasting, J, block) > 5.0
+
+
+def test_centred_statistics_have_their_mode_where_they_were_taken():
+    _, statistics, _, _ = regression(np.random.default_rng(11))
+    statistics.at[:] = 0.3
+    assert np.allclose(statistics.centred().mode, 0.3)
+    assert np.allclose(statistics.centred().covariance, statistics.covariance)
