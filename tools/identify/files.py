@@ -77,13 +77,13 @@ def _uncertainty(found: Identified, old: dict[str, float]) -> dict[str, float]:
 
 
 def vehicle_table(found: Identified) -> dict[str, Any]:
-    """The vehicle file's content: the case's vehicle with the posterior's means in place."""
+    """The vehicle file's content: the case's vehicle with the posterior's mode in place."""
     vehicle = found.case.vehicle
     table: dict[str, Any] = msgspec.to_builtins(vehicle)
     P = vehicle.vector()
-    for one in found.summaries:
-        if one.name in PLACES:
-            P[PLACES[one.name]] = one.mean
+    for name, value in zip(found.free.names, found.free.si(found.best).tolist(), strict=True):
+        if name in PLACES:
+            P[PLACES[name]] = value
     table["hydrodynamics"] |= {name: float(P[PLACES[name]]) for name in COEFFICIENTS}
     table["mass"] |= {name: float(P[PLACES[name]]) for name in ("m_t", "m_r", "m_s")}
     table["mass"]["added_mass"] = P[layout.A_X : layout.A_Z + 1].tolist()
@@ -114,7 +114,7 @@ def corrected(found: Identified) -> str | None:
     if not any(name in WIRES for name in found.free.names):
         return None
     P0 = nominal_model(found.case).P
-    P, F, _ = found.free.place(P0, found.means)
+    P, F, _ = found.free.place(P0, found.best)
     effects: dict[str, dict[str, float]] = {}
     for name in WIRES:
         parameter = next(p for p in catalogue()[name].parameters if p.entry >= 0)

@@ -90,10 +90,10 @@ class Flights:
         E = self.follow([values, *(values + s * row for s, row in zip(size, np.eye(len(values)), strict=True))], gains)
         return Linear(values, E[0], (E[1:] - E[0]) / size[:, None], gains)
 
-    def step(self, at: Linear) -> np.ndarray:
-        """The Gauss-Newton step from a point, or the share of it that does best; tempered where the misfit is large."""
-        heat = float(at.e @ at.e) / len(at.e)
-        cool = 1.0 / heat if heat > WARM else 1.0
+    def step(self, at: Linear, heat: float = 1.0) -> np.ndarray:
+        """The Gauss-Newton step from a point, or a share of it; tempered where the misfit is large, or by `heat`."""
+        squares = float(at.e @ at.e) / len(at.e)
+        cool = min(1.0 / squares if squares > WARM else 1.0, 1.0 / heat)
         normal = cool * (at.J @ at.J.T) + np.eye(len(at.values))
         step = -np.linalg.solve(normal, cool * (at.J @ at.e) + at.values)
         best, found = at.values, cool * float(at.e @ at.e) + float(at.values @ at.values)

@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 
 from sim_backend.core import effect_layout as ef
-from tools.gap.measure import RunGap, case_channels, root_mean_square, run_gap
+from tools.gap.measure import RunGap, case_channels, root_mean_square
 from tools.gap.model import Model
-from tools.gap.problem import cut, estimated, fly_on, pose
 from tools.identify.fit import Fit, fit
-from tools.identify.parameters import Parameters
+from tools.identify.predict import model_of, predicted
 from tools.runs.case import Case
 from tools.runs.run import Run
 
@@ -47,16 +46,6 @@ class Held:
         }
 
 
-def predicted(case: Case, model: Model, run: Run, P: np.ndarray, F: np.ndarray) -> tuple[RunGap, np.ndarray]:
-    """The gap of one run under (P, F), each window started where the model's own filter stands; and the prediction."""
-    problem = pose(case, model, [run])
-    gains = problem.filter(P, F, begin=True)
-    scored = cut(problem)
-    Y = estimated(problem, F, gains)
-    fly_on(problem, scored, P, F, gains, Y)
-    return run_gap(run, Y, scored.listed[0]), Y
-
-
 def without(found: Fit, run: int) -> np.ndarray:
     """The most probable values without one of the runs, by one step from the fit with all."""
     of = np.broadcast_to(found.problem.run_of[:, None], found.problem.z.shape)[found.problem.valid]
@@ -66,13 +55,6 @@ def without(found: Fit, run: int) -> np.ndarray:
     normal = q.normal - scale * (J @ J.T)
     low = np.array([f.low for f in found.free.free])
     return np.maximum(q.at - np.linalg.solve(normal, q.slope - scale * (J @ e)), low)
-
-
-def model_of(model: Model, free: Parameters, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """P and F at values, without the sensors' constant errors of this case."""
-    P, F, _ = free.place(model.P, values)
-    F[ef.BIAS :] = 0.0
-    return P, F
 
 
 def hold_out(case: Case, model: Model, found: Fit, say: Callable[[str], None] = lambda text: None) -> Held | None:

@@ -73,9 +73,9 @@ class Identified:
         return None if self.fit is None else self.fit.levels
 
     @property
-    def means(self) -> np.ndarray:
-        """Posterior means in units of the priors, (n,)."""
-        return np.asarray(self.chains.flat.mean(axis=0))
+    def best(self) -> np.ndarray:
+        """The posterior's mode within its limits, in units of the priors, (n,): what files hold."""
+        return np.maximum(self.quadratic.mode, self.quadratic.low)
 
     def compared(self) -> list[dict[str, Any]]:
         """The coefficients by the accelerations' likelihood, beside this one's."""

@@ -1,0 +1,34 @@
+"""Runs flown by an identified model, window by window, as GAP.md measures them."""
+
+import numpy as np
+
+from sim_backend.core import effect_layout as ef
+from tools.gap.measure import RunGap, root_mean_square, run_gap
+from tools.gap.model import Model
+from tools.gap.problem import cut, estimated, fly_on, pose
+from tools.identify.parameters import Parameters
+from tools.runs.case import Case
+from tools.runs.run import Run
+
+
+def predicted(case: Case, model: Model, run: Run, P: np.ndarray, F: np.ndarray) -> tuple[RunGap, np.ndarray]:
+    """The gap of one run under (P, F), each window started where the model's own filter stands; and the prediction."""
+    problem = pose(case, model, [run])
+    gains = problem.filter(P, F, begin=True)
+    scored = cut(problem)
+    Y = estimated(problem, F, gains)
+    fly_on(problem, scored, P, F, gains, Y)
+    return run_gap(run, Y, scored.listed[0]), Y
+
+
+def model_of(model: Model, free: Parameters, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """P and F at values, without the sensors' constant errors of this case."""
+    P, F, _ = free.place(model.P, values)
+    F[ef.BIAS :] = 0.0
+    return P, F
+
+
+def flown_gap(case: Case, model: Model, runs: list[Run], free: Parameters, values: np.ndarray) -> float:
+    """Total gap of the runs under the model at `values`, in tolerances; infinite where it cannot be flown."""
+    found = root_mean_square([predicted(case, model, run, *model_of(model, free, values))[0].total for run in runs])
+    return found if np.isfinite(found) else float("inf")
