@@ -12,10 +12,10 @@ from model_states import HIGH, LOW, RATE, TAU, P, repeatable, state
 
 from firmware.core import layout
 from firmware.core.actuators import actuator_rate
-from firmware.core.control import limited
 from firmware.core.input_forms import exact_form, paper_form
 from firmware.core.law import NOT_FINITE, OK, STEEP, axis_demand, k2_by_29, k2_to_cover, pitch_depth_law, solve_inputs
 from firmware.core.law_plus import reach
+from firmware.core.limits import limited
 
 
 @repeatable

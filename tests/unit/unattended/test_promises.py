@@ -4,6 +4,7 @@ import ast
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -84,16 +85,22 @@ def test_a_cache_that_others_may_write_into_is_not_read(tmp_path):
         assert "no writable folder of one's own" in done.stderr
 
 
-def test_a_heartbeats_folder_of_somebody_else_is_refused(tmp_path):
+@pytest.fixture
+def open_folder():
+    """A folder that every user gets to."""
+    with tempfile.TemporaryDirectory() as name:
+        yield Path(name)
+
+
+def test_a_heartbeats_folder_of_somebody_else_is_refused(open_folder):
     from hal.heartbeat import Heartbeat
 
     if os.getuid() != 0:
         pytest.skip("only root can give a folder away")
+    tmp_path = open_folder
     os.chown(tmp_path, 12345, 12345)
     code = "import os, sys\nfrom hal.heartbeat import Heartbeat\nos.setuid(54321)\nHeartbeat.create(sys.argv[1], 0.02)"
     tmp_path.chmod(0o777)
-    for parent in tmp_path.parents[:2]:
-        parent.chmod(parent.stat().st_mode | 0o011)
     done = subprocess.run([sys.executable, "-c", code, str(tmp_path)], cwd=ROOT, capture_output=True, text=True)
     assert "belongs to somebody else" in done.stderr
     (tmp_path / "elsewhere").write_text("precious")
