@@ -76,7 +76,7 @@ def test_shipped_file_has_the_keys_this_test_changes():
     assert {header.split(".")[0] or name for _, header, name in keys()} == set(in_file)
 
 
-@pytest.mark.parametrize(("index", "header", "name"), keys())
+@pytest.mark.parametrize(("index", "header", "name"), [key for key in keys() if key[1] != "limits"])
 def test_a_missing_key_is_named(index, header, name):
     error = refusal(LINES[:index] + LINES[index + 1 :])
     assert error.key == dotted(header, name)

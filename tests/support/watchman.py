@@ -34,9 +34,8 @@ class Watchman:
                  site: float = 1000.0, dt: float = DT, **settings):  # fmt: skip
         self.dt, periods = dt, {"imu": dt, "beacon": 2 * dt, "wires": 2 * dt}
         vehicle = load_vehicle("roughie")
-        if limits is not None or settings:
-            table = msgspec.structs.replace(vehicle.supervisor, **settings)
-            vehicle = msgspec.structs.replace(vehicle, limits=limits, supervisor=table)
+        table = msgspec.structs.replace(vehicle.supervisor, **settings)
+        vehicle = msgspec.structs.replace(vehicle, limits=limits, supervisor=table)
         _, source, mission = load_mission("sawtooth")
         mission = msgspec.structs.replace(mission, site=msgspec.structs.replace(mission.site, depth_m=site))
         C = configuration(vehicle, mission, dt=dt, periods=periods)

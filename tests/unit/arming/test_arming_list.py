@@ -72,6 +72,7 @@ def test_a_calibration_that_was_changed_is_refused(flight):
 
 
 def test_limits_unset_are_refused_on_hardware_alone(flight):
+    set_limits(flight, None)
     assert found(flight)["limits"].passed
     assert "working_depth_m" in one_refused(found(flight, hardware=True), "limits")
 

@@ -320,6 +320,15 @@ def test_a_stuck_wire_is_seen_once_its_actuator_was_sent_elsewhere(name, index, 
     assert man.supervisor.noticed(11) - begin <= 2.0 + TWO_TICKS
 
 
+@pytest.mark.parametrize(("name", "index", "way"), [("slider_wire", 1, 0.004), ("plunger_wire", 2, 0.015)])
+def test_a_wire_need_not_show_a_small_move(name, index, way):
+    man = flying()
+    man.frozen.add(name)
+    man.wanted[index] += way
+    man.seconds(4.0)
+    assert man.supervisor.worst(11) == NOTHING
+
+
 def test_a_leak_sensor_that_always_says_the_same_is_not_stuck():
     man = flying(fitted=("leak",))
     man.seconds(10.0)

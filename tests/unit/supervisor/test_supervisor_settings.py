@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from firmware.core import supervisor_layout as at
@@ -11,7 +12,8 @@ from firmware.model.vehicle import decode_vehicle
 from firmware.supervisor.settings import Limits, SupervisorTable, settings_vector
 from hal.ports import SLOTS
 
-TEXT = shipped("model/vehicles")["roughie"]
+SHIPPED = shipped("model/vehicles")["roughie"]
+TEXT = SHIPPED.split("[limits]")[0]
 PERIODS = {"imu": 0.02, "beacon": 0.04, "wires": 0.1}
 
 
@@ -24,6 +26,7 @@ def vector(limits=None, dt=0.02, site=6.0, **table):
 def test_a_vehicle_file_may_say_nothing_of_them():
     vehicle = decode_vehicle(TEXT, "roughie")
     assert vehicle.limits is None
+    assert decode_vehicle(SHIPPED, "roughie").limits == Limits(working_depth_m=60.0)
     assert vehicle.supervisor == SupervisorTable()
 
 
@@ -97,3 +100,55 @@ def test_places_in_the_vector_do_not_overlap():
     assert (G[at.HIGH : at.HIGH + at.N_VALUES] > G[at.LOW : at.LOW + at.N_VALUES]).all()
     singles = [value for name, value in vars(at).items() if name.isupper() and isinstance(value, int)]
     assert max(singles) == at.N_G == len(G)
+
+
+def test_what_the_mission_and_the_flight_before_say_is_there():
+    G = vector()
+    assert G[at.MISSION_TIME] == 600.0
+    assert G[at.RESTARTED] == 0.0
+    more = settings_vector(
+        Limits(low_voltage=12.0, least_voltage=11.0), SupervisorTable(), dt=0.02, periods=PERIODS, site_depth=6.0,
+        mission_time=5.0, restarted=True,
+    )  # fmt: skip
+    assert (more[at.RESTARTED], more[at.MISSION_TIME]) == (1.0, 5.0)
+    assert (more[at.LOW_VOLTAGE], more[at.LEAST_VOLTAGE]) == (12.0, 11.0)
+    assert (G[at.LOW_VOLTAGE], G[at.LEAST_VOLTAGE]) == (0.0, 0.0)
+
+
+SCALARS = {
+    "hold_s": at.HOLD_TIME, "frozen_s": at.FROZEN_TIME, "stuck_s": at.STUCK_TIME, "actuator_s": at.STATE_AGE,
+    "unfit_run": at.UNFIT_RUN, "disagree_s": at.DISAGREE_TIME, "disagree_rate_m_s": at.DISAGREE_RATE,
+    "deep_s": at.DEEP_TIME, "at_risk_s": at.RISK_TIME, "no_ascent_s": at.ASCENT_TIME, "ascent_step_m": at.ASCENT_STEP,
+    "blind_ascent_s": at.BLIND_TIME, "same_depth_s": at.SAME_TIME, "same_depth_m": at.SAME_BAND,
+    "leak_samples": at.LEAK_COUNT, "steep_s": at.STEEP_TIME, "law_tries": at.LAW_RUN, "law_rest_s": at.LAW_REST,
+    "voltage_s": at.VOLTAGE_TIME, "overruns": at.OVERRUN_RUN, "overrun_share": at.OVERRUN_SHARE,
+    "stall_factor": at.STALL_FACTOR, "stall_tries": at.STALL_TRIES, "stall_rest_s": at.STALL_REST,
+    "surface_m": at.SURFACE_DEPTH, "imu_s": at.LOST_AFTER, "pressure_s": at.LOST_AFTER + 1,
+    "wire_s": at.LOST_AFTER + 2,
+}  # fmt: skip
+ANGLES = {"disagree_pitch_deg": at.DISAGREE_PITCH, "steep_deg": at.STEEP_PITCH, "steep_margin_deg": at.STEEP_MARGIN,
+          "roll_deg": at.STEEP_ROLL}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [*SCALARS, *ANGLES])
+def test_every_setting_has_its_place(name):
+    default = getattr(SupervisorTable(), name)
+    value = 1 if isinstance(default, int) else 0.5 * default
+    if name == "stall_factor":
+        value = 1.25
+    changed, before = vector(**{name: value}), vector()
+    place = {**SCALARS, **ANGLES}[name]
+    places = [place, place + 1] if name == "wire_s" else [place]
+    assert [int(i) for i in np.flatnonzero((changed != before) & ~np.isnan(changed))] == places
+    assert changed[place] == pytest.approx(math.radians(value) if name in ANGLES else value)
+
+
+def test_ranges_and_jumps_stand_at_their_values():
+    G = vector()
+    low, high = (list(G[place : place + at.N_VALUES]) for place in (at.LOW, at.HIGH))
+    assert low[:6] == pytest.approx([-math.pi - 0.2, -math.pi / 2 - 0.2, -math.pi - 0.2, -10, -10, -10])
+    assert high[:6] == pytest.approx([math.pi + 0.2, math.pi / 2 + 0.2, math.pi + 0.2, 10, 10, 10])
+    assert low[6:] == [50_000.0, -10.0, -0.5, -0.5, 0.0, 0.0]
+    assert high[6:] == [1.2e8, 60.0, 0.5, 0.5, 1.0, 100.0]
+    assert list(G[at.JUMP : at.JUMP + 12]) == [0.3, 0.3, 0.3, 2, 2, 2, 15_000.0, 5, 0.01, 0.01, 1, 10]
+    assert list(G[at.JUMP_RATE : at.JUMP_RATE + 12]) == [3, 3, 3, 20, 20, 20, 30_000.0, 1, 0.05, 0.05, 1, 10]
