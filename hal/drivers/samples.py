@@ -82,6 +82,10 @@ class Sensor:
         self._slot[:] = np.nan
         self._slot[1] = Validity.MISSING
 
+    def forgive(self) -> None:
+        """Damaged frames until now are forgotten: somebody has looked at the line."""
+        self._damages.clear()
+
     def read(self, out: np.ndarray) -> None:
         """Copy [time, validity, values ...] into `out`."""
         out[...] = self._slot

@@ -164,7 +164,9 @@ def session(folder: Path, *, sweep: bool) -> tuple[str, dict]:
         else:  # half a minute of motion: Ctrl-C is in time on the busiest machine
             terminal.start("sweep slider")
             terminal.look(1.5)
+        stops = terminal.text().count("stopped")
         terminal.child.sendintr()
+        terminal.wait(lambda: terminal.text().count("stopped") > stops)
         terminal.ready()
         found["stop"] = terminal.text()
         found["stopped_m"] = [twins.state()["slider_m"] for _ in range(2) if terminal.look(0.3) is None]

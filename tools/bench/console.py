@@ -129,29 +129,22 @@ class Console:
         )
         self.say(f"{self.bench.source}: `help` lists the commands; nothing moves before `enable`")
         while True:
-            try:
+            try:  # Ctrl-C stops the actuators wherever it falls, between prompt and command too
                 line = self._session.prompt("bench> ")
+                with keys() as self._pressed:
+                    self._ask_plainly(line)
             except KeyboardInterrupt:
                 self._stop_quietly()
                 self.say("stopped")
-                continue
-            except EOFError:
-                return DONE
-            try:
-                with keys() as self._pressed:
-                    self._ask_plainly(line)
-            except SystemExit:
+            except (EOFError, SystemExit):
                 return DONE
 
     def _ask_plainly(self, line: str) -> None:
-        """Run one line of a person's; what goes wrong is said, and stops the actuators where they may move."""
+        """Run one line of a person's; what goes wrong is said."""
         try:
             self.commands.run(line)
         except BenchError as error:
             self.say(f"  {error}")
-        except KeyboardInterrupt:
-            self._stop_quietly()
-            self.say("stopped")
 
     def _completions(self) -> dict[str, Any]:
         state = self.bench.snapshot()

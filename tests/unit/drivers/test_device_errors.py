@@ -164,3 +164,12 @@ def test_a_servo_says_when_it_answered():
     servo.replies.expect(maestro.GET_ERRORS)
     servo.feed(b"\x00\x00", 6.05)
     assert state(servo) == (pytest.approx(1.05), Validity.VALID, Condition.WELL)
+
+
+def test_damage_that_somebody_has_looked_at_is_forgotten():
+    item = sensor()
+    item.damage(1.0, DAMAGES + 1)
+    assert not item.put(2.0, (0.01,), 2.0) or item.validity == Validity.FAULT
+    item.forgive()
+    assert item.put(3.0, (0.01,), 3.0)
+    assert item.validity == Validity.VALID
