@@ -101,7 +101,7 @@ class SimulatedClock:
 
 
 class PacedClock(MonotonicClock):
-    """Real time that takes the simulated world with it."""
+    """Real time that takes the simulated world with it; a late tick finds the present, as with real devices."""
 
     def __init__(self, world: World):
         super().__init__()
@@ -109,7 +109,7 @@ class PacedClock(MonotonicClock):
 
     def sleep_until(self, deadline: float) -> None:
         super().sleep_until(deadline)
-        self._world.advance(deadline)
+        self._world.advance(max(deadline, self.now()))
 
 
 class SimBoard:

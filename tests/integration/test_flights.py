@@ -9,8 +9,11 @@ import time
 
 import numpy as np
 import pytest
+from support.patience import patient_vehicle
 
 from firmware.core.control_layout import LEG
+from firmware.supervisor.table import Reaction
+from hal.ports import SLOTS
 from hal.recorder.recorder import NullRecorder
 from sim_backend.core.closed_loop import N_END, N_TRACE, fly
 from sim_backend.fleet import fly_fleet
@@ -154,7 +157,7 @@ def test_a_mission_that_cannot_be_flown_ends_with_exit_code_1(tmp_path):
 @pytest.mark.realtime
 def test_ctrl_c_gives_the_dive_up_and_the_log_is_whole(tmp_path):
     flight = subprocess.Popen(
-        [sys.executable, "-m", "tools.cli.main", "fly", "--realtime", "--json"],
+        [sys.executable, "-m", "tools.cli.main", "fly", "--realtime", "--json", "--vehicle", patient_vehicle(tmp_path)],
         cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ},
     )  # fmt: skip
     log = tmp_path / "sawtooth-001.mcap"
@@ -168,6 +171,29 @@ def test_ctrl_c_gives_the_dive_up_and_the_log_is_whole(tmp_path):
     assert result["reason"] == "asked to by the operator"
     assert result["surfaced"]
     assert result["records"]["complete"]
+
+
+@pytest.mark.realtime
+def test_a_tick_that_comes_late_finds_the_present():
+    """Not the samples of when it was due: a machine that stood still for a second is no IMU unplugged (row 1)."""
+    flight = build_flight(mission="sawtooth", realtime=True)
+    flight.board.open()
+    runtime = build_runtime(flight, NullRecorder(record_specs(flight)))
+    runtime.arm()
+    try:
+        for _ in range(5):
+            runtime.tick()
+        time.sleep(1.0)
+        runtime.tick()
+        assert runtime.timing.worst_s > 0.9
+        assert runtime.timing.missed >= 40
+        taken = flight.board.world.frame[SLOTS["imu"].all][0]
+        assert flight.board.clock.now() - taken < 0.2
+        for _ in range(5):
+            runtime.tick()
+        assert flight.supervisor.reaction < Reaction.HOLD
+    finally:
+        runtime.disarm()
 
 
 def test_check_tells_what_is_wrong(tmp_path):

@@ -3,6 +3,7 @@
 import sys
 
 import pytest
+from support.patience import patient_vehicle
 
 from tools.figures.devices import ATTITUDE_LIMIT_DEG, POSITION_LIMIT_M, compare_flights
 from tools.log.reader import read_log
@@ -33,7 +34,7 @@ ballast_kg = -0.15
 def flown(tmp_path_factory):
     folder = tmp_path_factory.mktemp("flight")
     (folder / "dip.toml").write_text(SHORT)
-    return folder, compare_flights(str(folder / "dip.toml"), 7, folder)
+    return folder, compare_flights(str(folder / "dip.toml"), 7, folder, vehicle=str(patient_vehicle(folder)))
 
 
 def test_it_ends_where_the_same_seed_ends_in_simulation(flown):

@@ -10,6 +10,8 @@ import time
 from contextlib import contextmanager
 from pathlib import Path
 
+from support.patience import patient_vehicle
+
 # Down and on down: only being brought up ends it.
 DIVE = """
 format = 1
@@ -59,6 +61,7 @@ def twins(folder: Path):
 def flying(board: Path, mission: Path, folder: Path, *extra: str):
     """`glider fly` on the twins; killed at the end if it still runs, and so is what it left behind."""
     command = [sys.executable, "-m", "tools.cli.main", "fly", "--board", str(board), "--mission", str(mission)]
+    command += ["--vehicle", str(patient_vehicle(folder))]
     command += ["--state", str(folder / "state"), "--log", str(folder / "flight.mcap"), "--json", *extra]
     with (folder / "stdout").open("w") as out, (folder / "stderr").open("a") as err:
         process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=err)

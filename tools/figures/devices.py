@@ -53,7 +53,7 @@ def same_flight(mission: str, seed: int, fifo: bool) -> None:
     raise SystemExit(DONE if result["pass"] else FAILED)
 
 
-def compare_flights(mission: str, seed: int, folder: Path) -> dict[str, Any]:
+def compare_flights(mission: str, seed: int, folder: Path, *, vehicle: str = "roughie") -> dict[str, Any]:
     """Both flights, logged, and how far they are apart."""
     from sim_backend.twins.boardfile import decode_twin_file, simulated_text
     from tools.compose import load_board_file
@@ -61,8 +61,8 @@ def compare_flights(mission: str, seed: int, folder: Path) -> dict[str, Any]:
 
     found = load_board_file("twin")
     (folder / "sim.toml").write_text(simulated_text(decode_twin_file(found.text, found.source)))
-    twin = fly(mission, "twin", seed, folder / "twin.mcap")
-    sim = fly(mission, str(folder / "sim.toml"), seed, folder / "sim.mcap")
+    twin = fly(mission, vehicle, "twin", seed, folder / "twin.mcap")
+    sim = fly(mission, vehicle, str(folder / "sim.toml"), seed, folder / "sim.mcap")
     ticks = {name: read_log(folder / f"{name}.mcap").topics["/tick"] for name in ("sim", "twin")}
     truth = read_log(folder / "sim.mcap").topics["/truth"]
     end = np.array([truth.column(f"true_{axis}_m")[-1] for axis in "xyz"])
@@ -78,23 +78,13 @@ def compare_flights(mission: str, seed: int, folder: Path) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def fly(mission: str, board: str, seed: int, log: Path) -> dict[str, Any]:
+def fly(mission: str, vehicle: str, board: str, seed: int, log: Path) -> dict[str, Any]:
     """`glider fly`, as a person types it."""
     import subprocess
     import sys
 
-    command = [
-        sys.executable,
-        "-m",
-        "tools.cli.main",
-        "fly",
-        "--mission",
-        mission,
-        "--board",
-        board,
-        "--seed",
-        str(seed),
-    ]
+    command = [sys.executable, "-m", "tools.cli.main", "fly", "--mission", mission, "--vehicle", vehicle]
+    command += ["--board", board, "--seed", str(seed)]
     done = subprocess.run([*command, "--log", str(log), "--json"], stdout=subprocess.PIPE, check=False)
     return json.loads(done.stdout)
 
