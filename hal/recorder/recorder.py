@@ -21,12 +21,17 @@ import numpy as np
 from hal.recorder import ring
 from hal.recorder.condition import FIRST_RETRY_S, HUNG_S, LONGEST_RETRY_S, Condition, Level
 from hal.recorder.producer import Channel, Producer
-from hal.recorder.schema import RecordSpec, specs_to_json
+from hal.recorder.schema import RECORDING, RecordSpec, specs_to_json
 
 SLOTS = 2048  # twenty seconds of a hundred records a second
 SYNC_PERIOD_S = 0.5  # with the time an fsync takes, at most a second is lost when the power goes
 START_TIMEOUT_S = 20.0
 CLOSE_TIMEOUT_S = 20.0
+
+
+def part_path(path: Path, part: int) -> Path:
+    """The file in which a log goes on: NAME-part2.mcap and so on; the first is `path` itself."""
+    return path if part == 1 else path.with_name(f"{path.stem}-part{part}{path.suffix}")
 
 
 def _shared_text(text: str) -> int:
@@ -95,7 +100,7 @@ class Recorder:
             "payload": layout.payload,
             "specs": specs_to_json(specs),
             "attachments": dict(attachments or {}),
-            "metadata": {str(key): str(value) for key, value in (metadata or {}).items()},
+            "metadata": {**{str(k): str(v) for k, v in (metadata or {}).items()}, RECORDING: os.urandom(8).hex()},
             "epoch_ns": epoch_ns,
             "period_s": sync_period_s,
         }
@@ -148,7 +153,7 @@ class Recorder:
         self._started_at = time.monotonic()
         assert self._process.stdin is not None
         start = {
-            "path": os.path.abspath(self._part_path(self._part)), "fd": self._fd, "config_fd": self._config_fd,
+            "path": os.path.abspath(part_path(self.path, self._part)), "fd": self._fd, "config_fd": self._config_fd,
             "part": self._part, "parent": os.getpid(),
         }  # fmt: skip
         try:
@@ -156,10 +161,6 @@ class Recorder:
             self._process.stdin.flush()
         except BrokenPipeError:
             pass  # whoever waits for it says so
-
-    def _part_path(self, part: int) -> Path:
-        """The file of a part: the first is `path` itself."""
-        return self.path if part == 1 else self.path.with_name(f"{self.path.stem}-part{part}{self.path.suffix}")
 
     def wait_ready(self) -> None:
         """Wait until the file is there; OSError as `start`."""

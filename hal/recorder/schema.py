@@ -14,6 +14,7 @@ SCHEMA_ENCODING = "ros2msg"
 MESSAGE_ENCODING = "cdr"
 
 EVENTS_TOPIC = "/events"
+RECORDING = "recording"  # metadata entry that the parts of one recording share, and no other recording has
 # Severities of rcl_interfaces/msg/Log.
 DEBUG, INFO, WARN, ERROR, FATAL = 10, 20, 30, 40, 50
 

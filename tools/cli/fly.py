@@ -305,7 +305,12 @@ def _tell(result: dict) -> None:
     for name, device in result.get("devices", {}).items():
         if device["notes"]:
             say(f"{name}: {'; '.join(device['notes'])}")
-    if not result["records"]["complete"]:
-        say(f"the log is not complete: {result['records']['dropped']} records dropped")
+    records = result["records"]
+    if records["parts"] > 1:
+        say(f"the recording process was replaced: the log goes on in part {records['parts']} (`glider log info`)")
+        if records["dropped"]:
+            say(f"{records['dropped']} records dropped")
+    elif not records["complete"]:
+        say(f"the log is not complete: {records['dropped']} records dropped")
     if result["log"]:
         click.echo(result["log"])

@@ -31,11 +31,55 @@ def _file(path: Path) -> Path:
 
 def _state(the_log: Any) -> str:
     """Complete or cut, in words."""
-    if the_log.whole:
+    if the_log.complete and not the_log.damages:
         return "complete"
-    parts = ["complete" if the_log.complete else f"cut at byte {the_log.end} of {the_log.size}"]
-    parts += [f"damaged at byte {item.offset}, {item.length} bytes: {item.what}" for item in the_log.damages]
-    return "; ".join(parts)
+    words = ["complete" if the_log.complete else f"cut at byte {the_log.end} of {the_log.size}"]
+    words += [f"damaged at byte {item.offset}, {item.length} bytes: {item.what}" for item in the_log.damages]
+    return "; ".join(words)
+
+
+def _parts(the_log: Any) -> list[str]:
+    """A flight's files, one a line, with what is missing before each; none for a log of one file."""
+    from tools.log.parts import FlightLog
+
+    if not isinstance(the_log, FlightLog):
+        return []
+    lines = {part.number: f"{part.log.path.name}: {_state(part.log)}{_before(part)}" for part in the_log.parts}
+    lines |= {number: f"{file.name}: is not there; never begun, or gone" for number, file in the_log.absent.items()}
+    return [*(lines[number] for number in sorted(lines)), *the_log.left_out]
+
+
+def _before(part: Any) -> str:
+    lost = ", ".join(f"{count} of {name}" for name, count in part.lost.items() if count)
+    return f"; missing before it: {lost} ({part.gap_s:.2f} s)" if lost else ""
+
+
+def _headline(the_log: Any) -> str:
+    """How it is with a log, in words."""
+    from hal.recorder.logfile import PART
+    from tools.log.parts import FlightLog
+
+    if isinstance(the_log, FlightLog):
+        return f"in {len(the_log.parts)} parts"
+    number = the_log.metadata.get(PART)
+    return _state(the_log) if number is None else f"part {number} of a flight, alone; {_state(the_log)}"
+
+
+def _parts_summary(the_log: Any) -> dict[str, Any]:
+    """What --json says of a flight's parts; nothing for a log of one file."""
+    from tools.log.parts import FlightLog
+
+    if not isinstance(the_log, FlightLog):
+        return {}
+    parts = [
+        {
+            "part": part.number, "file": str(part.log.path), "bytes": part.log.size, "complete": part.log.complete,
+            "read_to": part.log.end, "damaged": [vars(item) for item in part.log.damages],
+            "missing_before": part.lost, "gap_s": part.gap_s,
+        }
+        for part in the_log.parts
+    ]  # fmt: skip
+    return {"parts": parts, "absent": [str(f) for f in the_log.absent.values()], "left_out": the_log.left_out}
 
 
 def _summary(the_log: Any) -> dict[str, Any]:
@@ -59,6 +103,7 @@ def _summary(the_log: Any) -> dict[str, Any]:
         "metadata": the_log.metadata,
         "ending": the_log.ending,
         "events": [vars(event) for event in the_log.events],
+        **_parts_summary(the_log),
     }
 
 
@@ -66,14 +111,16 @@ def _summary(the_log: Any) -> dict[str, Any]:
 @click.argument("file", type=click.Path(path_type=Path))
 @json_option
 def info(file: Path, as_json: bool) -> None:
-    """What is in a log: topics, counts, texts, events, and whether it is complete."""
-    from tools.log.reader import read_log
+    """What is in a log, with the parts it goes on in: topics, counts, texts, events, and whether it is complete."""
+    from tools.log.parts import read_flight
 
-    the_log = read_log(_file(file))
+    the_log = read_flight(_file(file))
     if as_json:
         print_json(_summary(the_log))
         return
-    _show(f"{file}: {_state(the_log)}; {the_log.duration_s:.2f} s")
+    _show(f"{file}: {_headline(the_log)}; {the_log.duration_s:.2f} s")
+    for line in _parts(the_log):
+        _show(f"  {line}")
     for name, topic in the_log.topics.items():
         missing = f", {topic.missing} missing" if topic.missing else ""
         _show(f"  {name:<10} {topic.count} records{missing} ({topic.schema_name}, {len(topic.fields)} numbers)")
@@ -109,13 +156,14 @@ def export(source: Path, out: Path | None, vehicle: str | None, as_json: bool) -
 
 
 def _to_case(source: Path, out: Path | None, vehicle: str | None) -> dict[str, Any]:
-    from tools.log.reader import read_log
+    from tools.log.parts import read_flight
     from tools.log.rundata import export_case
 
-    the_log = read_log(source)
+    the_log = read_flight(source)
     folder = _case_beside(source) if out is None else out
     exported = export_case(the_log, folder, vehicle=vehicle)
-    notes = list(exported.notes) if the_log.whole else [_state(the_log), *exported.notes]
+    state = [] if the_log.whole else _parts(the_log) or [_state(the_log)]
+    notes = [*state, *exported.notes]
     return {
         "case": str(folder),
         "files": [str(path) for path in exported.files],
@@ -152,7 +200,10 @@ def _to_logs(source: Path, out: Path | None) -> list[Path]:
 @click.option("--out", type=click.Path(path_type=Path), help="Log to write.  [default: NAME.repaired.mcap]")
 @json_option
 def repair(file: Path, out: Path | None, as_json: bool) -> None:
-    """Write what can be trusted of a cut or damaged log as a complete one; the original stays."""
+    """Write what can be trusted of a cut or damaged log as a complete one; a flight's parts become one log.
+
+    The originals stay.
+    """
     from tools.log.repair import repair as repair_log
 
     report = repair_log(_file(file), out)
@@ -165,6 +216,9 @@ def repair(file: Path, out: Path | None, as_json: bool) -> None:
                 "messages": report.messages,
                 "torn_bytes": report.torn_bytes,
                 "damaged": lost,
+                "parts": [str(path) for path in report.parts],
+                "absent": [str(path) for path in report.absent],
+                "left_out": report.left_out,
             }
         )
     elif report.out is None:
@@ -175,5 +229,9 @@ def repair(file: Path, out: Path | None, as_json: bool) -> None:
         )
         for item in report.damages:
             say(f"  at byte {item.offset}, {item.length} bytes: {item.what}")
+        if len(report.parts) > 1:
+            say(f"  written from {', '.join(path.name for path in report.parts)}")
+        for line in (*(f"{path.name}: is not there; never begun, or gone" for path in report.absent), *report.left_out):
+            say(f"  {line}")
         click.echo(report.out)
     raise SystemExit(DONE if report.out is None or report.messages else FAILED)
