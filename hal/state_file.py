@@ -9,6 +9,7 @@ import contextlib
 import json
 import os
 import zlib
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
@@ -51,8 +52,34 @@ class FlightState:
         return self.phase > Phase.HELD
 
 
+def encode(state: FlightState) -> bytes:
+    """A copy's block."""
+    fields = [int(state.phase), state.sequence, state.flight, state.reason]
+    body = _MAGIC + json.dumps(fields, separators=(",", ":")).encode()
+    head = body.ljust(BLOCK - 9)
+    if len(head) > BLOCK - 9:
+        raise ValueError(f"a state of {len(body)} bytes")
+    return head + f"{zlib.crc32(head):08x}\n".encode()
+
+
+def decode(block: bytes) -> FlightState | str:
+    """The state in a copy's block, or what is wrong with it."""
+    if len(block) != BLOCK:
+        return f"torn ({len(block)} of {BLOCK} bytes)"
+    head, crc = block[: BLOCK - 9], block[BLOCK - 9 :]
+    if crc != f"{zlib.crc32(head):08x}\n".encode() or not head.startswith(_MAGIC):
+        return "torn (its check sum fails)"
+    try:
+        phase, sequence, flight, reason = json.loads(head[len(_MAGIC) :])
+        return FlightState(Phase(phase), str(flight), str(reason), int(sequence))
+    except (ValueError, TypeError):
+        return "not understood"
+
+
 class StateFile:
     """Two copies in `folder`, which is made if need be. OSError where it cannot be written."""
+
+    decode = staticmethod(decode)
 
     def __init__(self, folder: Path | str):
         self.folder = Path(folder)
@@ -61,7 +88,7 @@ class StateFile:
 
     def read(self) -> FlightState:
         """The worse of both copies; ashore where there is neither. Never raises over what is in them."""
-        copies = [_read_copy(path) for path in self.paths]
+        copies = [_read_copy(path, self.decode) for path in self.paths]
         if copies == [None, None]:
             return FlightState(Phase.ASHORE)
         good = [copy for copy in copies if isinstance(copy, FlightState)]
@@ -98,31 +125,7 @@ def _cut(text: str) -> str:
     return plain[:TEXT_BYTES]
 
 
-def encode(state: FlightState) -> bytes:
-    """A copy's block."""
-    fields = [int(state.phase), state.sequence, state.flight, state.reason]
-    body = _MAGIC + json.dumps(fields, separators=(",", ":")).encode()
-    head = body.ljust(BLOCK - 9)
-    if len(head) > BLOCK - 9:
-        raise ValueError(f"a state of {len(body)} bytes")
-    return head + f"{zlib.crc32(head):08x}\n".encode()
-
-
-def decode(block: bytes) -> FlightState | str:
-    """The state in a copy's block, or what is wrong with it."""
-    if len(block) != BLOCK:
-        return f"torn ({len(block)} of {BLOCK} bytes)"
-    head, crc = block[: BLOCK - 9], block[BLOCK - 9 :]
-    if crc != f"{zlib.crc32(head):08x}\n".encode() or not head.startswith(_MAGIC):
-        return "torn (its check sum fails)"
-    try:
-        phase, sequence, flight, reason = json.loads(head[len(_MAGIC) :])
-        return FlightState(Phase(phase), str(flight), str(reason), int(sequence))
-    except (ValueError, TypeError):
-        return "not understood"
-
-
-def _read_copy(path: Path) -> FlightState | str | None:
+def _read_copy(path: Path, decode: Callable[[bytes], FlightState | str]) -> FlightState | str | None:
     """A copy's state, what is wrong with it, or None where there is no such file."""
     try:
         with path.open("rb") as file:

@@ -97,9 +97,19 @@ def with_check_sum(body: bytes) -> bytes:
     return body + FramerRTU.compute_CRC(body).to_bytes(2, "big")
 
 
+def answers(frame: bytes, request: Request) -> bool:
+    """True if a frame of the request's function has the length, or the echo, that its reply has."""
+    if request.function in (READ_HOLDING, READ_INPUT):
+        return frame[2] == request.reply_size - 5
+    return frame[2:6] == request.echo
+
+
 class RtuDecoder:
     """Finds frames in whatever comes. With `expect`, only the reply to that request and what else looks whole is
     not waited for; without, any frame of FUNCTIONS (a listener, a twin, a fuzzer)."""
+
+    check_sum_holds = staticmethod(check_sum_holds)
+    answers = staticmethod(answers)
 
     def __init__(self, *, requests: bool = False) -> None:
         self._framer = _REQUESTS if requests else _REPLIES
@@ -128,7 +138,7 @@ class RtuDecoder:
         self._buffer += data
         buffer, at, end, events = bytes(self._buffer), 0, len(self._buffer), []
         while at < end:
-            size = self._size(buffer, at, end)
+            size = self.frame_size(buffer, at, end)
             if size == 0 or size > end - at:
                 break
             event = self._whole(buffer[at : at + size]) if size > 0 else None
@@ -142,7 +152,7 @@ class RtuDecoder:
         del self._buffer[:at]
         return events
 
-    def _size(self, buffer: bytes, at: int, end: int) -> int:
+    def frame_size(self, buffer: bytes, at: int, end: int) -> int:
         """Bytes of the frame that may start here; 0: too few to say; -1: none does."""
         wanted = self._wanted
         if wanted is not None and buffer[at] != wanted.device:
@@ -164,11 +174,11 @@ class RtuDecoder:
 
     def _whole(self, frame: bytes) -> Frame | None:
         """The frame, if its check sum holds, pymodbus can read it, and it is the one expected."""
-        if not check_sum_holds(frame):
+        if not self.check_sum_holds(frame):
             self.bad += 1
             return None
         wanted = self._wanted
-        if wanted is not None and not frame[1] & ERROR and not _answers(frame, wanted):
+        if wanted is not None and not frame[1] & ERROR and not self.answers(frame, wanted):
             return None
         pdu = self._framer.decoder.decode(frame[1:-2])
         if pdu is None:
@@ -176,9 +186,3 @@ class RtuDecoder:
             return None
         pdu.dev_id = frame[0]
         return Frame(frame[0], frame[1], pdu, frame)
-
-
-def _answers(frame: bytes, request: Request) -> bool:
-    if request.function in (READ_HOLDING, READ_INPUT):
-        return frame[2] == request.reply_size - 5
-    return frame[2:6] == request.echo

@@ -89,9 +89,12 @@ def looks_of(frame: Frame) -> tuple[int, int, int, bytes]:
 
 class ModbusBus:
     """A master. timeout_s runs from the end of the request to the reply's first byte; longest_s is the longest a
-    slave's reply may take to begin, and how long the line is kept quiet after a timeout."""
+    slave's reply may take to begin, and how long the line is kept quiet after a timeout. decoder finds the frames."""
 
-    def __init__(self, baud: int, *, timeout_s: float, longest_s: float, forget_s: float = 0.5):
+    def __init__(
+        self, baud: int, *, timeout_s: float, longest_s: float, forget_s: float = 0.5,
+        decoder: type[RtuDecoder] = RtuDecoder,
+    ):  # fmt: skip
         self.byte_s = BITS / baud
         self.gap_s = max(3.5 * self.byte_s, 0.00175)  # Modbus over serial line, section 2.5.1.1
         self.timeout_s, self.longest_s, self.forget_s = timeout_s, max(longest_s, timeout_s), forget_s
@@ -100,7 +103,8 @@ class ModbusBus:
         self.silent: dict[int, int] = {}  # timeouts running, by device
         self._asks: deque[Ask] = deque(maxlen=32)
         self._send: Callable[[bytes], bool] = lambda data: False
-        self._decoder, self._strays = RtuDecoder(), RtuDecoder()
+        self._new_decoder = decoder
+        self._decoder, self._strays = decoder(), decoder()
         self._window = bytearray()
         self._missing: dict[tuple, float] = {}  # looks of replies that may still come, until when
         self._job: Job | None = None
@@ -188,7 +192,7 @@ class ModbusBus:
         request = self._request
         assert request is not None
         self.counts.timeouts += 1
-        listener = RtuDecoder()
+        listener = self._new_decoder()
         for frame in listener.feed(bytes(self._window)):
             self.counts.wrong += 1
             self._missing.pop(looks_of(frame), None)

@@ -25,6 +25,8 @@ class Busy(Unplugged):
 class SerialPort:
     """8N1, exclusive, without waiting."""
 
+    exclusive = True
+
     def __init__(self, path: str, baud: int):
         self.path, self.baud = path, baud
         self.fd = -1
@@ -35,7 +37,7 @@ class SerialPort:
         if not os.path.exists(self.path):  # quick: asked again and again in flight
             raise Unplugged(f"{self.path}: not there")
         try:
-            port = serial.Serial(self.path, self.baud, timeout=0, write_timeout=0, exclusive=True)
+            port = serial.Serial(self.path, self.baud, timeout=0, write_timeout=0, exclusive=self.exclusive)
         except (serial.SerialException, OSError, termios.error, ValueError) as error:
             kind = Busy if "exclusively lock" in str(error) else Unplugged
             raise kind(f"{self.path}: {_reason(error)}") from None

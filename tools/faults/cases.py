@@ -7,6 +7,8 @@ from typing import Any
 from firmware.supervisor.table import Reaction
 from tools.faults.scene import PHASES, Setting
 
+Came = tuple[float | None, str, str]  # of a fault that is shown: noticed after s, reaction, how it ended
+SAFE, DAMAGE = "safe", "damaged"
 UNDER_WAY = ("descent", "level", "ascent")
 MOVING = ("descent", "ascent")
 ALL = PHASES
@@ -36,6 +38,6 @@ class Show:
 
     row: int
     name: str
-    run: Callable[[bool, Any], tuple[float | None, str, str]]
+    run: Callable[[bool, Any], Came]
     expected: str
     allowed_s: float

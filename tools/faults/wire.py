@@ -17,9 +17,10 @@ class Line:
 
     def __init__(
         self, slave: Callable[[bytes, int], bytes], delay: Callable[[random.Random], float], seed: int, *,
-        timeout_s: float = 0.05, **bus: float,
+        timeout_s: float = 0.05, longest_s: float = 0.1, forget_s: float = 0.5,
+        decoder: type[modbus.RtuDecoder] = modbus.RtuDecoder,
     ):  # fmt: skip
-        self.bus = ModbusBus(115_200, timeout_s=timeout_s, **{"longest_s": 0.1, **bus})
+        self.bus = ModbusBus(115_200, timeout_s=timeout_s, longest_s=longest_s, forget_s=forget_s, decoder=decoder)
         self.now, self.requests = 0.0, 0
         self._slave, self._delay, self._rng = slave, delay, random.Random(seed)
         self._coming: list[tuple[float, int, bytes]] = []

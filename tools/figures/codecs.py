@@ -51,8 +51,10 @@ class Outcome:
         return self.exceptions == 0 and self.out_of_step == 0
 
 
-def codecs() -> list[Codec]:
-    """Every decoder of hal/protocols, with frames as the devices send them."""
+def codecs(
+    imu: type[vn100.Vn100Decoder] = vn100.Vn100Decoder, rtu: type[modbus.RtuDecoder] = modbus.RtuDecoder
+) -> list[Codec]:
+    """Every decoder of hal/protocols, with frames as the devices send them; others may stand in for two of them."""
     text = "VNYMR,+010.071,+000.278,-002.026,-01.0208,-01.0110,+02.4580,+00.040,+00.322,-09.802,-0.0012,-0.0004,-0.0012"
     binary = vn100.encode_binary(vn100.FLIGHT_MASK, 123456789, *(0.25 * i - 1.0 for i in range(9)))
     requests = [
@@ -66,17 +68,17 @@ def codecs() -> list[Codec]:
     ]  # fmt: skip
     commands = [maestro.set_target(0, 6000, crc=True), maestro.encode(maestro.GET_ERRORS, crc=True)]
     return [
-        Codec("vn100", vn100.Vn100Decoder, [vn100.encode_text(text), vn100.encode_text("VNERR,03"), binary], 256),
-        Codec("modbus replies", modbus.RtuDecoder, replies, modbus.LONGEST),
-        Codec("modbus requests", lambda: modbus.RtuDecoder(requests=True), [r.frame for r in requests], modbus.LONGEST),
-        Codec("modbus expected reply", _expecting, [replies[0]], modbus.LONGEST),
+        Codec("vn100", imu, [vn100.encode_text(text), vn100.encode_text("VNERR,03"), binary], 256),
+        Codec("modbus replies", rtu, replies, modbus.LONGEST),
+        Codec("modbus requests", lambda: rtu(requests=True), [r.frame for r in requests], modbus.LONGEST),
+        Codec("modbus expected reply", lambda: _expecting(rtu), [replies[0]], modbus.LONGEST),
         Codec("maestro commands", lambda: maestro.CommandDecoder(crc=True), commands, maestro.LONGEST),
         Codec("maestro replies", _MaestroReplies, [b"\x28\x00"], maestro.LONGEST),
     ]
 
 
-def _expecting() -> modbus.RtuDecoder:
-    decoder = modbus.RtuDecoder()
+def _expecting(rtu: type[modbus.RtuDecoder]) -> modbus.RtuDecoder:
+    decoder = rtu()
     decoder.expect(preset("keller-33x").read(1, "all"))
     return decoder
 

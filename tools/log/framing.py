@@ -23,7 +23,7 @@ from mcap.writer import MCAP0_MAGIC
 from hal.recorder.logfile import CRC_KEY, metadata_crc
 
 _RECORD = struct.Struct("<BQ")
-_CHUNK = struct.Struct("<QQQII")  # start, end, size unpacked, checksum, length of the compression's name
+CHUNK_HEAD = struct.Struct("<QQQII")  # start, end, size unpacked, checksum, length of the compression's name
 _MESSAGE = struct.Struct("<HIQQ")
 _OPCODES = frozenset(int(opcode) for opcode in Opcode)
 # How a record under a checksum begins: a chunk, an attachment or metadata of less than 16 MB.
@@ -39,8 +39,36 @@ class Damage:
     what: str
 
 
+def _lengths_fit(body: bytes, skipped: int, strings: int, size_bytes: int, behind: int) -> bool:
+    """Whether a body is as long as it says: `skipped` bytes, strings, one block with its size ahead, `behind` bytes."""
+    place = skipped
+    for _ in range(strings):
+        place += 4 + int.from_bytes(body[place : place + 4], "little")
+    place += size_bytes + int.from_bytes(body[place : place + size_bytes], "little")
+    return place + behind == len(body)
+
+
+def chunk_content(body: bytes) -> tuple[bytes | None, str]:
+    """What a chunk holds if its checksum proves it, and else what is wrong."""
+    if len(body) < CHUNK_HEAD.size + 8:
+        return None, "a chunk too short to be one"
+    _, _, size, crc, name_length = CHUNK_HEAD.unpack_from(body)
+    name = body[CHUNK_HEAD.size : CHUNK_HEAD.size + name_length]
+    if name in (b"lz4", b"zstd"):
+        return None, f"a chunk compressed with {name.decode()}, as no recorder of ours writes it"
+    start = CHUNK_HEAD.size + 8
+    content = body[start:]
+    if name or struct.unpack_from("<Q", body, CHUNK_HEAD.size) != (size,) or len(content) != size:
+        return None, "a chunk's head"
+    if zlib.crc32(content) != crc:
+        return None, "a chunk (its checksum fails)"
+    return content, ""
+
+
 class Scan:
     """One pass over a file's bytes. `complete`, `end` and `damages` are right once `records` has come to its end."""
+
+    chunk_content = staticmethod(chunk_content)
 
     def __init__(self, data: bytes | mmap):
         self._data, self._size = data, len(data)
@@ -78,7 +106,7 @@ class Scan:
             if opcode == Opcode.DATA_END:
                 self._finish(place, after)
                 return
-            item, wrong = _checked(opcode, self._data[place + _RECORD.size : after])
+            item, wrong = self._checked(opcode, self._data[place + _RECORD.size : after])
             if wrong:
                 after = self._after_damage(place, after)
                 self._damage(place, after - place, wrong)
@@ -118,10 +146,34 @@ class Scan:
         while match := _START.search(self._data, place):
             start = match.start()
             head = self._head(start)
-            if head is not None and _checked(head[0], self._data[start + _RECORD.size : head[1]])[0] is not None:
+            if head is not None and self._checked(head[0], self._data[start + _RECORD.size : head[1]])[0] is not None:
                 return start
             place = start + 1
         return None
+
+    def _checked(self, opcode: int, body: bytes) -> tuple[bytes | Attachment | Metadata | None, str]:
+        """A record's content if its checksum proves it, and else what is wrong; neither for what carries no data."""
+        try:
+            if opcode == Opcode.CHUNK:
+                return self.chunk_content(body)
+            if opcode == Opcode.ATTACHMENT:
+                if not _lengths_fit(body, 16, 2, 8, 4):
+                    return None, "an attachment's head"
+                if struct.unpack("<I", body[-4:]) != (zlib.crc32(body[:-4]),):
+                    return None, "an attachment"
+                return Attachment.read(ReadDataStream(BytesIO(body))), ""
+            if opcode == Opcode.METADATA:
+                if not _lengths_fit(body, 0, 1, 4, 0):
+                    return None, "metadata"
+                metadata = Metadata.read(ReadDataStream(BytesIO(body)))
+                if metadata.metadata.get(CRC_KEY) != metadata_crc(metadata.name, metadata.metadata):
+                    return None, "metadata"
+                return metadata, ""
+            if opcode == Opcode.MESSAGE:
+                return None, "a message outside a chunk, under no checksum"
+        except (struct.error, EndOfFile, UnicodeDecodeError, MemoryError, OverflowError):
+            return None, "a record that makes no sense"
+        return None, ""
 
     def _finish(self, place: int, after: int) -> None:
         """Check the closing records: the checksum over all data, the summary's, the last magic."""
@@ -149,56 +201,6 @@ def _crc(data: bytes | mmap, start: int, end: int) -> int:
     for place in range(start, end, 1 << 20):
         crc = zlib.crc32(data[place : min(place + (1 << 20), end)], crc)
     return crc
-
-
-def _checked(opcode: int, body: bytes) -> tuple[bytes | Attachment | Metadata | None, str]:
-    """A record's content if its checksum proves it, and else what is wrong; neither for records that carry no data."""
-    try:
-        if opcode == Opcode.CHUNK:
-            return _chunk(body)
-        if opcode == Opcode.ATTACHMENT:
-            if not _lengths_fit(body, 16, 2, 8, 4):
-                return None, "an attachment's head"
-            if struct.unpack("<I", body[-4:]) != (zlib.crc32(body[:-4]),):
-                return None, "an attachment"
-            return Attachment.read(ReadDataStream(BytesIO(body))), ""
-        if opcode == Opcode.METADATA:
-            if not _lengths_fit(body, 0, 1, 4, 0):
-                return None, "metadata"
-            metadata = Metadata.read(ReadDataStream(BytesIO(body)))
-            if metadata.metadata.get(CRC_KEY) != metadata_crc(metadata.name, metadata.metadata):
-                return None, "metadata"
-            return metadata, ""
-        if opcode == Opcode.MESSAGE:
-            return None, "a message outside a chunk, under no checksum"
-    except (struct.error, EndOfFile, UnicodeDecodeError, MemoryError, OverflowError):
-        return None, "a record that makes no sense"
-    return None, ""
-
-
-def _lengths_fit(body: bytes, skipped: int, strings: int, size_bytes: int, behind: int) -> bool:
-    """Whether a body is as long as it says: `skipped` bytes, strings, one block with its size ahead, `behind` bytes."""
-    place = skipped
-    for _ in range(strings):
-        place += 4 + int.from_bytes(body[place : place + 4], "little")
-    place += size_bytes + int.from_bytes(body[place : place + size_bytes], "little")
-    return place + behind == len(body)
-
-
-def _chunk(body: bytes) -> tuple[bytes | None, str]:
-    if len(body) < _CHUNK.size + 8:
-        return None, "a chunk too short to be one"
-    _, _, size, crc, name_length = _CHUNK.unpack_from(body)
-    name = body[_CHUNK.size : _CHUNK.size + name_length]
-    if name in (b"lz4", b"zstd"):
-        return None, f"a chunk compressed with {name.decode()}, as no recorder of ours writes it"
-    start = _CHUNK.size + 8
-    content = body[start:]
-    if name or struct.unpack_from("<Q", body, _CHUNK.size) != (size,) or len(content) != size:
-        return None, "a chunk's head"
-    if zlib.crc32(content) != crc:
-        return None, "a chunk (its checksum fails)"
-    return content, ""
 
 
 def chunk_records(content: bytes) -> Iterator[Schema | Channel | Message]:

@@ -150,11 +150,11 @@ class Definitions:
             self.channels[number] = (channel, schema)
 
 
-def read_log(path: Path | str) -> Log:
+def read_log(path: Path | str, scan_by: type[Scan] = Scan) -> Log:
     """Everything in a log up to where it was cut; InputError only where the file is no log at all."""
     path = Path(path)
     with opened(path) as data:
-        scan = Scan(data)
+        scan = scan_by(data)
         log = Log(path, len(data), False, 0, [], {}, [], {}, {}, {})
         found = _gather(scan, log)
         if not scan.recognised and not scan.damages:
