@@ -15,7 +15,7 @@ UNCLEAN = 6.0  # sigma, corrected for the number of tests
 # Share that is left at which unknown is as likely as not: of the squared gap beyond the floor on runs left out, which
 # counts by the power BY_GAP, and of the misfit that can be explained, by the rest. Where what is left enters at the
 # place of the effect found, it is more probably that effect in another form. Width in e-folds.
-LEFT_OVER, LEFT_AT_HOME, LEFT_WIDTH = 0.35, 0.5, 0.35
+LEFT_OVER, LEFT_AT_HOME, LEFT_WIDTH = 0.24, 0.3, 0.8
 BY_GAP = 2.0 / 3.0
 NOISY, NOISY_WIDTH = 0.2, 0.8  # share of the explainable misfit that is left: disorder is looked for; width in e-folds
 UNFIT = 5.0  # tolerances that the best explanation still misses by: no effect of the catalogue does that

@@ -19,6 +19,9 @@ WARM = 1.1  # squared innovations a sample, above which a fit is tempered
 COARSE = 0.3  # of a spread, before the first step
 SHORTER = (0.4, 0.1)  # of a step, tried where the whole of it brings less than
 POOR = 0.3  # of what it should
+STUCK = 0.2  # a tenth of the misfit that a step should bring and does not, for parameters to be tried apart
+FREED = 2  # candidates at most, the best of those that are stuck
+ASIDE = (0.001, 0.004, 0.015, 0.06)  # of a spread, either way: a delay's misfit has steps, no slope leads on
 
 
 class Fitter:
@@ -97,6 +100,11 @@ class Fitter:
         for course in short:
             for share in SHORTER:
                 course.consider(next(E), *course.step(share), self.tight)
+        stuck = [c for c in short if c.misfit - c.best[0] < SHORTER[-1] * c.foreseen_fall() > STUCK]
+        stuck = sorted(stuck, key=lambda c: c.misfit)[:FREED]
+        points = [(course, *point) for course in stuck for point in course.apart()]
+        for (course, values, known), e in zip(points, self.flown([(c.free, v, a) for c, v, a in points]), strict=True):
+            course.consider(e, values, known, self.tight)
         for course in courses:
             course.accept()
 
@@ -162,7 +170,8 @@ class Course:
         at = np.concatenate([self.allowed, self.values])
         low = np.concatenate([np.minimum(-MOST, self.allowed), self.low])
         high = np.concatenate([np.maximum(MOST, self.allowed), self.high])
-        self.foreseen = within(self.normal, self.slope, low - at, high - at)
+        self.room = low - at, high - at
+        self.foreseen = within(self.normal, self.slope, *self.room)
         alone = within(fitter.A, self.slope[:count], (low - at)[:count], (high - at)[:count])
         self.alone = float(self.slope[:count] @ alone + 0.5 * alone @ fitter.A @ alone)
 
@@ -171,6 +180,21 @@ class Course:
         count = len(self.allowed)
         moved = np.clip(self.values + share * self.foreseen[count:], self.low, self.high)
         return moved, self.allowed + share * self.foreseen[:count]
+
+    def apart(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Points (values, allowed) where the whole step brings nothing: without each parameter, and each one alone."""
+        count, points = len(self.allowed), []
+        for k in range(count, len(self.slope)):
+            rest = np.delete(np.arange(len(self.slope)), k)
+            step = np.zeros(len(self.slope))
+            low, high = self.room
+            step[rest] = within(self.normal[np.ix_(rest, rest)], self.slope[rest], low[rest], high[rest])
+            points.append((self.values + step[count:], self.allowed + step[:count]))
+            for aside in (sign * size for size in ASIDE for sign in (-1.0, 1.0)):
+                values = self.values.copy()
+                values[k - count] += aside
+                points.append((np.clip(values, self.low, self.high), self.allowed))
+        return points
 
     def foreseen_fall(self) -> float:
         """By how much the misfit should fall, were everything linear."""

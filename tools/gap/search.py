@@ -11,13 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from tools.gap.candidates import Free, allowed, candidates, place
-from tools.gap.fit import Course, Fitter
+from tools.gap.fit import POOR, Course, Fitter
 from tools.gap.problem import Gains, Problem
 
 ROUGHNESS = (100.0, 10.0)  # times the disturbance, before the vehicle's own
 TRIED, KEPT, LEFT = 20, 12, 8  # candidates: after the screen, after the first rung, after the second
 FAR = 60.0  # half misfits behind the best, and then no longer worth a flight, beside a share of all that was gained
 SHARE = 0.5
+STARTED = 4  # candidates at most that are given other starts at a time
+SETTLING = 1  # steps of all candidates before any is dropped
 ENOUGH = 0.05  # half misfits; a candidate that gains less has arrived
 MOST_EFFECTS = 3
 SECONDS = 5  # further effects tried beside each of the leading candidates
@@ -25,8 +27,10 @@ LEADING = 3
 SHOWN = 1.0  # squared sigma: a spread of an effect that moves nothing by as much cannot be seen in these runs
 EARNED = 5.0  # nat that a further effect must promise
 LEAPS = (-10.0, -5.0, -2.0, 2.0, 5.0, 10.0)  # spreads of a parameter, tried as starts
+NEARER = (-1.0, -0.5, 0.5, 1.0)  # likewise, where a step brought too little
 NEAR = 30.0  # misfit a sample, within which labels are tried again at full weight
 POLISHED = (3, 2, 1)  # times at most, by the number of effects
+ROUNDS = 3  # of gains at the best label and all labels tried again there, at most
 COOL = 1.05  # times the weight of white innovations: the best candidate is near the truth
 
 
@@ -65,11 +69,15 @@ def settle(fitter: Fitter, course: Course, steps: int = 6) -> None:
 
 
 def prune(courses: list[Course], worst: float, most: int, least_kept: int = 4) -> list[Course]:
-    """The candidates that may still win: `worst` is the misfit of no effect."""
-    courses = sorted(courses, key=lambda c: c.misfit)
-    least = courses[0].misfit
+    """The candidates that may still win: `worst` is the misfit of no effect.
+
+    Each is taken to gain once more what its last step brought: many steps need not mean a poor end.
+    """
+    hoped = {id(c): c.misfit - (c.gained if np.isfinite(c.gained) else 0.0) for c in courses}
+    courses = sorted(courses, key=lambda c: hoped[id(c)])
+    least = min(c.misfit for c in courses)
     margin = max(2.0 * FAR, SHARE * (worst - least))
-    return [c for n, c in enumerate(courses) if n < least_kept or c.misfit - least <= margin][:most]
+    return [c for n, c in enumerate(courses) if n < least_kept or hoped[id(c)] - least <= margin][:most]
 
 
 def improve(fitter: Fitter, courses: list[Course], worst: float, most: int, steps: int) -> list[Course]:
@@ -105,21 +113,35 @@ def screen(search: Search, beside: Course, most: int) -> list[Course]:
     return sorted(shown, key=lambda course: -course.promise())[:most]
 
 
-def leap(fitter: Fitter, courses: list[Course]) -> None:
-    """Further starts: each parameter of a candidate alone far out, where that does better; a delay is not linear."""
+def leap(fitter: Fitter, courses: list[Course], leaps=LEAPS, afresh=False) -> None:
+    """Further starts: each parameter of a candidate's last effect alone far out, where that does better.
+
+    A delay is not linear. afresh: also with what is allowed back at the vehicle file's: it may have been led to make up
+    for the effect.
+    """
     points = []
     for course in courses:
-        for k in range(len(course.free)):
-            for far in LEAPS:
+        bases = [course.allowed] + ([np.zeros(len(course.allowed))] if afresh else [])
+        for k in (k for k, free in enumerate(course.free) if free.label == course.labels[-1]):
+            for far in leaps:
                 values = course.values.copy()
                 values[k] = far
                 if course.low[k] <= far <= course.high[k]:
-                    points.append((course, values))
-    flown = fitter.flown([(course.free, values, course.allowed) for course, values in points])
-    for (course, values), e in zip(points, flown, strict=True):
-        course.consider(e, values, course.allowed, fitter.tight)
+                    points += [(course, values, base) for base in bases]
+    flown = fitter.flown([(course.free, values, base) for course, values, base in points])
+    for (course, values, base), e in zip(points, flown, strict=True):
+        course.consider(e, values, base, fitter.tight)
     for course in courses:
         course.accept()
+        course.gained = np.inf  # no step was taken from there yet
+
+
+def begin(fitter: Fitter, courses: list[Course]) -> None:
+    """The first step of candidates; other starts for those to which it should bring much, and brings much less."""
+    fitter.move(courses)
+    much = [c for c in courses if c.foreseen_gain() > 2.0 * FAR and c.gained < POOR * c.foreseen_fall()]
+    much = sorted(much, key=lambda c: -c.foreseen_gain())[:STARTED]
+    leap(fitter, much, (*NEARER, *LEAPS), afresh=True)
 
 
 def gains_at(problem: Problem, model: tuple[np.ndarray, np.ndarray], roughness: float) -> Gains:
@@ -154,11 +176,17 @@ def run(problem: Problem, say: Callable[[str], None] = lambda text: None) -> Sea
     say(f"screened {len(known)} labels")
     fitter.move(tried)
     leap(fitter, tried)
-    search.courses = improve(fitter, prune(tried, null.misfit, KEPT, KEPT), null.misfit, KEPT, 3)
+    for _ in range(SETTLING):
+        fitter.advance(tried)
+    search.courses = improve(fitter, prune(tried, null.misfit, KEPT, KEPT), null.misfit, KEPT, 3 - SETTLING)
     refilter(search, min([*search.courses, search.null], key=lambda c: c.misfit), ROUGHNESS[1])
     search.courses = improve(search.fitter, search.courses, search.null.misfit, LEFT, 3)
-    polish(search, POLISHED[0])
-    rescreen(search)
+    for _ in range(ROUNDS):
+        polish(search, POLISHED[0])
+        first = search.best.labels
+        rescreen(search)
+        if search.best.labels == first:
+            break
     say(f"one effect: {' '.join(search.best.labels) or 'none'}")
     for count in range(2, MOST_EFFECTS + 1):
         if len(search.best.labels) < count - 1 or not widen(search, count):
@@ -177,7 +205,7 @@ def rescreen(search: Search) -> None:
     new = [c for c in screen(search, search.null, LEFT) if c.labels not in there]
     if not new:
         return
-    search.fitter.move(new)
+    begin(search.fitter, new)
     search.courses = improve(search.fitter, [*search.courses, *new], search.null.misfit, 2 * LEFT, 3)
 
 
@@ -201,6 +229,6 @@ def widen(search: Search, count: int) -> bool:
             return False
         more |= {tuple(sorted(c.labels)): c for c in tried}
     found = list(more.values())
-    search.fitter.move(found)
+    begin(search.fitter, found)
     search.courses += improve(search.fitter, found, min(c.misfit for c in leading), LEFT, 3)
     return True

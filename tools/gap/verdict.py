@@ -150,7 +150,7 @@ def conclude(search: Search, say: Callable[[str], None] = lambda text: None, noi
         main = noise.probe.name
         chances = {name: 0.0 for name in chances} | {main: 1.0}
     chances = {name: value * (1.0 - unknown) for name, value in chances.items()} | {UNKNOWN: unknown}
-    chances = admit_mistakes({label: 0.0 for label in catalogue()} | chances)
+    chances = admit_mistakes({label: 0.0 for label in catalogue()} | chances, main)
     top = max(chances, key=lambda name: chances[name])
     selected = sorted(gained, key=lambda label: -gained[label])
     groups = grouped(rivals(search, course, main)) if noise is None else {main: [main]}
@@ -165,13 +165,17 @@ def conclude(search: Search, say: Callable[[str], None] = lambda text: None, noi
     )  # fmt: skip
 
 
-def admit_mistakes(chances: dict[str, float]) -> dict[str, float]:
-    """Probabilities of which MISTAKEN is shared by all labels: the search may have lost the true one on its way."""
+def admit_mistakes(chances: dict[str, float], main: str) -> dict[str, float]:
+    """Probabilities of which MISTAKEN goes to all labels: the search may have lost the true one on its way.
+
+    Half of it to those at the place of the main one, which an effect in another form is taken for soonest.
+    """
     labels = catalogue()
-    return {
-        name: (1.0 - MISTAKEN) * value + (MISTAKEN / len(labels) if name in labels else 0.0)
-        for name, value in chances.items()
-    }
+    beside = [name for name, effect in labels.items() if main and effect.place == labels[main].place and name != main]
+    shares = dict.fromkeys(labels, (0.5 if beside else 1.0) * MISTAKEN / len(labels))
+    for name in beside:
+        shares[name] += 0.5 * MISTAKEN / len(beside)
+    return {name: (1.0 - MISTAKEN) * value + shares.get(name, 0.0) for name, value in chances.items()}
 
 
 def rivals(search: Search, course: Course, main: str) -> dict[str, float]:
