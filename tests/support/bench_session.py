@@ -129,6 +129,13 @@ class Terminal:
         self.start(answer)
 
 
+def enable(terminal: Terminal) -> None:
+    """Let actuators move, and say that hands are clear."""
+    terminal.start("enable")
+    terminal.answer("actuators will move", "yes")
+    terminal.ready()
+
+
 def session(folder: Path, *, sweep: bool) -> tuple[str, dict]:
     """The whole session, with or without the sweep to its end; its transcript and what was found on the way."""
     twins = Twins(folder / "p", wrong=WRONG)
@@ -137,7 +144,11 @@ def session(folder: Path, *, sweep: bool) -> tuple[str, dict]:
         terminal = Terminal(twins.board, folder)
         terminal.type("read slider_wire")
         found["not enabled"] = terminal.type("goto slider 5")
-        terminal.type("enable")
+        terminal.start("enable")
+        terminal.answer("actuators will move", "no")
+        terminal.ready()
+        found["not confirmed"] = terminal.text()
+        enable(terminal)
         terminal.start("calibrate slider")
         for _ in range(5):
             terminal.wait(lambda: terminal.line() == "where is it really, mm?")
@@ -146,7 +157,7 @@ def session(folder: Path, *, sweep: bool) -> tuple[str, dict]:
         terminal.ready()
         found["calibrate"] = terminal.text()
         found["board"] = twins.board.read_text()
-        terminal.type("enable")
+        enable(terminal)
         found["goto"] = terminal.type("goto slider 8")
         found["slider_m"] = twins.state()["slider_m"]
         if sweep:

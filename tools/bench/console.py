@@ -18,7 +18,8 @@ from pathlib import Path
 from typing import Any
 
 from tools.bench.client import Bench, BenchError
-from tools.bench.commands import Commands, UsageError
+from tools.bench.commands import Commands
+from tools.bench.desk import UsageError
 from tools.bench.units import ACTUATORS, WIRES
 from tools.cli.common import BAD_INPUT, DONE, FAILED
 

@@ -1,0 +1,32 @@
+"""What the bench's commands share: the bench, the person, and how a word is understood."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from tools.bench.client import Bench, BenchError
+
+
+class UsageError(BenchError):
+    """A command was typed that cannot be understood."""
+
+
+def number(word: str) -> float:
+    try:
+        value = float(word)
+    except ValueError:
+        raise UsageError(f"expected a number, got '{word}'") from None
+    if not math.isfinite(value):
+        raise UsageError(f"expected a finite number, got '{word}'")
+    return value
+
+
+class Desk:
+    """A bench, a way to say things, a way to ask, a way to see a key pressed, and where files go."""
+
+    def __init__(
+        self, bench: Bench, say: Callable[[str], None], ask: Callable[[str], str],
+        pressed: Callable[[], bool], show_table: Callable[[Callable[[], Any], float], None], out: Path,
+    ):  # fmt: skip
+        self.bench, self.say, self.ask, self.pressed, self._show, self.out = bench, say, ask, pressed, show_table, out
