@@ -38,15 +38,15 @@ def _advance_bar(bar: Any, task: Any, n: int = 1) -> None:
 
 
 @contextlib.contextmanager
-def progress(label: str, total: int) -> Iterator[Callable[[int], None]]:
-    """A progress bar on a terminal, plain lines at every tenth elsewhere; yields advance(n)."""
-    if sys.stderr.isatty():
+def progress(label: str, total: int, *, bar: bool = True) -> Iterator[Callable[[int], None]]:
+    """A progress bar on a terminal, plain lines at every tenth elsewhere (or without `bar`); yields advance(n)."""
+    if bar and sys.stderr.isatty():
         from rich.console import Console
         from rich.progress import Progress
 
-        with Progress(console=Console(stderr=True), transient=True) as bar:
-            task = bar.add_task(label, total=total)
-            yield functools.partial(_advance_bar, bar, task)
+        with Progress(console=Console(stderr=True), transient=True) as shown_bar:
+            task = shown_bar.add_task(label, total=total)
+            yield functools.partial(_advance_bar, shown_bar, task)
         return
     done, shown = 0, 0
 

@@ -48,24 +48,28 @@ def peak_rss_mb() -> float | None:
     help="Folder of the vehicle's state and heartbeat, on devices.",
 )
 @click.option("--acknowledge", is_flag=True, help="A person has looked after a flight that was given up or broke off.")
+@click.option("--yes", is_flag=True, help="Arm without asking the person at the terminal, on devices.")
 @click.option("--priority", type=click.IntRange(1, 90), help="Real-time priority (SCHED_FIFO); 50 is usual.")
 @click.option("--lock-memory", is_flag=True, help="Keep all memory resident (mlockall).")
 @click.option("--core", type=click.IntRange(0, 255), help="Keep the loop on one processor core.")
 @click.option("--effect", "effects", multiple=True, metavar="LABEL:NAME=VALUE", help="Add an effect to the plant.")
 @json_option
 def fly(
-    mission, vehicle, board, log_file, no_log, seed, realtime, state_folder, acknowledge, priority, lock_memory, core,
-    effects, as_json,
+    mission, vehicle, board, log_file, no_log, seed, realtime, state_folder, acknowledge, yes, priority, lock_memory,
+    core, effects, as_json,
 ) -> None:  # fmt: skip
     """Fly a mission and record it.
 
-    The first Ctrl-C gives the dive up and surfaces, the second stops at once. On devices, a flight that broke off is
-    never resumed: the next start only brings the vehicle up. Exit code 1: the flight did not complete.
+    The first Ctrl-C gives the dive up and surfaces, the second stops at once. On devices, arming is confirmed at the
+    terminal, a second Ctrl-C under water wants a third, and a flight that broke off is never resumed: the next start
+    only brings the vehicle up. Exit code 1: the flight did not complete.
     """
+    from firmware.core.control_layout import EST_DEPTH
     from firmware.core.supervisor_layout import RESTARTED
     from hal.ports import BoardError
     from hal.recorder.recorder import NullRecorder, Recorder
     from hal.state_file import Phase
+    from tools.cli.terminal import Stop, confirm_arming, undisturbed
     from tools.compose import build_flight, log_metadata, parse_effects, record_specs
     from tools.errors import InputError
 
@@ -102,19 +106,13 @@ def fly(
         say(f"ascending only: {keeper.life.reason}")
         flight.autopilot.give_up()
         flight.supervisor.G[RESTARTED] = 1.0
+    elif keeper is not None and not (yes or own_twins(flight) or confirm_arming(f"{board}, {flight.mission.name}")):
+        fail("glider: not armed: not confirmed")
 
-    presses = 0
-
-    def on_interrupt(*_):
-        nonlocal presses
-        presses += 1
-        if presses > 1:
-            raise KeyboardInterrupt
-        flight.autopilot.give_up()
-
-    before = signal.signal(signal.SIGINT, on_interrupt)
+    stop = Stop(flight.autopilot.give_up, None if keeper is None else lambda: flight.autopilot.est[EST_DEPTH])
+    before = signal.signal(signal.SIGINT, stop)
     try:
-        with keeper or contextlib.nullcontext():
+        with contextlib.nullcontext() if keeper is None else undisturbed(), keeper or contextlib.nullcontext():
             if keeper is not None:
                 keeper.prepare()
             flight.board.open()  # what does not arm leaves no log
@@ -122,11 +120,11 @@ def fly(
             with (
                 contextlib.closing(flight.board),
                 recorder,
-                progress(f"flying {flight.mission.name}", len(flight.mission.leg)) as advance,
+                progress(f"flying {flight.mission.name}", len(flight.mission.leg), bar=keeper is None) as advance,
             ):
                 timing, seconds = _run(flight, recorder, realtime, advance, keeper, wishes)
                 if keeper is not None:
-                    orderly = flight.autopilot.mode == "completed" or presses > 0
+                    orderly = flight.autopilot.mode == "completed" or stop.presses > 0
                     keeper.end(surfaced=flight.autopilot.surfaced, orderly=orderly, reason=flight.autopilot.reason)
                 report = recorder.close(ending={"ended": flight.autopilot.mode, "reason": flight.autopilot.reason})
     except KeyboardInterrupt:
@@ -192,7 +190,13 @@ class Wishes:
         if self._lock_memory:
             self.said.append(realtime.lock_memory())
         if self.said:
-            say(f"{', '.join(self.said)}, collector frozen")
+            with contextlib.suppress(OSError):
+                say(f"{', '.join(self.said)}, collector frozen")
+
+
+def own_twins(flight) -> bool:
+    """Whether the devices are twins that the board itself starts: nobody's hands are in those."""
+    return hasattr(flight.board, "control")
 
 
 def faults_noticed(supervisor) -> list[dict]:
@@ -257,7 +261,8 @@ def _run(flight, recorder, realtime, advance, keeper, wishes):
         nonlocal done
         leg = int(flight.autopilot.ap[LEG])
         if leg > done:
-            advance(leg - done)
+            with contextlib.suppress(OSError):  # a terminal that is gone, or takes no more
+                advance(leg - done)
             done = leg
         while simulated and recorder.health().pending > ROOM and recorder.health().alive:
             time.sleep(0.001)  # simulated time is quicker than a disk
@@ -279,7 +284,8 @@ def _run(flight, recorder, realtime, advance, keeper, wishes):
                     runtime.tick()
         began = runtime.deadline
         timing = runtime.run(on_second=on_second)
-        advance(len(flight.mission.leg) - done)
+        with contextlib.suppress(OSError):
+            advance(len(flight.mission.leg) - done)
         return timing, flight.board.clock.now() - began
     finally:
         runtime.disarm()

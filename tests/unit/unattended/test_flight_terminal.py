@@ -1,0 +1,185 @@
+"""A flight's terminal, a real one: what is typed, what is not read, and what happens when it goes away."""
+
+import json
+import math
+import os
+import signal
+import sys
+import time
+
+import pexpect
+import pytest
+
+from hal.state_file import Phase, StateFile
+from tests.support.twinned import end_guard
+from tools.cli.terminal import AGAIN_S, Stop
+
+# --- Ctrl-C ---------------------------------------------------------------------------------------------------------
+
+
+class Clock:
+    """A clock that a test turns."""
+
+    def __init__(self):
+        self.t = 100.0
+
+    def __call__(self):
+        return self.t
+
+
+def pressed(depth, seconds):
+    """Ctrl-C at these times; how often the dive was given up, and the number of presses before it stopped at once."""
+    clock, given_up = Clock(), []
+    stop = Stop(lambda: given_up.append(clock.t), depth, clock)
+    for number, at in enumerate(seconds, start=1):
+        clock.t = 100.0 + at
+        try:
+            stop(signal.SIGINT, None)
+        except KeyboardInterrupt:
+            return len(given_up), number
+    return len(given_up), None
+
+
+@pytest.mark.parametrize("depth", [None, lambda: 0.0, lambda: 0.29, lambda: -0.1, lambda: math.nan])
+def test_the_first_gives_up_and_the_second_stops_at_once_where_people_are(depth):
+    assert pressed(depth, [0.0, 0.001]) == (1, 2)
+    assert pressed(depth, [0.0]) == (1, None)
+
+
+def test_under_water_only_one_that_is_meant_leaves_the_vehicle():
+    def deep():
+        return 3.0
+
+    assert pressed(deep, [0.0, 1.0]) == (1, None)
+    assert pressed(deep, [0.0, 1.0, 2.0]) == (1, 3)
+    assert pressed(deep, [0.01 * n for n in range(500)]) == (1, None)  # a burst of noise
+    assert pressed(deep, [(AGAIN_S[1] + 1.0) * n for n in range(50)]) == (1, None)  # one now and then
+
+
+# --- arming -----------------------------------------------------------------------------------------------------------
+QUESTION = "hands and cables clear"
+
+
+@pytest.fixture
+def fly(tmp_path):
+    """`glider fly` of a board whose ports are not there, in a terminal."""
+    started = []
+
+    def start(*extra):
+        command = ["-m", "tools.cli.main", "fly", "--board", "roughie", "--no-log", "--state", str(tmp_path), *extra]
+        child = pexpect.spawn(sys.executable, command, timeout=120, encoding="utf-8")
+        started.append(child)
+        return child
+
+    yield start
+    for child in started:
+        child.close(force=True)
+    end_guard(tmp_path)
+
+
+def ended(child):
+    """What it still said, and its exit code."""
+    child.expect(pexpect.EOF)
+    child.close()
+    return child.before, child.exitstatus
+
+
+@pytest.mark.parametrize("answer", ["", "y", "no", "yes yes", "\x04", "\x00\x1b[A"])
+def test_nothing_arms_without_a_yes(fly, tmp_path, answer):
+    child = fly()
+    child.expect(QUESTION)
+    child.sendline(answer)
+    said, code = ended(child)
+    assert code == 1
+    assert "not armed: not confirmed" in said
+    assert StateFile(tmp_path).read().phase == Phase.ASHORE
+
+
+def test_a_confirmed_start_goes_on_to_the_checks(fly):
+    child = fly()
+    child.expect(QUESTION)
+    child.sendline("yes")
+    said, code = ended(child)
+    assert (code, "not confirmed" in said) == (1, False)
+    assert "not armed: " in said  # its ports are not there
+
+
+def test_ctrl_c_at_the_question_arms_nothing(fly, tmp_path):
+    child = fly()
+    child.expect(QUESTION)
+    child.sendintr()
+    assert ended(child)[1] == 1
+    assert StateFile(tmp_path).read().phase == Phase.ASHORE
+
+
+def test_who_says_yes_beforehand_is_not_asked(fly):
+    said, code = ended(fly("--yes"))
+    assert (code, QUESTION in said) == (1, False)
+
+
+def test_an_ascent_is_never_asked_for(fly, tmp_path):
+    StateFile(tmp_path).write(Phase.DIVING)
+    child = fly()
+    assert child.expect([QUESTION, "ascending only"]) == 1
+    assert QUESTION not in ended(child)[0]
+
+
+# --- in flight --------------------------------------------------------------------------------------------------------
+LOOP = """
+import contextlib, json, os, select, sys, time
+from tools.cli.terminal import undisturbed
+with undisturbed() if sys.argv[2] == "undisturbed" else contextlib.nullcontext():
+    print("flying", flush=True)
+    longest, before, end = 0.0, time.monotonic(), time.monotonic() + 2.0
+    while time.monotonic() < end:
+        with contextlib.suppress(OSError):
+            print("x" * 500, file=sys.stderr, flush=True)
+        time.sleep(0.01)
+        longest, before = max(longest, time.monotonic() - before), time.monotonic()
+left = bool(select.select([0], [], [], 0.0)[0]) if os.isatty(0) else None
+with open(sys.argv[1], "w") as file:
+    json.dump({"longest": longest, "left": left}, file)
+"""
+
+
+def disturbed(tmp_path, how, disturb):
+    """A loop in a terminal that nobody reads from its start on; what it says of itself, None where it did not end."""
+    result = tmp_path / "result"
+    child = pexpect.spawn(sys.executable, ["-c", LOOP, str(result), how], timeout=60)
+    child.expect_exact("flying")
+    disturb(child)
+    end = time.monotonic() + (8.0 if how == "undisturbed" else 4.0)  # of the loop, two
+    while time.monotonic() < end and not (result.exists() and result.read_text().endswith("}")):
+        time.sleep(0.05)
+    child.close(force=True)
+    return json.loads(result.read_text()) if result.exists() else None
+
+
+def hang_up(child):
+    """Close the terminal's other end, and that alone."""
+    null = os.open(os.devnull, os.O_RDWR)
+    os.dup2(null, child.child_fd)
+    os.close(null)
+
+
+DISTURBANCES = {
+    "suspend": lambda child: child.send(b"\x1a"),
+    "quit": lambda child: child.send(b"\x1c"),
+    "hold": lambda child: child.send(b"\x13"),
+    "nobody reads": lambda child: None,
+    "garbage": lambda child: child.send(bytes(range(4, 256)) + b"\nrm -r x\n\x1a\x1c\x13"),
+    "hang up": hang_up,
+}
+
+
+@pytest.mark.parametrize("what", DISTURBANCES)
+def test_nothing_that_a_terminal_does_reaches_the_loop(tmp_path, what):
+    found = disturbed(tmp_path, "undisturbed", DISTURBANCES[what])
+    assert found is not None, what
+    assert found["longest"] < 1.0  # s, on a busy machine
+    assert not found["left"]  # typed in flight: no shell shall run it
+
+
+@pytest.mark.parametrize("what", DISTURBANCES)
+def test_it_would_without(tmp_path, what):
+    assert disturbed(tmp_path, "as it is", DISTURBANCES[what]) is None
