@@ -27,7 +27,7 @@ IGNORED = (
 
 def confirm_arming(what: str) -> bool:
     """Whether the person at the terminal says yes, in full. Where no terminal asks, the command line was the order."""
-    if not sys.stdin.isatty():
+    if sys.stdin is None or not sys.stdin.isatty():
         return True
     click.echo(f"{what}: actuators go live once all checks pass; hands and cables clear? (yes/no) ", err=True, nl=False)
     return sys.stdin.readline().strip().lower() == "yes"
