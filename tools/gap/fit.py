@@ -17,6 +17,7 @@ MOST = 3.5  # prior sigma that what is allowed for may be off
 STEP = 0.05  # of a spread, for effects
 WARM = 1.1  # squared innovations a sample, above which a fit is tempered
 COARSE = 0.3  # of a spread, before the first step
+WIDE = 2.0  # spreads, for what begins only beyond some size: a limit that the commands never reached
 SHORTER = (0.4, 0.1)  # of a step, tried where the whole of it brings less than
 POOR = 0.3  # of what it should
 STUCK = 0.2  # a tenth of the misfit that a step should bring and does not, for parameters to be tried apart
@@ -140,6 +141,7 @@ class Course:
         self.e: np.ndarray = np.empty(0)
         self.misfit, self.gained = np.inf, np.inf
         self.known = np.empty((0, 0))  # columns of the first parameters, where they are known already
+        self.whole = 1.0  # spreads that an effect which begins at a kink is nudged by there
 
     def settle(self, e: np.ndarray, tight: float) -> None:
         self.e = e
@@ -148,9 +150,10 @@ class Course:
 
     def nudges(self, coarse: bool) -> np.ndarray:
         """Step of each derivative, away from the nearer limit; a whole spread where an effect begins at a kink."""
+        whole = [min(self.whole, max(f.high, -f.low)) if f.kinked else COARSE for f in self.free]
         sizes = np.array([
-            (1.0 if f.kinked else COARSE) if coarse or (f.kinked and v == 0.0) else STEP * max(1.0, abs(v))
-            for f, v in zip(self.free, self.values, strict=True)
+            size if coarse or (f.kinked and v == 0.0) else STEP * max(1.0, abs(v))
+            for f, v, size in zip(self.free, self.values, whole, strict=True)
         ])  # fmt: skip
         return np.where(self.values + sizes > self.high, -sizes, sizes)
 
