@@ -14,7 +14,6 @@ from hal.boardfile import calibration_hash, decode_device_file
 from tests.support.bench_session import Twins, session
 
 pytestmark = pytest.mark.realtime
-ENABLE = ("enable", "yes")
 
 
 def glider(*arguments, lines=(), **options):
@@ -56,7 +55,9 @@ def test_a_session_at_a_terminal(tmp_path):
 
 
 def test_a_pipe_runs_commands_and_says_what_it_does(twins):
-    done = bench(twins, "# a comment", "read beacon", *ENABLE, "goto slider 5", "jog slider -10", "limits", "watch 0.1")
+    done = bench(
+        twins, "# a comment", "read beacon", "enable", "goto slider 5", "jog slider -10", "limits", "watch 0.1"
+    )
     assert done.returncode == 0, done.stderr
     assert "> goto slider 5" in done.stdout
     assert "servo    -60.00 to 60.00 deg" in done.stdout
@@ -72,9 +73,7 @@ def test_a_pipe_runs_commands_and_says_what_it_does(twins):
         (["raw sensors 01 03 01 00 00 04", "no"], 1, "not sent"),
         (["raw sensors 01 63 01", "yes"], 1, "not one whole Modbus request"),
         (["zero slider_wire"], 1, "no line left to answer: write"),
-        (["enable", "no"], 1, "enable: not enabled"),
-        (["enable", "goto slider 5"], 1, "enable: not enabled"),  # a line that answers nothing is no confirmation
-        ([*ENABLE, "sweep slider 5 900"], 1, "expected LOW < HIGH within -60.00 to 60.00 mm"),
+        (["enable", "sweep slider 5 900"], 1, "expected LOW < HIGH within -60.00 to 60.00 mm"),
         (["limits slider 10 -10"], 1, "would not be a good board file"),
     ],
 )
@@ -92,7 +91,7 @@ def test_a_script_ends_at_the_first_command_that_fails(twins, tmp_path, lines, c
 
 
 def test_limits_hold_whatever_is_asked(twins):
-    done = bench(twins, *ENABLE, "goto servo 200", "goto ballast -3", "goto slider 0")
+    done = bench(twins, "enable", "goto servo 200", "goto ballast -3", "goto slider 0")
     assert done.returncode == 0, done.stderr
     assert "servo: limited to 60.00 deg" in done.stdout
     state = twins.state()
@@ -110,7 +109,7 @@ def test_raw_bytes_and_their_answers(twins):
 def test_a_sweep_leaves_run_data_and_a_picture(twins, tmp_path):
     from tools.runs.case import load_case
 
-    done = bench(twins, *ENABLE, "goto slider 0", "sweep slider -2 2", out=tmp_path)
+    done = bench(twins, "enable", "goto slider 0", "sweep slider -2 2", out=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "travel time" in done.stdout
     (run,) = load_case(tmp_path / "sweep-slider-001").runs
@@ -122,7 +121,7 @@ def start(twins):
     """A console on a pipe that is left open, with the slider on its way from end to end."""
     command = [sys.executable, "-m", "tools.cli.main", "bench", "--board", str(twins.board)]
     process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
-    process.stdin.write("enable\nyes\ngoto slider -55\ngoto slider 55\n")
+    process.stdin.write("enable\ngoto slider -55\ngoto slider 55\n")
     process.stdin.flush()
     end = time.monotonic() + 60.0
     while twins.state()["slider_m"] > -0.045:
@@ -193,7 +192,7 @@ SIGNS = ("nose up", "roll to starboard", "turn to starboard", "deeper", "mass fo
 
 def test_check_leads_through_signs_and_axes(twins):
     """Whatever the actuators stood at before: here the mass is further forward than the check will send it."""
-    assert bench(twins, *ENABLE, "goto slider 50").returncode == 0
+    assert bench(twins, "enable", "goto slider 50").returncode == 0
     found = lead(twins, twins.board, actuators=True)
     assert {name: found[name]["pass"] for name in SIGNS} == dict.fromkeys(SIGNS, True), found
     assert re.match(r"pitch \+1[3-7]\.\d deg: right", found["nose up"]["message"])

@@ -84,6 +84,7 @@ class Console:
     def run_lines(self, lines: Iterator[str], source: str) -> int:
         """Commands one a line; exit code 0, 1 (a command failed) or 2 (one was not understood)."""
         self._lines = (line.rstrip("\n") for line in lines)
+        self.commands.scripted = True
         for line in self._lines:
             if line.strip() and not line.strip().startswith("#"):
                 self.say(f"> {line.strip()}")

@@ -29,4 +29,5 @@ class Desk:
         self, bench: Bench, say: Callable[[str], None], ask: Callable[[str], str],
         pressed: Callable[[], bool], show_table: Callable[[Callable[[], Any], float], None], out: Path,
     ):  # fmt: skip
+        self.scripted = False  # an `enable` in a script was written with time to think, and is not asked about
         self.bench, self.say, self.ask, self.pressed, self._show, self.out = bench, say, ask, pressed, show_table, out

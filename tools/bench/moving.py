@@ -15,8 +15,9 @@ class Moving(Desk):
     """enable, disable, stop, reset, goto, jog, sweep. What moves is confirmed first; a stop never is."""
 
     def do_enable(self) -> None:
-        """enable: let actuators move, after a confirmation; nothing does before."""
-        if self.ask("actuators will move when told; hands and cables clear? (yes/no) ").lower() not in ("y", "yes"):
+        """enable: let actuators move; nothing does before. At a terminal it asks whether hands are clear."""
+        question = "actuators will move when told; hands and cables clear? (yes/no) "
+        if not self.scripted and self.ask(question).lower() not in ("y", "yes"):
             raise BenchError("not enabled")
         self.bench.ask("enable", on=True)
         self.say("enabled: actuators move when told")
