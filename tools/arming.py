@@ -179,6 +179,6 @@ def arm(flight: Any, *, log: Path | None) -> list[Check]:
     folder = None if log is None else log.resolve().parent
     if folder is not None and not folder.is_dir():
         raise InputError("no such folder", source=folder)
-    checks = Arming(flight, folder=folder, hardware=flight.board.name != "twin").run()
+    checks = Arming(flight, folder=folder, hardware=not flight.twinned).run()
     refuse(checks)
     return checks

@@ -63,6 +63,11 @@ class Flight:
         """The gains that count: the mission's, else the vehicle's, else the defaults."""
         return self.mission.control or self.vehicle.control or Control()
 
+    @property
+    def twinned(self) -> bool:
+        """Whether the devices are twins that the board itself starts: nothing real moves."""
+        return hasattr(self.board, "control")
+
 
 def load_board_file(wanted: str) -> BoardFile:
     """A board by shipped name ("sim") or path."""

@@ -144,7 +144,7 @@ def arming_list(mission: str, vehicle: str, board: str) -> list[dict]:
     except BoardError as error:
         return [{"check": "arming", "pass": False, "message": str(error)}]
     with contextlib.closing(flight.board):
-        checks = Arming(flight, folder=Path.cwd(), hardware=flight.board.name != "twin").run()
+        checks = Arming(flight, folder=Path.cwd(), hardware=not flight.twinned).run()
     return [{"check": f"arming: {item.name}", "pass": item.passed, "message": item.reason} for item in checks]
 
 

@@ -106,7 +106,7 @@ def fly(
         say(f"ascending only: {keeper.life.reason}")
         flight.autopilot.give_up()
         flight.supervisor.G[RESTARTED] = 1.0
-    elif keeper is not None and not (yes or own_twins(flight) or confirm_arming(f"{board}, {flight.mission.name}")):
+    elif keeper is not None and not (yes or flight.twinned or confirm_arming(f"{board}, {flight.mission.name}")):
         fail("glider: not armed: not confirmed")
 
     stop = Stop(flight.autopilot.give_up, None if keeper is None else lambda: flight.autopilot.est[EST_DEPTH])
@@ -194,11 +194,6 @@ class Wishes:
                 say(f"{', '.join(self.said)}, collector frozen")
 
 
-def own_twins(flight) -> bool:
-    """Whether the devices are twins that the board itself starts: nobody's hands are in those."""
-    return hasattr(flight.board, "control")
-
-
 def faults_noticed(supervisor) -> list[dict]:
     """Rows of the fault table that asked for something: when first, and for what at most."""
     from firmware.supervisor.table import FAULTS
@@ -218,7 +213,7 @@ def keep(flight, recorder, path, folder, acknowledge):
     if not hasattr(flight.board, "links"):
         return None
     name = flight.mission.name if path is None else path.stem
-    keeper = Keeper(flight, recorder, name=name, folder=folder, twin=flight.board.name == "twin")
+    keeper = Keeper(flight, recorder, name=name, folder=folder, twin=flight.twinned)
     keeper.claim()
     if acknowledge and not keeper.life.before.may_start:
         say(f"acknowledged: {keeper.life.reason}")
