@@ -4,6 +4,7 @@ All that flies on devices is there: drivers, wires, twins, recorder, heartbeat, 
 a process that never waits, on another core than the loop's.
 """
 
+import json
 import os
 import subprocess
 import sys
@@ -46,13 +47,42 @@ def measure(seconds: float, *, fifo: bool, load: bool) -> dict[str, Any]:
         mission = Path(place, "endurance.toml")
         mission.write_text(mission_text(seconds))
         busy = _load(cores[0]) if load and len(cores) > 1 else None
+        asleep = _sleeper(cores[-1], seconds, fifo)
         try:
             found = _fly(mission, Path(place), seconds, fifo, cores[-1])
+            machine = json.loads(asleep.communicate(timeout=60.0)[0])
         finally:
-            if busy is not None:
-                busy.kill()
-                busy.wait()
-    return {**found, "cores": len(cores), "load_on_other_core": busy is not None, "fifo": fifo}
+            for process in (busy, asleep):
+                if process is not None:
+                    process.kill()
+                    process.wait()
+    return {**found, "machine": machine, "cores": len(cores), "load_on_other_core": busy is not None, "fifo": fifo}
+
+
+SLEEPER = """
+import contextlib, ctypes, json, os, sys, time
+core, seconds, fifo = int(sys.argv[1]), float(sys.argv[2]), sys.argv[3] == "True"
+os.sched_setaffinity(0, {core})
+if fifo:
+    with contextlib.suppress(PermissionError):
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(51))
+    ctypes.CDLL(None).mlockall(3)
+ticks = missed = 0
+worst, due, end = 0.0, time.monotonic(), time.monotonic() + seconds
+while due < end:
+    time.sleep(max(0.0, due - time.monotonic()))
+    late = time.monotonic() - due
+    ticks, worst, due = ticks + 1, max(worst, late), due + 0.02
+    while due < time.monotonic():
+        missed, due = missed + 1, due + 0.02
+print(json.dumps({"ticks": ticks, "missed": missed, "worst_late_s": worst}))
+"""
+
+
+def _sleeper(core: int, seconds: float, fifo: bool) -> subprocess.Popen[bytes]:
+    """What the machine itself can keep: a process on the loop's core that only sleeps, above its priority, as often."""
+    command = [sys.executable, "-c", SLEEPER, str(core), str(seconds), str(fifo)]
+    return subprocess.Popen(command, stdout=subprocess.PIPE)
 
 
 def _load(core: int) -> subprocess.Popen[bytes]:
