@@ -20,7 +20,7 @@ COARSE = 0.3  # of a spread, before the first step
 WIDE = 2.0  # spreads, for what begins only beyond some size: a limit that the commands never reached
 SHORTER = (0.4, 0.1)  # of a step, tried where the whole of it brings less than
 POOR = 0.3  # of what it should
-STUCK = 0.2  # a tenth of the misfit that a step should bring and does not, for parameters to be tried apart
+STUCK = 0.2  # misfit that a tenth of a step's promise must be worth, for parameters to be tried apart where it fails
 FREED = 2  # candidates at most, the best of those that are stuck
 ASIDE = (0.001, 0.004, 0.015, 0.06)  # of a spread, either way: a delay's misfit has steps, no slope leads on
 
