@@ -101,7 +101,10 @@ class SimulatedClock:
 
 
 class PacedClock(MonotonicClock):
-    """Real time that takes the simulated world with it; a late tick finds the present, as with real devices."""
+    """Real time that takes the simulated world with it; a late tick finds the present, as with real devices.
+
+    The world moves in whole steps, to the nearest: half a step is taken off, so that no sample is of the future.
+    """
 
     def __init__(self, world: World):
         super().__init__()
@@ -109,7 +112,7 @@ class PacedClock(MonotonicClock):
 
     def sleep_until(self, deadline: float) -> None:
         super().sleep_until(deadline)
-        self._world.advance(max(deadline, self.now()))
+        self._world.advance(max(deadline, self.now()) - 0.5 * self._world.dt)
 
 
 class SimBoard:
