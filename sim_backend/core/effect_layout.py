@@ -37,12 +37,14 @@ SHAPES = (
     "pump running", "time", "climb or dive",
 )  # fmt: skip
 N_SHAPES = 11
-N_F = SHAPE + N_SHAPES
+TETHER_GROWTH, TETHER_ACROSS = SHAPE + N_SHAPES, SHAPE + N_SHAPES + 1  # 1/m, 1: a line longer with depth; across it
+N_F = SHAPE + N_SHAPES + 2
 
 # --- x: behind the plant's state, what effects remember --------------------------------------------------------------
 X_GEAR_SERVO, X_GEAR_SLIDER = N_X, N_X + 1  # behind the play: rad, m
 X_LAG = N_X + 2  # roll, pitch, yaw, depth: how far the reading is behind, rad, m
-N_XF = N_X + 6
+X_LATE = N_X + 6  # s; motion capture behind its delay, by what the diagnosis believes: it stays as it is
+N_XF = N_X + 7
 
 # --- y: what is read ------------------------------------------------------------------------------------------------
 Y_ROLL, Y_PITCH, Y_YAW, Y_P, Y_Q, Y_R, Y_DEPTH, Y_SLIDER, Y_BALLAST = 0, 1, 2, 3, 4, 5, 6, 7, 8
@@ -50,5 +52,5 @@ Y_ONBOARD = 9
 Y_MOCAP_X, Y_MOCAP_Y, Y_MOCAP_Z, Y_MOCAP_ROLL, Y_MOCAP_PITCH, Y_MOCAP_YAW = 9, 10, 11, 12, 13, 14
 N_Y = 15
 
-TAIL_TOP = 0.06  # m, above the axis: where a line is tied at the tail
+TAIL, TAIL_TOP = -0.5, 0.06  # m, body x and above the axis: where a line is tied at the tail
 REST_PITCH = 0.05  # rad, about level, over which a climb becomes a dive

@@ -114,16 +114,24 @@ def extra_wrench(P, F, kz, u, v, w):
         X -= F[ef.LINEAR_DRAG] * u
         Y -= F[ef.LINEAR_DRAG] * v
         Z -= F[ef.LINEAR_DRAG] * w
-    if F[ef.TETHER] != 0.0:
-        pull = F[ef.TETHER] * abs(u) * u
-        X -= pull
-        M += ef.TAIL_TOP * pull
     if F[ef.ROLL_TRIM] != 0.0 or F[ef.YAW_TRIM] != 0.0:
         K1, M1, N1 = flow_to_body(u, v, w, F[ef.ROLL_TRIM] * v_squared, 0.0, F[ef.YAW_TRIM] * v_squared)
         K += K1
         M += M1
         N += N1
     return X, Y, Z, K, M, N
+
+
+@kernel
+def line_wrench(F, depth, u, v, w, q, r):
+    """Forces (N) and moments (N m) in body axes of a line at the tail: X, Y, Z, M, N.
+
+    Drag with the square of the tail's own speed, of a line as long as the dive is deep; across the hull it may be less.
+    """
+    vt, wt = v + ef.TAIL * r, w - ef.TAIL * q
+    pull = F[ef.TETHER] * (1.0 + F[ef.TETHER_GROWTH] * max(depth, 0.0)) * math.sqrt(u * u + vt * vt + wt * wt)
+    X, Y, Z = -pull * u, -pull * F[ef.TETHER_ACROSS] * vt, -pull * F[ef.TETHER_ACROSS] * wt
+    return X, Y, Z, -ef.TAIL * Z - ef.TAIL_TOP * X, ef.TAIL * Y
 
 
 @kernel
@@ -185,6 +193,13 @@ def effect_derivative(P, F, x, mode, c_servo, c_slider, c_ballast, since, acc, f
     tank = x[15] * (1.0 + F[ef.BALLAST_SCALE]) + F[ef.LEAK] * since
     tank_rate = db * (1.0 + F[ef.BALLAST_SCALE]) + F[ef.LEAK]
     X, Y, Z, K, M, N = extra_wrench(P, F, r31, u, v, w)
+    if F[ef.TETHER] != 0.0:
+        X1, Y1, Z1, M1, N1 = line_wrench(F, x[2], u, v, w, q, r)
+        X += X1
+        Y += Y1
+        Z += Z1
+        M += M1
+        N += N1
     servo += F[ef.SERVO_OFFSET]
     slider *= scale
     link = int(F[ef.LINK])

@@ -13,7 +13,6 @@ import numpy as np
 from sim_backend.effects.base import catalogue
 from tools.gap.fit import Course
 from tools.gap.probes import TURBULENCE, WAVES, Probe, Probed, probe_model, probes
-from tools.gap.problem import pose
 from tools.gap.search import Search
 from tools.gap.verdict import instead
 
@@ -113,9 +112,7 @@ def ordered(shared: list[Link]) -> list[Link]:
 
 def calm(search: Search) -> Search:
     """A search that was told of turbulence or waves, with the case's own disturbance again."""
-    problem = search.problem
-    own = pose(problem.case, problem.model, problem.runs)
-    return replace(search, problem=replace(problem, spectral=own.spectral))
+    return replace(search, problem=replace(search.problem, told=None))
 
 
 def scatter(search: Search, null: Course) -> Scatter:

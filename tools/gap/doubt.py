@@ -1,13 +1,14 @@
-"""Whether what the selected effects leave is an effect that nobody knows, or disorder: turbulence or waves."""
+"""Whether what the selected effects leave is an effect that nobody knows, or disorder: of the water, or of a clock."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import norm
 
+from sim_backend.core import effect_layout as ef
 from sim_backend.effects.base import catalogue
 from tools.gap.fit import Course
-from tools.gap.probes import TURBULENCE, WAVES, Probed, probe_model, probes
+from tools.gap.probes import CLOCK, TURBULENCE, WAVES, Probed, probe_model, probes
 from tools.gap.search import Search
 from tools.gap.shrink import Shrinkage
 
@@ -23,6 +24,7 @@ LOOSE = 3.0  # times the floor, and one tolerance, that no vehicle without a gap
 ONE_AXIS = 0.65  # of what all axes bring together: where one alone brings as much, it is no turbulence
 MOSTLY = 0.9  # of all that can be explained, for turbulence or waves to be the cause
 LEAST_DOUBT, MORE_DOUBT = 0.002, 0.005  # probability of an unknown effect where nothing is left, and where something is
+CLOCK_PLACE = ("timing", "mocap")
 RIVALS = 4  # links asked beside water and axes
 
 
@@ -86,17 +88,38 @@ def scatter(search: Search, freed: list[Probed]) -> Probed | None:
 
 
 def disorder(search: Search, left: Left) -> Probed | None:
-    """Turbulence or waves, if they are the cause: of all that can be explained, they explain MOSTLY."""
+    """What the search has to be told of, to see what is beside it; None where there is nothing of the kind.
+
+    Motion capture's clock where it wanders so that freeing it gains more than any other link; turbulence or waves where
+    they are the cause: of all that can be explained, they explain MOSTLY.
+    """
     if left.share <= NOISY:
         return None
+    if left.freed[0].probe.name == CLOCK:
+        return left.freed[0]
     found = scatter(search, left.freed)
     return found if found is not None and found.gain > MOSTLY * (left.brought + left.left) else None
+
+
+def clock_label(search: Search, course: Course) -> str:
+    """The label of a clock that wanders: one that was selected; else whether it is late, or ever later.
+
+    The clock's error where the filter stands is drawn by a constant and by a line from 0, over all runs at once.
+    """
+    for label in course.labels:
+        if catalogue()[label].place == CLOCK_PLACE:
+            return label
+    t, bounds = search.problem.recording.t, search.problem.recording.bounds
+    since, late = t - t[bounds[:-1]][search.problem.run_of], search.gains.X[:, ef.X_LATE]
+    slope = float(since @ late) / max(float(since @ since), 1e-9)
+    left = {"mocap_delay": late - late.mean(), "clock_skew": late - slope * since}
+    return min(left, key=lambda label: float(left[label] @ left[label]))
 
 
 def doubt(search: Search, main: str, shrinkage: Shrinkage, left: Left | None, noise: bool) -> float:
     """Probability that the gap is none of the catalogue's, or that there is one where none shows otherwise.
 
-    main: the main effect, or "" without; noise: turbulence or waves is the cause, which no window's gap tells of.
+    main: the main effect, or "" without; noise: the search was told of disorder, which no window's gap tells of.
     """
     if left is None:  # what is left was not asked about, or nothing is
         loose = not main and not noise and shrinkage.after > max(LOOSE * shrinkage.floor, 1.0)

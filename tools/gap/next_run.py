@@ -11,6 +11,7 @@ import numpy as np
 
 from sim_backend.core import effect_layout as ef
 from tools.gap.channels import CHANNELS
+from tools.gap.core.innovations import N_SPECTRAL
 from tools.gap.measure import wrap
 from tools.gap.problem import Problem
 from tools.gap.search import Search
@@ -84,7 +85,7 @@ def flown(problem: Problem, models: list, manoeuvre: Manoeuvre) -> np.ndarray:
         inputs=commands(problem.case.vehicle, manoeuvre, t),
     )  # fmt: skip
     still = replace(
-        one, recording=recording, z=np.zeros((len(t), ef.N_Y)), spectral=np.zeros(12), R=np.zeros((1, ef.N_Y)),
+        one, recording=recording, z=np.zeros((len(t), ef.N_Y)), spectral=np.zeros(N_SPECTRAL), R=np.zeros((1, ef.N_Y)),
         valid=np.ones((len(t), ef.N_Y), dtype=bool),
     )  # fmt: skip
     rng = np.random.default_rng(0)

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim_backend.core import effect_layout as ef
+from tools.gap.core.innovations import N_SPECTRAL
 from tools.gap.problem import Problem
 
-TURBULENCE, WAVES = "turbulence", "waves"
+TURBULENCE, WAVES, CLOCK = "turbulence", "waves", "motion capture's clock"
 
 
 @dataclass(frozen=True)
@@ -51,9 +52,11 @@ def probes(problem: Problem) -> list[Probe]:
         Probe("slider wire", "sensor", "actuation", "slider", (), (7,), s.slider.noise),
         Probe("ballast wire", "sensor", "actuation", "ballast", (), (8,), s.ballast.noise),
         Probe("motion capture", "sensor", "timing", "mocap", (), (9, 10, 11, 12, 13, 14), s.mocap_position.noise),
+        Probe(CLOCK, "sensor", "timing", "mocap", (12,), unit=0.01),
     ]
     seen = problem.seen
-    return [p for p in every if not p.reading or seen[list(p.reading)].any()]
+    mocap = seen[ef.Y_ONBOARD :].any()
+    return [p for p in every if (mocap or p.name != CLOCK) and (not p.reading or seen[list(p.reading)].any())]
 
 
 SCALES = (2.0, 6.0, 20.0, 60.0)  # of a probe's unit; the best of them counts
@@ -70,10 +73,10 @@ class Probed:
 
 
 def raised(problem: Problem, probe: Probe, scale: float) -> tuple[np.ndarray, np.ndarray]:
-    """What a probe adds to the spectral densities (12,) and to the measurements' variances (N_Y,)."""
-    more, doubt = np.zeros(12), np.zeros(ef.N_Y)
+    """What a probe adds to the spectral densities (N_SPECTRAL,) and to the measurements' variances (N_Y,)."""
+    more, doubt = np.zeros(N_SPECTRAL), np.zeros(ef.N_Y)
     if probe.name == TURBULENCE:
-        more[:6] = problem.spectral[:6] * (scale**2 - 1.0)
+        more[:6] = problem.densities[:6] * (scale**2 - 1.0)
     else:
         more[list(probe.spectral)] = (probe.unit * scale) ** 2
         doubt[list(probe.reading)] = (probe.unit * scale) ** 2

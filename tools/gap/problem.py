@@ -52,11 +52,17 @@ class Problem:
     z: np.ndarray  # (rows, N_Y) measured
     starts: np.ndarray  # (runs, N_XF)
     spreads: np.ndarray  # (runs, N_ERR)
-    spectral: np.ndarray  # (12,) of accelerations, of actuators' walks and of the water's
+    spectral: np.ndarray  # (N_SPECTRAL,) of accelerations, of walks of actuators, water and motion capture's clock
     R: np.ndarray  # (runs, N_Y)
     valid: np.ndarray  # (rows, N_Y) bool
     run_of: np.ndarray  # (rows,)
     rules: Rules = ALL
+    told: np.ndarray | None = None  # (N_SPECTRAL,) of disorder that was found: added, and no rougher where others are
+
+    @property
+    def densities(self) -> np.ndarray:
+        """Spectral densities with what the problem was told of, (N_SPECTRAL,)."""
+        return self.spectral.copy() if self.told is None else self.spectral + self.told
 
     @property
     def seen(self) -> np.ndarray:
@@ -68,15 +74,15 @@ class Problem:
     ) -> Gains:
         """The filter of a model over all runs; `roughness` multiplies the disturbance; `begin` seeks the first speed.
 
-        more (12,) is added to the spectral densities, doubt (N_Y,) to the variances of the measurements.
+        more (N_SPECTRAL,) is added to the spectral densities, doubt (N_Y,) to the variances of the measurements.
         """
         rows, runs = len(self.z), len(self.runs)
         made = Gains(
             np.empty((rows, N_Y, N_Y)), np.empty((rows, N_ERR, N_Y)), np.empty((rows, ef.N_XF)), np.empty((rows, 6)),
             np.empty((rows, N_Y)), np.empty(runs),
         )  # fmt: skip
-        spectral = self.spectral.copy()
-        spectral[:6] *= roughness**2
+        spectral = self.densities
+        spectral[:6] += self.spectral[:6] * (roughness**2 - 1.0)
         if roughness > 1.0:
             spectral[6:9] += np.array(ROUGH_WALK) * roughness**2
         if more is not None:
@@ -132,7 +138,7 @@ class Problem:
         r, Z = self.recording, np.empty_like(self.z)
         rows = len(Z)
         simulate_runs(
-            P, F, self.spectral, self.R, r.modes, r.bounds, r.t, r.inputs, starts, rng.standard_normal((rows, 6)),
+            P, F, self.densities, self.R, r.modes, r.bounds, r.t, r.inputs, starts, rng.standard_normal((rows, 6)),
             rng.standard_normal((rows, N_Y)), Z,
         )  # fmt: skip
         Z[~self.valid] = np.nan
@@ -172,14 +178,14 @@ def pose(case: Case, model: Model | None = None, runs: list[Run] | None = None, 
             actuators[0], walk[0] = UNSEEN_SPREAD, UNSEEN_SERVO_WALK**2
         spreads[n] = [
             POSITION_SPREAD, POSITION_SPREAD, DEPTH_SPREAD, *3 * [ATTITUDE_SPREAD], *SPEED_SPREAD, *3 * [RATE_SPREAD],
-            *actuators,
+            *actuators, 0.0,
         ]  # fmt: skip
         # A position that drives the model is no measurement beside it.
         driven = recording.drawn[recording.bounds[n] : recording.bounds[n + 1]]
         z[recording.bounds[n] : recording.bounds[n + 1], ef.Y_SLIDER : ef.Y_BALLAST + 1][np.isfinite(driven)] = np.nan
     d = case.disturbance
     spectral = np.array(
-        [*3 * [d.linear**2 * est.DISTURBANCE_HOLD], *3 * [d.angular**2 * est.DISTURBANCE_HOLD], *walk, *3 * [0.0]]
+        [*3 * [d.linear**2 * est.DISTURBANCE_HOLD], *3 * [d.angular**2 * est.DISTURBANCE_HOLD], *walk, *4 * [0.0]]
     )
     run_of = np.repeat(np.arange(count), np.diff(recording.bounds))
     R = recording.settings[:, est.S_R :].copy()

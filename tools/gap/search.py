@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim_backend.effects.base import catalogue
 from tools.gap.candidates import Free, allowed, candidates, place
+from tools.gap.contradiction import LEAPS, NEAR, NEARER, contradicting
 from tools.gap.fit import POOR, WIDE, Course, Fitter
 from tools.gap.problem import Gains, Problem
 
@@ -27,13 +27,8 @@ SECONDS = 5  # further effects tried beside each of the leading candidates
 LEADING = 3
 SHOWN = 1.0  # squared sigma: a spread of an effect that moves nothing by as much cannot be seen in these runs
 EARNED = 5.0  # nat that a further effect must promise
-LEAPS = (-10.0, -5.0, -2.0, 2.0, 5.0, 10.0)  # spreads of a parameter, tried as starts
-NEARER = (-1.0, -0.5, 0.5, 1.0, 1.5)  # likewise, where a step brought too little
-NEAR = 30.0  # misfit a sample, within which labels are tried again at full weight
 POLISHED = (3, 2, 1)  # times at most, by the number of effects
 ROUNDS = 3  # of gains at the best label and all labels tried again there, at most
-CLOCK = ("timing", "mocap")
-OUT = 0.3  # of the squared innovations, that are left at most where a clock far out is set about right
 COOL = 1.05  # times the weight of white innovations: the best candidate is near the truth
 
 
@@ -152,34 +147,23 @@ def leap(fitter: Fitter, courses: list[Course], leaps=LEAPS, afresh=False) -> No
         course.gained = np.inf  # no step was taken from there yet
 
 
-def heat(search: Search, course: Course) -> float:
-    """Squared innovations a sample of a candidate followed with gains of its own, at the vehicle's own disturbance."""
-    model = search.model(course)
-    e = search.problem.follow([model], gains_at(search.problem, model, 1.0))[0]
-    return float(e @ e) / len(e)
+def contradiction_first(search: Search) -> bool:
+    """Readings that contradict each other, settled before all else; False where they do not.
 
-
-def clock_first(search: Search) -> bool:
-    """A clock of motion capture that is far out, found before all else; False where there is none.
-
-    A filter told to doubt its model leans on the poses, and with poses that are a second late it does not hold.
+    A filter told to doubt its model leans on the readings, and with gyros that turn twice as far as the attitude, or
+    with poses that are a second late, it holds no model to the course flown.
     """
-    first = heat(search, search.null)
-    if first <= NEAR:
+    if search.fitter.tight <= NEAR:
         return False
-    best, least = None, OUT * first
-    for label, free in search.candidates.items():
-        if catalogue()[label].place != CLOCK:
-            continue
-        for far in (far for far in (*NEARER, *LEAPS) if free[0].low <= far <= free[0].high):
-            course = search.fitter.course((label,), free, np.array([far]))
-            if (left := heat(search, course)) < least:
-                best, least = course, left
-    if best is not None:
-        search.courses = [best]
-        refilter(search, best, 1.0)
-        settle(search.fitter, search.courses[0])
-    return best is not None
+    found = contradicting(search.problem, search.allowed, search.candidates)
+    if found is None:
+        return False
+    free, value = found
+    labelled = search.candidates[free.label]
+    search.courses = [search.fitter.course((free.label,), labelled, np.array([value * (f is free) for f in labelled]))]
+    refilter(search, search.courses[0], 1.0)
+    settle(search.fitter, search.courses[0])
+    return True
 
 
 def begin(fitter: Fitter, courses: list[Course]) -> None:
@@ -207,6 +191,21 @@ def refilter(search: Search, at: Course, roughness: float) -> None:
     settle(search.fitter, search.null)
 
 
+def first_round(search: Search) -> None:
+    """Every label tried in the roughest filter, and the likely ones led on to the vehicle's own disturbance."""
+    fitter, null = search.fitter, search.null
+    fitter.linearise([null])
+    tried = screen(search, null, TRIED)
+    settle(fitter, null)
+    fitter.move(tried)
+    leap(fitter, tried)
+    for _ in range(SETTLING):
+        fitter.advance(tried)
+    search.courses = improve(fitter, prune(tried, null.misfit, KEPT, KEPT), null.misfit, KEPT, 3 - SETTLING)
+    refilter(search, min([*search.courses, search.null], key=lambda c: c.misfit), ROUGHNESS[1])
+    search.courses = improve(search.fitter, search.courses, search.null.misfit, LEFT, 3)
+
+
 def run(problem: Problem, say: Callable[[str], None] = lambda text: None) -> Search:
     """The search over a problem's runs."""
     free, known = allowed(problem), candidates(problem)
@@ -216,18 +215,11 @@ def run(problem: Problem, say: Callable[[str], None] = lambda text: None) -> Sea
     null = fitter.course((), [])
     fitter.measure([null])
     search = Search(problem, free, known, fitter, null, [], gains)
-    fitter.linearise([null])
-    tried = screen(search, null, TRIED)
-    settle(fitter, null)
-    say(f"screened {len(known)} labels")
-    fitter.move(tried)
-    leap(fitter, tried)
-    for _ in range(SETTLING):
-        fitter.advance(tried)
-    search.courses = improve(fitter, prune(tried, null.misfit, KEPT, KEPT), null.misfit, KEPT, 3 - SETTLING)
-    if not clock_first(search):
-        refilter(search, min([*search.courses, search.null], key=lambda c: c.misfit), ROUGHNESS[1])
-        search.courses = improve(search.fitter, search.courses, search.null.misfit, LEFT, 3)
+    if contradiction_first(search):
+        say(f"readings contradict each other: {search.courses[0].labels[0]}")
+    else:
+        first_round(search)
+        say(f"screened {len(known)} labels")
     for _ in range(ROUNDS):
         polish(search, POLISHED[0])
         first = search.best.labels

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sim_backend.effects.base import catalogue
-from tools.gap.doubt import UNCLEAN, disorder, doubt, left_share, what_is_left
+from tools.gap.doubt import UNCLEAN, clock_label, disorder, doubt, left_share, what_is_left
 from tools.gap.fit import Course
-from tools.gap.probes import Probed, raised
+from tools.gap.probes import CLOCK, Probed, raised
 from tools.gap.residuals import Finding, tests, worst
 from tools.gap.search import Search, run, settle
 from tools.gap.shrink import Shrinkage, left_out_gap, shrink
@@ -40,7 +40,7 @@ class Answer:
     unexplained: float  # of the squared gap beyond the floor, the share that the selected effects leave
     gained: dict[str, float]  # nat that each selected effect brings
     freed: list[Probed]  # links of the chain, beyond the selected effects; empty where nothing is left
-    noise: Probed | None  # turbulence or waves, where they are the cause
+    noise: Probed | None  # turbulence, waves or motion capture's clock, where the search was told of them
     shrinkage: Shrinkage
 
 
@@ -127,7 +127,7 @@ def softmax(logs: dict[str, float]) -> dict[str, float]:
 def conclude(search: Search, say: Callable[[str], None] = lambda text: None, noise: Probed | None = None) -> Answer:
     """The answer of a finished search; its gains are taken anew at the selected model.
 
-    `noise` is turbulence or waves that the search was already told of.
+    `noise` is disorder that the search was already told of: turbulence, waves, or motion capture's clock.
     """
     problem = search.problem
     course, gained = thin(search) if problem.rules.evidence else by_error(search)
@@ -141,22 +141,27 @@ def conclude(search: Search, say: Callable[[str], None] = lambda text: None, noi
         found = disorder(search, left) if noise is None else None
         if found is not None:
             more, _ = raised(problem, found.probe, found.scale)
-            return conclude(run(replace(problem, spectral=problem.spectral + more), say), say, found)
+            return conclude(run(replace(problem, told=more), say), say, found)
+    if noise is not None and noise.probe.name == CLOCK:
+        label = clock_label(search, course)
+        gained[label] = gained.get(label, 0.0) + noise.gain
     main = max(gained, key=lambda label: gained[label]) if gained else ""
-    chances = posterior(search, course, main) if problem.rules.evidence else {main or NONE: 1.0}
+    by_search = problem.rules.evidence and (not main or main in course.labels)
+    chances = posterior(search, course, main) if by_search else {main or NONE: 1.0}
     shrinkage = shrink(search, course)
     unknown = doubt(search, main, shrinkage, left, noise is not None)
-    if noise is not None:
+    scatter = noise is not None and noise.probe.name != CLOCK
+    if noise is not None and scatter:
         main = noise.probe.name
         chances = {name: 0.0 for name in chances} | {main: 1.0}
     chances = {name: value * (1.0 - unknown) for name, value in chances.items()} | {UNKNOWN: unknown}
     chances = admit_mistakes({label: 0.0 for label in catalogue()} | chances, main)
     top = max(chances, key=lambda name: chances[name])
     selected = sorted(gained, key=lambda label: -gained[label])
-    groups = grouped(rivals(search, course, main)) if noise is None else {main: [main]}
+    groups = {main: [main]} if scatter or not by_search else grouped(rivals(search, course, main))
     if top == UNKNOWN and course.labels and shrinkage.after > CERTAIN * shrinkage.recalibrated:
         course, selected, gained, shrinkage = search.null, [], {}, shrink(search, search.null)
-    if noise is not None:
+    if scatter:
         selected = [main, *selected]
     return Answer(
         search=search, selected=selected, main=top, probabilities=chances, groups=groups, course=course,

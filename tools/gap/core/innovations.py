@@ -6,7 +6,7 @@ course. Its gains are kept, and any other model is then flown along the same dat
 differ smoothly with its parameters however long the run, because the data hold every flight to the course flown.
 
 Runs stand one behind the other in tables of all rows; `bounds` (runs + 1) says where each begins. Errors of the state
-(N_ERR): position (NED), attitude (rotation vector, body), nu, servo, slider, ballast.
+(N_ERR): position (NED), attitude (rotation vector, body), nu, servo, slider, ballast, and how late motion capture is.
 """
 
 import math
@@ -19,8 +19,10 @@ from firmware.core.rotations import euler_from_quaternion, rotation_nb
 from sim_backend.core import effect_layout as ef
 from sim_backend.core.effect_plant import correction, effect_midpoint, effect_step, fold, read, wrapped
 
-N_ERR = 15
+N_ERR = 16
+LATE = 15  # the error of motion capture's clock, s: it walks, and moves nothing but what is read
 N_Y = ef.N_Y
+N_SPECTRAL = 13
 MAX_STEP = 0.1  # s
 NUDGE = 1e-5  # of the state's unit, for derivatives
 LARGEST_SPEED = 20.0  # m/s, rad/s: a model that flies faster has left every vehicle, and is held where it was
@@ -45,6 +47,7 @@ def correct(x, error):
         x[13 + i] += error[12 + i]
     x[ef.X_GEAR_SERVO] += error[12]
     x[ef.X_GEAR_SLIDER] += error[13]
+    x[ef.X_LATE] += error[LATE]
 
 
 @kernel
@@ -62,6 +65,7 @@ def difference(x, y, error):
         error[6 + i] = x[7 + i] - y[7 + i]
     for i in range(3):
         error[12 + i] = x[13 + i] - y[13 + i]
+    error[LATE] = x[ef.X_LATE] - y[ef.X_LATE]
 
 
 @kernel
@@ -139,7 +143,7 @@ def read_row(F, x, t, path, i, begin, y):
     link = int(F[ef.LINK])
     if link > ef.ACTUATOR_LINKS:
         y[link - ef.ACTUATOR_LINKS - 1] += correction(F, x, t[i] - t[begin], 0.0)
-    late = F[ef.MOCAP_DELAY] + F[ef.CLOCK_SKEW] * (t[i] - t[begin])
+    late = F[ef.MOCAP_DELAY] + F[ef.CLOCK_SKEW] * (t[i] - t[begin]) + x[ef.X_LATE]
     if late == 0.0 or i == begin:
         return
     at = t[i] - late
@@ -189,7 +193,7 @@ def pushed(x, dt, Gam):
 def linear_step(Pw, F, x, mode, t, inputs, i, begin, zero, work, kept, moved, base, error, Phi, Gam):
     """Fly x to row i; Phi (N_ERR, N_ERR) is the step's derivative by the state, Gam (N_ERR, 6) by accelerations.
 
-    Nothing of a step depends on the place north and east that it starts from.
+    Nothing of a step depends on the place north and east that it starts from, nor on motion capture's clock.
     """
     acc = np.zeros(6)
     base[:] = x
@@ -197,7 +201,9 @@ def linear_step(Pw, F, x, mode, t, inputs, i, begin, zero, work, kept, moved, ba
     for j in range(2):
         Phi[:, j] = 0.0
         Phi[j, j] = 1.0
-    for j in range(2, N_ERR):
+    Phi[:, LATE] = 0.0
+    Phi[LATE, LATE] = 1.0
+    for j in range(2, LATE):
         nudged(x, j, error, moved)
         propagate(Pw, F, moved, mode, t, inputs, i, begin, acc, zero, work, kept, True)
         difference(moved, base, error)
@@ -224,9 +230,9 @@ def linear_reading(F, x, t, path, i, begin, moved, error, y, y2, H):
 def filter_run(P, F, spectral, R, mode, t, inputs, z, begin, end, start, spread, X, path, E, W, K):
     """The Kalman filter over rows begin .. end - 1. Returns -2 log likelihood without its constant.
 
-    P (N_P), F (N_F); spectral (12): spectral densities of the accelerations ((m/s2)2 s, (rad/s2)2 s), walks of
-    servo, slider and ballast and of the position (per s); R (N_Y) measurements' variances; start (N_XF), spread
-    (N_ERR).
+    P (N_P), F (N_F); spectral (N_SPECTRAL): spectral densities of the accelerations ((m/s2)2 s, (rad/s2)2 s), walks
+    of servo, slider, ballast, of the position and of motion capture's clock (per s); R (N_Y) measurements' variances;
+    start (N_XF), spread (N_ERR).
     Out: X (rows, N_XF) the state and path (rows, 6) after each row, E (rows, N_Y) whitened innovations, NaN where
     nothing was measured, W (rows, N_Y, N_Y) what whitens a row's innovations and K (rows, N_ERR, N_Y) what corrects
     the state by the whitened ones.
@@ -263,6 +269,7 @@ def filter_run(P, F, spectral, R, mode, t, inputs, z, begin, end, start, spread,
             for j in range(3):
                 cov[12 + j, 12 + j] += spectral[6 + j] * dt
                 cov[j, j] += spectral[9 + j] * dt
+            cov[LATE, LATE] += spectral[12] * dt
         read_row(F, x, t, path, i, begin, y)
         missed(z[i], y, d)
         linear_reading(F, x, t, path, i, begin, moved, error, y, y2, H)
