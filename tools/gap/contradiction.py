@@ -13,6 +13,7 @@ from sim_backend.effects.base import catalogue
 from tools.gap.candidates import Free, place
 from tools.gap.problem import LOST, Gains, Problem
 
+CLOCK = ("timing", "mocap")
 LEAPS = (-10.0, -5.0, -2.0, 2.0, 5.0, 10.0)  # spreads of a parameter, tried as starts
 NEARER = (-1.0, -0.5, 0.5, 1.0, 1.5)  # likewise, nearer
 NEAR = 30.0  # squared innovations a sample: beyond that a filter does not hold its model to the course flown
@@ -31,7 +32,7 @@ def suspects(candidates: dict[str, list[Free]]) -> list[Free]:
     return [
         free
         for label, found in candidates.items()
-        if effects[label].subsystem == "sensing" or effects[label].place == ("timing", "mocap")
+        if effects[label].subsystem == "sensing" or effects[label].place == CLOCK
         for free in found
     ]
 

@@ -86,7 +86,7 @@ def flown(problem: Problem, models: list, manoeuvre: Manoeuvre) -> np.ndarray:
     )  # fmt: skip
     still = replace(
         one, recording=recording, z=np.zeros((len(t), ef.N_Y)), spectral=np.zeros(N_SPECTRAL), R=np.zeros((1, ef.N_Y)),
-        valid=np.ones((len(t), ef.N_Y), dtype=bool),
+        valid=np.ones((len(t), ef.N_Y), dtype=bool), stamps=t,
     )  # fmt: skip
     rng = np.random.default_rng(0)
     return np.array([still.simulated(P, F, start, rng) for P, F in models])

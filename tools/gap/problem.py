@@ -55,9 +55,17 @@ class Problem:
     spectral: np.ndarray  # (N_SPECTRAL,) of accelerations, of walks of actuators, water and motion capture's clock
     R: np.ndarray  # (runs, N_Y)
     valid: np.ndarray  # (rows, N_Y) bool
+    stamps: np.ndarray  # (rows,) s, of the poses of motion capture that stand in the rows
     run_of: np.ndarray  # (rows,)
     rules: Rules = ALL
     told: np.ndarray | None = None  # (N_SPECTRAL,) of disorder that was found: added, and no rougher where others are
+
+    recorded: "Problem | None" = None  # as it was before its poses were moved
+
+    @property
+    def as_recorded(self) -> "Problem":
+        """The problem with motion capture's poses in the rows where they were recorded."""
+        return self if self.recorded is None else self.recorded
 
     @property
     def densities(self) -> np.ndarray:
@@ -90,7 +98,7 @@ class Problem:
         R = self.R if doubt is None else self.R + doubt
         r = self.recording
         filter_runs(
-            P, F, spectral, R, r.modes, r.bounds, r.early, r.t, r.inputs, self.z, self.starts,
+            P, F, spectral, R, r.modes, r.bounds, r.early, r.t, self.stamps, r.inputs, self.z, self.starts,
             np.array(START_SPEEDS if begin else ()), self.spreads, made.X, made.path, made.E, made.W, made.K,
             made.misfit,
         )  # fmt: skip
@@ -112,8 +120,8 @@ class Problem:
             part = models[n : n + block]
             E = np.empty((len(part), *self.z.shape))
             follow_runs(
-                np.array([P for P, _ in part]), np.array([F for _, F in part]), r.modes, r.bounds, r.t, r.inputs,
-                self.z, self.starts, gains.W, gains.K, E,
+                np.array([P for P, _ in part]), np.array([F for _, F in part]), r.modes, r.bounds, r.t, self.stamps,
+                r.inputs, self.z, self.starts, gains.W, gains.K, E,
             )  # fmt: skip
             out.append(np.clip(np.nan_to_num(E[:, self.valid], nan=LOST), -LOST, LOST))
         return np.concatenate(out)
@@ -130,6 +138,7 @@ class Problem:
         return replace(
             self, runs=[self.runs[run]], recording=recording, z=self.z[at], starts=self.starts[run : run + 1].copy(),
             spreads=self.spreads[run : run + 1], R=self.R[run : run + 1], valid=self.valid[at],
+            stamps=self.stamps[at], recorded=None,
             run_of=np.zeros(at.stop - at.start, dtype=np.int64),
         )  # fmt: skip
 
@@ -189,7 +198,9 @@ def pose(case: Case, model: Model | None = None, runs: list[Run] | None = None, 
     )
     run_of = np.repeat(np.arange(count), np.diff(recording.bounds))
     R = recording.settings[:, est.S_R :].copy()
-    return Problem(case, model, runs, recording, z, starts, spreads, spectral, R, np.isfinite(z), run_of, rules)
+    return Problem(
+        case, model, runs, recording, z, starts, spreads, spectral, R, np.isfinite(z), recording.t, run_of, rules
+    )
 
 
 @dataclass

@@ -10,10 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sim_backend.effects.base import catalogue
 from tools.gap.candidates import Free, allowed, candidates, place
-from tools.gap.contradiction import LEAPS, NEAR, NEARER, contradicting
+from tools.gap.contradiction import CLOCK, LEAPS, NEAR, NEARER, contradicting
 from tools.gap.fit import POOR, WIDE, Course, Fitter
 from tools.gap.problem import Gains, Problem
+from tools.gap.retime import retimed
 
 ROUGHNESS = (100.0, 10.0)  # times the disturbance, before the vehicle's own
 TRIED, KEPT, LEFT = 20, 12, 8  # candidates: after the screen, after the first rung, after the second
@@ -29,6 +31,7 @@ SHOWN = 1.0  # squared sigma: a spread of an effect that moves nothing by as muc
 EARNED = 5.0  # nat that a further effect must promise
 POLISHED = (3, 2, 1)  # times at most, by the number of effects
 ROUNDS = 3  # of gains at the best label and all labels tried again there, at most
+RETIMED = 3  # times that poses are moved to where the clock found so far says
 COOL = 1.05  # times the weight of white innovations: the best candidate is near the truth
 
 
@@ -161,8 +164,11 @@ def contradiction_first(search: Search) -> bool:
     free, value = found
     labelled = search.candidates[free.label]
     search.courses = [search.fitter.course((free.label,), labelled, np.array([value * (f is free) for f in labelled]))]
-    refilter(search, search.courses[0], 1.0)
-    settle(search.fitter, search.courses[0])
+    for _ in range(RETIMED if catalogue()[free.label].place == CLOCK else 1):
+        if catalogue()[free.label].place == CLOCK:
+            search.problem = retimed(search.problem, search.model(search.courses[0])[1])
+        refilter(search, search.courses[0], 1.0)
+        settle(search.fitter, search.courses[0])
     return True
 
 

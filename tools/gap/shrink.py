@@ -81,7 +81,7 @@ def gaps(
     problem: Problem, models: list[tuple[np.ndarray, np.ndarray]], z: np.ndarray | None = None
 ) -> tuple[list[RunGap], list[np.ndarray]]:
     """Each run's own model's gap and prediction (rows, N_Y); `z` (rows, N_Y) in the place of what was measured."""
-    found, flown = [], []
+    problem, found, flown = problem.as_recorded, [], []
     for n, (P, F) in enumerate(models):
         part = problem.part(n)
         table = None
@@ -99,7 +99,7 @@ def gaps(
 
 def floor(search: Search, course: Course, rng: np.random.Generator) -> list[RunGap]:
     """What noise and disturbance leave of a perfect model: the selected model's own flights, predicted by itself."""
-    problem = search.problem
+    problem = search.problem.as_recorded
     model = search.model(course)
     starts = search.gains.X[problem.recording.bounds[:-1]]
     draws = []

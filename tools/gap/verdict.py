@@ -141,7 +141,7 @@ def conclude(search: Search, say: Callable[[str], None] = lambda text: None, noi
         found = disorder(search, left) if noise is None else None
         if found is not None:
             more, _ = raised(problem, found.probe, found.scale)
-            return conclude(run(replace(problem, told=more), say), say, found)
+            return conclude(run(replace(problem.as_recorded, told=more), say), say, found)
     if noise is not None and noise.probe.name == CLOCK:
         label = clock_label(search, course)
         gained[label] = gained.get(label, 0.0) + noise.gain

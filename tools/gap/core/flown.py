@@ -31,7 +31,7 @@ def fly_windows(Ps, Fs, modes, bounds, t, inputs, X, paths, first, last, run_of,
             stand(x, before)
             propagate(Pw, F, x, modes[run], t, inputs, i, begin, acc, zero, work, kept, False)
             log_path(x, before, path, i - begin, 0)
-            read_row(F, x, t[begin:], path, i - begin, 0, Y[m, i])
+            read_row(F, x, t[begin:], t[begin:], path, i - begin, 0, Y[m, i])
 
 
 @parallel_kernel
@@ -54,7 +54,7 @@ def simulate_runs(P, F, spectral, R, modes, bounds, t, inputs, starts, shaken, n
                 stand(x, before)
                 propagate(Pw, F, x, modes[run], t, inputs, i, begin, acc, zero, work, kept, False)
                 log_path(x, before, path, i - begin, 0)
-            read_row(F, x, t[begin:], path, i - begin, 0, Z[i])
+            read_row(F, x, t[begin:], t[begin:], path, i - begin, 0, Z[i])
             for m in range(N_Y):
                 Z[i, m] += math.sqrt(R[run, m]) * noise[i, m]
 
@@ -65,4 +65,4 @@ def read_rows(F, X, path, t, bounds, Y):
     for run in prange(len(bounds) - 1):
         begin, end = bounds[run], bounds[run + 1]
         for i in range(begin, end):
-            read_row(F, X[i], t[begin:end], path[begin:end], i - begin, 0, Y[i])
+            read_row(F, X[i], t[begin:end], t[begin:end], path[begin:end], i - begin, 0, Y[i])

@@ -137,16 +137,18 @@ def stand(x, before):
 
 
 @kernel
-def read_row(F, x, t, path, i, begin, y):
-    """What is read at row i, into y (N_Y); motion capture at its own time, along the path flown."""
+def read_row(F, x, t, stamps, path, i, begin, y):
+    """What is read at row i, into y (N_Y); motion capture at its own time, along the path flown.
+
+    stamps (rows): the times that the poses which stand in the rows were stamped with, s.
+    """
     read(F, x, y)
     link = int(F[ef.LINK])
     if link > ef.ACTUATOR_LINKS:
         y[link - ef.ACTUATOR_LINKS - 1] += correction(F, x, t[i] - t[begin], 0.0)
-    late = F[ef.MOCAP_DELAY] + F[ef.CLOCK_SKEW] * (t[i] - t[begin]) + x[ef.X_LATE]
-    if late == 0.0 or i == begin:
+    at = stamps[i] - (F[ef.MOCAP_DELAY] + F[ef.CLOCK_SKEW] * (stamps[i] - t[begin]) + x[ef.X_LATE])
+    if at == t[i] or i == begin:
         return
-    at = t[i] - late
     j = i
     while j > begin + 1 and t[j - 1] > at:
         j -= 1
@@ -214,11 +216,11 @@ def linear_step(Pw, F, x, mode, t, inputs, i, begin, zero, work, kept, moved, ba
 
 
 @kernel
-def linear_reading(F, x, t, path, i, begin, moved, error, y, y2, H):
+def linear_reading(F, x, t, stamps, path, i, begin, moved, error, y, y2, H):
     """H (N_Y, N_ERR), the derivative of what is read at row i, y (N_Y), by the state."""
     for j in range(N_ERR):
         nudged(x, j, error, moved)
-        read_row(F, moved, t, path, i, begin, y2)
+        read_row(F, moved, t, stamps, path, i, begin, y2)
         for m in range(N_Y):
             change = y2[m] - y[m]
             if m < 3 or m >= ef.Y_MOCAP_ROLL:
@@ -227,7 +229,7 @@ def linear_reading(F, x, t, path, i, begin, moved, error, y, y2, H):
 
 
 @kernel
-def filter_run(P, F, spectral, R, mode, t, inputs, z, begin, end, start, spread, X, path, E, W, K):
+def filter_run(P, F, spectral, R, mode, t, stamps, inputs, z, begin, end, start, spread, X, path, E, W, K):
     """The Kalman filter over rows begin .. end - 1. Returns -2 log likelihood without its constant.
 
     P (N_P), F (N_F); spectral (N_SPECTRAL): spectral densities of the accelerations ((m/s2)2 s, (rad/s2)2 s), walks
@@ -270,9 +272,9 @@ def filter_run(P, F, spectral, R, mode, t, inputs, z, begin, end, start, spread,
                 cov[12 + j, 12 + j] += spectral[6 + j] * dt
                 cov[j, j] += spectral[9 + j] * dt
             cov[LATE, LATE] += spectral[12] * dt
-        read_row(F, x, t, path, i, begin, y)
+        read_row(F, x, t, stamps, path, i, begin, y)
         missed(z[i], y, d)
-        linear_reading(F, x, t, path, i, begin, moved, error, y, y2, H)
+        linear_reading(F, x, t, stamps, path, i, begin, moved, error, y, y2, H)
         # S = H cov H' + R of what was measured, its Cholesky factor L, and W = L^-1; K~ = cov H' L^-T
         for m in range(N_Y):
             if math.isnan(d[m]):
@@ -355,7 +357,7 @@ def use_row(W, K, d, x, error, e):
 
 @parallel_kernel
 def filter_runs(
-    P, F, spectral, R, modes, bounds, early, t, inputs, z, starts, speeds, spreads, X, path, E, W, K, misfit
+    P, F, spectral, R, modes, bounds, early, t, stamps, inputs, z, starts, speeds, spreads, X, path, E, W, K, misfit
 ):
     """filter_run for every run, from the one of the forward speeds (m/s) that explains the rows below early best.
 
@@ -368,19 +370,36 @@ def filter_runs(
         for n in range(len(speeds)):
             start[7] = speeds[n]
             found = filter_run(
-                P, F, spectral, R[run], modes[run], t, inputs, z, begin, early[run], start, spreads[run],
+                P, F, spectral, R[run], modes[run], t, stamps, inputs, z, begin, early[run], start, spreads[run],
                 X, path, E, W, K,
             )  # fmt: skip
             if found < least:
                 least, speed = found, speeds[n]
         starts[run, 7] = speed
         misfit[run] = filter_run(
-            P, F, spectral, R[run], modes[run], t, inputs, z, begin, end, starts[run], spreads[run], X, path, E, W, K
+            P,
+            F,
+            spectral,
+            R[run],
+            modes[run],
+            t,
+            stamps,
+            inputs,
+            z,
+            begin,
+            end,
+            starts[run],
+            spreads[run],
+            X,
+            path,
+            E,
+            W,
+            K,
         )
 
 
 @kernel
-def follow_run(P, F, mode, t, inputs, z, begin, end, start, W, K, X, path, E):
+def follow_run(P, F, mode, t, stamps, inputs, z, begin, end, start, W, K, X, path, E):
     """A model flown along rows begin .. end - 1 with the gains of filter_run: X, path and E as there."""
     Pw, x = np.empty(N_P), start.copy()
     fold(P, F, Pw)
@@ -394,7 +413,7 @@ def follow_run(P, F, mode, t, inputs, z, begin, end, start, W, K, X, path, E):
             stand(x, before)
             propagate(Pw, F, x, mode, t, inputs, i, begin, acc, zero, work, kept, False)
             log_path(x, before, path, i, begin)
-        read_row(F, x, t, path, i, begin, y)
+        read_row(F, x, t, stamps, path, i, begin, y)
         missed(z[i], y, d)
         use_row(W[i], K[i], d, x, error, E[i])
         for n in range(ef.N_XF):
@@ -402,7 +421,7 @@ def follow_run(P, F, mode, t, inputs, z, begin, end, start, W, K, X, path, E):
 
 
 @parallel_kernel
-def follow_runs(Ps, Fs, modes, bounds, t, inputs, z, starts, W, K, E):
+def follow_runs(Ps, Fs, modes, bounds, t, stamps, inputs, z, starts, W, K, E):
     """Whitened innovations E (models, rows, N_Y) of models Ps (models, N_P), Fs (models, N_F) with kept gains."""
     runs = len(bounds) - 1
     for n in prange(Ps.shape[0] * runs):
@@ -411,6 +430,6 @@ def follow_runs(Ps, Fs, modes, bounds, t, inputs, z, starts, W, K, E):
         # scratch of this run alone; indices count from its first row
         X, path = np.empty((end - begin, ef.N_XF)), np.empty((end - begin, 6))
         follow_run(
-            Ps[m], Fs[m], modes[run], t[begin:end], inputs[begin:end], z[begin:end], 0, end - begin, starts[run],
-            W[begin:end], K[begin:end], X, path, E[m, begin:end],
+            Ps[m], Fs[m], modes[run], t[begin:end], stamps[begin:end], inputs[begin:end], z[begin:end], 0, end - begin,
+            starts[run], W[begin:end], K[begin:end], X, path, E[m, begin:end],
         )  # fmt: skip
