@@ -37,7 +37,7 @@ SHAPES = (
     "pump running", "time", "climb or dive",
 )  # fmt: skip
 N_SHAPES = 11
-TETHER_GROWTH, TETHER_ACROSS = SHAPE + N_SHAPES, SHAPE + N_SHAPES + 1  # 1/m, 1: a line longer with depth; across it
+TETHER_GROWTH, TETHER_ACROSS = SHAPE + N_SHAPES, SHAPE + N_SHAPES + 1  # kg/m2, 1: with depth, across the hull
 N_F = SHAPE + N_SHAPES + 2
 
 # --- x: behind the plant's state, what effects remember --------------------------------------------------------------

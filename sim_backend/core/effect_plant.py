@@ -129,7 +129,7 @@ def line_wrench(F, depth, u, v, w, q, r):
     Drag with the square of the tail's own speed, of a line as long as the dive is deep; across the hull it may be less.
     """
     vt, wt = v + ef.TAIL * r, w - ef.TAIL * q
-    pull = F[ef.TETHER] * (1.0 + F[ef.TETHER_GROWTH] * max(depth, 0.0)) * math.sqrt(u * u + vt * vt + wt * wt)
+    pull = (F[ef.TETHER] + F[ef.TETHER_GROWTH] * max(depth, 0.0)) * math.sqrt(u * u + vt * vt + wt * wt)
     X, Y, Z = -pull * u, -pull * F[ef.TETHER_ACROSS] * vt, -pull * F[ef.TETHER_ACROSS] * wt
     return X, Y, Z, -ef.TAIL * Z - ef.TAIL_TOP * X, ef.TAIL * Y
 
@@ -193,7 +193,7 @@ def effect_derivative(P, F, x, mode, c_servo, c_slider, c_ballast, since, acc, f
     tank = x[15] * (1.0 + F[ef.BALLAST_SCALE]) + F[ef.LEAK] * since
     tank_rate = db * (1.0 + F[ef.BALLAST_SCALE]) + F[ef.LEAK]
     X, Y, Z, K, M, N = extra_wrench(P, F, r31, u, v, w)
-    if F[ef.TETHER] != 0.0:
+    if F[ef.TETHER] != 0.0 or F[ef.TETHER_GROWTH] != 0.0:
         X1, Y1, Z1, M1, N1 = line_wrench(F, x[2], u, v, w, q, r)
         X += X1
         Y += Y1

@@ -184,7 +184,7 @@ def water_effects(P, F, u, v, w, p, q, r, tilt, down, down_rate, pump, x, t, see
     K, M, N = flow_to_body(u, v, w, T1, T2, T3)
     X += F[fo.PUMP_JET] * abs(pump) / P[at.BALLAST_RATE]
     # pulled at the tail, against the way that the tail itself goes
-    line = F[fo.TETHER] * (2.0 + max(down, 0.0))
+    line = 3.0 * F[fo.TETHER] * math.sqrt(1.0 + max(down, 0.0))
     if F[fo.TANGLE] != 0.0 and uniform(seed, fo.STREAM_TANGLE, int(t / TANGLE_BLOCK)) < 0.45:
         caught = F[fo.TANGLE] * math.sin(math.pi * (t / TANGLE_BLOCK - math.floor(t / TANGLE_BLOCK))) ** 2
         X -= caught * v2

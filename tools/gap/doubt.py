@@ -25,6 +25,7 @@ ONE_AXIS = 0.65  # of what all axes bring together: where one alone brings as mu
 MOSTLY = 0.9  # of all that can be explained, for turbulence or waves to be the cause
 LEAST_DOUBT, MORE_DOUBT = 0.002, 0.005  # probability of an unknown effect where nothing is left, and where something is
 CLOCK_PLACE = ("timing", "mocap")
+CLOCKED = 0.5  # of what freeing the poses altogether gains, that freeing their clock must
 RIVALS = 4  # links asked beside water and axes
 
 
@@ -90,13 +91,14 @@ def scatter(search: Search, freed: list[Probed]) -> Probed | None:
 def disorder(search: Search, left: Left) -> Probed | None:
     """What the search has to be told of, to see what is beside it; None where there is nothing of the kind.
 
-    Motion capture's clock where it wanders so that freeing it gains more than any other link; turbulence or waves where
-    they are the cause: of all that can be explained, they explain MOSTLY.
+    Motion capture's clock where freeing it gains more than any other link, its poses' noise apart; turbulence or waves
+    where they are the cause: of all that can be explained, they explain MOSTLY.
     """
+    clock = [found for found in left.freed if found.probe.name == CLOCK and found.gain > CLOCKED * left.left]
+    if clock and left.freed[0].probe.element == CLOCK_PLACE[1]:
+        return clock[0]
     if left.share <= NOISY:
         return None
-    if left.freed[0].probe.name == CLOCK:
-        return left.freed[0]
     found = scatter(search, left.freed)
     return found if found is not None and found.gain > MOSTLY * (left.brought + left.left) else None
 

@@ -67,6 +67,11 @@ class Problem:
         """The problem with motion capture's poses in the rows where they were recorded."""
         return self if self.recorded is None else self.recorded
 
+    def telling(self, more: np.ndarray) -> "Problem":
+        """The problem, and the one it was made from, with densities (N_SPECTRAL,) of disorder added."""
+        recorded = None if self.recorded is None else self.recorded.telling(more)
+        return replace(self, told=more, recorded=recorded)
+
     @property
     def densities(self) -> np.ndarray:
         """Spectral densities with what the problem was told of, (N_SPECTRAL,)."""

@@ -212,8 +212,8 @@ def first_round(search: Search) -> None:
     search.courses = improve(search.fitter, search.courses, search.null.misfit, LEFT, 3)
 
 
-def run(problem: Problem, say: Callable[[str], None] = lambda text: None) -> Search:
-    """The search over a problem's runs."""
+def run(problem: Problem, say: Callable[[str], None] = lambda text: None, first: Course | None = None) -> Search:
+    """The search over a problem's runs; from the effects of `first`, where those are certain."""
     free, known = allowed(problem), candidates(problem)
     P, F = place(problem, free, np.zeros(len(free)))
     gains = gains_at(problem, (P, F), ROUGHNESS[0])
@@ -221,7 +221,11 @@ def run(problem: Problem, say: Callable[[str], None] = lambda text: None) -> Sea
     null = fitter.course((), [])
     fitter.measure([null])
     search = Search(problem, free, known, fitter, null, [], gains)
-    if contradiction_first(search):
+    if first is not None:
+        search.courses = [fitter.course(first.labels, first.free, first.values, first.allowed)]
+        refilter(search, search.courses[0], 1.0)
+        settle(search.fitter, search.courses[0])
+    elif contradiction_first(search):
         say(f"readings contradict each other: {search.courses[0].labels[0]}")
     else:
         first_round(search)

@@ -1,12 +1,12 @@
 """From fits to an answer: which effects earn their place, how probable each label is, and what cannot be told apart."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from sim_backend.effects.base import catalogue
-from tools.gap.doubt import UNCLEAN, clock_label, disorder, doubt, left_share, what_is_left
+from tools.gap.doubt import CLOCK_PLACE, UNCLEAN, clock_label, disorder, doubt, left_share, what_is_left
 from tools.gap.fit import Course
 from tools.gap.probes import CLOCK, Probed, raised
 from tools.gap.residuals import Finding, tests, worst
@@ -60,6 +60,15 @@ def drop(search: Search, course: Course, label: str) -> Course:
     settle(search.fitter, less, 4)
     search.courses.append(less)
     return less
+
+
+def clock_of(search: Search, course: Course, gained: dict[str, float]) -> Course | None:
+    """Of a candidate the effect of motion capture's clock that brings most, as it stands; None where it has none."""
+    labels = sorted((label for label in gained if catalogue()[label].place == CLOCK_PLACE), key=lambda n: -gained[n])
+    if not labels:
+        return None
+    kept = np.array([f.label == labels[0] for f in course.free])
+    return search.fitter.course((labels[0],), [f for f in course.free if f.label == labels[0]], course.values[kept])
 
 
 def earned_outside(search: Search, course: Course) -> dict[str, float]:
@@ -141,16 +150,18 @@ def conclude(search: Search, say: Callable[[str], None] = lambda text: None, noi
         found = disorder(search, left) if noise is None else None
         if found is not None:
             more, _ = raised(problem, found.probe, found.scale)
-            return conclude(run(replace(problem.as_recorded, told=more), say), say, found)
-    if noise is not None and noise.probe.name == CLOCK:
-        label = clock_label(search, course)
-        gained[label] = gained.get(label, 0.0) + noise.gain
+            clock = clock_of(search, course, gained) if found.probe.name == CLOCK else None
+            again = problem.as_recorded if clock is None else problem
+            return conclude(run(again.telling(more), say, clock), say, found)
+    wandering = clock_label(search, course) if noise is not None and noise.probe.name == CLOCK else ""
+    if noise is not None and wandering:
+        gained[wandering] = gained.get(wandering, 0.0) + noise.gain
     main = max(gained, key=lambda label: gained[label]) if gained else ""
-    by_search = problem.rules.evidence and (not main or main in course.labels)
+    by_search = problem.rules.evidence and (not main or main != wandering)
     chances = posterior(search, course, main) if by_search else {main or NONE: 1.0}
     shrinkage = shrink(search, course)
     unknown = doubt(search, main, shrinkage, left, noise is not None)
-    scatter = noise is not None and noise.probe.name != CLOCK
+    scatter = noise is not None and not wandering
     if noise is not None and scatter:
         main = noise.probe.name
         chances = {name: 0.0 for name in chances} | {main: 1.0}

@@ -11,7 +11,15 @@ from firmware.core.rotations import quaternion_from_euler, rotation_nb
 from firmware.core.water import water_wrench
 from sim_backend.core import effect_layout as ef
 from sim_backend.core import layout as at
-from sim_backend.core.effect_plant import BALLAST_DRIVEN, SLIDER_DRIVEN, effect_derivative, extra_wrench, fold, play
+from sim_backend.core.effect_plant import (
+    BALLAST_DRIVEN,
+    SLIDER_DRIVEN,
+    effect_derivative,
+    extra_wrench,
+    fold,
+    line_wrench,
+    play,
+)
 from sim_backend.effects.base import apply_effects
 
 P = VEHICLE.vector()
@@ -259,10 +267,15 @@ def test_linear_drag_is_proportional_and_against_the_motion():
 
 
 @pytest.mark.parametrize("u", [0.4, -0.3])
-def test_a_tether_pulls_along_the_hull_above_its_axis_against_the_motion(u):
-    tied, force = np.array([-0.6, 0.0, -ef.TAIL_TOP]), np.array([-1.5 * abs(u) * u, 0.0, 0.0])
-    found = wrench(vector(tether={"k": 1.5}), u, -0.05, 0.03)
-    assert found == pytest.approx([*force, *np.cross(tied, force)])
+def test_a_line_pulls_at_the_tail_against_its_way(u):
+    tied, omega = np.array([ef.TAIL, 0.0, -ef.TAIL_TOP]), np.array([0.0, 0.2, -0.1])
+    tail = np.array([u, -0.05, 0.03]) + np.cross(omega, [ef.TAIL, 0.0, 0.0])
+    F = vector(tether={"k": 1.5, "growth": 0.2, "across": 0.5})
+    force = -(1.5 + 0.2 * 4.0) * np.linalg.norm(tail) * tail * [1.0, 0.5, 0.5]
+    X, Y, Z, M, N = line_wrench(F, 4.0, u, -0.05, 0.03, omega[1], omega[2])
+    assert [X, Y, Z] == pytest.approx(list(force))
+    along, across = np.cross(tied, force * [1.0, 0.0, 0.0]), np.cross([ef.TAIL, 0.0, 0.0], force)
+    assert [M, N] == pytest.approx([along[1] + across[1], across[2]])
 
 
 @pytest.mark.parametrize(("label", "axis"), [("roll_trim", 0), ("yaw_trim", 2)])
