@@ -198,7 +198,7 @@ def test_a_tick_that_comes_late_finds_the_present():
 
 @pytest.mark.realtime
 def test_no_sample_is_of_the_future_wherever_the_ticks_fall():
-    """The world's steps and the loop's deadlines begin apart; samples ahead of the clock are mistimed, and an IMU lost."""
+    """Steps of the world and deadlines begin apart; a sample ahead of the clock is refused as mistimed."""
     flight = build_flight(mission="sawtooth", realtime=True)
     flight.board.open()
     clock, world = flight.board.clock, flight.board.world

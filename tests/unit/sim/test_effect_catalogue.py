@@ -50,7 +50,7 @@ def test_every_label_stands_in_its_place_and_no_other_is_there():
 def test_every_entry_of_the_effect_vector_belongs_to_one_parameter():
     """But for the two signs of a mass that changes with depth, which are two labels; biases are no effect."""
     entries = [p.entry for effect in catalogue().values() for p in effect.parameters if p.entry >= 0]
-    assert sorted(entries) == sorted([*range(ef.BIAS), ef.MASS_PER_DEPTH])
+    assert sorted(entries) == sorted([*range(ef.BIAS), ef.MASS_PER_DEPTH, ef.TETHER_GROWTH, ef.TETHER_ACROSS])
 
 
 @pytest.mark.parametrize("label", catalogue())

@@ -273,9 +273,9 @@ def test_a_line_pulls_at_the_tail_against_its_way(u):
     F = vector(tether={"k": 1.5, "growth": 0.2, "across": 0.5})
     force = -(1.5 + 0.2 * 4.0) * np.linalg.norm(tail) * tail * [1.0, 0.5, 0.5]
     X, Y, Z, M, N = line_wrench(F, 4.0, u, -0.05, 0.03, omega[1], omega[2])
-    assert [X, Y, Z] == pytest.approx(list(force))
+    assert np.array([X, Y, Z]) == pytest.approx(force)
     along, across = np.cross(tied, force * [1.0, 0.0, 0.0]), np.cross([ef.TAIL, 0.0, 0.0], force)
-    assert [M, N] == pytest.approx([along[1] + across[1], across[2]])
+    assert np.array([M, N]) == pytest.approx([along[1] + across[1], across[2]])
 
 
 @pytest.mark.parametrize(("label", "axis"), [("roll_trim", 0), ("yaw_trim", 2)])
