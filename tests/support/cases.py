@@ -36,13 +36,19 @@ def _blank(rng: np.random.Generator, name: str, mocap: bool) -> Run:
     return Run(name, None, columns)
 
 
-def make_case(folder: Path, F: np.ndarray, *, seed: int, runs: int = 3, mocap: bool = False) -> Case:
-    """A case in `folder` whose vehicle has the effects F (N_F), its parameters and biases drawn as allowed."""
+def make_case(
+    folder: Path, F: np.ndarray, *, seed: int, runs: int = 3, mocap: bool = False, rough: float = 1.0, late=None
+) -> Case:
+    """A case in `folder` whose vehicle has the effects F (N_F), its parameters and biases drawn as allowed.
+
+    rough: times the disturbance; late(t): by how many seconds motion capture's clock is late, with mocap.
+    """
     rng = np.random.default_rng(seed)
     blank = [_blank(rng, f"run{n:02d}", mocap) for n in range(runs)]
     about = dict(vehicle="roughie", site="made", log_rate_hz=RATE, water_density_kg_m3=998.0, motion_capture=mocap)
     write_case(folder / "blank", blank, **about)
     problem = pose(load_case(folder / "blank"))
+    problem.spectral[:6] *= rough**2
     Z = problem.simulated(*drawn(problem, F, rng), begins(problem, rng), rng)
     bounds = problem.recording.bounds
     made = []
@@ -51,6 +57,9 @@ def make_case(folder: Path, F: np.ndarray, *, seed: int, runs: int = 3, mocap: b
         for m, column in enumerate(COLUMNS):
             if column in columns:
                 columns[column] = Z[bounds[n] : bounds[n + 1], m]
+            if column in columns and late is not None and m >= ef.Y_ONBOARD:
+                t = columns[names.TIME]
+                columns[column] = np.interp(t - late(t), t, np.unwrap(columns[column]))
         made.append(replace(run, columns=columns))
     write_case(folder / "case", made, **about)
     return load_case(folder / "case")

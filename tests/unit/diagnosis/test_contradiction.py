@@ -1,0 +1,82 @@
+"""Readings that contradict each other, and poses that are moved to their own time."""
+
+import numpy as np
+import pytest
+from support.cases import make_case
+
+from sim_backend.core import effect_layout as ef
+from tools.gap.candidates import allowed, candidates, place
+from tools.gap.contradiction import NEAR, contradicting, heat
+from tools.gap.problem import pose
+from tools.gap.retime import moved, retimed
+from tools.gap.search import ROUGHNESS
+
+
+def with_effect(folder, entry, value, **about):
+    F = np.zeros(ef.N_F)
+    F[entry] = value
+    return pose(make_case(folder, F, seed=5, **about)), F
+
+
+def rough_heat(problem):
+    free = allowed(problem)
+    gains = problem.filter(*place(problem, free, np.zeros(len(free))), roughness=ROUGHNESS[0], begin=True)
+    return heat(problem, gains)
+
+
+@pytest.mark.parametrize(
+    ("label", "entry", "value", "mocap"),
+    [
+        ("gyro_scale", ef.GYRO_SCALE, 1.5, False),
+        ("depth_offset", ef.DEPTH_OFFSET, 0.6, True),
+        ("imu_roll_bias", ef.ROLL_BIAS, -0.2, True),
+        ("mocap_delay", ef.MOCAP_DELAY, 1.7, True),
+    ],
+)
+def test_the_reading_that_is_far_out_is_named(tmp_path, label, entry, value, mocap):
+    problem, _ = with_effect(tmp_path, entry, value, mocap=mocap)
+    assert rough_heat(problem) > NEAR
+    free, spreads = contradicting(problem, allowed(problem), candidates(problem))
+    assert free.label == label
+    assert spreads * free.spread == pytest.approx(value, rel=0.6)
+
+
+@pytest.mark.parametrize(("entry", "value"), [(ef.NET_MASS, 0.1), (ef.DRAG_0, 2.0), (ef.PITCH_TRIM, 0.5)])
+def test_forces_make_no_reading_contradict_another(tmp_path, entry, value):
+    problem, _ = with_effect(tmp_path, entry, value, mocap=True)
+    assert rough_heat(problem) < NEAR
+
+
+def test_samples_go_to_the_row_of_their_time_once():
+    t = np.arange(10) * 0.1
+    assert moved(t, t).tolist() == list(range(10))
+    assert moved(t, t - 0.31).tolist() == [3, 4, 5, 6, 7, 8, 9, -1, -1, -1]
+    assert moved(t, t + 0.2).tolist() == [-1, -1, 0, 1, 2, 3, 4, 5, 6, 7]
+    slow = moved(t, 0.5 * t)  # two samples to a row: the nearer stays
+    assert slow.tolist() == [0, 2, 4, 6, 8, -1, -1, -1, -1, -1]
+    fast = moved(t, 2.0 * t)  # every other row has none
+    assert fast.tolist() == [0, -1, 1, -1, 2, -1, 3, -1, 4, -1]
+
+
+@pytest.mark.parametrize("delay", [1.7, -0.8])
+def test_poses_moved_to_their_time_are_foreseen(tmp_path, delay):
+    """As those of a right clock; an early one shows poses of the future, which no filter foresees by its past."""
+    none = np.zeros(ef.N_F)
+    right = pose(make_case(tmp_path / "right", none, seed=6, mocap=True))
+    problem = pose(make_case(tmp_path / "late", none, seed=6, mocap=True, late=lambda t: delay))
+    F = np.zeros(ef.N_F)
+    F[ef.MOCAP_DELAY] = delay
+    poses = slice(ef.Y_ONBOARD, ef.N_Y)
+
+    def missed(one, F):
+        E = one.filter(one.model.P, F, begin=True).E[:, poses]
+        return float(np.nanmean(E**2))
+
+    there = retimed(problem, F)
+    assert missed(there, F) == pytest.approx(missed(right, none), rel=0.15)
+    if delay < 0.0:
+        assert missed(problem, F) > 3.0 * missed(there, F)
+    lost = int(abs(delay) * 10) * len(problem.runs)
+    assert problem.valid[:, poses].all(axis=1).sum() - there.valid[:, poses].all(axis=1).sum() == lost
+    assert there.as_recorded is problem
+    assert retimed(there, np.zeros(ef.N_F)).as_recorded is problem
