@@ -13,11 +13,7 @@ from tools.gap.search import Search
 from tools.gap.shrink import Shrinkage
 
 UNCLEAN = 6.0  # sigma, corrected for the number of tests
-# Share that is left at which unknown is as likely as not: of the squared gap beyond the floor on runs left out, which
-# counts by the power BY_GAP, and of the misfit that can be explained, by the rest. Where what is left enters at the
-# place of the effect found, it is more probably that effect in another form. Width in e-folds.
-LEFT_OVER, LEFT_AT_HOME, LEFT_WIDTH = 0.24, 0.3, 0.8
-BY_GAP = 2.0 / 3.0
+LEFT_OVER, LEFT_WIDTH = 0.145, 1.1  # share of the explainable misfit at which unknown is as likely as not; e-folds
 NOISY, NOISY_WIDTH = 0.2, 0.8  # share of the explainable misfit that is left: disorder is looked for; width in e-folds
 UNFIT = 5.0  # tolerances that the best explanation still misses by: no effect of the catalogue does that
 LOOSE = 3.0  # times the floor, and one tolerance, that no vehicle without a gap is off
@@ -40,13 +36,6 @@ def left_share(shrinkage: Shrinkage) -> float:
     beyond = shrinkage.recalibrated**2 - shrinkage.floor**2
     left = shrinkage.after**2 - shrinkage.floor**2
     return float(np.clip(left / beyond, 0.0, 1.0)) if beyond > 0.0 else 0.0
-
-
-def at_home(freed: list[Probed], main: str) -> bool:
-    """Whether what is left enters where the main effect sits: the link that gains most when freed, water apart."""
-    links = [found.probe for found in freed if found.probe.name not in (TURBULENCE, WAVES)]
-    effect = catalogue().get(main)
-    return bool(links) and effect is not None and (links[0].subsystem, links[0].element) == effect.place
 
 
 @dataclass
@@ -131,6 +120,4 @@ def doubt(search: Search, main: str, shrinkage: Shrinkage, left: Left | None, no
         return 1.0 - MORE_DOUBT
     if noise:
         return chance(left.share, NOISY, NOISY_WIDTH)
-    share = left.share ** (1.0 - BY_GAP) * left_share(shrinkage) ** BY_GAP
-    middle = LEFT_AT_HOME if at_home(left.freed, main) else LEFT_OVER
-    return chance(share, middle, LEFT_WIDTH)
+    return chance(left.share, LEFT_OVER, LEFT_WIDTH)
