@@ -13,6 +13,7 @@ from tools.gap import verdict as rules
 from tools.gap.chain import Link, by_effects, calm, links, ordered, scatter, shared_out
 from tools.gap.channels import CHANNELS, channels_of, measured
 from tools.gap.diagnose import CORRECTION_FILE, UNPREDICTABLE, Diagnosis, parameters, places
+from tools.gap.probes import CLOCK
 from tools.gap.shrink import AFTER, BEFORE, FLOOR, RECALIBRATED
 from tools.gap.verdict import drop
 from tools.gap.windows import windows
@@ -50,8 +51,9 @@ def _panels(diagnosis: Diagnosis) -> list[dict[str, Any]]:
         beyond = f" beyond {words.joined(answer.selected)}" if answer.selected else ""
         return [_panel(f"Of what is left{beyond}", shared_out(answer.freed, 0.0))]
     fitted = [label for label in answer.selected if label in answer.course.labels][:PANELS]
-    if answer.noise is not None or not fitted:
-        seen = search if answer.noise is None else calm(search)
+    water = answer.noise is not None and answer.noise.probe.name != CLOCK
+    if water or not fitted:
+        seen = calm(search) if water else search
         return [_panel("Of what the likeliest link brings", links(seen, search.null, search.null))]
     panels = []
     for label in fitted:
@@ -105,7 +107,7 @@ def _effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 
 def _scatter(diagnosis: Diagnosis) -> dict[str, str] | None:
     noise = diagnosis.answer.noise
-    if noise is None:
+    if noise is None or noise.probe.name == CLOCK:
         return None
     found = scatter(diagnosis.search, diagnosis.search.null)
     return {"name": noise.probe.name, "calm": words.number(found.calm), "rough": words.number(found.rough)}

@@ -221,6 +221,8 @@ def _causes(diagnosis: Diagnosis) -> str:
     if others:
         beside = joined([f"{PLAIN[label]} ({label}, {place(label)})" for label in others])
         said += f", and beside it {beside}"
+    if answer.noise is not None:  # told of the clock: of water in disorder _scatter speaks
+        said += "; that clock wanders"
     head = {0: "", 1: "Two effects at once: "}.get(len(others), f"{len(others) + 1} effects at once: ")
     far = how_far(diagnosis, "with that in the model" if not others else "with these in the model")
     return f"{upper(head + said)}; {far}."

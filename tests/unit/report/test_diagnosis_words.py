@@ -7,7 +7,7 @@ import pytest
 
 from sim_backend.effects.base import catalogue
 from tools.gap.diagnose import Diagnosis
-from tools.gap.probes import TURBULENCE, Probe, Probed
+from tools.gap.probes import CLOCK, TURBULENCE, Probe, Probed
 from tools.gap.residuals import CHANNELS, Finding
 from tools.report import words
 
@@ -95,6 +95,13 @@ def test_an_unknown_gap_that_goes_with_something_elsewhere_says_where():
     bare = diagnosis({"unknown": 0.9})
     assert "strongest" not in words.sentence(bare)
     assert "with nothing added to the model" in words.sentence(bare)
+
+
+def test_a_clock_that_wanders_is_said_to():
+    probe = Probe(CLOCK, "sensor", "timing", "mocap", (12,))
+    said = words.sentence(diagnosis({"mocap_delay": 0.96}, ["mocap_delay"], noise=Probed(probe, 900.0, 6.0)))
+    assert said.startswith("Motion capture reports late (mocap_delay, timing: mocap; 96 % sure); that clock wanders; ")
+    assert "wanders" not in words.sentence(diagnosis({"mocap_delay": 0.96}, ["mocap_delay"]))
 
 
 def test_scatter_claims_no_shrinkage():
