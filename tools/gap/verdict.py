@@ -8,7 +8,7 @@ import numpy as np
 from sim_backend.effects.base import catalogue
 from tools.gap.doubt import CLOCK_PLACE, UNCLEAN, clock_label, disorder, doubt, left_share, what_is_left
 from tools.gap.fit import Course
-from tools.gap.probes import CLOCK, Probed, raised
+from tools.gap.probes import CLOCK, TURBULENCE, WAVES, Probed, raised
 from tools.gap.residuals import Finding, tests, worst
 from tools.gap.search import Search, run, settle
 from tools.gap.shrink import Shrinkage, left_out_gap, shrink
@@ -133,6 +133,16 @@ def softmax(logs: dict[str, float]) -> dict[str, float]:
     return {name: weight / total for name, weight in weights.items()}
 
 
+def told(search: Search, course: Course, gained: dict[str, float], found: Probed, say: Callable[[str], None]) -> Answer:
+    """The answer of a further search, by a filter that knows of the disorder found."""
+    problem, clock = search.problem, None
+    more, _ = raised(problem, found.probe, found.scale)
+    if found.probe.name == CLOCK:
+        clock = clock_of(search, course, gained)
+    begin = problem.as_recorded if clock is None else problem
+    return conclude(run(begin.telling(more), say, clock), say, found)
+
+
 def conclude(search: Search, say: Callable[[str], None] = lambda text: None, noise: Probed | None = None) -> Answer:
     """The answer of a finished search; its gains are taken anew at the selected model.
 
@@ -143,41 +153,35 @@ def conclude(search: Search, say: Callable[[str], None] = lambda text: None, noi
     search.courses = [c for c in search.courses if c is not course] + ([course] if course.labels else [])
     search.gains = problem.filter(*search.model(course), begin=True)
     findings = tests(problem, search.gains)
-    unclean = worst(findings)
-    left = None
+    unclean, left = worst(findings), None
     if unclean >= UNCLEAN and problem.rules.whiteness:
         left = what_is_left(search, course, noise)
         found = disorder(search, left) if noise is None else None
         if found is not None:
-            more, _ = raised(problem, found.probe, found.scale)
-            clock = clock_of(search, course, gained) if found.probe.name == CLOCK else None
-            again = problem.as_recorded if clock is None else problem
-            return conclude(run(again.telling(more), say, clock), say, found)
-    wandering = clock_label(search, course) if noise is not None and noise.probe.name == CLOCK else ""
-    if noise is not None and wandering:
-        gained[wandering] = gained.get(wandering, 0.0) + noise.gain
+            return told(search, course, gained, found, say)
+    disordered = ""  # its label
+    if noise is not None:
+        disordered = clock_label(search, course) if noise.probe.name == CLOCK else noise.probe.name
+        gained = gained | {disordered: gained.get(disordered, 0.0) + noise.gain}
     main = max(gained, key=lambda label: gained[label]) if gained else ""
-    by_search = problem.rules.evidence and (not main or main != wandering)
+    if disordered in (TURBULENCE, WAVES):
+        main = disordered
+    by_search = problem.rules.evidence and not (noise is not None and main == disordered)
     chances = posterior(search, course, main) if by_search else {main or NONE: 1.0}
     shrinkage = shrink(search, course)
     unknown = doubt(search, main, shrinkage, left, noise is not None)
-    scatter = noise is not None and not wandering
-    if noise is not None and scatter:
-        main = noise.probe.name
-        chances = {name: 0.0 for name in chances} | {main: 1.0}
     chances = {name: value * (1.0 - unknown) for name, value in chances.items()} | {UNKNOWN: unknown}
     chances = admit_mistakes({label: 0.0 for label in catalogue()} | chances, main)
     top = max(chances, key=lambda name: chances[name])
-    selected = sorted(gained, key=lambda label: -gained[label])
-    groups = {main: [main]} if scatter or not by_search else grouped(rivals(search, course, main))
+    groups = grouped(rivals(search, course, main)) if by_search else {main: [main]}
     if top == UNKNOWN and course.labels and shrinkage.after > CERTAIN * shrinkage.recalibrated:
-        course, selected, gained, shrinkage = search.null, [], {}, shrink(search, search.null)
-    if scatter:
-        selected = [main, *selected]
+        course, shrinkage = search.null, shrink(search, search.null)
+        gained = {label: gain for label, gain in gained.items() if label == disordered}
     return Answer(
-        search=search, selected=selected, main=top, probabilities=chances, groups=groups, course=course,
-        null=search.null, findings=findings, unclean=unclean, unexplained=left_share(shrinkage), gained=gained,
-        freed=[] if left is None else left.freed, noise=noise, shrinkage=shrinkage,
+        search=search, selected=sorted(gained, key=lambda label: (label != main, -gained[label])), main=top,
+        probabilities=chances, groups=groups, course=course, null=search.null, findings=findings, unclean=unclean,
+        unexplained=left_share(shrinkage), gained=gained, freed=[] if left is None else left.freed, noise=noise,
+        shrinkage=shrinkage,
     )  # fmt: skip
 
 
