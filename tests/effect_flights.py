@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from firmware.core.rotations import quaternion_from_euler
 from sim_backend.core.effect_layout import N_XF
 from sim_backend.effects.base import catalogue
 from sim_backend.world import Environment, SampledSensors, Start, World, build_world
@@ -53,3 +54,16 @@ def flown(made: World, seconds: float = 40.0, command=manoeuvre) -> tuple[np.nda
         frames.append(made.frame.copy())
     assert np.shape(states)[1] == N_XF
     return np.array(states), np.array(frames)
+
+
+def quiet(effects=None, depth=8.0, pitch=0.0, **environment) -> World:
+    """A world at rest."""
+    made = world(effects, **environment)
+    made.x[2], made.x[7] = depth, 0.0
+    made.x[3:7] = quaternion_from_euler(0.0, pitch, 0.0)
+    return made
+
+
+def held(*command):
+    """Commands that stay: servo (rad), slider (m), ballast (kg)."""
+    return lambda t: command

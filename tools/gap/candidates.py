@@ -9,6 +9,7 @@ from sim_backend.effects.base import Effect, catalogue
 from tools.gap.problem import Problem
 
 ALLOWED = ""  # the label of what is no effect
+CLOCK_PLACE = ("timing", "mocap")  # of the labels by which motion capture's clock is wrong
 
 
 @dataclass(frozen=True)

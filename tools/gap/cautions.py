@@ -6,6 +6,7 @@ import numpy as np
 
 from sim_backend.effects.base import catalogue
 from tools.gap.candidates import candidates
+from tools.gap.probes import UNPREDICTABLE
 from tools.gap.problem import Problem
 from tools.gap.windows import START
 from tools.runs import columns as names
@@ -35,8 +36,7 @@ def cautions(problem: Problem) -> list[str]:
 def not_asked(problem: Problem) -> list[str]:
     """Labels that these runs cannot show at all, and that are therefore not among the causes tried."""
     tried = candidates(problem)
-    noise = ("waves", "turbulence")  # asked otherwise
-    return [label for label in catalogue() if label not in tried and label not in noise]
+    return [label for label in catalogue() if label not in tried and label not in UNPREDICTABLE]  # asked otherwise
 
 
 def _without_commands(problem: Problem) -> list[str]:

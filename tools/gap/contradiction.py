@@ -10,10 +10,9 @@ import itertools
 import numpy as np
 
 from sim_backend.effects.base import catalogue
-from tools.gap.candidates import Free, place
+from tools.gap.candidates import CLOCK_PLACE, Free, place
 from tools.gap.problem import LOST, Gains, Problem
 
-CLOCK = ("timing", "mocap")
 LEAPS = (-10.0, -5.0, -2.0, 2.0, 5.0, 10.0)  # spreads of a parameter, tried as starts
 NEARER = (-1.0, -0.5, 0.5, 1.0, 1.5)  # likewise, nearer
 NEAR = 30.0  # squared innovations a sample: beyond that a filter does not hold its model to the course flown
@@ -32,7 +31,7 @@ def suspects(candidates: dict[str, list[Free]]) -> list[Free]:
     return [
         free
         for label, found in candidates.items()
-        if effects[label].subsystem == "sensing" or effects[label].place == CLOCK
+        if effects[label].subsystem == "sensing" or effects[label].place == CLOCK_PLACE
         for free in found
     ]
 

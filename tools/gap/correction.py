@@ -15,7 +15,7 @@ from sim_backend.core import effect_layout as ef
 from tools.gap.candidates import Free
 from tools.gap.corrected import LINKS
 from tools.gap.fit import Course, Fitter
-from tools.gap.probes import TURBULENCE, WAVES, Probe, Probed
+from tools.gap.probes import UNPREDICTABLE, Probe, Probed
 from tools.gap.residuals import pump_speed
 from tools.gap.search import Search, settle
 
@@ -55,7 +55,7 @@ class Correction:
 
 def links_of(probe: Probe) -> tuple[str, ...]:
     """The links that a probe stands for; none for the water and for motion capture."""
-    if probe.name in (TURBULENCE, WAVES):
+    if probe.name in UNPREDICTABLE:
         return ()
     return tuple(link for link in OF_PROBE.get(probe.name, (probe.name,)) if link in LINKS)
 
@@ -94,15 +94,14 @@ def fitted(search: Search, course: Course, link: str) -> tuple[Search, Course]:
 
 def shapes_flown(search: Search) -> np.ndarray:
     """The shapes along the runs where the filter stands, (rows, N_SHAPES)."""
-    x, recording = search.gains.X, search.problem.recording
-    t = recording.t
+    x = search.gains.X
     speed = np.maximum(np.sqrt((x[:, 7:10] ** 2).sum(axis=1)), 0.05)
     pump = pump_speed(search.problem, search.gains)
     dive = 2.0 * (x[:, 4] * x[:, 6] - x[:, 3] * x[:, 5])
     return np.column_stack([
         np.ones(len(x)), (x[:, 7:10] ** 2).sum(axis=1) / 0.09, x[:, 2] / 5.0, 10.0 * x[:, 9] / speed,
         10.0 * x[:, 8] / speed, 10.0 * x[:, 10:13], pump / 0.03,
-        (t - t[recording.bounds[:-1]][search.problem.run_of]) / 60.0, np.tanh(dive / ef.REST_PITCH),
+        search.problem.since / 60.0, np.tanh(dive / ef.REST_PITCH),
     ])  # fmt: skip
 
 

@@ -15,6 +15,7 @@ from tools.gap.correction import Correction, correct
 from tools.gap.doubt import UNFIT
 from tools.gap.fit import Course
 from tools.gap.next_run import propose
+from tools.gap.probes import UNPREDICTABLE
 from tools.gap.problem import ALL, pose
 from tools.gap.rules import Rules
 from tools.gap.search import Search, run
@@ -23,7 +24,6 @@ from tools.gap.verdict import NONE, UNKNOWN, Answer, conclude, strongest_left
 from tools.plain import as_plain
 from tools.runs.case import Case
 
-UNPREDICTABLE = ("waves", "turbulence")
 CORRECTION_FILE = "data_driven.toml"
 WORTH = 0.001  # a smaller probability is not written down
 

@@ -7,6 +7,7 @@ from scipy.stats import norm
 
 from sim_backend.core import effect_layout as ef
 from sim_backend.effects.base import catalogue
+from tools.gap.candidates import CLOCK_PLACE
 from tools.gap.fit import Course
 from tools.gap.probes import CLOCK, TURBULENCE, WAVES, Probed, probe_model, probes
 from tools.gap.search import Search
@@ -20,7 +21,6 @@ LOOSE = 3.0  # times the floor, and one tolerance, that no vehicle without a gap
 ONE_AXIS = 0.65  # of what all axes bring together: where one alone brings as much, it is no turbulence
 MOSTLY = 0.9  # of all that can be explained, for turbulence or waves to be the cause
 LEAST_DOUBT, MORE_DOUBT = 0.002, 0.005  # probability of an unknown effect where nothing is left, and where something is
-CLOCK_PLACE = ("timing", "mocap")
 CLOCKED = 0.5  # of what freeing the poses altogether gains, that freeing their clock must
 RIVALS = 4  # links asked beside water and axes
 
@@ -100,8 +100,7 @@ def clock_label(search: Search, course: Course) -> str:
     for label in course.labels:
         if catalogue()[label].place == CLOCK_PLACE:
             return label
-    t, bounds = search.problem.recording.t, search.problem.recording.bounds
-    since, late = t - t[bounds[:-1]][search.problem.run_of], search.gains.X[:, ef.X_LATE]
+    since, late = search.problem.since, search.gains.X[:, ef.X_LATE]
     slope = float(since @ late) / max(float(since @ since), 1e-9)
     left = {"mocap_delay": late - late.mean(), "clock_skew": late - slope * since}
     return min(left, key=lambda label: float(left[label] @ left[label]))

@@ -15,6 +15,7 @@ from tools.gap.core.innovations import N_SPECTRAL
 from tools.gap.problem import Problem
 
 TURBULENCE, WAVES, CLOCK = "turbulence", "waves", "motion capture's clock"
+UNPREDICTABLE = (TURBULENCE, WAVES)  # labels whose course nobody can foresee
 
 
 @dataclass(frozen=True)

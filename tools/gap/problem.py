@@ -10,7 +10,8 @@ from sim_backend.core import effect_layout as ef
 from tools.gap import start
 from tools.gap.channels import measured
 from tools.gap.core.flown import fly_windows, read_rows, simulate_runs
-from tools.gap.core.innovations import N_ERR, N_Y, filter_runs, follow_runs
+from tools.gap.core.innovations import filter_runs, follow_runs
+from tools.gap.core.passage import N_ERR, N_Y
 from tools.gap.model import Model, nominal_model
 from tools.gap.rules import Rules
 from tools.gap.windows import Window, windows
@@ -61,6 +62,12 @@ class Problem:
     told: np.ndarray | None = None  # (N_SPECTRAL,) of disorder that was found: added, and no rougher where others are
 
     recorded: "Problem | None" = None  # as it was before its poses were moved
+
+    @property
+    def since(self) -> np.ndarray:
+        """Time from the run's start, (rows,) s."""
+        t = self.recording.t
+        return np.asarray(t - t[self.recording.bounds[:-1]][self.run_of])
 
     @property
     def as_recorded(self) -> "Problem":

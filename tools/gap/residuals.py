@@ -30,15 +30,14 @@ class Finding:
 
 def features(problem: Problem, gains: Gains) -> dict[str, np.ndarray]:
     """What something left may go with, each (rows,), by the best model's state."""
-    x, t = gains.X, problem.recording.t
-    began = problem.recording.t[problem.recording.bounds[:-1]][problem.run_of]
+    x = gains.X
     speed = np.sqrt((x[:, 7:10] ** 2).sum(axis=1))
     moving = pump_speed(problem, gains)
     pitch = np.arcsin(np.clip(2.0 * (x[:, 3] * x[:, 5] - x[:, 6] * x[:, 4]), -1.0, 1.0))
     return {
         "speed": speed,
         "depth": x[:, 2],
-        "time": t - began,
+        "time": problem.since,
         "pitch": pitch,
         "pitch rate": x[:, 11],
         "roll rate": x[:, 10],

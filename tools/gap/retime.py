@@ -18,9 +18,7 @@ POSES = slice(ef.Y_ONBOARD, ef.N_Y)
 
 def taken(problem: Problem, F: np.ndarray) -> np.ndarray:
     """When the poses of the rows were taken, by a model's clock, (rows,) s."""
-    t, bounds = problem.recording.t, problem.recording.bounds
-    since = t - t[bounds[:-1]][problem.run_of]
-    return np.asarray(t - F[ef.MOCAP_DELAY] - F[ef.CLOCK_SKEW] * since)
+    return np.asarray(problem.recording.t - F[ef.MOCAP_DELAY] - F[ef.CLOCK_SKEW] * problem.since)
 
 
 def moved(t: np.ndarray, at: np.ndarray) -> np.ndarray:

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim_backend.effects.base import catalogue
-from tools.gap.candidates import Free, allowed, candidates, place
-from tools.gap.contradiction import CLOCK, LEAPS, NEAR, NEARER, contradicting
+from tools.gap.candidates import CLOCK_PLACE, Free, allowed, candidates, place
+from tools.gap.contradiction import LEAPS, NEAR, NEARER, contradicting
 from tools.gap.fit import POOR, WIDE, Course, Fitter
 from tools.gap.problem import Gains, Problem
 from tools.gap.retime import retimed
@@ -164,8 +164,8 @@ def contradiction_first(search: Search) -> bool:
     free, value = found
     labelled = search.candidates[free.label]
     search.courses = [search.fitter.course((free.label,), labelled, np.array([value * (f is free) for f in labelled]))]
-    for _ in range(RETIMED if catalogue()[free.label].place == CLOCK else 1):
-        if catalogue()[free.label].place == CLOCK:
+    for _ in range(RETIMED if catalogue()[free.label].place == CLOCK_PLACE else 1):
+        if catalogue()[free.label].place == CLOCK_PLACE:
             search.problem = retimed(search.problem, search.model(search.courses[0])[1])
         refilter(search, search.courses[0], 1.0)
         settle(search.fitter, search.courses[0])

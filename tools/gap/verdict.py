@@ -6,9 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim_backend.effects.base import catalogue
-from tools.gap.doubt import CLOCK_PLACE, UNCLEAN, clock_label, disorder, doubt, left_share, what_is_left
+from tools.gap.candidates import CLOCK_PLACE
+from tools.gap.doubt import UNCLEAN, clock_label, disorder, doubt, left_share, what_is_left
 from tools.gap.fit import Course
-from tools.gap.probes import CLOCK, TURBULENCE, WAVES, Probed, raised
+from tools.gap.probes import CLOCK, UNPREDICTABLE, Probed, raised
 from tools.gap.residuals import Finding, tests, worst
 from tools.gap.search import Search, run, settle
 from tools.gap.shrink import Shrinkage, left_out_gap, shrink
@@ -164,7 +165,7 @@ def conclude(search: Search, say: Callable[[str], None] = lambda text: None, noi
         disordered = clock_label(search, course) if noise.probe.name == CLOCK else noise.probe.name
         gained = gained | {disordered: gained.get(disordered, 0.0) + noise.gain}
     main = max(gained, key=lambda label: gained[label]) if gained else ""
-    if disordered in (TURBULENCE, WAVES):
+    if disordered in UNPREDICTABLE:
         main = disordered
     by_search = problem.rules.evidence and not (noise is not None and main == disordered)
     chances = posterior(search, course, main) if by_search else {main or NONE: 1.0}
@@ -172,7 +173,7 @@ def conclude(search: Search, say: Callable[[str], None] = lambda text: None, noi
     unknown = doubt(search, main, shrinkage, left, noise is not None)
     chances = {name: value * (1.0 - unknown) for name, value in chances.items()} | {UNKNOWN: unknown}
     chances = admit_mistakes({label: 0.0 for label in catalogue()} | chances, main)
-    top = max(chances, key=lambda name: chances[name])
+    top = max((NONE, UNKNOWN, *gained), key=lambda name: chances.get(name, 0.0))  # a label that has not earned its place is none
     groups = grouped(rivals(search, course, main)) if by_search else {main: [main]}
     if top == UNKNOWN and course.labels and shrinkage.after > CERTAIN * shrinkage.recalibrated:
         course, shrinkage = search.null, shrink(search, search.null)

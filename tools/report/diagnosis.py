@@ -12,8 +12,8 @@ from tools.gap import doubt
 from tools.gap import verdict as rules
 from tools.gap.chain import Link, by_effects, calm, links, ordered, scatter, shared_out
 from tools.gap.channels import CHANNELS, channels_of, measured
-from tools.gap.diagnose import CORRECTION_FILE, UNPREDICTABLE, Diagnosis, parameters, places
-from tools.gap.probes import CLOCK
+from tools.gap.diagnose import CORRECTION_FILE, Diagnosis, parameters, places
+from tools.gap.probes import CLOCK, UNPREDICTABLE
 from tools.gap.shrink import AFTER, BEFORE, FLOOR, RECALIBRATED
 from tools.gap.verdict import drop
 from tools.gap.windows import windows

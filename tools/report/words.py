@@ -6,7 +6,7 @@ from typing import Any
 from sim_backend.effects.base import catalogue
 from tools.gap.diagnose import Diagnosis, places
 from tools.gap.doubt import UNCLEAN
-from tools.gap.probes import TURBULENCE, WAVES
+from tools.gap.probes import TURBULENCE, UNPREDICTABLE
 from tools.gap.residuals import Finding
 from tools.gap.shrink import Shrinkage
 from tools.gap.verdict import SHAPES, strongest_left
@@ -196,7 +196,7 @@ def sentence(diagnosis: Diagnosis) -> str:
         return _none(diagnosis)
     if diagnosis.verdict == "unknown":
         return _unknown(diagnosis)
-    if diagnosis.answer.main in (TURBULENCE, WAVES):
+    if diagnosis.answer.main in UNPREDICTABLE:
         return _scatter(diagnosis)
     return _causes(diagnosis)
 

@@ -8,7 +8,7 @@ from firmware.core.jit import parallel_kernel, prange
 from firmware.core.layout import N_P
 from sim_backend.core import effect_layout as ef
 from sim_backend.core.effect_plant import fold
-from tools.gap.core.innovations import N_Y, log_path, propagate, read_row, stand
+from tools.gap.core.passage import N_Y, log_path, propagate, read_row, stand
 
 
 @parallel_kernel
