@@ -173,7 +173,8 @@ def conclude(search: Search, say: Callable[[str], None] = lambda text: None, noi
     unknown = doubt(search, main, shrinkage, left, noise is not None)
     chances = {name: value * (1.0 - unknown) for name, value in chances.items()} | {UNKNOWN: unknown}
     chances = admit_mistakes({label: 0.0 for label in catalogue()} | chances, main)
-    top = max((NONE, UNKNOWN, *gained), key=lambda name: chances.get(name, 0.0))  # a label that has not earned its place is none
+    # A label that has not earned its place is none.
+    top = max((NONE, UNKNOWN, *gained), key=lambda name: chances.get(name, 0.0))
     groups = grouped(rivals(search, course, main)) if by_search else {main: [main]}
     if top == UNKNOWN and course.labels and shrinkage.after > CERTAIN * shrinkage.recalibrated:
         course, shrinkage = search.null, shrink(search, search.null)
