@@ -16,7 +16,7 @@ $(STAMP): pyproject.toml constraints.txt
 	@touch $(STAMP)
 
 demo: setup
-	@$(BIN)/python -m tools.demo
+	@$(BIN)/python -m tools.measure.demo
 
 test: setup
 	$(BIN)/python -m pytest -n 2 -m 'not realtime'

@@ -5,10 +5,10 @@ import math
 import numpy as np
 
 from firmware.control.gains import Control
-from firmware.core import autopilot as core
-from firmware.core import control_layout as layout
-from firmware.core.estimator_layout import COMMANDED
-from firmware.core.guidance import abort
+from firmware.core.control import autopilot as core
+from firmware.core.control import control_layout as layout
+from firmware.core.control.guidance import abort
+from firmware.core.estimation.estimator_layout import COMMANDED
 from firmware.estimation.settings import estimator_settings, first_spread, parameter_sigma
 from firmware.guidance.mission import Mission
 from firmware.model.strict import ConfigError

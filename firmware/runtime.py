@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from firmware.autopilot import Autopilot
-from firmware.core import supervisor_layout as sup
-from firmware.core import telemetry as record
+from firmware.core.control import telemetry as record
 from firmware.core.jit import freeze_kernels, thaw_kernels
+from firmware.core.supervision import supervisor_layout as sup
 from firmware.supervisor.supervisor import Supervisor
 from firmware.supervisor.table import Reaction
 from hal.ports import SLOTS, Board

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from firmware.core.layout import BALLAST_MIN, BALLAST_RATE, NET_MASS, SERVO_RATE, SLIDER_RATE, X_ACT
+from firmware.core.vehicle.layout import BALLAST_MIN, BALLAST_RATE, NET_MASS, SERVO_RATE, SLIDER_RATE, X_ACT
 from hal.ports import Condition, Validity
 from sim_backend.world import World
 

@@ -7,9 +7,9 @@ from typing import Annotated
 import msgspec
 import numpy as np
 
-from firmware.core.layout import N_P, X_ACT, X_NU, X_POS, X_QUAT
-from firmware.core.rotations import quaternion_from_euler
-from firmware.core.seawater import water_density
+from firmware.core.maths.rotations import quaternion_from_euler
+from firmware.core.vehicle.layout import N_P, X_ACT, X_NU, X_POS, X_QUAT
+from firmware.core.vehicle.seawater import water_density
 from firmware.model.strict import Table
 from firmware.model.vehicle import Vehicle
 from hal.ports import empty_frame

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from firmware.core.rotations import quaternion_from_euler
+from firmware.core.maths.rotations import quaternion_from_euler
 from sim_backend.core.effect_layout import N_XF
 from sim_backend.effects.base import catalogue
 from sim_backend.world import Environment, SampledSensors, Start, World, build_world
-from tools.sources import load_vehicle
+from tools.data.sources import load_vehicle
 
 VEHICLE = load_vehicle("roughie")
 CALM = {"disturbance_linear": 0.0, "disturbance_angular": 0.0, "surface": False}

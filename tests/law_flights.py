@@ -8,13 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from firmware.core import layout
-from firmware.core.control import reference_step
-from firmware.core.error_bound import model_error_bound
-from firmware.core.input_forms import exact_form
-from firmware.core.law import OK, pitch_depth_law
-from firmware.core.law_plus import reach
-from firmware.core.rotations import euler_from_quaternion, rotation_nb
+from firmware.core.control.control import reference_step
+from firmware.core.control.error_bound import model_error_bound
+from firmware.core.control.input_forms import exact_form
+from firmware.core.control.law import OK, pitch_depth_law
+from firmware.core.control.law_plus import reach
+from firmware.core.maths.rotations import euler_from_quaternion, rotation_nb
+from firmware.core.vehicle import layout
 from sim_backend.core.layout import N_E, N_WAVE
 from sim_backend.core.plant import derivative, rk4_step
 

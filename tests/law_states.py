@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from law_flights import Gains, Reference, output_accelerations, outputs, plant_rates, without_stops
 from model_states import RATE, VEHICLE_TEXT, P, actuators, angles, rates, state, vehicles, velocities
 
-from firmware.core import layout
+from firmware.core.vehicle import layout
 from firmware.estimation.settings import parameter_sigma
 from firmware.model.vehicle import decode_vehicle
 

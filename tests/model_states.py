@@ -6,10 +6,10 @@ import numpy as np
 from hypothesis import settings
 from hypothesis import strategies as st
 
-from firmware.core import layout
-from firmware.core.flight import nominal_derivative
-from firmware.core.mass import first_moment, inertia, translational_mass
-from firmware.core.rotations import quaternion_from_euler
+from firmware.core.maths.rotations import quaternion_from_euler
+from firmware.core.vehicle import layout
+from firmware.core.vehicle.flight import nominal_derivative
+from firmware.core.vehicle.mass import first_moment, inertia, translational_mass
 from firmware.model.library import shipped
 from firmware.model.vehicle import decode_vehicle
 

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from firmware.control.gains import Control, LawGains
-from firmware.core import layout
-from firmware.core.control import pitch_feedforward
-from firmware.core.error_bound import model_error_bound
-from firmware.core.input_forms import exact_form
-from firmware.core.law import k2_to_cover
+from firmware.core.control.control import pitch_feedforward
+from firmware.core.control.error_bound import model_error_bound
+from firmware.core.control.input_forms import exact_form
+from firmware.core.control.law import k2_to_cover
+from firmware.core.vehicle import layout
 from firmware.estimation.settings import parameter_sigma
 from firmware.model.vehicle import Vehicle
 

@@ -1,7 +1,7 @@
 """How kernels are compiled: one decorator, one cache that notices every change.
 
 Numba's own disk cache does not see a change in a kernel that a cached kernel calls, so the cache directory carries a
-hash over every file that may hold kernels (the `core` folders and the effects). A kernel file elsewhere would escape
+hash over every file that may hold kernels (KERNEL_DIRS, with all their rooms). A kernel file elsewhere would escape
 the hash; tests/unit/test_jit.py holds the rule.
 
 Set GLIDER_JIT=0 to run every kernel as plain Python (slow, for reading and stepping through).
@@ -16,14 +16,17 @@ import tempfile
 from pathlib import Path
 
 PACKAGES_DIR = Path(__file__).resolve().parents[2]
-KERNEL_DIRS = ("firmware/core", "sim_backend/core", "sim_backend/effects", "tools/gap/core", "tools/identify/core")
+KERNEL_DIRS = (
+    "firmware/core", "sim_backend/core", "sim_backend/foreign", "sim_backend/effects", "tools/inference/core",
+    "tools/identify/core",
+)  # fmt: skip
 CONSTANT_FILES = ("hal/ports.py",)  # no kernels, but places in the frame that the kernels freeze
 KEEP_CACHES = 3
 
 
 def kernel_files() -> list[Path]:
     """Every source file whose kernels the cache key covers, in a fixed order."""
-    kernels = [path for folder in KERNEL_DIRS for path in sorted((PACKAGES_DIR / folder).glob("*.py"))]
+    kernels = [path for folder in KERNEL_DIRS for path in sorted((PACKAGES_DIR / folder).rglob("*.py"))]
     return kernels + [PACKAGES_DIR / name for name in CONSTANT_FILES]
 
 
@@ -31,7 +34,7 @@ def kernels_digest() -> str:
     """Hash of every kernel file's bytes, 16 hex digits."""
     digest = hashlib.sha256()
     for path in kernel_files():
-        digest.update(path.name.encode())
+        digest.update(path.relative_to(PACKAGES_DIR).as_posix().encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from firmware.core import estimator_layout as est
-from firmware.core import layout
+from firmware.core.estimation import estimator_layout as est
+from firmware.core.vehicle import layout
 from firmware.model.vehicle import COEFFICIENTS, DisturbanceTable, SensorsTable, UncertaintyTable
 
 # Errors of parameters stay, but the accelerations they cause turn with the flight: with each dive, climb or turn.
@@ -45,7 +45,7 @@ def parameter_sigma(P: np.ndarray, uncertainty: UncertaintyTable) -> np.ndarray:
 
 
 def estimator_settings(sensors: SensorsTable, disturbance: DisturbanceTable, mode: int = 0) -> np.ndarray:
-    """The settings vector of firmware/core/estimator, shape (N_S,); `mode` says which actuators are not commanded."""
+    """The settings vector of core/estimation/estimator, shape (N_S,); `mode` says which actuators are not commanded."""
     S = np.zeros(est.N_S)
     S[est.S_LINEAR] = disturbance.linear**2 * est.DISTURBANCE_HOLD
     S[est.S_ANGULAR] = disturbance.angular**2 * est.DISTURBANCE_HOLD

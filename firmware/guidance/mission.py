@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 
 from firmware.control.gains import Control
-from firmware.core import control_layout as layout
+from firmware.core.control import control_layout as layout
 from firmware.model.strict import ConfigError, Table, decode
 from firmware.model.vehicle import Vehicle
 

@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 
 from firmware.control.gains import Control
-from firmware.core import layout
+from firmware.core.vehicle import layout
 from firmware.model.strict import Table, decode
 from firmware.supervisor.settings import Limits, SupervisorTable
 

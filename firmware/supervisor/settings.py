@@ -9,7 +9,7 @@ from typing import Annotated
 import msgspec
 import numpy as np
 
-from firmware.core import supervisor_layout as at
+from firmware.core.supervision import supervisor_layout as at
 from firmware.model.strict import Table
 
 Seconds = Annotated[float, msgspec.Meta(gt=0.0, le=3600.0)]

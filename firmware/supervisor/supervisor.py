@@ -8,9 +8,9 @@ import math
 import numpy as np
 
 from firmware.autopilot import Autopilot
-from firmware.core import supervisor_layout as at
-from firmware.core.screening import screen
-from firmware.core.supervisor import guard
+from firmware.core.supervision import supervisor_layout as at
+from firmware.core.supervision.screening import screen
+from firmware.core.supervision.supervisor import guard
 from firmware.guidance.mission import Mission
 from firmware.model.vehicle import Vehicle
 from firmware.supervisor.settings import Limits, settings_vector

@@ -8,7 +8,7 @@ latched.
 from dataclasses import dataclass
 from enum import IntEnum
 
-from firmware.core import supervisor_layout as at
+from firmware.core.supervision import supervisor_layout as at
 
 
 class Reaction(IntEnum):

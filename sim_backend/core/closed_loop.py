@@ -5,11 +5,11 @@ The kernels are the ones that the real runtime calls; only the Python around the
 
 import numpy as np
 
-from firmware.core import control_layout as ctl
-from firmware.core.autopilot import reset, tick
+from firmware.core.control import control_layout as ctl
+from firmware.core.control.autopilot import reset, tick
 from firmware.core.jit import kernel, parallel_kernel, prange
-from firmware.core.layout import N_P, N_X, X_ACT
-from firmware.core.rotations import euler_from_quaternion
+from firmware.core.maths.rotations import euler_from_quaternion
+from firmware.core.vehicle.layout import N_P, N_X, X_ACT
 from hal.ports import FRAME_SIZE
 from sim_backend.core import effect_layout as ef
 from sim_backend.core import layout as at

@@ -4,7 +4,7 @@ F of zeros is the nominal vehicle. A label of the catalogue (sim_backend/effects
 entries go together in any number. Signs and meanings are those of docs/EFFECTS.md.
 """
 
-from firmware.core.layout import N_X
+from firmware.core.vehicle.layout import N_X
 
 # --- F: effects, SI -------------------------------------------------------------------------------------------------
 # actuation: rates and time constants in powers of e (-1: rate 1/e of the nominal), widths of play, offsets
@@ -29,7 +29,7 @@ DEPTH_OFFSET, DEPTH_SCALE, DEPTH_LAG, DEPTH_LEVER = 52, 53, 54, 55  # m, 1, s, m
 COMMAND_DELAY, MOCAP_DELAY, CLOCK_SKEW = 56, 57, 58  # s, s, 1
 # allowed: a constant error of each onboard reading, in the order of y below
 BIAS = 59  # 59..67
-# a data-driven correction (tools/gap/correction): the link at which it enters, and its coefficients
+# a data-driven correction (tools/diagnose/correction): the link at which it enters, and its coefficients
 LINK, SHAPE = 68, 69  # 69..79, in the link's unit
 FORCE_LINKS, ACTUATOR_LINKS = 6, 9  # links 1-6: X Y Z K M N (N, N m); 7-9: servo, slider, ballast; then the readings
 SHAPES = (

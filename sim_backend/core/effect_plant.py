@@ -7,10 +7,11 @@ sensors make of it all.
 
 import math
 
-from firmware.core.actuators import actuator_rate, clip
-from firmware.core.flight import normalise_attitude
 from firmware.core.jit import kernel
-from firmware.core.layout import (
+from firmware.core.maths.rotations import euler_from_quaternion, quaternion_rate, rotation_nb
+from firmware.core.vehicle.actuators import actuator_rate, clip
+from firmware.core.vehicle.flight import normalise_attitude
+from firmware.core.vehicle.layout import (
     A_Y,
     A_Z,
     BALLAST_MAX,
@@ -40,13 +41,12 @@ from firmware.core.layout import (
     SLIDER_RATE,
     SLIDER_TAU,
 )
-from firmware.core.layout import CG_X as P_CG_X
-from firmware.core.layout import CG_Y as P_CG_Y
-from firmware.core.layout import CG_Z as P_CG_Z
-from firmware.core.layout import NET_MASS as P_NET_MASS
-from firmware.core.motion import accelerations
-from firmware.core.rotations import euler_from_quaternion, quaternion_rate, rotation_nb
-from firmware.core.water import flow_angles, flow_to_body
+from firmware.core.vehicle.layout import CG_X as P_CG_X
+from firmware.core.vehicle.layout import CG_Y as P_CG_Y
+from firmware.core.vehicle.layout import CG_Z as P_CG_Z
+from firmware.core.vehicle.layout import NET_MASS as P_NET_MASS
+from firmware.core.vehicle.motion import accelerations
+from firmware.core.vehicle.water import flow_angles, flow_to_body
 from sim_backend.core import effect_layout as ef
 
 SERVO_DRIVEN, SLIDER_DRIVEN, BALLAST_DRIVEN = 1, 2, 4  # mode: this actuator's input is a speed, not a command

@@ -6,7 +6,7 @@ Where no effect is set, nothing of this runs: a nominal vehicle flies the plain 
 import math
 
 from firmware.core.jit import kernel
-from firmware.core.rotations import rotation_nb
+from firmware.core.maths.rotations import rotation_nb
 from sim_backend.core import effect_layout as ef
 from sim_backend.core import layout as at
 from sim_backend.core.effect_plant import effect_step, fold

@@ -3,7 +3,7 @@
 import numpy as np
 
 from firmware.core.jit import kernel, parallel_kernel, prange
-from firmware.core.layout import N_P, N_X
+from firmware.core.vehicle.layout import N_P, N_X
 from sim_backend.core import effect_layout as ef
 from sim_backend.core import layout as at
 from sim_backend.core.effect_world import effect_world_step, set_effects

@@ -5,12 +5,12 @@ One derivative for everything: the nominal flight is the case in which the envir
 
 import math
 
-from firmware.core.actuators import actuator_rates
-from firmware.core.flight import normalise_attitude
 from firmware.core.jit import kernel
-from firmware.core.layout import M_T, N_X, G
-from firmware.core.motion import accelerations
-from firmware.core.rotations import quaternion_rate, rotation_nb
+from firmware.core.maths.rotations import quaternion_rate, rotation_nb
+from firmware.core.vehicle.actuators import actuator_rates
+from firmware.core.vehicle.flight import normalise_attitude
+from firmware.core.vehicle.layout import M_T, N_X, G
+from firmware.core.vehicle.motion import accelerations
 from sim_backend.core import layout as at
 from sim_backend.core.noise import gaussian
 

@@ -5,8 +5,8 @@ and thousands in a campaign.
 """
 
 from firmware.core.jit import kernel
-from firmware.core.layout import PLUNGER_AREA, G
-from firmware.core.rotations import euler_from_quaternion
+from firmware.core.maths.rotations import euler_from_quaternion
+from firmware.core.vehicle.layout import PLUNGER_AREA, G
 from hal.ports import BEACON, IMU, PLUNGER_WIRE, SLIDER_WIRE
 from sim_backend.core import effect_layout as ef
 from sim_backend.core import layout as at

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from firmware.core.layout import X_ACT, X_NU, X_POS, X_QUAT
-from firmware.core.rotations import quaternion_from_euler
+from firmware.core.maths.rotations import quaternion_from_euler
+from firmware.core.vehicle.layout import X_ACT, X_NU, X_POS, X_QUAT
 from hal.ports import BEACON, IMU, PLUNGER_WIRE, SLIDER_WIRE
 from sim_backend.core import layout
 from sim_backend.core.effect_layout import X_LAG

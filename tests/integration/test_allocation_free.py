@@ -5,11 +5,11 @@ import pytest
 from numba import njit
 from numba.core.runtime import _nrt_python, rtsys
 
-from firmware.core import autopilot as core
-from firmware.core import control_layout as at
-from firmware.core.telemetry import N_RECORD, fill_record
-from tools.benchmark.allocations import BOXED, largest_block
-from tools.benchmark.tick import harness, measure_tick
+from firmware.core.control import autopilot as core
+from firmware.core.control import control_layout as at
+from firmware.core.control.telemetry import N_RECORD, fill_record
+from tools.measure.benchmark.allocations import BOXED, largest_block
+from tools.measure.benchmark.tick import harness, measure_tick
 
 # Seven arrays go into the autopilot's kernel, and each costs a 48-byte handle while the call lasts: 336 bytes, and
 # nothing else of size is alive then. See docs/PERFORMANCE.md.

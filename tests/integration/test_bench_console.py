@@ -107,7 +107,7 @@ def test_raw_bytes_and_their_answers(twins):
 
 
 def test_a_sweep_leaves_run_data_and_a_picture(twins, tmp_path):
-    from tools.runs.case import load_case
+    from tools.data.runs.case import load_case
 
     done = bench(twins, "enable", "goto slider 0", "sweep slider -2 2", out=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -11,8 +11,8 @@ import pytest
 
 from hal.board import BoardRequest, board_builder
 from hal.ports import SLOTS, ActuatorPort, Clock, SensorPort, Validity, empty_frame
-from tools.compose import load_board_file
-from tools.sources import load_vehicle
+from tools.data.sources import load_vehicle
+from tools.flight.compose import load_board_file
 
 VEHICLE = load_vehicle("roughie")
 FITTED = ("imu", "beacon", "slider_wire", "plunger_wire")

@@ -12,8 +12,8 @@ import time
 import numpy as np
 import pytest
 
-from tools.campaign.plan import build_plan, load_campaign, with_options
-from tools.campaign.run import fly_campaign
+from tools.study.campaign.conduct import fly_campaign
+from tools.study.campaign.plan import build_plan, load_campaign, with_options
 
 SMALL = ("--mission", "spiral", "--seeds", "3", "--controller", "law", "--controller", "pid")
 
@@ -162,8 +162,8 @@ def test_bad_input_is_one_line_and_exit_code_2(arguments, said, tmp_path):
 
 
 def test_without_its_packages_the_command_says_what_to_install(plan, monkeypatch):
-    from tools.campaign.picture import check_installed
-    from tools.errors import MissingExtra
+    from tools.data.errors import MissingExtra
+    from tools.study.campaign.picture import check_installed
 
     for name in ("joblib", "distributed.comm.addressing", "jinja2"):
         monkeypatch.setitem(sys.modules, name, None)

@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 
 from firmware.model.library import shipped
-from tools.challenge.make import Order, make, make_one
-from tools.challenge.plan import Counts, plan
-from tools.challenge.seal import open_answers
 from tools.cli.common import report_errors
 from tools.cli.main import cli
-from tools.runs.case import load_case
-from tools.sources import load_vehicle
+from tools.data.runs.case import load_case
+from tools.data.sources import load_vehicle
+from tools.study.challenge.make import Order, make, make_one
+from tools.study.challenge.plan import Counts, plan
+from tools.study.challenge.seal import open_answers
 
 COUNTS = Counts(single=1, none=1, pairs=0, unknown=1)
 SEED = 6

@@ -9,12 +9,12 @@ from support.cases import make_case
 from sim_backend.core import effect_layout as ef
 from tools.cli.common import report_errors
 from tools.cli.main import cli
-from tools.gap.corrected import LINKS
+from tools.data.runs import columns as names
 from tools.gap.measure import run_gap
-from tools.gap.model import load_model
-from tools.gap.predict import predict
-from tools.gap.windows import windows
-from tools.runs import columns as names
+from tools.inference.corrected import LINKS
+from tools.inference.model import load_model
+from tools.inference.predict import predict
+from tools.inference.windows import windows
 
 
 def glider(*words: object) -> int:

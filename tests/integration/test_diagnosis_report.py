@@ -10,12 +10,12 @@ import pytest
 from support.flights import World, fly_case
 from support.pages import assert_offline
 
-from firmware.core import layout as at
+from firmware.core.vehicle import layout as at
 from tools.cli.common import report_errors
 from tools.cli.main import cli
-from tools.gap.corrected import load_corrected
-from tools.gap.model import nominal_model
-from tools.runs.case import load_case, write_case
+from tools.data.runs.case import load_case, write_case
+from tools.inference.corrected import load_corrected
+from tools.inference.model import nominal_model
 
 HEAVY = 0.06  # kg, 12 times what [uncertainty] allows for
 PHONE = (390, 844)  # CSS pixels

@@ -12,8 +12,8 @@ import pytest
 from support.patience import patient_vehicle
 from support.twinned import until
 
-from tools.log.parts import FlightLog, read_flight
-from tools.log.repair import repair
+from tools.data.log.parts import FlightLog, read_flight
+from tools.data.log.repair import repair
 
 pytestmark = pytest.mark.realtime
 

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from support.patience import patient_vehicle
 
-from firmware.core.control_layout import LEG
+from firmware.core.control.control_layout import LEG
 from firmware.supervisor.table import Reaction
 from hal.ports import SLOTS
 from hal.recorder.recorder import NullRecorder
 from sim_backend.core.closed_loop import N_END, N_TRACE, fly
 from sim_backend.fleet import fly_fleet
-from tools.compose import build_flight, build_runtime, record_specs
+from tools.flight.compose import build_flight, build_runtime, record_specs
 
 MANY = {
     "command_delay": {"delay": 0.355},

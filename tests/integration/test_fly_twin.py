@@ -5,9 +5,9 @@ import sys
 import pytest
 from support.patience import patient_vehicle
 
-from tools.figures.devices import ATTITUDE_LIMIT_DEG, POSITION_LIMIT_M, compare_flights
-from tools.log.reader import read_log
-from tools.log.rundata import export_case
+from tools.data.log.reader import read_log
+from tools.data.log.rundata import export_case
+from tools.measure.figures.devices import ATTITUDE_LIMIT_DEG, POSITION_LIMIT_M, compare_flights
 
 pytestmark = pytest.mark.realtime
 
@@ -62,8 +62,8 @@ def test_a_tick_on_devices_gains_no_memory():
 
     from hal.board import BoardRequest, board_builder
     from hal.ports import SLOTS, empty_frame
-    from tools.compose import load_board_file
-    from tools.sources import load_vehicle
+    from tools.data.sources import load_vehicle
+    from tools.flight.compose import load_board_file
 
     file = load_board_file("twin")
     board = board_builder("twin")(BoardRequest(text=file.text, source=file.source, vehicle=load_vehicle("roughie")))

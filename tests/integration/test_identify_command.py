@@ -10,11 +10,11 @@ from click.testing import CliRunner
 
 from firmware.model.vehicle import COEFFICIENTS, decode_vehicle
 from tools.cli.identify import identify
+from tools.data.runs import columns as names
+from tools.data.runs.case import write_case
+from tools.data.sources import load_vehicle
 from tools.identify.design import CAPTURE, make_runs
 from tools.identify.parameters import coefficient_sizes
-from tools.runs import columns as names
-from tools.runs.case import write_case
-from tools.sources import load_vehicle
 
 ABOUT = dict(vehicle="roughie", site="pool", log_rate_hz=50.0, water_density_kg_m3=998.0, sensors=CAPTURE)
 
@@ -76,7 +76,7 @@ def test_files_are_there_and_others_read_them(found):
 
 
 def test_a_case_of_nothing_but_bad_runs_is_one_line(tmp_path):
-    from tools.errors import InputError
+    from tools.data.errors import InputError
 
     runs, _ = make_runs(load_vehicle("roughie"), 6, [0, 6])
     bad = [

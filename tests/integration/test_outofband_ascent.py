@@ -12,7 +12,7 @@ from support.twinned import DIVE, end_guard, flying, guard_pid, twins, until
 from hal.heartbeat import Guard, Heartbeat, Status
 from hal.outofband.plan import read_plan
 from hal.state_file import Phase, StateFile
-from tools.log.reader import read_log
+from tools.data.log.reader import read_log
 
 pytestmark = pytest.mark.realtime
 DEEP_M = 1.2
@@ -125,8 +125,8 @@ def test_a_second_flight_on_the_same_vehicle_is_refused(sea, tmp_path):
 
 
 def _kg_per_m():
-    from firmware.core.seawater import water_density
-    from tools.sources import load_vehicle
+    from firmware.core.vehicle.seawater import water_density
+    from tools.data.sources import load_vehicle
 
     return float(water_density(0.0, 20.0, 0.0)) * load_vehicle("roughie").actuators.ballast.plunger_area
 

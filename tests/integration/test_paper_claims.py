@@ -6,14 +6,14 @@ import pytest
 
 from firmware.autopilot import configuration
 from firmware.control.gains import Control, Law
-from firmware.core import control_layout as at
+from firmware.core.control import control_layout as at
 from firmware.guidance.mission import decode_mission
 from firmware.model.library import shipped
-from tools.campaign.flights import COLUMNS, TUMBLED, Job, cut, fly_chunk
-from tools.campaign.plan import build_plan, fingerprint, load_campaign
-from tools.reproduce import tracking
-from tools.reproduce.design import Variant, fly_design
-from tools.sources import load_vehicle
+from tools.data.sources import load_vehicle
+from tools.study.campaign.flights import COLUMNS, TUMBLED, Job, cut, fly_chunk
+from tools.study.campaign.plan import build_plan, fingerprint, load_campaign
+from tools.study.reproduce import tracking
+from tools.study.reproduce.design import Variant, fly_design
 
 VEHICLE = load_vehicle("roughie")
 NOISE = tracking.ROUGH * VEHICLE.disturbance.linear

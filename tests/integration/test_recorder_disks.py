@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tools.log.reader import read_log
+from tools.data.log.reader import read_log
 
 HEAD = """
 import fcntl, json, os, struct, subprocess, sys, time

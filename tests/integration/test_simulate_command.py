@@ -9,7 +9,7 @@ import pytest
 
 from tools.cli.common import report_errors
 from tools.cli.main import cli
-from tools.simulate import COLUMNS
+from tools.study.simulate import COLUMNS
 
 FLIGHT = Path(__file__).resolve().parents[1] / "data" / "reference" / "down_and_up.csv"
 HEADER = ",".join(COLUMNS)

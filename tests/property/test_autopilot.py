@@ -6,12 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from firmware.autopilot import CONTROLLERS, Autopilot, configuration
-from firmware.core import control_layout as at
-from firmware.core import layout
+from firmware.core.control import control_layout as at
+from firmware.core.vehicle import layout
 from firmware.guidance.mission import decode_mission
 from firmware.model.library import shipped
 from hal.ports import BEACON, FRAME_SIZE, IMU, PLUNGER_WIRE, SLIDER_WIRE
-from tools.sources import load_mission, load_vehicle
+from tools.data.sources import load_mission, load_vehicle
 
 VEHICLE = load_vehicle("roughie")
 PERIODS = {"imu": 0.02, "beacon": 0.04, "wires": 0.04}

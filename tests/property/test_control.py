@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
 
-from firmware.core.control import pid, reference_step, roll_law
-from firmware.core.limits import limited
+from firmware.core.control.control import pid, reference_step, roll_law
+from firmware.core.supervision.limits import limited
 
 repeatable = settings(deadline=None, derandomize=True, max_examples=200)
 anything = st.floats(allow_nan=True, allow_infinity=True, width=64)

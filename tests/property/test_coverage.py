@@ -7,12 +7,12 @@ import pytest
 from law_flights import Gains, Law, Reference, lyapunov_rate, plant_rates
 from law_states import SPREAD
 
-from firmware.core import control_layout as at
-from firmware.core import layout
-from firmware.core.coverage import WATCH_EVERY
-from firmware.core.law import k2_to_cover
-from firmware.core.telemetry import COVERAGE, N_RECORD, fill_record
-from tools.compose import build_flight
+from firmware.core.control import control_layout as at
+from firmware.core.control.coverage import WATCH_EVERY
+from firmware.core.control.law import k2_to_cover
+from firmware.core.control.telemetry import COVERAGE, N_RECORD, fill_record
+from firmware.core.vehicle import layout
+from tools.flight.compose import build_flight
 
 SIGMA = SPREAD / 3.0
 VALUES = slice(at.K2_NEED_PITCH, at.MARGIN_DEPTH + 1)

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from model_states import actuators, repeatable, states, vehicles
 
-from firmware.core import layout
+from firmware.core.vehicle import layout
 from sim_backend.core import effect_layout as ef
 from sim_backend.core import layout as at
 from sim_backend.core.effect_plant import effect_step, fold, play

@@ -5,10 +5,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.flights import World, case_of, fly
 
-from tools.gap.model import nominal_model
-from tools.gap.predict import predict
-from tools.gap.windows import windows
-from tools.runs.run import Run
+from tools.data.runs.run import Run
+from tools.inference.model import nominal_model
+from tools.inference.predict import predict
+from tools.inference.windows import windows
 
 FLIGHTS = {mocap: fly(World(mocap=mocap), 5).run for mocap in (False, True)}
 PREDICTIONS = {}

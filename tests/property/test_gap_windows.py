@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tools.gap.windows import START, WINDOW, windows
+from tools.inference.windows import START, WINDOW, windows
 
 clocks = st.builds(
     lambda begin, steps: begin + np.concatenate([[0.0], np.cumsum(steps)]),

@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from firmware.core import control_layout as at
+from firmware.core.control import control_layout as at
 from firmware.guidance.mission import decode_mission
 from sim_backend.core.closed_loop import N_END, N_TRACE, fly
-from tools.compose import build_flight
+from tools.flight.compose import build_flight
 
 HEAD = 'format = 1\nname = "m"\ntime_limit_s = 600.0\n[site]\nname = "deep"\ndepth_m = 60.0\n'
 ENTRY = "[[leg]]\nduration_s = 25.0\npitch_deg = {pitch}\nballast_kg = {ballast}\n"

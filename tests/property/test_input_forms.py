@@ -14,12 +14,13 @@ from law_flights import down, form_at, output_accelerations, outputs, plant_rate
 from law_states import actuator_speeds, flying, trimmed_vehicles
 from model_states import P, derivative, repeatable, state
 
-from firmware.core import input_forms, layout
-from firmware.core.input_forms import exact_form, paper_form
+from firmware.core.control import input_forms
+from firmware.core.control.input_forms import exact_form, paper_form
+from firmware.core.control.law import OK, STEEP, solve_inputs
+from firmware.core.control.law_plus import on_outputs
 from firmware.core.jit import PACKAGES_DIR
-from firmware.core.law import OK, STEEP, solve_inputs
-from firmware.core.law_plus import on_outputs
-from tools.figures import law
+from firmware.core.vehicle import layout
+from tools.measure.figures import law
 
 
 def scaled_glider(factors) -> tuple[Glider, np.ndarray]:
@@ -110,7 +111,7 @@ def test_derivative_of_the_plant_is_the_nominal_one_here():
 
 
 def test_figures_of_the_document_are_those_measured(capsys):
-    """The two tables that `python -m tools.figures.law` prints stand in docs/CONTROL.md, row by row."""
+    """The two tables that `python -m tools.measure.figures.law` prints stand in docs/CONTROL.md, row by row."""
     law.main()
     printed = [line.split("|") for line in capsys.readouterr().out.splitlines() if line.startswith("|")]
     document = (PACKAGES_DIR / "docs" / "CONTROL.md").read_text(encoding="utf-8").splitlines()

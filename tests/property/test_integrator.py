@@ -8,9 +8,9 @@ from independent.nominal import Glider
 from model_states import P, state
 from scipy.spatial.transform import Rotation
 
-from firmware.core import layout
-from firmware.core.flight import nominal_run, nominal_step
-from firmware.core.rotations import euler_from_quaternion
+from firmware.core.maths.rotations import euler_from_quaternion
+from firmware.core.vehicle import layout
+from firmware.core.vehicle.flight import nominal_run, nominal_step
 
 
 def flown(x: np.ndarray, act, dt: float, seconds: float, vehicle: np.ndarray = P) -> np.ndarray:

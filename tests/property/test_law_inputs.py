@@ -10,12 +10,21 @@ from law_flights import SLIDER, down, form_at
 from law_states import flying, gains, unit
 from model_states import HIGH, LOW, RATE, TAU, P, repeatable, state
 
-from firmware.core import layout
-from firmware.core.actuators import actuator_rate
-from firmware.core.input_forms import exact_form, paper_form
-from firmware.core.law import NOT_FINITE, OK, STEEP, axis_demand, k2_by_29, k2_to_cover, pitch_depth_law, solve_inputs
-from firmware.core.law_plus import reach
-from firmware.core.limits import limited
+from firmware.core.control.input_forms import exact_form, paper_form
+from firmware.core.control.law import (
+    NOT_FINITE,
+    OK,
+    STEEP,
+    axis_demand,
+    k2_by_29,
+    k2_to_cover,
+    pitch_depth_law,
+    solve_inputs,
+)
+from firmware.core.control.law_plus import reach
+from firmware.core.supervision.limits import limited
+from firmware.core.vehicle import layout
+from firmware.core.vehicle.actuators import actuator_rate
 
 
 @repeatable

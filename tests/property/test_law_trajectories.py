@@ -28,14 +28,14 @@ from law_flights import (
 )
 from model_states import HIGH, LOW, RATE, VEHICLE_TEXT, P, repeatable, state
 
-from firmware.core import layout
-from firmware.core.actuators import actuator_rates
-from firmware.core.control import roll_law
-from firmware.core.input_forms import exact_form, paper_form
-from firmware.core.law import decrease_margin, k2_to_cover
-from firmware.core.law_plus import SHARE, on_outputs
-from firmware.core.limits import limited
-from firmware.core.rotations import euler_from_quaternion
+from firmware.core.control.control import roll_law
+from firmware.core.control.input_forms import exact_form, paper_form
+from firmware.core.control.law import decrease_margin, k2_to_cover
+from firmware.core.control.law_plus import SHARE, on_outputs
+from firmware.core.maths.rotations import euler_from_quaternion
+from firmware.core.supervision.limits import limited
+from firmware.core.vehicle import layout
+from firmware.core.vehicle.actuators import actuator_rates
 from firmware.estimation.settings import parameter_sigma
 from firmware.model.vehicle import decode_vehicle
 

@@ -10,8 +10,8 @@ from independent.make_reference import VEHICLE
 from independent.nominal import Glider
 from model_states import P, actuators, angles, currents, derivative, repeatable, state, states
 
-from firmware.core import layout
-from firmware.core.flight import nominal_run, nominal_step
+from firmware.core.vehicle import layout
+from firmware.core.vehicle.flight import nominal_run, nominal_step
 
 STEP = 0.01
 

@@ -17,11 +17,11 @@ from model_states import (
 )
 from scipy.integrate import simpson
 
-from firmware.core import layout
-from firmware.core.flight import nominal_step
-from firmware.core.mass import first_moment
-from firmware.core.rotations import quaternion_from_euler, rotation_nb
-from firmware.core.water import water_wrench
+from firmware.core.maths.rotations import quaternion_from_euler, rotation_nb
+from firmware.core.vehicle import layout
+from firmware.core.vehicle.flight import nominal_step
+from firmware.core.vehicle.mass import first_moment
+from firmware.core.vehicle.water import water_wrench
 
 
 def energy(vehicle: np.ndarray, x: np.ndarray) -> float:

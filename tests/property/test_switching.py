@@ -6,10 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from firmware.control.gains import Control, HybridTable
-from firmware.core import control_layout as at
-from firmware.core import law, layout
+from firmware.core.control import control_layout as at
+from firmware.core.control import law
+from firmware.core.vehicle import layout
 from firmware.model.strict import ConfigError, decode
-from tools.compose import build_flight
+from tools.flight.compose import build_flight
 
 RATES = {"servo": layout.SERVO_RATE, "slider": layout.SLIDER_RATE, "ballast": layout.BALLAST_RATE}
 

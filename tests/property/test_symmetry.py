@@ -5,8 +5,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from model_states import P, actuators, currents, derivative, repeatable, states, vehicles
 
-from firmware.core import layout
-from firmware.core.flight import nominal_run
+from firmware.core.vehicle import layout
+from firmware.core.vehicle.flight import nominal_run
 
 # north, east, down, quaternion, nu, actuators: what changes its sign when east is swapped with west
 MIRROR = np.array([1, -1, 1, 1, -1, 1, -1, 1, -1, 1, -1, 1, -1, -1, 1, 1])

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 
 from sim_backend.core import effect_layout as ef
-from tools.gap.problem import Problem, pose
-from tools.runs import columns as names
-from tools.runs.case import Case, load_case, write_case
-from tools.runs.run import Run
+from tools.data.runs import columns as names
+from tools.data.runs.case import Case, load_case, write_case
+from tools.data.runs.run import Run
+from tools.inference.problem import Problem, pose
 
 RATE = 10.0  # Hz
 SECONDS = 45.0

@@ -4,12 +4,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from firmware.core import estimator_layout as at
-from firmware.core.estimator import estimator_predict, estimator_start, estimator_update
-from firmware.core.rotations import quaternion_from_euler
+from firmware.core.estimation import estimator_layout as at
+from firmware.core.estimation.estimator import estimator_predict, estimator_start, estimator_update
+from firmware.core.maths.rotations import quaternion_from_euler
 from firmware.estimation.settings import estimator_settings, first_spread, parameter_sigma
 from firmware.model.vehicle import Vehicle
-from tools.sources import load_vehicle
+from tools.data.sources import load_vehicle
 
 
 @dataclass

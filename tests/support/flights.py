@@ -9,15 +9,15 @@ from pathlib import Path
 
 import numpy as np
 
-from firmware.core import estimator_layout as est
-from firmware.core.rotations import quaternion_from_euler
+from firmware.core.estimation import estimator_layout as est
+from firmware.core.maths.rotations import quaternion_from_euler
 from firmware.estimation.settings import parameter_sigma
 from firmware.model.vehicle import Vehicle
-from tools.gap.core.flights import N_Y, flight_step, observe
-from tools.runs import columns as names
-from tools.runs.case import Case
-from tools.runs.run import Run
-from tools.sources import load_vehicle
+from tools.data.runs import columns as names
+from tools.data.runs.case import Case
+from tools.data.runs.run import Run
+from tools.data.sources import load_vehicle
+from tools.inference.core.flights import N_Y, flight_step, observe
 
 STEP = 0.02  # s
 

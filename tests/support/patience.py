@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from tools.sources import name_or_path
+from tools.data.sources import name_or_path
 
 
 def patient_vehicle(folder: Path) -> Path:

@@ -1,6 +1,6 @@
 """How the supervisor's stories begin, and the words they are told in."""
 
-from firmware.core import supervisor_layout as at
+from firmware.core.supervision import supervisor_layout as at
 from firmware.supervisor.table import Reaction
 from tests.support.watchman import DT, Watchman
 

@@ -10,13 +10,13 @@ import msgspec
 import numpy as np
 
 from firmware.autopilot import Autopilot, configuration
-from firmware.core import control_layout as ctl
-from firmware.core import supervisor_layout as at
+from firmware.core.control import control_layout as ctl
+from firmware.core.supervision import supervisor_layout as at
 from firmware.supervisor.settings import Limits
 from firmware.supervisor.supervisor import Supervisor
 from firmware.supervisor.table import Reaction
 from hal.ports import SLOTS, Validity
-from tools.sources import load_mission, load_vehicle
+from tools.data.sources import load_mission, load_vehicle
 
 DT = 0.02
 SLIDER_RANGE, BALLAST_RANGE = (-0.06, 0.06), (-0.20, 0.20)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from tools.bench.units import ACTUATORS, from_port, to_port
-from tools.errors import InputError
+from tools.data.errors import InputError
 
 BEAT_S = 0.5
 THERE, STANDS = 0.3, 0.03  # mm from the goal; mm in 0.1 s

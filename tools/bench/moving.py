@@ -81,7 +81,7 @@ class Moving(Desk):
 
     def _speed(self, actuator: str) -> float:
         """What an actuator can do, by the vehicle's file, in deg/s or mm/s."""
-        from tools.sources import load_vehicle
+        from tools.data.sources import load_vehicle
 
         vehicle: Any = load_vehicle(self.bench.vehicle)
         kg_per_m = self.bench.snapshot()["kg_per_m"]

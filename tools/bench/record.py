@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from tools.bench.worker import ROW
-from tools.errors import InputError
+from tools.data.errors import InputError
 
 KEPT = tuple(name for name in ROW if name != "t_s")
 

@@ -23,7 +23,7 @@ from hal.protocols import modbus
 from hal.protocols.modbus import Frame
 from hal.transport.port import Unplugged
 from tools.bench.units import finite
-from tools.sources import load_vehicle
+from tools.data.sources import load_vehicle
 
 STEP_S = 0.01
 HEARTBEAT_S = 3.0

@@ -62,11 +62,11 @@ def campaign(campaign, design, out, jobs, dask, chunk, as_json, **options) -> No
         return
     import msgspec
 
-    from tools.campaign.picture import check_installed, write_page
-    from tools.campaign.plan import build_plan, load_campaign, with_options
-    from tools.campaign.run import FLIGHTS_FILE, fly_campaign, write_flights
-    from tools.campaign.store import write_whole
-    from tools.campaign.summary import summarise
+    from tools.study.campaign.conduct import FLIGHTS_FILE, fly_campaign, write_flights
+    from tools.study.campaign.picture import check_installed, write_page
+    from tools.study.campaign.plan import build_plan, load_campaign, with_options
+    from tools.study.campaign.store import write_whole
+    from tools.study.campaign.summary import summarise
 
     check_installed()
     wanted, base = load_campaign(campaign)
@@ -97,9 +97,9 @@ def _make_runs(folder: Path, options: dict[str, Any], as_json: bool) -> None:
     """The identification design as a case; the truth goes beside it as truth.json."""
     import json
 
-    from tools.errors import InputError, need
+    from tools.data.errors import InputError, need
+    from tools.data.sources import load_vehicle
     from tools.identify.design import grid, truth, write_design
-    from tools.sources import load_vehicle
 
     need("scipy")
     given = [

@@ -27,10 +27,10 @@ def make(
     out: Path, seed: int, single: int, none: int, pairs: int, unknown: int, answers: Path | None, jobs: int
 ) -> None:
     """Draw, fly and seal a blind test. Cases that are there are kept: call again to go on after a stop."""
-    from tools.challenge.make import Order
-    from tools.challenge.make import make as make_all
-    from tools.challenge.plan import Counts
-    from tools.challenge.seal import ARCHIVE, MANIFEST, read_manifest
+    from tools.study.challenge.make import Order
+    from tools.study.challenge.make import make as make_all
+    from tools.study.challenge.plan import Counts
+    from tools.study.challenge.seal import ARCHIVE, MANIFEST, read_manifest
 
     counts = Counts(single, none, pairs, unknown)
     total = single + none + pairs + unknown
@@ -56,8 +56,8 @@ def run(cases: Path, out: Path, only: tuple[str, ...], jobs: int, extra: tuple[s
 
     What stands after `--` is handed on to `gap diagnose`. A case's time counts its whole process.
     """
-    from tools.challenge.run import count_cases
-    from tools.challenge.run import run as run_all
+    from tools.study.challenge.diagnose_all import count_cases
+    from tools.study.challenge.diagnose_all import run as run_all
 
     with progress("diagnosed", len(set(only)) or count_cases(cases)) as advance:
         done, wrong = run_all(cases, out, extra, jobs, advance, only)
@@ -84,8 +84,8 @@ def score(
     as_json: bool,
 ) -> None:
     """Open the sealed answers, check them against the manifest, and score the diagnoses by GAP.md's figures."""
-    from tools.challenge.judge import judge
-    from tools.errors import InputError, need
+    from tools.data.errors import InputError, need
+    from tools.study.challenge.judge import judge
 
     need("scipy")
     if manifest is not None and not manifest.is_file():
@@ -101,7 +101,7 @@ def score(
 
 
 def _answered(cases: Path) -> int:
-    from tools.challenge.run import count_cases
+    from tools.study.challenge.diagnose_all import count_cases
 
     return count_cases(cases)
 

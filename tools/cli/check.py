@@ -42,9 +42,9 @@ def check(
     from firmware.core.jit import CACHE_DIR
     from firmware.model.strict import ConfigError
     from hal.ports import BoardError
-    from tools.compose import build_flight, load_board_file
-    from tools.errors import InputError
-    from tools.sources import load_mission, load_vehicle
+    from tools.data.errors import InputError
+    from tools.data.sources import load_mission, load_vehicle
+    from tools.flight.compose import build_flight, load_board_file
 
     findings: list[dict] = []
     covers: list[Cover] = []
@@ -105,7 +105,7 @@ def _stand_by(live: bool, compile_: bool, acknowledge: bool, state: Path | None,
     from hal.state_file import Phase, StateFile
 
     if compile_:
-        from tools.kernels import compile_all
+        from tools.flight.precompile import compile_all
 
         done = compile_all()
         if as_json:
@@ -113,13 +113,13 @@ def _stand_by(live: bool, compile_: bool, acknowledge: bool, state: Path | None,
         else:
             say(f"{done['kernels']} kernels in {done['folder']}, {done['seconds']:.0f} s")
     if acknowledge:
-        from tools.unattended import told
+        from tools.flight.keeper import told
 
         file = StateFile(state or state_folder())
         say(f"acknowledged: {told(file.read())}")
         file.write(Phase.ASHORE, reason="acknowledged")
     if live:
-        from tools.live import find_folder, show, snapshot
+        from tools.flight.live import find_folder, show, snapshot
 
         folder = find_folder(state)
         if as_json:
@@ -135,8 +135,8 @@ def arming_list(mission: str, vehicle: str, board: str) -> list[dict]:
     import contextlib
 
     from hal.ports import BoardError
-    from tools.arming import Arming
-    from tools.compose import build_flight
+    from tools.flight.arming import Arming
+    from tools.flight.compose import build_flight
 
     flight = build_flight(mission=mission, vehicle=vehicle, board=board)
     try:
@@ -154,7 +154,7 @@ def talk(board: str, vehicle: str, signs: bool) -> list[dict]:
     from sim_backend.twins.boardfile import decode_twin_file
     from tools.bench.client import Bench, BenchError
     from tools.bench.signs import Finding, Signs, look
-    from tools.compose import load_board_file
+    from tools.flight.compose import load_board_file
 
     found = load_board_file(board)
     read = decode_twin_file if found.kind == "twin" else decode_device_file

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from tools.plain import as_plain
+from tools.data.plain import as_plain
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 
@@ -64,7 +64,7 @@ def progress(label: str, total: int, *, bar: bool = True) -> Iterator[Callable[[
 def report_errors(command: click.Command) -> int:
     """Run the command line; turn what a user can cause into one line and exit code 2."""
     from firmware.model.strict import ConfigError
-    from tools.errors import InputError, MissingExtra
+    from tools.data.errors import InputError, MissingExtra
 
     try:
         command(standalone_mode=False)

@@ -20,7 +20,7 @@ def faults(only: int | None, disabled: int | None, workers: int, as_json: bool) 
     A row passes if each of its cases is noticed within its time and two ticks, causes the reaction expected, and ends
     at the surface or safe. Exit code 1: a row failed.
     """
-    from tools.faults.campaign import jobs, run_all, summary
+    from tools.study.faults.campaign import jobs, run_all, summary
 
     with progress("faults", len(jobs(only))) as advance:
         result = summary(list(run_all(only, disabled, workers, advance)))

@@ -64,14 +64,14 @@ def fly(
     terminal, a second Ctrl-C under water wants a third, and a flight that broke off is never resumed: the next start
     only brings the vehicle up. Exit code 1: the flight did not complete.
     """
-    from firmware.core.control_layout import EST_DEPTH
-    from firmware.core.supervisor_layout import RESTARTED
+    from firmware.core.control.control_layout import EST_DEPTH
+    from firmware.core.supervision.supervisor_layout import RESTARTED
     from hal.ports import BoardError
     from hal.recorder.recorder import NullRecorder, Recorder
     from hal.state_file import Phase
-    from tools.cli.terminal import Stop, confirm_arming, undisturbed
-    from tools.compose import build_flight, log_metadata, parse_effects, record_specs
-    from tools.errors import InputError
+    from tools.data.errors import InputError
+    from tools.flight.compose import build_flight, log_metadata, parse_effects, record_specs
+    from tools.flight.terminal import Stop, confirm_arming, undisturbed
 
     wanted = parse_effects(effects)
     try:
@@ -206,9 +206,9 @@ def faults_noticed(supervisor) -> list[dict]:
 
 
 def keep(flight, recorder, path, folder, acknowledge):
-    """What stands around a flight on devices (tools/unattended.py); None in simulation. The state before it is read."""
+    """What stands around a flight on devices (flight/keeper); None in simulation. The state before it is read."""
     from hal.state_file import Phase
-    from tools.unattended import Keeper
+    from tools.flight.keeper import Keeper
 
     if not hasattr(flight.board, "links"):
         return None
@@ -225,7 +225,7 @@ def keep(flight, recorder, path, folder, acknowledge):
 def check_arming(flight, path, keeper) -> None:
     """BoardError where the flight is not fit to arm; a vehicle that only has to come up is not asked."""
     from hal.ports import BoardError
-    from tools.arming import arm
+    from tools.flight.arming import arm
 
     if keeper is not None and keeper.life.ascent_only:
         return
@@ -244,9 +244,9 @@ def device_summary(health) -> dict:
 
 def _run(flight, recorder, realtime, advance, keeper, wishes):
     """Arm, fly, disarm; returns the timing and the flight's length in s."""
-    from firmware.core.control_layout import LEG
-    from firmware.core.supervisor_layout import RECORDER
-    from tools.compose import build_runtime
+    from firmware.core.control.control_layout import LEG
+    from firmware.core.supervision.supervisor_layout import RECORDER
+    from tools.flight.compose import build_runtime
 
     runtime = build_runtime(flight, recorder)
     simulated = not realtime and hasattr(flight.board, "world")

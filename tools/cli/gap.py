@@ -26,9 +26,9 @@ def measure(case: Path, report: Path | None, as_json: bool) -> None:
     Gaps are root mean square errors in tolerances: at 1 the simulator is off by as much as may be. Without --json a
     report is written too, to <case>-gap.html in the working directory unless --report names a file.
     """
-    from tools.errors import need
+    from tools.data.errors import need
+    from tools.data.runs.case import load_case
     from tools.gap.assess import assess
-    from tools.runs.case import load_case
 
     need("scipy", "jinja2")
     with progress("gap", 3) as advance:
@@ -77,12 +77,12 @@ def _print_table(found) -> None:
 @click.option("--out", required=True, type=click.Path(path_type=Path, dir_okay=False), help="Predicted run (CSV).")
 def predict(run: Path, model: str, out: Path) -> None:
     """Predict RUN (a run file beside its case.toml): its rows and columns, no gaps, window by window."""
-    from tools.errors import InputError
-    from tools.gap.model import load_model
-    from tools.gap.predict import as_run
-    from tools.gap.predict import predict as predict_runs
-    from tools.runs.case import load_case_of_run
-    from tools.runs.run import write_run
+    from tools.data.errors import InputError
+    from tools.data.runs.case import load_case_of_run
+    from tools.data.runs.run import write_run
+    from tools.inference.model import load_model
+    from tools.inference.predict import as_run
+    from tools.inference.predict import predict as predict_runs
 
     case, recorded = load_case_of_run(run)
     if out.exists() and run.exists() and out.samefile(run):
@@ -102,13 +102,13 @@ def predict(run: Path, model: str, out: Path) -> None:
 @json_option
 def diagnose(case: Path, out: Path, without: str | None, as_json: bool) -> None:
     """Where the simulator is wrong about CASE, which effect causes it, and how far the gap shrinks with it."""
-    from tools.errors import need
-    from tools.gap.diagnose import diagnose as run_diagnosis
-    from tools.gap.diagnose import plain, write
-    from tools.gap.rules import Rules
+    from tools.data.errors import need
+    from tools.data.runs.case import load_case
+    from tools.diagnose.diagnosis import diagnose as run_diagnosis
+    from tools.diagnose.diagnosis import plain, write
+    from tools.inference.rules import Rules
     from tools.report.diagnosis import write_report
     from tools.report.words import sentence
-    from tools.runs.case import load_case
 
     need("scipy", "jinja2")
     loaded = load_case(case)

@@ -26,9 +26,9 @@ def identify(case: Path, out: Path | None, seed: int, likelihood: str, as_json: 
     """
     # The kernels share out the work over the cores; threads of the linear algebra beside them would only wait.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from tools.errors import need
-    from tools.identify.run import identify as run_identification
-    from tools.runs.case import load_case
+    from tools.data.errors import need
+    from tools.data.runs.case import load_case
+    from tools.identify.pipeline import identify as run_identification
 
     need("scipy", "arviz", extra="identify")
     if out is not None:

@@ -19,8 +19,8 @@ def import_() -> None:
 @json_option
 def csv(files: tuple[Path, ...], mapping: str, out: Path | None, as_json: bool) -> None:
     """Turn CSV logs (.csv or .csv.gz), one a run, into a case, by a mapping file (docs/IMPORT.md)."""
-    from tools.importers.csvlog import import_csv
-    from tools.runs.run import run_name
+    from tools.data.importers.csvlog import import_csv
+    from tools.data.runs.run import run_name
 
     folder = files[0].parent / f"{run_name(files[0])}.case" if out is None else out
     imported = import_csv(list(files), mapping, folder)
@@ -44,8 +44,8 @@ def csv(files: tuple[Path, ...], mapping: str, out: Path | None, as_json: bool) 
 @json_option
 def qualisys(files, log, body, vehicle, out, as_json) -> None:
     """Turn 6DOF exports (TSV) of Qualisys into a case, aligned in time with the onboard logs of another case."""
-    from tools.errors import need
-    from tools.importers.captured import import_qualisys
+    from tools.data.errors import need
+    from tools.data.importers.captured import import_qualisys
 
     need("scipy")
     written, offsets = import_qualisys(list(files), log, body, vehicle, out)

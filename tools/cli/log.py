@@ -22,7 +22,7 @@ def _show(line: str) -> None:
 
 
 def _file(path: Path) -> Path:
-    from tools.errors import InputError
+    from tools.data.errors import InputError
 
     if path.is_dir():
         raise InputError("a folder, where a log was expected", source=path)
@@ -40,7 +40,7 @@ def _state(the_log: Any) -> str:
 
 def _parts(the_log: Any) -> list[str]:
     """A flight's files, one a line, with what is missing before each; none for a log of one file."""
-    from tools.log.parts import FlightLog
+    from tools.data.log.parts import FlightLog
 
     if not isinstance(the_log, FlightLog):
         return []
@@ -57,7 +57,7 @@ def _before(part: Any) -> str:
 def _headline(the_log: Any) -> str:
     """How it is with a log, in words."""
     from hal.recorder.logfile import PART
-    from tools.log.parts import FlightLog
+    from tools.data.log.parts import FlightLog
 
     if isinstance(the_log, FlightLog):
         return f"in {len(the_log.parts)} parts"
@@ -67,7 +67,7 @@ def _headline(the_log: Any) -> str:
 
 def _parts_summary(the_log: Any) -> dict[str, Any]:
     """What --json says of a flight's parts; nothing for a log of one file."""
-    from tools.log.parts import FlightLog
+    from tools.data.log.parts import FlightLog
 
     if not isinstance(the_log, FlightLog):
         return {}
@@ -112,7 +112,7 @@ def _summary(the_log: Any) -> dict[str, Any]:
 @json_option
 def info(file: Path, as_json: bool) -> None:
     """What is in a log, with the parts it goes on in: topics, counts, texts, events, and whether it is complete."""
-    from tools.log.parts import read_flight
+    from tools.data.log.parts import read_flight
 
     the_log = read_flight(_file(file))
     if as_json:
@@ -156,8 +156,8 @@ def export(source: Path, out: Path | None, vehicle: str | None, as_json: bool) -
 
 
 def _to_case(source: Path, out: Path | None, vehicle: str | None) -> dict[str, Any]:
-    from tools.log.parts import read_flight
-    from tools.log.rundata import export_case
+    from tools.data.log.parts import read_flight
+    from tools.data.log.rundata import export_case
 
     the_log = read_flight(source)
     folder = _case_beside(source) if out is None else out
@@ -179,8 +179,8 @@ def _case_beside(source: Path) -> Path:
 
 def _to_logs(source: Path, out: Path | None) -> list[Path]:
     """One log a run: --out names it, or for several runs the folder that takes them; else beside the run."""
-    from tools.log.rundata import write_log
-    from tools.runs.case import load_case, load_case_of_run
+    from tools.data.log.rundata import write_log
+    from tools.data.runs.case import load_case, load_case_of_run
 
     if source.is_dir():
         case = load_case(source)
@@ -204,7 +204,7 @@ def repair(file: Path, out: Path | None, as_json: bool) -> None:
 
     The originals stay.
     """
-    from tools.log.repair import repair as repair_log
+    from tools.data.log.repair import repair as repair_log
 
     report = repair_log(_file(file), out)
     lost = [vars(item) for item in report.damages]

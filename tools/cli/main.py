@@ -24,7 +24,7 @@ COMMANDS = {
     "tune": ("tools.cli.tune", "tune", "gains of the pitch and depth PID, by rule or by search"),
     "simulate": ("tools.cli.simulate", "simulate", "open-loop nominal flight from a file of commands"),
     "faults": ("tools.cli.faults", "faults", "fly the fault table: noticed after, reaction, how it ended"),
-    "benchmark": ("tools.cli.benchmark", "benchmark", "the speed figures, each as a ratio in one run"),
+    "benchmark": ("tools.measure.benchmark.command", "benchmark", "the speed figures, each as a ratio in one run"),
 }
 
 

@@ -21,8 +21,8 @@ def reproduce(figures, vehicle, seeds, noise, out, as_json) -> None:
 
     One picture a figure, FIGURE.png; one JSON object a figure with --json (a list where several are asked for).
     """
-    from tools.reproduce.run import reproduce_circle, reproduce_tracking
-    from tools.sources import load_vehicle
+    from tools.data.sources import load_vehicle
+    from tools.study.reproduce.figures import reproduce_circle, reproduce_tracking
 
     the_vehicle = load_vehicle(vehicle)
     out.mkdir(parents=True, exist_ok=True)
@@ -30,8 +30,8 @@ def reproduce(figures, vehicle, seeds, noise, out, as_json) -> None:
     for name in figures:
         say(f"{name} ...")
         if name == "fig4":
-            from tools.errors import need
-            from tools.reproduce.fig4 import reproduce_fig4
+            from tools.data.errors import need
+            from tools.study.reproduce.fig4 import reproduce_fig4
 
             need("arviz", "matplotlib", "scipy", extra="identify")
             result = reproduce_fig4(vehicle, the_vehicle, out)

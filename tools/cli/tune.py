@@ -9,7 +9,7 @@ from tools.cli.common import json_option, print_json, progress
 
 if TYPE_CHECKING:
     from firmware.control.gains import Control
-    from tools.tuning.rule import Row
+    from tools.study.tuning.rule import Row
 
 BUDGET = 180  # candidates a loop
 
@@ -27,7 +27,7 @@ def tune(vehicle: str, method: str, seed: int, budget: int, as_json: bool) -> No
     best under noise, with the rule's beside them; takes minutes. Both end with a [control] table to paste into a
     vehicle or mission file. The reference filters stay as the vehicle has them.
     """
-    from tools.errors import MissingExtra
+    from tools.data.errors import MissingExtra
 
     try:
         import scipy  # noqa: F401
@@ -35,9 +35,9 @@ def tune(vehicle: str, method: str, seed: int, budget: int, as_json: bool) -> No
         raise MissingExtra("scipy") from None
     from firmware.model.strict import decode
     from sim_backend.board import SimBoardFile
-    from tools.compose import load_board_file
-    from tools.sources import load_vehicle
-    from tools.tuning import rule, search
+    from tools.data.sources import load_vehicle
+    from tools.flight.compose import load_board_file
+    from tools.study.tuning import rule, search
 
     the_vehicle, file = load_vehicle(vehicle), load_board_file("sim")
     board = decode(file.text, SimBoardFile, file.source)

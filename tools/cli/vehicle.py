@@ -17,9 +17,9 @@ def vehicle() -> None:
 @click.option("--name", help="Of the vehicle.  [default: the file's]")
 def new(out: Path, name: str | None) -> None:
     """Ask for weighed masses and measured lengths, one by one, and write a first vehicle file OUT."""
-    from tools.errors import InputError
-    from tools.runs.csvfile import write_bytes
-    from tools.vehicles.first import QUESTIONS, first_vehicle
+    from tools.data.errors import InputError
+    from tools.data.first_vehicle import QUESTIONS, first_vehicle
+    from tools.data.runs.csvfile import write_bytes
 
     if out.exists():
         raise InputError("is there already: name another file", source=out)
@@ -39,8 +39,8 @@ def show(wanted: str, as_json: bool) -> None:
     """A vehicle at a glance: masses, actuators, coefficients and how sure they are."""
     import msgspec
 
-    from tools.gap.model import vehicle_model
-    from tools.sources import load_vehicle
+    from tools.data.sources import load_vehicle
+    from tools.inference.model import vehicle_model
 
     loaded = load_vehicle(wanted)
     if as_json:

@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from tools.errors import InputError
+from tools.data.errors import InputError
+from tools.data.runs.case import Case
 from tools.gap.measure import RunGap, case_channels, root_mean_square, run_gap
-from tools.gap.model import Model, nominal_model
-from tools.gap.predict import Flown, Variant, fly, prepare
 from tools.gap.where import Share, where
-from tools.runs.case import Case
+from tools.inference.model import Model, nominal_model
+from tools.inference.predict import Flown, Variant, fly, prepare
 
 
 @dataclass

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tools.gap.channels import channels_of
-from tools.gap.predict import Flown
-from tools.runs.run import Run
+from tools.data.runs.run import Run
+from tools.inference.channels import channels_of
+from tools.inference.predict import Flown
 
 
 @dataclass

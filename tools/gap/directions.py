@@ -9,14 +9,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from firmware.core import estimator_layout as est
-from firmware.core import layout as at
-from tools.gap.channels import measured_column
-from tools.gap.core import flights as ex
-from tools.gap.predict import Flown, Inputs, Variant
-from tools.gap.start import drawn_position
-from tools.runs import columns as names
-from tools.runs.run import Run
+from firmware.core.estimation import estimator_layout as est
+from firmware.core.vehicle import layout as at
+from tools.data.runs import columns as names
+from tools.data.runs.run import Run
+from tools.inference.channels import measured_column
+from tools.inference.core import flights as ex
+from tools.inference.predict import Flown, Inputs, Variant
+from tools.inference.start import drawn_position
 
 _ATT, _YAW, _DEPTH, _XY = (0, 1, 2), (est.Z_YAW,), (est.Z_DEPTH,), (ex.Y_X, ex.Y_Y)
 SMOOTHED = 5  # samples of a draw-wire whose median is taken

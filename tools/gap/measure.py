@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tools.gap.channels import CHANNELS, Channel, channels_of, measured
-from tools.gap.windows import Window
-from tools.runs.run import Run
+from tools.data.runs.run import Run
+from tools.inference.channels import CHANNELS, Channel, channels_of, measured
+from tools.inference.windows import Window
 
 
 @dataclass

@@ -18,14 +18,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from firmware.core.estimator_layout import E_ACT, E_NU
-from firmware.core.layout import X_ACT, X_NU
+from firmware.core.estimation.estimator_layout import E_ACT, E_NU
+from firmware.core.vehicle.layout import X_ACT, X_NU
+from tools.data.runs.case import Case
 from tools.gap.cells import Cells, cells_of
-from tools.gap.channels import measured
 from tools.gap.directions import DIRECTIONS, Direction, Scene
-from tools.gap.model import Model
-from tools.gap.predict import Flown, Inputs, Variant, fly
-from tools.runs.case import Case
+from tools.inference.channels import measured
+from tools.inference.model import Model
+from tools.inference.predict import Flown, Inputs, Variant, fly
 
 EFFECTIVE = 4.0  # independent samples a window and channel: 18 s of residuals that hang together for some 4 s
 CLAIM = 5.0  # nat of evidence that a part has to bring

@@ -13,18 +13,18 @@ from typing import Any
 
 import numpy as np
 
-from firmware.core import layout
-from firmware.core.rotations import quaternion_from_euler
+from firmware.core.maths.rotations import quaternion_from_euler
+from firmware.core.vehicle import layout
 from firmware.estimation.settings import parameter_sigma
 from firmware.model.vehicle import COEFFICIENTS, SensorTable, Vehicle
 from sim_backend.core import effect_layout as ef
 from sim_backend.core import layout as at
 from sim_backend.core.open_loop import fly_open_loop_many
+from tools.data.runs import columns as names
+from tools.data.runs.case import SensorsPart, write_case
+from tools.data.runs.run import Run
 from tools.gap.measure import wrap
 from tools.identify.parameters import coefficient_sizes
-from tools.runs import columns as names
-from tools.runs.case import SensorsPart, write_case
-from tools.runs.run import Run
 
 BALLAST, SLIDER, SERVO = (1.0, 0.6, 0.2), (1.0, 0.5, 0.1), (1.0, 0.8, 0.6, 0.4, 0.2)
 LARGEST = (0.9, 0.75, 1.0)  # of the ranges of servo, slider and ballast: with all of the slider it would stand on end

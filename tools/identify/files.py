@@ -10,17 +10,17 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from firmware.core import layout
 from firmware.core.jit import kernels_digest
+from firmware.core.vehicle import layout
 from firmware.model.vehicle import COEFFICIENTS, PLACES, Vehicle, decode_vehicle
 from sim_backend.effects.base import catalogue
-from tools.gap.corrected import corrected_text
-from tools.gap.model import nominal_model
+from tools.data.runs.case import CASE_FILE
+from tools.data.runs.csvfile import write_bytes
+from tools.data.tomltext import toml_text
 from tools.identify.levels import DISTURBANCE
-from tools.identify.run import Identified
-from tools.runs.case import CASE_FILE
-from tools.runs.csvfile import write_bytes
-from tools.tomltext import toml_text
+from tools.identify.pipeline import Identified
+from tools.inference.corrected import corrected_text
+from tools.inference.model import nominal_model
 
 VEHICLE, CORRECTED, POSTERIOR, RESULT = "identified.toml", "corrected.toml", "posterior.nc", "identified.json"
 WIRES = ("ballast_scale", "slider_scale")  # effects, of what the draw-wires say

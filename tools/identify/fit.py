@@ -6,16 +6,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim_backend.core import effect_layout as ef
-from tools.gap.model import Model
-from tools.gap.problem import Problem, pose
+from tools.data.runs.case import Case
+from tools.data.runs.run import Run
 from tools.identify import levels as noise
-from tools.identify.flights import Flights, Linear
+from tools.identify.flight_likelihood import Flights, Linear
 from tools.identify.parameters import Parameters, parameters
 from tools.identify.predict import flown_gap
 from tools.identify.screen import LeftOut
 from tools.identify.statistics import Quadratic, collect, heat
-from tools.runs.case import Case
-from tools.runs.run import Run
+from tools.inference.model import Model
+from tools.inference.problem import Problem, pose
 
 LEVELS = 0.0  # in a schedule: the noise's levels are estimated
 # The filter is told of so many times the disturbance, one step at each: less and less as the model comes closer.

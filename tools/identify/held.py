@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from sim_backend.core import effect_layout as ef
+from tools.data.runs.case import Case
+from tools.data.runs.run import Run
 from tools.gap.measure import RunGap, case_channels, root_mean_square
-from tools.gap.model import Model
 from tools.identify.fit import Fit, fit
 from tools.identify.predict import model_of, predicted
-from tools.runs.case import Case
-from tools.runs.run import Run
+from tools.inference.model import Model
 
 MOST = 12  # runs that are predicted; of a longer case evenly chosen ones
 FEW = 3  # runs, up to which each is left out of a fit of its own

@@ -10,11 +10,11 @@ from math import inf
 
 import numpy as np
 
-from firmware.core import layout
+from firmware.core.vehicle import layout
 from firmware.model.vehicle import COEFFICIENTS
 from sim_backend.core import effect_layout as ef
-from tools.gap.candidates import Free
-from tools.gap.problem import Problem
+from tools.inference.candidates import Free
+from tools.inference.problem import Problem
 
 # 1 sigma before any flight. [uncertainty] says what is left after one: these are what a first vehicle file may be off.
 K_SHARE = 0.5  # of a coefficient's size

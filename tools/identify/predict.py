@@ -3,12 +3,12 @@
 import numpy as np
 
 from sim_backend.core import effect_layout as ef
+from tools.data.runs.case import Case
+from tools.data.runs.run import Run
 from tools.gap.measure import RunGap, root_mean_square, run_gap
-from tools.gap.model import Model
-from tools.gap.problem import cut, estimated, fly_on, pose
 from tools.identify.parameters import Parameters
-from tools.runs.case import Case
-from tools.runs.run import Run
+from tools.inference.model import Model
+from tools.inference.problem import cut, estimated, fly_on, pose
 
 
 def predicted(case: Case, model: Model, run: Run, P: np.ndarray, F: np.ndarray) -> tuple[RunGap, np.ndarray]:

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tools.runs import columns as names
-from tools.runs.run import Run
+from tools.data.runs import columns as names
+from tools.data.runs.run import Run
 
 LARGEST_ROLL_PITCH, LARGEST_YAW = 1.65, 60.0  # rad: beyond, an angle is in degrees (yaw may be continuous: ten turns)
 FASTEST = 5.0  # m/s through the capture's volume: beyond, it counts in millimetres

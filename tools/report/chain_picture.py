@@ -3,7 +3,7 @@
 from html import escape
 from typing import Any
 
-from tools.gap.chain import STAGES, stage_of
+from tools.diagnose.chain import STAGES, stage_of
 
 WIDTH = 360
 BOX, GAP, TOP, TALL, LINE = 62.0, 12.5, 8, 48, 27

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 
 from sim_backend.effects.base import catalogue
-from tools.gap import doubt
-from tools.gap import verdict as rules
-from tools.gap.chain import Link, by_effects, calm, links, ordered, scatter, shared_out
-from tools.gap.channels import CHANNELS, channels_of, measured
-from tools.gap.diagnose import CORRECTION_FILE, Diagnosis, parameters, places
-from tools.gap.probes import CLOCK, UNPREDICTABLE
-from tools.gap.shrink import AFTER, BEFORE, FLOOR, RECALIBRATED
-from tools.gap.verdict import drop
-from tools.gap.windows import windows
+from tools.diagnose import doubt
+from tools.diagnose import verdict as rules
+from tools.diagnose.chain import Link, by_effects, calm, links, ordered, scatter, shared_out
+from tools.diagnose.diagnosis import CORRECTION_FILE, Diagnosis, parameters, places
+from tools.diagnose.probes import CLOCK, UNPREDICTABLE
+from tools.diagnose.shrink import AFTER, BEFORE, FLOOR, RECALIBRATED
+from tools.diagnose.verdict import drop
+from tools.inference.channels import CHANNELS, channels_of, measured
+from tools.inference.windows import windows
 from tools.report import words
 from tools.report.chain_picture import chain_svg
 from tools.report.charts import Chart, Line, svg

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from tools.gap.assess import CaseGap
-from tools.gap.channels import CHANNELS, Channel, channels_of, measured
+from tools.inference.channels import CHANNELS, Channel, channels_of, measured
 from tools.report.charts import Chart, Line, svg
 from tools.report.lines import bands, broken, near, unwrapped
 from tools.report.page import render

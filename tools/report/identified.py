@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from firmware.model.vehicle import COEFFICIENTS
-from tools.gap.channels import measured
-from tools.gap.windows import windows
 from tools.identify.levels import SENSORS, group_of_reading
-from tools.identify.run import Identified
+from tools.identify.pipeline import Identified
 from tools.identify.telling import blind, sentences
+from tools.inference.channels import measured
+from tools.inference.windows import windows
 from tools.report.charts import Chart, Line, svg
 from tools.report.lines import broken, near, unwrapped
 from tools.report.page import render

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tools.gap.windows import START, Window
+from tools.inference.windows import START, Window
 from tools.report.charts import Band, Line
 
 

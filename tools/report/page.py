@@ -3,7 +3,7 @@
 from importlib.resources import files
 from typing import Any
 
-from tools.errors import MissingExtra
+from tools.data.errors import MissingExtra
 
 
 def render(template: str, context: dict[str, Any]) -> str:

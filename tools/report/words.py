@@ -4,12 +4,12 @@ import math
 from typing import Any
 
 from sim_backend.effects.base import catalogue
-from tools.gap.diagnose import Diagnosis, places
-from tools.gap.doubt import UNCLEAN
-from tools.gap.probes import TURBULENCE, UNPREDICTABLE
-from tools.gap.residuals import Finding
-from tools.gap.shrink import Shrinkage
-from tools.gap.verdict import SHAPES, strongest_left
+from tools.diagnose.diagnosis import Diagnosis, places
+from tools.diagnose.doubt import UNCLEAN
+from tools.diagnose.probes import TURBULENCE, UNPREDICTABLE
+from tools.diagnose.residuals import Finding
+from tools.diagnose.shrink import Shrinkage
+from tools.diagnose.verdict import SHAPES, strongest_left
 
 MINUS, DASH = "\N{MINUS SIGN}", "\N{EN DASH}"
 PLAIN = {

@@ -8,9 +8,9 @@ import pytest
 
 from firmware.supervisor.settings import Limits
 from hal.ports import BoardError, Validity
-from tools import arming
-from tools.arming import Arming, Check, arm, refuse
-from tools.compose import build_flight
+from tools.flight import arming
+from tools.flight.arming import Arming, Check, arm, refuse
+from tools.flight.compose import build_flight
 
 
 @pytest.fixture

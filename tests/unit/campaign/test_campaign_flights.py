@@ -6,10 +6,12 @@ import msgspec
 import numpy as np
 import pytest
 
-from firmware.core import control_layout as ctl
+from firmware.core.control import control_layout as ctl
 from sim_backend.core.closed_loop import TRACE
 from sim_backend.fleet import fly_fleet
-from tools.campaign.flights import (
+from tools.data.errors import InputError
+from tools.study.campaign.conduct import fly_campaign
+from tools.study.campaign.flights import (
     COLUMNS,
     PAST_LIMITS,
     STILL_FLYING,
@@ -23,10 +25,8 @@ from tools.campaign.flights import (
     fly_chunk,
     trace_every,
 )
-from tools.campaign.plan import fingerprint
-from tools.campaign.run import fly_campaign
-from tools.campaign.worlds import draw_world
-from tools.errors import InputError
+from tools.study.campaign.plan import fingerprint
+from tools.study.campaign.worlds import draw_world
 
 
 def test_chunks_cover_every_flight_once(plan_of):

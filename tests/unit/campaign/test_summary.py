@@ -5,10 +5,10 @@ import csv
 import numpy as np
 import pytest
 
-from tools.campaign.flights import COLUMNS, ENDINGS
-from tools.campaign.picture import page
-from tools.campaign.run import Flown, write_flights
-from tools.campaign.summary import completed_by_all, summarise, wilson
+from tools.study.campaign.conduct import Flown, write_flights
+from tools.study.campaign.flights import COLUMNS, ENDINGS
+from tools.study.campaign.picture import page
+from tools.study.campaign.summary import completed_by_all, summarise, wilson
 
 LEG_TIME = next(code for code, text in ENDINGS.items() if text == "leg over its time limit")
 

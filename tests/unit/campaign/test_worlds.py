@@ -8,8 +8,8 @@ import pytest
 
 from sim_backend.core import layout as at
 from sim_backend.core.effect_layout import DRAG_0
-from tools.campaign.plan import fingerprint
-from tools.campaign.worlds import draw_world
+from tools.study.campaign.plan import fingerprint
+from tools.study.campaign.worlds import draw_world
 
 
 def arrays(world):

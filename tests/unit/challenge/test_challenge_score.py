@@ -5,9 +5,9 @@ import math
 
 import pytest
 
-from tools.challenge.diagnosis import Cause, Diagnosis, Where, read_diagnosis
-from tools.challenge.score import Scored, by_label, score, wilson
-from tools.errors import InputError
+from tools.data.errors import InputError
+from tools.study.challenge.diagnosis import Cause, Diagnosis, Where, read_diagnosis
+from tools.study.challenge.score import Scored, by_label, score, wilson
 
 SURGE, NET = ["hydrodynamics", "surge"], ["mass", "net"]
 

@@ -5,9 +5,9 @@ import zipfile
 
 import pytest
 
-from tools.challenge.judge import open_sealed
-from tools.challenge.seal import MANIFEST, open_answers, seal, write_manifest
-from tools.errors import InputError
+from tools.data.errors import InputError
+from tools.study.challenge.judge import open_sealed
+from tools.study.challenge.seal import MANIFEST, open_answers, seal, write_manifest
 
 ANSWER = {"labels": ["drag"], "places": [[["hydrodynamics", "surge"]]], "before": [], "oracle": [], "runs": 6}
 

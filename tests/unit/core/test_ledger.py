@@ -21,14 +21,14 @@ from model_states import (
     velocities,
 )
 
-from firmware.core import layout
-from firmware.core.control import reference_step
-from firmware.core.input_forms import exact_form, paper_form, roll_form
+from firmware.core.control.control import reference_step
+from firmware.core.control.input_forms import exact_form, paper_form, roll_form
+from firmware.core.control.law import axis_demand
 from firmware.core.jit import PACKAGES_DIR
-from firmware.core.law import axis_demand
-from firmware.core.mass import first_moment, inertia
-from firmware.core.rotations import euler_rates, rotation_nb, rotation_nb_euler
-from firmware.core.water import water_wrench
+from firmware.core.maths.rotations import euler_rates, rotation_nb, rotation_nb_euler
+from firmware.core.vehicle import layout
+from firmware.core.vehicle.mass import first_moment, inertia
+from firmware.core.vehicle.water import water_wrench
 from firmware.model.vehicle import decode_vehicle
 
 LEDGER = PACKAGES_DIR / "docs" / "LEDGER.md"

@@ -22,10 +22,10 @@ from model_states import (
     velocities,
 )
 
-from firmware.core import layout
-from firmware.core.mass import first_moment, first_moment_rate, inertia, translational_mass
-from firmware.core.motion import solve_mass_matrix
-from firmware.core.water import flow_angles, flow_to_body, water_wrench
+from firmware.core.vehicle import layout
+from firmware.core.vehicle.mass import first_moment, first_moment_rate, inertia, translational_mass
+from firmware.core.vehicle.motion import solve_mass_matrix
+from firmware.core.vehicle.water import flow_angles, flow_to_body, water_wrench
 
 GLIDER = Glider.from_file(VEHICLE)
 forces = st.tuples(*[st.floats(-10.0, 10.0)] * 6)

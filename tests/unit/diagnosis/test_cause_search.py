@@ -7,8 +7,8 @@ import pytest
 from support.cases import make_case
 
 from sim_backend.core import effect_layout as ef
-from tools.gap.problem import pose
-from tools.gap.search import FAR, prune, run
+from tools.diagnose.search import FAR, prune, run
+from tools.inference.problem import pose
 
 
 def candidate(name, misfit, gained):

@@ -7,10 +7,10 @@ import pytest
 from support.cases import make_case
 
 from sim_backend.core import effect_layout as ef
-from tools.gap.cautions import cautions, not_asked
-from tools.gap.problem import pose
-from tools.runs import columns as names
-from tools.runs.case import Case
+from tools.data.runs import columns as names
+from tools.data.runs.case import Case
+from tools.diagnose.cautions import cautions, not_asked
+from tools.inference.problem import pose
 
 
 @pytest.fixture(scope="module")

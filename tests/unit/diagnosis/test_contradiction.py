@@ -5,11 +5,11 @@ import pytest
 from support.cases import make_case
 
 from sim_backend.core import effect_layout as ef
-from tools.gap.candidates import allowed, candidates, place
-from tools.gap.contradiction import NEAR, contradicting, heat
-from tools.gap.problem import pose
-from tools.gap.retime import moved, retimed
-from tools.gap.search import ROUGHNESS
+from tools.diagnose.contradiction import NEAR, contradicting, heat
+from tools.diagnose.retime import moved, retimed
+from tools.diagnose.search import ROUGHNESS
+from tools.inference.candidates import allowed, candidates, place
+from tools.inference.problem import pose
 
 
 def with_effect(folder, entry, value, **about):

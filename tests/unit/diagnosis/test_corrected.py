@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from firmware.core import layout
+from firmware.core.vehicle import layout
 from firmware.model.strict import ConfigError
 from sim_backend.core import effect_layout as ef
-from tools.gap.corrected import LINKS, corrected_text, load_corrected
-from tools.gap.model import Model
-from tools.sources import load_vehicle
+from tools.data.sources import load_vehicle
+from tools.inference.corrected import LINKS, corrected_text, load_corrected
+from tools.inference.model import Model
 
 
 @pytest.fixture

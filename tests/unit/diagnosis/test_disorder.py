@@ -4,10 +4,10 @@ import numpy as np
 from support.cases import make_case
 
 from sim_backend.core import effect_layout as ef
-from tools.gap.probes import CLOCK, TURBULENCE
-from tools.gap.problem import pose
-from tools.gap.search import run
-from tools.gap.verdict import conclude
+from tools.diagnose.probes import CLOCK, TURBULENCE
+from tools.diagnose.search import run
+from tools.diagnose.verdict import conclude
+from tools.inference.problem import pose
 
 
 def test_rough_water_is_turbulence_however_rough(tmp_path):

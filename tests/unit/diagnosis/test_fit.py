@@ -6,9 +6,9 @@ from scipy.optimize import lsq_linear
 from support.cases import make_case
 
 from sim_backend.core import effect_layout as ef
-from tools.gap.candidates import allowed, candidates, place
-from tools.gap.fit import Fitter, within
-from tools.gap.problem import pose
+from tools.inference.candidates import allowed, candidates, place
+from tools.inference.fit import Fitter, within
+from tools.inference.problem import pose
 
 
 def test_steps_within_limits_are_those_of_bounded_least_squares():

@@ -5,9 +5,9 @@ import pytest
 from support.cases import begins, drawn, make_case
 
 from sim_backend.core import effect_layout as ef
-from tools.gap.core.passage import N_ERR, correct, difference, mean_input
-from tools.gap.problem import pose
-from tools.gap.residuals import tests as residual_tests
+from tools.diagnose.residuals import tests as residual_tests
+from tools.inference.core.passage import N_ERR, correct, difference, mean_input
+from tools.inference.problem import pose
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tools.gap.residuals import Finding, chi, goes_with, lagged, peak, worst
+from tools.diagnose.residuals import Finding, chi, goes_with, lagged, peak, worst
 
 BOUNDS = np.array([0, 700, 1500, 2100])
 

@@ -12,7 +12,7 @@ from hal.ports import SLOTS, Condition, Validity, empty_frame
 from hal.protocols import maestro, modbus
 from hal.protocols.registers import preset, to_registers
 from hal.transport.modbus_bus import Failure
-from tools.faults.wire import Line
+from tools.study.faults.wire import Line
 
 
 def sensor() -> Sensor:

@@ -6,7 +6,7 @@ from scipy.stats import chi2
 from support.estimating import Filter, state_error
 from support.flights import World, fly
 
-from firmware.core import estimator_layout as at
+from firmware.core.estimation import estimator_layout as at
 
 # Depth, attitude and nu; position north and east is dead reckoning, actuators are known but for their noise.
 KEPT = [2, *range(at.E_ATT, at.E_ACT)]
@@ -57,8 +57,8 @@ def test_with_uncertain_parameters_it_is_not_too_sure():
 def test_the_launch_is_found_whether_at_rest_or_gliding(speed):
     from support.flights import fly_case
 
-    from tools.gap.model import nominal_model
-    from tools.gap.predict import prepare
+    from tools.inference.model import nominal_model
+    from tools.inference.predict import prepare
 
     errors = []
     for seed in range(6):

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from support.estimating import Filter, state_error
 
-from firmware.core import estimator_layout as at
-from firmware.core.estimator import estimator_step
-from firmware.core.flight import nominal_run
-from firmware.core.layout import N_X
-from firmware.core.linearise import linearise
+from firmware.core.estimation import estimator_layout as at
+from firmware.core.estimation.estimator import estimator_step
+from firmware.core.vehicle.flight import nominal_run
+from firmware.core.vehicle.layout import N_X
+from firmware.core.vehicle.linearise import linearise
 
 HERE = dict(roll=0.0, pitch=-0.2, yaw=0.5, p=0.0, q=0.0, r=0.0, depth=2.0, slider=0.0, ballast=0.0)
 
@@ -101,7 +101,7 @@ def settle(filtered: Filter, seconds: float = 5.0) -> None:
 
 
 def readings(filtered: Filter) -> dict[str, float]:
-    from firmware.core.rotations import euler_from_quaternion
+    from firmware.core.maths.rotations import euler_from_quaternion
 
     angles = euler_from_quaternion(*filtered.x[3:7])
     values = (*angles, *filtered.x[10:13], filtered.x[2], filtered.x[14], filtered.x[15])

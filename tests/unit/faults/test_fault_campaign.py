@@ -6,10 +6,10 @@ import pytest
 from click.testing import CliRunner
 
 from firmware.supervisor.table import FAULTS
-from tools.faults import campaign
-from tools.faults.campaign import Outcome, everything, jobs, run, summary
-from tools.faults.cases import Case, Show
-from tools.faults.scene import PHASES
+from tools.study.faults import campaign
+from tools.study.faults.campaign import Outcome, everything, jobs, run, summary
+from tools.study.faults.cases import Case, Show
+from tools.study.faults.scene import PHASES
 
 # One quick case for each row that is flown; the whole campaign is `glider faults`.
 QUICK = {1: "imu silent", 2: "beacon off", 4: "plunger_wire off", 6: "imu backwards", 10: "imu garbage", 15: "past",
@@ -78,8 +78,8 @@ def test_a_vehicle_that_stays_below_is_called_lost():
     from pathlib import Path
     from tempfile import TemporaryDirectory
 
-    from tools.faults.flights import pump_fails_in_abort
-    from tools.faults.scene import Setting, build_scene, fly
+    from tools.study.faults.flights import pump_fails_in_abort
+    from tools.study.faults.scene import Setting, build_scene, fly
 
     with TemporaryDirectory() as folder:
         scene = build_scene("descent", pump_fails_in_abort("stuck"), Setting(), 1, Path(folder, "m.toml"))

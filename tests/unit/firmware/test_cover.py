@@ -13,10 +13,10 @@ from model_states import state
 
 from firmware.control.cover import Cover, glides, k2_asked, k2_cover
 from firmware.control.gains import Control, Law, LawGains
-from firmware.core import layout
+from firmware.core.vehicle import layout
 from firmware.estimation.settings import parameter_sigma
 from firmware.model.vehicle import UncertaintyTable
-from tools.sources import load_vehicle
+from tools.data.sources import load_vehicle
 
 VEHICLE = load_vehicle("roughie")
 EPS = (0.1, 0.1)

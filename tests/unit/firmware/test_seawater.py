@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from firmware.core.seawater import water_density
+from firmware.core.vehicle.seawater import water_density
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,8 @@ from support.flights import World, fly_case
 
 from tools.cli.common import report_errors
 from tools.cli.main import cli
-from tools.runs.case import write_case
-from tools.runs.run import load_run
+from tools.data.runs.case import write_case
+from tools.data.runs.run import load_run
 
 
 @pytest.fixture(scope="module")

@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
+from tools.data.runs.run import Run
 from tools.gap.measure import run_gap
-from tools.gap.predict import as_run
-from tools.gap.windows import windows
-from tools.runs.run import Run
+from tools.inference.predict import as_run
+from tools.inference.windows import windows
 
 TOLERANCE = {"depth_m": 0.05, "pitch_rad": math.radians(1.5), "roll_rad": math.radians(1.5), "yaw_rad": math.radians(4)}
 

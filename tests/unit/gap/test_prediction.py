@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from support.flights import World, case_of, fly, fly_case
 
-from firmware.core import estimator_layout as est
-from firmware.core import layout
+from firmware.core.estimation import estimator_layout as est
+from firmware.core.vehicle import layout
+from tools.data.runs.run import Run
 from tools.gap.measure import root_mean_square, run_gap
-from tools.gap.model import load_model, nominal_model
-from tools.gap.predict import Variant, predict, prepare
-from tools.gap.predict import fly as fly_variants
-from tools.gap.windows import windows
-from tools.runs.run import Run
+from tools.inference.model import load_model, nominal_model
+from tools.inference.predict import Variant, predict, prepare
+from tools.inference.predict import fly as fly_variants
+from tools.inference.windows import windows
 
 
 def total(case, predictions=None) -> float:

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
+from tools.data.runs.case import load_case
 from tools.gap.assess import assess
-from tools.runs.case import load_case
 
 
 def no_gap_cases(shared) -> list[str]:

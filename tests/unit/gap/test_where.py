@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support.flights import World, fly_case
 
-from firmware.core import layout
+from firmware.core.vehicle import layout
 from tools.gap.assess import assess
 from tools.gap.where import ALLOWED, evidence
 

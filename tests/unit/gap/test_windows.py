@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tools.gap.windows import windows
+from tools.inference.windows import windows
 
 
 def rows(count: int, rate: float = 10.0, begin: float = 0.0) -> list[tuple[int, int, int, bool]]:

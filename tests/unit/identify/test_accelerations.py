@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from firmware.model.vehicle import COEFFICIENTS
-from tools.errors import InputError
-from tools.gap.model import Model
-from tools.identify.accelerations import bandwidth, fit_accelerations, kinematics
+from tools.data.errors import InputError
+from tools.data.runs.run import Run
+from tools.data.sources import load_vehicle
+from tools.identify.acceleration_likelihood import bandwidth, fit_accelerations, kinematics
 from tools.identify.design import make_runs
 from tools.identify.parameters import coefficient_sizes
-from tools.runs.run import Run
-from tools.sources import load_vehicle
+from tools.inference.model import Model
 
 
 def errors(seed: int, square: bool) -> np.ndarray:

@@ -4,12 +4,12 @@ import msgspec
 import numpy as np
 import pytest
 
-from firmware.core import layout
+from firmware.core.vehicle import layout
 from firmware.model.strict import ConfigError
 from firmware.model.vehicle import decode_vehicle
-from tools.gap.model import vehicle_model
-from tools.sources import load_vehicle
-from tools.tomltext import toml_text
+from tools.data.sources import load_vehicle
+from tools.data.tomltext import toml_text
+from tools.inference.model import vehicle_model
 
 NAMES = ["K_D0", "K_L", "added_mass_z", "cg_x"]
 

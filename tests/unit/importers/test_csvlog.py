@@ -11,10 +11,10 @@ from click.testing import CliRunner
 
 from firmware.model.strict import ConfigError
 from tools.cli.import_ import import_
-from tools.errors import InputError
-from tools.importers.csvlog import import_csv
-from tools.importers.mapping import UNITS, decode_map, load_map
-from tools.runs.case import load_case
+from tools.data.errors import InputError
+from tools.data.importers.csvlog import import_csv
+from tools.data.importers.mapping import UNITS, decode_map, load_map
+from tools.data.runs.case import load_case
 
 MAP = """\
 format = 1

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tools.errors import InputError
-from tools.importers.align import aligned, find_offset
-from tools.importers.captured import import_qualisys
-from tools.importers.qualisys import read_capture
-from tools.runs import columns as names
-from tools.runs.case import load_case, write_case
-from tools.runs.run import Run
+from tools.data.errors import InputError
+from tools.data.importers.align import aligned, find_offset
+from tools.data.importers.captured import import_qualisys
+from tools.data.importers.qualisys import read_capture
+from tools.data.runs import columns as names
+from tools.data.runs.case import load_case, write_case
+from tools.data.runs.run import Run
 
 RATE = 50.0
 UP = np.diag([1.0, -1.0, -1.0])

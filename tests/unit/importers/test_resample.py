@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tools.importers.resample import bins_of, body_rates, fill_gaps, means, wrapped
+from tools.data.importers.resample import bins_of, body_rates, fill_gaps, means, wrapped
 
 
 def test_a_row_is_the_mean_of_what_lies_within_half_a_period_of_it():

@@ -11,9 +11,9 @@ from mcap.writer import CompressionType, Writer
 
 from hal.recorder import logfile
 from tools.cli.log import log as log_command
-from tools.errors import InputError
-from tools.log.reader import read_log
-from tools.log.rundata import export_case
+from tools.data.errors import InputError
+from tools.data.log.reader import read_log
+from tools.data.log.rundata import export_case
 
 NUMBER = st.integers(0, 2**64 - 1) | st.sampled_from([0, 1, 2**63 - 1, 2**63, 2**64 - 1])
 TEXT = st.text(max_size=40) | st.sampled_from(

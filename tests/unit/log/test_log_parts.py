@@ -12,12 +12,12 @@ from log_files import METADATA, TICK, TRUTH, VEHICLE, write_small_log
 from hal.recorder.recorder import Recorder
 from hal.recorder.schema import INFO
 from tools.cli.log import log as log_command
-from tools.errors import InputError
-from tools.log.parts import FlightLog, read_flight
-from tools.log.reader import read_log
-from tools.log.repair import repair
-from tools.log.rundata import run_of
-from tools.runs.case import load_case
+from tools.data.errors import InputError
+from tools.data.log.parts import FlightLog, read_flight
+from tools.data.log.reader import read_log
+from tools.data.log.repair import repair
+from tools.data.log.rundata import run_of
+from tools.data.runs.case import load_case
 
 BETWEEN = 13  # ticks that a recording process takes with it when it dies
 

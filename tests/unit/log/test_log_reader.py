@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.writer import CompressionType, Writer
 
-from tools.errors import InputError
-from tools.log.reader import read_log
-from tools.log.repair import repair
+from tools.data.errors import InputError
+from tools.data.log.reader import read_log
+from tools.data.log.repair import repair
 
 
 @pytest.fixture(scope="session")

@@ -14,13 +14,13 @@ from log_files import METADATA, TICK, VEHICLE, tick_rows, write_small_log
 
 from firmware.model.strict import ConfigError
 from tools.cli.log import log as command
-from tools.errors import InputError
-from tools.log.reader import read_log
-from tools.log.rundata import export_case, run_of, write_log
-from tools.runs import columns as names
-from tools.runs.case import SensorsPart, load_case, write_case
-from tools.runs.run import Run
-from tools.sources import load_vehicle
+from tools.data.errors import InputError
+from tools.data.log.reader import read_log
+from tools.data.log.rundata import export_case, run_of, write_log
+from tools.data.runs import columns as names
+from tools.data.runs.case import SensorsPart, load_case, write_case
+from tools.data.runs.run import Run
+from tools.data.sources import load_vehicle
 
 FACTS = {"vehicle": "roughie", "site": "pool", "log_rate_hz": 10.0, "water_density_kg_m3": 998.0}
 

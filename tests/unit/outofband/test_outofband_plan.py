@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from hal.board import BoardRequest, board_builder
 from hal.outofband.make import make_plan
 from hal.outofband.plan import PlanError, read_plan, write_plan
-from tools.compose import load_board_file
-from tools.sources import load_vehicle
+from tools.data.sources import load_vehicle
+from tools.flight.compose import load_board_file
 
 
 @pytest.fixture(scope="module")

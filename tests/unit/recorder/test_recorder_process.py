@@ -16,7 +16,7 @@ from mcap_ros2.decoder import DecoderFactory
 from hal.recorder.condition import Level
 from hal.recorder.recorder import NullRecorder, Recorder
 from hal.recorder.schema import ERROR, INFO, Field, RecordSpec
-from tools.log.reader import read_log
+from tools.data.log.reader import read_log
 
 TICK = RecordSpec(
     "/tick",

@@ -6,8 +6,8 @@ from xml.etree import ElementTree
 import pytest
 
 from sim_backend.effects.base import catalogue
-from tools.gap.chain import LEAST, STAGES, Link, ordered, shared_out, stage_of
-from tools.gap.probes import Probe, Probed
+from tools.diagnose.chain import LEAST, STAGES, Link, ordered, shared_out, stage_of
+from tools.diagnose.probes import Probe, Probed
 from tools.report.chain_picture import chain_svg
 
 BALLAST = {"subsystem": "actuation", "element": "ballast", "probability": 0.9}

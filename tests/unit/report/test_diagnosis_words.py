@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from sim_backend.effects.base import catalogue
-from tools.gap.diagnose import Diagnosis
-from tools.gap.probes import CLOCK, TURBULENCE, Probe, Probed
-from tools.gap.residuals import CHANNELS, Finding
+from tools.diagnose.diagnosis import Diagnosis
+from tools.diagnose.probes import CLOCK, TURBULENCE, Probe, Probed
+from tools.diagnose.residuals import CHANNELS, Finding
 from tools.report import words
 
 FAR = {"before": 4.0, "recalibrated": 3.0, "after": 0.5, "floor": 0.4, "shrinkage": 0.875, "ci90": (0.81, 0.93)}

@@ -63,7 +63,7 @@ def test_a_long_case_shows_its_worst_runs(found, monkeypatch):
 def test_without_jinja2_it_says_what_to_install(found, monkeypatch):
     import sys
 
-    from tools.errors import MissingExtra
+    from tools.data.errors import MissingExtra
 
     monkeypatch.setitem(sys.modules, "jinja2", None)
     with pytest.raises(MissingExtra, match="jinja2"):

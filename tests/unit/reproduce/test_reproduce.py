@@ -9,9 +9,9 @@ import pytest
 
 from firmware.control.gains import Control
 from sim_backend.core.closed_loop import TRACE
-from tools.reproduce import circle, tracking
-from tools.reproduce.design import LAST, Batch, Variant, fly_design, mission_of
-from tools.sources import load_vehicle
+from tools.data.sources import load_vehicle
+from tools.study.reproduce import circle, tracking
+from tools.study.reproduce.design import LAST, Batch, Variant, fly_design, mission_of
 
 VEHICLE = load_vehicle("roughie")
 

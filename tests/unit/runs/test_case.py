@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from firmware.model.strict import ConfigError
-from tools.errors import InputError
-from tools.runs.case import CASE_FILE, SensorsPart, load_case, load_case_of_run, write_case
-from tools.runs.run import Run
-from tools.sources import load_vehicle
+from tools.data.errors import InputError
+from tools.data.runs.case import CASE_FILE, SensorsPart, load_case, load_case_of_run, write_case
+from tools.data.runs.run import Run
+from tools.data.sources import load_vehicle
 
 FACTS = {"vehicle": "roughie", "site": "pool", "log_rate_hz": 10.0, "water_density_kg_m3": 998.0}
 

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tools.errors import InputError
-from tools.runs import columns as names
-from tools.runs import csvfile
-from tools.runs.run import Run, load_run, write_run
+from tools.data.errors import InputError
+from tools.data.runs import columns as names
+from tools.data.runs import csvfile
+from tools.data.runs.run import Run, load_run, write_run
 
 GOOD = "t_s,depth_m,note\n0.0,1.0,a\n0.1,,b\n0.2,3,c\n"
 

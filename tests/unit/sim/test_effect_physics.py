@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from effect_flights import VEHICLE, flown, held, quiet
 
-from firmware.core import layout
-from firmware.core.rotations import quaternion_from_euler, rotation_nb
-from firmware.core.water import water_wrench
+from firmware.core.maths.rotations import quaternion_from_euler, rotation_nb
+from firmware.core.vehicle import layout
+from firmware.core.vehicle.water import water_wrench
 from sim_backend.core import effect_layout as ef
 from sim_backend.core.effect_plant import (
     BALLAST_DRIVEN,

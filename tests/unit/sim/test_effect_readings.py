@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from effect_flights import flown, world
 
-from firmware.core.rotations import euler_from_quaternion, quaternion_from_euler
+from firmware.core.maths.rotations import euler_from_quaternion, quaternion_from_euler
 from sim_backend.core import effect_layout as ef
 from sim_backend.core import layout as at
 from sim_backend.core.effect_plant import read, remember

@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from firmware.core.layout import N_X
-from firmware.core.rotations import euler_from_quaternion
+from firmware.core.maths.rotations import euler_from_quaternion
+from firmware.core.vehicle.layout import N_X
 from sim_backend.core.open_loop import fly_open_loop, fly_open_loop_many
 from sim_backend.core.plant import hold_disturbance, rk4_step, water_velocity
 from sim_backend.world import Environment, SampledSensor, SampledSensors, Start, Wave, build_world
-from tools.sources import load_vehicle
+from tools.data.sources import load_vehicle
 
 VEHICLE = load_vehicle("roughie")
 CALM = dict(disturbance_linear=0.0, disturbance_angular=0.0)

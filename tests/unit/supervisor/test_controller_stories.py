@@ -7,8 +7,8 @@ import math
 
 import pytest
 
-from firmware.core import control_layout as ctl
-from firmware.core import supervisor_layout as at
+from firmware.core.control import control_layout as ctl
+from firmware.core.supervision import supervisor_layout as at
 from firmware.supervisor.table import Reaction
 from tests.support.stories import ABORT, HOLD, LOG, NOTHING, WARN, flying
 from tests.support.watchman import Watchman

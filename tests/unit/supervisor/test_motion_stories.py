@@ -5,8 +5,8 @@ Each row as a story: all is well, something breaks, it is noticed in time, and w
 
 import pytest
 
-from firmware.core import control_layout as ctl
-from firmware.core import supervisor_layout as at
+from firmware.core.control import control_layout as ctl
+from firmware.core.supervision import supervisor_layout as at
 from firmware.supervisor.settings import Limits
 from tests.support.stories import ABORT, COARSE, HW, NOTHING, OOB, TWO_TICKS, WARN, flying, rising
 

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from firmware.core import control_layout as ctl
-from firmware.core import supervisor_layout as at
-from firmware.core.supervisor import highest
+from firmware.core.control import control_layout as ctl
+from firmware.core.supervision import supervisor_layout as at
+from firmware.core.supervision.supervisor import highest
 from firmware.supervisor.table import FAULTS, Reaction
 from hal.ports import SLOTS, Validity
 from tests.support.watchman import BALLAST_RANGE, DT, SLIDER_RANGE, Watchman

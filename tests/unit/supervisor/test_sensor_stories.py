@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from firmware.core import control_layout as ctl
+from firmware.core.control import control_layout as ctl
 from firmware.supervisor.settings import Limits
 from hal.ports import SLOTS, Validity
 from tests.support.stories import ABORT, HOLD, LOG, NOTHING, TWO_TICKS, WARN, flying, rising

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from firmware.core import supervisor_layout as at
+from firmware.core.supervision import supervisor_layout as at
 from firmware.model.library import shipped
 from firmware.model.strict import ConfigError
 from firmware.model.vehicle import decode_vehicle

@@ -5,7 +5,7 @@ Each row as a story: all is well, something breaks, it is noticed in time, and w
 
 import pytest
 
-from firmware.core import supervisor_layout as at
+from firmware.core.supervision import supervisor_layout as at
 from firmware.supervisor.settings import Limits
 from tests.support.stories import ABORT, COARSE, LOG, NOTHING, WARN, flying
 

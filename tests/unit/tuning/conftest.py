@@ -7,8 +7,8 @@ import pytest
 
 from firmware.model.strict import decode
 from sim_backend.board import SimBoardFile
-from tools.compose import load_board_file
-from tools.sources import load_vehicle
+from tools.data.sources import load_vehicle
+from tools.flight.compose import load_board_file
 
 sys.path.insert(0, str(Path(__file__).parent))
 

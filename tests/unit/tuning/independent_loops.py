@@ -1,15 +1,15 @@
 """The loops a second time, for the tests: state space with Pade delays, put together by python-control.
 
-Only the plant's matrices are shared with tools/tuning; wiring, delays, observer and closing are python-control's.
+Only the plant's matrices are shared with tools/study/tuning; wiring, delays, observer and closing are python-control's.
 """
 
 import control
 import numpy as np
 
 from firmware.control.gains import Control
-from firmware.core.layout import M_R, M_S, R_R, R_S, X_B
-from tools.tuning.loops import Delays
-from tools.tuning.plant import Plant
+from firmware.core.vehicle.layout import M_R, M_S, R_R, R_S, X_B
+from tools.study.tuning.linear_plant import Plant
+from tools.study.tuning.loops import Delays
 
 ORDER = 4  # of the Pade approximation
 REFERENCES = ["pitch_ref", "pitch_rate_ref", "depth_ref", "depth_rate_ref"]

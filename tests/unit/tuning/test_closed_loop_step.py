@@ -9,12 +9,12 @@ from test_plant import flight_state
 
 from firmware.autopilot import Autopilot, configuration
 from firmware.control.gains import Control
-from firmware.core.layout import N_X, X_POS
+from firmware.core.vehicle.layout import N_X, X_POS
 from firmware.guidance.mission import Leg, Mission, Site
 from sim_backend.core.closed_loop import N_END, N_TRACE, TRACE, fly
 from sim_backend.world import Environment, Start, build_world
-from tools.tuning.loops import Delays
-from tools.tuning.plant import DESIGN_TRIMS, OTHER_TRIMS, linearise, steady_glide
+from tools.study.tuning.linear_plant import DESIGN_TRIMS, OTHER_TRIMS, linearise, steady_glide
+from tools.study.tuning.loops import Delays
 
 SECONDS = 30.0
 QUIET = Environment(surface=False, disturbance_linear=0.0, disturbance_angular=0.0)

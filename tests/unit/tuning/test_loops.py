@@ -9,8 +9,8 @@ import pytest
 from independent_loops import closed, opened
 
 from firmware.control.gains import Control
-from tools.tuning.loops import OMEGA, Delays, depth_terms, margins, open_loop, pitch_terms
-from tools.tuning.plant import DESIGN_TRIMS, OTHER_TRIMS, linearise
+from tools.study.tuning.linear_plant import DESIGN_TRIMS, OTHER_TRIMS, linearise
+from tools.study.tuning.loops import OMEGA, Delays, depth_terms, margins, open_loop, pitch_terms
 
 TRIMS = [*DESIGN_TRIMS, *OTHER_TRIMS]
 FACTOR = {"pitch": "slider", "depth": "ballast"}

@@ -5,11 +5,22 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from firmware.core import layout
-from firmware.core.flight import nominal_run
-from firmware.core.rotations import euler_from_quaternion, quaternion_from_euler
-from tools.errors import InputError
-from tools.tuning.plant import BALLAST, DESIGN_TRIMS, OTHER_TRIMS, PITCH, SLIDER, Q, U, W, linearise, steady_glide
+from firmware.core.maths.rotations import euler_from_quaternion, quaternion_from_euler
+from firmware.core.vehicle import layout
+from firmware.core.vehicle.flight import nominal_run
+from tools.data.errors import InputError
+from tools.study.tuning.linear_plant import (
+    BALLAST,
+    DESIGN_TRIMS,
+    OTHER_TRIMS,
+    PITCH,
+    SLIDER,
+    Q,
+    U,
+    W,
+    linearise,
+    steady_glide,
+)
 
 
 @pytest.mark.parametrize("trim", [*DESIGN_TRIMS, *OTHER_TRIMS], ids=lambda trim: trim.name)

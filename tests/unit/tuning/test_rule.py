@@ -7,10 +7,10 @@ import pytest
 from independent_loops import closed, opened
 
 from firmware.control.gains import Control, DepthGains, PitchGains, ReferenceTable
-from tools.errors import InputError
-from tools.tuning import rule
-from tools.tuning.loops import Delays
-from tools.tuning.plant import DESIGN_TRIMS, OTHER_TRIMS, linearise
+from tools.data.errors import InputError
+from tools.study.tuning import rule
+from tools.study.tuning.linear_plant import DESIGN_TRIMS, OTHER_TRIMS, linearise
+from tools.study.tuning.loops import Delays
 
 
 def margins_by_python_control(vehicle, board, gains, loop):

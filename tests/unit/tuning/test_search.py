@@ -6,8 +6,8 @@ import pytest
 
 from firmware.control.gains import BEST_TUNED, Control, DepthGains, PitchGains
 from sim_backend.core.closed_loop import END_ERROR_DEPTH, END_ERROR_PITCH, END_TRAVEL_SLIDER, N_END, N_TRACE, TRACE, fly
-from tools.compose import build_flight
-from tools.tuning import manoeuvres, search
+from tools.flight.compose import build_flight
+from tools.study.tuning import manoeuvres, search
 
 BAD = Control(pitch=PitchGains(kp=0.02, ki=0.002, kd=0.03), depth=DepthGains(kp=0.1), estimator="measured")
 FEW = search.Flights(range(1), (0.03,))

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 from firmware.control.gains import Control
 from firmware.guidance.mission import decode_mission
 from tools.cli.tune import tune
-from tools.errors import InputError
+from tools.data.errors import InputError
 
 MISSION = 'format = 1\nname = "m"\ntime_limit_s = 60.0\n[site]\nname = "pool"\ndepth_m = 6.0\n[[leg]]\ndepth_m = 5.0\n'
 
@@ -48,7 +48,7 @@ def test_the_table_goes_into_a_mission_as_it_is(ruled):
 
 
 def test_another_vehicle_is_tuned_for_itself(tmp_path, ruled):
-    from tools.sources import name_or_path
+    from tools.data.sources import name_or_path
 
     text, _ = name_or_path("roughie", "vehicle", "model/vehicles")
     file = tmp_path / "heavy.toml"
@@ -61,7 +61,7 @@ def test_another_vehicle_is_tuned_for_itself(tmp_path, ruled):
 
 
 def test_search_prints_both_sets_side_by_side(monkeypatch):
-    from tools.tuning import search
+    from tools.study.tuning import search
 
     monkeypatch.setattr(search, "SEARCHED", search.Flights(range(1), (0.03,)))
     monkeypatch.setattr(search, "REPORTED", search.Flights(range(7, 8), (0.003, 0.1)))

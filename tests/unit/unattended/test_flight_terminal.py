@@ -12,7 +12,7 @@ import pytest
 
 from hal.state_file import Phase, StateFile
 from tests.support.twinned import end_guard
-from tools.cli.terminal import AGAIN_S, Stop
+from tools.flight.terminal import AGAIN_S, Stop
 
 # --- Ctrl-C ---------------------------------------------------------------------------------------------------------
 
@@ -127,7 +127,7 @@ def test_an_ascent_is_never_asked_for(fly, tmp_path):
 # --- in flight --------------------------------------------------------------------------------------------------------
 LOOP = """
 import contextlib, json, os, select, sys, time
-from tools.cli.terminal import undisturbed
+from tools.flight.terminal import undisturbed
 with undisturbed() if sys.argv[2] == "undisturbed" else contextlib.nullcontext():
     print("flying", flush=True)
     longest, before, end = 0.0, time.monotonic(), time.monotonic() + 2.0

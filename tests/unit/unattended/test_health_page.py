@@ -11,7 +11,7 @@ from hal.heartbeat import Guard, Heartbeat, Status
 from hal.recorder.condition import Level
 from hal.state_file import Phase, StateFile
 from tools.cli.check import check
-from tools.live import find_folder, lines, snapshot
+from tools.flight.live import find_folder, lines, snapshot
 
 
 @pytest.fixture
@@ -71,7 +71,7 @@ def test_a_dead_flight_is_seen(pulse, tmp_path):
 def test_without_a_heartbeat_it_says_where_it_looked(tmp_path, monkeypatch):
     monkeypatch.setenv("GLIDER_RUN_DIR", str(tmp_path / "run"))
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    from tools.errors import InputError
+    from tools.data.errors import InputError
 
     with pytest.raises(InputError, match="run: no flight has left a heartbeat"):
         find_folder(None)

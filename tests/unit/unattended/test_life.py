@@ -5,7 +5,7 @@ import itertools
 import pytest
 
 from hal.state_file import Phase, StateFile
-from tools.unattended import Life, told
+from tools.flight.keeper import Life, told
 
 STEPS = ("armed", "diving", "ended")
 END = {"surfaced": True, "orderly": True, "reason": ""}

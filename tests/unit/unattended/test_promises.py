@@ -112,12 +112,12 @@ def test_a_heartbeats_folder_of_somebody_else_is_refused(open_folder):
 
 
 def test_a_text_file_without_end_is_not_read_to_it(tmp_path, monkeypatch):
-    from tools.errors import InputError
-    from tools.sources import read_text
+    from tools.data.errors import InputError
+    from tools.data.sources import read_text
 
     path = tmp_path / "x.toml"
     with path.open("wb") as file:
         file.truncate(2**40)  # a terabyte of nothing
-    monkeypatch.setattr("tools.sources.LONGEST", 1_000_000)
+    monkeypatch.setattr("tools.data.sources.LONGEST", 1_000_000)
     with pytest.raises(InputError, match=r"x\.toml: longer than 1000000 characters"):
         read_text(path)

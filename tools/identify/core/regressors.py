@@ -5,13 +5,13 @@ The terms are those that the plant flies with (firmware/core); nothing of equati
 
 import numpy as np
 
-from firmware.core.actuators import clip
 from firmware.core.jit import kernel
-from firmware.core.layout import K_D0, K_R, N_P
-from firmware.core.mass import first_moment, inertia, translational_mass
-from firmware.core.motion import momentum_rate
-from firmware.core.rotations import rotation_nb_euler
-from firmware.core.water import water_wrench
+from firmware.core.maths.rotations import rotation_nb_euler
+from firmware.core.vehicle.actuators import clip
+from firmware.core.vehicle.layout import K_D0, K_R, N_P
+from firmware.core.vehicle.mass import first_moment, inertia, translational_mass
+from firmware.core.vehicle.motion import momentum_rate
+from firmware.core.vehicle.water import water_wrench
 
 N_K = K_R - K_D0 + 1
 

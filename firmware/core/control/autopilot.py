@@ -1,0 +1,88 @@
+"""One tick of the autopilot: samples to estimate, mission to targets, targets to commands, limits last.
+
+`tick` is what the runtime calls 50 times a second and what a campaign calls from compiled code: the same function.
+"""
+
+import math
+
+from firmware.core.control import control_layout as at
+from firmware.core.control.coverage import forget_coverage, watch
+from firmware.core.control.guidance import follow, sequence
+from firmware.core.control.steering import steer
+from firmware.core.estimation.estimator_layout import S_ANGULAR, S_LINEAR
+from firmware.core.estimation.navigation import navigate
+from firmware.core.estimation.sensing import sense, take_as_measured
+from firmware.core.jit import kernel
+from firmware.core.supervision.limits import limited
+from firmware.core.vehicle.layout import (
+    BALLAST_MAX,
+    BALLAST_MIN,
+    BALLAST_RATE,
+    SERVO_MAX,
+    SERVO_MIN,
+    SERVO_RATE,
+    SLIDER_MAX,
+    SLIDER_MIN,
+    SLIDER_RATE,
+)  # fmt: skip
+
+
+@kernel
+def score(legs, est, ap):
+    """Add this tick's tracking errors up; depth only where the depth loop commands the ballast."""
+    if math.isnan(legs[int(ap[at.LEG]), at.LEG_BALLAST]):
+        ap[at.SUM_DEPTH] += (est[at.EST_DEPTH] - ap[at.REF_DEPTH]) ** 2
+        ap[at.COUNT_DEPTH] += 1.0
+    ap[at.SUM_PITCH] += (est[at.EST_PITCH] - ap[at.REF_PITCH]) ** 2
+    ap[at.SUM_ROLL] += (est[at.EST_ROLL] - ap[at.REF_ROLL]) ** 2
+    ap[at.COUNT_ATTITUDE] += 1.0
+
+
+@kernel
+def limit_commands(P, ap, servo, slider, ballast, dt, cmd):
+    """Limits last: into cmd (3,) what may be sent, and into the memory what was."""
+    cmd[0] = limited(servo, ap[at.SENT_SERVO], P[SERVO_MIN], P[SERVO_MAX], P[SERVO_RATE], dt)
+    cmd[1] = limited(slider, ap[at.SENT_SLIDER], P[SLIDER_MIN], P[SLIDER_MAX], P[SLIDER_RATE], dt)
+    cmd[2] = limited(ballast, ap[at.SENT_BALLAST], P[BALLAST_MIN], P[BALLAST_MAX], P[BALLAST_RATE], dt)
+    ap[at.SENT_SERVO], ap[at.SENT_SLIDER], ap[at.SENT_BALLAST] = cmd[0], cmd[1], cmd[2]
+
+
+@kernel
+def tick(P, C, legs, frame, est, ap, nav, cmd, t):
+    """One tick at time t (s): frame (FRAME_SIZE,) in, cmd (3,) servo rad, slider m, ballast kg out.
+
+    est (N_EST,), ap (N_AP,) and nav (N_NAV,) are the autopilot's memory. Waiting: actuators stay where they are.
+    Completed or aborted: ballast to its light end, mass aft for nose up, servo centred, so that the vehicle surfaces.
+    """
+    sense(P, C, frame, est, t)
+    if C[at.ESTIMATOR] == at.MEASURED:
+        take_as_measured(est)
+    else:
+        navigate(P, C, nav, est, ap, t)
+    sequence(C, legs, est, ap, t)
+    if ap[at.MODE] == at.FLYING:
+        follow(C, legs, est, ap)
+        servo, slider, ballast = steer(P, C, legs, est, ap, t)
+        score(legs, est, ap)
+    elif ap[at.MODE] == at.WAITING:
+        servo, slider, ballast = ap[at.SENT_SERVO], ap[at.SENT_SLIDER], ap[at.SENT_BALLAST]
+    else:
+        servo, slider, ballast = 0.0, P[SLIDER_MIN], P[BALLAST_MIN]
+    watch(P, C, legs, nav, est, ap, t)
+    ap[at.WANTED_SERVO], ap[at.WANTED_SLIDER], ap[at.WANTED_BALLAST] = servo, slider, ballast
+    limit_commands(P, ap, servo, slider, ballast, C[at.DT], cmd)
+
+
+@kernel
+def reset(est, ap, nav):
+    """Forget everything: no sample seen, nothing commanded, the filter not started, waiting for the first samples."""
+    if nav[at.NAV_RUNNING] == 1.0:
+        nav[at.NAV_SETTINGS + S_LINEAR], nav[at.NAV_SETTINGS + S_ANGULAR] = nav[at.NAV_CALM], nav[at.NAV_CALM + 1]
+    nav[at.NAV_RUNNING] = 0.0
+    est[:] = 0.0
+    est[at.EST_IMU_TIME : at.EST_BEACON_TIME + 3] = -1.0
+    ap[:] = 0.0
+    ap[at.MODE] = at.WAITING
+    ap[at.REACHED] = -1.0
+    ap[at.ACTIVE_SINCE] = -math.inf
+    forget_coverage(ap)

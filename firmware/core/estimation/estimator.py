@@ -1,0 +1,343 @@
+"""The estimator: an extended Kalman filter over the nominal flight, its error in attitude taken as a small rotation.
+
+State x, covariance `cov` (N_E, N_E) of the error state and everything else stand in the caller's arrays as
+firmware/core/estimation/estimator_layout has them; a step allocates nothing.
+
+Prediction: equation (1) with the model's error added, in sub-steps of at most MAX_STEP. The model's error is a first
+order Gauss-Markov process whose variance follows, state by state, from the vehicle file's [uncertainty]: errors of
+parameters stay, so their accelerations change as slowly as the flight does; that is S_ERROR_TIME. The disturbance held
+0.1 s enters as white noise of the same spectral density. The covariance is carried by the flight linearised about
+the state. What equation (1) gives to that serves for HOLD seconds, and the model error's covariance C for HOLD_ERROR,
+or until speeds have changed (MOVED_SHARE, MOVED_RATE). FRESH in `mode` works both out anew at every step.
+
+Measurements z (N_Z), NaN where there is none, one after the other; what they take off the covariance waits in `work`
+and comes off in one go. What does not fit:
+- An innovation beyond GATE sigma is left out: a spike moves nothing.
+- While attitude, gyro, depth or position are beyond it, the model's error grows, by `stress` (2: linear, angular), up
+  to ERROR_LINEAR and ERROR_ANGULAR: a vehicle that is not the one in the file is followed by its sensors.
+- A sensor beyond it for PATIENCE seconds has jumped, or the filter has: the covariance is widened in what it measures,
+  and the filter follows. Not so the gyro, since attitude tells the rates too.
+- A gyro that is seen to be biased has a bias that moves (GYRO_WANDER): one of wrong scale is followed like that.
+
+`cov` says how sure the filter is of what its sensors show: constant biases of attitude, depth and draw-wires, which
+nothing it sees can tell from the truth, are not in it.
+
+Valid for |pitch| < 84 deg in roll and yaw (beyond it both are skipped: Euler angles say little there) and for speeds
+up to SPEED_LIMIT, above which the integration at MAX_STEP is not stable. Tested in tests/unit/estimator.
+"""
+
+import math
+
+from firmware.core.estimation.estimator_layout import (
+    BALLAST_DRIVEN,
+    E_ACT,
+    E_ATT,
+    E_ERR,
+    E_GYRO,
+    E_NU,
+    E_WATER,
+    ERROR_ANGULAR,
+    ERROR_LINEAR,
+    FRESH,
+    GYRO_WANDER,
+    HOLD,
+    HOLD_ERROR,
+    MAX_STEP,
+    MOVED_RATE,
+    MOVED_SHARE,
+    N_COUPLED,
+    N_E,
+    N_MOVING,
+    N_W,
+    N_WORK_ROWS,
+    N_XE,
+    S_ANGULAR,
+    S_BALLAST,
+    S_BALLAST_BIAS,
+    S_ERROR_TIME,
+    S_GYRO,
+    S_LINEAR,
+    S_SERVO,
+    S_SLIDER,
+    S_SLIDER_BIAS,
+    S_SPEED_ERROR,
+    S_WATER,
+    SERVO_DRIVEN,
+    SLIDER_DRIVEN,
+    STRESS_TIME,
+    W_A,
+    W_C,
+    W_DRIVE,
+    W_HELD,
+    W_POINT,
+    W_SCRATCH,
+    W_T,
+    W_TURNED,
+    X_ERR,
+    X_GYRO,
+)
+from firmware.core.estimation.estimator_update import estimator_update
+from firmware.core.jit import kernel
+from firmware.core.maths.rotations import quaternion_rate, rotation_nb
+from firmware.core.vehicle.actuators import actuator_rates
+from firmware.core.vehicle.flight import normalise_attitude
+from firmware.core.vehicle.layout import N_X, SERVO_TAU, X_NU
+from firmware.core.vehicle.linearise import linearise, linearise_motion, model_error
+from firmware.core.vehicle.motion import accelerations
+
+T0, R0 = W_T * N_W, W_TURNED * N_W  # in the flat work: T = F cov, and A's columns
+
+
+@kernel
+def actuator_speeds(P, x, mode, c_servo, c_slider, c_ballast):
+    """Speeds of servo, slider, ballast: c_ is each one's command or, where mode says driven, its speed itself."""
+    ds, dl, db = actuator_rates(P, x[13], x[14], x[15], c_servo, c_slider, c_ballast)
+    if mode & SERVO_DRIVEN:
+        ds = c_servo
+    if mode & SLIDER_DRIVEN:
+        dl = c_slider
+    if mode & BALLAST_DRIVEN:
+        db = c_ballast
+    return ds, dl, db
+
+
+@kernel
+def flight_derivative(P, x, mode, c_servo, c_slider, c_ballast, out):
+    """dx/dt into out[0:16], the model's error added to the accelerations, the water carrying the position."""
+    q0, q1, q2, q3 = x[3], x[4], x[5], x[6]
+    u, v, w, p, q, r = x[7], x[8], x[9], x[10], x[11], x[12]
+    ds, dl, db = actuator_speeds(P, x, mode, c_servo, c_slider, c_ballast)
+    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation_nb(q0, q1, q2, q3)
+    ud, vd, wd, pd, qd, rd = accelerations(
+        P, r31, r32, r33, u, v, w, p, q, r, x[13], x[14], x[15], ds, dl, db, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    )
+    out[0] = r11 * u + r12 * v + r13 * w + x[25]
+    out[1] = r21 * u + r22 * v + r23 * w + x[26]
+    out[2] = r31 * u + r32 * v + r33 * w
+    out[3], out[4], out[5], out[6] = quaternion_rate(q0, q1, q2, q3, p, q, r)
+    out[7], out[8], out[9] = ud + x[16], vd + x[17], wd + x[18]
+    out[10], out[11], out[12] = pd + x[19], qd + x[20], rd + x[21]
+    out[13], out[14], out[15] = ds, dl, db
+
+
+@kernel
+def predict_state(P, x, mode, c_servo, c_slider, c_ballast, d, dt, k, y):
+    """One midpoint step of x in place; the model's error shrinks by d[3:9]. k, y are scratch of N_XE."""
+    flight_derivative(P, x, mode, c_servo, c_slider, c_ballast, k)
+    for i in range(N_X):
+        y[i] = x[i] + 0.5 * dt * k[i]
+    for i in range(N_X, N_XE):
+        y[i] = x[i]
+    flight_derivative(P, y, mode, c_servo, c_slider, c_ballast, k)
+    for i in range(N_X):
+        x[i] += dt * k[i]
+    for i in range(6):
+        x[X_ERR + i] *= d[3 + i]
+    normalise_attitude(x)
+
+
+@kernel
+def decays(P, settings, mode, dt, d):
+    """Factors by which the errors from E_ACT on shrink over dt, into d (N_E - E_ACT)."""
+    for i in range(3):
+        d[i] = 1.0 if mode & (1 << i) else math.exp(-dt / P[SERVO_TAU + 4 * i])
+    error = math.exp(-dt / settings[S_ERROR_TIME])
+    for i in range(E_ERR - E_ACT, E_GYRO - E_ACT):
+        d[i] = error
+    for i in range(E_GYRO - E_ACT, N_E - E_ACT):
+        d[i] = 1.0
+
+
+@kernel
+def carry_rows(p, A, dt, m):
+    """The rows of F cov that are not trivial, into m from T0 on; p is cov, m work, both flat. F = I + A dt."""
+    for i in range(E_ATT):
+        a3, a4, a5 = dt * A[i, 3], dt * A[i, 4], dt * A[i, 5]
+        a6, a7, a8 = dt * A[i, 6], dt * A[i, 7], dt * A[i, 8]
+        to, row, water = T0 + i * N_W, i * N_E, (E_WATER + min(i, 1)) * N_E
+        carried = dt if i < 2 else 0.0
+        for j in range(N_E):
+            m[to + j] = (
+                p[row + j] + carried * p[water + j]
+                + a3 * p[3 * N_E + j] + a4 * p[4 * N_E + j] + a5 * p[5 * N_E + j]
+                + a6 * p[6 * N_E + j] + a7 * p[7 * N_E + j] + a8 * p[8 * N_E + j]
+            )  # fmt: skip
+    for i in range(E_ATT, E_NU):
+        a3, a4, a5 = dt * A[i, 3], dt * A[i, 4], dt * A[i, 5]
+        to, row = T0 + i * N_W, i * N_E
+        for j in range(N_E):
+            m[to + j] = (
+                p[row + j] + dt * p[row + (E_NU + 3 - E_ATT) * N_E + j]
+                + a3 * p[3 * N_E + j] + a4 * p[4 * N_E + j] + a5 * p[5 * N_E + j]
+            )  # fmt: skip
+    for i in range(E_NU, N_MOVING):
+        a3, a4, a5, a6, a7, a8 = dt * A[i, 3], dt * A[i, 4], dt * A[i, 5], dt * A[i, 6], dt * A[i, 7], dt * A[i, 8]
+        a9, aa, ab, ac, ad, ae = dt * A[i, 9], dt * A[i, 10], dt * A[i, 11], dt * A[i, 12], dt * A[i, 13], dt * A[i, 14]
+        to, row = T0 + i * N_W, i * N_E
+        for j in range(N_E):
+            m[to + j] = (
+                p[row + j] + dt * p[row + (E_ERR - E_NU) * N_E + j]
+                + a3 * p[3 * N_E + j] + a4 * p[4 * N_E + j] + a5 * p[5 * N_E + j]
+                + a6 * p[6 * N_E + j] + a7 * p[7 * N_E + j] + a8 * p[8 * N_E + j]
+                + a9 * p[9 * N_E + j] + aa * p[10 * N_E + j] + ab * p[11 * N_E + j]
+                + ac * p[12 * N_E + j] + ad * p[13 * N_E + j] + ae * p[14 * N_E + j]
+            )  # fmt: skip
+
+
+@kernel
+def predict_covariance(cov, A, d, dt, work):
+    """cov = F cov F' over dt: F = I + A dt for what moves, d on the diagonal below it.
+
+    Loops run along rows, over flat arrays and numbers known beforehand, so that they compile to vector code.
+    """
+    p, m = cov.reshape(N_E * N_E), work.reshape(N_WORK_ROWS * N_W)
+    carry_rows(p, A, dt, m)
+    for i in range(N_MOVING):
+        to, row = T0 + i * N_W, i * N_E
+        t3, t4, t5, t6, t7, t8 = m[to + 3], m[to + 4], m[to + 5], m[to + 6], m[to + 7], m[to + 8]
+        t9, ta, tb, tc, td, te = m[to + 9], m[to + 10], m[to + 11], m[to + 12], m[to + 13], m[to + 14]
+        for j in range(N_MOVING):
+            p[row + j] = m[to + j] + dt * (
+                t3 * m[R0 + j] + t4 * m[R0 + N_W + j] + t5 * m[R0 + 2 * N_W + j]
+                + t6 * m[R0 + 3 * N_W + j] + t7 * m[R0 + 4 * N_W + j] + t8 * m[R0 + 5 * N_W + j]
+                + t9 * m[R0 + 6 * N_W + j] + ta * m[R0 + 7 * N_W + j] + tb * m[R0 + 8 * N_W + j]
+                + tc * m[R0 + 9 * N_W + j] + td * m[R0 + 10 * N_W + j] + te * m[R0 + 11 * N_W + j]
+            )  # fmt: skip
+        p[row] += dt * m[to + E_WATER]
+        p[row + 1] += dt * m[to + E_WATER + 1]
+        for j in range(6):
+            p[row + E_NU + j] += dt * m[to + E_ERR + j]
+        for j in range(i):
+            p[j * N_E + i] = p[row + j]
+        for j in range(E_ACT, N_E):
+            p[row + j] = m[to + j] * d[j - E_ACT]
+            p[j * N_E + i] = p[row + j]
+    for i in range(E_ACT, N_E):
+        for j in range(E_ACT, N_E):
+            p[i * N_E + j] *= d[i - E_ACT] * d[j - E_ACT]
+
+
+@kernel
+def add_process_noise(settings, x, cov, C, d, ds, dl, db, dt):
+    """What dt adds: disturbance on nu, what actuators do beside their model, and the drive of the model's error."""
+    for i in range(3):
+        cov[E_NU + i, E_NU + i] += settings[S_LINEAR] * dt
+        cov[E_NU + 3 + i, E_NU + 3 + i] += settings[S_ANGULAR] * dt
+    wrong = settings[S_SPEED_ERROR]
+    cov[E_ACT, E_ACT] += (settings[S_SERVO] + wrong * ds * ds) * dt
+    cov[E_ACT + 1, E_ACT + 1] += (settings[S_SLIDER] + wrong * dl * dl) * dt
+    cov[E_ACT + 2, E_ACT + 2] += (settings[S_BALLAST] + wrong * db * db) * dt
+    for i in range(3):
+        cov[E_GYRO + i, E_GYRO + i] += (settings[S_GYRO] + GYRO_WANDER * x[X_GYRO + i] * x[X_GYRO + i]) * dt
+    for i in range(2):
+        cov[E_WATER + i, E_WATER + i] += settings[S_WATER] * dt
+    share = 1.0 - d[3] * d[3]  # keeps the variance at C where C stays
+    for i in range(6):
+        for j in range(6):
+            cov[E_ERR + i, E_ERR + j] += share * C[i, j]
+
+
+@kernel
+def error_covariance(P, settings, sigma, x, ds, dl, db, A, C, work):
+    """A at x, and C (6, 6), the covariance of the model's error there, from parameters and the draw-wires' biases."""
+    y, g, Pt = work[W_POINT], work[W_SCRATCH + 3], work[W_SCRATCH + 4]
+    linearise(P, x, ds, dl, db, A, y)
+    model_error(P, sigma, ds, dl, db, y, C, Pt, g)
+    # a biased draw-wire is a mass that is not where the filter has it
+    for i in range(6):
+        for j in range(6):
+            C[i, j] += (
+                settings[S_SLIDER_BIAS] * A[E_NU + i, E_ACT + 1] * A[E_NU + j, E_ACT + 1]
+                + settings[S_BALLAST_BIAS] * A[E_NU + i, E_ACT + 2] * A[E_NU + j, E_ACT + 2]
+            )
+
+
+@kernel
+def scale_error(x, stress, C, f, dt, drive):
+    """Into drive: C, where the model errs by more than its sigma times the stress; at least the error's own square."""
+    fade = math.exp(-dt / STRESS_TIME)
+    for n in range(2):
+        stress[n] = 1.0 + (stress[n] - 1.0) * fade
+    for i in range(6):
+        most = ERROR_LINEAR if i < 3 else ERROR_ANGULAR
+        f[i] = math.sqrt(max(1.0, min(stress[i // 3], most * most / max(C[i, i], 1e-12))))
+    for i in range(6):
+        for j in range(6):
+            drive[i, j] = C[i, j] * (f[i] * f[j])
+        most = ERROR_LINEAR if i < 3 else ERROR_ANGULAR
+        error = min(abs(x[X_ERR + i]), most)
+        drive[i, i] = max(drive[i, i], error * error)
+
+
+@kernel
+def moved(x, y):
+    """Have speeds changed by more than MOVED_SHARE of the speed, or rates by MOVED_RATE, since y = [k, nu, ..]?"""
+    change, turn, speed = 0.0, 0.0, 0.0
+    for i in range(3):
+        change += (x[X_NU + i] - y[3 + i]) ** 2
+        turn += (x[X_NU + 3 + i] - y[6 + i]) ** 2
+        speed += y[3 + i] * y[3 + i]
+    return change > MOVED_SHARE * MOVED_SHARE * speed or turn > MOVED_RATE * MOVED_RATE
+
+
+@kernel
+def linearise_where_due(P, settings, sigma, x, ds, dl, db, dt, work):
+    """A at x into work; equation (1) linearised anew, and C, where their time is over or speeds have changed."""
+    A, C, turned = work[W_A : W_A + N_MOVING], work[W_C : W_C + 6], work[W_TURNED : W_TURNED + N_COUPLED - E_ATT]
+    held = work[W_HELD]
+    still = not moved(x, work[W_POINT])
+    if still and held[0] >= 0.5 * dt:
+        linearise_motion(x, work[W_POINT], A)
+    elif still and held[1] >= 0.5 * dt:
+        linearise(P, x, ds, dl, db, A, work[W_POINT])
+        held[0] = HOLD
+    else:
+        error_covariance(P, settings, sigma, x, ds, dl, db, A, C, work)
+        held[0], held[1] = HOLD, HOLD_ERROR
+    held[0] -= dt
+    held[1] -= dt
+    for k in range(N_COUPLED - E_ATT):
+        for i in range(N_MOVING):
+            turned[k, i] = A[i, E_ATT + k]
+
+
+@kernel
+def estimator_predict(P, settings, sigma, x, cov, stress, mode, c_servo, c_slider, c_ballast, dt, work):
+    """Carry x and cov over dt (s) in sub-steps of at most MAX_STEP, actuators as in actuator_speeds."""
+    A, C, drive = work[W_A : W_A + N_MOVING], work[W_C : W_C + 6], work[W_DRIVE : W_DRIVE + 6]
+    k, y, d = work[W_SCRATCH], work[W_SCRATCH + 1], work[W_SCRATCH + 2]
+    steps = max(1, math.ceil(dt / MAX_STEP - 1e-9))
+    h = dt / steps
+    for _ in range(steps):
+        ds, dl, db = actuator_speeds(P, x, mode, c_servo, c_slider, c_ballast)
+        if mode & FRESH:
+            work[W_HELD, 0], work[W_HELD, 1] = 0.0, 0.0
+        linearise_where_due(P, settings, sigma, x, ds, dl, db, h, work)
+        decays(P, settings, mode, h, d)
+        scale_error(x, stress, C, work[W_SCRATCH + 3], h, drive)
+        predict_covariance(cov, A, d, h, work)
+        add_process_noise(settings, x, cov, drive, d, ds, dl, db, h)
+        predict_state(P, x, mode, c_servo, c_slider, c_ballast, d, h, k, y)
+
+
+@kernel
+def estimator_step(P, settings, sigma, x, cov, stress, mode, c_servo, c_slider, c_ballast, dt, z, beyond, scores, work):
+    """One step of the filter: dt (s) under the commands in force, then the measurements z at its end."""
+    estimator_predict(P, settings, sigma, x, cov, stress, mode, c_servo, c_slider, c_ballast, dt, work)
+    estimator_update(P, settings, x, cov, stress, z, beyond, scores, dt, work)
+
+
+@kernel
+def estimator_start(P, settings, sigma, x, cov, spread, work):
+    """The covariance before the first measurement: `spread` (N_E, 1 sigma) on the diagonal, the model's error at x."""
+    A, C = work[W_A : W_A + N_MOVING], work[W_C : W_C + 6]
+    for i in range(N_E):
+        for j in range(N_E):
+            cov[i, j] = 0.0
+    for i in range(N_E):
+        cov[i, i] = spread[i] * spread[i]
+    error_covariance(P, settings, sigma, x, 0.0, 0.0, 0.0, A, C, work)
+    work[W_HELD, 0], work[W_HELD, 1] = 0.0, 0.0
+    for i in range(6):
+        for j in range(6):
+            cov[E_ERR + i, E_ERR + j] = C[i, j]

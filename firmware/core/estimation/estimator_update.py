@@ -1,0 +1,178 @@
+"""The estimator's measurements: gate, update and what happens to what does not fit (see estimator)."""
+
+import math
+
+from firmware.core.estimation.estimator_layout import (
+    COS_PITCH_MIN,
+    E_ACT,
+    E_ATT,
+    E_ERR,
+    E_GYRO,
+    E_NU,
+    E_POS,
+    GATE,
+    LARGEST,
+    N_E,
+    N_Z,
+    PATIENCE,
+    RATE_LIMIT,
+    S_R,
+    SPEED_LIMIT,
+    STOP_MARGIN,
+    STRESS_GROWTH,
+    STRESS_MAX,
+    W_K,
+    W_SCRATCH,
+    X_ERR,
+    X_GYRO,
+    Z_BALLAST,
+    Z_DEPTH,
+    Z_MOCAP_ROLL,
+    Z_R,
+    Z_YAW,
+)
+from firmware.core.jit import kernel
+from firmware.core.maths.rotations import euler_from_quaternion, wrap_angle
+from firmware.core.vehicle.actuators import clip
+from firmware.core.vehicle.flight import normalise_attitude
+from firmware.core.vehicle.layout import SERVO_MAX, SERVO_MIN, X_ACT, X_NU
+
+
+@kernel
+def widen(cov, column, h0, h1, h2, grow):
+    """cov += grow h h', h on error[column : column + 3]."""
+    for i in range(3):
+        a = h0 if i == 0 else (h1 if i == 1 else h2)
+        cov[column + i, column] += grow * (a * h0)
+        cov[column + i, column + 1] += grow * (a * h1)
+        cov[column + i, column + 2] += grow * (a * h2)
+
+
+@kernel
+def update_scalar(cov, taken, n, dx, column, h0, h1, h2, other, innovation, R, beyond, dt):
+    """One measurement, h . error[column : column + 3] + error[other] = innovation, variance R, into dx and row n of
+    `taken`: the covariance is cov less the sum of r r' over rows r of `taken`, and cov itself waits.
+
+    `other` is a gyro's bias, 0 for the sensors that have none in the state. `beyond` is for how long (s) this sensor
+    has been out of the gate. Returns the innovation in sigma, the new `beyond`, and how many rows there are now.
+    """
+    v = taken[n]
+    bias = 1.0 if other > 0 else 0.0
+    for i in range(N_E):
+        v[i] = h0 * cov[column, i] + h1 * cov[column + 1, i] + h2 * cov[column + 2, i] + bias * cov[other, i]
+    for k in range(n):
+        r = taken[k]
+        along = h0 * r[column] + h1 * r[column + 1] + h2 * r[column + 2] + bias * r[other]
+        for i in range(N_E):
+            v[i] -= along * r[i]
+    seen = h0 * v[column] + h1 * v[column + 1] + h2 * v[column + 2] + bias * v[other]
+    left = innovation - (h0 * dx[column] + h1 * dx[column + 1] + h2 * dx[column + 2] + bias * dx[other])
+    S = seen + R
+    score = left / math.sqrt(S)
+    if abs(score) > GATE:
+        beyond += dt
+        if beyond < PATIENCE or other > 0:
+            return score, beyond, n
+        # the measured quantity may have jumped: cov + grow h h' is positive definite, and hardly moves anything else
+        h = h0 * h0 + h1 * h1 + h2 * h2
+        wanted = (left / GATE) ** 2 - R
+        grow = (wanted - seen) / (h * h)
+        v[column] += grow * h * h0
+        v[column + 1] += grow * h * h1
+        v[column + 2] += grow * h * h2
+        widen(cov, column, h0, h1, h2, grow)
+        S = wanted + R
+    scale = 1.0 / math.sqrt(S)
+    for i in range(N_E):
+        v[i] *= scale
+        dx[i] += v[i] * (left * scale)
+    return score, 0.0, n + 1
+
+
+@kernel
+def subtract_taken(cov, taken, n):
+    """cov less r r' for the first n rows r of `taken`, three in one go over cov."""
+    for k in range(n, n + 2):
+        for i in range(N_E):
+            taken[k, i] = 0.0
+    for k in range(0, n, 3):
+        r0, r1, r2 = taken[k], taken[k + 1], taken[k + 2]
+        for i in range(N_E):
+            a, b, c, row = r0[i], r1[i], r2[i], cov[i]
+            for j in range(N_E):
+                row[j] -= a * r0[j] + b * r1[j] + c * r2[j]
+    # rounding may differ between the two sides of the diagonal
+    for i in range(N_E):
+        for j in range(i):
+            cov[j, i] = cov[i, j]
+
+
+@kernel
+def inject(P, x, dx):
+    """Move x by the error state dx; the attitude by the small rotation q * [1, dtheta / 2]."""
+    for i in range(3):
+        x[i] += dx[E_POS + i]
+    a, b, c = 0.5 * dx[E_ATT], 0.5 * dx[E_ATT + 1], 0.5 * dx[E_ATT + 2]
+    q0, q1, q2, q3 = x[3], x[4], x[5], x[6]
+    x[3] = q0 - q1 * a - q2 * b - q3 * c
+    x[4] = q1 + q0 * a + q2 * c - q3 * b
+    x[5] = q2 + q0 * b - q1 * c + q3 * a
+    x[6] = q3 + q0 * c + q1 * b - q2 * a
+    normalise_attitude(x)
+    for i in range(6):
+        x[X_NU + i] += dx[E_NU + i]
+    for i in range(E_ERR, N_E):
+        x[X_ERR + i - E_ERR] += dx[i]
+    for i in range(3):
+        x[X_NU + i] = clip(x[X_NU + i], -SPEED_LIMIT, SPEED_LIMIT)
+        x[X_NU + 3 + i] = clip(x[X_NU + 3 + i], -RATE_LIMIT, RATE_LIMIT)
+        # a draw-wire may read a little beyond the stops, for it has a bias, but no more
+        low, high = P[SERVO_MIN + 4 * i], P[SERVO_MAX + 4 * i]
+        margin = 0.0 if i == 0 else STOP_MARGIN * (high - low)
+        x[X_ACT + i] = clip(x[X_ACT + i] + dx[E_ACT + i], low - margin, high + margin)
+
+
+@kernel
+def estimator_update(P, settings, x, cov, stress, z, beyond, scores, dt, work):
+    """Take the measurements z (N_Z, NaN = none) into x and cov, one after the other, about the same x.
+
+    dt is the time since the last update; beyond (N_Z) is kept between calls. scores (N_Z) gets each innovation in
+    sigma, NaN where there was no measurement.
+    """
+    dx, taken, n = work[W_SCRATCH], work[W_K : W_K + N_Z + 2], 0
+    for i in range(N_E):
+        dx[i] = 0.0
+    phi, theta, psi = euler_from_quaternion(x[3], x[4], x[5], x[6])
+    sf, cf, st, ct = math.sin(phi), math.cos(phi), math.sin(theta), math.cos(theta)
+    for m in range(N_Z):
+        scores[m] = math.nan
+        if not abs(z[m]) < LARGEST:
+            continue
+        axis = m % 3
+        column, h0, h1, h2, other = E_NU + 3 + axis, 1.0, 0.0, 0.0, 0
+        if m <= Z_YAW or m >= Z_MOCAP_ROLL:
+            column = E_ATT
+            if axis == 1:
+                h0, h1, h2, innovation = 0.0, cf, -sf, z[m] - theta
+            elif ct < COS_PITCH_MIN:
+                continue
+            elif axis == 0:
+                h1, h2, innovation = sf * st / ct, cf * st / ct, wrap_angle(z[m] - phi)
+            else:
+                h0, h1, h2, innovation = 0.0, sf / ct, cf / ct, wrap_angle(z[m] - psi)
+        elif m <= Z_R:
+            other, innovation = E_GYRO + axis, z[m] - x[X_NU + 3 + axis] - x[X_GYRO + axis]
+        elif m == Z_DEPTH:
+            column, innovation = E_POS + 2, z[m] - x[2]
+        elif m <= Z_BALLAST:
+            column, innovation = E_ACT + m - Z_DEPTH, z[m] - x[X_ACT + m - Z_DEPTH]
+        else:
+            column, innovation = E_POS + axis, z[m] - x[axis]
+        scores[m], beyond[m], n = update_scalar(
+            cov, taken, n, dx, column, h0, h1, h2, other, innovation, settings[S_R + m], beyond[m], dt
+        )
+        if column < E_ACT and abs(scores[m]) > GATE:
+            which = 0 if column < E_ATT else 1
+            stress[which] = min(stress[which] * math.exp(STRESS_GROWTH * dt), STRESS_MAX)
+    subtract_taken(cov, taken, n)
+    inject(P, x, dx)

@@ -1,0 +1,164 @@
+"""The estimator aboard: the Kalman filter stepped once a tick with whatever samples are new.
+
+A sample is older than the tick by its delay; it is carried forward by the filter's own rates before it is compared, so
+that a slow beacon does not drag the depth behind. What is missing, late or refused is simply not there this tick.
+"""
+
+import math
+
+from firmware.core.control import control_layout as at
+from firmware.core.estimation.estimator import estimator_start, estimator_step
+from firmware.core.estimation.estimator_layout import (
+    COMMANDED,
+    E_ATT,
+    E_NU,
+    N_E,
+    N_S,
+    N_W,
+    N_WORK_ROWS,
+    N_XE,
+    N_Z,
+    S_ANGULAR,
+    S_LINEAR,
+    X_ERR,
+    X_WATER,
+    Z_BALLAST,
+    Z_DEPTH,
+    Z_SLIDER,
+)
+from firmware.core.jit import kernel
+from firmware.core.maths.rotations import euler_from_quaternion, euler_rates, quaternion_from_euler, rotation_nb
+from firmware.core.vehicle.layout import N_P, N_X, X_ACT, X_NU, X_QUAT
+
+ROUGHNESS_TIME = 0.7  # s, in which the roughness follows scores that are twice (or half) what they should be
+ROUGHEST = 300.0  # times the vehicle file's disturbance
+STEEP = 1.4  # rad; beyond it Euler rates mean nothing and samples are taken as they are
+
+
+@kernel
+def new_samples(est, x, nav, t):
+    """The measurements of this tick into nav's z, NaN where nothing is new, each carried forward over its age."""
+    z = nav[at.NAV_Z : at.NAV_Z + N_Z]
+    for i in range(N_Z):
+        z[i] = math.nan
+    if est[at.EST_IMU_TIME] > nav[at.NAV_USED]:
+        age = t - est[at.EST_IMU_TIME]
+        nav[at.NAV_USED] = est[at.EST_IMU_TIME]
+        phi, theta, _ = euler_from_quaternion(x[3], x[4], x[5], x[6])
+        phi_rate, theta_rate, psi_rate = 0.0, 0.0, 0.0
+        if abs(theta) < STEEP:
+            phi_rate, theta_rate, psi_rate = euler_rates(phi, theta, x[X_NU + 3], x[X_NU + 4], x[X_NU + 5])
+        z[0] = est[at.NEW_ROLL] + phi_rate * age
+        z[1] = est[at.NEW_PITCH] + theta_rate * age
+        z[2] = est[at.NEW_YAW] + psi_rate * age
+        for i in range(3):
+            z[3 + i] = est[at.NEW_P + i]
+    if est[at.EST_BEACON_TIME] > nav[at.NAV_USED + 1]:
+        nav[at.NAV_USED + 1] = est[at.EST_BEACON_TIME]
+        z[Z_DEPTH] = est[at.NEW_DEPTH] + est[at.EST_DEPTH_RATE] * (t - est[at.EST_BEACON_TIME])
+    if est[at.EST_SLIDER_TIME] > nav[at.NAV_USED + 2]:
+        nav[at.NAV_USED + 2] = est[at.EST_SLIDER_TIME]
+        z[Z_SLIDER] = est[at.NEW_SLIDER]
+    if est[at.EST_PLUNGER_TIME] > nav[at.NAV_USED + 3]:
+        nav[at.NAV_USED + 3] = est[at.EST_PLUNGER_TIME]
+        z[Z_BALLAST] = est[at.NEW_BALLAST]
+
+
+@kernel
+def start_filter(P, nav, est, t, x, cov, work):
+    """The first state: at rest, attitude and depth as first measured, actuators where the draw-wires say."""
+    for i in range(N_XE):
+        x[i] = 0.0
+    x[2] = est[at.NEW_DEPTH]
+    x[X_QUAT], x[X_QUAT + 1], x[X_QUAT + 2], x[X_QUAT + 3] = quaternion_from_euler(
+        est[at.NEW_ROLL], est[at.NEW_PITCH], est[at.NEW_YAW]
+    )
+    x[X_ACT + 1], x[X_ACT + 2] = est[at.NEW_SLIDER], est[at.NEW_BALLAST]
+    nav[at.NAV_STRESS], nav[at.NAV_STRESS + 1] = 1.0, 1.0
+    for i in range(N_Z):
+        nav[at.NAV_BEYOND + i] = 0.0
+    for i in range(4):
+        nav[at.NAV_USED + i] = -1.0
+    spread = nav[at.NAV_SPREAD : at.NAV_SPREAD + N_E]
+    estimator_start(P, nav[at.NAV_SETTINGS : at.NAV_SETTINGS + N_S], nav[at.NAV_SIGMA : at.NAV_SIGMA + N_P], x, cov,
+                    spread, work)  # fmt: skip
+    nav[at.NAV_RUNNING], nav[at.NAV_TIME] = 1.0, t
+    nav[at.NAV_ROUGHNESS] = 1.0
+    nav[at.NAV_CALM] = nav[at.NAV_SETTINGS + S_LINEAR]
+    nav[at.NAV_CALM + 1] = nav[at.NAV_SETTINGS + S_ANGULAR]
+
+
+@kernel
+def write_state(x, est):
+    """A state (N_X or longer) as the rest of the autopilot reads it."""
+    est[at.EST_X], est[at.EST_Y], est[at.EST_DEPTH] = x[0], x[1], x[2]
+    est[at.EST_ROLL], est[at.EST_PITCH], est[at.EST_YAW] = euler_from_quaternion(x[3], x[4], x[5], x[6])
+    _, _, _, _, _, _, r31, r32, r33 = rotation_nb(x[3], x[4], x[5], x[6])
+    u, v, w = x[X_NU], x[X_NU + 1], x[X_NU + 2]
+    est[at.EST_U], est[at.EST_V], est[at.EST_W] = u, v, w
+    est[at.EST_DEPTH_RATE] = r31 * u + r32 * v + r33 * w
+    for i in range(3):
+        est[at.EST_P + i] = x[X_NU + 3 + i]
+    est[at.EST_SERVO], est[at.EST_SLIDER], est[at.EST_BALLAST] = x[X_ACT], x[X_ACT + 1], x[X_ACT + 2]
+
+
+@kernel
+def write_errors(x, cov, est):
+    """What the filter knows beside the state: current, model error, and how sure it is."""
+    _, _, _, _, _, _, r31, _, r33 = rotation_nb(x[3], x[4], x[5], x[6])
+    est[at.EST_WATER_N], est[at.EST_WATER_E] = x[X_WATER], x[X_WATER + 1]
+    for i in range(6):
+        est[at.MODEL_ERROR + i] = x[X_ERR + i]
+    est[at.SD_DEPTH_RATE] = math.sqrt(
+        r31 * r31 * cov[E_NU, E_NU] + r33 * r33 * cov[E_NU + 2, E_NU + 2] + 2.0 * r31 * r33 * cov[E_NU, E_NU + 2]
+    )
+    est[at.SD_PITCH] = math.sqrt(cov[E_ATT + 1, E_ATT + 1])
+    est[at.SD_U] = math.sqrt(cov[E_NU, E_NU])
+
+
+@kernel
+def follow_roughness(nav, scores, dt):
+    """Let the filter's disturbance follow the water: the gyro's squared scores are 1 on average where it is right.
+
+    A filter that believes in calm water lags behind rough water, and one that believes in rough water hands the gyro's
+    noise on. Roughness multiplies the disturbance's strength, and its square the spectral densities; it moves by the
+    scores' logarithm, so that one wild sample does little, and never below what the vehicle file says.
+    """
+    total, count = 0.0, 0
+    for i in range(3, 6):
+        if not math.isnan(scores[i]):
+            total += scores[i] * scores[i]
+            count += 1
+    if count == 0:
+        return
+    step = min(total / count, 4.0) - 1.0
+    roughness = nav[at.NAV_ROUGHNESS] * math.exp(step * dt / ROUGHNESS_TIME)
+    roughness = min(max(roughness, 1.0), ROUGHEST)
+    nav[at.NAV_ROUGHNESS] = roughness
+    nav[at.NAV_SETTINGS + S_LINEAR] = nav[at.NAV_CALM] * roughness * roughness
+    nav[at.NAV_SETTINGS + S_ANGULAR] = nav[at.NAV_CALM + 1] * roughness * roughness
+
+
+@kernel
+def navigate(P, C, nav, est, ap, t):
+    """One step of the filter at time t (s): the commands sent last, this tick's samples, the estimate into est."""
+    if est[at.EST_STARTED] == 0.0:
+        return
+    x = nav[at.NAV_X : at.NAV_X + N_XE]
+    cov = nav[at.NAV_COV : at.NAV_COV + N_E * N_E].reshape(N_E, N_E)
+    work = nav[at.NAV_WORK : at.NAV_WORK + N_WORK_ROWS * N_W].reshape(N_WORK_ROWS, N_W)
+    if nav[at.NAV_RUNNING] == 0.0:
+        start_filter(P, nav, est, t, x, cov, work)
+    new_samples(est, x, nav, t)
+    dt = t - nav[at.NAV_TIME]
+    nav[at.NAV_TIME] = t
+    scores = nav[at.NAV_SCORES : at.NAV_SCORES + N_Z]
+    estimator_step(
+        P, nav[at.NAV_SETTINGS : at.NAV_SETTINGS + N_S], nav[at.NAV_SIGMA : at.NAV_SIGMA + N_P], x, cov,
+        nav[at.NAV_STRESS : at.NAV_STRESS + 2], COMMANDED, ap[at.SENT_SERVO], ap[at.SENT_SLIDER], ap[at.SENT_BALLAST],
+        dt, nav[at.NAV_Z : at.NAV_Z + N_Z], nav[at.NAV_BEYOND : at.NAV_BEYOND + N_Z], scores, work,
+    )  # fmt: skip
+    write_state(nav[at.NAV_GIVEN : at.NAV_GIVEN + N_X] if C[at.ESTIMATOR] == at.GIVEN else x, est)
+    write_errors(x, cov, est)
+    follow_roughness(nav, scores, dt)
+    est[at.ROUGHNESS] = nav[at.NAV_ROUGHNESS]

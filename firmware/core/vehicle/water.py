@@ -1,0 +1,72 @@
+"""Forces and moments of the water on the hull: equations (3) and (4), lift by ledger L4."""
+
+import math
+
+from firmware.core.jit import kernel
+from firmware.core.vehicle.layout import (
+    K_BETA,
+    K_D,
+    K_D0,
+    K_L,
+    K_L0,
+    K_M,
+    K_M0,
+    K_MR,
+    K_MY,
+    K_P,
+    K_Q,
+    K_R,
+    LIFT_PRINTED,
+)  # fmt: skip
+
+STILL = 1e-6  # m/s; below this the flow has no direction and alpha = beta = 0
+
+
+@kernel
+def flow_angles(u, v, w):
+    """Angle of attack, sideslip angle (rad) and squared speed through the water (m2/s2)."""
+    v_squared = u * u + v * v + w * w
+    speed = math.sqrt(v_squared)
+    if speed < STILL:
+        return 0.0, 0.0, v_squared
+    # + 0.0 makes -0.0 a zero like any other: atan2(0, -0.0) is pi, and flow_to_body knows no such flow
+    return math.atan2(w, u + 0.0), math.asin(min(1.0, max(-1.0, v / speed))), v_squared
+
+
+@kernel
+def flow_to_body(u, v, w, a, b, c):
+    """R_bf [a, b, c], equation (3): from flow axes to body axes, with the sines and cosines taken from u, v, w."""
+    plane = math.sqrt(u * u + w * w)
+    speed = math.sqrt(u * u + v * v + w * w)
+    if speed < STILL:
+        return a, b, c
+    sb, cb = v / speed, plane / speed
+    if plane > 0.0:
+        ca, sa = u / plane, w / plane
+    else:
+        ca, sa = 1.0, 0.0
+    along = cb * a - sb * b
+    return ca * along - sa * c, sb * a + cb * b, sa * along + ca * c
+
+
+@kernel
+def water_wrench(P, u, v, w, p, q, r):
+    """Force (N) and moment (N m) of the water in body axes, F1 F2 F3 T1 T2 T3, for velocities relative to the water.
+
+    D = (K_D0 + K_D alpha^2) V^2, SF = K_beta beta V^2, L = (K_L0 + K_L alpha) V^2 (ledger L4; K_L alpha^2 with
+    LIFT_PRINTED), T_DL1 = (K_MR beta + K_p p) V^2, T_DL2 = (K_M0 + K_M alpha + K_q q) V^2,
+    T_DL3 = (K_MY beta + K_r r) V^2.
+    """
+    alpha, beta, v_squared = flow_angles(u, v, w)
+    drag = (P[K_D0] + P[K_D] * alpha * alpha) * v_squared
+    lift_slope = alpha * alpha if P[LIFT_PRINTED] != 0.0 else alpha
+    lift = (P[K_L0] + P[K_L] * lift_slope) * v_squared
+    side = P[K_BETA] * beta * v_squared
+    F1, F2, F3 = flow_to_body(u, v, w, -drag, side, -lift)
+    T1, T2, T3 = flow_to_body(
+        u, v, w,
+        (P[K_MR] * beta + P[K_P] * p) * v_squared,
+        (P[K_M0] + P[K_M] * alpha + P[K_Q] * q) * v_squared,
+        (P[K_MY] * beta + P[K_R] * r) * v_squared,
+    )  # fmt: skip
+    return F1, F2, F3, T1, T2, T3

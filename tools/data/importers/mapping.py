@@ -1,0 +1,190 @@
+"""The mapping file of `glider import csv`: which column of a foreign log becomes which column of run data, and how.
+
+    value = sign * scale * (logged - zero), in `unit`, turned into SI, + offset
+
+docs/IMPORT.md explains every key with an example.
+"""
+
+import math
+import tomllib
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, Literal
+
+import msgspec
+
+from firmware.model.strict import ConfigError, Table, decode, locate
+from tools.data.errors import InputError
+from tools.data.runs import columns as names
+from tools.data.sources import read_text
+
+GRAVITY = 9.80665  # m/s2, for depth out of pressure
+
+# unit -> (kind, factor to SI). 'counts' is for values that `scale` alone turns into the target's SI unit.
+UNITS: dict[str, tuple[str, float]] = {
+    "m": ("length", 1.0),
+    "cm": ("length", 0.01),
+    "mm": ("length", 0.001),
+    "ft": ("length", 0.3048),
+    "in": ("length", 0.0254),
+    "rad": ("angle", 1.0),
+    "deg": ("angle", math.pi / 180.0),
+    "rad/s": ("rate", 1.0),
+    "deg/s": ("rate", math.pi / 180.0),
+    "kg": ("mass", 1.0),
+    "g": ("mass", 0.001),
+    "lb": ("mass", 0.45359237),
+    "Pa": ("pressure", 1.0),
+    "kPa": ("pressure", 1e3),
+    "mbar": ("pressure", 100.0),
+    "dbar": ("pressure", 1e4),
+    "bar": ("pressure", 1e5),
+    "psi": ("pressure", 6894.757293168),
+    "counts": ("counts", 1.0),
+}
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
+_KINDS = (("_rad_s", "rate"), ("_rad", "angle"), ("_kg", "mass"), ("_m", "length"))
+
+Factor = Annotated[float, msgspec.Meta(ge=-1e12, le=1e12)]
+
+
+class ColumnTable(Table):
+    """[columns.NAME] or [extra.NAME]: where a column comes from."""
+
+    source: Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
+    unit: str = "counts"
+    scale: Factor = 1.0  # units a step of the logged number
+    zero: Factor = 0.0  # the logged number that means nothing
+    sign: Literal[1, -1] = 1
+    offset: Factor = 0.0  # added at the end, SI
+    valid: tuple[Factor, Factor] | None = None  # SI; what is outside becomes missing
+    decimals: Annotated[int, msgspec.Meta(ge=0, le=17)] | None = None  # of the written file; exact without
+
+    def __post_init__(self):
+        if self.unit not in UNITS:
+            raise ValueError(f"unit: expected one of {', '.join(UNITS)}, got {self.unit!r}")
+        if self.scale == 0.0:
+            raise ValueError("scale: expected anything but 0")
+        if self.valid is not None and not self.valid[0] < self.valid[1]:
+            raise ValueError(f"valid: expected [low, high] with low < high, got {list(self.valid)}")
+
+    def factor(self, density: float) -> float:
+        """From logged steps to SI; a pressure becomes a depth of water of this density, kg/m3."""
+        kind, factor = UNITS[self.unit]
+        if kind == "pressure":
+            factor /= density * GRAVITY
+        return self.sign * self.scale * factor
+
+
+class TimeTable(Table):
+    """[time]: the log's clock."""
+
+    column: Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
+    unit: str = "s"  # one of TIME_UNITS, or iso8601 for dates and times
+    not_increasing: Literal["refuse", "drop"] = "refuse"
+
+    def __post_init__(self):
+        if self.unit not in TIME_UNITS and self.unit != "iso8601":
+            raise ValueError(f"unit: expected one of {', '.join(TIME_UNITS)}, iso8601, got {self.unit!r}")
+
+
+class CutTable(Table):
+    """[[cut]]: the part of a file to take, s from its first row; `file` is its name, * for anything."""
+
+    file: Annotated[str, msgspec.Meta(min_length=1, max_length=200)] = "*"
+    start_s: Annotated[float, msgspec.Meta(ge=0.0)] = 0.0
+    end_s: Annotated[float, msgspec.Meta(gt=0.0)] | None = None
+
+    def __post_init__(self):
+        if self.end_s is not None and self.end_s <= self.start_s:
+            raise ValueError(f"end_s: expected more than start_s = {self.start_s}, got {self.end_s}")
+
+
+class TextTable(Table):
+    """[text]: how the file is written."""
+
+    delimiter: Annotated[str, msgspec.Meta(min_length=1, max_length=1)] = ","
+    decimal: Literal[".", ","] = "."
+    encoding: Literal["utf-8", "latin-1"] = "utf-8"
+    skip_lines: Annotated[int, msgspec.Meta(ge=0, le=10_000)] = 0  # above the header
+    header: tuple[str, ...] = ()  # for files that have none
+    missing: tuple[str, ...] = ()  # what stands for a missing sample, beside nothing
+    broken_rows: Literal["refuse", "drop"] = "refuse"  # rows of too few or too many fields
+
+
+class MapTable(Table):
+    """A mapping file."""
+
+    format: Annotated[int, msgspec.Meta(ge=1, le=1)]
+    vehicle: Annotated[str, msgspec.Meta(min_length=1, max_length=1000)]
+    water_density_kg_m3: Annotated[float, msgspec.Meta(ge=900.0, le=1300.0)]
+    time: TimeTable
+    columns: Annotated[dict[str, ColumnTable], msgspec.Meta(min_length=1)]
+    site: Annotated[str, msgspec.Meta(max_length=1000)] = ""
+    extra: dict[str, ColumnTable] = msgspec.field(default_factory=dict)
+    # Means at this rate; without it, row by row.
+    rate_hz: Annotated[float, msgspec.Meta(gt=0.0, le=10_000.0)] | None = None
+    max_gap_s: Annotated[float, msgspec.Meta(ge=0.0)] = 0.0  # longer holes are missing, shorter ones interpolated
+    rates_from_attitude: bool = False  # p, q, r that are not mapped, out of roll, pitch and yaw
+    cut: tuple[CutTable, ...] = ()
+    text: TextTable = TextTable()
+
+
+def _check(mapping: MapTable, source: str) -> None:
+    """What no single table can see; ConfigError."""
+    for name, column in mapping.columns.items():
+        if name not in names.KNOWN or name == names.TIME:
+            known = ", ".join(sorted(names.KNOWN - {names.TIME}))
+            raise ConfigError(
+                source, f"no column of run data (put it in [extra], or use {known})", key=f"columns.{name}"
+            )
+        wanted = next(kind for ending, kind in _KINDS if name.endswith(ending))
+        kind = UNITS[column.unit][0]
+        if kind not in (wanted, "counts") and not (kind == "pressure" and name == names.DEPTH):
+            raise ConfigError(source, f"{column.unit!r} is no unit of {wanted}", key=f"columns.{name}.unit")
+    for name in mapping.extra:
+        if name in names.KNOWN or not name.strip():
+            raise ConfigError(source, "the name is taken by a column of run data", key=f"extra.{name}")
+    if mapping.rates_from_attitude and not all(name in mapping.columns for name in names.ATTITUDE):
+        raise ConfigError(source, f"needs {', '.join(names.ATTITUDE)}", key="rates_from_attitude")
+    if mapping.max_gap_s and mapping.rate_hz is None:
+        raise ConfigError(source, "needs rate_hz: a log taken row by row has no gaps to fill", key="max_gap_s")
+
+
+def decode_map(text: str, source: str) -> MapTable:
+    """A mapping file's text; raises ConfigError with file, line and key."""
+    try:
+        mapping = decode(text, MapTable, source)
+    except ConfigError as error:
+        raise _with_column(error, text, source) from None
+    _check(mapping, source)
+    return mapping
+
+
+def _with_column(error: ConfigError, text: str, source: str) -> ConfigError:
+    """An error inside [columns] or [extra] with the column's name, which the decoder leaves out for tables by name."""
+    group, *rest = error.key.split(".")
+    if group not in ("columns", "extra"):
+        return error
+    for name, table in tomllib.loads(text)[group].items():
+        try:
+            msgspec.convert(table, ColumnTable, strict=True)
+        except msgspec.ValidationError:
+            path: list[str | int] = [group, name, *rest]
+            return ConfigError(source, error.message, key=".".join(map(str, path)), line=locate(text, path))
+    return error
+
+
+def load_map(wanted: str) -> tuple[MapTable, Path]:
+    """A mapping by shipped name or by path, and the folder that its vehicle file is looked for in."""
+    shipped = {
+        entry.name.removesuffix(".toml"): entry.read_text(encoding="utf-8")
+        for entry in files("tools.data.importers").joinpath("maps").iterdir()
+        if entry.name.endswith(".toml")
+    }
+    if wanted in shipped:
+        return decode_map(shipped[wanted], f"{wanted} (shipped)"), Path()
+    path = Path(wanted)
+    if path.is_file():
+        return decode_map(read_text(path), str(path)), path.parent
+    raise InputError(f"no mapping '{wanted}': neither a file nor one of {', '.join(sorted(shipped))}")

@@ -1,0 +1,230 @@
+"""A case: a folder of `case.toml` and its runs, with the vehicle they were flown with."""
+
+import itertools
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+
+from firmware.model.strict import MAX_BYTES, Table, decode
+from firmware.model.vehicle import DisturbanceTable, NonNegative, SensorsTable, SensorTable, Vehicle
+from tools.data.errors import InputError
+from tools.data.runs import csvfile
+from tools.data.runs.run import Run, load_run, run_name, write_run
+from tools.data.sources import load_vehicle, read_text
+
+CASE_FILE = "case.toml"
+VEHICLE_FILE = "vehicle.toml"  # beside it, where the vehicle is not a shipped one
+_RUN_FILE = re.compile(r"run.*\.csv(\.gz)?\Z")
+_NUMBER = re.compile(r"\d+")
+
+
+class SensorsPart(Table):
+    """[sensors] of a case: any of the vehicle's entries, each in place of the vehicle's."""
+
+    attitude: SensorTable | None = None
+    gyro: SensorTable | None = None
+    depth: SensorTable | None = None
+    slider: SensorTable | None = None
+    ballast: SensorTable | None = None
+    mocap_position: SensorTable | None = None
+    mocap_attitude: SensorTable | None = None
+
+
+class DisturbancePart(Table):
+    """[disturbance] of a case."""
+
+    linear: NonNegative | None = None
+    angular: NonNegative | None = None
+
+
+class CaseTable(Table):
+    """case.toml."""
+
+    format: Annotated[int, msgspec.Meta(ge=1, le=1)]
+    vehicle: Annotated[str, msgspec.Meta(min_length=1, max_length=1000)]
+    site: Annotated[str, msgspec.Meta(max_length=1000)]
+    log_rate_hz: Annotated[float, msgspec.Meta(gt=0.0, le=10_000.0)]
+    water_density_kg_m3: Annotated[float, msgspec.Meta(ge=900.0, le=1300.0)]
+    motion_capture: bool
+    runs: Annotated[int, msgspec.Meta(ge=1, le=100_000)]
+    sensors: SensorsPart = SensorsPart()
+    disturbance: DisturbancePart = DisturbancePart()
+
+
+@dataclass
+class Case:
+    """Runs of one vehicle at one site."""
+
+    folder: Path
+    vehicle: Vehicle
+    vehicle_name: str  # as case.toml gives it: a shipped name or a path
+    site: str
+    log_rate_hz: float
+    water_density_kg_m3: float
+    motion_capture: bool
+    runs: list[Run]
+    sensors: SensorsTable  # the vehicle's, with the case's entries in their place
+    disturbance: DisturbanceTable
+
+
+def _run_files(folder: Path) -> list[Path]:
+    """The folder's run files by number; InputError where one run is there packed and unpacked."""
+    files = [path for path in folder.iterdir() if _RUN_FILE.match(path.name)]
+
+    def place(path: Path) -> tuple[int, str]:
+        number = _NUMBER.search(run_name(path))
+        return (int(number.group()) if number else -1, path.name)
+
+    files.sort(key=place)
+    for first, second in itertools.pairwise(files):
+        if run_name(first) == run_name(second):
+            raise InputError(f"the run is there twice, as {first.name} too", source=second)
+    return files
+
+
+def _read_case_file(folder: Path) -> CaseTable:
+    path = folder / CASE_FILE
+    if not folder.is_dir():
+        raise InputError("not a folder" if folder.exists() else "no such folder", source=folder)
+    if not path.is_file():
+        raise InputError(f"no {CASE_FILE} in this folder", source=folder)
+    if path.stat().st_size > 4 * MAX_BYTES:  # UTF-8 takes up to four bytes a character
+        raise InputError(f"longer than {MAX_BYTES} characters", source=path)
+    return decode(read_text(path), CaseTable, str(path))
+
+
+def _assemble(folder: Path, table: CaseTable, runs: list[Run]) -> Case:
+    vehicle = load_vehicle(table.vehicle, base=folder)
+    return Case(
+        folder=folder,
+        vehicle=vehicle,
+        vehicle_name=table.vehicle,
+        site=table.site,
+        log_rate_hz=table.log_rate_hz,
+        water_density_kg_m3=table.water_density_kg_m3,
+        motion_capture=table.motion_capture,
+        runs=runs,
+        sensors=_replaced(vehicle.sensors, table.sensors),
+        disturbance=_replaced(vehicle.disturbance, table.disturbance),
+    )
+
+
+def _given(part: Table | None) -> dict[str, Any]:
+    """The entries of a table that are there."""
+    whole = {} if part is None else msgspec.structs.asdict(part)
+    return {name: value for name, value in whole.items() if value is not None}
+
+
+def _replaced(whole: Any, part: Table) -> Any:
+    return msgspec.structs.replace(whole, **_given(part))
+
+
+def load_case(folder: Path | str) -> Case:
+    """A case with all its runs; InputError or ConfigError, one line, where it cannot be used."""
+    folder = Path(folder)
+    table = _read_case_file(folder)
+    files = _run_files(folder)
+    if len(files) != table.runs:
+        message = f"{table.runs} expected, {len(files)} files run*.csv found"
+        raise InputError(message, source=folder / CASE_FILE, column="runs")
+    return _assemble(folder, table, [load_run(path) for path in files])
+
+
+def load_case_of_run(path: Path | str) -> tuple[Case, Run]:
+    """One run and its case, by the case.toml beside it; the case's other runs are neither read nor counted."""
+    path = Path(path)
+    if not path.is_file():
+        raise InputError("not a file" if path.exists() else "no such file", source=path)
+    table = _read_case_file(path.parent)
+    run = load_run(path)
+    return _assemble(path.parent, table, [run]), run
+
+
+def _quoted(text: str) -> str:
+    """A TOML basic string."""
+    special = {'"': '\\"', "\\": "\\\\"}
+    return '"' + "".join(special.get(c, f"\\u{ord(c):04x}" if ord(c) < 32 or ord(c) == 127 else c) for c in text) + '"'
+
+
+def case_text(
+    *,
+    vehicle: str,
+    site: str,
+    log_rate_hz: float,
+    water_density_kg_m3: float,
+    motion_capture: bool,
+    runs: int,
+    sensors: SensorsPart | SensorsTable | None = None,
+    disturbance: DisturbancePart | DisturbanceTable | None = None,
+) -> str:
+    """The text of a case.toml; raises ConfigError where a value is not one that reading would take."""
+    lines = [
+        "format = 1",
+        f"vehicle = {_quoted(vehicle)}",
+        f"site = {_quoted(site)}",
+        f"log_rate_hz = {float(log_rate_hz)!r}",
+        f"water_density_kg_m3 = {float(water_density_kg_m3)!r}",
+        f"motion_capture = {str(bool(motion_capture)).lower()}",
+        f"runs = {runs}",
+    ]
+    entries = [
+        f"{name} = {{ noise = {entry.noise!r}, bias = {entry.bias!r} }}" for name, entry in _given(sensors).items()
+    ]
+    if entries:
+        lines += ["", "[sensors]", *entries]
+    entries = [f"{name} = {value!r}" for name, value in _given(disturbance).items()]
+    if entries:
+        lines += ["", "[disturbance]", *entries]
+    text = "\n".join(lines) + "\n"
+    decode(text, CaseTable, CASE_FILE)
+    return text
+
+
+def write_case(
+    folder: Path | str,
+    runs: list[Run],
+    *,
+    vehicle: str,
+    vehicle_text: str | None = None,
+    site: str,
+    log_rate_hz: float,
+    water_density_kg_m3: float,
+    motion_capture: bool | None = None,
+    sensors: SensorsPart | SensorsTable | None = None,
+    disturbance: DisturbancePart | DisturbanceTable | None = None,
+    suffix: str = ".csv",
+    decimals: dict[str, int] | None = None,
+) -> list[Path]:
+    """Write runs as a case, run00 on, and return the run files; case.toml comes last, so that a cut one is no case.
+
+    `vehicle` is a shipped name or a path from the case's folder; with `vehicle_text`, that file is written too, as
+    vehicle.toml. `motion_capture` is, if not given, whether any run has it. InputError where the folder already holds a
+    case: runs of two cases in one folder could not be told apart.
+    """
+    folder = Path(folder)
+    if motion_capture is None:
+        motion_capture = any(run.has_mocap for run in runs)
+    text = case_text(
+        vehicle=vehicle if vehicle_text is None else VEHICLE_FILE,
+        site=site,
+        log_rate_hz=log_rate_hz,
+        water_density_kg_m3=water_density_kg_m3,
+        motion_capture=motion_capture,
+        runs=len(runs),
+        sensors=sensors,
+        disturbance=disturbance,
+    )
+    if folder.is_dir() and ((folder / CASE_FILE).exists() or _run_files(folder)):
+        raise InputError("the folder already holds a case: name another, or empty it", source=folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    files = []
+    for number, run in enumerate(runs):
+        files.append(folder / f"run{number:02d}{suffix}")
+        write_run(files[-1], run, decimals=decimals)
+    if vehicle_text is not None:
+        csvfile.write_bytes(folder / VEHICLE_FILE, vehicle_text.encode("utf-8"))
+    csvfile.write_bytes(folder / CASE_FILE, text.encode("utf-8"))
+    return files

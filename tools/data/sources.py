@@ -1,0 +1,54 @@
+"""From what a user types, a name or a path, to a decoded file."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
+from firmware.guidance.mission import Mission, decode_mission
+from firmware.model.library import shipped
+from firmware.model.vehicle import Vehicle, decode_vehicle
+from tools.data.errors import InputError
+
+T = TypeVar("T")
+LONGEST = 256_000_000  # characters of any text file
+
+
+def read_text(path: Path) -> str:
+    """A text file's content; InputError where it cannot be read."""
+    try:
+        with path.open(encoding="utf-8") as file:
+            text = file.read(LONGEST + 1)
+        if len(text) > LONGEST:
+            raise InputError(f"longer than {LONGEST} characters", source=path)
+        return text
+    except UnicodeDecodeError as error:
+        raise InputError(f"not UTF-8 text (byte {error.start})", source=path) from None
+    except OSError as error:
+        raise InputError(error.strerror or str(error), source=path) from None
+
+
+def name_or_path(wanted: str, kind: str, folder: str, base: Path | None = None) -> tuple[str, str]:
+    """Text and source of a shipped name or of a path (relative to `base` first, then to the working directory)."""
+    library = shipped(folder)
+    if wanted in library:
+        return library[wanted], f"{wanted} (shipped)"
+    for candidate in ([base / wanted] if base else []) + [Path(wanted)]:
+        if candidate.is_file():
+            return read_text(candidate), str(candidate)
+    raise InputError(f"no {kind} '{wanted}': neither a file nor one of {', '.join(library) or 'none'}")
+
+
+def _load(wanted: str, kind: str, folder: str, decode: Callable[[str, str], T], base: Path | None) -> T:
+    text, source = name_or_path(wanted, kind, folder, base)
+    return decode(text, source)
+
+
+def load_vehicle(wanted: str, base: Path | None = None) -> Vehicle:
+    """A vehicle by shipped name or path; `base` is the folder of the file that names it."""
+    return _load(wanted, "vehicle", "model/vehicles", decode_vehicle, base)
+
+
+def load_mission(wanted: str) -> tuple[str, str, Mission]:
+    """A mission by shipped name or path: its text, its source, and the mission."""
+    text, source = name_or_path(wanted, "mission", "guidance/missions")
+    return text, source, decode_mission(text, source)

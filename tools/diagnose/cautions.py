@@ -1,0 +1,98 @@
+"""What a case cannot say, in plain words: columns that are not there, stretches without samples, one run, a bad fit."""
+
+import itertools
+
+import numpy as np
+
+from sim_backend.effects.base import catalogue
+from tools.data.runs import columns as names
+from tools.diagnose.probes import UNPREDICTABLE
+from tools.inference.candidates import candidates
+from tools.inference.problem import Problem
+from tools.inference.windows import START
+
+SPARSE, LONG = 0.2, 5.0  # share of samples missing; s without a sample
+PARTS = {
+    "onboard attitude": names.ATTITUDE,
+    "gyro": names.RATES,
+    "depth": (names.DEPTH,),
+    "draw-wires": names.DRAW_WIRES,
+    "motion capture": names.MOCAP_POSITION,
+}
+WITHOUT = {
+    "onboard attitude": "errors of the attitude sensor cannot be seen",
+    "gyro": "errors of the gyro cannot be seen, and quick effects less sharply",
+    "depth": "errors of the pressure sensor cannot be seen",
+    "draw-wires": "slider and ballast are taken to follow their commands",
+    "motion capture": "a steady current and errors common to all onboard sensors cannot be seen",
+}
+
+
+def cautions(problem: Problem) -> list[str]:
+    """Everything about these runs that limits what can be concluded, a line each."""
+    return [*_without_commands(problem), *_without_columns(problem), *_holes(problem), *_few(problem)]
+
+
+def not_asked(problem: Problem) -> list[str]:
+    """Labels that these runs cannot show at all, and that are therefore not among the causes tried."""
+    tried = candidates(problem)
+    return [label for label in catalogue() if label not in tried and label not in UNPREDICTABLE]  # asked otherwise
+
+
+def _without_commands(problem: Problem) -> list[str]:
+    lacking = [run.name for run in problem.runs if not run.has_commands]
+    if not lacking:
+        return []
+    where = "" if len(lacking) == len(problem.runs) else f" in {', '.join(lacking)}"
+    return [
+        f"no commands{where}: the flights are driven by the draw-wires, the servo is guessed, and how actuators follow "
+        "their commands cannot be judged"
+    ]
+
+
+def _without_columns(problem: Problem) -> list[str]:
+    found = []
+    for part, wanted in PARTS.items():
+        lacking = [run.name for run in problem.runs if not any(name in run.columns for name in wanted)]
+        partly = [
+            (run.name, [name for name in wanted if name not in run.columns])
+            for run in problem.runs
+            if run.name not in lacking and not run.has(*wanted)
+        ]
+        if lacking:
+            where = "" if len(lacking) == len(problem.runs) else f" in {', '.join(lacking)}"
+            found.append(f"no {part}{where}: {WITHOUT[part]}")
+        for run, missing in partly:
+            found.append(f"{run}: column {', '.join(missing)} is missing: what it would show cannot be seen")
+    return found
+
+
+def _holes(problem: Problem) -> list[str]:
+    """Columns with many samples missing, or none for long; motion capture's short blind spells are usual."""
+    found = []
+    for run in problem.runs:
+        holed = []
+        for name, values in run.columns.items():
+            if name == names.TIME or name in names.COMMANDS:
+                continue
+            ok = np.isfinite(values)
+            if not ok.any():
+                holed.append(f"{name} (no sample)")
+                continue
+            at = np.concatenate([run.t[:1], run.t[ok], run.t[-1:]])
+            longest = max(b - a for a, b in itertools.pairwise(at))
+            if 1.0 - ok.mean() > SPARSE or longest > LONG:
+                holed.append(f"{name} ({100.0 * (1.0 - ok.mean()):.0f} % missing, up to {longest:.0f} s)")
+        if holed:
+            found.append(f"{run.name}: {', '.join(holed)}: less can be seen there")
+    return found
+
+
+def _few(problem: Problem) -> list[str]:
+    found = []
+    if len(problem.runs) == 1:
+        found.append("one run only: nothing can be left out, so that figures after a fit are not checked on other data")
+    short = [run.name for run in problem.runs if run.t[-1] - run.t[0] <= START]
+    if short:
+        found.append(f"{', '.join(short)}: no longer than {START:g} s, so that nothing of it is scored")
+    return found

@@ -1,0 +1,137 @@
+"""A data-driven correction: what an unknown gap does, learned at the link of the chain where it enters.
+
+Where no effect of the catalogue explains a gap, the link that gains most when freed is given an error of its own: a sum
+of shapes (constant, speed, depth, angles of flow, rates, running pump, time, climb or dive) with coefficients fitted as
+those of an effect are. It is no cause, but it says what the gap goes with, and by how much the gap would shrink.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from sim_backend.core import effect_layout as ef
+from tools.diagnose.probes import UNPREDICTABLE, Probe, Probed
+from tools.diagnose.residuals import pump_speed
+from tools.diagnose.search import Search, settle
+from tools.inference.candidates import Free
+from tools.inference.corrected import LINKS
+from tools.inference.fit import Course, Fitter
+
+LABEL = "correction"
+LINKS_TRIED = 3
+REFITS, STEPS = 3, 4
+TELLING = 0.1  # of the correction's size that a shape must carry to be named
+
+UNITS = ("N", "N", "N", "N m", "N m", "N m", "rad", "m", "kg", *3 * ("rad",), *3 * ("rad/s",), "m", "m", "kg")
+SPREADS = (0.5, 0.5, 0.5, 0.2, 0.2, 0.1, 0.1, 0.005, 0.02, *3 * (0.05,), *3 * (0.03,), 0.2, 0.005, 0.02)
+OF_PROBE = {"attitude": ("roll", "pitch", "yaw"), "gyro": ("roll rate", "pitch rate", "yaw rate")}
+BY_PUMP = ef.SHAPES.index("pump running")
+
+
+@dataclass
+class Correction:
+    """A link with the error that these runs ask for there."""
+
+    link: str
+    unit: str
+    search: Search  # its problem knows of the link
+    course: Course
+    carried: dict[str, float]  # by shape: rms of its part over the runs, in the unit; those that tell, largest first
+
+    @property
+    def coefficients(self) -> dict[str, float]:
+        """By shape, in the link's unit."""
+        return {
+            free.name: float(value * free.spread)
+            for free, value in zip(self.course.free, self.course.values, strict=True)
+            if free.label == LABEL
+        }
+
+    def plain(self) -> dict[str, Any]:
+        return {"link": self.link, "unit": self.unit, "goes_with": self.carried, "coefficients": self.coefficients}
+
+
+def links_of(probe: Probe) -> tuple[str, ...]:
+    """The links that a probe stands for; none for the water and for motion capture."""
+    if probe.name in UNPREDICTABLE:
+        return ()
+    return tuple(link for link in OF_PROBE.get(probe.name, (probe.name,)) if link in LINKS)
+
+
+def free_of(link: str) -> list[Free]:
+    """The coefficients of a correction at a link."""
+    number = LINKS.index(link)
+    shapes = list(enumerate(ef.SHAPES))
+    if number >= ef.ACTUATOR_LINKS:  # a sensor does not feel the pump
+        shapes.pop(BY_PUMP)
+    return [
+        Free(LABEL, name, "F", ef.SHAPE + k, SPREADS[number] * (0.3 if k else 1.0), unit=UNITS[number])
+        for k, name in shapes
+    ]
+
+
+def fitted(search: Search, course: Course, link: str) -> tuple[Search, Course]:
+    """A correction at a link beside a candidate's effects, fitted with gains of its own."""
+    F = np.zeros(ef.N_F)
+    F[ef.LINK] = 1.0 + LINKS.index(link)
+    problem = replace(search.problem, model=replace(search.problem.model, F=F))
+    own = replace(search, problem=problem, courses=[])
+    free = [*course.free, *free_of(link)]
+    values = np.concatenate([course.values, np.zeros(len(free) - len(course.free))])
+    found = Course((*course.labels, LABEL), free, values, course.allowed)
+    for _ in range(REFITS):
+        own.gains = problem.filter(*own.model(found), begin=True)
+        own.fitter = Fitter(problem, own.gains, own.allowed, found, temper=True)
+        found = own.fitter.course(found.labels, free, found.values, found.allowed)
+        own.fitter.measure([found])
+        settle(own.fitter, found, STEPS)
+    own.gains = problem.filter(*own.model(found), begin=True)
+    own.courses = [found]
+    return own, found
+
+
+def shapes_flown(search: Search) -> np.ndarray:
+    """The shapes along the runs where the filter stands, (rows, N_SHAPES)."""
+    x = search.gains.X
+    speed = np.maximum(np.sqrt((x[:, 7:10] ** 2).sum(axis=1)), 0.05)
+    pump = pump_speed(search.problem, search.gains)
+    dive = 2.0 * (x[:, 4] * x[:, 6] - x[:, 3] * x[:, 5])
+    return np.column_stack([
+        np.ones(len(x)), (x[:, 7:10] ** 2).sum(axis=1) / 0.09, x[:, 2] / 5.0, 10.0 * x[:, 9] / speed,
+        10.0 * x[:, 8] / speed, 10.0 * x[:, 10:13], pump / 0.03,
+        search.problem.since / 60.0, np.tanh(dive / ef.REST_PITCH),
+    ])  # fmt: skip
+
+
+def carried_by(search: Search, course: Course) -> dict[str, float]:
+    """How much of the correction each shape carries over these runs (rms), the largest first, what tells only."""
+    table = shapes_flown(search)
+    parts = {
+        free.name: float(abs(value) * free.spread * np.sqrt(np.mean(table[:, free.entry - ef.SHAPE] ** 2)))
+        for free, value in zip(course.free, course.values, strict=True)
+        if free.label == LABEL
+    }
+    whole = np.sqrt(sum(part**2 for part in parts.values()))
+    ranked = sorted(parts.items(), key=lambda item: -item[1])
+    return {name: part for name, part in ranked if part >= TELLING * whole}
+
+
+def correct(
+    search: Search, course: Course, freed: list[Probed], say: Callable[[str], None] = lambda text: None
+) -> Correction | None:
+    """The correction that explains most, of those at the links that gain most when freed; None where none may be."""
+    probes = [found.probe for found in freed if found.gain > 0.0 and links_of(found.probe)][:LINKS_TRIED]
+    best: tuple[float, str, Search, Course] | None = None
+    for probe in probes:
+        for link in links_of(probe):
+            say(f"correction: {link}")
+            own, found = fitted(search, course, link)
+            misfit = float(own.gains.misfit.sum())
+            if np.isfinite(misfit) and (best is None or misfit < best[0]):
+                best = misfit, link, own, found
+    if best is None:
+        return None
+    _, link, own, found = best
+    return Correction(link, UNITS[LINKS.index(link)], own, found, carried_by(own, found))

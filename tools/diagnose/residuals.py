@@ -1,0 +1,134 @@
+"""Whether anything is left: tests on whitened innovations, which the true model leaves white and of unit variance.
+
+Each test is a number of standard deviations, normal under the true model; the largest of them is judged against how
+many there are (Bonferroni). Spectrum and correlations are taken run by run and pooled, gaps in the data count as 0.
+"""
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import norm
+
+from tools.inference.problem import Gains, Problem
+
+CHANNELS = (
+    "roll", "pitch", "yaw", "p", "q", "r", "depth", "slider", "ballast",
+    "mocap x", "mocap y", "mocap z", "mocap roll", "mocap pitch", "mocap yaw",
+)  # fmt: skip
+LAGS = ((1, 2), (3, 10), (11, 60))  # samples, in groups
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One test: what is left in a channel, and what it goes with."""
+
+    channel: str
+    test: str
+    sigma: float
+
+
+def features(problem: Problem, gains: Gains) -> dict[str, np.ndarray]:
+    """What something left may go with, each (rows,), by the best model's state."""
+    x = gains.X
+    speed = np.sqrt((x[:, 7:10] ** 2).sum(axis=1))
+    moving = pump_speed(problem, gains)
+    pitch = np.arcsin(np.clip(2.0 * (x[:, 3] * x[:, 5] - x[:, 6] * x[:, 4]), -1.0, 1.0))
+    return {
+        "speed": speed,
+        "depth": x[:, 2],
+        "time": problem.since,
+        "pitch": pitch,
+        "pitch rate": x[:, 11],
+        "roll rate": x[:, 10],
+        "yaw rate": x[:, 12],
+        "angle of attack": x[:, 9] / np.maximum(speed, 0.05),
+        "sideslip": x[:, 8] / np.maximum(speed, 0.05),
+        "servo": x[:, 13],
+        "slider": x[:, 14],
+        "ballast": x[:, 15],
+        "pump running": (np.abs(moving) > 0.003).astype(float),
+        "pump expelling": (moving < -0.003).astype(float),
+    }
+
+
+def pump_speed(problem: Problem, gains: Gains) -> np.ndarray:
+    """Speed of the ballast, kg/s, where the filter stands, (rows,)."""
+    speed = np.zeros(len(gains.X))
+    for a, b in itertools.pairwise(problem.recording.bounds):
+        if b - a > 1:
+            speed[a:b] = np.gradient(gains.X[a:b, 15], problem.recording.t[a:b])
+    return speed
+
+
+def tests(problem: Problem, gains: Gains) -> list[Finding]:
+    """Every test of every channel, the strongest first."""
+    found = []
+    E = gains.E
+    bounds = problem.recording.bounds
+    with_what = features(problem, gains)
+    for m, channel in enumerate(CHANNELS):
+        e = E[:, m]
+        ok = np.isfinite(e)
+        count = int(ok.sum())
+        if count < 100:
+            continue
+        filled = np.where(ok, e, 0.0)
+        found.append(Finding(channel, "variance", float(((filled**2).sum() - count) / np.sqrt(2.0 * count))))
+        # mean of each run: N(0, 1) each
+        means = [filled[a:b].sum() / np.sqrt(max(1, ok[a:b].sum())) for a, b in itertools.pairwise(bounds)]
+        found.append(Finding(channel, "mean", chi(np.array(means))))
+        for low, high in LAGS:
+            z = np.array([lagged(filled, ok, bounds, lag) for lag in range(low, high + 1)])
+            found.append(Finding(channel, f"lag {low}-{high}", chi(z)))
+        found.append(Finding(channel, "spectrum", peak(filled, bounds)))
+        for name, values in with_what.items():
+            found.append(Finding(channel, name, goes_with(filled, ok, values, bounds)))
+    return sorted(found, key=lambda f: -abs(f.sigma))
+
+
+def chi(z: np.ndarray) -> float:
+    """A sum of squared normals as one normal deviate (Wilson and Hilferty)."""
+    k = len(z)
+    return float((np.cbrt((z**2).sum() / k) - (1.0 - 2.0 / (9.0 * k))) / np.sqrt(2.0 / (9.0 * k)))
+
+
+def lagged(e: np.ndarray, ok: np.ndarray, bounds: np.ndarray, lag: int) -> float:
+    """Correlation with itself `lag` samples before, within runs, as a normal deviate."""
+    total, pairs = 0.0, 0
+    for a, b in itertools.pairwise(bounds):
+        if b - a > lag:
+            total += float(e[a + lag : b] @ e[a : b - lag])
+            pairs += int((ok[a + lag : b] & ok[a : b - lag]).sum())
+    return total / np.sqrt(max(1, pairs))
+
+
+def peak(e: np.ndarray, bounds: np.ndarray) -> float:
+    """The highest line of the periodogram of all runs, as a normal deviate of the same probability (Fisher)."""
+    highest, lines = 0.0, 0
+    for a, b in itertools.pairwise(bounds):
+        power = np.abs(np.fft.rfft(e[a:b])[1:]) ** 2 / max(1.0, float((e[a:b] ** 2).sum()))
+        highest, lines = max(highest, float(power.max(initial=0.0))), lines + len(power)
+    chance = -np.expm1(lines * np.log1p(-np.exp(-min(highest, 700.0)))) if highest < 700.0 else 0.0
+    return float(norm.isf(min(max(chance, 1e-300), 1.0 - 1e-12)))
+
+
+def goes_with(e: np.ndarray, ok: np.ndarray, values: np.ndarray, bounds: np.ndarray) -> float:
+    """Correlation with a feature, each run's means taken off, as a normal deviate."""
+    total, weight = 0.0, 0.0
+    for a, b in itertools.pairwise(bounds):
+        part = values[a:b][ok[a:b]]
+        if len(part) < 2:
+            continue
+        part = part - part.mean()
+        total += float(e[a:b][ok[a:b]] @ part)
+        weight += float(part @ part)
+    return total / np.sqrt(weight) if weight > 1e-12 else 0.0
+
+
+def worst(found: list[Finding]) -> float:
+    """The strongest finding, corrected for how many were looked at: normal under the true model."""
+    if not found:
+        return 0.0
+    chance = 2.0 * norm.sf(max(abs(f.sigma) for f in found)) * len(found)
+    return float(norm.isf(min(max(chance, 1e-300), 1.0 - 1e-9)))

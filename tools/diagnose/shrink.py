@@ -1,0 +1,192 @@
+"""How far the gap shrinks: windows of runs that were left out of the fit, flown by four models (GAP.md, Measures)."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim_backend.core import effect_layout as ef
+from tools.diagnose.search import Search
+from tools.gap.measure import RunGap, root_mean_square, run_gap
+from tools.inference.candidates import place
+from tools.inference.channels import CHANNELS
+from tools.inference.fit import MOST, Course, within
+from tools.inference.model import Model
+from tools.inference.predict import predict as predict_nominal
+from tools.inference.problem import Problem, cut, estimated, fly_on
+
+DRAWS = 2  # simulated repetitions that find the floor
+SEED = 20261121
+BOOTSTRAP = 2000
+BEFORE, RECALIBRATED, AFTER, FLOOR = "before", "recalibrated", "after", "floor"
+
+
+@dataclass
+class Shrinkage:
+    """Gaps by run of the four models, and what follows from them."""
+
+    runs: dict[str, list[RunGap]]
+    before: float
+    recalibrated: float
+    after: float
+    floor: float
+    shrinkage: float
+    ci90: tuple[float, float]
+    closed: float
+    closed_ci90: tuple[float, float]
+    predictions: dict[str, list[np.ndarray]]  # by model and run, (rows, N_Y); not of the floor
+
+    def channels(self, which: str) -> dict[str, float]:
+        """Each channel's rms over the runs, and the total."""
+        return by_channel(self.runs[which])
+
+
+def by_channel(runs: list[RunGap]) -> dict[str, float]:
+    """Each channel's rms over the runs, and the total."""
+    found = {}
+    for channel in CHANNELS:
+        values = [gap.channels[channel.name] for gap in runs if channel.name in gap.channels]
+        if values:
+            found[channel.name] = root_mean_square(values)
+    return found | {"total": root_mean_square([gap.total for gap in runs])}
+
+
+def left_out(search: Search, course: Course) -> list[tuple[np.ndarray, np.ndarray]]:
+    """A candidate's models, each fitted without one run: the step that the other runs ask for, to first order.
+
+    Of a single run nothing can be left out: its model is fitted to it.
+    """
+    if len(search.problem.runs) == 1:
+        return [search.model(course)]
+    fitter, problem = search.fitter, search.problem
+    fitter.linearise([course])
+    columns = np.vstack([fitter.J, course.columns]) if len(course.free) else fitter.J
+    normal = course.normal
+    run = np.broadcast_to(problem.run_of[:, None], problem.valid.shape)[problem.valid]
+    at = np.concatenate([course.allowed, course.values])
+    low = np.concatenate([np.minimum(-MOST, course.allowed), course.low]) - at
+    high = np.concatenate([np.maximum(MOST, course.allowed), course.high]) - at
+    # A step that all runs together still ask for was tried and brought nothing: limits and kinks are not linear.
+    still = within(normal, course.slope, low, high)
+    models = []
+    for n in range(len(problem.runs)):
+        own = columns[:, run == n]
+        slope = course.slope - own @ course.e[run == n]
+        step = within(normal - own @ own.T, slope, low, high) - still
+        models.append(place(problem, [*search.allowed, *course.free], at + np.clip(step, low, high)))
+    return models
+
+
+def gaps(
+    problem: Problem, models: list[tuple[np.ndarray, np.ndarray]], z: np.ndarray | None = None
+) -> tuple[list[RunGap], list[np.ndarray]]:
+    """Each run's own model's gap and prediction (rows, N_Y); `z` (rows, N_Y) in the place of what was measured."""
+    problem, found, flown = problem.as_recorded, [], []
+    for n, (P, F) in enumerate(models):
+        part = problem.part(n)
+        table = None
+        if z is not None:
+            table = z[problem.recording.bounds[n] : problem.recording.bounds[n + 1]]
+            part.z = table
+        scored = cut(part)
+        gains = part.filter(P, F, begin=True)
+        Y = estimated(part, F, gains)
+        fly_on(part, scored, P, F, gains, Y)
+        found.append(run_gap(part.runs[0], Y[:, : ef.Y_MOCAP_Z], scored.listed[0], table))
+        flown.append(Y)
+    return found, flown
+
+
+def floor(search: Search, course: Course, rng: np.random.Generator) -> list[RunGap]:
+    """What noise and disturbance leave of a perfect model: the selected model's own flights, predicted by itself."""
+    problem = search.problem.as_recorded
+    model = search.model(course)
+    starts = search.gains.X[problem.recording.bounds[:-1]]
+    draws = []
+    for _ in range(DRAWS):
+        Z = problem.simulated(*model, starts, rng)
+        draws.append(gaps(problem, [model] * len(problem.runs), Z)[0])
+    mean = []
+    for n, run in enumerate(problem.runs):
+        names = draws[0][n].channels
+        channels = {name: root_mean_square([draw[n].channels[name] for draw in draws]) for name in names}
+        mean.append(RunGap(run.name, channels, root_mean_square(channels.values()), draws[0][n].windows))
+    return mean
+
+
+def squares(found: list[RunGap]) -> np.ndarray:
+    """Squared total gaps by run, (runs,)."""
+    return np.array([gap.total for gap in found]) ** 2
+
+
+def rms(values: np.ndarray, pick: np.ndarray) -> float:
+    """Root mean of squares over picked runs."""
+    return float(np.sqrt(values[pick].mean()))
+
+
+def over_runs(
+    value: Callable[[np.ndarray], float], rng: np.random.Generator, count: int
+) -> tuple[float, tuple[float, float]]:
+    """A figure of picked runs: over all, and its 90 % interval by bootstrap."""
+    whole = np.arange(count)
+    if count == 1:
+        return value(whole), (np.nan, np.nan)
+    drawn = np.array([value(rng.choice(whole, count)) for _ in range(BOOTSTRAP)])
+    low, high = np.quantile(drawn, [0.05, 0.95])
+    return value(whole), (float(low), float(high))
+
+
+def left_out_gap(search: Search, course: Course) -> float:
+    """The total gap of a candidate on runs left out, over the runs."""
+    runs, _ = gaps(search.problem, left_out(search, course))
+    return float(np.sqrt(squares(runs).mean()))
+
+
+@dataclass
+class Further:
+    """How far the gap shrinks with something that is no effect, on runs left out."""
+
+    runs: list[RunGap]
+    after: float
+    shrinkage: float
+    ci90: tuple[float, float]
+
+
+def shrink_further(search: Search, course: Course, before: list[RunGap]) -> Further:
+    """The gap with another model fitted to the same runs, against the gaps before."""
+    runs, _ = gaps(search.problem, left_out(search, course))
+    b, a = squares(before), squares(runs)
+    rng = np.random.default_rng(SEED)
+    shrunk, ci90 = over_runs(lambda pick: 1.0 - rms(a, pick) / rms(b, pick), rng, len(runs))
+    return Further(runs, float(np.sqrt(a.mean())), shrunk, ci90)
+
+
+def shrink(search: Search, course: Course) -> Shrinkage:
+    """The gap before, recalibrated, after, and its floor, on runs left out of the fit."""
+    problem = search.problem
+    rng = np.random.default_rng(SEED)
+    nominal = Model(problem.model.name, problem.model.P, problem.model.sigma)
+    flown = predict_nominal(problem.case, nominal, problem.runs)
+    listed = cut(problem).listed
+    refitted, Y_refitted = gaps(problem, left_out(search, search.null))
+    after, Y_after = gaps(problem, left_out(search, course)) if course.labels else (refitted, Y_refitted)
+    runs = {
+        BEFORE: [run_gap(run, flown[n], listed[n]) for n, run in enumerate(problem.runs)],
+        RECALIBRATED: refitted,
+        AFTER: after,
+        FLOOR: floor(search, course, rng),
+    }
+    predictions = {BEFORE: flown, RECALIBRATED: Y_refitted, AFTER: Y_after}
+    total = {name: squares(found) for name, found in runs.items()}
+    shrunk, ci90 = over_runs(lambda pick: 1.0 - rms(total[AFTER], pick) / rms(total[BEFORE], pick), rng, len(listed))
+
+    def closed_of(pick: np.ndarray) -> float:
+        b, a, f = (rms(total[name], pick) for name in (BEFORE, AFTER, FLOOR))
+        return (b - a) / max(b - f, 1e-9)
+
+    closed, closed_ci90 = over_runs(closed_of, rng, len(listed))
+    mean = {name: float(np.sqrt(values.mean())) for name, values in total.items()}
+    return Shrinkage(
+        runs, mean[BEFORE], mean[RECALIBRATED], mean[AFTER], mean[FLOOR], shrunk, ci90, closed, closed_ci90,
+        predictions,
+    )  # fmt: skip

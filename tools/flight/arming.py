@@ -1,0 +1,184 @@
+"""Arming: one list of checks, each with its reason. Refusing is the default: what cannot be checked is not fit.
+
+Run on an open board, before the recorder starts and anything moves; `glider fly` on devices and twins refuses on the
+first reason, `glider check` shows the same list.
+"""
+
+import os
+import shutil
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from firmware.core.jit import CACHE_DIR, compiled_signatures
+from firmware.core.vehicle.layout import G
+from firmware.core.vehicle.seawater import water_density
+from hal.ports import SLOTS, BoardError, Validity, empty_frame
+from tools.data.errors import InputError
+
+LISTEN_S = 0.4
+ZERO_M = 0.5  # of depth by pressure, at the surface
+STEADY_DEG = 45.0
+BYTES_PER_SECOND = 40_000.0  # of a log, generously
+SPARE_BYTES = 50e6
+FITTED = ("imu", "beacon", "slider_wire", "plunger_wire")
+
+
+@dataclass(frozen=True)
+class Check:
+    """One thing looked at before a flight."""
+
+    name: str
+    passed: bool
+    reason: str
+
+
+class Refused(Exception):
+    """A check's reason to refuse."""
+
+
+class Arming:
+    """The checks of one flight. `folder`: where its log goes, None without one; `hardware`: a real vehicle."""
+
+    def __init__(self, flight: Any, *, folder: Path | None, hardware: bool):
+        self.flight, self.folder, self.hardware = flight, folder, hardware
+        self.frame = empty_frame()
+
+    def run(self, disabled: bool = False) -> list[Check]:
+        """Every check, in the order of the list; `disabled`: none of them refuses, to show that they do."""
+        self._listen()
+        checks = [self._one(name, work) for name, work in self._list().items()]
+        return [Check(item.name, True, item.reason) for item in checks] if disabled else checks
+
+    def _list(self) -> dict[str, Callable[[], str]]:
+        return {
+            "calibration": self.calibration, "devices": self.devices, "zero depth": self.zero_depth,
+            "attitude": self.attitude, "limits": self.limits, "mission": self.mission, "clock": self.clock,
+            "disk": self.disk, "kernels": self.kernels,
+        }  # fmt: skip
+
+    def _one(self, name: str, work: Callable[[], str]) -> Check:
+        try:
+            return Check(name, True, work())
+        except (Refused, BoardError) as error:
+            return Check(name, False, str(error))
+        except Exception as error:  # whatever goes wrong in a check, it has not passed
+            return Check(name, False, f"could not be checked: {type(error).__name__}: {error}")
+
+    def _listen(self) -> None:
+        """Let time pass and take a sample of everything."""
+        board = self.flight.board
+        begin = board.clock.now()
+        for tick in range(1, round(LISTEN_S * board.loop_hz) + 1):
+            board.clock.sleep_until(begin + tick / board.loop_hz)
+        for name, slot in SLOTS.items():
+            port = getattr(board, name)
+            if port is not None:
+                port.read(self.frame[slot.all])
+
+    # --- the checks -------------------------------------------------------------------------------------------------
+    def calibration(self) -> str:
+        look = getattr(self.flight.board, "check_calibration", None)
+        if look is None:
+            return "simulated: none"
+        look()
+        return "as accepted"
+
+    def devices(self) -> str:
+        silent = self.flight.board.silent() if hasattr(self.flight.board, "silent") else []
+        bad = [name for name in FITTED if self.frame[SLOTS[name].validity] != Validity.VALID]
+        bad += [name for name in FITTED if not np.isfinite(self.frame[SLOTS[name].values]).all() and name not in bad]
+        if silent or bad:
+            raise Refused("; ".join(silent) or f"nothing fit from {', '.join(bad)}")
+        return "every device answers"
+
+    def zero_depth(self) -> str:
+        pressure, temperature = self.frame[SLOTS["beacon"].values]
+        salinity = self.flight.mission.site.salinity
+        density = water_density(0.0, float(temperature), salinity)
+        depth = float(pressure - self.flight.board.surface_pressure) / (density * G)
+        if not abs(depth) <= ZERO_M:
+            raise Refused(f"{depth:.2f} m deep, expected the surface, within {ZERO_M:g} m: `zero beacon` in the bench")
+        return f"{depth:.2f} m"
+
+    def attitude(self) -> str:
+        roll, pitch = np.degrees(self.frame[SLOTS["imu"].values][:2])
+        if not (abs(roll) <= STEADY_DEG and abs(pitch) <= STEADY_DEG):
+            raise Refused(f"roll {roll:.0f}, pitch {pitch:.0f} deg: no attitude to begin from")
+        return f"roll {roll:.0f}, pitch {pitch:.0f} deg"
+
+    def limits(self) -> str:
+        limits = self.flight.vehicle.limits
+        depth = None if limits is None else limits.working_depth_m
+        if depth is None and self.hardware:
+            raise Refused("the vehicle file has no [limits] working_depth_m")
+        if depth is None:
+            return f"no working depth; the site's {self.flight.mission.site.depth_m:g} m counts"
+        return f"working depth {depth:g} m"
+
+    def mission(self) -> str:
+        limits, mission = self.flight.vehicle.limits, self.flight.mission
+        deepest = max((leg.depth_m for leg in mission.leg if leg.depth_m is not None), default=0.0)
+        if limits is not None and limits.working_depth_m is not None and deepest > limits.working_depth_m:
+            raise Refused(f"{mission.name} goes to {deepest:g} m, deeper than the hull's {limits.working_depth_m:g} m")
+        return f"{mission.name}: {len(mission.leg)} legs"
+
+    def clock(self) -> str:
+        clock = self.flight.board.clock
+        before = clock.now()
+        clock.sleep_until(before + 0.02)
+        passed = clock.now() - before
+        if not 0.019 <= passed < 1.0:
+            raise Refused(f"20 ms of the board's clock took {1e3 * passed:.1f} ms")
+        return "runs"
+
+    def disk(self) -> str:
+        if self.folder is None:
+            return "no log"
+        if not os.access(self.folder, os.W_OK):
+            raise Refused(f"{self.folder}: cannot be written")
+        needed = SPARE_BYTES + BYTES_PER_SECOND * self.flight.mission.time_limit_s
+        free = shutil.disk_usage(self.folder).free
+        if free < needed:
+            raise Refused(f"{self.folder}: {free / 1e6:.0f} MB free, a flight may need {needed / 1e6:.0f} MB")
+        return f"{free / 1e6:.0f} MB free"
+
+    def kernels(self) -> str:
+        from firmware.runtime import rehearse
+
+        if CACHE_DIR is None and self.hardware:
+            raise Refused("plain Python (GLIDER_JIT=0) is too slow to fly with")
+        rehearse(self.flight.autopilot, self.flight.supervisor)
+        before, took = compiled_signatures(), 1.0
+        for _ in range(5):  # the quickest: the machine may have been at something else
+            begin = time.perf_counter()
+            rehearse(self.flight.autopilot, self.flight.supervisor)
+            took = min(took, time.perf_counter() - begin)
+        if compiled_signatures() != before:
+            raise Refused("kernels compile anew in every rehearsal")
+        if self.hardware and took > 1.0 / self.flight.board.loop_hz:
+            raise Refused(f"a rehearsal takes {1e3 * took:.0f} ms, a tick has {1e3 / self.flight.board.loop_hz:.0f} ms")
+        return f"compiled; a rehearsed tick takes {1e3 * took:.1f} ms"
+
+
+def refuse(checks: list[Check]) -> None:
+    """BoardError with every reason; nothing where all is fit."""
+    reasons = [f"{check.name}: {check.reason}" for check in checks if not check.passed]
+    if reasons:
+        raise BoardError("; ".join(reasons))
+
+
+def arm(flight: Any, *, log: Path | None) -> list[Check]:
+    """The checks of a flight on an open board; BoardError where one refuses. Simulated boards are not asked."""
+    if not hasattr(flight.board, "links"):
+        return []
+    folder = None if log is None else log.resolve().parent
+    if folder is not None and not folder.is_dir():
+        raise InputError("no such folder", source=folder)
+    checks = Arming(flight, folder=folder, hardware=not flight.twinned).run()
+    refuse(checks)
+    return checks

@@ -1,0 +1,193 @@
+"""The composition root: the one place that builds a flight out of vehicle, mission, board and recorder."""
+
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+
+from firmware.autopilot import Autopilot, configuration
+from firmware.control.cover import Cover, k2_cover
+from firmware.control.gains import Control
+from firmware.core.vehicle.seawater import water_density
+from firmware.guidance.mission import Mission
+from firmware.model.strict import ConfigError
+from firmware.model.vehicle import Vehicle
+from firmware.runtime import Runtime
+from firmware.supervisor.supervisor import Supervisor
+from firmware.supervisor.table import Reaction
+from firmware.telemetry import TICK
+from hal.board import BoardRequest, board_builder, board_kinds
+from hal.ports import BoardError
+from hal.recorder.schema import DEBUG, ERROR, FATAL, INFO, WARN
+from tools.data.errors import InputError
+from tools.data.sources import load_mission, load_vehicle, read_text
+
+SEVERITIES = dict(zip(Reaction, (DEBUG, INFO, WARN, WARN, ERROR, FATAL, FATAL), strict=True))
+
+
+class BoardKind(msgspec.Struct):
+    """The one key that every board file has; the rest is its kind's."""
+
+    kind: Annotated[str, msgspec.Meta(min_length=1, max_length=100)]
+
+
+@dataclass
+class BoardFile:
+    """A board file's text, where it came from, and its kind."""
+
+    text: str
+    source: str
+    kind: str
+
+
+@dataclass
+class Flight:
+    """All that flies: ready to be armed."""
+
+    vehicle: Vehicle
+    mission: Mission
+    board: Any  # hal.ports.Board, and of a simulated one its world and truth
+    autopilot: Autopilot
+    supervisor: Supervisor
+    texts: dict[str, str]
+
+    @property
+    def cover(self) -> tuple[Cover, Cover]:
+        """The law's k2 of pitch and depth against what this vehicle's [uncertainty] asks for."""
+        return k2_cover(self.vehicle, self.control)
+
+    @property
+    def control(self) -> Control:
+        """The gains that count: the mission's, else the vehicle's, else the defaults."""
+        return self.mission.control or self.vehicle.control or Control()
+
+    @property
+    def twinned(self) -> bool:
+        """Whether the devices are twins that the board itself starts: nothing real moves."""
+        return hasattr(self.board, "control")
+
+
+def load_board_file(wanted: str) -> BoardFile:
+    """A board by shipped name ("sim") or path."""
+    from firmware.model.strict import decode
+
+    folders = [files("sim_backend").joinpath("boards"), files("hal").joinpath("boards")]
+    shipped = [file for folder in folders if (file := folder.joinpath(f"{wanted}.toml")).is_file()]
+    if shipped and "/" not in wanted:
+        text, source = shipped[0].read_text(encoding="utf-8"), f"{wanted} (shipped)"
+    elif Path(wanted).is_file():
+        text, source = read_text(Path(wanted)), wanted
+    else:
+        names = sorted(
+            entry.name.removesuffix(".toml") for folder in folders for entry in folder.iterdir() if "." in entry.name
+        )
+        raise InputError(f"no board '{wanted}': neither a file nor one of {', '.join(names)}")
+    kind = decode(text, BoardKind, source).kind
+    if kind not in board_kinds():
+        raise ConfigError(source, f"no board of kind '{kind}'; installed: {', '.join(board_kinds())}", key="kind")
+    return BoardFile(text, source, kind)
+
+
+def parse_effects(items: tuple[str, ...]) -> dict[str, dict[str, float]]:
+    """`label:parameter=value,...` items as a dictionary; InputError says which item is wrong."""
+    from sim_backend.effects.base import EffectError, check_flown
+
+    effects: dict[str, dict[str, float]] = {}
+    for item in items:
+        label, _, rest = item.partition(":")
+        values = {}
+        for pair in filter(None, rest.split(",")):
+            name, _, number = pair.partition("=")
+            try:
+                values[name.strip()] = float(number)
+            except ValueError:
+                raise InputError(f"expected label:parameter=number, got '{item}'", source="--effect") from None
+        try:
+            check_flown(label, values)
+        except EffectError as error:
+            raise InputError(str(error), source="--effect") from None
+        effects[label] = values
+    return effects
+
+
+def build_flight(
+    *,
+    mission: str,
+    vehicle: str = "roughie",
+    board: str = "sim",
+    seed: int = 0,
+    realtime: bool = False,
+    effects: dict[str, dict[str, float]] | None = None,
+) -> Flight:
+    """Vehicle, mission, board and autopilot by name or path; raises ConfigError, InputError or BoardError."""
+    vehicle_text, the_vehicle = load_vehicle_text(vehicle)
+    mission_text, mission_source, the_mission = load_mission(mission)
+    board_file = load_board_file(board)
+    request = BoardRequest(
+        text=board_file.text, source=board_file.source, vehicle=the_vehicle, seed=seed, realtime=realtime,
+        site_depth=the_mission.site.depth_m, water_density=water_density(0.0, 20.0, the_mission.site.salinity),
+        effects=effects or {},
+    )  # fmt: skip
+    the_board: Any = board_builder(board_file.kind)(request)
+    C = configuration(
+        the_vehicle, the_mission, dt=1.0 / the_board.loop_hz, periods=the_board.periods,
+        surface_pressure=the_board.surface_pressure,
+    )  # fmt: skip
+    autopilot = Autopilot(the_vehicle, the_mission, C, mission_source)
+    supervisor = Supervisor(autopilot, the_vehicle, the_mission, dt=1.0 / the_board.loop_hz, periods=the_board.periods)
+    texts = {"vehicle.toml": vehicle_text, "mission.toml": mission_text, "board.toml": board_file.text}
+    return Flight(the_vehicle, the_mission, the_board, autopilot, supervisor, texts)
+
+
+def load_vehicle_text(wanted: str) -> tuple[str, Vehicle]:
+    """A vehicle's text and the vehicle."""
+    from tools.data.sources import name_or_path
+
+    text, _ = name_or_path(wanted, "vehicle", "model/vehicles")
+    return text, load_vehicle(wanted)
+
+
+def log_metadata(flight: Flight, *, seed: int, effects: dict[str, dict[str, float]]) -> dict[str, str]:
+    """What a log says of itself; what the simulation hides from the vehicle is not in it, but for the seed."""
+    from importlib.metadata import version
+
+    site = flight.mission.site
+    return {
+        "software": f"glider {version('glider')}",
+        "vehicle": flight.vehicle.name,
+        "mission": flight.mission.name,
+        "board": flight.board.name,
+        "site": site.name,
+        "log_rate_hz": f"{flight.board.loop_hz:g}",
+        "water_density_kg_m3": f"{water_density(0.0, 20.0, site.salinity):.2f}",
+        "seed": str(seed),
+        "effects": ", ".join(effects),
+    }
+
+
+def record_specs(flight: Flight) -> tuple:
+    """What this flight records: the ticks, and the plant's truth where there is a plant."""
+    if hasattr(flight.board, "truth_recorder"):
+        from sim_backend.board import TRUTH
+
+        return (TICK, TRUTH)
+    return (TICK,)
+
+
+def build_runtime(flight: Flight, recorder: Any) -> Runtime:
+    """The loop, recording into `recorder`; the board is open, for that is when a real clock starts."""
+    extras: tuple = ()
+    if hasattr(flight.board, "truth_recorder"):
+        extras = (flight.board.truth_recorder(recorder.channel("/truth")),)
+
+    def on_news(t: float, reaction: Reaction, text: str) -> None:
+        recorder.event(t, SEVERITIES[reaction], text)
+
+    return Runtime(
+        flight.board, flight.autopilot, flight.supervisor, recorder.channel("/tick"), extras=extras, on_news=on_news
+    )
+
+
+__all__ = ["BoardError", "Flight", "build_flight", "build_runtime", "load_board_file", "parse_effects", "record_specs"]

@@ -1,0 +1,188 @@
+"""`glider identify`: from a case's runs to parameters and their distribution."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from firmware.model.vehicle import COEFFICIENTS
+from tools.data.errors import InputError
+from tools.data.runs.case import Case
+from tools.data.runs.run import Run
+from tools.identify.acceleration_likelihood import fit_accelerations, suited
+from tools.identify.fit import Fit, fit
+from tools.identify.flight_likelihood import Flights
+from tools.identify.held import Held, hold_out
+from tools.identify.levels import Levels
+from tools.identify.parameters import Parameters
+from tools.identify.sampler import Chains, Summary, sample, summarise
+from tools.identify.screen import LeftOut, despiked, screen
+from tools.identify.statistics import Quadratic
+from tools.identify.telling import blind
+from tools.inference.model import nominal_model
+from tools.inference.problem import Problem
+
+CHECKED = 24  # draws at which the whole likelihood is compared with its linearisation
+ROUGH = 0.3  # effective share of the draws, below which intervals are called rough
+FLIGHTS, ACCELERATIONS = "flights", "accelerations"
+
+
+@dataclass(frozen=True)
+class Check:
+    """How well the linearised likelihood stands for the whole one at draws of the posterior."""
+
+    draws: int
+    spread: float  # sd of the difference of their logarithms, nat
+    share: float  # effective share of the draws under importance weights
+
+
+@dataclass
+class Identified:
+    """What was found."""
+
+    case: Case
+    likelihood: str
+    runs: list[Run]  # that were fitted, without spikes
+    free: Parameters
+    quadratic: Quadratic
+    chains: Chains
+    summaries: list[Summary]  # of everything free, the coefficients first
+    left_out: list[LeftOut]
+    spikes: int
+    notes: list[str]
+    seconds: float
+    fit: Fit | None = None  # of the flights
+    held: Held | None = None
+    check: Check | None = None
+    accelerations: Quadratic | None = (
+        None  # the other likelihood's statistics of the coefficients, where it could be had
+    )
+
+    @property
+    def coefficients(self) -> list[Summary]:
+        return self.summaries[: len(COEFFICIENTS)]
+
+    @property
+    def problem(self) -> Problem | None:
+        return None if self.fit is None else self.fit.problem
+
+    @property
+    def levels(self) -> Levels | None:
+        return None if self.fit is None else self.fit.levels
+
+    @property
+    def best(self) -> np.ndarray:
+        """The posterior's mode within its limits, in units of the priors, (n,): what files hold."""
+        return np.maximum(self.quadratic.mode, self.quadratic.low)
+
+    def compared(self) -> list[dict[str, Any]]:
+        """The coefficients by the accelerations' likelihood, beside this one's."""
+        if self.accelerations is None:
+            return []
+        count = len(COEFFICIENTS)
+        spread = self.free.spreads[:count]
+        mean = self.free.nominal[:count] + self.accelerations.mode * spread
+        sd = np.sqrt(np.diag(self.accelerations.covariance)) * spread
+        return [
+            {"name": one.name, "mean": m, "sd": s, "difference_in_sd": (m - one.mean) / float(np.hypot(s, one.sd))}
+            for one, m, s in zip(self.coefficients, mean.tolist(), sd.tolist(), strict=True)
+        ]
+
+    def plain(self) -> dict[str, Any]:
+        """The result as `--json` prints it."""
+        result: dict[str, Any] = {
+            "parameters": [one.plain() for one in self.coefficients],
+            "seconds": self.seconds,
+            "acceptance": float(self.chains.acceptance.mean()),
+            "divergent_runs": [{"run": one.run, "reason": str(one)} for one in self.left_out],
+            "likelihood": self.likelihood,
+            "also_free": [one.plain() for one in self.summaries[len(COEFFICIENTS) :]],
+            "runs": [run.name for run in self.runs],
+            "heat": self.quadratic.heat,
+            "spikes_removed": self.spikes,
+            "seed": self.chains.seed,
+            "notes": self.notes,
+            "not_told": [one.plain() for one in blind(self.free, self.chains.flat)],
+        }
+        if self.levels is not None:
+            levels = zip(self.levels.names, self.levels.log, self.levels.sd, strict=True)
+            result["noise"] = {name: {"factor": np.exp(log), "sd_of_log": sd} for name, log, sd in levels}
+        if self.check is not None:
+            check = self.check
+            result["linearised"] = {
+                "draws": check.draws, "spread_nat": check.spread, "effective_share": check.share
+            }  # fmt: skip
+        if self.held is not None:
+            result["held_out"] = self.held.plain()
+        if self.accelerations is not None:
+            result["accelerations"] = self.compared()
+        return result
+
+
+def check_linearised(found: Fit, chains: Chains, draws: int = CHECKED) -> Check:
+    """The whole likelihood (gains kept) at draws of the posterior, against its linearisation."""
+    flat = chains.flat
+    picked = flat[np.linspace(0, len(flat) - 1, draws).astype(int)]
+    E = Flights(found.problem, found.free).follow(list(picked), found.at.gains)
+    whole = np.square(E).sum(axis=1) / found.quadratic.heat
+    log = -0.5 * (whole - found.quadratic.misfit(picked))
+    weights = np.exp(log - log.max())
+    return Check(draws, float(log.std(ddof=1)), float(weights.sum() ** 2 / (weights @ weights) / draws))
+
+
+def usable(case: Case) -> tuple[list[Run], list[LeftOut], int]:
+    """Runs that may be fitted, without their spikes; InputError, naming the first, where there is none."""
+    kept, left_out = screen(case.runs, case.motion_capture)
+    if not kept:
+        first = left_out[0]
+        raise InputError(
+            f"{first.reason} (none of {len(case.runs)} runs can be used)", source=first.path, column=first.column
+        )
+    cleaned = [despiked(run) for run in kept]
+    return [run for run, _ in cleaned], left_out, sum(count for _, count in cleaned)
+
+
+def identify(
+    case: Case,
+    seed: int = 1,
+    likelihood: str = FLIGHTS,
+    say: Callable[[str], None] = lambda text: None,
+    leave_out: bool = False,
+) -> Identified:
+    """Identify the vehicle of a case from its runs; with `leave_out`, predict runs that were left out, too."""
+    began = time.perf_counter()
+    runs, left_out, spikes = usable(case)
+    model = nominal_model(case)
+    first = None
+    if likelihood == ACCELERATIONS or suited(runs):
+        say("accelerations")
+        first, free = fit_accelerations(model, runs)
+    if likelihood == ACCELERATIONS:
+        assert first is not None
+        chains = sample(first, seed)
+        summaries = summarise(free.names, [f.unit for f in free.free], free.si(chains.values))
+        took = time.perf_counter() - began
+        return Identified(
+            case, likelihood, runs, free, first, chains, summaries, left_out, spikes, [], took
+        )  # fmt: skip
+    found = fit(case, model, runs, None if first is None else first.mode, say)
+    say("chains")
+    chains = sample(found.quadratic, seed)
+    free = found.free
+    summaries = summarise(free.names, [f.unit for f in free.free], free.si(chains.values))
+    check = check_linearised(found, chains)
+    if check.share < ROUGH:
+        found.notes.append(
+            "the posterior is not normal: its linearisation misses the whole likelihood "
+            f"(effective share of draws {check.share:.2f}); intervals are rough, the vehicle file may be far off"
+        )
+    held = None
+    if leave_out:
+        say("flights left out")
+        held = hold_out(case, model, found, say)
+    return Identified(
+        case, likelihood, found.problem.runs, free, found.quadratic, chains, summaries, left_out + found.left_out,
+        spikes, found.notes, time.perf_counter() - began, found, held, check, first,
+    )  # fmt: skip

@@ -1,0 +1,90 @@
+"""What may differ: the parameters that a diagnosis fits, each in units of how far it is likely to go."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim_backend.core import effect_layout as ef
+from sim_backend.effects.base import Effect, catalogue
+from tools.inference.problem import Problem
+
+ALLOWED = ""  # the label of what is no effect
+CLOCK_PLACE = ("timing", "mocap")  # of the labels by which motion capture's clock is wrong
+
+
+@dataclass(frozen=True)
+class Free:
+    """A parameter that is free in a fit: `entry` of P or F moves by `spread` for each unit; limits in those units."""
+
+    label: str  # of its effect; ALLOWED for what [uncertainty] and [sensors] allow
+    name: str
+    vector: str  # "P" or "F"
+    entry: int
+    spread: float
+    low: float = -np.inf
+    high: float = np.inf
+    unit: str = ""
+    along: tuple[tuple[int, float], ...] = ()  # entries of P that move together, in place of `entry`
+
+    @property
+    def kinked(self) -> bool:
+        """Whether it begins at 0 and does nothing, or something else, on the other side."""
+        return self.low == 0.0 or self.high == 0.0
+
+
+def allowed(problem: Problem) -> list[Free]:
+    """What the nominal model allows for: parameters within [uncertainty], and a constant bias of each sensor."""
+    if not problem.rules.nuisance:
+        return []
+    sigma, spread = problem.model.sigma.copy(), problem.model.spread
+    free = []
+    if spread is not None:  # as identification left them, together
+        sigma[np.abs(spread).max(axis=0) > 0.0] = 0.0
+        for n, row in enumerate(spread):
+            along = tuple((int(i), float(row[i])) for i in np.flatnonzero(row))
+            free.append(Free(ALLOWED, f"identified[{n}]", "P", -1, 1.0, along=along))
+    free += [Free(ALLOWED, f"P[{i}]", "P", int(i), float(sigma[i])) for i in np.flatnonzero(sigma > 0.0)]
+    s = problem.case.sensors
+    bias = [*3 * [s.attitude.bias], *3 * [s.gyro.bias], s.depth.bias, s.slider.bias, s.ballast.bias]
+    seen = problem.seen
+    for j, size in enumerate(bias):
+        if seen[j] and size > 0.0:
+            free.append(Free(ALLOWED, f"bias[{j}]", "F", ef.BIAS + j, size))
+    return free
+
+
+def of_effect(effect: Effect) -> list[Free]:
+    """The parameters of an effect that stand in F."""
+    return [
+        Free(effect.label, p.name, "F", p.entry, p.spread, p.low / p.spread, p.high / p.spread, p.unit)
+        for p in effect.parameters
+        if p.entry >= 0
+    ]
+
+
+def candidates(problem: Problem) -> dict[str, list[Free]]:
+    """Every label whose effect these runs could show, with its parameters."""
+    seen = problem.seen
+    mocap = bool(seen[ef.Y_ONBOARD :].any())
+    commands = all(run.has_commands for run in problem.runs)
+    found = {}
+    for label, effect in catalogue().items():
+        free = of_effect(effect)
+        if not free:
+            continue
+        if effect.subsystem == "timing" and effect.element == "mocap" and not mocap:
+            continue
+        if effect.subsystem == "actuation" and not commands and label != "ballast_leak":
+            continue
+        found[label] = free
+    return found
+
+
+def place(problem: Problem, free: list[Free], values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The model (P, F) with these parameters at `values` (in their spreads)."""
+    P = problem.model.P.copy()
+    F = np.zeros(ef.N_F) if problem.model.F is None else problem.model.F.copy()
+    for parameter, value in zip(free, values, strict=True):
+        for entry, size in parameter.along or ((parameter.entry, parameter.spread),):
+            (P if parameter.vector == "P" else F)[entry] += size * value
+    return P, F

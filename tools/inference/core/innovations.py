@@ -1,0 +1,304 @@
+"""Kernels of the diagnosis: what a model with effects fails to foresee of a recording, row by row.
+
+A Kalman filter follows each run with a given model; what its one-step predictions miss, divided by how much they may
+miss, are the whitened innovations: for the true model white, of unit variance, whatever the disturbance did to the
+course. Its gains are kept, and any other model is then flown along the same data with those gains: its innovations
+differ smoothly with its parameters however long the run, because the data hold every flight to the course flown.
+
+Runs stand one behind the other in tables of all rows; `bounds` (runs + 1) says where each begins. Errors of the state
+(N_ERR) are those of core/passage.
+"""
+
+import math
+
+import numpy as np
+
+from firmware.core.jit import kernel, parallel_kernel, prange
+from firmware.core.maths.rotations import rotation_nb
+from firmware.core.vehicle.layout import N_P
+from sim_backend.core import effect_layout as ef
+from sim_backend.core.effect_plant import fold, wrapped
+from tools.inference.core.passage import (
+    LATE,
+    N_ERR,
+    N_Y,
+    correct,
+    difference,
+    log_path,
+    missed,
+    propagate,
+    read_row,
+    stand,
+)
+
+N_SPECTRAL = 13
+NUDGE = 1e-5  # of the state's unit, for derivatives
+
+
+@kernel
+def nudged(x, j, error, moved):
+    """x with its error j at NUDGE, into moved; error (N_ERR) is scratch."""
+    for n in range(N_ERR):
+        error[n] = 0.0
+    error[j] = NUDGE
+    moved[:] = x
+    correct(moved, error)
+
+
+@kernel
+def pushed(x, dt, Gam):
+    """What accelerations held over a step of dt to x leave, Gam (N_ERR, 6): speeds, and half as much way and turn."""
+    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation_nb(x[3], x[4], x[5], x[6])
+    half = 0.5 * dt * dt
+    Gam[:] = 0.0
+    Gam[0, 0], Gam[0, 1], Gam[0, 2] = half * r11, half * r12, half * r13
+    Gam[1, 0], Gam[1, 1], Gam[1, 2] = half * r21, half * r22, half * r23
+    Gam[2, 0], Gam[2, 1], Gam[2, 2] = half * r31, half * r32, half * r33
+    for j in range(3):
+        Gam[3 + j, 3 + j] = half
+    for j in range(6):
+        Gam[6 + j, j] = dt
+
+
+@kernel
+def linear_step(Pw, F, x, mode, t, inputs, i, begin, zero, work, kept, moved, base, error, Phi, Gam):
+    """Fly x to row i; Phi (N_ERR, N_ERR) is the step's derivative by the state, Gam (N_ERR, 6) by accelerations.
+
+    Nothing of a step depends on the place north and east that it starts from, nor on motion capture's clock.
+    """
+    acc = np.zeros(6)
+    base[:] = x
+    propagate(Pw, F, base, mode, t, inputs, i, begin, acc, zero, work, kept, True)
+    for j in range(2):
+        Phi[:, j] = 0.0
+        Phi[j, j] = 1.0
+    Phi[:, LATE] = 0.0
+    Phi[LATE, LATE] = 1.0
+    for j in range(2, LATE):
+        nudged(x, j, error, moved)
+        propagate(Pw, F, moved, mode, t, inputs, i, begin, acc, zero, work, kept, True)
+        difference(moved, base, error)
+        for n in range(N_ERR):
+            Phi[n, j] = error[n] / NUDGE
+    propagate(Pw, F, x, mode, t, inputs, i, begin, acc, zero, work, kept, False)
+    pushed(x, t[i] - t[i - 1], Gam)
+
+
+@kernel
+def linear_reading(F, x, t, stamps, path, i, begin, moved, error, y, y2, H):
+    """H (N_Y, N_ERR), the derivative of what is read at row i, y (N_Y), by the state."""
+    for j in range(N_ERR):
+        nudged(x, j, error, moved)
+        read_row(F, moved, t, stamps, path, i, begin, y2)
+        for m in range(N_Y):
+            change = y2[m] - y[m]
+            if m < 3 or m >= ef.Y_MOCAP_ROLL:
+                change = wrapped(change)
+            H[m, j] = change / NUDGE
+
+
+@kernel
+def filter_run(P, F, spectral, R, mode, t, stamps, inputs, z, begin, end, start, spread, X, path, E, W, K):
+    """The Kalman filter over rows begin .. end - 1. Returns -2 log likelihood without its constant.
+
+    P (N_P), F (N_F); spectral (N_SPECTRAL): spectral densities of the accelerations ((m/s2)2 s, (rad/s2)2 s), walks
+    of servo, slider, ballast, of the position and of motion capture's clock (per s); R (N_Y) measurements' variances;
+    start (N_XF), spread (N_ERR).
+    Out: X (rows, N_XF) the state and path (rows, 6) after each row, E (rows, N_Y) whitened innovations, NaN where
+    nothing was measured, W (rows, N_Y, N_Y) what whitens a row's innovations and K (rows, N_ERR, N_Y) what corrects
+    the state by the whitened ones.
+    """
+    Pw, x = np.empty(N_P), start.copy()
+    fold(P, F, Pw)
+    work, kept, moved, base = np.zeros((6, ef.N_XF)), np.empty(ef.N_XF), np.empty(ef.N_XF), np.empty(ef.N_XF)
+    error, zero, before = np.empty(N_ERR), np.zeros(3), np.empty(6)
+    Phi, Gam, cov, temp = (
+        np.empty((N_ERR, N_ERR)),
+        np.empty((N_ERR, 6)),
+        np.zeros((N_ERR, N_ERR)),
+        np.empty((N_ERR, N_ERR)),
+    )
+    H, L, y, y2, d = np.empty((N_Y, N_ERR)), np.empty((N_Y, N_Y)), np.empty(N_Y), np.empty(N_Y), np.empty(N_Y)
+    for j in range(N_ERR):
+        cov[j, j] = spread[j] * spread[j]
+    misfit = 0.0
+    for n in range(6):
+        path[begin, n] = 0.0
+    for i in range(begin, end):
+        if i > begin:
+            dt = t[i] - t[i - 1]
+            stand(x, before)
+            linear_step(Pw, F, x, mode, t, inputs, i, begin, zero, work, kept, moved, base, error, Phi, Gam)
+            log_path(x, before, path, i, begin)
+            temp[:] = Phi @ cov
+            cov[:] = temp @ Phi.T
+            for j in range(6):
+                s = spectral[j] / dt
+                for a in range(N_ERR):
+                    for b in range(N_ERR):
+                        cov[a, b] += s * Gam[a, j] * Gam[b, j]
+            for j in range(3):
+                cov[12 + j, 12 + j] += spectral[6 + j] * dt
+                cov[j, j] += spectral[9 + j] * dt
+            cov[LATE, LATE] += spectral[12] * dt
+        read_row(F, x, t, stamps, path, i, begin, y)
+        missed(z[i], y, d)
+        linear_reading(F, x, t, stamps, path, i, begin, moved, error, y, y2, H)
+        # S = H cov H' + R of what was measured, its Cholesky factor L, and W = L^-1; K~ = cov H' L^-T
+        for m in range(N_Y):
+            if math.isnan(d[m]):
+                for j in range(N_ERR):
+                    H[m, j] = 0.0
+        HC = H @ cov
+        S = HC @ H.T
+        for m in range(N_Y):
+            if math.isnan(d[m]):
+                S[m, m] = 1.0
+            else:
+                S[m, m] += R[m]
+        for m in range(N_Y):
+            for n in range(m + 1):
+                total = S[m, n]
+                for k in range(n):
+                    total -= L[m, k] * L[n, k]
+                if m == n:
+                    L[m, m] = math.sqrt(max(total, 1e-18))
+                else:
+                    L[m, n] = total / L[n, n]
+        for m in range(N_Y):  # W = L^-1, lower triangular
+            for n in range(N_Y):
+                W[i, m, n] = 0.0
+            W[i, m, m] = 1.0 / L[m, m]
+            for n in range(m):
+                total = 0.0
+                for k in range(n, m):
+                    total -= L[m, k] * W[i, k, n]
+                W[i, m, n] = total / L[m, m]
+        for a in range(N_ERR):
+            for m in range(N_Y):
+                total = 0.0
+                for n in range(m + 1):
+                    total += HC[n, a] * W[i, m, n]
+                K[i, a, m] = total
+        for a in range(N_ERR):
+            for b in range(N_ERR):
+                total = 0.0
+                for m in range(N_Y):
+                    total += K[i, a, m] * K[i, b, m]
+                cov[a, b] -= total
+        for a in range(N_ERR):
+            for b in range(a):
+                mean = 0.5 * (cov[a, b] + cov[b, a])
+                cov[a, b] = mean
+                cov[b, a] = mean
+        for m in range(N_Y):
+            if not math.isnan(d[m]):
+                misfit += 2.0 * math.log(L[m, m])
+        misfit += use_row(W[i], K[i], d, x, error, E[i])
+        for n in range(ef.N_XF):
+            X[i, n] = x[n]
+    return misfit
+
+
+@kernel
+def use_row(W, K, d, x, error, e):
+    """Whiten a row's innovations d into e, correct x by them, return their sum of squares."""
+    total = 0.0
+    for m in range(N_Y):
+        if math.isnan(d[m]):
+            e[m] = math.nan
+            continue
+        value = 0.0
+        for n in range(m + 1):
+            if not math.isnan(d[n]):
+                value += W[m, n] * d[n]
+        e[m] = value
+        total += value * value
+    for a in range(N_ERR):
+        value = 0.0
+        for m in range(N_Y):
+            if not math.isnan(e[m]):
+                value += K[a, m] * e[m]
+        error[a] = value
+    correct(x, error)
+    return total
+
+
+@parallel_kernel
+def filter_runs(
+    P, F, spectral, R, modes, bounds, early, t, stamps, inputs, z, starts, speeds, spreads, X, path, E, W, K, misfit
+):
+    """filter_run for every run, from the one of the forward speeds (m/s) that explains the rows below early best.
+
+    misfit (runs) gets -2 log likelihood; starts (runs, N_XF) the speed taken.
+    """
+    for run in prange(len(bounds) - 1):
+        begin, end = bounds[run], bounds[run + 1]
+        least, speed = math.inf, starts[run, 7]
+        start = starts[run].copy()
+        for n in range(len(speeds)):
+            start[7] = speeds[n]
+            found = filter_run(
+                P, F, spectral, R[run], modes[run], t, stamps, inputs, z, begin, early[run], start, spreads[run],
+                X, path, E, W, K,
+            )  # fmt: skip
+            if found < least:
+                least, speed = found, speeds[n]
+        starts[run, 7] = speed
+        misfit[run] = filter_run(
+            P,
+            F,
+            spectral,
+            R[run],
+            modes[run],
+            t,
+            stamps,
+            inputs,
+            z,
+            begin,
+            end,
+            starts[run],
+            spreads[run],
+            X,
+            path,
+            E,
+            W,
+            K,
+        )
+
+
+@kernel
+def follow_run(P, F, mode, t, stamps, inputs, z, begin, end, start, W, K, X, path, E):
+    """A model flown along rows begin .. end - 1 with the gains of filter_run: X, path and E as there."""
+    Pw, x = np.empty(N_P), start.copy()
+    fold(P, F, Pw)
+    work, kept = np.zeros((6, ef.N_XF)), np.empty(ef.N_XF)
+    error, zero, before, acc = np.empty(N_ERR), np.zeros(3), np.empty(6), np.zeros(6)
+    y, d = np.empty(N_Y), np.empty(N_Y)
+    for n in range(6):
+        path[begin, n] = 0.0
+    for i in range(begin, end):
+        if i > begin:
+            stand(x, before)
+            propagate(Pw, F, x, mode, t, inputs, i, begin, acc, zero, work, kept, False)
+            log_path(x, before, path, i, begin)
+        read_row(F, x, t, stamps, path, i, begin, y)
+        missed(z[i], y, d)
+        use_row(W[i], K[i], d, x, error, E[i])
+        for n in range(ef.N_XF):
+            X[i, n] = x[n]
+
+
+@parallel_kernel
+def follow_runs(Ps, Fs, modes, bounds, t, stamps, inputs, z, starts, W, K, E):
+    """Whitened innovations E (models, rows, N_Y) of models Ps (models, N_P), Fs (models, N_F) with kept gains."""
+    runs = len(bounds) - 1
+    for n in prange(Ps.shape[0] * runs):
+        m, run = n // runs, n % runs
+        begin, end = bounds[run], bounds[run + 1]
+        # scratch of this run alone; indices count from its first row
+        X, path = np.empty((end - begin, ef.N_XF)), np.empty((end - begin, 6))
+        follow_run(
+            Ps[m], Fs[m], modes[run], t[begin:end], stamps[begin:end], inputs[begin:end], z[begin:end], 0, end - begin,
+            starts[run], W[begin:end], K[begin:end], X, path, E[m, begin:end],
+        )  # fmt: skip

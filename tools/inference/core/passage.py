@@ -1,0 +1,156 @@
+"""Kernels of the diagnosis: errors of a state, a model flown from row to row of a recording, and what is read there.
+
+Errors of the state (N_ERR): position (NED), attitude (rotation vector, body), nu, servo, slider, ballast, and how late
+motion capture is.
+"""
+
+import math
+
+from firmware.core.jit import kernel
+from firmware.core.maths.rotations import euler_from_quaternion
+from sim_backend.core import effect_layout as ef
+from sim_backend.core.effect_plant import correction, effect_midpoint, effect_step, read, wrapped
+
+N_ERR = 16
+LATE = 15  # the error of motion capture's clock, s: it walks, and moves nothing but what is read
+N_Y = ef.N_Y
+MAX_STEP = 0.1  # s
+LARGEST_SPEED = 20.0  # m/s, rad/s: a model that flies faster has left every vehicle, and is held where it was
+
+
+@kernel
+def correct(x, error):
+    """Add an error (N_ERR) to a state, in place."""
+    for i in range(3):
+        x[i] += error[i]
+    a, b, c = 0.5 * error[3], 0.5 * error[4], 0.5 * error[5]
+    q0, q1, q2, q3 = x[3], x[4], x[5], x[6]
+    n0 = q0 - q1 * a - q2 * b - q3 * c
+    n1 = q1 + q0 * a + q2 * c - q3 * b
+    n2 = q2 + q0 * b + q3 * a - q1 * c
+    n3 = q3 + q0 * c + q1 * b - q2 * a
+    scale = 1.0 / math.sqrt(n0 * n0 + n1 * n1 + n2 * n2 + n3 * n3)
+    x[3], x[4], x[5], x[6] = n0 * scale, n1 * scale, n2 * scale, n3 * scale
+    for i in range(6):
+        x[7 + i] += error[6 + i]
+    for i in range(3):
+        x[13 + i] += error[12 + i]
+    x[ef.X_GEAR_SERVO] += error[12]
+    x[ef.X_GEAR_SLIDER] += error[13]
+    x[ef.X_LATE] += error[LATE]
+
+
+@kernel
+def difference(x, y, error):
+    """The small error (N_ERR) that takes y to x, into error."""
+    for i in range(3):
+        error[i] = x[i] - y[i]
+    a0, a1, a2, a3 = y[3], -y[4], -y[5], -y[6]
+    b0, b1, b2, b3 = x[3], x[4], x[5], x[6]
+    sign = 2.0 if a0 * b0 - a1 * b1 - a2 * b2 - a3 * b3 >= 0.0 else -2.0
+    error[3] = sign * (a0 * b1 + a1 * b0 + a2 * b3 - a3 * b2)
+    error[4] = sign * (a0 * b2 + a2 * b0 + a3 * b1 - a1 * b3)
+    error[5] = sign * (a0 * b3 + a3 * b0 + a1 * b2 - a2 * b1)
+    for i in range(6):
+        error[6 + i] = x[7 + i] - y[7 + i]
+    for i in range(3):
+        error[12 + i] = x[13 + i] - y[13 + i]
+    error[LATE] = x[ef.X_LATE] - y[ef.X_LATE]
+
+
+@kernel
+def mean_input(t, inputs, column, i, begin, since, until):
+    """Mean over since..until (s) of an input held from each row on; before row `begin` its first value holds."""
+    if until <= since:
+        since = until - 1e-9
+    j = i
+    while j > begin and t[j] > since:
+        j -= 1
+    total, at = 0.0, since
+    while True:
+        end = until if j + 1 > i or t[j + 1] >= until else t[j + 1]
+        if end > at:
+            total += inputs[j, column] * (end - at)
+            at = end
+        if at >= until or j + 1 > i:
+            break
+        j += 1
+    return total / (until - since)
+
+
+@kernel
+def propagate(Pw, F, x, mode, t, inputs, i, begin, acc, zero, work, kept, quick):
+    """Fly from row i - 1 to row i, in place; acc (6) added to nu_dot; kept (N_XF), zero (3), work are scratch.
+
+    quick: by the midpoint rule.
+    """
+    dt = t[i] - t[i - 1]
+    steps = max(1, math.ceil(dt / MAX_STEP - 1e-9))
+    h, delay = dt / steps, F[ef.COMMAND_DELAY]
+    for k in range(steps):
+        if delay > 0.0:
+            a = t[i - 1] + k * h - delay
+            c0 = mean_input(t, inputs, 0, i - 1, begin, a, a + h)
+            c1 = mean_input(t, inputs, 1, i - 1, begin, a, a + h)
+            c2 = mean_input(t, inputs, 2, i - 1, begin, a, a + h)
+        else:
+            c0, c1, c2 = inputs[i - 1, 0], inputs[i - 1, 1], inputs[i - 1, 2]
+        kept[:] = x
+        since = t[i - 1] - t[begin] + k * h
+        if quick:
+            effect_midpoint(Pw, F, x, mode, c0, c1, c2, since, acc, 0.0, zero, h, work)
+        else:
+            effect_step(Pw, F, x, mode, c0, c1, c2, since, acc, 0.0, zero, h, work)
+        worst = 0.0
+        for n in range(7, 13):
+            worst = max(worst, abs(x[n]))
+        if not worst < LARGEST_SPEED:
+            x[:] = kept
+
+
+@kernel
+def log_path(x, before, path, i, begin):
+    """Add to the path (rows, 6: position, roll, pitch, yaw, without the filter's corrections) the step to row i."""
+    roll, pitch, yaw = euler_from_quaternion(x[3], x[4], x[5], x[6])
+    for n in range(3):
+        path[i, n] = path[i - 1, n] + x[n] - before[n]
+    path[i, 3] = path[i - 1, 3] + wrapped(roll - before[3])
+    path[i, 4] = path[i - 1, 4] + wrapped(pitch - before[4])
+    path[i, 5] = path[i - 1, 5] + wrapped(yaw - before[5])
+
+
+@kernel
+def stand(x, before):
+    """Position and Euler angles of x, into before (6)."""
+    before[0], before[1], before[2] = x[0], x[1], x[2]
+    before[3], before[4], before[5] = euler_from_quaternion(x[3], x[4], x[5], x[6])
+
+
+@kernel
+def read_row(F, x, t, stamps, path, i, begin, y):
+    """What is read at row i, into y (N_Y); motion capture at its own time, along the path flown.
+
+    stamps (rows): the times that the poses which stand in the rows were stamped with, s.
+    """
+    read(F, x, y)
+    link = int(F[ef.LINK])
+    if link > ef.ACTUATOR_LINKS:
+        y[link - ef.ACTUATOR_LINKS - 1] += correction(F, x, t[i] - t[begin], 0.0)
+    at = stamps[i] - (F[ef.MOCAP_DELAY] + F[ef.CLOCK_SKEW] * (stamps[i] - t[begin]) + x[ef.X_LATE])
+    if at == t[i] or i == begin:
+        return
+    j = i
+    while j > begin + 1 and t[j - 1] > at:
+        j -= 1
+    share = (t[j] - at) / (t[j] - t[j - 1])
+    for n in range(6):
+        y[ef.Y_MOCAP_X + n] -= path[i, n] - path[j, n] + share * (path[j, n] - path[j - 1, n])
+
+
+@kernel
+def missed(z, y, d):
+    """z - y into d (N_Y), angles wrapped; NaN where nothing was measured."""
+    for j in range(N_Y):
+        d[j] = z[j] - y[j]
+        if (j < 3 or j >= ef.Y_MOCAP_ROLL) and not math.isnan(d[j]):
+            d[j] = wrapped(d[j])

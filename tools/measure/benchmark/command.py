@@ -1,0 +1,34 @@
+"""`glider benchmark`: the speed figures, each beside what it is compared with."""
+
+from pathlib import Path
+
+import click
+
+from tools.cli.common import json_option, print_json, say
+from tools.measure.benchmark.registry import MEASURES, Settings, run
+
+
+def _shown(value: object) -> str:
+    """A figure for people: four digits, large numbers in groups of three."""
+    if isinstance(value, float):
+        return f"{value:,.0f}" if abs(value) >= 1e4 else f"{value:.4g}"
+    if isinstance(value, list):
+        return " ".join(_shown(item) for item in value)
+    return "-" if value is None else f"{value:,}" if isinstance(value, int) else str(value)
+
+
+@click.command(epilog="Measures: " + "; ".join(f"{name}: {measure.line}" for name, measure in MEASURES.items()) + ".")
+@click.option("--only", multiple=True, metavar="NAME", type=click.Choice(list(MEASURES)), help="Measure this alone.")
+@click.option("--repeats", type=click.IntRange(1, 1000), default=5, show_default=True, help="Runs behind each median.")
+@click.option("--plant-c", type=click.Path(exists=True, dir_okay=False, path_type=Path), help="Another C plant.")
+@json_option
+def benchmark(only: tuple[str, ...], repeats: int, plant_c: Path | None, as_json: bool) -> None:
+    """Measure how fast this machine flies: medians of repeated runs, what is compared taken in turns."""
+    names = list(dict.fromkeys(only)) or list(MEASURES)
+    results = run(names, Settings(repeats, plant_c), lambda name: say(f"{name} ..."))
+    if as_json:
+        print_json(results)
+        return
+    for name, figures in results.items():
+        for figure, value in figures.items():
+            click.echo(f"{name + '.' + figure:<28} {_shown(value)}")

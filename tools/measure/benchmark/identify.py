@@ -1,0 +1,132 @@
+"""Effective samples a second of `glider identify`'s chains, beside others on the same posterior in the same run.
+
+The posterior is that of some of the paper's runs, flown and captured in simulation. All samplers work in the same
+whitened coordinates, from starts as far apart; emcee calls the same compiled, vectorised log density. Counted is the
+whole walk, warm-up and all; an effective sample is the smallest bulk ESS (ArviZ) of the twelve coefficients.
+"""
+
+import tempfile
+import time
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from firmware.model.vehicle import COEFFICIENTS
+from tools.data.errors import need
+from tools.data.runs.case import load_case
+from tools.data.sources import load_vehicle
+from tools.identify.design import write_design
+from tools.identify.fit import fit
+from tools.identify.sampler import APART, Whitened, sample, whiten
+from tools.identify.statistics import Quadratic
+from tools.measure.benchmark.registry import Settings
+from tools.measure.benchmark.timing import alternate, median
+
+RUNS, SEED = list(range(0, 45, 5)), 1
+DRAWS = 10_000
+STEPS, BURN = 6_000, 1_500  # of emcee; 670 steps of its default moves were one effective sample of each walker
+TUNE, KEPT = 500, 2_000  # of NUTS
+
+
+def posterior() -> Quadratic:
+    """The statistics that are sampled."""
+    with tempfile.TemporaryDirectory() as folder:
+        write_design(Path(folder), "roughie", load_vehicle("roughie"), SEED, RUNS)
+        case = load_case(folder)
+        from tools.inference.model import nominal_model
+
+        return fit(case, nominal_model(case), case.runs).quadratic
+
+
+def smallest_ess(values: np.ndarray) -> float:
+    """Of draws (chains, draws, n), the coefficients first."""
+    import arviz
+
+    return min(float(arviz.ess(values[:, :, i], method="bulk")) for i in range(len(COEFFICIENTS)))
+
+
+def ours(statistics: Quadratic) -> float:
+    chains = sample(statistics, SEED, draws=DRAWS)
+    return smallest_ess(chains.values) / chains.seconds
+
+
+def emcee_ess(statistics: Quadratic, white: Whitened, evolving: bool = False) -> float:
+    """The affine-invariant ensemble, two walkers a dimension and one pair over; or moves of differential evolution."""
+    import emcee
+
+    size = len(statistics.at) + len(statistics.groups)
+    walkers = 2 * (size + 1)
+    rng = np.random.default_rng(SEED)
+    start = np.column_stack([
+        APART * rng.standard_normal((walkers, len(statistics.at))),
+        0.01 * rng.standard_normal((walkers, len(statistics.groups))),
+    ])  # fmt: skip
+    start[~np.isfinite(white.log_densities(start))] *= 0.1
+    moves = [(emcee.moves.DEMove(), 0.8), (emcee.moves.DESnookerMove(), 0.2)] if evolving else None
+    sampler = emcee.EnsembleSampler(walkers, size, white.log_densities, vectorize=True, moves=moves)
+    sampler.random_state = np.random.RandomState(SEED).get_state()
+    before = time.perf_counter()
+    sampler.run_mcmc(start, STEPS, skip_initial_state_check=True)
+    seconds = time.perf_counter() - before
+    y = sampler.get_chain(discard=BURN).transpose(1, 0, 2)[:, :, : len(statistics.at)]
+    return smallest_ess(white.mode + y @ white.root.T) / seconds
+
+
+def nuts_ess(statistics: Quadratic, white: Whitened) -> tuple[float, float] | None:
+    """NumPyro's NUTS on the same density; with and without the time to compile. None where it is not installed."""
+    if find_spec("numpyro") is None or find_spec("jax") is None:
+        return None
+    import jax
+    import jax.numpy as jnp
+    from numpyro.infer import MCMC, NUTS
+
+    jax.config.update("jax_enable_x64", True)
+    A0, b0, A, b, c, count = (jnp.asarray(term) for term in white.terms)
+    n = len(b0)
+
+    def energy(point):
+        y, levels = point[:n], point[n:]
+        square = c + 2.0 * b @ y + jnp.einsum("i,gij,j->g", y, A, y)
+        prior = 0.5 * y @ A0 @ y + b0 @ y + 0.5 * jnp.sum((levels / white.width) ** 2)
+        return prior + jnp.sum(count * levels + 0.5 * jnp.exp(-2.0 * levels) * square)
+
+    rng = np.random.default_rng(SEED)
+    start = APART * rng.standard_normal((4, n + len(c)))
+    start[:, n:] *= 0.005
+    mcmc = MCMC(NUTS(potential_fn=energy), num_warmup=TUNE, num_samples=KEPT, num_chains=4, chain_method="vectorized",
+                progress_bar=False)  # fmt: skip
+    times = []
+    for _ in range(2):
+        before = time.perf_counter()
+        mcmc.run(jax.random.PRNGKey(SEED), init_params=jnp.asarray(start))
+        y = np.asarray(mcmc.get_samples(group_by_chain=True))
+        times.append(time.perf_counter() - before)
+    found = smallest_ess(white.mode + y[:, :, :n] @ white.root.T)
+    return found / times[1], found / times[0]
+
+
+def measure(settings: Settings) -> dict[str, Any]:
+    """ess_per_s, emcee_ess_per_s, ratio; numpyro_ess_per_s (null where it is not installed); parameters."""
+    need("arviz", "scipy", extra="identify")
+    need("emcee", extra="test")
+    statistics = posterior()
+    white = whiten(statistics)
+    ours(statistics)  # compiles
+    white.log_densities(np.zeros((4, len(statistics.at) + len(statistics.groups))))
+    walks, ensembles, evolving = alternate(
+        min(settings.repeats, 3), lambda: ours(statistics), lambda: emcee_ess(statistics, white),
+        lambda: emcee_ess(statistics, white, evolving=True),
+    )  # fmt: skip
+    nuts = nuts_ess(statistics, white)
+    return {
+        "ess_per_s": median(walks),
+        "emcee_ess_per_s": median(ensembles),
+        "ratio": median([one / other for one, other in zip(walks, ensembles, strict=True)]),
+        "emcee_evolution_ess_per_s": median(evolving),
+        "ratio_evolution": median([one / other for one, other in zip(walks, evolving, strict=True)]),
+        "numpyro_ess_per_s": None if nuts is None else nuts[0],
+        "numpyro_ess_per_s_with_compiling": None if nuts is None else nuts[1],
+        "parameters": len(statistics.at) + len(statistics.groups),
+    }

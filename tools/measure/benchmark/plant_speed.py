@@ -1,0 +1,131 @@
+"""Steps of the nominal plant in a second: one flight, one core, beside the same flight in plain C.
+
+The C program (plant.c here, or another of the same protocol) is compiled for this machine and both are run in turns.
+Start, commands and step are the program's: 1 m deep, 0.2 m/s, servo 0.6 rad, slider -0.02 m, ballast 0.1 kg, 0.01 s.
+"""
+
+import math
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from firmware.core.maths.rotations import euler_from_quaternion, wrap_angle
+from firmware.core.vehicle import layout
+from firmware.core.vehicle.flight import nominal_run
+from firmware.model.library import shipped
+from firmware.model.vehicle import decode_vehicle
+from tools.data.errors import InputError
+from tools.measure.benchmark.registry import Settings
+from tools.measure.benchmark.timing import alternate, median, seconds
+
+STEPS = 2_000_000
+DT = 0.01  # s
+COMMANDS = (0.6, -0.02, 0.1)  # rad, m, kg
+STILL_WATER = (0.0, 0.0, 0.0)
+FLAGS = ("-O3", "-march=native")
+HEADING_STRIDE = 50  # steps between looks at the heading, which turns by much less than half a circle in them
+C_TIMEOUT_S = 600.0
+
+
+def start() -> np.ndarray:
+    """The kernels' state at the beginning, shape (N_X,)."""
+    x = np.zeros(layout.N_X)
+    x[2], x[layout.X_QUAT], x[layout.X_NU] = 1.0, 1.0, 0.2
+    return x
+
+
+def final_state(P: np.ndarray, steps: int) -> list[float]:
+    """eta (psi continuous), nu, servo, slider, ballast after `steps` steps: 15 numbers."""
+    x, work, psi, done = start(), np.zeros((5, layout.N_X)), 0.0, 0
+    while done < steps:
+        count = min(HEADING_STRIDE, steps - done)
+        nominal_run(P, x, *COMMANDS, *STILL_WATER, DT, count, work)
+        done += count
+        psi += wrap_angle(euler_from_quaternion(*x[layout.X_QUAT : layout.X_NU])[2] - psi)
+    phi, theta, _ = euler_from_quaternion(*x[layout.X_QUAT : layout.X_NU])
+    return [float(value) for value in (*x[:3], phi, theta, psi, *x[layout.X_NU :])]
+
+
+@contextmanager
+def compiled(source: Path, compiler: str) -> Iterator[Path]:
+    """The program made from a C file, for as long as it is needed. InputError with the compiler's first complaint."""
+    with tempfile.TemporaryDirectory(prefix="glider-plant-") as folder:
+        program = Path(folder) / "plant"
+        command = [compiler, *FLAGS, str(source), "-lm", "-o", str(program)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            complaints = [line for line in done.stderr.splitlines() if "error" in line] or done.stderr.splitlines()
+            raise InputError(f"does not compile: {complaints[0] if complaints else done.returncode}", source=source)
+        yield program
+
+
+def run_c(program: Path, source: Path, steps: int) -> tuple[float, list[float]]:
+    """Steps per second and final state of the C program."""
+    try:
+        done = subprocess.run(
+            [str(program), str(steps)], capture_output=True, text=True, timeout=C_TIMEOUT_S, check=True
+        )
+        speed, *state = (float(number) for number in done.stdout.split())
+    except subprocess.TimeoutExpired:
+        raise InputError(f"still flying after {C_TIMEOUT_S:g} s", source=source) from None
+    except subprocess.CalledProcessError as error:
+        raise InputError(f"the program ended with exit code {error.returncode}", source=source) from None
+    except ValueError:
+        raise InputError("expected a speed and 15 states on standard output", source=source) from None
+    if len(state) != 15 or not (speed > 0.0 and all(math.isfinite(value) for value in state)):
+        message = f"expected a speed and 15 states on standard output, got {len(state) + 1} numbers"
+        raise InputError(message, source=source)
+    return speed, state
+
+
+def kernel_speed(P: np.ndarray, steps: int) -> float:
+    """Steps per second of the compiled kernel."""
+    x, work = start(), np.zeros((5, layout.N_X))
+    return steps / seconds(lambda: nominal_run(P, x, *COMMANDS, *STILL_WATER, DT, steps, work))
+
+
+def measure(settings: Settings, steps: int = STEPS) -> dict[str, Any]:
+    """steps_per_s, c_steps_per_s and ratio (medians, taken in turns), final_state and its distance from C's.
+
+    Where there is no C to compare with, its figures are null and `note` says why.
+    """
+    P = decode_vehicle(shipped("model/vehicles")["roughie"], "roughie").vector()
+    state = final_state(P, steps)  # compiles the kernel, too
+    result: dict[str, Any] = {"steps": steps, "final_state": state}
+    compiler = shutil.which("cc")
+    note = "no C compiler (cc) to compare with"
+    with as_file(files("tools.measure.benchmark") / "plant.c") as own:
+        source = settings.plant_c or own
+        try:
+            if compiler is not None:
+                return {**against_c(P, source, compiler, state, settings.repeats, steps), **result}
+        except InputError as error:
+            if settings.plant_c is not None:
+                raise
+            note = str(error)
+    speeds = alternate(settings.repeats, lambda: kernel_speed(P, steps))[0]
+    nothing = {"c_steps_per_s": None, "ratio": None, "max_state_difference": None}
+    return {"steps_per_s": median(speeds), **nothing, **result, "note": note}
+
+
+def against_c(
+    P: np.ndarray, source: Path, compiler: str, state: list[float], repeats: int, steps: int
+) -> dict[str, Any]:
+    """Kernel and C in turns: both speeds, their ratio, the largest difference of `state` from where C ends."""
+    with compiled(source, compiler) as program:
+        speeds, flights = alternate(repeats, lambda: kernel_speed(P, steps), lambda: run_c(program, source, steps))
+    speed, c_speed = median(speeds), median([speed for speed, _ in flights])
+    return {
+        "steps_per_s": speed,
+        "c_steps_per_s": c_speed,
+        "ratio": speed / c_speed,
+        "max_state_difference": max(abs(a - b) for a, b in zip(state, flights[0][1], strict=True)),
+        "c_source": source.name,
+    }

@@ -1,0 +1,193 @@
+"""`python -m tools.measure.figures.devices`: what is claimed of the real drivers, measured against twins, as JSON.
+
+same-flight: a mission at real time through drivers, wires and twins, against the same seed on the simulated board
+with the same rates and delays. lateness: the tick's lateness while a device is silent, late, babbling or unplugged,
+against the undisturbed run of the same minutes, in turns.
+"""
+
+import json
+import math
+import os
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from firmware.core.control.telemetry import LATENESS
+from tools.cli.common import DONE, FAILED, print_json, progress
+
+POSITION_LIMIT_M, ATTITUDE_LIMIT_DEG = 0.10, 2.0
+RATIO_LIMIT = 1.5
+FAULTS = (
+    ("beacon", "silent"), ("beacon", "late 0.2"), ("beacon", "babble"), ("beacon", "unplug"), ("imu", "babble"),
+    ("imu", "unplug"), ("servo", "unplug"),
+)  # fmt: skip
+FIFO_PRIORITY = 50
+FIFO = click.option("--fifo", is_flag=True, help="At real-time priority, as a flight should be; needs the right to it.")
+
+
+def take_priority(fifo: bool) -> None:
+    """Real-time priority for this process and those it starts."""
+    if fifo:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(FIFO_PRIORITY))
+
+
+@click.group()
+def main() -> None:
+    """Measure the drivers against twins."""
+
+
+# --- same flight ----------------------------------------------------------------------------------------------------
+@main.command("same-flight")
+@click.option("--mission", default="sawtooth", show_default=True)
+@click.option("--seed", default=1, show_default=True)
+@FIFO
+def same_flight(mission: str, seed: int, fifo: bool) -> None:
+    """Fly a mission on the twin at real time and on its simulated board; compare the ends and the attitudes."""
+    take_priority(fifo)
+    with tempfile.TemporaryDirectory() as folder:
+        result = compare_flights(mission, seed, Path(folder))
+    print_json(result)
+    raise SystemExit(DONE if result["pass"] else FAILED)
+
+
+def compare_flights(mission: str, seed: int, folder: Path, *, vehicle: str = "roughie") -> dict[str, Any]:
+    """Both flights, logged, and how far they are apart."""
+    from sim_backend.twins.boardfile import decode_twin_file, simulated_text
+    from tools.data.log.reader import read_log
+    from tools.flight.compose import load_board_file
+
+    found = load_board_file("twin")
+    (folder / "sim.toml").write_text(simulated_text(decode_twin_file(found.text, found.source)))
+    twin = fly(mission, vehicle, "twin", seed, folder / "twin.mcap")
+    sim = fly(mission, vehicle, str(folder / "sim.toml"), seed, folder / "sim.mcap")
+    ticks = {name: read_log(folder / f"{name}.mcap").topics["/tick"] for name in ("sim", "twin")}
+    truth = read_log(folder / "sim.mcap").topics["/truth"]
+    end = np.array([truth.column(f"true_{axis}_m")[-1] for axis in "xyz"])
+    there = np.array([twin["truth"][f"{axis}_m"] for axis in "xyz"])
+    apart = float(np.linalg.norm(end - there))
+    rms = attitude_rms_deg(ticks["sim"], ticks["twin"])
+    return {
+        "mission": mission, "seed": seed, "completed": twin["completed"] and sim["completed"],
+        "seconds": {name: float(np.ptp(topic.column("t_s"))) for name, topic in ticks.items()},
+        "end_apart_m": apart, "end_m": {"sim": end, "twin": there}, "attitude_rms_deg": rms,
+        "missed_ticks": twin["missed_ticks"], "ticks": twin["ticks"],
+        "pass": bool(apart < POSITION_LIMIT_M and rms["flying"] < ATTITUDE_LIMIT_DEG and twin["completed"]),
+    }  # fmt: skip
+
+
+def fly(mission: str, vehicle: str, board: str, seed: int, log: Path) -> dict[str, Any]:
+    """`glider fly`, as a person types it."""
+    import subprocess
+    import sys
+
+    command = [sys.executable, "-m", "tools.cli.main", "fly", "--mission", mission, "--vehicle", vehicle]
+    command += ["--board", board, "--seed", str(seed)]
+    done = subprocess.run([*command, "--log", str(log), "--json"], stdout=subprocess.PIPE, check=False)
+    return json.loads(done.stdout)
+
+
+def attitude_rms_deg(sim: Any, twin: Any) -> dict[str, float]:
+    """Rms of the angle between both attitudes (deg), at equal times since the first tick: flying, and to the end."""
+    times = sim.column("t_s")
+    own = twin.column("t_s") - twin.column("t_s")[0]
+    angles = np.array([np.interp(times, own, np.unwrap(twin.column(f"est_{axis}_rad"))) for axis in AXES]).T
+    both = [_quaternions(angles), _quaternions(np.array([sim.column(f"est_{axis}_rad") for axis in AXES]).T)]
+    turned = 2.0 * np.arccos(np.clip(np.abs((both[0] * both[1]).sum(axis=1)), 0.0, 1.0))
+    flying = (sim.column("mode") == 1.0) & (times < own[-1])
+    return {
+        "flying": math.degrees(math.sqrt(float(np.mean(turned[flying] ** 2)))),
+        "with_ascent": math.degrees(math.sqrt(float(np.mean(turned**2)))),
+    }
+
+
+AXES = ("roll", "pitch", "yaw")
+
+
+def _quaternions(angles: np.ndarray) -> np.ndarray:
+    """Unit quaternions (n, 4) of roll, pitch and yaw (n, 3)."""
+    from firmware.core.maths.rotations import quaternion_from_euler
+
+    return np.array([quaternion_from_euler(*row) for row in angles])
+
+
+# --- lateness -------------------------------------------------------------------------------------------------------
+@main.command("lateness")
+@click.option("--block", default=0.6, show_default=True, help="Seconds of a block; disturbed and not take turns.")
+@click.option("--turns", default=40, show_default=True, help="Blocks of each kind for each fault.")
+@FIFO
+def lateness(block: float, turns: int, fifo: bool) -> None:
+    """The tick's lateness with one device disturbed over that of the undisturbed blocks between."""
+    take_priority(fifo)
+    rows = measure_lateness(block, turns, FAULTS)
+    result = {"fifo": fifo, "faults": rows, "ratio_limit": RATIO_LIMIT, "pass": all(row["pass"] for row in rows)}
+    print_json(result)
+    raise SystemExit(DONE if result["pass"] else FAILED)
+
+
+def measure_lateness(block: float, turns: int, faults: Any) -> list[dict[str, Any]]:
+    """One flight of the real runtime on twins; in turns, each fault comes and goes."""
+    from firmware.runtime import Runtime
+    from firmware.telemetry import TICK
+    from hal.recorder.recorder import NullRecorder
+    from tools.flight.compose import build_flight
+    from tools.measure.benchmark.tick import ENDLESS
+
+    with tempfile.TemporaryDirectory() as folder:
+        mission = Path(folder, "endless.toml")
+        mission.write_text(ENDLESS)
+        flight = build_flight(mission=str(mission), board="twin")
+    flight.board.open()
+    channel = NullRecorder((TICK,)).channel("/tick")
+    runtime = Runtime(flight.board, flight.autopilot, flight.supervisor, channel)
+    runtime.arm()
+    try:
+        ticks = round(block / runtime.dt)
+        _run_ticks(runtime, channel, ticks)
+        rows = []
+        with progress("turns", turns * len(faults)) as advance:
+            for device, fault in faults:
+                rows.append(_one_fault(flight.board, runtime, channel, device, fault, ticks, turns, advance))
+        return rows
+    finally:
+        runtime.disarm()
+        flight.board.close()
+
+
+def _run_ticks(runtime: Any, channel: Any, ticks: int) -> np.ndarray:
+    late = np.empty(ticks)
+    for i in range(ticks):
+        runtime.tick()
+        late[i] = channel.values[LATENESS]
+    return late
+
+
+def _one_fault(
+    board: Any, runtime: Any, channel: Any, device: str, fault: str, ticks: int, turns: int, advance: Any
+) -> dict[str, Any]:
+    """Lateness (s) of disturbed and undisturbed blocks in turns; the first 0.2 s of each are not counted."""
+    late: dict[bool, list[np.ndarray]] = {False: [], True: []}
+    settle = round(0.2 / runtime.dt)
+    for _ in range(turns):
+        for disturbed in (False, True):
+            board.control(f"fault {device} {fault if disturbed else 'none'}")
+            _run_ticks(runtime, channel, settle)
+            late[disturbed].append(_run_ticks(runtime, channel, ticks))
+        board.control(f"fault {device} none")
+        advance(1)
+    quiet, bad = (np.concatenate(late[key]) for key in (False, True))
+    figures = {
+        name: {"undisturbed_us": 1e6 * float(of(quiet)), "disturbed_us": 1e6 * float(of(bad))}
+        for name, of in (("median", np.median), ("p99", lambda x: np.percentile(x, 99)))
+    }
+    ratios = {name: row["disturbed_us"] / row["undisturbed_us"] for name, row in figures.items()}
+    return {
+        "device": device, "fault": fault, "ticks": len(bad), **figures, "ratio": ratios,
+        "pass": all(ratio <= RATIO_LIMIT for ratio in ratios.values()),
+    }  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,330 @@
+"""`python -m tools.measure.figures.unattended`: what is claimed of flights that nobody watches, measured, as JSON.
+
+kills: a flight killed (-9) at random instants and started again, by the rule that `glider fly` goes by (tools/
+unattended.py Life): how many dives were resumed. power-cuts: a log of a flight cut at every byte: what is read of it.
+endurance: half an hour on twins at real time, beside load on another core.
+"""
+
+import gc
+import math
+import os
+import random
+import signal
+import tempfile
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import click
+
+from tools.cli.common import DONE, FAILED, print_json, progress
+
+DIP = """
+format = 1
+name = "dip"
+time_limit_s = 60.0
+[site]
+name = "pool"
+depth_m = 6.0
+[[leg]]
+duration_s = {seconds}
+pitch_deg = -15.0
+ballast_kg = 0.08
+[[leg]]
+duration_s = 1.0
+pitch_deg = 15.0
+ballast_kg = -0.15
+"""
+LOST_LIMIT_S = 1.0
+
+
+@click.group()
+def main() -> None:
+    """Measure what is promised of unattended flights."""
+
+
+# --- kills ----------------------------------------------------------------------------------------------------------
+@main.command("kills")
+@click.option("--kills", default=1000, show_default=True, type=click.IntRange(1))
+@click.option("--seed", default=1, show_default=True)
+def kills(kills: int, seed: int) -> None:
+    """Kill a flight at random instants, start it again: 0 dives may be resumed."""
+    result = measure_kills(kills, seed)
+    print_json(result)
+    raise SystemExit(DONE if result["pass"] else FAILED)
+
+
+@dataclass
+class Told:
+    """What a flight that may have been killed had told by then."""
+
+    steps: str = ""  # A armed, D diving (both on the disk), F flew a tick of the mission, E ended, X that on the disk
+    refused: bool = False
+    ascent_only: bool = False
+    seconds: float = 0.0  # from its first step to its end
+
+    @property
+    def under_way(self) -> bool:
+        """Killed between its arming and its end."""
+        return "A" in self.steps and "E" not in self.steps
+
+
+def measure_kills(count: int, seed: int) -> dict[str, Any]:
+    """Each trial: a flight killed, its restart killed too, a last one left alone."""
+    from tools.flight.compose import build_flight
+
+    rng = random.Random(seed)
+    with tempfile.TemporaryDirectory() as place:
+        mission = Path(place, "dip.toml")
+        mission.write_text(DIP.format(seconds=20.0))
+        flight = build_flight(mission=str(mission))
+        _warm(flight)
+        flight = build_flight(mission=str(mission))
+        gc.collect()
+        gc.freeze()  # a child's collection need not copy all that was there before it
+        whole_s = _in_child(flight, Path(place, "whole"), None).seconds
+        found = {"kills": 0, "under_way": 0, "resumed": 0, "ascended_only": 0, "refused": 0, "ended_before": 0}
+        by_step: dict[str, int] = {}
+        trial = 0
+        with progress("kills", count) as advance:
+            while found["kills"] < count:
+                trial += 1
+                folder = Path(place, f"trial-{trial}")
+                under_way = False
+                for last in (False, False, True):
+                    if not last and found["kills"] == count:
+                        continue
+                    told = _in_child(flight, folder, None if last else rng.uniform(0.0, 1.05 * whole_s))
+                    found["resumed"] += under_way and "F" in told.steps
+                    found["ascended_only"] += under_way and told.ascent_only
+                    found["refused"] += told.refused
+                    under_way = under_way or told.under_way
+                    if "X" in told.steps:
+                        under_way = False
+                    if not last:
+                        found["kills"] += 1
+                        found["under_way"] += told.under_way
+                        found["ended_before"] += "X" in told.steps
+                        step = told.steps[-1:] or "before arming"
+                        by_step[step] = by_step.get(step, 0) + 1
+                        advance(1)
+    return {**found, "killed_after": by_step, "whole_flight_s": whole_s, "seed": seed, "pass": found["resumed"] == 0}
+
+
+def _warm(flight: Any) -> None:
+    """Everything compiled and loaded before the first fork."""
+    import tools.flight.keeper  # noqa: F401
+    from hal.recorder.recorder import NullRecorder
+    from tools.flight.compose import build_runtime, record_specs
+
+    flight.board.open()
+    runtime = build_runtime(flight, NullRecorder(record_specs(flight)))
+    runtime.arm()
+    runtime.run()
+    runtime.disarm()
+
+
+def _in_child(flight: Any, folder: Path, kill_after_s: float | None) -> Told:
+    """One start of the flight in a process of its own."""
+    ours, theirs = os.pipe()
+    pid = os.fork()
+    if pid == 0:
+        code = 1
+        try:
+            os.close(ours)
+            _live(flight, folder, theirs)
+            code = 0
+        finally:
+            os._exit(code)
+    os.close(theirs)
+    data = os.read(ours, 1)  # it begins
+    begin = time.monotonic()
+    if kill_after_s is not None:
+        time.sleep(kill_after_s)
+        os.kill(pid, signal.SIGKILL)
+    while piece := os.read(ours, 1000):
+        data += piece
+    os.close(ours)
+    _, status = os.waitpid(pid, 0)
+    if kill_after_s is None and status:
+        raise RuntimeError("a flight that nobody killed broke off")
+    text = data.decode()
+    steps = "".join(letter for letter in text if letter in "ADFEX")
+    return Told(steps, "R" in text, "U" in text, time.monotonic() - begin)
+
+
+def _live(flight: Any, folder: Path, pipe: int) -> None:
+    """What `glider fly` does between its start and its end, on the simulated board."""
+    from firmware.core.control import control_layout as at
+    from hal.recorder.recorder import NullRecorder
+    from hal.state_file import Phase
+    from tools.flight.compose import build_runtime, record_specs
+    from tools.flight.keeper import Life
+
+    os.write(pipe, b"S")
+    life = Life(folder, "dip")
+    if life.before.phase == Phase.HELD:
+        os.write(pipe, b"R")
+        return
+    if life.ascent_only:
+        os.write(pipe, b"U")
+        flight.autopilot.give_up()
+    life.armed()
+    os.write(pipe, b"A")
+    flight.board.open()
+    life.diving()
+    os.write(pipe, b"D")
+    flown = [False]
+
+    def look(t: float) -> None:
+        if not flown[0] and flight.autopilot.ap[at.MODE] == at.FLYING:
+            flown[0] = True
+            os.write(pipe, b"F")
+
+    runtime = build_runtime(flight, NullRecorder(record_specs(flight)))
+    runtime.extras = (*runtime.extras, look)
+    runtime.arm()
+    runtime.run()
+    os.write(pipe, b"E")
+    autopilot = flight.autopilot
+    life.ended(surfaced=autopilot.surfaced, orderly=autopilot.mode == "completed", reason=autopilot.reason)
+    os.write(pipe, b"X")
+
+
+# --- power cuts -----------------------------------------------------------------------------------------------------
+@main.command("power-cuts")
+@click.option("--seconds", default=4.0, show_default=True, help="Length of the mission whose log is cut.")
+@click.option("--every", default=1, show_default=True, help="Cut at every n-th byte.")
+def power_cuts(seconds: float, every: int) -> None:
+    """Cut the log of a flight at every byte: nothing damaged is read, at most a second is lost."""
+    result = measure_cuts(seconds, every)
+    print_json(result)
+    raise SystemExit(DONE if result["pass"] else FAILED)
+
+
+def reference_log(path: Path, seconds: float) -> None:
+    """A flight on the simulated board at real time, so that the log is brought to the disk as it is in flight."""
+    from hal.recorder.recorder import Recorder
+    from tools.flight.compose import build_flight, build_runtime, log_metadata, record_specs
+
+    mission = path.with_suffix(".toml")
+    mission.write_text(DIP.format(seconds=1000.0).replace("time_limit_s = 60.0", "time_limit_s = 2000.0"))
+    flight = build_flight(mission=str(mission), realtime=True)
+    metadata = log_metadata(flight, seed=0, effects={})
+    with Recorder(path, record_specs(flight), attachments=flight.texts, metadata=metadata) as recorder:
+        flight.board.open()
+        runtime = build_runtime(flight, recorder)
+        runtime.arm()
+        try:
+            for _ in range(round(seconds / runtime.dt)):
+                runtime.tick()
+        finally:
+            runtime.disarm()
+        recorder.close({"reason": "long enough"})
+
+
+def measure_cuts(seconds: float, every: int) -> dict[str, Any]:
+    """The log shortened byte by byte, and read each time: what is read against what was written.
+
+    Lost is what had happened when the byte at the cut was written and is not read: the time from the last record that
+    is read to the last of the piece (chunk) in which the cut lies.
+    """
+    from tools.data.log.reader import read_log
+    from tools.data.log.repair import repair
+
+    with tempfile.TemporaryDirectory() as place:
+        path = Path(place, "reference.mcap")
+        reference_log(path, seconds)
+        whole = read_log(path)
+        size = path.stat().st_size
+        written = {name: (topic.times_ns.tobytes(), _rows(topic)) for name, topic in whole.topics.items()}
+        ends = chunk_ends(path)
+        wrong, worst, repaired = 0, 0.0, 0
+        cuts = range(size, -1, -every)
+        with progress("cuts", len(cuts)) as advance:
+            for done, cut in enumerate(cuts):
+                os.truncate(path, cut)
+                log = read_log(path)
+                good = all(
+                    name in written
+                    and written[name][0].startswith(topic.times_ns.tobytes())
+                    and written[name][1].startswith(_rows(topic))
+                    for name, topic in log.topics.items()
+                )
+                wrong += not (good and not log.damages)
+                worst = max(worst, _lost_s(log, ends, cut))
+                if done % 5000 == 0:
+                    repaired += _repairs(repair, read_log, path, log)
+                advance(1)
+    return {
+        "bytes": size, "cuts": len(cuts), "records": {name: topic.count for name, topic in whole.topics.items()},
+        "cuts_with_damaged_records": wrong, "most_lost_s": worst, "repaired_and_whole": repaired,
+        "repairs_tried": math.ceil(len(cuts) / 5000), "pass": wrong == 0 and worst <= LOST_LIMIT_S,
+    }  # fmt: skip
+
+
+def _rows(topic: Any) -> bytes:
+    return b"" if topic.data is None else topic.data.tobytes()
+
+
+@dataclass
+class Piece:
+    """A chunk: where it begins, and the times of its last record and the last before it, ns."""
+
+    start: int
+    last_ns: int
+    topics: set[str] = field(default_factory=set)
+
+
+def chunk_ends(path: Path) -> list[Piece]:
+    """The chunks of a log by their own index, which the standard reader reads."""
+    from mcap.reader import make_reader
+
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    found = [Piece(index.chunk_start_offset, index.message_end_time) for index in summary.chunk_indexes]
+    return sorted(found, key=lambda piece: piece.start)
+
+
+def _lost_s(log: Any, pieces: list[Piece], cut: int) -> float:
+    """Seconds between the last record read and the last that the piece at the cut was to bring."""
+    begun = [piece.last_ns for piece in pieces if piece.start < cut]
+    if not begun:
+        return 0.0
+    read = [int(topic.times_ns.max()) for topic in log.topics.values() if topic.count]
+    return (max(begun) - max(read, default=0)) / 1e9
+
+
+def _repairs(repair: Any, read_log: Any, path: Path, cut: Any) -> bool:
+    """Whether what can be read of a cut log is a whole log once repaired."""
+    out = path.with_name("repaired.mcap")
+    if cut.size < 8:
+        return True
+    report = repair(path, out)
+    if report.out is None:
+        return cut.whole
+    again = read_log(out)
+    out.unlink()
+    return again.whole and {n: _rows(t) for n, t in again.topics.items()} == {
+        n: _rows(t) for n, t in cut.topics.items()
+    }
+
+
+# --- endurance ------------------------------------------------------------------------------------------------------
+@main.command("endurance")
+@click.option("--minutes", default=30.0, show_default=True)
+@click.option("--fifo", is_flag=True, help="At real-time priority, memory locked, as a flight should be.")
+@click.option("--no-load", is_flag=True, help="Without the busy process on the other core.")
+def endurance(minutes: float, fifo: bool, no_load: bool) -> None:
+    """Fly on twins at real time beside load: missed ticks, lateness, memory, descriptors."""
+    from tools.measure.figures.endurance import measure
+
+    result = measure(minutes * 60.0, fifo=fifo, load=not no_load)
+    print_json(result)
+    raise SystemExit(DONE if result["pass"] else FAILED)
+
+
+if __name__ == "__main__":
+    main()

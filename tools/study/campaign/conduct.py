@@ -1,0 +1,88 @@
+"""A campaign from plan to results: what is already there is read, the rest is flown, kept as it comes, added up."""
+
+import contextlib
+import csv
+import io
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tools.study.campaign.flights import CHUNK, COLUMNS, ENDINGS, Job, cut
+from tools.study.campaign.plan import Plan, fingerprint
+from tools.study.campaign.store import Store, write_whole
+from tools.study.campaign.workers import check_reachable, fly_here, fly_on_dask
+
+FLIGHTS_FILE = "flights.csv"
+
+
+@dataclass
+class Flown:
+    """All flights of a campaign."""
+
+    plan: Plan
+    table: np.ndarray  # (flights, len(COLUMNS)), in the order mission, seed, controller
+    fresh: int  # flights flown now; the others were there
+    seconds: float  # that those took
+
+    def column(self, name: str) -> np.ndarray:
+        """One column of the table by its name in COLUMNS, shape (flights,)."""
+        return self.table[:, COLUMNS.index(name)]
+
+
+def fly_campaign(
+    plan: Plan,
+    folder: Path | None = None,
+    *,
+    jobs: int = 0,
+    dask: str | None = None,
+    chunk: int = CHUNK,
+    advance: Callable[[int], None] = lambda flights: None,
+) -> Flown:
+    """Fly what is not yet in the folder (None: keep nothing); advance(n) is told of flights as they are done.
+
+    jobs: processes, 0 for one a core; dask: address of a scheduler, which then gets the same chunks instead. The
+    result does not depend on any of them.
+    """
+    if dask:
+        check_reachable(dask)
+    job = Job(plan, fingerprint(plan))
+    store = None if folder is None else Store(folder, plan, job.fingerprint, chunk)
+    chunks = cut(plan, chunk if store is None else store.chunk)
+    rows: dict[int, np.ndarray] = {}
+    for piece in chunks:
+        found = None if store is None else store.read(piece, len(plan.campaign.controllers))
+        if found is not None:
+            rows[piece.number] = found
+            advance(len(found))
+    missing = [piece for piece in chunks if piece.number not in rows]
+    fresh, begin = 0, time.perf_counter()
+    if missing:
+        flown = fly_on_dask(job, missing, dask) if dask else fly_here(job, missing, jobs)
+        with contextlib.closing(flown):
+            for piece, table in flown:
+                if store is not None:
+                    store.keep(piece, table)
+                rows[piece.number] = table
+                fresh += len(table)
+                advance(len(table))
+    return Flown(plan, np.concatenate([rows[n] for n in range(len(chunks))]), fresh, time.perf_counter() - begin)
+
+
+def write_flights(path: Path, flown: Flown) -> None:
+    """All flights as CSV, one line each, with names where the table has numbers."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for row in flown.table.tolist():
+        values = dict(zip(COLUMNS, row, strict=True))
+        values["mission"] = flown.plan.missions[int(values["mission"])].name
+        values["controller"] = flown.plan.campaign.controllers[int(values["controller"])]
+        values["ended"] = ENDINGS[values["ended"]]
+        for name in ("seed", "completed", "within_limits", "leg"):
+            values[name] = int(values[name])
+        values["leg"] += 1  # legs count from 1 to a reader
+        writer.writerow("" if value != value else value for value in values.values())
+    write_whole(path, text.getvalue().encode())

@@ -1,0 +1,62 @@
+"""A diagnosis.json as a scorer reads it (GAP.md, Answers): what is scored is checked, the rest is let be."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import msgspec
+
+from tools.data.errors import InputError
+
+FILE = "diagnosis.json"
+MODEL = "corrected.toml"
+TIMING = "timing.json"  # beside it, by `glider gap challenge run`
+SUM = 0.01  # by which the probabilities of the causes may miss 1
+MAX_BYTES = 50_000_000
+
+Probability = Annotated[float, msgspec.Meta(ge=0.0, le=1.0 + 1e-9)]
+
+
+class Where(msgspec.Struct):
+    subsystem: str
+    element: str
+    probability: Probability
+
+
+class Cause(msgspec.Struct):
+    label: str
+    probability: Probability
+    group: list[str] = msgspec.field(default_factory=list)
+
+
+class Diagnosis(msgspec.Struct):
+    """Verdict, places and causes most probable first, and the effects that the corrected model holds."""
+
+    format: Annotated[int, msgspec.Meta(ge=1, le=1)]
+    verdict: Literal["none", "cause", "unknown"]
+    where: list[Where]
+    causes: Annotated[list[Cause], msgspec.Meta(min_length=1)]
+    selected: list[str]
+
+    def probability(self, *labels: str) -> float:
+        """Probability that the main cause is one of the labels."""
+        return sum(cause.probability for cause in self.causes if cause.label in labels)
+
+
+def read_diagnosis(path: Path) -> Diagnosis:
+    """A diagnosis, sorted as it should be; InputError with the place in the file where it is not one."""
+    if path.stat().st_size > MAX_BYTES:
+        raise InputError(f"longer than {MAX_BYTES} bytes", source=path)
+    try:
+        found = msgspec.json.decode(path.read_bytes(), type=Diagnosis)
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise InputError(str(error), source=path) from None
+    labels = [cause.label for cause in found.causes]
+    if len(set(labels)) < len(labels):
+        twice = next(label for label in labels if labels.count(label) > 1)
+        raise InputError(f"the label '{twice}' stands twice", source=path, column="causes")
+    total = sum(cause.probability for cause in found.causes)
+    if abs(total - 1.0) > SUM:
+        raise InputError(f"the probabilities add up to {total:.3f}, not 1", source=path, column="causes")
+    found.causes.sort(key=lambda cause: -cause.probability)
+    found.where.sort(key=lambda place: -place.probability)
+    return found

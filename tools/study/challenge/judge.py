@@ -1,0 +1,146 @@
+"""Diagnoses of a blind test gathered and scored: sealed answers, what was said, and how far it closes the gap."""
+
+import contextlib
+import io
+import json
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from tools.data.errors import InputError
+from tools.data.runs.run import Run, load_run
+from tools.gap.measure import root_mean_square, run_gap
+from tools.inference.channels import measured as table
+from tools.inference.windows import windows
+from tools.study.challenge.diagnosis import FILE, MODEL, TIMING, read_diagnosis
+from tools.study.challenge.score import Score, Scored, score
+from tools.study.challenge.seal import Answers, check_seal, folder_digest, open_answers, read_manifest
+from tools.study.challenge.trial import total
+
+NOMINAL = "nominal"
+NOTHING = 0.02
+
+
+def case_folders(cases: Path) -> tuple[Path, Path]:
+    """The folders of the cases and of their held flights: DIR/cases and DIR/held, or DIR and held beside it."""
+    if not cases.is_dir():
+        raise InputError("no such folder", source=cases)
+    if (cases / "cases").is_dir():
+        return cases / "cases", cases / "held"
+    return cases, cases.parent / "held"
+
+
+def open_sealed(path: Path, manifest: Path | None, cases: Path, held: Path) -> Answers:
+    """The answers, checked against the manifest if there is one: their own hash and those of the cases.
+
+    An archive without a manifest is an InputError: nobody could tell when it was written.
+    """
+    answers = open_answers(path)
+    if answers.sha256 is None:
+        return answers
+    if manifest is None or not manifest.is_file():
+        raise InputError("no manifest beside the cases to check the answers against", source=manifest or path)
+    check_seal(answers, manifest)
+    for name, promised in read_manifest(manifest).get("cases", {}).items():
+        for kind, folder in (("cases", cases / name), ("held", held / name)):
+            if not folder.is_dir():
+                raise InputError("the manifest names it, but it is not there", source=folder)
+            if folder_digest(folder) != promised[kind]:
+                raise InputError("not the case that the manifest promised: its files have changed", source=folder)
+    return answers
+
+
+def gather(answers: Answers, diagnoses: Path, partial: bool) -> list[Scored]:
+    """What was said to every case; with `partial`, only to those answered. InputError where nothing was said at all."""
+    if not diagnoses.is_dir():
+        raise InputError("no such folder", source=diagnoses)
+    found = []
+    for name, truth in sorted(answers.cases.items()):
+        path = diagnoses / name / FILE
+        said = read_diagnosis(path) if path.is_file() else None
+        timing = diagnoses / name / TIMING
+        seconds = _seconds(timing) if timing.is_file() else None
+        if said is not None or not partial:
+            found.append(Scored(name, truth, said, seconds=seconds))
+    if not any(case.said for case in found):
+        raise InputError(f"no {FILE} of any case in its folders", source=diagnoses)
+    return found
+
+
+def _seconds(path: Path) -> float:
+    try:
+        return float(json.loads(path.read_bytes())["seconds"])
+    except (ValueError, KeyError, TypeError):
+        raise InputError("no number 'seconds' in it", source=path) from None
+
+
+def _predicted(run: Path, model: str | Path, out: Path) -> Run:
+    """The run as `glider gap predict` predicts it."""
+    from tools.cli.gap import predict
+
+    arguments = [str(run), "--model", str(model), "--out", str(out)]
+    with contextlib.redirect_stderr(io.StringIO()):  # what it says to a person
+        predict.main(arguments, standalone_mode=False)
+    return load_run(out)
+
+
+def run_total(measured: Run, predicted: Run) -> float:
+    """Total gap of a prediction in run data: rms over its channels."""
+    return run_gap(measured, table(predicted), windows(measured.t)).total
+
+
+def closed_share(case: Scored, held: Path, diagnoses: Path) -> float | None:
+    """(before - after) / (before - perfect), totals over the held runs; 0 where there is no corrected model.
+
+    None where a perfect model closes next to nothing (NOTHING of the gap), so that the share means nothing.
+
+    before and after are `glider gap predict`'s with the nominal and with the corrected model, perfect is the sealed
+    answer's, from true starts.
+    """
+    model = diagnoses / case.name / MODEL
+    runs = sorted((held / case.name).glob("run*.csv*"))
+    if not runs:
+        raise InputError("no held runs of this case", source=held / case.name)
+    if case.said is None or not model.is_file():
+        return 0.0
+    before, perfect = held_total(runs, NOMINAL), perfect_total(case.truth)
+    if before - perfect < NOTHING * before:
+        return None
+    after = held_total(runs, model)
+    return (before - after) / (before - perfect)
+
+
+def held_total(runs: list[Path], model: str | Path) -> float:
+    """A model's total gap over runs: rms of theirs."""
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "predicted.csv"
+        totals = [run_total(load_run(path), _predicted(path, model, out)) for path in runs]
+    return root_mean_square(totals)
+
+
+def perfect_total(truth: dict[str, Any]) -> float:
+    """A perfect model's total gap over the held runs."""
+    return total(truth["oracle"][truth["runs"] :])
+
+
+def judge(
+    cases: Path,
+    answers: Path,
+    diagnoses: Path,
+    *,
+    manifest: Path | None = None,
+    partial: bool = False,
+    closing: bool = True,
+    advance: Callable[[int], None] = lambda n: None,
+) -> Score:
+    """Open, check and score; closing: fly the corrected models on the held runs too, which takes the time."""
+    folders = case_folders(cases)
+    beside = next((path for path in (cases / "manifest.json", cases.parent / "manifest.json") if path.is_file()), None)
+    opened = open_sealed(answers, manifest or beside, *folders)
+    found = gather(opened, diagnoses, partial)
+    for case in found:
+        if closing and case.predictable:
+            case.closed = closed_share(case, folders[1], diagnoses)
+        advance(1)
+    return score(found)

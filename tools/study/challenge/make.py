@@ -1,0 +1,135 @@
+"""A blind test made: cases drawn, flown and written on all cores, what is there kept, answers sealed at the end."""
+
+import os
+import shutil
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from firmware.model.vehicle import Vehicle
+from tools.data.errors import InputError
+from tools.data.runs.csvfile import write_bytes
+from tools.data.sources import load_vehicle
+from tools.study.challenge.cases import NoCase, answer, draw_case, write
+from tools.study.challenge.plan import CasePlan, Counts, plan
+from tools.study.challenge.seal import (
+    MANIFEST,
+    PLAN,
+    as_json,
+    check_seal,
+    open_answers,
+    read_object,
+    seal,
+    write_manifest,
+)
+
+VEHICLE = "roughie"
+MAKING = ".making"  # answers until they are sealed
+
+
+@dataclass(frozen=True)
+class Order:
+    """What is to be made and where."""
+
+    out: Path
+    seed: int
+    counts: Counts
+    archive: Path
+
+    @property
+    def plain(self) -> dict[str, Any]:
+        return {"seed": self.seed, "vehicle": VEHICLE, "counts": asdict(self.counts)}
+
+    @property
+    def cases(self) -> Path:
+        return self.out / "cases"
+
+    @property
+    def held(self) -> Path:
+        return self.out / "held"
+
+    @property
+    def making(self) -> Path:
+        return self.out / MAKING
+
+
+def make_one(order: Order, case: CasePlan, vehicle: Vehicle) -> str | None:
+    """Draw and write one case, its answer last; what went wrong, if no such case can be drawn."""
+    for folder in (order.cases, order.held):
+        shutil.rmtree(folder / case.name, ignore_errors=True)  # cut off in the middle
+    try:
+        made = draw_case(order.seed, case, vehicle)
+    except NoCase as error:
+        return str(error)
+    write(made, order.cases, order.held)
+    write_bytes(order.making / f"{case.name}.json", as_json(answer(made)))
+    return None
+
+
+def _prepare(order: Order) -> bool:
+    """Make the folders; whether everything has been made and sealed already."""
+    manifest = order.out / MANIFEST
+    if manifest.exists():
+        sealed = open_answers(order.archive)
+        check_seal(sealed, manifest)
+        if sealed.plan != order.plain:
+            raise InputError("holds another blind test (other seed or counts): name another folder", source=order.out)
+        return True
+    for folder in (order.cases, order.held, order.making, order.archive.parent):
+        folder.mkdir(parents=True, exist_ok=True)
+    begun = order.making / PLAN
+    if begun.exists() and read_object(begun.read_bytes(), begun) != order.plain:
+        raise InputError("holds the beginning of another blind test: name another folder", source=order.out)
+    if not begun.exists():
+        if any(order.cases.iterdir()) or any(order.held.iterdir()):
+            raise InputError("already holds cases of something else: name another folder", source=order.out)
+        write_bytes(begun, as_json(order.plain))
+    return False
+
+
+def missing(order: Order, cases: list[CasePlan]) -> list[CasePlan]:
+    """The cases that are not there yet."""
+    return [case for case in cases if not (order.making / f"{case.name}.json").exists()]
+
+
+def make(order: Order, jobs: int = 0, advance: Callable[[int], None] = lambda n: None) -> tuple[int, list[str]]:
+    """Make what is missing and seal; cases made now, and what could not be made (then nothing is sealed).
+
+    jobs: processes, 0 for one a core. The result depends on the seed and the counts alone.
+    """
+    cases = plan(order.seed, order.counts)
+    if _prepare(order):
+        advance(len(cases))
+        return 0, []
+    todo, failed = missing(order, cases), []
+    advance(len(cases) - len(todo))
+    vehicle = load_vehicle(VEHICLE)
+    if todo:  # the first one here: it compiles the kernels into the cache that the processes share
+        failed.append(make_one(order, todo[0], vehicle))
+        advance(1)
+    with ProcessPoolExecutor(jobs or os.cpu_count(), mp_context=get_context("spawn")) as pool:
+        waiting = [pool.submit(make_one, order, case, vehicle) for case in todo[1:]]
+        try:
+            for done in as_completed(waiting):
+                failed.append(done.result())
+                advance(1)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    wrong = sorted(error for error in failed if error)
+    if not wrong:
+        _seal(order, cases)
+    return len(todo), wrong
+
+
+def _seal(order: Order, cases: list[CasePlan]) -> None:
+    answers = {}
+    for case in cases:
+        path = order.making / f"{case.name}.json"
+        answers[case.name] = read_object(path.read_bytes(), path)
+    sha256 = seal(order.archive, order.plain, answers)
+    write_manifest(order.out / MANIFEST, order.archive, sha256, order.cases, order.held)
+    shutil.rmtree(order.making)

@@ -1,0 +1,271 @@
+"""Answers against the truth: GAP.md's figures by name, each counted as docs/CHALLENGE.md says."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from tools.study.challenge.diagnosis import Cause, Diagnosis
+from tools.study.challenge.plan import NONE, PAIR, SINGLE, UNKNOWN
+
+LEAST_PROBABILITY = 1e-6  # what a cause without an entry counts as
+LARGEST_GROUP = 3
+MOST_SELECTED = 3  # naming more than that is no answer for a pair
+SURE = 0.8
+CONFIDENCE = 0.9
+SCATTER = frozenset({"waves", "turbulence"})  # whose course nobody can predict
+
+
+@dataclass
+class Scored:
+    """One case: the truth, what was said (None: nothing), and what came of it."""
+
+    name: str
+    truth: dict[str, Any]
+    said: Diagnosis | None
+    closed: float | None = None  # of what a perfect model closes, on the held runs; None: not asked or no sense
+    seconds: float | None = None
+
+    @property
+    def labels(self) -> list[str]:
+        return self.truth["labels"]
+
+    @property
+    def kind(self) -> str:
+        """none, single, pair or unknown."""
+        if not self.labels:
+            return NONE
+        if "unknown" in self.labels:
+            return UNKNOWN
+        return SINGLE if len(self.labels) == 1 else PAIR
+
+    @property
+    def answers(self) -> list[str]:
+        """What the main cause may rightly be called."""
+        return self.labels or ["none"]
+
+    @property
+    def subsystems(self) -> set[str]:
+        return {place[0] for places in self.truth["places"] for place in places}
+
+    @property
+    def predictable(self) -> bool:
+        """Whether a model can close this gap at all."""
+        return self.kind in (SINGLE, PAIR) and not SCATTER & set(self.labels)
+
+    # --- one yes or no a figure; nothing said is no answer, wrong wherever it counts ------------------------------
+    def verdict(self) -> str | None:
+        return None if self.said is None else self.said.verdict
+
+    def seen(self) -> bool:
+        return self.verdict() in ("cause", "unknown")
+
+    def called_gap(self) -> bool:
+        return self.verdict() != "none"
+
+    def called_unknown(self) -> bool:
+        return self.verdict() == "unknown"
+
+    def _main(self) -> Cause | None:
+        """The most probable cause; None where nothing was said, or so large a group that nothing was."""
+        cause = None if self.said is None else self.said.causes[0]
+        return None if cause is None or len(cause.group) > LARGEST_GROUP else cause
+
+    def first(self) -> bool:
+        cause = self._main()
+        return cause is not None and cause.label in self.answers
+
+    def grouped(self) -> bool:
+        cause = self._main()
+        return cause is not None and bool({cause.label, *cause.group} & set(self.answers))
+
+    def first_three(self) -> bool:
+        return self.said is not None and any(cause.label in self.answers for cause in self.said.causes[:3])
+
+    def subsystem(self) -> bool:
+        return self.said is not None and bool(self.said.where) and self.said.where[0].subsystem in self.subsystems
+
+    def log_loss(self) -> float:
+        probability = 0.0 if self.said is None else self.said.probability(*self.answers)
+        return -math.log(min(1.0, max(probability, LEAST_PROBABILITY)))
+
+    def odds(self) -> float | None:
+        """Nat by which the likeliest label is more probable than `none`; None where one of them has no probability."""
+        if self.said is None:
+            return None
+        none = self.said.probability("none")
+        label = max((c.probability for c in self.said.causes if c.label not in ("none", "unknown")), default=0.0)
+        return math.log(label / none) if label > 0.0 and none > 0.0 else None
+
+    def _named(self) -> set[str]:
+        if self.said is None or len(self.said.selected) > MOST_SELECTED:
+            return set()
+        return set(self.said.selected)
+
+    def both(self) -> bool:
+        return set(self.labels) <= self._named()
+
+    def one_at_least(self) -> bool:
+        return bool(set(self.labels) & self._named())
+
+    def sure_and_wrong(self) -> bool:
+        if self.said is None:
+            return True
+        cause = self.said.causes[0]
+        return cause.probability > SURE and cause.label not in self.answers
+
+
+@dataclass
+class Figure:
+    """One line of the result."""
+
+    key: str
+    name: str  # as in GAP.md
+    target: float
+    at_most: bool
+    value: float | None
+    of: int  # cases that it was counted over
+    count: int | None = None  # None: no share
+    interval: tuple[float, float] | None = None
+
+    @property
+    def met(self) -> bool | None:
+        """Whether the value reaches the target; None without a value."""
+        if self.value is None:
+            return None
+        return self.value <= self.target if self.at_most else self.value >= self.target
+
+    def plain(self) -> dict[str, Any]:
+        found: dict[str, Any] = {"name": self.name, "value": self.value, "of": self.of, "target": self.target}
+        found |= {"bound": "at most" if self.at_most else "at least", "met": self.met}
+        if self.count is not None:
+            found |= {"count": self.count, "ci90": self.interval}
+        return found
+
+
+def wilson(count: int, of: int) -> tuple[float, float]:
+    """90 % interval of a share by Wilson's score (two-sided); of nothing, 0 to 1."""
+    from scipy.stats import binomtest
+
+    if not of:
+        return 0.0, 1.0
+    interval = binomtest(count, of).proportion_ci(CONFIDENCE, method="wilson")
+    return float(interval.low), float(interval.high)
+
+
+@dataclass(frozen=True)
+class _Share:
+    key: str
+    name: str
+    kinds: tuple[str, ...]
+    holds: Callable[[Scored], bool]
+    target: float
+    at_most: bool = False
+
+
+GAPS = (SINGLE, PAIR, UNKNOWN)
+SHARES = (
+    _Share("no_gap_called_gap", "no-gap cases called a gap", (NONE,), Scored.called_gap, 0.02, True),
+    _Share("effects_seen", "effects seen", GAPS, Scored.seen, 0.98),
+    _Share("right_cause_first", "right cause first", (SINGLE,), Scored.first, 0.95),
+    _Share("within_group", "right cause within its group", (SINGLE,), Scored.grouped, 0.98),
+    _Share("in_first_three", "right cause in the first three", (SINGLE,), Scored.first_three, 0.99),
+    _Share("right_subsystem", "right subsystem", (SINGLE,), Scored.subsystem, 0.98),
+    _Share("unknown_called_unknown", "outside the catalogue, called unknown", (UNKNOWN,), Scored.called_unknown, 0.90),
+    _Share("known_called_unknown", "known called unknown", (SINGLE, PAIR), Scored.called_unknown, 0.05, True),
+    _Share("two_both_named", "two effects at once, both named", (PAIR,), Scored.both, 0.80),
+    _Share("two_one_named", "two effects at once, at least one named", (PAIR,), Scored.one_at_least, 0.98),
+    _Share("sure_and_wrong", "sure (> 0.8) and wrong", (NONE, *GAPS), Scored.sure_and_wrong, 0.02, True),
+)
+
+
+def _share(share: _Share, cases: Sequence[Scored]) -> Figure:
+    counted = [case for case in cases if case.kind in share.kinds]
+    count = sum(share.holds(case) for case in counted)
+    value = count / len(counted) if counted else None
+    interval = wilson(count, len(counted))
+    return Figure(share.key, share.name, share.target, share.at_most, value, len(counted), count, interval)
+
+
+def _middle(key: str, name: str, values: list[float], target: float, at_most: bool, middle) -> Figure:
+    return Figure(key, name, target, at_most, float(middle(values)) if values else None, len(values))
+
+
+@dataclass
+class Score:
+    """A blind test scored."""
+
+    cases: list[Scored]
+    figures: list[Figure] = field(default_factory=list)
+
+    def plain(self) -> dict[str, Any]:
+        """The result as `--json` prints it."""
+        return {
+            "figures": {figure.key: figure.plain() for figure in self.figures},
+            "cases_by_kind": {kind: len([c for c in self.cases if c.kind == kind]) for kind in (NONE, *GAPS)},
+            "unanswered": [case.name for case in self.cases if case.said is None],
+            "labels": by_label(self.cases),
+            "cases": [_plain_case(case) for case in self.cases],
+        }
+
+
+def _plain_case(case: Scored) -> dict[str, Any]:
+    said = case.said
+    return {
+        "name": case.name,
+        "kind": case.kind,
+        "labels": case.truth.get("secret") or case.labels,
+        "verdict": case.verdict(),
+        "first": None if said is None else said.causes[0].label,
+        "probability": None if said is None else said.causes[0].probability,
+        "selected": None if said is None else said.selected,
+        "log_loss": case.log_loss(),
+        "odds": case.odds(),
+        "closed": case.closed,
+        "seconds": case.seconds,
+    }
+
+
+def score(cases: Sequence[Scored]) -> Score:
+    """Every figure of GAP.md over the cases."""
+    figures = [_share(share, cases) for share in SHARES]
+    losses = [case.log_loss() for case in cases]
+    closed = [case.closed for case in cases if case.closed is not None]
+    seconds = [case.seconds for case in cases if case.seconds is not None]
+    figures.insert(6, _middle("log_loss", "probability log loss, nat", losses, 0.3, True, np.mean))
+    figures.append(_middle("closed", "closed of what a perfect model closes, median", closed, 0.95, False, np.median))
+    figures.append(_middle("seconds", "seconds a case, the longest", seconds, 60.0, True, max))
+    figures.append(_middle("seconds_median", "seconds a case, median", seconds, 20.0, True, np.median))
+    return Score(list(cases), figures)
+
+
+def by_label(cases: Sequence[Scored]) -> dict[str, dict[str, Any]]:
+    """One line a label: its single cases, and how many of them were seen, first, in the group, in the right place.
+
+    Effects outside the catalogue stand under their own names, `first` being what called them unknown; so does `none`.
+    """
+    table: dict[str, dict[str, Any]] = {}
+    for case in cases:
+        if case.kind == PAIR:
+            continue
+        label = (case.truth.get("secret") or case.answers)[0]
+        row = table.setdefault(
+            label,
+            {"cases": 0, "seen": 0, "first": 0, "group": 0, "three": 0, "subsystem": 0, "called": {}, "closed": []},
+        )
+        row["cases"] += 1
+        row["seen"] += case.seen()
+        row["first"] += case.called_unknown() if case.kind == UNKNOWN else case.first()
+        row["group"] += case.grouped()
+        row["three"] += case.first_three()
+        row["subsystem"] += bool(case.subsystems) and case.subsystem()
+        if case.said is not None and not case.first():
+            wrong = case.said.causes[0].label
+            row["called"][wrong] = row["called"].get(wrong, 0) + 1
+        if case.closed is not None:
+            row["closed"].append(case.closed)
+    for row in table.values():
+        row["closed"] = float(np.median(row["closed"])) if row["closed"] else None
+    return dict(sorted(table.items()))

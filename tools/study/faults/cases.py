@@ -1,0 +1,43 @@
+"""The cases of the fault campaign: which row, how it breaks, in which phases, and what has to come of it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from firmware.supervisor.table import Reaction
+from tools.study.faults.scene import PHASES, Setting
+
+Came = tuple[float | None, str, str]  # of a fault that is shown: noticed after s, reaction, how it ended
+SAFE, DAMAGE = "safe", "damaged"
+UNDER_WAY = ("descent", "level", "ascent")
+MOVING = ("descent", "ascent")
+ALL = PHASES
+PLAIN = Setting()
+
+
+@dataclass(frozen=True)
+class Case:
+    """A fault that is flown. `expected`: the highest reaction that the row itself has to ask for."""
+
+    row: int
+    name: str
+    begin: Callable[[Any], None]
+    expected: Reaction
+    allowed_s: float
+    phases: tuple[str, ...] = ALL
+    setting: Setting = PLAIN
+    late: bool = False  # the clock may be late
+
+
+@dataclass(frozen=True)
+class Show:
+    """A fault that no flight is needed for: `run(disabled, folder)` does the real thing, and says what came of it.
+
+    It returns (noticed after s or None, reaction in words, how it ended).
+    """
+
+    row: int
+    name: str
+    run: Callable[[bool, Any], Came]
+    expected: str
+    allowed_s: float

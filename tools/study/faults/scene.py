@@ -1,0 +1,213 @@
+"""One flight of the fault campaign: a dive and a climb on the simulated board, into which one fault is put.
+
+The real runtime, autopilot and supervisor fly; what breaks is a device's port, the plant, the clock, or what the
+controller asks for. The fault begins in a phase of the mission and, unless a case says otherwise, stays.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import msgspec
+
+from firmware.autopilot import Autopilot
+from firmware.core.control import control_layout as ctl
+from firmware.runtime import RESOURCES_S, Runtime
+from firmware.supervisor.settings import Limits
+from firmware.supervisor.supervisor import Supervisor
+from firmware.supervisor.table import Reaction
+from firmware.telemetry import TICK
+from hal.recorder.recorder import NullRecorder
+from sim_backend.faults import SimulatedEscape, break_in
+from tools.flight.compose import build_flight
+
+PHASES = ("waiting", "descent", "level", "ascent", "surface")
+SURFACED_M = 0.5
+ASCENT_S = 200.0  # after the mission's end
+LINGER_S = 3.0  # behind a fault's time, before a flight at the surface may end
+LONGEST_S = 600.0
+MISSION = """
+format = 1
+name = "dive"
+time_limit_s = {limit}
+[site]
+name = "pool"
+depth_m = 6.0
+[[leg]]
+depth_m = 3.0
+pitch_deg = -20.0
+time_limit_s = {limit}
+hold_s = {hold}
+[[leg]]
+depth_m = 1.0
+pitch_deg = 20.0
+time_limit_s = {limit}
+[control]
+controller = "{controller}"
+"""
+
+
+@dataclass
+class Scene:
+    """A flight with its broken-in board. `since`: when the fault began, s; None: not yet."""
+
+    flight: Any
+    escape: SimulatedEscape
+    phase: str
+    begin: Callable[["Scene"], None]
+    since: float | None = None
+    each_tick: Callable[["Scene", float], None] | None = None
+    lateness: Callable[[float], float] | None = None
+    deepest: float = 0.0
+    cleanup: list[Callable[[], None]] = field(default_factory=list)
+    notes: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def board(self) -> Any:
+        return self.flight.board
+
+    @property
+    def supervisor(self) -> Supervisor:
+        return self.flight.supervisor
+
+    @property
+    def pilot(self) -> Autopilot:
+        return self.flight.autopilot
+
+    @property
+    def world(self) -> Any:
+        return self.flight.board.world
+
+    @property
+    def depth(self) -> float:
+        """The plant's true depth, m."""
+        return float(self.world.x[2])
+
+    def due(self) -> bool:
+        """Whether the phase in which the fault begins is reached."""
+        ap, est = self.pilot.ap, self.pilot.est
+        mode, leg, depth = ap[ctl.MODE], int(ap[ctl.LEG]), est[ctl.EST_DEPTH]
+        return {
+            "waiting": True,
+            "descent": mode == ctl.FLYING and leg == 0 and depth > 1.2,
+            "level": mode == ctl.FLYING and leg == 0 and ap[ctl.REACHED] >= 0.0,
+            "ascent": mode == ctl.FLYING and leg == 1 and depth < 2.3,
+            "surface": mode == ctl.COMPLETED and depth < 0.8,
+        }[self.phase]
+
+    def finish(self) -> None:
+        """Give back what a case has taken."""
+        while self.cleanup:
+            self.cleanup.pop()()
+
+    def step(self, t: float) -> None:
+        """Once a tick, as the runtime's extra."""
+        self.deepest = max(self.deepest, self.depth)
+        if self.since is None and self.due():
+            self.since = t
+            self.begin(self)
+        if self.since is not None and self.each_tick is not None:
+            self.each_tick(self, t)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What a case flies in."""
+
+    controller: str = "pid"
+    hold_s: float = 12.0
+    mission_s: float = 300.0
+    limits: Limits | None = None
+    effects: dict[str, dict[str, float]] = field(default_factory=dict)
+    restarted: bool = False
+
+
+@dataclass(frozen=True)
+class Flown:
+    """What came of a case."""
+
+    noticed_s: float | None
+    reaction: Reaction
+    ended: str  # surfaced, safe, lost, or what kept the fault from beginning
+    notes: dict[str, Any]
+
+
+class LateClock:
+    """The simulated clock, read late where the scene says so."""
+
+    def __init__(self, clock: Any, scene: Scene):
+        self._clock, self._scene, self._late = clock, scene, 0.0
+
+    def now(self) -> float:
+        return self._clock.now() + self._late
+
+    def sleep_until(self, deadline: float) -> None:
+        scene = self._scene
+        self._clock.sleep_until(deadline)
+        self._late = scene.lateness(deadline) if scene.lateness is not None else 0.0
+
+
+def build_scene(phase: str, begin: Callable[[Scene], None], setting: Setting, seed: int, mission_file: Any) -> Scene:
+    """Everything but the first tick."""
+    mission_file.write_text(MISSION.format(limit=setting.mission_s, hold=setting.hold_s, controller=setting.controller))
+    flight = build_flight(mission=str(mission_file), seed=seed, effects=setting.effects)
+    flight.vehicle = msgspec.structs.replace(flight.vehicle, limits=setting.limits)
+    flight.supervisor = Supervisor(
+        flight.autopilot, flight.vehicle, flight.mission, dt=1.0 / flight.board.loop_hz, periods=flight.board.periods,
+        restarted=setting.restarted,
+    )  # fmt: skip
+    scene = Scene(flight, break_in(flight.board), phase, begin)
+    if phase == "waiting":
+        scene.since = 0.0
+        begin(scene)
+    return scene
+
+
+def fly(scene: Scene, row: int, *, allowed_s: float, disabled: int | None = None) -> Flown:
+    """Fly it to its end, and a little on; what `row` made of the fault."""
+    board, supervisor, pilot = scene.board, scene.supervisor, scene.pilot
+    if disabled is not None:
+        supervisor.disable(disabled)
+    board.open()
+    if scene.lateness is not None or "late" in scene.notes:
+        board.clock = LateClock(board.clock, scene)
+    channel = NullRecorder((TICK,)).channel("/tick")
+    runtime = Runtime(board, pilot, supervisor, channel, extras=(scene.step,))
+    runtime.arm()
+    try:
+        _run(runtime, scene, allowed_s)
+    finally:
+        runtime.disarm()
+    noticed = supervisor.noticed(row)
+    since = scene.since
+    return Flown(
+        None if noticed is None or since is None else noticed - since,
+        supervisor.worst(row),
+        "never begun" if since is None else ended(scene),
+        scene.notes,
+    )
+
+
+def _run(runtime: Runtime, scene: Scene, allowed_s: float) -> None:
+    finished, looked = None, 0.0
+    pilot, supervisor = scene.pilot, scene.supervisor
+    while runtime.deadline < LONGEST_S:
+        runtime.tick()
+        now = runtime.deadline
+        if now - looked >= RESOURCES_S:
+            runtime.look_at_resources(now)
+            looked = now
+        if not pilot.finished:
+            continue
+        finished = now if finished is None else finished
+        waited = scene.since is None or now - scene.since > allowed_s + LINGER_S
+        up = pilot.surfaced and supervisor.depth_known and waited
+        if up or now - finished > ASCENT_S:
+            return
+
+
+def ended(scene: Scene) -> str:
+    """How the flight ended, by the plant's truth."""
+    if scene.deepest < SURFACED_M:
+        return "safe"  # never left the surface
+    return "surfaced" if scene.depth < SURFACED_M else "lost"

@@ -1,0 +1,80 @@
+"""Faults that are refused before anything moves: a vehicle not fit to arm, files that hold what they may not."""
+
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from firmware.supervisor.settings import Limits
+from hal.strict import ConfigError
+from tools.study.faults.cases import SAFE, Came
+
+
+def arming(kind: str) -> Callable[[bool, Path], Came]:
+    """A vehicle that is not fit to arm; calibrations are those of a real board file."""
+
+    def show(disabled: bool, folder: Path) -> Came:
+        import msgspec
+
+        from hal.board import BoardRequest, board_builder
+        from tools.flight.arming import Arming
+        from tools.flight.compose import build_flight, load_board_file
+
+        flight = build_flight(mission="sawtooth")
+        flight.board.open()
+        limits = None if kind == "limits unset" else Limits(working_depth_m=50.0)
+        flight.vehicle = msgspec.structs.replace(flight.vehicle, limits=limits)
+        if kind == "depth not zero":
+            flight.board.world.x[2] = 3.0
+        if kind in ("never calibrated", "wrong hash"):
+            file = load_board_file("twin")
+            old, new = {
+                "never calibrated": ("calibration = ", 'calibration = ""  # '),
+                "wrong hash": ("per_m = 80000.0", "per_m = -80000.0"),
+            }[kind]
+            text = file.text.replace(old, new)
+            request = BoardRequest(text=text, source="board.toml", vehicle=flight.vehicle)
+            doubtful: Any = board_builder("twin")(request)
+            flight.board.check_calibration = doubtful.check_calibration
+            doubtful.close()
+        checks = Arming(flight, folder=folder, hardware=True).run(disabled)
+        refused = any(not check.passed for check in checks)
+        return (0.0 if refused else None), "refuse to arm" if refused else "armed", SAFE if refused else "lost"
+
+    return show
+
+
+def bad_files(disabled: bool, folder: Path) -> Came:
+    """Files with an unknown key, a wrong type, NaN, out of limits, too deep, no end."""
+    from firmware.guidance.mission import decode_mission
+    from firmware.model.library import shipped
+    from firmware.model.vehicle import decode_vehicle
+    from hal.boardfile import decode_device_file
+    from tools.flight.compose import load_board_file
+
+    vehicle, mission = shipped("model/vehicles")["roughie"], shipped("guidance/missions")["sawtooth"]
+    board = load_board_file("roughie").text
+    bad = [
+        (decode_vehicle, vehicle.replace("K_D0 =", "K_D00 ="), "K_D00"),
+        (decode_vehicle, vehicle.replace("m_t = 13.0", 'm_t = "heavy"'), "m_t"),
+        (decode_vehicle, vehicle.replace("K_q = -8.0", "K_q = nan"), "K_q"),
+        (decode_vehicle, vehicle.replace("m_t = 13.0", "m_t = 1e9"), "m_t"),
+        (decode_mission, mission.replace("depth_m = 4.0", "depth_m = 40.0"), "depth_m"),
+        (decode_mission, mission.replace("time_limit_s = 120.0", "", 1), "time_limit_s"),
+        (decode_mission, mission.replace("time_limit_s = 600.0", "time_limit_s = inf"), "time_limit_s"),
+        (decode_mission, mission + "\n[a.b.c.d.e.f.g.h.i]\nj = 1\n", "a"),
+        (decode_device_file, board.replace("per_m", "per_mm"), "per_mm"),
+        (decode_device_file, board.replace('port = "imu"', "port = 5", 1), "port"),
+    ]
+    refused = 0
+    for decode, text, key in bad:
+        try:
+            tomllib.loads(text) if disabled else decode(text, "file.toml")
+        except ConfigError as error:
+            refused += "file.toml:" in str(error) and key in str(error) and "\n" not in str(error)
+    good = refused == len(bad)
+    return (
+        (0.0 if good else None),
+        "refused" if good else f"{len(bad) - refused} of {len(bad)} read",
+        (SAFE if good else "lost"),
+    )

@@ -1,0 +1,114 @@
+"""Faults of processes and clocks: a flight that is killed or hangs, a start after it, a wall clock that is set."""
+
+import contextlib
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from tools.study.faults.cases import SAFE, Came
+
+BEATING = """
+import sys, time
+from hal import heartbeat as hb
+pulse = hb.Heartbeat.create(sys.argv[1], 0.02, "faults")
+pulse.beat(0.0)
+pulse.say(hb.Status.FLYING)
+print("flying", flush=True)
+while True:
+    pulse.beat(0.0)
+    time.sleep(0.02)
+"""
+
+
+@contextlib.contextmanager
+def _beating(folder: Path) -> Iterator[subprocess.Popen]:
+    flight = subprocess.Popen([sys.executable, "-c", BEATING, str(folder)], stdout=subprocess.PIPE)
+    assert flight.stdout is not None
+    flight.stdout.readline()
+    try:
+        yield flight
+    finally:
+        flight.kill()
+        flight.wait()
+        flight.stdout.close()
+
+
+def loop_ends(how: signal.Signals) -> Callable[[bool, Path], Came]:
+    """A process that flies is killed, or hangs; the out-of-band process watches its heartbeat, in real time."""
+
+    def show(disabled: bool, folder: Path) -> Came:
+        from hal.outofband.guard import Watch
+
+        with _beating(folder) as flight:
+            watch = Watch(folder, folder, service=False)
+            watch.start()
+            end = time.monotonic() + 0.5
+            while time.monotonic() < end:
+                watch.step()
+                time.sleep(0.02)
+            begin = time.monotonic()
+            flight.send_signal(how)
+            noticed = None
+            while time.monotonic() - begin < 3.0 and noticed is None:
+                if not disabled:
+                    watch.step()
+                noticed = time.monotonic() - begin if watch._ascent is not None else None
+                time.sleep(0.02)
+            watch.close()
+        return noticed, "OOB" if noticed is not None else "none", SAFE if noticed is not None else "lost"
+
+    return show
+
+
+def restart(disabled: bool, folder: Path) -> Came:
+    """Killed in every phase after arming: the next start only ascends."""
+    from hal.state_file import Phase, StateFile
+    from tools.flight.keeper import Life
+
+    resumed = 0
+    for phase in (Phase.ARMED, Phase.DIVING, Phase.ABORTED):
+        StateFile(folder).write(phase, flight="before")
+        life = Life(folder, "after")
+        ascends = life.ascent_only and not life.file.read().may_start
+        resumed += disabled or not ascends
+    return (None if resumed else 0.0), "ascent only" if not resumed else "resumed", "lost" if resumed else SAFE
+
+
+@contextlib.contextmanager
+def _wall_set_on(shift: float) -> Iterator[None]:
+    """The wall clock as this process reads it, so many seconds on: the machine's own is not ours to set."""
+    honest = time.time
+    time.time = lambda: honest() + shift
+    try:
+        yield
+    finally:
+        time.time = honest
+
+
+def wall_clock(disabled: bool, folder: Path) -> Came:
+    """The wall clock is set an hour on and back while the board's clock runs."""
+    from hal.clocks import MonotonicClock
+
+    class WallClock(MonotonicClock):
+        def __init__(self) -> None:
+            self._start = time.time()
+
+        def now(self) -> float:
+            return time.time() - self._start
+
+        def sleep_until(self, deadline: float) -> None:
+            time.sleep(min(max(deadline - self.now(), 0.0), 0.05))
+
+    clock = WallClock() if disabled else MonotonicClock()
+    worst = 0.0
+    for shift in (3600.0, -3600.0, 0.0):
+        before = clock.now()
+        with _wall_set_on(shift):
+            begin = time.monotonic()
+            clock.sleep_until(before + 0.01)
+            worst = max(worst, abs(clock.now() - before - (time.monotonic() - begin)))
+    steady = worst < 0.5
+    return (0.0 if steady else None), "no effect" if steady else f"{worst:.0f} s", SAFE if steady else "lost"
