@@ -58,6 +58,8 @@ class Condition(IntEnum):
     MISCONFIGURED = 6  # refuses what it is asked: address, function or value
 
 
+MAX_AGE_PERIODS = 3.0  # a sample older than so many of its sensor's periods is stale: for drivers, twins and autopilot
+
 # Where each slot begins: plain integers, because the kernels freeze them.
 IMU, BEACON, SLIDER_WIRE, PLUNGER_WIRE, LEAK, BATTERY = 0, 8, 12, 15, 18, 21
 SERVO, SLIDER, BALLAST = 24, 27, 30

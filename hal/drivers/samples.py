@@ -7,10 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hal.ports import Condition, Slot, Validity
+from hal.ports import MAX_AGE_PERIODS, Condition, Slot, Validity
 
 FAULTY_AFTER = 5  # unfit samples running, past which the device is in error
-STALE_PERIODS = 3.0
 DAMAGES = 5  # damaged frames in DAMAGE_S, past which the device is in error, until there were fewer
 DAMAGE_S = 60.0
 
@@ -145,7 +144,7 @@ class Sensor:
         return len(self._damages) > DAMAGES and now - self._damages[0] <= DAMAGE_S
 
     def age(self, now: float) -> None:
-        """Say that the sample is stale once it is older than three periods."""
-        if self._slot[1] == Validity.VALID and now - self._taken_at > STALE_PERIODS * self.period:
+        """Say that the sample is stale once it is older than MAX_AGE_PERIODS of its periods."""
+        if self._slot[1] == Validity.VALID and now - self._taken_at > MAX_AGE_PERIODS * self.period:
             self._slot[1] = Validity.STALE
-            self.health.say(now, f"no sample for {STALE_PERIODS:g} periods")
+            self.health.say(now, f"no sample for {MAX_AGE_PERIODS:g} periods")
