@@ -17,8 +17,8 @@ from hal.drivers.modbus_sensors import AnalogModule, Beacon, EncoderWire, Input,
 from hal.drivers.samples import Health, Sensor
 from hal.drivers.vn100 import Vn100
 from hal.ports import BoardError, Validity
+from hal.protocols.modbus_master import ModbusBus
 from hal.transport.hub import Hub, LineHandler, Link
-from hal.transport.modbus_bus import ModbusBus
 from hal.transport.port import SerialPort, Unplugged
 
 GUARD_S = 0.001  # before a deadline, in which ports are left alone

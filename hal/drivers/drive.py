@@ -16,8 +16,8 @@ from hal.drivers.samples import Health, Sensor, State
 from hal.ports import SLOTS, Condition, Validity
 from hal.protocols import modbus
 from hal.protocols.modbus import Frame, Request
+from hal.protocols.modbus_master import Failure, ModbusBus
 from hal.protocols.registers import RegisterMap, to_registers
-from hal.transport.modbus_bus import Failure, ModbusBus
 
 FAULT, ENABLED, RUNNING = 1, 2, 4  # bits of the status
 STATUS_S = 0.2

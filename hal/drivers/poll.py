@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 
 from hal.drivers.samples import Health
 from hal.protocols.modbus import Frame, Request
-from hal.transport.modbus_bus import Failure
+from hal.protocols.modbus_master import Failure
 
 CONFIGURATION_FAULTS = (1, 2, 3)  # illegal function, address, value: asking again does not help
 TRIES = 3  # after which other exceptions running are an error too

@@ -17,9 +17,9 @@ from hal.boardfile import BeaconTable, DriveTable, WireTable
 from hal.drivers.drive import Drive
 from hal.drivers.modbus_sensors import AnalogModule, Beacon, wire
 from hal.ports import Validity
+from hal.protocols.modbus_master import ModbusBus
 from hal.protocols.registers import preset
 from hal.transport.hub import Hub, Link
-from hal.transport.modbus_bus import ModbusBus
 from hal.transport.port import SerialPort
 from sim_backend.twins.line import open_pty
 

@@ -10,8 +10,9 @@ from firmware.core.control import control_layout as at
 from firmware.guidance.mission import decode_mission
 from firmware.model.library import shipped
 from tools.data.sources import load_vehicle
+from tools.study.campaign.fingerprint import fingerprint
 from tools.study.campaign.flights import COLUMNS, TUMBLED, Job, cut, fly_chunk
-from tools.study.campaign.plan import build_plan, fingerprint, load_campaign
+from tools.study.campaign.plan import build_plan, load_campaign
 from tools.study.reproduce import tracking
 from tools.study.reproduce.design import Variant, fly_design
 

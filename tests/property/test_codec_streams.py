@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from hal.protocols import modbus, vn100
 from hal.protocols.registers import CODES, from_registers, to_registers
-from tools.measure.figures.codecs import codecs, run_codec
+from tools.study.faults.damaged_streams import codecs, run_codec
 
 CODECS = {codec.name: codec for codec in codecs()}
 FRAMED = [name for name in CODECS if name != "maestro replies"]  # which have no frames to find

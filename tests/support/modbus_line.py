@@ -6,7 +6,7 @@ import random
 from collections.abc import Callable
 
 from hal.protocols import modbus
-from hal.transport.modbus_bus import ModbusBus
+from hal.protocols.modbus_master import ModbusBus
 
 
 class SimulatedLine:

@@ -21,7 +21,7 @@ from tools.bench.client import Bench, BenchError
 from tools.bench.commands import Commands
 from tools.bench.desk import UsageError
 from tools.bench.units import ACTUATORS, WIRES
-from tools.cli.common import BAD_INPUT, DONE, FAILED
+from tools.data.errors import BAD_INPUT, DONE, FAILED
 
 HISTORY = "GLIDER_BENCH_HISTORY"
 WATCH_S = 0.2

@@ -8,9 +8,8 @@ from typing import Any
 
 import click
 
+from tools.data.errors import BAD_INPUT, DONE, FAILED, InputError, MissingExtra
 from tools.data.plain import as_plain
-
-DONE, FAILED, BAD_INPUT = 0, 1, 2
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the result alone, as JSON.")
 
@@ -64,7 +63,6 @@ def progress(label: str, total: int, *, bar: bool = True) -> Iterator[Callable[[
 def report_errors(command: click.Command) -> int:
     """Run the command line; turn what a user can cause into one line and exit code 2."""
     from firmware.model.strict import ConfigError
-    from tools.data.errors import InputError, MissingExtra
 
     try:
         command(standalone_mode=False)

@@ -2,6 +2,8 @@
 
 from importlib.util import find_spec
 
+DONE, FAILED, BAD_INPUT = 0, 1, 2  # exit codes of every command
+
 
 class InputError(ValueError):
     """Input that cannot be used; str() is the one line the user sees, `file:line: what` as far as it is known."""

@@ -18,12 +18,12 @@ from firmware.core.supervision.supervisor_layout import RECORDER
 from hal import heartbeat as hb
 from hal.heartbeat import Guard, Heartbeat, Held, Status
 from hal.notify import notify
-from hal.outofband.make import make_plan
 from hal.outofband.plan import NAME as PLAN
 from hal.outofband.plan import write_plan
 from hal.ports import BATTERY, BoardError, Validity
 from hal.recorder.condition import Level
 from hal.state_file import FlightState, Phase, StateFile
+from tools.flight.ascent_plan import make_plan
 
 GUARD_START_S = 10.0
 GUARD_SILENT_S = 3.0

@@ -136,7 +136,7 @@ def write_posterior(found: Identified, path: Path) -> None:
 
 def write(found: Identified, out: Path) -> Vehicle:
     """All files but the report into a folder; returns the vehicle as it will be read."""
-    from tools.cli.common import as_plain
+    from tools.data.plain import as_plain
 
     out.mkdir(parents=True, exist_ok=True)
     text = vehicle_text(found)

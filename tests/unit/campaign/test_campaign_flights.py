@@ -11,6 +11,7 @@ from sim_backend.core.closed_loop import TRACE
 from sim_backend.fleet import fly_fleet
 from tools.data.errors import InputError
 from tools.study.campaign.conduct import fly_campaign
+from tools.study.campaign.fingerprint import fingerprint
 from tools.study.campaign.flights import (
     COLUMNS,
     PAST_LIMITS,
@@ -25,7 +26,6 @@ from tools.study.campaign.flights import (
     fly_chunk,
     trace_every,
 )
-from tools.study.campaign.plan import fingerprint
 from tools.study.campaign.worlds import draw_world
 
 

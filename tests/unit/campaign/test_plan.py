@@ -10,7 +10,8 @@ import pytest
 from firmware.control.gains import Control
 from firmware.model.strict import ConfigError
 from tools.data.errors import InputError
-from tools.study.campaign.plan import build_plan, fingerprint, load_campaign, shipped_campaigns, with_options
+from tools.study.campaign.fingerprint import fingerprint
+from tools.study.campaign.plan import build_plan, load_campaign, shipped_campaigns, with_options
 
 TEXT = 'format = 1\nname = "one"\nmissions = ["spiral"]\ncontrollers = ["pid"]\nseeds = 3\n'
 
@@ -109,5 +110,5 @@ def test_a_fingerprint_notices_what_changes_a_flight(plan_of, monkeypatch):
     control = Control()
     other = msgspec.structs.replace(control, pitch=msgspec.structs.replace(control.pitch, kp=0.21))
     assert fingerprint(replace(plan, vehicle=msgspec.structs.replace(plan.vehicle, control=other))) != found
-    monkeypatch.setattr("tools.study.campaign.plan.kernels_digest", lambda: "other kernels")
+    monkeypatch.setattr("tools.study.campaign.fingerprint.kernels_digest", lambda: "other kernels")
     assert fingerprint(plan) != found

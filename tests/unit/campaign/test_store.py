@@ -5,8 +5,8 @@ import pytest
 
 from tools.data.errors import InputError
 from tools.study.campaign.conduct import fly_campaign
+from tools.study.campaign.fingerprint import fingerprint
 from tools.study.campaign.flights import COLUMNS, cut
-from tools.study.campaign.plan import fingerprint
 from tools.study.campaign.store import MANIFEST, Store
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from sim_backend.core import layout as at
 from sim_backend.core.effect_layout import DRAG_0
-from tools.study.campaign.plan import fingerprint
+from tools.study.campaign.fingerprint import fingerprint
 from tools.study.campaign.worlds import draw_world
 
 

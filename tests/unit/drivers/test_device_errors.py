@@ -10,8 +10,8 @@ from hal.drivers.poll import TRIES
 from hal.drivers.samples import DAMAGES, Sensor
 from hal.ports import SLOTS, Condition, Validity, empty_frame
 from hal.protocols import maestro, modbus
+from hal.protocols.modbus_master import Failure
 from hal.protocols.registers import preset, to_registers
-from hal.transport.modbus_bus import Failure
 from tools.study.faults.wire import Line
 
 

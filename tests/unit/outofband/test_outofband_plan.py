@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hal.board import BoardRequest, board_builder
-from hal.outofband.make import make_plan
 from hal.outofband.plan import PlanError, read_plan, write_plan
 from tools.data.sources import load_vehicle
+from tools.flight.ascent_plan import make_plan
 from tools.flight.compose import load_board_file
 
 

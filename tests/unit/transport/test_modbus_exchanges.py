@@ -8,7 +8,7 @@ import pytest
 from hal.drivers.poll import Poll
 from hal.drivers.samples import Health
 from hal.protocols import modbus
-from hal.transport.modbus_bus import ModbusBus
+from hal.protocols.modbus_master import ModbusBus
 from tests.support.modbus_line import SimulatedLine, stamp_reply
 
 EXCHANGES = 100_000

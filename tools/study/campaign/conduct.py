@@ -10,8 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
+from tools.study.campaign.fingerprint import fingerprint
 from tools.study.campaign.flights import CHUNK, COLUMNS, ENDINGS, Job, cut
-from tools.study.campaign.plan import Plan, fingerprint
+from tools.study.campaign.plan import Plan
 from tools.study.campaign.store import Store, write_whole
 from tools.study.campaign.workers import check_reachable, fly_here, fly_on_dask
 

@@ -22,7 +22,8 @@ from sim_backend.core.closed_loop import (
     fly,
 )  # fmt: skip
 from tools.data.errors import InputError
-from tools.study.campaign.plan import Plan, fingerprint
+from tools.study.campaign.fingerprint import fingerprint
+from tools.study.campaign.plan import Plan
 from tools.study.campaign.worlds import draw_world
 
 # what is kept of each flight, one column each; SI

@@ -1,6 +1,5 @@
-"""What a campaign flies: its strict file, the files that it names, a fingerprint of every number behind a flight."""
+"""What a campaign flies: its strict file, and the files that it names."""
 
-import hashlib
 import math
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -14,7 +13,6 @@ import numpy as np
 from firmware.autopilot import Autopilot, configuration
 from firmware.control import gains
 from firmware.control.gains import Control
-from firmware.core.jit import kernels_digest
 from firmware.guidance.mission import Mission, decode_mission
 from firmware.model.strict import Table, decode
 from firmware.model.vehicle import Vehicle
@@ -189,31 +187,3 @@ def build_plan(campaign: Campaign, base: Path | None = None) -> Plan:
 def software() -> str:
     """This program's version."""
     return f"glider {version('glider')}"
-
-
-def fingerprint(plan: Plan) -> str:
-    """Hash over the campaign, this software, and the arrays that flights are made of, 16 hex digits.
-
-    Gains, references, a vehicle's numbers or the way worlds are drawn may change with nothing changed in the campaign:
-    the arrays tell, and the files that draw and count.
-    """
-    from tools.study.campaign.worlds import draw_world
-
-    digest = hashlib.sha256()
-    for part in (plan.campaign, plan.board):
-        digest.update(msgspec.json.encode(part))
-    digest.update(f"{software()} {kernels_digest()}".encode())
-    for name in ("flights.py", "worlds.py"):  # what is counted, and how worlds are drawn
-        digest.update(Path(__file__).with_name(name).read_bytes())
-    for number, mission in enumerate(plan.missions):
-        for controller in plan.campaign.controllers:
-            pilot = plan.pilot(number, controller)
-            for array in (pilot.P, pilot.C, pilot.legs, pilot.nav):
-                digest.update(array.tobytes())
-        digest.update(mission.name.encode())
-        world = draw_world(plan, number, plan.campaign.first_seed).world
-        for array in (
-            world.P, world.E, world.F, world.waves, world.sensors, world.errors, np.array(world.seed), world.x,
-        ):  # fmt: skip
-            digest.update(array.tobytes())
-    return digest.hexdigest()[:16]

@@ -9,8 +9,7 @@ from firmware.core.vehicle.layout import N_X, X_ACT
 from firmware.model.vehicle import Vehicle
 from sim_backend.foreign import foreign_layout as fo
 from sim_backend.foreign.foreign_flight import fly_foreign, fly_on, pose_rows, start_from_readings
-from sim_backend.uncertainty import draw_parameters
-from sim_backend.world import sensor_errors
+from sim_backend.uncertainty import draw_parameters, sensor_errors
 from tools.data.runs import columns as names
 from tools.data.runs.run import Run
 from tools.gap.measure import root_mean_square, run_gap, wrap

@@ -9,7 +9,7 @@ from typing import Any
 from hal.drivers.poll import Poll
 from hal.drivers.samples import Health
 from hal.protocols import modbus
-from hal.transport.modbus_bus import ModbusBus
+from hal.protocols.modbus_master import ModbusBus
 
 
 class Line:

@@ -15,6 +15,7 @@ from hal.ports import Validity
 from hal.protocols import modbus, vn100
 from hal.protocols.registers import preset, to_registers
 from tools.study.faults.cases import DAMAGE, SAFE, Came
+from tools.study.faults.damaged_streams import codecs, run_codec
 from tools.study.faults.wire import Line, Stamped, stamp_reply
 
 RATE_HZ = 100.0
@@ -164,8 +165,6 @@ def exception(code: int) -> Callable[[bool, Path], Came]:
 
 def hostile_bytes(disabled: bool, folder: Path) -> Came:
     """Damage through every codec: back in step within a longest frame, no exception, nothing made up, little kept."""
-    from tools.measure.figures.codecs import codecs, run_codec
-
     bad, made_up = 0, 0
     chosen = codecs(UncheckedImu, UncheckedModbus) if disabled else codecs()
     for codec in chosen:

@@ -1,4 +1,4 @@
-"""A plan for the out-of-band process, made of a board file at arming; the flight's side, which may know the drivers."""
+"""A plan for the out-of-band process, made of a board file at arming."""
 
 from typing import Any
 
