@@ -136,7 +136,7 @@ class ServoTable(DeviceTable):
 class DriveTable(DeviceTable):
     """[slider], [ballast]: counts = zero_counts + counts_per_m * metres (slider position, plunger travel).
 
-    follow = "wire": a slow loop on the draw-wire carries the zero along, so that lost steps and slip do not stay;
+    follow = "wire": a slow loop on the draw-wire follows the drift of the zero: lost steps and slip do not stay;
     "drive": the drive's own count is trusted. A move that does not show for stall_s is a stall.
     """
 

@@ -1,9 +1,9 @@
 """Slider and ballast pump: a stepper drive moved by absolute positions, watched by the draw-wire.
 
-Counts = zero + carried + counts_per_m * metres. With follow = "wire" a slow loop on the draw-wire makes `carried`, so
-that lost steps and slip do not stay; it is quick while the drive stands and ten times slower while it moves, when the
-wire lags. A move that does not show is a stall: stopped, tried twice more, then an error; one the wrong way is
-stopped at once. Errors keep the drive still until `reset`.
+Counts = zero + zero_drift + counts_per_m * metres. With follow = "wire" a slow loop on the draw-wire estimates
+`zero_drift`, so that lost steps and slip do not stay; it is quick while the drive stands and ten times slower while it
+moves, when the wire lags. A move that does not show is a stall: stopped, tried twice more, then an error; one the wrong
+way is stopped at once. Errors keep the drive still until `reset`.
 """
 
 import math
@@ -21,7 +21,7 @@ from hal.protocols.registers import RegisterMap, to_registers
 
 FAULT, ENABLED, RUNNING = 1, 2, 4  # bits of the status
 STATUS_S = 0.2
-CARRY_STANDING, CARRY_MOVING = 0.1, 0.01  # shares of the wire's disagreement taken over at each reading
+DRIFT_STANDING, DRIFT_MOVING = 0.1, 0.01  # shares of the wire's disagreement taken over at each reading
 STALL_TRIES = 2
 REST_S = 0.3  # between a stall and the next try
 LOST_AFTER_S = 0.5  # without its position
@@ -47,12 +47,12 @@ class Drive:
         self.status = 0
         self.counts = 0
         self.counts_at = -math.inf
-        self.carried = 0.0
+        self.zero_drift = 0.0
         self.stalls = 0
         self.fault = ""  # what keeps it still until `reset`
         self._map, self._wire = registers, wire
-        self._carrying = False
-        self._watch = Watch(table.stall_m, table.stall_s)
+        self._drift_known = False
+        self._watch = StallDetector(table.stall_m, table.stall_s)
         self._low = registers.read(table.id, "position_low")
         position = [registers.read(table.id, "position"), self._low]
         self._position = Poll(position, 1.0 / table.rate_hz, self._took_position, self.health, in_error=self.refused)
@@ -116,8 +116,8 @@ class Drive:
         self.health.say(now, what)
 
     def position(self) -> float:
-        """Where the drive is by its own count and what is carried, m."""
-        return (self.counts - self.table.zero_counts - self.carried) / self.table.counts_per_m
+        """Where the drive is by its own count and its zero's drift, m."""
+        return (self.counts - self.table.zero_counts - self.zero_drift) / self.table.counts_per_m
 
     def measured(self) -> float:
         """Where it is by the draw-wire, if that is well, else by its own count; m."""
@@ -126,7 +126,7 @@ class Drive:
 
     def counts_for(self, metres: float) -> float:
         low, high = self.table.limits_m
-        return self.table.zero_counts + self.carried + self.table.counts_per_m * min(max(metres, low), high)
+        return self.table.zero_counts + self.zero_drift + self.table.counts_per_m * min(max(metres, low), high)
 
     # --- replies ----------------------------------------------------------------------------------------------------
     def _took_position(self, request: Request, registers: list[int], asked_at: float, now: float) -> None:
@@ -141,20 +141,20 @@ class Drive:
         if self.health.error != self.fault:
             self.health.say(now, self.fault)
         if self.table.follow == "wire":
-            self._carry(self.counts - before)
+            self._update_drift(self.counts - before)
         if self.target is not None and self.enabled and not self.fault:
             self._look(now)
 
-    def _carry(self, moved: float) -> None:
+    def _update_drift(self, moved: float) -> None:
         wire = self._wire
         if wire is None or wire.validity != Validity.VALID:
             return
         found = self.counts - self.table.zero_counts - self.table.counts_per_m * wire.values[0]
-        if not self._carrying:
-            self._carrying, self.carried = True, found
+        if not self._drift_known:
+            self._drift_known, self.zero_drift = True, found
             return
         standing = abs(moved) <= 2.0 * self.table.deadband_m * abs(self.table.counts_per_m)
-        self.carried += (CARRY_STANDING if standing else CARRY_MOVING) * (found - self.carried)
+        self.zero_drift += (DRIFT_STANDING if standing else DRIFT_MOVING) * (found - self.zero_drift)
 
     def _look(self, now: float) -> None:
         """Does it move where it was sent?"""
@@ -182,7 +182,7 @@ class Drive:
             self._fail(now, ALARM)
 
 
-class Watch:
+class StallDetector:
     """Sees a stall: no progress towards a target that is away; or a drive that counts on while its wire stands.
 
     The wire is judged by how far it moves, not by where it is: a wrong zero is no stall.

@@ -29,7 +29,7 @@ class Beacon(Sensor):
         if len(registers) == 4:
             self._temperature = value_of(block, "temperature", registers)
         pressure = value_of(block, "pressure", registers) * PA_PER_BAR
-        self.put(asked_at, (pressure - self._zero, self._temperature), now)
+        self.accept(asked_at, (pressure - self._zero, self._temperature), now)
 
 
 class Input(Sensor):
@@ -42,7 +42,7 @@ class Input(Sensor):
 
     def take(self, reading: float, asked_at: float, now: float) -> None:
         self.reading = reading
-        self.put(asked_at, (self._convert(reading),), now)
+        self.accept(asked_at, (self._convert(reading),), now)
 
 
 def wire(name: str, table: WireTable) -> Input:

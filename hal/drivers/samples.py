@@ -73,7 +73,7 @@ class Sensor:
         self._running_unfit = 0
         self._taken_at = -math.inf
         self._damages: deque[float] = deque(maxlen=DAMAGES + 1)
-        self.epoch = 0.0  # s, when the board's time began, on the clock that `put` is told
+        self.epoch = 0.0  # s, when the board's time began, on the clock that `accept` is given
 
     def start(self, epoch: float) -> None:
         """The board's time begins: what was read before is forgotten."""
@@ -81,7 +81,7 @@ class Sensor:
         self._slot[:] = np.nan
         self._slot[1] = Validity.MISSING
 
-    def forgive(self) -> None:
+    def reset_damage_count(self) -> None:
         """Damaged frames until now are forgotten: somebody has looked at the line."""
         self._damages.clear()
 
@@ -102,7 +102,7 @@ class Sensor:
     def validity(self) -> Validity:
         return Validity(int(self._slot[1]))
 
-    def put(self, taken_at: float, values: Sequence[float], now: float) -> bool:
+    def accept(self, taken_at: float, values: Sequence[float], now: float) -> bool:
         """Take a sample, if it is finite, in range and newer than the last; False if it is not fit."""
         health = self.health
         for value, (low, high) in zip(values, self._ranges, strict=True):

@@ -89,7 +89,7 @@ class Vn100(Sensor):
             self._bad = self.decoder.bad
         if newest is not None:
             self._heard_at = now
-            self.put(now - self._delay, self._to_body(newest), now)
+            self.accept(now - self._delay, self._to_body(newest), now)
 
     def _to_body(self, values: tuple[float, ...]) -> tuple[float, ...]:
         """Yaw, pitch, roll in degrees and rates of the sensor as roll, pitch, yaw in rad and rates of the hull."""

@@ -67,7 +67,7 @@ class Axis:
     def __init__(self, plan: AxisPlan, ascent: Ascent):
         self.plan, self._ascent = plan, ascent
         self.answered = False
-        self._carried = 0.0  # counts between the drive's zero and the draw-wire's
+        self._zero_drift = 0.0  # counts between the drive's zero and the draw-wire's
         self._written: int | None = None
         self._written_at = self._cleared_at = -1e9
 
@@ -87,8 +87,8 @@ class Axis:
         if counts is not None and plan.wire is not None:
             measured = self._measure(plan.wire)
             if measured is not None:
-                self._carried = counts - plan.zero_counts - plan.counts_per_m * measured
-        target = round(plan.zero_counts + self._carried + plan.counts_per_m * plan.end_m)
+                self._zero_drift = counts - plan.zero_counts - plan.counts_per_m * measured
+        target = round(plan.zero_counts + self._zero_drift + plan.counts_per_m * plan.end_m)
         near = plan.tolerance_m * abs(plan.counts_per_m)
         if counts is not None and abs(counts - target) <= near:
             return f"{plan.name} at its end"

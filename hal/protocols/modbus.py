@@ -35,7 +35,7 @@ class Request(NamedTuple):
     echo: bytes = b""  # what a write's reply repeats after the function
 
     @property
-    def looks(self) -> tuple[int, int, int, bytes]:
+    def reply_signature(self) -> tuple[int, int, int, bytes]:
         """What its reply can be told by; requests whose replies look alike are never sent while one may be late."""
         return self.device, self.function, self.reply_size, self.echo
 

@@ -81,8 +81,8 @@ class Ask:
         self._done(None, exception)
 
 
-def looks_of(frame: Frame) -> tuple[int, int, int, bytes]:
-    """As Request.looks, of a reply."""
+def signature_of(frame: Frame) -> tuple[int, int, int, bytes]:
+    """As Request.reply_signature, of a reply."""
     echo = b"" if frame.function in (READ_HOLDING, READ_INPUT) else frame.raw[2:6]
     return frame.device, frame.function, len(frame.raw), echo
 
@@ -106,7 +106,7 @@ class ModbusBus:
         self._new_decoder = decoder
         self._decoder, self._strays = decoder(), decoder()
         self._window = bytearray()
-        self._missing: dict[tuple, float] = {}  # looks of replies that may still come, until when
+        self._missing: dict[tuple, float] = {}  # signature of replies that may still come, until when
         self._job: Job | None = None
         self._request: Request | None = None
         self._asked_at = self._deadline = 0.0
@@ -151,7 +151,7 @@ class ModbusBus:
                 self.counts.late += 1
             elif not frame.exception:
                 self._answer(frame, now)
-            elif any(looks[:2] == (frame.device, frame.function & ~ERROR) for looks in self._missing):
+            elif any(signature[:2] == (frame.device, frame.function & ~ERROR) for signature in self._missing):
                 self.counts.late += 1
             else:
                 self.counts.exceptions += 1
@@ -163,7 +163,7 @@ class ModbusBus:
         self.counts.stray_bytes += len(data)
         for frame in self._strays.feed(data):
             self.counts.late += 1
-            self._missing.pop(looks_of(frame), None)
+            self._missing.pop(signature_of(frame), None)
 
     def _answer(self, frame: Frame, now: float) -> None:
         job, request = self._job, self._request
@@ -195,10 +195,10 @@ class ModbusBus:
         listener = self._new_decoder()
         for frame in listener.feed(bytes(self._window)):
             self.counts.wrong += 1
-            self._missing.pop(looks_of(frame), None)
+            self._missing.pop(signature_of(frame), None)
         damaged = self._decoder.bad > 0
         self.counts.damaged += damaged
-        self._missing[request.looks] = now + self.forget_s
+        self._missing[request.reply_signature] = now + self.forget_s
         self.silent[request.device] = self.silent.get(request.device, 0) + 1
         self._quiet_until = max(now, self._asked_at + self.longest_s + request.reply_size * self.byte_s)
         self._end(Failure.DAMAGED if damaged else Failure.TIMEOUT, 0, now)
@@ -239,17 +239,17 @@ class ModbusBus:
 
     def _try(self, job: Job, now: float) -> bool:
         """Ask for a job, unless it has nothing to ask or all its replies could be mistaken."""
-        for looks in [looks for looks, until in self._missing.items() if until <= now]:
-            del self._missing[looks]
+        for signature in [signature for signature, until in self._missing.items() if until <= now]:
+            del self._missing[signature]
         requests = job.requests(now)
         if not requests:
             job.due = max(job.due, now + self.gap_s)  # whatever the job says: no endless loop
             return False
         for request in requests:
-            if request.looks not in self._missing:
+            if request.reply_signature not in self._missing:
                 self._ask(job, request, now)
                 return True
-        job.due = min(self._missing[request.looks] for request in requests)
+        job.due = min(self._missing[request.reply_signature] for request in requests)
         return False
 
     def _ask(self, job: Job, request: Request, now: float) -> None:

@@ -14,7 +14,7 @@ from hal.transport.port import SerialPort, Unplugged
 
 RETRY_S = 0.5  # between two tries to open a lost port
 OUT_LIMIT = 1024  # bytes on their way out, past which a line takes no more
-ABSENT_S = 0.2  # a hub that nobody ran for so long finds old bytes, and drops them
+STALE_INPUT_S = 0.2  # a hub that nobody ran for so long finds old bytes, and drops them
 SPARE = 256  # bytes a link may take beside twice its line rate
 
 
@@ -141,7 +141,7 @@ class Hub:
     def serve(self, until: float) -> None:
         """Serve all links until `until` (s on the board's clock), and once at least."""
         self._begun = self._now()
-        absent = self._begun - self._served > ABSENT_S
+        absent = self._begun - self._served > STALE_INPUT_S
         for link in self.links:
             link.spent = 0
             if absent:

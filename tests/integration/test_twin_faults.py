@@ -59,7 +59,7 @@ def fault(board):
         assert board.control(f"fault {device} none") == "ok"
         if isinstance(sensor := getattr(board, device), Sensor):
             serve(board, 0.3)  # what was on the line has been read
-            sensor.forgive()
+            sensor.reset_damage_count()
         assert until(board, lambda name=device: well(board, name)), board.silent()
 
 

@@ -25,20 +25,20 @@ def test_a_few_damaged_frames_are_counted_and_no_more():
     item = sensor()
     for n in range(DAMAGES):
         item.damage(1.0 + n)
-    assert item.put(10.0, (0.01,), 10.0)
+    assert item.accept(10.0, (0.01,), 10.0)
     assert (item.validity, item.health.damaged) == (Validity.VALID, DAMAGES)
 
 
 def test_more_than_five_in_a_minute_are_an_error_until_there_are_fewer():
     item = sensor()
-    item.put(0.5, (0.01,), 0.5)
+    item.accept(0.5, (0.01,), 0.5)
     for n in range(DAMAGES + 1):
         item.damage(1.0 + 10.0 * n)
     assert item.validity == Validity.FAULT
     assert "damaged frames" in item.health.error
-    assert not item.put(55.0, (0.01,), 55.0)
+    assert not item.accept(55.0, (0.01,), 55.0)
     assert item.validity == Validity.FAULT
-    assert item.put(61.5, (0.01,), 61.5)
+    assert item.accept(61.5, (0.01,), 61.5)
     assert (item.validity, item.health.error) == (Validity.VALID, "")
 
 
@@ -169,7 +169,7 @@ def test_a_servo_says_when_it_answered():
 def test_damage_that_somebody_has_looked_at_is_forgotten():
     item = sensor()
     item.damage(1.0, DAMAGES + 1)
-    assert not item.put(2.0, (0.01,), 2.0) or item.validity == Validity.FAULT
-    item.forgive()
-    assert item.put(3.0, (0.01,), 3.0)
+    assert not item.accept(2.0, (0.01,), 2.0) or item.validity == Validity.FAULT
+    item.reset_damage_count()
+    assert item.accept(3.0, (0.01,), 3.0)
     assert item.validity == Validity.VALID

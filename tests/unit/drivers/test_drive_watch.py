@@ -5,7 +5,7 @@ import math
 import pytest
 
 from hal.boardfile import DriveTable
-from hal.drivers.drive import Drive, Watch
+from hal.drivers.drive import Drive, StallDetector
 from hal.drivers.maestro import Servo
 from hal.drivers.samples import Sensor
 from hal.ports import SLOTS
@@ -28,24 +28,24 @@ def move(watch, places, target, step=0.1):
 
 
 def test_a_move_that_shows_is_no_stall():
-    assert move(Watch(0.002, 1.0), [0.001 * i for i in range(51)], 0.05) == []
+    assert move(StallDetector(0.002, 1.0), [0.001 * i for i in range(51)], 0.05) == []
 
 
 def test_standing_at_the_target_is_no_stall():
-    assert move(Watch(0.002, 1.0), [0.0195] * 100, 0.02) == []
+    assert move(StallDetector(0.002, 1.0), [0.0195] * 100, 0.02) == []
 
 
 def test_standing_away_from_the_target_is_a_stall_after_the_patience():
-    verdicts = move(Watch(0.002, 1.0), [0.0] * 12, 0.02)
+    verdicts = move(StallDetector(0.002, 1.0), [0.0] * 12, 0.02)
     assert verdicts == ["stalled"]
 
 
 def test_creeping_is_a_stall():
-    assert "stalled" in move(Watch(0.002, 1.0), [0.00002 * i for i in range(30)], 0.02)
+    assert "stalled" in move(StallDetector(0.002, 1.0), [0.00002 * i for i in range(30)], 0.02)
 
 
 def test_the_wrong_way_is_seen_as_soon_as_it_shows():
-    verdicts = move(Watch(0.002, 1.0), [0.0, -0.001, -0.0025], 0.02)
+    verdicts = move(StallDetector(0.002, 1.0), [0.0, -0.001, -0.0025], 0.02)
     assert verdicts == ["runs the wrong way"]
 
 
@@ -54,22 +54,22 @@ def compare(watch, ways):
 
 
 def test_a_wire_that_goes_along_is_well_wherever_its_zero_is():
-    assert compare(Watch(0.002, 1.0), [(0.0005 * i, 0.03 + 0.00045 * i) for i in range(100)]) == []
+    assert compare(StallDetector(0.002, 1.0), [(0.0005 * i, 0.03 + 0.00045 * i) for i in range(100)]) == []
 
 
 def test_a_wire_may_lag():
     there = [0.0005 * i for i in range(60)]
     places = [*there, *reversed(there)]
     lagging = [places[max(i - 2, 0)] for i in range(len(places))]
-    assert compare(Watch(0.002, 1.0), list(zip(places, lagging, strict=True))) == []
+    assert compare(StallDetector(0.002, 1.0), list(zip(places, lagging, strict=True))) == []
 
 
 def test_a_wire_that_stands_while_the_drive_counts_is_a_stall():
-    assert compare(Watch(0.002, 1.0), [(0.0005 * i, 0.01) for i in range(10)]) == ["stalled"]
+    assert compare(StallDetector(0.002, 1.0), [(0.0005 * i, 0.01) for i in range(10)]) == ["stalled"]
 
 
 def test_a_wire_that_goes_the_other_way_is_seen_within_twice_the_least_way():
-    verdicts = compare(Watch(0.002, 1.0), [(0.0005 * i, -0.0005 * i) for i in range(10)])
+    verdicts = compare(StallDetector(0.002, 1.0), [(0.0005 * i, -0.0005 * i) for i in range(10)])
     assert verdicts == ["runs the wrong way"]
 
 
@@ -107,7 +107,7 @@ def test_the_wire_carries_the_zero_along():
     """The drive has lost 3 mm: with follow = "wire" its counts are corrected, while its own position was wrong."""
     item, wire = drive(follow="wire")
     for i in range(100):
-        wire.put(1.0 + 0.04 * i, (0.007,), 1.0 + 0.04 * i)
+        wire.accept(1.0 + 0.04 * i, (0.007,), 1.0 + 0.04 * i)
         item._took_position(None, [0, 20_000], 1.0 + 0.04 * i, 1.0 + 0.04 * i)
     assert item.position() == pytest.approx(0.007, abs=1e-6)
     assert item.counts_for(0.007) == pytest.approx(20_000, abs=1)

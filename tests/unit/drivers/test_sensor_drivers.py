@@ -21,38 +21,38 @@ def sensor():
 
 def test_a_sample_has_the_boards_time():
     item, frame = sensor(), empty_frame()
-    item.put(100.5, (0.02,), 100.51)
+    item.accept(100.5, (0.02,), 100.51)
     item.read(frame[SLOTS["slider_wire"].all])
     assert frame[SLOTS["slider_wire"].all].tolist() == [0.5, Validity.VALID, 0.02]
 
 
 def test_samples_before_the_start_or_running_back_are_not_taken():
     item = sensor()
-    item.put(99.0, (0.02,), 100.0)
+    item.accept(99.0, (0.02,), 100.0)
     assert item.validity == Validity.MISSING
-    item.put(100.5, (0.02,), 100.5)
-    item.put(100.4, (0.03,), 100.6)
+    item.accept(100.5, (0.02,), 100.5)
+    item.accept(100.4, (0.03,), 100.6)
     assert item.values == (0.02,)
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 0.2, -0.2])
 def test_an_unfit_sample_is_rejected_and_five_running_are_a_fault(bad):
     item = sensor()
-    item.put(100.1, (0.02,), 100.1)
+    item.accept(100.1, (0.02,), 100.1)
     for i in range(FAULTY_AFTER):
         assert item.validity == Validity.VALID
         assert item.values == (0.02,)
-        assert not item.put(100.2 + 0.1 * i, (bad,), 100.2 + 0.1 * i)
+        assert not item.accept(100.2 + 0.1 * i, (bad,), 100.2 + 0.1 * i)
     assert item.validity == Validity.FAULT
     assert item.health.unfit == FAULTY_AFTER
-    assert item.put(101.0, (0.03,), 101.0)
+    assert item.accept(101.0, (0.03,), 101.0)
     assert item.validity == Validity.VALID
     assert item.health.error == ""
 
 
 def test_a_sample_grows_stale_after_three_periods():
     item = sensor()
-    item.put(100.1, (0.02,), 100.1)
+    item.accept(100.1, (0.02,), 100.1)
     item.age(100.1 + 0.119)
     assert item.validity == Validity.VALID
     item.age(100.1 + 0.121)
