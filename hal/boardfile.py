@@ -202,6 +202,8 @@ def preset_of(file: DeviceFile, name: str, source: str) -> RegisterMap:
     try:
         found = preset(table.device)
     except ConfigError as error:
+        if table.device.endswith(".toml"):
+            raise  # it names that file
         raise ConfigError(source, error.message, key=f"{name}.device") from None
     if found.role not in ROLES[name]:
         raise ConfigError(source, f"'{table.device}' is no {' or '.join(ROLES[name])}", key=f"{name}.device")
@@ -209,8 +211,12 @@ def preset_of(file: DeviceFile, name: str, source: str) -> RegisterMap:
 
 
 def calibration_hash(file: DeviceFile) -> str:
-    """16 hex digits over every device's table: addresses, scales, zeros, directions, limits."""
+    """16 hex digits over every device's table: addresses, scales, zeros, directions, limits; and over register maps of
+    one's own, whose units and scales are calibration too."""
     tables = {name: msgspec.to_builtins(table) for name, table in devices_of(file).items()}
+    for name, table in devices_of(file).items():
+        if table.device.endswith(".toml"):
+            tables[name]["map"] = msgspec.to_builtins(preset(table.device))
     text = json.dumps(tables, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 

@@ -10,7 +10,6 @@ from hal.protocols import modbus
 from hal.protocols.modbus import Request
 from hal.protocols.registers import RegisterMap, value_of
 
-PA_PER_BAR = 1e5
 TEMPERATURES = (-10.0, 60.0)  # deg C, past which the transmitter is not in water
 
 
@@ -19,16 +18,19 @@ class Beacon(Sensor):
 
     def __init__(self, table: BeaconTable, registers: RegisterMap):
         super().__init__("beacon", SLOTS["beacon"], 1.0 / table.rate_hz, (table.range_pa, TEMPERATURES))
-        self._zero, self._map = table.zero_pa, registers
-        self._temperature = 15.0
-        variants = [registers.read(table.id, "all"), registers.read(table.id, "pressure")]
-        self.poll = Poll(variants, self.period, self._taken, self.health, in_error=self.fail, damaged=self.damage)
+        self._zero = table.zero_pa
+        self._temperature = 15.0  # until the transmitter says its own, if it has any
+        names = [name for name in ("all", "pressure") if name in registers.block]
+        self._blocks = {registers.read(table.id, name): registers.block[name] for name in names}
+        self.poll = Poll(
+            list(self._blocks), self.period, self._taken, self.health, in_error=self.fail, damaged=self.damage
+        )
 
     def _taken(self, request: Request, registers: list[int], asked_at: float, now: float) -> None:
-        block = self._map.block["all" if len(registers) == 4 else "pressure"]
-        if len(registers) == 4:
+        block = self._blocks[request]
+        if "temperature" in block.value:
             self._temperature = value_of(block, "temperature", registers)
-        pressure = value_of(block, "pressure", registers) * PA_PER_BAR
+        pressure = value_of(block, "pressure", registers)
         self.accept(asked_at, (pressure - self._zero, self._temperature), now)
 
 

@@ -12,11 +12,9 @@ from pymodbus.constants import ExcCodes
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 from hal.boardfile import BatteryTable, DriveTable, LeakTable, WireTable
-from hal.protocols.registers import RegisterMap, to_registers
+from hal.protocols.registers import RegisterMap, registers_of, to_registers
 from sim_backend.twins.faults import Fault
 from sim_backend.twins.plant import TwinPlant
-
-PA_PER_BAR = 1e5
 
 
 class RegisterTwin(ABC):
@@ -61,10 +59,7 @@ class RegisterTwin(ABC):
         """A plant step has been made."""
 
     def _place(self, block: str, name: str, number: float) -> dict[int, int]:
-        item = self.map.block[block]
-        value = item.value[name]
-        words = to_registers(value.type, number)
-        return {item.address + value.at + i: word for i, word in enumerate(words)}
+        return registers_of(self.map.block[block], name, number)
 
 
 class PressureTwin(RegisterTwin):
@@ -76,20 +71,24 @@ class PressureTwin(RegisterTwin):
 
     def fill(self) -> dict[int, int]:
         pressure, temperature = self._plant.pressure()
-        bar = math.nan if self.fault.kind == "nan" else (pressure + self._zero) / PA_PER_BAR
-        places = {**self._place("all", "pressure", bar), **self._place("all", "temperature", temperature)}
-        return {**places, **self._place("pressure_old", "pressure", bar)}
+        now = {"pressure": math.nan if self.fault.kind == "nan" else pressure + self._zero, "temperature": temperature}
+        places: dict[int, int] = {}
+        for name, block in self.map.block.items():
+            for quantity in now.keys() & block.value.keys():
+                places |= self._place(name, quantity, now[quantity])
+        return places
 
 
 class AnalogTwin(RegisterTwin):
     """An analog module: draw-wires by the plant, leak and battery as told."""
 
     def __init__(self, device: int, registers: RegisterMap, plant: TwinPlant):
-        super().__init__(device, registers, extra=((registers.word["uart"], 1), (registers.word["id"], 1)))
+        super().__init__(device, registers, extra=tuple((word, 1) for word in registers.word.values()))
         self._plant = plant
         self._wires: dict[str, tuple[int, WireTable]] = {}
         self.channels = [0.0] * registers.block["all"].count
-        self._modes = [3] * registers.block["modes"].count
+        self._modes = [3] * (registers.block["modes"].count if "modes" in registers.block else 0)
+        self._first_mode = registers.block["modes"].address if self._modes else 0
 
     def add(self, name: str, table: Any) -> None:
         """Something is connected to a channel."""
@@ -104,12 +103,12 @@ class AnalogTwin(RegisterTwin):
         for name, (channel, table) in self._wires.items():
             reading = table.zero + table.per_m * self._plant.wire(name)
             self.channels[channel - 1] = 0.0 if self.fault.kind == "nan" else reading  # a broken wire: no current
-        base, modes = self.map.block["all"].address, self.map.block["modes"].address
+        base = self.map.block["all"].address
         places = {base + i: to_registers("u16", value)[0] for i, value in enumerate(self.channels)}
-        return {**places, **{modes + i: mode for i, mode in enumerate(self._modes)}}
+        return {**places, **{self._first_mode + i: mode for i, mode in enumerate(self._modes)}}
 
     def written(self, address: int, values: list[int], stored: Any) -> ExcCodes | None:
-        first = self.map.block["modes"].address
+        first = self._first_mode
         for place, value in enumerate(values, start=address):
             if not first <= place < first + len(self._modes) or value > 4:
                 return ExcCodes.ILLEGAL_VALUE

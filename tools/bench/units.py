@@ -6,40 +6,34 @@ The ballast pump is moved by its plunger's travel, which a ruler can check; net 
 import math
 from typing import Any
 
+from hal.ports import SLOTS
+from hal.units import UNITS as SI
+
 ACTUATORS = ("servo", "slider", "ballast")
 UNITS = {"servo": "deg", "slider": "mm", "ballast": "mm"}
 WIRES = {"slider": "slider_wire", "ballast": "plunger_wire"}
-SHOWN = {  # sensor -> (name, unit, factor) of each value
-    "imu": [(name, "deg", 180.0 / math.pi) for name in ("roll", "pitch", "yaw")]
-    + [(name, "deg/s", 180.0 / math.pi) for name in ("p", "q", "r")],
-    "beacon": [("pressure", "kPa", 1e-3), ("temperature", "deg C", 1.0)],
-    "slider_wire": [("slider", "mm", 1e3)],
-    "plunger_wire": [("plunger", "mm", 1e3)],
-    "leak": [("wet", "", 1.0)],
-    "battery": [("voltage", "V", 1.0)],
-}
+SHOWN = {"rad": "deg", "rad/s": "deg/s", "m": "mm", "Pa": "kPa", "1": ""}  # a port's unit as a person reads it
 
 
 def from_port(name: str, value: float, kg_per_m: float) -> float:
     """An actuator's position in its port's unit as a person reads it."""
-    if name == "servo":
-        return math.degrees(value)
-    return 1e3 * (value / kg_per_m if name == "ballast" else value)
+    return (value / kg_per_m if name == "ballast" else value) / SI[UNITS[name]].factor
 
 
 def to_port(name: str, value: float, kg_per_m: float) -> float:
     """What a person typed in the port's unit."""
-    if name == "servo":
-        return math.radians(value)
-    return 1e-3 * (value * kg_per_m if name == "ballast" else value)
+    return (value * kg_per_m if name == "ballast" else value) * SI[UNITS[name]].factor
 
 
 def shown_values(name: str, values: list[float | None]) -> str:
     """A sensor's values as text."""
     parts = []
-    for (label, unit, factor), value in zip(SHOWN[name], values, strict=True):
-        text = "-" if value is None else f"{value * factor:.2f}"
-        parts.append(f"{label} {text} {unit}".rstrip())
+    slot = SLOTS[name]
+    for label, port_unit, value in zip(slot.names, slot.units, values, strict=True):
+        unit = SHOWN.get(port_unit, port_unit)
+        factor = SI[unit].factor if unit else 1.0
+        text = "-" if value is None else f"{value / factor:.2f}"
+        parts.append(f"{label.removesuffix('_c')} {text} {unit}".rstrip())
     return ", ".join(parts)
 
 

@@ -76,7 +76,7 @@ def test_floats_stand_high_word_first():
     block = preset("keller-33x").block["all"]
     registers = [*to_registers("f32", 1.01325), *to_registers("f32", 20.5)]
     assert registers[2:] == [0x41A4, 0x0000]
-    assert value_of(block, "pressure", registers) == pytest.approx(1.01325, rel=1e-7)
+    assert value_of(block, "pressure", registers) == pytest.approx(101_325.0, rel=1e-7)
     assert value_of(block, "temperature", registers) == 20.5
 
 

@@ -5,7 +5,6 @@
 docs/IMPORT.md explains every key with an example.
 """
 
-import math
 import tomllib
 from importlib.resources import files
 from pathlib import Path
@@ -14,35 +13,16 @@ from typing import Annotated, Literal
 import msgspec
 
 from firmware.model.strict import ConfigError, Table, decode, locate
+from hal.units import UNITS, units_of
 from tools.data.errors import InputError
 from tools.data.runs import columns as names
 from tools.data.sources import read_text
 
 GRAVITY = 9.80665  # m/s2, for depth out of pressure
 
-# unit -> (kind, factor to SI). 'counts' is for values that `scale` alone turns into the target's SI unit.
-UNITS: dict[str, tuple[str, float]] = {
-    "m": ("length", 1.0),
-    "cm": ("length", 0.01),
-    "mm": ("length", 0.001),
-    "ft": ("length", 0.3048),
-    "in": ("length", 0.0254),
-    "rad": ("angle", 1.0),
-    "deg": ("angle", math.pi / 180.0),
-    "rad/s": ("rate", 1.0),
-    "deg/s": ("rate", math.pi / 180.0),
-    "kg": ("mass", 1.0),
-    "g": ("mass", 0.001),
-    "lb": ("mass", 0.45359237),
-    "Pa": ("pressure", 1.0),
-    "kPa": ("pressure", 1e3),
-    "mbar": ("pressure", 100.0),
-    "dbar": ("pressure", 1e4),
-    "bar": ("pressure", 1e5),
-    "psi": ("pressure", 6894.757293168),
-    "counts": ("counts", 1.0),
-}
-TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
+# 'counts' is for values that `scale` alone turns into the target's SI unit.
+COLUMN_UNITS = units_of("length", "angle", "rate", "mass", "pressure", "counts")
+TIME_UNITS = {name: UNITS[name].factor for name in units_of("time")}
 _KINDS = (("_rad_s", "rate"), ("_rad", "angle"), ("_kg", "mass"), ("_m", "length"))
 
 Factor = Annotated[float, msgspec.Meta(ge=-1e12, le=1e12)]
@@ -61,8 +41,8 @@ class ColumnTable(Table):
     decimals: Annotated[int, msgspec.Meta(ge=0, le=17)] | None = None  # of the written file; exact without
 
     def __post_init__(self):
-        if self.unit not in UNITS:
-            raise ValueError(f"unit: expected one of {', '.join(UNITS)}, got {self.unit!r}")
+        if self.unit not in COLUMN_UNITS:
+            raise ValueError(f"unit: expected one of {', '.join(COLUMN_UNITS)}, got {self.unit!r}")
         if self.scale == 0.0:
             raise ValueError("scale: expected anything but 0")
         if self.valid is not None and not self.valid[0] < self.valid[1]:
@@ -139,7 +119,7 @@ def _check(mapping: MapTable, source: str) -> None:
                 source, f"no column of run data (put it in [extra], or use {known})", key=f"columns.{name}"
             )
         wanted = next(kind for ending, kind in _KINDS if name.endswith(ending))
-        kind = UNITS[column.unit][0]
+        kind = UNITS[column.unit].kind
         if kind not in (wanted, "counts") and not (kind == "pressure" and name == names.DEPTH):
             raise ConfigError(source, f"{column.unit!r} is no unit of {wanted}", key=f"columns.{name}.unit")
     for name in mapping.extra:
