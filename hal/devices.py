@@ -6,6 +6,7 @@ memory. So a slow, silent or babbling device costs the tick nothing.
 """
 
 import time
+from collections.abc import Callable
 from typing import Any
 
 from hal import boardfile
@@ -14,10 +15,11 @@ from hal.clocks import MonotonicClock
 from hal.drivers.drive import Drive
 from hal.drivers.maestro import Servo
 from hal.drivers.modbus_sensors import AnalogModule, Beacon, EncoderWire, Input, battery, leak, wire
-from hal.drivers.samples import Health, Sensor
+from hal.drivers.samples import Sensor
 from hal.drivers.vn100 import Vn100
-from hal.ports import BoardError, Validity
+from hal.ports import Board, BoardError, Hardware, OutOfBand, Validity
 from hal.protocols.modbus_master import ModbusBus
+from hal.recorder.schema import RecordSpec
 from hal.transport.hub import Hub, LineHandler, Link
 from hal.transport.port import SerialPort, Unplugged
 
@@ -47,7 +49,9 @@ class ServingClock(MonotonicClock):
 class DeviceBoard:
     """Every device of a board file. Drop weight, watchdog and a way to the out-of-band process are not fitted."""
 
-    drop_weight = watchdog = out_of_band = None
+    drop_weight = watchdog = None
+    hardware = Hardware.REAL
+    records: tuple[RecordSpec, ...] = ()
     imu: Vn100
     beacon: Beacon
     slider_wire: Input
@@ -61,6 +65,7 @@ class DeviceBoard:
     def __init__(self, file: boardfile.DeviceFile, source: str, vehicle: Any, water_density: float):
         self.name, self.file, self.source, self.loop_hz = file.name, file, source, file.loop_hz
         self.surface_pressure = file.beacon.surface_pa
+        self.out_of_band: OutOfBand | None = None
         self.periods = {
             "imu": 1.0 / file.imu.rate_hz,
             "beacon": 1.0 / file.beacon.rate_hz,
@@ -141,7 +146,7 @@ class DeviceBoard:
         self.enable(True)
         self.start()
 
-    def check_calibration(self) -> None:
+    def check_calibration(self) -> str:
         """BoardError where the file is not as it was when someone last looked it through."""
         found = boardfile.calibration_hash(self.file)
         if not self.file.calibration:
@@ -151,6 +156,7 @@ class DeviceBoard:
                 f"{self.source}: calibration: changed since it was looked through (is {found}, was "
                 f"{self.file.calibration}); look it through with glider bench, then `accept`"
             )
+        return "as accepted"
 
     def connect(self) -> None:
         """Open every port; BoardError names the one that cannot be, and its devices."""
@@ -160,6 +166,14 @@ class DeviceBoard:
             except Unplugged as error:
                 self.close()
                 raise BoardError(f"port {name} ({', '.join(self.devices_on(name))}): {error}") from None
+
+    def connect_available(self) -> None:
+        """Open every port that is there, for the bench; the rest is tried again and again."""
+        for link in self.links.values():
+            try:
+                link.open(time.monotonic())
+            except Unplugged as error:
+                link.trouble = str(error)
 
     def devices_on(self, port: str) -> list[str]:
         return [name for name, table in boardfile.devices_of(self.file).items() if table.port == port]
@@ -222,12 +236,20 @@ class DeviceBoard:
         self.slider.age(now)
         self.ballast.age(now)
 
-    def health(self) -> dict[str, Health]:
+    def health(self) -> dict[str, dict[str, Any]]:
         """How every device does."""
-        return {name: port.health for name, port in (*self.sensors.items(), *self.actuators.items())}
+        return {name: port.health.plain() for name, port in (*self.sensors.items(), *self.actuators.items())}
+
+    def state(self) -> dict[str, float]:
+        """Nobody knows where a real vehicle is."""
+        return {}
+
+    def recording(self, channel: Callable[[str], Any]) -> tuple[Callable[[float], None], ...]:
+        """Nothing beside the ticks."""
+        return ()
 
 
-def build_board(request: BoardRequest) -> DeviceBoard:
+def build_board(request: BoardRequest) -> Board:
     """A board of real devices from its file's text."""
     file = boardfile.decode_device_file(request.text, request.source)
     return DeviceBoard(file, request.source, request.vehicle, request.water_density)

@@ -7,10 +7,13 @@ takes the frame as it is. A device that is unplugged in flight writes its validi
 is opened.
 """
 
+from collections.abc import Callable
 from enum import IntEnum
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
+
+from hal.recorder.schema import RecordSpec
 
 
 class Validity(IntEnum):
@@ -59,6 +62,10 @@ class Condition(IntEnum):
 
 
 MAX_AGE_PERIODS = 3.0  # a sample older than so many of its sensor's periods is stale: for drivers, twins and autopilot
+
+# An actuator that does not move when sent: tried again so often, so long apart. The supervisor counts by its draw-wire,
+# a driver by its own count, for it has to act alone at the bench.
+STALL_TRIES, STALL_REST_S = 2, 1.0
 
 # Where each slot begins: plain integers, because the kernels freeze them.
 IMU, BEACON, SLIDER_WIRE, PLUNGER_WIRE, LEAK, BATTERY = 0, 8, 12, 15, 18, 21
@@ -134,27 +141,70 @@ class HardwareWatchdog(Protocol):
         """Hold off the hardware watchdog for one more of its periods."""
 
 
+class Hardware(IntEnum):
+    """What a board's ports lead to."""
+
+    NONE = 0  # a simulated vehicle: no devices, nothing to keep alive
+    TWINNED = 1  # the real drivers, in front of twins that the board starts: nothing real moves
+    REAL = 2
+
+
 class Board(Protocol):
     """A vehicle's hardware, or what stands in for it. Optional devices are None."""
 
     name: str
     loop_hz: float
-    clock: Clock
-    imu: SensorPort
-    beacon: SensorPort
-    slider_wire: SensorPort
-    plunger_wire: SensorPort
-    leak: SensorPort | None
-    battery: SensorPort | None
-    servo: ActuatorPort
-    slider: ActuatorPort
-    ballast: ActuatorPort
-    drop_weight: DropWeight | None
+    surface_pressure: float  # Pa, absolute, where depth is zero
+    periods: dict[str, float]  # s between two samples: imu, beacon, wires (the slower of both)
     out_of_band: OutOfBand | None
-    watchdog: HardwareWatchdog | None
+
+    @property
+    def hardware(self) -> Hardware: ...
+    @property
+    def clock(self) -> Clock: ...
+    @property
+    def imu(self) -> SensorPort: ...
+    @property
+    def beacon(self) -> SensorPort: ...
+    @property
+    def slider_wire(self) -> SensorPort: ...
+    @property
+    def plunger_wire(self) -> SensorPort: ...
+    @property
+    def leak(self) -> SensorPort | None: ...
+    @property
+    def battery(self) -> SensorPort | None: ...
+    @property
+    def servo(self) -> ActuatorPort: ...
+    @property
+    def slider(self) -> ActuatorPort: ...
+    @property
+    def ballast(self) -> ActuatorPort: ...
+    @property
+    def drop_weight(self) -> DropWeight | None: ...
+    @property
+    def watchdog(self) -> HardwareWatchdog | None: ...
+    @property
+    def records(self) -> tuple[RecordSpec, ...]:
+        """What it records beside the ticks."""
+
+    def recording(self, channel: Callable[[str], Any]) -> tuple[Callable[[float], None], ...]:
+        """Functions of time that record it, once a tick, on an open board; `channel(topic)` is where to."""
 
     def open(self) -> None:
         """Open the devices; raises BoardError naming the device that does not answer."""
+
+    def check_calibration(self) -> str:
+        """Whose the calibration is, in words; raises BoardError where it is not the one accepted."""
+
+    def silent(self) -> list[str]:
+        """A line for each device that gives nothing, or nothing good."""
+
+    def health(self) -> dict[str, dict[str, Any]]:
+        """How every device does, by its place on the board: counts, what is wrong now, what has changed."""
+
+    def state(self) -> dict[str, float]:
+        """Where the plant behind it truly is (x_m, y_m, z_m, servo_rad, slider_m, ballast_kg); empty on a real one."""
 
     def close(self) -> None:
         """Close the devices. Never raises."""

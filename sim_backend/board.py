@@ -1,5 +1,6 @@
 """The simulated board: the ports of a real one, moved by the plant. Its `world` is the way in for tests and physics."""
 
+from collections.abc import Callable
 from typing import Annotated, Any
 
 import msgspec
@@ -8,8 +9,21 @@ import numpy as np
 from firmware.model.strict import Table, decode
 from hal.board import BoardRequest
 from hal.clocks import MonotonicClock
-from hal.ports import SLOTS, Condition, Validity
+from hal.ports import (
+    SLOTS,
+    ActuatorPort,
+    Board,
+    BoardError,
+    Clock,
+    Condition,
+    DropWeight,
+    Hardware,
+    OutOfBand,
+    SensorPort,
+    Validity,
+)  # fmt: skip
 from hal.recorder.schema import Field, RecordSpec
+from sim_backend.core import layout
 from sim_backend.core.world import write_truth
 from sim_backend.effects.base import check_board
 from sim_backend.world import Environment, SampledSensors, Start, World, build_world
@@ -118,19 +132,28 @@ class PacedClock(MonotonicClock):
 class SimBoard:
     """All devices of the nominal vehicle, simulated. Leak, battery, drop weight and the like are not fitted."""
 
-    leak = battery = drop_weight = watchdog = out_of_band = None
+    hardware = Hardware.NONE
+    records: tuple[RecordSpec, ...] = (TRUTH,)
+    imu: SensorPort
+    beacon: SensorPort
+    slider_wire: SensorPort
+    plunger_wire: SensorPort
+    servo: ActuatorPort
+    slider: ActuatorPort
+    ballast: ActuatorPort
+    watchdog = None
 
     def __init__(self, file: SimBoardFile, world: World, vehicle: Any, *, realtime: bool):
         self.name = "sim"
         self.file, self.world, self.loop_hz = file, world, file.loop_hz
-        self.periods = {
-            "imu": 1.0 / file.sensors.imu.rate_hz,
-            "beacon": 1.0 / file.sensors.beacon.rate_hz,
-            "wires": 1.0 / min(file.sensors.slider_wire.rate_hz, file.sensors.plunger_wire.rate_hz),
-        }
-        self.surface_pressure = 101325.0
+        self.periods = file.sensors.periods
+        self.surface_pressure = float(world.E[layout.SURFACE_PRESSURE])
         self.realtime = realtime
-        self.clock: SimulatedClock | PacedClock = SimulatedClock(world)
+        self.clock: Clock = SimulatedClock(world)
+        self.leak: SensorPort | None = None
+        self.battery: SensorPort | None = None
+        self.drop_weight: DropWeight | None = None
+        self.out_of_band: OutOfBand | None = None
         for name in ("imu", "beacon", "slider_wire", "plunger_wire"):
             setattr(self, name, SimulatedSensor(world.frame[SLOTS[name].all]))
         for index, name in enumerate(("servo", "slider", "ballast")):
@@ -145,19 +168,43 @@ class SimBoard:
     def close(self) -> None:
         """Nothing to close."""
 
-    def truth_recorder(self, channel):
-        """A function for the runtime that records the plant's true state into a channel of TRUTH, once a tick."""
-        x, values = self.world.x, channel.values
+    def check_calibration(self) -> str:
+        """Nothing to calibrate."""
+        return "simulated: none"
+
+    def silent(self) -> list[str]:
+        """No devices, so none that is silent."""
+        return []
+
+    def health(self) -> dict[str, dict[str, Any]]:
+        """No devices."""
+        return {}
+
+    def state(self) -> dict[str, float]:
+        """Where the plant is."""
+        return self.world.truth()
+
+    def recording(self, channel: Callable[[str], Any]) -> tuple[Callable[[float], None], ...]:
+        """The plant's true state into the channel of TRUTH."""
+        truth = channel(TRUTH.topic)
+        x, values = self.world.x, truth.values
 
         def record(t: float) -> None:
             write_truth(t, x, values)
-            channel.commit(t)
+            truth.commit(t)
 
         record(0.0)
-        return record
+        return (record,)
 
 
-def build_board(request: BoardRequest) -> SimBoard:
+def world_of(board: Board) -> World:
+    """The world behind a simulated board; BoardError where there is none."""
+    if not isinstance(board, SimBoard):
+        raise BoardError(f"board '{board.name}' is not simulated")
+    return board.world
+
+
+def build_board(request: BoardRequest) -> Board:
     """A simulated board from its file's text; floor and salinity are the mission site's where the file has none."""
     file = decode(request.text, SimBoardFile, request.source)
     check_board(file.effects, request.source)

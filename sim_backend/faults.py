@@ -9,12 +9,14 @@ wrong way), slow, alarm (once), alarm_kept, stalled, misconfigured (what a drive
 
 import math
 from collections import deque
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from firmware.core.vehicle.layout import BALLAST_MIN, BALLAST_RATE, NET_MASS, SERVO_RATE, SLIDER_RATE, X_ACT
 from hal.ports import Condition, Validity
+from sim_backend.board import SimBoard
 from sim_backend.world import World
 
 SENSOR_KINDS = ("silent", "off", "stuck", "garbage", "wrong", "jump", "slow", "delayed", "repeated", "backwards",
@@ -171,13 +173,24 @@ class SimulatedInput:
         out[0], out[1], out[2] = math.floor(self._world.time * 5.0 + 1e-6) / 5.0, Validity.VALID, self.value
 
 
-def break_in(board: Any) -> SimulatedEscape:
+@dataclass(frozen=True)
+class Broken:
+    """What breaks the inputs and the pump of a board that was broken in; its other ports do so themselves."""
+
+    leak: SimulatedInput
+    battery: SimulatedInput
+    pump: FaultyActuator
+
+
+def break_in(board: SimBoard) -> Broken:
     """Put a faulty port in front of every device of a simulated board, a leak and a battery, and the ways out."""
     world = board.world
-    board.leak, board.battery = SimulatedInput(world, 0.0), SimulatedInput(world, 14.0)
+    leak, battery = SimulatedInput(world, 0.0), SimulatedInput(world, 14.0)
+    board.leak, board.battery = leak, battery
     for name in ("imu", "beacon", "slider_wire", "plunger_wire", "leak", "battery"):
         setattr(board, name, FaultySensor(getattr(board, name), world))
-    for index, name in enumerate(("servo", "slider", "ballast")):
+    for index, name in enumerate(("servo", "slider")):
         setattr(board, name, FaultyActuator(getattr(board, name), world, index))
-    board.out_of_band = board.drop_weight = SimulatedEscape(world, board.ballast)
-    return board.out_of_band
+    board.ballast = pump = FaultyActuator(board.ballast, world, 2)
+    board.out_of_band = board.drop_weight = SimulatedEscape(world, pump)
+    return Broken(leak, battery, pump)

@@ -61,6 +61,12 @@ class SampledSensors(Table):
     slider_wire: SampledSensor = SampledSensor(rate_hz=25.0, delay_s=0.02)
     plunger_wire: SampledSensor = SampledSensor(rate_hz=25.0, delay_s=0.02)
 
+    @property
+    def periods(self) -> dict[str, float]:
+        """Seconds between two samples, as hal.ports.Board has them."""
+        wires = min(self.slider_wire.rate_hz, self.plunger_wire.rate_hz)
+        return {"imu": 1.0 / self.imu.rate_hz, "beacon": 1.0 / self.beacon.rate_hz, "wires": 1.0 / wires}
+
 
 class Start(Table):
     """[start]: where the simulated vehicle begins. Depth m, angles deg, surge m/s."""
@@ -110,6 +116,12 @@ class World:
     @property
     def time(self) -> float:
         return float(self.counters[layout.C_STEP]) * self.dt
+
+    def truth(self) -> dict[str, float]:
+        """Where the vehicle is and its actuators are, for people and tests."""
+        names = ("x_m", "y_m", "z_m", "servo_rad", "slider_m", "ballast_kg")
+        values = (*self.x[X_POS : X_POS + 3], *self.x[X_ACT : X_ACT + 3])
+        return dict(zip(names, map(float, values), strict=True))
 
     def advance(self, t_end: float) -> float:
         """Move to t_end (s), under the commands in self.cmd; samples that have arrived are in self.frame."""

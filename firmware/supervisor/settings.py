@@ -11,6 +11,7 @@ import numpy as np
 
 from firmware.core.supervision import supervisor_layout as at
 from firmware.model.strict import Table
+from hal.ports import STALL_REST_S, STALL_TRIES
 
 Seconds = Annotated[float, msgspec.Meta(gt=0.0, le=3600.0)]
 Short = Annotated[float, msgspec.Meta(gt=0.0, le=10.0)]
@@ -68,8 +69,8 @@ class SupervisorTable(Table):
     overruns: Count = 10
     overrun_share: Annotated[float, msgspec.Meta(gt=0.0, le=1.0)] = 0.01
     stall_factor: Annotated[float, msgspec.Meta(ge=1.0, le=10.0)] = 1.5
-    stall_tries: Count = 2
-    stall_rest_s: Short = 1.0
+    stall_tries: Count = STALL_TRIES
+    stall_rest_s: Short = STALL_REST_S
     wrong_way_s: Annotated[float, msgspec.Meta(ge=0.1, le=0.3)] = 0.24
     longest_delay_s: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)] = 0.6  # of commands; younger ones prove nothing
     surface_m: Annotated[float, msgspec.Meta(gt=0.0, le=2.0)] = 0.4

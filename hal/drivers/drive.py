@@ -13,7 +13,7 @@ from hal.boardfile import DriveTable
 from hal.drivers.modbus_sensors import nearest
 from hal.drivers.poll import Poll, Refusals, exception_text
 from hal.drivers.samples import Health, Sensor, State
-from hal.ports import SLOTS, Condition, Validity
+from hal.ports import SLOTS, STALL_REST_S, STALL_TRIES, Condition, Validity
 from hal.protocols import modbus
 from hal.protocols.modbus import Frame, Request
 from hal.protocols.modbus_master import Failure, ModbusBus
@@ -22,8 +22,6 @@ from hal.protocols.registers import RegisterMap, to_registers
 FAULT, ENABLED, RUNNING = 1, 2, 4  # bits of the status
 STATUS_S = 0.2
 DRIFT_STANDING, DRIFT_MOVING = 0.1, 0.01  # shares of the wire's disagreement taken over at each reading
-STALL_TRIES = 2
-REST_S = 0.3  # between a stall and the next try
 LOST_AFTER_S = 0.5  # without its position
 STALLED, WRONG_WAY, ALARM = "stalled", "runs the wrong way", "drive alarm"
 CONDITIONS = {STALLED: Condition.GIVEN_UP, WRONG_WAY: Condition.WRONG_WAY, ALARM: Condition.ALARM_KEPT}
@@ -167,7 +165,7 @@ class Drive:
             return
         self.stalls += 1
         self._mover.stop_wanted = True
-        self._mover.rest_until = now + REST_S
+        self._mover.rest_until = now + STALL_REST_S
         self._watch.forget(now)
         if verdict == WRONG_WAY or self.stalls > STALL_TRIES:
             self._fail(now, verdict)

@@ -3,7 +3,8 @@
 import math
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -26,6 +27,10 @@ class Health:
     damaged: int = 0
     error: str = ""  # what is wrong now; empty: nothing
     notes: deque = field(default_factory=lambda: deque(maxlen=20))
+
+    def plain(self) -> dict[str, Any]:
+        """Counts, what is wrong now, and what has changed, in plain types."""
+        return {**asdict(self), "notes": [note for _, note in self.notes]}
 
     def say(self, now: float, text: str) -> None:
         """A change in the device's state, for logs and the bench."""

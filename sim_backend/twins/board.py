@@ -10,13 +10,12 @@ import sys
 import tempfile
 import time
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
 from hal.board import BoardRequest
 from hal.devices import DeviceBoard
-from hal.ports import BoardError
+from hal.ports import Board, BoardError, Hardware
 from sim_backend.twins.boardfile import TwinFile, decode_twin_file
 from sim_backend.twins.service import replaced_ports
 
@@ -25,6 +24,8 @@ START_S = 180.0  # for the twins to be there, their kernels compiled
 
 class TwinBoard(DeviceBoard):
     """A board of kind "twin". `control` tells the twins what to do; `state` is the plant's truth."""
+
+    hardware = Hardware.TWINNED
 
     def __init__(self, file: TwinFile, request: BoardRequest):
         self.folder = Path(tempfile.mkdtemp(prefix="glider-twin-"))
@@ -55,6 +56,8 @@ class TwinBoard(DeviceBoard):
             self.close()
             raise BoardError("the twins did not start")
         super().connect()
+
+    connect_available = connect  # the twins have to be started
 
     def control(self, command: str) -> str:
         """A command to the twins, and their answer; BoardError where they are gone."""
@@ -96,6 +99,6 @@ class TwinBoard(DeviceBoard):
         self.serve(time.monotonic() + seconds)
 
 
-def build_board(request: BoardRequest) -> Any:
+def build_board(request: BoardRequest) -> Board:
     """A twinned board from its file's text."""
     return TwinBoard(decode_twin_file(request.text, request.source), request)

@@ -102,10 +102,7 @@ class TwinPlant:
 
     def state(self) -> dict[str, float]:
         """The truth, for people and tests."""
-        x = self.world.x
-        names = ("x_m", "y_m", "z_m", "servo_rad", "slider_m", "ballast_kg")
-        values = (*x[X_POS : X_POS + 3], *x[X_ACT : X_ACT + 3])
-        return {"flight_s": self.flight_time, **dict(zip(names, map(float, values), strict=True))}
+        return {"flight_s": self.flight_time, **self.world.truth()}
 
 
 def degrees(values: tuple[float, ...]) -> tuple[float, ...]:

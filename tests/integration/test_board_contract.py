@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from hal.board import BoardRequest, board_builder
-from hal.ports import SLOTS, ActuatorPort, Clock, SensorPort, Validity, empty_frame
+from hal.ports import SLOTS, ActuatorPort, Clock, Hardware, SensorPort, Validity, empty_frame
+from hal.recorder.recorder import NullRecorder
 from tools.data.sources import load_vehicle
 from tools.flight.compose import load_board_file
 
@@ -56,8 +57,30 @@ def test_ports_have_the_shape_of_ports(board):
         assert port is None or isinstance(port, SensorPort)
     assert all(getattr(board, name) is not None for name in FITTED)
     assert board.loop_hz > 0
+    assert isinstance(board.hardware, Hardware)
+    assert board.check_calibration()
     assert set(board.periods) == {"imu", "beacon", "wires"}
     assert 80_000 < board.surface_pressure < 110_000
+
+
+def test_a_board_says_how_it_is_and_where_its_plant_is(board):
+    """A board without devices has no health; one with nothing real behind it knows where it is."""
+    wait(board, 0.2)
+    assert board.silent() == []
+    devices = {name for name in SLOTS if getattr(board, name) is not None}
+    assert set(board.health()) == (set() if board.hardware is Hardware.NONE else devices)
+    where = board.state()
+    assert set(where) >= {"x_m", "y_m", "z_m", "servo_rad", "slider_m", "ballast_kg"} or board.hardware is Hardware.REAL
+    assert all(math.isfinite(value) for value in where.values())
+
+
+def test_what_a_board_records_is_recorded_once_a_tick(board):
+    recorder = NullRecorder(board.records)
+    recording = board.recording(recorder.channel)
+    assert len(recording) == len(board.records)
+    for spec, record in zip(board.records, recording, strict=True):
+        record(board.clock.now())
+        assert np.isfinite(recorder.channel(spec.topic).values[1:]).all()
 
 
 def test_time_never_runs_back_and_deadlines_are_kept(board):

@@ -120,7 +120,7 @@ LOST_ACTUATORS = [("servo", "silent"), ("servo", "unplug"), ("slider", "silent")
 @pytest.mark.parametrize(("device", "kind"), LOST_ACTUATORS)
 def test_a_lost_actuator_is_seen(board, fault, device, kind):
     fault(device, kind)
-    assert until(board, lambda: board.health()[device].error != "", 3.0)
+    assert until(board, lambda: board.health()[device]["error"] != "", 3.0)
 
 
 def test_a_jammed_slider_is_tried_twice_more_and_then_left_alone(board, fault):

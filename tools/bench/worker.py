@@ -218,18 +218,6 @@ ROW = (
 )  # fmt: skip
 
 
-def open_ports(board: DeviceBoard) -> None:
-    """Open what is there; the rest is tried again and again."""
-    if hasattr(board, "control"):  # twins have to be started
-        board.connect()
-        return
-    for link in board.links.values():
-        try:
-            link.open(time.monotonic())
-        except Unplugged as error:
-            link.trouble = str(error)
-
-
 def serve(worker: Worker, requests: Requests, say: Callable[[dict], None]) -> None:
     """Until the console is gone."""
     heard = time.monotonic()
@@ -260,14 +248,15 @@ def main() -> None:
 
     vehicle: Any = load_vehicle(config["vehicle"])
     request = BoardRequest(text=config["text"], source=config["source"], vehicle=vehicle)
-    board: Any = board_builder(config["kind"])(request)
+    board = board_builder(config["kind"])(request)
+    assert isinstance(board, DeviceBoard), "a simulated board has no devices"
 
     def end(*_: object) -> None:
         requests.ended = True
 
     signal.signal(signal.SIGTERM, end)
     try:
-        open_ports(board)
+        board.connect_available()
         worker = Worker(board)
         worker.do_enable(False)
         board.wait_for_answers(config.get("wait_s", 2.0))

@@ -161,10 +161,7 @@ def fly(
         },
         "real_time": wishes.said,
     }
-    if hasattr(flight.board, "health"):
-        result["devices"] = {name: device_summary(health) for name, health in flight.board.health().items()}
-    if hasattr(flight.board, "state"):
-        result["truth"] = flight.board.state()
+    result["devices"], result["truth"] = flight.board.health(), flight.board.state()
     if as_json:
         print_json(result)
     else:
@@ -207,10 +204,11 @@ def faults_noticed(supervisor) -> list[dict]:
 
 def keep(flight, recorder, path, folder, acknowledge):
     """What stands around a flight on devices (flight/keeper); None in simulation. The state before it is read."""
+    from hal.ports import Hardware
     from hal.state_file import Phase
     from tools.flight.keeper import Keeper
 
-    if not hasattr(flight.board, "links"):
+    if flight.board.hardware is Hardware.NONE:
         return None
     name = flight.mission.name if path is None else path.stem
     keeper = Keeper(flight, recorder, name=name, folder=folder, twin=flight.twinned)
@@ -236,20 +234,15 @@ def check_arming(flight, path, keeper) -> None:
         raise
 
 
-def device_summary(health) -> dict:
-    """A device's counts and what has changed about it."""
-    counts = {name: getattr(health, name) for name in ("samples", "unfit", "timeouts", "exceptions", "damaged")}
-    return {**counts, "error": health.error, "notes": [note for _, note in health.notes]}
-
-
 def _run(flight, recorder, realtime, advance, keeper, wishes):
     """Arm, fly, disarm; returns the timing and the flight's length in s."""
     from firmware.core.control.control_layout import LEG
     from firmware.core.supervision.supervisor_layout import RECORDER
+    from hal.ports import Hardware
     from tools.flight.compose import build_runtime
 
     runtime = build_runtime(flight, recorder)
-    simulated = not realtime and hasattr(flight.board, "world")
+    simulated = not realtime and flight.board.hardware is Hardware.NONE
     done = 0
 
     def on_second(t: float) -> None:

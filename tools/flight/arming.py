@@ -10,15 +10,15 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from firmware.core.jit import CACHE_DIR, compiled_signatures
 from firmware.core.vehicle.layout import G
 from firmware.core.vehicle.seawater import water_density
-from hal.ports import SLOTS, BoardError, Validity, empty_frame
+from hal.ports import SLOTS, BoardError, Hardware, Validity, empty_frame
 from tools.data.errors import InputError
+from tools.flight.compose import Flight
 
 LISTEN_S = 0.4
 ZERO_M = 0.5  # of depth by pressure, at the surface
@@ -44,7 +44,7 @@ class Refused(Exception):
 class Arming:
     """The checks of one flight. `folder`: where its log goes, None without one; `hardware`: a real vehicle."""
 
-    def __init__(self, flight: Any, *, folder: Path | None, hardware: bool):
+    def __init__(self, flight: Flight, *, folder: Path | None, hardware: bool):
         self.flight, self.folder, self.hardware = flight, folder, hardware
         self.frame = empty_frame()
 
@@ -82,14 +82,10 @@ class Arming:
 
     # --- the checks -------------------------------------------------------------------------------------------------
     def calibration(self) -> str:
-        look = getattr(self.flight.board, "check_calibration", None)
-        if look is None:
-            return "simulated: none"
-        look()
-        return "as accepted"
+        return self.flight.board.check_calibration()
 
     def devices(self) -> str:
-        silent = self.flight.board.silent() if hasattr(self.flight.board, "silent") else []
+        silent = self.flight.board.silent()
         bad = [name for name in FITTED if self.frame[SLOTS[name].validity] != Validity.VALID]
         bad += [name for name in FITTED if not np.isfinite(self.frame[SLOTS[name].values]).all() and name not in bad]
         if silent or bad:
@@ -172,9 +168,9 @@ def refuse(checks: list[Check]) -> None:
         raise BoardError("; ".join(reasons))
 
 
-def arm(flight: Any, *, log: Path | None) -> list[Check]:
+def arm(flight: Flight, *, log: Path | None) -> list[Check]:
     """The checks of a flight on an open board; BoardError where one refuses. Simulated boards are not asked."""
-    if not hasattr(flight.board, "links"):
+    if flight.board.hardware is Hardware.NONE:
         return []
     folder = None if log is None else log.resolve().parent
     if folder is not None and not folder.is_dir():

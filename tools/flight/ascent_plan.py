@@ -1,19 +1,18 @@
 """A plan for the out-of-band process, made of a board file at arming."""
 
-from typing import Any
-
 from hal.boardfile import DeviceFile, DriveTable, WireTable, preset_of
+from hal.devices import DeviceBoard
 from hal.outofband.plan import AxisPlan, Plan, ServoPlan, WirePlan
 
 NEAR_M = 0.0005  # an actuator so near its end has arrived
 
 
-def make_plan(board: Any, *, flight: str, watchdog: str = "", give_up_s: float = 0.0) -> Plan:
-    """`board` is a DeviceBoard: its file's addresses, and the ends that its drivers would not pass either."""
+def make_plan(board: DeviceBoard, *, flight: str, watchdog: str = "", give_up_s: float = 0.0) -> Plan:
+    """The board file's addresses, and the ends that its drivers would not pass either."""
     file, source = board.file, board.source
     axes = tuple(
-        _axis(file, source, name, wire, getattr(board, name).limits[0] / getattr(board, name).unit)
-        for name, wire in (("ballast", "plunger_wire"), ("slider", "slider_wire"))
+        _axis(file, source, drive.name, wire, drive.limits[0] / drive.unit)
+        for drive, wire in ((board.ballast, "plunger_wire"), (board.slider, "slider_wire"))
     )
     port = file.port[file.servo.port]
     servo = ServoPlan(

@@ -19,7 +19,7 @@ from firmware.supervisor.supervisor import Supervisor
 from firmware.supervisor.table import Reaction
 from firmware.telemetry import TICK
 from hal.board import BoardRequest, board_builder, board_kinds
-from hal.ports import BoardError
+from hal.ports import Board, BoardError, Hardware
 from hal.recorder.schema import DEBUG, ERROR, FATAL, INFO, WARN
 from tools.data.errors import InputError
 from tools.data.sources import load_mission, load_vehicle, read_text
@@ -48,7 +48,7 @@ class Flight:
 
     vehicle: Vehicle
     mission: Mission
-    board: Any  # hal.ports.Board, and of a simulated one its world and truth
+    board: Board
     autopilot: Autopilot
     supervisor: Supervisor
     texts: dict[str, str]
@@ -66,7 +66,7 @@ class Flight:
     @property
     def twinned(self) -> bool:
         """Whether the devices are twins that the board itself starts: nothing real moves."""
-        return hasattr(self.board, "control")
+        return self.board.hardware is Hardware.TWINNED
 
 
 def load_board_file(wanted: str) -> BoardFile:
@@ -130,7 +130,7 @@ def build_flight(
         site_depth=the_mission.site.depth_m, water_density=water_density(0.0, 20.0, the_mission.site.salinity),
         effects=effects or {},
     )  # fmt: skip
-    the_board: Any = board_builder(board_file.kind)(request)
+    the_board = board_builder(board_file.kind)(request)
     C = configuration(
         the_vehicle, the_mission, dt=1.0 / the_board.loop_hz, periods=the_board.periods,
         surface_pressure=the_board.surface_pressure,
@@ -169,24 +169,17 @@ def log_metadata(flight: Flight, *, seed: int, effects: dict[str, dict[str, floa
 
 def record_specs(flight: Flight) -> tuple:
     """What this flight records: the ticks, and the plant's truth where there is a plant."""
-    if hasattr(flight.board, "truth_recorder"):
-        from sim_backend.board import TRUTH
-
-        return (TICK, TRUTH)
-    return (TICK,)
+    return (TICK, *flight.board.records)
 
 
 def build_runtime(flight: Flight, recorder: Any) -> Runtime:
     """The loop, recording into `recorder`; the board is open, for that is when a real clock starts."""
-    extras: tuple = ()
-    if hasattr(flight.board, "truth_recorder"):
-        extras = (flight.board.truth_recorder(recorder.channel("/truth")),)
-
     def on_news(t: float, reaction: Reaction, text: str) -> None:
         recorder.event(t, SEVERITIES[reaction], text)
 
     return Runtime(
-        flight.board, flight.autopilot, flight.supervisor, recorder.channel("/tick"), extras=extras, on_news=on_news
+        flight.board, flight.autopilot, flight.supervisor, recorder.channel("/tick"),
+        extras=flight.board.recording(recorder.channel), on_news=on_news,
     )
 
 

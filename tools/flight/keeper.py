@@ -16,6 +16,7 @@ from typing import Any
 
 from firmware.core.supervision.supervisor_layout import RECORDER
 from hal import heartbeat as hb
+from hal.devices import DeviceBoard
 from hal.heartbeat import Guard, Heartbeat, Held, Status
 from hal.notify import notify
 from hal.outofband.plan import NAME as PLAN
@@ -24,6 +25,7 @@ from hal.ports import BATTERY, BoardError, Validity
 from hal.recorder.condition import Level
 from hal.state_file import FlightState, Phase, StateFile
 from tools.flight.ascent_plan import make_plan
+from tools.flight.compose import Flight
 
 GUARD_START_S = 10.0
 GUARD_SILENT_S = 3.0
@@ -84,7 +86,7 @@ def told(state: FlightState) -> str:
 class Keeper:
     """A context around one flight on devices. `beat` is an extra of the runtime, `second` for once a second."""
 
-    def __init__(self, flight: Any, recorder: Any, *, name: str, folder: Path | None, twin: bool):
+    def __init__(self, flight: Flight, recorder: Any, *, name: str, folder: Path | None, twin: bool):
         """`folder` takes state and heartbeat; None: the vehicle's own folders, or one for a twin that goes with it."""
         self._flight, self._recorder, self._twin = flight, recorder, twin
         self._own = Path(tempfile.mkdtemp(prefix="glider-run-")) if twin and folder is None else None
@@ -109,6 +111,8 @@ class Keeper:
         """Before the board opens: plan, out-of-band process, state. BoardError says what is missing."""
         assert self._pulse is not None
         board = self._flight.board
+        if not isinstance(board, DeviceBoard):
+            raise BoardError(f"board '{board.name}' has no devices to bring up")
         plan = make_plan(
             board, flight=self._name, watchdog=os.environ.get("GLIDER_WATCHDOG", ""),
             give_up_s=WITHOUT_PORTS_S if self._twin else 0.0,

@@ -7,7 +7,7 @@ import msgspec
 import pytest
 
 from firmware.supervisor.settings import Limits
-from hal.ports import BoardError, Validity
+from hal.ports import BoardError, Hardware, Validity
 from tools.flight import arming
 from tools.flight.arming import Arming, Check, arm, refuse
 from tools.flight.compose import build_flight
@@ -131,6 +131,6 @@ def test_switched_off_nothing_refuses(flight):
 def test_simulated_boards_are_not_asked(flight):
     flight.board.world.x[2] = 2.0
     assert arm(flight, log=None) == []
-    flight.board.links = {}
+    flight.board.hardware = Hardware.TWINNED
     with pytest.raises(BoardError, match="zero depth"):
         arm(flight, log=None)

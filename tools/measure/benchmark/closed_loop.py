@@ -10,6 +10,7 @@ import numpy as np
 
 from firmware.autopilot import CONTROLLERS
 from firmware.core.control.control_layout import CONTROLLER
+from sim_backend.board import world_of
 from sim_backend.core.closed_loop import N_END, N_TRACE, fly
 from tools.flight.compose import build_flight
 from tools.measure.benchmark.registry import Settings
@@ -22,7 +23,7 @@ LONGEST = 50_000  # ticks
 def one_flight(seed: int, controller: str = "pid") -> tuple[int, float]:
     """Ticks of one flight and the processor's seconds they took; two Runge-Kutta steps of 0.01 s a tick."""
     flight = build_flight(mission=MISSION, seed=seed)
-    world, pilot = flight.board.world, flight.autopilot
+    world, pilot = world_of(flight.board), flight.autopilot
     pilot.C[CONTROLLER] = CONTROLLERS[controller]
     trace, end = np.zeros((1, N_TRACE)), np.zeros(N_END)
     before = time.thread_time()
@@ -36,7 +37,7 @@ def one_flight(seed: int, controller: str = "pid") -> tuple[int, float]:
 def autopilot_us(controller: str, ticks: int = 6000) -> tuple[float, float]:
     """Median and 99th percentile of the autopilot's own tick, us, the call from Python in it."""
     flight = build_flight(mission=MISSION)
-    world, pilot, clock = flight.board.world, flight.autopilot, time.perf_counter
+    world, pilot, clock = world_of(flight.board), flight.autopilot, time.perf_counter
     pilot.C[CONTROLLER] = CONTROLLERS[controller]
     took = np.zeros(ticks)
     for number in range(ticks):

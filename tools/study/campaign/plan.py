@@ -144,9 +144,7 @@ class Plan:
         the_mission, sensors = self.missions[mission], self.board.sensors
         base = the_mission.control or self.vehicle.control or Control()
         flown = msgspec.structs.replace(the_mission, control=_control(controller, base))
-        wires = 1.0 / min(sensors.slider_wire.rate_hz, sensors.plunger_wire.rate_hz)
-        periods = {"imu": 1.0 / sensors.imu.rate_hz, "beacon": 1.0 / sensors.beacon.rate_hz, "wires": wires}
-        C = configuration(self.vehicle, flown, dt=self.step, periods=periods)
+        C = configuration(self.vehicle, flown, dt=self.step, periods=sensors.periods)
         return Autopilot(self.vehicle, flown, C, the_mission.name)
 
 

@@ -222,12 +222,12 @@ def memory(megabytes: int):
 
 def leak(samples: float):
     def begin(scene: Scene) -> None:
-        scene.board.leak._port.value = 1.0
+        scene.broken.leak.value = 1.0
         end = scene.world.time + 0.2 * samples
 
         def dry(scene: Scene, t: float) -> None:
             if t >= end - 0.01:
-                scene.board.leak._port.value = 0.0
+                scene.broken.leak.value = 0.0
 
         scene.each_tick = dry
 
@@ -236,7 +236,7 @@ def leak(samples: float):
 
 def voltage(volts: float):
     def begin(scene: Scene) -> None:
-        scene.board.battery._port.value = volts
+        scene.broken.battery.value = volts
 
     return begin
 
@@ -245,7 +245,7 @@ def pump_fails_in_abort(kind: str):
     """The operator gives the dive up, and the pump does not bring the vehicle up."""
 
     def begin(scene: Scene) -> None:
-        scene.board.ballast.begin(kind)
+        scene.broken.pump.begin(kind)
         scene.pilot.give_up()
 
     return begin

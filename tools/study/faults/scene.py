@@ -18,8 +18,10 @@ from firmware.supervisor.supervisor import Supervisor
 from firmware.supervisor.table import Reaction
 from firmware.telemetry import TICK
 from hal.recorder.recorder import NullRecorder
-from sim_backend.faults import SimulatedEscape, break_in
-from tools.flight.compose import build_flight
+from sim_backend.board import SimBoard
+from sim_backend.faults import Broken, break_in
+from sim_backend.world import World
+from tools.flight.compose import Flight, build_flight
 
 PHASES = ("waiting", "descent", "level", "ascent", "surface")
 SURFACED_M = 0.5
@@ -51,8 +53,8 @@ controller = "{controller}"
 class Scene:
     """A flight with its broken-in board. `since`: when the fault began, s; None: not yet."""
 
-    flight: Any
-    escape: SimulatedEscape
+    flight: Flight
+    broken: Broken
     phase: str
     begin: Callable[["Scene"], None]
     since: float | None = None
@@ -63,8 +65,10 @@ class Scene:
     notes: dict[str, Any] = field(default_factory=dict)
 
     @property
-    def board(self) -> Any:
-        return self.flight.board
+    def board(self) -> SimBoard:
+        board = self.flight.board
+        assert isinstance(board, SimBoard)
+        return board
 
     @property
     def supervisor(self) -> Supervisor:
@@ -75,8 +79,8 @@ class Scene:
         return self.flight.autopilot
 
     @property
-    def world(self) -> Any:
-        return self.flight.board.world
+    def world(self) -> World:
+        return self.board.world
 
     @property
     def depth(self) -> float:
@@ -156,6 +160,7 @@ def build_scene(phase: str, begin: Callable[[Scene], None], setting: Setting, se
         flight.autopilot, flight.vehicle, flight.mission, dt=1.0 / flight.board.loop_hz, periods=flight.board.periods,
         restarted=setting.restarted,
     )  # fmt: skip
+    assert isinstance(flight.board, SimBoard)
     scene = Scene(flight, break_in(flight.board), phase, begin)
     if phase == "waiting":
         scene.since = 0.0

@@ -3,7 +3,6 @@
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from firmware.supervisor.settings import Limits
 from hal.strict import ConfigError
@@ -17,6 +16,7 @@ def arming(kind: str) -> Callable[[bool, Path], Came]:
         import msgspec
 
         from hal.board import BoardRequest, board_builder
+        from sim_backend.board import world_of
         from tools.flight.arming import Arming
         from tools.flight.compose import build_flight, load_board_file
 
@@ -25,7 +25,7 @@ def arming(kind: str) -> Callable[[bool, Path], Came]:
         limits = None if kind == "limits unset" else Limits(working_depth_m=50.0)
         flight.vehicle = msgspec.structs.replace(flight.vehicle, limits=limits)
         if kind == "depth not zero":
-            flight.board.world.x[2] = 3.0
+            world_of(flight.board).x[2] = 3.0
         if kind in ("never calibrated", "wrong hash"):
             file = load_board_file("twin")
             old, new = {
@@ -34,8 +34,8 @@ def arming(kind: str) -> Callable[[bool, Path], Came]:
             }[kind]
             text = file.text.replace(old, new)
             request = BoardRequest(text=text, source="board.toml", vehicle=flight.vehicle)
-            doubtful: Any = board_builder("twin")(request)
-            flight.board.check_calibration = doubtful.check_calibration
+            doubtful = board_builder("twin")(request)
+            flight.board.check_calibration = doubtful.check_calibration  # type: ignore[method-assign]
             doubtful.close()
         checks = Arming(flight, folder=folder, hardware=True).run(disabled)
         refused = any(not check.passed for check in checks)
