@@ -6,11 +6,14 @@ over all of these: an edit behind the bench's back is seen, and the board does n
 
 import hashlib
 import json
-from typing import Annotated, Literal
+from collections.abc import Callable
+from importlib import import_module
+from typing import Annotated, Any, Literal
 
 import msgspec
 
-from hal.protocols.registers import RegisterMap, preset
+from hal.ports import SLOTS
+from hal.protocols.registers import RegisterMap, Role, preset, presets
 from hal.strict import ConfigError, Table, decode
 
 Positive = Annotated[float, msgspec.Meta(gt=0.0)]
@@ -50,7 +53,6 @@ class DeviceTable(Table):
 class ImuTable(DeviceTable):
     """[imu]. `mount_deg`: roll, pitch and yaw of the sensor in a level hull; `output`: the sensor's serial port."""
 
-    device: Literal["vn100"]
     rate_hz: Annotated[float, msgspec.Meta(ge=1.0, le=200.0)] = 100.0
     output: Literal[1, 2, 3] = 2
     mount_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -118,7 +120,6 @@ class BatteryTable(DeviceTable):
 class ServoTable(DeviceTable):
     """[servo]: pulse in us = zero_us + us_per_rad * angle, within limits_us."""
 
-    device: Literal["maestro"]
     channel: Annotated[int, msgspec.Meta(ge=0, le=23)]
     us_per_rad: float
     zero_us: Annotated[float, msgspec.Meta(ge=500.0, le=2500.0)]
@@ -184,8 +185,13 @@ class DeviceFile(Table):
     calibration: str = ""  # hash of what was calibrated and looked through; empty: never
 
 
-DEVICES = ("imu", "beacon", "slider_wire", "plunger_wire", "leak", "battery", "servo", "slider", "ballast")
-ROLES = {
+# Devices that speak a protocol of their own on a port of their own: place on the board -> name -> who builds its
+# driver, loaded when a board file asks for it. What speaks Modbus is a register map of the role that its place takes.
+DRIVERS = {
+    "imu": {"vn100": "hal.drivers.vn100:build"},
+    "servo": {"maestro": "hal.drivers.maestro:build"},
+}
+ROLES: dict[str, tuple[Role, ...]] = {
     "beacon": ("pressure",), "slider_wire": ("analog", "encoder"), "plunger_wire": ("analog", "encoder"),
     "leak": ("analog",), "battery": ("analog",), "slider": ("drive",), "ballast": ("drive",),
 }  # fmt: skip
@@ -193,21 +199,37 @@ ROLES = {
 
 def devices_of(file: DeviceFile) -> dict[str, DeviceTable]:
     """The tables of the devices that are fitted, by their place on the board."""
-    return {name: table for name in DEVICES if (table := getattr(file, name)) is not None}
+    return {name: table for name in SLOTS if (table := getattr(file, name)) is not None}
+
+
+def known_devices(place: str) -> list[str]:
+    """Names of the devices that may stand in a place of the board."""
+    maps = [name for name in presets() if preset(name).role in ROLES.get(place, ())]
+    return [*DRIVERS.get(place, ()), *maps]
+
+
+def driver_builder(place: str, device: str) -> Callable[..., Any]:
+    """The function that builds the driver of a device with a port of its own, from its table, its port's and the
+    vehicle."""
+    module, _, name = DRIVERS[place][device].partition(":")
+    return getattr(import_module(module), name)
 
 
 def preset_of(file: DeviceFile, name: str, source: str) -> RegisterMap:
     """The register map of a Modbus device; ConfigError where it is none or of another sort."""
     table = getattr(file, name)
-    try:
-        found = preset(table.device)
-    except ConfigError as error:
-        if table.device.endswith(".toml"):
-            raise  # it names that file
-        raise ConfigError(source, error.message, key=f"{name}.device") from None
+    own = table.device.endswith(".toml")
+    if not own and table.device not in presets():
+        raise _unknown(source, name, table.device)
+    found = preset(table.device)
     if found.role not in ROLES[name]:
         raise ConfigError(source, f"'{table.device}' is no {' or '.join(ROLES[name])}", key=f"{name}.device")
     return found
+
+
+def _unknown(source: str, place: str, device: str) -> ConfigError:
+    known = ", ".join(known_devices(place))
+    return ConfigError(source, f"no device '{device}'; known: {known}", key=f"{place}.device")
 
 
 def calibration_hash(file: DeviceFile) -> str:
@@ -227,9 +249,11 @@ def check(file: DeviceFile, source: str) -> None:
     for name, table in devices_of(file).items():
         if table.port not in file.port:
             raise ConfigError(source, f"no [port.{table.port}]", key=f"{name}.port")
+        if name in DRIVERS and table.device not in DRIVERS[name]:
+            raise _unknown(source, name, table.device)
         users.setdefault(table.port, []).append(name)
     for port, names in users.items():
-        alone = [name for name in names if name in ("imu", "servo")]
+        alone = [name for name in names if name in DRIVERS]
         others = [name for name in names if name != alone[0]] if alone else []
         if others:
             raise ConfigError(source, f"shares port '{port}' with {', '.join(others)}", key=f"{alone[0]}.port")

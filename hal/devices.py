@@ -16,8 +16,7 @@ from hal.drivers.drive import Drive
 from hal.drivers.maestro import Servo
 from hal.drivers.modbus_sensors import AnalogModule, Beacon, EncoderWire, Input, battery, leak, wire
 from hal.drivers.samples import Sensor
-from hal.drivers.vn100 import Vn100
-from hal.ports import Board, BoardError, Hardware, OutOfBand, Validity
+from hal.ports import ACTUATORS, SENSORS, Board, BoardError, Hardware, OutOfBand, Validity
 from hal.protocols.modbus_master import ModbusBus
 from hal.recorder.schema import RecordSpec
 from hal.transport.hub import Hub, LineHandler, Link
@@ -26,8 +25,6 @@ from hal.transport.port import SerialPort, Unplugged
 GUARD_S = 0.001  # before a deadline, in which ports are left alone
 FIRST_ANSWER_S = 4.0  # for every device to answer after opening
 STOPPING_S = 0.15
-SENSORS = ("imu", "beacon", "slider_wire", "plunger_wire", "leak", "battery")
-ACTUATORS = ("servo", "slider", "ballast")
 
 
 class ServingClock(MonotonicClock):
@@ -52,7 +49,7 @@ class DeviceBoard:
     drop_weight = watchdog = None
     hardware = Hardware.REAL
     records: tuple[RecordSpec, ...] = ()
-    imu: Vn100
+    imu: Sensor
     beacon: Beacon
     slider_wire: Input
     plunger_wire: Input
@@ -72,6 +69,7 @@ class DeviceBoard:
             "wires": 1.0 / min(file.slider_wire.rate_hz, file.plunger_wire.rate_hz),
         }
         self.buses: dict[str, ModbusBus] = {}
+        self._handlers: dict[str, LineHandler] = {}  # by port
         self._build(file, source, vehicle, water_density)
         self.sensors: dict[str, Sensor] = {name: port for name in SENSORS if (port := getattr(self, name)) is not None}
         self.actuators: dict[str, Servo | Drive] = {name: getattr(self, name) for name in ACTUATORS}
@@ -85,7 +83,11 @@ class DeviceBoard:
         presets = {
             name: boardfile.preset_of(file, name, source) for name in boardfile.ROLES if getattr(file, name) is not None
         }
-        self.imu = Vn100(file.imu, file.port[file.imu.port].baud)
+        for name in boardfile.DRIVERS:
+            table = getattr(file, name)
+            driver = boardfile.driver_builder(name, table.device)(table, file.port[table.port], vehicle)
+            setattr(self, name, driver)
+            self._handlers[table.port] = driver
         self.beacon = Beacon(file.beacon, presets["beacon"])
         self._bus(file.beacon.port).add(self.beacon.poll)
         self.slider_wire, self.plunger_wire = (
@@ -94,7 +96,6 @@ class DeviceBoard:
         self.leak = None if file.leak is None else leak(file.leak)
         self.battery = None if file.battery is None else battery(file.battery)
         self._build_inputs(presets)
-        self.servo = Servo(file.servo, vehicle.actuators.servo.range)
         kg_per_m = density * vehicle.actuators.ballast.plunger_area
         for name, unit, feedback in (("slider", 1.0, self.slider_wire), ("ballast", kg_per_m, self.plunger_wire)):
             table, limits = getattr(file, name), getattr(vehicle.actuators, name).range
@@ -123,16 +124,12 @@ class DeviceBoard:
         if port not in self.buses:
             table = self.file.port[port]
             self.buses[port] = ModbusBus(table.baud, timeout_s=table.timeout_s, longest_s=table.longest_s)
+            self._handlers[port] = self.buses[port]
         return self.buses[port]
 
     def _link(self, name: str) -> Link:
         table = self.file.port[name]
-        handlers: dict[str, LineHandler] = {
-            self.file.imu.port: self.imu,
-            self.file.servo.port: self.servo,
-            **self.buses,
-        }
-        return Link(name, SerialPort(table.path, table.baud), handlers[name])
+        return Link(name, SerialPort(table.path, table.baud), self._handlers[name])
 
     # --- opening and closing ----------------------------------------------------------------------------------------
     def open(self) -> None:

@@ -83,6 +83,8 @@ SLOTS = {
     "slider": Slot(SLIDER, ("condition",), ("1",)),
     "ballast": Slot(BALLAST, ("condition",), ("1",)),
 }
+ACTUATORS = tuple(name for name, slot in SLOTS.items() if slot.names == ("condition",))
+SENSORS = tuple(name for name in SLOTS if name not in ACTUATORS)
 
 
 def empty_frame() -> np.ndarray:

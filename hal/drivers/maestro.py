@@ -6,8 +6,9 @@ what errors it counts. Its serial timeout is the dead-man: the target is sent te
 
 import math
 from collections.abc import Callable
+from typing import Any
 
-from hal.boardfile import ServoTable
+from hal.boardfile import PortTable, ServoTable
 from hal.drivers.samples import Health, State
 from hal.ports import SLOTS, Condition
 from hal.protocols import maestro
@@ -18,6 +19,11 @@ ASK_S = 0.2
 ANSWER_S = 0.08
 LOST_AFTER = 2  # unanswered questions
 EXPECTED = maestro.MaestroError.TIMEOUT | maestro.MaestroError.SIGNAL  # left over from before, or a reset
+
+
+def build(table: ServoTable, port: PortTable, vehicle: Any) -> "Servo":
+    """The driver of a board file's [servo], within the vehicle's range."""
+    return Servo(table, vehicle.actuators.servo.range)
 
 
 class Servo:

@@ -72,6 +72,7 @@ class Sensor:
     def __init__(self, name: str, slot: Slot, period: float, ranges: Sequence[tuple[float, float]]):
         self.name, self.period = name, period
         self.health = Health(name)
+        self.model = ""  # as the device names itself, where it does
         self._ranges = tuple(ranges)
         self._slot = np.full(2 + len(slot.names), np.nan)
         self._slot[1] = Validity.MISSING

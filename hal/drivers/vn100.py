@@ -2,10 +2,11 @@
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
-from hal.boardfile import ImuTable
+from hal.boardfile import ImuTable, PortTable
 from hal.drivers.samples import Sensor
 from hal.ports import SLOTS
 from hal.protocols import vn100
@@ -34,6 +35,11 @@ def euler(R: np.ndarray) -> tuple[float, float, float]:
     )  # fmt: skip
 
 
+def build(table: ImuTable, port: PortTable, vehicle: Any) -> "Vn100":
+    """The driver of a board file's [imu]."""
+    return Vn100(table, port.baud)
+
+
 class Vn100(Sensor):
     """Sensor port and line handler in one. Sample times: arrival less time on the line and the file's delay."""
 
@@ -48,7 +54,6 @@ class Vn100(Sensor):
         level = table.mount_deg == (0.0, 0.0, 0.0)
         self._R_bd = None if level else rotation(*(math.radians(angle) for angle in table.mount_deg))
         self.decoder = vn100.Vn100Decoder()
-        self.model = ""
         self.errors = self._bad = 0
         self._send: Callable[[bytes], bool] = lambda data: False
         self._heard_at = self._asked_at = -math.inf

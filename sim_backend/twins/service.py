@@ -20,6 +20,7 @@ import msgspec
 
 from firmware.model.vehicle import Vehicle
 from hal import boardfile
+from hal.strict import ConfigError
 from sim_backend.twins.boardfile import TwinFile, decode_twin_file
 from sim_backend.twins.faults import Fault, FaultError, parse_fault
 from sim_backend.twins.modbus_devices import AnalogTwin, DriveTwin, EncoderTwin, PressureTwin, RegisterTwin
@@ -27,6 +28,7 @@ from sim_backend.twins.modbus_line import ModbusTwin
 from sim_backend.twins.plant import BALLAST, SLIDER, TwinPlant
 from sim_backend.twins.serial_devices import MaestroTwin, Vn100Twin
 
+LINE_TWINS = {"vn100": Vn100Twin, "maestro": MaestroTwin}  # by the names of hal.boardfile.DRIVERS
 STEP_S = 0.01
 FALL_BEHIND_S = 1.0  # past which the plant's time stands rather than runs after the clock
 HELP = (
@@ -44,10 +46,7 @@ class TwinService:
         self.slips = 0
         self._rng = random.Random(seed)
         self._stopping = asyncio.Event()
-        self.imu = Vn100Twin(folder / file.imu.port, file.port[file.imu.port], file.imu, self.plant, self._rng)
-        self.servo = MaestroTwin(
-            folder / file.servo.port, file.port[file.servo.port], file.servo, self.plant, self._rng
-        )
+        self.imu, self.servo = (self._line_twin(name, source) for name in boardfile.DRIVERS)
         self.registers: dict[str, RegisterTwin] = {}  # by place on the board
         self._modules: dict[tuple[str, int], AnalogTwin] = {}
         self.drives: dict[str, DriveTwin] = {}
@@ -57,6 +56,13 @@ class TwinService:
         self.modbus = {
             port: self._modbus_twin(port) for port in file.port if port not in (file.imu.port, file.servo.port)
         }
+
+    def _line_twin(self, name: str, source: str) -> Any:
+        table = getattr(self.file, name)
+        if table.device not in LINE_TWINS:
+            raise ConfigError(source, f"'{table.device}' has no twin", key=f"{name}.device")
+        line = self.file.port[table.port]
+        return LINE_TWINS[table.device](self.folder / table.port, line, table, self.plant, self._rng)
 
     def _register_twin(self, name: str, source: str) -> RegisterTwin:
         table, found = getattr(self.file, name), boardfile.preset_of(self.file, name, source)

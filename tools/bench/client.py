@@ -10,7 +10,8 @@ import time
 from pathlib import Path
 from typing import Any
 
-from tools.bench.units import ACTUATORS, from_port, to_port
+from hal.ports import ACTUATORS
+from tools.bench.units import from_port, to_port
 from tools.data.errors import InputError
 
 BEAT_S = 0.5

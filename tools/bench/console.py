@@ -17,10 +17,11 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+from hal.ports import ACTUATORS
 from tools.bench.client import Bench, BenchError
 from tools.bench.commands import Commands
 from tools.bench.desk import UsageError
-from tools.bench.units import ACTUATORS, WIRES
+from tools.bench.units import WIRES
 from tools.data.errors import BAD_INPUT, DONE, FAILED
 
 HISTORY = "GLIDER_BENCH_HISTORY"

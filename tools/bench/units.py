@@ -9,7 +9,6 @@ from typing import Any
 from hal.ports import SLOTS
 from hal.units import UNITS as SI
 
-ACTUATORS = ("servo", "slider", "ballast")
 UNITS = {"servo": "deg", "slider": "mm", "ballast": "mm"}
 WIRES = {"slider": "slider_wire", "ballast": "plunger_wire"}
 SHOWN = {"rad": "deg", "rad/s": "deg/s", "m": "mm", "Pa": "kPa", "1": ""}  # a port's unit as a person reads it

@@ -1,12 +1,15 @@
 """Board files: strict, checked across tables, and hashed."""
 
 from importlib.resources import files
+from pathlib import Path
 
 import pytest
 
-from hal.boardfile import calibration_hash, decode_device_file
+from hal.boardfile import DRIVERS, calibration_hash, decode_device_file, driver_builder, known_devices
+from hal.ports import SLOTS
 from hal.strict import ConfigError
 from sim_backend.twins.boardfile import decode_twin_file, simulated_text
+from sim_backend.twins.service import LINE_TWINS
 
 TEXT = files("hal").joinpath("boards", "roughie.toml").read_text(encoding="utf-8")
 TWIN = files("sim_backend").joinpath("boards", "twin.toml").read_text(encoding="utf-8")
@@ -31,9 +34,9 @@ REFUSED = [
     ("channel = 1\n", "", "slider_wire.channel: missing key"),
     ("channel = 2", "channel = 1", "plunger_wire.id: is slider_wire's on port 'sensors' too"),
     ("id = 8", "id = 7", "ballast.id: is slider's on port 'drives' too"),
-    ('device = "keller-33x"', 'device = "keller"', "beacon.device: no device 'keller'; known: draw-wire-encoder"),
+    ('device = "keller-33x"', 'device = "keller"', "beacon.device: no device 'keller'; known: keller-33x"),
     ('device = "keller-33x"', 'device = "leadshine-cs2rs"', "beacon.device: 'leadshine-cs2rs' is no pressure"),
-    ('device = "vn100"', 'device = "vn300"', "imu.device: invalid enum value 'vn300'"),
+    ('device = "vn100"', 'device = "vn300"', "imu.device: no device 'vn300'; known: vn100"),
     ('[slider]                        # positive: mass forward\ndevice = "leadshine-cs2rs"\nport = "drives"',
      '[slider]\ndevice = "leadshine-cs2rs"\nport = "imu"', "imu.port: shares port 'imu' with slider"),
     ('port = "servo"', 'port = "rudder"', r"servo.port: no \[port.rudder\]"),
@@ -84,3 +87,12 @@ def test_the_simulated_board_of_a_twin_has_its_rates_and_reads():
     assert 0.002 < file.sensors.beacon.delay_s < 0.01
     assert file.environment.temperature_c == 12.0
     assert file.environment.wave[0].height_m == 0.3
+
+
+def test_every_device_that_a_board_file_may_name_stands_in_the_documents_and_has_a_driver():
+    rows = [f"| `[{place}]` | {', '.join(f'`{name}`' for name in known_devices(place))} |" for place in SLOTS]
+    document = (Path(__file__).parents[3] / "docs" / "DEVICES.md").read_text(encoding="utf-8")
+    assert "\n".join(rows) in document
+    for place, drivers in DRIVERS.items():
+        assert all(callable(driver_builder(place, name)) for name in drivers)
+        assert set(drivers) <= set(LINE_TWINS)

@@ -35,18 +35,18 @@ def test_a_write_cut_at_any_byte_never_reads_better_than_both(state, before, aft
     old, new = state.paths[0].read_bytes(), encode(FlightState(after, "a flight", "why", 2))
     least = min(before, after)
     every = 1 if (before, after) == (Phase.ASHORE, Phase.ARMED) else 32  # each byte once, the others by samples
-    for place in range(0, BLOCK + 1, every):
-        torn = new[:place] + old[place:]
-        for first, second in ((torn, old), (new, torn)):
-            write_raw(state, 0, first)
-            write_raw(state, 1, second)
+    for index, other in ((0, old), (1, new)):
+        write_raw(state, 1 - index, other)
+        for place in range(0, BLOCK + 1, every):
+            torn = new[:place] + old[place:]
+            write_raw(state, index, torn)
             found = state.read()
             assert found.phase >= least
             if place in (0, BLOCK):
                 assert found.phase in (before, after)
             elif isinstance(decode(torn), str):
                 assert found.must_ascend
-                assert NAMES[0 if first is torn else 1] in found.trouble
+                assert NAMES[index] in found.trouble
     write_raw(state, 0, new)
     write_raw(state, 1, old)  # both whole: the worse
     assert state.read().phase == max(before, after)

@@ -106,11 +106,19 @@ def test_unplugging_is_noticed_and_plugging_in_again_too(tmp_path):
 
 
 def test_serving_ends_at_its_deadline_whatever_the_line_does(pty):
+    """Counted in looks at the clock, which a busy machine does not change: none is left but the round under way, and
+    one that only takes what waits."""
     master, path = pty
-    link, handler, hub = linked(path)
+    looks = []
+
+    def now():
+        looks.append(time.monotonic())
+        return looks[-1]
+
+    link, handler, _ = linked(path)
+    hub = Hub([link], now)
     hub.set_period(0.02)
     link.open(time.monotonic())
-    late = []
     for _ in range(20):
         with_room = True
         while with_room:
@@ -118,13 +126,13 @@ def test_serving_ends_at_its_deadline_whatever_the_line_does(pty):
                 os.write(master, b"\xaa" * 1000)
             except BlockingIOError:
                 with_room = False
-        before = len(handler.data)
-        deadline = time.monotonic() + 0.02
-        hub.serve(deadline)
-        late.append(time.monotonic() - deadline)
+        before, begin = len(handler.data), time.monotonic()
+        looks.clear()
+        hub.serve(begin + 0.02)
+        assert sum(at >= begin + 0.02 for at in looks) <= 9
         # bounded work: twice the line rate, what is spare, and the chunk that was under way
-        assert len(handler.data) - before <= SPARE + 0.2 * 115_200 * 0.045 + 1024
-    assert sorted(late)[10] < 0.003
+        passed = time.monotonic() - begin + 0.02
+        assert len(handler.data) - before <= SPARE + 0.2 * 115_200 * passed + 1024
     link.port.close()
 
 
