@@ -71,9 +71,11 @@ def fly(
     from hal.state_file import Phase
     from tools.data.errors import InputError
     from tools.flight.compose import build_flight, log_metadata, parse_effects, record_specs
+    from tools.flight.precompile import ensure_compiled
     from tools.flight.terminal import Stop, confirm_arming, undisturbed
 
     wanted = parse_effects(effects)
+    ensure_compiled(say, progress)
     try:
         flight = build_flight(
             mission=mission, vehicle=vehicle, board=board, seed=seed, realtime=realtime, effects=wanted
