@@ -6,7 +6,9 @@ STAMP := $(VENV)/.installed
 
 .PHONY: setup demo test check lint types contract benchmark deploy clean
 
+# Kernels are compiled here, with a word about it, and again only when they change.
 setup: $(STAMP)
+	@$(BIN)/glider check --compile
 
 # pip runs again only when the dependencies change.
 $(STAMP): pyproject.toml constraints.txt

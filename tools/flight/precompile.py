@@ -52,7 +52,7 @@ def is_compiled() -> bool:
 
 
 def ensure_compiled(say: Callable[[str], None], progress: Progress) -> None:
-    """Compile what a flight needs unless it is there, with a word about it and a bar; once, however many ask at once."""
+    """Compile what a flight needs unless it is there, with a word and a bar; once, however many ask at once."""
     stamp = _stamp()
     if stamp is None or stamp.exists():
         return
