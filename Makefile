@@ -20,8 +20,9 @@ $(STAMP): pyproject.toml constraints.txt
 demo: setup
 	@$(BIN)/python -m tools.measure.demo
 
+# A file's tests stay with one worker: what they share is flown once, and its kernels are compiled once.
 test: setup
-	$(BIN)/python -m pytest -n 2 -m 'not realtime'
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m 'not realtime'
 	$(BIN)/python -m pytest -m realtime
 
 check: setup lint types contract test

@@ -11,6 +11,7 @@ import time
 
 import numpy as np
 import pytest
+from support import commands
 
 from tools.study.campaign.conduct import fly_campaign
 from tools.study.campaign.plan import build_plan, load_campaign, with_options
@@ -153,7 +154,7 @@ def test_what_a_person_sees(tmp_path):
     ],
 )
 def test_bad_input_is_one_line_and_exit_code_2(arguments, said, tmp_path):
-    done = glider(*arguments, cwd=tmp_path)
+    done = commands.glider("campaign", *arguments, cwd=tmp_path)
     assert done.returncode == 2
     assert said in done.stderr
     assert "Traceback" not in done.stderr

@@ -5,13 +5,12 @@ files. CALLS.json holds `calls` (a list of arguments each) and `blocked`: module
 starts, shall not find.
 """
 
-import contextlib
-import io
 import json
 import os
 import sys
-import traceback
 from pathlib import Path
+
+from commands import glider
 
 HIDE = "import os, sys\nsys.modules.update(dict.fromkeys(os.environ['GLIDER_HIDDEN'].split(), None))\n"
 
@@ -26,25 +25,14 @@ def hide(modules: list[str]) -> None:
     sys.modules.update(dict.fromkeys(modules, None))
 
 
-def call(arguments: list[str]) -> dict:
-    """One command: its exit code (None: it ended in a traceback), standard output and standard error."""
-    from tools.cli.common import report_errors
-    from tools.cli.main import cli
-
-    out, err = io.StringIO(), io.StringIO()
-    sys.argv, sys.stdin, code = ["glider", *arguments], io.StringIO("\n" * 100), None
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-        try:
-            code = report_errors(cli)
-        except BaseException:
-            traceback.print_exc()
-    return {"arguments": arguments, "code": code, "out": out.getvalue(), "err": err.getvalue()}
-
-
 def main() -> None:
     asked = json.loads(Path(sys.argv[1]).read_text())
     hide(asked["blocked"])
-    print(json.dumps([call(arguments) for arguments in asked["calls"]]))
+    found = []
+    for arguments in asked["calls"]:
+        done = glider(*arguments, cwd=Path.cwd(), lines="\n" * 100)
+        found.append({"arguments": arguments, "code": done.returncode, "out": done.stdout, "err": done.stderr})
+    print(json.dumps(found))
 
 
 if __name__ == "__main__":

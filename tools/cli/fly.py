@@ -75,13 +75,13 @@ def fly(
     from tools.flight.terminal import Stop, confirm_arming, undisturbed
 
     wanted = parse_effects(effects)
-    ensure_compiled(say, progress)
     try:
         flight = build_flight(
             mission=mission, vehicle=vehicle, board=board, seed=seed, realtime=realtime, effects=wanted
         )
     except BoardError as error:
         raise InputError(str(error), source=board) from None
+    ensure_compiled(say, progress)
     if flight.control.controller != "pid":
         for axis in flight.cover:
             if not axis.covered:

@@ -2,8 +2,6 @@
 
 import json
 import math
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -11,6 +9,7 @@ from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from log_files import METADATA, TICK, VEHICLE, tick_rows, write_small_log
+from support.commands import glider
 
 from firmware.model.strict import ConfigError
 from tools.cli.log import log as command
@@ -210,9 +209,7 @@ def test_repair_on_the_command_line(small_log, tmp_path):
 def test_wrong_input_ends_in_one_line_and_code_2(tmp_path):
     (tmp_path / "x.mcap").write_text("no log")
     for arguments in (["info", "x.mcap"], ["export", "nowhere.mcap"], ["repair", "."], ["export", "."]):
-        done = subprocess.run(
-            [sys.executable, "-m", "tools.cli.main", "log", *arguments], cwd=tmp_path, capture_output=True, text=True
-        )
+        done = glider("log", *arguments, cwd=tmp_path)
         assert done.returncode == 2
         assert len(done.stderr.splitlines()) == 1
         assert done.stdout == ""
