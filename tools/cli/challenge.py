@@ -85,7 +85,7 @@ def score(
     no_closed: bool,
     as_json: bool,
 ) -> None:
-    """Open the sealed answers, check them against the manifest, and score the diagnoses by GAP.md's figures."""
+    """Open the sealed answers, check them against the manifest, and score the diagnoses (docs/CHALLENGE.md)."""
     from tools.data.errors import InputError, need
     from tools.study.challenge.judge import judge
 
