@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: setup demo test check lint types contract benchmark deploy clean
+.PHONY: setup demo picture test check lint types contract benchmark deploy clean
 
 # Kernels are compiled here, with a word about it, and again only when they change.
 setup: $(STAMP)
@@ -19,6 +19,12 @@ $(STAMP): pyproject.toml constraints.txt
 
 demo: setup
 	@$(BIN)/python -m tools.measure.demo
+
+# README's picture: the top of the demo's report.
+picture: demo
+	mkdir -p docs/pictures
+	chromium --headless --no-sandbox --disable-gpu --hide-scrollbars --window-size=900,760 \
+	    --screenshot=docs/pictures/diagnosis.png out/demo/diagnosis/report.html
 
 # A file's tests stay with one worker: what they share is flown once, and its kernels are compiled once.
 test: setup

@@ -7,6 +7,7 @@ import time
 from pathlib import Path
 
 OUT = Path("out/demo")
+BOARD = Path(__file__).with_name("demo.toml")
 HIDDEN = "drag:scale=0.4"
 FLIGHTS = ("1", "2", "3")
 
@@ -14,10 +15,11 @@ STEPS: tuple[tuple[str, tuple[tuple[str, ...], ...]], ...] = (
     (
         "Three flights of a vehicle that drags 40 % more than its file says, and nobody is told",
         tuple(
-            ("fly", "--mission", "spiral", "--seed", seed, "--effect", HIDDEN, "--log", f"flight{seed}.mcap")
+            ("fly", "--mission", "spiral", "--board", BOARD.name, "--seed", seed, "--effect", HIDDEN,
+             "--log", f"flight{seed}.mcap")
             for seed in FLIGHTS
         ),
-    ),
+    ),  # fmt: skip
     (
         "Their logs as run data",
         (("log", "export", *(f"flight{seed}.mcap" for seed in FLIGHTS), "--out", "flights"),),
@@ -37,6 +39,7 @@ def main() -> int:
     """Run the steps in OUT; returns the exit code of the first that fails, else 0."""
     shutil.rmtree(OUT, ignore_errors=True)
     OUT.mkdir(parents=True)
+    shutil.copy(BOARD, OUT)
     begin = time.monotonic()
     for number, (title, commands) in enumerate(STEPS, start=1):
         print(f"\n{number}. {title}", flush=True)
