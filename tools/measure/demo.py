@@ -9,28 +9,22 @@ from pathlib import Path
 OUT = Path("out/demo")
 BOARD = Path(__file__).with_name("demo.toml")
 HIDDEN = "drag:scale=0.4"
-FLIGHTS = ("1", "2", "3")
+LOGS = ("flight1.mcap", "flight2.mcap", "flight3.mcap")
+FLY = f"fly --mission spiral --board {BOARD.name} --effect {HIDDEN}"
 
-STEPS: tuple[tuple[str, tuple[tuple[str, ...], ...]], ...] = (
+STEPS: tuple[tuple[str, tuple[str, ...]], ...] = (
     (
         "Three flights of a vehicle that drags 40 % more than its file says, and nobody is told",
-        tuple(
-            ("fly", "--mission", "spiral", "--board", BOARD.name, "--seed", seed, "--effect", HIDDEN,
-             "--log", f"flight{seed}.mcap")
-            for seed in FLIGHTS
-        ),
-    ),  # fmt: skip
-    (
-        "Their logs as run data",
-        (("log", "export", *(f"flight{seed}.mcap" for seed in FLIGHTS), "--out", "flights"),),
+        tuple(f"{FLY} --seed {seed} --log {log}" for seed, log in enumerate(LOGS, start=1)),
     ),
+    ("Their logs as run data", (f"log export {' '.join(LOGS)} --out flights",)),
     (
         "The gap: root mean square errors of the nominal model, in tolerances",
-        (("gap", "measure", "flights", "--report", "gap.html"),),
+        ("gap measure flights --report gap.html",),
     ),
     (
         "The diagnosis: where the model is wrong, which effect causes it, how far the gap shrinks",
-        (("gap", "diagnose", "flights", "--out", "diagnosis"),),
+        ("gap diagnose flights --out diagnosis",),
     ),
 )
 
@@ -44,8 +38,8 @@ def main() -> int:
     for number, (title, commands) in enumerate(STEPS, start=1):
         print(f"\n{number}. {title}", flush=True)
         for command in commands:
-            print(f"   $ glider {' '.join(command)}", flush=True)
-            done = subprocess.run([sys.executable, "-m", "tools.cli.main", *command], cwd=OUT)
+            print(f"   $ glider {command}", flush=True)
+            done = subprocess.run([sys.executable, "-m", "tools.cli.main", *command.split()], cwd=OUT)
             if done.returncode:
                 return done.returncode
     print(f"\nHidden was {HIDDEN}. The report: {OUT / 'diagnosis' / 'report.html'} (any browser, no network)")
