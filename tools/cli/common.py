@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from tools.data.errors import BAD_INPUT, DONE, FAILED, InputError, MissingExtra
+from tools.data.errors import BAD_INPUT, DONE, FAILED, InputError, MissingExtra, missing_extra
 from tools.data.plain import as_plain
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the result alone, as JSON.")
@@ -76,6 +76,12 @@ def report_errors(command: click.Command) -> int:
         return FAILED
     except (ConfigError, InputError, MissingExtra) as error:
         say(f"glider: {error}")
+        return BAD_INPUT
+    except ModuleNotFoundError as error:
+        missing = missing_extra(error)
+        if missing is None:
+            raise
+        say(f"glider: {missing}")
         return BAD_INPUT
     except OSError as error:
         if error.filename is None:

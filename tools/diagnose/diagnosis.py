@@ -1,4 +1,4 @@
-"""The diagnosis of a case: where the simulator is wrong, which effect causes it, how far the gap shrinks (GAP.md)."""
+"""The diagnosis of a case: where the simulator is wrong, why, how far the gap shrinks (docs/GAP.md, Answers)."""
 
 import json
 from collections.abc import Callable

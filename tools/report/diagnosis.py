@@ -251,7 +251,7 @@ def _context(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def report_html(diagnosis: Diagnosis) -> str:
-    """The page's text; MissingExtra without jinja2."""
+    """The page's text."""
     return render("diagnosis.html", _context(diagnosis)).replace(" %", "\N{NO-BREAK SPACE}%")
 
 
