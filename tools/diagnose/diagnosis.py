@@ -13,14 +13,14 @@ from tools.data.plain import as_plain
 from tools.data.runs.case import Case
 from tools.diagnose.cautions import cautions, not_asked
 from tools.diagnose.correction import Correction, correct
-from tools.diagnose.doubt import UNFIT
 from tools.diagnose.next_run import propose
-from tools.diagnose.probes import UNPREDICTABLE
+from tools.diagnose.noise_probes import UNPREDICTABLE
 from tools.diagnose.search import Search, run
 from tools.diagnose.shrink import AFTER, BEFORE, FLOOR, RECALIBRATED, Further, Shrinkage, by_channel, shrink_further
+from tools.diagnose.unknown import UNFIT
 from tools.diagnose.verdict import NONE, UNKNOWN, Answer, conclude, strongest_left
 from tools.inference.corrected import corrected_text
-from tools.inference.fit import Course
+from tools.inference.fit import Hypothesis
 from tools.inference.problem import ALL, pose
 from tools.inference.rules import Rules
 
@@ -78,10 +78,10 @@ def diagnose(case: Case, say: Callable[[str], None] = lambda text: None, rules: 
 def learn(diagnosis: Diagnosis, say: Callable[[str], None]) -> None:
     """What an unknown gap does, as a correction, and how far it shrinks the gap; nothing where that would not help."""
     answer, shrinkage = diagnosis.answer, diagnosis.shrinkage
-    correction = correct(answer.search, answer.course, answer.freed, say)
+    correction = correct(answer.search, answer.hypothesis, answer.probed, say)
     if correction is None:
         return
-    further = shrink_further(correction.search, correction.course, shrinkage.runs[BEFORE])
+    further = shrink_further(correction.search, correction.hypothesis, shrinkage.runs[BEFORE])
     if further.after < shrinkage.after:
         diagnosis.correction, diagnosis.further = correction, further
 
@@ -108,21 +108,21 @@ def unexplained(diagnosis: Diagnosis) -> dict[str, Any] | None:
 
 def parameters(diagnosis: Diagnosis, label: str) -> dict[str, dict[str, Any]]:
     """Estimate, 90 % interval and unit of each parameter of a selected label, by Laplace's approximation."""
-    course = diagnosis.answer.course
-    if not len(course.free) or label not in course.labels:
+    hypothesis = diagnosis.answer.hypothesis
+    if not len(hypothesis.free) or label not in hypothesis.labels:
         return {}
-    spread = np.sqrt(np.diag(np.linalg.inv(course.precision)))
+    spread = np.sqrt(np.diag(np.linalg.inv(hypothesis.precision)))
     found = {}
-    for n, free in enumerate(course.free):
+    for n, free in enumerate(hypothesis.free):
         if free.label == label:
-            value, sd = course.values[n] * free.spread, 1.645 * spread[n] * free.spread
+            value, sd = hypothesis.values[n] * free.spread, 1.645 * spread[n] * free.spread
             low, high = max(value - sd, free.low * free.spread), min(value + sd, free.high * free.spread)
             found[free.name] = {"estimate": value, "ci90": [low, high], "unit": free.unit}
     return found
 
 
 def places(answer: Answer) -> list[dict[str, Any]]:
-    """Where, most probable first: labels' probabilities by place; what is unknown lies where a freed link gains."""
+    """Where, most probable first: labels' probabilities by place; what is unknown lies where a probed link gains."""
     weight: dict[tuple[str, str], float] = {}
     effects = catalogue()
 
@@ -132,7 +132,7 @@ def places(answer: Answer) -> list[dict[str, Any]]:
     known = {label: p for label, p in answer.probabilities.items() if label in effects}
     total = sum(known.values())
     doubt = answer.probabilities[UNKNOWN]
-    links = [f for f in answer.freed if f.probe.name not in UNPREDICTABLE and f.gain > 0.0]
+    links = [f for f in answer.probed if f.probe.name not in UNPREDICTABLE and f.gain > 0.0]
     gained = sum(f.gain for f in links)
     for link in links:
         add((link.probe.subsystem, link.probe.element), doubt * link.gain / gained)
@@ -181,10 +181,10 @@ def plain(diagnosis: Diagnosis) -> dict[str, Any]:
     }
 
 
-def effects_of(course: Course) -> dict[str, dict[str, float]]:
+def effects_of(hypothesis: Hypothesis) -> dict[str, dict[str, float]]:
     """A candidate's effects with their values, as a corrected model holds them."""
     found: dict[str, dict[str, float]] = {}
-    for free, value in zip(course.free, course.values, strict=True):
+    for free, value in zip(hypothesis.free, hypothesis.values, strict=True):
         if free.label in catalogue():
             found.setdefault(free.label, {})[free.name] = float(value * free.spread)
     return found
@@ -194,13 +194,13 @@ def write(diagnosis: Diagnosis, out: Path) -> None:
     """diagnosis.json and corrected.toml into a folder."""
     out.mkdir(parents=True, exist_ok=True)
 
-    def model(search: Search, course: Course) -> str:
-        P, F = search.model(course)
-        return corrected_text(diagnosis.case.vehicle_name, search.problem.model.P, P, F, effects_of(course))
+    def model(search: Search, hypothesis: Hypothesis) -> str:
+        P, F = search.model(hypothesis)
+        return corrected_text(diagnosis.case.vehicle_name, search.problem.model.P, P, F, effects_of(hypothesis))
 
     (out / "next_run.toml").write_text(diagnosis.mission, encoding="utf-8")
-    (out / "corrected.toml").write_text(model(diagnosis.search, diagnosis.answer.course), encoding="utf-8")
+    (out / "corrected.toml").write_text(model(diagnosis.search, diagnosis.answer.hypothesis), encoding="utf-8")
     if diagnosis.correction is not None:
-        text = model(diagnosis.correction.search, diagnosis.correction.course)
+        text = model(diagnosis.correction.search, diagnosis.correction.hypothesis)
         (out / CORRECTION_FILE).write_text(text, encoding="utf-8")
     (out / "diagnosis.json").write_text(json.dumps(as_plain(plain(diagnosis)), indent=1) + "\n", encoding="utf-8")

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from sim_backend.effects.base import catalogue
-from tools.diagnose import doubt
+from tools.diagnose import unknown
 from tools.diagnose import verdict as rules
 from tools.diagnose.chain import Link, by_effects, calm, links, ordered, scatter, shared_out
 from tools.diagnose.diagnosis import CORRECTION_FILE, Diagnosis, parameters, places
-from tools.diagnose.probes import CLOCK, UNPREDICTABLE
+from tools.diagnose.noise_probes import CLOCK, UNPREDICTABLE
 from tools.diagnose.shrink import AFTER, BEFORE, FLOOR, RECALIBRATED
 from tools.diagnose.verdict import drop
 from tools.inference.channels import CHANNELS, channels_of, measured
@@ -43,22 +43,22 @@ def _panel(title: str, found: list[Link]) -> dict[str, Any]:
 
 
 def _panels(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """The chain's links freed, one panel for each effect; for an unknown gap what is left, for none nothing."""
+    """The chain's links probed, one panel for each effect; for an unknown gap what is left, for none nothing."""
     answer, search = diagnosis.answer, diagnosis.search
     if diagnosis.verdict == "none":
         return []
-    if diagnosis.verdict == "unknown" and answer.freed:
+    if diagnosis.verdict == "unknown" and answer.probed:
         beyond = f" beyond {words.joined(answer.selected)}" if answer.selected else ""
-        return [_panel(f"Of what is left{beyond}", shared_out(answer.freed, 0.0))]
-    fitted = [label for label in answer.selected if label in answer.course.labels][:PANELS]
+        return [_panel(f"Of what is left{beyond}", shared_out(answer.probed, 0.0))]
+    fitted = [label for label in answer.selected if label in answer.hypothesis.labels][:PANELS]
     water = answer.noise is not None and answer.noise.probe.name != CLOCK
     if water or not fitted:
         seen = calm(search) if water else search
         return [_panel("Of what the likeliest link brings", links(seen, search.null, search.null))]
     panels = []
     for label in fitted:
-        without = drop(search, answer.course, label)
-        found = links(search, without, answer.course) + by_effects(search, without, answer.course, label)
+        without = drop(search, answer.hypothesis, label)
+        found = links(search, without, answer.hypothesis) + by_effects(search, without, answer.hypothesis, label)
         panels.append(_panel(f"Of what {label} brings", ordered(found)))
     return panels
 
@@ -229,7 +229,7 @@ def _context(diagnosis: Diagnosis) -> dict[str, Any]:
         "effects": _effects(diagnosis),
         "scatter": _scatter(diagnosis),
         "pictures": _pictures(diagnosis),
-        "corrected": "corrected" if answer.course.labels and not none else "recalibrated",
+        "corrected": "corrected" if answer.hypothesis.labels and not none else "recalibrated",
         "table": _table(diagnosis),
         "shrinkage": f"{words.percent(s.shrinkage)} ({words.interval(*s.ci90)})",
         "closed": f"{words.percent(s.closed)} ({words.interval(*s.closed_ci90)})",
@@ -246,7 +246,7 @@ def _context(diagnosis: Diagnosis) -> dict[str, Any]:
         "next_run": diagnosis.next_run,
         "version": _version(),
         "rules": rules,
-        "doubt": doubt,
+        "doubt": unknown,
     }
 
 

@@ -5,10 +5,10 @@ from typing import Any
 
 from sim_backend.effects.base import catalogue
 from tools.diagnose.diagnosis import Diagnosis, places
-from tools.diagnose.doubt import UNCLEAN
-from tools.diagnose.probes import TURBULENCE, UNPREDICTABLE
+from tools.diagnose.noise_probes import TURBULENCE, UNPREDICTABLE
 from tools.diagnose.residuals import Finding
 from tools.diagnose.shrink import Shrinkage
+from tools.diagnose.unknown import UNCLEAN
 from tools.diagnose.verdict import SHAPES, strongest_left
 
 MINUS, DASH = "\N{MINUS SIGN}", "\N{EN DASH}"

@@ -7,11 +7,18 @@ import pytest
 
 from sim_backend.effects.base import catalogue
 from tools.diagnose.diagnosis import Diagnosis
-from tools.diagnose.probes import CLOCK, TURBULENCE, Probe, Probed
+from tools.diagnose.noise_probes import CLOCK, TURBULENCE, NoiseProbe, ProbeResult
 from tools.diagnose.residuals import CHANNELS, Finding
 from tools.report import words
 
-FAR = {"before": 4.0, "recalibrated": 3.0, "after": 0.5, "floor": 0.4, "shrinkage": 0.875, "ci90": (0.81, 0.93)}
+PRUNE_BEHIND = {
+    "before": 4.0,
+    "recalibrated": 3.0,
+    "after": 0.5,
+    "floor": 0.4,
+    "shrinkage": 0.875,
+    "ci90": (0.81, 0.93),
+}
 
 
 def diagnosis(probabilities, selected=(), groups=None, findings=(), noise=None, **far) -> Diagnosis:
@@ -19,10 +26,10 @@ def diagnosis(probabilities, selected=(), groups=None, findings=(), noise=None, 
     main = max(probabilities, key=lambda name: probabilities[name])
     answer = SimpleNamespace(
         main=main, selected=list(selected), probabilities={"none": 0.0, "unknown": 0.0} | probabilities,
-        groups=groups or {}, findings=list(findings), noise=noise, freed=[],
+        groups=groups or {}, findings=list(findings), noise=noise, probed=[],
     )  # fmt: skip
     case = SimpleNamespace(log_rate_hz=10.0)
-    return Diagnosis(case, None, answer, SimpleNamespace(**FAR | far), {}, "")
+    return Diagnosis(case, None, answer, SimpleNamespace(**PRUNE_BEHIND | far), {}, "")
 
 
 def test_every_label_has_plain_words():
@@ -98,20 +105,20 @@ def test_an_unknown_gap_that_goes_with_something_elsewhere_says_where():
 
 
 def test_a_clock_that_wanders_is_said_to():
-    probe = Probe(CLOCK, "sensor", "timing", "mocap", (12,))
-    said = words.sentence(diagnosis({"mocap_delay": 0.96}, ["mocap_delay"], noise=Probed(probe, 900.0, 6.0)))
+    probe = NoiseProbe(CLOCK, "sensor", "timing", "mocap", (12,))
+    said = words.sentence(diagnosis({"mocap_delay": 0.96}, ["mocap_delay"], noise=ProbeResult(probe, 900.0, 6.0)))
     assert said.startswith("Motion capture reports late (mocap_delay, timing: mocap; 96 % sure); that clock wanders; ")
     assert "wanders" not in words.sentence(diagnosis({"mocap_delay": 0.96}, ["mocap_delay"]))
 
 
 def test_scatter_claims_no_shrinkage():
-    probe = Probe(TURBULENCE, "force", "environment", "water", (0, 1, 2, 3, 4, 5))
-    said = words.sentence(diagnosis({"turbulence": 0.96}, ["turbulence"], noise=Probed(probe, 900.0, 3.6)))
+    probe = NoiseProbe(TURBULENCE, "force", "environment", "water", (0, 1, 2, 3, 4, 5))
+    said = words.sentence(diagnosis({"turbulence": 0.96}, ["turbulence"], noise=ProbeResult(probe, 900.0, 3.6)))
     assert said.startswith("The water is rougher than the vehicle file says, about 3.6 times as rough (turbulence, env")
     assert "its course cannot be predicted, so that knowing it shrinks no gap" in said
     assert "88 %" not in said
-    waves = Probe("waves", "water", "environment", "water", (9, 10, 11))
-    said = words.sentence(diagnosis({"waves": 0.96}, ["waves"], noise=Probed(waves, 900.0, 6.0)))
+    waves = NoiseProbe("waves", "water", "environment", "water", (9, 10, 11))
+    said = words.sentence(diagnosis({"waves": 0.96}, ["waves"], noise=ProbeResult(waves, 900.0, 6.0)))
     assert said.startswith("Surface waves move the vehicle (waves, environment: water; 96 % sure)")
 
 
