@@ -141,7 +141,7 @@ def told(search: Search, course: Course, gained: dict[str, float], found: Probed
     if found.probe.name == CLOCK:
         clock = clock_of(search, course, gained)
     begin = problem.as_recorded if clock is None else problem
-    return conclude(run(begin.telling(more), say, clock), say, found)
+    return conclude(run(begin.with_extra_noise(more), say, clock), say, found)
 
 
 def conclude(search: Search, say: Callable[[str], None] = lambda text: None, noise: Probed | None = None) -> Answer:
