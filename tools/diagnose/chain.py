@@ -112,7 +112,7 @@ def ordered(shared: list[Link]) -> list[Link]:
 
 def calm(search: Search) -> Search:
     """A search that was told of turbulence or waves, with the case's own disturbance again."""
-    return replace(search, problem=replace(search.problem, told=None))
+    return replace(search, problem=replace(search.problem, extra_noise=None))
 
 
 def scatter(search: Search, null: Hypothesis) -> Scatter:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim_backend.core import effect_layout as ef
-from tools.inference.core.innovations import N_SPECTRAL
+from tools.inference.core.filter import N_SPECTRAL
 from tools.inference.problem import Problem
 
 TURBULENCE, WAVES, CLOCK = "turbulence", "waves", "motion capture's clock"

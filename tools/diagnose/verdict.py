@@ -144,7 +144,7 @@ def search_again_with_noise(
     if found.probe.name == CLOCK:
         clock = clock_of(search, hypothesis, gained)
     begin = problem.as_recorded if clock is None else problem
-    return conclude(run(begin.telling(more), say, clock), say, found)
+    return conclude(run(begin.with_extra_noise(more), say, clock), say, found)
 
 
 def conclude(
