@@ -16,6 +16,7 @@ from hal.ports import empty_frame
 from sim_backend.core import effect_layout, layout
 from sim_backend.core import world as core
 from sim_backend.effects.base import apply_effects
+from sim_backend.uncertainty import sensor_errors
 from sim_backend.waves import wave_row
 
 PLANT_STEP = 0.01  # s
@@ -126,16 +127,6 @@ def start_state(start: Start) -> np.ndarray:
     x[X_NU] = start.surge_m_s
     x[X_ACT : X_ACT + 3] = 0.0
     return x
-
-
-def sensor_errors(vehicle: Vehicle, rng: np.random.Generator) -> np.ndarray:
-    """Bias (drawn, row 0) and white noise (row 1) of the nine measured values, shape (2, N_ERRORS)."""
-    tables = vehicle.sensors
-    rows = [tables.attitude] * 3 + [tables.gyro] * 3 + [tables.depth, tables.slider, tables.ballast]
-    errors = np.zeros((2, layout.N_ERRORS))
-    errors[0] = [table.bias * rng.standard_normal() for table in rows]
-    errors[1] = [table.noise for table in rows]
-    return errors
 
 
 def build_world(

@@ -6,7 +6,7 @@ at last of what the vehicle file says. Hypotheses that fall behind by far are dr
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -182,6 +182,13 @@ def first_step(fitter: Fitter, hypotheses: list[Hypothesis]) -> None:
     much = [c for c in hypotheses if c.expected_gain() > 2.0 * PRUNE_BEHIND and c.gained < POOR * c.expected_fall()]
     much = sorted(much, key=lambda c: -c.expected_gain())[:STARTED]
     try_distant_starts(fitter, much, (*NEARBY, *DISTANT), afresh=True)
+
+
+def without_extra_noise(search: Search) -> Search:
+    """A search that knows of disorder, with the case's own disturbance again."""
+    problem = search.problem
+    recorded = None if problem.recorded is None else replace(problem.recorded, extra_noise=None)
+    return replace(search, problem=replace(problem, extra_noise=None, recorded=recorded))
 
 
 def gains_of(problem: Problem, model: tuple[np.ndarray, np.ndarray], roughness: float) -> Gains:

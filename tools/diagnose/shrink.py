@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim_backend.core import effect_layout as ef
-from tools.diagnose.search import Search
+from tools.diagnose.search import Search, without_extra_noise
 from tools.gap.measure import RunGap, root_mean_square, run_gap
 from tools.inference.channels import CHANNELS
 from tools.inference.fit import NUISANCE_LIMIT, Hypothesis, bounded_step
@@ -112,6 +112,11 @@ def floor(search: Search, hypothesis: Hypothesis, rng: np.random.Generator) -> l
         channels = {name: root_mean_square([draw[n].channels[name] for draw in draws]) for name in names}
         mean.append(RunGap(run.name, channels, root_mean_square(channels.values()), draws[0][n].windows))
     return mean
+
+
+def case_noise_floor(search: Search, hypothesis: Hypothesis) -> dict[str, float]:
+    """The floor by channel with the disturbance of the case alone, whatever disorder the search knows of."""
+    return by_channel(floor(without_extra_noise(search), hypothesis, np.random.default_rng(SEED)))
 
 
 def squares(found: list[RunGap]) -> np.ndarray:

@@ -13,7 +13,6 @@ from tools.diagnose.shrink import Shrinkage
 from tools.inference.fit import Hypothesis
 from tools.inference.parameters import CLOCK_PLACE
 
-UNCLEAN = 6.0  # sigma, corrected for the number of tests
 LEFT_OVER, LEFT_WIDTH = 0.145, 1.1  # share of the explainable misfit at which unknown is as likely as not; e-folds
 NOISY, NOISY_WIDTH = 0.2, 0.8  # share of the explainable misfit that is left: disorder is looked for; width in e-folds
 UNFIT = 5.0  # tolerances that the best explanation still misses by: no effect of the catalogue does that
@@ -106,16 +105,19 @@ def clock_label(search: Search, hypothesis: Hypothesis) -> str:
     return min(left, key=lambda label: float(left[label] @ left[label]))
 
 
-def probability_unknown(search: Search, main: str, shrinkage: Shrinkage, left: Remainder | None, noise: bool) -> float:
+def probability_unknown(
+    search: Search, selected: bool, evident: bool, shrinkage: Shrinkage, left: Remainder | None, noise: bool
+) -> float:
     """Probability that the gap is none of the catalogue's, or that there is one where none shows otherwise.
 
-    main: the main effect, or "" without; noise: the search knows of extra noise, which no window's gap shows.
+    selected, evident: whether any effect is, or is at least there; noise: the search knows of extra noise, which no
+    window's gap shows.
     """
     if left is None:  # what is left was not asked about, or nothing is
-        loose = not main and not noise and shrinkage.after > max(LOOSE * shrinkage.floor, 1.0)
+        loose = not selected and not noise and shrinkage.after > max(LOOSE * shrinkage.floor, 1.0)
         unfit = search.problem.rules.whiteness and (loose or shrinkage.after > UNFIT)
         return 1.0 - MORE_UNKNOWN if unfit else LEAST_UNKNOWN
-    if shrinkage.after > UNFIT or not (main or noise):
+    if shrinkage.after > UNFIT or not (evident or noise):
         return 1.0 - MORE_UNKNOWN
     if noise:
         return probability(left.share, NOISY, NOISY_WIDTH)

@@ -1,28 +1,30 @@
-"""From fits to an answer: which effects earn their place, how probable each label is, and what cannot be told apart."""
+"""From fits to an answer: which effects are selected, how probable each label is, and which cannot be told apart."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from sim_backend.effects.base import catalogue
+from tools.diagnose.matter import MATTERS, disorder_matters, gap_matters, movements
 from tools.diagnose.noise_probes import CLOCK, UNPREDICTABLE, ProbeResult, inflated
-from tools.diagnose.residuals import Finding, tests, worst
+from tools.diagnose.record import NONE, UNKNOWN, Finding
+from tools.diagnose.residuals import UNCLEAN, tests, worst
 from tools.diagnose.search import Search, converge, run
 from tools.diagnose.shrink import Shrinkage, left_out_gap, shrink
-from tools.diagnose.unknown import UNCLEAN, clock_label, disorder, left_share, probability_unknown, remainder_of
+from tools.diagnose.unknown import LEAST_UNKNOWN, clock_label, disorder, left_share, probability_unknown, remainder_of
 from tools.inference.fit import Hypothesis
 from tools.inference.parameters import CLOCK_PLACE
 
-NONE, UNKNOWN = "none", "unknown"
-PRIOR_NONE = 0.5  # before anything was measured; the labels share the rest
 HELD_OUT_SHARE = 0.3  # of the gap that is left on runs left out: an effect beside another must close as much more
-EVIDENCE_NEEDED = 12.0  # nat of evidence that an effect brings, or it is left out (docs/DIAGNOSIS.md, Thresholds)
+# Nat of evidence that an effect brings, or it is left out (docs/DIAGNOSIS.md, Thresholds): the prior odds of none to a
+# label, so that a label is as probable as none where it would just be selected.
+EVIDENCE_NEEDED = 12.0
 TIE = 6.0  # nat within which two labels are not told apart: what a change of prior spreads can move
 MOST_GROUP = 3
 ERROR_RATE = 0.03  # answers that named something else altogether, of those to the cases it was developed with: 3 of 104
 CERTAIN = 0.9  # of the recalibrated gap: effects beside an unknown one that leave more are not certain
-SHAPES = ("variance", "mean", "lag", "spectrum")  # tests of a channel by itself; the others go with something
+LIKELY = 1e-3  # probability from which an alternative's effect on the windows is looked at
 
 
 @dataclass
@@ -31,7 +33,7 @@ class Answer:
 
     search: Search  # the one that the answer rests on
     selected: list[str]  # most of the gap first
-    main: str  # label, NONE or UNKNOWN
+    main: str  # label out of `selected`, NONE or UNKNOWN: the most probable
     probabilities: dict[str, float]  # of the main cause; NONE and UNKNOWN among them
     groups: dict[str, list[str]]
     hypothesis: Hypothesis  # the corrected model
@@ -40,13 +42,14 @@ class Answer:
     whiteness: float  # sigma of what is left, corrected for the number of tests
     unexplained: float  # of the squared gap beyond the floor, the share that the selected effects leave
     gained: dict[str, float]  # nat that each selected effect brings
-    probed: list[ProbeResult]  # links of the chain, beyond the selected effects; empty where nothing is left
-    noise: ProbeResult | None  # turbulence, waves or motion capture's clock, where the search was told of them
+    negligible: dict[str, float]  # nat of effects that are there, but move no window by MATTERS
+    probed: list[ProbeResult]  # beyond the selected effects; empty where nothing is left
+    noise: ProbeResult | None  # turbulence, waves or motion capture's clock, where the search knew of it
     shrinkage: Shrinkage
 
 
 def drop(search: Search, hypothesis: Hypothesis, label: str) -> Hypothesis:
-    """The candidate without one of its effects, fitted."""
+    """The hypothesis without one of its effects, fitted."""
     labels = tuple(one for one in hypothesis.labels if one != label)
     for known in search.hypotheses:
         if set(known.labels) == set(labels):
@@ -64,7 +67,7 @@ def drop(search: Search, hypothesis: Hypothesis, label: str) -> Hypothesis:
 
 
 def clock_of(search: Search, hypothesis: Hypothesis, gained: dict[str, float]) -> Hypothesis | None:
-    """Of a candidate the effect of motion capture's clock that brings most, as it stands; None where it has none."""
+    """Of a hypothesis the effect of motion capture's clock that brings most, as it stands; None where it has none."""
     labels = sorted((label for label in gained if catalogue()[label].place == CLOCK_PLACE), key=lambda n: -gained[n])
     if not labels:
         return None
@@ -88,7 +91,7 @@ def held_out_worth(search: Search, hypothesis: Hypothesis) -> dict[str, float]:
 
 
 def prune_effects(search: Search) -> tuple[Hypothesis, dict[str, float]]:
-    """The best candidate without what does not earn its place, and what each of its effects brings."""
+    """Backward elimination: the best hypothesis without what does not earn its place; nat that each effect brings."""
     hypothesis = search.best
     while hypothesis.labels:
         gains = {
@@ -108,24 +111,30 @@ def prune_effects(search: Search) -> tuple[Hypothesis, dict[str, float]]:
 
 
 def by_held_out_gap(search: Search) -> tuple[Hypothesis, dict[str, float]]:
-    """The candidate of one effect, or of none, with the least gap on runs left out: what evidence is compared with."""
+    """The hypothesis of one effect, or of none, with the least gap on runs left out: what evidence is compared with."""
     tried = [search.null, *(hypothesis for hypothesis in search.hypotheses if len(hypothesis.labels) == 1)]
     best = min(tried, key=lambda hypothesis: left_out_gap(search, hypothesis))
     return best, {label: best.log_evidence(search.fitter) for label in best.labels}
 
 
-def evidence_of_alternatives(search: Search, hypothesis: Hypothesis, main: str) -> dict[str, float]:
-    """Log evidence of every label in the place of the main one, beside the others that were selected."""
+def alternatives(search: Search, hypothesis: Hypothesis, main: str) -> dict[str, Hypothesis]:
+    """The hypothesis of every label in the place of the main one, beside the others that were selected."""
     others = tuple(label for label in hypothesis.labels if label != main)
-    found = {main: hypothesis.log_evidence(search.fitter)} if main else {}
+    found = {main: hypothesis} if main else {}
     for known in search.hypotheses:
         if others and not set(others) <= set(known.labels):
             continue
         rest = [label for label in known.labels if label not in others]
         if len(rest) == 1 and len(known.labels) == len(others) + 1:
-            value = known.log_evidence(search.fitter)
-            found[rest[0]] = max(value, found.get(rest[0], -np.inf))
+            rival = found.setdefault(rest[0], known)
+            if known.log_evidence(search.fitter) > rival.log_evidence(search.fitter):
+                found[rest[0]] = known
     return found
+
+
+def evidence_of_alternatives(search: Search, hypothesis: Hypothesis, main: str) -> dict[str, float]:
+    """Log evidence of every label in the place of the main one."""
+    return {label: one.log_evidence(search.fitter) for label, one in alternatives(search, hypothesis, main).items()}
 
 
 def softmax(logs: dict[str, float]) -> dict[str, float]:
@@ -150,49 +159,89 @@ def search_again_with_noise(
 def conclude(
     search: Search, say: Callable[[str], None] = lambda text: None, noise: ProbeResult | None = None
 ) -> Answer:
-    """The answer of a finished search; its gains are taken anew at the selected model.
+    """The answer of a finished search; its gains are taken anew at the hypothesis with all that is evident.
 
-    `noise` is disorder that the search was already told of: turbulence, waves, or motion capture's clock.
+    `noise` is disorder that the search already knows of: turbulence, waves, or motion capture's clock.
     """
     problem = search.problem
-    hypothesis, gained = prune_effects(search) if problem.rules.evidence else by_held_out_gap(search)
-    search.hypotheses = [c for c in search.hypotheses if c is not hypothesis] + (
-        [hypothesis] if hypothesis.labels else []
-    )
-    search.gains = problem.filter(*search.model(hypothesis), begin=True)
+    evident, gained = prune_effects(search) if problem.rules.evidence else by_held_out_gap(search)
+    search.hypotheses = [c for c in search.hypotheses if c is not evident] + ([evident] if evident.labels else [])
+    search.gains = problem.filter(*search.model(evident), begin=True)
     findings = tests(problem, search.gains)
     whiteness, left = worst(findings), None
     if whiteness >= UNCLEAN and problem.rules.whiteness:
-        left = remainder_of(search, hypothesis, noise)
+        left = remainder_of(search, evident, noise)
         found = disorder(search, left) if noise is None else None
         if found is not None:
-            return search_again_with_noise(search, hypothesis, gained, found, say)
+            return search_again_with_noise(search, evident, gained, found, say)
+    moved = movements(search, evident)
+    small = [label for label in evident.labels if moved[label] < MATTERS]
+    selected = evident
+    for label in small:
+        selected = drop(search, selected, label)
+    shrinkage = shrink(search, selected)
     disordered = ""  # its label
     if noise is not None:
-        disordered = clock_label(search, hypothesis) if noise.probe.name == CLOCK else noise.probe.name
+        disordered = clock_label(search, evident) if noise.probe.name == CLOCK else noise.probe.name
         gained = gained | {disordered: gained.get(disordered, 0.0) + noise.gain}
-    main = max(gained, key=lambda label: gained[label]) if gained else ""
+        if disorder_matters(search, selected, shrinkage):
+            small = [label for label in small if label != disordered]
+        elif disordered not in moved:
+            small.append(disordered)
+    negligible = {label: gained.pop(label) for label in small}
+    ranked = gained or negligible
+    main = max(ranked, key=lambda label: ranked[label]) if ranked else ""
     if disordered in UNPREDICTABLE:
         main = disordered
     by_search = problem.rules.evidence and not (noise is not None and main == disordered)
-    chances = posterior(search, hypothesis, main) if by_search else {main or NONE: 1.0}
-    shrinkage = shrink(search, hypothesis)
-    unknown = probability_unknown(search, main, shrinkage, left, noise is not None)
+    chances = posterior(search, evident, main) if by_search else {main or NONE: 1.0}
+    chances = to_none(chances, negligible, movements_of_alternatives(search, evident, main, chances))
+    unknown = probability_unknown(search, bool(gained), bool(ranked), shrinkage, left, noise is not None)
+    if not gained and not gap_matters(shrinkage):
+        unknown = LEAST_UNKNOWN
     chances = {name: value * (1.0 - unknown) for name, value in chances.items()} | {UNKNOWN: unknown}
     chances = mix_in_error_rate({label: 0.0 for label in catalogue()} | chances, main)
-    # A label that has not earned its place is none.
-    top = max((NONE, UNKNOWN, *gained), key=lambda name: chances.get(name, 0.0))
-    groups = grouped(log_posteriors(search, hypothesis, main)) if by_search else {main: [main]}
-    if top == UNKNOWN and hypothesis.labels and shrinkage.after > CERTAIN * shrinkage.recalibrated:
-        hypothesis, shrinkage = search.null, shrink(search, search.null)
-        gained = {label: gain for label, gain in gained.items() if label == disordered}
+    top, chances = answer_first(chances, gained)
+    if top == NONE or (top == UNKNOWN and shrinkage.after > CERTAIN * shrinkage.recalibrated):
+        gained = {label: gain for label, gain in gained.items() if label == disordered and top == UNKNOWN}
+        if selected.labels:
+            selected, shrinkage = search.null, shrink(search, search.null)
+    groups = grouped(log_posteriors(search, evident, main)) if by_search else {main: [main]}
     return Answer(
         search=search, selected=sorted(gained, key=lambda label: (label != main, -gained[label])), main=top,
-        probabilities=chances, groups=groups, hypothesis=hypothesis, null=search.null, findings=findings,
-        whiteness=whiteness,
-        unexplained=left_share(shrinkage), gained=gained, probed=[] if left is None else left.probed, noise=noise,
-        shrinkage=shrinkage,
+        probabilities=chances, groups=groups, hypothesis=selected, null=search.null, findings=findings,
+        whiteness=whiteness, unexplained=left_share(shrinkage), gained=gained, negligible=negligible,
+        probed=[] if left is None else left.probed, noise=noise, shrinkage=shrinkage,
     )  # fmt: skip
+
+
+def movements_of_alternatives(
+    search: Search, hypothesis: Hypothesis, main: str, chances: dict[str, float]
+) -> dict[str, float]:
+    """How far each likely label moves the windows in the place of the main one, in tolerances."""
+    return {
+        label: movements(search, one)[label]
+        for label, one in alternatives(search, hypothesis, main).items()
+        if label != main and chances.get(label, 0.0) >= LIKELY
+    }
+
+
+def to_none(chances: dict[str, float], negligible: Iterable[str], moved: dict[str, float]) -> dict[str, float]:
+    """Probabilities with those of effects that do not matter given to none: there is no gap with them."""
+    small = {*negligible, *(label for label, far in moved.items() if far < MATTERS)}
+    kept = {label: 0.0 if label in small else chance for label, chance in chances.items()}
+    return kept | {NONE: kept.get(NONE, 0.0) + sum(chance for label, chance in chances.items() if label in small)}
+
+
+def answer_first(chances: dict[str, float], gained: Iterable[str]) -> tuple[str, dict[str, float]]:
+    """The most probable of none, unknown and what was selected; probabilities in which no other label passes it.
+
+    A label that was not selected can only pass by what is mixed in for errors, or where elimination went another way.
+    """
+    top = max((NONE, UNKNOWN, *gained), key=lambda name: chances.get(name, 0.0))
+    capped = {name: min(chance, chances[top]) for name, chance in chances.items()}
+    total = sum(capped.values())
+    return top, {name: capped[name] / total for name in (top, *(name for name in capped if name != top))}
 
 
 def mix_in_error_rate(chances: dict[str, float], main: str) -> dict[str, float]:
@@ -209,16 +258,17 @@ def mix_in_error_rate(chances: dict[str, float], main: str) -> dict[str, float]:
 
 
 def log_posteriors(search: Search, hypothesis: Hypothesis, main: str) -> dict[str, float]:
-    """Log posterior of each label in the place of the main one, up to a constant."""
-    prior = np.log((1.0 - PRIOR_NONE) / len(search.parameters))
-    return {label: value + prior for label, value in evidence_of_alternatives(search, hypothesis, main).items()}
+    """Log posterior of each label in the place of the main one, up to a constant: that of none is its log evidence."""
+    return {
+        label: value - EVIDENCE_NEEDED for label, value in evidence_of_alternatives(search, hypothesis, main).items()
+    }
 
 
 def posterior(search: Search, hypothesis: Hypothesis, main: str) -> dict[str, float]:
     """Probabilities of the labels and of none, as if there were nothing unknown."""
     logs = log_posteriors(search, hypothesis, main)
     bare = drop(search, hypothesis, main) if main else search.null
-    logs[NONE] = bare.log_evidence(search.fitter) + np.log(PRIOR_NONE)
+    logs[NONE] = bare.log_evidence(search.fitter)
     return softmax(logs)
 
 
@@ -229,18 +279,3 @@ def grouped(logs: dict[str, float]) -> dict[str, list[str]]:
         label: [label, *(o for o in labels if o != label and abs(logs[o] - logs[label]) < TIE)][:MOST_GROUP]
         for label in labels
     }
-
-
-def strongest_left(findings: list[Finding]) -> tuple[Finding | None, Finding | None]:
-    """The strongest finding, and the strongest that says what it goes with, in the same channel if that has one.
-
-    None where they are too weak.
-    """
-    strong = [f for f in findings if abs(f.sigma) >= UNCLEAN]
-    if not strong:
-        return None, None
-    goes = sorted(
-        (f for f in strong if not f.test.startswith(SHAPES)),
-        key=lambda f: (f.channel != strong[0].channel, -abs(f.sigma)),
-    )
-    return strong[0], goes[0] if goes else None
