@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -50,14 +51,20 @@ def folder(tmp_path_factory) -> Path:
     return path
 
 
+def glider(*words: object) -> int:
+    """The command line's exit code."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sys.argv", ["glider", *map(str, words)])
+        return report_errors(cli)
+
+
 @pytest.fixture(scope="module")
 def said(folder) -> str:
     """What the command says on standard error; its files lie in `answer` beside the case."""
     with pytest.MonkeyPatch.context() as patch:
         lines: list[str] = []
-        patch.setattr("sys.argv", ["glider", "gap", "diagnose", str(folder), "--out", str(folder.parent / "answer")])
         patch.setattr("tools.cli.gap.say", lines.append)
-        assert report_errors(cli) == 0
+        assert glider("gap", "diagnose", folder, "--out", folder.parent / "answer") == 0
     return "\n".join(lines)
 
 
@@ -75,6 +82,46 @@ def test_the_cause_is_found_and_said(folder, said):
     load_corrected(folder.parent / "answer" / "corrected.toml", nominal_model(case))
     low, high = found["causes"][0]["parameters"]["mass"]["ci90"]
     assert low < HEAVY < high or abs(found["causes"][0]["parameters"]["mass"]["estimate"] - HEAVY) < 0.02
+
+
+def test_it_is_drawn_again_from_what_is_on_disk(folder, page, tmp_path):
+    """Also where the case has moved: the folder holds what the pictures show."""
+    again = tmp_path / "again"
+    shutil.copytree(folder.parent / "answer", again)
+    (again / "report.html").unlink()
+    assert glider("gap", "report", again) == 0
+    assert (again / "report.html").read_bytes() == page.encode()
+
+
+@pytest.mark.parametrize(
+    ("name", "damage", "message"),
+    [
+        ("report.json", None, "report.json: no such file"),
+        ("diagnosis.json", "{", "diagnosis.json"),
+        ("diagnosis.json", '{"format": 2}', "diagnosis.json"),
+        ("report.json", '{"format": 1}', "missing required field"),
+        ("report.npz", "PK", "report.npz: not the curves of this diagnosis"),
+    ],
+)
+def test_a_damaged_diagnosis_is_one_line_and_exit_2(folder, page, tmp_path, capsys, name, damage, message):
+    broken = tmp_path / "broken"
+    shutil.copytree(folder.parent / "answer", broken)
+    if damage is None:
+        (broken / name).unlink()
+    else:
+        (broken / name).write_text(damage)
+    assert glider("gap", "report", broken) == 2
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert message in line
+    assert glider("gap", "report", tmp_path / "nothing") == 2
+
+
+def test_drawing_a_report_fits_nothing():
+    script = "import sys, tools.report.diagnosis; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.split()
+    assert "tools.report.words" in loaded
+    fitting = {"tools.inference.fit", *(f"tools.diagnose.{name}" for name in ("search", "verdict", "chain", "shrink"))}
+    assert not fitting & set(loaded)
 
 
 def test_it_opens_offline_and_without_script(page):

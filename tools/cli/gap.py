@@ -125,14 +125,27 @@ def diagnose(case: Path, out: Path, without: str | None, as_json: bool) -> None:
         found = run_diagnosis(loaded, step, Rules() if without is None else Rules().without(without))
         advance(STEPS - 1 - done)
         write(found, out)
-        write_report(out / "report.html", found)
+        record = write_report(out)
         advance(1)
     if as_json:
         print_json(plain(found))
-    for caution in found.cautions:
+    for caution in record.answer.cautions:
         say(f"note: {caution}")
-    say(sentence(found))
+    say(sentence(record))
     say(f"answer: {out / 'diagnosis.json'}, report: {out / 'report.html'}")
+
+
+@gap.command()
+@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+def report(folder: Path) -> None:
+    """Draw report.html again from what `glider gap diagnose` left in DIR."""
+    from tools.data.errors import need
+    from tools.report.diagnosis import REPORT, write_report
+    from tools.report.words import sentence
+
+    need("jinja2")
+    say(sentence(write_report(folder)))
+    say(f"report: {folder / REPORT}")
 
 
 gap.add_command(challenge)

@@ -54,7 +54,7 @@ def identify(case: Path, out: Path | None, seed: int, likelihood: str, as_json: 
 
 def _tell(found) -> None:
     """The coefficients, and what the runs cannot tell, for a person."""
-    from tools.identify.telling import blind, sentences
+    from tools.identify.identifiability import sentences, unidentifiable_directions
 
     click.echo(f"{'':<6} {'mean':>10} {'sd':>9}   {'90 % interval':<22} {'R-hat':>6} {'ESS':>7}  unit")
     for one in found.coefficients:
@@ -64,5 +64,5 @@ def _tell(found) -> None:
         click.echo(f"{figures} {one.rhat:>6.3f} {one.ess:>7.0f}  {one.unit}")
     for line in sentences(found.free, found.chains.flat):
         click.echo(line)
-    for combination in blind(found.free, found.chains.flat):
+    for combination in unidentifiable_directions(found.free, found.chains.flat):
         click.echo(f"  {combination.sentence()}")

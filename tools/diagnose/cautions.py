@@ -6,8 +6,8 @@ import numpy as np
 
 from sim_backend.effects.base import catalogue
 from tools.data.runs import columns as names
-from tools.diagnose.probes import UNPREDICTABLE
-from tools.inference.candidates import candidates
+from tools.diagnose.noise_probes import UNPREDICTABLE
+from tools.inference.parameters import effect_parameters
 from tools.inference.problem import Problem
 from tools.inference.windows import START
 
@@ -35,7 +35,7 @@ def cautions(problem: Problem) -> list[str]:
 
 def not_asked(problem: Problem) -> list[str]:
     """Labels that these runs cannot show at all, and that are therefore not among the causes tried."""
-    tried = candidates(problem)
+    tried = effect_parameters(problem)
     return [label for label in catalogue() if label not in tried and label not in UNPREDICTABLE]  # asked otherwise
 
 

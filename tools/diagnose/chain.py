@@ -1,27 +1,23 @@
 """The gap followed through the chain command -> actuator -> force and moment -> motion -> sensor, for the report.
 
-Links are freed one at a time (tools/diagnose/probes) at the model without an effect, or without any: what a link brings
-when it may err as it likes, beside what that effect brings, is its share. Noise cannot take the shape of a constant
+The noise of one link at a time is inflated (tools/diagnose/noise_probes) at the model without an effect, or without
+any: what that gains, beside what the effect brings, is the link's share. Noise cannot take the shape of a constant
 error or of a delay, so that effects of the catalogue count for their links too, as far as the search followed them.
 Shares do not add up: an error of the pump can be taken up by its own speed, and by the draw-wire that measures it.
 """
 
-from dataclasses import dataclass, replace
-
 import numpy as np
 
 from sim_backend.effects.base import catalogue
-from tools.diagnose.probes import TURBULENCE, WAVES, Probe, Probed, probe_model, probes
-from tools.diagnose.search import Search
-from tools.diagnose.verdict import instead
-from tools.inference.fit import Course
+from tools.diagnose.noise_probes import CLOCK, TURBULENCE, WAVES, NoiseProbe, ProbeResult, probes, run_probes
+from tools.diagnose.record import NONE, UNKNOWN, Link, Noise, Panel
+from tools.diagnose.search import Search, without_extra_noise
+from tools.diagnose.stages import ACTUATOR, FORCE, MOTION, SENSOR, STAGES, stage_of
+from tools.diagnose.verdict import Answer, drop, evidence_of_alternatives
+from tools.inference.fit import Hypothesis
 
-COMMAND, ACTUATOR, FORCE, MOTION, SENSOR = STAGES = ("command", "actuator", "force and moment", "motion", "sensor")
 SCALES = (3.0, 12.0, 50.0)  # of a probe's unit: coarser than for a verdict
 STAGE_OF_PROBE = {"actuator": ACTUATOR, "force": FORCE, "water": MOTION, "sensor": SENSOR}
-STAGE_OF_PLACE = {
-    "actuation": ACTUATOR, "hydrodynamics": FORCE, "mass": FORCE, "environment": MOTION, "sensing": SENSOR
-}  # fmt: skip
 NAMES = {TURBULENCE: "all forces and moments", WAVES: "water"}
 LINK_OF_PLACE = {
     "net": "net mass", "longitudinal": "centre of gravity, lengthwise", "lateral": "centre of gravity, sideways",
@@ -30,71 +26,46 @@ LINK_OF_PLACE = {
     **{axis: f"{axis} moment" for axis in ("roll", "pitch", "yaw")},
 }  # fmt: skip
 RUNS = 1  # that are probed
+PANELS = 2  # one for each effect, the first ones
 LEAST = 10.0  # nat that the best explanation must bring, or there is nothing to share out
 
 
-@dataclass(frozen=True)
-class Link:
-    """A link that was freed: of what the best explanation brings, the share it brings, 0 to 1."""
-
-    stage: str
-    name: str
-    share: float
-
-
-@dataclass(frozen=True)
-class Scatter:
-    """Mean square of what each sample brings anew at the recalibrated model, by what the model expects of it."""
-
-    calm: float  # with the case's disturbance
-    rough: float  # with the disturbance or the waves that were found
-
-
-def stage_of(subsystem: str, element: str) -> str:
-    """The stage of the chain that a place belongs to."""
-    if subsystem == "timing":
-        return COMMAND if element == "command" else SENSOR
-    if (subsystem, element) == ("mass", "inertia"):
-        return MOTION
-    return STAGE_OF_PLACE[subsystem]
-
-
-def links(search: Search, without: Course, best: Course) -> list[Link]:
+def links(search: Search, without: Hypothesis, best: Hypothesis) -> list[Link]:
     """Every link's share of what `best` brings over `without`, in the order of the chain, by the run that shows most.
 
     The two may be one: then the shares are of the link that brings most. No links where hardly anything is brought.
     """
     problem, model = search.problem, search.model(without)
-    bare, fitted = (problem.filter(*search.model(course)).misfit for course in (without, best))
-    told = np.argsort(-(bare if best is without else bare - fitted))[:RUNS]
-    total: dict[Probe, float] = {}
-    for n in told.tolist():
-        for found in probe_model(problem.part(n), *model, probes(problem), SCALES, ()):
+    bare, fitted = (problem.filter(*search.model(hypothesis)).misfit for hypothesis in (without, best))
+    shown = np.argsort(-(bare if best is without else bare - fitted))[:RUNS]
+    total: dict[NoiseProbe, float] = {}
+    for n in shown.tolist():
+        for found in run_probes(problem.part(n), *model, probes(problem), SCALES, ()):
             total[found.probe] = total.get(found.probe, 0.0) + found.gain
-    freed = [Probed(probe, gain, 1.0) for probe, gain in total.items()]
-    return shared_out(freed, 0.5 * float((bare - fitted)[told].sum()))
+    probed = [ProbeResult(probe, gain, 1.0) for probe, gain in total.items()]
+    return shared_out(probed, 0.5 * float((bare - fitted)[shown].sum()))
 
 
-def shared_out(freed: list[Probed], brought: float) -> list[Link]:
+def shared_out(probed: list[ProbeResult], brought: float) -> list[Link]:
     """Shares of probes of the best explanation's nat: the effects' or, where that is more, a probe's own."""
-    brought = max([brought, *(found.gain for found in freed)])
+    brought = max([brought, *(found.gain for found in probed)])
     if brought < LEAST:
         return []
     shared = []
-    for found in freed:
+    for found in probed:
         name = NAMES.get(found.probe.name, found.probe.name)
         shared.append(Link(STAGE_OF_PROBE[found.probe.stage], name, float(np.clip(found.gain / brought, 0.0, 1.0))))
     return ordered(shared)
 
 
-def by_effects(search: Search, without: Course, best: Course, label: str) -> list[Link]:
+def by_effects(search: Search, without: Hypothesis, best: Hypothesis, label: str) -> list[Link]:
     """The same by effects of the catalogue that the search has tried in the place of `label`: a link's best counts."""
     bare, effects = without.log_evidence(search.fitter), catalogue()
     brought = best.log_evidence(search.fitter) - bare
     if brought < LEAST:
         return []
     shared = []
-    for other, value in instead(search, best, label).items():
+    for other, value in evidence_of_alternatives(search, best, label).items():
         place = effects[other].subsystem, effects[other].element
         share = float(np.clip((value - bare) / brought, 0.0, 1.0))
         shared.append(Link(stage_of(*place), LINK_OF_PLACE.get(place[1], place[1]), share))
@@ -110,13 +81,33 @@ def ordered(shared: list[Link]) -> list[Link]:
     return sorted(most.values(), key=lambda link: (STAGES.index(link.stage), -link.share))
 
 
-def calm(search: Search) -> Search:
-    """A search that was told of turbulence or waves, with the case's own disturbance again."""
-    return replace(search, problem=replace(search.problem, told=None))
+def panels(verdict: str, answer: Answer) -> list[Panel]:
+    """The shares of links in what each effect brings; for an unknown gap in what is left, for none nothing."""
+    search = answer.search
+    if verdict == NONE:
+        return []
+    if verdict == UNKNOWN and answer.probed:
+        return [Panel("", shared_out(answer.probed, 0.0))]
+    fitted = [label for label in answer.selected if label in answer.hypothesis.labels][:PANELS]
+    water = answer.noise is not None and answer.noise.probe.name != CLOCK
+    if water or not fitted:
+        seen = without_extra_noise(search) if water else search
+        return [Panel("", links(seen, search.null, search.null))]
+    found = []
+    for label in fitted:
+        without = drop(search, answer.hypothesis, label)
+        shares = links(search, without, answer.hypothesis) + by_effects(search, without, answer.hypothesis, label)
+        found.append(Panel(label, ordered(shares)))
+    return found
 
 
-def scatter(search: Search, null: Course) -> Scatter:
-    """How much of the scatter the turbulence or the waves that a search was told of explain, at a model."""
-    model = search.model(null)
-    both = (calm(search).problem, search.problem)
-    return Scatter(*(float(np.nanmean(problem.filter(*model).E ** 2)) for problem in both))
+def noise_of(answer: Answer) -> Noise | None:
+    """The disorder that the search knows of; for water in disorder also the mean NIS with and without."""
+    noise, search = answer.noise, answer.search
+    if noise is None:
+        return None
+    if noise.probe.name == CLOCK:
+        return Noise(noise.probe.name, float(noise.scale))
+    model = search.model(search.null)
+    nis = [float(np.nanmean(one.problem.filter(*model).E ** 2)) for one in (without_extra_noise(search), search)]
+    return Noise(noise.probe.name, float(noise.scale), *nis)

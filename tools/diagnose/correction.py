@@ -1,6 +1,6 @@
 """A data-driven correction: what an unknown gap does, learned at the link of the chain where it enters.
 
-Where no effect of the catalogue explains a gap, the link that gains most when freed is given an error of its own: a sum
+Where no effect of the catalogue explains a gap, the link whose probe gains most is given an error of its own: a sum
 of shapes (constant, speed, depth, angles of flow, rates, running pump, time, climb or dive) with coefficients fitted as
 those of an effect are. It is no cause, but it says what the gap goes with, and by how much the gap would shrink.
 """
@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from sim_backend.core import effect_layout as ef
-from tools.diagnose.probes import UNPREDICTABLE, Probe, Probed
+from tools.diagnose.noise_probes import UNPREDICTABLE, NoiseProbe, ProbeResult
 from tools.diagnose.residuals import pump_speed
-from tools.diagnose.search import Search, settle
-from tools.inference.candidates import Free
+from tools.diagnose.search import Search, converge
 from tools.inference.corrected import LINKS
-from tools.inference.fit import Course, Fitter
+from tools.inference.fit import Fitter, Hypothesis
+from tools.inference.parameters import FreeParameter
 
 LABEL = "correction"
 LINKS_TRIED = 3
@@ -37,7 +37,7 @@ class Correction:
     link: str
     unit: str
     search: Search  # its problem knows of the link
-    course: Course
+    hypothesis: Hypothesis
     carried: dict[str, float]  # by shape: rms of its part over the runs, in the unit; those that tell, largest first
 
     @property
@@ -45,7 +45,7 @@ class Correction:
         """By shape, in the link's unit."""
         return {
             free.name: float(value * free.spread)
-            for free, value in zip(self.course.free, self.course.values, strict=True)
+            for free, value in zip(self.hypothesis.free, self.hypothesis.values, strict=True)
             if free.label == LABEL
         }
 
@@ -53,42 +53,42 @@ class Correction:
         return {"link": self.link, "unit": self.unit, "goes_with": self.carried, "coefficients": self.coefficients}
 
 
-def links_of(probe: Probe) -> tuple[str, ...]:
+def links_of(probe: NoiseProbe) -> tuple[str, ...]:
     """The links that a probe stands for; none for the water and for motion capture."""
     if probe.name in UNPREDICTABLE:
         return ()
     return tuple(link for link in OF_PROBE.get(probe.name, (probe.name,)) if link in LINKS)
 
 
-def free_of(link: str) -> list[Free]:
+def free_of(link: str) -> list[FreeParameter]:
     """The coefficients of a correction at a link."""
     number = LINKS.index(link)
     shapes = list(enumerate(ef.SHAPES))
     if number >= ef.ACTUATOR_LINKS:  # a sensor does not feel the pump
         shapes.pop(BY_PUMP)
     return [
-        Free(LABEL, name, "F", ef.SHAPE + k, SPREADS[number] * (0.3 if k else 1.0), unit=UNITS[number])
+        FreeParameter(LABEL, name, "F", ef.SHAPE + k, SPREADS[number] * (0.3 if k else 1.0), unit=UNITS[number])
         for k, name in shapes
     ]
 
 
-def fitted(search: Search, course: Course, link: str) -> tuple[Search, Course]:
+def fitted(search: Search, hypothesis: Hypothesis, link: str) -> tuple[Search, Hypothesis]:
     """A correction at a link beside a candidate's effects, fitted with gains of its own."""
     F = np.zeros(ef.N_F)
     F[ef.LINK] = 1.0 + LINKS.index(link)
     problem = replace(search.problem, model=replace(search.problem.model, F=F))
-    own = replace(search, problem=problem, courses=[])
-    free = [*course.free, *free_of(link)]
-    values = np.concatenate([course.values, np.zeros(len(free) - len(course.free))])
-    found = Course((*course.labels, LABEL), free, values, course.allowed)
+    own = replace(search, problem=problem, hypotheses=[])
+    free = [*hypothesis.free, *free_of(link)]
+    values = np.concatenate([hypothesis.values, np.zeros(len(free) - len(hypothesis.free))])
+    found = Hypothesis((*hypothesis.labels, LABEL), free, values, hypothesis.nuisance)
     for _ in range(REFITS):
         own.gains = problem.filter(*own.model(found), begin=True)
-        own.fitter = Fitter(problem, own.gains, own.allowed, found, temper=True)
-        found = own.fitter.course(found.labels, free, found.values, found.allowed)
+        own.fitter = Fitter(problem, own.gains, own.nuisance, found, temper=True)
+        found = own.fitter.hypothesis(found.labels, free, found.values, found.nuisance)
         own.fitter.measure([found])
-        settle(own.fitter, found, STEPS)
+        converge(own.fitter, found, STEPS)
     own.gains = problem.filter(*own.model(found), begin=True)
-    own.courses = [found]
+    own.hypotheses = [found]
     return own, found
 
 
@@ -105,12 +105,12 @@ def shapes_flown(search: Search) -> np.ndarray:
     ])  # fmt: skip
 
 
-def carried_by(search: Search, course: Course) -> dict[str, float]:
+def carried_by(search: Search, hypothesis: Hypothesis) -> dict[str, float]:
     """How much of the correction each shape carries over these runs (rms), the largest first, what tells only."""
     table = shapes_flown(search)
     parts = {
         free.name: float(abs(value) * free.spread * np.sqrt(np.mean(table[:, free.entry - ef.SHAPE] ** 2)))
-        for free, value in zip(course.free, course.values, strict=True)
+        for free, value in zip(hypothesis.free, hypothesis.values, strict=True)
         if free.label == LABEL
     }
     whole = np.sqrt(sum(part**2 for part in parts.values()))
@@ -119,15 +119,15 @@ def carried_by(search: Search, course: Course) -> dict[str, float]:
 
 
 def correct(
-    search: Search, course: Course, freed: list[Probed], say: Callable[[str], None] = lambda text: None
+    search: Search, hypothesis: Hypothesis, probed: list[ProbeResult], say: Callable[[str], None] = lambda text: None
 ) -> Correction | None:
-    """The correction that explains most, of those at the links that gain most when freed; None where none may be."""
-    probes = [found.probe for found in freed if found.gain > 0.0 and links_of(found.probe)][:LINKS_TRIED]
-    best: tuple[float, str, Search, Course] | None = None
+    """The correction that explains most, of those at the links whose probes gain most; None where none may be."""
+    probes = [found.probe for found in probed if found.gain > 0.0 and links_of(found.probe)][:LINKS_TRIED]
+    best: tuple[float, str, Search, Hypothesis] | None = None
     for probe in probes:
         for link in links_of(probe):
             say(f"correction: {link}")
-            own, found = fitted(search, course, link)
+            own, found = fitted(search, hypothesis, link)
             misfit = float(own.gains.misfit.sum())
             if np.isfinite(misfit) and (best is None or misfit < best[0]):
                 best = misfit, link, own, found

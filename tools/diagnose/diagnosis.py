@@ -1,31 +1,36 @@
 """The diagnosis of a case: where the simulator is wrong, why, how far the gap shrinks (docs/GAP.md, Answers)."""
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from sim_backend.effects.base import catalogue
-from tools.data.plain import as_plain
 from tools.data.runs.case import Case
 from tools.diagnose.cautions import cautions, not_asked
+from tools.diagnose.chain import noise_of, panels
 from tools.diagnose.correction import Correction, correct
-from tools.diagnose.doubt import UNFIT
+from tools.diagnose.matter import MATTERS
 from tools.diagnose.next_run import propose
-from tools.diagnose.probes import UNPREDICTABLE
+from tools.diagnose.noise_probes import UNPREDICTABLE
+from tools.diagnose.record import NONE, UNKNOWN, Curves, Data, Details, Noise, Panel, Picture, write_record
+from tools.diagnose.residuals import UNCLEAN, strongest_left
 from tools.diagnose.search import Search, run
 from tools.diagnose.shrink import AFTER, BEFORE, FLOOR, RECALIBRATED, Further, Shrinkage, by_channel, shrink_further
-from tools.diagnose.verdict import NONE, UNKNOWN, Answer, conclude, strongest_left
+from tools.diagnose.unknown import LEFT_OVER, UNFIT
+from tools.diagnose.verdict import EVIDENCE_NEEDED, TIE, Answer, conclude
+from tools.inference.channels import channels_of, measured
 from tools.inference.corrected import corrected_text
-from tools.inference.fit import Course
+from tools.inference.fit import Hypothesis
 from tools.inference.problem import ALL, pose
 from tools.inference.rules import Rules
 
 CORRECTION_FILE = "data_driven.toml"
 WORTH = 0.001  # a smaller probability is not written down
+DRAWN_RUNS = 2  # with the largest gaps
 
 
 @dataclass
@@ -38,6 +43,8 @@ class Diagnosis:
     shrinkage: Shrinkage
     next_run: dict[str, Any]
     mission: str  # its file's text
+    panels: list[Panel]
+    noise: Noise | None
     correction: Correction | None = None  # of an unknown gap
     further: Further | None = None  # with that correction
 
@@ -50,6 +57,11 @@ class Diagnosis:
     def cautions(self) -> list[str]:
         """What these runs cannot say, a line each."""
         found = cautions(self.answer.search.problem)
+        found += [
+            f"{label} is there ({nat:.0f} nat of evidence), but moves no channel of any window by {MATTERS:g} of its "
+            "tolerance: no gap"
+            for label, nat in self.answer.negligible.items()
+        ]
         if self.identify_first:
             found.insert(0, (
                 f"the vehicle file misses these runs by {self.shrinkage.after:.1f} tolerances whatever is added to it: "
@@ -59,17 +71,23 @@ class Diagnosis:
 
     @property
     def verdict(self) -> str:
-        return {NONE: "none", UNKNOWN: "unknown"}.get(self.answer.main, "cause")
+        return verdict_of(self.answer)
+
+
+def verdict_of(answer: Answer) -> str:
+    """none, cause or unknown."""
+    return answer.main if answer.main in (NONE, UNKNOWN) else "cause"
 
 
 def diagnose(case: Case, say: Callable[[str], None] = lambda text: None, rules: Rules = ALL) -> Diagnosis:
-    """Diagnose a case; `say` is told where the search stands."""
+    """Diagnose a case; `say` hears how far the search is."""
     search = run(pose(case, rules=rules), say)
     answer = conclude(search, say)
     search = answer.search
     say(f"verdict: {answer.main}")
     entry, mission = propose(search)
-    found = Diagnosis(case, search, answer, answer.shrinkage, entry, mission)
+    noise, shares = noise_of(answer), panels(verdict_of(answer), answer)
+    found = Diagnosis(case, search, answer, answer.shrinkage, entry, mission, shares, noise)
     if found.verdict == "unknown":
         learn(found, say)
     return found
@@ -78,10 +96,10 @@ def diagnose(case: Case, say: Callable[[str], None] = lambda text: None, rules: 
 def learn(diagnosis: Diagnosis, say: Callable[[str], None]) -> None:
     """What an unknown gap does, as a correction, and how far it shrinks the gap; nothing where that would not help."""
     answer, shrinkage = diagnosis.answer, diagnosis.shrinkage
-    correction = correct(answer.search, answer.course, answer.freed, say)
+    correction = correct(answer.search, answer.hypothesis, answer.probed, say)
     if correction is None:
         return
-    further = shrink_further(correction.search, correction.course, shrinkage.runs[BEFORE])
+    further = shrink_further(correction.search, correction.hypothesis, shrinkage.runs[BEFORE])
     if further.after < shrinkage.after:
         diagnosis.correction, diagnosis.further = correction, further
 
@@ -108,21 +126,21 @@ def unexplained(diagnosis: Diagnosis) -> dict[str, Any] | None:
 
 def parameters(diagnosis: Diagnosis, label: str) -> dict[str, dict[str, Any]]:
     """Estimate, 90 % interval and unit of each parameter of a selected label, by Laplace's approximation."""
-    course = diagnosis.answer.course
-    if not len(course.free) or label not in course.labels:
+    hypothesis = diagnosis.answer.hypothesis
+    if not len(hypothesis.free) or label not in hypothesis.labels:
         return {}
-    spread = np.sqrt(np.diag(np.linalg.inv(course.precision)))
+    spread = np.sqrt(np.diag(np.linalg.inv(hypothesis.precision)))
     found = {}
-    for n, free in enumerate(course.free):
+    for n, free in enumerate(hypothesis.free):
         if free.label == label:
-            value, sd = course.values[n] * free.spread, 1.645 * spread[n] * free.spread
+            value, sd = hypothesis.values[n] * free.spread, 1.645 * spread[n] * free.spread
             low, high = max(value - sd, free.low * free.spread), min(value + sd, free.high * free.spread)
             found[free.name] = {"estimate": value, "ci90": [low, high], "unit": free.unit}
     return found
 
 
 def places(answer: Answer) -> list[dict[str, Any]]:
-    """Where, most probable first: labels' probabilities by place; what is unknown lies where a freed link gains."""
+    """Where, most probable first: labels' probabilities by place; what is unknown lies where a probed link gains."""
     weight: dict[tuple[str, str], float] = {}
     effects = catalogue()
 
@@ -132,7 +150,7 @@ def places(answer: Answer) -> list[dict[str, Any]]:
     known = {label: p for label, p in answer.probabilities.items() if label in effects}
     total = sum(known.values())
     doubt = answer.probabilities[UNKNOWN]
-    links = [f for f in answer.freed if f.probe.name not in UNPREDICTABLE and f.gain > 0.0]
+    links = [f for f in answer.probed if f.probe.name not in UNPREDICTABLE and f.gain > 0.0]
     gained = sum(f.gain for f in links)
     for link in links:
         add((link.probe.subsystem, link.probe.element), doubt * link.gain / gained)
@@ -164,13 +182,12 @@ def plain(diagnosis: Diagnosis) -> dict[str, Any]:
             "label": label, "probability": p, "group": answer.groups.get(label, [label]),
             "parameters": parameters(diagnosis, label),
         })  # fmt: skip
-    selected = list(answer.selected)
     return {
         "format": 1,
         "verdict": diagnosis.verdict,
         "where": places(answer),
         "causes": causes,
-        "selected": [] if diagnosis.verdict == "none" else selected,
+        "selected": list(answer.selected),
         "gap": gap_table(diagnosis.shrinkage, answer),
         "left": [{"channel": f.channel, "goes_with": f.test, "sigma": f.sigma} for f in answer.findings[:8]],
         "unknown": unexplained(diagnosis),
@@ -181,26 +198,76 @@ def plain(diagnosis: Diagnosis) -> dict[str, Any]:
     }
 
 
-def effects_of(course: Course) -> dict[str, dict[str, float]]:
+def effects_of(hypothesis: Hypothesis) -> dict[str, dict[str, float]]:
     """A candidate's effects with their values, as a corrected model holds them."""
     found: dict[str, dict[str, float]] = {}
-    for free, value in zip(course.free, course.values, strict=True):
+    for free, value in zip(hypothesis.free, hypothesis.values, strict=True):
         if free.label in catalogue():
             found.setdefault(free.label, {})[free.name] = float(value * free.spread)
     return found
 
 
-def write(diagnosis: Diagnosis, out: Path) -> None:
-    """diagnosis.json and corrected.toml into a folder."""
-    out.mkdir(parents=True, exist_ok=True)
+def details(diagnosis: Diagnosis) -> Details:
+    """report.json."""
+    answer, case = diagnosis.answer, diagnosis.case
+    runs = case.runs
+    columns = sorted({name for run in runs for name, values in run.columns.items() if np.isfinite(values).any()})
+    channels = {channel.name for run in runs for channel in channels_of(run)}
+    data = Data(
+        case.folder.resolve().name, case.vehicle.name, case.site, len(runs),
+        float(sum(run.t[-1] - run.t[0] for run in runs)), float(case.log_rate_hz), case.motion_capture, columns,
+        sorted(channels),
+    )  # fmt: skip
+    return Details(
+        format=1, version=installed(), data=data, evidence={k: float(v) for k, v in answer.gained.items()},
+        corrected=bool(answer.hypothesis.labels), noise=diagnosis.noise, panels=diagnosis.panels,
+        findings=answer.findings, pictures=[picture(diagnosis, n) for n in drawn_runs(diagnosis)],
+        thresholds={"evidence": EVIDENCE_NEEDED, "tie": TIE, "sigma": UNCLEAN, "left": LEFT_OVER, "matters": MATTERS},
+    )  # fmt: skip
 
-    def model(search: Search, course: Course) -> str:
-        P, F = search.model(course)
-        return corrected_text(diagnosis.case.vehicle_name, search.problem.model.P, P, F, effects_of(course))
+
+def installed() -> str:
+    """The version of this program."""
+    try:
+        return version("glider")
+    except PackageNotFoundError:
+        return "not installed"
+
+
+def drawn_runs(diagnosis: Diagnosis) -> list[int]:
+    """The runs with the largest gaps before, in their order."""
+    totals = np.nan_to_num([gap.total for gap in diagnosis.shrinkage.runs[BEFORE]])
+    return sorted(np.argsort(-totals, kind="stable")[:DRAWN_RUNS].tolist())
+
+
+def picture(diagnosis: Diagnosis, n: int) -> Picture:
+    """A run's gaps, for its pictures."""
+    run = diagnosis.case.runs[n]
+
+    def gaps(which: str) -> dict[str, float | None]:
+        found = diagnosis.shrinkage.runs[which][n]
+        return {**found.channels, "total": found.total}
+
+    names = [channel.name for channel in channels_of(run)]
+    return Picture(run.name, names, gaps(BEFORE), gaps(AFTER))
+
+
+def curves(diagnosis: Diagnosis, n: int) -> Curves:
+    """What was measured in a run and what two models say of it."""
+    run, said = diagnosis.case.runs[n], diagnosis.shrinkage.predictions
+    return Curves(run.t, measured(run), said[BEFORE][n], said[AFTER][n])
+
+
+def write(diagnosis: Diagnosis, out: Path) -> None:
+    """Everything that a diagnosis leaves behind, but for the report, into a folder."""
+    write_record(out, plain(diagnosis), details(diagnosis), [curves(diagnosis, n) for n in drawn_runs(diagnosis)])
+
+    def model(search: Search, hypothesis: Hypothesis) -> str:
+        P, F = search.model(hypothesis)
+        return corrected_text(diagnosis.case.vehicle_name, search.problem.model.P, P, F, effects_of(hypothesis))
 
     (out / "next_run.toml").write_text(diagnosis.mission, encoding="utf-8")
-    (out / "corrected.toml").write_text(model(diagnosis.search, diagnosis.answer.course), encoding="utf-8")
+    (out / "corrected.toml").write_text(model(diagnosis.search, diagnosis.answer.hypothesis), encoding="utf-8")
     if diagnosis.correction is not None:
-        text = model(diagnosis.correction.search, diagnosis.correction.course)
+        text = model(diagnosis.correction.search, diagnosis.correction.hypothesis)
         (out / CORRECTION_FILE).write_text(text, encoding="utf-8")
-    (out / "diagnosis.json").write_text(json.dumps(as_plain(plain(diagnosis)), indent=1) + "\n", encoding="utf-8")

@@ -13,7 +13,7 @@ from sim_backend.core import effect_layout as ef
 from tools.diagnose.search import Search
 from tools.gap.measure import wrap
 from tools.inference.channels import CHANNELS
-from tools.inference.core.innovations import N_SPECTRAL
+from tools.inference.core.filter import N_SPECTRAL
 from tools.inference.problem import Problem
 
 SECONDS, RATE = 90.0, 10.0  # s, Hz

@@ -5,11 +5,11 @@ many there are (Bonferroni). Spectrum and correlations are taken run by run and 
 """
 
 import itertools
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import norm
 
+from tools.diagnose.record import Finding
 from tools.inference.problem import Gains, Problem
 
 CHANNELS = (
@@ -17,15 +17,8 @@ CHANNELS = (
     "mocap x", "mocap y", "mocap z", "mocap roll", "mocap pitch", "mocap yaw",
 )  # fmt: skip
 LAGS = ((1, 2), (3, 10), (11, 60))  # samples, in groups
-
-
-@dataclass(frozen=True)
-class Finding:
-    """One test: what is left in a channel, and what it goes with."""
-
-    channel: str
-    test: str
-    sigma: float
+SHAPES = ("variance", "mean", "lag", "spectrum")  # tests of a channel by itself; the others are correlations
+UNCLEAN = 6.0  # sigma, corrected for the number of tests
 
 
 def features(problem: Problem, gains: Gains) -> dict[str, np.ndarray]:
@@ -132,3 +125,18 @@ def worst(found: list[Finding]) -> float:
         return 0.0
     chance = 2.0 * norm.sf(max(abs(f.sigma) for f in found)) * len(found)
     return float(norm.isf(min(max(chance, 1e-300), 1.0 - 1e-9)))
+
+
+def strongest_left(findings: list[Finding]) -> tuple[Finding | None, Finding | None]:
+    """The strongest finding, and the strongest that is a correlation, in the same channel if that has one.
+
+    None where they are too weak.
+    """
+    strong = [f for f in findings if abs(f.sigma) >= UNCLEAN]
+    if not strong:
+        return None, None
+    correlated = sorted(
+        (f for f in strong if not f.test.startswith(SHAPES)),
+        key=lambda f: (f.channel != strong[0].channel, -abs(f.sigma)),
+    )
+    return strong[0], correlated[0] if correlated else None

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim_backend.core import effect_layout as ef
-from tools.diagnose.search import Search
+from tools.diagnose.search import Search, without_extra_noise
 from tools.gap.measure import RunGap, root_mean_square, run_gap
-from tools.inference.candidates import place
 from tools.inference.channels import CHANNELS
-from tools.inference.fit import MOST, Course, within
+from tools.inference.fit import NUISANCE_LIMIT, Hypothesis, bounded_step
 from tools.inference.model import Model
+from tools.inference.parameters import model_at
 from tools.inference.predict import predict as predict_nominal
 from tools.inference.problem import Problem, cut, estimated, fly_on
 
@@ -51,29 +51,29 @@ def by_channel(runs: list[RunGap]) -> dict[str, float]:
     return found | {"total": root_mean_square([gap.total for gap in runs])}
 
 
-def left_out(search: Search, course: Course) -> list[tuple[np.ndarray, np.ndarray]]:
+def left_out(search: Search, hypothesis: Hypothesis) -> list[tuple[np.ndarray, np.ndarray]]:
     """A candidate's models, each fitted without one run: the step that the other runs ask for, to first order.
 
     Of a single run nothing can be left out: its model is fitted to it.
     """
     if len(search.problem.runs) == 1:
-        return [search.model(course)]
+        return [search.model(hypothesis)]
     fitter, problem = search.fitter, search.problem
-    fitter.linearise([course])
-    columns = np.vstack([fitter.J, course.columns]) if len(course.free) else fitter.J
-    normal = course.normal
+    fitter.linearise([hypothesis])
+    columns = np.vstack([fitter.J, hypothesis.columns]) if len(hypothesis.free) else fitter.J
+    normal = hypothesis.normal
     run = np.broadcast_to(problem.run_of[:, None], problem.valid.shape)[problem.valid]
-    at = np.concatenate([course.allowed, course.values])
-    low = np.concatenate([np.minimum(-MOST, course.allowed), course.low]) - at
-    high = np.concatenate([np.maximum(MOST, course.allowed), course.high]) - at
+    at = np.concatenate([hypothesis.nuisance, hypothesis.values])
+    low = np.concatenate([np.minimum(-NUISANCE_LIMIT, hypothesis.nuisance), hypothesis.low]) - at
+    high = np.concatenate([np.maximum(NUISANCE_LIMIT, hypothesis.nuisance), hypothesis.high]) - at
     # A step that all runs together still ask for was tried and brought nothing: limits and kinks are not linear.
-    still = within(normal, course.slope, low, high)
+    still = bounded_step(normal, hypothesis.slope, low, high)
     models = []
     for n in range(len(problem.runs)):
         own = columns[:, run == n]
-        slope = course.slope - own @ course.e[run == n]
-        step = within(normal - own @ own.T, slope, low, high) - still
-        models.append(place(problem, [*search.allowed, *course.free], at + np.clip(step, low, high)))
+        slope = hypothesis.slope - own @ hypothesis.e[run == n]
+        step = bounded_step(normal - own @ own.T, slope, low, high) - still
+        models.append(model_at(problem, [*search.nuisance, *hypothesis.free], at + np.clip(step, low, high)))
     return models
 
 
@@ -97,10 +97,10 @@ def gaps(
     return found, flown
 
 
-def floor(search: Search, course: Course, rng: np.random.Generator) -> list[RunGap]:
+def floor(search: Search, hypothesis: Hypothesis, rng: np.random.Generator) -> list[RunGap]:
     """What noise and disturbance leave of a perfect model: the selected model's own flights, predicted by itself."""
     problem = search.problem.as_recorded
-    model = search.model(course)
+    model = search.model(hypothesis)
     starts = search.gains.X[problem.recording.bounds[:-1]]
     draws = []
     for _ in range(DRAWS):
@@ -112,6 +112,11 @@ def floor(search: Search, course: Course, rng: np.random.Generator) -> list[RunG
         channels = {name: root_mean_square([draw[n].channels[name] for draw in draws]) for name in names}
         mean.append(RunGap(run.name, channels, root_mean_square(channels.values()), draws[0][n].windows))
     return mean
+
+
+def case_noise_floor(search: Search, hypothesis: Hypothesis) -> dict[str, float]:
+    """The floor by channel with the disturbance of the case alone, whatever disorder the search knows of."""
+    return by_channel(floor(without_extra_noise(search), hypothesis, np.random.default_rng(SEED)))
 
 
 def squares(found: list[RunGap]) -> np.ndarray:
@@ -136,9 +141,9 @@ def over_runs(
     return value(whole), (float(low), float(high))
 
 
-def left_out_gap(search: Search, course: Course) -> float:
+def left_out_gap(search: Search, hypothesis: Hypothesis) -> float:
     """The total gap of a candidate on runs left out, over the runs."""
-    runs, _ = gaps(search.problem, left_out(search, course))
+    runs, _ = gaps(search.problem, left_out(search, hypothesis))
     return float(np.sqrt(squares(runs).mean()))
 
 
@@ -152,16 +157,16 @@ class Further:
     ci90: tuple[float, float]
 
 
-def shrink_further(search: Search, course: Course, before: list[RunGap]) -> Further:
+def shrink_further(search: Search, hypothesis: Hypothesis, before: list[RunGap]) -> Further:
     """The gap with another model fitted to the same runs, against the gaps before."""
-    runs, _ = gaps(search.problem, left_out(search, course))
+    runs, _ = gaps(search.problem, left_out(search, hypothesis))
     b, a = squares(before), squares(runs)
     rng = np.random.default_rng(SEED)
     shrunk, ci90 = over_runs(lambda pick: 1.0 - rms(a, pick) / rms(b, pick), rng, len(runs))
     return Further(runs, float(np.sqrt(a.mean())), shrunk, ci90)
 
 
-def shrink(search: Search, course: Course) -> Shrinkage:
+def shrink(search: Search, hypothesis: Hypothesis) -> Shrinkage:
     """The gap before, recalibrated, after, and its floor, on runs left out of the fit."""
     problem = search.problem
     rng = np.random.default_rng(SEED)
@@ -169,12 +174,12 @@ def shrink(search: Search, course: Course) -> Shrinkage:
     flown = predict_nominal(problem.case, nominal, problem.runs)
     listed = cut(problem).listed
     refitted, Y_refitted = gaps(problem, left_out(search, search.null))
-    after, Y_after = gaps(problem, left_out(search, course)) if course.labels else (refitted, Y_refitted)
+    after, Y_after = gaps(problem, left_out(search, hypothesis)) if hypothesis.labels else (refitted, Y_refitted)
     runs = {
         BEFORE: [run_gap(run, flown[n], listed[n]) for n, run in enumerate(problem.runs)],
         RECALIBRATED: refitted,
         AFTER: after,
-        FLOOR: floor(search, course, rng),
+        FLOOR: floor(search, hypothesis, rng),
     }
     predictions = {BEFORE: flown, RECALIBRATED: Y_refitted, AFTER: Y_after}
     total = {name: squares(found) for name, found in runs.items()}

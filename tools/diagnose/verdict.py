@@ -1,28 +1,30 @@
-"""From fits to an answer: which effects earn their place, how probable each label is, and what cannot be told apart."""
+"""From fits to an answer: which effects are selected, how probable each label is, and which cannot be told apart."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from sim_backend.effects.base import catalogue
-from tools.diagnose.doubt import UNCLEAN, clock_label, disorder, doubt, left_share, what_is_left
-from tools.diagnose.probes import CLOCK, UNPREDICTABLE, Probed, raised
-from tools.diagnose.residuals import Finding, tests, worst
-from tools.diagnose.search import Search, run, settle
+from tools.diagnose.matter import MATTERS, disorder_matters, gap_matters, movements
+from tools.diagnose.noise_probes import CLOCK, UNPREDICTABLE, ProbeResult, inflated
+from tools.diagnose.record import NONE, UNKNOWN, Finding
+from tools.diagnose.residuals import UNCLEAN, tests, worst
+from tools.diagnose.search import Search, converge, run
 from tools.diagnose.shrink import Shrinkage, left_out_gap, shrink
-from tools.inference.candidates import CLOCK_PLACE
-from tools.inference.fit import Course
+from tools.diagnose.unknown import LEAST_UNKNOWN, clock_label, disorder, left_share, probability_unknown, remainder_of
+from tools.inference.fit import Hypothesis
+from tools.inference.parameters import CLOCK_PLACE
 
-NONE, UNKNOWN = "none", "unknown"
-PRIOR_NONE = 0.5  # before anything was measured; the labels share the rest
-SHOWN = 0.3  # of the gap that is left on runs left out: an effect beside another must close as much more
-EARNED = 12.0  # nat of evidence that an effect brings, or it is left out (docs/DIAGNOSIS.md, Thresholds)
+HELD_OUT_SHARE = 0.3  # of the gap that is left on runs left out: an effect beside another must close as much more
+# Nat of evidence that an effect brings, or it is left out (docs/DIAGNOSIS.md, Thresholds): the prior odds of none to a
+# label, so that a label is as probable as none where it would just be selected.
+EVIDENCE_NEEDED = 12.0
 TIE = 6.0  # nat within which two labels are not told apart: what a change of prior spreads can move
 MOST_GROUP = 3
-MISTAKEN = 0.03  # answers that named something else altogether, of those to the cases it was developed with: 3 of 104
+ERROR_RATE = 0.03  # answers that named something else altogether, of those to the cases it was developed with: 3 of 104
 CERTAIN = 0.9  # of the recalibrated gap: effects beside an unknown one that leave more are not certain
-SHAPES = ("variance", "mean", "lag", "spectrum")  # tests of a channel by itself; the others go with something
+LIKELY = 1e-3  # probability from which an alternative's effect on the windows is looked at
 
 
 @dataclass
@@ -31,100 +33,108 @@ class Answer:
 
     search: Search  # the one that the answer rests on
     selected: list[str]  # most of the gap first
-    main: str  # label, NONE or UNKNOWN
+    main: str  # label out of `selected`, NONE or UNKNOWN: the most probable
     probabilities: dict[str, float]  # of the main cause; NONE and UNKNOWN among them
     groups: dict[str, list[str]]
-    course: Course  # the corrected model
-    null: Course  # recalibrated
+    hypothesis: Hypothesis  # the corrected model
+    null: Hypothesis  # recalibrated
     findings: list[Finding]
-    unclean: float  # sigma of what is left, corrected for the number of tests
+    whiteness: float  # sigma of what is left, corrected for the number of tests
     unexplained: float  # of the squared gap beyond the floor, the share that the selected effects leave
     gained: dict[str, float]  # nat that each selected effect brings
-    freed: list[Probed]  # links of the chain, beyond the selected effects; empty where nothing is left
-    noise: Probed | None  # turbulence, waves or motion capture's clock, where the search was told of them
+    negligible: dict[str, float]  # nat of effects that are there, but move no window by MATTERS
+    probed: list[ProbeResult]  # beyond the selected effects; empty where nothing is left
+    noise: ProbeResult | None  # turbulence, waves or motion capture's clock, where the search knew of it
     shrinkage: Shrinkage
 
 
-def drop(search: Search, course: Course, label: str) -> Course:
-    """The candidate without one of its effects, fitted."""
-    labels = tuple(one for one in course.labels if one != label)
-    for known in search.courses:
+def drop(search: Search, hypothesis: Hypothesis, label: str) -> Hypothesis:
+    """The hypothesis without one of its effects, fitted."""
+    labels = tuple(one for one in hypothesis.labels if one != label)
+    for known in search.hypotheses:
         if set(known.labels) == set(labels):
             return known
     if not labels:
         return search.null
-    keep = np.array([f.label != label for f in course.free])
-    less = search.fitter.course(
-        labels, [f for f in course.free if f.label != label], course.values[keep], course.allowed
+    keep = np.array([f.label != label for f in hypothesis.free])
+    less = search.fitter.hypothesis(
+        labels, [f for f in hypothesis.free if f.label != label], hypothesis.values[keep], hypothesis.nuisance
     )
     search.fitter.measure([less])
-    settle(search.fitter, less, 4)
-    search.courses.append(less)
+    converge(search.fitter, less, 4)
+    search.hypotheses.append(less)
     return less
 
 
-def clock_of(search: Search, course: Course, gained: dict[str, float]) -> Course | None:
-    """Of a candidate the effect of motion capture's clock that brings most, as it stands; None where it has none."""
+def clock_of(search: Search, hypothesis: Hypothesis, gained: dict[str, float]) -> Hypothesis | None:
+    """Of a hypothesis the effect of motion capture's clock that brings most, as it stands; None where it has none."""
     labels = sorted((label for label in gained if catalogue()[label].place == CLOCK_PLACE), key=lambda n: -gained[n])
     if not labels:
         return None
-    kept = np.array([f.label == labels[0] for f in course.free])
-    return search.fitter.course((labels[0],), [f for f in course.free if f.label == labels[0]], course.values[kept])
+    kept = np.array([f.label == labels[0] for f in hypothesis.free])
+    free = [f for f in hypothesis.free if f.label == labels[0]]
+    return search.fitter.hypothesis((labels[0],), free, hypothesis.values[kept])
 
 
-def earned_outside(search: Search, course: Course) -> dict[str, float]:
+def held_out_worth(search: Search, hypothesis: Hypothesis) -> dict[str, float]:
     """By how much the gap on runs left out grows without each effect, the rest fitted anew, over the gap with it.
 
-    The root of the difference of squares; 0 where it does not grow. An effect below SHOWN is a detail that the data can
-    see and nobody needs: the wrong form of another one, a sample's worth of delay.
+    The root of the difference of squares; 0 where it does not grow. An effect below HELD_OUT_SHARE is a detail that
+    the data can see and nobody needs: the wrong form of another one, a sample's worth of delay.
     """
-    whole = left_out_gap(search, course)
+    whole = left_out_gap(search, hypothesis)
     found = {}
-    for label in course.labels:
-        without = left_out_gap(search, drop(search, course, label))
+    for label in hypothesis.labels:
+        without = left_out_gap(search, drop(search, hypothesis, label))
         found[label] = float(np.sqrt(max(without**2 - whole**2, 0.0)) / max(whole, 1e-6))
     return found
 
 
-def thin(search: Search) -> tuple[Course, dict[str, float]]:
-    """The best candidate without what does not earn its place, and what each of its effects brings."""
-    course = search.best
-    while course.labels:
+def prune_effects(search: Search) -> tuple[Hypothesis, dict[str, float]]:
+    """Backward elimination: the best hypothesis without what does not earn its place; nat that each effect brings."""
+    hypothesis = search.best
+    while hypothesis.labels:
         gains = {
-            label: course.log_evidence(search.fitter) - drop(search, course, label).log_evidence(search.fitter)
-            for label in course.labels
+            label: hypothesis.log_evidence(search.fitter) - drop(search, hypothesis, label).log_evidence(search.fitter)
+            for label in hypothesis.labels
         }
         weakest = min(gains, key=lambda label: gains[label])
-        if gains[weakest] >= EARNED:
-            if len(course.labels) == 1:
-                return course, gains
-            outside = earned_outside(search, course)
+        if gains[weakest] >= EVIDENCE_NEEDED:
+            if len(hypothesis.labels) == 1:
+                return hypothesis, gains
+            outside = held_out_worth(search, hypothesis)
             weakest = min(outside, key=lambda label: outside[label])
-            if outside[weakest] >= SHOWN:
-                return course, gains
-        course = drop(search, course, weakest)
-    return course, {}
+            if outside[weakest] >= HELD_OUT_SHARE:
+                return hypothesis, gains
+        hypothesis = drop(search, hypothesis, weakest)
+    return hypothesis, {}
 
 
-def by_error(search: Search) -> tuple[Course, dict[str, float]]:
-    """The candidate of one effect, or of none, with the least gap on runs left out: what evidence is compared with."""
-    tried = [search.null, *(course for course in search.courses if len(course.labels) == 1)]
-    best = min(tried, key=lambda course: left_out_gap(search, course))
+def by_held_out_gap(search: Search) -> tuple[Hypothesis, dict[str, float]]:
+    """The hypothesis of one effect, or of none, with the least gap on runs left out: what evidence is compared with."""
+    tried = [search.null, *(hypothesis for hypothesis in search.hypotheses if len(hypothesis.labels) == 1)]
+    best = min(tried, key=lambda hypothesis: left_out_gap(search, hypothesis))
     return best, {label: best.log_evidence(search.fitter) for label in best.labels}
 
 
-def instead(search: Search, course: Course, main: str) -> dict[str, float]:
-    """Log evidence of every label in the place of the main one, beside the others that were selected."""
-    others = tuple(label for label in course.labels if label != main)
-    found = {main: course.log_evidence(search.fitter)} if main else {}
-    for known in search.courses:
+def alternatives(search: Search, hypothesis: Hypothesis, main: str) -> dict[str, Hypothesis]:
+    """The hypothesis of every label in the place of the main one, beside the others that were selected."""
+    others = tuple(label for label in hypothesis.labels if label != main)
+    found = {main: hypothesis} if main else {}
+    for known in search.hypotheses:
         if others and not set(others) <= set(known.labels):
             continue
         rest = [label for label in known.labels if label not in others]
         if len(rest) == 1 and len(known.labels) == len(others) + 1:
-            value = known.log_evidence(search.fitter)
-            found[rest[0]] = max(value, found.get(rest[0], -np.inf))
+            rival = found.setdefault(rest[0], known)
+            if known.log_evidence(search.fitter) > rival.log_evidence(search.fitter):
+                found[rest[0]] = known
     return found
+
+
+def evidence_of_alternatives(search: Search, hypothesis: Hypothesis, main: str) -> dict[str, float]:
+    """Log evidence of every label in the place of the main one."""
+    return {label: one.log_evidence(search.fitter) for label, one in alternatives(search, hypothesis, main).items()}
 
 
 def softmax(logs: dict[str, float]) -> dict[str, float]:
@@ -134,83 +144,132 @@ def softmax(logs: dict[str, float]) -> dict[str, float]:
     return {name: weight / total for name, weight in weights.items()}
 
 
-def told(search: Search, course: Course, gained: dict[str, float], found: Probed, say: Callable[[str], None]) -> Answer:
+def search_again_with_noise(
+    search: Search, hypothesis: Hypothesis, gained: dict[str, float], found: ProbeResult, say: Callable[[str], None]
+) -> Answer:
     """The answer of a further search, by a filter that knows of the disorder found."""
     problem, clock = search.problem, None
-    more, _ = raised(problem, found.probe, found.scale)
+    more, _ = inflated(problem, found.probe, found.scale)
     if found.probe.name == CLOCK:
-        clock = clock_of(search, course, gained)
+        clock = clock_of(search, hypothesis, gained)
     begin = problem.as_recorded if clock is None else problem
-    return conclude(run(begin.telling(more), say, clock), say, found)
+    return conclude(run(begin.with_extra_noise(more), say, clock), say, found)
 
 
-def conclude(search: Search, say: Callable[[str], None] = lambda text: None, noise: Probed | None = None) -> Answer:
-    """The answer of a finished search; its gains are taken anew at the selected model.
+def conclude(
+    search: Search, say: Callable[[str], None] = lambda text: None, noise: ProbeResult | None = None
+) -> Answer:
+    """The answer of a finished search; its gains are taken anew at the hypothesis with all that is evident.
 
-    `noise` is disorder that the search was already told of: turbulence, waves, or motion capture's clock.
+    `noise` is disorder that the search already knows of: turbulence, waves, or motion capture's clock.
     """
     problem = search.problem
-    course, gained = thin(search) if problem.rules.evidence else by_error(search)
-    search.courses = [c for c in search.courses if c is not course] + ([course] if course.labels else [])
-    search.gains = problem.filter(*search.model(course), begin=True)
+    evident, gained = prune_effects(search) if problem.rules.evidence else by_held_out_gap(search)
+    search.hypotheses = [c for c in search.hypotheses if c is not evident] + ([evident] if evident.labels else [])
+    search.gains = problem.filter(*search.model(evident), begin=True)
     findings = tests(problem, search.gains)
-    unclean, left = worst(findings), None
-    if unclean >= UNCLEAN and problem.rules.whiteness:
-        left = what_is_left(search, course, noise)
+    whiteness, left = worst(findings), None
+    if whiteness >= UNCLEAN and problem.rules.whiteness:
+        left = remainder_of(search, evident, noise)
         found = disorder(search, left) if noise is None else None
         if found is not None:
-            return told(search, course, gained, found, say)
+            return search_again_with_noise(search, evident, gained, found, say)
+    moved = movements(search, evident)
+    small = [label for label in evident.labels if moved[label] < MATTERS]
+    selected = evident
+    for label in small:
+        selected = drop(search, selected, label)
+    shrinkage = shrink(search, selected)
     disordered = ""  # its label
     if noise is not None:
-        disordered = clock_label(search, course) if noise.probe.name == CLOCK else noise.probe.name
+        disordered = clock_label(search, evident) if noise.probe.name == CLOCK else noise.probe.name
         gained = gained | {disordered: gained.get(disordered, 0.0) + noise.gain}
-    main = max(gained, key=lambda label: gained[label]) if gained else ""
+        if disorder_matters(search, selected, shrinkage):
+            small = [label for label in small if label != disordered]
+        elif disordered not in moved:
+            small.append(disordered)
+    negligible = {label: gained.pop(label) for label in small}
+    ranked = gained or negligible
+    main = max(ranked, key=lambda label: ranked[label]) if ranked else ""
     if disordered in UNPREDICTABLE:
         main = disordered
     by_search = problem.rules.evidence and not (noise is not None and main == disordered)
-    chances = posterior(search, course, main) if by_search else {main or NONE: 1.0}
-    shrinkage = shrink(search, course)
-    unknown = doubt(search, main, shrinkage, left, noise is not None)
+    chances = posterior(search, evident, main) if by_search else {main or NONE: 1.0}
+    chances = to_none(chances, negligible, movements_of_alternatives(search, evident, main, chances))
+    unknown = probability_unknown(search, bool(gained), bool(ranked), shrinkage, left, noise is not None)
+    if not gained and not gap_matters(shrinkage):
+        unknown = LEAST_UNKNOWN
     chances = {name: value * (1.0 - unknown) for name, value in chances.items()} | {UNKNOWN: unknown}
-    chances = admit_mistakes({label: 0.0 for label in catalogue()} | chances, main)
-    # A label that has not earned its place is none.
-    top = max((NONE, UNKNOWN, *gained), key=lambda name: chances.get(name, 0.0))
-    groups = grouped(rivals(search, course, main)) if by_search else {main: [main]}
-    if top == UNKNOWN and course.labels and shrinkage.after > CERTAIN * shrinkage.recalibrated:
-        course, shrinkage = search.null, shrink(search, search.null)
-        gained = {label: gain for label, gain in gained.items() if label == disordered}
+    likely = main if main in gained else ""
+    chances = mix_in_error_rate({label: 0.0 for label in catalogue()} | chances, likely)
+    top, chances = answer_first(chances, gained)
+    if top == NONE or (top == UNKNOWN and shrinkage.after > CERTAIN * shrinkage.recalibrated):
+        gained = {label: gain for label, gain in gained.items() if label == disordered and top == UNKNOWN}
+        if selected.labels:
+            selected, shrinkage = search.null, shrink(search, search.null)
+    groups = grouped(log_posteriors(search, evident, main)) if by_search else {main: [main]}
     return Answer(
         search=search, selected=sorted(gained, key=lambda label: (label != main, -gained[label])), main=top,
-        probabilities=chances, groups=groups, course=course, null=search.null, findings=findings, unclean=unclean,
-        unexplained=left_share(shrinkage), gained=gained, freed=[] if left is None else left.freed, noise=noise,
-        shrinkage=shrinkage,
+        probabilities=chances, groups=groups, hypothesis=selected, null=search.null, findings=findings,
+        whiteness=whiteness, unexplained=left_share(shrinkage), gained=gained, negligible=negligible,
+        probed=[] if left is None else left.probed, noise=noise, shrinkage=shrinkage,
     )  # fmt: skip
 
 
-def admit_mistakes(chances: dict[str, float], main: str) -> dict[str, float]:
-    """Probabilities of which MISTAKEN goes to all labels: the search may have lost the true one on its way.
+def movements_of_alternatives(
+    search: Search, hypothesis: Hypothesis, main: str, chances: dict[str, float]
+) -> dict[str, float]:
+    """How far each likely label moves the windows in the place of the main one, in tolerances."""
+    return {
+        label: movements(search, one)[label]
+        for label, one in alternatives(search, hypothesis, main).items()
+        if label != main and chances.get(label, 0.0) >= LIKELY
+    }
+
+
+def to_none(chances: dict[str, float], negligible: Iterable[str], moved: dict[str, float]) -> dict[str, float]:
+    """Probabilities with those of effects that do not matter given to none: there is no gap with them."""
+    small = {*negligible, *(label for label, far in moved.items() if far < MATTERS)}
+    kept = {label: 0.0 if label in small else chance for label, chance in chances.items()}
+    return kept | {NONE: kept.get(NONE, 0.0) + sum(chance for label, chance in chances.items() if label in small)}
+
+
+def answer_first(chances: dict[str, float], gained: Iterable[str]) -> tuple[str, dict[str, float]]:
+    """The most probable of none, unknown and what was selected; probabilities in which no other label passes it.
+
+    A label that was not selected can only pass by what is mixed in for errors, or where elimination went another way.
+    """
+    top = max((NONE, UNKNOWN, *gained), key=lambda name: chances.get(name, 0.0))
+    capped = {name: min(chance, chances[top]) for name, chance in chances.items()}
+    total = sum(capped.values())
+    return top, {name: capped[name] / total for name in (top, *(name for name in capped if name != top))}
+
+
+def mix_in_error_rate(chances: dict[str, float], main: str) -> dict[str, float]:
+    """Probabilities of which ERROR_RATE goes to all labels: the search may have lost the true one on its way.
 
     Half of it to those at the place of the main one, which an effect in another form is taken for soonest.
     """
     labels = catalogue()
     beside = [name for name, effect in labels.items() if main and effect.place == labels[main].place and name != main]
-    shares = dict.fromkeys(labels, (0.5 if beside else 1.0) * MISTAKEN / len(labels))
+    shares = dict.fromkeys(labels, (0.5 if beside else 1.0) * ERROR_RATE / len(labels))
     for name in beside:
-        shares[name] += 0.5 * MISTAKEN / len(beside)
-    return {name: (1.0 - MISTAKEN) * value + shares.get(name, 0.0) for name, value in chances.items()}
+        shares[name] += 0.5 * ERROR_RATE / len(beside)
+    return {name: (1.0 - ERROR_RATE) * value + shares.get(name, 0.0) for name, value in chances.items()}
 
 
-def rivals(search: Search, course: Course, main: str) -> dict[str, float]:
-    """Log posterior of each label in the place of the main one, up to a constant."""
-    prior = np.log((1.0 - PRIOR_NONE) / len(search.candidates))
-    return {label: value + prior for label, value in instead(search, course, main).items()}
+def log_posteriors(search: Search, hypothesis: Hypothesis, main: str) -> dict[str, float]:
+    """Log posterior of each label in the place of the main one, up to a constant: that of none is its log evidence."""
+    return {
+        label: value - EVIDENCE_NEEDED for label, value in evidence_of_alternatives(search, hypothesis, main).items()
+    }
 
 
-def posterior(search: Search, course: Course, main: str) -> dict[str, float]:
+def posterior(search: Search, hypothesis: Hypothesis, main: str) -> dict[str, float]:
     """Probabilities of the labels and of none, as if there were nothing unknown."""
-    logs = rivals(search, course, main)
-    bare = drop(search, course, main) if main else search.null
-    logs[NONE] = bare.log_evidence(search.fitter) + np.log(PRIOR_NONE)
+    logs = log_posteriors(search, hypothesis, main)
+    bare = drop(search, hypothesis, main) if main else search.null
+    logs[NONE] = bare.log_evidence(search.fitter)
     return softmax(logs)
 
 
@@ -221,18 +280,3 @@ def grouped(logs: dict[str, float]) -> dict[str, list[str]]:
         label: [label, *(o for o in labels if o != label and abs(logs[o] - logs[label]) < TIE)][:MOST_GROUP]
         for label in labels
     }
-
-
-def strongest_left(findings: list[Finding]) -> tuple[Finding | None, Finding | None]:
-    """The strongest finding, and the strongest that says what it goes with, in the same channel if that has one.
-
-    None where they are too weak.
-    """
-    strong = [f for f in findings if abs(f.sigma) >= UNCLEAN]
-    if not strong:
-        return None, None
-    goes = sorted(
-        (f for f in strong if not f.test.startswith(SHAPES)),
-        key=lambda f: (f.channel != strong[0].channel, -abs(f.sigma)),
-    )
-    return strong[0], goes[0] if goes else None

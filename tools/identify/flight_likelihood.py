@@ -1,6 +1,6 @@
 """The trajectory likelihood: flights held to the recordings by a Kalman filter, linearised in what is free.
 
-What a model fails to foresee of each row, whitened (inference/core/innovations), is white for the true model whatever
+What a model fails to foresee of each row, whitened (inference/core/filter), is white for the true model whatever
 the disturbance did to the course. With the filter's gains kept, the innovations of any other model are a smooth
 function of its parameters, so that Gauss-Newton steps find the most probable ones, and their columns J there are the
 sufficient statistics of the posterior.

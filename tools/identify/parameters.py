@@ -13,7 +13,7 @@ import numpy as np
 from firmware.core.vehicle import layout
 from firmware.model.vehicle import COEFFICIENTS
 from sim_backend.core import effect_layout as ef
-from tools.inference.candidates import Free
+from tools.inference.parameters import FreeParameter
 from tools.inference.problem import Problem
 
 # 1 sigma before any flight. [uncertainty] says what is left after one: these are what a first vehicle file may be off.
@@ -44,7 +44,7 @@ BIAS_UNITS = (*3 * ["rad"], *3 * ["rad/s"], "m", "m", "kg")
 class Parameters:
     """Everything free, the coefficients first. `nominal` (n,): the vehicle file's values, 0 where it names none."""
 
-    free: list[Free]
+    free: list[FreeParameter]
     nominal: np.ndarray
 
     @property
@@ -78,46 +78,49 @@ def coefficient_sizes(P: np.ndarray) -> np.ndarray:
     return np.maximum(size, 1e-3)
 
 
-def coefficients(P: np.ndarray) -> list[Free]:
+def coefficients(P: np.ndarray) -> list[FreeParameter]:
     """The twelve, with priors about the vehicle file's values."""
     found = []
     for name, size in zip(COEFFICIENTS, coefficient_sizes(P), strict=True):
         entry = getattr(layout, name.upper())
         spread = K_SHARE * size
         low = -P[entry] / spread if name in ("K_D0", "K_D") else -inf  # drag does not push
-        found.append(Free("", name, "P", entry, spread, low, inf, K_UNITS[name]))
+        found.append(FreeParameter("", name, "P", entry, spread, low, inf, K_UNITS[name]))
     return found
 
 
-def _masses(problem: Problem, scale: float) -> list[Free]:
+def _masses(problem: Problem, scale: float) -> list[FreeParameter]:
     P, u = problem.model.P, problem.case.vehicle.uncertainty
-    found = [Free("", name, "P", entry, u.mass * P[entry], unit="kg") for name, entry in MASSES.items()]
+    found = [FreeParameter("", name, "P", entry, u.mass * P[entry], unit="kg") for name, entry in MASSES.items()]
     share = max(u.added, ADDED_SHARE)
     for name, entry in ADDED.items():
-        found.append(Free("", name, "P", entry, share * P[entry], unit="kg m2" if "inertia" in name else "kg"))
-    found.append(Free("", "net_mass", "P", layout.NET_MASS, max(u.net_mass, scale * NET_MASS), unit="kg"))
+        found.append(FreeParameter("", name, "P", entry, share * P[entry], unit="kg m2" if "inertia" in name else "kg"))
+    found.append(FreeParameter("", "net_mass", "P", layout.NET_MASS, max(u.net_mass, scale * NET_MASS), unit="kg"))
     for name, entry in CENTRE.items():
-        found.append(Free("", name, "P", entry, max(u.cg, scale * CG), unit="m"))
+        found.append(FreeParameter("", name, "P", entry, max(u.cg, scale * CG), unit="m"))
     return [f for f in found if f.spread > 0.0]
 
 
-def _biases(problem: Problem) -> list[Free]:
+def _biases(problem: Problem) -> list[FreeParameter]:
     s, seen = problem.case.sensors, problem.seen
     size = [*3 * [s.attitude.bias], *3 * [s.gyro.bias], s.depth.bias, s.slider.bias, s.ballast.bias]
     return [
-        Free("", f"{BIASES[j]}_bias", "F", ef.BIAS + j, size[j], unit=BIAS_UNITS[j])
+        FreeParameter("", f"{BIASES[j]}_bias", "F", ef.BIAS + j, size[j], unit=BIAS_UNITS[j])
         for j in range(len(BIASES))
         if seen[j] and size[j] > 0.0
     ]
 
 
-def _capture(problem: Problem) -> list[Free]:
+def _capture(problem: Problem) -> list[FreeParameter]:
     """The capture's frame and clock; which way its x axis lies along the vehicle's is free only with its attitude."""
     if not problem.seen[ef.Y_MOCAP_ROLL :].all():
         return []
     spreads = [*3 * [FRAME_TURN], *3 * [FRAME_OFFSET]]
-    found = [Free("", name, FRAME, n, spreads[n], unit="rad" if n < 3 else "m") for n, name in enumerate(FRAME_NAMES)]
-    return [*found, Free("", "capture_delay", "F", ef.MOCAP_DELAY, CLOCK, unit="s")]
+    found = [
+        FreeParameter("", name, FRAME, n, spreads[n], unit="rad" if n < 3 else "m")
+        for n, name in enumerate(FRAME_NAMES)
+    ]
+    return [*found, FreeParameter("", "capture_delay", "F", ef.MOCAP_DELAY, CLOCK, unit="s")]
 
 
 def parameters(problem: Problem) -> Parameters:
@@ -127,7 +130,7 @@ def parameters(problem: Problem) -> Parameters:
     if mocap:
         free += _capture(problem)
     else:
-        free.append(Free("", "ballast_scale", "F", ef.BALLAST_SCALE, WIRE_SCALE))
-        free.append(Free("", "slider_scale", "F", ef.SLIDER_SCALE, WIRE_SCALE))
+        free.append(FreeParameter("", "ballast_scale", "F", ef.BALLAST_SCALE, WIRE_SCALE))
+        free.append(FreeParameter("", "slider_scale", "F", ef.SLIDER_SCALE, WIRE_SCALE))
     nominal = np.array([problem.model.P[f.entry] if f.vector == "P" else 0.0 for f in free])
     return Parameters(free, nominal)

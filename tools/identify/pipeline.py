@@ -15,12 +15,12 @@ from tools.identify.acceleration_likelihood import fit_accelerations, suited
 from tools.identify.fit import Fit, fit
 from tools.identify.flight_likelihood import Flights
 from tools.identify.held import Held, hold_out
+from tools.identify.identifiability import unidentifiable_directions
 from tools.identify.levels import Levels
 from tools.identify.parameters import Parameters
 from tools.identify.sampler import Chains, Summary, sample, summarise
 from tools.identify.screen import LeftOut, despiked, screen
 from tools.identify.statistics import Quadratic
-from tools.identify.telling import blind
 from tools.inference.model import nominal_model
 from tools.inference.problem import Problem
 
@@ -104,7 +104,7 @@ class Identified:
             "spikes_removed": self.spikes,
             "seed": self.chains.seed,
             "notes": self.notes,
-            "not_told": [one.plain() for one in blind(self.free, self.chains.flat)],
+            "not_told": [one.plain() for one in unidentifiable_directions(self.free, self.chains.flat)],
         }
         if self.levels is not None:
             levels = zip(self.levels.names, self.levels.log, self.levels.sd, strict=True)

@@ -1,4 +1,4 @@
-"""A case as the diagnosis sees it: recordings, noise, and flights of any model along them (core/innovations)."""
+"""A case as the diagnosis sees it: recordings, noise, and flights of any model along them (core/filter)."""
 
 from dataclasses import dataclass, replace
 
@@ -12,9 +12,9 @@ from tools.data.runs.case import Case
 from tools.data.runs.run import Run
 from tools.inference import start
 from tools.inference.channels import measured
-from tools.inference.core.flown import fly_windows, read_rows, simulate_runs
-from tools.inference.core.innovations import filter_runs, follow_runs
-from tools.inference.core.passage import N_ERR, N_Y
+from tools.inference.core.filter import filter_runs, follow_runs
+from tools.inference.core.flight import fly_windows, read_rows, simulate_runs
+from tools.inference.core.step import N_ERR, N_Y
 from tools.inference.model import Model, nominal_model
 from tools.inference.rules import Rules
 from tools.inference.windows import Window, windows
@@ -59,7 +59,7 @@ class Problem:
     stamps: np.ndarray  # (rows,) s, of the poses of motion capture that stand in the rows
     run_of: np.ndarray  # (rows,)
     rules: Rules = ALL
-    told: np.ndarray | None = None  # (N_SPECTRAL,) of disorder that was found: added, and no rougher where others are
+    extra_noise: np.ndarray | None = None  # (N_SPECTRAL,) densities of disorder that was found, beside `spectral`
 
     recorded: "Problem | None" = None  # as it was before its poses were moved
 
@@ -74,15 +74,15 @@ class Problem:
         """The problem with motion capture's poses in the rows where they were recorded."""
         return self if self.recorded is None else self.recorded
 
-    def telling(self, more: np.ndarray) -> "Problem":
+    def with_extra_noise(self, more: np.ndarray) -> "Problem":
         """The problem, and the one it was made from, with densities (N_SPECTRAL,) of disorder added."""
-        recorded = None if self.recorded is None else self.recorded.telling(more)
-        return replace(self, told=more, recorded=recorded)
+        recorded = None if self.recorded is None else self.recorded.with_extra_noise(more)
+        return replace(self, extra_noise=more, recorded=recorded)
 
     @property
     def densities(self) -> np.ndarray:
-        """Spectral densities with what the problem was told of, (N_SPECTRAL,)."""
-        return self.spectral.copy() if self.told is None else self.spectral + self.told
+        """Spectral densities with the extra noise, (N_SPECTRAL,)."""
+        return self.spectral.copy() if self.extra_noise is None else self.spectral + self.extra_noise
 
     @property
     def seen(self) -> np.ndarray:

@@ -1,9 +1,9 @@
 """The chain command -> actuator -> force and moment -> motion -> sensor as a picture: five boxes, the likely lit."""
 
 from html import escape
-from typing import Any
 
-from tools.diagnose.chain import STAGES, stage_of
+from tools.diagnose.record import Place
+from tools.diagnose.stages import STAGES, stage_of
 
 WIDTH = 360
 BOX, GAP, TOP, TALL, LINE = 62.0, 12.5, 8, 48, 27
@@ -11,31 +11,31 @@ WRITTEN = {"force and moment": ("force,", "moment")}
 MOST_PLACES, LEAST = 2, 0.05  # named under a box: how many, and how probable
 
 
-def chain_svg(places: list[dict[str, Any]], certain: list[tuple[str, str]], doubt: bool) -> str:
+def chain_svg(places: list[Place], certain: list[tuple[str, str]], doubt: bool) -> str:
     """The picture as an <svg> element.
 
-    places: subsystem, element, probability; certain: places of further effects that are there beside the main one;
+    places: the likely ones; certain: places of further effects that are there beside the main one;
     doubt: the boxes are dashed, for a gap whose cause is not known.
     """
     heat = dict.fromkeys(STAGES, 0.0)
     named: dict[str, list[tuple[str, str]]] = {stage: [] for stage in STAGES}
     for place in places:
-        stage, p = stage_of(place["subsystem"], place["element"]), place["probability"]
+        stage, p = stage_of(place.subsystem, place.element), place.probability
         heat[stage] += p
-        own = (place["subsystem"], place["element"])
+        own = (place.subsystem, place.element)
         if p >= LEAST and own not in certain:
-            named[stage].append((place["element"], f"{100.0 * p:.0f} %"))
+            named[stage].append((place.element, f"{100.0 * p:.0f} %"))
     for subsystem, element in certain:
         stage = stage_of(subsystem, element)
         heat[stage] = 1.0
         named[stage].append((element, "too"))
-    told = (
+    said = (
         "; ".join(f"{stage}: {element} {share}" for stage in STAGES for element, share in named[stage])
         or "nothing stands out"
     )
     lines = min(max(len(found) for found in named.values()), MOST_PLACES)
     height = TOP + TALL + 8 + LINE * lines
-    out = [f'<svg class="chain" viewBox="0 0 {WIDTH} {height}" role="img" aria-label="{escape(f"chain: {told}")}">']
+    out = [f'<svg class="chain" viewBox="0 0 {WIDTH} {height}" role="img" aria-label="{escape(f"chain: {said}")}">']
     for n, stage in enumerate(STAGES):
         x = n * (BOX + GAP)
         out.append(_box(x, stage, min(heat[stage], 1.0), doubt))

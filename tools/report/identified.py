@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from firmware.model.vehicle import COEFFICIENTS
+from tools.identify.identifiability import sentences, unidentifiable_directions
 from tools.identify.levels import SENSORS, group_of_reading
 from tools.identify.pipeline import Identified
-from tools.identify.telling import blind, sentences
 from tools.inference.channels import measured
 from tools.inference.windows import windows
 from tools.report.charts import Chart, Line, svg
@@ -158,7 +158,7 @@ def report_html(found: Identified, truth: dict[str, float] | None = None) -> str
         "summaries": [one.plain() for one in found.coefficients],
         "others": [one.plain() for one in found.summaries[len(COEFFICIENTS) :]],
         "told": sentences(found.free, found.chains.flat),
-        "blind": [one.sentence() for one in blind(found.free, found.chains.flat)],
+        "blind": [one.sentence() for one in unidentifiable_directions(found.free, found.chains.flat)],
         "left_out": [str(one) for one in found.left_out], "spikes": found.spikes, "notes": found.notes,
         "marginals": png(marginals(found, truth)), "corner": png(corner(found)), "truth": truth is not None,
         "levels": [] if found.levels is None else [

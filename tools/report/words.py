@@ -4,12 +4,10 @@ import math
 from typing import Any
 
 from sim_backend.effects.base import catalogue
-from tools.diagnose.diagnosis import Diagnosis, places
-from tools.diagnose.doubt import UNCLEAN
-from tools.diagnose.probes import TURBULENCE, UNPREDICTABLE
-from tools.diagnose.residuals import Finding
-from tools.diagnose.shrink import Shrinkage
-from tools.diagnose.verdict import SHAPES, strongest_left
+from tools.diagnose.noise_probes import CLOCK, TURBULENCE, UNPREDICTABLE
+from tools.diagnose.record import Finding, Gap, Record
+from tools.diagnose.record import number as finite
+from tools.diagnose.residuals import SHAPES, UNCLEAN, strongest_left
 
 MINUS, DASH = "\N{MINUS SIGN}", "\N{EN DASH}"
 PLAIN = {
@@ -74,6 +72,11 @@ AXES = {
     "depth": "vertical", "slider": "slider", "ballast": "ballast tank", "mocap x": "horizontal",
     "mocap y": "horizontal", "mocap z": "vertical", "mocap roll": "roll axis",
     "mocap pitch": "pitch axis", "mocap yaw": "yaw axis",
+}  # fmt: skip
+FEATURES = {
+    "pump running": "whether the pump runs", "pump expelling": "whether the pump expels",
+    "time": "time since the start", "servo": "servo angle", "slider": "slider position", "ballast": "ballast mass",
+    "constant": "a constant",
 }  # fmt: skip
 SURE, LITTLE = 0.8, 0.02  # below the first the next answer is named, unless it is below the second
 MEANS = {"none": "no gap", "unknown": "a gap of another kind"}
@@ -164,138 +167,141 @@ def interval(low: float, high: float) -> str:
     return f"90 % interval {percent(low).removesuffix(' %')} to {percent(high)}"
 
 
-def how_far(diagnosis: Diagnosis, with_what: str) -> str:
+def how_far(record: Record, with_what: str) -> str:
     """The shrinkage on runs left out, and what recalibration alone does."""
-    s = diagnosis.shrinkage
+    gap = record.answer.gap
     return (
-        f"{with_what} the gap on runs left out of the fit {change(s.shrinkage)} ({interval(*s.ci90)}), "
-        f"while refitting the nominal parameters alone {alone(s)}"
+        f"{with_what} the gap on runs left out of the fit {change(finite(gap.shrinkage.value))} "
+        f"({interval(*map(finite, gap.shrinkage.ci90))}), while refitting the nominal parameters alone {alone(gap)}"
     )
 
 
-def alone(s: Shrinkage) -> str:
+def alone(gap: Gap) -> str:
     """What recalibration does to the gap, as the end of a sentence."""
-    share = left_of(s.before, s.recalibrated)
+    share = left_of(finite(gap.before["total"]), finite(gap.recalibrated["total"]))
     return f"makes it {percent(-share)} larger" if share < -0.005 else f"shrinks it by {percent(max(share, 0.0))}"
 
 
-def how_sure(diagnosis: Diagnosis) -> str:
+def how_sure(record: Record) -> str:
     """`97 % sure`; where that is little, what else it may be."""
-    answer = diagnosis.answer
-    p = answer.probabilities[answer.main]
-    others = {label: chance for label, chance in answer.probabilities.items() if label != answer.main}
-    second = max(others, key=lambda label: others[label])
-    if p >= SURE or others[second] < LITTLE:
-        return f"{sure(p)} sure"
-    return f"only {sure(p)} sure, else {MEANS.get(second, second)} at {sure(others[second])}"
+    first, second = record.answer.causes[:2]
+    if first.probability >= SURE or second.probability < LITTLE:
+        return f"{sure(first.probability)} sure"
+    other = MEANS.get(second.label, second.label)
+    return f"only {sure(first.probability)} sure, else {other} at {sure(second.probability)}"
 
 
-def sentence(diagnosis: Diagnosis) -> str:
+def sentence(record: Record) -> str:
     """The verdict in one plain sentence: what, where, how sure, how far."""
-    if diagnosis.verdict == "none":
-        return _none(diagnosis)
-    if diagnosis.verdict == "unknown":
-        return _unknown(diagnosis)
-    if diagnosis.answer.main in UNPREDICTABLE:
-        return _scatter(diagnosis)
-    return _causes(diagnosis)
+    answer = record.answer
+    if answer.verdict == "none":
+        return _none(record)
+    if answer.verdict == "unknown":
+        return _unknown(record)
+    return _disorder(record) if answer.main in UNPREDICTABLE else _causes(record)
 
 
-def _none(diagnosis: Diagnosis) -> str:
-    s = diagnosis.shrinkage
+def _none(record: Record) -> str:
+    gap = record.answer.gap
+    before, refitted, floor = (number(finite(table["total"])) for table in (gap.before, gap.recalibrated, gap.floor))
     return (
-        "No gap: noise, disturbance and parameters within their uncertainty explain these runs "
-        f"({how_sure(diagnosis)}); on runs left out of the fit the total stands at {number(s.before)} tolerances with "
-        f"the nominal model and at {number(s.recalibrated)} with its parameters refitted, where noise and disturbance "
-        f"alone leave {number(s.floor)}."
+        f"No gap: noise, disturbance and parameters within their uncertainty explain these runs ({how_sure(record)}); "
+        f"on runs left out of the fit the total is {before} tolerances with the nominal model and {refitted} with its "
+        f"parameters refitted, where noise and disturbance alone leave {floor}."
     )
 
 
-def _causes(diagnosis: Diagnosis) -> str:
-    answer = diagnosis.answer
+def _causes(record: Record) -> str:
+    answer = record.answer
     others = [label for label in answer.selected if label != answer.main]
-    alike = [label for label in answer.groups.get(answer.main, []) if label != answer.main]
-    said = f"{PLAIN[answer.main]} ({answer.main}, {place(answer.main)}; {how_sure(diagnosis)})"
+    alike = [label for label in answer.cause(answer.main).group if label != answer.main]
+    said = f"{PLAIN[answer.main]} ({answer.main}, {place(answer.main)}; {how_sure(record)})"
     if alike:
-        said += f", which these data cannot tell from {joined(alike)}"
+        said += f", which these data cannot distinguish from {joined(alike)}"
     if others:
-        beside = joined([f"{PLAIN[label]} ({label}, {place(label)})" for label in others])
-        said += f", and beside it {beside}"
-    if answer.noise is not None:  # told of the clock: of water in disorder _scatter speaks
-        said += "; that clock wanders"
+        said += f", and also {joined([f'{PLAIN[label]} ({label}, {place(label)})' for label in others])}"
+    if record.details.noise is not None and record.details.noise.name == CLOCK:
+        said += "; that clock's delay varies with time"
     head = {0: "", 1: "Two effects at once: "}.get(len(others), f"{len(others) + 1} effects at once: ")
-    far = how_far(diagnosis, "with that in the model" if not others else "with these in the model")
+    far = how_far(record, "with that in the model" if not others else "with these in the model")
     return f"{upper(head + said)}; {far}."
 
 
-def _scatter(diagnosis: Diagnosis) -> str:
-    answer, s = diagnosis.answer, diagnosis.shrinkage
-    main, noise = answer.main, answer.noise
+def _disorder(record: Record) -> str:
+    answer, noise = record.answer, record.details.noise
     size = ""
-    if main == TURBULENCE and noise is not None:
+    if answer.main == TURBULENCE and noise is not None:
         size = f", about {noise.scale:.2g} times as rough"
-    others = [label for label in answer.selected if label != main]
-    beside = f", and beside it {joined([f'{PLAIN[o]} ({o}, {place(o)})' for o in others])}" if others else ""
+    others = [label for label in answer.selected if label != answer.main]
+    beside = f", and also {joined([f'{PLAIN[o]} ({o}, {place(o)})' for o in others])}" if others else ""
     return (
-        f"{upper(PLAIN[main])}{size} ({main}, {place(main)}; {how_sure(diagnosis)}){beside}; its "
-        f"course cannot be predicted, so that knowing it shrinks no gap, and on runs left out of the fit refitting the "
-        f"nominal parameters {alone(s)}, to {number(s.recalibrated)} tolerances."
+        f"{upper(PLAIN[answer.main])}{size} ({answer.main}, {place(answer.main)}; {how_sure(record)}){beside}; its "
+        f"time course is random, so that knowing it shrinks no gap, and on runs left out of the fit refitting the "
+        f"nominal parameters {alone(answer.gap)}, to {number(finite(answer.gap.recalibrated['total']))} tolerances."
     )
 
 
-def _unknown(diagnosis: Diagnosis) -> str:
-    answer = diagnosis.answer
-    said = f"A gap that no effect of the catalogue explains ({how_sure(diagnosis)})"
-    strongest, goes = strongest_left(answer.findings)
+def _unknown(record: Record) -> str:
+    answer = record.answer
+    said = f"A gap that no effect of the catalogue explains ({how_sure(record)})"
+    strongest, correlated = strongest_left(record.details.findings)
     if strongest is not None:
         said += f", strongest in measured {channel(strongest.channel)}"
-    if strongest is not None and goes is not None:
-        elsewhere = f", in measured {channel(goes.channel)}," if goes.channel != strongest.channel else ""
-        said += f" and{elsewhere} going with {goes.test}"
-    likely = places(answer)[:1]
-    if likely:
-        said += f", likeliest in {likely[0]['subsystem']}: {likely[0]['element']} ({sure(likely[0]['probability'])})"
+    if strongest is not None and correlated is not None:
+        elsewhere = f", in measured {channel(correlated.channel)}," if correlated.channel != strongest.channel else ""
+        said += f" and{elsewhere} correlated with {feature(correlated.test)}"
+    if answer.where:
+        likely = answer.where[0]
+        said += f", most likely in {likely.subsystem}: {likely.element} ({sure(likely.probability)})"
     known = "with nothing added to the model"
     if answer.selected:
         known = f"with the nearest known effects in the model ({joined(answer.selected)})"
-    said += f"; {how_far(diagnosis, known)}"
-    if diagnosis.correction is not None and diagnosis.further is not None:
-        said += (
-            (
-                f"; a data-driven correction of the {diagnosis.correction.link}, going with "
-                f"{joined(list(diagnosis.correction.carried))}, {change(diagnosis.further.shrinkage)}"
-            )
-            .replace("shrinks by", "would shrink it by")
-            .replace("grows by", "would make it larger by")
-        )
+    said += f"; {how_far(record, known)}"
+    correction = None if answer.unknown is None else answer.unknown.correction
+    if correction is not None:
+        share = finite(correction.shrinkage.value)
+        does = f"shrink it by {percent(max(share, 0.0))}" if share >= -0.005 else f"enlarge it by {percent(-share)}"
+        features = joined([feature(name) for name in correction.goes_with])
+        said += f"; a data-driven correction of the {correction.link}, a function of {features}, would {does}"
     return f"{said}."
+
+
+def feature(name: str) -> str:
+    """What a residual is correlated with, or a correction is a function of."""
+    return FEATURES.get(name, name)
 
 
 def finding(found: Finding, rate_hz: float) -> str:
     """What a test says, after the channel's name."""
     if found.test == "variance":
-        return "scatters more than noise and disturbance allow" if found.sigma > 0 else "scatters less than expected"
+        return "larger than noise and disturbance allow" if found.sigma > 0 else "smaller than expected"
     if found.test == "mean":
-        return "off by a constant in some runs"
+        return "biased in some runs"
     if found.test == "spectrum":
-        return "one period stands out"
+        return "periodic"
     if found.test.startswith("lag"):
         low, high = (f"{int(part) / rate_hz:.2g}" for part in found.test.split()[1].split("-"))
-        return f"hangs together over {low} to {high} s"
-    return f"goes with {found.test}"
+        return f"autocorrelated over {low} to {high} s"
+    return f"correlated with {feature(found.test)}"
 
 
-def described(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """What is left by channel, strongest first: channel, axis, its shape, what it goes with, sigma."""
+def described(record: Record) -> list[dict[str, Any]]:
+    """What is left by channel, strongest first: channel, axis, its shape, its correlations, sigma."""
     rows: dict[str, dict[str, Any]] = {}
-    for found in diagnosis.answer.findings:
+    for found in record.details.findings:
         if abs(found.sigma) < UNCLEAN:
             continue
-        empty = {"channel": channel(found.channel), "axis": AXES[found.channel], "sigma": 0.0, "shape": [], "goes": []}
+        empty = {
+            "channel": channel(found.channel),
+            "axis": AXES.get(found.channel, ""),
+            "sigma": 0.0,
+            "shape": [],
+            "correlated": [],
+        }
         row = rows.setdefault(found.channel, empty)
         row["sigma"] = max(row["sigma"], float(abs(found.sigma)))
-        text = f"{finding(found, diagnosis.case.log_rate_hz)} ({abs(found.sigma):.0f})"
-        kind, most = ("shape", 1) if found.test.startswith(SHAPES) else ("goes", 3)
+        text = f"{finding(found, record.details.data.log_rate_hz)} ({abs(found.sigma):.0f})"
+        kind, most = ("shape", 1) if found.test.startswith(SHAPES) else ("correlated", 3)
         if len(row[kind]) < most:
             row[kind].append(text)
     return list(rows.values())

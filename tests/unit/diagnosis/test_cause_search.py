@@ -7,7 +7,7 @@ import pytest
 from support.cases import make_case
 
 from sim_backend.core import effect_layout as ef
-from tools.diagnose.search import FAR, prune, run
+from tools.diagnose.search import PRUNE_BEHIND, prune, run
 from tools.inference.problem import pose
 
 
@@ -17,15 +17,15 @@ def candidate(name, misfit, gained):
 
 def test_a_candidate_far_behind_is_dropped_unless_it_still_moves():
     best = candidate("best", 1000.0, 0.0)
-    stands = candidate("stands", 1000.0 + 3.0 * FAR, 0.0)
-    falls = candidate("falls", 1000.0 + 3.0 * FAR, 2.0 * FAR)
+    stands = candidate("stands", 1000.0 + 3.0 * PRUNE_BEHIND, 0.0)
+    falls = candidate("falls", 1000.0 + 3.0 * PRUNE_BEHIND, 2.0 * PRUNE_BEHIND)
     kept = prune([stands, falls, best], worst=1050.0, most=5, least_kept=1)
     assert [c.labels[0] for c in kept] == ["best", "falls"]
 
 
 def test_a_candidate_that_took_no_step_yet_is_judged_by_where_it_is():
     best = candidate("best", 1000.0, 0.0)
-    new = candidate("new", 1000.0 + 3.0 * FAR, np.inf)
+    new = candidate("new", 1000.0 + 3.0 * PRUNE_BEHIND, np.inf)
     assert prune([new, best], worst=1050.0, most=5, least_kept=1) == [best]
 
 
@@ -43,6 +43,6 @@ def test_effects_that_begin_with_a_kink_or_go_in_steps_are_found(tmp_path, label
     F = np.zeros(ef.N_F)
     F[entry] = value
     search = run(pose(make_case(tmp_path, F, seed=5, mocap=entry in (ef.MOCAP_DELAY, ef.CLOCK_SKEW))))
-    best = max((c for c in search.courses if len(c.labels) == 1), key=lambda c: c.log_evidence(search.fitter))
+    best = max((c for c in search.hypotheses if len(c.labels) == 1), key=lambda c: c.log_evidence(search.fitter))
     assert best.labels == (label,)
     assert best.values[0] * best.free[0].spread == pytest.approx(value, rel=0.25)

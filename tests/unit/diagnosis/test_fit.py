@@ -6,8 +6,8 @@ from scipy.optimize import lsq_linear
 from support.cases import make_case
 
 from sim_backend.core import effect_layout as ef
-from tools.inference.candidates import allowed, candidates, place
-from tools.inference.fit import Fitter, within
+from tools.inference.fit import Fitter, bounded_step
+from tools.inference.parameters import effect_parameters, model_at, nuisance_parameters
 from tools.inference.problem import pose
 
 
@@ -16,7 +16,7 @@ def test_steps_within_limits_are_those_of_bounded_least_squares():
     for _ in range(50):
         A, b = rng.standard_normal((12, 5)), rng.standard_normal(12)
         low, high = -rng.uniform(0.0, 0.5, 5), rng.uniform(0.0, 0.5, 5)
-        step = within(A.T @ A, A.T @ b, low, high)
+        step = bounded_step(A.T @ A, A.T @ b, low, high)
         assert (step >= low - 1e-9).all()
         assert (step <= high + 1e-9).all()
         best = lsq_linear(A, -b, (low - 1e-12, high + 1e-12), tol=1e-14)
@@ -30,42 +30,42 @@ def fitter(tmp_path_factory):
     F[ef.PITCH_BIAS] = 0.04
     problem = pose(make_case(tmp_path_factory.mktemp("fit"), F, seed=2))
     gains = problem.filter(problem.model.P, np.zeros(ef.N_F), roughness=20.0, begin=True)
-    return Fitter(problem, gains, allowed(problem), temper=True)
+    return Fitter(problem, gains, nuisance_parameters(problem), temper=True)
 
 
 def test_the_fit_of_the_true_label_finds_its_size(fitter):
-    free = candidates(fitter.problem)["imu_pitch_bias"]
-    course = fitter.course(("imu_pitch_bias",), free)
+    free = effect_parameters(fitter.problem)["imu_pitch_bias"]
+    hypothesis = fitter.hypothesis(("imu_pitch_bias",), free)
     for _ in range(5):
-        fitter.advance([course])
-    P, F = place(fitter.problem, [*fitter.allowed, *free], np.concatenate([course.allowed, course.values]))
+        fitter.advance([hypothesis])
+    P, F = model_at(fitter.problem, [*fitter.nuisance, *free], np.concatenate([hypothesis.nuisance, hypothesis.values]))
     gains = fitter.problem.filter(P, F, begin=True)
-    fine = Fitter(fitter.problem, gains, fitter.allowed, course, temper=True)
-    again = fine.course(course.labels, free, course.values, course.allowed)
+    fine = Fitter(fitter.problem, gains, fitter.nuisance, hypothesis, temper=True)
+    again = fine.hypothesis(hypothesis.labels, free, hypothesis.values, hypothesis.nuisance)
     for _ in range(4):
         fine.advance([again])
     # the bias of the sensor itself (0.15 deg) is part of what is read
     assert again.values[0] * free[0].spread + again_bias(fine, again) == pytest.approx(0.04, abs=0.008)
 
 
-def again_bias(fitter, course) -> float:
-    """The allowed pitch bias of a fit, rad."""
-    return sum(f.spread * v for f, v in zip(fitter.allowed, course.allowed, strict=True) if f.name == "bias[1]")
+def again_bias(fitter, hypothesis) -> float:
+    """The nuisance pitch bias of a fit, rad."""
+    return sum(f.spread * v for f, v in zip(fitter.nuisance, hypothesis.nuisance, strict=True) if f.name == "bias[1]")
 
 
 def test_log_evidence_is_that_of_a_linear_gaussian_model(fitter):
     """With nothing beside what is allowed, -misfit/2 - log det/2 is the Gaussian marginal up to a constant."""
-    null = fitter.course((), [])
+    null = fitter.hypothesis((), [])
     fitter.measure([null])
     fitter.linearise([null])
     e, J = fitter.e0, fitter.J
-    one_step = null.misfit - null.foreseen_fall()
+    one_step = null.misfit - null.expected_fall()
     # |e|^2 - b' A^-1 b with b = J e: the exponent of N(e; 0, I + J'J / tight)
     b = J @ e
-    closed = e @ e - b @ np.linalg.solve(J @ J.T + fitter.tight * np.eye(len(J)), b)
-    held = np.abs(null.foreseen) >= 3.5 - 1e-9
+    closed = e @ e - b @ np.linalg.solve(J @ J.T + fitter.prior_weight * np.eye(len(J)), b)
+    held = np.abs(null.full_step) >= 3.5 - 1e-9
     assert one_step >= closed - 1e-6
     if not held.any():
         assert one_step == pytest.approx(closed, rel=1e-9)
-    _, logdet = np.linalg.slogdet(J @ J.T / fitter.tight + np.eye(len(J)))
+    _, logdet = np.linalg.slogdet(J @ J.T / fitter.prior_weight + np.eye(len(J)))
     assert fitter.occam == pytest.approx(logdet, rel=1e-9)

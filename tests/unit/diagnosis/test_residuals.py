@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tools.diagnose.residuals import Finding, chi, goes_with, lagged, peak, worst
+from tools.diagnose.record import Finding
+from tools.diagnose.residuals import chi, goes_with, lagged, peak, worst
 
 BOUNDS = np.array([0, 700, 1500, 2100])
 

@@ -6,12 +6,14 @@ from xml.etree import ElementTree
 import pytest
 
 from sim_backend.effects.base import catalogue
-from tools.diagnose.chain import LEAST, STAGES, Link, ordered, shared_out, stage_of
-from tools.diagnose.probes import Probe, Probed
+from tools.diagnose.chain import LEAST, ordered, shared_out
+from tools.diagnose.noise_probes import NoiseProbe, ProbeResult
+from tools.diagnose.record import Link, Place
+from tools.diagnose.stages import STAGES, stage_of
 from tools.report.chain_picture import chain_svg
 
-BALLAST = {"subsystem": "actuation", "element": "ballast", "probability": 0.9}
-SURGE = {"subsystem": "hydrodynamics", "element": "surge", "probability": 0.08}
+BALLAST = Place("actuation", "ballast", 0.9)
+SURGE = Place("hydrodynamics", "surge", 0.08)
 
 
 def heats(text: str) -> dict[str, float]:
@@ -48,8 +50,8 @@ def test_doubt_is_dashed_only_where_it_may_lie():
     assert chain_svg([BALLAST, SURGE], [], doubt=True).count("stage doubt") == 2
 
 
-def probed(name: str, stage: str, gain: float) -> Probed:
-    return Probed(Probe(name, stage, "actuation", "ballast"), gain, 3.0)
+def probed(name: str, stage: str, gain: float) -> ProbeResult:
+    return ProbeResult(NoiseProbe(name, stage, "actuation", "ballast"), gain, 3.0)
 
 
 def test_shares_are_of_the_best_explanation_in_the_order_of_the_chain():

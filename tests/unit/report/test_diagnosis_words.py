@@ -1,28 +1,43 @@
 """The verdict as a sentence, for every kind of verdict; numbers and units as a person reads them."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 from sim_backend.effects.base import catalogue
-from tools.diagnose.diagnosis import Diagnosis
-from tools.diagnose.probes import CLOCK, TURBULENCE, Probe, Probed
-from tools.diagnose.residuals import CHANNELS, Finding
+from tools.diagnose.noise_probes import CLOCK, TURBULENCE
+from tools.diagnose.record import (
+    Answer,
+    Cause,
+    Data,
+    Details,
+    Finding,
+    Gap,
+    Interval,
+    NextRun,
+    Noise,
+    Place,
+    Record,
+    Unexplained,
+)
+from tools.diagnose.residuals import CHANNELS
 from tools.report import words
 
-FAR = {"before": 4.0, "recalibrated": 3.0, "after": 0.5, "floor": 0.4, "shrinkage": 0.875, "ci90": (0.81, 0.93)}
+FAR = {"before": 4.0, "recalibrated": 3.0, "after": 0.5, "floor": 0.4}
 
 
-def diagnosis(probabilities, selected=(), groups=None, findings=(), noise=None, **far) -> Diagnosis:
-    """A diagnosis of these numbers, without the search behind it."""
-    main = max(probabilities, key=lambda name: probabilities[name])
-    answer = SimpleNamespace(
-        main=main, selected=list(selected), probabilities={"none": 0.0, "unknown": 0.0} | probabilities,
-        groups=groups or {}, findings=list(findings), noise=noise, freed=[],
+def record(probabilities, selected=(), groups=None, findings=(), noise=None, where=(), **far) -> Record:
+    """A diagnosis of these numbers, as its folder would hold it."""
+    ranked = sorted(({"none": 0.0, "unknown": 0.0} | probabilities).items(), key=lambda item: -item[1])
+    causes = [Cause(label, p, (groups or {}).get(label, [label]), {}) for label, p in ranked]
+    tables = ({"total": value} for value in (FAR | far).values())
+    gap = Gap(*tables, Interval(0.875, (0.81, 0.93)), Interval(0.97, (0.9, 1.0)))
+    main = causes[0].label
+    answer = Answer(
+        1, main if main in ("none", "unknown") else "cause", [Place(*one) for one in where], causes, list(selected),
+        gap, Unexplained(), [], NextRun("a dive", [], None, "next_run.toml"),
     )  # fmt: skip
-    case = SimpleNamespace(log_rate_hz=10.0)
-    return Diagnosis(case, None, answer, SimpleNamespace(**FAR | far), {}, "")
+    data = Data("case", "roughie", "pond", 3, 180.0, 10.0, False, [], [])
+    return Record(answer, Details(1, "0", data, {}, bool(selected), noise, [], list(findings), [], {}), [])
 
 
 def test_every_label_has_plain_words():
@@ -31,7 +46,7 @@ def test_every_label_has_plain_words():
 
 
 def test_one_cause_says_what_where_how_sure_and_how_far():
-    said = words.sentence(diagnosis({"pump_slow": 0.97, "pump_droop": 0.02}, ["pump_slow"]))
+    said = words.sentence(record({"pump_slow": 0.97, "pump_droop": 0.02}, ["pump_slow"]))
     assert said == (
         "The ballast pump is slower than modelled (pump_slow, actuation: ballast; 97 % sure); with that in the model "
         "the gap on runs left out of the fit shrinks by 88 % (90 % interval 81 to 93 %), while refitting the nominal "
@@ -40,27 +55,27 @@ def test_one_cause_says_what_where_how_sure_and_how_far():
 
 
 def test_what_cannot_be_told_apart_is_in_the_sentence():
-    said = words.sentence(diagnosis({"drag": 0.6, "tether": 0.4}, ["drag"], {"drag": ["drag", "tether"]}))
-    assert "only 60 % sure, else tether at 40 %), which these data cannot tell from tether; with that" in said
+    said = words.sentence(record({"drag": 0.6, "tether": 0.4}, ["drag"], {"drag": ["drag", "tether"]}))
+    assert "only 60 % sure, else tether at 40 %), which these data cannot distinguish from tether; with that" in said
 
 
 def test_doubt_names_the_next_answer():
-    said = words.sentence(diagnosis({"none": 0.51, "unknown": 0.49}))
+    said = words.sentence(record({"none": 0.51, "unknown": 0.49}))
     assert "(only 51 % sure, else a gap of another kind at 49 %)" in said
-    said = words.sentence(diagnosis({"unknown": 0.7, "none": 0.3}))
+    said = words.sentence(record({"unknown": 0.7, "none": 0.3}))
     assert "(only 70 % sure, else no gap at 30 %)" in said
 
 
 def test_two_effects_are_both_named():
-    said = words.sentence(diagnosis({"pump_slow": 0.999}, ["pump_slow", "imu_pitch_bias"], recalibrated=5.0))
+    said = words.sentence(record({"pump_slow": 0.999}, ["pump_slow", "imu_pitch_bias"], recalibrated=5.0))
     assert said.startswith("Two effects at once: the ballast pump is slower")
-    assert "more than 99 % sure), and beside it measured pitch is off by a constant (imu_pitch_bias, sens" in said
+    assert "more than 99 % sure), and also measured pitch is off by a constant (imu_pitch_bias, sens" in said
     assert "with these in the model" in said
     assert said.endswith("while refitting the nominal parameters alone makes it 25 % larger.")
 
 
 def test_no_gap_claims_no_shrinkage():
-    said = words.sentence(diagnosis({"none": 0.98}, before=0.5, recalibrated=0.45, floor=0.44))
+    said = words.sentence(record({"none": 0.98}, before=0.5, recalibrated=0.45, floor=0.44))
     assert said.startswith("No gap: ")
     assert "(98 % sure)" in said
     assert "shrinks" not in said
@@ -75,43 +90,44 @@ UNEXPLAINED = [
 
 
 def test_an_unknown_gap_is_placed_and_described():
-    found = diagnosis({"unknown": 0.95, "yaw_trim": 0.05}, ["yaw_trim"], findings=UNEXPLAINED)
+    found = record(
+        {"unknown": 0.95, "yaw_trim": 0.05}, ["yaw_trim"], findings=UNEXPLAINED, where=[("hydrodynamics", "yaw", 0.97)]
+    )
     said = words.sentence(found)
     assert said.startswith("A gap that no effect of the catalogue explains (95 % sure), strongest in measured yaw rate")
-    assert "and going with pump running" in said  # of the same channel, not the stronger one of another
-    assert "likeliest in hydrodynamics: yaw" in said
+    assert "and correlated with whether the pump runs" in said  # of the same channel, not the stronger one of another
+    assert "most likely in hydrodynamics: yaw (97 %)" in said
     assert "with the nearest known effects in the model (yaw_trim)" in said
     rows = words.described(found)
     assert [row["channel"] for row in rows] == ["yaw rate", "depth"]  # what is weak is not told
-    assert rows[0]["shape"] == ["hangs together over 1.1 to 6 s (40)"]
-    assert rows[0]["goes"] == ["goes with pump running (12)"]
+    assert rows[0]["shape"] == ["autocorrelated over 1.1 to 6 s (40)"]
+    assert rows[0]["correlated"] == ["correlated with whether the pump runs (12)"]
     assert rows[0]["axis"] == "yaw axis"
-    assert rows[1]["goes"] == ["goes with speed (25)"]
+    assert rows[1]["correlated"] == ["correlated with speed (25)"]
 
 
-def test_an_unknown_gap_that_goes_with_something_elsewhere_says_where():
-    found = diagnosis({"unknown": 0.9}, findings=UNEXPLAINED[:3])
-    assert "strongest in measured yaw rate and, in measured depth, going with speed" in words.sentence(found)
-    bare = diagnosis({"unknown": 0.9})
+def test_an_unknown_gap_that_is_correlated_elsewhere_says_where():
+    found = record({"unknown": 0.9}, findings=UNEXPLAINED[:3])
+    assert "strongest in measured yaw rate and, in measured depth, correlated with speed" in words.sentence(found)
+    bare = record({"unknown": 0.9})
     assert "strongest" not in words.sentence(bare)
     assert "with nothing added to the model" in words.sentence(bare)
 
 
 def test_a_clock_that_wanders_is_said_to():
-    probe = Probe(CLOCK, "sensor", "timing", "mocap", (12,))
-    said = words.sentence(diagnosis({"mocap_delay": 0.96}, ["mocap_delay"], noise=Probed(probe, 900.0, 6.0)))
-    assert said.startswith("Motion capture reports late (mocap_delay, timing: mocap; 96 % sure); that clock wanders; ")
-    assert "wanders" not in words.sentence(diagnosis({"mocap_delay": 0.96}, ["mocap_delay"]))
+    said = words.sentence(record({"mocap_delay": 0.96}, ["mocap_delay"], noise=Noise(CLOCK, 6.0)))
+    assert said.startswith(
+        "Motion capture reports late (mocap_delay, timing: mocap; 96 % sure); that clock's delay varies with time; "
+    )
+    assert "varies" not in words.sentence(record({"mocap_delay": 0.96}, ["mocap_delay"]))
 
 
-def test_scatter_claims_no_shrinkage():
-    probe = Probe(TURBULENCE, "force", "environment", "water", (0, 1, 2, 3, 4, 5))
-    said = words.sentence(diagnosis({"turbulence": 0.96}, ["turbulence"], noise=Probed(probe, 900.0, 3.6)))
+def test_disorder_claims_no_shrinkage():
+    said = words.sentence(record({"turbulence": 0.96}, ["turbulence"], noise=Noise(TURBULENCE, 3.6, 5.0, 1.0)))
     assert said.startswith("The water is rougher than the vehicle file says, about 3.6 times as rough (turbulence, env")
-    assert "its course cannot be predicted, so that knowing it shrinks no gap" in said
+    assert "its time course is random, so that knowing it shrinks no gap" in said
     assert "88 %" not in said
-    waves = Probe("waves", "water", "environment", "water", (9, 10, 11))
-    said = words.sentence(diagnosis({"waves": 0.96}, ["waves"], noise=Probed(waves, 900.0, 6.0)))
+    said = words.sentence(record({"waves": 0.96}, ["waves"], noise=Noise("waves", 6.0, 5.0, 1.0)))
     assert said.startswith("Surface waves move the vehicle (waves, environment: water; 96 % sure)")
 
 

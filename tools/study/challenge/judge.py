@@ -1,24 +1,23 @@
 """Diagnoses of a blind test gathered and scored: sealed answers, what was said, and how far it closes the gap."""
 
-import contextlib
-import io
 import json
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from tools.data.errors import InputError
-from tools.data.runs.run import Run, load_run
+from tools.data.runs.case import load_case_of_run
+from tools.data.runs.run import Run
 from tools.gap.measure import root_mean_square, run_gap
 from tools.inference.channels import measured as table
+from tools.inference.model import NOMINAL, load_model
+from tools.inference.predict import as_run, predict
 from tools.inference.windows import windows
 from tools.study.challenge.diagnosis import FILE, MODEL, TIMING, read_diagnosis
 from tools.study.challenge.score import Score, Scored, score
 from tools.study.challenge.seal import Answers, check_seal, folder_digest, open_answers, read_manifest
 from tools.study.challenge.trial import total
 
-NOMINAL = "nominal"
 NOTHING = 0.02
 
 
@@ -75,14 +74,11 @@ def _seconds(path: Path) -> float:
         raise InputError("no number 'seconds' in it", source=path) from None
 
 
-def _predicted(run: Path, model: str | Path, out: Path) -> Run:
-    """The run as `glider gap predict` predicts it."""
-    from tools.cli.gap import predict
-
-    arguments = [str(run), "--model", str(model), "--out", str(out)]
-    with contextlib.redirect_stderr(io.StringIO()):  # what it says to a person
-        predict.main(arguments, standalone_mode=False)
-    return load_run(out)
+def predicted_total(path: Path, model: str | Path) -> float:
+    """Total gap of a run file as `glider gap predict` predicts it with a model."""
+    case, recorded = load_case_of_run(path)
+    Y = predict(case, load_model(str(model), case), [recorded])[0]
+    return run_total(recorded, as_run(recorded, Y))
 
 
 def run_total(measured: Run, predicted: Run) -> float:
@@ -113,10 +109,7 @@ def closed_share(case: Scored, held: Path, diagnoses: Path) -> float | None:
 
 def held_total(runs: list[Path], model: str | Path) -> float:
     """A model's total gap over runs: rms of theirs."""
-    with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder) / "predicted.csv"
-        totals = [run_total(load_run(path), _predicted(path, model, out)) for path in runs]
-    return root_mean_square(totals)
+    return root_mean_square([predicted_total(path, model) for path in runs])
 
 
 def perfect_total(truth: dict[str, Any]) -> float:

@@ -13,11 +13,12 @@ from sim_backend.uncertainty import draw_parameters, sensor_errors
 from tools.data.runs import columns as names
 from tools.data.runs.run import Run
 from tools.gap.measure import root_mean_square, run_gap, wrap
-from tools.inference.core.flights import N_Y
+from tools.inference.channels import CHANNELS
 from tools.inference.windows import Window, windows
 from tools.study.challenge.design import STYLES, RunDesign, Site, draw_run, draw_runs
 from tools.study.challenge.forms import Form, draw_shapes, draw_waves
 
+N_Y = 1 + max(column for channel in CHANNELS for column in channel.columns)  # columns of a prediction
 EXTRA = 40  # rows flown past the end: a fast motion capture clock looks ahead
 TUMBLED_PITCH, TUMBLED_ROLL, TOO_FAST = 1.31, 1.57, 1.5  # rad, rad, m/s
 

@@ -6,7 +6,7 @@ from support.cases import begins, drawn, make_case
 
 from sim_backend.core import effect_layout as ef
 from tools.diagnose.residuals import tests as residual_tests
-from tools.inference.core.passage import N_ERR, correct, difference, mean_input
+from tools.inference.core.step import N_ERR, difference, inject_error, mean_input
 from tools.inference.problem import pose
 
 
@@ -60,7 +60,7 @@ def test_difference_undoes_correct():
     x[3:7] /= np.linalg.norm(x[3:7])
     error = 1e-4 * rng.standard_normal(N_ERR)
     y, back = x.copy(), np.empty(N_ERR)
-    correct(y, error)
+    inject_error(y, error)
     difference(y, x, back)
     assert np.allclose(back, error, rtol=1e-6, atol=1e-12)
     assert y[ef.X_GEAR_SERVO] - x[ef.X_GEAR_SERVO] == pytest.approx(error[12])

@@ -1,6 +1,6 @@
-"""Links of the chain freed one at a time: how much better a model does when one of its parts may err as it likes.
+"""The likelihood gained by inflating the noise of one link of the chain.
 
-A probe raises the noise of one link (an actuator's motion, a force or moment along one axis, the water, a sensor) so
+A probe inflates the noise of one link (an actuator's motion, a force or moment along one axis, the water, a sensor) so
 that the filter no longer believes the model there; the likelihood it gains says how much of the misfit enters at that
 link, whatever its cause. Two probes are effects of the catalogue by themselves: turbulence, a disturbance stronger on
 every axis, and waves, water that moves the vehicle without turning it.
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim_backend.core import effect_layout as ef
-from tools.inference.core.innovations import N_SPECTRAL
+from tools.inference.core.filter import N_SPECTRAL
 from tools.inference.problem import Problem
 
 TURBULENCE, WAVES, CLOCK = "turbulence", "waves", "motion capture's clock"
@@ -19,8 +19,8 @@ UNPREDICTABLE = (TURBULENCE, WAVES)  # labels whose course nobody can foresee
 
 
 @dataclass(frozen=True)
-class Probe:
-    """A link and how its noise is raised: densities by index of `spectral`, variances by index of y."""
+class NoiseProbe:
+    """A link and how its noise is inflated: densities by index of `spectral`, variances by index of y."""
 
     name: str
     stage: str  # of the chain: actuator, force, water, sensor
@@ -31,29 +31,29 @@ class Probe:
     unit: float = 1.0  # 1 sigma, or density's root, at scale 1: about what the vehicle file allows for
 
 
-def probes(problem: Problem) -> list[Probe]:
+def probes(problem: Problem) -> list[NoiseProbe]:
     """The probes that these runs can answer."""
     d, s = problem.case.disturbance, problem.case.sensors
     linear, angular = np.sqrt(0.1) * d.linear, np.sqrt(0.1) * d.angular
     every = [
-        Probe(TURBULENCE, "force", "environment", "water", (0, 1, 2, 3, 4, 5)),
-        Probe(WAVES, "water", "environment", "water", (9, 10, 11), unit=0.003),
-        Probe("surge force", "force", "hydrodynamics", "surge", (0,), unit=linear),
-        Probe("sway force", "force", "hydrodynamics", "sway", (1,), unit=linear),
-        Probe("heave force", "force", "hydrodynamics", "heave", (2,), unit=linear),
-        Probe("roll moment", "force", "hydrodynamics", "roll", (3,), unit=angular),
-        Probe("pitch moment", "force", "hydrodynamics", "pitch", (4,), unit=angular),
-        Probe("yaw moment", "force", "hydrodynamics", "yaw", (5,), unit=angular),
-        Probe("servo", "actuator", "actuation", "servo", (6,), unit=0.003),
-        Probe("slider", "actuator", "actuation", "slider", (7,), unit=0.00005),
-        Probe("ballast", "actuator", "actuation", "ballast", (8,), unit=0.0001),
-        Probe("attitude", "sensor", "sensing", "attitude", (), (0, 1, 2), s.attitude.noise),
-        Probe("gyro", "sensor", "sensing", "gyro", (), (3, 4, 5), s.gyro.noise),
-        Probe("depth", "sensor", "sensing", "depth", (), (6,), s.depth.noise),
-        Probe("slider wire", "sensor", "actuation", "slider", (), (7,), s.slider.noise),
-        Probe("ballast wire", "sensor", "actuation", "ballast", (), (8,), s.ballast.noise),
-        Probe("motion capture", "sensor", "timing", "mocap", (), (9, 10, 11, 12, 13, 14), s.mocap_position.noise),
-        Probe(CLOCK, "sensor", "timing", "mocap", (12,), unit=0.01),
+        NoiseProbe(TURBULENCE, "force", "environment", "water", (0, 1, 2, 3, 4, 5)),
+        NoiseProbe(WAVES, "water", "environment", "water", (9, 10, 11), unit=0.003),
+        NoiseProbe("surge force", "force", "hydrodynamics", "surge", (0,), unit=linear),
+        NoiseProbe("sway force", "force", "hydrodynamics", "sway", (1,), unit=linear),
+        NoiseProbe("heave force", "force", "hydrodynamics", "heave", (2,), unit=linear),
+        NoiseProbe("roll moment", "force", "hydrodynamics", "roll", (3,), unit=angular),
+        NoiseProbe("pitch moment", "force", "hydrodynamics", "pitch", (4,), unit=angular),
+        NoiseProbe("yaw moment", "force", "hydrodynamics", "yaw", (5,), unit=angular),
+        NoiseProbe("servo", "actuator", "actuation", "servo", (6,), unit=0.003),
+        NoiseProbe("slider", "actuator", "actuation", "slider", (7,), unit=0.00005),
+        NoiseProbe("ballast", "actuator", "actuation", "ballast", (8,), unit=0.0001),
+        NoiseProbe("attitude", "sensor", "sensing", "attitude", (), (0, 1, 2), s.attitude.noise),
+        NoiseProbe("gyro", "sensor", "sensing", "gyro", (), (3, 4, 5), s.gyro.noise),
+        NoiseProbe("depth", "sensor", "sensing", "depth", (), (6,), s.depth.noise),
+        NoiseProbe("slider wire", "sensor", "actuation", "slider", (), (7,), s.slider.noise),
+        NoiseProbe("ballast wire", "sensor", "actuation", "ballast", (), (8,), s.ballast.noise),
+        NoiseProbe("motion capture", "sensor", "timing", "mocap", (), (9, 10, 11, 12, 13, 14), s.mocap_position.noise),
+        NoiseProbe(CLOCK, "sensor", "timing", "mocap", (12,), unit=0.01),
     ]
     seen = problem.seen
     mocap = seen[ef.Y_ONBOARD :].any()
@@ -65,15 +65,15 @@ FINER = (0.6, 1.6)  # and then about that
 
 
 @dataclass
-class Probed:
+class ProbeResult:
     """A probe's answer: nat gained over the same model without it, at the best scale."""
 
-    probe: Probe
+    probe: NoiseProbe
     gain: float
     scale: float
 
 
-def raised(problem: Problem, probe: Probe, scale: float) -> tuple[np.ndarray, np.ndarray]:
+def inflated(problem: Problem, probe: NoiseProbe, scale: float) -> tuple[np.ndarray, np.ndarray]:
     """What a probe adds to the spectral densities (N_SPECTRAL,) and to the measurements' variances (N_Y,)."""
     more, doubt = np.zeros(N_SPECTRAL), np.zeros(ef.N_Y)
     if probe.name == TURBULENCE:
@@ -84,9 +84,9 @@ def raised(problem: Problem, probe: Probe, scale: float) -> tuple[np.ndarray, np
     return more, doubt
 
 
-def probe_model(
-    problem: Problem, P: np.ndarray, F: np.ndarray, wanted: list[Probe], scales=SCALES, finer=FINER
-) -> list[Probed]:
+def run_probes(
+    problem: Problem, P: np.ndarray, F: np.ndarray, wanted: list[NoiseProbe], scales=SCALES, finer=FINER
+) -> list[ProbeResult]:
     """Every probe of a model, the one that gains most first."""
     bare = float(problem.filter(P, F).misfit.sum())
     found = []
@@ -94,8 +94,8 @@ def probe_model(
         best, scale = 0.0, 1.0
         tried = {1.0: 0.0}
 
-        def gain(s: float, probe: Probe = probe, tried: dict[float, float] = tried) -> float:
-            more, doubt = raised(problem, probe, s)
+        def gain(s: float, probe: NoiseProbe = probe, tried: dict[float, float] = tried) -> float:
+            more, doubt = inflated(problem, probe, s)
             tried[s] = 0.5 * (bare - float(problem.filter(P, F, more=more, doubt=doubt).misfit.sum()))
             return tried[s]
 
@@ -109,5 +109,5 @@ def probe_model(
                 value = gain(s)
                 if np.isfinite(value) and value > best:
                     best, scale = value, s
-        found.append(Probed(probe, best, scale))
+        found.append(ProbeResult(probe, best, scale))
     return sorted(found, key=lambda p: -p.gain)

@@ -6,7 +6,7 @@ course. Its gains are kept, and any other model is then flown along the same dat
 differ smoothly with its parameters however long the run, because the data hold every flight to the course flown.
 
 Runs stand one behind the other in tables of all rows; `bounds` (runs + 1) says where each begins. Errors of the state
-(N_ERR) are those of core/passage.
+(N_ERR) are those of core/step.
 """
 
 import math
@@ -18,17 +18,17 @@ from firmware.core.maths.rotations import rotation_nb
 from firmware.core.vehicle.layout import N_P
 from sim_backend.core import effect_layout as ef
 from sim_backend.core.effect_plant import fold, wrapped
-from tools.inference.core.passage import (
+from tools.inference.core.step import (
     LATE,
     N_ERR,
     N_Y,
-    correct,
     difference,
+    inject_error,
+    innovation,
     log_path,
-    missed,
+    pose_of,
     propagate,
     read_row,
-    stand,
 )
 
 N_SPECTRAL = 13
@@ -36,17 +36,17 @@ NUDGE = 1e-5  # of the state's unit, for derivatives
 
 
 @kernel
-def nudged(x, j, error, moved):
+def perturbed(x, j, error, moved):
     """x with its error j at NUDGE, into moved; error (N_ERR) is scratch."""
     for n in range(N_ERR):
         error[n] = 0.0
     error[j] = NUDGE
     moved[:] = x
-    correct(moved, error)
+    inject_error(moved, error)
 
 
 @kernel
-def pushed(x, dt, Gam):
+def noise_gain(x, dt, Gam):
     """What accelerations held over a step of dt to x leave, Gam (N_ERR, 6): speeds, and half as much way and turn."""
     r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation_nb(x[3], x[4], x[5], x[6])
     half = 0.5 * dt * dt
@@ -75,20 +75,20 @@ def linear_step(Pw, F, x, mode, t, inputs, i, begin, zero, work, kept, moved, ba
     Phi[:, LATE] = 0.0
     Phi[LATE, LATE] = 1.0
     for j in range(2, LATE):
-        nudged(x, j, error, moved)
+        perturbed(x, j, error, moved)
         propagate(Pw, F, moved, mode, t, inputs, i, begin, acc, zero, work, kept, True)
         difference(moved, base, error)
         for n in range(N_ERR):
             Phi[n, j] = error[n] / NUDGE
     propagate(Pw, F, x, mode, t, inputs, i, begin, acc, zero, work, kept, False)
-    pushed(x, t[i] - t[i - 1], Gam)
+    noise_gain(x, t[i] - t[i - 1], Gam)
 
 
 @kernel
 def linear_reading(F, x, t, stamps, path, i, begin, moved, error, y, y2, H):
     """H (N_Y, N_ERR), the derivative of what is read at row i, y (N_Y), by the state."""
     for j in range(N_ERR):
-        nudged(x, j, error, moved)
+        perturbed(x, j, error, moved)
         read_row(F, moved, t, stamps, path, i, begin, y2)
         for m in range(N_Y):
             change = y2[m] - y[m]
@@ -127,7 +127,7 @@ def filter_run(P, F, spectral, R, mode, t, stamps, inputs, z, begin, end, start,
     for i in range(begin, end):
         if i > begin:
             dt = t[i] - t[i - 1]
-            stand(x, before)
+            pose_of(x, before)
             linear_step(Pw, F, x, mode, t, inputs, i, begin, zero, work, kept, moved, base, error, Phi, Gam)
             log_path(x, before, path, i, begin)
             temp[:] = Phi @ cov
@@ -142,7 +142,7 @@ def filter_run(P, F, spectral, R, mode, t, stamps, inputs, z, begin, end, start,
                 cov[j, j] += spectral[9 + j] * dt
             cov[LATE, LATE] += spectral[12] * dt
         read_row(F, x, t, stamps, path, i, begin, y)
-        missed(z[i], y, d)
+        innovation(z[i], y, d)
         linear_reading(F, x, t, stamps, path, i, begin, moved, error, y, y2, H)
         # S = H cov H' + R of what was measured, its Cholesky factor L, and W = L^-1; K~ = cov H' L^-T
         for m in range(N_Y):
@@ -194,14 +194,14 @@ def filter_run(P, F, spectral, R, mode, t, stamps, inputs, z, begin, end, start,
         for m in range(N_Y):
             if not math.isnan(d[m]):
                 misfit += 2.0 * math.log(L[m, m])
-        misfit += use_row(W[i], K[i], d, x, error, E[i])
+        misfit += apply_gain(W[i], K[i], d, x, error, E[i])
         for n in range(ef.N_XF):
             X[i, n] = x[n]
     return misfit
 
 
 @kernel
-def use_row(W, K, d, x, error, e):
+def apply_gain(W, K, d, x, error, e):
     """Whiten a row's innovations d into e, correct x by them, return their sum of squares."""
     total = 0.0
     for m in range(N_Y):
@@ -220,7 +220,7 @@ def use_row(W, K, d, x, error, e):
             if not math.isnan(e[m]):
                 value += K[a, m] * e[m]
         error[a] = value
-    correct(x, error)
+    inject_error(x, error)
     return total
 
 
@@ -279,12 +279,12 @@ def follow_run(P, F, mode, t, stamps, inputs, z, begin, end, start, W, K, X, pat
         path[begin, n] = 0.0
     for i in range(begin, end):
         if i > begin:
-            stand(x, before)
+            pose_of(x, before)
             propagate(Pw, F, x, mode, t, inputs, i, begin, acc, zero, work, kept, False)
             log_path(x, before, path, i, begin)
         read_row(F, x, t, stamps, path, i, begin, y)
-        missed(z[i], y, d)
-        use_row(W[i], K[i], d, x, error, E[i])
+        innovation(z[i], y, d)
+        apply_gain(W[i], K[i], d, x, error, E[i])
         for n in range(ef.N_XF):
             X[i, n] = x[n]
 

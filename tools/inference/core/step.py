@@ -19,7 +19,7 @@ LARGEST_SPEED = 20.0  # m/s, rad/s: a model that flies faster has left every veh
 
 
 @kernel
-def correct(x, error):
+def inject_error(x, error):
     """Add an error (N_ERR) to a state, in place."""
     for i in range(3):
         x[i] += error[i]
@@ -120,7 +120,7 @@ def log_path(x, before, path, i, begin):
 
 
 @kernel
-def stand(x, before):
+def pose_of(x, before):
     """Position and Euler angles of x, into before (6)."""
     before[0], before[1], before[2] = x[0], x[1], x[2]
     before[3], before[4], before[5] = euler_from_quaternion(x[3], x[4], x[5], x[6])
@@ -148,7 +148,7 @@ def read_row(F, x, t, stamps, path, i, begin, y):
 
 
 @kernel
-def missed(z, y, d):
+def innovation(z, y, d):
     """z - y into d (N_Y), angles wrapped; NaN where nothing was measured."""
     for j in range(N_Y):
         d[j] = z[j] - y[j]

@@ -8,15 +8,15 @@ from sim_backend.core import effect_layout as ef
 from sim_backend.effects.base import Effect, catalogue
 from tools.inference.problem import Problem
 
-ALLOWED = ""  # the label of what is no effect
+NUISANCE = ""  # the label of what is no effect
 CLOCK_PLACE = ("timing", "mocap")  # of the labels by which motion capture's clock is wrong
 
 
 @dataclass(frozen=True)
-class Free:
+class FreeParameter:
     """A parameter that is free in a fit: `entry` of P or F moves by `spread` for each unit; limits in those units."""
 
-    label: str  # of its effect; ALLOWED for what [uncertainty] and [sensors] allow
+    label: str  # of its effect; NUISANCE for what [uncertainty] and [sensors] allow
     name: str
     vector: str  # "P" or "F"
     entry: int
@@ -32,7 +32,7 @@ class Free:
         return self.low == 0.0 or self.high == 0.0
 
 
-def allowed(problem: Problem) -> list[Free]:
+def nuisance_parameters(problem: Problem) -> list[FreeParameter]:
     """What the nominal model allows for: parameters within [uncertainty], and a constant bias of each sensor."""
     if not problem.rules.nuisance:
         return []
@@ -42,27 +42,27 @@ def allowed(problem: Problem) -> list[Free]:
         sigma[np.abs(spread).max(axis=0) > 0.0] = 0.0
         for n, row in enumerate(spread):
             along = tuple((int(i), float(row[i])) for i in np.flatnonzero(row))
-            free.append(Free(ALLOWED, f"identified[{n}]", "P", -1, 1.0, along=along))
-    free += [Free(ALLOWED, f"P[{i}]", "P", int(i), float(sigma[i])) for i in np.flatnonzero(sigma > 0.0)]
+            free.append(FreeParameter(NUISANCE, f"identified[{n}]", "P", -1, 1.0, along=along))
+    free += [FreeParameter(NUISANCE, f"P[{i}]", "P", int(i), float(sigma[i])) for i in np.flatnonzero(sigma > 0.0)]
     s = problem.case.sensors
     bias = [*3 * [s.attitude.bias], *3 * [s.gyro.bias], s.depth.bias, s.slider.bias, s.ballast.bias]
     seen = problem.seen
     for j, size in enumerate(bias):
         if seen[j] and size > 0.0:
-            free.append(Free(ALLOWED, f"bias[{j}]", "F", ef.BIAS + j, size))
+            free.append(FreeParameter(NUISANCE, f"bias[{j}]", "F", ef.BIAS + j, size))
     return free
 
 
-def of_effect(effect: Effect) -> list[Free]:
+def of_effect(effect: Effect) -> list[FreeParameter]:
     """The parameters of an effect that stand in F."""
     return [
-        Free(effect.label, p.name, "F", p.entry, p.spread, p.low / p.spread, p.high / p.spread, p.unit)
+        FreeParameter(effect.label, p.name, "F", p.entry, p.spread, p.low / p.spread, p.high / p.spread, p.unit)
         for p in effect.parameters
         if p.entry >= 0
     ]
 
 
-def candidates(problem: Problem) -> dict[str, list[Free]]:
+def effect_parameters(problem: Problem) -> dict[str, list[FreeParameter]]:
     """Every label whose effect these runs could show, with its parameters."""
     seen = problem.seen
     mocap = bool(seen[ef.Y_ONBOARD :].any())
@@ -80,7 +80,7 @@ def candidates(problem: Problem) -> dict[str, list[Free]]:
     return found
 
 
-def place(problem: Problem, free: list[Free], values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def model_at(problem: Problem, free: list[FreeParameter], values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The model (P, F) with these parameters at `values` (in their spreads)."""
     P = problem.model.P.copy()
     F = np.zeros(ef.N_F) if problem.model.F is None else problem.model.F.copy()

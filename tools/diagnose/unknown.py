@@ -7,28 +7,27 @@ from scipy.stats import norm
 
 from sim_backend.core import effect_layout as ef
 from sim_backend.effects.base import catalogue
-from tools.diagnose.probes import CLOCK, TURBULENCE, WAVES, Probed, probe_model, probes
+from tools.diagnose.noise_probes import CLOCK, TURBULENCE, WAVES, ProbeResult, probes, run_probes
 from tools.diagnose.search import Search
 from tools.diagnose.shrink import Shrinkage
-from tools.inference.candidates import CLOCK_PLACE
-from tools.inference.fit import Course
+from tools.inference.fit import Hypothesis
+from tools.inference.parameters import CLOCK_PLACE
 
-UNCLEAN = 6.0  # sigma, corrected for the number of tests
 LEFT_OVER, LEFT_WIDTH = 0.145, 1.1  # share of the explainable misfit at which unknown is as likely as not; e-folds
 NOISY, NOISY_WIDTH = 0.2, 0.8  # share of the explainable misfit that is left: disorder is looked for; width in e-folds
 UNFIT = 5.0  # tolerances that the best explanation still misses by: no effect of the catalogue does that
 LOOSE = 3.0  # times the floor, and one tolerance, that no vehicle without a gap is off
 ONE_AXIS = 0.65  # of what all axes bring together: where one alone brings as much, it is no turbulence
 MOSTLY = 0.9  # of all that can be explained, for turbulence or waves to be the cause
-LEAST_DOUBT, MORE_DOUBT = 0.002, 0.005  # probability of an unknown effect where nothing is left, and where something is
-CLOCKED = 0.5  # of what freeing the poses altogether gains, that freeing their clock must
-RIVALS = 4  # links asked beside water and axes
+LEAST_UNKNOWN, MORE_UNKNOWN = 0.002, 0.005  # probability of an unknown effect: nothing is left, or something is
+CLOCKED = 0.5  # of what the best probe gains, that the probe of motion capture's clock must
+RIVALS = 4  # links probed beside water and axes
 
 
-def chance(share: float, middle: float, width: float) -> float:
+def probability(share: float, middle: float, width: float) -> float:
     """Probability that what is left is a gap of its own (docs/DIAGNOSIS.md, Thresholds)."""
     z = (np.log(max(share, 1e-6)) - np.log(middle)) / width
-    return float(np.clip(norm.cdf(z), MORE_DOUBT, 1.0 - MORE_DOUBT))
+    return float(np.clip(norm.cdf(z), MORE_UNKNOWN, 1.0 - MORE_UNKNOWN))
 
 
 def left_share(shrinkage: Shrinkage) -> float:
@@ -39,37 +38,37 @@ def left_share(shrinkage: Shrinkage) -> float:
 
 
 @dataclass
-class Left:
-    """What the selected effects leave: nat, by links freed one at a time."""
+class Remainder:
+    """What the selected effects leave, in nat of likelihood that inflating one link's noise gains."""
 
-    brought: float  # by the selected effects over none
-    left: float  # by the link that gains most when freed
-    freed: list[Probed]
+    explained: float  # by the selected effects over none
+    left: float  # by the probe that gains most
+    probed: list[ProbeResult]
 
     @property
     def share(self) -> float:
-        return float(np.clip(self.left / max(self.left + self.brought, 1e-9), 0.0, 1.0))
+        return float(np.clip(self.left / max(self.left + self.explained, 1e-9), 0.0, 1.0))
 
 
-def what_is_left(search: Search, course: Course, noise: Probed | None) -> Left:
-    """Links freed at a candidate, beside what its effects bring; `noise` is brought too."""
+def remainder_of(search: Search, hypothesis: Hypothesis, noise: ProbeResult | None) -> Remainder:
+    """The probes at a hypothesis, beside what its effects explain; `noise` explains too."""
     problem = search.problem
     null = float(problem.filter(*search.model(search.null), begin=True).misfit.sum())
     own = float(search.gains.misfit.sum())
-    freed = probe_model(problem, *search.model(course), probes(problem))
-    brought = max(0.5 * (null - own), 0.0) + (noise.gain if noise is not None else 0.0)
-    return Left(brought, freed[0].gain, freed)
+    probed = run_probes(problem, *search.model(hypothesis), probes(problem))
+    explained = max(0.5 * (null - own), 0.0) + (noise.gain if noise is not None else 0.0)
+    return Remainder(explained, probed[0].gain, probed)
 
 
-def scatter(search: Search, freed: list[Probed]) -> Probed | None:
+def water_disorder(search: Search, probed: list[ProbeResult]) -> ProbeResult | None:
     """Turbulence or waves, where water in disorder explains the recalibrated model's misfit better than any one link.
 
-    Turbulence shakes every axis: where one alone brings most of it, something else shakes that axis. `freed`: the links
-    at the selected model; those that gain most there are asked beside water and axes.
+    Turbulence shakes every axis: where one alone brings most of it, something else shakes that axis. `probed`: at the
+    selected model; the links that gain most there are probed beside water and axes.
     """
-    rivals = [found.probe for found in freed[:RIVALS]]
+    rivals = [found.probe for found in probed[:RIVALS]]
     asked = [p for p in probes(search.problem) if p in rivals or p.stage in ("force", "water")]
-    found = probe_model(search.problem, *search.model(search.null), asked)
+    found = run_probes(search.problem, *search.model(search.null), asked)
     first = found[0]
     if first.probe.name == WAVES:
         return first
@@ -77,27 +76,27 @@ def scatter(search: Search, freed: list[Probed]) -> Probed | None:
     return first if first.probe.name == TURBULENCE and axes[0] < ONE_AXIS * first.gain else None
 
 
-def disorder(search: Search, left: Left) -> Probed | None:
-    """What the search has to be told of, to see what is beside it; None where there is nothing of the kind.
+def disorder(search: Search, left: Remainder) -> ProbeResult | None:
+    """The noise that the search has to know of, to see what is beside it; None where there is nothing of the kind.
 
-    Motion capture's clock where freeing it gains more than any other link, its poses' noise apart; turbulence or waves
+    Motion capture's clock where its probe gains more than any other link's, its poses' noise apart; turbulence or waves
     where they are the cause: of all that can be explained, they explain MOSTLY.
     """
-    clock = [found for found in left.freed if found.probe.name == CLOCK and found.gain > CLOCKED * left.left]
-    if clock and left.freed[0].probe.element == CLOCK_PLACE[1]:
+    clock = [found for found in left.probed if found.probe.name == CLOCK and found.gain > CLOCKED * left.left]
+    if clock and left.probed[0].probe.element == CLOCK_PLACE[1]:
         return clock[0]
     if left.share <= NOISY:
         return None
-    found = scatter(search, left.freed)
-    return found if found is not None and found.gain > MOSTLY * (left.brought + left.left) else None
+    found = water_disorder(search, left.probed)
+    return found if found is not None and found.gain > MOSTLY * (left.explained + left.left) else None
 
 
-def clock_label(search: Search, course: Course) -> str:
+def clock_label(search: Search, hypothesis: Hypothesis) -> str:
     """The label of a clock that wanders: one that was selected; else whether it is late, or ever later.
 
     The clock's error where the filter stands is drawn by a constant and by a line from 0, over all runs at once.
     """
-    for label in course.labels:
+    for label in hypothesis.labels:
         if catalogue()[label].place == CLOCK_PLACE:
             return label
     since, late = search.problem.since, search.gains.X[:, ef.X_LATE]
@@ -106,17 +105,20 @@ def clock_label(search: Search, course: Course) -> str:
     return min(left, key=lambda label: float(left[label] @ left[label]))
 
 
-def doubt(search: Search, main: str, shrinkage: Shrinkage, left: Left | None, noise: bool) -> float:
+def probability_unknown(
+    search: Search, selected: bool, evident: bool, shrinkage: Shrinkage, left: Remainder | None, noise: bool
+) -> float:
     """Probability that the gap is none of the catalogue's, or that there is one where none shows otherwise.
 
-    main: the main effect, or "" without; noise: the search was told of disorder, which no window's gap tells of.
+    selected, evident: whether any effect is, or is at least there; noise: the search knows of extra noise, which no
+    window's gap shows.
     """
     if left is None:  # what is left was not asked about, or nothing is
-        loose = not main and not noise and shrinkage.after > max(LOOSE * shrinkage.floor, 1.0)
+        loose = not selected and not noise and shrinkage.after > max(LOOSE * shrinkage.floor, 1.0)
         unfit = search.problem.rules.whiteness and (loose or shrinkage.after > UNFIT)
-        return 1.0 - MORE_DOUBT if unfit else LEAST_DOUBT
-    if shrinkage.after > UNFIT or not (main or noise):
-        return 1.0 - MORE_DOUBT
+        return 1.0 - MORE_UNKNOWN if unfit else LEAST_UNKNOWN
+    if shrinkage.after > UNFIT or not (evident or noise):
+        return 1.0 - MORE_UNKNOWN
     if noise:
-        return chance(left.share, NOISY, NOISY_WIDTH)
-    return chance(left.share, LEFT_OVER, LEFT_WIDTH)
+        return probability(left.share, NOISY, NOISY_WIDTH)
+    return probability(left.share, LEFT_OVER, LEFT_WIDTH)

@@ -31,7 +31,7 @@ HELP = {
 
 
 @dataclass(frozen=True)
-class Blind:
+class Unidentifiable:
     """A combination that is not told: its width over the prior's, its parameters with their shares, what would help."""
 
     width: float
@@ -51,7 +51,7 @@ def looked_for(free: Parameters) -> list[int]:
     return [n for n, name in enumerate(free.names) if name in WORDS]
 
 
-def blind(free: Parameters, draws: np.ndarray) -> list[Blind]:
+def unidentifiable_directions(free: Parameters, draws: np.ndarray) -> list[Unidentifiable]:
     """Combinations wider than WIDE of the prior, widest first. draws (k, n), in units of the priors."""
     listed = looked_for(free)
     values, vectors = np.linalg.eigh(np.cov(draws[:, listed].T))
@@ -65,7 +65,7 @@ def blind(free: Parameters, draws: np.ndarray) -> list[Blind]:
         parts = parts or [(free.names[listed[order[0]]], float(vector[order[0]]))]
         if parts[0][1] < 0.0:
             parts = [(name, -share) for name, share in parts]
-        found.append(Blind(width, tuple(parts), HELP[parts[0][0]]))
+        found.append(Unidentifiable(width, tuple(parts), HELP[parts[0][0]]))
     return found
 
 

@@ -8,7 +8,7 @@ from firmware.core.jit import parallel_kernel, prange
 from firmware.core.vehicle.layout import N_P
 from sim_backend.core import effect_layout as ef
 from sim_backend.core.effect_plant import fold
-from tools.inference.core.passage import N_Y, log_path, propagate, read_row, stand
+from tools.inference.core.step import N_Y, log_path, pose_of, propagate, read_row
 
 
 @parallel_kernel
@@ -28,7 +28,7 @@ def fly_windows(Ps, Fs, modes, bounds, t, inputs, X, paths, first, last, run_of,
         zero, before, acc = np.zeros(3), np.empty(6), np.zeros(6)
         path = paths[m, begin : last[w]].copy()
         for i in range(first[w], last[w]):
-            stand(x, before)
+            pose_of(x, before)
             propagate(Pw, F, x, modes[run], t, inputs, i, begin, acc, zero, work, kept, False)
             log_path(x, before, path, i - begin, 0)
             read_row(F, x, t[begin:], t[begin:], path, i - begin, 0, Y[m, i])
@@ -51,7 +51,7 @@ def simulate_runs(P, F, spectral, R, modes, bounds, t, inputs, starts, shaken, n
             if i > begin:
                 for j in range(6):
                     acc[j] = math.sqrt(spectral[j] / (t[i] - t[i - 1])) * shaken[i, j]
-                stand(x, before)
+                pose_of(x, before)
                 propagate(Pw, F, x, modes[run], t, inputs, i, begin, acc, zero, work, kept, False)
                 log_path(x, before, path, i - begin, 0)
             read_row(F, x, t[begin:], t[begin:], path, i - begin, 0, Z[i])

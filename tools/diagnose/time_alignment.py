@@ -16,12 +16,12 @@ UNSEEN_SPEED = 0.4  # m/s, by which a vehicle may have left its first pose's pla
 POSES = slice(ef.Y_ONBOARD, ef.N_Y)
 
 
-def taken(problem: Problem, F: np.ndarray) -> np.ndarray:
+def capture_times(problem: Problem, F: np.ndarray) -> np.ndarray:
     """When the poses of the rows were taken, by a model's clock, (rows,) s."""
     return np.asarray(problem.recording.t - F[ef.MOCAP_DELAY] - F[ef.CLOCK_SKEW] * problem.since)
 
 
-def moved(t: np.ndarray, at: np.ndarray) -> np.ndarray:
+def sample_at_row(t: np.ndarray, at: np.ndarray) -> np.ndarray:
     """For each time of `t` (rows,) which sample stands there, -1 for none: `at` (rows,) are their times.
 
     A sample goes to the nearest row, and of two that would go to one row the nearer.
@@ -35,16 +35,16 @@ def moved(t: np.ndarray, at: np.ndarray) -> np.ndarray:
     return stands
 
 
-def retimed(problem: Problem, F: np.ndarray) -> Problem:
+def aligned(problem: Problem, F: np.ndarray) -> Problem:
     """The problem with its poses where the clock of F says; `recorded` keeps the one it was made from."""
     origin = problem.as_recorded
     t, bounds = origin.recording.t, origin.recording.bounds
-    at = taken(origin, F)
+    at = capture_times(origin, F)
     z, stamps = origin.z.copy(), t.copy()
     starts, spreads = origin.starts.copy(), origin.spreads.copy()
     z[:, POSES] = np.nan
     for n, (a, b) in enumerate(itertools.pairwise(bounds)):
-        stands = moved(t[a:b], at[a:b])
+        stands = sample_at_row(t[a:b], at[a:b])
         rows = np.flatnonzero(stands >= 0)
         z[a + rows, POSES] = origin.z[a + stands[rows], POSES]
         stamps[a + rows] = t[a + stands[rows]]

@@ -5,10 +5,10 @@ import pytest
 from support.cases import make_case
 
 from sim_backend.core import effect_layout as ef
-from tools.diagnose.contradiction import NEAR, contradicting, heat
-from tools.diagnose.retime import moved, retimed
 from tools.diagnose.search import ROUGHNESS
-from tools.inference.candidates import allowed, candidates, place
+from tools.diagnose.sensor_consistency import HOLDS_BELOW, inconsistent_sensor, mean_nis
+from tools.diagnose.time_alignment import aligned, sample_at_row
+from tools.inference.parameters import effect_parameters, model_at, nuisance_parameters
 from tools.inference.problem import pose
 
 
@@ -18,10 +18,10 @@ def with_effect(folder, entry, value, **about):
     return pose(make_case(folder, F, seed=5, **about)), F
 
 
-def rough_heat(problem):
-    free = allowed(problem)
-    gains = problem.filter(*place(problem, free, np.zeros(len(free))), roughness=ROUGHNESS[0], begin=True)
-    return heat(problem, gains)
+def rough_nis(problem):
+    free = nuisance_parameters(problem)
+    gains = problem.filter(*model_at(problem, free, np.zeros(len(free))), roughness=ROUGHNESS[0], begin=True)
+    return mean_nis(problem, gains)
 
 
 @pytest.mark.parametrize(
@@ -35,8 +35,8 @@ def rough_heat(problem):
 )
 def test_the_reading_that_is_far_out_is_named(tmp_path, label, entry, value, mocap):
     problem, _ = with_effect(tmp_path, entry, value, mocap=mocap)
-    assert rough_heat(problem) > NEAR
-    free, spreads = contradicting(problem, allowed(problem), candidates(problem))
+    assert rough_nis(problem) > HOLDS_BELOW
+    free, spreads = inconsistent_sensor(problem, nuisance_parameters(problem), effect_parameters(problem))
     assert free.label == label
     assert spreads * free.spread == pytest.approx(value, rel=0.6)
 
@@ -44,17 +44,17 @@ def test_the_reading_that_is_far_out_is_named(tmp_path, label, entry, value, moc
 @pytest.mark.parametrize(("entry", "value"), [(ef.NET_MASS, 0.1), (ef.DRAG_0, 2.0), (ef.PITCH_TRIM, 0.5)])
 def test_forces_make_no_reading_contradict_another(tmp_path, entry, value):
     problem, _ = with_effect(tmp_path, entry, value, mocap=True)
-    assert rough_heat(problem) < NEAR
+    assert rough_nis(problem) < HOLDS_BELOW
 
 
 def test_samples_go_to_the_row_of_their_time_once():
     t = np.arange(10) * 0.1
-    assert moved(t, t).tolist() == list(range(10))
-    assert moved(t, t - 0.31).tolist() == [3, 4, 5, 6, 7, 8, 9, -1, -1, -1]
-    assert moved(t, t + 0.2).tolist() == [-1, -1, 0, 1, 2, 3, 4, 5, 6, 7]
-    slow = moved(t, 0.5 * t)  # two samples to a row: the nearer stays
+    assert sample_at_row(t, t).tolist() == list(range(10))
+    assert sample_at_row(t, t - 0.31).tolist() == [3, 4, 5, 6, 7, 8, 9, -1, -1, -1]
+    assert sample_at_row(t, t + 0.2).tolist() == [-1, -1, 0, 1, 2, 3, 4, 5, 6, 7]
+    slow = sample_at_row(t, 0.5 * t)  # two samples to a row: the nearer stays
     assert slow.tolist() == [0, 2, 4, 6, 8, -1, -1, -1, -1, -1]
-    fast = moved(t, 2.0 * t)  # every other row has none
+    fast = sample_at_row(t, 2.0 * t)  # every other row has none
     assert fast.tolist() == [0, -1, 1, -1, 2, -1, 3, -1, 4, -1]
 
 
@@ -72,11 +72,11 @@ def test_poses_moved_to_their_time_are_foreseen(tmp_path, delay):
         E = one.filter(one.model.P, F, begin=True).E[:, poses]
         return float(np.nanmean(E**2))
 
-    there = retimed(problem, F)
+    there = aligned(problem, F)
     assert missed(there, F) == pytest.approx(missed(right, none), rel=0.15)
     if delay < 0.0:
         assert missed(problem, F) > 3.0 * missed(there, F)
     lost = int(abs(delay) * 10) * len(problem.runs)
     assert problem.valid[:, poses].all(axis=1).sum() - there.valid[:, poses].all(axis=1).sum() == lost
     assert there.as_recorded is problem
-    assert retimed(there, np.zeros(ef.N_F)).as_recorded is problem
+    assert aligned(there, np.zeros(ef.N_F)).as_recorded is problem

@@ -1,0 +1,74 @@
+"""Whether an effect matters: how far it moves what is measured, and not only how surely it is there.
+
+Evidence grows with the length of the runs, whatever an effect does: a clock that is a millisecond late brings a
+hundred nat in ten minutes of 10 Hz. What nobody could see in a window is no gap (docs/GAP.md, Measures).
+"""
+
+import numpy as np
+
+from sim_backend.core import effect_layout as ef
+from tools.diagnose.search import Search
+from tools.diagnose.shrink import AFTER, FLOOR, Shrinkage, case_noise_floor
+from tools.gap.measure import errors, mean_square
+from tools.inference.channels import channels_of
+from tools.inference.fit import Hypothesis
+from tools.inference.problem import Problem, cut, estimated, fly_on
+
+# Tolerances. A tolerance is what a simulator may be off; a tenth of it adds half a percent to a gap of one, and lies
+# below what noise and disturbance leave of a perfect model (0.12 to 0.17 in total), so no prediction is the better.
+MATTERS = 0.1
+
+
+def movements(search: Search, hypothesis: Hypothesis) -> dict[str, float]:
+    """By effect of a hypothesis: the largest rms, in tolerances, by which it moves a channel of a window.
+
+    Windows are flown with it and without it from the same starts, where the filter of the whole model stands.
+    """
+    if not hypothesis.labels:
+        return {}
+    problem = search.problem.as_recorded
+    P, F = search.model(hypothesis)
+    gains, scored = problem.filter(P, F, begin=True), cut(problem)
+
+    def flown(effects: np.ndarray) -> np.ndarray:
+        Y = estimated(problem, effects, gains)
+        fly_on(problem, scored, P, effects, gains, Y)
+        return Y
+
+    whole, found = flown(F), {}
+    nominal = np.zeros(ef.N_F) if problem.model.F is None else problem.model.F
+    for label in hypothesis.labels:
+        entries = [free.entry for free in hypothesis.free if free.label == label]
+        without = F.copy()
+        without[entries] = nominal[entries]
+        found[label] = largest(problem, whole, flown(without))
+    return found
+
+
+def largest(problem: Problem, Y: np.ndarray, other: np.ndarray) -> float:
+    """The largest rms of a channel in a scored window by which two predictions (rows, N_Y) differ, in tolerances."""
+    most = 0.0
+    for n, listed in enumerate(cut(problem).listed):
+        first = problem.recording.bounds[n]
+        for window in (window for window in listed if window.scored and window.start < window.end):
+            rows = slice(first + window.start, first + window.end)
+            for channel in channels_of(problem.runs[n]):
+                square = mean_square(channel, errors(channel, Y[rows], other[rows]))
+                most = max(most, float(np.sqrt(np.nan_to_num(square))))
+    return most
+
+
+def excess(after: dict[str, float], floor: dict[str, float]) -> float:
+    """The most by which a channel's gap exceeds its floor: the root of the difference of squares, in tolerances."""
+    beyond = [after[name] ** 2 - floor[name] ** 2 for name in after if name != "total" and name in floor]
+    return float(np.sqrt(max([0.0, *beyond])))
+
+
+def disorder_matters(search: Search, hypothesis: Hypothesis, shrinkage: Shrinkage) -> bool:
+    """Whether disorder that the search knows of shows in the gap, beyond what the case's own noise leaves."""
+    return excess(shrinkage.channels(AFTER), case_noise_floor(search, hypothesis)) >= MATTERS
+
+
+def gap_matters(shrinkage: Shrinkage) -> bool:
+    """Whether what is left exceeds the floor in any channel."""
+    return excess(shrinkage.channels(AFTER), shrinkage.channels(FLOOR)) >= MATTERS

@@ -1,0 +1,279 @@
+"""A diagnosis on disk: diagnosis.json (the answer), report.json (what else a report says), report.npz (its curves).
+
+The answer's keys are those of docs/GAP.md; those of the other two are in docs/DIAGNOSIS.md, Files. Numbers that are not
+finite are null.
+"""
+
+import json
+import math
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import msgspec
+import numpy as np
+
+from sim_backend.effects.base import catalogue
+from tools.data.errors import InputError
+from tools.data.plain import as_plain
+from tools.diagnose.stages import STAGES
+
+ANSWER, DETAILS, CURVES = "diagnosis.json", "report.json", "report.npz"
+NONE, UNKNOWN = "none", "unknown"
+MOST_BYTES = 100_000_000
+TABLES = ("measured", "nominal", "corrected")  # (rows, N_Y) of a run that is drawn
+
+Format = Annotated[int, msgspec.Meta(ge=1, le=1)]
+Number = float | None
+
+
+class Place(msgspec.Struct):
+    """Where, and how probable."""
+
+    subsystem: str
+    element: str
+    probability: float
+
+
+class Estimate(msgspec.Struct):
+    """A parameter of an effect, SI."""
+
+    estimate: Number
+    ci90: tuple[Number, Number]
+    unit: str
+
+
+class Cause(msgspec.Struct):
+    """A label, `none` or `unknown`."""
+
+    label: str
+    probability: float
+    group: list[str]
+    parameters: dict[str, Estimate]
+
+
+class Interval(msgspec.Struct):
+    """A share and its 90 % interval over runs."""
+
+    value: Number
+    ci90: tuple[Number, Number]
+
+
+class Gap(msgspec.Struct):
+    """Gaps in tolerances by channel, and in all (`total`), of four models."""
+
+    before: dict[str, Number]
+    recalibrated: dict[str, Number]
+    after: dict[str, Number]
+    floor: dict[str, Number]
+    shrinkage: Interval
+    closed: Interval
+
+
+class Correction(msgspec.Struct):
+    """A data-driven correction of an unknown gap: its link, its shapes (rms in `unit`), and what it does."""
+
+    link: str
+    unit: str
+    goes_with: dict[str, float]
+    model: str
+    gap: dict[str, Number]
+    shrinkage: Interval
+
+
+class Unexplained(msgspec.Struct):
+    """What is known of an unknown gap."""
+
+    correction: Correction | None = None
+
+
+class NextRun(msgspec.Struct):
+    """The manoeuvre proposed."""
+
+    description: str
+    parts: list[str]
+    distance: Number
+    mission: str
+
+
+class Answer(msgspec.Struct):
+    """diagnosis.json, as far as a report says it."""
+
+    format: Format
+    verdict: Literal["none", "cause", "unknown"]
+    where: list[Place]
+    causes: Annotated[list[Cause], msgspec.Meta(min_length=2)]
+    selected: list[str]
+    gap: Gap
+    unknown: Unexplained | None
+    cautions: list[str]
+    next_run: NextRun
+
+    @property
+    def main(self) -> str:
+        """The most probable: a label, `none` or `unknown`."""
+        return self.causes[0].label
+
+    def cause(self, label: str) -> Cause:
+        """The entry of a label."""
+        return next(cause for cause in self.causes if cause.label == label)
+
+
+class Finding(msgspec.Struct, frozen=True):
+    """One test of whitened innovations: what is left in a channel, and what it is correlated with."""
+
+    channel: str
+    test: str
+    sigma: float
+
+
+class Link(msgspec.Struct, frozen=True):
+    """A link of the chain: of what the best explanation brings, the share that it brings, 0 to 1."""
+
+    stage: str
+    name: str
+    share: float
+
+
+class Panel(msgspec.Struct):
+    """Links' shares of what a label brings; label "": of what the likeliest link brings, or of an unknown rest."""
+
+    label: str
+    links: list[Link]
+
+
+class Noise(msgspec.Struct):
+    """Disorder that the search knows of; mean NIS of the recalibrated model with the case's own noise, and with it."""
+
+    name: str
+    scale: float
+    nis_before: Number = None
+    nis_after: Number = None
+
+
+class Data(msgspec.Struct):
+    """What was diagnosed."""
+
+    case: str
+    vehicle: str
+    site: str
+    runs: int
+    seconds: float
+    log_rate_hz: float
+    motion_capture: bool
+    columns: list[str]
+    channels: list[str]
+
+
+class Picture(msgspec.Struct):
+    """A run that is drawn: its gaps, by channel and in all."""
+
+    name: str
+    channels: list[str]
+    before: dict[str, float | None]
+    after: dict[str, float | None]
+
+
+class Details(msgspec.Struct):
+    """report.json."""
+
+    format: Format
+    version: str
+    data: Data
+    evidence: dict[str, float]
+    corrected: bool  # whether the corrected model holds any effect
+    noise: Noise | None
+    panels: list[Panel]
+    findings: list[Finding]
+    pictures: list[Picture]
+    thresholds: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Curves:
+    """A drawn run: t (rows,) s, and what was measured and predicted, each (rows, N_Y)."""
+
+    t: np.ndarray
+    measured: np.ndarray
+    nominal: np.ndarray
+    corrected: np.ndarray
+
+
+@dataclass(frozen=True)
+class Record:
+    """A diagnosis as its folder holds it."""
+
+    answer: Answer
+    details: Details
+    curves: list[Curves]  # of the runs in details.pictures
+
+
+def number(value: Number) -> float:
+    """A number that may be missing, NaN then."""
+    return math.nan if value is None else value
+
+
+def write_record(folder: Path, answer: dict[str, Any], details: Details, curves: list[Curves]) -> None:
+    """The three files of a diagnosis; `answer` holds what Answer does, and whatever else others read."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, value in ((ANSWER, answer), (DETAILS, msgspec.to_builtins(details, enc_hook=float))):
+        (folder / name).write_text(json.dumps(as_plain(value), indent=1) + "\n", encoding="utf-8")
+    tables = {}
+    for n, run in enumerate(curves):
+        tables[f"t_{n}"] = run.t
+        tables |= {f"{name}_{n}": getattr(run, name).astype(np.float32) for name in TABLES}
+    np.savez_compressed(folder / CURVES, allow_pickle=False, **tables)
+
+
+def read_record(folder: Path) -> Record:
+    """A diagnosis from its folder; InputError names the file that is missing or not what it should be."""
+    if not folder.is_dir():
+        raise InputError("no such folder", source=folder)
+    answer, details = _read(folder / ANSWER, Answer), _read(folder / DETAILS, Details)
+    _check(answer, details, folder)
+    return Record(answer, details, _read_curves(folder / CURVES, len(details.pictures)))
+
+
+def _present(path: Path) -> Path:
+    if not path.is_file():
+        raise InputError("no such file: not a folder of `glider gap diagnose`, or of an older one", source=path)
+    if path.stat().st_size > MOST_BYTES:
+        raise InputError(f"longer than {MOST_BYTES} bytes", source=path)
+    return path
+
+
+def _read(path: Path, kind: Any) -> Any:
+    try:
+        return msgspec.json.decode(_present(path).read_bytes(), type=kind)
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise InputError(str(error), source=path) from None
+
+
+def _check(answer: Answer, details: Details, folder: Path) -> None:
+    """InputError where a file names what no catalogue holds, or where the two files are of different diagnoses."""
+    known = {*catalogue(), NONE, UNKNOWN}
+    named = [cause.label for cause in answer.causes] + answer.selected
+    for label in (label for label in named if label not in known):
+        raise InputError(f"no label '{label}' in the catalogue", source=folder / ANSWER, column="causes")
+    if not {NONE, UNKNOWN, *answer.selected} <= {cause.label for cause in answer.causes}:
+        raise InputError("not every answer has its entry", source=folder / ANSWER, column="causes")
+    if not set(details.evidence) >= set(answer.selected):
+        raise InputError(f"does not belong to the {ANSWER} beside it", source=folder / DETAILS, column="evidence")
+    links = [link for panel in details.panels for link in panel.links]
+    if any(link.stage not in STAGES for link in links):
+        raise InputError("a link of no stage of the chain", source=folder / DETAILS, column="panels")
+
+
+def _read_curves(path: Path, count: int) -> list[Curves]:
+    found = []
+    try:
+        with np.load(_present(path), allow_pickle=False) as tables:
+            for n in range(count):
+                run = Curves(tables[f"t_{n}"], *(tables[f"{name}_{n}"].astype(float) for name in TABLES))
+                if any(getattr(run, name).shape[:1] != run.t.shape for name in TABLES) or len(run.t) < 2:
+                    raise InputError(f"tables of different lengths for run {n}", source=path)
+                found.append(run)
+    except (ValueError, KeyError, OSError, EOFError, zipfile.BadZipFile) as error:
+        raise InputError(f"not the curves of this diagnosis: {error}", source=path) from None
+    return found
