@@ -8,7 +8,7 @@ latched.
 from dataclasses import dataclass
 from enum import IntEnum
 
-from firmware.core.supervision import supervisor_layout as at
+from firmware.core.supervision import supervisor_layout as sup
 
 
 class Reaction(IntEnum):
@@ -23,7 +23,15 @@ class Reaction(IntEnum):
     HW = 6  # hardware watchdog, drop weight
 
 
-assert [float(reaction) for reaction in Reaction] == [at.NOTHING, at.LOG, at.WARN, at.HOLD, at.ABORT, at.OOB, at.HW]
+assert [float(reaction) for reaction in Reaction] == [
+    sup.NOTHING,
+    sup.LOG,
+    sup.WARN,
+    sup.HOLD,
+    sup.ABORT,
+    sup.OOB,
+    sup.HW,
+]
 
 
 @dataclass(frozen=True)
@@ -83,4 +91,4 @@ _ROWS = (
 )  # fmt: skip
 FAULTS = {number: Row(number, *row) for number, row in enumerate(_ROWS, start=1)}
 
-assert len(FAULTS) == at.N_ROWS - 1
+assert len(FAULTS) == sup.N_ROWS - 1

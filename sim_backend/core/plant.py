@@ -5,13 +5,14 @@ One derivative for everything: the nominal flight is the case in which the envir
 
 import math
 
+from firmware.core.estimation.estimator_layout import DISTURBANCE_HOLD
 from firmware.core.jit import kernel
 from firmware.core.maths.rotations import quaternion_rate, rotation_nb
 from firmware.core.vehicle.actuators import actuator_rates
 from firmware.core.vehicle.flight import normalise_attitude
-from firmware.core.vehicle.layout import M_T, N_X, G
+from firmware.core.vehicle.layout import GRAVITY, M_T, N_X
 from firmware.core.vehicle.motion import accelerations
-from sim_backend.core import layout as at
+from sim_backend.core import layout as wl
 from sim_backend.core.noise import gaussian
 
 
@@ -21,14 +22,14 @@ def water_velocity(E, waves, north, east, down, t):
 
     Waves by linear theory in deep water: amplitude a, k = omega^2 / g, orbital speed a omega exp(-k Z).
     """
-    vn = E[at.CURRENT_N] + E[at.SHEAR_N] * down
-    ve = E[at.CURRENT_E] + E[at.SHEAR_E] * down
+    vn = E[wl.ENV_CURRENT_N] + E[wl.ENV_SHEAR_N] * down
+    ve = E[wl.ENV_CURRENT_E] + E[wl.ENV_SHEAR_E] * down
     vd = 0.0
     for i in range(waves.shape[0]):
-        omega, kn, ke = waves[i, at.WAVE_OMEGA], waves[i, at.WAVE_K_N], waves[i, at.WAVE_K_E]
+        omega, kn, ke = waves[i, wl.WAVE_OMEGA], waves[i, wl.WAVE_K_N], waves[i, wl.WAVE_K_E]
         k = math.sqrt(kn * kn + ke * ke)
-        phase = kn * north + ke * east - omega * t + waves[i, at.WAVE_PHASE]
-        speed = waves[i, at.WAVE_AMPLITUDE] * omega * math.exp(-k * max(down, 0.0))
+        phase = kn * north + ke * east - omega * t + waves[i, wl.WAVE_PHASE]
+        speed = waves[i, wl.WAVE_AMPLITUDE] * omega * math.exp(-k * max(down, 0.0))
         vn += speed * math.cos(phase) * kn / k
         ve += speed * math.cos(phase) * ke / k
         vd -= speed * math.sin(phase)
@@ -39,10 +40,10 @@ def water_velocity(E, waves, north, east, down, t):
 def boundary_force(P, E, down, down_rate):
     """Downward force (N) at the surface, where buoyancy is lost, and on the floor, a stiff damped spring."""
     force = 0.0
-    if E[at.SURFACE_HEIGHT] > 0.0 and down < 0.0:
-        force += P[M_T] * G * min(1.0, -down / E[at.SURFACE_HEIGHT])
-    if E[at.FLOOR_DEPTH] > 0.0 and down > E[at.FLOOR_DEPTH]:
-        force -= max(0.0, at.FLOOR_STIFFNESS * (down - E[at.FLOOR_DEPTH]) + at.FLOOR_DAMPING * down_rate)
+    if E[wl.ENV_SURFACE_HEIGHT] > 0.0 and down < 0.0:
+        force += P[M_T] * GRAVITY * min(1.0, -down / E[wl.ENV_SURFACE_HEIGHT])
+    if E[wl.ENV_FLOOR_DEPTH] > 0.0 and down > E[wl.ENV_FLOOR_DEPTH]:
+        force -= max(0.0, wl.FLOOR_STIFFNESS * (down - E[wl.ENV_FLOOR_DEPTH]) + wl.FLOOR_DAMPING * down_rate)
     return force
 
 
@@ -92,10 +93,10 @@ def rk4_step(P, E, waves, x, cmd, t, dt, acc, work):
 @kernel
 def hold_disturbance(E, seed, counters, t, acc):
     """Refresh the disturbance acceleration when its 0.1 s are over; the same t always gives the same numbers."""
-    hold = int(t / at.DISTURBANCE_HOLD + 1e-9)
-    if hold == counters[at.C_HOLD]:
+    hold = int(t / DISTURBANCE_HOLD + 1e-9)
+    if hold == counters[wl.C_HOLD]:
         return
-    counters[at.C_HOLD] = hold
+    counters[wl.C_HOLD] = hold
     for i in range(6):
-        strength = E[at.ACC_LINEAR] if i < 3 else E[at.ACC_ANGULAR]
-        acc[i] = strength * gaussian(seed, at.STREAM_DISTURBANCE + i, hold) if strength > 0.0 else 0.0
+        strength = E[wl.ENV_ACC_LINEAR] if i < 3 else E[wl.ENV_ACC_ANGULAR]
+        acc[i] = strength * gaussian(seed, wl.STREAM_DISTURBANCE + i, hold) if strength > 0.0 else 0.0

@@ -10,7 +10,7 @@ from hal.drivers.vn100 import euler, rotation
 from hal.protocols import maestro, vn100
 from sim_backend.twins.faults import Fault
 from sim_backend.twins.line import Line
-from sim_backend.twins.plant import SERVO, TwinPlant
+from sim_backend.twins.plant import CMD_SERVO, TwinPlant
 
 MODEL = "VN-100T-CR"
 DEAD_MAN_S = 1.0  # the servo board's serial timeout
@@ -124,7 +124,7 @@ class MaestroTwin:
             return
         self._plant.first_command()
         if quarter_us:  # 0: no pulses, the servo stays where it is
-            self._plant.commands[SERVO] = (quarter_us / 4.0 - self._table.zero_us) / self._table.us_per_rad
+            self._plant.commands[CMD_SERVO] = (quarter_us / 4.0 - self._table.zero_us) / self._table.us_per_rad
 
     def _reply(self, command: maestro.Command) -> None:
         if command.code == maestro.GET_ERRORS:

@@ -111,7 +111,7 @@ K2_NEED_PITCH, K2_NEED_DEPTH = 37, 38  # m, kg: the k2 that covers; NaN where th
 MARGIN_PITCH, MARGIN_DEPTH = 39, 40  # rad/s2, m/s2: positive, V is sure to fall
 WANTED_SERVO, WANTED_SLIDER, WANTED_BALLAST = 41, 42, 43  # what the controller wants, before any limit
 CAUTIOUS = 44  # 1: the PID flies, whatever controller is chosen
-REACTION, FAULT_ROW = 45, 46  # the supervisor's, and the row of the fault table that asked for it
+AP_REACTION, AP_FAULT_ROW = 45, 46  # the supervisor's, and the row of the fault table that asked for it
 N_AP = 47
 
 # --- modes and reasons ----------------------------------------------------------------------------------------------

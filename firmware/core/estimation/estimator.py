@@ -40,8 +40,8 @@ from firmware.core.estimation.estimator_layout import (
     ERROR_LINEAR,
     FRESH,
     GYRO_WANDER,
-    HOLD,
     HOLD_ERROR,
+    HOLD_LINEARISED,
     MAX_STEP,
     MOVED_RATE,
     MOVED_SHARE,
@@ -290,10 +290,10 @@ def linearise_where_due(P, settings, sigma, x, ds, dl, db, dt, work):
         linearise_motion(x, work[W_POINT], A)
     elif still and held[1] >= 0.5 * dt:
         linearise(P, x, ds, dl, db, A, work[W_POINT])
-        held[0] = HOLD
+        held[0] = HOLD_LINEARISED
     else:
         error_covariance(P, settings, sigma, x, ds, dl, db, A, C, work)
-        held[0], held[1] = HOLD, HOLD_ERROR
+        held[0], held[1] = HOLD_LINEARISED, HOLD_ERROR
     held[0] -= dt
     held[1] -= dt
     for k in range(N_COUPLED - E_ATT):

@@ -42,8 +42,8 @@ FRESH = 8  # in that sum too: linearise at every sub-step and hold nothing, wher
 # --- constants ------------------------------------------------------------------------------------------------------
 MAX_STEP = 0.02  # s
 DISTURBANCE_HOLD = 0.1  # s; held that long, an acceleration a is white noise of spectral density a^2 DISTURBANCE_HOLD
-HOLD, HOLD_ERROR = 0.1, 0.2  # s, for which equation (1) linearised and the covariance of the model's error serve,
-MOVED_SHARE, MOVED_RATE = 0.015, 0.025  # of the speed, and rad/s: past such a change they do not
+HOLD_LINEARISED, HOLD_ERROR = 0.1, 0.2  # s, how long equation (1) linearised and the model error's covariance serve
+MOVED_SHARE, MOVED_RATE = 0.015, 0.025  # of the speed, and rad/s: past such a change neither does
 GATE = 5.0  # sigma
 PATIENCE = 1.0  # s
 STRESS_GROWTH, STRESS_TIME, STRESS_MAX = 14.0, 5.0, 1e4  # 1/s (fourfold in 0.1 s), s, of the variance

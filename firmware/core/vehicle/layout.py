@@ -29,4 +29,4 @@ X_NU = 7  # 7..12 u v w (relative to the water), p q r
 X_ACT = 13  # 13 servo rad, 14 slider m, 15 ballast kg
 N_X = 16
 
-G = 9.80665  # m/s2
+GRAVITY = 9.80665  # m/s2

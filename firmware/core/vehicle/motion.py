@@ -5,7 +5,7 @@ symmetric 3 x 3 system for the rotations (Schur complement).
 """
 
 from firmware.core.jit import kernel
-from firmware.core.vehicle.layout import NET_MASS, G
+from firmware.core.vehicle.layout import GRAVITY, NET_MASS
 from firmware.core.vehicle.mass import first_moment, first_moment_rate, inertia, translational_mass
 from firmware.core.vehicle.water import water_wrench
 
@@ -27,14 +27,14 @@ def momentum_rate(P, kx, ky, kz, u, v, w, p, q, r, servo, slider, ballast, servo
     Q1 = I1 * p + I12 * q + I13 * r + S2 * w - S3 * v
     Q2 = I12 * p + I2 * q + I23 * r + S3 * u - S1 * w
     Q3 = I13 * p + I23 * q + I3 * r + S1 * v - S2 * u
-    weight = (ballast + P[NET_MASS]) * G
+    weight = (ballast + P[NET_MASS]) * GRAVITY
     return (
         P2 * r - P3 * q + weight * kx - (ballast_rate * u + q * dS3 - r * dS2),
         P3 * p - P1 * r + weight * ky - (ballast_rate * v + r * dS1 - p * dS3),
         P1 * q - P2 * p + weight * kz - (ballast_rate * w + p * dS2 - q * dS1),
-        Q2 * r - Q3 * q + P2 * w - P3 * v + G * (S2 * kz - S3 * ky) - (dS2 * w - dS3 * v),
-        Q3 * p - Q1 * r + P3 * u - P1 * w + G * (S3 * kx - S1 * kz) - (dS3 * u - dS1 * w),
-        Q1 * q - Q2 * p + P1 * v - P2 * u + G * (S1 * ky - S2 * kx) - (dS1 * v - dS2 * u),
+        Q2 * r - Q3 * q + P2 * w - P3 * v + GRAVITY * (S2 * kz - S3 * ky) - (dS2 * w - dS3 * v),
+        Q3 * p - Q1 * r + P3 * u - P1 * w + GRAVITY * (S3 * kx - S1 * kz) - (dS3 * u - dS1 * w),
+        Q1 * q - Q2 * p + P1 * v - P2 * u + GRAVITY * (S1 * ky - S2 * kx) - (dS1 * v - dS2 * u),
     )
 
 

@@ -8,7 +8,7 @@ import math
 import pytest
 
 from firmware.core.control import control_layout as ctl
-from firmware.core.supervision import supervisor_layout as at
+from firmware.core.supervision import supervisor_layout as sup
 from firmware.supervisor.table import Reaction
 from tests.support.stories import ABORT, HOLD, LOG, NOTHING, WARN, flying
 from tests.support.watchman import Watchman
@@ -68,7 +68,7 @@ def test_a_law_without_a_solution_hands_over_to_the_pid_and_three_times_aborts(s
     for count in (1.0, 2.0):
         man.ap[ctl.LAW_STATUS], man.ap[ctl.ACTIVE] = status, ctl.LAW
         assert man.step() == WARN
-        assert man.G[at.LAW_FAILED] == count
+        assert man.G[sup.LAW_FAILED] == count
         man.ap[ctl.ACTIVE] = ctl.PID
         man.step(10)
         assert man.ap[ctl.CAUTIOUS] == 1.0
@@ -85,7 +85,7 @@ def test_a_law_that_answers_again_starts_afresh():
         man.step(2)
         man.ap[ctl.LAW_STATUS] = 0.0
         man.step()
-        assert man.G[at.LAW_FAILED] == 0.0
+        assert man.G[sup.LAW_FAILED] == 0.0
     man.ap[ctl.LAW_STATUS] = 1.0
     man.pilot.C[ctl.CONTROLLER] = ctl.PID  # the status is an old one
     assert man.step() == NOTHING
@@ -101,9 +101,9 @@ def test_what_an_aborted_flight_wants_is_no_law():
 
 # --- row 24 ---------------------------------------------------------------------------------------------------------
 def late(man: Watchman, ticks: int = 1, by: float = 0.03) -> Reaction:
-    man.G[at.LATENESS] = by
+    man.G[sup.LATENESS] = by
     man.step(ticks)
-    man.G[at.LATENESS] = 0.0
+    man.G[sup.LATENESS] = 0.0
     return man.supervisor.reaction
 
 

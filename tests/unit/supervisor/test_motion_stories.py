@@ -6,7 +6,7 @@ Each row as a story: all is well, something breaks, it is noticed in time, and w
 import pytest
 
 from firmware.core.control import control_layout as ctl
-from firmware.core.supervision import supervisor_layout as at
+from firmware.core.supervision import supervisor_layout as sup
 from firmware.supervisor.settings import Limits
 from tests.support.stories import ABORT, COARSE, HW, NOTHING, OOB, TWO_TICKS, WARN, flying, rising
 
@@ -17,7 +17,7 @@ def test_pitch_and_depth_rate_that_disagree_make_the_controller_cautious(nose):
     man = flying()
     man.pitch, man.sinks = -0.3 * nose, -0.2 * nose
     man.depth = 3.0
-    man.G[at.JUMP] = man.G[at.JUMP + 1] = 10.0
+    man.G[sup.JUMP] = man.G[sup.JUMP + 1] = 10.0
     begin = man.t
     if nose == -1:
         man.pitch = 0.3
@@ -35,7 +35,7 @@ def test_pitch_and_depth_rate_that_disagree_make_the_controller_cautious(nose):
 @pytest.mark.parametrize(("pitch", "sinks"), [(0.1, 0.2), (0.3, 0.03), (-0.3, 0.2)])
 def test_a_flat_or_slow_glide_does_not_disagree(pitch, sinks):
     man = flying(dt=COARSE)
-    man.G[at.JUMP + 1] = 10.0
+    man.G[sup.JUMP + 1] = 10.0
     man.pitch, man.sinks = pitch, sinks
     assert man.seconds(10.0) == NOTHING
 
@@ -51,7 +51,7 @@ def test_deeper_than_the_working_depth_aborts_and_at_risk_goes_out_of_band():
     assert man.until(ABORT, 1.0) <= 1.0
     assert man.supervisor.row == 17
     man.depth, man.sinks = 5.0, 0.2
-    man.G[at.JUMP + 6] = 1e6
+    man.G[sup.JUMP + 6] = 1e6
     assert man.until(OOB, 0.2) <= 0.2
     assert man.supervisor.row == 17
 
@@ -73,7 +73,7 @@ def test_without_a_working_depth_the_sites_counts():
     man = flying(site=6.0)
     man.depth = 6.05
     man.sinks = 0.0
-    man.G[at.JUMP + 6] = 1e6
+    man.G[sup.JUMP + 6] = 1e6
     assert man.until(ABORT, 1.0) <= 1.0
     man.depth = 6.65
     assert man.until(OOB, 0.2) <= 0.2
@@ -107,7 +107,7 @@ def test_an_ascent_however_slow_is_one():
 def test_at_the_surface_nothing_has_to_ascend():
     man = flying(dt=COARSE)
     man.depth, man.sinks, man.ap[ctl.MODE] = 0.3, 0.0, ctl.COMPLETED
-    man.G[at.JUMP + 6] = 1e6
+    man.G[sup.JUMP + 6] = 1e6
     man.seconds(100.0)
     assert man.supervisor.worst(18) == NOTHING
 
@@ -116,7 +116,7 @@ def test_an_ascent_that_stops_halfway_is_noticed():
     man = flying(dt=COARSE)
     man.ap[ctl.MODE] = ctl.ABORTED
     rising(man)
-    man.G[at.JUMP + 1] = 10.0
+    man.G[sup.JUMP + 1] = 10.0
     man.seconds(5.0)
     man.sinks = 0.0
     assert man.until(OOB, 30.0 + 1.5) > 28.0
@@ -161,7 +161,7 @@ def test_a_slow_glide_is_not_the_same_depth(sinks):
 ])  # fmt: skip
 def test_overtime(mode, reaction):
     man = flying()
-    man.G[at.MISSION_TIME] = 5.0
+    man.G[sup.MISSION_TIME] = 5.0
     man.ap[ctl.MISSION_START] = man.t - 4.0
     man.ap[ctl.MODE] = mode
     assert man.seconds(0.9) == NOTHING
@@ -175,7 +175,7 @@ def test_overtime(mode, reaction):
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_too_steep_or_rolling_over_flies_the_pid_then_aborts(what, side):
     man = flying()
-    man.G[at.JUMP : at.JUMP + 3] = 10.0
+    man.G[sup.JUMP : sup.JUMP + 3] = 10.0
     setattr(man, what, side * (1.1 if what == "pitch" else 1.4))
     if side * man.pitch > 0:
         man.sinks = 0.0
@@ -188,7 +188,7 @@ def test_too_steep_or_rolling_over_flies_the_pid_then_aborts(what, side):
 
 def test_a_leg_that_is_meant_to_be_steep_may_be():
     man = flying()
-    man.G[at.JUMP + 1] = 10.0
+    man.G[sup.JUMP + 1] = 10.0
     man.ap[ctl.REF_PITCH] = -1.2
     man.pitch = -1.3
     assert man.seconds(5.0) == NOTHING
@@ -198,7 +198,7 @@ def test_a_leg_that_is_meant_to_be_steep_may_be():
 
 def test_a_vehicle_that_comes_upright_again_flies_on():
     man = flying()
-    man.G[at.JUMP + 1] = 10.0
+    man.G[sup.JUMP + 1] = 10.0
     man.pitch = -1.1
     man.seconds(1.5)
     man.pitch = -0.3
@@ -210,7 +210,7 @@ def test_a_vehicle_that_comes_upright_again_flies_on():
 
 def test_an_ascent_may_be_as_steep_as_it_comes():
     man = flying(mode=ctl.COMPLETED)
-    man.G[at.JUMP + 1] = 10.0
+    man.G[sup.JUMP + 1] = 10.0
     rising(man)
     man.pitch = 1.5
     man.seconds(5.0)

@@ -5,7 +5,7 @@ Each row as a story: all is well, something breaks, it is noticed in time, and w
 
 import pytest
 
-from firmware.core.supervision import supervisor_layout as at
+from firmware.core.supervision import supervisor_layout as sup
 from firmware.supervisor.settings import Limits
 from tests.support.stories import ABORT, COARSE, LOG, NOTHING, WARN, flying
 
@@ -59,8 +59,8 @@ def test_a_dip_of_voltage_is_no_under_voltage():
 @pytest.mark.parametrize(
     ("place", "value", "row", "reaction"),
     [
-        (at.RESTARTED, 1.0, 25, ABORT), (at.RECORDER, 1.0, 27, LOG), (at.RECORDER, 2.0, 27, WARN),
-        (at.GROWTH, 1.0, 33, WARN), (at.GROWTH, 2.0, 33, ABORT),
+        (sup.RESTARTED, 1.0, 25, ABORT), (sup.RECORDER, 1.0, 27, LOG), (sup.RECORDER, 2.0, 27, WARN),
+        (sup.GROWTH, 1.0, 33, WARN), (sup.GROWTH, 2.0, 33, ABORT),
     ],
 )  # fmt: skip
 def test_what_the_runtime_tells_is_heard_in_the_same_tick(place, value, row, reaction):

@@ -9,7 +9,7 @@ import numpy as np
 
 from firmware.core.control import control_layout as ctl
 from firmware.core.maths.rotations import euler_from_quaternion
-from firmware.core.supervision import supervisor_layout as at
+from firmware.core.supervision import supervisor_layout as sup
 from firmware.core.vehicle.layout import CG_X, CG_Y, X_ACT, X_QUAT
 from firmware.supervisor.settings import Limits
 from firmware.supervisor.table import Reaction
@@ -301,8 +301,8 @@ def conditions() -> list[Case]:
         Case(24, "one in ten late", lateness(lambda n: 0.03 * (n % 10 == 0)), ABORT, 0.2, UNDER_WAY, late=True,
              setting=Setting(hold_s=60.0)),
         Case(25, "restarted", nothing, ABORT, 0.02, ("waiting",), Setting(restarted=True)),
-        Case(27, "recorder drops", told(at.RECORDER, 1.0), LOG, 0.0),
-        Case(27, "recorder failed", told(at.RECORDER, 2.0), WARN, 0.0),
+        Case(27, "recorder drops", told(sup.RECORDER, 1.0), LOG, 0.0),
+        Case(27, "recorder failed", told(sup.RECORDER, 2.0), WARN, 0.0),
         Case(33, "handles are not given back", handles(130), WARN, 60.0, UNDER_WAY, Setting(hold_s=30.0)),
         Case(33, "handles, without end", handles(260), ABORT, 60.0, UNDER_WAY, Setting(hold_s=30.0)),
         Case(33, "memory is not given back", memory(70), WARN, 60.0, ("descent",), Setting(hold_s=30.0)),
