@@ -131,7 +131,7 @@ class Autopilot:
         code = float(self.ap[ctl.REASON])
         if code > ctl.REASON_FAULT:
             row = int(code - ctl.REASON_FAULT)
-            return f"fault {row}: {FAULTS[row].name}"
+            return f"fault {row}: {FAULTS[row]}"
         reason = REASONS[code]
         if self.ap[ctl.REASON] == ctl.REASON_LEG_TIME:
             row = int(self.ap[ctl.LEG])

@@ -69,10 +69,10 @@ class Supervisor:
         worst = self.G[sup.WORST : sup.WORST + sup.N_ROWS]
         rows = np.flatnonzero(worst > self._told)
         self._told[:] = worst
-        return [(Reaction(int(worst[row])), f"fault {row}: {FAULTS[int(row)].name}") for row in rows]
+        return [(Reaction(int(worst[row])), f"fault {row}: {FAULTS[int(row)]}") for row in rows]
 
     @property
     def depth_known(self) -> bool:
         """False once the beacon has had nothing fit to say for too long."""
         last = float(self.G[sup.TAKEN + sup.SENSOR_BEACON])
-        return math.isfinite(last) and self.worst(2) == Reaction.NOTHING
+        return math.isfinite(last) and self.worst(sup.FAULT_PRESSURE_LOST) == Reaction.NOTHING

@@ -199,7 +199,7 @@ def faults_noticed(supervisor) -> list[dict]:
     from firmware.supervisor.table import FAULTS
 
     return [
-        {"number": row, "name": FAULTS[row].name, "noticed_s": at, "reaction": supervisor.worst(row).name}
+        {"number": row, "name": FAULTS[row], "noticed_s": at, "reaction": supervisor.worst(row).name}
         for row in FAULTS
         if (at := supervisor.noticed(row)) is not None
     ]

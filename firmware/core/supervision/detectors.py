@@ -49,23 +49,23 @@ def watch_sensors(G, frame, t):
     """Rows 1, 2, 4, 6, 10, 11, 20 and 23."""
     gone = lasting(G, sup.T_IMU, lost(G, sup.SENSOR_IMU, t) or G[sup.SAMPLE_VERDICT + sup.SENSOR_IMU] == sup.STUCK, t)
     if gone >= 0.0:
-        ask(G, 1, sup.ABORT if gone >= G[sup.HOLD_TIME] else sup.HOLD)
+        ask(G, sup.FAULT_IMU_LOST, sup.ABORT if gone >= G[sup.HOLD_TIME] else sup.HOLD)
     if lost(G, sup.SENSOR_BEACON, t):
-        ask(G, 2, sup.ABORT)
+        ask(G, sup.FAULT_PRESSURE_LOST, sup.ABORT)
     if lost(G, sup.SENSOR_SLIDER, t):
-        ask(G, 4, sup.WARN)
+        ask(G, sup.FAULT_WIRE_LOST, sup.WARN)
     if lost(G, sup.SENSOR_PLUNGER, t):
-        ask(G, 4, sup.ABORT)
+        ask(G, sup.FAULT_WIRE_LOST, sup.ABORT)
     for sensor in range(sup.N_SENSORS):
         worth = G[sup.SAMPLE_VERDICT + sensor]
         fitted = sensor <= sup.SENSOR_PLUNGER or math.isfinite(G[sup.TAKEN + sensor])
         old = fitted and age(G, sensor, t) > 3.0 * G[sup.PERIOD + sensor] + G[sup.TICK]
         if worth == sup.MISTIMED or old:
-            ask(G, 6, sup.LOG)
+            ask(G, sup.FAULT_SAMPLE_TIME, sup.LOG)
         if worth == sup.ABSURD:
-            ask(G, 10, sup.WARN if G[sup.UNFIT + sensor] >= G[sup.UNFIT_RUN] else sup.LOG)
+            ask(G, sup.FAULT_IMPLAUSIBLE, sup.WARN if G[sup.UNFIT + sensor] >= G[sup.UNFIT_RUN] else sup.LOG)
         if worth == sup.STUCK:
-            ask(G, 11, sup.WARN)
+            ask(G, sup.FAULT_STUCK_SENSOR, sup.WARN)
     watch_leak(G, frame)
     watch_battery(G, frame, t)
 
@@ -79,9 +79,9 @@ def watch_leak(G, frame):
         if frame[start + 2] > 0.5:
             G[sup.WET] += 1.0
     if G[sup.WET] >= G[sup.LEAK_COUNT]:
-        ask(G, 20, sup.ABORT)
+        ask(G, sup.FAULT_LEAK, sup.ABORT)
     elif G[sup.WET] > 0.0:
-        ask(G, 20, sup.WARN)
+        ask(G, sup.FAULT_LEAK, sup.WARN)
 
 
 @kernel
@@ -92,9 +92,9 @@ def watch_battery(G, frame, t):
         return
     volts = frame[start + 2]
     if lasting(G, sup.T_LOW, volts < G[sup.LOW_VOLTAGE], t) >= G[sup.VOLTAGE_TIME]:
-        ask(G, 23, sup.WARN)
+        ask(G, sup.FAULT_VOLTAGE, sup.WARN)
     if lasting(G, sup.T_LEAST, volts < G[sup.LEAST_VOLTAGE], t) >= G[sup.VOLTAGE_TIME]:
-        ask(G, 23, sup.ABORT)
+        ask(G, sup.FAULT_VOLTAGE, sup.ABORT)
 
 
 @kernel
@@ -108,23 +108,23 @@ def silent(G, frame, actuator, t):
 def watch_states(G, frame, t):
     """What actuators say of themselves: rows 3, 5, 9, 14 and 16."""
     if silent(G, frame, 0, t):
-        ask(G, 5, sup.WARN)
+        ask(G, sup.FAULT_SERVO_LOST, sup.WARN)
     for actuator in range(3):
         if actuator > 0 and silent(G, frame, actuator, t):
-            ask(G, 3, sup.ABORT)
+            ask(G, sup.FAULT_BUS_LOST, sup.ABORT)
         if frame[sup.STATES[actuator] + 1] != sup.VALID:
             continue
         condition = frame[sup.STATES[actuator] + 2]
         if condition == sup.ALARM:
-            ask(G, 16, sup.WARN)
+            ask(G, sup.FAULT_DRIVE_ALARM, sup.WARN)
         elif condition == sup.ALARM_KEPT:
-            ask(G, 16, sup.ABORT)
+            ask(G, sup.FAULT_DRIVE_ALARM, sup.ABORT)
         elif condition == sup.RETRYING:
-            ask(G, 14, sup.WARN)
+            ask(G, sup.FAULT_STALL, sup.WARN)
         elif condition == sup.GIVEN_UP or condition == sup.WRONG_WAY:
-            ask(G, 14, sup.ABORT)
+            ask(G, sup.FAULT_STALL, sup.ABORT)
         elif condition == sup.MISCONFIGURED:
-            ask(G, 9, sup.ABORT)
+            ask(G, sup.FAULT_EXCEPTION, sup.ABORT)
 
 
 @kernel
@@ -150,10 +150,10 @@ def runs_away(G, i, measured, least):
 def watch_move(G, i, measured, rate, tau, span, t):
     """Row 14 for slider (i = 0) or ballast (1): does it go where it was sent? rate 1/s, tau s, span the whole range."""
     if runs_away(G, i, measured, 0.3 * rate * G[sup.WRONG_TICKS] * G[sup.TICK]):
-        G[sup.STOPPED + i] = G[sup.ENABLED + 14]
+        G[sup.STOPPED + i] = G[sup.ENABLED + sup.FAULT_STALL]
         G[sup.SENT + 1 + i] = measured
     if G[sup.STOPPED + i] == 1.0:
-        ask(G, 14, sup.ABORT)
+        ask(G, sup.FAULT_STALL, sup.ABORT)
     else:
         watch_stall(G, i, measured, rate, tau, span, t)
 
@@ -164,7 +164,7 @@ def watch_stall(G, i, measured, rate, tau, span, t):
     off = abs(G[sup.SENT + 1 + i] - measured)
     tolerance = rate * (tau + 0.2) + 0.02 * span
     if t < G[sup.REST_UNTIL + i]:
-        ask(G, 14, sup.WARN)
+        ask(G, sup.FAULT_STALL, sup.WARN)
         return
     moved = abs(measured - G[sup.MARK + i]) > 0.25 * tolerance
     stands = lasting(G, sup.T_STALL + i, off > tolerance and not moved, t)
@@ -172,12 +172,12 @@ def watch_stall(G, i, measured, rate, tau, span, t):
         G[sup.MARK + i] = measured
     if moved:
         G[sup.STALLS + i] = 0.0
-    if stands > G[sup.STALL_FACTOR] * (off / rate + tau) and G[sup.ENABLED + 14] == 1.0:
+    if stands > G[sup.STALL_FACTOR] * (off / rate + tau) and G[sup.ENABLED + sup.FAULT_STALL] == 1.0:
         G[sup.STALLS + i] += 1.0
         G[sup.REST_UNTIL + i] = t + G[sup.STALL_REST]
         G[sup.SINCE + sup.T_STALL + i] = math.nan
     if G[sup.STALLS + i] > G[sup.STALL_TRIES]:
-        ask(G, 14, sup.ABORT)
+        ask(G, sup.FAULT_STALL, sup.ABORT)
 
 
 @kernel
@@ -199,19 +199,19 @@ def watch_depth(G, est, ap, t):
     rate = depth_rate(G, depth, t)
     against = rate * pitch > 0.0 and abs(pitch) > G[sup.DISAGREE_PITCH] and abs(rate) > G[sup.DISAGREE_RATE]
     if lasting(G, sup.T_DISAGREE, flying and against, t) >= G[sup.DISAGREE_TIME]:
-        ask(G, 13, sup.WARN)
+        ask(G, sup.FAULT_DISAGREE, sup.WARN)
     if lasting(G, sup.T_DEEP, depth > G[sup.WORKING_DEPTH], t) >= G[sup.DEEP_TIME]:
-        ask(G, 17, sup.ABORT)
+        ask(G, sup.FAULT_TOO_DEEP, sup.ABORT)
     if lasting(G, sup.T_RISK, depth > G[sup.RISK_DEPTH], t) >= G[sup.RISK_TIME]:
-        ask(G, 17, sup.OOB)
+        ask(G, sup.FAULT_TOO_DEEP, sup.OOB)
     held = not flying or ap[ctl.REACHED] >= 0.0
     if held or not abs(depth - G[sup.BAND_MARK]) <= G[sup.SAME_BAND]:
         G[sup.BAND_MARK], G[sup.BAND_SINCE] = depth, t
     if t - G[sup.BAND_SINCE] > G[sup.SAME_TIME]:
-        ask(G, 19, sup.ABORT)
+        ask(G, sup.FAULT_OVERTIME, sup.ABORT)
     begun = ap[ctl.MODE] == ctl.FLYING or ap[ctl.MODE] == ctl.ABORTED
     if begun and t - ap[ctl.MISSION_START] > G[sup.MISSION_TIME]:
-        ask(G, 19, sup.ABORT)
+        ask(G, sup.FAULT_OVERTIME, sup.ABORT)
 
 
 @kernel
@@ -231,7 +231,7 @@ def watch_ascent(G, est, ap, t):
     if math.isnan(G[sup.OOB_SINCE]):
         G[sup.OOB_SINCE] = G[sup.ASCENT_SINCE] = t
     patience = G[sup.BLIND_TIME] if blind else G[sup.ASCENT_TIME]
-    ask(G, 18, sup.HW if t - max(G[sup.ASCENT_SINCE], G[sup.OOB_SINCE]) > patience else sup.OOB)
+    ask(G, sup.FAULT_NO_ASCENT, sup.HW if t - max(G[sup.ASCENT_SINCE], G[sup.OOB_SINCE]) > patience else sup.OOB)
 
 
 @kernel
@@ -242,7 +242,7 @@ def watch_attitude(G, est, ap, t):
     over = roll > max(G[sup.STEEP_ROLL], abs(ap[ctl.REF_ROLL]) + G[sup.STEEP_MARGIN])
     bad = lasting(G, sup.T_STEEP, ap[ctl.MODE] == ctl.FLYING and (steep or over), t)
     if bad >= 0.0:
-        ask(G, 21, sup.ABORT if bad >= G[sup.STEEP_TIME] else sup.WARN)
+        ask(G, sup.FAULT_STEEP, sup.ABORT if bad >= G[sup.STEEP_TIME] else sup.WARN)
 
 
 @kernel
@@ -262,7 +262,7 @@ def watch_law(P, C, G, ap, t):
     if answerless(P, C, ap):
         G[sup.LAW_FAILED] += 1.0
         G[sup.PID_UNTIL] = t + G[sup.LAW_REST]
-        ask(G, 22, sup.ABORT if G[sup.LAW_FAILED] >= G[sup.LAW_RUN] else sup.WARN)
+        ask(G, sup.FAULT_NO_ANSWER, sup.ABORT if G[sup.LAW_FAILED] >= G[sup.LAW_RUN] else sup.WARN)
     elif C[ctl.CONTROLLER] == ctl.PID or ap[ctl.ACTIVE] == ctl.LAW:
         G[sup.LAW_FAILED] = 0.0
 
@@ -275,16 +275,16 @@ def watch_loop(G, t):
     if G[sup.LATENESS] > G[sup.TICK]:
         G[sup.LATE_RUN] += 1.0
         G[sup.LATE_COUNT] += 1.0
-        ask(G, 24, sup.LOG)
+        ask(G, sup.FAULT_OVERRUN, sup.LOG)
     else:
         G[sup.LATE_RUN] = 0.0
     many = G[sup.LATE_COUNT] * G[sup.TICK] > 60.0 * G[sup.OVERRUN_SHARE]
     heavy = lasting(G, sup.T_HEAVY, G[sup.LATE_RUN] >= G[sup.OVERRUN_RUN] or many, t)
     if heavy >= 0.0:
-        ask(G, 24, sup.ABORT if heavy >= G[sup.HOLD_TIME] else sup.HOLD)
+        ask(G, sup.FAULT_OVERRUN, sup.ABORT if heavy >= G[sup.HOLD_TIME] else sup.HOLD)
     if G[sup.RESTARTED] == 1.0:
-        ask(G, 25, sup.ABORT)
+        ask(G, sup.FAULT_LOOP_HUNG, sup.ABORT)
     if G[sup.RECORDER] > 0.0:
-        ask(G, 27, sup.WARN if G[sup.RECORDER] > 1.0 else sup.LOG)
+        ask(G, sup.FAULT_DISK, sup.WARN if G[sup.RECORDER] > 1.0 else sup.LOG)
     if G[sup.GROWTH] > 0.0:
-        ask(G, 33, sup.ABORT if G[sup.GROWTH] > 1.0 else sup.WARN)
+        ask(G, sup.FAULT_GROWTH, sup.ABORT if G[sup.GROWTH] > 1.0 else sup.WARN)

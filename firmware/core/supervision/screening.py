@@ -73,7 +73,7 @@ def stuck(P, G, frame, sensor, t):
         if sensor == sup.SENSOR_SLIDER or sensor == sup.SENSOR_PLUNGER:
             G[sup.SENT_THEN + sensor - sup.SENSOR_SLIDER] = G[sup.SENT + 1 + sensor - sup.SENSOR_SLIDER]
     patience = G[sup.FROZEN_TIME] if sensor == sup.SENSOR_IMU else G[sup.STUCK_TIME]
-    row = 1 if sensor == sup.SENSOR_IMU else 11
+    row = sup.FAULT_IMU_LOST if sensor == sup.SENSOR_IMU else sup.FAULT_STUCK_SENSOR
     same = t - G[sup.SAME_SINCE + sensor] >= max(patience, 4.0 * G[sup.PERIOD + sensor])
     return G[sup.ENABLED + row] == 1.0 and same and moves(P, G, frame, sensor)
 
@@ -83,11 +83,11 @@ def judge(P, G, frame, sensor, t):
     """What a sample not seen before is worth: FIT, MISTIMED, ABSURD or STUCK."""
     time, last = frame[sup.STARTS[sensor]], G[sup.TAKEN + sensor]
     still = stuck(P, G, frame, sensor, t)
-    if G[sup.ENABLED + 6] == 1.0:
+    if G[sup.ENABLED + sup.FAULT_SAMPLE_TIME] == 1.0:
         oldest = t - 3.0 * G[sup.PERIOD + sensor] - G[sup.TICK]
         if not oldest <= time <= t + 1e-6 or time <= last:
             return sup.MISTIMED
-    if G[sup.ENABLED + 10] == 1.0 and absurd(G, frame, sensor, max(time - last, 0.0)):
+    if G[sup.ENABLED + sup.FAULT_IMPLAUSIBLE] == 1.0 and absurd(G, frame, sensor, max(time - last, 0.0)):
         return sup.ABSURD
     return sup.STUCK if still else sup.FIT
 
@@ -108,7 +108,7 @@ def take(P, G, frame, sensor, t):
         else:
             G[sup.UNFIT + sensor] += 1.0
         G[sup.SAMPLE_VERDICT + sensor] = worth
-    elif G[sup.ENABLED + 6] == 1.0 and differs(G, frame, sensor, sup.RAW):
+    elif G[sup.ENABLED + sup.FAULT_SAMPLE_TIME] == 1.0 and differs(G, frame, sensor, sup.RAW):
         G[sup.SAMPLE_VERDICT + sensor] = sup.MISTIMED  # another sample under the same time
     if G[sup.SAMPLE_VERDICT + sensor] != sup.FIT:
         frame[start + 1] = sup.FAULT

@@ -84,7 +84,7 @@ def goal(P, G, cmd, ap, i):
         return math.nan
     if G[sup.HIGHEST] == sup.HOLD:
         return G[sup.SENT + i]
-    if i == 0 and G[sup.ASKED + 5] * G[sup.ENABLED + 5] > 0.0:
+    if i == 0 and G[sup.ASKED + sup.FAULT_SERVO_LOST] * G[sup.ENABLED + sup.FAULT_SERVO_LOST] > 0.0:
         return 0.0
     return cmd[i] if math.isfinite(cmd[i]) else G[sup.SENT + i]
 
@@ -99,7 +99,7 @@ def act(P, G, cmd, ap, t):
             wanted = G[sup.MARK + i - 1]  # where it stands
         last = G[sup.SENT + i]
         beyond = abs(ap[ctl.WANTED_SERVO + i]) > IMPOSSIBLE * (high - low)
-        if G[sup.ENABLED + 22] == 1.0 and beyond and G[sup.HIGHEST] < sup.ABORT:
+        if G[sup.ENABLED + sup.FAULT_NO_ANSWER] == 1.0 and beyond and G[sup.HIGHEST] < sup.ABORT:
             wanted = last
         sent = limited(wanted, last, low, high, P[RATES[i]], G[sup.TICK])
         cmd[i] = math.nan if math.isnan(wanted) else sent
@@ -111,7 +111,7 @@ def watch_limits(P, G, cmd):
     """Row 15: asked to go past a limit; clamped in `act`."""
     for i in range(3):
         if cmd[i] < P[MINS[i]] - ROUNDING or cmd[i] > P[MINS[i] + 1] + ROUNDING:
-            ask(G, 15, sup.LOG)
+            ask(G, sup.FAULT_SOFT_LIMIT, sup.LOG)
 
 
 @kernel
@@ -152,8 +152,12 @@ def guard(P, C, G, frame, est, ap, cmd, t):
     watch_limits(P, G, cmd)
     settle(G, t)
     act(P, G, cmd, ap, t)
-    doubtful = G[sup.ASKED + 13] * G[sup.ENABLED + 13] + G[sup.ASKED + 21] * G[sup.ENABLED + 21] > 0.0
-    lawless = G[sup.ENABLED + 22] == 1.0 and t < G[sup.PID_UNTIL]
+    doubtful = (
+        G[sup.ASKED + sup.FAULT_DISAGREE] * G[sup.ENABLED + sup.FAULT_DISAGREE]
+        + G[sup.ASKED + sup.FAULT_STEEP] * G[sup.ENABLED + sup.FAULT_STEEP]
+        > 0.0
+    )
+    lawless = G[sup.ENABLED + sup.FAULT_NO_ANSWER] == 1.0 and t < G[sup.PID_UNTIL]
     ap[ctl.CAUTIOUS] = 1.0 if doubtful or lawless else 0.0
     if G[sup.HIGHEST] >= sup.ABORT and ap[ctl.MODE] < ctl.COMPLETED:
         abort(ap, ctl.REASON_FAULT + G[sup.HIGHEST_ROW])

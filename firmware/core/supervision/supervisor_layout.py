@@ -1,10 +1,19 @@
 """Where things stand in the supervisor's vector G: settings, what the runtime tells it, and its memory. SI.
 
-Rows are the numbers of the fault table (firmware/supervisor/table.py); row 0 is nobody's.
+Row 0 of the fault table is nobody's.
 """
 
 from hal.ports import BALLAST, BATTERY, BEACON, IMU, LEAK, PLUNGER_WIRE, SERVO, SLIDER, SLIDER_WIRE
 
+# --- rows of the fault table: docs/SUPERVISOR.md says of each who sees it, how soon, and what is done ----------------
+(
+    FAULT_IMU_LOST, FAULT_PRESSURE_LOST, FAULT_BUS_LOST, FAULT_WIRE_LOST, FAULT_SERVO_LOST,
+    FAULT_SAMPLE_TIME, FAULT_CHECKSUM, FAULT_REPLY, FAULT_EXCEPTION, FAULT_IMPLAUSIBLE, FAULT_STUCK_SENSOR,
+    FAULT_NOT_ARMED, FAULT_DISAGREE, FAULT_STALL, FAULT_SOFT_LIMIT, FAULT_DRIVE_ALARM, FAULT_TOO_DEEP,
+    FAULT_NO_ASCENT, FAULT_OVERTIME, FAULT_LEAK, FAULT_STEEP, FAULT_NO_ANSWER, FAULT_VOLTAGE, FAULT_OVERRUN,
+    FAULT_LOOP_HUNG, FAULT_WALL_CLOCK, FAULT_DISK, FAULT_POWER_CUT, FAULT_STATE_FILE, FAULT_FILE, FAULT_SERIAL,
+    FAULT_CONSOLE, FAULT_GROWTH, FAULT_PORT,
+) = range(1, 35)  # fmt: skip
 N_ROWS = 35
 
 # --- reactions, mildest first ---------------------------------------------------------------------------------------

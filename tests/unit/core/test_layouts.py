@@ -83,3 +83,25 @@ def test_a_layout_has_one_alias(room):
         if (name.asname or name.name) != known.get(f"{node.module}.{name.name}", name.asname or name.name)
     ]
     assert other == []
+
+
+def bare_fault_rows(tree: ast.AST) -> list[str]:
+    """Rows of the fault table by number: `ASKED + 24`, `ask(G, 24, ...)`, `Case(24, ...)`, `worst(24)`."""
+    found = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.BinOp) and isinstance(node.left, ast.Attribute):
+            row = node.right if node.left.attr in ("ASKED", "ENABLED", "FIRST", "WORST") else None
+        elif isinstance(node, ast.Call) and node.args:
+            name = getattr(node.func, "id", getattr(node.func, "attr", ""))
+            place = {"ask": 1, "Case": 0, "Show": 0, "worst": 0, "noticed": 0, "disable": 0}.get(name, len(node.args))
+            row = node.args[place] if place < len(node.args) else None
+        else:
+            continue
+        if isinstance(row, ast.Constant) and isinstance(row.value, int):
+            found.append(ast.unparse(node))
+    return found
+
+
+def test_rows_of_the_fault_table_have_names():
+    assert bare_fault_rows(ast.parse("G[sup.ASKED + 24]; ask(G, 1, sup.LOG); man.worst(2)")) != []
+    assert {str(path): rows for path in FILES if (rows := bare_fault_rows(TREES[path]))} == {}

@@ -20,14 +20,14 @@ def test_a_lost_drive_aborts(name):
     man = flying()
     man.silence.add(name)
     assert man.until(ABORT, 0.5) > 0.35
-    assert man.supervisor.row == 3
+    assert man.supervisor.row == sup.FAULT_BUS_LOST
 
 
 def test_a_lost_servo_flies_level_until_it_answers():
     man = flying()
     man.silence.add("servo")
     assert man.until(WARN, 0.5) > 0.35
-    assert man.supervisor.row == 5
+    assert man.supervisor.row == sup.FAULT_SERVO_LOST
     man.seconds(2.0)
     assert man.commands == pytest.approx([0.0, 0.01, 0.05])
     assert man.ap[ctl.MODE] == ctl.FLYING
@@ -97,7 +97,7 @@ def test_a_jammed_actuator_is_tried_twice_more_then_given_up(i, goal, rate, tau,
     man.wanted[1 + i] = goal
     way = abs(goal) / rate + tau
     first = man.until(WARN, 1.5 * way + 1.0)
-    assert man.supervisor.row == 14
+    assert man.supervisor.row == sup.FAULT_STALL
     assert first <= 1.5 * (abs(goal) / rate + tau) + 2.0
     place = man.commands[1 + i]
     man.seconds(0.9)
@@ -105,7 +105,7 @@ def test_a_jammed_actuator_is_tried_twice_more_then_given_up(i, goal, rate, tau,
     assert man.G[sup.STALLS + i] == 1.0
     man.until(ABORT, 5.0 * way)
     assert man.G[sup.STALLS + i] == 3.0
-    assert man.supervisor.row == 14
+    assert man.supervisor.row == sup.FAULT_STALL
 
 
 @pytest.mark.parametrize(("i", "goal", "rate", "tau", "span"), WAYS)
@@ -143,7 +143,7 @@ def test_the_wrong_way_is_stopped_at_once(i, goal, rate, tau, span):
         moved -= math.copysign(rate * DT, goal)
         man.places[i] = moved
         assert man.t - begin <= 0.3 + TWO_TICKS
-    assert man.supervisor.row == 14
+    assert man.supervisor.row == sup.FAULT_STALL
     assert man.G[sup.STOPPED + i] == 1.0
     assert man.commands[1 + i] == pytest.approx(moved, abs=0.2 * rate)
     place = man.commands[1 + i]
@@ -167,7 +167,7 @@ def test_commands_that_show_late_are_no_wrong_way(i, goal, rate, tau, span, dela
         place += min(max((old - place) / tau, -rate), rate) * DT
         man.places[i] = place
     assert man.G[sup.STOPPED + i] == 0.0
-    assert man.supervisor.worst(14) == NOTHING
+    assert man.supervisor.worst(sup.FAULT_STALL) == NOTHING
 
 
 def test_a_wire_that_jumps_about_is_not_a_stall():
@@ -175,4 +175,4 @@ def test_a_wire_that_jumps_about_is_not_a_stall():
     man.say["slider_wire"] = (math.nan,)
     man.wanted[1] = 0.05
     man.seconds(20.0)
-    assert man.supervisor.worst(14) == NOTHING
+    assert man.supervisor.worst(sup.FAULT_STALL) == NOTHING
