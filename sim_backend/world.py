@@ -9,7 +9,7 @@ import numpy as np
 
 from firmware.core.maths.rotations import quaternion_from_euler
 from firmware.core.vehicle.layout import N_P, X_ACT, X_NU, X_POS, X_QUAT
-from firmware.core.vehicle.seawater import water_density
+from firmware.core.vehicle.seawater import STANDARD_PRESSURE, water_density
 from firmware.model.strict import Table
 from firmware.model.vehicle import Vehicle
 from hal.ports import empty_frame
@@ -157,7 +157,7 @@ def build_world(
     E[layout.ACC_LINEAR] = vehicle.disturbance.linear if linear is None else linear
     E[layout.ACC_ANGULAR] = vehicle.disturbance.angular if angular is None else angular
     E[layout.TEMPERATURE_C], E[layout.SALINITY] = environment.temperature_c, environment.salinity
-    E[layout.SURFACE_PRESSURE] = 101325.0
+    E[layout.SURFACE_PRESSURE] = STANDARD_PRESSURE
     E[layout.WATER_DENSITY] = water_density(0.0, environment.temperature_c, environment.salinity)
     table = np.zeros((layout.N_SENSORS, layout.N_SENSOR_FIELDS))
     for row, name in ((layout.S_IMU, "imu"), (layout.S_BEACON, "beacon"), (layout.S_SLIDER, "slider_wire"),
