@@ -9,6 +9,7 @@ from firmware.core.control import autopilot as core
 from firmware.core.control import control_layout as ctl
 from firmware.core.control.guidance import abort
 from firmware.core.estimation.estimator_layout import COMMANDED
+from firmware.core.vehicle.seawater import STANDARD_PRESSURE
 from firmware.estimation.settings import estimator_settings, first_spread, parameter_sigma
 from firmware.guidance.mission import Mission
 from firmware.model.strict import ConfigError
@@ -28,7 +29,6 @@ REASONS = {
 }
 ESTIMATORS = {"measured": ctl.MEASURED, "filter": ctl.FILTERED, "given": ctl.GIVEN}
 CONTROLLERS = {"pid": ctl.PID, "law": ctl.LAW, "hybrid": ctl.HYBRID, "law+": ctl.LAW_PLUS}
-STANDARD_PRESSURE = 101325.0  # Pa
 SURFACED = 0.3  # m; shallower than this counts as at the surface
 
 

@@ -5,6 +5,7 @@ from typing import Annotated, Any
 import msgspec
 import numpy as np
 
+from firmware.core.vehicle.seawater import STANDARD_PRESSURE
 from firmware.model.strict import Table, decode
 from hal.board import BoardRequest
 from hal.clocks import MonotonicClock
@@ -128,7 +129,7 @@ class SimBoard:
             "beacon": 1.0 / file.sensors.beacon.rate_hz,
             "wires": 1.0 / min(file.sensors.slider_wire.rate_hz, file.sensors.plunger_wire.rate_hz),
         }
-        self.surface_pressure = 101325.0
+        self.surface_pressure = STANDARD_PRESSURE
         self.realtime = realtime
         self.clock: SimulatedClock | PacedClock = SimulatedClock(world)
         for name in ("imu", "beacon", "slider_wire", "plunger_wire"):

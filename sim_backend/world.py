@@ -10,7 +10,7 @@ import numpy as np
 from firmware.core.maths.rotations import quaternion_from_euler
 from firmware.core.supervision import supervisor_layout as sup
 from firmware.core.vehicle.layout import N_P, X_ACT, X_NU, X_POS, X_QUAT
-from firmware.core.vehicle.seawater import water_density
+from firmware.core.vehicle.seawater import STANDARD_PRESSURE, water_density
 from firmware.model.strict import Table
 from firmware.model.vehicle import Vehicle
 from hal.ports import empty_frame
@@ -159,7 +159,7 @@ def build_world(
     E[wl.ENV_ACC_LINEAR] = vehicle.disturbance.linear if linear is None else linear
     E[wl.ENV_ACC_ANGULAR] = vehicle.disturbance.angular if angular is None else angular
     E[wl.ENV_TEMPERATURE_C], E[wl.ENV_SALINITY] = environment.temperature_c, environment.salinity
-    E[wl.ENV_SURFACE_PRESSURE] = 101325.0
+    E[wl.ENV_SURFACE_PRESSURE] = STANDARD_PRESSURE
     E[wl.ENV_WATER_DENSITY] = water_density(0.0, environment.temperature_c, environment.salinity)
     table = np.zeros((wl.N_SAMPLED, wl.N_SENSOR_FIELDS))
     for row, name in ((sup.SENSOR_IMU, "imu"), (sup.SENSOR_BEACON, "beacon"), (sup.SENSOR_SLIDER, "slider_wire"),

@@ -15,6 +15,7 @@ from firmware.core.control.error_bound import model_error_bound
 from firmware.core.control.input_forms import exact_form
 from firmware.core.control.law import k2_to_cover
 from firmware.core.vehicle import layout
+from firmware.core.vehicle.mass import swung_moment
 from firmware.estimation.settings import parameter_sigma
 from firmware.model.vehicle import Vehicle
 
@@ -49,7 +50,7 @@ class Cover:
 
 def glides(P: np.ndarray) -> Iterator[tuple[tuple, tuple]]:
     """k, nu and actuators of each glide, and the actuators' speeds: at rest."""
-    sr = P[layout.M_R] * P[layout.R_R] + P[layout.M_S] * P[layout.R_S]
+    sr = swung_moment(P)
     for pitch in PITCHES:
         end = P[layout.BALLAST_MAX] if pitch < 0.0 else P[layout.BALLAST_MIN]
         ballast = BALLAST_SHARE * end if pitch else 0.0

@@ -6,7 +6,6 @@ Where no effect is set, nothing of this runs: a nominal vehicle flies the plain 
 import math
 
 from firmware.core.jit import kernel
-from firmware.core.maths.rotations import rotation_nb
 from sim_backend.core import effect_layout as ef
 from sim_backend.core import layout as wl
 from sim_backend.core.effect_plant import effect_step, fold
@@ -52,8 +51,7 @@ def effect_world_step(P, F, E, waves, x, cmd, step, dt, acc, queue, work):
     water[0], water[1], water[2] = water_velocity(E, waves, x[0], x[1], x[2], t + 0.5 * dt)
     force = 0.0
     if E[wl.ENV_SURFACE_HEIGHT] > 0.0 or E[wl.ENV_FLOOR_DEPTH] > 0.0:
-        r = rotation_nb(x[3], x[4], x[5], x[6])
-        force = boundary_force(P, E, x[2], r[6] * x[7] + r[7] * x[8] + r[8] * x[9] + water[2])
+        force = boundary_force(P, E, x, water[2])
     if F[ef.COMMAND_DELAY] > 0.0:
         late_commands(queue, cmd, step, F[ef.COMMAND_DELAY], dt, wanted)
     else:

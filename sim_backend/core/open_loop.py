@@ -7,7 +7,7 @@ from firmware.core.vehicle.layout import N_P, N_X
 from sim_backend.core import effect_layout as ef
 from sim_backend.core import layout as wl
 from sim_backend.core.effect_world import effect_world_step, set_effects
-from sim_backend.core.plant import hold_disturbance, rk4_step
+from sim_backend.core.plant import hold_disturbance, plant_step
 
 
 @kernel
@@ -28,7 +28,7 @@ def fly_open_loop(P, E, F, waves, seed, x, commands, dt, steps_per_row, out):
             if effects:
                 effect_world_step(folded, F, E, waves, x, commands[row], step, dt, acc, queue, work)
             else:
-                rk4_step(P, E, waves, x, commands[row], step * dt, dt, acc, work)
+                plant_step(P, E, waves, x, commands[row], step * dt, dt, acc, work)
             step += 1
 
 

@@ -14,7 +14,7 @@ from sim_backend.core import layout as wl
 from sim_backend.core.effect_plant import read
 from sim_backend.core.effect_world import effect_world_step, set_effects
 from sim_backend.core.noise import gaussian
-from sim_backend.core.plant import hold_disturbance, rk4_step
+from sim_backend.core.plant import hold_disturbance, plant_step
 
 
 @kernel
@@ -146,7 +146,7 @@ def move(P, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, work, 
         sample_sensors(P, E, sensors, errors, seed, x, t, counters, ring)
     while t < t_end - 0.5 * dt:
         hold_disturbance(E, seed, counters, t, acc)
-        rk4_step(P, E, waves, x, cmd, t, dt, acc, work)
+        plant_step(P, E, waves, x, cmd, t, dt, acc, work)
         counters[wl.C_STEP] += 1
         t = counters[wl.C_STEP] * dt
         sample_sensors(P, E, sensors, errors, seed, x, t, counters, ring)

@@ -10,7 +10,7 @@ from firmware.core.vehicle import layout
 from sim_backend.core import effect_layout as ef
 from sim_backend.core import layout as wl
 from sim_backend.core.effect_plant import effect_step, fold, play
-from sim_backend.core.plant import rk4_step
+from sim_backend.core.plant import plant_step
 from sim_backend.effects.base import catalogue
 
 NO_WAVES = np.zeros((0, wl.N_WAVE))
@@ -49,7 +49,7 @@ def test_without_effects_a_step_is_the_plain_step(vehicle, x, command, acc):
     fold(vehicle, F, P)
     np.testing.assert_array_equal(P, vehicle)
     plain, other, work = extended(x), extended(x), np.zeros((wl.N_WORK, wl.WORK_WIDTH))
-    rk4_step(vehicle, STILL, NO_WAVES, plain, np.array(command), 0.0, 0.01, acc, work)
+    plant_step(vehicle, STILL, NO_WAVES, plain, np.array(command), 0.0, 0.01, acc, work)
     effect_step(P, F, other, 0, *command, 0.0, acc, 0.0, np.zeros(3), 0.01, work)
     size = 1.0 + np.abs(plain[: layout.N_X])
     assert (np.abs(plain - other)[: layout.N_X] <= 1e-14 * size).all()

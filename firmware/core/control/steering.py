@@ -18,16 +18,14 @@ from firmware.core.vehicle.layout import (
     BALLAST_MIN,
     BALLAST_RATE,
     BALLAST_TAU,
-    M_R,
     M_S,
-    R_R,
-    R_S,
     SLIDER_MAX,
     SLIDER_MIN,
     SLIDER_RATE,
     SLIDER_TAU,
     X_B,
 )
+from firmware.core.vehicle.mass import swung_moment
 
 BUMP_TIME = 2.0  # s in which what a switch left over fades
 
@@ -72,7 +70,7 @@ def pid_inputs(P, C, legs, est, ap, pitch_rate):
 @kernel
 def slider_feedforward(P, est, ap):
     """Where gravity alone holds the reference pitch, ballast as it is, m."""
-    sr = P[M_R] * P[R_R] + P[M_S] * P[R_S]
+    sr = swung_moment(P)
     return pitch_feedforward(sr, P[M_S], P[X_B], ap[ctl.REF_PITCH], est[ctl.EST_BALLAST], P[SLIDER_MIN], P[SLIDER_MAX])
 
 

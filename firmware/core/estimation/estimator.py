@@ -75,15 +75,16 @@ from firmware.core.estimation.estimator_layout import (
     W_TURNED,
     X_ERR,
     X_GYRO,
+    X_WATER,
 )
 from firmware.core.estimation.estimator_update import estimator_update
 from firmware.core.jit import kernel
-from firmware.core.maths.rotations import quaternion_rate, rotation_nb
+from firmware.core.maths.steps import MIDPOINT, end_stage
 from firmware.core.vehicle.actuators import actuator_rates
-from firmware.core.vehicle.flight import normalise_attitude
+from firmware.core.vehicle.flight import add_accelerations, state_derivative
 from firmware.core.vehicle.layout import N_X, SERVO_TAU, X_NU
 from firmware.core.vehicle.linearise import linearise, linearise_motion, model_error
-from firmware.core.vehicle.motion import accelerations
+from firmware.core.vehicle.state import actuators, normalise_attitude
 
 T0, R0 = W_T * N_W, W_TURNED * N_W  # in the flat work: T = F cov, and A's columns
 
@@ -91,7 +92,8 @@ T0, R0 = W_T * N_W, W_TURNED * N_W  # in the flat work: T = F cov, and A's colum
 @kernel
 def actuator_speeds(P, x, mode, c_servo, c_slider, c_ballast):
     """Speeds of servo, slider, ballast: c_ is each one's command or, where mode says driven, its speed itself."""
-    ds, dl, db = actuator_rates(P, x[13], x[14], x[15], c_servo, c_slider, c_ballast)
+    servo, slider, ballast = actuators(x)
+    ds, dl, db = actuator_rates(P, servo, slider, ballast, c_servo, c_slider, c_ballast)
     if mode & SERVO_DRIVEN:
         ds = c_servo
     if mode & SLIDER_DRIVEN:
@@ -104,33 +106,19 @@ def actuator_speeds(P, x, mode, c_servo, c_slider, c_ballast):
 @kernel
 def flight_derivative(P, x, mode, c_servo, c_slider, c_ballast, out):
     """dx/dt into out[0:16], the model's error added to the accelerations, the water carrying the position."""
-    q0, q1, q2, q3 = x[3], x[4], x[5], x[6]
-    u, v, w, p, q, r = x[7], x[8], x[9], x[10], x[11], x[12]
     ds, dl, db = actuator_speeds(P, x, mode, c_servo, c_slider, c_ballast)
-    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation_nb(q0, q1, q2, q3)
-    ud, vd, wd, pd, qd, rd = accelerations(
-        P, r31, r32, r33, u, v, w, p, q, r, x[13], x[14], x[15], ds, dl, db, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    )
-    out[0] = r11 * u + r12 * v + r13 * w + x[25]
-    out[1] = r21 * u + r22 * v + r23 * w + x[26]
-    out[2] = r31 * u + r32 * v + r33 * w
-    out[3], out[4], out[5], out[6] = quaternion_rate(q0, q1, q2, q3, p, q, r)
-    out[7], out[8], out[9] = ud + x[16], vd + x[17], wd + x[18]
-    out[10], out[11], out[12] = pd + x[19], qd + x[20], rd + x[21]
-    out[13], out[14], out[15] = ds, dl, db
+    state_derivative(P, x, ds, dl, db, 0.0, x[X_WATER], x[X_WATER + 1], 0.0, out)
+    add_accelerations(x, X_ERR, out)
 
 
 @kernel
-def predict_state(P, x, mode, c_servo, c_slider, c_ballast, d, dt, k, y):
-    """One midpoint step of x in place; the model's error shrinks by d[3:9]. k, y are scratch of N_XE."""
-    flight_derivative(P, x, mode, c_servo, c_slider, c_ballast, k)
-    for i in range(N_X):
-        y[i] = x[i] + 0.5 * dt * k[i]
-    for i in range(N_X, N_XE):
+def predict_state(P, x, mode, c_servo, c_slider, c_ballast, d, dt, k, total, y):
+    """One midpoint step of x in place; the model's error shrinks by d[3:9]. k, total, y are scratch of N_XE."""
+    for i in range(N_XE):
         y[i] = x[i]
-    flight_derivative(P, y, mode, c_servo, c_slider, c_ballast, k)
-    for i in range(N_X):
-        x[i] += dt * k[i]
+    for stage in range(len(MIDPOINT)):
+        flight_derivative(P, y, mode, c_servo, c_slider, c_ballast, k)
+        end_stage(MIDPOINT, stage, dt, x, k, total, y, N_X)
     for i in range(6):
         x[X_ERR + i] *= d[3 + i]
     normalise_attitude(x)
@@ -306,6 +294,7 @@ def estimator_predict(P, settings, sigma, x, cov, stress, mode, c_servo, c_slide
     """Carry x and cov over dt (s) in sub-steps of at most MAX_STEP, actuators as in actuator_speeds."""
     A, C, drive = work[W_A : W_A + N_MOVING], work[W_C : W_C + 6], work[W_DRIVE : W_DRIVE + 6]
     k, y, d = work[W_SCRATCH], work[W_SCRATCH + 1], work[W_SCRATCH + 2]
+    scratch = work[W_SCRATCH + 3]
     steps = max(1, math.ceil(dt / MAX_STEP - 1e-9))
     h = dt / steps
     for _ in range(steps):
@@ -314,10 +303,10 @@ def estimator_predict(P, settings, sigma, x, cov, stress, mode, c_servo, c_slide
             work[W_HELD, 0], work[W_HELD, 1] = 0.0, 0.0
         linearise_where_due(P, settings, sigma, x, ds, dl, db, h, work)
         decays(P, settings, mode, h, d)
-        scale_error(x, stress, C, work[W_SCRATCH + 3], h, drive)
+        scale_error(x, stress, C, scratch, h, drive)
         predict_covariance(cov, A, d, h, work)
         add_process_noise(settings, x, cov, drive, d, ds, dl, db, h)
-        predict_state(P, x, mode, c_servo, c_slider, c_ballast, d, h, k, y)
+        predict_state(P, x, mode, c_servo, c_slider, c_ballast, d, h, k, scratch, y)
 
 
 @kernel

@@ -34,8 +34,8 @@ from firmware.core.estimation.estimator_layout import (
 from firmware.core.jit import kernel
 from firmware.core.maths.rotations import euler_from_quaternion, wrap_angle
 from firmware.core.vehicle.actuators import clip
-from firmware.core.vehicle.flight import normalise_attitude
 from firmware.core.vehicle.layout import SERVO_MAX, SERVO_MIN, X_ACT, X_NU
+from firmware.core.vehicle.state import normalise_attitude
 
 
 @kernel

@@ -5,9 +5,9 @@ the actuators. The estimator's other errors act on one of these each, with a fac
 """
 
 from firmware.core.jit import kernel
-from firmware.core.maths.rotations import rotation_nb
-from firmware.core.vehicle.layout import N_P
+from firmware.core.vehicle.layout import N_P, X_NU
 from firmware.core.vehicle.motion import accelerations
+from firmware.core.vehicle.state import rotation, velocities
 
 _STEP = 1e-5  # of the differences, in SI: truncation and rounding are both below 1e-6 of what is differentiated
 Y_BY_DOWN = 12  # in y: d(nu_dot)/dk, six numbers for each of k's three
@@ -25,8 +25,8 @@ def acceleration_at(P, y, servo_rate, slider_rate, ballast_rate):
 @kernel
 def linearise_motion(x, y, A):
     """Position's and attitude's rows of A at x, and how attitude errors turn gravity; y as linearise left it."""
-    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation_nb(x[3], x[4], x[5], x[6])
-    u, v, w, p, q, r = x[7], x[8], x[9], x[10], x[11], x[12]
+    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation(x)
+    u, v, w, p, q, r = velocities(x)
     # position: R v, and d(R v) = -R [v x] dtheta
     A[0, 6], A[0, 7], A[0, 8] = r11, r12, r13
     A[1, 6], A[1, 7], A[1, 8] = r21, r22, r23
@@ -52,9 +52,9 @@ def linearise(P, x, servo_rate, slider_rate, ballast_rate, A, y):
     Attitude errors turn gravity (k + k x dtheta) and the way through the water; the accelerations' derivatives are
     forward differences of equation (1), the actuators' speeds held.
     """
-    _, _, _, _, _, _, y[0], y[1], y[2] = rotation_nb(x[3], x[4], x[5], x[6])
+    _, _, _, _, _, _, y[0], y[1], y[2] = rotation(x)
     for i in range(9):
-        y[3 + i] = x[7 + i]
+        y[3 + i] = x[X_NU + i]
     a0, a1, a2, a3, a4, a5 = acceleration_at(P, y, servo_rate, slider_rate, ballast_rate)
     for j in range(12):
         # equation (1) is linear in k: any step is exact

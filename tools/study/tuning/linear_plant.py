@@ -14,6 +14,7 @@ from scipy.optimize import fsolve
 from firmware.core.maths.rotations import quaternion_from_euler
 from firmware.core.vehicle import layout
 from firmware.core.vehicle.flight import nominal_derivative
+from firmware.core.vehicle.mass import swung_moment
 from tools.data.errors import InputError
 
 LIN_DEPTH, LIN_PITCH, LIN_U, LIN_W, LIN_Q, LIN_SLIDER, LIN_BALLAST = range(7)
@@ -86,7 +87,7 @@ def steady_glide(P: np.ndarray, trim: Trim) -> np.ndarray:
         return derivative(P, state, state[LIN_SLIDER], trim.ballast)[[LIN_U, LIN_W, LIN_Q]]
 
     # slow, a little along the flow, the slider where gravity alone holds the pitch
-    sr = P[layout.M_R] * P[layout.R_R] + P[layout.M_S] * P[layout.R_S]
+    sr = swung_moment(P)
     slider = -(sr * math.tan(trim.pitch) + trim.ballast * P[layout.X_B]) / P[layout.M_S]
     found, _, good, _ = fsolve(unrest, [0.3, 0.03 * math.copysign(1.0, trim.ballast), slider], full_output=True)
     unrest(found)
