@@ -9,6 +9,7 @@ from firmware.core.control import autopilot as core
 from firmware.core.control import control_layout as ctl
 from firmware.core.control.guidance import abort
 from firmware.core.estimation.estimator_layout import COMMANDED
+from firmware.core.estimation.sensing import longest_age
 from firmware.core.vehicle.seawater import STANDARD_PRESSURE
 from firmware.estimation.settings import estimator_settings, first_spread, parameter_sigma
 from firmware.guidance.mission import Mission
@@ -44,7 +45,7 @@ def configuration(
     """The configuration vector C, shape (ctl.N_C,).
 
     Gains come from the mission, else the vehicle, else the defaults. `periods` are the sensors' sample periods in s
-    (imu, beacon, wires): a sample older than three of them, plus a tick, is not used.
+    (imu, beacon, wires); core/estimation/sensing, longest_age.
     """
     control = mission.control or vehicle.control or Control()
     C = np.zeros(ctl.N_C)
@@ -66,9 +67,9 @@ def configuration(
         C[getattr(ctl, f"{name}_WN")] = wn
         C[getattr(ctl, f"{name}_ZETA")] = reference.zeta
     C[ctl.DEPTH_FILTER_WN] = control.depth.rate_bandwidth
-    C[ctl.MAX_AGE_IMU] = 3.0 * periods["imu"] + dt
-    C[ctl.MAX_AGE_BEACON] = 3.0 * periods["beacon"] + dt
-    C[ctl.MAX_AGE_WIRE] = 3.0 * periods["wires"] + dt
+    C[ctl.MAX_AGE_IMU] = longest_age(periods["imu"], dt)
+    C[ctl.MAX_AGE_BEACON] = longest_age(periods["beacon"], dt)
+    C[ctl.MAX_AGE_WIRE] = longest_age(periods["wires"], dt)
     C[ctl.ABORT_AGE] = abort_age
     C[ctl.SALINITY] = mission.site.salinity
     C[ctl.SURFACE_PRESSURE] = surface_pressure
@@ -90,7 +91,7 @@ def configuration(
 
 
 def filter_memory(vehicle: Vehicle) -> np.ndarray:
-    """The Kalman filter's vector nav, shape (layout.N_NAV,), with what the vehicle file says of sensors and errors."""
+    """The Kalman filter's vector nav, shape (ctl.N_NAV,), with what the vehicle file says of sensors and errors."""
     P = vehicle.vector()
     nav = np.zeros(ctl.N_NAV)
     for start, values in (

@@ -1,4 +1,4 @@
-"""What the estimator is told about a vehicle: spectral densities, variances and spreads out of the vehicle file."""
+"""The estimator's settings for a vehicle: spectral densities, variances and spreads out of the vehicle file."""
 
 import numpy as np
 

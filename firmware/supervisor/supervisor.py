@@ -30,7 +30,7 @@ class Supervisor:
             mission_time=mission.time_limit_s, restarted=restarted,
         )  # fmt: skip
         self.table = vehicle.supervisor
-        self._told = np.zeros(sup.N_ROWS)
+        self._said = np.zeros(sup.N_ROWS)
 
     def screen(self, t: float) -> None:
         """Before the autopilot's tick at time t (s): what is not fit is marked in its frame."""
@@ -67,8 +67,8 @@ class Supervisor:
     def news(self) -> list[tuple[Reaction, str]]:
         """Rows that ask for more than when this was last called, with their names."""
         worst = self.G[sup.WORST : sup.WORST + sup.N_ROWS]
-        rows = np.flatnonzero(worst > self._told)
-        self._told[:] = worst
+        rows = np.flatnonzero(worst > self._said)
+        self._said[:] = worst
         return [(Reaction(int(worst[row])), f"fault {row}: {FAULTS[int(row)]}") for row in rows]
 
     @property

@@ -27,7 +27,7 @@ class Filter:
         if not self.uncertain:
             self.settings[[kf.S_SLIDER_BIAS, kf.S_BALLAST_BIAS]] = 0.0
         self.x, self.cov = np.zeros(kf.N_XE), np.zeros((kf.N_E, kf.N_E))
-        self.stress, self.beyond, self.scores = np.ones(2), np.zeros(kf.N_Z), np.full(kf.N_Z, np.nan)
+        self.inflation, self.rejected_for_s, self.scores = np.ones(2), np.zeros(kf.N_Z), np.full(kf.N_Z, np.nan)
         self.work = np.zeros((kf.N_WORK_ROWS, kf.N_W))
         self.x[3] = 1.0
 
@@ -40,7 +40,7 @@ class Filter:
         return self
 
     def predict(self, dt: float, commands=(0.0, 0.0, 0.0)) -> None:
-        arrays = (self.P, self.settings, self.sigma, self.x, self.cov, self.stress)
+        arrays = (self.P, self.settings, self.sigma, self.x, self.cov, self.inflation)
         estimator_predict(*arrays, self.mode, *map(float, commands), dt, self.work)
 
     def update(self, dt: float = 0.1, **readings: float) -> np.ndarray:
@@ -51,8 +51,8 @@ class Filter:
         return self.take(z, dt)
 
     def take(self, z: np.ndarray, dt: float = 0.1) -> np.ndarray:
-        arrays = (self.P, self.settings, self.x, self.cov, self.stress)
-        estimator_update(*arrays, z, self.beyond, self.scores, dt, self.work)
+        arrays = (self.P, self.settings, self.x, self.cov, self.inflation)
+        estimator_update(*arrays, z, self.rejected_for_s, self.scores, dt, self.work)
         return self.scores
 
     def positive_definite(self) -> bool:

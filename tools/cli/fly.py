@@ -81,7 +81,7 @@ def fly(
     except BoardError as error:
         raise InputError(str(error), source=board) from None
     if flight.control.controller != "pid":
-        for axis in flight.cover:
+        for axis in flight.k2_margins:
             if not axis.covered:
                 say(f"warning: {axis}")
     specs = record_specs(flight)

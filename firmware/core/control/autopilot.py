@@ -6,8 +6,8 @@
 import math
 
 from firmware.core.control import control_layout as ctl
-from firmware.core.control.coverage import forget_coverage, watch
 from firmware.core.control.guidance import follow, sequence
+from firmware.core.control.lyapunov_monitor import forget_lyapunov, monitor
 from firmware.core.control.steering import steer
 from firmware.core.estimation.estimator_layout import S_ANGULAR, S_LINEAR
 from firmware.core.estimation.navigation import navigate
@@ -68,7 +68,7 @@ def tick(P, C, legs, frame, est, ap, nav, cmd, t):
         servo, slider, ballast = ap[ctl.SENT_SERVO], ap[ctl.SENT_SLIDER], ap[ctl.SENT_BALLAST]
     else:
         servo, slider, ballast = 0.0, P[SLIDER_MIN], P[BALLAST_MIN]
-    watch(P, C, legs, nav, est, ap, t)
+    monitor(P, C, legs, nav, est, ap, t)
     ap[ctl.WANTED_SERVO], ap[ctl.WANTED_SLIDER], ap[ctl.WANTED_BALLAST] = servo, slider, ballast
     limit_commands(P, ap, servo, slider, ballast, C[ctl.DT], cmd)
 
@@ -85,4 +85,4 @@ def reset(est, ap, nav):
     ap[ctl.MODE] = ctl.WAITING
     ap[ctl.REACHED] = -1.0
     ap[ctl.ACTIVE_SINCE] = -math.inf
-    forget_coverage(ap)
+    forget_lyapunov(ap)

@@ -12,7 +12,7 @@ REC_DEPTH_EST, REC_DEPTH_RATE, REC_REFERENCES, REC_INTEGRATORS = 13, 14, 15, 21
 REC_MODE, REC_LEG, REC_REASON, REC_LATENESS, REC_DURATION = 23, 24, 25, 26, 27
 REC_DENSITY, REC_PRESSURE, REC_TEMPERATURE, REC_SAMPLE_TIMES = 28, 29, 30, 31
 REC_ESTIMATE, REC_SPREADS = 35, 48
-REC_COVERAGE = 52
+REC_LYAPUNOV = 52
 REC_REACTION, REC_FAULT_ROW = 56, 57
 N_RECORD = 58
 
@@ -64,5 +64,5 @@ def fill_record(frame, est, ap, cmd, t, lateness, duration, out):
     for i in range(4):
         out[REC_ESTIMATE + 9 + i] = est[ctl.EST_X + i]
         out[REC_SPREADS + i] = est[ctl.SD_DEPTH_RATE + i]
-        out[REC_COVERAGE + i] = ap[ctl.K2_NEED_PITCH + i]
+        out[REC_LYAPUNOV + i] = ap[ctl.K2_NEED_PITCH + i]
     out[REC_REACTION], out[REC_FAULT_ROW] = ap[ctl.AP_REACTION], ap[ctl.AP_FAULT_ROW]

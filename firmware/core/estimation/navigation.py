@@ -24,11 +24,17 @@ from firmware.core.estimation.estimator_layout import (
     X_WATER,
     Z_BALLAST,
     Z_DEPTH,
+    Z_P,
+    Z_PITCH,
+    Z_R,
+    Z_ROLL,
     Z_SLIDER,
+    Z_YAW,
 )
 from firmware.core.jit import kernel
-from firmware.core.maths.rotations import euler_from_quaternion, euler_rates, quaternion_from_euler, rotation_nb
-from firmware.core.vehicle.layout import N_P, N_X, X_ACT, X_NU, X_QUAT
+from firmware.core.maths.rotations import euler_rates, quaternion_from_euler
+from firmware.core.vehicle.layout import N_P, N_X, X_BALLAST, X_DOWN, X_EAST, X_NORTH, X_NU, X_QUAT, X_SLIDER
+from firmware.core.vehicle.state import actuators, euler_angles, rotation
 
 ROUGHNESS_TIME = 0.7  # s, in which the roughness follows scores that are twice (or half) what they should be
 ROUGHEST = 300.0  # times the vehicle file's disturbance
@@ -44,15 +50,15 @@ def new_samples(est, x, nav, t):
     if est[ctl.EST_IMU_TIME] > nav[ctl.NAV_USED]:
         age = t - est[ctl.EST_IMU_TIME]
         nav[ctl.NAV_USED] = est[ctl.EST_IMU_TIME]
-        phi, theta, _ = euler_from_quaternion(x[3], x[4], x[5], x[6])
+        phi, theta, _ = euler_angles(x)
         phi_rate, theta_rate, psi_rate = 0.0, 0.0, 0.0
         if abs(theta) < EULER_LIMIT:
             phi_rate, theta_rate, psi_rate = euler_rates(phi, theta, x[X_NU + 3], x[X_NU + 4], x[X_NU + 5])
-        z[0] = est[ctl.NEW_ROLL] + phi_rate * age
-        z[1] = est[ctl.NEW_PITCH] + theta_rate * age
-        z[2] = est[ctl.NEW_YAW] + psi_rate * age
+        z[Z_ROLL] = est[ctl.NEW_ROLL] + phi_rate * age
+        z[Z_PITCH] = est[ctl.NEW_PITCH] + theta_rate * age
+        z[Z_YAW] = est[ctl.NEW_YAW] + psi_rate * age
         for i in range(3):
-            z[3 + i] = est[ctl.NEW_P + i]
+            z[Z_P + i] = est[ctl.NEW_P + i]
     if est[ctl.EST_BEACON_TIME] > nav[ctl.NAV_USED + 1]:
         nav[ctl.NAV_USED + 1] = est[ctl.EST_BEACON_TIME]
         z[Z_DEPTH] = est[ctl.NEW_DEPTH] + est[ctl.EST_DEPTH_RATE] * (t - est[ctl.EST_BEACON_TIME])
@@ -69,14 +75,14 @@ def start_filter(P, nav, est, t, x, cov, work):
     """The first state: at rest, attitude and depth as first measured, actuators where the draw-wires say."""
     for i in range(N_XE):
         x[i] = 0.0
-    x[2] = est[ctl.NEW_DEPTH]
+    x[X_DOWN] = est[ctl.NEW_DEPTH]
     x[X_QUAT], x[X_QUAT + 1], x[X_QUAT + 2], x[X_QUAT + 3] = quaternion_from_euler(
         est[ctl.NEW_ROLL], est[ctl.NEW_PITCH], est[ctl.NEW_YAW]
     )
-    x[X_ACT + 1], x[X_ACT + 2] = est[ctl.NEW_SLIDER], est[ctl.NEW_BALLAST]
-    nav[ctl.NAV_STRESS], nav[ctl.NAV_STRESS + 1] = 1.0, 1.0
+    x[X_SLIDER], x[X_BALLAST] = est[ctl.NEW_SLIDER], est[ctl.NEW_BALLAST]
+    nav[ctl.NAV_INFLATION], nav[ctl.NAV_INFLATION + 1] = 1.0, 1.0
     for i in range(N_Z):
-        nav[ctl.NAV_BEYOND + i] = 0.0
+        nav[ctl.NAV_REJECTED + i] = 0.0
     for i in range(4):
         nav[ctl.NAV_USED + i] = -1.0
     spread = nav[ctl.NAV_SPREAD : ctl.NAV_SPREAD + N_E]
@@ -91,21 +97,21 @@ def start_filter(P, nav, est, t, x, cov, work):
 @kernel
 def write_state(x, est):
     """A state (N_X or longer) as the rest of the autopilot reads it."""
-    est[ctl.EST_X], est[ctl.EST_Y], est[ctl.EST_DEPTH] = x[0], x[1], x[2]
-    est[ctl.EST_ROLL], est[ctl.EST_PITCH], est[ctl.EST_YAW] = euler_from_quaternion(x[3], x[4], x[5], x[6])
-    _, _, _, _, _, _, r31, r32, r33 = rotation_nb(x[3], x[4], x[5], x[6])
+    est[ctl.EST_X], est[ctl.EST_Y], est[ctl.EST_DEPTH] = x[X_NORTH], x[X_EAST], x[X_DOWN]
+    est[ctl.EST_ROLL], est[ctl.EST_PITCH], est[ctl.EST_YAW] = euler_angles(x)
+    _, _, _, _, _, _, r31, r32, r33 = rotation(x)
     u, v, w = x[X_NU], x[X_NU + 1], x[X_NU + 2]
     est[ctl.EST_U], est[ctl.EST_V], est[ctl.EST_W] = u, v, w
     est[ctl.EST_DEPTH_RATE] = r31 * u + r32 * v + r33 * w
     for i in range(3):
         est[ctl.EST_P + i] = x[X_NU + 3 + i]
-    est[ctl.EST_SERVO], est[ctl.EST_SLIDER], est[ctl.EST_BALLAST] = x[X_ACT], x[X_ACT + 1], x[X_ACT + 2]
+    est[ctl.EST_SERVO], est[ctl.EST_SLIDER], est[ctl.EST_BALLAST] = actuators(x)
 
 
 @kernel
 def write_errors(x, cov, est):
     """What the filter knows beside the state: current, model error, and how sure it is."""
-    _, _, _, _, _, _, r31, _, r33 = rotation_nb(x[3], x[4], x[5], x[6])
+    _, _, _, _, _, _, r31, _, r33 = rotation(x)
     est[ctl.EST_WATER_N], est[ctl.EST_WATER_E] = x[X_WATER], x[X_WATER + 1]
     for i in range(6):
         est[ctl.MODEL_ERROR + i] = x[X_ERR + i]
@@ -117,15 +123,15 @@ def write_errors(x, cov, est):
 
 
 @kernel
-def follow_roughness(nav, scores, dt):
-    """Let the filter's disturbance follow the water: the gyro's squared scores are 1 on average where it is right.
+def adapt_process_noise(nav, scores, dt):
+    """Adapt the process noise to the water: the gyro's squared innovations over their variance average 1 where it fits.
 
-    A filter that believes in calm water lags behind rough water, and one that believes in rough water hands the gyro's
+    A filter with the noise of calm water lags behind rough water, and one with that of rough water hands the gyro's
     noise on. Roughness multiplies the disturbance's strength, and its square the spectral densities; it moves by the
     scores' logarithm, so that one wild sample does little, and never below what the vehicle file says.
     """
     total, count = 0.0, 0
-    for i in range(3, 6):
+    for i in range(Z_P, Z_R + 1):
         if not math.isnan(scores[i]):
             total += scores[i] * scores[i]
             count += 1
@@ -155,11 +161,11 @@ def navigate(P, C, nav, est, ap, t):
     scores = nav[ctl.NAV_SCORES : ctl.NAV_SCORES + N_Z]
     estimator_step(
         P, nav[ctl.NAV_SETTINGS : ctl.NAV_SETTINGS + N_S], nav[ctl.NAV_SIGMA : ctl.NAV_SIGMA + N_P], x, cov,
-        nav[ctl.NAV_STRESS : ctl.NAV_STRESS + 2],
+        nav[ctl.NAV_INFLATION : ctl.NAV_INFLATION + 2],
         COMMANDED, ap[ctl.SENT_SERVO], ap[ctl.SENT_SLIDER], ap[ctl.SENT_BALLAST],
-        dt, nav[ctl.NAV_Z : ctl.NAV_Z + N_Z], nav[ctl.NAV_BEYOND : ctl.NAV_BEYOND + N_Z], scores, work,
+        dt, nav[ctl.NAV_Z : ctl.NAV_Z + N_Z], nav[ctl.NAV_REJECTED : ctl.NAV_REJECTED + N_Z], scores, work,
     )  # fmt: skip
     write_state(nav[ctl.NAV_GIVEN : ctl.NAV_GIVEN + N_X] if C[ctl.ESTIMATOR] == ctl.GIVEN else x, est)
     write_errors(x, cov, est)
-    follow_roughness(nav, scores, dt)
+    adapt_process_noise(nav, scores, dt)
     est[ctl.ROUGHNESS] = nav[ctl.NAV_ROUGHNESS]

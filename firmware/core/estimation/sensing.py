@@ -6,7 +6,13 @@ from firmware.core.control import control_layout as ctl
 from firmware.core.jit import kernel
 from firmware.core.vehicle.layout import GRAVITY, PLUNGER_AREA
 from firmware.core.vehicle.seawater import water_density
-from hal.ports import BEACON, IMU, PLUNGER_WIRE, SLIDER_WIRE
+from hal.ports import BEACON, IMU, PLUNGER_WIRE, SLIDER_WIRE, STALE_PERIODS
+
+
+@kernel
+def longest_age(period, tick):
+    """Age (s) past which a sample counts for nothing: STALE_PERIODS of its sensor, and the tick that looks at it."""
+    return STALE_PERIODS * period + tick
 
 
 @kernel

@@ -6,6 +6,7 @@ They read what was screened (frame, G), what is believed (est) and what the auto
 import math
 
 from firmware.core.control import control_layout as ctl
+from firmware.core.estimation.sensing import longest_age
 from firmware.core.jit import kernel
 from firmware.core.supervision import supervisor_layout as sup
 from firmware.core.vehicle.layout import BALLAST_MAX, BALLAST_MIN, SERVO_MAX, SERVO_MIN, SLIDER_MAX, SLIDER_MIN
@@ -41,7 +42,7 @@ def age(G, sensor, t):
 @kernel
 def lost(G, sensor, t):
     """True where nothing fit has come from a sensor for too long."""
-    return age(G, sensor, t) > max(G[sup.LOST_AFTER + sensor], 3.5 * G[sup.PERIOD + sensor])
+    return age(G, sensor, t) > max(G[sup.LOST_AFTER + sensor], longest_age(G[sup.PERIOD + sensor], G[sup.TICK]))
 
 
 @kernel
@@ -57,14 +58,14 @@ def watch_sensors(G, frame, t):
     if lost(G, sup.SENSOR_PLUNGER, t):
         ask(G, sup.FAULT_WIRE_LOST, sup.ABORT)
     for sensor in range(sup.N_SENSORS):
-        worth = G[sup.SAMPLE_VERDICT + sensor]
+        verdict = G[sup.SAMPLE_VERDICT + sensor]
         fitted = sensor <= sup.SENSOR_PLUNGER or math.isfinite(G[sup.TAKEN + sensor])
-        old = fitted and age(G, sensor, t) > 3.0 * G[sup.PERIOD + sensor] + G[sup.TICK]
-        if worth == sup.MISTIMED or old:
+        old = fitted and age(G, sensor, t) > longest_age(G[sup.PERIOD + sensor], G[sup.TICK])
+        if verdict == sup.MISTIMED or old:
             ask(G, sup.FAULT_SAMPLE_TIME, sup.LOG)
-        if worth == sup.ABSURD:
+        if verdict == sup.ABSURD:
             ask(G, sup.FAULT_IMPLAUSIBLE, sup.WARN if G[sup.UNFIT + sensor] >= G[sup.UNFIT_RUN] else sup.LOG)
-        if worth == sup.STUCK:
+        if verdict == sup.STUCK:
             ask(G, sup.FAULT_STUCK_SENSOR, sup.WARN)
     watch_leak(G, frame)
     watch_battery(G, frame, t)

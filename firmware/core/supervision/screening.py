@@ -1,10 +1,11 @@
-"""Samples looked at before anybody believes them: their times, their ranges, their jumps, and whether they live.
+"""Plausibility checks of samples: their times, their ranges, their jumps, and whether they are stuck.
 
-What is not fit is marked as FAULT in the frame, so that the estimator leaves it and goes on from what it knows.
+What is not fit is marked as FAULT in the frame, so that the estimator does without it.
 """
 
 import math
 
+from firmware.core.estimation.sensing import longest_age
 from firmware.core.jit import kernel
 from firmware.core.supervision import supervisor_layout as sup
 from firmware.core.vehicle.layout import BALLAST_MAX, BALLAST_MIN, SLIDER_MAX, SLIDER_MIN
@@ -53,8 +54,8 @@ def absurd(G, frame, sensor, elapsed):
 
 
 @kernel
-def moves(P, G, frame, sensor):
-    """True where the vehicle does what should show in this sensor."""
+def excited(P, G, frame, sensor):
+    """True where the vehicle does what should show in this sensor (persistent excitation)."""
     if sensor == sup.SENSOR_IMU:
         return True
     if sensor == sup.SENSOR_BEACON:
@@ -75,16 +76,16 @@ def stuck(P, G, frame, sensor, t):
     patience = G[sup.FROZEN_TIME] if sensor == sup.SENSOR_IMU else G[sup.STUCK_TIME]
     row = sup.FAULT_IMU_LOST if sensor == sup.SENSOR_IMU else sup.FAULT_STUCK_SENSOR
     same = t - G[sup.SAME_SINCE + sensor] >= max(patience, 4.0 * G[sup.PERIOD + sensor])
-    return G[sup.ENABLED + row] == 1.0 and same and moves(P, G, frame, sensor)
+    return G[sup.ENABLED + row] == 1.0 and same and excited(P, G, frame, sensor)
 
 
 @kernel
 def judge(P, G, frame, sensor, t):
-    """What a sample not seen before is worth: FIT, MISTIMED, ABSURD or STUCK."""
+    """The verdict on a sample not seen before: FIT, MISTIMED, ABSURD or STUCK."""
     time, last = frame[sup.STARTS[sensor]], G[sup.TAKEN + sensor]
     still = stuck(P, G, frame, sensor, t)
     if G[sup.ENABLED + sup.FAULT_SAMPLE_TIME] == 1.0:
-        oldest = t - 3.0 * G[sup.PERIOD + sensor] - G[sup.TICK]
+        oldest = t - longest_age(G[sup.PERIOD + sensor], G[sup.TICK])
         if not oldest <= time <= t + 1e-6 or time <= last:
             return sup.MISTIMED
     if G[sup.ENABLED + sup.FAULT_IMPLAUSIBLE] == 1.0 and absurd(G, frame, sensor, max(time - last, 0.0)):
@@ -99,15 +100,15 @@ def take(P, G, frame, sensor, t):
     if frame[start + 1] != sup.VALID:
         return
     if frame[start] != G[sup.SEEN + sensor]:
-        worth = judge(P, G, frame, sensor, t)
+        verdict = judge(P, G, frame, sensor, t)
         G[sup.SEEN + sensor] = frame[start]
         keep(G, frame, sensor, sup.RAW)
-        if worth == sup.FIT:
+        if verdict == sup.FIT:
             G[sup.TAKEN + sensor], G[sup.UNFIT + sensor] = frame[start], 0.0
             keep(G, frame, sensor, sup.LAST)
         else:
             G[sup.UNFIT + sensor] += 1.0
-        G[sup.SAMPLE_VERDICT + sensor] = worth
+        G[sup.SAMPLE_VERDICT + sensor] = verdict
     elif G[sup.ENABLED + sup.FAULT_SAMPLE_TIME] == 1.0 and differs(G, frame, sensor, sup.RAW):
         G[sup.SAMPLE_VERDICT + sensor] = sup.MISTIMED  # another sample under the same time
     if G[sup.SAMPLE_VERDICT + sensor] != sup.FIT:

@@ -27,7 +27,7 @@ WIDTHS = (6, 2, 1, 1, 1, 1)
 PLACES = (0, 6, 8, 9, 10, 11)  # of their values in the tables below
 N_VALUES = 12
 STATES = (SERVO, SLIDER, BALLAST)  # slots in which actuators say how they do
-FIT, MISTIMED, ABSURD, STUCK = 0.0, 1.0, 2.0, 3.0  # what a sample is worth
+FIT, MISTIMED, ABSURD, STUCK = 0.0, 1.0, 2.0, 3.0  # the verdict on a sample
 # hal.ports.Validity and hal.ports.Condition as the frame holds them
 VALID, FAULT = 1.0, 3.0
 WELL, ALARM, ALARM_KEPT, RETRYING, GIVEN_UP, WRONG_WAY, MISCONFIGURED = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0
@@ -76,7 +76,7 @@ _M = _H + 3
 BEGAN = _M  # s, the first tick
 SEEN = BEGAN + 1  # N_SENSORS, time of the sample looked at last
 TAKEN = SEEN + N_SENSORS  # time of the newest fit sample
-SAMPLE_VERDICT = TAKEN + N_SENSORS  # of the sample in the frame: FIT ...
+SAMPLE_VERDICT = TAKEN + N_SENSORS  # on the sample in the frame: FIT ...
 UNFIT = SAMPLE_VERDICT + N_SENSORS  # unfit samples running
 SAME_SINCE = UNFIT + N_SENSORS  # s, since when the sensor says the same
 LAST = SAME_SINCE + N_SENSORS  # N_VALUES, newest fit values

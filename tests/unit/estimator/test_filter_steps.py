@@ -123,7 +123,7 @@ def test_a_sensor_that_stays_away_is_followed_in_the_end():
     settle(filtered)
     speed = filtered.x[7:10].copy()
     jump = filtered.x[2] + 0.5
-    for _ in range(round(kf.PATIENCE / 0.1) + 3):
+    for _ in range(round(kf.REJECTED_AT_MOST / 0.1) + 3):
         filtered.predict(0.1)
         filtered.update(**{**readings(filtered), "depth": jump})
         assert filtered.positive_definite()
@@ -188,9 +188,9 @@ def test_an_unseen_servo_is_found_from_the_motion():
 
 
 @numba.njit
-def many_steps(count, P, settings, sigma, x, cov, stress, z, beyond, scores, work):
+def many_steps(count, P, settings, sigma, x, cov, inflation, z, rejected_for_s, scores, work):
     for _ in range(count):
-        estimator_step(P, settings, sigma, x, cov, stress, 0, 0.1, 0.01, 0.1, 0.02, z, beyond, scores, work)
+        estimator_step(P, settings, sigma, x, cov, inflation, 0, 0.1, 0.01, 0.1, 0.02, z, rejected_for_s, scores, work)
 
 
 def test_a_step_allocates_nothing():
@@ -202,8 +202,8 @@ def test_a_step_allocates_nothing():
 
     def allocated(count: int) -> int:
         before = rtsys.get_allocation_stats().alloc
-        arrays = (filtered.P, filtered.settings, filtered.sigma, filtered.x, filtered.cov, filtered.stress)
-        many_steps(count, *arrays, z, filtered.beyond, filtered.scores, filtered.work)
+        arrays = (filtered.P, filtered.settings, filtered.sigma, filtered.x, filtered.cov, filtered.inflation)
+        many_steps(count, *arrays, z, filtered.rejected_for_s, filtered.scores, filtered.work)
         return rtsys.get_allocation_stats().alloc - before
 
     allocated(1)

@@ -7,8 +7,8 @@ Every WATCH_EVERY s while the law flies, for pitch and, where the law commands t
 - margin: what is left with the actuators where they are (law.decrease_margin): positive, V is sure to fall by
   |s| margin; not positive, nothing is promised. Estimates are taken for the truth. docs/CONTROL.md.
 
-Both are told against the exact form, whichever the law flies with, and against the observer's share of f: what either
-makes of the commands is in the mismatch.
+Both are worked out with the exact form, whichever the law flies with, and without the observer's share of f: what
+either makes of the commands is in the mismatch.
 """
 
 import math
@@ -28,11 +28,11 @@ WATCH_EVERY = 0.2  # s; the bound takes longer than the law itself
 
 
 @kernel
-def forget_coverage(ap):
+def forget_lyapunov(ap):
     """Nothing is said of V."""
     for i in range(ctl.K2_NEED_PITCH, ctl.MARGIN_DEPTH + 1):
         ap[i] = math.nan
-    ap[ctl.WATCHED] = -math.inf
+    ap[ctl.MONITORED] = -math.inf
 
 
 @kernel
@@ -45,15 +45,15 @@ def axis_margin(error, error_rate, reference_acc, acc, g, k1, k2, k3, eps, jerk,
 
 
 @kernel
-def watch(P, C, legs, nav, est, ap, t):
+def monitor(P, C, legs, nav, est, ap, t):
     """Need and margin of this tick into ap, every WATCH_EVERY s; NaN where the law does not fly or the leg holds it."""
     if ap[ctl.MODE] != ctl.FLYING or ap[ctl.LAW_RAN] != 1.0:
-        if ap[ctl.WATCHED] > -math.inf:
-            forget_coverage(ap)
+        if ap[ctl.MONITORED] > -math.inf:
+            forget_lyapunov(ap)
         return
-    if t < ap[ctl.WATCHED] + WATCH_EVERY - 0.5 * C[ctl.DT]:
+    if t < ap[ctl.MONITORED] + WATCH_EVERY - 0.5 * C[ctl.DT]:
         return
-    ap[ctl.WATCHED] = t
+    ap[ctl.MONITORED] = t
     cf, sf = math.cos(est[ctl.EST_ROLL]), math.sin(est[ctl.EST_ROLL])
     ct, st = math.cos(est[ctl.EST_PITCH]), math.sin(est[ctl.EST_PITCH])
     kx, ky, kz = -st, sf * ct, cf * ct

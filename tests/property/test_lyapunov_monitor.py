@@ -8,9 +8,9 @@ from law_flights import Gains, Law, Reference, lyapunov_rate, plant_rates
 from law_states import SPREAD
 
 from firmware.core.control import control_layout as ctl
-from firmware.core.control.coverage import WATCH_EVERY
 from firmware.core.control.law import k2_to_cover
-from firmware.core.control.telemetry import N_RECORD, REC_COVERAGE, fill_record
+from firmware.core.control.lyapunov_monitor import WATCH_EVERY
+from firmware.core.control.telemetry import N_RECORD, REC_LYAPUNOV, fill_record
 from firmware.core.vehicle import layout
 from tools.flight.compose import build_flight
 
@@ -62,7 +62,7 @@ def test_where_the_margin_is_positive_V_falls_by_it_in_every_vehicle_of_the_box(
             sent = step(world, pilot, tick, given=True)
             if pilot.finished:
                 break
-            if pilot.ap[ctl.WATCHED] == 0.02 * tick:
+            if pilot.ap[ctl.MONITORED] == 0.02 * tick:
                 references = Reference(*pilot.ap[ctl.REF_PITCH :][:3]), Reference(*pilot.ap[ctl.REF_DEPTH :][:3])
                 V_dot = lyapunov_rate(law_of(pilot), world.P, world.x, references, sent)
                 for axis in (0, 1):
@@ -83,7 +83,7 @@ def test_the_need_is_the_model_error_bound_and_the_disturbance_seen():
     for tick in range(1500):
         sent = step(world, pilot, tick, given=True)
         world.cmd[...] = pilot.commands
-        if pilot.ap[ctl.WATCHED] != 0.02 * tick:
+        if pilot.ap[ctl.MONITORED] != 0.02 * tick:
             continue
         looked += 1
         law, speeds = law_of(pilot), plant_rates(pilot.P, world.x, sent)[layout.X_ACT :]
@@ -137,9 +137,9 @@ def test_it_looks_five_times_a_second_and_the_record_has_what_it_saw():
     for tick in range(400):
         step(world, pilot, tick)
         world.cmd[...] = pilot.commands
-        times.add(float(pilot.ap[ctl.WATCHED]))
+        times.add(float(pilot.ap[ctl.MONITORED]))
         fill_record(pilot.frame, pilot.est, pilot.ap, pilot.commands, 0.02 * tick, 0.0, 0.0, out)
-        assert np.array_equal(out[REC_COVERAGE : REC_COVERAGE + 4], pilot.ap[VALUES], equal_nan=True)
+        assert np.array_equal(out[REC_LYAPUNOV : REC_LYAPUNOV + 4], pilot.ap[VALUES], equal_nan=True)
     gaps = np.diff(sorted(times - {-math.inf}))
     assert gaps == pytest.approx(WATCH_EVERY, abs=1e-9)
 
