@@ -7,6 +7,7 @@ import numpy as np
 from firmware.control.gains import Control
 from firmware.core.control import autopilot as core
 from firmware.core.control import control_layout as ctl
+from firmware.core.control.controllers import CONTROLLERS
 from firmware.core.control.guidance import abort
 from firmware.core.estimation.estimator_layout import COMMANDED
 from firmware.core.estimation.sensing import longest_age
@@ -29,7 +30,6 @@ REASONS = {
     ctl.REASON_OPERATOR: "asked to by the operator",
 }
 ESTIMATORS = {"measured": ctl.MEASURED, "filter": ctl.FILTERED, "given": ctl.GIVEN}
-CONTROLLERS = {"pid": ctl.PID, "law": ctl.LAW, "hybrid": ctl.HYBRID, "law+": ctl.LAW_PLUS}
 SURFACED = 0.3  # m; shallower than this counts as at the surface
 
 
@@ -76,7 +76,7 @@ def configuration(
     C[ctl.SITE_DEPTH] = mission.site.depth_m
     C[ctl.MISSION_TIME_LIMIT] = mission.time_limit_s
     C[ctl.ESTIMATOR] = ESTIMATORS[control.estimator]
-    C[ctl.CONTROLLER] = CONTROLLERS[control.controller]
+    C[ctl.CONTROLLER] = CONTROLLERS[control.controller].number
     law = control.law_flown
     C[ctl.FORM] = ctl.PAPER if law.form == "paper" else ctl.EXACT
     C[ctl.OBSERVER_SHARE] = law.observer_share

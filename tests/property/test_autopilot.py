@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from firmware.autopilot import CONTROLLERS, Autopilot, configuration
+from firmware.autopilot import Autopilot, configuration
 from firmware.core.control import control_layout as ctl
+from firmware.core.control.controllers import CONTROLLERS
 from firmware.core.vehicle import layout
 from firmware.guidance.mission import decode_mission
 from firmware.model.library import shipped
@@ -48,7 +49,7 @@ sample = st.one_of(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(width=6
 @given(st.lists(st.lists(sample, min_size=FRAME_SIZE, max_size=FRAME_SIZE), min_size=3, max_size=12))
 def test_absurd_samples_never_reach_an_actuator(controller, frames):
     pilot = autopilot()
-    pilot.C[ctl.CONTROLLER] = CONTROLLERS[controller]
+    pilot.C[ctl.CONTROLLER] = CONTROLLERS[controller].number
     last = feed(pilot, 0.0)
     for number, frame in enumerate(frames, start=1):
         pilot.frame[:] = frame

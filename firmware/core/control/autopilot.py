@@ -6,9 +6,9 @@
 import math
 
 from firmware.core.control import control_layout as ctl
+from firmware.core.control.controllers import steer
 from firmware.core.control.guidance import follow, sequence
 from firmware.core.control.lyapunov_monitor import forget_lyapunov, monitor
-from firmware.core.control.steering import steer
 from firmware.core.estimation.estimator_layout import S_ANGULAR, S_LINEAR
 from firmware.core.estimation.navigation import navigate
 from firmware.core.estimation.sensing import sense, take_as_measured

@@ -47,7 +47,7 @@ def axis_margin(error, error_rate, reference_acc, acc, g, k1, k2, k3, eps, jerk,
 @kernel
 def monitor(P, C, legs, nav, est, ap, t):
     """Need and margin of this tick into ap, every WATCH_EVERY s; NaN where the law does not fly or the leg holds it."""
-    if ap[ctl.MODE] != ctl.FLYING or ap[ctl.LAW_RAN] != 1.0:
+    if ap[ctl.MODE] != ctl.FLYING or ap[ctl.ACTIVE] != ctl.LAW or ap[ctl.LAW_RAN] != 1.0:
         if ap[ctl.MONITORED] > -math.inf:
             forget_lyapunov(ap)
         return

@@ -1,15 +1,14 @@
-"""From references and estimate to wanted actuator positions: PID, the law, the hybrid of both, the law with foresight.
+"""From references and estimate to wanted slider and ballast: by PID, and by the law.
 
-Roll is always (37). The PID and the law share the estimate, the references and the limits; they differ in nothing else.
-Whatever a controller wants goes through `limited` afterwards (core/autopilot).
+Both share the estimate, the references and the limits; they differ in nothing else.
 """
 
 import math
 
 from firmware.core.control import control_layout as ctl
-from firmware.core.control.control import pid, pitch_feedforward, roll_law
+from firmware.core.control.control import pid, pitch_feedforward
 from firmware.core.control.input_forms import exact_form, paper_form
-from firmware.core.control.law import OK, pitch_depth_law
+from firmware.core.control.law import pitch_depth_law
 from firmware.core.control.law_plus import SHARE, on_outputs, reach
 from firmware.core.jit import kernel
 from firmware.core.vehicle.actuators import actuator_rates, clip
@@ -26,8 +25,6 @@ from firmware.core.vehicle.layout import (
     X_B,
 )
 from firmware.core.vehicle.mass import swung_moment
-
-BUMP_TIME = 2.0  # s in which what a switch left over fades
 
 
 @kernel
@@ -142,81 +139,3 @@ def law_inputs(P, C, legs, est, ap, pitch_rate):
     if not depth_is_held(legs, ap):
         ballast = legs[int(ap[ctl.LEG]), ctl.LEG_BALLAST]
     return slider, ballast, status
-
-
-@kernel
-def choose(C, legs, est, ap, t):
-    """The hybrid's choice, PID or LAW, with hysteresis and a dwell time.
-
-    The law's are transitions (the pitch reference is still on its way to the leg's target), a depth that has come off
-    its reference, and rough water; steady flight is the PID's.
-    """
-    if t - ap[ctl.ACTIVE_SINCE] < C[ctl.HYBRID_DWELL]:
-        return ap[ctl.ACTIVE]
-    row = int(ap[ctl.LEG])
-    pitch_left = abs(legs[row, ctl.LEG_PITCH] - ap[ctl.REF_PITCH])
-    depth_off = abs(est[ctl.EST_DEPTH] - ap[ctl.REF_DEPTH]) if depth_is_held(legs, ap) else 0.0
-    if ap[ctl.ACTIVE] == ctl.LAW:
-        calm = (
-            est[ctl.ROUGHNESS] < C[ctl.HYBRID_ROUGHNESS_OFF]
-            and pitch_left < C[ctl.HYBRID_PITCH_OFF]
-            and depth_off < C[ctl.HYBRID_DEPTH_OFF]
-        )
-        return ctl.PID if calm else ctl.LAW
-    rough = (
-        est[ctl.ROUGHNESS] > C[ctl.HYBRID_ROUGHNESS_ON]
-        or pitch_left > C[ctl.HYBRID_PITCH_ON]
-        or depth_off > C[ctl.HYBRID_DEPTH_ON]
-    )
-    return ctl.LAW if rough else ctl.PID
-
-
-@kernel
-def wanted_by(P, C, legs, est, ap, controller, pitch_rate):
-    """Slider and ballast by PID or LAW; where the law has no answer (steep, not finite) the PID's."""
-    if controller == ctl.LAW:
-        slider, ballast, status = law_inputs(P, C, legs, est, ap, pitch_rate)
-        ap[ctl.LAW_STATUS] = status
-        if status == OK:
-            ap[ctl.LAW_RAN] = 1.0
-            return slider, ballast
-    if ap[ctl.LAW_RAN] == 1.0:
-        start_pid(P, C, legs, est, ap, pitch_rate)
-        ap[ctl.LAW_RAN] = 0.0
-    return pid_inputs(P, C, legs, est, ap, pitch_rate)
-
-
-@kernel
-def steer(P, C, legs, est, ap, t):
-    """Wanted servo (rad), slider (m) and ballast (kg) at time t (s), before the limits.
-
-    A switch of controllers makes no step: the PID begins at the commands sent last, and what the law differs from them
-    is taken off and fades in BUMP_TIME.
-    """
-    roll_rate, pitch_rate = angle_rates(est)
-    servo = roll_law(
-        ap[ctl.REF_ROLL], ap[ctl.REF_ROLL_RATE], est[ctl.EST_ROLL], roll_rate, C[ctl.ROLL_KP], C[ctl.ROLL_KD]
-    )
-    controller = ctl.PID
-    if ap[ctl.CAUTIOUS] == 1.0:
-        controller = ctl.PID
-    elif C[ctl.CONTROLLER] == ctl.HYBRID:
-        controller = choose(C, legs, est, ap, t)
-    elif C[ctl.CONTROLLER] != ctl.PID:
-        controller = ctl.LAW
-    switched = controller != ap[ctl.ACTIVE]
-    if switched:
-        ap[ctl.ACTIVE], ap[ctl.ACTIVE_SINCE] = controller, t
-    slider, ballast = wanted_by(P, C, legs, est, ap, controller, pitch_rate)
-    if switched and controller == ctl.LAW:
-        ap[ctl.BUMP_SLIDER] = clip(ap[ctl.SENT_SLIDER] - slider, P[SLIDER_MIN], P[SLIDER_MAX])
-        ap[ctl.BUMP_BALLAST] = clip(ap[ctl.SENT_BALLAST] - ballast, P[BALLAST_MIN], P[BALLAST_MAX])
-    elif switched:
-        ap[ctl.BUMP_SLIDER], ap[ctl.BUMP_BALLAST] = 0.0, 0.0
-    fade = math.exp(-C[ctl.DT] / BUMP_TIME)
-    slider += ap[ctl.BUMP_SLIDER]
-    if depth_is_held(legs, ap):
-        ballast += ap[ctl.BUMP_BALLAST]
-    ap[ctl.BUMP_SLIDER] *= fade
-    ap[ctl.BUMP_BALLAST] *= fade
-    return servo, slider, ballast

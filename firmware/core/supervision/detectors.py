@@ -252,7 +252,7 @@ def answerless(P, C, ap):
     for i in range(3):
         if not abs(ap[ctl.WANTED_SERVO + i]) <= IMPOSSIBLE * (P[SPANS[i][1]] - P[SPANS[i][0]]):  # NaN too
             return True
-    return C[ctl.CONTROLLER] != ctl.PID and ap[ctl.ACTIVE] == ctl.LAW and ap[ctl.LAW_STATUS] != 0.0
+    return C[ctl.CONTROLLER] != ctl.PID and ap[ctl.ACTIVE] != ctl.PID and ap[ctl.LAW_STATUS] != 0.0
 
 
 @kernel
@@ -264,7 +264,7 @@ def watch_law(P, C, G, ap, t):
         G[sup.LAW_FAILED] += 1.0
         G[sup.PID_UNTIL] = t + G[sup.LAW_REST]
         ask(G, sup.FAULT_NO_ANSWER, sup.ABORT if G[sup.LAW_FAILED] >= G[sup.LAW_RUN] else sup.WARN)
-    elif C[ctl.CONTROLLER] == ctl.PID or ap[ctl.ACTIVE] == ctl.LAW:
+    elif C[ctl.CONTROLLER] == ctl.PID or ap[ctl.ACTIVE] != ctl.PID:
         G[sup.LAW_FAILED] = 0.0
 
 
