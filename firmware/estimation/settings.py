@@ -12,8 +12,6 @@ ERROR_TIME = 10.0  # s
 # what keeps the filter listening to the draw-wires while they stand still.
 SPEED_ERROR = 0.1  # share of the speed, over 1 s
 SERVO_WALK, SLIDER_WALK, BALLAST_WALK = 0.002, 0.0002, 0.0003  # rad, m, kg, each per square root of a second
-# A gyro's bias is called constant; this lets the filter follow one that is worse than its file says.
-GYRO_WALK, WATER_WALK = 0.0005, 0.005  # rad/s, m/s, each per square root of a second
 UNSEEN_SERVO_WALK = 0.2  # rad per square root of a second: a servo turns where the pilot wants, unannounced
 
 # Before the first measurement: recordings begin at rest, at a launch or within a glide. One linearisation does not
@@ -24,7 +22,6 @@ START_SPEEDS = (0.0, 0.1, 0.2, 0.3, 0.45, 0.6)  # m/s
 POSITION_SPREAD, ATTITUDE_SPREAD = 1.0, 0.3  # m, rad, about the first readings
 SPEED_SPREAD = (0.05, 0.02, 0.02)  # m/s
 RATE_SPREAD = 0.2  # rad/s
-GYRO_SPREAD, WATER_SPREAD = 0.003, 0.05  # rad/s, m/s
 SERVO_SPREAD, SLIDER_SPREAD, BALLAST_SPREAD = 0.005, 0.001, 0.002  # rad, m, kg, about 0 and the first readings
 UNKNOWN_SPREAD = 0.5  # share of an actuator's range, where neither command nor reading says where it is
 
@@ -54,7 +51,7 @@ def estimator_settings(sensors: SensorsTable, disturbance: DisturbanceTable, mod
     S[kf.S_BALLAST] = BALLAST_WALK**2
     S[kf.S_SPEED_ERROR] = SPEED_ERROR**2
     S[kf.S_ERROR_TIME] = ERROR_TIME
-    S[kf.S_GYRO], S[kf.S_WATER] = GYRO_WALK**2, WATER_WALK**2
+    S[kf.S_WALK : kf.S_R] = [walk**2 for _, count, _, walk, _ in kf.WANDERING for _ in range(count)]
     S[kf.S_SLIDER_BIAS] = sensors.slider.bias**2
     S[kf.S_BALLAST_BIAS] = sensors.ballast.bias**2
     noise = (
@@ -74,4 +71,5 @@ def first_spread(P: np.ndarray, mode: int, seen: tuple[bool, bool, bool]) -> np.
     if mode & kf.SERVO_DRIVEN:
         actuators[0] = max(actuators[0], 0.1)
     moving = [*3 * [POSITION_SPREAD], *3 * [ATTITUDE_SPREAD], *SPEED_SPREAD, *3 * [RATE_SPREAD], *actuators]
-    return np.array([*moving, *6 * [0.0], *3 * [GYRO_SPREAD], *2 * [WATER_SPREAD]])
+    wandering = [spread for _, count, spread, _, _ in kf.WANDERING for _ in range(count)]
+    return np.array([*moving, *6 * [0.0], *wandering])

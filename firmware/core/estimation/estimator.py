@@ -57,13 +57,12 @@ from firmware.core.estimation.estimator_layout import (
     S_BALLAST,
     S_BALLAST_BIAS,
     S_ERROR_TIME,
-    S_GYRO,
     S_LINEAR,
     S_SERVO,
     S_SLIDER,
     S_SLIDER_BIAS,
     S_SPEED_ERROR,
-    S_WATER,
+    S_WALK,
     SERVO_DRIVEN,
     SLIDER_DRIVEN,
     W_A,
@@ -216,10 +215,10 @@ def add_process_noise(settings, x, cov, C, d, ds, dl, db, dt):
     cov[E_ACT, E_ACT] += (settings[S_SERVO] + wrong * ds * ds) * dt
     cov[E_ACT + 1, E_ACT + 1] += (settings[S_SLIDER] + wrong * dl * dl) * dt
     cov[E_ACT + 2, E_ACT + 2] += (settings[S_BALLAST] + wrong * db * db) * dt
+    for i in range(N_E - E_GYRO):
+        cov[E_GYRO + i, E_GYRO + i] += settings[S_WALK + i] * dt
     for i in range(3):
-        cov[E_GYRO + i, E_GYRO + i] += (settings[S_GYRO] + GYRO_WANDER * x[X_GYRO + i] * x[X_GYRO + i]) * dt
-    for i in range(2):
-        cov[E_WATER + i, E_WATER + i] += settings[S_WATER] * dt
+        cov[E_GYRO + i, E_GYRO + i] += GYRO_WANDER * x[X_GYRO + i] * x[X_GYRO + i] * dt
     share = 1.0 - d[3] * d[3]  # keeps the variance at C where C stays
     for i in range(6):
         for j in range(6):

@@ -3,11 +3,11 @@
 import math
 
 from firmware.core.estimation.estimator_layout import (
+    BIAS_OF,
     COS_PITCH_MIN,
     E_ACT,
     E_ATT,
     E_ERR,
-    E_GYRO,
     E_NU,
     E_POS,
     GATE,
@@ -24,7 +24,6 @@ from firmware.core.estimation.estimator_layout import (
     W_K,
     W_SCRATCH,
     X_ERR,
-    X_GYRO,
     Z_BALLAST,
     Z_DEPTH,
     Z_MOCAP_ROLL,
@@ -53,7 +52,7 @@ def update_scalar(cov, taken, n, dx, column, h0, h1, h2, other, innovation, R, r
     """One measurement, h . error[column : column + 3] + error[other] = innovation, variance R, into dx and row n of
     `taken`: the covariance is cov less the sum of r r' over rows r of `taken`, and cov itself waits.
 
-    `other` is a gyro's bias, 0 for the sensors that have none in the state. rejected_for_s: how long this sensor has
+    `other` is the sensor's bias in E, 0 where the state has none. rejected_for_s: how long this sensor has
     been out of the gate. Returns the innovation in sigma, the new `rejected_for_s`, and how many rows there are now.
     """
     v = taken[n]
@@ -71,7 +70,7 @@ def update_scalar(cov, taken, n, dx, column, h0, h1, h2, other, innovation, R, r
     score = left / math.sqrt(S)
     if abs(score) > GATE:
         rejected_for_s += dt
-        if rejected_for_s < REJECTED_AT_MOST or other > 0:
+        if rejected_for_s < REJECTED_AT_MOST or E_NU <= column < E_ACT:  # not so the gyro
             return score, rejected_for_s, n
         # the measured quantity may have jumped: cov + grow h h' is positive definite, and hardly moves anything else
         h = h0 * h0 + h1 * h1 + h2 * h2
@@ -149,7 +148,7 @@ def estimator_update(P, settings, x, cov, inflation, z, rejected_for_s, scores, 
         if not abs(z[m]) < LARGEST:
             continue
         axis = m % 3
-        column, h0, h1, h2, other = E_NU + 3 + axis, 1.0, 0.0, 0.0, 0
+        column, h0, h1, h2, other = E_NU + 3 + axis, 1.0, 0.0, 0.0, BIAS_OF[m]
         if m <= Z_YAW or m >= Z_MOCAP_ROLL:
             column = E_ATT
             if axis == 1:
@@ -161,13 +160,15 @@ def estimator_update(P, settings, x, cov, inflation, z, rejected_for_s, scores, 
             else:
                 h0, h1, h2, innovation = 0.0, sf / ct, cf / ct, wrap_angle(z[m] - psi)
         elif m <= Z_R:
-            other, innovation = E_GYRO + axis, z[m] - x[X_NU + 3 + axis] - x[X_GYRO + axis]
+            innovation = z[m] - x[X_NU + 3 + axis]
         elif m == Z_DEPTH:
             column, innovation = E_POS + 2, z[m] - x[X_DOWN]
         elif m <= Z_BALLAST:
             column, innovation = E_ACT + m - Z_DEPTH, z[m] - x[X_ACT + m - Z_DEPTH]
         else:
             column, innovation = E_POS + axis, z[m] - x[axis]
+        if other > 0:
+            innovation -= x[X_ERR + other - E_ERR]
         scores[m], rejected_for_s[m], n = update_scalar(
             cov, taken, n, dx, column, h0, h1, h2, other, innovation, settings[S_R + m], rejected_for_s[m], dt
         )

@@ -46,8 +46,7 @@ def test_prediction_of_the_covariance_is_f_p_f_plus_q():
     disturbance = filtered.vehicle.disturbance
     Q[kf.E_NU : kf.E_ACT] = np.repeat([disturbance.linear**2, disturbance.angular**2], 3) * 0.1 * dt
     Q[kf.E_ACT : kf.E_ERR] = filtered.settings[kf.S_SERVO : kf.S_BALLAST + 1] * dt
-    Q[kf.E_GYRO : kf.E_WATER] = filtered.settings[kf.S_GYRO] * dt
-    Q[kf.E_WATER :] = filtered.settings[kf.S_WATER] * dt
+    Q[kf.E_GYRO :] = filtered.settings[kf.S_WALK : kf.S_R] * dt
     np.testing.assert_allclose(filtered.cov, F @ before @ F.T + np.diag(Q), rtol=1e-9, atol=1e-9)
 
 
