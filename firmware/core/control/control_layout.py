@@ -112,7 +112,8 @@ MARGIN_PITCH, MARGIN_DEPTH = 39, 40  # rad/s2, m/s2: positive, V is sure to fall
 WANTED_SERVO, WANTED_SLIDER, WANTED_BALLAST = 41, 42, 43  # what the controller wants, before any limit
 CAUTIOUS = 44  # 1: the PID flies, whatever controller is chosen
 AP_REACTION, AP_FAULT_ROW = 45, 46  # the supervisor's, and the row of the fault table that asked for it
-N_AP = 47
+SUPERVISED = 47  # 1: a supervisor guards, and it alone gives the dive up for what it sees
+N_AP = 48
 
 # --- modes and reasons ----------------------------------------------------------------------------------------------
 WAITING, FLYING, COMPLETED, ABORTED = 0.0, 1.0, 2.0, 3.0

@@ -56,14 +56,8 @@ def abort(ap, reason):
 
 
 @kernel
-def sequence(C, legs, est, ap, t):
-    """Move through the legs; a leg or mission over its time, a dead sensor or too great a depth aborts."""
-    if ap[ctl.MODE] == ctl.WAITING:
-        if est[ctl.EST_STARTED] == 1.0:
-            begin_mission(est, ap, t)
-        return
-    if ap[ctl.MODE] != ctl.FLYING:
-        return
+def guard_alone(C, est, ap, t):
+    """Where no supervisor guards: a dead sensor, too great a depth, or a mission over its time aborts."""
     if t - est[ctl.EST_IMU_TIME] > C[ctl.ABORT_AGE]:
         abort(ap, ctl.REASON_IMU)
     elif t - est[ctl.EST_BEACON_TIME] > C[ctl.ABORT_AGE]:
@@ -72,8 +66,21 @@ def sequence(C, legs, est, ap, t):
         abort(ap, ctl.REASON_TOO_DEEP)
     elif t - ap[ctl.MISSION_START] > C[ctl.MISSION_TIME_LIMIT]:
         abort(ap, ctl.REASON_MISSION_TIME)
+
+
+@kernel
+def sequence(C, legs, est, ap, t):
+    """Move through the legs; a leg over its time aborts, and without a supervisor what `guard_alone` sees."""
+    if ap[ctl.MODE] == ctl.WAITING:
+        if est[ctl.EST_STARTED] == 1.0:
+            begin_mission(est, ap, t)
+        return
     if ap[ctl.MODE] != ctl.FLYING:
         return
+    if ap[ctl.SUPERVISED] == 0.0:
+        guard_alone(C, est, ap, t)
+        if ap[ctl.MODE] != ctl.FLYING:
+            return
     row = int(ap[ctl.LEG])
     elapsed = t - ap[ctl.LEG_START]
     ap[ctl.TURNED] += wrap_angle(est[ctl.EST_YAW] - ap[ctl.YAW_BEFORE])

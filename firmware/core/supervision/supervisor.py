@@ -161,4 +161,5 @@ def guard(P, C, G, frame, est, ap, cmd, t):
     ap[ctl.CAUTIOUS] = 1.0 if doubtful or lawless else 0.0
     if G[sup.HIGHEST] >= sup.ABORT and ap[ctl.MODE] < ctl.COMPLETED:
         abort(ap, ctl.REASON_FAULT + G[sup.HIGHEST_ROW])
+    ap[ctl.SUPERVISED] = 1.0
     ap[ctl.AP_REACTION], ap[ctl.AP_FAULT_ROW] = G[sup.HIGHEST], G[sup.HIGHEST_ROW]
