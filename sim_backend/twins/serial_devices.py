@@ -5,6 +5,7 @@ import math
 import random
 from pathlib import Path
 
+from firmware.core.vehicle.layout import GRAVITY
 from hal.boardfile import ImuTable, PortTable, ServoTable
 from hal.drivers.vn100 import euler, rotation
 from hal.protocols import maestro, vn100
@@ -73,7 +74,7 @@ class Vn100Twin:
         (roll, pitch, yaw), rates = self._values()
         if self.fault.kind == "nan":
             roll = pitch = yaw = math.nan
-        gravity = (rotation(math.radians(roll), math.radians(pitch), 0.0).T @ (0.0, 0.0, -9.80665)).tolist()
+        gravity = (rotation(math.radians(roll), math.radians(pitch), 0.0).T @ (0.0, 0.0, -GRAVITY)).tolist()
         return vn100.encode_binary(vn100.FLIGHT_MASK, int(t * 1e9), yaw, pitch, roll, *rates, *gravity)
 
     def _text(self) -> bytes:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from firmware.core.vehicle.layout import GRAVITY
 from sim_backend.foreign import foreign_layout as fo
 
 Place = tuple[str, str]
@@ -147,6 +148,6 @@ def draw_waves(rng: np.random.Generator) -> np.ndarray:
     waves = np.zeros((5, fo.N_FW))
     for row in waves:
         omega = 2.0 * np.pi / period * rng.uniform(0.85, 1.15)
-        toward, k = direction + 0.3 * rng.standard_normal(), omega * omega / 9.80665
+        toward, k = direction + 0.3 * rng.standard_normal(), omega * omega / GRAVITY
         row[:] = 0.04 * rng.uniform(0.6, 1.0), omega, k * np.cos(toward), k * np.sin(toward), 0.0
     return waves
