@@ -23,7 +23,7 @@ from hal.ports import (
     Validity,
 )  # fmt: skip
 from hal.recorder.schema import Field, RecordSpec
-from sim_backend.core import layout
+from sim_backend.core import layout as wl
 from sim_backend.core.world import write_truth
 from sim_backend.effects.base import check_board
 from sim_backend.world import Environment, SampledSensors, Start, World, build_world
@@ -147,7 +147,7 @@ class SimBoard:
         self.name = "sim"
         self.file, self.world, self.loop_hz = file, world, file.loop_hz
         self.periods = file.sensors.periods
-        self.surface_pressure = float(world.E[layout.SURFACE_PRESSURE])
+        self.surface_pressure = float(world.E[wl.ENV_SURFACE_PRESSURE])
         self.realtime = realtime
         self.clock: Clock = SimulatedClock(world)
         self.leak: SensorPort | None = None

@@ -2,7 +2,7 @@
 
 import math
 
-GRAVITY = 9.80665  # m/s2
+from firmware.core.vehicle.layout import GRAVITY
 
 
 def wave_row(amplitude: float, omega: float, direction: float, phase: float) -> tuple[float, ...]:

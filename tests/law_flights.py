@@ -15,10 +15,10 @@ from firmware.core.control.law import OK, pitch_depth_law
 from firmware.core.control.law_plus import reach
 from firmware.core.maths.rotations import euler_from_quaternion, rotation_nb
 from firmware.core.vehicle import layout
-from sim_backend.core.layout import N_E, N_WAVE
-from sim_backend.core.plant import derivative, rk4_step
+from sim_backend.core.layout import N_ENV, N_WAVE
+from sim_backend.core.plant import derivative, plant_step
 
-STILL, NO_WAVES, NO_DISTURBANCE = np.zeros(N_E), np.zeros((0, N_WAVE)), np.zeros(6)
+STILL, NO_WAVES, NO_DISTURBANCE = np.zeros(N_ENV), np.zeros((0, N_WAVE)), np.zeros(6)
 SLIDER, BALLAST = layout.X_ACT + 1, layout.X_ACT + 2
 STANDING = (0.0, 0.0, 0.0)  # actuators' speeds
 TICK = 0.02  # s
@@ -193,7 +193,7 @@ class Law:
 
 def advance(vehicle: np.ndarray, x: np.ndarray, command, acc: np.ndarray, dt: float, work: np.ndarray) -> None:
     """One Runge-Kutta step of the plant in still water, in place."""
-    rk4_step(vehicle, STILL, NO_WAVES, x, np.asarray(command, dtype=float), 0.0, dt, acc, work)
+    plant_step(vehicle, STILL, NO_WAVES, x, np.asarray(command, dtype=float), 0.0, dt, acc, work)
 
 
 def worst(x: np.ndarray, s: np.ndarray, strength: np.ndarray) -> np.ndarray:

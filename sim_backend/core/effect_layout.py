@@ -10,15 +10,15 @@ from firmware.core.vehicle.layout import N_X
 # actuation: rates and time constants in powers of e (-1: rate 1/e of the nominal), widths of play, offsets
 SERVO_RATE_LOG, SERVO_LAG_LOG, SERVO_PLAY, SERVO_OFFSET, SERVO_LIMIT = 0, 1, 2, 3, 4  # 1, 1, rad, rad, rad
 SLIDER_RATE_LOG, SLIDER_LAG_LOG, SLIDER_PLAY = 5, 6, 7  # 1, 1, m
-PUMP_RATE_LOG, PUMP_LAG_LOG, PUMP_DROOP, LEAK = 8, 9, 10, 11  # 1, 1, 1/m, kg/s
+PUMP_RATE_LOG, PUMP_LAG_LOG, PUMP_DROOP, BALLAST_LEAK = 8, 9, 10, 11  # 1, 1, 1/m, kg/s
 # hydrodynamics: shares of a coefficient, and terms that the model has not
 DRAG_0, DRAG_ALPHA, LINEAR_DRAG, CLIMB_DIVE, TETHER = 12, 13, 14, 15, 16  # 1, 1, N s/m, 1, kg/m
 LIFT, STALL, ADDED_Y, ADDED_Z, SIDE = 17, 18, 19, 20, 21  # 1, 1/rad, 1, 1, 1
 ROLL_TRIM, PITCH_TRIM, PITCH_DAMPING = 22, 23, 24  # kg, kg, 1
 YAW_TRIM, WEATHERCOCK, YAW_DAMPING = 25, 26, 27  # kg, 1, 1
 # mass
-NET_MASS, BALLAST_SCALE, MASS_PER_DEPTH = 28, 29, 30  # kg, 1, kg/m
-CG_X, CG_Y, CG_Z, SLIDER_SCALE, INERTIA_Y, INERTIA_Z = 31, 32, 33, 34, 35, 36  # m, m, m, 1, 1, 1
+NET_MASS_OFFSET, BALLAST_SCALE, MASS_PER_DEPTH = 28, 29, 30  # kg, 1, kg/m
+CG_OFFSET_X, CG_OFFSET_Y, CG_OFFSET_Z, SLIDER_SCALE, INERTIA_Y, INERTIA_Z = 31, 32, 33, 34, 35, 36  # m, m, m, 1, 1, 1
 # environment: water in motion (waves and turbulence have a course of their own and stand in the world)
 CURRENT_N, CURRENT_E, SHEAR_N, SHEAR_E = 37, 38, 39, 40  # m/s, m/s, 1/s, 1/s
 # sensing: errors of what is read, beside the biases that every sensor may have

@@ -77,10 +77,10 @@ def fold(P, F, out):
     out[K_Q] *= 1.0 + F[ef.PITCH_DAMPING]
     out[K_MY] *= 1.0 + F[ef.WEATHERCOCK]
     out[K_R] *= 1.0 + F[ef.YAW_DAMPING]
-    out[P_NET_MASS] += F[ef.NET_MASS]
-    out[P_CG_X] += F[ef.CG_X]
-    out[P_CG_Y] += F[ef.CG_Y]
-    out[P_CG_Z] += F[ef.CG_Z]
+    out[P_NET_MASS] += F[ef.NET_MASS_OFFSET]
+    out[P_CG_X] += F[ef.CG_OFFSET_X]
+    out[P_CG_Y] += F[ef.CG_OFFSET_Y]
+    out[P_CG_Z] += F[ef.CG_OFFSET_Z]
     out[J_YY] *= 1.0 + F[ef.INERTIA_Y]
     out[J_ZZ] *= 1.0 + F[ef.INERTIA_Z]
 
@@ -190,8 +190,8 @@ def effect_derivative(P, F, x, mode, c_servo, c_slider, c_ballast, since, acc, f
         if slider == x[ef.X_GEAR_SLIDER]:
             screw_rate = 0.0
     scale = 1.0 + F[ef.SLIDER_SCALE]
-    tank = x[15] * (1.0 + F[ef.BALLAST_SCALE]) + F[ef.LEAK] * since
-    tank_rate = db * (1.0 + F[ef.BALLAST_SCALE]) + F[ef.LEAK]
+    tank = x[15] * (1.0 + F[ef.BALLAST_SCALE]) + F[ef.BALLAST_LEAK] * since
+    tank_rate = db * (1.0 + F[ef.BALLAST_SCALE]) + F[ef.BALLAST_LEAK]
     X, Y, Z, K, M, N = extra_wrench(P, F, r31, u, v, w)
     if F[ef.TETHER] != 0.0 or F[ef.TETHER_GROWTH] != 0.0:
         X1, Y1, Z1, M1, N1 = line_wrench(F, x[2], u, v, w, q, r)

@@ -6,9 +6,8 @@ Where no effect is set, nothing of this runs: a nominal vehicle flies the plain 
 import math
 
 from firmware.core.jit import kernel
-from firmware.core.maths.rotations import rotation_nb
 from sim_backend.core import effect_layout as ef
-from sim_backend.core import layout as at
+from sim_backend.core import layout as wl
 from sim_backend.core.effect_plant import effect_step, fold
 from sim_backend.core.plant import boundary_force, water_velocity
 
@@ -48,12 +47,11 @@ def effect_world_step(P, F, E, waves, x, cmd, step, dt, acc, queue, work):
     is (N_WORK, WORK_WIDTH) of scratch.
     """
     t = step * dt
-    water, wanted = work[at.W_WATER, 0:3], work[at.W_WATER, 3:6]
+    water, wanted = work[wl.W_WATER, 0:3], work[wl.W_WATER, 3:6]
     water[0], water[1], water[2] = water_velocity(E, waves, x[0], x[1], x[2], t + 0.5 * dt)
     force = 0.0
-    if E[at.SURFACE_HEIGHT] > 0.0 or E[at.FLOOR_DEPTH] > 0.0:
-        r = rotation_nb(x[3], x[4], x[5], x[6])
-        force = boundary_force(P, E, x[2], r[6] * x[7] + r[7] * x[8] + r[8] * x[9] + water[2])
+    if E[wl.ENV_SURFACE_HEIGHT] > 0.0 or E[wl.ENV_FLOOR_DEPTH] > 0.0:
+        force = boundary_force(P, E, x, water[2])
     if F[ef.COMMAND_DELAY] > 0.0:
         late_commands(queue, cmd, step, F[ef.COMMAND_DELAY], dt, wanted)
     else:

@@ -8,5 +8,5 @@ EFFECT = Effect(
     subsystem="actuation",
     element="ballast",
     summary="mass gained from the start of the run on, at the tank",
-    parameters=(Parameter("rate", "kg/s", 0.0, 0.01, spread=0.0005, entry=ef.LEAK),),
+    parameters=(Parameter("rate", "kg/s", 0.0, 0.01, spread=0.0005, entry=ef.BALLAST_LEAK),),
 )

@@ -8,5 +8,5 @@ EFFECT = Effect(
     subsystem="mass",
     element="lateral",
     summary="offset along y, starboard positive",
-    parameters=(Parameter("offset", "m", -0.02, 0.02, spread=0.0007, entry=ef.CG_Y),),
+    parameters=(Parameter("offset", "m", -0.02, 0.02, spread=0.0007, entry=ef.CG_OFFSET_Y),),
 )

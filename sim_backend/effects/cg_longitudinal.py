@@ -8,5 +8,5 @@ EFFECT = Effect(
     subsystem="mass",
     element="longitudinal",
     summary="offset along x, forward positive",
-    parameters=(Parameter("offset", "m", -0.02, 0.02, spread=0.0007, entry=ef.CG_X),),
+    parameters=(Parameter("offset", "m", -0.02, 0.02, spread=0.0007, entry=ef.CG_OFFSET_X),),
 )

@@ -8,5 +8,5 @@ EFFECT = Effect(
     subsystem="mass",
     element="vertical",
     summary="offset along z, down positive",
-    parameters=(Parameter("offset", "m", -0.01, 0.03, spread=0.001, entry=ef.CG_Z),),
+    parameters=(Parameter("offset", "m", -0.01, 0.03, spread=0.001, entry=ef.CG_OFFSET_Z),),
 )

@@ -8,5 +8,5 @@ EFFECT = Effect(
     subsystem="mass",
     element="net",
     summary="a constant net mass at the origin, heavy positive",
-    parameters=(Parameter("mass", "kg", -0.3, 0.3, spread=0.02, entry=ef.NET_MASS),),
+    parameters=(Parameter("mass", "kg", -0.3, 0.3, spread=0.02, entry=ef.NET_MASS_OFFSET),),
 )

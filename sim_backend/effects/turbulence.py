@@ -2,14 +2,14 @@
 
 from typing import Any
 
-from sim_backend.core.layout import ACC_ANGULAR, ACC_LINEAR
+from sim_backend.core.layout import ENV_ACC_ANGULAR, ENV_ACC_LINEAR
 from sim_backend.effects.base import Effect, Parameter
 
 
 def apply(world: Any, scale: float) -> None:
     """Scale the strength of the world's disturbance; its numbers stay those of the seed."""
-    world.E[ACC_LINEAR] *= 1.0 + scale
-    world.E[ACC_ANGULAR] *= 1.0 + scale
+    world.E[ENV_ACC_LINEAR] *= 1.0 + scale
+    world.E[ENV_ACC_ANGULAR] *= 1.0 + scale
 
 
 EFFECT = Effect(

@@ -48,10 +48,8 @@ def test_shared_reference_flights(shared, name):
     if not path.is_file():
         pytest.skip(f"no {path.name} in the shared reference")
     worst = deviations(path, SHARED_WATER.get(name, (0.0, 0.0)))
-    # Contract: 1 cm and 2 mrad. The flights themselves move servo and slider half of their 1 ms step late, which is
-    # all but 2e-5 rad of what is seen here.
-    assert worst[:3].max() < 0.01
-    assert worst[ANGLES].max() < 0.002
+    assert worst[:3].max() < 1e-5
+    assert worst[ANGLES].max() < 1e-5
     assert worst[12:].max() < 1e-5
 
 

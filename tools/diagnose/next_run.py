@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from firmware.core.vehicle.mass import swung_moment
 from sim_backend.core import effect_layout as ef
 from tools.diagnose.search import Search
 from tools.gap.measure import wrap
@@ -66,7 +67,7 @@ def commands(vehicle, manoeuvre: Manoeuvre, t: np.ndarray) -> np.ndarray:
     phase = (t // half).astype(int)
     diving = phase % 2 == 0
     ballast = np.where(diving, manoeuvre.ballast, -manoeuvre.ballast)
-    sr = m.m_r * m.R_r + m.m_s * m.R_s
+    sr = swung_moment(vehicle.vector())
     pitch = np.radians(np.where(diving, -manoeuvre.pitch, manoeuvre.pitch))
     slider = -(sr * np.tan(pitch) + ballast * m.x_b) / m.m_s
     servo = np.radians(np.where(diving, manoeuvre.roll[0], manoeuvre.roll[1]))

@@ -18,7 +18,6 @@ from numba.core import event
 from firmware.core import jit
 
 TICKS = 200
-CONTROLLERS = ("pid", "law", "law+", "hybrid")
 EFFECTS: dict[str, dict[str, float]] = {"drag": {"scale": 0.1}}  # any: one plant flies them all
 
 Progress = Callable[[str, int], AbstractContextManager[Callable[[int], None]]]
@@ -90,11 +89,13 @@ def compile_all(advance: Callable[[int], None] = lambda n: None) -> dict[str, An
 
     `advance(1)` is called for every kernel that had to be compiled.
     """
+    from firmware.core.control.controllers import CONTROLLERS
+
     begin = time.monotonic()
     with event.install_listener("numba:compile", _Compiled(advance)):
         for controller in CONTROLLERS:
             _fly_a_moment(controller, {})
-        _fly_a_moment(CONTROLLERS[0], EFFECTS)
+        _fly_a_moment("pid", EFFECTS)
     stamp = _stamp()
     if stamp is not None:
         stamp.touch()

@@ -19,7 +19,7 @@ from firmware.core.control.input_forms import level
 from firmware.core.jit import kernel
 from firmware.core.vehicle.layout import CG_X, CG_Z, M_T, N_P
 from firmware.core.vehicle.mass import first_moment, inertia, translational_mass
-from firmware.core.vehicle.motion import momentum_rate, solve_mass_matrix
+from firmware.core.vehicle.motion import momentum, momentum_rate, solve_mass_matrix
 from firmware.core.vehicle.water import water_wrench
 
 
@@ -35,19 +35,6 @@ def row_sums(m1, m2, m3, S1, S2, S3, I1, I2, I3, I12, I13, I23, d1, d2, d3, d4, 
         (S3 / d2 + S2 / d3 + abs(I1) / d4 + I12 / d5 + I13 / d6) / d4,
         (S3 / d1 + S1 / d3 + I12 / d4 + abs(I2) / d5 + I23 / d6) / d5,
         (S2 / d1 + S1 / d2 + I13 / d4 + I23 / d5 + abs(I3) / d6) / d6,
-    )
-
-
-@kernel
-def mass_times(m1, m2, m3, S1, S2, S3, I1, I2, I3, I12, I13, I23, a1, a2, a3, a4, a5, a6):
-    """M a, six forces (N, N m)."""
-    return (
-        m1 * a1 + a5 * S3 - a6 * S2,
-        m2 * a2 + a6 * S1 - a4 * S3,
-        m3 * a3 + a4 * S2 - a5 * S1,
-        I1 * a4 + I12 * a5 + I13 * a6 + S2 * a3 - S3 * a2,
-        I12 * a4 + I2 * a5 + I23 * a6 + S3 * a1 - S1 * a3,
-        I13 * a4 + I23 * a5 + I3 * a6 + S1 * a2 - S2 * a1,
     )
 
 
@@ -96,7 +83,7 @@ def model_error_bound(
         )
         F1, F2, F3, T1, T2, T3 = water_wrench(Pt, u, v, w, p, q, r)
         Pt[n] = P[n]
-        f1, f2, f3, f4, f5, f6 = mass_times(
+        f1, f2, f3, f4, f5, f6 = momentum(
             n1, n2, n3, s1, s2, s3, j1, j2, j3, j12, j13, j23, a1, a2, a3, a4, a5, a6
         )  # fmt: skip
         f1, f2, f3 = b1 + F1 - f1, b2 + F2 - f2, b3 + F3 - f3

@@ -24,9 +24,11 @@ N_P = 48
 
 # --- x: the plant's state -------------------------------------------------------------------------------------------
 X_POS = 0  # 0..2 north, east, down, m
+X_NORTH, X_EAST, X_DOWN = 0, 1, 2
 X_QUAT = 3  # 3..6 attitude quaternion, scalar first, body to NED
 X_NU = 7  # 7..12 u v w (relative to the water), p q r
-X_ACT = 13  # 13 servo rad, 14 slider m, 15 ballast kg
+X_ACT = 13  # 13..15
+X_SERVO, X_SLIDER, X_BALLAST = 13, 14, 15  # rad, m, kg
 N_X = 16
 
-G = 9.80665  # m/s2
+GRAVITY = 9.80665  # m/s2

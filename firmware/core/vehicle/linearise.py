@@ -5,12 +5,12 @@ the actuators. The estimator's other errors act on one of these each, with a fac
 """
 
 from firmware.core.jit import kernel
-from firmware.core.maths.rotations import rotation_nb
-from firmware.core.vehicle.layout import N_P
+from firmware.core.vehicle.layout import N_P, X_NU
 from firmware.core.vehicle.motion import accelerations
+from firmware.core.vehicle.state import rotation, velocities
 
 _STEP = 1e-5  # of the differences, in SI: truncation and rounding are both below 1e-6 of what is differentiated
-GRAVITY = 12  # in y: d(nu_dot)/dk, six numbers for each of k's three
+Y_BY_DOWN = 12  # in y: d(nu_dot)/dk, six numbers for each of k's three
 
 
 @kernel
@@ -25,8 +25,8 @@ def acceleration_at(P, y, servo_rate, slider_rate, ballast_rate):
 @kernel
 def linearise_motion(x, y, A):
     """Position's and attitude's rows of A at x, and how attitude errors turn gravity; y as linearise left it."""
-    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation_nb(x[3], x[4], x[5], x[6])
-    u, v, w, p, q, r = x[7], x[8], x[9], x[10], x[11], x[12]
+    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation(x)
+    u, v, w, p, q, r = velocities(x)
     # position: R v, and d(R v) = -R [v x] dtheta
     A[0, 6], A[0, 7], A[0, 8] = r11, r12, r13
     A[1, 6], A[1, 7], A[1, 8] = r21, r22, r23
@@ -41,7 +41,7 @@ def linearise_motion(x, y, A):
     A[3, 9], A[4, 10], A[5, 11] = 1.0, 1.0, 1.0
     # d/dtheta from d/dk by dk = k x dtheta
     for i in range(6):
-        g0, g1, g2 = y[GRAVITY + i], y[GRAVITY + 6 + i], y[GRAVITY + 12 + i]
+        g0, g1, g2 = y[Y_BY_DOWN + i], y[Y_BY_DOWN + 6 + i], y[Y_BY_DOWN + 12 + i]
         A[6 + i, 3], A[6 + i, 4], A[6 + i, 5] = g1 * r33 - g2 * r32, g2 * r31 - g0 * r33, g0 * r32 - g1 * r31
 
 
@@ -52,9 +52,9 @@ def linearise(P, x, servo_rate, slider_rate, ballast_rate, A, y):
     Attitude errors turn gravity (k + k x dtheta) and the way through the water; the accelerations' derivatives are
     forward differences of equation (1), the actuators' speeds held.
     """
-    _, _, _, _, _, _, y[0], y[1], y[2] = rotation_nb(x[3], x[4], x[5], x[6])
+    _, _, _, _, _, _, y[0], y[1], y[2] = rotation(x)
     for i in range(9):
-        y[3 + i] = x[7 + i]
+        y[3 + i] = x[X_NU + i]
     a0, a1, a2, a3, a4, a5 = acceleration_at(P, y, servo_rate, slider_rate, ballast_rate)
     for j in range(12):
         # equation (1) is linear in k: any step is exact
@@ -65,7 +65,7 @@ def linearise(P, x, servo_rate, slider_rate, ballast_rate, A, y):
         y[j] = kept
         h = 1.0 / h
         if j < 3:
-            to = GRAVITY + 6 * j
+            to = Y_BY_DOWN + 6 * j
             y[to], y[to + 1], y[to + 2] = b0 - a0, b1 - a1, b2 - a2
             y[to + 3], y[to + 4], y[to + 5] = b3 - a3, b4 - a4, b5 - a5
         else:

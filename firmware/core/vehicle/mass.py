@@ -29,13 +29,19 @@ from firmware.core.vehicle.layout import (
 
 
 @kernel
+def swung_moment(P):
+    """m_r R_r + m_s R_s, kg m: what the servo swings, times the distance from its axis."""
+    return P[M_R] * P[R_R] + P[M_S] * P[R_S]
+
+
+@kernel
 def first_moment(P, servo, slider, ballast):
     """S = [m_s dr_s + m_b x_b, sr sin(gamma), sr cos(gamma)] + m_t cg, kg m, with sr = m_r R_r + m_s R_s.
 
     What the fixed hull trims out (ledger L1) is not in S: at gamma = 0, dr_s = 0, m_b = 0 only the pendulum is left.
     """
     gamma, dr_s, m_b = servo, slider, ballast
-    sr = P[M_R] * P[R_R] + P[M_S] * P[R_S]
+    sr = swung_moment(P)
     return (
         P[M_S] * dr_s + m_b * P[X_B] + P[M_T] * P[CG_X],
         sr * math.sin(gamma) + P[M_T] * P[CG_Y],
@@ -46,7 +52,7 @@ def first_moment(P, servo, slider, ballast):
 @kernel
 def first_moment_rate(P, servo, servo_rate, slider_rate, ballast_rate):
     """dS/dt from the actuators' speeds, kg m/s: what enters M_dot (the change of Jt is left out)."""
-    sr = P[M_R] * P[R_R] + P[M_S] * P[R_S]
+    sr = swung_moment(P)
     return (
         P[M_S] * slider_rate + ballast_rate * P[X_B],
         sr * math.cos(servo) * servo_rate,
@@ -55,9 +61,12 @@ def first_moment_rate(P, servo, servo_rate, slider_rate, ballast_rate):
 
 
 @kernel
-def translational_mass(P, ballast):
-    """Diagonal of the upper left block of M: m_t + m_b + net mass + added mass, kg, on x, y, z."""
-    m = P[M_T] + ballast + P[NET_MASS]
+def translational_mass(P, ballast, net=0.0):
+    """Diagonal of the upper left block of M: m_t + m_b + net mass + added mass, kg, on x, y, z.
+
+    net: mass at the origin beside P's own, kg.
+    """
+    m = P[M_T] + ballast + P[NET_MASS] + net
     return m + P[A_X], m + P[A_Y], m + P[A_Z]
 
 

@@ -5,36 +5,49 @@ symmetric 3 x 3 system for the rotations (Schur complement).
 """
 
 from firmware.core.jit import kernel
-from firmware.core.vehicle.layout import NET_MASS, G
+from firmware.core.vehicle.layout import GRAVITY, NET_MASS
 from firmware.core.vehicle.mass import first_moment, first_moment_rate, inertia, translational_mass
 from firmware.core.vehicle.water import water_wrench
 
 
 @kernel
-def momentum_rate(P, kx, ky, kz, u, v, w, p, q, r, servo, slider, ballast, servo_rate, slider_rate, ballast_rate):
+def momentum(m1, m2, m3, S1, S2, S3, I1, I2, I3, I12, I13, I23, u, v, w, p, q, r):
+    """[P; Q] = M nu, kg m/s and kg m2/s (of any other six numbers, M times those).
+
+    -S^ Omega = Omega x S and S^ V = S x V.
+    """
+    return (
+        m1 * u + q * S3 - r * S2,
+        m2 * v + r * S1 - p * S3,
+        m3 * w + p * S2 - q * S1,
+        I1 * p + I12 * q + I13 * r + S2 * w - S3 * v,
+        I12 * p + I2 * q + I23 * r + S3 * u - S1 * w,
+        I13 * p + I23 * q + I3 * r + S1 * v - S2 * u,
+    )
+
+
+@kernel
+def momentum_rate(
+    P, kx, ky, kz, u, v, w, p, q, r, servo, slider, ballast, servo_rate, slider_rate, ballast_rate, net=0.0
+):
     """Right-hand side of equation (1) without the water's forces: six generalised forces, N and N m.
 
     -M_dot nu + [P x Omega ; Q x Omega + P x V] + [W k ; S x g k], k = [kx, ky, kz] the unit vector down in body axes.
+    net: mass at the origin beside P's own, kg.
     """
-    m1, m2, m3 = translational_mass(P, ballast)
+    m1, m2, m3 = translational_mass(P, ballast, net)
     S1, S2, S3 = first_moment(P, servo, slider, ballast)
     I1, I2, I3, I12, I13, I23 = inertia(P, servo, slider, ballast)
     dS1, dS2, dS3 = first_moment_rate(P, servo, servo_rate, slider_rate, ballast_rate)
-    # [P; Q] = M nu, with -S^ Omega = Omega x S and S^ V = S x V
-    P1 = m1 * u + q * S3 - r * S2
-    P2 = m2 * v + r * S1 - p * S3
-    P3 = m3 * w + p * S2 - q * S1
-    Q1 = I1 * p + I12 * q + I13 * r + S2 * w - S3 * v
-    Q2 = I12 * p + I2 * q + I23 * r + S3 * u - S1 * w
-    Q3 = I13 * p + I23 * q + I3 * r + S1 * v - S2 * u
-    weight = (ballast + P[NET_MASS]) * G
+    P1, P2, P3, Q1, Q2, Q3 = momentum(m1, m2, m3, S1, S2, S3, I1, I2, I3, I12, I13, I23, u, v, w, p, q, r)
+    weight = (ballast + P[NET_MASS] + net) * GRAVITY
     return (
         P2 * r - P3 * q + weight * kx - (ballast_rate * u + q * dS3 - r * dS2),
         P3 * p - P1 * r + weight * ky - (ballast_rate * v + r * dS1 - p * dS3),
         P1 * q - P2 * p + weight * kz - (ballast_rate * w + p * dS2 - q * dS1),
-        Q2 * r - Q3 * q + P2 * w - P3 * v + G * (S2 * kz - S3 * ky) - (dS2 * w - dS3 * v),
-        Q3 * p - Q1 * r + P3 * u - P1 * w + G * (S3 * kx - S1 * kz) - (dS3 * u - dS1 * w),
-        Q1 * q - Q2 * p + P1 * v - P2 * u + G * (S1 * ky - S2 * kx) - (dS1 * v - dS2 * u),
+        Q2 * r - Q3 * q + P2 * w - P3 * v + GRAVITY * (S2 * kz - S3 * ky) - (dS2 * w - dS3 * v),
+        Q3 * p - Q1 * r + P3 * u - P1 * w + GRAVITY * (S3 * kx - S1 * kz) - (dS3 * u - dS1 * w),
+        Q1 * q - Q2 * p + P1 * v - P2 * u + GRAVITY * (S1 * ky - S2 * kx) - (dS1 * v - dS2 * u),
     )
 
 
@@ -75,17 +88,19 @@ def solve_mass_matrix(m1, m2, m3, S1, S2, S3, I1, I2, I3, I12, I13, I23, f1, f2,
 
 @kernel
 def accelerations(
-    P, kx, ky, kz, u, v, w, p, q, r, servo, slider, ballast, servo_rate, slider_rate, ballast_rate, X, Y, Z, K, M, N
-):
+    P, kx, ky, kz, u, v, w, p, q, r, servo, slider, ballast, servo_rate, slider_rate, ballast_rate,
+    X, Y, Z, K, M, N, net=0.0,
+):  # fmt: skip
     """nu_dot of equation (1), m/s2 and rad/s2, with any further wrench X..N (N, N m, body axes) beside the water's.
 
-    u, v, w are relative to the water. The actuators' speeds enter through M_dot.
+    u, v, w are relative to the water. The actuators' speeds enter through M_dot. net: mass at the origin beside P's
+    own, kg.
     """
     b1, b2, b3, b4, b5, b6 = momentum_rate(
-        P, kx, ky, kz, u, v, w, p, q, r, servo, slider, ballast, servo_rate, slider_rate, ballast_rate
+        P, kx, ky, kz, u, v, w, p, q, r, servo, slider, ballast, servo_rate, slider_rate, ballast_rate, net
     )
     F1, F2, F3, T1, T2, T3 = water_wrench(P, u, v, w, p, q, r)
-    m1, m2, m3 = translational_mass(P, ballast)
+    m1, m2, m3 = translational_mass(P, ballast, net)
     S1, S2, S3 = first_moment(P, servo, slider, ballast)
     I1, I2, I3, I12, I13, I23 = inertia(P, servo, slider, ballast)
     return solve_mass_matrix(

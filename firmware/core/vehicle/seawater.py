@@ -10,6 +10,7 @@ from firmware.core.jit import kernel
 from firmware.core.vehicle.actuators import clip
 
 PA_PER_BAR = 1e5
+STANDARD_PRESSURE = 101325.0  # Pa, of the atmosphere at sea level
 
 
 @kernel

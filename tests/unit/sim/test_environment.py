@@ -8,7 +8,7 @@ import pytest
 from firmware.core.maths.rotations import euler_from_quaternion
 from firmware.core.vehicle.layout import N_X
 from sim_backend.core.open_loop import fly_open_loop, fly_open_loop_many
-from sim_backend.core.plant import hold_disturbance, rk4_step, water_velocity
+from sim_backend.core.plant import hold_disturbance, plant_step, water_velocity
 from sim_backend.world import Environment, SampledSensor, SampledSensors, Start, Wave, build_world
 from tools.data.sources import load_vehicle
 
@@ -104,8 +104,8 @@ def test_the_disturbance_enters_after_the_mass_matrix():
     quiet, moved = w.x.copy(), w.x.copy()
     acc = np.array([0.01, -0.02, 0.03, 0.01, 0.02, -0.01])
     dt = 1e-5
-    rk4_step(w.P, w.E, w.waves, quiet, w.cmd, 0.0, dt, np.zeros(6), w.work)
-    rk4_step(w.P, w.E, w.waves, moved, w.cmd, 0.0, dt, acc, w.work)
+    plant_step(w.P, w.E, w.waves, quiet, w.cmd, 0.0, dt, np.zeros(6), w.work)
+    plant_step(w.P, w.E, w.waves, moved, w.cmd, 0.0, dt, acc, w.work)
     assert (moved - quiet)[7:13] / dt == pytest.approx(acc, rel=1e-3)
 
 

@@ -12,13 +12,12 @@ from typing import Annotated, Literal
 
 import msgspec
 
+from firmware.core.vehicle.layout import GRAVITY
 from firmware.model.strict import ConfigError, Table, decode, locate
 from hal.units import UNITS, units_of
 from tools.data.errors import InputError
 from tools.data.runs import columns as names
 from tools.data.sources import read_text
-
-GRAVITY = 9.80665  # m/s2, for depth out of pressure
 
 # 'counts' is for values that `scale` alone turns into the target's SI unit.
 COLUMN_UNITS = units_of("length", "angle", "rate", "mass", "pressure", "counts")

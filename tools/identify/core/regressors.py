@@ -10,26 +10,10 @@ from firmware.core.maths.rotations import rotation_nb_euler
 from firmware.core.vehicle.actuators import clip
 from firmware.core.vehicle.layout import K_D0, K_R, N_P
 from firmware.core.vehicle.mass import first_moment, inertia, translational_mass
-from firmware.core.vehicle.motion import momentum_rate
+from firmware.core.vehicle.motion import momentum, momentum_rate
 from firmware.core.vehicle.water import water_wrench
 
 N_K = K_R - K_D0 + 1
-
-
-@kernel
-def momentum(P, u, v, w, p, q, r, servo, slider, ballast):
-    """M nu, six numbers, kg m/s and kg m2/s."""
-    m1, m2, m3 = translational_mass(P, ballast)
-    S1, S2, S3 = first_moment(P, servo, slider, ballast)
-    I1, I2, I3, I12, I13, I23 = inertia(P, servo, slider, ballast)
-    return (
-        m1 * u + q * S3 - r * S2,
-        m2 * v + r * S1 - p * S3,
-        m3 * w + p * S2 - q * S1,
-        I1 * p + I12 * q + I13 * r + S2 * w - S3 * v,
-        I12 * p + I2 * q + I23 * r + S3 * u - S1 * w,
-        I13 * p + I23 * q + I3 * r + S1 * v - S2 * u,
-    )
 
 
 @kernel
@@ -44,7 +28,12 @@ def momentum_rows(P, attitude, nu, actuators, M, N, K):
         u, v, w, p, q, r = nu[i, 0], nu[i, 1], nu[i, 2], nu[i, 3], nu[i, 4], nu[i, 5]
         servo, slider, ballast = actuators[i, 0], actuators[i, 1], actuators[i, 2]
         R = rotation_nb_euler(attitude[i, 0], attitude[i, 1], attitude[i, 2])
-        M[i, 0], M[i, 1], M[i, 2], M[i, 3], M[i, 4], M[i, 5] = momentum(P, u, v, w, p, q, r, servo, slider, ballast)
+        m1, m2, m3 = translational_mass(P, ballast)
+        S1, S2, S3 = first_moment(P, servo, slider, ballast)
+        I1, I2, I3, I12, I13, I23 = inertia(P, servo, slider, ballast)
+        M[i, 0], M[i, 1], M[i, 2], M[i, 3], M[i, 4], M[i, 5] = momentum(
+            m1, m2, m3, S1, S2, S3, I1, I2, I3, I12, I13, I23, u, v, w, p, q, r
+        )
         N[i, 0], N[i, 1], N[i, 2], N[i, 3], N[i, 4], N[i, 5] = momentum_rate(
             P, R[6], R[7], R[8], u, v, w, p, q, r, servo, slider, ballast, 0.0, 0.0, 0.0
         )

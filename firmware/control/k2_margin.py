@@ -1,4 +1,4 @@
-"""k2 against what is left of (29), before anything flies: what a vehicle's [uncertainty] and [disturbance] ask for.
+"""The margin of k2 over what is left of (29), before anything flies, by a vehicle's [uncertainty] and [disturbance].
 
 Looked for in glides of every pitch the law may be sent to, at the speeds such vehicles have; docs/CONTROL.md.
 """
@@ -15,6 +15,7 @@ from firmware.core.control.error_bound import model_error_bound
 from firmware.core.control.input_forms import exact_form
 from firmware.core.control.law import k2_to_cover
 from firmware.core.vehicle import layout
+from firmware.core.vehicle.mass import swung_moment
 from firmware.estimation.settings import parameter_sigma
 from firmware.model.vehicle import Vehicle
 
@@ -25,7 +26,7 @@ BALLAST_SHARE = 0.75  # of the tank's range, heavy where the nose is down
 
 
 @dataclass(frozen=True)
-class Cover:
+class K2Margin:
     """One axis: the k2 that is set, the largest that the glides ask for at one sigma and at three, its unit."""
 
     axis: str
@@ -49,7 +50,7 @@ class Cover:
 
 def glides(P: np.ndarray) -> Iterator[tuple[tuple, tuple]]:
     """k, nu and actuators of each glide, and the actuators' speeds: at rest."""
-    sr = P[layout.M_R] * P[layout.R_R] + P[layout.M_S] * P[layout.R_S]
+    sr = swung_moment(P)
     for pitch in PITCHES:
         end = P[layout.BALLAST_MAX] if pitch < 0.0 else P[layout.BALLAST_MIN]
         ballast = BALLAST_SHARE * end if pitch else 0.0
@@ -76,13 +77,13 @@ def k2_asked(vehicle: Vehicle, eps: tuple[float, float], sigmas: float) -> np.nd
     return asked
 
 
-def k2_cover(vehicle: Vehicle, control: Control) -> tuple[Cover, Cover]:
+def k2_margins(vehicle: Vehicle, control: Control) -> tuple[K2Margin, K2Margin]:
     """Pitch and depth of a vehicle under the law of `control`."""
     tables: tuple[LawGains, LawGains] = (control.law_flown.pitch, control.law_flown.depth)
     eps = (tables[0].eps, tables[1].eps)
     one, three = (k2_asked(vehicle, eps, sigmas) for sigmas in (1.0, 3.0))
     pitch, depth = (
-        Cover(axis, unit, gains.k2, float(one[i]), float(three[i]))
+        K2Margin(axis, unit, gains.k2, float(one[i]), float(three[i]))
         for i, (axis, unit, gains) in enumerate(zip(("pitch", "depth"), ("m", "kg"), tables, strict=True))
     )
     return pitch, depth
