@@ -81,11 +81,6 @@ def fly(
         )
     except BoardError as error:
         raise InputError(str(error), source=board) from None
-    ensure_compiled(say, progress)
-    if flight.control.controller != "pid":
-        for axis in flight.k2_margins:
-            if not axis.covered:
-                say(f"warning: {axis}")
     specs = record_specs(flight)
     path = None if no_log else (log_file or next_log(flight.mission.name))
     if path is not None and path.exists():
@@ -97,6 +92,11 @@ def fly(
     else:
         recorder = Recorder(path, specs, attachments=flight.texts, metadata=metadata)
 
+    ensure_compiled(say, progress)
+    if flight.control.controller != "pid":
+        for axis in flight.k2_margins:
+            if not axis.covered:
+                say(f"warning: {axis}")
     wishes = Wishes(priority, lock_memory, core)
     try:
         keeper = keep(flight, recorder, path, state_folder, acknowledge)

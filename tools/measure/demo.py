@@ -1,4 +1,8 @@
-"""`make demo`: what a user would type: a vehicle with a hidden difference is flown, and the difference found."""
+"""`make demo`: what a user would type: flights of a vehicle with a hidden effect, and the effect found.
+
+The flights are a blind test of one case (docs/CHALLENGE.md): another plant than the model, with one effect that the
+seed draws. The answer is opened after the diagnosis.
+"""
 
 import shutil
 import subprocess
@@ -6,25 +10,23 @@ import sys
 import time
 from pathlib import Path
 
+from tools.study.challenge.seal import ARCHIVE, open_answers
+
 OUT = Path("out/demo")
-BOARD = Path(__file__).with_name("demo.toml")
-HIDDEN = "drag:scale=0.4"
-LOGS = ("flight1.mcap", "flight2.mcap", "flight3.mcap")
-FLY = f"fly --mission spiral --board {BOARD.name} --effect {HIDDEN}"
+CASE = "case000"
 
 STEPS: tuple[tuple[str, tuple[str, ...]], ...] = (
     (
-        "Three flights of a vehicle that drags 40 % more than its file says, and nobody is told",
-        tuple(f"{FLY} --seed {seed} --log {log}" for seed, log in enumerate(LOGS, start=1)),
+        "Flights of a vehicle with one effect that its file does not know; which one is sealed",
+        ("gap challenge make --out blind --seed 3 --single 1 --none 0 --pairs 0 --unknown 0",),
     ),
-    ("Their logs as run data", (f"log export {' '.join(LOGS)} --out flights",)),
     (
         "The gap: root mean square errors of the nominal model, in tolerances",
-        ("gap measure flights --report gap.html",),
+        (f"gap measure blind/cases/{CASE} --report gap.html",),
     ),
     (
         "The diagnosis: where the model is wrong, which effect causes it, how far the gap shrinks",
-        ("gap diagnose flights --out diagnosis",),
+        (f"gap diagnose blind/cases/{CASE} --out diagnosis",),
     ),
 )
 
@@ -33,7 +35,6 @@ def main() -> int:
     """Run the steps in OUT; returns the exit code of the first that fails, else 0."""
     shutil.rmtree(OUT, ignore_errors=True)
     OUT.mkdir(parents=True)
-    shutil.copy(BOARD, OUT)
     begin = time.monotonic()
     for number, (title, commands) in enumerate(STEPS, start=1):
         print(f"\n{number}. {title}", flush=True)
@@ -42,7 +43,8 @@ def main() -> int:
             done = subprocess.run([sys.executable, "-m", "tools.cli.main", *command.split()], cwd=OUT)
             if done.returncode:
                 return done.returncode
-    print(f"\nHidden was {HIDDEN}. The report: {OUT / 'diagnosis' / 'report.html'} (any browser, no network)")
+    hidden = open_answers(OUT / "blind" / ARCHIVE).cases[CASE]["labels"]
+    print(f"\nThe sealed answer: {', '.join(hidden)}. The report: {OUT / 'diagnosis' / 'report.html'} (opens offline)")
     print(f"{time.monotonic() - begin:.0f} s")
     return 0
 
