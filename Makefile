@@ -6,7 +6,9 @@ STAMP := $(VENV)/.installed
 
 .PHONY: setup demo test check lint types contract benchmark deploy clean
 
+# Kernels are compiled here, with a word about it, and again only when they change.
 setup: $(STAMP)
+	@$(BIN)/glider check --compile
 
 # pip runs again only when the dependencies change.
 $(STAMP): pyproject.toml constraints.txt
@@ -18,8 +20,9 @@ $(STAMP): pyproject.toml constraints.txt
 demo: setup
 	@$(BIN)/python -m tools.measure.demo
 
+# A file's tests stay with one worker: what they share is flown once, and its kernels are compiled once.
 test: setup
-	$(BIN)/python -m pytest -n 2 -m 'not realtime'
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m 'not realtime'
 	$(BIN)/python -m pytest -m realtime
 
 check: setup lint types contract test

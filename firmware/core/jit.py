@@ -122,6 +122,11 @@ def compiled_signatures() -> int:
     return sum(len(getattr(dispatcher, "signatures", ())) for dispatcher in _KERNELS)
 
 
+def kernel_count() -> int:
+    """Number of kernels imported so far, compiled or not."""
+    return len(_KERNELS)
+
+
 def freeze_kernels() -> None:
     """Turn a call with unforeseen types of any kernel that has been called into an error: once the loop is armed."""
     for dispatcher in _KERNELS:

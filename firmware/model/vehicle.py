@@ -33,7 +33,7 @@ PLACES = {
 
 
 class MassTable(Table):
-    """[mass]: kg, m, kg m2 (MODEL.md, Mass)."""
+    """[mass]: kg, m, kg m2 (docs/MODEL.md, Mass)."""
 
     m_t: Mass
     m_r: Mass
@@ -134,7 +134,7 @@ class UncertaintyTable(Table):
 
 
 class TrimTable(Table):
-    """[trim]: what identification found beside the nominal trim; kg, m (MODEL.md, beside the nominal)."""
+    """[trim]: what identification found beside the nominal trim; kg, m (docs/MODEL.md, Beside the nominal)."""
 
     net_mass: Annotated[float, msgspec.Meta(ge=-100.0, le=100.0)] = 0.0
     cg: tuple[Length, Length, Length] = (0.0, 0.0, 0.0)
@@ -174,7 +174,7 @@ class IdentifiedTable(Table):
 
 
 class Vehicle(Table):
-    """A vehicle file (MODEL.md, roughie.toml)."""
+    """A vehicle file (docs/MODEL.md, Vehicle file)."""
 
     format: Annotated[int, msgspec.Meta(ge=1, le=1)]
     name: Annotated[str, msgspec.Meta(min_length=1, max_length=100)]

@@ -15,7 +15,7 @@ SURFACE_PRESSURE = 10  # Pa
 WATER_DENSITY = 11  # kg/m3, the plant's own
 N_E = 12
 
-DISTURBANCE_HOLD = 0.1  # s (MODEL.md)
+DISTURBANCE_HOLD = 0.1  # s (docs/MODEL.md, Motion)
 FLOOR_STIFFNESS = 2000.0  # N/m
 FLOOR_DAMPING = 300.0  # N s/m
 

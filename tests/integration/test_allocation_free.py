@@ -12,7 +12,7 @@ from tools.measure.benchmark.allocations import BOXED, largest_block
 from tools.measure.benchmark.tick import harness, measure_tick
 
 # Seven arrays go into the autopilot's kernel, and each costs a 48-byte handle while the call lasts: 336 bytes, and
-# nothing else of size is alive then. See docs/PERFORMANCE.md.
+# nothing else of size is alive then. See docs/FIGURES.md, Speed.
 PEAK_LIMIT = 400
 
 

@@ -11,6 +11,7 @@ import time
 
 import numpy as np
 import pytest
+from support import commands
 
 from tools.study.campaign.conduct import fly_campaign
 from tools.study.campaign.plan import build_plan, load_campaign, with_options
@@ -153,24 +154,9 @@ def test_what_a_person_sees(tmp_path):
     ],
 )
 def test_bad_input_is_one_line_and_exit_code_2(arguments, said, tmp_path):
-    done = glider(*arguments, cwd=tmp_path)
+    done = commands.glider("campaign", *arguments, cwd=tmp_path)
     assert done.returncode == 2
     assert said in done.stderr
     assert "Traceback" not in done.stderr
     assert done.stdout == ""
     assert list(tmp_path.iterdir()) == []
-
-
-def test_without_its_packages_the_command_says_what_to_install(plan, monkeypatch):
-    from tools.data.errors import MissingExtra
-    from tools.study.campaign.picture import check_installed
-
-    for name in ("joblib", "distributed.comm.addressing", "jinja2"):
-        monkeypatch.setitem(sys.modules, name, None)
-    for call in (
-        lambda: fly_campaign(plan, jobs=2),
-        lambda: fly_campaign(plan, dask="127.0.0.1:8786"),
-        check_installed,
-    ):
-        with pytest.raises(MissingExtra, match=r"pip install 'glider\[campaign\]'"):
-            call()

@@ -9,6 +9,7 @@ import time
 
 import numpy as np
 import pytest
+from support.commands import glider
 from support.patience import patient_vehicle
 
 from firmware.core.control.control_layout import LEG
@@ -101,13 +102,9 @@ def test_a_hidden_difference_shows_in_the_flight():
     assert np.nanmax(np.abs(nominal[:n, 13] - heavy[:n, 13])) > 0.2
 
 
-def glider(*arguments, cwd, **options):
-    command = [sys.executable, "-m", "tools.cli.main", *arguments]
-    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=120, **options)
-
-
 def test_fly_as_a_user_types_it(tmp_path):
-    done = glider("fly", "--mission", "spiral", "--json", cwd=tmp_path)
+    command = [sys.executable, "-m", "tools.cli.main", "fly", "--mission", "spiral", "--json"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
     result = json.loads(done.stdout)
     assert done.returncode == 0
     assert result["completed"]

@@ -1,4 +1,4 @@
-"""What README says of the controllers in the paper's simulations and in rough water, with fewer seeds."""
+"""What docs/FIGURES.md says of the controllers in the paper's simulations and in rough water, with fewer seeds."""
 
 import msgspec
 import numpy as np

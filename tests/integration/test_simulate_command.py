@@ -1,11 +1,11 @@
 """The command `glider simulate`: its files, its exit codes, its one line for what it cannot use."""
 
-import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from support.commands import glider
 
 from tools.cli.common import report_errors
 from tools.cli.main import cli
@@ -155,12 +155,11 @@ def test_a_flight_that_diverges_says_when(simulate):
 
 
 def test_missing_files_get_one_line(tmp_path):
-    glider = [sys.executable, "-m", "tools.cli.main", "simulate"]
     for arguments in (
         [str(tmp_path / "none.csv"), "--out", str(tmp_path / "out.csv")],
         [str(FLIGHT), "--out", str(tmp_path / "no" / "folder" / "out.csv")],
     ):
-        done = subprocess.run([*glider, *arguments], capture_output=True, text=True, check=False)
+        done = glider("simulate", *arguments, cwd=tmp_path)
         assert done.returncode == 2
         assert done.stdout == ""
         assert done.stderr.count("\n") == 1

@@ -20,7 +20,7 @@ def bench(board: str, vehicle: str, script: Path | None, out: Path) -> None:
     """
     from tools.data.errors import InputError, need
 
-    need("prompt_toolkit", "tomlkit", "matplotlib", extra="bench")
+    need("bench")
     from tools.bench.client import Bench
     from tools.bench.console import Console, hang_up_ends
     from tools.data.sources import load_vehicle, read_text

@@ -62,13 +62,15 @@ def campaign(campaign, design, out, jobs, dask, chunk, as_json, **options) -> No
         return
     import msgspec
 
+    from tools.data.errors import need
+
+    need("campaign")
     from tools.study.campaign.conduct import FLIGHTS_FILE, fly_campaign, write_flights
-    from tools.study.campaign.picture import check_installed, write_page
+    from tools.study.campaign.picture import write_page
     from tools.study.campaign.plan import build_plan, load_campaign, with_options
     from tools.study.campaign.store import write_whole
     from tools.study.campaign.summary import summarise
 
-    check_installed()
     wanted, base = load_campaign(campaign)
     given = {KEYS[name]: None if value == () else value for name, value in options.items()}
     wanted = with_options(wanted, given)
@@ -101,7 +103,7 @@ def _make_runs(folder: Path, options: dict[str, Any], as_json: bool) -> None:
     from tools.data.sources import load_vehicle
     from tools.identify.design import grid, truth, write_design
 
-    need("scipy")
+    need("analysis")
     given = [
         name for name, value in options.items() if value not in (None, ()) and name not in ("vehicle", "first_seed")
     ]

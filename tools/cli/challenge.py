@@ -56,9 +56,11 @@ def run(cases: Path, out: Path, only: tuple[str, ...], jobs: int, extra: tuple[s
 
     What stands after `--` is handed on to `gap diagnose`. A case's time counts its whole process.
     """
+    from tools.data.errors import need
     from tools.study.challenge.diagnose_all import count_cases
     from tools.study.challenge.diagnose_all import run as run_all
 
+    need("analysis")
     with progress("diagnosed", len(set(only)) or count_cases(cases)) as advance:
         done, wrong = run_all(cases, out, extra, jobs, advance, only)
     say(f"{done} diagnosed: {out}")
@@ -83,11 +85,11 @@ def score(
     no_closed: bool,
     as_json: bool,
 ) -> None:
-    """Open the sealed answers, check them against the manifest, and score the diagnoses by GAP.md's figures."""
+    """Open the sealed answers, check them against the manifest, and score the diagnoses (docs/CHALLENGE.md)."""
     from tools.data.errors import InputError, need
     from tools.study.challenge.judge import judge
 
-    need("scipy")
+    need("analysis")
     if manifest is not None and not manifest.is_file():
         raise InputError("no such file", source=manifest, column="--manifest")
     with progress("scored", _answered(cases)) as advance:

@@ -7,7 +7,7 @@ from typing import NoReturn
 
 import click
 
-from tools.cli.common import DONE, FAILED, json_option, print_json, say
+from tools.cli.common import DONE, FAILED, json_option, print_json, progress, say
 
 
 @click.command()
@@ -105,13 +105,14 @@ def _stand_by(live: bool, compile_: bool, acknowledge: bool, state: Path | None,
     from hal.state_file import Phase, StateFile
 
     if compile_:
-        from tools.flight.precompile import compile_all
+        from firmware.core.jit import CACHE_DIR
+        from tools.flight.precompile import compile_all, ensure_compiled
 
-        done = compile_all()
+        ensure_compiled(say, progress)
         if as_json:
-            print_json(done)
+            print_json(compile_all())
         else:
-            say(f"{done['kernels']} kernels in {done['folder']}, {done['seconds']:.0f} s")
+            say(f"kernels of a flight: {CACHE_DIR or 'plain Python (GLIDER_JIT=0)'}")
     if acknowledge:
         from tools.flight.keeper import told
 

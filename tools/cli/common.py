@@ -64,7 +64,7 @@ def progress(label: str, total: int, *, bar: bool = True) -> Iterator[Callable[[
 def report_errors(command: click.Command) -> int:
     """Run the command line; turn what a user can cause into one line and exit code 2."""
     from firmware.model.strict import ConfigError
-    from tools.data.errors import InputError, MissingExtra
+    from tools.data.errors import InputError, MissingExtra, missing_extra
 
     try:
         command(standalone_mode=False)
@@ -78,6 +78,12 @@ def report_errors(command: click.Command) -> int:
         return FAILED
     except (ConfigError, InputError, MissingExtra) as error:
         say(f"glider: {error}")
+        return BAD_INPUT
+    except ModuleNotFoundError as error:
+        missing = missing_extra(error)
+        if missing is None:
+            raise
+        say(f"glider: {missing}")
         return BAD_INPUT
     except OSError as error:
         if error.filename is None:

@@ -71,6 +71,7 @@ def fly(
     from hal.state_file import Phase
     from tools.data.errors import InputError
     from tools.flight.compose import build_flight, log_metadata, parse_effects, record_specs
+    from tools.flight.precompile import ensure_compiled
     from tools.flight.terminal import Stop, confirm_arming, undisturbed
 
     wanted = parse_effects(effects)
@@ -80,6 +81,7 @@ def fly(
         )
     except BoardError as error:
         raise InputError(str(error), source=board) from None
+    ensure_compiled(say, progress)
     if flight.control.controller != "pid":
         for axis in flight.cover:
             if not axis.covered:

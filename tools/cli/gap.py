@@ -30,7 +30,7 @@ def measure(case: Path, report: Path | None, as_json: bool) -> None:
     from tools.data.runs.case import load_case
     from tools.gap.assess import assess
 
-    need("scipy", "jinja2")
+    need("analysis")
     with progress("gap", 3) as advance:
         loaded = load_case(case)
         advance(1)
@@ -110,7 +110,7 @@ def diagnose(case: Path, out: Path, without: str | None, as_json: bool) -> None:
     from tools.report.diagnosis import write_report
     from tools.report.words import sentence
 
-    need("scipy", "jinja2")
+    need("analysis")
     loaded = load_case(case)
     done = 0
     with progress("diagnose", STEPS) as advance:
@@ -143,7 +143,7 @@ def report(folder: Path) -> None:
     from tools.report.diagnosis import REPORT, write_report
     from tools.report.words import sentence
 
-    need("jinja2")
+    need("analysis")
     say(sentence(write_report(folder)))
     say(f"report: {folder / REPORT}")
 

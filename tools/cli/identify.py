@@ -27,12 +27,11 @@ def identify(case: Path, out: Path | None, seed: int, likelihood: str, as_json: 
     # The kernels share out the work over the cores; threads of the linear algebra beside them would only wait.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from tools.data.errors import need
+
+    need("identify")
     from tools.data.runs.case import load_case
     from tools.identify.pipeline import identify as run_identification
 
-    need("scipy", "arviz", extra="identify")
-    if out is not None:
-        need("jinja2", "matplotlib", extra="identify")
     found = run_identification(
         load_case(case), seed, likelihood, lambda text: print(text, file=sys.stderr), leave_out=out is not None
     )

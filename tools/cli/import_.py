@@ -47,7 +47,7 @@ def qualisys(files, log, body, vehicle, out, as_json) -> None:
     from tools.data.errors import need
     from tools.data.importers.captured import import_qualisys
 
-    need("scipy")
+    need("analysis")
     written, offsets = import_qualisys(list(files), log, body, vehicle, out)
     for path, offset in zip(files, offsets, strict=True):
         if offset is not None:

@@ -135,17 +135,22 @@ def info(file: Path, as_json: bool) -> None:
 
 
 @log.command()
-@click.argument("source", metavar="FILE", type=click.Path(path_type=Path))
+@click.argument("sources", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for the case; for run data, the log to write.")
 @click.option("--vehicle", help="Vehicle file or name, in place of the log's own.")
 @json_option
-def export(source: Path, out: Path | None, vehicle: str | None, as_json: bool) -> None:
-    """Turn a log into run data (a case folder), or run data (a case's folder or run file) into a log."""
-    if source.is_dir() or source.name.endswith((".csv", ".csv.gz")):
-        files = _to_logs(source, out)
+def export(sources: tuple[Path, ...], out: Path | None, vehicle: str | None, as_json: bool) -> None:
+    """Turn logs into run data (a case folder, a run a log), or run data (a case's folder or run file) into a log."""
+    from tools.data.errors import InputError
+
+    run_data = [source for source in sources if source.is_dir() or source.name.endswith((".csv", ".csv.gz"))]
+    if run_data and len(sources) > 1:
+        raise InputError("run data, which is exported one by one", source=run_data[0])
+    if run_data:
+        files = _to_logs(run_data[0], out)
         result = {"files": [str(path) for path in files], "notes": []}
     else:
-        result = _to_case(source, out, vehicle)
+        result = _to_case(sources, out, vehicle)
     for note in result["notes"]:
         say(note)
     if as_json:
@@ -155,19 +160,19 @@ def export(source: Path, out: Path | None, vehicle: str | None, as_json: bool) -
             click.echo(path)
 
 
-def _to_case(source: Path, out: Path | None, vehicle: str | None) -> dict[str, Any]:
+def _to_case(sources: tuple[Path, ...], out: Path | None, vehicle: str | None) -> dict[str, Any]:
     from tools.data.log.parts import read_flight
     from tools.data.log.rundata import export_case
 
-    the_log = read_flight(source)
-    folder = _case_beside(source) if out is None else out
-    exported = export_case(the_log, folder, vehicle=vehicle)
-    state = [] if the_log.whole else _parts(the_log) or [_state(the_log)]
-    notes = [*state, *exported.notes]
+    logs = [read_flight(source) for source in sources]
+    folder = _case_beside(sources[0]) if out is None else out
+    exported = export_case(logs[0], folder, vehicle=vehicle, more=logs[1:])
+    states = [line for log in logs if not log.whole for line in _parts(log) or [_state(log)]]
+    notes = [*states, *exported.notes]
     return {
         "case": str(folder),
         "files": [str(path) for path in exported.files],
-        "rows": exported.run.rows,
+        "rows": exported.rows,
         "notes": notes,
     }
 

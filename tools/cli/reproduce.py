@@ -21,7 +21,10 @@ def reproduce(figures, vehicle, seeds, noise, out, as_json) -> None:
 
     One picture a figure, FIGURE.png; one JSON object a figure with --json (a list where several are asked for).
     """
+    from tools.data.errors import need
     from tools.data.sources import load_vehicle
+
+    need("identify" if "fig4" in figures else "analysis")
     from tools.study.reproduce.figures import reproduce_circle, reproduce_tracking
 
     the_vehicle = load_vehicle(vehicle)
@@ -30,10 +33,8 @@ def reproduce(figures, vehicle, seeds, noise, out, as_json) -> None:
     for name in figures:
         say(f"{name} ...")
         if name == "fig4":
-            from tools.data.errors import need
             from tools.study.reproduce.fig4 import reproduce_fig4
 
-            need("arviz", "matplotlib", "scipy", extra="identify")
             result = reproduce_fig4(vehicle, the_vehicle, out)
         elif name == "fig7":
             result = reproduce_circle(the_vehicle, seeds, out)

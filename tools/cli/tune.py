@@ -27,12 +27,9 @@ def tune(vehicle: str, method: str, seed: int, budget: int, as_json: bool) -> No
     best under noise, with the rule's beside them; takes minutes. Both end with a [control] table to paste into a
     vehicle or mission file. The reference filters stay as the vehicle has them.
     """
-    from tools.data.errors import MissingExtra
+    from tools.data.errors import need
 
-    try:
-        import scipy  # noqa: F401
-    except ModuleNotFoundError:
-        raise MissingExtra("scipy") from None
+    need("analysis")
     from firmware.model.strict import decode
     from sim_backend.board import SimBoardFile
     from tools.data.sources import load_vehicle

@@ -40,7 +40,7 @@ def twin(board, vehicle, folder, seed, stand, faults, print_sim) -> None:
     if print_sim:
         click.echo(simulated_text(file), nl=False)
         return
-    need("tomlkit", extra="bench")
+    need("bench")
     from tools.bench.boardtext import set_ports
 
     the_vehicle = load_vehicle(vehicle)

@@ -1,5 +1,8 @@
 """The errors a user can cause: one line saying what and where. Anything else is a defect and shows its traceback."""
 
+import functools
+import re
+from importlib import metadata
 from importlib.util import find_spec
 
 
@@ -15,12 +18,31 @@ class InputError(ValueError):
 class MissingExtra(RuntimeError):
     """A command needs packages that the base install leaves out."""
 
-    def __init__(self, package: str, extra: str = "analysis"):
+    def __init__(self, package: str, extra: str):
         super().__init__(f"this command needs {package}: pip install 'glider[{extra}]'")
 
 
-def need(*packages: str, extra: str = "analysis") -> None:
-    """MissingExtra for the first of the packages that is not installed: said before any work is done."""
-    for package in packages:
+@functools.cache
+def extras() -> dict[str, tuple[str, ...]]:
+    """The packages that each extra of pyproject.toml brings, as they are imported."""
+    found: dict[str, tuple[str, ...]] = {}
+    for line in metadata.requires("glider") or ():
+        asked, _, condition = line.partition(";")
+        extra = re.search(r"extra == ['\"](\w+)", condition)
+        if extra and not asked.startswith("glider["):
+            names = re.findall(r"[a-zA-Z][\w-]*", re.split("[<>=!~]", asked)[0])  # dask[distributed] is two
+            found[extra[1]] = (*found.get(extra[1], ()), *(name.replace("-", "_") for name in names))
+    return found
+
+
+def need(extra: str) -> None:
+    """MissingExtra for the first package of an extra that is not installed: said before any work is done."""
+    for package in extras()[extra]:
         if find_spec(package) is None:
             raise MissingExtra(package, extra)
+
+
+def missing_extra(error: ModuleNotFoundError) -> MissingExtra | None:
+    """What to install for an import that failed; None where no extra brings it: then it is a defect."""
+    package = (error.name or "").partition(".")[0]
+    return next((MissingExtra(package, extra) for extra, brought in extras().items() if package in brought), None)

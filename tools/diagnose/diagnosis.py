@@ -1,4 +1,4 @@
-"""The diagnosis of a case: where the simulator is wrong, which effect causes it, how far the gap shrinks."""
+"""The diagnosis of a case: where the simulator is wrong, why, how far the gap shrinks (docs/GAP.md, Answers)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""How far the gap shrinks: windows of runs that were left out of the fit, flown by four models (GAP.md, Measures)."""
+"""How far the gap shrinks: windows of runs left out of the fit, flown by four models (docs/GAP.md, Measures)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

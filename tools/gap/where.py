@@ -1,4 +1,4 @@
-"""Where a gap sits: its square shared out over the parts of the model (GAP.md, Words).
+"""Where a gap sits: its square shared out over the parts of the model (docs/GAP.md, Words).
 
 A first, linear answer. Every direction (tools/gap/directions) is flown once from the windows' fixed starts; the
 difference to the nominal flight is its column. Residuals are weighed by what noise, disturbance and an uncertain start

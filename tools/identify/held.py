@@ -1,4 +1,4 @@
-"""Flights left out of the fit, predicted by the nominal and by the identified model (GAP.md's measure)."""
+"""Flights left out of the fit, predicted by the nominal and by the identified model (docs/GAP.md, Measures)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Runs flown by an identified model, window by window, as GAP.md measures them."""
+"""Runs flown by an identified model, window by window, as they are measured (docs/GAP.md, Measures)."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Channels of the gap: their tolerances, and which recorded columns they are measured in (GAP.md, Measures)."""
+"""Channels of the gap: their tolerances, and which recorded columns they are measured in (docs/GAP.md, Measures)."""
 
 from dataclasses import dataclass
 from math import radians

@@ -1,4 +1,4 @@
-"""What the model says a recorded flight should have been: every window flown on from its start (GAP.md, Measures)."""
+"""What the model says a recorded flight should have been: every window from its start (docs/GAP.md, Measures)."""
 
 from dataclasses import dataclass, field, replace
 

@@ -217,7 +217,7 @@ def pose(case: Case, model: Model | None = None, runs: list[Run] | None = None, 
 
 @dataclass
 class Scored:
-    """Windows of the runs as GAP.md cuts them, in rows of the table."""
+    """Windows of the runs as docs/GAP.md, Windows, cuts them, in rows of the table."""
 
     listed: list[list[Window]]
     first: np.ndarray

@@ -196,7 +196,7 @@ def _share(value: float | None, ci90: tuple[float | None, float | None]) -> str:
 
 
 def report_html(record: Record) -> str:
-    """The page's text; MissingExtra without jinja2."""
+    """The page's text."""
     return render("diagnosis.html", _context(record)).replace(" %", "\N{NO-BREAK SPACE}%")
 
 

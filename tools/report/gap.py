@@ -103,7 +103,7 @@ def _context(found: CaseGap) -> dict[str, Any]:
 
 
 def report_html(found: CaseGap) -> str:
-    """The page's text; MissingExtra without jinja2."""
+    """The page's text."""
     return render("gap.html", _context(found))
 
 

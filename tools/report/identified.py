@@ -150,7 +150,7 @@ def flights(found: Identified) -> list[dict[str, Any]]:
 
 
 def report_html(found: Identified, truth: dict[str, float] | None = None) -> str:
-    """The page's text; MissingExtra without jinja2."""
+    """The page's text."""
     held = None if found.held is None else found.held.plain()
     context = {
         "case": found.case.folder.resolve().name, "vehicle": found.case.vehicle.name, "site": found.case.site,

@@ -3,15 +3,11 @@
 from importlib.resources import files
 from typing import Any
 
-from tools.data.errors import MissingExtra
-
 
 def render(template: str, context: dict[str, Any]) -> str:
-    """The text of a page; MissingExtra without jinja2. Every name that the template uses must be in the context."""
-    try:
-        from jinja2 import Environment, StrictUndefined
-    except ImportError:
-        raise MissingExtra("jinja2") from None
+    """The text of a page. Every name that the template uses must be in the context."""
+    from jinja2 import Environment, StrictUndefined
+
     folder = files("tools.report")
     text = folder.joinpath(template).read_text(encoding="utf-8")
     style = folder.joinpath("page.css").read_text(encoding="utf-8")

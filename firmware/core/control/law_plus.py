@@ -20,7 +20,7 @@ SHARE = 0.3
 
 @kernel
 def reach(position, low, high, rate, time_constant, horizon):
-    """Least and greatest position that an actuator (MODEL.md) may have `horizon` s from now.
+    """Least and greatest position that an actuator (docs/MODEL.md, Actuators) may have `horizon` s from now.
 
     Each the nearer of what its rate and what its lag towards the end of its range allow.
     """

@@ -1,4 +1,4 @@
-"""The nominal actuators (MODEL.md): first-order lag, limited in rate, towards a command limited in range."""
+"""The nominal actuators (docs/MODEL.md, Actuators): a lag limited in rate, towards a command limited in range."""
 
 from firmware.core.jit import kernel
 from firmware.core.vehicle.layout import (

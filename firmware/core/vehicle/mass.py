@@ -1,4 +1,4 @@
-"""Mass properties of the vehicle with its moving masses (MODEL.md, Mass): the first moment S and the inertia Jt."""
+"""Mass properties of a vehicle with moving masses (docs/MODEL.md, Mass): the first moment S and the inertia Jt."""
 
 import math
 

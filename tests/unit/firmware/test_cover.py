@@ -2,14 +2,13 @@
 
 import json
 import math
-import subprocess
-import sys
 
 import msgspec
 import numpy as np
 import pytest
 from law_flights import output_accelerations, plant_rates
 from model_states import state
+from support.commands import glider
 
 from firmware.control.cover import Cover, glides, k2_asked, k2_cover
 from firmware.control.gains import Control, Law, LawGains
@@ -112,10 +111,7 @@ law.pitch = { k1 = 0.8, k2 = 0.0001, k3 = 0.8, eps = 0.1 }
 def test_a_k2_that_does_not_cover_is_a_warning_and_no_error(command, code, tmp_path):
     (tmp_path / "short.toml").write_text(MISSION)
     options = ["--json"] if command == "check" else ["--no-log"]
-    done = subprocess.run(
-        [sys.executable, "-m", "tools.cli.main", command, "--mission", "short.toml", *options],
-        cwd=tmp_path, capture_output=True, text=True,
-    )  # fmt: skip
+    done = glider(command, "--mission", "short.toml", *options, cwd=tmp_path)
     if command == "fly":
         assert "warning: k2 of pitch 0.0001 m, (29) asks" in done.stderr
         assert "k2 of depth" not in done.stderr

@@ -2,8 +2,6 @@
 
 import json
 import math
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -11,6 +9,7 @@ from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from log_files import METADATA, TICK, VEHICLE, tick_rows, write_small_log
+from support.commands import glider
 
 from firmware.model.strict import ConfigError
 from tools.cli.log import log as command
@@ -166,6 +165,24 @@ def test_the_command_goes_both_ways_by_the_kind_of_its_input(small_log, tmp_path
     assert 0 < load_case(tmp_path / "cut").runs[0].rows < 500
 
 
+def test_several_logs_are_one_case_of_several_runs(small_log, tmp_path):
+    second = write_small_log(tmp_path / "second.mcap", tick_rows(60))
+    both = ["export", str(small_log), str(second), "--out", str(tmp_path / "both"), "--json"]
+    done = CliRunner().invoke(command, both)
+    found = json.loads(done.stdout)
+    assert [path.rsplit("/", 1)[1] for path in found["files"]] == ["run00.csv", "run01.csv"]
+    assert found["rows"] == 560
+    assert [run.rows for run in load_case(tmp_path / "both").runs] == [500, 60]
+    elsewhere = write_small_log(tmp_path / "sea.mcap", tick_rows(60), metadata={**METADATA, "site": "sea"})
+    with pytest.raises(InputError, match="site is not that of"):
+        export_case(read_log(small_log), tmp_path / "no", more=[read_log(elsewhere)])
+    heavy = {"vehicle.toml": VEHICLE.replace("m_t = 13.0", "m_t = 13.5")}
+    other = write_small_log(tmp_path / "other.mcap", tick_rows(60), attachments=heavy)
+    with pytest.raises(InputError, match="another vehicle"):
+        export_case(read_log(small_log), tmp_path / "no", more=[read_log(other)])
+    assert not (tmp_path / "no").exists()
+
+
 def test_info_says_what_is_there(small_log, tmp_path):
     result = json.loads(CliRunner().invoke(command, ["info", str(small_log), "--json"]).stdout)
     assert result["complete"] is True
@@ -192,9 +209,7 @@ def test_repair_on_the_command_line(small_log, tmp_path):
 def test_wrong_input_ends_in_one_line_and_code_2(tmp_path):
     (tmp_path / "x.mcap").write_text("no log")
     for arguments in (["info", "x.mcap"], ["export", "nowhere.mcap"], ["repair", "."], ["export", "."]):
-        done = subprocess.run(
-            [sys.executable, "-m", "tools.cli.main", "log", *arguments], cwd=tmp_path, capture_output=True, text=True
-        )
+        done = glider("log", *arguments, cwd=tmp_path)
         assert done.returncode == 2
         assert len(done.stderr.splitlines()) == 1
         assert done.stdout == ""

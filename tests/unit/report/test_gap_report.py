@@ -60,16 +60,6 @@ def test_a_long_case_shows_its_worst_runs(found, monkeypatch):
     assert "1 more run with smaller gaps" in page
 
 
-def test_without_jinja2_it_says_what_to_install(found, monkeypatch):
-    import sys
-
-    from tools.data.errors import MissingExtra
-
-    monkeypatch.setitem(sys.modules, "jinja2", None)
-    with pytest.raises(MissingExtra, match="jinja2"):
-        report_html(found)
-
-
 @pytest.mark.parametrize("width", [500, 1200])  # 500 px is the narrowest window a headless browser opens
 def test_a_browser_shows_it_without_scrolling_sideways(found, tmp_path, width):
     browser = shutil.which("chromium")

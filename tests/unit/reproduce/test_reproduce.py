@@ -1,11 +1,10 @@
 """The paper's figures: pairing, measures against plain recomputation, and what the command prints."""
 
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pytest
+from support.commands import glider
 
 from firmware.control.gains import Control
 from sim_backend.core.closed_loop import TRACE
@@ -127,10 +126,7 @@ def test_missions_of_the_figures_are_sound():
 
 
 def test_the_command_prints_one_object_and_draws_a_picture(tmp_path):
-    done = subprocess.run(
-        [sys.executable, "-m", "tools.cli.main", "reproduce", "fig7", "--seeds", "2", "--json"],
-        cwd=tmp_path, capture_output=True, text=True, timeout=300,
-    )  # fmt: skip
+    done = glider("reproduce", "fig7", "--seeds", "2", "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
     assert {"cases", "noise"} <= set(result)
@@ -138,8 +134,6 @@ def test_the_command_prints_one_object_and_draws_a_picture(tmp_path):
 
 
 def test_a_figure_that_is_not_there_is_refused(tmp_path):
-    done = subprocess.run(
-        [sys.executable, "-m", "tools.cli.main", "reproduce", "fig9"], cwd=tmp_path, capture_output=True, text=True
-    )
+    done = glider("reproduce", "fig9", cwd=tmp_path)
     assert done.returncode == 2
     assert "fig9" in done.stderr

@@ -1,12 +1,14 @@
-"""docs/EFFECTS.md says of every label what the catalogue says."""
+"""docs/EFFECTS.md says of every label what the catalogue says, docs/GAP.md where it belongs."""
 
+import re
 from pathlib import Path
 
 import pytest
 
 from sim_backend.effects.base import catalogue
 
-TEXT = (Path(__file__).parents[3] / "docs" / "EFFECTS.md").read_text(encoding="utf-8")
+DOCS = Path(__file__).parents[3] / "docs"
+TEXT = (DOCS / "EFFECTS.md").read_text(encoding="utf-8")
 ROWS = {line.split("|")[2].strip(): line for line in TEXT.splitlines() if line.startswith("|") and "---" not in line}
 
 
@@ -32,3 +34,16 @@ def test_the_table_has_no_other_label():
 
 def test_every_label_is_said_to_change_something():
     assert all(len(effect.summary) > 10 for effect in catalogue().values())
+
+
+def test_the_words_of_the_gap_have_every_label_in_its_place():
+    table = (DOCS / "GAP.md").read_text(encoding="utf-8").partition("## Words")[2].partition("## Windows")[0]
+    found, subsystem = {}, ""
+    for line in [line for line in table.splitlines() if line.startswith("|")][2:]:
+        first, elements, labels = (cell.strip() for cell in line.strip("|").split("|"))
+        subsystem = first or subsystem
+        places = [(subsystem, element) for element in elements.split(", ")]
+        groups = labels.split("; ") if subsystem == "timing" else labels.split(", ") if len(places) > 1 else [labels]
+        for place, group in zip(places, groups, strict=True):
+            found |= dict.fromkeys(re.findall(r"`(\w+)`", group), place)
+    assert found == {label: (effect.subsystem, effect.element) for label, effect in catalogue().items()}

@@ -4,6 +4,7 @@ The tick record's fields that run data knows become its columns; the others (ref
 their own names, which readers of run data keep and ignore; a simulation's truth follows as `true_*`.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -43,11 +44,12 @@ _UNITS = (("_rad_s", "rad/s"), ("_rad", "rad"), ("_kg", "kg"), ("_m", "m"), ("_s
 
 @dataclass
 class Exported:
-    """Run data out of a log, and what a person should know of it."""
+    """Run data out of a log, and what a person should know of it; of a case, `files` and `rows` of all its runs."""
 
     run: Run
     notes: list[str] = field(default_factory=list)
     files: list[Path] = field(default_factory=list)
+    rows: int = 0
 
 
 def _spread(topic: Topic) -> dict[str, np.ndarray]:
@@ -123,13 +125,24 @@ def run_of(log: Log, name: str = "run00") -> Exported:
     return Exported(Run(name=name, path=None, columns=numbers, extra=extra), notes)
 
 
-def export_case(log: Log, folder: Path, *, vehicle: str | None = None) -> Exported:
-    """Write a log as a case of one run; `vehicle` stands in for the log's own vehicle file.
+def export_case(log: Log, folder: Path, *, vehicle: str | None = None, more: Sequence[Log] = ()) -> Exported:
+    """Write a log as a case's first run, `more` as those after it; `vehicle` stands in for the log's own vehicle file.
 
-    InputError where the log does not say what a case must (and nothing can stand in), or the folder holds a case.
+    InputError where the log does not say what a case must (and nothing can stand in), where one of `more` says
+    something else, or where the folder holds a case.
     """
     exported = run_of(log)
     vehicle_name, vehicle_text = _vehicle(log, vehicle)
+    runs = [exported.run]
+    for other in more:
+        for key in ("site", "log_rate_hz", "water_density_kg_m3"):
+            if other.metadata.get(key) != log.metadata.get(key):
+                raise InputError(f"{key} is not that of {log.path.name}: no run of the same case", source=other.path)
+        if _vehicle(other, vehicle) != (vehicle_name, vehicle_text):
+            raise InputError(f"another vehicle than that of {log.path.name}", source=other.path)
+        found = run_of(other, f"run{len(runs):02d}")
+        runs.append(found.run)
+        exported.notes += [f"{other.path.name}: {note}" for note in found.notes]
     rate = _number(log, "log_rate_hz")
     if rate is None:
         if exported.run.rows < 2:
@@ -144,7 +157,7 @@ def export_case(log: Log, folder: Path, *, vehicle: str | None = None) -> Export
         table = decode(log.attachments[CASE_FILE], CaseTable, f"{log.path}: {CASE_FILE}")
     exported.files = write_case(
         folder,
-        [exported.run],
+        runs,
         vehicle=vehicle_name,
         vehicle_text=vehicle_text,
         site=log.metadata.get("site", ""),
@@ -154,6 +167,7 @@ def export_case(log: Log, folder: Path, *, vehicle: str | None = None) -> Export
         sensors=table.sensors if table else None,
         disturbance=table.disturbance if table else None,
     )
+    exported.rows = sum(run.rows for run in runs)
     return exported
 
 

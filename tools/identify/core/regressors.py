@@ -58,7 +58,7 @@ def momentum_rows(P, attitude, nu, actuators, M, N, K):
 
 @kernel
 def flown_servo(t, commands, low, high, rate, time_constant, out):
-    """The nominal servo under its commands from 0 on, out (rows,), rad: it has no sensor (MODEL.md, Actuators)."""
+    """The nominal servo under its commands from 0 on, out (rows,), rad: it has no sensor (docs/MODEL.md, Actuators)."""
     at = 0.0
     for i in range(len(t)):
         out[i] = at

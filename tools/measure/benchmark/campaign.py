@@ -3,7 +3,8 @@
 import time
 from typing import Any
 
-from tools.data.errors import MissingExtra
+import joblib
+
 from tools.measure.benchmark.registry import Settings
 from tools.measure.benchmark.timing import alternate, median
 from tools.study.campaign.conduct import fly_campaign
@@ -25,10 +26,6 @@ def measure(settings: Settings) -> dict[str, Any]:
 
     The processes are there before: a campaign of minutes starts them once.
     """
-    try:
-        import joblib
-    except ImportError:
-        raise MissingExtra("joblib", "campaign") from None
     plan, cores = build_plan(with_options(load_campaign("robustness")[0], OPTIONS)), joblib.cpu_count()
     fly_all(plan, cores)
     alone, together = alternate(settings.repeats, lambda: fly_all(plan, 1), lambda: fly_all(plan, cores))

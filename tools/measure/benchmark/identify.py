@@ -11,10 +11,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import emcee  # first: the extra that brings it brings all the rest
 import numpy as np
 
 from firmware.model.vehicle import COEFFICIENTS
-from tools.data.errors import need
 from tools.data.runs.case import load_case
 from tools.data.sources import load_vehicle
 from tools.identify.design import write_design
@@ -54,8 +54,6 @@ def ours(statistics: Quadratic) -> float:
 
 def emcee_ess(statistics: Quadratic, white: Whitened, evolving: bool = False) -> float:
     """The affine-invariant ensemble, two walkers a dimension and one pair over; or moves of differential evolution."""
-    import emcee
-
     size = len(statistics.at) + len(statistics.groups)
     walkers = 2 * (size + 1)
     rng = np.random.default_rng(SEED)
@@ -109,8 +107,6 @@ def nuts_ess(statistics: Quadratic, white: Whitened) -> tuple[float, float] | No
 
 def measure(settings: Settings) -> dict[str, Any]:
     """ess_per_s, emcee_ess_per_s, ratio; numpyro_ess_per_s (null where it is not installed); parameters."""
-    need("arviz", "scipy", extra="identify")
-    need("emcee", extra="test")
     statistics = posterior()
     white = whiten(statistics)
     ours(statistics)  # compiles

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from tools.data.errors import MissingExtra
 from tools.report.charts import Chart, Line, svg
 from tools.study.campaign.conduct import Flown
 from tools.study.campaign.store import write_whole
@@ -116,17 +115,8 @@ def _context(flown: Flown) -> dict[str, Any]:
     }
 
 
-def check_installed() -> None:
-    """MissingExtra where the page could not be made: better said before the flights."""
-    try:
-        import jinja2  # noqa: F401
-    except ImportError:
-        raise MissingExtra("jinja2", "campaign") from None
-
-
 def page(flown: Flown) -> str:
     """The page's text."""
-    check_installed()
     from jinja2 import Environment, StrictUndefined
 
     template = files("tools.study.campaign").joinpath("page.html").read_text(encoding="utf-8")

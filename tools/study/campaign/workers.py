@@ -9,10 +9,9 @@ from collections.abc import Generator
 
 import numpy as np
 
-from tools.data.errors import InputError, MissingExtra
+from tools.data.errors import InputError
 from tools.study.campaign.flights import Chunk, Job, compile_loop, fly_chunk
 
-EXTRA = "campaign"
 CONNECT_SECONDS = 10
 WORKER_SECONDS = 60
 Flying = Generator[tuple[Chunk, np.ndarray], None, None]
@@ -25,10 +24,8 @@ def fly_here(job: Job, chunks: list[Chunk], jobs: int) -> Flying:
         for chunk in chunks:
             yield chunk, fly_chunk(job, chunk)
         return
-    try:
-        import joblib
-    except ImportError:
-        raise MissingExtra("joblib", EXTRA) from None
+    import joblib
+
     compile_loop(job.plan)
     parallel = joblib.Parallel(
         n_jobs=jobs or joblib.cpu_count(), backend="loky", return_as="generator_unordered", batch_size=1
@@ -47,10 +44,8 @@ def _in_process(job: Job, chunk: Chunk, parent: int) -> tuple[Chunk, np.ndarray]
 
 def check_reachable(address: str) -> None:
     """InputError where nothing listens at a Dask address, before anything is begun."""
-    try:
-        from distributed.comm.addressing import get_address_host_port
-    except ImportError:
-        raise MissingExtra("dask[distributed]", EXTRA) from None
+    from distributed.comm.addressing import get_address_host_port
+
     try:
         with socket.create_connection(get_address_host_port(address), CONNECT_SECONDS):
             return

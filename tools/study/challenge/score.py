@@ -1,4 +1,4 @@
-"""Answers against the truth: GAP.md's figures by name, each counted as docs/CHALLENGE.md says."""
+"""Answers against the truth: the figures of docs/GAP.md by name, each counted as docs/CHALLENGE.md says."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -122,7 +122,7 @@ class Figure:
     """One line of the result."""
 
     key: str
-    name: str  # as in GAP.md
+    name: str  # as in docs/GAP.md, Figures to reach
     target: float
     at_most: bool
     value: float | None
@@ -229,7 +229,7 @@ def _plain_case(case: Scored) -> dict[str, Any]:
 
 
 def score(cases: Sequence[Scored]) -> Score:
-    """Every figure of GAP.md over the cases."""
+    """Every figure of docs/GAP.md over the cases."""
     figures = [_share(share, cases) for share in SHARES]
     losses = [case.log_loss() for case in cases]
     closed = [case.closed for case in cases if case.closed is not None]

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from tools.data.errors import MissingExtra
 from tools.study.reproduce import circle, tracking
 from tools.study.reproduce.design import Batch
 
@@ -14,10 +13,8 @@ NAMES = {"law": "law", "hybrid": "hybrid", "pid": "PID by rule", "pid_tuned": "P
 
 
 def _figure(**options: Any):
-    try:
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise MissingExtra("matplotlib") from None
+    from matplotlib.figure import Figure
+
     return Figure(layout="constrained", **options)
 
 
