@@ -143,7 +143,7 @@ def report(folder: Path) -> None:
     from tools.report.diagnosis import REPORT, write_report
     from tools.report.words import sentence
 
-    need("jinja2")
+    need("analysis")
     say(sentence(write_report(folder)))
     say(f"report: {folder / REPORT}")
 

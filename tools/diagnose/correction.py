@@ -2,7 +2,7 @@
 
 Where no effect of the catalogue explains a gap, the link whose probe gains most is given an error of its own: a sum
 of shapes (constant, speed, depth, angles of flow, rates, running pump, time, climb or dive) with coefficients fitted as
-those of an effect are. It is no cause, but it says what the gap goes with, and by how much the gap would shrink.
+those of an effect are. It is no cause, but says what the gap is correlated with, and by how much the gap would shrink.
 """
 
 from collections.abc import Callable

@@ -105,7 +105,7 @@ def learn(diagnosis: Diagnosis, say: Callable[[str], None]) -> None:
 
 
 def unexplained(diagnosis: Diagnosis) -> dict[str, Any] | None:
-    """The `unknown` entry of diagnosis.json: channel, axis and what the gap goes with, and its correction."""
+    """The `unknown` entry of diagnosis.json: channel, strongest correlation, and its correction."""
     if diagnosis.verdict != "unknown":
         return None
     strongest, goes = strongest_left(diagnosis.answer.findings)

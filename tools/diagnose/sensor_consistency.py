@@ -1,4 +1,4 @@
-"""Readings that contradict each other: sensors and clocks so far out that no motion of the vehicle reconciles them.
+"""Sensor consistency: sensors and clocks so far out that no motion of the vehicle reconciles them.
 
 With the disturbance inflated a hundredfold the filter lets the vehicle move as it likes: what it then misses by far, no
 force explains. One run, the one that misses most, is filtered again with each parameter of each sensor's and of motion
@@ -26,7 +26,7 @@ def mean_nis(problem: Problem, gains: Gains) -> float:
 
 
 def suspects(candidates: dict[str, list[FreeParameter]]) -> list[FreeParameter]:
-    """The parameters of the labels by which readings contradict each other."""
+    """The parameters of the labels of sensors and of motion capture's clock."""
     effects = catalogue()
     return [
         free

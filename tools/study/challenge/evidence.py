@@ -9,7 +9,7 @@ from tools.inference.channels import channels_of, measured
 from tools.study.challenge.trial import Flight, Trial
 
 THIN = 5  # rows
-MEMORY = 20.0  # rows over which a gap hangs together: as many count as one
+MEMORY = 20.0  # rows over which a gap is autocorrelated: as many count as one
 STEPS = 6  # of the search, its Jacobian kept
 BIASES = 9
 
