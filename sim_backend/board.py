@@ -12,7 +12,7 @@ from hal.clocks import MonotonicClock
 from hal.ports import SLOTS, Condition, Validity
 from hal.recorder.schema import Field, RecordSpec
 from sim_backend.core.world import write_truth
-from sim_backend.effects.base import check_board
+from sim_backend.effects.catalogue import check_board
 from sim_backend.world import Environment, SampledSensors, Start, World, build_world
 
 TRUTH = RecordSpec(

@@ -15,8 +15,8 @@ from firmware.model.vehicle import Vehicle
 from hal.ports import empty_frame
 from sim_backend.core import effect_layout, layout
 from sim_backend.core import world as core
-from sim_backend.effects.base import apply_effects
-from sim_backend.waves import wave_row
+from sim_backend.core.environment import wave_row
+from sim_backend.effects.catalogue import apply_effects
 
 PLANT_STEP = 0.01  # s
 SpeedPair = tuple[float, float]
@@ -99,7 +99,7 @@ class World:
     counters: np.ndarray = field(default_factory=lambda: np.zeros(layout.N_C, dtype=np.int64))
     ring: np.ndarray = field(default_factory=lambda: np.zeros((layout.N_SENSORS, layout.RING, layout.RING_WIDTH)))
     frame: np.ndarray = field(default_factory=empty_frame)
-    folded: np.ndarray = field(default_factory=lambda: np.zeros(N_P))
+    effective: np.ndarray = field(default_factory=lambda: np.zeros(N_P))
     work: np.ndarray = field(default_factory=lambda: np.zeros((layout.N_WORK, layout.WORK_WIDTH)))
 
     def __post_init__(self):
@@ -114,7 +114,7 @@ class World:
         """Move to t_end (s), under the commands in self.cmd; samples that have arrived are in self.frame."""
         return core.advance(
             self.P, self.F, self.E, self.waves, self.sensors, self.errors, self.seed, self.x, self.cmd, self.acc,
-            self.counters, self.ring, self.queue, self.frame, self.folded, self.work, self.dt, t_end,
+            self.counters, self.ring, self.queue, self.frame, self.effective, self.work, self.dt, t_end,
         )  # fmt: skip
 
 
@@ -151,7 +151,7 @@ def build_world(
     E = np.zeros(layout.N_E)
     E[layout.CURRENT_N], E[layout.CURRENT_E] = environment.current_m_s
     E[layout.SHEAR_N], E[layout.SHEAR_E] = environment.shear_1_s
-    E[layout.SURFACE_HEIGHT] = 0.16 if environment.surface else 0.0
+    E[layout.SURFACE_HEIGHT] = layout.HULL_HEIGHT if environment.surface else 0.0
     E[layout.FLOOR_DEPTH] = environment.floor_m
     linear, angular = environment.disturbance_linear, environment.disturbance_angular
     E[layout.ACC_LINEAR] = vehicle.disturbance.linear if linear is None else linear

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sim_backend.effects.base import catalogue
+from sim_backend.effects.catalogue import catalogue
 from tools.diagnose.probes import TURBULENCE, WAVES, Probe, Probed, probe_model, probes
 from tools.diagnose.search import Search
 from tools.diagnose.verdict import instead

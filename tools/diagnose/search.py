@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim_backend.effects.base import catalogue
+from sim_backend.effects.catalogue import catalogue
 from tools.diagnose.contradiction import LEAPS, NEAR, NEARER, contradicting
 from tools.diagnose.retime import retimed
 from tools.inference.candidates import CLOCK_PLACE, Free, allowed, candidates, place

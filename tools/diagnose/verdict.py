@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim_backend.effects.base import catalogue
+from sim_backend.effects.catalogue import catalogue
 from tools.diagnose.doubt import UNCLEAN, clock_label, disorder, doubt, left_share, what_is_left
 from tools.diagnose.probes import CLOCK, UNPREDICTABLE, Probed, raised
 from tools.diagnose.residuals import Finding, tests, worst

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from sim_backend.effects.base import catalogue
+from sim_backend.effects.catalogue import catalogue
 from tools.diagnose import doubt
 from tools.diagnose import verdict as rules
 from tools.diagnose.chain import Link, by_effects, calm, links, ordered, scatter, shared_out

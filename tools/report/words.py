@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from sim_backend.effects.base import catalogue
+from sim_backend.effects.catalogue import catalogue
 from tools.diagnose.diagnosis import Diagnosis, places
 from tools.diagnose.doubt import UNCLEAN
 from tools.diagnose.probes import TURBULENCE, UNPREDICTABLE

@@ -5,7 +5,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from sim_backend.effects.base import catalogue
+from sim_backend.effects.catalogue import catalogue
 from tools.diagnose.chain import LEAST, STAGES, Link, ordered, shared_out, stage_of
 from tools.diagnose.probes import Probe, Probed
 from tools.report.chain_picture import chain_svg

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sim_backend.effects.base import catalogue
+from sim_backend.effects.catalogue import catalogue
 from tools.diagnose.diagnosis import Diagnosis
 from tools.diagnose.probes import CLOCK, TURBULENCE, Probe, Probed
 from tools.diagnose.residuals import CHANNELS, Finding

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from sim_backend.effects.base import catalogue
+from sim_backend.effects.catalogue import catalogue
 
 TEXT = (Path(__file__).parents[3] / "docs" / "EFFECTS.md").read_text(encoding="utf-8")
 ROWS = {line.split("|")[2].strip(): line for line in TEXT.splitlines() if line.startswith("|") and "---" not in line}
