@@ -6,9 +6,11 @@ import numpy as np
 
 from firmware.control.gains import Control
 from firmware.core.control import autopilot as core
-from firmware.core.control import control_layout as layout
+from firmware.core.control import control_layout as ctl
+from firmware.core.control.controllers import CONTROLLERS
 from firmware.core.control.guidance import abort
 from firmware.core.estimation.estimator_layout import COMMANDED
+from firmware.core.estimation.sensing import longest_age
 from firmware.core.vehicle.seawater import STANDARD_PRESSURE
 from firmware.estimation.settings import estimator_settings, first_spread, parameter_sigma
 from firmware.guidance.mission import Mission
@@ -17,18 +19,17 @@ from firmware.model.vehicle import Vehicle
 from firmware.supervisor.table import FAULTS
 from hal.ports import empty_frame
 
-MODES = {layout.WAITING: "waiting", layout.FLYING: "flying", layout.COMPLETED: "completed", layout.ABORTED: "aborted"}
+MODES = {ctl.WAITING: "waiting", ctl.FLYING: "flying", ctl.COMPLETED: "completed", ctl.ABORTED: "aborted"}
 REASONS = {
-    layout.REASON_NONE: "",
-    layout.REASON_LEG_TIME: "leg over its time limit",
-    layout.REASON_MISSION_TIME: "mission over its time limit",
-    layout.REASON_IMU: "no attitude",
-    layout.REASON_BEACON: "no depth",
-    layout.REASON_TOO_DEEP: "deeper than the site",
-    layout.REASON_OPERATOR: "asked to by the operator",
+    ctl.REASON_NONE: "",
+    ctl.REASON_LEG_TIME: "leg over its time limit",
+    ctl.REASON_MISSION_TIME: "mission over its time limit",
+    ctl.REASON_IMU: "no attitude",
+    ctl.REASON_BEACON: "no depth",
+    ctl.REASON_TOO_DEEP: "deeper than the site",
+    ctl.REASON_OPERATOR: "asked to by the operator",
 }
-ESTIMATORS = {"measured": layout.MEASURED, "filter": layout.FILTERED, "given": layout.GIVEN}
-CONTROLLERS = {"pid": layout.PID, "law": layout.LAW, "hybrid": layout.HYBRID, "law+": layout.LAW_PLUS}
+ESTIMATORS = {"measured": ctl.MEASURED, "filter": ctl.FILTERED, "given": ctl.GIVEN}
 SURFACED = 0.3  # m; shallower than this counts as at the surface
 
 
@@ -41,20 +42,20 @@ def configuration(
     surface_pressure: float = STANDARD_PRESSURE,
     abort_age: float = 1.0,
 ) -> np.ndarray:
-    """The configuration vector C, shape (layout.N_C,).
+    """The configuration vector C, shape (ctl.N_C,).
 
     Gains come from the mission, else the vehicle, else the defaults. `periods` are the sensors' sample periods in s
-    (imu, beacon, wires): a sample older than three of them, plus a tick, is not used.
+    (imu, beacon, wires); core/estimation/sensing, longest_age.
     """
     control = mission.control or vehicle.control or Control()
-    C = np.zeros(layout.N_C)
-    C[layout.DT] = dt
+    C = np.zeros(ctl.N_C)
+    C[ctl.DT] = dt
     for name, gains in (("PITCH", control.pitch), ("DEPTH", control.depth)):
-        C[getattr(layout, f"{name}_KP")] = gains.kp
-        C[getattr(layout, f"{name}_KI")] = gains.ki
-        C[getattr(layout, f"{name}_KD")] = gains.kd
-    C[layout.ROLL_KP], C[layout.ROLL_KD] = control.roll.kp, control.roll.kd
-    C[layout.HEADING_KP], C[layout.HEADING_KD] = control.heading.kp, control.heading.kd
+        C[getattr(ctl, f"{name}_KP")] = gains.kp
+        C[getattr(ctl, f"{name}_KI")] = gains.ki
+        C[getattr(ctl, f"{name}_KD")] = gains.kd
+    C[ctl.ROLL_KP], C[ctl.ROLL_KD] = control.roll.kp, control.roll.kd
+    C[ctl.HEADING_KP], C[ctl.HEADING_KD] = control.heading.kp, control.heading.kd
     for name, reference in (
         ("PITCH", control.pitch.reference),
         ("DEPTH", control.depth.reference),
@@ -63,40 +64,40 @@ def configuration(
         wn = reference.wn
         if wn * dt > 0.5:
             raise ConfigError(mission.name, f"{wn} rad/s is too fast for a step of {dt} s", key="reference.wn")
-        C[getattr(layout, f"{name}_WN")] = wn
-        C[getattr(layout, f"{name}_ZETA")] = reference.zeta
-    C[layout.DEPTH_FILTER_WN] = control.depth.rate_bandwidth
-    C[layout.MAX_AGE_IMU] = 3.0 * periods["imu"] + dt
-    C[layout.MAX_AGE_BEACON] = 3.0 * periods["beacon"] + dt
-    C[layout.MAX_AGE_WIRE] = 3.0 * periods["wires"] + dt
-    C[layout.ABORT_AGE] = abort_age
-    C[layout.SALINITY] = mission.site.salinity
-    C[layout.SURFACE_PRESSURE] = surface_pressure
-    C[layout.SITE_DEPTH] = mission.site.depth_m
-    C[layout.MISSION_TIME_LIMIT] = mission.time_limit_s
-    C[layout.ESTIMATOR] = ESTIMATORS[control.estimator]
-    C[layout.CONTROLLER] = CONTROLLERS[control.controller]
+        C[getattr(ctl, f"{name}_WN")] = wn
+        C[getattr(ctl, f"{name}_ZETA")] = reference.zeta
+    C[ctl.DEPTH_FILTER_WN] = control.depth.rate_bandwidth
+    C[ctl.MAX_AGE_IMU] = longest_age(periods["imu"], dt)
+    C[ctl.MAX_AGE_BEACON] = longest_age(periods["beacon"], dt)
+    C[ctl.MAX_AGE_WIRE] = longest_age(periods["wires"], dt)
+    C[ctl.ABORT_AGE] = abort_age
+    C[ctl.SALINITY] = mission.site.salinity
+    C[ctl.SURFACE_PRESSURE] = surface_pressure
+    C[ctl.SITE_DEPTH] = mission.site.depth_m
+    C[ctl.MISSION_TIME_LIMIT] = mission.time_limit_s
+    C[ctl.ESTIMATOR] = ESTIMATORS[control.estimator]
+    C[ctl.CONTROLLER] = CONTROLLERS[control.controller].number
     law = control.law_flown
-    C[layout.FORM] = layout.PAPER if law.form == "paper" else layout.EXACT
-    C[layout.OBSERVER_SHARE] = law.observer_share
+    C[ctl.FORM] = ctl.PAPER if law.form == "paper" else ctl.EXACT
+    C[ctl.OBSERVER_SHARE] = law.observer_share
     for name, table in (("PITCH", law.pitch), ("DEPTH", law.depth)):
         for gain in ("k1", "k2", "k3", "eps"):
-            C[getattr(layout, f"{name}_{gain.upper()}")] = getattr(table, gain)
+            C[getattr(ctl, f"{name}_{gain.upper()}")] = getattr(table, gain)
     for gain in ("roughness", "pitch", "depth"):
         for edge in ("on", "off"):
-            C[getattr(layout, f"HYBRID_{gain}_{edge}".upper())] = getattr(control.hybrid, f"{gain}_{edge}")
-    C[layout.HYBRID_DWELL] = control.hybrid.dwell_s
+            C[getattr(ctl, f"HYBRID_{gain}_{edge}".upper())] = getattr(control.hybrid, f"{gain}_{edge}")
+    C[ctl.HYBRID_DWELL] = control.hybrid.dwell_s
     return C
 
 
 def filter_memory(vehicle: Vehicle) -> np.ndarray:
-    """The Kalman filter's vector nav, shape (layout.N_NAV,), with what the vehicle file says of sensors and errors."""
+    """The Kalman filter's vector nav, shape (ctl.N_NAV,), with what the vehicle file says of sensors and errors."""
     P = vehicle.vector()
-    nav = np.zeros(layout.N_NAV)
+    nav = np.zeros(ctl.N_NAV)
     for start, values in (
-        (layout.NAV_SETTINGS, estimator_settings(vehicle.sensors, vehicle.disturbance)),
-        (layout.NAV_SIGMA, parameter_sigma(P, vehicle.uncertainty)),
-        (layout.NAV_SPREAD, first_spread(P, COMMANDED, (True, True, True))),
+        (ctl.NAV_SETTINGS, estimator_settings(vehicle.sensors, vehicle.disturbance)),
+        (ctl.NAV_SIGMA, parameter_sigma(P, vehicle.uncertainty)),
+        (ctl.NAV_SPREAD, first_spread(P, COMMANDED, (True, True, True))),
     ):
         nav[start : start + len(values)] = values
     return nav
@@ -110,8 +111,8 @@ class Autopilot:
         self.C = C
         self.legs = mission.matrix(vehicle, source)
         self.frame = empty_frame()
-        self.est = np.zeros(layout.N_EST)
-        self.ap = np.zeros(layout.N_AP)
+        self.est = np.zeros(ctl.N_EST)
+        self.ap = np.zeros(ctl.N_AP)
         self.nav = filter_memory(vehicle)
         self.commands = np.zeros(3)
         core.reset(self.est, self.ap, self.nav)
@@ -123,20 +124,20 @@ class Autopilot:
 
     @property
     def mode(self) -> str:
-        return MODES[float(self.ap[layout.MODE])]
+        return MODES[float(self.ap[ctl.MODE])]
 
     @property
     def reason(self) -> str:
         """Why the dive was given up, with the leg; empty if it was not."""
-        code = float(self.ap[layout.REASON])
-        if code > layout.REASON_FAULT:
-            row = int(code - layout.REASON_FAULT)
-            return f"fault {row}: {FAULTS[row].name}"
+        code = float(self.ap[ctl.REASON])
+        if code > ctl.REASON_FAULT:
+            row = int(code - ctl.REASON_FAULT)
+            return f"fault {row}: {FAULTS[row]}"
         reason = REASONS[code]
-        if self.ap[layout.REASON] == layout.REASON_LEG_TIME:
-            row = int(self.ap[layout.LEG])
-            target, turn = self.legs[row, layout.LEG_DEPTH], self.legs[row, layout.LEG_TURNED]
-            limit = self.legs[row, layout.LEG_TIME_LIMIT]
+        if self.ap[ctl.REASON] == ctl.REASON_LEG_TIME:
+            row = int(self.ap[ctl.LEG])
+            target, turn = self.legs[row, ctl.LEG_DEPTH], self.legs[row, ctl.LEG_TURNED]
+            limit = self.legs[row, ctl.LEG_TIME_LIMIT]
             missed = f"not at {target:g} m" if math.isfinite(target) else f"not turned by {math.degrees(turn):g} deg"
             return f"leg {row + 1}: {missed} within {limit:g} s"
         return reason
@@ -144,26 +145,26 @@ class Autopilot:
     @property
     def finished(self) -> bool:
         """True once the mission is completed or given up."""
-        return bool(self.ap[layout.MODE] >= layout.COMPLETED)
+        return bool(self.ap[ctl.MODE] >= ctl.COMPLETED)
 
     @property
     def surfaced(self) -> bool:
         """True where the vehicle is at the surface, by its own depth."""
-        return bool(self.est[layout.EST_DEPTH] < SURFACED)
+        return bool(self.est[ctl.EST_DEPTH] < SURFACED)
 
     def give_up(self) -> None:
         """Abort, as the operator wishes: ballast out, nose up, to the surface."""
-        abort(self.ap, layout.REASON_OPERATOR)
+        abort(self.ap, ctl.REASON_OPERATOR)
 
     def rms_errors(self) -> dict[str, float | None]:
         """Rms of estimate less reference while flying: depth_m, pitch_rad, roll_rad; None where not controlled."""
-        depth, attitude = self.ap[layout.COUNT_DEPTH], self.ap[layout.COUNT_ATTITUDE]
+        depth, attitude = self.ap[ctl.COUNT_DEPTH], self.ap[ctl.COUNT_ATTITUDE]
 
         def rms(total: float, count: float) -> float | None:
             return math.sqrt(total / count) if count else None
 
         return {
-            "depth_m": rms(self.ap[layout.SUM_DEPTH], depth),
-            "pitch_rad": rms(self.ap[layout.SUM_PITCH], attitude),
-            "roll_rad": rms(self.ap[layout.SUM_ROLL], attitude),
+            "depth_m": rms(self.ap[ctl.SUM_DEPTH], depth),
+            "pitch_rad": rms(self.ap[ctl.SUM_PITCH], attitude),
+            "roll_rad": rms(self.ap[ctl.SUM_ROLL], attitude),
         }

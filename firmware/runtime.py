@@ -133,7 +133,7 @@ class Runtime:
         record.fill_record(
             autopilot.frame, autopilot.est, autopilot.ap, commands, t, lateness, self._last_duration, channel.values
         )
-        self._shed = (self._shed + 1) % SHED if G[sup.ASKED + 24] >= sup.HOLD else 0
+        self._shed = (self._shed + 1) % SHED if G[sup.ASKED + sup.FAULT_OVERRUN] >= sup.HOLD else 0
         if not self._shed:
             channel.commit(t)
         for extra in self.extras:

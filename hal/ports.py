@@ -62,6 +62,7 @@ class Condition(IntEnum):
 IMU, BEACON, SLIDER_WIRE, PLUNGER_WIRE, LEAK, BATTERY = 0, 8, 12, 15, 18, 21
 SERVO, SLIDER, BALLAST = 24, 27, 30
 FRAME_SIZE = 33
+STALE_PERIODS = 3.0  # of a sensor; an older sample counts for nothing
 
 SLOTS = {
     "imu": Slot(IMU, ("roll", "pitch", "yaw", "p", "q", "r"), ("rad",) * 3 + ("rad/s",) * 3),

@@ -8,12 +8,14 @@ import msgspec
 import numpy as np
 
 from firmware.core.maths.rotations import quaternion_from_euler
+from firmware.core.supervision import supervisor_layout as sup
 from firmware.core.vehicle.layout import N_P, X_ACT, X_NU, X_POS, X_QUAT
 from firmware.core.vehicle.seawater import STANDARD_PRESSURE, water_density
 from firmware.model.strict import Table
 from firmware.model.vehicle import Vehicle
 from hal.ports import empty_frame
-from sim_backend.core import effect_layout, layout
+from sim_backend.core import effect_layout as ef
+from sim_backend.core import layout as wl
 from sim_backend.core import world as core
 from sim_backend.core.environment import wave_row
 from sim_backend.effects.catalogue import apply_effects
@@ -71,7 +73,7 @@ class Start(Table):
 
 
 def _wave_rows(waves: list[Wave]) -> np.ndarray:
-    rows = np.zeros((len(waves), layout.N_WAVE))
+    rows = np.zeros((len(waves), wl.N_WAVE))
     for row, wave in zip(rows, waves, strict=True):
         direction, phase = math.radians(wave.direction_deg), math.radians(wave.phase_deg)
         row[:] = wave_row(0.5 * wave.height_m, 2.0 * math.pi / wave.period_s, direction, phase)
@@ -93,22 +95,22 @@ class World:
     seed: np.uint64
     x: np.ndarray
     dt: float = PLANT_STEP
-    F: np.ndarray = field(default_factory=lambda: np.zeros(effect_layout.N_F))
+    F: np.ndarray = field(default_factory=lambda: np.zeros(ef.N_F))
     cmd: np.ndarray = field(default_factory=lambda: np.zeros(3))
     acc: np.ndarray = field(default_factory=lambda: np.zeros(6))
-    counters: np.ndarray = field(default_factory=lambda: np.zeros(layout.N_C, dtype=np.int64))
-    ring: np.ndarray = field(default_factory=lambda: np.zeros((layout.N_SENSORS, layout.RING, layout.RING_WIDTH)))
+    counters: np.ndarray = field(default_factory=lambda: np.zeros(wl.N_COUNTERS, dtype=np.int64))
+    ring: np.ndarray = field(default_factory=lambda: np.zeros((wl.N_SAMPLED, wl.DELAY_SLOTS, wl.DELAY_WIDTH)))
     frame: np.ndarray = field(default_factory=empty_frame)
     effective: np.ndarray = field(default_factory=lambda: np.zeros(N_P))
-    work: np.ndarray = field(default_factory=lambda: np.zeros((layout.N_WORK, layout.WORK_WIDTH)))
+    work: np.ndarray = field(default_factory=lambda: np.zeros((wl.N_WORK, wl.WORK_WIDTH)))
 
     def __post_init__(self):
-        self.counters[layout.C_HOLD] = -1
-        self.queue = np.zeros((math.ceil(layout.LONGEST_DELAY / self.dt) + 2, 3))  # commands of the past
+        self.counters[wl.C_HOLD] = -1
+        self.queue = np.zeros((math.ceil(wl.LONGEST_DELAY / self.dt) + 2, 3))  # commands of the past
 
     @property
     def time(self) -> float:
-        return float(self.counters[layout.C_STEP]) * self.dt
+        return float(self.counters[wl.C_STEP]) * self.dt
 
     def advance(self, t_end: float) -> float:
         """Move to t_end (s), under the commands in self.cmd; samples that have arrived are in self.frame."""
@@ -120,7 +122,7 @@ class World:
 
 def start_state(start: Start) -> np.ndarray:
     """State (N_XF,) of a vehicle at rest or gliding ahead, actuators neutral, plays centred, no reading behind."""
-    x = np.zeros(effect_layout.N_XF)
+    x = np.zeros(ef.N_XF)
     x[X_POS + 2] = start.depth_m
     x[X_QUAT : X_QUAT + 4] = quaternion_from_euler(0.0, math.radians(start.pitch_deg), math.radians(start.heading_deg))
     x[X_NU] = start.surge_m_s
@@ -132,7 +134,7 @@ def sensor_errors(vehicle: Vehicle, rng: np.random.Generator) -> np.ndarray:
     """Bias (drawn, row 0) and white noise (row 1) of the nine measured values, shape (2, N_ERRORS)."""
     tables = vehicle.sensors
     rows = [tables.attitude] * 3 + [tables.gyro] * 3 + [tables.depth, tables.slider, tables.ballast]
-    errors = np.zeros((2, layout.N_ERRORS))
+    errors = np.zeros((2, wl.N_ERRORS))
     errors[0] = [table.bias * rng.standard_normal() for table in rows]
     errors[1] = [table.noise for table in rows]
     return errors
@@ -148,20 +150,20 @@ def build_world(
 ) -> World:
     """A world from its description; the same arguments give the same flight, bit for bit on one machine."""
     rng = np.random.default_rng(np.random.SeedSequence([seed, 1]))
-    E = np.zeros(layout.N_E)
-    E[layout.CURRENT_N], E[layout.CURRENT_E] = environment.current_m_s
-    E[layout.SHEAR_N], E[layout.SHEAR_E] = environment.shear_1_s
-    E[layout.SURFACE_HEIGHT] = layout.HULL_HEIGHT if environment.surface else 0.0
-    E[layout.FLOOR_DEPTH] = environment.floor_m
+    E = np.zeros(wl.N_ENV)
+    E[wl.ENV_CURRENT_N], E[wl.ENV_CURRENT_E] = environment.current_m_s
+    E[wl.ENV_SHEAR_N], E[wl.ENV_SHEAR_E] = environment.shear_1_s
+    E[wl.ENV_SURFACE_HEIGHT] = wl.HULL_HEIGHT if environment.surface else 0.0
+    E[wl.ENV_FLOOR_DEPTH] = environment.floor_m
     linear, angular = environment.disturbance_linear, environment.disturbance_angular
-    E[layout.ACC_LINEAR] = vehicle.disturbance.linear if linear is None else linear
-    E[layout.ACC_ANGULAR] = vehicle.disturbance.angular if angular is None else angular
-    E[layout.TEMPERATURE_C], E[layout.SALINITY] = environment.temperature_c, environment.salinity
-    E[layout.SURFACE_PRESSURE] = STANDARD_PRESSURE
-    E[layout.WATER_DENSITY] = water_density(0.0, environment.temperature_c, environment.salinity)
-    table = np.zeros((layout.N_SENSORS, layout.N_SENSOR_FIELDS))
-    for row, name in ((layout.S_IMU, "imu"), (layout.S_BEACON, "beacon"), (layout.S_SLIDER, "slider_wire"),
-                      (layout.S_PLUNGER, "plunger_wire")):  # fmt: skip
+    E[wl.ENV_ACC_LINEAR] = vehicle.disturbance.linear if linear is None else linear
+    E[wl.ENV_ACC_ANGULAR] = vehicle.disturbance.angular if angular is None else angular
+    E[wl.ENV_TEMPERATURE_C], E[wl.ENV_SALINITY] = environment.temperature_c, environment.salinity
+    E[wl.ENV_SURFACE_PRESSURE] = STANDARD_PRESSURE
+    E[wl.ENV_WATER_DENSITY] = water_density(0.0, environment.temperature_c, environment.salinity)
+    table = np.zeros((wl.N_SAMPLED, wl.N_SENSOR_FIELDS))
+    for row, name in ((sup.SENSOR_IMU, "imu"), (sup.SENSOR_BEACON, "beacon"), (sup.SENSOR_SLIDER, "slider_wire"),
+                      (sup.SENSOR_PLUNGER, "plunger_wire")):  # fmt: skip
         sensor = getattr(sensors, name)
         table[row] = 1.0 / sensor.rate_hz, sensor.delay_s
     world = World(

@@ -15,10 +15,10 @@ from firmware.core.control.law import OK, pitch_depth_law
 from firmware.core.control.law_plus import reach
 from firmware.core.maths.rotations import euler_from_quaternion, rotation_nb
 from firmware.core.vehicle import layout
-from sim_backend.core.layout import N_E, N_WAVE
+from sim_backend.core.layout import N_ENV, N_WAVE
 from sim_backend.core.plant import derivative, plant_step
 
-STILL, NO_WAVES, NO_DISTURBANCE = np.zeros(N_E), np.zeros((0, N_WAVE)), np.zeros(6)
+STILL, NO_WAVES, NO_DISTURBANCE = np.zeros(N_ENV), np.zeros((0, N_WAVE)), np.zeros(6)
 SLIDER, BALLAST = layout.X_ACT + 1, layout.X_ACT + 2
 STANDING = (0.0, 0.0, 0.0)  # actuators' speeds
 TICK = 0.02  # s

@@ -1,10 +1,16 @@
 """Gains of the baseline controllers: read from the vehicle or the mission file, the mission's word counting first."""
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import msgspec
 
+from firmware.core.control.controllers import CONTROLLERS
 from firmware.model.strict import Table
+
+if TYPE_CHECKING:
+    Name = str
+else:
+    Name = Literal[tuple(CONTROLLERS)]
 
 NonNegative = Annotated[float, msgspec.Meta(ge=0.0, le=1e4)]
 Bandwidth = Annotated[float, msgspec.Meta(gt=0.0, le=10.0)]
@@ -118,19 +124,20 @@ class Control(Table):
     roll: RollGains = RollGains()
     heading: HeadingGains = HeadingGains()
     estimator: Literal["measured", "filter"] = "filter"
-    controller: Literal["pid", "law", "hybrid", "law+"] = "pid"
+    controller: Name = "pid"
     law: Law = Law()
     law_plus: LawPlus = LawPlus()
     hybrid: HybridTable = HybridTable()
 
     def __post_init__(self):
-        if self.controller != "pid" and self.estimator == "measured":
+        if CONTROLLERS[self.controller].needs_velocities and self.estimator == "measured":
             raise ValueError(f"controller {self.controller!r} needs body velocities: estimator = 'filter'")
 
     @property
     def law_flown(self) -> Law:
         """The law's gains under this controller."""
-        return self.law_plus if self.controller == "law+" else self.law
+        law: Law = getattr(self, CONTROLLERS[self.controller].law_gains)
+        return law
 
 
 # The best-tuned PID: gains that track the paper's manoeuvres under noise best, whatever their margins (docs/TUNING.md).

@@ -1,8 +1,8 @@
-"""What the estimator is told about a vehicle: spectral densities, variances and spreads out of the vehicle file."""
+"""The estimator's settings for a vehicle: spectral densities, variances and spreads out of the vehicle file."""
 
 import numpy as np
 
-from firmware.core.estimation import estimator_layout as est
+from firmware.core.estimation import estimator_layout as kf
 from firmware.core.vehicle import layout
 from firmware.model.vehicle import COEFFICIENTS, DisturbanceTable, SensorsTable, UncertaintyTable
 
@@ -12,8 +12,6 @@ ERROR_TIME = 10.0  # s
 # what keeps the filter listening to the draw-wires while they stand still.
 SPEED_ERROR = 0.1  # share of the speed, over 1 s
 SERVO_WALK, SLIDER_WALK, BALLAST_WALK = 0.002, 0.0002, 0.0003  # rad, m, kg, each per square root of a second
-# A gyro's bias is called constant; this lets the filter follow one that is worse than its file says.
-GYRO_WALK, WATER_WALK = 0.0005, 0.005  # rad/s, m/s, each per square root of a second
 UNSEEN_SERVO_WALK = 0.2  # rad per square root of a second: a servo turns where the pilot wants, unannounced
 
 # Before the first measurement: recordings begin at rest, at a launch or within a glide. One linearisation does not
@@ -24,7 +22,6 @@ START_SPEEDS = (0.0, 0.1, 0.2, 0.3, 0.45, 0.6)  # m/s
 POSITION_SPREAD, ATTITUDE_SPREAD = 1.0, 0.3  # m, rad, about the first readings
 SPEED_SPREAD = (0.05, 0.02, 0.02)  # m/s
 RATE_SPREAD = 0.2  # rad/s
-GYRO_SPREAD, WATER_SPREAD = 0.003, 0.05  # rad/s, m/s
 SERVO_SPREAD, SLIDER_SPREAD, BALLAST_SPREAD = 0.005, 0.001, 0.002  # rad, m, kg, about 0 and the first readings
 UNKNOWN_SPREAD = 0.5  # share of an actuator's range, where neither command nor reading says where it is
 
@@ -46,23 +43,23 @@ def parameter_sigma(P: np.ndarray, uncertainty: UncertaintyTable) -> np.ndarray:
 
 def estimator_settings(sensors: SensorsTable, disturbance: DisturbanceTable, mode: int = 0) -> np.ndarray:
     """The settings vector of core/estimation/estimator, shape (N_S,); `mode` says which actuators are not commanded."""
-    S = np.zeros(est.N_S)
-    S[est.S_LINEAR] = disturbance.linear**2 * est.DISTURBANCE_HOLD
-    S[est.S_ANGULAR] = disturbance.angular**2 * est.DISTURBANCE_HOLD
-    S[est.S_SERVO] = (UNSEEN_SERVO_WALK if mode & est.SERVO_DRIVEN else SERVO_WALK) ** 2
-    S[est.S_SLIDER] = SLIDER_WALK**2
-    S[est.S_BALLAST] = BALLAST_WALK**2
-    S[est.S_SPEED_ERROR] = SPEED_ERROR**2
-    S[est.S_ERROR_TIME] = ERROR_TIME
-    S[est.S_GYRO], S[est.S_WATER] = GYRO_WALK**2, WATER_WALK**2
-    S[est.S_SLIDER_BIAS] = sensors.slider.bias**2
-    S[est.S_BALLAST_BIAS] = sensors.ballast.bias**2
+    S = np.zeros(kf.N_S)
+    S[kf.S_LINEAR] = disturbance.linear**2 * kf.DISTURBANCE_HOLD
+    S[kf.S_ANGULAR] = disturbance.angular**2 * kf.DISTURBANCE_HOLD
+    S[kf.S_SERVO] = (UNSEEN_SERVO_WALK if mode & kf.SERVO_DRIVEN else SERVO_WALK) ** 2
+    S[kf.S_SLIDER] = SLIDER_WALK**2
+    S[kf.S_BALLAST] = BALLAST_WALK**2
+    S[kf.S_SPEED_ERROR] = SPEED_ERROR**2
+    S[kf.S_ERROR_TIME] = ERROR_TIME
+    S[kf.S_WALK : kf.S_R] = [walk**2 for _, count, _, walk, _ in kf.WANDERING for _ in range(count)]
+    S[kf.S_SLIDER_BIAS] = sensors.slider.bias**2
+    S[kf.S_BALLAST_BIAS] = sensors.ballast.bias**2
     noise = (
         *3 * (sensors.attitude,), *3 * (sensors.gyro,), sensors.depth, sensors.slider, sensors.ballast,
         *3 * (sensors.mocap_position,), *3 * (sensors.mocap_attitude,),
     )  # fmt: skip
     # A file may say a sensor has no noise; a filter must not believe that.
-    S[est.S_R :] = [max(sensor.noise, 1e-6) ** 2 for sensor in noise]
+    S[kf.S_R :] = [max(sensor.noise, 1e-6) ** 2 for sensor in noise]
     return S
 
 
@@ -71,7 +68,8 @@ def first_spread(P: np.ndarray, mode: int, seen: tuple[bool, bool, bool]) -> np.
     ranges = [P[layout.SERVO_MAX + 4 * i] - P[layout.SERVO_MIN + 4 * i] for i in range(3)]
     known = (SERVO_SPREAD, SLIDER_SPREAD, BALLAST_SPREAD)
     actuators = [known[i] if seen[i] else UNKNOWN_SPREAD * ranges[i] for i in range(3)]
-    if mode & est.SERVO_DRIVEN:
+    if mode & kf.SERVO_DRIVEN:
         actuators[0] = max(actuators[0], 0.1)
     moving = [*3 * [POSITION_SPREAD], *3 * [ATTITUDE_SPREAD], *SPEED_SPREAD, *3 * [RATE_SPREAD], *actuators]
-    return np.array([*moving, *6 * [0.0], *3 * [GYRO_SPREAD], *2 * [WATER_SPREAD]])
+    wandering = [spread for _, count, spread, _, _ in kf.WANDERING for _ in range(count)]
+    return np.array([*moving, *6 * [0.0], *wandering])

@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 
 from firmware.control.gains import Control
-from firmware.core.control import control_layout as layout
+from firmware.core.control import control_layout as ctl
 from firmware.model.strict import ConfigError, Table, decode
 from firmware.model.vehicle import Vehicle
 
@@ -92,23 +92,23 @@ class Mission(Table):
     def matrix(self, vehicle: Vehicle, source: str) -> np.ndarray:
         """The legs as the kernels take them, shape (legs, N_LEG), SI; ConfigError where the vehicle cannot do it."""
         low, high = vehicle.actuators.ballast.range
-        legs = np.full((len(self.leg), layout.N_LEG), math.nan)
+        legs = np.full((len(self.leg), ctl.N_LEG), math.nan)
         for row, leg in enumerate(self.leg):
             if leg.ballast_kg is not None and not low <= leg.ballast_kg <= high:
                 message = f"{leg.ballast_kg} kg is outside {vehicle.name}'s {low} to {high} kg"
                 raise ConfigError(source, message, key=f"leg[{row}].ballast_kg")
-            legs[row, layout.LEG_PITCH] = math.radians(leg.pitch_deg)
-            legs[row, layout.LEG_ROLL] = math.radians(leg.roll_deg)
-            legs[row, layout.LEG_HOLD] = leg.hold_s
-            legs[row, layout.LEG_TOLERANCE] = leg.tolerance_m
+            legs[row, ctl.LEG_PITCH] = math.radians(leg.pitch_deg)
+            legs[row, ctl.LEG_ROLL] = math.radians(leg.roll_deg)
+            legs[row, ctl.LEG_HOLD] = leg.hold_s
+            legs[row, ctl.LEG_TOLERANCE] = leg.tolerance_m
             for index, value in (
-                (layout.LEG_DEPTH, leg.depth_m),
-                (layout.LEG_BALLAST, leg.ballast_kg),
-                (layout.LEG_TIME_LIMIT, leg.time_limit_s),
-                (layout.LEG_DURATION, leg.duration_s),
-                (layout.LEG_TURN, None if leg.turn is None else (1.0 if leg.turn == "starboard" else -1.0)),
-                (layout.LEG_HEADING, None if leg.heading_deg is None else math.radians(leg.heading_deg)),
-                (layout.LEG_TURNED, None if leg.turned_deg is None else math.radians(leg.turned_deg)),
+                (ctl.LEG_DEPTH, leg.depth_m),
+                (ctl.LEG_BALLAST, leg.ballast_kg),
+                (ctl.LEG_TIME_LIMIT, leg.time_limit_s),
+                (ctl.LEG_DURATION, leg.duration_s),
+                (ctl.LEG_TURN, None if leg.turn is None else (1.0 if leg.turn == "starboard" else -1.0)),
+                (ctl.LEG_HEADING, None if leg.heading_deg is None else math.radians(leg.heading_deg)),
+                (ctl.LEG_TURNED, None if leg.turned_deg is None else math.radians(leg.turned_deg)),
             ):
                 if value is not None:
                     legs[row, index] = value

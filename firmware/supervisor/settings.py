@@ -9,7 +9,7 @@ from typing import Annotated
 import msgspec
 import numpy as np
 
-from firmware.core.supervision import supervisor_layout as at
+from firmware.core.supervision import supervisor_layout as sup
 from firmware.model.strict import Table
 
 Seconds = Annotated[float, msgspec.Meta(gt=0.0, le=3600.0)]
@@ -95,31 +95,37 @@ def settings_vector(
     dt: the loop's step, s; periods: of imu, beacon, wires, s; site_depth (m; 0: unknown) and mission_time (s) are the
     mission's; restarted: the flight before this one did not end in order.
     """
-    G = np.zeros(at.N_G)
-    G[at.ENABLED : at.ENABLED + at.N_ROWS] = 1.0
-    G[at.TICK] = dt
+    G = np.zeros(sup.N_G)
+    G[sup.ENABLED : sup.ENABLED + sup.N_ROWS] = 1.0
+    G[sup.TICK] = dt
     slow = 1.0 / 5.0  # leak and battery
-    G[at.PERIOD : at.PERIOD + at.N_SENSORS] = [periods["imu"], periods["beacon"], *2 * [periods["wires"]], slow, slow]
+    G[sup.PERIOD : sup.PERIOD + sup.N_SENSORS] = [
+        periods["imu"],
+        periods["beacon"],
+        *2 * [periods["wires"]],
+        slow,
+        slow,
+    ]
     lost = [table.imu_s, table.pressure_s, table.wire_s, table.wire_s, math.inf, math.inf]
-    G[at.LOST_AFTER : at.LOST_AFTER + at.N_SENSORS] = lost
+    G[sup.LOST_AFTER : sup.LOST_AFTER + sup.N_SENSORS] = lost
     ranges = np.array(_IMU + _OTHERS)
-    G[at.LOW : at.LOW + at.N_VALUES], G[at.HIGH : at.HIGH + at.N_VALUES] = ranges.T
-    G[at.JUMP : at.JUMP + at.N_VALUES], G[at.JUMP_RATE : at.JUMP_RATE + at.N_VALUES] = _JUMPS, _JUMP_RATES
+    G[sup.LOW : sup.LOW + sup.N_VALUES], G[sup.HIGH : sup.HIGH + sup.N_VALUES] = ranges.T
+    G[sup.JUMP : sup.JUMP + sup.N_VALUES], G[sup.JUMP_RATE : sup.JUMP_RATE + sup.N_VALUES] = _JUMPS, _JUMP_RATES
     for place, value in _scalars(limits, table, dt, site_depth, mission_time).items():
         G[place] = value
-    G[at.RESTARTED] = float(restarted)
-    G[at.BEGAN : at.N_G] = 0.0
+    G[sup.RESTARTED] = float(restarted)
+    G[sup.BEGAN : sup.N_G] = 0.0
     for place, count in _UNSET:
         G[place : place + count] = math.nan
-    G[at.TAKEN : at.TAKEN + at.N_SENSORS] = -math.inf
-    G[at.FIRST : at.FIRST + at.N_ROWS] = -1.0
+    G[sup.TAKEN : sup.TAKEN + sup.N_SENSORS] = -math.inf
+    G[sup.FIRST : sup.FIRST + sup.N_ROWS] = -1.0
     return G
 
 
 _UNSET = (
-    (at.BEGAN, 1), (at.SEEN, at.N_SENSORS), (at.SAME_SINCE, at.N_SENSORS), (at.LAST, at.N_VALUES),
-    (at.RAW, at.N_VALUES), (at.SINCE, at.N_TIMERS), (at.SLOW_TIME, 1), (at.BAND_MARK, 1), (at.MINUTE, 1),
-    (at.LEAK_SEEN, 1), (at.OOB_SINCE, 1), (at.MARK, 2), (at.RING, 4 * at.N_RING),
+    (sup.BEGAN, 1), (sup.SEEN, sup.N_SENSORS), (sup.SAME_SINCE, sup.N_SENSORS), (sup.LAST, sup.N_VALUES),
+    (sup.RAW, sup.N_VALUES), (sup.SINCE, sup.N_TIMERS), (sup.SLOW_TIME, 1), (sup.BAND_MARK, 1), (sup.MINUTE, 1),
+    (sup.LEAK_SEEN, 1), (sup.OOB_SINCE, 1), (sup.MARK, 2), (sup.RING, 4 * sup.N_RING),
 )  # fmt: skip
 
 
@@ -130,21 +136,21 @@ def _scalars(
     working = min(limits.working_depth_m or math.inf, site_depth or math.inf)
     risk = limits.at_risk_depth_m or 1.1 * (limits.working_depth_m or math.inf)
     return {
-        at.STATE_AGE: table.actuator_s, at.HOLD_TIME: table.hold_s, at.FROZEN_TIME: table.frozen_s,
-        at.STUCK_TIME: table.stuck_s, at.UNFIT_RUN: table.unfit_run,
-        at.DISAGREE_TIME: table.disagree_s, at.DISAGREE_PITCH: math.radians(table.disagree_pitch_deg),
-        at.DISAGREE_RATE: table.disagree_rate_m_s,
-        at.WORKING_DEPTH: working, at.DEEP_TIME: table.deep_s,
-        at.RISK_DEPTH: min(risk, 1.1 * site_depth or math.inf), at.RISK_TIME: table.at_risk_s,
-        at.ASCENT_TIME: table.no_ascent_s, at.ASCENT_STEP: table.ascent_step_m, at.BLIND_TIME: table.blind_ascent_s,
-        at.SAME_TIME: table.same_depth_s, at.SAME_BAND: table.same_depth_m, at.LEAK_COUNT: table.leak_samples,
-        at.STEEP_PITCH: math.radians(table.steep_deg), at.STEEP_MARGIN: math.radians(table.steep_margin_deg),
-        at.STEEP_ROLL: math.radians(table.roll_deg), at.STEEP_TIME: table.steep_s,
-        at.LAW_RUN: table.law_tries, at.LAW_REST: table.law_rest_s,
-        at.LOW_VOLTAGE: limits.low_voltage or 0.0, at.LEAST_VOLTAGE: limits.least_voltage or 0.0,
-        at.VOLTAGE_TIME: table.voltage_s, at.OVERRUN_RUN: table.overruns, at.OVERRUN_SHARE: table.overrun_share,
-        at.MISSION_TIME: mission_time, at.STALL_FACTOR: table.stall_factor, at.STALL_TRIES: table.stall_tries,
-        at.STALL_REST: table.stall_rest_s, at.SURFACE_DEPTH: table.surface_m,
-        at.WRONG_TICKS: min(max(round(table.wrong_way_s / dt), 2), at.N_RING - 1),
-        at.DELAY_TICKS: min(max(round(table.longest_delay_s / dt), 2), at.N_RING - 1),
+        sup.STATE_AGE: table.actuator_s, sup.HOLD_TIME: table.hold_s, sup.FROZEN_TIME: table.frozen_s,
+        sup.STUCK_TIME: table.stuck_s, sup.UNFIT_RUN: table.unfit_run,
+        sup.DISAGREE_TIME: table.disagree_s, sup.DISAGREE_PITCH: math.radians(table.disagree_pitch_deg),
+        sup.DISAGREE_RATE: table.disagree_rate_m_s,
+        sup.WORKING_DEPTH: working, sup.DEEP_TIME: table.deep_s,
+        sup.RISK_DEPTH: min(risk, 1.1 * site_depth or math.inf), sup.RISK_TIME: table.at_risk_s,
+        sup.ASCENT_TIME: table.no_ascent_s, sup.ASCENT_STEP: table.ascent_step_m, sup.BLIND_TIME: table.blind_ascent_s,
+        sup.SAME_TIME: table.same_depth_s, sup.SAME_BAND: table.same_depth_m, sup.LEAK_COUNT: table.leak_samples,
+        sup.STEEP_PITCH: math.radians(table.steep_deg), sup.STEEP_MARGIN: math.radians(table.steep_margin_deg),
+        sup.STEEP_ROLL: math.radians(table.roll_deg), sup.STEEP_TIME: table.steep_s,
+        sup.LAW_RUN: table.law_tries, sup.LAW_REST: table.law_rest_s,
+        sup.LOW_VOLTAGE: limits.low_voltage or 0.0, sup.LEAST_VOLTAGE: limits.least_voltage or 0.0,
+        sup.VOLTAGE_TIME: table.voltage_s, sup.OVERRUN_RUN: table.overruns, sup.OVERRUN_SHARE: table.overrun_share,
+        sup.MISSION_TIME: mission_time, sup.STALL_FACTOR: table.stall_factor, sup.STALL_TRIES: table.stall_tries,
+        sup.STALL_REST: table.stall_rest_s, sup.SURFACE_DEPTH: table.surface_m,
+        sup.WRONG_TICKS: min(max(round(table.wrong_way_s / dt), 2), sup.N_RING - 1),
+        sup.DELAY_TICKS: min(max(round(table.longest_delay_s / dt), 2), sup.N_RING - 1),
     }  # fmt: skip

@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from firmware.autopilot import Autopilot
-from firmware.core.supervision import supervisor_layout as at
+from firmware.core.supervision import supervisor_layout as sup
 from firmware.core.supervision.screening import screen
 from firmware.core.supervision.supervisor import guard
 from firmware.guidance.mission import Mission
@@ -30,7 +30,7 @@ class Supervisor:
             mission_time=mission.time_limit_s, restarted=restarted,
         )  # fmt: skip
         self.table = vehicle.supervisor
-        self._told = np.zeros(at.N_ROWS)
+        self._said = np.zeros(sup.N_ROWS)
 
     def screen(self, t: float) -> None:
         """Before the autopilot's tick at time t (s): what is not fit is marked in its frame."""
@@ -44,35 +44,35 @@ class Supervisor:
     @property
     def reaction(self) -> Reaction:
         """What is done now."""
-        return Reaction(int(self.G[at.REACTION]))
+        return Reaction(int(self.G[sup.HIGHEST]))
 
     @property
     def row(self) -> int:
         """Row of the fault table that asked for it; 0: none."""
-        return int(self.G[at.ROW])
+        return int(self.G[sup.HIGHEST_ROW])
 
     def noticed(self, row: int) -> float | None:
         """When a row asked for anything for the first time, s; None: never."""
-        first = float(self.G[at.FIRST + row])
+        first = float(self.G[sup.FIRST + row])
         return None if first < 0.0 else first
 
     def worst(self, row: int) -> Reaction:
         """The highest reaction that a row ever asked for."""
-        return Reaction(int(self.G[at.WORST + row]))
+        return Reaction(int(self.G[sup.WORST + row]))
 
     def disable(self, row: int) -> None:
         """Switch a row's detector off: to show that it is what notices the fault."""
-        self.G[at.ENABLED + row] = 0.0
+        self.G[sup.ENABLED + row] = 0.0
 
     def news(self) -> list[tuple[Reaction, str]]:
         """Rows that ask for more than when this was last called, with their names."""
-        worst = self.G[at.WORST : at.WORST + at.N_ROWS]
-        rows = np.flatnonzero(worst > self._told)
-        self._told[:] = worst
-        return [(Reaction(int(worst[row])), f"fault {row}: {FAULTS[int(row)].name}") for row in rows]
+        worst = self.G[sup.WORST : sup.WORST + sup.N_ROWS]
+        rows = np.flatnonzero(worst > self._said)
+        self._said[:] = worst
+        return [(Reaction(int(worst[row])), f"fault {row}: {FAULTS[int(row)]}") for row in rows]
 
     @property
     def depth_known(self) -> bool:
         """False once the beacon has had nothing fit to say for too long."""
-        last = float(self.G[at.TAKEN + at.S_BEACON])
-        return math.isfinite(last) and self.worst(2) == Reaction.NOTHING
+        last = float(self.G[sup.TAKEN + sup.SENSOR_BEACON])
+        return math.isfinite(last) and self.worst(sup.FAULT_PRESSURE_LOST) == Reaction.NOTHING

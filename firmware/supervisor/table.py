@@ -1,14 +1,13 @@
-"""The fault table as data: what can go wrong, where it is seen, how soon, and what is done about it.
+"""The fault table: what can go wrong, by row, and the reactions. Who sees a row, how soon, what is done about it and
+what clears it stands in docs/SUPERVISOR.md, "The fault table".
 
-Rows of the supervisor's own are asked for by the kernels of core/detectors; the others by whoever stands nearest:
-drivers and the bus, arming, the readers of files, recorder and out-of-band process. From ABORT on a reaction is
-latched.
+Rows of the supervisor's own are asked for by the kernels of core/supervision; the others by whoever stands nearest.
+From ABORT on a reaction is latched.
 """
 
-from dataclasses import dataclass
 from enum import IntEnum
 
-from firmware.core.supervision import supervisor_layout as at
+from firmware.core.supervision import supervisor_layout as sup
 
 
 class Reaction(IntEnum):
@@ -23,64 +22,52 @@ class Reaction(IntEnum):
     HW = 6  # hardware watchdog, drop weight
 
 
-assert [float(reaction) for reaction in Reaction] == [at.NOTHING, at.LOG, at.WARN, at.HOLD, at.ABORT, at.OOB, at.HW]
+assert [float(reaction) for reaction in Reaction] == [
+    sup.NOTHING,
+    sup.LOG,
+    sup.WARN,
+    sup.HOLD,
+    sup.ABORT,
+    sup.OOB,
+    sup.HW,
+]
 
 
-@dataclass(frozen=True)
-class Row:
-    """A row. `within_s`: noticed so soon, None where it is judged as it comes (loading, arming, a start)."""
+FAULTS = {
+    sup.FAULT_IMU_LOST: "IMU unplugged or frozen",
+    sup.FAULT_PRESSURE_LOST: "pressure unplugged",
+    sup.FAULT_BUS_LOST: "drive or pump bus lost",
+    sup.FAULT_WIRE_LOST: "draw-wire lost or broken",
+    sup.FAULT_SERVO_LOST: "servo lost",
+    sup.FAULT_SAMPLE_TIME: "sample too old, time repeats or runs back",
+    sup.FAULT_CHECKSUM: "CRC errors",
+    sup.FAULT_REPLY: "late, wrong-id, wrong-function, wrong-length reply",
+    sup.FAULT_EXCEPTION: "Modbus exception",
+    sup.FAULT_IMPLAUSIBLE: "NaN, Inf, out of range, impossible jump",
+    sup.FAULT_STUCK_SENSOR: "stuck sensor while moving",
+    sup.FAULT_NOT_ARMED: "not fit to arm",
+    sup.FAULT_DISAGREE: "pitch and depth rate disagree",
+    sup.FAULT_STALL: "actuator stalls or runs the wrong way",
+    sup.FAULT_SOFT_LIMIT: "soft limit",
+    sup.FAULT_DRIVE_ALARM: "drive alarm",
+    sup.FAULT_TOO_DEEP: "too deep",
+    sup.FAULT_NO_ASCENT: "no ascent after ABORT",
+    sup.FAULT_OVERTIME: "same depth too long, mission overtime",
+    sup.FAULT_LEAK: "leak",
+    sup.FAULT_STEEP: "steeper than 60 deg, rolling over",
+    sup.FAULT_NO_ANSWER: "no answer from the control law",
+    sup.FAULT_VOLTAGE: "under-voltage",
+    sup.FAULT_OVERRUN: "overrun",
+    sup.FAULT_LOOP_HUNG: "loop hung, process killed",
+    sup.FAULT_WALL_CLOCK: "wall clock stepped",
+    sup.FAULT_DISK: "disk full, read-only, I/O error",
+    sup.FAULT_POWER_CUT: "power cut in a write",
+    sup.FAULT_STATE_FILE: "state file torn",
+    sup.FAULT_FILE: "file: unknown key, wrong type, NaN, too deep",
+    sup.FAULT_SERIAL: "hostile or random serial bytes",
+    sup.FAULT_CONSOLE: "console garbage",
+    sup.FAULT_GROWTH: "memory or file handles grow",
+    sup.FAULT_PORT: "two programs open one port",
+}
 
-    number: int
-    name: str
-    seen_by: str
-    within_s: float | None
-    reaction: str
-    clears: str
-
-
-_LATCHED = "never in this flight"
-_ROWS = (
-    ("IMU unplugged or frozen", "supervisor", 0.2, "WARN, HOLD 1 s, ABORT open loop", "a fit sample, before ABORT"),
-    ("pressure unplugged", "supervisor", 0.5, "ABORT by time, ballast to its light end", _LATCHED),
-    ("drive or pump bus lost", "supervisor", 0.5, "reconnect; ABORT with what is left", _LATCHED),
-    ("draw-wire lost or broken", "supervisor", 0.5, "WARN, dead reckoning; ABORT if the pump's",
-     "a fit sample; the pump's: " + _LATCHED),
-    ("servo lost", "supervisor", 0.5, "WARN, finish level", "an answer"),
-    ("sample too old, time repeats or runs back", "supervisor", 0.04, "LOG, sample not used, then as 1 to 5",
-     "a fit sample"),
-    ("CRC errors", "driver", 60.0, "drop and count; more than 5 a minute: device in error", "a minute without"),
-    ("late, wrong-id, wrong-function, wrong-length reply", "bus", 0.1, "never delivered", "the next reply"),
-    ("Modbus exception", "driver", 0.1, "1-3: device in error; 4-6: back off, 3 tries, device in error", "an answer"),
-    ("NaN, Inf, out of range, impossible jump", "supervisor", 0.04, "LOG, rejected; 5 running: WARN, device in error",
-     "a fit sample"),
-    ("stuck sensor while moving", "supervisor", 2.0, "WARN, device in error", "another value"),
-    ("not fit to arm", "arming", None, "refuse to arm", "set right"),
-    ("pitch and depth rate disagree", "supervisor", 5.0, "WARN, cautious controller", "they agree"),
-    ("actuator stalls or runs the wrong way", "supervisor", 0.3, "2 tries, then ABORT; wrong way: stopped, ABORT",
-     "it moves; after ABORT: " + _LATCHED),
-    ("soft limit", "supervisor", 0.0, "LOG, clamped", "asked for less"),
-    ("drive alarm", "supervisor", 0.2, "WARN, cleared once; then ABORT", "cleared; after ABORT: " + _LATCHED),
-    ("too deep", "supervisor", 1.0, "working depth: ABORT; at-risk depth: OOB", _LATCHED),
-    ("no ascent after ABORT", "supervisor", 30.0, "OOB, then HW", _LATCHED),
-    ("same depth too long, mission overtime", "supervisor", 120.0, "ABORT", _LATCHED),
-    ("leak", "supervisor", 1.0, "one sample: WARN; three: ABORT", _LATCHED),
-    ("steeper than 60 deg, rolling over", "supervisor", 2.0, "PID; then ABORT", "upright; after ABORT: " + _LATCHED),
-    ("no answer from the control law", "supervisor", 0.0, "last good command, PID; 3 running: ABORT",
-     "an answer; after ABORT: " + _LATCHED),
-    ("under-voltage", "supervisor", 10.0, "WARN; then ABORT", "voltage; after ABORT: " + _LATCHED),
-    ("overrun", "supervisor", 60.0, "LOG; 10 running or 1 % of a minute: log less, HOLD, ABORT",
-     "a punctual tick; after ABORT: " + _LATCHED),
-    ("loop hung, process killed", "out-of-band process", 2.0, "OOB; a restart goes into ABORT", _LATCHED),
-    ("wall clock stepped", "nobody", None, "no effect", ""),
-    ("disk full, read-only, I/O error", "recorder", 1.0, "LOG, drop by priority, fly on; refuse to arm", "the disk"),
-    ("power cut in a write", "log reader", None, "valid prefix read; at most 1 s lost, nothing damaged returned", ""),
-    ("state file torn", "state file", None, "two copies, checked; the worse wins", "a person looked"),
-    ("file: unknown key, wrong type, NaN, too deep", "loading", None, "refused, key and line named", "set right"),
-    ("hostile or random serial bytes", "codecs, hub", 1.0, "back in step within a frame; bounded work", "their end"),
-    ("console garbage", "console", None, "no effect; arm and abort want confirmation", ""),
-    ("memory or file handles grow", "supervisor", 60.0, "WARN; at the limit ABORT", "less of it"),
-    ("two programs open one port", "port", None, "refused", "the other leaves"),
-)  # fmt: skip
-FAULTS = {number: Row(number, *row) for number, row in enumerate(_ROWS, start=1)}
-
-assert len(FAULTS) == at.N_ROWS - 1
+assert len(FAULTS) == sup.N_ROWS - 1

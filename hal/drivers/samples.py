@@ -7,10 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hal.ports import Condition, Slot, Validity
+from hal.ports import STALE_PERIODS, Condition, Slot, Validity
 
 FAULTY_AFTER = 5  # unfit samples running, past which the device is in error
-STALE_PERIODS = 3.0
 DAMAGES = 5  # damaged frames in DAMAGE_S, past which the device is in error, until there were fewer
 DAMAGE_S = 60.0
 

@@ -12,7 +12,7 @@ from firmware.core.vehicle.layout import N_P, N_X, X_ACT, X_DOWN, X_EAST, X_NORT
 from firmware.core.vehicle.state import euler_angles
 from hal.ports import FRAME_SIZE
 from sim_backend.core import effect_layout as ef
-from sim_backend.core import layout as at
+from sim_backend.core import layout as wl
 from sim_backend.core.effect_plant import set_effects
 from sim_backend.core.world import deliver, move, move_with_effects
 
@@ -62,11 +62,11 @@ def fly(P_plant, P, C, legs, nav, E, F, waves, sensors, errors, seed, x, dt, max
     """
     cmd, acc, frame = np.zeros(3), np.zeros(6), np.full(FRAME_SIZE, np.nan)
     frame[:] = 0.0
-    counters = np.zeros(at.N_C, dtype=np.int64)
-    counters[at.C_HOLD] = -1
-    ring = np.zeros((at.N_SENSORS, at.RING, at.RING_WIDTH))
+    counters = np.zeros(wl.N_COUNTERS, dtype=np.int64)
+    counters[wl.C_HOLD] = -1
+    ring = np.zeros((wl.N_SAMPLED, wl.DELAY_SLOTS, wl.DELAY_WIDTH))
     queue = np.zeros((int(F[ef.COMMAND_DELAY] / dt) + 3, 3))
-    effective, work = np.zeros(N_P), np.zeros((at.N_WORK, at.WORK_WIDTH))
+    effective, work = np.zeros(N_P), np.zeros((wl.N_WORK, wl.WORK_WIDTH))
     effects = set_effects(P_plant, F, effective)
     est, ap = np.zeros(ctl.N_EST), np.zeros(ctl.N_AP)
     memory = nav.copy()
@@ -82,7 +82,7 @@ def fly(P_plant, P, C, legs, nav, E, F, waves, sensors, errors, seed, x, dt, max
             )  # fmt: skip
         else:
             move(P_plant, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, work, dt, t)
-        deliver(sensors, counters[at.C_STEP] * dt, counters, ring, frame)
+        deliver(sensors, counters[wl.C_STEP] * dt, counters, ring, frame)
         if C[ctl.ESTIMATOR] == ctl.GIVEN:
             memory[ctl.NAV_GIVEN : ctl.NAV_GIVEN + N_X] = x[:N_X]
         tick(P, C, legs, frame, est, ap, memory, cmd, t)

@@ -12,7 +12,7 @@ from firmware.core.vehicle.flight import add_accelerations, body_derivative
 from firmware.core.vehicle.layout import N_P, N_X, X_BALLAST, X_DOWN, X_EAST, X_NORTH, X_SERVO, X_SLIDER
 from firmware.core.vehicle.state import normalise_attitude, rotation, velocities
 from sim_backend.core import effect_layout as ef
-from sim_backend.core import layout as at
+from sim_backend.core import layout as wl
 from sim_backend.core.effects.actuation import effective_actuators, geared, motor_speeds, update_gears
 from sim_backend.core.effects.correction import correction
 from sim_backend.core.effects.hydrodynamics import effective_coefficients, extra_wrench
@@ -115,7 +115,7 @@ def effect_world_step(P, F, E, waves, x, cmd, step, dt, acc, queue, work):
     is (N_WORK, WORK_WIDTH) of scratch.
     """
     t = step * dt
-    water, wanted = work[at.W_WATER, 0:3], work[at.W_WATER, 3:6]
+    water, wanted = work[wl.W_WATER, 0:3], work[wl.W_WATER, 3:6]
     water[0], water[1], water[2] = water_velocity(E, waves, x[X_NORTH], x[X_EAST], x[X_DOWN], t + 0.5 * dt)
     force = boundary_force(P, E, x, water[2])
     if F[ef.COMMAND_DELAY] > 0.0:

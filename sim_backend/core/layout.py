@@ -5,17 +5,16 @@ The effects' vector F and the extended state have a layout of their own, effect_
 """
 
 # --- E: the environment, SI, NED ------------------------------------------------------------------------------------
-CURRENT_N, CURRENT_E = 0, 1  # m/s at the surface
-SHEAR_N, SHEAR_E = 2, 3  # 1/s, change of the current with depth
-SURFACE_HEIGHT = 4  # m, over which buoyancy is lost above the surface: HULL_HEIGHT; 0: no surface
-FLOOR_DEPTH = 5  # m; 0: no floor
-ACC_LINEAR, ACC_ANGULAR = 6, 7  # m/s2, rad/s2, 1 sigma of the held disturbance
-TEMPERATURE_C, SALINITY = 8, 9
-SURFACE_PRESSURE = 10  # Pa
-WATER_DENSITY = 11  # kg/m3, the plant's own
-N_E = 12
+ENV_CURRENT_N, ENV_CURRENT_E = 0, 1  # m/s at the surface
+ENV_SHEAR_N, ENV_SHEAR_E = 2, 3  # 1/s, change of the current with depth
+ENV_SURFACE_HEIGHT = 4  # m, over which buoyancy is lost above the surface: HULL_HEIGHT; 0: no surface
+ENV_FLOOR_DEPTH = 5  # m; 0: no floor
+ENV_ACC_LINEAR, ENV_ACC_ANGULAR = 6, 7  # m/s2, rad/s2, 1 sigma of the held disturbance
+ENV_TEMPERATURE_C, ENV_SALINITY = 8, 9
+ENV_SURFACE_PRESSURE = 10  # Pa
+ENV_WATER_DENSITY = 11  # kg/m3, the plant's own
+N_ENV = 12
 
-DISTURBANCE_HOLD = 0.1  # s (MODEL.md)
 HULL_HEIGHT = 0.16  # m
 FLOOR_STIFFNESS = 2000.0  # N/m
 FLOOR_DAMPING = 300.0  # N s/m
@@ -25,8 +24,8 @@ WAVE_AMPLITUDE, WAVE_OMEGA, WAVE_K_N, WAVE_K_E, WAVE_PHASE = 0, 1, 2, 3, 4
 N_WAVE = 5
 
 # --- SENSOR: one row a sensor ---------------------------------------------------------------------------------------
-S_IMU, S_BEACON, S_SLIDER, S_PLUNGER = 0, 1, 2, 3
-N_SENSORS = 4
+# IMU, beacon and draw-wires are numbered as aboard, supervisor_layout
+N_SAMPLED = 4
 SENSOR_PERIOD, SENSOR_DELAY = 0, 1  # s
 N_SENSOR_FIELDS = 2
 
@@ -40,8 +39,8 @@ STREAM_SENSORS = 16  # + index of the value
 STREAM_WAVES = 32  # phase, frequency
 
 # --- delay line: each sensor has RING slots of [delivery time, measurement time, values ...] ------------------------
-RING = 64
-RING_WIDTH = 8
+DELAY_SLOTS = 64
+DELAY_WIDTH = 8
 
 # --- memory of effects and scratch -----------------------------------------------------------------------------------
 LONGEST_DELAY = 6.0  # s, of commands; a world keeps those of the steps so far back
@@ -53,4 +52,4 @@ C_STEP = 0  # plant steps done
 C_HOLD = 1  # index of the disturbance's hold, -1 before the first
 C_SAMPLES = 2  # 2..5 samples taken, by sensor
 C_TAKEN = 6  # 6..9 samples delivered, by sensor
-N_C = 10
+N_COUNTERS = 10

@@ -5,7 +5,7 @@ import numpy as np
 from firmware.core.jit import kernel, parallel_kernel, prange
 from firmware.core.vehicle.layout import N_P, N_X
 from sim_backend.core import effect_layout as ef
-from sim_backend.core import layout as at
+from sim_backend.core import layout as wl
 from sim_backend.core.effect_plant import effect_world_step, set_effects
 from sim_backend.core.plant import hold_disturbance, plant_step
 
@@ -16,10 +16,10 @@ def fly_open_loop(P, E, F, waves, seed, x, commands, dt, steps_per_row, out):
 
     out[i] is the state when row i's commands come into force.
     """
-    acc, work, effective = np.zeros(6), np.zeros((at.N_WORK, at.WORK_WIDTH)), np.zeros(N_P)
+    acc, work, effective = np.zeros(6), np.zeros((wl.N_WORK, wl.WORK_WIDTH)), np.zeros(N_P)
     queue = np.zeros((int(F[ef.COMMAND_DELAY] / dt) + 3, 3))
-    counters = np.zeros(at.N_C, dtype=np.int64)
-    counters[at.C_HOLD] = -1
+    counters = np.zeros(wl.N_COUNTERS, dtype=np.int64)
+    counters[wl.C_HOLD] = -1
     effects, step = set_effects(P, F, effective), 0
     for row in range(commands.shape[0]):
         out[row] = x[:N_X]

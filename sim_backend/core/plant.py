@@ -1,12 +1,13 @@
 """The simulated vehicle in its environment: the nominal one in moving water, with surface, floor and disturbance."""
 
+from firmware.core.estimation.estimator_layout import DISTURBANCE_HOLD
 from firmware.core.jit import kernel
 from firmware.core.maths.steps import NODE, RK4, end_stage
 from firmware.core.vehicle.actuators import actuator_rates
 from firmware.core.vehicle.flight import add_accelerations, state_derivative
 from firmware.core.vehicle.layout import N_X, X_DOWN, X_EAST, X_NORTH
 from firmware.core.vehicle.state import actuators, normalise_attitude
-from sim_backend.core import layout as at
+from sim_backend.core import layout as wl
 from sim_backend.core.environment import boundary_force, water_velocity
 from sim_backend.core.noise import gaussian
 
@@ -37,10 +38,10 @@ def plant_step(P, E, waves, x, cmd, t, dt, acc, work):
 @kernel
 def hold_disturbance(E, seed, counters, t, acc):
     """Refresh the disturbance acceleration when its 0.1 s are over; the same t always gives the same numbers."""
-    hold = int(t / at.DISTURBANCE_HOLD + 1e-9)
-    if hold == counters[at.C_HOLD]:
+    hold = int(t / DISTURBANCE_HOLD + 1e-9)
+    if hold == counters[wl.C_HOLD]:
         return
-    counters[at.C_HOLD] = hold
+    counters[wl.C_HOLD] = hold
     for i in range(6):
-        strength = E[at.ACC_LINEAR] if i < 3 else E[at.ACC_ANGULAR]
-        acc[i] = strength * gaussian(seed, at.STREAM_DISTURBANCE + i, hold) if strength > 0.0 else 0.0
+        strength = E[wl.ENV_ACC_LINEAR] if i < 3 else E[wl.ENV_ACC_ANGULAR]
+        acc[i] = strength * gaussian(seed, wl.STREAM_DISTURBANCE + i, hold) if strength > 0.0 else 0.0

@@ -5,11 +5,12 @@ and thousands in a campaign.
 """
 
 from firmware.core.jit import kernel
-from firmware.core.vehicle.layout import PLUNGER_AREA, X_BALLAST, X_DOWN, X_NU, X_POS, X_SLIDER, G
+from firmware.core.supervision import supervisor_layout as sup
+from firmware.core.vehicle.layout import GRAVITY, PLUNGER_AREA, X_BALLAST, X_DOWN, X_NU, X_POS, X_SLIDER
 from firmware.core.vehicle.state import euler_angles, velocities
 from hal.ports import BEACON, IMU, PLUNGER_WIRE, SLIDER_WIRE
 from sim_backend.core import effect_layout as ef
-from sim_backend.core import layout as at
+from sim_backend.core import layout as wl
 from sim_backend.core.effect_plant import effect_world_step, set_effects
 from sim_backend.core.effects.sensing import read
 from sim_backend.core.noise import gaussian
@@ -21,44 +22,44 @@ def measured(errors, seed, value, index, count):
     """A true value as its sensor reads it: bias plus white noise number `count`."""
     noise = errors[1, index]
     if noise > 0.0:
-        value += noise * gaussian(seed, at.STREAM_SENSORS + index, count)
+        value += noise * gaussian(seed, wl.STREAM_SENSORS + index, count)
     return value + errors[0, index]
 
 
 @kernel
 def write_imu(errors, seed, roll, pitch, yaw, p, q, r, count, slot):
     """Sample number `count` of the IMU behind slot's two times."""
-    slot[2] = measured(errors, seed, roll, at.E_ROLL, count)
-    slot[3] = measured(errors, seed, pitch, at.E_PITCH, count)
-    slot[4] = measured(errors, seed, yaw, at.E_YAW, count)
-    slot[5] = measured(errors, seed, p, at.E_P, count)
-    slot[6] = measured(errors, seed, q, at.E_Q, count)
-    slot[7] = measured(errors, seed, r, at.E_R, count)
+    slot[2] = measured(errors, seed, roll, wl.E_ROLL, count)
+    slot[3] = measured(errors, seed, pitch, wl.E_PITCH, count)
+    slot[4] = measured(errors, seed, yaw, wl.E_YAW, count)
+    slot[5] = measured(errors, seed, p, wl.E_P, count)
+    slot[6] = measured(errors, seed, q, wl.E_Q, count)
+    slot[7] = measured(errors, seed, r, wl.E_R, count)
 
 
 @kernel
 def write_beacon(E, errors, seed, depth, count, slot):
     """The same of the beacon: pressure and temperature."""
-    depth = measured(errors, seed, depth, at.E_DEPTH, count)
-    slot[2] = E[at.SURFACE_PRESSURE] + E[at.WATER_DENSITY] * G * depth
-    slot[3] = E[at.TEMPERATURE_C]
+    depth = measured(errors, seed, depth, wl.E_DEPTH, count)
+    slot[2] = E[wl.ENV_SURFACE_PRESSURE] + E[wl.ENV_WATER_DENSITY] * GRAVITY * depth
+    slot[3] = E[wl.ENV_TEMPERATURE_C]
 
 
 @kernel
 def write_plunger(P, E, errors, seed, ballast, count, slot):
     """The same of the plunger's draw-wire, which sees the ballast's mass as a length."""
-    slot[2] = measured(errors, seed, ballast, at.E_BALLAST, count) / (E[at.WATER_DENSITY] * P[PLUNGER_AREA])
+    slot[2] = measured(errors, seed, ballast, wl.E_BALLAST, count) / (E[wl.ENV_WATER_DENSITY] * P[PLUNGER_AREA])
 
 
 @kernel
 def due_slot(sensors, sensor, t, counters, ring):
     """Number of the sample that a sensor has to take now, its slot stamped; -1: it is not time."""
-    count = counters[at.C_SAMPLES + sensor]
-    if t < count * sensors[sensor, at.SENSOR_PERIOD] - 1e-9:
+    count = counters[wl.C_SAMPLES + sensor]
+    if t < count * sensors[sensor, wl.SENSOR_PERIOD] - 1e-9:
         return -1
-    counters[at.C_SAMPLES + sensor] = count + 1
-    slot = count % at.RING
-    ring[sensor, slot, 0] = t + sensors[sensor, at.SENSOR_DELAY]
+    counters[wl.C_SAMPLES + sensor] = count + 1
+    slot = count % wl.DELAY_SLOTS
+    ring[sensor, slot, 0] = t + sensors[sensor, wl.SENSOR_DELAY]
     ring[sensor, slot, 1] = t
     return count
 
@@ -66,63 +67,63 @@ def due_slot(sensors, sensor, t, counters, ring):
 @kernel
 def sample_sensors(P, E, sensors, errors, seed, x, t, counters, ring):
     """Sample every sensor whose time has come into its delay line, no effect being set."""
-    for sensor in range(at.N_SENSORS):
+    for sensor in range(wl.N_SAMPLED):
         count = due_slot(sensors, sensor, t, counters, ring)
         if count < 0:
             continue
-        slot = ring[sensor, count % at.RING]
-        if sensor == at.S_IMU:
+        slot = ring[sensor, count % wl.DELAY_SLOTS]
+        if sensor == sup.SENSOR_IMU:
             phi, theta, psi = euler_angles(x)
             _, _, _, p, q, r = velocities(x)
             write_imu(errors, seed, phi, theta, psi, p, q, r, count, slot)
-        elif sensor == at.S_BEACON:
+        elif sensor == sup.SENSOR_BEACON:
             write_beacon(E, errors, seed, x[X_DOWN], count, slot)
-        elif sensor == at.S_SLIDER:
-            slot[2] = measured(errors, seed, x[X_SLIDER], at.E_SLIDER, count)
-        elif sensor == at.S_PLUNGER:
+        elif sensor == sup.SENSOR_SLIDER:
+            slot[2] = measured(errors, seed, x[X_SLIDER], wl.E_SLIDER, count)
+        elif sensor == sup.SENSOR_PLUNGER:
             write_plunger(P, E, errors, seed, x[X_BALLAST], count, slot)
 
 
 @kernel
 def sample_with_effects(P, F, E, sensors, errors, seed, x, t, counters, ring, y):
     """The same with effects F: what `read` says; y (at least N_Y) is scratch."""
-    for sensor in range(at.N_SENSORS):
+    for sensor in range(wl.N_SAMPLED):
         count = due_slot(sensors, sensor, t, counters, ring)
         if count < 0:
             continue
-        slot = ring[sensor, count % at.RING]
+        slot = ring[sensor, count % wl.DELAY_SLOTS]
         read(F, x, y)
-        if sensor == at.S_IMU:
+        if sensor == sup.SENSOR_IMU:
             write_imu(
                 errors, seed, y[ef.Y_ROLL], y[ef.Y_PITCH], y[ef.Y_YAW], y[ef.Y_P], y[ef.Y_Q], y[ef.Y_R], count, slot
             )
-        elif sensor == at.S_BEACON:
+        elif sensor == sup.SENSOR_BEACON:
             write_beacon(E, errors, seed, y[ef.Y_DEPTH], count, slot)
-        elif sensor == at.S_SLIDER:
-            slot[2] = measured(errors, seed, y[ef.Y_SLIDER], at.E_SLIDER, count)
-        elif sensor == at.S_PLUNGER:
+        elif sensor == sup.SENSOR_SLIDER:
+            slot[2] = measured(errors, seed, y[ef.Y_SLIDER], wl.E_SLIDER, count)
+        elif sensor == sup.SENSOR_PLUNGER:
             write_plunger(P, E, errors, seed, y[ef.Y_BALLAST], count, slot)
 
 
 @kernel
 def deliver(sensors, t, counters, ring, frame):
     """Write the newest sample that has arrived by time t of every sensor into the frame."""
-    for sensor in range(at.N_SENSORS):
+    for sensor in range(wl.N_SAMPLED):
         start, width = IMU, 6
-        if sensor == at.S_BEACON:
+        if sensor == sup.SENSOR_BEACON:
             start, width = BEACON, 2
-        elif sensor == at.S_SLIDER:
+        elif sensor == sup.SENSOR_SLIDER:
             start, width = SLIDER_WIRE, 1
-        elif sensor == at.S_PLUNGER:
+        elif sensor == sup.SENSOR_PLUNGER:
             start, width = PLUNGER_WIRE, 1
-        taken = counters[at.C_TAKEN + sensor]
+        taken = counters[wl.C_TAKEN + sensor]
         newest = -1
-        while taken < counters[at.C_SAMPLES + sensor] and ring[sensor, taken % at.RING, 0] <= t + 1e-9:
+        while taken < counters[wl.C_SAMPLES + sensor] and ring[sensor, taken % wl.DELAY_SLOTS, 0] <= t + 1e-9:
             newest = taken
             taken += 1
-        counters[at.C_TAKEN + sensor] = taken
+        counters[wl.C_TAKEN + sensor] = taken
         if newest >= 0:
-            slot = ring[sensor, newest % at.RING]
+            slot = ring[sensor, newest % wl.DELAY_SLOTS]
             frame[start] = slot[1]
             frame[start + 1] = 1.0
             for i in range(width):
@@ -143,14 +144,14 @@ def write_truth(t, x, out):
 @kernel
 def move(P, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, work, dt, t_end):
     """Step and sample to t_end, no effect being set: kept apart, for it is what most flights are. Returns the time."""
-    t = counters[at.C_STEP] * dt
-    if counters[at.C_STEP] == 0:
+    t = counters[wl.C_STEP] * dt
+    if counters[wl.C_STEP] == 0:
         sample_sensors(P, E, sensors, errors, seed, x, t, counters, ring)
     while t < t_end - 0.5 * dt:
         hold_disturbance(E, seed, counters, t, acc)
         plant_step(P, E, waves, x, cmd, t, dt, acc, work)
-        counters[at.C_STEP] += 1
-        t = counters[at.C_STEP] * dt
+        counters[wl.C_STEP] += 1
+        t = counters[wl.C_STEP] * dt
         sample_sensors(P, E, sensors, errors, seed, x, t, counters, ring)
     return t
 
@@ -160,15 +161,15 @@ def move_with_effects(
     P, effective, F, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, queue, work, dt, t_end
 ):  # fmt: skip
     """The same with effects F, effective (N_P) being what holds throughout."""
-    t = counters[at.C_STEP] * dt
-    if counters[at.C_STEP] == 0:
-        sample_with_effects(P, F, E, sensors, errors, seed, x, t, counters, ring, work[at.W_READ])
+    t = counters[wl.C_STEP] * dt
+    if counters[wl.C_STEP] == 0:
+        sample_with_effects(P, F, E, sensors, errors, seed, x, t, counters, ring, work[wl.W_READ])
     while t < t_end - 0.5 * dt:
         hold_disturbance(E, seed, counters, t, acc)
-        effect_world_step(effective, F, E, waves, x, cmd, counters[at.C_STEP], dt, acc, queue, work)
-        counters[at.C_STEP] += 1
-        t = counters[at.C_STEP] * dt
-        sample_with_effects(P, F, E, sensors, errors, seed, x, t, counters, ring, work[at.W_READ])
+        effect_world_step(effective, F, E, waves, x, cmd, counters[wl.C_STEP], dt, acc, queue, work)
+        counters[wl.C_STEP] += 1
+        t = counters[wl.C_STEP] * dt
+        sample_with_effects(P, F, E, sensors, errors, seed, x, t, counters, ring, work[wl.W_READ])
     return t
 
 

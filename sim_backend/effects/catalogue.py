@@ -53,7 +53,7 @@ EFFECTS = (
          Parameter("droop", "1/m", 0.0, 0.6, 0.05, "PUMP_DROOP")),
     # water comes into the tank unseen by the draw-wire
     _row("actuation ballast", "ballast_leak", "mass gained from the start of the run on, at the tank",
-         Parameter("rate", "kg/s", 0.0, 0.01, 0.0005, "LEAK")),
+         Parameter("rate", "kg/s", 0.0, 0.01, 0.0005, "BALLAST_LEAK")),
     # --- hydrodynamics -------------------------------------------------------------------------------------------
     # the hull drags more or less than its coefficients say
     _row("hydrodynamics surge", "drag", "K_D0 times 1 + scale, K_D times 1 + induced",
@@ -103,7 +103,7 @@ EFFECTS = (
     # --- mass ----------------------------------------------------------------------------------------------------
     # the vehicle was ballasted heavy or light; the missing mass acts at the origin
     _row("mass net", "net_buoyancy", "a constant net mass at the origin, heavy positive",
-         Parameter("mass", "kg", -0.3, 0.3, 0.02, "NET_MASS")),
+         Parameter("mass", "kg", -0.3, 0.3, 0.02, "NET_MASS_OFFSET")),
     # the tank holds more or less than its draw-wire says
     _row("mass net", "ballast_scale", "ballast mass times 1 + scale, at the tank",
          Parameter("scale", "1", -0.9, 3.0, 0.15, "BALLAST_SCALE")),
@@ -115,13 +115,13 @@ EFFECTS = (
          Parameter("slope", "kg/m", -0.05, 0.0, 0.002, "MASS_PER_DEPTH")),
     # the centre of gravity lies ahead of or behind where trim should have put it
     _row("mass longitudinal", "cg_longitudinal", "offset along x, forward positive",
-         Parameter("offset", "m", -0.02, 0.02, 0.0007, "CG_X")),
+         Parameter("offset", "m", -0.02, 0.02, 0.0007, "CG_OFFSET_X")),
     # the centre of gravity lies to one side
     _row("mass lateral", "cg_lateral", "offset along y, starboard positive",
-         Parameter("offset", "m", -0.02, 0.02, 0.0007, "CG_Y")),
+         Parameter("offset", "m", -0.02, 0.02, 0.0007, "CG_OFFSET_Y")),
     # the centre of gravity lies lower or higher than its file says
     _row("mass vertical", "cg_vertical", "offset along z, down positive",
-         Parameter("offset", "m", -0.01, 0.03, 0.001, "CG_Z")),
+         Parameter("offset", "m", -0.01, 0.03, 0.001, "CG_OFFSET_Z")),
     # the sliding mass moves more or less than its draw-wire says
     _row("mass longitudinal", "slider_scale", "slider position times 1 + scale",
          Parameter("scale", "1", -0.95, 3.0, 0.15, "SLIDER_SCALE")),

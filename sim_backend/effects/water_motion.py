@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from sim_backend.core.environment import wave_row
-from sim_backend.core.layout import ACC_ANGULAR, ACC_LINEAR, STREAM_WAVES
+from sim_backend.core.layout import ENV_ACC_ANGULAR, ENV_ACC_LINEAR, STREAM_WAVES
 from sim_backend.core.noise import uniform
 
 COMPONENTS = 5  # of a narrow spectrum
@@ -16,8 +16,8 @@ WIDTH = 1.2  # 1 sigma of their energies, in spacings
 
 def scale_disturbance(world: Any, scale: float) -> None:
     """Scale the strength of the world's disturbance; its numbers stay those of the seed."""
-    world.E[ACC_LINEAR] *= 1.0 + scale
-    world.E[ACC_ANGULAR] *= 1.0 + scale
+    world.E[ENV_ACC_LINEAR] *= 1.0 + scale
+    world.E[ENV_ACC_ANGULAR] *= 1.0 + scale
 
 
 def add_waves(world: Any, amplitude: float, period: float, direction: float) -> None:

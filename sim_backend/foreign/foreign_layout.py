@@ -8,42 +8,42 @@ from firmware.core.vehicle.layout import N_X
 
 # --- F: strengths ---------------------------------------------------------------------------------------------------
 (
-    SERVO_SLOW, SERVO_BACKLASH, SERVO_OFFSET, SERVO_LIMIT,  # 1, rad, rad, 1
-    SLIDER_SLOW, SLIDER_BACKLASH,  # 1, m
-    PUMP_SLOW, PUMP_DROOP, BALLAST_LEAK,  # 1, 1/m, kg in the end
-    DRAG, LINEAR_DRAG, ASYMMETRY, TETHER,  # 1, kg/s, 1, kg/m a metre of line
-    LIFT, STALL, ADDED_MASS, SIDE_FORCE,  # 1, 1/rad, 1, 1
-    ROLL_TRIM, PITCH_TRIM, PITCH_DAMPING,  # kg, kg, 1
-    YAW_TRIM, WEATHERCOCK, YAW_DAMPING,  # kg, 1, 1
-    NET_BUOYANCY, BALLAST_SCALE, COMPRESSIBILITY, STRATIFICATION,  # kg, 1, kg in the end, kg from layer to layer
-    CG_LONGITUDINAL, SLIDER_SCALE, CG_LATERAL, CG_VERTICAL, INERTIA,  # m, 1, m, m, kg m2
-    CURRENT_N, CURRENT_E, SHEAR_N, SHEAR_E,  # m/s, m/s for each e-fold of depth
-    WAVES, TURBULENCE,  # 1 (scale of the waves' table), 1 (in nominal disturbances)
-    IMU_PITCH, IMU_ROLL, COMPASS_1, COMPASS_2, ATTITUDE_LAG,  # rad, rad, rad, rad, s
-    GYRO_SCALE, GYRO_P, GYRO_Q, GYRO_R,  # 1, rad/s
-    DEPTH_OFFSET, DEPTH_SCALE, DEPTH_LAG, LEVER,  # m, 1, s, m
-    COMMAND_DELAY, MOCAP_DELAY, CLOCK_SKEW,  # s, s, 1
+    FS_SERVO_SLOW, FS_SERVO_BACKLASH, FS_SERVO_OFFSET, FS_SERVO_LIMIT,  # 1, rad, rad, 1
+    FS_SLIDER_SLOW, FS_SLIDER_BACKLASH,  # 1, m
+    FS_PUMP_SLOW, FS_PUMP_DROOP, FS_BALLAST_LEAK,  # 1, 1/m, kg in the end
+    FS_DRAG, FS_LINEAR_DRAG, FS_ASYMMETRY, FS_TETHER,  # 1, kg/s, 1, kg/m a metre of line
+    FS_LIFT, FS_STALL, FS_ADDED_MASS, FS_SIDE_FORCE,  # 1, 1/rad, 1, 1
+    FS_ROLL_TRIM, FS_PITCH_TRIM, FS_PITCH_DAMPING,  # kg, kg, 1
+    FS_YAW_TRIM, FS_WEATHERCOCK, FS_YAW_DAMPING,  # kg, 1, 1
+    FS_NET_BUOYANCY, FS_BALLAST_SCALE, FS_COMPRESSIBILITY, FS_STRATIFICATION,  # kg, 1, kg in the end, kg a layer
+    FS_CG_LONGITUDINAL, FS_SLIDER_SCALE, FS_CG_LATERAL, FS_CG_VERTICAL, FS_INERTIA,  # m, 1, m, m, kg m2
+    FS_CURRENT_N, FS_CURRENT_E, FS_SHEAR_N, FS_SHEAR_E,  # m/s, m/s for each e-fold of depth
+    FS_WAVES, FS_TURBULENCE,  # 1 (scale of the waves' table), 1 (in nominal disturbances)
+    FS_IMU_PITCH, FS_IMU_ROLL, FS_COMPASS_1, FS_COMPASS_2, FS_ATTITUDE_LAG,  # rad, rad, rad, rad, s
+    FS_GYRO_SCALE, FS_GYRO_P, FS_GYRO_Q, FS_GYRO_R,  # 1, rad/s
+    FS_DEPTH_OFFSET, FS_DEPTH_SCALE, FS_DEPTH_LAG, FS_LEVER,  # m, 1, s, m
+    FS_COMMAND_DELAY, FS_MOCAP_DELAY, FS_CLOCK_SKEW,  # s, s, 1
     # outside the catalogue
-    FLAP, PUMP_JET, FOULING, ROLL_PITCH, TANGLE, LIFT_LAG,  # N m s, N, 1, kg, kg/m, 1
-    GYRO_DEPTH, WIRE_DRIFT, ROLL_PULL,  # rad/s a metre, m, rad
+    FS_FLAP, FS_PUMP_JET, FS_FOULING, FS_ROLL_PITCH, FS_TANGLE, FS_LIFT_LAG,  # N m s, N, 1, kg, kg/m, 1
+    FS_GYRO_DEPTH, FS_WIRE_DRIFT, FS_ROLL_PULL,  # rad/s a metre, m, rad
 ) = range(63)  # fmt: skip
 N_STRENGTH = 64  # one to spare
 
 # --- F: shapes ------------------------------------------------------------------------------------------------------
-EXPONENT = 64  # of the speed in what nominally grows with V^2
-LEAK_START, LEAK_TIME = 65, 66  # s
-TRAPPED_AIR = 67  # 1: compressibility by Boyle's law, 0: saturating exponentially
-DEPTH_SCALE_M = 68  # m over which mass saturates with depth
-LAYER_DEPTH, LAYER_WIDTH = 69, 70  # m, middle and half width of the pycnocline
-COMPASS_PHASE_1, COMPASS_PHASE_2 = 71, 72  # rad
-GUST_TIME = 73  # s, correlation time of turbulence
-JITTER = 74  # share by which a delay wanders
-SKEW_STEP, SKEW_TIME = 75, 76  # s, the mocap clock's step and when
-DRIFT_TIME, DRIFT_PHASE = 77, 78  # s, rad: slow change of what is called constant
-FLAP_OMEGA, FLAP_ZETA = 79, 80  # rad/s, 1
-FOUL_TIME = 81  # s
-LIFT_TIME = 82  # s
-N_F = 83
+FS_EXPONENT = 64  # of the speed in what nominally grows with V^2
+FS_LEAK_START, FS_LEAK_TIME = 65, 66  # s
+FS_TRAPPED_AIR = 67  # 1: compressibility by Boyle's law, 0: saturating exponentially
+FS_DEPTH_SCALE_M = 68  # m over which mass saturates with depth
+FS_LAYER_DEPTH, FS_LAYER_WIDTH = 69, 70  # m, middle and half width of the pycnocline
+FS_COMPASS_PHASE_1, FS_COMPASS_PHASE_2 = 71, 72  # rad
+FS_GUST_TIME = 73  # s, correlation time of turbulence
+FS_JITTER = 74  # share by which a delay wanders
+FS_SKEW_STEP, FS_SKEW_TIME = 75, 76  # s, the mocap clock's step and when
+FS_DRIFT_TIME, FS_DRIFT_PHASE = 77, 78  # s, rad: slow change of what is called constant
+FS_FLAP_OMEGA, FS_FLAP_ZETA = 79, 80  # rad/s, 1
+FS_FOUL_TIME = 81  # s
+FS_LIFT_TIME = 82  # s
+N_FS = 83
 
 # --- x: the plant's state as in core/vehicle/layout, then what the effects remember ---------------------------------
 X_SERVO_V, X_SERVO_Z, X_SLIDER_Z, X_PUMP_V = 16, 17, 18, 19  # speed, play taken up, play taken up, speed
@@ -56,8 +56,8 @@ N_FX = 37
 assert N_X == X_SERVO_V
 
 # --- readings: as the first nine columns of a prediction (tools/inference/core/flights) -----------------------------
-(R_ROLL, R_PITCH, R_YAW, R_P, R_Q, R_R, R_DEPTH, R_SLIDER, R_BALLAST) = range(9)
-N_R = 9
+(FR_ROLL, FR_PITCH, FR_YAW, FR_P, FR_Q, FR_R, FR_DEPTH, FR_SLIDER, FR_BALLAST) = range(9)
+N_FR = 9
 
 # --- L: one leg of the pilot's plan ---------------------------------------------------------------------------------
 L_PITCH, L_BALLAST, L_SERVO = 0, 1, 2  # rad, kg, rad
@@ -67,10 +67,10 @@ L_STEP_TIME, L_STEP_SERVO, L_STEP_PITCH, L_STEP_SLIDER = 7, 8, 9, 10  # s into t
 N_L = 11
 
 # --- waves: one row a component -------------------------------------------------------------------------------------
-W_AMPLITUDE, W_OMEGA, W_NORTH, W_EAST, W_PHASE = 0, 1, 2, 3, 4  # m, rad/s, wave number north and east 1/m, rad
-N_W = 5
+FW_AMPLITUDE, FW_OMEGA, FW_NORTH, FW_EAST, FW_PHASE = 0, 1, 2, 3, 4  # m, rad/s, wave number north and east 1/m, rad
+N_FW = 5
 
-ROW = 0.1  # s between samples
-STEPS = 10  # of the integrator in a row
-TAIL = -0.6  # m, body x
+ROW_S = 0.1  # s between samples
+ROW_STEPS = 10  # of the integrator in a row
+FOREIGN_TAIL = -0.6  # m, body x
 STREAM_JITTER, STREAM_TANGLE, STREAM_GUST, STREAM_PUSH, STREAM_NOISE = 40, 41, 42, 50, 60

@@ -9,7 +9,7 @@ import math
 
 from firmware.core.jit import kernel
 from firmware.core.maths.rotations import euler_from_quaternion, quaternion_rate, rotation_nb, wrap_angle
-from firmware.core.vehicle import layout as at
+from firmware.core.vehicle import layout
 from firmware.core.vehicle.actuators import actuator_rate
 from firmware.core.vehicle.layout import N_P, N_X
 from firmware.core.vehicle.motion import accelerations
@@ -32,9 +32,9 @@ def bouc_wen_rate(v, z, play):
 @kernel
 def soft_limit(F, angle):
     """Servo angle (rad) that a soft stop lets through, and its slope."""
-    if F[fo.SERVO_LIMIT] == 0.0:
+    if F[fo.FS_SERVO_LIMIT] == 0.0:
         return angle, 1.0
-    share = (angle * F[fo.SERVO_LIMIT]) ** 6
+    share = (angle * F[fo.FS_SERVO_LIMIT]) ** 6
     below = (1.0 + share) ** (-1.0 / 6.0)
     return angle * below, below / (1.0 + share)
 
@@ -42,8 +42,8 @@ def soft_limit(F, angle):
 @kernel
 def servo_motion(P, F, x, command, out):
     """Angle and speed of the servo's masses; the motor's own motion into out."""
-    low, high, rate, tau = P[at.SERVO_MIN], P[at.SERVO_MAX], P[at.SERVO_RATE], P[at.SERVO_TAU]
-    slow = F[fo.SERVO_SLOW]
+    low, high, rate, tau = P[layout.SERVO_MIN], P[layout.SERVO_MAX], P[layout.SERVO_RATE], P[layout.SERVO_TAU]
+    slow = F[fo.FS_SERVO_SLOW]
     if slow == 0.0:
         speed = actuator_rate(x[13], command, low, high, rate, tau)
     else:  # a motor with inertia: its speed follows the nominal law only after a while
@@ -53,25 +53,27 @@ def servo_motion(P, F, x, command, out):
     out[13] = speed
     angle, slope = soft_limit(F, x[13])
     speed *= slope
-    if F[fo.SERVO_BACKLASH] > 0.0:
-        swallowed = bouc_wen_rate(speed, x[fo.X_SERVO_Z], F[fo.SERVO_BACKLASH])
+    if F[fo.FS_SERVO_BACKLASH] > 0.0:
+        swallowed = bouc_wen_rate(speed, x[fo.X_SERVO_Z], F[fo.FS_SERVO_BACKLASH])
         out[fo.X_SERVO_Z] = swallowed
         angle -= x[fo.X_SERVO_Z]
         speed -= swallowed
-    return angle + F[fo.SERVO_OFFSET] * (1.0 - 0.15 * abs(x[13])), speed
+    return angle + F[fo.FS_SERVO_OFFSET] * (1.0 - 0.15 * abs(x[13])), speed
 
 
 @kernel
 def slider_motion(P, F, x, command, kx, out):
     """Position and speed of the sliding mass; the motor's own motion into out. kx: gravity's share along body x."""
-    speed = actuator_rate(x[14], command, P[at.SLIDER_MIN], P[at.SLIDER_MAX], P[at.SLIDER_RATE], P[at.SLIDER_TAU])
-    if F[fo.SLIDER_SLOW] > 0.0:  # a weak motor: slower still when it lifts the mass
+    speed = actuator_rate(
+        x[14], command, P[layout.SLIDER_MIN], P[layout.SLIDER_MAX], P[layout.SLIDER_RATE], P[layout.SLIDER_TAU]
+    )
+    if F[fo.FS_SLIDER_SLOW] > 0.0:  # a weak motor: slower still when it lifts the mass
         uphill = -kx if speed > 0.0 else kx
-        speed /= 1.0 + 3.0 * F[fo.SLIDER_SLOW] * (1.0 + 0.5 * uphill)
+        speed /= 1.0 + 3.0 * F[fo.FS_SLIDER_SLOW] * (1.0 + 0.5 * uphill)
     out[14] = speed
     position = x[14]
-    if F[fo.SLIDER_BACKLASH] > 0.0:
-        swallowed = bouc_wen_rate(speed, x[fo.X_SLIDER_Z], F[fo.SLIDER_BACKLASH])
+    if F[fo.FS_SLIDER_BACKLASH] > 0.0:
+        swallowed = bouc_wen_rate(speed, x[fo.X_SLIDER_Z], F[fo.FS_SLIDER_BACKLASH])
         out[fo.X_SLIDER_Z] = swallowed
         position -= x[fo.X_SLIDER_Z]
         speed -= swallowed
@@ -81,8 +83,8 @@ def slider_motion(P, F, x, command, kx, out):
 @kernel
 def pump_motion(P, F, x, command, out):
     """Speed of the ballast, kg/s; the pump's own motion into out."""
-    low, high, rate, tau = P[at.BALLAST_MIN], P[at.BALLAST_MAX], P[at.BALLAST_RATE], P[at.BALLAST_TAU]
-    droop, slow = F[fo.PUMP_DROOP], F[fo.PUMP_SLOW]
+    low, high, rate, tau = P[layout.BALLAST_MIN], P[layout.BALLAST_MAX], P[layout.BALLAST_RATE], P[layout.BALLAST_TAU]
+    droop, slow = F[fo.FS_PUMP_DROOP], F[fo.FS_PUMP_SLOW]
     if droop > 0.0 and command < x[15]:  # expelling against depth: power over pressure, by a root
         rate /= math.sqrt(1.0 + droop * max(x[2], 0.0))
     if slow == 0.0:
@@ -98,21 +100,21 @@ def pump_motion(P, F, x, command, out):
 @kernel
 def settled(F, t):
     """How far what is called constant wanders: 0.9 to 1.1 within a run."""
-    return 1.0 + 0.1 * math.sin(2.0 * math.pi * t / F[fo.DRIFT_TIME] + F[fo.DRIFT_PHASE])
+    return 1.0 + 0.1 * math.sin(2.0 * math.pi * t / F[fo.FS_DRIFT_TIME] + F[fo.FS_DRIFT_PHASE])
 
 
 @kernel
 def depth_mass(F, down):
     """Mass (kg, at the origin) that depends on depth: compressed hull or trapped air heavier, denser water lighter."""
     mass, z = 0.0, max(down, 0.0)
-    if F[fo.COMPRESSIBILITY] != 0.0:
-        if F[fo.TRAPPED_AIR] > 0.5:
-            mass += F[fo.COMPRESSIBILITY] * z / (10.3 + z)
+    if F[fo.FS_COMPRESSIBILITY] != 0.0:
+        if F[fo.FS_TRAPPED_AIR] > 0.5:
+            mass += F[fo.FS_COMPRESSIBILITY] * z / (10.3 + z)
         else:
-            mass += F[fo.COMPRESSIBILITY] * (1.0 - math.exp(-z / F[fo.DEPTH_SCALE_M]))
-    if F[fo.STRATIFICATION] != 0.0:
-        middle, width = F[fo.LAYER_DEPTH], F[fo.LAYER_WIDTH]
-        mass -= 0.5 * F[fo.STRATIFICATION] * (math.tanh((z - middle) / width) + math.tanh(middle / width))
+            mass += F[fo.FS_COMPRESSIBILITY] * (1.0 - math.exp(-z / F[fo.FS_DEPTH_SCALE_M]))
+    if F[fo.FS_STRATIFICATION] != 0.0:
+        middle, width = F[fo.FS_LAYER_DEPTH], F[fo.FS_LAYER_WIDTH]
+        mass -= 0.5 * F[fo.FS_STRATIFICATION] * (math.tanh((z - middle) / width) + math.tanh(middle / width))
     return mass
 
 
@@ -121,20 +123,20 @@ def mass_effects(P, F, servo, slider, ballast, down, t, Pw):
     """P with the effects on masses, into Pw (N_P)."""
     for i in range(N_P):
         Pw[i] = P[i]
-    tank = F[fo.BALLAST_SCALE] * ballast * (1.0 + 3.0 * ballast * ballast / 0.04)
-    if F[fo.BALLAST_LEAK] != 0.0 and t > F[fo.LEAK_START]:
-        tank += F[fo.BALLAST_LEAK] * (1.0 - math.exp(-(t - F[fo.LEAK_START]) / F[fo.LEAK_TIME]))
+    tank = F[fo.FS_BALLAST_SCALE] * ballast * (1.0 + 3.0 * ballast * ballast / 0.04)
+    if F[fo.FS_BALLAST_LEAK] != 0.0 and t > F[fo.FS_LEAK_START]:
+        tank += F[fo.FS_BALLAST_LEAK] * (1.0 - math.exp(-(t - F[fo.FS_LEAK_START]) / F[fo.FS_LEAK_TIME]))
     steady = settled(F, t)
-    Pw[at.NET_MASS] += tank + depth_mass(F, down) + F[fo.NET_BUOYANCY] * steady
-    moved = F[fo.SLIDER_SCALE] * P[at.M_S] * slider * (0.8 + 0.4 * slider * slider / 0.0036)
-    Pw[at.CG_X] += (tank * P[at.X_B] + moved) / P[at.M_T] + F[fo.CG_LONGITUDINAL]
-    Pw[at.CG_Y] += F[fo.CG_LATERAL]
+    Pw[layout.NET_MASS] += tank + depth_mass(F, down) + F[fo.FS_NET_BUOYANCY] * steady
+    moved = F[fo.FS_SLIDER_SCALE] * P[layout.M_S] * slider * (0.8 + 0.4 * slider * slider / 0.0036)
+    Pw[layout.CG_X] += (tank * P[layout.X_B] + moved) / P[layout.M_T] + F[fo.FS_CG_LONGITUDINAL]
+    Pw[layout.CG_Y] += F[fo.FS_CG_LATERAL]
     # a weight that sits off the middle is not at the middle's height either
-    Pw[at.CG_Z] += F[fo.CG_VERTICAL] + 0.06 * abs(F[fo.CG_LATERAL]) - 0.06 * abs(F[fo.CG_LONGITUDINAL])
-    Pw[at.J_YY] += F[fo.INERTIA]
-    Pw[at.J_ZZ] += 1.15 * F[fo.INERTIA]
-    Pw[at.A_Z] *= 1.0 + F[fo.ADDED_MASS]
-    Pw[at.A_Y] *= 1.0 + 0.15 * F[fo.ADDED_MASS]
+    Pw[layout.CG_Z] += F[fo.FS_CG_VERTICAL] + 0.06 * abs(F[fo.FS_CG_LATERAL]) - 0.06 * abs(F[fo.FS_CG_LONGITUDINAL])
+    Pw[layout.J_YY] += F[fo.FS_INERTIA]
+    Pw[layout.J_ZZ] += 1.15 * F[fo.FS_INERTIA]
+    Pw[layout.A_Z] *= 1.0 + F[fo.FS_ADDED_MASS]
+    Pw[layout.A_Y] *= 1.0 + 0.15 * F[fo.FS_ADDED_MASS]
 
 
 @kernel
@@ -147,56 +149,56 @@ def water_effects(P, F, u, v, w, p, q, r, tilt, down, down_rate, pump, x, t, see
     speed = math.sqrt(v2)
     # in place of V^2
     power = v2
-    if F[fo.EXPONENT] != 2.0 and speed > 1e-4:
-        power *= (speed / REFERENCE_SPEED) ** (F[fo.EXPONENT] - 2.0)
+    if F[fo.FS_EXPONENT] != 2.0 and speed > 1e-4:
+        power *= (speed / REFERENCE_SPEED) ** (F[fo.FS_EXPONENT] - 2.0)
     D, SF, L, T1, T2, T3 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    if F[fo.DRAG] != 0.0:
-        D += F[fo.DRAG] * (P[at.K_D0] + P[at.K_D] * (alpha - 0.01) * (alpha - 0.01)) * power
-    if F[fo.LINEAR_DRAG] != 0.0:
-        D += F[fo.LINEAR_DRAG] * speed * (speed / REFERENCE_SPEED) ** 0.15
-    if F[fo.ASYMMETRY] != 0.0:
-        D += F[fo.ASYMMETRY] * (P[at.K_D0] + P[at.K_D] * alpha * alpha) * math.tanh(down_rate / 0.04) * power
-    if F[fo.SIDE_FORCE] != 0.0:
-        SF += F[fo.SIDE_FORCE] * P[at.K_BETA] * 0.5 * math.sin(2.0 * beta) * power
-    if F[fo.LIFT] != 0.0:
-        L += F[fo.LIFT] * P[at.K_L] * 0.5 * math.sin(2.0 * alpha) * power
-    if F[fo.STALL] > 0.0:
-        bent = min(abs(alpha) * F[fo.STALL], 0.5 * math.pi)
-        L += P[at.K_L] * (math.copysign(math.sin(bent) / F[fo.STALL], alpha) - alpha) * v2
-    T1 += F[fo.ROLL_TRIM] * (1.0 + 0.3 * alpha) * power
-    T2 += F[fo.PITCH_TRIM] * (1.0 - 0.3 * alpha) * power
-    T2 += F[fo.PITCH_DAMPING] * P[at.K_Q] * (0.7 * v2 + 0.8 * abs(q)) * q
-    T3 += F[fo.YAW_TRIM] * (1.0 + 0.3 * alpha) * power
-    if F[fo.WEATHERCOCK] != 0.0:
-        T3 += F[fo.WEATHERCOCK] * P[at.K_MY] * 0.5 * math.sin(2.0 * beta) * power
-    T3 += F[fo.YAW_DAMPING] * P[at.K_R] * (0.7 * v2 + 0.4 * abs(r)) * r
+    if F[fo.FS_DRAG] != 0.0:
+        D += F[fo.FS_DRAG] * (P[layout.K_D0] + P[layout.K_D] * (alpha - 0.01) * (alpha - 0.01)) * power
+    if F[fo.FS_LINEAR_DRAG] != 0.0:
+        D += F[fo.FS_LINEAR_DRAG] * speed * (speed / REFERENCE_SPEED) ** 0.15
+    if F[fo.FS_ASYMMETRY] != 0.0:
+        D += F[fo.FS_ASYMMETRY] * (P[layout.K_D0] + P[layout.K_D] * alpha * alpha) * math.tanh(down_rate / 0.04) * power
+    if F[fo.FS_SIDE_FORCE] != 0.0:
+        SF += F[fo.FS_SIDE_FORCE] * P[layout.K_BETA] * 0.5 * math.sin(2.0 * beta) * power
+    if F[fo.FS_LIFT] != 0.0:
+        L += F[fo.FS_LIFT] * P[layout.K_L] * 0.5 * math.sin(2.0 * alpha) * power
+    if F[fo.FS_STALL] > 0.0:
+        bent = min(abs(alpha) * F[fo.FS_STALL], 0.5 * math.pi)
+        L += P[layout.K_L] * (math.copysign(math.sin(bent) / F[fo.FS_STALL], alpha) - alpha) * v2
+    T1 += F[fo.FS_ROLL_TRIM] * (1.0 + 0.3 * alpha) * power
+    T2 += F[fo.FS_PITCH_TRIM] * (1.0 - 0.3 * alpha) * power
+    T2 += F[fo.FS_PITCH_DAMPING] * P[layout.K_Q] * (0.7 * v2 + 0.8 * abs(q)) * q
+    T3 += F[fo.FS_YAW_TRIM] * (1.0 + 0.3 * alpha) * power
+    if F[fo.FS_WEATHERCOCK] != 0.0:
+        T3 += F[fo.FS_WEATHERCOCK] * P[layout.K_MY] * 0.5 * math.sin(2.0 * beta) * power
+    T3 += F[fo.FS_YAW_DAMPING] * P[layout.K_R] * (0.7 * v2 + 0.4 * abs(r)) * r
     # outside the catalogue
-    if F[fo.FOULING] != 0.0:
-        grown = F[fo.FOULING] / (1.0 + math.exp(-(t - F[fo.FOUL_TIME]) / 0.5))
-        D += grown * P[at.K_D0] * v2
-        L -= 0.3 * grown * P[at.K_L] * alpha * v2
+    if F[fo.FS_FOULING] != 0.0:
+        grown = F[fo.FS_FOULING] / (1.0 + math.exp(-(t - F[fo.FS_FOUL_TIME]) / 0.5))
+        D += grown * P[layout.K_D0] * v2
+        L -= 0.3 * grown * P[layout.K_L] * alpha * v2
     followed = 0.0
-    if F[fo.LIFT_LAG] != 0.0:
-        followed = (alpha - x[fo.X_ALPHA]) / F[fo.LIFT_TIME]
-        L += F[fo.LIFT_LAG] * P[at.K_L] * (x[fo.X_ALPHA] - alpha) * v2
-    T2 += F[fo.ROLL_PITCH] * tilt * v2 + F[fo.FLAP] * x[fo.X_FLAP_V]
+    if F[fo.FS_LIFT_LAG] != 0.0:
+        followed = (alpha - x[fo.X_ALPHA]) / F[fo.FS_LIFT_TIME]
+        L += F[fo.FS_LIFT_LAG] * P[layout.K_L] * (x[fo.X_ALPHA] - alpha) * v2
+    T2 += F[fo.FS_ROLL_PITCH] * tilt * v2 + F[fo.FS_FLAP] * x[fo.X_FLAP_V]
     X, Y, Z = flow_to_body(u, v, w, -D, SF, -L)
     K, M, N = flow_to_body(u, v, w, T1, T2, T3)
-    X += F[fo.PUMP_JET] * abs(pump) / P[at.BALLAST_RATE]
+    X += F[fo.FS_PUMP_JET] * abs(pump) / P[layout.BALLAST_RATE]
     # pulled at the tail, against the way that the tail itself goes
-    line = 3.0 * F[fo.TETHER] * math.sqrt(1.0 + max(down, 0.0))
-    if F[fo.TANGLE] != 0.0 and uniform(seed, fo.STREAM_TANGLE, int(t / TANGLE_BLOCK)) < 0.45:
-        caught = F[fo.TANGLE] * math.sin(math.pi * (t / TANGLE_BLOCK - math.floor(t / TANGLE_BLOCK))) ** 2
+    line = 3.0 * F[fo.FS_TETHER] * math.sqrt(1.0 + max(down, 0.0))
+    if F[fo.FS_TANGLE] != 0.0 and uniform(seed, fo.STREAM_TANGLE, int(t / TANGLE_BLOCK)) < 0.45:
+        caught = F[fo.FS_TANGLE] * math.sin(math.pi * (t / TANGLE_BLOCK - math.floor(t / TANGLE_BLOCK))) ** 2
         X -= caught * v2
         N += TANGLE_ARM * caught * v2
     if line != 0.0:
-        vt, wt = v + fo.TAIL * r, w - fo.TAIL * q
+        vt, wt = v + fo.FOREIGN_TAIL * r, w - fo.FOREIGN_TAIL * q
         pull = line * math.sqrt(u * u + vt * vt + wt * wt)
         X -= pull * u
         Y -= pull * vt
         Z -= pull * wt
-        M += fo.TAIL * pull * wt
-        N -= fo.TAIL * pull * vt
+        M += fo.FOREIGN_TAIL * pull * wt
+        N -= fo.FOREIGN_TAIL * pull * vt
     return X, Y, Z, K, M, N, followed
 
 
@@ -204,20 +206,20 @@ def water_effects(P, F, u, v, w, p, q, r, tilt, down, down_rate, pump, x, t, see
 def foreign_water(F, waves, north, east, down, t):
     """Velocity of the water, m/s NED: a current that slowly turns, a logarithmic shear, a narrow sea of waves."""
     vn, ve, vd, z = 0.0, 0.0, 0.0, max(down, 0.0)
-    if F[fo.CURRENT_N] != 0.0 or F[fo.CURRENT_E] != 0.0:
-        bend = 0.15 * math.sin(2.0 * math.pi * t / (2.0 * F[fo.DRIFT_TIME]) + F[fo.DRIFT_PHASE])
-        vn += F[fo.CURRENT_N] - bend * F[fo.CURRENT_E]
-        ve += F[fo.CURRENT_E] + bend * F[fo.CURRENT_N]
-    if F[fo.SHEAR_N] != 0.0 or F[fo.SHEAR_E] != 0.0:
+    if F[fo.FS_CURRENT_N] != 0.0 or F[fo.FS_CURRENT_E] != 0.0:
+        bend = 0.15 * math.sin(2.0 * math.pi * t / (2.0 * F[fo.FS_DRIFT_TIME]) + F[fo.FS_DRIFT_PHASE])
+        vn += F[fo.FS_CURRENT_N] - bend * F[fo.FS_CURRENT_E]
+        ve += F[fo.FS_CURRENT_E] + bend * F[fo.FS_CURRENT_N]
+    if F[fo.FS_SHEAR_N] != 0.0 or F[fo.FS_SHEAR_E] != 0.0:
         grown = math.log(1.0 + z / 1.5)
-        vn += F[fo.SHEAR_N] * grown
-        ve += F[fo.SHEAR_E] * grown
-    if F[fo.WAVES] != 0.0:
+        vn += F[fo.FS_SHEAR_N] * grown
+        ve += F[fo.FS_SHEAR_E] * grown
+    if F[fo.FS_WAVES] != 0.0:
         for i in range(waves.shape[0]):
-            kn, ke, omega = waves[i, fo.W_NORTH], waves[i, fo.W_EAST], waves[i, fo.W_OMEGA]
+            kn, ke, omega = waves[i, fo.FW_NORTH], waves[i, fo.FW_EAST], waves[i, fo.FW_OMEGA]
             k = math.sqrt(kn * kn + ke * ke)
-            phase = kn * north + ke * east - omega * t + waves[i, fo.W_PHASE]
-            orbit = F[fo.WAVES] * waves[i, fo.W_AMPLITUDE] * omega * math.exp(-k * z)
+            phase = kn * north + ke * east - omega * t + waves[i, fo.FW_PHASE]
+            orbit = F[fo.FS_WAVES] * waves[i, fo.FW_AMPLITUDE] * omega * math.exp(-k * z)
             vn += orbit * math.cos(phase) * kn / k
             ve += orbit * math.cos(phase) * ke / k
             vd -= orbit * math.sin(phase)
@@ -227,17 +229,17 @@ def foreign_water(F, waves, north, east, down, t):
 @kernel
 def lagging(F, x, out):
     """dx/dt of the sensors' two-stage lags."""
-    if F[fo.ATTITUDE_LAG] > 0.0:
+    if F[fo.FS_ATTITUDE_LAG] > 0.0:
         phi, theta, psi = euler_from_quaternion(x[3], x[4], x[5], x[6])
-        stage = 0.5 * F[fo.ATTITUDE_LAG]
+        stage = 0.5 * F[fo.FS_ATTITUDE_LAG]
         one, two = fo.X_ATT_1, fo.X_ATT_2
         out[one] = wrap_angle(phi - x[one]) / stage
         out[one + 1] = (theta - x[one + 1]) / stage
         out[one + 2] = wrap_angle(psi - x[one + 2]) / stage
         for i in range(3):
             out[two + i] = wrap_angle(x[one + i] - x[two + i]) / stage
-    if F[fo.DEPTH_LAG] > 0.0:
-        stage = 0.5 * F[fo.DEPTH_LAG]
+    if F[fo.FS_DEPTH_LAG] > 0.0:
+        stage = 0.5 * F[fo.FS_DEPTH_LAG]
         out[fo.X_DEPTH_1] = (x[2] - x[fo.X_DEPTH_1]) / stage
         out[fo.X_DEPTH_2] = (x[fo.X_DEPTH_1] - x[fo.X_DEPTH_2]) / stage
 
@@ -266,10 +268,10 @@ def foreign_derivative(P, F, waves, seed, x, servo_cmd, slider_cmd, ballast_cmd,
     out[3], out[4], out[5], out[6] = quaternion_rate(q0, q1, q2, q3, p, q, r)
     out[7], out[8], out[9] = a1 + acc[0] + x[28], a2 + acc[1] + x[29], a3 + acc[2] + x[30]
     out[10], out[11], out[12] = a4 + acc[3] + x[31], a5 + acc[4] + x[32], a6 + acc[5] + x[33]
-    if F[fo.FLAP] != 0.0:
+    if F[fo.FS_FLAP] != 0.0:
         out[fo.X_FLAP] = x[fo.X_FLAP_V]
-        omega = F[fo.FLAP_OMEGA]
-        out[fo.X_FLAP_V] = -omega * (omega * x[fo.X_FLAP] + 2.0 * F[fo.FLAP_ZETA] * x[fo.X_FLAP_V] + 2.0 * q)
+        omega = F[fo.FS_FLAP_OMEGA]
+        out[fo.X_FLAP_V] = -omega * (omega * x[fo.X_FLAP] + 2.0 * F[fo.FS_FLAP_ZETA] * x[fo.X_FLAP_V] + 2.0 * q)
     out[fo.X_ALPHA] = followed
     lagging(F, x, out)
 
@@ -292,11 +294,11 @@ def foreign_step(P, F, waves, seed, x, servo_cmd, slider_cmd, ballast_cmd, t, dt
 @kernel
 def gusts(F, linear, angular, seed, count, dt, x):
     """Turbulence moved on by dt: an Ornstein-Uhlenbeck process on each axis, in x."""
-    if F[fo.TURBULENCE] == 0.0:
+    if F[fo.FS_TURBULENCE] == 0.0:
         return
-    keep = math.exp(-dt / F[fo.GUST_TIME])
+    keep = math.exp(-dt / F[fo.FS_GUST_TIME])
     for i in range(6):
-        strength = F[fo.TURBULENCE] * (linear if i < 3 else angular)
+        strength = F[fo.FS_TURBULENCE] * (linear if i < 3 else angular)
         x[fo.X_GUST + i] = keep * x[fo.X_GUST + i] + strength * math.sqrt(1.0 - keep * keep) * gaussian(
             seed, fo.STREAM_GUST + i, count
         )

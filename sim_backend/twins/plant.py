@@ -12,12 +12,12 @@ import numpy as np
 from firmware.core.maths.rotations import quaternion_from_euler
 from firmware.core.vehicle.layout import X_ACT, X_NU, X_POS, X_QUAT
 from hal.ports import BEACON, IMU, PLUNGER_WIRE, SLIDER_WIRE
-from sim_backend.core import layout
+from sim_backend.core import layout as wl
 from sim_backend.core.effect_layout import X_LAG
 from sim_backend.world import Environment, SampledSensor, SampledSensors, Start, World, build_world
 
 AT_ONCE = SampledSensor(rate_hz=100.0, delay_s=0.0)  # the lines add the delays
-SERVO, SLIDER, BALLAST = 0, 1, 2
+CMD_SERVO, CMD_SLIDER, CMD_BALLAST = 0, 1, 2
 
 
 class TwinPlant:
@@ -27,7 +27,7 @@ class TwinPlant:
         sensors = SampledSensors(imu=AT_ONCE, beacon=AT_ONCE, slider_wire=AT_ONCE, plunger_wire=AT_ONCE)
         self._flight = build_world(vehicle, environment, sensors, start, seed, effects)
         self.world: World = build_world(vehicle, environment, sensors, start, seed, effects)
-        self.kg_per_m = float(self.world.E[layout.WATER_DENSITY]) * vehicle.actuators.ballast.plunger_area
+        self.kg_per_m = float(self.world.E[wl.ENV_WATER_DENSITY]) * vehicle.actuators.ballast.plunger_area
         self.free = False
         self._let_go = let_go
         self._released_at = 0.0
@@ -94,11 +94,11 @@ class TwinPlant:
     def actuator(self, index: int) -> float:
         """Where the slider or the plunger is, m; the servo, rad."""
         value = float(self.world.x[X_ACT + index])
-        return value / self.kg_per_m if index == BALLAST else value
+        return value / self.kg_per_m if index == CMD_BALLAST else value
 
     def drive(self, index: int, metres: float) -> None:
         """Move the slider's or the plunger's drive to a place, m."""
-        self.world.cmd[index] = metres * self.kg_per_m if index == BALLAST else metres
+        self.world.cmd[index] = metres * self.kg_per_m if index == CMD_BALLAST else metres
 
     def state(self) -> dict[str, float]:
         """The truth, for people and tests."""

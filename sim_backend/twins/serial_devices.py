@@ -5,12 +5,13 @@ import math
 import random
 from pathlib import Path
 
+from firmware.core.vehicle.layout import GRAVITY
 from hal.boardfile import ImuTable, PortTable, ServoTable
 from hal.drivers.vn100 import euler, rotation
 from hal.protocols import maestro, vn100
 from sim_backend.twins.faults import Fault
 from sim_backend.twins.line import Line
-from sim_backend.twins.plant import SERVO, TwinPlant
+from sim_backend.twins.plant import CMD_SERVO, TwinPlant
 
 MODEL = "VN-100T-CR"
 DEAD_MAN_S = 1.0  # the servo board's serial timeout
@@ -73,7 +74,7 @@ class Vn100Twin:
         (roll, pitch, yaw), rates = self._values()
         if self.fault.kind == "nan":
             roll = pitch = yaw = math.nan
-        gravity = (rotation(math.radians(roll), math.radians(pitch), 0.0).T @ (0.0, 0.0, -9.80665)).tolist()
+        gravity = (rotation(math.radians(roll), math.radians(pitch), 0.0).T @ (0.0, 0.0, -GRAVITY)).tolist()
         return vn100.encode_binary(vn100.FLIGHT_MASK, int(t * 1e9), yaw, pitch, roll, *rates, *gravity)
 
     def _text(self) -> bytes:
@@ -124,7 +125,7 @@ class MaestroTwin:
             return
         self._plant.first_command()
         if quarter_us:  # 0: no pulses, the servo stays where it is
-            self._plant.commands[SERVO] = (quarter_us / 4.0 - self._table.zero_us) / self._table.us_per_rad
+            self._plant.commands[CMD_SERVO] = (quarter_us / 4.0 - self._table.zero_us) / self._table.us_per_rad
 
     def _reply(self, command: maestro.Command) -> None:
         if command.code == maestro.GET_ERRORS:

@@ -24,7 +24,7 @@ from sim_backend.twins.boardfile import TwinFile, decode_twin_file
 from sim_backend.twins.faults import Fault, FaultError, parse_fault
 from sim_backend.twins.modbus_devices import AnalogTwin, DriveTwin, EncoderTwin, PressureTwin, RegisterTwin
 from sim_backend.twins.modbus_line import ModbusTwin
-from sim_backend.twins.plant import BALLAST, SLIDER, TwinPlant
+from sim_backend.twins.plant import CMD_BALLAST, CMD_SLIDER, TwinPlant
 from sim_backend.twins.serial_devices import MaestroTwin, Vn100Twin
 
 STEP_S = 0.01
@@ -65,7 +65,7 @@ class TwinService:
         if found.role == "encoder":
             return EncoderTwin(table.id, found, self.plant, name, table)
         if found.role == "drive":
-            index = SLIDER if name == "slider" else BALLAST
+            index = CMD_SLIDER if name == "slider" else CMD_BALLAST
             self.drives[name] = DriveTwin(table.id, found, self.plant, index, table)
             return self.drives[name]
         module = self._modules.setdefault((table.port, table.id), AnalogTwin(table.id, found, self.plant))

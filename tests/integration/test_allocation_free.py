@@ -6,7 +6,7 @@ from numba import njit
 from numba.core.runtime import _nrt_python, rtsys
 
 from firmware.core.control import autopilot as core
-from firmware.core.control import control_layout as at
+from firmware.core.control import control_layout as ctl
 from firmware.core.control.telemetry import N_RECORD, fill_record
 from tools.measure.benchmark.allocations import BOXED, largest_block
 from tools.measure.benchmark.tick import harness, measure_tick
@@ -124,7 +124,7 @@ def test_the_compiled_tick_allocates_nothing(controller):
     with harness(LAW_FLIES.format(controller)) as flown:
         flown.run(50)
         pilot = flown.runtime.autopilot
-        law_at_work = pilot.ap[at.LAW_RAN] == 1.0 and np.isfinite(pilot.ap[at.MARGIN_DEPTH])
+        law_at_work = pilot.ap[ctl.LAW_RAN] == 1.0 and np.isfinite(pilot.ap[ctl.MARGIN_DEPTH])
         assert law_at_work == (controller != "pid")
         arguments = (pilot.P, pilot.C, pilot.legs, pilot.frame, pilot.est, pilot.ap)
         arguments += (pilot.nav, pilot.commands, np.zeros(N_RECORD))

@@ -27,7 +27,7 @@ def glider(*words: object) -> int:
 @pytest.fixture(scope="module")
 def lateral(tmp_path_factory):
     F = np.zeros(ef.N_F)
-    F[ef.CG_Y] = 0.0015
+    F[ef.CG_OFFSET_Y] = 0.0015
     folder = tmp_path_factory.mktemp("lateral")
     case = make_case(folder, F, seed=11)
     assert glider("gap", "diagnose", case.folder, "--out", folder / "out") == 0
@@ -132,7 +132,7 @@ def test_what_is_selected_beside_the_unknown_does_not_make_it_worse(pushed):
 def test_a_vehicle_that_does_not_fit_is_to_be_identified_first(tmp_path, capsys):
     """One run of another vehicle, without commands: not `none`, and no cause either."""
     F = np.zeros(ef.N_F)
-    F[ef.CG_X], F[ef.NET_MASS], F[ef.DRAG_0], F[ef.PITCH_TRIM], F[ef.LIFT] = 0.004, 0.08, 2.0, 1.5, -0.8
+    F[ef.CG_OFFSET_X], F[ef.NET_MASS_OFFSET], F[ef.DRAG_0], F[ef.PITCH_TRIM], F[ef.LIFT] = 0.004, 0.08, 2.0, 1.5, -0.8
     case = make_case(tmp_path, F, seed=14, runs=1)
     run = case.folder / "run00.csv"
     lines = [line.split(",") for line in run.read_text().splitlines()]

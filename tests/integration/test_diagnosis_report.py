@@ -10,7 +10,7 @@ import pytest
 from support.flights import World, fly_case
 from support.pages import assert_offline
 
-from firmware.core.vehicle import layout as at
+from firmware.core.vehicle import layout
 from tools.cli.common import report_errors
 from tools.cli.main import cli
 from tools.data.runs.case import load_case, write_case
@@ -42,7 +42,7 @@ FRAME = """<!doctype html><body style="margin:0">
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:
     """A heavy vehicle's case and, beside it, the answer."""
-    case, _ = fly_case(World(mocap=True, seconds=60.0, changes={at.NET_MASS: HEAVY}), 41, runs=3)
+    case, _ = fly_case(World(mocap=True, seconds=60.0, changes={layout.NET_MASS: HEAVY}), 41, runs=3)
     path = tmp_path_factory.mktemp("diagnosis") / "heavy"
     write_case(
         path, case.runs, vehicle="roughie", site="pond", log_rate_hz=10.0, water_density_kg_m3=998.0, suffix=".csv.gz"

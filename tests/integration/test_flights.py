@@ -12,6 +12,7 @@ import pytest
 from support.patience import patient_vehicle
 
 from firmware.core.control.control_layout import LEG
+from firmware.core.supervision import supervisor_layout as sup
 from firmware.supervisor.table import Reaction
 from hal.ports import SLOTS
 from hal.recorder.recorder import NullRecorder
@@ -37,7 +38,9 @@ def flown(mission, seed=0, effects=None):
     """Fly under the real runtime; returns the flight and what the recorder was given, (ticks, fields)."""
     flight = build_flight(mission=mission, seed=seed, effects=effects)
     if effects:
-        flight.supervisor.disable(21)  # so much at once pitches the vehicle past 60 deg, where the supervisor ends it
+        flight.supervisor.disable(
+            sup.FAULT_STEEP
+        )  # so much at once pitches the vehicle past 60 deg, where the supervisor ends it
     recorder = NullRecorder(record_specs(flight))
     rows = []
     channel = recorder.channel("/tick")
@@ -191,7 +194,7 @@ def test_a_tick_that_comes_late_finds_the_present():
         assert flight.board.clock.now() - taken < 0.2
         for _ in range(5):
             runtime.tick()
-        assert flight.supervisor.worst(1) == Reaction.NOTHING
+        assert flight.supervisor.worst(sup.FAULT_IMU_LOST) == Reaction.NOTHING
     finally:
         runtime.disarm()
 

@@ -6,7 +6,7 @@ import pytest
 
 from firmware.autopilot import configuration
 from firmware.control.gains import Control, Law
-from firmware.core.control import control_layout as at
+from firmware.core.control import control_layout as ctl
 from firmware.guidance.mission import decode_mission
 from firmware.model.library import shipped
 from tools.data.sources import load_vehicle
@@ -92,5 +92,5 @@ def test_law_plus_flies_with_gains_of_its_own():
         flying = msgspec.structs.replace(mission, control=Control(controller=controller))
         C = configuration(VEHICLE, flying, dt=0.02, periods={"imu": 0.02, "beacon": 0.04, "wires": 0.04})
         pitch, depth = table.pitch, table.depth
-        assert C[at.PITCH_K1 : at.PITCH_EPS + 1].tolist() == [pitch.k1, pitch.k2, pitch.k3, pitch.eps]
-        assert C[at.DEPTH_K1 : at.DEPTH_EPS + 1].tolist() == [depth.k1, depth.k2, depth.k3, depth.eps]
+        assert C[ctl.PITCH_K1 : ctl.PITCH_EPS + 1].tolist() == [pitch.k1, pitch.k2, pitch.k3, pitch.eps]
+        assert C[ctl.DEPTH_K1 : ctl.DEPTH_EPS + 1].tolist() == [depth.k1, depth.k2, depth.k3, depth.eps]

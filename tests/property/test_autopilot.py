@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from firmware.autopilot import CONTROLLERS, Autopilot, configuration
-from firmware.core.control import control_layout as at
+from firmware.autopilot import Autopilot, configuration
+from firmware.core.control import control_layout as ctl
+from firmware.core.control.controllers import CONTROLLERS
 from firmware.core.vehicle import layout
 from firmware.guidance.mission import decode_mission
 from firmware.model.library import shipped
@@ -48,7 +49,7 @@ sample = st.one_of(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(width=6
 @given(st.lists(st.lists(sample, min_size=FRAME_SIZE, max_size=FRAME_SIZE), min_size=3, max_size=12))
 def test_absurd_samples_never_reach_an_actuator(controller, frames):
     pilot = autopilot()
-    pilot.C[at.CONTROLLER] = CONTROLLERS[controller]
+    pilot.C[ctl.CONTROLLER] = CONTROLLERS[controller].number
     last = feed(pilot, 0.0)
     for number, frame in enumerate(frames, start=1):
         pilot.frame[:] = frame
@@ -73,10 +74,10 @@ def test_an_old_or_repeated_sample_is_not_a_new_one():
     feed(pilot, 0.0, pitch=0.1)
     pilot.frame[IMU + 3] = 0.5  # the same time: not a new sample
     pilot.tick(0.02)
-    assert pilot.est[at.NEW_PITCH] == 0.1
+    assert pilot.est[ctl.NEW_PITCH] == 0.1
     pilot.frame[IMU] = 0.04
-    pilot.tick(0.04 + pilot.C[at.MAX_AGE_IMU] + 0.01)  # too old when it is seen
-    assert pilot.est[at.NEW_PITCH] == 0.1
+    pilot.tick(0.04 + pilot.C[ctl.MAX_AGE_IMU] + 0.01)  # too old when it is seen
+    assert pilot.est[ctl.NEW_PITCH] == 0.1
 
 
 @pytest.mark.parametrize(("dead", "reason"), [(IMU, "no attitude"), (BEACON, "no depth")])
@@ -87,7 +88,7 @@ def test_a_dead_sensor_gives_the_dive_up(dead, reason):
         feed(pilot, t)
         if t > 1.0:
             pilot.frame[dead + 1] = 0.0
-            pilot.est[at.EST_IMU_TIME if dead == IMU else at.EST_BEACON_TIME] = 1.0
+            pilot.est[ctl.EST_IMU_TIME if dead == IMU else ctl.EST_BEACON_TIME] = 1.0
         pilot.tick(t)
     assert pilot.mode == "aborted"
     assert pilot.reason == reason
@@ -119,8 +120,8 @@ def test_net_ballast_mass_follows_from_travel_and_density():
     feed(pilot, 0.0)
     feed(pilot, 0.02, depth=2.0, plunger=0.01)
     area = VEHICLE.actuators.ballast.plunger_area
-    assert pilot.est[at.NEW_BALLAST] == pytest.approx(998.2 * area * 0.01, rel=1e-4)
-    assert pilot.est[at.NEW_DEPTH] == pytest.approx(2.0, abs=1e-3)
+    assert pilot.est[ctl.NEW_BALLAST] == pytest.approx(998.2 * area * 0.01, rel=1e-4)
+    assert pilot.est[ctl.NEW_DEPTH] == pytest.approx(2.0, abs=1e-3)
 
 
 @pytest.mark.parametrize("name", shipped("guidance/missions"))
@@ -128,4 +129,4 @@ def test_shipped_missions_are_sound(name):
     mission = decode_mission(shipped("guidance/missions")[name], name)
     legs = mission.matrix(VEHICLE, name)
     assert mission.name == name
-    assert legs.shape == (len(mission.leg), at.N_LEG)
+    assert legs.shape == (len(mission.leg), ctl.N_LEG)

@@ -9,14 +9,14 @@ from model_states import actuators, repeatable, states, vehicles
 from firmware.core.maths.steps import RK4
 from firmware.core.vehicle import layout
 from sim_backend.core import effect_layout as ef
-from sim_backend.core import layout as at
+from sim_backend.core import layout as wl
 from sim_backend.core.effect_plant import effect_step, effective_parameters
 from sim_backend.core.effects.actuation import backlash
 from sim_backend.core.plant import plant_step
 from sim_backend.effects.catalogue import catalogue
 
-NO_WAVES = np.zeros((0, at.N_WAVE))
-STILL = np.zeros(at.N_E)
+NO_WAVES = np.zeros((0, wl.N_WAVE))
+STILL = np.zeros(wl.N_ENV)
 IN_F = [label for label, effect in catalogue().items() if effect.apply is None]
 
 
@@ -50,7 +50,7 @@ def test_without_effects_a_step_is_the_plain_step(vehicle, x, command, acc):
     P, F, acc = np.zeros(layout.N_P), np.zeros(ef.N_F), np.array(acc)
     effective_parameters(vehicle, F, P)
     np.testing.assert_array_equal(P, vehicle)
-    plain, other, work = extended(x), extended(x), np.zeros((at.N_WORK, at.WORK_WIDTH))
+    plain, other, work = extended(x), extended(x), np.zeros((wl.N_WORK, wl.WORK_WIDTH))
     plant_step(vehicle, STILL, NO_WAVES, plain, np.array(command), 0.0, 0.01, acc, work)
     effect_step(RK4, P, F, other, 0, *command, 0.0, acc, 0.0, np.zeros(3), 0.01, work)
     size = 1.0 + np.abs(plain[: layout.N_X])
@@ -80,7 +80,7 @@ def test_any_effects_within_their_ranges_leave_a_vehicle_a_vehicle(effects, x, c
 
     F, P = Plain(effects).F, np.zeros(layout.N_P)
     effective_parameters(vehicle, F, P)
-    state, work = extended(x), np.zeros((at.N_WORK, at.WORK_WIDTH))
+    state, work = extended(x), np.zeros((wl.N_WORK, wl.WORK_WIDTH))
     speed = max(0.6, float(np.abs(state[7:13]).max()))
     state[7:13] *= 0.6 / speed
     for k in range(100):

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from firmware.core.control import control_layout as at
+from firmware.core.control import control_layout as ctl
 from firmware.guidance.mission import decode_mission
 from sim_backend.core.closed_loop import N_END, N_TRACE, fly
 from tools.flight.compose import build_flight
@@ -25,7 +25,7 @@ def end_state(tmp_path, legs, seed=0):
         world.P, pilot.P, pilot.C, pilot.legs, pilot.nav, world.E, world.F, world.waves, world.sensors,
         world.errors, world.seed, world.x, world.dt, 30_000, 30_000, trace, end,
     )  # fmt: skip
-    assert end[0] == at.COMPLETED
+    assert end[0] == ctl.COMPLETED
     x = world.x
     yaw = math.atan2(2 * (x[3] * x[6] + x[4] * x[5]), 1 - 2 * (x[5] ** 2 + x[6] ** 2))
     return x, yaw

@@ -81,7 +81,7 @@ def test_the_slider_loses_its_grip_at_the_poles_alone(vehicle, x, speeds, paper)
     """det G = -m_s g^2 ctheta det N with N positive definite: at every roll, phi = +-90 deg included."""
     _, _, g_ts, g_tb, g_zs, g_zb = form_at(vehicle, x, speeds, paper_form if paper else exact_form)
     cos_pitch = math.hypot(*down(x)[1:])
-    det_N = (g_ts * g_zb - g_tb * g_zs) / (-vehicle[layout.M_S] * layout.G**2 * cos_pitch)
+    det_N = (g_ts * g_zb - g_tb * g_zs) / (-vehicle[layout.M_S] * layout.GRAVITY**2 * cos_pitch)
     # 1/(m Jt) between that of the heaviest axes and that of the lightest
     assert 0.5 / (35.0 * 4.0) < det_N < 2.0 / (10.0 * 1.5)
     assert g_ts < 0.0 < g_zb

@@ -28,8 +28,8 @@ def energy(vehicle: np.ndarray, x: np.ndarray) -> float:
     """Kinetic energy 1/2 nu' M nu and potential energy -W Z - g S.k, k the direction of down in body axes; J."""
     nu, act = x[7:13], x[layout.X_ACT :]
     down = np.array(rotation_nb(*x[3:7]))[6:]
-    weight = layout.G * (act[2] + vehicle[layout.NET_MASS])
-    swing = layout.G * np.dot(first_moment(vehicle, *act), down)
+    weight = layout.GRAVITY * (act[2] + vehicle[layout.NET_MASS])
+    swing = layout.GRAVITY * np.dot(first_moment(vehicle, *act), down)
     return 0.5 * nu @ full_mass_matrix(act, vehicle) @ nu - weight * x[2] - swing
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from firmware.core.estimation import estimator_layout as at
+from firmware.core.estimation import estimator_layout as kf
 from firmware.core.estimation.estimator import estimator_predict, estimator_start, estimator_update
 from firmware.core.maths.rotations import quaternion_from_euler
 from firmware.estimation.settings import estimator_settings, first_spread, parameter_sigma
@@ -25,10 +25,10 @@ class Filter:
         self.settings = estimator_settings(self.vehicle.sensors, self.vehicle.disturbance, self.mode)
         self.sigma = parameter_sigma(self.P, self.vehicle.uncertainty) * self.uncertain
         if not self.uncertain:
-            self.settings[[at.S_SLIDER_BIAS, at.S_BALLAST_BIAS]] = 0.0
-        self.x, self.cov = np.zeros(at.N_XE), np.zeros((at.N_E, at.N_E))
-        self.stress, self.beyond, self.scores = np.ones(2), np.zeros(at.N_Z), np.full(at.N_Z, np.nan)
-        self.work = np.zeros((at.N_WORK_ROWS, at.N_W))
+            self.settings[[kf.S_SLIDER_BIAS, kf.S_BALLAST_BIAS]] = 0.0
+        self.x, self.cov = np.zeros(kf.N_XE), np.zeros((kf.N_E, kf.N_E))
+        self.inflation, self.rejected_for_s, self.scores = np.ones(2), np.zeros(kf.N_Z), np.full(kf.N_Z, np.nan)
+        self.work = np.zeros((kf.N_WORK_ROWS, kf.N_W))
         self.x[3] = 1.0
 
     def start(self, depth=2.0, euler=(0.0, -0.2, 0.5), speed=0.3, spread=None) -> "Filter":
@@ -40,19 +40,19 @@ class Filter:
         return self
 
     def predict(self, dt: float, commands=(0.0, 0.0, 0.0)) -> None:
-        arrays = (self.P, self.settings, self.sigma, self.x, self.cov, self.stress)
+        arrays = (self.P, self.settings, self.sigma, self.x, self.cov, self.inflation)
         estimator_predict(*arrays, self.mode, *map(float, commands), dt, self.work)
 
     def update(self, dt: float = 0.1, **readings: float) -> np.ndarray:
         """Readings by name: roll, pitch, yaw, p, q, r, depth, slider, ballast, mocap_x .. mocap_yaw."""
-        z = np.full(at.N_Z, np.nan)
+        z = np.full(kf.N_Z, np.nan)
         for name, value in readings.items():
-            z[getattr(at, f"Z_{name.upper()}")] = value
+            z[getattr(kf, f"Z_{name.upper()}")] = value
         return self.take(z, dt)
 
     def take(self, z: np.ndarray, dt: float = 0.1) -> np.ndarray:
-        arrays = (self.P, self.settings, self.x, self.cov, self.stress)
-        estimator_update(*arrays, z, self.beyond, self.scores, dt, self.work)
+        arrays = (self.P, self.settings, self.x, self.cov, self.inflation)
+        estimator_update(*arrays, z, self.rejected_for_s, self.scores, dt, self.work)
         return self.scores
 
     def positive_definite(self) -> bool:

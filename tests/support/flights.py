@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from firmware.core.estimation import estimator_layout as est
+from firmware.core.estimation import estimator_layout as kf
 from firmware.core.maths.rotations import quaternion_from_euler
 from firmware.estimation.settings import parameter_sigma
 from firmware.model.vehicle import Vehicle
@@ -75,7 +75,7 @@ def sensor_biases(world: World, rng: np.random.Generator) -> np.ndarray:
     sensors = world.vehicle.sensors
     sigma = [*3 * [sensors.attitude.bias], *3 * [sensors.gyro.bias], sensors.depth.bias]
     sigma += [sensors.slider.bias, sensors.ballast.bias, *6 * [0.0]]
-    return world.bias * np.array(sigma) * rng.standard_normal(est.N_Z)
+    return world.bias * np.array(sigma) * rng.standard_normal(kf.N_Z)
 
 
 def fly(world: World, seed: int, *, P: np.ndarray | None = None, name: str = "run00") -> Flight:
@@ -87,13 +87,13 @@ def fly(world: World, seed: int, *, P: np.ndarray | None = None, name: str = "ru
     sensors, disturbance = world.vehicle.sensors, world.vehicle.disturbance
     t = np.round(np.arange(0.0, world.seconds - 1e-9, 1.0 / world.rate_hz), 6)
     commands = manoeuvres(rng, t)
-    x = np.zeros(est.N_XE)
+    x = np.zeros(kf.N_XE)
     x[2] = rng.uniform(1.0, 3.0)
     x[3:7] = quaternion_from_euler(0.0, rng.uniform(-0.3, 0.0), rng.uniform(-3.0, 3.0))
     x[7] = world.start_speed
-    x[est.X_WATER : est.X_WATER + 2] = world.water
-    truth, table = np.empty((len(t), est.N_XE)), np.empty((len(t), N_Y))
-    work = np.zeros((5, est.N_XE))
+    x[kf.X_WATER : kf.X_WATER + 2] = world.water
+    truth, table = np.empty((len(t), kf.N_XE)), np.empty((len(t), N_Y))
+    work = np.zeros((5, kf.N_XE))
     held = -np.inf
     for i, now in enumerate(t):
         truth[i] = x
@@ -104,8 +104,8 @@ def fly(world: World, seed: int, *, P: np.ndarray | None = None, name: str = "ru
             if moment - held >= 0.1 - 1e-6:
                 held = moment
                 strength = world.disturbance * np.repeat([disturbance.linear, disturbance.angular], 3)
-                x[est.X_ERR : est.X_GYRO] = strength * rng.standard_normal(6)
-            flight_step(P, x, est.COMMANDED, *commands[i], 1.0 / world.rate_hz / steps, work)
+                x[kf.X_ERR : kf.X_GYRO] = strength * rng.standard_normal(6)
+            flight_step(P, x, kf.COMMANDED, *commands[i], 1.0 / world.rate_hz / steps, work)
     sigma = [*3 * [sensors.attitude.noise], *3 * [sensors.gyro.noise], sensors.depth.noise]
     sigma += [sensors.slider.noise, sensors.ballast.noise]
     onboard = (*names.ATTITUDE, *names.RATES, names.DEPTH, *names.DRAW_WIRES)

@@ -1,6 +1,6 @@
 """How the supervisor's stories begin, and the words they are told in."""
 
-from firmware.core.supervision import supervisor_layout as at
+from firmware.core.supervision import supervisor_layout as sup
 from firmware.supervisor.table import Reaction
 from tests.support.watchman import DT, Watchman
 
@@ -19,7 +19,7 @@ def flying(**more) -> Watchman:
         man.depth = 0.5
         man.wanted = [0.1, 0.01, 0.05]
         assert man.seconds(10.0) == NOTHING
-        assert not man.G[at.FIRST : at.FIRST + at.N_ROWS].max() >= 0.0
+        assert not man.G[sup.FIRST : sup.FIRST + sup.N_ROWS].max() >= 0.0
         FLOWN[repr(more)] = man
     return FLOWN[repr(more)].copy()
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from firmware.autopilot import Autopilot, configuration
 from firmware.core.control import control_layout as ctl
-from firmware.core.supervision import supervisor_layout as at
+from firmware.core.supervision import supervisor_layout as sup
 from firmware.supervisor.settings import Limits
 from firmware.supervisor.supervisor import Supervisor
 from firmware.supervisor.table import Reaction
@@ -110,7 +110,7 @@ class Watchman:
             self.ap[ctl.WANTED_SERVO : ctl.WANTED_SERVO + 3] = self.wanted
             self.supervisor.guard(self.t)
             if self.follows:
-                self.places[:] = self.G[at.SENT + 1 : at.SENT + 3]
+                self.places[:] = self.G[sup.SENT + 1 : sup.SENT + 3]
         return self.supervisor.reaction
 
     def _believe(self) -> None:
@@ -133,4 +133,4 @@ class Watchman:
 
     def asked(self, row: int) -> Reaction:
         """What a row asks for in this tick."""
-        return Reaction(int(self.G[at.ASKED + row]))
+        return Reaction(int(self.G[sup.ASKED + row]))

@@ -9,13 +9,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from firmware.core.vehicle.layout import GRAVITY
+from firmware.core.vehicle.seawater import STANDARD_PRESSURE
 from tools.bench.client import Bench, BenchError
 from tools.bench.units import UNITS, WIRES, shown_values
 
 LEAST_DEG, LEAST_M = 5.0, 0.002
 SHARE = 0.5  # of an actuator's way
 MOVE_S = 30.0
-WATER, G = 998.2, 9.80665
+WATER = 998.2  # kg/m3
 
 
 @dataclass
@@ -50,7 +52,7 @@ def _more(name: str, item: dict, state: dict) -> str:
     if name == "imu":
         return f"; model {state['imu_model'] or 'not said'}"
     if name == "beacon":
-        return f"; {(values[0] - 101_325.0) / (WATER * G):.2f} m deep under standard pressure"
+        return f"; {(values[0] - STANDARD_PRESSURE) / (WATER * GRAVITY):.2f} m deep under standard pressure"
     return f"; reads {item['reading']:g}" if item["reading"] is not None else ""
 
 

@@ -34,7 +34,7 @@ KEYS = {
     help="Make run data instead: the paper's 45 captured runs of a vehicle drawn with --first-seed, for `identify`.",
 )  # fmt: skip
 @click.option("--mission", multiple=True, help="Mission: shipped name or file. Again for more.")
-@click.option("--controller", multiple=True, help="pid, pid_tuned, law, hybrid or law+. Again for more.")
+@click.option("--controller", multiple=True, help="A controller as in a mission file, or pid_tuned. Again for more.")
 @click.option("--vehicle", help="Vehicle: shipped name or file.")
 @click.option("--seeds", type=int, help="Worlds of each mission.")
 @click.option("--first-seed", type=int, help="The first of them.")

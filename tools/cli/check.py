@@ -38,7 +38,7 @@ def check(
     """
     if live or compile_ or acknowledge:
         _stand_by(live, compile_, acknowledge, state, as_json)
-    from firmware.control.cover import Cover
+    from firmware.control.k2_margin import K2Margin
     from firmware.core.jit import CACHE_DIR
     from firmware.model.strict import ConfigError
     from hal.ports import BoardError
@@ -47,7 +47,7 @@ def check(
     from tools.flight.compose import build_flight, load_board_file
 
     findings: list[dict] = []
-    covers: list[Cover] = []
+    covers: list[K2Margin] = []
 
     def look(name: str, work) -> bool:
         try:
@@ -74,7 +74,7 @@ def check(
 
     def see_all() -> str:
         flight = build_flight(mission=mission, vehicle=vehicle, board=board)
-        covers.extend(flight.cover)
+        covers.extend(flight.k2_margins)
         return f"a loop of {flight.board.loop_hz:g} Hz, controller {flight.control.controller}"
 
     good = [look("vehicle", see_vehicle), look("mission", see_mission), look("board", see_board)]

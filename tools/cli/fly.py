@@ -81,7 +81,7 @@ def fly(
     except BoardError as error:
         raise InputError(str(error), source=board) from None
     if flight.control.controller != "pid":
-        for axis in flight.cover:
+        for axis in flight.k2_margins:
             if not axis.covered:
                 say(f"warning: {axis}")
     specs = record_specs(flight)
@@ -199,7 +199,7 @@ def faults_noticed(supervisor) -> list[dict]:
     from firmware.supervisor.table import FAULTS
 
     return [
-        {"number": row, "name": FAULTS[row].name, "noticed_s": at, "reaction": supervisor.worst(row).name}
+        {"number": row, "name": FAULTS[row], "noticed_s": at, "reaction": supervisor.worst(row).name}
         for row in FAULTS
         if (at := supervisor.noticed(row)) is not None
     ]

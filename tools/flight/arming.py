@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from firmware.core.jit import CACHE_DIR, compiled_signatures
-from firmware.core.vehicle.layout import G
+from firmware.core.vehicle.layout import GRAVITY
 from firmware.core.vehicle.seawater import water_density
 from hal.ports import SLOTS, BoardError, Validity, empty_frame
 from tools.data.errors import InputError
@@ -100,7 +100,7 @@ class Arming:
         pressure, temperature = self.frame[SLOTS["beacon"].values]
         salinity = self.flight.mission.site.salinity
         density = water_density(0.0, float(temperature), salinity)
-        depth = float(pressure - self.flight.board.surface_pressure) / (density * G)
+        depth = float(pressure - self.flight.board.surface_pressure) / (density * GRAVITY)
         if not abs(depth) <= ZERO_M:
             raise Refused(f"{depth:.2f} m deep, expected the surface, within {ZERO_M:g} m: `zero beacon` in the bench")
         return f"{depth:.2f} m"

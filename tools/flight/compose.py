@@ -8,8 +8,8 @@ from typing import Annotated, Any
 import msgspec
 
 from firmware.autopilot import Autopilot, configuration
-from firmware.control.cover import Cover, k2_cover
 from firmware.control.gains import Control
+from firmware.control.k2_margin import K2Margin, k2_margins
 from firmware.core.vehicle.seawater import water_density
 from firmware.guidance.mission import Mission
 from firmware.model.strict import ConfigError
@@ -54,9 +54,9 @@ class Flight:
     texts: dict[str, str]
 
     @property
-    def cover(self) -> tuple[Cover, Cover]:
+    def k2_margins(self) -> tuple[K2Margin, K2Margin]:
         """The law's k2 of pitch and depth against what this vehicle's [uncertainty] asks for."""
-        return k2_cover(self.vehicle, self.control)
+        return k2_margins(self.vehicle, self.control)
 
     @property
     def control(self) -> Control:

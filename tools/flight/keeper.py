@@ -157,14 +157,14 @@ class Keeper:
 
     # --- parts ------------------------------------------------------------------------------------------------------
     def _tell_flight(self, pulse: Heartbeat, timing: Any) -> None:
-        from firmware.core.control import control_layout as at
+        from firmware.core.control import control_layout as ctl
 
         words, values, autopilot = pulse.words, pulse.values, self._flight.autopilot
         words[hb.W_MISSED], words[hb.W_WORST_NS] = timing.missed, int(1e9 * timing.worst_s)
-        words[hb.W_MODE], words[hb.W_LEG] = int(autopilot.ap[at.MODE]), int(autopilot.ap[at.LEG])
+        words[hb.W_MODE], words[hb.W_LEG] = int(autopilot.ap[ctl.MODE]), int(autopilot.ap[ctl.LEG])
         words[hb.W_LEGS], words[hb.W_PHASE] = len(self._flight.mission.leg), int(Phase.DIVING)
-        values[hb.V_DEPTH_M] = autopilot.est[at.EST_DEPTH]
-        values[hb.V_PITCH_RAD], values[hb.V_ROLL_RAD] = autopilot.est[at.EST_PITCH], autopilot.est[at.EST_ROLL]
+        values[hb.V_DEPTH_M] = autopilot.est[ctl.EST_DEPTH]
+        values[hb.V_PITCH_RAD], values[hb.V_ROLL_RAD] = autopilot.est[ctl.EST_PITCH], autopilot.est[ctl.EST_ROLL]
         values[hb.V_SLIDER_M], values[hb.V_BALLAST_KG] = autopilot.commands[1], autopilot.commands[2]
         frame = autopilot.frame
         values[hb.V_BATTERY_V] = frame[BATTERY + 2] if frame[BATTERY + 1] == Validity.VALID else float("nan")

@@ -4,7 +4,6 @@ import time
 from typing import Any
 
 TICKS = 200
-CONTROLLERS = ("pid", "law", "law+", "hybrid")
 
 
 def compile_all() -> dict[str, Any]:
@@ -13,6 +12,7 @@ def compile_all() -> dict[str, Any]:
 
     from firmware.autopilot import Autopilot, configuration
     from firmware.control.gains import Control
+    from firmware.core.control.controllers import CONTROLLERS
     from firmware.core.jit import CACHE_DIR, compiled_signatures
     from hal.recorder.recorder import NullRecorder
     from tools.flight.compose import build_flight, build_runtime, record_specs

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from firmware.core.estimation import estimator_layout as est
-from firmware.core.vehicle import layout as at
+from firmware.core.estimation import estimator_layout as kf
+from firmware.core.vehicle import layout
 from tools.data.runs import columns as names
 from tools.data.runs.run import Run
 from tools.inference.channels import measured_column
@@ -18,7 +18,7 @@ from tools.inference.core import flights as ex
 from tools.inference.predict import Flown, Inputs, Variant
 from tools.inference.start import drawn_position
 
-_ATT, _YAW, _DEPTH, _XY = (0, 1, 2), (est.Z_YAW,), (est.Z_DEPTH,), (ex.Y_X, ex.Y_Y)
+_ATT, _YAW, _DEPTH, _XY = (0, 1, 2), (kf.Z_YAW,), (kf.Z_DEPTH,), (ex.Y_X, ex.Y_Y)
 SMOOTHED = 5  # samples of a draw-wire whose median is taken
 
 
@@ -79,7 +79,7 @@ def _extra(index: int):
 def _servo_offset(scene: Scene, variant: Variant, value: float) -> Variant:
     values, starts = variant.inputs.values.copy(), variant.inputs.starts.copy()
     values[:, 0] += value
-    starts[:, at.X_ACT] += value
+    starts[:, layout.X_ACT] += value
     return replace(variant, inputs=replace(variant.inputs, values=values, starts=starts))
 
 
@@ -117,14 +117,14 @@ def _splice(which: int):
             if wire is None or not np.isfinite(wire).any() or modes[n] & (1 << which):
                 continue
             first, last = flown.recording.bounds[n], flown.recording.bounds[n + 1]
-            simulated = scene.Y[first:last, est.Z_DEPTH + which]
+            simulated = scene.Y[first:last, kf.Z_DEPTH + which]
             apart = median_filter(drawn_position(run.t, wire) - simulated, SMOOTHED, mode="nearest")
             # What bias and noise could be is left out, else the splice would bring them in and seem to explain them.
             position = simulated + np.sign(apart) * np.maximum(np.abs(apart) - scene.wire_doubt[which - 1], 0.0)
             values[first:last, which] = np.append(np.diff(position) / np.diff(run.t), 0.0)
             modes[n] |= 1 << which
             here = flown.run_of == n
-            starts[here, at.X_ACT + which] = position[flown.first[here] - 1 - first]
+            starts[here, layout.X_ACT + which] = position[flown.first[here] - 1 - first]
         return replace(variant, inputs=Inputs(modes, values, starts, inputs.shaken))
 
     return change
@@ -145,7 +145,7 @@ def _by_mocap(run: Run, column: int) -> bool:
     """Whether the start of this column comes from motion capture while the column itself is measured onboard."""
     if column in _XY:
         return False
-    mocap = names.MOCAP_POSITION[2] if column == est.Z_DEPTH else names.MOCAP_ATTITUDE[column]
+    mocap = names.MOCAP_POSITION[2] if column == kf.Z_DEPTH else names.MOCAP_ATTITUDE[column]
     return mocap in run.columns and measured_column(run, column) != mocap
 
 
@@ -178,36 +178,36 @@ def _constant(scene: Scene) -> np.ndarray:
 DIRECTIONS = (
     Direction("actuation", "servo", "offset", 0.05, _servo_offset),
     Direction("actuation", "servo", "backlash", 0.1, _servo_backlash),
-    parameter("actuation", "servo", "rate", -0.5, at.SERVO_RATE, True),
-    parameter("actuation", "servo", "time_constant", 5.0, at.SERVO_TAU, True),
-    parameter("actuation", "servo", "range", -0.3, at.SERVO_MAX, True),
+    parameter("actuation", "servo", "rate", -0.5, layout.SERVO_RATE, True),
+    parameter("actuation", "servo", "time_constant", 5.0, layout.SERVO_TAU, True),
+    parameter("actuation", "servo", "range", -0.3, layout.SERVO_MAX, True),
     Direction("actuation", "slider", "splice", 1.0, _splice(1)),
     Direction("actuation", "ballast", "splice", 1.0, _splice(2)),
     Direction("actuation", "ballast", "leak", 2e-4, _extra(ex.NET_TIME)),
-    parameter("hydrodynamics", "surge", "K_D0", 0.2, at.K_D0, True),
-    parameter("hydrodynamics", "surge", "K_D", 0.2, at.K_D, True),
-    parameter("hydrodynamics", "heave", "K_L0", 2.0, at.K_L0),
-    parameter("hydrodynamics", "heave", "K_L", 0.2, at.K_L, True),
-    parameter("hydrodynamics", "heave", "A_z", 0.4, at.A_Z, True),
-    parameter("hydrodynamics", "sway", "K_beta", 0.3, at.K_BETA, True),
+    parameter("hydrodynamics", "surge", "K_D0", 0.2, layout.K_D0, True),
+    parameter("hydrodynamics", "surge", "K_D", 0.2, layout.K_D, True),
+    parameter("hydrodynamics", "heave", "K_L0", 2.0, layout.K_L0),
+    parameter("hydrodynamics", "heave", "K_L", 0.2, layout.K_L, True),
+    parameter("hydrodynamics", "heave", "A_z", 0.4, layout.A_Z, True),
+    parameter("hydrodynamics", "sway", "K_beta", 0.3, layout.K_BETA, True),
     Direction("hydrodynamics", "roll", "trim", 0.1, _extra(ex.ROLL_TRIM)),
-    parameter("hydrodynamics", "roll", "K_p", 0.3, at.K_P, True),
-    parameter("hydrodynamics", "roll", "K_MR", 0.3, at.K_MR, True),
-    parameter("hydrodynamics", "pitch", "K_M0", 0.2, at.K_M0),
-    parameter("hydrodynamics", "pitch", "K_M", 0.2, at.K_M, True),
-    parameter("hydrodynamics", "pitch", "K_q", 0.4, at.K_Q, True),
+    parameter("hydrodynamics", "roll", "K_p", 0.3, layout.K_P, True),
+    parameter("hydrodynamics", "roll", "K_MR", 0.3, layout.K_MR, True),
+    parameter("hydrodynamics", "pitch", "K_M0", 0.2, layout.K_M0),
+    parameter("hydrodynamics", "pitch", "K_M", 0.2, layout.K_M, True),
+    parameter("hydrodynamics", "pitch", "K_q", 0.4, layout.K_Q, True),
     Direction("hydrodynamics", "yaw", "trim", 0.1, _extra(ex.YAW_TRIM)),
-    parameter("hydrodynamics", "yaw", "K_MY", 0.3, at.K_MY, True),
-    parameter("hydrodynamics", "yaw", "K_r", 0.3, at.K_R, True),
-    parameter("mass", "net", "net_mass", 0.01, at.NET_MASS),
+    parameter("hydrodynamics", "yaw", "K_MY", 0.3, layout.K_MY, True),
+    parameter("hydrodynamics", "yaw", "K_r", 0.3, layout.K_R, True),
+    parameter("mass", "net", "net_mass", 0.01, layout.NET_MASS),
     Direction("mass", "net", "ballast_scale", 0.05, _extra(ex.BALLAST_SCALE)),
     Direction("mass", "net", "with_depth", 0.002, _extra(ex.NET_DEPTH)),
-    parameter("mass", "longitudinal", "cg_x", 0.0005, at.CG_X),
+    parameter("mass", "longitudinal", "cg_x", 0.0005, layout.CG_X),
     Direction("mass", "longitudinal", "slider_scale", 0.05, _extra(ex.SLIDER_SCALE)),
-    parameter("mass", "lateral", "cg_y", 0.0005, at.CG_Y),
-    parameter("mass", "vertical", "cg_z", 0.0005, at.CG_Z),
-    parameter("mass", "inertia", "J_yy", 0.5, at.B_Y, True),
-    parameter("mass", "inertia", "J_zz", 0.5, at.B_Z, True),
+    parameter("mass", "lateral", "cg_y", 0.0005, layout.CG_Y),
+    parameter("mass", "vertical", "cg_z", 0.0005, layout.CG_Z),
+    parameter("mass", "inertia", "J_yy", 0.5, layout.B_Y, True),
+    parameter("mass", "inertia", "J_zz", 0.5, layout.B_Z, True),
     Direction("environment", "water", "north", 0.1, _extra(ex.WATER_N)),
     Direction("environment", "water", "east", 0.1, _extra(ex.WATER_E)),
     Direction("environment", "water", "shear_north", 0.03, _extra(ex.SHEAR_N)),

@@ -18,7 +18,7 @@ from firmware.core.vehicle import layout
 from firmware.estimation.settings import parameter_sigma
 from firmware.model.vehicle import COEFFICIENTS, SensorTable, Vehicle
 from sim_backend.core import effect_layout as ef
-from sim_backend.core import layout as at
+from sim_backend.core import layout as wl
 from sim_backend.core.open_loop import fly_open_loop_many
 from tools.data.runs import columns as names
 from tools.data.runs.case import SensorsPart, write_case
@@ -102,12 +102,12 @@ def starts(rng: np.random.Generator, commanded: np.ndarray) -> np.ndarray:
 def fly(vehicle: Vehicle, world: World, rng: np.random.Generator, commanded: np.ndarray) -> np.ndarray:
     """True states (runs, rows, N_X) under commands, with the vehicle file's disturbance, far from surface and floor."""
     count = len(commanded)
-    E = np.zeros((count, at.N_E))
-    E[:, at.ACC_LINEAR], E[:, at.ACC_ANGULAR] = vehicle.disturbance.linear, vehicle.disturbance.angular
+    E = np.zeros((count, wl.N_ENV))
+    E[:, wl.ENV_ACC_LINEAR], E[:, wl.ENV_ACC_ANGULAR] = vehicle.disturbance.linear, vehicle.disturbance.angular
     X = np.empty((*commanded.shape[:2], layout.N_X))
     seeds = rng.integers(0, 2**63, count, dtype=np.uint64)
     fly_open_loop_many(
-        np.tile(world.P, (count, 1)), E, np.zeros((count, ef.N_F)), np.zeros((0, at.N_WAVE)), seeds,
+        np.tile(world.P, (count, 1)), E, np.zeros((count, ef.N_F)), np.zeros((0, wl.N_WAVE)), seeds,
         starts(rng, commanded), commanded, STEP, round(1.0 / RATE / STEP), X,
     )  # fmt: skip
     return X

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from firmware.core.estimation import estimator_layout as est
+from firmware.core.estimation import estimator_layout as kf
 from firmware.estimation.settings import UNSEEN_SERVO_WALK
 from sim_backend.core import effect_layout as ef
 from tools.data.runs import columns as names
@@ -195,7 +195,7 @@ def pose(case: Case, model: Model | None = None, runs: list[Run] | None = None, 
     walk = np.array(WALK)
     for n in range(count):
         actuators = np.array(ACTUATOR_SPREAD)
-        if recording.modes[n] & est.SERVO_DRIVEN:
+        if recording.modes[n] & kf.SERVO_DRIVEN:
             actuators[0], walk[0] = UNSEEN_SPREAD, UNSEEN_SERVO_WALK**2
         spreads[n] = [
             POSITION_SPREAD, POSITION_SPREAD, DEPTH_SPREAD, *3 * [ATTITUDE_SPREAD], *SPEED_SPREAD, *3 * [RATE_SPREAD],
@@ -206,10 +206,10 @@ def pose(case: Case, model: Model | None = None, runs: list[Run] | None = None, 
         z[recording.bounds[n] : recording.bounds[n + 1], ef.Y_SLIDER : ef.Y_BALLAST + 1][np.isfinite(driven)] = np.nan
     d = case.disturbance
     spectral = np.array(
-        [*3 * [d.linear**2 * est.DISTURBANCE_HOLD], *3 * [d.angular**2 * est.DISTURBANCE_HOLD], *walk, *4 * [0.0]]
+        [*3 * [d.linear**2 * kf.DISTURBANCE_HOLD], *3 * [d.angular**2 * kf.DISTURBANCE_HOLD], *walk, *4 * [0.0]]
     )
     run_of = np.repeat(np.arange(count), np.diff(recording.bounds))
-    R = recording.settings[:, est.S_R :].copy()
+    R = recording.settings[:, kf.S_R :].copy()
     return Problem(
         case, model, runs, recording, z, starts, spreads, spectral, R, np.isfinite(z), recording.t, run_of, rules
     )

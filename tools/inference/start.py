@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from firmware.core.estimation import estimator_layout as est
+from firmware.core.estimation import estimator_layout as kf
 from firmware.core.estimation.estimator_layout import N_E
 from firmware.core.maths.rotations import quaternion_from_euler
 from firmware.estimation.settings import START_SPEEDS, estimator_settings, first_spread
@@ -60,7 +60,7 @@ def drawn_position(t: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 def _inputs(run: Run) -> tuple[int, np.ndarray, np.ndarray]:
     """Mode, inputs (rows, 3) and driven positions (rows, 2) of a run."""
-    mode, t = est.COMMANDED, run.t
+    mode, t = kf.COMMANDED, run.t
     inputs, drawn = np.zeros((run.rows, 3)), np.full((run.rows, 2), np.nan)
     for i, command in enumerate(names.COMMANDS):
         values = run.columns.get(command)
@@ -89,12 +89,12 @@ def measurements(run: Run, table: np.ndarray) -> np.ndarray:
     those is then in the gap and not in the start, and two sensors that disagree cannot pull the filter apart. Where
     it has not been seen for COAST seconds, onboard takes over.
     """
-    z = np.full((run.rows, est.N_Z), np.nan)
-    z[:, : est.Z_MOCAP_Z] = table
+    z = np.full((run.rows, kf.N_Z), np.nan)
+    z[:, : kf.Z_MOCAP_Z] = table
     for onboard, mocap, slot in zip(
-        (est.Z_ROLL, est.Z_PITCH, est.Z_YAW, est.Z_DEPTH),
+        (kf.Z_ROLL, kf.Z_PITCH, kf.Z_YAW, kf.Z_DEPTH),
         (*names.MOCAP_ATTITUDE, names.MOCAP_POSITION[2]),
-        (est.Z_MOCAP_ROLL, est.Z_MOCAP_PITCH, est.Z_MOCAP_YAW, est.Z_MOCAP_Z),
+        (kf.Z_MOCAP_ROLL, kf.Z_MOCAP_PITCH, kf.Z_MOCAP_YAW, kf.Z_MOCAP_Z),
         strict=True,
     ):
         if not recorded(run, mocap):
@@ -113,12 +113,12 @@ def record(case: Case, model: Model, runs: list[Run]) -> Recording:
         bounds=bounds,
         early=bounds[:-1] + [np.searchsorted(run.t, run.t[0] + START) for run in runs],
         modes=np.zeros(count, dtype=np.int64),
-        settings=np.zeros((count, est.N_S)),
+        settings=np.zeros((count, kf.N_S)),
         t=np.concatenate([run.t for run in runs]),
         inputs=np.zeros((rows, 3)),
         drawn=np.zeros((rows, 2)),
-        z=np.full((rows, est.N_Z), np.nan),
-        starts=np.zeros((count, est.N_XE)),
+        z=np.full((rows, kf.N_Z), np.nan),
+        starts=np.zeros((count, kf.N_XE)),
         spreads=np.zeros((count, N_E)),
     )
     for n, run in enumerate(runs):
@@ -129,9 +129,9 @@ def record(case: Case, model: Model, runs: list[Run]) -> Recording:
         table = measured(run)
         made.z[at] = measurements(run, table)
         first = np.nan_to_num(_first(run, table))
-        seen = (not mode & est.SERVO_DRIVEN, *np.isfinite(_first(run, table))[[est.Z_SLIDER, est.Z_BALLAST]])
+        seen = (not mode & kf.SERVO_DRIVEN, *np.isfinite(_first(run, table))[[kf.Z_SLIDER, kf.Z_BALLAST]])
         x = made.starts[n]
-        x[0:3] = first[est.Z_MOCAP_X], first[est.Z_MOCAP_Y], first[est.Z_DEPTH]
+        x[0:3] = first[kf.Z_MOCAP_X], first[kf.Z_MOCAP_Y], first[kf.Z_DEPTH]
         x[3:7] = quaternion_from_euler(*first[:3])
         x[10:13] = first[3:6]
         x[14:16] = first[7:9]
@@ -142,7 +142,7 @@ def record(case: Case, model: Model, runs: list[Run]) -> Recording:
 def estimate(recording: Recording, model: Model) -> Estimates:
     """Run the filter over every run."""
     rows = len(recording.t)
-    X, sd = np.empty((rows, est.N_XE)), np.empty((rows, N_E))
+    X, sd = np.empty((rows, kf.N_XE)), np.empty((rows, N_E))
     estimate_runs(
         model.P, recording.settings, model.sigma, recording.modes, recording.bounds, recording.early, recording.t,
         recording.inputs, recording.z, recording.starts, np.array(START_SPEEDS), recording.spreads, X, sd,

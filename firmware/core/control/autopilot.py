@@ -5,10 +5,10 @@
 
 import math
 
-from firmware.core.control import control_layout as at
-from firmware.core.control.coverage import forget_coverage, watch
+from firmware.core.control import control_layout as ctl
+from firmware.core.control.controllers import steer
 from firmware.core.control.guidance import follow, sequence
-from firmware.core.control.steering import steer
+from firmware.core.control.lyapunov_monitor import forget_lyapunov, monitor
 from firmware.core.estimation.estimator_layout import S_ANGULAR, S_LINEAR
 from firmware.core.estimation.navigation import navigate
 from firmware.core.estimation.sensing import sense, take_as_measured
@@ -30,21 +30,21 @@ from firmware.core.vehicle.layout import (
 @kernel
 def score(legs, est, ap):
     """Add this tick's tracking errors up; depth only where the depth loop commands the ballast."""
-    if math.isnan(legs[int(ap[at.LEG]), at.LEG_BALLAST]):
-        ap[at.SUM_DEPTH] += (est[at.EST_DEPTH] - ap[at.REF_DEPTH]) ** 2
-        ap[at.COUNT_DEPTH] += 1.0
-    ap[at.SUM_PITCH] += (est[at.EST_PITCH] - ap[at.REF_PITCH]) ** 2
-    ap[at.SUM_ROLL] += (est[at.EST_ROLL] - ap[at.REF_ROLL]) ** 2
-    ap[at.COUNT_ATTITUDE] += 1.0
+    if math.isnan(legs[int(ap[ctl.LEG]), ctl.LEG_BALLAST]):
+        ap[ctl.SUM_DEPTH] += (est[ctl.EST_DEPTH] - ap[ctl.REF_DEPTH]) ** 2
+        ap[ctl.COUNT_DEPTH] += 1.0
+    ap[ctl.SUM_PITCH] += (est[ctl.EST_PITCH] - ap[ctl.REF_PITCH]) ** 2
+    ap[ctl.SUM_ROLL] += (est[ctl.EST_ROLL] - ap[ctl.REF_ROLL]) ** 2
+    ap[ctl.COUNT_ATTITUDE] += 1.0
 
 
 @kernel
 def limit_commands(P, ap, servo, slider, ballast, dt, cmd):
     """Limits last: into cmd (3,) what may be sent, and into the memory what was."""
-    cmd[0] = limited(servo, ap[at.SENT_SERVO], P[SERVO_MIN], P[SERVO_MAX], P[SERVO_RATE], dt)
-    cmd[1] = limited(slider, ap[at.SENT_SLIDER], P[SLIDER_MIN], P[SLIDER_MAX], P[SLIDER_RATE], dt)
-    cmd[2] = limited(ballast, ap[at.SENT_BALLAST], P[BALLAST_MIN], P[BALLAST_MAX], P[BALLAST_RATE], dt)
-    ap[at.SENT_SERVO], ap[at.SENT_SLIDER], ap[at.SENT_BALLAST] = cmd[0], cmd[1], cmd[2]
+    cmd[0] = limited(servo, ap[ctl.SENT_SERVO], P[SERVO_MIN], P[SERVO_MAX], P[SERVO_RATE], dt)
+    cmd[1] = limited(slider, ap[ctl.SENT_SLIDER], P[SLIDER_MIN], P[SLIDER_MAX], P[SLIDER_RATE], dt)
+    cmd[2] = limited(ballast, ap[ctl.SENT_BALLAST], P[BALLAST_MIN], P[BALLAST_MAX], P[BALLAST_RATE], dt)
+    ap[ctl.SENT_SERVO], ap[ctl.SENT_SLIDER], ap[ctl.SENT_BALLAST] = cmd[0], cmd[1], cmd[2]
 
 
 @kernel
@@ -55,34 +55,34 @@ def tick(P, C, legs, frame, est, ap, nav, cmd, t):
     Completed or aborted: ballast to its light end, mass aft for nose up, servo centred, so that the vehicle surfaces.
     """
     sense(P, C, frame, est, t)
-    if C[at.ESTIMATOR] == at.MEASURED:
+    if C[ctl.ESTIMATOR] == ctl.MEASURED:
         take_as_measured(est)
     else:
         navigate(P, C, nav, est, ap, t)
     sequence(C, legs, est, ap, t)
-    if ap[at.MODE] == at.FLYING:
+    if ap[ctl.MODE] == ctl.FLYING:
         follow(C, legs, est, ap)
         servo, slider, ballast = steer(P, C, legs, est, ap, t)
         score(legs, est, ap)
-    elif ap[at.MODE] == at.WAITING:
-        servo, slider, ballast = ap[at.SENT_SERVO], ap[at.SENT_SLIDER], ap[at.SENT_BALLAST]
+    elif ap[ctl.MODE] == ctl.WAITING:
+        servo, slider, ballast = ap[ctl.SENT_SERVO], ap[ctl.SENT_SLIDER], ap[ctl.SENT_BALLAST]
     else:
         servo, slider, ballast = 0.0, P[SLIDER_MIN], P[BALLAST_MIN]
-    watch(P, C, legs, nav, est, ap, t)
-    ap[at.WANTED_SERVO], ap[at.WANTED_SLIDER], ap[at.WANTED_BALLAST] = servo, slider, ballast
-    limit_commands(P, ap, servo, slider, ballast, C[at.DT], cmd)
+    monitor(P, C, legs, nav, est, ap, t)
+    ap[ctl.WANTED_SERVO], ap[ctl.WANTED_SLIDER], ap[ctl.WANTED_BALLAST] = servo, slider, ballast
+    limit_commands(P, ap, servo, slider, ballast, C[ctl.DT], cmd)
 
 
 @kernel
 def reset(est, ap, nav):
     """Forget everything: no sample seen, nothing commanded, the filter not started, waiting for the first samples."""
-    if nav[at.NAV_RUNNING] == 1.0:
-        nav[at.NAV_SETTINGS + S_LINEAR], nav[at.NAV_SETTINGS + S_ANGULAR] = nav[at.NAV_CALM], nav[at.NAV_CALM + 1]
-    nav[at.NAV_RUNNING] = 0.0
+    if nav[ctl.NAV_RUNNING] == 1.0:
+        nav[ctl.NAV_SETTINGS + S_LINEAR], nav[ctl.NAV_SETTINGS + S_ANGULAR] = nav[ctl.NAV_CALM], nav[ctl.NAV_CALM + 1]
+    nav[ctl.NAV_RUNNING] = 0.0
     est[:] = 0.0
-    est[at.EST_IMU_TIME : at.EST_BEACON_TIME + 3] = -1.0
+    est[ctl.EST_IMU_TIME : ctl.EST_BEACON_TIME + 3] = -1.0
     ap[:] = 0.0
-    ap[at.MODE] = at.WAITING
-    ap[at.REACHED] = -1.0
-    ap[at.ACTIVE_SINCE] = -math.inf
-    forget_coverage(ap)
+    ap[ctl.MODE] = ctl.WAITING
+    ap[ctl.REACHED] = -1.0
+    ap[ctl.ACTIVE_SINCE] = -math.inf
+    forget_lyapunov(ap)

@@ -19,7 +19,7 @@ theta = +-90 deg alone, whatever the roll. Nothing here needs an angle: k, down 
 import math
 
 from firmware.core.jit import kernel
-from firmware.core.vehicle.layout import M_S, M_T, X_B, G
+from firmware.core.vehicle.layout import GRAVITY, M_S, M_T, X_B
 from firmware.core.vehicle.mass import first_moment, inertia, swung_moment, translational_mass
 from firmware.core.vehicle.motion import momentum_rate, solve_mass_matrix
 from firmware.core.vehicle.water import water_wrench
@@ -54,8 +54,8 @@ def output_accelerations(kx, ky, kz, u, v, w, p, q, r, ud, vd, wd, pd, qd, rd):
 @kernel
 def input_gains(P, cos_pitch, n11, n12, n22):
     """g_ts (rad/s2/m), g_tb (rad/s2/kg), g_zs (1/s2), g_zb (m/s2/kg) from N of the module's docstring."""
-    slider, tank = -P[M_S] * G * cos_pitch, -P[X_B] * G * cos_pitch
-    return slider * n11, G * n12 + tank * n11, slider * n12, G * n22 + tank * n12
+    slider, tank = -P[M_S] * GRAVITY * cos_pitch, -P[X_B] * GRAVITY * cos_pitch
+    return slider * n11, GRAVITY * n12 + tank * n11, slider * n12, GRAVITY * n22 + tank * n12
 
 
 @kernel
@@ -110,8 +110,8 @@ def paper_form(
     I1, I2, I3, _, _, _ = inertia(P, servo, slider, ballast)
     sr = swung_moment(P)
     turn = sf * q + cf * r
-    pitch = ((I3 - I1) * p * r - G * st * sr * math.cos(servo) + T2) / I2
-    yaw = ((I1 - I2) * p * q + G * st * sr * math.sin(servo) + T3) / I3
+    pitch = ((I3 - I1) * p * r - GRAVITY * st * sr * math.cos(servo) + T2) / I2
+    yaw = ((I1 - I2) * p * q + GRAVITY * st * sr * math.sin(servo) + T3) / I3
     f_theta = cf * pitch - sf * yaw - turn * (p + turn * st / ct)
     f_Z = (kx * F1 + ky * F2 + kz * F3) / P[M_T]
     g_ts, g_tb, g_zs, g_zb = input_gains(P, ct, cf * cf / I2 + sf * sf / I3, 0.0, 1.0 / P[M_T])
@@ -135,9 +135,9 @@ def roll_form(P, kx, ky, kz, u, v, w, p, q, r, servo, slider, ballast):
     J = (
         H
         + ((I2 - I3) * q * r + T1) / I1
-        + sf * tt / I2 * ((I3 - I1) * p * r - G * cf * ct * S1 + T2)
-        + cf * tt / I3 * ((I1 - I2) * p * q + G * sf * ct * S1 + T3)
+        + sf * tt / I2 * ((I3 - I1) * p * r - GRAVITY * cf * ct * S1 + T2)
+        + cf * tt / I3 * ((I1 - I2) * p * q + GRAVITY * sf * ct * S1 + T3)
     )
-    a = G * sr * (ct * cf / I1 + cf * tt * st / I3)
-    b = -G * sr * (ct * sf / I1 + sf * tt * st / I2)
+    a = GRAVITY * sr * (ct * cf / I1 + cf * tt * st / I3)
+    b = -GRAVITY * sr * (ct * sf / I1 + sf * tt * st / I2)
     return J, a, b

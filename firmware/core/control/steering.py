@@ -1,15 +1,14 @@
-"""From references and estimate to wanted actuator positions: PID, the law, the hybrid of both, the law with foresight.
+"""From references and estimate to wanted slider and ballast: by PID, and by the law.
 
-Roll is always (37). The PID and the law share the estimate, the references and the limits; they differ in nothing else.
-Whatever a controller wants goes through `limited` afterwards (core/autopilot).
+Both share the estimate, the references and the limits; they differ in nothing else.
 """
 
 import math
 
-from firmware.core.control import control_layout as at
-from firmware.core.control.control import pid, pitch_feedforward, roll_law
+from firmware.core.control import control_layout as ctl
+from firmware.core.control.control import pid, pitch_feedforward
 from firmware.core.control.input_forms import exact_form, paper_form
-from firmware.core.control.law import OK, pitch_depth_law
+from firmware.core.control.law import pitch_depth_law
 from firmware.core.control.law_plus import SHARE, on_outputs, reach
 from firmware.core.jit import kernel
 from firmware.core.vehicle.actuators import actuator_rates, clip
@@ -27,40 +26,39 @@ from firmware.core.vehicle.layout import (
 )
 from firmware.core.vehicle.mass import swung_moment
 
-BUMP_TIME = 2.0  # s in which what a switch left over fades
-
 
 @kernel
 def depth_is_held(legs, ap):
     """True where the leg leaves the ballast to the depth loop."""
-    return math.isnan(legs[int(ap[at.LEG]), at.LEG_BALLAST])
+    return math.isnan(legs[int(ap[ctl.LEG]), ctl.LEG_BALLAST])
 
 
 @kernel
 def angle_rates(est):
     """phi_dot and theta_dot, rad/s, by (5); phi_dot's tan(theta) is held at 84 deg."""
-    roll, pitch = est[at.EST_ROLL], est[at.EST_PITCH]
+    roll, pitch = est[ctl.EST_ROLL], est[ctl.EST_PITCH]
     cf, sf = math.cos(roll), math.sin(roll)
     ct = max(math.cos(pitch), 0.1)
-    turn = sf * est[at.EST_Q] + cf * est[at.EST_R]
-    return est[at.EST_P] + turn * math.sin(pitch) / ct, cf * est[at.EST_Q] - sf * est[at.EST_R]
+    turn = sf * est[ctl.EST_Q] + cf * est[ctl.EST_R]
+    return est[ctl.EST_P] + turn * math.sin(pitch) / ct, cf * est[ctl.EST_Q] - sf * est[ctl.EST_R]
 
 
 @kernel
 def pid_inputs(P, C, legs, est, ap, pitch_rate):
     """Slider (m) and ballast (kg) by PID; pitch with gravity's own moment fed forward."""
-    dt = C[at.DT]
+    dt = C[ctl.DT]
     if depth_is_held(legs, ap):
-        ballast, ap[at.INT_DEPTH] = pid(
-            ap[at.REF_DEPTH] - est[at.EST_DEPTH], ap[at.REF_DEPTH_RATE] - est[at.EST_DEPTH_RATE], ap[at.INT_DEPTH], 0.0,
-            C[at.DEPTH_KP], C[at.DEPTH_KI], C[at.DEPTH_KD], P[BALLAST_MIN], P[BALLAST_MAX], dt,
+        ballast, ap[ctl.INT_DEPTH] = pid(
+            ap[ctl.REF_DEPTH] - est[ctl.EST_DEPTH], ap[ctl.REF_DEPTH_RATE] - est[ctl.EST_DEPTH_RATE],
+            ap[ctl.INT_DEPTH], 0.0,
+            C[ctl.DEPTH_KP], C[ctl.DEPTH_KI], C[ctl.DEPTH_KD], P[BALLAST_MIN], P[BALLAST_MAX], dt,
         )  # fmt: skip
     else:
-        ballast = legs[int(ap[at.LEG]), at.LEG_BALLAST]
+        ballast = legs[int(ap[ctl.LEG]), ctl.LEG_BALLAST]
     # a mass moved forward lowers the nose: the loop's sign is turned here, not in the gains
-    slider, ap[at.INT_PITCH] = pid(
-        est[at.EST_PITCH] - ap[at.REF_PITCH], pitch_rate - ap[at.REF_PITCH_RATE], ap[at.INT_PITCH],
-        slider_feedforward(P, est, ap), C[at.PITCH_KP], C[at.PITCH_KI], C[at.PITCH_KD], P[SLIDER_MIN], P[SLIDER_MAX],
+    slider, ap[ctl.INT_PITCH] = pid(
+        est[ctl.EST_PITCH] - ap[ctl.REF_PITCH], pitch_rate - ap[ctl.REF_PITCH_RATE], ap[ctl.INT_PITCH],
+        slider_feedforward(P, est, ap), C[ctl.PITCH_KP], C[ctl.PITCH_KI], C[ctl.PITCH_KD], P[SLIDER_MIN], P[SLIDER_MAX],
         dt,
     )  # fmt: skip
     return slider, ballast
@@ -70,38 +68,38 @@ def pid_inputs(P, C, legs, est, ap, pitch_rate):
 def slider_feedforward(P, est, ap):
     """Where gravity alone holds the reference pitch, ballast as it is, m."""
     sr = swung_moment(P)
-    return pitch_feedforward(sr, P[M_S], P[X_B], ap[at.REF_PITCH], est[at.EST_BALLAST], P[SLIDER_MIN], P[SLIDER_MAX])
+    return pitch_feedforward(sr, P[M_S], P[X_B], ap[ctl.REF_PITCH], est[ctl.EST_BALLAST], P[SLIDER_MIN], P[SLIDER_MAX])
 
 
 @kernel
 def start_pid(P, C, legs, est, ap, pitch_rate):
     """Set the integrators so that the PID begins with the commands sent last."""
     slider = slider_feedforward(P, est, ap)
-    slider += C[at.PITCH_KP] * (est[at.EST_PITCH] - ap[at.REF_PITCH])
-    slider += C[at.PITCH_KD] * (pitch_rate - ap[at.REF_PITCH_RATE])
-    ap[at.INT_PITCH] = clip(ap[at.SENT_SLIDER] - slider, P[SLIDER_MIN], P[SLIDER_MAX])
-    ballast = C[at.DEPTH_KP] * (ap[at.REF_DEPTH] - est[at.EST_DEPTH])
-    ballast += C[at.DEPTH_KD] * (ap[at.REF_DEPTH_RATE] - est[at.EST_DEPTH_RATE])
-    ap[at.INT_DEPTH] = clip(ap[at.SENT_BALLAST] - ballast, P[BALLAST_MIN], P[BALLAST_MAX])
+    slider += C[ctl.PITCH_KP] * (est[ctl.EST_PITCH] - ap[ctl.REF_PITCH])
+    slider += C[ctl.PITCH_KD] * (pitch_rate - ap[ctl.REF_PITCH_RATE])
+    ap[ctl.INT_PITCH] = clip(ap[ctl.SENT_SLIDER] - slider, P[SLIDER_MIN], P[SLIDER_MAX])
+    ballast = C[ctl.DEPTH_KP] * (ap[ctl.REF_DEPTH] - est[ctl.EST_DEPTH])
+    ballast += C[ctl.DEPTH_KD] * (ap[ctl.REF_DEPTH_RATE] - est[ctl.EST_DEPTH_RATE])
+    ap[ctl.INT_DEPTH] = clip(ap[ctl.SENT_BALLAST] - ballast, P[BALLAST_MIN], P[BALLAST_MAX])
 
 
 @kernel
 def form_at(P, C, est, ap):
     """The I/O form chosen in C at the estimate: f_theta, f_Z, g_ts, g_tb, g_zs, g_zb, and cos(theta)."""
-    cf, sf = math.cos(est[at.EST_ROLL]), math.sin(est[at.EST_ROLL])
-    ct, st = math.cos(est[at.EST_PITCH]), math.sin(est[at.EST_PITCH])
+    cf, sf = math.cos(est[ctl.EST_ROLL]), math.sin(est[ctl.EST_ROLL])
+    ct, st = math.cos(est[ctl.EST_PITCH]), math.sin(est[ctl.EST_PITCH])
     kx, ky, kz = -st, sf * ct, cf * ct
-    a, b, c = est[at.EST_SERVO], est[at.EST_SLIDER], est[at.EST_BALLAST]
-    da, db, dc = actuator_rates(P, a, b, c, ap[at.SENT_SERVO], ap[at.SENT_SLIDER], ap[at.SENT_BALLAST])
-    u, v, w = est[at.EST_U], est[at.EST_V], est[at.EST_W]
-    p, q, r = est[at.EST_P], est[at.EST_Q], est[at.EST_R]
-    if C[at.FORM] == at.PAPER:
+    a, b, c = est[ctl.EST_SERVO], est[ctl.EST_SLIDER], est[ctl.EST_BALLAST]
+    da, db, dc = actuator_rates(P, a, b, c, ap[ctl.SENT_SERVO], ap[ctl.SENT_SLIDER], ap[ctl.SENT_BALLAST])
+    u, v, w = est[ctl.EST_U], est[ctl.EST_V], est[ctl.EST_W]
+    p, q, r = est[ctl.EST_P], est[ctl.EST_Q], est[ctl.EST_R]
+    if C[ctl.FORM] == ctl.PAPER:
         f_t, f_z, g_ts, g_tb, g_zs, g_zb = paper_form(P, kx, ky, kz, u, v, w, p, q, r, a, b, c, da, db, dc)
     else:
         f_t, f_z, g_ts, g_tb, g_zs, g_zb = exact_form(P, kx, ky, kz, u, v, w, p, q, r, a, b, c, da, db, dc)
-    share = C[at.OBSERVER_SHARE]
+    share = C[ctl.OBSERVER_SHARE]
     if share > 0.0:
-        e = at.MODEL_ERROR
+        e = ctl.MODEL_ERROR
         d_t, d_z = on_outputs(kx, ky, kz, est[e], est[e + 1], est[e + 2], est[e + 3], est[e + 4], est[e + 5])
         f_t += share * d_t
         f_z += share * d_z
@@ -114,10 +112,10 @@ def within_reach(P, C, est):
 
     The law takes the other actuator where it is, as (34) and (35) do; law+ takes it where it can be in a moment.
     """
-    slider, ballast = est[at.EST_SLIDER], est[at.EST_BALLAST]
-    if C[at.CONTROLLER] != at.LAW_PLUS:
+    slider, ballast = est[ctl.EST_SLIDER], est[ctl.EST_BALLAST]
+    if C[ctl.CONTROLLER] != ctl.LAW_PLUS:
         return slider, slider, ballast, ballast
-    horizon = P[SLIDER_TAU] + C[at.DT]
+    horizon = P[SLIDER_TAU] + C[ctl.DT]
     s_low, s_high = reach(slider, P[SLIDER_MIN], P[SLIDER_MAX], P[SLIDER_RATE], P[SLIDER_TAU], horizon)
     b_low, b_high = reach(ballast, P[BALLAST_MIN], P[BALLAST_MAX], P[BALLAST_RATE], P[BALLAST_TAU], horizon)
     return s_low, s_high, b_low, b_high
@@ -128,92 +126,16 @@ def law_inputs(P, C, legs, est, ap, pitch_rate):
     """Slider (m), ballast (kg) and status by the law, (34) and (35); where the leg holds the ballast, pitch alone."""
     f_t, f_z, g_ts, g_tb, g_zs, g_zb, ct = form_at(P, C, est, ap)
     jerk_t = jerk_z = math.inf
-    if C[at.CONTROLLER] == at.LAW_PLUS:
+    if C[ctl.CONTROLLER] == ctl.LAW_PLUS:
         jerk_t, jerk_z = SHARE * abs(g_ts) * P[SLIDER_RATE], SHARE * abs(g_zb) * P[BALLAST_RATE]
-    slider, ballast, ap[at.S_PITCH], ap[at.S_DEPTH], status = pitch_depth_law(
+    slider, ballast, ap[ctl.S_PITCH], ap[ctl.S_DEPTH], status = pitch_depth_law(
         f_t, f_z, g_ts, g_tb, g_zs, g_zb, ct,
-        est[at.EST_PITCH] - ap[at.REF_PITCH], pitch_rate - ap[at.REF_PITCH_RATE], ap[at.REF_PITCH_ACC],
-        C[at.PITCH_K1], C[at.PITCH_K2], C[at.PITCH_K3], C[at.PITCH_EPS], jerk_t,
-        est[at.EST_DEPTH] - ap[at.REF_DEPTH], est[at.EST_DEPTH_RATE] - ap[at.REF_DEPTH_RATE], ap[at.REF_DEPTH_ACC],
-        C[at.DEPTH_K1], C[at.DEPTH_K2], C[at.DEPTH_K3], C[at.DEPTH_EPS], jerk_z,
+        est[ctl.EST_PITCH] - ap[ctl.REF_PITCH], pitch_rate - ap[ctl.REF_PITCH_RATE], ap[ctl.REF_PITCH_ACC],
+        C[ctl.PITCH_K1], C[ctl.PITCH_K2], C[ctl.PITCH_K3], C[ctl.PITCH_EPS], jerk_t,
+        est[ctl.EST_DEPTH] - ap[ctl.REF_DEPTH], est[ctl.EST_DEPTH_RATE] - ap[ctl.REF_DEPTH_RATE], ap[ctl.REF_DEPTH_ACC],
+        C[ctl.DEPTH_K1], C[ctl.DEPTH_K2], C[ctl.DEPTH_K3], C[ctl.DEPTH_EPS], jerk_z,
         *within_reach(P, C, est),
     )  # fmt: skip
     if not depth_is_held(legs, ap):
-        ballast = legs[int(ap[at.LEG]), at.LEG_BALLAST]
+        ballast = legs[int(ap[ctl.LEG]), ctl.LEG_BALLAST]
     return slider, ballast, status
-
-
-@kernel
-def choose(C, legs, est, ap, t):
-    """The hybrid's choice, PID or LAW, with hysteresis and a dwell time.
-
-    The law's are transitions (the pitch reference is still on its way to the leg's target), a depth that has come off
-    its reference, and rough water; steady flight is the PID's.
-    """
-    if t - ap[at.ACTIVE_SINCE] < C[at.HYBRID_DWELL]:
-        return ap[at.ACTIVE]
-    row = int(ap[at.LEG])
-    pitch_left = abs(legs[row, at.LEG_PITCH] - ap[at.REF_PITCH])
-    depth_off = abs(est[at.EST_DEPTH] - ap[at.REF_DEPTH]) if depth_is_held(legs, ap) else 0.0
-    if ap[at.ACTIVE] == at.LAW:
-        calm = (
-            est[at.ROUGHNESS] < C[at.HYBRID_ROUGHNESS_OFF]
-            and pitch_left < C[at.HYBRID_PITCH_OFF]
-            and depth_off < C[at.HYBRID_DEPTH_OFF]
-        )
-        return at.PID if calm else at.LAW
-    rough = (
-        est[at.ROUGHNESS] > C[at.HYBRID_ROUGHNESS_ON]
-        or pitch_left > C[at.HYBRID_PITCH_ON]
-        or depth_off > C[at.HYBRID_DEPTH_ON]
-    )
-    return at.LAW if rough else at.PID
-
-
-@kernel
-def wanted_by(P, C, legs, est, ap, controller, pitch_rate):
-    """Slider and ballast by PID or LAW; where the law has no answer (steep, not finite) the PID's."""
-    if controller == at.LAW:
-        slider, ballast, status = law_inputs(P, C, legs, est, ap, pitch_rate)
-        ap[at.LAW_STATUS] = status
-        if status == OK:
-            ap[at.LAW_RAN] = 1.0
-            return slider, ballast
-    if ap[at.LAW_RAN] == 1.0:
-        start_pid(P, C, legs, est, ap, pitch_rate)
-        ap[at.LAW_RAN] = 0.0
-    return pid_inputs(P, C, legs, est, ap, pitch_rate)
-
-
-@kernel
-def steer(P, C, legs, est, ap, t):
-    """Wanted servo (rad), slider (m) and ballast (kg) at time t (s), before the limits.
-
-    A switch of controllers makes no step: the PID begins at the commands sent last, and what the law differs from them
-    is taken off and fades in BUMP_TIME.
-    """
-    roll_rate, pitch_rate = angle_rates(est)
-    servo = roll_law(ap[at.REF_ROLL], ap[at.REF_ROLL_RATE], est[at.EST_ROLL], roll_rate, C[at.ROLL_KP], C[at.ROLL_KD])
-    controller = at.PID
-    if ap[at.CAUTIOUS] == 1.0:
-        controller = at.PID
-    elif C[at.CONTROLLER] == at.HYBRID:
-        controller = choose(C, legs, est, ap, t)
-    elif C[at.CONTROLLER] != at.PID:
-        controller = at.LAW
-    switched = controller != ap[at.ACTIVE]
-    if switched:
-        ap[at.ACTIVE], ap[at.ACTIVE_SINCE] = controller, t
-    slider, ballast = wanted_by(P, C, legs, est, ap, controller, pitch_rate)
-    if switched and controller == at.LAW:
-        ap[at.BUMP_SLIDER] = clip(ap[at.SENT_SLIDER] - slider, P[SLIDER_MIN], P[SLIDER_MAX])
-        ap[at.BUMP_BALLAST] = clip(ap[at.SENT_BALLAST] - ballast, P[BALLAST_MIN], P[BALLAST_MAX])
-    elif switched:
-        ap[at.BUMP_SLIDER], ap[at.BUMP_BALLAST] = 0.0, 0.0
-    fade = math.exp(-C[at.DT] / BUMP_TIME)
-    slider += ap[at.BUMP_SLIDER]
-    if depth_is_held(legs, ap):
-        ballast += ap[at.BUMP_BALLAST]
-    ap[at.BUMP_SLIDER] *= fade
-    ap[at.BUMP_BALLAST] *= fade
-    return servo, slider, ballast

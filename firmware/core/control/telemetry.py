@@ -2,18 +2,18 @@
 
 import math
 
-from firmware.core.control import control_layout as at
+from firmware.core.control import control_layout as ctl
 from firmware.core.jit import kernel
 from hal.ports import BEACON
 
 # Places in the record; firmware/telemetry.py gives them their names.
-T, CMD, SLIDER, BALLAST, ATTITUDE, RATES, DEPTH = 0, 1, 4, 5, 6, 9, 12
-DEPTH_EST, DEPTH_RATE, REFERENCES, INTEGRATORS = 13, 14, 15, 21
-MODE_, LEG_, REASON_, LATENESS, DURATION = 23, 24, 25, 26, 27
-DENSITY, PRESSURE, TEMPERATURE, SAMPLE_TIMES = 28, 29, 30, 31
-ESTIMATE, SPREADS = 35, 48
-COVERAGE = 52
-REACTION, FAULT_ROW = 56, 57
+REC_T, REC_CMD, REC_SLIDER, REC_BALLAST, REC_ATTITUDE, REC_RATES, REC_DEPTH = 0, 1, 4, 5, 6, 9, 12
+REC_DEPTH_EST, REC_DEPTH_RATE, REC_REFERENCES, REC_INTEGRATORS = 13, 14, 15, 21
+REC_MODE, REC_LEG, REC_REASON, REC_LATENESS, REC_DURATION = 23, 24, 25, 26, 27
+REC_DENSITY, REC_PRESSURE, REC_TEMPERATURE, REC_SAMPLE_TIMES = 28, 29, 30, 31
+REC_ESTIMATE, REC_SPREADS = 35, 48
+REC_LYAPUNOV = 52
+REC_REACTION, REC_FAULT_ROW = 56, 57
 N_RECORD = 58
 
 
@@ -26,39 +26,43 @@ def fresh(value, time, seen):
 @kernel
 def fill_record(frame, est, ap, cmd, t, lateness, duration, out):
     """Write one tick into out (N_RECORD,); the sample times that out holds from the tick before tell what is new."""
-    out[T] = t
-    out[CMD], out[CMD + 1], out[CMD + 2] = cmd[0], cmd[1], cmd[2]
-    imu, beacon = est[at.EST_IMU_TIME], est[at.EST_BEACON_TIME]
-    slider, plunger = est[at.EST_SLIDER_TIME], est[at.EST_PLUNGER_TIME]
-    out[SLIDER] = fresh(est[at.NEW_SLIDER], slider, out[SAMPLE_TIMES + 2])
-    out[BALLAST] = fresh(est[at.NEW_BALLAST], plunger, out[SAMPLE_TIMES + 3])
-    seen = out[SAMPLE_TIMES]
-    out[ATTITUDE] = fresh(est[at.NEW_ROLL], imu, seen)
-    out[ATTITUDE + 1] = fresh(est[at.NEW_PITCH], imu, seen)
-    out[ATTITUDE + 2] = fresh(est[at.NEW_YAW], imu, seen)
-    out[RATES] = fresh(est[at.NEW_P], imu, seen)
-    out[RATES + 1] = fresh(est[at.NEW_Q], imu, seen)
-    out[RATES + 2] = fresh(est[at.NEW_R], imu, seen)
-    seen = out[SAMPLE_TIMES + 1]
-    out[DEPTH] = fresh(est[at.NEW_DEPTH], beacon, seen)
-    out[PRESSURE] = fresh(frame[BEACON + 2], beacon, seen)
-    out[TEMPERATURE] = fresh(frame[BEACON + 3], beacon, seen)
-    out[DEPTH_EST], out[DEPTH_RATE] = est[at.EST_DEPTH], est[at.EST_DEPTH_RATE]
-    out[REFERENCES], out[REFERENCES + 1] = ap[at.REF_DEPTH], ap[at.REF_DEPTH_RATE]
-    out[REFERENCES + 2], out[REFERENCES + 3] = ap[at.REF_PITCH], ap[at.REF_PITCH_RATE]
-    out[REFERENCES + 4], out[REFERENCES + 5] = ap[at.REF_ROLL], ap[at.REF_ROLL_RATE]
-    out[INTEGRATORS], out[INTEGRATORS + 1] = ap[at.INT_PITCH], ap[at.INT_DEPTH]
-    out[MODE_], out[LEG_], out[REASON_] = ap[at.MODE], ap[at.LEG], ap[at.REASON]
-    out[LATENESS], out[DURATION] = lateness, duration
-    out[DENSITY] = est[at.EST_DENSITY]
-    out[SAMPLE_TIMES], out[SAMPLE_TIMES + 1] = imu, beacon
-    out[SAMPLE_TIMES + 2], out[SAMPLE_TIMES + 3] = slider, plunger
+    out[REC_T] = t
+    out[REC_CMD], out[REC_CMD + 1], out[REC_CMD + 2] = cmd[0], cmd[1], cmd[2]
+    imu, beacon = est[ctl.EST_IMU_TIME], est[ctl.EST_BEACON_TIME]
+    slider, plunger = est[ctl.EST_SLIDER_TIME], est[ctl.EST_PLUNGER_TIME]
+    out[REC_SLIDER] = fresh(est[ctl.NEW_SLIDER], slider, out[REC_SAMPLE_TIMES + 2])
+    out[REC_BALLAST] = fresh(est[ctl.NEW_BALLAST], plunger, out[REC_SAMPLE_TIMES + 3])
+    seen = out[REC_SAMPLE_TIMES]
+    out[REC_ATTITUDE] = fresh(est[ctl.NEW_ROLL], imu, seen)
+    out[REC_ATTITUDE + 1] = fresh(est[ctl.NEW_PITCH], imu, seen)
+    out[REC_ATTITUDE + 2] = fresh(est[ctl.NEW_YAW], imu, seen)
+    out[REC_RATES] = fresh(est[ctl.NEW_P], imu, seen)
+    out[REC_RATES + 1] = fresh(est[ctl.NEW_Q], imu, seen)
+    out[REC_RATES + 2] = fresh(est[ctl.NEW_R], imu, seen)
+    seen = out[REC_SAMPLE_TIMES + 1]
+    out[REC_DEPTH] = fresh(est[ctl.NEW_DEPTH], beacon, seen)
+    out[REC_PRESSURE] = fresh(frame[BEACON + 2], beacon, seen)
+    out[REC_TEMPERATURE] = fresh(frame[BEACON + 3], beacon, seen)
+    out[REC_DEPTH_EST], out[REC_DEPTH_RATE] = est[ctl.EST_DEPTH], est[ctl.EST_DEPTH_RATE]
+    out[REC_REFERENCES], out[REC_REFERENCES + 1] = ap[ctl.REF_DEPTH], ap[ctl.REF_DEPTH_RATE]
+    out[REC_REFERENCES + 2], out[REC_REFERENCES + 3] = ap[ctl.REF_PITCH], ap[ctl.REF_PITCH_RATE]
+    out[REC_REFERENCES + 4], out[REC_REFERENCES + 5] = ap[ctl.REF_ROLL], ap[ctl.REF_ROLL_RATE]
+    out[REC_INTEGRATORS], out[REC_INTEGRATORS + 1] = ap[ctl.INT_PITCH], ap[ctl.INT_DEPTH]
+    out[REC_MODE], out[REC_LEG], out[REC_REASON] = ap[ctl.MODE], ap[ctl.LEG], ap[ctl.REASON]
+    out[REC_LATENESS], out[REC_DURATION] = lateness, duration
+    out[REC_DENSITY] = est[ctl.EST_DENSITY]
+    out[REC_SAMPLE_TIMES], out[REC_SAMPLE_TIMES + 1] = imu, beacon
+    out[REC_SAMPLE_TIMES + 2], out[REC_SAMPLE_TIMES + 3] = slider, plunger
     for i in range(3):
-        out[ESTIMATE + i] = est[at.EST_ROLL + i]
-        out[ESTIMATE + 3 + i] = est[at.EST_U + i]
-    out[ESTIMATE + 6], out[ESTIMATE + 7], out[ESTIMATE + 8] = est[at.EST_SERVO], est[at.EST_SLIDER], est[at.EST_BALLAST]
+        out[REC_ESTIMATE + i] = est[ctl.EST_ROLL + i]
+        out[REC_ESTIMATE + 3 + i] = est[ctl.EST_U + i]
+    out[REC_ESTIMATE + 6], out[REC_ESTIMATE + 7], out[REC_ESTIMATE + 8] = (
+        est[ctl.EST_SERVO],
+        est[ctl.EST_SLIDER],
+        est[ctl.EST_BALLAST],
+    )
     for i in range(4):
-        out[ESTIMATE + 9 + i] = est[at.EST_X + i]
-        out[SPREADS + i] = est[at.SD_DEPTH_RATE + i]
-        out[COVERAGE + i] = ap[at.K2_NEED_PITCH + i]
-    out[REACTION], out[FAULT_ROW] = ap[at.REACTION], ap[at.FAULT_ROW]
+        out[REC_ESTIMATE + 9 + i] = est[ctl.EST_X + i]
+        out[REC_SPREADS + i] = est[ctl.SD_DEPTH_RATE + i]
+        out[REC_LYAPUNOV + i] = ap[ctl.K2_NEED_PITCH + i]
+    out[REC_REACTION], out[REC_FAULT_ROW] = ap[ctl.AP_REACTION], ap[ctl.AP_FAULT_ROW]

@@ -13,10 +13,11 @@ or until speeds have changed (MOVED_SHARE, MOVED_RATE). FRESH in `mode` works bo
 Measurements z (N_Z), NaN where there is none, one after the other; what they take off the covariance waits in `work`
 and comes off in one go. What does not fit:
 - An innovation beyond GATE sigma is left out: a spike moves nothing.
-- While attitude, gyro, depth or position are beyond it, the model's error grows, by `stress` (2: linear, angular), up
-  to ERROR_LINEAR and ERROR_ANGULAR: a vehicle that is not the one in the file is followed by its sensors.
-- A sensor beyond it for PATIENCE seconds has jumped, or the filter has: the covariance is widened in what it measures,
-  and the filter follows. Not so the gyro, since attitude tells the rates too.
+- While attitude, gyro, depth or position are beyond it, the variance of the model's error grows by the factors
+  `inflation` (2: linear, angular), up to ERROR_LINEAR and ERROR_ANGULAR: a vehicle that is not the one in the file is
+  followed by its sensors.
+- A sensor rejected for REJECTED_AT_MOST seconds has jumped, or the filter has: the covariance is widened in what it
+  measures, and the filter follows. Not so the gyro, since attitude tells the rates too.
 - A gyro that is seen to be biased has a bias that moves (GYRO_WANDER): one of wrong scale is followed like that.
 
 `cov` says how sure the filter is of what its sensors show: constant biases of attitude, depth and draw-wires, which
@@ -40,8 +41,9 @@ from firmware.core.estimation.estimator_layout import (
     ERROR_LINEAR,
     FRESH,
     GYRO_WANDER,
-    HOLD,
     HOLD_ERROR,
+    HOLD_LINEARISED,
+    INFLATION_TIME,
     MAX_STEP,
     MOVED_RATE,
     MOVED_SHARE,
@@ -55,16 +57,14 @@ from firmware.core.estimation.estimator_layout import (
     S_BALLAST,
     S_BALLAST_BIAS,
     S_ERROR_TIME,
-    S_GYRO,
     S_LINEAR,
     S_SERVO,
     S_SLIDER,
     S_SLIDER_BIAS,
     S_SPEED_ERROR,
-    S_WATER,
+    S_WALK,
     SERVO_DRIVEN,
     SLIDER_DRIVEN,
-    STRESS_TIME,
     W_A,
     W_C,
     W_DRIVE,
@@ -215,10 +215,10 @@ def add_process_noise(settings, x, cov, C, d, ds, dl, db, dt):
     cov[E_ACT, E_ACT] += (settings[S_SERVO] + wrong * ds * ds) * dt
     cov[E_ACT + 1, E_ACT + 1] += (settings[S_SLIDER] + wrong * dl * dl) * dt
     cov[E_ACT + 2, E_ACT + 2] += (settings[S_BALLAST] + wrong * db * db) * dt
+    for i in range(N_E - E_GYRO):
+        cov[E_GYRO + i, E_GYRO + i] += settings[S_WALK + i] * dt
     for i in range(3):
-        cov[E_GYRO + i, E_GYRO + i] += (settings[S_GYRO] + GYRO_WANDER * x[X_GYRO + i] * x[X_GYRO + i]) * dt
-    for i in range(2):
-        cov[E_WATER + i, E_WATER + i] += settings[S_WATER] * dt
+        cov[E_GYRO + i, E_GYRO + i] += GYRO_WANDER * x[X_GYRO + i] * x[X_GYRO + i] * dt
     share = 1.0 - d[3] * d[3]  # keeps the variance at C where C stays
     for i in range(6):
         for j in range(6):
@@ -241,14 +241,14 @@ def error_covariance(P, settings, sigma, x, ds, dl, db, A, C, work):
 
 
 @kernel
-def scale_error(x, stress, C, f, dt, drive):
-    """Into drive: C, where the model errs by more than its sigma times the stress; at least the error's own square."""
-    fade = math.exp(-dt / STRESS_TIME)
+def scale_error(x, inflation, C, f, dt, drive):
+    """Into drive: C, where the model errs by more than its sigma, inflated; at least the error's own square."""
+    fade = math.exp(-dt / INFLATION_TIME)
     for n in range(2):
-        stress[n] = 1.0 + (stress[n] - 1.0) * fade
+        inflation[n] = 1.0 + (inflation[n] - 1.0) * fade
     for i in range(6):
         most = ERROR_LINEAR if i < 3 else ERROR_ANGULAR
-        f[i] = math.sqrt(max(1.0, min(stress[i // 3], most * most / max(C[i, i], 1e-12))))
+        f[i] = math.sqrt(max(1.0, min(inflation[i // 3], most * most / max(C[i, i], 1e-12))))
     for i in range(6):
         for j in range(6):
             drive[i, j] = C[i, j] * (f[i] * f[j])
@@ -278,10 +278,10 @@ def linearise_where_due(P, settings, sigma, x, ds, dl, db, dt, work):
         linearise_motion(x, work[W_POINT], A)
     elif still and held[1] >= 0.5 * dt:
         linearise(P, x, ds, dl, db, A, work[W_POINT])
-        held[0] = HOLD
+        held[0] = HOLD_LINEARISED
     else:
         error_covariance(P, settings, sigma, x, ds, dl, db, A, C, work)
-        held[0], held[1] = HOLD, HOLD_ERROR
+        held[0], held[1] = HOLD_LINEARISED, HOLD_ERROR
     held[0] -= dt
     held[1] -= dt
     for k in range(N_COUPLED - E_ATT):
@@ -290,7 +290,7 @@ def linearise_where_due(P, settings, sigma, x, ds, dl, db, dt, work):
 
 
 @kernel
-def estimator_predict(P, settings, sigma, x, cov, stress, mode, c_servo, c_slider, c_ballast, dt, work):
+def estimator_predict(P, settings, sigma, x, cov, inflation, mode, c_servo, c_slider, c_ballast, dt, work):
     """Carry x and cov over dt (s) in sub-steps of at most MAX_STEP, actuators as in actuator_speeds."""
     A, C, drive = work[W_A : W_A + N_MOVING], work[W_C : W_C + 6], work[W_DRIVE : W_DRIVE + 6]
     k, y, d = work[W_SCRATCH], work[W_SCRATCH + 1], work[W_SCRATCH + 2]
@@ -303,17 +303,19 @@ def estimator_predict(P, settings, sigma, x, cov, stress, mode, c_servo, c_slide
             work[W_HELD, 0], work[W_HELD, 1] = 0.0, 0.0
         linearise_where_due(P, settings, sigma, x, ds, dl, db, h, work)
         decays(P, settings, mode, h, d)
-        scale_error(x, stress, C, scratch, h, drive)
+        scale_error(x, inflation, C, scratch, h, drive)
         predict_covariance(cov, A, d, h, work)
         add_process_noise(settings, x, cov, drive, d, ds, dl, db, h)
         predict_state(P, x, mode, c_servo, c_slider, c_ballast, d, h, k, scratch, y)
 
 
 @kernel
-def estimator_step(P, settings, sigma, x, cov, stress, mode, c_servo, c_slider, c_ballast, dt, z, beyond, scores, work):
+def estimator_step(
+    P, settings, sigma, x, cov, inflation, mode, c_servo, c_slider, c_ballast, dt, z, rejected_for_s, scores, work
+):
     """One step of the filter: dt (s) under the commands in force, then the measurements z at its end."""
-    estimator_predict(P, settings, sigma, x, cov, stress, mode, c_servo, c_slider, c_ballast, dt, work)
-    estimator_update(P, settings, x, cov, stress, z, beyond, scores, dt, work)
+    estimator_predict(P, settings, sigma, x, cov, inflation, mode, c_servo, c_slider, c_ballast, dt, work)
+    estimator_update(P, settings, x, cov, inflation, z, rejected_for_s, scores, dt, work)
 
 
 @kernel

@@ -9,11 +9,7 @@ then what nothing turns: the model's error, the gyro's bias, the water.
 
 from firmware.core.vehicle.layout import N_X
 
-X_ERR, X_GYRO, X_WATER = N_X, N_X + 6, N_X + 9
-N_XE = N_X + 11
-
 E_POS, E_ATT, E_NU, E_ACT, E_ERR, E_GYRO, E_WATER = 0, 3, 6, 12, 15, 21, 24
-N_E = 26
 N_MOVING = E_ACT  # rows of the linearised flight's matrix A: position, attitude, nu
 N_COUPLED = E_ERR  # its columns: what they hang on
 
@@ -25,14 +21,28 @@ Z_MOCAP_X, Z_MOCAP_Y, Z_MOCAP_Z = 9, 10, 11  # m, NED
 Z_MOCAP_ROLL, Z_MOCAP_PITCH, Z_MOCAP_YAW = 12, 13, 14
 N_Z = 15
 
+# --- states that wander: the last of E, in its order ----------------------------------------------------------------
+# place in E, components, 1 sigma before the first measurement, walk (1 sigma after a second), and the measurement that
+# the first component adds to, the second to the next, and so on; -1: none
+WANDERING = (
+    (E_GYRO, 3, 0.003, 0.0005, Z_P),  # rad/s; it wanders, so that the filter follows a bias worse than its file says
+    (E_WATER, 2, 0.05, 0.005, -1),  # m/s
+)  # fmt: skip
+N_E = E_GYRO + sum(row[1] for row in WANDERING)
+X_ERR, X_GYRO, X_WATER = N_X, N_X + E_GYRO - E_ERR, N_X + E_WATER - E_ERR
+N_XE = N_X + N_E - E_ERR
+# the place in E of what adds to each measurement, 0: nothing
+BIAS_OF = tuple(max([row[0] + m - row[4] for row in WANDERING if 0 <= m - row[4] < row[1] and row[4] >= 0], default=0)
+                for m in range(N_Z))  # fmt: skip
+
 # --- settings: spectral densities (variance per second), times, biases, and the measurements' variances -------------
 S_LINEAR, S_ANGULAR = 0, 1  # (m/s2)2 s, (rad/s2)2 s
 S_SERVO, S_SLIDER, S_BALLAST = 2, 3, 4  # rad2/s, m2/s, kg2/s
 S_SPEED_ERROR = 5  # (share of an actuator's speed that may be wrong)2 s
 S_ERROR_TIME = 6  # s
 S_SLIDER_BIAS, S_BALLAST_BIAS = 7, 8  # variances: m2, kg2
-S_GYRO, S_WATER = 9, 10  # (rad/s)2/s, (m/s)2/s
-S_R = 11  # N_Z variances
+S_WALK = 9  # N_E - E_GYRO, of the states that wander
+S_R = S_WALK + N_E - E_GYRO  # N_Z variances
 N_S = S_R + N_Z
 
 # mode, a sum: actuators that are not known to follow a command but move at a given speed (0 where nothing is known)
@@ -42,11 +52,11 @@ FRESH = 8  # in that sum too: linearise at every sub-step and hold nothing, wher
 # --- constants ------------------------------------------------------------------------------------------------------
 MAX_STEP = 0.02  # s
 DISTURBANCE_HOLD = 0.1  # s; held that long, an acceleration a is white noise of spectral density a^2 DISTURBANCE_HOLD
-HOLD, HOLD_ERROR = 0.1, 0.2  # s, for which equation (1) linearised and the covariance of the model's error serve,
-MOVED_SHARE, MOVED_RATE = 0.015, 0.025  # of the speed, and rad/s: past such a change they do not
+HOLD_LINEARISED, HOLD_ERROR = 0.1, 0.2  # s, how long equation (1) linearised and the model error's covariance serve
+MOVED_SHARE, MOVED_RATE = 0.015, 0.025  # of the speed, and rad/s: past such a change neither does
 GATE = 5.0  # sigma
-PATIENCE = 1.0  # s
-STRESS_GROWTH, STRESS_TIME, STRESS_MAX = 14.0, 5.0, 1e4  # 1/s (fourfold in 0.1 s), s, of the variance
+REJECTED_AT_MOST = 1.0  # s
+INFLATION_GROWTH, INFLATION_TIME, INFLATION_MAX = 14.0, 5.0, 1e4  # 1/s (fourfold in 0.1 s), s, of the variance
 ERROR_LINEAR, ERROR_ANGULAR = 0.1, 0.3  # m/s2, rad/s2
 GYRO_WANDER = 0.2  # 1/s
 SPEED_LIMIT, RATE_LIMIT = 1.5, 3.0  # m/s, rad/s

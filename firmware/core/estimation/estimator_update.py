@@ -3,28 +3,27 @@
 import math
 
 from firmware.core.estimation.estimator_layout import (
+    BIAS_OF,
     COS_PITCH_MIN,
     E_ACT,
     E_ATT,
     E_ERR,
-    E_GYRO,
     E_NU,
     E_POS,
     GATE,
+    INFLATION_GROWTH,
+    INFLATION_MAX,
     LARGEST,
     N_E,
     N_Z,
-    PATIENCE,
     RATE_LIMIT,
+    REJECTED_AT_MOST,
     S_R,
     SPEED_LIMIT,
     STOP_MARGIN,
-    STRESS_GROWTH,
-    STRESS_MAX,
     W_K,
     W_SCRATCH,
     X_ERR,
-    X_GYRO,
     Z_BALLAST,
     Z_DEPTH,
     Z_MOCAP_ROLL,
@@ -32,10 +31,10 @@ from firmware.core.estimation.estimator_layout import (
     Z_YAW,
 )
 from firmware.core.jit import kernel
-from firmware.core.maths.rotations import euler_from_quaternion, wrap_angle
+from firmware.core.maths.rotations import wrap_angle
 from firmware.core.vehicle.actuators import clip
-from firmware.core.vehicle.layout import SERVO_MAX, SERVO_MIN, X_ACT, X_NU
-from firmware.core.vehicle.state import normalise_attitude
+from firmware.core.vehicle.layout import SERVO_MAX, SERVO_MIN, X_ACT, X_DOWN, X_NU, X_QUAT
+from firmware.core.vehicle.state import euler_angles, normalise_attitude, quaternion
 
 
 @kernel
@@ -49,12 +48,12 @@ def widen(cov, column, h0, h1, h2, grow):
 
 
 @kernel
-def update_scalar(cov, taken, n, dx, column, h0, h1, h2, other, innovation, R, beyond, dt):
+def update_scalar(cov, taken, n, dx, column, h0, h1, h2, other, innovation, R, rejected_for_s, dt):
     """One measurement, h . error[column : column + 3] + error[other] = innovation, variance R, into dx and row n of
     `taken`: the covariance is cov less the sum of r r' over rows r of `taken`, and cov itself waits.
 
-    `other` is a gyro's bias, 0 for the sensors that have none in the state. `beyond` is for how long (s) this sensor
-    has been out of the gate. Returns the innovation in sigma, the new `beyond`, and how many rows there are now.
+    `other` is the sensor's bias in E, 0 where the state has none. rejected_for_s: how long this sensor has
+    been out of the gate. Returns the innovation in sigma, the new `rejected_for_s`, and how many rows there are now.
     """
     v = taken[n]
     bias = 1.0 if other > 0 else 0.0
@@ -70,9 +69,9 @@ def update_scalar(cov, taken, n, dx, column, h0, h1, h2, other, innovation, R, b
     S = seen + R
     score = left / math.sqrt(S)
     if abs(score) > GATE:
-        beyond += dt
-        if beyond < PATIENCE or other > 0:
-            return score, beyond, n
+        rejected_for_s += dt
+        if rejected_for_s < REJECTED_AT_MOST or E_NU <= column < E_ACT:  # not so the gyro
+            return score, rejected_for_s, n
         # the measured quantity may have jumped: cov + grow h h' is positive definite, and hardly moves anything else
         h = h0 * h0 + h1 * h1 + h2 * h2
         wanted = (left / GATE) ** 2 - R
@@ -113,11 +112,11 @@ def inject(P, x, dx):
     for i in range(3):
         x[i] += dx[E_POS + i]
     a, b, c = 0.5 * dx[E_ATT], 0.5 * dx[E_ATT + 1], 0.5 * dx[E_ATT + 2]
-    q0, q1, q2, q3 = x[3], x[4], x[5], x[6]
-    x[3] = q0 - q1 * a - q2 * b - q3 * c
-    x[4] = q1 + q0 * a + q2 * c - q3 * b
-    x[5] = q2 + q0 * b - q1 * c + q3 * a
-    x[6] = q3 + q0 * c + q1 * b - q2 * a
+    q0, q1, q2, q3 = quaternion(x)
+    x[X_QUAT] = q0 - q1 * a - q2 * b - q3 * c
+    x[X_QUAT + 1] = q1 + q0 * a + q2 * c - q3 * b
+    x[X_QUAT + 2] = q2 + q0 * b - q1 * c + q3 * a
+    x[X_QUAT + 3] = q3 + q0 * c + q1 * b - q2 * a
     normalise_attitude(x)
     for i in range(6):
         x[X_NU + i] += dx[E_NU + i]
@@ -133,23 +132,23 @@ def inject(P, x, dx):
 
 
 @kernel
-def estimator_update(P, settings, x, cov, stress, z, beyond, scores, dt, work):
+def estimator_update(P, settings, x, cov, inflation, z, rejected_for_s, scores, dt, work):
     """Take the measurements z (N_Z, NaN = none) into x and cov, one after the other, about the same x.
 
-    dt is the time since the last update; beyond (N_Z) is kept between calls. scores (N_Z) gets each innovation in
-    sigma, NaN where there was no measurement.
+    dt is the time since the last update; rejected_for_s (N_Z) is kept between calls. scores (N_Z) gets each innovation
+    in sigma, NaN where there was no measurement.
     """
     dx, taken, n = work[W_SCRATCH], work[W_K : W_K + N_Z + 2], 0
     for i in range(N_E):
         dx[i] = 0.0
-    phi, theta, psi = euler_from_quaternion(x[3], x[4], x[5], x[6])
+    phi, theta, psi = euler_angles(x)
     sf, cf, st, ct = math.sin(phi), math.cos(phi), math.sin(theta), math.cos(theta)
     for m in range(N_Z):
         scores[m] = math.nan
         if not abs(z[m]) < LARGEST:
             continue
         axis = m % 3
-        column, h0, h1, h2, other = E_NU + 3 + axis, 1.0, 0.0, 0.0, 0
+        column, h0, h1, h2, other = E_NU + 3 + axis, 1.0, 0.0, 0.0, BIAS_OF[m]
         if m <= Z_YAW or m >= Z_MOCAP_ROLL:
             column = E_ATT
             if axis == 1:
@@ -161,18 +160,20 @@ def estimator_update(P, settings, x, cov, stress, z, beyond, scores, dt, work):
             else:
                 h0, h1, h2, innovation = 0.0, sf / ct, cf / ct, wrap_angle(z[m] - psi)
         elif m <= Z_R:
-            other, innovation = E_GYRO + axis, z[m] - x[X_NU + 3 + axis] - x[X_GYRO + axis]
+            innovation = z[m] - x[X_NU + 3 + axis]
         elif m == Z_DEPTH:
-            column, innovation = E_POS + 2, z[m] - x[2]
+            column, innovation = E_POS + 2, z[m] - x[X_DOWN]
         elif m <= Z_BALLAST:
             column, innovation = E_ACT + m - Z_DEPTH, z[m] - x[X_ACT + m - Z_DEPTH]
         else:
             column, innovation = E_POS + axis, z[m] - x[axis]
-        scores[m], beyond[m], n = update_scalar(
-            cov, taken, n, dx, column, h0, h1, h2, other, innovation, settings[S_R + m], beyond[m], dt
+        if other > 0:
+            innovation -= x[X_ERR + other - E_ERR]
+        scores[m], rejected_for_s[m], n = update_scalar(
+            cov, taken, n, dx, column, h0, h1, h2, other, innovation, settings[S_R + m], rejected_for_s[m], dt
         )
         if column < E_ACT and abs(scores[m]) > GATE:
             which = 0 if column < E_ATT else 1
-            stress[which] = min(stress[which] * math.exp(STRESS_GROWTH * dt), STRESS_MAX)
+            inflation[which] = min(inflation[which] * math.exp(INFLATION_GROWTH * dt), INFLATION_MAX)
     subtract_taken(cov, taken, n)
     inject(P, x, dx)

@@ -6,7 +6,7 @@ that a slow beacon does not drag the depth behind. What is missing, late or refu
 
 import math
 
-from firmware.core.control import control_layout as at
+from firmware.core.control import control_layout as ctl
 from firmware.core.estimation.estimator import estimator_start, estimator_step
 from firmware.core.estimation.estimator_layout import (
     COMMANDED,
@@ -24,44 +24,50 @@ from firmware.core.estimation.estimator_layout import (
     X_WATER,
     Z_BALLAST,
     Z_DEPTH,
+    Z_P,
+    Z_PITCH,
+    Z_R,
+    Z_ROLL,
     Z_SLIDER,
+    Z_YAW,
 )
 from firmware.core.jit import kernel
-from firmware.core.maths.rotations import euler_from_quaternion, euler_rates, quaternion_from_euler, rotation_nb
-from firmware.core.vehicle.layout import N_P, N_X, X_ACT, X_NU, X_QUAT
+from firmware.core.maths.rotations import euler_rates, quaternion_from_euler
+from firmware.core.vehicle.layout import N_P, N_X, X_BALLAST, X_DOWN, X_EAST, X_NORTH, X_NU, X_QUAT, X_SLIDER
+from firmware.core.vehicle.state import actuators, euler_angles, rotation
 
 ROUGHNESS_TIME = 0.7  # s, in which the roughness follows scores that are twice (or half) what they should be
 ROUGHEST = 300.0  # times the vehicle file's disturbance
-STEEP = 1.4  # rad; beyond it Euler rates mean nothing and samples are taken as they are
+EULER_LIMIT = 1.4  # rad; beyond it Euler rates mean nothing and samples are taken as they are
 
 
 @kernel
 def new_samples(est, x, nav, t):
     """The measurements of this tick into nav's z, NaN where nothing is new, each carried forward over its age."""
-    z = nav[at.NAV_Z : at.NAV_Z + N_Z]
+    z = nav[ctl.NAV_Z : ctl.NAV_Z + N_Z]
     for i in range(N_Z):
         z[i] = math.nan
-    if est[at.EST_IMU_TIME] > nav[at.NAV_USED]:
-        age = t - est[at.EST_IMU_TIME]
-        nav[at.NAV_USED] = est[at.EST_IMU_TIME]
-        phi, theta, _ = euler_from_quaternion(x[3], x[4], x[5], x[6])
+    if est[ctl.EST_IMU_TIME] > nav[ctl.NAV_USED]:
+        age = t - est[ctl.EST_IMU_TIME]
+        nav[ctl.NAV_USED] = est[ctl.EST_IMU_TIME]
+        phi, theta, _ = euler_angles(x)
         phi_rate, theta_rate, psi_rate = 0.0, 0.0, 0.0
-        if abs(theta) < STEEP:
+        if abs(theta) < EULER_LIMIT:
             phi_rate, theta_rate, psi_rate = euler_rates(phi, theta, x[X_NU + 3], x[X_NU + 4], x[X_NU + 5])
-        z[0] = est[at.NEW_ROLL] + phi_rate * age
-        z[1] = est[at.NEW_PITCH] + theta_rate * age
-        z[2] = est[at.NEW_YAW] + psi_rate * age
+        z[Z_ROLL] = est[ctl.NEW_ROLL] + phi_rate * age
+        z[Z_PITCH] = est[ctl.NEW_PITCH] + theta_rate * age
+        z[Z_YAW] = est[ctl.NEW_YAW] + psi_rate * age
         for i in range(3):
-            z[3 + i] = est[at.NEW_P + i]
-    if est[at.EST_BEACON_TIME] > nav[at.NAV_USED + 1]:
-        nav[at.NAV_USED + 1] = est[at.EST_BEACON_TIME]
-        z[Z_DEPTH] = est[at.NEW_DEPTH] + est[at.EST_DEPTH_RATE] * (t - est[at.EST_BEACON_TIME])
-    if est[at.EST_SLIDER_TIME] > nav[at.NAV_USED + 2]:
-        nav[at.NAV_USED + 2] = est[at.EST_SLIDER_TIME]
-        z[Z_SLIDER] = est[at.NEW_SLIDER]
-    if est[at.EST_PLUNGER_TIME] > nav[at.NAV_USED + 3]:
-        nav[at.NAV_USED + 3] = est[at.EST_PLUNGER_TIME]
-        z[Z_BALLAST] = est[at.NEW_BALLAST]
+            z[Z_P + i] = est[ctl.NEW_P + i]
+    if est[ctl.EST_BEACON_TIME] > nav[ctl.NAV_USED + 1]:
+        nav[ctl.NAV_USED + 1] = est[ctl.EST_BEACON_TIME]
+        z[Z_DEPTH] = est[ctl.NEW_DEPTH] + est[ctl.EST_DEPTH_RATE] * (t - est[ctl.EST_BEACON_TIME])
+    if est[ctl.EST_SLIDER_TIME] > nav[ctl.NAV_USED + 2]:
+        nav[ctl.NAV_USED + 2] = est[ctl.EST_SLIDER_TIME]
+        z[Z_SLIDER] = est[ctl.NEW_SLIDER]
+    if est[ctl.EST_PLUNGER_TIME] > nav[ctl.NAV_USED + 3]:
+        nav[ctl.NAV_USED + 3] = est[ctl.EST_PLUNGER_TIME]
+        z[Z_BALLAST] = est[ctl.NEW_BALLAST]
 
 
 @kernel
@@ -69,96 +75,97 @@ def start_filter(P, nav, est, t, x, cov, work):
     """The first state: at rest, attitude and depth as first measured, actuators where the draw-wires say."""
     for i in range(N_XE):
         x[i] = 0.0
-    x[2] = est[at.NEW_DEPTH]
+    x[X_DOWN] = est[ctl.NEW_DEPTH]
     x[X_QUAT], x[X_QUAT + 1], x[X_QUAT + 2], x[X_QUAT + 3] = quaternion_from_euler(
-        est[at.NEW_ROLL], est[at.NEW_PITCH], est[at.NEW_YAW]
+        est[ctl.NEW_ROLL], est[ctl.NEW_PITCH], est[ctl.NEW_YAW]
     )
-    x[X_ACT + 1], x[X_ACT + 2] = est[at.NEW_SLIDER], est[at.NEW_BALLAST]
-    nav[at.NAV_STRESS], nav[at.NAV_STRESS + 1] = 1.0, 1.0
+    x[X_SLIDER], x[X_BALLAST] = est[ctl.NEW_SLIDER], est[ctl.NEW_BALLAST]
+    nav[ctl.NAV_INFLATION], nav[ctl.NAV_INFLATION + 1] = 1.0, 1.0
     for i in range(N_Z):
-        nav[at.NAV_BEYOND + i] = 0.0
+        nav[ctl.NAV_REJECTED + i] = 0.0
     for i in range(4):
-        nav[at.NAV_USED + i] = -1.0
-    spread = nav[at.NAV_SPREAD : at.NAV_SPREAD + N_E]
-    estimator_start(P, nav[at.NAV_SETTINGS : at.NAV_SETTINGS + N_S], nav[at.NAV_SIGMA : at.NAV_SIGMA + N_P], x, cov,
+        nav[ctl.NAV_USED + i] = -1.0
+    spread = nav[ctl.NAV_SPREAD : ctl.NAV_SPREAD + N_E]
+    estimator_start(P, nav[ctl.NAV_SETTINGS : ctl.NAV_SETTINGS + N_S], nav[ctl.NAV_SIGMA : ctl.NAV_SIGMA + N_P], x, cov,
                     spread, work)  # fmt: skip
-    nav[at.NAV_RUNNING], nav[at.NAV_TIME] = 1.0, t
-    nav[at.NAV_ROUGHNESS] = 1.0
-    nav[at.NAV_CALM] = nav[at.NAV_SETTINGS + S_LINEAR]
-    nav[at.NAV_CALM + 1] = nav[at.NAV_SETTINGS + S_ANGULAR]
+    nav[ctl.NAV_RUNNING], nav[ctl.NAV_TIME] = 1.0, t
+    nav[ctl.NAV_ROUGHNESS] = 1.0
+    nav[ctl.NAV_CALM] = nav[ctl.NAV_SETTINGS + S_LINEAR]
+    nav[ctl.NAV_CALM + 1] = nav[ctl.NAV_SETTINGS + S_ANGULAR]
 
 
 @kernel
 def write_state(x, est):
     """A state (N_X or longer) as the rest of the autopilot reads it."""
-    est[at.EST_X], est[at.EST_Y], est[at.EST_DEPTH] = x[0], x[1], x[2]
-    est[at.EST_ROLL], est[at.EST_PITCH], est[at.EST_YAW] = euler_from_quaternion(x[3], x[4], x[5], x[6])
-    _, _, _, _, _, _, r31, r32, r33 = rotation_nb(x[3], x[4], x[5], x[6])
+    est[ctl.EST_X], est[ctl.EST_Y], est[ctl.EST_DEPTH] = x[X_NORTH], x[X_EAST], x[X_DOWN]
+    est[ctl.EST_ROLL], est[ctl.EST_PITCH], est[ctl.EST_YAW] = euler_angles(x)
+    _, _, _, _, _, _, r31, r32, r33 = rotation(x)
     u, v, w = x[X_NU], x[X_NU + 1], x[X_NU + 2]
-    est[at.EST_U], est[at.EST_V], est[at.EST_W] = u, v, w
-    est[at.EST_DEPTH_RATE] = r31 * u + r32 * v + r33 * w
+    est[ctl.EST_U], est[ctl.EST_V], est[ctl.EST_W] = u, v, w
+    est[ctl.EST_DEPTH_RATE] = r31 * u + r32 * v + r33 * w
     for i in range(3):
-        est[at.EST_P + i] = x[X_NU + 3 + i]
-    est[at.EST_SERVO], est[at.EST_SLIDER], est[at.EST_BALLAST] = x[X_ACT], x[X_ACT + 1], x[X_ACT + 2]
+        est[ctl.EST_P + i] = x[X_NU + 3 + i]
+    est[ctl.EST_SERVO], est[ctl.EST_SLIDER], est[ctl.EST_BALLAST] = actuators(x)
 
 
 @kernel
 def write_errors(x, cov, est):
     """What the filter knows beside the state: current, model error, and how sure it is."""
-    _, _, _, _, _, _, r31, _, r33 = rotation_nb(x[3], x[4], x[5], x[6])
-    est[at.EST_WATER_N], est[at.EST_WATER_E] = x[X_WATER], x[X_WATER + 1]
+    _, _, _, _, _, _, r31, _, r33 = rotation(x)
+    est[ctl.EST_WATER_N], est[ctl.EST_WATER_E] = x[X_WATER], x[X_WATER + 1]
     for i in range(6):
-        est[at.MODEL_ERROR + i] = x[X_ERR + i]
-    est[at.SD_DEPTH_RATE] = math.sqrt(
+        est[ctl.MODEL_ERROR + i] = x[X_ERR + i]
+    est[ctl.SD_DEPTH_RATE] = math.sqrt(
         r31 * r31 * cov[E_NU, E_NU] + r33 * r33 * cov[E_NU + 2, E_NU + 2] + 2.0 * r31 * r33 * cov[E_NU, E_NU + 2]
     )
-    est[at.SD_PITCH] = math.sqrt(cov[E_ATT + 1, E_ATT + 1])
-    est[at.SD_U] = math.sqrt(cov[E_NU, E_NU])
+    est[ctl.SD_PITCH] = math.sqrt(cov[E_ATT + 1, E_ATT + 1])
+    est[ctl.SD_U] = math.sqrt(cov[E_NU, E_NU])
 
 
 @kernel
-def follow_roughness(nav, scores, dt):
-    """Let the filter's disturbance follow the water: the gyro's squared scores are 1 on average where it is right.
+def adapt_process_noise(nav, scores, dt):
+    """Adapt the process noise to the water: the gyro's squared innovations over their variance average 1 where it fits.
 
-    A filter that believes in calm water lags behind rough water, and one that believes in rough water hands the gyro's
+    A filter with the noise of calm water lags behind rough water, and one with that of rough water hands the gyro's
     noise on. Roughness multiplies the disturbance's strength, and its square the spectral densities; it moves by the
     scores' logarithm, so that one wild sample does little, and never below what the vehicle file says.
     """
     total, count = 0.0, 0
-    for i in range(3, 6):
+    for i in range(Z_P, Z_R + 1):
         if not math.isnan(scores[i]):
             total += scores[i] * scores[i]
             count += 1
     if count == 0:
         return
     step = min(total / count, 4.0) - 1.0
-    roughness = nav[at.NAV_ROUGHNESS] * math.exp(step * dt / ROUGHNESS_TIME)
+    roughness = nav[ctl.NAV_ROUGHNESS] * math.exp(step * dt / ROUGHNESS_TIME)
     roughness = min(max(roughness, 1.0), ROUGHEST)
-    nav[at.NAV_ROUGHNESS] = roughness
-    nav[at.NAV_SETTINGS + S_LINEAR] = nav[at.NAV_CALM] * roughness * roughness
-    nav[at.NAV_SETTINGS + S_ANGULAR] = nav[at.NAV_CALM + 1] * roughness * roughness
+    nav[ctl.NAV_ROUGHNESS] = roughness
+    nav[ctl.NAV_SETTINGS + S_LINEAR] = nav[ctl.NAV_CALM] * roughness * roughness
+    nav[ctl.NAV_SETTINGS + S_ANGULAR] = nav[ctl.NAV_CALM + 1] * roughness * roughness
 
 
 @kernel
 def navigate(P, C, nav, est, ap, t):
     """One step of the filter at time t (s): the commands sent last, this tick's samples, the estimate into est."""
-    if est[at.EST_STARTED] == 0.0:
+    if est[ctl.EST_STARTED] == 0.0:
         return
-    x = nav[at.NAV_X : at.NAV_X + N_XE]
-    cov = nav[at.NAV_COV : at.NAV_COV + N_E * N_E].reshape(N_E, N_E)
-    work = nav[at.NAV_WORK : at.NAV_WORK + N_WORK_ROWS * N_W].reshape(N_WORK_ROWS, N_W)
-    if nav[at.NAV_RUNNING] == 0.0:
+    x = nav[ctl.NAV_X : ctl.NAV_X + N_XE]
+    cov = nav[ctl.NAV_COV : ctl.NAV_COV + N_E * N_E].reshape(N_E, N_E)
+    work = nav[ctl.NAV_WORK : ctl.NAV_WORK + N_WORK_ROWS * N_W].reshape(N_WORK_ROWS, N_W)
+    if nav[ctl.NAV_RUNNING] == 0.0:
         start_filter(P, nav, est, t, x, cov, work)
     new_samples(est, x, nav, t)
-    dt = t - nav[at.NAV_TIME]
-    nav[at.NAV_TIME] = t
-    scores = nav[at.NAV_SCORES : at.NAV_SCORES + N_Z]
+    dt = t - nav[ctl.NAV_TIME]
+    nav[ctl.NAV_TIME] = t
+    scores = nav[ctl.NAV_SCORES : ctl.NAV_SCORES + N_Z]
     estimator_step(
-        P, nav[at.NAV_SETTINGS : at.NAV_SETTINGS + N_S], nav[at.NAV_SIGMA : at.NAV_SIGMA + N_P], x, cov,
-        nav[at.NAV_STRESS : at.NAV_STRESS + 2], COMMANDED, ap[at.SENT_SERVO], ap[at.SENT_SLIDER], ap[at.SENT_BALLAST],
-        dt, nav[at.NAV_Z : at.NAV_Z + N_Z], nav[at.NAV_BEYOND : at.NAV_BEYOND + N_Z], scores, work,
+        P, nav[ctl.NAV_SETTINGS : ctl.NAV_SETTINGS + N_S], nav[ctl.NAV_SIGMA : ctl.NAV_SIGMA + N_P], x, cov,
+        nav[ctl.NAV_INFLATION : ctl.NAV_INFLATION + 2],
+        COMMANDED, ap[ctl.SENT_SERVO], ap[ctl.SENT_SLIDER], ap[ctl.SENT_BALLAST],
+        dt, nav[ctl.NAV_Z : ctl.NAV_Z + N_Z], nav[ctl.NAV_REJECTED : ctl.NAV_REJECTED + N_Z], scores, work,
     )  # fmt: skip
-    write_state(nav[at.NAV_GIVEN : at.NAV_GIVEN + N_X] if C[at.ESTIMATOR] == at.GIVEN else x, est)
+    write_state(nav[ctl.NAV_GIVEN : ctl.NAV_GIVEN + N_X] if C[ctl.ESTIMATOR] == ctl.GIVEN else x, est)
     write_errors(x, cov, est)
-    follow_roughness(nav, scores, dt)
-    est[at.ROUGHNESS] = nav[at.NAV_ROUGHNESS]
+    adapt_process_noise(nav, scores, dt)
+    est[ctl.ROUGHNESS] = nav[ctl.NAV_ROUGHNESS]

@@ -2,11 +2,17 @@
 
 import math
 
-from firmware.core.control import control_layout as at
+from firmware.core.control import control_layout as ctl
 from firmware.core.jit import kernel
-from firmware.core.vehicle.layout import PLUNGER_AREA, G
+from firmware.core.vehicle.layout import GRAVITY, PLUNGER_AREA
 from firmware.core.vehicle.seawater import water_density
-from hal.ports import BEACON, IMU, PLUNGER_WIRE, SLIDER_WIRE
+from hal.ports import BEACON, IMU, PLUNGER_WIRE, SLIDER_WIRE, STALE_PERIODS
+
+
+@kernel
+def longest_age(period, tick):
+    """Age (s) past which a sample counts for nothing: STALE_PERIODS of its sensor, and the tick that looks at it."""
+    return STALE_PERIODS * period + tick
 
 
 @kernel
@@ -31,54 +37,56 @@ def ballast_mass(density, plunger_area, plunger):
 def track_depth(est, depth, h, wn):
     """Depth and its rate by a critically damped second-order observer, a step of h (s) from sample to sample."""
     gain = min(wn * h, 1.0)
-    predicted = est[at.EST_DEPTH] + est[at.EST_DEPTH_RATE] * h
+    predicted = est[ctl.EST_DEPTH] + est[ctl.EST_DEPTH_RATE] * h
     innovation = depth - predicted
     # double pole at exp(-gain): the discrete alpha-beta filter with the same two real poles
     z = math.exp(-gain)
-    est[at.EST_DEPTH] = predicted + (1.0 - z * z) * innovation
-    est[at.EST_DEPTH_RATE] += (1.0 - z) * (1.0 - z) / h * innovation
+    est[ctl.EST_DEPTH] = predicted + (1.0 - z * z) * innovation
+    est[ctl.EST_DEPTH_RATE] += (1.0 - z) * (1.0 - z) / h * innovation
 
 
 @kernel
 def sense_beacon(C, frame, est):
     """Water density, depth and, where nothing better filters it, depth rate from a new beacon sample."""
-    gauge = frame[BEACON + 2] - C[at.SURFACE_PRESSURE]
+    gauge = frame[BEACON + 2] - C[ctl.SURFACE_PRESSURE]
     # the mean of the column above is half way between the surface's density and this one
-    density = water_density(gauge, frame[BEACON + 3], C[at.SALINITY])
-    column = 0.5 * (density + water_density(0.0, frame[BEACON + 3], C[at.SALINITY]))
-    depth = gauge / (column * G)
-    est[at.EST_DENSITY] = density
-    est[at.NEW_DEPTH] = depth
-    if est[at.EST_BEACON_TIME] < 0.0:
-        est[at.EST_DEPTH], est[at.EST_DEPTH_RATE] = depth, 0.0
-    elif C[at.ESTIMATOR] == at.MEASURED:
-        track_depth(est, depth, frame[BEACON] - est[at.EST_BEACON_TIME], C[at.DEPTH_FILTER_WN])
-    est[at.EST_BEACON_TIME] = frame[BEACON]
+    density = water_density(gauge, frame[BEACON + 3], C[ctl.SALINITY])
+    column = 0.5 * (density + water_density(0.0, frame[BEACON + 3], C[ctl.SALINITY]))
+    depth = gauge / (column * GRAVITY)
+    est[ctl.EST_DENSITY] = density
+    est[ctl.NEW_DEPTH] = depth
+    if est[ctl.EST_BEACON_TIME] < 0.0:
+        est[ctl.EST_DEPTH], est[ctl.EST_DEPTH_RATE] = depth, 0.0
+    elif C[ctl.ESTIMATOR] == ctl.MEASURED:
+        track_depth(est, depth, frame[BEACON] - est[ctl.EST_BEACON_TIME], C[ctl.DEPTH_FILTER_WN])
+    est[ctl.EST_BEACON_TIME] = frame[BEACON]
 
 
 @kernel
 def sense(P, C, frame, est, now):
     """Take every new, valid sample of the frame into `est`; what is missing, late or not finite leaves it as it was."""
-    if usable(frame, IMU, 6, est[at.EST_IMU_TIME], now, C[at.MAX_AGE_IMU]):
-        est[at.EST_IMU_TIME] = frame[IMU]
+    if usable(frame, IMU, 6, est[ctl.EST_IMU_TIME], now, C[ctl.MAX_AGE_IMU]):
+        est[ctl.EST_IMU_TIME] = frame[IMU]
         for i in range(6):
-            est[at.NEW_ROLL + i] = frame[IMU + 2 + i]
-    if usable(frame, BEACON, 2, est[at.EST_BEACON_TIME], now, C[at.MAX_AGE_BEACON]):
+            est[ctl.NEW_ROLL + i] = frame[IMU + 2 + i]
+    if usable(frame, BEACON, 2, est[ctl.EST_BEACON_TIME], now, C[ctl.MAX_AGE_BEACON]):
         sense_beacon(C, frame, est)
-    if usable(frame, SLIDER_WIRE, 1, est[at.EST_SLIDER_TIME], now, C[at.MAX_AGE_WIRE]):
-        est[at.EST_SLIDER_TIME] = frame[SLIDER_WIRE]
-        est[at.NEW_SLIDER] = frame[SLIDER_WIRE + 2]
-    if est[at.EST_DENSITY] > 0.0 and usable(frame, PLUNGER_WIRE, 1, est[at.EST_PLUNGER_TIME], now, C[at.MAX_AGE_WIRE]):
-        est[at.EST_PLUNGER_TIME] = frame[PLUNGER_WIRE]
-        est[at.NEW_BALLAST] = ballast_mass(est[at.EST_DENSITY], P[PLUNGER_AREA], frame[PLUNGER_WIRE + 2])
-    if est[at.EST_IMU_TIME] >= 0.0 and est[at.EST_BEACON_TIME] >= 0.0:
-        est[at.EST_STARTED] = 1.0
+    if usable(frame, SLIDER_WIRE, 1, est[ctl.EST_SLIDER_TIME], now, C[ctl.MAX_AGE_WIRE]):
+        est[ctl.EST_SLIDER_TIME] = frame[SLIDER_WIRE]
+        est[ctl.NEW_SLIDER] = frame[SLIDER_WIRE + 2]
+    if est[ctl.EST_DENSITY] > 0.0 and usable(
+        frame, PLUNGER_WIRE, 1, est[ctl.EST_PLUNGER_TIME], now, C[ctl.MAX_AGE_WIRE]
+    ):
+        est[ctl.EST_PLUNGER_TIME] = frame[PLUNGER_WIRE]
+        est[ctl.NEW_BALLAST] = ballast_mass(est[ctl.EST_DENSITY], P[PLUNGER_AREA], frame[PLUNGER_WIRE + 2])
+    if est[ctl.EST_IMU_TIME] >= 0.0 and est[ctl.EST_BEACON_TIME] >= 0.0:
+        est[ctl.EST_STARTED] = 1.0
 
 
 @kernel
 def take_as_measured(est):
     """The estimate without a filter: the newest samples as they are (depth and its rate come from the observer)."""
     for i in range(6):
-        est[at.EST_ROLL + i] = est[at.NEW_ROLL + i]
-    est[at.EST_SLIDER] = est[at.NEW_SLIDER]
-    est[at.EST_BALLAST] = est[at.NEW_BALLAST]
+        est[ctl.EST_ROLL + i] = est[ctl.NEW_ROLL + i]
+    est[ctl.EST_SLIDER] = est[ctl.NEW_SLIDER]
+    est[ctl.EST_BALLAST] = est[ctl.NEW_BALLAST]

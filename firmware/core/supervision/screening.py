@@ -1,12 +1,13 @@
-"""Samples looked at before anybody believes them: their times, their ranges, their jumps, and whether they live.
+"""Plausibility checks of samples: their times, their ranges, their jumps, and whether they are stuck.
 
-What is not fit is marked as FAULT in the frame, so that the estimator leaves it and goes on from what it knows.
+What is not fit is marked as FAULT in the frame, so that the estimator does without it.
 """
 
 import math
 
+from firmware.core.estimation.sensing import longest_age
 from firmware.core.jit import kernel
-from firmware.core.supervision import supervisor_layout as at
+from firmware.core.supervision import supervisor_layout as sup
 from firmware.core.vehicle.layout import BALLAST_MAX, BALLAST_MIN, SLIDER_MAX, SLIDER_MIN
 from hal.ports import IMU
 
@@ -21,9 +22,9 @@ DRAWN = 0.05  # of a range; an actuator sent so far moves its draw-wire
 @kernel
 def differs(G, frame, sensor, table):
     """True where the sensor's values are not those at `table`; NaN differs from everything."""
-    start, place = at.STARTS[sensor] + 2, at.PLACES[sensor]
+    start, place = sup.STARTS[sensor] + 2, sup.PLACES[sensor]
     other = False
-    for i in range(at.WIDTHS[sensor]):
+    for i in range(sup.WIDTHS[sensor]):
         other = other or frame[start + i] != G[table + place + i]
     return other
 
@@ -31,87 +32,87 @@ def differs(G, frame, sensor, table):
 @kernel
 def keep(G, frame, sensor, table):
     """The sensor's values into the table."""
-    start, place = at.STARTS[sensor] + 2, at.PLACES[sensor]
-    for i in range(at.WIDTHS[sensor]):
+    start, place = sup.STARTS[sensor] + 2, sup.PLACES[sensor]
+    for i in range(sup.WIDTHS[sensor]):
         G[table + place + i] = frame[start + i]
 
 
 @kernel
 def absurd(G, frame, sensor, elapsed):
     """True where a value is not finite, out of its physical range, or farther from the last than anything moves."""
-    start, place = at.STARTS[sensor] + 2, at.PLACES[sensor]
-    for i in range(at.WIDTHS[sensor]):
+    start, place = sup.STARTS[sensor] + 2, sup.PLACES[sensor]
+    for i in range(sup.WIDTHS[sensor]):
         value = frame[start + i]
-        if not (math.isfinite(value) and G[at.LOW + place + i] <= value <= G[at.HIGH + place + i]):
+        if not (math.isfinite(value) and G[sup.LOW + place + i] <= value <= G[sup.HIGH + place + i]):
             return True
-        jump = abs(value - G[at.LAST + place + i])
-        if sensor == at.S_IMU and (i == 0 or i == 2):  # roll and yaw go round, and mean nothing upright
+        jump = abs(value - G[sup.LAST + place + i])
+        if sensor == sup.SENSOR_IMU and (i == 0 or i == 2):  # roll and yaw go round, and mean nothing upright
             jump = min(jump, 2.0 * math.pi - jump) if abs(frame[start + 1]) < UPRIGHT else 0.0
-        if jump > G[at.JUMP + place + i] + G[at.JUMP_RATE + place + i] * elapsed:  # never for NaN, the first
+        if jump > G[sup.JUMP + place + i] + G[sup.JUMP_RATE + place + i] * elapsed:  # never for NaN, the first
             return True
     return False
 
 
 @kernel
-def moves(P, G, frame, sensor):
-    """True where the vehicle does what should show in this sensor."""
-    if sensor == at.S_IMU:
+def excited(P, G, frame, sensor):
+    """True where the vehicle does what should show in this sensor (persistent excitation)."""
+    if sensor == sup.SENSOR_IMU:
         return True
-    if sensor == at.S_BEACON:
-        return abs(frame[IMU + 3]) > NODDING or abs(G[at.SENT + 2]) > HEAVY * (P[BALLAST_MAX] - P[BALLAST_MIN])
-    if sensor == at.S_SLIDER or sensor == at.S_PLUNGER:
-        i = sensor - at.S_SLIDER
-        return abs(G[at.SENT + 1 + i] - G[at.SENT_THEN + i]) > DRAWN * (P[HIGHS[i]] - P[LOWS[i]])
+    if sensor == sup.SENSOR_BEACON:
+        return abs(frame[IMU + 3]) > NODDING or abs(G[sup.SENT + 2]) > HEAVY * (P[BALLAST_MAX] - P[BALLAST_MIN])
+    if sensor == sup.SENSOR_SLIDER or sensor == sup.SENSOR_PLUNGER:
+        i = sensor - sup.SENSOR_SLIDER
+        return abs(G[sup.SENT + 1 + i] - G[sup.SENT_THEN + i]) > DRAWN * (P[HIGHS[i]] - P[LOWS[i]])
     return False
 
 
 @kernel
 def stuck(P, G, frame, sensor, t):
     """True where the sensor has said the same for too long while it should not; notes when that began."""
-    if differs(G, frame, sensor, at.RAW) or math.isnan(G[at.SAME_SINCE + sensor]):
-        G[at.SAME_SINCE + sensor] = t
-        if sensor == at.S_SLIDER or sensor == at.S_PLUNGER:
-            G[at.SENT_THEN + sensor - at.S_SLIDER] = G[at.SENT + 1 + sensor - at.S_SLIDER]
-    patience = G[at.FROZEN_TIME] if sensor == at.S_IMU else G[at.STUCK_TIME]
-    row = 1 if sensor == at.S_IMU else 11
-    same = t - G[at.SAME_SINCE + sensor] >= max(patience, 4.0 * G[at.PERIOD + sensor])
-    return G[at.ENABLED + row] == 1.0 and same and moves(P, G, frame, sensor)
+    if differs(G, frame, sensor, sup.RAW) or math.isnan(G[sup.SAME_SINCE + sensor]):
+        G[sup.SAME_SINCE + sensor] = t
+        if sensor == sup.SENSOR_SLIDER or sensor == sup.SENSOR_PLUNGER:
+            G[sup.SENT_THEN + sensor - sup.SENSOR_SLIDER] = G[sup.SENT + 1 + sensor - sup.SENSOR_SLIDER]
+    patience = G[sup.FROZEN_TIME] if sensor == sup.SENSOR_IMU else G[sup.STUCK_TIME]
+    row = sup.FAULT_IMU_LOST if sensor == sup.SENSOR_IMU else sup.FAULT_STUCK_SENSOR
+    same = t - G[sup.SAME_SINCE + sensor] >= max(patience, 4.0 * G[sup.PERIOD + sensor])
+    return G[sup.ENABLED + row] == 1.0 and same and excited(P, G, frame, sensor)
 
 
 @kernel
 def judge(P, G, frame, sensor, t):
-    """What a sample not seen before is worth: FIT, MISTIMED, ABSURD or STUCK."""
-    time, last = frame[at.STARTS[sensor]], G[at.TAKEN + sensor]
+    """The verdict on a sample not seen before: FIT, MISTIMED, ABSURD or STUCK."""
+    time, last = frame[sup.STARTS[sensor]], G[sup.TAKEN + sensor]
     still = stuck(P, G, frame, sensor, t)
-    if G[at.ENABLED + 6] == 1.0:
-        oldest = t - 3.0 * G[at.PERIOD + sensor] - G[at.TICK]
+    if G[sup.ENABLED + sup.FAULT_SAMPLE_TIME] == 1.0:
+        oldest = t - longest_age(G[sup.PERIOD + sensor], G[sup.TICK])
         if not oldest <= time <= t + 1e-6 or time <= last:
-            return at.MISTIMED
-    if G[at.ENABLED + 10] == 1.0 and absurd(G, frame, sensor, max(time - last, 0.0)):
-        return at.ABSURD
-    return at.STUCK if still else at.FIT
+            return sup.MISTIMED
+    if G[sup.ENABLED + sup.FAULT_IMPLAUSIBLE] == 1.0 and absurd(G, frame, sensor, max(time - last, 0.0)):
+        return sup.ABSURD
+    return sup.STUCK if still else sup.FIT
 
 
 @kernel
 def take(P, G, frame, sensor, t):
     """Look at one sensor's slot; what is unfit is marked in the frame."""
-    start = at.STARTS[sensor]
-    if frame[start + 1] != at.VALID:
+    start = sup.STARTS[sensor]
+    if frame[start + 1] != sup.VALID:
         return
-    if frame[start] != G[at.SEEN + sensor]:
-        worth = judge(P, G, frame, sensor, t)
-        G[at.SEEN + sensor] = frame[start]
-        keep(G, frame, sensor, at.RAW)
-        if worth == at.FIT:
-            G[at.TAKEN + sensor], G[at.UNFIT + sensor] = frame[start], 0.0
-            keep(G, frame, sensor, at.LAST)
+    if frame[start] != G[sup.SEEN + sensor]:
+        verdict = judge(P, G, frame, sensor, t)
+        G[sup.SEEN + sensor] = frame[start]
+        keep(G, frame, sensor, sup.RAW)
+        if verdict == sup.FIT:
+            G[sup.TAKEN + sensor], G[sup.UNFIT + sensor] = frame[start], 0.0
+            keep(G, frame, sensor, sup.LAST)
         else:
-            G[at.UNFIT + sensor] += 1.0
-        G[at.WORTH + sensor] = worth
-    elif G[at.ENABLED + 6] == 1.0 and differs(G, frame, sensor, at.RAW):
-        G[at.WORTH + sensor] = at.MISTIMED  # another sample under the same time
-    if G[at.WORTH + sensor] != at.FIT:
-        frame[start + 1] = at.FAULT
+            G[sup.UNFIT + sensor] += 1.0
+        G[sup.SAMPLE_VERDICT + sensor] = verdict
+    elif G[sup.ENABLED + sup.FAULT_SAMPLE_TIME] == 1.0 and differs(G, frame, sensor, sup.RAW):
+        G[sup.SAMPLE_VERDICT + sensor] = sup.MISTIMED  # another sample under the same time
+    if G[sup.SAMPLE_VERDICT + sensor] != sup.FIT:
+        frame[start + 1] = sup.FAULT
 
 
 @kernel
@@ -120,17 +121,17 @@ def start_place(G, frame, wire, scale, dead):
 
     scale: the actuator's unit per metre of wire; nearer to neutral than `dead` counts as neutral.
     """
-    if G[at.PLACED + wire] == 0.0 and frame[at.STARTS[at.S_SLIDER + wire] + 1] == at.VALID:
-        place = scale * frame[at.STARTS[at.S_SLIDER + wire] + 2]
+    if G[sup.PLACED + wire] == 0.0 and frame[sup.STARTS[sup.SENSOR_SLIDER + wire] + 1] == sup.VALID:
+        place = scale * frame[sup.STARTS[sup.SENSOR_SLIDER + wire] + 2]
         if abs(place) > dead:
-            G[at.SENT + 1 + wire] = place
-        G[at.PLACED + wire] = 1.0
+            G[sup.SENT + 1 + wire] = place
+        G[sup.PLACED + wire] = 1.0
 
 
 @kernel
 def screen(P, G, frame, t):
     """Every sensor of the frame (FRAME_SIZE,) at time t (s), in place; P (N_P,), G (N_G,)."""
-    if math.isnan(G[at.BEGAN]):
-        G[at.BEGAN] = t
-    for sensor in range(at.N_SENSORS):
+    if math.isnan(G[sup.BEGAN]):
+        G[sup.BEGAN] = t
+    for sensor in range(sup.N_SENSORS):
         take(P, G, frame, sensor, t)

@@ -8,9 +8,9 @@ import math
 from firmware.core.control import control_layout as ctl
 from firmware.core.control.guidance import abort
 from firmware.core.jit import kernel
-from firmware.core.supervision import supervisor_layout as at
+from firmware.core.supervision import supervisor_layout as sup
 from firmware.core.supervision.detectors import (
-    ABSURD,
+    IMPOSSIBLE,
     ask,
     watch_ascent,
     watch_attitude,
@@ -45,11 +45,11 @@ def highest(asked, enabled, before):
 
     asked, enabled (N_ROWS,); before: the reaction until now. Returns reaction, row; row 0 where `before` stands.
     """
-    reaction, row = at.NOTHING, 0
-    for i in range(1, at.N_ROWS):
+    reaction, row = sup.NOTHING, 0
+    for i in range(1, sup.N_ROWS):
         if enabled[i] == 1.0 and asked[i] > reaction:
             reaction, row = asked[i], i
-    if before >= at.ABORT and before >= reaction:
+    if before >= sup.ABORT and before >= reaction:
         return before, 0
     return reaction, row
 
@@ -57,34 +57,36 @@ def highest(asked, enabled, before):
 @kernel
 def settle(G, t):
     """This tick's reaction and who asked for it; what each row asked for first and at most."""
-    G[at.CHANGED] = 0.0
-    for row in range(1, at.N_ROWS):
-        asked = G[at.ASKED + row] * G[at.ENABLED + row]
-        if asked > G[at.WORST + row]:
-            if G[at.FIRST + row] < 0.0:
-                G[at.FIRST + row] = t
-            G[at.WORST + row] = asked
-            G[at.CHANGED] = 1.0
-    reaction, row = highest(G[at.ASKED : at.ASKED + at.N_ROWS], G[at.ENABLED : at.ENABLED + at.N_ROWS], G[at.REACTION])
-    if row > 0 or reaction < at.ABORT:
-        G[at.ROW] = row
-    G[at.REACTION] = reaction
+    G[sup.CHANGED] = 0.0
+    for row in range(1, sup.N_ROWS):
+        asked = G[sup.ASKED + row] * G[sup.ENABLED + row]
+        if asked > G[sup.WORST + row]:
+            if G[sup.FIRST + row] < 0.0:
+                G[sup.FIRST + row] = t
+            G[sup.WORST + row] = asked
+            G[sup.CHANGED] = 1.0
+    reaction, row = highest(
+        G[sup.ASKED : sup.ASKED + sup.N_ROWS], G[sup.ENABLED : sup.ENABLED + sup.N_ROWS], G[sup.HIGHEST]
+    )
+    if row > 0 or reaction < sup.ABORT:
+        G[sup.HIGHEST_ROW] = row
+    G[sup.HIGHEST] = reaction
 
 
 @kernel
 def goal(P, G, cmd, ap, i):
     """Where actuator i (servo, slider, ballast) is to go under this tick's reaction; NaN: it is left alone."""
-    if i > 0 and G[at.STOPPED + i - 1] == 1.0:
-        return G[at.SENT + i]
-    if G[at.REACTION] >= at.ABORT:
+    if i > 0 and G[sup.STOPPED + i - 1] == 1.0:
+        return G[sup.SENT + i]
+    if G[sup.HIGHEST] >= sup.ABORT:
         return 0.0 if i == 0 else P[MINS[i]]
-    if (i == 0 and ap[ctl.MODE] == ctl.WAITING) or (i > 0 and G[at.PLACED + i - 1] == 0.0):
+    if (i == 0 and ap[ctl.MODE] == ctl.WAITING) or (i > 0 and G[sup.PLACED + i - 1] == 0.0):
         return math.nan
-    if G[at.REACTION] == at.HOLD:
-        return G[at.SENT + i]
-    if i == 0 and G[at.ASKED + 5] * G[at.ENABLED + 5] > 0.0:
+    if G[sup.HIGHEST] == sup.HOLD:
+        return G[sup.SENT + i]
+    if i == 0 and G[sup.ASKED + sup.FAULT_SERVO_LOST] * G[sup.ENABLED + sup.FAULT_SERVO_LOST] > 0.0:
         return 0.0
-    return cmd[i] if math.isfinite(cmd[i]) else G[at.SENT + i]
+    return cmd[i] if math.isfinite(cmd[i]) else G[sup.SENT + i]
 
 
 @kernel
@@ -93,15 +95,15 @@ def act(P, G, cmd, ap, t):
     for i in range(3):
         low, high = P[MINS[i]], P[MINS[i] + 1]
         wanted = goal(P, G, cmd, ap, i)
-        if i > 0 and t < G[at.REST_UNTIL + i - 1] and G[at.REACTION] < at.HOLD:
-            wanted = G[at.MARK + i - 1]  # where it stands
-        last = G[at.SENT + i]
-        beyond = abs(ap[ctl.WANTED_SERVO + i]) > ABSURD * (high - low)
-        if G[at.ENABLED + 22] == 1.0 and beyond and G[at.REACTION] < at.ABORT:
+        if i > 0 and t < G[sup.REST_UNTIL + i - 1] and G[sup.HIGHEST] < sup.HOLD:
+            wanted = G[sup.MARK + i - 1]  # where it stands
+        last = G[sup.SENT + i]
+        beyond = abs(ap[ctl.WANTED_SERVO + i]) > IMPOSSIBLE * (high - low)
+        if G[sup.ENABLED + sup.FAULT_NO_ANSWER] == 1.0 and beyond and G[sup.HIGHEST] < sup.ABORT:
             wanted = last
-        sent = limited(wanted, last, low, high, P[RATES[i]], G[at.TICK])
+        sent = limited(wanted, last, low, high, P[RATES[i]], G[sup.TICK])
         cmd[i] = math.nan if math.isnan(wanted) else sent
-        G[at.SENT + i] = ap[ctl.SENT_SERVO + i] = sent
+        G[sup.SENT + i] = ap[ctl.SENT_SERVO + i] = sent
 
 
 @kernel
@@ -109,24 +111,24 @@ def watch_limits(P, G, cmd):
     """Row 15: asked to go past a limit; clamped in `act`."""
     for i in range(3):
         if cmd[i] < P[MINS[i]] - ROUNDING or cmd[i] > P[MINS[i] + 1] + ROUNDING:
-            ask(G, 15, at.LOG)
+            ask(G, sup.FAULT_SOFT_LIMIT, sup.LOG)
 
 
 @kernel
 def watch_moves(P, G, frame, scale, t):
     """Row 14, as the draw-wires see it; a wire that is lost says nothing."""
-    G[at.RING_AT] = (G[at.RING_AT] + 1.0) % at.N_RING
+    G[sup.RING_AT] = (G[sup.RING_AT] + 1.0) % sup.N_RING
     for i in range(2):
-        start, place = at.STARTS[at.S_SLIDER + i], i * at.N_RING + int(G[at.RING_AT])
+        start, place = sup.STARTS[sup.SENSOR_SLIDER + i], i * sup.N_RING + int(G[sup.RING_AT])
         factor, span = 1.0 if i == 0 else scale, P[MINS[i + 1] + 1] - P[MINS[i + 1]]
         start_place(G, frame, i, factor, 0.03 * span)
-        G[at.RING + place], G[at.SENT_RING + place] = math.nan, G[at.SENT + 1 + i]
+        G[sup.RING + place], G[sup.SENT_RING + place] = math.nan, G[sup.SENT + 1 + i]
         rate, tau = (P[SLIDER_RATE], P[SLIDER_TAU]) if i == 0 else (P[BALLAST_RATE], P[BALLAST_TAU])
-        if frame[start + 1] == at.VALID and G[at.PLACED + i] == 1.0:
-            G[at.RING + place] = factor * frame[start + 2]
-            watch_move(G, i, G[at.RING + place], rate, tau, span, t)
-        elif G[at.PLACED + i] == 0.0 and t - G[at.BEGAN] > G[at.LOST_AFTER + at.S_SLIDER + i]:
-            G[at.PLACED + i] = 1.0  # no wire: from where it was sent last, as far as is known
+        if frame[start + 1] == sup.VALID and G[sup.PLACED + i] == 1.0:
+            G[sup.RING + place] = factor * frame[start + 2]
+            watch_move(G, i, G[sup.RING + place], rate, tau, span, t)
+        elif G[sup.PLACED + i] == 0.0 and t - G[sup.BEGAN] > G[sup.LOST_AFTER + sup.SENSOR_SLIDER + i]:
+            G[sup.PLACED + i] = 1.0  # no wire: from where it was sent last, as far as is known
 
 
 @kernel
@@ -135,8 +137,8 @@ def guard(P, C, G, frame, est, ap, cmd, t):
 
     P (N_P,), C (N_C,), G (N_G,), frame (FRAME_SIZE,), est (N_EST,), ap (N_AP,).
     """
-    for row in range(at.N_ROWS):
-        G[at.ASKED + row] = at.NOTHING
+    for row in range(sup.N_ROWS):
+        G[sup.ASKED + row] = sup.NOTHING
     scale = est[ctl.EST_DENSITY] * P[PLUNGER_AREA] if est[ctl.EST_DENSITY] > 0.0 else 1000.0 * P[PLUNGER_AREA]
     watch_sensors(G, frame, t)
     watch_states(G, frame, t)
@@ -150,9 +152,14 @@ def guard(P, C, G, frame, est, ap, cmd, t):
     watch_limits(P, G, cmd)
     settle(G, t)
     act(P, G, cmd, ap, t)
-    doubtful = G[at.ASKED + 13] * G[at.ENABLED + 13] + G[at.ASKED + 21] * G[at.ENABLED + 21] > 0.0
-    lawless = G[at.ENABLED + 22] == 1.0 and t < G[at.PID_UNTIL]
+    doubtful = (
+        G[sup.ASKED + sup.FAULT_DISAGREE] * G[sup.ENABLED + sup.FAULT_DISAGREE]
+        + G[sup.ASKED + sup.FAULT_STEEP] * G[sup.ENABLED + sup.FAULT_STEEP]
+        > 0.0
+    )
+    lawless = G[sup.ENABLED + sup.FAULT_NO_ANSWER] == 1.0 and t < G[sup.PID_UNTIL]
     ap[ctl.CAUTIOUS] = 1.0 if doubtful or lawless else 0.0
-    if G[at.REACTION] >= at.ABORT and ap[ctl.MODE] < ctl.COMPLETED:
-        abort(ap, ctl.REASON_FAULT + G[at.ROW])
-    ap[ctl.REACTION], ap[ctl.FAULT_ROW] = G[at.REACTION], G[at.ROW]
+    if G[sup.HIGHEST] >= sup.ABORT and ap[ctl.MODE] < ctl.COMPLETED:
+        abort(ap, ctl.REASON_FAULT + G[sup.HIGHEST_ROW])
+    ap[ctl.SUPERVISED] = 1.0
+    ap[ctl.AP_REACTION], ap[ctl.AP_FAULT_ROW] = G[sup.HIGHEST], G[sup.HIGHEST_ROW]

@@ -1,24 +1,33 @@
 """Where things stand in the supervisor's vector G: settings, what the runtime tells it, and its memory. SI.
 
-Rows are the numbers of the fault table (firmware/supervisor/table.py); row 0 is nobody's.
+Row 0 of the fault table is nobody's.
 """
 
 from hal.ports import BALLAST, BATTERY, BEACON, IMU, LEAK, PLUNGER_WIRE, SERVO, SLIDER, SLIDER_WIRE
 
+# --- rows of the fault table: docs/SUPERVISOR.md says of each who sees it, how soon, and what is done ----------------
+(
+    FAULT_IMU_LOST, FAULT_PRESSURE_LOST, FAULT_BUS_LOST, FAULT_WIRE_LOST, FAULT_SERVO_LOST,
+    FAULT_SAMPLE_TIME, FAULT_CHECKSUM, FAULT_REPLY, FAULT_EXCEPTION, FAULT_IMPLAUSIBLE, FAULT_STUCK_SENSOR,
+    FAULT_NOT_ARMED, FAULT_DISAGREE, FAULT_STALL, FAULT_SOFT_LIMIT, FAULT_DRIVE_ALARM, FAULT_TOO_DEEP,
+    FAULT_NO_ASCENT, FAULT_OVERTIME, FAULT_LEAK, FAULT_STEEP, FAULT_NO_ANSWER, FAULT_VOLTAGE, FAULT_OVERRUN,
+    FAULT_LOOP_HUNG, FAULT_WALL_CLOCK, FAULT_DISK, FAULT_POWER_CUT, FAULT_STATE_FILE, FAULT_FILE, FAULT_SERIAL,
+    FAULT_CONSOLE, FAULT_GROWTH, FAULT_PORT,
+) = range(1, 35)  # fmt: skip
 N_ROWS = 35
 
 # --- reactions, mildest first ---------------------------------------------------------------------------------------
 NOTHING, LOG, WARN, HOLD, ABORT, OOB, HW = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0
 
 # --- sensors and their values, in the frame's order -----------------------------------------------------------------
-S_IMU, S_BEACON, S_SLIDER, S_PLUNGER, S_LEAK, S_BATTERY = 0, 1, 2, 3, 4, 5
+SENSOR_IMU, SENSOR_BEACON, SENSOR_SLIDER, SENSOR_PLUNGER, SENSOR_LEAK, SENSOR_BATTERY = 0, 1, 2, 3, 4, 5
 N_SENSORS = 6
 STARTS = (IMU, BEACON, SLIDER_WIRE, PLUNGER_WIRE, LEAK, BATTERY)  # of their slots in the frame
 WIDTHS = (6, 2, 1, 1, 1, 1)
 PLACES = (0, 6, 8, 9, 10, 11)  # of their values in the tables below
 N_VALUES = 12
 STATES = (SERVO, SLIDER, BALLAST)  # slots in which actuators say how they do
-FIT, MISTIMED, ABSURD, STUCK = 0.0, 1.0, 2.0, 3.0  # what a sample is worth
+FIT, MISTIMED, ABSURD, STUCK = 0.0, 1.0, 2.0, 3.0  # the verdict on a sample
 # hal.ports.Validity and hal.ports.Condition as the frame holds them
 VALID, FAULT = 1.0, 3.0
 WELL, ALARM, ALARM_KEPT, RETRYING, GIVEN_UP, WRONG_WAY, MISCONFIGURED = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0
@@ -67,8 +76,8 @@ _M = _H + 3
 BEGAN = _M  # s, the first tick
 SEEN = BEGAN + 1  # N_SENSORS, time of the sample looked at last
 TAKEN = SEEN + N_SENSORS  # time of the newest fit sample
-WORTH = TAKEN + N_SENSORS  # of the sample in the frame: FIT ...
-UNFIT = WORTH + N_SENSORS  # unfit samples running
+SAMPLE_VERDICT = TAKEN + N_SENSORS  # on the sample in the frame: FIT ...
+UNFIT = SAMPLE_VERDICT + N_SENSORS  # unfit samples running
 SAME_SINCE = UNFIT + N_SENSORS  # s, since when the sensor says the same
 LAST = SAME_SINCE + N_SENSORS  # N_VALUES, newest fit values
 RAW = LAST + N_VALUES  # N_VALUES, as looked at last
@@ -87,7 +96,7 @@ STALLS = _N + 5  # 2
 REST_UNTIL = _N + 7  # 2, s
 STOPPED = _N + 9  # 2: 1: ran the wrong way, stays where it is
 MARK = _N + 11  # 2: place from which progress counts
-REACTION, ROW = _N + 13, _N + 14  # the highest asked for, and who asked
+HIGHEST, HIGHEST_ROW = _N + 13, _N + 14  # the highest asked for, and who asked
 SLOW_DEPTH, SLOW_TIME = _N + 15, _N + 16  # m, s: depth that lags 1 s, for its rate
 ASCENT_MARK, ASCENT_SINCE = _N + 17, _N + 18  # m, s: the last progress upwards
 BAND_MARK, BAND_SINCE = _N + 19, _N + 20  # m, s

@@ -31,4 +31,4 @@ X_ACT = 13  # 13..15
 X_SERVO, X_SLIDER, X_BALLAST = 13, 14, 15  # rad, m, kg
 N_X = 16
 
-G = 9.80665  # m/s2
+GRAVITY = 9.80665  # m/s2

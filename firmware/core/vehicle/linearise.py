@@ -10,7 +10,7 @@ from firmware.core.vehicle.motion import accelerations
 from firmware.core.vehicle.state import rotation, velocities
 
 _STEP = 1e-5  # of the differences, in SI: truncation and rounding are both below 1e-6 of what is differentiated
-GRAVITY = 12  # in y: d(nu_dot)/dk, six numbers for each of k's three
+Y_BY_DOWN = 12  # in y: d(nu_dot)/dk, six numbers for each of k's three
 
 
 @kernel
@@ -41,7 +41,7 @@ def linearise_motion(x, y, A):
     A[3, 9], A[4, 10], A[5, 11] = 1.0, 1.0, 1.0
     # d/dtheta from d/dk by dk = k x dtheta
     for i in range(6):
-        g0, g1, g2 = y[GRAVITY + i], y[GRAVITY + 6 + i], y[GRAVITY + 12 + i]
+        g0, g1, g2 = y[Y_BY_DOWN + i], y[Y_BY_DOWN + 6 + i], y[Y_BY_DOWN + 12 + i]
         A[6 + i, 3], A[6 + i, 4], A[6 + i, 5] = g1 * r33 - g2 * r32, g2 * r31 - g0 * r33, g0 * r32 - g1 * r31
 
 
@@ -65,7 +65,7 @@ def linearise(P, x, servo_rate, slider_rate, ballast_rate, A, y):
         y[j] = kept
         h = 1.0 / h
         if j < 3:
-            to = GRAVITY + 6 * j
+            to = Y_BY_DOWN + 6 * j
             y[to], y[to + 1], y[to + 2] = b0 - a0, b1 - a1, b2 - a2
             y[to + 3], y[to + 4], y[to + 5] = b3 - a3, b4 - a4, b5 - a5
         else:

@@ -5,7 +5,7 @@ symmetric 3 x 3 system for the rotations (Schur complement).
 """
 
 from firmware.core.jit import inlined_kernel, kernel
-from firmware.core.vehicle.layout import NET_MASS, G
+from firmware.core.vehicle.layout import GRAVITY, NET_MASS
 from firmware.core.vehicle.mass import first_moment, first_moment_rate, inertia, translational_mass
 from firmware.core.vehicle.water import water_wrench
 
@@ -40,14 +40,14 @@ def momentum_rate(
     I1, I2, I3, I12, I13, I23 = inertia(P, servo, slider, ballast)
     dS1, dS2, dS3 = first_moment_rate(P, servo, servo_rate, slider_rate, ballast_rate)
     P1, P2, P3, Q1, Q2, Q3 = momentum(m1, m2, m3, S1, S2, S3, I1, I2, I3, I12, I13, I23, u, v, w, p, q, r)
-    weight = (ballast + P[NET_MASS] + net) * G
+    weight = (ballast + P[NET_MASS] + net) * GRAVITY
     return (
         P2 * r - P3 * q + weight * kx - (ballast_rate * u + q * dS3 - r * dS2),
         P3 * p - P1 * r + weight * ky - (ballast_rate * v + r * dS1 - p * dS3),
         P1 * q - P2 * p + weight * kz - (ballast_rate * w + p * dS2 - q * dS1),
-        Q2 * r - Q3 * q + P2 * w - P3 * v + G * (S2 * kz - S3 * ky) - (dS2 * w - dS3 * v),
-        Q3 * p - Q1 * r + P3 * u - P1 * w + G * (S3 * kx - S1 * kz) - (dS3 * u - dS1 * w),
-        Q1 * q - Q2 * p + P1 * v - P2 * u + G * (S1 * ky - S2 * kx) - (dS1 * v - dS2 * u),
+        Q2 * r - Q3 * q + P2 * w - P3 * v + GRAVITY * (S2 * kz - S3 * ky) - (dS2 * w - dS3 * v),
+        Q3 * p - Q1 * r + P3 * u - P1 * w + GRAVITY * (S3 * kx - S1 * kz) - (dS3 * u - dS1 * w),
+        Q1 * q - Q2 * p + P1 * v - P2 * u + GRAVITY * (S1 * ky - S2 * kx) - (dS1 * v - dS2 * u),
     )
 
 

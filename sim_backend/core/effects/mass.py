@@ -8,10 +8,10 @@ from sim_backend.core import effect_layout as ef
 @kernel
 def effective_masses(F, out):
     """Net mass, centre of gravity and inertia with effects F, in place in out (N_P)."""
-    out[layout.NET_MASS] += F[ef.NET_MASS]
-    out[layout.CG_X] += F[ef.CG_X]
-    out[layout.CG_Y] += F[ef.CG_Y]
-    out[layout.CG_Z] += F[ef.CG_Z]
+    out[layout.NET_MASS] += F[ef.NET_MASS_OFFSET]
+    out[layout.CG_X] += F[ef.CG_OFFSET_X]
+    out[layout.CG_Y] += F[ef.CG_OFFSET_Y]
+    out[layout.CG_Z] += F[ef.CG_OFFSET_Z]
     out[layout.J_YY] *= 1.0 + F[ef.INERTIA_Y]
     out[layout.J_ZZ] *= 1.0 + F[ef.INERTIA_Z]
 
@@ -33,4 +33,4 @@ def slider_mass(F, slider, speed):
 def tank_mass(F, ballast, rate, since):
     """Mass in the tank (kg) and its rate (kg/s), the draw-wire saying `ballast` and `rate`, `since` s into the run."""
     scale = 1.0 + F[ef.BALLAST_SCALE]
-    return ballast * scale + F[ef.LEAK] * since, rate * scale + F[ef.LEAK]
+    return ballast * scale + F[ef.BALLAST_LEAK] * since, rate * scale + F[ef.BALLAST_LEAK]

@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from sim_backend.core import layout as at
+from sim_backend.core import layout as wl
 from sim_backend.core.effect_layout import DRAG_0
 from tools.study.campaign.plan import fingerprint
 from tools.study.campaign.worlds import draw_world
@@ -45,11 +45,11 @@ def test_draws_keep_to_their_limits_and_fill_them(plan_of):
         assert low <= min(values) < low + 0.05 * (high - low)
         assert high - 0.05 * (high - low) < max(values) <= high
     for d in drawn:
-        assert np.hypot(d.world.E[at.CURRENT_N], d.world.E[at.CURRENT_E]) == pytest.approx(d.current)
-        assert d.world.waves[0, at.WAVE_AMPLITUDE] == pytest.approx(0.5 * d.wave_height)
-        assert d.world.E[at.ACC_LINEAR] == d.world.E[at.ACC_ANGULAR] == d.disturbance
+        assert np.hypot(d.world.E[wl.ENV_CURRENT_N], d.world.E[wl.ENV_CURRENT_E]) == pytest.approx(d.current)
+        assert d.world.waves[0, wl.WAVE_AMPLITUDE] == pytest.approx(0.5 * d.wave_height)
+        assert d.world.E[wl.ENV_ACC_LINEAR] == d.world.E[wl.ENV_ACC_ANGULAR] == d.disturbance
         assert d.world.x[2] == d.start_depth
-    headings = np.arctan2([d.world.E[at.CURRENT_E] for d in drawn], [d.world.E[at.CURRENT_N] for d in drawn])
+    headings = np.arctan2([d.world.E[wl.ENV_CURRENT_E] for d in drawn], [d.world.E[wl.ENV_CURRENT_N] for d in drawn])
     assert {1, 2, 3, 4} == set(np.ceil((headings + np.pi) / (0.5 * np.pi)).astype(int))
 
 
@@ -81,5 +81,5 @@ def test_effects_of_the_board_come_on_top_of_the_drawn_vehicle(plan_of):
     a, b = draw_world(plain, 0, 0).world, draw_world(plan, 0, 0).world
     assert np.array_equal(a.P, b.P)
     assert np.flatnonzero(b.F).tolist() == [DRAG_0]
-    assert b.E[at.ACC_LINEAR] == 2.0 * a.E[at.ACC_LINEAR] > 0.0
+    assert b.E[wl.ENV_ACC_LINEAR] == 2.0 * a.E[wl.ENV_ACC_LINEAR] > 0.0
     assert fingerprint(plan) != fingerprint(plain)

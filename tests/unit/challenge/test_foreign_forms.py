@@ -33,12 +33,12 @@ def test_without_effects_it_is_the_nominal_flight():
     design = draw_runs(rng, LAKE, draw_waves(rng))[0]
     P, F = VEHICLE.vector(), draw_shapes(rng, 100.0, LAKE.depths)
     rows = 600
-    commands, X, Y = np.zeros((rows, 3)), np.zeros((rows, fo.N_FX)), np.zeros((rows, fo.N_R))
+    commands, X, Y = np.zeros((rows, 3)), np.zeros((rows, fo.N_FX)), np.zeros((rows, fo.N_FR))
     fly_foreign(
         P,
         F,
         design.waves,
-        np.zeros((2, fo.N_R)),
+        np.zeros((2, fo.N_FR)),
         0.0,
         0.0,
         design.seed,
@@ -58,12 +58,12 @@ def test_without_effects_it_is_the_nominal_flight():
 def test_windows_flown_on_without_noise_repeat_the_flight(trial):
     F, design = trial.shapes, trial.designs[0]
     rows = 300
-    commands, X, Y = np.zeros((rows, 3)), np.zeros((rows, fo.N_FX)), np.zeros((rows, fo.N_R))
+    commands, X, Y = np.zeros((rows, 3)), np.zeros((rows, fo.N_FX)), np.zeros((rows, fo.N_FR))
     fly_foreign(
-        trial.P, F, design.waves, np.zeros((2, fo.N_R)), 0.0, 0.0, design.seed, design.start.copy(), design.legs,
+        trial.P, F, design.waves, np.zeros((2, fo.N_FR)), 0.0, 0.0, design.seed, design.start.copy(), design.legs,
         commands, X, Y,
     )  # fmt: skip
-    Xw, Yw = np.zeros((1, 100, fo.N_FX)), np.zeros((1, 100, fo.N_R))
+    Xw, Yw = np.zeros((1, 100, fo.N_FX)), np.zeros((1, 100, fo.N_FR))
     fly_on(trial.P, F, design.waves, design.seed, commands, X, np.array([100]), np.array([200]), Xw, Yw)
     np.testing.assert_array_equal(Xw[0], X[100:200])
     np.testing.assert_array_equal(Yw[0], Y[100:200])

@@ -65,7 +65,7 @@ def test_L2_printed_matrix_takes_body_to_ned():
     vehicle = P.copy()
     vehicle[[layout.X_B, layout.R_R, layout.R_S]] = 0.0  # no moments, so that M is diagonal
     force = full_mass_matrix(x[13:], vehicle) @ derivative(x, x[13:], vehicle=vehicle)[7:13]
-    weight = 0.1 * layout.G * np.array(rotation_nb(*x[3:7]))[6:]
+    weight = 0.1 * layout.GRAVITY * np.array(rotation_nb(*x[3:7]))[6:]
     np.testing.assert_allclose(force, [*weight, 0, 0, 0], atol=1e-14)
 
 
@@ -160,9 +160,13 @@ def test_L14_pitch_form_has_the_pitch_moment_and_both_parts(phi, theta, V, omega
     sr = P[layout.M_R] * P[layout.R_R] + P[layout.M_S] * P[layout.R_S]
     A = -(q * sf + r * cf) * (p + sf * st / ct * q + cf * st / ct * r)
     # m_r r_r1 + m_s r_sx0 are trimmed out (ledger L1)
-    q_dot = ((Izz - Ixx) * p * r - layout.G * (st * sr * math.cos(gamma) + cf * ct * m_b * P[layout.X_B]) + T_2) / Iyy
-    r_dot = ((Ixx - Iyy) * p * q + layout.G * (st * sr * math.sin(gamma) + sf * ct * m_b * P[layout.X_B]) + T_3) / Izz
-    C = -P[layout.M_S] * layout.G * ct * (cf**2 / Iyy + sf**2 / Izz)
+    q_dot = (
+        (Izz - Ixx) * p * r - layout.GRAVITY * (st * sr * math.cos(gamma) + cf * ct * m_b * P[layout.X_B]) + T_2
+    ) / Iyy
+    r_dot = (
+        (Ixx - Iyy) * p * q + layout.GRAVITY * (st * sr * math.sin(gamma) + sf * ct * m_b * P[layout.X_B]) + T_3
+    ) / Izz
+    C = -P[layout.M_S] * layout.GRAVITY * ct * (cf**2 / Iyy + sf**2 / Izz)
     f_t, _, g_ts, g_tb, _, _ = form_at(P, x, form=paper_form)
     printed = A + cf * q_dot - sf * r_dot + C * dr_s
     assert f_t + g_ts * dr_s + g_tb * m_b == pytest.approx(printed, rel=1e-11, abs=1e-11)
@@ -194,7 +198,7 @@ def test_L17_depth_form_is_18_and_the_exact_one_all_of_M(phi, theta, V, omega, a
         - st / m_t * (m_t * (r * v - q * w) + F_1)
         + sf * ct / m_t * (m_t * (p * w - r * u) + F_2)
         + cf * ct / m_t * (m_t * (q * u - p * v) + F_3)
-        + layout.G / m_t * m_b
+        + layout.GRAVITY / m_t * m_b
     )
     _, f_z, _, _, g_zs, g_zb = form_at(P, x, form=paper_form)
     assert g_zs == 0.0

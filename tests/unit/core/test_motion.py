@@ -125,4 +125,4 @@ def test_net_mass_and_centre_of_gravity_off_nominal():
     # at rest, level, neutral otherwise: the net mass sinks the hull, and its weight acts at the origin
     vehicle[layout.CG_X] = 0.0
     force = full_mass_matrix((0.0, 0.0, 0.0), vehicle) @ derivative(state(), (0.0, 0.0, 0.0), vehicle=vehicle)[7:13]
-    np.testing.assert_allclose(force, [0, 0, 0.05 * layout.G, 0, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(force, [0, 0, 0.05 * layout.GRAVITY, 0, 0, 0], atol=1e-12)

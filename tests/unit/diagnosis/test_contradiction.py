@@ -41,7 +41,7 @@ def test_the_reading_that_is_far_out_is_named(tmp_path, label, entry, value, moc
     assert spreads * free.spread == pytest.approx(value, rel=0.6)
 
 
-@pytest.mark.parametrize(("entry", "value"), [(ef.NET_MASS, 0.1), (ef.DRAG_0, 2.0), (ef.PITCH_TRIM, 0.5)])
+@pytest.mark.parametrize(("entry", "value"), [(ef.NET_MASS_OFFSET, 0.1), (ef.DRAG_0, 2.0), (ef.PITCH_TRIM, 0.5)])
 def test_forces_make_no_reading_contradict_another(tmp_path, entry, value):
     problem, _ = with_effect(tmp_path, entry, value, mocap=True)
     assert rough_heat(problem) < NEAR

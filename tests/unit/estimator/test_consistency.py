@@ -6,10 +6,10 @@ from scipy.stats import chi2
 from support.estimating import Filter, state_error
 from support.flights import World, fly
 
-from firmware.core.estimation import estimator_layout as at
+from firmware.core.estimation import estimator_layout as kf
 
 # Depth, attitude and nu; position north and east is dead reckoning, actuators are known but for their noise.
-KEPT = [2, *range(at.E_ATT, at.E_ACT)]
+KEPT = [2, *range(kf.E_ATT, kf.E_ACT)]
 EVERY, AFTER = 50, 100  # rows: once in 5 s, from 10 s on, when one launch no longer colours the next sample
 
 
@@ -19,7 +19,7 @@ def squared_errors(world: World, seeds: range, uncertain: bool) -> np.ndarray:
     for seed in seeds:
         flight = fly(world, seed)
         columns, t = flight.run.columns, flight.run.t
-        z = np.full((len(t), at.N_Z), np.nan)
+        z = np.full((len(t), kf.N_Z), np.nan)
         for slot, name in enumerate(
             ("roll_rad", "pitch_rad", "yaw_rad", "p_rad_s", "q_rad_s", "r_rad_s", "depth_m", "slider_m", "ballast_kg")
         ):

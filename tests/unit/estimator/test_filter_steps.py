@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support.estimating import Filter, state_error
 
-from firmware.core.estimation import estimator_layout as at
+from firmware.core.estimation import estimator_layout as kf
 from firmware.core.estimation.estimator import estimator_step
 from firmware.core.vehicle.flight import nominal_run
 from firmware.core.vehicle.layout import N_X
@@ -28,26 +28,25 @@ def test_prediction_follows_the_nominal_flight():
 def test_prediction_of_the_covariance_is_f_p_f_plus_q():
     filtered = Filter(uncertain=False).start()
     rng = np.random.default_rng(2)
-    root = rng.standard_normal((at.N_E, at.N_E))
+    root = rng.standard_normal((kf.N_E, kf.N_E))
     filtered.cov[:] = root @ root.T
     before, x = filtered.cov.copy(), filtered.x.copy()
-    A, y = np.zeros((at.N_MOVING, at.N_COUPLED)), np.zeros(at.N_W)
+    A, y = np.zeros((kf.N_MOVING, kf.N_COUPLED)), np.zeros(kf.N_W)
     linearise(filtered.P, x, 0.0, 0.0, 0.0, A, y)
-    dt, F = 0.02, np.eye(at.N_E)
-    F[: at.N_MOVING, : at.N_COUPLED] += dt * A
-    F[0, at.E_WATER] = F[1, at.E_WATER + 1] = dt
+    dt, F = 0.02, np.eye(kf.N_E)
+    F[: kf.N_MOVING, : kf.N_COUPLED] += dt * A
+    F[0, kf.E_WATER] = F[1, kf.E_WATER + 1] = dt
     for i in range(6):
-        F[at.E_NU + i, at.E_ERR + i] = dt
-        F[at.E_ERR + i, at.E_ERR + i] = math.exp(-dt / filtered.settings[at.S_ERROR_TIME])
+        F[kf.E_NU + i, kf.E_ERR + i] = dt
+        F[kf.E_ERR + i, kf.E_ERR + i] = math.exp(-dt / filtered.settings[kf.S_ERROR_TIME])
     for i, tau in enumerate((0.10, 0.15, 0.30)):
-        F[at.E_ACT + i, at.E_ACT + i] = math.exp(-dt / tau)
+        F[kf.E_ACT + i, kf.E_ACT + i] = math.exp(-dt / tau)
     filtered.predict(dt)
-    Q = np.zeros(at.N_E)
+    Q = np.zeros(kf.N_E)
     disturbance = filtered.vehicle.disturbance
-    Q[at.E_NU : at.E_ACT] = np.repeat([disturbance.linear**2, disturbance.angular**2], 3) * 0.1 * dt
-    Q[at.E_ACT : at.E_ERR] = filtered.settings[at.S_SERVO : at.S_BALLAST + 1] * dt
-    Q[at.E_GYRO : at.E_WATER] = filtered.settings[at.S_GYRO] * dt
-    Q[at.E_WATER :] = filtered.settings[at.S_WATER] * dt
+    Q[kf.E_NU : kf.E_ACT] = np.repeat([disturbance.linear**2, disturbance.angular**2], 3) * 0.1 * dt
+    Q[kf.E_ACT : kf.E_ERR] = filtered.settings[kf.S_SERVO : kf.S_BALLAST + 1] * dt
+    Q[kf.E_GYRO :] = filtered.settings[kf.S_WALK : kf.S_R] * dt
     np.testing.assert_allclose(filtered.cov, F @ before @ F.T + np.diag(Q), rtol=1e-9, atol=1e-9)
 
 
@@ -55,7 +54,7 @@ def test_prediction_of_the_covariance_is_f_p_f_plus_q():
 def test_an_update_is_the_textbooks(name):
     filtered = Filter().start(euler=(0.5, -0.4, 1.0))
     rng = np.random.default_rng(3)
-    root = 0.01 * rng.standard_normal((at.N_E, at.N_E))
+    root = 0.01 * rng.standard_normal((kf.N_E, kf.N_E))
     filtered.cov[:] = root @ root.T
     before, x = filtered.cov.copy(), filtered.x.copy()
     f, th = 0.5, -0.4
@@ -64,22 +63,22 @@ def test_an_update_is_the_textbooks(name):
         "pitch": [0.0, math.cos(f), -math.sin(f)],
         "yaw": [0.0, math.sin(f) / math.cos(th), math.cos(f) / math.cos(th)],
     }
-    H = np.zeros(at.N_E)
-    places = {"q": [at.E_NU + 4, at.E_GYRO + 1], "depth": [2], "slider": [at.E_ACT + 1], "mocap_y": [1]}
+    H = np.zeros(kf.N_E)
+    places = {"q": [kf.E_NU + 4, kf.E_GYRO + 1], "depth": [2], "slider": [kf.E_ACT + 1], "mocap_y": [1]}
     now = {"roll": f, "pitch": th, "yaw": 1.0, "mocap_yaw": 1.0, "depth": 2.0}.get(name, 0.0)
     if name in places:
         H[places[name]] = 1.0
     else:
-        H[at.E_ATT : at.E_NU] = rows[name.removeprefix("mocap_")]
-    R = filtered.settings[at.S_R + getattr(at, f"Z_{name.upper()}")]
+        H[kf.E_ATT : kf.E_NU] = rows[name.removeprefix("mocap_")]
+    R = filtered.settings[kf.S_R + getattr(kf, f"Z_{name.upper()}")]
     S = H @ before @ H + R
     K = before @ H / S
     innovation = 2.0 * math.sqrt(S)
     scores = filtered.update(**{name: now + innovation})
-    assert scores[getattr(at, f"Z_{name.upper()}")] == pytest.approx(2.0)
-    IKH = np.eye(at.N_E) - np.outer(K, H)
+    assert scores[getattr(kf, f"Z_{name.upper()}")] == pytest.approx(2.0)
+    IKH = np.eye(kf.N_E) - np.outer(K, H)
     np.testing.assert_allclose(filtered.cov, IKH @ before @ IKH.T + R * np.outer(K, K), rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(filtered.x[7:13] - x[7:13], (K * innovation)[at.E_NU : at.E_ACT], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(filtered.x[7:13] - x[7:13], (K * innovation)[kf.E_NU : kf.E_ACT], rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(filtered.x[:3] - x[:3], (K * innovation)[:3], rtol=1e-9, atol=1e-12)
 
 
@@ -87,7 +86,7 @@ def test_what_is_missing_or_no_number_changes_nothing():
     filtered = Filter().start()
     x, cov = filtered.x.copy(), filtered.cov.copy()
     for value in (math.nan, math.inf, -math.inf, 1e30):
-        scores = filtered.take(np.full(at.N_Z, value))
+        scores = filtered.take(np.full(kf.N_Z, value))
         assert np.isnan(scores).all()
     np.testing.assert_array_equal(filtered.x, x)
     np.testing.assert_array_equal(filtered.cov, cov)
@@ -114,7 +113,7 @@ def test_a_spike_moves_nothing():
     filtered.predict(0.1)
     x = filtered.x.copy()
     scores = filtered.update(depth=x[2] + 5.0)
-    assert scores[at.Z_DEPTH] > at.GATE
+    assert scores[kf.Z_DEPTH] > kf.GATE
     np.testing.assert_allclose(filtered.x, x, rtol=1e-14, atol=0.0)
 
 
@@ -123,7 +122,7 @@ def test_a_sensor_that_stays_away_is_followed_in_the_end():
     settle(filtered)
     speed = filtered.x[7:10].copy()
     jump = filtered.x[2] + 0.5
-    for _ in range(round(at.PATIENCE / 0.1) + 3):
+    for _ in range(round(kf.REJECTED_AT_MOST / 0.1) + 3):
         filtered.predict(0.1)
         filtered.update(**{**readings(filtered), "depth": jump})
         assert filtered.positive_definite()
@@ -147,7 +146,7 @@ def test_a_biased_gyro_is_found_out_by_the_attitude():
         filtered.predict(0.1)
         seen = readings(filtered)
         filtered.update(**{**seen, "r": 0.01, "yaw": 0.5})
-    assert filtered.x[at.X_GYRO + 2] == pytest.approx(0.01, abs=0.003)
+    assert filtered.x[kf.X_GYRO + 2] == pytest.approx(0.01, abs=0.003)
     assert abs(filtered.x[12]) < 0.004
 
 
@@ -161,8 +160,8 @@ def test_yaw_is_taken_the_short_way_round():
 def test_near_the_vertical_only_pitch_is_taken():
     filtered = Filter().start(euler=(0.3, 1.52, 0.2))
     scores = filtered.update(roll=0.3, pitch=1.52, yaw=0.2)
-    assert np.isfinite(scores[at.Z_PITCH])
-    assert np.isnan(scores[[at.Z_ROLL, at.Z_YAW]]).all()
+    assert np.isfinite(scores[kf.Z_PITCH])
+    assert np.isnan(scores[[kf.Z_ROLL, kf.Z_YAW]]).all()
     assert np.isfinite(filtered.x).all()
 
 
@@ -176,7 +175,7 @@ def test_a_long_step_is_many_short_ones():
 
 
 def test_an_unseen_servo_is_found_from_the_motion():
-    mode = at.SERVO_DRIVEN | at.SLIDER_DRIVEN | at.BALLAST_DRIVEN
+    mode = kf.SERVO_DRIVEN | kf.SLIDER_DRIVEN | kf.BALLAST_DRIVEN
     truth, filtered = Filter().start(speed=0.4), Filter(mode=mode).start(speed=0.4)
     rng = np.random.default_rng(4)
     for _ in range(100):
@@ -188,9 +187,9 @@ def test_an_unseen_servo_is_found_from_the_motion():
 
 
 @numba.njit
-def many_steps(count, P, settings, sigma, x, cov, stress, z, beyond, scores, work):
+def many_steps(count, P, settings, sigma, x, cov, inflation, z, rejected_for_s, scores, work):
     for _ in range(count):
-        estimator_step(P, settings, sigma, x, cov, stress, 0, 0.1, 0.01, 0.1, 0.02, z, beyond, scores, work)
+        estimator_step(P, settings, sigma, x, cov, inflation, 0, 0.1, 0.01, 0.1, 0.02, z, rejected_for_s, scores, work)
 
 
 def test_a_step_allocates_nothing():
@@ -198,12 +197,12 @@ def test_a_step_allocates_nothing():
 
     _nrt_python.memsys_enable_stats()
     filtered = Filter().start()
-    z = np.full(at.N_Z, 0.1)
+    z = np.full(kf.N_Z, 0.1)
 
     def allocated(count: int) -> int:
         before = rtsys.get_allocation_stats().alloc
-        arrays = (filtered.P, filtered.settings, filtered.sigma, filtered.x, filtered.cov, filtered.stress)
-        many_steps(count, *arrays, z, filtered.beyond, filtered.scores, filtered.work)
+        arrays = (filtered.P, filtered.settings, filtered.sigma, filtered.x, filtered.cov, filtered.inflation)
+        many_steps(count, *arrays, z, filtered.rejected_for_s, filtered.scores, filtered.work)
         return rtsys.get_allocation_stats().alloc - before
 
     allocated(1)
@@ -215,8 +214,8 @@ def test_the_covariance_stays_sound_under_nonsense():
     rng = np.random.default_rng(5)
     for _ in range(2000):
         filtered.predict(0.02, rng.normal(0.0, 0.3, 3))
-        z = rng.normal(0.0, 3.0, at.N_Z)
-        z[rng.random(at.N_Z) < 0.3] = np.nan
+        z = rng.normal(0.0, 3.0, kf.N_Z)
+        z[rng.random(kf.N_Z) < 0.3] = np.nan
         filtered.take(z, 0.02)
     assert np.isfinite(filtered.x).all()
     assert np.isfinite(filtered.cov).all()
@@ -224,7 +223,7 @@ def test_the_covariance_stays_sound_under_nonsense():
 
 
 def test_a_linearised_flight_that_is_held_serves_as_well_as_a_fresh_one():
-    held, fresh = Filter().start(), Filter(mode=at.FRESH).start()
+    held, fresh = Filter().start(), Filter(mode=kf.FRESH).start()
     rng = np.random.default_rng(6)
     for i in range(1500):
         commands = (0.5 * math.sin(0.002 * i), 0.02 * math.sin(0.005 * i), 0.15 * math.cos(0.004 * i))
@@ -233,6 +232,6 @@ def test_a_linearised_flight_that_is_held_serves_as_well_as_a_fresh_one():
         fresh.update(0.02, **seen)
         held.predict(0.02, commands)
         held.update(0.02, **seen)
-    sure = np.sqrt(np.diag(fresh.cov))[: at.E_ERR]
-    np.testing.assert_allclose(np.sqrt(np.diag(held.cov))[: at.E_ERR], sure, rtol=0.05)
+    sure = np.sqrt(np.diag(fresh.cov))[: kf.E_ERR]
+    np.testing.assert_allclose(np.sqrt(np.diag(held.cov))[: kf.E_ERR], sure, rtol=0.05)
     assert (np.abs(state_error(fresh.x, held.x)) < 0.2 * sure).all()

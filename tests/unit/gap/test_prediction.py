@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.flights import World, case_of, fly, fly_case
 
-from firmware.core.estimation import estimator_layout as est
+from firmware.core.estimation import estimator_layout as kf
 from firmware.core.vehicle import layout
 from tools.data.runs.run import Run
 from tools.gap.measure import root_mean_square, run_gap
@@ -104,10 +104,10 @@ def test_without_commands_the_draw_wires_fly_it():
     case = case_of(World(), [run])
     model = nominal_model(case)
     flown = prepare(case, model, case.runs)
-    assert flown.recording.modes[0] == est.SERVO_DRIVEN | est.SLIDER_DRIVEN | est.BALLAST_DRIVEN
+    assert flown.recording.modes[0] == kf.SERVO_DRIVEN | kf.SLIDER_DRIVEN | kf.BALLAST_DRIVEN
     (Y,) = predict(case, model, case.runs)
     seen = np.isfinite(run.columns["ballast_kg"])
-    np.testing.assert_allclose(Y[seen, est.Z_BALLAST], run.columns["ballast_kg"][seen], atol=2e-3)
+    np.testing.assert_allclose(Y[seen, kf.Z_BALLAST], run.columns["ballast_kg"][seen], atol=2e-3)
     gap = run_gap(run, Y, windows(run.t))
     assert gap.channels["depth"] < 3.0
     assert gap.channels["pitch"] < 3.0

@@ -8,7 +8,7 @@ from effect_flights import flown, world
 
 from firmware.core.maths.rotations import euler_from_quaternion, quaternion_from_euler
 from sim_backend.core import effect_layout as ef
-from sim_backend.core import layout as at
+from sim_backend.core import layout as wl
 from sim_backend.core.effect_plant import update_effect_states
 from sim_backend.core.effects.sensing import read
 from sim_backend.core.world import sample_sensors, sample_with_effects
@@ -124,7 +124,7 @@ def test_samples_with_no_effect_are_the_plain_samples_bit_for_bit():
         made.advance(0.01 * k)
         shared = (made.sensors, made.errors, made.seed, made.x, made.time)
         sample_sensors(made.P, made.E, *shared, counters[0], rings[0])
-        sample_with_effects(made.P, made.F, made.E, *shared, counters[1], rings[1], made.work[at.W_READ])
+        sample_with_effects(made.P, made.F, made.E, *shared, counters[1], rings[1], made.work[wl.W_READ])
     assert rings[0][:, 40].all(axis=0).any()
     assert np.array_equal(*rings)
     assert np.array_equal(*counters)

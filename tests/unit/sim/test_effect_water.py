@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from effect_flights import flown, held, quiet, world
 
-from sim_backend.core import layout as at
+from sim_backend.core import layout as wl
 from sim_backend.core.effects.timing import delayed_commands, mean_input
 
 GRAVITY = 9.80665
@@ -36,12 +36,12 @@ def test_waves_have_the_energy_of_their_amplitude_and_phases_of_the_seed():
     values = {"amplitude": 0.2, "period": 4.0, "direction": 0.5}
     first, again, other = (world({"waves": values}, seed).waves for seed in (1, 1, 2))
     assert np.array_equal(first, again)
-    assert not np.array_equal(first[:, at.WAVE_PHASE], other[:, at.WAVE_PHASE])
-    assert (first[:, at.WAVE_AMPLITUDE] ** 2).sum() == pytest.approx(0.04)
-    omega = first[:, at.WAVE_OMEGA]
+    assert not np.array_equal(first[:, wl.WAVE_PHASE], other[:, wl.WAVE_PHASE])
+    assert (first[:, wl.WAVE_AMPLITUDE] ** 2).sum() == pytest.approx(0.04)
+    omega = first[:, wl.WAVE_OMEGA]
     assert (np.abs(omega / (2.0 * math.pi / 4.0) - 1.0) < 0.13).all()
-    assert np.hypot(first[:, at.WAVE_K_N], first[:, at.WAVE_K_E]) == pytest.approx(omega**2 / GRAVITY)
-    assert np.arctan2(first[:, at.WAVE_K_E], first[:, at.WAVE_K_N]) == pytest.approx(0.5)
+    assert np.hypot(first[:, wl.WAVE_K_N], first[:, wl.WAVE_K_E]) == pytest.approx(omega**2 / GRAVITY)
+    assert np.arctan2(first[:, wl.WAVE_K_E], first[:, wl.WAVE_K_N]) == pytest.approx(0.5)
 
 
 def test_waves_beside_another_effect_move_the_vehicle_as_they_do_alone():

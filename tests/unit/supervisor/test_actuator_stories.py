@@ -8,7 +8,7 @@ import math
 import pytest
 
 from firmware.core.control import control_layout as ctl
-from firmware.core.supervision import supervisor_layout as at
+from firmware.core.supervision import supervisor_layout as sup
 from hal.ports import Condition, Validity
 from tests.support.stories import ABORT, NOTHING, TWO_TICKS, WARN, flying
 from tests.support.watchman import BALLAST_RANGE, DT, SLIDER_RANGE, Watchman
@@ -20,14 +20,14 @@ def test_a_lost_drive_aborts(name):
     man = flying()
     man.silence.add(name)
     assert man.until(ABORT, 0.5) > 0.35
-    assert man.supervisor.row == 3
+    assert man.supervisor.row == sup.FAULT_BUS_LOST
 
 
 def test_a_lost_servo_flies_level_until_it_answers():
     man = flying()
     man.silence.add("servo")
     assert man.until(WARN, 0.5) > 0.35
-    assert man.supervisor.row == 5
+    assert man.supervisor.row == sup.FAULT_SERVO_LOST
     man.seconds(2.0)
     assert man.commands == pytest.approx([0.0, 0.01, 0.05])
     assert man.ap[ctl.MODE] == ctl.FLYING
@@ -67,15 +67,15 @@ def test_conditions_ask_for_their_rows(name, condition, row, reaction):
 
 def test_the_layout_says_what_the_ports_say():
     assert list(Condition) == [
-        at.WELL,
-        at.ALARM,
-        at.ALARM_KEPT,
-        at.RETRYING,
-        at.GIVEN_UP,
-        at.WRONG_WAY,
-        at.MISCONFIGURED,
+        sup.WELL,
+        sup.ALARM,
+        sup.ALARM_KEPT,
+        sup.RETRYING,
+        sup.GIVEN_UP,
+        sup.WRONG_WAY,
+        sup.MISCONFIGURED,
     ]
-    assert (at.VALID, at.FAULT) == (Validity.VALID, Validity.FAULT)
+    assert (sup.VALID, sup.FAULT) == (Validity.VALID, Validity.FAULT)
 
 
 # --- row 14: the draw-wires see a stall or a wrong way ---------------------------------------------------------------
@@ -97,15 +97,15 @@ def test_a_jammed_actuator_is_tried_twice_more_then_given_up(i, goal, rate, tau,
     man.wanted[1 + i] = goal
     way = abs(goal) / rate + tau
     first = man.until(WARN, 1.5 * way + 1.0)
-    assert man.supervisor.row == 14
+    assert man.supervisor.row == sup.FAULT_STALL
     assert first <= 1.5 * (abs(goal) / rate + tau) + 2.0
     place = man.commands[1 + i]
     man.seconds(0.9)
     assert abs(man.commands[1 + i]) < abs(place)  # rests, back to where it stands
-    assert man.G[at.STALLS + i] == 1.0
+    assert man.G[sup.STALLS + i] == 1.0
     man.until(ABORT, 5.0 * way)
-    assert man.G[at.STALLS + i] == 3.0
-    assert man.supervisor.row == 14
+    assert man.G[sup.STALLS + i] == 3.0
+    assert man.supervisor.row == sup.FAULT_STALL
 
 
 @pytest.mark.parametrize(("i", "goal", "rate", "tau", "span"), WAYS)
@@ -117,7 +117,7 @@ def test_an_actuator_that_frees_itself_is_forgiven(i, goal, rate, tau, span):
     man.follows = True
     man.seconds(25.0)
     assert man.supervisor.reaction == NOTHING
-    assert man.G[at.STALLS + i] == 0.0
+    assert man.G[sup.STALLS + i] == 0.0
     assert man.commands[1 + i] == pytest.approx(goal)
 
 
@@ -127,7 +127,7 @@ def test_a_slow_actuator_is_no_stall(i, goal, rate, tau, span):
     man.follows = False
     man.wanted[1 + i] = goal
     for _ in range(round(abs(goal) / rate / DT * 2.5)):
-        left = man.G[at.SENT + 1 + i] - man.places[i]
+        left = man.G[sup.SENT + 1 + i] - man.places[i]
         man.places[i] += math.copysign(min(abs(left), 0.5 * rate * DT), left)
         assert man.step() == NOTHING
 
@@ -143,8 +143,8 @@ def test_the_wrong_way_is_stopped_at_once(i, goal, rate, tau, span):
         moved -= math.copysign(rate * DT, goal)
         man.places[i] = moved
         assert man.t - begin <= 0.3 + TWO_TICKS
-    assert man.supervisor.row == 14
-    assert man.G[at.STOPPED + i] == 1.0
+    assert man.supervisor.row == sup.FAULT_STALL
+    assert man.G[sup.STOPPED + i] == 1.0
     assert man.commands[1 + i] == pytest.approx(moved, abs=0.2 * rate)
     place = man.commands[1 + i]
     man.seconds(3.0)
@@ -162,12 +162,12 @@ def test_commands_that_show_late_are_no_wrong_way(i, goal, rate, tau, span, dela
     for n in range(1500):
         man.wanted[1 + i] = goal if n // 70 % 2 else -goal
         man.step()
-        sent.append(man.G[at.SENT + 1 + i])
+        sent.append(man.G[sup.SENT + 1 + i])
         old = sent[-1 - round(delay / DT)]
         place += min(max((old - place) / tau, -rate), rate) * DT
         man.places[i] = place
-    assert man.G[at.STOPPED + i] == 0.0
-    assert man.supervisor.worst(14) == NOTHING
+    assert man.G[sup.STOPPED + i] == 0.0
+    assert man.supervisor.worst(sup.FAULT_STALL) == NOTHING
 
 
 def test_a_wire_that_jumps_about_is_not_a_stall():
@@ -175,4 +175,4 @@ def test_a_wire_that_jumps_about_is_not_a_stall():
     man.say["slider_wire"] = (math.nan,)
     man.wanted[1] = 0.05
     man.seconds(20.0)
-    assert man.supervisor.worst(14) == NOTHING
+    assert man.supervisor.worst(sup.FAULT_STALL) == NOTHING

@@ -8,7 +8,7 @@ import math
 import pytest
 
 from firmware.core.control import control_layout as ctl
-from firmware.core.supervision import supervisor_layout as at
+from firmware.core.supervision import supervisor_layout as sup
 from firmware.supervisor.table import Reaction
 from tests.support.stories import ABORT, HOLD, LOG, NOTHING, WARN, flying
 from tests.support.watchman import Watchman
@@ -22,7 +22,7 @@ def test_past_a_limit_is_clamped_and_logged_in_the_same_tick(i, side):
     high = (math.pi / 3, 0.06, 0.2)[i]
     man.wanted[i] = side * 1.5 * high
     assert man.step() == LOG
-    assert man.supervisor.row == 15
+    assert man.supervisor.row == sup.FAULT_SOFT_LIMIT
     man.seconds(25.0)
     assert man.commands[i] == pytest.approx(side * high, rel=1e-4)
     assert abs(man.commands[i]) <= high * (1 + 1e-4)
@@ -44,7 +44,7 @@ def test_no_answer_keeps_the_last_good_command_and_three_running_abort(bad, i):
     assert man.commands[i] == last[i]
     assert man.supervisor.reaction == WARN
     assert man.step() == ABORT
-    assert man.supervisor.row == 22
+    assert man.supervisor.row == sup.FAULT_NO_ANSWER
 
 
 def test_two_without_an_answer_are_forgiven():
@@ -54,7 +54,7 @@ def test_two_without_an_answer_are_forgiven():
         man.step(2)
         man.wanted = good
         man.step()
-    assert man.supervisor.worst(22) == WARN
+    assert man.supervisor.worst(sup.FAULT_NO_ANSWER) == WARN
     assert man.ap[ctl.CAUTIOUS] == 1.0
     man.seconds(5.1)
     assert man.ap[ctl.CAUTIOUS] == 0.0
@@ -68,7 +68,7 @@ def test_a_law_without_a_solution_hands_over_to_the_pid_and_three_times_aborts(s
     for count in (1.0, 2.0):
         man.ap[ctl.LAW_STATUS], man.ap[ctl.ACTIVE] = status, ctl.LAW
         assert man.step() == WARN
-        assert man.G[at.LAW_FAILED] == count
+        assert man.G[sup.LAW_FAILED] == count
         man.ap[ctl.ACTIVE] = ctl.PID
         man.step(10)
         assert man.ap[ctl.CAUTIOUS] == 1.0
@@ -85,7 +85,7 @@ def test_a_law_that_answers_again_starts_afresh():
         man.step(2)
         man.ap[ctl.LAW_STATUS] = 0.0
         man.step()
-        assert man.G[at.LAW_FAILED] == 0.0
+        assert man.G[sup.LAW_FAILED] == 0.0
     man.ap[ctl.LAW_STATUS] = 1.0
     man.pilot.C[ctl.CONTROLLER] = ctl.PID  # the status is an old one
     assert man.step() == NOTHING
@@ -96,14 +96,14 @@ def test_what_an_aborted_flight_wants_is_no_law():
     man.ap[ctl.MODE] = ctl.ABORTED
     man.wanted = [math.nan] * 3
     man.step(5)
-    assert man.supervisor.worst(22) == NOTHING
+    assert man.supervisor.worst(sup.FAULT_NO_ANSWER) == NOTHING
 
 
 # --- row 24 ---------------------------------------------------------------------------------------------------------
 def late(man: Watchman, ticks: int = 1, by: float = 0.03) -> Reaction:
-    man.G[at.LATENESS] = by
+    man.G[sup.LATENESS] = by
     man.step(ticks)
-    man.G[at.LATENESS] = 0.0
+    man.G[sup.LATENESS] = 0.0
     return man.supervisor.reaction
 
 
@@ -111,7 +111,7 @@ def test_one_overrun_is_logged_in_its_tick():
     man = flying()
     assert late(man, by=0.02) == NOTHING  # punctual to a period
     assert late(man, by=0.021) == LOG
-    assert man.supervisor.row == 24
+    assert man.supervisor.row == sup.FAULT_OVERRUN
     assert man.step() == NOTHING
 
 
@@ -121,7 +121,7 @@ def test_ten_running_hold_then_abort():
     assert late(man, 1) == HOLD
     assert late(man, 49) == HOLD
     assert late(man, 2) == ABORT
-    assert man.supervisor.row == 24
+    assert man.supervisor.row == sup.FAULT_OVERRUN
 
 
 def test_ten_with_a_pause_hold_nothing():
@@ -151,4 +151,4 @@ def test_overruns_of_another_minute_are_forgotten():
     for _ in range(20):
         assert late(man) == LOG
         man.step()
-    assert man.supervisor.worst(24) == LOG
+    assert man.supervisor.worst(sup.FAULT_OVERRUN) == LOG

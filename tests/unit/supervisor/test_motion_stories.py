@@ -6,7 +6,7 @@ Each row as a story: all is well, something breaks, it is noticed in time, and w
 import pytest
 
 from firmware.core.control import control_layout as ctl
-from firmware.core.supervision import supervisor_layout as at
+from firmware.core.supervision import supervisor_layout as sup
 from firmware.supervisor.settings import Limits
 from tests.support.stories import ABORT, COARSE, HW, NOTHING, OOB, TWO_TICKS, WARN, flying, rising
 
@@ -17,13 +17,13 @@ def test_pitch_and_depth_rate_that_disagree_make_the_controller_cautious(nose):
     man = flying()
     man.pitch, man.sinks = -0.3 * nose, -0.2 * nose
     man.depth = 3.0
-    man.G[at.JUMP] = man.G[at.JUMP + 1] = 10.0
+    man.G[sup.JUMP] = man.G[sup.JUMP + 1] = 10.0
     begin = man.t
     if nose == -1:
         man.pitch = 0.3
     assert man.until(WARN, 7.0) >= 4.0
-    assert man.supervisor.row == 13
-    assert man.supervisor.noticed(13) - begin < 4.8 + 2.0
+    assert man.supervisor.row == sup.FAULT_DISAGREE
+    assert man.supervisor.noticed(sup.FAULT_DISAGREE) - begin < 4.8 + 2.0
     man.step()
     assert man.ap[ctl.CAUTIOUS] == 1.0
     man.sinks *= -1
@@ -35,7 +35,7 @@ def test_pitch_and_depth_rate_that_disagree_make_the_controller_cautious(nose):
 @pytest.mark.parametrize(("pitch", "sinks"), [(0.1, 0.2), (0.3, 0.03), (-0.3, 0.2)])
 def test_a_flat_or_slow_glide_does_not_disagree(pitch, sinks):
     man = flying(dt=COARSE)
-    man.G[at.JUMP + 1] = 10.0
+    man.G[sup.JUMP + 1] = 10.0
     man.pitch, man.sinks = pitch, sinks
     assert man.seconds(10.0) == NOTHING
 
@@ -49,11 +49,11 @@ def test_deeper_than_the_working_depth_aborts_and_at_risk_goes_out_of_band():
         man.step()
     assert man.supervisor.reaction == NOTHING
     assert man.until(ABORT, 1.0) <= 1.0
-    assert man.supervisor.row == 17
+    assert man.supervisor.row == sup.FAULT_TOO_DEEP
     man.depth, man.sinks = 5.0, 0.2
-    man.G[at.JUMP + 6] = 1e6
+    man.G[sup.JUMP + 6] = 1e6
     assert man.until(OOB, 0.2) <= 0.2
-    assert man.supervisor.row == 17
+    assert man.supervisor.row == sup.FAULT_TOO_DEEP
 
 
 def test_a_spike_of_depth_is_not_too_deep():
@@ -66,14 +66,14 @@ def test_a_spike_of_depth_is_not_too_deep():
         man.step(10)
         man.depth = 3.95
         man.step(10)
-    assert man.supervisor.worst(17) == NOTHING
+    assert man.supervisor.worst(sup.FAULT_TOO_DEEP) == NOTHING
 
 
 def test_without_a_working_depth_the_sites_counts():
     man = flying(site=6.0)
     man.depth = 6.05
     man.sinks = 0.0
-    man.G[at.JUMP + 6] = 1e6
+    man.G[sup.JUMP + 6] = 1e6
     assert man.until(ABORT, 1.0) <= 1.0
     man.depth = 6.65
     assert man.until(OOB, 0.2) <= 0.2
@@ -87,11 +87,11 @@ def test_no_ascent_goes_out_of_band_then_to_the_hardware(mode):
     man.sinks = 0.0
     took = man.until(OOB, 30.0 + TWO_TICKS)
     assert took > 29.0
-    assert man.supervisor.row == 18
+    assert man.supervisor.row == sup.FAULT_NO_ASCENT
     man.seconds(25.0)
     assert man.supervisor.reaction == OOB
     man.until(HW, 10.0)
-    assert man.supervisor.row == 18
+    assert man.supervisor.row == sup.FAULT_NO_ASCENT
     assert man.seconds(5.0) == HW
 
 
@@ -101,22 +101,22 @@ def test_an_ascent_however_slow_is_one():
     man.seconds(5.0)  # sinks on for a while
     man.sinks = -0.02
     man.seconds(200.0)
-    assert man.supervisor.worst(18) == NOTHING
+    assert man.supervisor.worst(sup.FAULT_NO_ASCENT) == NOTHING
 
 
 def test_at_the_surface_nothing_has_to_ascend():
     man = flying(dt=COARSE)
     man.depth, man.sinks, man.ap[ctl.MODE] = 0.3, 0.0, ctl.COMPLETED
-    man.G[at.JUMP + 6] = 1e6
+    man.G[sup.JUMP + 6] = 1e6
     man.seconds(100.0)
-    assert man.supervisor.worst(18) == NOTHING
+    assert man.supervisor.worst(sup.FAULT_NO_ASCENT) == NOTHING
 
 
 def test_an_ascent_that_stops_halfway_is_noticed():
     man = flying(dt=COARSE)
     man.ap[ctl.MODE] = ctl.ABORTED
     rising(man)
-    man.G[at.JUMP + 1] = 10.0
+    man.G[sup.JUMP + 1] = 10.0
     man.seconds(5.0)
     man.sinks = 0.0
     assert man.until(OOB, 30.0 + 1.5) > 28.0
@@ -137,7 +137,7 @@ def test_the_same_depth_for_too_long_aborts():
     man = flying(dt=COARSE)
     man.sinks = 0.0
     assert man.until(ABORT, 121.0) > 115.0
-    assert man.supervisor.row == 19
+    assert man.supervisor.row == sup.FAULT_OVERTIME
 
 
 def test_holding_a_depth_that_was_reached_is_meant():
@@ -153,7 +153,7 @@ def test_a_slow_glide_is_not_the_same_depth(sinks):
     man = flying(dt=COARSE)
     man.pitch, man.sinks = 0.0, sinks
     man.seconds(250.0)
-    assert man.supervisor.worst(19) == NOTHING
+    assert man.supervisor.worst(sup.FAULT_OVERTIME) == NOTHING
 
 
 @pytest.mark.parametrize(("mode", "reaction"), [
@@ -161,7 +161,7 @@ def test_a_slow_glide_is_not_the_same_depth(sinks):
 ])  # fmt: skip
 def test_overtime(mode, reaction):
     man = flying()
-    man.G[at.MISSION_TIME] = 5.0
+    man.G[sup.MISSION_TIME] = 5.0
     man.ap[ctl.MISSION_START] = man.t - 4.0
     man.ap[ctl.MODE] = mode
     assert man.seconds(0.9) == NOTHING
@@ -175,20 +175,20 @@ def test_overtime(mode, reaction):
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_too_steep_or_rolling_over_flies_the_pid_then_aborts(what, side):
     man = flying()
-    man.G[at.JUMP : at.JUMP + 3] = 10.0
+    man.G[sup.JUMP : sup.JUMP + 3] = 10.0
     setattr(man, what, side * (1.1 if what == "pitch" else 1.4))
     if side * man.pitch > 0:
         man.sinks = 0.0
     assert man.step() == WARN
-    assert man.supervisor.row == 21
+    assert man.supervisor.row == sup.FAULT_STEEP
     assert man.ap[ctl.CAUTIOUS] == 1.0
     assert man.until(ABORT, 2.0) > 1.5
-    assert man.supervisor.row == 21
+    assert man.supervisor.row == sup.FAULT_STEEP
 
 
 def test_a_leg_that_is_meant_to_be_steep_may_be():
     man = flying()
-    man.G[at.JUMP + 1] = 10.0
+    man.G[sup.JUMP + 1] = 10.0
     man.ap[ctl.REF_PITCH] = -1.2
     man.pitch = -1.3
     assert man.seconds(5.0) == NOTHING
@@ -198,7 +198,7 @@ def test_a_leg_that_is_meant_to_be_steep_may_be():
 
 def test_a_vehicle_that_comes_upright_again_flies_on():
     man = flying()
-    man.G[at.JUMP + 1] = 10.0
+    man.G[sup.JUMP + 1] = 10.0
     man.pitch = -1.1
     man.seconds(1.5)
     man.pitch = -0.3
@@ -210,8 +210,8 @@ def test_a_vehicle_that_comes_upright_again_flies_on():
 
 def test_an_ascent_may_be_as_steep_as_it_comes():
     man = flying(mode=ctl.COMPLETED)
-    man.G[at.JUMP + 1] = 10.0
+    man.G[sup.JUMP + 1] = 10.0
     rising(man)
     man.pitch = 1.5
     man.seconds(5.0)
-    assert man.supervisor.worst(21) == NOTHING
+    assert man.supervisor.worst(sup.FAULT_STEEP) == NOTHING

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from firmware.core.control import control_layout as ctl
+from firmware.core.supervision import supervisor_layout as sup
 from firmware.supervisor.settings import Limits
 from hal.ports import SLOTS, Validity
 from tests.support.stories import ABORT, HOLD, LOG, NOTHING, TWO_TICKS, WARN, flying, rising
@@ -33,7 +34,7 @@ def test_imu_lost_holds_then_aborts(how):
     else:
         man.say["imu"] = (math.nan,) * 6
     assert man.until(HOLD, 0.2) <= 0.2 + TWO_TICKS
-    assert man.supervisor.row == 1
+    assert man.supervisor.row == sup.FAULT_IMU_LOST
     man.wanted = [0.5, -0.05, -0.1]
     held = man.commands.copy()
     man.seconds(0.9)
@@ -67,10 +68,10 @@ def test_pressure_lost_aborts_and_never_clears():
     man = flying()
     man.silence.add("beacon")
     assert man.until(ABORT, 0.5) > 0.35
-    assert man.supervisor.row == 2
+    assert man.supervisor.row == sup.FAULT_PRESSURE_LOST
     man.silence.clear()
     assert man.seconds(5.0) == ABORT
-    assert man.supervisor.row == 2
+    assert man.supervisor.row == sup.FAULT_PRESSURE_LOST
     assert man.seconds(20.0) >= ABORT
     assert man.commands == pytest.approx([0.0, SLIDER_RANGE[0], BALLAST_RANGE[0]])
 
@@ -80,7 +81,7 @@ def test_without_the_sliders_wire_the_flight_goes_on():
     man = flying()
     man.silence.add("slider_wire")
     assert man.until(WARN, 0.5) > 0.35
-    assert man.supervisor.row == 4
+    assert man.supervisor.row == sup.FAULT_WIRE_LOST
     assert man.seconds(10.0) == WARN
     man.silence.clear()
     assert man.seconds(0.1) == NOTHING
@@ -90,7 +91,7 @@ def test_without_the_pumps_wire_it_does_not():
     man = flying()
     man.say["plunger_wire"] = (math.nan,)
     assert man.until(ABORT, 0.5) > 0.3
-    assert man.supervisor.row == 4
+    assert man.supervisor.row == sup.FAULT_WIRE_LOST
 
 
 # --- rows 6 and 10: samples that are not fit -------------------------------------------------------------------------
@@ -123,7 +124,7 @@ def test_a_slow_sensor_is_old_after_three_periods():
     man = flying()
     man.silence.add("beacon")
     assert man.until(LOG, 0.2) == pytest.approx(3 * 0.04 + DT, abs=0.041)
-    assert man.supervisor.row == 6
+    assert man.supervisor.row == sup.FAULT_SAMPLE_TIME
 
 
 ABSURD = {
@@ -162,8 +163,8 @@ def test_one_bad_sample_between_good_ones_is_never_an_error():
         man.step(2)
         man.say.clear()
         man.step(2)
-    assert man.supervisor.worst(10) == LOG
-    assert man.supervisor.worst(2) == NOTHING
+    assert man.supervisor.worst(sup.FAULT_IMPLAUSIBLE) == LOG
+    assert man.supervisor.worst(sup.FAULT_PRESSURE_LOST) == NOTHING
 
 
 @pytest.mark.parametrize("way", [1.0, -1.0])
@@ -173,7 +174,7 @@ def test_yaw_and_roll_go_round(way):
         man.roll = angle = math.remainder(way * 0.02 * number, 2 * math.pi)
         man.say["imu"] = (angle, -0.3, angle, 0.0, 0.0, 1e-6 * number)
         man.step()
-    assert man.supervisor.worst(10) == NOTHING
+    assert man.supervisor.worst(sup.FAULT_IMPLAUSIBLE) == NOTHING
 
 
 def test_upright_roll_and_yaw_mean_nothing():
@@ -185,7 +186,7 @@ def test_upright_roll_and_yaw_mean_nothing():
     for i in range(10):
         man.say["imu"] = (3.0 * (-1) ** i, 1.3, 2.0 * (-1) ** i, 0.0, 0.0, 1e-6 * i)
         man.step()
-    assert man.supervisor.worst(10) == NOTHING
+    assert man.supervisor.worst(sup.FAULT_IMPLAUSIBLE) == NOTHING
 
 
 def test_what_moved_while_nobody_listened_is_no_jump():
@@ -195,7 +196,7 @@ def test_what_moved_while_nobody_listened_is_no_jump():
     man.depth += 5.0
     man.silence.clear()
     man.step(2)
-    assert man.supervisor.worst(10) == NOTHING
+    assert man.supervisor.worst(sup.FAULT_IMPLAUSIBLE) == NOTHING
 
 
 # --- row 11: stuck --------------------------------------------------------------------------------------------------
@@ -204,9 +205,9 @@ def test_stuck_pressure_in_a_dive_is_seen_and_ends_it():
     man.frozen.add("beacon")
     begin = man.t
     man.until(ABORT, 3.0)
-    assert man.supervisor.noticed(11) - begin <= 2.0 + TWO_TICKS
-    assert man.supervisor.worst(11) == WARN
-    assert man.supervisor.row == 2
+    assert man.supervisor.noticed(sup.FAULT_STUCK_SENSOR) - begin <= 2.0 + TWO_TICKS
+    assert man.supervisor.worst(sup.FAULT_STUCK_SENSOR) == WARN
+    assert man.supervisor.row == sup.FAULT_PRESSURE_LOST
 
 
 def test_pressure_that_stands_still_while_nothing_moves_is_not_stuck():
@@ -216,10 +217,10 @@ def test_pressure_that_stands_still_while_nothing_moves_is_not_stuck():
     man.step(60)
     man.frozen.add("beacon")
     man.seconds(5.0)
-    assert man.supervisor.worst(11) == NOTHING
+    assert man.supervisor.worst(sup.FAULT_STUCK_SENSOR) == NOTHING
     man.wanted[2] = 0.15  # heavy: now it should sink
     man.seconds(3.0)
-    assert man.supervisor.worst(11) == WARN
+    assert man.supervisor.worst(sup.FAULT_STUCK_SENSOR) == WARN
 
 
 @pytest.mark.parametrize(("name", "index", "way"), [("slider_wire", 1, 0.01), ("plunger_wire", 2, 0.04)])
@@ -227,12 +228,12 @@ def test_a_stuck_wire_is_seen_once_its_actuator_was_sent_elsewhere(name, index, 
     man = flying()
     man.frozen.add(name)
     man.seconds(4.0)
-    assert man.supervisor.worst(11) == NOTHING
+    assert man.supervisor.worst(sup.FAULT_STUCK_SENSOR) == NOTHING
     man.wanted[index] += way
     begin = man.t
     man.seconds(2.1)
-    assert man.supervisor.worst(11) == WARN
-    assert man.supervisor.noticed(11) - begin <= 2.0 + TWO_TICKS
+    assert man.supervisor.worst(sup.FAULT_STUCK_SENSOR) == WARN
+    assert man.supervisor.noticed(sup.FAULT_STUCK_SENSOR) - begin <= 2.0 + TWO_TICKS
 
 
 @pytest.mark.parametrize(("name", "index", "way"), [("slider_wire", 1, 0.004), ("plunger_wire", 2, 0.015)])
@@ -241,10 +242,10 @@ def test_a_wire_need_not_show_a_small_move(name, index, way):
     man.frozen.add(name)
     man.wanted[index] += way
     man.seconds(4.0)
-    assert man.supervisor.worst(11) == NOTHING
+    assert man.supervisor.worst(sup.FAULT_STUCK_SENSOR) == NOTHING
 
 
 def test_a_leak_sensor_that_always_says_the_same_is_not_stuck():
     man = flying(fitted=("leak",))
     man.seconds(10.0)
-    assert man.supervisor.worst(11) == NOTHING
+    assert man.supervisor.worst(sup.FAULT_STUCK_SENSOR) == NOTHING

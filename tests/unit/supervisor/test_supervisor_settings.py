@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from firmware.core.supervision import supervisor_layout as at
+from firmware.core.supervision import supervisor_layout as sup
 from firmware.model.library import shipped
 from firmware.model.strict import ConfigError
 from firmware.model.vehicle import decode_vehicle
@@ -72,62 +72,63 @@ def test_what_makes_no_sense_is_refused_by_name(more, said):
 )
 def test_the_shallower_of_hull_and_site_counts(limits, site, working, risk):
     G = vector(limits, site=site)
-    assert G[at.WORKING_DEPTH] == pytest.approx(working)
-    assert G[at.RISK_DEPTH] == pytest.approx(risk)
+    assert G[sup.WORKING_DEPTH] == pytest.approx(working)
+    assert G[sup.RISK_DEPTH] == pytest.approx(risk)
 
 
 @pytest.mark.parametrize(("dt", "ticks", "delay"), [(0.02, 12, 30), (0.01, 24, 60), (0.1, 2, 6), (0.001, 63, 63)])
 def test_times_become_ticks_within_the_ring(dt, ticks, delay):
     G = vector(dt=dt)
-    assert (G[at.WRONG_TICKS], G[at.DELAY_TICKS]) == (ticks, delay)
-    assert G[at.TICK] == dt
+    assert (G[sup.WRONG_TICKS], G[sup.DELAY_TICKS]) == (ticks, delay)
+    assert G[sup.TICK] == dt
 
 
 def test_the_layout_follows_the_frame():
     names = ("imu", "beacon", "slider_wire", "plunger_wire", "leak", "battery")
-    assert tuple(SLOTS[name].start for name in names) == at.STARTS
-    assert tuple(len(SLOTS[name].names) for name in names) == at.WIDTHS
-    assert tuple(sum(at.WIDTHS[:i]) for i in range(6)) == at.PLACES
-    assert sum(at.WIDTHS) == at.N_VALUES
-    assert tuple(SLOTS[name].start for name in ("servo", "slider", "ballast")) == at.STATES
+    assert tuple(SLOTS[name].start for name in names) == sup.STARTS
+    assert tuple(len(SLOTS[name].names) for name in names) == sup.WIDTHS
+    assert tuple(sum(sup.WIDTHS[:i]) for i in range(6)) == sup.PLACES
+    assert sum(sup.WIDTHS) == sup.N_VALUES
+    assert tuple(SLOTS[name].start for name in ("servo", "slider", "ballast")) == sup.STATES
     assert all(len(SLOTS[name].names) == 1 for name in ("servo", "slider", "ballast"))
 
 
 def test_places_in_the_vector_do_not_overlap():
     G = vector()
-    assert list(G[at.PERIOD : at.PERIOD + at.N_SENSORS]) == [0.02, 0.04, 0.1, 0.1, 0.2, 0.2]
-    assert (G[at.ENABLED : at.ENABLED + at.N_ROWS] == 1.0).all()
-    assert (G[at.HIGH : at.HIGH + at.N_VALUES] > G[at.LOW : at.LOW + at.N_VALUES]).all()
-    singles = [value for name, value in vars(at).items() if name.isupper() and isinstance(value, int)]
-    assert max(singles) == at.N_G == len(G)
+    assert list(G[sup.PERIOD : sup.PERIOD + sup.N_SENSORS]) == [0.02, 0.04, 0.1, 0.1, 0.2, 0.2]
+    assert (G[sup.ENABLED : sup.ENABLED + sup.N_ROWS] == 1.0).all()
+    assert (G[sup.HIGH : sup.HIGH + sup.N_VALUES] > G[sup.LOW : sup.LOW + sup.N_VALUES]).all()
+    singles = [value for name, value in vars(sup).items() if name.isupper() and isinstance(value, int)]
+    assert max(singles) == sup.N_G == len(G)
 
 
 def test_what_the_mission_and_the_flight_before_say_is_there():
     G = vector()
-    assert G[at.MISSION_TIME] == 600.0
-    assert G[at.RESTARTED] == 0.0
+    assert G[sup.MISSION_TIME] == 600.0
+    assert G[sup.RESTARTED] == 0.0
     more = settings_vector(
         Limits(low_voltage=12.0, least_voltage=11.0), SupervisorTable(), dt=0.02, periods=PERIODS, site_depth=6.0,
         mission_time=5.0, restarted=True,
     )  # fmt: skip
-    assert (more[at.RESTARTED], more[at.MISSION_TIME]) == (1.0, 5.0)
-    assert (more[at.LOW_VOLTAGE], more[at.LEAST_VOLTAGE]) == (12.0, 11.0)
-    assert (G[at.LOW_VOLTAGE], G[at.LEAST_VOLTAGE]) == (0.0, 0.0)
+    assert (more[sup.RESTARTED], more[sup.MISSION_TIME]) == (1.0, 5.0)
+    assert (more[sup.LOW_VOLTAGE], more[sup.LEAST_VOLTAGE]) == (12.0, 11.0)
+    assert (G[sup.LOW_VOLTAGE], G[sup.LEAST_VOLTAGE]) == (0.0, 0.0)
 
 
 SCALARS = {
-    "hold_s": at.HOLD_TIME, "frozen_s": at.FROZEN_TIME, "stuck_s": at.STUCK_TIME, "actuator_s": at.STATE_AGE,
-    "unfit_run": at.UNFIT_RUN, "disagree_s": at.DISAGREE_TIME, "disagree_rate_m_s": at.DISAGREE_RATE,
-    "deep_s": at.DEEP_TIME, "at_risk_s": at.RISK_TIME, "no_ascent_s": at.ASCENT_TIME, "ascent_step_m": at.ASCENT_STEP,
-    "blind_ascent_s": at.BLIND_TIME, "same_depth_s": at.SAME_TIME, "same_depth_m": at.SAME_BAND,
-    "leak_samples": at.LEAK_COUNT, "steep_s": at.STEEP_TIME, "law_tries": at.LAW_RUN, "law_rest_s": at.LAW_REST,
-    "voltage_s": at.VOLTAGE_TIME, "overruns": at.OVERRUN_RUN, "overrun_share": at.OVERRUN_SHARE,
-    "stall_factor": at.STALL_FACTOR, "stall_tries": at.STALL_TRIES, "stall_rest_s": at.STALL_REST,
-    "surface_m": at.SURFACE_DEPTH, "imu_s": at.LOST_AFTER, "pressure_s": at.LOST_AFTER + 1,
-    "wire_s": at.LOST_AFTER + 2,
+    "hold_s": sup.HOLD_TIME, "frozen_s": sup.FROZEN_TIME, "stuck_s": sup.STUCK_TIME, "actuator_s": sup.STATE_AGE,
+    "unfit_run": sup.UNFIT_RUN, "disagree_s": sup.DISAGREE_TIME, "disagree_rate_m_s": sup.DISAGREE_RATE,
+    "deep_s": sup.DEEP_TIME, "at_risk_s": sup.RISK_TIME,
+    "no_ascent_s": sup.ASCENT_TIME, "ascent_step_m": sup.ASCENT_STEP,
+    "blind_ascent_s": sup.BLIND_TIME, "same_depth_s": sup.SAME_TIME, "same_depth_m": sup.SAME_BAND,
+    "leak_samples": sup.LEAK_COUNT, "steep_s": sup.STEEP_TIME, "law_tries": sup.LAW_RUN, "law_rest_s": sup.LAW_REST,
+    "voltage_s": sup.VOLTAGE_TIME, "overruns": sup.OVERRUN_RUN, "overrun_share": sup.OVERRUN_SHARE,
+    "stall_factor": sup.STALL_FACTOR, "stall_tries": sup.STALL_TRIES, "stall_rest_s": sup.STALL_REST,
+    "surface_m": sup.SURFACE_DEPTH, "imu_s": sup.LOST_AFTER, "pressure_s": sup.LOST_AFTER + 1,
+    "wire_s": sup.LOST_AFTER + 2,
 }  # fmt: skip
-ANGLES = {"disagree_pitch_deg": at.DISAGREE_PITCH, "steep_deg": at.STEEP_PITCH, "steep_margin_deg": at.STEEP_MARGIN,
-          "roll_deg": at.STEEP_ROLL}  # fmt: skip
+ANGLES = {"disagree_pitch_deg": sup.DISAGREE_PITCH, "steep_deg": sup.STEEP_PITCH, "steep_margin_deg": sup.STEEP_MARGIN,
+          "roll_deg": sup.STEEP_ROLL}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", [*SCALARS, *ANGLES])
@@ -145,10 +146,10 @@ def test_every_setting_has_its_place(name):
 
 def test_ranges_and_jumps_stand_at_their_values():
     G = vector()
-    low, high = (list(G[place : place + at.N_VALUES]) for place in (at.LOW, at.HIGH))
+    low, high = (list(G[place : place + sup.N_VALUES]) for place in (sup.LOW, sup.HIGH))
     assert low[:6] == pytest.approx([-math.pi - 0.2, -math.pi / 2 - 0.2, -math.pi - 0.2, -10, -10, -10])
     assert high[:6] == pytest.approx([math.pi + 0.2, math.pi / 2 + 0.2, math.pi + 0.2, 10, 10, 10])
     assert low[6:] == [50_000.0, -10.0, -0.5, -0.5, 0.0, 0.0]
     assert high[6:] == [1.2e8, 60.0, 0.5, 0.5, 1.0, 100.0]
-    assert list(G[at.JUMP : at.JUMP + 12]) == [0.3, 0.3, 0.3, 2, 2, 2, 15_000.0, 5, 0.01, 0.01, 1, 10]
-    assert list(G[at.JUMP_RATE : at.JUMP_RATE + 12]) == [3, 3, 3, 20, 20, 20, 30_000.0, 1, 0.05, 0.05, 1, 10]
+    assert list(G[sup.JUMP : sup.JUMP + 12]) == [0.3, 0.3, 0.3, 2, 2, 2, 15_000.0, 5, 0.01, 0.01, 1, 10]
+    assert list(G[sup.JUMP_RATE : sup.JUMP_RATE + 12]) == [3, 3, 3, 20, 20, 20, 30_000.0, 1, 0.05, 0.05, 1, 10]

@@ -5,7 +5,7 @@ Each row as a story: all is well, something breaks, it is noticed in time, and w
 
 import pytest
 
-from firmware.core.supervision import supervisor_layout as at
+from firmware.core.supervision import supervisor_layout as sup
 from firmware.supervisor.settings import Limits
 from tests.support.stories import ABORT, COARSE, LOG, NOTHING, WARN, flying
 
@@ -16,14 +16,14 @@ def test_one_wet_sample_warns_for_good_and_three_abort():
     man.say["leak"] = (1.0,)
     man.step(man.slow)
     assert man.supervisor.reaction == WARN
-    assert man.supervisor.row == 20
+    assert man.supervisor.row == sup.FAULT_LEAK
     man.say.clear()
     assert man.seconds(20.0) == WARN
     man.say["leak"] = (1.0,)
     man.step(man.slow)
     assert man.supervisor.reaction == WARN
     assert man.step(man.slow) == ABORT
-    assert man.supervisor.row == 20
+    assert man.supervisor.row == sup.FAULT_LEAK
 
 
 def test_a_leak_aborts_within_a_second():
@@ -36,7 +36,7 @@ def test_under_voltage_warns_then_aborts():
     man = flying(dt=COARSE, fitted=("battery",), limits=Limits(low_voltage=12.0, least_voltage=11.0))
     man.say["battery"] = (11.5,)
     assert man.until(WARN, 10.0) > 8.0
-    assert man.supervisor.row == 23
+    assert man.supervisor.row == sup.FAULT_VOLTAGE
     assert man.seconds(20.0) == WARN
     man.say["battery"] = (13.0,)
     man.seconds(0.5)
@@ -52,15 +52,15 @@ def test_a_dip_of_voltage_is_no_under_voltage():
         man.seconds(8.0)
         man.say["battery"] = (13.0,)
         man.seconds(0.4)
-    assert man.supervisor.worst(23) == NOTHING
+    assert man.supervisor.worst(sup.FAULT_VOLTAGE) == NOTHING
 
 
 # --- rows 25, 27, 33 ------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize(
     ("place", "value", "row", "reaction"),
     [
-        (at.RESTARTED, 1.0, 25, ABORT), (at.RECORDER, 1.0, 27, LOG), (at.RECORDER, 2.0, 27, WARN),
-        (at.GROWTH, 1.0, 33, WARN), (at.GROWTH, 2.0, 33, ABORT),
+        (sup.RESTARTED, 1.0, 25, ABORT), (sup.RECORDER, 1.0, 27, LOG), (sup.RECORDER, 2.0, 27, WARN),
+        (sup.GROWTH, 1.0, 33, WARN), (sup.GROWTH, 2.0, 33, ABORT),
     ],
 )  # fmt: skip
 def test_what_the_runtime_tells_is_heard_in_the_same_tick(place, value, row, reaction):

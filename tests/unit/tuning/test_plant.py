@@ -10,14 +10,14 @@ from firmware.core.vehicle import layout
 from firmware.core.vehicle.flight import nominal_run
 from tools.data.errors import InputError
 from tools.study.tuning.linear_plant import (
-    BALLAST,
     DESIGN_TRIMS,
+    LIN_BALLAST,
+    LIN_PITCH,
+    LIN_Q,
+    LIN_SLIDER,
+    LIN_U,
+    LIN_W,
     OTHER_TRIMS,
-    PITCH,
-    SLIDER,
-    Q,
-    U,
-    W,
     linearise,
     steady_glide,
 )
@@ -27,18 +27,18 @@ from tools.study.tuning.linear_plant import (
 def test_a_steady_glide_stays_as_it_is(vehicle, trim):
     P, state = vehicle.vector(), steady_glide(vehicle.vector(), trim)
     x = flight_state(state)
-    nominal_run(P, x, 0.0, state[SLIDER], state[BALLAST], 0.0, 0.0, 0.0, 0.01, 2000, np.zeros((5, layout.N_X)))
+    nominal_run(P, x, 0.0, state[LIN_SLIDER], state[LIN_BALLAST], 0.0, 0.0, 0.0, 0.01, 2000, np.zeros((5, layout.N_X)))
     assert euler_from_quaternion(*x[3:7])[1] == pytest.approx(trim.pitch, abs=1e-6)
-    assert x[layout.X_NU] == pytest.approx(state[U], abs=1e-6)
+    assert x[layout.X_NU] == pytest.approx(state[LIN_U], abs=1e-6)
     # heavy sinks, light rises, nose in the same direction
     assert np.sign(x[2]) == np.sign(trim.ballast)
 
 
 def flight_state(state):
     x = np.zeros(layout.N_X)
-    x[3:7] = quaternion_from_euler(0.0, state[PITCH], 0.0)
-    x[layout.X_NU], x[layout.X_NU + 2], x[layout.X_NU + 4] = state[U], state[W], state[Q]
-    x[layout.X_ACT + 1], x[layout.X_ACT + 2] = state[SLIDER], state[BALLAST]
+    x[3:7] = quaternion_from_euler(0.0, state[LIN_PITCH], 0.0)
+    x[layout.X_NU], x[layout.X_NU + 2], x[layout.X_NU + 4] = state[LIN_U], state[LIN_W], state[LIN_Q]
+    x[layout.X_ACT + 1], x[layout.X_ACT + 2] = state[LIN_SLIDER], state[LIN_BALLAST]
     return x
 
 
@@ -57,11 +57,11 @@ def test_a_small_step_of_a_command_goes_as_the_flight_does(vehicle, trim, step):
     for _ in range(20):
         for flown, (slider, ballast) in ((stepped, step), (steady, (0.0, 0.0))):
             nominal_run(
-                P, flown, 0.0, state[SLIDER] + slider, state[BALLAST] + ballast, 0.0, 0.0, 0.0, 0.01, 50,
+                P, flown, 0.0, state[LIN_SLIDER] + slider, state[LIN_BALLAST] + ballast, 0.0, 0.0, 0.0, 0.01, 50,
                 np.zeros((5, layout.N_X)),
             )  # fmt: skip
         x = one @ x
-        wanted.append([x[PITCH], x[0]])
+        wanted.append([x[LIN_PITCH], x[0]])
         pitches = [euler_from_quaternion(*flown[3:7])[1] for flown in (stepped, steady)]
         got.append([pitches[0] - pitches[1], stepped[2] - steady[2]])
     wanted, got = np.array(wanted), np.array(got)

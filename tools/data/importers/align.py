@@ -6,6 +6,7 @@ import numpy as np
 
 from tools.data.errors import InputError
 from tools.data.importers.qualisys import Capture
+from tools.data.importers.resample import wrapped
 from tools.data.runs import columns as names
 from tools.data.runs.run import Run
 
@@ -79,9 +80,9 @@ def aligned(run: Run, capture: Capture, offset: Offset) -> Run:
         x = capture.pose[:, n]
         change = x[row + 1] - x[row]
         if n >= 3:
-            change = (change + np.pi) % (2.0 * np.pi) - np.pi
+            change = wrapped(change)
         value = x[row] + share * change
         if n >= 3:
-            value = (value + np.pi) % (2.0 * np.pi) - np.pi
+            value = wrapped(value)
         columns[name] = np.where(inside, value, np.nan)
     return Run(run.name, run.path, columns, run.extra)

@@ -13,12 +13,11 @@ from typing import Annotated, Literal
 
 import msgspec
 
+from firmware.core.vehicle.layout import GRAVITY
 from firmware.model.strict import ConfigError, Table, decode, locate
 from tools.data.errors import InputError
 from tools.data.runs import columns as names
 from tools.data.sources import read_text
-
-GRAVITY = 9.80665  # m/s2, for depth out of pressure
 
 # unit -> (kind, factor to SI). 'counts' is for values that `scale` alone turns into the target's SI unit.
 UNITS: dict[str, tuple[str, float]] = {

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from firmware.autopilot import CONTROLLERS
 from firmware.core.control.control_layout import CONTROLLER
+from firmware.core.control.controllers import CONTROLLERS
 from sim_backend.core.closed_loop import N_END, N_TRACE, fly
 from tools.flight.compose import build_flight
 from tools.measure.benchmark.registry import Settings
@@ -23,7 +23,7 @@ def one_flight(seed: int, controller: str = "pid") -> tuple[int, float]:
     """Ticks of one flight and the processor's seconds they took; two Runge-Kutta steps of 0.01 s a tick."""
     flight = build_flight(mission=MISSION, seed=seed)
     world, pilot = flight.board.world, flight.autopilot
-    pilot.C[CONTROLLER] = CONTROLLERS[controller]
+    pilot.C[CONTROLLER] = CONTROLLERS[controller].number
     trace, end = np.zeros((1, N_TRACE)), np.zeros(N_END)
     before = time.thread_time()
     ticks = fly(
@@ -37,7 +37,7 @@ def autopilot_us(controller: str, ticks: int = 6000) -> tuple[float, float]:
     """Median and 99th percentile of the autopilot's own tick, us, the call from Python in it."""
     flight = build_flight(mission=MISSION)
     world, pilot, clock = flight.board.world, flight.autopilot, time.perf_counter
-    pilot.C[CONTROLLER] = CONTROLLERS[controller]
+    pilot.C[CONTROLLER] = CONTROLLERS[controller].number
     took = np.zeros(ticks)
     for number in range(ticks):
         world.advance(0.02 * number)
@@ -51,14 +51,15 @@ def autopilot_us(controller: str, ticks: int = 6000) -> tuple[float, float]:
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """ticks_per_s of the PID and ticks_per_s_law, medians over whole flights; what the autopilot takes of a tick."""
+    """ticks_per_s by controller, medians over whole flights; what the autopilot takes of a tick."""
     result: dict[str, Any] = {"plant_steps_per_tick": 2}
-    for controller, name in (("pid", "ticks_per_s"), ("law", "ticks_per_s_law"), ("law+", "ticks_per_s_law_plus")):
+    for controller in CONTROLLERS:
+        name = "ticks_per_s" if controller == "pid" else f"ticks_per_s_{controller.replace('+', '_plus')}"
         one_flight(0, controller)
         flights = [one_flight(seed, controller) for seed in range(4 * settings.repeats)]
         result[name] = median([ticks / seconds for ticks, seconds in flights])
         result["ticks"] = flights[-1][0]
     result["autopilot_us"] = {
-        name: dict(zip(("median", "p99"), autopilot_us(name), strict=True)) for name in ("pid", "law", "law+")
+        name: dict(zip(("median", "p99"), autopilot_us(name), strict=True)) for name in CONTROLLERS
     }
     return result

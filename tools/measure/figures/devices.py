@@ -15,7 +15,7 @@ from typing import Any
 import click
 import numpy as np
 
-from firmware.core.control.telemetry import LATENESS
+from firmware.core.control.telemetry import REC_LATENESS
 from tools.cli.common import DONE, FAILED, print_json, progress
 
 POSITION_LIMIT_M, ATTITUDE_LIMIT_DEG = 0.10, 2.0
@@ -160,7 +160,7 @@ def _run_ticks(runtime: Any, channel: Any, ticks: int) -> np.ndarray:
     late = np.empty(ticks)
     for i in range(ticks):
         runtime.tick()
-        late[i] = channel.values[LATENESS]
+        late[i] = channel.values[REC_LATENESS]
     return late
 
 

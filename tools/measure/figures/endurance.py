@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from firmware.core.control.telemetry import LATENESS
+from firmware.core.control.telemetry import REC_LATENESS
 from tools.cli.common import progress
 
 WARM_UP_S = 20.0
@@ -165,7 +165,7 @@ def _ticks(runtime: Any, keeper: Any, recorder: Any, samples: Samples, seconds: 
         minute = 60.0
         while (passed := runtime.deadline - begin) < seconds:
             runtime.tick()
-            lateness = values[LATENESS]
+            lateness = values[REC_LATENESS]
             if lateness > LATE_S:
                 samples.note_late(passed, lateness)
             if passed >= next_second:

@@ -156,7 +156,7 @@ def _in_child(flight: Any, folder: Path, kill_after_s: float | None) -> Told:
 
 def _live(flight: Any, folder: Path, pipe: int) -> None:
     """What `glider fly` does between its start and its end, on the simulated board."""
-    from firmware.core.control import control_layout as at
+    from firmware.core.control import control_layout as ctl
     from hal.recorder.recorder import NullRecorder
     from hal.state_file import Phase
     from tools.flight.compose import build_runtime, record_specs
@@ -178,7 +178,7 @@ def _live(flight: Any, folder: Path, pipe: int) -> None:
     flown = [False]
 
     def look(t: float) -> None:
-        if not flown[0] and flight.autopilot.ap[at.MODE] == at.FLYING:
+        if not flown[0] and flight.autopilot.ap[ctl.MODE] == ctl.FLYING:
             flown[0] = True
             os.write(pipe, b"F")
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from firmware.core.control.controllers import CONTROLLERS
 from tools.data.errors import MissingExtra
 from tools.report.charts import Chart, Line, svg
 from tools.study.campaign.conduct import Flown
@@ -23,7 +24,7 @@ CONDITIONS = (
     ("start_depth_m", "depth at the start", "m"),
 )
 ERRORS = (("depth_error_m", "depth error, m", "m", 1.0), ("pitch_error_rad", "pitch error, deg", "deg", 180.0 / np.pi))
-CONTROLLER_NAMES = {"pid": "PID", "pid_tuned": "PID best-tuned", "law": "law", "hybrid": "hybrid", "law+": "law+"}
+CONTROLLER_NAMES = {"pid_tuned": "PID best-tuned", **{name: row.title for name, row in CONTROLLERS.items()}}
 
 
 def _style(number: int) -> str:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import msgspec
 import numpy as np
@@ -14,6 +14,7 @@ import numpy as np
 from firmware.autopilot import Autopilot, configuration
 from firmware.control import gains
 from firmware.control.gains import Control
+from firmware.core.control.controllers import CONTROLLERS
 from firmware.core.jit import kernels_digest
 from firmware.guidance.mission import Mission, decode_mission
 from firmware.model.strict import Table, decode
@@ -23,6 +24,11 @@ from sim_backend.effects.catalogue import check_board
 from tools.data.errors import InputError
 from tools.data.sources import load_vehicle, name_or_path, read_text
 from tools.flight.compose import load_board_file
+
+if TYPE_CHECKING:
+    Flown = str
+else:
+    Flown = Literal[(*CONTROLLERS, "pid_tuned")]
 
 Name = Annotated[str, msgspec.Meta(min_length=1, max_length=1000)]
 Times = Annotated[float, msgspec.Meta(ge=0.0, le=100.0)]
@@ -71,7 +77,7 @@ class Campaign(Table):
     format: Annotated[int, msgspec.Meta(ge=1, le=1)]
     name: Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$")]
     missions: Annotated[list[Name], msgspec.Meta(min_length=1, max_length=100)]
-    controllers: Annotated[list[Literal["pid", "pid_tuned", "law", "hybrid", "law+"]], msgspec.Meta(min_length=1)]
+    controllers: Annotated[list[Flown], msgspec.Meta(min_length=1)]
     seeds: Annotated[int, msgspec.Meta(ge=1, le=1_000_000)]
     first_seed: Annotated[int, msgspec.Meta(ge=0, le=2**31)] = 0
     vehicle: Name = "roughie"

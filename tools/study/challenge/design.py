@@ -86,8 +86,8 @@ def draw_run(rng: np.random.Generator, site: Site, style: str, waves: np.ndarray
     x[X_NU], x[X_NU + 2] = rng.uniform(0.1, 0.3), rng.uniform(0.0, 0.02)
     x[X_ACT : X_ACT + 3] = 0.0
     own = waves.copy()
-    own[:, fo.W_PHASE] = rng.uniform(0.0, 2.0 * np.pi, len(own))
-    rows = int(rng.uniform(*site.seconds) / fo.ROW)
+    own[:, fo.FW_PHASE] = rng.uniform(0.0, 2.0 * np.pi, len(own))
+    rows = int(rng.uniform(*site.seconds) / fo.ROW_S)
     return RunDesign(x, np.array(legs), rows, np.uint64(rng.integers(0, 2**63)), own)
 
 

@@ -46,7 +46,7 @@ class Trial:
     site: Site
     P: np.ndarray  # (N_P,) the true parameters, within [uncertainty]
     shapes: np.ndarray  # F without effects
-    errors: np.ndarray  # (2, N_R) bias and noise
+    errors: np.ndarray  # (2, N_FR) bias and noise
     designs: list[RunDesign]
     noise_seed: int
 
@@ -56,16 +56,16 @@ class Trial:
 
     def _fly(self, F: np.ndarray, number: int, design: RunDesign) -> Flight:
         rows = design.rows + EXTRA
-        commands, X, Y = np.zeros((rows, 3)), np.zeros((rows, fo.N_FX)), np.zeros((rows, fo.N_R))
+        commands, X, Y = np.zeros((rows, 3)), np.zeros((rows, fo.N_FX)), np.zeros((rows, fo.N_FR))
         disturbance = self.vehicle.disturbance
         fly_foreign(
             self.P, F, design.waves, self.errors, disturbance.linear, disturbance.angular, design.seed,
             design.start.copy(), design.legs, commands, X, Y,
         )  # fmt: skip
-        columns = {names.TIME: np.arange(design.rows) * fo.ROW}
+        columns = {names.TIME: np.arange(design.rows) * fo.ROW_S}
         columns |= dict(zip(names.COMMANDS, commands[: design.rows].T, strict=True))
         order = (*names.DRAW_WIRES, *names.ATTITUDE, *names.RATES, names.DEPTH)
-        places = (fo.R_SLIDER, fo.R_BALLAST, *range(7))
+        places = (fo.FR_SLIDER, fo.FR_BALLAST, *range(7))
         columns |= {name: Y[: design.rows, place] for name, place in zip(order, places, strict=True)}
         for name in names.ATTITUDE:
             columns[name] = wrap(columns[name])
@@ -95,11 +95,11 @@ class Trial:
         rows, found = flight.run.rows, [w for w in flight.windows if w.scored and w.start < w.end]
         truth = poses(flight.X)
         Y = np.zeros((rows, N_Y))
-        beyond = EXTRA if self.site.mocap and (F[fo.MOCAP_DELAY] or F[fo.CLOCK_SKEW]) else 0
+        beyond = EXTRA if self.site.mocap and (F[fo.FS_MOCAP_DELAY] or F[fo.FS_CLOCK_SKEW]) else 0
         first = np.array([w.start for w in found])
         last = np.array([w.end + beyond for w in found])
         longest = int((last - first).max())
-        X, Xw, Yw = flight.X, np.zeros((len(found), longest, fo.N_FX)), np.zeros((len(found), longest, fo.N_R))
+        X, Xw, Yw = flight.X, np.zeros((len(found), longest, fo.N_FX)), np.zeros((len(found), longest, fo.N_FR))
         if plain:
             X = X.copy()
             if seen and not self.site.mocap:
@@ -133,10 +133,10 @@ def poses(X: np.ndarray) -> np.ndarray:
 
 def mocap_pose(F: np.ndarray, pose: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """What motion capture gives out at the onboard times of `rows`: the pose (rows, 6) of another moment, maybe."""
-    t = rows * fo.ROW
-    late = F[fo.MOCAP_DELAY] * (1.0 + F[fo.JITTER] * np.sin(2.0 * np.pi * t / 7.0))
-    ahead = F[fo.CLOCK_SKEW] * (t + F[fo.SKEW_STEP] * (t > F[fo.SKEW_TIME]))
-    at = np.arange(len(pose)) * fo.ROW
+    t = rows * fo.ROW_S
+    late = F[fo.FS_MOCAP_DELAY] * (1.0 + F[fo.FS_JITTER] * np.sin(2.0 * np.pi * t / 7.0))
+    ahead = F[fo.FS_CLOCK_SKEW] * (t + F[fo.FS_SKEW_STEP] * (t > F[fo.FS_SKEW_TIME]))
+    at = np.arange(len(pose)) * fo.ROW_S
     return np.stack([np.interp(t - late + ahead, at, column) for column in pose.T], axis=1)
 
 
@@ -144,7 +144,7 @@ def draw_trial(rng: np.random.Generator, vehicle: Vehicle, site: Site) -> Trial:
     """A vehicle as identification leaves it, sensors with their biases, and its runs."""
     waves = draw_waves(rng)
     designs = draw_runs(rng, site, waves)
-    seconds = fo.ROW * min(design.rows for design in designs)
+    seconds = fo.ROW_S * min(design.rows for design in designs)
     return Trial(
         vehicle, site, draw_parameters(vehicle, rng), draw_shapes(rng, seconds, site.depths),
         sensor_errors(vehicle, rng), designs, int(rng.integers(0, 2**31)),
@@ -198,5 +198,5 @@ def with_effect(F: np.ndarray, form: Form, sizes: np.ndarray, strength: float) -
 def predictable(F: np.ndarray) -> np.ndarray:
     """F without what no model could foretell: the phases of waves, turbulence."""
     F = F.copy()
-    F[[fo.WAVES, fo.TURBULENCE]] = 0.0
+    F[[fo.FS_WAVES, fo.FS_TURBULENCE]] = 0.0
     return F

@@ -9,7 +9,7 @@ import numpy as np
 
 from firmware.core.control import control_layout as ctl
 from firmware.core.maths.rotations import euler_from_quaternion
-from firmware.core.supervision import supervisor_layout as at
+from firmware.core.supervision import supervisor_layout as sup
 from firmware.core.vehicle.layout import CG_X, CG_Y, X_ACT, X_QUAT
 from firmware.supervisor.settings import Limits
 from firmware.supervisor.table import Reaction
@@ -36,37 +36,50 @@ def device(name: str, kind: str, **more: Any):
 
 def devices() -> list[Case]:
     """Rows 1 to 6, 9 to 11, 14, 16: what a device can do wrong."""
-    cases = [Case(1, f"imu {kind}", device("imu", kind), ABORT, 0.2) for kind in ("silent", "off", "stuck", "garbage")]
-    cases += [Case(1, f"imu {kind}", device("imu", kind), HOLD, 0.2) for kind in ("slow", "intermittent")]
+    cases = [
+        Case(sup.FAULT_IMU_LOST, f"imu {kind}", device("imu", kind), ABORT, 0.2)
+        for kind in ("silent", "off", "stuck", "garbage")
+    ]
     cases += [
-        Case(2, f"beacon {kind}", device("beacon", kind), ABORT, 0.5)
+        Case(sup.FAULT_IMU_LOST, f"imu {kind}", device("imu", kind), HOLD, 0.2) for kind in ("slow", "intermittent")
+    ]
+    cases += [
+        Case(sup.FAULT_PRESSURE_LOST, f"beacon {kind}", device("beacon", kind), ABORT, 0.5)
         for kind in ("silent", "off", "garbage", "slow", "intermittent")
     ]
     cases += [
-        Case(3, f"{name} {kind}", device(name, kind), ABORT, 0.5)
+        Case(sup.FAULT_BUS_LOST, f"{name} {kind}", device(name, kind), ABORT, 0.5)
         for name in ("slider", "ballast")
         for kind in ("silent", "off")
     ]
     cases += [
-        Case(4, f"{name} {kind}", device(name, kind), reaction, 0.5)
+        Case(sup.FAULT_WIRE_LOST, f"{name} {kind}", device(name, kind), reaction, 0.5)
         for name, reaction in (("slider_wire", WARN), ("plunger_wire", ABORT))
         for kind in ("silent", "off", "garbage")
     ]
-    cases += [Case(5, f"servo {kind}", device("servo", kind), WARN, 0.5) for kind in ("silent", "off")]
+    cases += [
+        Case(sup.FAULT_SERVO_LOST, f"servo {kind}", device("servo", kind), WARN, 0.5) for kind in ("silent", "off")
+    ]
     under = tuple(phase for phase in ALL if phase != "waiting")
     cases += [
-        Case(6, f"{name} {kind}", device(name, kind), LOG, 4 * SAMPLE_S, under)
+        Case(sup.FAULT_SAMPLE_TIME, f"{name} {kind}", device(name, kind), LOG, 4 * SAMPLE_S, under)
         for name in SENSORS
         for kind in ("delayed", "repeated", "backwards", "slow")
     ]
-    cases += [Case(9, f"{name} refuses", device(name, "misconfigured"), ABORT, 0.1) for name in ("slider", "ballast")]
-    cases += [Case(10, f"{name} garbage", device(name, "garbage"), WARN, SAMPLE_S) for name in SENSORS]
     cases += [
-        Case(10, f"{name} jumps", device(name, "jump", drift=JUMPS[name]), WARN, SAMPLE_S, under) for name in SENSORS
+        Case(sup.FAULT_EXCEPTION, f"{name} refuses", device(name, "misconfigured"), ABORT, 0.1)
+        for name in ("slider", "ballast")
     ]
-    cases.append(Case(11, "beacon stuck", device("beacon", "stuck"), WARN, 2.0 + SAMPLE_S, MOVING))
     cases += [
-        Case(11, f"{name} stuck", stuck_wire(name, index), WARN, 2.0 + SAMPLE_S, UNDER_WAY)
+        Case(sup.FAULT_IMPLAUSIBLE, f"{name} garbage", device(name, "garbage"), WARN, SAMPLE_S) for name in SENSORS
+    ]
+    cases += [
+        Case(sup.FAULT_IMPLAUSIBLE, f"{name} jumps", device(name, "jump", drift=JUMPS[name]), WARN, SAMPLE_S, under)
+        for name in SENSORS
+    ]
+    cases.append(Case(sup.FAULT_STUCK_SENSOR, "beacon stuck", device("beacon", "stuck"), WARN, 2.0 + SAMPLE_S, MOVING))
+    cases += [
+        Case(sup.FAULT_STUCK_SENSOR, f"{name} stuck", stuck_wire(name, index), WARN, 2.0 + SAMPLE_S, UNDER_WAY)
         for name, index in (("slider_wire", 1), ("plunger_wire", 2))
     ]
     return cases
@@ -93,13 +106,19 @@ def actuators() -> list[Case]:
     """Rows 14 and 16."""
     ways = {"slider": 1.5 * (0.12 / 0.02 + 0.15), "ballast": 1.5 * (0.4 / 0.03 + 0.3)}
     cases = [
-        Case(14, "slider jams", device("slider", "stuck"), ABORT, ways["slider"], MOVING),
-        Case(14, "ballast jams", device("ballast", "stuck"), ABORT, ways["ballast"], ("descent",)),
+        Case(sup.FAULT_STALL, "slider jams", device("slider", "stuck"), ABORT, ways["slider"], MOVING),
+        Case(sup.FAULT_STALL, "ballast jams", device("ballast", "stuck"), ABORT, ways["ballast"], ("descent",)),
     ]
-    cases += [Case(14, f"{name} given up by its drive", device(name, "stalled"), ABORT, 0.1) for name in ways]
-    cases += [Case(14, f"{name} runs the wrong way", wrong_way(name), ABORT, 0.3, ("level",)) for name in ways]
-    cases += [Case(16, f"{name} alarm", device(name, "alarm"), WARN, 0.2) for name in ways]
-    cases += [Case(16, f"{name} alarm kept", device(name, "alarm_kept"), ABORT, 0.2) for name in ways]
+    cases += [
+        Case(sup.FAULT_STALL, f"{name} given up by its drive", device(name, "stalled"), ABORT, 0.1) for name in ways
+    ]
+    cases += [
+        Case(sup.FAULT_STALL, f"{name} runs the wrong way", wrong_way(name), ABORT, 0.3, ("level",)) for name in ways
+    ]
+    cases += [Case(sup.FAULT_DRIVE_ALARM, f"{name} alarm", device(name, "alarm"), WARN, 0.2) for name in ways]
+    cases += [
+        Case(sup.FAULT_DRIVE_ALARM, f"{name} alarm kept", device(name, "alarm_kept"), ABORT, 0.2) for name in ways
+    ]
     return cases
 
 
@@ -275,38 +294,42 @@ def conditions() -> list[Case]:
     risk = Limits(working_depth_m=1.99, at_risk_depth_m=2.0)
     drift = {"drift": (-4_000.0, 0.0)}
     cases = [
-        Case(13, "pressure drifts", device("beacon", "wrong", **drift), WARN, 5.0, ("descent",)),
-        Case(15, "past the slider's range", controller(0.09), LOG, 0.0, UNDER_WAY),
-        Case(15, "past the servo's range", controller(-2.0, index=0), LOG, 0.0, UNDER_WAY),
-        Case(15, "past the ballast's range", controller(0.5, index=2), LOG, 0.0, ("descent",)),
-        Case(17, "deeper than the working depth", too_deep(2.0), ABORT, 1.0, ("descent",), Setting(limits=deep)),
-        Case(17, "deeper than the at-risk depth", too_deep(2.0), OOB, 0.2, ("descent",), Setting(limits=risk)),
-        Case(18, "pump hears nothing", pump_fails_in_abort("silent"), OOB, 30.0, ("descent",)),
-        Case(18, "pump jams", pump_fails_in_abort("stuck"), HW, 30.0, ("descent",)),
-        Case(19, "too light to dive", nothing, ABORT, 120.0, ("waiting",),
+        Case(sup.FAULT_DISAGREE, "pressure drifts", device("beacon", "wrong", **drift), WARN, 5.0, ("descent",)),
+        Case(sup.FAULT_SOFT_LIMIT, "past the slider's range", controller(0.09), LOG, 0.0, UNDER_WAY),
+        Case(sup.FAULT_SOFT_LIMIT, "past the servo's range", controller(-2.0, index=0), LOG, 0.0, UNDER_WAY),
+        Case(sup.FAULT_SOFT_LIMIT, "past the ballast's range", controller(0.5, index=2), LOG, 0.0, ("descent",)),
+        Case(sup.FAULT_TOO_DEEP, "deeper than the working depth", too_deep(2.0), ABORT, 1.0, ("descent",),
+             Setting(limits=deep)),
+        Case(sup.FAULT_TOO_DEEP, "deeper than the at-risk depth", too_deep(2.0), OOB, 0.2, ("descent",),
+             Setting(limits=risk)),
+        Case(sup.FAULT_NO_ASCENT, "pump hears nothing", pump_fails_in_abort("silent"), OOB, 30.0, ("descent",)),
+        Case(sup.FAULT_NO_ASCENT, "pump jams", pump_fails_in_abort("stuck"), HW, 30.0, ("descent",)),
+        Case(sup.FAULT_OVERTIME, "too light to dive", nothing, ABORT, 120.0, ("waiting",),
              Setting(effects={"net_buoyancy": {"mass": -0.3}})),
-        Case(19, "mission overtime", nothing, ABORT, 41.0, ("waiting",), Setting(mission_s=40.0)),
-        Case(20, "leak, one sample", leak(1), WARN, 1.0),
-        Case(20, "leak", leak(1000), ABORT, 1.0),
-        Case(21, "mass shifted forward", tipped(CG_X, 0.04), ABORT, 2.0, MOVING),
-        Case(21, "mass shifted to the side", tipped(CG_Y, 0.05), ABORT, 2.0, UNDER_WAY),
-        Case(22, "no number, once", controller(math.nan, 1), WARN, 0.0, UNDER_WAY),
-        Case(22, "no number", controller(math.nan), ABORT, 0.0, UNDER_WAY),
-        Case(22, "beyond all measure", controller(1e6), ABORT, 0.0, UNDER_WAY),
-        Case(22, "law without a solution", no_solution, ABORT, 0.02, UNDER_WAY, Setting(controller="law")),
-        Case(23, "voltage low", voltage(11.5), WARN, 10.0, setting=Setting(limits=BATTERY)),
-        Case(23, "voltage too low", voltage(10.5), ABORT, 10.0, setting=Setting(limits=BATTERY)),
-        Case(24, "one overrun", lateness(lambda n: 0.03 * (n == 1)), LOG, 0.02, late=True),
-        Case(24, "every tick late", lateness(lambda n: 0.03), ABORT, 0.02, late=True),
-        Case(24, "one in ten late", lateness(lambda n: 0.03 * (n % 10 == 0)), ABORT, 0.2, UNDER_WAY, late=True,
+        Case(sup.FAULT_OVERTIME, "mission overtime", nothing, ABORT, 41.0, ("waiting",), Setting(mission_s=40.0)),
+        Case(sup.FAULT_LEAK, "leak, one sample", leak(1), WARN, 1.0),
+        Case(sup.FAULT_LEAK, "leak", leak(1000), ABORT, 1.0),
+        Case(sup.FAULT_STEEP, "mass shifted forward", tipped(CG_X, 0.04), ABORT, 2.0, MOVING),
+        Case(sup.FAULT_STEEP, "mass shifted to the side", tipped(CG_Y, 0.05), ABORT, 2.0, UNDER_WAY),
+        Case(sup.FAULT_NO_ANSWER, "no number, once", controller(math.nan, 1), WARN, 0.0, UNDER_WAY),
+        Case(sup.FAULT_NO_ANSWER, "no number", controller(math.nan), ABORT, 0.0, UNDER_WAY),
+        Case(sup.FAULT_NO_ANSWER, "beyond all measure", controller(1e6), ABORT, 0.0, UNDER_WAY),
+        Case(sup.FAULT_NO_ANSWER, "law without a solution", no_solution, ABORT, 0.02, UNDER_WAY,
+             Setting(controller="law")),
+        Case(sup.FAULT_VOLTAGE, "voltage low", voltage(11.5), WARN, 10.0, setting=Setting(limits=BATTERY)),
+        Case(sup.FAULT_VOLTAGE, "voltage too low", voltage(10.5), ABORT, 10.0, setting=Setting(limits=BATTERY)),
+        Case(sup.FAULT_OVERRUN, "one overrun", lateness(lambda n: 0.03 * (n == 1)), LOG, 0.02, late=True),
+        Case(sup.FAULT_OVERRUN, "every tick late", lateness(lambda n: 0.03), ABORT, 0.02, late=True),
+        Case(sup.FAULT_OVERRUN, "one in ten late", lateness(lambda n: 0.03 * (n % 10 == 0)), ABORT, 0.2,
+             UNDER_WAY, late=True,
              setting=Setting(hold_s=60.0)),
-        Case(25, "restarted", nothing, ABORT, 0.02, ("waiting",), Setting(restarted=True)),
-        Case(27, "recorder drops", told(at.RECORDER, 1.0), LOG, 0.0),
-        Case(27, "recorder failed", told(at.RECORDER, 2.0), WARN, 0.0),
-        Case(33, "handles are not given back", handles(130), WARN, 60.0, UNDER_WAY, Setting(hold_s=30.0)),
-        Case(33, "handles, without end", handles(260), ABORT, 60.0, UNDER_WAY, Setting(hold_s=30.0)),
-        Case(33, "memory is not given back", memory(70), WARN, 60.0, ("descent",), Setting(hold_s=30.0)),
-        Case(33, "memory, without end", memory(160), ABORT, 60.0, ("descent",), Setting(hold_s=30.0)),
+        Case(sup.FAULT_LOOP_HUNG, "restarted", nothing, ABORT, 0.02, ("waiting",), Setting(restarted=True)),
+        Case(sup.FAULT_DISK, "recorder drops", told(sup.RECORDER, 1.0), LOG, 0.0),
+        Case(sup.FAULT_DISK, "recorder failed", told(sup.RECORDER, 2.0), WARN, 0.0),
+        Case(sup.FAULT_GROWTH, "handles are not given back", handles(130), WARN, 60.0, UNDER_WAY, Setting(hold_s=30.0)),
+        Case(sup.FAULT_GROWTH, "handles, without end", handles(260), ABORT, 60.0, UNDER_WAY, Setting(hold_s=30.0)),
+        Case(sup.FAULT_GROWTH, "memory is not given back", memory(70), WARN, 60.0, ("descent",), Setting(hold_s=30.0)),
+        Case(sup.FAULT_GROWTH, "memory, without end", memory(160), ABORT, 60.0, ("descent",), Setting(hold_s=30.0)),
     ]  # fmt: skip
     return cases
 

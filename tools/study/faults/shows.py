@@ -7,6 +7,7 @@ row has to fail, which shows that it is this that notices.
 
 import signal
 
+from firmware.core.supervision import supervisor_layout as sup
 from tools.study.faults.cases import Show
 from tools.study.faults.shown import console, loading, ports, processes, records, wire
 
@@ -15,25 +16,26 @@ def shows() -> list[Show]:
     """Every fault that needs no flight."""
     never = "never delivered"
     return [
-        Show(7, "damaged IMU frames", wire.damaged_imu, "device in error", 60.0),
-        Show(7, "damaged Modbus replies", wire.damaged_beacon, "device in error", 60.0),
-        Show(8, "late and lost replies", wire.late_replies, never, 0.1),
-        Show(8, "reply in another's name", wire.foreign_reply(wire.wrong_id), never, 0.1),
-        Show(8, "reply of another function", wire.foreign_reply(wire.wrong_function), never, 0.1),
-        Show(8, "reply of another length", wire.foreign_reply(wire.wrong_length), never, 0.1),
-        *(Show(9, f"exception {code}", wire.exception(code), "device in error", 0.1 if code <= 3 else 1.0)
+        Show(sup.FAULT_CHECKSUM, "damaged IMU frames", wire.damaged_imu, "device in error", 60.0),
+        Show(sup.FAULT_CHECKSUM, "damaged Modbus replies", wire.damaged_beacon, "device in error", 60.0),
+        Show(sup.FAULT_REPLY, "late and lost replies", wire.late_replies, never, 0.1),
+        Show(sup.FAULT_REPLY, "reply in another's name", wire.foreign_reply(wire.wrong_id), never, 0.1),
+        Show(sup.FAULT_REPLY, "reply of another function", wire.foreign_reply(wire.wrong_function), never, 0.1),
+        Show(sup.FAULT_REPLY, "reply of another length", wire.foreign_reply(wire.wrong_length), never, 0.1),
+        *(Show(sup.FAULT_EXCEPTION, f"exception {code}", wire.exception(code), "device in error",
+             0.1 if code <= 3 else 1.0)
           for code in range(1, 7)),
-        *(Show(12, kind, loading.arming(kind), "refuse to arm", 1.0)
+        *(Show(sup.FAULT_NOT_ARMED, kind, loading.arming(kind), "refuse to arm", 1.0)
           for kind in ("depth not zero", "limits unset", "never calibrated", "wrong hash")),
-        Show(25, "process killed", processes.loop_ends(signal.SIGKILL), "OOB", 2.0),
-        Show(25, "loop hung", processes.loop_ends(signal.SIGSTOP), "OOB", 2.0),
-        Show(25, "restart", processes.restart, "ascent only", 2.0),
-        Show(26, "an hour on and back", processes.wall_clock, "no effect", 0.0),
-        Show(27, "disk full", records.full_disk, "LOG", 1.0),
-        Show(28, "torn at 300 places", records.cut_log, "valid prefix", 0.0),
-        Show(29, "torn at every seventh byte", records.torn_state, "the worse wins", 0.0),
-        Show(30, "files", loading.bad_files, "refused", 0.0),
-        Show(31, "random and mutated bytes", wire.hostile_bytes, "back in step", 1.0),
-        Show(32, "garbage", console.console, "no effect", 0.0),
-        Show(34, "a second program", ports.two_programs, "refused", 0.0),
+        Show(sup.FAULT_LOOP_HUNG, "process killed", processes.loop_ends(signal.SIGKILL), "OOB", 2.0),
+        Show(sup.FAULT_LOOP_HUNG, "loop hung", processes.loop_ends(signal.SIGSTOP), "OOB", 2.0),
+        Show(sup.FAULT_LOOP_HUNG, "restart", processes.restart, "ascent only", 2.0),
+        Show(sup.FAULT_WALL_CLOCK, "an hour on and back", processes.wall_clock, "no effect", 0.0),
+        Show(sup.FAULT_DISK, "disk full", records.full_disk, "LOG", 1.0),
+        Show(sup.FAULT_POWER_CUT, "torn at 300 places", records.cut_log, "valid prefix", 0.0),
+        Show(sup.FAULT_STATE_FILE, "torn at every seventh byte", records.torn_state, "the worse wins", 0.0),
+        Show(sup.FAULT_FILE, "files", loading.bad_files, "refused", 0.0),
+        Show(sup.FAULT_SERIAL, "random and mutated bytes", wire.hostile_bytes, "back in step", 1.0),
+        Show(sup.FAULT_CONSOLE, "garbage", console.console, "no effect", 0.0),
+        Show(sup.FAULT_PORT, "a second program", ports.two_programs, "refused", 0.0),
     ]  # fmt: skip

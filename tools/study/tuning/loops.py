@@ -20,7 +20,7 @@ from sim_backend.world import SampledSensor
 from tools.study.tuning.linear_plant import Plant
 
 OMEGA = np.geomspace(1e-3, 100.0, 3000)  # rad/s
-PITCH, PITCH_RATE, DEPTH, BALLAST = range(4)  # plant.OUTPUTS
+OUT_PITCH, OUT_PITCH_RATE, OUT_DEPTH, OUT_BALLAST = range(4)  # plant.OUTPUTS
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def _held(omega: np.ndarray, delay: float) -> np.ndarray:
 def pitch_terms(plant: Plant, delays: Delays, omega: np.ndarray = OMEGA) -> np.ndarray:
     """T_p, T_i, T_d of the pitch loop, shape (3, n): slider (m) by pitch (rad); the slider forward lowers the nose."""
     slider = plant.response(omega)[:, :, 0]
-    pitch, rate = -slider[:, PITCH], -slider[:, PITCH_RATE]
+    pitch, rate = -slider[:, OUT_PITCH], -slider[:, OUT_PITCH_RATE]
     return np.array([pitch, pitch / (1j * omega), rate]) * _held(omega, delays.imu)
 
 
@@ -66,10 +66,10 @@ def depth_terms(
 
     def asked(column: int) -> np.ndarray:
         """Slider that the pitch loop asks for, for one unit of an input."""
-        return by_pitch * response[:, PITCH, column] + by_rate * response[:, PITCH_RATE, column]
+        return by_pitch * response[:, OUT_PITCH, column] + by_rate * response[:, OUT_PITCH_RATE, column]
 
-    slider = (asked(1) + forward * response[:, BALLAST, 1]) / (1.0 - asked(0))
-    depth = (response[:, DEPTH, 1] + response[:, DEPTH, 0] * slider) * _held(omega, delays.beacon)
+    slider = (asked(1) + forward * response[:, OUT_BALLAST, 1]) / (1.0 - asked(0))
+    depth = (response[:, OUT_DEPTH, 1] + response[:, OUT_DEPTH, 0] * slider) * _held(omega, delays.beacon)
     seen = depth * observer * (2.0 * s + observer) / (s + observer) ** 2
     return np.array([seen, seen / s, depth * observer**2 * s / (s + observer) ** 2])
 

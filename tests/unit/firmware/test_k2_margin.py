@@ -11,8 +11,8 @@ import pytest
 from law_flights import output_accelerations, plant_rates
 from model_states import state
 
-from firmware.control.cover import Cover, glides, k2_asked, k2_cover
 from firmware.control.gains import Control, Law, LawGains
+from firmware.control.k2_margin import K2Margin, glides, k2_asked, k2_margins
 from firmware.core.vehicle import layout
 from firmware.estimation.settings import parameter_sigma
 from firmware.model.vehicle import UncertaintyTable
@@ -30,7 +30,7 @@ def with_k2(pitch: float, depth: float) -> Control:
 def test_the_k2_asked_for_divides_covered_from_not_covered():
     asked = k2_asked(VEHICLE, EPS, 1.0)
     for factor, covered in ((0.99, False), (1.01, True)):
-        for axis in k2_cover(VEHICLE, with_k2(*map(float, factor * asked))):
+        for axis in k2_margins(VEHICLE, with_k2(*map(float, factor * asked))):
             assert axis.covered is covered
 
 
@@ -76,19 +76,19 @@ def test_more_uncertainty_asks_for_more_and_none_for_the_disturbance_alone():
 
 def test_a_vehicle_that_no_k2_covers_is_said_to_be_one():
     vague = msgspec.structs.replace(VEHICLE, uncertainty=msgspec.structs.replace(VEHICLE.uncertainty, added=3.0))
-    for axis in k2_cover(vague, Control()):
+    for axis in k2_margins(vague, Control()):
         assert axis.asked == math.inf
         assert not axis.covered
 
 
 def test_it_says_what_is_asked_what_is_set_and_what_is_left():
-    said = str(Cover("pitch", "m", 0.004, 0.003, 0.01))
+    said = str(K2Margin("pitch", "m", 0.004, 0.003, 0.01))
     assert said == "k2 of pitch 0.004 m, (29) asks 0.003 m (0.01 at 3 sigma): covered, margin +0.001 m"
-    assert "NOT covered, margin -0.001 m" in str(Cover("pitch", "m", 0.002, 0.003, 0.01))
+    assert "NOT covered, margin -0.001 m" in str(K2Margin("pitch", "m", 0.002, 0.003, 0.01))
 
 
 def test_the_shipped_gains_cover_the_shipped_vehicle():
-    assert all(axis.covered for axis in k2_cover(VEHICLE, Control()))
+    assert all(axis.covered for axis in k2_margins(VEHICLE, Control()))
 
 
 MISSION = """

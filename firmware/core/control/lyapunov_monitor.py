@@ -7,13 +7,13 @@ Every WATCH_EVERY s while the law flies, for pitch and, where the law commands t
 - margin: what is left with the actuators where they are (law.decrease_margin): positive, V is sure to fall by
   |s| margin; not positive, nothing is promised. Estimates are taken for the truth. docs/CONTROL.md.
 
-Both are told against the exact form, whichever the law flies with, and against the observer's share of f: what either
-makes of the commands is in the mismatch.
+Both are worked out with the exact form, whichever the law flies with, and without the observer's share of f: what
+either makes of the commands is in the mismatch.
 """
 
 import math
 
-from firmware.core.control import control_layout as at
+from firmware.core.control import control_layout as ctl
 from firmware.core.control.error_bound import model_error_bound
 from firmware.core.control.input_forms import exact_form
 from firmware.core.control.law import decrease_margin, feedback, k2_to_cover
@@ -28,11 +28,11 @@ WATCH_EVERY = 0.2  # s; the bound takes longer than the law itself
 
 
 @kernel
-def forget_coverage(ap):
+def forget_lyapunov(ap):
     """Nothing is said of V."""
-    for i in range(at.K2_NEED_PITCH, at.MARGIN_DEPTH + 1):
+    for i in range(ctl.K2_NEED_PITCH, ctl.MARGIN_DEPTH + 1):
         ap[i] = math.nan
-    ap[at.WATCHED] = -math.inf
+    ap[ctl.MONITORED] = -math.inf
 
 
 @kernel
@@ -45,46 +45,46 @@ def axis_margin(error, error_rate, reference_acc, acc, g, k1, k2, k3, eps, jerk,
 
 
 @kernel
-def watch(P, C, legs, nav, est, ap, t):
+def monitor(P, C, legs, nav, est, ap, t):
     """Need and margin of this tick into ap, every WATCH_EVERY s; NaN where the law does not fly or the leg holds it."""
-    if ap[at.MODE] != at.FLYING or ap[at.LAW_RAN] != 1.0:
-        if ap[at.WATCHED] > -math.inf:
-            forget_coverage(ap)
+    if ap[ctl.MODE] != ctl.FLYING or ap[ctl.ACTIVE] != ctl.LAW or ap[ctl.LAW_RAN] != 1.0:
+        if ap[ctl.MONITORED] > -math.inf:
+            forget_lyapunov(ap)
         return
-    if t < ap[at.WATCHED] + WATCH_EVERY - 0.5 * C[at.DT]:
+    if t < ap[ctl.MONITORED] + WATCH_EVERY - 0.5 * C[ctl.DT]:
         return
-    ap[at.WATCHED] = t
-    cf, sf = math.cos(est[at.EST_ROLL]), math.sin(est[at.EST_ROLL])
-    ct, st = math.cos(est[at.EST_PITCH]), math.sin(est[at.EST_PITCH])
+    ap[ctl.MONITORED] = t
+    cf, sf = math.cos(est[ctl.EST_ROLL]), math.sin(est[ctl.EST_ROLL])
+    ct, st = math.cos(est[ctl.EST_PITCH]), math.sin(est[ctl.EST_PITCH])
     kx, ky, kz = -st, sf * ct, cf * ct
-    a, b, c = est[at.EST_SERVO], est[at.EST_SLIDER], est[at.EST_BALLAST]
-    da, db, dc = actuator_rates(P, a, b, c, ap[at.SENT_SERVO], ap[at.SENT_SLIDER], ap[at.SENT_BALLAST])
-    u, v, w = est[at.EST_U], est[at.EST_V], est[at.EST_W]
-    p, q, r = est[at.EST_P], est[at.EST_Q], est[at.EST_R]
-    sigma = nav[at.NAV_SIGMA : at.NAV_SIGMA + N_P]
-    scratch = at.NAV_WORK + (W_SCRATCH + 4) * N_W  # the estimator's, free between its steps
+    a, b, c = est[ctl.EST_SERVO], est[ctl.EST_SLIDER], est[ctl.EST_BALLAST]
+    da, db, dc = actuator_rates(P, a, b, c, ap[ctl.SENT_SERVO], ap[ctl.SENT_SLIDER], ap[ctl.SENT_BALLAST])
+    u, v, w = est[ctl.EST_U], est[ctl.EST_V], est[ctl.EST_W]
+    p, q, r = est[ctl.EST_P], est[ctl.EST_Q], est[ctl.EST_R]
+    sigma = nav[ctl.NAV_SIGMA : ctl.NAV_SIGMA + N_P]
+    scratch = ctl.NAV_WORK + (W_SCRATCH + 4) * N_W  # the estimator's, free between its steps
     off_t, off_z = model_error_bound(
         P, sigma, nav[scratch : scratch + N_P], kx, ky, kz, u, v, w, p, q, r, a, b, c, da, db, dc
     )
-    d_t = math.sqrt(nav[at.NAV_SETTINGS + S_ANGULAR] / DISTURBANCE_HOLD)
-    d_z = math.sqrt(nav[at.NAV_SETTINGS + S_LINEAR] / DISTURBANCE_HOLD)
+    d_t = math.sqrt(nav[ctl.NAV_SETTINGS + S_ANGULAR] / DISTURBANCE_HOLD)
+    d_z = math.sqrt(nav[ctl.NAV_SETTINGS + S_LINEAR] / DISTURBANCE_HOLD)
     f_t, f_z, g_ts, g_tb, g_zs, g_zb = exact_form(P, kx, ky, kz, u, v, w, p, q, r, a, b, c, da, db, dc)
     jerk_t = jerk_z = math.inf
-    if C[at.CONTROLLER] == at.LAW_PLUS:
+    if C[ctl.CONTROLLER] == ctl.LAW_PLUS:
         jerk_t, jerk_z = SHARE * abs(g_ts) * P[SLIDER_RATE], SHARE * abs(g_zb) * P[BALLAST_RATE]
     _, pitch_rate = angle_rates(est)
-    ap[at.K2_NEED_PITCH] = k2_to_cover(off_t, d_t, g_ts, C[at.PITCH_EPS])
-    ap[at.MARGIN_PITCH] = axis_margin(
-        est[at.EST_PITCH] - ap[at.REF_PITCH], pitch_rate - ap[at.REF_PITCH_RATE], ap[at.REF_PITCH_ACC],
+    ap[ctl.K2_NEED_PITCH] = k2_to_cover(off_t, d_t, g_ts, C[ctl.PITCH_EPS])
+    ap[ctl.MARGIN_PITCH] = axis_margin(
+        est[ctl.EST_PITCH] - ap[ctl.REF_PITCH], pitch_rate - ap[ctl.REF_PITCH_RATE], ap[ctl.REF_PITCH_ACC],
         f_t + g_ts * b + g_tb * c, g_ts,
-        C[at.PITCH_K1], C[at.PITCH_K2], C[at.PITCH_K3], C[at.PITCH_EPS], jerk_t, off_t, d_t,
+        C[ctl.PITCH_K1], C[ctl.PITCH_K2], C[ctl.PITCH_K3], C[ctl.PITCH_EPS], jerk_t, off_t, d_t,
     )  # fmt: skip
     if not depth_is_held(legs, ap):
-        ap[at.K2_NEED_DEPTH] = ap[at.MARGIN_DEPTH] = math.nan
+        ap[ctl.K2_NEED_DEPTH] = ap[ctl.MARGIN_DEPTH] = math.nan
         return
-    ap[at.K2_NEED_DEPTH] = k2_to_cover(off_z, d_z, g_zb, C[at.DEPTH_EPS])
-    ap[at.MARGIN_DEPTH] = axis_margin(
-        est[at.EST_DEPTH] - ap[at.REF_DEPTH], est[at.EST_DEPTH_RATE] - ap[at.REF_DEPTH_RATE], ap[at.REF_DEPTH_ACC],
+    ap[ctl.K2_NEED_DEPTH] = k2_to_cover(off_z, d_z, g_zb, C[ctl.DEPTH_EPS])
+    ap[ctl.MARGIN_DEPTH] = axis_margin(
+        est[ctl.EST_DEPTH] - ap[ctl.REF_DEPTH], est[ctl.EST_DEPTH_RATE] - ap[ctl.REF_DEPTH_RATE], ap[ctl.REF_DEPTH_ACC],
         f_z + g_zs * b + g_zb * c, g_zb,
-        C[at.DEPTH_K1], C[at.DEPTH_K2], C[at.DEPTH_K3], C[at.DEPTH_EPS], jerk_z, off_z, d_z,
+        C[ctl.DEPTH_K1], C[ctl.DEPTH_K2], C[ctl.DEPTH_K3], C[ctl.DEPTH_EPS], jerk_z, off_z, d_z,
     )  # fmt: skip

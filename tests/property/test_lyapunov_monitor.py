@@ -7,20 +7,20 @@ import pytest
 from law_flights import Gains, Law, Reference, lyapunov_rate, plant_rates
 from law_states import SPREAD
 
-from firmware.core.control import control_layout as at
-from firmware.core.control.coverage import WATCH_EVERY
+from firmware.core.control import control_layout as ctl
 from firmware.core.control.law import k2_to_cover
-from firmware.core.control.telemetry import COVERAGE, N_RECORD, fill_record
+from firmware.core.control.lyapunov_monitor import WATCH_EVERY
+from firmware.core.control.telemetry import N_RECORD, REC_LYAPUNOV, fill_record
 from firmware.core.vehicle import layout
 from tools.flight.compose import build_flight
 
 SIGMA = SPREAD / 3.0
-VALUES = slice(at.K2_NEED_PITCH, at.MARGIN_DEPTH + 1)
+VALUES = slice(ctl.K2_NEED_PITCH, ctl.MARGIN_DEPTH + 1)
 
 
 def flight(controller, seed=1, mission="sawtooth", shaken=True):
     built = build_flight(mission=mission, seed=seed)
-    built.autopilot.C[at.CONTROLLER] = controller
+    built.autopilot.C[ctl.CONTROLLER] = controller
     if not shaken:
         built.board.world.E[6] = built.board.world.E[7] = 0.0
     return built.board.world, built.autopilot
@@ -32,19 +32,19 @@ def step(world, pilot, tick, given=False):
     world.advance(t)
     pilot.frame[...] = world.frame
     if given:
-        pilot.C[at.ESTIMATOR] = at.GIVEN
-        pilot.nav[at.NAV_GIVEN : at.NAV_GIVEN + layout.N_X] = world.x[: layout.N_X]
+        pilot.C[ctl.ESTIMATOR] = ctl.GIVEN
+        pilot.nav[ctl.NAV_GIVEN : ctl.NAV_GIVEN + layout.N_X] = world.x[: layout.N_X]
     sent = pilot.commands.copy()
     pilot.tick(t)
     return sent
 
 
 def law_of(pilot) -> Law:
-    gains = [Gains(*pilot.C[start : start + 4]) for start in (at.PITCH_K1, at.DEPTH_K1)]
+    gains = [Gains(*pilot.C[start : start + 4]) for start in (ctl.PITCH_K1, ctl.DEPTH_K1)]
     return Law(pilot.P, *gains)
 
 
-@pytest.mark.parametrize("controller", [at.LAW, at.LAW_PLUS])
+@pytest.mark.parametrize("controller", [ctl.LAW, ctl.LAW_PLUS])
 def test_where_the_margin_is_positive_V_falls_by_it_in_every_vehicle_of_the_box(controller):
     """True states, vehicles at corners of one sigma: V_dot of the plant under the commands in force <= -|s| margin.
 
@@ -57,16 +57,16 @@ def test_where_the_margin_is_positive_V_falls_by_it_in_every_vehicle_of_the_box(
         world.P[:] = world.P + SIGMA * rng.choice([-1.0, 1.0], layout.N_P)
         for tick in range(4000):
             if tick % 500 == 100:
-                pilot.ap[at.REF_PITCH] += rng.choice([-0.3, 0.3])
-                pilot.ap[at.REF_DEPTH] += rng.choice([-0.6, 0.6])
+                pilot.ap[ctl.REF_PITCH] += rng.choice([-0.3, 0.3])
+                pilot.ap[ctl.REF_DEPTH] += rng.choice([-0.6, 0.6])
             sent = step(world, pilot, tick, given=True)
             if pilot.finished:
                 break
-            if pilot.ap[at.WATCHED] == 0.02 * tick:
-                references = Reference(*pilot.ap[at.REF_PITCH :][:3]), Reference(*pilot.ap[at.REF_DEPTH :][:3])
+            if pilot.ap[ctl.MONITORED] == 0.02 * tick:
+                references = Reference(*pilot.ap[ctl.REF_PITCH :][:3]), Reference(*pilot.ap[ctl.REF_DEPTH :][:3])
                 V_dot = lyapunov_rate(law_of(pilot), world.P, world.x, references, sent)
                 for axis in (0, 1):
-                    margin, s = pilot.ap[at.MARGIN_PITCH + axis], pilot.ap[at.S_PITCH + axis]
+                    margin, s = pilot.ap[ctl.MARGIN_PITCH + axis], pilot.ap[ctl.S_PITCH + axis]
                     if math.isfinite(margin):
                         looked[axis] += 1
                         if margin > 0.0:
@@ -78,19 +78,19 @@ def test_where_the_margin_is_positive_V_falls_by_it_in_every_vehicle_of_the_box(
 
 
 def test_the_need_is_the_model_error_bound_and_the_disturbance_seen():
-    world, pilot = flight(at.LAW)
+    world, pilot = flight(ctl.LAW)
     looked = 0
     for tick in range(1500):
         sent = step(world, pilot, tick, given=True)
         world.cmd[...] = pilot.commands
-        if pilot.ap[at.WATCHED] != 0.02 * tick:
+        if pilot.ap[ctl.MONITORED] != 0.02 * tick:
             continue
         looked += 1
         law, speeds = law_of(pilot), plant_rates(pilot.P, world.x, sent)[layout.X_ACT :]
         bound = law.error_bound(world.x, SIGMA, speeds)
-        seen = pilot.nav[at.NAV_ROUGHNESS] * 0.003
+        seen = pilot.nav[ctl.NAV_ROUGHNESS] * 0.003
         _, _, g = law(world.x, (Reference(0.0), Reference(0.0)), speeds)
-        for axis, index in enumerate((at.K2_NEED_PITCH, at.K2_NEED_DEPTH)):
+        for axis, index in enumerate((ctl.K2_NEED_PITCH, ctl.K2_NEED_DEPTH)):
             assert pilot.ap[index] == pytest.approx(k2_to_cover(bound[axis], seen, g[axis], law.eps[axis]), rel=1e-9)
     assert looked > 100
 
@@ -98,7 +98,7 @@ def test_the_need_is_the_model_error_bound_and_the_disturbance_seen():
 def test_rough_water_asks_for_more_and_leaves_less():
     need, margin = [], []
     for strength in (0.003, 0.1):
-        world, pilot = flight(at.LAW)
+        world, pilot = flight(ctl.LAW)
         world.E[6] = world.E[7] = strength
         rows = []
         for tick in range(3000):
@@ -113,45 +113,45 @@ def test_rough_water_asks_for_more_and_leaves_less():
 
 
 def test_it_is_silent_where_the_law_does_not_fly_and_of_an_axis_the_leg_holds():
-    world, pilot = flight(at.PID)
+    world, pilot = flight(ctl.PID)
     for tick in range(500):
         step(world, pilot, tick)
         world.cmd[...] = pilot.commands
         assert np.isnan(pilot.ap[VALUES]).all()
-    pilot.C[at.CONTROLLER] = at.LAW
+    pilot.C[ctl.CONTROLLER] = ctl.LAW
     for tick in range(500, 540):
         step(world, pilot, tick)
     assert np.isfinite(pilot.ap[VALUES]).all()
-    pilot.legs[int(pilot.ap[at.LEG]), at.LEG_BALLAST] = 0.1
+    pilot.legs[int(pilot.ap[ctl.LEG]), ctl.LEG_BALLAST] = 0.1
     for tick in range(540, 560):
         step(world, pilot, tick)
     assert np.isnan(pilot.ap[VALUES]).tolist() == [False, True, False, True]
-    pilot.C[at.CONTROLLER] = at.PID
+    pilot.C[ctl.CONTROLLER] = ctl.PID
     step(world, pilot, 560)
     assert np.isnan(pilot.ap[VALUES]).all()
 
 
 def test_it_looks_five_times_a_second_and_the_record_has_what_it_saw():
-    world, pilot = flight(at.LAW)
+    world, pilot = flight(ctl.LAW)
     out, times = np.zeros(N_RECORD), set()
     for tick in range(400):
         step(world, pilot, tick)
         world.cmd[...] = pilot.commands
-        times.add(float(pilot.ap[at.WATCHED]))
+        times.add(float(pilot.ap[ctl.MONITORED]))
         fill_record(pilot.frame, pilot.est, pilot.ap, pilot.commands, 0.02 * tick, 0.0, 0.0, out)
-        assert np.array_equal(out[COVERAGE : COVERAGE + 4], pilot.ap[VALUES], equal_nan=True)
+        assert np.array_equal(out[REC_LYAPUNOV : REC_LYAPUNOV + 4], pilot.ap[VALUES], equal_nan=True)
     gaps = np.diff(sorted(times - {-math.inf}))
     assert gaps == pytest.approx(WATCH_EVERY, abs=1e-9)
 
 
 def test_a_state_that_is_no_number_promises_nothing():
-    world, pilot = flight(at.LAW)
+    world, pilot = flight(ctl.LAW)
     for tick in range(300):
         step(world, pilot, tick, given=True)
         world.cmd[...] = pilot.commands
     for tick in range(300, 320):
         world.advance(0.02 * tick)
         pilot.frame[...] = world.frame
-        pilot.nav[at.NAV_GIVEN + layout.X_NU] = math.nan
+        pilot.nav[ctl.NAV_GIVEN + layout.X_NU] = math.nan
         pilot.tick(0.02 * tick)
-        assert not (pilot.ap[[at.MARGIN_PITCH, at.MARGIN_DEPTH]] > 0.0).any()
+        assert not (pilot.ap[[ctl.MARGIN_PITCH, ctl.MARGIN_DEPTH]] > 0.0).any()

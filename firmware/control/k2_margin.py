@@ -1,4 +1,4 @@
-"""k2 against what is left of (29), before anything flies: what a vehicle's [uncertainty] and [disturbance] ask for.
+"""The margin of k2 over what is left of (29), before anything flies, by a vehicle's [uncertainty] and [disturbance].
 
 Looked for in glides of every pitch the law may be sent to, at the speeds such vehicles have; docs/CONTROL.md.
 """
@@ -26,7 +26,7 @@ BALLAST_SHARE = 0.75  # of the tank's range, heavy where the nose is down
 
 
 @dataclass(frozen=True)
-class Cover:
+class K2Margin:
     """One axis: the k2 that is set, the largest that the glides ask for at one sigma and at three, its unit."""
 
     axis: str
@@ -77,13 +77,13 @@ def k2_asked(vehicle: Vehicle, eps: tuple[float, float], sigmas: float) -> np.nd
     return asked
 
 
-def k2_cover(vehicle: Vehicle, control: Control) -> tuple[Cover, Cover]:
+def k2_margins(vehicle: Vehicle, control: Control) -> tuple[K2Margin, K2Margin]:
     """Pitch and depth of a vehicle under the law of `control`."""
     tables: tuple[LawGains, LawGains] = (control.law_flown.pitch, control.law_flown.depth)
     eps = (tables[0].eps, tables[1].eps)
     one, three = (k2_asked(vehicle, eps, sigmas) for sigmas in (1.0, 3.0))
     pitch, depth = (
-        Cover(axis, unit, gains.k2, float(one[i]), float(three[i]))
+        K2Margin(axis, unit, gains.k2, float(one[i]), float(three[i]))
         for i, (axis, unit, gains) in enumerate(zip(("pitch", "depth"), ("m", "kg"), tables, strict=True))
     )
     return pitch, depth
