@@ -17,9 +17,9 @@ from hal.ports import empty_frame
 from sim_backend.core import effect_layout as ef
 from sim_backend.core import layout as wl
 from sim_backend.core import world as core
-from sim_backend.effects.base import apply_effects
+from sim_backend.core.environment import wave_row
+from sim_backend.effects.catalogue import apply_effects
 from sim_backend.uncertainty import sensor_errors
-from sim_backend.waves import wave_row
 
 PLANT_STEP = 0.01  # s
 SpeedPair = tuple[float, float]
@@ -108,7 +108,7 @@ class World:
     counters: np.ndarray = field(default_factory=lambda: np.zeros(wl.N_COUNTERS, dtype=np.int64))
     ring: np.ndarray = field(default_factory=lambda: np.zeros((wl.N_SAMPLED, wl.DELAY_SLOTS, wl.DELAY_WIDTH)))
     frame: np.ndarray = field(default_factory=empty_frame)
-    folded: np.ndarray = field(default_factory=lambda: np.zeros(N_P))
+    effective: np.ndarray = field(default_factory=lambda: np.zeros(N_P))
     work: np.ndarray = field(default_factory=lambda: np.zeros((wl.N_WORK, wl.WORK_WIDTH)))
 
     def __post_init__(self):
@@ -129,7 +129,7 @@ class World:
         """Move to t_end (s), under the commands in self.cmd; samples that have arrived are in self.frame."""
         return core.advance(
             self.P, self.F, self.E, self.waves, self.sensors, self.errors, self.seed, self.x, self.cmd, self.acc,
-            self.counters, self.ring, self.queue, self.frame, self.folded, self.work, self.dt, t_end,
+            self.counters, self.ring, self.queue, self.frame, self.effective, self.work, self.dt, t_end,
         )  # fmt: skip
 
 
@@ -156,7 +156,7 @@ def build_world(
     E = np.zeros(wl.N_ENV)
     E[wl.ENV_CURRENT_N], E[wl.ENV_CURRENT_E] = environment.current_m_s
     E[wl.ENV_SHEAR_N], E[wl.ENV_SHEAR_E] = environment.shear_1_s
-    E[wl.ENV_SURFACE_HEIGHT] = 0.16 if environment.surface else 0.0
+    E[wl.ENV_SURFACE_HEIGHT] = wl.HULL_HEIGHT if environment.surface else 0.0
     E[wl.ENV_FLOOR_DEPTH] = environment.floor_m
     linear, angular = environment.disturbance_linear, environment.disturbance_angular
     E[wl.ENV_ACC_LINEAR] = vehicle.disturbance.linear if linear is None else linear

@@ -1,4 +1,4 @@
-"""How kernels are compiled: one decorator, one cache that notices every change.
+"""How kernels are compiled: one way, one cache that notices every change.
 
 Numba's own disk cache does not see a change in a kernel that a cached kernel calls, so the cache directory carries a
 hash over every file that may hold kernels (KERNEL_DIRS, with all their rooms). A kernel file elsewhere would escape
@@ -103,6 +103,13 @@ _KERNELS: list = []
 def kernel(function):
     """Compile a pure function of float64 scalars and arrays; results go to tuples or the caller's `out`."""
     dispatcher = numba.njit(**_OPTIONS)(function)
+    _KERNELS.append(dispatcher)
+    return dispatcher
+
+
+def inlined_kernel(function):
+    """Compile a kernel that becomes part of every kernel that calls it: small pieces, whose sums are shared there."""
+    dispatcher = numba.njit(**_OPTIONS, forceinline=True)(function)
     _KERNELS.append(dispatcher)
     return dispatcher
 

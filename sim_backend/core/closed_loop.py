@@ -8,12 +8,12 @@ import numpy as np
 from firmware.core.control import control_layout as ctl
 from firmware.core.control.autopilot import reset, tick
 from firmware.core.jit import kernel, parallel_kernel, prange
-from firmware.core.maths.rotations import euler_from_quaternion
-from firmware.core.vehicle.layout import N_P, N_X, X_ACT
+from firmware.core.vehicle.layout import N_P, N_X, X_ACT, X_DOWN, X_EAST, X_NORTH
+from firmware.core.vehicle.state import euler_angles
 from hal.ports import FRAME_SIZE
 from sim_backend.core import effect_layout as ef
 from sim_backend.core import layout as wl
-from sim_backend.core.effect_world import set_effects
+from sim_backend.core.effect_plant import set_effects
 from sim_backend.core.world import deliver, move, move_with_effects
 
 # what is kept of each logged tick
@@ -36,8 +36,8 @@ def write_trace(t, est, ap, cmd, x, out):
     out[1], out[2], out[3] = est[ctl.EST_DEPTH], est[ctl.EST_PITCH], est[ctl.EST_ROLL]
     out[4], out[5], out[6] = ap[ctl.REF_DEPTH], ap[ctl.REF_PITCH], ap[ctl.REF_ROLL]
     out[7], out[8], out[9] = cmd[0], cmd[1], cmd[2]
-    out[10], out[11], out[12] = x[0], x[1], x[2]
-    out[14], out[13], out[15] = euler_from_quaternion(x[3], x[4], x[5], x[6])
+    out[10], out[11], out[12] = x[X_NORTH], x[X_EAST], x[X_DOWN]
+    out[14], out[13], out[15] = euler_angles(x)
     out[16], out[17] = ap[ctl.ACTIVE], ap[ctl.LEG]
 
 
@@ -66,8 +66,8 @@ def fly(P_plant, P, C, legs, nav, E, F, waves, sensors, errors, seed, x, dt, max
     counters[wl.C_HOLD] = -1
     ring = np.zeros((wl.N_SAMPLED, wl.DELAY_SLOTS, wl.DELAY_WIDTH))
     queue = np.zeros((int(F[ef.COMMAND_DELAY] / dt) + 3, 3))
-    folded, work = np.zeros(N_P), np.zeros((wl.N_WORK, wl.WORK_WIDTH))
-    effects = set_effects(P_plant, F, folded)
+    effective, work = np.zeros(N_P), np.zeros((wl.N_WORK, wl.WORK_WIDTH))
+    effects = set_effects(P_plant, F, effective)
     est, ap = np.zeros(ctl.N_EST), np.zeros(ctl.N_AP)
     memory = nav.copy()
     reset(est, ap, memory)
@@ -78,7 +78,7 @@ def fly(P_plant, P, C, legs, nav, E, F, waves, sensors, errors, seed, x, dt, max
         t = ticks * C[ctl.DT]
         if effects:
             move_with_effects(
-                P_plant, folded, F, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, queue, work, dt, t
+                P_plant, effective, F, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, queue, work, dt, t
             )  # fmt: skip
         else:
             move(P_plant, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, work, dt, t)

@@ -7,7 +7,7 @@ The effects' vector F and the extended state have a layout of their own, effect_
 # --- E: the environment, SI, NED ------------------------------------------------------------------------------------
 ENV_CURRENT_N, ENV_CURRENT_E = 0, 1  # m/s at the surface
 ENV_SHEAR_N, ENV_SHEAR_E = 2, 3  # 1/s, change of the current with depth
-ENV_SURFACE_HEIGHT = 4  # m, hull height over which buoyancy is lost above the surface; 0: no surface
+ENV_SURFACE_HEIGHT = 4  # m, over which buoyancy is lost above the surface: HULL_HEIGHT; 0: no surface
 ENV_FLOOR_DEPTH = 5  # m; 0: no floor
 ENV_ACC_LINEAR, ENV_ACC_ANGULAR = 6, 7  # m/s2, rad/s2, 1 sigma of the held disturbance
 ENV_TEMPERATURE_C, ENV_SALINITY = 8, 9
@@ -15,6 +15,7 @@ ENV_SURFACE_PRESSURE = 10  # Pa
 ENV_WATER_DENSITY = 11  # kg/m3, the plant's own
 N_ENV = 12
 
+HULL_HEIGHT = 0.16  # m
 FLOOR_STIFFNESS = 2000.0  # N/m
 FLOOR_DAMPING = 300.0  # N s/m
 
@@ -43,8 +44,8 @@ DELAY_WIDTH = 8
 
 # --- memory of effects and scratch -----------------------------------------------------------------------------------
 LONGEST_DELAY = 6.0  # s, of commands; a world keeps those of the steps so far back
-W_READ, W_WATER = 6, 7  # rows of scratch behind the step's: what is read; water (3), late commands (3)
-N_WORK, WORK_WIDTH = 8, 24  # rows, columns: N_XF and what makes rows whole cache lines
+W_READ, W_WATER = 4, 5  # rows of scratch behind the step's: what is read; water (3), late commands (3)
+N_WORK, WORK_WIDTH = 6, 24  # rows, columns: N_XF and what makes rows whole cache lines
 
 # --- C: counters of a world (int64) ---------------------------------------------------------------------------------
 C_STEP = 0  # plant steps done

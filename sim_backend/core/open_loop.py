@@ -6,7 +6,7 @@ from firmware.core.jit import kernel, parallel_kernel, prange
 from firmware.core.vehicle.layout import N_P, N_X
 from sim_backend.core import effect_layout as ef
 from sim_backend.core import layout as wl
-from sim_backend.core.effect_world import effect_world_step, set_effects
+from sim_backend.core.effect_plant import effect_world_step, set_effects
 from sim_backend.core.plant import hold_disturbance, plant_step
 
 
@@ -16,17 +16,17 @@ def fly_open_loop(P, E, F, waves, seed, x, commands, dt, steps_per_row, out):
 
     out[i] is the state when row i's commands come into force.
     """
-    acc, work, folded = np.zeros(6), np.zeros((wl.N_WORK, wl.WORK_WIDTH)), np.zeros(N_P)
+    acc, work, effective = np.zeros(6), np.zeros((wl.N_WORK, wl.WORK_WIDTH)), np.zeros(N_P)
     queue = np.zeros((int(F[ef.COMMAND_DELAY] / dt) + 3, 3))
     counters = np.zeros(wl.N_COUNTERS, dtype=np.int64)
     counters[wl.C_HOLD] = -1
-    effects, step = set_effects(P, F, folded), 0
+    effects, step = set_effects(P, F, effective), 0
     for row in range(commands.shape[0]):
         out[row] = x[:N_X]
         for _ in range(steps_per_row):
             hold_disturbance(E, seed, counters, step * dt, acc)
             if effects:
-                effect_world_step(folded, F, E, waves, x, commands[row], step, dt, acc, queue, work)
+                effect_world_step(effective, F, E, waves, x, commands[row], step, dt, acc, queue, work)
             else:
                 plant_step(P, E, waves, x, commands[row], step * dt, dt, acc, work)
             step += 1
@@ -34,7 +34,7 @@ def fly_open_loop(P, E, F, waves, seed, x, commands, dt, steps_per_row, out):
 
 @parallel_kernel
 def fly_open_loop_many(Ps, Es, Fs, waves, seeds, xs, commands, dt, steps_per_row, out):
-    """`fly_open_loop` for every row of Ps (n, N_P), Es (n, N_ENV), Fs (n, N_F), seeds (n,), xs (n, N_XF) and commands
+    """`fly_open_loop` for every row of Ps (n, N_P), Es (n, N_E), Fs (n, N_F), seeds (n,), xs (n, N_XF) and commands
     (n, rows, 3)."""
     for i in prange(Ps.shape[0]):
         fly_open_loop(Ps[i], Es[i], Fs[i], waves, seeds[i], xs[i], commands[i], dt, steps_per_row, out[i])

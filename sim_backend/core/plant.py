@@ -1,53 +1,15 @@
 """The simulated vehicle in its environment: the nominal one in moving water, with surface, floor and disturbance."""
 
-import math
-
 from firmware.core.estimation.estimator_layout import DISTURBANCE_HOLD
 from firmware.core.jit import kernel
 from firmware.core.maths.steps import NODE, RK4, end_stage
 from firmware.core.vehicle.actuators import actuator_rates
 from firmware.core.vehicle.flight import add_accelerations, state_derivative
-from firmware.core.vehicle.layout import GRAVITY, M_T, N_X, X_DOWN, X_EAST, X_NORTH
-from firmware.core.vehicle.state import actuators, normalise_attitude, rotation, velocities
+from firmware.core.vehicle.layout import N_X, X_DOWN, X_EAST, X_NORTH
+from firmware.core.vehicle.state import actuators, normalise_attitude
 from sim_backend.core import layout as wl
+from sim_backend.core.environment import boundary_force, water_velocity
 from sim_backend.core.noise import gaussian
-
-
-@kernel
-def water_velocity(E, waves, north, east, down, t):
-    """Velocity of the water at a place and time, m/s NED: current, shear, and surface waves dying out with depth.
-
-    Waves by linear theory in deep water: amplitude a, k = omega^2 / g, orbital speed a omega exp(-k Z).
-    """
-    vn = E[wl.ENV_CURRENT_N] + E[wl.ENV_SHEAR_N] * down
-    ve = E[wl.ENV_CURRENT_E] + E[wl.ENV_SHEAR_E] * down
-    vd = 0.0
-    for i in range(waves.shape[0]):
-        omega, kn, ke = waves[i, wl.WAVE_OMEGA], waves[i, wl.WAVE_K_N], waves[i, wl.WAVE_K_E]
-        k = math.sqrt(kn * kn + ke * ke)
-        phase = kn * north + ke * east - omega * t + waves[i, wl.WAVE_PHASE]
-        speed = waves[i, wl.WAVE_AMPLITUDE] * omega * math.exp(-k * max(down, 0.0))
-        vn += speed * math.cos(phase) * kn / k
-        ve += speed * math.cos(phase) * ke / k
-        vd -= speed * math.sin(phase)
-    return vn, ve, vd
-
-
-@kernel
-def boundary_force(P, E, x, water_d):
-    """Downward force (N) at the surface, where buoyancy is lost, and on the floor, a stiff damped spring.
-
-    water_d: speed of the water downward, m/s.
-    """
-    down, force = x[X_DOWN], 0.0
-    if E[wl.ENV_SURFACE_HEIGHT] > 0.0 and down < 0.0:
-        force += P[M_T] * GRAVITY * min(1.0, -down / E[wl.ENV_SURFACE_HEIGHT])
-    if E[wl.ENV_FLOOR_DEPTH] > 0.0 and down > E[wl.ENV_FLOOR_DEPTH]:
-        _, _, _, _, _, _, r31, r32, r33 = rotation(x)
-        u, v, w, _, _, _ = velocities(x)
-        down_rate = r31 * u + r32 * v + r33 * w + water_d
-        force -= max(0.0, wl.FLOOR_STIFFNESS * (down - E[wl.ENV_FLOOR_DEPTH]) + wl.FLOOR_DAMPING * down_rate)
-    return force
 
 
 @kernel

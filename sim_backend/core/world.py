@@ -5,14 +5,14 @@ and thousands in a campaign.
 """
 
 from firmware.core.jit import kernel
-from firmware.core.maths.rotations import euler_from_quaternion
 from firmware.core.supervision import supervisor_layout as sup
-from firmware.core.vehicle.layout import GRAVITY, PLUNGER_AREA
+from firmware.core.vehicle.layout import GRAVITY, PLUNGER_AREA, X_BALLAST, X_DOWN, X_NU, X_POS, X_SLIDER
+from firmware.core.vehicle.state import euler_angles, velocities
 from hal.ports import BEACON, IMU, PLUNGER_WIRE, SLIDER_WIRE
 from sim_backend.core import effect_layout as ef
 from sim_backend.core import layout as wl
-from sim_backend.core.effect_plant import read
-from sim_backend.core.effect_world import effect_world_step, set_effects
+from sim_backend.core.effect_plant import effect_world_step, set_effects
+from sim_backend.core.effects.sensing import read
 from sim_backend.core.noise import gaussian
 from sim_backend.core.plant import hold_disturbance, plant_step
 
@@ -73,14 +73,15 @@ def sample_sensors(P, E, sensors, errors, seed, x, t, counters, ring):
             continue
         slot = ring[sensor, count % wl.DELAY_SLOTS]
         if sensor == sup.SENSOR_IMU:
-            phi, theta, psi = euler_from_quaternion(x[3], x[4], x[5], x[6])
-            write_imu(errors, seed, phi, theta, psi, x[10], x[11], x[12], count, slot)
+            phi, theta, psi = euler_angles(x)
+            _, _, _, p, q, r = velocities(x)
+            write_imu(errors, seed, phi, theta, psi, p, q, r, count, slot)
         elif sensor == sup.SENSOR_BEACON:
-            write_beacon(E, errors, seed, x[2], count, slot)
+            write_beacon(E, errors, seed, x[X_DOWN], count, slot)
         elif sensor == sup.SENSOR_SLIDER:
-            slot[2] = measured(errors, seed, x[14], wl.E_SLIDER, count)
+            slot[2] = measured(errors, seed, x[X_SLIDER], wl.E_SLIDER, count)
         elif sensor == sup.SENSOR_PLUNGER:
-            write_plunger(P, E, errors, seed, x[15], count, slot)
+            write_plunger(P, E, errors, seed, x[X_BALLAST], count, slot)
 
 
 @kernel
@@ -93,7 +94,9 @@ def sample_with_effects(P, F, E, sensors, errors, seed, x, t, counters, ring, y)
         slot = ring[sensor, count % wl.DELAY_SLOTS]
         read(F, x, y)
         if sensor == sup.SENSOR_IMU:
-            write_imu(errors, seed, y[0], y[1], y[2], y[3], y[4], y[5], count, slot)
+            write_imu(
+                errors, seed, y[ef.Y_ROLL], y[ef.Y_PITCH], y[ef.Y_YAW], y[ef.Y_P], y[ef.Y_Q], y[ef.Y_R], count, slot
+            )
         elif sensor == sup.SENSOR_BEACON:
             write_beacon(E, errors, seed, y[ef.Y_DEPTH], count, slot)
         elif sensor == sup.SENSOR_SLIDER:
@@ -132,10 +135,10 @@ def write_truth(t, x, out):
     """Time, position, Euler angles, nu and actuators of the plant, into out (16,)."""
     out[0] = t
     for i in range(3):
-        out[1 + i] = x[i]
-    out[4], out[5], out[6] = euler_from_quaternion(x[3], x[4], x[5], x[6])
+        out[1 + i] = x[X_POS + i]
+    out[4], out[5], out[6] = euler_angles(x)
     for i in range(9):
-        out[7 + i] = x[7 + i]
+        out[7 + i] = x[X_NU + i]
 
 
 @kernel
@@ -155,15 +158,15 @@ def move(P, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, work, 
 
 @kernel
 def move_with_effects(
-    P, folded, F, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, queue, work, dt, t_end
+    P, effective, F, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, queue, work, dt, t_end
 ):  # fmt: skip
-    """The same with effects F, folded (N_P) being what holds throughout."""
+    """The same with effects F, effective (N_P) being what holds throughout."""
     t = counters[wl.C_STEP] * dt
     if counters[wl.C_STEP] == 0:
         sample_with_effects(P, F, E, sensors, errors, seed, x, t, counters, ring, work[wl.W_READ])
     while t < t_end - 0.5 * dt:
         hold_disturbance(E, seed, counters, t, acc)
-        effect_world_step(folded, F, E, waves, x, cmd, counters[wl.C_STEP], dt, acc, queue, work)
+        effect_world_step(effective, F, E, waves, x, cmd, counters[wl.C_STEP], dt, acc, queue, work)
         counters[wl.C_STEP] += 1
         t = counters[wl.C_STEP] * dt
         sample_with_effects(P, F, E, sensors, errors, seed, x, t, counters, ring, work[wl.W_READ])
@@ -172,16 +175,16 @@ def move_with_effects(
 
 @kernel
 def advance(
-    P, F, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, queue, frame, folded, work, dt, t_end
+    P, F, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, queue, frame, effective, work, dt, t_end
 ):  # fmt: skip
     """Move the world to t_end in steps of dt, sampling on the way, then deliver what has arrived. Returns its time.
 
-    x (N_XF); queue (rows, 3) commands of the past; folded (N_P) and work (N_WORK, WORK_WIDTH) scratch. Vehicle and
+    x (N_XF); queue (rows, 3) commands of the past; effective (N_P) and work (N_WORK, WORK_WIDTH) scratch. Vehicle and
     effects may have been changed since the last call.
     """
-    if set_effects(P, F, folded):
+    if set_effects(P, F, effective):
         t = move_with_effects(
-            P, folded, F, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, queue, work, dt, t_end
+            P, effective, F, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, queue, work, dt, t_end
         )  # fmt: skip
     else:
         t = move(P, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, work, dt, t_end)

@@ -6,12 +6,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from model_states import actuators, repeatable, states, vehicles
 
+from firmware.core.maths.steps import RK4
 from firmware.core.vehicle import layout
 from sim_backend.core import effect_layout as ef
 from sim_backend.core import layout as wl
-from sim_backend.core.effect_plant import effect_step, fold, play
+from sim_backend.core.effect_plant import effect_step, effective_parameters
+from sim_backend.core.effects.actuation import backlash
 from sim_backend.core.plant import plant_step
-from sim_backend.effects.base import catalogue
+from sim_backend.effects.catalogue import catalogue
 
 NO_WAVES = np.zeros((0, wl.N_WAVE))
 STILL = np.zeros(wl.N_ENV)
@@ -46,11 +48,11 @@ def extended(x):
 @given(vehicles(), states(), actuators, st.lists(st.floats(-0.05, 0.05), min_size=6, max_size=6))
 def test_without_effects_a_step_is_the_plain_step(vehicle, x, command, acc):
     P, F, acc = np.zeros(layout.N_P), np.zeros(ef.N_F), np.array(acc)
-    fold(vehicle, F, P)
+    effective_parameters(vehicle, F, P)
     np.testing.assert_array_equal(P, vehicle)
     plain, other, work = extended(x), extended(x), np.zeros((wl.N_WORK, wl.WORK_WIDTH))
     plant_step(vehicle, STILL, NO_WAVES, plain, np.array(command), 0.0, 0.01, acc, work)
-    effect_step(P, F, other, 0, *command, 0.0, acc, 0.0, np.zeros(3), 0.01, work)
+    effect_step(RK4, P, F, other, 0, *command, 0.0, acc, 0.0, np.zeros(3), 0.01, work)
     size = 1.0 + np.abs(plain[: layout.N_X])
     assert (np.abs(plain - other)[: layout.N_X] <= 1e-14 * size).all()
 
@@ -77,12 +79,12 @@ def test_any_effects_within_their_ranges_leave_a_vehicle_a_vehicle(effects, x, c
     from model_states import P as vehicle
 
     F, P = Plain(effects).F, np.zeros(layout.N_P)
-    fold(vehicle, F, P)
+    effective_parameters(vehicle, F, P)
     state, work = extended(x), np.zeros((wl.N_WORK, wl.WORK_WIDTH))
     speed = max(0.6, float(np.abs(state[7:13]).max()))
     state[7:13] *= 0.6 / speed
     for k in range(100):
-        effect_step(P, F, state, 0, *command, 0.01 * k, np.zeros(6), 0.0, np.zeros(3), 0.01, work)
+        effect_step(RK4, P, F, state, 0, *command, 0.01 * k, np.zeros(6), 0.0, np.zeros(3), 0.01, work)
     assert np.isfinite(state).all()
     assert abs(np.linalg.norm(state[3:7]) - 1.0) < 1e-12
     for place, gear, width in ((13, ef.X_GEAR_SERVO, F[ef.SERVO_PLAY]), (14, ef.X_GEAR_SLIDER, F[ef.SLIDER_PLAY])):
@@ -94,7 +96,7 @@ def test_any_effects_within_their_ranges_leave_a_vehicle_a_vehicle(effects, x, c
 def test_play_never_lets_go_and_never_moves_more_than_its_leader(width, way):
     follower, last = 0.0, 0.0
     for leader in way:
-        moved = play(follower, leader, width)
+        moved = backlash(follower, leader, width)
         assert abs(moved - leader) <= 0.5 * width + 1e-12
         assert abs(moved - follower) <= abs(leader - last) + 1e-12
         follower, last = moved, leader

@@ -9,6 +9,7 @@ from model_states import P, state
 from scipy.spatial.transform import Rotation
 
 from firmware.core.maths.rotations import euler_from_quaternion
+from firmware.core.maths.steps import MIDPOINT, RK4, end_stage
 from firmware.core.vehicle import layout
 from firmware.core.vehicle.flight import nominal_run, nominal_step
 
@@ -32,6 +33,26 @@ def test_fourth_order():
     orders = np.log2(errors[:-1] / errors[1:])
     assert ((orders > 3.7) & (orders < 4.4)).all(), orders
     assert errors[-1] < 1e-7
+
+
+@pytest.mark.parametrize(("method", "order"), [(RK4, 4), (MIDPOINT, 2)])
+def test_each_method_has_its_order(method, order):
+    """On x' = t x - y, y' = x + t^2: an equation of its own, in which time and states work on each other."""
+
+    def last(steps):
+        x, k, total, dt = np.array([1.0, -0.5]), np.zeros(2), np.zeros(2), 2.0 / steps
+        for n in range(steps):
+            y = x.copy()
+            for stage, (node, _) in enumerate(method):
+                t = (n + node) * dt
+                k[:] = t * y[0] - y[1], y[0] + t * t
+                end_stage(method, stage, dt, x, k, total, y, 2)
+        return x
+
+    exact = last(4096) if order == 4 else last(4096) + (last(4096) - last(2048)) / 3.0
+    errors = np.array([np.linalg.norm(last(steps) - exact) for steps in (32, 64, 128)])
+    orders = np.log2(errors[:-1] / errors[1:])
+    assert orders == pytest.approx(order, abs=0.1)
 
 
 def test_two_runs_are_one_run():

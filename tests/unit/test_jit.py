@@ -14,7 +14,9 @@ from firmware.core import jit
 
 ROOT = jit.PACKAGES_DIR
 PACKAGES = ("firmware", "hal", "sim_backend", "tools")
-COMPILERS = {"kernel", "parallel_kernel", "njit", "jit", "vectorize", "guvectorize", "stencil", "jitclass"}
+COMPILERS = {
+    "kernel", "inlined_kernel", "parallel_kernel", "njit", "jit", "vectorize", "guvectorize", "stencil", "jitclass",
+}  # fmt: skip
 
 # Flies through every kernel of the nominal flight and prints what came out, to the last bit.
 FLIGHT = """

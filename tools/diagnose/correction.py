@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from sim_backend.core import effect_layout as ef
+from sim_backend.core.effects.correction import shapes
 from tools.diagnose.noise_probes import UNPREDICTABLE, NoiseProbe, ProbeResult
 from tools.diagnose.residuals import pump_speed
 from tools.diagnose.search import Search, converge
@@ -94,15 +95,9 @@ def fitted(search: Search, hypothesis: Hypothesis, link: str) -> tuple[Search, H
 
 def shapes_flown(search: Search) -> np.ndarray:
     """The shapes along the runs where the filter stands, (rows, N_SHAPES)."""
-    x = search.gains.X
-    speed = np.maximum(np.sqrt((x[:, 7:10] ** 2).sum(axis=1)), 0.05)
     pump = pump_speed(search.problem, search.gains)
-    dive = 2.0 * (x[:, 4] * x[:, 6] - x[:, 3] * x[:, 5])
-    return np.column_stack([
-        np.ones(len(x)), (x[:, 7:10] ** 2).sum(axis=1) / 0.09, x[:, 2] / 5.0, 10.0 * x[:, 9] / speed,
-        10.0 * x[:, 8] / speed, 10.0 * x[:, 10:13], pump / 0.03,
-        search.problem.since / 60.0, np.tanh(dive / ef.REST_PITCH),
-    ])  # fmt: skip
+    rows = zip(search.gains.X, search.problem.since, pump, strict=True)
+    return np.array([shapes(x, since, speed) for x, since, speed in rows])
 
 
 def carried_by(search: Search, hypothesis: Hypothesis) -> dict[str, float]:

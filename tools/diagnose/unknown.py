@@ -6,7 +6,7 @@ import numpy as np
 from scipy.stats import norm
 
 from sim_backend.core import effect_layout as ef
-from sim_backend.effects.base import catalogue
+from sim_backend.effects.catalogue import catalogue
 from tools.diagnose.noise_probes import CLOCK, TURBULENCE, WAVES, ProbeResult, probes, run_probes
 from tools.diagnose.search import Search
 from tools.diagnose.shrink import Shrinkage

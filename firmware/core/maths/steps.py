@@ -12,14 +12,14 @@ and counting that tuple's references costs a quarter of the step.
 Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.1.
 """
 
-from firmware.core.jit import kernel
+from firmware.core.jit import inlined_kernel
 
 NODE, WEIGHT = 0, 1
 RK4 = ((0.0, 1.0 / 6.0), (0.5, 1.0 / 3.0), (0.5, 1.0 / 3.0), (1.0, 1.0 / 6.0))  # the classical one, order 4
 MIDPOINT = ((0.0, 0.0), (0.5, 1.0))  # order 2
 
 
-@kernel
+@inlined_kernel
 def end_stage(method, stage, dt, x, k, total, y, n):
     """After stage number `stage`, whose derivative is in k: the next stage's state into y or, after the last, x moved.
 

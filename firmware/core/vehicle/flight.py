@@ -4,7 +4,7 @@ State x (N_X = 16): position north, east, down (m), attitude quaternion, nu = u 
 water), servo (rad), slider (m), ballast (kg).
 """
 
-from firmware.core.jit import kernel
+from firmware.core.jit import inlined_kernel, kernel
 from firmware.core.maths.rotations import quaternion_rate, rotation_nb
 from firmware.core.maths.steps import RK4, end_stage
 from firmware.core.vehicle.actuators import actuator_rates
@@ -13,7 +13,7 @@ from firmware.core.vehicle.motion import accelerations
 from firmware.core.vehicle.state import actuators, normalise_attitude, quaternion, velocities
 
 
-@kernel
+@inlined_kernel
 def body_derivative(
     P, x, servo, slider, ballast, servo_rate, slider_rate, ballast_rate, net, X, Y, Z, K, M, N,
     force, water_n, water_e, water_d, out,
@@ -39,7 +39,7 @@ def body_derivative(
     out[X_NU + 3], out[X_NU + 4], out[X_NU + 5] = pd, qd, rd
 
 
-@kernel
+@inlined_kernel
 def state_derivative(P, x, servo_rate, slider_rate, ballast_rate, force, water_n, water_e, water_d, out):
     """dx/dt of the vehicle into out[0:16], its actuators at these speeds; force and water as in body_derivative."""
     servo, slider, ballast = actuators(x)
@@ -50,7 +50,7 @@ def state_derivative(P, x, servo_rate, slider_rate, ballast_rate, force, water_n
     out[X_SERVO], out[X_SLIDER], out[X_BALLAST] = servo_rate, slider_rate, ballast_rate
 
 
-@kernel
+@inlined_kernel
 def add_accelerations(acc, at, out):
     """Add six accelerations, those from acc[at] on, to the rates of nu in out."""
     for i in range(6):

@@ -2,7 +2,7 @@
 
 import math
 
-from firmware.core.jit import kernel
+from firmware.core.jit import inlined_kernel, kernel
 from firmware.core.vehicle.layout import (
     A_X,
     A_Y,
@@ -28,7 +28,7 @@ from firmware.core.vehicle.layout import (
 )  # fmt: skip
 
 
-@kernel
+@inlined_kernel
 def swung_moment(P):
     """m_r R_r + m_s R_s, kg m: what the servo swings, times the distance from its axis."""
     return P[M_R] * P[R_R] + P[M_S] * P[R_S]

@@ -4,13 +4,13 @@ M = [[diag(m1, m2, m3), -S^], [S^, Jt]] with a diagonal upper left block, so eli
 symmetric 3 x 3 system for the rotations (Schur complement).
 """
 
-from firmware.core.jit import kernel
+from firmware.core.jit import inlined_kernel, kernel
 from firmware.core.vehicle.layout import GRAVITY, NET_MASS
 from firmware.core.vehicle.mass import first_moment, first_moment_rate, inertia, translational_mass
 from firmware.core.vehicle.water import water_wrench
 
 
-@kernel
+@inlined_kernel
 def momentum(m1, m2, m3, S1, S2, S3, I1, I2, I3, I12, I13, I23, u, v, w, p, q, r):
     """[P; Q] = M nu, kg m/s and kg m2/s (of any other six numbers, M times those).
 
@@ -26,7 +26,7 @@ def momentum(m1, m2, m3, S1, S2, S3, I1, I2, I3, I12, I13, I23, u, v, w, p, q, r
     )
 
 
-@kernel
+@inlined_kernel
 def momentum_rate(
     P, kx, ky, kz, u, v, w, p, q, r, servo, slider, ballast, servo_rate, slider_rate, ballast_rate, net=0.0
 ):

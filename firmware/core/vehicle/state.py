@@ -2,30 +2,30 @@
 
 import math
 
-from firmware.core.jit import kernel
+from firmware.core.jit import inlined_kernel, kernel
 from firmware.core.maths.rotations import euler_from_quaternion, rotation_nb
 from firmware.core.vehicle.layout import X_BALLAST, X_NU, X_QUAT, X_SERVO, X_SLIDER
 
 
-@kernel
+@inlined_kernel
 def quaternion(x):
     """Attitude q0, q1, q2, q3, body to NED."""
     return x[X_QUAT], x[X_QUAT + 1], x[X_QUAT + 2], x[X_QUAT + 3]
 
 
-@kernel
+@inlined_kernel
 def velocities(x):
     """u, v, w relative to the water (m/s) and p, q, r (rad/s)."""
     return x[X_NU], x[X_NU + 1], x[X_NU + 2], x[X_NU + 3], x[X_NU + 4], x[X_NU + 5]
 
 
-@kernel
+@inlined_kernel
 def actuators(x):
     """Servo (rad), slider (m), ballast (kg)."""
     return x[X_SERVO], x[X_SLIDER], x[X_BALLAST]
 
 
-@kernel
+@inlined_kernel
 def rotation(x):
     """R_nb, nine numbers row by row."""
     q0, q1, q2, q3 = quaternion(x)

@@ -4,53 +4,28 @@ import numpy as np
 import pytest
 from effect_flights import FLOWN, MOCAP, at_spread, flown, world
 
+from firmware.core.vehicle.layout import X_BALLAST, X_SERVO, X_SLIDER
 from hal.board import BoardRequest
 from hal.strict import ConfigError
 from sim_backend.board import build_board
 from sim_backend.core import effect_layout as ef
-from sim_backend.effects.base import EffectError, apply_effects, catalogue, check_values
+from sim_backend.effects.base import EffectError
+from sim_backend.effects.catalogue import apply_effects, catalogue, check_values
 
-PLACES = {
-    ("actuation", "servo"): "servo_slow servo_backlash servo_offset servo_limit",
-    ("actuation", "slider"): "slider_slow slider_backlash",
-    ("actuation", "ballast"): "pump_slow pump_droop ballast_leak",
-    ("hydrodynamics", "surge"): "drag linear_drag climb_dive_asymmetry tether",
-    ("hydrodynamics", "heave"): "lift stall added_mass",
-    ("hydrodynamics", "sway"): "side_force",
-    ("hydrodynamics", "roll"): "roll_trim",
-    ("hydrodynamics", "pitch"): "pitch_trim pitch_damping",
-    ("hydrodynamics", "yaw"): "yaw_trim weathercock yaw_damping",
-    ("mass", "net"): "net_buoyancy ballast_scale compressibility stratification",
-    ("mass", "longitudinal"): "cg_longitudinal slider_scale",
-    ("mass", "lateral"): "cg_lateral",
-    ("mass", "vertical"): "cg_vertical",
-    ("mass", "inertia"): "inertia",
-    ("environment", "water"): "current current_shear waves turbulence",
-    ("sensing", "attitude"): "imu_pitch_bias imu_roll_bias compass attitude_lag",
-    ("sensing", "gyro"): "gyro_scale gyro_bias",
-    ("sensing", "depth"): "depth_offset depth_scale depth_lag pressure_lever",
-    ("timing", "command"): "command_delay",
-    ("timing", "mocap"): "mocap_delay clock_skew",
-}
 ROUGH = {"disturbance_linear": 0.01, "disturbance_angular": 0.02}
 NOMINAL, READ = flown(world(**ROUGH))
 WATER = ("current", "current_shear")
-ACTUATOR_OF = {"servo": 13, "slider": 14, "ballast": 15}
+ACTUATOR_OF = {"servo": X_SERVO, "slider": X_SLIDER, "ballast": X_BALLAST}
 
 
 def arrays(made):
     return (made.P, made.E, made.F, made.waves, made.sensors, made.errors, made.x)
 
 
-def test_every_label_stands_in_its_place_and_no_other_is_there():
-    wanted = {label: place for place, labels in PLACES.items() for label in labels.split()}
-    assert {label: (effect.subsystem, effect.element) for label, effect in catalogue().items()} == wanted
-
-
 def test_every_entry_of_the_effect_vector_belongs_to_one_parameter():
     """But for the two signs of a mass that changes with depth, which are two labels; biases are no effect."""
     entries = [p.entry for effect in catalogue().values() for p in effect.parameters if p.entry >= 0]
-    assert sorted(entries) == sorted([*range(ef.BIAS), ef.MASS_PER_DEPTH, ef.TETHER_GROWTH, ef.TETHER_ACROSS])
+    assert sorted(entries) == sorted([*range(ef.BIAS), ef.MASS_PER_DEPTH])
 
 
 @pytest.mark.parametrize("label", catalogue())
@@ -114,7 +89,7 @@ def test_at_its_spread_a_label_changes_its_own_part_and_leaves_the_rest(label):
     if label in WATER:
         assert (off[2:] < 1e-9).all()
         assert off[:2].max() > 0.5
-    actuators = [13, 14, 15]
+    actuators = [X_SERVO, X_SLIDER, X_BALLAST]
     if effect.subsystem == "actuation":
         actuators.remove(ACTUATOR_OF[effect.element])
     if effect.subsystem != "timing":

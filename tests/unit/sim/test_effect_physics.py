@@ -10,16 +10,10 @@ from firmware.core.maths.rotations import quaternion_from_euler, rotation_nb
 from firmware.core.vehicle import layout
 from firmware.core.vehicle.water import water_wrench
 from sim_backend.core import effect_layout as ef
-from sim_backend.core.effect_plant import (
-    BALLAST_DRIVEN,
-    SLIDER_DRIVEN,
-    effect_derivative,
-    extra_wrench,
-    fold,
-    line_wrench,
-    play,
-)
-from sim_backend.effects.base import apply_effects
+from sim_backend.core.effect_plant import effect_derivative, effective_parameters
+from sim_backend.core.effects.actuation import BALLAST_DRIVEN, SLIDER_DRIVEN, backlash
+from sim_backend.core.effects.hydrodynamics import extra_wrench, tether_wrench
+from sim_backend.effects.catalogue import apply_effects
 
 P = VEHICLE.vector()
 SERVO, SLIDER, BALLAST = (VEHICLE.actuators.servo, VEHICLE.actuators.slider, VEHICLE.actuators.ballast)
@@ -38,9 +32,9 @@ def vector(**effects):
     return Plain(**effects).F
 
 
-def folded(vehicle=P, **effects):
+def effective(vehicle=P, **effects):
     out = np.zeros(layout.N_P)
-    fold(vehicle, vector(**effects), out)
+    effective_parameters(vehicle, vector(**effects), out)
     return out
 
 
@@ -56,7 +50,7 @@ def a_state(depth=6.0):
 def rates(F, x, mode=0, command=(0.3, -0.015, 0.12), since=0.0, vehicle=P):
     """dx/dt with effects F."""
     whole, out = np.zeros(layout.N_P), np.zeros(layout.N_X)
-    fold(vehicle, F, whole)
+    effective_parameters(vehicle, F, whole)
     effect_derivative(whole, F, x, mode, *command, since, np.zeros(6), 0.0, np.zeros(3), out)
     return out
 
@@ -76,7 +70,7 @@ ADDED = {
 
 @pytest.mark.parametrize(("name", "place"), SCALED.items())
 def test_a_share_of_a_coefficient_is_that_share(name, place):
-    changed = folded(**{name[0]: {name[1]: 0.25}})
+    changed = effective(**{name[0]: {name[1]: 0.25}})
     wanted = P.copy()
     wanted[place] *= 1.25
     if name[0] == "lift":
@@ -88,7 +82,7 @@ def test_a_share_of_a_coefficient_is_that_share(name, place):
 def test_what_is_added_to_a_parameter_is_added(name, place):
     wanted = P.copy()
     wanted[place] += 0.01
-    assert np.array_equal(folded(**{name[0]: {name[1]: 0.01}}), wanted)
+    assert np.array_equal(effective(**{name[0]: {name[1]: 0.01}}), wanted)
 
 
 # --- actuators ------------------------------------------------------------------------------------------------------
@@ -119,7 +113,7 @@ def test_a_servo_stops_short_of_its_range(side, loss, left):
 def test_a_servo_that_loses_more_than_it_has_stands_in_the_middle():
     weak = P.copy()
     weak[layout.SERVO_MIN], weak[layout.SERVO_MAX] = -0.6, 0.8
-    changed = folded(weak, servo_limit={"loss": 1.0})
+    changed = effective(weak, servo_limit={"loss": 1.0})
     assert changed[layout.SERVO_MIN] == changed[layout.SERVO_MAX] == pytest.approx(0.1)
 
 
@@ -128,9 +122,9 @@ def test_play_holds_until_it_is_taken_up():
     way = [0.05, 0.1, 0.3, 0.25, 0.11, 0.1, 0.05, -0.1, -0.1, 0.09, 0.2]
     stands = [0.0, 0.0, 0.2, 0.2, 0.2, 0.2, 0.15, 0.0, 0.0, 0.0, 0.1]
     for leader, wanted in zip(way, stands, strict=True):
-        follower = play(follower, leader, width)
+        follower = backlash(follower, leader, width)
         assert follower == pytest.approx(wanted, abs=1e-12)
-    assert play(0.3, 0.7, 0.0) == 0.7
+    assert backlash(0.3, 0.7, 0.0) == 0.7
 
 
 def test_a_servo_within_its_play_leaves_the_rail_hanging():
@@ -218,7 +212,7 @@ def test_a_servo_offset_turns_the_rail_and_not_the_servo():
 
 
 def wrench(F, u, v, w, pitch=0.0):
-    return np.array(extra_wrench(P, F, -math.sin(pitch), u, v, w))
+    return np.array(extra_wrench(P, F, -math.sin(pitch), 0.0, u, v, w, 0.0, 0.0, 0.0))
 
 
 @pytest.mark.parametrize("alpha", [-0.3, -0.05, 0.0, 0.04, 0.1, 0.25])
@@ -229,7 +223,8 @@ def test_stall_caps_the_lift_and_only_the_lift(alpha, printed):
     speed, most = 0.4, 1.0 / 15.0
     u, w = speed * math.cos(alpha), speed * math.sin(alpha)
     F = vector(stall={"inverse": 15.0})
-    force = np.array(water_wrench(vehicle, u, 0.0, w, 0.0, 0.0, 0.0)) + extra_wrench(vehicle, F, 0.0, u, 0.0, w)
+    moving = (u, 0.0, w, 0.0, 0.0, 0.0)
+    force = np.array(water_wrench(vehicle, *moving)) + extra_wrench(vehicle, F, 0.0, 0.0, *moving)
     lift = force[0] * math.sin(alpha) - force[2] * math.cos(alpha)
     drag = -force[0] * math.cos(alpha) - force[2] * math.sin(alpha)
     held_ = max(-most, min(most, alpha))
@@ -259,7 +254,7 @@ def test_a_line_pulls_at_the_tail_against_its_way(u):
     tail = np.array([u, -0.05, 0.03]) + np.cross(omega, [ef.TAIL, 0.0, 0.0])
     F = vector(tether={"k": 1.5, "growth": 0.2, "across": 0.5})
     force = -(1.5 + 0.2 * 4.0) * np.linalg.norm(tail) * tail * [1.0, 0.5, 0.5]
-    X, Y, Z, M, N = line_wrench(F, 4.0, u, -0.05, 0.03, omega[1], omega[2])
+    X, Y, Z, M, N = tether_wrench(F, 4.0, u, -0.05, 0.03, omega[1], omega[2])
     assert np.array([X, Y, Z]) == pytest.approx(force)
     along, across = np.cross(tied, force * [1.0, 0.0, 0.0]), np.cross([ef.TAIL, 0.0, 0.0], force)
     assert np.array([M, N]) == pytest.approx([along[1] + across[1], across[2]])

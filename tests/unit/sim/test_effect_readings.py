@@ -9,9 +9,10 @@ from effect_flights import flown, world
 from firmware.core.maths.rotations import euler_from_quaternion, quaternion_from_euler
 from sim_backend.core import effect_layout as ef
 from sim_backend.core import layout as wl
-from sim_backend.core.effect_plant import read, remember
+from sim_backend.core.effect_plant import update_effect_states
+from sim_backend.core.effects.sensing import read
 from sim_backend.core.world import sample_sensors, sample_with_effects
-from sim_backend.effects.base import apply_effects
+from sim_backend.effects.catalogue import apply_effects
 
 
 class Plain:
@@ -76,7 +77,7 @@ def test_a_depth_lag_follows_a_ramp_one_time_constant_behind():
     for _ in range(500):
         before[3] = x[2]
         x[2] += speed * dt
-        remember(F, x, before, dt)
+        update_effect_states(F, x, before, dt)
         y = np.zeros(ef.N_Y)
         read(F, x, y)
         behind.append(x[2] - y[ef.Y_DEPTH])
@@ -84,8 +85,8 @@ def test_a_depth_lag_follows_a_ramp_one_time_constant_behind():
     assert np.array(behind) == pytest.approx(speed * lag * (1.0 - np.exp(-t / lag)), rel=1e-10)
     for _ in range(700):
         before[3] = x[2]
-        remember(F, x, before, dt)
-    assert abs(x[ef.X_LAG + 3]) < 1e-4 * behind[-1]  # at rest, it settles
+        update_effect_states(F, x, before, dt)
+    assert abs(x[ef.X_LAG_DEPTH]) < 1e-4 * behind[-1]  # at rest, it settles
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
@@ -97,9 +98,9 @@ def test_an_attitude_lag_follows_a_turn_one_time_constant_behind_across_the_seam
         before[:3] = euler_from_quaternion(*x[3:7])
         angles[axis] += rate * dt
         x[3:7] = quaternion_from_euler(*angles)
-        remember(F, x, before, dt)
+        update_effect_states(F, x, before, dt)
     assert x[ef.X_LAG + axis] == pytest.approx(rate * lag * (1.0 - math.exp(-1.8 / lag)), rel=1e-9)
-    assert np.delete(x[ef.X_LAG : ef.X_LAG + 3], axis) == pytest.approx([0.0, 0.0], abs=1e-12)
+    assert np.delete(x[ef.X_LAG : ef.X_LAG_DEPTH], axis) == pytest.approx([0.0, 0.0], abs=1e-12)
 
 
 def test_a_lag_ends_where_the_vehicle_comes_to_rest():

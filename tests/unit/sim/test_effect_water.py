@@ -7,6 +7,7 @@ import pytest
 from effect_flights import flown, held, quiet, world
 
 from sim_backend.core import layout as wl
+from sim_backend.core.effects.timing import delayed_commands, mean_input
 
 GRAVITY = 9.80665
 
@@ -95,6 +96,19 @@ def test_a_delay_shifts_commands_by_itself(delay):
             made.cmd[:] = stepped(moment)(0.01 * k)
     assert np.array_equal(late.x, punctual.x)
     assert late.x[13] > 0.1
+
+
+@pytest.mark.parametrize("delay", [0.03, 0.074, 0.1])
+def test_a_worlds_late_commands_are_the_mean_that_a_recording_has_of_them(delay):
+    dt, rng = 0.01, np.random.default_rng(3)
+    t, commands = dt * np.arange(60), rng.standard_normal((60, 3))
+    queue, late = np.zeros((math.ceil(delay / dt) + 2, 3)), np.zeros(3)
+    for step in range(60):
+        delayed_commands(queue, commands[step], step, delay, dt, late)
+        since = t[step] - delay
+        if step > 20:
+            rows = [mean_input(t, commands, column, step, 0, since, since + dt) for column in range(3)]
+            assert late == pytest.approx(rows, abs=1e-9)
 
 
 def test_a_delay_between_two_steps_lies_between_them():

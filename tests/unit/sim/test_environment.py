@@ -7,8 +7,9 @@ import pytest
 
 from firmware.core.maths.rotations import euler_from_quaternion
 from firmware.core.vehicle.layout import N_X
+from sim_backend.core.environment import water_velocity
 from sim_backend.core.open_loop import fly_open_loop, fly_open_loop_many
-from sim_backend.core.plant import hold_disturbance, plant_step, water_velocity
+from sim_backend.core.plant import hold_disturbance, plant_step
 from sim_backend.world import Environment, SampledSensor, SampledSensors, Start, Wave, build_world
 from tools.data.sources import load_vehicle
 

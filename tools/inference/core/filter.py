@@ -14,10 +14,10 @@ import math
 import numpy as np
 
 from firmware.core.jit import kernel, parallel_kernel, prange
-from firmware.core.maths.rotations import rotation_nb
+from firmware.core.maths.rotations import rotation_nb, wrap_angle
 from firmware.core.vehicle.layout import N_P
 from sim_backend.core import effect_layout as ef
-from sim_backend.core.effect_plant import fold, wrapped
+from sim_backend.core.effect_plant import effective_parameters
 from tools.inference.core.step import (
     LATE,
     N_ERR,
@@ -93,7 +93,7 @@ def linear_reading(F, x, t, stamps, path, i, begin, moved, error, y, y2, H):
         for m in range(N_Y):
             change = y2[m] - y[m]
             if m < 3 or m >= ef.Y_MOCAP_ROLL:
-                change = wrapped(change)
+                change = wrap_angle(change)
             H[m, j] = change / NUDGE
 
 
@@ -109,8 +109,8 @@ def filter_run(P, F, spectral, R, mode, t, stamps, inputs, z, begin, end, start,
     the state by the whitened ones.
     """
     Pw, x = np.empty(N_P), start.copy()
-    fold(P, F, Pw)
-    work, kept, moved, base = np.zeros((6, ef.N_XF)), np.empty(ef.N_XF), np.empty(ef.N_XF), np.empty(ef.N_XF)
+    effective_parameters(P, F, Pw)
+    work, kept, moved, base = np.zeros((4, ef.N_XF)), np.empty(ef.N_XF), np.empty(ef.N_XF), np.empty(ef.N_XF)
     error, zero, before = np.empty(N_ERR), np.zeros(3), np.empty(6)
     Phi, Gam, cov, temp = (
         np.empty((N_ERR, N_ERR)),
@@ -271,8 +271,8 @@ def filter_runs(
 def follow_run(P, F, mode, t, stamps, inputs, z, begin, end, start, W, K, X, path, E):
     """A model flown along rows begin .. end - 1 with the gains of filter_run: X, path and E as there."""
     Pw, x = np.empty(N_P), start.copy()
-    fold(P, F, Pw)
-    work, kept = np.zeros((6, ef.N_XF)), np.empty(ef.N_XF)
+    effective_parameters(P, F, Pw)
+    work, kept = np.zeros((4, ef.N_XF)), np.empty(ef.N_XF)
     error, zero, before, acc = np.empty(N_ERR), np.zeros(3), np.empty(6), np.zeros(6)
     y, d = np.empty(N_Y), np.empty(N_Y)
     for n in range(6):

@@ -7,7 +7,7 @@ import numpy as np
 from firmware.core.jit import parallel_kernel, prange
 from firmware.core.vehicle.layout import N_P
 from sim_backend.core import effect_layout as ef
-from sim_backend.core.effect_plant import fold
+from sim_backend.core.effect_plant import effective_parameters
 from tools.inference.core.step import N_Y, log_path, pose_of, propagate, read_row
 
 
@@ -23,8 +23,8 @@ def fly_windows(Ps, Fs, modes, bounds, t, inputs, X, paths, first, last, run_of,
         P, F, run = Ps[m], Fs[m], run_of[w]
         begin = bounds[run]
         Pw, x = np.empty(N_P), X[m, first[w] - 1].copy()
-        fold(P, F, Pw)
-        work, kept = np.zeros((6, ef.N_XF)), np.empty(ef.N_XF)
+        effective_parameters(P, F, Pw)
+        work, kept = np.zeros((4, ef.N_XF)), np.empty(ef.N_XF)
         zero, before, acc = np.zeros(3), np.empty(6), np.zeros(6)
         path = paths[m, begin : last[w]].copy()
         for i in range(first[w], last[w]):
@@ -43,8 +43,8 @@ def simulate_runs(P, F, spectral, R, modes, bounds, t, inputs, starts, shaken, n
     for run in prange(len(bounds) - 1):
         begin = bounds[run]
         Pw, x = np.empty(N_P), starts[run].copy()
-        fold(P, F, Pw)
-        work, kept = np.zeros((6, ef.N_XF)), np.empty(ef.N_XF)
+        effective_parameters(P, F, Pw)
+        work, kept = np.zeros((4, ef.N_XF)), np.empty(ef.N_XF)
         zero, before, acc = np.zeros(3), np.empty(6), np.zeros(6)
         path = np.zeros((bounds[run + 1] - begin, 6))
         for i in range(begin, bounds[run + 1]):

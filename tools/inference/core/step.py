@@ -7,9 +7,13 @@ motion capture is.
 import math
 
 from firmware.core.jit import kernel
-from firmware.core.maths.rotations import euler_from_quaternion
+from firmware.core.maths.rotations import euler_from_quaternion, wrap_angle
+from firmware.core.maths.steps import MIDPOINT, RK4
 from sim_backend.core import effect_layout as ef
-from sim_backend.core.effect_plant import correction, effect_midpoint, effect_step, read, wrapped
+from sim_backend.core.effect_plant import effect_step
+from sim_backend.core.effects.correction import correction
+from sim_backend.core.effects.sensing import read
+from sim_backend.core.effects.timing import mean_input, mocap_lateness
 
 N_ERR = 16
 LATE = 15  # the error of motion capture's clock, s: it walks, and moves nothing but what is read
@@ -59,26 +63,6 @@ def difference(x, y, error):
 
 
 @kernel
-def mean_input(t, inputs, column, i, begin, since, until):
-    """Mean over since..until (s) of an input held from each row on; before row `begin` its first value holds."""
-    if until <= since:
-        since = until - 1e-9
-    j = i
-    while j > begin and t[j] > since:
-        j -= 1
-    total, at = 0.0, since
-    while True:
-        end = until if j + 1 > i or t[j + 1] >= until else t[j + 1]
-        if end > at:
-            total += inputs[j, column] * (end - at)
-            at = end
-        if at >= until or j + 1 > i:
-            break
-        j += 1
-    return total / (until - since)
-
-
-@kernel
 def propagate(Pw, F, x, mode, t, inputs, i, begin, acc, zero, work, kept, quick):
     """Fly from row i - 1 to row i, in place; acc (6) added to nu_dot; kept (N_XF), zero (3), work are scratch.
 
@@ -98,9 +82,9 @@ def propagate(Pw, F, x, mode, t, inputs, i, begin, acc, zero, work, kept, quick)
         kept[:] = x
         since = t[i - 1] - t[begin] + k * h
         if quick:
-            effect_midpoint(Pw, F, x, mode, c0, c1, c2, since, acc, 0.0, zero, h, work)
+            effect_step(MIDPOINT, Pw, F, x, mode, c0, c1, c2, since, acc, 0.0, zero, h, work)
         else:
-            effect_step(Pw, F, x, mode, c0, c1, c2, since, acc, 0.0, zero, h, work)
+            effect_step(RK4, Pw, F, x, mode, c0, c1, c2, since, acc, 0.0, zero, h, work)
         worst = 0.0
         for n in range(7, 13):
             worst = max(worst, abs(x[n]))
@@ -114,9 +98,9 @@ def log_path(x, before, path, i, begin):
     roll, pitch, yaw = euler_from_quaternion(x[3], x[4], x[5], x[6])
     for n in range(3):
         path[i, n] = path[i - 1, n] + x[n] - before[n]
-    path[i, 3] = path[i - 1, 3] + wrapped(roll - before[3])
-    path[i, 4] = path[i - 1, 4] + wrapped(pitch - before[4])
-    path[i, 5] = path[i - 1, 5] + wrapped(yaw - before[5])
+    path[i, 3] = path[i - 1, 3] + wrap_angle(roll - before[3])
+    path[i, 4] = path[i - 1, 4] + wrap_angle(pitch - before[4])
+    path[i, 5] = path[i - 1, 5] + wrap_angle(yaw - before[5])
 
 
 @kernel
@@ -136,7 +120,7 @@ def read_row(F, x, t, stamps, path, i, begin, y):
     link = int(F[ef.LINK])
     if link > ef.ACTUATOR_LINKS:
         y[link - ef.ACTUATOR_LINKS - 1] += correction(F, x, t[i] - t[begin], 0.0)
-    at = stamps[i] - (F[ef.MOCAP_DELAY] + F[ef.CLOCK_SKEW] * (stamps[i] - t[begin]) + x[ef.X_LATE])
+    at = stamps[i] - mocap_lateness(F, x[ef.X_LATE], stamps[i] - t[begin])
     if at == t[i] or i == begin:
         return
     j = i
@@ -153,4 +137,4 @@ def innovation(z, y, d):
     for j in range(N_Y):
         d[j] = z[j] - y[j]
         if (j < 3 or j >= ef.Y_MOCAP_ROLL) and not math.isnan(d[j]):
-            d[j] = wrapped(d[j])
+            d[j] = wrap_angle(d[j])

@@ -1,0 +1,86 @@
+"""Effects of the water on the hull: coefficients that are others, and terms that equation (4) has not."""
+
+import math
+
+from firmware.core.jit import kernel
+from firmware.core.vehicle.actuators import clip
+from firmware.core.vehicle.layout import (
+    A_Y,
+    A_Z,
+    K_BETA,
+    K_D,
+    K_D0,
+    K_L,
+    K_L0,
+    K_M0,
+    K_MY,
+    K_Q,
+    K_R,
+    LIFT_PRINTED,
+)
+from firmware.core.vehicle.water import flow_angles, flow_to_body
+from sim_backend.core import effect_layout as ef
+
+
+@kernel
+def effective_coefficients(F, out):
+    """Coefficients and added mass with effects F, in place in out (N_P)."""
+    out[K_D0] *= 1.0 + F[ef.DRAG_0]
+    out[K_D] *= 1.0 + F[ef.DRAG_ALPHA]
+    out[K_L] *= 1.0 + F[ef.LIFT]
+    out[K_L0] *= 1.0 + F[ef.LIFT]
+    out[A_Y] *= 1.0 + F[ef.ADDED_Y]
+    out[A_Z] *= 1.0 + F[ef.ADDED_Z]
+    out[K_BETA] *= 1.0 + F[ef.SIDE]
+    out[K_M0] += F[ef.PITCH_TRIM]
+    out[K_Q] *= 1.0 + F[ef.PITCH_DAMPING]
+    out[K_MY] *= 1.0 + F[ef.WEATHERCOCK]
+    out[K_R] *= 1.0 + F[ef.YAW_DAMPING]
+
+
+@kernel
+def tether_wrench(F, depth, u, v, w, q, r):
+    """Forces (N) and moments (N m) in body axes of a line at the tail: X, Y, Z, M, N.
+
+    Drag with the square of the tail's own speed, of a line as long as the dive is deep; across the hull it may be less.
+    """
+    vt, wt = v + ef.TAIL * r, w - ef.TAIL * q
+    pull = (F[ef.TETHER] + F[ef.TETHER_GROWTH] * max(depth, 0.0)) * math.sqrt(u * u + vt * vt + wt * wt)
+    X, Y, Z = -pull * u, -pull * F[ef.TETHER_ACROSS] * vt, -pull * F[ef.TETHER_ACROSS] * wt
+    return X, Y, Z, -ef.TAIL * Z - ef.TAIL_TOP * X, ef.TAIL * Y
+
+
+@kernel
+def extra_wrench(P, F, kx, depth, u, v, w, p, q, r):
+    """Forces (N) and moments (N m) in body axes that equation (4) has not: X, Y, Z, K, M, N.
+
+    kx is the forward component of the unit vector down, -sin(theta): positive in a dive. depth in m.
+    """
+    X, Y, Z, K, M, N = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    alpha, _, v_squared = flow_angles(u, v, w)
+    drag, lift = 0.0, 0.0
+    if F[ef.CLIMB_DIVE] != 0.0:
+        drag += F[ef.CLIMB_DIVE] * math.tanh(-kx / ef.REST_PITCH) * (P[K_D0] + P[K_D] * alpha * alpha) * v_squared
+    if F[ef.STALL] > 0.0:
+        held = clip(alpha, -1.0 / F[ef.STALL], 1.0 / F[ef.STALL])
+        lost = held * held - alpha * alpha if P[LIFT_PRINTED] != 0.0 else held - alpha
+        lift += P[K_L] * lost * v_squared
+    if drag != 0.0 or lift != 0.0:
+        X, Y, Z = flow_to_body(u, v, w, -drag, 0.0, -lift)
+    if F[ef.LINEAR_DRAG] != 0.0:
+        X -= F[ef.LINEAR_DRAG] * u
+        Y -= F[ef.LINEAR_DRAG] * v
+        Z -= F[ef.LINEAR_DRAG] * w
+    if F[ef.ROLL_TRIM] != 0.0 or F[ef.YAW_TRIM] != 0.0:
+        K1, M1, N1 = flow_to_body(u, v, w, F[ef.ROLL_TRIM] * v_squared, 0.0, F[ef.YAW_TRIM] * v_squared)
+        K += K1
+        M += M1
+        N += N1
+    if F[ef.TETHER] != 0.0 or F[ef.TETHER_GROWTH] != 0.0:
+        X1, Y1, Z1, M1, N1 = tether_wrench(F, depth, u, v, w, q, r)
+        X += X1
+        Y += Y1
+        Z += Z1
+        M += M1
+        N += N1
+    return X, Y, Z, K, M, N
