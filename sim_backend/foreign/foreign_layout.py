@@ -55,7 +55,7 @@ X_ALPHA = 36  # rad, angle of attack that the lift has followed
 N_FX = 37
 assert N_X == X_SERVO_V
 
-# --- readings: as the first nine columns of a prediction (tools/inference/core/flights) -----------------------------
+# --- readings: as the first nine readings of the observer (sim_backend/core/effect_layout) ----------------------------
 (R_ROLL, R_PITCH, R_YAW, R_P, R_Q, R_R, R_DEPTH, R_SLIDER, R_BALLAST) = range(9)
 N_R = 9
 

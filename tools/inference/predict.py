@@ -30,13 +30,16 @@ DOUBLED = (
 )  # fmt: skip
 
 
-def without_doubled(problem: Problem) -> np.ndarray:
-    """What was measured, (rows, N_Y), less onboard attitude and depth where motion capture sees the vehicle.
+LARGEST = 1e4  # rad, rad/s, m, kg: no vehicle reads more
 
-    An offset of those is then in the gap and not in the start, and two sensors that disagree cannot pull the filter
-    apart. Where motion capture has not seen the vehicle for COAST seconds, onboard takes over.
+
+def without_doubled(problem: Problem) -> np.ndarray:
+    """What was measured, (rows, N_Y), less the absurd, and less what is onboard where motion capture sees the vehicle.
+
+    An offset of attitude or depth is then in the gap and not in the start, and two sensors that disagree cannot pull
+    the filter apart. Where motion capture has not seen the vehicle for COAST seconds, onboard takes over.
     """
-    z, bounds = problem.z.copy(), problem.recording.bounds
+    z, bounds = np.where(np.abs(problem.z) < LARGEST, problem.z, np.nan), problem.recording.bounds
     for n, run in enumerate(problem.runs):
         part = z[bounds[n] : bounds[n + 1]]
         for onboard, mocap in DOUBLED:
