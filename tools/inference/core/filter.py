@@ -29,6 +29,7 @@ from tools.inference.core.lacking import (
     take_gyro_bias,
 )
 from tools.inference.core.step import (
+    LARGEST_SPEED,
     LATE,
     N_ERR,
     N_Y,
@@ -215,12 +216,33 @@ def filter_run(
         for m in range(N_Y):
             if not math.isnan(d[m]):
                 misfit += 2.0 * math.log(L[m, m])
+        base[:] = x
         misfit += apply_gain(W[i], K[i], d, x, error, E[i])
         for n in range(count - N_ERR):
             lacking[n] += error[N_ERR + n]
+        if count > N_ERR and lost(x, cov):  # by readings of no vehicle: it begins anew
+            x[:] = base
+            lacking[:] = 0.0
+            K[i, :, :] = 0.0
+            cov[:] = 0.0
+            for j in range(count):
+                cov[j, j] = spread[j] * spread[j]
         for n in range(ef.N_XF):
             X[i, n] = x[n]
     return misfit
+
+
+@kernel
+def lost(x, cov):
+    """Whether a filter's state moves as no vehicle does, or is no number, or its covariance is none."""
+    total, fastest = 0.0, 0.0
+    for n in range(len(cov)):
+        total += cov[n, n]
+    for n in range(ef.N_XF):
+        total += x[n]
+    for n in range(7, 13):
+        fastest = max(fastest, abs(x[n]))
+    return not (math.isfinite(total) and fastest < LARGEST_SPEED)
 
 
 @kernel
