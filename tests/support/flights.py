@@ -1,7 +1,7 @@
 """Made-up recordings: the nominal vehicle, or one drawn from its [uncertainty], flown with noise and disturbance.
 
-The flight is the kernels' own (nothing here checks the equations); what is added is what a recording has: sensors with
-bias and noise, a disturbance held 0.1 s, motion capture with dropouts. Everything follows from the seed.
+The flight is the diagnosis' kernels' own (nothing here checks the equations); what is added is what a recording has:
+sensors with bias and noise, a disturbance held 0.1 s, motion capture with dropouts. Everything follows from the seed.
 """
 
 from dataclasses import dataclass, field
@@ -9,15 +9,17 @@ from pathlib import Path
 
 import numpy as np
 
-from firmware.core.estimation import estimator_layout as kf
-from firmware.core.maths.rotations import quaternion_from_euler
+from firmware.core.estimation import estimator_layout as est
+from firmware.core.maths.rotations import euler_from_quaternion, quaternion_from_euler
 from firmware.estimation.settings import parameter_sigma
 from firmware.model.vehicle import Vehicle
+from sim_backend.core import effect_layout as ef
 from tools.data.runs import columns as names
 from tools.data.runs.case import Case
 from tools.data.runs.run import Run
 from tools.data.sources import load_vehicle
-from tools.inference.core.flights import N_Y, flight_step, observe
+from tools.inference.channels import ONBOARD
+from tools.inference.core.step import propagate
 
 STEP = 0.02  # s
 
@@ -42,7 +44,7 @@ class World:
 
 @dataclass
 class Flight:
-    """A recording and the truth behind it: states (rows, N_XE) at the rows."""
+    """A recording and the truth behind it: states (rows, N_XF) at the rows."""
 
     run: Run
     truth: np.ndarray
@@ -87,25 +89,27 @@ def fly(world: World, seed: int, *, P: np.ndarray | None = None, name: str = "ru
     sensors, disturbance = world.vehicle.sensors, world.vehicle.disturbance
     t = np.round(np.arange(0.0, world.seconds - 1e-9, 1.0 / world.rate_hz), 6)
     commands = manoeuvres(rng, t)
-    x = np.zeros(kf.N_XE)
+    x, F = np.zeros(ef.N_XF), np.zeros(ef.N_F)
     x[2] = rng.uniform(1.0, 3.0)
     x[3:7] = quaternion_from_euler(0.0, rng.uniform(-0.3, 0.0), rng.uniform(-3.0, 3.0))
     x[7] = world.start_speed
-    x[kf.X_WATER : kf.X_WATER + 2] = world.water
-    truth, table = np.empty((len(t), kf.N_XE)), np.empty((len(t), N_Y))
-    work = np.zeros((5, kf.N_XE))
+    F[ef.CURRENT_N], F[ef.CURRENT_E] = world.water
+    truth, table = np.empty((len(t), ef.N_XF)), np.empty((len(t), len(ONBOARD)))
+    zero, work, kept, acc = np.zeros(3), np.zeros((6, ef.N_XF)), np.empty(ef.N_XF), np.zeros(6)
+    steps = max(1, round(1.0 / world.rate_hz / STEP))
+    moments = np.array([0.0, 1.0 / world.rate_hz / steps])
     held = -np.inf
     for i, now in enumerate(t):
         truth[i] = x
-        observe(x, table[i])
-        steps = max(1, round(1.0 / world.rate_hz / STEP))
+        table[i] = *euler_from_quaternion(*x[3:7]), *x[10:13], x[2], *x[14:16], *x[:2]
         for k in range(steps):
             moment = now + k / world.rate_hz / steps
             if moment - held >= 0.1 - 1e-6:
                 held = moment
                 strength = world.disturbance * np.repeat([disturbance.linear, disturbance.angular], 3)
-                x[kf.X_ERR : kf.X_GYRO] = strength * rng.standard_normal(6)
-            flight_step(P, x, kf.COMMANDED, *commands[i], 1.0 / world.rate_hz / steps, work)
+                acc[:] = strength * rng.standard_normal(6)
+            inputs = np.array([commands[i], commands[i]])
+            propagate(P, F, x, est.COMMANDED, moments, inputs, 1, 0, acc, zero, work, kept, False)
     sigma = [*3 * [sensors.attitude.noise], *3 * [sensors.gyro.noise], sensors.depth.noise]
     sigma += [sensors.slider.noise, sensors.ballast.noise]
     onboard = (*names.ATTITUDE, *names.RATES, names.DEPTH, *names.DRAW_WIRES)

@@ -5,15 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim_backend.core import effect_layout as ef
-from tools.diagnose.search import Search, without_extra_noise
+from tools.diagnose.search import Search
 from tools.gap.measure import RunGap, root_mean_square, run_gap
 from tools.inference.channels import CHANNELS
 from tools.inference.fit import NUISANCE_LIMIT, Hypothesis, bounded_step
 from tools.inference.model import Model
 from tools.inference.parameters import model_at
-from tools.inference.predict import predict as predict_nominal
-from tools.inference.problem import Problem, cut, estimated, fly_on
+from tools.inference.predict import fly, predict
+from tools.inference.problem import Problem, cut
 
 DRAWS = 2  # simulated repetitions that find the floor
 SEED = 20261121
@@ -88,11 +87,8 @@ def gaps(
         if z is not None:
             table = z[problem.recording.bounds[n] : problem.recording.bounds[n + 1]]
             part.z = table
-        scored = cut(part)
-        gains = part.filter(P, F, begin=True)
-        Y = estimated(part, F, gains)
-        fly_on(part, scored, P, F, gains, Y)
-        found.append(run_gap(part.runs[0], Y[:, : ef.Y_MOCAP_Z], scored.listed[0], table))
+        Y = fly(part, P, F)
+        found.append(run_gap(part.runs[0], Y, cut(part).listed[0], table))
         flown.append(Y)
     return found, flown
 
@@ -171,7 +167,7 @@ def shrink(search: Search, hypothesis: Hypothesis) -> Shrinkage:
     problem = search.problem
     rng = np.random.default_rng(SEED)
     nominal = Model(problem.model.name, problem.model.P, problem.model.sigma)
-    flown = predict_nominal(problem.case, nominal, problem.runs)
+    flown = predict(problem.case, nominal, problem.runs)
     listed = cut(problem).listed
     refitted, Y_refitted = gaps(problem, left_out(search, search.null))
     after, Y_after = gaps(problem, left_out(search, hypothesis)) if hypothesis.labels else (refitted, Y_refitted)

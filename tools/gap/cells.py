@@ -6,7 +6,7 @@ import numpy as np
 
 from tools.data.runs.run import Run
 from tools.inference.channels import channels_of
-from tools.inference.predict import Flown
+from tools.inference.windows import Window
 
 
 @dataclass
@@ -37,14 +37,15 @@ class Cells:
         return np.bincount(self.cell)[self.cell]
 
 
-def cells_of(runs: list[Run], flown: Flown, table: np.ndarray) -> Cells:
-    """The scored samples of a case's runs; table (rows, N_Y) is what was measured."""
+def cells_of(runs: list[Run], bounds: np.ndarray, listed: list[list[Window]], table: np.ndarray) -> Cells:
+    """The scored samples of a case's runs by their windows; bounds (runs + 1,) in the table (rows, N_Y) of what was
+    measured."""
     scored = []
     for n, run in enumerate(runs):
-        begin, of_run = flown.recording.bounds[n], []
+        begin, of_run = bounds[n], []
         for channel in channels_of(run):
             found = []
-            for w, window in enumerate(flown.windows[n]):
+            for w, window in enumerate(listed[n]):
                 block = table[begin + window.start : begin + window.end][:, list(channel.columns)]
                 at, column = np.nonzero(np.isfinite(block) & window.scored)
                 found.append((begin + window.start + at, np.array(channel.columns)[column], np.full(len(at), w)))

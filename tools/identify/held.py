@@ -62,8 +62,9 @@ def hold_out(case: Case, model: Model, found: Fit, say: Callable[[str], None] = 
     runs = found.problem.runs
     if len(runs) < 2:
         return None
+    recorded = {run.name: run for run in case.runs}  # with their spikes, as everybody measures them
     picked = np.unique(np.linspace(0, len(runs) - 1, min(MOST, len(runs))).astype(int)).tolist()
-    made = Held([runs[n] for n in picked], [], [], [], [], ALONE if len(runs) <= FEW else EARLY)
+    made = Held([recorded[runs[n].name] for n in picked], [], [], [], [], ALONE if len(runs) <= FEW else EARLY)
     nominal = replace(model, F=None)
     for n in picked:
         if len(runs) <= FEW:
@@ -76,7 +77,7 @@ def hold_out(case: Case, model: Model, found: Fit, say: Callable[[str], None] = 
             ((nominal.P, np.zeros(ef.N_F)), made.before, made.nominal),
             (model_of(model, found.free, values), made.after, made.identified),
         ):
-            gap, Y = predicted(case, model, runs[n], P, F)
+            gap, Y = predicted(case, model, recorded[runs[n].name], P, F)
             gaps.append(gap)
             flown.append(Y)
     return made

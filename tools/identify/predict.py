@@ -8,17 +8,15 @@ from tools.data.runs.run import Run
 from tools.gap.measure import RunGap, root_mean_square, run_gap
 from tools.identify.parameters import Parameters
 from tools.inference.model import Model
-from tools.inference.problem import cut, estimated, fly_on, pose
+from tools.inference.predict import fly
+from tools.inference.problem import cut, pose
 
 
 def predicted(case: Case, model: Model, run: Run, P: np.ndarray, F: np.ndarray) -> tuple[RunGap, np.ndarray]:
     """The gap of one run under (P, F), each window started where the model's own filter stands; and the prediction."""
     problem = pose(case, model, [run])
-    gains = problem.filter(P, F, begin=True)
-    scored = cut(problem)
-    Y = estimated(problem, F, gains)
-    fly_on(problem, scored, P, F, gains, Y)
-    return run_gap(run, Y, scored.listed[0]), Y
+    Y = fly(problem, P, F)
+    return run_gap(run, Y, cut(problem).listed[0]), Y
 
 
 def model_of(model: Model, free: Parameters, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -11,7 +11,7 @@ from tools.data.runs.run import Run
 
 @dataclass(frozen=True)
 class Channel:
-    """One line of the gap: prediction columns (inference/core/flights), their tolerance in SI, and how it is shown."""
+    """One line of the gap: prediction columns (as `measured`), their tolerance in SI, and how it is shown."""
 
     name: str
     columns: tuple[int, ...]

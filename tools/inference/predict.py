@@ -1,101 +1,103 @@
-"""What the model says a recorded flight should have been: every window from its start (docs/GAP.md, Measures)."""
+"""What the model says a recorded flight should have been: every window flown on from its start (docs/GAP.md, Measures).
 
-from dataclasses import dataclass, field, replace
+Windows start where the filter of the flying model stands, which for this purpose also finds what the model lacks
+(core/lacking): of a wrong model taken at its word the starts would be wrong, and the gap would be theirs.
+"""
+
+from dataclasses import replace
 
 import numpy as np
 
-from firmware.core.vehicle.layout import X_ACT
 from sim_backend.core import effect_layout as ef
 from tools.data.runs import columns as names
 from tools.data.runs.case import Case
 from tools.data.runs.run import Run
-from tools.inference import start
 from tools.inference.channels import INSTEAD, ONBOARD
-from tools.inference.core.flights import N_EXTRAS, N_Y, fly_windows, observe_rows
+from tools.inference.core.flight import fly_followed, fly_windows, read_rows
+from tools.inference.core.lacking import LACKING_SPREAD
 from tools.inference.model import Model
-from tools.inference.windows import Window, windows
+from tools.inference.problem import DRIFT, Gains, Problem, cut, pose
+from tools.inference.recording import held
+
+# Recordings begin at rest, at a launch or within a glide. One linearisation does not reach from one to the other, so
+# forward speeds are tried one by one, each with SPEED_SPREAD.
+START_SPEEDS = (0.0, 0.1, 0.2, 0.3, 0.45, 0.6)  # m/s
+SPEED_SPREAD = (0.05, 0.02, 0.02)  # m/s
+COAST = 1.0  # s without motion capture, after which what is onboard takes over
+# readings that motion capture has too, and its own
+DOUBLED = (
+    (0, ef.Y_MOCAP_ROLL), (1, ef.Y_MOCAP_ROLL + 1), (2, ef.Y_MOCAP_ROLL + 2), (ef.Y_DEPTH, ef.Y_MOCAP_Z)
+)  # fmt: skip
 
 
-@dataclass
-class Inputs:
-    """What drives the windows: as recorded, or with something in it changed."""
-
-    modes: np.ndarray  # (runs,)
-    values: np.ndarray  # (rows, 3)
-    starts: np.ndarray  # (windows, N_XE) state at row first - 1
-    shaken: np.ndarray | None = None  # (rows, 6) accelerations from each row on
+LARGEST = 1e4  # rad, rad/s, m, kg: no vehicle reads more
 
 
-@dataclass
-class Variant:
-    """One model flown: parameters, extras (tools/inference/core/flights) and inputs."""
+def without_doubled(problem: Problem) -> np.ndarray:
+    """What was measured, (rows, N_Y), less the absurd, and less what is onboard where motion capture sees the vehicle.
 
-    P: np.ndarray
-    inputs: Inputs
-    extras: np.ndarray = field(default_factory=lambda: np.zeros(N_EXTRAS))
-
-
-@dataclass
-class Flown:
-    """A case's windows, their starts, and what one or more models make of them."""
-
-    recording: start.Recording
-    estimates: start.Estimates
-    windows: list[list[Window]]  # by run
-    first: np.ndarray  # (windows,) first row flown, in the recording's table
-    last: np.ndarray  # (windows,) one past the last
-    run_of: np.ndarray  # (windows,)
-    scored: np.ndarray  # (windows,) bool
-    inputs: Inputs  # as recorded
+    An offset of attitude or depth is then in the gap and not in the start, and two sensors that disagree cannot pull
+    the filter apart. Where motion capture has not seen the vehicle for COAST seconds, onboard takes over.
+    """
+    z, bounds = np.where(np.abs(problem.z) < LARGEST, problem.z, np.nan), problem.recording.bounds
+    for n, run in enumerate(problem.runs):
+        part = z[bounds[n] : bounds[n + 1]]
+        for onboard, mocap in DOUBLED:
+            seen = np.where(np.isfinite(part[:, mocap]), run.t, -np.inf)
+            part[run.t - np.maximum.accumulate(seen) < COAST, onboard] = np.nan
+    return z
 
 
-def prepare(case: Case, model: Model, runs: list[Run]) -> Flown:
-    """The filter over the runs, and the start of each window out of it."""
-    recording = start.record(case, model, runs)
-    estimates = start.estimate(recording, model)
-    found = [windows(run.t) for run in runs]
-    flat = [(n, window) for n, listed in enumerate(found) for window in listed if window.start < window.end]
-    offset = recording.bounds[:-1]
-    run_of = np.array([n for n, _ in flat], dtype=np.int64)
-    first = np.array([offset[n] + window.start for n, window in flat], dtype=np.int64)
-    last = np.array([offset[n] + window.end for n, window in flat], dtype=np.int64)
-    starts = estimates.x[first - 1].copy()
-    # Driven actuators stand where the draw-wires say; the speeds between samples keep them there.
-    for i in (0, 1):
-        at = recording.drawn[first - 1, i]
-        starts[:, X_ACT + 1 + i] = np.where(np.isfinite(at), at, starts[:, X_ACT + 1 + i])
-    scored = np.array([window.scored for _, window in flat], dtype=bool)
-    inputs = Inputs(recording.modes, recording.inputs, starts)
-    return Flown(recording, estimates, found, first, last, run_of, scored, inputs)
+def observe(problem: Problem, P: np.ndarray, F: np.ndarray) -> Gains:
+    """The filter that finds where windows start; it looks at no row behind the one where it stands."""
+    return observer_of(problem).filter(P, F, begin=True, speeds=START_SPEEDS)
 
 
-def fly(flown: Flown, models: list[Variant]) -> np.ndarray:
-    """Predictions (models, rows, N_Y); the windows' first 2 s hold the filter's estimate."""
-    recording = flown.recording
-    rows = len(recording.t)
-    Y = np.empty((len(models), rows, N_Y))
-    observe_rows(flown.estimates.x, Y[0])
-    Y[1:] = Y[0]
-    begins = np.repeat(recording.t[recording.bounds[:-1]], np.diff(recording.bounds))
-    # Variants that share their inputs share one copy: the list may be long and the rows many.
-    kinds = list({id(model.inputs): model.inputs for model in models}.values())
-    which = np.array([next(n for n, kind in enumerate(kinds) if kind is model.inputs) for model in models])
+def observer_of(problem: Problem) -> Problem:
+    """The problem as the filter sees it that finds starts."""
+    spreads = np.column_stack([problem.spreads, np.tile(LACKING_SPREAD, (len(problem.runs), 1))])
+    spreads[:, 6:9] = SPEED_SPREAD
+    return replace(problem, z=without_doubled(problem), starts=problem.starts.copy(), spreads=spreads)
+
+
+def fly_near(problem: Problem, models: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+    """Predictions (models, rows, N_Y) of models (P, F) near the problem's own, whose observer's gains are kept.
+
+    Far quicker than an observer of each. Rows that no window scores are NaN.
+    """
+    observer, r, scored = observer_of(problem), problem.recording, cut(problem)
+    F = np.zeros(ef.N_F) if problem.model.F is None else problem.model.F
+    gains = observer.filter(problem.model.P, F, begin=True, speeds=START_SPEEDS)
+    Y = np.full((len(models), *problem.z.shape), np.nan)
+    fly_followed(
+        np.array([P for P, _ in models]), np.array([F for _, F in models]), np.array(DRIFT), r.modes, r.bounds, r.t,
+        problem.stamps, r.inputs, observer.z, observer.starts, gains.W, gains.K, scored.first, scored.last,
+        scored.run_of, Y,
+    )  # fmt: skip
+    return Y
+
+
+def fly(problem: Problem, P: np.ndarray, F: np.ndarray) -> np.ndarray:
+    """A model's prediction (rows, N_Y) of all runs; the windows' first 2 s hold the filter's estimate."""
+    return fly_windows_from(problem, P, F, observe(problem, P, F))
+
+
+def fly_windows_from(problem: Problem, P: np.ndarray, F: np.ndarray, gains: Gains) -> np.ndarray:
+    """The same from where a filter stands."""
+    r, scored = problem.recording, cut(problem)
+    Y = np.empty_like(problem.z)
+    read_rows(F, gains.X, gains.path, r.t, r.bounds, Y)
     fly_windows(
-        np.array([model.P for model in models]),
-        np.array([model.extras for model in models]),
-        which,
-        np.array([kind.modes for kind in kinds]),
-        recording.t,
-        recording.t - begins,
-        np.array([kind.values for kind in kinds]),
-        np.array([np.zeros((rows, 6)) if kind.shaken is None else kind.shaken for kind in kinds]),
-        np.array([kind.starts for kind in kinds]),
-        flown.first,
-        flown.last,
-        flown.run_of,
-        Y,
+        P, F, r.modes, r.bounds, r.t, r.inputs, gains.X, gains.path, scored.first, scored.last, scored.run_of, Y
     )
     return Y
+
+
+def predict(case: Case, model: Model, runs: list[Run]) -> list[np.ndarray]:
+    """A prediction (rows, N_Y) for every run."""
+    problem = pose(case, model, runs)
+    Y = fly(problem, model.P, np.zeros(ef.N_F) if model.F is None else model.F)
+    return np.split(Y, problem.recording.bounds[1:-1])
 
 
 def as_run(run: Run, Y: np.ndarray) -> Run:
@@ -105,33 +107,7 @@ def as_run(run: Run, Y: np.ndarray) -> Run:
         if name in ONBOARD:
             columns[name] = Y[:, ONBOARD.index(name)]
         elif name in INSTEAD:
-            # motion capture beside onboard sensors, where the prediction tells them apart
-            own = ef.Y_MOCAP_X + (*names.MOCAP_POSITION, *names.MOCAP_ATTITUDE).index(name)
-            columns[name] = Y[:, own if own < Y.shape[1] else INSTEAD.index(name)]
+            columns[name] = Y[:, ef.Y_MOCAP_X + (*names.MOCAP_POSITION, *names.MOCAP_ATTITUDE).index(name)]
         else:  # time and commands are not predicted, only without gaps
-            columns[name] = start.held(values)
+            columns[name] = held(values)
     return replace(run, columns=columns, path=None)
-
-
-def predict(case: Case, model: Model, runs: list[Run]) -> list[np.ndarray]:
-    """A prediction (rows, N_Y) for every run."""
-    if model.F is not None:
-        return predict_effects(case, model, runs)
-    flown = prepare(case, model, runs)
-    Y = fly(flown, [Variant(model.P, flown.inputs)])[0]
-    bounds = flown.recording.bounds
-    return [Y[bounds[n] : bounds[n + 1]] for n in range(len(runs))]
-
-
-def predict_effects(case: Case, model: Model, runs: list[Run]) -> list[np.ndarray]:
-    """The same for a model with effects: each window starts where that model's own filter stands."""
-    from tools.inference import problem as whole
-
-    assert model.F is not None
-    posed = whole.pose(case, model, runs)
-    gains = posed.filter(model.P, model.F, begin=True)
-    scored = whole.cut(posed)
-    Y = whole.estimated(posed, model.F, gains)
-    whole.fly_on(posed, scored, model.P, model.F, gains, Y)
-    bounds = posed.recording.bounds
-    return [Y[bounds[n] : bounds[n + 1]] for n in range(len(runs))]

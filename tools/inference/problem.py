@@ -4,18 +4,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from firmware.core.estimation import estimator_layout as kf
+from firmware.core.estimation import estimator_layout as est
+from firmware.core.vehicle.layout import N_X
 from firmware.estimation.settings import UNSEEN_SERVO_WALK
+from firmware.model.vehicle import SensorsTable
 from sim_backend.core import effect_layout as ef
 from tools.data.runs import columns as names
 from tools.data.runs.case import Case
 from tools.data.runs.run import Run
-from tools.inference import start
 from tools.inference.channels import measured
 from tools.inference.core.filter import filter_runs, follow_runs
-from tools.inference.core.flight import fly_windows, read_rows, simulate_runs
+from tools.inference.core.flight import simulate_runs
 from tools.inference.core.step import N_ERR, N_Y
 from tools.inference.model import Model, nominal_model
+from tools.inference.recording import Recording, record
 from tools.inference.rules import Rules
 from tools.inference.windows import Window, windows
 
@@ -26,8 +28,12 @@ ACTUATOR_SPREAD = (1e-4, 3e-4, 5e-4)  # rad, m, kg: where commanded, they begin 
 UNSEEN_SPREAD = 0.3  # rad, of a servo without command
 ROUGH_WALK = (1e-6, 4e-10, 2.5e-9)  # per s, times the roughness squared, of filters that are not to trust the model
 ALL = Rules()
+LEAST_NOISE = 1e-6
 LOST = 1e6  # sigma; innovations of a model that has left every vehicle
 WALK = (1e-8, 1e-12, 1e-12)  # per s; commanded actuators go as the model says
+
+
+DRIFT = (10.0, 0.0005**2, 0.005**2)  # s, (rad/s)2/s, (m/s)2/s: of what the model lacks
 
 
 @dataclass
@@ -49,7 +55,7 @@ class Problem:
     case: Case
     model: Model
     runs: list[Run]
-    recording: start.Recording
+    recording: Recording
     z: np.ndarray  # (rows, N_Y) measured
     starts: np.ndarray  # (runs, N_XF)
     spreads: np.ndarray  # (runs, N_ERR)
@@ -90,16 +96,18 @@ class Problem:
         return np.asarray(self.valid.any(axis=0))
 
     def filter(
-        self, P: np.ndarray, F: np.ndarray, roughness: float = 1.0, begin: bool = False, more=None, doubt=None
-    ) -> Gains:
-        """The filter of a model over all runs; `roughness` multiplies the disturbance; `begin` seeks the first speed.
+        self, P: np.ndarray, F: np.ndarray, roughness: float = 1.0, begin: bool = False, more=None, doubt=None,
+        speeds=START_SPEEDS,
+    ) -> Gains:  # fmt: skip
+        """The filter of a model over all runs; `roughness` multiplies the disturbance; `begin` seeks the first speed
+        among `speeds`.
 
         more (N_SPECTRAL,) is added to the spectral densities, doubt (N_Y,) to the variances of the measurements.
         """
         rows, runs = len(self.z), len(self.runs)
         made = Gains(
-            np.empty((rows, N_Y, N_Y)), np.empty((rows, N_ERR, N_Y)), np.empty((rows, ef.N_XF)), np.empty((rows, 6)),
-            np.empty((rows, N_Y)), np.empty(runs),
+            np.empty((rows, N_Y, N_Y)), np.empty((rows, self.spreads.shape[1], N_Y)), np.empty((rows, ef.N_XF)),
+            np.empty((rows, 6)), np.empty((rows, N_Y)), np.empty(runs),
         )  # fmt: skip
         spectral = self.densities
         spectral[:6] += self.spectral[:6] * (roughness**2 - 1.0)
@@ -110,9 +118,9 @@ class Problem:
         R = self.R if doubt is None else self.R + doubt
         r = self.recording
         filter_runs(
-            P, F, spectral, R, r.modes, r.bounds, r.early, r.t, self.stamps, r.inputs, self.z, self.starts,
-            np.array(START_SPEEDS if begin else ()), self.spreads, made.X, made.path, made.E, made.W, made.K,
-            made.misfit,
+            P, F, spectral, R, self.model.sigma, np.array(DRIFT), r.modes, r.bounds, r.early, r.t, self.stamps,
+            r.inputs, self.z, self.starts, np.array(speeds if begin else ()), self.spreads, made.X, made.path, made.E,
+            made.W, made.K, made.misfit,
         )  # fmt: skip
         return made
 
@@ -132,8 +140,8 @@ class Problem:
             part = models[n : n + block]
             E = np.empty((len(part), *self.z.shape))
             follow_runs(
-                np.array([P for P, _ in part]), np.array([F for _, F in part]), r.modes, r.bounds, r.t, self.stamps,
-                r.inputs, self.z, self.starts, gains.W, gains.K, E,
+                np.array([P for P, _ in part]), np.array([F for _, F in part]), np.array(DRIFT), r.modes, r.bounds,
+                r.t, self.stamps, r.inputs, self.z, self.starts, gains.W, gains.K, E,
             )  # fmt: skip
             out.append(np.clip(np.nan_to_num(E[:, self.valid], nan=LOST), -LOST, LOST))
         return np.concatenate(out)
@@ -144,8 +152,8 @@ class Problem:
         at = slice(r.bounds[run], r.bounds[run + 1])
         recording = replace(
             r, bounds=np.array([0, r.bounds[run + 1] - r.bounds[run]]), early=r.early[run : run + 1] - r.bounds[run],
-            modes=r.modes[run : run + 1], settings=r.settings[run : run + 1], t=r.t[at], inputs=r.inputs[at],
-            drawn=r.drawn[at], z=r.z[at], starts=r.starts[run : run + 1], spreads=r.spreads[run : run + 1],
+            modes=r.modes[run : run + 1], t=r.t[at], inputs=r.inputs[at], drawn=r.drawn[at],
+            begins=r.begins[run : run + 1],
         )  # fmt: skip
         return replace(
             self, runs=[self.runs[run]], recording=recording, z=self.z[at], starts=self.starts[run : run + 1].copy(),
@@ -181,15 +189,24 @@ def measured_all(run: Run) -> np.ndarray:
     return table
 
 
+def variances(sensors: SensorsTable) -> np.ndarray:
+    """The measurements' variances, (N_Y,). A file may say that one has no noise; a filter must not believe that."""
+    of = [
+        *3 * [sensors.attitude], *3 * [sensors.gyro], sensors.depth, sensors.slider, sensors.ballast,
+        *3 * [sensors.mocap_position], *3 * [sensors.mocap_attitude],
+    ]  # fmt: skip
+    return np.array([max(sensor.noise, LEAST_NOISE) ** 2 for sensor in of])
+
+
 def pose(case: Case, model: Model | None = None, runs: list[Run] | None = None, rules: Rules = ALL) -> Problem:
     """The problem of a case (all of its runs, if none are named)."""
     model = nominal_model(case) if model is None else model
     runs = case.runs if runs is None else runs
-    recording = start.record(case, model, runs)
+    recording = record(runs)
     count = len(runs)
     z = np.concatenate([measured_all(run) for run in runs])
     starts, spreads = np.zeros((count, ef.N_XF)), np.zeros((count, N_ERR))
-    starts[:, :16] = recording.starts[:, :16]
+    starts[:, :N_X] = recording.begins
     starts[:, 7], starts[:, 10:13] = 0.2, 0.0
     starts[:, ef.X_GEAR_SERVO], starts[:, ef.X_GEAR_SLIDER] = starts[:, 13], starts[:, 14]
     walk = np.array(WALK)
@@ -209,7 +226,7 @@ def pose(case: Case, model: Model | None = None, runs: list[Run] | None = None, 
         [*3 * [d.linear**2 * kf.DISTURBANCE_HOLD], *3 * [d.angular**2 * kf.DISTURBANCE_HOLD], *walk, *4 * [0.0]]
     )
     run_of = np.repeat(np.arange(count), np.diff(recording.bounds))
-    R = recording.settings[:, kf.S_R :].copy()
+    R = np.tile(variances(case.sensors), (count, 1))
     return Problem(
         case, model, runs, recording, z, starts, spreads, spectral, R, np.isfinite(z), recording.t, run_of, rules
     )
@@ -236,19 +253,3 @@ def cut(problem: Problem) -> Scored:
         np.array([offset[n] + window.end for n, window in flat], dtype=np.int64),
         np.array([n for n, _ in flat], dtype=np.int64),
     )
-
-
-def estimated(problem: Problem, F: np.ndarray, gains: Gains) -> np.ndarray:
-    """What the sensors would read where the filter stands, (rows, N_Y)."""
-    Y = np.empty_like(problem.z)
-    read_rows(F, gains.X, gains.path, problem.recording.t, problem.recording.bounds, Y)
-    return Y
-
-
-def fly_on(problem: Problem, scored: Scored, P: np.ndarray, F: np.ndarray, gains: Gains, Y: np.ndarray) -> None:
-    """Fly every window on from where the filter stands, into Y (rows, N_Y)."""
-    r = problem.recording
-    fly_windows(
-        P[None], F[None], r.modes, r.bounds, r.t, r.inputs, gains.X[None], gains.path[None], scored.first, scored.last,
-        scored.run_of, Y[None],
-    )  # fmt: skip

@@ -23,7 +23,7 @@ PARTS = {
 
 def _charts(found: CaseGap, n: int) -> list[dict[str, Any]]:
     """The pictures of one run: title, gap and SVG."""
-    run, Y, listed = found.case.runs[n], found.predictions[n], found.flown.windows[n]
+    run, Y, listed = found.case.runs[n], found.predictions[n], found.windows[n]
     table, gaps, t = measured(run), found.runs[n].channels, run.t
     drawn: list[dict[str, Any]] = []
 

@@ -1,18 +1,17 @@
 """Predictions of made-up flights: near the truth, whatever columns are missing."""
 
-import itertools
-
 import numpy as np
 import pytest
 from support.flights import World, case_of, fly, fly_case
 
 from firmware.core.estimation import estimator_layout as kf
 from firmware.core.vehicle import layout
+from sim_backend.core import effect_layout as ef
 from tools.data.runs.run import Run
 from tools.gap.measure import root_mean_square, run_gap
 from tools.inference.model import load_model, nominal_model
-from tools.inference.predict import Variant, predict, prepare
-from tools.inference.predict import fly as fly_variants
+from tools.inference.predict import fly_windows_from, observe, predict
+from tools.inference.problem import cut, pose
 from tools.inference.windows import windows
 
 
@@ -28,14 +27,24 @@ def test_the_start_is_found_nearly_as_good_as_known(mocap, speed, most):
     found, known = [], []
     for seed in range(5):
         case, flights = fly_case(World(mocap=mocap, start_speed=speed), seed, runs=2)
-        model = nominal_model(case)
-        flown = prepare(case, model, case.runs)
-        bounds = flown.recording.bounds
-        for sink in (found, known):
-            Y = fly_variants(flown, [Variant(model.P, flown.inputs)])[0]
-            sink.append(total(case, [Y[a:b] for a, b in itertools.pairwise(bounds)]))
-            flown.inputs.starts[:] = np.concatenate([flight.truth for flight in flights])[flown.first - 1]
+        problem, P, F = pose(case), nominal_model(case).P, np.zeros(ef.N_F)
+        bounds = problem.recording.bounds
+        found.append(total(case, np.split(fly_windows_from(problem, P, F, observe(problem, P, F)), bounds[1:-1])))
+        gains = observe(problem, P, F)
+        gains.X[:] = np.concatenate([flight.truth for flight in flights])
+        known.append(total(case, np.split(fly_windows_from(problem, P, F, gains), bounds[1:-1])))
     assert root_mean_square(found) < most * root_mean_square(known)
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.2, 0.5])
+def test_the_launch_is_found_whether_at_rest_or_gliding(speed):
+    errors = []
+    for seed in range(6):
+        case, flights = fly_case(World(mocap=True, start_speed=speed, seconds=20.0), seed, runs=1)
+        problem = pose(case)
+        gains, row = observe(problem, problem.model.P, np.zeros(ef.N_F)), cut(problem).first[0] - 1
+        errors.append(gains.X[row, 7] - flights[0].truth[row, 7])
+    assert np.sqrt(np.mean(np.square(errors))) < 0.04
 
 
 def test_without_noise_the_nominal_vehicle_is_predicted_to_the_millimetre():
@@ -103,8 +112,7 @@ def test_without_commands_the_draw_wires_fly_it():
     run.columns["slider_m"][50:60] = np.nan
     case = case_of(World(), [run])
     model = nominal_model(case)
-    flown = prepare(case, model, case.runs)
-    assert flown.recording.modes[0] == kf.SERVO_DRIVEN | kf.SLIDER_DRIVEN | kf.BALLAST_DRIVEN
+    assert pose(case, model).recording.modes[0] == est.SERVO_DRIVEN | est.SLIDER_DRIVEN | est.BALLAST_DRIVEN
     (Y,) = predict(case, model, case.runs)
     seen = np.isfinite(run.columns["ballast_kg"])
     np.testing.assert_allclose(Y[seen, kf.Z_BALLAST], run.columns["ballast_kg"][seen], atol=2e-3)

@@ -17,8 +17,19 @@ from firmware.core.jit import kernel, parallel_kernel, prange
 from firmware.core.maths.rotations import rotation_nb, wrap_angle
 from firmware.core.vehicle.layout import N_P
 from sim_backend.core import effect_layout as ef
-from sim_backend.core.effect_plant import effective_parameters
+from sim_backend.core.effect_plant import fold, wrapped
+from tools.inference.core.lacking import (
+    L_GYRO,
+    N_LACKING,
+    Y_GYRO,
+    add_drift,
+    add_model_error,
+    lacking_columns,
+    step_lacking,
+    take_gyro_bias,
+)
 from tools.inference.core.step import (
+    LARGEST_SPEED,
     LATE,
     N_ERR,
     N_Y,
@@ -37,9 +48,8 @@ NUDGE = 1e-5  # of the state's unit, for derivatives
 
 @kernel
 def perturbed(x, j, error, moved):
-    """x with its error j at NUDGE, into moved; error (N_ERR) is scratch."""
-    for n in range(N_ERR):
-        error[n] = 0.0
+    """x with its error j at NUDGE, into moved; error (N_ERR or more) is scratch."""
+    error[:] = 0.0
     error[j] = NUDGE
     moved[:] = x
     inject_error(moved, error)
@@ -61,12 +71,12 @@ def noise_gain(x, dt, Gam):
 
 
 @kernel
-def linear_step(Pw, F, x, mode, t, inputs, i, begin, zero, work, kept, moved, base, error, Phi, Gam):
+def linear_step(Pw, F, x, acc, mode, t, inputs, i, begin, zero, work, kept, moved, base, error, Phi, Gam):
     """Fly x to row i; Phi (N_ERR, N_ERR) is the step's derivative by the state, Gam (N_ERR, 6) by accelerations.
 
-    Nothing of a step depends on the place north and east that it starts from, nor on motion capture's clock.
+    acc (6) is added to nu_dot. Nothing of a step depends on the place north and east that it starts from, nor on
+    motion capture's clock.
     """
-    acc = np.zeros(6)
     base[:] = x
     propagate(Pw, F, base, mode, t, inputs, i, begin, acc, zero, work, kept, True)
     for j in range(2):
@@ -98,29 +108,32 @@ def linear_reading(F, x, t, stamps, path, i, begin, moved, error, y, y2, H):
 
 
 @kernel
-def filter_run(P, F, spectral, R, mode, t, stamps, inputs, z, begin, end, start, spread, X, path, E, W, K):
+def filter_run(
+    P, F, spectral, R, sigma, drift, mode, t, stamps, inputs, z, begin, end, start, spread, X, path, E, W, K
+):
     """The Kalman filter over rows begin .. end - 1. Returns -2 log likelihood without its constant.
+
+    With a spread of N_ERR the model is taken at its word but for `spectral`; with N_ERR + N_LACKING the filter also
+    finds what the model lacks (core/lacking): sigma (N_P) and drift (N_DRIFT) say how much that may be.
 
     P (N_P), F (N_F); spectral (N_SPECTRAL): spectral densities of the accelerations ((m/s2)2 s, (rad/s2)2 s), walks
     of servo, slider, ballast, of the position and of motion capture's clock (per s); R (N_Y) measurements' variances;
-    start (N_XF), spread (N_ERR).
+    start (N_XF), spread (N_ERR or N_ERR + N_LACKING).
     Out: X (rows, N_XF) the state and path (rows, 6) after each row, E (rows, N_Y) whitened innovations, NaN where
-    nothing was measured, W (rows, N_Y, N_Y) what whitens a row's innovations and K (rows, N_ERR, N_Y) what corrects
+    nothing was measured, W (rows, N_Y, N_Y) what whitens a row's innovations and K (rows, spreads, N_Y) what corrects
     the state by the whitened ones.
     """
     Pw, x = np.empty(N_P), start.copy()
-    effective_parameters(P, F, Pw)
-    work, kept, moved, base = np.zeros((4, ef.N_XF)), np.empty(ef.N_XF), np.empty(ef.N_XF), np.empty(ef.N_XF)
-    error, zero, before = np.empty(N_ERR), np.zeros(3), np.empty(6)
-    Phi, Gam, cov, temp = (
-        np.empty((N_ERR, N_ERR)),
-        np.empty((N_ERR, 6)),
-        np.zeros((N_ERR, N_ERR)),
-        np.empty((N_ERR, N_ERR)),
-    )
-    H, L, y, y2, d = np.empty((N_Y, N_ERR)), np.empty((N_Y, N_Y)), np.empty(N_Y), np.empty(N_Y), np.empty(N_Y)
-    for j in range(N_ERR):
+    fold(P, F, Pw)
+    work, kept, moved, base = np.zeros((6, ef.N_XF)), np.empty(ef.N_XF), np.empty(ef.N_XF), np.empty(ef.N_XF)
+    count = len(spread)
+    error, zero, before, lacking = np.empty(count), np.zeros(3), np.empty(6), np.zeros(N_LACKING)
+    Phi, Gam, cov = np.zeros((count, count)), np.empty((count, 6)), np.zeros((count, count))
+    H, L, y, y2, d = np.zeros((N_Y, count)), np.empty((N_Y, N_Y)), np.empty(N_Y), np.empty(N_Y), np.empty(N_Y)
+    for j in range(count):
         cov[j, j] = spread[j] * spread[j]
+    if count > N_ERR:
+        add_model_error(Pw, sigma, x, 1.0, work, cov)
     misfit = 0.0
     for n in range(6):
         path[begin, n] = 0.0
@@ -128,27 +141,36 @@ def filter_run(P, F, spectral, R, mode, t, stamps, inputs, z, begin, end, start,
         if i > begin:
             dt = t[i] - t[i - 1]
             pose_of(x, before)
-            linear_step(Pw, F, x, mode, t, inputs, i, begin, zero, work, kept, moved, base, error, Phi, Gam)
+            linear_step(
+                Pw, F, x, lacking[:6], mode, t, inputs, i, begin, zero, work, kept, moved, base, error, Phi, Gam
+            )
+            if count > N_ERR:
+                step_lacking(drift, x, lacking, dt)
+                lacking_columns(drift, dt, Gam, Phi)
             log_path(x, before, path, i, begin)
-            temp[:] = Phi @ cov
-            cov[:] = temp @ Phi.T
+            cov[:] = Phi @ cov @ Phi.T
             for j in range(6):
                 s = spectral[j] / dt
-                for a in range(N_ERR):
-                    for b in range(N_ERR):
+                for a in range(count):
+                    for b in range(count):
                         cov[a, b] += s * Gam[a, j] * Gam[b, j]
             for j in range(3):
                 cov[12 + j, 12 + j] += spectral[6 + j] * dt
                 cov[j, j] += spectral[9 + j] * dt
             cov[LATE, LATE] += spectral[12] * dt
+            if count > N_ERR:
+                add_drift(Pw, sigma, drift, x, dt, work, cov)
         read_row(F, x, t, stamps, path, i, begin, y)
         innovation(z[i], y, d)
         linear_reading(F, x, t, stamps, path, i, begin, moved, error, y, y2, H)
+        if count > N_ERR:
+            take_gyro_bias(lacking, d)
+            for j in range(3):
+                H[Y_GYRO + j, N_ERR + L_GYRO + j] = 1.0
         # S = H cov H' + R of what was measured, its Cholesky factor L, and W = L^-1; K~ = cov H' L^-T
         for m in range(N_Y):
             if math.isnan(d[m]):
-                for j in range(N_ERR):
-                    H[m, j] = 0.0
+                H[m, :] = 0.0
         HC = H @ cov
         S = HC @ H.T
         for m in range(N_Y):
@@ -174,19 +196,19 @@ def filter_run(P, F, spectral, R, mode, t, stamps, inputs, z, begin, end, start,
                 for k in range(n, m):
                     total -= L[m, k] * W[i, k, n]
                 W[i, m, n] = total / L[m, m]
-        for a in range(N_ERR):
+        for a in range(count):
             for m in range(N_Y):
                 total = 0.0
                 for n in range(m + 1):
                     total += HC[n, a] * W[i, m, n]
                 K[i, a, m] = total
-        for a in range(N_ERR):
-            for b in range(N_ERR):
+        for a in range(count):
+            for b in range(count):
                 total = 0.0
                 for m in range(N_Y):
                     total += K[i, a, m] * K[i, b, m]
                 cov[a, b] -= total
-        for a in range(N_ERR):
+        for a in range(count):
             for b in range(a):
                 mean = 0.5 * (cov[a, b] + cov[b, a])
                 cov[a, b] = mean
@@ -194,10 +216,33 @@ def filter_run(P, F, spectral, R, mode, t, stamps, inputs, z, begin, end, start,
         for m in range(N_Y):
             if not math.isnan(d[m]):
                 misfit += 2.0 * math.log(L[m, m])
+        base[:] = x
         misfit += apply_gain(W[i], K[i], d, x, error, E[i])
+        for n in range(count - N_ERR):
+            lacking[n] += error[N_ERR + n]
+        if count > N_ERR and lost(x, cov):  # by readings of no vehicle: it begins anew
+            x[:] = base
+            lacking[:] = 0.0
+            K[i, :, :] = 0.0
+            cov[:] = 0.0
+            for j in range(count):
+                cov[j, j] = spread[j] * spread[j]
         for n in range(ef.N_XF):
             X[i, n] = x[n]
     return misfit
+
+
+@kernel
+def lost(x, cov):
+    """Whether a filter's state moves as no vehicle does, or is no number, or its covariance is none."""
+    total, fastest = 0.0, 0.0
+    for n in range(len(cov)):
+        total += cov[n, n]
+    for n in range(ef.N_XF):
+        total += x[n]
+    for n in range(7, 13):
+        fastest = max(fastest, abs(x[n]))
+    return not (math.isfinite(total) and fastest < LARGEST_SPEED)
 
 
 @kernel
@@ -214,7 +259,7 @@ def apply_gain(W, K, d, x, error, e):
                 value += W[m, n] * d[n]
         e[m] = value
         total += value * value
-    for a in range(N_ERR):
+    for a in range(len(error)):
         value = 0.0
         for m in range(N_Y):
             if not math.isnan(e[m]):
@@ -226,8 +271,9 @@ def apply_gain(W, K, d, x, error, e):
 
 @parallel_kernel
 def filter_runs(
-    P, F, spectral, R, modes, bounds, early, t, stamps, inputs, z, starts, speeds, spreads, X, path, E, W, K, misfit
-):
+    P, F, spectral, R, sigma, drift, modes, bounds, early, t, stamps, inputs, z, starts, speeds, spreads,
+    X, path, E, W, K, misfit,
+):  # fmt: skip
     """filter_run for every run, from the one of the forward speeds (m/s) that explains the rows below early best.
 
     misfit (runs) gets -2 log likelihood; starts (runs, N_XF) the speed taken.
@@ -236,61 +282,53 @@ def filter_runs(
         begin, end = bounds[run], bounds[run + 1]
         least, speed = math.inf, starts[run, 7]
         start = starts[run].copy()
-        for n in range(len(speeds)):
-            start[7] = speeds[n]
+        for n in range(len(speeds) + 1):
+            start[7] = speeds[n] if n < len(speeds) else speed
             found = filter_run(
-                P, F, spectral, R[run], modes[run], t, stamps, inputs, z, begin, early[run], start, spreads[run],
-                X, path, E, W, K,
+                P, F, spectral, R[run], sigma, drift, modes[run], t, stamps, inputs, z, begin,
+                early[run] if n < len(speeds) else end, start, spreads[run], X, path, E, W, K,
             )  # fmt: skip
-            if found < least:
+            if n == len(speeds):
+                misfit[run] = found
+            elif found < least:
                 least, speed = found, speeds[n]
         starts[run, 7] = speed
-        misfit[run] = filter_run(
-            P,
-            F,
-            spectral,
-            R[run],
-            modes[run],
-            t,
-            stamps,
-            inputs,
-            z,
-            begin,
-            end,
-            starts[run],
-            spreads[run],
-            X,
-            path,
-            E,
-            W,
-            K,
-        )
 
 
 @kernel
-def follow_run(P, F, mode, t, stamps, inputs, z, begin, end, start, W, K, X, path, E):
-    """A model flown along rows begin .. end - 1 with the gains of filter_run: X, path and E as there."""
+def follow_run(P, F, drift, mode, t, stamps, inputs, z, begin, end, start, W, K, X, path, E):
+    """A model flown along rows begin .. end - 1 with the gains of filter_run: X, path and E as there.
+
+    Where the gains correct what the model lacks, too, it is followed with the state.
+    """
     Pw, x = np.empty(N_P), start.copy()
-    effective_parameters(P, F, Pw)
-    work, kept = np.zeros((4, ef.N_XF)), np.empty(ef.N_XF)
-    error, zero, before, acc = np.empty(N_ERR), np.zeros(3), np.empty(6), np.zeros(6)
+    fold(P, F, Pw)
+    work, kept = np.zeros((6, ef.N_XF)), np.empty(ef.N_XF)
+    count = K.shape[1]
+    error, zero, before, lacking = np.empty(count), np.zeros(3), np.empty(6), np.zeros(N_LACKING)
     y, d = np.empty(N_Y), np.empty(N_Y)
     for n in range(6):
         path[begin, n] = 0.0
     for i in range(begin, end):
         if i > begin:
             pose_of(x, before)
-            propagate(Pw, F, x, mode, t, inputs, i, begin, acc, zero, work, kept, False)
+            propagate(Pw, F, x, mode, t, inputs, i, begin, lacking[:6], zero, work, kept, False)
+            if count > N_ERR:
+                step_lacking(drift, x, lacking, t[i] - t[i - 1])
             log_path(x, before, path, i, begin)
         read_row(F, x, t, stamps, path, i, begin, y)
         innovation(z[i], y, d)
+        if count > N_ERR:
+            take_gyro_bias(lacking, d)
         apply_gain(W[i], K[i], d, x, error, E[i])
+        for n in range(count - N_ERR):
+            lacking[n] += error[N_ERR + n]
         for n in range(ef.N_XF):
             X[i, n] = x[n]
 
 
 @parallel_kernel
-def follow_runs(Ps, Fs, modes, bounds, t, stamps, inputs, z, starts, W, K, E):
+def follow_runs(Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, K, E):
     """Whitened innovations E (models, rows, N_Y) of models Ps (models, N_P), Fs (models, N_F) with kept gains."""
     runs = len(bounds) - 1
     for n in prange(Ps.shape[0] * runs):
@@ -299,6 +337,6 @@ def follow_runs(Ps, Fs, modes, bounds, t, stamps, inputs, z, starts, W, K, E):
         # scratch of this run alone; indices count from its first row
         X, path = np.empty((end - begin, ef.N_XF)), np.empty((end - begin, 6))
         follow_run(
-            Ps[m], Fs[m], modes[run], t[begin:end], stamps[begin:end], inputs[begin:end], z[begin:end], 0, end - begin,
-            starts[run], W[begin:end], K[begin:end], X, path, E[m, begin:end],
+            Ps[m], Fs[m], drift, modes[run], t[begin:end], stamps[begin:end], inputs[begin:end], z[begin:end], 0,
+            end - begin, starts[run], W[begin:end], K[begin:end], X, path, E[m, begin:end],
         )  # fmt: skip

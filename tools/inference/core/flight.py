@@ -4,34 +4,59 @@ import math
 
 import numpy as np
 
-from firmware.core.jit import parallel_kernel, prange
+from firmware.core.jit import kernel, parallel_kernel, prange
 from firmware.core.vehicle.layout import N_P
 from sim_backend.core import effect_layout as ef
-from sim_backend.core.effect_plant import effective_parameters
+from sim_backend.core.effect_plant import fold
+from tools.inference.core.filter import follow_run
 from tools.inference.core.step import N_Y, log_path, pose_of, propagate, read_row
 
 
-@parallel_kernel
-def fly_windows(Ps, Fs, modes, bounds, t, inputs, X, paths, first, last, run_of, Y):
-    """Fly every window with every model from where its filter stands: Y (models, rows, N_Y), rows first .. last - 1.
+@kernel
+def fly_window(P, F, mode, t, inputs, X, path, first, last, Y):
+    """Fly rows first .. last - 1 of a run on from X[first - 1], into Y (rows, N_Y); path (rows, 6) up to there."""
+    Pw, x = np.empty(N_P), X[first - 1].copy()
+    fold(P, F, Pw)
+    work, kept = np.zeros((6, ef.N_XF)), np.empty(ef.N_XF)
+    zero, before, acc = np.zeros(3), np.empty(6), np.zeros(6)
+    flown = path[:last].copy()
+    for i in range(first, last):
+        pose_of(x, before)
+        propagate(Pw, F, x, mode, t, inputs, i, 0, acc, zero, work, kept, False)
+        log_path(x, before, flown, i, 0)
+        read_row(F, x, t, t, flown, i, 0, Y[i])
 
-    X (models, rows, N_XF) and paths (models, rows, 6) as filter_runs leaves them; nothing measured is looked at.
+
+@parallel_kernel
+def fly_windows(P, F, modes, bounds, t, inputs, X, paths, first, last, run_of, Y):
+    """Fly every window on from where a filter stands: Y (rows, N_Y), rows first .. last - 1.
+
+    X (rows, N_XF) and paths (rows, 6) as filter_runs leaves them. Nothing measured is looked at.
     """
-    windows = len(first)
-    for n in prange(Ps.shape[0] * windows):
-        m, w = n // windows, n % windows
-        P, F, run = Ps[m], Fs[m], run_of[w]
-        begin = bounds[run]
-        Pw, x = np.empty(N_P), X[m, first[w] - 1].copy()
-        effective_parameters(P, F, Pw)
-        work, kept = np.zeros((4, ef.N_XF)), np.empty(ef.N_XF)
-        zero, before, acc = np.zeros(3), np.empty(6), np.zeros(6)
-        path = paths[m, begin : last[w]].copy()
-        for i in range(first[w], last[w]):
-            pose_of(x, before)
-            propagate(Pw, F, x, modes[run], t, inputs, i, begin, acc, zero, work, kept, False)
-            log_path(x, before, path, i - begin, 0)
-            read_row(F, x, t[begin:], t[begin:], path, i - begin, 0, Y[m, i])
+    for w in prange(len(first)):
+        a, b = bounds[run_of[w]], bounds[run_of[w] + 1]
+        fly_window(P, F, modes[run_of[w]], t[a:b], inputs[a:b], X[a:b], paths[a:b], first[w] - a, last[w] - a, Y[a:b])
+
+
+@parallel_kernel
+def fly_followed(Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, K, first, last, run_of, Y):
+    """Every model followed along the runs with kept gains, and its windows flown on from there: Y as in fly_windows.
+
+    Rows outside the windows are left as they are.
+    """
+    runs = len(bounds) - 1
+    for n in prange(Ps.shape[0] * runs):
+        m, run = n // runs, n % runs
+        begin, end = bounds[run], bounds[run + 1]
+        X, path, E = np.empty((end - begin, ef.N_XF)), np.empty((end - begin, 6)), np.empty((end - begin, N_Y))
+        follow_run(
+            Ps[m], Fs[m], drift, modes[run], t[begin:end], stamps[begin:end], inputs[begin:end], z[begin:end], 0,
+            end - begin, starts[run], W[begin:end], K[begin:end], X, path, E,
+        )  # fmt: skip
+        for w in range(len(first)):
+            if run_of[w] == run:
+                a, b = first[w] - begin, last[w] - begin
+                fly_window(Ps[m], Fs[m], modes[run], t[begin:end], inputs[begin:end], X, path, a, b, Y[m, begin:end])
 
 
 @parallel_kernel

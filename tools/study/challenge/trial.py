@@ -13,7 +13,7 @@ from sim_backend.uncertainty import draw_parameters, sensor_errors
 from tools.data.runs import columns as names
 from tools.data.runs.run import Run
 from tools.gap.measure import root_mean_square, run_gap, wrap
-from tools.inference.channels import CHANNELS
+from tools.inference.channels import ONBOARD
 from tools.inference.windows import Window, windows
 from tools.study.challenge.design import STYLES, RunDesign, Site, draw_run, draw_runs
 from tools.study.challenge.forms import Form, draw_shapes, draw_waves
@@ -87,15 +87,15 @@ class Trial:
     def predict(
         self, flight: Flight, P: np.ndarray, F: np.ndarray, plain: bool = False, seen: bool = False
     ) -> np.ndarray:
-        """The flight's windows flown on from the truth with another model, (rows, N_Y); plain: of nominal form.
+        """The flight's windows flown on from the truth with another model, (rows, 11); plain: of nominal form.
 
         A model of nominal form takes the slider to be where its wire is, and knows of nothing that effects remember;
         seen: without motion capture it also starts at the depth and attitude that its sensors show, noise apart.
         """
         rows, found = flight.run.rows, [w for w in flight.windows if w.scored and w.start < w.end]
         truth = poses(flight.X)
-        Y = np.zeros((rows, N_Y))
-        beyond = EXTRA if self.site.mocap and (F[fo.FS_MOCAP_DELAY] or F[fo.FS_CLOCK_SKEW]) else 0
+        Y = np.zeros((rows, len(ONBOARD)))
+        beyond = EXTRA if self.site.mocap and (F[fo.MOCAP_DELAY] or F[fo.CLOCK_SKEW]) else 0
         first = np.array([w.start for w in found])
         last = np.array([w.end + beyond for w in found])
         longest = int((last - first).max())

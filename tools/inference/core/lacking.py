@@ -1,0 +1,79 @@
+"""What a model lacks, found by the filter beside the state: accelerations, constant errors of the gyro, moving water.
+
+A filter that takes a wrong model at its word pays for it where nothing is measured: a yaw moment that is off for as
+long as the vehicle turns ends up as a sideslip that is not there, and with it every window would start. So a filter
+that finds starts has N_LACKING states more: accelerations as large as the parameters' uncertainty makes them, which
+fade over a flight's manoeuvres; gyro biases; the water's velocity. Windows fly on without.
+"""
+
+import math
+
+import numpy as np
+
+from firmware.core.jit import kernel
+from firmware.core.maths.rotations import rotation_nb
+from firmware.core.vehicle.layout import N_P
+from firmware.core.vehicle.linearise import model_error
+from tools.inference.core.step import N_ERR
+
+L_GYRO, L_WATER = 6, 9  # of the lacking, behind m/s2 and rad/s2 (body): rad/s, m/s north and east
+N_LACKING = 11
+D_TIME, D_GYRO, D_WATER = 0, 1, 2  # drift: s over which accelerations fade; walks, (rad/s)2/s and (m/s)2/s
+N_DRIFT = 3
+# 1 sigma before the first measurement; of the accelerations it is the parameters'
+LACKING_SPREAD = (*6 * (0.0,), *3 * (0.003,), *2 * (0.05,))  # rad/s, m/s
+Y_GYRO = 3  # the first of the gyro's readings
+
+
+@kernel
+def step_lacking(drift, x, lacking, dt):
+    """A step of dt of the lacking (N_LACKING), in place, and of the position that the water carries."""
+    fade = math.exp(-dt / drift[D_TIME])
+    for j in range(L_GYRO):
+        lacking[j] *= fade
+    for j in range(2):
+        x[j] += dt * lacking[L_WATER + j]
+
+
+@kernel
+def lacking_columns(drift, dt, Gam, Phi):
+    """The lacking's columns of Phi; Gam (N_ERR, 6) is the step's derivative by accelerations."""
+    fade = math.exp(-dt / drift[D_TIME])
+    for j in range(L_GYRO):
+        for a in range(N_ERR):
+            Phi[a, N_ERR + j] = Gam[a, j]
+        Phi[N_ERR + j, N_ERR + j] = fade
+    for j in range(L_GYRO, N_LACKING):
+        Phi[N_ERR + j, N_ERR + j] = 1.0
+    for j in range(2):
+        Phi[j, N_ERR + L_WATER + j] = dt
+
+
+@kernel
+def add_model_error(P, sigma, x, share, work, cov):
+    """A share of the accelerations' covariance that parameters of 1 sigma (N_P) leave at x, to the lacking's in cov."""
+    point, C, Pt, g = work[0], np.empty((6, 6)), np.empty(N_P), work[1]
+    _, _, _, _, _, _, point[0], point[1], point[2] = rotation_nb(x[3], x[4], x[5], x[6])
+    for n in range(9):
+        point[3 + n] = x[7 + n]
+    model_error(P, sigma, 0.0, 0.0, 0.0, point, C, Pt, g)
+    for i in range(6):
+        for j in range(6):
+            cov[N_ERR + i, N_ERR + j] += share * C[i, j]
+
+
+@kernel
+def add_drift(P, sigma, drift, x, dt, work, cov):
+    """What dt adds to the lacking's covariance: as much of the model's error as keeps it where it is, and walks."""
+    add_model_error(P, sigma, x, 1.0 - math.exp(-2.0 * dt / drift[D_TIME]), work, cov)
+    for j in range(3):
+        cov[N_ERR + L_GYRO + j, N_ERR + L_GYRO + j] += drift[D_GYRO] * dt
+    for j in range(2):
+        cov[N_ERR + L_WATER + j, N_ERR + L_WATER + j] += drift[D_WATER] * dt
+
+
+@kernel
+def take_gyro_bias(lacking, d):
+    """Take the gyro's errors out of innovations d (N_Y)."""
+    for j in range(3):
+        d[Y_GYRO + j] -= lacking[L_GYRO + j]
