@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from firmware.core.estimation import estimator_layout as est
+from firmware.core.estimation import estimator_layout as kf
 from firmware.core.maths.rotations import euler_from_quaternion, quaternion_from_euler
 from firmware.estimation.settings import parameter_sigma
 from firmware.model.vehicle import Vehicle
@@ -95,7 +95,7 @@ def fly(world: World, seed: int, *, P: np.ndarray | None = None, name: str = "ru
     x[7] = world.start_speed
     F[ef.CURRENT_N], F[ef.CURRENT_E] = world.water
     truth, table = np.empty((len(t), ef.N_XF)), np.empty((len(t), len(ONBOARD)))
-    zero, work, kept, acc = np.zeros(3), np.zeros((6, ef.N_XF)), np.empty(ef.N_XF), np.zeros(6)
+    zero, work, kept, acc = np.zeros(3), np.zeros((4, ef.N_XF)), np.empty(ef.N_XF), np.zeros(6)
     steps = max(1, round(1.0 / world.rate_hz / STEP))
     moments = np.array([0.0, 1.0 / world.rate_hz / steps])
     held = -np.inf
@@ -109,7 +109,7 @@ def fly(world: World, seed: int, *, P: np.ndarray | None = None, name: str = "ru
                 strength = world.disturbance * np.repeat([disturbance.linear, disturbance.angular], 3)
                 acc[:] = strength * rng.standard_normal(6)
             inputs = np.array([commands[i], commands[i]])
-            propagate(P, F, x, est.COMMANDED, moments, inputs, 1, 0, acc, zero, work, kept, False)
+            propagate(P, F, x, kf.COMMANDED, moments, inputs, 1, 0, acc, zero, work, kept, False)
     sigma = [*3 * [sensors.attitude.noise], *3 * [sensors.gyro.noise], sensors.depth.noise]
     sigma += [sensors.slider.noise, sensors.ballast.noise]
     onboard = (*names.ATTITUDE, *names.RATES, names.DEPTH, *names.DRAW_WIRES)

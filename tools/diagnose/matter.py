@@ -12,7 +12,8 @@ from tools.diagnose.shrink import AFTER, FLOOR, Shrinkage, case_noise_floor
 from tools.gap.measure import errors, mean_square
 from tools.inference.channels import channels_of
 from tools.inference.fit import Hypothesis
-from tools.inference.problem import Problem, cut, estimated, fly_on
+from tools.inference.predict import fly_windows_from
+from tools.inference.problem import Problem, cut
 
 # Tolerances. A tolerance is what a simulator may be off; a tenth of it adds half a percent to a gap of one, and lies
 # below what noise and disturbance leave of a perfect model (0.12 to 0.17 in total), so no prediction is the better.
@@ -28,20 +29,14 @@ def movements(search: Search, hypothesis: Hypothesis) -> dict[str, float]:
         return {}
     problem = search.problem.as_recorded
     P, F = search.model(hypothesis)
-    gains, scored = problem.filter(P, F, begin=True), cut(problem)
-
-    def flown(effects: np.ndarray) -> np.ndarray:
-        Y = estimated(problem, effects, gains)
-        fly_on(problem, scored, P, effects, gains, Y)
-        return Y
-
-    whole, found = flown(F), {}
+    gains, found = problem.filter(P, F, begin=True), {}
+    whole = fly_windows_from(problem, P, F, gains)
     nominal = np.zeros(ef.N_F) if problem.model.F is None else problem.model.F
     for label in hypothesis.labels:
         entries = [free.entry for free in hypothesis.free if free.label == label]
         without = F.copy()
         without[entries] = nominal[entries]
-        found[label] = largest(problem, whole, flown(without))
+        found[label] = largest(problem, whole, fly_windows_from(problem, P, without, gains))
     return found
 
 

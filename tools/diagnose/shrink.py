@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tools.diagnose.search import Search
+from tools.diagnose.search import Search, without_extra_noise
 from tools.gap.measure import RunGap, root_mean_square, run_gap
 from tools.inference.channels import CHANNELS
 from tools.inference.fit import NUISANCE_LIMIT, Hypothesis, bounded_step

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from firmware.core.estimation import estimator_layout as est
+from firmware.core.estimation import estimator_layout as kf
 from firmware.core.vehicle.layout import N_X
 from firmware.estimation.settings import UNSEEN_SERVO_WALK
 from firmware.model.vehicle import SensorsTable

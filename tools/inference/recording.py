@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from firmware.core.estimation import estimator_layout as est
+from firmware.core.estimation import estimator_layout as kf
 from firmware.core.maths.rotations import quaternion_from_euler
 from firmware.core.vehicle.layout import N_X
 from tools.data.runs import columns as names
@@ -43,7 +43,7 @@ def drawn_position(t: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 def _inputs(run: Run) -> tuple[int, np.ndarray, np.ndarray]:
     """Mode, inputs (rows, 3) and driven positions (rows, 2) of a run."""
-    mode, t = est.COMMANDED, run.t
+    mode, t = kf.COMMANDED, run.t
     inputs, drawn = np.zeros((run.rows, 3)), np.full((run.rows, 2), np.nan)
     for i, command in enumerate(names.COMMANDS):
         values = run.columns.get(command)

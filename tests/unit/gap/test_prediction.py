@@ -112,7 +112,7 @@ def test_without_commands_the_draw_wires_fly_it():
     run.columns["slider_m"][50:60] = np.nan
     case = case_of(World(), [run])
     model = nominal_model(case)
-    assert pose(case, model).recording.modes[0] == est.SERVO_DRIVEN | est.SLIDER_DRIVEN | est.BALLAST_DRIVEN
+    assert pose(case, model).recording.modes[0] == kf.SERVO_DRIVEN | kf.SLIDER_DRIVEN | kf.BALLAST_DRIVEN
     (Y,) = predict(case, model, case.runs)
     seen = np.isfinite(run.columns["ballast_kg"])
     np.testing.assert_allclose(Y[seen, kf.Z_BALLAST], run.columns["ballast_kg"][seen], atol=2e-3)

@@ -17,7 +17,7 @@ from firmware.core.jit import kernel, parallel_kernel, prange
 from firmware.core.maths.rotations import rotation_nb, wrap_angle
 from firmware.core.vehicle.layout import N_P
 from sim_backend.core import effect_layout as ef
-from sim_backend.core.effect_plant import fold, wrapped
+from sim_backend.core.effect_plant import effective_parameters
 from tools.inference.core.lacking import (
     L_GYRO,
     N_LACKING,
@@ -124,8 +124,8 @@ def filter_run(
     the state by the whitened ones.
     """
     Pw, x = np.empty(N_P), start.copy()
-    fold(P, F, Pw)
-    work, kept, moved, base = np.zeros((6, ef.N_XF)), np.empty(ef.N_XF), np.empty(ef.N_XF), np.empty(ef.N_XF)
+    effective_parameters(P, F, Pw)
+    work, kept, moved, base = np.zeros((4, ef.N_XF)), np.empty(ef.N_XF), np.empty(ef.N_XF), np.empty(ef.N_XF)
     count = len(spread)
     error, zero, before, lacking = np.empty(count), np.zeros(3), np.empty(6), np.zeros(N_LACKING)
     Phi, Gam, cov = np.zeros((count, count)), np.empty((count, 6)), np.zeros((count, count))
@@ -302,8 +302,8 @@ def follow_run(P, F, drift, mode, t, stamps, inputs, z, begin, end, start, W, K,
     Where the gains correct what the model lacks, too, it is followed with the state.
     """
     Pw, x = np.empty(N_P), start.copy()
-    fold(P, F, Pw)
-    work, kept = np.zeros((6, ef.N_XF)), np.empty(ef.N_XF)
+    effective_parameters(P, F, Pw)
+    work, kept = np.zeros((4, ef.N_XF)), np.empty(ef.N_XF)
     count = K.shape[1]
     error, zero, before, lacking = np.empty(count), np.zeros(3), np.empty(6), np.zeros(N_LACKING)
     y, d = np.empty(N_Y), np.empty(N_Y)

@@ -7,7 +7,7 @@ import numpy as np
 from firmware.core.jit import kernel, parallel_kernel, prange
 from firmware.core.vehicle.layout import N_P
 from sim_backend.core import effect_layout as ef
-from sim_backend.core.effect_plant import fold
+from sim_backend.core.effect_plant import effective_parameters
 from tools.inference.core.filter import follow_run
 from tools.inference.core.step import N_Y, log_path, pose_of, propagate, read_row
 
@@ -16,8 +16,8 @@ from tools.inference.core.step import N_Y, log_path, pose_of, propagate, read_ro
 def fly_window(P, F, mode, t, inputs, X, path, first, last, Y):
     """Fly rows first .. last - 1 of a run on from X[first - 1], into Y (rows, N_Y); path (rows, 6) up to there."""
     Pw, x = np.empty(N_P), X[first - 1].copy()
-    fold(P, F, Pw)
-    work, kept = np.zeros((6, ef.N_XF)), np.empty(ef.N_XF)
+    effective_parameters(P, F, Pw)
+    work, kept = np.zeros((4, ef.N_XF)), np.empty(ef.N_XF)
     zero, before, acc = np.zeros(3), np.empty(6), np.zeros(6)
     flown = path[:last].copy()
     for i in range(first, last):

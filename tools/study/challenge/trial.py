@@ -18,7 +18,6 @@ from tools.inference.windows import Window, windows
 from tools.study.challenge.design import STYLES, RunDesign, Site, draw_run, draw_runs
 from tools.study.challenge.forms import Form, draw_shapes, draw_waves
 
-N_Y = 1 + max(column for channel in CHANNELS for column in channel.columns)  # columns of a prediction
 EXTRA = 40  # rows flown past the end: a fast motion capture clock looks ahead
 TUMBLED_PITCH, TUMBLED_ROLL, TOO_FAST = 1.31, 1.57, 1.5  # rad, rad, m/s
 
@@ -95,7 +94,7 @@ class Trial:
         rows, found = flight.run.rows, [w for w in flight.windows if w.scored and w.start < w.end]
         truth = poses(flight.X)
         Y = np.zeros((rows, len(ONBOARD)))
-        beyond = EXTRA if self.site.mocap and (F[fo.MOCAP_DELAY] or F[fo.CLOCK_SKEW]) else 0
+        beyond = EXTRA if self.site.mocap and (F[fo.FS_MOCAP_DELAY] or F[fo.FS_CLOCK_SKEW]) else 0
         first = np.array([w.start for w in found])
         last = np.array([w.end + beyond for w in found])
         longest = int((last - first).max())
