@@ -24,8 +24,8 @@ from hal.ports import (
 )  # fmt: skip
 from hal.recorder.schema import Field, RecordSpec
 from sim_backend.core import layout as wl
+from sim_backend.core.effects.catalogue import check_board
 from sim_backend.core.world import write_truth
-from sim_backend.effects.catalogue import check_board
 from sim_backend.world import Environment, SampledSensors, Start, World, build_world
 
 TRUTH = RecordSpec(

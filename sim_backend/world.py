@@ -14,11 +14,11 @@ from firmware.core.vehicle.seawater import STANDARD_PRESSURE, water_density
 from firmware.model.strict import Table
 from firmware.model.vehicle import Vehicle
 from hal.ports import empty_frame
-from sim_backend.core import effect_layout as ef
 from sim_backend.core import layout as wl
 from sim_backend.core import world as core
+from sim_backend.core.effects import effect_layout as ef
+from sim_backend.core.effects.catalogue import apply_effects
 from sim_backend.core.environment import wave_row
-from sim_backend.effects.catalogue import apply_effects
 from sim_backend.uncertainty import sensor_errors
 
 PLANT_STEP = 0.01  # s

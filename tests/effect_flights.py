@@ -3,8 +3,8 @@
 import numpy as np
 
 from firmware.core.maths.rotations import quaternion_from_euler
-from sim_backend.core.effect_layout import N_XF
-from sim_backend.effects.catalogue import catalogue
+from sim_backend.core.effects.catalogue import catalogue
+from sim_backend.core.effects.effect_layout import N_XF
 from sim_backend.world import Environment, SampledSensors, Start, World, build_world
 from tools.data.sources import load_vehicle
 

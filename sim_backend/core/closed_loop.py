@@ -11,9 +11,9 @@ from firmware.core.jit import kernel, parallel_kernel, prange
 from firmware.core.vehicle.layout import N_P, N_X, X_ACT, X_DOWN, X_EAST, X_NORTH
 from firmware.core.vehicle.state import euler_angles
 from hal.ports import FRAME_SIZE
-from sim_backend.core import effect_layout as ef
 from sim_backend.core import layout as wl
 from sim_backend.core.effect_plant import set_effects
+from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.world import deliver, move, move_with_effects
 
 # what is kept of each logged tick

@@ -11,8 +11,8 @@ from firmware.core.maths.steps import NODE, RK4, end_stage
 from firmware.core.vehicle.flight import add_accelerations, body_derivative
 from firmware.core.vehicle.layout import N_P, N_X, X_BALLAST, X_DOWN, X_EAST, X_NORTH, X_SERVO, X_SLIDER
 from firmware.core.vehicle.state import normalise_attitude, rotation, velocities
-from sim_backend.core import effect_layout as ef
 from sim_backend.core import layout as wl
+from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.actuation import effective_actuators, geared, motor_speeds, update_gears
 from sim_backend.core.effects.correction import correction
 from sim_backend.core.effects.hydrodynamics import effective_coefficients, extra_wrench

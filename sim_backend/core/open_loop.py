@@ -4,9 +4,9 @@ import numpy as np
 
 from firmware.core.jit import kernel, parallel_kernel, prange
 from firmware.core.vehicle.layout import N_P, N_X
-from sim_backend.core import effect_layout as ef
 from sim_backend.core import layout as wl
 from sim_backend.core.effect_plant import effect_world_step, set_effects
+from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.plant import hold_disturbance, plant_step
 
 

@@ -9,9 +9,9 @@ from firmware.core.supervision import supervisor_layout as sup
 from firmware.core.vehicle.layout import GRAVITY, PLUNGER_AREA, X_BALLAST, X_DOWN, X_NU, X_POS, X_SLIDER
 from firmware.core.vehicle.state import euler_angles, velocities
 from hal.ports import BEACON, IMU, PLUNGER_WIRE, SLIDER_WIRE
-from sim_backend.core import effect_layout as ef
 from sim_backend.core import layout as wl
 from sim_backend.core.effect_plant import effect_world_step, set_effects
+from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.sensing import read
 from sim_backend.core.noise import gaussian
 from sim_backend.core.plant import hold_disturbance, plant_step

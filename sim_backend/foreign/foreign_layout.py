@@ -55,7 +55,7 @@ X_ALPHA = 36  # rad, angle of attack that the lift has followed
 N_FX = 37
 assert N_X == X_SERVO_V
 
-# --- readings: as the first nine columns of a prediction (sim_backend/core/effect_layout) ---
+# --- readings: as the first nine columns of a prediction (sim_backend/core/effects/effect_layout) ---
 (FR_ROLL, FR_PITCH, FR_YAW, FR_P, FR_Q, FR_R, FR_DEPTH, FR_SLIDER, FR_BALLAST) = range(9)
 N_FR = 9
 

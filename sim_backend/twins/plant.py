@@ -13,7 +13,7 @@ from firmware.core.maths.rotations import quaternion_from_euler
 from firmware.core.vehicle.layout import X_ACT, X_NU, X_POS, X_QUAT
 from hal.ports import BEACON, IMU, PLUNGER_WIRE, SLIDER_WIRE
 from sim_backend.core import layout as wl
-from sim_backend.core.effect_layout import X_LAG
+from sim_backend.core.effects.effect_layout import X_LAG
 from sim_backend.world import Environment, SampledSensor, SampledSensors, Start, World, build_world
 
 AT_ONCE = SampledSensor(rate_hz=100.0, delay_s=0.0)  # the lines add the delays

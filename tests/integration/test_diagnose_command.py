@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.cases import make_case
 
-from sim_backend.core import effect_layout as ef
+from sim_backend.core.effects import effect_layout as ef
 from tools.cli.common import report_errors
 from tools.cli.main import cli
 from tools.data.runs import columns as names

@@ -8,12 +8,12 @@ from model_states import actuators, repeatable, states, vehicles
 
 from firmware.core.maths.steps import RK4
 from firmware.core.vehicle import layout
-from sim_backend.core import effect_layout as ef
 from sim_backend.core import layout as wl
 from sim_backend.core.effect_plant import effect_step, effective_parameters
+from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.actuation import backlash
+from sim_backend.core.effects.catalogue import catalogue
 from sim_backend.core.plant import plant_step
-from sim_backend.effects.catalogue import catalogue
 
 NO_WAVES = np.zeros((0, wl.N_WAVE))
 STILL = np.zeros(wl.N_ENV)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sim_backend.core import effect_layout as ef
+from sim_backend.core.effects import effect_layout as ef
 from tools.data.runs import columns as names
 from tools.data.runs.case import Case, load_case, write_case
 from tools.data.runs.run import Run

@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 
-from sim_backend.effects.catalogue import catalogue
+from sim_backend.core.effects.catalogue import catalogue
 from tools.data.runs import columns as names
 from tools.diagnose.noise_probes import UNPREDICTABLE
 from tools.inference.parameters import effect_parameters

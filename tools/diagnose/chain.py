@@ -8,7 +8,7 @@ Shares do not add up: an error of the pump can be taken up by its own speed, and
 
 import numpy as np
 
-from sim_backend.effects.catalogue import catalogue
+from sim_backend.core.effects.catalogue import catalogue
 from tools.diagnose.noise_probes import CLOCK, TURBULENCE, WAVES, NoiseProbe, ProbeResult, probes, run_probes
 from tools.diagnose.record import NONE, UNKNOWN, Link, Noise, Panel
 from tools.diagnose.search import Search, without_extra_noise

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from sim_backend.core import effect_layout as ef
+from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.correction import shapes
 from tools.diagnose.noise_probes import UNPREDICTABLE, NoiseProbe, ProbeResult
 from tools.diagnose.residuals import pump_speed

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from sim_backend.effects.catalogue import catalogue
+from sim_backend.core.effects.catalogue import catalogue
 from tools.data.runs.case import Case
 from tools.diagnose.cautions import cautions, not_asked
 from tools.diagnose.chain import noise_of, panels

@@ -6,7 +6,7 @@ hundred nat in ten minutes of 10 Hz. What nobody could see in a window is no gap
 
 import numpy as np
 
-from sim_backend.core import effect_layout as ef
+from sim_backend.core.effects import effect_layout as ef
 from tools.diagnose.search import Search
 from tools.diagnose.shrink import AFTER, FLOOR, Shrinkage, case_noise_floor
 from tools.gap.measure import errors, mean_square

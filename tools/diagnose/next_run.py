@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from firmware.core.vehicle.mass import swung_moment
-from sim_backend.core import effect_layout as ef
+from sim_backend.core.effects import effect_layout as ef
 from tools.diagnose.search import Search
 from tools.gap.measure import wrap
 from tools.inference.channels import CHANNELS

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim_backend.core import effect_layout as ef
+from sim_backend.core.effects import effect_layout as ef
 from tools.inference.core.filter import N_SPECTRAL
 from tools.inference.problem import Problem
 

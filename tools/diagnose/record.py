@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 import numpy as np
 
-from sim_backend.effects.catalogue import catalogue
+from sim_backend.core.effects.catalogue import catalogue
 from tools.data.errors import InputError
 from tools.data.plain import as_plain
 from tools.diagnose.stages import STAGES

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sim_backend.effects.catalogue import catalogue
+from sim_backend.core.effects.catalogue import catalogue
 from tools.diagnose.sensor_consistency import DISTANT, HOLDS_BELOW, NEARBY, inconsistent_sensor
 from tools.diagnose.time_alignment import aligned
 from tools.inference.fit import POOR, THRESHOLD_STEP, Fitter, Hypothesis

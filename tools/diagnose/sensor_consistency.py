@@ -9,7 +9,7 @@ import itertools
 
 import numpy as np
 
-from sim_backend.effects.catalogue import catalogue
+from sim_backend.core.effects.catalogue import catalogue
 from tools.inference.parameters import CLOCK_PLACE, FreeParameter, model_at
 from tools.inference.problem import LOST, Gains, Problem
 

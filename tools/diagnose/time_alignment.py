@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sim_backend.core import effect_layout as ef
+from sim_backend.core.effects import effect_layout as ef
 from tools.inference.problem import Problem
 
 UNSEEN_SPEED = 0.4  # m/s, by which a vehicle may have left its first pose's place before that was taken

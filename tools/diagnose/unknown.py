@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
-from sim_backend.core import effect_layout as ef
-from sim_backend.effects.catalogue import catalogue
+from sim_backend.core.effects import effect_layout as ef
+from sim_backend.core.effects.catalogue import catalogue
 from tools.diagnose.noise_probes import CLOCK, TURBULENCE, WAVES, ProbeResult, probes, run_probes
 from tools.diagnose.search import Search
 from tools.diagnose.shrink import Shrinkage

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim_backend.effects.catalogue import catalogue
+from sim_backend.core.effects.catalogue import catalogue
 from tools.diagnose.matter import MATTERS, disorder_matters, gap_matters, movements
 from tools.diagnose.noise_probes import CLOCK, UNPREDICTABLE, ProbeResult, inflated
 from tools.diagnose.record import NONE, UNKNOWN, Finding

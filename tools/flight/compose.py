@@ -92,8 +92,8 @@ def load_board_file(wanted: str) -> BoardFile:
 
 def parse_effects(items: tuple[str, ...]) -> dict[str, dict[str, float]]:
     """`label:parameter=value,...` items as a dictionary; InputError says which item is wrong."""
-    from sim_backend.effects.base import EffectError
-    from sim_backend.effects.catalogue import check_flown
+    from sim_backend.core.effects.base import EffectError
+    from sim_backend.core.effects.catalogue import check_flown
 
     effects: dict[str, dict[str, float]] = {}
     for item in items:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from sim_backend.core import effect_layout as ef
+from sim_backend.core.effects import effect_layout as ef
 from tools.data.errors import InputError
 from tools.data.runs.case import Case
 from tools.gap.measure import RunGap, case_channels, root_mean_square, run_gap

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sim_backend.effects.catalogue import catalogue
+from sim_backend.core.effects.catalogue import catalogue
 from tools.gap.cells import Cells, cells_of
 from tools.inference.channels import measured
 from tools.inference.parameters import NUISANCE, effect_parameters, model_at, nuisance_parameters

@@ -17,8 +17,8 @@ from firmware.core.maths.rotations import quaternion_from_euler
 from firmware.core.vehicle import layout
 from firmware.estimation.settings import parameter_sigma
 from firmware.model.vehicle import COEFFICIENTS, SensorTable, Vehicle
-from sim_backend.core import effect_layout as ef
 from sim_backend.core import layout as wl
+from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.open_loop import fly_open_loop_many
 from tools.data.runs import columns as names
 from tools.data.runs.case import SensorsPart, write_case

@@ -13,7 +13,7 @@ import numpy as np
 from firmware.core.jit import kernels_digest
 from firmware.core.vehicle import layout
 from firmware.model.vehicle import COEFFICIENTS, PLACES, Vehicle, decode_vehicle
-from sim_backend.effects.catalogue import catalogue
+from sim_backend.core.effects.catalogue import catalogue
 from tools.data.runs.case import CASE_FILE
 from tools.data.runs.csvfile import write_bytes
 from tools.data.tomltext import toml_text

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim_backend.core import effect_layout as ef
+from sim_backend.core.effects import effect_layout as ef
 from tools.data.runs.case import Case
 from tools.data.runs.run import Run
 from tools.identify import levels as noise

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from sim_backend.core import effect_layout as ef
+from sim_backend.core.effects import effect_layout as ef
 from tools.data.runs.case import Case
 from tools.data.runs.run import Run
 from tools.gap.measure import RunGap, case_channels, root_mean_square

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sim_backend.core import effect_layout as ef
+from sim_backend.core.effects import effect_layout as ef
 from tools.inference.problem import Gains, Problem
 
 DISTURBANCE = {"disturbance_linear": slice(0, 3), "disturbance_angular": slice(3, 6)}  # of the spectral densities

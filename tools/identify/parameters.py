@@ -12,7 +12,7 @@ import numpy as np
 
 from firmware.core.vehicle import layout
 from firmware.model.vehicle import COEFFICIENTS
-from sim_backend.core import effect_layout as ef
+from sim_backend.core.effects import effect_layout as ef
 from tools.inference.parameters import FreeParameter
 from tools.inference.problem import Problem
 

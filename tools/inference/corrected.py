@@ -8,9 +8,9 @@ import numpy as np
 
 from firmware.core.vehicle import layout
 from firmware.model.strict import ConfigError, Table, decode
-from sim_backend.core import effect_layout as ef
-from sim_backend.effects.base import EffectError
-from sim_backend.effects.catalogue import catalogue, check_values
+from sim_backend.core.effects import effect_layout as ef
+from sim_backend.core.effects.base import EffectError
+from sim_backend.core.effects.catalogue import catalogue, check_values
 from tools.data.sources import read_text
 from tools.inference.model import Model
 

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim_backend.core import effect_layout as ef
-from sim_backend.effects.base import Effect
-from sim_backend.effects.catalogue import catalogue
+from sim_backend.core.effects import effect_layout as ef
+from sim_backend.core.effects.base import Effect
+from sim_backend.core.effects.catalogue import catalogue
 from tools.inference.problem import Problem
 
 NUISANCE = ""  # the label of what is no effect

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sim_backend.core import effect_layout as ef
+from sim_backend.core.effects import effect_layout as ef
 from tools.data.runs import columns as names
 from tools.data.runs.case import Case
 from tools.data.runs.run import Run

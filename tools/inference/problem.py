@@ -8,7 +8,7 @@ from firmware.core.estimation import estimator_layout as kf
 from firmware.core.vehicle.layout import N_X
 from firmware.estimation.settings import UNSEEN_SERVO_WALK
 from firmware.model.vehicle import SensorsTable
-from sim_backend.core import effect_layout as ef
+from sim_backend.core.effects import effect_layout as ef
 from tools.data.runs import columns as names
 from tools.data.runs.case import Case
 from tools.data.runs.run import Run

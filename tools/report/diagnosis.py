@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from sim_backend.effects.catalogue import catalogue
+from sim_backend.core.effects.catalogue import catalogue
 from tools.diagnose.noise_probes import CLOCK, UNPREDICTABLE
 from tools.diagnose.record import Curves, Panel, Picture, Record, number, read_record
 from tools.inference.channels import CHANNELS

@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from sim_backend.effects.catalogue import catalogue
+from sim_backend.core.effects.catalogue import catalogue
 from tools.diagnose.noise_probes import CLOCK, TURBULENCE, UNPREDICTABLE
 from tools.diagnose.record import Finding, Gap, Record
 from tools.diagnose.record import number as finite

@@ -22,7 +22,7 @@ from firmware.core.vehicle.layout import (
     X_SLIDER,
 )
 from firmware.core.vehicle.state import actuators
-from sim_backend.core import effect_layout as ef
+from sim_backend.core.effects import effect_layout as ef
 
 SERVO_DRIVEN, SLIDER_DRIVEN, BALLAST_DRIVEN = 1, 2, 4  # mode: this actuator's input is a speed, not a command
 

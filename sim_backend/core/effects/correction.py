@@ -5,7 +5,7 @@ import math
 from firmware.core.jit import kernel
 from firmware.core.vehicle.layout import X_DOWN
 from firmware.core.vehicle.state import rotation, velocities
-from sim_backend.core import effect_layout as ef
+from sim_backend.core.effects import effect_layout as ef
 
 SPEED, DEPTH, ANGLE, RATE, PUMP, TIME = 0.3, 5.0, 0.1, 0.1, 0.03, 60.0  # of a glide: m/s, m, rad, rad/s, kg/s, s
 SLOWEST = 0.05  # m/s, below which angles of flow grow no more

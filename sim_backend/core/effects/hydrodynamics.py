@@ -19,7 +19,7 @@ from firmware.core.vehicle.layout import (
     LIFT_PRINTED,
 )
 from firmware.core.vehicle.water import flow_angles, flow_to_body
-from sim_backend.core import effect_layout as ef
+from sim_backend.core.effects import effect_layout as ef
 
 
 @kernel

@@ -2,7 +2,7 @@
 
 from firmware.core.jit import kernel
 from firmware.core.vehicle import layout
-from sim_backend.core import effect_layout as ef
+from sim_backend.core.effects import effect_layout as ef
 
 
 @kernel

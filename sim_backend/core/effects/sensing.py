@@ -6,7 +6,7 @@ from firmware.core.jit import kernel
 from firmware.core.maths.rotations import wrap_angle
 from firmware.core.vehicle.layout import X_BALLAST, X_DOWN, X_EAST, X_NORTH, X_NU, X_SLIDER
 from firmware.core.vehicle.state import euler_angles
-from sim_backend.core import effect_layout as ef
+from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.actuation import backlash
 
 

@@ -1,7 +1,7 @@
-"""Effects of the water's motion; waves and turbulence change the world instead (sim_backend/effects/water_motion)."""
+"""Effects of the water's motion; waves and turbulence change the world instead (water_motion)."""
 
 from firmware.core.jit import kernel
-from sim_backend.core import effect_layout as ef
+from sim_backend.core.effects import effect_layout as ef
 
 
 @kernel

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sim_backend.core import layout as wl
-from sim_backend.core.effect_layout import DRAG_0
+from sim_backend.core.effects.effect_layout import DRAG_0
 from tools.study.campaign.fingerprint import fingerprint
 from tools.study.campaign.worlds import draw_world
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import tools.study
 
 BLIND = ("make", "plan", "forms", "cases", "trial", "design", "magnitude", "evidence", "seal")
-FORBIDDEN = ("sim_backend.effects", "sim_backend.core.effect", "tools.diagnose", "tools.identify", "tools.cli")
+FORBIDDEN = ("sim_backend.core.effects", "sim_backend.core.effect", "tools.diagnose", "tools.identify", "tools.cli")
 
 
 def test_what_makes_the_cases_never_sees_effects_or_diagnosis():

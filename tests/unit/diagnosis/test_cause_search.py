@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.cases import make_case
 
-from sim_backend.core import effect_layout as ef
+from sim_backend.core.effects import effect_layout as ef
 from tools.diagnose.search import PRUNE_BEHIND, prune, run
 from tools.inference.problem import pose
 

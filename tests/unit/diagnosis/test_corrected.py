@@ -5,7 +5,7 @@ import pytest
 
 from firmware.core.vehicle import layout
 from firmware.model.strict import ConfigError
-from sim_backend.core import effect_layout as ef
+from sim_backend.core.effects import effect_layout as ef
 from tools.data.sources import load_vehicle
 from tools.inference.corrected import LINKS, corrected_text, load_corrected
 from tools.inference.model import Model

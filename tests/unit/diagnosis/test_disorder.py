@@ -3,7 +3,7 @@
 import numpy as np
 from support.cases import make_case
 
-from sim_backend.core import effect_layout as ef
+from sim_backend.core.effects import effect_layout as ef
 from tools.diagnose.noise_probes import CLOCK, TURBULENCE
 from tools.diagnose.search import run
 from tools.diagnose.verdict import conclude

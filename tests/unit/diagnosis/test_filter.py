@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support.cases import begins, drawn, make_case
 
-from sim_backend.core import effect_layout as ef
+from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.timing import mean_input
 from tools.diagnose.residuals import tests as residual_tests
 from tools.inference.core.step import N_ERR, difference, inject_error

@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import lsq_linear
 from support.cases import make_case
 
-from sim_backend.core import effect_layout as ef
+from sim_backend.core.effects import effect_layout as ef
 from tools.inference.fit import Fitter, bounded_step
 from tools.inference.parameters import effect_parameters, model_at, nuisance_parameters
 from tools.inference.problem import pose

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support.cases import make_case
 
-from sim_backend.core import effect_layout as ef
+from sim_backend.core.effects import effect_layout as ef
 from tools.diagnose.matter import MATTERS, excess, movements
 from tools.diagnose.record import NONE, UNKNOWN
 from tools.diagnose.search import run

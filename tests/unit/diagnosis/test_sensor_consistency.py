@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support.cases import make_case
 
-from sim_backend.core import effect_layout as ef
+from sim_backend.core.effects import effect_layout as ef
 from tools.diagnose.search import ROUGHNESS
 from tools.diagnose.sensor_consistency import HOLDS_BELOW, inconsistent_sensor, mean_nis
 from tools.diagnose.time_alignment import aligned, sample_at_row

@@ -6,7 +6,7 @@ from support.flights import World, case_of, fly, fly_case
 
 from firmware.core.estimation import estimator_layout as kf
 from firmware.core.vehicle import layout
-from sim_backend.core import effect_layout as ef
+from sim_backend.core.effects import effect_layout as ef
 from tools.data.runs.run import Run
 from tools.gap.measure import root_mean_square, run_gap
 from tools.inference.model import load_model, nominal_model

@@ -5,7 +5,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from sim_backend.effects.catalogue import catalogue
+from sim_backend.core.effects.catalogue import catalogue
 from tools.diagnose.chain import LEAST, ordered, shared_out
 from tools.diagnose.noise_probes import NoiseProbe, ProbeResult
 from tools.diagnose.record import Link, Place

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sim_backend.effects.catalogue import catalogue
+from sim_backend.core.effects.catalogue import catalogue
 from tools.diagnose.noise_probes import CLOCK, TURBULENCE
 from tools.diagnose.record import (
     Answer,

@@ -8,9 +8,9 @@ from firmware.core.vehicle.layout import X_BALLAST, X_SERVO, X_SLIDER
 from hal.board import BoardRequest
 from hal.strict import ConfigError
 from sim_backend.board import build_board
-from sim_backend.core import effect_layout as ef
-from sim_backend.effects.base import EffectError
-from sim_backend.effects.catalogue import apply_effects, catalogue, check_values
+from sim_backend.core.effects import effect_layout as ef
+from sim_backend.core.effects.base import EffectError
+from sim_backend.core.effects.catalogue import apply_effects, catalogue, check_values
 
 ROUGH = {"disturbance_linear": 0.01, "disturbance_angular": 0.02}
 NOMINAL, READ = flown(world(**ROUGH))

@@ -9,11 +9,11 @@ from effect_flights import VEHICLE, flown, held, quiet
 from firmware.core.maths.rotations import quaternion_from_euler, rotation_nb
 from firmware.core.vehicle import layout
 from firmware.core.vehicle.water import water_wrench
-from sim_backend.core import effect_layout as ef
 from sim_backend.core.effect_plant import effect_derivative, effective_parameters
+from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.actuation import BALLAST_DRIVEN, SLIDER_DRIVEN, backlash
+from sim_backend.core.effects.catalogue import apply_effects
 from sim_backend.core.effects.hydrodynamics import extra_wrench, tether_wrench
-from sim_backend.effects.catalogue import apply_effects
 
 P = VEHICLE.vector()
 SERVO, SLIDER, BALLAST = (VEHICLE.actuators.servo, VEHICLE.actuators.slider, VEHICLE.actuators.ballast)

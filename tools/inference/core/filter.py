@@ -16,8 +16,8 @@ import numpy as np
 from firmware.core.jit import kernel, parallel_kernel, prange
 from firmware.core.maths.rotations import rotation_nb, wrap_angle
 from firmware.core.vehicle.layout import N_P
-from sim_backend.core import effect_layout as ef
 from sim_backend.core.effect_plant import effective_parameters
+from sim_backend.core.effects import effect_layout as ef
 from tools.inference.core.lacking import (
     L_GYRO,
     N_LACKING,

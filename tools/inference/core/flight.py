@@ -6,8 +6,8 @@ import numpy as np
 
 from firmware.core.jit import kernel, parallel_kernel, prange
 from firmware.core.vehicle.layout import N_P
-from sim_backend.core import effect_layout as ef
 from sim_backend.core.effect_plant import effective_parameters
+from sim_backend.core.effects import effect_layout as ef
 from tools.inference.core.filter import follow_run
 from tools.inference.core.step import N_Y, log_path, pose_of, propagate, read_row
 

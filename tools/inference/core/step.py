@@ -9,8 +9,8 @@ import math
 from firmware.core.jit import kernel
 from firmware.core.maths.rotations import euler_from_quaternion, wrap_angle
 from firmware.core.maths.steps import MIDPOINT, RK4
-from sim_backend.core import effect_layout as ef
 from sim_backend.core.effect_plant import effect_step
+from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.correction import correction
 from sim_backend.core.effects.sensing import read
 from sim_backend.core.effects.timing import mean_input, mocap_lateness

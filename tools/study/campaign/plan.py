@@ -18,7 +18,7 @@ from firmware.guidance.mission import Mission, decode_mission
 from firmware.model.strict import Table, decode
 from firmware.model.vehicle import Vehicle
 from sim_backend.board import SimBoardFile
-from sim_backend.effects.catalogue import check_board
+from sim_backend.core.effects.catalogue import check_board
 from tools.data.errors import InputError
 from tools.data.sources import load_vehicle, name_or_path, read_text
 from tools.flight.compose import load_board_file

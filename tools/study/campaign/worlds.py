@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
-from sim_backend.effects.catalogue import apply_effects
+from sim_backend.core.effects.catalogue import apply_effects
 from sim_backend.uncertainty import draw_parameters
 from sim_backend.world import Wave, World, build_world
 from tools.study.campaign.plan import Plan

@@ -2,11 +2,11 @@
 
 F of zeros is the nominal vehicle. A label of the catalogue sets one or more entries; entries go together in any number.
 The names of the first entries (ef.DRAG_0 and so on) are those that the catalogue's rows give them
-(sim_backend/effects/catalogue), where units and meanings stand.
+(sim_backend/core/effects/catalogue), where units and meanings stand.
 """
 
 from firmware.core.vehicle.layout import N_X
-from sim_backend.effects.catalogue import ENTRIES
+from sim_backend.core.effects.catalogue import ENTRIES
 
 globals().update({name: number for number, name in enumerate(ENTRIES)})
 

@@ -2,7 +2,7 @@
 
 A row says where the effect sits (subsystem and element), what it is called, what it changes, and its parameters: name,
 unit, range, the prior's 1 sigma and the entry of the effect vector F that it sets. The entries' numbers follow from the
-order here (sim_backend/core/effect_layout). docs/ADDING.md says how to add one.
+order here (sim_backend/core/effects/effect_layout). docs/ADDING.md says how to add one.
 """
 
 import math
@@ -12,9 +12,9 @@ from functools import cache
 from typing import Any
 
 from hal.strict import ConfigError
+from sim_backend.core.effects import water_motion
+from sim_backend.core.effects.base import Effect, EffectError, Parameter
 from sim_backend.core.layout import LONGEST_DELAY
-from sim_backend.effects import water_motion
-from sim_backend.effects.base import Effect, EffectError, Parameter
 
 
 def _row(place: str, label: str, summary: str, *parameters: Parameter, apply: Callable[..., None] | None = None):
