@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from sim_backend.core import effect_layout as ef
 from tools.data.runs.run import Run
 from tools.gap.measure import run_gap
 from tools.inference.predict import as_run
@@ -88,7 +89,8 @@ def test_a_run_shorter_than_the_start_has_no_gap():
 def test_a_prediction_has_the_rows_and_columns_of_the_run_and_no_gaps():
     run, Y = made_up()
     run.columns["cmd_slider_m"][100:120] = np.nan
+    Y = np.column_stack([Y, *np.random.default_rng(1).normal(size=(4, len(Y)))])  # motion capture's own readings
     predicted = as_run(run, Y)
     assert list(predicted.columns) == list(run.columns)
     assert all(np.isfinite(values).all() for values in predicted.columns.values())
-    np.testing.assert_array_equal(predicted.columns["mocap_yaw_rad"], Y[:, 2])
+    np.testing.assert_array_equal(predicted.columns["mocap_yaw_rad"], Y[:, ef.Y_MOCAP_ROLL + 2])

@@ -63,7 +63,7 @@ def _spoil(name: str, value: float):
     ("name", "value", "part"),
     [
         ("pitch_rad", 0.06, ("sensing", "attitude")),
-        ("q_rad_s", 0.06, ("sensing", "gyro")),
+        ("q_rad_s", 0.1, ("sensing", "gyro")),
         ("depth_m", 0.4, ("sensing", "depth")),
     ],
 )
