@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from sim_backend.core import effect_layout as ef
+from sim_backend.core.effects import effect_layout as ef
 from tools.data.runs.run import Run
 from tools.gap.measure import run_gap
 from tools.inference.predict import as_run

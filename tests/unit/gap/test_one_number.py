@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support.flights import World, fly_case
 
-from sim_backend.core import effect_layout as ef
+from sim_backend.core.effects import effect_layout as ef
 from tools.diagnose.shrink import gaps
 from tools.gap.assess import assess
 from tools.gap.measure import root_mean_square, run_gap
