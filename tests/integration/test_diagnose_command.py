@@ -11,10 +11,10 @@ from tools.cli.common import report_errors
 from tools.cli.main import cli
 from tools.data.runs import columns as names
 from tools.gap.measure import run_gap
+from tools.inference.channels import ROUGHIE_MEASURES
 from tools.inference.corrected import LINKS
-from tools.inference.model import load_model
+from tools.inference.load import load_model
 from tools.inference.predict import predict
-from tools.inference.windows import windows
 
 
 def glider(*words: object) -> int:
@@ -119,7 +119,8 @@ def test_a_correction_learned_from_the_data_shrinks_the_gap_of_runs_left_out(pus
     assert found["gap"]["total"] < answer["gap"]["after"]["total"]
     model = load_model(str(out / found["model"]), case)
     flown = [
-        run_gap(run, Y, windows(run.t)).total for run, Y in zip(case.runs, predict(case, model, case.runs), strict=True)
+        run_gap(ROUGHIE_MEASURES, run, Y, ROUGHIE_MEASURES.windows(run.t)).total
+        for run, Y in zip(case.runs, predict(case, model, case.runs), strict=True)
     ]
     assert max(flown) < answer["gap"]["before"]["total"]
 

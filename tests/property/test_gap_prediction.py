@@ -6,9 +6,9 @@ from hypothesis import strategies as st
 from support.flights import World, case_of, fly
 
 from tools.data.runs.run import Run
+from tools.inference.channels import ROUGHIE_MEASURES
 from tools.inference.model import nominal_model
 from tools.inference.predict import predict
-from tools.inference.windows import windows
 
 FLIGHTS = {mocap: fly(World(mocap=mocap), 5).run for mocap in (False, True)}
 PREDICTIONS = {}
@@ -31,7 +31,7 @@ def test_what_comes_after_the_start_changes_nothing(mocap, number, later, blank,
     run = FLIGHTS[mocap]
     if mocap not in PREDICTIONS:
         PREDICTIONS[mocap] = predicted(run, mocap)
-    window = windows(run.t)[number]
+    window = ROUGHIE_MEASURES.windows(run.t)[number]
     rng = np.random.default_rng(seed)
     columns = {}
     for name, values in run.columns.items():

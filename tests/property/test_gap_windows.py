@@ -6,7 +6,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tools.inference.windows import START, WINDOW, windows
+from tools.inference.channels import ROUGHIE_MEASURES
+
+START, WINDOW = ROUGHIE_MEASURES.look_in, ROUGHIE_MEASURES.window
 
 clocks = st.builds(
     lambda begin, steps: begin + np.concatenate([[0.0], np.cumsum(steps)]),
@@ -18,7 +20,7 @@ clocks = st.builds(
 @settings(deadline=None, derandomize=True)
 @given(clocks)
 def test_windows_cut_the_run(t):
-    found = windows(t)
+    found = ROUGHIE_MEASURES.windows(t)
     assert found[0].first == 0
     assert found[-1].end == len(t)
     for before, after in itertools.pairwise(found):
@@ -35,5 +37,5 @@ def test_windows_cut_the_run(t):
 @settings(deadline=None, derandomize=True)
 @given(st.integers(1, 1500), st.sampled_from([1.0, 5.0, 10.0, 20.0, 50.0]))
 def test_whole_windows_at_an_even_rate_are_counted_by_their_samples(count, rate):
-    scored = [window for window in windows(np.arange(count) / rate) if window.scored]
+    scored = [window for window in ROUGHIE_MEASURES.windows(np.arange(count) / rate) if window.scored]
     assert len(scored) == max(1, int(count // (WINDOW * rate)))

@@ -9,7 +9,7 @@ from sim_backend.core.effects import effect_layout as ef
 from tools.data.runs import columns as names
 from tools.data.runs.case import Case, load_case, write_case
 from tools.data.runs.run import Run
-from tools.inference.problem import Problem, pose
+from tools.inference.problem import Problem, problem_of
 
 RATE = 10.0  # Hz
 SECONDS = 45.0
@@ -47,7 +47,7 @@ def make_case(
     blank = [_blank(rng, f"run{n:02d}", mocap) for n in range(runs)]
     about = dict(vehicle="roughie", site="made", log_rate_hz=RATE, water_density_kg_m3=998.0, motion_capture=mocap)
     write_case(folder / "blank", blank, **about)
-    problem = pose(load_case(folder / "blank"))
+    problem = problem_of(load_case(folder / "blank"))
     problem.spectral[:6] *= rough**2
     Z = problem.simulated(*drawn(problem, F, rng), begins(problem, rng), rng)
     bounds = problem.recording.bounds

@@ -18,7 +18,7 @@ from tools.data.runs import columns as names
 from tools.data.runs.case import Case
 from tools.data.runs.run import Run
 from tools.data.sources import load_vehicle
-from tools.inference.channels import ONBOARD
+from tools.inference.channels import ROUGHIE_MEASURES
 from tools.inference.core.step import propagate
 
 STEP = 0.02  # s
@@ -94,7 +94,7 @@ def fly(world: World, seed: int, *, P: np.ndarray | None = None, name: str = "ru
     x[3:7] = quaternion_from_euler(0.0, rng.uniform(-0.3, 0.0), rng.uniform(-3.0, 3.0))
     x[7] = world.start_speed
     F[ef.CURRENT_N], F[ef.CURRENT_E] = world.water
-    truth, table = np.empty((len(t), ef.N_XF)), np.empty((len(t), len(ONBOARD)))
+    truth, table = np.empty((len(t), ef.N_XF)), np.empty((len(t), len(ROUGHIE_MEASURES.columns)))
     zero, work, kept, acc = np.zeros(3), np.zeros((4, ef.N_XF)), np.empty(ef.N_XF), np.zeros(6)
     steps = max(1, round(1.0 / world.rate_hz / STEP))
     moments = np.array([0.0, 1.0 / world.rate_hz / steps])

@@ -80,7 +80,7 @@ def predict(run: Path, model: str, out: Path) -> None:
     from tools.data.errors import InputError
     from tools.data.runs.case import load_case_of_run
     from tools.data.runs.run import write_run
-    from tools.inference.model import load_model
+    from tools.inference.load import load_model
     from tools.inference.predict import as_run
     from tools.inference.predict import predict as predict_runs
 

@@ -9,7 +9,6 @@ from tools.data.runs import columns as names
 from tools.diagnose.noise_probes import UNPREDICTABLE
 from tools.inference.parameters import effect_parameters
 from tools.inference.problem import Problem
-from tools.inference.windows import START
 
 SPARSE, LONG = 0.2, 5.0  # share of samples missing; s without a sample
 PARTS = {
@@ -92,7 +91,8 @@ def _few(problem: Problem) -> list[str]:
     found = []
     if len(problem.runs) == 1:
         found.append("one run only: nothing can be left out, so that figures after a fit are not checked on other data")
-    short = [run.name for run in problem.runs if run.t[-1] - run.t[0] <= START]
+    look_in = problem.kind.measures.look_in
+    short = [run.name for run in problem.runs if run.t[-1] - run.t[0] <= look_in]
     if short:
-        found.append(f"{', '.join(short)}: no longer than {START:g} s, so that nothing of it is scored")
+        found.append(f"{', '.join(short)}: no longer than {look_in:g} s, so that nothing of it is scored")
     return found

@@ -22,10 +22,9 @@ from tools.diagnose.search import Search, run
 from tools.diagnose.shrink import AFTER, BEFORE, FLOOR, RECALIBRATED, Further, Shrinkage, by_channel, shrink_further
 from tools.diagnose.unknown import LEFT_OVER, UNFIT
 from tools.diagnose.verdict import EVIDENCE_NEEDED, TIE, Answer, conclude
-from tools.inference.channels import channels_of, measured
 from tools.inference.corrected import corrected_text
 from tools.inference.fit import Hypothesis
-from tools.inference.problem import ALL, pose
+from tools.inference.problem import ALL, problem_of
 from tools.inference.rules import Rules
 
 CORRECTION_FILE = "data_driven.toml"
@@ -81,7 +80,7 @@ def verdict_of(answer: Answer) -> str:
 
 def diagnose(case: Case, say: Callable[[str], None] = lambda text: None, rules: Rules = ALL) -> Diagnosis:
     """Diagnose a case; `say` hears how far the search is."""
-    search = run(pose(case, rules=rules), say)
+    search = run(problem_of(case, rules=rules), say)
     answer = conclude(search, say)
     search = answer.search
     say(f"verdict: {answer.main}")
@@ -212,7 +211,7 @@ def details(diagnosis: Diagnosis) -> Details:
     answer, case = diagnosis.answer, diagnosis.case
     runs = case.runs
     columns = sorted({name for run in runs for name, values in run.columns.items() if np.isfinite(values).any()})
-    channels = {channel.name for run in runs for channel in channels_of(run)}
+    channels = {channel.name for run in runs for channel in diagnosis.search.problem.kind.measures.channels_of(run)}
     data = Data(
         case.folder.resolve().name, case.vehicle.name, case.site, len(runs),
         float(sum(run.t[-1] - run.t[0] for run in runs)), float(case.log_rate_hz), case.motion_capture, columns,
@@ -248,14 +247,14 @@ def picture(diagnosis: Diagnosis, n: int) -> Picture:
         found = diagnosis.shrinkage.runs[which][n]
         return {**found.channels, "total": found.total}
 
-    names = [channel.name for channel in channels_of(run)]
+    names = [channel.name for channel in diagnosis.search.problem.kind.measures.channels_of(run)]
     return Picture(run.name, names, gaps(BEFORE), gaps(AFTER))
 
 
 def curves(diagnosis: Diagnosis, n: int) -> Curves:
     """What was measured in a run and what two models say of it."""
     run, said = diagnosis.case.runs[n], diagnosis.shrinkage.predictions
-    return Curves(run.t, measured(run), said[BEFORE][n], said[AFTER][n])
+    return Curves(run.t, diagnosis.search.problem.kind.measures.measured(run), said[BEFORE][n], said[AFTER][n])
 
 
 def write(diagnosis: Diagnosis, out: Path) -> None:

@@ -10,7 +10,6 @@ from sim_backend.core.effects import effect_layout as ef
 from tools.diagnose.search import Search
 from tools.diagnose.shrink import AFTER, FLOOR, Shrinkage, case_noise_floor
 from tools.gap.measure import errors, mean_square
-from tools.inference.channels import channels_of
 from tools.inference.fit import Hypothesis
 from tools.inference.predict import fly_windows_from
 from tools.inference.problem import Problem, cut
@@ -47,7 +46,7 @@ def largest(problem: Problem, Y: np.ndarray, other: np.ndarray) -> float:
         first = problem.recording.bounds[n]
         for window in (window for window in listed if window.scored and window.start < window.end):
             rows = slice(first + window.start, first + window.end)
-            for channel in channels_of(problem.runs[n]):
+            for channel in problem.kind.measures.channels_of(problem.runs[n]):
                 square = mean_square(channel, errors(channel, Y[rows], other[rows]))
                 most = max(most, float(np.sqrt(np.nan_to_num(square))))
     return most

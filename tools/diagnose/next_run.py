@@ -9,12 +9,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from firmware.core.vehicle.layout import X_DOWN, X_NU, X_QUAT
 from firmware.core.vehicle.mass import swung_moment
 from sim_backend.core.effects import effect_layout as ef
 from tools.diagnose.search import Search
 from tools.gap.measure import wrap
-from tools.inference.channels import CHANNELS
-from tools.inference.core.filter import N_SPECTRAL
 from tools.inference.problem import Problem
 
 SECONDS, RATE = 90.0, 10.0  # s, Hz
@@ -79,15 +78,15 @@ def flown(problem: Problem, models: list, manoeuvre: Manoeuvre) -> np.ndarray:
     """What each model (P, F) foresees of a manoeuvre, (models, rows, N_Y), without noise."""
     t = np.arange(int(SECONDS * RATE)) / RATE
     start = np.zeros((1, ef.N_XF))
-    start[0, 2], start[0, 3], start[0, 7] = 1.0, 1.0, 0.1
+    start[0, X_DOWN], start[0, X_QUAT], start[0, X_NU] = 1.0, 1.0, 0.1
     one = problem.part(0)
     recording = replace(
         one.recording, bounds=np.array([0, len(t)]), modes=np.zeros(1, dtype=np.int64), t=t,
         inputs=commands(problem.case.vehicle, manoeuvre, t),
     )  # fmt: skip
     still = replace(
-        one, recording=recording, z=np.zeros((len(t), ef.N_Y)), spectral=np.zeros(N_SPECTRAL), R=np.zeros((1, ef.N_Y)),
-        valid=np.ones((len(t), ef.N_Y), dtype=bool), stamps=t,
+        one, recording=recording, z=np.zeros((len(t), ef.N_Y)), spectral=np.zeros_like(one.spectral),
+        R=np.zeros((1, ef.N_Y)), valid=np.ones((len(t), ef.N_Y), dtype=bool), stamps=t,
     )  # fmt: skip
     rng = np.random.default_rng(0)
     return np.array([still.simulated(P, F, start, rng) for P, F in models])
@@ -97,7 +96,7 @@ def distance(problem: Problem, a: np.ndarray, b: np.ndarray) -> float:
     """How far two predictions lie apart: root mean square over the channels recorded, in tolerances."""
     seen = problem.seen
     squares = []
-    for channel in CHANNELS:
+    for channel in problem.kind.measures.channels:
         columns = [c for c in channel.columns if seen[c]]
         if columns:
             difference = a[:, columns] - b[:, columns]

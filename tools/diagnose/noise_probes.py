@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim_backend.core.effects import effect_layout as ef
-from tools.inference.core.filter import N_SPECTRAL
 from tools.inference.problem import Problem
 
 TURBULENCE, WAVES, CLOCK = "turbulence", "waves", "motion capture's clock"
@@ -74,10 +73,11 @@ class ProbeResult:
 
 
 def inflated(problem: Problem, probe: NoiseProbe, scale: float) -> tuple[np.ndarray, np.ndarray]:
-    """What a probe adds to the spectral densities (N_SPECTRAL,) and to the measurements' variances (N_Y,)."""
-    more, doubt = np.zeros(N_SPECTRAL), np.zeros(ef.N_Y)
+    """What a probe adds to the spectral densities (n_spectral,) and to the measurements' variances (N_Y,)."""
+    more, doubt = np.zeros(problem.kind.n_spectral), np.zeros(len(problem.kind.readings))
     if probe.name == TURBULENCE:
-        more[:6] = problem.densities[:6] * (scale**2 - 1.0)
+        axes = problem.kind.accelerations
+        more[axes] = problem.densities[axes] * (scale**2 - 1.0)
     else:
         more[list(probe.spectral)] = (probe.unit * scale) ** 2
         doubt[list(probe.reading)] = (probe.unit * scale) ** 2

@@ -9,13 +9,10 @@ import itertools
 import numpy as np
 from scipy.stats import norm
 
+from firmware.core.vehicle.layout import X_ACT, X_BALLAST, X_DOWN, X_NU, X_QUAT, X_SERVO, X_SLIDER
 from tools.diagnose.record import Finding
 from tools.inference.problem import Gains, Problem
 
-CHANNELS = (
-    "roll", "pitch", "yaw", "p", "q", "r", "depth", "slider", "ballast",
-    "mocap x", "mocap y", "mocap z", "mocap roll", "mocap pitch", "mocap yaw",
-)  # fmt: skip
 LAGS = ((1, 2), (3, 10), (11, 60))  # samples, in groups
 SHAPES = ("variance", "mean", "lag", "spectrum")  # tests of a channel by itself; the others are correlations
 UNCLEAN = 6.0  # sigma, corrected for the number of tests
@@ -24,22 +21,24 @@ UNCLEAN = 6.0  # sigma, corrected for the number of tests
 def features(problem: Problem, gains: Gains) -> dict[str, np.ndarray]:
     """What something left may go with, each (rows,), by the best model's state."""
     x = gains.X
-    speed = np.sqrt((x[:, 7:10] ** 2).sum(axis=1))
+    speed = np.sqrt((x[:, X_NU : X_NU + 3] ** 2).sum(axis=1))
     moving = pump_speed(problem, gains)
-    pitch = np.arcsin(np.clip(2.0 * (x[:, 3] * x[:, 5] - x[:, 6] * x[:, 4]), -1.0, 1.0))
+    q0, q1, q2, q3 = x[:, X_QUAT:X_NU].T
+    pitch = np.arcsin(np.clip(2.0 * (q0 * q2 - q3 * q1), -1.0, 1.0))
+    _, v, w, p, q, r = x[:, X_NU:X_ACT].T
     return {
         "speed": speed,
-        "depth": x[:, 2],
+        "depth": x[:, X_DOWN],
         "time": problem.since,
         "pitch": pitch,
-        "pitch rate": x[:, 11],
-        "roll rate": x[:, 10],
-        "yaw rate": x[:, 12],
-        "angle of attack": x[:, 9] / np.maximum(speed, 0.05),
-        "sideslip": x[:, 8] / np.maximum(speed, 0.05),
-        "servo": x[:, 13],
-        "slider": x[:, 14],
-        "ballast": x[:, 15],
+        "pitch rate": q,
+        "roll rate": p,
+        "yaw rate": r,
+        "angle of attack": w / np.maximum(speed, 0.05),
+        "sideslip": v / np.maximum(speed, 0.05),
+        "servo": x[:, X_SERVO],
+        "slider": x[:, X_SLIDER],
+        "ballast": x[:, X_BALLAST],
         "pump running": (np.abs(moving) > 0.003).astype(float),
         "pump expelling": (moving < -0.003).astype(float),
     }
@@ -50,7 +49,7 @@ def pump_speed(problem: Problem, gains: Gains) -> np.ndarray:
     speed = np.zeros(len(gains.X))
     for a, b in itertools.pairwise(problem.recording.bounds):
         if b - a > 1:
-            speed[a:b] = np.gradient(gains.X[a:b, 15], problem.recording.t[a:b])
+            speed[a:b] = np.gradient(gains.X[a:b, X_BALLAST], problem.recording.t[a:b])
     return speed
 
 
@@ -60,7 +59,7 @@ def tests(problem: Problem, gains: Gains) -> list[Finding]:
     E = gains.E
     bounds = problem.recording.bounds
     with_what = features(problem, gains)
-    for m, channel in enumerate(CHANNELS):
+    for m, channel in enumerate(reading.name for reading in problem.kind.readings):
         e = E[:, m]
         ok = np.isfinite(e)
         count = int(ok.sum())

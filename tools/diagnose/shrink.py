@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tools.diagnose.search import Search, without_extra_noise
-from tools.gap.measure import RunGap, root_mean_square, run_gap
-from tools.inference.channels import CHANNELS
+from tools.gap.measure import RunGap, case_channels, root_mean_square, run_gap
 from tools.inference.fit import NUISANCE_LIMIT, Hypothesis, bounded_step
 from tools.inference.model import Model
 from tools.inference.parameters import model_at
@@ -42,12 +41,7 @@ class Shrinkage:
 
 def by_channel(runs: list[RunGap]) -> dict[str, float]:
     """Each channel's rms over the runs, and the total."""
-    found = {}
-    for channel in CHANNELS:
-        values = [gap.channels[channel.name] for gap in runs if channel.name in gap.channels]
-        if values:
-            found[channel.name] = root_mean_square(values)
-    return found | {"total": root_mean_square([gap.total for gap in runs])}
+    return case_channels(runs) | {"total": root_mean_square([gap.total for gap in runs])}
 
 
 def left_out(search: Search, hypothesis: Hypothesis) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -88,7 +82,7 @@ def gaps(
             table = z[problem.recording.bounds[n] : problem.recording.bounds[n + 1]]
             part.z = table
         Y = fly(part, P, F)
-        found.append(run_gap(part.runs[0], Y, cut(part).listed[0], table))
+        found.append(run_gap(part.kind.measures, part.runs[0], Y, cut(part).listed[0], table))
         flown.append(Y)
     return found, flown
 
@@ -172,7 +166,7 @@ def shrink(search: Search, hypothesis: Hypothesis) -> Shrinkage:
     refitted, Y_refitted = gaps(problem, left_out(search, search.null))
     after, Y_after = gaps(problem, left_out(search, hypothesis)) if hypothesis.labels else (refitted, Y_refitted)
     runs = {
-        BEFORE: [run_gap(run, flown[n], listed[n]) for n, run in enumerate(problem.runs)],
+        BEFORE: [run_gap(problem.kind.measures, run, flown[n], listed[n]) for n, run in enumerate(problem.runs)],
         RECALIBRATED: refitted,
         AFTER: after,
         FLOOR: floor(search, hypothesis, rng),

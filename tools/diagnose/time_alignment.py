@@ -9,7 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from firmware.core.vehicle.layout import X_DOWN, X_POS
 from sim_backend.core.effects import effect_layout as ef
+from tools.inference.core.error_layout import E_DOWN, E_POS
 from tools.inference.problem import Problem
 
 UNSEEN_SPEED = 0.4  # m/s, by which a vehicle may have left its first pose's place before that was taken
@@ -50,8 +52,8 @@ def aligned(problem: Problem, F: np.ndarray) -> Problem:
         stamps[a + rows] = t[a + stands[rows]]
         seen = np.flatnonzero(np.isfinite(z[a:b, ef.Y_MOCAP_X : ef.Y_MOCAP_X + 2]).all(axis=1))
         if len(seen):
-            starts[n, :2] = z[a + seen[0], ef.Y_MOCAP_X : ef.Y_MOCAP_X + 2]
-            spreads[n, :2] += UNSEEN_SPEED * (t[a + seen[0]] - t[a])
+            starts[n, X_POS:X_DOWN] = z[a + seen[0], ef.Y_MOCAP_X : ef.Y_MOCAP_X + 2]
+            spreads[n, E_POS:E_DOWN] += UNSEEN_SPEED * (t[a + seen[0]] - t[a])
     return replace(
         origin, z=z, stamps=stamps, starts=starts, spreads=spreads, valid=np.isfinite(z), recorded=origin
     )  # fmt: skip

@@ -175,12 +175,17 @@ def record_specs(flight: Flight) -> tuple:
 
 def build_runtime(flight: Flight, recorder: Any) -> Runtime:
     """The loop, recording into `recorder`; the board is open, for that is when a real clock starts."""
+
     def on_news(t: float, reaction: Reaction, text: str) -> None:
         recorder.event(t, SEVERITIES[reaction], text)
 
     return Runtime(
-        flight.board, flight.autopilot, flight.supervisor, recorder.channel("/tick"),
-        extras=flight.board.recording(recorder.channel), on_news=on_news,
+        flight.board,
+        flight.autopilot,
+        flight.supervisor,
+        recorder.channel("/tick"),
+        extras=flight.board.recording(recorder.channel),
+        on_news=on_news,
     )
 
 

@@ -10,9 +10,10 @@ from tools.data.errors import InputError
 from tools.data.runs.case import Case
 from tools.gap.measure import RunGap, case_channels, root_mean_square, run_gap
 from tools.gap.where import Share, where
+from tools.inference.channels import Measures
 from tools.inference.model import Model, nominal_model
 from tools.inference.predict import fly
-from tools.inference.problem import cut, pose
+from tools.inference.problem import cut, problem_of
 from tools.inference.windows import Window
 
 
@@ -22,6 +23,7 @@ class CaseGap:
 
     case: Case
     model: Model
+    measures: Measures
     windows: list[list[Window]]  # by run
     predictions: list[np.ndarray]  # by run, (rows, N_Y)
     runs: list[RunGap]
@@ -45,12 +47,12 @@ class CaseGap:
 def assess(case: Case, model: Model | None = None) -> CaseGap:
     """Measure a case against a model (nominal, if none is given); InputError where no sample can be scored."""
     model = nominal_model(case) if model is None else model
-    problem = pose(case, model)
+    problem = problem_of(case, model)
     Y = fly(problem, model.P, np.zeros(ef.N_F) if model.F is None else model.F)
     predictions, listed = np.split(Y, problem.recording.bounds[1:-1]), cut(problem).listed
-    gaps = [run_gap(run, predictions[n], listed[n]) for n, run in enumerate(case.runs)]
+    gaps = [run_gap(problem.kind.measures, run, predictions[n], listed[n]) for n, run in enumerate(case.runs)]
     total = root_mean_square([gap.total for gap in gaps])
     if not np.isfinite(total):
         raise InputError("nothing to score: no run has a measured channel beyond the first 2 s", source=case.folder)
     shares = where(problem, Y)
-    return CaseGap(case, model, listed, predictions, gaps, case_channels(gaps), total, shares)
+    return CaseGap(case, model, problem.kind.measures, listed, predictions, gaps, case_channels(gaps), total, shares)

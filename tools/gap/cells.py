@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tools.data.runs.run import Run
-from tools.inference.channels import channels_of
+from tools.inference.channels import Measures
 from tools.inference.windows import Window
 
 
@@ -37,13 +37,15 @@ class Cells:
         return np.bincount(self.cell)[self.cell]
 
 
-def cells_of(runs: list[Run], bounds: np.ndarray, listed: list[list[Window]], table: np.ndarray) -> Cells:
+def cells_of(
+    measures: Measures, runs: list[Run], bounds: np.ndarray, listed: list[list[Window]], table: np.ndarray
+) -> Cells:
     """The scored samples of a case's runs by their windows; bounds (runs + 1,) in the table (rows, N_Y) of what was
     measured."""
     scored = []
     for n, run in enumerate(runs):
         begin, of_run = bounds[n], []
-        for channel in channels_of(run):
+        for channel in measures.channels_of(run):
             found = []
             for w, window in enumerate(listed[n]):
                 block = table[begin + window.start : begin + window.end][:, list(channel.columns)]

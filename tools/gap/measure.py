@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tools.data.runs.run import Run
-from tools.inference.channels import CHANNELS, Channel, channels_of, measured
+from tools.inference.channels import Channel, Measures
 from tools.inference.windows import Window
 
 
@@ -50,13 +50,17 @@ def mean_square(channel: Channel, error: np.ndarray) -> float:
     return float(np.mean(valid**2)) if valid.size else float("nan")
 
 
-def run_gap(run: Run, Y: np.ndarray, listed: list[Window], table: np.ndarray | None = None) -> RunGap:
+def run_gap(
+    measures: Measures, run: Run, Y: np.ndarray, listed: list[Window], table: np.ndarray | None = None
+) -> RunGap:
     """The gap of a run against its prediction Y (rows, N_Y). Channels without a scored sample are left out.
 
     `table` (rows, N_Y or more) stands in the place of what the run measured.
     """
-    rows, table = scored_rows(listed, run.rows), measured(run) if table is None else table
-    squares = {channel.name: mean_square(channel, errors(channel, table, Y)[rows]) for channel in channels_of(run)}
+    rows, table = scored_rows(listed, run.rows), measures.measured(run) if table is None else table
+    squares = {
+        channel.name: mean_square(channel, errors(channel, table, Y)[rows]) for channel in measures.channels_of(run)
+    }
     gaps = {name: float(np.sqrt(value)) for name, value in squares.items() if np.isfinite(value)}
     return RunGap(run.name, gaps, root_mean_square(gaps.values()), sum(window.scored for window in listed))
 
@@ -68,9 +72,6 @@ def root_mean_square(values) -> float:
 
 
 def case_channels(gaps: list[RunGap]) -> dict[str, float]:
-    """Each channel's rms over the runs that have it."""
-    return {
-        channel.name: root_mean_square([gap.channels[channel.name] for gap in gaps if channel.name in gap.channels])
-        for channel in CHANNELS
-        if any(channel.name in gap.channels for gap in gaps)
-    }
+    """Each channel's rms over the runs that have it, in the order of the runs that have most."""
+    names = dict.fromkeys(name for gap in sorted(gaps, key=lambda gap: -len(gap.channels)) for name in gap.channels)
+    return {name: root_mean_square([gap.channels[name] for gap in gaps if name in gap.channels]) for name in names}

@@ -21,9 +21,8 @@ import numpy as np
 
 from sim_backend.core.effects.catalogue import catalogue
 from tools.gap.cells import Cells, cells_of
-from tools.inference.channels import measured
 from tools.inference.parameters import NUISANCE, effect_parameters, model_at, nuisance_parameters
-from tools.inference.predict import DOUBLED, fly, fly_near, observe
+from tools.inference.predict import fly, fly_near, observe
 from tools.inference.problem import Problem, cut
 
 EFFECTIVE = 4.0  # independent samples a window and channel: 18 s of residuals that hang together for some 4 s
@@ -58,7 +57,7 @@ def floor_of(problem: Problem, cells: Cells) -> np.ndarray:
     for _ in range(DRAWS):
         Z = problem.simulated(P, F, starts, rng)
         Y = fly(replace(problem, z=Z), P, F)
-        for onboard, mocap in DOUBLED:  # a channel is motion capture's where nothing is onboard
+        for onboard, mocap in problem.kind.doubled:  # a channel is motion capture's where nothing is onboard
             Z[:, onboard] = np.where(np.isnan(Z[:, onboard]), Z[:, mocap], Z[:, onboard])
         error = cells.residual(Z, Y)
         square += error**2 / DRAWS
@@ -143,8 +142,9 @@ def where(problem: Problem, Y: np.ndarray) -> list[Share]:
 
     They sum to 1.
     """
-    table = np.concatenate([measured(run) for run in problem.runs])
-    cells = cells_of(problem.runs, problem.recording.bounds, cut(problem).listed, table)
+    measures = problem.kind.measures
+    table = np.concatenate([measures.measured(run) for run in problem.runs])
+    cells = cells_of(measures, problem.runs, problem.recording.bounds, cut(problem).listed, table)
     floor = floor_of(problem, cells)
     search = Search(problem, cells, table, Y, np.sqrt(EFFECTIVE / cells.cell_sizes() / floor[cells.channel]))
     chosen, left = search.run()

@@ -118,8 +118,8 @@ def captured(X: np.ndarray, world: World, sensors: SensorsPart, rng: np.random.G
     from scipy.spatial.transform import Rotation
 
     t = np.arange(len(X)) / RATE
-    attitude = Rotation.from_quat(X[:, [4, 5, 6, 3]])
-    position = X[:, :3] + attitude.apply(world.frame[3:])
+    attitude = Rotation.from_quat(np.roll(X[:, layout.X_QUAT : layout.X_NU], -1, axis=1))  # scalar last
+    position = X[:, layout.X_POS : layout.X_QUAT] + attitude.apply(world.frame[3:])
     pose = np.column_stack([position, (attitude * Rotation.from_rotvec(world.frame[:3])).as_euler("ZYX")[:, ::-1]])
     pose[:, 3:] = np.unwrap(pose[:, 3:], axis=0)
     pose = np.column_stack([np.interp(t - world.delay, t, column) for column in pose.T])

@@ -15,10 +15,10 @@ from tools.identify.predict import flown_gap
 from tools.identify.screen import LeftOut
 from tools.identify.statistics import Quadratic, collect, heat
 from tools.inference.model import Model
-from tools.inference.problem import Problem, pose
+from tools.inference.problem import Problem, problem_of
 
 LEVELS = 0.0  # in a schedule: the noise's levels are estimated
-# The filter is told of so many times the disturbance, one step at each: less and less as the model comes closer.
+# The filter expects so many times the disturbance, one step at each: less and less as the model comes closer.
 SCHEDULE = (100.0, 10.0, 3.0, 1.0, LEVELS)
 FROM_START = (10.0, 1.0, LEVELS)  # where the accelerations have given first values
 UNSEEN = (100.0, 30.0, LEVELS, 10.0, LEVELS, 3.0, 1.0, LEVELS, 1.0, 1.0, LEVELS, 1.0, 1.0)  # without motion capture
@@ -98,13 +98,13 @@ def flights(first: First, problem: Problem | None = None) -> Flights:
 def level(case: Case, first: First) -> noise.Levels:
     """The noise's levels with the model at its present values, from as many runs as that takes."""
     runs = first.problem.runs
-    part = pose(case, first.problem.model, [runs[n] for n in some(runs, LEVEL_ROWS)])
+    part = problem_of(case, first.problem.model, [runs[n] for n in some(runs, LEVEL_ROWS)])
     return noise.estimate(part, lambda p: flights(first).filter(first.values, problem=p), first.levels)
 
 
 def settle(case: Case, model: Model, runs: list[Run], begin: np.ndarray | None) -> First:
-    """First values from these runs, the filter told to doubt the model less and less; names runs that do not belong."""
-    problem = pose(case, model, runs)
+    """First values from these runs, the filter doubting the model less and less; names runs that do not belong."""
+    problem = problem_of(case, model, runs)
     free = parameters(problem)
     first = First(problem, free, np.zeros(len(free.free)), noise.named(problem), [])
     if begin is not None:
@@ -157,12 +157,12 @@ def fit(
     gone = {one.run for one in first.left_out}
     runs = [run for run in runs if run.name not in gone]
     say(f"{len(runs)} runs")
-    whole = flights(first, pose(case, model, runs))
+    whole = flights(first, problem_of(case, model, runs))
     at = whole.linear(first.values)
     left_out, more = first.left_out, odd_runs(whole.problem, at.e) if len(runs) >= 4 else []
     if more and len(more) <= len(runs) // 2:
         left_out, gone = left_out + more, {one.run for one in more}
-        whole = flights(first, pose(case, model, [run for run in runs if run.name not in gone]))
+        whole = flights(first, problem_of(case, model, [run for run in runs if run.name not in gone]))
         at = whole.linear(whole.step(whole.linear(first.values)))
     statistics = gather(whole, at)
     mocap = bool(whole.problem.seen[ef.Y_MOCAP_X])

@@ -9,14 +9,14 @@ from tools.gap.measure import RunGap, root_mean_square, run_gap
 from tools.identify.parameters import Parameters
 from tools.inference.model import Model
 from tools.inference.predict import fly
-from tools.inference.problem import cut, pose
+from tools.inference.problem import cut, problem_of
 
 
 def predicted(case: Case, model: Model, run: Run, P: np.ndarray, F: np.ndarray) -> tuple[RunGap, np.ndarray]:
     """The gap of one run under (P, F), each window started where the model's own filter stands; and the prediction."""
-    problem = pose(case, model, [run])
+    problem = problem_of(case, model, [run])
     Y = fly(problem, P, F)
-    return run_gap(run, Y, cut(problem).listed[0]), Y
+    return run_gap(problem.kind.measures, run, Y, cut(problem).listed[0]), Y
 
 
 def model_of(model: Model, free: Parameters, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

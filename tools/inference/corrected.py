@@ -12,13 +12,14 @@ from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.base import EffectError
 from sim_backend.core.effects.catalogue import catalogue, check_values
 from tools.data.sources import read_text
+from tools.inference.kind import ROUGHIE
 from tools.inference.model import Model
 
 LINKS = (
     "surge force", "sway force", "heave force", "roll moment", "pitch moment", "yaw moment", "servo", "slider",
     "ballast", "roll", "pitch", "yaw", "roll rate", "pitch rate", "yaw rate", "depth", "slider wire", "ballast wire",
 )  # fmt: skip
-BIASES = ("roll", "pitch", "yaw", "p", "q", "r", "depth", "slider", "ballast")
+BIASES = {reading.name: reading.bias for reading in ROUGHIE.readings if reading.bias >= 0}
 NAMES = {
     name.lower(): getattr(layout, name)
     for name in dir(layout)
@@ -68,7 +69,7 @@ def load_corrected(path: Path | str, nominal: Model) -> Model:
     for name, value in table.bias.items():
         if name not in BIASES:
             raise ConfigError(source, f"no such reading; known: {', '.join(BIASES)}", key=f"bias.{name}")
-        F[ef.BIAS + BIASES.index(name)] = value
+        F[BIASES[name]] = value
     for label, values in table.effects.items():
         try:
             checked = check_values(label, values)
@@ -110,7 +111,7 @@ def corrected_text(
         by_index.setdefault(index, name)
     lines += [f"{by_index[int(i)]} = {float(P[i])!r}" for i in np.flatnonzero(nominal != P)]
     lines += ["", "[bias]  # of what is read, SI, rad"]
-    lines += [f"{name} = {float(F[ef.BIAS + n])!r}" for n, name in enumerate(BIASES) if F[ef.BIAS + n] != 0.0]
+    lines += [f"{name} = {float(F[entry])!r}" for name, entry in BIASES.items() if F[entry] != 0.0]
     for label, values in effects.items():
         lines += ["", f"[effects.{label}]", *(f"{name} = {float(value)!r}" for name, value in values.items())]
     if F[ef.LINK] > 0.0:

@@ -1,16 +1,14 @@
 """The model that a prediction flies with: the case's nominal vehicle, or a vehicle file's."""
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from firmware.estimation.settings import parameter_sigma
 from firmware.model.vehicle import Vehicle
 from tools.data.runs.case import Case
-from tools.data.sources import load_vehicle, read_text
 
-NOMINAL = "nominal"
+NOMINAL = "nominal"  # its name
 
 
 @dataclass(frozen=True)
@@ -44,14 +42,3 @@ def vehicle_model(name: str, vehicle: Vehicle) -> Model:
     spread = np.zeros((len(values), len(P)))
     spread[:, found.places] = (vectors * np.sqrt(np.maximum(values, 0.0))).T
     return Model(name, P, sigma, spread=spread[np.abs(spread).max(axis=1) > 0.0])
-
-
-def load_model(wanted: str, case: Case) -> Model:
-    """`nominal`, a corrected model's file, or a vehicle; InputError or ConfigError where it cannot be used."""
-    from tools.inference.corrected import is_corrected, load_corrected
-
-    if wanted == NOMINAL:
-        return nominal_model(case)
-    if Path(wanted).is_file() and is_corrected(read_text(Path(wanted))):
-        return load_corrected(wanted, nominal_model(case))
-    return vehicle_model(wanted, load_vehicle(wanted))

@@ -45,12 +45,10 @@ def nuisance_parameters(problem: Problem) -> list[FreeParameter]:
             along = tuple((int(i), float(row[i])) for i in np.flatnonzero(row))
             free.append(FreeParameter(NUISANCE, f"identified[{n}]", "P", -1, 1.0, along=along))
     free += [FreeParameter(NUISANCE, f"P[{i}]", "P", int(i), float(sigma[i])) for i in np.flatnonzero(sigma > 0.0)]
-    s = problem.case.sensors
-    bias = [*3 * [s.attitude.bias], *3 * [s.gyro.bias], s.depth.bias, s.slider.bias, s.ballast.bias]
-    seen = problem.seen
-    for j, size in enumerate(bias):
-        if seen[j] and size > 0.0:
-            free.append(FreeParameter(NUISANCE, f"bias[{j}]", "F", ef.BIAS + j, size))
+    for j, (reading, seen) in enumerate(zip(problem.kind.readings, problem.seen, strict=True)):
+        size = getattr(problem.case.sensors, reading.source).bias
+        if reading.bias >= 0 and seen and size > 0.0:
+            free.append(FreeParameter(NUISANCE, f"bias[{j}]", "F", reading.bias, size))
     return free
 
 

@@ -9,27 +9,14 @@ from dataclasses import replace
 import numpy as np
 
 from sim_backend.core.effects import effect_layout as ef
-from tools.data.runs import columns as names
 from tools.data.runs.case import Case
 from tools.data.runs.run import Run
-from tools.inference.channels import INSTEAD, ONBOARD
-from tools.inference.core.flight import fly_followed, fly_windows, read_rows
-from tools.inference.core.lacking import LACKING_SPREAD
+from tools.inference.kind import ROUGHIE, Kind
 from tools.inference.model import Model
-from tools.inference.problem import DRIFT, Gains, Problem, cut, pose
+from tools.inference.problem import Gains, Problem, cut, problem_of
 from tools.inference.recording import held
 
-# Recordings begin at rest, at a launch or within a glide. One linearisation does not reach from one to the other, so
-# forward speeds are tried one by one, each with SPEED_SPREAD.
-START_SPEEDS = (0.0, 0.1, 0.2, 0.3, 0.45, 0.6)  # m/s
-SPEED_SPREAD = (0.05, 0.02, 0.02)  # m/s
 COAST = 1.0  # s without motion capture, after which what is onboard takes over
-# readings that motion capture has too, and its own
-DOUBLED = (
-    (0, ef.Y_MOCAP_ROLL), (1, ef.Y_MOCAP_ROLL + 1), (2, ef.Y_MOCAP_ROLL + 2), (ef.Y_DEPTH, ef.Y_MOCAP_Z)
-)  # fmt: skip
-
-
 LARGEST = 1e4  # rad, rad/s, m, kg: no vehicle reads more
 
 
@@ -42,7 +29,7 @@ def without_doubled(problem: Problem) -> np.ndarray:
     z, bounds = np.where(np.abs(problem.z) < LARGEST, problem.z, np.nan), problem.recording.bounds
     for n, run in enumerate(problem.runs):
         part = z[bounds[n] : bounds[n + 1]]
-        for onboard, mocap in DOUBLED:
+        for onboard, mocap in problem.kind.doubled:
             seen = np.where(np.isfinite(part[:, mocap]), run.t, -np.inf)
             part[run.t - np.maximum.accumulate(seen) < COAST, onboard] = np.nan
     return z
@@ -50,13 +37,14 @@ def without_doubled(problem: Problem) -> np.ndarray:
 
 def observe(problem: Problem, P: np.ndarray, F: np.ndarray) -> Gains:
     """The filter that finds where windows start; it looks at no row behind the one where it stands."""
-    return observer_of(problem).filter(P, F, begin=True, speeds=START_SPEEDS)
+    return observer_of(problem).filter(P, F, begin=True, speeds=problem.kind.window_speeds)
 
 
 def observer_of(problem: Problem) -> Problem:
     """The problem as the filter sees it that finds starts."""
-    spreads = np.column_stack([problem.spreads, np.tile(LACKING_SPREAD, (len(problem.runs), 1))])
-    spreads[:, 6:9] = SPEED_SPREAD
+    kind = problem.kind
+    spreads = np.column_stack([problem.spreads, np.tile(kind.lacking_spread, (len(problem.runs), 1))])
+    spreads[:, kind.speed_errors] = kind.window_speed_spread
     return replace(problem, z=without_doubled(problem), starts=problem.starts.copy(), spreads=spreads)
 
 
@@ -67,12 +55,12 @@ def fly_near(problem: Problem, models: list[tuple[np.ndarray, np.ndarray]]) -> n
     """
     observer, r, scored = observer_of(problem), problem.recording, cut(problem)
     F = np.zeros(ef.N_F) if problem.model.F is None else problem.model.F
-    gains = observer.filter(problem.model.P, F, begin=True, speeds=START_SPEEDS)
+    gains = observer.filter(problem.model.P, F, begin=True, speeds=problem.kind.window_speeds)
     Y = np.full((len(models), *problem.z.shape), np.nan)
-    fly_followed(
-        np.array([P for P, _ in models]), np.array([F for _, F in models]), np.array(DRIFT), r.modes, r.bounds, r.t,
-        problem.stamps, r.inputs, observer.z, observer.starts, gains.W, gains.K, scored.first, scored.last,
-        scored.run_of, Y,
+    problem.kind.fly_followed(
+        np.array([P for P, _ in models]), np.array([F for _, F in models]), np.array(problem.kind.drift), r.modes,
+        r.bounds, r.t, problem.stamps, r.inputs, observer.z, observer.starts, gains.W, gains.K, scored.first,
+        scored.last, scored.run_of, Y,
     )  # fmt: skip
     return Y
 
@@ -86,8 +74,8 @@ def fly_windows_from(problem: Problem, P: np.ndarray, F: np.ndarray, gains: Gain
     """The same from where a filter stands."""
     r, scored = problem.recording, cut(problem)
     Y = np.empty_like(problem.z)
-    read_rows(F, gains.X, gains.path, r.t, r.bounds, Y)
-    fly_windows(
+    problem.kind.read_rows(F, gains.X, gains.path, r.t, r.bounds, Y)
+    problem.kind.fly_windows(
         P, F, r.modes, r.bounds, r.t, r.inputs, gains.X, gains.path, scored.first, scored.last, scored.run_of, Y
     )
     return Y
@@ -95,19 +83,14 @@ def fly_windows_from(problem: Problem, P: np.ndarray, F: np.ndarray, gains: Gain
 
 def predict(case: Case, model: Model, runs: list[Run]) -> list[np.ndarray]:
     """A prediction (rows, N_Y) for every run."""
-    problem = pose(case, model, runs)
+    problem = problem_of(case, model, runs)
     Y = fly(problem, model.P, np.zeros(ef.N_F) if model.F is None else model.F)
     return np.split(Y, problem.recording.bounds[1:-1])
 
 
-def as_run(run: Run, Y: np.ndarray) -> Run:
+def as_run(run: Run, Y: np.ndarray, kind: Kind = ROUGHIE) -> Run:
     """A prediction (rows, N_Y) with the rows and columns of the measured run, no gaps."""
-    columns = {}
-    for name, values in run.columns.items():
-        if name in ONBOARD:
-            columns[name] = Y[:, ONBOARD.index(name)]
-        elif name in INSTEAD:
-            columns[name] = Y[:, ef.Y_MOCAP_X + (*names.MOCAP_POSITION, *names.MOCAP_ATTITUDE).index(name)]
-        else:  # time and commands are not predicted, only without gaps
-            columns[name] = held(values)
+    read = {reading.column: n for n, reading in enumerate(kind.readings)}
+    # time and commands are not predicted, only without gaps
+    columns = {name: Y[:, read[name]] if name in read else held(values) for name, values in run.columns.items()}
     return replace(run, columns=columns, path=None)

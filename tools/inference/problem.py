@@ -1,39 +1,22 @@
-"""A case as the diagnosis sees it: recordings, noise, and flights of any model along them (core/filter)."""
+"""A case as the observer sees it: recordings, noise, and flights of any model along them (core/filter)."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from firmware.core.estimation import estimator_layout as kf
-from firmware.core.vehicle.layout import N_X
-from firmware.estimation.settings import UNSEEN_SERVO_WALK
 from firmware.model.vehicle import SensorsTable
-from sim_backend.core.effects import effect_layout as ef
-from tools.data.runs import columns as names
 from tools.data.runs.case import Case
 from tools.data.runs.run import Run
-from tools.inference.channels import measured
-from tools.inference.core.filter import filter_runs, follow_runs
-from tools.inference.core.flight import simulate_runs
-from tools.inference.core.step import N_ERR, N_Y
+from tools.inference.channels import recorded
+from tools.inference.kind import ROUGHIE, Kind
 from tools.inference.model import Model, nominal_model
 from tools.inference.recording import Recording, record
 from tools.inference.rules import Rules
-from tools.inference.windows import Window, windows
+from tools.inference.windows import Window
 
-START_SPEEDS = (0.03, 0.2, 0.4)  # m/s, tried; each with SPEED_SPREAD
-SPEED_SPREAD = (0.1, 0.03, 0.03)  # m/s
-POSITION_SPREAD, DEPTH_SPREAD, ATTITUDE_SPREAD, RATE_SPREAD = 0.05, 0.05, 0.05, 0.05  # m, m, rad, rad/s about readings
-ACTUATOR_SPREAD = (1e-4, 3e-4, 5e-4)  # rad, m, kg: where commanded, they begin at 0 and at the draw-wires
-UNSEEN_SPREAD = 0.3  # rad, of a servo without command
-ROUGH_WALK = (1e-6, 4e-10, 2.5e-9)  # per s, times the roughness squared, of filters that are not to trust the model
 ALL = Rules()
 LEAST_NOISE = 1e-6
 LOST = 1e6  # sigma; innovations of a model that has left every vehicle
-WALK = (1e-8, 1e-12, 1e-12)  # per s; commanded actuators go as the model says
-
-
-DRIFT = (10.0, 0.0005**2, 0.005**2)  # s, (rad/s)2/s, (m/s)2/s: of what the model lacks
 
 
 @dataclass
@@ -41,31 +24,35 @@ class Gains:
     """What a filter leaves behind, by row: whitening, corrections, and the innovations of its own model."""
 
     W: np.ndarray  # (rows, N_Y, N_Y)
-    K: np.ndarray  # (rows, N_ERR, N_Y)
-    X: np.ndarray  # (rows, N_XF) states
-    path: np.ndarray  # (rows, 6)
+    K: np.ndarray  # (rows, n_error, N_Y)
+    X: np.ndarray  # (rows, n_state) states
+    path: np.ndarray  # (rows, n_path)
     E: np.ndarray  # (rows, N_Y) whitened innovations, NaN where nothing was measured
     misfit: np.ndarray  # (runs,) -2 log likelihood without its constant
 
 
 @dataclass
 class Problem:
-    """Runs behind each other in one table, ready for the kernels."""
+    """Runs behind each other in one table, ready for the kernels of their vehicle's kind.
 
+    N_Y is the number of its readings; n_state, n_error, n_spectral are the kind's.
+    """
+
+    kind: Kind
     case: Case
     model: Model
     runs: list[Run]
     recording: Recording
     z: np.ndarray  # (rows, N_Y) measured
-    starts: np.ndarray  # (runs, N_XF)
-    spreads: np.ndarray  # (runs, N_ERR)
-    spectral: np.ndarray  # (N_SPECTRAL,) of accelerations, of walks of actuators, water and motion capture's clock
+    starts: np.ndarray  # (runs, n_state)
+    spreads: np.ndarray  # (runs, n_error)
+    spectral: np.ndarray  # (n_spectral,) of accelerations, of walks of actuators, water and motion capture's clock
     R: np.ndarray  # (runs, N_Y)
     valid: np.ndarray  # (rows, N_Y) bool
     stamps: np.ndarray  # (rows,) s, of the poses of motion capture that stand in the rows
     run_of: np.ndarray  # (rows,)
     rules: Rules = ALL
-    extra_noise: np.ndarray | None = None  # (N_SPECTRAL,) densities of disorder that was found, beside `spectral`
+    extra_noise: np.ndarray | None = None  # (n_spectral,) densities of disorder that was found, beside `spectral`
 
     recorded: "Problem | None" = None  # as it was before its poses were moved
 
@@ -81,13 +68,13 @@ class Problem:
         return self if self.recorded is None else self.recorded
 
     def with_extra_noise(self, more: np.ndarray) -> "Problem":
-        """The problem, and the one it was made from, with densities (N_SPECTRAL,) of disorder added."""
+        """The problem, and the one it was made from, with densities (n_spectral,) of disorder added."""
         recorded = None if self.recorded is None else self.recorded.with_extra_noise(more)
         return replace(self, extra_noise=more, recorded=recorded)
 
     @property
     def densities(self) -> np.ndarray:
-        """Spectral densities with the extra noise, (N_SPECTRAL,)."""
+        """Spectral densities with the extra noise, (n_spectral,)."""
         return self.spectral.copy() if self.extra_noise is None else self.spectral + self.extra_noise
 
     @property
@@ -97,28 +84,28 @@ class Problem:
 
     def filter(
         self, P: np.ndarray, F: np.ndarray, roughness: float = 1.0, begin: bool = False, more=None, doubt=None,
-        speeds=START_SPEEDS,
+        speeds=None,
     ) -> Gains:  # fmt: skip
         """The filter of a model over all runs; `roughness` multiplies the disturbance; `begin` seeks the first speed
-        among `speeds`.
+        among `speeds`, the kind's if none are given.
 
-        more (N_SPECTRAL,) is added to the spectral densities, doubt (N_Y,) to the variances of the measurements.
+        more (n_spectral,) is added to the spectral densities, doubt (N_Y,) to the variances of the measurements.
         """
-        rows, runs = len(self.z), len(self.runs)
+        kind, (rows, width), runs = self.kind, self.z.shape, len(self.runs)
         made = Gains(
-            np.empty((rows, N_Y, N_Y)), np.empty((rows, self.spreads.shape[1], N_Y)), np.empty((rows, ef.N_XF)),
-            np.empty((rows, 6)), np.empty((rows, N_Y)), np.empty(runs),
+            np.empty((rows, width, width)), np.empty((rows, self.spreads.shape[1], width)),
+            np.empty((rows, kind.n_state)), np.empty((rows, kind.n_path)), np.empty((rows, width)), np.empty(runs),
         )  # fmt: skip
-        spectral = self.densities
-        spectral[:6] += self.spectral[:6] * (roughness**2 - 1.0)
+        spectral, speeds = self.densities, kind.speeds if speeds is None else speeds
+        spectral[kind.accelerations] += self.spectral[kind.accelerations] * (roughness**2 - 1.0)
         if roughness > 1.0:
-            spectral[6:9] += np.array(ROUGH_WALK) * roughness**2
+            spectral[kind.actuator_walks] += np.array(kind.rough_walks) * roughness**2
         if more is not None:
             spectral += more
         R = self.R if doubt is None else self.R + doubt
         r = self.recording
-        filter_runs(
-            P, F, spectral, R, self.model.sigma, np.array(DRIFT), r.modes, r.bounds, r.early, r.t, self.stamps,
+        kind.filter_runs(
+            P, F, spectral, R, self.model.sigma, np.array(kind.drift), r.modes, r.bounds, r.early, r.t, self.stamps,
             r.inputs, self.z, self.starts, np.array(speeds if begin else ()), self.spreads, made.X, made.path, made.E,
             made.W, made.K, made.misfit,
         )  # fmt: skip
@@ -139,9 +126,9 @@ class Problem:
         for n in range(0, len(models), block):
             part = models[n : n + block]
             E = np.empty((len(part), *self.z.shape))
-            follow_runs(
-                np.array([P for P, _ in part]), np.array([F for _, F in part]), np.array(DRIFT), r.modes, r.bounds,
-                r.t, self.stamps, r.inputs, self.z, self.starts, gains.W, gains.K, E,
+            self.kind.follow_runs(
+                np.array([P for P, _ in part]), np.array([F for _, F in part]), np.array(self.kind.drift), r.modes,
+                r.bounds, r.t, self.stamps, r.inputs, self.z, self.starts, gains.W, gains.K, E,
             )  # fmt: skip
             out.append(np.clip(np.nan_to_num(E[:, self.valid], nan=LOST), -LOST, LOST))
         return np.concatenate(out)
@@ -165,71 +152,56 @@ class Problem:
     def simulated(self, P: np.ndarray, F: np.ndarray, starts: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """What would have been measured, were (P, F) the truth: (rows, N_Y), NaN where nothing was."""
         r, Z = self.recording, np.empty_like(self.z)
-        rows = len(Z)
-        simulate_runs(
-            P, F, self.densities, self.R, r.modes, r.bounds, r.t, r.inputs, starts, rng.standard_normal((rows, 6)),
-            rng.standard_normal((rows, N_Y)), Z,
+        shaken = rng.standard_normal((len(Z), len(self.kind.disturbance)))
+        self.kind.simulate_runs(
+            P, F, self.densities, self.R, r.modes, r.bounds, r.t, r.inputs, starts, shaken,
+            rng.standard_normal(Z.shape), Z,
         )  # fmt: skip
         Z[~self.valid] = np.nan
         return Z
 
 
-def measured_all(run: Run) -> np.ndarray:
+def measured_all(kind: Kind, run: Run) -> np.ndarray:
     """Everything that was measured, (rows, N_Y): onboard, and motion capture's pose beside it."""
-    table = np.full((run.rows, N_Y), np.nan)
-    table[:, : ef.Y_ONBOARD] = measured(run)[:, : ef.Y_ONBOARD]
-    for onboard, mocap in zip(names.ATTITUDE, names.MOCAP_ATTITUDE, strict=True):
-        if onboard not in run.columns and mocap in run.columns:
-            table[:, names.ATTITUDE.index(onboard)] = np.nan
-    if names.DEPTH not in run.columns:
-        table[:, ef.Y_DEPTH] = np.nan
-    for n, name in enumerate((*names.MOCAP_POSITION, *names.MOCAP_ATTITUDE)):
-        if name in run.columns:
-            table[:, ef.Y_MOCAP_X + n] = run.columns[name]
+    table = np.full((run.rows, len(kind.readings)), np.nan)
+    for n, reading in enumerate(kind.readings):
+        if recorded(run, reading.column):
+            table[:, n] = run.columns[reading.column]
     return table
 
 
-def variances(sensors: SensorsTable) -> np.ndarray:
+def variances(kind: Kind, sensors: SensorsTable) -> np.ndarray:
     """The measurements' variances, (N_Y,). A file may say that one has no noise; a filter must not believe that."""
-    of = [
-        *3 * [sensors.attitude], *3 * [sensors.gyro], sensors.depth, sensors.slider, sensors.ballast,
-        *3 * [sensors.mocap_position], *3 * [sensors.mocap_attitude],
-    ]  # fmt: skip
-    return np.array([max(sensor.noise, LEAST_NOISE) ** 2 for sensor in of])
+    noise = [getattr(sensors, reading.source).noise for reading in kind.readings]
+    return np.array([max(sigma, LEAST_NOISE) ** 2 for sigma in noise])
 
 
-def pose(case: Case, model: Model | None = None, runs: list[Run] | None = None, rules: Rules = ALL) -> Problem:
+def problem_of(
+    case: Case, model: Model | None = None, runs: list[Run] | None = None, rules: Rules = ALL, kind: Kind = ROUGHIE
+) -> Problem:
     """The problem of a case (all of its runs, if none are named)."""
     model = nominal_model(case) if model is None else model
     runs = case.runs if runs is None else runs
-    recording = record(runs)
-    count = len(runs)
-    z = np.concatenate([measured_all(run) for run in runs])
-    starts, spreads = np.zeros((count, ef.N_XF)), np.zeros((count, N_ERR))
-    starts[:, :N_X] = recording.begins
-    starts[:, 7], starts[:, 10:13] = 0.2, 0.0
-    starts[:, ef.X_GEAR_SERVO], starts[:, ef.X_GEAR_SLIDER] = starts[:, 13], starts[:, 14]
-    walk = np.array(WALK)
-    for n in range(count):
-        actuators = np.array(ACTUATOR_SPREAD)
-        if recording.modes[n] & kf.SERVO_DRIVEN:
-            actuators[0], walk[0] = UNSEEN_SPREAD, UNSEEN_SERVO_WALK**2
-        spreads[n] = [
-            POSITION_SPREAD, POSITION_SPREAD, DEPTH_SPREAD, *3 * [ATTITUDE_SPREAD], *SPEED_SPREAD, *3 * [RATE_SPREAD],
-            *actuators, 0.0,
-        ]  # fmt: skip
-        # A position that drives the model is no measurement beside it.
-        driven = recording.drawn[recording.bounds[n] : recording.bounds[n + 1]]
-        z[recording.bounds[n] : recording.bounds[n + 1], ef.Y_SLIDER : ef.Y_BALLAST + 1][np.isfinite(driven)] = np.nan
-    d = case.disturbance
-    spectral = np.array(
-        [*3 * [d.linear**2 * kf.DISTURBANCE_HOLD], *3 * [d.angular**2 * kf.DISTURBANCE_HOLD], *walk, *4 * [0.0]]
-    )
-    run_of = np.repeat(np.arange(count), np.diff(recording.bounds))
-    R = np.tile(variances(case.sensors), (count, 1))
+    recording = record(kind, runs)
+    z = np.concatenate([measured_all(kind, run) for run in runs])
+    spreads, spectral = np.tile(kind.spread, (len(runs), 1)), np.zeros(kind.n_spectral)
+    disturbance = [getattr(case.disturbance, name) for name in kind.disturbance]
+    spectral[kind.accelerations] = np.array(disturbance) ** 2 * kind.hold
+    walks = np.array(kind.walks)
+    for i, entry in enumerate(kind.inputs):
+        if entry.unseen is not None:
+            unseen = (recording.modes & entry.driven) > 0
+            if unseen.any():
+                spreads[unseen, kind.actuator_errors.start + i], walks[i] = entry.unseen
+        if entry.reading >= 0:  # a position that drives the model is no measurement beside it
+            z[np.isfinite(recording.drawn[:, i]), entry.reading] = np.nan
+    spectral[kind.actuator_walks] = walks
+    run_of = np.repeat(np.arange(len(runs)), np.diff(recording.bounds))
+    R = np.tile(variances(kind, case.sensors), (len(runs), 1))
     return Problem(
-        case, model, runs, recording, z, starts, spreads, spectral, R, np.isfinite(z), recording.t, run_of, rules
-    )
+        kind, case, model, runs, recording, z, recording.begins.copy(), spreads, spectral, R, np.isfinite(z),
+        recording.t, run_of, rules,
+    )  # fmt: skip
 
 
 @dataclass
@@ -244,7 +216,7 @@ class Scored:
 
 def cut(problem: Problem) -> Scored:
     """The windows of all runs."""
-    listed = [windows(run.t) for run in problem.runs]
+    listed = [problem.kind.measures.windows(run.t) for run in problem.runs]
     flat = [(n, window) for n, found in enumerate(listed) for window in found if window.start < window.end]
     offset = problem.recording.bounds[:-1]
     return Scored(

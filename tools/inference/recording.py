@@ -4,13 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from firmware.core.estimation import estimator_layout as kf
-from firmware.core.maths.rotations import quaternion_from_euler
-from firmware.core.vehicle.layout import N_X
-from tools.data.runs import columns as names
 from tools.data.runs.run import Run
-from tools.inference.channels import measured
-from tools.inference.windows import START
+from tools.inference.channels import recorded
+from tools.inference.kind import Kind
 
 
 @dataclass
@@ -21,9 +17,9 @@ class Recording:
     early: np.ndarray  # (runs,) end of the rows that may say how the run began
     modes: np.ndarray  # (runs,) actuators that are driven rather than commanded
     t: np.ndarray  # (rows,) s
-    inputs: np.ndarray  # (rows, 3) command, or speed where driven
-    drawn: np.ndarray  # (rows, 2) slider and ballast where they are driven, NaN where they are commanded
-    begins: np.ndarray  # (runs, N_X) state by the first readings
+    inputs: np.ndarray  # (rows, inputs) command, or speed where driven
+    drawn: np.ndarray  # (rows, inputs) positions of what is driven, NaN where it is commanded
+    begins: np.ndarray  # (runs, n_state) state by the first readings
 
 
 def held(values: np.ndarray) -> np.ndarray:
@@ -41,41 +37,35 @@ def drawn_position(t: np.ndarray, values: np.ndarray) -> np.ndarray:
     return np.interp(t, t[given], values[given])
 
 
-def _inputs(run: Run) -> tuple[int, np.ndarray, np.ndarray]:
-    """Mode, inputs (rows, 3) and driven positions (rows, 2) of a run."""
-    mode, t = kf.COMMANDED, run.t
-    inputs, drawn = np.zeros((run.rows, 3)), np.full((run.rows, 2), np.nan)
-    for i, command in enumerate(names.COMMANDS):
-        values = run.columns.get(command)
-        if values is not None and np.isfinite(values).any():
-            inputs[:, i] = held(values)
+def _inputs(kind: Kind, run: Run) -> tuple[int, np.ndarray, np.ndarray]:
+    """Mode, inputs and driven positions, both (rows, inputs), of a run."""
+    mode, t, shape = 0, run.t, (run.rows, len(kind.inputs))
+    inputs, drawn = np.zeros(shape), np.full(shape, np.nan)
+    for i, entry in enumerate(kind.inputs):
+        if recorded(run, entry.command):
+            inputs[:, i] = held(run.columns[entry.command])
             continue
-        mode |= 1 << i
-        wire = run.columns.get(names.DRAW_WIRES[i - 1]) if i else None
-        if wire is not None and np.isfinite(wire).any():
-            drawn[:, i - 1] = drawn_position(t, wire)
+        mode |= entry.driven
+        if entry.position is not None and recorded(run, entry.position):
+            drawn[:, i] = drawn_position(t, run.columns[entry.position])
             if run.rows > 1:
-                inputs[:-1, i] = np.diff(drawn[:, i - 1]) / np.diff(t)
+                inputs[:-1, i] = np.diff(drawn[:, i]) / np.diff(t)
     return mode, inputs, drawn
 
 
-def _first_state(run: Run) -> np.ndarray:
-    """State (N_X,) by each column's first reading within the first window's start, 0 where there is none."""
-    early = measured(run)[run.t < run.t[0] + START]
+def _first_state(kind: Kind, run: Run) -> np.ndarray:
+    """State (n_state,) by each column's first reading within the first window's start, 0 where there is none."""
+    early = kind.measures.measured(run)[run.t < run.t[0] + kind.measures.look_in]
     first = [column[np.isfinite(column)][0] if np.isfinite(column).any() else 0.0 for column in early.T]
-    x = np.zeros(N_X)
-    x[0:3] = first[9], first[10], first[6]
-    x[3:7] = quaternion_from_euler(*first[:3])
-    x[10:13], x[14:16] = first[3:6], first[7:9]
-    return x
+    return kind.first_state(np.array(first))
 
 
-def record(runs: list[Run]) -> Recording:
+def record(kind: Kind, runs: list[Run]) -> Recording:
     """The runs' tables for the kernels."""
     bounds = np.concatenate([[0], np.cumsum([run.rows for run in runs])])
-    early = bounds[:-1] + [np.searchsorted(run.t, run.t[0] + START) for run in runs]
-    modes, inputs, drawn = zip(*(_inputs(run) for run in runs), strict=True)
+    early = bounds[:-1] + [np.searchsorted(run.t, run.t[0] + kind.measures.look_in) for run in runs]
+    modes, inputs, drawn = zip(*(_inputs(kind, run) for run in runs), strict=True)
     return Recording(
         bounds, early, np.array(modes, dtype=np.int64), np.concatenate([run.t for run in runs]),
-        np.concatenate(inputs), np.concatenate(drawn), np.array([_first_state(run) for run in runs]),
+        np.concatenate(inputs), np.concatenate(drawn), np.array([_first_state(kind, run) for run in runs]),
     )  # fmt: skip

@@ -6,8 +6,7 @@ from typing import Any
 from sim_backend.core.effects.catalogue import catalogue
 from tools.diagnose.noise_probes import CLOCK, UNPREDICTABLE
 from tools.diagnose.record import Curves, Panel, Picture, Record, number, read_record
-from tools.inference.channels import CHANNELS
-from tools.inference.windows import windows
+from tools.inference.channels import ROUGHIE_MEASURES
 from tools.report import words
 from tools.report.chain_picture import chain_svg
 from tools.report.charts import Chart, Line, svg
@@ -92,10 +91,10 @@ def _pictures(record: Record) -> list[dict[str, Any]]:
 
 
 def _charts(run: Picture, curves: Curves) -> list[dict[str, Any]]:
-    table, t, listed = curves.measured, curves.t, windows(curves.t)
+    table, t, listed = curves.measured, curves.t, ROUGHIE_MEASURES.windows(curves.t)
     said = {"nominal": curves.nominal, "corrected": curves.corrected}
     drawn = []
-    for channel in (c for c in CHANNELS if c.name in run.channels and c.name in DRAWN):
+    for channel in (c for c in ROUGHIE_MEASURES.channels if c.name in run.channels and c.name in DRAWN):
         if channel.joint:
             north, east = channel.columns
             lines = [Line(table[:, east], table[:, north], "measured")]
@@ -177,7 +176,9 @@ def _context(record: Record) -> dict[str, Any]:
         "closed": _share(gap.closed.value, gap.closed.ci90),
         "alone": words.alone(gap),
         "predictable": answer.main not in UNPREDICTABLE,
-        "tolerances": [f"{c.name} {c.tolerance * c.scale:g} {c.unit}" for c in CHANNELS if c.name in data.channels],
+        "tolerances": [
+            f"{c.name} {c.tolerance * c.scale:g} {c.unit}" for c in ROUGHIE_MEASURES.channels if c.name in data.channels
+        ],
         "groups": _groups(record),
         "cautions": [words.upper(line) for line in answer.cautions],
         "correction": _correction(record),

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from tools.gap.assess import CaseGap
-from tools.inference.channels import CHANNELS, Channel, channels_of, measured
+from tools.inference.channels import Channel
 from tools.report.charts import Chart, Line, svg
 from tools.report.lines import bands, broken, near, unwrapped
 from tools.report.page import render
@@ -24,13 +24,13 @@ PARTS = {
 def _charts(found: CaseGap, n: int) -> list[dict[str, Any]]:
     """The pictures of one run: title, gap and SVG."""
     run, Y, listed = found.case.runs[n], found.predictions[n], found.windows[n]
-    table, gaps, t = measured(run), found.runs[n].channels, run.t
+    table, gaps, t = found.measures.measured(run), found.runs[n].channels, run.t
     drawn: list[dict[str, Any]] = []
 
     def add(channel: Channel, chart: Chart, least: float) -> None:
         drawn.append({"title": chart.title, "gap": gaps.get(channel.name), "svg": svg(chart, least)})
 
-    for channel in channels_of(run):
+    for channel in found.measures.channels_of(run):
         if channel.joint:
             continue
         for k, column in enumerate(channel.columns):
@@ -45,7 +45,7 @@ def _charts(found: CaseGap, n: int) -> list[dict[str, Any]]:
             ]
             chart = Chart(title, "s", lines, bands(t, listed), down=channel.name == "depth")
             add(channel, chart, 4.0 * channel.tolerance * channel.scale)
-    for channel in channels_of(run):
+    for channel in found.measures.channels_of(run):
         if channel.joint:
             north, east = channel.columns
             lines = [Line(table[:, east], table[:, north], "measured")]
@@ -79,7 +79,9 @@ def _context(found: CaseGap) -> dict[str, Any]:
         for s in found.where
     ]
     tolerances = [
-        {"name": c.name, "tolerance": f"{c.tolerance * c.scale:g} {c.unit}"} for c in CHANNELS if c.name in names
+        {"name": c.name, "tolerance": f"{c.tolerance * c.scale:g} {c.unit}"}
+        for c in found.measures.channels
+        if c.name in names
     ]
     return {
         "case": found.case.folder.resolve().name,

@@ -11,8 +11,7 @@ from firmware.model.vehicle import COEFFICIENTS
 from tools.identify.identifiability import sentences, unidentifiable_directions
 from tools.identify.levels import SENSORS, group_of_reading
 from tools.identify.pipeline import Identified
-from tools.inference.channels import measured
-from tools.inference.windows import windows
+from tools.inference.channels import ROUGHIE_MEASURES
 from tools.report.charts import Chart, Line, svg
 from tools.report.lines import broken, near, unwrapped
 from tools.report.page import render
@@ -20,7 +19,7 @@ from tools.report.page import render
 INK, TRUTH, SOFT = "#1d3f72", "#d9480f", "#8a94a3"
 SHOWN = 4  # flights left out with pictures: those whose gap was largest before
 POINTS = 1500  # of the chains, in a corner plot
-CHANNELS = ((6, "depth, m", 1.0, True), (1, "pitch, deg", 180 / np.pi, False), (0, "roll, deg", 180 / np.pi, False))
+DRAWN = ("depth", "pitch", "roll")
 
 
 def png(figure) -> str:
@@ -129,9 +128,11 @@ def flights(found: Identified) -> list[dict[str, Any]]:
     order = np.argsort([-gap.total for gap in held.before])[:SHOWN]
     shown = []
     for n in sorted(order.tolist()):
-        run, listed = held.runs[n], windows(held.runs[n].t)
-        table, charts = measured(run), []
-        for column, title, scale, down in CHANNELS:
+        run = held.runs[n]
+        listed, table, charts = ROUGHIE_MEASURES.windows(run.t), ROUGHIE_MEASURES.measured(run), []
+        for channel in (c for c in ROUGHIE_MEASURES.channels if c.name in DRAWN):
+            column, scale, down = channel.columns[0], channel.scale, channel.name == "depth"
+            title = f"{channel.name}, {channel.unit}"
             if not np.isfinite(table[:, column]).any():
                 continue
             seen, said = table[:, column], [held.nominal[n][:, column], held.identified[n][:, column]]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tools.inference.windows import START, Window
+from tools.inference.windows import Window
 from tools.report.charts import Band, Line
 
 
@@ -27,12 +27,12 @@ def broken(x: np.ndarray, y: np.ndarray, listed: list[Window], style: str) -> Li
 
 
 def bands(t: np.ndarray, listed: list[Window]) -> list[Band]:
-    """The 2 s in which each window finds its start, and what is left unscored."""
+    """The seconds in which each window finds its start, and what is left unscored."""
     found = []
     for window in listed:
         first, last = t[window.first], t[window.end - 1]
         if window.scored:
-            found.append(Band(first, min(first + START, last), "start"))
+            found.append(Band(first, t[min(window.start, window.end - 1)], "start"))
         else:
             found.append(Band(first, last, "unscored"))
     return found

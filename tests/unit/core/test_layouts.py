@@ -107,34 +107,31 @@ def test_rows_of_the_fault_table_have_names():
     assert {str(path): rows for path in FILES if (rows := bare_fault_rows(TREES[path]))} == {}
 
 
-# Kernels in which a place in a state is still a number.
-NUMBERED = {
-    "sim_backend/core/closed_loop.py",
-    "sim_backend/core/effect_plant.py",
-    "sim_backend/core/effect_world.py",
-    "sim_backend/core/world.py",
-    "tools/inference/core/flights.py",
-    "tools/inference/core/innovations.py",
-    "tools/inference/core/passage.py",
-}
+STATES = {"x", "X", "start", "starts", "begins", "error", "spread", "spreads", "spectral", "cov"}
+NAMED = (
+    "firmware/core", "sim_backend/core", "tools/data", "tools/flight", "tools/inference", "tools/gap", "tools/diagnose",
+    "tools/identify",
+)  # fmt: skip
 
 
 def literal_state_indices(tree: ast.AST) -> list[str]:
-    """Subscripts of a state x, or of rows X of states, by a bare number: `x[7]`, `X[:, 13]`, `x[3:7]`."""
+    """Subscripts of states, their errors or process noise by a bare number: `x[7]`, `gains.X[:, 13]`, `x[3:7]`."""
     found = []
     for node in ast.walk(tree):
-        if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name) and node.value.id in ("x", "X"):
-            parts = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
-            ends = [
-                end for part in parts for end in ((part.lower, part.upper) if isinstance(part, ast.Slice) else (part,))
-            ]
+        if not isinstance(node, ast.Subscript):
+            continue
+        if getattr(node.value, "id", getattr(node.value, "attr", "")) in STATES:
+            last = node.slice.elts[-1] if isinstance(node.slice, ast.Tuple) else node.slice
+            ends = (last.lower, last.upper) if isinstance(last, ast.Slice) else (last,)
             if any(isinstance(end, ast.Constant) and isinstance(end.value, int) for end in ends):
                 found.append(ast.unparse(node))
     return found
 
 
-@pytest.mark.parametrize("room", ["firmware/core", "sim_backend/core", "tools/inference/core"])
+@pytest.mark.parametrize("room", NAMED)
 def test_states_are_indexed_by_name(room):
-    assert literal_state_indices(ast.parse("x[7], X[:, 13], x[3:7], x[X_NU], x[i]")) == ["x[7]", "X[:, 13]", "x[3:7]"]
-    numbered = {path.relative_to(ROOT).as_posix() for path in FILES if literal_state_indices(TREES[path])}
-    assert {path for path in numbered if path.startswith(room)} <= NUMBERED
+    bare = ["x[7]", "a.X[:, 13]", "x[3:7]"]
+    assert literal_state_indices(ast.parse(f"{', '.join(bare)}, x[X_NU], x[i], X[-1], X[0, X_NU]")) == bare
+    here = [path for path in FILES if path.is_relative_to(ROOT / room)]
+    assert here
+    assert {str(path): found for path in here if (found := literal_state_indices(TREES[path]))} == {}

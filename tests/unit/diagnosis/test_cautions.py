@@ -10,7 +10,7 @@ from sim_backend.core.effects import effect_layout as ef
 from tools.data.runs import columns as names
 from tools.data.runs.case import Case
 from tools.diagnose.cautions import cautions, not_asked
-from tools.inference.problem import pose
+from tools.inference.problem import problem_of
 
 
 @pytest.fixture(scope="module")
@@ -26,8 +26,8 @@ def changed(case: Case, *drop: str, **columns: np.ndarray) -> Case:
 
 
 def test_whole_runs_with_everything_recorded_need_no_caution(case):
-    assert cautions(pose(case)) == []
-    assert not_asked(pose(case)) == []
+    assert cautions(problem_of(case)) == []
+    assert not_asked(problem_of(case)) == []
 
 
 @pytest.mark.parametrize(("drop", "said"), [
@@ -38,25 +38,25 @@ def test_whole_runs_with_everything_recorded_need_no_caution(case):
     (names.COMMANDS, "no commands in run00: the flights are driven by the draw-wires, the servo is guessed"),
 ])  # fmt: skip
 def test_a_missing_column_is_named_and_what_it_costs(case, drop, said):
-    (line,) = cautions(pose(changed(case, *drop)))
+    (line,) = cautions(problem_of(changed(case, *drop)))
     assert line.startswith(said)
 
 
 def test_a_long_hole_is_named_with_its_column_and_length(case):
     depth = case.runs[0].columns[names.DEPTH].copy()
     depth[100:180] = np.nan
-    (line,) = cautions(pose(changed(case, **{names.DEPTH: depth})))
+    (line,) = cautions(problem_of(changed(case, **{names.DEPTH: depth})))
     assert line == "run00: depth_m (18 % missing, up to 8 s): less can be seen there"
 
 
 def test_short_blind_spells_are_usual(case):
     x = case.runs[0].columns["mocap_x_m"].copy()
     x[100:110] = np.nan
-    assert cautions(pose(changed(case, mocap_x_m=x))) == []
+    assert cautions(problem_of(changed(case, mocap_x_m=x))) == []
 
 
 def test_one_run_leaves_nothing_out(case):
-    (line,) = cautions(pose(replace(case, runs=case.runs[:1])))
+    (line,) = cautions(problem_of(replace(case, runs=case.runs[:1])))
     assert line.startswith("one run only")
 
 
@@ -65,6 +65,6 @@ def test_labels_that_these_runs_cannot_show_are_not_asked(case):
         replace(run, columns={n: v for n, v in run.columns.items() if not n.startswith(("mocap", "cmd"))})
         for run in case.runs
     ]
-    left_out = not_asked(pose(replace(case, runs=onboard)))
+    left_out = not_asked(problem_of(replace(case, runs=onboard)))
     assert {"mocap_delay", "clock_skew", "servo_slow", "pump_slow"} <= set(left_out)
     assert not {"drag", "ballast_leak", "waves"} & set(left_out)

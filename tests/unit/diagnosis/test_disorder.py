@@ -7,11 +7,11 @@ from sim_backend.core.effects import effect_layout as ef
 from tools.diagnose.noise_probes import CLOCK, TURBULENCE
 from tools.diagnose.search import run
 from tools.diagnose.verdict import conclude
-from tools.inference.problem import pose
+from tools.inference.problem import problem_of
 
 
 def test_rough_water_is_turbulence_however_rough(tmp_path):
-    answer = conclude(run(pose(make_case(tmp_path, np.zeros(ef.N_F), seed=7, mocap=True, rough=20.0))))
+    answer = conclude(run(problem_of(make_case(tmp_path, np.zeros(ef.N_F), seed=7, mocap=True, rough=20.0))))
     assert answer.main == TURBULENCE
     assert answer.noise.probe.name == TURBULENCE
     assert 10.0 < answer.noise.scale < 40.0
@@ -21,7 +21,7 @@ def test_a_clock_that_wanders_is_late_and_hides_nothing_beside_it(tmp_path):
     F = np.zeros(ef.N_F)
     F[ef.DRAG_0] = 1.0
     case = make_case(tmp_path, F, seed=8, mocap=True, late=lambda t: 1.2 + 0.25 * np.sin(2.0 * np.pi * t / 7.0))
-    answer = conclude(run(pose(case)))
+    answer = conclude(run(problem_of(case)))
     assert answer.noise.probe.name == CLOCK
     assert set(answer.selected) == {"mocap_delay", "drag"}
     assert answer.probabilities["unknown"] < 0.2

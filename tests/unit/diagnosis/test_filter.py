@@ -7,13 +7,14 @@ from support.cases import begins, drawn, make_case
 from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.timing import mean_input
 from tools.diagnose.residuals import tests as residual_tests
-from tools.inference.core.step import N_ERR, difference, inject_error
-from tools.inference.problem import pose
+from tools.inference.core.error_layout import N_ERR
+from tools.inference.core.step import difference, inject_error
+from tools.inference.problem import problem_of
 
 
 @pytest.fixture(scope="module")
 def problem(tmp_path_factory):
-    return pose(make_case(tmp_path_factory.mktemp("white"), np.zeros(ef.N_F), seed=1, mocap=True))
+    return problem_of(make_case(tmp_path_factory.mktemp("white"), np.zeros(ef.N_F), seed=1, mocap=True))
 
 
 def test_the_true_model_leaves_white_innovations_of_unit_variance(problem):

@@ -8,7 +8,7 @@ from support.cases import make_case
 from sim_backend.core.effects import effect_layout as ef
 from tools.inference.fit import Fitter, bounded_step
 from tools.inference.parameters import effect_parameters, model_at, nuisance_parameters
-from tools.inference.problem import pose
+from tools.inference.problem import problem_of
 
 
 def test_steps_within_limits_are_those_of_bounded_least_squares():
@@ -28,7 +28,7 @@ def test_steps_within_limits_are_those_of_bounded_least_squares():
 def fitter(tmp_path_factory):
     F = np.zeros(ef.N_F)
     F[ef.PITCH_BIAS] = 0.04
-    problem = pose(make_case(tmp_path_factory.mktemp("fit"), F, seed=2))
+    problem = problem_of(make_case(tmp_path_factory.mktemp("fit"), F, seed=2))
     gains = problem.filter(problem.model.P, np.zeros(ef.N_F), roughness=20.0, begin=True)
     return Fitter(problem, gains, nuisance_parameters(problem), temper=True)
 

@@ -9,7 +9,7 @@ from tools.diagnose.matter import MATTERS, excess, movements
 from tools.diagnose.record import NONE, UNKNOWN
 from tools.diagnose.search import run
 from tools.diagnose.verdict import EVIDENCE_NEEDED, Answer, answer_first, conclude, mix_in_error_rate, to_none
-from tools.inference.problem import pose
+from tools.inference.problem import problem_of
 
 SMALL, LARGE = 0.004, 0.2  # s; at 0.3 m/s and 0.15 m of tolerance some 0.008 and 0.4 tolerances
 
@@ -18,7 +18,7 @@ def late(folder, delay: float) -> Answer:
     """The answer to a case whose motion capture is `delay` (s) late."""
     F = np.zeros(ef.N_F)
     F[ef.MOCAP_DELAY] = delay
-    return conclude(run(pose(make_case(folder, F, seed=5, mocap=True))))
+    return conclude(run(problem_of(make_case(folder, F, seed=5, mocap=True))))
 
 
 def agrees(answer: Answer) -> bool:

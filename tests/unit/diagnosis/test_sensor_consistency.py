@@ -9,13 +9,13 @@ from tools.diagnose.search import ROUGHNESS
 from tools.diagnose.sensor_consistency import HOLDS_BELOW, inconsistent_sensor, mean_nis
 from tools.diagnose.time_alignment import aligned, sample_at_row
 from tools.inference.parameters import effect_parameters, model_at, nuisance_parameters
-from tools.inference.problem import pose
+from tools.inference.problem import problem_of
 
 
 def with_effect(folder, entry, value, **about):
     F = np.zeros(ef.N_F)
     F[entry] = value
-    return pose(make_case(folder, F, seed=5, **about)), F
+    return problem_of(make_case(folder, F, seed=5, **about)), F
 
 
 def rough_nis(problem):
@@ -62,8 +62,8 @@ def test_samples_go_to_the_row_of_their_time_once():
 def test_poses_moved_to_their_time_are_foreseen(tmp_path, delay):
     """As those of a right clock; an early one shows poses of the future, which no filter foresees by its past."""
     none = np.zeros(ef.N_F)
-    right = pose(make_case(tmp_path / "right", none, seed=6, mocap=True))
-    problem = pose(make_case(tmp_path / "late", none, seed=6, mocap=True, late=lambda t: delay))
+    right = problem_of(make_case(tmp_path / "right", none, seed=6, mocap=True))
+    problem = problem_of(make_case(tmp_path / "late", none, seed=6, mocap=True, late=lambda t: delay))
     F = np.zeros(ef.N_F)
     F[ef.MOCAP_DELAY] = delay
     poses = slice(ef.Y_ONBOARD, ef.N_Y)

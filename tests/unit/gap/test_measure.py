@@ -8,8 +8,8 @@ import pytest
 from sim_backend.core.effects import effect_layout as ef
 from tools.data.runs.run import Run
 from tools.gap.measure import run_gap
+from tools.inference.channels import ROUGHIE_MEASURES
 from tools.inference.predict import as_run
-from tools.inference.windows import windows
 
 TOLERANCE = {"depth_m": 0.05, "pitch_rad": math.radians(1.5), "roll_rad": math.radians(1.5), "yaw_rad": math.radians(4)}
 
@@ -53,7 +53,7 @@ def test_every_channel_as_the_contract_words_it():
         "ballast": rms((c["ballast_kg"] - Y[:, 8])[scored]) / 0.005,
         "xy": rms(np.hypot(c["mocap_x_m"] - Y[:, 9], c["mocap_y_m"] - Y[:, 10])[scored]) / 0.15,
     }
-    gap = run_gap(run, Y, windows(t))
+    gap = run_gap(ROUGHIE_MEASURES, run, Y, ROUGHIE_MEASURES.windows(t))
     assert list(gap.channels) == list(expected)
     for name, value in expected.items():
         assert gap.channels[name] == pytest.approx(value, rel=1e-12), name
@@ -63,12 +63,12 @@ def test_every_channel_as_the_contract_words_it():
 
 def test_without_commands_the_draw_wires_are_no_channel():
     run, Y = made_up(drop=("cmd_servo_rad", "cmd_slider_m", "cmd_ballast_kg"))
-    assert not {"slider", "ballast"} & set(run_gap(run, Y, windows(run.t)).channels)
+    assert not {"slider", "ballast"} & set(run_gap(ROUGHIE_MEASURES, run, Y, ROUGHIE_MEASURES.windows(run.t)).channels)
 
 
 def test_motion_capture_stands_in_for_attitude_and_depth_that_were_not_recorded():
     run, Y = made_up(drop=("roll_rad", "pitch_rad", "yaw_rad", "depth_m"))
-    gap = run_gap(run, Y, windows(run.t))
+    gap = run_gap(ROUGHIE_MEASURES, run, Y, ROUGHIE_MEASURES.windows(run.t))
     assert gap.channels["depth"] == pytest.approx(0.3 / 0.05)
     assert gap.channels["yaw"] == pytest.approx(math.degrees(0.1) / 4.0)
 
@@ -76,12 +76,13 @@ def test_motion_capture_stands_in_for_attitude_and_depth_that_were_not_recorded(
 def test_a_column_of_nothing_was_not_recorded():
     run, Y = made_up()
     run.columns["depth_m"][:] = np.nan
-    assert run_gap(run, Y, windows(run.t)).channels["depth"] == pytest.approx(0.3 / 0.05)
+    gap = run_gap(ROUGHIE_MEASURES, run, Y, ROUGHIE_MEASURES.windows(run.t))
+    assert gap.channels["depth"] == pytest.approx(0.3 / 0.05)
 
 
 def test_a_run_shorter_than_the_start_has_no_gap():
     run, Y = made_up(count=15)
-    gap = run_gap(run, Y, windows(run.t))
+    gap = run_gap(ROUGHIE_MEASURES, run, Y, ROUGHIE_MEASURES.windows(run.t))
     assert gap.channels == {}
     assert math.isnan(gap.total)
 

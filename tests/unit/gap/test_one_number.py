@@ -9,10 +9,10 @@ from tools.diagnose.shrink import gaps
 from tools.gap.assess import assess
 from tools.gap.measure import root_mean_square, run_gap
 from tools.identify.predict import predicted
+from tools.inference.channels import ROUGHIE_MEASURES
 from tools.inference.model import nominal_model
 from tools.inference.predict import predict
-from tools.inference.problem import pose
-from tools.inference.windows import windows
+from tools.inference.problem import problem_of
 
 
 @pytest.mark.parametrize("mocap", [False, True])
@@ -21,9 +21,9 @@ def test_measure_predict_identify_and_diagnose_name_the_same_gap(mocap):
     model, F = nominal_model(case), np.zeros(ef.N_F)
     measured = {run.name: run.total for run in assess(case).runs}
     identified = {run.name: predicted(case, model, run, model.P, F)[0].total for run in case.runs}
-    before = {gap.name: gap.total for gap in gaps(pose(case), 2 * [(model.P, F)])[0]}
+    before = {gap.name: gap.total for gap in gaps(problem_of(case), 2 * [(model.P, F)])[0]}
     flown = zip(case.runs, predict(case, model, case.runs), strict=True)
-    written = {run.name: run_gap(run, Y, windows(run.t)).total for run, Y in flown}
+    written = {run.name: run_gap(ROUGHIE_MEASURES, run, Y, ROUGHIE_MEASURES.windows(run.t)).total for run, Y in flown}
     for other in (identified, before, written):
         assert other == pytest.approx(measured, rel=1e-9)
     assert root_mean_square(measured.values()) > 0.0

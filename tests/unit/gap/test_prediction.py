@@ -9,15 +9,19 @@ from firmware.core.vehicle import layout
 from sim_backend.core.effects import effect_layout as ef
 from tools.data.runs.run import Run
 from tools.gap.measure import root_mean_square, run_gap
-from tools.inference.model import load_model, nominal_model
+from tools.inference.channels import ROUGHIE_MEASURES
+from tools.inference.load import load_model
+from tools.inference.model import nominal_model
 from tools.inference.predict import fly_windows_from, observe, predict
-from tools.inference.problem import cut, pose
-from tools.inference.windows import windows
+from tools.inference.problem import cut, problem_of
 
 
 def total(case, predictions=None) -> float:
     predictions = predict(case, nominal_model(case), case.runs) if predictions is None else predictions
-    return root_mean_square([run_gap(r, Y, windows(r.t)).total for r, Y in zip(case.runs, predictions, strict=True)])
+    pairs = zip(case.runs, predictions, strict=True)
+    return root_mean_square(
+        [run_gap(ROUGHIE_MEASURES, run, Y, ROUGHIE_MEASURES.windows(run.t)).total for run, Y in pairs]
+    )
 
 
 @pytest.mark.parametrize("mocap", [False, True])
@@ -27,7 +31,7 @@ def test_the_start_is_found_nearly_as_good_as_known(mocap, speed, most):
     found, known = [], []
     for seed in range(5):
         case, flights = fly_case(World(mocap=mocap, start_speed=speed), seed, runs=2)
-        problem, P, F = pose(case), nominal_model(case).P, np.zeros(ef.N_F)
+        problem, P, F = problem_of(case), nominal_model(case).P, np.zeros(ef.N_F)
         bounds = problem.recording.bounds
         found.append(total(case, np.split(fly_windows_from(problem, P, F, observe(problem, P, F)), bounds[1:-1])))
         gains = observe(problem, P, F)
@@ -41,7 +45,7 @@ def test_the_launch_is_found_whether_at_rest_or_gliding(speed):
     errors = []
     for seed in range(6):
         case, flights = fly_case(World(mocap=True, start_speed=speed, seconds=20.0), seed, runs=1)
-        problem = pose(case)
+        problem = problem_of(case)
         gains, row = observe(problem, problem.model.P, np.zeros(ef.N_F)), cut(problem).first[0] - 1
         errors.append(gains.X[row, 7] - flights[0].truth[row, 7])
     assert np.sqrt(np.mean(np.square(errors))) < 0.04
@@ -112,11 +116,11 @@ def test_without_commands_the_draw_wires_fly_it():
     run.columns["slider_m"][50:60] = np.nan
     case = case_of(World(), [run])
     model = nominal_model(case)
-    assert pose(case, model).recording.modes[0] == kf.SERVO_DRIVEN | kf.SLIDER_DRIVEN | kf.BALLAST_DRIVEN
+    assert problem_of(case, model).recording.modes[0] == kf.SERVO_DRIVEN | kf.SLIDER_DRIVEN | kf.BALLAST_DRIVEN
     (Y,) = predict(case, model, case.runs)
     seen = np.isfinite(run.columns["ballast_kg"])
     np.testing.assert_allclose(Y[seen, kf.Z_BALLAST], run.columns["ballast_kg"][seen], atol=2e-3)
-    gap = run_gap(run, Y, windows(run.t))
+    gap = run_gap(ROUGHIE_MEASURES, run, Y, ROUGHIE_MEASURES.windows(run.t))
     assert gap.channels["depth"] < 3.0
     assert gap.channels["pitch"] < 3.0
 
@@ -124,7 +128,7 @@ def test_without_commands_the_draw_wires_fly_it():
 def test_a_current_is_in_the_gap_of_the_position_and_in_no_other():
     case, _ = fly_case(World(mocap=True, water=(0.15, -0.1)), 12, runs=2)
     for run, Y in zip(case.runs, predict(case, nominal_model(case), case.runs), strict=True):
-        gap = run_gap(run, Y, windows(run.t))
+        gap = run_gap(ROUGHIE_MEASURES, run, Y, ROUGHIE_MEASURES.windows(run.t))
         assert gap.channels["xy"] > 5.0
         assert gap.channels["depth"] < 2.0
         assert gap.channels["yaw"] < 1.5
@@ -135,7 +139,8 @@ def test_a_depth_sensor_that_is_off_does_not_move_the_start_where_motion_capture
     flight.run.columns["depth_m"] += 0.5
     case = case_of(World(mocap=True), [flight.run])
     (Y,) = predict(case, nominal_model(case), case.runs)
-    assert run_gap(flight.run, Y, windows(flight.run.t)).channels["depth"] == pytest.approx(10.0, rel=0.3)
+    gap = run_gap(ROUGHIE_MEASURES, flight.run, Y, ROUGHIE_MEASURES.windows(flight.run.t))
+    assert gap.channels["depth"] == pytest.approx(10.0, rel=0.3)
 
 
 def test_commands_that_come_late_are_held():

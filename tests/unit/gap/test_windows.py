@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from tools.inference.windows import windows
+from tools.inference.channels import ROUGHIE_MEASURES
 
 
 def rows(count: int, rate: float = 10.0, begin: float = 0.0) -> list[tuple[int, int, int, bool]]:
-    found = windows(begin + np.arange(count) / rate)
+    found = ROUGHIE_MEASURES.windows(begin + np.arange(count) / rate)
     return [(w.first, w.start, w.end, w.scored) for w in found]
 
 
@@ -39,6 +39,6 @@ def test_at_50_hz_a_window_has_a_thousand_rows():
 
 def test_a_gap_in_the_log_drops_the_windows_it_swallows():
     t = np.concatenate([np.arange(0.0, 15.0, 0.1), np.arange(65.0, 100.0, 0.1)])
-    found = windows(t)
+    found = ROUGHIE_MEASURES.windows(t)
     assert [(round(t[w.first], 3), w.scored) for w in found] == [(0.0, True), (65.0, True), (80.0, True)]
     assert t[found[1].start] == pytest.approx(65.0)  # nothing of its first 2 s was recorded

@@ -19,7 +19,7 @@ from tools.diagnose.record import (
     Record,
     Unexplained,
 )
-from tools.diagnose.residuals import CHANNELS
+from tools.inference.kind import ROUGHIE
 from tools.report import words
 
 FAR = {"before": 4.0, "recalibrated": 3.0, "after": 0.5, "floor": 0.4}
@@ -42,7 +42,7 @@ def record(probabilities, selected=(), groups=None, findings=(), noise=None, whe
 
 def test_every_label_has_plain_words():
     assert set(words.PLAIN) == set(catalogue())
-    assert set(words.AXES) == set(CHANNELS)
+    assert set(words.AXES) == {reading.name for reading in ROUGHIE.readings}
 
 
 def test_one_cause_says_what_where_how_sure_and_how_far():

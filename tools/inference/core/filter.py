@@ -6,7 +6,7 @@ course. Its gains are kept, and any other model is then flown along the same dat
 differ smoothly with its parameters however long the run, because the data hold every flight to the course flown.
 
 Runs stand one behind the other in tables of all rows; `bounds` (runs + 1) says where each begins. Errors of the state
-(N_ERR) are those of core/step.
+(N_ERR) and densities of process noise (N_SPECTRAL) are those of core/error_layout.
 """
 
 import math
@@ -14,14 +14,28 @@ import math
 import numpy as np
 
 from firmware.core.jit import kernel, parallel_kernel, prange
-from firmware.core.maths.rotations import rotation_nb, wrap_angle
-from firmware.core.vehicle.layout import N_P
+from firmware.core.maths.rotations import wrap_angle
+from firmware.core.vehicle.layout import N_P, X_ACT, X_NU
+from firmware.core.vehicle.state import rotation
 from sim_backend.core.effect_plant import effective_parameters
 from sim_backend.core.effects import effect_layout as ef
+from tools.inference.core.error_layout import (
+    E_ACT,
+    E_ATT,
+    E_DOWN,
+    E_LATE,
+    E_NU,
+    E_POS,
+    N_ERR,
+    N_PATH,
+    Q_ACC,
+    Q_ACT,
+    Q_LATE,
+    Q_POS,
+)
 from tools.inference.core.lacking import (
     L_GYRO,
     N_LACKING,
-    Y_GYRO,
     add_drift,
     add_model_error,
     lacking_columns,
@@ -30,8 +44,6 @@ from tools.inference.core.lacking import (
 )
 from tools.inference.core.step import (
     LARGEST_SPEED,
-    LATE,
-    N_ERR,
     N_Y,
     difference,
     inject_error,
@@ -42,7 +54,6 @@ from tools.inference.core.step import (
     read_row,
 )
 
-N_SPECTRAL = 13
 NUDGE = 1e-5  # of the state's unit, for derivatives
 
 
@@ -58,16 +69,16 @@ def perturbed(x, j, error, moved):
 @kernel
 def noise_gain(x, dt, Gam):
     """What accelerations held over a step of dt to x leave, Gam (N_ERR, 6): speeds, and half as much way and turn."""
-    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation_nb(x[3], x[4], x[5], x[6])
+    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation(x)
     half = 0.5 * dt * dt
     Gam[:] = 0.0
-    Gam[0, 0], Gam[0, 1], Gam[0, 2] = half * r11, half * r12, half * r13
-    Gam[1, 0], Gam[1, 1], Gam[1, 2] = half * r21, half * r22, half * r23
-    Gam[2, 0], Gam[2, 1], Gam[2, 2] = half * r31, half * r32, half * r33
+    Gam[E_POS, 0], Gam[E_POS, 1], Gam[E_POS, 2] = half * r11, half * r12, half * r13
+    Gam[E_POS + 1, 0], Gam[E_POS + 1, 1], Gam[E_POS + 1, 2] = half * r21, half * r22, half * r23
+    Gam[E_POS + 2, 0], Gam[E_POS + 2, 1], Gam[E_POS + 2, 2] = half * r31, half * r32, half * r33
     for j in range(3):
-        Gam[3 + j, 3 + j] = half
+        Gam[E_ATT + j, 3 + j] = half
     for j in range(6):
-        Gam[6 + j, j] = dt
+        Gam[E_NU + j, j] = dt
 
 
 @kernel
@@ -79,12 +90,12 @@ def linear_step(Pw, F, x, acc, mode, t, inputs, i, begin, zero, work, kept, move
     """
     base[:] = x
     propagate(Pw, F, base, mode, t, inputs, i, begin, acc, zero, work, kept, True)
-    for j in range(2):
+    for j in range(E_DOWN):
         Phi[:, j] = 0.0
         Phi[j, j] = 1.0
-    Phi[:, LATE] = 0.0
-    Phi[LATE, LATE] = 1.0
-    for j in range(2, LATE):
+    Phi[:, E_LATE] = 0.0
+    Phi[E_LATE, E_LATE] = 1.0
+    for j in range(E_DOWN, E_LATE):
         perturbed(x, j, error, moved)
         propagate(Pw, F, moved, mode, t, inputs, i, begin, acc, zero, work, kept, True)
         difference(moved, base, error)
@@ -102,7 +113,7 @@ def linear_reading(F, x, t, stamps, path, i, begin, moved, error, y, y2, H):
         read_row(F, moved, t, stamps, path, i, begin, y2)
         for m in range(N_Y):
             change = y2[m] - y[m]
-            if m < 3 or m >= ef.Y_MOCAP_ROLL:
+            if m <= ef.Y_YAW or m >= ef.Y_MOCAP_ROLL:
                 change = wrap_angle(change)
             H[m, j] = change / NUDGE
 
@@ -119,7 +130,7 @@ def filter_run(
     P (N_P), F (N_F); spectral (N_SPECTRAL): spectral densities of the accelerations ((m/s2)2 s, (rad/s2)2 s), walks
     of servo, slider, ballast, of the position and of motion capture's clock (per s); R (N_Y) measurements' variances;
     start (N_XF), spread (N_ERR or N_ERR + N_LACKING).
-    Out: X (rows, N_XF) the state and path (rows, 6) after each row, E (rows, N_Y) whitened innovations, NaN where
+    Out: X (rows, N_XF) the state and path (rows, N_PATH) after each row, E (rows, N_Y) whitened innovations, NaN where
     nothing was measured, W (rows, N_Y, N_Y) what whitens a row's innovations and K (rows, spreads, N_Y) what corrects
     the state by the whitened ones.
     """
@@ -127,7 +138,7 @@ def filter_run(
     effective_parameters(P, F, Pw)
     work, kept, moved, base = np.zeros((4, ef.N_XF)), np.empty(ef.N_XF), np.empty(ef.N_XF), np.empty(ef.N_XF)
     count = len(spread)
-    error, zero, before, lacking = np.empty(count), np.zeros(3), np.empty(6), np.zeros(N_LACKING)
+    error, zero, before, lacking = np.empty(count), np.zeros(3), np.empty(N_PATH), np.zeros(N_LACKING)
     Phi, Gam, cov = np.zeros((count, count)), np.empty((count, 6)), np.zeros((count, count))
     H, L, y, y2, d = np.zeros((N_Y, count)), np.empty((N_Y, N_Y)), np.empty(N_Y), np.empty(N_Y), np.empty(N_Y)
     for j in range(count):
@@ -135,7 +146,7 @@ def filter_run(
     if count > N_ERR:
         add_model_error(Pw, sigma, x, 1.0, work, cov)
     misfit = 0.0
-    for n in range(6):
+    for n in range(N_PATH):
         path[begin, n] = 0.0
     for i in range(begin, end):
         if i > begin:
@@ -150,14 +161,14 @@ def filter_run(
             log_path(x, before, path, i, begin)
             cov[:] = Phi @ cov @ Phi.T
             for j in range(6):
-                s = spectral[j] / dt
+                s = spectral[Q_ACC + j] / dt
                 for a in range(count):
                     for b in range(count):
                         cov[a, b] += s * Gam[a, j] * Gam[b, j]
             for j in range(3):
-                cov[12 + j, 12 + j] += spectral[6 + j] * dt
-                cov[j, j] += spectral[9 + j] * dt
-            cov[LATE, LATE] += spectral[12] * dt
+                cov[E_ACT + j, E_ACT + j] += spectral[Q_ACT + j] * dt
+                cov[E_POS + j, E_POS + j] += spectral[Q_POS + j] * dt
+            cov[E_LATE, E_LATE] += spectral[Q_LATE] * dt
             if count > N_ERR:
                 add_drift(Pw, sigma, drift, x, dt, work, cov)
         read_row(F, x, t, stamps, path, i, begin, y)
@@ -166,7 +177,7 @@ def filter_run(
         if count > N_ERR:
             take_gyro_bias(lacking, d)
             for j in range(3):
-                H[Y_GYRO + j, N_ERR + L_GYRO + j] = 1.0
+                H[ef.Y_P + j, N_ERR + L_GYRO + j] = 1.0
         # S = H cov H' + R of what was measured, its Cholesky factor L, and W = L^-1; K~ = cov H' L^-T
         for m in range(N_Y):
             if math.isnan(d[m]):
@@ -240,7 +251,7 @@ def lost(x, cov):
         total += cov[n, n]
     for n in range(ef.N_XF):
         total += x[n]
-    for n in range(7, 13):
+    for n in range(X_NU, X_ACT):
         fastest = max(fastest, abs(x[n]))
     return not (math.isfinite(total) and fastest < LARGEST_SPEED)
 
@@ -280,10 +291,10 @@ def filter_runs(
     """
     for run in prange(len(bounds) - 1):
         begin, end = bounds[run], bounds[run + 1]
-        least, speed = math.inf, starts[run, 7]
+        least, speed = math.inf, starts[run, X_NU]
         start = starts[run].copy()
         for n in range(len(speeds) + 1):
-            start[7] = speeds[n] if n < len(speeds) else speed
+            start[X_NU] = speeds[n] if n < len(speeds) else speed
             found = filter_run(
                 P, F, spectral, R[run], sigma, drift, modes[run], t, stamps, inputs, z, begin,
                 early[run] if n < len(speeds) else end, start, spreads[run], X, path, E, W, K,
@@ -292,7 +303,7 @@ def filter_runs(
                 misfit[run] = found
             elif found < least:
                 least, speed = found, speeds[n]
-        starts[run, 7] = speed
+        starts[run, X_NU] = speed
 
 
 @kernel
@@ -305,9 +316,9 @@ def follow_run(P, F, drift, mode, t, stamps, inputs, z, begin, end, start, W, K,
     effective_parameters(P, F, Pw)
     work, kept = np.zeros((4, ef.N_XF)), np.empty(ef.N_XF)
     count = K.shape[1]
-    error, zero, before, lacking = np.empty(count), np.zeros(3), np.empty(6), np.zeros(N_LACKING)
+    error, zero, before, lacking = np.empty(count), np.zeros(3), np.empty(N_PATH), np.zeros(N_LACKING)
     y, d = np.empty(N_Y), np.empty(N_Y)
-    for n in range(6):
+    for n in range(N_PATH):
         path[begin, n] = 0.0
     for i in range(begin, end):
         if i > begin:
@@ -335,7 +346,7 @@ def follow_runs(Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, K
         m, run = n // runs, n % runs
         begin, end = bounds[run], bounds[run + 1]
         # scratch of this run alone; indices count from its first row
-        X, path = np.empty((end - begin, ef.N_XF)), np.empty((end - begin, 6))
+        X, path = np.empty((end - begin, ef.N_XF)), np.empty((end - begin, N_PATH))
         follow_run(
             Ps[m], Fs[m], drift, modes[run], t[begin:end], stamps[begin:end], inputs[begin:end], z[begin:end], 0,
             end - begin, starts[run], W[begin:end], K[begin:end], X, path, E[m, begin:end],

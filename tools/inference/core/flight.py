@@ -8,17 +8,18 @@ from firmware.core.jit import kernel, parallel_kernel, prange
 from firmware.core.vehicle.layout import N_P
 from sim_backend.core.effect_plant import effective_parameters
 from sim_backend.core.effects import effect_layout as ef
+from tools.inference.core.error_layout import N_PATH, Q_ACC
 from tools.inference.core.filter import follow_run
 from tools.inference.core.step import N_Y, log_path, pose_of, propagate, read_row
 
 
 @kernel
 def fly_window(P, F, mode, t, inputs, X, path, first, last, Y):
-    """Fly rows first .. last - 1 of a run on from X[first - 1], into Y (rows, N_Y); path (rows, 6) up to there."""
+    """Fly rows first .. last - 1 of a run on from X[first - 1], into Y (rows, N_Y); path (rows, N_PATH) up to there."""
     Pw, x = np.empty(N_P), X[first - 1].copy()
     effective_parameters(P, F, Pw)
     work, kept = np.zeros((4, ef.N_XF)), np.empty(ef.N_XF)
-    zero, before, acc = np.zeros(3), np.empty(6), np.zeros(6)
+    zero, before, acc = np.zeros(3), np.empty(N_PATH), np.zeros(6)
     flown = path[:last].copy()
     for i in range(first, last):
         pose_of(x, before)
@@ -31,7 +32,7 @@ def fly_window(P, F, mode, t, inputs, X, path, first, last, Y):
 def fly_windows(P, F, modes, bounds, t, inputs, X, paths, first, last, run_of, Y):
     """Fly every window on from where a filter stands: Y (rows, N_Y), rows first .. last - 1.
 
-    X (rows, N_XF) and paths (rows, 6) as filter_runs leaves them. Nothing measured is looked at.
+    X (rows, N_XF) and paths (rows, N_PATH) as filter_runs leaves them. Nothing measured is looked at.
     """
     for w in prange(len(first)):
         a, b = bounds[run_of[w]], bounds[run_of[w] + 1]
@@ -48,7 +49,7 @@ def fly_followed(Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, 
     for n in prange(Ps.shape[0] * runs):
         m, run = n // runs, n % runs
         begin, end = bounds[run], bounds[run + 1]
-        X, path, E = np.empty((end - begin, ef.N_XF)), np.empty((end - begin, 6)), np.empty((end - begin, N_Y))
+        X, path, E = np.empty((end - begin, ef.N_XF)), np.empty((end - begin, N_PATH)), np.empty((end - begin, N_Y))
         follow_run(
             Ps[m], Fs[m], drift, modes[run], t[begin:end], stamps[begin:end], inputs[begin:end], z[begin:end], 0,
             end - begin, starts[run], W[begin:end], K[begin:end], X, path, E,
@@ -70,12 +71,12 @@ def simulate_runs(P, F, spectral, R, modes, bounds, t, inputs, starts, shaken, n
         Pw, x = np.empty(N_P), starts[run].copy()
         effective_parameters(P, F, Pw)
         work, kept = np.zeros((4, ef.N_XF)), np.empty(ef.N_XF)
-        zero, before, acc = np.zeros(3), np.empty(6), np.zeros(6)
-        path = np.zeros((bounds[run + 1] - begin, 6))
+        zero, before, acc = np.zeros(3), np.empty(N_PATH), np.zeros(6)
+        path = np.zeros((bounds[run + 1] - begin, N_PATH))
         for i in range(begin, bounds[run + 1]):
             if i > begin:
                 for j in range(6):
-                    acc[j] = math.sqrt(spectral[j] / (t[i] - t[i - 1])) * shaken[i, j]
+                    acc[j] = math.sqrt(spectral[Q_ACC + j] / (t[i] - t[i - 1])) * shaken[i, j]
                 pose_of(x, before)
                 propagate(Pw, F, x, modes[run], t, inputs, i, begin, acc, zero, work, kept, False)
                 log_path(x, before, path, i - begin, 0)

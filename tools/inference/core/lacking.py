@@ -11,10 +11,11 @@ import math
 import numpy as np
 
 from firmware.core.jit import kernel
-from firmware.core.maths.rotations import rotation_nb
-from firmware.core.vehicle.layout import N_P
+from firmware.core.vehicle.layout import N_P, N_X, X_NU, X_POS
 from firmware.core.vehicle.linearise import model_error
-from tools.inference.core.step import N_ERR
+from firmware.core.vehicle.state import rotation
+from sim_backend.core.effects import effect_layout as ef
+from tools.inference.core.error_layout import E_POS, N_ERR
 
 L_GYRO, L_WATER = 6, 9  # of the lacking, behind m/s2 and rad/s2 (body): rad/s, m/s north and east
 N_LACKING = 11
@@ -22,7 +23,6 @@ D_TIME, D_GYRO, D_WATER = 0, 1, 2  # drift: s over which accelerations fade; wal
 N_DRIFT = 3
 # 1 sigma before the first measurement; of the accelerations it is the parameters'
 LACKING_SPREAD = (*6 * (0.0,), *3 * (0.003,), *2 * (0.05,))  # rad/s, m/s
-Y_GYRO = 3  # the first of the gyro's readings
 
 
 @kernel
@@ -32,7 +32,7 @@ def step_lacking(drift, x, lacking, dt):
     for j in range(L_GYRO):
         lacking[j] *= fade
     for j in range(2):
-        x[j] += dt * lacking[L_WATER + j]
+        x[X_POS + j] += dt * lacking[L_WATER + j]
 
 
 @kernel
@@ -46,16 +46,16 @@ def lacking_columns(drift, dt, Gam, Phi):
     for j in range(L_GYRO, N_LACKING):
         Phi[N_ERR + j, N_ERR + j] = 1.0
     for j in range(2):
-        Phi[j, N_ERR + L_WATER + j] = dt
+        Phi[E_POS + j, N_ERR + L_WATER + j] = dt
 
 
 @kernel
 def add_model_error(P, sigma, x, share, work, cov):
     """A share of the accelerations' covariance that parameters of 1 sigma (N_P) leave at x, to the lacking's in cov."""
     point, C, Pt, g = work[0], np.empty((6, 6)), np.empty(N_P), work[1]
-    _, _, _, _, _, _, point[0], point[1], point[2] = rotation_nb(x[3], x[4], x[5], x[6])
-    for n in range(9):
-        point[3 + n] = x[7 + n]
+    _, _, _, _, _, _, point[0], point[1], point[2] = rotation(x)
+    for n in range(N_X - X_NU):
+        point[3 + n] = x[X_NU + n]
     model_error(P, sigma, 0.0, 0.0, 0.0, point, C, Pt, g)
     for i in range(6):
         for j in range(6):
@@ -76,4 +76,4 @@ def add_drift(P, sigma, drift, x, dt, work, cov):
 def take_gyro_bias(lacking, d):
     """Take the gyro's errors out of innovations d (N_Y)."""
     for j in range(3):
-        d[Y_GYRO + j] -= lacking[L_GYRO + j]
+        d[ef.Y_P + j] -= lacking[L_GYRO + j]

@@ -1,22 +1,22 @@
 """Kernels of the diagnosis: errors of a state, a model flown from row to row of a recording, and what is read there.
 
-Errors of the state (N_ERR): position (NED), attitude (rotation vector, body), nu, servo, slider, ballast, and how late
-motion capture is.
+Errors of a state are those of core/error_layout.
 """
 
 import math
 
 from firmware.core.jit import kernel
-from firmware.core.maths.rotations import euler_from_quaternion, wrap_angle
+from firmware.core.maths.rotations import wrap_angle
 from firmware.core.maths.steps import MIDPOINT, RK4
+from firmware.core.vehicle.layout import X_ACT, X_NU, X_POS, X_QUAT
+from firmware.core.vehicle.state import euler_angles, quaternion
 from sim_backend.core.effect_plant import effect_step
 from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.correction import correction
 from sim_backend.core.effects.sensing import read
 from sim_backend.core.effects.timing import mean_input, mocap_lateness
+from tools.inference.core.error_layout import E_ACT, E_ATT, E_LATE, E_NU, E_POS
 
-N_ERR = 16
-LATE = 15  # the error of motion capture's clock, s: it walks, and moves nothing but what is read
 N_Y = ef.N_Y
 MAX_STEP = 0.1  # s
 LARGEST_SPEED = 20.0  # m/s, rad/s: a model that flies faster has left every vehicle, and is held where it was
@@ -26,40 +26,40 @@ LARGEST_SPEED = 20.0  # m/s, rad/s: a model that flies faster has left every veh
 def inject_error(x, error):
     """Add an error (N_ERR) to a state, in place."""
     for i in range(3):
-        x[i] += error[i]
-    a, b, c = 0.5 * error[3], 0.5 * error[4], 0.5 * error[5]
-    q0, q1, q2, q3 = x[3], x[4], x[5], x[6]
+        x[X_POS + i] += error[E_POS + i]
+    a, b, c = 0.5 * error[E_ATT], 0.5 * error[E_ATT + 1], 0.5 * error[E_ATT + 2]
+    q0, q1, q2, q3 = quaternion(x)
     n0 = q0 - q1 * a - q2 * b - q3 * c
     n1 = q1 + q0 * a + q2 * c - q3 * b
     n2 = q2 + q0 * b + q3 * a - q1 * c
     n3 = q3 + q0 * c + q1 * b - q2 * a
     scale = 1.0 / math.sqrt(n0 * n0 + n1 * n1 + n2 * n2 + n3 * n3)
-    x[3], x[4], x[5], x[6] = n0 * scale, n1 * scale, n2 * scale, n3 * scale
+    x[X_QUAT], x[X_QUAT + 1], x[X_QUAT + 2], x[X_QUAT + 3] = n0 * scale, n1 * scale, n2 * scale, n3 * scale
     for i in range(6):
-        x[7 + i] += error[6 + i]
+        x[X_NU + i] += error[E_NU + i]
     for i in range(3):
-        x[13 + i] += error[12 + i]
-    x[ef.X_GEAR_SERVO] += error[12]
-    x[ef.X_GEAR_SLIDER] += error[13]
-    x[ef.X_LATE] += error[LATE]
+        x[X_ACT + i] += error[E_ACT + i]
+    x[ef.X_GEAR_SERVO] += error[E_ACT]
+    x[ef.X_GEAR_SLIDER] += error[E_ACT + 1]
+    x[ef.X_LATE] += error[E_LATE]
 
 
 @kernel
 def difference(x, y, error):
     """The small error (N_ERR) that takes y to x, into error."""
     for i in range(3):
-        error[i] = x[i] - y[i]
-    a0, a1, a2, a3 = y[3], -y[4], -y[5], -y[6]
-    b0, b1, b2, b3 = x[3], x[4], x[5], x[6]
+        error[E_POS + i] = x[X_POS + i] - y[X_POS + i]
+    a0, a1, a2, a3 = y[X_QUAT], -y[X_QUAT + 1], -y[X_QUAT + 2], -y[X_QUAT + 3]
+    b0, b1, b2, b3 = quaternion(x)
     sign = 2.0 if a0 * b0 - a1 * b1 - a2 * b2 - a3 * b3 >= 0.0 else -2.0
-    error[3] = sign * (a0 * b1 + a1 * b0 + a2 * b3 - a3 * b2)
-    error[4] = sign * (a0 * b2 + a2 * b0 + a3 * b1 - a1 * b3)
-    error[5] = sign * (a0 * b3 + a3 * b0 + a1 * b2 - a2 * b1)
+    error[E_ATT] = sign * (a0 * b1 + a1 * b0 + a2 * b3 - a3 * b2)
+    error[E_ATT + 1] = sign * (a0 * b2 + a2 * b0 + a3 * b1 - a1 * b3)
+    error[E_ATT + 2] = sign * (a0 * b3 + a3 * b0 + a1 * b2 - a2 * b1)
     for i in range(6):
-        error[6 + i] = x[7 + i] - y[7 + i]
+        error[E_NU + i] = x[X_NU + i] - y[X_NU + i]
     for i in range(3):
-        error[12 + i] = x[13 + i] - y[13 + i]
-    error[LATE] = x[ef.X_LATE] - y[ef.X_LATE]
+        error[E_ACT + i] = x[X_ACT + i] - y[X_ACT + i]
+    error[E_LATE] = x[ef.X_LATE] - y[ef.X_LATE]
 
 
 @kernel
@@ -86,7 +86,7 @@ def propagate(Pw, F, x, mode, t, inputs, i, begin, acc, zero, work, kept, quick)
         else:
             effect_step(RK4, Pw, F, x, mode, c0, c1, c2, since, acc, 0.0, zero, h, work)
         worst = 0.0
-        for n in range(7, 13):
+        for n in range(X_NU, X_ACT):
             worst = max(worst, abs(x[n]))
         if not worst < LARGEST_SPEED:
             x[:] = kept
@@ -94,10 +94,10 @@ def propagate(Pw, F, x, mode, t, inputs, i, begin, acc, zero, work, kept, quick)
 
 @kernel
 def log_path(x, before, path, i, begin):
-    """Add to the path (rows, 6: position, roll, pitch, yaw, without the filter's corrections) the step to row i."""
-    roll, pitch, yaw = euler_from_quaternion(x[3], x[4], x[5], x[6])
+    """Add to the path (rows, N_PATH: position, roll, pitch, yaw, less the filter's corrections) the step to row i."""
+    roll, pitch, yaw = euler_angles(x)
     for n in range(3):
-        path[i, n] = path[i - 1, n] + x[n] - before[n]
+        path[i, n] = path[i - 1, n] + x[X_POS + n] - before[n]
     path[i, 3] = path[i - 1, 3] + wrap_angle(roll - before[3])
     path[i, 4] = path[i - 1, 4] + wrap_angle(pitch - before[4])
     path[i, 5] = path[i - 1, 5] + wrap_angle(yaw - before[5])
@@ -105,9 +105,10 @@ def log_path(x, before, path, i, begin):
 
 @kernel
 def pose_of(x, before):
-    """Position and Euler angles of x, into before (6)."""
-    before[0], before[1], before[2] = x[0], x[1], x[2]
-    before[3], before[4], before[5] = euler_from_quaternion(x[3], x[4], x[5], x[6])
+    """Position and Euler angles of x, into before (N_PATH)."""
+    for n in range(3):
+        before[n] = x[X_POS + n]
+    before[3], before[4], before[5] = euler_angles(x)
 
 
 @kernel
@@ -136,5 +137,5 @@ def innovation(z, y, d):
     """z - y into d (N_Y), angles wrapped; NaN where nothing was measured."""
     for j in range(N_Y):
         d[j] = z[j] - y[j]
-        if (j < 3 or j >= ef.Y_MOCAP_ROLL) and not math.isnan(d[j]):
+        if (j <= ef.Y_YAW or j >= ef.Y_MOCAP_ROLL) and not math.isnan(d[j]):
             d[j] = wrap_angle(d[j])

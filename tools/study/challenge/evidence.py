@@ -5,7 +5,7 @@ import numpy as np
 from firmware.estimation.settings import parameter_sigma
 from firmware.model.vehicle import Vehicle
 from tools.gap.measure import errors
-from tools.inference.channels import channels_of, measured
+from tools.inference.channels import ROUGHIE_MEASURES
 from tools.study.challenge.trial import Flight, Trial
 
 THIN = 5  # rows
@@ -60,8 +60,8 @@ def _rows(flight: Flight) -> np.ndarray:
 
 def _errors(flight: Flight, Y: np.ndarray, floor: dict[str, float]) -> np.ndarray:
     """Errors of a prediction at the thinned rows, channel by channel, in weighed floors; what is missing is 0."""
-    rows, table = _rows(flight), measured(flight.run)
-    parts = [errors(c, table[rows], Y[rows]).ravel() / floor[c.name] for c in channels_of(flight.run)]
+    rows, table = _rows(flight), ROUGHIE_MEASURES.measured(flight.run)
+    parts = [errors(c, table[rows], Y[rows]).ravel() / floor[c.name] for c in ROUGHIE_MEASURES.channels_of(flight.run)]
     return np.nan_to_num(np.concatenate(parts)) * np.sqrt(THIN / MEMORY)
 
 
@@ -70,7 +70,7 @@ def _biases(vehicle: Vehicle, flight: Flight, floor: dict[str, float]) -> np.nda
     sensors = vehicle.sensors
     tables = (*3 * (sensors.attitude,), *3 * (sensors.gyro,), sensors.depth, sensors.slider, sensors.ballast)
     parts = []
-    for channel in channels_of(flight.run):
+    for channel in ROUGHIE_MEASURES.channels_of(flight.run):
         one = np.zeros((len(channel.columns), BIASES))
         for k, column in enumerate(channel.columns):
             if column < BIASES:

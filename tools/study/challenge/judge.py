@@ -9,10 +9,10 @@ from tools.data.errors import InputError
 from tools.data.runs.case import load_case_of_run
 from tools.data.runs.run import Run
 from tools.gap.measure import root_mean_square, run_gap
-from tools.inference.channels import measured as table
-from tools.inference.model import NOMINAL, load_model
+from tools.inference.channels import ROUGHIE_MEASURES
+from tools.inference.load import load_model
+from tools.inference.model import NOMINAL
 from tools.inference.predict import as_run, predict
-from tools.inference.windows import windows
 from tools.study.challenge.diagnosis import FILE, MODEL, TIMING, read_diagnosis
 from tools.study.challenge.score import Score, Scored, score
 from tools.study.challenge.seal import Answers, check_seal, folder_digest, open_answers, read_manifest
@@ -83,7 +83,8 @@ def predicted_total(path: Path, model: str | Path) -> float:
 
 def run_total(measured: Run, predicted: Run) -> float:
     """Total gap of a prediction in run data: rms over its channels."""
-    return run_gap(measured, table(predicted), windows(measured.t)).total
+    table = ROUGHIE_MEASURES.measured(predicted)
+    return run_gap(ROUGHIE_MEASURES, measured, table, ROUGHIE_MEASURES.windows(measured.t)).total
 
 
 def closed_share(case: Scored, held: Path, diagnoses: Path) -> float | None:

@@ -13,8 +13,8 @@ from sim_backend.uncertainty import draw_parameters, sensor_errors
 from tools.data.runs import columns as names
 from tools.data.runs.run import Run
 from tools.gap.measure import root_mean_square, run_gap, wrap
-from tools.inference.channels import ONBOARD
-from tools.inference.windows import Window, windows
+from tools.inference.channels import ROUGHIE_MEASURES
+from tools.inference.windows import Window
 from tools.study.challenge.design import STYLES, RunDesign, Site, draw_run, draw_runs
 from tools.study.challenge.forms import Form, draw_shapes, draw_waves
 
@@ -34,7 +34,7 @@ class Flight:
 
     @cached_property
     def windows(self) -> list[Window]:
-        return windows(self.run.t)
+        return ROUGHIE_MEASURES.windows(self.run.t)
 
 
 @dataclass
@@ -93,7 +93,7 @@ class Trial:
         """
         rows, found = flight.run.rows, [w for w in flight.windows if w.scored and w.start < w.end]
         truth = poses(flight.X)
-        Y = np.zeros((rows, len(ONBOARD)))
+        Y = np.zeros((rows, len(ROUGHIE_MEASURES.columns)))
         beyond = EXTRA if self.site.mocap and (F[fo.FS_MOCAP_DELAY] or F[fo.FS_CLOCK_SKEW]) else 0
         first = np.array([w.start for w in found])
         last = np.array([w.end + beyond for w in found])
@@ -119,7 +119,8 @@ class Trial:
         self, flights: list[Flight], P: np.ndarray, F: np.ndarray, plain: bool, seen: bool = False
     ) -> list[dict[str, float]]:
         """Channel gaps of every flight for a model."""
-        return [run_gap(f.run, self.predict(f, P, F, plain, seen), f.windows).channels for f in flights]
+        flown = [(f, self.predict(f, P, F, plain, seen)) for f in flights]
+        return [run_gap(ROUGHIE_MEASURES, f.run, Y, f.windows).channels for f, Y in flown]
 
 
 def poses(X: np.ndarray) -> np.ndarray:

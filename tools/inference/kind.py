@@ -1,0 +1,150 @@
+"""A kind of vehicle, as the observer is built for it: its layouts, readings, inputs, numbers and compiled functions.
+
+Recordings, problems, filters and predictions take all of it from here; docs/ADDING.md, A vehicle kind.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from firmware.core.estimation import estimator_layout as kf
+from firmware.core.maths.rotations import quaternion_from_euler
+from firmware.core.vehicle.layout import X_BALLAST, X_DOWN, X_EAST, X_NORTH, X_NU, X_QUAT, X_SLIDER
+from firmware.estimation.settings import UNSEEN_SERVO_WALK
+from sim_backend.core.effects import effect_layout as ef
+from tools.data.runs import columns as names
+from tools.inference.channels import ROUGHIE_MEASURES, Measures
+from tools.inference.core.error_layout import E_ACT, E_NU, N_ERR, N_PATH, N_SPECTRAL, Q_ACC, Q_ACT
+from tools.inference.core.filter import filter_runs, follow_runs
+from tools.inference.core.flight import fly_followed, fly_windows, read_rows, simulate_runs
+from tools.inference.core.lacking import LACKING_SPREAD
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A value that the model reads at every row, in the order of y."""
+
+    name: str
+    column: str  # in which it is recorded
+    source: str  # its table in [sensors]
+    bias: int = -1  # the entry of F with its constant error; -1: none is allowed
+
+
+@dataclass(frozen=True)
+class Input:
+    """What drives the model: a command, or where none was recorded the speed of what was seen moving."""
+
+    command: str  # column
+    driven: int  # what the mode has more where it is not commanded
+    position: str | None = None  # column of what was seen moving; None: nothing sees it
+    reading: int = -1  # its place in y
+    unseen: tuple[float, float] | None = None  # where it is neither: spread, and spectral density of its walk
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Numbers in SI, spreads 1 sigma, walks as spectral densities (per s)."""
+
+    name: str
+    measures: Measures
+    readings: tuple[Reading, ...]
+    inputs: tuple[Input, ...]
+    doubled: tuple[tuple[int, int], ...]  # readings that motion capture has too, and its own
+    n_state: int
+    n_error: int
+    n_spectral: int
+    n_path: int
+    speed: int  # state that has no reading: several first values are tried
+    speed_errors: slice  # the errors that go with it
+    actuator_errors: slice
+    accelerations: slice  # of the spectral densities
+    actuator_walks: slice
+    disturbance: tuple[str, ...]  # entries of [disturbance], of each acceleration, held `hold` s
+    hold: float
+    walks: tuple[float, ...]  # of actuators, which go as the model says
+    rough_walks: tuple[float, ...]  # times the roughness squared, of filters that are not to trust the model
+    first_state: Callable[[np.ndarray], np.ndarray]  # by the first readings (prediction columns)
+    spread: tuple[float, ...]  # (n_error,) about it
+    speeds: tuple[float, ...]  # tried
+    window_speeds: tuple[float, ...]  # tried by the filter that finds where windows start
+    window_speed_spread: tuple[float, ...]
+    lacking_spread: tuple[float, ...]  # of what the model lacks
+    drift: tuple[float, ...]
+    filter_runs: Callable[..., None]
+    follow_runs: Callable[..., None]
+    fly_windows: Callable[..., None]
+    fly_followed: Callable[..., None]
+    read_rows: Callable[..., None]
+    simulate_runs: Callable[..., None]
+
+
+def _first_state(first: np.ndarray) -> np.ndarray:
+    """State (N_XF,) under way and without rates, at the first readings; the servo at rest."""
+    x = np.zeros(ef.N_XF)
+    x[X_NORTH], x[X_EAST], x[X_DOWN] = first[ef.Y_MOCAP_X], first[ef.Y_MOCAP_Y], first[ef.Y_DEPTH]
+    x[X_QUAT:X_NU] = quaternion_from_euler(*first[ef.Y_ROLL : ef.Y_YAW + 1])
+    x[X_NU] = 0.2
+    x[X_SLIDER], x[X_BALLAST] = first[ef.Y_SLIDER], first[ef.Y_BALLAST]
+    x[ef.X_GEAR_SLIDER] = x[X_SLIDER]
+    return x
+
+
+_ANGLES = ("roll", "pitch", "yaw")
+_READINGS = tuple(
+    Reading(name, column, source, ef.BIAS + n if n < ef.N_BIASES else -1)
+    for n, (name, column, source) in enumerate(
+        (
+            *((x, y, "attitude") for x, y in zip(_ANGLES, names.ATTITUDE, strict=True)),
+            *((x, y, "gyro") for x, y in zip("pqr", names.RATES, strict=True)),
+            ("depth", names.DEPTH, "depth"),
+            *((x, y, x) for x, y in zip(("slider", "ballast"), names.DRAW_WIRES, strict=True)),
+            *((f"mocap {x}", y, "mocap_position") for x, y in zip("xyz", names.MOCAP_POSITION, strict=True)),
+            *((f"mocap {x}", y, "mocap_attitude") for x, y in zip(_ANGLES, names.MOCAP_ATTITUDE, strict=True)),
+        )
+    )
+)
+
+# Recordings begin at rest, at a launch or within a glide. One linearisation does not reach from one to the other, so
+# forward speeds are tried one by one.
+ROUGHIE = Kind(
+    name="roughie",
+    measures=ROUGHIE_MEASURES,
+    readings=_READINGS,
+    inputs=(
+        Input(names.COMMANDS[0], kf.SERVO_DRIVEN, unseen=(0.3, UNSEEN_SERVO_WALK**2)),
+        Input(names.COMMANDS[1], kf.SLIDER_DRIVEN, names.DRAW_WIRES[0], ef.Y_SLIDER),
+        Input(names.COMMANDS[2], kf.BALLAST_DRIVEN, names.DRAW_WIRES[1], ef.Y_BALLAST),
+    ),
+    doubled=(
+        (ef.Y_ROLL, ef.Y_MOCAP_ROLL), (ef.Y_PITCH, ef.Y_MOCAP_PITCH), (ef.Y_YAW, ef.Y_MOCAP_YAW),
+        (ef.Y_DEPTH, ef.Y_MOCAP_Z),
+    ),
+    n_state=ef.N_XF,
+    n_error=N_ERR,
+    n_spectral=N_SPECTRAL,
+    n_path=N_PATH,
+    speed=X_NU,
+    speed_errors=slice(E_NU, E_NU + 3),
+    actuator_errors=slice(E_ACT, E_ACT + 3),
+    accelerations=slice(Q_ACC, Q_ACC + 6),
+    actuator_walks=slice(Q_ACT, Q_ACT + 3),
+    disturbance=(*3 * ("linear",), *3 * ("angular",)),
+    hold=kf.DISTURBANCE_HOLD,
+    walks=(1e-8, 1e-12, 1e-12),
+    rough_walks=(1e-6, 4e-10, 2.5e-9),
+    first_state=_first_state,
+    # m, rad, m/s, rad/s about readings; rad, m, kg where commanded: they begin at 0 and at the draw-wires
+    spread=(*3 * (0.05,), *3 * (0.05,), 0.1, 0.03, 0.03, *3 * (0.05,), 1e-4, 3e-4, 5e-4, 0.0),
+    speeds=(0.03, 0.2, 0.4),  # m/s
+    window_speeds=(0.0, 0.1, 0.2, 0.3, 0.45, 0.6),
+    window_speed_spread=(0.05, 0.02, 0.02),
+    lacking_spread=LACKING_SPREAD,
+    drift=(10.0, 0.0005**2, 0.005**2),  # s, (rad/s)2/s, (m/s)2/s
+    filter_runs=filter_runs,
+    follow_runs=follow_runs,
+    fly_windows=fly_windows,
+    fly_followed=fly_followed,
+    read_rows=read_rows,
+    simulate_runs=simulate_runs,
+)  # fmt: skip
