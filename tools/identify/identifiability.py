@@ -8,7 +8,7 @@ import numpy as np
 from firmware.model.vehicle import COEFFICIENTS
 from tools.identify.parameters import Parameters
 
-WIDE = 0.5  # of the prior's sigma: a combination that stays wider is not identifiable from these runs
+WIDE = 0.5  # of the prior's sigma: a combination that stays wider is not told by these runs
 LOADING = 0.3  # of a combination, for a parameter to be named in it
 WORDS = {
     "K_D0": "drag at no angle", "K_D": "drag growing with the angle of attack", "K_L0": "lift at no angle",
@@ -32,7 +32,7 @@ HELP = {
 
 @dataclass(frozen=True)
 class Unidentifiable:
-    """A combination that is not identifiable: its width over the prior's, its parameters' shares, what would help."""
+    """A combination that is not told: its width over the prior's, its parameters with their shares, what would help."""
 
     width: float
     parts: tuple[tuple[str, float], ...]
@@ -78,11 +78,11 @@ def sentences(free: Parameters, draws: np.ndarray) -> list[str]:
     def words(which: list[int]) -> str:
         return ", ".join(f"{WORDS[free.names[n]]} ({free.names[n]})" for n in which)
 
-    found = [f"These runs tell: {words(known)}."] if known else []
+    told = [f"These runs tell: {words(known)}."] if known else []
     if unknown:
-        found.append(
+        told.append(
             f"They do not tell: {words(unknown)}; what is printed for these is mostly what was believed before."
         )
     elif len(known) >= len(COEFFICIENTS):
-        found.append("No coefficient is left to belief.")
-    return found
+        told.append("No coefficient is left to belief.")
+    return told
