@@ -7,6 +7,7 @@ import click
 
 from tools.cli.challenge import challenge
 from tools.cli.common import json_option, print_json, progress, say
+from tools.cli.readings import readings
 
 STEPS = 7  # of a diagnosis: screen, up to three effects, verdict, how far, report
 
@@ -136,3 +137,4 @@ def diagnose(case: Path, out: Path, without: str | None, as_json: bool) -> None:
 
 
 gap.add_command(challenge)
+gap.add_command(readings)

@@ -17,6 +17,7 @@ from tools.readings.rates import compare, lateness, rms
 from tools.readings.regression import Estimate, fit
 from tools.readings.signals import Table, steps, unwrapped
 
+LAG_TURNS = 4
 RATE_SPAN = 0.5  # s over which a derivative is taken
 BIAS_LABEL = {"roll_rad": "imu_roll_bias", "pitch_rad": "imu_pitch_bias", "yaw_rad": "compass"}
 
@@ -164,22 +165,28 @@ def _harmonics(solved, onboard: str, mocap: str) -> list[Finding]:
 
 def _depth(table: Table, late: Estimate) -> list[Finding]:
     """Offset, scale, lag and lever of the depth."""
-    depth, height = (table.flown(table.columns[name]) for name in (names.DEPTH, names.MOCAP_POSITION[2]))
     pitch_name = names.MOCAP_ATTITUDE[1] if table.has(names.MOCAP_ATTITUDE[1]) else names.ATTITUDE[1]
     if not table.has(pitch_name):
         return []
-    lever = -np.sin(table.columns[pitch_name])
-    sinking = derivative(table, height)
-    middle = float(np.nanmean(height))
-    columns = [np.ones(len(depth)), height - middle, -sinking, lever]
-    solved = fit(depth - height, np.column_stack(columns), table.block)
-    if solved is None:
-        return []
+    height = table.flown(table.columns[names.MOCAP_POSITION[2]])
+    lever, sinking = -np.sin(table.columns[pitch_name]), derivative(table, height)
+    middle, shifted = float(np.nanmean(height)), 0.0
+    for turn in range(LAG_TURNS):  # a long lag is no small one: the depth is moved by it, and what is left asked again
+        depth = table.flown(table.columns[names.DEPTH])
+        columns = [np.ones(len(depth)), height - middle, -sinking, lever]
+        solved = fit(depth - height, np.column_stack(columns), table.block)
+        if solved is None:
+            return []
+        step = solved[2].value
+        if turn == LAG_TURNS - 1 or abs(step) * rms(sinking) < 0.02 * TOLERANCE[names.DEPTH]:
+            break
+        shifted += step
+        table = advanced(table, (names.DEPTH,), step)
     found = []
     scale, lag, arm = solved[1], solved[2], solved[3]
     # The constant is asked at depth 0, as the catalogue's effect means it.
     offset = fit(depth - height, np.column_stack([columns[0], height, *columns[2:]]), table.block)
-    lag = Estimate(lag.value + late.value, math.hypot(lag.error, late.error), lag.freedom)
+    lag = Estimate(lag.value + shifted + late.value, math.hypot(lag.error, late.error), lag.freedom)
     for one, moves, what, unit, label, words in (
         (scale, abs(scale.value) * rms(height - middle), "scale", "1", "depth_scale", "grows {} times too fast"),
         (lag, abs(lag.value) * rms(sinking), "delay", "s", "depth_lag", "comes {} late"),
