@@ -14,7 +14,7 @@ import numpy as np
 from tools.data.runs import columns as names
 from tools.readings.findings import OFFSET_MATTERS, SURE, TOLERANCE, Finding, certain, spoken
 from tools.readings.rates import compare, lateness, rms
-from tools.readings.regression import Estimate, fit
+from tools.readings.regression import Estimate, Fit, fit
 from tools.readings.signals import Table, steps, unwrapped
 
 LAG_TURNS = 4
@@ -171,6 +171,7 @@ def _depth(table: Table, late: Estimate) -> list[Finding]:
     height = table.flown(table.columns[names.MOCAP_POSITION[2]])
     lever, sinking = -np.sin(table.columns[pitch_name]), derivative(table, height)
     middle, shifted = float(np.nanmean(height)), 0.0
+    solved: Fit | None = None
     for turn in range(LAG_TURNS):  # a long lag is no small one: the depth is moved by it, and what is left asked again
         depth = table.flown(table.columns[names.DEPTH])
         columns = [np.ones(len(depth)), height - middle, -sinking, lever]
@@ -182,6 +183,7 @@ def _depth(table: Table, late: Estimate) -> list[Finding]:
             break
         shifted += step
         table = advanced(table, (names.DEPTH,), step)
+    assert solved is not None
     found = []
     scale, lag, arm = solved[1], solved[2], solved[3]
     # The constant is asked at depth 0, as the catalogue's effect means it.
@@ -194,7 +196,10 @@ def _depth(table: Table, late: Estimate) -> list[Finding]:
          "goes with sin(pitch): the port is {} ahead of the origin"),
     ):  # fmt: skip
         if certain(one, moves, names.DEPTH):
-            shown = spoken(1.0 + one.value, _plus_one(one)) if what == "scale" else spoken(one.value, one.interval, unit)
+            if what == "scale":
+                shown = spoken(1.0 + one.value, _plus_one(one))
+            else:
+                shown = spoken(one.value, one.interval, unit)
             found.append(
                 Finding(names.DEPTH, names.MOCAP_POSITION[2], what, one.value, one.interval, unit, label, True,
                         f"The depth {words.format(shown)}.", {label: one.value})

@@ -1,7 +1,7 @@
 """The heading against the yaw rate, and what the difference goes with.
 
 The Euler rate of the heading by the mended rates, integrated, is what the heading should do; what it does beside, over
-a whole unbroken piece of a run, is compared with the heading itself (a compass that is disturbed by its own mount), with
+a whole unbroken piece of a run, is compared with the heading itself (a compass disturbed by its own mount), with
 pitch and roll (a tilt that is not compensated) and with the actuators' positions (iron or currents that move).
 """
 
@@ -73,7 +73,7 @@ def _said(name: str, solved: Fit, ratio: float) -> Finding:
         second = math.hypot(solved.coefficients[3], solved.coefficients[4])
         size = max(first, second)
         error = Estimate(size, max(solved[n].error for n in (1, 2, 3, 4)), solved[1].freedom)
-        text = f"The heading's error goes with the heading itself: {spoken(size, error.interval, 'rad')} at its largest."
+        text = f"The heading's error goes with the heading: {spoken(size, error.interval, 'rad')} at its largest."
         return Finding(HEADING, "yaw rate", "goes_with", size, error.interval, "rad", "compass", False, text)
     slope = solved[1]
     unit = f"rad/{name.rpartition('_')[2]}"

@@ -100,7 +100,8 @@ def compare(table: Table, columns: tuple[str, ...], euler: bool = False, skew: b
         for axis in range(3):
             regressors = X[:, axis, :4]
             solved = np.linalg.lstsq(regressors, A[:, axis], rcond=None)[0]
-            left += float(np.mean((A[:, axis] - regressors @ solved) ** 2)) / max(float(np.mean(A[:, axis] ** 2)), 1e-12)
+            missed = float(np.mean((A[:, axis] - regressors @ solved) ** 2))
+            left += missed / max(float(np.mean(A[:, axis] ** 2)), 1e-12)
         if left < least * 0.98:
             best, least = float(delay), left
     A, X, usable = design(table, attitude, rates, best, euler, skew)
@@ -180,11 +181,12 @@ def _exchanged(body: Compared) -> list[Finding]:
         if abs(slope.value) < FOREIGN * own or slope.sigma() < SURE or abs(slope.value) < 0.3:
             continue
         name, source = names.RATES[axis], names.RATES[other]
-        text = f"The attitude turns about the axis of {name} as {source} says, {spoken(slope.value, slope.interval)} times."
+        size = spoken(slope.value, slope.interval)
+        text = f"The attitude turns about the axis of {name} as {source} says, {size} times."
         found.append(
             Finding(
-                name, f"derivative of {names.ATTITUDE[axis]}", "axes", slope.value, slope.interval, "1", None, True, text,
-                {"from": float(other), "sign": math.copysign(1.0, slope.value)},
+                name, f"derivative of {names.ATTITUDE[axis]}", "axes", slope.value, slope.interval, "1", None, True,
+                text, {"from": float(other), "sign": math.copysign(1.0, slope.value)},
             )
         )  # fmt: skip
     return found
