@@ -20,7 +20,7 @@ def readings(case: Path, as_json: bool) -> None:
     from tools.data.runs.case import load_case
     from tools.readings.check import check
 
-    need("scipy")
+    need("analysis")
     with progress("readings", 2) as advance:
         loaded = load_case(case)
         advance(1)
