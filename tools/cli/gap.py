@@ -7,6 +7,7 @@ import click
 
 from tools.cli.challenge import challenge
 from tools.cli.common import json_option, print_json, progress, say
+from tools.cli.readings import readings
 
 STEPS = 7  # of a diagnosis: screen, up to three effects, verdict, how far, report
 
@@ -149,3 +150,4 @@ def report(folder: Path) -> None:
 
 
 gap.add_command(challenge)
+gap.add_command(readings)

@@ -1,0 +1,95 @@
+"""All checks of the readings of a case, in their order, and the runs with the mended readings.
+
+Rates are mended before the heading is compared with them, motion capture's clock before anything is compared with it.
+No vehicle file is read: columns and units are enough.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tools.data.errors import InputError
+from tools.data.runs import columns as names
+from tools.data.runs.run import Run
+from tools.readings.capture import advanced, judge_capture
+from tools.readings.findings import Finding
+from tools.readings.heading import judge_heading
+from tools.readings.rates import judge_rates
+from tools.readings.samples import judge_clock, judge_samples
+from tools.readings.signals import Table, table_of
+from tools.readings.stretches import flying, judge_stretches
+from tools.readings.surface import judge_surface
+
+ORDER = ("axes", "units", "sign", "scale", "offset", "delay", "drift", "goes_with", "saturated", "held", "not_flying")
+
+
+@dataclass(frozen=True)
+class Readings:
+    """What was found, most telling first, and the runs as later stages should see them."""
+
+    findings: list[Finding]
+    runs: list[Run]
+
+
+def check(runs: list[Run]) -> Readings:
+    """The findings of a case's runs. InputError where there is nothing to compare."""
+    compared = [name for name in names.ALL if any(_recorded(run, name) for run in runs) and name not in names.COMMANDS]
+    if len(compared) < 3:  # time and one channel
+        raise InputError(f"nothing to compare: {', '.join(compared[1:]) or 'no channel'} only")
+    flies = [flying(run) for run in runs]
+    samples = [*judge_samples(runs), *judge_clock(runs), *judge_stretches(runs)]
+    if not any(state.any() for state in flies):
+        return Readings(ordered(samples), runs)
+    table = table_of(runs, flies)
+    rates = judge_rates(table)
+    mended = mend(table, rates)
+    found = [*rates, *judge_capture(mended), *judge_heading(mended), *judge_surface(runs), *samples]
+    return Readings(ordered(found), mended_runs(runs, mend(table, found)))
+
+
+def ordered(findings: list[Finding]) -> list[Finding]:
+    """By what is to be settled first."""
+    return sorted(findings, key=lambda one: ORDER.index(one.finding))
+
+
+def _recorded(run: Run, name: str) -> bool:
+    return name in run.columns and bool(np.isfinite(run.columns[name]).any())
+
+
+def mend(table: Table, findings: list[Finding]) -> Table:
+    """The table with what can be mended put right."""
+    columns = dict(table.columns)
+    for one in findings:
+        if not one.mended or one.channel not in columns:
+            continue
+        values, made = columns[one.channel], one.values
+        if "offset" in made:
+            values = values - made["offset"]
+        if "gain" in made:
+            values = values / made["gain"]
+        if "from" in made:
+            values = made["sign"] * table.columns[names.RATES[int(made["from"])]]
+        if "depth_scale" in made:
+            values = values / (1.0 + made["depth_scale"])
+        if "pressure_lever" in made or "pitch" in made:
+            lever = made.get("pressure_lever", made.get("pitch", 0.0))
+            values = values + lever * np.sin(table.columns.get(names.ATTITUDE[1], np.zeros(len(values))))
+        if "ballast_kg" in made:
+            values = values - made["ballast_kg"] * table.columns["ballast_kg"]
+        columns[one.channel] = values
+    moved = replace(table, columns=columns)
+    for one in findings:
+        if one.finding == "delay" and one.mended:
+            late = {"attitude": names.ATTITUDE, "mocap": names.MOCAP, names.DEPTH: (names.DEPTH,)}[one.channel]
+            moved = advanced(moved, late, one.size)
+    return moved
+
+
+def mended_runs(runs: list[Run], table: Table) -> list[Run]:
+    """The table's columns as runs again."""
+    out = []
+    for n, run in enumerate(runs):
+        here = table.run == n
+        columns = {name: table.columns[name][here] if name in table.columns else v for name, v in run.columns.items()}
+        out.append(replace(run, columns=columns))
+    return out

@@ -1,0 +1,63 @@
+"""What a check of the readings says, and when it says anything at all.
+
+A finding has to be certain and to matter. Certain: SURE standard errors (of blocks, see regression). Matters: it moves
+its channel by MATTERS of the channel's tolerance, root mean square over the flight; a constant error by more than
+OFFSET_MATTERS, since any sensor has a bias. The tolerances are those in which gaps are counted (docs/GAP.md, Measures).
+
+SURE is far beyond a normal 5 % point: a case has some sixty comparisons, blocks are few, and what is compared is
+filtered by instruments nobody knows. With it and MATTERS no instrument of the simulated cases without a gap is accused
+(docs/READINGS.md has the count).
+"""
+
+import math
+from dataclasses import dataclass, field
+
+from tools.readings.regression import Estimate
+
+SURE = 6.0  # standard errors
+MATTERS = 0.1  # of a tolerance
+OFFSET_MATTERS = 0.35  # of a tolerance; 3.5 sigma of the bias of the sensors that the vehicle is shipped with
+TOLERANCE = {
+    "roll_rad": math.radians(1.5), "pitch_rad": math.radians(1.5), "yaw_rad": math.radians(4.0),
+    "p_rad_s": math.radians(2.0), "q_rad_s": math.radians(2.0), "r_rad_s": math.radians(2.0),
+    "depth_m": 0.05, "slider_m": 0.002, "ballast_kg": 0.005,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something wrong with a reading.
+
+    size and its 90 % interval in `unit`; `label` of the catalogue or None; `mended`: whether later stages see the
+    reading put right; `values` are what the mending needs.
+    """
+
+    channel: str
+    against: str
+    finding: str  # scale, offset, sign, axes, units, delay, drift, held, saturated, goes_with, not_flying
+    size: float
+    ci90: tuple[float, float]
+    unit: str
+    label: str | None
+    mended: bool
+    text: str
+    values: dict[str, float] = field(default_factory=dict)
+
+    def plain(self) -> dict:
+        """The entry in diagnosis.json (docs/GAP.md, Answers)."""
+        return {
+            "channel": self.channel, "against": self.against, "finding": self.finding, "size": self.size,
+            "ci90": list(self.ci90), "unit": self.unit, "label": self.label, "mended": self.mended, "text": self.text,
+        }  # fmt: skip
+
+
+def certain(estimate: Estimate, moves: float, channel: str, null: float = 0.0, worth: float = MATTERS) -> bool:
+    """Whether an estimate is a finding: sure, and moving its channel by enough (`moves`, in the channel's unit)."""
+    return estimate.sigma(null) >= SURE and moves >= worth * TOLERANCE[channel]
+
+
+def spoken(value: float, interval: tuple[float, float], unit: str = "", digits: int = 3) -> str:
+    """A size with its 90 % interval, as one says it."""
+    low, high = interval
+    tail = f" {unit}" if unit and unit != "1" else ""
+    return f"{value:.{digits}g}{tail} (90 %: {low:.{digits}g} to {high:.{digits}g})"

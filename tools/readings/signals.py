@@ -1,0 +1,136 @@
+"""The runs of a case as one table, and what the attitude says of body rates.
+
+Increments of the attitude between two samples are turned into a rotation vector in body axes and summed up, so that the
+noise of the attitude does not grow with time; rates are integrated by the trapezoidal rule. Where a sample is missing
+the sums stop (NaN) and go on from 0: a piece of them is known up to a constant, which every block has of its own.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tools.data.runs import columns as names
+from tools.data.runs.run import Run
+from tools.readings.regression import blocks_of
+
+LONGEST_STEP = 0.5  # s between two samples that are still integrated over
+
+
+@dataclass(frozen=True)
+class Table:
+    """All runs behind each other: `t` (rows,) s from each run's start, `run` its number, `columns` by name."""
+
+    names: tuple[str, ...]  # of the runs
+    t: np.ndarray
+    run: np.ndarray
+    columns: dict[str, np.ndarray]
+    flying: np.ndarray  # (rows,) bool
+
+    def has(self, *wanted: str) -> bool:
+        """Whether all of these columns hold anything."""
+        return all(name in self.columns and np.isfinite(self.columns[name]).any() for name in wanted)
+
+    @property
+    def block(self) -> np.ndarray:
+        """Blocks for the covariances, (rows,)."""
+        return blocks_of(self.t, self.run)
+
+    @property
+    def period(self) -> float:
+        """Median time between samples, s."""
+        step = np.diff(self.t)[np.diff(self.run) == 0]
+        return float(np.median(step)) if len(step) else 1.0
+
+    def flown(self, values: np.ndarray) -> np.ndarray:
+        """Values where the vehicle flies, NaN elsewhere."""
+        return np.where(self.flying if values.ndim == 1 else self.flying[:, None], values, np.nan)
+
+
+def table_of(runs: list[Run], flying: list[np.ndarray] | None = None) -> Table:
+    """The runs as a table; a column that a run lacks is NaN there. `flying` holds a bool per row and run."""
+    known = [name for name in names.ALL if name != names.TIME and any(name in run.columns for run in runs)]
+    columns = {
+        name: np.concatenate([run.columns.get(name, np.full(run.rows, np.nan)) for run in runs]) for name in known
+    }
+    t = np.concatenate([run.t - run.t[0] for run in runs])
+    number = np.repeat(np.arange(len(runs)), [run.rows for run in runs])
+    flies = np.ones(len(t), dtype=bool) if flying is None else np.concatenate(flying)
+    return Table(tuple(run.name for run in runs), t, number, columns, flies)
+
+
+def steps(table: Table) -> np.ndarray:
+    """Time to the row before, (rows,) s; NaN at a run's first row and over a gap."""
+    dt = np.diff(table.t, prepend=np.nan)
+    dt[np.flatnonzero(np.diff(table.run)) + 1] = np.nan
+    dt[0] = np.nan
+    return np.where(dt <= LONGEST_STEP, dt, np.nan)
+
+
+def unwrapped(angle: np.ndarray, run: np.ndarray) -> np.ndarray:
+    """An angle (rows,) without jumps of 2 pi, missing samples left out, run by run."""
+    out = angle.copy()
+    for n in np.unique(run):
+        here = (run == n) & np.isfinite(angle)
+        out[here] = np.unwrap(angle[here])
+    return out
+
+
+def body_increments(attitude: np.ndarray) -> np.ndarray:
+    """Rotation from each row to the next in body axes, (rows, 3) rad, row 0 NaN; attitude (rows, 3) ZYX angles, rad.
+
+    Rotation vectors of q_before* q_after: exact for a rotation about a fixed axis, to third order otherwise.
+    """
+    half = 0.5 * attitude
+    (cf, ct, cp), (sf, st, sp) = np.cos(half).T, np.sin(half).T
+    q = np.column_stack([
+        cf * ct * cp + sf * st * sp, sf * ct * cp - cf * st * sp, cf * st * cp + sf * ct * sp,
+        cf * ct * sp - sf * st * cp,
+    ])  # fmt: skip
+    a, b = q[:-1], q[1:]
+    scalar = (a * b).sum(axis=1)
+    vector = np.column_stack([
+        a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0] - a[:, 2] * b[:, 3] + a[:, 3] * b[:, 2],
+        a[:, 0] * b[:, 2] - a[:, 2] * b[:, 0] - a[:, 3] * b[:, 1] + a[:, 1] * b[:, 3],
+        a[:, 0] * b[:, 3] - a[:, 3] * b[:, 0] - a[:, 1] * b[:, 2] + a[:, 2] * b[:, 1],
+    ])  # fmt: skip
+    vector *= np.where(scalar < 0.0, -1.0, 1.0)[:, None]
+    length = np.linalg.norm(vector, axis=1)
+    angle = 2.0 * np.arctan2(length, np.abs(scalar))
+    ratio = np.where(length > 1e-9, angle / np.maximum(length, 1e-12), 2.0)
+    return np.vstack([np.full((1, 3), np.nan), vector * ratio[:, None]])
+
+
+def summed(increments: np.ndarray, usable: np.ndarray) -> np.ndarray:
+    """Running sums of increments (rows, k) over pieces without a gap; NaN where a row cannot be reached."""
+    good = usable & np.isfinite(increments).all(axis=1)
+    total = np.cumsum(np.where(good[:, None], increments, 0.0), axis=0)
+    return np.where(good[:, None], total, np.nan)
+
+
+def pieces(usable: np.ndarray) -> np.ndarray:
+    """Number of the unbroken piece each row belongs to, (rows,)."""
+    return np.cumsum(~usable)
+
+
+def integrated(table: Table, rates: np.ndarray, delay: float = 0.0) -> np.ndarray:
+    """Increments of the integral of rates (rows, 3) up to `delay` s before each row, (rows, 3); NaN over gaps."""
+    dt = steps(table)
+    middle = 0.5 * (rates + np.vstack([np.full((1, rates.shape[1]), np.nan), rates[:-1]]))
+    increments = middle * dt[:, None]
+    if delay == 0.0:
+        return increments
+    moved = np.full_like(increments, np.nan)
+    for n in np.unique(table.run):
+        here = np.flatnonzero(table.run == n)
+        t = table.t[here]
+        filled = np.nan_to_num(increments[here])
+        total = np.cumsum(filled, axis=0)
+        inside = (t - delay >= t[0]) & (t - delay <= t[-1])
+        late = np.column_stack([np.interp(t - delay, t, column) for column in total.T])
+        change = np.vstack([np.full((1, rates.shape[1]), np.nan), np.diff(late, axis=0)])
+        bad = ~inside | ~np.concatenate([[False], inside[:-1]])
+        # A missing rate near the moment itself leaves the increment unknown.
+        holes = np.interp(t - delay, t, (~np.isfinite(increments[here]).all(axis=1)).astype(float)) > 0.0
+        change[bad | holes] = np.nan
+        moved[here] = change
+    return moved

@@ -1,0 +1,98 @@
+"""Stretches of a run in which the vehicle does not fly: at the surface, lying still, hauled or handled.
+
+They are left out of every comparison and said as findings. A vehicle at the surface moves on the waves and is held up
+by what is out of the water; one on the bottom, in a net or against a wall does not move though it is told to; one in
+somebody's hands turns faster than it can by itself.
+"""
+
+import numpy as np
+
+from tools.data.runs import columns as names
+from tools.data.runs.run import Run
+from tools.readings.findings import Finding
+
+SPAN = 8.0  # s that a stretch lasts at least
+SURFACE = 0.25  # m about the surface: a hull of a metre that is partly out of the water, and a gauge that is off
+SURFACE_RANGE = 0.1  # m that the depth moves within SPAN there: waves, no dive
+STILL_ANGLE, STILL_DEPTH = 0.004, 0.02  # rad, m: ranges within STILL_SPAN of a vehicle that lies on something
+STILL_SPAN = 15.0  # s
+HANDLED_RATE = 1.5  # rad/s; the fastest turns of gliders of this class are some 0.5 rad/s
+HANDLED_SPEED = 1.5  # m/s up or down
+HANDLED_SPAN = 3.0  # s that it goes on at least, with pauses of as much
+
+
+def rolling_range(t: np.ndarray, values: np.ndarray, span: float) -> np.ndarray:
+    """Range of the values over a span (s) about each row, (rows,); NaN where nothing was read."""
+    period = float(np.median(np.diff(t))) if len(t) > 1 else span
+    half = max(1, round(0.5 * span / period))
+    padded = np.concatenate([np.full(half, np.nan), values, np.full(half, np.nan)])
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1)
+    known = np.isfinite(windows).any(axis=1)
+    out = np.full(len(values), np.nan)
+    out[known] = np.nanmax(windows[known], axis=1) - np.nanmin(windows[known], axis=1)
+    return out
+
+
+def lasting(t: np.ndarray, state: np.ndarray, span: float) -> np.ndarray:
+    """The state (bool, rows) where it lasts `span` s at least."""
+    out = np.zeros(len(state), dtype=bool)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], state.astype(int), [0]])))
+    for first, last in zip(edges[::2], edges[1::2], strict=True):
+        if t[last - 1] - t[first] >= span:
+            out[first:last] = True
+    return out
+
+
+def states(run: Run) -> dict[str, np.ndarray]:
+    """Why the vehicle does not fly, by reason: bool of shape (rows,) each."""
+    t, found = run.t, {}
+    depth = run.columns.get(names.DEPTH, run.columns.get(names.MOCAP_POSITION[2]))
+    attitude = [run.columns[name] for name in names.ATTITUDE if name in run.columns]
+    if depth is not None and np.isfinite(depth).any():
+        shallow = depth < SURFACE + max(0.0, float(np.nanmin(depth)))
+        found["at the surface"] = lasting(t, shallow & (rolling_range(t, depth, SPAN) < SURFACE_RANGE), SPAN)
+        still = rolling_range(t, depth, STILL_SPAN) < STILL_DEPTH
+        for values in attitude:
+            still &= rolling_range(t, np.unwrap(np.nan_to_num(values)), STILL_SPAN) < STILL_ANGLE
+        found["lying still"] = lasting(t, still & ~found["at the surface"] & bool(attitude), STILL_SPAN)
+        speed = np.abs(np.gradient(depth, t)) if len(t) > 1 else np.zeros(len(t))
+        fast = np.nan_to_num(speed) > HANDLED_SPEED
+    else:
+        fast = np.zeros(len(t), dtype=bool)
+    for values in attitude[:2]:
+        if len(t) > 1:
+            fast |= np.nan_to_num(np.abs(np.gradient(values, t))) > HANDLED_RATE
+    found["handled or hauled"] = lasting(t, near(t, fast, 0.5 * HANDLED_SPAN), 2.0 * HANDLED_SPAN)
+    return found
+
+
+def near(t: np.ndarray, state: np.ndarray, span: float) -> np.ndarray:
+    """Rows within `span` s of a row in the state."""
+    at = t[state]
+    if not len(at):
+        return state
+    after = np.searchsorted(at, t)
+    left = np.abs(t - at[np.maximum(after - 1, 0)])
+    right = np.abs(at[np.minimum(after, len(at) - 1)] - t)
+    return np.minimum(left, right) <= span
+
+
+def flying(run: Run) -> np.ndarray:
+    """Whether the vehicle flies, (rows,) bool."""
+    found = states(run)
+    return ~np.any(list(found.values()), axis=0) if found else np.ones(run.rows, dtype=bool)
+
+
+def judge_stretches(runs: list[Run]) -> list[Finding]:
+    """One finding for every reason and run."""
+    said = []
+    for run in runs:
+        for reason, state in states(run).items():
+            if not state.any():
+                continue
+            period = float(np.median(np.diff(run.t)))
+            seconds = float(state.sum() * period)
+            first, last = run.t[state][0], run.t[state][-1]
+            text = f"{run.name}: {reason} for {seconds:.0f} s between {first:.0f} and {last:.0f} s; left out."
+            said.append(Finding("vehicle", "depth", "not_flying", seconds, (seconds, seconds), "s", None, True, text))
+    return said
