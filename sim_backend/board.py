@@ -6,7 +6,6 @@ from typing import Annotated, Any
 import msgspec
 import numpy as np
 
-from firmware.model.strict import Table, decode
 from hal.board import BoardRequest
 from hal.clocks import MonotonicClock
 from hal.ports import (
@@ -23,6 +22,7 @@ from hal.ports import (
     Validity,
 )  # fmt: skip
 from hal.recorder.schema import Field, RecordSpec
+from hal.strict import Table, decode
 from sim_backend.core import layout as wl
 from sim_backend.core.effects.catalogue import check_board
 from sim_backend.core.world import write_truth

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from firmware.autopilot import Autopilot
-from firmware.core.control.control_layout import COMPLETED, N_LEG
+from firmware.core.layouts.control_layout import COMPLETED, N_LEG
 from sim_backend.core.closed_loop import END_LEG, END_MODE, END_REASON, END_TIME, N_END, N_TRACE, TRACE, fly_many
 from sim_backend.core.layout import N_WAVE
 from sim_backend.world import World

@@ -5,9 +5,9 @@ The kernels are the ones that the real runtime calls; only the Python around the
 
 import numpy as np
 
-from firmware.core.control import control_layout as ctl
 from firmware.core.control.autopilot import reset, tick
 from firmware.core.jit import kernel, parallel_kernel, prange
+from firmware.core.layouts import control_layout as ctl
 from firmware.core.vehicle.layout import N_P, N_X, X_ACT, X_DOWN, X_EAST, X_NORTH
 from firmware.core.vehicle.state import euler_angles
 from hal.ports import FRAME_SIZE

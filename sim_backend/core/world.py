@@ -5,7 +5,7 @@ and thousands in a campaign.
 """
 
 from firmware.core.jit import kernel
-from firmware.core.supervision import supervisor_layout as sup
+from firmware.core.layouts import supervisor_layout as sup
 from firmware.core.vehicle.layout import GRAVITY, PLUNGER_AREA, X_BALLAST, X_DOWN, X_NU, X_POS, X_SLIDER
 from firmware.core.vehicle.state import euler_angles, velocities
 from hal.ports import BEACON, IMU, PLUNGER_WIRE, SLIDER_WIRE

@@ -6,8 +6,8 @@ from numba import njit
 from numba.core.runtime import _nrt_python, rtsys
 
 from firmware.core.control import autopilot as core
-from firmware.core.control import control_layout as ctl
 from firmware.core.control.telemetry import N_RECORD, fill_record
+from firmware.core.layouts import control_layout as ctl
 from tools.measure.benchmark.allocations import BOXED, largest_block
 from tools.measure.benchmark.tick import harness, measure_tick
 

@@ -22,9 +22,8 @@ from firmware.core.control.law import (
     solve_inputs,
 )
 from firmware.core.control.law_plus import reach
-from firmware.core.supervision.limits import limited
 from firmware.core.vehicle import layout
-from firmware.core.vehicle.actuators import actuator_rate
+from firmware.core.vehicle.actuators import actuator_rate, limited
 
 
 @repeatable

@@ -111,7 +111,7 @@ def _fly_a_moment(controller: str, effects: dict[str, dict[str, float]]) -> None
     import msgspec
 
     from firmware.autopilot import Autopilot, configuration
-    from firmware.control.gains import Control
+    from firmware.model.gains import Control
     from hal.recorder.recorder import NullRecorder
     from tools.flight.compose import build_flight, build_runtime, record_specs
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from firmware.estimation.settings import parameter_sigma
+from firmware.model.estimator_settings import parameter_sigma
 from firmware.model.vehicle import Vehicle
 from tools.data.runs.case import Case
 from tools.data.sources import load_vehicle, read_text

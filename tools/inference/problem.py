@@ -4,9 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from firmware.core.estimation import estimator_layout as kf
+from firmware.core.layouts import estimator_layout as kf
 from firmware.core.vehicle.layout import N_X
-from firmware.estimation.settings import UNSEEN_SERVO_WALK
+from firmware.model.estimator_settings import UNSEEN_SERVO_WALK
 from firmware.model.vehicle import SensorsTable
 from sim_backend.core.effects import effect_layout as ef
 from tools.data.runs import columns as names

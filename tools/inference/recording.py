@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from firmware.core.estimation import estimator_layout as kf
+from firmware.core.layouts import estimator_layout as kf
 from firmware.core.maths.rotations import quaternion_from_euler
 from firmware.core.vehicle.layout import N_X
 from tools.data.runs import columns as names

@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parents[2]
 MUTATED = (
     "firmware/core/supervision/supervisor.py", "firmware/core/supervision/detectors.py",
     "firmware/core/supervision/screening.py",
-    "firmware/core/supervision/limits.py", "firmware/supervisor/settings.py",
+    "firmware/core/vehicle/actuators.py", "firmware/model/supervisor_settings.py",
 )  # fmt: skip
 PARTS = ("firmware", "hal", "sim_backend", "tools", "tests/support", "tests/unit/supervisor", "tests/conftest.py")
 CONFIG = """

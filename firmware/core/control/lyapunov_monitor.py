@@ -13,14 +13,14 @@ either makes of the commands is in the mismatch.
 
 import math
 
-from firmware.core.control import control_layout as ctl
 from firmware.core.control.error_bound import model_error_bound
 from firmware.core.control.input_forms import exact_form
 from firmware.core.control.law import decrease_margin, feedback, k2_to_cover
 from firmware.core.control.law_plus import SHARE
 from firmware.core.control.steering import angle_rates, depth_is_held
-from firmware.core.estimation.estimator_layout import DISTURBANCE_HOLD, N_W, S_ANGULAR, S_LINEAR, W_SCRATCH
 from firmware.core.jit import kernel
+from firmware.core.layouts import control_layout as ctl
+from firmware.core.layouts.estimator_layout import DISTURBANCE_HOLD, N_W, S_ANGULAR, S_LINEAR, W_SCRATCH
 from firmware.core.vehicle.actuators import actuator_rates
 from firmware.core.vehicle.layout import BALLAST_RATE, N_P, SLIDER_RATE
 

@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from firmware.core.supervision import supervisor_layout as sup
+from firmware.core.layouts import supervisor_layout as sup
 from firmware.model.library import shipped
-from firmware.model.strict import ConfigError
+from firmware.model.supervisor_settings import Limits, SupervisorTable, settings_vector
 from firmware.model.vehicle import decode_vehicle
-from firmware.supervisor.settings import Limits, SupervisorTable, settings_vector
 from hal.ports import SLOTS
+from hal.strict import ConfigError
 
 SHIPPED = shipped("model/vehicles")["roughie"]
 TEXT = SHIPPED.split("[limits]")[0]

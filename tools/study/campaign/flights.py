@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from firmware.core.control import control_layout as ctl
+from firmware.core.layouts import control_layout as ctl
 from firmware.core.vehicle import layout
 from sim_backend.core.closed_loop import (
     END_ERROR_DEPTH,

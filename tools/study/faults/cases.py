@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from firmware.supervisor.table import Reaction
+from firmware.faults import Reaction
 from tools.study.faults.scene import PHASES, Setting
 
 Came = tuple[float | None, str, str]  # of a fault that is shown: noticed after s, reaction, how it ended

@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from firmware.control.gains import BEST_TUNED, Control
+from firmware.model.gains import BEST_TUNED, Control
 from firmware.model.vehicle import Vehicle
 from sim_backend.core.closed_loop import END_ERROR_DEPTH, END_ERROR_PITCH
 from tools.study.reproduce.design import (

@@ -4,7 +4,7 @@ import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
-from firmware.supervisor.settings import Limits
+from firmware.model.supervisor_settings import Limits
 from hal.strict import ConfigError
 from tools.study.faults.cases import SAFE, Came
 

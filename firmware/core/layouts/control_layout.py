@@ -3,7 +3,7 @@
 Missions come as a matrix, one row a leg; nav is the estimator's own memory. SI and radians.
 """
 
-from firmware.core.estimation.estimator_layout import N_E, N_S, N_W, N_WORK_ROWS, N_XE, N_Z
+from firmware.core.layouts.estimator_layout import N_E, N_S, N_W, N_WORK_ROWS, N_XE, N_Z
 from firmware.core.vehicle.layout import N_P, N_X
 
 # --- C: configuration -----------------------------------------------------------------------------------------------

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import msgspec
 
 from firmware.core.control.controllers import CONTROLLERS
-from firmware.model.strict import Table
+from hal.strict import Table
 
 if TYPE_CHECKING:
     Name = str

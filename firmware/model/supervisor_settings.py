@@ -9,9 +9,9 @@ from typing import Annotated
 import msgspec
 import numpy as np
 
-from firmware.core.supervision import supervisor_layout as sup
-from firmware.model.strict import Table
+from firmware.core.layouts import supervisor_layout as sup
 from hal.ports import STALL_REST_S, STALL_TRIES
+from hal.strict import Table
 
 Seconds = Annotated[float, msgspec.Meta(gt=0.0, le=3600.0)]
 Short = Annotated[float, msgspec.Meta(gt=0.0, le=10.0)]
