@@ -39,10 +39,7 @@ def _charts(found: CaseGap, n: int) -> list[dict[str, Any]]:
             if channel.name == "yaw":
                 seen = unwrapped(seen)
                 said = near(t, seen, said)
-            lines = [
-                Line(t, seen * channel.scale, "measured"),
-                broken(t, said * channel.scale, listed, "predicted"),
-            ]
+            lines = [Line(t, seen * channel.scale, "measured"), broken(t, said * channel.scale, listed, "predicted")]
             chart = Chart(title, "s", lines, bands(t, listed), down=channel.name == "depth")
             add(channel, chart, 4.0 * channel.tolerance * channel.scale)
     for channel in channels_of(run):

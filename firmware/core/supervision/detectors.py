@@ -177,7 +177,7 @@ def watch_stall(G, i, measured, rate, tau, span, t):
         G[sup.STALLS + i] += 1.0
         G[sup.REST_UNTIL + i] = t + G[sup.STALL_REST]
         G[sup.SINCE + sup.T_STALL + i] = math.nan
-    if G[sup.STALLS + i] > G[sup.STALL_TRIES]:
+    if G[sup.STALLS + i] > G[sup.STALL_COUNT]:
         ask(G, sup.FAULT_STALL, sup.ABORT)
 
 
