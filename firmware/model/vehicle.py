@@ -12,7 +12,6 @@ from hal.strict import Table, decode
 
 Positive = Annotated[float, msgspec.Meta(gt=0.0)]
 NonNegative = Annotated[float, msgspec.Meta(ge=0.0)]
-Triple = tuple[float, float, float]
 PositiveTriple = tuple[Positive, Positive, Positive]
 NonNegativeTriple = tuple[NonNegative, NonNegative, NonNegative]
 # No glider of this class is outside these; a file that is has its units wrong.

@@ -44,12 +44,6 @@ def _stamp() -> Path | None:
     return None if jit.CACHE_DIR is None else jit.CACHE_DIR / f"flight-numba-{numba_version}"
 
 
-def is_compiled() -> bool:
-    """Whether a flight finds all its kernels compiled."""
-    stamp = _stamp()
-    return stamp is None or stamp.exists()
-
-
 def ensure_compiled(say: Callable[[str], None], progress: Progress) -> None:
     """Compile what a flight needs unless it is there, with a word and a bar; once, however many ask at once."""
     stamp = _stamp()

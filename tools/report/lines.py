@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from firmware.core.maths.rotations import wrap
 from tools.inference.windows import START, Window
 from tools.report.charts import Band, Line
 
@@ -17,7 +18,7 @@ def near(t: np.ndarray, seen: np.ndarray, said: np.ndarray) -> np.ndarray:
     """Predicted angles (rows,) brought to the turn of the measured ones (already unwrapped) next to them."""
     valid = np.isfinite(seen)
     beside = np.interp(t, t[valid], seen[valid]) if valid.any() else np.zeros_like(t)
-    return beside + (said - beside + np.pi) % (2.0 * np.pi) - np.pi
+    return beside + wrap(said - beside)
 
 
 def broken(x: np.ndarray, y: np.ndarray, listed: list[Window], style: str) -> Line:

@@ -74,26 +74,31 @@ def start_pid(P, C, legs, est, ap, pitch_rate):
 
 
 @kernel
-def form_at(P, C, est, ap):
-    """The I/O form chosen in C at the estimate: f_theta, f_Z, g_ts, g_tb, g_zs, g_zb, and cos(theta)."""
+def form_point(P, est, ap):
+    """Where a form (input_forms) is wanted: kx, ky, kz, u, v, w, p, q, r, servo, slider, ballast and their rates."""
     cf, sf = math.cos(est[ctl.EST_ROLL]), math.sin(est[ctl.EST_ROLL])
     ct, st = math.cos(est[ctl.EST_PITCH]), math.sin(est[ctl.EST_PITCH])
-    kx, ky, kz = -st, sf * ct, cf * ct
     a, b, c = est[ctl.EST_SERVO], est[ctl.EST_SLIDER], est[ctl.EST_BALLAST]
     da, db, dc = actuator_rates(P, a, b, c, ap[ctl.SENT_SERVO], ap[ctl.SENT_SLIDER], ap[ctl.SENT_BALLAST])
     u, v, w = est[ctl.EST_U], est[ctl.EST_V], est[ctl.EST_W]
-    p, q, r = est[ctl.EST_P], est[ctl.EST_Q], est[ctl.EST_R]
+    return -st, sf * ct, cf * ct, u, v, w, est[ctl.EST_P], est[ctl.EST_Q], est[ctl.EST_R], a, b, c, da, db, dc
+
+
+@kernel
+def form_at(P, C, est, ap):
+    """The I/O form chosen in C at the estimate: f_theta, f_Z, g_ts, g_tb, g_zs, g_zb, and cos(theta)."""
+    point = form_point(P, est, ap)
     if C[ctl.FORM] == ctl.PAPER:
-        f_t, f_z, g_ts, g_tb, g_zs, g_zb = paper_form(P, kx, ky, kz, u, v, w, p, q, r, a, b, c, da, db, dc)
+        f_t, f_z, g_ts, g_tb, g_zs, g_zb = paper_form(P, *point)
     else:
-        f_t, f_z, g_ts, g_tb, g_zs, g_zb = exact_form(P, kx, ky, kz, u, v, w, p, q, r, a, b, c, da, db, dc)
+        f_t, f_z, g_ts, g_tb, g_zs, g_zb = exact_form(P, *point)
     share = C[ctl.OBSERVER_SHARE]
     if share > 0.0:
         e = ctl.MODEL_ERROR
-        d_t, d_z = on_outputs(kx, ky, kz, est[e], est[e + 1], est[e + 2], est[e + 3], est[e + 4], est[e + 5])
+        d_t, d_z = on_outputs(*point[:3], est[e], est[e + 1], est[e + 2], est[e + 3], est[e + 4], est[e + 5])
         f_t += share * d_t
         f_z += share * d_z
-    return f_t, f_z, g_ts, g_tb, g_zs, g_zb, ct
+    return f_t, f_z, g_ts, g_tb, g_zs, g_zb, math.cos(est[ctl.EST_PITCH])
 
 
 @kernel

@@ -72,3 +72,9 @@ def extra_wrench(P, F, kx, depth, u, v, w, p, q, r):
         M += M1
         N += N1
     return X, Y, Z, K, M, N
+
+
+@kernel
+def current(F, depth):
+    """Velocity of the water (m/s, north and east) that effects F add at a depth (m)."""
+    return F[ef.CURRENT_N] + F[ef.SHEAR_N] * depth, F[ef.CURRENT_E] + F[ef.SHEAR_E] * depth

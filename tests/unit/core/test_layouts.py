@@ -113,9 +113,9 @@ NUMBERED = {
     "sim_backend/core/effect_plant.py",
     "sim_backend/core/effect_world.py",
     "sim_backend/core/world.py",
-    "tools/inference/core/flights.py",
-    "tools/inference/core/innovations.py",
-    "tools/inference/core/passage.py",
+    "tools/inference/core/filter.py",
+    "tools/inference/core/lacking.py",
+    "tools/inference/core/step.py",
 }
 
 

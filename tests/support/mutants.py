@@ -1,4 +1,4 @@
-"""`python -m tools.measure.mutants FOLDER`: mutants of the supervisor's and limits' code, by mutmut: do tests notice?
+"""`python -m tests.support.mutants FOLDER`: mutants of the supervisor's and limits' code, by mutmut: do tests notice?
 
 mutmut leaves decorated functions alone, and a compiled kernel shows it nothing: the copy that it works on has no
 `@kernel`, which is what GLIDER_JIT=0 makes of it anyway. Needs `pip install mutmut`; takes some minutes.
