@@ -40,7 +40,7 @@ def fly_fleet(
 ) -> FleetResult:
     """Fly pilot i in world i, for all i at once over all cores. The worlds do not move; their states are copied.
 
-    All pilots believe in the same vehicle and run at the same step. trace_every in s; 0 keeps no trace.
+    All pilots have the same model and run at the same step. trace_every in s; 0 keeps no trace.
     """
     n, first = len(worlds), pilots[0]
     step = float(first.C[0])

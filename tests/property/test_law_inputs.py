@@ -16,7 +16,6 @@ from firmware.core.control.law import (
     OK,
     STEEP,
     axis_demand,
-    k2_by_29,
     k2_to_cover,
     pitch_depth_law,
     solve_inputs,
@@ -24,6 +23,7 @@ from firmware.core.control.law import (
 from firmware.core.control.law_plus import reach
 from firmware.core.vehicle import layout
 from firmware.core.vehicle.actuators import actuator_rate, limited
+from tests.support.equations import k2_by_29
 
 
 @repeatable

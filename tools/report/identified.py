@@ -149,7 +149,7 @@ def flights(found: Identified) -> list[dict[str, Any]]:
     return shown
 
 
-def report_html(found: Identified, truth: dict[str, float] | None = None) -> str:
+def report_html(found: Identified) -> str:
     """The page's text."""
     held = None if found.held is None else found.held.plain()
     context = {
@@ -160,7 +160,7 @@ def report_html(found: Identified, truth: dict[str, float] | None = None) -> str
         "told": sentences(found.free, found.chains.flat),
         "blind": [one.sentence() for one in unidentifiable_directions(found.free, found.chains.flat)],
         "left_out": [str(one) for one in found.left_out], "spikes": found.spikes, "notes": found.notes,
-        "marginals": png(marginals(found, truth)), "corner": png(corner(found)), "truth": truth is not None,
+        "marginals": png(marginals(found)), "corner": png(corner(found)),
         "levels": [] if found.levels is None else [
             {"name": name.replace("_", " "), "factor": float(np.exp(log))}
             for name, log in zip(found.levels.names, found.levels.log, strict=True)
@@ -173,6 +173,6 @@ def report_html(found: Identified, truth: dict[str, float] | None = None) -> str
     return render("identified.html", context)
 
 
-def write_report(path: Path, found: Identified, truth: dict[str, float] | None = None) -> None:
+def write_report(path: Path, found: Identified) -> None:
     """Write the page to a file."""
-    path.write_text(report_html(found, truth), encoding="utf-8")
+    path.write_text(report_html(found), encoding="utf-8")

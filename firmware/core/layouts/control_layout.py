@@ -1,4 +1,4 @@
-"""Where things stand in the autopilot's vectors: C its configuration, est what it believes, ap what it remembers.
+"""Where things stand in the autopilot's vectors: C its configuration, est the estimate, ap its memory.
 
 Missions come as a matrix, one row a leg; nav is the estimator's own memory. SI and radians.
 """

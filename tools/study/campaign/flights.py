@@ -165,8 +165,8 @@ def fly_chunk(job: Job, chunk: Chunk) -> np.ndarray:
                     drawn.current, drawn.wave_height, drawn.wave_period, drawn.disturbance, drawn.start_depth,
                     end[closed_loop.END_MODE] == ctl.COMPLETED, ended == ctl.REASON_NONE, ended,
                     end[closed_loop.END_LEG], end[closed_loop.END_TIME],
-                    np.nan if held else end[closed_loop.END_ERROR_DEPTH], end[closed_loop.END_ERROR_PITCH],
-        end[closed_loop.END_ERROR_ROLL],
+                    np.nan if held else end[closed_loop.END_ERROR_DEPTH],
+                    end[closed_loop.END_ERROR_PITCH], end[closed_loop.END_ERROR_ROLL],
                     *end[closed_loop.END_TRAVEL_SERVO : closed_loop.END_TRAVEL_SERVO + 3],
                     deepest, *over, attitude,
                 )
