@@ -14,7 +14,7 @@ from tools.identify.pipeline import Identified
 from tools.inference.channels import measured
 from tools.inference.windows import windows
 from tools.report.charts import Chart, Line, svg
-from tools.report.lines import broken, near, unwrapped
+from tools.report.lines import compared
 from tools.report.page import render
 
 INK, TRUTH, SOFT = "#1d3f72", "#d9480f", "#8a94a3"
@@ -134,14 +134,8 @@ def flights(found: Identified) -> list[dict[str, Any]]:
         for column, title, scale, down in CHANNELS:
             if not np.isfinite(table[:, column]).any():
                 continue
-            seen, said = table[:, column], [held.nominal[n][:, column], held.identified[n][:, column]]
-            if not down:
-                seen = unwrapped(seen)
-                said = [near(run.t, seen, one) for one in said]
-            lines = [
-                Line(run.t, seen * scale, "measured"), broken(run.t, said[0] * scale, listed, "nominal"),
-                broken(run.t, said[1] * scale, listed, "corrected"),
-            ]  # fmt: skip
+            said = {"nominal": held.nominal[n][:, column], "corrected": held.identified[n][:, column]}
+            lines = compared(run.t, table[:, column], said, listed, scale, wraps=not down)
             charts.append({"title": title, "svg": svg(Chart(title, "s", lines, down=down), 0.05)})
         shown.append(
             {"name": run.name, "before": held.before[n].total, "after": held.after[n].total, "charts": charts}
