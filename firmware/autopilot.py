@@ -4,20 +4,20 @@ import math
 
 import numpy as np
 
-from firmware.control.gains import Control
 from firmware.core.control import autopilot as core
-from firmware.core.control import control_layout as ctl
 from firmware.core.control.controllers import CONTROLLERS
 from firmware.core.control.guidance import abort
-from firmware.core.estimation.estimator_layout import COMMANDED
 from firmware.core.estimation.sensing import longest_age
+from firmware.core.layouts import control_layout as ctl
+from firmware.core.layouts.estimator_layout import COMMANDED
 from firmware.core.vehicle.seawater import STANDARD_PRESSURE
-from firmware.estimation.settings import estimator_settings, first_spread, parameter_sigma
+from firmware.faults import FAULTS
 from firmware.guidance.mission import Mission
-from firmware.model.strict import ConfigError
+from firmware.model.estimator_settings import estimator_settings, first_spread, parameter_sigma
+from firmware.model.gains import Control
 from firmware.model.vehicle import Vehicle
-from firmware.supervisor.table import FAULTS
 from hal.ports import empty_frame
+from hal.strict import ConfigError
 
 MODES = {ctl.WAITING: "waiting", ctl.FLYING: "flying", ctl.COMPLETED: "completed", ctl.ABORTED: "aborted"}
 REASONS = {

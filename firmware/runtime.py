@@ -18,9 +18,9 @@ import numpy as np
 from firmware.autopilot import Autopilot
 from firmware.core.control import telemetry as record
 from firmware.core.jit import freeze_kernels, thaw_kernels
-from firmware.core.supervision import supervisor_layout as sup
-from firmware.supervisor.supervisor import Supervisor
-from firmware.supervisor.table import Reaction
+from firmware.core.layouts import supervisor_layout as sup
+from firmware.faults import Reaction
+from firmware.supervisor import Supervisor
 from hal.ports import SLOTS, Board
 
 HISTOGRAM_EDGES = np.array([0.0, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, np.inf])  # s

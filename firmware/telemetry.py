@@ -29,7 +29,7 @@ _FIELDS = (
     ("int_depth_kg", "kg", "integrator of the depth loop"),
     ("mode", "1", "0 waiting, 1 flying, 2 completed, 3 aborted"),
     ("leg", "1", "leg being flown, from 0"),
-    ("reason", "1", "why the dive was given up; core/control/control_layout; past 100 the row of the fault table"),
+    ("reason", "1", "why the dive was given up; core/layouts/control_layout; past 100 the row of the fault table"),
     ("lateness_s", "s", "start of the tick after its deadline"),
     ("duration_s", "s", "time the tick before this one took"),
     ("density_kg_m3", "kg/m3", "water density from pressure and temperature"),

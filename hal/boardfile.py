@@ -187,10 +187,7 @@ class DeviceFile(Table):
 
 # Devices that speak a protocol of their own on a port of their own: place on the board -> name -> who builds its
 # driver, loaded when a board file asks for it. What speaks Modbus is a register map of the role that its place takes.
-DRIVERS = {
-    "imu": {"vn100": "hal.drivers.vn100:build"},
-    "servo": {"maestro": "hal.drivers.maestro:build"},
-}
+DRIVERS = {"imu": {"vn100": "hal.drivers.vn100:build"}, "servo": {"maestro": "hal.drivers.maestro:build"}}
 ROLES: dict[str, tuple[Role, ...]] = {
     "beacon": ("pressure",), "slider_wire": ("analog", "encoder"), "plunger_wire": ("analog", "encoder"),
     "leak": ("analog",), "battery": ("analog",), "slider": ("drive",), "ballast": ("drive",),

@@ -182,23 +182,21 @@ def _age(stamp_ns: int, now_ns: int) -> float:
     return (now_ns - stamp_ns) / 1e9 if stamp_ns else float("inf")
 
 
+def _folder(variable: str, system: str) -> Path | None:
+    """The folder that a variable names, or the system's where it may be written to; None: the user's own."""
+    wanted = os.environ.get(variable, "")
+    return Path(wanted or system) if wanted or os.access(system, os.W_OK) else None
+
+
 def run_folder() -> Path:
     """Where the heartbeat of the vehicle's one flight lies: GLIDER_RUN_DIR, /run/glider, or the user's own folder."""
-    wanted = os.environ.get("GLIDER_RUN_DIR")
-    if wanted:
-        return Path(wanted)
-    if os.access("/run/glider", os.W_OK):
-        return Path("/run/glider")
     base = os.environ.get("XDG_RUNTIME_DIR")
-    return Path(base) / "glider" if base else Path(tempfile.gettempdir()) / f"glider-run-{os.getuid()}"
+    own = Path(base) / "glider" if base else Path(tempfile.gettempdir()) / f"glider-run-{os.getuid()}"
+    return _folder("GLIDER_RUN_DIR", "/run/glider") or own
 
 
 def state_folder() -> Path:
     """Where the state outlives a restart: GLIDER_STATE_DIR, /var/lib/glider, or the user's own folder."""
-    wanted = os.environ.get("GLIDER_STATE_DIR")
-    if wanted:
-        return Path(wanted)
-    if os.access("/var/lib/glider", os.W_OK):
-        return Path("/var/lib/glider")
     base = os.environ.get("XDG_STATE_HOME")
-    return (Path(base) if base else Path.home() / ".local" / "state") / "glider"
+    own = (Path(base) if base else Path.home() / ".local" / "state") / "glider"
+    return _folder("GLIDER_STATE_DIR", "/var/lib/glider") or own

@@ -3,6 +3,8 @@
 import math
 from typing import NamedTuple
 
+BITS = 10  # on a serial line for a byte, 8N1
+
 
 class Unit(NamedTuple):
     """What a unit measures, and how many SI units it is (deg C for temperatures)."""

@@ -6,23 +6,11 @@ from typing import Annotated, Any
 import msgspec
 import numpy as np
 
-from firmware.model.strict import Table, decode
+from hal import ports
 from hal.board import BoardRequest
 from hal.clocks import MonotonicClock
-from hal.ports import (
-    SLOTS,
-    ActuatorPort,
-    Board,
-    BoardError,
-    Clock,
-    Condition,
-    DropWeight,
-    Hardware,
-    OutOfBand,
-    SensorPort,
-    Validity,
-)  # fmt: skip
 from hal.recorder.schema import Field, RecordSpec
+from hal.strict import Table, decode
 from sim_backend.core import layout as wl
 from sim_backend.core.effects.catalogue import check_board
 from sim_backend.core.world import write_truth
@@ -86,7 +74,7 @@ class SimulatedActuator:
         self._low, self._high = limits
 
     def read(self, out: np.ndarray) -> None:
-        out[0], out[1], out[2] = self._world.time, Validity.VALID, Condition.WELL
+        out[0], out[1], out[2] = self._world.time, ports.Validity.VALID, ports.Condition.WELL
 
     def command(self, value: float) -> float:
         if value != value:
@@ -132,15 +120,15 @@ class PacedClock(MonotonicClock):
 class SimBoard:
     """All devices of the nominal vehicle, simulated. Leak, battery, drop weight and the like are not fitted."""
 
-    hardware = Hardware.NONE
+    hardware = ports.Hardware.NONE
     records: tuple[RecordSpec, ...] = (TRUTH,)
-    imu: SensorPort
-    beacon: SensorPort
-    slider_wire: SensorPort
-    plunger_wire: SensorPort
-    servo: ActuatorPort
-    slider: ActuatorPort
-    ballast: ActuatorPort
+    imu: ports.SensorPort
+    beacon: ports.SensorPort
+    slider_wire: ports.SensorPort
+    plunger_wire: ports.SensorPort
+    servo: ports.ActuatorPort
+    slider: ports.ActuatorPort
+    ballast: ports.ActuatorPort
     watchdog = None
 
     def __init__(self, file: SimBoardFile, world: World, vehicle: Any, *, realtime: bool):
@@ -149,13 +137,13 @@ class SimBoard:
         self.periods = file.sensors.periods
         self.surface_pressure = float(world.E[wl.ENV_SURFACE_PRESSURE])
         self.realtime = realtime
-        self.clock: Clock = SimulatedClock(world)
-        self.leak: SensorPort | None = None
-        self.battery: SensorPort | None = None
-        self.drop_weight: DropWeight | None = None
-        self.out_of_band: OutOfBand | None = None
+        self.clock: ports.Clock = SimulatedClock(world)
+        self.leak: ports.SensorPort | None = None
+        self.battery: ports.SensorPort | None = None
+        self.drop_weight: ports.DropWeight | None = None
+        self.out_of_band: ports.OutOfBand | None = None
         for name in ("imu", "beacon", "slider_wire", "plunger_wire"):
-            setattr(self, name, SimulatedSensor(world.frame[SLOTS[name].all]))
+            setattr(self, name, SimulatedSensor(world.frame[ports.SLOTS[name].all]))
         for index, name in enumerate(("servo", "slider", "ballast")):
             setattr(self, name, SimulatedActuator(world, index, getattr(vehicle.actuators, name).range))
 
@@ -197,14 +185,14 @@ class SimBoard:
         return (record,)
 
 
-def world_of(board: Board) -> World:
+def world_of(board: ports.Board) -> World:
     """The world behind a simulated board; BoardError where there is none."""
     if not isinstance(board, SimBoard):
-        raise BoardError(f"board '{board.name}' is not simulated")
+        raise ports.BoardError(f"board '{board.name}' is not simulated")
     return board.world
 
 
-def build_board(request: BoardRequest) -> Board:
+def build_board(request: BoardRequest) -> ports.Board:
     """A simulated board from its file's text; floor and salinity are the mission site's where the file has none."""
     file = decode(request.text, SimBoardFile, request.source)
     check_board(file.effects, request.source)

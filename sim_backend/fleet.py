@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from firmware.autopilot import Autopilot
-from firmware.core.control.control_layout import COMPLETED, N_LEG
+from firmware.core.layouts.control_layout import COMPLETED, N_LEG
 from sim_backend.core.closed_loop import END_LEG, END_MODE, END_REASON, END_TIME, N_END, N_TRACE, TRACE, fly_many
 from sim_backend.core.layout import N_WAVE
 from sim_backend.world import World
@@ -40,7 +40,7 @@ def fly_fleet(
 ) -> FleetResult:
     """Fly pilot i in world i, for all i at once over all cores. The worlds do not move; their states are copied.
 
-    All pilots believe in the same vehicle and run at the same step. trace_every in s; 0 keeps no trace.
+    All pilots have the same model and run at the same step. trace_every in s; 0 keeps no trace.
     """
     n, first = len(worlds), pilots[0]
     step = float(first.C[0])

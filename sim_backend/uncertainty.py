@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from firmware.estimation.settings import parameter_sigma
+from firmware.model.estimator_settings import parameter_sigma
 from firmware.model.vehicle import Vehicle
-from sim_backend.core import layout
+from sim_backend.core import layout as wl
 
 
 def draw_parameters(vehicle: Vehicle, rng: np.random.Generator, scale: float = 1.0) -> np.ndarray:
@@ -24,7 +24,7 @@ def sensor_errors(vehicle: Vehicle, rng: np.random.Generator) -> np.ndarray:
     """Bias (drawn, row 0) and white noise (row 1) of the nine measured values, shape (2, N_ERRORS)."""
     tables = vehicle.sensors
     rows = [tables.attitude] * 3 + [tables.gyro] * 3 + [tables.depth, tables.slider, tables.ballast]
-    errors = np.zeros((2, layout.N_ERRORS))
+    errors = np.zeros((2, wl.N_ERRORS))
     errors[0] = [table.bias * rng.standard_normal() for table in rows]
     errors[1] = [table.noise for table in rows]
     return errors

@@ -7,13 +7,13 @@ from typing import Annotated
 import msgspec
 import numpy as np
 
+from firmware.core.layouts import supervisor_layout as sup
 from firmware.core.maths.rotations import quaternion_from_euler
-from firmware.core.supervision import supervisor_layout as sup
 from firmware.core.vehicle.layout import N_P, X_ACT, X_NU, X_POS, X_QUAT
 from firmware.core.vehicle.seawater import STANDARD_PRESSURE, water_density
-from firmware.model.strict import Table
 from firmware.model.vehicle import Vehicle
 from hal.ports import empty_frame
+from hal.strict import Table
 from sim_backend.core import layout as wl
 from sim_backend.core import world as core
 from sim_backend.core.effects import effect_layout as ef

@@ -8,7 +8,7 @@ from law_flights import Gains, Reference, output_accelerations, outputs, plant_r
 from model_states import RATE, VEHICLE_TEXT, P, actuators, angles, rates, state, vehicles, velocities
 
 from firmware.core.vehicle import layout
-from firmware.estimation.settings import parameter_sigma
+from firmware.model.estimator_settings import parameter_sigma
 from firmware.model.vehicle import decode_vehicle
 
 SPREAD = 3.0 * parameter_sigma(P, decode_vehicle(VEHICLE_TEXT, "roughie").uncertainty)

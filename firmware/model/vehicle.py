@@ -5,14 +5,13 @@ from typing import Annotated
 import msgspec
 import numpy as np
 
-from firmware.control.gains import Control
 from firmware.core.vehicle import layout
-from firmware.model.strict import Table, decode
-from firmware.supervisor.settings import Limits, SupervisorTable
+from firmware.model.gains import Control
+from firmware.model.supervisor_settings import Limits, SupervisorTable
+from hal.strict import Table, decode
 
 Positive = Annotated[float, msgspec.Meta(gt=0.0)]
 NonNegative = Annotated[float, msgspec.Meta(ge=0.0)]
-Triple = tuple[float, float, float]
 PositiveTriple = tuple[Positive, Positive, Positive]
 NonNegativeTriple = tuple[NonNegative, NonNegative, NonNegative]
 # No glider of this class is outside these; a file that is has its units wrong.

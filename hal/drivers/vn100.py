@@ -10,10 +10,10 @@ from hal.boardfile import ImuTable, PortTable
 from hal.drivers.samples import Sensor
 from hal.ports import SLOTS
 from hal.protocols import vn100
+from hal.units import BITS
 
 ASK_AGAIN_S = 1.0
 PI = math.pi
-BITS = 10  # on the line for a byte, 8N1
 
 
 def rotation(roll: float, pitch: float, yaw: float) -> np.ndarray:

@@ -33,7 +33,7 @@ class WirePlan:
     words: int
     zero: float
     per_m: float
-    low_m: float  # readings outside are not believed
+    low_m: float  # readings outside are rejected
     high_m: float
 
 

@@ -17,8 +17,8 @@ from enum import Enum
 from typing import Protocol
 
 from hal.protocols.modbus import ERROR, READ_HOLDING, READ_INPUT, Frame, Request, RtuDecoder
+from hal.units import BITS
 
-BITS = 10  # on the line for a byte, 8N1
 GIVE_UP_AFTER = 3  # timeouts running, past which a device is asked seldom
 BACK_OFF_S = 0.25
 BABBLE_S = 0.25  # a line that is not quiet for so long is asked all the same
@@ -122,11 +122,6 @@ class ModbusBus:
     def ask(self, request: Request, done: Callable[[Frame | None, int], None]) -> None:
         """One request before all jobs; done(reply or None, exception code)."""
         self._asks.append(Ask(request, done))
-
-    @property
-    def idle(self) -> bool:
-        """True if nothing is on the line and no single request waits."""
-        return self._request is None and not self._asks
 
     def connected(self, now: float) -> None:
         self._up = True

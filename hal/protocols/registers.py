@@ -63,20 +63,12 @@ class Block(Table):
                 raise ValueError(f"value.{name}: reaches past the block's {self.count} registers")
 
 
-class Line(Table):
-    """How the device talks: speed, and the longest it takes to begin its reply."""
-
-    baud: Annotated[int, msgspec.Meta(ge=1200, le=1_000_000)]
-    turnaround_s: Annotated[float, msgspec.Meta(gt=0.0, le=1.0)]
-
-
 class RegisterMap(Table):
     """A preset: what is known of a device on a Modbus line."""
 
     format: Annotated[int, msgspec.Meta(ge=1, le=1)]
     name: str
     role: Role
-    line: Line
     block: dict[str, Block]
     command: dict[str, Address] = msgspec.field(default_factory=dict)
     word: dict[str, Address] = msgspec.field(default_factory=dict)

@@ -5,9 +5,9 @@ The kernels are the ones that the real runtime calls; only the Python around the
 
 import numpy as np
 
-from firmware.core.control import control_layout as ctl
 from firmware.core.control.autopilot import reset, tick
 from firmware.core.jit import kernel, parallel_kernel, prange
+from firmware.core.layouts import control_layout as ctl
 from firmware.core.vehicle.layout import N_P, N_X, X_ACT, X_DOWN, X_EAST, X_NORTH
 from firmware.core.vehicle.state import euler_angles
 from hal.ports import FRAME_SIZE
@@ -56,7 +56,7 @@ def add_up(est, ap, x, last, end):
 def fly(P_plant, P, C, legs, nav, E, F, waves, sensors, errors, seed, x, dt, max_ticks, every, trace, end):
     """Fly one mission from state x (N_XF, in place) until it ends or max_ticks are over; returns the ticks flown.
 
-    P_plant is the vehicle in the water, with effects F (N_F,), P the one the autopilot believes in; nav (N_NAV,) is as
+    P_plant is the vehicle in the water, with effects F (N_F,), P the autopilot's model; nav (N_NAV,) is as
     Autopilot makes it and is not changed. Every `every`-th tick goes into trace (rows, N_TRACE) while it has rows; end
     (N_END,) says how the flight ended and how well it kept to its references.
     """
@@ -105,7 +105,7 @@ def fly_many(
 ):  # fmt: skip
     """`fly` for n flights, shared out over all cores; a flight does not depend on how many fly beside it.
 
-    Shared: P and nav (what the autopilots believe), dt, max_ticks, every. Of each flight: P_plants (n, N_P),
+    Shared: P and nav (the autopilots' model and filter), dt, max_ticks, every. Of each flight: P_plants (n, N_P),
     Cs (n, N_C), legs (n, most, N_LEG) of which rows (n,) count, Es (n, N_E), Fs (n, N_F),
     waves (n, components, N_WAVE), sensors (n, N_SENSORS, N_SENSOR_FIELDS), errors (n, 2, N_ERRORS),
     seeds (n,) uint64, xs (n, N_XF) in place,

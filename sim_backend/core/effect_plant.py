@@ -15,11 +15,10 @@ from sim_backend.core import layout as wl
 from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.actuation import effective_actuators, geared, motor_speeds, update_gears
 from sim_backend.core.effects.correction import correction
-from sim_backend.core.effects.hydrodynamics import effective_coefficients, extra_wrench
+from sim_backend.core.effects.hydrodynamics import current, effective_coefficients, extra_wrench
 from sim_backend.core.effects.mass import effective_masses, net_mass_of_depth, slider_mass, tank_mass
 from sim_backend.core.effects.sensing import before_lags, update_lags
 from sim_backend.core.effects.timing import delayed_commands
-from sim_backend.core.effects.water import current
 from sim_backend.core.environment import boundary_force, water_velocity
 
 

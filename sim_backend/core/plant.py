@@ -1,7 +1,7 @@
 """The simulated vehicle in its environment: the nominal one in moving water, with surface, floor and disturbance."""
 
-from firmware.core.estimation.estimator_layout import DISTURBANCE_HOLD
 from firmware.core.jit import kernel
+from firmware.core.layouts.estimator_layout import DISTURBANCE_HOLD
 from firmware.core.maths.steps import NODE, RK4, end_stage
 from firmware.core.vehicle.actuators import actuator_rates
 from firmware.core.vehicle.flight import add_accelerations, state_derivative

@@ -5,14 +5,14 @@ and thousands in a campaign.
 """
 
 from firmware.core.jit import kernel
-from firmware.core.supervision import supervisor_layout as sup
-from firmware.core.vehicle.layout import GRAVITY, PLUNGER_AREA, X_BALLAST, X_DOWN, X_NU, X_POS, X_SLIDER
-from firmware.core.vehicle.state import euler_angles, velocities
+from firmware.core.layouts import supervisor_layout as sup
+from firmware.core.vehicle.layout import GRAVITY, PLUNGER_AREA, X_NU, X_POS
+from firmware.core.vehicle.state import euler_angles
 from hal.ports import BEACON, IMU, PLUNGER_WIRE, SLIDER_WIRE
 from sim_backend.core import layout as wl
 from sim_backend.core.effect_plant import effect_world_step, set_effects
 from sim_backend.core.effects import effect_layout as ef
-from sim_backend.core.effects.sensing import read
+from sim_backend.core.effects.sensing import read, read_state
 from sim_backend.core.noise import gaussian
 from sim_backend.core.plant import hold_disturbance, plant_step
 
@@ -65,34 +65,20 @@ def due_slot(sensors, sensor, t, counters, ring):
 
 
 @kernel
-def sample_sensors(P, E, sensors, errors, seed, x, t, counters, ring):
-    """Sample every sensor whose time has come into its delay line, no effect being set."""
+def sample_sensors(P, F, effects, E, sensors, errors, seed, x, t, counters, ring, y):
+    """Sample every sensor whose time has come into its delay line: the state x, or with effects what `read` says of it.
+
+    effects: whether any of F is set; y (at least N_Y) is scratch.
+    """
     for sensor in range(wl.N_SAMPLED):
         count = due_slot(sensors, sensor, t, counters, ring)
         if count < 0:
             continue
         slot = ring[sensor, count % wl.DELAY_SLOTS]
-        if sensor == sup.SENSOR_IMU:
-            phi, theta, psi = euler_angles(x)
-            _, _, _, p, q, r = velocities(x)
-            write_imu(errors, seed, phi, theta, psi, p, q, r, count, slot)
-        elif sensor == sup.SENSOR_BEACON:
-            write_beacon(E, errors, seed, x[X_DOWN], count, slot)
-        elif sensor == sup.SENSOR_SLIDER:
-            slot[2] = measured(errors, seed, x[X_SLIDER], wl.E_SLIDER, count)
-        elif sensor == sup.SENSOR_PLUNGER:
-            write_plunger(P, E, errors, seed, x[X_BALLAST], count, slot)
-
-
-@kernel
-def sample_with_effects(P, F, E, sensors, errors, seed, x, t, counters, ring, y):
-    """The same with effects F: what `read` says; y (at least N_Y) is scratch."""
-    for sensor in range(wl.N_SAMPLED):
-        count = due_slot(sensors, sensor, t, counters, ring)
-        if count < 0:
-            continue
-        slot = ring[sensor, count % wl.DELAY_SLOTS]
-        read(F, x, y)
+        if effects:
+            read(F, x, y)
+        else:
+            read_state(x, y)
         if sensor == sup.SENSOR_IMU:
             write_imu(
                 errors, seed, y[ef.Y_ROLL], y[ef.Y_PITCH], y[ef.Y_YAW], y[ef.Y_P], y[ef.Y_Q], y[ef.Y_R], count, slot
@@ -142,17 +128,17 @@ def write_truth(t, x, out):
 
 
 @kernel
-def move(P, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, work, dt, t_end):
+def move(P, F, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, work, dt, t_end):
     """Step and sample to t_end, no effect being set: kept apart, for it is what most flights are. Returns the time."""
     t = counters[wl.C_STEP] * dt
     if counters[wl.C_STEP] == 0:
-        sample_sensors(P, E, sensors, errors, seed, x, t, counters, ring)
+        sample_sensors(P, F, False, E, sensors, errors, seed, x, t, counters, ring, work[wl.W_READ])
     while t < t_end - 0.5 * dt:
         hold_disturbance(E, seed, counters, t, acc)
         plant_step(P, E, waves, x, cmd, t, dt, acc, work)
         counters[wl.C_STEP] += 1
         t = counters[wl.C_STEP] * dt
-        sample_sensors(P, E, sensors, errors, seed, x, t, counters, ring)
+        sample_sensors(P, F, False, E, sensors, errors, seed, x, t, counters, ring, work[wl.W_READ])
     return t
 
 
@@ -163,13 +149,13 @@ def move_with_effects(
     """The same with effects F, effective (N_P) being what holds throughout."""
     t = counters[wl.C_STEP] * dt
     if counters[wl.C_STEP] == 0:
-        sample_with_effects(P, F, E, sensors, errors, seed, x, t, counters, ring, work[wl.W_READ])
+        sample_sensors(P, F, True, E, sensors, errors, seed, x, t, counters, ring, work[wl.W_READ])
     while t < t_end - 0.5 * dt:
         hold_disturbance(E, seed, counters, t, acc)
         effect_world_step(effective, F, E, waves, x, cmd, counters[wl.C_STEP], dt, acc, queue, work)
         counters[wl.C_STEP] += 1
         t = counters[wl.C_STEP] * dt
-        sample_with_effects(P, F, E, sensors, errors, seed, x, t, counters, ring, work[wl.W_READ])
+        sample_sensors(P, F, True, E, sensors, errors, seed, x, t, counters, ring, work[wl.W_READ])
     return t
 
 
@@ -187,6 +173,6 @@ def advance(
             P, effective, F, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, queue, work, dt, t_end
         )  # fmt: skip
     else:
-        t = move(P, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, work, dt, t_end)
+        t = move(P, F, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, work, dt, t_end)
     deliver(sensors, t, counters, ring, frame)
     return t

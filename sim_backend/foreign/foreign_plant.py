@@ -10,7 +10,7 @@ import math
 from firmware.core.jit import kernel
 from firmware.core.maths.rotations import euler_from_quaternion, quaternion_rate, rotation_nb, wrap_angle
 from firmware.core.vehicle import layout
-from firmware.core.vehicle.actuators import actuator_rate
+from firmware.core.vehicle.actuators import actuator_rate, actuator_table
 from firmware.core.vehicle.layout import N_P, N_X
 from firmware.core.vehicle.motion import accelerations
 from firmware.core.vehicle.water import flow_angles, flow_to_body
@@ -42,7 +42,7 @@ def soft_limit(F, angle):
 @kernel
 def servo_motion(P, F, x, command, out):
     """Angle and speed of the servo's masses; the motor's own motion into out."""
-    low, high, rate, tau = P[layout.SERVO_MIN], P[layout.SERVO_MAX], P[layout.SERVO_RATE], P[layout.SERVO_TAU]
+    low, high, rate, tau = actuator_table(P, layout.SERVO_MIN)
     slow = F[fo.FS_SERVO_SLOW]
     if slow == 0.0:
         speed = actuator_rate(x[13], command, low, high, rate, tau)
@@ -64,9 +64,7 @@ def servo_motion(P, F, x, command, out):
 @kernel
 def slider_motion(P, F, x, command, kx, out):
     """Position and speed of the sliding mass; the motor's own motion into out. kx: gravity's share along body x."""
-    speed = actuator_rate(
-        x[14], command, P[layout.SLIDER_MIN], P[layout.SLIDER_MAX], P[layout.SLIDER_RATE], P[layout.SLIDER_TAU]
-    )
+    speed = actuator_rate(x[14], command, *actuator_table(P, layout.SLIDER_MIN))
     if F[fo.FS_SLIDER_SLOW] > 0.0:  # a weak motor: slower still when it lifts the mass
         uphill = -kx if speed > 0.0 else kx
         speed /= 1.0 + 3.0 * F[fo.FS_SLIDER_SLOW] * (1.0 + 0.5 * uphill)
@@ -83,7 +81,7 @@ def slider_motion(P, F, x, command, kx, out):
 @kernel
 def pump_motion(P, F, x, command, out):
     """Speed of the ballast, kg/s; the pump's own motion into out."""
-    low, high, rate, tau = P[layout.BALLAST_MIN], P[layout.BALLAST_MAX], P[layout.BALLAST_RATE], P[layout.BALLAST_TAU]
+    low, high, rate, tau = actuator_table(P, layout.BALLAST_MIN)
     droop, slow = F[fo.FS_PUMP_DROOP], F[fo.FS_PUMP_SLOW]
     if droop > 0.0 and command < x[15]:  # expelling against depth: power over pressure, by a root
         rate /= math.sqrt(1.0 + droop * max(x[2], 0.0))

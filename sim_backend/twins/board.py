@@ -8,7 +8,6 @@ import socket
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 import msgspec
@@ -93,10 +92,6 @@ class TwinBoard(DeviceBoard):
                 process.kill()
                 process.wait()
         shutil.rmtree(self.folder, ignore_errors=True)
-
-    def wait_flight(self, seconds: float) -> None:
-        """Serve the ports for a while; for tests."""
-        self.serve(time.monotonic() + seconds)
 
 
 def build_board(request: BoardRequest) -> Board:

@@ -4,9 +4,9 @@ import msgspec
 
 from hal import boardfile
 from hal.boardfile import DeviceFile
-from hal.drivers.vn100 import BITS
 from hal.protocols.vn100 import FLIGHT_MASK, payload_size
 from hal.strict import ConfigError, decode
+from hal.units import BITS
 from sim_backend.core.effects.catalogue import check_board
 from sim_backend.twins.modbus_line import TURNAROUND_S
 from sim_backend.world import Environment, SampledSensor, Start

@@ -1,4 +1,4 @@
-"""Faults on demand: what a device's twin may be told to do wrong."""
+"""Faults on demand: what a device's twin can do wrong."""
 
 from dataclasses import dataclass
 

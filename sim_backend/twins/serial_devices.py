@@ -18,7 +18,7 @@ DEAD_MAN_S = 1.0  # the servo board's serial timeout
 
 
 class Vn100Twin:
-    """Answers commands and streams binary output at the rate it is told, the plant's attitude and rates in it."""
+    """Answers commands and streams binary output at the rate set, the plant's attitude and rates in it."""
 
     def __init__(self, link: Path, port: PortTable, table: ImuTable, plant: TwinPlant, rng: random.Random):
         self.fault = Fault()

@@ -12,9 +12,9 @@ import pytest
 from support.commands import glider
 from support.patience import patient_vehicle
 
-from firmware.core.control.control_layout import LEG
-from firmware.core.supervision import supervisor_layout as sup
-from firmware.supervisor.table import Reaction
+from firmware.core.layouts import supervisor_layout as sup
+from firmware.core.layouts.control_layout import LEG
+from firmware.faults import Reaction
 from hal.ports import SLOTS
 from hal.recorder.recorder import NullRecorder
 from sim_backend.core.closed_loop import N_END, N_TRACE, fly

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from firmware.autopilot import configuration
-from firmware.control.gains import Control, Law
-from firmware.core.control import control_layout as ctl
+from firmware.core.layouts import control_layout as ctl
 from firmware.guidance.mission import decode_mission
+from firmware.model.gains import Control, Law
 from firmware.model.library import shipped
 from tools.data.sources import load_vehicle
 from tools.study.campaign.fingerprint import fingerprint

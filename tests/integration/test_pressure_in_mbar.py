@@ -27,10 +27,6 @@ name = "deepsense-20"
 role = "pressure"
 description = "fictitious transmitter of 20 bar: tenths of a mbar, hundredths of a degree"
 
-[line]
-baud = 115200
-turnaround_s = 0.01
-
 [block.all]
 function = 4
 address = 0x0020

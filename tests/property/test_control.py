@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy import signal
 
 from firmware.core.control.control import pid, reference_step, roll_law
-from firmware.core.supervision.limits import limited
+from firmware.core.vehicle.actuators import limited
 
 repeatable = settings(deadline=None, derandomize=True, max_examples=200)
 anything = st.floats(allow_nan=True, allow_infinity=True, width=64)

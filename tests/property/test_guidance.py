@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from firmware.core.control import control_layout as ctl
+from firmware.core.layouts import control_layout as ctl
 from firmware.guidance.mission import decode_mission
 from sim_backend.core.closed_loop import N_END, N_TRACE, fly
 from tools.flight.compose import build_flight

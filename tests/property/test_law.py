@@ -27,8 +27,9 @@ from law_flights import (
 from law_states import SPREAD, actuator_speeds, closed_loops, flying, forward, trimmed_vehicles, unit
 from model_states import HIGH, LOW, TAU, P, repeatable, state
 
-from firmware.core.control.law import k2_by_29, k2_to_cover
+from firmware.core.control.law import k2_to_cover
 from firmware.core.vehicle import layout
+from tests.support.equations import k2_by_29
 
 
 def settle(law: Law, x, references, speeds=STANDING) -> None:

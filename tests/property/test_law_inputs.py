@@ -16,15 +16,14 @@ from firmware.core.control.law import (
     OK,
     STEEP,
     axis_demand,
-    k2_by_29,
     k2_to_cover,
     pitch_depth_law,
     solve_inputs,
 )
 from firmware.core.control.law_plus import reach
-from firmware.core.supervision.limits import limited
 from firmware.core.vehicle import layout
-from firmware.core.vehicle.actuators import actuator_rate
+from firmware.core.vehicle.actuators import actuator_rate, limited
+from tests.support.equations import k2_by_29
 
 
 @repeatable

@@ -33,10 +33,9 @@ from firmware.core.control.input_forms import exact_form, paper_form
 from firmware.core.control.law import decrease_margin, k2_to_cover
 from firmware.core.control.law_plus import SHARE, on_outputs
 from firmware.core.maths.rotations import euler_from_quaternion
-from firmware.core.supervision.limits import limited
 from firmware.core.vehicle import layout
-from firmware.core.vehicle.actuators import actuator_rates
-from firmware.estimation.settings import parameter_sigma
+from firmware.core.vehicle.actuators import actuator_rates, limited
+from firmware.model.estimator_settings import parameter_sigma
 from firmware.model.vehicle import decode_vehicle
 
 SIGMA = parameter_sigma(P, decode_vehicle(VEHICLE_TEXT, "roughie").uncertainty)

@@ -7,10 +7,10 @@ import pytest
 from law_flights import Gains, Law, Reference, lyapunov_rate, plant_rates
 from law_states import SPREAD
 
-from firmware.core.control import control_layout as ctl
 from firmware.core.control.law import k2_to_cover
 from firmware.core.control.lyapunov_monitor import WATCH_EVERY
 from firmware.core.control.telemetry import N_RECORD, REC_LYAPUNOV, fill_record
+from firmware.core.layouts import control_layout as ctl
 from firmware.core.vehicle import layout
 from tools.flight.compose import build_flight
 

@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from firmware.control.gains import Control, HybridTable
-from firmware.core.control import control_layout as ctl
 from firmware.core.control import law
+from firmware.core.layouts import control_layout as ctl
 from firmware.core.vehicle import layout
-from firmware.model.strict import ConfigError, decode
+from firmware.model.gains import Control, HybridTable
+from hal.strict import ConfigError, decode
 from tools.flight.compose import build_flight
 
 RATES = {"servo": layout.SERVO_RATE, "slider": layout.SLIDER_RATE, "ballast": layout.BALLAST_RATE}

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from model_states import VEHICLE_TEXT, repeatable
 
-from firmware.model.strict import ConfigError
 from firmware.model.vehicle import Vehicle, decode_vehicle
+from hal.strict import ConfigError
 
 LINES = VEHICLE_TEXT.splitlines()
 WRONG = {

@@ -4,10 +4,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from firmware.core.estimation import estimator_layout as kf
 from firmware.core.estimation.estimator import estimator_predict, estimator_start, estimator_update
+from firmware.core.layouts import estimator_layout as kf
 from firmware.core.maths.rotations import quaternion_from_euler
-from firmware.estimation.settings import estimator_settings, first_spread, parameter_sigma
+from firmware.model.estimator_settings import estimator_settings, first_spread, parameter_sigma
 from firmware.model.vehicle import Vehicle
 from tools.data.sources import load_vehicle
 

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from firmware.core.estimation import estimator_layout as kf
+from firmware.core.layouts import estimator_layout as kf
 from firmware.core.maths.rotations import euler_from_quaternion, quaternion_from_euler
-from firmware.estimation.settings import parameter_sigma
+from firmware.model.estimator_settings import parameter_sigma
 from firmware.model.vehicle import Vehicle
 from sim_backend.core.effects import effect_layout as ef
 from tools.data.runs import columns as names

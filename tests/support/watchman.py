@@ -10,11 +10,11 @@ import msgspec
 import numpy as np
 
 from firmware.autopilot import Autopilot, configuration
-from firmware.core.control import control_layout as ctl
-from firmware.core.supervision import supervisor_layout as sup
-from firmware.supervisor.settings import Limits
-from firmware.supervisor.supervisor import Supervisor
-from firmware.supervisor.table import Reaction
+from firmware.core.layouts import control_layout as ctl
+from firmware.core.layouts import supervisor_layout as sup
+from firmware.faults import Reaction
+from firmware.model.supervisor_settings import Limits
+from firmware.supervisor import Supervisor
 from hal.ports import SLOTS, Validity
 from tools.data.sources import load_mission, load_vehicle
 

@@ -7,7 +7,7 @@ reversals of growing size give the dead band: the largest that did not show. In 
 """
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -45,9 +45,6 @@ class SweepResult:
     backlash: float = math.nan
     dead_band: float = math.nan
     noise: float = math.nan  # 1 sigma of the reading at rest
-
-    def as_dict(self) -> dict[str, Any]:
-        return asdict(self)
 
 
 def plan(low: float, high: float, speed: float) -> SweepPlan:

@@ -77,13 +77,7 @@ def run(cases: Path, out: Path, only: tuple[str, ...], jobs: int, extra: tuple[s
 @click.option("--no-closed", is_flag=True, help="Do not fly the corrected models on the held runs.")
 @json_option
 def score(
-    cases: Path,
-    answers: Path,
-    diagnoses: Path,
-    manifest: Path | None,
-    partial: bool,
-    no_closed: bool,
-    as_json: bool,
+    cases: Path, answers: Path, diagnoses: Path, manifest: Path | None, partial: bool, no_closed: bool, as_json: bool
 ) -> None:
     """Open the sealed answers, check them against the manifest, and score the diagnoses (docs/CHALLENGE.md)."""
     from tools.data.errors import InputError, need

@@ -38,10 +38,10 @@ def check(
     """
     if live or compile_ or acknowledge:
         _stand_by(live, compile_, acknowledge, state, as_json)
-    from firmware.control.k2_margin import K2Margin
     from firmware.core.jit import CACHE_DIR
-    from firmware.model.strict import ConfigError
+    from firmware.model.k2_margin import K2Margin
     from hal.ports import BoardError
+    from hal.strict import ConfigError
     from tools.data.errors import InputError
     from tools.data.sources import load_mission, load_vehicle
     from tools.flight.compose import build_flight, load_board_file

@@ -62,7 +62,7 @@ def progress(label: str, total: int, *, bar: bool = True) -> Iterator[Callable[[
 
 def report_errors(command: click.Command) -> int:
     """Run the command line; turn what a user can cause into one line and exit code 2."""
-    from firmware.model.strict import ConfigError
+    from hal.strict import ConfigError
 
     try:
         command(standalone_mode=False)

@@ -64,8 +64,8 @@ def fly(
     terminal, a second Ctrl-C under water wants a third, and a flight that broke off is never resumed: the next start
     only brings the vehicle up. Exit code 1: the flight did not complete.
     """
-    from firmware.core.control.control_layout import EST_DEPTH
-    from firmware.core.supervision.supervisor_layout import RESTARTED
+    from firmware.core.layouts.control_layout import EST_DEPTH
+    from firmware.core.layouts.supervisor_layout import RESTARTED
     from hal.ports import BoardError
     from hal.recorder.recorder import NullRecorder, Recorder
     from hal.state_file import Phase
@@ -195,7 +195,7 @@ class Wishes:
 
 def faults_noticed(supervisor) -> list[dict]:
     """Rows of the fault table that asked for something: when first, and for what at most."""
-    from firmware.supervisor.table import FAULTS
+    from firmware.faults import FAULTS
 
     return [
         {"number": row, "name": FAULTS[row], "noticed_s": at, "reaction": supervisor.worst(row).name}
@@ -238,8 +238,8 @@ def check_arming(flight, path, keeper) -> None:
 
 def _run(flight, recorder, realtime, advance, keeper, wishes):
     """Arm, fly, disarm; returns the timing and the flight's length in s."""
-    from firmware.core.control.control_layout import LEG
-    from firmware.core.supervision.supervisor_layout import RECORDER
+    from firmware.core.layouts.control_layout import LEG
+    from firmware.core.layouts.supervisor_layout import RECORDER
     from hal.ports import Hardware
     from tools.flight.compose import build_runtime
 

@@ -169,12 +169,7 @@ def _to_case(sources: tuple[Path, ...], out: Path | None, vehicle: str | None) -
     exported = export_case(logs[0], folder, vehicle=vehicle, more=logs[1:])
     states = [line for log in logs if not log.whole for line in _parts(log) or [_state(log)]]
     notes = [*states, *exported.notes]
-    return {
-        "case": str(folder),
-        "files": [str(path) for path in exported.files],
-        "rows": exported.rows,
-        "notes": notes,
-    }
+    return {"case": str(folder), "files": [str(path) for path in exported.files], "rows": exported.rows, "notes": notes}
 
 
 def _case_beside(source: Path) -> Path:

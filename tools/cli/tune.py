@@ -8,7 +8,7 @@ import click
 from tools.cli.common import json_option, print_json, progress
 
 if TYPE_CHECKING:
-    from firmware.control.gains import Control
+    from firmware.model.gains import Control
     from tools.study.tuning.rule import Row
 
 BUDGET = 180  # candidates a loop
@@ -30,7 +30,7 @@ def tune(vehicle: str, method: str, seed: int, budget: int, as_json: bool) -> No
     from tools.data.errors import need
 
     need("analysis")
-    from firmware.model.strict import decode
+    from hal.strict import decode
     from sim_backend.board import SimBoardFile
     from tools.data.sources import load_vehicle
     from tools.flight.compose import load_board_file

@@ -1,7 +1,7 @@
 """The likelihood gained by inflating the noise of one link of the chain.
 
 A probe inflates the noise of one link (an actuator's motion, a force or moment along one axis, the water, a sensor) so
-that the filter no longer believes the model there; the likelihood it gains says how much of the misfit enters at that
+that the filter gives the model no weight there; the likelihood it gains says how much of the misfit enters at that
 link, whatever its cause. Two probes are effects of the catalogue by themselves: turbulence, a disturbance stronger on
 every axis, and waves, water that moves the vehicle without turning it.
 """

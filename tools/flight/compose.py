@@ -8,19 +8,19 @@ from typing import Annotated, Any
 import msgspec
 
 from firmware.autopilot import Autopilot, configuration
-from firmware.control.gains import Control
-from firmware.control.k2_margin import K2Margin, k2_margins
 from firmware.core.vehicle.seawater import water_density
+from firmware.faults import Reaction
 from firmware.guidance.mission import Mission
-from firmware.model.strict import ConfigError
+from firmware.model.gains import Control
+from firmware.model.k2_margin import K2Margin, k2_margins
 from firmware.model.vehicle import Vehicle
 from firmware.runtime import Runtime
-from firmware.supervisor.supervisor import Supervisor
-from firmware.supervisor.table import Reaction
+from firmware.supervisor import Supervisor
 from firmware.telemetry import TICK
 from hal.board import BoardRequest, board_builder, board_kinds
 from hal.ports import Board, BoardError, Hardware
 from hal.recorder.schema import DEBUG, ERROR, FATAL, INFO, WARN
+from hal.strict import ConfigError
 from tools.data.errors import InputError
 from tools.data.sources import load_mission, load_vehicle, read_text
 
@@ -71,7 +71,7 @@ class Flight:
 
 def load_board_file(wanted: str) -> BoardFile:
     """A board by shipped name ("sim") or path."""
-    from firmware.model.strict import decode
+    from hal.strict import decode
 
     folders = [files("sim_backend").joinpath("boards"), files("hal").joinpath("boards")]
     shipped = [file for folder in folders if (file := folder.joinpath(f"{wanted}.toml")).is_file()]

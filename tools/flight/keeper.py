@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from firmware.core.supervision.supervisor_layout import RECORDER
+from firmware.core.layouts.supervisor_layout import RECORDER
 from hal import heartbeat as hb
 from hal.devices import DeviceBoard
 from hal.heartbeat import Guard, Heartbeat, Held, Status
@@ -161,7 +161,7 @@ class Keeper:
 
     # --- parts ------------------------------------------------------------------------------------------------------
     def _tell_flight(self, pulse: Heartbeat, timing: Any) -> None:
-        from firmware.core.control import control_layout as ctl
+        from firmware.core.layouts import control_layout as ctl
 
         words, values, autopilot = pulse.words, pulse.values, self._flight.autopilot
         words[hb.W_MISSED], words[hb.W_WORST_NS] = timing.missed, int(1e9 * timing.worst_s)

@@ -11,7 +11,6 @@ from firmware.autopilot import MODES
 from hal import heartbeat as hb
 from hal.heartbeat import Guard, Heartbeat, Status
 from hal.recorder.condition import Level
-from hal.state_file import StateFile
 from tools.data.errors import InputError
 
 PERIOD_S = 1.0
@@ -118,10 +117,3 @@ def show(folder: Path) -> None:
                 table.add_row(name, text, style=style)
             live.update(table)
             time.sleep(PERIOD_S)
-
-
-def state_line(folder: Path) -> str:
-    """What the state file says, in words."""
-    from tools.flight.keeper import told
-
-    return told(StateFile(folder).read())

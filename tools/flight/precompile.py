@@ -44,12 +44,6 @@ def _stamp() -> Path | None:
     return None if jit.CACHE_DIR is None else jit.CACHE_DIR / f"flight-numba-{numba_version}"
 
 
-def is_compiled() -> bool:
-    """Whether a flight finds all its kernels compiled."""
-    stamp = _stamp()
-    return stamp is None or stamp.exists()
-
-
 def ensure_compiled(say: Callable[[str], None], progress: Progress) -> None:
     """Compile what a flight needs unless it is there, with a word and a bar; once, however many ask at once."""
     stamp = _stamp()
@@ -111,7 +105,7 @@ def _fly_a_moment(controller: str, effects: dict[str, dict[str, float]]) -> None
     import msgspec
 
     from firmware.autopilot import Autopilot, configuration
-    from firmware.control.gains import Control
+    from firmware.model.gains import Control
     from hal.recorder.recorder import NullRecorder
     from tools.flight.compose import build_flight, build_runtime, record_specs
 

@@ -47,12 +47,6 @@ class Kinematics:
     sound: np.ndarray
 
 
-def bandwidth(rate: float) -> float:
-    """Half-power bandwidth of the smoother at a sample rate, Hz."""
-    half = _width(rate) // 2
-    return float(4.0 / (3.2 * half - 4.6) * rate / 2.0)
-
-
 def _width(rate: float) -> int:
     return max(2 * round(0.5 * SMOOTH * rate) + 1, 7)
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from firmware.core.maths.rotations import quaternion_from_euler
 from firmware.core.vehicle import layout
-from firmware.estimation.settings import parameter_sigma
+from firmware.model.estimator_settings import parameter_sigma
 from firmware.model.vehicle import COEFFICIENTS, SensorTable, Vehicle
 from sim_backend.core import layout as wl
 from sim_backend.core.effects import effect_layout as ef

@@ -18,7 +18,7 @@ from tools.inference.model import Model
 from tools.inference.problem import Problem, problem_of
 
 LEVELS = 0.0  # in a schedule: the noise's levels are estimated
-# The filter is told of so many times the disturbance, one step at each: less and less as the model comes closer.
+# Times the disturbance in the filter's process noise, one step at each: less and less as the model comes closer.
 SCHEDULE = (100.0, 10.0, 3.0, 1.0, LEVELS)
 FROM_START = (10.0, 1.0, LEVELS)  # where the accelerations have given first values
 UNSEEN = (100.0, 30.0, LEVELS, 10.0, LEVELS, 3.0, 1.0, LEVELS, 1.0, 1.0, LEVELS, 1.0, 1.0)  # without motion capture
@@ -103,7 +103,7 @@ def level(case: Case, first: First) -> noise.Levels:
 
 
 def settle(case: Case, model: Model, runs: list[Run], begin: np.ndarray | None) -> First:
-    """First values from these runs, the filter told to doubt the model less and less; names runs that do not belong."""
+    """First values from these runs, the filter's process noise less and less; names runs that do not belong."""
     problem = problem_of(case, model, runs)
     free = parameters(problem)
     first = First(problem, free, np.zeros(len(free.free)), noise.named(problem), [])

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from sim_backend.core.effects import effect_layout as ef
-from tools.identify.parameters import FRAME, Parameters
+from tools.identify.parameters import Parameters
 from tools.inference.problem import Gains, Problem
 
 NUDGE = 0.02  # of a prior's sigma, for columns
@@ -63,7 +63,6 @@ class Flights:
     def __init__(self, problem: Problem, free: Parameters):
         self.problem, self.free = problem, free
         self.low = np.array([f.low for f in free.free])
-        self.framed = np.array([f.vector == FRAME for f in free.free])
 
     def filter(self, values: np.ndarray, roughness: float = 1.0, problem: Problem | None = None) -> Gains:
         """The filter of the model at `values`."""

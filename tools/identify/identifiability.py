@@ -1,4 +1,4 @@
-"""What these runs cannot tell: combinations of parameters as wide as they were believed, and what would help."""
+"""Unidentifiable directions: combinations of parameters as wide as their prior, and what would help."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -8,7 +8,7 @@ import numpy as np
 from firmware.model.vehicle import COEFFICIENTS
 from tools.identify.parameters import Parameters
 
-WIDE = 0.5  # of the prior's sigma: a combination that stays wider is not told by these runs
+WIDE = 0.5  # of the prior's sigma: a combination that stays wider is unidentifiable
 LOADING = 0.3  # of a combination, for a parameter to be named in it
 WORDS = {
     "K_D0": "drag at no angle", "K_D": "drag growing with the angle of attack", "K_L0": "lift at no angle",
@@ -32,7 +32,7 @@ HELP = {
 
 @dataclass(frozen=True)
 class Unidentifiable:
-    """A combination that is not told: its width over the prior's, its parameters with their shares, what would help."""
+    """An unidentifiable combination: its width over the prior's, its parameters with their shares, what would help."""
 
     width: float
     parts: tuple[tuple[str, float], ...]
@@ -43,7 +43,7 @@ class Unidentifiable:
 
     def sentence(self) -> str:
         names = " with ".join(f"{name} ({share:+.2f})" for name, share in self.parts)
-        return f"{names}: stays at {100 * self.width:.0f} % of what was believed before. Would help: {self.help}."
+        return f"{names}: stays at {100 * self.width:.0f} % of its prior width. Would help: {self.help}."
 
 
 def looked_for(free: Parameters) -> list[int]:
@@ -70,7 +70,7 @@ def unidentifiable_directions(free: Parameters, draws: np.ndarray) -> list[Unide
 
 
 def sentences(free: Parameters, draws: np.ndarray) -> list[str]:
-    """In plain words, coefficient by coefficient: what the runs tell and what not."""
+    """In plain words, coefficient by coefficient: what the runs identify and what not."""
     spread = draws.std(axis=0)
     known = [n for n in looked_for(free) if spread[n] < WIDE]
     unknown = [n for n in looked_for(free) if spread[n] >= WIDE]
@@ -78,11 +78,9 @@ def sentences(free: Parameters, draws: np.ndarray) -> list[str]:
     def words(which: list[int]) -> str:
         return ", ".join(f"{WORDS[free.names[n]]} ({free.names[n]})" for n in which)
 
-    told = [f"These runs tell: {words(known)}."] if known else []
+    found = [f"These runs identify: {words(known)}."] if known else []
     if unknown:
-        told.append(
-            f"They do not tell: {words(unknown)}; what is printed for these is mostly what was believed before."
-        )
+        found.append(f"They do not identify: {words(unknown)}; what is printed for these is mostly the prior.")
     elif len(known) >= len(COEFFICIENTS):
-        told.append("No coefficient is left to belief.")
-    return told
+        found.append("No coefficient is left to its prior.")
+    return found

@@ -1,4 +1,4 @@
-"""What is free in an identification, and what was believed of it before: priors out of the vehicle file.
+"""What is free in an identification, and its priors, out of the vehicle file.
 
 The twelve coefficients of equation (4) are what is looked for. Beside them everything is free that the recordings
 could mistake for them: weighed and estimated masses, trim, constant errors of the sensors, and how the capture's body

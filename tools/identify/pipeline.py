@@ -104,7 +104,7 @@ class Identified:
             "spikes_removed": self.spikes,
             "seed": self.chains.seed,
             "notes": self.notes,
-            "not_told": [one.plain() for one in unidentifiable_directions(self.free, self.chains.flat)],
+            "unidentifiable": [one.plain() for one in unidentifiable_directions(self.free, self.chains.flat)],
         }
         if self.levels is not None:
             levels = zip(self.levels.names, self.levels.log, self.levels.sd, strict=True)

@@ -15,7 +15,6 @@ WIDEST = 60.0  # m; no capture sees farther
 SLOW = 0.08  # m/s, below which the way a hull moves says nothing about its axes
 FROZEN = 0.5  # s for which a pose may stand still to the last digit
 AHEAD = 0.6  # of the motion's energy, along the hull, at least; the slowest of sound glides had 0.76
-AGREE = 0.15  # rad or m: onboard and capture, a constant apart
 EARLIEST = 1.0  # s that the two clocks may be apart
 FULL = 0.2  # of a run's rows with a whole pose, at least
 

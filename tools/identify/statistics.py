@@ -6,7 +6,6 @@ from itertools import pairwise
 import numpy as np
 
 LEVEL_WIDTH = 0.5  # prior 1 sigma of the logarithm of what is left of a noise level
-MOST_HEAT = 25.0
 
 
 @dataclass

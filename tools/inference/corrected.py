@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 
 from firmware.core.vehicle import layout
-from firmware.model.strict import ConfigError, Table, decode
+from hal.strict import ConfigError, Table, decode
 from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.base import EffectError
 from sim_backend.core.effects.catalogue import catalogue, check_values

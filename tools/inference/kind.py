@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from firmware.core.estimation import estimator_layout as kf
+from firmware.core.layouts import estimator_layout as kf
 from firmware.core.maths.rotations import quaternion_from_euler
 from firmware.core.vehicle.layout import X_BALLAST, X_DOWN, X_EAST, X_NORTH, X_NU, X_QUAT, X_SLIDER
-from firmware.estimation.settings import UNSEEN_SERVO_WALK
+from firmware.model.estimator_settings import UNSEEN_SERVO_WALK
 from sim_backend.core.effects import effect_layout as ef
 from tools.data.runs import columns as names
 from tools.inference.channels import ROUGHIE_MEASURES, Measures

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from firmware.estimation.settings import parameter_sigma
+from firmware.model.estimator_settings import parameter_sigma
 from firmware.model.vehicle import Vehicle
 from tools.data.runs.case import Case
 

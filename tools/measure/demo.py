@@ -15,20 +15,14 @@ from tools.study.challenge.seal import ARCHIVE, open_answers
 OUT = Path("out/demo")
 CASE = "case000"
 
-STEPS: tuple[tuple[str, tuple[str, ...]], ...] = (
-    (
-        "Flights of a vehicle with one effect that its file does not know; which one is sealed",
-        ("gap challenge make --out blind --seed 3 --single 1 --none 0 --pairs 0 --unknown 0",),
-    ),
-    (
-        "The gap: root mean square errors of the nominal model, in tolerances",
-        (f"gap measure blind/cases/{CASE} --report gap.html",),
-    ),
-    (
-        "The diagnosis: where the model is wrong, which effect causes it, how far the gap shrinks",
-        (f"gap diagnose blind/cases/{CASE} --out diagnosis",),
-    ),
-)
+STEPS = (  # what is done, and the command
+    ("Flights of a vehicle with one effect that its file does not know; which one is sealed",
+     "gap challenge make --out blind --seed 3 --single 1 --none 0 --pairs 0 --unknown 0"),
+    ("The gap: root mean square errors of the nominal model, in tolerances",
+     f"gap measure blind/cases/{CASE} --report gap.html"),
+    ("The diagnosis: where the model is wrong, which effect causes it, how far the gap shrinks",
+     f"gap diagnose blind/cases/{CASE} --out diagnosis"),
+)  # fmt: skip
 
 
 def main() -> int:
@@ -36,13 +30,11 @@ def main() -> int:
     shutil.rmtree(OUT, ignore_errors=True)
     OUT.mkdir(parents=True)
     begin = time.monotonic()
-    for number, (title, commands) in enumerate(STEPS, start=1):
-        print(f"\n{number}. {title}", flush=True)
-        for command in commands:
-            print(f"   $ glider {command}", flush=True)
-            done = subprocess.run([sys.executable, "-m", "tools.cli.main", *command.split()], cwd=OUT)
-            if done.returncode:
-                return done.returncode
+    for number, (title, command) in enumerate(STEPS, start=1):
+        print(f"\n{number}. {title}\n   $ glider {command}", flush=True)
+        done = subprocess.run([sys.executable, "-m", "tools.cli.main", *command.split()], cwd=OUT)
+        if done.returncode:
+            return done.returncode
     hidden = open_answers(OUT / "blind" / ARCHIVE).cases[CASE]["labels"]
     print(f"\nThe sealed answer: {', '.join(hidden)}. The report: {OUT / 'diagnosis' / 'report.html'} (opens offline)")
     print(f"{time.monotonic() - begin:.0f} s")

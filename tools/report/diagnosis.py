@@ -9,8 +9,8 @@ from tools.diagnose.record import Curves, Panel, Picture, Record, number, read_r
 from tools.inference.channels import ROUGHIE_MEASURES
 from tools.report import words
 from tools.report.chain_picture import chain_svg
-from tools.report.charts import Chart, Line, svg
-from tools.report.lines import bands, broken, near, unwrapped
+from tools.report.charts import Chart, svg
+from tools.report.lines import bands, compared, plan_chart
 from tools.report.page import render
 
 REPORT = "report.html"
@@ -96,17 +96,11 @@ def _charts(run: Picture, curves: Curves) -> list[dict[str, Any]]:
     drawn = []
     for channel in (c for c in ROUGHIE_MEASURES.channels if c.name in run.channels and c.name in DRAWN):
         if channel.joint:
-            north, east = channel.columns
-            lines = [Line(table[:, east], table[:, north], "measured")]
-            lines += [broken(Y[:, east], Y[:, north], listed, style) for style, Y in said.items()]
-            chart, least = Chart("plan, north up, m", "east", lines, square=True), 1.0
+            chart, least = plan_chart(table, said, channel.columns, listed), 1.0
         else:
             column, scale = channel.columns[0], channel.scale
-            seen = unwrapped(table[:, column]) if channel.wrapped else table[:, column]
-            lines = [Line(t, seen * scale, "measured")]
-            for style, Y in said.items():
-                values = near(t, seen, Y[:, column]) if channel.wrapped else Y[:, column]
-                lines.append(broken(t, values * scale, listed, style))
+            columns = {style: Y[:, column] for style, Y in said.items()}
+            lines = compared(t, table[:, column], columns, listed, scale, channel.wrapped)
             chart = Chart(f"{channel.name}, {channel.unit}", "s", lines, bands(t, listed), down=channel.name == "depth")
             least = 4.0 * channel.tolerance * scale
         before, after = (words.number(number(gaps.get(channel.name))) for gaps in (run.before, run.after))

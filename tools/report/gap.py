@@ -8,8 +8,8 @@ import numpy as np
 
 from tools.gap.assess import CaseGap
 from tools.inference.channels import Channel
-from tools.report.charts import Chart, Line, svg
-from tools.report.lines import bands, broken, near, unwrapped
+from tools.report.charts import Chart, svg
+from tools.report.lines import bands, compared, plan_chart
 from tools.report.page import render
 
 MOST_RUNS = 12  # with pictures; of a longer case those with the largest gaps
@@ -35,22 +35,13 @@ def _charts(found: CaseGap, n: int) -> list[dict[str, Any]]:
             continue
         for k, column in enumerate(channel.columns):
             title = f"{RATE_NAMES[k] if channel.name == 'rates' else channel.name}, {channel.unit}"
-            seen, said = table[:, column], Y[:, column]
-            if channel.name == "yaw":
-                seen = unwrapped(seen)
-                said = near(t, seen, said)
-            lines = [
-                Line(t, seen * channel.scale, "measured"),
-                broken(t, said * channel.scale, listed, "predicted"),
-            ]
+            said = {"predicted": Y[:, column]}
+            lines = compared(t, table[:, column], said, listed, channel.scale, channel.wrapped)
             chart = Chart(title, "s", lines, bands(t, listed), down=channel.name == "depth")
             add(channel, chart, 4.0 * channel.tolerance * channel.scale)
     for channel in found.measures.channels_of(run):
         if channel.joint:
-            north, east = channel.columns
-            lines = [Line(table[:, east], table[:, north], "measured")]
-            lines.append(broken(Y[:, east], Y[:, north], listed, "predicted"))
-            add(channel, Chart("plan, north up, m", "east", lines, square=True), 1.0)
+            add(channel, plan_chart(table, {"predicted": Y}, channel.columns, listed), 1.0)
     return drawn
 
 

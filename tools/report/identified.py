@@ -13,7 +13,7 @@ from tools.identify.levels import SENSORS, group_of_reading
 from tools.identify.pipeline import Identified
 from tools.inference.channels import ROUGHIE_MEASURES
 from tools.report.charts import Chart, Line, svg
-from tools.report.lines import broken, near, unwrapped
+from tools.report.lines import compared
 from tools.report.page import render
 
 INK, TRUTH, SOFT = "#1d3f72", "#d9480f", "#8a94a3"
@@ -135,14 +135,8 @@ def flights(found: Identified) -> list[dict[str, Any]]:
             title = f"{channel.name}, {channel.unit}"
             if not np.isfinite(table[:, column]).any():
                 continue
-            seen, said = table[:, column], [held.nominal[n][:, column], held.identified[n][:, column]]
-            if not down:
-                seen = unwrapped(seen)
-                said = [near(run.t, seen, one) for one in said]
-            lines = [
-                Line(run.t, seen * scale, "measured"), broken(run.t, said[0] * scale, listed, "nominal"),
-                broken(run.t, said[1] * scale, listed, "corrected"),
-            ]  # fmt: skip
+            said = {"nominal": held.nominal[n][:, column], "corrected": held.identified[n][:, column]}
+            lines = compared(run.t, table[:, column], said, listed, scale, wraps=not down)
             charts.append({"title": title, "svg": svg(Chart(title, "s", lines, down=down), 0.05)})
         shown.append(
             {"name": run.name, "before": held.before[n].total, "after": held.after[n].total, "charts": charts}
@@ -150,7 +144,7 @@ def flights(found: Identified) -> list[dict[str, Any]]:
     return shown
 
 
-def report_html(found: Identified, truth: dict[str, float] | None = None) -> str:
+def report_html(found: Identified) -> str:
     """The page's text."""
     held = None if found.held is None else found.held.plain()
     context = {
@@ -161,7 +155,7 @@ def report_html(found: Identified, truth: dict[str, float] | None = None) -> str
         "told": sentences(found.free, found.chains.flat),
         "blind": [one.sentence() for one in unidentifiable_directions(found.free, found.chains.flat)],
         "left_out": [str(one) for one in found.left_out], "spikes": found.spikes, "notes": found.notes,
-        "marginals": png(marginals(found, truth)), "corner": png(corner(found)), "truth": truth is not None,
+        "marginals": png(marginals(found)), "corner": png(corner(found)),
         "levels": [] if found.levels is None else [
             {"name": name.replace("_", " "), "factor": float(np.exp(log))}
             for name, log in zip(found.levels.names, found.levels.log, strict=True)
@@ -174,6 +168,6 @@ def report_html(found: Identified, truth: dict[str, float] | None = None) -> str
     return render("identified.html", context)
 
 
-def write_report(path: Path, found: Identified, truth: dict[str, float] | None = None) -> None:
+def write_report(path: Path, found: Identified) -> None:
     """Write the page to a file."""
-    path.write_text(report_html(found, truth), encoding="utf-8")
+    path.write_text(report_html(found), encoding="utf-8")

@@ -2,28 +2,42 @@
 
 import numpy as np
 
+from firmware.core.maths.rotations import wrap
 from tools.inference.windows import Window
-from tools.report.charts import Band, Line
-
-
-def unwrapped(seen: np.ndarray) -> np.ndarray:
-    """Measured angles (rows,) in rad without jumps of a turn; NaN stays."""
-    seen, valid = seen.copy(), np.isfinite(seen)
-    seen[valid] = np.unwrap(seen[valid])
-    return seen
-
-
-def near(t: np.ndarray, seen: np.ndarray, said: np.ndarray) -> np.ndarray:
-    """Predicted angles (rows,) brought to the turn of the measured ones (already unwrapped) next to them."""
-    valid = np.isfinite(seen)
-    beside = np.interp(t, t[valid], seen[valid]) if valid.any() else np.zeros_like(t)
-    return beside + (said - beside + np.pi) % (2.0 * np.pi) - np.pi
+from tools.report.charts import Band, Chart, Line
 
 
 def broken(x: np.ndarray, y: np.ndarray, listed: list[Window], style: str) -> Line:
     """A predicted line, which starts anew with each window."""
     begins = [window.first for window in listed[1:]]
     return Line(np.insert(x, begins, x[begins]), np.insert(y, begins, np.nan), style)
+
+
+def compared(
+    t: np.ndarray, seen: np.ndarray, said: dict[str, np.ndarray], listed: list[Window], scale: float, wraps: bool
+) -> list[Line]:
+    """Lines of a measured column (rows,) and of predictions of it by style, times `scale`.
+
+    wraps: angles in rad; the measured ones run on without jumps of a turn, the predicted ones stand by those next to
+    them. NaN stays.
+    """
+    if wraps:
+        seen, valid = seen.copy(), np.isfinite(seen)
+        seen[valid] = np.unwrap(seen[valid])
+        beside = np.interp(t, t[valid], seen[valid]) if valid.any() else np.zeros_like(t)
+        said = {style: beside + wrap(values - beside) for style, values in said.items()}
+    return [
+        Line(t, seen * scale, "measured"),
+        *(broken(t, values * scale, listed, style) for style, values in said.items()),
+    ]
+
+
+def plan_chart(table: np.ndarray, said: dict[str, np.ndarray], columns: tuple, listed: list[Window]) -> Chart:
+    """The way over ground, measured (rows, columns) and predicted by style; columns: those of north and east."""
+    north, east = columns
+    lines = [Line(table[:, east], table[:, north], "measured")]
+    lines += [broken(Y[:, east], Y[:, north], listed, style) for style, Y in said.items()]
+    return Chart("plan, north up, m", "east", lines, square=True)
 
 
 def bands(t: np.ndarray, listed: list[Window]) -> list[Band]:

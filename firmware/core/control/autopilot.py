@@ -5,26 +5,16 @@
 
 import math
 
-from firmware.core.control import control_layout as ctl
 from firmware.core.control.controllers import steer
 from firmware.core.control.guidance import follow, sequence
 from firmware.core.control.lyapunov_monitor import forget_lyapunov, monitor
-from firmware.core.estimation.estimator_layout import S_ANGULAR, S_LINEAR
 from firmware.core.estimation.navigation import navigate
 from firmware.core.estimation.sensing import sense, take_as_measured
 from firmware.core.jit import kernel
-from firmware.core.supervision.limits import limited
-from firmware.core.vehicle.layout import (
-    BALLAST_MAX,
-    BALLAST_MIN,
-    BALLAST_RATE,
-    SERVO_MAX,
-    SERVO_MIN,
-    SERVO_RATE,
-    SLIDER_MAX,
-    SLIDER_MIN,
-    SLIDER_RATE,
-)  # fmt: skip
+from firmware.core.layouts import control_layout as ctl
+from firmware.core.layouts.estimator_layout import S_ANGULAR, S_LINEAR
+from firmware.core.vehicle import layout
+from firmware.core.vehicle.actuators import actuator_table, limited
 
 
 @kernel
@@ -41,10 +31,10 @@ def score(legs, est, ap):
 @kernel
 def limit_commands(P, ap, servo, slider, ballast, dt, cmd):
     """Limits last: into cmd (3,) what may be sent, and into the memory what was."""
-    cmd[0] = limited(servo, ap[ctl.SENT_SERVO], P[SERVO_MIN], P[SERVO_MAX], P[SERVO_RATE], dt)
-    cmd[1] = limited(slider, ap[ctl.SENT_SLIDER], P[SLIDER_MIN], P[SLIDER_MAX], P[SLIDER_RATE], dt)
-    cmd[2] = limited(ballast, ap[ctl.SENT_BALLAST], P[BALLAST_MIN], P[BALLAST_MAX], P[BALLAST_RATE], dt)
-    ap[ctl.SENT_SERVO], ap[ctl.SENT_SLIDER], ap[ctl.SENT_BALLAST] = cmd[0], cmd[1], cmd[2]
+    wanted = (servo, slider, ballast)
+    for i in range(3):
+        low, high, rate, _ = actuator_table(P, layout.ACTUATORS[i])
+        cmd[i] = ap[ctl.SENT_SERVO + i] = limited(wanted[i], ap[ctl.SENT_SERVO + i], low, high, rate, dt)
 
 
 @kernel
@@ -67,7 +57,7 @@ def tick(P, C, legs, frame, est, ap, nav, cmd, t):
     elif ap[ctl.MODE] == ctl.WAITING:
         servo, slider, ballast = ap[ctl.SENT_SERVO], ap[ctl.SENT_SLIDER], ap[ctl.SENT_BALLAST]
     else:
-        servo, slider, ballast = 0.0, P[SLIDER_MIN], P[BALLAST_MIN]
+        servo, slider, ballast = 0.0, P[layout.SLIDER_MIN], P[layout.BALLAST_MIN]
     monitor(P, C, legs, nav, est, ap, t)
     ap[ctl.WANTED_SERVO], ap[ctl.WANTED_SLIDER], ap[ctl.WANTED_BALLAST] = servo, slider, ballast
     limit_commands(P, ap, servo, slider, ballast, C[ctl.DT], cmd)

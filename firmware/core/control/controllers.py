@@ -7,11 +7,11 @@ PID flies. Whatever is wanted goes through `limited` afterwards (core/autopilot)
 import math
 from dataclasses import dataclass
 
-from firmware.core.control import control_layout as ctl
 from firmware.core.control.control import roll_law
 from firmware.core.control.law import OK
 from firmware.core.control.steering import angle_rates, depth_is_held, law_inputs, pid_inputs, start_pid
 from firmware.core.jit import kernel
+from firmware.core.layouts import control_layout as ctl
 from firmware.core.vehicle.actuators import clip
 from firmware.core.vehicle.layout import BALLAST_MAX, BALLAST_MIN, SLIDER_MAX, SLIDER_MIN
 

@@ -2,9 +2,9 @@
 
 import math
 
-from firmware.core.control import control_layout as ctl
 from firmware.core.control.control import reference_step
 from firmware.core.jit import kernel
+from firmware.core.layouts import control_layout as ctl
 from firmware.core.maths.rotations import wrap_angle
 from firmware.core.vehicle.actuators import clip
 

@@ -122,17 +122,6 @@ def pitch_depth_law(
 
 
 @kernel
-def k2_by_29(error_rate, reference_acc, f, g, k1):
-    """Smallest k2 of (29), |k1 e_d - x_dd_ref + f| / |g|, in the input's unit; infinite where g = 0.
-
-    For the sliding term alone, without (32); f holds the other input's share, f_i + g_ij u_j.
-    """
-    if g == 0.0:
-        return math.inf
-    return abs(k1 * error_rate - reference_acc + f) / abs(g)
-
-
-@kernel
 def k2_to_cover(model_error, disturbance, g, eps):
     """Smallest k2 with which V_dot <= -k3 s^2 outside the layer, (32) at work: (d_f + d) / (|g| sat(|g|/eps)).
 

@@ -13,15 +13,14 @@ either makes of the commands is in the mismatch.
 
 import math
 
-from firmware.core.control import control_layout as ctl
 from firmware.core.control.error_bound import model_error_bound
 from firmware.core.control.input_forms import exact_form
 from firmware.core.control.law import decrease_margin, feedback, k2_to_cover
 from firmware.core.control.law_plus import SHARE
-from firmware.core.control.steering import angle_rates, depth_is_held
-from firmware.core.estimation.estimator_layout import DISTURBANCE_HOLD, N_W, S_ANGULAR, S_LINEAR, W_SCRATCH
+from firmware.core.control.steering import angle_rates, depth_is_held, form_point
 from firmware.core.jit import kernel
-from firmware.core.vehicle.actuators import actuator_rates
+from firmware.core.layouts import control_layout as ctl
+from firmware.core.layouts.estimator_layout import DISTURBANCE_HOLD, N_W, S_ANGULAR, S_LINEAR, W_SCRATCH
 from firmware.core.vehicle.layout import BALLAST_RATE, N_P, SLIDER_RATE
 
 WATCH_EVERY = 0.2  # s; the bound takes longer than the law itself
@@ -54,21 +53,13 @@ def monitor(P, C, legs, nav, est, ap, t):
     if t < ap[ctl.MONITORED] + WATCH_EVERY - 0.5 * C[ctl.DT]:
         return
     ap[ctl.MONITORED] = t
-    cf, sf = math.cos(est[ctl.EST_ROLL]), math.sin(est[ctl.EST_ROLL])
-    ct, st = math.cos(est[ctl.EST_PITCH]), math.sin(est[ctl.EST_PITCH])
-    kx, ky, kz = -st, sf * ct, cf * ct
-    a, b, c = est[ctl.EST_SERVO], est[ctl.EST_SLIDER], est[ctl.EST_BALLAST]
-    da, db, dc = actuator_rates(P, a, b, c, ap[ctl.SENT_SERVO], ap[ctl.SENT_SLIDER], ap[ctl.SENT_BALLAST])
-    u, v, w = est[ctl.EST_U], est[ctl.EST_V], est[ctl.EST_W]
-    p, q, r = est[ctl.EST_P], est[ctl.EST_Q], est[ctl.EST_R]
+    b, c = est[ctl.EST_SLIDER], est[ctl.EST_BALLAST]
     sigma = nav[ctl.NAV_SIGMA : ctl.NAV_SIGMA + N_P]
     scratch = ctl.NAV_WORK + (W_SCRATCH + 4) * N_W  # the estimator's, free between its steps
-    off_t, off_z = model_error_bound(
-        P, sigma, nav[scratch : scratch + N_P], kx, ky, kz, u, v, w, p, q, r, a, b, c, da, db, dc
-    )
+    off_t, off_z = model_error_bound(P, sigma, nav[scratch : scratch + N_P], *form_point(P, est, ap))
     d_t = math.sqrt(nav[ctl.NAV_SETTINGS + S_ANGULAR] / DISTURBANCE_HOLD)
     d_z = math.sqrt(nav[ctl.NAV_SETTINGS + S_LINEAR] / DISTURBANCE_HOLD)
-    f_t, f_z, g_ts, g_tb, g_zs, g_zb = exact_form(P, kx, ky, kz, u, v, w, p, q, r, a, b, c, da, db, dc)
+    f_t, f_z, g_ts, g_tb, g_zs, g_zb = exact_form(P, *form_point(P, est, ap))
     jerk_t = jerk_z = math.inf
     if C[ctl.CONTROLLER] == ctl.LAW_PLUS:
         jerk_t, jerk_z = SHARE * abs(g_ts) * P[SLIDER_RATE], SHARE * abs(g_zb) * P[BALLAST_RATE]

@@ -5,25 +5,14 @@ Both share the estimate, the references and the limits; they differ in nothing e
 
 import math
 
-from firmware.core.control import control_layout as ctl
 from firmware.core.control.control import pid, pitch_feedforward
 from firmware.core.control.input_forms import exact_form, paper_form
 from firmware.core.control.law import pitch_depth_law
 from firmware.core.control.law_plus import SHARE, on_outputs, reach
 from firmware.core.jit import kernel
-from firmware.core.vehicle.actuators import actuator_rates, clip
-from firmware.core.vehicle.layout import (
-    BALLAST_MAX,
-    BALLAST_MIN,
-    BALLAST_RATE,
-    BALLAST_TAU,
-    M_S,
-    SLIDER_MAX,
-    SLIDER_MIN,
-    SLIDER_RATE,
-    SLIDER_TAU,
-    X_B,
-)
+from firmware.core.layouts import control_layout as ctl
+from firmware.core.vehicle import layout
+from firmware.core.vehicle.actuators import actuator_rates, actuator_table, clip
 from firmware.core.vehicle.mass import swung_moment
 
 
@@ -51,15 +40,15 @@ def pid_inputs(P, C, legs, est, ap, pitch_rate):
         ballast, ap[ctl.INT_DEPTH] = pid(
             ap[ctl.REF_DEPTH] - est[ctl.EST_DEPTH], ap[ctl.REF_DEPTH_RATE] - est[ctl.EST_DEPTH_RATE],
             ap[ctl.INT_DEPTH], 0.0,
-            C[ctl.DEPTH_KP], C[ctl.DEPTH_KI], C[ctl.DEPTH_KD], P[BALLAST_MIN], P[BALLAST_MAX], dt,
+            C[ctl.DEPTH_KP], C[ctl.DEPTH_KI], C[ctl.DEPTH_KD], P[layout.BALLAST_MIN], P[layout.BALLAST_MAX], dt,
         )  # fmt: skip
     else:
         ballast = legs[int(ap[ctl.LEG]), ctl.LEG_BALLAST]
     # a mass moved forward lowers the nose: the loop's sign is turned here, not in the gains
     slider, ap[ctl.INT_PITCH] = pid(
         est[ctl.EST_PITCH] - ap[ctl.REF_PITCH], pitch_rate - ap[ctl.REF_PITCH_RATE], ap[ctl.INT_PITCH],
-        slider_feedforward(P, est, ap), C[ctl.PITCH_KP], C[ctl.PITCH_KI], C[ctl.PITCH_KD], P[SLIDER_MIN], P[SLIDER_MAX],
-        dt,
+        slider_feedforward(P, est, ap), C[ctl.PITCH_KP], C[ctl.PITCH_KI], C[ctl.PITCH_KD],
+        P[layout.SLIDER_MIN], P[layout.SLIDER_MAX], dt,
     )  # fmt: skip
     return slider, ballast
 
@@ -68,7 +57,8 @@ def pid_inputs(P, C, legs, est, ap, pitch_rate):
 def slider_feedforward(P, est, ap):
     """Where gravity alone holds the reference pitch, ballast as it is, m."""
     sr = swung_moment(P)
-    return pitch_feedforward(sr, P[M_S], P[X_B], ap[ctl.REF_PITCH], est[ctl.EST_BALLAST], P[SLIDER_MIN], P[SLIDER_MAX])
+    low, high = P[layout.SLIDER_MIN], P[layout.SLIDER_MAX]
+    return pitch_feedforward(sr, P[layout.M_S], P[layout.X_B], ap[ctl.REF_PITCH], est[ctl.EST_BALLAST], low, high)
 
 
 @kernel
@@ -77,33 +67,38 @@ def start_pid(P, C, legs, est, ap, pitch_rate):
     slider = slider_feedforward(P, est, ap)
     slider += C[ctl.PITCH_KP] * (est[ctl.EST_PITCH] - ap[ctl.REF_PITCH])
     slider += C[ctl.PITCH_KD] * (pitch_rate - ap[ctl.REF_PITCH_RATE])
-    ap[ctl.INT_PITCH] = clip(ap[ctl.SENT_SLIDER] - slider, P[SLIDER_MIN], P[SLIDER_MAX])
+    ap[ctl.INT_PITCH] = clip(ap[ctl.SENT_SLIDER] - slider, P[layout.SLIDER_MIN], P[layout.SLIDER_MAX])
     ballast = C[ctl.DEPTH_KP] * (ap[ctl.REF_DEPTH] - est[ctl.EST_DEPTH])
     ballast += C[ctl.DEPTH_KD] * (ap[ctl.REF_DEPTH_RATE] - est[ctl.EST_DEPTH_RATE])
-    ap[ctl.INT_DEPTH] = clip(ap[ctl.SENT_BALLAST] - ballast, P[BALLAST_MIN], P[BALLAST_MAX])
+    ap[ctl.INT_DEPTH] = clip(ap[ctl.SENT_BALLAST] - ballast, P[layout.BALLAST_MIN], P[layout.BALLAST_MAX])
+
+
+@kernel
+def form_point(P, est, ap):
+    """Where a form (input_forms) is wanted: kx, ky, kz, u, v, w, p, q, r, servo, slider, ballast and their rates."""
+    cf, sf = math.cos(est[ctl.EST_ROLL]), math.sin(est[ctl.EST_ROLL])
+    ct, st = math.cos(est[ctl.EST_PITCH]), math.sin(est[ctl.EST_PITCH])
+    a, b, c = est[ctl.EST_SERVO], est[ctl.EST_SLIDER], est[ctl.EST_BALLAST]
+    da, db, dc = actuator_rates(P, a, b, c, ap[ctl.SENT_SERVO], ap[ctl.SENT_SLIDER], ap[ctl.SENT_BALLAST])
+    u, v, w = est[ctl.EST_U], est[ctl.EST_V], est[ctl.EST_W]
+    return -st, sf * ct, cf * ct, u, v, w, est[ctl.EST_P], est[ctl.EST_Q], est[ctl.EST_R], a, b, c, da, db, dc
 
 
 @kernel
 def form_at(P, C, est, ap):
     """The I/O form chosen in C at the estimate: f_theta, f_Z, g_ts, g_tb, g_zs, g_zb, and cos(theta)."""
-    cf, sf = math.cos(est[ctl.EST_ROLL]), math.sin(est[ctl.EST_ROLL])
-    ct, st = math.cos(est[ctl.EST_PITCH]), math.sin(est[ctl.EST_PITCH])
-    kx, ky, kz = -st, sf * ct, cf * ct
-    a, b, c = est[ctl.EST_SERVO], est[ctl.EST_SLIDER], est[ctl.EST_BALLAST]
-    da, db, dc = actuator_rates(P, a, b, c, ap[ctl.SENT_SERVO], ap[ctl.SENT_SLIDER], ap[ctl.SENT_BALLAST])
-    u, v, w = est[ctl.EST_U], est[ctl.EST_V], est[ctl.EST_W]
-    p, q, r = est[ctl.EST_P], est[ctl.EST_Q], est[ctl.EST_R]
+    point = form_point(P, est, ap)
     if C[ctl.FORM] == ctl.PAPER:
-        f_t, f_z, g_ts, g_tb, g_zs, g_zb = paper_form(P, kx, ky, kz, u, v, w, p, q, r, a, b, c, da, db, dc)
+        f_t, f_z, g_ts, g_tb, g_zs, g_zb = paper_form(P, *point)
     else:
-        f_t, f_z, g_ts, g_tb, g_zs, g_zb = exact_form(P, kx, ky, kz, u, v, w, p, q, r, a, b, c, da, db, dc)
+        f_t, f_z, g_ts, g_tb, g_zs, g_zb = exact_form(P, *point)
     share = C[ctl.OBSERVER_SHARE]
     if share > 0.0:
         e = ctl.MODEL_ERROR
-        d_t, d_z = on_outputs(kx, ky, kz, est[e], est[e + 1], est[e + 2], est[e + 3], est[e + 4], est[e + 5])
+        d_t, d_z = on_outputs(*point[:3], est[e], est[e + 1], est[e + 2], est[e + 3], est[e + 4], est[e + 5])
         f_t += share * d_t
         f_z += share * d_z
-    return f_t, f_z, g_ts, g_tb, g_zs, g_zb, ct
+    return f_t, f_z, g_ts, g_tb, g_zs, g_zb, math.cos(est[ctl.EST_PITCH])
 
 
 @kernel
@@ -115,9 +110,9 @@ def within_reach(P, C, est):
     slider, ballast = est[ctl.EST_SLIDER], est[ctl.EST_BALLAST]
     if C[ctl.CONTROLLER] != ctl.LAW_PLUS:
         return slider, slider, ballast, ballast
-    horizon = P[SLIDER_TAU] + C[ctl.DT]
-    s_low, s_high = reach(slider, P[SLIDER_MIN], P[SLIDER_MAX], P[SLIDER_RATE], P[SLIDER_TAU], horizon)
-    b_low, b_high = reach(ballast, P[BALLAST_MIN], P[BALLAST_MAX], P[BALLAST_RATE], P[BALLAST_TAU], horizon)
+    horizon = P[layout.SLIDER_TAU] + C[ctl.DT]
+    s_low, s_high = reach(slider, *actuator_table(P, layout.SLIDER_MIN), horizon)
+    b_low, b_high = reach(ballast, *actuator_table(P, layout.BALLAST_MIN), horizon)
     return s_low, s_high, b_low, b_high
 
 
@@ -127,7 +122,7 @@ def law_inputs(P, C, legs, est, ap, pitch_rate):
     f_t, f_z, g_ts, g_tb, g_zs, g_zb, ct = form_at(P, C, est, ap)
     jerk_t = jerk_z = math.inf
     if C[ctl.CONTROLLER] == ctl.LAW_PLUS:
-        jerk_t, jerk_z = SHARE * abs(g_ts) * P[SLIDER_RATE], SHARE * abs(g_zb) * P[BALLAST_RATE]
+        jerk_t, jerk_z = SHARE * abs(g_ts) * P[layout.SLIDER_RATE], SHARE * abs(g_zb) * P[layout.BALLAST_RATE]
     slider, ballast, ap[ctl.S_PITCH], ap[ctl.S_DEPTH], status = pitch_depth_law(
         f_t, f_z, g_ts, g_tb, g_zs, g_zb, ct,
         est[ctl.EST_PITCH] - ap[ctl.REF_PITCH], pitch_rate - ap[ctl.REF_PITCH_RATE], ap[ctl.REF_PITCH_ACC],

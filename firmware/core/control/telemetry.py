@@ -2,8 +2,8 @@
 
 import math
 
-from firmware.core.control import control_layout as ctl
 from firmware.core.jit import kernel
+from firmware.core.layouts import control_layout as ctl
 from hal.ports import BEACON
 
 # Places in the record; firmware/telemetry.py gives them their names.

@@ -1,7 +1,7 @@
 """The estimator: an extended Kalman filter over the nominal flight, its error in attitude taken as a small rotation.
 
 State x, covariance `cov` (N_E, N_E) of the error state and everything else stand in the caller's arrays as
-firmware/core/estimation/estimator_layout has them; a step allocates nothing.
+firmware/core/layouts/estimator_layout has them; a step allocates nothing.
 
 Prediction: equation (1) with the model's error added, in sub-steps of at most MAX_STEP. The model's error is a first
 order Gauss-Markov process whose variance follows, state by state, from the vehicle file's [uncertainty]: errors of
@@ -29,56 +29,9 @@ up to SPEED_LIMIT, above which the integration at MAX_STEP is not stable. Tested
 
 import math
 
-from firmware.core.estimation.estimator_layout import (
-    BALLAST_DRIVEN,
-    E_ACT,
-    E_ATT,
-    E_ERR,
-    E_GYRO,
-    E_NU,
-    E_WATER,
-    ERROR_ANGULAR,
-    ERROR_LINEAR,
-    FRESH,
-    GYRO_WANDER,
-    HOLD_ERROR,
-    HOLD_LINEARISED,
-    INFLATION_TIME,
-    MAX_STEP,
-    MOVED_RATE,
-    MOVED_SHARE,
-    N_COUPLED,
-    N_E,
-    N_MOVING,
-    N_W,
-    N_WORK_ROWS,
-    N_XE,
-    S_ANGULAR,
-    S_BALLAST,
-    S_BALLAST_BIAS,
-    S_ERROR_TIME,
-    S_LINEAR,
-    S_SERVO,
-    S_SLIDER,
-    S_SLIDER_BIAS,
-    S_SPEED_ERROR,
-    S_WALK,
-    SERVO_DRIVEN,
-    SLIDER_DRIVEN,
-    W_A,
-    W_C,
-    W_DRIVE,
-    W_HELD,
-    W_POINT,
-    W_SCRATCH,
-    W_T,
-    W_TURNED,
-    X_ERR,
-    X_GYRO,
-    X_WATER,
-)
 from firmware.core.estimation.estimator_update import estimator_update
 from firmware.core.jit import kernel
+from firmware.core.layouts import estimator_layout as kf
 from firmware.core.maths.steps import MIDPOINT, end_stage
 from firmware.core.vehicle.actuators import actuator_rates
 from firmware.core.vehicle.flight import add_accelerations, state_derivative
@@ -86,7 +39,7 @@ from firmware.core.vehicle.layout import N_X, SERVO_TAU, X_NU
 from firmware.core.vehicle.linearise import linearise, linearise_motion, model_error
 from firmware.core.vehicle.state import actuators, normalise_attitude
 
-T0, R0 = W_T * N_W, W_TURNED * N_W  # in the flat work: T = F cov, and A's columns
+T0, R0 = kf.W_T * kf.N_W, kf.W_TURNED * kf.N_W  # in the flat work: T = F cov, and A's columns
 
 
 @kernel
@@ -94,11 +47,11 @@ def actuator_speeds(P, x, mode, c_servo, c_slider, c_ballast):
     """Speeds of servo, slider, ballast: c_ is each one's command or, where mode says driven, its speed itself."""
     servo, slider, ballast = actuators(x)
     ds, dl, db = actuator_rates(P, servo, slider, ballast, c_servo, c_slider, c_ballast)
-    if mode & SERVO_DRIVEN:
+    if mode & kf.SERVO_DRIVEN:
         ds = c_servo
-    if mode & SLIDER_DRIVEN:
+    if mode & kf.SLIDER_DRIVEN:
         dl = c_slider
-    if mode & BALLAST_DRIVEN:
+    if mode & kf.BALLAST_DRIVEN:
         db = c_ballast
     return ds, dl, db
 
@@ -107,20 +60,20 @@ def actuator_speeds(P, x, mode, c_servo, c_slider, c_ballast):
 def flight_derivative(P, x, mode, c_servo, c_slider, c_ballast, out):
     """dx/dt into out[0:16], the model's error added to the accelerations, the water carrying the position."""
     ds, dl, db = actuator_speeds(P, x, mode, c_servo, c_slider, c_ballast)
-    state_derivative(P, x, ds, dl, db, 0.0, x[X_WATER], x[X_WATER + 1], 0.0, out)
-    add_accelerations(x, X_ERR, out)
+    state_derivative(P, x, ds, dl, db, 0.0, x[kf.X_WATER], x[kf.X_WATER + 1], 0.0, out)
+    add_accelerations(x, kf.X_ERR, out)
 
 
 @kernel
 def predict_state(P, x, mode, c_servo, c_slider, c_ballast, d, dt, k, total, y):
     """One midpoint step of x in place; the model's error shrinks by d[3:9]. k, total, y are scratch of N_XE."""
-    for i in range(N_XE):
+    for i in range(kf.N_XE):
         y[i] = x[i]
     for stage in range(len(MIDPOINT)):
         flight_derivative(P, y, mode, c_servo, c_slider, c_ballast, k)
         end_stage(MIDPOINT, stage, dt, x, k, total, y, N_X)
     for i in range(6):
-        x[X_ERR + i] *= d[3 + i]
+        x[kf.X_ERR + i] *= d[3 + i]
     normalise_attitude(x)
 
 
@@ -129,46 +82,46 @@ def decays(P, settings, mode, dt, d):
     """Factors by which the errors from E_ACT on shrink over dt, into d (N_E - E_ACT)."""
     for i in range(3):
         d[i] = 1.0 if mode & (1 << i) else math.exp(-dt / P[SERVO_TAU + 4 * i])
-    error = math.exp(-dt / settings[S_ERROR_TIME])
-    for i in range(E_ERR - E_ACT, E_GYRO - E_ACT):
+    error = math.exp(-dt / settings[kf.S_ERROR_TIME])
+    for i in range(kf.E_ERR - kf.E_ACT, kf.E_GYRO - kf.E_ACT):
         d[i] = error
-    for i in range(E_GYRO - E_ACT, N_E - E_ACT):
+    for i in range(kf.E_GYRO - kf.E_ACT, kf.N_E - kf.E_ACT):
         d[i] = 1.0
 
 
 @kernel
 def carry_rows(p, A, dt, m):
     """The rows of F cov that are not trivial, into m from T0 on; p is cov, m work, both flat. F = I + A dt."""
-    for i in range(E_ATT):
+    for i in range(kf.E_ATT):
         a3, a4, a5 = dt * A[i, 3], dt * A[i, 4], dt * A[i, 5]
         a6, a7, a8 = dt * A[i, 6], dt * A[i, 7], dt * A[i, 8]
-        to, row, water = T0 + i * N_W, i * N_E, (E_WATER + min(i, 1)) * N_E
+        to, row, water = T0 + i * kf.N_W, i * kf.N_E, (kf.E_WATER + min(i, 1)) * kf.N_E
         carried = dt if i < 2 else 0.0
-        for j in range(N_E):
+        for j in range(kf.N_E):
             m[to + j] = (
                 p[row + j] + carried * p[water + j]
-                + a3 * p[3 * N_E + j] + a4 * p[4 * N_E + j] + a5 * p[5 * N_E + j]
-                + a6 * p[6 * N_E + j] + a7 * p[7 * N_E + j] + a8 * p[8 * N_E + j]
+                + a3 * p[3 * kf.N_E + j] + a4 * p[4 * kf.N_E + j] + a5 * p[5 * kf.N_E + j]
+                + a6 * p[6 * kf.N_E + j] + a7 * p[7 * kf.N_E + j] + a8 * p[8 * kf.N_E + j]
             )  # fmt: skip
-    for i in range(E_ATT, E_NU):
+    for i in range(kf.E_ATT, kf.E_NU):
         a3, a4, a5 = dt * A[i, 3], dt * A[i, 4], dt * A[i, 5]
-        to, row = T0 + i * N_W, i * N_E
-        for j in range(N_E):
+        to, row = T0 + i * kf.N_W, i * kf.N_E
+        for j in range(kf.N_E):
             m[to + j] = (
-                p[row + j] + dt * p[row + (E_NU + 3 - E_ATT) * N_E + j]
-                + a3 * p[3 * N_E + j] + a4 * p[4 * N_E + j] + a5 * p[5 * N_E + j]
+                p[row + j] + dt * p[row + (kf.E_NU + 3 - kf.E_ATT) * kf.N_E + j]
+                + a3 * p[3 * kf.N_E + j] + a4 * p[4 * kf.N_E + j] + a5 * p[5 * kf.N_E + j]
             )  # fmt: skip
-    for i in range(E_NU, N_MOVING):
+    for i in range(kf.E_NU, kf.N_MOVING):
         a3, a4, a5, a6, a7, a8 = dt * A[i, 3], dt * A[i, 4], dt * A[i, 5], dt * A[i, 6], dt * A[i, 7], dt * A[i, 8]
         a9, aa, ab, ac, ad, ae = dt * A[i, 9], dt * A[i, 10], dt * A[i, 11], dt * A[i, 12], dt * A[i, 13], dt * A[i, 14]
-        to, row = T0 + i * N_W, i * N_E
-        for j in range(N_E):
+        to, row = T0 + i * kf.N_W, i * kf.N_E
+        for j in range(kf.N_E):
             m[to + j] = (
-                p[row + j] + dt * p[row + (E_ERR - E_NU) * N_E + j]
-                + a3 * p[3 * N_E + j] + a4 * p[4 * N_E + j] + a5 * p[5 * N_E + j]
-                + a6 * p[6 * N_E + j] + a7 * p[7 * N_E + j] + a8 * p[8 * N_E + j]
-                + a9 * p[9 * N_E + j] + aa * p[10 * N_E + j] + ab * p[11 * N_E + j]
-                + ac * p[12 * N_E + j] + ad * p[13 * N_E + j] + ae * p[14 * N_E + j]
+                p[row + j] + dt * p[row + (kf.E_ERR - kf.E_NU) * kf.N_E + j]
+                + a3 * p[3 * kf.N_E + j] + a4 * p[4 * kf.N_E + j] + a5 * p[5 * kf.N_E + j]
+                + a6 * p[6 * kf.N_E + j] + a7 * p[7 * kf.N_E + j] + a8 * p[8 * kf.N_E + j]
+                + a9 * p[9 * kf.N_E + j] + aa * p[10 * kf.N_E + j] + ab * p[11 * kf.N_E + j]
+                + ac * p[12 * kf.N_E + j] + ad * p[13 * kf.N_E + j] + ae * p[14 * kf.N_E + j]
             )  # fmt: skip
 
 
@@ -178,82 +131,82 @@ def predict_covariance(cov, A, d, dt, work):
 
     Loops run along rows, over flat arrays and numbers known beforehand, so that they compile to vector code.
     """
-    p, m = cov.reshape(N_E * N_E), work.reshape(N_WORK_ROWS * N_W)
+    p, m = cov.reshape(kf.N_E * kf.N_E), work.reshape(kf.N_WORK_ROWS * kf.N_W)
     carry_rows(p, A, dt, m)
-    for i in range(N_MOVING):
-        to, row = T0 + i * N_W, i * N_E
+    for i in range(kf.N_MOVING):
+        to, row = T0 + i * kf.N_W, i * kf.N_E
         t3, t4, t5, t6, t7, t8 = m[to + 3], m[to + 4], m[to + 5], m[to + 6], m[to + 7], m[to + 8]
         t9, ta, tb, tc, td, te = m[to + 9], m[to + 10], m[to + 11], m[to + 12], m[to + 13], m[to + 14]
-        for j in range(N_MOVING):
+        for j in range(kf.N_MOVING):
             p[row + j] = m[to + j] + dt * (
-                t3 * m[R0 + j] + t4 * m[R0 + N_W + j] + t5 * m[R0 + 2 * N_W + j]
-                + t6 * m[R0 + 3 * N_W + j] + t7 * m[R0 + 4 * N_W + j] + t8 * m[R0 + 5 * N_W + j]
-                + t9 * m[R0 + 6 * N_W + j] + ta * m[R0 + 7 * N_W + j] + tb * m[R0 + 8 * N_W + j]
-                + tc * m[R0 + 9 * N_W + j] + td * m[R0 + 10 * N_W + j] + te * m[R0 + 11 * N_W + j]
+                t3 * m[R0 + j] + t4 * m[R0 + kf.N_W + j] + t5 * m[R0 + 2 * kf.N_W + j]
+                + t6 * m[R0 + 3 * kf.N_W + j] + t7 * m[R0 + 4 * kf.N_W + j] + t8 * m[R0 + 5 * kf.N_W + j]
+                + t9 * m[R0 + 6 * kf.N_W + j] + ta * m[R0 + 7 * kf.N_W + j] + tb * m[R0 + 8 * kf.N_W + j]
+                + tc * m[R0 + 9 * kf.N_W + j] + td * m[R0 + 10 * kf.N_W + j] + te * m[R0 + 11 * kf.N_W + j]
             )  # fmt: skip
-        p[row] += dt * m[to + E_WATER]
-        p[row + 1] += dt * m[to + E_WATER + 1]
+        p[row] += dt * m[to + kf.E_WATER]
+        p[row + 1] += dt * m[to + kf.E_WATER + 1]
         for j in range(6):
-            p[row + E_NU + j] += dt * m[to + E_ERR + j]
+            p[row + kf.E_NU + j] += dt * m[to + kf.E_ERR + j]
         for j in range(i):
-            p[j * N_E + i] = p[row + j]
-        for j in range(E_ACT, N_E):
-            p[row + j] = m[to + j] * d[j - E_ACT]
-            p[j * N_E + i] = p[row + j]
-    for i in range(E_ACT, N_E):
-        for j in range(E_ACT, N_E):
-            p[i * N_E + j] *= d[i - E_ACT] * d[j - E_ACT]
+            p[j * kf.N_E + i] = p[row + j]
+        for j in range(kf.E_ACT, kf.N_E):
+            p[row + j] = m[to + j] * d[j - kf.E_ACT]
+            p[j * kf.N_E + i] = p[row + j]
+    for i in range(kf.E_ACT, kf.N_E):
+        for j in range(kf.E_ACT, kf.N_E):
+            p[i * kf.N_E + j] *= d[i - kf.E_ACT] * d[j - kf.E_ACT]
 
 
 @kernel
 def add_process_noise(settings, x, cov, C, d, ds, dl, db, dt):
     """What dt adds: disturbance on nu, what actuators do beside their model, and the drive of the model's error."""
     for i in range(3):
-        cov[E_NU + i, E_NU + i] += settings[S_LINEAR] * dt
-        cov[E_NU + 3 + i, E_NU + 3 + i] += settings[S_ANGULAR] * dt
-    wrong = settings[S_SPEED_ERROR]
-    cov[E_ACT, E_ACT] += (settings[S_SERVO] + wrong * ds * ds) * dt
-    cov[E_ACT + 1, E_ACT + 1] += (settings[S_SLIDER] + wrong * dl * dl) * dt
-    cov[E_ACT + 2, E_ACT + 2] += (settings[S_BALLAST] + wrong * db * db) * dt
-    for i in range(N_E - E_GYRO):
-        cov[E_GYRO + i, E_GYRO + i] += settings[S_WALK + i] * dt
+        cov[kf.E_NU + i, kf.E_NU + i] += settings[kf.S_LINEAR] * dt
+        cov[kf.E_NU + 3 + i, kf.E_NU + 3 + i] += settings[kf.S_ANGULAR] * dt
+    wrong = settings[kf.S_SPEED_ERROR]
+    cov[kf.E_ACT, kf.E_ACT] += (settings[kf.S_SERVO] + wrong * ds * ds) * dt
+    cov[kf.E_ACT + 1, kf.E_ACT + 1] += (settings[kf.S_SLIDER] + wrong * dl * dl) * dt
+    cov[kf.E_ACT + 2, kf.E_ACT + 2] += (settings[kf.S_BALLAST] + wrong * db * db) * dt
+    for i in range(kf.N_E - kf.E_GYRO):
+        cov[kf.E_GYRO + i, kf.E_GYRO + i] += settings[kf.S_WALK + i] * dt
     for i in range(3):
-        cov[E_GYRO + i, E_GYRO + i] += GYRO_WANDER * x[X_GYRO + i] * x[X_GYRO + i] * dt
+        cov[kf.E_GYRO + i, kf.E_GYRO + i] += kf.GYRO_WANDER * x[kf.X_GYRO + i] * x[kf.X_GYRO + i] * dt
     share = 1.0 - d[3] * d[3]  # keeps the variance at C where C stays
     for i in range(6):
         for j in range(6):
-            cov[E_ERR + i, E_ERR + j] += share * C[i, j]
+            cov[kf.E_ERR + i, kf.E_ERR + j] += share * C[i, j]
 
 
 @kernel
 def error_covariance(P, settings, sigma, x, ds, dl, db, A, C, work):
     """A at x, and C (6, 6), the covariance of the model's error there, from parameters and the draw-wires' biases."""
-    y, g, Pt = work[W_POINT], work[W_SCRATCH + 3], work[W_SCRATCH + 4]
+    y, g, Pt = work[kf.W_POINT], work[kf.W_SCRATCH + 3], work[kf.W_SCRATCH + 4]
     linearise(P, x, ds, dl, db, A, y)
     model_error(P, sigma, ds, dl, db, y, C, Pt, g)
     # a biased draw-wire is a mass that is not where the filter has it
     for i in range(6):
         for j in range(6):
             C[i, j] += (
-                settings[S_SLIDER_BIAS] * A[E_NU + i, E_ACT + 1] * A[E_NU + j, E_ACT + 1]
-                + settings[S_BALLAST_BIAS] * A[E_NU + i, E_ACT + 2] * A[E_NU + j, E_ACT + 2]
+                settings[kf.S_SLIDER_BIAS] * A[kf.E_NU + i, kf.E_ACT + 1] * A[kf.E_NU + j, kf.E_ACT + 1]
+                + settings[kf.S_BALLAST_BIAS] * A[kf.E_NU + i, kf.E_ACT + 2] * A[kf.E_NU + j, kf.E_ACT + 2]
             )
 
 
 @kernel
 def scale_error(x, inflation, C, f, dt, drive):
     """Into drive: C, where the model errs by more than its sigma, inflated; at least the error's own square."""
-    fade = math.exp(-dt / INFLATION_TIME)
+    fade = math.exp(-dt / kf.INFLATION_TIME)
     for n in range(2):
         inflation[n] = 1.0 + (inflation[n] - 1.0) * fade
     for i in range(6):
-        most = ERROR_LINEAR if i < 3 else ERROR_ANGULAR
+        most = kf.ERROR_LINEAR if i < 3 else kf.ERROR_ANGULAR
         f[i] = math.sqrt(max(1.0, min(inflation[i // 3], most * most / max(C[i, i], 1e-12))))
     for i in range(6):
         for j in range(6):
             drive[i, j] = C[i, j] * (f[i] * f[j])
-        most = ERROR_LINEAR if i < 3 else ERROR_ANGULAR
-        error = min(abs(x[X_ERR + i]), most)
+        most = kf.ERROR_LINEAR if i < 3 else kf.ERROR_ANGULAR
+        error = min(abs(x[kf.X_ERR + i]), most)
         drive[i, i] = max(drive[i, i], error * error)
 
 
@@ -265,42 +218,43 @@ def moved(x, y):
         change += (x[X_NU + i] - y[3 + i]) ** 2
         turn += (x[X_NU + 3 + i] - y[6 + i]) ** 2
         speed += y[3 + i] * y[3 + i]
-    return change > MOVED_SHARE * MOVED_SHARE * speed or turn > MOVED_RATE * MOVED_RATE
+    return change > kf.MOVED_SHARE * kf.MOVED_SHARE * speed or turn > kf.MOVED_RATE * kf.MOVED_RATE
 
 
 @kernel
 def linearise_where_due(P, settings, sigma, x, ds, dl, db, dt, work):
     """A at x into work; equation (1) linearised anew, and C, where their time is over or speeds have changed."""
-    A, C, turned = work[W_A : W_A + N_MOVING], work[W_C : W_C + 6], work[W_TURNED : W_TURNED + N_COUPLED - E_ATT]
-    held = work[W_HELD]
-    still = not moved(x, work[W_POINT])
+    A, C = work[kf.W_A : kf.W_A + kf.N_MOVING], work[kf.W_C : kf.W_C + 6]
+    turned = work[kf.W_TURNED : kf.W_TURNED + kf.N_COUPLED - kf.E_ATT]
+    held = work[kf.W_HELD]
+    still = not moved(x, work[kf.W_POINT])
     if still and held[0] >= 0.5 * dt:
-        linearise_motion(x, work[W_POINT], A)
+        linearise_motion(x, work[kf.W_POINT], A)
     elif still and held[1] >= 0.5 * dt:
-        linearise(P, x, ds, dl, db, A, work[W_POINT])
-        held[0] = HOLD_LINEARISED
+        linearise(P, x, ds, dl, db, A, work[kf.W_POINT])
+        held[0] = kf.HOLD_LINEARISED
     else:
         error_covariance(P, settings, sigma, x, ds, dl, db, A, C, work)
-        held[0], held[1] = HOLD_LINEARISED, HOLD_ERROR
+        held[0], held[1] = kf.HOLD_LINEARISED, kf.HOLD_ERROR
     held[0] -= dt
     held[1] -= dt
-    for k in range(N_COUPLED - E_ATT):
-        for i in range(N_MOVING):
-            turned[k, i] = A[i, E_ATT + k]
+    for k in range(kf.N_COUPLED - kf.E_ATT):
+        for i in range(kf.N_MOVING):
+            turned[k, i] = A[i, kf.E_ATT + k]
 
 
 @kernel
 def estimator_predict(P, settings, sigma, x, cov, inflation, mode, c_servo, c_slider, c_ballast, dt, work):
     """Carry x and cov over dt (s) in sub-steps of at most MAX_STEP, actuators as in actuator_speeds."""
-    A, C, drive = work[W_A : W_A + N_MOVING], work[W_C : W_C + 6], work[W_DRIVE : W_DRIVE + 6]
-    k, y, d = work[W_SCRATCH], work[W_SCRATCH + 1], work[W_SCRATCH + 2]
-    scratch = work[W_SCRATCH + 3]
-    steps = max(1, math.ceil(dt / MAX_STEP - 1e-9))
+    A, C, drive = work[kf.W_A : kf.W_A + kf.N_MOVING], work[kf.W_C : kf.W_C + 6], work[kf.W_DRIVE : kf.W_DRIVE + 6]
+    k, y, d = work[kf.W_SCRATCH], work[kf.W_SCRATCH + 1], work[kf.W_SCRATCH + 2]
+    scratch = work[kf.W_SCRATCH + 3]
+    steps = max(1, math.ceil(dt / kf.MAX_STEP - 1e-9))
     h = dt / steps
     for _ in range(steps):
         ds, dl, db = actuator_speeds(P, x, mode, c_servo, c_slider, c_ballast)
-        if mode & FRESH:
-            work[W_HELD, 0], work[W_HELD, 1] = 0.0, 0.0
+        if mode & kf.FRESH:
+            work[kf.W_HELD, 0], work[kf.W_HELD, 1] = 0.0, 0.0
         linearise_where_due(P, settings, sigma, x, ds, dl, db, h, work)
         decays(P, settings, mode, h, d)
         scale_error(x, inflation, C, scratch, h, drive)
@@ -321,14 +275,14 @@ def estimator_step(
 @kernel
 def estimator_start(P, settings, sigma, x, cov, spread, work):
     """The covariance before the first measurement: `spread` (N_E, 1 sigma) on the diagonal, the model's error at x."""
-    A, C = work[W_A : W_A + N_MOVING], work[W_C : W_C + 6]
-    for i in range(N_E):
-        for j in range(N_E):
+    A, C = work[kf.W_A : kf.W_A + kf.N_MOVING], work[kf.W_C : kf.W_C + 6]
+    for i in range(kf.N_E):
+        for j in range(kf.N_E):
             cov[i, j] = 0.0
-    for i in range(N_E):
+    for i in range(kf.N_E):
         cov[i, i] = spread[i] * spread[i]
     error_covariance(P, settings, sigma, x, 0.0, 0.0, 0.0, A, C, work)
-    work[W_HELD, 0], work[W_HELD, 1] = 0.0, 0.0
+    work[kf.W_HELD, 0], work[kf.W_HELD, 1] = 0.0, 0.0
     for i in range(6):
         for j in range(6):
-            cov[E_ERR + i, E_ERR + j] = C[i, j]
+            cov[kf.E_ERR + i, kf.E_ERR + j] = C[i, j]

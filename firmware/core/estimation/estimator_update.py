@@ -2,35 +2,8 @@
 
 import math
 
-from firmware.core.estimation.estimator_layout import (
-    BIAS_OF,
-    COS_PITCH_MIN,
-    E_ACT,
-    E_ATT,
-    E_ERR,
-    E_NU,
-    E_POS,
-    GATE,
-    INFLATION_GROWTH,
-    INFLATION_MAX,
-    LARGEST,
-    N_E,
-    N_Z,
-    RATE_LIMIT,
-    REJECTED_AT_MOST,
-    S_R,
-    SPEED_LIMIT,
-    STOP_MARGIN,
-    W_K,
-    W_SCRATCH,
-    X_ERR,
-    Z_BALLAST,
-    Z_DEPTH,
-    Z_MOCAP_ROLL,
-    Z_R,
-    Z_YAW,
-)
 from firmware.core.jit import kernel
+from firmware.core.layouts import estimator_layout as kf
 from firmware.core.maths.rotations import wrap_angle
 from firmware.core.vehicle.actuators import clip
 from firmware.core.vehicle.layout import SERVO_MAX, SERVO_MIN, X_ACT, X_DOWN, X_NU, X_QUAT
@@ -57,24 +30,24 @@ def update_scalar(cov, taken, n, dx, column, h0, h1, h2, other, innovation, R, r
     """
     v = taken[n]
     bias = 1.0 if other > 0 else 0.0
-    for i in range(N_E):
+    for i in range(kf.N_E):
         v[i] = h0 * cov[column, i] + h1 * cov[column + 1, i] + h2 * cov[column + 2, i] + bias * cov[other, i]
     for k in range(n):
         r = taken[k]
         along = h0 * r[column] + h1 * r[column + 1] + h2 * r[column + 2] + bias * r[other]
-        for i in range(N_E):
+        for i in range(kf.N_E):
             v[i] -= along * r[i]
     seen = h0 * v[column] + h1 * v[column + 1] + h2 * v[column + 2] + bias * v[other]
     left = innovation - (h0 * dx[column] + h1 * dx[column + 1] + h2 * dx[column + 2] + bias * dx[other])
     S = seen + R
     score = left / math.sqrt(S)
-    if abs(score) > GATE:
+    if abs(score) > kf.GATE:
         rejected_for_s += dt
-        if rejected_for_s < REJECTED_AT_MOST or E_NU <= column < E_ACT:  # not so the gyro
+        if rejected_for_s < kf.REJECTED_AT_MOST or kf.E_NU <= column < kf.E_ACT:  # not so the gyro
             return score, rejected_for_s, n
         # the measured quantity may have jumped: cov + grow h h' is positive definite, and hardly moves anything else
         h = h0 * h0 + h1 * h1 + h2 * h2
-        wanted = (left / GATE) ** 2 - R
+        wanted = (left / kf.GATE) ** 2 - R
         grow = (wanted - seen) / (h * h)
         v[column] += grow * h * h0
         v[column + 1] += grow * h * h1
@@ -82,7 +55,7 @@ def update_scalar(cov, taken, n, dx, column, h0, h1, h2, other, innovation, R, r
         widen(cov, column, h0, h1, h2, grow)
         S = wanted + R
     scale = 1.0 / math.sqrt(S)
-    for i in range(N_E):
+    for i in range(kf.N_E):
         v[i] *= scale
         dx[i] += v[i] * (left * scale)
     return score, 0.0, n + 1
@@ -92,16 +65,16 @@ def update_scalar(cov, taken, n, dx, column, h0, h1, h2, other, innovation, R, r
 def subtract_taken(cov, taken, n):
     """cov less r r' for the first n rows r of `taken`, three in one go over cov."""
     for k in range(n, n + 2):
-        for i in range(N_E):
+        for i in range(kf.N_E):
             taken[k, i] = 0.0
     for k in range(0, n, 3):
         r0, r1, r2 = taken[k], taken[k + 1], taken[k + 2]
-        for i in range(N_E):
+        for i in range(kf.N_E):
             a, b, c, row = r0[i], r1[i], r2[i], cov[i]
-            for j in range(N_E):
+            for j in range(kf.N_E):
                 row[j] -= a * r0[j] + b * r1[j] + c * r2[j]
     # rounding may differ between the two sides of the diagonal
-    for i in range(N_E):
+    for i in range(kf.N_E):
         for j in range(i):
             cov[j, i] = cov[i, j]
 
@@ -110,8 +83,8 @@ def subtract_taken(cov, taken, n):
 def inject(P, x, dx):
     """Move x by the error state dx; the attitude by the small rotation q * [1, dtheta / 2]."""
     for i in range(3):
-        x[i] += dx[E_POS + i]
-    a, b, c = 0.5 * dx[E_ATT], 0.5 * dx[E_ATT + 1], 0.5 * dx[E_ATT + 2]
+        x[i] += dx[kf.E_POS + i]
+    a, b, c = 0.5 * dx[kf.E_ATT], 0.5 * dx[kf.E_ATT + 1], 0.5 * dx[kf.E_ATT + 2]
     q0, q1, q2, q3 = quaternion(x)
     x[X_QUAT] = q0 - q1 * a - q2 * b - q3 * c
     x[X_QUAT + 1] = q1 + q0 * a + q2 * c - q3 * b
@@ -119,16 +92,16 @@ def inject(P, x, dx):
     x[X_QUAT + 3] = q3 + q0 * c + q1 * b - q2 * a
     normalise_attitude(x)
     for i in range(6):
-        x[X_NU + i] += dx[E_NU + i]
-    for i in range(E_ERR, N_E):
-        x[X_ERR + i - E_ERR] += dx[i]
+        x[X_NU + i] += dx[kf.E_NU + i]
+    for i in range(kf.E_ERR, kf.N_E):
+        x[kf.X_ERR + i - kf.E_ERR] += dx[i]
     for i in range(3):
-        x[X_NU + i] = clip(x[X_NU + i], -SPEED_LIMIT, SPEED_LIMIT)
-        x[X_NU + 3 + i] = clip(x[X_NU + 3 + i], -RATE_LIMIT, RATE_LIMIT)
+        x[X_NU + i] = clip(x[X_NU + i], -kf.SPEED_LIMIT, kf.SPEED_LIMIT)
+        x[X_NU + 3 + i] = clip(x[X_NU + 3 + i], -kf.RATE_LIMIT, kf.RATE_LIMIT)
         # a draw-wire may read a little beyond the stops, for it has a bias, but no more
         low, high = P[SERVO_MIN + 4 * i], P[SERVO_MAX + 4 * i]
-        margin = 0.0 if i == 0 else STOP_MARGIN * (high - low)
-        x[X_ACT + i] = clip(x[X_ACT + i] + dx[E_ACT + i], low - margin, high + margin)
+        margin = 0.0 if i == 0 else kf.STOP_MARGIN * (high - low)
+        x[X_ACT + i] = clip(x[X_ACT + i] + dx[kf.E_ACT + i], low - margin, high + margin)
 
 
 @kernel
@@ -138,42 +111,42 @@ def estimator_update(P, settings, x, cov, inflation, z, rejected_for_s, scores, 
     dt is the time since the last update; rejected_for_s (N_Z) is kept between calls. scores (N_Z) gets each innovation
     in sigma, NaN where there was no measurement.
     """
-    dx, taken, n = work[W_SCRATCH], work[W_K : W_K + N_Z + 2], 0
-    for i in range(N_E):
+    dx, taken, n = work[kf.W_SCRATCH], work[kf.W_K : kf.W_K + kf.N_Z + 2], 0
+    for i in range(kf.N_E):
         dx[i] = 0.0
     phi, theta, psi = euler_angles(x)
     sf, cf, st, ct = math.sin(phi), math.cos(phi), math.sin(theta), math.cos(theta)
-    for m in range(N_Z):
+    for m in range(kf.N_Z):
         scores[m] = math.nan
-        if not abs(z[m]) < LARGEST:
+        if not abs(z[m]) < kf.LARGEST:
             continue
         axis = m % 3
-        column, h0, h1, h2, other = E_NU + 3 + axis, 1.0, 0.0, 0.0, BIAS_OF[m]
-        if m <= Z_YAW or m >= Z_MOCAP_ROLL:
-            column = E_ATT
+        column, h0, h1, h2, other = kf.E_NU + 3 + axis, 1.0, 0.0, 0.0, kf.BIAS_OF[m]
+        if m <= kf.Z_YAW or m >= kf.Z_MOCAP_ROLL:
+            column = kf.E_ATT
             if axis == 1:
                 h0, h1, h2, innovation = 0.0, cf, -sf, z[m] - theta
-            elif ct < COS_PITCH_MIN:
+            elif ct < kf.COS_PITCH_MIN:
                 continue
             elif axis == 0:
                 h1, h2, innovation = sf * st / ct, cf * st / ct, wrap_angle(z[m] - phi)
             else:
                 h0, h1, h2, innovation = 0.0, sf / ct, cf / ct, wrap_angle(z[m] - psi)
-        elif m <= Z_R:
+        elif m <= kf.Z_R:
             innovation = z[m] - x[X_NU + 3 + axis]
-        elif m == Z_DEPTH:
-            column, innovation = E_POS + 2, z[m] - x[X_DOWN]
-        elif m <= Z_BALLAST:
-            column, innovation = E_ACT + m - Z_DEPTH, z[m] - x[X_ACT + m - Z_DEPTH]
+        elif m == kf.Z_DEPTH:
+            column, innovation = kf.E_POS + 2, z[m] - x[X_DOWN]
+        elif m <= kf.Z_BALLAST:
+            column, innovation = kf.E_ACT + m - kf.Z_DEPTH, z[m] - x[X_ACT + m - kf.Z_DEPTH]
         else:
-            column, innovation = E_POS + axis, z[m] - x[axis]
+            column, innovation = kf.E_POS + axis, z[m] - x[axis]
         if other > 0:
-            innovation -= x[X_ERR + other - E_ERR]
+            innovation -= x[kf.X_ERR + other - kf.E_ERR]
         scores[m], rejected_for_s[m], n = update_scalar(
-            cov, taken, n, dx, column, h0, h1, h2, other, innovation, settings[S_R + m], rejected_for_s[m], dt
+            cov, taken, n, dx, column, h0, h1, h2, other, innovation, settings[kf.S_R + m], rejected_for_s[m], dt
         )
-        if column < E_ACT and abs(scores[m]) > GATE:
-            which = 0 if column < E_ATT else 1
-            inflation[which] = min(inflation[which] * math.exp(INFLATION_GROWTH * dt), INFLATION_MAX)
+        if column < kf.E_ACT and abs(scores[m]) > kf.GATE:
+            which = 0 if column < kf.E_ATT else 1
+            inflation[which] = min(inflation[which] * math.exp(kf.INFLATION_GROWTH * dt), kf.INFLATION_MAX)
     subtract_taken(cov, taken, n)
     inject(P, x, dx)

@@ -6,32 +6,10 @@ that a slow beacon does not drag the depth behind. What is missing, late or refu
 
 import math
 
-from firmware.core.control import control_layout as ctl
 from firmware.core.estimation.estimator import estimator_start, estimator_step
-from firmware.core.estimation.estimator_layout import (
-    COMMANDED,
-    E_ATT,
-    E_NU,
-    N_E,
-    N_S,
-    N_W,
-    N_WORK_ROWS,
-    N_XE,
-    N_Z,
-    S_ANGULAR,
-    S_LINEAR,
-    X_ERR,
-    X_WATER,
-    Z_BALLAST,
-    Z_DEPTH,
-    Z_P,
-    Z_PITCH,
-    Z_R,
-    Z_ROLL,
-    Z_SLIDER,
-    Z_YAW,
-)
 from firmware.core.jit import kernel
+from firmware.core.layouts import control_layout as ctl
+from firmware.core.layouts import estimator_layout as kf
 from firmware.core.maths.rotations import euler_rates, quaternion_from_euler
 from firmware.core.vehicle.layout import N_P, N_X, X_BALLAST, X_DOWN, X_EAST, X_NORTH, X_NU, X_QUAT, X_SLIDER
 from firmware.core.vehicle.state import actuators, euler_angles, rotation
@@ -44,8 +22,8 @@ EULER_LIMIT = 1.4  # rad; beyond it Euler rates mean nothing and samples are tak
 @kernel
 def new_samples(est, x, nav, t):
     """The measurements of this tick into nav's z, NaN where nothing is new, each carried forward over its age."""
-    z = nav[ctl.NAV_Z : ctl.NAV_Z + N_Z]
-    for i in range(N_Z):
+    z = nav[ctl.NAV_Z : ctl.NAV_Z + kf.N_Z]
+    for i in range(kf.N_Z):
         z[i] = math.nan
     if est[ctl.EST_IMU_TIME] > nav[ctl.NAV_USED]:
         age = t - est[ctl.EST_IMU_TIME]
@@ -54,26 +32,26 @@ def new_samples(est, x, nav, t):
         phi_rate, theta_rate, psi_rate = 0.0, 0.0, 0.0
         if abs(theta) < EULER_LIMIT:
             phi_rate, theta_rate, psi_rate = euler_rates(phi, theta, x[X_NU + 3], x[X_NU + 4], x[X_NU + 5])
-        z[Z_ROLL] = est[ctl.NEW_ROLL] + phi_rate * age
-        z[Z_PITCH] = est[ctl.NEW_PITCH] + theta_rate * age
-        z[Z_YAW] = est[ctl.NEW_YAW] + psi_rate * age
+        z[kf.Z_ROLL] = est[ctl.NEW_ROLL] + phi_rate * age
+        z[kf.Z_PITCH] = est[ctl.NEW_PITCH] + theta_rate * age
+        z[kf.Z_YAW] = est[ctl.NEW_YAW] + psi_rate * age
         for i in range(3):
-            z[Z_P + i] = est[ctl.NEW_P + i]
+            z[kf.Z_P + i] = est[ctl.NEW_P + i]
     if est[ctl.EST_BEACON_TIME] > nav[ctl.NAV_USED + 1]:
         nav[ctl.NAV_USED + 1] = est[ctl.EST_BEACON_TIME]
-        z[Z_DEPTH] = est[ctl.NEW_DEPTH] + est[ctl.EST_DEPTH_RATE] * (t - est[ctl.EST_BEACON_TIME])
+        z[kf.Z_DEPTH] = est[ctl.NEW_DEPTH] + est[ctl.EST_DEPTH_RATE] * (t - est[ctl.EST_BEACON_TIME])
     if est[ctl.EST_SLIDER_TIME] > nav[ctl.NAV_USED + 2]:
         nav[ctl.NAV_USED + 2] = est[ctl.EST_SLIDER_TIME]
-        z[Z_SLIDER] = est[ctl.NEW_SLIDER]
+        z[kf.Z_SLIDER] = est[ctl.NEW_SLIDER]
     if est[ctl.EST_PLUNGER_TIME] > nav[ctl.NAV_USED + 3]:
         nav[ctl.NAV_USED + 3] = est[ctl.EST_PLUNGER_TIME]
-        z[Z_BALLAST] = est[ctl.NEW_BALLAST]
+        z[kf.Z_BALLAST] = est[ctl.NEW_BALLAST]
 
 
 @kernel
 def start_filter(P, nav, est, t, x, cov, work):
     """The first state: at rest, attitude and depth as first measured, actuators where the draw-wires say."""
-    for i in range(N_XE):
+    for i in range(kf.N_XE):
         x[i] = 0.0
     x[X_DOWN] = est[ctl.NEW_DEPTH]
     x[X_QUAT], x[X_QUAT + 1], x[X_QUAT + 2], x[X_QUAT + 3] = quaternion_from_euler(
@@ -81,17 +59,17 @@ def start_filter(P, nav, est, t, x, cov, work):
     )
     x[X_SLIDER], x[X_BALLAST] = est[ctl.NEW_SLIDER], est[ctl.NEW_BALLAST]
     nav[ctl.NAV_INFLATION], nav[ctl.NAV_INFLATION + 1] = 1.0, 1.0
-    for i in range(N_Z):
+    for i in range(kf.N_Z):
         nav[ctl.NAV_REJECTED + i] = 0.0
     for i in range(4):
         nav[ctl.NAV_USED + i] = -1.0
-    spread = nav[ctl.NAV_SPREAD : ctl.NAV_SPREAD + N_E]
-    estimator_start(P, nav[ctl.NAV_SETTINGS : ctl.NAV_SETTINGS + N_S], nav[ctl.NAV_SIGMA : ctl.NAV_SIGMA + N_P], x, cov,
-                    spread, work)  # fmt: skip
+    spread = nav[ctl.NAV_SPREAD : ctl.NAV_SPREAD + kf.N_E]
+    settings, sigma = nav[ctl.NAV_SETTINGS : ctl.NAV_SETTINGS + kf.N_S], nav[ctl.NAV_SIGMA : ctl.NAV_SIGMA + N_P]
+    estimator_start(P, settings, sigma, x, cov, spread, work)
     nav[ctl.NAV_RUNNING], nav[ctl.NAV_TIME] = 1.0, t
     nav[ctl.NAV_ROUGHNESS] = 1.0
-    nav[ctl.NAV_CALM] = nav[ctl.NAV_SETTINGS + S_LINEAR]
-    nav[ctl.NAV_CALM + 1] = nav[ctl.NAV_SETTINGS + S_ANGULAR]
+    nav[ctl.NAV_CALM] = nav[ctl.NAV_SETTINGS + kf.S_LINEAR]
+    nav[ctl.NAV_CALM + 1] = nav[ctl.NAV_SETTINGS + kf.S_ANGULAR]
 
 
 @kernel
@@ -112,14 +90,16 @@ def write_state(x, est):
 def write_errors(x, cov, est):
     """What the filter knows beside the state: current, model error, and how sure it is."""
     _, _, _, _, _, _, r31, _, r33 = rotation(x)
-    est[ctl.EST_WATER_N], est[ctl.EST_WATER_E] = x[X_WATER], x[X_WATER + 1]
+    est[ctl.EST_WATER_N], est[ctl.EST_WATER_E] = x[kf.X_WATER], x[kf.X_WATER + 1]
     for i in range(6):
-        est[ctl.MODEL_ERROR + i] = x[X_ERR + i]
+        est[ctl.MODEL_ERROR + i] = x[kf.X_ERR + i]
     est[ctl.SD_DEPTH_RATE] = math.sqrt(
-        r31 * r31 * cov[E_NU, E_NU] + r33 * r33 * cov[E_NU + 2, E_NU + 2] + 2.0 * r31 * r33 * cov[E_NU, E_NU + 2]
+        r31 * r31 * cov[kf.E_NU, kf.E_NU]
+        + r33 * r33 * cov[kf.E_NU + 2, kf.E_NU + 2]
+        + 2.0 * r31 * r33 * cov[kf.E_NU, kf.E_NU + 2]
     )
-    est[ctl.SD_PITCH] = math.sqrt(cov[E_ATT + 1, E_ATT + 1])
-    est[ctl.SD_U] = math.sqrt(cov[E_NU, E_NU])
+    est[ctl.SD_PITCH] = math.sqrt(cov[kf.E_ATT + 1, kf.E_ATT + 1])
+    est[ctl.SD_U] = math.sqrt(cov[kf.E_NU, kf.E_NU])
 
 
 @kernel
@@ -131,7 +111,7 @@ def adapt_process_noise(nav, scores, dt):
     scores' logarithm, so that one wild sample does little, and never below what the vehicle file says.
     """
     total, count = 0.0, 0
-    for i in range(Z_P, Z_R + 1):
+    for i in range(kf.Z_P, kf.Z_R + 1):
         if not math.isnan(scores[i]):
             total += scores[i] * scores[i]
             count += 1
@@ -141,8 +121,8 @@ def adapt_process_noise(nav, scores, dt):
     roughness = nav[ctl.NAV_ROUGHNESS] * math.exp(step * dt / ROUGHNESS_TIME)
     roughness = min(max(roughness, 1.0), ROUGHEST)
     nav[ctl.NAV_ROUGHNESS] = roughness
-    nav[ctl.NAV_SETTINGS + S_LINEAR] = nav[ctl.NAV_CALM] * roughness * roughness
-    nav[ctl.NAV_SETTINGS + S_ANGULAR] = nav[ctl.NAV_CALM + 1] * roughness * roughness
+    nav[ctl.NAV_SETTINGS + kf.S_LINEAR] = nav[ctl.NAV_CALM] * roughness * roughness
+    nav[ctl.NAV_SETTINGS + kf.S_ANGULAR] = nav[ctl.NAV_CALM + 1] * roughness * roughness
 
 
 @kernel
@@ -150,20 +130,20 @@ def navigate(P, C, nav, est, ap, t):
     """One step of the filter at time t (s): the commands sent last, this tick's samples, the estimate into est."""
     if est[ctl.EST_STARTED] == 0.0:
         return
-    x = nav[ctl.NAV_X : ctl.NAV_X + N_XE]
-    cov = nav[ctl.NAV_COV : ctl.NAV_COV + N_E * N_E].reshape(N_E, N_E)
-    work = nav[ctl.NAV_WORK : ctl.NAV_WORK + N_WORK_ROWS * N_W].reshape(N_WORK_ROWS, N_W)
+    x = nav[ctl.NAV_X : ctl.NAV_X + kf.N_XE]
+    cov = nav[ctl.NAV_COV : ctl.NAV_COV + kf.N_E * kf.N_E].reshape(kf.N_E, kf.N_E)
+    work = nav[ctl.NAV_WORK : ctl.NAV_WORK + kf.N_WORK_ROWS * kf.N_W].reshape(kf.N_WORK_ROWS, kf.N_W)
     if nav[ctl.NAV_RUNNING] == 0.0:
         start_filter(P, nav, est, t, x, cov, work)
     new_samples(est, x, nav, t)
     dt = t - nav[ctl.NAV_TIME]
     nav[ctl.NAV_TIME] = t
-    scores = nav[ctl.NAV_SCORES : ctl.NAV_SCORES + N_Z]
+    scores = nav[ctl.NAV_SCORES : ctl.NAV_SCORES + kf.N_Z]
     estimator_step(
-        P, nav[ctl.NAV_SETTINGS : ctl.NAV_SETTINGS + N_S], nav[ctl.NAV_SIGMA : ctl.NAV_SIGMA + N_P], x, cov,
+        P, nav[ctl.NAV_SETTINGS : ctl.NAV_SETTINGS + kf.N_S], nav[ctl.NAV_SIGMA : ctl.NAV_SIGMA + N_P], x, cov,
         nav[ctl.NAV_INFLATION : ctl.NAV_INFLATION + 2],
-        COMMANDED, ap[ctl.SENT_SERVO], ap[ctl.SENT_SLIDER], ap[ctl.SENT_BALLAST],
-        dt, nav[ctl.NAV_Z : ctl.NAV_Z + N_Z], nav[ctl.NAV_REJECTED : ctl.NAV_REJECTED + N_Z], scores, work,
+        kf.COMMANDED, ap[ctl.SENT_SERVO], ap[ctl.SENT_SLIDER], ap[ctl.SENT_BALLAST],
+        dt, nav[ctl.NAV_Z : ctl.NAV_Z + kf.N_Z], nav[ctl.NAV_REJECTED : ctl.NAV_REJECTED + kf.N_Z], scores, work,
     )  # fmt: skip
     write_state(nav[ctl.NAV_GIVEN : ctl.NAV_GIVEN + N_X] if C[ctl.ESTIMATOR] == ctl.GIVEN else x, est)
     write_errors(x, cov, est)

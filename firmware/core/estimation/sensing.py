@@ -2,8 +2,8 @@
 
 import math
 
-from firmware.core.control import control_layout as ctl
 from firmware.core.jit import kernel
+from firmware.core.layouts import control_layout as ctl
 from firmware.core.vehicle.layout import GRAVITY, PLUNGER_AREA
 from firmware.core.vehicle.seawater import water_density
 from hal.ports import BEACON, IMU, MAX_AGE_PERIODS, PLUNGER_WIRE, SLIDER_WIRE

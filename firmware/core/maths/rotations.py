@@ -17,6 +17,11 @@ def wrap_angle(angle):
     return math.pi - (math.pi - angle) % (2.0 * math.pi)
 
 
+def wrap(angles):
+    """An array of angles (any shape, rad), each in [-pi, pi)."""
+    return (angles + math.pi) % (2.0 * math.pi) - math.pi
+
+
 @kernel
 def quaternion_from_euler(phi, theta, psi):
     """Unit quaternion (body to NED) of ZYX Euler angles in rad."""

@@ -5,10 +5,10 @@ They read what was screened (frame, G), what is believed (est) and what the auto
 
 import math
 
-from firmware.core.control import control_layout as ctl
 from firmware.core.estimation.sensing import longest_age
 from firmware.core.jit import kernel
-from firmware.core.supervision import supervisor_layout as sup
+from firmware.core.layouts import control_layout as ctl
+from firmware.core.layouts import supervisor_layout as sup
 from firmware.core.vehicle.layout import BALLAST_MAX, BALLAST_MIN, SERVO_MAX, SERVO_MIN, SLIDER_MAX, SLIDER_MIN
 
 LAG = 1.0  # s of the depth that lags, from which its rate is made
@@ -177,7 +177,7 @@ def watch_stall(G, i, measured, rate, tau, span, t):
         G[sup.STALLS + i] += 1.0
         G[sup.REST_UNTIL + i] = t + G[sup.STALL_REST]
         G[sup.SINCE + sup.T_STALL + i] = math.nan
-    if G[sup.STALLS + i] > G[sup.STALL_TRIES]:
+    if G[sup.STALLS + i] > G[sup.STALL_COUNT]:
         ask(G, sup.FAULT_STALL, sup.ABORT)
 
 

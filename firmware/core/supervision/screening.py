@@ -7,7 +7,7 @@ import math
 
 from firmware.core.estimation.sensing import longest_age
 from firmware.core.jit import kernel
-from firmware.core.supervision import supervisor_layout as sup
+from firmware.core.layouts import supervisor_layout as sup
 from firmware.core.vehicle.layout import BALLAST_MAX, BALLAST_MIN, SLIDER_MAX, SLIDER_MIN
 from hal.ports import IMU
 

@@ -5,37 +5,15 @@
 
 import math
 
-from firmware.core.control import control_layout as ctl
 from firmware.core.control.guidance import abort
 from firmware.core.jit import kernel
-from firmware.core.supervision import supervisor_layout as sup
-from firmware.core.supervision.detectors import (
-    IMPOSSIBLE,
-    ask,
-    watch_ascent,
-    watch_attitude,
-    watch_depth,
-    watch_law,
-    watch_loop,
-    watch_move,
-    watch_sensors,
-    watch_states,
-)
-from firmware.core.supervision.limits import limited
+from firmware.core.layouts import control_layout as ctl
+from firmware.core.layouts import supervisor_layout as sup
+from firmware.core.supervision import detectors
 from firmware.core.supervision.screening import start_place
-from firmware.core.vehicle.layout import (
-    BALLAST_MIN,
-    BALLAST_RATE,
-    BALLAST_TAU,
-    PLUNGER_AREA,
-    SERVO_MIN,
-    SERVO_RATE,
-    SLIDER_MIN,
-    SLIDER_RATE,
-    SLIDER_TAU,
-)
+from firmware.core.vehicle import layout
+from firmware.core.vehicle.actuators import actuator_table, limited
 
-MINS, RATES = (SERVO_MIN, SLIDER_MIN, BALLAST_MIN), (SERVO_RATE, SLIDER_RATE, BALLAST_RATE)
 ROUNDING = 1e-9
 
 
@@ -79,7 +57,7 @@ def goal(P, G, cmd, ap, i):
     if i > 0 and G[sup.STOPPED + i - 1] == 1.0:
         return G[sup.SENT + i]
     if G[sup.HIGHEST] >= sup.ABORT:
-        return 0.0 if i == 0 else P[MINS[i]]
+        return 0.0 if i == 0 else P[layout.ACTUATORS[i]]
     if (i == 0 and ap[ctl.MODE] == ctl.WAITING) or (i > 0 and G[sup.PLACED + i - 1] == 0.0):
         return math.nan
     if G[sup.HIGHEST] == sup.HOLD:
@@ -93,15 +71,15 @@ def goal(P, G, cmd, ap, i):
 def act(P, G, cmd, ap, t):
     """Limits last: into cmd (3,) what may be sent, and what was sent into every memory."""
     for i in range(3):
-        low, high = P[MINS[i]], P[MINS[i] + 1]
+        low, high, rate, _ = actuator_table(P, layout.ACTUATORS[i])
         wanted = goal(P, G, cmd, ap, i)
         if i > 0 and t < G[sup.REST_UNTIL + i - 1] and G[sup.HIGHEST] < sup.HOLD:
             wanted = G[sup.MARK + i - 1]  # where it stands
         last = G[sup.SENT + i]
-        beyond = abs(ap[ctl.WANTED_SERVO + i]) > IMPOSSIBLE * (high - low)
+        beyond = abs(ap[ctl.WANTED_SERVO + i]) > detectors.IMPOSSIBLE * (high - low)
         if G[sup.ENABLED + sup.FAULT_NO_ANSWER] == 1.0 and beyond and G[sup.HIGHEST] < sup.ABORT:
             wanted = last
-        sent = limited(wanted, last, low, high, P[RATES[i]], G[sup.TICK])
+        sent = limited(wanted, last, low, high, rate, G[sup.TICK])
         cmd[i] = math.nan if math.isnan(wanted) else sent
         G[sup.SENT + i] = ap[ctl.SENT_SERVO + i] = sent
 
@@ -110,8 +88,8 @@ def act(P, G, cmd, ap, t):
 def watch_limits(P, G, cmd):
     """Row 15: asked to go past a limit; clamped in `act`."""
     for i in range(3):
-        if cmd[i] < P[MINS[i]] - ROUNDING or cmd[i] > P[MINS[i] + 1] + ROUNDING:
-            ask(G, sup.FAULT_SOFT_LIMIT, sup.LOG)
+        if cmd[i] < P[layout.ACTUATORS[i]] - ROUNDING or cmd[i] > P[layout.ACTUATORS[i] + 1] + ROUNDING:
+            detectors.ask(G, sup.FAULT_SOFT_LIMIT, sup.LOG)
 
 
 @kernel
@@ -120,13 +98,13 @@ def watch_moves(P, G, frame, scale, t):
     G[sup.RING_AT] = (G[sup.RING_AT] + 1.0) % sup.N_RING
     for i in range(2):
         start, place = sup.STARTS[sup.SENSOR_SLIDER + i], i * sup.N_RING + int(G[sup.RING_AT])
-        factor, span = 1.0 if i == 0 else scale, P[MINS[i + 1] + 1] - P[MINS[i + 1]]
+        low, high, rate, tau = actuator_table(P, layout.ACTUATORS[i + 1])
+        factor, span = 1.0 if i == 0 else scale, high - low
         start_place(G, frame, i, factor, 0.03 * span)
         G[sup.RING + place], G[sup.SENT_RING + place] = math.nan, G[sup.SENT + 1 + i]
-        rate, tau = (P[SLIDER_RATE], P[SLIDER_TAU]) if i == 0 else (P[BALLAST_RATE], P[BALLAST_TAU])
         if frame[start + 1] == sup.VALID and G[sup.PLACED + i] == 1.0:
             G[sup.RING + place] = factor * frame[start + 2]
-            watch_move(G, i, G[sup.RING + place], rate, tau, span, t)
+            detectors.watch_move(G, i, G[sup.RING + place], rate, tau, span, t)
         elif G[sup.PLACED + i] == 0.0 and t - G[sup.BEGAN] > G[sup.LOST_AFTER + sup.SENSOR_SLIDER + i]:
             G[sup.PLACED + i] = 1.0  # no wire: from where it was sent last, as far as is known
 
@@ -139,16 +117,16 @@ def guard(P, C, G, frame, est, ap, cmd, t):
     """
     for row in range(sup.N_ROWS):
         G[sup.ASKED + row] = sup.NOTHING
-    scale = est[ctl.EST_DENSITY] * P[PLUNGER_AREA] if est[ctl.EST_DENSITY] > 0.0 else 1000.0 * P[PLUNGER_AREA]
-    watch_sensors(G, frame, t)
-    watch_states(G, frame, t)
+    scale = P[layout.PLUNGER_AREA] * (est[ctl.EST_DENSITY] if est[ctl.EST_DENSITY] > 0.0 else 1000.0)
+    detectors.watch_sensors(G, frame, t)
+    detectors.watch_states(G, frame, t)
     watch_moves(P, G, frame, scale, t)
     if est[ctl.EST_BEACON_TIME] >= 0.0:
-        watch_depth(G, est, ap, t)
-        watch_ascent(G, est, ap, t)
-    watch_attitude(G, est, ap, t)
-    watch_law(P, C, G, ap, t)
-    watch_loop(G, t)
+        detectors.watch_depth(G, est, ap, t)
+        detectors.watch_ascent(G, est, ap, t)
+    detectors.watch_attitude(G, est, ap, t)
+    detectors.watch_law(P, C, G, ap, t)
+    detectors.watch_loop(G, t)
     watch_limits(P, G, cmd)
     settle(G, t)
     act(P, G, cmd, ap, t)

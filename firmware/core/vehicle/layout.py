@@ -17,6 +17,7 @@ LIFT_PRINTED = 29  # 1: lift as printed in (4), K_L alpha^2; 0: K_L alpha (ledge
 SERVO_MIN, SERVO_MAX, SERVO_RATE, SERVO_TAU = 30, 31, 32, 33  # rad, rad, rad/s, s
 SLIDER_MIN, SLIDER_MAX, SLIDER_RATE, SLIDER_TAU = 34, 35, 36, 37  # m
 BALLAST_MIN, BALLAST_MAX, BALLAST_RATE, BALLAST_TAU = 38, 39, 40, 41  # kg
+ACTUATORS = (SERVO_MIN, SLIDER_MIN, BALLAST_MIN)  # where each begins
 PLUNGER_AREA = 42  # m2
 NET_MASS = 43  # kg, trim error at the origin; nominal 0
 CG_X, CG_Y, CG_Z = 44, 45, 46  # m, offset of the whole vehicle's centre of gravity; nominal 0

@@ -3,21 +3,7 @@
 import math
 
 from firmware.core.jit import kernel
-from firmware.core.vehicle.layout import (
-    K_BETA,
-    K_D,
-    K_D0,
-    K_L,
-    K_L0,
-    K_M,
-    K_M0,
-    K_MR,
-    K_MY,
-    K_P,
-    K_Q,
-    K_R,
-    LIFT_PRINTED,
-)  # fmt: skip
+from firmware.core.vehicle import layout
 
 STILL = 1e-6  # m/s; below this the flow has no direction and alpha = beta = 0
 
@@ -58,15 +44,15 @@ def water_wrench(P, u, v, w, p, q, r):
     T_DL3 = (K_MY beta + K_r r) V^2.
     """
     alpha, beta, v_squared = flow_angles(u, v, w)
-    drag = (P[K_D0] + P[K_D] * alpha * alpha) * v_squared
-    lift_slope = alpha * alpha if P[LIFT_PRINTED] != 0.0 else alpha
-    lift = (P[K_L0] + P[K_L] * lift_slope) * v_squared
-    side = P[K_BETA] * beta * v_squared
+    drag = (P[layout.K_D0] + P[layout.K_D] * alpha * alpha) * v_squared
+    lift_slope = alpha * alpha if P[layout.LIFT_PRINTED] != 0.0 else alpha
+    lift = (P[layout.K_L0] + P[layout.K_L] * lift_slope) * v_squared
+    side = P[layout.K_BETA] * beta * v_squared
     F1, F2, F3 = flow_to_body(u, v, w, -drag, side, -lift)
     T1, T2, T3 = flow_to_body(
         u, v, w,
-        (P[K_MR] * beta + P[K_P] * p) * v_squared,
-        (P[K_M0] + P[K_M] * alpha + P[K_Q] * q) * v_squared,
-        (P[K_MY] * beta + P[K_R] * r) * v_squared,
+        (P[layout.K_MR] * beta + P[layout.K_P] * p) * v_squared,
+        (P[layout.K_M0] + P[layout.K_M] * alpha + P[layout.K_Q] * q) * v_squared,
+        (P[layout.K_MY] * beta + P[layout.K_R] * r) * v_squared,
     )  # fmt: skip
     return F1, F2, F3, T1, T2, T3

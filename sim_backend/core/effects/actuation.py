@@ -3,24 +3,8 @@
 import math
 
 from firmware.core.jit import kernel
-from firmware.core.vehicle.actuators import actuator_rate, clip
-from firmware.core.vehicle.layout import (
-    BALLAST_MAX,
-    BALLAST_MIN,
-    BALLAST_RATE,
-    BALLAST_TAU,
-    SERVO_MAX,
-    SERVO_MIN,
-    SERVO_RATE,
-    SERVO_TAU,
-    SLIDER_MAX,
-    SLIDER_MIN,
-    SLIDER_RATE,
-    SLIDER_TAU,
-    X_DOWN,
-    X_SERVO,
-    X_SLIDER,
-)
+from firmware.core.vehicle import layout
+from firmware.core.vehicle.actuators import actuator_rate, actuator_table, clip
 from firmware.core.vehicle.state import actuators
 from sim_backend.core.effects import effect_layout as ef
 
@@ -30,15 +14,15 @@ SERVO_DRIVEN, SLIDER_DRIVEN, BALLAST_DRIVEN = 1, 2, 4  # mode: this actuator's i
 @kernel
 def effective_actuators(P, F, out):
     """Rates, time constants and ranges of P with effects F, into out (N_P)."""
-    out[SERVO_RATE] *= math.exp(-F[ef.SERVO_RATE_LOG])
-    out[SERVO_TAU] *= math.exp(F[ef.SERVO_LAG_LOG])
-    middle = 0.5 * (P[SERVO_MIN] + P[SERVO_MAX])
-    out[SERVO_MIN] = min(P[SERVO_MIN] + F[ef.SERVO_LIMIT], middle)  # a loss of more than there is leaves one place
-    out[SERVO_MAX] = max(P[SERVO_MAX] - F[ef.SERVO_LIMIT], middle)
-    out[SLIDER_RATE] *= math.exp(-F[ef.SLIDER_RATE_LOG])
-    out[SLIDER_TAU] *= math.exp(F[ef.SLIDER_LAG_LOG])
-    out[BALLAST_RATE] *= math.exp(-F[ef.PUMP_RATE_LOG])
-    out[BALLAST_TAU] *= math.exp(F[ef.PUMP_LAG_LOG])
+    out[layout.SERVO_RATE] *= math.exp(-F[ef.SERVO_RATE_LOG])
+    out[layout.SERVO_TAU] *= math.exp(F[ef.SERVO_LAG_LOG])
+    middle = 0.5 * (P[layout.SERVO_MIN] + P[layout.SERVO_MAX])
+    out[layout.SERVO_MIN] = min(P[layout.SERVO_MIN] + F[ef.SERVO_LIMIT], middle)  # at most all is lost
+    out[layout.SERVO_MAX] = max(P[layout.SERVO_MAX] - F[ef.SERVO_LIMIT], middle)
+    out[layout.SLIDER_RATE] *= math.exp(-F[ef.SLIDER_RATE_LOG])
+    out[layout.SLIDER_TAU] *= math.exp(F[ef.SLIDER_LAG_LOG])
+    out[layout.BALLAST_RATE] *= math.exp(-F[ef.PUMP_RATE_LOG])
+    out[layout.BALLAST_TAU] *= math.exp(F[ef.PUMP_LAG_LOG])
 
 
 @kernel
@@ -47,14 +31,14 @@ def motor_speeds(P, F, x, mode, c_servo, c_slider, c_ballast):
     servo, slider, ballast = actuators(x)
     ds, dl, db = c_servo, c_slider, c_ballast
     if not mode & SERVO_DRIVEN:
-        ds = actuator_rate(servo, c_servo, P[SERVO_MIN], P[SERVO_MAX], P[SERVO_RATE], P[SERVO_TAU])
+        ds = actuator_rate(servo, c_servo, *actuator_table(P, layout.SERVO_MIN))
     if not mode & SLIDER_DRIVEN:
-        dl = actuator_rate(slider, c_slider, P[SLIDER_MIN], P[SLIDER_MAX], P[SLIDER_RATE], P[SLIDER_TAU])
+        dl = actuator_rate(slider, c_slider, *actuator_table(P, layout.SLIDER_MIN))
     if not mode & BALLAST_DRIVEN:
-        rate = P[BALLAST_RATE]
+        low, high, rate, tau = actuator_table(P, layout.BALLAST_MIN)
         if F[ef.PUMP_DROOP] > 0.0 and c_ballast < ballast:
-            rate *= math.exp(-F[ef.PUMP_DROOP] * max(x[X_DOWN], 0.0))
-        db = actuator_rate(ballast, c_ballast, P[BALLAST_MIN], P[BALLAST_MAX], rate, P[BALLAST_TAU])
+            rate *= math.exp(-F[ef.PUMP_DROOP] * max(x[layout.X_DOWN], 0.0))
+        db = actuator_rate(ballast, c_ballast, low, high, rate, tau)
     return ds, dl, db
 
 
@@ -69,13 +53,13 @@ def backlash(follower, leader, width):
 @kernel
 def geared(F, x, servo_speed, slider_speed):
     """Rail (rad) and sliding mass (m) behind their motors' backlash and offset, and the speeds of both."""
-    servo, slider = x[X_SERVO], x[X_SLIDER]
+    servo, slider = x[layout.X_SERVO], x[layout.X_SLIDER]
     if F[ef.SERVO_PLAY] > 0.0:
-        servo = backlash(x[ef.X_GEAR_SERVO], x[X_SERVO], F[ef.SERVO_PLAY])
+        servo = backlash(x[ef.X_GEAR_SERVO], x[layout.X_SERVO], F[ef.SERVO_PLAY])
         if servo == x[ef.X_GEAR_SERVO]:
             servo_speed = 0.0
     if F[ef.SLIDER_PLAY] > 0.0:
-        slider = backlash(x[ef.X_GEAR_SLIDER], x[X_SLIDER], F[ef.SLIDER_PLAY])
+        slider = backlash(x[ef.X_GEAR_SLIDER], x[layout.X_SLIDER], F[ef.SLIDER_PLAY])
         if slider == x[ef.X_GEAR_SLIDER]:
             slider_speed = 0.0
     return servo + F[ef.SERVO_OFFSET], slider, servo_speed, slider_speed
@@ -84,5 +68,5 @@ def geared(F, x, servo_speed, slider_speed):
 @kernel
 def update_gears(F, x):
     """What the gears remember after a step: where they stand behind their motors."""
-    x[ef.X_GEAR_SERVO] = backlash(x[ef.X_GEAR_SERVO], x[X_SERVO], F[ef.SERVO_PLAY])
-    x[ef.X_GEAR_SLIDER] = backlash(x[ef.X_GEAR_SLIDER], x[X_SLIDER], F[ef.SLIDER_PLAY])
+    x[ef.X_GEAR_SERVO] = backlash(x[ef.X_GEAR_SERVO], x[layout.X_SERVO], F[ef.SERVO_PLAY])
+    x[ef.X_GEAR_SLIDER] = backlash(x[ef.X_GEAR_SLIDER], x[layout.X_SLIDER], F[ef.SLIDER_PLAY])

@@ -34,7 +34,7 @@ N_F = SHAPE + N_SHAPES
 X_GEAR_SERVO, X_GEAR_SLIDER = N_X, N_X + 1  # behind the backlash: rad, m
 X_LAG = N_X + 2  # roll, pitch, yaw, depth: how far the reading is behind, rad, m
 X_LAG_DEPTH = X_LAG + 3
-X_LATE = N_X + 6  # s; motion capture behind its delay, by what the diagnosis believes: it stays as it is
+X_LATE = N_X + 6  # s; motion capture behind its delay, as the diagnosis models it: constant
 N_XF = N_X + 7
 
 # --- y: what is read ------------------------------------------------------------------------------------------------

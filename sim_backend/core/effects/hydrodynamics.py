@@ -3,21 +3,8 @@
 import math
 
 from firmware.core.jit import kernel
+from firmware.core.vehicle import layout
 from firmware.core.vehicle.actuators import clip
-from firmware.core.vehicle.layout import (
-    A_Y,
-    A_Z,
-    K_BETA,
-    K_D,
-    K_D0,
-    K_L,
-    K_L0,
-    K_M0,
-    K_MY,
-    K_Q,
-    K_R,
-    LIFT_PRINTED,
-)
 from firmware.core.vehicle.water import flow_angles, flow_to_body
 from sim_backend.core.effects import effect_layout as ef
 
@@ -25,17 +12,17 @@ from sim_backend.core.effects import effect_layout as ef
 @kernel
 def effective_coefficients(F, out):
     """Coefficients and added mass with effects F, in place in out (N_P)."""
-    out[K_D0] *= 1.0 + F[ef.DRAG_0]
-    out[K_D] *= 1.0 + F[ef.DRAG_ALPHA]
-    out[K_L] *= 1.0 + F[ef.LIFT]
-    out[K_L0] *= 1.0 + F[ef.LIFT]
-    out[A_Y] *= 1.0 + F[ef.ADDED_Y]
-    out[A_Z] *= 1.0 + F[ef.ADDED_Z]
-    out[K_BETA] *= 1.0 + F[ef.SIDE]
-    out[K_M0] += F[ef.PITCH_TRIM]
-    out[K_Q] *= 1.0 + F[ef.PITCH_DAMPING]
-    out[K_MY] *= 1.0 + F[ef.WEATHERCOCK]
-    out[K_R] *= 1.0 + F[ef.YAW_DAMPING]
+    out[layout.K_D0] *= 1.0 + F[ef.DRAG_0]
+    out[layout.K_D] *= 1.0 + F[ef.DRAG_ALPHA]
+    out[layout.K_L] *= 1.0 + F[ef.LIFT]
+    out[layout.K_L0] *= 1.0 + F[ef.LIFT]
+    out[layout.A_Y] *= 1.0 + F[ef.ADDED_Y]
+    out[layout.A_Z] *= 1.0 + F[ef.ADDED_Z]
+    out[layout.K_BETA] *= 1.0 + F[ef.SIDE]
+    out[layout.K_M0] += F[ef.PITCH_TRIM]
+    out[layout.K_Q] *= 1.0 + F[ef.PITCH_DAMPING]
+    out[layout.K_MY] *= 1.0 + F[ef.WEATHERCOCK]
+    out[layout.K_R] *= 1.0 + F[ef.YAW_DAMPING]
 
 
 @kernel
@@ -60,11 +47,12 @@ def extra_wrench(P, F, kx, depth, u, v, w, p, q, r):
     alpha, _, v_squared = flow_angles(u, v, w)
     drag, lift = 0.0, 0.0
     if F[ef.CLIMB_DIVE] != 0.0:
-        drag += F[ef.CLIMB_DIVE] * math.tanh(-kx / ef.REST_PITCH) * (P[K_D0] + P[K_D] * alpha * alpha) * v_squared
+        profile = P[layout.K_D0] + P[layout.K_D] * alpha * alpha
+        drag += F[ef.CLIMB_DIVE] * math.tanh(-kx / ef.REST_PITCH) * profile * v_squared
     if F[ef.STALL] > 0.0:
         held = clip(alpha, -1.0 / F[ef.STALL], 1.0 / F[ef.STALL])
-        lost = held * held - alpha * alpha if P[LIFT_PRINTED] != 0.0 else held - alpha
-        lift += P[K_L] * lost * v_squared
+        lost = held * held - alpha * alpha if P[layout.LIFT_PRINTED] != 0.0 else held - alpha
+        lift += P[layout.K_L] * lost * v_squared
     if drag != 0.0 or lift != 0.0:
         X, Y, Z = flow_to_body(u, v, w, -drag, 0.0, -lift)
     if F[ef.LINEAR_DRAG] != 0.0:
@@ -84,3 +72,9 @@ def extra_wrench(P, F, kx, depth, u, v, w, p, q, r):
         M += M1
         N += N1
     return X, Y, Z, K, M, N
+
+
+@kernel
+def current(F, depth):
+    """Velocity of the water (m/s, north and east) that effects F add at a depth (m)."""
+    return F[ef.CURRENT_N] + F[ef.SHEAR_N] * depth, F[ef.CURRENT_E] + F[ef.SHEAR_E] * depth

@@ -43,6 +43,15 @@ def update_lags(F, x, before, dt):
 
 
 @kernel
+def read_state(x, y):
+    """What the onboard sensors read at x without noise and without effects, into y (N_Y)."""
+    y[ef.Y_ROLL], y[ef.Y_PITCH], y[ef.Y_YAW] = euler_angles(x)
+    for i in range(3):
+        y[ef.Y_P + i] = x[X_NU + 3 + i]
+    y[ef.Y_DEPTH], y[ef.Y_SLIDER], y[ef.Y_BALLAST] = x[X_DOWN], x[X_SLIDER], x[X_BALLAST]
+
+
+@kernel
 def read(F, x, y):
     """What the sensors read at x without noise, into y (N_Y): onboard with its errors, motion capture without."""
     roll, pitch, yaw = euler_angles(x)

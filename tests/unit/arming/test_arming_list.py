@@ -6,7 +6,7 @@ import shutil
 import msgspec
 import pytest
 
-from firmware.supervisor.settings import Limits
+from firmware.model.supervisor_settings import Limits
 from hal.ports import BoardError, Hardware, Validity
 from tools.flight import arming
 from tools.flight.arming import Arming, Check, arm, refuse

@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from firmware.core.control import control_layout as ctl
+from firmware.core.layouts import control_layout as ctl
 from sim_backend.core.closed_loop import TRACE
 from sim_backend.fleet import fly_fleet
 from tools.data.errors import InputError

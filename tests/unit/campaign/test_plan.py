@@ -7,8 +7,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from firmware.control.gains import Control
-from firmware.model.strict import ConfigError
+from firmware.model.gains import Control
+from hal.strict import ConfigError
 from tools.data.errors import InputError
 from tools.study.campaign.fingerprint import fingerprint
 from tools.study.campaign.plan import build_plan, load_campaign, shipped_campaigns, with_options

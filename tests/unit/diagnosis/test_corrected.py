@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from firmware.core.vehicle import layout
-from firmware.model.strict import ConfigError
+from hal.strict import ConfigError
 from sim_backend.core.effects import effect_layout as ef
 from tools.data.sources import load_vehicle
 from tools.inference.corrected import LINKS, corrected_text, load_corrected

@@ -5,7 +5,7 @@ from scipy.stats import chi2
 from support.estimating import Filter, state_error
 from support.flights import World, fly
 
-from firmware.core.estimation import estimator_layout as kf
+from firmware.core.layouts import estimator_layout as kf
 
 # Depth, attitude and nu; position north and east is dead reckoning, actuators are known but for their noise.
 KEPT = [2, *range(kf.E_ATT, kf.E_ACT)]

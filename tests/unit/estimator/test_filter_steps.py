@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from support.estimating import Filter, state_error
 
-from firmware.core.estimation import estimator_layout as kf
 from firmware.core.estimation.estimator import estimator_step
+from firmware.core.layouts import estimator_layout as kf
 from firmware.core.vehicle.flight import nominal_run
 from firmware.core.vehicle.layout import N_X
 from firmware.core.vehicle.linearise import linearise

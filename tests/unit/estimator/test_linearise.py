@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from support.estimating import Filter
 
-from firmware.core.estimation import estimator_layout as kf
 from firmware.core.estimation.estimator import error_covariance, flight_derivative
+from firmware.core.layouts import estimator_layout as kf
 from firmware.core.maths.rotations import quaternion_from_euler
 from firmware.core.vehicle import layout
 from firmware.core.vehicle.linearise import linearise

@@ -5,7 +5,7 @@ import json
 import pytest
 from click.testing import CliRunner
 
-from firmware.supervisor.table import FAULTS
+from firmware.faults import FAULTS
 from tools.study.faults import campaign
 from tools.study.faults.campaign import Outcome, everything, jobs, run, summary
 from tools.study.faults.cases import Case, Show

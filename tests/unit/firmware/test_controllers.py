@@ -7,10 +7,10 @@ import msgspec
 import numpy as np
 import pytest
 
-from firmware.control.gains import Control
-from firmware.core.control import control_layout as ctl
 from firmware.core.control.controllers import CONTROLLERS
-from firmware.model.strict import decode
+from firmware.core.layouts import control_layout as ctl
+from firmware.model.gains import Control
+from hal.strict import decode
 from tools.flight.compose import build_flight
 
 CONTROL_PAGE = Path(__file__).resolve().parents[3] / "docs" / "CONTROL.md"

@@ -10,10 +10,10 @@ from law_flights import output_accelerations, plant_rates
 from model_states import state
 from support.commands import glider
 
-from firmware.control.gains import Control, Law, LawGains
-from firmware.control.k2_margin import K2Margin, glides, k2_asked, k2_margins
 from firmware.core.vehicle import layout
-from firmware.estimation.settings import parameter_sigma
+from firmware.model.estimator_settings import parameter_sigma
+from firmware.model.gains import Control, Law, LawGains
+from firmware.model.k2_margin import K2Margin, glides, k2_asked, k2_margins
 from firmware.model.vehicle import UncertaintyTable
 from tools.data.sources import load_vehicle
 

@@ -4,7 +4,7 @@ import pytest
 
 from firmware.guidance.mission import decode_mission
 from firmware.model.library import shipped
-from firmware.model.strict import ConfigError
+from hal.strict import ConfigError
 from tools.data.sources import load_vehicle
 
 GOOD = shipped("guidance/missions")["sawtooth"]

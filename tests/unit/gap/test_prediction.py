@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support.flights import World, case_of, fly, fly_case
 
-from firmware.core.estimation import estimator_layout as kf
+from firmware.core.layouts import estimator_layout as kf
 from firmware.core.vehicle import layout
 from sim_backend.core.effects import effect_layout as ef
 from tools.data.runs.run import Run

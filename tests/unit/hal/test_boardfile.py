@@ -77,7 +77,7 @@ def test_the_hash_sees_calibration_and_nothing_else(old, new, same):
 
 
 def test_the_simulated_board_of_a_twin_has_its_rates_and_reads():
-    from firmware.model.strict import decode
+    from hal.strict import decode
     from sim_backend.board import SimBoardFile
 
     text = TWIN.replace("temperature_c = 20.0", "temperature_c = 12.0\nwave = [{ height_m = 0.3, period_s = 4.0 }]")

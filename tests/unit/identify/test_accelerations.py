@@ -7,7 +7,7 @@ from firmware.model.vehicle import COEFFICIENTS
 from tools.data.errors import InputError
 from tools.data.runs.run import Run
 from tools.data.sources import load_vehicle
-from tools.identify.acceleration_likelihood import bandwidth, fit_accelerations, kinematics
+from tools.identify.acceleration_likelihood import _width, fit_accelerations, kinematics
 from tools.identify.design import make_runs
 from tools.identify.parameters import coefficient_sizes
 from tools.inference.model import Model
@@ -47,7 +47,8 @@ def test_velocities_are_those_flown():
 
 
 def test_bandwidth_is_as_stated():
-    assert bandwidth(50.0) == pytest.approx(2.3, abs=0.05)
+    half = _width(50.0) // 2
+    assert 4.0 / (3.2 * half - 4.6) * 50.0 / 2.0 == pytest.approx(2.3, abs=0.05)  # Schafer (2011), equation (12)
 
 
 def test_runs_without_capture_are_refused():

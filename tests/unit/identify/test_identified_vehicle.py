@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from firmware.core.vehicle import layout
-from firmware.model.strict import ConfigError
 from firmware.model.vehicle import decode_vehicle
+from hal.strict import ConfigError
 from tools.data.sources import load_vehicle
 from tools.data.tomltext import toml_text
 from tools.inference.model import vehicle_model

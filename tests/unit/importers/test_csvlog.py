@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from firmware.model.strict import ConfigError
+from hal.strict import ConfigError
 from tools.cli.import_ import import_
 from tools.data.errors import InputError
 from tools.data.importers.csvlog import import_csv

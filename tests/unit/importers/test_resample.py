@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tools.data.importers.resample import bins_of, body_rates, fill_gaps, means, wrapped
+from firmware.core.maths.rotations import wrap
+from tools.data.importers.resample import bins_of, body_rates, fill_gaps, means
 
 
 def test_a_row_is_the_mean_of_what_lies_within_half_a_period_of_it():
@@ -26,9 +27,9 @@ angles = st.floats(-3.1, 3.1)
 
 @given(middle=angles, spread=st.lists(st.floats(-1.0, 1.0), min_size=1, max_size=6))
 def test_the_mean_of_angles_does_not_know_where_they_wrap(middle, spread):
-    samples = wrapped(middle + np.array(spread))
+    samples = wrap(middle + np.array(spread))
     mean = means(samples, np.zeros(len(spread), dtype=int), 1, angle=True)
-    assert wrapped(mean - (middle + np.mean(spread)))[0] == pytest.approx(0.0, abs=1e-12)
+    assert wrap(mean - (middle + np.mean(spread)))[0] == pytest.approx(0.0, abs=1e-12)
     assert -np.pi <= mean[0] <= np.pi
 
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from log_files import METADATA, TICK, VEHICLE, tick_rows, write_small_log
 from support.commands import glider
 
-from firmware.model.strict import ConfigError
+from hal.strict import ConfigError
 from tools.cli.log import log as command
 from tools.data.errors import InputError
 from tools.data.log.reader import read_log

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.commands import glider
 
-from firmware.control.gains import Control
+from firmware.model.gains import Control
 from sim_backend.core.closed_loop import TRACE
 from tools.data.sources import load_vehicle
 from tools.study.reproduce import circle, tracking

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from firmware.model.strict import ConfigError
+from hal.strict import ConfigError
 from tools.data.errors import InputError
 from tools.data.runs.case import CASE_FILE, SensorsPart, load_case, load_case_of_run, write_case
 from tools.data.runs.run import Run

@@ -12,7 +12,7 @@ from sim_backend.core.effect_plant import update_effect_states
 from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.catalogue import apply_effects
 from sim_backend.core.effects.sensing import read
-from sim_backend.core.world import sample_sensors, sample_with_effects
+from sim_backend.core.world import sample_sensors
 
 
 class Plain:
@@ -123,8 +123,11 @@ def test_samples_with_no_effect_are_the_plain_samples_bit_for_bit():
         made.cmd[:] = 0.5, -0.02, 0.1
         made.advance(0.01 * k)
         shared = (made.sensors, made.errors, made.seed, made.x, made.time)
-        sample_sensors(made.P, made.E, *shared, counters[0], rings[0])
-        sample_with_effects(made.P, made.F, made.E, *shared, counters[1], rings[1], made.work[wl.W_READ])
+        for effects in (False, True):
+            scratch = made.work[wl.W_READ]
+            sample_sensors(
+                made.P, made.F, effects, made.E, *shared, counters[int(effects)], rings[int(effects)], scratch
+            )
     assert rings[0][:, 40].all(axis=0).any()
     assert np.array_equal(*rings)
     assert np.array_equal(*counters)

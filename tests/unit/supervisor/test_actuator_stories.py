@@ -7,8 +7,8 @@ import math
 
 import pytest
 
-from firmware.core.control import control_layout as ctl
-from firmware.core.supervision import supervisor_layout as sup
+from firmware.core.layouts import control_layout as ctl
+from firmware.core.layouts import supervisor_layout as sup
 from hal.ports import Condition, Validity
 from tests.support.stories import ABORT, NOTHING, TWO_TICKS, WARN, flying
 from tests.support.watchman import BALLAST_RANGE, DT, SLIDER_RANGE, Watchman

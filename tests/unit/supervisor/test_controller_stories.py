@@ -7,9 +7,9 @@ import math
 
 import pytest
 
-from firmware.core.control import control_layout as ctl
-from firmware.core.supervision import supervisor_layout as sup
-from firmware.supervisor.table import Reaction
+from firmware.core.layouts import control_layout as ctl
+from firmware.core.layouts import supervisor_layout as sup
+from firmware.faults import Reaction
 from tests.support.stories import ABORT, HOLD, LOG, NOTHING, WARN, flying
 from tests.support.watchman import Watchman
 

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from firmware.core.control import control_layout as ctl
-from firmware.core.supervision import supervisor_layout as sup
+from firmware.core.layouts import control_layout as ctl
+from firmware.core.layouts import supervisor_layout as sup
 from firmware.core.supervision.supervisor import highest
-from firmware.supervisor.table import FAULTS, Reaction
+from firmware.faults import FAULTS, Reaction
 from hal.ports import SLOTS, Validity
 from tests.support.watchman import BALLAST_RANGE, DT, SLIDER_RANGE, Watchman
 from tools.study.faults.flights import flown

@@ -8,9 +8,9 @@ import math
 import numpy as np
 import pytest
 
-from firmware.core.control import control_layout as ctl
-from firmware.core.supervision import supervisor_layout as sup
-from firmware.supervisor.settings import Limits
+from firmware.core.layouts import control_layout as ctl
+from firmware.core.layouts import supervisor_layout as sup
+from firmware.model.supervisor_settings import Limits
 from hal.ports import SLOTS, Validity
 from tests.support.stories import ABORT, HOLD, LOG, NOTHING, TWO_TICKS, WARN, flying, rising
 from tests.support.watchman import BALLAST_RANGE, DT, SLIDER_RANGE, Watchman

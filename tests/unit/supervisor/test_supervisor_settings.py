@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from firmware.core.supervision import supervisor_layout as sup
+from firmware.core.layouts import supervisor_layout as sup
 from firmware.model.library import shipped
-from firmware.model.strict import ConfigError
+from firmware.model.supervisor_settings import Limits, SupervisorTable, settings_vector
 from firmware.model.vehicle import decode_vehicle
-from firmware.supervisor.settings import Limits, SupervisorTable, settings_vector
 from hal.ports import SLOTS
+from hal.strict import ConfigError
 
 SHIPPED = shipped("model/vehicles")["roughie"]
 TEXT = SHIPPED.split("[limits]")[0]
@@ -123,7 +123,7 @@ SCALARS = {
     "blind_ascent_s": sup.BLIND_TIME, "same_depth_s": sup.SAME_TIME, "same_depth_m": sup.SAME_BAND,
     "leak_samples": sup.LEAK_COUNT, "steep_s": sup.STEEP_TIME, "law_tries": sup.LAW_RUN, "law_rest_s": sup.LAW_REST,
     "voltage_s": sup.VOLTAGE_TIME, "overruns": sup.OVERRUN_RUN, "overrun_share": sup.OVERRUN_SHARE,
-    "stall_factor": sup.STALL_FACTOR, "stall_tries": sup.STALL_TRIES, "stall_rest_s": sup.STALL_REST,
+    "stall_factor": sup.STALL_FACTOR, "stall_tries": sup.STALL_COUNT, "stall_rest_s": sup.STALL_REST,
     "surface_m": sup.SURFACE_DEPTH, "imu_s": sup.LOST_AFTER, "pressure_s": sup.LOST_AFTER + 1,
     "wire_s": sup.LOST_AFTER + 2,
 }  # fmt: skip

@@ -5,8 +5,8 @@ Each row as a story: all is well, something breaks, it is noticed in time, and w
 
 import pytest
 
-from firmware.core.supervision import supervisor_layout as sup
-from firmware.supervisor.settings import Limits
+from firmware.core.layouts import supervisor_layout as sup
+from firmware.model.supervisor_settings import Limits
 from tests.support.stories import ABORT, COARSE, LOG, NOTHING, WARN, flying
 
 

@@ -9,38 +9,18 @@ from hal.drivers.poll import Poll
 from hal.drivers.samples import Health
 from hal.protocols import modbus
 from hal.protocols.modbus_master import ModbusBus
-from tests.support.modbus_line import SimulatedLine, stamp_reply
+from tools.study.faults.wire import Line, Stamped, stamp_reply
 
 EXCHANGES = 100_000
 
 
-class Observed(Poll):
-    """A poll that compares what it is given with what was on the line when it asked."""
-
-    def __init__(self, variants, period, line_number):
-        super().__init__(variants, period, self._check, Health("observed"))
-        self._line_number = line_number
-        self.delivered = self.misdelivered = 0
-
-    def _check(self, request, registers, asked_at, now):
-        self.delivered += 1
-        stamp = registers[0] << 16 | registers[1]
-        self.misdelivered += stamp != self._line_number()
-
-
 def exchange(delay, seed, exchanges=EXCHANGES, forget_s=0.5, longest_s=0.1):
     """Three devices, two of them asked for the same registers; every reply carries its request's number."""
-    rng = random.Random(seed)
-    bus = ModbusBus(115_200, timeout_s=0.03, longest_s=longest_s, forget_s=forget_s)
-    line = SimulatedLine(bus, lambda frame: stamp_reply(frame, line.requests), lambda: delay(rng), rng)
-    jobs = [
-        Observed([modbus.read(device, 3, 0x0100, count) for count in (4, 2, 3)], period, lambda: line.requests)
-        for device, period in ((1, 0.02), (2, 0.02), (3, 0.05))
-    ]
-    for job in jobs:
-        bus.add(job)
-    line.run(lambda: line.requests >= exchanges)
-    return bus, jobs, line
+    line = Line(stamp_reply, delay, seed, timeout_s=0.03, longest_s=longest_s, forget_s=forget_s)
+    jobs = [Stamped(line, device, period) for device, period in ((1, 0.02), (2, 0.02), (3, 0.05))]
+    while line.requests < exchanges:
+        line.run(line.now + 1.0)
+    return line.bus, jobs, line
 
 
 def late_and_lost(rng):
@@ -77,66 +57,53 @@ def test_the_measurement_can_fail():
 
 def test_a_silent_device_leaves_the_line_to_the_others():
     """With device 1 dead, the others are answered as often as without it, but for its few timeouts."""
-    rng = random.Random(3)
-    bus = ModbusBus(115_200, timeout_s=0.02, longest_s=0.02)
-    dead = {1}
-
-    def delay():
-        return math.inf if line_frame[0][0] in dead else 0.002
-
-    line_frame = [b""]
-    line = SimulatedLine(bus, lambda frame: stamp_reply(frame, line.requests), delay, rng)
+    dead, asked = {1}, [0]
+    line = Line(stamp_reply, lambda rng: math.inf if asked[0] in dead else 0.002, 3, timeout_s=0.02, longest_s=0.02)
     forward = line._sent
 
     def note(frame):
-        line_frame[0] = frame
+        asked[0] = frame[0]
         return forward(frame)
 
-    bus.attach(note)
-    jobs = [
-        Observed([modbus.read(n, 3, 0, 4), modbus.read(n, 3, 0, 2)], 0.04, lambda: line.requests) for n in (1, 2, 3)
-    ]
-    for job in jobs:
-        bus.add(job)
-    line.run(lambda: line.now >= 60.0)
+    line.bus.attach(note)
+    jobs = [Stamped(line, device, 0.04) for device in (1, 2, 3)]
+    line.run(60.0)
     assert jobs[0].delivered == 0
     assert min(job.delivered for job in jobs[1:]) > 0.85 * 60.0 / 0.04
     dead.clear()
-    line.run(lambda: line.now >= 70.0)
+    line.run(70.0)
     assert jobs[0].delivered > 0.8 * 9.0 / 0.04
 
 
 @pytest.mark.parametrize("code", [1, 2, 4, 6])
 def test_exceptions_are_counted_and_slow_the_poll_down(code):
-    bus = ModbusBus(115_200, timeout_s=0.02, longest_s=0.02)
-    rng = random.Random(4)
-    line = SimulatedLine(
-        bus, lambda frame: modbus.with_check_sum(bytes((frame[0], frame[1] | 0x80, code))), lambda: 0.002, rng
-    )
-    job = Observed([modbus.read(1, 3, 0, 4)], 0.02, lambda: 0)
-    bus.add(job)
-    line.run(lambda: line.now >= 10.0)
+    def slave(frame, number):
+        return modbus.with_check_sum(bytes((frame[0], frame[1] | 0x80, code)))
+
+    line = Line(slave, lambda rng: 0.002, 4, timeout_s=0.02, longest_s=0.02)
+    job = Stamped(line, 1, 0.02, ask=4)
+    line.run(10.0)
     assert job.delivered == 0
-    assert 0 <= line.requests - bus.counts.exceptions <= 1
+    assert 0 <= line.requests - line.bus.counts.exceptions <= 1
     assert line.requests <= (12 if code < 4 else 130)
 
 
 def test_replies_in_anothers_name_are_counted_as_wrong():
-    bus = ModbusBus(115_200, timeout_s=0.02, longest_s=0.02)
-    rng = random.Random(5)
-    line = SimulatedLine(bus, lambda frame: modbus.with_check_sum(bytes((9, 3, 8)) + bytes(8)), lambda: 0.002, rng)
-    job = Observed([modbus.read(1, 3, 0, 4)], 0.02, lambda: 0)
-    bus.add(job)
-    line.run(lambda: line.now >= 5.0)
+    def slave(frame, number):
+        return modbus.with_check_sum(bytes((9, 3, 8)) + bytes(8))
+
+    line = Line(slave, lambda rng: 0.002, 5, timeout_s=0.02, longest_s=0.02)
+    job = Stamped(line, 1, 0.02, ask=4)
+    line.run(5.0)
     assert job.delivered == 0
-    assert bus.counts.wrong == bus.counts.timeouts > 8
+    assert line.bus.counts.wrong == line.bus.counts.timeouts > 8
 
 
 def test_a_babbling_line_is_still_asked_now_and_then():
     bus = ModbusBus(9600, timeout_s=0.02, longest_s=0.02)
     sent = []
     bus.attach(lambda frame: sent.append(frame) or True)
-    bus.add(Observed([modbus.read(1, 3, 0, 4)], 0.02, lambda: 0))
+    bus.add(Poll([modbus.read(1, 3, 0, 4)], 0.02, lambda *reply: None, Health("asked")))
     bus.connected(0.0)
     rng, now = random.Random(6), 0.0
     while now < 10.0:

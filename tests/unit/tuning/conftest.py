@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from firmware.model.strict import decode
+from hal.strict import decode
 from sim_backend.board import SimBoardFile
 from tools.data.sources import load_vehicle
 from tools.flight.compose import load_board_file

@@ -6,8 +6,8 @@ Only the plant's matrices are shared with tools/study/tuning; wiring, delays, ob
 import control
 import numpy as np
 
-from firmware.control.gains import Control
 from firmware.core.vehicle.layout import M_R, M_S, R_R, R_S, X_B
+from firmware.model.gains import Control
 from tools.study.tuning.linear_plant import Plant
 from tools.study.tuning.loops import Delays
 

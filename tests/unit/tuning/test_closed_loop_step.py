@@ -8,9 +8,9 @@ from independent_loops import closed
 from test_plant import flight_state
 
 from firmware.autopilot import Autopilot, configuration
-from firmware.control.gains import Control
 from firmware.core.vehicle.layout import N_X, X_POS
 from firmware.guidance.mission import Leg, Mission, Site
+from firmware.model.gains import Control
 from sim_backend.core.closed_loop import N_END, N_TRACE, TRACE, fly
 from sim_backend.world import Environment, Start, build_world
 from tools.study.tuning.linear_plant import DESIGN_TRIMS, OTHER_TRIMS, linearise, steady_glide

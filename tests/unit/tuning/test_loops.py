@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from independent_loops import closed, opened
 
-from firmware.control.gains import Control
+from firmware.model.gains import Control
 from tools.study.tuning.linear_plant import DESIGN_TRIMS, OTHER_TRIMS, linearise
 from tools.study.tuning.loops import OMEGA, Delays, depth_terms, margins, open_loop, pitch_terms
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from independent_loops import closed, opened
 
-from firmware.control.gains import Control, DepthGains, PitchGains, ReferenceTable
+from firmware.model.gains import Control, DepthGains, PitchGains, ReferenceTable
 from tools.data.errors import InputError
 from tools.study.tuning import rule
 from tools.study.tuning.linear_plant import DESIGN_TRIMS, OTHER_TRIMS, linearise
@@ -45,7 +45,7 @@ def test_ti_is_twice_td(ruled):
 
 
 def test_the_defaults_are_the_rules_gains(ruled):
-    """What ships in firmware/control/gains.py is what `glider tune` prints for the vehicle that ships."""
+    """What ships in firmware/model/gains.py is what `glider tune` prints for the vehicle that ships."""
     assert ruled.pitch == PitchGains()
     assert ruled.depth == DepthGains()
 

@@ -4,7 +4,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from firmware.control.gains import BEST_TUNED, Control, DepthGains, PitchGains
+from firmware.model.gains import BEST_TUNED, Control, DepthGains, PitchGains
 from sim_backend.core.closed_loop import END_ERROR_DEPTH, END_ERROR_PITCH, END_TRAVEL_SLIDER, N_END, N_TRACE, TRACE, fly
 from tools.flight.compose import build_flight
 from tools.study.tuning import manoeuvres, search

@@ -6,8 +6,8 @@ import tomllib
 import pytest
 from click.testing import CliRunner
 
-from firmware.control.gains import Control
 from firmware.guidance.mission import decode_mission
+from firmware.model.gains import Control
 from tools.cli.tune import tune
 from tools.data.errors import InputError
 

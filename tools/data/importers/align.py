@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from firmware.core.maths.rotations import wrap
 from tools.data.errors import InputError
 from tools.data.importers.qualisys import Capture
-from tools.data.importers.resample import wrapped
 from tools.data.runs import columns as names
 from tools.data.runs.run import Run
 
@@ -80,9 +80,9 @@ def aligned(run: Run, capture: Capture, offset: Offset) -> Run:
         x = capture.pose[:, n]
         change = x[row + 1] - x[row]
         if n >= 3:
-            change = wrapped(change)
+            change = wrap(change)
         value = x[row] + share * change
         if n >= 3:
-            value = wrapped(value)
+            value = wrap(value)
         columns[name] = np.where(inside, value, np.nan)
     return Run(run.name, run.path, columns, run.extra)

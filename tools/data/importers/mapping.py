@@ -13,7 +13,7 @@ from typing import Annotated, Literal
 import msgspec
 
 from firmware.core.vehicle.layout import GRAVITY
-from firmware.model.strict import ConfigError, Table, decode, locate
+from hal.strict import ConfigError, Table, decode, locate
 from hal.units import UNITS, units_of
 from tools.data.errors import InputError
 from tools.data.runs import columns as names

@@ -2,10 +2,7 @@
 
 import numpy as np
 
-
-def wrapped(angle: np.ndarray) -> np.ndarray:
-    """An angle, rad, in [-pi, pi)."""
-    return (angle + np.pi) % (2.0 * np.pi) - np.pi
+from firmware.core.maths.rotations import wrap
 
 
 def bins_of(t: np.ndarray, start_s: float, rate_hz: float) -> np.ndarray:
@@ -29,7 +26,7 @@ def means(values: np.ndarray, bins: np.ndarray, rows: int, angle: bool) -> np.nd
     first = np.zeros(rows)
     if angle:
         first[place[::-1]] = taken[::-1]
-        total = np.bincount(place, wrapped(taken - first[place]), minlength=rows)
+        total = np.bincount(place, wrap(taken - first[place]), minlength=rows)
     else:
         total = np.bincount(place, taken, minlength=rows)
     mean = np.full(rows, np.nan)
@@ -40,7 +37,7 @@ def means(values: np.ndarray, bins: np.ndarray, rows: int, angle: bool) -> np.nd
 
 def _as_the_samples(angle: np.ndarray, samples: np.ndarray) -> np.ndarray:
     """Wrapped where all samples are."""
-    return wrapped(angle) if samples.size and np.abs(samples).max() <= np.pi + 1e-9 else angle
+    return wrap(angle) if samples.size and np.abs(samples).max() <= np.pi + 1e-9 else angle
 
 
 def fill_gaps(
@@ -56,7 +53,7 @@ def fill_gaps(
     span = times[after] - times[before]
     share = (grid_s - times[before]) / span
     step = samples[after] - samples[before]
-    between = samples[before] + share * (wrapped(step) if angle else step)
+    between = samples[before] + share * (wrap(step) if angle else step)
     if angle:
         between = _as_the_samples(between, samples)
     use = np.isnan(mean) & (span <= max_gap_s) & (share >= 0.0) & (share <= 1.0)

@@ -13,11 +13,11 @@ import numpy as np
 from msgspec import structs
 
 from firmware.model.library import shipped
-from firmware.model.strict import Table, decode
 from firmware.model.vehicle import decode_vehicle
 from hal.recorder import disk
 from hal.recorder.logfile import LogFile
 from hal.recorder.schema import Field, RecordSpec
+from hal.strict import Table, decode
 from tools.data.errors import InputError
 from tools.data.log.reader import Log, Topic
 from tools.data.runs import columns as names

@@ -8,8 +8,8 @@ from typing import Annotated, Any
 
 import msgspec
 
-from firmware.model.strict import MAX_BYTES, Table, decode
 from firmware.model.vehicle import DisturbanceTable, NonNegative, SensorsTable, SensorTable, Vehicle
+from hal.strict import MAX_BYTES, Table, decode
 from tools.data.errors import InputError
 from tools.data.runs import csvfile
 from tools.data.runs.run import Run, load_run, run_name, write_run

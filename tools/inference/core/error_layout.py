@@ -5,7 +5,7 @@ filter has them; then how late motion capture is (s). Behind them, where the fil
 (core/lacking).
 """
 
-from firmware.core.estimation.estimator_layout import E_ACT, E_ATT, E_NU, E_POS
+from firmware.core.layouts.estimator_layout import E_ACT, E_ATT, E_NU, E_POS
 
 __all__ = ["E_ACT", "E_ATT", "E_DOWN", "E_LATE", "E_NU", "E_POS", "N_ERR", "N_PATH", "N_SPECTRAL", "Q_ACC", "Q_ACT",
            "Q_LATE", "Q_POS"]  # fmt: skip

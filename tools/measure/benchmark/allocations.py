@@ -98,8 +98,3 @@ def _count(function: Callable[[], object], times: int) -> np.ndarray:
         for domain, (original, _, _, _) in hooks.items():
             setter(domain, ctypes.byref(original))
     return np.sum([counts for _, _, counts, _ in hooks.values()], axis=0)
-
-
-def largest_block(function: Callable[[], object], times: int = 200) -> int:
-    """Size in bytes of the largest block that a call of `function` asks for; 0 if it asks for none."""
-    return max(blocks_asked_for(function, times), default=0)

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from firmware.core.control.control_layout import CONTROLLER
 from firmware.core.control.controllers import CONTROLLERS
+from firmware.core.layouts.control_layout import CONTROLLER
 from sim_backend.board import world_of
 from sim_backend.core.closed_loop import N_END, N_TRACE, fly
 from tools.flight.compose import build_flight

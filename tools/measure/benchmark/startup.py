@@ -1,4 +1,4 @@
-"""How long a person waits before the first word."""
+"""How long a person waits before the first word; as a program, gets ready to fly, ticks once and says so."""
 
 import shutil
 import subprocess
@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 from tools.measure.benchmark.registry import Settings
+from tools.measure.benchmark.tick import harness
 from tools.measure.benchmark.timing import median, process_seconds, seconds
 
 
@@ -17,7 +18,7 @@ def glider_command() -> list[str]:
 
 def _first_tick() -> None:
     """Start a process that gets ready to fly, and wait until it has ticked once."""
-    command = [sys.executable, "-m", "tools.measure.benchmark.first_tick"]
+    command = [sys.executable, "-m", "tools.measure.benchmark.startup"]
     with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
         assert process.stdout is not None
         if process.stdout.readline() != b"ticked\n":
@@ -36,3 +37,9 @@ def measure(settings: Settings) -> dict[str, float]:
         "help_s": median([process_seconds(command) for _ in range(2 * settings.repeats + 1)]),
         "first_tick_s": median([seconds(_first_tick) for _ in range(settings.repeats)]),
     }
+
+
+if __name__ == "__main__":
+    with harness() as flown:
+        flown.runtime.tick()
+        print("ticked", flush=True)

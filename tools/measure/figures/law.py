@@ -18,7 +18,7 @@ from firmware.core.maths.rotations import euler_from_quaternion, quaternion_from
 from firmware.core.vehicle import layout
 from firmware.core.vehicle.flight import nominal_derivative, nominal_run
 from firmware.core.vehicle.motion import accelerations
-from firmware.estimation.settings import parameter_sigma
+from firmware.model.estimator_settings import parameter_sigma
 from firmware.model.vehicle import Vehicle
 from tools.data.sources import load_vehicle
 

@@ -156,7 +156,7 @@ def _in_child(flight: Any, folder: Path, kill_after_s: float | None) -> Told:
 
 def _live(flight: Any, folder: Path, pipe: int) -> None:
     """What `glider fly` does between its start and its end, on the simulated board."""
-    from firmware.core.control import control_layout as ctl
+    from firmware.core.layouts import control_layout as ctl
     from hal.recorder.recorder import NullRecorder
     from hal.state_file import Phase
     from tools.flight.compose import build_runtime, record_specs

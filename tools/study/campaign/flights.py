@@ -5,22 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from firmware.core.control import control_layout as ctl
+from firmware.core.layouts import control_layout as ctl
 from firmware.core.vehicle import layout
-from sim_backend.core.closed_loop import (
-    END_ERROR_DEPTH,
-    END_ERROR_PITCH,
-    END_ERROR_ROLL,
-    END_LEG,
-    END_MODE,
-    END_REASON,
-    END_TIME,
-    END_TRAVEL_SERVO,
-    N_END,
-    N_TRACE,
-    TRACE,
-    fly,
-)  # fmt: skip
+from sim_backend.core import closed_loop
 from tools.data.errors import InputError
 from tools.study.campaign.fingerprint import fingerprint
 from tools.study.campaign.plan import Plan
@@ -108,15 +95,18 @@ def _past_limits(P: np.ndarray, commands: np.ndarray, seconds: float) -> tuple[f
 
 def _worst_attitude(flown: np.ndarray) -> float:
     """Most (rad) that the plant's pitch or roll is off its reference in the lines of a trace; NaN if one is NaN."""
-    off = [flown[:, TRACE.index(f"true_{name}")] - flown[:, TRACE.index(f"ref_{name}")] for name in ("pitch", "roll")]
+    off = [
+        flown[:, closed_loop.TRACE.index(f"true_{name}")] - flown[:, closed_loop.TRACE.index(f"ref_{name}")]
+        for name in ("pitch", "roll")
+    ]
     return float(np.abs(np.angle(np.exp(1j * np.array(off)))).max())
 
 
 def _ending(end: np.ndarray, deepest: float, site: float, over: tuple[float, float], attitude: float) -> float:
     """How a flight ended, a key of ENDINGS."""
-    if end[END_MODE] == ctl.ABORTED:
-        return float(end[END_REASON])
-    if end[END_MODE] != ctl.COMPLETED:
+    if end[closed_loop.END_MODE] == ctl.ABORTED:
+        return float(end[closed_loop.END_REASON])
+    if end[closed_loop.END_MODE] != ctl.COMPLETED:
         return STILL_FLYING
     if not deepest <= site:
         return UNSEEN_DEPTH
@@ -130,9 +120,10 @@ def _ending(end: np.ndarray, deepest: float, site: float, over: tuple[float, flo
 def compile_loop(plan: Plan) -> None:
     """Compile the loop into the kernels' cache, or find it there, before processes that would each do it themselves."""
     pilot, world = plan.pilot(0, plan.campaign.controllers[0]), draw_world(plan, 0, plan.campaign.first_seed).world
-    fly(
+    closed_loop.fly(
         world.P, pilot.P, pilot.C, pilot.legs, pilot.nav, world.E, world.F, world.waves, world.sensors,
-        world.errors, world.seed, world.x, world.dt, 0, 1, np.zeros((1, N_TRACE)), np.zeros(N_END),
+        world.errors, world.seed, world.x, world.dt, 0, 1, np.zeros((1, closed_loop.N_TRACE)),
+        np.zeros(closed_loop.N_END),
     )  # fmt: skip
 
 
@@ -150,8 +141,8 @@ def fly_chunk(job: Job, chunk: Chunk) -> np.ndarray:
     most_ticks = int(_longest(plan, chunk.mission) / plan.step)
     # One flight after the other from the loop that fly_many shares out over threads: here the cores are shared out
     # by process, and one trace serves all.
-    trace, end = np.zeros((most_ticks // every + 1, N_TRACE)), np.zeros(N_END)
-    command, depth = TRACE.index("servo"), TRACE.index("true_depth")
+    trace, end = np.zeros((most_ticks // every + 1, closed_loop.N_TRACE)), np.zeros(closed_loop.N_END)
+    command, depth = closed_loop.TRACE.index("servo"), closed_loop.TRACE.index("true_depth")
     pilots = [plan.pilot(chunk.mission, name) for name in plan.campaign.controllers]
     held = bool(np.isfinite(pilots[0].legs[:, ctl.LEG_BALLAST]).any())  # the depth then keeps to no reference
     rows = []
@@ -159,7 +150,7 @@ def fly_chunk(job: Job, chunk: Chunk) -> np.ndarray:
         drawn = draw_world(plan, chunk.mission, seed)
         world = drawn.world
         for number, pilot in enumerate(pilots):
-            ticks = fly(
+            ticks = closed_loop.fly(
                 world.P, pilot.P, pilot.C, pilot.legs, pilot.nav, world.E, world.F, world.waves, world.sensors,
                 world.errors, world.seed, world.x.copy(), world.dt, most_ticks, every, trace, end,
             )  # fmt: skip
@@ -172,10 +163,11 @@ def fly_chunk(job: Job, chunk: Chunk) -> np.ndarray:
                 (
                     chunk.mission, number, seed,
                     drawn.current, drawn.wave_height, drawn.wave_period, drawn.disturbance, drawn.start_depth,
-                    end[END_MODE] == ctl.COMPLETED, ended == ctl.REASON_NONE, ended,
-                    end[END_LEG], end[END_TIME],
-                    np.nan if held else end[END_ERROR_DEPTH], end[END_ERROR_PITCH], end[END_ERROR_ROLL],
-                    *end[END_TRAVEL_SERVO : END_TRAVEL_SERVO + 3],
+                    end[closed_loop.END_MODE] == ctl.COMPLETED, ended == ctl.REASON_NONE, ended,
+                    end[closed_loop.END_LEG], end[closed_loop.END_TIME],
+                    np.nan if held else end[closed_loop.END_ERROR_DEPTH],
+                    end[closed_loop.END_ERROR_PITCH], end[closed_loop.END_ERROR_ROLL],
+                    *end[closed_loop.END_TRAVEL_SERVO : closed_loop.END_TRAVEL_SERVO + 3],
                     deepest, *over, attitude,
                 )
             )  # fmt: skip

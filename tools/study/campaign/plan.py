@@ -11,12 +11,12 @@ import msgspec
 import numpy as np
 
 from firmware.autopilot import Autopilot, configuration
-from firmware.control import gains
-from firmware.control.gains import Control
 from firmware.core.control.controllers import CONTROLLERS
 from firmware.guidance.mission import Mission, decode_mission
-from firmware.model.strict import Table, decode
+from firmware.model import gains
+from firmware.model.gains import Control
 from firmware.model.vehicle import Vehicle
+from hal.strict import Table, decode
 from sim_backend.board import SimBoardFile
 from sim_backend.core.effects.catalogue import check_board
 from tools.data.errors import InputError

@@ -37,11 +37,7 @@ def _spread(values: np.ndarray) -> dict[str, float | None]:
     values = values[np.isfinite(values)]
     if not values.size:
         return {"mean": None, "median": None, "p90": None}
-    return {
-        "mean": float(values.mean()),
-        "median": float(np.median(values)),
-        "p90": float(np.percentile(values, 90.0)),
-    }
+    return {"mean": float(values.mean()), "median": float(np.median(values)), "p90": float(np.percentile(values, 90.0))}
 
 
 def completed_by_all(flown: Flown) -> np.ndarray:

@@ -12,16 +12,7 @@ from tools.data.runs.case import write_case
 from tools.study.challenge.design import FITTED, LAKE, POOL
 from tools.study.challenge.magnitude import Magnitude, choose
 from tools.study.challenge.plan import UNKNOWN, CasePlan, forms_of
-from tools.study.challenge.trial import (
-    Flight,
-    Trial,
-    draw_trial,
-    flyable,
-    predictable,
-    redraw,
-    total,
-    with_effect,
-)
+from tools.study.challenge.trial import Flight, Trial, draw_trial, flyable, predictable, redraw, total, with_effect
 
 LOG_RATE, DENSITY = 10.0, 998.0  # Hz, kg/m3
 TRIES, GIVE_WAY = 12, 4

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from firmware.estimation.settings import parameter_sigma
+from firmware.model.estimator_settings import parameter_sigma
 from firmware.model.vehicle import Vehicle
 from tools.gap.measure import errors
 from tools.inference.channels import ROUGHIE_MEASURES

@@ -8,14 +8,7 @@ import numpy as np
 from tools.study.challenge.design import FITTED
 from tools.study.challenge.evidence import evidence as weigh
 from tools.study.challenge.forms import Form
-from tools.study.challenge.trial import (
-    Trial,
-    by_channel,
-    flyable,
-    predictable,
-    total,
-    with_effect,
-)
+from tools.study.challenge.trial import Trial, by_channel, flyable, predictable, total, with_effect
 
 LEAST, WEAK, STRONG = 2.0, 8.0, 25.0  # gap over floor
 WEIGHED = 4  # runs

@@ -13,18 +13,9 @@ from firmware.model.vehicle import Vehicle
 from tools.data.errors import InputError
 from tools.data.runs.csvfile import write_bytes
 from tools.data.sources import load_vehicle
+from tools.study.challenge import seal
 from tools.study.challenge.cases import NoCase, answer, draw_case, write
 from tools.study.challenge.plan import CasePlan, Counts, plan
-from tools.study.challenge.seal import (
-    MANIFEST,
-    PLAN,
-    as_json,
-    check_seal,
-    open_answers,
-    read_object,
-    seal,
-    write_manifest,
-)
 
 VEHICLE = "roughie"
 MAKING = ".making"  # answers until they are sealed
@@ -65,28 +56,28 @@ def make_one(order: Order, case: CasePlan, vehicle: Vehicle) -> str | None:
     except NoCase as error:
         return str(error)
     write(made, order.cases, order.held)
-    write_bytes(order.making / f"{case.name}.json", as_json(answer(made)))
+    write_bytes(order.making / f"{case.name}.json", seal.as_json(answer(made)))
     return None
 
 
 def _prepare(order: Order) -> bool:
     """Make the folders; whether everything has been made and sealed already."""
-    manifest = order.out / MANIFEST
+    manifest = order.out / seal.MANIFEST
     if manifest.exists():
-        sealed = open_answers(order.archive)
-        check_seal(sealed, manifest)
+        sealed = seal.open_answers(order.archive)
+        seal.check_seal(sealed, manifest)
         if sealed.plan != order.plain:
             raise InputError("holds another blind test (other seed or counts): name another folder", source=order.out)
         return True
     for folder in (order.cases, order.held, order.making, order.archive.parent):
         folder.mkdir(parents=True, exist_ok=True)
-    begun = order.making / PLAN
-    if begun.exists() and read_object(begun.read_bytes(), begun) != order.plain:
+    begun = order.making / seal.PLAN
+    if begun.exists() and seal.read_object(begun.read_bytes(), begun) != order.plain:
         raise InputError("holds the beginning of another blind test: name another folder", source=order.out)
     if not begun.exists():
         if any(order.cases.iterdir()) or any(order.held.iterdir()):
             raise InputError("already holds cases of something else: name another folder", source=order.out)
-        write_bytes(begun, as_json(order.plain))
+        write_bytes(begun, seal.as_json(order.plain))
     return False
 
 
@@ -129,7 +120,7 @@ def _seal(order: Order, cases: list[CasePlan]) -> None:
     answers = {}
     for case in cases:
         path = order.making / f"{case.name}.json"
-        answers[case.name] = read_object(path.read_bytes(), path)
-    sha256 = seal(order.archive, order.plain, answers)
-    write_manifest(order.out / MANIFEST, order.archive, sha256, order.cases, order.held)
+        answers[case.name] = seal.read_object(path.read_bytes(), path)
+    sha256 = seal.seal(order.archive, order.plain, answers)
+    seal.write_manifest(order.out / seal.MANIFEST, order.archive, sha256, order.cases, order.held)
     shutil.rmtree(order.making)

@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from firmware.supervisor.table import FAULTS
+from firmware.faults import FAULTS
 from tools.study.faults.cases import Case, Show
 from tools.study.faults.flights import flown
 from tools.study.faults.scene import build_scene, fly

@@ -4,15 +4,20 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from firmware.supervisor.table import Reaction
+from firmware.faults import Reaction
 from tools.study.faults.scene import PHASES, Setting
 
 Came = tuple[float | None, str, str]  # of a fault that is shown: noticed after s, reaction, how it ended
-SAFE, DAMAGE = "safe", "damaged"
+SAFE, DAMAGE, LOST = "safe", "damaged", "lost"
 UNDER_WAY = ("descent", "level", "ascent")
 MOVING = ("descent", "ascent")
 ALL = PHASES
 PLAIN = Setting()
+
+
+def came(good: bool, well: str, ill: str, *, end: str = LOST, after: float = 0.0) -> Came:
+    """A fault's outcome: noticed `after` s with the reaction `well`, safe; else never, `ill`, ended as `end` says."""
+    return (after, well, SAFE) if good else (None, ill, end)
 
 
 @dataclass(frozen=True)

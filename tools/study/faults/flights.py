@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from firmware.core.control import control_layout as ctl
+from firmware.core.layouts import control_layout as ctl
+from firmware.core.layouts import supervisor_layout as sup
 from firmware.core.maths.rotations import euler_from_quaternion
-from firmware.core.supervision import supervisor_layout as sup
 from firmware.core.vehicle.layout import CG_X, CG_Y, X_ACT, X_QUAT
-from firmware.supervisor.settings import Limits
-from firmware.supervisor.table import Reaction
+from firmware.faults import Reaction
+from firmware.model.supervisor_settings import Limits
 from tools.study.faults.cases import ALL, MOVING, UNDER_WAY, Case
 from tools.study.faults.scene import Scene, Setting
 

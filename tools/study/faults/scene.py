@@ -11,11 +11,11 @@ from typing import Any
 import msgspec
 
 from firmware.autopilot import Autopilot
-from firmware.core.control import control_layout as ctl
+from firmware.core.layouts import control_layout as ctl
+from firmware.faults import Reaction
+from firmware.model.supervisor_settings import Limits
 from firmware.runtime import RESOURCES_S, Runtime
-from firmware.supervisor.settings import Limits
-from firmware.supervisor.supervisor import Supervisor
-from firmware.supervisor.table import Reaction
+from firmware.supervisor import Supervisor
 from firmware.telemetry import TICK
 from hal.recorder.recorder import NullRecorder
 from sim_backend.board import SimBoard

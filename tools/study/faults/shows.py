@@ -7,7 +7,7 @@ row has to fail, which shows that it is this that notices.
 
 import signal
 
-from firmware.core.supervision import supervisor_layout as sup
+from firmware.core.layouts import supervisor_layout as sup
 from tools.study.faults.cases import Show
 from tools.study.faults.shown import console, loading, ports, processes, records, wire
 

@@ -1,4 +1,4 @@
-"""A Modbus line in simulated time, for faults: a slave function answers the real master after a delay, or never."""
+"""A Modbus line in simulated time: slaves that answer the real master late, or not at all, or in another's name."""
 
 import heapq
 import math
@@ -13,7 +13,10 @@ from hal.protocols.modbus_master import ModbusBus
 
 
 class Line:
-    """slave(frame, number of the request) gives a reply's bytes; delay(rng) the seconds before it, inf: never."""
+    """slave(frame, number of the request) gives a reply's bytes; delay(rng) the seconds before it, inf: never.
+
+    Replies come whole or in two pieces, and damage each other where they overlap. Time moves only by `run`.
+    """
 
     def __init__(
         self, slave: Callable[[bytes, int], bytes], delay: Callable[[random.Random], float], seed: int, *,
@@ -24,6 +27,7 @@ class Line:
         self.now, self.requests = 0.0, 0
         self._slave, self._delay, self._rng = slave, delay, random.Random(seed)
         self._coming: list[tuple[float, int, bytes]] = []
+        self._pieces = 0
         self.bus.attach(self._sent)
         self.bus.connected(0.0)
 
@@ -32,8 +36,12 @@ class Line:
         wait = self._delay(self._rng)
         if wait < math.inf:
             reply = self._slave(frame, self.requests)
-            done = self.now + (len(frame) + len(reply)) * self.bus.byte_s + wait
-            heapq.heappush(self._coming, (done, self.requests, reply))
+            cut = self._rng.randrange(1, len(reply)) if self._rng.random() < 0.3 else len(reply)
+            for piece, end in ((reply[:cut], cut), (reply[cut:], len(reply))):
+                if piece:
+                    self._pieces += 1
+                    done = self.now + (len(frame) + end) * self.bus.byte_s + wait
+                    heapq.heappush(self._coming, (done, self._pieces, piece))
         return True
 
     def run(self, until: float) -> None:

@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 
 from firmware.autopilot import Autopilot, configuration
-from firmware.control.gains import Control
+from firmware.model.gains import Control
 from firmware.model.vehicle import Vehicle
 from sim_backend.fleet import FleetResult, fly_fleet
 from tools.data.sources import load_mission

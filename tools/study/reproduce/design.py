@@ -12,8 +12,8 @@ import msgspec
 import numpy as np
 
 from firmware.autopilot import Autopilot, configuration
-from firmware.control.gains import Control
 from firmware.guidance.mission import Leg, Mission, Site
+from firmware.model.gains import Control
 from firmware.model.vehicle import Vehicle
 from sim_backend.fleet import FleetResult, fly_fleet
 from sim_backend.uncertainty import draw_parameters

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from firmware.control.gains import DepthGains, PitchGains
 from firmware.core.vehicle.layout import M_S, X_B
+from firmware.model.gains import DepthGains, PitchGains
 from sim_backend.board import SimBoardFile
 from sim_backend.world import SampledSensor
 from tools.study.tuning.linear_plant import Plant

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
-from firmware.control.gains import Control
+from firmware.model.gains import Control
 from firmware.model.vehicle import Vehicle
 from sim_backend.core.closed_loop import END_TRAVEL_BALLAST, END_TRAVEL_SERVO
 from tools.study.reproduce.design import SECONDS, Variant, fly_design

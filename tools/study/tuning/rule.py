@@ -19,8 +19,8 @@ import msgspec
 import numpy as np
 from scipy.optimize import fsolve
 
-from firmware.control.gains import Control, DepthGains, PitchGains
 from firmware.core.vehicle.layout import BALLAST_RATE, SLIDER_RATE
+from firmware.model.gains import Control, DepthGains, PitchGains
 from firmware.model.vehicle import Vehicle
 from sim_backend.board import SimBoardFile
 from tools.data.errors import InputError

@@ -18,7 +18,7 @@ import msgspec
 import numpy as np
 from scipy.optimize import Bounds, differential_evolution, minimize
 
-from firmware.control.gains import Control
+from firmware.model.gains import Control
 from firmware.model.vehicle import Vehicle
 from tools.study.tuning.manoeuvres import FIGURES, STRENGTHS, Score, fly
 

@@ -4,7 +4,7 @@ import contextlib
 import random
 from pathlib import Path
 
-from tools.study.faults.cases import SAFE, Came
+from tools.study.faults.cases import Came, came
 
 
 def console(disabled: bool, folder: Path) -> Came:
@@ -37,4 +37,4 @@ def console(disabled: bool, folder: Path) -> Came:
         state = bench.snapshot()
     moved = any(item["target"] is not None for item in state["actuators"].values())
     good = not state["enabled"] and not moved and survived == 150
-    return (0.0 if good else None), "no effect" if good else "actuators moved", SAFE if good else "lost"
+    return came(good, "no effect", "actuators moved")

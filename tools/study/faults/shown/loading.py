@@ -4,9 +4,9 @@ import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
-from firmware.supervisor.settings import Limits
+from firmware.model.supervisor_settings import Limits
 from hal.strict import ConfigError
-from tools.study.faults.cases import SAFE, Came
+from tools.study.faults.cases import Came, came
 
 
 def arming(kind: str) -> Callable[[bool, Path], Came]:
@@ -39,7 +39,7 @@ def arming(kind: str) -> Callable[[bool, Path], Came]:
             doubtful.close()
         checks = Arming(flight, folder=folder, hardware=True).run(disabled)
         refused = any(not check.passed for check in checks)
-        return (0.0 if refused else None), "refuse to arm" if refused else "armed", SAFE if refused else "lost"
+        return came(refused, "refuse to arm", "armed")
 
     return show
 
@@ -72,9 +72,4 @@ def bad_files(disabled: bool, folder: Path) -> Came:
             tomllib.loads(text) if disabled else decode(text, "file.toml")
         except ConfigError as error:
             refused += "file.toml:" in str(error) and key in str(error) and "\n" not in str(error)
-    good = refused == len(bad)
-    return (
-        (0.0 if good else None),
-        "refused" if good else f"{len(bad) - refused} of {len(bad)} read",
-        (SAFE if good else "lost"),
-    )
+    return came(refused == len(bad), "refused", f"{len(bad) - refused} of {len(bad)} read")

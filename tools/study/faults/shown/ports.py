@@ -8,7 +8,7 @@ from pathlib import Path
 
 from hal.transport.port import Busy, SerialPort
 from sim_backend.twins.line import open_pty
-from tools.study.faults.cases import SAFE, Came
+from tools.study.faults.cases import Came, came
 
 
 class SharedPort(SerialPort):
@@ -26,13 +26,13 @@ def two_programs(disabled: bool, folder: Path) -> Came:
     try:
         if disabled:
             SharedPort(path, 115_200).open()
-            return None, "opened twice", "lost"
+            return came(False, "refused", "opened twice")
         second = subprocess.run(held, capture_output=True, text=True, check=False)
         refused = "Busy" in second.stderr
         with contextlib.suppress(Busy):
             SerialPort(path, 115_200).open()
             refused = False
-        return (0.0 if refused else None), "refused" if refused else "opened twice", SAFE if refused else "lost"
+        return came(refused, "refused", "opened twice")
     finally:
         first.close()
         for fd in (master, slave):

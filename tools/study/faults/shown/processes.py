@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from tools.study.faults.cases import SAFE, Came
+from tools.study.faults.cases import Came, came
 
 BEATING = """
 import sys, time
@@ -58,7 +58,7 @@ def loop_ends(how: signal.Signals) -> Callable[[bool, Path], Came]:
                 noticed = time.monotonic() - begin if watch._ascent is not None else None
                 time.sleep(0.02)
             watch.close()
-        return noticed, "OOB" if noticed is not None else "none", SAFE if noticed is not None else "lost"
+        return came(noticed is not None, "OOB", "none", after=noticed or 0.0)
 
     return show
 
@@ -74,7 +74,7 @@ def restart(disabled: bool, folder: Path) -> Came:
         life = Life(folder, "after")
         ascends = life.ascent_only and not life.file.read().may_start
         resumed += disabled or not ascends
-    return (None if resumed else 0.0), "ascent only" if not resumed else "resumed", "lost" if resumed else SAFE
+    return came(not resumed, "ascent only", "resumed")
 
 
 @contextlib.contextmanager
@@ -110,5 +110,4 @@ def wall_clock(disabled: bool, folder: Path) -> Came:
             begin = time.monotonic()
             clock.sleep_until(before + 0.01)
             worst = max(worst, abs(clock.now() - before - (time.monotonic() - begin)))
-    steady = worst < 0.5
-    return (0.0 if steady else None), "no effect" if steady else f"{worst:.0f} s", SAFE if steady else "lost"
+    return came(worst < 0.5, "no effect", f"{worst:.0f} s")

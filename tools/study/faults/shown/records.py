@@ -12,7 +12,7 @@ from hal.state_file import FlightState, Phase, StateFile
 from tools.data.errors import InputError
 from tools.data.log.framing import CHUNK_HEAD, Scan
 from tools.data.log.reader import Topic, read_log
-from tools.study.faults.cases import DAMAGE, SAFE, Came
+from tools.study.faults.cases import DAMAGE, SAFE, Came, came
 
 
 class UncheckedScan(Scan):
@@ -91,12 +91,7 @@ def cut_log(disabled: bool, folder: Path) -> Came:
         wrong += int(np.any(data != np.round(data[:, :1])) or np.any(np.diff(first) <= 0.0))
         there = 25 * int(np.searchsorted(_ends(whole), cut, side="right"))
         lost = max(lost, 0.02 * (there - int(np.sum(first < there))))
-    good = wrong == 0 and lost <= 1.0
-    return (
-        (0.0 if good else None),
-        f"{wrong} damaged, {lost:.1f} s lost" if not good else "valid prefix",
-        (SAFE if good else DAMAGE),
-    )
+    return came(wrong == 0 and lost <= 1.0, "valid prefix", f"{wrong} damaged, {lost:.1f} s lost", end=DAMAGE)
 
 
 def _ticks(path: Path, scan: type[Scan]) -> Topic | None:
@@ -121,7 +116,7 @@ def _ends(whole: bytes) -> np.ndarray:
 
 def torn_state(disabled: bool, folder: Path) -> Came:
     """The power goes at every byte of a write of either copy; what is read has to be as bad as the worse of both."""
-    believed = 0
+    wrong_phase = 0
     for old, new in ((Phase.ASHORE, Phase.DIVING), (Phase.DIVING, Phase.ASHORE)):
         for copy in (0, 1):
             for cut in range(0, state_file.BLOCK, 7):
@@ -136,9 +131,5 @@ def torn_state(disabled: bool, folder: Path) -> Came:
                 found = (Trusting if disabled else StateFile)(folder).read()
                 untouched = old == Phase.ASHORE and copy == 0 and torn == kept  # nothing of it has changed yet
                 finished = new == Phase.ASHORE and copy == 1 and torn == block  # all of it has
-                believed += found.phase < Phase.DIVING and not (untouched or finished)
-    return (
-        (None if believed else 0.0),
-        "the worse wins" if not believed else f"{believed} believed",
-        ("lost" if believed else SAFE),
-    )
+                wrong_phase += found.phase < Phase.DIVING and not (untouched or finished)
+    return came(not wrong_phase, "the worse wins", f"{wrong_phase} taken for whole")

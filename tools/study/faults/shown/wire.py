@@ -14,7 +14,7 @@ from hal.drivers.vn100 import Vn100
 from hal.ports import Validity
 from hal.protocols import modbus, vn100
 from hal.protocols.registers import preset, to_registers
-from tools.study.faults.cases import DAMAGE, SAFE, Came
+from tools.study.faults.cases import DAMAGE, SAFE, Came, came
 from tools.study.faults.damaged_streams import codecs, run_codec
 from tools.study.faults.wire import Line, Stamped, stamp_reply
 
@@ -22,13 +22,13 @@ RATE_HZ = 100.0
 
 
 class UncheckedImu(vn100.Vn100Decoder):
-    """Believes any check sum."""
+    """Takes any check sum for right."""
 
     crc = staticmethod(lambda data, start: 0)
 
 
 class UncheckedModbus(modbus.RtuDecoder):
-    """Believes any check sum."""
+    """Takes any check sum for right."""
 
     check_sum_holds = staticmethod(lambda frame: True)
 
@@ -174,5 +174,4 @@ def hostile_bytes(disabled: bool, folder: Path) -> Came:
             decoder, rng = codec.make(), random.Random(31)
             made_up += sum(len(decoder.feed(rng.randbytes(512))) for _ in range(400))
     good = not bad and not made_up
-    longest_s = 256 * 10 / 9600
-    return (longest_s if good else None), "back in step" if good else f"{made_up} made up", SAFE if good else DAMAGE
+    return came(good, "back in step", f"{made_up} made up", end=DAMAGE, after=256 * 10 / 9600)

@@ -9,9 +9,9 @@ from typing import Annotated
 import msgspec
 import numpy as np
 
-from firmware.core.supervision import supervisor_layout as sup
-from firmware.model.strict import Table
+from firmware.core.layouts import supervisor_layout as sup
 from hal.ports import STALL_REST_S, STALL_TRIES
+from hal.strict import Table
 
 Seconds = Annotated[float, msgspec.Meta(gt=0.0, le=3600.0)]
 Short = Annotated[float, msgspec.Meta(gt=0.0, le=10.0)]
@@ -150,7 +150,7 @@ def _scalars(
         sup.LAW_RUN: table.law_tries, sup.LAW_REST: table.law_rest_s,
         sup.LOW_VOLTAGE: limits.low_voltage or 0.0, sup.LEAST_VOLTAGE: limits.least_voltage or 0.0,
         sup.VOLTAGE_TIME: table.voltage_s, sup.OVERRUN_RUN: table.overruns, sup.OVERRUN_SHARE: table.overrun_share,
-        sup.MISSION_TIME: mission_time, sup.STALL_FACTOR: table.stall_factor, sup.STALL_TRIES: table.stall_tries,
+        sup.MISSION_TIME: mission_time, sup.STALL_FACTOR: table.stall_factor, sup.STALL_COUNT: table.stall_tries,
         sup.STALL_REST: table.stall_rest_s, sup.SURFACE_DEPTH: table.surface_m,
         sup.WRONG_TICKS: min(max(round(table.wrong_way_s / dt), 2), sup.N_RING - 1),
         sup.DELAY_TICKS: min(max(round(table.longest_delay_s / dt), 2), sup.N_RING - 1),

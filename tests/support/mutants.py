@@ -1,4 +1,4 @@
-"""`python -m tools.measure.mutants FOLDER`: mutants of the supervisor's and limits' code, by mutmut: do tests notice?
+"""`python -m tests.support.mutants FOLDER`: mutants of the supervisor's and limits' code, by mutmut: do tests notice?
 
 mutmut leaves decorated functions alone, and a compiled kernel shows it nothing: the copy that it works on has no
 `@kernel`, which is what GLIDER_JIT=0 makes of it anyway. Needs `pip install mutmut`; takes some minutes.
@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parents[2]
 MUTATED = (
     "firmware/core/supervision/supervisor.py", "firmware/core/supervision/detectors.py",
     "firmware/core/supervision/screening.py",
-    "firmware/core/supervision/limits.py", "firmware/supervisor/settings.py",
+    "firmware/core/vehicle/actuators.py", "firmware/model/supervisor_settings.py",
 )  # fmt: skip
 PARTS = ("firmware", "hal", "sim_backend", "tools", "tests/support", "tests/unit/supervisor", "tests/conftest.py")
 CONFIG = """

@@ -1,9 +1,9 @@
-"""Where things stand in the autopilot's vectors: C its configuration, est what it believes, ap what it remembers.
+"""Where things stand in the autopilot's vectors: C its configuration, est the estimate, ap its memory.
 
 Missions come as a matrix, one row a leg; nav is the estimator's own memory. SI and radians.
 """
 
-from firmware.core.estimation.estimator_layout import N_E, N_S, N_W, N_WORK_ROWS, N_XE, N_Z
+from firmware.core.layouts.estimator_layout import N_E, N_S, N_W, N_WORK_ROWS, N_XE, N_Z
 from firmware.core.vehicle.layout import N_P, N_X
 
 # --- C: configuration -----------------------------------------------------------------------------------------------

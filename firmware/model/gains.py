@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import msgspec
 
 from firmware.core.control.controllers import CONTROLLERS
-from firmware.model.strict import Table
+from hal.strict import Table
 
 if TYPE_CHECKING:
     Name = str
@@ -141,7 +141,4 @@ class Control(Table):
 
 
 # The best-tuned PID: gains that track the paper's manoeuvres under noise best, whatever their margins (docs/TUNING.md).
-BEST_TUNED = Control(
-    pitch=PitchGains(kp=0.214, ki=0.0652, kd=0.279),
-    depth=DepthGains(kp=0.949, ki=0.00112, kd=2.84),
-)
+BEST_TUNED = Control(pitch=PitchGains(kp=0.214, ki=0.0652, kd=0.279), depth=DepthGains(kp=0.949, ki=0.00112, kd=2.84))

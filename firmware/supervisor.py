@@ -8,13 +8,13 @@ import math
 import numpy as np
 
 from firmware.autopilot import Autopilot
-from firmware.core.supervision import supervisor_layout as sup
+from firmware.core.layouts import supervisor_layout as sup
 from firmware.core.supervision.screening import screen
 from firmware.core.supervision.supervisor import guard
+from firmware.faults import FAULTS, Reaction
 from firmware.guidance.mission import Mission
+from firmware.model.supervisor_settings import Limits, settings_vector
 from firmware.model.vehicle import Vehicle
-from firmware.supervisor.settings import Limits, settings_vector
-from firmware.supervisor.table import FAULTS, Reaction
 
 
 class Supervisor:

@@ -7,7 +7,7 @@ From ABORT on a reaction is latched.
 
 from enum import IntEnum
 
-from firmware.core.supervision import supervisor_layout as sup
+from firmware.core.layouts import supervisor_layout as sup
 
 
 class Reaction(IntEnum):

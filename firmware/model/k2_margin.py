@@ -9,14 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from firmware.control.gains import Control, LawGains
 from firmware.core.control.control import pitch_feedforward
 from firmware.core.control.error_bound import model_error_bound
 from firmware.core.control.input_forms import exact_form
 from firmware.core.control.law import k2_to_cover
 from firmware.core.vehicle import layout
 from firmware.core.vehicle.mass import swung_moment
-from firmware.estimation.settings import parameter_sigma
+from firmware.model.estimator_settings import parameter_sigma
+from firmware.model.gains import Control, LawGains
 from firmware.model.vehicle import Vehicle
 
 PITCHES = tuple(math.radians(angle) for angle in (-45.0, -30.0, -15.0, 0.0, 15.0, 30.0, 45.0))

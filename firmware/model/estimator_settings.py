@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from firmware.core.estimation import estimator_layout as kf
+from firmware.core.layouts import estimator_layout as kf
 from firmware.core.vehicle import layout
 from firmware.model.vehicle import COEFFICIENTS, DisturbanceTable, SensorsTable, UncertaintyTable
 
