@@ -5,9 +5,12 @@ from pathlib import Path
 
 import pytest
 
-# A shell starts what it runs in the background with Ctrl-C ignored, and programs under test would inherit that.
+# A shell starts what it runs in the background with Ctrl-C or a hang-up ignored, and programs under test would inherit it.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+for ignored in (signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP):
+    if signal.getsignal(ignored) is signal.SIG_IGN:
+        signal.signal(ignored, signal.SIG_DFL)
 
 
 def pytest_addoption(parser):
