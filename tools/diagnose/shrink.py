@@ -10,7 +10,7 @@ from tools.gap.measure import RunGap, case_channels, root_mean_square, run_gap
 from tools.inference.fit import NUISANCE_LIMIT, Hypothesis, bounded_step
 from tools.inference.model import Model
 from tools.inference.parameters import model_at
-from tools.inference.predict import fly, predict
+from tools.inference.predict import fly, fly_windows_from, predict
 from tools.inference.problem import Problem, cut
 
 DRAWS = 2  # simulated repetitions that find the floor
@@ -71,9 +71,15 @@ def left_out(search: Search, hypothesis: Hypothesis) -> list[tuple[np.ndarray, n
 
 
 def gaps(
-    problem: Problem, models: list[tuple[np.ndarray, np.ndarray]], z: np.ndarray | None = None
+    problem: Problem,
+    models: list[tuple[np.ndarray, np.ndarray]],
+    z: np.ndarray | None = None,
+    own_filter: bool = False,
 ) -> tuple[list[RunGap], list[np.ndarray]]:
-    """Each run's own model's gap and prediction (rows, N_Y); `z` (rows, N_Y) in the place of what was measured."""
+    """Each run's own model's gap and prediction (rows, N_Y); `z` (rows, N_Y) in the place of what was measured.
+
+    own_filter: windows begin where the model's own filter stands, and not where the observer does.
+    """
     problem, found, flown = problem.as_recorded, [], []
     for n, (P, F) in enumerate(models):
         part = problem.part(n)
@@ -81,7 +87,7 @@ def gaps(
         if z is not None:
             table = z[problem.recording.bounds[n] : problem.recording.bounds[n + 1]]
             part.z = table
-        Y = fly(part, P, F)
+        Y = fly_windows_from(part, P, F, part.filter(P, F, begin=True)) if own_filter else fly(part, P, F)
         found.append(run_gap(part.kind.measures, part.runs[0], Y, cut(part).listed[0], table))
         flown.append(Y)
     return found, flown
@@ -132,8 +138,11 @@ def over_runs(
 
 
 def left_out_gap(search: Search, hypothesis: Hypothesis) -> float:
-    """The total gap of a candidate on runs left out, over the runs."""
-    runs, _ = gaps(search.problem, left_out(search, hypothesis))
+    """The total gap of a hypothesis on runs left out, over the runs, windows begun where its own filter stands.
+
+    Hypotheses are compared so: the observer that finds what a model lacks would take up what tells them apart.
+    """
+    runs, _ = gaps(search.problem, left_out(search, hypothesis), own_filter=True)
     return float(np.sqrt(squares(runs).mean()))
 
 
