@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-# A shell starts what it runs in the background with Ctrl-C or a hang-up ignored, and programs under test would inherit it.
+# A shell starts what it runs in the background with Ctrl-C or a hang-up ignored; programs under test would inherit it.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 for ignored in (signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP):

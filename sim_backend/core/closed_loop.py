@@ -81,7 +81,7 @@ def fly(P_plant, P, C, legs, nav, E, F, waves, sensors, errors, seed, x, dt, max
                 P_plant, effective, F, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, queue, work, dt, t
             )  # fmt: skip
         else:
-            move(P_plant, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, work, dt, t)
+            move(P_plant, F, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, work, dt, t)
         deliver(sensors, counters[wl.C_STEP] * dt, counters, ring, frame)
         if C[ctl.ESTIMATOR] == ctl.GIVEN:
             memory[ctl.NAV_GIVEN : ctl.NAV_GIVEN + N_X] = x[:N_X]
