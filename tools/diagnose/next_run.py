@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from firmware.core.maths.rotations import wrap
 from firmware.core.vehicle.layout import X_DOWN, X_NU, X_QUAT
 from firmware.core.vehicle.mass import swung_moment
 from sim_backend.core.effects import effect_layout as ef
 from tools.diagnose.search import Search
-from tools.gap.measure import wrap
 from tools.inference.problem import Problem
 
 SECONDS, RATE = 90.0, 10.0  # s, Hz

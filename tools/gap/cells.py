@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from firmware.core.maths.rotations import wrap
 from tools.data.runs.run import Run
 from tools.inference.channels import Measures
 from tools.inference.windows import Window
@@ -25,8 +26,7 @@ class Cells:
     def residual(self, table: np.ndarray, Y: np.ndarray) -> np.ndarray:
         """(table - Y) / tolerance at the scored samples; both (rows, N_Y)."""
         difference = table[self.rows, self.columns] - Y[self.rows, self.columns]
-        wrapped = (difference + np.pi) % (2.0 * np.pi) - np.pi
-        return np.where(self.wrapped, wrapped, difference) / self.scale
+        return np.where(self.wrapped, wrap(difference), difference) / self.scale
 
     def squared_gap(self, residual: np.ndarray) -> float:
         """Squared total gap of the case."""

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from firmware.core.maths.rotations import wrap
 from tools.data.runs.run import Run
 from tools.inference.channels import Channel, Measures
 from tools.inference.windows import Window
@@ -17,11 +18,6 @@ class RunGap:
     channels: dict[str, float]
     total: float
     windows: int  # scored ones
-
-
-def wrap(angles: np.ndarray) -> np.ndarray:
-    """Angles in rad brought to [-pi, pi)."""
-    return (angles + np.pi) % (2.0 * np.pi) - np.pi
 
 
 def scored_rows(listed: list[Window], rows: int) -> np.ndarray:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from firmware.core.maths.rotations import quaternion_from_euler
+from firmware.core.maths.rotations import quaternion_from_euler, wrap
 from firmware.core.vehicle import layout
 from firmware.model.estimator_settings import parameter_sigma
 from firmware.model.vehicle import COEFFICIENTS, SensorTable, Vehicle
@@ -23,7 +23,6 @@ from sim_backend.core.open_loop import fly_open_loop_many
 from tools.data.runs import columns as names
 from tools.data.runs.case import SensorsPart, write_case
 from tools.data.runs.run import Run
-from tools.gap.measure import wrap
 from tools.identify.parameters import coefficient_sizes
 
 BALLAST, SLIDER, SERVO = (1.0, 0.6, 0.2), (1.0, 0.5, 0.1), (1.0, 0.8, 0.6, 0.4, 0.2)
