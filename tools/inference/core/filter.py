@@ -43,7 +43,6 @@ from tools.inference.core.lacking import (
     take_gyro_bias,
 )
 from tools.inference.core.step import (
-    LARGEST_SPEED,
     N_Y,
     difference,
     inject_error,
@@ -54,6 +53,7 @@ from tools.inference.core.step import (
     read_row,
 )
 
+LOST_SPEED = 3.0  # m/s; a glider of this class flies at 0.2 to 0.7: an observer that thinks it faster has lost it
 NUDGE = 1e-5  # of the state's unit, for derivatives
 
 
@@ -233,6 +233,7 @@ def filter_run(
             lacking[n] += error[N_ERR + n]
         if count > N_ERR and lost(x, cov):  # by readings of no vehicle: it begins anew
             x[:] = base
+            x[X_NU:X_ACT] = start[X_NU:X_ACT]
             lacking[:] = 0.0
             K[i, :, :] = 0.0
             cov[:] = 0.0
@@ -251,9 +252,9 @@ def lost(x, cov):
         total += cov[n, n]
     for n in range(ef.N_XF):
         total += x[n]
-    for n in range(X_NU, X_ACT):
+    for n in range(X_NU, X_NU + 3):
         fastest = max(fastest, abs(x[n]))
-    return not (math.isfinite(total) and fastest < LARGEST_SPEED)
+    return not (math.isfinite(total) and fastest < LOST_SPEED)
 
 
 @kernel
