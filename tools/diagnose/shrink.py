@@ -10,7 +10,7 @@ from tools.gap.measure import RunGap, case_channels, root_mean_square, run_gap
 from tools.inference.fit import NUISANCE_LIMIT, Hypothesis, bounded_step
 from tools.inference.model import Model
 from tools.inference.parameters import model_at
-from tools.inference.predict import fly, fly_windows_from, predict
+from tools.inference.predict import fly, predict
 from tools.inference.problem import Problem, cut
 
 DRAWS = 2  # simulated repetitions that find the floor
@@ -78,7 +78,7 @@ def gaps(
 ) -> tuple[list[RunGap], list[np.ndarray]]:
     """Each run's own model's gap and prediction (rows, N_Y); `z` (rows, N_Y) in the place of what was measured.
 
-    own_filter: windows begin where the model's own filter stands, and not where the observer does.
+    own_filter: as in `fly`.
     """
     problem, found, flown = problem.as_recorded, [], []
     for n, (P, F) in enumerate(models):
@@ -87,7 +87,7 @@ def gaps(
         if z is not None:
             table = z[problem.recording.bounds[n] : problem.recording.bounds[n + 1]]
             part.z = table
-        Y = fly_windows_from(part, P, F, part.filter(P, F, begin=True)) if own_filter else fly(part, P, F)
+        Y = fly(part, P, F, own_filter)
         found.append(run_gap(part.kind.measures, part.runs[0], Y, cut(part).listed[0], table))
         flown.append(Y)
     return found, flown
@@ -138,10 +138,7 @@ def over_runs(
 
 
 def left_out_gap(search: Search, hypothesis: Hypothesis) -> float:
-    """The total gap of a hypothesis on runs left out, over the runs, windows begun where its own filter stands.
-
-    Hypotheses are compared so: the observer that finds what a model lacks would take up what tells them apart.
-    """
+    """The total gap of a hypothesis on runs left out, over the runs, windows begun where its own filter stands."""
     runs, _ = gaps(search.problem, left_out(search, hypothesis), own_filter=True)
     return float(np.sqrt(squares(runs).mean()))
 

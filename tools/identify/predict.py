@@ -12,10 +12,12 @@ from tools.inference.predict import fly
 from tools.inference.problem import cut, problem_of
 
 
-def predicted(case: Case, model: Model, run: Run, P: np.ndarray, F: np.ndarray) -> tuple[RunGap, np.ndarray]:
-    """The gap of one run under (P, F), each window started where the model's own filter stands; and the prediction."""
+def predicted(
+    case: Case, model: Model, run: Run, P: np.ndarray, F: np.ndarray, own_filter: bool = False
+) -> tuple[RunGap, np.ndarray]:
+    """The gap of one run under (P, F), and the prediction; own_filter as in `fly`."""
     problem = problem_of(case, model, [run])
-    Y = fly(problem, P, F)
+    Y = fly(problem, P, F, own_filter)
     return run_gap(problem.kind.measures, run, Y, cut(problem).listed[0]), Y
 
 
@@ -27,6 +29,7 @@ def model_of(model: Model, free: Parameters, values: np.ndarray) -> tuple[np.nda
 
 
 def flown_gap(case: Case, model: Model, runs: list[Run], free: Parameters, values: np.ndarray) -> float:
-    """Total gap of the runs under the model at `values`, in tolerances; infinite where it cannot be flown."""
-    found = root_mean_square([predicted(case, model, run, *model_of(model, free, values))[0].total for run in runs])
+    """Total gap of the runs under the model at `values`, in tolerances, by its own filter; infinite where it fails."""
+    P, F = model_of(model, free, values)
+    found = root_mean_square([predicted(case, model, run, P, F, own_filter=True)[0].total for run in runs])
     return found if np.isfinite(found) else float("inf")

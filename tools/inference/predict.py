@@ -65,9 +65,14 @@ def fly_near(problem: Problem, models: list[tuple[np.ndarray, np.ndarray]]) -> n
     return Y
 
 
-def fly(problem: Problem, P: np.ndarray, F: np.ndarray) -> np.ndarray:
-    """A model's prediction (rows, N_Y) of all runs; the windows' first 2 s hold the filter's estimate."""
-    return fly_windows_from(problem, P, F, observe(problem, P, F))
+def fly(problem: Problem, P: np.ndarray, F: np.ndarray, own_filter: bool = False) -> np.ndarray:
+    """A model's prediction (rows, N_Y) of all runs; the windows' first 2 s hold the filter's estimate.
+
+    own_filter: windows begin where the filter stands that takes the model at its word. So models are compared with each
+    other: the observer would take up what tells them apart.
+    """
+    gains = problem.filter(P, F, begin=True) if own_filter else observe(problem, P, F)
+    return fly_windows_from(problem, P, F, gains)
 
 
 def fly_windows_from(problem: Problem, P: np.ndarray, F: np.ndarray, gains: Gains) -> np.ndarray:
