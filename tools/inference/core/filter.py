@@ -15,7 +15,8 @@ import numpy as np
 
 from firmware.core.jit import kernel, parallel_kernel, prange
 from firmware.core.maths.rotations import wrap_angle
-from firmware.core.vehicle.layout import N_P, X_ACT, X_NU
+from firmware.core.vehicle.actuators import clip
+from firmware.core.vehicle.layout import N_P, SERVO_MAX, SERVO_MIN, X_ACT, X_NU, X_SERVO
 from firmware.core.vehicle.state import rotation
 from sim_backend.core.effect_plant import effective_parameters
 from sim_backend.core.effects import effect_layout as ef
@@ -231,6 +232,9 @@ def filter_run(
         misfit += apply_gain(W[i], K[i], d, x, error, E[i])
         for n in range(count - N_ERR):
             lacking[n] += error[N_ERR + n]
+        if count > N_ERR:  # a servo that nobody reads or commands turns no further than its stops
+            x[X_SERVO] = clip(x[X_SERVO], P[SERVO_MIN], P[SERVO_MAX])
+            x[ef.X_GEAR_SERVO] = x[X_SERVO] if F[ef.SERVO_PLAY] == 0.0 else x[ef.X_GEAR_SERVO]
         if count > N_ERR and lost(x, cov):  # by readings of no vehicle: it begins anew
             x[:] = base
             x[X_NU:X_ACT] = start[X_NU:X_ACT]
