@@ -18,6 +18,7 @@ NonNegativeTriple = tuple[NonNegative, NonNegative, NonNegative]
 Mass = Annotated[float, msgspec.Meta(gt=0.0, le=5000.0)]
 Length = Annotated[float, msgspec.Meta(ge=-10.0, le=10.0)]
 Coefficient = Annotated[float, msgspec.Meta(ge=-1e6, le=1e6)]
+Damping = Annotated[float, msgspec.Meta(ge=-1e6, le=0.0)]
 
 
 COEFFICIENTS = ("K_D0", "K_D", "K_L0", "K_L", "K_beta", "K_MR", "K_p", "K_M0", "K_M", "K_q", "K_MY", "K_r")
@@ -27,6 +28,7 @@ PLACES = {
     "m_t": layout.M_T, "m_r": layout.M_R, "m_s": layout.M_S,
     **{f"added_mass_{axis}": layout.A_X + n for n, axis in enumerate("xyz")},
     **{f"added_inertia_{axis}": layout.B_X + n for n, axis in enumerate("xyz")},
+    "x_b": layout.X_B, **{name: getattr(layout, name.upper()) for name in ("D_p", "D_q", "D_r")},
     "net_mass": layout.NET_MASS, **{f"cg_{axis}": layout.CG_X + n for n, axis in enumerate("xyz")},
 }  # fmt: skip
 
@@ -52,7 +54,10 @@ class MassTable(Table):
 
 
 class HydrodynamicsTable(Table):
-    """[hydrodynamics]: the twelve coefficients of equation (4), and which lift law they belong to (ledger L4)."""
+    """[hydrodynamics]: the twelve coefficients of equation (4), and which lift law they belong to (ledger L4).
+
+    D_p, D_q, D_r, N m s/rad: damping that is linear in the rate, beside the print's, which grows with V^2.
+    """
 
     K_D0: NonNegative
     K_D: NonNegative
@@ -66,6 +71,9 @@ class HydrodynamicsTable(Table):
     K_q: Coefficient
     K_MY: Coefficient
     K_r: Coefficient
+    D_p: Damping = 0.0
+    D_q: Damping = 0.0
+    D_r: Damping = 0.0
     lift_law: str = "linear"
 
     def __post_init__(self):
@@ -139,6 +147,26 @@ class TrimTable(Table):
     cg: tuple[Length, Length, Length] = (0.0, 0.0, 0.0)
 
 
+class ReadingsTable(Table):
+    """[readings]: what an instrument reads of something else than its own quantity."""
+
+    # m/kg; a gauge vented into the hull reads the hull's pressure too, which goes with the water in the tank
+    depth_with_ballast: Annotated[float, msgspec.Meta(ge=-20.0, le=20.0)] = 0.0
+
+
+class Assumed(Table):
+    """A number that nobody measured: known to a factor, or to lie in a range (90 %), in its unit."""
+
+    factor: Annotated[float, msgspec.Meta(gt=1.0, le=100.0)] | None = None
+    range: tuple[float, float] | None = None
+
+    def __post_init__(self):
+        if (self.factor is None) == (self.range is None):
+            raise ValueError("either factor or range")
+        if self.range is not None and not self.range[0] < self.range[1]:
+            raise ValueError(f"range: expected [low, high] with low < high, got {list(self.range)}")
+
+
 class IdentifiedTable(Table):
     """[identified]: where a vehicle file's numbers come from, and how sure they are, together.
 
@@ -185,6 +213,11 @@ class Vehicle(Table):
     uncertainty: UncertaintyTable
     control: Control | None = None
     trim: TrimTable = TrimTable()
+    readings: ReadingsTable = ReadingsTable()
+    # by label of the catalogue, its parameters: calibrations and effects that belong to this vehicle. What flies does
+    # not read them; models of its flights do.
+    effects: dict[str, dict[str, Coefficient]] = msgspec.field(default_factory=dict)
+    assumed: dict[str, Assumed] = msgspec.field(default_factory=dict)
     identified: IdentifiedTable | None = None
     limits: Limits | None = None
     supervisor: SupervisorTable = SupervisorTable()
@@ -198,7 +231,7 @@ class Vehicle(Table):
         P[layout.J_XX : layout.J_ZZ + 1] = mass.J
         P[layout.A_X : layout.A_Z + 1] = mass.added_mass
         P[layout.B_X : layout.B_Z + 1] = mass.added_inertia
-        for name in COEFFICIENTS:
+        for name in (*COEFFICIENTS, "D_p", "D_q", "D_r"):
             P[getattr(layout, name.upper())] = getattr(water, name)
         P[layout.LIFT_PRINTED] = float(water.lift_law == "printed")
         for name in ("servo", "slider", "ballast"):

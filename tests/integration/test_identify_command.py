@@ -14,7 +14,7 @@ from tools.data.runs import columns as names
 from tools.data.runs.case import write_case
 from tools.data.sources import load_vehicle
 from tools.identify.design import CAPTURE, make_runs
-from tools.identify.parameters import coefficient_sizes
+from tools.inference.vehicle_parameters import coefficient_sizes
 
 ABOUT = dict(vehicle="roughie", site="pool", log_rate_hz=50.0, water_density_kg_m3=998.0, sensors=CAPTURE)
 

@@ -11,6 +11,9 @@ import click
 from tools.data.errors import BAD_INPUT, DONE, FAILED, InputError, MissingExtra, missing_extra
 from tools.data.plain import as_plain
 
+vehicle_option = click.option(
+    "--vehicle", metavar="FILE", help="A shipped vehicle or a vehicle file, in the place of the case's own."
+)
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the result alone, as JSON.")
 
 

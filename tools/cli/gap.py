@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from tools.cli.challenge import challenge
-from tools.cli.common import json_option, print_json, progress, say
+from tools.cli.common import json_option, print_json, progress, say, vehicle_option
 from tools.cli.readings import readings
 
 STEPS = 7  # of a diagnosis: screen, up to three effects, verdict, how far, report
@@ -20,8 +20,9 @@ def gap():
 @gap.command()
 @click.argument("case", type=click.Path(path_type=Path))
 @click.option("--report", type=click.Path(path_type=Path, dir_okay=False), help="Where the report (HTML) goes.")
+@vehicle_option
 @json_option
-def measure(case: Path, report: Path | None, as_json: bool) -> None:
+def measure(case: Path, report: Path | None, vehicle: str | None, as_json: bool) -> None:
     """The gap of CASE per run and channel, and how it is spread over the parts of the model.
 
     Gaps are root mean square errors in tolerances: at 1 the simulator is off by as much as may be. Without --json a
@@ -33,7 +34,7 @@ def measure(case: Path, report: Path | None, as_json: bool) -> None:
 
     need("analysis")
     with progress("gap", 3) as advance:
-        loaded = load_case(case)
+        loaded = load_case(case, vehicle)
         advance(1)
         found = assess(loaded)
         advance(1)
@@ -76,7 +77,8 @@ def _print_table(found) -> None:
 @click.argument("run", type=click.Path(path_type=Path))
 @click.option("--model", default="nominal", show_default=True, help="`nominal`, a shipped vehicle or a vehicle file.")
 @click.option("--out", required=True, type=click.Path(path_type=Path, dir_okay=False), help="Predicted run (CSV).")
-def predict(run: Path, model: str, out: Path) -> None:
+@vehicle_option
+def predict(run: Path, model: str, out: Path, vehicle: str | None) -> None:
     """Predict RUN (a run file beside its case.toml): its rows and columns, no gaps, window by window."""
     from tools.data.errors import InputError, need
     from tools.data.runs.case import load_case_of_run
@@ -86,7 +88,7 @@ def predict(run: Path, model: str, out: Path) -> None:
     from tools.inference.predict import predict as predict_runs
 
     need("analysis")  # matrix products of compiled kernels are SciPy's BLAS
-    case, recorded = load_case_of_run(run)
+    case, recorded = load_case_of_run(run, vehicle)
     if out.exists() and run.exists() and out.samefile(run):
         raise InputError("would overwrite the run itself: name another file", source=out, column="--out")
     predicted = predict_runs(case, load_model(model, case), [recorded])[0]
@@ -101,8 +103,9 @@ def predict(run: Path, model: str, out: Path) -> None:
     "--without", type=click.Choice(["nuisance", "splice", "whiteness", "evidence"]),
     help="Leave one idea of the diagnosis out, to see what it is worth (docs/DIAGNOSIS.md).",
 )  # fmt: skip
+@vehicle_option
 @json_option
-def diagnose(case: Path, out: Path, without: str | None, as_json: bool) -> None:
+def diagnose(case: Path, out: Path, without: str | None, vehicle: str | None, as_json: bool) -> None:
     """Where the simulator is wrong about CASE, which effect causes it, and how far the gap shrinks with it."""
     from tools.data.errors import need
     from tools.data.runs.case import load_case
@@ -113,7 +116,7 @@ def diagnose(case: Path, out: Path, without: str | None, as_json: bool) -> None:
     from tools.report.words import sentence
 
     need("analysis")
-    loaded = load_case(case)
+    loaded = load_case(case, vehicle)
     done = 0
     with progress("diagnose", STEPS) as advance:
 

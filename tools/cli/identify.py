@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from tools.cli.common import json_option, print_json, say
+from tools.cli.common import json_option, print_json, say, vehicle_option
 
 
 @click.command()
@@ -17,8 +17,9 @@ from tools.cli.common import json_option, print_json, say
     "--likelihood", type=click.Choice(["flights", "accelerations"]), default="flights", show_default=True,
     help="Flights held to the recordings, or the paper's: equation (1) along smoothed motion capture.",
 )  # fmt: skip
+@vehicle_option
 @json_option
-def identify(case: Path, out: Path | None, seed: int, likelihood: str, as_json: bool) -> None:
+def identify(case: Path, out: Path | None, seed: int, likelihood: str, vehicle: str | None, as_json: bool) -> None:
     """Identify the vehicle of CASE from its runs: the twelve coefficients and their distribution, by MCMC.
 
     Runs that cannot be fitted are named and left out. With --out: identified.toml (a vehicle file that says where it
@@ -33,7 +34,7 @@ def identify(case: Path, out: Path | None, seed: int, likelihood: str, as_json: 
     from tools.identify.pipeline import identify as run_identification
 
     found = run_identification(
-        load_case(case), seed, likelihood, lambda text: print(text, file=sys.stderr), leave_out=out is not None
+        load_case(case, vehicle), seed, likelihood, lambda text: print(text, file=sys.stderr), leave_out=out is not None
     )
     for one in found.left_out:
         say(f"left out: {one}")

@@ -18,6 +18,7 @@ from tools.diagnose.residuals import pump_speed
 from tools.diagnose.search import Search, converge
 from tools.inference.corrected import LINKS
 from tools.inference.fit import Fitter, Hypothesis
+from tools.inference.model import effect_vector
 from tools.inference.parameters import FreeParameter
 
 LABEL = "correction"
@@ -75,7 +76,7 @@ def free_of(link: str) -> list[FreeParameter]:
 
 def fitted(search: Search, hypothesis: Hypothesis, link: str) -> tuple[Search, Hypothesis]:
     """A correction at a link beside a candidate's effects, fitted with gains of its own."""
-    F = np.zeros(ef.N_F)
+    F = effect_vector(search.problem.model)
     F[ef.LINK] = 1.0 + LINKS.index(link)
     problem = replace(search.problem, model=replace(search.problem.model, F=F))
     own = replace(search, problem=problem, hypotheses=[])

@@ -6,11 +6,12 @@ hundred nat in ten minutes of 10 Hz. What nobody could see in a window is no gap
 
 import numpy as np
 
-from sim_backend.core.effects import effect_layout as ef
 from tools.diagnose.search import Search
 from tools.diagnose.shrink import AFTER, FLOOR, Shrinkage, case_noise_floor
-from tools.gap.measure import errors, mean_square
+from tools.gap.measure import mean_square
+from tools.inference.channels import errors
 from tools.inference.fit import Hypothesis
+from tools.inference.model import effect_vector
 from tools.inference.predict import fly_windows_from
 from tools.inference.problem import Problem, cut
 
@@ -30,7 +31,7 @@ def movements(search: Search, hypothesis: Hypothesis) -> dict[str, float]:
     P, F = search.model(hypothesis)
     gains, found = problem.filter(P, F, begin=True), {}
     whole = fly_windows_from(problem, P, F, gains)
-    nominal = np.zeros(ef.N_F) if problem.model.F is None else problem.model.F
+    nominal = effect_vector(problem.model)
     for label in hypothesis.labels:
         entries = [free.entry for free in hypothesis.free if free.label == label]
         without = F.copy()

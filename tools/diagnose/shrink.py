@@ -8,7 +8,7 @@ import numpy as np
 from tools.diagnose.search import Search, without_extra_noise
 from tools.gap.measure import RunGap, case_channels, root_mean_square, run_gap
 from tools.inference.fit import NUISANCE_LIMIT, Hypothesis, bounded_step
-from tools.inference.model import Model
+from tools.inference.model import nominal_model
 from tools.inference.parameters import model_at
 from tools.inference.predict import fly, predict
 from tools.inference.problem import Problem, cut
@@ -166,8 +166,7 @@ def shrink(search: Search, hypothesis: Hypothesis) -> Shrinkage:
     """The gap before, recalibrated, after, and its floor, on runs left out of the fit."""
     problem = search.problem
     rng = np.random.default_rng(SEED)
-    nominal = Model(problem.model.name, problem.model.P, problem.model.sigma)
-    flown = predict(problem.case, nominal, problem.runs)
+    flown = predict(problem.case, nominal_model(problem.case), problem.runs)
     listed = cut(problem).listed
     refitted, Y_refitted = gaps(problem, left_out(search, search.null))
     after, Y_after = gaps(problem, left_out(search, hypothesis)) if hypothesis.labels else (refitted, Y_refitted)

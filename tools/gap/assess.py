@@ -5,13 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from sim_backend.core.effects import effect_layout as ef
 from tools.data.errors import InputError
 from tools.data.runs.case import Case
 from tools.gap.measure import RunGap, case_channels, root_mean_square, run_gap
 from tools.gap.where import Share, where
 from tools.inference.channels import Measures
-from tools.inference.model import Model, nominal_model
+from tools.inference.model import Model, effect_vector, nominal_model
 from tools.inference.predict import fly
 from tools.inference.problem import cut, problem_of
 from tools.inference.windows import Window
@@ -48,7 +47,7 @@ def assess(case: Case, model: Model | None = None) -> CaseGap:
     """Measure a case against a model (nominal, if none is given); InputError where no sample can be scored."""
     model = nominal_model(case) if model is None else model
     problem = problem_of(case, model)
-    Y = fly(problem, model.P, np.zeros(ef.N_F) if model.F is None else model.F)
+    Y = fly(problem, model.P, effect_vector(model))
     predictions, listed = np.split(Y, problem.recording.bounds[1:-1]), cut(problem).listed
     gaps = [run_gap(problem.kind.measures, run, predictions[n], listed[n]) for n, run in enumerate(case.runs)]
     total = root_mean_square([gap.total for gap in gaps])

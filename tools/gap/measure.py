@@ -4,9 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from firmware.core.maths.rotations import wrap
 from tools.data.runs.run import Run
-from tools.inference.channels import Channel, Measures
+from tools.inference.channels import Channel, Measures, errors
 from tools.inference.windows import Window
 
 
@@ -27,15 +26,6 @@ def scored_rows(listed: list[Window], rows: int) -> np.ndarray:
         if window.scored:
             mask[window.start : window.end] = True
     return mask
-
-
-def errors(channel: Channel, table: np.ndarray, Y: np.ndarray) -> np.ndarray:
-    """(measured - predicted) / tolerance of a channel, shape (rows, columns); NaN where nothing was measured."""
-    columns = list(channel.columns)
-    difference = table[:, columns] - Y[:, columns]
-    if channel.wrapped:
-        difference = wrap(difference)
-    return difference / channel.tolerance
 
 
 def mean_square(channel: Channel, error: np.ndarray) -> float:

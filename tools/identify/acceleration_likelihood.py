@@ -24,9 +24,9 @@ from tools.data.errors import InputError
 from tools.data.runs import columns as names
 from tools.data.runs.run import Run
 from tools.identify.core.regressors import N_K, flown_servo, momentum_rows
-from tools.identify.parameters import Parameters, coefficients
 from tools.identify.statistics import Quadratic, collect, heat
 from tools.inference.model import Model
+from tools.inference.vehicle_parameters import Parameters, coefficients
 
 SMOOTH = 0.6  # s, of the local cubic
 STRETCH = 1.5  # s, of a test function; one begins every third of it

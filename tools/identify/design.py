@@ -23,7 +23,7 @@ from sim_backend.core.open_loop import fly_open_loop_many
 from tools.data.runs import columns as names
 from tools.data.runs.case import SensorsPart, write_case
 from tools.data.runs.run import Run
-from tools.identify.parameters import coefficient_sizes
+from tools.inference.vehicle_parameters import coefficient_sizes
 
 BALLAST, SLIDER, SERVO = (1.0, 0.6, 0.2), (1.0, 0.5, 0.1), (1.0, 0.8, 0.6, 0.4, 0.2)
 LARGEST = (0.9, 0.75, 1.0)  # of the ranges of servo, slider and ballast: with all of the slider it would stand on end

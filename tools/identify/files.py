@@ -13,17 +13,16 @@ import numpy as np
 from firmware.core.jit import kernels_digest
 from firmware.core.vehicle import layout
 from firmware.model.vehicle import COEFFICIENTS, PLACES, Vehicle, decode_vehicle
-from sim_backend.core.effects.catalogue import catalogue
+from sim_backend.core.effects import effect_layout as ef
 from tools.data.runs.case import CASE_FILE
 from tools.data.runs.csvfile import write_bytes
 from tools.data.tomltext import toml_text
 from tools.identify.levels import DISTURBANCE
 from tools.identify.pipeline import Identified
 from tools.inference.corrected import corrected_text
-from tools.inference.model import nominal_model
+from tools.inference.model import effect_vector, effects_in, nominal_model
 
 VEHICLE, CORRECTED, POSTERIOR, RESULT = "identified.toml", "corrected.toml", "posterior.nc", "identified.json"
-WIRES = ("ballast_scale", "slider_scale")  # effects, of what the draw-wires say
 DIGITS = 10  # of a covariance
 
 
@@ -80,21 +79,21 @@ def vehicle_table(found: Identified) -> dict[str, Any]:
     """The vehicle file's content: the case's vehicle with the posterior's mode in place."""
     vehicle = found.case.vehicle
     table: dict[str, Any] = msgspec.to_builtins(vehicle)
-    P = vehicle.vector()
-    for name, value in zip(found.free.names, found.free.si(found.best).tolist(), strict=True):
-        if name in PLACES:
-            P[PLACES[name]] = value
-    table["hydrodynamics"] |= {name: float(P[PLACES[name]]) for name in COEFFICIENTS}
-    table["mass"] |= {name: float(P[PLACES[name]]) for name in ("m_t", "m_r", "m_s")}
+    P, F, _ = found.free.place(found.read.model, found.best)
+    table["hydrodynamics"] |= {name: float(P[PLACES[name]]) for name in (*COEFFICIENTS, "D_p", "D_q", "D_r")}
+    table["mass"] |= {name: float(P[PLACES[name]]) for name in ("m_t", "m_r", "m_s", "x_b")}
     table["mass"]["added_mass"] = P[layout.A_X : layout.A_Z + 1].tolist()
     table["mass"]["added_inertia"] = P[layout.B_X : layout.B_Z + 1].tolist()
     table["trim"] = {"net_mass": float(P[layout.NET_MASS]), "cg": P[layout.CG_X : layout.CG_Z + 1].tolist()}
+    table["effects"] = effects_in(F)
+    table["readings"] = {"depth_with_ballast": float(F[ef.GAUGE_TANK])}
     if found.levels is not None:
         for name, log in zip(found.levels.names, found.levels.log.tolist(), strict=True):
             if name in DISTURBANCE:
                 axis = name.removeprefix("disturbance_")
                 table["disturbance"][axis] = getattr(found.case.disturbance, axis) * float(np.exp(log))
-    table["uncertainty"] = _uncertainty(found, table["uncertainty"])
+    if found.fit is None or found.fit.at is not None:  # by prediction error, the observer's settings are those of the fit
+        table["uncertainty"] = _uncertainty(found, table["uncertainty"])
     table["identified"] = provenance(found)
     return table
 
@@ -110,17 +109,15 @@ def vehicle_text(found: Identified) -> str:
 
 
 def corrected(found: Identified) -> str | None:
-    """A model for `glider gap predict` where a vehicle file cannot hold what was found: the draw-wires' scales."""
-    if not any(name in WIRES for name in found.free.names):
+    """The same as a model on top of the case's own vehicle, where it has effects: draw-wires' scales, readings."""
+    P, F, _ = found.free.place(found.read.model, found.best)
+    nominal = nominal_model(found.case)
+    F[ef.BIAS : ef.BIAS + ef.N_BIASES] = 0.0
+    F -= effect_vector(nominal)
+    effects = effects_in(F)
+    if not effects:
         return None
-    P0 = nominal_model(found.case).P
-    P, F, _ = found.free.place(P0, found.best)
-    effects: dict[str, dict[str, float]] = {}
-    for name in WIRES:
-        parameter = next(p for p in catalogue()[name].parameters if p.entry >= 0)
-        low, high = parameter.low, parameter.high
-        effects[name] = {parameter.name: float(np.clip(F[parameter.entry], low, high))}
-    return corrected_text(found.case.vehicle_name, P0, P, F, effects)
+    return corrected_text(found.case.vehicle_name, nominal.P, P, F, effects)
 
 
 def write_posterior(found: Identified, path: Path) -> None:

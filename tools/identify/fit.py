@@ -10,12 +10,13 @@ from tools.data.runs.case import Case
 from tools.data.runs.run import Run
 from tools.identify import levels as noise
 from tools.identify.flight_likelihood import Flights, Linear
-from tools.identify.parameters import Parameters, parameters
 from tools.identify.predict import flown_gap
 from tools.identify.screen import LeftOut
 from tools.identify.statistics import Quadratic, collect, heat
 from tools.inference.model import Model
+from tools.inference.prediction_error import identify_by_prediction
 from tools.inference.problem import Problem, problem_of
+from tools.inference.vehicle_parameters import Parameters, parameters
 
 LEVELS = 0.0  # in a schedule: the noise's levels are estimated
 # Times the disturbance in the filter's process noise, one step at each: less and less as the model comes closer.
@@ -26,6 +27,7 @@ AGAIN = (1.0, LEVELS, 1.0)  # where the noise is not what the case says
 # Without motion capture a model may foresee every next row and yet fly elsewhere: of the points that the steps pass,
 # from this roughness on, the one is kept from which the fitted runs themselves are flown best, window by window.
 WATCHED = 30.0
+FAR_OFF = 5.0  # tolerances that the file misses the runs by: what next rows are foreseen by says little there
 LOOK = 10.0  # of them, the one at which runs that do not belong are looked for
 MOST_STEPS = 6  # with all runs
 CORRELATED = 1.5  # heat, from which the priors weigh more than they did in the first fit: a few steps more
@@ -42,7 +44,7 @@ class Fit:
 
     problem: Problem  # of the runs kept, noise at its levels
     free: Parameters
-    at: Linear
+    at: Linear | None  # None: by prediction error
     quadratic: Quadratic
     levels: noise.Levels
     left_out: list[LeftOut]
@@ -152,6 +154,10 @@ def fit(
     if sum(run.rows for run in runs) > MOST_ROWS:
         runs = [runs[n] for n in some(runs, MOST_ROWS)]
         notes.append(f"{len(runs)} of the runs were fitted, evenly chosen: more rows would tell little and cost time")
+    if not any(run.has_mocap for run in runs):
+        found = by_prediction(case, model, runs, notes, say)
+        if found is not None:
+            return found
     say("first values and noise")
     first = settle(case, model, [runs[n] for n in some(runs, FIRST_ROWS)], begin)
     gone = {one.run for one in first.left_out}
@@ -181,6 +187,28 @@ def fit(
         notes.append("the misfit is no parabola about its least: the best values found stand for the mode")
         statistics = statistics.centred()
     return Fit(whole.problem, first.free, at, statistics, first.levels, left_out, notes)
+
+
+def by_prediction(
+    case: Case, model: Model, runs: list[Run], notes: list[str], say: Callable[[str], None]
+) -> Fit | None:
+    """The fit by prediction error where the file misses the runs by more than FAR_OFF tolerances, else None."""
+    problem = problem_of(case, model, runs)
+    free = parameters(problem, first=True)
+    missed = flown_gap(case, model, runs, parameters(problem), np.zeros(len(parameters(problem).free)))
+    if missed < FAR_OFF:
+        return None
+    notes.append(
+        f"the vehicle file misses these runs by {missed:.1f} tolerances: identified by prediction error, window by "
+        "window (docs/IDENTIFICATION.md, Far from the file)"
+    )
+    found = identify_by_prediction(problem, free, say)
+    n, low = len(found.values), np.array([f.low for f in free.free])
+    statistics = Quadratic(
+        found.values, low, (found.normal - np.eye(n))[None], -found.values[None], np.array([found.independent]),
+        np.array([found.independent]), ("windows",),
+    )  # fmt: skip
+    return Fit(problem, free, None, statistics, noise.named(problem), [], notes)
 
 
 def foresees(flown: Flights, at: Linear, statistics: Quadratic) -> bool:

@@ -12,8 +12,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from sim_backend.core.effects import effect_layout as ef
-from tools.identify.parameters import Parameters
 from tools.inference.problem import Gains, Problem
+from tools.inference.vehicle_parameters import Parameters
 
 NUDGE = 0.02  # of a prior's sigma, for columns
 SHARES = (1.0, 0.4, 0.1)  # of a foreseen step, tried in turn
@@ -66,13 +66,13 @@ class Flights:
 
     def filter(self, values: np.ndarray, roughness: float = 1.0, problem: Problem | None = None) -> Gains:
         """The filter of the model at `values`."""
-        P, F, frame = self.free.place(self.problem.model.P, values)
+        P, F, frame = self.free.place(self.problem.model, values)
         base = self.problem if problem is None else problem
         return replace(base, z=reframed(base.z, frame)).filter(P, F, roughness=roughness, begin=True)
 
     def follow(self, points: list[np.ndarray], gains: Gains) -> np.ndarray:
         """Innovations of the models at points, (points, samples), with kept gains."""
-        placed = [self.free.place(self.problem.model.P, values) for values in points]
+        placed = [self.free.place(self.problem.model, values) for values in points]
         kinds: dict[bytes, list[int]] = {}
         for n, (_, _, frame) in enumerate(placed):
             kinds.setdefault(frame.tobytes(), []).append(n)

@@ -1,18 +1,17 @@
 """Flights left out of the fit, predicted by the nominal and by the identified model (docs/GAP.md, Measures)."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from sim_backend.core.effects import effect_layout as ef
 from tools.data.runs.case import Case
 from tools.data.runs.run import Run
 from tools.gap.measure import RunGap, case_channels, root_mean_square
 from tools.identify.fit import Fit, fit
 from tools.identify.predict import model_of, predicted
-from tools.inference.model import Model
+from tools.inference.model import Model, effect_vector, nominal_model
 
 MOST = 12  # runs that are predicted; of a longer case evenly chosen ones
 FEW = 3  # runs, up to which each is left out of a fit of its own
@@ -48,6 +47,7 @@ class Held:
 
 def without(found: Fit, run: int) -> np.ndarray:
     """The most probable values without one of the runs, by one step from the fit with all."""
+    assert found.at is not None
     of = np.broadcast_to(found.problem.run_of[:, None], found.problem.z.shape)[found.problem.valid]
     kept = np.flatnonzero(of == run)
     J, e = found.at.J[:, kept], found.at.e[kept]
@@ -64,18 +64,20 @@ def hold_out(case: Case, model: Model, found: Fit, say: Callable[[str], None] = 
         return None
     recorded = {run.name: run for run in case.runs}  # with their spikes, as everybody measures them
     picked = np.unique(np.linspace(0, len(runs) - 1, min(MOST, len(runs))).astype(int)).tolist()
-    made = Held([recorded[runs[n].name] for n in picked], [], [], [], [], ALONE if len(runs) <= FEW else EARLY)
-    nominal = replace(model, F=None)
+    alone = len(runs) <= FEW or found.at is None
+    made = Held([recorded[runs[n].name] for n in picked], [], [], [], [], ALONE if alone else EARLY)
+    nominal = nominal_model(case)
     for n in picked:
-        if len(runs) <= FEW:
+        free = found.free
+        if alone:
             say(f"without {runs[n].name}")
             other = fit(case, model, [run for m, run in enumerate(runs) if m != n])
-            values = np.maximum(other.quadratic.mode, other.quadratic.low)
+            free, values = other.free, np.maximum(other.quadratic.mode, other.quadratic.low)
         else:
             values = without(found, n)
         for (P, F), gaps, flown in (
-            ((nominal.P, np.zeros(ef.N_F)), made.before, made.nominal),
-            (model_of(model, found.free, values), made.after, made.identified),
+            ((nominal.P, effect_vector(nominal)), made.before, made.nominal),
+            (model_of(model, free, values), made.after, made.identified),
         ):
             gap, Y = predicted(case, model, recorded[runs[n].name], P, F)
             gaps.append(gap)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from firmware.model.vehicle import COEFFICIENTS
-from tools.identify.parameters import Parameters
+from tools.inference.vehicle_parameters import Parameters
 
 WIDE = 0.5  # of the prior's sigma: a combination that stays wider is unidentifiable
 LOADING = 0.3  # of a combination, for a parameter to be named in it

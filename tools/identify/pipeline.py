@@ -11,18 +11,19 @@ from firmware.model.vehicle import COEFFICIENTS
 from tools.data.errors import InputError
 from tools.data.runs.case import Case
 from tools.data.runs.run import Run
+from tools.gap.mended import Mended, mended
 from tools.identify.acceleration_likelihood import fit_accelerations, suited
 from tools.identify.fit import Fit, fit
 from tools.identify.flight_likelihood import Flights
 from tools.identify.held import Held, hold_out
 from tools.identify.identifiability import unidentifiable_directions
 from tools.identify.levels import Levels
-from tools.identify.parameters import Parameters
 from tools.identify.sampler import Chains, Summary, sample, summarise
 from tools.identify.screen import LeftOut, despiked, screen
 from tools.identify.statistics import Quadratic
 from tools.inference.model import nominal_model
 from tools.inference.problem import Problem
+from tools.inference.vehicle_parameters import Parameters
 
 CHECKED = 24  # draws at which the whole likelihood is compared with its linearisation
 ROUGH = 0.3  # effective share of the draws, below which intervals are called rough
@@ -43,6 +44,7 @@ class Identified:
     """What was found."""
 
     case: Case
+    read: Mended  # what the readings say of each other, and the model that reads as they do
     likelihood: str
     runs: list[Run]  # that were fitted, without spikes
     free: Parameters
@@ -98,6 +100,7 @@ class Identified:
             "acceptance": float(self.chains.acceptance.mean()),
             "divergent_runs": [{"run": one.run, "reason": str(one)} for one in self.left_out],
             "likelihood": self.likelihood,
+            "readings": [one.plain() for one in self.read.findings],
             "also_free": [one.plain() for one in self.summaries[len(COEFFICIENTS) :]],
             "runs": [run.name for run in self.runs],
             "heat": self.quadratic.heat,
@@ -125,6 +128,7 @@ def check_linearised(found: Fit, chains: Chains, draws: int = CHECKED) -> Check:
     """The whole likelihood (gains kept) at draws of the posterior, against its linearisation."""
     flat = chains.flat
     picked = flat[np.linspace(0, len(flat) - 1, draws).astype(int)]
+    assert found.at is not None
     E = Flights(found.problem, found.free).follow(list(picked), found.at.gains)
     whole = np.square(E).sum(axis=1) / found.quadratic.heat
     log = -0.5 * (whole - found.quadratic.misfit(picked))
@@ -154,7 +158,8 @@ def identify(
     """Identify the vehicle of a case from its runs; with `leave_out`, predict runs that were left out, too."""
     began = time.perf_counter()
     runs, left_out, spikes = usable(case)
-    model = nominal_model(case)
+    read = mended(case, nominal_model(case), runs)
+    runs, model = read.runs, read.model
     first = None
     if likelihood == ACCELERATIONS or suited(runs):
         say("accelerations")
@@ -165,15 +170,15 @@ def identify(
         summaries = summarise(free.names, [f.unit for f in free.free], free.si(chains.values))
         took = time.perf_counter() - began
         return Identified(
-            case, likelihood, runs, free, first, chains, summaries, left_out, spikes, [], took
+            case, read, likelihood, runs, free, first, chains, summaries, left_out, spikes, [], took
         )  # fmt: skip
     found = fit(case, model, runs, None if first is None else first.mode, say)
     say("chains")
     chains = sample(found.quadratic, seed)
     free = found.free
     summaries = summarise(free.names, [f.unit for f in free.free], free.si(chains.values))
-    check = check_linearised(found, chains)
-    if check.share < ROUGH:
+    check = None if found.at is None else check_linearised(found, chains)
+    if check is not None and check.share < ROUGH:
         found.notes.append(
             "the posterior is not normal: its linearisation misses the whole likelihood "
             f"(effective share of draws {check.share:.2f}); intervals are rough, the vehicle file may be far off"
@@ -183,6 +188,6 @@ def identify(
         say("flights left out")
         held = hold_out(case, model, found, say)
     return Identified(
-        case, likelihood, found.problem.runs, free, found.quadratic, chains, summaries, left_out + found.left_out,
+        case, read, likelihood, found.problem.runs, free, found.quadratic, chains, summaries, left_out + found.left_out,
         spikes, found.notes, time.perf_counter() - began, found, held, check, first,
     )  # fmt: skip

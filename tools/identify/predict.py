@@ -6,10 +6,10 @@ from sim_backend.core.effects import effect_layout as ef
 from tools.data.runs.case import Case
 from tools.data.runs.run import Run
 from tools.gap.measure import RunGap, root_mean_square, run_gap
-from tools.identify.parameters import Parameters
 from tools.inference.model import Model
 from tools.inference.predict import fly
 from tools.inference.problem import cut, problem_of
+from tools.inference.vehicle_parameters import Parameters
 
 
 def predicted(
@@ -23,8 +23,8 @@ def predicted(
 
 def model_of(model: Model, free: Parameters, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """P and F at values, without the sensors' constant errors of this case."""
-    P, F, _ = free.place(model.P, values)
-    F[ef.BIAS :] = 0.0
+    P, F, _ = free.place(model, values)
+    F[ef.BIAS : ef.BIAS + ef.N_BIASES] = 0.0
     return P, F
 
 

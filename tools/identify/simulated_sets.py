@@ -18,8 +18,8 @@ from firmware.model.vehicle import COEFFICIENTS, Vehicle
 from tools.data.runs.case import load_case
 from tools.data.sources import load_vehicle
 from tools.identify.design import grid, write_design
-from tools.identify.parameters import coefficient_sizes
 from tools.identify.pipeline import identify
+from tools.inference.vehicle_parameters import coefficient_sizes
 
 RUNS = 5  # of the 45, drawn anew for each data set
 

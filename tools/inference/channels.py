@@ -8,6 +8,7 @@ from math import radians
 
 import numpy as np
 
+from firmware.core.maths.rotations import wrap
 from tools.data.runs import columns as names
 from tools.data.runs.run import Run
 from tools.inference.windows import Window, cut_windows
@@ -27,6 +28,15 @@ class Channel:
     unit: str = ""
     scale: float = 1.0  # SI to `unit`
     commanded: bool = False  # only where the run has commands
+
+
+def errors(channel: Channel, table: np.ndarray, Y: np.ndarray) -> np.ndarray:
+    """(measured - predicted) / tolerance of a channel, shape (rows, columns); NaN where nothing was measured."""
+    columns = list(channel.columns)
+    difference = table[:, columns] - Y[:, columns]
+    if channel.wrapped:
+        difference = wrap(difference)
+    return difference / channel.tolerance
 
 
 def recorded(run: Run, name: str | None) -> bool:

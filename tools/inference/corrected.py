@@ -9,17 +9,16 @@ import numpy as np
 from firmware.core.vehicle import layout
 from hal.strict import ConfigError, Table, decode
 from sim_backend.core.effects import effect_layout as ef
-from sim_backend.core.effects.base import EffectError
-from sim_backend.core.effects.catalogue import catalogue, check_values
 from tools.data.sources import read_text
 from tools.inference.kind import ROUGHIE
-from tools.inference.model import Model
+from tools.inference.model import Model, add_effects, effect_vector
 
 LINKS = (
     "surge force", "sway force", "heave force", "roll moment", "pitch moment", "yaw moment", "servo", "slider",
     "ballast", "roll", "pitch", "yaw", "roll rate", "pitch rate", "yaw rate", "depth", "slider wire", "ballast wire",
 )  # fmt: skip
 BIASES = {reading.name: reading.bias for reading in ROUGHIE.readings if reading.bias >= 0}
+BIASES["depth_with_ballast"] = ef.GAUGE_TANK  # m/kg
 NAMES = {
     name.lower(): getattr(layout, name)
     for name in dir(layout)
@@ -61,7 +60,7 @@ def load_corrected(path: Path | str, nominal: Model) -> Model:
     table = decode(read_text(Path(path)), CorrectedTable, source)
     if not table.corrected:
         raise ConfigError(source, "must be true", key="corrected")
-    P, F = nominal.P.copy(), np.zeros(ef.N_F)
+    P, F = nominal.P.copy(), effect_vector(nominal)
     for name, value in table.parameters.items():
         if name not in PARAMETERS:
             raise ConfigError(source, "no such parameter", key=f"parameters.{name}")
@@ -69,15 +68,8 @@ def load_corrected(path: Path | str, nominal: Model) -> Model:
     for name, value in table.bias.items():
         if name not in BIASES:
             raise ConfigError(source, f"no such reading; known: {', '.join(BIASES)}", key=f"bias.{name}")
-        F[BIASES[name]] = value
-    for label, values in table.effects.items():
-        try:
-            checked = check_values(label, values)
-        except EffectError as error:
-            raise ConfigError(source, str(error), key=f"effects.{label}") from None
-        for parameter in catalogue()[label].parameters:
-            if parameter.entry >= 0:
-                F[parameter.entry] += checked[parameter.name]
+        F[BIASES[name]] += value
+    add_effects(F, table.effects, source)
     if table.correction is not None:
         _correct(F, table.correction, source)
     return Model(source, P, nominal.sigma, F)

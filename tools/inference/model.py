@@ -1,4 +1,4 @@
-"""The model that a prediction flies with: the case's nominal vehicle, or a vehicle file's."""
+"""The model that a prediction flies with: the case's nominal vehicle, or a vehicle file's, with its own effects."""
 
 from dataclasses import dataclass
 
@@ -6,6 +6,10 @@ import numpy as np
 
 from firmware.model.estimator_settings import parameter_sigma
 from firmware.model.vehicle import Vehicle
+from hal.strict import ConfigError
+from sim_backend.core.effects import effect_layout as ef
+from sim_backend.core.effects.base import EffectError
+from sim_backend.core.effects.catalogue import catalogue, check_values
 from tools.data.runs.case import Case
 
 NOMINAL = "nominal"  # its name
@@ -33,12 +37,51 @@ def vehicle_model(name: str, vehicle: Vehicle) -> Model:
     """A vehicle as a model: what is uncertain as [uncertainty] says, or where it was identified as its covariance."""
     P = vehicle.vector()
     sigma = parameter_sigma(P, vehicle.uncertainty)
+    F = own_effects(vehicle)
     found = vehicle.identified
     if found is None or not found.parameters:
-        return Model(name, P, sigma)
+        return Model(name, P, sigma, F)
     C = np.array(found.covariance)
-    sigma[found.places] = np.sqrt(np.maximum(np.diag(C), 0.0))
+    # The observer takes parameters as independent, which a posterior seldom is: it is told the lesser of the two.
+    sigma[found.places] = np.minimum(sigma[found.places], np.sqrt(np.maximum(np.diag(C), 0.0)))
     values, vectors = np.linalg.eigh(C)
     spread = np.zeros((len(values), len(P)))
     spread[:, found.places] = (vectors * np.sqrt(np.maximum(values, 0.0))).T
-    return Model(name, P, sigma, spread=spread[np.abs(spread).max(axis=1) > 0.0])
+    return Model(name, P, sigma, F, spread=spread[np.abs(spread).max(axis=1) > 0.0])
+
+
+def own_effects(vehicle: Vehicle) -> np.ndarray | None:
+    """F (N_F,) of a vehicle file's [effects] and [readings]; None where it has none. ConfigError names the key."""
+    if not vehicle.effects and not vehicle.readings.depth_with_ballast:
+        return None
+    F = np.zeros(ef.N_F)
+    add_effects(F, vehicle.effects, vehicle.name)
+    F[ef.GAUGE_TANK] = vehicle.readings.depth_with_ballast
+    return F
+
+
+def add_effects(F: np.ndarray, effects: dict[str, dict[str, float]], source: str) -> None:
+    """Add effects by label to F (N_F,), in place; ConfigError names the key."""
+    for label, values in effects.items():
+        try:
+            checked = check_values(label, values)
+        except EffectError as error:
+            raise ConfigError(source, str(error), key=f"effects.{label}") from None
+        for parameter in catalogue()[label].parameters:
+            if parameter.entry >= 0:
+                F[parameter.entry] += checked[parameter.name]
+
+
+def effects_in(F: np.ndarray) -> dict[str, dict[str, float]]:
+    """The effects of the catalogue that stand in F (N_F,), as files write them: the way back from add_effects."""
+    found: dict[str, dict[str, float]] = {}
+    for label, effect in catalogue().items():
+        placed = [p for p in effect.parameters if p.entry >= 0]
+        if any(F[p.entry] != 0.0 and p.low <= F[p.entry] <= p.high for p in placed):
+            found[label] = {p.name: float(F[p.entry]) for p in placed}
+    return found
+
+
+def effect_vector(model: Model) -> np.ndarray:
+    """The model's F, (N_F,); zeros where it has none."""
+    return np.zeros(ef.N_F) if model.F is None else model.F.copy()

@@ -7,6 +7,7 @@ import numpy as np
 from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.base import Effect
 from sim_backend.core.effects.catalogue import catalogue
+from tools.inference.model import effect_vector
 from tools.inference.problem import Problem
 
 NUISANCE = ""  # the label of what is no effect
@@ -82,7 +83,7 @@ def effect_parameters(problem: Problem) -> dict[str, list[FreeParameter]]:
 def model_at(problem: Problem, free: list[FreeParameter], values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The model (P, F) with these parameters at `values` (in their spreads)."""
     P = problem.model.P.copy()
-    F = np.zeros(ef.N_F) if problem.model.F is None else problem.model.F.copy()
+    F = effect_vector(problem.model)
     for parameter, value in zip(free, values, strict=True):
         for entry, size in parameter.along or ((parameter.entry, parameter.spread),):
             (P if parameter.vector == "P" else F)[entry] += size * value

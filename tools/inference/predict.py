@@ -8,11 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from sim_backend.core.effects import effect_layout as ef
 from tools.data.runs.case import Case
 from tools.data.runs.run import Run
 from tools.inference.kind import ROUGHIE, Kind
-from tools.inference.model import Model
+from tools.inference.model import Model, effect_vector
 from tools.inference.problem import Gains, Problem, cut, problem_of
 from tools.inference.recording import held
 
@@ -54,7 +53,7 @@ def fly_near(problem: Problem, models: list[tuple[np.ndarray, np.ndarray]]) -> n
     Far quicker than an observer of each. Rows that no window scores are NaN.
     """
     observer, r, scored = observer_of(problem), problem.recording, cut(problem)
-    F = np.zeros(ef.N_F) if problem.model.F is None else problem.model.F
+    F = effect_vector(problem.model)
     gains = observer.filter(problem.model.P, F, begin=True, speeds=problem.kind.window_speeds)
     Y = np.full((len(models), *problem.z.shape), np.nan)
     problem.kind.fly_followed(
@@ -89,7 +88,7 @@ def fly_windows_from(problem: Problem, P: np.ndarray, F: np.ndarray, gains: Gain
 def predict(case: Case, model: Model, runs: list[Run]) -> list[np.ndarray]:
     """A prediction (rows, N_Y) for every run."""
     problem = problem_of(case, model, runs)
-    Y = fly(problem, model.P, np.zeros(ef.N_F) if model.F is None else model.F)
+    Y = fly(problem, model.P, effect_vector(model))
     return np.split(Y, problem.recording.bounds[1:-1])
 
 

@@ -90,7 +90,7 @@ def corner(found: Identified):
 
 def residual_rows(found: Identified) -> list[dict[str, Any]]:
     """Whitened innovations by sensor: mean square, and correlation with themselves a sample later."""
-    if found.fit is None:
+    if found.fit is None or found.fit.at is None:
         return []
     E, rows = found.fit.at.gains.E, []
     for g, name in enumerate(SENSORS):
@@ -109,7 +109,7 @@ def residual_rows(found: Identified) -> list[dict[str, Any]]:
 
 def residual_chart(found: Identified) -> str | None:
     """Distribution of all whitened innovations beside the normal one."""
-    if found.fit is None:
+    if found.fit is None or found.fit.at is None:
         return None
     edges = np.linspace(-5.0, 5.0, 61)
     middle = 0.5 * (edges[1:] + edges[:-1])

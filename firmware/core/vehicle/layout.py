@@ -21,7 +21,8 @@ ACTUATORS = (SERVO_MIN, SLIDER_MIN, BALLAST_MIN)  # where each begins
 PLUNGER_AREA = 42  # m2
 NET_MASS = 43  # kg, trim error at the origin; nominal 0
 CG_X, CG_Y, CG_Z = 44, 45, 46  # m, offset of the whole vehicle's centre of gravity; nominal 0
-N_P = 48
+D_P, D_Q, D_R = 47, 48, 49  # N m s/rad, moments linear in the rates beside (4); nominal 0
+N_P = 50
 
 # --- x: the plant's state -------------------------------------------------------------------------------------------
 X_POS = 0  # 0..2 north, east, down, m

@@ -41,7 +41,7 @@ def water_wrench(P, u, v, w, p, q, r):
 
     D = (K_D0 + K_D alpha^2) V^2, SF = K_beta beta V^2, L = (K_L0 + K_L alpha) V^2 (ledger L4; K_L alpha^2 with
     LIFT_PRINTED), T_DL1 = (K_MR beta + K_p p) V^2, T_DL2 = (K_M0 + K_M alpha + K_q q) V^2,
-    T_DL3 = (K_MY beta + K_r r) V^2.
+    T_DL3 = (K_MY beta + K_r r) V^2; beside the print D_p p, D_q q, D_r r on the body's axes, which damp at rest too.
     """
     alpha, beta, v_squared = flow_angles(u, v, w)
     drag = (P[layout.K_D0] + P[layout.K_D] * alpha * alpha) * v_squared
@@ -55,4 +55,4 @@ def water_wrench(P, u, v, w, p, q, r):
         (P[layout.K_M0] + P[layout.K_M] * alpha + P[layout.K_Q] * q) * v_squared,
         (P[layout.K_MY] * beta + P[layout.K_R] * r) * v_squared,
     )  # fmt: skip
-    return F1, F2, F3, T1, T2, T3
+    return F1, F2, F3, T1 + P[layout.D_P] * p, T2 + P[layout.D_Q] * q, T3 + P[layout.D_R] * r

@@ -20,8 +20,10 @@ def __getattr__(name: str) -> int:
 # allowed: a constant error of each onboard reading, in the order of y below
 BIAS = len(ENTRIES)
 N_BIASES = 9
+# m/kg: a pressure gauge vented into the hull reads the hull's pressure, too, which goes with the water in the tank
+GAUGE_TANK = BIAS + N_BIASES
 # a data-driven correction (tools/diagnose/correction): the link at which it enters, and its coefficients
-LINK, SHAPE = BIAS + N_BIASES, BIAS + N_BIASES + 1  # SHAPE and behind it in the link's unit
+LINK, SHAPE = GAUGE_TANK + 1, GAUGE_TANK + 2  # SHAPE and behind it in the link's unit
 FORCE_LINKS, ACTUATOR_LINKS = 6, 9  # links 1-6: X Y Z K M N (N, N m); 7-9: servo, slider, ballast; then the readings
 SHAPES = (
     "constant", "speed squared", "depth", "angle of attack", "sideslip", "roll rate", "pitch rate", "yaw rate",

@@ -66,6 +66,7 @@ def read(F, x, y):
         y[ef.Y_P + i] = (1.0 + F[ef.GYRO_SCALE]) * x[X_NU + 3 + i] + F[ef.GYRO_P + i]
     lever = F[ef.DEPTH_LEVER] * math.sin(pitch)
     y[ef.Y_DEPTH] = (1.0 + F[ef.DEPTH_SCALE]) * (x[X_DOWN] - lever - x[ef.X_LAG_DEPTH]) + F[ef.DEPTH_OFFSET]
+    y[ef.Y_DEPTH] += F[ef.GAUGE_TANK] * x[X_BALLAST]
     y[ef.Y_SLIDER] = backlash(x[ef.X_GEAR_SLIDER], x[X_SLIDER], F[ef.SLIDER_PLAY])
     y[ef.Y_BALLAST] = x[X_BALLAST]
     for i in range(ef.Y_ONBOARD):

@@ -9,8 +9,8 @@ from tools.data.runs.run import Run
 from tools.data.sources import load_vehicle
 from tools.identify.acceleration_likelihood import _width, fit_accelerations, kinematics
 from tools.identify.design import make_runs
-from tools.identify.parameters import coefficient_sizes
 from tools.inference.model import Model
+from tools.inference.vehicle_parameters import coefficient_sizes
 
 
 def errors(seed: int, square: bool) -> np.ndarray:

@@ -2,13 +2,13 @@
 
 import itertools
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
 import msgspec
 
-from firmware.model.vehicle import DisturbanceTable, NonNegative, SensorsTable, SensorTable, Vehicle
+from firmware.model.vehicle import Assumed, DisturbanceTable, NonNegative, SensorsTable, SensorTable, Vehicle
 from hal.strict import MAX_BYTES, Table, decode
 from tools.data.errors import InputError
 from tools.data.runs import csvfile
@@ -52,6 +52,7 @@ class CaseTable(Table):
     runs: Annotated[int, msgspec.Meta(ge=1, le=100_000)]
     sensors: SensorsPart = SensorsPart()
     disturbance: DisturbancePart = DisturbancePart()
+    assumed: dict[str, Assumed] = msgspec.field(default_factory=dict)
 
 
 @dataclass
@@ -68,6 +69,7 @@ class Case:
     runs: list[Run]
     sensors: SensorsTable  # the vehicle's, with the case's entries in their place
     disturbance: DisturbanceTable
+    assumed: dict[str, Assumed] = field(default_factory=dict)  # the vehicle's and the case's own
 
 
 def _run_files(folder: Path) -> list[Path]:
@@ -96,12 +98,12 @@ def _read_case_file(folder: Path) -> CaseTable:
     return decode(read_text(path), CaseTable, str(path))
 
 
-def _assemble(folder: Path, table: CaseTable, runs: list[Run]) -> Case:
-    vehicle = load_vehicle(table.vehicle, base=folder)
+def _assemble(folder: Path, table: CaseTable, runs: list[Run], instead: str | None) -> Case:
+    vehicle = load_vehicle(table.vehicle, base=folder) if instead is None else load_vehicle(instead)
     return Case(
         folder=folder,
         vehicle=vehicle,
-        vehicle_name=table.vehicle,
+        vehicle_name=table.vehicle if instead is None else instead,
         site=table.site,
         log_rate_hz=table.log_rate_hz,
         water_density_kg_m3=table.water_density_kg_m3,
@@ -109,6 +111,7 @@ def _assemble(folder: Path, table: CaseTable, runs: list[Run]) -> Case:
         runs=runs,
         sensors=_replaced(vehicle.sensors, table.sensors),
         disturbance=_replaced(vehicle.disturbance, table.disturbance),
+        assumed={**vehicle.assumed, **table.assumed},
     )
 
 
@@ -122,25 +125,31 @@ def _replaced(whole: Any, part: Table) -> Any:
     return msgspec.structs.replace(whole, **_given(part))
 
 
-def load_case(folder: Path | str) -> Case:
-    """A case with all its runs; InputError or ConfigError, one line, where it cannot be used."""
+def load_case(folder: Path | str, vehicle: str | None = None) -> Case:
+    """A case with all its runs; InputError or ConfigError, one line, where it cannot be used.
+
+    vehicle: a shipped name or a file that stands in for the vehicle that the case names.
+    """
     folder = Path(folder)
     table = _read_case_file(folder)
     files = _run_files(folder)
     if len(files) != table.runs:
         message = f"{table.runs} expected, {len(files)} files run*.csv found"
         raise InputError(message, source=folder / CASE_FILE, column="runs")
-    return _assemble(folder, table, [load_run(path) for path in files])
+    return _assemble(folder, table, [load_run(path) for path in files], vehicle)
 
 
-def load_case_of_run(path: Path | str) -> tuple[Case, Run]:
-    """One run and its case, by the case.toml beside it; the case's other runs are neither read nor counted."""
+def load_case_of_run(path: Path | str, vehicle: str | None = None) -> tuple[Case, Run]:
+    """One run and its case, by the case.toml beside it; the case's other runs are neither read nor counted.
+
+    vehicle: as in load_case.
+    """
     path = Path(path)
     if not path.is_file():
         raise InputError("not a file" if path.exists() else "no such file", source=path)
     table = _read_case_file(path.parent)
     run = load_run(path)
-    return _assemble(path.parent, table, [run]), run
+    return _assemble(path.parent, table, [run], vehicle), run
 
 
 def _quoted(text: str) -> str:

@@ -4,8 +4,7 @@ import numpy as np
 
 from firmware.model.estimator_settings import parameter_sigma
 from firmware.model.vehicle import Vehicle
-from tools.gap.measure import errors
-from tools.inference.channels import ROUGHIE_MEASURES
+from tools.inference.channels import ROUGHIE_MEASURES, errors
 from tools.study.challenge.trial import Flight, Trial
 
 THIN = 5  # rows

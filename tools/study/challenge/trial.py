@@ -5,6 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
+from firmware.core.maths.rotations import wrap
 from firmware.core.vehicle.layout import N_X, X_ACT
 from firmware.model.vehicle import Vehicle
 from sim_backend.foreign import foreign_layout as fo
@@ -12,7 +13,7 @@ from sim_backend.foreign.foreign_flight import fly_foreign, fly_on, pose_rows, s
 from sim_backend.uncertainty import draw_parameters, sensor_errors
 from tools.data.runs import columns as names
 from tools.data.runs.run import Run
-from tools.gap.measure import root_mean_square, run_gap, wrap
+from tools.gap.measure import root_mean_square, run_gap
 from tools.inference.channels import ROUGHIE_MEASURES
 from tools.inference.windows import Window
 from tools.study.challenge.design import STYLES, RunDesign, Site, draw_run, draw_runs

@@ -9,8 +9,8 @@ import numpy as np
 from firmware.model.vehicle import COEFFICIENTS, Vehicle
 from tools.data.runs.case import load_case
 from tools.identify.design import write_design
-from tools.identify.parameters import coefficient_sizes
 from tools.identify.pipeline import identify
+from tools.inference.vehicle_parameters import coefficient_sizes
 from tools.report.identified import marginals
 
 SEED = 4

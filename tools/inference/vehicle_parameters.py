@@ -1,18 +1,21 @@
-"""What is free in an identification, and its priors, out of the vehicle file.
+"""What is free where a vehicle is identified, and its priors, out of the vehicle file.
 
 The twelve coefficients of equation (4) are what is looked for. Beside them everything is free that the recordings
 could mistake for them: weighed and estimated masses, trim, constant errors of the sensors, and how the capture's body
-sits on the vehicle and its clock beside the onboard one.
+sits on the vehicle and its clock beside the onboard one. What a vehicle or case file calls assumed is free as it says.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 
 import numpy as np
 
 from firmware.core.vehicle import layout
-from firmware.model.vehicle import COEFFICIENTS
+from firmware.model.vehicle import COEFFICIENTS, PLACES
+from hal.strict import ConfigError
 from sim_backend.core.effects import effect_layout as ef
+from sim_backend.core.effects.catalogue import catalogue
+from tools.inference.model import Model, effect_vector
 from tools.inference.parameters import FreeParameter
 from tools.inference.problem import Problem
 
@@ -22,8 +25,15 @@ CAMBER, TRIM_ANGLE = 0.025, 0.03  # rad of attack by which lift and pitch moment
 ADDED_SHARE, NET_MASS, CG = 0.15, 0.01, 0.0005  # of added mass and inertia; kg; m
 FIRST = 10.0  # times these trims, where no motion capture holds the flight
 WIRE_SCALE = 0.5  # of what a draw-wire says, there: a first calibration may be far off
+# Of a vehicle that nobody identified, where its file misses its flights by far: damping that is linear in the rate (N m
+# s/rad; about what the print's does at 0.3 m/s), and the tank's place (m).
+FIRST_EFFECTS = {"stall": 2.0, "pressure_lever": 0.15}  # 1/rad, m
+# A gauge that is vented into a hull of some ten litres of air reads about a metre less a kilogram of water in the tank.
+GAUGE, GAUGE_SPREAD = "depth_with_ballast", 0.5  # its name in [readings]; m/kg
+LINEAR_DAMPING, TANK_ARM = {"D_p": 0.1, "D_q": 1.5, "D_r": 1.0}, 0.15
 FRAME_TURN, FRAME_OFFSET = 0.02, 0.02  # rad, m: capture's body against the vehicle's
 CLOCK = 0.05  # s, capture's clock behind the onboard one
+NINETY = 1.645  # sigma on either side that hold 90 %
 FRAME = "frame"  # the vector of what is no part of the model but of how the capture sees it
 FRAME_NAMES = ("capture_roll", "capture_pitch", "capture_yaw", "capture_x", "capture_y", "capture_z")
 MASSES = {"m_t": layout.M_T, "m_r": layout.M_R, "m_s": layout.M_S}
@@ -60,9 +70,9 @@ class Parameters:
         """Values (..., n) in units of the priors as SI."""
         return self.nominal + values * self.spreads
 
-    def place(self, P0: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def place(self, model: Model, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The model at values (n,): parameters P, effects F, and the capture's frame (6,)."""
-        P, F, frame = P0.copy(), np.zeros(ef.N_F), np.zeros(6)
+        P, F, frame = model.P.copy(), effect_vector(model), np.zeros(6)
         vectors = {"P": P, "F": F, FRAME: frame}
         for f, value in zip(self.free, values, strict=True):
             vectors[f.vector][f.entry] += f.spread * value
@@ -123,14 +133,89 @@ def _capture(problem: Problem) -> list[FreeParameter]:
     return [*found, FreeParameter("", "capture_delay", "F", ef.MOCAP_DELAY, CLOCK, unit="s")]
 
 
-def parameters(problem: Problem) -> Parameters:
-    """What is free for these recordings."""
+def parameters(problem: Problem, first: bool = False) -> Parameters:
+    """What is free for these recordings; first: of a vehicle that nobody identified."""
     mocap = bool(problem.seen[ef.Y_MOCAP_X])
     free = [*coefficients(problem.model.P), *_masses(problem, 1.0 if mocap else FIRST), *_biases(problem)]
     if mocap:
         free += _capture(problem)
     else:
-        free.append(FreeParameter("", "ballast_scale", "F", ef.BALLAST_SCALE, WIRE_SCALE))
-        free.append(FreeParameter("", "slider_scale", "F", ef.SLIDER_SCALE, WIRE_SCALE))
-    nominal = np.array([problem.model.P[f.entry] if f.vector == "P" else 0.0 for f in free])
+        free += [of_effect(problem, name, WIRE_SCALE) for name in ("ballast_scale", "slider_scale")]
+    if first:
+        free += [*_damping(problem), FreeParameter("", "x_b", "P", layout.X_B, TANK_ARM, unit="m")]
+        free += [of_effect(problem, name, spread) for name, spread in FIRST_EFFECTS.items()]
+        free.append(FreeParameter("", GAUGE, "F", ef.GAUGE_TANK, GAUGE_SPREAD, unit="m/kg"))
+    free = _as_assumed(problem, free)
+    vectors = {"P": problem.model.P, "F": effect_vector(problem.model), FRAME: np.zeros(6)}
+    nominal = np.array([vectors[f.vector][f.entry] for f in free])
     return Parameters(free, nominal)
+
+
+def _damping(problem: Problem) -> list[FreeParameter]:
+    """Damping that is linear in the rate: it never pushes."""
+    found = []
+    for name, spread in LINEAR_DAMPING.items():
+        entry = PLACES[name]
+        high = -problem.model.P[entry] / spread
+        found.append(FreeParameter("", name, "P", entry, spread, -inf, high, "N m s/rad"))
+    return found
+
+
+def of_effect(problem: Problem, label: str, spread: float) -> FreeParameter:
+    """The first parameter of an effect about its value in the model, with a prior of 1 sigma `spread` (its unit)."""
+    parameter = catalogue()[label].parameters[0]
+    here = float(effect_vector(problem.model)[parameter.entry])
+    low, high = (parameter.low - here) / spread, (parameter.high - here) / spread
+    return FreeParameter("", label, "F", parameter.entry, spread, low, high, parameter.unit)
+
+
+def assumable() -> dict[str, tuple[str, int]]:
+    """What a file may call assumed: its name, the vector it stands in and its entry there."""
+    effects = {
+        f"{label}.{p.name}": ("F", p.entry)
+        for label, effect in catalogue().items() for p in effect.parameters if p.entry >= 0
+    }  # fmt: skip
+    return {name: ("P", entry) for name, entry in PLACES.items()} | effects
+
+
+def assumed(problem: Problem) -> list[FreeParameter]:
+    """What the vehicle or case file calls assumed, as free as it says; ConfigError names what is no number of either.
+
+    A factor f is 1 sigma of (f - 1) times the value, of a scale's 1 + value; a range holds 90 %.
+    """
+    found, known = [], assumable()
+    P, F = problem.model.P, effect_vector(problem.model)
+    for name, one in problem.case.assumed.items():
+        if name not in known:
+            raise ConfigError(problem.case.vehicle_name, "no such number to be assumed", key=f"assumed.{name}")
+        vector, entry = known[name]
+        value = float((P if vector == "P" else F)[entry])
+        limits = (-inf, inf)
+        if one.factor is not None:
+            whole = 1.0 + value if name.endswith(".scale") else value
+            if whole == 0.0:
+                raise ConfigError(
+                    problem.case.vehicle_name, "is 0: a factor says nothing, give a range", key=f"assumed.{name}"
+                )
+            spread = (one.factor - 1.0) * abs(whole)
+        else:
+            assert one.range is not None
+            low, high = one.range
+            spread = (high - low) / (2.0 * NINETY)
+            limits = ((low - value) / spread, (high - value) / spread)
+            if not limits[0] <= 0.0 <= limits[1]:
+                raise ConfigError(
+                    problem.case.vehicle_name, f"the file's own value {value:g} is not in it", key=f"assumed.{name}"
+                )
+        found.append(FreeParameter("", name, vector, entry, spread, *limits))
+    return found
+
+
+def _as_assumed(problem: Problem, free: list[FreeParameter]) -> list[FreeParameter]:
+    """What is free, with what files call assumed in the place of what is free anyway, or behind it."""
+    said = {(f.vector, f.entry): f for f in assumed(problem)}
+    kept = []
+    for f in free:
+        one = said.pop((f.vector, f.entry), None)
+        kept.append(f if one is None else replace(f, spread=one.spread, low=one.low, high=one.high))
+    return [*kept, *said.values()]

@@ -1,0 +1,98 @@
+"""Runs and model as later stages see them once the readings are compared with each other (docs/READINGS.md).
+
+What an effect of the catalogue says (a scale of the gyro, a lag, an offset) goes into the model, which then reads as
+the instrument does: what was recorded stays as it is. What no effect says (exchanged axes, a sign, degrees) is put
+right in the runs.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sim_backend.core.effects import effect_layout as ef
+from sim_backend.core.effects.catalogue import catalogue
+from tools.data.errors import InputError
+from tools.data.runs import columns as names
+from tools.data.runs.case import Case
+from tools.data.runs.run import Run
+from tools.inference.model import Model, effect_vector
+from tools.inference.vehicle_parameters import GAUGE
+from tools.readings.check import check, mend, mended_runs
+from tools.readings.findings import Finding
+from tools.readings.signals import table_of
+
+# effects of a constant size, by label: the one entry of F that a finding's size is
+SIZED = {
+    "attitude_lag": "ATTITUDE_LAG", "depth_lag": "DEPTH_LAG", "depth_offset": "DEPTH_OFFSET",
+    "depth_scale": "DEPTH_SCALE", "pressure_lever": "DEPTH_LEVER", "imu_pitch_bias": "PITCH_BIAS",
+    "imu_roll_bias": "ROLL_BIAS",
+}  # fmt: skip
+# Axes of a gyro have one scale where they differ by less than standard errors, or than a share of it: the rate about
+# the vertical is compared with a compass, whose errors that turn with the heading look like some of it.
+ALIKE, NEARLY = 3.0, 0.3
+
+
+@dataclass(frozen=True)
+class Mended:
+    """What was found, the runs with what only runs can be rid of, and the model that reads as the instruments do."""
+
+    findings: list[Finding]
+    runs: list[Run]
+    model: Model
+    added: list[str]  # labels that the model holds now, and what was put right in the runs
+
+    @property
+    def labels(self) -> list[str]:
+        """Labels of the catalogue among what was added."""
+        return [name for name in self.added if name in catalogue()]
+
+
+def findings_of(runs: list[Run]) -> list[Finding]:
+    """What the readings say of each other; nothing where there is nothing to compare."""
+    try:
+        return check(runs).findings
+    except InputError:
+        return []
+
+
+def mended(case: Case, model: Model, runs: list[Run] | None = None) -> Mended:
+    """The runs (all of the case, if none are given) and the model, by what the readings of the runs say."""
+    runs = case.runs if runs is None else runs
+    findings = findings_of(runs)
+    F, added, rest = effect_vector(model), [], []
+    for one in findings:
+        if not one.mended or one.channel not in {*names.RATES, *names.ATTITUDE, names.DEPTH, "attitude"}:
+            continue
+        if one.label in SIZED:
+            F[getattr(ef, SIZED[one.label])] += one.size
+            added.append(one.label)
+        elif one.label == "gyro_bias":
+            F[ef.GYRO_P + names.RATES.index(one.channel)] += one.size
+            added.append(one.label)
+        elif one.channel == names.DEPTH and one.against == "ballast_kg":
+            F[ef.GAUGE_TANK] += one.size
+            added.append(GAUGE)
+        elif one.label != "gyro_scale":
+            rest.append(one)
+    scale = one_scale([one for one in findings if one.label == "gyro_scale" and one.mended])
+    if scale is not None:
+        F[ef.GYRO_SCALE] += scale
+        added.append("gyro_scale")
+    else:
+        rest += [one for one in findings if one.label == "gyro_scale"]
+    if rest:
+        runs = mended_runs(runs, mend(table_of(runs), rest))
+        added += [f"{one.channel} {one.finding}" for one in rest]
+    return Mended(findings, runs, replace(model, F=F if F.any() else model.F), list(dict.fromkeys(added)))
+
+
+def one_scale(found: list[Finding]) -> float | None:
+    """The scale error that the axes of a gyro share, by certainty; None where they differ or one alone says it."""
+    if len(found) < 2:
+        return None
+    size = np.array([one.size for one in found])
+    error = np.maximum([(one.ci90[1] - one.ci90[0]) / 3.29 for one in found], 1e-6)
+    weight = error**-2.0
+    mean = float((weight * size).sum() / weight.sum())
+    apart = np.abs(size - mean)
+    return mean if np.all((apart < ALIKE * error) | (apart < NEARLY * abs(1.0 + mean))) else None

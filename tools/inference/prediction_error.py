@@ -1,0 +1,229 @@
+"""Identification by prediction error: parameters with which windows of the runs are flown best on commands alone.
+
+For a vehicle far from its file, and real water: a filter that takes a wrong model at its word, or noise that is not
+white, leads a likelihood of one-step innovations astray, while what a model is for is to fly a window. Residuals are
+those of the gap (docs/GAP.md, Measures): what is measured less what is flown, in tolerances, from where the observer of
+the model itself stands.
+
+- Horizons grow: 4 s, 8 s, then nearly a whole window. Over a short one even a wrong model stays near what was flown,
+  so that the least squares have one valley; a flight of 20 s that tumbles once says nothing of where to go.
+- Each channel counts the same, and large residuals count linearly (pseudo-Huber), so that one window that is lost does
+  not decide.
+- Errors within a window are one error: as many independent residuals are counted as there are windows and channels.
+  The prior, 1 sigma of each parameter, is weighed against the misfit that is there, so that it holds while little is
+  explained and yields as more is.
+- From several starts: the file's values and the best of RANDOM draws of the prior, each taken through all horizons.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from tools.inference.channels import errors
+from tools.inference.fit import bounded_step
+from tools.inference.predict import observer_of
+from tools.inference.problem import Gains, Problem
+from tools.inference.vehicle_parameters import Parameters
+
+HORIZONS = ((4.0, (0.0,)), (8.0, (0.0, 4.0)), (18.0, (0.0, 10.0)))  # s, and where the first window begins
+STEPS = (8, 8, 12)  # at most, at each
+LOOK_IN = 2.0  # s of a run before its first window
+LINEAR = 4.0  # tolerances from which a residual counts linearly
+LARGEST = 200.0  # tolerances: a flight that is lost is lost
+NUDGE = 0.02  # of a prior's sigma, for columns
+LIMIT = 5.0  # sigma that a parameter goes at most
+BOLDEST = 1.0  # sigma a step
+STILL = 2e-3  # share of the objective, below which a step has converged
+RANDOM, TAKEN = 12, 2  # draws of the prior that are tried, and those that are followed beside the file's own values
+START_SPREAD = 0.7  # sigma of those draws
+SEED = 20261122
+
+
+@dataclass
+class Windows:
+    """Windows to be flown: first and last + 1 row of each, and its run."""
+
+    first: np.ndarray
+    last: np.ndarray
+    run_of: np.ndarray
+
+    @property
+    def rows(self) -> np.ndarray:
+        """All rows in them, (rows,)."""
+        return np.concatenate([np.arange(a, b) for a, b in zip(self.first, self.last, strict=True)])
+
+
+@dataclass
+class Fitted:
+    """Where a fit ended: values (n,) in units of the priors, and what is known of them there."""
+
+    values: np.ndarray
+    cost: float  # mean square residual over channels, large ones counted linearly, tolerances squared
+    normal: np.ndarray  # (n, n) of the posterior: J'J over the misfit, and the prior's identity
+    independent: float  # residuals counted as independent
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """Laplace's approximation, (n, n)."""
+        return np.linalg.inv(self.normal)
+
+
+class PredictionError:
+    """A problem and what is free in it."""
+
+    def __init__(self, problem: Problem, free: Parameters):
+        self.problem, self.free = problem, free
+        self.observer = observer_of(problem)
+        measures = problem.kind.measures
+        self.table = np.concatenate([measures.measured(run) for run in problem.runs])
+        self.channels = list({c.name: c for run in problem.runs for c in measures.channels_of(run)}.values())
+        self.low = np.maximum([f.low for f in free.free], -LIMIT)
+        self.high = np.minimum([f.high for f in free.free], LIMIT)
+
+    def model(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(P, F) at values (n,)."""
+        P, F, _ = self.free.place(self.problem.model, values)
+        return P, F
+
+    def windows(self, horizon: float, offset: float) -> Windows:
+        """Windows of `horizon` s, one behind the other; a run that is shorter is one window."""
+        bounds, times = self.problem.recording.bounds, self.problem.recording.t
+        first, last, run_of = [], [], []
+        for n in range(len(self.problem.runs)):
+            t = times[bounds[n] : bounds[n + 1]] - times[bounds[n]]
+            starts = np.arange(LOOK_IN + offset, t[-1] - horizon, horizon)
+            for start in starts if len(starts) else [LOOK_IN]:
+                a, b = np.searchsorted(t, [start, start + horizon])
+                if b > a > 0:
+                    first.append(bounds[n] + a)
+                    last.append(bounds[n] + b)
+                    run_of.append(n)
+        return Windows(*(np.array(values, dtype=np.int64) for values in (first, last, run_of)))
+
+    def gains(self, values: np.ndarray) -> Gains:
+        """The observer of the model at `values`."""
+        self.observer.starts[:] = self.problem.starts
+        return self.observer.filter(*self.model(values), begin=True, speeds=self.problem.kind.window_speeds)
+
+    def fly(self, points: list[np.ndarray], gains: Gains, windows: Windows) -> np.ndarray:
+        """Flights (points, rows, N_Y) of the windows from where the gains hold each model."""
+        problem, r = self.problem, self.problem.recording
+        Ps, Fs = zip(*(self.model(values) for values in points), strict=True)
+        Y = np.full((len(points), *problem.z.shape), np.nan)
+        problem.kind.fly_followed(
+            np.array(Ps), np.array(Fs), np.array(problem.kind.drift), r.modes, r.bounds, r.t, problem.stamps, r.inputs,
+            self.observer.z, self.observer.starts, gains.W, gains.K, windows.first, windows.last, windows.run_of, Y,
+        )  # fmt: skip
+        return Y
+
+    def residuals(self, Y: np.ndarray, windows: Windows) -> np.ndarray:
+        """Residuals (models, samples) in tolerances, divided so that their squares add up to a mean over channels."""
+        rows, parts = windows.rows, []
+        table = self.table[rows]
+        for channel in self.channels:
+            measured = np.isfinite(table[:, list(channel.columns)])
+            if channel.joint:
+                measured[:] = measured.all(axis=1, keepdims=True)
+            if not measured.any():
+                continue
+            flown = np.array([errors(channel, table, one[rows])[measured] for one in Y])
+            flown = np.clip(np.nan_to_num(flown, nan=LARGEST), -LARGEST, LARGEST)
+            count = measured.sum() / (len(channel.columns) if channel.joint else 1)
+            parts.append(flown / np.sqrt(count))
+        return np.concatenate(parts, axis=1) / np.sqrt(len(parts))
+
+    def weights(self, e: np.ndarray) -> tuple[np.ndarray, float]:
+        """Of residuals (samples,): each one's weight in the normal equations, and the mean square, large ones tamed."""
+        squares = e * e * len(e) / LINEAR**2
+        root = np.sqrt(1.0 + squares)
+        return 1.0 / root, float(2.0 * LINEAR**2 * (root - 1.0).mean())
+
+    def cost(self, values: np.ndarray, cuts: list[Windows]) -> tuple[float, Gains]:
+        """The mean square at values, over cuts into windows, and the observer's gains there."""
+        gains = self.gains(values)
+        parts = [self.weights(self.residuals(self.fly([values], gains, one), one)[0])[1] for one in cuts]
+        return float(np.mean(parts)), gains
+
+    def linear(self, values: np.ndarray, gains: Gains, cuts: list[Windows]) -> tuple[np.ndarray, np.ndarray]:
+        """Normal matrix (n, n) and slope (n,) of the mean square at values, the gains kept."""
+        size = np.where(values + NUDGE <= self.high, NUDGE, -NUDGE)
+        points = [values, *(values + s * row for s, row in zip(size, np.eye(len(values)), strict=True))]
+        normal, slope = np.zeros((len(values), len(values))), np.zeros(len(values))
+        for one in cuts:
+            E = self.residuals(self.fly(points, gains, one), one)
+            J = (E[1:] - E[0]) / size[:, None]
+            weight, _ = self.weights(E[0])
+            normal += (J * weight) @ J.T / len(cuts)
+            slope += (J * weight) @ E[0] / len(cuts)
+        return normal, slope
+
+    def descend(self, values: np.ndarray, horizon: float, offsets: tuple[float, ...], steps: int) -> Fitted:
+        """Levenberg and Marquardt's steps at one horizon, limits kept."""
+        cuts = [self.windows(horizon, offset) for offset in offsets]
+        independent = float(len(cuts[0].first) * len(self.channels))
+        cost, gains = self.cost(values, cuts)
+        damping, n = 1e-2, len(values)
+        held = max(cost, 1.0) / independent  # weight of the prior
+        for _ in range(steps):
+            normal, slope = self.linear(values, gains, cuts)
+            normal, slope = normal + held * np.eye(n), slope + held * values
+            objective, moved = cost + held * float(values @ values), False
+            for _ in range(5):
+                damped = normal + damping * np.diag(np.diag(normal))
+                low, high = np.maximum(self.low - values, -BOLDEST), np.minimum(self.high - values, BOLDEST)
+                tried = values + bounded_step(damped, slope, low, high)
+                found, at = self.cost(tried, cuts)
+                fall = objective - found - held * float(tried @ tried)
+                if fall > 0.0:
+                    moved = True
+                    break
+                damping *= 5.0
+            if not moved:
+                break
+            values, cost, gains, damping = tried, found, at, max(damping / 4.0, 1e-5)
+            held = max(cost, 1.0) / independent
+            if fall < STILL * objective:
+                break
+        normal, _ = self.linear(values, gains, cuts)
+        return Fitted(values, cost, normal / held + np.eye(n), independent)
+
+    def starts(self, rng: np.random.Generator) -> list[np.ndarray]:
+        """The file's values, and the best of some draws of the prior at the first horizon."""
+        horizon, offsets = HORIZONS[0]
+        cuts, n = [self.windows(horizon, offset) for offset in offsets], len(self.low)
+        drawn = [np.clip(rng.normal(size=n) * START_SPREAD, self.low, self.high) for _ in range(RANDOM)]
+        costs = [self.cost(values, cuts)[0] for values in drawn]
+        best = np.argsort(costs, kind="stable")[:TAKEN]
+        return [self.file_values, *(drawn[k] for k in best)]
+
+    @property
+    def file_values(self) -> np.ndarray:
+        """Where the file stands, (n,)."""
+        return np.clip(np.zeros(len(self.low)), self.low, self.high)
+
+    def through(self, values: np.ndarray) -> Fitted:
+        """From values through all horizons."""
+        for (horizon, offsets), steps in zip(HORIZONS, STEPS, strict=True):
+            found = self.descend(values, horizon, offsets, steps)
+            values = found.values
+        return found
+
+    def again(self, values: np.ndarray) -> Fitted:
+        """From values that fit already, at the last horizon alone."""
+        horizon, offsets = HORIZONS[-1]
+        return self.descend(values, horizon, offsets, STEPS[-1])
+
+
+def identify_by_prediction(
+    problem: Problem, free: Parameters, say: Callable[[str], None] = lambda text: None, many: bool = True
+) -> Fitted:
+    """The best fit of what is free; many: from several starts, else from the file's values alone."""
+    fitting = PredictionError(problem, free)
+    rng = np.random.default_rng(SEED)
+    starts = fitting.starts(rng) if many else [fitting.file_values]
+    found = []
+    for n, start in enumerate(starts):
+        say(f"prediction error, start {n + 1} of {len(starts)}")
+        found.append(fitting.through(start))
+    return min(found, key=lambda one: one.cost + float(one.values @ one.values) * max(one.cost, 1.0) / one.independent)
