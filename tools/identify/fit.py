@@ -16,7 +16,7 @@ from tools.identify.statistics import Quadratic, collect, heat
 from tools.inference.model import Model
 from tools.inference.prediction_error import identify_by_prediction
 from tools.inference.problem import Problem, problem_of
-from tools.inference.vehicle_parameters import Parameters, parameters
+from tools.inference.vehicle_parameters import Parameters, first_effects, listed, parameters
 
 LEVELS = 0.0  # in a schedule: the noise's levels are estimated
 # Times the disturbance in the filter's process noise, one step at each: less and less as the model comes closer.
@@ -194,7 +194,7 @@ def by_prediction(
 ) -> Fit | None:
     """The fit by prediction error where the file misses the runs by more than FAR_OFF tolerances, else None."""
     problem = problem_of(case, model, runs)
-    free = parameters(problem, first=True)
+    free = listed(problem, [*parameters(problem, first=True).free, *first_effects(problem)])
     missed = flown_gap(case, model, runs, parameters(problem), np.zeros(len(parameters(problem).free)))
     if missed < FAR_OFF:
         return None

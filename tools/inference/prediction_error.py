@@ -35,7 +35,7 @@ NUDGE = 0.02  # of a prior's sigma, for columns
 LIMIT = 5.0  # sigma that a parameter goes at most
 BOLDEST = 1.0  # sigma a step
 STILL = 2e-3  # share of the objective, below which a step has converged
-RANDOM, TAKEN = 12, 2  # draws of the prior that are tried, and those that are followed beside the file's own values
+RANDOM, TAKEN = 12, 1  # draws of the prior that are tried, and those that are followed beside the file's own values
 START_SPREAD = 0.7  # sigma of those draws
 SEED = 20261122
 
@@ -80,6 +80,7 @@ class PredictionError:
         self.channels = list({c.name: c for run in problem.runs for c in measures.channels_of(run)}.values())
         self.low = np.maximum([f.low for f in free.free], -LIMIT)
         self.high = np.minimum([f.high for f in free.free], LIMIT)
+        self.kinked = np.array([f.kinked for f in free.free])
 
     def model(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(P, F) at values (n,)."""
@@ -147,16 +148,21 @@ class PredictionError:
 
     def linear(self, values: np.ndarray, gains: Gains, cuts: list[Windows]) -> tuple[np.ndarray, np.ndarray]:
         """Normal matrix (n, n) and slope (n,) of the mean square at values, the gains kept."""
-        size = np.where(values + NUDGE <= self.high, NUDGE, -NUDGE)
-        points = [values, *(values + s * row for s, row in zip(size, np.eye(len(values)), strict=True))]
         normal, slope = np.zeros((len(values), len(values))), np.zeros(len(values))
         for one in cuts:
-            E = self.residuals(self.fly(points, gains, one), one)
-            J = (E[1:] - E[0]) / size[:, None]
-            weight, _ = self.weights(E[0])
+            e, J = self.columns(values, gains, one)
+            weight, _ = self.weights(e)
             normal += (J * weight) @ J.T / len(cuts)
-            slope += (J * weight) @ E[0] / len(cuts)
+            slope += (J * weight) @ e / len(cuts)
         return normal, slope
+
+    def columns(self, values: np.ndarray, gains: Gains, windows: Windows) -> tuple[np.ndarray, np.ndarray]:
+        """Residuals (samples,) and their columns (n, samples) at values; from a kink by a whole sigma."""
+        size = np.where(self.kinked & (values == 0.0), 1.0, NUDGE)
+        size = np.where(values + size <= self.high, size, -size)
+        points = [values, *(values + s * row for s, row in zip(size, np.eye(len(values)), strict=True))]
+        E = self.residuals(self.fly(points, gains, windows), windows)
+        return E[0], (E[1:] - E[0]) / size[:, None]
 
     def descend(self, values: np.ndarray, horizon: float, offsets: tuple[float, ...], steps: int) -> Fitted:
         """Levenberg and Marquardt's steps at one horizon, limits kept."""
@@ -209,10 +215,9 @@ class PredictionError:
             values = found.values
         return found
 
-    def again(self, values: np.ndarray) -> Fitted:
+    def again(self, values: np.ndarray, steps: int = STEPS[-1]) -> Fitted:
         """From values that fit already, at the last horizon alone."""
-        horizon, offsets = HORIZONS[-1]
-        return self.descend(values, horizon, offsets, STEPS[-1])
+        return self.descend(values, *HORIZONS[-1], steps)
 
 
 def identify_by_prediction(

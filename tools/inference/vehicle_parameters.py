@@ -143,12 +143,19 @@ def parameters(problem: Problem, first: bool = False) -> Parameters:
         free += [of_effect(problem, name, WIRE_SCALE) for name in ("ballast_scale", "slider_scale")]
     if first:
         free += [*_damping(problem), FreeParameter("", "x_b", "P", layout.X_B, TANK_ARM, unit="m")]
-        free += [of_effect(problem, name, spread) for name, spread in FIRST_EFFECTS.items()]
-        free.append(FreeParameter("", GAUGE, "F", ef.GAUGE_TANK, GAUGE_SPREAD, unit="m/kg"))
-    free = _as_assumed(problem, free)
+    return listed(problem, _as_assumed(problem, free))
+
+
+def listed(problem: Problem, free: list[FreeParameter]) -> Parameters:
+    """Free parameters with their values in the problem's model."""
     vectors = {"P": problem.model.P, "F": effect_vector(problem.model), FRAME: np.zeros(6)}
-    nominal = np.array([vectors[f.vector][f.entry] for f in free])
-    return Parameters(free, nominal)
+    return Parameters(free, np.array([vectors[f.vector][f.entry] for f in free]))
+
+
+def first_effects(problem: Problem) -> list[FreeParameter]:
+    """What a vehicle that nobody identified may have beside its parameters, whatever its file says."""
+    found = [of_effect(problem, name, spread) for name, spread in FIRST_EFFECTS.items()]
+    return [*found, FreeParameter("", GAUGE, "F", ef.GAUGE_TANK, GAUGE_SPREAD, unit="m/kg")]
 
 
 def _damping(problem: Problem) -> list[FreeParameter]:

@@ -1,0 +1,271 @@
+"""A vehicle far from its file, in stages, each checked on runs left out (docs/DIAGNOSIS.md, Stages).
+
+Readings first: what they say of each other goes into the model. Then the vehicle: identified by prediction error, once
+without each run (or each of FOLDS parts of many runs). Then causes beside it, one after the other: every effect of the
+catalogue that the identification has no parameter for is tried by one linear step, the best are fitted in full, and the
+one that takes most of the gap of runs left out stays, if it takes WORTH of it, in every part, with the same sign. A fit
+of the runs themselves says little here: with forty effects to choose from one of them always brings something.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from sim_backend.core.effects import effect_layout as ef
+from tools.data.runs.case import Case
+from tools.data.runs.run import Run
+from tools.gap.measure import RunGap, root_mean_square, run_gap
+from tools.gap.mended import Mended, mended
+from tools.inference.fit import bounded_step
+from tools.inference.model import Model, effect_vector, nominal_model
+from tools.inference.parameters import FreeParameter, effect_parameters
+from tools.inference.predict import fly
+from tools.inference.prediction_error import HORIZONS, Fitted, PredictionError, identify_by_prediction
+from tools.inference.problem import cut, problem_of
+from tools.inference.vehicle_parameters import GAUGE, Parameters, first_effects, listed, parameters
+
+NOMINAL, READINGS, IDENTIFIED = "nominal", "readings", "identified"  # names of stages
+FOLDS, ALONE = 4, 6  # parts of many runs; runs up to which each is left out alone
+TRIED = 4  # effects fitted in full, of those whose linear step takes most
+REFIT_STEPS = 5
+WORTH = 0.1  # of the squared gap of runs left out, that an effect has to take
+SURE = 1.645  # sigma in the fit to all runs: its 90 % interval leaves 0 out
+# Effects whose work parameters of the identification do: they would be asked twice.
+IDENTIFIED_BY = frozenset({
+    "drag", "lift", "side_force", "pitch_trim", "pitch_damping", "weathercock", "yaw_damping", "added_mass", "inertia",
+    "net_buoyancy", "cg_longitudinal", "cg_lateral", "cg_vertical", "ballast_scale", "slider_scale",
+})  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Size:
+    """A parameter with its 90 % interval, in its unit."""
+
+    estimate: float
+    ci90: tuple[float, float]
+    unit: str
+
+
+@dataclass
+class Stage:
+    """Gaps of runs left out after a stage, and what it added."""
+
+    name: str
+    added: list[str]
+    gaps: list[RunGap]
+
+    @property
+    def total(self) -> float:
+        return root_mean_square([gap.total for gap in self.gaps])
+
+
+@dataclass
+class Staged:
+    """What the stages came to."""
+
+    read: Mended
+    stages: list[Stage]
+    selected: list[str]  # labels: of readings first, then by the order in which they were added
+    sizes: dict[str, dict[str, Size]]  # by label (or GAUGE), of the fit to all runs
+    vehicle: dict[str, Size]  # what was identified, by name
+    model: tuple[np.ndarray, np.ndarray]  # P, F of the fit to all runs
+    predictions: list[np.ndarray]  # of each run by the model that has not seen it, (rows, N_Y)
+    taken: dict[str, float] = field(default_factory=dict)  # squared tolerances of left-out runs that each label took
+
+
+@dataclass
+class _Fold:
+    """A part of the runs that is predicted by a fit to the others."""
+
+    left_out: list[int]
+    read: Mended
+    values: np.ndarray
+
+
+class _Stages:
+    def __init__(self, case: Case, say: Callable[[str], None]):
+        self.case, self.say = case, say
+        self.nominal = nominal_model(case)
+        self.whole = mended(case, self.nominal)
+        runs = len(case.runs)
+        parts = [[n] for n in range(runs)] if runs <= ALONE else [list(range(k, runs, FOLDS)) for k in range(FOLDS)]
+        self.folds = []
+        for left_out in parts:
+            # What the readings say is found without the run, too; of a single run nothing can be left out.
+            kept = [run for n, run in enumerate(case.runs) if n not in left_out] or case.runs
+            self.folds.append(_Fold(left_out, mended(case, self.nominal, kept), np.empty(0)))
+
+    def free(self, model: Model, runs: list[Run], more: list[FreeParameter]) -> PredictionError:
+        """The fitting of everything identified, and more, to runs."""
+        problem = problem_of(self.case, model, runs)
+        return PredictionError(problem, listed(problem, [*parameters(problem, first=True).free, *more]))
+
+    def predict(self, n: int, P: np.ndarray, F: np.ndarray) -> tuple[RunGap, np.ndarray]:
+        """A run as it was recorded, flown by a model: its gap, and the prediction."""
+        problem = problem_of(self.case, self.nominal, [self.case.runs[n]])
+        Y = fly(problem, P, F)
+        return run_gap(problem.kind.measures, self.case.runs[n], Y, cut(problem).listed[0]), Y
+
+    def flown(self, models: dict[int, tuple[np.ndarray, np.ndarray]]) -> tuple[list[RunGap], list[np.ndarray]]:
+        """Every run by its own model."""
+        found = [self.predict(n, *models[n]) for n in range(len(self.case.runs))]
+        return [gap for gap, _ in found], [Y for _, Y in found]
+
+    def identify(self) -> None:
+        """Every fold's fit of the vehicle."""
+        for fold in self.folds:
+            self.say(f"identified without {', '.join(self.case.runs[n].name for n in fold.left_out)}")
+            fitting = self.free(fold.read.model, fold.read.runs, [])
+            fold.values = identify_by_prediction(fitting.problem, fitting.free, many=False).values
+
+    def models(self, more: list[FreeParameter], values: list[np.ndarray]) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+        """By run, the model that has not seen it; constant errors of the sensors are a run's own."""
+        found = {}
+        for fold, at in zip(self.folds, values, strict=True):
+            P, F = self.free(fold.read.model, fold.read.runs, more).model(at)
+            F[ef.BIAS : ef.BIAS + ef.N_BIASES] = 0.0
+            found |= {n: (P, F) for n in fold.left_out}
+        return found
+
+    def candidates(self) -> dict[str, list[FreeParameter]]:
+        """Effects that may be added, by label; GAUGE has none."""
+        problem = problem_of(self.case, self.whole.model, self.whole.runs)
+        own = {one.name: [one] for one in first_effects(problem)}
+        known = {
+            label: free
+            for label, free in effect_parameters(problem).items()
+            if label not in IDENTIFIED_BY and label not in own
+        }
+        return {label: free for label, free in (own | known).items() if label not in self.whole.added}
+
+    def linear_worth(self, added: list[FreeParameter], candidates: dict[str, list[FreeParameter]]) -> dict[str, float]:
+        """Mean square left on runs left out after one linear step with each candidate, by label."""
+        more = [*added, *(f for free in candidates.values() for f in free)]
+        found = dict.fromkeys(candidates, 0.0)
+        for fold in self.folds:
+            inside = self.free(fold.read.model, fold.read.runs, more)
+            kept = fold.left_out if len(fold.left_out) < len(self.case.runs) else range(len(self.case.runs))
+            outside = self.free(fold.read.model, [self.case.runs[n] for n in kept], more)
+            at = np.concatenate([fold.values, np.zeros(len(more) - len(added))])
+            horizon, offsets = HORIZONS[-1]
+            cuts = [inside.windows(horizon, offset) for offset in offsets]
+            cost, gains = inside.cost(at, cuts)
+            held = max(cost, 1.0) / (len(cuts[0].first) * len(inside.channels))
+            normal, slope = inside.linear(at, gains, cuts)
+            normal, slope = normal + held * np.eye(len(at)), slope + held * at
+            e, J = outside.columns(at, outside.gains(at), outside.windows(horizon, 0.0))
+            first = len(fold.values)
+            for label, free in candidates.items():
+                on = np.concatenate([np.arange(len(fold.values)), np.arange(first, first + len(free))])
+                first += len(free)
+                step = bounded_step(
+                    normal[np.ix_(on, on)], slope[on], inside.low[on] - at[on], inside.high[on] - at[on]
+                )
+                found[label] += outside.weights(e + step @ J[on])[1] / len(self.folds)
+        return found
+
+    def refitted(self, more: list[FreeParameter], new: int) -> list[np.ndarray]:
+        """Every fold's values with `new` parameters more at the end, from where it stands."""
+        found = []
+        for fold in self.folds:
+            fitting = self.free(fold.read.model, fold.read.runs, more)
+            begin = np.concatenate([fold.values, np.zeros(new)])
+            begin[-new:] = np.where(fitting.kinked[-new:], np.where(fitting.high[-new:] > 0.0, 0.5, -0.5), 0.0)
+            found.append(fitting.again(begin, REFIT_STEPS).values)
+        return found
+
+
+def worth_it(before: list[RunGap], after: list[RunGap], folds: list[list[int]]) -> bool:
+    """Whether a stage takes WORTH of the squared gap of runs left out, and some of it in every part of them."""
+    b, a = np.array([gap.total for gap in before]) ** 2, np.array([gap.total for gap in after]) ** 2
+    return bool(a.sum() <= (1.0 - WORTH) * b.sum()) and all(a[part].sum() < b[part].sum() for part in folds)
+
+
+def staged(case: Case, say: Callable[[str], None] = lambda text: None) -> Staged:
+    """Readings, vehicle and causes of a case whose vehicle file misses its runs."""
+    work = _Stages(case, say)
+    every = range(len(case.runs))
+    nominal = (work.nominal.P, effect_vector(work.nominal))
+    gaps, _ = work.flown(dict.fromkeys(every, nominal))
+    stages = [Stage(NOMINAL, [], gaps)]
+    if work.whole.added:
+        models = {
+            n: (fold.read.model.P, effect_vector(fold.read.model)) for fold in work.folds for n in fold.left_out
+        }
+        stages.append(Stage(READINGS, work.whole.added, work.flown(models)[0]))
+    work.identify()
+    gaps, predictions = work.flown(work.models([], [fold.values for fold in work.folds]))
+    stages.append(Stage(IDENTIFIED, [], gaps))
+    added: list[FreeParameter] = []
+    chosen: list[str] = []
+    taken: dict[str, float] = {}
+    candidates = work.candidates()
+    parts = [fold.left_out for fold in work.folds]
+    while candidates:
+        say(f"causes beside the vehicle: {len(chosen) + 1}")
+        worth = work.linear_worth(added, candidates)
+        best = None
+        for label in sorted(worth, key=lambda name: worth[name])[:TRIED]:
+            own = candidates[label]
+            values = work.refitted([*added, *own], len(own))
+            gaps, flown = work.flown(work.models([*added, *own], values))
+            new = np.array([at[-len(own) :] for at in values])
+            alike = bool((np.abs(np.sign(new).sum(axis=0)) == len(new)).any())
+            if alike and worth_it(stages[-1].gaps, gaps, parts):
+                total = root_mean_square([gap.total for gap in gaps])
+                if best is None or total < best[0]:
+                    best = (total, label, values, gaps, flown)
+        if best is None:
+            break
+        total, label, values, gaps, predictions = best
+        taken[label] = stages[-1].total ** 2 - total**2
+        added += candidates.pop(label)
+        chosen.append(label)
+        for fold, at in zip(work.folds, values, strict=True):
+            fold.values = at
+        stages.append(Stage(f"+ {label}", [label], gaps))
+    return _concluded(work, stages, chosen, added, predictions, taken)
+
+
+def _concluded(
+    work: _Stages, stages: list[Stage], chosen: list[str], added: list[FreeParameter], predictions: list[np.ndarray],
+    taken: dict[str, float],
+) -> Staged:  # fmt: skip
+    """The fit to all runs with everything that was chosen."""
+    work.say("all runs")
+    fitting = work.free(work.whole.model, work.whole.runs, added)
+    start = np.mean([fold.values for fold in work.folds], axis=0)
+    candidates = [fitting.again(np.clip(start, fitting.low, fitting.high))]
+    if len(work.folds) > 1:
+        candidates += [fitting.again(np.clip(fold.values, fitting.low, fitting.high)) for fold in work.folds[:2]]
+    found = min(candidates, key=lambda one: one.cost)
+    P, F = fitting.model(found.values)
+    F[ef.BIAS : ef.BIAS + ef.N_BIASES] = 0.0
+    sizes = sizes_of(fitting.free, found)
+    by_label: dict[str, dict[str, Size]] = {}
+    first = len(fitting.free.free) - len(added)
+    for n, one in enumerate(added):
+        name = one.label or one.name
+        by_label.setdefault(name, {})[one.name if one.label else "size"] = sizes[first + n]
+    for finding in work.whole.findings:
+        if finding.label in work.whole.labels:
+            name = {"gyro_scale": "scale", "attitude_lag": "time"}.get(str(finding.label), finding.channel)
+            by_label.setdefault(str(finding.label), {})[f"{name} {finding.channel}"] = Size(
+                finding.size, finding.ci90, finding.unit
+            )
+    vehicle = dict(zip(fitting.free.names[:first], sizes[:first], strict=True))
+    selected = [*work.whole.labels, *(label for label in chosen if label != GAUGE)]
+    return Staged(work.whole, stages, selected, by_label, vehicle, (P, F), predictions, taken)
+
+
+def sizes_of(free: Parameters, found: Fitted) -> list[Size]:
+    """Every parameter with its 90 % interval by Laplace's approximation, limits kept, SI."""
+    sd = np.sqrt(np.diag(found.covariance))
+    sizes = []
+    for n, one in enumerate(free.free):
+        low = max(found.values[n] - SURE * sd[n], one.low)
+        high = min(found.values[n] + SURE * sd[n], one.high)
+        at = free.nominal[n] + one.spread * np.array([found.values[n], low, high])
+        sizes.append(Size(float(at[0]), (float(at[1]), float(at[2])), one.unit))
+    return sizes
