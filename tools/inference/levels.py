@@ -117,7 +117,7 @@ def deviance(problem: Problem, gains: Gains) -> float:
     return float(np.square(gains.E[problem.valid]).sum() - 2.0 * np.log(weight).sum())
 
 
-def estimate(problem: Problem, filtered, levels: Levels) -> Levels:
+def estimate(problem: Problem, filtered, levels: Levels, rounds: int = ROUNDS) -> Levels:
     """The most probable levels; filtered(problem) -> Gains filters with the model at hand."""
 
     def objective(log: np.ndarray) -> float:
@@ -126,7 +126,7 @@ def estimate(problem: Problem, filtered, levels: Levels) -> Levels:
 
     log, at = levels.log.copy(), objective(levels.log)
     sd = np.full(len(log), levels.width)
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         slope, bend = np.empty(len(log)), np.empty(len(log))
         for i, row in enumerate(np.eye(len(log)) * NUDGE):
             above, below = objective(log + row), objective(log - row)
