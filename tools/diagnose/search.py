@@ -25,10 +25,10 @@ SHARE = 0.5  # of all that was gained
 STARTED = 4  # hypotheses at most that are given other starts at a time
 SETTLING = 1  # steps of all hypotheses before any is dropped
 CONVERGED = 0.05  # nat; a hypothesis that gains less in a step has converged
-MOST_EFFECTS = 6
-LEADING = {2: 3, 3: 2}  # hypotheses beside which a second, a third effect is tried; beside one only any further one
-PARTNERS_TRIED = 5  # further effects tried beside each of the leading hypotheses
-SHORT_LIST = 6  # hypotheses led on from the third effect on
+MOST_EFFECTS = 5
+LEADING, PARTNERS_TRIED = 3, 5  # hypotheses beside which a second effect is tried, and how many beside each
+FURTHER = 3  # effects tried as a third or further one, beside the best hypothesis
+SHORT_LIST = 3  # hypotheses led on from the third effect on
 # Nat of evidence that an effect brings, or it is left out (docs/DIAGNOSIS.md, Thresholds): the prior odds of none to a
 # label, so that a label is as probable as none where it would just be selected.
 EVIDENCE_NEEDED = 12.0
@@ -38,7 +38,7 @@ POLISHED = {1: 3, 2: 2}  # times at most, by the number of effects; once with mo
 # What a file says of noise is taken to be right by a factor of two: beyond that it is an effect, or a reading that is
 # held or coloured.
 LEAST_LEVEL, MOST_LEVEL = 0.5, 2.0
-NO_LEVEL = 4.0  # a disturbance that would have to be as many times the file's is none: it stays what the file says
+NO_LEVEL = 2.5  # a disturbance that would have to be as many times the file's is none: it stays what the file says
 UNLIKE = 0.1  # logarithm of a level, by which another is worth new gains
 LEVEL_ROUNDS = 2  # Newton steps at a time
 ROUNDS = 3  # of gains at the best label and all labels tried again there, at most
@@ -216,7 +216,7 @@ def refilter(search: Search, at: Hypothesis, roughness: float) -> None:
     search.hypotheses = rebase(search.fitter, search.hypotheses)
     search.null = rebase(search.fitter, [search.null])[0]
     search.fitter.measure(search.hypotheses)
-    converge(search.fitter, search.null)
+    converge(search.fitter, search.null, 1 if len(at.labels) > 1 else 6)
 
 
 def first_round(search: Search) -> None:
@@ -264,6 +264,7 @@ def run(problem: Problem, say: Callable[[str], None] = lambda text: None, first:
     grow(search, say)
     if level_disturbance(search):
         grow(search, say)
+    converge(search.fitter, search.null)
     return search
 
 
@@ -334,15 +335,17 @@ def refine(search: Search, times: int) -> None:
 
 def add_effects(search: Search, count: int) -> bool:
     """Further effects beside the leading hypotheses of one effect less; False where none is expected to gain."""
-    leading = [c for c in search.ranked() if len(c.labels) == count - 1][: LEADING.get(count, 1)]
+    leading = [c for c in search.ranked() if len(c.labels) == count - 1][: LEADING if count == 2 else 1]
     search.fitter.linearise(leading)
     more: dict[tuple[str, ...], Hypothesis] = {}
     for n, hypothesis in enumerate(leading):
-        tried = screen(search, hypothesis, PARTNERS_TRIED)
+        tried = screen(search, hypothesis, PARTNERS_TRIED if count == 2 else FURTHER)
         if n == 0 and (not tried or tried[0].expected_evidence() - hypothesis.expected_evidence() < PARTNER_EVIDENCE):
             return False
         more |= {tuple(sorted(c.labels)): c for c in tried}
     found = list(more.values())
     first_step(search.fitter, found)
-    search.hypotheses += advance_and_prune(search.fitter, found, min(c.misfit for c in leading), LEFT, 3)
+    worst = min(c.misfit for c in leading)
+    few = count > 2  # the best one only is led further, with gains of its own
+    search.hypotheses += advance_and_prune(search.fitter, found, worst, SHORT_LIST if few else LEFT, 1 if few else 3)
     return True

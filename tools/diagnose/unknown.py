@@ -14,7 +14,7 @@ from tools.inference.fit import Hypothesis
 from tools.inference.parameters import CLOCK_PLACE
 
 LEFT_OVER, LEFT_WIDTH = 0.145, 1.1  # share of the explainable misfit at which unknown is as likely as not; e-folds
-LEFT_GAP, LEFT_GAP_WIDTH = 0.35, 0.8  # the same of the squared gap beyond the floor
+LEFT_GAP, LEFT_GAP_WIDTH = 0.17, 0.5  # the same of the squared gap beyond the floor
 # Floors that the gap left lies beyond its own floor (root of the difference of squares), at which it is as likely one
 # effect of its own as what small ones leave; e-folds.
 WIDE, WIDE_WIDTH = 1.8, 0.35
