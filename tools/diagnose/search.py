@@ -290,15 +290,13 @@ def level_disturbance(search: Search) -> bool:
 
     The level is found only here: a model that lacks an effect would have it in its disturbance.
     """
-    problem, axes = search.problem, search.problem.kind.accelerations
-    said = np.zeros_like(problem.spectral)
-    said[axes] = [getattr(problem.case.disturbance, name) ** 2 * problem.kind.hold for name in problem.kind.disturbance]
-    plain = replace(problem, spectral=np.where(said > 0.0, said, problem.spectral))
+    problem = search.problem
+    plain = replace(problem, spectral=levels.as_said(problem).spectral)
     now = levels.disturbance(plain)
     if not now.names:
         return False
-    first = [levels.DISTURBANCE[name].start for name in now.names]
-    before = 0.5 * np.log(problem.spectral[first] / plain.spectral[first])
+    factors = levels.factors(problem)
+    before = np.log([factors[name] for name in now.names])
     model = search.model(min([search.null, search.best], key=lambda c: c.misfit))
     found = levels.estimate(plain, lambda p: p.filter(*model, begin=True), now.moved(before), LEVEL_ROUNDS)
     log = np.clip(found.log, np.log(LEAST_LEVEL), np.log(MOST_LEVEL))

@@ -13,7 +13,7 @@ import numpy as np
 
 from firmware.core.maths.rotations import wrap
 from sim_backend.core.effects import effect_layout as ef
-from tools.inference.problem import Gains, Problem
+from tools.inference.problem import Gains, Problem, variances
 
 DISTURBANCE = {"disturbance_linear": slice(0, 3), "disturbance_angular": slice(3, 6)}  # of the spectral densities
 SENSORS = {
@@ -74,6 +74,27 @@ def disturbance(problem: Problem, width: float = WIDTH) -> Levels:
     """The levels of the disturbance alone."""
     names = [name for name, part in DISTURBANCE.items() if problem.spectral[part].any()]
     return Levels(tuple(names), np.zeros(len(names)), np.full(len(names), width), width)
+
+
+def as_said(problem: Problem) -> Problem:
+    """The problem with the noise that its case names."""
+    kind, spectral = problem.kind, problem.spectral.copy()
+    spectral[kind.accelerations] = [
+        getattr(problem.case.disturbance, name) ** 2 * kind.hold for name in kind.disturbance
+    ]
+    R = np.tile(variances(kind, problem.case.sensors), (len(problem.runs), 1))
+    return replace(problem, spectral=spectral, R=R)
+
+
+def factors(problem: Problem) -> dict[str, float]:
+    """By level, how many times what its case names a problem's standard deviations are."""
+    said = as_said(problem)
+    found = {name: float(np.sqrt(problem.spectral[part] / said.spectral[part]).mean())
+             for name, part in DISTURBANCE.items() if said.spectral[part].all()}  # fmt: skip
+    return found | {
+        name: float(np.sqrt(problem.R[:, part] / said.R[:, part]).mean())
+        for name, part in SENSORS.items() if problem.seen[part].any()
+    }  # fmt: skip
 
 
 def sensor_noise(problem: Problem, least: float, most: float) -> Levels:

@@ -7,6 +7,7 @@ import pytest
 from support.cases import make_case
 
 from sim_backend.core.effects import effect_layout as ef
+from tools.diagnose.cautions import cautions
 from tools.diagnose.search import MOST_LEVEL, Search, converge, gains_of, level_disturbance
 from tools.inference import levels
 from tools.inference.fit import Fitter
@@ -79,3 +80,22 @@ def test_what_is_far_rougher_is_no_level_of_the_disturbance(tmp_path):
     level_disturbance(search)
     said = problem_of(search.problem.case).spectral[:6]
     assert (search.problem.spectral[:6] <= MOST_LEVEL**2 * said * 1.001).all()
+
+
+def test_factors_are_counted_from_what_the_case_says(calm):
+    found = levels.sensor_noise(noisier(calm, {"gyro": 1.5}), 0.5, 2.0).applied(calm)
+    factors = levels.factors(found)
+    assert factors["gyro"] == pytest.approx(1.5, rel=0.1)
+    assert factors["disturbance_linear"] == pytest.approx(1.0)
+    back = levels.as_said(found)
+    assert np.allclose(back.R, calm.R)
+    assert np.allclose(back.spectral, calm.spectral)
+
+
+def test_noise_that_is_not_what_the_file_says_is_a_caution(calm):
+    assert not any("noise" in line for line in cautions(calm))
+    found = levels.sensor_noise(noisier(calm, {"gyro": 1.5}), 0.5, 2.0).applied(calm)
+    said = [line for line in cautions(found) if "noise is not what" in line]
+    assert len(said) == 1
+    assert "gyro 1.5" in said[0]
+    assert "depth" not in said[0]
