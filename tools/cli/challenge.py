@@ -1,5 +1,6 @@
 """`glider gap challenge`: a blind test of the diagnosis, made, run and scored."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -7,6 +8,7 @@ import click
 from tools.cli.common import fail, json_option, print_json, progress, say
 
 folder = click.Path(path_type=Path, file_okay=False)
+COUNT = click.IntRange(0, 1000)
 
 
 @click.group()
@@ -17,26 +19,30 @@ def challenge():
 @challenge.command()
 @click.option("--out", required=True, type=folder, help="Folder for cases, held, answers.zip and manifest.json.")
 @click.option("--seed", required=True, type=click.IntRange(0, 2**63 - 1), help="All cases follow from it.")
-@click.option("--single", default=100, show_default=True, type=click.IntRange(0, 1000), help="Cases with one effect.")
-@click.option("--none", "none", default=60, show_default=True, type=click.IntRange(0, 1000), help="Without a gap.")
-@click.option("--pairs", default=30, show_default=True, type=click.IntRange(0, 1000), help="With two effects.")
-@click.option("--unknown", default=30, show_default=True, type=click.IntRange(0, 1000), help="Outside the catalogue.")
+@click.option("--messy", is_flag=True, help="Beside the effect four small ones; noise that is not what the file says.")
+@click.option("--single", type=COUNT, help="Cases with one effect: 100.")
+@click.option("--none", "none", type=COUNT, help="Without a gap: 60; messy, without a large effect: 20.")
+@click.option("--pairs", type=COUNT, help="With two effects: 30; messy: 0.")
+@click.option("--unknown", type=COUNT, help="Outside the catalogue: 30; messy: 20.")
 @click.option("--answers", type=click.Path(path_type=Path, dir_okay=False), help="Where the sealed answers go.")
 @click.option("--jobs", default=0, type=click.IntRange(0, 256), help="Processes; one a core by default.")
 def make(
-    out: Path, seed: int, single: int, none: int, pairs: int, unknown: int, answers: Path | None, jobs: int
-) -> None:
+    out: Path, seed: int, messy: bool, single: int | None, none: int | None, pairs: int | None, unknown: int | None,
+    answers: Path | None, jobs: int,
+) -> None:  # fmt: skip
     """Draw, fly and seal a blind test. Cases that are there are kept: call again to go on after a stop."""
     from tools.study.challenge.make import Order
     from tools.study.challenge.make import make as make_all
-    from tools.study.challenge.plan import Counts
+    from tools.study.challenge.plan import MESSY, Counts
     from tools.study.challenge.seal import ARCHIVE, MANIFEST, read_manifest
 
-    counts = Counts(single, none, pairs, unknown)
-    total = single + none + pairs + unknown
+    asked = {"single": single, "none": none, "pairs": pairs, "unknown": unknown}
+    given = {name: count for name, count in asked.items() if count is not None}
+    counts = replace(MESSY if messy else Counts(), **given)
+    total = counts.total
     if not total:
         raise click.UsageError("no cases: all counts are 0")
-    order = Order(out, seed, counts, answers or out / ARCHIVE)
+    order = Order(out, seed, counts, answers or out / ARCHIVE, messy)
     with progress("cases", total) as advance:
         made, wrong = make_all(order, jobs, advance)
     if wrong:

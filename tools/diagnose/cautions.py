@@ -7,10 +7,12 @@ import numpy as np
 from sim_backend.core.effects.catalogue import catalogue
 from tools.data.runs import columns as names
 from tools.diagnose.noise_probes import UNPREDICTABLE
+from tools.inference.levels import factors
 from tools.inference.parameters import effect_parameters
 from tools.inference.problem import Problem
 
 SPARSE, LONG = 0.2, 5.0  # share of samples missing; s without a sample
+UNLIKE = 1.25  # times what a file says of noise, or less by as much
 PARTS = {
     "onboard attitude": names.ATTITUDE,
     "gyro": names.RATES,
@@ -29,7 +31,8 @@ WITHOUT = {
 
 def cautions(problem: Problem) -> list[str]:
     """Everything about these runs that limits what can be concluded, a line each."""
-    return [*_without_commands(problem), *_without_columns(problem), *_holes(problem), *_few(problem)]
+    found = [*_without_commands(problem), *_without_columns(problem), *_holes(problem), *_few(problem)]
+    return [*found, *_noise(problem)]
 
 
 def not_asked(problem: Problem) -> list[str]:
@@ -85,6 +88,18 @@ def _holes(problem: Problem) -> list[str]:
         if holed:
             found.append(f"{run.name}: {', '.join(holed)}: less can be seen there")
     return found
+
+
+def _noise(problem: Problem) -> list[str]:
+    """Noise that is not what the case says."""
+    unlike = [
+        f"{name.replace('_', ' ')} {factor:.2g}"
+        for name, factor in factors(problem).items()
+        if abs(np.log(factor)) > np.log(UNLIKE)
+    ]
+    if not unlike:
+        return []
+    return [f"noise is not what the vehicle file says: {', '.join(unlike)} times that (taken from these runs)"]
 
 
 def _few(problem: Problem) -> list[str]:

@@ -13,6 +13,7 @@ import numpy as np
 from sim_backend.core.effects.catalogue import catalogue
 from tools.diagnose.sensor_consistency import DISTANT, HOLDS_BELOW, NEARBY, inconsistent_sensor
 from tools.diagnose.time_alignment import aligned
+from tools.inference import levels
 from tools.inference.fit import POOR, THRESHOLD_STEP, Fitter, Hypothesis
 from tools.inference.parameters import CLOCK_PLACE, FreeParameter, effect_parameters, model_at, nuisance_parameters
 from tools.inference.problem import Gains, Problem
@@ -24,12 +25,22 @@ SHARE = 0.5  # of all that was gained
 STARTED = 4  # hypotheses at most that are given other starts at a time
 SETTLING = 1  # steps of all hypotheses before any is dropped
 CONVERGED = 0.05  # nat; a hypothesis that gains less in a step has converged
-MOST_EFFECTS = 3
-PARTNERS_TRIED = 5  # further effects tried beside each of the leading hypotheses
-LEADING = 3  # hypotheses
+MOST_EFFECTS = 5
+LEADING, PARTNERS_TRIED = 3, 5  # hypotheses beside which a second effect is tried, and how many beside each
+FURTHER = 3  # effects tried as a third or further one, beside the best hypothesis
+SHORT_LIST = 3  # hypotheses led on from the third effect on
+# Nat of evidence that an effect brings, or it is left out (docs/DIAGNOSIS.md, Thresholds): the prior odds of none to a
+# label, so that a label is as probable as none where it would just be selected.
+EVIDENCE_NEEDED = 12.0
 VISIBLE = 1.0  # squared sigma: a spread of an effect that moves nothing by as much cannot be seen in these runs
 PARTNER_EVIDENCE = 5.0  # nat that one step is expected to gain with a further effect, or none is tried
-POLISHED = (3, 2, 1)  # times at most, by the number of effects
+POLISHED = {1: 3, 2: 2}  # times at most, by the number of effects; once with more
+# What a file says of noise is taken to be right by a factor of two: beyond that it is an effect, or a reading that is
+# held or coloured.
+LEAST_LEVEL, MOST_LEVEL = 0.5, 2.0
+NO_LEVEL = 2.5  # a disturbance that would have to be as many times the file's is none: it stays what the file says
+UNLIKE = 0.1  # logarithm of a level, by which another is worth new gains
+LEVEL_ROUNDS = 2  # Newton steps at a time
 ROUNDS = 3  # of gains at the best label and all labels tried again there, at most
 ALIGNED = 3  # times that poses are moved to where the clock found so far says
 NEARLY_UNTEMPERED = 1.05  # temperature: the best hypothesis is near the truth
@@ -205,7 +216,7 @@ def refilter(search: Search, at: Hypothesis, roughness: float) -> None:
     search.hypotheses = rebase(search.fitter, search.hypotheses)
     search.null = rebase(search.fitter, [search.null])[0]
     search.fitter.measure(search.hypotheses)
-    converge(search.fitter, search.null)
+    converge(search.fitter, search.null, 1 if len(at.labels) > 1 else 6)
 
 
 def first_round(search: Search) -> None:
@@ -226,6 +237,7 @@ def first_round(search: Search) -> None:
 
 def run(problem: Problem, say: Callable[[str], None] = lambda text: None, first: Hypothesis | None = None) -> Search:
     """The search over a problem's runs; from the effects of `first`, where those are certain."""
+    problem = levels.sensor_noise(problem, LEAST_LEVEL, MOST_LEVEL).applied(problem)
     free, known = nuisance_parameters(problem), effect_parameters(problem)
     P, F = model_at(problem, free, np.zeros(len(free)))
     gains = gains_of(problem, (P, F), ROUGHNESS[0])
@@ -243,18 +255,58 @@ def run(problem: Problem, say: Callable[[str], None] = lambda text: None, first:
         first_round(search)
         say(f"screened {len(known)} labels")
     for _ in range(ROUNDS):
-        refine(search, POLISHED[0])
+        refine(search, POLISHED[1])
         first = search.best.labels
         rescreen(search)
         if search.best.labels == first:
             break
     say(f"one effect: {' '.join(search.best.labels) or 'none'}")
-    for count in range(2, MOST_EFFECTS + 1):
-        if len(search.best.labels) < count - 1 or not add_effects(search, count):
-            break
-        refine(search, POLISHED[count - 1])
-        say(f"{count} effects: {' '.join(search.best.labels)}")
+    grow(search, say)
+    if level_disturbance(search):
+        grow(search, say)
+    converge(search.fitter, search.null)
     return search
+
+
+def grow(search: Search, say: Callable[[str], None]) -> None:
+    """Effects added one by one to the best hypothesis, as long as each brings the evidence that is needed."""
+    for count in range(max(2, len(search.best.labels) + 1), MOST_EFFECTS + 1):
+        before = search.best
+        if len(before.labels) < count - 1 or not add_effects(search, count):
+            break
+        if count > 2:
+            listed = [c for c in search.ranked() if len(c.labels) >= count - 1][:SHORT_LIST]
+            search.hypotheses = listed if any(c is before for c in listed) else [*listed, before]
+        refine(search, POLISHED.get(count, 1))
+        say(f"{count} effects: {' '.join(search.best.labels)}")
+        fewer = [c.log_evidence(search.fitter) for c in search.hypotheses if len(c.labels) < count]
+        least = max(fewer, default=-np.inf)
+        if search.best.log_evidence(search.fitter) < least + EVIDENCE_NEEDED:
+            break
+
+
+def level_disturbance(search: Search) -> bool:
+    """The disturbance's level at the best hypothesis, and all taken over to it; whether it is another than before.
+
+    The level is found only here: a model that lacks an effect would have it in its disturbance.
+    """
+    problem = search.problem
+    plain = replace(problem, spectral=levels.as_said(problem).spectral)
+    now = levels.disturbance(plain)
+    if not now.names:
+        return False
+    factors = levels.factors(problem)
+    before = np.log([factors[name] for name in now.names])
+    model = search.model(min([search.null, search.best], key=lambda c: c.misfit))
+    found = levels.estimate(plain, lambda p: p.filter(*model, begin=True), now.moved(before), LEVEL_ROUNDS)
+    log = np.clip(found.log, np.log(LEAST_LEVEL), np.log(MOST_LEVEL))
+    log[found.log > np.log(NO_LEVEL)] = 0.0
+    if np.abs(log - before).max() < UNLIKE:
+        return False
+    search.problem = now.moved(log - before).applied(problem)
+    refilter(search, search.best, 1.0)
+    search.hypotheses = advance_and_prune(search.fitter, search.hypotheses, search.null.misfit, 2 * LEFT, 1)
+    return True
 
 
 def rescreen(search: Search) -> None:
@@ -281,15 +333,17 @@ def refine(search: Search, times: int) -> None:
 
 def add_effects(search: Search, count: int) -> bool:
     """Further effects beside the leading hypotheses of one effect less; False where none is expected to gain."""
-    leading = [c for c in search.ranked() if len(c.labels) == count - 1][:LEADING]
+    leading = [c for c in search.ranked() if len(c.labels) == count - 1][: LEADING if count == 2 else 1]
     search.fitter.linearise(leading)
     more: dict[tuple[str, ...], Hypothesis] = {}
     for n, hypothesis in enumerate(leading):
-        tried = screen(search, hypothesis, PARTNERS_TRIED)
+        tried = screen(search, hypothesis, PARTNERS_TRIED if count == 2 else FURTHER)
         if n == 0 and (not tried or tried[0].expected_evidence() - hypothesis.expected_evidence() < PARTNER_EVIDENCE):
             return False
         more |= {tuple(sorted(c.labels)): c for c in tried}
     found = list(more.values())
     first_step(search.fitter, found)
-    search.hypotheses += advance_and_prune(search.fitter, found, min(c.misfit for c in leading), LEFT, 3)
+    worst = min(c.misfit for c in leading)
+    few = count > 2  # the best one only is led further, with gains of its own
+    search.hypotheses += advance_and_prune(search.fitter, found, worst, SHORT_LIST if few else LEFT, 1 if few else 3)
     return True

@@ -137,10 +137,20 @@ def over_runs(
     return value(whole), (float(low), float(high))
 
 
-def left_out_gap(search: Search, hypothesis: Hypothesis) -> float:
-    """The total gap of a hypothesis on runs left out, over the runs, windows begun where its own filter stands."""
+def left_out_squares(search: Search, hypothesis: Hypothesis) -> np.ndarray:
+    """A hypothesis's squared gaps on runs left out, (runs,), windows begun where its own filter stands."""
     runs, _ = gaps(search.problem, left_out(search, hypothesis), own_filter=True)
-    return float(np.sqrt(squares(runs).mean()))
+    return squares(runs)
+
+
+def most_often(taken: dict[str, np.ndarray]) -> dict[str, float]:
+    """How often each of several figures (runs,) is the largest, by bootstrap over runs."""
+    if len(taken) < 2:
+        return dict.fromkeys(taken, 1.0)
+    table = np.array(list(taken.values()))
+    picks = np.random.default_rng(SEED).integers(0, table.shape[1], (BOOTSTRAP, table.shape[1]))
+    first = np.argmax(table[:, picks].mean(axis=2), axis=0)
+    return {label: float((first == n).mean()) for n, label in enumerate(taken)}
 
 
 @dataclass

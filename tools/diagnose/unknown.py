@@ -14,6 +14,10 @@ from tools.inference.fit import Hypothesis
 from tools.inference.parameters import CLOCK_PLACE
 
 LEFT_OVER, LEFT_WIDTH = 0.145, 1.1  # share of the explainable misfit at which unknown is as likely as not; e-folds
+LEFT_GAP, LEFT_GAP_WIDTH = 0.17, 0.5  # the same of the squared gap beyond the floor
+# Floors that the gap left lies beyond its own floor (root of the difference of squares), at which it is as likely one
+# effect of its own as what small ones leave; e-folds.
+WIDE, WIDE_WIDTH = 1.8, 0.35
 NOISY, NOISY_WIDTH = 0.2, 0.8  # share of the explainable misfit that is left: disorder is looked for; width in e-folds
 UNFIT = 5.0  # tolerances that the best explanation still misses by: no effect of the catalogue does that
 LOOSE = 3.0  # times the floor, and one tolerance, that no vehicle without a gap is off
@@ -35,6 +39,11 @@ def left_share(shrinkage: Shrinkage) -> float:
     beyond = shrinkage.recalibrated**2 - shrinkage.floor**2
     left = shrinkage.after**2 - shrinkage.floor**2
     return float(np.clip(left / beyond, 0.0, 1.0)) if beyond > 0.0 else 0.0
+
+
+def left_floors(shrinkage: Shrinkage) -> float:
+    """What is left of the gap beyond the floor, in floors."""
+    return float(np.sqrt(max(shrinkage.after**2 - shrinkage.floor**2, 0.0)) / max(shrinkage.floor, 1e-6))
 
 
 @dataclass
@@ -117,8 +126,15 @@ def probability_unknown(
         loose = not selected and not noise and shrinkage.after > max(LOOSE * shrinkage.floor, 1.0)
         unfit = search.problem.rules.whiteness and (loose or shrinkage.after > UNFIT)
         return 1.0 - MORE_UNKNOWN if unfit else LEAST_UNKNOWN
-    if shrinkage.after > UNFIT or not (evident or noise):
+    if shrinkage.after > UNFIT:
         return 1.0 - MORE_UNKNOWN
     if noise:
         return probability(left.share, NOISY, NOISY_WIDTH)
-    return probability(left.share, LEFT_OVER, LEFT_WIDTH)
+    wide = probability(left_floors(shrinkage), WIDE, WIDE_WIDTH)
+    if not evident:
+        return wide
+    shares = (
+        probability(left.share, LEFT_OVER, LEFT_WIDTH),
+        probability(left_share(shrinkage), LEFT_GAP, LEFT_GAP_WIDTH),
+    )
+    return max(wide * max(shares), MORE_UNKNOWN)

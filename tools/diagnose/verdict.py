@@ -4,26 +4,29 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import norm
 
 from sim_backend.core.effects.catalogue import catalogue
 from tools.diagnose.matter import MATTERS, disorder_matters, gap_matters, movements
-from tools.diagnose.noise_probes import CLOCK, UNPREDICTABLE, ProbeResult, inflated
+from tools.diagnose.noise_probes import CLOCK, ProbeResult, inflated
 from tools.diagnose.record import NONE, UNKNOWN, Finding
 from tools.diagnose.residuals import UNCLEAN, tests, worst
-from tools.diagnose.search import Search, converge, run
-from tools.diagnose.shrink import Shrinkage, left_out_gap, shrink
+from tools.diagnose.search import EVIDENCE_NEEDED, Search, advance_and_prune, converge, first_step, run, screen
+from tools.diagnose.shrink import Shrinkage, case_noise_floor, left_out_squares, most_often, shrink
 from tools.diagnose.unknown import LEAST_UNKNOWN, clock_label, disorder, left_share, probability_unknown, remainder_of
 from tools.inference.fit import Hypothesis
 from tools.inference.parameters import CLOCK_PLACE
 
 HELD_OUT_SHARE = 0.3  # of the gap that is left on runs left out: an effect beside another must close as much more
-# Nat of evidence that an effect brings, or it is left out (docs/DIAGNOSIS.md, Thresholds): the prior odds of none to a
-# label, so that a label is as probable as none where it would just be selected.
-EVIDENCE_NEEDED = 12.0
 TIE = 6.0  # nat within which two labels are not told apart: what a change of prior spreads can move
 MOST_GROUP = 3
 ERROR_RATE = 0.03  # answers that named something else altogether, of those to the cases it was developed with: 3 of 104
 CERTAIN = 0.9  # of the recalibrated gap: effects beside an unknown one that leave more are not certain
+RIVALS = 5  # further labels fitted in the place of the main one, where it stands beside others
+# Floors by which an effect alone widens the gap, as likely a main cause as one of many small ones there: where others
+# are seen or something is left, and where it is all that can be seen; e-folds.
+LARGE, ALONE, LARGE_WIDTH = 1.7, 0.6, 0.4
+SECOND = 0.9  # of the main cause's probability, that none may have where there is an effect at all
 LIKELY = 1e-3  # probability from which an alternative's effect on the windows is looked at
 
 
@@ -61,7 +64,7 @@ def drop(search: Search, hypothesis: Hypothesis, label: str) -> Hypothesis:
         labels, [f for f in hypothesis.free if f.label != label], hypothesis.values[keep], hypothesis.nuisance
     )
     search.fitter.measure([less])
-    converge(search.fitter, less, 4)
+    converge(search.fitter, less, 2)
     search.hypotheses.append(less)
     return less
 
@@ -76,22 +79,40 @@ def clock_of(search: Search, hypothesis: Hypothesis, gained: dict[str, float]) -
     return search.fitter.hypothesis((labels[0],), free, hypothesis.values[kept])
 
 
-def held_out_worth(search: Search, hypothesis: Hypothesis) -> dict[str, float]:
-    """By how much the gap on runs left out grows without each effect, the rest fitted anew, over the gap with it.
+@dataclass(frozen=True)
+class Worth:
+    """What each effect of a hypothesis takes off the gap on runs left out, the rest fitted anew without it."""
 
-    The root of the difference of squares; 0 where it does not grow. An effect below HELD_OUT_SHARE is a detail that
-    the data can see and nobody needs: the wrong form of another one, a sample's worth of delay.
+    whole: np.ndarray  # (runs,) squared gaps with all of them
+    taken: dict[str, np.ndarray]  # by label, (runs,): by how much the squares grow without it
+
+    def tolerances(self, label: str) -> float:
+        """The root of the mean; 0 where the gap does not grow, or for a label that was not asked about."""
+        return float(np.sqrt(max(self.taken[label].mean(), 0.0))) if label in self.taken else 0.0
+
+    def share(self, label: str) -> float:
+        """The same over the gap with all of them.
+
+        An effect below HELD_OUT_SHARE is a detail that the data can see and nobody needs: the wrong form of another
+        one, a sample's worth of delay.
+        """
+        return self.tolerances(label) / max(float(np.sqrt(self.whole.mean())), 1e-6)
+
+
+def held_out_worth(search: Search, hypothesis: Hypothesis) -> Worth:
+    """What each effect of a hypothesis is worth on runs left out."""
+    whole = left_out_squares(search, hypothesis)
+    taken = {
+        label: left_out_squares(search, drop(search, hypothesis, label)) - whole for label in hypothesis.labels
+    }  # fmt: skip
+    return Worth(whole, taken)
+
+
+def prune_effects(search: Search) -> tuple[Hypothesis, dict[str, float], Worth | None]:
+    """Backward elimination: the best hypothesis without what does not earn its place; nat that each effect brings.
+
+    Also what each is worth on runs left out, where that was asked: of one alone it was not.
     """
-    whole = left_out_gap(search, hypothesis)
-    found = {}
-    for label in hypothesis.labels:
-        without = left_out_gap(search, drop(search, hypothesis, label))
-        found[label] = float(np.sqrt(max(without**2 - whole**2, 0.0)) / max(whole, 1e-6))
-    return found
-
-
-def prune_effects(search: Search) -> tuple[Hypothesis, dict[str, float]]:
-    """Backward elimination: the best hypothesis without what does not earn its place; nat that each effect brings."""
     hypothesis = search.best
     while hypothesis.labels:
         gains = {
@@ -101,20 +122,31 @@ def prune_effects(search: Search) -> tuple[Hypothesis, dict[str, float]]:
         weakest = min(gains, key=lambda label: gains[label])
         if gains[weakest] >= EVIDENCE_NEEDED:
             if len(hypothesis.labels) == 1:
-                return hypothesis, gains
+                return hypothesis, gains, None
             outside = held_out_worth(search, hypothesis)
-            weakest = min(outside, key=lambda label: outside[label])
-            if outside[weakest] >= HELD_OUT_SHARE:
-                return hypothesis, gains
+            weakest = min(outside.taken, key=outside.tolerances)
+            if outside.share(weakest) >= HELD_OUT_SHARE:
+                return hypothesis, gains, outside
         hypothesis = drop(search, hypothesis, weakest)
-    return hypothesis, {}
+    return hypothesis, {}, None
 
 
-def by_held_out_gap(search: Search) -> tuple[Hypothesis, dict[str, float]]:
+def by_held_out_gap(search: Search) -> tuple[Hypothesis, dict[str, float], Worth | None]:
     """The hypothesis of one effect, or of none, with the least gap on runs left out: what evidence is compared with."""
     tried = [search.null, *(hypothesis for hypothesis in search.hypotheses if len(hypothesis.labels) == 1)]
-    best = min(tried, key=lambda hypothesis: left_out_gap(search, hypothesis))
-    return best, {label: best.log_evidence(search.fitter) for label in best.labels}
+    best = min(tried, key=lambda hypothesis: float(left_out_squares(search, hypothesis).mean()))
+    return best, {label: best.log_evidence(search.fitter) for label in best.labels}, None
+
+
+def try_rivals(search: Search, hypothesis: Hypothesis, main: str) -> None:
+    """The labels that promise most in the place of the main one, beside the others, fitted."""
+    others = drop(search, hypothesis, main)
+    search.fitter.linearise([others])
+    there = [set(known.labels) for known in search.hypotheses]
+    new = [c for c in screen(search, others, RIVALS + 1) if set(c.labels) not in there]
+    if new:
+        first_step(search.fitter, new)
+        search.hypotheses += advance_and_prune(search.fitter, new, others.misfit, RIVALS, 2)
 
 
 def alternatives(search: Search, hypothesis: Hypothesis, main: str) -> dict[str, Hypothesis]:
@@ -164,7 +196,7 @@ def conclude(
     `noise` is disorder that the search already knows of: turbulence, waves, or motion capture's clock.
     """
     problem = search.problem
-    evident, gained = prune_effects(search) if problem.rules.evidence else by_held_out_gap(search)
+    evident, gained, worth = prune_effects(search) if problem.rules.evidence else by_held_out_gap(search)
     search.hypotheses = [c for c in search.hypotheses if c is not evident] + ([evident] if evident.labels else [])
     search.gains = problem.filter(*search.model(evident), begin=True)
     findings = tests(problem, search.gains)
@@ -189,13 +221,22 @@ def conclude(
         elif disordered not in moved:
             small.append(disordered)
     negligible = {label: gained.pop(label) for label in small}
+    worth = held_out_worth(search, evident) if worth is None else worth
+    calm = case_noise_floor(search, selected)["total"] if disordered else shrinkage.floor
+    if disordered and disordered not in worth.taken:
+        worth.taken[disordered] = np.full(len(problem.runs), max(shrinkage.after**2 - calm**2, 0.0))
     ranked = gained or negligible
-    main = max(ranked, key=lambda label: ranked[label]) if ranked else ""
-    if disordered in UNPREDICTABLE:
-        main = disordered
+    main = max(ranked, key=worth.tolerances) if ranked else ""
     by_search = problem.rules.evidence and not (noise is not None and main == disordered)
+    if by_search and len(evident.labels) > 1:
+        try_rivals(search, evident, main)
     chances = posterior(search, evident, main) if by_search else {main or NONE: 1.0}
+    chances = share_out(chances, main, most_often({label: worth.taken[label] for label in gained}))
     chances = to_none(chances, negligible, movements_of_alternatives(search, evident, main, chances))
+    if main in gained:
+        many = left is not None or len(evident.labels) > 1
+        floors = worth.tolerances(main) / max(calm, 1e-6)
+        chances = doubt_small(chances, main, floors / (LARGE if many else ALONE))
     unknown = probability_unknown(search, bool(gained), bool(ranked), shrinkage, left, noise is not None)
     if not gained and not gap_matters(shrinkage):
         unknown = LEAST_UNKNOWN
@@ -209,11 +250,38 @@ def conclude(
             selected, shrinkage = search.null, shrink(search, search.null)
     groups = grouped(log_posteriors(search, evident, main)) if by_search else {main: [main]}
     return Answer(
-        search=search, selected=sorted(gained, key=lambda label: (label != main, -gained[label])), main=top,
+        search=search, selected=sorted(gained, key=worth.tolerances, reverse=True), main=top,
         probabilities=chances, groups=groups, hypothesis=selected, null=search.null, findings=findings,
         whiteness=whiteness, unexplained=left_share(shrinkage), gained=gained, negligible=negligible,
         probed=[] if left is None else left.probed, noise=noise, shrinkage=shrinkage,
     )  # fmt: skip
+
+
+def share_out(chances: dict[str, float], main: str, first: dict[str, float]) -> dict[str, float]:
+    """Probabilities of the main cause, where others of the selected effects may take more of the gap than it.
+
+    first: how probably each takes the most.
+    """
+    own = first.get(main, 1.0)
+    shared = {label: chance * own for label, chance in chances.items()}
+    for label in first:
+        if label != main:
+            shared[label] = shared.get(label, 0.0) + first[label]
+    return shared
+
+
+def doubt_small(chances: dict[str, float], main: str, size: float) -> dict[str, float]:
+    """Probabilities where the largest of the effects may be one of many small ones, and nothing the main cause.
+
+    size: of the main one, in sizes at which that is as likely as not. What this takes off the labels goes to none, but
+    no more than SECOND of what the main one keeps: there is something.
+    """
+    large = float(norm.cdf(np.log(max(size, 1e-6)) / LARGE_WIDTH))
+    labels = sum(chance for name, chance in chances.items() if name != NONE)
+    least = 1.0 / (1.0 + SECOND * chances[main] / max(labels, 1e-9))  # of the labels' probability that stays
+    kept = max(large, least)
+    found = {name: kept * chance for name, chance in chances.items() if name != NONE}
+    return found | {NONE: 1.0 - sum(found.values())}
 
 
 def movements_of_alternatives(

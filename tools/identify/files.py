@@ -17,9 +17,9 @@ from sim_backend.core.effects import effect_layout as ef
 from tools.data.runs.case import CASE_FILE
 from tools.data.runs.csvfile import write_bytes
 from tools.data.tomltext import toml_text
-from tools.identify.levels import DISTURBANCE
 from tools.identify.pipeline import Identified
 from tools.inference.corrected import corrected_text
+from tools.inference.levels import DISTURBANCE
 from tools.inference.model import effect_vector, effects_in, nominal_model
 
 VEHICLE, CORRECTED, POSTERIOR, RESULT = "identified.toml", "corrected.toml", "posterior.nc", "identified.json"

@@ -8,11 +8,11 @@ import numpy as np
 from sim_backend.core.effects import effect_layout as ef
 from tools.data.runs.case import Case
 from tools.data.runs.run import Run
-from tools.identify import levels as noise
 from tools.identify.flight_likelihood import Flights, Linear
 from tools.identify.predict import flown_gap
 from tools.identify.screen import LeftOut
 from tools.identify.statistics import Quadratic, collect, heat
+from tools.inference import levels as noise
 from tools.inference.model import Model
 from tools.inference.prediction_error import identify_by_prediction
 from tools.inference.problem import Problem, problem_of

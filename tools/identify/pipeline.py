@@ -17,10 +17,10 @@ from tools.identify.fit import Fit, fit
 from tools.identify.flight_likelihood import Flights
 from tools.identify.held import Held, hold_out
 from tools.identify.identifiability import unidentifiable_directions
-from tools.identify.levels import Levels
 from tools.identify.sampler import Chains, Summary, sample, summarise
 from tools.identify.screen import LeftOut, despiked, screen
 from tools.identify.statistics import Quadratic
+from tools.inference.levels import Levels
 from tools.inference.model import nominal_model
 from tools.inference.problem import Problem
 from tools.inference.vehicle_parameters import Parameters

@@ -9,9 +9,9 @@ import numpy as np
 
 from firmware.model.vehicle import COEFFICIENTS
 from tools.identify.identifiability import sentences, unidentifiable_directions
-from tools.identify.levels import SENSORS, group_of_reading
 from tools.identify.pipeline import Identified
 from tools.inference.channels import ROUGHIE_MEASURES
+from tools.inference.levels import SENSORS, group_of_reading
 from tools.report.charts import Chart, Line, svg
 from tools.report.lines import compared
 from tools.report.page import render

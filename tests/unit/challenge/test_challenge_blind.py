@@ -7,7 +7,7 @@ from pathlib import Path
 
 import tools.study
 
-BLIND = ("make", "plan", "forms", "cases", "trial", "design", "magnitude", "evidence", "seal")
+BLIND = ("make", "plan", "forms", "cases", "trial", "design", "magnitude", "messy", "evidence", "seal")
 FORBIDDEN = ("sim_backend.core.effects", "sim_backend.core.effect", "tools.diagnose", "tools.identify", "tools.cli")
 
 

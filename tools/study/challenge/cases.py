@@ -10,7 +10,8 @@ from firmware.model.vehicle import Vehicle
 from tools.data.runs import columns as names
 from tools.data.runs.case import write_case
 from tools.study.challenge.design import FITTED, LAKE, POOL
-from tools.study.challenge.magnitude import Magnitude, choose
+from tools.study.challenge.magnitude import LEAST, Magnitude, choose
+from tools.study.challenge.messy import COUNT, LARGE, Factors, draw_factors, small_ones
 from tools.study.challenge.plan import UNKNOWN, CasePlan, forms_of
 from tools.study.challenge.trial import Flight, Trial, draw_trial, flyable, predictable, redraw, total, with_effect
 
@@ -32,6 +33,8 @@ class Made:
     magnitudes: list[Magnitude]
     flights: list[Flight]
     tries: int
+    small: list[Magnitude]  # beside them, of a messy case
+    factors: Factors | None  # on noise, of a messy case
 
 
 class NoCase(RuntimeError):
@@ -42,25 +45,30 @@ def draw_case(seed: int, plan: CasePlan, vehicle: Vehicle) -> Made:
     """Draw vehicles and runs until the effects show as planned; a size that cannot be had gives way to the other."""
     for number in range(TRIES):
         rng = np.random.default_rng(np.random.SeedSequence([seed, 1 + plan.number, number]))
-        trial = draw_trial(rng, vehicle, POOL if plan.mocap else LAKE)
+        factors = draw_factors(rng, vehicle) if plan.messy else None
+        flown = vehicle if factors is None else factors.applied(vehicle)
+        trial = draw_trial(rng, vehicle, POOL if plan.mocap else LAKE, flown)
         if not redraw(rng, trial, trial.shapes, 40):
             continue
         found = []
         for form, weak in zip(forms_of(plan), plan.weak, strict=True):
-            size = choose(rng, trial, form, weak != (number >= GIVE_WAY))
+            size = choose(rng, trial, form, weak != (number >= GIVE_WAY), LARGE if plan.messy else LEAST)
             if size is None:
                 break
             found.append(size)
         if len(found) < len(plan.labels):
             continue
+        small = small_ones(rng, trial, {place for size in found for place in size.form.places}) if plan.messy else []
+        if plan.messy and len(small) < COUNT:
+            continue
         F = trial.shapes
-        for size in found:
+        for size in (*found, *small):
             F = with_effect(F, size.form, size.sizes, size.strength)
         # Held runs were not looked at; a redrawn fitted run would change the sizes found.
         flights = trial.fly(F)
         if not flyable(flights[:FITTED], trial.site) or not redraw(rng, trial, F, 40):
             continue
-        return Made(plan, trial, F, found, trial.fly(F), number + 1)
+        return Made(plan, trial, F, found, trial.fly(F), number + 1, small, factors)
     raise NoCase(f"{plan.name}: {' and '.join(plan.labels)} cannot be seen in {TRIES} drawn vehicles")
 
 
@@ -70,6 +78,7 @@ def answer(made: Made) -> dict[str, Any]:
     before = trial.channels(made.flights, trial.vehicle.vector(), trial.shapes, plain=True)
     oracle = trial.channels(made.flights, trial.P, predictable(made.F), plain=False)
     unknown = plan.kind == UNKNOWN
+    messy = {} if made.factors is None else {"small": list(map(_setting, made.small)), "factors": made.factors.plain()}
     return {
         "case": plan.name,
         "kind": plan.kind,
@@ -86,7 +95,7 @@ def answer(made: Made) -> dict[str, Any]:
         "mocap": trial.site.mocap,
         "site": trial.site.name,
         "tries": made.tries,
-    }
+    } | messy
 
 
 def _setting(size: Magnitude) -> dict[str, Any]:

@@ -24,7 +24,7 @@ class Magnitude:
     sizes: np.ndarray  # of the entries of F at strength 1
     strength: float
     visible: float  # against a model that lacks the effect only
-    evidence: float | None  # nat, against one that takes all that is allowed; None for scatter
+    evidence: float | None  # nat, against one that takes all that is allowed; None for scatter, and where nobody asked
     nominal: float  # against the nominal model
 
 
@@ -70,8 +70,8 @@ def find_strength(value: Callable[[float], float], target: float, most: float) -
     return best
 
 
-def measure(trial: Trial, form: Form, sizes: np.ndarray, strength: float) -> Magnitude | None:
-    """The effect alone at a strength; None where its runs are not flyable."""
+def measure(trial: Trial, form: Form, sizes: np.ndarray, strength: float, weighed: bool = True) -> Magnitude | None:
+    """The effect alone at a strength, its evidence `weighed` or not; None where its runs are not flyable."""
     seen = visible(trial, form, sizes, strength)
     if not np.isfinite(seen):
         return None
@@ -79,20 +79,20 @@ def measure(trial: Trial, form: Form, sizes: np.ndarray, strength: float) -> Mag
     flights = trial.fly(F, FITTED)
     gaps = trial.channels(flights, trial.P, predictable(F), plain=False)
     nominal = total(trial.channels(flights, trial.vehicle.vector(), trial.shapes, plain=True, seen=True)) / total(gaps)
-    evidence = None if form.scatter else weigh(trial, flights[:WEIGHED], F, by_channel(gaps))
+    evidence = None if form.scatter or not weighed else weigh(trial, flights[:WEIGHED], F, by_channel(gaps))
     return Magnitude(form, sizes, strength, seen, evidence, nominal)
 
 
-def choose(rng: np.random.Generator, trial: Trial, form: Form, weak: bool) -> Magnitude | None:
+def choose(rng: np.random.Generator, trial: Trial, form: Form, weak: bool, least: float = LEAST) -> Magnitude | None:
     """An effect of a drawn size: from what can be seen at all to WEAK, or from there to STRONG; None if there is none.
 
-    Weak goes by the nominal model's gap, which what is allowed adds to.
+    Weak goes by the nominal model's gap, which what is allowed adds to. least: visible by this factor at least.
     """
     sizes, most = form.draw(rng)
     low, high = WEAK, STRONG
     if weak:
         room = WEAK**2 - allowed(trial) ** 2  # what is allowed takes its part of the nominal gap
-        low, high = 1.15 * LEAST, 0.8 * np.sqrt(max(room, 0.0))
+        low, high = 1.15 * least, 0.8 * np.sqrt(max(room, 0.0))
         if high < low:
             return None
     target = float(np.exp(rng.uniform(np.log(low), np.log(high))))
@@ -100,9 +100,9 @@ def choose(rng: np.random.Generator, trial: Trial, form: Form, weak: bool) -> Ma
         strength = find_strength(lambda s: visible(trial, form, sizes, s), target, most)
         strength = max(strength, form.least)
         found = measure(trial, form, sizes, strength) if strength > 0.0 else None
-        if found is None or found.visible < LEAST or (weak and found.nominal > WEAK):
+        if found is None or found.visible < least or (weak and found.nominal > WEAK):
             return None
-        if found.evidence is None or (found.evidence >= EVIDENCE and found.nominal >= LEAST):
+        if found.evidence is None or (found.evidence >= EVIDENCE and found.nominal >= least):
             return found
         if found.visible < 0.8 * target:  # no more to be had
             return None

@@ -29,10 +29,12 @@ class Order:
     seed: int
     counts: Counts
     archive: Path
+    messy: bool = False
 
     @property
     def plain(self) -> dict[str, Any]:
-        return {"seed": self.seed, "vehicle": VEHICLE, "counts": asdict(self.counts)}
+        found = {"seed": self.seed, "vehicle": VEHICLE, "counts": asdict(self.counts)}
+        return found | {"messy": True} if self.messy else found
 
     @property
     def cases(self) -> Path:
@@ -67,7 +69,9 @@ def _prepare(order: Order) -> bool:
         sealed = seal.open_answers(order.archive)
         seal.check_seal(sealed, manifest)
         if sealed.plan != order.plain:
-            raise InputError("holds another blind test (other seed or counts): name another folder", source=order.out)
+            raise InputError(
+                "holds another blind test (other seed, counts or kind): name another folder", source=order.out
+            )
         return True
     for folder in (order.cases, order.held, order.making, order.archive.parent):
         folder.mkdir(parents=True, exist_ok=True)
@@ -91,7 +95,7 @@ def make(order: Order, jobs: int = 0, advance: Callable[[int], None] = lambda n:
 
     jobs: processes, 0 for one a core. The result depends on the seed and the counts alone.
     """
-    cases = plan(order.seed, order.counts)
+    cases = plan(order.seed, order.counts, order.messy)
     if _prepare(order):
         advance(len(cases))
         return 0, []

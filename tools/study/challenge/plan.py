@@ -20,6 +20,13 @@ class Counts:
     pairs: int = 30
     unknown: int = 30
 
+    @property
+    def total(self) -> int:
+        return self.single + self.none + self.pairs + self.unknown
+
+
+MESSY = Counts(100, 20, 0, 20)
+
 
 @dataclass(frozen=True)
 class CasePlan:
@@ -30,6 +37,7 @@ class CasePlan:
     labels: tuple[str, ...]
     weak: tuple[bool, ...]
     mocap: bool
+    messy: bool = False  # noise is not what the file says, and small effects act beside
 
     @property
     def name(self) -> str:
@@ -57,7 +65,7 @@ def _pair(rng: np.random.Generator) -> tuple[Form, Form]:
             return first, second
 
 
-def plan(seed: int, counts: Counts) -> list[CasePlan]:
+def plan(seed: int, counts: Counts, messy: bool = False) -> list[CasePlan]:
     """The cases in their order; half of each kind with motion capture, those that need it among them."""
     rng = np.random.default_rng(np.random.SeedSequence([seed, 0]))
     drawn: list[tuple[str, tuple[Form, ...], tuple[bool, ...]]] = []
@@ -75,7 +83,7 @@ def plan(seed: int, counts: Counts) -> list[CasePlan]:
         mocap[free[: max(0, len(here) // 2 - len(must))]] = True
     order = rng.permutation(len(drawn))
     return [
-        CasePlan(number, drawn[n][0], tuple(form.label for form in drawn[n][1]), drawn[n][2], bool(mocap[n]))
+        CasePlan(number, drawn[n][0], tuple(form.label for form in drawn[n][1]), drawn[n][2], bool(mocap[n]), messy)
         for number, n in enumerate(order)
     ]
 

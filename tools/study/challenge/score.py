@@ -47,6 +47,16 @@ class Scored:
         return self.labels or ["none"]
 
     @property
+    def messy(self) -> bool:
+        """Whether small effects act beside the main one, or alone."""
+        return bool(self.truth.get("small"))
+
+    @property
+    def tolerable(self) -> list[str]:
+        """What may have probability: where only small effects act, they too."""
+        return self.answers if self.labels else [*self.answers, *(one["label"] for one in self.truth.get("small", ()))]
+
+    @property
     def subsystems(self) -> set[str]:
         return {place[0] for places in self.truth["places"] for place in places}
 
@@ -68,6 +78,12 @@ class Scored:
     def called_unknown(self) -> bool:
         return self.verdict() == "unknown"
 
+    def sure_of_a_label(self) -> bool:
+        """Whether a label, or unknown, is named with more than SURE; no answer counts too."""
+        if self.said is None:
+            return True
+        return any(cause.probability > SURE for cause in self.said.causes if cause.label != "none")
+
     def _main(self) -> Cause | None:
         """The most probable cause; None where nothing was said, or so large a group that nothing was."""
         cause = None if self.said is None else self.said.causes[0]
@@ -88,7 +104,7 @@ class Scored:
         return self.said is not None and bool(self.said.where) and self.said.where[0].subsystem in self.subsystems
 
     def log_loss(self) -> float:
-        probability = 0.0 if self.said is None else self.said.probability(*self.answers)
+        probability = 0.0 if self.said is None else self.said.probability(*self.tolerable)
         return -math.log(min(1.0, max(probability, LEAST_PROBABILITY)))
 
     def odds(self) -> float | None:
@@ -181,6 +197,20 @@ SHARES = (
 )
 
 
+MESSY_SHARES = (
+    _Share("right_cause_first", "right cause first", (SINGLE,), Scored.first, 0.90),
+    _Share("within_group", "right cause within its group", (SINGLE,), Scored.grouped, 0.97),
+    _Share("in_first_three", "right cause in the first three", (SINGLE,), Scored.first_three, 0.97),
+    _Share("right_subsystem", "right subsystem", (SINGLE,), Scored.subsystem, 0.90),
+    _Share("unknown_called_unknown", "outside the catalogue, called unknown", (UNKNOWN,), Scored.called_unknown, 0.90),
+    _Share("known_called_unknown", "known called unknown", (SINGLE, PAIR), Scored.called_unknown, 0.05, True),
+    _Share("small_sure", "no large one, but sure (> 0.8) of one", (NONE,), Scored.sure_of_a_label, 0.03, True),
+    _Share("small_called_gap", "no large one, called a gap", (NONE,), Scored.called_gap, 1.0, True),
+    _Share("two_both_named", "two effects at once, both named", (PAIR,), Scored.both, 0.80),
+    _Share("sure_and_wrong", "sure (> 0.8) and wrong", (NONE, *GAPS), Scored.sure_and_wrong, 0.03, True),
+)
+
+
 def _share(share: _Share, cases: Sequence[Scored]) -> Figure:
     counted = [case for case in cases if case.kind in share.kinds]
     count = sum(share.holds(case) for case in counted)
@@ -229,8 +259,9 @@ def _plain_case(case: Scored) -> dict[str, Any]:
 
 
 def score(cases: Sequence[Scored]) -> Score:
-    """Every figure of docs/GAP.md over the cases."""
-    figures = [_share(share, cases) for share in SHARES]
+    """Every figure of docs/GAP.md over the cases; those of messy cases where small effects act in any of them."""
+    shares = MESSY_SHARES if any(case.messy for case in cases) else SHARES
+    figures = [_share(share, cases) for share in shares]
     losses = [case.log_loss() for case in cases]
     closed = [case.closed for case in cases if case.closed is not None]
     seconds = [case.seconds for case in cases if case.seconds is not None]

@@ -49,6 +49,7 @@ class Trial:
     errors: np.ndarray  # (2, N_FR) bias and noise
     designs: list[RunDesign]
     noise_seed: int
+    flown: Vehicle  # with the noise and disturbance that it has; `vehicle` has what its file says
 
     def fly(self, F: np.ndarray, runs: int | None = None) -> list[Flight]:
         """Fly the first `runs` designs (all, if None) with effects F."""
@@ -57,7 +58,7 @@ class Trial:
     def _fly(self, F: np.ndarray, number: int, design: RunDesign) -> Flight:
         rows = design.rows + EXTRA
         commands, X, Y = np.zeros((rows, 3)), np.zeros((rows, fo.N_FX)), np.zeros((rows, fo.N_FR))
-        disturbance = self.vehicle.disturbance
+        disturbance = self.flown.disturbance
         fly_foreign(
             self.P, F, design.waves, self.errors, disturbance.linear, disturbance.angular, design.seed,
             design.start.copy(), design.legs, commands, X, Y,
@@ -77,7 +78,7 @@ class Trial:
         """Motion capture's columns: at its own time, with noise and short blind spells."""
         rng = np.random.default_rng([self.noise_seed, number])
         pose = mocap_pose(F, poses(X), np.arange(rows))
-        sensors = self.vehicle.sensors
+        sensors = self.flown.sensors
         pose[:, :3] += sensors.mocap_position.noise * rng.standard_normal((rows, 3))
         pose[:, 3:] = wrap(pose[:, 3:] + sensors.mocap_attitude.noise * rng.standard_normal((rows, 3)))
         for first in np.flatnonzero(rng.random(rows) < 0.004):
@@ -141,14 +142,18 @@ def mocap_pose(F: np.ndarray, pose: np.ndarray, rows: np.ndarray) -> np.ndarray:
     return np.stack([np.interp(t - late + ahead, at, column) for column in pose.T], axis=1)
 
 
-def draw_trial(rng: np.random.Generator, vehicle: Vehicle, site: Site) -> Trial:
-    """A vehicle as identification leaves it, sensors with their biases, and its runs."""
+def draw_trial(rng: np.random.Generator, vehicle: Vehicle, site: Site, flown: Vehicle | None = None) -> Trial:
+    """A vehicle as identification leaves it, sensors with their biases, and its runs.
+
+    flown: the vehicle with the noise that it really has, where that is not what its file says.
+    """
+    flown = vehicle if flown is None else flown
     waves = draw_waves(rng)
     designs = draw_runs(rng, site, waves)
     seconds = fo.ROW_S * min(design.rows for design in designs)
     return Trial(
         vehicle, site, draw_parameters(vehicle, rng), draw_shapes(rng, seconds, site.depths),
-        sensor_errors(vehicle, rng), designs, int(rng.integers(0, 2**31)),
+        sensor_errors(flown, rng), designs, int(rng.integers(0, 2**31)), flown,
     )  # fmt: skip
 
 

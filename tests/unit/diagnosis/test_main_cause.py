@@ -1,0 +1,85 @@
+"""The main cause: the one that takes the most of the gap; small ones, and what they leave, make nothing sure."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tools.diagnose.record import NONE
+from tools.diagnose.shrink import most_often
+from tools.diagnose.unknown import (
+    MORE_UNKNOWN,
+    UNFIT,
+    WIDE,
+    Remainder,
+    left_floors,
+    left_share,
+    probability_unknown,
+)
+from tools.diagnose.verdict import SECOND, Worth, doubt_small, share_out
+
+
+def test_worth_is_the_root_of_what_the_gap_grows_by():
+    worth = Worth(np.array([1.0, 1.0]), {"drag": np.array([3.0, 5.0]), "lift": np.array([-0.1, 0.0])})
+    assert worth.tolerances("drag") == pytest.approx(2.0)
+    assert worth.share("drag") == pytest.approx(2.0)
+    assert worth.tolerances("lift") == worth.tolerances("never asked") == 0.0
+
+
+def test_an_effect_that_takes_most_in_every_run_is_first_in_every_draw():
+    taken = {"drag": np.array([5.0, 4.0, 6.0]), "lift": np.array([1.0, 2.0, 0.5])}
+    assert most_often(taken) == {"drag": 1.0, "lift": 0.0}
+
+
+def test_effects_that_take_the_most_in_turn_share_the_first_place():
+    taken = {"drag": np.array([5.0, 0.0, 5.0, 0.0]), "lift": np.array([0.0, 5.0, 0.0, 5.1])}
+    found = most_often(taken)
+    assert sum(found.values()) == pytest.approx(1.0)
+    assert 0.3 < found["drag"] < 0.7
+    assert most_often({"drag": np.array([1.0])}) == {"drag": 1.0}
+
+
+def test_what_another_may_take_first_goes_to_it():
+    shared = share_out({"drag": 0.8, "tether": 0.1, NONE: 0.1}, "drag", {"drag": 0.7, "lift": 0.3})
+    assert shared == pytest.approx({"drag": 0.56, "tether": 0.07, NONE: 0.07, "lift": 0.3})
+
+
+@pytest.mark.parametrize("size", [0.05, 0.5, 1.0])
+def test_a_small_effect_is_never_sure_and_none_never_before_it(size):
+    found = doubt_small({"drag": 0.9, "lift": 0.1, NONE: 0.0}, "drag", size)
+    assert sum(found.values()) == pytest.approx(1.0)
+    assert found["drag"] < 0.6
+    assert found[NONE] <= SECOND * found["drag"] + 1e-9
+    assert found["lift"] / found["drag"] == pytest.approx(1.0 / 9.0)
+
+
+def test_a_large_effect_stays_sure():
+    assert doubt_small({"drag": 0.99, NONE: 0.01}, "drag", 4.0)["drag"] > 0.98
+
+
+def shrinkage(after: float, floor: float = 0.15, recalibrated: float = 1.0) -> SimpleNamespace:
+    return SimpleNamespace(after=after, floor=floor, recalibrated=recalibrated)
+
+
+def unknown(after: float, left: float, explained: float, evident: bool = True) -> float:
+    search = SimpleNamespace(problem=SimpleNamespace(rules=SimpleNamespace(whiteness=True)))
+    return probability_unknown(search, True, evident, shrinkage(after), Remainder(explained, left, []), False)
+
+
+def test_what_leaves_next_to_no_gap_is_not_unknown_however_many_nat_it_has():
+    assert left_floors(shrinkage(0.15 * np.sqrt(2.0))) == pytest.approx(1.0)
+    assert unknown(after=0.16, left=1e5, explained=10.0) < 0.02
+    assert unknown(after=0.16, left=1e5, explained=0.0, evident=False) < 0.02
+    assert unknown(after=0.9, left=1e5, explained=10.0) > 0.9
+
+
+def test_a_wide_gap_is_unknown_where_a_sensor_s_small_error_has_nearly_all_the_nat():
+    assert left_share(shrinkage(0.8)) > 0.6
+    assert unknown(after=0.8, left=1e3, explained=1e6) > 0.6
+    assert unknown(after=0.2, left=1e3, explained=1e6) == MORE_UNKNOWN
+
+
+def test_as_likely_as_not_at_the_width_that_small_effects_leave():
+    after = 0.15 * np.sqrt(1.0 + WIDE**2)
+    assert unknown(after, left=1e9, explained=0.0, evident=False) == pytest.approx(0.5)
+    assert unknown(UNFIT + 0.1, left=1.0, explained=1e9) > 0.99
