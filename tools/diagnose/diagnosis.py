@@ -1,7 +1,7 @@
 """The diagnosis of a case: where the simulator is wrong, why, how far the gap shrinks (docs/GAP.md, Answers)."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -19,13 +19,30 @@ from tools.diagnose.noise_probes import UNPREDICTABLE
 from tools.diagnose.record import NONE, UNKNOWN, Curves, Data, Details, Noise, Panel, Picture, write_record
 from tools.diagnose.residuals import UNCLEAN, strongest_left
 from tools.diagnose.search import Search, run
-from tools.diagnose.shrink import AFTER, BEFORE, FLOOR, RECALIBRATED, Further, Shrinkage, by_channel, shrink_further
+from tools.diagnose.shrink import (
+    AFTER,
+    BEFORE,
+    FLOOR,
+    RECALIBRATED,
+    Further,
+    Shrinkage,
+    by_channel,
+    shrink_further,
+    shrinkage_of,
+)
+from tools.diagnose.staged import Staged, staged
+from tools.diagnose.staged_answer import conclusion, findings_in, identified_text
+from tools.diagnose.staircase import Stage, stages_of
 from tools.diagnose.unknown import LEFT_OVER, UNFIT
 from tools.diagnose.verdict import EVIDENCE_NEEDED, TIE, Answer, conclude
+from tools.gap.mended import findings_of, put_right
 from tools.inference.corrected import corrected_text
 from tools.inference.fit import Hypothesis
+from tools.inference.model import effect_vector, effects_in, nominal_model
 from tools.inference.problem import ALL, problem_of
 from tools.inference.rules import Rules
+from tools.readings.findings import Finding
+from tools.readings.pictures import pictures_of
 
 CORRECTION_FILE = "data_driven.toml"
 WORTH = 0.001  # a smaller probability is not written down
@@ -46,11 +63,14 @@ class Diagnosis:
     noise: Noise | None
     correction: Correction | None = None  # of an unknown gap
     further: Further | None = None  # with that correction
+    readings: list[Finding] = field(default_factory=list)  # what they say of each other
+    stages: list[Stage] = field(default_factory=list)
+    staged: Staged | None = None  # of a vehicle far from its file
 
     @property
     def identify_first(self) -> bool:
-        """Whether the log fits the vehicle file so badly that no cause can be asked for yet."""
-        return self.shrinkage.after > UNFIT
+        """Whether the log fits the vehicle file so badly that the vehicle had to be identified first."""
+        return self.staged is not None
 
     @property
     def cautions(self) -> list[str]:
@@ -61,11 +81,8 @@ class Diagnosis:
             "tolerance: no gap"
             for label, nat in self.answer.negligible.items()
         ]
-        if self.identify_first:
-            found.insert(0, (
-                f"the vehicle file misses these runs by {self.shrinkage.after:.1f} tolerances whatever is added to it: "
-                "check vehicle, units and calibrations, identify the vehicle first"
-            ))  # fmt: skip
+        if self.staged is not None:
+            found.insert(0, identified_text(self.staged))
         return found
 
     @property
@@ -80,16 +97,32 @@ def verdict_of(answer: Answer) -> str:
 
 def diagnose(case: Case, say: Callable[[str], None] = lambda text: None, rules: Rules = ALL) -> Diagnosis:
     """Diagnose a case; `say` hears how far the search is."""
-    search = run(problem_of(case, rules=rules), say)
+    readings = findings_of(case.runs)
+    runs = put_right(case.runs, readings)
+    search = run(problem_of(case, runs=runs, rules=rules), say)
     answer = conclude(search, say)
     search = answer.search
     say(f"verdict: {answer.main}")
     entry, mission = propose(search)
     noise, shares = noise_of(answer), panels(verdict_of(answer), answer)
-    found = Diagnosis(case, search, answer, answer.shrinkage, entry, mission, shares, noise)
+    found = Diagnosis(case, search, answer, answer.shrinkage, entry, mission, shares, noise, readings=readings)
+    if answer.shrinkage.after > UNFIT and rules == ALL and len(case.runs) > 1:
+        take(found, staged(case, say))
+        return found
+    found.stages = stages_of(answer, case, runs)
     if found.verdict == "unknown":
         learn(found, say)
     return found
+
+
+def take(diagnosis: Diagnosis, found: Staged) -> None:
+    """The diagnosis with what the stages of a vehicle far from its file came to."""
+    before = diagnosis.answer.shrinkage
+    runs = before.runs | {AFTER: found.stages[-1].gaps, FLOOR: found.floor}
+    shrinkage = shrinkage_of(runs, before.predictions | {AFTER: found.predictions})
+    diagnosis.staged, diagnosis.stages, diagnosis.readings = found, found.stages, findings_in(found)
+    diagnosis.shrinkage, diagnosis.answer = shrinkage, conclusion(diagnosis.answer, found, shrinkage)
+    diagnosis.panels = panels(verdict_of(diagnosis.answer), diagnosis.answer)
 
 
 def learn(diagnosis: Diagnosis, say: Callable[[str], None]) -> None:
@@ -125,6 +158,9 @@ def unexplained(diagnosis: Diagnosis) -> dict[str, Any] | None:
 
 def parameters(diagnosis: Diagnosis, label: str) -> dict[str, dict[str, Any]]:
     """Estimate, 90 % interval and unit of each parameter of a selected label, by Laplace's approximation."""
+    if diagnosis.staged is not None:
+        sizes = diagnosis.staged.sizes.get(label, {})
+        return {name: {"estimate": s.estimate, "ci90": list(s.ci90), "unit": s.unit} for name, s in sizes.items()}
     hypothesis = diagnosis.answer.hypothesis
     if not len(hypothesis.free) or label not in hypothesis.labels:
         return {}
@@ -194,7 +230,13 @@ def plain(diagnosis: Diagnosis) -> dict[str, Any]:
         "not_asked": not_asked(diagnosis.answer.search.problem),
         "identify_first": diagnosis.identify_first,
         "next_run": diagnosis.next_run,
-    }
+        "readings": [one.plain() for one in diagnosis.readings],
+        "stages": [stage.plain() for stage in diagnosis.stages],
+        "identified": {} if diagnosis.staged is None else {
+            name: {"estimate": s.estimate, "ci90": list(s.ci90), "unit": s.unit}
+            for name, s in diagnosis.staged.vehicle.items()
+        },
+    }  # fmt: skip
 
 
 def effects_of(hypothesis: Hypothesis) -> dict[str, dict[str, float]]:
@@ -218,8 +260,9 @@ def details(diagnosis: Diagnosis) -> Details:
         sorted(channels),
     )  # fmt: skip
     return Details(
+        shown=[one.title for one in pictures_of(diagnosis.readings, case.runs)],
         format=1, version=installed(), data=data, evidence={k: float(v) for k, v in answer.gained.items()},
-        corrected=bool(answer.hypothesis.labels), noise=diagnosis.noise, panels=diagnosis.panels,
+        corrected=bool(answer.selected), noise=diagnosis.noise, panels=diagnosis.panels,
         findings=answer.findings, pictures=[picture(diagnosis, n) for n in drawn_runs(diagnosis)],
         thresholds={"evidence": EVIDENCE_NEEDED, "tie": TIE, "sigma": UNCLEAN, "left": LEFT_OVER, "matters": MATTERS},
     )  # fmt: skip
@@ -257,16 +300,30 @@ def curves(diagnosis: Diagnosis, n: int) -> Curves:
     return Curves(run.t, diagnosis.search.problem.kind.measures.measured(run), said[BEFORE][n], said[AFTER][n])
 
 
+def model_text(case: Case, search: Search, hypothesis: Hypothesis) -> str:
+    """corrected.toml of a hypothesis."""
+    P, F = search.model(hypothesis)
+    return corrected_text(case.vehicle_name, search.problem.model.P, P, F, effects_of(hypothesis))
+
+
+def corrected(diagnosis: Diagnosis) -> str:
+    """corrected.toml: the selected effects, and what was identified where the vehicle had to be."""
+    if diagnosis.staged is None:
+        return model_text(diagnosis.case, diagnosis.search, diagnosis.answer.hypothesis)
+    nominal = nominal_model(diagnosis.case)
+    P, F = diagnosis.staged.model
+    own = F - effect_vector(nominal)
+    return corrected_text(diagnosis.case.vehicle_name, nominal.P, P, own, effects_in(own))
+
+
 def write(diagnosis: Diagnosis, out: Path) -> None:
     """Everything that a diagnosis leaves behind, but for the report, into a folder."""
-    write_record(out, plain(diagnosis), details(diagnosis), [curves(diagnosis, n) for n in drawn_runs(diagnosis)])
-
-    def model(search: Search, hypothesis: Hypothesis) -> str:
-        P, F = search.model(hypothesis)
-        return corrected_text(diagnosis.case.vehicle_name, search.problem.model.P, P, F, effects_of(hypothesis))
+    shown = pictures_of(diagnosis.readings, diagnosis.case.runs)
+    drawn = [curves(diagnosis, n) for n in drawn_runs(diagnosis)]
+    write_record(out, plain(diagnosis), details(diagnosis), drawn, shown)
 
     (out / "next_run.toml").write_text(diagnosis.mission, encoding="utf-8")
-    (out / "corrected.toml").write_text(model(diagnosis.search, diagnosis.answer.hypothesis), encoding="utf-8")
+    (out / "corrected.toml").write_text(corrected(diagnosis), encoding="utf-8")
     if diagnosis.correction is not None:
-        text = model(diagnosis.correction.search, diagnosis.correction.hypothesis)
+        text = model_text(diagnosis.case, diagnosis.correction.search, diagnosis.correction.hypothesis)
         (out / CORRECTION_FILE).write_text(text, encoding="utf-8")

@@ -18,10 +18,12 @@ from sim_backend.core.effects.catalogue import catalogue
 from tools.data.errors import InputError
 from tools.data.plain import as_plain
 from tools.diagnose.stages import STAGES
+from tools.readings.pictures import Shown
 
 ANSWER, DETAILS, CURVES = "diagnosis.json", "report.json", "report.npz"
 NONE, UNKNOWN = "none", "unknown"
 MOST_BYTES = 100_000_000
+SHOWN = ("x", "read", "expected", "mended")  # of a picture of a reading
 TABLES = ("measured", "nominal", "corrected")  # (rows, N_Y) of a run that is drawn
 
 Format = Annotated[int, msgspec.Meta(ge=1, le=1)]
@@ -88,6 +90,29 @@ class Unexplained(msgspec.Struct):
     correction: Correction | None = None
 
 
+class Reading(msgspec.Struct):
+    """Something wrong with a reading (docs/READINGS.md)."""
+
+    channel: str
+    against: str
+    finding: str
+    size: Number
+    ci90: tuple[Number, Number]
+    unit: str
+    label: str | None
+    mended: bool
+    text: str
+
+
+class Step(msgspec.Struct):
+    """A stage of the staircase: gaps of runs left out, in tolerances, and the total's 90 % interval."""
+
+    stage: str
+    added: list[str]
+    gap: dict[str, Number]
+    ci90: tuple[Number, Number] = (None, None)
+
+
 class NextRun(msgspec.Struct):
     """The manoeuvre proposed."""
 
@@ -109,6 +134,8 @@ class Answer(msgspec.Struct):
     unknown: Unexplained | None
     cautions: list[str]
     next_run: NextRun
+    readings: list[Reading] = []
+    stages: list[Step] = []
 
     @property
     def main(self) -> str:
@@ -188,6 +215,7 @@ class Details(msgspec.Struct):
     findings: list[Finding]
     pictures: list[Picture]
     thresholds: dict[str, float]
+    shown: list[str] = []  # titles of the pictures of readings
 
 
 @dataclass(frozen=True)
@@ -207,6 +235,7 @@ class Record:
     answer: Answer
     details: Details
     curves: list[Curves]  # of the runs in details.pictures
+    shown: list[Shown]
 
 
 def number(value: Number) -> float:
@@ -214,7 +243,9 @@ def number(value: Number) -> float:
     return math.nan if value is None else value
 
 
-def write_record(folder: Path, answer: dict[str, Any], details: Details, curves: list[Curves]) -> None:
+def write_record(
+    folder: Path, answer: dict[str, Any], details: Details, curves: list[Curves], shown: list[Shown]
+) -> None:
     """The three files of a diagnosis; `answer` holds what Answer does, and whatever else others read."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, value in ((ANSWER, answer), (DETAILS, msgspec.to_builtins(details, enc_hook=float))):
@@ -223,6 +254,8 @@ def write_record(folder: Path, answer: dict[str, Any], details: Details, curves:
     for n, run in enumerate(curves):
         tables[f"t_{n}"] = run.t
         tables |= {f"{name}_{n}": getattr(run, name).astype(np.float32) for name in TABLES}
+    for n, one in enumerate(shown):
+        tables |= {f"shown_{name}_{n}": getattr(one, name).astype(np.float32) for name in SHOWN}
     np.savez_compressed(folder / CURVES, allow_pickle=False, **tables)
 
 
@@ -232,7 +265,8 @@ def read_record(folder: Path) -> Record:
         raise InputError("no such folder", source=folder)
     answer, details = _read(folder / ANSWER, Answer), _read(folder / DETAILS, Details)
     _check(answer, details, folder)
-    return Record(answer, details, _read_curves(folder / CURVES, len(details.pictures)))
+    curves = _read_curves(folder / CURVES, len(details.pictures))
+    return Record(answer, details, curves, _read_shown(folder / CURVES, details.shown))
 
 
 def _present(path: Path) -> Path:
@@ -263,6 +297,17 @@ def _check(answer: Answer, details: Details, folder: Path) -> None:
     links = [link for panel in details.panels for link in panel.links]
     if any(link.stage not in STAGES for link in links):
         raise InputError("a link of no stage of the chain", source=folder / DETAILS, column="panels")
+
+
+def _read_shown(path: Path, titles: list[str]) -> list[Shown]:
+    with np.load(_present(path), allow_pickle=False) as tables:
+        try:
+            return [
+                Shown(title, *(tables[f"shown_{name}_{n}"].astype(float) for name in SHOWN))
+                for n, title in enumerate(titles)
+            ]
+        except KeyError as error:
+            raise InputError(f"not the curves of this diagnosis: {error}", source=path) from None
 
 
 def _read_curves(path: Path, count: int) -> list[Curves]:

@@ -172,6 +172,23 @@ def shrink_further(search: Search, hypothesis: Hypothesis, before: list[RunGap])
     return Further(runs, float(np.sqrt(a.mean())), shrunk, ci90)
 
 
+def shrinkage_of(runs: dict[str, list[RunGap]], predictions: dict[str, list[np.ndarray]]) -> Shrinkage:
+    """What follows from the four models' gaps by run."""
+    total = {name: squares(found) for name, found in runs.items()}
+    rng, count = np.random.default_rng(SEED), len(runs[BEFORE])
+
+    def closed_of(pick: np.ndarray) -> float:
+        b, a, f = (rms(total[name], pick) for name in (BEFORE, AFTER, FLOOR))
+        return (b - a) / max(b - f, 1e-9)
+
+    shrunk, ci90 = over_runs(lambda pick: 1.0 - rms(total[AFTER], pick) / rms(total[BEFORE], pick), rng, count)
+    closed, closed_ci90 = over_runs(closed_of, rng, count)
+    mean = {name: float(np.sqrt(values.mean())) for name, values in total.items()}
+    return Shrinkage(
+        runs, mean[BEFORE], mean[RECALIBRATED], mean[AFTER], mean[FLOOR], shrunk, ci90, closed, closed_ci90, predictions
+    )
+
+
 def shrink(search: Search, hypothesis: Hypothesis) -> Shrinkage:
     """The gap before, recalibrated, after, and its floor, on runs left out of the fit."""
     problem = search.problem
@@ -187,16 +204,4 @@ def shrink(search: Search, hypothesis: Hypothesis) -> Shrinkage:
         FLOOR: floor(search, hypothesis, rng),
     }
     predictions = {BEFORE: flown, RECALIBRATED: Y_refitted, AFTER: Y_after}
-    total = {name: squares(found) for name, found in runs.items()}
-    shrunk, ci90 = over_runs(lambda pick: 1.0 - rms(total[AFTER], pick) / rms(total[BEFORE], pick), rng, len(listed))
-
-    def closed_of(pick: np.ndarray) -> float:
-        b, a, f = (rms(total[name], pick) for name in (BEFORE, AFTER, FLOOR))
-        return (b - a) / max(b - f, 1e-9)
-
-    closed, closed_ci90 = over_runs(closed_of, rng, len(listed))
-    mean = {name: float(np.sqrt(values.mean())) for name, values in total.items()}
-    return Shrinkage(
-        runs, mean[BEFORE], mean[RECALIBRATED], mean[AFTER], mean[FLOOR], shrunk, ci90, closed, closed_ci90,
-        predictions,
-    )  # fmt: skip
+    return shrinkage_of(runs, predictions)

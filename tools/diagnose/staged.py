@@ -15,17 +15,19 @@ import numpy as np
 from sim_backend.core.effects import effect_layout as ef
 from tools.data.runs.case import Case
 from tools.data.runs.run import Run
+from tools.diagnose.shrink import SEED, gaps
+from tools.diagnose.staircase import NOMINAL, READINGS, Stage
 from tools.gap.measure import RunGap, root_mean_square, run_gap
 from tools.gap.mended import Mended, mended
 from tools.inference.fit import bounded_step
 from tools.inference.model import Model, effect_vector, nominal_model
 from tools.inference.parameters import FreeParameter, effect_parameters
-from tools.inference.predict import fly
+from tools.inference.predict import fly, observe
 from tools.inference.prediction_error import HORIZONS, Fitted, PredictionError, identify_by_prediction
 from tools.inference.problem import cut, problem_of
 from tools.inference.vehicle_parameters import GAUGE, Parameters, first_effects, listed, parameters
 
-NOMINAL, READINGS, IDENTIFIED = "nominal", "readings", "identified"  # names of stages
+IDENTIFIED = "identified"  # its stage
 FOLDS, ALONE = 4, 6  # parts of many runs; runs up to which each is left out alone
 TRIED = 4  # effects fitted in full, of those whose linear step takes most
 REFIT_STEPS = 5
@@ -48,19 +50,6 @@ class Size:
 
 
 @dataclass
-class Stage:
-    """Gaps of runs left out after a stage, and what it added."""
-
-    name: str
-    added: list[str]
-    gaps: list[RunGap]
-
-    @property
-    def total(self) -> float:
-        return root_mean_square([gap.total for gap in self.gaps])
-
-
-@dataclass
 class Staged:
     """What the stages came to."""
 
@@ -71,6 +60,7 @@ class Staged:
     vehicle: dict[str, Size]  # what was identified, by name
     model: tuple[np.ndarray, np.ndarray]  # P, F of the fit to all runs
     predictions: list[np.ndarray]  # of each run by the model that has not seen it, (rows, N_Y)
+    floor: list[RunGap]  # what noise and disturbance would leave of the last model
     taken: dict[str, float] = field(default_factory=dict)  # squared tolerances of left-out runs that each label took
 
 
@@ -121,7 +111,7 @@ class _Stages:
 
     def models(self, more: list[FreeParameter], values: list[np.ndarray]) -> dict[int, tuple[np.ndarray, np.ndarray]]:
         """By run, the model that has not seen it; constant errors of the sensors are a run's own."""
-        found = {}
+        found: dict[int, tuple[np.ndarray, np.ndarray]] = {}
         for fold, at in zip(self.folds, values, strict=True):
             P, F = self.free(fold.read.model, fold.read.runs, more).model(at)
             F[ef.BIAS : ef.BIAS + ef.N_BIASES] = 0.0
@@ -187,16 +177,15 @@ def staged(case: Case, say: Callable[[str], None] = lambda text: None) -> Staged
     work = _Stages(case, say)
     every = range(len(case.runs))
     nominal = (work.nominal.P, effect_vector(work.nominal))
-    gaps, _ = work.flown(dict.fromkeys(every, nominal))
-    stages = [Stage(NOMINAL, [], gaps)]
+    stages = [Stage(NOMINAL, [], work.flown(dict.fromkeys(every, nominal))[0])]
     if work.whole.added:
         models = {
             n: (fold.read.model.P, effect_vector(fold.read.model)) for fold in work.folds for n in fold.left_out
         }
         stages.append(Stage(READINGS, work.whole.added, work.flown(models)[0]))
     work.identify()
-    gaps, predictions = work.flown(work.models([], [fold.values for fold in work.folds]))
-    stages.append(Stage(IDENTIFIED, [], gaps))
+    left, predictions = work.flown(work.models([], [fold.values for fold in work.folds]))
+    stages.append(Stage(IDENTIFIED, [], left))
     added: list[FreeParameter] = []
     chosen: list[str] = []
     taken: dict[str, float] = {}
@@ -209,22 +198,22 @@ def staged(case: Case, say: Callable[[str], None] = lambda text: None) -> Staged
         for label in sorted(worth, key=lambda name: worth[name])[:TRIED]:
             own = candidates[label]
             values = work.refitted([*added, *own], len(own))
-            gaps, flown = work.flown(work.models([*added, *own], values))
+            left, flown = work.flown(work.models([*added, *own], values))
             new = np.array([at[-len(own) :] for at in values])
             alike = bool((np.abs(np.sign(new).sum(axis=0)) == len(new)).any())
-            if alike and worth_it(stages[-1].gaps, gaps, parts):
-                total = root_mean_square([gap.total for gap in gaps])
+            if alike and worth_it(stages[-1].gaps, left, parts):
+                total = root_mean_square([gap.total for gap in left])
                 if best is None or total < best[0]:
-                    best = (total, label, values, gaps, flown)
+                    best = (total, label, values, left, flown)
         if best is None:
             break
-        total, label, values, gaps, predictions = best
+        total, label, values, left, predictions = best
         taken[label] = stages[-1].total ** 2 - total**2
         added += candidates.pop(label)
         chosen.append(label)
         for fold, at in zip(work.folds, values, strict=True):
             fold.values = at
-        stages.append(Stage(f"+ {label}", [label], gaps))
+        stages.append(Stage(f"+ {label}", [label], left))
     return _concluded(work, stages, chosen, added, predictions, taken)
 
 
@@ -247,7 +236,8 @@ def _concluded(
     first = len(fitting.free.free) - len(added)
     for n, one in enumerate(added):
         name = one.label or one.name
-        by_label.setdefault(name, {})[one.name if one.label else "size"] = sizes[first + n]
+        own = one.name if one.label else catalogue()[name].parameters[0].name if name in catalogue() else "size"
+        by_label.setdefault(name, {})[own] = sizes[first + n]
     for finding in work.whole.findings:
         if finding.label in work.whole.labels:
             name = {"gyro_scale": "scale", "attitude_lag": "time"}.get(str(finding.label), finding.channel)
@@ -256,7 +246,16 @@ def _concluded(
             )
     vehicle = dict(zip(fitting.free.names[:first], sizes[:first], strict=True))
     selected = [*work.whole.labels, *(label for label in chosen if label != GAUGE)]
-    return Staged(work.whole, stages, selected, by_label, vehicle, (P, F), predictions, taken)
+    floor = floor_of(work, P, F)
+    return Staged(work.whole, stages, selected, by_label, vehicle, (P, F), predictions, floor, taken)
+
+
+def floor_of(work: _Stages, P: np.ndarray, F: np.ndarray) -> list[RunGap]:
+    """Gaps of the model's own simulated flights of the runs, predicted by itself."""
+    problem = problem_of(work.case, work.nominal)
+    starts = observe(problem, P, F).X[problem.recording.bounds[:-1]]
+    Z = problem.simulated(P, F, starts, np.random.default_rng(SEED))
+    return gaps(problem, [(P, F)] * len(problem.runs), Z)[0]
 
 
 def sizes_of(free: Parameters, found: Fitted) -> list[Size]:

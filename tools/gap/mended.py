@@ -86,6 +86,12 @@ def mended(case: Case, model: Model, runs: list[Run] | None = None) -> Mended:
     return Mended(findings, runs, replace(model, F=F if F.any() else model.F), list(dict.fromkeys(added)))
 
 
+def put_right(runs: list[Run], findings: list[Finding]) -> list[Run]:
+    """The runs with what no effect of the catalogue stands for put right: axes, signs, units."""
+    wrong = [one for one in findings if one.mended and one.label is None and one.channel in names.ALL]
+    return mended_runs(runs, mend(table_of(runs), wrong)) if wrong else runs
+
+
 def one_scale(found: list[Finding]) -> float | None:
     """The scale error that the axes of a gyro share, by certainty; None where they differ or one alone says it."""
     if len(found) < 2:

@@ -92,7 +92,7 @@ def vehicle_table(found: Identified) -> dict[str, Any]:
             if name in DISTURBANCE:
                 axis = name.removeprefix("disturbance_")
                 table["disturbance"][axis] = getattr(found.case.disturbance, axis) * float(np.exp(log))
-    if found.fit is None or found.fit.at is not None:  # by prediction error, the observer's settings are those of the fit
+    if found.fit is None or found.fit.at is not None:  # else the observer stays as it was in the fit
         table["uncertainty"] = _uncertainty(found, table["uncertainty"])
     table["identified"] = provenance(found)
     return table

@@ -74,7 +74,9 @@ def effect_parameters(problem: Problem) -> dict[str, list[FreeParameter]]:
             continue
         if effect.subsystem == "timing" and effect.element == "mocap" and not mocap:
             continue
-        if effect.subsystem == "actuation" and not commands and label != "ballast_leak":
+        if effect.subsystem in ("actuation", "timing") and effect.element != "mocap" and not commands and (
+            label != "ballast_leak"
+        ):  # fmt: skip
             continue
         found[label] = free
     return found

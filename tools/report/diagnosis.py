@@ -3,13 +3,15 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from sim_backend.core.effects.catalogue import catalogue
 from tools.diagnose.noise_probes import CLOCK, UNPREDICTABLE
 from tools.diagnose.record import Curves, Panel, Picture, Record, number, read_record
 from tools.inference.channels import ROUGHIE_MEASURES
 from tools.report import words
 from tools.report.chain_picture import chain_svg
-from tools.report.charts import Chart, svg
+from tools.report.charts import Chart, Line, svg
 from tools.report.lines import bands, compared, plan_chart
 from tools.report.page import render
 
@@ -142,6 +144,36 @@ def _correction(record: Record) -> dict[str, str] | None:
     }  # fmt: skip
 
 
+def _staircase(record: Record) -> list[dict[str, Any]]:
+    """The stages: how far the gap of runs left out is, after what."""
+    stages = record.answer.stages
+    highest = max((number(one.gap["total"]) for one in stages), default=1.0)
+    rows = []
+    for one in stages:
+        total, (low, high) = number(one.gap["total"]), map(number, one.ci90)
+        rows.append({
+            "name": one.stage, "added": words.joined(one.added) if one.stage == "readings" else "",
+            "total": words.number(total), "interval": words.interval_of(low, high), "percent": 100.0 * total / highest,
+        })  # fmt: skip
+    return rows
+
+
+def _readings(record: Record) -> list[dict[str, Any]]:
+    """What is wrong with the readings, a sentence each, with the catalogue's label."""
+    return [{"text": one.text, "label": one.label, "mended": one.mended} for one in record.answer.readings]
+
+
+def _shown(record: Record) -> list[dict[str, str]]:
+    """Pictures of the data behind the readings' findings."""
+    drawn = []
+    for one in record.shown:
+        lines = [Line(one.x, one.expected, "nominal"), Line(one.x, one.read, "measured")]
+        if np.isfinite(one.mended).any():
+            lines.append(Line(one.x, one.mended, "corrected"))
+        drawn.append({"title": one.title, "svg": svg(Chart(one.title, "", lines))})
+    return drawn
+
+
 def _context(record: Record) -> dict[str, Any]:
     answer, details = record.answer, record.details
     data, gap, effects = details.data, answer.gap, catalogue()
@@ -164,6 +196,9 @@ def _context(record: Record) -> dict[str, Any]:
         "effects": _effects(record),
         "noise": _noise(record),
         "pictures": _pictures(record),
+        "stages": _staircase(record),
+        "readings": _readings(record),
+        "shown": _shown(record),
         "corrected": "corrected" if details.corrected else "recalibrated",
         "table": _table(record),
         "shrinkage": _share(gap.shrinkage.value, gap.shrinkage.ci90),

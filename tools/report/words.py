@@ -162,6 +162,11 @@ def change(share: float) -> str:
     return f"grows by {percent(-share)}" if share < -0.005 else f"shrinks by {percent(max(share, 0.0))}"
 
 
+def interval_of(low: float, high: float) -> str:
+    """A 90 % interval of a number; nothing where there is none."""
+    return f"90 %: {number(low)} to {number(high)}" if math.isfinite(low) and math.isfinite(high) else ""
+
+
 def interval(low: float, high: float) -> str:
     """A 90 % interval of a share."""
     return f"90 % interval {percent(low).removesuffix(' %')} to {percent(high)}"

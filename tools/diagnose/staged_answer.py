@@ -1,0 +1,84 @@
+"""What the stages of a vehicle far from its file come to: its answer, evidence, findings and words."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from sim_backend.core.effects.catalogue import catalogue
+from tools.data.runs import columns as names
+from tools.diagnose.record import NONE, UNKNOWN
+from tools.diagnose.shrink import Shrinkage
+from tools.diagnose.staged import IDENTIFIED, SURE, Staged
+from tools.diagnose.verdict import Answer
+from tools.inference.vehicle_parameters import GAUGE
+from tools.readings.findings import Finding, spoken
+
+# A vehicle that had to be identified was not the file's: what is left of the gap of a first identification is no effect
+# alone, but the rest of the vehicle, and the answer says so; of the other probability each effect has its share.
+UNKNOWN_THEN = 0.9
+
+
+def conclusion(answer: Answer, found: Staged, shrinkage: Shrinkage) -> Answer:
+    """The answer of the search with what the stages came to in its place."""
+    by_readings = {label: found.stages[0].total ** 2 - found.stages[1].total ** 2 for label in found.read.labels}
+    weight = {label: max(by_readings.get(label, 0.0), found.taken.get(label, 0.0), 1e-3) for label in found.selected}
+    total = sum(weight.values())
+    chances = dict.fromkeys(catalogue(), 0.0) | {label: (1.0 - UNKNOWN_THEN) * w / total for label, w in weight.items()}
+    chances |= {NONE: 0.0, UNKNOWN: UNKNOWN_THEN if weight else 1.0}
+    count = sum(gap.windows * len(gap.channels) for gap in found.stages[0].gaps)
+    gained = {label: nats(found, label, count) for label in found.selected}
+    return replace(
+        answer, selected=found.selected, main=UNKNOWN, probabilities=chances, gained=gained, negligible={},
+        groups={label: [label] for label in found.selected}, shrinkage=shrinkage,
+    )  # fmt: skip
+
+
+def nats(found: Staged, label: str, count: int) -> float:
+    """Evidence of a label: of what it takes of the gap of runs left out, or of its distance from 0 in the readings."""
+    for before, after in pairwise(found.stages):
+        if after.added == [label] and after.name.startswith("+"):
+            return count * float(np.log(before.total / after.total))
+    sigma = [one.size / max((one.ci90[1] - one.ci90[0]) / (2.0 * SURE), 1e-9) for one in found.read.findings
+             if one.label == label]  # fmt: skip
+    return 0.5 * max((s * s for s in sigma), default=0.0)
+
+
+def identified_text(found: Staged) -> str:
+    """What was identified and what it left, in a sentence."""
+    first, last = found.stages[0].total, found.stages[-1].total
+    left = next(stage.total for stage in found.stages if stage.name == IDENTIFIED)
+    wires = [
+        f"the {name}'s draw-wire means {1.0 + size.estimate:.2f} of what it says"
+        for name, size in ((name, found.vehicle.get(f"{name}_scale")) for name in ("slider", "ballast"))
+        if size is not None and not size.ci90[0] <= 0.0 <= size.ci90[1]
+    ]
+    return (
+        f"the vehicle file misses these runs by {first:.1f} tolerances, so the vehicle was identified from them: that "
+        f"leaves {left:.1f} of runs left out, with all that was found {last:.1f}" + "".join(f"; {one}" for one in wires)
+    )
+
+
+def findings_in(found: Staged) -> list[Finding]:
+    """All that is wrong with the readings: what they say of each other, and what only the identified vehicle shows."""
+    more = []
+    if GAUGE in found.sizes:
+        size = found.sizes[GAUGE]["size"]
+        text = (
+            f"In flight the depth goes with the water in the tank, {spoken(size.estimate, size.ci90, size.unit)}: the "
+            "gauge feels the hull's pressure. Found beside the identified vehicle."
+        )
+        more.append(
+            Finding(names.DEPTH, "ballast_kg", "goes_with", size.estimate, size.ci90, size.unit, None, True, text)
+        )
+    if "pressure_lever" in found.taken:
+        size = found.sizes["pressure_lever"]["ahead"]
+        text = (
+            f"In flight the depth goes with sin(pitch): the port is {spoken(size.estimate, size.ci90, size.unit)} "
+            "ahead of the origin. Found beside the identified vehicle."
+        )
+        more.append(
+            Finding(names.DEPTH, "pitch_rad", "goes_with", size.estimate, size.ci90, size.unit, "pressure_lever", True,
+                    text)
+        )  # fmt: skip
+    return [*found.read.findings, *more]
