@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sim_backend.core.effects import effect_layout as ef
+from sim_backend.core.effects.catalogue import catalogue
 from tools.data.runs.case import Case
 from tools.data.runs.run import Run
 from tools.diagnose.shrink import SEED, gaps
