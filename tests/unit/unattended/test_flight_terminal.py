@@ -11,7 +11,7 @@ import pexpect
 import pytest
 
 from hal.state_file import Phase, StateFile
-from tests.support.twinned import end_guard
+from tests.support.twinned import end_guard, until
 from tools.flight.terminal import AGAIN_S, Stop
 
 # --- Ctrl-C ---------------------------------------------------------------------------------------------------------
@@ -78,9 +78,9 @@ def fly(tmp_path):
 
 
 def ended(child):
-    """What it still said, and its exit code."""
-    child.expect(pexpect.EOF)
-    child.close()
+    """What it still said, and its exit code. The out-of-band process that it leaves behind may keep the terminal."""
+    until(lambda: not child.isalive(), 120.0)
+    child.expect([pexpect.EOF, pexpect.TIMEOUT], timeout=0.5)
     return child.before, child.exitstatus
 
 
