@@ -1,9 +1,13 @@
 """Fixtures for all tests."""
 
+import os
 import signal
 from pathlib import Path
 
 import pytest
+
+# Tests fill the cores by processes. Before NumPy is loaded: its BLAS otherwise keeps a second core waiting in each.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # A shell starts what it runs in the background with Ctrl-C or a hang-up ignored; programs under test would inherit it.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
