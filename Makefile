@@ -26,10 +26,9 @@ picture: demo
 	chromium --headless --no-sandbox --disable-gpu --hide-scrollbars --window-size=900,760 \
 	    --screenshot=docs/pictures/diagnosis.png out/demo/diagnosis/report.html
 
-# A file's tests stay with one worker: what they share is flown once, and its kernels are compiled once.
+# Two processes that compute, and one for the tests that wait for the clock (tests/conftest.py).
 test: setup
-	$(BIN)/python -m pytest -n 2 --dist loadfile -m 'not realtime'
-	$(BIN)/python -m pytest -m realtime
+	$(BIN)/python -m pytest -n 3 --dist loadgroup --no-loadscope-reorder
 
 check: setup lint types contract test
 

@@ -2,20 +2,25 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
-from importlib.metadata import packages_distributions
+import tomllib
+import zipfile
+from importlib.metadata import distribution
 from pathlib import Path
 
 import click
 import pytest
+from packaging.requirements import Requirement
 
 from tools.cli.main import cli
 from tools.data.errors import extras, missing_extra
 
 ROOT = Path(__file__).resolve().parents[2]
 DRIVER = ROOT / "tests" / "support" / "every_command.py"
-NOT_ON_THE_GLIDER = ("matplotlib", "scipy", "jinja2", "pandas", "polars", "pytest", "hypothesis")
+PACKAGES = ("firmware", "hal", "sim_backend", "tools")
+NOT_ON_THE_GLIDER = {"matplotlib", "scipy", "jinja2", "pandas", "polars", "pytest", "hypothesis"}
 BROUGHT = ("analysis", "bench", "campaign", "identify")
 
 # In this order, each with the extra that it asks for; None: it does its work without any.
@@ -79,38 +84,50 @@ def test_the_list_of_calls_has_every_command():
     assert [leaf for leaf in leaves(cli) if not any(call[: len(leaf)] == leaf for call in called)] == []
 
 
-def call_all(python: object, folder: Path, blocked: list[str], environment: dict[str, str]) -> list[dict]:
-    """What came of CALLS, in a process of another Python."""
+def needed(package: str, found: set[str]) -> set[str]:
+    """A package and all that it asks for without extras, by the metadata of what is installed here."""
+    if package not in found:
+        found.add(package)
+        for line in distribution(package).requires or ():
+            wanted = Requirement(line)
+            if wanted.marker is None or wanted.marker.evaluate({"extra": ""}):
+                needed(wanted.name.lower(), found)
+    return found
+
+
+@pytest.fixture(scope="module")
+def base_install(tmp_path_factory) -> Path:
+    """An environment of just the packages that the base install brings: links to those of this one."""
+    folder = tmp_path_factory.mktemp("base")
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder / "venv"], check=True)
+    (site,) = (folder / "venv").glob("lib/python*/site-packages")
+    for package in needed("glider", set()):
+        one = distribution(package)
+        for top in {Path(file).parts[0] for file in one.files} - {".."}:
+            if package != "glider" or top.endswith(".dist-info"):  # the project itself is this tree
+                (site / top).symlink_to(Path(one.locate_file(top)))
+    return folder
+
+
+@pytest.mark.slow
+def test_in_a_base_install_every_command_works_or_names_its_extra(base_install):
+    python, folder = base_install / "venv" / "bin" / "python", base_install / "calls"
     folder.mkdir()
     for name, text in FILES.items():
         (folder / name).write_text(text)
-    (folder / "calls.json").write_text(json.dumps({"calls": [call.split() for call, _ in CALLS], "blocked": blocked}))
-    done = run(python, DRIVER, "calls.json", cwd=folder, env=environment)
+    (folder / "calls.json").write_text(json.dumps([call.split() for call, _ in CALLS]))
+    done = subprocess.run(
+        [python, DRIVER, "calls.json"], cwd=folder, env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True, text=True, timeout=900,
+    )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
-
-
-def check_all(found: list[dict]) -> None:
-    """Each command has worked, or said in one line which extra it needs."""
     wrong = []
-    for (_, extra), one in zip(CALLS, found, strict=True):
+    for (_, extra), one in zip(CALLS, json.loads(done.stdout), strict=True):
         lines = [line for line in one["err"].splitlines() if not line.endswith(" ...")]  # it names what it begins with
         asks = len(lines) == 1 and lines[0].endswith(f"pip install 'glider[{extra}]'") and one["out"] == ""
         if "Traceback" in one["err"] or not (one["code"] == 0 if extra is None else one["code"] == 2 and asks):
             wrong.append((extra, one))
     assert wrong == []
-
-
-def run(*command, **options):
-    return subprocess.run([str(part) for part in command], capture_output=True, text=True, timeout=900, **options)
-
-
-def test_every_command_works_or_names_its_extra_where_the_extras_are_hidden(tmp_path):
-    brought = {package for packages in extras().values() for package in packages}
-    hidden = sorted(brought & set(packages_distributions()))
-    assert {"scipy", "jinja2", "matplotlib", "tomlkit", "joblib", "arviz", "emcee"} <= set(hidden)
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    check_all(call_all(sys.executable, tmp_path / "calls", hidden, environment))
 
 
 def test_the_extras_are_those_of_the_package():
@@ -120,26 +137,30 @@ def test_the_extras_are_those_of_the_package():
     assert missing_extra(ModuleNotFoundError(name="tools.nothing")) is None
 
 
-@pytest.fixture(scope="module")
-def base_install(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("base")
-    python = folder / "venv" / "bin" / "python"
-    assert run(sys.executable, "-m", "venv", folder / "venv").returncode == 0
-    installed = run(
-        python, "-m", "pip", "install", "--disable-pip-version-check", "--constraint", ROOT / "constraints.txt", ROOT
-    )
-    if installed.returncode != 0 and "Could not find a version" in installed.stderr + installed.stdout:
-        pytest.skip("no package index to install from")
-    assert installed.returncode == 0, installed.stderr
-    return folder
+def test_what_flies_asks_for_few_packages():
+    packages = needed("glider", set())
+    assert {"numba", "numpy", "pyserial"} <= packages
+    assert not packages & NOT_ON_THE_GLIDER
 
 
 @pytest.mark.slow
-def test_a_base_install_flies_and_every_command_works_or_names_its_extra(base_install):
-    python = base_install / "venv" / "bin" / "python"
-    environment = {**os.environ, "GLIDER_CACHE_DIR": str(base_install / "kernels")}
-    environment.pop("PYTHONPATH", None)
-    check_all(call_all(python, base_install / "calls", [], environment))
-    listed = run(python, "-m", "pip", "list", "--format", "json").stdout
-    packages = {package["name"].lower() for package in json.loads(listed)}
-    assert not packages & set(NOT_ON_THE_GLIDER)
+def test_a_wheel_holds_every_file_of_the_packages(tmp_path):
+    """Of a copy: building leaves its own folders behind."""
+    for name in PACKAGES:
+        shutil.copytree(ROOT / name, tmp_path / "tree" / name, ignore=shutil.ignore_patterns("__pycache__"))
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, tmp_path / "tree")
+    build = [sys.executable, "-m", "pip", "wheel", "--no-deps", "--disable-pip-version-check"]
+    done = subprocess.run([*build, "-w", tmp_path, tmp_path / "tree"], capture_output=True, text=True)
+    if done.returncode != 0 and "Could not find a version" in done.stderr + done.stdout:
+        pytest.skip("no package index to fetch setuptools from")
+    assert done.returncode == 0, done.stderr
+    (wheel,) = tmp_path.glob("glider-*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        held = {name for name in archive.namelist() if name.split("/")[0] in PACKAGES}
+        (metadata,) = [archive.read(name) for name in archive.namelist() if name.endswith("METADATA")]
+    tree = [path for name in PACKAGES for path in (ROOT / name).rglob("*")]
+    assert held == {str(p.relative_to(ROOT)) for p in tree if p.is_file() and "__pycache__" not in p.parts}
+    asked = {line.removeprefix("Requires-Dist: ") for line in metadata.decode().splitlines() if "Requires-Dist" in line}
+    declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["dependencies"]
+    assert {Requirement(line) for line in asked if "extra ==" not in line} == {Requirement(line) for line in declared}

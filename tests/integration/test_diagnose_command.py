@@ -29,7 +29,7 @@ def lateral(tmp_path_factory):
     F = np.zeros(ef.N_F)
     F[ef.CG_OFFSET_Y] = 0.0015
     folder = tmp_path_factory.mktemp("lateral")
-    case = make_case(folder, F, seed=11)
+    case = make_case(folder, F, seed=11, runs=2)
     assert glider("gap", "diagnose", case.folder, "--out", folder / "out") == 0
     return case, folder / "out", json.loads((folder / "out" / "diagnosis.json").read_text())
 
@@ -77,10 +77,17 @@ def test_the_next_run_is_a_mission_that_check_accepts(lateral):
     assert glider("check", "--mission", out / "next_run.toml") == 0
 
 
-def test_no_effect_is_called_none(tmp_path, capsys):
-    case = make_case(tmp_path, np.zeros(ef.N_F), seed=12)
-    assert glider("gap", "diagnose", case.folder, "--out", tmp_path / "out", "--json") == 0
-    answer = json.loads(capsys.readouterr().out)
+@pytest.fixture(scope="module")
+def nothing(tmp_path_factory):
+    """A vehicle as its file has it, and what is said of it."""
+    folder = tmp_path_factory.mktemp("nothing")
+    case = make_case(folder, np.zeros(ef.N_F), seed=12, runs=2)
+    assert glider("gap", "diagnose", case.folder, "--out", folder / "out") == 0
+    return case, json.loads((folder / "out" / "diagnosis.json").read_text())
+
+
+def test_no_effect_is_called_none(nothing):
+    _, answer = nothing
     assert answer["verdict"] == "none"
     assert answer["selected"] == []
 
@@ -97,7 +104,7 @@ def pushed(tmp_path_factory):
     F = np.zeros(ef.N_F)
     F[ef.LINK], F[ef.SHAPE + ef.SHAPES.index("pump running")] = 1 + LINKS.index("pitch moment"), 0.15
     folder = tmp_path_factory.mktemp("pushed")
-    case = make_case(folder, F, seed=21, runs=3)
+    case = make_case(folder, F, seed=21)
     assert glider("gap", "diagnose", case.folder, "--out", folder / "out") == 0
     return case, folder / "out", json.loads((folder / "out" / "diagnosis.json").read_text())
 
@@ -173,10 +180,11 @@ def test_without_a_test_of_what_is_left_nobody_is_sure_that_it_is_unknown(pushed
 
 
 @pytest.mark.parametrize("part", ["nuisance", "splice", "evidence"])
-def test_a_part_left_out_leaves_a_diagnosis(lateral, tmp_path, part):
-    case, _, whole = lateral
+def test_without_a_part_nothing_is_given_a_cause(nothing, tmp_path, part):
+    """docs/DIAGNOSIS.md, What each part is worth."""
+    case, whole = nothing
     assert glider("gap", "diagnose", case.folder, "--out", tmp_path, "--without", part) == 0
     answer = json.loads((tmp_path / "diagnosis.json").read_text())
-    assert answer["verdict"] in ("none", "cause", "unknown")
+    assert answer["verdict"] != "none"
     assert answer["gap"]["before"] == whole["gap"]["before"]
     assert answer["causes"] != whole["causes"]

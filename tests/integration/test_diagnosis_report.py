@@ -43,7 +43,7 @@ FRAME = """<!doctype html><body style="margin:0">
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:
     """A heavy vehicle's case and, beside it, the answer."""
-    case, _ = fly_case(World(mocap=True, seconds=60.0, changes={layout.NET_MASS: HEAVY}), 41, runs=3)
+    case, _ = fly_case(World(mocap=True, seconds=45.0, changes={layout.NET_MASS: HEAVY}), 41, runs=2)
     path = tmp_path_factory.mktemp("diagnosis") / "heavy"
     write_case(
         path, case.runs, vehicle="roughie", site="pond", log_rate_hz=10.0, water_density_kg_m3=998.0, suffix=".csv.gz"

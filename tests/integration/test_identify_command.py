@@ -1,7 +1,6 @@
 """`glider identify` on a small captured case: truth held, bad runs named, files that others read."""
 
 import json
-import os
 from dataclasses import replace
 
 import numpy as np
@@ -29,7 +28,6 @@ def found(tmp_path_factory):
     longer = {name: 1000.0 * runs[4].columns[name] for name in names.MOCAP_POSITION}
     runs[4] = replace(runs[4], columns=runs[4].columns | longer)
     write_case(folder / "case", runs, **ABOUT)
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     ran = CliRunner().invoke(identify, [str(folder / "case"), "--out", str(folder / "out"), "--json"])
     assert ran.exit_code == 0, ran.output
     return json.loads(ran.stdout), folder / "out", world.coefficients()

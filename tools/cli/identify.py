@@ -1,6 +1,5 @@
 """`glider identify`: parameters and their distribution from runs."""
 
-import os
 import sys
 from pathlib import Path
 
@@ -25,8 +24,6 @@ def identify(case: Path, out: Path | None, seed: int, likelihood: str, vehicle: 
     Runs that cannot be fitted are named and left out. With --out: identified.toml (a vehicle file that says where it
     comes from), report.html, posterior.nc (ArviZ).
     """
-    # The kernels share out the work over the cores; threads of the linear algebra beside them would only wait.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from tools.data.errors import need
 
     need("identify")

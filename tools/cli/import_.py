@@ -16,20 +16,22 @@ def import_() -> None:
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--map", "mapping", required=True, metavar="NAME or FILE", help="Mapping: shipped name or TOML file.")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for the case.  [default: beside the first file]")
+@click.option("--strict", is_flag=True, help="Refuse damaged rows, also where the mapping leaves them out.")
 @json_option
-def csv(files: tuple[Path, ...], mapping: str, out: Path | None, as_json: bool) -> None:
+def csv(files: tuple[Path, ...], mapping: str, out: Path | None, strict: bool, as_json: bool) -> None:
     """Turn CSV logs (.csv or .csv.gz), one a run, into a case, by a mapping file (docs/IMPORT.md)."""
     from tools.data.importers.csvlog import import_csv
     from tools.data.runs.run import run_name
 
     folder = files[0].parent / f"{run_name(files[0])}.case" if out is None else out
-    imported = import_csv(list(files), mapping, folder)
+    imported = import_csv(list(files), mapping, folder, strict)
     for note in imported.notes:
         say(note)
     if as_json:
-        rows = [run.rows for run in imported.runs]
-        files_written = [str(path) for path in imported.files]
-        print_json({"case": str(folder), "files": files_written, "rows": rows, "notes": imported.notes})
+        print_json({
+            "case": str(folder), "files": [str(path) for path in imported.files],
+            "rows": [run.rows for run in imported.runs], "left_out": imported.left_out, "notes": imported.notes,
+        })  # fmt: skip
     else:
         for path in imported.files:
             click.echo(path)

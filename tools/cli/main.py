@@ -1,6 +1,7 @@
 """`glider`: the one entry point. Commands are imported when called, so that --help stays quick."""
 
 import importlib
+import os
 import sys
 
 import click
@@ -52,6 +53,9 @@ def cli():
 
 
 def main() -> None:
+    # Before NumPy is loaded. The kernels share out the work over the cores; threads of the linear algebra beside them
+    # would only wait, each keeping a core busy.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     sys.exit(report_errors(cli))
 
 

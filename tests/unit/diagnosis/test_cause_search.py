@@ -42,7 +42,7 @@ def test_a_candidate_that_took_no_step_yet_is_judged_by_where_it_is():
 def test_effects_that_begin_with_a_kink_or_go_in_steps_are_found(tmp_path, label, entry, value):
     F = np.zeros(ef.N_F)
     F[entry] = value
-    search = run(problem_of(make_case(tmp_path, F, seed=5, mocap=entry in (ef.MOCAP_DELAY, ef.CLOCK_SKEW))))
+    search = run(problem_of(make_case(tmp_path, F, seed=5, runs=2, mocap=entry in (ef.MOCAP_DELAY, ef.CLOCK_SKEW))))
     best = max((c for c in search.hypotheses if len(c.labels) == 1), key=lambda c: c.log_evidence(search.fitter))
     assert best.labels == (label,)
     assert best.values[0] * best.free[0].spread == pytest.approx(value, rel=0.25)

@@ -11,7 +11,7 @@ from tools.inference.problem import problem_of
 
 
 def test_rough_water_is_turbulence_however_rough(tmp_path):
-    answer = conclude(run(problem_of(make_case(tmp_path, np.zeros(ef.N_F), seed=7, mocap=True, rough=20.0))))
+    answer = conclude(run(problem_of(make_case(tmp_path, np.zeros(ef.N_F), seed=7, runs=2, mocap=True, rough=20.0))))
     assert answer.main == TURBULENCE
     assert answer.noise.probe.name == TURBULENCE
     assert 10.0 < answer.noise.scale < 40.0

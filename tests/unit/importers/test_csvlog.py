@@ -154,7 +154,8 @@ def test_a_log_without_header_and_with_broken_rows(folder):
         _import(folder, text=MAP.replace("[time]", f"[text]\n{names}\n[time]"))
     text = MAP.replace("[time]", f'[text]\n{names}\nbroken_rows = "drop"\n[time]')
     imported = _import(folder, text=text)
-    assert "1 broken rows" in imported.notes[0]
+    assert imported.left_out == [{"broken": 1}]
+    assert imported.notes[0].endswith("a.csv: 1 of 239 rows left out: 1 broken (line 11)")
     # Lines are still the file's own where rows before them were left out.
     lines[20] = "x,1,2,3"
     (folder / "a.csv").write_text("\n".join(lines))
@@ -169,7 +170,7 @@ def test_times_that_do_not_go_on(folder):
     with pytest.raises(InputError, match=r"a.csv:31: millis: time does not go on"):
         _import(folder)
     imported = _import(folder, text=MAP.replace('unit = "ms"', 'unit = "ms"\nnot_increasing = "drop"'))
-    assert "1 rows left out" in imported.notes[0]
+    assert imported.notes[0].endswith("1 of 239 rows left out: 1 whose time does not go on (line 31)")
 
 
 def test_dates_are_times_too(folder):

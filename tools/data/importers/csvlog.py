@@ -5,11 +5,13 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
 from firmware.model.library import shipped
 from tools.data.errors import InputError
 from tools.data.importers import resample
+from tools.data.importers.commands import CommandTable, rebuild, says, seen_direction
 from tools.data.importers.mapping import TIME_UNITS, ColumnTable, CutTable, MapTable, load_map
 from tools.data.runs import columns as names
 from tools.data.runs import csvfile
@@ -22,22 +24,31 @@ MAX_ROWS = 10_000_000  # of one run: what a mistaken time unit would ask for
 
 @dataclass
 class Imported:
-    """A case that was written, and what a person should know of it."""
+    """A case that was written, what of the files is not in it, and what else a person should know of it."""
 
     folder: Path
     runs: list[Run]
     files: list[Path]
+    left_out: list[dict[str, int]]  # by file: rows by the reason why
     notes: list[str] = field(default_factory=list)
 
 
-def import_csv(paths: list[Path], map_name: str, out: Path) -> Imported:
-    """Write the files as the runs of a case; InputError or ConfigError, one line, where that cannot be."""
+def import_csv(paths: list[Path], map_name: str, out: Path, strict: bool = False) -> Imported:
+    """Write the files as the runs of a case; InputError or ConfigError, one line, where that cannot be.
+
+    strict: no row is left out, whatever the mapping allows.
+    """
     mapping, base = load_map(map_name)
+    if strict:
+        text = msgspec.structs.replace(mapping.text, broken_rows="refuse", bad_fields="refuse")
+        time = msgspec.structs.replace(mapping.time, not_increasing="refuse")
+        mapping = msgspec.structs.replace(mapping, text=text, time=time)
     vehicle, vehicle_text = mapping.vehicle, None
     if vehicle not in shipped("model/vehicles"):
         vehicle_text, _ = name_or_path(vehicle, "vehicle", "model/vehicles", base=base)
-    notes: list[str] = []
-    runs = [import_run(path, mapping, f"run{number:02d}", notes) for number, path in enumerate(paths)]
+    sources = [_Source(path, mapping) for path in paths]
+    runs = [source.run(f"run{number:02d}") for number, source in enumerate(sources)]
+    notes = [note for source in sources for note in source.said()]
     rate = mapping.rate_hz
     if rate is None:
         steps = np.concatenate([np.diff(run.t) for run in runs])
@@ -46,107 +57,151 @@ def import_csv(paths: list[Path], map_name: str, out: Path) -> Imported:
         rate = float(f"{1.0 / np.median(steps):.4g}")
         notes.append(f"taken row by row; log_rate_hz = {rate:g} from the times")
     everything = {**mapping.columns, **mapping.extra}
-    decimals = {name: column.decimals for name, column in everything.items() if column.decimals is not None}
     files = write_case(
-        out,
-        runs,
-        vehicle=vehicle,
-        vehicle_text=vehicle_text,
-        site=mapping.site,
-        log_rate_hz=rate,
+        out, runs, vehicle=vehicle, vehicle_text=vehicle_text, site=mapping.site, log_rate_hz=rate,
         water_density_kg_m3=mapping.water_density_kg_m3,
-        decimals=decimals,
-    )
-    return Imported(out, runs, files, notes)
+        decimals={name: column.decimals for name, column in everything.items() if column.decimals is not None},
+    )  # fmt: skip
+    left_out = [{reason: len(lines) for reason, lines in source.left_out.items()} for source in sources]
+    return Imported(out, runs, files, left_out, notes)
 
 
-def import_run(path: Path, mapping: MapTable, name: str, notes: list[str]) -> Run:
-    """One file as a run; lines worth saying are added to `notes`."""
-    text = mapping.text
-    table = csvfile.read_table(
-        path,
-        csvfile.Dialect(
-            delimiter=text.delimiter,
-            decimal=text.decimal,
-            encoding=text.encoding,
-            skip_lines=text.skip_lines,
-            header=text.header,
-            missing=frozenset(text.missing),
-            drop_broken_rows=text.broken_rows == "drop",
-        ),
-    )
-    if table.dropped:
-        notes.append(f"{path}: {table.dropped} broken rows left out")
-    everything = {**mapping.columns, **mapping.extra}
-    for column in [mapping.time.column, *(item.source for item in everything.values())]:
-        if column not in table.header:
-            raise InputError(f"no column '{column}'; it has {', '.join(table.header)}", source=path)
-    t, keep = _times(table, mapping, path, notes)
-    cut = next((cut for cut in mapping.cut if fnmatch.fnmatch(path.name, cut.file)), None)
-    if cut is None:
-        cut = CutTable()
-        if mapping.cut:
-            notes.append(f"{path}: no [[cut]] is for a file of this name; it is taken whole")
-    density = mapping.water_density_kg_m3
-    values = {
-        target: _converted(table.numbers(item.source)[keep], item, density) for target, item in everything.items()
-    }
-    columns = _rows(path, t, values, cut, mapping)
-    if mapping.rates_from_attitude:
-        rates = resample.body_rates(columns[names.TIME], *(columns[angle] for angle in names.ATTITUDE))
-        columns |= {rate: found for rate, found in zip(names.RATES, rates, strict=True) if rate not in columns}
-    numbers = {target: columns[target] for target in names.in_order(list(columns)) if target in names.KNOWN}
-    extra = {target: csvfile.as_texts(target, columns[target], item.decimals) for target, item in mapping.extra.items()}
-    return Run(name=name, path=path, columns=numbers, extra=extra)
+class _Source:
+    """One file on its way to a run: its table, the rows that are good, and why the others are not."""
 
+    def __init__(self, path: Path, mapping: MapTable):
+        self.path, self.mapping = path, mapping
+        self.table = csvfile.read_table(path, mapping.text)
+        self.everything = {**mapping.columns, **mapping.extra}
+        states = [s for c in mapping.commands.values() for s in (c.to_low, c.to_high) if s is not None]
+        asked = [item.source for item in self.everything.values()] + [state.source for state in states]
+        for column in [mapping.time.column, *asked]:
+            if column not in self.table.header:
+                raise InputError(f"no column '{column}'; it has {', '.join(self.table.header)}", source=path)
+        self.left_out: dict[str, list[int]] = {}  # lines, by the reason why
+        self.notes: list[str] = []
+        if self.table.broken:
+            self.left_out["broken"] = self.table.broken
+        self.numbers, self.keep = self._read()
+        self.t = self._times()
 
-def _times(table: csvfile.Table, mapping: MapTable, path: Path, notes: list[str]) -> tuple[np.ndarray, np.ndarray]:
-    """Time from the first row, s, strictly increasing, and the rows that have one."""
-    column = mapping.time.column
-    if mapping.time.unit == "iso8601":
-        t = _iso_seconds(table, column)
-    else:
-        logged = table.numbers(column)
-        known = logged[~np.isnan(logged)]
+    def _leave_out(self, reason: str, rows: np.ndarray) -> None:
+        if rows.size:
+            self.left_out[reason] = [self.table.line(int(row)) for row in rows]
+
+    def _read(self) -> tuple[dict[str, np.ndarray], np.ndarray]:
+        """Every column that is asked for as it was logged, and the rows of which all fields are numbers."""
+        keep, bad_fields = np.ones(self.table.rows, dtype=bool), self.mapping.text.bad_fields
+        numbers = {}
+        for target, item in self.everything.items():
+            if bad_fields == "refuse":
+                numbers[target] = self.table.numbers(item.source, item.words)
+                continue
+            numbers[target], bad = self.table.numbers_and_bad(item.source, item.words)
+            if bad_fields == "drop":
+                keep &= ~bad
+            elif bad.any():
+                line = self.table.line(int(np.flatnonzero(bad)[0]))
+                self.notes.append(f"{target}: {np.count_nonzero(bad)} fields are no numbers, missing now (line {line})")
+        self._leave_out("with a field that is no number", np.flatnonzero(~keep))
+        return numbers, keep
+
+    def said(self) -> list[str]:
+        """What a person should know of this file, a line each."""
+        count = sum(map(len, self.left_out.values()))
+        reasons = ", ".join(f"{len(lines)} {why} (line {lines[0]})" for why, lines in self.left_out.items())
+        total = self.table.rows + len(self.table.broken)
+        said = [f"{count} of {total} rows left out: {reasons}"] if count else []
+        said += [f"{self.table.joined} rows put together that a line's end had broken"] if self.table.joined else []
+        return [f"{self.path}: {note}" for note in [*said, *self.notes]]
+
+    def run(self, name: str) -> Run:
+        """The file as a run."""
+        mapping = self.mapping
+        cut = next((cut for cut in mapping.cut if fnmatch.fnmatch(self.path.name, cut.file)), None)
+        if cut is None:
+            cut = CutTable()
+            if mapping.cut:
+                self.notes.append("no [[cut]] is for a file of this name; it is taken whole")
+        values = {target: self._converted(target, item) for target, item in self.everything.items()}
+        values |= {target: self._rebuilt(target, command, values) for target, command in mapping.commands.items()}
+        columns = _rows(self.path, self.t, values, cut, mapping)
+        if mapping.rates_from_attitude:
+            rates = resample.body_rates(columns[names.TIME], *(columns[angle] for angle in names.ATTITUDE))
+            columns |= {rate: found for rate, found in zip(names.RATES, rates, strict=True) if rate not in columns}
+        numbers = {target: columns[target] for target in names.in_order(list(columns)) if target in names.KNOWN}
+        extra = {
+            target: csvfile.as_texts(target, columns[target], item.decimals) for target, item in mapping.extra.items()
+        }
+        return Run(name=name, path=self.path, columns=numbers, extra=extra)
+
+    def _converted(self, target: str, item: ColumnTable) -> np.ndarray:
+        """Logged numbers in SI; what is outside `valid` is missing."""
+        logged = self.numbers[target][self.keep]
+        values = item.factor(self.mapping.water_density_kg_m3) * (logged - item.zero) + item.offset
+        if item.valid is not None:
+            outside = (values < item.valid[0]) | (values > item.valid[1])
+            values[outside] = np.nan
+            if outside.any():
+                self.notes.append(f"{target}: {np.count_nonzero(outside)} samples outside `valid`, missing now")
+        return values
+
+    def _rebuilt(self, target: str, command: CommandTable, values: dict[str, np.ndarray]) -> np.ndarray:
+        """A command by its rule, in SI."""
+        where = values[command.follows]
+        if command.to_low is not None and command.to_high is not None:
+            low, high = (says(self.table.texts(one.source), one) for one in (command.to_low, command.to_high))
+            direction = (high.astype(np.int64) - low)[self.keep]
+        else:
+            direction = seen_direction(self.t, where, command.rate or np.inf, command.over_s)
+        found = rebuild(command, direction, where)
+        ended = f", {found.ended_between} that ended between them" if found.ended_between else ""
+        self.notes.append(f"{target}: rebuilt of {command.follows}: {found.to_a_stop} runs to a stop{ended}")
+        return found.command
+
+    def _times(self) -> np.ndarray:
+        """Time of the good rows from the first, s, strictly increasing; rows whose time does not go on are not good."""
+        time, table = self.mapping.time, self.table
+        if time.unit == "iso8601":
+            logged, per_unit = self._iso_seconds(), 1.0
+        elif self.mapping.text.bad_fields == "refuse":
+            logged, per_unit = table.numbers(time.column), TIME_UNITS[time.unit]
+        else:
+            (logged, _), per_unit = table.numbers_and_bad(time.column), TIME_UNITS[time.unit]
+        good = np.flatnonzero(self.keep & ~np.isnan(logged))
+        if not good.size:
+            raise InputError("no row has a time", source=self.path, column=time.column)
+        kept = good[resample.longest_course(logged[good])]
+        wrong = np.setdiff1d(np.flatnonzero(self.keep), kept)
         # Differences first: whole milliseconds or nanoseconds since long ago are exact, their seconds are not.
-        per_second = round(1.0 / TIME_UNITS[mapping.time.unit])
-        t = logged - (known[0] if known.size else 0.0)
-        t = t / per_second if per_second else t * TIME_UNITS[mapping.time.unit]
-    ahead = np.concatenate(([-np.inf], np.maximum.accumulate(np.where(np.isnan(t), -np.inf, t))[:-1]))
-    keep = t > ahead
-    wrong = np.flatnonzero(~keep)
-    if wrong.size:
-        row = int(wrong[0])
-        if mapping.time.not_increasing == "refuse":
-            what = "a missing time" if np.isnan(t[row]) else f"time does not go on: {t[row]:g} s after {ahead[row]:g} s"
-            raise table.error(f'{what} (time.not_increasing = "drop" leaves such rows out)', row=row, column=column)
-        notes.append(f"{path}: {wrong.size} rows left out, their time does not go on")
-    if not keep.any():
-        raise InputError("no row has a time", source=path, column=column)
-    return t[keep], keep
+        whole = round(1.0 / per_unit)
+        t = (logged - logged[kept[0]]) / whole if whole else (logged - logged[kept[0]]) * per_unit
+        if wrong.size and time.not_increasing == "refuse":
+            row = int(wrong[0])
+            before = float(t[kept[kept < row][-1]]) if (kept < row).any() else 0.0
+            what = "a missing time" if np.isnan(t[row]) else f"time does not go on: {t[row]:g} s after {before:g} s"
+            what += ' (time.not_increasing = "drop" leaves such rows out)'
+            raise table.error(what, row=row, column=time.column)
+        self._leave_out("whose time does not go on", wrong)
+        self.keep = np.zeros(table.rows, dtype=bool)
+        self.keep[kept] = True
+        return np.asarray(t[kept])
 
-
-def _iso_seconds(table: csvfile.Table, column: str) -> np.ndarray:
-    seconds = np.full(table.rows, np.nan)
-    first: datetime | None = None
-    for row, text in enumerate(table.texts(column)):
-        if not text.strip():
-            continue
-        try:
-            moment = datetime.fromisoformat(text.strip())
-            first = first or moment
-            seconds[row] = (moment - first).total_seconds()
-        except (ValueError, TypeError):  # no date, or some with and some without a time zone
-            raise table.error(f"not a date and time: {text[:40]!r}", row=row, column=column) from None
-    return seconds
-
-
-def _converted(logged: np.ndarray, item: ColumnTable, density: float) -> np.ndarray:
-    """Logged numbers in SI; what is outside `valid` is missing."""
-    values = item.factor(density) * (logged - item.zero) + item.offset
-    if item.valid is not None:
-        values[(values < item.valid[0]) | (values > item.valid[1])] = np.nan
-    return values
+    def _iso_seconds(self) -> np.ndarray:
+        """Dates and times as seconds from the first, NaN where there is none, (rows,)."""
+        table, column = self.table, self.mapping.time.column
+        seconds, first = np.full(table.rows, np.nan), None
+        for row, text in enumerate(table.texts(column)):
+            if not text.strip():
+                continue
+            try:
+                moment = datetime.fromisoformat(text.strip())
+                first = first or moment
+                seconds[row] = (moment - first).total_seconds()
+            except (ValueError, TypeError):  # no date, or some with and some without a time zone
+                if self.mapping.text.bad_fields == "refuse":
+                    raise table.error(f"not a date and time: {text[:40]!r}", row=row, column=column) from None
+        return seconds
 
 
 def _rows(
@@ -168,6 +223,9 @@ def _rows(
     grid = np.arange(count) / mapping.rate_hz
     columns = {names.TIME: grid}
     for name, column in values.items():
+        if name in names.COMMANDS:
+            columns[name] = resample.in_force(t, column, grid + cut.start_s)
+            continue
         angle = name in names.WRAPPING
         mean = resample.means(column, bins, count, angle)
         columns[name] = resample.fill_gaps(mean, grid + cut.start_s, t, column, mapping.max_gap_s, angle)

@@ -16,7 +16,9 @@ from firmware.core.vehicle.layout import GRAVITY
 from hal.strict import ConfigError, Table, decode, locate
 from hal.units import UNITS, units_of
 from tools.data.errors import InputError
+from tools.data.importers.commands import CommandTable
 from tools.data.runs import columns as names
+from tools.data.runs.csvfile import Dialect
 from tools.data.sources import read_text
 
 # 'counts' is for values that `scale` alone turns into the target's SI unit.
@@ -36,6 +38,7 @@ class ColumnTable(Table):
     zero: Factor = 0.0  # the logged number that means nothing
     sign: Literal[1, -1] = 1
     offset: Factor = 0.0  # added at the end, SI
+    words: dict[str, Factor] = msgspec.field(default_factory=dict)  # what is logged, and the number it stands for
     valid: tuple[Factor, Factor] | None = None  # SI; what is outside becomes missing
     decimals: Annotated[int, msgspec.Meta(ge=0, le=17)] | None = None  # of the written file; exact without
 
@@ -79,18 +82,6 @@ class CutTable(Table):
             raise ValueError(f"end_s: expected more than start_s = {self.start_s}, got {self.end_s}")
 
 
-class TextTable(Table):
-    """[text]: how the file is written."""
-
-    delimiter: Annotated[str, msgspec.Meta(min_length=1, max_length=1)] = ","
-    decimal: Literal[".", ","] = "."
-    encoding: Literal["utf-8", "latin-1"] = "utf-8"
-    skip_lines: Annotated[int, msgspec.Meta(ge=0, le=10_000)] = 0  # above the header
-    header: tuple[str, ...] = ()  # for files that have none
-    missing: tuple[str, ...] = ()  # what stands for a missing sample, beside nothing
-    broken_rows: Literal["refuse", "drop"] = "refuse"  # rows of too few or too many fields
-
-
 class MapTable(Table):
     """A mapping file."""
 
@@ -106,7 +97,8 @@ class MapTable(Table):
     max_gap_s: Annotated[float, msgspec.Meta(ge=0.0)] = 0.0  # longer holes are missing, shorter ones interpolated
     rates_from_attitude: bool = False  # p, q, r that are not mapped, out of roll, pitch and yaw
     cut: tuple[CutTable, ...] = ()
-    text: TextTable = TextTable()
+    text: Dialect = Dialect()
+    commands: dict[str, CommandTable] = msgspec.field(default_factory=dict)
 
 
 def _check(mapping: MapTable, source: str) -> None:
@@ -124,6 +116,13 @@ def _check(mapping: MapTable, source: str) -> None:
     for name in mapping.extra:
         if name in names.KNOWN or not name.strip():
             raise ConfigError(source, "the name is taken by a column of run data", key=f"extra.{name}")
+    for name, command in mapping.commands.items():
+        if name not in names.COMMANDS or name in mapping.columns:
+            raise ConfigError(
+                source, f"expected one of {', '.join(names.COMMANDS)} that [columns] has not", key=f"commands.{name}"
+            )
+        if command.follows not in mapping.columns:
+            raise ConfigError(source, f"[columns] has no {command.follows!r}", key=f"commands.{name}.follows")
     if mapping.rates_from_attitude and not all(name in mapping.columns for name in names.ATTITUDE):
         raise ConfigError(source, f"needs {', '.join(names.ATTITUDE)}", key="rates_from_attitude")
     if mapping.max_gap_s and mapping.rate_hz is None:
@@ -140,14 +139,17 @@ def decode_map(text: str, source: str) -> MapTable:
     return mapping
 
 
+_BY_NAME = {"columns": ColumnTable, "extra": ColumnTable, "commands": CommandTable}
+
+
 def _with_column(error: ConfigError, text: str, source: str) -> ConfigError:
-    """An error inside [columns] or [extra] with the column's name, which the decoder leaves out for tables by name."""
+    """An error inside a group of tables by name with the table's name, which the decoder leaves out."""
     group, *rest = error.key.split(".")
-    if group not in ("columns", "extra"):
+    if group not in _BY_NAME:
         return error
     for name, table in tomllib.loads(text)[group].items():
         try:
-            msgspec.convert(table, ColumnTable, strict=True)
+            msgspec.convert(table, _BY_NAME[group], strict=True)
         except msgspec.ValidationError:
             path: list[str | int] = [group, name, *rest]
             return ConfigError(source, error.message, key=".".join(map(str, path)), line=locate(text, path))

@@ -1,8 +1,37 @@
-"""From uneven samples to even rows: means, short gaps, angles that wrap, rates out of attitude."""
+"""From uneven samples to even rows: time that goes on, means, short gaps, angles that wrap, rates out of attitude."""
+
+from bisect import bisect_left
 
 import numpy as np
 
 from firmware.core.maths.rotations import wrap
+
+
+def longest_course(t: np.ndarray) -> np.ndarray:
+    """The rows of the longest course of times that go on, each later than the one before; t (rows,) without gaps.
+
+    Leaves out the fewest rows, whichever way a damaged time is off: one far ahead costs itself, not all behind it.
+    """
+    if (np.diff(t) > 0.0).all():
+        return np.arange(len(t))
+    ends: list[float] = []  # the earliest time that a course of this length can end with, and the row it ends at
+    rows: list[int] = []
+    before = np.empty(len(t), dtype=np.int64)
+    for row, moment in enumerate(t.tolist()):
+        length = bisect_left(ends, moment)
+        ends[length : length + 1], rows[length : length + 1] = [moment], [row]
+        before[row] = rows[length - 1] if length else -1
+    course = [rows[-1]]
+    while before[course[-1]] >= 0:
+        course.append(int(before[course[-1]]))
+    return np.array(course[::-1])
+
+
+def in_force(t: np.ndarray, values: np.ndarray, grid_s: np.ndarray) -> np.ndarray:
+    """A command at the rows of `grid_s`: the last that was logged, at `t`, until then; NaN before the first."""
+    known = np.isfinite(values)
+    place = np.searchsorted(t[known], grid_s + 1e-9, side="right")
+    return np.concatenate(([np.nan], values[known]))[place]
 
 
 def bins_of(t: np.ndarray, start_s: float, rate_hz: float) -> np.ndarray:

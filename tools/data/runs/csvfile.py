@@ -7,18 +7,21 @@ import io
 import math
 import os
 import zlib
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import BinaryIO, Literal
+from types import MappingProxyType
+from typing import Annotated, BinaryIO, Literal
 
 import msgspec
 import numpy as np
 
+from hal.strict import Table as StrictTable
 from tools.data.errors import InputError
+from tools.data.runs.records import Line, LineTable, joined, over_lines, told_apart
 
 MAX_BYTES = 256_000_000  # unpacked; an hour at 50 Hz with forty columns of full precision is half of it
 _NUMBERS = msgspec.json.Decoder(list[float | None])
+NO_WORDS: Mapping[str, float] = MappingProxyType({})
 _SHOWN = 40  # characters of a wrong field that an error quotes
 
 
@@ -37,62 +40,82 @@ def _read_bounded(path: Path) -> bytes:
     return data
 
 
-@dataclass(frozen=True)
-class Dialect:
-    """How a table is written: as run data by default, as other loggers do if told."""
+class Dialect(StrictTable):
+    """How a table is written: as run data by default, as other loggers do if told. [text] of a mapping file."""
 
-    delimiter: str = ","
-    decimal: str = "."
-    encoding: str = "utf-8"
-    skip_lines: int = 0  # above the header
+    delimiter: Annotated[str, msgspec.Meta(min_length=1, max_length=1)] = ","
+    decimal: Literal[".", ","] = "."
+    encoding: Literal["utf-8", "latin-1"] = "utf-8"
+    quotes: bool = True  # false: a quotation mark is a letter, and damage in a number
+    skip_lines: Annotated[int, msgspec.Meta(ge=0, le=10_000)] = 0  # above the header
     header: tuple[str, ...] = ()  # for files that have none
-    missing: frozenset[str] = frozenset()  # what stands for a missing sample, beside nothing
-    drop_broken_rows: bool = False
+    comment: str = ""  # lines that begin so are passed over
+    line: tuple[LineTable, ...] = ()  # a record is written over these lines
+    missing: tuple[str, ...] = ()  # what stands for a missing sample, beside nothing
+    broken_rows: Literal["refuse", "drop", "join"] = "refuse"  # rows of too few or too many fields
+    bad_fields: Literal["refuse", "missing", "drop"] = "refuse"  # fields that are no number; drop: with their row
+
+    def __post_init__(self):
+        if not told_apart(self.line):
+            raise ValueError("line: expected lines of different numbers of fields, or of different `begins`")
+        if any(line.begins for line in self.line) and not self.header:
+            raise ValueError("header: missing; records of lines with `begins` have none of their own")
+
+    @property
+    def patient(self) -> bool:
+        """Whether damage is expected, so that bytes that are no text are some more of it."""
+        return self.broken_rows != "refuse" or self.bad_fields != "refuse"
 
 
 class Table:
-    """A CSV file's header and its fields, still text, by column. `dropped` counts the broken rows left out."""
+    """A CSV file's header and its fields, still text, by column. `broken` has the lines of broken rows left out,
+    `joined` counts those that were put together."""
 
     def __init__(self, path: Path, data: bytes, dialect: Dialect = Dialect()):
         self.path = path
         self._dialect = dialect
         self._text, self._above = self._decoded(data)
-        self.dropped = 0
-        self._numbers_of_rows: list[int] | None = None  # of the rows that are left, where some were dropped
+        self.broken: list[int] = []
+        self.joined = 0
         rows = self._rows()
         try:
-            header = list(dialect.header) or next(rows)
+            header = list(dialect.header) or next(rows)[1]
             self.header = [name.strip() for name in header]
             body = list(rows)
         except StopIteration:
             raise self.error("the file is empty") from None
-        while body and body[-1] in ([], [""]):
+        while body and body[-1][1] in ([], [""]):
             body.pop()
         self._check_header()
         if not body:
             raise self.error("no samples below the header")
         # One pass in C for the usual case; the slow search for the line only once something is known to be wrong.
-        if set(map(len, body)) != {len(self.header)}:
+        fields = [row for _, row in body]
+        if set(map(len, fields)) != {len(self.header)}:
             body = self._without_broken(body)
-        self._columns = dict(zip(self.header, zip(*body, strict=True), strict=True))
+            fields = [row for _, row in body]
+        self._lines = [number for number, _ in body]
+        self._columns = dict(zip(self.header, zip(*fields, strict=True), strict=True))
 
-    def _without_broken(self, body: list[list[str]]) -> list[list[str]]:
+    def _without_broken(self, body: list[Line]) -> list[Line]:
         width = len(self.header)
-        good = [number for number, row in enumerate(body) if len(row) == width]
-        if not self._dialect.drop_broken_rows or not good:
-            number = next(number for number, row in enumerate(body) if len(row) != width)
-            got = len(body[number])
-            few = "too few" if got < width else "too many"
-            raise self.error(f"{few} fields: expected {width}, got {got}", row=number)
-        self.dropped = len(body) - len(good)
-        self._numbers_of_rows = good
-        return [body[number] for number in good]
+        if self._dialect.broken_rows == "join":
+            whole = joined(body, width)
+            self.joined, body = len(body) - len(whole), whole
+        good = [row for row in body if len(row[1]) == width]
+        broken = [row for row in body if len(row[1]) != width]
+        if broken and (self._dialect.broken_rows == "refuse" or not good):
+            number, row = broken[0]
+            few = "too few" if len(row) < width else "too many"
+            raise self.error(f"{few} fields: expected {width}, got {len(row)}", line=number)
+        self.broken = sorted([*self.broken, *(number for number, _ in broken)])
+        return good
 
     def _decoded(self, data: bytes) -> tuple[str, int]:
         """The text from the header on, and the number of lines above it."""
         encoding = "utf-8-sig" if self._dialect.encoding == "utf-8" else self._dialect.encoding
         try:
-            text = data.decode(encoding)
+            text = data.decode(encoding, errors="replace" if self._dialect.patient else "strict")
         except UnicodeDecodeError as error:
             line = data.count(b"\n", 0, error.start) + 1
             raise InputError(f"not UTF-8 text (byte {error.start})", source=self.path, line=line) from None
@@ -102,18 +125,27 @@ class Table:
                 raise self.error(f"{self._dialect.skip_lines} lines above the header expected, {number} found")
         return text, self._dialect.skip_lines
 
-    def _rows(self) -> Iterator[list[str]]:
+    def _rows(self) -> Iterator[Line]:
+        lines: Iterator[Line] = self._fields()
+        if self._dialect.comment:
+            lines = (line for line in lines if not (line[1] and line[1][0].startswith(self._dialect.comment)))
+        if self._dialect.line:
+            lines = over_lines(lines, self._dialect.line, self.broken)
+        return lines
+
+    def _fields(self) -> Iterator[Line]:
         text, delimiter = self._text, self._dialect.delimiter
         if not text:
             return
-        if '"' not in text:
+        if not self._dialect.quotes or '"' not in text:
             # No quotes, so no field spans lines or hides a comma: splitting is the same as csv and twice as fast.
             lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-            yield from [line.split(delimiter) for line in lines]
+            yield from enumerate([line.split(delimiter) for line in lines], start=self._above + 1)
             return
         reader = csv.reader(io.StringIO(text, newline=""), strict=True, delimiter=delimiter)
         try:
-            yield from reader
+            for row in reader:
+                yield self._above + reader.line_num, row
         except csv.Error as error:
             raise InputError(f"not CSV: {error}", source=self.path, line=self._above + reader.line_num) from None
 
@@ -124,21 +156,13 @@ class Table:
                 raise self.error("the column stands twice", column=name or "(no name)", line=1)
             seen.add(name)
 
-    def _line(self, row: int) -> int:
-        """Line (from 1) on which a row (from 0, below the header) ends; fields in quotes may span lines."""
-        if self._numbers_of_rows is not None:
-            row = self._numbers_of_rows[row]
-        rows = row + (1 if self._dialect.header else 2)
-        if '"' not in self._text:
-            return self._above + rows
-        reader = csv.reader(io.StringIO(self._text, newline=""), strict=True, delimiter=self._dialect.delimiter)
-        for _ in range(rows):
-            next(reader)
-        return self._above + reader.line_num
+    def line(self, row: int) -> int:
+        """Line (from 1) on which a row (from 0, below the header) ends."""
+        return self._lines[row]
 
     def error(self, message: str, *, row: int | None = None, column: str | None = None, line: int | None = None):
         """An InputError of this file: `row` counts from 0 below the header."""
-        return InputError(message, source=self.path, line=line if row is None else self._line(row), column=column)
+        return InputError(message, source=self.path, line=line if row is None else self.line(row), column=column)
 
     @property
     def rows(self) -> int:
@@ -148,11 +172,22 @@ class Table:
         """A column as it stands."""
         return list(self._columns[column])
 
-    def numbers(self, column: str) -> np.ndarray:
-        """A column as float64, shape (rows,); NaN for an empty field; InputError for anything but a finite number."""
+    def numbers(self, column: str, words: Mapping[str, float] = NO_WORDS) -> np.ndarray:
+        """A column as float64, shape (rows,); NaN for an empty field; InputError for anything but a finite number.
+
+        Where there are `words`, each stands for its number, and nothing else is one.
+        """
+        values, bad = self.numbers_and_bad(column, words)
+        if bad.any():
+            row = int(np.flatnonzero(bad)[0])
+            raise self.error(_complaint(self._plain(self._columns[column])[row]), row=row, column=column)
+        return values
+
+    def numbers_and_bad(self, column: str, words: Mapping[str, float] = NO_WORDS) -> tuple[np.ndarray, np.ndarray]:
+        """The same, NaN also for what is no number, and where that is so, bool of shape (rows,)."""
         fields = self._plain(self._columns[column])
         joined = ",".join(fields)
-        if "n" not in joined:  # a field 'null' is not a missing sample
+        if not words and "n" not in joined:  # a field 'null' is not a missing sample
             if "" in fields:
                 joined = ",".join([field or "null" for field in fields])
             # JSON's numbers are a strict part of ours and decode five times as fast; what they leave out, and
@@ -160,8 +195,10 @@ class Table:
             with contextlib.suppress(msgspec.DecodeError):
                 values = np.array(_NUMBERS.decode(f"[{joined}]"), dtype=np.float64)
                 if len(values) == len(fields):
-                    return values
-        return np.array([self._number(field.strip(), row, column) for row, field in enumerate(fields)])
+                    return values, np.zeros(len(fields), dtype=bool)
+        found = [words.get(field.strip()) if words and field.strip() else _number(field) for field in fields]
+        bad = np.array([value is None for value in found])
+        return np.array([math.nan if value is None else value for value in found]), bad
 
     def _plain(self, fields: tuple[str, ...]) -> tuple[str, ...]:
         """Fields as run data would have them."""
@@ -170,23 +207,6 @@ class Table:
         if self._dialect.missing:
             fields = tuple("" if field.strip() in self._dialect.missing else field for field in fields)
         return fields
-
-    def _number(self, field: str, row: int, column: str) -> float:
-        if not field:
-            return math.nan
-        shown = repr(field if len(field) <= _SHOWN else field[:_SHOWN] + "...")
-        # float() takes more than a number in a table should be: '1_000', digits of other scripts.
-        try:
-            value = float(field) if field.isascii() and "_" not in field else None
-        except ValueError:
-            value = None
-        if value is None:
-            raise self.error(f"not a number: {shown}", row=row, column=column)
-        if math.isnan(value):
-            raise self.error(f"not a number: {shown} (a missing sample is an empty field)", row=row, column=column)
-        if math.isinf(value):
-            raise self.error(f"infinite: {shown}", row=row, column=column)
-        return value
 
     def require_increasing(self, column: str, values: np.ndarray) -> None:
         """InputError unless every sample is there and each is greater than the one before."""
@@ -197,6 +217,32 @@ class Table:
             row = int(back[0]) + 1
             message = f"not increasing: {values[row]} after {values[row - 1]}"
             raise self.error(message, row=row, column=column)
+
+
+def _as_float(field: str) -> float | None:
+    """A field as Python reads it; None if it does not."""
+    # float() takes more than a number in a table should be: '1_000', digits of other scripts.
+    try:
+        return float(field) if field.isascii() and "_" not in field else None
+    except ValueError:
+        return None
+
+
+def _number(field: str) -> float | None:
+    """A field as a number: NaN if it is empty, None if it is none or is not finite."""
+    if not field.strip():
+        return math.nan
+    value = _as_float(field)
+    return value if value is not None and math.isfinite(value) else None
+
+
+def _complaint(field: str) -> str:
+    """What is wrong with a field that is no number."""
+    field = field.strip()
+    value, shown = _as_float(field), repr(field if len(field) <= _SHOWN else field[:_SHOWN] + "...")
+    if value is not None and math.isinf(value):
+        return f"infinite: {shown}"
+    return f"not a number: {shown}" + (" (a missing sample is an empty field)" if value is not None else "")
 
 
 def read_table(path: Path, dialect: Dialect = Dialect()) -> Table:
