@@ -7,7 +7,7 @@ finite are null.
 import json
 import math
 import zipfile
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -235,7 +235,7 @@ class Record:
     answer: Answer
     details: Details
     curves: list[Curves]  # of the runs in details.pictures
-    shown: list[Shown]
+    shown: list[Shown] = field(default_factory=list)  # of details.shown
 
 
 def number(value: Number) -> float:

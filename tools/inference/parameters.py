@@ -4,12 +4,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from firmware.model.vehicle import PLACES
+from hal.strict import ConfigError
 from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.base import Effect
 from sim_backend.core.effects.catalogue import catalogue
 from tools.inference.model import effect_vector
 from tools.inference.problem import Problem
 
+NINETY = 1.645  # sigma on either side that hold 90 %
 NUISANCE = ""  # the label of what is no effect
 CLOCK_PLACE = ("timing", "mocap")  # of the labels by which motion capture's clock is wrong
 
@@ -45,12 +48,57 @@ def nuisance_parameters(problem: Problem) -> list[FreeParameter]:
         for n, row in enumerate(spread):
             along = tuple((int(i), float(row[i])) for i in np.flatnonzero(row))
             free.append(FreeParameter(NUISANCE, f"identified[{n}]", "P", -1, 1.0, along=along))
+    said = assumed(problem)
+    sigma[[f.entry for f in said if f.vector == "P"]] = 0.0
+    free += said
     free += [FreeParameter(NUISANCE, f"P[{i}]", "P", int(i), float(sigma[i])) for i in np.flatnonzero(sigma > 0.0)]
     for j, (reading, seen) in enumerate(zip(problem.kind.readings, problem.seen, strict=True)):
         size = getattr(problem.case.sensors, reading.source).bias
         if reading.bias >= 0 and seen and size > 0.0:
             free.append(FreeParameter(NUISANCE, f"bias[{j}]", "F", reading.bias, size))
     return free
+
+
+def assumable() -> dict[str, tuple[str, int]]:
+    """What a file may call assumed: its name, the vector it stands in and its entry there."""
+    effects = {
+        f"{label}.{p.name}": ("F", p.entry)
+        for label, effect in catalogue().items() for p in effect.parameters if p.entry >= 0
+    }  # fmt: skip
+    return {name: ("P", entry) for name, entry in PLACES.items()} | effects
+
+
+def assumed(problem: Problem) -> list[FreeParameter]:
+    """What the vehicle or case file calls assumed, as free as it says; ConfigError names what is no number of either.
+
+    A factor f is 1 sigma of (f - 1) times the value, of a scale's 1 + value; a range holds 90 %.
+    """
+    found, known = [], assumable()
+    P, F = problem.model.P, effect_vector(problem.model)
+    for name, one in problem.case.assumed.items():
+        if name not in known:
+            raise ConfigError(problem.case.vehicle_name, "no such number to be assumed", key=f"assumed.{name}")
+        vector, entry = known[name]
+        value = float((P if vector == "P" else F)[entry])
+        limits = (-np.inf, np.inf)
+        if one.factor is not None:
+            whole = 1.0 + value if name.endswith(".scale") else value
+            if whole == 0.0:
+                raise ConfigError(
+                    problem.case.vehicle_name, "is 0: a factor says nothing, give a range", key=f"assumed.{name}"
+                )
+            spread = (one.factor - 1.0) * abs(whole)
+        else:
+            assert one.range is not None
+            low, high = one.range
+            spread = (high - low) / (2.0 * NINETY)
+            limits = ((low - value) / spread, (high - value) / spread)
+            if not limits[0] <= 0.0 <= limits[1]:
+                raise ConfigError(
+                    problem.case.vehicle_name, f"the file's own value {value:g} is not in it", key=f"assumed.{name}"
+                )
+        found.append(FreeParameter("", name, vector, entry, spread, *limits))
+    return found
 
 
 def of_effect(effect: Effect) -> list[FreeParameter]:

@@ -12,11 +12,10 @@ import numpy as np
 
 from firmware.core.vehicle import layout
 from firmware.model.vehicle import COEFFICIENTS, PLACES
-from hal.strict import ConfigError
 from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.catalogue import catalogue
 from tools.inference.model import Model, effect_vector
-from tools.inference.parameters import FreeParameter
+from tools.inference.parameters import FreeParameter, assumed
 from tools.inference.problem import Problem
 
 # 1 sigma before any flight. [uncertainty] says what is left after one: these are what a first vehicle file may be off.
@@ -33,7 +32,6 @@ GAUGE, GAUGE_SPREAD = "depth_with_ballast", 0.5  # its name in [readings]; m/kg
 LINEAR_DAMPING, TANK_ARM = {"D_p": 0.1, "D_q": 1.5, "D_r": 1.0}, 0.15
 FRAME_TURN, FRAME_OFFSET = 0.02, 0.02  # rad, m: capture's body against the vehicle's
 CLOCK = 0.05  # s, capture's clock behind the onboard one
-NINETY = 1.645  # sigma on either side that hold 90 %
 FRAME = "frame"  # the vector of what is no part of the model but of how the capture sees it
 FRAME_NAMES = ("capture_roll", "capture_pitch", "capture_yaw", "capture_x", "capture_y", "capture_z")
 MASSES = {"m_t": layout.M_T, "m_r": layout.M_R, "m_s": layout.M_S}
@@ -174,48 +172,6 @@ def of_effect(problem: Problem, label: str, spread: float) -> FreeParameter:
     here = float(effect_vector(problem.model)[parameter.entry])
     low, high = (parameter.low - here) / spread, (parameter.high - here) / spread
     return FreeParameter("", label, "F", parameter.entry, spread, low, high, parameter.unit)
-
-
-def assumable() -> dict[str, tuple[str, int]]:
-    """What a file may call assumed: its name, the vector it stands in and its entry there."""
-    effects = {
-        f"{label}.{p.name}": ("F", p.entry)
-        for label, effect in catalogue().items() for p in effect.parameters if p.entry >= 0
-    }  # fmt: skip
-    return {name: ("P", entry) for name, entry in PLACES.items()} | effects
-
-
-def assumed(problem: Problem) -> list[FreeParameter]:
-    """What the vehicle or case file calls assumed, as free as it says; ConfigError names what is no number of either.
-
-    A factor f is 1 sigma of (f - 1) times the value, of a scale's 1 + value; a range holds 90 %.
-    """
-    found, known = [], assumable()
-    P, F = problem.model.P, effect_vector(problem.model)
-    for name, one in problem.case.assumed.items():
-        if name not in known:
-            raise ConfigError(problem.case.vehicle_name, "no such number to be assumed", key=f"assumed.{name}")
-        vector, entry = known[name]
-        value = float((P if vector == "P" else F)[entry])
-        limits = (-inf, inf)
-        if one.factor is not None:
-            whole = 1.0 + value if name.endswith(".scale") else value
-            if whole == 0.0:
-                raise ConfigError(
-                    problem.case.vehicle_name, "is 0: a factor says nothing, give a range", key=f"assumed.{name}"
-                )
-            spread = (one.factor - 1.0) * abs(whole)
-        else:
-            assert one.range is not None
-            low, high = one.range
-            spread = (high - low) / (2.0 * NINETY)
-            limits = ((low - value) / spread, (high - value) / spread)
-            if not limits[0] <= 0.0 <= limits[1]:
-                raise ConfigError(
-                    problem.case.vehicle_name, f"the file's own value {value:g} is not in it", key=f"assumed.{name}"
-                )
-        found.append(FreeParameter("", name, vector, entry, spread, *limits))
-    return found
 
 
 def _as_assumed(problem: Problem, free: list[FreeParameter]) -> list[FreeParameter]:

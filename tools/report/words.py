@@ -246,8 +246,24 @@ def _disorder(record: Record) -> str:
     )
 
 
+def _identified(record: Record) -> str:
+    """A vehicle that had to be identified: what is certain, how far it helps, what is left."""
+    answer = record.answer
+    first, last = (finite(answer.stages[n].gap["total"]) for n in (0, -1))
+    certain = [f"{PLAIN[label]} ({label})" for label in answer.selected]
+    unnamed = [one.text for one in answer.readings if one.label is None and one.finding == "goes_with"]
+    said = "Certain: " + "; ".join(certain) if certain else "No effect of the catalogue is certain"
+    said += (
+        f". With {'that and ' if certain or unnamed else ''}the vehicle identified from these runs, runs left out are "
+        f"missed by {number(last)} tolerances instead of {number(first)}. What is left has no cause with a name yet"
+    )
+    return f"{said}."
+
+
 def _unknown(record: Record) -> str:
     answer = record.answer
+    if any(stage.stage == "identified" for stage in answer.stages):
+        return _identified(record)
     said = f"A gap that no effect of the catalogue explains ({how_sure(record)})"
     strongest, correlated = strongest_left(record.details.findings)
     if strongest is not None:
