@@ -3,6 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+DEMO_STAMP := $(VENV)/.installed-demo
 
 .PHONY: setup demo picture test check lint types contract benchmark deploy clean
 
@@ -10,14 +11,22 @@ STAMP := $(VENV)/.installed
 setup: $(STAMP)
 	@$(BIN)/glider check --compile
 
-# pip runs again only when the dependencies change.
-$(STAMP): pyproject.toml constraints.txt
-	@$(PYTHON) -c 'import sys; sys.exit("glider needs Python 3.11 or newer, this is " + sys.version.split()[0]) if sys.version_info < (3, 11) else None'
-	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
-	@touch $(STAMP)
+# pip runs again only when the dependencies change. $(call install,EXTRA)
+define install
+@$(PYTHON) -c 'import sys; sys.exit("glider needs Python 3.11 or newer, this is " + sys.version.split()[0]) if sys.version_info < (3, 11) else None'
+@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[$(1)]'
+@touch $@
+endef
 
-demo: setup
+$(STAMP): pyproject.toml constraints.txt
+	$(call install,dev)
+
+# The demo needs a part of that, and compiles its own kernels on the way.
+$(DEMO_STAMP): pyproject.toml constraints.txt
+	$(call install,analysis)
+
+demo: $(DEMO_STAMP)
 	@$(BIN)/python -m tools.measure.demo
 
 # README's picture: the top of the demo's report.

@@ -62,6 +62,7 @@ class SampledSensors(Table):
     beacon: SampledSensor = SampledSensor(rate_hz=25.0, delay_s=0.02)
     slider_wire: SampledSensor = SampledSensor(rate_hz=25.0, delay_s=0.02)
     plunger_wire: SampledSensor = SampledSensor(rate_hz=25.0, delay_s=0.02)
+    biases: Annotated[int, msgspec.Meta(ge=0, le=2**31)] | None = None  # their seed; without one, the flight's own
 
     @property
     def periods(self) -> dict[str, float]:
@@ -169,9 +170,12 @@ def build_world(
                       (sup.SENSOR_PLUNGER, "plunger_wire")):  # fmt: skip
         sensor = getattr(sensors, name)
         table[row] = 1.0 / sensor.rate_hz, sensor.delay_s
+    errors = sensor_errors(vehicle, rng)
+    if sensors.biases is not None:
+        errors = sensor_errors(vehicle, np.random.default_rng(np.random.SeedSequence([sensors.biases, 2])))
     world = World(
-        P=vehicle.vector(), E=E, waves=_wave_rows(environment.wave), sensors=table,
-        errors=sensor_errors(vehicle, rng), seed=np.uint64(rng.integers(0, 2**63)), x=start_state(start),
+        P=vehicle.vector(), E=E, waves=_wave_rows(environment.wave), sensors=table, errors=errors,
+        seed=np.uint64(rng.integers(0, 2**63)), x=start_state(start),
     )  # fmt: skip
     apply_effects(world, effects or {})
     return world

@@ -10,6 +10,7 @@ import sys
 import time
 from pathlib import Path
 
+from firmware.core.jit import CACHE_DIR
 from tools.study.challenge.seal import ARCHIVE, open_answers
 
 OUT = Path("out/demo")
@@ -30,6 +31,8 @@ def main() -> int:
     shutil.rmtree(OUT, ignore_errors=True)
     OUT.mkdir(parents=True)
     begin = time.monotonic()
+    if CACHE_DIR is not None and not any(CACHE_DIR.rglob("*.nbc")):
+        print("The first time, kernels are compiled on the way: about a minute of what follows.", flush=True)
     for number, (title, command) in enumerate(STEPS, start=1):
         print(f"\n{number}. {title}\n   $ glider {command}", flush=True)
         done = subprocess.run([sys.executable, "-m", "tools.cli.main", *command.split()], cwd=OUT)

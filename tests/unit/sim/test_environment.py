@@ -179,3 +179,13 @@ def test_effect_imu_pitch_bias_is_in_the_reading_only():
     for w in (biased, plain):
         w.advance(1.0)
     assert biased.frame[3] - plain.frame[3] == pytest.approx(0.05)
+
+
+def test_flights_of_one_vehicle_have_its_biases_and_noise_of_their_own():
+    same = SampledSensors(biases=1)
+    worlds = [build_world(VEHICLE, Environment(**CALM), same, Start(depth_m=5.0), seed) for seed in (0, 1)]
+    drawn = [build_world(VEHICLE, Environment(**CALM), SampledSensors(), Start(depth_m=5.0), seed) for seed in (0, 1)]
+    assert np.array_equal(worlds[0].errors, worlds[1].errors)
+    assert not np.array_equal(drawn[0].errors, drawn[1].errors)
+    assert [world.seed for world in worlds] == [world.seed for world in drawn]
+    assert worlds[0].seed != worlds[1].seed

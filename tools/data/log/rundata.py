@@ -71,6 +71,29 @@ def _increasing(t: np.ndarray) -> np.ndarray:
     return known > before
 
 
+# What is of one sample, and where its time is.
+_SAMPLES = {
+    "imu_time_s": (*names.ATTITUDE, *names.RATES), "beacon_time_s": (names.DEPTH, "pressure_pa", "temperature_c"),
+    "slider_time_s": ("slider_m",), "plunger_time_s": ("ballast_kg",),
+}  # fmt: skip
+
+
+def _at_their_times(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Samples in the rows of the times when they were taken; a tick holds those that had come by then, some of them
+    milliseconds old. Of two that fall into one row the later stays.
+    """
+    t, moved = columns[names.TIME], dict(columns)
+    for time, of_a_sample in _SAMPLES.items():
+        if time not in columns:
+            continue
+        middles = 0.5 * (t[1:] + t[:-1])
+        for name in set(of_a_sample) & set(columns):
+            seen = np.flatnonzero(np.isfinite(columns[name]) & np.isfinite(columns[time]))
+            moved[name] = np.full(len(t), np.nan)
+            moved[name][np.searchsorted(middles, columns[time][seen] - 1e-9)] = columns[name][seen]
+    return moved
+
+
 def _aligned_truth(truth: Topic, times_ns: np.ndarray) -> dict[str, np.ndarray]:
     """The truth's columns at the ticks' times; NaN where a tick has none."""
     order = np.argsort(truth.times_ns, kind="stable")
@@ -97,13 +120,16 @@ def run_of(log: Log, name: str = "run00") -> Exported:
         raise InputError(f"holds no {TICK} record with a time", source=log.path)
     if not keep.all():
         notes.append(f"{np.count_nonzero(~keep)} records left out: their time does not go on")
+    columns = {column: values[keep] for column, values in columns.items()}
+    if log.metadata.get(SOURCE) != RUN_DATA:
+        columns = _at_their_times(columns)
     truth = log.topics.get(TRUTH)
     if truth is not None and truth.data is not None and truth.count:
-        columns |= _aligned_truth(truth, tick.times_ns)
+        columns |= _aligned_truth(truth, tick.times_ns[keep])
     numbers: dict[str, np.ndarray] = {}
     extra: dict[str, list[str]] = {}
     for column in names.in_order(list(columns)):
-        values = columns[column][keep]
+        values = columns[column]
         if column not in names.KNOWN:
             extra[column] = _exact_texts(values)
             continue
