@@ -153,6 +153,11 @@ def test_a_vehicle_that_does_not_fit_is_to_be_identified_first(tmp_path, capsys)
     assert "note: no commands" in said.err
     assert "note: one run only" in said.err
     assert answer["gap"]["shrinkage"]["ci90"] == [None, None]
+    assert [stage["stage"] for stage in answer["stages"]] == ["nominal", "identified"]
+    nominal, identified = (stage["gap"]["total"] for stage in answer["stages"])
+    assert identified < 0.5 * nominal
+    assert answer["identified"]["net_mass"]["unit"] == "kg"
+    assert answer["selected"] == []  # of one run no cause is added
 
 
 def test_time_that_runs_back_is_one_line_with_its_place(tmp_path, capsys):

@@ -106,7 +106,7 @@ def diagnose(case: Case, say: Callable[[str], None] = lambda text: None, rules: 
     entry, mission = propose(search)
     noise, shares = noise_of(answer), panels(verdict_of(answer), answer)
     found = Diagnosis(case, search, answer, answer.shrinkage, entry, mission, shares, noise, readings=readings)
-    if answer.shrinkage.after > UNFIT and rules == ALL and len(case.runs) > 1:
+    if answer.shrinkage.after > UNFIT and rules == ALL:
         take(found, staged(case, say))
         return found
     found.stages = stages_of(answer, case, runs)

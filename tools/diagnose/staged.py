@@ -1,10 +1,10 @@
 """A vehicle far from its file, in stages, each checked on runs left out (docs/DIAGNOSIS.md, Stages).
 
 Readings first: what they say of each other goes into the model. Then the vehicle: identified by prediction error, once
-without each run (or each of FOLDS parts of many runs). Then causes beside it, one after the other: every effect of the
-catalogue that the identification has no parameter for is tried by one linear step, the best are fitted in full, and the
-one that takes most of the gap of runs left out stays, if it takes WORTH of it, in every part, with the same sign. A fit
-of the runs themselves says little here: with forty effects to choose from one of them always brings something.
+without each run (or each of FOLDS parts of many runs). Then what is wrong with the sensors beside it, one after the
+other: every effect of theirs is tried by one linear step, the best are fitted in full, and the one that takes most of
+the gap of runs left out stays, if it takes WORTH of it, in every part, with the same sign. A fit of the runs themselves
+says little here: with many effects to choose from one of them always brings something.
 """
 
 from collections.abc import Callable
@@ -34,13 +34,6 @@ TRIED = 4  # effects fitted in full, of those whose linear step takes most
 REFIT_STEPS = 5
 WORTH = 0.1  # of the squared gap of runs left out, that an effect has to take
 SURE = 1.645  # sigma in the fit to all runs: its 90 % interval leaves 0 out
-# Effects whose work parameters of the identification do: they would be asked twice.
-IDENTIFIED_BY = frozenset({
-    "drag", "lift", "side_force", "pitch_trim", "pitch_damping", "weathercock", "yaw_damping", "added_mass", "inertia",
-    "net_buoyancy", "cg_longitudinal", "cg_lateral", "cg_vertical", "ballast_scale", "slider_scale",
-})  # fmt: skip
-
-
 @dataclass(frozen=True)
 class Size:
     """A parameter with its 90 % interval, in its unit."""
@@ -120,13 +113,18 @@ class _Stages:
         return found
 
     def candidates(self) -> dict[str, list[FreeParameter]]:
-        """Effects that may be added, by label; GAUGE has none."""
+        """Effects of the sensors that may be added, by label; GAUGE has none.
+
+        Effects of forces and masses are not asked here: beside drag, lift and trim that were identified a moment ago,
+        within priors that may be too narrow, a tether or a current is one more parameter of the same.
+        """
         problem = problem_of(self.case, self.whole.model, self.whole.runs)
-        own = {one.name: [one] for one in first_effects(problem)}
+        own = {one.name: [one] for one in first_effects(problem) if one.name != "stall"}
+        effects = catalogue()
         known = {
             label: free
             for label, free in effect_parameters(problem).items()
-            if label not in IDENTIFIED_BY and label not in own
+            if effects[label].subsystem == "sensing" and label not in own
         }
         return {label: free for label, free in (own | known).items() if label not in self.whole.added}
 
@@ -155,6 +153,13 @@ class _Stages:
                 )
                 found[label] += outside.weights(e + step @ J[on])[1] / len(self.folds)
         return found
+
+    def sure(self, more: list[FreeParameter], new: int, values: list[np.ndarray]) -> bool:
+        """Whether the fit to all runs has one of the `new` last parameters away from 0 by SURE sigma."""
+        fitting = self.free(self.whole.model, self.whole.runs, more)
+        found = fitting.again(np.clip(np.mean(values, axis=0), fitting.low, fitting.high), REFIT_STEPS)
+        sd = np.sqrt(np.diag(found.covariance))
+        return bool((np.abs(found.values[-new:]) > SURE * sd[-new:]).any())
 
     def refitted(self, more: list[FreeParameter], new: int) -> list[np.ndarray]:
         """Every fold's values with `new` parameters more at the end, from where it stands."""
@@ -192,7 +197,7 @@ def staged(case: Case, say: Callable[[str], None] = lambda text: None) -> Staged
     taken: dict[str, float] = {}
     candidates = work.candidates()
     parts = [fold.left_out for fold in work.folds]
-    while candidates:
+    while candidates and len(case.runs) > 1:  # a fit to the run itself decides nothing
         say(f"causes beside the vehicle: {len(chosen) + 1}")
         worth = work.linear_worth(added, candidates)
         best = None
@@ -202,7 +207,7 @@ def staged(case: Case, say: Callable[[str], None] = lambda text: None) -> Staged
             left, flown = work.flown(work.models([*added, *own], values))
             new = np.array([at[-len(own) :] for at in values])
             alike = bool((np.abs(np.sign(new).sum(axis=0)) == len(new)).any())
-            if alike and worth_it(stages[-1].gaps, left, parts):
+            if alike and work.sure([*added, *own], len(own), values) and worth_it(stages[-1].gaps, left, parts):
                 total = root_mean_square([gap.total for gap in left])
                 if best is None or total < best[0]:
                     best = (total, label, values, left, flown)
@@ -240,11 +245,13 @@ def _concluded(
         own = one.name if one.label else catalogue()[name].parameters[0].name if name in catalogue() else "size"
         by_label.setdefault(name, {})[own] = sizes[first + n]
     for finding in work.whole.findings:
-        if finding.label in work.whole.labels:
-            name = {"gyro_scale": "scale", "attitude_lag": "time"}.get(str(finding.label), finding.channel)
-            by_label.setdefault(str(finding.label), {})[f"{name} {finding.channel}"] = Size(
-                finding.size, finding.ci90, finding.unit
-            )
+        label = str(finding.label)
+        if label in work.whole.labels and label != "gyro_scale":
+            name = finding.channel.partition("_")[0] if label == "gyro_bias" else catalogue()[label].parameters[0].name
+            by_label.setdefault(label, {})[name] = Size(finding.size, finding.ci90, finding.unit)
+    if work.whole.scale is not None:
+        size, low, high = work.whole.scale
+        by_label["gyro_scale"] = {"scale": Size(size, (low, high), "1")}
     vehicle = dict(zip(fitting.free.names[:first], sizes[:first], strict=True))
     selected = [*work.whole.labels, *(label for label in chosen if label != GAUGE)]
     floor = floor_of(work, P, F)

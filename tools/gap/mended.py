@@ -16,6 +16,7 @@ from tools.data.runs import columns as names
 from tools.data.runs.case import Case
 from tools.data.runs.run import Run
 from tools.inference.model import Model, effect_vector
+from tools.inference.parameters import NINETY
 from tools.inference.vehicle_parameters import GAUGE
 from tools.readings.check import check, mend, mended_runs
 from tools.readings.findings import Finding
@@ -40,6 +41,7 @@ class Mended:
     runs: list[Run]
     model: Model
     added: list[str]  # labels that the model holds now, and what was put right in the runs
+    scale: tuple[float, float, float] | None = None  # of the gyro, where its axes have one: error and 90 % interval
 
     @property
     def labels(self) -> list[str]:
@@ -76,14 +78,14 @@ def mended(case: Case, model: Model, runs: list[Run] | None = None) -> Mended:
             rest.append(one)
     scale = one_scale([one for one in findings if one.label == "gyro_scale" and one.mended])
     if scale is not None:
-        F[ef.GYRO_SCALE] += scale
+        F[ef.GYRO_SCALE] += scale[0]
         added.append("gyro_scale")
     else:
         rest += [one for one in findings if one.label == "gyro_scale"]
     if rest:
         runs = mended_runs(runs, mend(table_of(runs), rest))
         added += [f"{one.channel} {one.finding}" for one in rest]
-    return Mended(findings, runs, replace(model, F=F if F.any() else model.F), list(dict.fromkeys(added)))
+    return Mended(findings, runs, replace(model, F=F if F.any() else model.F), list(dict.fromkeys(added)), scale)
 
 
 def put_right(runs: list[Run], findings: list[Finding]) -> list[Run]:
@@ -92,13 +94,20 @@ def put_right(runs: list[Run], findings: list[Finding]) -> list[Run]:
     return mended_runs(runs, mend(table_of(runs), wrong)) if wrong else runs
 
 
-def one_scale(found: list[Finding]) -> float | None:
-    """The scale error that the axes of a gyro share, by certainty; None where they differ or one alone says it."""
+def one_scale(found: list[Finding]) -> tuple[float, float, float] | None:
+    """The scale error that the axes of a gyro share, with its 90 % interval; None where they differ or one says it.
+
+    Weighed by certainty; the error is widened by as much as the axes scatter more than their errors.
+    """
     if len(found) < 2:
         return None
     size = np.array([one.size for one in found])
-    error = np.maximum([(one.ci90[1] - one.ci90[0]) / 3.29 for one in found], 1e-6)
+    error = np.maximum([(one.ci90[1] - one.ci90[0]) / (2.0 * NINETY) for one in found], 1e-6)
     weight = error**-2.0
     mean = float((weight * size).sum() / weight.sum())
     apart = np.abs(size - mean)
-    return mean if np.all((apart < ALIKE * error) | (apart < NEARLY * abs(1.0 + mean))) else None
+    if not np.all((apart < ALIKE * error) | (apart < NEARLY * abs(1.0 + mean))):
+        return None
+    scatter = max(1.0, float(np.sqrt((weight * apart**2).sum() / (len(found) - 1))))
+    half = NINETY * scatter / float(np.sqrt(weight.sum()))
+    return mean, mean - half, mean + half

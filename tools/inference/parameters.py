@@ -62,7 +62,7 @@ def nuisance_parameters(problem: Problem) -> list[FreeParameter]:
 def assumable() -> dict[str, tuple[str, int]]:
     """What a file may call assumed: its name, the vector it stands in and its entry there."""
     effects = {
-        f"{label}.{p.name}": ("F", p.entry)
+        label if len(effect.parameters) == 1 else f"{label}_{p.name}": ("F", p.entry)
         for label, effect in catalogue().items() for p in effect.parameters if p.entry >= 0
     }  # fmt: skip
     return {name: ("P", entry) for name, entry in PLACES.items()} | effects
@@ -82,7 +82,7 @@ def assumed(problem: Problem) -> list[FreeParameter]:
         value = float((P if vector == "P" else F)[entry])
         limits = (-np.inf, np.inf)
         if one.factor is not None:
-            whole = 1.0 + value if name.endswith(".scale") else value
+            whole = 1.0 + value if name.endswith("_scale") else value
             if whole == 0.0:
                 raise ConfigError(
                     problem.case.vehicle_name, "is 0: a factor says nothing, give a range", key=f"assumed.{name}"
