@@ -2,9 +2,15 @@
 
 import numpy as np
 
+from firmware.core.vehicle.layout import N_DRAWN, N_P
 from firmware.model.estimator_settings import parameter_sigma
 from firmware.model.vehicle import Vehicle
 from sim_backend.core import layout as wl
+
+
+def deviates(rng: np.random.Generator) -> np.ndarray:
+    """A standard normal deviate for every parameter that may be drawn, 0 for the others, (N_P,)."""
+    return np.concatenate([rng.standard_normal(N_DRAWN), np.zeros(N_P - N_DRAWN)])
 
 
 def draw_parameters(vehicle: Vehicle, rng: np.random.Generator, scale: float = 1.0) -> np.ndarray:
@@ -15,7 +21,7 @@ def draw_parameters(vehicle: Vehicle, rng: np.random.Generator, scale: float = 1
     nominal = vehicle.vector()
     sigma = scale * parameter_sigma(nominal, vehicle.uncertainty)
     while True:
-        drawn = nominal + sigma * rng.standard_normal(len(nominal))
+        drawn = nominal + sigma * deviates(rng)
         if (np.sign(drawn) == np.sign(nominal))[(sigma > 0.0) & (nominal != 0.0)].all():
             return drawn
 

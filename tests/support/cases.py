@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from sim_backend.core.effects import effect_layout as ef
+from sim_backend.uncertainty import deviates
 from tools.data.runs import columns as names
 from tools.data.runs.case import Case, load_case, write_case
 from tools.data.runs.run import Run
@@ -67,7 +68,7 @@ def make_case(
 
 def drawn(problem: Problem, F: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """A vehicle as [uncertainty] and [sensors] allow, with effects F."""
-    P = problem.model.P + problem.model.sigma * rng.standard_normal(len(problem.model.P))
+    P = problem.model.P + problem.model.sigma * deviates(rng)
     s = problem.case.sensors
     bias = np.array([*3 * [s.attitude.bias], *3 * [s.gyro.bias], s.depth.bias, s.slider.bias, s.ballast.bias])
     F = F.copy()

@@ -20,6 +20,7 @@ from firmware.model.vehicle import COEFFICIENTS, SensorTable, Vehicle
 from sim_backend.core import layout as wl
 from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.open_loop import fly_open_loop_many
+from sim_backend.uncertainty import deviates
 from tools.data.runs import columns as names
 from tools.data.runs.case import SensorsPart, write_case
 from tools.data.runs.run import Run
@@ -57,7 +58,7 @@ def draw_world(vehicle: Vehicle, rng: np.random.Generator) -> World:
     P = vehicle.vector()
     sigma = parameter_sigma(P, vehicle.uncertainty)
     sizes = coefficient_sizes(P)
-    P = P + sigma * rng.standard_normal(len(P))
+    P = P + sigma * deviates(rng)
     for name, size in zip(COEFFICIENTS, sizes, strict=True):
         entry = getattr(layout, name.upper())
         P[entry] = vehicle.vector()[entry] + COEFFICIENTS_OFF * size * rng.uniform(-1.0, 1.0)

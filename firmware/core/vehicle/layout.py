@@ -23,6 +23,7 @@ NET_MASS = 43  # kg, trim error at the origin; nominal 0
 CG_X, CG_Y, CG_Z = 44, 45, 46  # m, offset of the whole vehicle's centre of gravity; nominal 0
 D_P, D_Q, D_R = 47, 48, 49  # N m s/rad, moments linear in the rates beside (4); nominal 0
 N_P = 50
+N_DRAWN = 48  # random numbers that a drawn vehicle takes: what came later is not drawn, and seeds keep their vehicles
 
 # --- x: the plant's state -------------------------------------------------------------------------------------------
 X_POS = 0  # 0..2 north, east, down, m
