@@ -27,6 +27,7 @@ SETTLING = 1  # steps of all hypotheses before any is dropped
 CONVERGED = 0.05  # nat; a hypothesis that gains less in a step has converged
 MOST_EFFECTS = 5
 LEADING, PARTNERS_TRIED = 3, 5  # hypotheses beside which a second effect is tried, and how many beside each
+FAR_OFF = 10.0  # mean NIS of the best of three effects, beyond which no further one is small, nor explains it
 FURTHER = 3  # effects tried as a third or further one, beside the best hypothesis
 SHORT_LIST = 3  # hypotheses led on from the third effect on
 # Nat of evidence that an effect brings, or it is left out (docs/DIAGNOSIS.md, Thresholds): the prior odds of none to a
@@ -272,6 +273,8 @@ def grow(search: Search, say: Callable[[str], None]) -> None:
     """Effects added one by one to the best hypothesis, as long as each brings the evidence that is needed."""
     for count in range(max(2, len(search.best.labels) + 1), MOST_EFFECTS + 1):
         before = search.best
+        if count > 3 and search.fitter.temperature > FAR_OFF:
+            break
         if len(before.labels) < count - 1 or not add_effects(search, count):
             break
         if count > 2:

@@ -64,7 +64,7 @@ def drop(search: Search, hypothesis: Hypothesis, label: str) -> Hypothesis:
         labels, [f for f in hypothesis.free if f.label != label], hypothesis.values[keep], hypothesis.nuisance
     )
     search.fitter.measure([less])
-    converge(search.fitter, less, 2)
+    converge(search.fitter, less, 4)
     search.hypotheses.append(less)
     return less
 

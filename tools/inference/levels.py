@@ -26,6 +26,7 @@ DIFFERENCES = 3  # taken of readings: of a vehicle's motion in four samples next
 SPREAD_OF_DIFFERENCE = 20.0**0.5  # 1 sigma of the third difference of white noise of 1
 MEDIAN_OF_NORMAL = 0.6745  # median size of a normal deviate of 1 sigma
 FEWEST = 200  # differences that say anything
+COLOURED = 0.2  # logarithm by which noise of every second sample may be more than that of all
 MOST_HELD = 0.2  # share of samples that repeat the one before, from which a reading is held or coarse
 NUDGE, LARGEST_STEP, CLOSE = 0.05, 0.8, 0.02
 ROUNDS = 8
@@ -101,32 +102,42 @@ def sensor_noise(problem: Problem, least: float, most: float) -> Levels:
     """The levels of the sensors' white noise, within factors `least` and `most`, by their readings alone.
 
     The median size of third differences within runs: steps of a command, blind spells and outliers are few. A reading
-    that is held, coarse or short says nothing, and keeps what its file says.
+    that is held, coarse or short says nothing, nor one whose noise is not white (smoothed, resampled: every second
+    sample then has more of it); they keep what their file says.
     """
     names, logs, sds = [], [], []
     for name, part in SENSORS.items():
-        relative = [found for m in range(part.start, part.stop) for found in _differences(problem, m)]
-        sizes = np.concatenate(relative) if relative else np.zeros(0)
-        if len(sizes) < FEWEST:
+        sizes, apart = (_relative(problem, part, stride) for stride in (1, 2))
+        if min(len(sizes), len(apart)) < FEWEST:
             continue
-        log = float(np.log(max(np.median(sizes), 1e-9) / MEDIAN_OF_NORMAL))
+        log, other = (float(np.log(max(np.median(found), 1e-9) / MEDIAN_OF_NORMAL)) for found in (sizes, apart))
+        if other - log > COLOURED:
+            continue
         names.append(name)
         logs.append(min(max(log, np.log(least)), np.log(most)))
         sds.append(1.2 / np.sqrt(len(sizes) / (DIFFERENCES + 1)))
     return Levels(tuple(names), np.array(logs), np.array(sds))
 
 
-def _differences(problem: Problem, reading: int) -> list[np.ndarray]:
-    """Sizes of a reading's third differences, run by run, in the sigma that the case says they have."""
+def _relative(problem: Problem, part: slice, stride: int) -> np.ndarray:
+    """Sizes of a sensor's third differences over every `stride`-th sample, in the sigma that the case gives them."""
+    found = [sizes for m in range(part.start, part.stop) for sizes in _differences(problem, m, stride)]
+    return np.concatenate(found) if found else np.zeros(0)
+
+
+def _differences(problem: Problem, reading: int, stride: int) -> list[np.ndarray]:
+    """The same of one reading, run by run."""
     found = []
     for n, (a, b) in enumerate(itertools.pairwise(problem.recording.bounds)):
         values = problem.z[a:b, reading]
-        steps = np.diff(values)
+        steps = values[stride:] - values[:-stride]
         steps = wrap(steps) if reading in ANGLES else steps
         given = np.isfinite(steps)
         if given.sum() < FEWEST // 4 or (steps[given] == 0.0).mean() > MOST_HELD:
             continue
-        left = np.diff(steps, DIFFERENCES - 1)
+        left = steps
+        for _ in range(DIFFERENCES - 1):
+            left = left[stride:] - left[:-stride]
         sigma = SPREAD_OF_DIFFERENCE * np.sqrt(problem.R[n, reading])
         found.append(np.abs(left[np.isfinite(left)]) / sigma)
     return found

@@ -4,8 +4,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from support.cases import make_case
 
+from sim_backend.core.effects import effect_layout as ef
 from tools.diagnose.record import NONE
+from tools.diagnose.search import run
 from tools.diagnose.shrink import most_often
 from tools.diagnose.unknown import (
     MORE_UNKNOWN,
@@ -16,7 +19,8 @@ from tools.diagnose.unknown import (
     left_share,
     probability_unknown,
 )
-from tools.diagnose.verdict import SECOND, Worth, doubt_small, share_out
+from tools.diagnose.verdict import SECOND, Worth, conclude, doubt_small, share_out
+from tools.inference.problem import problem_of
 
 
 def test_worth_is_the_root_of_what_the_gap_grows_by():
@@ -83,3 +87,13 @@ def test_as_likely_as_not_at_the_width_that_small_effects_leave():
     after = 0.15 * np.sqrt(1.0 + WIDE**2)
     assert unknown(after, left=1e9, explained=0.0, evident=False) == pytest.approx(0.5)
     assert unknown(UNFIT + 0.1, left=1.0, explained=1e9) > 0.99
+
+
+def test_the_main_cause_takes_the_most_of_the_gap_however_many_nat_a_sensor_s_small_error_has(tmp_path):
+    F = np.zeros(ef.N_F)
+    F[ef.DRAG_0], F[ef.GYRO_SCALE] = 1.2, 0.15
+    answer = conclude(run(problem_of(make_case(tmp_path, F, seed=6, mocap=True, rough=1.5))))
+    assert answer.main == answer.selected[0] == "drag"
+    assert "gyro_scale" in answer.selected
+    assert answer.gained["gyro_scale"] > answer.gained["drag"]
+    assert answer.probabilities["drag"] > 0.8

@@ -99,3 +99,12 @@ def test_noise_that_is_not_what_the_file_says_is_a_caution(calm):
     assert len(said) == 1
     assert "gyro 1.5" in said[0]
     assert "depth" not in said[0]
+
+
+def test_noise_that_is_not_white_says_nothing(calm):
+    z = calm.z.copy()
+    smoothed = np.convolve(z[:, ef.Y_DEPTH], [0.25, 0.5, 0.25], mode="same")
+    z[:, ef.Y_DEPTH] = smoothed
+    found = levels.sensor_noise(replace(calm, z=z), 0.5, 2.0)
+    assert "depth" not in found.names
+    assert "gyro" in found.names
