@@ -46,7 +46,7 @@ CALLS: tuple[tuple[str, str | None], ...] = (
     ("twin --dir ports", "bench"),
     ("bench --board twin", "bench"),
     ("gap measure case", "analysis"),
-    ("gap predict case/run00.csv --out predicted.csv", "analysis"),
+    ("gap predict case/run00.csv --out predicted.csv", None),
     ("gap readings case", "analysis"),
     ("gap report answer", "analysis"),
     ("gap diagnose case --out answer", "analysis"),

@@ -80,14 +80,13 @@ def _print_table(found) -> None:
 @vehicle_option
 def predict(run: Path, model: str, out: Path, vehicle: str | None) -> None:
     """Predict RUN (a run file beside its case.toml): its rows and columns, no gaps, window by window."""
-    from tools.data.errors import InputError, need
+    from tools.data.errors import InputError
     from tools.data.runs.case import load_case_of_run
     from tools.data.runs.run import write_run
     from tools.inference.load import load_model
     from tools.inference.predict import as_run
     from tools.inference.predict import predict as predict_runs
 
-    need("analysis")  # matrix products of compiled kernels are SciPy's BLAS
     case, recorded = load_case_of_run(run, vehicle)
     if out.exists() and run.exists() and out.samefile(run):
         raise InputError("would overwrite the run itself: name another file", source=out, column="--out")

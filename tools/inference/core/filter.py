@@ -14,6 +14,7 @@ import math
 import numpy as np
 
 from firmware.core.jit import kernel, parallel_kernel, prange
+from firmware.core.maths.matrices import product
 from firmware.core.maths.rotations import wrap_angle
 from firmware.core.vehicle.actuators import clip
 from firmware.core.vehicle.layout import N_P, SERVO_MAX, SERVO_MIN, X_ACT, X_NU, X_SERVO
@@ -141,7 +142,9 @@ def filter_run(
     count = len(spread)
     error, zero, before, lacking = np.empty(count), np.zeros(3), np.empty(N_PATH), np.zeros(N_LACKING)
     Phi, Gam, cov = np.zeros((count, count)), np.empty((count, 6)), np.zeros((count, count))
+    carried, turned = np.empty((count, count)), np.empty((count, count))
     H, L, y, y2, d = np.zeros((N_Y, count)), np.empty((N_Y, N_Y)), np.empty(N_Y), np.empty(N_Y), np.empty(N_Y)
+    HC, HT, S = np.empty((N_Y, count)), np.empty((count, N_Y)), np.empty((N_Y, N_Y))
     for j in range(count):
         cov[j, j] = spread[j] * spread[j]
     if count > N_ERR:
@@ -160,7 +163,9 @@ def filter_run(
                 step_lacking(drift, x, lacking, dt)
                 lacking_columns(drift, dt, Gam, Phi)
             log_path(x, before, path, i, begin)
-            cov[:] = Phi @ cov @ Phi.T
+            product(Phi, cov, carried)
+            turned[:] = Phi.T
+            product(carried, turned, cov)
             for j in range(6):
                 s = spectral[Q_ACC + j] / dt
                 for a in range(count):
@@ -183,8 +188,9 @@ def filter_run(
         for m in range(N_Y):
             if math.isnan(d[m]):
                 H[m, :] = 0.0
-        HC = H @ cov
-        S = HC @ H.T
+        product(H, cov, HC)
+        HT[:] = H.T
+        product(HC, HT, S)
         for m in range(N_Y):
             if math.isnan(d[m]):
                 S[m, m] = 1.0
