@@ -15,6 +15,7 @@ from tools.watch.flights import Flights, numbers
 
 SCALES = (1.6, 2.5, 4.0, 7.0, 12.0, 20.0, 35.0, 60.0)
 WATER = (TURBULENCE, WAVES)  # labels whose course nobody can foresee
+COARSE = 2  # of the scales, one in so many is tried of single links
 FAR_BEHIND = 50.0  # nat behind its best: a probe is not tried at larger scales
 
 
@@ -28,6 +29,9 @@ def probe_gains(flights: Flights, wanted: Sequence[NoiseProbe], runs: Sequence[i
         for i, probe in enumerate(wanted):
             best = 0.0
             for k, scale in enumerate(SCALES):
+                if probe.name not in WATER and k % COARSE:
+                    gains[i, j, k] = gains[i, j, k - 1]
+                    continue
                 more, doubt = inflated(part, probe, scale)
                 value = 0.5 * (bare - float(part.filter(*model, more=more, doubt=doubt).misfit[0])) / flights.heat
                 gains[i, j, k] = value = value if np.isfinite(value) else -1e9

@@ -4,11 +4,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tools.inference.fit import bounded_step
 from tools.inference.problem import Problem
 from tools.watch.expansion import Expansion, expand
 from tools.watch.scatter import learn_scatter, without_deviation
 from tools.watch.shared_model import fit_shared, heat_of
 from tools.watch.shared_parameters import SharedParameters
+
+LEAST_SIZE = 1e-6  # spreads by which runs may differ
 
 
 @dataclass
@@ -20,10 +23,11 @@ class Flights:
     reference: np.ndarray  # (runs,) bool: before anything changed
     heat: float = 1.0
     sizes: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (count,) 1 sigma of what runs differ by
-    spread: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # root of a run's own covariance
+    certainty: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # inverse covariance of a run's own values
     values: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (count,) shared
     raw: list[Expansion] = field(default_factory=list)  # not cooled, at `values`
     runs: list[Expansion] = field(default_factory=list)  # cooled, deviations integrated out, at what each flies by
+    deviations: dict[int, tuple[Expansion, np.ndarray]] = field(default_factory=dict)  # with what they were found of
 
     @property
     def count(self) -> int:
@@ -39,7 +43,7 @@ class Flights:
         self.sizes = learn_scatter([one.cooled(self.heat) for one in found], self.shared)
         self.runs = [self.made(one) for one in self.raw]
         known = np.diag(self.shared.prior**-2.0) + sum(self.runs[n].curvature for n in own)
-        self.spread = np.linalg.cholesky(np.linalg.inv(known) + np.diag(np.maximum(self.sizes, 1e-9) ** 2))
+        self.certainty = np.linalg.inv(np.linalg.inv(known) + np.diag(np.maximum(self.sizes, LEAST_SIZE) ** 2))
 
     def made(self, one: Expansion) -> Expansion:
         """A run's parabola as events are judged by it."""
@@ -58,9 +62,24 @@ class Flights:
 
         Of what the reference leaves unknown of the shared values, and of what runs differ by.
         """
-        one, L = self.raw[n].cooled(self.heat), self.spread
-        found = -L @ np.linalg.solve(np.eye(len(L)) + L.T @ one.curvature @ L, L.T @ one.slope)
-        return np.clip(found, self.shared.low - one.at, self.shared.high - one.at)
+        one = self.raw[n]
+        known = self.deviations.get(n)
+        if known is None or known[0] is not one:
+            known = one, self.deviation_of(one)
+            self.deviations[n] = known
+        return known[1]
+
+    def deviation_of(self, one: Expansion) -> np.ndarray:
+        """The same of any parabola."""
+        cooled = one.cooled(self.heat)
+        low, high = np.minimum(self.shared.low - one.at, 0.0), np.maximum(self.shared.high - one.at, 0.0)
+        return bounded_step(cooled.curvature + self.certainty, cooled.slope, low, high)
+
+    def own_cost(self, part: Problem, x: np.ndarray) -> float:
+        """-2 log likelihood over the heat of a run, as `part` knows it, at its most probable values about x."""
+        one = expand(part, self.shared, x)
+        own = one.at + self.deviation_of(one)
+        return float(part.filter(*self.shared.model(part, own)).misfit[0]) / self.heat
 
     def own_values(self, n: int) -> np.ndarray:
         """The values of a run with its own deviation, (count,)."""

@@ -45,7 +45,7 @@ class Event:
     sure_spans: dict[Span, float] = field(default_factory=dict)  # log evidence by span
     probe: tuple[str, float] | None = None  # of disorder that is not the water's: what shakes, and how much
     place: NoiseProbe | None = None  # and the single link that shakes most
-    fitted: tuple[list[int], float] = field(default_factory=lambda: ([], 0.0))  # runs in which rivals were fitted, cost
+    fitted: list[int] = field(default_factory=list)  # runs in which it was compared with rivals
 
     @property
     def has_course(self) -> bool:
@@ -101,19 +101,18 @@ def next_event(history: History) -> Event | None:
 
 def rougher(history: History, rough: Event, event: Event) -> bool:
     """Whether disorder says more of the runs than a label does; of other runs, whether it is the more evident."""
-    chosen, cost = event.fitted
-    inside = rough.span.weights(history.flights.count) > 0.0
+    flights, chosen = history.flights, event.fitted
+    inside = rough.span.weights(flights.count) > 0.0
     if not inside[chosen].any():
         return rough.evidence > event.evidence
-    flights, least = history.flights, np.inf
-    for label in WATER:
-        for scale in SCALES:
-            found = 0.0
-            for n in chosen:
-                part = shaken(flights.parts[n], label, scale)
-                found += float(part.filter(*flights.shared.model(part, flights.own_values(n))).misfit[0])
-            least = min(least, found / flights.heat)
-    return least < cost
+    weights, cost = event.span.weights(flights.count), 0.0
+    for n in chosen:
+        x = flights.raw[n].at
+        part = shaken(flights.parts[n], rough.label, float(rough.size[0]))
+        cost += flights.own_cost(part, x)
+        changed = values_of(flights.shared, event.label, x, weights[n], event.size)
+        cost -= flights.own_cost(flights.parts[n], within(flights, changed))
+    return cost < 0.0
 
 
 def already(history: History, change: Change) -> bool:
@@ -190,7 +189,7 @@ def refined(history: History, joint: Joint, best: Change, changes: Sequence[Chan
     # labels that were behind already count as far behind as they were in the runs of the fit
     for fit in ranked:
         winner.rivals.setdefault(fit.label, winner.evidence - 0.5 * (fit.cost - ranked[0].cost))
-    winner.fitted = [int(n) for n in chosen], fits[winner.label].cost
+    winner.fitted = chosen
     winner.explained = 0.5 * gained * len(inside) / max(1, len(chosen))
     return winner
 

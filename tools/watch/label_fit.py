@@ -54,15 +54,26 @@ def cost_of(runs: Affected, shared: SharedParameters, label: str, size: np.ndarr
     return found if np.isfinite(found) else np.inf
 
 
-def own_step(
-    runs: Affected, shared: SharedParameters, label: str, size: np.ndarray, roughness: float
-) -> tuple[np.ndarray, float, np.ndarray]:
-    """The Gauss-Newton step of a label's size within its limits, what it promises, and the normal matrix."""
-    columns = shared.labels[label]
-    normal, slope = np.eye(len(columns)), size.copy()
+@dataclass
+class Step:
+    """Where a label's size stands, by its own filters, and where its parabola and the kept gains lead from there."""
+
+    cost: float
+    promised: float
+    to: np.ndarray
+
+
+def next_step(
+    runs: Affected, shared: SharedParameters, label: str, size: np.ndarray, roughness: float, shares: Sequence[float]
+) -> Step:
+    """The cost of a size, and the share of the Gauss-Newton step within its limits that does best with gains kept."""
+    columns, low_high = shared.labels[label], shared.limits(label, runs.at[0])
+    normal, slope, cost = np.eye(len(columns)), size.copy(), float(size @ size)
+    kept = []
     for part, weight, at in zip(runs.parts, runs.weights, runs.at, strict=True):
         x = values_of(shared, label, at, weight, size)
         gains = part.filter(*shared.model(part, x), roughness=roughness, begin=True)
+        cost += float(gains.misfit[0]) / runs.heat
         steps = np.where(np.abs(size) > 0.0, EFFECT_STEP * np.maximum(1.0, np.abs(x[columns])), FIRST_STEP)
         steps = np.where(shared.kinked[columns] & (x[columns] == 0.0), 1.0, steps)
         steps = np.where(x[columns] + steps > shared.high[columns], -steps, steps)
@@ -75,9 +86,16 @@ def own_step(
         J = weight * (E[1:] - E[0]) / steps[:, None]
         normal += J @ J.T / runs.heat
         slope += J @ E[0] / runs.heat
-    low, high = shared.limits(label, runs.at[0])
+        kept.append(gains)
+    low, high = low_high
     step = bounded_step(normal, slope, np.minimum(low - size, 0.0), np.maximum(high - size, 0.0))
-    return step, -float(2.0 * slope @ step + step @ normal @ step), normal
+    tried = [np.clip(size + share * step, low, high) for share in shares]
+    misfits = np.array([one @ one for one in tried])
+    for part, weight, at, gains in zip(runs.parts, runs.weights, runs.at, kept, strict=True):
+        E = part.follow([shared.model(part, values_of(shared, label, at, weight, one)) for one in tried], gains)
+        misfits += (E**2).sum(axis=1) / runs.heat
+    promised = -float(2.0 * slope @ step + step @ normal @ step)
+    return Step(cost if np.isfinite(cost) else np.inf, promised, tried[int(misfits.argmin())])
 
 
 def fit_label(
@@ -85,31 +103,27 @@ def fit_label(
 ) -> LabelFit:
     """The label led to its least misfit from `start` (spreads), through filters of each roughness first."""
     size = start.copy()
-    low, high = shared.limits(label, runs.at[0])
-    for rough in (*roughness, *(STEPS * (1.0,))):
-        step, promised, _ = own_step(runs, shared, label, size, rough)
-        if promised < ENOUGH:
-            if rough == 1.0:
+    for rough in roughness:
+        size = next_step(runs, shared, label, size, rough, SHARES).to
+    best, least, shares = size, np.inf, SHARES
+    for _ in range(STEPS):
+        step = next_step(runs, shared, label, size, 1.0, shares)
+        if step.cost < least:
+            best, least, shares = size, step.cost, SHARES
+            if step.promised < ENOUGH:
                 break
-            continue
-        least = cost_of(runs, shared, label, size, rough)
-        for share in SHARES:
-            tried = np.clip(size + share * step, low, high)
-            cost = cost_of(runs, shared, label, tried, rough)
-            if cost < least:
-                size = tried
-                break
+            size = step.to
+        elif shares is SHARES:  # the filter of the new model sees it otherwise: half way back
+            size, shares = best + 0.3 * (size - best), SHARES[1:]
         else:
-            if rough == 1.0:
-                break
-    return LabelFit(label, size, cost_of(runs, shared, label, size))
+            break
+    return LabelFit(label, best, least)
 
 
 def best_fit(runs: Affected, shared: SharedParameters, label: str, linear: np.ndarray, strong: bool) -> LabelFit:
-    """From the size that parabolas promise, or the share of it that does best; of strong changes, the rough way too."""
+    """From the size that parabolas promise, and from nothing; of strong changes, by way of rough filters too."""
     nothing = np.zeros(len(linear))
-    starts = [share * linear for share in (1.0, 0.5, 0.25)] + [nothing]
-    start = min(starts, key=lambda size: cost_of(runs, shared, label, size))
+    start = min((linear, nothing), key=lambda size: cost_of(runs, shared, label, size))
     fits = [fit_label(runs, shared, label, start)]
     if strong:
         fits.append(fit_label(runs, shared, label, nothing, ROUGH))

@@ -35,6 +35,7 @@ COMMON = (
 )  # fmt: skip  # of those that remember nothing
 COMMON_VISIBLE = (1.3, 3.0)  # gap of a model that lacks it, over a perfect one's
 VISIBLE = (2.0, 10.0)  # the same of a change at its full size
+SHORT = 0.9  # of the least, that a bisection may fall short
 SECONDS = (60.0, 90.0)  # of a run
 TRIES, REDRAWN = 12, 40
 
@@ -74,10 +75,17 @@ def _common(rng: np.random.Generator, trial: Trial, changed: Form | None) -> tup
     places = changed.places if changed is not None else ()
     free = [form for form in KNOWN if form.label in COMMON and form.places[0] not in places]
     form = free[rng.integers(len(free))]
-    sizes, most = form.draw(rng)
-    target = float(np.exp(rng.uniform(*np.log(COMMON_VISIBLE))))
-    strength = find_strength(lambda s: visible(trial, form, sizes, s), target, most)
+    sizes, strength = _drawn_size(rng, trial, form, COMMON_VISIBLE)
     return None if strength <= 0.0 else (with_effect(trial.shapes, form, sizes, strength), form.label)
+
+
+def _drawn_size(
+    rng: np.random.Generator, trial: Trial, form: Form, seen: tuple[float, float]
+) -> tuple[np.ndarray, float]:
+    """Sizes of an effect at strength 1, and the strength that makes it as visible as drawn between two factors."""
+    sizes, most = form.draw(rng)
+    target = float(np.exp(rng.uniform(*np.log(seen))))
+    return sizes, find_strength(lambda strength: visible(trial, form, sizes, strength), target, most)
 
 
 def _fly(rng: np.random.Generator, trial: Trial, effects: list[np.ndarray]) -> list[Flight] | None:
@@ -113,11 +121,9 @@ def draw_vehicle(seed: int, plan: VehiclePlan, counts: WatchCounts, vehicle: Veh
         trial.shapes, common = found
         strength, sizes, seen = 0.0, np.zeros(0), 1.0
         if form is not None:
-            sizes, most = form.draw(rng)
-            target = float(np.exp(rng.uniform(*np.log(VISIBLE))))
-            strength = find_strength(lambda s: visible(trial, form, sizes, s), target, most)
+            sizes, strength = _drawn_size(rng, trial, form, VISIBLE)
             seen = visible(trial, form, sizes, strength) if strength > 0.0 else 0.0
-            if not seen >= VISIBLE[0] * 0.9:
+            if not seen >= SHORT * VISIBLE[0]:
                 continue
         effects = [trial.shapes] * counts.reference
         for share in plan.strengths(counts.judged):
