@@ -1,6 +1,6 @@
 """From events to an answer: does a change matter, is its label the cause, how large is it, and in which runs."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -52,7 +52,28 @@ def settle(history: History) -> list[Settled]:
         sure = 1.0 / (1.0 + np.exp(-np.clip(event.evidence - EVIDENCE_NEEDED, -50.0, 50.0)))
         unknown = event.label == "" or left.probability > 0.5
         found.append(Settled(event, left, min(float(sure), MOST_SURE), unknown, own))
-    return [*found, *nameless(history, found)]
+    return one_unknown([*found, *nameless(history, found)])
+
+
+def one_unknown(found: list[Settled]) -> list[Settled]:
+    """Unknown changes of runs that overlap or follow on each other are one, at the place of the first."""
+    kept: list[Settled] = []
+    for one in found:
+        other = next((k for k in kept if k.unknown and one.unknown and touch(k.event.span, one.event.span)), None)
+        if other is None:
+            kept.append(one)
+            continue
+        a, b = other.event.span, one.event.span
+        span = Span(min(a.first, b.first), max(a.end, b.end), STEP)
+        evidence = other.event.evidence + one.event.evidence
+        other.event = replace(other.event, span=span, evidence=evidence, sure_spans={})
+        other.probability = max(other.probability, one.probability)
+    return kept if len(kept) == len(found) else one_unknown(kept)
+
+
+def touch(one: Span, other: Span) -> bool:
+    """Whether two spans overlap or have one run at most between them."""
+    return one.first <= other.end + 1 and other.first <= one.end + 1
 
 
 def beside(one: Span, other: Span) -> bool:
