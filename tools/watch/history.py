@@ -9,7 +9,7 @@ from tools.diagnose.noise_probes import TURBULENCE, WAVES, NoiseProbe, probes
 from tools.diagnose.unknown import ONE_AXIS
 from tools.inference.fit import bounded_step
 from tools.watch.disorder import SCALES, WATER, beyond_reference, shaken, water_gains
-from tools.watch.events import GROWING, Change, Joint, Span, spans
+from tools.watch.events import GROWING, STEP, Change, Joint, Span, spans
 from tools.watch.expansion import Expansion, expand
 from tools.watch.flights import Flights, numbers, roughness_sigma
 from tools.watch.label_fit import Affected, LabelFit, best_fit, cost_of, values_of
@@ -185,6 +185,9 @@ def refined(history: History, joint: Joint, best: Change, changes: Sequence[Chan
     if not found:
         return None
     winner = max(found, key=lambda event: event.evidence)
+    again = by_other_course(history, joint, winner)
+    if again is not None and again.evidence > winner.evidence:
+        found[found.index(winner)] = winner = again
     winner.rivals = {event.label: event.evidence for event in found}
     # labels that were behind already count as far behind as they were in the runs of the fit
     for fit in ranked:
@@ -192,6 +195,24 @@ def refined(history: History, joint: Joint, best: Change, changes: Sequence[Chan
     winner.fitted = chosen
     winner.explained = 0.5 * gained * len(inside) / max(1, len(chosen))
     return winner
+
+
+def by_other_course(history: History, joint: Joint, event: Event) -> Event | None:
+    """A change that is still there fitted as growing where it is a step, and the other way; None where it ended.
+
+    Parabolas about a step say little of the small sizes that a growth begins with.
+    """
+    flights, span = history.flights, event.span
+    other = replace(span, course=STEP if span.course == GROWING else GROWING)
+    if other not in history.listed():
+        return None
+    weights = other.weights(flights.count)
+    inside = numbers(weights * history.judged)
+    chosen = [inside[0], inside[len(inside) // 2], inside[-1]]
+    base = [within(flights, flights.raw[n].at) for n in chosen]
+    affected = Affected([flights.parts[n] for n in chosen], [weights[n] for n in chosen], base, flights.heat)
+    fit = best_fit(affected, flights.shared, event.label, event.size, False)
+    return over_spans(history, joint, other, fit)
 
 
 def rough_ranking(affected: Affected, flights: Flights) -> list[tuple[str, np.ndarray]]:

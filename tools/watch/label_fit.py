@@ -11,11 +11,13 @@ import numpy as np
 
 from tools.inference.fit import EFFECT_STEP, FIRST_STEP, bounded_step
 from tools.inference.problem import Problem
+from tools.watch.expansion import at_kink, columns_at
 from tools.watch.shared_parameters import SharedParameters
 
 STEPS = 5
 ROUGH = (100.0, 10.0)
 ENOUGH = 1.0  # squared sigma that a step promises: no further step
+APART = (0.1, 0.4, 0.9, 1.3, 1.7, 2.1)  # spreads: further starts of what begins at a kink, or behind a threshold
 SHARES = (1.0, 0.4, 0.1, 0.02)  # of a step that is tried
 
 
@@ -75,17 +77,18 @@ def next_step(
         gains = part.filter(*shared.model(part, x), roughness=roughness, begin=True)
         cost += float(gains.misfit[0]) / runs.heat
         steps = np.where(np.abs(size) > 0.0, EFFECT_STEP * np.maximum(1.0, np.abs(x[columns])), FIRST_STEP)
-        steps = np.where(shared.kinked[columns] & (x[columns] == 0.0), 1.0, steps)
+        steps = np.where(at_kink(shared, x)[columns], 1.0, steps)
         steps = np.where(x[columns] + steps > shared.high[columns], -steps, steps)
-        models = [shared.model(part, x)]
-        for k, step in zip(columns, steps, strict=True):
-            moved = x.copy()
-            moved[k] += step
-            models.append(shared.model(part, moved))
-        E = part.follow(models, gains)
-        J = weight * (E[1:] - E[0]) / steps[:, None]
-        normal += J @ J.T / runs.heat
-        slope += J @ E[0] / runs.heat
+
+        def moved(k: int, step: float, part: Problem = part, x: np.ndarray = x) -> tuple[np.ndarray, np.ndarray]:
+            point = x.copy()
+            if k >= 0:
+                point[columns[k]] += step
+            return shared.model(part, point)
+
+        e, J = columns_at(part, gains, moved, at_kink(shared, x)[columns], steps)
+        normal += weight**2 * J @ J.T / runs.heat
+        slope += weight * J @ e / runs.heat
         kept.append(gains)
     low, high = low_high
     step = bounded_step(normal, slope, np.minimum(low - size, 0.0), np.maximum(high - size, 0.0))
@@ -123,7 +126,13 @@ def fit_label(
 def best_fit(runs: Affected, shared: SharedParameters, label: str, linear: np.ndarray, strong: bool) -> LabelFit:
     """From the size that parabolas promise, and from nothing; of strong changes, by way of rough filters too."""
     nothing = np.zeros(len(linear))
-    start = min((linear, nothing), key=lambda size: cost_of(runs, shared, label, size))
+    starts = [linear, nothing]
+    low, high = shared.limits(label, runs.at[0])
+    if at_kink(shared, runs.at[0])[shared.labels[label]].any():  # a threshold leads nowhere before it is reached
+        far = [sign * size for size in APART for sign in (1.0, -1.0)]
+        alone = [np.clip(size * one, low, high) for one in np.eye(len(linear)) for size in far]
+        starts += [one for one in alone if one.any()]
+    start = min(starts, key=lambda size: cost_of(runs, shared, label, size))
     fits = [fit_label(runs, shared, label, start)]
     if strong:
         fits.append(fit_label(runs, shared, label, nothing, ROUGH))
