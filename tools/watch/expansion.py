@@ -65,8 +65,7 @@ def columns_at(
     innovations by more than FAR sigma in all is taken again shorter: the sizes that can be seen differ a hundredfold.
     One that moves nothing where the effect begins (`begins`) is taken longer; one that has to reach a threshold stays.
     """
-    every = np.arange(len(steps))
-    E = part.follow([models(-1, 0.0), *(models(k, steps[k]) for k in every)], gains)
+    E = part.follow([models(-1, 0.0), *(models(k, float(size)) for k, size in enumerate(steps))], gains)
     e, J = E[0], (E[1:] - E[0]) / steps[:, None]
     norms = np.sqrt((J**2).sum(axis=1))
     far = np.flatnonzero(norms * np.abs(steps) > FAR)
@@ -75,7 +74,8 @@ def columns_at(
     if len(again):
         scales = np.concatenate([NEAR / (norms[far] * np.abs(steps[far])), np.full(len(hidden), THRESHOLD_STEP)])
         sizes = steps[again] * scales
-        new = (part.follow([models(k, size) for k, size in zip(again, sizes, strict=True)], gains) - e) / sizes[:, None]
+        moved = part.follow([models(int(k), float(size)) for k, size in zip(again, sizes, strict=True)], gains)
+        new = (moved - e) / sizes[:, None]
         reached = (new**2).sum(axis=1) > (PAST_THRESHOLD * norms[again]) ** 2
         kept = reached | ~begins[again]
         J[again[kept]] = new[kept]

@@ -5,9 +5,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from sim_backend.core.effects.catalogue import catalogue
 from tools.diagnose.noise_probes import TURBULENCE, WAVES, NoiseProbe, probes
 from tools.diagnose.unknown import ONE_AXIS
 from tools.inference.fit import bounded_step
+from tools.inference.parameters import CLOCK_PLACE
 from tools.watch.disorder import SCALES, WATER, beyond_reference, shaken, water_gains
 from tools.watch.events import GROWING, STEP, Change, Joint, Span, spans
 from tools.watch.expansion import Expansion, expand
@@ -96,7 +98,22 @@ def next_event(history: History) -> Event | None:
     rough = water_event(history)
     if rough is None or rough.evidence < EVIDENCE_NEEDED or (event is not None and not rougher(history, rough, event)):
         return event
-    return named(history, rough) if earns_place(history, rough) else event
+    if not earns_place(history, rough):
+        return event
+    found = named(history, rough)
+    if event is not None and place_of(event) == CLOCK_PLACE == shaken_place(found):
+        return event  # a clock that wanders is still one that is wrong
+    return found
+
+
+def place_of(event: Event) -> tuple[str, str]:
+    """Where its label sits."""
+    return catalogue()[event.label].place
+
+
+def shaken_place(event: Event) -> tuple[str, str] | None:
+    """Where a single link shakes; None of the water."""
+    return None if event.place is None else (event.place.subsystem, event.place.element)
 
 
 def rougher(history: History, rough: Event, event: Event) -> bool:
@@ -185,9 +202,9 @@ def refined(history: History, joint: Joint, best: Change, changes: Sequence[Chan
     if not found:
         return None
     winner = max(found, key=lambda event: event.evidence)
-    again = by_other_course(history, joint, winner)
-    if again is not None and again.evidence > winner.evidence:
-        found[found.index(winner)] = winner = again
+    other = by_other_course(history, joint, winner)
+    if other is not None and other.evidence > winner.evidence:
+        found[found.index(winner)] = winner = other
     winner.rivals = {event.label: event.evidence for event in found}
     # labels that were behind already count as far behind as they were in the runs of the fit
     for fit in ranked:

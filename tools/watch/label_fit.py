@@ -108,16 +108,16 @@ def fit_label(
     size = start.copy()
     for rough in roughness:
         size = next_step(runs, shared, label, size, rough, SHARES).to
-    best, least, shares = size, np.inf, SHARES
+    best, least, whole = size, np.inf, True
     for _ in range(STEPS):
-        step = next_step(runs, shared, label, size, 1.0, shares)
+        step = next_step(runs, shared, label, size, 1.0, SHARES if whole else SHARES[1:])
         if step.cost < least:
-            best, least, shares = size, step.cost, SHARES
+            best, least, whole = size, step.cost, True
             if step.promised < ENOUGH:
                 break
             size = step.to
-        elif shares is SHARES:  # the filter of the new model sees it otherwise: half way back
-            size, shares = best + 0.3 * (size - best), SHARES[1:]
+        elif whole:  # the filter of the new model sees it otherwise: half way back
+            size, whole = best + 0.3 * (size - best), False
         else:
             break
     return LabelFit(label, best, least)

@@ -17,7 +17,7 @@ from tools.watch.unknown import NOTHING, Left, what_is_left
 
 ROUGH = 6.0  # sigma of a run's mean squared innovation: something changed, though no label says what
 MOST_SURE = 0.995
-FORM = 0.05  # of a size, 1 sigma: nature's form is not the catalogue's
+FORM = 0.06  # of a size, 1 sigma: nature's form is not the catalogue's (docs/WATCH.md)
 CI90 = 1.645
 LOOKED_AT = 2  # runs of an event in which it has to matter
 VECTORS = ("gyro_bias", "current", "current_shear", "compass")  # labels whose parameters are parts of one length
@@ -216,7 +216,8 @@ def event_answer(history: History, one: Settled, names: list[str]) -> EventAnswe
         own = sized(history, one, float(weights[n]))
         sizes.append({"run": names[n], "size": own.size, "ci90": own.ci90})
     known = max([*probabilities(one).values(), 0.0])
-    chance = known if one.label else one.probability * max(one.left.probability, 0.5)
+    unknown = one.left.probability if one.event.has_course else 1.0 - ERROR_RATE
+    chance = known if one.label else one.probability * unknown
     last = None if still else names[inside[-1]]
     return EventAnswer(
         one.label, where_of(one), group_of(one), names[inside[0]], last, course, float(chance), sized(history, one),
