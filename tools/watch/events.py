@@ -94,9 +94,9 @@ class Joint:
         """The shared values, (count,)."""
         return self.u[: self.shared.count]
 
-    def run_values(self, n: int) -> np.ndarray:
-        """The values of a run with its events, (count,)."""
-        x, at = self.values.copy(), self.shared.count
+    def run_values(self, n: int, shared: np.ndarray | None = None) -> np.ndarray:
+        """The values of a run with its events, (count,); about other shared values, where they are given."""
+        x, at = (self.values if shared is None else shared).copy(), self.shared.count
         for columns, weights in self.places:
             x[columns] += weights[n] * self.u[at : at + len(columns)]
             at += len(columns)

@@ -12,7 +12,8 @@ from tools.watch.answer import CAUSE, NONE, UNKNOWN, EventAnswer, RunCause, RunV
 from tools.watch.disorder import WATER
 from tools.watch.events import GROWING, STEP, Span
 from tools.watch.flights import roughness_sigma
-from tools.watch.history import EVIDENCE_NEEDED, Event, History, within
+from tools.watch.history import Event, History, within
+from tools.watch.search import EVIDENCE_NEEDED
 from tools.watch.unknown import NOTHING, Left, what_is_left
 
 ROUGH = 6.0  # sigma of a run's mean squared innovation: something changed, though no label says what

@@ -12,7 +12,8 @@ from tools.inference.predict import fly
 from tools.inference.problem import Problem, cut, problem_of
 from tools.watch.answer import NONE, RunVerdict, Watch
 from tools.watch.flights import Flights
-from tools.watch.history import History, find_events
+from tools.watch.history import History
+from tools.watch.search import find_events
 from tools.watch.shared_parameters import shared_parameters
 from tools.watch.usable import ASKED, readings_of, usable
 from tools.watch.verdicts import event_answer, run_verdict, settle

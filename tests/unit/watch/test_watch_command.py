@@ -19,11 +19,14 @@ from tools.watch.watch import watch
 WORLD = World(seconds=40.0, bias=0.2)
 REFERENCE, WATCHED = 3, 4
 COMMON = {layout.K_D0: 0.35, layout.K_L: 0.2, layout.K_MY: -0.15}  # relative: a file that is not right, in all runs
-HEAVY = 0.03  # kg
+HEAVY, RATE = 0.03, 0.02  # kg, rad/s
 
 
-def flown(changed: dict[int, float], seed: int = 40):
-    """Runs of one vehicle that its file does not describe well; `changed`: by run, kg that it is heavier."""
+def flown(changed: dict[int, float], seed: int = 40, turned: dict[int, float] | None = None):
+    """Runs of one vehicle that its file does not describe well.
+
+    changed: by run, kg that it is heavier; turned: rad/s that its pitch rate reads too much.
+    """
     P = drawn_vehicle(WORLD, np.random.default_rng(seed))
     for index, share in COMMON.items():
         P[index] *= 1.0 + share
@@ -31,7 +34,9 @@ def flown(changed: dict[int, float], seed: int = 40):
     for n in range(REFERENCE + WATCHED):
         own = P.copy()
         own[layout.NET_MASS] += changed.get(n - REFERENCE, 0.0)
-        runs.append(fly(WORLD, seed + n, P=own, name=f"run{n:02d}").run)
+        run = fly(WORLD, seed + n, P=own, name=f"run{n:02d}").run
+        run.columns[names.RATES[1]] += (turned or {}).get(n - REFERENCE, 0.0)
+        runs.append(run)
     return case_of(WORLD, runs[:REFERENCE]), case_of(WORLD, runs[REFERENCE:])
 
 
@@ -86,6 +91,17 @@ def test_the_json_is_that_of_the_contract(episode):
         told["events"][0]
     )
     assert all(run["gap"] > 0.0 for run in told["runs"])
+
+
+@pytest.mark.slow
+def test_two_changes_each_with_its_own_first_run():
+    reference, case = flown({n: HEAVY for n in (1, 2, 3)}, 60, {2: RATE, 3: RATE})
+    found = {event.label: event for event in watch(case, reference).events}
+    assert set(found) == {"net_buoyancy", "gyro_bias"}
+    assert [found[label].from_run for label in ("net_buoyancy", "gyro_bias")] == ["run04", "run05"]
+    assert [event.to_run for event in found.values()] == [None, None]
+    low, high = found["gyro_bias"].sized.ci90
+    assert low <= RATE <= high
 
 
 def run(monkeypatch, *arguments: object) -> int:
