@@ -26,23 +26,39 @@ def challenge():
 @click.option("--unknown", type=COUNT, help="Outside the catalogue: 30; messy: 20.")
 @click.option("--answers", type=click.Path(path_type=Path, dir_okay=False), help="Where the sealed answers go.")
 @click.option("--jobs", default=0, type=click.IntRange(0, 256), help="Processes; one a core by default.")
+@click.option("--watch", is_flag=True, help="A blind test of `gap watch`: vehicles, of which some change.")
+@click.option("--vehicles", default=40, show_default=True, type=click.IntRange(1, 1000), help="With --watch.")
+@click.option("--unchanged", default=10, show_default=True, type=click.IntRange(0, 1000), help="Of the vehicles.")
+@click.option("--runs", default=14, show_default=True, type=click.IntRange(4, 200), help="Of each vehicle.")
+@click.option("--reference", default=5, show_default=True, type=click.IntRange(1, 100), help="Of the runs, the first.")
 def make(
     out: Path, seed: int, messy: bool, single: int | None, none: int | None, pairs: int | None, unknown: int | None,
     answers: Path | None, jobs: int,
+    watch: bool, vehicles: int, unchanged: int, runs: int, reference: int,
 ) -> None:  # fmt: skip
     """Draw, fly and seal a blind test. Cases that are there are kept: call again to go on after a stop."""
     from tools.study.challenge.make import Order
     from tools.study.challenge.make import make as make_all
     from tools.study.challenge.plan import MESSY, Counts
     from tools.study.challenge.seal import ARCHIVE, MANIFEST, read_manifest
+    from tools.study.challenge.watch_make import WatchOrder
+    from tools.study.challenge.watch_plan import LEAST_WATCHED, WatchCounts
 
-    asked = {"single": single, "none": none, "pairs": pairs, "unknown": unknown}
-    given = {name: count for name, count in asked.items() if count is not None}
-    counts = replace(MESSY if messy else Counts(), **given)
-    total = counts.total
-    if not total:
-        raise click.UsageError("no cases: all counts are 0")
-    order = Order(out, seed, counts, answers or out / ARCHIVE, messy)
+    if watch:
+        if unchanged > vehicles or runs - reference < LEAST_WATCHED:
+            few = f"--unchanged at most --vehicles, and {LEAST_WATCHED} runs at least behind the reference"
+            raise click.UsageError(few)
+        watched = WatchCounts(vehicles, unchanged, runs, reference)
+        order: Order = WatchOrder(out, seed, watched, answers or out / ARCHIVE)
+        total = vehicles
+    else:
+        asked = {"single": single, "none": none, "pairs": pairs, "unknown": unknown}
+        given = {name: count for name, count in asked.items() if count is not None}
+        counts = replace(MESSY if messy else Counts(), **given)
+        total = counts.total
+        if not total:
+            raise click.UsageError("no cases: all counts are 0")
+        order = Order(out, seed, counts, answers or out / ARCHIVE, messy)
     with progress("cases", total) as advance:
         made, wrong = make_all(order, jobs, advance)
     if wrong:
@@ -56,8 +72,9 @@ def make(
 @click.option("--out", required=True, type=folder, help="Where the diagnoses go, one folder a case.")
 @click.option("--only", multiple=True, metavar="CASE", help="This case only; may be given again.")
 @click.option("--jobs", default=1, show_default=True, type=click.IntRange(1, 256), help="Cases at a time.")
+@click.option("--watch", is_flag=True, help="`glider gap watch` on every vehicle, with its reference.")
 @click.argument("extra", nargs=-1, type=click.UNPROCESSED)
-def run(cases: Path, out: Path, only: tuple[str, ...], jobs: int, extra: tuple[str, ...]) -> None:
+def run(cases: Path, out: Path, only: tuple[str, ...], jobs: int, watch: bool, extra: tuple[str, ...]) -> None:
     """Run `glider gap diagnose` on every case; those that have a diagnosis are kept.
 
     What stands after `--` is handed on to `gap diagnose`. A case's time counts its whole process.
@@ -68,7 +85,7 @@ def run(cases: Path, out: Path, only: tuple[str, ...], jobs: int, extra: tuple[s
 
     need("analysis")
     with progress("diagnosed", len(set(only)) or count_cases(cases)) as advance:
-        done, wrong = run_all(cases, out, extra, jobs, advance, only)
+        done, wrong = run_all(cases, out, extra, jobs, advance, only, watch)
     say(f"{done} diagnosed: {out}")
     if wrong:
         fail("\n".join(wrong))
@@ -81,10 +98,12 @@ def run(cases: Path, out: Path, only: tuple[str, ...], jobs: int, extra: tuple[s
 @click.option("--manifest", type=click.Path(path_type=Path, dir_okay=False), help="As published; else the one there.")
 @click.option("--partial", is_flag=True, help="Score answered cases only; else a case without an answer is wrong.")
 @click.option("--no-closed", is_flag=True, help="Do not fly the corrected models on the held runs.")
+@click.option("--watch", is_flag=True, help="The answers are those of `gap watch`: <case>/watch.json.")
 @json_option
 def score(
-    cases: Path, answers: Path, diagnoses: Path, manifest: Path | None, partial: bool, no_closed: bool, as_json: bool
-) -> None:
+    cases: Path, answers: Path, diagnoses: Path, manifest: Path | None, partial: bool, no_closed: bool, watch: bool,
+    as_json: bool,
+) -> None:  # fmt: skip
     """Open the sealed answers, check them against the manifest, and score the diagnoses (docs/CHALLENGE.md)."""
     from tools.data.errors import InputError, need
     from tools.study.challenge.judge import judge
@@ -92,6 +111,17 @@ def score(
     need("analysis")
     if manifest is not None and not manifest.is_file():
         raise InputError("no such file", source=manifest, column="--manifest")
+    if watch:
+        from tools.study.challenge.watch_score import judge_watches
+
+        with progress("scored", _answered(cases)) as advance:
+            watched = judge_watches(cases, answers, diagnoses, manifest, partial, advance)
+        if as_json:
+            print_json(watched.plain())
+        else:
+            _print_figures(watched.figures)
+            _print_watches(watched)
+        return
     with progress("scored", _answered(cases)) as advance:
         found = judge(
             cases, answers, diagnoses, manifest=manifest, partial=partial, closing=not no_closed, advance=advance
@@ -108,9 +138,22 @@ def _answered(cases: Path) -> int:
     return count_cases(cases)
 
 
-def _print_score(found) -> None:
-    """The figures, then the labels, on standard output."""
-    for figure in found.figures:
+def _print_watches(found) -> None:
+    """One line a vehicle."""
+    click.echo(f"\n{'vehicle':10}{'changed by':24}{'runs':>8}  {'called':24}{'runs':>14}{'wrong':>7}{'missed':>7}")
+    for row in found.plain()["cases"]:
+        last = "" if row["to_run"] is None else row["to_run"]
+        true = "" if row["from_run"] is None else f"{row['from_run']}-{last}"
+        called = "" if row["said"] is None else f"{row['said_from']}-{row['said_to'] or ''}"
+        click.echo(
+            f"{row['name']:10}{row['label'] or '-':24}{true:>8}  {row['said'] or '-':24}{called:>14}"
+            f"{row['called_wrongly']:7d}{row['not_found']:7d}"
+        )
+
+
+def _print_figures(figures) -> None:
+    """One line a figure."""
+    for figure in figures:
         bound = "<=" if figure.at_most else ">="
         if figure.count is None:
             value, target = "-" if figure.value is None else f"{figure.value:.2f}", f"{bound} {figure.target:g}"
@@ -122,6 +165,11 @@ def _print_score(found) -> None:
             counted = f"{figure.count} of {figure.of}, {100.0 * low:.1f} to {100.0 * high:.1f} %"
         mark = {None: "", True: "met", False: "missed"}[figure.met]
         click.echo(f"{figure.name:46}{value:>9}  {target:8} {mark:7} {counted}")
+
+
+def _print_score(found) -> None:
+    """The figures, then the labels, on standard output."""
+    _print_figures(found.figures)
     unanswered = sum(case.said is None for case in found.cases)
     if unanswered:
         click.echo(f"{unanswered} cases without an answer count as wrong")

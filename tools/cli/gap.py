@@ -8,6 +8,7 @@ import click
 from tools.cli.challenge import challenge
 from tools.cli.common import json_option, print_json, progress, say, vehicle_option
 from tools.cli.readings import readings
+from tools.cli.watch import watch
 
 STEPS = 7  # of a diagnosis: screen, up to three effects, verdict, how far, report
 
@@ -154,3 +155,4 @@ def report(folder: Path) -> None:
 
 gap.add_command(challenge)
 gap.add_command(readings)
+gap.add_command(watch)

@@ -30,6 +30,7 @@ class FreeParameter:
     high: float = np.inf
     unit: str = ""
     along: tuple[tuple[int, float], ...] = ()  # entries of P that move together, in place of `entry`
+    along_effects: tuple[tuple[int, float], ...] = ()  # entries of F that move with them
 
     @property
     def kinked(self) -> bool:
@@ -135,6 +136,10 @@ def model_at(problem: Problem, free: list[FreeParameter], values: np.ndarray) ->
     P = problem.model.P.copy()
     F = effect_vector(problem.model)
     for parameter, value in zip(free, values, strict=True):
-        for entry, size in parameter.along or ((parameter.entry, parameter.spread),):
-            (P if parameter.vector == "P" else F)[entry] += size * value
+        if not parameter.along and not parameter.along_effects:
+            (P if parameter.vector == "P" else F)[parameter.entry] += parameter.spread * value
+        for entry, size in parameter.along:
+            P[entry] += size * value
+        for entry, size in parameter.along_effects:
+            F[entry] += size * value
     return P, F

@@ -15,7 +15,14 @@ from tools.inference.model import NOMINAL
 from tools.inference.predict import as_run, predict
 from tools.study.challenge.diagnosis import FILE, MODEL, TIMING, read_diagnosis
 from tools.study.challenge.score import Score, Scored, score
-from tools.study.challenge.seal import Answers, check_seal, folder_digest, open_answers, read_manifest
+from tools.study.challenge.seal import (
+    OF_A_DIAGNOSIS,
+    Answers,
+    check_seal,
+    folder_digest,
+    open_answers,
+    read_manifest,
+)
 from tools.study.challenge.trial import total
 
 NOTHING = 0.02
@@ -30,19 +37,23 @@ def case_folders(cases: Path) -> tuple[Path, Path]:
     return cases, cases.parent / "held"
 
 
-def open_sealed(path: Path, manifest: Path | None, cases: Path, held: Path) -> Answers:
+def open_sealed(
+    path: Path, manifest: Path | None, cases: Path, held: Path, needed: tuple[str, ...] = OF_A_DIAGNOSIS
+) -> Answers:
     """The answers, checked against the manifest if there is one: their own hash and those of the cases.
 
     An archive without a manifest is an InputError: nobody could tell when it was written.
     """
-    answers = open_answers(path)
+    answers = open_answers(path, needed)
     if answers.sha256 is None:
         return answers
     if manifest is None or not manifest.is_file():
         raise InputError("no manifest beside the cases to check the answers against", source=manifest or path)
     check_seal(answers, manifest)
     for name, promised in read_manifest(manifest).get("cases", {}).items():
-        for kind, folder in (("cases", cases / name), ("held", held / name)):
+        for kind, folder in (("cases", cases / name), (held.name, held / name)):
+            if kind not in promised:
+                raise InputError(f"the manifest is not of cases with '{kind}'", source=manifest)
             if not folder.is_dir():
                 raise InputError("the manifest names it, but it is not there", source=folder)
             if folder_digest(folder) != promised[kind]:

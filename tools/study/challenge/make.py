@@ -15,7 +15,7 @@ from tools.data.runs.csvfile import write_bytes
 from tools.data.sources import load_vehicle
 from tools.study.challenge import seal
 from tools.study.challenge.cases import NoCase, answer, draw_case, write
-from tools.study.challenge.plan import CasePlan, Counts, plan
+from tools.study.challenge.plan import Counts, plan
 
 VEHICLE = "roughie"
 MAKING = ".making"  # answers until they are sealed
@@ -42,23 +42,33 @@ class Order:
 
     @property
     def held(self) -> Path:
+        """Where the other runs of each case go."""
         return self.out / "held"
 
     @property
     def making(self) -> Path:
         return self.out / MAKING
 
+    def plans(self) -> list:
+        """The cases in their order."""
+        return plan(self.seed, self.counts, self.messy)
 
-def make_one(order: Order, case: CasePlan, vehicle: Vehicle) -> str | None:
+    def draw(self, case: Any, vehicle: Vehicle) -> dict[str, Any]:
+        """Draw and write one case; its answer. NoCase where it cannot be drawn."""
+        made = draw_case(self.seed, case, vehicle)
+        write(made, self.cases, self.held)
+        return answer(made)
+
+
+def make_one(order: Order, case: Any, vehicle: Vehicle) -> str | None:
     """Draw and write one case, its answer last; what went wrong, if no such case can be drawn."""
     for folder in (order.cases, order.held):
         shutil.rmtree(folder / case.name, ignore_errors=True)  # cut off in the middle
     try:
-        made = draw_case(order.seed, case, vehicle)
+        found = order.draw(case, vehicle)
     except NoCase as error:
         return str(error)
-    write(made, order.cases, order.held)
-    write_bytes(order.making / f"{case.name}.json", seal.as_json(answer(made)))
+    write_bytes(order.making / f"{case.name}.json", seal.as_json(found))
     return None
 
 
@@ -66,7 +76,7 @@ def _prepare(order: Order) -> bool:
     """Make the folders; whether everything has been made and sealed already."""
     manifest = order.out / seal.MANIFEST
     if manifest.exists():
-        sealed = seal.open_answers(order.archive)
+        sealed = seal.open_answers(order.archive, ())
         seal.check_seal(sealed, manifest)
         if sealed.plan != order.plain:
             raise InputError(
@@ -85,7 +95,7 @@ def _prepare(order: Order) -> bool:
     return False
 
 
-def missing(order: Order, cases: list[CasePlan]) -> list[CasePlan]:
+def missing(order: Order, cases: list) -> list:
     """The cases that are not there yet."""
     return [case for case in cases if not (order.making / f"{case.name}.json").exists()]
 
@@ -95,7 +105,7 @@ def make(order: Order, jobs: int = 0, advance: Callable[[int], None] = lambda n:
 
     jobs: processes, 0 for one a core. The result depends on the seed and the counts alone.
     """
-    cases = plan(order.seed, order.counts, order.messy)
+    cases = order.plans()
     if _prepare(order):
         advance(len(cases))
         return 0, []
@@ -120,7 +130,7 @@ def make(order: Order, jobs: int = 0, advance: Callable[[int], None] = lambda n:
     return len(todo), wrong
 
 
-def _seal(order: Order, cases: list[CasePlan]) -> None:
+def _seal(order: Order, cases: list) -> None:
     answers = {}
     for case in cases:
         path = order.making / f"{case.name}.json"

@@ -12,6 +12,7 @@ from tools.data.runs.csvfile import write_bytes
 
 MANIFEST, ARCHIVE = "manifest.json", "answers.zip"
 PLAN = "plan.json"
+OF_A_DIAGNOSIS = ("labels", "places", "before", "oracle", "runs")  # keys of an answer
 FORMAT = 1
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # no time inside: equal answers are equal archives
 MAX_BYTES = 100_000_000
@@ -55,12 +56,17 @@ def seal(path: Path, plan: dict[str, Any], answers: dict[str, dict[str, Any]]) -
 
 
 def write_manifest(path: Path, archive: Path, sha256: str, cases: Path, held: Path) -> None:
-    """The part that is published: hashes of the answers and of every case, and nothing of what they hold."""
+    """The part that is published: hashes of the answers and of every case, and nothing of what they hold.
+
+    held: the folder of the other runs of each case, by whose name the manifest knows them.
+    """
     names = sorted(folder.name for folder in cases.iterdir())
     manifest = {
         "format": FORMAT,
         "answers": {"file": archive.name, "sha256": sha256},
-        "cases": {name: {"cases": folder_digest(cases / name), "held": folder_digest(held / name)} for name in names},
+        "cases": {
+            name: {"cases": folder_digest(cases / name), held.name: folder_digest(held / name)} for name in names
+        },
     }
     write_bytes(path, as_json(manifest))
 
@@ -91,13 +97,13 @@ def check_seal(answers: Answers, manifest: Path) -> None:
         raise InputError(f"SHA-256 {answers.sha256}, but {manifest} promised {promised}", source=answers.source)
 
 
-def open_answers(path: Path) -> Answers:
-    """Answers of an archive, or of a folder of caseNNN.json; InputError where there are none."""
+def open_answers(path: Path, needed: tuple[str, ...] = OF_A_DIAGNOSIS) -> Answers:
+    """Answers of an archive, or of a folder of caseNNN.json, with the keys needed; InputError where there are none."""
     if path.is_dir():
         files = sorted(path.glob("*.json"))
         if not files:
             raise InputError("no answers (*.json) in this folder", source=path)
-        cases = {file.stem: _checked(read_object(file.read_bytes(), file), file) for file in files}
+        cases = {file.stem: _checked(read_object(file.read_bytes(), file), file, needed) for file in files}
         return Answers(path, cases, None, None)
     if not path.is_file():
         raise InputError("no such file or folder", source=path)
@@ -111,7 +117,7 @@ def open_answers(path: Path) -> Answers:
                 if name == PLAN:
                     plan = value
                 else:
-                    cases[name.removesuffix(".json")] = _checked(value, f"{path}:{name}")
+                    cases[name.removesuffix(".json")] = _checked(value, f"{path}:{name}", needed)
     except zipfile.BadZipFile as error:
         raise InputError(f"not an archive of answers: {error}", source=path) from None
     if not cases:
@@ -119,8 +125,8 @@ def open_answers(path: Path) -> Answers:
     return Answers(path, cases, plan, digest(path.read_bytes()))
 
 
-def _checked(answer: dict[str, Any], source: object) -> dict[str, Any]:
-    for key in ("labels", "places", "before", "oracle", "runs"):
+def _checked(answer: dict[str, Any], source: object, needed: tuple[str, ...]) -> dict[str, Any]:
+    for key in needed:
         if key not in answer:
             raise InputError("the key is missing", source=source, column=key)
     return answer

@@ -1,0 +1,91 @@
+"""`glider gap watch`: what is different since when."""
+
+import sys
+from pathlib import Path
+
+import click
+
+from tools.cli.common import json_option, print_json, progress, say
+
+folder = click.Path(path_type=Path, file_okay=False)
+
+
+@click.command()
+@click.argument("case", type=click.Path(path_type=Path))
+@click.option("--reference", type=folder, metavar="CASE0", help="Runs of the same vehicle before anything changed.")
+@click.option("--vehicle", metavar="FILE", help="Stands in for the case's vehicle: one identified from earlier runs.")
+@click.option("--out", type=folder, help="Folder of the answer.")
+@json_option
+def watch(case: Path, reference: Path | None, vehicle: str | None, out: Path | None, as_json: bool) -> None:
+    """What changed over the runs of CASE, in their order: in which run, from when to when, why, and how much.
+
+    What all runs share, a model that is not quite right or a sensor that is a little off, is no change: it is learned
+    from the reference, or without one from the first runs (docs/WATCH.md).
+    """
+    from dataclasses import replace
+
+    from tools.data.errors import need
+    from tools.data.runs.case import load_case
+    from tools.data.runs.csvfile import write_bytes
+    from tools.data.sources import load_vehicle
+    from tools.watch.answer import FILE
+    from tools.watch.watch import watch as watch_runs
+
+    need("analysis")
+    loaded = load_case(case)
+    before = None if reference is None else load_case(reference)
+    if vehicle is not None:
+        other = load_vehicle(vehicle)
+        loaded = replace(loaded, vehicle=other, vehicle_name=vehicle)
+    with progress("watch", 2) as advance:
+        advance(1)
+        found = watch_runs(loaded, before, lambda text: print(text, file=sys.stderr))
+        advance(1)
+    if out is not None:
+        import json
+
+        from tools.data.plain import as_plain
+
+        out.mkdir(parents=True, exist_ok=True)
+        write_bytes(out / FILE, (json.dumps(as_plain(found.plain()), indent=1) + "\n").encode())
+    for caution in found.cautions:
+        say(f"note: {caution}")
+    if as_json:
+        print_json(found.plain())
+    else:
+        for line in lines(found):
+            click.echo(line)
+    if out is not None:
+        say(f"answer: {out / FILE}")
+
+
+def lines(found) -> list[str]:
+    """The answer for a terminal: runs, then events."""
+    told = []
+    for run in found.runs:
+        if run.skipped is not None:
+            told.append(f"{run.run:12} skipped  {run.skipped}")
+            continue
+        causes = ", ".join(f"{cause.label} {_size(cause.sized)}" for cause in run.causes[:2])
+        gap = "-" if run.gap is None else f"{run.gap:.2f}"
+        told.append(f"{run.run:12} {run.verdict:8} gap {gap:>6}  {causes}".rstrip())
+    told.append("")
+    if not found.events:
+        told.append("nothing changed, as far as these runs can show")
+    for event in found.events:
+        until = "and is still there" if event.to_run is None else f"to {event.to_run}"
+        place = f"{event.where[0]['subsystem']} {event.where[0]['element']}" if event.where else ""
+        name = event.label or f"unknown ({place})"
+        others = [label for label in event.group if label != event.label]
+        alike = f"; may as well be {', '.join(others)}" if others else ""
+        size = _size(event.sized)
+        told.append(f"{name} {size} from {event.from_run} {until}, {event.course}, {event.probability:.2f}{alike}")
+    return told
+
+
+def _size(sized) -> str:
+    if sized.size is None or sized.ci90 is None:
+        return ""
+    low, high = sized.ci90
+    unit = "" if sized.unit in ("1", None) else f" {sized.unit}"
+    return f"{sized.size:.3g}{unit} ({low:.3g} to {high:.3g})"

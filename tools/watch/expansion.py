@@ -1,0 +1,97 @@
+"""A run's misfit about a model, to second order in everything that runs may share or change in."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from tools.inference.fit import NUISANCE_STEP, THRESHOLD_STEP
+from tools.inference.problem import Gains, Problem
+from tools.watch.shared_parameters import SharedParameters
+
+STEP = 0.1  # of a label's spread: difference step
+HARDLY = 0.05  # spreads past a kink
+HIDDEN = 1.0  # sigma: a whole spread that moves less may be a threshold that was not reached
+FAR, NEAR = 30.0, 8.0  # sigma in all: steps that move more are too long, and how far they go instead
+PAST_THRESHOLD = 0.1  # of a long step's derivative: a short one that sees less has not reached a threshold
+Moved = Callable[[int, float], tuple[np.ndarray, np.ndarray]]
+
+
+@dataclass
+class Expansion:
+    """-2 log likelihood of a run at x: value + 2 slope (x - at) + (x - at) curvature (x - at), in spreads."""
+
+    at: np.ndarray  # (count,)
+    value: float
+    slope: np.ndarray  # (count,)
+    curvature: np.ndarray  # (count, count)
+    nis: float  # mean squared innovation at `at`, of the filter of that model
+    samples: int
+
+    @property
+    def offset(self) -> np.ndarray:
+        """Slope at x = 0 of the same parabola."""
+        return self.slope - self.curvature @ self.at
+
+    @property
+    def constant(self) -> float:
+        """Value at x = 0."""
+        return float(self.value - 2.0 * self.slope @ self.at + self.at @ self.curvature @ self.at)
+
+    def cooled(self, heat: float) -> "Expansion":
+        """The same with squared innovations that count for less."""
+        return Expansion(self.at, self.value / heat, self.slope / heat, self.curvature / heat, self.nis, self.samples)
+
+
+def at_kink(shared: SharedParameters, x: np.ndarray) -> np.ndarray:
+    """Of each parameter, whether it has a kink and is hardly past it, (count,) bool."""
+    return shared.kinked & (np.abs(x) < HARDLY)
+
+
+def difference_steps(shared: SharedParameters, x: np.ndarray) -> np.ndarray:
+    """Step of each derivative at x, away from the nearer limit; a whole spread where an effect begins at a kink."""
+    steps = np.where(shared.groups == 2, STEP * np.maximum(1.0, np.abs(x)), NUISANCE_STEP)
+    begins = at_kink(shared, x)
+    steps[begins] = np.minimum(1.0, np.maximum(shared.high, -shared.low)[begins])
+    return np.where(x + steps > shared.high, -steps, steps)
+
+
+def columns_at(
+    part: Problem, gains: Gains, models: Moved, begins: np.ndarray, steps: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Innovations (samples,) of a run by kept gains, and their derivatives (parameters, samples) by difference.
+
+    models(k, size): the model with parameter k moved by a size, none moved for k = -1. A step that moves the
+    innovations by more than FAR sigma in all is taken again shorter: the sizes that can be seen differ a hundredfold.
+    One that moves nothing where the effect begins (`begins`) is taken longer; one that has to reach a threshold stays.
+    """
+    E = part.follow([models(-1, 0.0), *(models(k, float(size)) for k, size in enumerate(steps))], gains)
+    e, J = E[0], (E[1:] - E[0]) / steps[:, None]
+    norms = np.sqrt((J**2).sum(axis=1))
+    far = np.flatnonzero(norms * np.abs(steps) > FAR)
+    hidden = np.flatnonzero(begins & (norms < HIDDEN))
+    again = np.concatenate([far, hidden]).astype(int)
+    if len(again):
+        scales = np.concatenate([NEAR / (norms[far] * np.abs(steps[far])), np.full(len(hidden), THRESHOLD_STEP)])
+        sizes = steps[again] * scales
+        moved = part.follow([models(int(k), float(size)) for k, size in zip(again, sizes, strict=True)], gains)
+        new = (moved - e) / sizes[:, None]
+        reached = (new**2).sum(axis=1) > (PAST_THRESHOLD * norms[again]) ** 2
+        kept = reached | ~begins[again]
+        J[again[kept]] = new[kept]
+    return e, J
+
+
+def expand(part: Problem, shared: SharedParameters, x: np.ndarray, roughness: float = 1.0) -> Expansion:
+    """A run (a problem of its own) about the model at x, by the gains of that model's filter."""
+    gains = part.filter(*shared.model(part, x), roughness=roughness, begin=True)
+
+    def moved(k: int, size: float) -> tuple[np.ndarray, np.ndarray]:
+        point = x.copy()
+        if k >= 0:
+            point[k] += size
+        return shared.model(part, point)
+
+    e, J = columns_at(part, gains, moved, at_kink(shared, x), difference_steps(shared, x))
+    nis = float(e @ e) / max(1, len(e))
+    return Expansion(x.copy(), float(gains.misfit[0]), J @ e, J @ J.T, nis, len(e))

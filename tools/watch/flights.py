@@ -1,0 +1,113 @@
+"""The runs of a watch as its parts see them: each a problem of its own, the reference first."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tools.inference.fit import bounded_step
+from tools.inference.problem import Problem
+from tools.watch.expansion import Expansion, expand
+from tools.watch.scatter import learn_scatter, without_deviation
+from tools.watch.shared_model import fit_shared, heat_of
+from tools.watch.shared_parameters import SharedParameters
+
+LEAST_SIZE = 1e-6  # spreads by which runs may differ
+
+
+@dataclass
+class Flights:
+    """Every run with the model that it is thought to fly by, and its parabola about that."""
+
+    parts: list[Problem]
+    shared: SharedParameters
+    reference: np.ndarray  # (runs,) bool: before anything changed
+    heat: float = 1.0
+    sizes: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (count,) 1 sigma of what runs differ by
+    certainty: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # inverse covariance of a run's own values
+    values: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (count,) shared
+    raw: list[Expansion] = field(default_factory=list)  # not cooled, at `values`
+    runs: list[Expansion] = field(default_factory=list)  # cooled, deviations integrated out, at what each flies by
+    deviations: dict[int, tuple[Expansion, np.ndarray]] = field(default_factory=dict)  # with what they were found of
+
+    @property
+    def count(self) -> int:
+        return len(self.parts)
+
+    def learn(self, start: np.ndarray | None = None) -> None:
+        """The shared model, the heat and the scatter, from the reference."""
+        own = numbers(self.reference)
+        self.values = fit_shared([self.parts[n] for n in own], self.shared, start)
+        self.raw = [expand(part, self.shared, self.values) for part in self.parts]
+        found = [self.raw[n] for n in own]
+        self.heat = heat_of(found)
+        self.sizes = learn_scatter([one.cooled(self.heat) for one in found], self.shared)
+        self.runs = [self.made(one) for one in self.raw]
+        known = np.diag(self.shared.prior**-2.0) + sum(self.runs[n].curvature for n in own)
+        self.certainty = np.linalg.inv(np.linalg.inv(known) + np.diag(np.maximum(self.sizes, LEAST_SIZE) ** 2))
+
+    def made(self, one: Expansion) -> Expansion:
+        """A run's parabola as events are judged by it."""
+        return without_deviation(one.cooled(self.heat), self.sizes)
+
+    def expanded(self, n: int, x: np.ndarray) -> Expansion:
+        """A run's parabola about other values."""
+        return expand(self.parts[n], self.shared, x)
+
+    def put(self, n: int, one: Expansion) -> None:
+        """A run flies by another model from now on: the one that its parabola is about."""
+        self.raw[n], self.runs[n] = one, self.made(one)
+
+    def deviation(self, n: int) -> np.ndarray:
+        """A run's own most probable deviation from the model that it flies by, (count,) spreads, within limits.
+
+        Of what the reference leaves unknown of the shared values, and of what runs differ by.
+        """
+        one = self.raw[n]
+        known = self.deviations.get(n)
+        if known is None or known[0] is not one:
+            known = one, self.deviation_of(one)
+            self.deviations[n] = known
+        return known[1]
+
+    def deviation_of(self, one: Expansion) -> np.ndarray:
+        """The same of any parabola."""
+        cooled = one.cooled(self.heat)
+        low, high = np.minimum(self.shared.low - one.at, 0.0), np.maximum(self.shared.high - one.at, 0.0)
+        return bounded_step(cooled.curvature + self.certainty, cooled.slope, low, high)
+
+    def own_cost(self, part: Problem, x: np.ndarray) -> float:
+        """-2 log likelihood over the heat of a run, as `part` knows it, at its most probable values about x."""
+        one = expand(part, self.shared, x)
+        own = one.at + self.deviation_of(one)
+        return float(part.filter(*self.shared.model(part, own)).misfit[0]) / self.heat
+
+    def own_values(self, n: int) -> np.ndarray:
+        """The values of a run with its own deviation, (count,)."""
+        return self.raw[n].at + self.deviation(n)
+
+    def nis(self, n: int) -> float:
+        """Mean squared innovation of a run at its own values, by its parabola."""
+        one, shift = self.raw[n], self.deviation(n)
+        return one.nis + float(2.0 * one.slope @ shift + shift @ one.curvature @ shift) / one.samples
+
+    @property
+    def usual_nis(self) -> np.ndarray:
+        """The same of every run of the reference."""
+        return np.array([self.nis(n) for n in numbers(self.reference)])
+
+    def excess(self, n: int) -> float:
+        """Squared innovations of a run beyond what the reference has of them, over the heat."""
+        return float((self.nis(n) - self.usual_nis.mean()) * self.raw[n].samples / self.heat)
+
+
+def roughness_sigma(flights: Flights, n: int) -> float:
+    """How far a run's mean squared innovation lies above the reference's, by the model it flies by, in sigma."""
+    values = flights.usual_nis
+    chance = 2.0 / flights.runs[n].samples
+    spread = float(values.var(ddof=1)) if len(values) > 2 else 0.02**2
+    return float((flights.nis(n) - values.mean()) / np.sqrt(chance + spread))
+
+
+def numbers(state: np.ndarray) -> list[int]:
+    """The runs where a state (runs,) holds."""
+    return [int(n) for n in np.flatnonzero(state)]

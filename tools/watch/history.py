@@ -1,0 +1,113 @@
+"""What happened over the runs, as far as it is found: events, and what the runs fly by with them."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from sim_backend.core.effects.catalogue import catalogue
+from tools.diagnose.noise_probes import NoiseProbe
+from tools.watch.disorder import WATER, shaken
+from tools.watch.events import Change, Joint, Span, spans
+from tools.watch.flights import Flights, numbers
+
+NOT_ROUGH = 5.0  # nat that a run that is not rough takes off disorder that would hold there too
+FURTHER = 0.15  # of what an event explains in the same runs, that a further event there has to bring
+
+
+@dataclass
+class Event:
+    """A change over a span of runs."""
+
+    label: str  # of the catalogue, with parameters or of water's disorder; "" for disorder of something else
+    span: Span
+    evidence: float  # nat over no such change
+    rivals: dict[str, float]  # log evidence of labels, its own among them
+    size: np.ndarray  # spreads; of disorder its scale
+    covariance: np.ndarray
+    explained: float  # nat by which the runs' misfit falls
+    sure_spans: dict[Span, float] = field(default_factory=dict)  # log evidence by span
+    probe: tuple[str, float] | None = None  # of disorder that is not the water's: what shakes, and how much
+    place: NoiseProbe | None = None  # and the single link that shakes most
+
+    @property
+    def has_course(self) -> bool:
+        """Whether its runs fly by another model; else by more noise."""
+        return self.label not in ("", *WATER)
+
+
+@dataclass
+class History:
+    """Where the search stands."""
+
+    flights: Flights
+    judged: np.ndarray  # (runs,) bool
+    begins: int  # the first run with which an event may begin
+    events: list[Event] = field(default_factory=list)
+    water: np.ndarray | None = None  # nat that the water's disorder gains, (WATER, runs, scales)
+
+    @property
+    def taken(self) -> list[tuple[str, np.ndarray]]:
+        """The events with a course, as unknowns of all runs together."""
+        count = self.flights.count
+        return [(event.label, event.span.weights(count)) for event in self.events if event.has_course]
+
+    def joint(self) -> Joint:
+        """All runs with the events that have a course."""
+        return Joint(self.flights.shared, list(self.flights.runs), self.taken)
+
+    def listed(self) -> list[Span]:
+        """Every span that an event may have."""
+        return spans([bool(one) for one in self.judged], self.begins)
+
+
+def place_of(event: Event) -> tuple[str, str]:
+    """Where its label sits."""
+    return catalogue()[event.label].place
+
+
+def shaken_place(event: Event) -> tuple[str, str] | None:
+    """Where a single link shakes; None of the water."""
+    return None if event.place is None else (event.place.subsystem, event.place.element)
+
+
+def already(history: History, change: Change) -> bool:
+    """Whether a change is one of those found: the same label, over runs that overlap."""
+    return any(
+        event.label == change.label and event.span.first < change.span.end and change.span.first < event.span.end
+        for event in history.events
+    )
+
+
+def earns_place(history: History, event: Event | Change) -> bool:
+    """Whether an event beside others in the same runs is more than the wrong form of one of them."""
+    count = history.flights.count
+    own = event.span.weights(count) > 0.0
+    for other in history.events:
+        theirs = other.span.weights(count) > 0.0
+        mostly_there = (own & theirs).sum() >= 0.5 * own.sum()
+        if mostly_there and event.evidence < FURTHER * other.explained:
+            return False
+    return True
+
+
+def take(history: History, event: Event) -> None:
+    """The runs of an event about the model that has it; without a course, with the noise that it is."""
+    flights = history.flights
+    inside = numbers(event.span.weights(flights.count))
+    if not event.has_course:
+        for n in inside:
+            name, scale = event.probe or (event.label, float(event.size[0]))
+            flights.parts[n] = shaken(flights.parts[n], name, scale)
+            flights.put(n, flights.expanded(n, flights.runs[n].at))
+    else:
+        joint = history.joint()
+        for n in inside:  # about the shared values of the reference: those of all runs make up for the next event too
+            flights.put(n, flights.expanded(n, within(flights, joint.run_values(n, flights.values))))
+    if history.water is not None:
+        # what the form of a label leaves is no disorder: it is asked about as what is left of the label
+        history.water[:, inside] = -NOT_ROUGH
+
+
+def within(flights: Flights, x: np.ndarray) -> np.ndarray:
+    """Values inside the limits of what runs may share."""
+    return np.clip(x, flights.shared.low, flights.shared.high)

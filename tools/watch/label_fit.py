@@ -1,0 +1,139 @@
+"""One label fitted to the runs of a span, beside the shared model: how large, and how much of the misfit it takes.
+
+The shared values are held; only the label's own parameters move, so that a step costs a few flights. A strong change
+is reached by way of filters that expect a rough disturbance, as in tools/diagnose/search.py.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tools.inference.fit import EFFECT_STEP, FIRST_STEP, bounded_step
+from tools.inference.problem import Problem
+from tools.watch.expansion import at_kink, columns_at
+from tools.watch.shared_parameters import SharedParameters
+
+STEPS = 5
+ROUGH = (100.0, 10.0)
+ENOUGH = 1.0  # squared sigma that a step promises: no further step
+APART = (0.1, 0.4, 0.9, 1.3, 1.7, 2.1)  # spreads: further starts of what begins at a kink, or behind a threshold
+SHARES = (1.0, 0.4, 0.1, 0.02)  # of a step that is tried
+
+
+@dataclass
+class Affected:
+    """Runs of a span, each a problem of its own, with their share of the full size and the model that they share."""
+
+    parts: Sequence[Problem]
+    weights: Sequence[float]
+    at: Sequence[np.ndarray]  # (count,) values of each run without the change
+    heat: float
+
+
+@dataclass(frozen=True)
+class LabelFit:
+    """A label at its most probable size."""
+
+    label: str
+    size: np.ndarray  # spreads, of its parameters
+    cost: float  # -2 log likelihood over the heat, and the prior's
+
+
+def values_of(shared: SharedParameters, label: str, at: np.ndarray, weight: float, size: np.ndarray) -> np.ndarray:
+    """The values (count,) of a run that has a share of a change."""
+    x = at.copy()
+    x[shared.labels[label]] += weight * size
+    return x
+
+
+def cost_of(runs: Affected, shared: SharedParameters, label: str, size: np.ndarray, roughness: float = 1.0) -> float:
+    """-2 log likelihood of the runs with a change of this size, by its own filters, over the heat; and the prior's."""
+    found = float(size @ size)
+    for part, weight, at in zip(runs.parts, runs.weights, runs.at, strict=True):
+        model = shared.model(part, values_of(shared, label, at, weight, size))
+        found += float(part.filter(*model, roughness=roughness, begin=True).misfit[0]) / runs.heat
+    return found if np.isfinite(found) else np.inf
+
+
+@dataclass
+class Step:
+    """Where a label's size stands, by its own filters, and where its parabola and the kept gains lead from there."""
+
+    cost: float
+    promised: float
+    to: np.ndarray
+
+
+def next_step(
+    runs: Affected, shared: SharedParameters, label: str, size: np.ndarray, roughness: float, shares: Sequence[float]
+) -> Step:
+    """The cost of a size, and the share of the Gauss-Newton step within its limits that does best with gains kept."""
+    columns, low_high = shared.labels[label], shared.limits(label, runs.at[0])
+    normal, slope, cost = np.eye(len(columns)), size.copy(), float(size @ size)
+    kept = []
+    for part, weight, at in zip(runs.parts, runs.weights, runs.at, strict=True):
+        x = values_of(shared, label, at, weight, size)
+        gains = part.filter(*shared.model(part, x), roughness=roughness, begin=True)
+        cost += float(gains.misfit[0]) / runs.heat
+        steps = np.where(np.abs(size) > 0.0, EFFECT_STEP * np.maximum(1.0, np.abs(x[columns])), FIRST_STEP)
+        steps = np.where(at_kink(shared, x)[columns], 1.0, steps)
+        steps = np.where(x[columns] + steps > shared.high[columns], -steps, steps)
+
+        def moved(k: int, step: float, part: Problem = part, x: np.ndarray = x) -> tuple[np.ndarray, np.ndarray]:
+            point = x.copy()
+            if k >= 0:
+                point[columns[k]] += step
+            return shared.model(part, point)
+
+        e, J = columns_at(part, gains, moved, at_kink(shared, x)[columns], steps)
+        normal += weight**2 * J @ J.T / runs.heat
+        slope += weight * J @ e / runs.heat
+        kept.append(gains)
+    low, high = low_high
+    step = bounded_step(normal, slope, np.minimum(low - size, 0.0), np.maximum(high - size, 0.0))
+    tried = [np.clip(size + share * step, low, high) for share in shares]
+    misfits = np.array([one @ one for one in tried])
+    for part, weight, at, gains in zip(runs.parts, runs.weights, runs.at, kept, strict=True):
+        E = part.follow([shared.model(part, values_of(shared, label, at, weight, one)) for one in tried], gains)
+        misfits += (E**2).sum(axis=1) / runs.heat
+    promised = -float(2.0 * slope @ step + step @ normal @ step)
+    return Step(cost if np.isfinite(cost) else np.inf, promised, tried[int(misfits.argmin())])
+
+
+def fit_label(
+    runs: Affected, shared: SharedParameters, label: str, start: np.ndarray, roughness: Sequence[float] = ()
+) -> LabelFit:
+    """The label led to its least misfit from `start` (spreads), through filters of each roughness first."""
+    size = start.copy()
+    for rough in roughness:
+        size = next_step(runs, shared, label, size, rough, SHARES).to
+    best, least, whole = size, np.inf, True
+    for _ in range(STEPS):
+        step = next_step(runs, shared, label, size, 1.0, SHARES if whole else SHARES[1:])
+        if step.cost < least:
+            best, least, whole = size, step.cost, True
+            if step.promised < ENOUGH:
+                break
+            size = step.to
+        elif whole:  # the filter of the new model sees it otherwise: half way back
+            size, whole = best + 0.3 * (size - best), False
+        else:
+            break
+    return LabelFit(label, best, least)
+
+
+def best_fit(runs: Affected, shared: SharedParameters, label: str, linear: np.ndarray, strong: bool) -> LabelFit:
+    """From the size that parabolas promise, and from nothing; of strong changes, by way of rough filters too."""
+    nothing = np.zeros(len(linear))
+    starts = [linear, nothing]
+    low, high = shared.limits(label, runs.at[0])
+    if at_kink(shared, runs.at[0])[shared.labels[label]].any():  # a threshold leads nowhere before it is reached
+        far = [sign * size for size in APART for sign in (1.0, -1.0)]
+        alone = [np.clip(size * one, low, high) for one in np.eye(len(linear)) for size in far]
+        starts += [one for one in alone if one.any()]
+    start = min(starts, key=lambda size: cost_of(runs, shared, label, size))
+    fits = [fit_label(runs, shared, label, start)]
+    if strong:
+        fits.append(fit_label(runs, shared, label, nothing, ROUGH))
+    return min(fits, key=lambda fit: fit.cost)

@@ -1,0 +1,125 @@
+"""A label over a span of runs against its rivals: fitted without parabolas, compared over all spans near by."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from tools.inference.fit import bounded_step
+from tools.watch.events import GROWING, STEP, Change, Joint, Span
+from tools.watch.expansion import Expansion, expand
+from tools.watch.flights import Flights, numbers
+from tools.watch.history import Event, History, within
+from tools.watch.label_fit import Affected, LabelFit, best_fit, cost_of, values_of
+
+FITTED = 3  # runs in which rivals are fitted
+LINEAR_TRIED, ROUGH_TRIED = 4, 5  # labels: by the parabolas of the filter as it is, and by rough ones
+FINAL = 3  # rivals that are compared over all spans
+BEHIND, BEHIND_SHARE = 40.0, 0.1  # squared sigma, and share of what the best gains, that a rival may be behind
+POORLY = 0.1  # of the excess: what the best of the first rivals may leave before more are tried
+REACH = 2  # runs about a span's ends between which it is found again
+
+
+def refined(history: History, joint: Joint, best: Change, changes: Sequence[Change]) -> Event | None:
+    """The change fitted without parabolas, with the labels that may be meant as well, and its span found again."""
+    flights, shared = history.flights, history.flights.shared
+    weights = best.span.weights(flights.count)
+    inside = numbers(weights * history.judged)
+    chosen = sorted(inside, key=lambda n: (-weights[n], -flights.excess(n)))[:FITTED]
+    base = [within(flights, flights.runs[n].at) for n in chosen]
+    affected = Affected([flights.parts[n] for n in chosen], [weights[n] for n in chosen], base, flights.heat)
+    same = sorted((one for one in changes if one.span == best.span), key=lambda one: -one.evidence)
+    nothing = cost_of(affected, shared, best.label, np.zeros(len(best.size)))
+    fits = {one.label: best_fit(affected, shared, one.label, one.size, False) for one in same[:LINEAR_TRIED]}
+    samples = sum(flights.raw[n].samples for n in chosen)
+    least = min(fits.values(), key=lambda fit: fit.cost)
+    promised = sum(max(flights.excess(n), 0.0) for n in chosen)
+    if nothing - least.cost < (1.0 - POORLY) * promised and promised > 0.1 * samples:
+        for label, size in rough_ranking(affected, flights)[:ROUGH_TRIED]:
+            again = best_fit(affected, shared, label, size, True)
+            if label not in fits or again.cost < fits[label].cost:
+                fits[label] = again
+    ranked = sorted(fits.values(), key=lambda fit: fit.cost)
+    gained = nothing - ranked[0].cost
+    kept = [fit for fit in ranked if fit.cost - ranked[0].cost <= max(BEHIND, BEHIND_SHARE * gained)][:FINAL]
+    found = [one for one in (over_spans(history, joint, best.span, fit) for fit in kept) if one is not None]
+    if not found:
+        return None
+    winner = max(found, key=lambda event: event.evidence)
+    other = by_other_course(history, joint, winner)
+    if other is not None and other.evidence > winner.evidence:
+        found[found.index(winner)] = winner = other
+    winner.rivals = {event.label: event.evidence for event in found}
+    # labels that were behind already count as far behind as they were in the runs of the fit
+    for fit in ranked:
+        winner.rivals.setdefault(fit.label, winner.evidence - 0.5 * (fit.cost - ranked[0].cost))
+    winner.explained = 0.5 * gained * len(inside) / max(1, len(chosen))
+    return winner
+
+
+def by_other_course(history: History, joint: Joint, event: Event) -> Event | None:
+    """A change that is still there fitted as growing where it is a step, and the other way; None where it ended.
+
+    Parabolas about a step say little of the small sizes that a growth begins with.
+    """
+    flights, span = history.flights, event.span
+    other = replace(span, course=STEP if span.course == GROWING else GROWING)
+    if other not in history.listed():
+        return None
+    weights = other.weights(flights.count)
+    inside = numbers(weights * history.judged)
+    chosen = [inside[0], inside[len(inside) // 2], inside[-1]]
+    base = [within(flights, flights.raw[n].at) for n in chosen]
+    affected = Affected([flights.parts[n] for n in chosen], [weights[n] for n in chosen], base, flights.heat)
+    fit = best_fit(affected, flights.shared, event.label, event.size, False)
+    return over_spans(history, joint, other, fit)
+
+
+def rough_ranking(affected: Affected, flights: Flights) -> list[tuple[str, np.ndarray]]:
+    """Labels by what a filter that lets the vehicle move sees of them, with the sizes it promises."""
+    shared = flights.shared
+    normal, slope = np.zeros((shared.count, shared.count)), np.zeros(shared.count)
+    for part, weight, at in zip(affected.parts, affected.weights, affected.at, strict=True):
+        one = expand(part, shared, at, 100.0).cooled(flights.heat)
+        normal += weight**2 * one.curvature
+        slope += weight * one.slope
+    found = []
+    for label, columns in shared.labels.items():
+        own = normal[np.ix_(columns, columns)] + np.eye(len(columns))
+        low, high = shared.limits(label, affected.at[0])
+        size = bounded_step(own, slope[columns], low, high)
+        found.append((float(2.0 * slope[columns] @ size + size @ own @ size), label, size))
+    return [(label, size) for _, label, size in sorted(found, key=lambda one: one[0])]
+
+
+def over_spans(history: History, joint: Joint, span: Span, fit: LabelFit) -> Event | None:
+    """A label's evidence over every span near the one it was fitted in, by parabolas about what it fitted."""
+    flights, shared = history.flights, history.flights.shared
+    weights = span.weights(flights.count)
+    first = max(history.begins, span.first - REACH)
+    end = min(flights.count, span.end + REACH)
+    about: dict[int, Expansion] = {}
+    for n in range(first, end):
+        if history.judged[n]:
+            weight = weights[n] or (1.0 if span.course != GROWING or n >= span.end else weights[span.first])
+            x = values_of(shared, fit.label, flights.runs[n].at, weight, fit.size)
+            about[n] = flights.made(flights.expanded(n, within(flights, x)))
+    found: dict[Span, tuple[float, np.ndarray, np.ndarray]] = {}
+    for one in history.listed():
+        near = abs(one.first - span.first) <= REACH and abs(one.end - span.end) <= REACH
+        if not near:
+            continue
+        own = one.weights(flights.count)
+        runs = [about[n] if own[n] and n in about else flights.runs[n] for n in range(flights.count)]
+        tried = Joint(shared, runs, [*history.taken, (fit.label, own)])
+        size, covariance = tried.size_of(len(history.taken))
+        low, high = shared.limits(fit.label, tried.values)
+        halved = float(np.log(2.0) * ((low == 0.0) | (high == 0.0)).sum())
+        outside = np.maximum(low - size, 0.0) + np.maximum(size - high, 0.0)
+        lost = 0.5 * float(outside @ np.linalg.solve(covariance, outside)) if outside.any() else 0.0
+        found[one] = tried.log_evidence - joint.log_evidence + halved - lost, np.clip(size, low, high), covariance
+    if not found:
+        return None
+    best = max(found, key=lambda one: found[one][0])
+    evidence, size, covariance = found[best]
+    return Event(fit.label, best, evidence, {}, size, covariance, 0.0, {one: value[0] for one, value in found.items()})

@@ -1,0 +1,52 @@
+"""The model that all runs share, fitted to the reference: Gauss and Newton in everything at once, held by its prior.
+
+As in tools/diagnose/search.py the data's weight is let in by degrees: first a filter that expects a rough disturbance.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tools.inference.fit import SHORTER_STEPS, bounded_step
+from tools.inference.problem import Problem
+from tools.watch.expansion import Expansion, expand
+from tools.watch.shared_parameters import SharedParameters
+
+ROUGHNESS = (100.0, 10.0, 1.0, 1.0, 1.0)  # of each step
+ENOUGH = 2.0  # squared sigma that the last step's parabola still promises: no further step
+
+
+def misfit(parts: Sequence[Problem], shared: SharedParameters, x: np.ndarray, roughness: float) -> float:
+    """-2 log likelihood of a model's own filters over runs."""
+    found = sum(float(part.filter(*shared.model(part, x), roughness=roughness, begin=True).misfit[0]) for part in parts)
+    return found if np.isfinite(found) else np.inf
+
+
+def fit_shared(parts: Sequence[Problem], shared: SharedParameters, start: np.ndarray | None = None) -> np.ndarray:
+    """The most probable shared values (count,) of runs, each a problem of its own; from `start`, where there is one."""
+    x = np.zeros(shared.count) if start is None else start.copy()
+    weight = np.diag(shared.prior**-2.0)
+    for roughness in ROUGHNESS if start is None else ROUGHNESS[-2:]:
+        found = [expand(part, shared, x, roughness) for part in parts]
+        heat = heat_of(found)
+        normal = sum(one.curvature for one in found) / heat + weight
+        slope = sum(one.slope for one in found) / heat + weight @ x
+        step = bounded_step(normal, slope, np.minimum(shared.low - x, 0.0), np.maximum(shared.high - x, 0.0))
+        promised = -float(2.0 * slope @ step + step @ normal @ step)
+        if roughness == 1.0 and promised < ENOUGH:
+            break
+        best, least = x, sum(one.value for one in found) / heat + x @ weight @ x
+        for share in (1.0, *SHORTER_STEPS):
+            tried = np.clip(x + share * step, shared.low, shared.high)
+            value = misfit(parts, shared, tried, roughness) / heat + tried @ weight @ tried
+            if value < least:
+                best, least = tried, value
+                break
+        x = best
+    return x
+
+
+def heat_of(found: Sequence[Expansion]) -> float:
+    """Mean squared innovation of runs, 1 at least: by so much their evidence counts for less."""
+    samples = sum(one.samples for one in found)
+    return max(1.0, sum(one.nis * one.samples for one in found) / max(1, samples))

@@ -1,0 +1,96 @@
+"""What all runs may share: one value of every parameter, bias and effect, each about what the vehicle file says.
+
+The shared values are no cause: they make up for whatever the runs have in common, by whichever of them do it. So
+effects that cannot be told apart from each other all stand among them.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from tools.inference.parameters import NUISANCE, FreeParameter, effect_parameters, model_at, nuisance_parameters
+from tools.inference.problem import Problem
+
+ALLOWED_PRIOR = 3.0  # times [uncertainty] and [sensors]: a file that is not quite right
+EFFECT_PRIOR = 0.5  # spreads of a label
+
+
+@dataclass(frozen=True)
+class SharedParameters:
+    """The parameters in their order: what the file allows for, then every entry of F that a label has."""
+
+    free: list[FreeParameter]
+    labels: dict[str, list[int]]  # places of each label's parameters in `free`
+    limited: dict[str, list[tuple[float, float]]]  # limits of each label's own parameters, spreads
+
+    @property
+    def count(self) -> int:
+        return len(self.free)
+
+    @cached_property
+    def prior(self) -> np.ndarray:
+        """1 sigma of each shared value, in its spreads, (count,)."""
+        return np.array([ALLOWED_PRIOR if one.label == NUISANCE else EFFECT_PRIOR for one in self.free])
+
+    @cached_property
+    def low(self) -> np.ndarray:
+        return np.array([one.low for one in self.free])
+
+    @cached_property
+    def high(self) -> np.ndarray:
+        return np.array([one.high for one in self.free])
+
+    @cached_property
+    def kinked(self) -> np.ndarray:
+        return np.array([one.kinked for one in self.free])
+
+    @cached_property
+    def groups(self) -> np.ndarray:
+        """0 parameters of the vehicle, 1 biases of its sensors, 2 effects, (count,)."""
+        return np.array([2 if f.label != NUISANCE else int(f.vector == "F") for f in self.free])
+
+    def model(self, problem: Problem, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """P, F at values x (count,) in spreads."""
+        return model_at(problem, self.free, x)
+
+    def limits(self, label: str, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """How far down and up a label's parameters can go from the shared values `at` (count,), spreads.
+
+        An entry that two labels share, each one way, goes each way from wherever it is.
+        """
+        own = self.limited[label]
+        shared = np.array([self.free[k].label != label or (self.low[k], self.high[k]) != limit
+                           for k, limit in zip(self.labels[label], own, strict=True)])  # fmt: skip
+        values = np.where(shared, 0.0, at[self.labels[label]])
+        low, high = np.array(own).T
+        return np.minimum(low - values, 0.0), np.maximum(high - values, 0.0)
+
+    def of_label(self, label: str, at: np.ndarray) -> list[FreeParameter]:
+        """A label's parameters counted from the shared values `at`: limits are as far away as they are from there."""
+        places, (low, high) = self.labels[label], self.limits(label, at)
+        return [
+            replace(self.free[k], label=label, low=float(a), high=float(b))
+            for k, a, b in zip(places, low, high, strict=True)
+        ]
+
+
+def shared_parameters(problem: Problem) -> SharedParameters:
+    """Of all runs of a problem. An entry that two labels have (heavier or lighter with depth) goes both ways."""
+    free = nuisance_parameters(problem)
+    places: dict[int, int] = {}
+    labels: dict[str, list[int]] = {}
+    limited: dict[str, list[tuple[float, float]]] = {}
+    for label, own in effect_parameters(problem).items():
+        labels[label] = []
+        limited[label] = [(one.low, one.high) for one in own]
+        for one in own:
+            if one.entry in places:
+                at = places[one.entry]
+                there = free[at]
+                free[at] = replace(there, low=min(there.low, one.low), high=max(there.high, one.high))
+            else:
+                places[one.entry] = len(free)
+                free.append(one)
+            labels[label].append(places[one.entry])
+    return SharedParameters(free, labels, limited)

@@ -1,0 +1,65 @@
+"""Whether what is left of a change, once its label is in the model, is a change that no label explains."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import norm
+
+from sim_backend.core.effects.catalogue import catalogue
+from tools.diagnose.noise_probes import NoiseProbe, probes
+from tools.inference.parameters import CLOCK_PLACE
+from tools.watch.disorder import SCALES, WATER, beyond_reference
+from tools.watch.flights import roughness_sigma
+from tools.watch.history import Event, History
+
+LEFT_OVER, LEFT_WIDTH = 0.145, 1.1  # as in tools/diagnose/unknown.py: the share left at which it is as likely as not
+PROBED, REFERENCE = 3, 2  # runs at most
+CLEAN = 5.0  # sigma of the mean squared innovation, below which nothing is left
+LEAST_PROBABILITY = 0.005
+
+
+@dataclass(frozen=True)
+class Left:
+    """What an event leaves in its runs: nat that the best probe gains there, over that and what the event explains."""
+
+    share: float
+    probes: list[tuple[NoiseProbe, float, float]]  # with gain and scale, the one that gains most first
+
+    @property
+    def probability(self) -> float:
+        """That this is no effect of the catalogue."""
+        z = (np.log(max(self.share, 1e-6)) - np.log(LEFT_OVER)) / LEFT_WIDTH
+        return float(np.clip(norm.cdf(z), LEAST_PROBABILITY, 1.0 - LEAST_PROBABILITY))
+
+
+NOTHING = Left(0.0, [])
+
+
+def what_is_left(history: History, event: Event) -> Left:
+    """Of an event in the runs that it has for itself."""
+    runs = alone(history, event)
+    explained = event.explained / max(1, int((event.span.weights(history.flights.count) > 0.0).sum()))
+    flights = history.flights
+    rough = sorted(runs, key=lambda n: -roughness_sigma(flights, n))[:PROBED]
+    if not rough or roughness_sigma(flights, rough[0]) < CLEAN:
+        return NOTHING
+    wanted = [probe for probe in probes(flights.parts[rough[0]]) if probe.name not in WATER]
+    together = beyond_reference(flights, wanted, rough, REFERENCE).sum(axis=1)
+    order = np.argsort(-together.max(axis=1))
+    found = [(wanted[n], float(together[n].max()), SCALES[int(together[n].argmax())]) for n in order]
+    if event.has_course and found[0][0].element == CLOCK_PLACE[1] and catalogue()[event.label].place == CLOCK_PLACE:
+        return NOTHING  # a clock that wanders is still one that is wrong
+    left = max(found[0][1], 0.0)
+    return Left(left / max(left + explained * len(rough), 1e-9), found)
+
+
+def alone(history: History, event: Event) -> np.ndarray:
+    """The runs that have this event and no other of another span; all of its runs, where there are none."""
+    count = history.flights.count
+    own = event.span.weights(count) > 0.0
+    free = own.copy()
+    for other in history.events:
+        if other is not event and other.span != event.span:
+            free &= other.span.weights(count) == 0.0
+    found = free if (free & history.judged).any() else own
+    return np.flatnonzero(found & history.judged)

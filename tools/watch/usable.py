@@ -1,0 +1,50 @@
+"""Which runs can be judged at all, and which part of them: a vehicle that does not fly says nothing about itself."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from tools.data.runs import columns as names
+from tools.data.runs.run import Run
+from tools.inference.channels import recorded
+from tools.readings.stretches import flying, states
+
+SHORTEST = 15.0  # s of flight; the filter needs some seconds to find how a run began
+READ = 0.2  # of the rows that at least have a reading of the attitude
+ASKED = (*names.ATTITUDE, *names.RATES, names.DEPTH)
+
+
+def usable(run: Run, wanted: set[str] = frozenset()) -> Run | str:  # type: ignore[assignment]
+    """The run's longest stretch of flight, or why it cannot be judged. wanted: readings that other runs have."""
+    if run.rows < 2:
+        return "no two samples"
+    there = {name for name in ASKED if recorded(run, name)}
+    if len(there) < 2:
+        return f"no readings but {', '.join(sorted(there)) or 'time'}"
+    missing = sorted(name for name in wanted if not recorded(run, name))
+    if missing:
+        return f"no readings of {', '.join(missing)}, which the other runs have"
+    attitude = [np.isfinite(run.columns[name]) for name in names.ATTITUDE if name in there]
+    if attitude and np.mean(np.any(attitude, axis=0)) < READ:
+        return "hardly a reading of the attitude"
+    state = flying(run)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], state.astype(int), [0]])))
+    stretches = sorted(zip(edges[::2], edges[1::2], strict=True), key=lambda one: run.t[one[0]] - run.t[one[1] - 1])
+    length = float(run.t[stretches[0][1] - 1] - run.t[stretches[0][0]]) if stretches else 0.0
+    if length < SHORTEST:
+        reasons = [reason for reason, when in states(run).items() if when.any()]
+        whole = float(run.t[-1] - run.t[0])
+        if not reasons:
+            return f"{whole:.0f} s long: {SHORTEST:.0f} s at least can be judged"
+        return f"flies for {length:.0f} s of {whole:.0f} s only: {', '.join(reasons)}"
+    first, end = stretches[0]
+    if first == 0 and end == run.rows:
+        return run
+    columns = {name: values[first:end] for name, values in run.columns.items()}
+    return replace(run, columns=columns, extra={})
+
+
+def readings_of(runs: list[Run]) -> set[str]:
+    """The readings that every one of the runs has."""
+    found = [{name for name in ASKED if recorded(run, name)} for run in runs]
+    return set.intersection(*found) if found else set()

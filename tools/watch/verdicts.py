@@ -1,0 +1,247 @@
+"""From events to an answer: does a change matter, is its label the cause, how large is it, and in which runs."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sim_backend.core.effects.catalogue import catalogue
+from tools.diagnose.matter import MATTERS, largest
+from tools.diagnose.verdict import ERROR_RATE, TIE, softmax
+from tools.inference.predict import fly_windows_from
+from tools.watch.answer import CAUSE, NONE, UNKNOWN, EventAnswer, RunCause, RunVerdict, Sized
+from tools.watch.disorder import WATER
+from tools.watch.events import GROWING, STEP, Span
+from tools.watch.flights import roughness_sigma
+from tools.watch.history import Event, History, within
+from tools.watch.search import EVIDENCE_NEEDED
+from tools.watch.unknown import NOTHING, Left, what_is_left
+
+ROUGH = 6.0  # sigma of a run's mean squared innovation: something changed, though no label says what
+MOST_SURE = 0.995
+FORM = 0.06  # of a size, 1 sigma: nature's form is not the catalogue's (docs/WATCH.md)
+CI90 = 1.645
+LOOKED_AT = 2  # runs of an event in which it has to matter
+VECTORS = ("gyro_bias", "current", "current_shear", "compass")  # labels whose parameters are parts of one length
+
+
+@dataclass
+class Settled:
+    """An event that stands, and what is thought of it."""
+
+    event: Event
+    left: Left
+    probability: float  # that there is such a change
+    unknown: bool
+    number: int  # of the event among those with a course; -1: it has none
+
+    @property
+    def label(self) -> str | None:
+        return None if self.unknown else self.event.label
+
+
+def settle(history: History) -> list[Settled]:
+    """The events that matter; those that no label explains, as unknown."""
+    found: list[Settled] = []
+    number = 0
+    for event in history.events:
+        own, number = (number, number + 1) if event.has_course else (-1, number)
+        if any(one.unknown and beside(one.event.span, event.span) for one in found):
+            continue  # what mimics an unknown change is none of its own
+        if event.has_course and not matters(history, event, own):
+            continue
+        left = what_is_left(history, event) if event.has_course else NOTHING
+        sure = 1.0 / (1.0 + np.exp(-np.clip(event.evidence - EVIDENCE_NEEDED, -50.0, 50.0)))
+        unknown = event.label == "" or left.probability > 0.5
+        found.append(Settled(event, left, min(float(sure), MOST_SURE), unknown, own))
+    return one_unknown([*found, *nameless(history, found)])
+
+
+def one_unknown(found: list[Settled]) -> list[Settled]:
+    """Unknown changes of runs that overlap or follow on each other are one, at the place of the first."""
+    kept: list[Settled] = []
+    for one in found:
+        other = next((k for k in kept if k.unknown and one.unknown and touch(k.event.span, one.event.span)), None)
+        if other is None:
+            kept.append(one)
+            continue
+        a, b = other.event.span, one.event.span
+        span = Span(min(a.first, b.first), max(a.end, b.end), STEP)
+        evidence = other.event.evidence + one.event.evidence
+        other.event = replace(other.event, span=span, evidence=evidence, sure_spans={})
+        other.probability = max(other.probability, one.probability)
+    return kept if len(kept) == len(found) else one_unknown(kept)
+
+
+def touch(one: Span, other: Span) -> bool:
+    """Whether two spans overlap or have one run at most between them."""
+    return one.first <= other.end + 1 and other.first <= one.end + 1
+
+
+def beside(one: Span, other: Span) -> bool:
+    """Whether two spans are the same to one run."""
+    return abs(one.first - other.first) <= 1 and abs(one.end - other.end) <= 1
+
+
+def nameless(history: History, found: list[Settled]) -> list[Settled]:
+    """Runs in no event that are rougher than the reference by far: a change that no label takes."""
+    flights = history.flights
+    covered = np.zeros(flights.count, dtype=bool)
+    for one in found:
+        covered |= one.event.span.weights(flights.count) > 0.0
+    rough = np.array([
+        bool(history.judged[n]) and not covered[n] and n >= history.begins and roughness_sigma(flights, n) > ROUGH
+        for n in range(flights.count)
+    ])  # fmt: skip
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], rough.astype(int), [0]])))
+    more = []
+    for first, end in zip(edges[::2], edges[1::2], strict=True):
+        span = Span(int(first), int(end), STEP)
+        evidence = float(sum(max(flights.excess(n), 0.0) for n in range(first, end))) / 2.0
+        event = Event("", span, evidence, {}, np.zeros(0), np.zeros((0, 0)), 0.0)
+        more.append(Settled(event, what_is_left(history, event), MOST_SURE, True, -1))
+    return more
+
+
+def matters(history: History, event: Event, number: int) -> bool:
+    """Whether the change moves a channel of some window by a tenth of its tolerance (docs/GAP.md)."""
+    flights, shared = history.flights, history.flights.shared
+    weights = event.span.weights(flights.count)
+    inside = sorted(np.flatnonzero(weights * history.judged), key=lambda n: -weights[n])[:LOOKED_AT]
+    size = history.joint().size_of(number)[0]
+    for n in inside:
+        part, x = flights.parts[n], flights.raw[n].at
+        without = x.copy()
+        without[shared.labels[event.label]] -= weights[n] * size
+        P, F = shared.model(part, x)
+        gains = part.filter(P, F, begin=True)
+        Y = fly_windows_from(part, P, F, gains)
+        other = fly_windows_from(part, *shared.model(part, within(flights, without)), gains)
+        if largest(part, Y, other) >= MATTERS:
+            return True
+    return False
+
+
+def membership(event: Event, count: int) -> np.ndarray:
+    """Probability of each run to be in the event, by the evidence of its spans, (runs,)."""
+    if not event.sure_spans:
+        return (event.span.weights(count) > 0.0).astype(float)
+    chances = softmax({str(n): value for n, value in enumerate(event.sure_spans.values())})
+    inside = [span.weights(count) > 0.0 for span in event.sure_spans]
+    return np.asarray(sum(chances[str(n)] * own for n, own in enumerate(inside)))
+
+
+def probabilities(one: Settled) -> dict[str, float]:
+    """Of the labels that the change may be, most probable first."""
+    if one.unknown or not one.event.rivals:
+        return {}
+    known = 1.0 - one.left.probability if one.left.probes else 1.0
+    chances = softmax(one.event.rivals)
+    scaled = {label: chance * (1.0 - ERROR_RATE) * known * one.probability for label, chance in chances.items()}
+    return dict(sorted(scaled.items(), key=lambda item: -item[1]))
+
+
+def group_of(one: Settled) -> list[str]:
+    """The labels that these runs cannot tell apart from the change's own, itself first."""
+    if one.label is None:
+        return []
+    rivals = one.event.rivals
+    near = [label for label in rivals if rivals[one.label] - rivals[label] <= TIE and label != one.label]
+    return [one.label, *sorted(near, key=lambda label: -rivals[label])]
+
+
+def sized(history: History, one: Settled, weight: float = 1.0) -> Sized:
+    """The change's size at a share of it, in the unit of its main parameter."""
+    event = one.event
+    if one.label is None:
+        return Sized(None, None, None)
+    if event.label in WATER:
+        return water_size(event)
+    size, covariance = history.joint().size_of(one.number)
+    free = [history.flights.shared.free[k] for k in history.flights.shared.labels[event.label]]
+    units = np.array([own.spread for own in free])
+    low, high = history.flights.shared.limits(event.label, history.flights.values)
+    values = weight * np.clip(size, low, high) * units
+    C = weight**2 * covariance * np.outer(units, units)
+    sigma = np.sqrt(np.diag(C) + (FORM * values) ** 2)
+    parameters = {
+        own.name: {"estimate": float(v), "ci90": (float(v - CI90 * s), float(v + CI90 * s)), "unit": own.unit}
+        for own, v, s in zip(free, values, sigma, strict=True)
+    }
+    if event.label in VECTORS:
+        length = float(np.linalg.norm(values))
+        along = values / max(length, 1e-12)
+        spread = float(np.sqrt(along @ C @ along + (FORM * length) ** 2))
+        return Sized(length, (max(0.0, length - CI90 * spread), length + CI90 * spread), free[0].unit, parameters)
+    main = int(np.argmax(np.abs(values) / np.maximum(sigma, 1e-12)))
+    value, spread = float(values[main]), float(sigma[main])
+    return Sized(value, (value - CI90 * spread, value + CI90 * spread), free[main].unit, parameters)
+
+
+def water_size(event: Event) -> Sized:
+    """Of turbulence: by how much rougher the water is, less one, as the catalogue says it; of waves nothing."""
+    scale, spread = float(event.size[0]), float(np.sqrt(event.covariance[0, 0]))
+    if event.label != "turbulence":
+        return Sized(None, None, None)
+    return Sized(scale - 1.0, (scale - 1.0 - CI90 * spread, scale - 1.0 + CI90 * spread), "1")
+
+
+def where_of(one: Settled) -> list[dict[str, object]]:
+    """Places of the change, most probable first."""
+    chances: dict[tuple[str, str], float] = {}
+    if one.label is not None:
+        for label, chance in probabilities(one).items():
+            place = catalogue()[label].place
+            chances[place] = chances.get(place, 0.0) + chance
+    elif one.left.probes:
+        gains = [max(gain, 0.0) for _, gain, _ in one.left.probes]
+        for (probe, _, _), gain in zip(one.left.probes, gains, strict=True):
+            place = (probe.subsystem, probe.element)
+            chances[place] = chances.get(place, 0.0) + gain / max(sum(gains), 1e-9)
+    elif one.event.place is not None:
+        chances[one.event.place.subsystem, one.event.place.element] = 1.0
+    elif one.event.label:
+        chances[catalogue()[one.event.label].place] = 1.0
+    ranked = sorted(chances.items(), key=lambda item: -item[1])
+    return [{"subsystem": s, "element": e, "probability": p} for (s, e), p in ranked if p > 0.005]
+
+
+def event_answer(history: History, one: Settled, names: list[str]) -> EventAnswer:
+    """An event as it is told; names: of all runs."""
+    span, count = one.event.span, history.flights.count
+    inside = np.flatnonzero((span.weights(count) > 0.0) & history.judged)
+    still = int(inside[-1]) == int(np.flatnonzero(history.judged)[-1])
+    weights = span.weights(count)
+    course = GROWING if span.course == GROWING else (STEP if still else "episode")
+    sizes = []
+    for n in inside:
+        own = sized(history, one, float(weights[n]))
+        sizes.append({"run": names[n], "size": own.size, "ci90": own.ci90})
+    known = max([*probabilities(one).values(), 0.0])
+    unknown = one.left.probability if one.event.has_course else 1.0 - ERROR_RATE
+    chance = known if one.label else one.probability * unknown
+    last = None if still else names[inside[-1]]
+    return EventAnswer(
+        one.label, where_of(one), group_of(one), names[inside[0]], last, course, float(chance), sized(history, one),
+        sizes,
+    )  # fmt: skip
+
+
+def run_verdict(history: History, settled: list[Settled], n: int, name: str, gap: float | None) -> RunVerdict:
+    """One run by the events that it is in."""
+    count = history.flights.count
+    causes, unknown = [], False
+    for one in settled:
+        weight = float(one.event.span.weights(count)[n])
+        if weight == 0.0:
+            continue
+        unknown |= one.unknown
+        inside = float(membership(one.event, count)[n])
+        for label, chance in probabilities(one).items():
+            if chance * inside > 0.01 or label == one.label:
+                own = sized(history, one, weight) if label == one.label else Sized(None, None, None)
+                causes.append(RunCause(label, chance * inside, group_of(one) if label == one.label else [label], own))
+    causes.sort(key=lambda cause: -cause.probability)
+    verdict = CAUSE if causes else (UNKNOWN if unknown else NONE)
+    return RunVerdict(name, verdict, causes, gap, None)
+
+

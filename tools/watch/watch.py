@@ -1,0 +1,136 @@
+"""`glider gap watch`: what is different, since when. The flow from runs to the answer (docs/WATCH.md)."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from tools.data.errors import InputError
+from tools.data.runs.case import Case
+from tools.data.runs.run import Run
+from tools.gap.measure import run_gap
+from tools.inference.predict import fly
+from tools.inference.problem import Problem, cut, problem_of
+from tools.watch.answer import NONE, RunVerdict, Watch
+from tools.watch.flights import Flights
+from tools.watch.history import History
+from tools.watch.search import find_events
+from tools.watch.shared_parameters import shared_parameters
+from tools.watch.usable import ASKED, readings_of, usable
+from tools.watch.verdicts import event_answer, run_verdict, settle
+
+FIRST, FIRST_SHARE = 4, 3  # without a reference: so many runs at most, one in so many, are where learning begins
+FEW = 3  # runs of a reference from which it can be learned what runs differ by
+
+
+def watch(case: Case, reference: Case | None = None, say: Callable[[str], None] = lambda text: None) -> Watch:
+    """What changed over the runs of a case; InputError where there is nothing to compare them with."""
+    before = [] if reference is None else reference.runs
+    runs, skipped = usable_runs([*before, *case.runs])
+    count = len(before)
+    here = sorted(runs)
+    told = [f"{reference.folder.name}/{run.name}" for run in before] if reference is not None else []
+    names = [*told, *(run.name for run in case.runs)]
+    judged = np.array([reference is None or n >= count for n in here], dtype=bool)
+    if not judged.any() or (reference is not None and judged.all()) or len(here) < 2:
+        raise InputError(nothing_to_compare(skipped, names, count), source=case.folder)
+    problem = problem_of(case, runs=[runs[n] for n in here])
+    parts = [problem.part(k) for k in range(len(here))]
+    learned_from = ~judged if reference is not None else first_runs(len(here))
+    begins = int((~judged).sum()) if reference is not None else 1
+    history = looked_at(parts, problem, learned_from, judged, begins, say)
+    if reference is None and any(event.span.first < learned_from.sum() for event in history.events):
+        again = unchanged(history)
+        if (again != learned_from).any():
+            say("something changed among the first runs: learning again from those without it")
+            learned_from = again
+            history = looked_at(parts, problem, learned_from, judged, begins, say)
+    settled = settle(history)
+    told_by = [names[n] for n in here]
+    verdicts = []
+    for n, run in enumerate(case.runs, start=count):
+        if n not in runs:
+            verdicts.append(RunVerdict(run.name, NONE, [], None, skipped[n]))
+            continue
+        k = here.index(n)
+        gap = shared_gap(problem.part(k), history.flights, k)
+        verdicts.append(run_verdict(history, settled, k, run.name, gap))
+    events = [event_answer(history, one, told_by) for one in settled]
+    learned = [told_by[k] for k in np.flatnonzero(learned_from)]
+    return Watch(verdicts, events, learned, cautions(case, reference, learned, skipped, names))
+
+
+def usable_runs(runs: list[Run]) -> tuple[dict[int, Run], dict[int, str]]:
+    """The runs that can be judged by their number, and why the others cannot."""
+    found = {n: usable(run) for n, run in enumerate(runs)}
+    good = {n: one for n, one in found.items() if isinstance(one, Run)}
+    wanted = usual_readings(list(good.values()))
+    found |= {n: usable(runs[n], wanted) for n in good}
+    return (
+        {n: one for n, one in found.items() if isinstance(one, Run)},
+        {n: one for n, one in found.items() if isinstance(one, str)},
+    )
+
+
+def usual_readings(runs: list[Run]) -> set[str]:
+    """The readings that more than half of the runs have."""
+    each = [readings_of([run]) for run in runs]
+    return {name for name in ASKED if sum(name in own for own in each) > 0.5 * len(each)}
+
+
+def first_runs(count: int) -> np.ndarray:
+    """Where learning begins without a reference: the first runs, (runs,) bool."""
+    return np.arange(count) < max(1, min(FIRST, count // FIRST_SHARE))
+
+
+def looked_at(
+    parts: list[Problem], problem: Problem, learned_from: np.ndarray, judged: np.ndarray, begins: int,
+    say: Callable[[str], None],
+) -> History:
+    """The shared model learned, and the events found."""
+    flights = Flights(list(parts), shared_parameters(problem), learned_from)
+    flights.learn()
+    say(f"learned from {int(learned_from.sum())} runs what all share")
+    history = History(flights, judged, begins)
+    find_events(history, say)
+    return history
+
+
+def unchanged(history: History) -> np.ndarray:
+    """The runs before the first event and behind those that ended, (runs,) bool."""
+    inside = np.zeros(history.flights.count, dtype=bool)
+    for event in history.events:
+        inside |= event.span.weights(len(inside)) > 0.0
+    return ~inside
+
+
+def shared_gap(part: Problem, flights: Flights, n: int) -> float | None:
+    """Total gap of a run to the model that all runs share."""
+    Y = fly(part, *flights.shared.model(part, flights.values))
+    total = run_gap(part.kind.measures, part.runs[0], Y, cut(part).listed[0]).total
+    return float(total) if np.isfinite(total) else None
+
+
+def nothing_to_compare(skipped: dict[int, str], names: list[str], count: int) -> str:
+    """Why no run can be compared with any other."""
+    if skipped:
+        n = min(skipped, key=lambda k: (k < count, k))
+        return f"nothing to compare: {names[n]}: {skipped[n]}"
+    return "nothing to compare: one run, and no --reference"
+
+
+def cautions(
+    case: Case, reference: Case | None, learned: list[str], skipped: dict[int, str], names: list[str]
+) -> list[str]:
+    """What has to be said with the answer."""
+    found = []
+    if len(learned) < FEW:
+        found.append(
+            f"only {len(learned)} run{'' if len(learned) == 1 else 's'} to learn from: how much runs differ though "
+            "nothing changed is assumed, not learned, and a model that is wrong may pass for a change"
+        )
+    if reference is None:
+        found.append(f"no reference: {', '.join(learned)} are taken as unchanged")
+    if reference is not None and reference.motion_capture != case.motion_capture:
+        found.append("motion capture in the reference or in the case only: what it alone sees cannot be compared")
+    found += [f"reference run {names[n]} left out: {why}" for n, why in skipped.items() if names[n].find("/") > 0]
+    return found

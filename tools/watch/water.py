@@ -1,0 +1,93 @@
+"""Disorder over a span of runs: of the water, or of something that no label means; and whether a label says more."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from tools.diagnose.noise_probes import TURBULENCE, WAVES, probes
+from tools.diagnose.unknown import ONE_AXIS
+from tools.watch.disorder import SCALES, WATER, beyond_reference, shaken, water_gains
+from tools.watch.events import GROWING
+from tools.watch.flights import Flights, numbers, roughness_sigma
+from tools.watch.history import NOT_ROUGH, Event, History, within
+from tools.watch.label_fit import values_of
+
+ASKED_ABOVE = 4.0  # sigma of a run's mean squared innovation over the reference's, for disorder to be looked for
+STRETCH = 5.0  # s
+BURSTS = 0.65  # turbulence by 0.5 (weak) and less; changes that no label knows come in bursts, by 0.9 and more
+PROBED = 2  # runs in which it is asked what shakes
+
+
+def water_event(history: History) -> Event | None:
+    """The water's disorder over the span where it gains most; None where it gains nothing."""
+    flights, best = history.flights, None
+    if history.water is None:
+        history.water = rough_water(flights, range(flights.count))
+    shaken_before = [event.span.weights(flights.count) > 0.0 for event in history.events if not event.has_course]
+    for span in history.listed():
+        inside = span.weights(flights.count) > 0.0
+        if span.course == GROWING or any((inside & before).any() for before in shaken_before):
+            continue
+        for label, gains in zip(WATER, history.water, strict=True):
+            together = gains[inside].sum(axis=0)
+            k = int(together.argmax())
+            if best is None or together[k] > best.evidence:
+                size, gain = np.array([SCALES[k]]), float(together[k])
+                best = Event(label, span, gain, {label: gain}, size, np.diag(size**2 / 16.0), gain)
+    return best
+
+
+def rough_water(flights: Flights, runs: Sequence[int]) -> np.ndarray:
+    """Nat that the water's disorder gains in runs, (WATER, runs, scales); asked of rough ones only."""
+    found = np.full((len(WATER), len(runs), len(SCALES)), -NOT_ROUGH)
+    rough = [k for k, n in enumerate(runs) if roughness_sigma(flights, n) > ASKED_ABOVE]
+    if rough:
+        found[:, rough] = water_gains(flights, [runs[k] for k in rough])
+    return found
+
+
+def named(history: History, event: Event) -> Event:
+    """Disorder by what shakes most: the water, or something else, which no label means.
+
+    Turbulence shakes every axis, and it does so all the time.
+    """
+    flights = history.flights
+    inside = numbers((event.span.weights(flights.count) > 0.0) & history.judged)
+    loudest = sorted(inside, key=lambda n: -roughness_sigma(flights, n))[:PROBED]
+    wanted = probes(flights.parts[loudest[0]])
+    gains = beyond_reference(flights, wanted, loudest, PROBED).sum(axis=1).max(axis=1)
+    first = int(gains.argmax())
+    own = gains[[one.name for one in wanted].index(TURBULENCE)]
+    axes = [gain for gain, one in zip(gains, wanted, strict=True) if one.stage == "force" and one.name != TURBULENCE]
+    even = max(axes) < ONE_AXIS * own and max(burstiness(flights, n) for n in loudest) < BURSTS
+    if wanted[first].name == WAVES or (wanted[first].name == TURBULENCE and even):
+        return replace(event, label=wanted[first].name)
+    linked = max((n for n, one in enumerate(wanted) if one.name not in WATER), key=lambda n: gains[n])
+    return replace(event, label="", rivals={}, probe=(wanted[first].name, float(event.size[0])), place=wanted[linked])
+
+
+def burstiness(flights: Flights, n: int) -> float:
+    """By how much a run's squared innovations change from one stretch to the next, over how far they exceed 1."""
+    part = flights.parts[n]
+    E = part.filter(*flights.shared.model(part, flights.own_values(n))).E
+    rows = max(2, int(STRETCH / np.median(np.diff(part.recording.t))))
+    each = [np.nanmean(E[k : k + rows] ** 2) for k in range(0, len(E) - rows + 1, rows)]
+    return float(np.std(each) / max(np.mean(each) - 1.0, 0.05))
+
+
+def rougher(history: History, rough: Event, event: Event) -> bool:
+    """Whether disorder says more of the runs than a label does; of other runs, whether it is the more evident."""
+    flights = history.flights
+    both = (rough.span.weights(flights.count) > 0.0) & (event.span.weights(flights.count) > 0.0) & history.judged
+    if not both.any():
+        return rough.evidence > event.evidence
+    chosen = sorted(numbers(both), key=lambda n: -roughness_sigma(flights, n))[:PROBED]
+    weights, cost = event.span.weights(flights.count), 0.0
+    for n in chosen:
+        x = flights.raw[n].at
+        part = shaken(flights.parts[n], rough.label, float(rough.size[0]))
+        cost += flights.own_cost(part, x)
+        changed = values_of(flights.shared, event.label, x, weights[n], event.size)
+        cost -= flights.own_cost(flights.parts[n], within(flights, changed))
+    return cost < 0.0
