@@ -65,7 +65,7 @@ def _trial(rng: np.random.Generator, vehicle: Vehicle, plan: VehiclePlan, runs: 
     errors = sensor_errors(vehicle, rng)
     errors[0] *= WIDER
     P = draw_parameters(vehicle, rng, WIDER)
-    return Trial(vehicle, site, P, shapes, errors, designs, int(rng.integers(0, 2**31)))
+    return Trial(vehicle, site, P, shapes, errors, designs, int(rng.integers(0, 2**31)), vehicle)
 
 
 def _common(rng: np.random.Generator, trial: Trial, changed: Form | None) -> tuple[np.ndarray, str | None] | None:
