@@ -45,6 +45,7 @@ def read_attitude(F, x, t, y):
     pulled = F[fo.FS_ROLL_PULL] * wire_position(F, x) / 0.06
     y[fo.FR_ROLL] = phi + F[fo.FS_IMU_ROLL] * (1.0 + 0.1 * math.cos(2.0 * theta)) + pulled
     y[fo.FR_PITCH] = theta + F[fo.FS_IMU_PITCH] * (1.0 - 0.15 * math.exp(-t / 30.0))
+    y[fo.FR_PITCH] += 0.5 * F[fo.FS_PITCH_SCALE] * math.sin(2.0 * theta)
     bent = F[fo.FS_COMPASS_1] * math.sin(psi - F[fo.FS_COMPASS_PHASE_1])
     bent += F[fo.FS_COMPASS_2] * math.sin(2.0 * psi - F[fo.FS_COMPASS_PHASE_2])
     y[fo.FR_YAW] = psi + bent

@@ -26,8 +26,9 @@ from firmware.core.vehicle.layout import N_X
     # outside the catalogue
     FS_FLAP, FS_PUMP_JET, FS_FOULING, FS_ROLL_PITCH, FS_TANGLE, FS_LIFT_LAG,  # N m s, N, 1, kg, kg/m, 1
     FS_GYRO_DEPTH, FS_WIRE_DRIFT, FS_ROLL_PULL,  # rad/s a metre, m, rad
-) = range(63)  # fmt: skip
-N_STRENGTH = 64  # one to spare
+    FS_PITCH_SCALE,  # 1; a label of the catalogue that came later
+) = range(64)  # fmt: skip
+N_STRENGTH = 64
 
 # --- F: shapes ------------------------------------------------------------------------------------------------------
 FS_EXPONENT = 64  # of the speed in what nominally grows with V^2

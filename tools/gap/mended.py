@@ -26,7 +26,7 @@ from tools.readings.signals import table_of
 SIZED = {
     "attitude_lag": "ATTITUDE_LAG", "depth_lag": "DEPTH_LAG", "depth_offset": "DEPTH_OFFSET",
     "depth_scale": "DEPTH_SCALE", "pressure_lever": "DEPTH_LEVER", "imu_pitch_bias": "PITCH_BIAS",
-    "imu_roll_bias": "ROLL_BIAS",
+    "imu_roll_bias": "ROLL_BIAS", "attitude_scale": "PITCH_SCALE",
 }  # fmt: skip
 # Axes of a gyro have one scale where they differ by less than standard errors, or than a share of it: the rate about
 # the vertical is compared with a compass, whose errors that turn with the heading look like some of it.

@@ -13,6 +13,7 @@ MINUS, DASH = "\N{MINUS SIGN}", "\N{EN DASH}"
 PLAIN = {
     "added_mass": "the water carried along across the hull is more or less than modelled",
     "attitude_lag": "measured attitude lags behind the motion",
+    "attitude_scale": "measured pitch is off by a factor",
     "ballast_leak": "the vehicle takes on water, unseen by the tank's draw-wire",
     "ballast_scale": "the tank holds more or less than its draw-wire says",
     "cg_lateral": "the centre of gravity lies off to one side",

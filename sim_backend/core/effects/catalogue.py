@@ -151,6 +151,9 @@ EFFECTS = (
     # the IMU is mounted nose up or down; its pitch reads a constant too much
     _row("sensing attitude", "imu_pitch_bias", "constant error of the measured pitch, nose up positive",
          Parameter("angle", "rad", -0.4, 0.4, 0.05, "PITCH_BIAS")),
+    # the pitch is turned into radians by a wrong factor, or its filter falls short
+    _row("sensing attitude", "attitude_scale", "measured pitch times 1 + scale",
+         Parameter("scale", "1", -0.9, 4.0, 0.15, "PITCH_SCALE")),
     # iron near the compass: its heading errs with the heading
     _row("sensing attitude", "compass", "error s1 sin(yaw) + c1 cos(yaw) + s2 sin(2 yaw) + c2 cos(2 yaw)",
          Parameter("s1", "rad", -0.8, 0.8, 0.1, "COMPASS_S1"), Parameter("c1", "rad", -0.8, 0.8, 0.1, "COMPASS_C1"),

@@ -58,7 +58,7 @@ def read(F, x, y):
     y[ef.Y_MOCAP_X], y[ef.Y_MOCAP_Y], y[ef.Y_MOCAP_Z] = x[X_NORTH], x[X_EAST], x[X_DOWN]
     y[ef.Y_MOCAP_ROLL], y[ef.Y_MOCAP_PITCH], y[ef.Y_MOCAP_YAW] = roll, pitch, yaw
     y[ef.Y_ROLL] = roll - x[ef.X_LAG] + F[ef.ROLL_BIAS]
-    y[ef.Y_PITCH] = pitch - x[ef.X_LAG + 1] + F[ef.PITCH_BIAS]
+    y[ef.Y_PITCH] = (1.0 + F[ef.PITCH_SCALE]) * (pitch - x[ef.X_LAG + 1]) + F[ef.PITCH_BIAS]
     compass = F[ef.COMPASS_S1] * math.sin(yaw) + F[ef.COMPASS_C1] * math.cos(yaw)
     compass += F[ef.COMPASS_S2] * math.sin(2.0 * yaw) + F[ef.COMPASS_C2] * math.cos(2.0 * yaw)
     y[ef.Y_YAW] = yaw - x[ef.X_LAG + 2] + compass

@@ -46,6 +46,7 @@ def test_without_effects_everything_is_read_as_it_is():
     [
         ({"imu_roll_bias": {"angle": 0.05}}, ef.Y_ROLL, 0.25),
         ({"imu_pitch_bias": {"angle": 0.05}}, ef.Y_PITCH, -0.35),
+        ({"attitude_scale": {"scale": 0.1}}, ef.Y_PITCH, -0.44),
         ({"gyro_scale": {"scale": 0.4}}, ef.Y_Q, -0.056),
         ({"gyro_bias": {"r": 0.01}}, ef.Y_R, 0.04),
         ({"gyro_bias": {"p": 0.01}, "gyro_scale": {"scale": 1.0}}, ef.Y_P, 0.11),

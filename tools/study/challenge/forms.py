@@ -87,6 +87,7 @@ KNOWN = (
     _form("turbulence", "environment", "water", fo.FS_TURBULENCE, 6.0, 4.0, scatter=True),
     _form("imu_pitch_bias", "sensing", "attitude", fo.FS_IMU_PITCH, 0.06, 2.5, 2.5, least=0.217),
     _form("imu_roll_bias", "sensing", "attitude", fo.FS_IMU_ROLL, 0.08, 2.5, 2.5, least=0.1625),
+    _form("attitude_scale", "sensing", "attitude", fo.FS_PITCH_SCALE, 0.2, 3.0, 3.0),
     _form("compass", "sensing", "attitude", (fo.FS_COMPASS_1, fo.FS_COMPASS_2), 0.15, 3.0),
     _form("attitude_lag", "sensing", "attitude", fo.FS_ATTITUDE_LAG, 0.4, 5.0),
     _form("gyro_scale", "sensing", "gyro", fo.FS_GYRO_SCALE, 0.3, 5.0, 2.8),
