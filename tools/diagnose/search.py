@@ -40,7 +40,7 @@ POLISHED = {1: 3, 2: 2}  # times at most, by the number of effects; once with mo
 # held or coloured.
 LEAST_LEVEL, MOST_LEVEL = 0.5, 2.0
 NO_LEVEL = 2.5  # a disturbance that would have to be as many times the file's is none: it stays what the file says
-UNLIKE = 0.1  # logarithm of a level, by which another is worth new gains
+UNLIKE = 0.1  # logarithm by which a level is another: what is found of sensors is right by as much (docs/DIAGNOSIS.md)
 LEVEL_ROUNDS = 2  # Newton steps at a time
 ROUNDS = 3  # of gains at the best label and all labels tried again there, at most
 ALIGNED = 3  # times that poses are moved to where the clock found so far says
@@ -238,7 +238,7 @@ def first_round(search: Search) -> None:
 
 def run(problem: Problem, say: Callable[[str], None] = lambda text: None, first: Hypothesis | None = None) -> Search:
     """The search over a problem's runs; from the effects of `first`, where those are certain."""
-    problem = levels.sensor_noise(problem, LEAST_LEVEL, MOST_LEVEL).applied(problem)
+    problem = levels.sensor_noise(problem, LEAST_LEVEL, MOST_LEVEL).beyond(UNLIKE).applied(problem)
     free, known = nuisance_parameters(problem), effect_parameters(problem)
     P, F = model_at(problem, free, np.zeros(len(free)))
     gains = gains_of(problem, (P, F), ROUGHNESS[0])

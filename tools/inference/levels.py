@@ -52,6 +52,10 @@ class Levels:
         recorded = None if problem.recorded is None else self.applied(problem.recorded)
         return replace(problem, spectral=spectral, R=R, recorded=recorded)
 
+    def beyond(self, least: float) -> "Levels":
+        """These levels, those whose logarithm is less than `least` as the case names them."""
+        return self.moved(np.where(np.abs(self.log) < least, 0.0, self.log))
+
     def moved(self, log: np.ndarray) -> "Levels":
         return replace(self, log=log)
 

@@ -108,3 +108,9 @@ def test_noise_that_is_not_white_says_nothing(calm):
     found = levels.sensor_noise(replace(calm, z=z), 0.5, 2.0)
     assert "depth" not in found.names
     assert "gyro" in found.names
+
+
+def test_what_is_within_the_estimate_s_own_error_keeps_what_the_file_says(calm):
+    found = levels.sensor_noise(noisier(calm, {"gyro": 1.5}), 0.5, 2.0).beyond(0.1)
+    assert np.exp(found.log[found.names.index("gyro")]) == pytest.approx(1.5, rel=0.1)
+    assert all(log == 0.0 for name, log in zip(found.names, found.log, strict=True) if name != "gyro")
