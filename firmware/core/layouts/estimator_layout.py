@@ -66,7 +66,7 @@ LARGEST = 1e6  # a reading beyond it, or an infinite one, is none
 
 # --- rows of `work` (N_WORK_ROWS, N_W) ------------------------------------------------------------------------------
 # The first of them hold the linearised flight from step to step; the others are scratch.
-N_W = 48
+N_W = 56  # holds a vehicle's parameters, in whole cache lines
 W_HELD = 0  # [s for which A still serves, s for which C does]
 W_POINT = 1  # what linearise leaves
 W_A, W_TURNED = 2, 2 + N_MOVING  # A, and its columns from E_ATT on as rows

@@ -11,6 +11,11 @@ from pathlib import Path
 
 import pytest
 
+from firmware.core.layouts import estimator_layout as kf
+from firmware.core.vehicle import layout
+from sim_backend.core import layout as wl
+from sim_backend.core.effects import effect_layout as ef
+
 ROOT = Path(__file__).resolve().parents[3]
 ROOMS = ("firmware", "sim_backend", "tools")
 FILES = sorted(path for room in ROOMS for path in (ROOT / room).rglob("*.py"))
@@ -135,3 +140,9 @@ def test_states_are_indexed_by_name(room):
     here = [path for path in FILES if path.is_relative_to(ROOT / room)]
     assert here
     assert {str(path): found for path in here if (found := literal_state_indices(TREES[path]))} == {}
+
+
+def test_a_scratch_row_of_the_filter_holds_a_vehicle_and_a_state():
+    """A row that is too short is written past its end, and nobody says so."""
+    assert kf.N_W >= max(layout.N_P, kf.N_XE, kf.N_E)
+    assert wl.WORK_WIDTH >= ef.N_XF
