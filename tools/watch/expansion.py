@@ -7,10 +7,9 @@ import numpy as np
 
 from tools.inference.fit import NUISANCE_STEP, THRESHOLD_STEP
 from tools.inference.problem import Gains, Problem
-from tools.watch.shared_parameters import SharedParameters
+from tools.watch.shared_parameters import HARDLY, SharedParameters
 
 STEP = 0.1  # of a label's spread: difference step
-HARDLY = 0.05  # spreads past a kink
 HIDDEN = 1.0  # sigma: a whole spread that moves less may be a threshold that was not reached
 FAR, NEAR = 30.0, 8.0  # sigma in all: steps that move more are too long, and how far they go instead
 PAST_THRESHOLD = 0.1  # of a long step's derivative: a short one that sees less has not reached a threshold

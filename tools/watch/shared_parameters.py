@@ -14,6 +14,7 @@ from tools.inference.problem import Problem
 
 ALLOWED_PRIOR = 3.0  # times [uncertainty] and [sensors]: a file that is not quite right
 EFFECT_PRIOR = 0.5  # spreads of a label
+HARDLY = 0.05  # spreads past a kink
 
 
 @dataclass(frozen=True)
@@ -62,8 +63,10 @@ class SharedParameters:
         own = self.limited[label]
         shared = np.array([self.free[k].label != label or (self.low[k], self.high[k]) != limit
                            for k, limit in zip(self.labels[label], own, strict=True)])  # fmt: skip
-        values = np.where(shared, 0.0, at[self.labels[label]])
         low, high = np.array(own).T
+        values = at[self.labels[label]]
+        noise = ((low == 0.0) | (high == 0.0)) & (np.abs(values) < HARDLY)  # there is no less of what is not there
+        values = np.where(shared | noise, 0.0, values)
         return np.minimum(low - values, 0.0), np.maximum(high - values, 0.0)
 
     def of_label(self, label: str, at: np.ndarray) -> list[FreeParameter]:

@@ -18,6 +18,7 @@ from tools.watch.unknown import NOTHING, Left, what_is_left
 
 ROUGH = 6.0  # sigma of a run's mean squared innovation: something changed, though no label says what
 MOST_SURE = 0.995
+FEW = 3  # runs of a reference from which it can be learned what runs differ by
 FORM = 0.06  # of a size, 1 sigma: nature's form is not the catalogue's (docs/WATCH.md)
 CI90 = 1.645
 LOOKED_AT = 2  # runs of an event in which it has to matter
@@ -52,7 +53,7 @@ def settle(history: History) -> list[Settled]:
         left = what_is_left(history, event) if event.has_course else NOTHING
         sure = 1.0 / (1.0 + np.exp(-np.clip(event.evidence - EVIDENCE_NEEDED, -50.0, 50.0)))
         unknown = event.label == "" or left.probability > 0.5
-        found.append(Settled(event, left, min(float(sure), MOST_SURE), unknown, own))
+        found.append(Settled(event, left, min(float(sure), most_sure(history)), unknown, own))
     return one_unknown([*found, *nameless(history, found)])
 
 
@@ -77,6 +78,12 @@ def touch(one: Span, other: Span) -> bool:
     return one.first <= other.end + 1 and other.first <= one.end + 1
 
 
+def most_sure(history: History) -> float:
+    """How probable an event can be at most: of what one or two runs share nobody knows that the next ones share it."""
+    learned = int(history.flights.reference.sum())
+    return MOST_SURE if learned >= FEW else learned / (learned + 1.0)
+
+
 def beside(one: Span, other: Span) -> bool:
     """Whether two spans are the same to one run."""
     return abs(one.first - other.first) <= 1 and abs(one.end - other.end) <= 1
@@ -98,7 +105,7 @@ def nameless(history: History, found: list[Settled]) -> list[Settled]:
         span = Span(int(first), int(end), STEP)
         evidence = float(sum(max(flights.excess(n), 0.0) for n in range(first, end))) / 2.0
         event = Event("", span, evidence, {}, np.zeros(0), np.zeros((0, 0)), 0.0)
-        more.append(Settled(event, what_is_left(history, event), MOST_SURE, True, -1))
+        more.append(Settled(event, what_is_left(history, event), most_sure(history), True, -1))
     return more
 
 

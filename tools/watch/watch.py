@@ -16,10 +16,9 @@ from tools.watch.history import History
 from tools.watch.search import find_events
 from tools.watch.shared_parameters import shared_parameters
 from tools.watch.usable import ASKED, readings_of, usable
-from tools.watch.verdicts import event_answer, run_verdict, settle
+from tools.watch.verdicts import FEW, event_answer, run_verdict, settle
 
 FIRST, FIRST_SHARE = 4, 3  # without a reference: so many runs at most, one in so many, are where learning begins
-FEW = 3  # runs of a reference from which it can be learned what runs differ by
 
 
 def watch(case: Case, reference: Case | None = None, say: Callable[[str], None] = lambda text: None) -> Watch:
