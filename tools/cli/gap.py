@@ -143,13 +143,15 @@ def diagnose(case: Path, out: Path, without: str | None, vehicle: str | None, as
 @gap.command()
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 def report(folder: Path) -> None:
-    """Draw report.html again from what `glider gap diagnose` left in DIR."""
+    """Draw report.html again from what `glider gap diagnose` or `glider gap watch` left in DIR."""
     from tools.data.errors import need
     from tools.report.diagnosis import REPORT, write_report
+    from tools.report.watch import write_watch_report
     from tools.report.words import sentence
+    from tools.watch.answer import FILE
 
     need("analysis")
-    say(sentence(write_report(folder)))
+    say(write_watch_report(folder) if (folder / FILE).is_file() else sentence(write_report(folder)))
     say(f"report: {folder / REPORT}")
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from tools.cli.common import json_option, print_json, progress, say
+from tools.cli.common import json_option, print_json, progress, say, vehicle_option
 
 folder = click.Path(path_type=Path, file_okay=False)
 
@@ -13,7 +13,7 @@ folder = click.Path(path_type=Path, file_okay=False)
 @click.command()
 @click.argument("case", type=click.Path(path_type=Path))
 @click.option("--reference", type=folder, metavar="CASE0", help="Runs of the same vehicle before anything changed.")
-@click.option("--vehicle", metavar="FILE", help="Stands in for the case's vehicle: one identified from earlier runs.")
+@vehicle_option
 @click.option("--out", type=folder, help="Folder of the answer.")
 @json_option
 def watch(case: Path, reference: Path | None, vehicle: str | None, out: Path | None, as_json: bool) -> None:
@@ -22,21 +22,16 @@ def watch(case: Path, reference: Path | None, vehicle: str | None, out: Path | N
     What all runs share, a model that is not quite right or a sensor that is a little off, is no change: it is learned
     from the reference, or without one from the first runs (docs/WATCH.md).
     """
-    from dataclasses import replace
-
     from tools.data.errors import need
     from tools.data.runs.case import load_case
     from tools.data.runs.csvfile import write_bytes
-    from tools.data.sources import load_vehicle
+    from tools.report.watch import REPORT, write_watch_report
     from tools.watch.answer import FILE
     from tools.watch.watch import watch as watch_runs
 
     need("analysis")
-    loaded = load_case(case)
-    before = None if reference is None else load_case(reference)
-    if vehicle is not None:
-        other = load_vehicle(vehicle)
-        loaded = replace(loaded, vehicle=other, vehicle_name=vehicle)
+    loaded = load_case(case, vehicle)
+    before = None if reference is None else load_case(reference, vehicle)
     with progress("watch", 2) as advance:
         advance(1)
         found = watch_runs(loaded, before, lambda text: print(text, file=sys.stderr))
@@ -48,6 +43,7 @@ def watch(case: Path, reference: Path | None, vehicle: str | None, out: Path | N
 
         out.mkdir(parents=True, exist_ok=True)
         write_bytes(out / FILE, (json.dumps(as_plain(found.plain()), indent=1) + "\n").encode())
+        write_watch_report(out)
     for caution in found.cautions:
         say(f"note: {caution}")
     if as_json:
@@ -56,7 +52,7 @@ def watch(case: Path, reference: Path | None, vehicle: str | None, out: Path | N
         for line in lines(found):
             click.echo(line)
     if out is not None:
-        say(f"answer: {out / FILE}")
+        say(f"answer: {out / FILE}, report: {out / REPORT}")
 
 
 def lines(found) -> list[str]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sim_backend.core.effects import effect_layout as ef
-from tests.support.cases import make_case
+from support.cases import make_case
 from tools.gap.mended import mended, put_right
 from tools.inference.model import nominal_model
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sim_backend.core.effects import effect_layout as ef
-from tests.support.cases import make_case
+from support.cases import make_case
 from tools.data.runs.case import Case
 from tools.diagnose.staged import Staged, staged
 from tools.diagnose.staged_answer import identified_text

@@ -9,7 +9,7 @@ from firmware.core.vehicle.water import water_wrench
 from firmware.model.vehicle import decode_vehicle
 from hal.strict import ConfigError
 from sim_backend.core.effects import effect_layout as ef
-from tests.support.cases import make_case
+from support.cases import make_case
 from tools.data.runs.case import load_case
 from tools.data.sources import load_vehicle
 from tools.data.tomltext import toml_text

@@ -1,0 +1,49 @@
+"""The report of a watch, drawn from its folder alone."""
+
+import json
+
+import pytest
+
+from tools.cli.common import report_errors
+from tools.cli.main import cli
+from tools.report.watch import write_watch_report
+
+EVENT = {
+    "label": "drag", "where": [{"subsystem": "hydrodynamics", "element": "surge", "probability": 0.9}],
+    "group": ["drag", "linear_drag"], "from_run": "run03", "to_run": None, "course": "growing", "probability": 0.93,
+    "size": 0.31, "ci90": [0.2, 0.42], "unit": "1", "sizes": [],
+}  # fmt: skip
+RUNS = [
+    {"run": "run02", "verdict": "none", "causes": [], "gap": 0.8, "skipped": None},
+    {"run": "run03", "verdict": "cause", "gap": 2.1, "skipped": None,
+     "causes": [{"label": "drag", "probability": 0.9, "group": ["drag"], "size": 0.3, "ci90": [0.1, 0.5], "unit": "1"}]},
+    {"run": "run04", "verdict": "none", "causes": [], "gap": None, "skipped": "12 s: too short"},
+]  # fmt: skip
+
+
+def answer(folder, **changed):
+    """A folder with a watch's answer."""
+    table = {"format": 1, "runs": RUNS, "events": [EVENT], "reference": ["run00"], "cautions": ["few runs"]} | changed
+    (folder / "watch.json").write_text(json.dumps(table))
+    return folder
+
+
+def test_events_and_runs_are_said(tmp_path):
+    said = write_watch_report(answer(tmp_path))
+    assert said == "Drag since run03."
+    page = (tmp_path / "report.html").read_text()
+    for text in ("drag, from run03", "still there", "cannot tell it from linear_drag", "too short", "few runs", "0.31"):
+        assert text in page
+
+
+def test_no_event_is_said_so(tmp_path):
+    assert write_watch_report(answer(tmp_path, events=[])).startswith("Nothing changed")
+
+
+@pytest.mark.parametrize("changed", [{"runs": 3}, {"events": [{"label": 1}]}])
+def test_what_is_no_answer_is_one_line(tmp_path, capsys, changed):
+    folder = answer(tmp_path, **changed)
+    code = report_errors(lambda **kept: cli(["gap", "report", str(folder)], **kept))
+    assert code == 2
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert "watch.json" in line

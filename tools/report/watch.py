@@ -1,0 +1,112 @@
+"""The report of a watch, drawn from its folder: events, then every run; one HTML file that opens offline."""
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from tools.data.errors import InputError
+from tools.report import words
+from tools.report.page import render
+from tools.watch.answer import FILE
+
+REPORT = "report.html"
+MOST_BYTES = 100_000_000
+
+
+class _Cause(msgspec.Struct):
+    label: str
+    probability: float
+    size: float | None
+    ci90: tuple[float, float] | None
+    unit: str | None
+
+
+class _Run(msgspec.Struct):
+    run: str
+    verdict: str
+    causes: list[_Cause]
+    gap: float | None
+    skipped: str | None
+
+
+class _Event(msgspec.Struct):
+    label: str | None
+    where: list[dict[str, Any]]
+    group: list[str]
+    from_run: str
+    to_run: str | None
+    course: str
+    probability: float
+    size: float | None
+    ci90: tuple[float, float] | None
+    unit: str | None
+    sizes: list[dict[str, Any]]
+
+
+class _Watch(msgspec.Struct):
+    runs: list[_Run]
+    events: list[_Event]
+    reference: list[str]
+    cautions: list[str]
+
+
+def read_watch(folder: Path) -> _Watch:
+    """watch.json of a folder; InputError where it is missing or no answer of a watch."""
+    path = folder / FILE
+    if not path.is_file():
+        raise InputError("no such file: not a folder of `glider gap watch --out`", source=path)
+    if path.stat().st_size > MOST_BYTES:
+        raise InputError(f"longer than {MOST_BYTES} bytes", source=path)
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=_Watch)
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise InputError(str(error), source=path) from None
+
+
+def _size(one: _Cause | _Event) -> str:
+    if one.size is None or one.ci90 is None:
+        return ""
+    unit = "" if one.unit in (None, "1") else f" {one.unit}"
+    low, high = one.ci90
+    return f"{words.number(one.size)}{unit} (90 %: {words.number(low)} to {words.number(high)})"
+
+
+def _event(one: _Event) -> dict[str, Any]:
+    place = " ".join(str(one.where[0][key]) for key in ("subsystem", "element")) if one.where else ""
+    if one.label is None:
+        said = f"No effect of the catalogue explains it{f'; most likely in {place}' if place else ''}"
+    else:
+        said = words.upper(words.PLAIN.get(one.label, one.label))
+    others = [label for label in one.group if label != one.label]
+    return {
+        "name": one.label or "unknown", "said": said, "size": _size(one), "alike": words.joined(others),
+        "from": one.from_run, "to": one.to_run, "course": one.course, "percent": 100.0 * one.probability,
+    }  # fmt: skip
+
+
+def report_html(found: _Watch) -> str:
+    """The page's text; MissingExtra without jinja2."""
+    runs = [
+        {
+            "name": run.run, "verdict": run.skipped or run.verdict, "kind": "skipped" if run.skipped else run.verdict,
+            "gap": "" if run.gap is None else words.number(run.gap),
+            "causes": ", ".join(f"{one.label} {_size(one)}".strip() for one in run.causes[:2]),
+        }
+        for run in found.runs
+    ]  # fmt: skip
+    context = {
+        "events": [_event(one) for one in found.events], "runs": runs, "cautions": found.cautions,
+        "reference": words.joined(found.reference),
+    }  # fmt: skip
+    return render("watch.html", context).replace(" %", "\N{NO-BREAK SPACE}%")
+
+
+def write_watch_report(folder: Path) -> str:
+    """Draw the report of a watch from its folder, into it; what changed, in a sentence."""
+    found = read_watch(folder)
+    (folder / REPORT).write_text(report_html(found), encoding="utf-8")
+    if not found.events:
+        return "Nothing changed, as far as these runs can show."
+    named = [f"{one.label or 'an unknown change'} since {one.from_run}" for one in found.events]
+    return f"{words.upper(words.joined(named))}."
