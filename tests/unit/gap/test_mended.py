@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.cases import make_case
 
 from sim_backend.core.effects import effect_layout as ef
-from support.cases import make_case
 from tools.gap.mended import mended, put_right
 from tools.inference.model import nominal_model
 

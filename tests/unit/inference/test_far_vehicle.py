@@ -4,9 +4,9 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from support.cases import make_case
 
 from sim_backend.core.effects import effect_layout as ef
-from support.cases import make_case
 from tools.data.runs.case import Case
 from tools.diagnose.staged import Staged, staged
 from tools.diagnose.staged_answer import identified_text

@@ -16,7 +16,9 @@ EVENT = {
 RUNS = [
     {"run": "run02", "verdict": "none", "causes": [], "gap": 0.8, "skipped": None},
     {"run": "run03", "verdict": "cause", "gap": 2.1, "skipped": None,
-     "causes": [{"label": "drag", "probability": 0.9, "group": ["drag"], "size": 0.3, "ci90": [0.1, 0.5], "unit": "1"}]},
+     "causes": [
+         {"label": "drag", "probability": 0.9, "group": ["drag"], "size": 0.3, "ci90": [0.1, 0.5], "unit": "1"},
+     ]},
     {"run": "run04", "verdict": "none", "causes": [], "gap": None, "skipped": "12 s: too short"},
 ]  # fmt: skip
 

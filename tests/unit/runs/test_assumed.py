@@ -3,13 +3,13 @@
 import msgspec
 import numpy as np
 import pytest
+from support.cases import make_case
 
 from firmware.core.vehicle import layout
 from firmware.core.vehicle.water import water_wrench
 from firmware.model.vehicle import decode_vehicle
 from hal.strict import ConfigError
 from sim_backend.core.effects import effect_layout as ef
-from support.cases import make_case
 from tools.data.runs.case import load_case
 from tools.data.sources import load_vehicle
 from tools.data.tomltext import toml_text
