@@ -49,6 +49,7 @@ CALLS: tuple[tuple[str, str | None], ...] = (
     ("gap predict case/run00.csv --out predicted.csv", None),
     ("gap readings case", "analysis"),
     ("gap report answer", "analysis"),
+    ("gap watch case", "analysis"),
     ("gap diagnose case --out answer", "analysis"),
     ("gap challenge make --out blind --seed 1 --single 1 --none 0 --pairs 0 --unknown 0 --jobs 1", None),
     ("gap challenge run --cases blind --out answers", "analysis"),

@@ -23,13 +23,14 @@ def watch(case: Path, reference: Path | None, vehicle: str | None, out: Path | N
     from the reference, or without one from the first runs (docs/WATCH.md).
     """
     from tools.data.errors import need
+
+    need("analysis")
     from tools.data.runs.case import load_case
     from tools.data.runs.csvfile import write_bytes
     from tools.report.watch import REPORT, write_watch_report
     from tools.watch.answer import FILE
     from tools.watch.watch import watch as watch_runs
 
-    need("analysis")
     loaded = load_case(case, vehicle)
     before = None if reference is None else load_case(reference, vehicle)
     with progress("watch", 2) as advance:
