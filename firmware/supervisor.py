@@ -8,7 +8,6 @@ import math
 import numpy as np
 
 from firmware.autopilot import Autopilot
-from firmware.core.layouts import control_layout as ctl
 from firmware.core.layouts import supervisor_layout as sup
 from firmware.core.supervision.screening import screen
 from firmware.core.supervision.supervisor import guard
@@ -31,12 +30,11 @@ class Supervisor:
             mission_time=mission.time_limit_s, restarted=restarted,
         )  # fmt: skip
         self.table = vehicle.supervisor
-        autopilot.ap[ctl.SUPERVISED] = 1.0
         self._said = np.zeros(sup.N_ROWS)
 
     def screen(self, t: float) -> None:
         """Before the autopilot's tick at time t (s): what is not fit is marked in its frame."""
-        screen(self.autopilot.P, self.G, self.autopilot.ap, self.autopilot.frame, t)
+        screen(self.autopilot.P, self.G, self.autopilot.frame, t)
 
     def guard(self, t: float) -> None:
         """After it: the autopilot's commands become what may be sent; NaN: an actuator is left alone."""

@@ -110,7 +110,7 @@ class Watchman:
             self.ap[ctl.WANTED_SERVO : ctl.WANTED_SERVO + 3] = self.wanted
             self.supervisor.guard(self.t)
             if self.follows:
-                self.places[:] = self.ap[ctl.SENT_SLIDER : ctl.SENT_BALLAST + 1]
+                self.places[:] = self.G[sup.SENT + 1 : sup.SENT + 3]
         return self.supervisor.reaction
 
     def _believe(self) -> None:

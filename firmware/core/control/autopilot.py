@@ -30,13 +30,11 @@ def score(legs, est, ap):
 
 @kernel
 def limit_commands(P, ap, servo, slider, ballast, dt, cmd):
-    """Limits last: into cmd (3,) what may be sent, and into the memory what was, unless a supervisor has yet to say."""
+    """Limits last: into cmd (3,) what may be sent, and into the memory what was."""
     wanted = (servo, slider, ballast)
     for i in range(3):
         low, high, rate, _ = actuator_table(P, layout.ACTUATORS[i])
-        cmd[i] = limited(wanted[i], ap[ctl.SENT_SERVO + i], low, high, rate, dt)
-        if ap[ctl.SUPERVISED] == 0.0:
-            ap[ctl.SENT_SERVO + i] = cmd[i]
+        cmd[i] = ap[ctl.SENT_SERVO + i] = limited(wanted[i], ap[ctl.SENT_SERVO + i], low, high, rate, dt)
 
 
 @kernel

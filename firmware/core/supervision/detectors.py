@@ -148,21 +148,21 @@ def runs_away(G, i, measured, least):
 
 
 @kernel
-def watch_move(G, ap, i, measured, rate, tau, span, t):
+def watch_move(G, i, measured, rate, tau, span, t):
     """Row 14 for slider (i = 0) or ballast (1): does it go where it was sent? rate 1/s, tau s, span the whole range."""
     if runs_away(G, i, measured, 0.3 * rate * G[sup.WRONG_TICKS] * G[sup.TICK]):
         G[sup.STOPPED + i] = G[sup.ENABLED + sup.FAULT_STALL]
-        ap[ctl.SENT_SLIDER + i] = measured
+        G[sup.SENT + 1 + i] = measured
     if G[sup.STOPPED + i] == 1.0:
         ask(G, sup.FAULT_STALL, sup.ABORT)
     else:
-        watch_stall(G, ap, i, measured, rate, tau, span, t)
+        watch_stall(G, i, measured, rate, tau, span, t)
 
 
 @kernel
-def watch_stall(G, ap, i, measured, rate, tau, span, t):
+def watch_stall(G, i, measured, rate, tau, span, t):
     """Row 14: away from where it was sent, without progress, for longer than the way takes; rests, tries again."""
-    off = abs(ap[ctl.SENT_SLIDER + i] - measured)
+    off = abs(G[sup.SENT + 1 + i] - measured)
     tolerance = rate * (tau + 0.2) + 0.02 * span
     if t < G[sup.REST_UNTIL + i]:
         ask(G, sup.FAULT_STALL, sup.WARN)

@@ -7,7 +7,6 @@ import math
 
 from firmware.core.estimation.sensing import longest_age
 from firmware.core.jit import kernel
-from firmware.core.layouts import control_layout as ctl
 from firmware.core.layouts import supervisor_layout as sup
 from firmware.core.vehicle.layout import BALLAST_MAX, BALLAST_MIN, SLIDER_MAX, SLIDER_MIN
 from hal.ports import IMU
@@ -55,36 +54,36 @@ def absurd(G, frame, sensor, elapsed):
 
 
 @kernel
-def excited(P, G, ap, frame, sensor):
+def excited(P, G, frame, sensor):
     """True where the vehicle does what should show in this sensor (persistent excitation)."""
     if sensor == sup.SENSOR_IMU:
         return True
     if sensor == sup.SENSOR_BEACON:
-        return abs(frame[IMU + 3]) > NODDING or abs(ap[ctl.SENT_BALLAST]) > HEAVY * (P[BALLAST_MAX] - P[BALLAST_MIN])
+        return abs(frame[IMU + 3]) > NODDING or abs(G[sup.SENT + 2]) > HEAVY * (P[BALLAST_MAX] - P[BALLAST_MIN])
     if sensor == sup.SENSOR_SLIDER or sensor == sup.SENSOR_PLUNGER:
         i = sensor - sup.SENSOR_SLIDER
-        return abs(ap[ctl.SENT_SLIDER + i] - G[sup.SENT_THEN + i]) > DRAWN * (P[HIGHS[i]] - P[LOWS[i]])
+        return abs(G[sup.SENT + 1 + i] - G[sup.SENT_THEN + i]) > DRAWN * (P[HIGHS[i]] - P[LOWS[i]])
     return False
 
 
 @kernel
-def stuck(P, G, ap, frame, sensor, t):
+def stuck(P, G, frame, sensor, t):
     """True where the sensor has said the same for too long while it should not; notes when that began."""
     if differs(G, frame, sensor, sup.RAW) or math.isnan(G[sup.SAME_SINCE + sensor]):
         G[sup.SAME_SINCE + sensor] = t
         if sensor == sup.SENSOR_SLIDER or sensor == sup.SENSOR_PLUNGER:
-            G[sup.SENT_THEN + sensor - sup.SENSOR_SLIDER] = ap[ctl.SENT_SLIDER + sensor - sup.SENSOR_SLIDER]
+            G[sup.SENT_THEN + sensor - sup.SENSOR_SLIDER] = G[sup.SENT + 1 + sensor - sup.SENSOR_SLIDER]
     patience = G[sup.FROZEN_TIME] if sensor == sup.SENSOR_IMU else G[sup.STUCK_TIME]
     row = sup.FAULT_IMU_LOST if sensor == sup.SENSOR_IMU else sup.FAULT_STUCK_SENSOR
     same = t - G[sup.SAME_SINCE + sensor] >= max(patience, 4.0 * G[sup.PERIOD + sensor])
-    return G[sup.ENABLED + row] == 1.0 and same and excited(P, G, ap, frame, sensor)
+    return G[sup.ENABLED + row] == 1.0 and same and excited(P, G, frame, sensor)
 
 
 @kernel
-def judge(P, G, ap, frame, sensor, t):
+def judge(P, G, frame, sensor, t):
     """The verdict on a sample not seen before: FIT, MISTIMED, ABSURD or STUCK."""
     time, last = frame[sup.STARTS[sensor]], G[sup.TAKEN + sensor]
-    still = stuck(P, G, ap, frame, sensor, t)
+    still = stuck(P, G, frame, sensor, t)
     if G[sup.ENABLED + sup.FAULT_SAMPLE_TIME] == 1.0:
         oldest = t - longest_age(G[sup.PERIOD + sensor], G[sup.TICK])
         if not oldest <= time <= t + 1e-6 or time <= last:
@@ -95,13 +94,13 @@ def judge(P, G, ap, frame, sensor, t):
 
 
 @kernel
-def take(P, G, ap, frame, sensor, t):
+def take(P, G, frame, sensor, t):
     """Look at one sensor's slot; what is unfit is marked in the frame."""
     start = sup.STARTS[sensor]
     if frame[start + 1] != sup.VALID:
         return
     if frame[start] != G[sup.SEEN + sensor]:
-        verdict = judge(P, G, ap, frame, sensor, t)
+        verdict = judge(P, G, frame, sensor, t)
         G[sup.SEEN + sensor] = frame[start]
         keep(G, frame, sensor, sup.RAW)
         if verdict == sup.FIT:
@@ -117,7 +116,7 @@ def take(P, G, ap, frame, sensor, t):
 
 
 @kernel
-def start_place(G, ap, frame, wire, scale, dead):
+def start_place(G, frame, wire, scale, dead):
     """Before anything is sent: slider (wire 0) and ballast (1) begin where their wires say they stand.
 
     scale: the actuator's unit per metre of wire; nearer to neutral than `dead` counts as neutral.
@@ -125,14 +124,14 @@ def start_place(G, ap, frame, wire, scale, dead):
     if G[sup.PLACED + wire] == 0.0 and frame[sup.STARTS[sup.SENSOR_SLIDER + wire] + 1] == sup.VALID:
         place = scale * frame[sup.STARTS[sup.SENSOR_SLIDER + wire] + 2]
         if abs(place) > dead:
-            ap[ctl.SENT_SLIDER + wire] = place
+            G[sup.SENT + 1 + wire] = place
         G[sup.PLACED + wire] = 1.0
 
 
 @kernel
-def screen(P, G, ap, frame, t):
-    """Every sensor of the frame (FRAME_SIZE,) at time t (s), in place; P (N_P,), G (N_G,), ap (N_AP,)."""
+def screen(P, G, frame, t):
+    """Every sensor of the frame (FRAME_SIZE,) at time t (s), in place; P (N_P,), G (N_G,)."""
     if math.isnan(G[sup.BEGAN]):
         G[sup.BEGAN] = t
     for sensor in range(sup.N_SENSORS):
-        take(P, G, ap, frame, sensor, t)
+        take(P, G, frame, sensor, t)

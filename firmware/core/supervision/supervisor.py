@@ -55,33 +55,33 @@ def settle(G, t):
 def goal(P, G, cmd, ap, i):
     """Where actuator i (servo, slider, ballast) is to go under this tick's reaction; NaN: it is left alone."""
     if i > 0 and G[sup.STOPPED + i - 1] == 1.0:
-        return ap[ctl.SENT_SERVO + i]
+        return G[sup.SENT + i]
     if G[sup.HIGHEST] >= sup.ABORT:
         return 0.0 if i == 0 else P[layout.ACTUATORS[i]]
     if (i == 0 and ap[ctl.MODE] == ctl.WAITING) or (i > 0 and G[sup.PLACED + i - 1] == 0.0):
         return math.nan
     if G[sup.HIGHEST] == sup.HOLD:
-        return ap[ctl.SENT_SERVO + i]
+        return G[sup.SENT + i]
     if i == 0 and G[sup.ASKED + sup.FAULT_SERVO_LOST] * G[sup.ENABLED + sup.FAULT_SERVO_LOST] > 0.0:
         return 0.0
-    return cmd[i] if math.isfinite(cmd[i]) else ap[ctl.SENT_SERVO + i]
+    return cmd[i] if math.isfinite(cmd[i]) else G[sup.SENT + i]
 
 
 @kernel
 def act(P, G, cmd, ap, t):
-    """Limits last: into cmd (3,) what may be sent, and what was sent into the autopilot's memory."""
+    """Limits last: into cmd (3,) what may be sent, and what was sent into every memory."""
     for i in range(3):
         low, high, rate, _ = actuator_table(P, layout.ACTUATORS[i])
         wanted = goal(P, G, cmd, ap, i)
         if i > 0 and t < G[sup.REST_UNTIL + i - 1] and G[sup.HIGHEST] < sup.HOLD:
             wanted = G[sup.MARK + i - 1]  # where it stands
-        last = ap[ctl.SENT_SERVO + i]
+        last = G[sup.SENT + i]
         beyond = abs(ap[ctl.WANTED_SERVO + i]) > detectors.IMPOSSIBLE * (high - low)
         if G[sup.ENABLED + sup.FAULT_NO_ANSWER] == 1.0 and beyond and G[sup.HIGHEST] < sup.ABORT:
             wanted = last
         sent = limited(wanted, last, low, high, rate, G[sup.TICK])
         cmd[i] = math.nan if math.isnan(wanted) else sent
-        ap[ctl.SENT_SERVO + i] = sent
+        G[sup.SENT + i] = ap[ctl.SENT_SERVO + i] = sent
 
 
 @kernel
@@ -93,18 +93,18 @@ def watch_limits(P, G, cmd):
 
 
 @kernel
-def watch_moves(P, G, ap, frame, scale, t):
+def watch_moves(P, G, frame, scale, t):
     """Row 14, as the draw-wires see it; a wire that is lost says nothing."""
     G[sup.RING_AT] = (G[sup.RING_AT] + 1.0) % sup.N_RING
     for i in range(2):
         start, place = sup.STARTS[sup.SENSOR_SLIDER + i], i * sup.N_RING + int(G[sup.RING_AT])
         low, high, rate, tau = actuator_table(P, layout.ACTUATORS[i + 1])
         factor, span = 1.0 if i == 0 else scale, high - low
-        start_place(G, ap, frame, i, factor, 0.03 * span)
-        G[sup.RING + place], G[sup.SENT_RING + place] = math.nan, ap[ctl.SENT_SLIDER + i]
+        start_place(G, frame, i, factor, 0.03 * span)
+        G[sup.RING + place], G[sup.SENT_RING + place] = math.nan, G[sup.SENT + 1 + i]
         if frame[start + 1] == sup.VALID and G[sup.PLACED + i] == 1.0:
             G[sup.RING + place] = factor * frame[start + 2]
-            detectors.watch_move(G, ap, i, G[sup.RING + place], rate, tau, span, t)
+            detectors.watch_move(G, i, G[sup.RING + place], rate, tau, span, t)
         elif G[sup.PLACED + i] == 0.0 and t - G[sup.BEGAN] > G[sup.LOST_AFTER + sup.SENSOR_SLIDER + i]:
             G[sup.PLACED + i] = 1.0  # no wire: from where it was sent last, as far as is known
 
@@ -120,7 +120,7 @@ def guard(P, C, G, frame, est, ap, cmd, t):
     scale = P[layout.PLUNGER_AREA] * (est[ctl.EST_DENSITY] if est[ctl.EST_DENSITY] > 0.0 else 1000.0)
     detectors.watch_sensors(G, frame, t)
     detectors.watch_states(G, frame, t)
-    watch_moves(P, G, ap, frame, scale, t)
+    watch_moves(P, G, frame, scale, t)
     if est[ctl.EST_BEACON_TIME] >= 0.0:
         detectors.watch_depth(G, est, ap, t)
         detectors.watch_ascent(G, est, ap, t)
@@ -139,4 +139,5 @@ def guard(P, C, G, frame, est, ap, cmd, t):
     ap[ctl.CAUTIOUS] = 1.0 if doubtful or lawless else 0.0
     if G[sup.HIGHEST] >= sup.ABORT and ap[ctl.MODE] < ctl.COMPLETED:
         abort(ap, ctl.REASON_FAULT + G[sup.HIGHEST_ROW])
+    ap[ctl.SUPERVISED] = 1.0
     ap[ctl.AP_REACTION], ap[ctl.AP_FAULT_ROW] = G[sup.HIGHEST], G[sup.HIGHEST_ROW]

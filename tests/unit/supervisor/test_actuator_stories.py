@@ -127,7 +127,7 @@ def test_a_slow_actuator_is_no_stall(i, goal, rate, tau, span):
     man.follows = False
     man.wanted[1 + i] = goal
     for _ in range(round(abs(goal) / rate / DT * 2.5)):
-        left = man.ap[ctl.SENT_SLIDER + i] - man.places[i]
+        left = man.G[sup.SENT + 1 + i] - man.places[i]
         man.places[i] += math.copysign(min(abs(left), 0.5 * rate * DT), left)
         assert man.step() == NOTHING
 
@@ -162,7 +162,7 @@ def test_commands_that_show_late_are_no_wrong_way(i, goal, rate, tau, span, dela
     for n in range(1500):
         man.wanted[1 + i] = goal if n // 70 % 2 else -goal
         man.step()
-        sent.append(man.ap[ctl.SENT_SLIDER + i])
+        sent.append(man.G[sup.SENT + 1 + i])
         old = sent[-1 - round(delay / DT)]
         place += min(max((old - place) / tau, -rate), rate) * DT
         man.places[i] = place
