@@ -22,7 +22,7 @@ from tools.gap.measure import RunGap, root_mean_square, run_gap
 from tools.gap.mended import Mended, mended
 from tools.inference.fit import bounded_step
 from tools.inference.model import Model, effect_vector, nominal_model
-from tools.inference.parameters import FreeParameter, effect_parameters
+from tools.inference.parameters import NINETY, FreeParameter, effect_parameters
 from tools.inference.predict import fly, observe
 from tools.inference.prediction_error import HORIZONS, Fitted, PredictionError, identify_by_prediction
 from tools.inference.problem import cut, problem_of
@@ -33,7 +33,7 @@ FOLDS, ALONE = 4, 6  # parts of many runs; runs up to which each is left out alo
 TRIED = 4  # effects fitted in full, of those whose linear step takes most
 REFIT_STEPS = 5
 WORTH = 0.1  # of the squared gap of runs left out, that an effect has to take
-SURE = 1.645  # sigma in the fit to all runs: its 90 % interval leaves 0 out
+SURE = NINETY  # sigma in the fit to all runs: its 90 % interval leaves 0 out
 @dataclass(frozen=True)
 class Size:
     """A parameter with its 90 % interval, in its unit."""

@@ -1,5 +1,6 @@
 """Which runs can be judged at all, and which part of them: a vehicle that does not fly says nothing about itself."""
 
+from collections.abc import Set
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +15,7 @@ READ = 0.2  # of the rows that at least have a reading of the attitude
 ASKED = (*names.ATTITUDE, *names.RATES, names.DEPTH)
 
 
-def usable(run: Run, wanted: set[str] = frozenset()) -> Run | str:  # type: ignore[assignment]
+def usable(run: Run, wanted: Set[str] = frozenset()) -> Run | str:
     """The run's longest stretch of flight, or why it cannot be judged. wanted: readings that other runs have."""
     if run.rows < 2:
         return "no two samples"
