@@ -26,12 +26,19 @@ def identify(case: Path, out: Path | None, seed: int, likelihood: str, vehicle: 
     """
     from tools.data.errors import need
 
-    need("identify")
+    need("analysis")
+    from sim_backend.ocean.vehicle import OceanVehicle
     from tools.data.runs.case import load_case
+
+    loaded = load_case(case, vehicle)
+    if isinstance(loaded.vehicle, OceanVehicle):
+        _identify_ocean(loaded, out, as_json)
+        return
+    need("identify")
     from tools.identify.pipeline import identify as run_identification
 
     found = run_identification(
-        load_case(case, vehicle), seed, likelihood, lambda text: print(text, file=sys.stderr), leave_out=out is not None
+        loaded, seed, likelihood, lambda text: print(text, file=sys.stderr), leave_out=out is not None
     )
     for one in found.left_out:
         say(f"left out: {one}")
@@ -48,6 +55,31 @@ def identify(case: Path, out: Path | None, seed: int, likelihood: str, vehicle: 
         print_json(found.plain())
     else:
         _tell(found)
+
+
+def _identify_ocean(case, out: Path | None, as_json: bool) -> None:
+    """The same of an ocean glider: no chains, its posterior is close to normal (docs/OCEAN.md, Identification)."""
+    from tools.identify.ocean.files import VEHICLE, plain, write
+    from tools.identify.ocean.identify import identify_ocean
+
+    found = identify_ocean(case, lambda text: print(text, file=sys.stderr))
+    for one in found.left_out:
+        say(f"left out: {one}")
+    if out is not None:
+        write(found, out)
+        say(f"vehicle: {out / VEHICLE}")
+    if as_json:
+        print_json(plain(found))
+        return
+    click.echo(f"{'':<18} {'mean':>11} {'sd':>9}   {'90 % interval':<24} unit")
+    for one in [*found.parameters, found.net_mass]:
+        low, high = one.ci90
+        click.echo(f"{one.name:<18} {one.mean:>11.5g} {one.sd:>9.2g}   {f'{low:.5g} to {high:.5g}':<24} {one.unit}")
+    for ridge in found.ridges:
+        click.echo(ridge.sentence())
+    if found.next_run is not None:
+        click.echo(f"to part them: {found.next_run['text']}")
+    click.echo(f"vertical water {100.0 * found.water_rms:.2f} cm/s rms over {len(found.water)} runs")
 
 
 def _tell(found) -> None:

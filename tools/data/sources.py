@@ -1,5 +1,6 @@
 """From what a user types, a name or a path, to a decoded file."""
 
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
@@ -7,6 +8,8 @@ from typing import TypeVar
 from firmware.guidance.mission import Mission, decode_mission
 from firmware.model.library import shipped
 from firmware.model.vehicle import Vehicle, decode_vehicle
+from hal.strict import ConfigError
+from sim_backend.ocean.vehicle import KIND, OceanVehicle, decode_ocean_vehicle, shipped_vehicles
 from tools.data.errors import InputError
 
 T = TypeVar("T")
@@ -27,9 +30,14 @@ def read_text(path: Path) -> str:
         raise InputError(error.strerror or str(error), source=path) from None
 
 
-def name_or_path(wanted: str, kind: str, folder: str, base: Path | None = None) -> tuple[str, str]:
-    """Text and source of a shipped name or of a path (relative to `base` first, then to the working directory)."""
-    library = shipped(folder)
+def name_or_path(
+    wanted: str, kind: str, folder: str, base: Path | None = None, more: dict[str, str] | None = None
+) -> tuple[str, str]:
+    """Text and source of a shipped name or of a path (relative to `base` first, then to the working directory).
+
+    more: name -> text of others that are shipped.
+    """
+    library = shipped(folder) | (more or {})
     if wanted in library:
         return library[wanted], f"{wanted} (shipped)"
     for candidate in ([base / wanted] if base else []) + [Path(wanted)]:
@@ -44,8 +52,25 @@ def _load(wanted: str, kind: str, folder: str, decode: Callable[[str, str], T], 
 
 
 def load_vehicle(wanted: str, base: Path | None = None) -> Vehicle:
-    """A vehicle by shipped name or path; `base` is the folder of the file that names it."""
-    return _load(wanted, "vehicle", "model/vehicles", decode_vehicle, base)
+    """A vehicle by shipped name or path; `base` is the folder of the file that names it. ConfigError for another kind."""
+    found = load_any_vehicle(wanted, base)
+    if isinstance(found, OceanVehicle):
+        raise ConfigError(wanted, "an ocean glider: this command flies or asks a ROUGHIE-like vehicle", key="kind")
+    return found
+
+
+def load_any_vehicle(wanted: str, base: Path | None = None) -> Vehicle | OceanVehicle:
+    """A vehicle of any kind, as load_vehicle."""
+    text, source = name_or_path(wanted, "vehicle", "model/vehicles", base, shipped_vehicles())
+    return decode_ocean_vehicle(text, source) if _kind_of(text) == KIND else decode_vehicle(text, source)
+
+
+def _kind_of(text: str) -> object:
+    """The kind that a vehicle file names; None where it names none or is no TOML (its own reader then says so)."""
+    try:
+        return tomllib.loads(text).get("kind")
+    except (ValueError, RecursionError):
+        return None
 
 
 def load_mission(wanted: str) -> tuple[str, str, Mission]:

@@ -82,7 +82,7 @@ def flown(problem: Problem, models: list, manoeuvre: Manoeuvre) -> np.ndarray:
     one = problem.part(0)
     recording = replace(
         one.recording, bounds=np.array([0, len(t)]), modes=np.zeros(1, dtype=np.int64), t=t,
-        inputs=commands(problem.case.vehicle, manoeuvre, t),
+        inputs=commands(problem.case.roughie, manoeuvre, t),
     )  # fmt: skip
     still = replace(
         one, recording=recording, z=np.zeros((len(t), ef.N_Y)), spectral=np.zeros_like(one.spectral),

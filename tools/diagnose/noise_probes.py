@@ -11,10 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim_backend.core.effects import effect_layout as ef
+from sim_backend.ocean.core import layout as ocean
 from tools.inference.problem import Problem
 
 TURBULENCE, WAVES, CLOCK = "turbulence", "waves", "motion capture's clock"
-UNPREDICTABLE = (TURBULENCE, WAVES)  # labels whose course nobody can foresee
+VERTICAL_WATER = "vertical_water"
+UNPREDICTABLE = (TURBULENCE, WAVES, VERTICAL_WATER)  # labels whose course nobody can foresee
 
 
 @dataclass(frozen=True)
@@ -32,6 +34,8 @@ class NoiseProbe:
 
 def probes(problem: Problem) -> list[NoiseProbe]:
     """The probes that these runs can answer."""
+    if problem.kind.input_table is not None:
+        return ocean_probes(problem)
     d, s = problem.case.disturbance, problem.case.sensors
     linear, angular = np.sqrt(0.1) * d.linear, np.sqrt(0.1) * d.angular
     every = [
@@ -57,6 +61,18 @@ def probes(problem: Problem) -> list[NoiseProbe]:
     seen = problem.seen
     mocap = seen[ef.Y_ONBOARD :].any()
     return [p for p in every if (mocap or p.name != CLOCK) and (not p.reading or seen[list(p.reading)].any())]
+
+
+def ocean_probes(problem: Problem) -> list[NoiseProbe]:
+    """Those of an ocean glider."""
+    d, s = problem.case.disturbance, problem.case.sensors
+    every = [
+        NoiseProbe(VERTICAL_WATER, "water", "environment", "water", (ocean.Q_WATER,), unit=d.water_rate),
+        NoiseProbe("speed", "force", "hydrodynamics", "surge", (ocean.Q_SPEED,), unit=d.speed),
+        NoiseProbe("roll", "force", "hydrodynamics", "roll", (ocean.Q_ROLL,), unit=d.roll_rate),
+        NoiseProbe("depth", "sensor", "sensing", "depth", (), (ocean.Y_DEPTH,), s.depth.noise),
+    ]
+    return [p for p in every if problem.seen[ocean.Y_ROLL] or p.name != "roll"]
 
 
 SCALES = (2.0, 6.0, 20.0, 60.0)  # of a probe's unit; the best of them counts

@@ -77,7 +77,7 @@ def _uncertainty(found: Identified, old: dict[str, float]) -> dict[str, float]:
 
 def vehicle_table(found: Identified) -> dict[str, Any]:
     """The vehicle file's content: the case's vehicle with the posterior's mode in place."""
-    vehicle = found.case.vehicle
+    vehicle = found.case.roughie
     table: dict[str, Any] = msgspec.to_builtins(vehicle)
     P, F, _ = found.free.place(found.read.model, found.best)
     table["hydrodynamics"] |= {name: float(P[PLACES[name]]) for name in (*COEFFICIENTS, "D_p", "D_q", "D_r")}

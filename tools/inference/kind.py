@@ -3,7 +3,7 @@
 Recordings, problems, filters and predictions take all of it from here; docs/ADDING.md, A vehicle kind.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +13,10 @@ from firmware.core.maths.rotations import quaternion_from_euler
 from firmware.core.vehicle.layout import X_BALLAST, X_DOWN, X_EAST, X_NORTH, X_NU, X_QUAT, X_SLIDER
 from firmware.model.estimator_settings import UNSEEN_SERVO_WALK
 from sim_backend.core.effects import effect_layout as ef
+from sim_backend.core.effects.base import Effect
+from sim_backend.core.effects.catalogue import catalogue
 from tools.data.runs import columns as names
+from tools.data.runs.run import Run
 from tools.inference.channels import ROUGHIE_MEASURES, Measures
 from tools.inference.core.error_layout import E_ACT, E_NU, N_ERR, N_PATH, N_SPECTRAL, Q_ACC, Q_ACT
 from tools.inference.core.filter import filter_runs, follow_runs
@@ -48,8 +51,9 @@ class Kind:
 
     name: str
     measures: Measures
+    catalogue: Callable[[], Mapping[str, Effect]]  # effects by label
     readings: tuple[Reading, ...]
-    inputs: tuple[Input, ...]
+    inputs: tuple[Input, ...]  # none where `input_table` makes them
     doubled: tuple[tuple[int, int], ...]  # readings that motion capture has too, and its own
     n_state: int
     n_error: int
@@ -77,6 +81,11 @@ class Kind:
     fly_followed: Callable[..., None]
     read_rows: Callable[..., None]
     simulate_runs: Callable[..., None]
+    input_table: Callable[[Run], np.ndarray] | None = None  # (rows, inputs) of a kind whose inputs are measured
+    # t (rows,) s, runs' bounds (runs + 1,), inputs: (rows, N_Y) bool, the readings that the observer does not look at
+    unread: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray] | None = None
+    learned_runs: int = 4  # of the first, from which a watch without a reference learns what all share
+    matters: float = 0.1  # tolerances: what moves no channel of any window so far is no gap (docs/GAP.md)
 
 
 def _first_state(first: np.ndarray) -> np.ndarray:
@@ -110,6 +119,7 @@ _READINGS = tuple(
 ROUGHIE = Kind(
     name="roughie",
     measures=ROUGHIE_MEASURES,
+    catalogue=catalogue,
     readings=_READINGS,
     inputs=(
         Input(names.COMMANDS[0], kf.SERVO_DRIVEN, unseen=(0.3, UNSEEN_SERVO_WALK**2)),

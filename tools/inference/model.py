@@ -10,6 +10,8 @@ from hal.strict import ConfigError
 from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.base import EffectError
 from sim_backend.core.effects.catalogue import catalogue, check_values
+from sim_backend.ocean.core import layout as ocean
+from sim_backend.ocean.vehicle import OceanVehicle
 from tools.data.runs.case import Case
 
 NOMINAL = "nominal"  # its name
@@ -33,8 +35,10 @@ def nominal_model(case: Case) -> Model:
     return vehicle_model(NOMINAL, case.vehicle)
 
 
-def vehicle_model(name: str, vehicle: Vehicle) -> Model:
+def vehicle_model(name: str, vehicle: Vehicle | OceanVehicle) -> Model:
     """A vehicle as a model: what is uncertain as [uncertainty] says, or where it was identified as its covariance."""
+    if isinstance(vehicle, OceanVehicle):
+        return _ocean_model(name, vehicle)
     P = vehicle.vector()
     sigma = parameter_sigma(P, vehicle.uncertainty)
     F = own_effects(vehicle)
@@ -44,10 +48,28 @@ def vehicle_model(name: str, vehicle: Vehicle) -> Model:
     C = np.array(found.covariance)
     # The observer takes parameters as independent, which a posterior seldom is: it is told the lesser of the two.
     sigma[found.places] = np.minimum(sigma[found.places], np.sqrt(np.maximum(np.diag(C), 0.0)))
+    return Model(name, P, sigma, F, spread=_directions(C, found.places, len(P)))
+
+
+def _directions(C: np.ndarray, places: np.ndarray, count: int) -> np.ndarray:
+    """Independent directions of a covariance C (n, n) at places of P, (n, count), each of 1 sigma."""
     values, vectors = np.linalg.eigh(C)
-    spread = np.zeros((len(values), len(P)))
-    spread[:, found.places] = (vectors * np.sqrt(np.maximum(values, 0.0))).T
-    return Model(name, P, sigma, F, spread=spread[np.abs(spread).max(axis=1) > 0.0])
+    spread = np.zeros((len(values), count))
+    spread[:, places] = (vectors * np.sqrt(np.maximum(values, 0.0))).T
+    return np.asarray(spread[np.abs(spread).max(axis=1) > 0.0])
+
+
+def _ocean_model(name: str, vehicle: OceanVehicle) -> Model:
+    """An ocean glider as a model; its F (ocean.N_F,) has no effects."""
+    P, sigma, F = vehicle.vector(), vehicle.sigma(), np.zeros(ocean.N_F)
+    found, places = vehicle.identified, vehicle.identified_places
+    if found is None or not len(places):
+        return Model(name, P, sigma, F)
+    C = np.array(found.covariance)
+    scale = np.sqrt(np.maximum(np.diag(C), 1e-300))  # a compressibility is 1e-10: its square is lost beside others
+    directions = _directions(C / np.outer(scale, scale), places, ocean.N_P)
+    directions[:, places] *= scale
+    return Model(name, P, sigma, F, spread=directions)
 
 
 def own_effects(vehicle: Vehicle) -> np.ndarray | None:

@@ -5,10 +5,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from firmware.model.vehicle import SensorsTable
+from sim_backend.ocean.vehicle import OceanSensors
 from tools.data.runs.case import Case
 from tools.data.runs.run import Run
 from tools.inference.channels import recorded
-from tools.inference.kind import ROUGHIE, Kind
+from tools.inference.kind import Kind
+from tools.inference.kinds import kind_of
 from tools.inference.model import Model, nominal_model
 from tools.inference.recording import Recording, record
 from tools.inference.rules import Rules
@@ -170,20 +172,23 @@ def measured_all(kind: Kind, run: Run) -> np.ndarray:
     return table
 
 
-def variances(kind: Kind, sensors: SensorsTable) -> np.ndarray:
+def variances(kind: Kind, sensors: SensorsTable | OceanSensors) -> np.ndarray:
     """The measurements' variances, (N_Y,). A file may say that one has no noise; a filter must not believe that."""
     noise = [getattr(sensors, reading.source).noise for reading in kind.readings]
     return np.array([max(sigma, LEAST_NOISE) ** 2 for sigma in noise])
 
 
 def problem_of(
-    case: Case, model: Model | None = None, runs: list[Run] | None = None, rules: Rules = ALL, kind: Kind = ROUGHIE
+    case: Case, model: Model | None = None, runs: list[Run] | None = None, rules: Rules = ALL
 ) -> Problem:
     """The problem of a case (all of its runs, if none are named)."""
+    kind = kind_of(case.vehicle)
     model = nominal_model(case) if model is None else model
     runs = case.runs if runs is None else runs
     recording = record(kind, runs)
     z = np.concatenate([measured_all(kind, run) for run in runs])
+    if kind.unread is not None:
+        z[kind.unread(recording.t, recording.bounds, recording.inputs)] = np.nan
     spreads, spectral = np.tile(kind.spread, (len(runs), 1)), np.zeros(kind.n_spectral)
     disturbance = [getattr(case.disturbance, name) for name in kind.disturbance]
     spectral[kind.accelerations] = np.array(disturbance) ** 2 * kind.hold

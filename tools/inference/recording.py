@@ -39,6 +39,9 @@ def drawn_position(t: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 def _inputs(kind: Kind, run: Run) -> tuple[int, np.ndarray, np.ndarray]:
     """Mode, inputs and driven positions, both (rows, inputs), of a run."""
+    if kind.input_table is not None:
+        table = kind.input_table(run)
+        return 0, table, np.full(table.shape, np.nan)
     mode, t, shape = 0, run.t, (run.rows, len(kind.inputs))
     inputs, drawn = np.zeros(shape), np.full(shape, np.nan)
     for i, entry in enumerate(kind.inputs):

@@ -98,7 +98,7 @@ def coefficients(P: np.ndarray) -> list[FreeParameter]:
 
 
 def _masses(problem: Problem, scale: float) -> list[FreeParameter]:
-    P, u = problem.model.P, problem.case.vehicle.uncertainty
+    P, u = problem.model.P, problem.case.roughie.uncertainty
     found = [FreeParameter("", name, "P", entry, u.mass * P[entry], unit="kg") for name, entry in MASSES.items()]
     share = max(u.added, ADDED_SHARE)
     for name, entry in ADDED.items():

@@ -9,12 +9,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from tools.diagnose.noise_probes import TURBULENCE, WAVES, NoiseProbe, inflated, probes
+from tools.diagnose.noise_probes import UNPREDICTABLE, NoiseProbe, inflated, probes
 from tools.inference.problem import Problem
 from tools.watch.flights import Flights, numbers
 
 SCALES = (1.6, 2.5, 4.0, 7.0, 12.0, 20.0, 35.0, 60.0)
-WATER = (TURBULENCE, WAVES)  # labels whose course nobody can foresee
+WATER = UNPREDICTABLE
 COARSE = 2  # of the scales, one in so many is tried of single links
 FAR_BEHIND = 50.0  # nat behind its best: a probe is not tried at larger scales
 
@@ -51,9 +51,16 @@ def beyond_reference(flights: Flights, wanted: Sequence[NoiseProbe], runs: Seque
     return probe_gains(flights, wanted, runs) - usual[:, None, :] * samples[list(runs)][None, :, None]
 
 
+def water_labels(flights: Flights) -> list[str]:
+    """The labels of the water's disorder that these runs can have."""
+    there = {probe.name for probe in probes(flights.parts[0])}
+    return [name for name in WATER if name in there]
+
+
 def water_gains(flights: Flights, runs: Sequence[int]) -> np.ndarray:
-    """Nat that the water's disorder gains in runs beyond the reference, (WATER, runs, scales)."""
-    wanted = [probe for name in WATER for probe in probes(flights.parts[0]) if probe.name == name]
+    """Nat that the water's disorder gains in runs beyond the reference, (labels, runs, scales)."""
+    listed = {probe.name: probe for probe in probes(flights.parts[0])}
+    wanted = [listed[name] for name in water_labels(flights)]
     return beyond_reference(flights, wanted, runs, flights.count)
 
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tools.inference.fit import bounded_step
-from tools.watch.expansion import Expansion
-from tools.watch.shared_parameters import SharedParameters
+from tools.inference.expansion import Expansion
+from tools.inference.shared_parameters import SharedParameters
 
 STEP, GROWING = "step", "growing"
 LEAST_GROWING = 3  # runs in which a growth can be told from a step

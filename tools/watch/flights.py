@@ -6,10 +6,10 @@ import numpy as np
 
 from tools.inference.fit import bounded_step
 from tools.inference.problem import Problem
-from tools.watch.expansion import Expansion, expand
+from tools.inference.expansion import Expansion, expand
 from tools.watch.scatter import learn_scatter, without_deviation
-from tools.watch.shared_model import fit_shared, heat_of
-from tools.watch.shared_parameters import SharedParameters
+from tools.inference.shared_model import fit_shared, heat_of
+from tools.inference.shared_parameters import SharedParameters
 
 LEAST_SIZE = 1e-6  # spreads by which runs may differ
 

@@ -4,7 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sim_backend.core.effects.catalogue import catalogue
+from collections.abc import Mapping
+from sim_backend.core.effects.base import Effect
 from tools.diagnose.noise_probes import NoiseProbe
 from tools.watch.disorder import WATER, shaken
 from tools.watch.events import Change, Joint, Span, spans
@@ -43,13 +44,18 @@ class History:
     judged: np.ndarray  # (runs,) bool
     begins: int  # the first run with which an event may begin
     events: list[Event] = field(default_factory=list)
-    water: np.ndarray | None = None  # nat that the water's disorder gains, (WATER, runs, scales)
+    water: np.ndarray | None = None  # nat that the water's disorder gains, (labels, runs, scales)
 
     @property
     def taken(self) -> list[tuple[str, np.ndarray]]:
         """The events with a course, as unknowns of all runs together."""
         count = self.flights.count
         return [(event.label, event.span.weights(count)) for event in self.events if event.has_course]
+
+    @property
+    def effects(self) -> Mapping[str, Effect]:
+        """The catalogue of the vehicles' kind."""
+        return self.flights.parts[0].kind.catalogue()
 
     def joint(self) -> Joint:
         """All runs with the events that have a course."""
@@ -60,9 +66,6 @@ class History:
         return spans([bool(one) for one in self.judged], self.begins)
 
 
-def place_of(event: Event) -> tuple[str, str]:
-    """Where its label sits."""
-    return catalogue()[event.label].place
 
 
 def shaken_place(event: Event) -> tuple[str, str] | None:

@@ -11,8 +11,8 @@ import numpy as np
 
 from tools.inference.fit import EFFECT_STEP, FIRST_STEP, bounded_step
 from tools.inference.problem import Problem
-from tools.watch.expansion import at_kink, columns_at
-from tools.watch.shared_parameters import SharedParameters
+from tools.inference.expansion import at_kink, columns_at
+from tools.inference.shared_parameters import SharedParameters
 
 STEPS = 5
 ROUGH = (100.0, 10.0)

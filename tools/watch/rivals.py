@@ -7,7 +7,7 @@ import numpy as np
 
 from tools.inference.fit import bounded_step
 from tools.watch.events import GROWING, STEP, Change, Joint, Span
-from tools.watch.expansion import Expansion, expand
+from tools.inference.expansion import Expansion, expand
 from tools.watch.flights import Flights, numbers
 from tools.watch.history import Event, History, within
 from tools.watch.label_fit import Affected, LabelFit, best_fit, cost_of, values_of

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.optimize import minimize
 
-from tools.watch.expansion import Expansion
-from tools.watch.shared_parameters import SharedParameters
+from tools.inference.expansion import Expansion
+from tools.inference.shared_parameters import SharedParameters
 
 USUAL = np.array([0.05, 0.3, 0.01])  # spreads, by group
 USUAL_WIDTH = 1.0  # e-folds

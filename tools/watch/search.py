@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from tools.inference.parameters import CLOCK_PLACE
-from tools.watch.history import Event, History, already, earns_place, place_of, shaken_place, take
+from tools.watch.history import Event, History, already, earns_place, shaken_place, take
 from tools.watch.rivals import refined
 from tools.watch.water import named, rougher, water_event
 
@@ -35,6 +35,6 @@ def next_event(history: History) -> Event | None:
     if not earns_place(history, rough):
         return event
     found = named(history, rough)
-    if event is not None and place_of(event) == CLOCK_PLACE == shaken_place(found):
+    if event is not None and history.effects[event.label].place == CLOCK_PLACE == shaken_place(found):
         return event  # a clock that wanders is still one that is wrong
     return found

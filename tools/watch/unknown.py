@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
-from sim_backend.core.effects.catalogue import catalogue
 from tools.diagnose.noise_probes import NoiseProbe, probes
 from tools.inference.parameters import CLOCK_PLACE
 from tools.watch.disorder import SCALES, WATER, beyond_reference
@@ -47,7 +46,7 @@ def what_is_left(history: History, event: Event) -> Left:
     together = beyond_reference(flights, wanted, rough, REFERENCE).sum(axis=1)
     order = np.argsort(-together.max(axis=1))
     found = [(wanted[n], float(together[n].max()), SCALES[int(together[n].argmax())]) for n in order]
-    if event.has_course and found[0][0].element == CLOCK_PLACE[1] and catalogue()[event.label].place == CLOCK_PLACE:
+    if event.has_course and found[0][0].element == CLOCK_PLACE[1] and history.effects[event.label].place == CLOCK_PLACE:
         return NOTHING  # a clock that wanders is still one that is wrong
     left = max(found[0][1], 0.0)
     return Left(left / max(left + explained * len(rough), 1e-9), found)

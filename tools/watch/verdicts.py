@@ -4,8 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sim_backend.core.effects.catalogue import catalogue
-from tools.diagnose.matter import MATTERS, largest
+from tools.diagnose.matter import largest
 from tools.diagnose.verdict import ERROR_RATE, TIE, softmax
 from tools.inference.predict import fly_windows_from
 from tools.watch.answer import CAUSE, NONE, UNKNOWN, EventAnswer, RunCause, RunVerdict, Sized
@@ -123,7 +122,7 @@ def matters(history: History, event: Event, number: int) -> bool:
         gains = part.filter(P, F, begin=True)
         Y = fly_windows_from(part, P, F, gains)
         other = fly_windows_from(part, *shared.model(part, within(flights, without)), gains)
-        if largest(part, Y, other) >= MATTERS:
+        if largest(part, Y, other) >= part.kind.matters:
             return True
     return False
 
@@ -192,12 +191,12 @@ def water_size(event: Event) -> Sized:
     return Sized(scale - 1.0, (scale - 1.0 - CI90 * spread, scale - 1.0 + CI90 * spread), "1")
 
 
-def where_of(one: Settled) -> list[dict[str, object]]:
+def where_of(history: History, one: Settled) -> list[dict[str, object]]:
     """Places of the change, most probable first."""
     chances: dict[tuple[str, str], float] = {}
     if one.label is not None:
         for label, chance in probabilities(one).items():
-            place = catalogue()[label].place
+            place = history.effects[label].place
             chances[place] = chances.get(place, 0.0) + chance
     elif one.left.probes:
         gains = [max(gain, 0.0) for _, gain, _ in one.left.probes]
@@ -207,7 +206,7 @@ def where_of(one: Settled) -> list[dict[str, object]]:
     elif one.event.place is not None:
         chances[one.event.place.subsystem, one.event.place.element] = 1.0
     elif one.event.label:
-        chances[catalogue()[one.event.label].place] = 1.0
+        chances[history.effects[one.event.label].place] = 1.0
     ranked = sorted(chances.items(), key=lambda item: -item[1])
     return [{"subsystem": s, "element": e, "probability": p} for (s, e), p in ranked if p > 0.005]
 
@@ -228,7 +227,7 @@ def event_answer(history: History, one: Settled, names: list[str]) -> EventAnswe
     chance = known if one.label else one.probability * unknown
     last = None if still else names[inside[-1]]
     return EventAnswer(
-        one.label, where_of(one), group_of(one), names[inside[0]], last, course, float(chance), sized(history, one),
+        one.label, where_of(history, one), group_of(one), names[inside[0]], last, course, float(chance), sized(history, one),
         sizes,
     )  # fmt: skip
 

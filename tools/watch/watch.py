@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from sim_backend.ocean.vehicle import OceanVehicle
 from tools.data.errors import InputError
 from tools.data.runs.case import Case
 from tools.data.runs.run import Run
@@ -14,17 +15,17 @@ from tools.watch.answer import NONE, RunVerdict, Watch
 from tools.watch.flights import Flights
 from tools.watch.history import History
 from tools.watch.search import find_events
-from tools.watch.shared_parameters import shared_parameters
-from tools.watch.usable import ASKED, readings_of, usable
+from tools.inference.shared_parameters import shared_parameters
+from tools.watch.usable import ASKED, readings_of, usable, usable_dive
 from tools.watch.verdicts import FEW, event_answer, run_verdict, settle
 
-FIRST, FIRST_SHARE = 4, 3  # without a reference: so many runs at most, one in so many, are where learning begins
+FIRST_SHARE = 3  # without a reference: one run in so many, as many as their kind asks for at most, are where learning begins
 
 
 def watch(case: Case, reference: Case | None = None, say: Callable[[str], None] = lambda text: None) -> Watch:
     """What changed over the runs of a case; InputError where there is nothing to compare them with."""
     before = [] if reference is None else reference.runs
-    runs, skipped = usable_runs([*before, *case.runs])
+    runs, skipped = usable_runs([*before, *case.runs], isinstance(case.vehicle, OceanVehicle))
     count = len(before)
     here = sorted(runs)
     told = [f"{reference.folder.name}/{run.name}" for run in before] if reference is not None else []
@@ -34,7 +35,7 @@ def watch(case: Case, reference: Case | None = None, say: Callable[[str], None] 
         raise InputError(nothing_to_compare(skipped, names, count), source=case.folder)
     problem = problem_of(case, runs=[runs[n] for n in here])
     parts = [problem.part(k) for k in range(len(here))]
-    learned_from = ~judged if reference is not None else first_runs(len(here))
+    learned_from = ~judged if reference is not None else first_runs(len(here), problem.kind.learned_runs)
     begins = int((~judged).sum()) if reference is not None else 1
     history = looked_at(parts, problem, learned_from, judged, begins, say)
     if reference is None and any(event.span.first < learned_from.sum() for event in history.events):
@@ -58,12 +59,13 @@ def watch(case: Case, reference: Case | None = None, say: Callable[[str], None] 
     return Watch(verdicts, events, learned, cautions(case, reference, learned, skipped, names))
 
 
-def usable_runs(runs: list[Run]) -> tuple[dict[int, Run], dict[int, str]]:
+def usable_runs(runs: list[Run], ocean: bool = False) -> tuple[dict[int, Run], dict[int, str]]:
     """The runs that can be judged by their number, and why the others cannot."""
-    found = {n: usable(run) for n, run in enumerate(runs)}
+    found = {n: usable_dive(run) if ocean else usable(run) for n, run in enumerate(runs)}
     good = {n: one for n, one in found.items() if isinstance(one, Run)}
-    wanted = usual_readings(list(good.values()))
-    found |= {n: usable(runs[n], wanted) for n in good}
+    if not ocean:
+        wanted = usual_readings(list(good.values()))
+        found |= {n: usable(runs[n], wanted) for n in good}
     return (
         {n: one for n, one in found.items() if isinstance(one, Run)},
         {n: one for n, one in found.items() if isinstance(one, str)},
@@ -76,9 +78,9 @@ def usual_readings(runs: list[Run]) -> set[str]:
     return {name for name in ASKED if sum(name in own for own in each) > 0.5 * len(each)}
 
 
-def first_runs(count: int) -> np.ndarray:
-    """Where learning begins without a reference: the first runs, (runs,) bool."""
-    return np.arange(count) < max(1, min(FIRST, count // FIRST_SHARE))
+def first_runs(count: int, most: int) -> np.ndarray:
+    """Where learning begins without a reference: the first runs, `most` at most, (runs,) bool."""
+    return np.arange(count) < max(1, min(most, count // FIRST_SHARE))
 
 
 def looked_at(

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from tools.diagnose.noise_probes import TURBULENCE, WAVES, probes
+from tools.diagnose.noise_probes import TURBULENCE, WAVES, NoiseProbe, probes
 from tools.diagnose.unknown import ONE_AXIS
-from tools.watch.disorder import SCALES, WATER, beyond_reference, shaken, water_gains
+from tools.watch.disorder import SCALES, WATER, beyond_reference, shaken, water_gains, water_labels
 from tools.watch.events import GROWING
 from tools.watch.flights import Flights, numbers, roughness_sigma
 from tools.watch.history import NOT_ROUGH, Event, History, within
@@ -29,7 +29,7 @@ def water_event(history: History) -> Event | None:
         inside = span.weights(flights.count) > 0.0
         if span.course == GROWING or any((inside & before).any() for before in shaken_before):
             continue
-        for label, gains in zip(WATER, history.water, strict=True):
+        for label, gains in zip(water_labels(flights), history.water, strict=True):
             together = gains[inside].sum(axis=0)
             k = int(together.argmax())
             if best is None or together[k] > best.evidence:
@@ -39,8 +39,8 @@ def water_event(history: History) -> Event | None:
 
 
 def rough_water(flights: Flights, runs: Sequence[int]) -> np.ndarray:
-    """Nat that the water's disorder gains in runs, (WATER, runs, scales); asked of rough ones only."""
-    found = np.full((len(WATER), len(runs), len(SCALES)), -NOT_ROUGH)
+    """Nat that the water's disorder gains in runs, (labels, runs, scales); asked of rough ones only."""
+    found = np.full((len(water_labels(flights)), len(runs), len(SCALES)), -NOT_ROUGH)
     rough = [k for k, n in enumerate(runs) if roughness_sigma(flights, n) > ASKED_ABOVE]
     if rough:
         found[:, rough] = water_gains(flights, [runs[k] for k in rough])
@@ -58,13 +58,21 @@ def named(history: History, event: Event) -> Event:
     wanted = probes(flights.parts[loudest[0]])
     gains = beyond_reference(flights, wanted, loudest, PROBED).sum(axis=1).max(axis=1)
     first = int(gains.argmax())
+    if TURBULENCE not in [one.name for one in wanted]:  # of a kind whose water moves it one way
+        return replace(event, label=wanted[first].name) if wanted[first].name in WATER else linked(event, wanted, gains)
     own = gains[[one.name for one in wanted].index(TURBULENCE)]
     axes = [gain for gain, one in zip(gains, wanted, strict=True) if one.stage == "force" and one.name != TURBULENCE]
     even = max(axes) < ONE_AXIS * own and max(burstiness(flights, n) for n in loudest) < BURSTS
     if wanted[first].name == WAVES or (wanted[first].name == TURBULENCE and even):
         return replace(event, label=wanted[first].name)
-    linked = max((n for n, one in enumerate(wanted) if one.name not in WATER), key=lambda n: gains[n])
-    return replace(event, label="", rivals={}, probe=(wanted[first].name, float(event.size[0])), place=wanted[linked])
+    return linked(event, wanted, gains)
+
+
+def linked(event: Event, wanted: Sequence[NoiseProbe], gains: np.ndarray) -> Event:
+    """Disorder that no label means, at the single link that shakes most."""
+    first = int(gains.argmax())
+    link = max((n for n, one in enumerate(wanted) if one.name not in WATER), key=lambda n: gains[n])
+    return replace(event, label="", rivals={}, probe=(wanted[first].name, float(event.size[0])), place=wanted[link])
 
 
 def burstiness(flights: Flights, n: int) -> float:

@@ -278,8 +278,8 @@ def write_log(path: Path | str, case: Case, run: Run) -> Path:
             water_density_kg_m3=case.water_density_kg_m3,
             motion_capture=case.motion_capture,
             runs=1,
-            sensors=SensorsPart(**_own(case.sensors, case.vehicle.sensors)),
-            disturbance=DisturbancePart(**_own(case.disturbance, case.vehicle.disturbance)),
+            sensors=SensorsPart(**_own(case.sensors, case.roughie.sensors)),
+            disturbance=DisturbancePart(**_own(case.disturbance, case.roughie.disturbance)),
         ),
     }
     if texts:

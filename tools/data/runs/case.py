@@ -13,7 +13,8 @@ from hal.strict import MAX_BYTES, Table, decode
 from tools.data.errors import InputError
 from tools.data.runs import csvfile
 from tools.data.runs.run import Run, load_run, run_name, write_run
-from tools.data.sources import load_vehicle, read_text
+from sim_backend.ocean.vehicle import OceanDisturbance, OceanSensors, OceanVehicle
+from tools.data.sources import load_any_vehicle, read_text
 
 CASE_FILE = "case.toml"
 VEHICLE_FILE = "vehicle.toml"  # beside it, where the vehicle is not a shipped one
@@ -60,16 +61,26 @@ class Case:
     """Runs of one vehicle at one site."""
 
     folder: Path
-    vehicle: Vehicle
+    vehicle: Vehicle | OceanVehicle
     vehicle_name: str  # as case.toml gives it: a shipped name or a path
     site: str
     log_rate_hz: float
     water_density_kg_m3: float
     motion_capture: bool
     runs: list[Run]
-    sensors: SensorsTable  # the vehicle's, with the case's entries in their place
-    disturbance: DisturbanceTable
+    sensors: SensorsTable | OceanSensors  # the vehicle's, with the case's entries in their place
+    disturbance: DisturbanceTable | OceanDisturbance
     assumed: dict[str, Assumed] = field(default_factory=dict)  # the vehicle's and the case's own
+
+    @property
+    def roughie(self) -> Vehicle:
+        """The vehicle of a command that takes no ocean glider; InputError where it is one."""
+        if isinstance(self.vehicle, OceanVehicle):
+            raise InputError(
+                f"{self.vehicle_name} is an ocean glider, which this command does not take", source=self.folder,
+                column="vehicle",
+            )  # fmt: skip
+        return self.vehicle
 
 
 def _run_files(folder: Path) -> list[Path]:
@@ -99,7 +110,7 @@ def _read_case_file(folder: Path) -> CaseTable:
 
 
 def _assemble(folder: Path, table: CaseTable, runs: list[Run], instead: str | None) -> Case:
-    vehicle = load_vehicle(table.vehicle, base=folder) if instead is None else load_vehicle(instead)
+    vehicle = load_any_vehicle(table.vehicle, folder) if instead is None else load_any_vehicle(instead)
     return Case(
         folder=folder,
         vehicle=vehicle,

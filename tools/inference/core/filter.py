@@ -35,6 +35,7 @@ from tools.inference.core.error_layout import (
     Q_LATE,
     Q_POS,
 )
+from tools.inference.core.gain import corrections, take_measurement, whitened
 from tools.inference.core.lacking import (
     L_GYRO,
     N_LACKING,
@@ -184,56 +185,7 @@ def filter_run(
             take_gyro_bias(lacking, d)
             for j in range(3):
                 H[ef.Y_P + j, N_ERR + L_GYRO + j] = 1.0
-        # S = H cov H' + R of what was measured, its Cholesky factor L, and W = L^-1; K~ = cov H' L^-T
-        for m in range(N_Y):
-            if math.isnan(d[m]):
-                H[m, :] = 0.0
-        product(H, cov, HC)
-        HT[:] = H.T
-        product(HC, HT, S)
-        for m in range(N_Y):
-            if math.isnan(d[m]):
-                S[m, m] = 1.0
-            else:
-                S[m, m] += R[m]
-        for m in range(N_Y):
-            for n in range(m + 1):
-                total = S[m, n]
-                for k in range(n):
-                    total -= L[m, k] * L[n, k]
-                if m == n:
-                    L[m, m] = math.sqrt(max(total, 1e-18))
-                else:
-                    L[m, n] = total / L[n, n]
-        for m in range(N_Y):  # W = L^-1, lower triangular
-            for n in range(N_Y):
-                W[i, m, n] = 0.0
-            W[i, m, m] = 1.0 / L[m, m]
-            for n in range(m):
-                total = 0.0
-                for k in range(n, m):
-                    total -= L[m, k] * W[i, k, n]
-                W[i, m, n] = total / L[m, m]
-        for a in range(count):
-            for m in range(N_Y):
-                total = 0.0
-                for n in range(m + 1):
-                    total += HC[n, a] * W[i, m, n]
-                K[i, a, m] = total
-        for a in range(count):
-            for b in range(count):
-                total = 0.0
-                for m in range(N_Y):
-                    total += K[i, a, m] * K[i, b, m]
-                cov[a, b] -= total
-        for a in range(count):
-            for b in range(a):
-                mean = 0.5 * (cov[a, b] + cov[b, a])
-                cov[a, b] = mean
-                cov[b, a] = mean
-        for m in range(N_Y):
-            if not math.isnan(d[m]):
-                misfit += 2.0 * math.log(L[m, m])
+        misfit += take_measurement(H, cov, R, d, HC, HT, S, L, W[i], K[i])
         base[:] = x
         misfit += apply_gain(W[i], K[i], d, x, error, E[i])
         for n in range(count - N_ERR):
@@ -270,23 +222,8 @@ def lost(x, cov):
 @kernel
 def apply_gain(W, K, d, x, error, e):
     """Whiten a row's innovations d into e, correct x by them, return their sum of squares."""
-    total = 0.0
-    for m in range(N_Y):
-        if math.isnan(d[m]):
-            e[m] = math.nan
-            continue
-        value = 0.0
-        for n in range(m + 1):
-            if not math.isnan(d[n]):
-                value += W[m, n] * d[n]
-        e[m] = value
-        total += value * value
-    for a in range(len(error)):
-        value = 0.0
-        for m in range(N_Y):
-            if not math.isnan(e[m]):
-                value += K[a, m] * e[m]
-        error[a] = value
+    total = whitened(W, d, e)
+    corrections(K, e, error)
     inject_error(x, error)
     return total
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from tools.inference.fit import NUISANCE_STEP, THRESHOLD_STEP
 from tools.inference.problem import Gains, Problem
-from tools.watch.shared_parameters import HARDLY, SharedParameters
+from tools.inference.shared_parameters import HARDLY, SharedParameters
 
 STEP = 0.1  # of a label's spread: difference step
 HIDDEN = 1.0  # sigma: a whole spread that moves less may be a threshold that was not reached

@@ -9,8 +9,8 @@ import numpy as np
 
 from tools.inference.fit import SHORTER_STEPS, bounded_step
 from tools.inference.problem import Problem
-from tools.watch.expansion import Expansion, expand
-from tools.watch.shared_parameters import SharedParameters
+from tools.inference.expansion import Expansion, expand
+from tools.inference.shared_parameters import SharedParameters
 
 ROUGHNESS = (100.0, 10.0, 1.0, 1.0, 1.0)  # of each step
 ENOUGH = 2.0  # squared sigma that the last step's parabola still promises: no further step

@@ -1,0 +1,72 @@
+"""What the identification of an ocean glider leaves behind: a vehicle file, and the answer as JSON."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from sim_backend.ocean.core import layout as at
+from sim_backend.ocean.vehicle import PLACES, OceanVehicle, decode_ocean_vehicle
+from tools.data.plain import as_plain
+from tools.data.runs.csvfile import write_bytes
+from tools.data.tomltext import toml_text
+from tools.identify.ocean.identify import OceanIdentification
+
+VEHICLE, RESULT = "identified.toml", "identified.json"
+DIGITS = 10  # of a covariance
+
+
+def vehicle_table(found: OceanIdentification) -> dict[str, Any]:
+    """The vehicle file's content: the case's vehicle with what was found in place."""
+    vehicle = found.case.vehicle
+    assert isinstance(vehicle, OceanVehicle)
+    table: dict[str, Any] = msgspec.to_builtins(vehicle)
+    P = found.P
+    weight, water = ("volume", "compressibility", "thermal_expansion", "oil_scale"), ("Cd0", "Cd1", "lift_slope")
+    table["buoyancy"] |= {name: float(P[PLACES[name]]) for name in weight}
+    table["hydrodynamics"] |= {name: float(P[PLACES[name]]) for name in water}
+    table["attitude"] = {name: float(P[PLACES[name]]) for name in ("pitch_offset", "pitch_scale", "roll_trim")}
+    C = 0.5 * (found.covariance + found.covariance.T)
+    table["identified"] = {
+        "runs": len(found.problem.runs),
+        "from_vehicle": found.case.vehicle_name,
+        "parameters": [one.name for one in found.parameters],
+        "covariance": [[float(f"{value:.{DIGITS}g}") for value in row] for row in C.tolist()],
+    }
+    return table
+
+
+def vehicle_text(found: OceanIdentification) -> str:
+    """identified.toml; checked by reading it back."""
+    text = (
+        "# A vehicle identified by `glider identify`; [identified] says from what, and how sure the numbers are.\n"
+        + toml_text(vehicle_table(found), inline=("sensors",))
+    )
+    decode_ocean_vehicle(text, VEHICLE)
+    return text
+
+
+def plain(found: OceanIdentification) -> dict[str, Any]:
+    """The answer as it is written."""
+    d = found.case.disturbance
+    return {
+        "kind": "ocean",
+        "runs": [run.name for run in found.problem.runs],
+        "parameters": [
+            {"name": one.name, "mean": one.mean, "sd": one.sd, "ci90": list(one.ci90), "unit": one.unit,
+             "prior_sd": one.prior_sd} for one in [*found.parameters, found.net_mass]
+        ],
+        "ridges": [{"names": one.names, "weights": one.weights, "left": one.left} for one in found.ridges],
+        "next_run": found.next_run,
+        "water": {"sd": d.water, "time": d.water_time, "rms": found.water_rms, "runs": found.water},
+        "left_out": found.left_out,
+        "gravity": float(found.P[at.GRAVITY]),
+    }  # fmt: skip
+
+
+def write(found: OceanIdentification, out: Path) -> None:
+    """All files into a folder."""
+    out.mkdir(parents=True, exist_ok=True)
+    write_bytes(out / VEHICLE, vehicle_text(found).encode("utf-8"))
+    write_bytes(out / RESULT, (json.dumps(as_plain(plain(found)), indent=1) + "\n").encode("utf-8"))

@@ -1,0 +1,211 @@
+"""An ocean glider identified from a mission's dives: volume, drag, lift, compression, expansion, attitude, noise.
+
+Gauss and Newton's steps in everything at once along the observer's innovations, held by what the vehicle file allows
+(docs/OCEAN.md, Identification). Dives differ by more than their noise says; the covariance is that of a sandwich.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim_backend.ocean.core import layout as at
+from sim_backend.ocean.vehicle import PLACES, UNITS, OceanVehicle
+from tools.data.errors import InputError
+from tools.data.runs.case import Case
+from tools.data.runs.run import Run
+from tools.identify.ocean.levels import find_levels
+from tools.inference.expansion import Expansion, expand
+from tools.inference.ocean_inputs import lacking, steady_seconds
+from tools.inference.parameters import NINETY, FreeParameter, nuisance_parameters
+from tools.inference.problem import Problem, problem_of
+from tools.inference.shared_model import fit_shared, heat_of
+from tools.inference.shared_parameters import SharedParameters
+from tools.inference.steady import first_guess, steady_rows, vertical_water
+
+MOST_RUNS = 24  # of the mission's first: drag creeps after that
+LEVEL_RUNS = 6
+SHORTEST = 900.0  # s of steady flight, for a run to be learned from
+ROUNDS = 2
+DENSITY = 1027.0  # kg/m3, at which the net mass is told
+RIDGE = 0.6  # of the prior's width that is left: such a direction the dives do not tell
+
+
+# numbers that go together on depth rate, and what parts them
+PARTED_BY = (
+    (("Cd0", "lift_slope", "pitch_scale"),
+     "two dives at 8 degrees more and two at 8 degrees less pitch; a speed log or ADCP parts them surely"),
+    (("volume", "oil_scale"), "two dives with half the buoyancy"),
+    (("compressibility", "thermal_expansion"), "two dives to another depth, or where the temperature is another"),
+)  # fmt: skip
+
+
+@dataclass
+class Parameter:
+    """One number of the vehicle, SI."""
+
+    name: str
+    mean: float
+    sd: float
+    unit: str
+    prior_sd: float
+
+    @property
+    def ci90(self) -> tuple[float, float]:
+        return self.mean - NINETY * self.sd, self.mean + NINETY * self.sd
+
+
+@dataclass
+class Ridge:
+    """Numbers that go together: what one has more of, the others make up for."""
+
+    names: list[str]
+    weights: list[float]  # in prior spreads
+    left: float  # of the prior's width
+
+    def sentence(self) -> str:
+        """For a person."""
+        return f"{', '.join(self.names)} cannot be told apart by these dives ({100.0 * self.left:.0f} % of what was open is left)"
+
+
+@dataclass
+class OceanIdentification:
+    """What was found, and from what."""
+
+    case: Case  # with the noise found
+    problem: Problem  # of the runs that were learned from
+    P: np.ndarray
+    places: list[int]  # of the parameters in P
+    parameters: list[Parameter]
+    covariance: np.ndarray  # SI, of the parameters
+    ridges: list[Ridge]
+    water: dict[str, float]  # rms of the vertical water by run, m/s
+    left_out: list[str]
+
+    @property
+    def net_mass(self) -> Parameter:
+        """Mass less that of the water of DENSITY that the hull displaces at the reference temperature, heavy positive."""
+        volume = next(one for one in self.parameters if one.name == "volume")
+        mass = float(self.P[at.MASS]) - DENSITY * volume.mean
+        return Parameter("net_mass", mass, DENSITY * volume.sd, "kg", DENSITY * volume.prior_sd)
+
+    @property
+    def next_run(self) -> dict[str, str] | None:
+        """What to fly to part what these dives cannot, in a pilot's words; None where nothing is left."""
+        together = {name for ridge in self.ridges for name in ridge.names}
+        told = [text for names, text in PARTED_BY if together & set(names)]
+        return {"text": "; ".join(told)} if told else None
+
+    @property
+    def water_rms(self) -> float:
+        return float(np.sqrt(np.mean(np.square(list(self.water.values())))))
+
+
+def learnable(runs: list[Run]) -> tuple[list[Run], list[str]]:
+    """The runs that fly steadily long enough, and why the others are left out."""
+    good, out = [], []
+    for run in runs:
+        missing = lacking(run)
+        steady = 0.0 if missing is not None else steady_seconds(run)
+        if missing is not None:
+            out.append(f"{run.name}: no {missing}")
+        elif steady >= SHORTEST:
+            good.append(run)
+        else:
+            out.append(f"{run.name}: {steady:.0f} s of steady flight, {SHORTEST:.0f} s are needed")
+    return good, out
+
+
+def identify_ocean(case: Case, say: Callable[[str], None] = lambda text: None) -> OceanIdentification:
+    """The vehicle of a case, from its first dives; InputError where none can be learned from."""
+    runs, left_out = learnable(case.runs)
+    if not runs:
+        raise InputError(f"no run flies steadily for {SHORTEST:.0f} s: {left_out[0]}", source=case.folder)
+    runs = runs[:MOST_RUNS]
+    problem = problem_of(case, runs=runs)
+    free = nuisance_parameters(problem)
+    P = first_guess(problem)
+    x = np.array([(P[f.entry] - problem.model.P[f.entry]) / f.spread if f.entry >= 0 and f.vector == "P" else 0.0
+                  for f in free])  # fmt: skip
+    say(f"{len(runs)} runs, {len(problem.z)} rows; a first guess of volume and drag")
+    shared = SharedParameters(free, {}, {}, 1.0)
+    levels_from = [runs[k] for k in np.unique(np.linspace(0, len(runs) - 1, LEVEL_RUNS).astype(int))]
+    for _ in range(ROUNDS):
+        parts = [problem.part(k) for k in range(len(runs))]
+        x = fit_shared(parts, shared, x)
+        P, F = shared.model(problem, x)
+        case = find_levels(case, problem_of(case, runs=levels_from), P, F)
+        problem = problem_of(case, runs=runs)
+        say(f"vertical water {100.0 * case.disturbance.water:.2f} cm/s over {case.disturbance.water_time:.0f} s")
+    parts = [problem.part(k) for k in range(len(runs))]
+    x = fit_shared(parts, shared, x)
+    P, F = shared.model(problem, x)
+    found = [expand(part, shared, x) for part in parts]
+    C = covariance(found, shared)
+    places = [k for k, f in enumerate(free) if f.vector == "P" and f.entry in PLACES.values()]
+    return OceanIdentification(
+        case, problem, P, [free[k].entry for k in places], parameters(free, places, P, C),
+        C[np.ix_(places, places)] * np.outer(_spreads(free, places), _spreads(free, places)), ridges(free, C),
+        water_by_run(problem, P, F), left_out,
+    )  # fmt: skip
+
+
+def _spreads(free: list[FreeParameter], places: list[int]) -> np.ndarray:
+    return np.array([free[k].spread for k in places])
+
+
+def covariance(found: list[Expansion], shared: SharedParameters) -> np.ndarray:
+    """Of the values about their most probable ones, (count, count) in spreads.
+
+    Where dives pull apart by more than their noise says, the spread is that of their pulls (a sandwich), in each
+    direction the larger of the two.
+    """
+    heat, prior = heat_of(found), np.diag(shared.prior**-2.0)
+    normal = sum(one.curvature for one in found) / heat + prior
+    inverse = np.linalg.inv(normal)
+    if len(found) < 3:
+        return np.asarray(inverse)
+    pulls = np.array([one.slope / heat for one in found])
+    pulls -= pulls.mean(axis=0)
+    meat = pulls.T @ pulls * len(found) / (len(found) - 1.0) + prior
+    # in the directions where both are diagonal, the larger
+    root = np.linalg.cholesky(normal)
+    inner = np.linalg.solve(root, np.linalg.solve(root, meat).T)
+    values, vectors = np.linalg.eigh(0.5 * (inner + inner.T))
+    back = np.linalg.solve(root.T, vectors)
+    return np.asarray((back * np.maximum(values, 1.0)) @ back.T)
+
+
+def parameters(free: list[FreeParameter], places: list[int], P: np.ndarray, C: np.ndarray) -> list[Parameter]:
+    """The vehicle's numbers by name."""
+    names = {place: name for name, place in PLACES.items()}
+    return [
+        Parameter(names[free[k].entry], float(P[free[k].entry]), float(np.sqrt(C[k, k]) * free[k].spread),
+                  UNITS[names[free[k].entry]], free[k].spread)
+        for k in places
+    ]  # fmt: skip
+
+
+def ridges(free: list[FreeParameter], C: np.ndarray) -> list[Ridge]:
+    """Directions in which next to nothing was learned: more than RIDGE of the prior's width is left."""
+    names = {place: name for name, place in PLACES.items()}
+    values, vectors = np.linalg.eigh(C)
+    found = []
+    for value, vector in zip(values[::-1], vectors.T[::-1], strict=True):
+        if np.sqrt(value) < RIDGE:
+            break
+        chosen = [k for k in np.argsort(-np.abs(vector)) if abs(vector[k]) > 0.25 and free[k].vector == "P"]
+        if chosen:
+            listed = [names[free[k].entry] for k in chosen]
+            found.append(Ridge(listed, [float(vector[k]) for k in chosen], float(np.sqrt(value))))
+    return found
+
+
+def water_by_run(problem: Problem, P: np.ndarray, F: np.ndarray) -> dict[str, float]:
+    """Root mean square of the vertical water by run, m/s."""
+    steady = steady_rows(problem)
+    water = vertical_water(problem, P, F, steady)
+    return {
+        run.name: float(np.sqrt(np.mean(water[steady.run == n] ** 2)))
+        for n, run in enumerate(problem.runs) if (steady.run == n).any()
+    }  # fmt: skip

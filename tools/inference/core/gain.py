@@ -1,0 +1,99 @@
+"""Kernels: what a Kalman filter takes from a row of readings, for any kind of vehicle.
+
+n errors of the state, m readings; what was not measured is NaN in d.
+"""
+
+import math
+
+from firmware.core.jit import kernel
+from firmware.core.maths.matrices import product
+
+
+@kernel
+def take_measurement(H, cov, R, d, HC, HT, S, L, W, K):
+    """The update of cov (n, n) by a row of innovations d (m), of which only it is asked what was measured.
+
+    H (m, n), whose rows of what was not measured become 0; R (m) variances; HC, HT, S, L scratch. Out: W (m, m) what
+    whitens the innovations, K (n, m) what corrects the state by the whitened ones. Returns log det of their covariance.
+    """
+    readings, count = len(d), len(cov)
+    # S = H cov H' + R of what was measured, its Cholesky factor L, and W = L^-1; K~ = cov H' L^-T
+    for m in range(readings):
+        if math.isnan(d[m]):
+            H[m, :] = 0.0
+    product(H, cov, HC)
+    HT[:] = H.T
+    product(HC, HT, S)
+    for m in range(readings):
+        if math.isnan(d[m]):
+            S[m, m] = 1.0
+        else:
+            S[m, m] += R[m]
+    for m in range(readings):
+        for n in range(m + 1):
+            total = S[m, n]
+            for k in range(n):
+                total -= L[m, k] * L[n, k]
+            if m == n:
+                L[m, m] = math.sqrt(max(total, 1e-18))
+            else:
+                L[m, n] = total / L[n, n]
+    for m in range(readings):  # W = L^-1, lower triangular
+        for n in range(readings):
+            W[m, n] = 0.0
+        W[m, m] = 1.0 / L[m, m]
+        for n in range(m):
+            total = 0.0
+            for k in range(n, m):
+                total -= L[m, k] * W[k, n]
+            W[m, n] = total / L[m, m]
+    for a in range(count):
+        for m in range(readings):
+            total = 0.0
+            for n in range(m + 1):
+                total += HC[n, a] * W[m, n]
+            K[a, m] = total
+    for a in range(count):
+        for b in range(count):
+            total = 0.0
+            for m in range(readings):
+                total += K[a, m] * K[b, m]
+            cov[a, b] -= total
+    for a in range(count):
+        for b in range(a):
+            mean = 0.5 * (cov[a, b] + cov[b, a])
+            cov[a, b] = mean
+            cov[b, a] = mean
+    logarithm = 0.0
+    for m in range(readings):
+        if not math.isnan(d[m]):
+            logarithm += 2.0 * math.log(L[m, m])
+    return logarithm
+
+
+@kernel
+def whitened(W, d, e):
+    """Innovations d (m), NaN where nothing was measured, whitened by W (m, m) into e (m); their sum of squares."""
+    total = 0.0
+    for m in range(len(d)):
+        if math.isnan(d[m]):
+            e[m] = math.nan
+            continue
+        value = 0.0
+        for n in range(m + 1):
+            if not math.isnan(d[n]):
+                value += W[m, n] * d[n]
+        e[m] = value
+        total += value * value
+    return total
+
+
+@kernel
+def corrections(K, e, error):
+    """What whitened innovations e (m) correct the state by, K (n, m), into error (n)."""
+    for a in range(len(error)):
+        value = 0.0
+        for m in range(len(e)):
+            if not math.isnan(e[m]):
+                value += K[a, m] * e[m]
+        error[a] = value

@@ -1,0 +1,105 @@
+"""An ocean glider's steady rows: measured depth rate beside the one that the model would have there (docs/OCEAN.md)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from firmware.core.jit import kernel
+from sim_backend.ocean.core import layout as at
+from sim_backend.ocean.core.glide import net_buoyancy, steady_speed, true_pitch
+from tools.data.runs import columns as names
+from tools.inference.ocean_inputs import drawn
+from tools.inference.problem import Problem
+
+HALF = 30.0  # s either way, over which the depth rate is taken
+LEAST = 3  # samples of it
+ROUGH_ROWS = 4000  # are enough for a first guess
+ROUGH_VOLUMES = np.linspace(-0.02, 0.02, 81)  # share of the volume
+
+
+@dataclass
+class Steady:
+    """Rows where the vehicle glides steadily, all runs behind each other."""
+
+    rows: np.ndarray  # (n,) of the problem's table
+    run: np.ndarray  # (n,)
+    rate: np.ndarray  # (n,) m/s, measured, down positive
+
+
+def _sums(values: np.ndarray, first: np.ndarray, end: np.ndarray) -> np.ndarray:
+    total = np.concatenate([[0.0], np.cumsum(values)])
+    return total[end] - total[first]
+
+
+def depth_rate(t: np.ndarray, depth: np.ndarray, half: float = HALF) -> np.ndarray:
+    """Slope of the depth (rows,) m over `half` s either way by least squares, m/s; NaN where there are too few."""
+    given = np.isfinite(depth)
+    if given.sum() < LEAST:
+        return np.full(len(t), np.nan)
+    s, z = t[given] - t[given][0], depth[given]
+    first, end = np.searchsorted(t[given], t - half), np.searchsorted(t[given], t + half, side="right")
+    count = np.maximum(end - first, 1)
+    mean_s, mean_z = _sums(s, first, end) / count, _sums(z, first, end) / count
+    around = _sums(s * s, first, end) - count * mean_s**2
+    slope = (_sums(s * z, first, end) - count * mean_s * mean_z) / np.maximum(around, 1e-9)
+    centred = np.abs(mean_s + t[given][0] - t) < half / 3.0
+    return np.where((end - first >= LEAST) & centred, slope, np.nan)
+
+
+def steady_rows(problem: Problem) -> Steady:
+    """The steady rows of a problem of ocean gliders."""
+    r = problem.recording
+    rates = np.concatenate([depth_rate(run.t, run.columns[names.DEPTH]) for run in problem.runs])
+    rows = np.flatnonzero((r.inputs[:, at.U_UNSTEADY] == 0.0) & np.isfinite(rates))
+    return Steady(rows, problem.run_of[rows], rates[rows])
+
+
+@kernel
+def steady_glide(P, F, z, since, inputs, rows, out):
+    """Speed (m/s) and angle of the path (rad) of steady glides at rows, out (n, 2); depth z (rows), since (rows) s."""
+    for k in range(len(rows)):
+        i = rows[k]
+        u = inputs[i]
+        force = net_buoyancy(P, F, z[i], u[at.U_DENSITY], u[at.U_TEMPERATURE], u[at.U_OIL], since[i])
+        pitch = true_pitch(P, F, u[at.U_PITCH], u[at.U_PITCH_RATE])
+        out[k, 0], out[k, 1] = steady_speed(P, F, pitch, u[at.U_DENSITY], force)
+
+
+def glides(problem: Problem, P: np.ndarray, F: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Speed along the path and its angle at rows, (n, 2)."""
+    out = np.empty((len(rows), 2))
+    depth = np.concatenate([drawn(run.t, run.columns[names.DEPTH])[0] for run in problem.runs])
+    steady_glide(P, F, depth, problem.since, problem.recording.inputs, rows, out)
+    return out
+
+
+def vertical_water(problem: Problem, P: np.ndarray, F: np.ndarray, steady: Steady) -> np.ndarray:
+    """Vertical velocity of the water at the steady rows, down positive, m/s (n,): measured less modelled depth rate."""
+    found = glides(problem, P, F, steady.rows)
+    return np.asarray(steady.rate + found[:, 0] * np.sin(found[:, 1]))
+
+
+def first_guess(problem: Problem) -> np.ndarray:
+    """P with the volume and the drag that steady rows ask for: one by search, the other by the median ratio of speeds."""
+    steady = steady_rows(problem)
+    P, F = problem.model.P.copy(), np.zeros(at.N_F)
+    if len(steady.rows) < LEAST:
+        return P
+    chosen = np.linspace(0, len(steady.rows) - 1, min(ROUGH_ROWS, len(steady.rows))).astype(int)
+    rows, rate = steady.rows[chosen], steady.rate[chosen]
+    best, least = P, np.inf
+    for share in ROUGH_VOLUMES:
+        moved = P.copy()
+        moved[at.VOLUME] *= 1.0 + share
+        found = glides(problem, moved, F, rows)
+        down = -found[:, 0] * np.sin(found[:, 1])
+        gliding = np.abs(down) > 2.0 * at.SLOWEST
+        if gliding.mean() < 0.8:
+            continue
+        ratio = float(np.median(np.abs(rate[gliding]) / np.abs(down[gliding])))
+        miss = float(np.median(np.abs(rate - ratio * down)))
+        if miss < least:
+            least = miss
+            best = moved.copy()
+            best[at.DRAG_0] = P[at.DRAG_0] * np.clip(ratio**-2.0, 0.2, 8.0)
+    return best
