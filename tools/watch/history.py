@@ -12,6 +12,7 @@ from tools.watch.events import Change, Joint, Span, spans
 from tools.watch.flights import Flights, numbers
 
 NOT_ROUGH = 5.0  # nat that a run that is not rough takes off disorder that would hold there too
+UNLIKE = 0.01  # cosine of two labels' columns, below which they have nothing to do with each other
 FURTHER = 0.15  # of what an event explains in the same runs, that a further event there has to bring
 
 
@@ -88,9 +89,26 @@ def earns_place(history: History, event: Event | Change) -> bool:
     for other in history.events:
         theirs = other.span.weights(count) > 0.0
         mostly_there = (own & theirs).sum() >= 0.5 * own.sum()
-        if mostly_there and event.evidence < FURTHER * other.explained:
+        if mostly_there and akin(history, event.label, other.label, own & theirs) and event.evidence < FURTHER * other.explained:
             return False
     return True
+
+
+def akin(history: History, one: str, other: str, runs: np.ndarray) -> bool:
+    """Whether two labels move the same readings alike at all, in any of the runs (bool): else one is no form of the other.
+
+    Disorder is akin to everything.
+    """
+    flights, labels = history.flights, history.flights.shared.labels
+    if one not in labels or other not in labels:
+        return True
+    a, b = labels[one], labels[other]
+    for n in numbers(runs):
+        A = flights.raw[n].curvature
+        sizes = np.sqrt(np.outer(np.diag(A)[a], np.diag(A)[b]))
+        if (np.abs(A[np.ix_(a, b)]) > UNLIKE * sizes).any():
+            return True
+    return False
 
 
 def take(history: History, event: Event) -> None:

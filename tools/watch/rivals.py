@@ -9,7 +9,7 @@ from tools.inference.fit import bounded_step
 from tools.watch.events import GROWING, STEP, Change, Joint, Span
 from tools.inference.expansion import Expansion, expand
 from tools.watch.flights import Flights, numbers
-from tools.watch.history import Event, History, within
+from tools.watch.history import Event, History, akin, within
 from tools.watch.label_fit import Affected, LabelFit, best_fit, cost_of, values_of
 
 FITTED = 3  # runs in which rivals are fitted
@@ -28,14 +28,17 @@ def refined(history: History, joint: Joint, best: Change, changes: Sequence[Chan
     chosen = sorted(inside, key=lambda n: (-weights[n], -flights.excess(n)))[:FITTED]
     base = [within(flights, flights.runs[n].at) for n in chosen]
     affected = Affected([flights.parts[n] for n in chosen], [weights[n] for n in chosen], base, flights.heat)
-    same = sorted((one for one in changes if one.span == best.span), key=lambda one: -one.evidence)
+    inside_state = weights > 0.0
+    same = [one for one in changes if one.span == best.span and akin(history, one.label, best.label, inside_state)]
+    same.sort(key=lambda one: -one.evidence)
     nothing = cost_of(affected, shared, best.label, np.zeros(len(best.size)))
     fits = {one.label: best_fit(affected, shared, one.label, one.size, False) for one in same[:LINEAR_TRIED]}
     samples = sum(flights.raw[n].samples for n in chosen)
     least = min(fits.values(), key=lambda fit: fit.cost)
     promised = sum(max(flights.excess(n), 0.0) for n in chosen)
     if nothing - least.cost < (1.0 - POORLY) * promised and promised > 0.1 * samples:
-        for label, size in rough_ranking(affected, flights)[:ROUGH_TRIED]:
+        ranking = [one for one in rough_ranking(affected, flights) if akin(history, one[0], best.label, inside_state)]
+        for label, size in ranking[:ROUGH_TRIED]:
             again = best_fit(affected, shared, label, size, True)
             if label not in fits or again.cost < fits[label].cost:
                 fits[label] = again
