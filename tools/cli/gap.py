@@ -141,6 +141,26 @@ def diagnose(case: Path, out: Path, without: str | None, vehicle: str | None, as
 
 
 @gap.command()
+@click.argument("case", type=click.Path(path_type=Path))
+@click.option("--model", default="nominal", show_default=True, help="`nominal`, a shipped vehicle or a vehicle file.")
+@click.option("--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Folder of the CSV files.")
+@json_option
+def velocity(case: Path, model: str, out: Path, as_json: bool) -> None:
+    """Velocity through the water of an ocean glider, with its standard deviation: a CSV for each run of CASE."""
+    from tools.data.runs.case import load_case
+    from tools.gap.velocity import velocities, write
+    from tools.inference.load import load_model
+
+    loaded = load_case(case, None if model == "nominal" else model)
+    files = write(velocities(loaded, load_model("nominal", loaded)), out)
+    if as_json:
+        print_json({"files": [str(path) for path in files]})
+    else:
+        for path in files:
+            click.echo(path)
+
+
+@gap.command()
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 def report(folder: Path) -> None:
     """Draw report.html again from what `glider gap diagnose` or `glider gap watch` left in DIR."""

@@ -85,6 +85,7 @@ class Kind:
     # t (rows,) s, runs' bounds (runs + 1,), inputs: (rows, N_Y) bool, the readings that the observer does not look at
     unread: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray] | None = None
     learned_runs: int = 4  # of the first, from which a watch without a reference learns what all share
+    growth_matters: float = 0.1  # the same of what grows slowly
     matters: float = 0.1  # tolerances: what moves no channel of any window so far is no gap (docs/GAP.md)
 
 

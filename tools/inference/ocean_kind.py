@@ -24,7 +24,8 @@ FIRST_SPEED = 0.2  # m/s
 APART = 29.0  # s at least between readings that are looked at
 
 # 10 minutes are several times what vertical water remembers. 6 m in 10 minutes are 1 cm/s, to which a quiet flight's
-# vertical velocity is known; half of it, 5 mm/s, is what flight models are held to be good for (docs/OCEAN.md, Windows).
+# vertical velocity is known; half of it, 5 mm/s, is what flight models are held to be good for. What creeps over weeks
+# has to be 1 cm/s: seasons, a cell that drifts and a little growth do half of that (docs/OCEAN.md, Windows).
 OCEAN_MEASURES = Measures(
     channels=(
         Channel("depth", (at.Y_DEPTH,), 6.0, unit="m"),
@@ -106,5 +107,6 @@ OCEAN = Kind(
     input_table=input_table,
     unread=_unread,
     learned_runs=12,
+    growth_matters=1.0,
     matters=0.5,
 )

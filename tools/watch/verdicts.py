@@ -109,22 +109,31 @@ def nameless(history: History, found: list[Settled]) -> list[Settled]:
 
 
 def matters(history: History, event: Event, number: int) -> bool:
-    """Whether the change moves a channel of some window by a tenth of its tolerance (docs/GAP.md)."""
+    """Whether the change moves a channel of some window by as much as its kind of vehicle asks for (docs/GAP.md)."""
+    weights = event.span.weights(history.flights.count)
+    inside = sorted(np.flatnonzero(weights * history.judged), key=lambda n: -weights[n])[:LOOKED_AT]
+    needed = needed_of(history, event)
+    return any(moved_by(history, event, number, int(n)) >= needed for n in inside)
+
+
+def needed_of(history: History, event: Event) -> float:
+    """Tolerances by which a change has to move a channel."""
+    kind = history.flights.parts[0].kind
+    return kind.growth_matters if event.span.course == GROWING else kind.matters
+
+
+def moved_by(history: History, event: Event, number: int, n: int) -> float:
+    """The largest rms, in tolerances, by which a change moves a channel of a window of run n."""
     flights, shared = history.flights, history.flights.shared
     weights = event.span.weights(flights.count)
-    inside = sorted(np.flatnonzero(weights * history.judged), key=lambda n: -weights[n])[:LOOKED_AT]
     size = history.joint().size_of(number)[0]
-    for n in inside:
-        part, x = flights.parts[n], flights.raw[n].at
-        without = x.copy()
-        without[shared.labels[event.label]] -= weights[n] * size
-        P, F = shared.model(part, x)
-        gains = part.filter(P, F, begin=True)
-        Y = fly_windows_from(part, P, F, gains)
-        other = fly_windows_from(part, *shared.model(part, within(flights, without)), gains)
-        if largest(part, Y, other) >= part.kind.matters:
-            return True
-    return False
+    part, x = flights.parts[n], flights.raw[n].at
+    without = x.copy()
+    without[shared.labels[event.label]] -= weights[n] * size
+    P, F = shared.model(part, x)
+    gains = part.filter(P, F, begin=True)
+    Y = fly_windows_from(part, P, F, gains)
+    return largest(part, Y, fly_windows_from(part, *shared.model(part, within(flights, without)), gains))
 
 
 def membership(event: Event, count: int) -> np.ndarray:

@@ -1,0 +1,103 @@
+"""Velocity of an ocean glider through the water, row by row, with its standard deviation (docs/OCEAN.md, Velocity)."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from sim_backend.ocean.core import layout as at
+from sim_backend.ocean.vehicle import OceanVehicle
+from tools.data.errors import InputError
+from tools.data.runs import columns as names
+from tools.data.runs.case import Case
+from tools.data.runs.run import Run, run_name, write_run
+from tools.inference.model import Model, effect_vector
+from tools.inference.ocean_inputs import lacking
+from tools.inference.problem import Problem, problem_of
+
+FORM = 0.03  # of a speed, 1 sigma: laws of drag and lift are not nature's
+PITCH_NOISE = 0.005  # rad, 1 sigma from row to row
+HEADING = 0.035  # rad, 1 sigma of a compass that was looked after
+OUT_OF_MODEL = 0.15  # m/s, 1 sigma where the vehicle does not fly steadily
+COLUMNS = (
+    "u_m_s", "w_m_s", "vn_m_s", "ve_m_s", "water_w_m_s", "sd_u_m_s", "sd_w_m_s", "sd_vn_m_s", "sd_ve_m_s",
+    "sd_water_w_m_s",
+)  # fmt: skip
+
+
+@dataclass
+class Velocity:
+    """Of one run, rows as recorded; m/s.
+
+    u horizontal speed, w vertical velocity, vn and ve north and east, all of the vehicle through the water, down
+    positive; water_w the vertical velocity of the water itself.
+    """
+
+    run: Run
+    columns: dict[str, np.ndarray]  # (rows,) each, COLUMNS
+
+
+def velocities(case: Case, model: Model) -> list[Velocity]:
+    """Every run's; InputError for another kind of vehicle, or where a run lacks what the model is driven by."""
+    if not isinstance(case.vehicle, OceanVehicle):
+        raise InputError("velocity is asked of ocean gliders", source=case.folder, column="vehicle")
+    for run in case.runs:
+        missing = lacking(run)
+        if missing is not None:
+            raise InputError("an ocean glider's run needs it", source=run.path or run.name, column=missing)
+    problem = problem_of(case, model)
+    return [of_run(problem.part(n)) for n in range(len(problem.runs))]
+
+
+def of_run(part: Problem) -> Velocity:
+    """The velocity of a problem's only run."""
+    P, F = part.model.P, effect_vector(part.model)
+    gains = part.filter(P, F)
+    u, w = components(gains.X)
+    var_u, var_w = np.square(FORM * u), np.square(FORM * w)
+    for direction in directions(part.model):
+        other = part.filter(P + direction, F)
+        moved_u, moved_w = components(other.X)
+        var_u, var_w = var_u + (moved_u - u) ** 2, var_w + (moved_w - w) ** 2
+    path = gains.X[:, at.X_GLIDE]
+    var_u = var_u + (gains.path[:, 0] * np.cos(path)) ** 2 + (w * PITCH_NOISE) ** 2
+    var_w = var_w + (gains.path[:, 0] * np.sin(path)) ** 2 + (u * PITCH_NOISE) ** 2
+    unsteady = part.recording.inputs[:, at.U_UNSTEADY] > 0.0
+    var_u[unsteady] += OUT_OF_MODEL**2
+    var_w[unsteady] += OUT_OF_MODEL**2
+    yaw = part.recording.inputs[:, at.U_YAW]
+    along, across = var_u, (u * HEADING) ** 2
+    water = gains.X[:, at.X_WATER]
+    return Velocity(part.runs[0], {
+        "u_m_s": u, "w_m_s": w, "vn_m_s": u * np.cos(yaw), "ve_m_s": u * np.sin(yaw), "water_w_m_s": water,
+        "sd_u_m_s": np.sqrt(var_u), "sd_w_m_s": np.sqrt(var_w),
+        "sd_vn_m_s": np.sqrt(along * np.cos(yaw) ** 2 + across * np.sin(yaw) ** 2),
+        "sd_ve_m_s": np.sqrt(along * np.sin(yaw) ** 2 + across * np.cos(yaw) ** 2),
+        "sd_water_w_m_s": gains.path[:, 1],
+    })  # fmt: skip
+
+
+def components(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Horizontal speed and vertical velocity (down positive) of states (rows, N_X), m/s."""
+    return X[:, at.X_SPEED] * np.cos(X[:, at.X_GLIDE]), -X[:, at.X_SPEED] * np.sin(X[:, at.X_GLIDE])
+
+
+def directions(model: Model) -> list[np.ndarray]:
+    """Independent directions of the vehicle's numbers, each of 1 sigma, (N_P,)."""
+    found = [] if model.spread is None else list(model.spread)
+    sigma = model.sigma.copy()
+    if model.spread is not None:
+        sigma[np.abs(model.spread).max(axis=0) > 0.0] = 0.0
+    return [*found, *(np.where(np.arange(len(sigma)) == n, sigma, 0.0) for n in np.flatnonzero(sigma > 0.0))]
+
+
+def write(found: list[Velocity], out: Path) -> list[Path]:
+    """A CSV a run into a folder: runNNN.csv with t_s and COLUMNS."""
+    out.mkdir(parents=True, exist_ok=True)
+    files = []
+    for one in found:
+        name = one.run.name if one.run.path is None else run_name(one.run.path)
+        files.append(out / f"{name}.csv")
+        columns = {names.TIME: one.run.t, **one.columns}
+        write_run(files[-1], replace(one.run, columns=columns, extra={}, path=None), decimals=dict.fromkeys(COLUMNS, 5))
+    return files
