@@ -1,4 +1,4 @@
-"""An ocean glider's vehicle file, and its way into the parameter vector of the kernels (docs/OCEAN.md, Vehicle files)."""
+"""An ocean glider's vehicle file, and its way into the kernels' parameter vector (docs/OCEAN.md, Vehicle files)."""
 
 from importlib.resources import files
 from typing import Annotated, Literal
@@ -119,7 +119,7 @@ RELATIVE = ("volume", "Cd0", "Cd1", "lift_slope")
 
 
 class OceanIdentified(Table):
-    """[identified]: what the numbers were found from, and how sure they are together; rows of `covariance` (n, n), SI."""
+    """[identified]: what the numbers were found from, and how sure they are together: `covariance` (n, n), SI."""
 
     runs: Annotated[int, msgspec.Meta(ge=1)]
     from_vehicle: Annotated[str, msgspec.Meta(max_length=1000)]

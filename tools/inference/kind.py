@@ -84,6 +84,8 @@ class Kind:
     input_table: Callable[[Run], np.ndarray] | None = None  # (rows, inputs) of a kind whose inputs are measured
     # t (rows,) s, runs' bounds (runs + 1,), inputs: (rows, N_Y) bool, the readings that the observer does not look at
     unread: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray] | None = None
+    # of what an effect explains, by which another may explain less and still be it: a law of drag is not nature's
+    form_share: float = 0.0
     learned_runs: int = 4  # of the first, from which a watch without a reference learns what all share
     growth_matters: float = 0.1  # the same of what grows slowly
     matters: float = 0.1  # tolerances: what moves no channel of any window so far is no gap (docs/GAP.md)

@@ -106,6 +106,7 @@ OCEAN = Kind(
     simulate_runs=simulate_runs,
     input_table=input_table,
     unread=_unread,
+    form_share=0.1,
     learned_runs=12,
     growth_matters=1.0,
     matters=0.5,

@@ -25,6 +25,7 @@ class SharedParameters:
     labels: dict[str, list[int]]  # places of each label's parameters in `free`
     limited: dict[str, list[tuple[float, float]]]  # limits of each label's own parameters, spreads
     allowed: float = ALLOWED_PRIOR  # 1 sigma of what the file allows for, of its own
+    effects: float = EFFECT_PRIOR  # 1 sigma of every label's entry
 
     @property
     def count(self) -> int:
@@ -33,7 +34,7 @@ class SharedParameters:
     @cached_property
     def prior(self) -> np.ndarray:
         """1 sigma of each shared value, in its spreads, (count,)."""
-        return np.array([self.allowed if one.label == NUISANCE else EFFECT_PRIOR for one in self.free])
+        return np.array([self.allowed if one.label == NUISANCE else self.effects for one in self.free])
 
     @cached_property
     def low(self) -> np.ndarray:

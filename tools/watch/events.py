@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tools.inference.fit import bounded_step
 from tools.inference.expansion import Expansion
+from tools.inference.fit import bounded_step
 from tools.inference.shared_parameters import SharedParameters
 
 STEP, GROWING = "step", "growing"

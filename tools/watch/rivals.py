@@ -5,14 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from tools.inference.expansion import Expansion, expand
 from tools.inference.fit import bounded_step
 from tools.watch.events import GROWING, STEP, Change, Joint, Span
-from tools.inference.expansion import Expansion, expand
 from tools.watch.flights import Flights, numbers
 from tools.watch.history import Event, History, akin, within
 from tools.watch.label_fit import Affected, LabelFit, best_fit, cost_of, values_of
 
 FITTED = 3  # runs in which rivals are fitted
+SMALL = 20  # labels of a catalogue that can be tried whole
 LINEAR_TRIED, ROUGH_TRIED = 4, 5  # labels: by the parabolas of the filter as it is, and by rough ones
 FINAL = 3  # rivals that are compared over all spans
 BEHIND, BEHIND_SHARE = 40.0, 0.1  # squared sigma, and share of what the best gains, that a rival may be behind
@@ -32,7 +33,8 @@ def refined(history: History, joint: Joint, best: Change, changes: Sequence[Chan
     same = [one for one in changes if one.span == best.span and akin(history, one.label, best.label, inside_state)]
     same.sort(key=lambda one: -one.evidence)
     nothing = cost_of(affected, shared, best.label, np.zeros(len(best.size)))
-    fits = {one.label: best_fit(affected, shared, one.label, one.size, False) for one in same[:LINEAR_TRIED]}
+    tried = LINEAR_TRIED if len(shared.labels) > SMALL else len(same)
+    fits = {one.label: best_fit(affected, shared, one.label, one.size, False) for one in same[:tried]}
     samples = sum(flights.raw[n].samples for n in chosen)
     least = min(fits.values(), key=lambda fit: fit.cost)
     promised = sum(max(flights.excess(n), 0.0) for n in chosen)
@@ -57,6 +59,11 @@ def refined(history: History, joint: Joint, best: Change, changes: Sequence[Chan
     for fit in ranked:
         winner.rivals.setdefault(fit.label, winner.evidence - 0.5 * (fit.cost - ranked[0].cost))
     winner.explained = 0.5 * gained * len(inside) / max(1, len(chosen))
+    alike = flights.parts[0].kind.form_share * winner.explained  # nat by which a form decides, not a cause
+    best_evidence = winner.rivals[winner.label]
+    winner.rivals = {
+        label: best_evidence - max(0.0, best_evidence - value - alike) for label, value in winner.rivals.items()
+    }
     return winner
 
 

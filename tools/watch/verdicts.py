@@ -236,8 +236,8 @@ def event_answer(history: History, one: Settled, names: list[str]) -> EventAnswe
     chance = known if one.label else one.probability * unknown
     last = None if still else names[inside[-1]]
     return EventAnswer(
-        one.label, where_of(history, one), group_of(one), names[inside[0]], last, course, float(chance), sized(history, one),
-        sizes,
+        one.label, where_of(history, one), group_of(one), names[inside[0]], last, course, float(chance),
+        sized(history, one), sizes,
     )  # fmt: skip
 
 

@@ -10,10 +10,10 @@ import msgspec
 
 from firmware.model.vehicle import Assumed, DisturbanceTable, NonNegative, SensorsTable, SensorTable, Vehicle
 from hal.strict import MAX_BYTES, Table, decode
+from sim_backend.ocean.vehicle import OceanVehicle
 from tools.data.errors import InputError
 from tools.data.runs import csvfile
 from tools.data.runs.run import Run, load_run, run_name, write_run
-from sim_backend.ocean.vehicle import OceanDisturbance, OceanSensors, OceanVehicle
 from tools.data.sources import load_any_vehicle, read_text
 
 CASE_FILE = "case.toml"
@@ -68,8 +68,8 @@ class Case:
     water_density_kg_m3: float
     motion_capture: bool
     runs: list[Run]
-    sensors: SensorsTable | OceanSensors  # the vehicle's, with the case's entries in their place
-    disturbance: DisturbanceTable | OceanDisturbance
+    sensors: Any  # of the vehicle's kind, SensorsTable or OceanSensors: the vehicle's, with the case's entries in their place
+    disturbance: Any  # DisturbanceTable or OceanDisturbance
     assumed: dict[str, Assumed] = field(default_factory=dict)  # the vehicle's and the case's own
 
     @property
