@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 import msgspec
 import numpy as np
 
+from firmware.model.vehicle import Assumed
 from hal.strict import Table, decode
 from sim_backend.ocean.core import layout
 
@@ -156,7 +157,7 @@ class OceanVehicle(Table):
     identified: OceanIdentified | None = None
 
     @property
-    def assumed(self) -> dict[str, object]:
+    def assumed(self) -> dict[str, Assumed]:
         """An ocean glider's file says what is assumed by [uncertainty] alone."""
         return {}
 
