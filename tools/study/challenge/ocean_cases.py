@@ -19,14 +19,15 @@ from tools.study.challenge.watch_plan import CHANGED, UNCHANGED, WatchCounts
 # Sizes of a change at its full strength, drawn uniformly, in the unit of the catalogue's parameter.
 SIZES = {
     "drag": (0.1, 0.6), "attitude_scale": (0.05, 0.15), "net_buoyancy": (0.03, 0.15), "density_bias": (0.3, 1.5),
-    "lift": (0.25, 0.6),
+    "lift": (0.2, 0.5),
 }  # fmt: skip
 EITHER_WAY = ("attitude_scale", "net_buoyancy", "density_bias")
 # What no observer could place is no case: a first run two dives off is preferred to the true one in some 2 of 100
 # missions where a dive has 4 nat (a normal deviate beyond 2), in 8 where it has 2. All together: as in evidence.py.
 DIVE_NAT, ALL_NAT = 4.0, 20.0
 SIZE_TRIES, TRIES = 12, 40
-SLOWEST, STEADY = 0.04, 0.5  # m/s, share of the depth about its middle: a dive that sinks slower there is none
+SLOWEST, STEADY = 0.04, 0.45  # m/s, share of the depth about its middle: a dive that sinks slower there is none
+STALLED = 0.14  # rad, angle of attack: with too little lift for its pitch a glider has no glide at all, and falls
 TRUTH_EVERY = 60.0  # s, at which true speeds are kept
 PITCH_NOISE, ROLL_NOISE, YAW_NOISE, DENSITY_NOISE, TEMPERATURE_NOISE, OIL_NOISE = 0.001, 0.003, 0.01, 0.004, 0.002, 1e-7
 LOST = 0.003  # of the samples of the water
@@ -84,15 +85,17 @@ def legs(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def flies(mission: Mission) -> bool:
-    """Whether the first dive goes down and comes up again, and at a speed."""
+    """Whether the first dive goes down and comes up again, at a speed, and gliding."""
     depth = mission.dives[0][at.DEPTH]
     rows = flown(mission, 0, mission.V, mission.calm(0))
     if rows[-1, at.R_DEPTH] > 5.0 or rows[:, at.R_DEPTH].max() < depth:
         return False
     for leg in legs(rows):
-        near = np.abs(leg[:, at.R_DEPTH] - 0.5 * depth) < STEADY * 0.9 * depth
+        near = np.abs(leg[:, at.R_DEPTH] - 0.5 * depth) < STEADY * depth
         rate = np.abs(np.gradient(leg[:, at.R_DEPTH], leg[:, at.R_TIME]))[near]
-        if len(rate) < 5 or np.percentile(rate, 5) < SLOWEST:
+        pitch = (leg[near, at.R_PITCH] - mission.V[at.PITCH_OFFSET]) / mission.V[at.PITCH_SCALE]
+        path = np.arccos(np.minimum(leg[near, at.R_HORIZONTAL] / leg[near, at.R_SPEED], 1.0))
+        if len(rate) < 5 or np.percentile(rate, 5) < SLOWEST or np.median(path - np.abs(pitch)) > STALLED:
             return False
     return True
 
