@@ -13,7 +13,7 @@ from sim_backend.ocean.core import layout
 
 def _row(place: str, label: str, summary: str, *parameters: Parameter) -> Effect:
     subsystem, element = place.split()
-    placed = tuple(replace(p, entry=getattr(layout, p.place)) for p in parameters)
+    placed = tuple(replace(p, entry=getattr(layout, p.place)) if p.place else p for p in parameters)
     return Effect(label, subsystem, element, summary, placed)
 
 
@@ -55,6 +55,9 @@ EFFECTS = (
     # pitch reads a multiple of the truth
     _row("sensing attitude", "attitude_scale", "pitch reads 1 + scale times the truth",
          Parameter("scale", "1", -0.6, 1.0, 0.1, "F_PITCH_SCALE")),
+    # the water rises and falls more than it did: its course nobody can foresee
+    _row("environment water", "vertical_water", "vertical velocity of the water times 1 + scale",
+         Parameter("scale", "1", 0.0, 20.0, 1.0)),
     # the attitude comes late
     _row("sensing attitude", "attitude_lag", "pitch follows with a time constant",
          Parameter("time", "s", 0.0, 60.0, 4.0, "F_ATTITUDE_LAG")),

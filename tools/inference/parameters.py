@@ -114,7 +114,8 @@ def of_effect(effect: Effect) -> list[FreeParameter]:
 def effect_parameters(problem: Problem) -> dict[str, list[FreeParameter]]:
     """Every label whose effect these runs could show, with its parameters."""
     if problem.kind.input_table is not None:  # attitude and engine are measured: every label of such a kind is seen
-        return {label: of_effect(effect) for label, effect in problem.kind.catalogue().items()}
+        found = {label: of_effect(effect) for label, effect in problem.kind.catalogue().items()}
+        return {label: free for label, free in found.items() if free}
     seen = problem.seen
     mocap = bool(seen[ef.Y_ONBOARD :].any())
     commands = all(run.has_commands for run in problem.runs)

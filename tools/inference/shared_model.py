@@ -22,13 +22,18 @@ def misfit(parts: Sequence[Problem], shared: SharedParameters, x: np.ndarray, ro
     return found if np.isfinite(found) else np.inf
 
 
-def fit_shared(parts: Sequence[Problem], shared: SharedParameters, start: np.ndarray | None = None) -> np.ndarray:
-    """The most probable shared values (count,) of runs, each a problem of its own; from `start`, where there is one."""
+def fit_shared(
+    parts: Sequence[Problem], shared: SharedParameters, start: np.ndarray | None = None, least_heat: float = 1.0
+) -> np.ndarray:
+    """The most probable shared values (count,) of runs, each a problem of its own; from `start`, where there is one.
+
+    least_heat: by which the runs' evidence counts for less at least.
+    """
     x = np.zeros(shared.count) if start is None else start.copy()
     weight = np.diag(shared.prior**-2.0)
     for roughness in ROUGHNESS if start is None else ROUGHNESS[-2:]:
         found = [expand(part, shared, x, roughness) for part in parts]
-        heat = heat_of(found)
+        heat = max(least_heat, heat_of(found))
         normal = sum(one.curvature for one in found) / heat + weight
         slope = sum(one.slope for one in found) / heat + weight @ x
         step = bounded_step(normal, slope, np.minimum(shared.low - x, 0.0), np.maximum(shared.high - x, 0.0))

@@ -12,12 +12,13 @@ from tools.gap.measure import run_gap
 from tools.inference.predict import fly
 from tools.inference.problem import Problem, cut, problem_of
 from tools.watch.answer import NONE, RunVerdict, Watch
+from tools.watch.events import GROWING
 from tools.watch.flights import Flights
 from tools.watch.history import History
 from tools.watch.search import find_events
 from tools.inference.shared_parameters import shared_parameters
 from tools.watch.usable import ASKED, readings_of, usable, usable_dive
-from tools.watch.verdicts import FEW, event_answer, run_verdict, settle
+from tools.watch.verdicts import FEW, event_answer, matters, run_verdict, settle
 
 FIRST_SHARE = 3  # without a reference: one run in so many, as many as their kind asks for at most, are where learning begins
 
@@ -38,8 +39,8 @@ def watch(case: Case, reference: Case | None = None, say: Callable[[str], None] 
     learned_from = ~judged if reference is not None else first_runs(len(here), problem.kind.learned_runs)
     begins = int((~judged).sum()) if reference is not None else 1
     history = looked_at(parts, problem, learned_from, judged, begins, say)
-    if reference is None and any(event.span.first < learned_from.sum() for event in history.events):
-        again = unchanged(history)
+    if reference is None:
+        again = unchanged(history, learned_from)
         if (again != learned_from).any():
             say("something changed among the first runs: learning again from those without it")
             learned_from = again
@@ -96,12 +97,20 @@ def looked_at(
     return history
 
 
-def unchanged(history: History) -> np.ndarray:
-    """The runs before the first event and behind those that ended, (runs,) bool."""
-    inside = np.zeros(history.flights.count, dtype=bool)
+def unchanged(history: History, learned_from: np.ndarray) -> np.ndarray:
+    """The runs before the first event and behind those that ended, (runs,) bool; `learned_from` where none begins there.
+
+    What does not matter is no event, and what grows slowly from the first runs on is not theirs alone.
+    """
+    count, number = history.flights.count, 0
+    inside, early = np.zeros(count, dtype=bool), False
     for event in history.events:
-        inside |= event.span.weights(len(inside)) > 0.0
-    return ~inside
+        own, number = number, number + int(event.has_course)
+        if event.span.course == GROWING or (event.has_course and not matters(history, event, own)):
+            continue
+        early |= event.span.first < learned_from.sum()
+        inside |= event.span.weights(count) > 0.0
+    return ~inside if early else learned_from
 
 
 def shared_gap(part: Problem, flights: Flights, n: int) -> float | None:

@@ -25,7 +25,10 @@ from tools.inference.steady import first_guess, steady_rows, vertical_water
 
 MOST_RUNS = 24  # of the mission's first: drag creeps after that
 LEVEL_RUNS = 6
-SHORTEST = 900.0  # s of steady flight, for a run to be learned from
+# Dives that all of them are worth together: what the form of the model misses (a cell that lags in the thermocline, a hull
+# that warms late) is the same in every dive, and no number of them makes it smaller.
+WORTH = 3.0
+SHORTEST = 300.0  # s of steady flight, for a run to be learned from
 ROUNDS = 2
 DENSITY = 1027.0  # kg/m3, at which the net mass is told
 RIDGE = 0.6  # of the prior's width that is left: such a direction the dives do not tell
@@ -128,20 +131,20 @@ def identify_ocean(case: Case, say: Callable[[str], None] = lambda text: None) -
     x = np.array([(P[f.entry] - problem.model.P[f.entry]) / f.spread if f.entry >= 0 and f.vector == "P" else 0.0
                   for f in free])  # fmt: skip
     say(f"{len(runs)} runs, {len(problem.z)} rows; a first guess of volume and drag")
-    shared = SharedParameters(free, {}, {}, 1.0)
+    shared, heat = SharedParameters(free, {}, {}, 1.0), max(1.0, len(runs) / WORTH)
     levels_from = [runs[k] for k in np.unique(np.linspace(0, len(runs) - 1, LEVEL_RUNS).astype(int))]
     for _ in range(ROUNDS):
         parts = [problem.part(k) for k in range(len(runs))]
-        x = fit_shared(parts, shared, x)
+        x = fit_shared(parts, shared, x, heat)
         P, F = shared.model(problem, x)
         case = find_levels(case, problem_of(case, runs=levels_from), P, F)
         problem = problem_of(case, runs=runs)
         say(f"vertical water {100.0 * case.disturbance.water:.2f} cm/s over {case.disturbance.water_time:.0f} s")
     parts = [problem.part(k) for k in range(len(runs))]
-    x = fit_shared(parts, shared, x)
+    x = fit_shared(parts, shared, x, heat)
     P, F = shared.model(problem, x)
     found = [expand(part, shared, x) for part in parts]
-    C = covariance(found, shared)
+    C = covariance(found, shared, heat)
     places = [k for k, f in enumerate(free) if f.vector == "P" and f.entry in PLACES.values()]
     return OceanIdentification(
         case, problem, P, [free[k].entry for k in places], parameters(free, places, P, C),
@@ -154,13 +157,13 @@ def _spreads(free: list[FreeParameter], places: list[int]) -> np.ndarray:
     return np.array([free[k].spread for k in places])
 
 
-def covariance(found: list[Expansion], shared: SharedParameters) -> np.ndarray:
+def covariance(found: list[Expansion], shared: SharedParameters, least_heat: float = 1.0) -> np.ndarray:
     """Of the values about their most probable ones, (count, count) in spreads.
 
     Where dives pull apart by more than their noise says, the spread is that of their pulls (a sandwich), in each
     direction the larger of the two.
     """
-    heat, prior = heat_of(found), np.diag(shared.prior**-2.0)
+    heat, prior = max(least_heat, heat_of(found)), np.diag(shared.prior**-2.0)
     normal = sum(one.curvature for one in found) / heat + prior
     inverse = np.linalg.inv(normal)
     if len(found) < 3:
