@@ -27,34 +27,38 @@ def challenge():
 @click.option("--answers", type=click.Path(path_type=Path, dir_okay=False), help="Where the sealed answers go.")
 @click.option("--jobs", default=0, type=click.IntRange(0, 256), help="Processes; one a core by default.")
 @click.option("--watch", is_flag=True, help="A blind test of `gap watch`: vehicles, of which some change.")
-@click.option("--vehicles", default=40, show_default=True, type=click.IntRange(1, 1000), help="With --watch.")
-@click.option("--unchanged", default=10, show_default=True, type=click.IntRange(0, 1000), help="Of the vehicles.")
-@click.option("--runs", default=14, show_default=True, type=click.IntRange(4, 200), help="Of each vehicle.")
-@click.option("--reference", default=5, show_default=True, type=click.IntRange(1, 100), help="Of the runs, the first.")
+@click.option("--ocean", is_flag=True, help="With --watch: missions of ocean gliders, runs being dives.")
+@click.option("--vehicles", type=click.IntRange(1, 1000), help="With --watch: 40; missions 60.")
+@click.option("--unchanged", type=click.IntRange(0, 1000), help="Of the vehicles: 10; missions 12.")
+@click.option("--runs", type=click.IntRange(4, 200), help="Of each vehicle: 14; dives 40.")
+@click.option("--reference", type=click.IntRange(1, 100), help="Of the runs, the first: 5; dives 12.")
 def make(
     out: Path, seed: int, messy: bool, single: int | None, none: int | None, pairs: int | None, unknown: int | None,
     answers: Path | None, jobs: int,
-    watch: bool, vehicles: int, unchanged: int, runs: int, reference: int,
+    watch: bool, ocean: bool, vehicles: int | None, unchanged: int | None, runs: int | None, reference: int | None,
 ) -> None:  # fmt: skip
     """Draw, fly and seal a blind test. Cases that are there are kept: call again to go on after a stop."""
     from tools.study.challenge.make import Order
     from tools.study.challenge.make import make as make_all
+    from tools.study.challenge.ocean_make import OceanOrder
+    from tools.study.challenge.ocean_plan import MISSIONS
     from tools.study.challenge.plan import MESSY, Counts
     from tools.study.challenge.seal import ARCHIVE, MANIFEST, read_manifest
     from tools.study.challenge.watch_make import WatchOrder
     from tools.study.challenge.watch_plan import LEAST_WATCHED, WatchCounts
 
+    _only_with_watch(watch, ocean)
     if watch:
-        if unchanged > vehicles or runs - reference < LEAST_WATCHED:
+        asked = {"vehicles": vehicles, "unchanged": unchanged, "runs": runs, "reference": reference}
+        watched = replace(MISSIONS if ocean else WatchCounts(), **_given(asked))
+        if watched.unchanged > watched.vehicles or watched.judged < LEAST_WATCHED:
             few = f"--unchanged at most --vehicles, and {LEAST_WATCHED} runs at least behind the reference"
             raise click.UsageError(few)
-        watched = WatchCounts(vehicles, unchanged, runs, reference)
-        order: Order = WatchOrder(out, seed, watched, answers or out / ARCHIVE)
-        total = vehicles
+        order: Order = (OceanOrder if ocean else WatchOrder)(out, seed, watched, answers or out / ARCHIVE)
+        total = watched.vehicles
     else:
         asked = {"single": single, "none": none, "pairs": pairs, "unknown": unknown}
-        given = {name: count for name, count in asked.items() if count is not None}
-        counts = replace(MESSY if messy else Counts(), **given)
+        counts = replace(MESSY if messy else Counts(), **_given(asked))
         total = counts.total
         if not total:
             raise click.UsageError("no cases: all counts are 0")
@@ -67,25 +71,39 @@ def make(
     say(f"SHA-256 of {order.archive}: {read_manifest(out / MANIFEST)['answers']['sha256']}")
 
 
+def _only_with_watch(watch: bool, ocean: bool) -> None:
+    if ocean and not watch:
+        raise click.UsageError("--ocean goes with --watch")
+
+
+def _given(asked: dict[str, int | None]) -> dict[str, int]:
+    return {name: count for name, count in asked.items() if count is not None}
+
+
 @challenge.command()
 @click.option("--cases", required=True, type=folder, help="A blind test's folder, or a folder of cases.")
 @click.option("--out", required=True, type=folder, help="Where the diagnoses go, one folder a case.")
 @click.option("--only", multiple=True, metavar="CASE", help="This case only; may be given again.")
 @click.option("--jobs", default=1, show_default=True, type=click.IntRange(1, 256), help="Cases at a time.")
 @click.option("--watch", is_flag=True, help="`glider gap watch` on every vehicle, with its reference.")
+@click.option("--ocean", is_flag=True, help="With --watch: `glider identify` on the reference first; velocity last.")
 @click.argument("extra", nargs=-1, type=click.UNPROCESSED)
-def run(cases: Path, out: Path, only: tuple[str, ...], jobs: int, watch: bool, extra: tuple[str, ...]) -> None:
+def run(
+    cases: Path, out: Path, only: tuple[str, ...], jobs: int, watch: bool, ocean: bool, extra: tuple[str, ...]
+) -> None:
     """Run `glider gap diagnose` on every case; those that have a diagnosis are kept.
 
     What stands after `--` is handed on to `gap diagnose`. A case's time counts its whole process.
     """
     from tools.data.errors import need
-    from tools.study.challenge.diagnose_all import count_cases
+    from tools.study.challenge.diagnose_all import DIAGNOSIS, MISSION, WATCH, count_cases
     from tools.study.challenge.diagnose_all import run as run_all
 
     need("analysis")
+    _only_with_watch(watch, ocean)
+    kind = (MISSION if ocean else WATCH) if watch else DIAGNOSIS
     with progress("diagnosed", len(set(only)) or count_cases(cases)) as advance:
-        done, wrong = run_all(cases, out, extra, jobs, advance, only, watch)
+        done, wrong = run_all(cases, out, extra, jobs, advance, only, kind)
     say(f"{done} diagnosed: {out}")
     if wrong:
         fail("\n".join(wrong))
@@ -99,10 +117,11 @@ def run(cases: Path, out: Path, only: tuple[str, ...], jobs: int, watch: bool, e
 @click.option("--partial", is_flag=True, help="Score answered cases only; else a case without an answer is wrong.")
 @click.option("--no-closed", is_flag=True, help="Do not fly the corrected models on the held runs.")
 @click.option("--watch", is_flag=True, help="The answers are those of `gap watch`: <case>/watch.json.")
+@click.option("--ocean", is_flag=True, help="With --watch: of missions; their velocity is scored too.")
 @json_option
 def score(
     cases: Path, answers: Path, diagnoses: Path, manifest: Path | None, partial: bool, no_closed: bool, watch: bool,
-    as_json: bool,
+    ocean: bool, as_json: bool,
 ) -> None:  # fmt: skip
     """Open the sealed answers, check them against the manifest, and score the diagnoses (docs/CHALLENGE.md)."""
     from tools.data.errors import InputError, need
@@ -111,11 +130,15 @@ def score(
     need("analysis")
     if manifest is not None and not manifest.is_file():
         raise InputError("no such file", source=manifest, column="--manifest")
+    _only_with_watch(watch, ocean)
     if watch:
+        from tools.study.challenge.ocean_score import judge_missions
         from tools.study.challenge.watch_score import judge_watches
 
         with progress("scored", _answered(cases)) as advance:
-            watched = judge_watches(cases, answers, diagnoses, manifest, partial, advance)
+            watched = (judge_missions if ocean else judge_watches)(
+                cases, answers, diagnoses, manifest, partial, advance
+            )
         if as_json:
             print_json(watched.plain())
         else:

@@ -10,6 +10,7 @@ from tools.study.challenge.diagnosis import MAX_BYTES, Probability
 
 WATCH_FILE = "watch.json"
 REFERENCE = "reference"  # the folder of the runs before anything changed
+IDENTIFIED, VELOCITY = "identified", "velocity"  # folders of a mission's vehicle and of its velocity
 
 
 class RunCause(msgspec.Struct):

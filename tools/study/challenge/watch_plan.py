@@ -59,7 +59,7 @@ class VehiclePlan:
         return asdict(self)
 
 
-def _span(rng: np.random.Generator, course: str, judged: int) -> tuple[int, int | None]:
+def draw_span(rng: np.random.Generator, course: str, judged: int) -> tuple[int, int | None]:
     """First and last run of a change; a growing one has runs enough to grow in."""
     if course == EPISODE:
         length = int(rng.integers(LEAST_AFTER, max(LEAST_AFTER, judged // 2) + 1))
@@ -94,6 +94,6 @@ def watch_plan(seed: int, counts: WatchCounts) -> list[VehiclePlan]:
         if form is None:
             plans.append(VehiclePlan(number, kind, None, None, None, None, bool(mocap[n])))
             continue
-        first, last = _span(rng, courses[n], counts.judged)
+        first, last = draw_span(rng, courses[n], counts.judged)
         plans.append(VehiclePlan(number, kind, form.label, courses[n], first, last, bool(mocap[n])))
     return plans

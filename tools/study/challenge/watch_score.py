@@ -75,14 +75,15 @@ class Watched:
 
     def size(self) -> bool | None:
         """Whether the size is in its interval; None where it cannot be compared, or the label is another."""
-        if self.truth["label"] not in SAME_UNIT or not self.label() or self.main is None or self.main.ci90 is None:
+        comparable = self.truth.get("same_unit", self.truth["label"] in SAME_UNIT)
+        if not comparable or not self.label() or self.main is None or self.main.ci90 is None:
             return None
         values = self.truth["values"]
         true = values[0] if len(values) == 1 else float(np.linalg.norm(values))
         return self.main.ci90[0] <= true <= self.main.ci90[1]
 
 
-def _share(key: str, name: str, target: float, marks: Sequence[bool], at_most: bool = False) -> Figure:
+def share(key: str, name: str, target: float, marks: Sequence[bool], at_most: bool = False) -> Figure:
     value = sum(marks) / len(marks) if marks else None
     return Figure(key, name, target, at_most, value, len(marks), sum(marks), wilson(sum(marks), len(marks)))
 
@@ -125,13 +126,13 @@ def score_watches(cases: Sequence[Watched]) -> WatchScore:
     outside = [case for case in cases if case.kind == OUTSIDE]
     sizes = [found for found in (case.size() for case in known) if found is not None]
     figures = [
-        _share("unchanged_called", "runs without change called one", 0.02, [s for _, t, s in runs if not t], True),
-        _share("changed_found", "runs with it found", 0.95, [s for _, t, s in runs if t]),
-        _share("bounds", "first and last run right to one run", 0.90, [case.bounds() for case in changed]),
-        _share("label", "label right first", 0.90, [case.label() for case in known]),
-        _share("group", "label in its group", 0.97, [case.group() for case in known]),
-        _share("size", "size within its interval", 0.90, sizes),
-        _share("outside_unknown", "outside the catalogue, called unknown", 0.90, [case.unknown() for case in outside]),
+        share("unchanged_called", "runs without change called one", 0.02, [s for _, t, s in runs if not t], True),
+        share("changed_found", "runs with it found", 0.95, [s for _, t, s in runs if t]),
+        share("bounds", "first and last run right to one run", 0.90, [case.bounds() for case in changed]),
+        share("label", "label right first", 0.90, [case.label() for case in known]),
+        share("group", "label in its group", 0.97, [case.group() for case in known]),
+        share("size", "size within its interval", 0.90, sizes),
+        share("outside_unknown", "outside the catalogue, called unknown", 0.90, [case.unknown() for case in outside]),
     ]
     seconds = [case.seconds for case in cases if case.seconds is not None]
     longest = max(seconds) if seconds else None
@@ -139,14 +140,14 @@ def score_watches(cases: Sequence[Watched]) -> WatchScore:
     return WatchScore(list(cases), figures)
 
 
-def judge_watches(
+def gather_watches(
     cases: Path, answers: Path, said: Path, manifest: Path | None = None, partial: bool = False,
-    advance: Callable[[int], None] = lambda n: None,
-) -> WatchScore:
-    """Open, check and score what was said to every vehicle of a blind test's folder."""
+    advance: Callable[[int], None] = lambda n: None, needed: tuple[str, ...] = NEEDED,
+) -> list[Watched]:
+    """Open and check the answers, and gather what was said to every vehicle of a blind test's folder."""
     folder = cases / "cases" if (cases / "cases").is_dir() else cases
     beside = next((p for p in (folder.parent / "manifest.json", folder / "manifest.json") if p.is_file()), None)
-    opened = open_sealed(answers, manifest or beside, folder, folder.parent / REFERENCE, NEEDED)
+    opened = open_sealed(answers, manifest or beside, folder, folder.parent / REFERENCE, needed)
     if not said.is_dir():
         raise InputError("no such folder", source=said)
     found = []
@@ -159,4 +160,12 @@ def judge_watches(
         advance(1)
     if not any(case.said for case in found):
         raise InputError(f"no {WATCH_FILE} of any case in its folders", source=said)
-    return score_watches(found)
+    return found
+
+
+def judge_watches(
+    cases: Path, answers: Path, said: Path, manifest: Path | None = None, partial: bool = False,
+    advance: Callable[[int], None] = lambda n: None,
+) -> WatchScore:
+    """Open, check and score what was said to every vehicle of a blind test's folder."""
+    return score_watches(gather_watches(cases, answers, said, manifest, partial, advance))

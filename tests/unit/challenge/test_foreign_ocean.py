@@ -1,0 +1,98 @@
+"""The foreign ocean glider: against the steady glide of the observer's model, mirrored, and what its dives are."""
+
+import numpy as np
+import pytest
+
+from sim_backend.foreign import ocean as at
+from sim_backend.ocean.core import layout
+from sim_backend.ocean.core.glide import steady_speed
+from tools.data.runs import columns as names
+from tools.study.challenge.ocean_cases import fly_mission, nat_of_a_dive, shipped_vehicle, with_change
+from tools.study.challenge.ocean_design import CRAFTS, Mission, draw_mission
+
+
+def mission(craft: str = "slocum", dives: int = 2) -> Mission:
+    return draw_mission(np.random.default_rng(4), CRAFTS[craft], shipped_vehicle(craft), dives)
+
+
+@pytest.mark.parametrize("pitch", [-0.45, -0.3, 0.4])
+def test_it_settles_where_the_observers_glide_is(pitch):
+    vehicle = shipped_vehicle("slocum")
+    P, weight, density = vehicle.vector(), np.copysign(1.8, -pitch), 1026.0
+    V = mission().V.copy()
+    V[[at.DRAG, at.INDUCED, at.LIFT]] = P[[layout.DRAG_0, layout.DRAG_ALPHA, layout.LIFT_SLOPE]]
+    V[[at.DRAG_POWER, at.LIFT_BEND, at.CLIMB_DRAG]] = 0.0
+    state = np.array([0.1, 0.0, 0.0])
+    for _ in range(4000):
+        du, dv, dw, rate = at.rates(V, weight, density, pitch, 0.0, 0.0, *state)
+        state += 0.1 * np.array([du, dv, dw])
+    speed, path = steady_speed(P, np.zeros(layout.N_F), pitch, density, -weight)
+    assert np.hypot(*state[[0, 2]]) == pytest.approx(speed, rel=0.01)
+    assert rate == pytest.approx(-speed * np.sin(path), rel=0.01)
+
+
+def test_climbing_mirrors_diving_but_for_its_drag():
+    V = mission().V.copy()
+    V[at.CLIMB_DRAG] = 0.0
+    down = at.rates(V, 1.5, 1026.0, -0.4, 0.01, 0.1, 0.3, 0.01, 0.02)
+    up = at.rates(V, -1.5, 1026.0, 0.4, -0.01, 0.1, 0.3, -0.01, -0.02)
+    assert up == pytest.approx((down[0], -down[1], -down[2], -down[3]), rel=1e-12)
+    V[at.CLIMB_DRAG] = 0.1
+    assert at.rates(V, -1.5, 1026.0, 0.4, -0.01, 0.1, 0.3, -0.01, -0.02)[0] < up[0]
+
+
+@pytest.mark.parametrize("craft", sorted(CRAFTS))
+def test_a_dive_goes_to_its_depth_and_back(craft):
+    made = mission(craft, 2)
+    runs, truth = fly_mission(made, [(None, 0.0)] * 2, speed=True)
+    for run, D, fast in zip(runs, made.dives, truth, strict=True):
+        depth = run.columns[names.DEPTH]
+        assert D[at.DEPTH] - 2.0 < depth.max() < D[at.DEPTH] + 150.0  # it sinks on while the pump begins
+        assert depth[-1] < 10.0
+        assert np.all(np.diff(run.t) > 0.0)
+        assert 0.1 < np.mean(fast) < 0.8
+        speed = run.columns[names.SPEED]
+        assert np.nanmean(speed) == pytest.approx(np.mean(fast) / np.cos(0.5), rel=0.15)
+
+
+def test_the_sea_is_the_same_and_the_vehicle_another_behind_a_change():
+    made = mission()
+    bare, _ = fly_mission(made, [(None, 0.0), ("drag", 0.0)], speed=False)
+    changed, _ = fly_mission(made, [(None, 0.0), ("drag", 0.5)], speed=False)
+    assert np.array_equal(bare[0].columns[names.DEPTH], changed[0].columns[names.DEPTH])
+    assert changed[1].t[-1] > 1.05 * bare[1].t[-1]
+
+
+def test_each_change_is_what_its_label_says():
+    V, S = mission().V, mission().seas[0]
+    heavier = at.net_weight(with_change(V, "net_buoyancy", 0.1), S, 50.0, 0.0) - at.net_weight(V, S, 50.0, 0.0)
+    assert heavier == pytest.approx(0.1 * V[at.GRAVITY], rel=0.02)
+    assert with_change(V, "drag", 0.2)[at.DRAG] == pytest.approx(1.2 * V[at.DRAG])
+    assert with_change(V, "lift", -0.5)[at.LIFT] == pytest.approx(0.5 * V[at.LIFT])
+    assert with_change(V, "attitude_scale", 0.1)[at.PITCH_SCALE] == pytest.approx(V[at.PITCH_SCALE] + 0.1)
+    assert with_change(V, "density_bias", 0.4)[at.DENSITY_BIAS] == pytest.approx(V[at.DENSITY_BIAS] + 0.4)
+    with pytest.raises(ValueError, match="tether"):
+        with_change(V, "tether", 1.0)
+
+
+def test_evidence_goes_with_the_square_of_the_change_and_against_that_of_the_water():
+    made = mission()
+    small, large = nat_of_a_dive(made, "drag", 0.05), nat_of_a_dive(made, "drag", 0.1)
+    assert large == pytest.approx(4.0 * small, rel=0.25)
+    made.seas[0][at.WATER] *= 2.0
+    assert nat_of_a_dive(made, "drag", 0.05) == pytest.approx(small / 4.0, rel=1e-9)
+
+
+def settled(V: np.ndarray, roll: float) -> np.ndarray:
+    state = np.array([0.3, 0.0, 0.02])
+    for _ in range(4000):
+        state += 0.1 * np.array(at.rates(V, 1.8, 1026.0, -0.4, 0.0, roll, *state)[:3])
+    return state
+
+
+def test_on_its_side_it_slips_to_the_low_side_and_is_slower_by_little():
+    V = mission().V
+    upright, heeled = settled(V, 0.0), settled(V, 0.3)
+    assert upright[1] == 0.0
+    assert 0.003 < heeled[1] < 0.05
+    assert 0.95 < heeled[0] / upright[0] < 1.05

@@ -1,0 +1,239 @@
+"""One mission of a blind test of ocean gliders: drawn, flown by the foreign glider, read by its sensors, written."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sim_backend.foreign import ocean as at
+from sim_backend.ocean.vehicle import OceanVehicle, decode_ocean_vehicle, shipped_vehicles
+from tools.data.runs import columns as names
+from tools.data.runs.case import write_case
+from tools.data.runs.run import Run
+from tools.study.challenge.cases import NoCase
+from tools.study.challenge.ocean_design import CRAFTS, SPEED_NOISE, Mission, draw_mission
+from tools.study.challenge.ocean_plan import MissionPlan
+from tools.study.challenge.watch_plan import CHANGED, UNCHANGED, WatchCounts
+
+# Sizes of a change at its full strength, drawn uniformly, in the unit of the catalogue's parameter.
+SIZES = {
+    "drag": (0.1, 0.6), "attitude_scale": (0.05, 0.15), "net_buoyancy": (0.03, 0.15), "density_bias": (0.3, 1.5),
+    "lift": (0.2, 0.5),
+}  # fmt: skip
+EITHER_WAY = ("attitude_scale", "net_buoyancy", "density_bias")
+# What no observer could place is no case: a first run two dives off is preferred to the true one in some 2 of 100
+# missions where a dive has 4 nat (a normal deviate beyond 2), in 8 where it has 2. All together: as in evidence.py.
+DIVE_NAT, ALL_NAT = 4.0, 20.0
+SIZE_TRIES, TRIES = 12, 40
+SLOWEST, STEADY = 0.04, 0.45  # m/s, share of the depth about its middle: a dive that sinks slower there is none
+STALLED = 0.14  # rad, angle of attack: with too little lift for its pitch a glider has no glide at all, and falls
+TRUTH_EVERY = 60.0  # s, at which true speeds are kept
+PITCH_NOISE, ROLL_NOISE, YAW_NOISE, DENSITY_NOISE, TEMPERATURE_NOISE, OIL_NOISE = 0.001, 0.003, 0.01, 0.004, 0.002, 1e-7
+LOST = 0.003  # of the samples of the water
+DECIMALS = {
+    names.TIME: 2, names.DEPTH: 3, names.OIL: 8, names.DENSITY: 4, names.TEMPERATURE: 4, names.PUMP: 0, names.SPEED: 4,
+} | dict.fromkeys(names.ATTITUDE, 5)  # fmt: skip
+
+
+@dataclass
+class MadeMission:
+    """A mission ready to be written."""
+
+    plan: MissionPlan
+    mission: Mission
+    size: float  # of the change at its full strength, 0 for none
+    nat: float  # of evidence in a dive at full strength
+    runs: list[Run]  # reference first
+    truth: list[np.ndarray]  # horizontal speed through the water every TRUTH_EVERY s, m/s
+
+
+def shipped_vehicle(name: str) -> OceanVehicle:
+    """A shipped ocean glider's file."""
+    return decode_ocean_vehicle(shipped_vehicles()[name], name)
+
+
+def with_change(V: np.ndarray, label: str, size: float) -> np.ndarray:
+    """The vehicle (N_V,) changed by a label at a size in the catalogue's unit."""
+    V = V.copy()
+    if label == "drag":
+        V[at.DRAG] *= 1.0 + size
+    elif label == "lift":
+        V[at.LIFT] *= 1.0 + size
+    elif label == "attitude_scale":
+        V[at.PITCH_SCALE] += size
+    elif label == "net_buoyancy":  # a volume that is lost, not a mass that is gained
+        V[at.VOLUME] *= 1.0 - size / V[at.MASS]
+    elif label == "density_bias":
+        V[at.DENSITY_BIAS] += size
+    else:
+        raise ValueError(f"no change of an ocean glider: {label!r}")
+    return V
+
+
+def flown(mission: Mission, dive: int, V: np.ndarray, S: np.ndarray) -> np.ndarray:
+    """Rows (rows, N_R) of a dive without noise."""
+    out = at.room()
+    count = at.fly_dive(V, mission.dives[dive], S, np.uint64(mission.seed + dive), out)
+    return out[:count].copy()
+
+
+def legs(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of the way down and of the way up."""
+    deepest = int(rows[:, at.R_DEPTH].argmax())
+    return rows[: deepest + 1], rows[deepest:]
+
+
+def flies(mission: Mission) -> bool:
+    """Whether the first dive goes down and comes up again, at a speed, and gliding."""
+    depth = mission.dives[0][at.DEPTH]
+    rows = flown(mission, 0, mission.V, mission.calm(0))
+    if rows[-1, at.R_DEPTH] > 5.0 or rows[:, at.R_DEPTH].max() < depth:
+        return False
+    for leg in legs(rows):
+        near = np.abs(leg[:, at.R_DEPTH] - 0.5 * depth) < STEADY * depth
+        rate = np.abs(np.gradient(leg[:, at.R_DEPTH], leg[:, at.R_TIME]))[near]
+        pitch = (leg[near, at.R_PITCH] - mission.V[at.PITCH_OFFSET]) / mission.V[at.PITCH_SCALE]
+        path = np.arccos(np.minimum(leg[near, at.R_HORIZONTAL] / leg[near, at.R_SPEED], 1.0))
+        if len(rate) < 5 or np.percentile(rate, 5) < SLOWEST or np.median(path - np.abs(pitch)) > STALLED:
+            return False
+    return True
+
+
+def nat_of_a_dive(mission: Mission, label: str, size: float) -> float:
+    """Evidence of a change in an average dive, nat: depth rates with and without it over the water's density at 0 Hz.
+
+    A mean over T of water that has size s and forgets itself in tau varies by 2 s2 tau / T. What makes the readings of
+    the water wrong shows as the weight that it pretends.
+    """
+    if label == "density_bias":
+        V = mission.V.copy()
+        V[at.MASS] += size * V[at.VOLUME]
+    else:
+        V = with_change(mission.V, label, size)
+    S = mission.calm(0)
+    total = 0.0
+    for bare, other in zip(legs(flown(mission, 0, mission.V, S)), legs(flown(mission, 0, V, S)), strict=True):
+        depths = np.linspace(0.15, 0.9, 200) * mission.dives[0][at.DEPTH]
+        rates = []
+        for leg in (bare, other):
+            z, rate = leg[:, at.R_DEPTH], np.abs(np.gradient(leg[:, at.R_DEPTH], leg[:, at.R_TIME]))
+            order = np.argsort(z)
+            rates.append(np.maximum(np.interp(depths, z[order], rate[order]), 1e-3))
+        total += float(np.sum((rates[1] - rates[0]) ** 2 / rates[0]) * (depths[1] - depths[0]))
+    water, time = mission.seas[0][at.WATER], mission.seas[0][at.WATER_TIME]
+    return 0.5 * total / (2.0 * water**2 * time)
+
+
+def draw_size(rng: np.random.Generator, mission: Mission, plan: MissionPlan, judged: int) -> tuple[float, float] | None:
+    """A size that shows, with its evidence in a dive; None where none does."""
+    assert plan.label is not None
+    strengths = plan.strengths(judged)
+    for _ in range(SIZE_TRIES):
+        size = float(rng.uniform(*SIZES[plan.label]))
+        if plan.label == "lift" or (plan.label in EITHER_WAY and rng.random() < 0.5):
+            size = -size
+        if not flies(mission.changed(with_change(mission.V, plan.label, size))):
+            continue
+        nat = nat_of_a_dive(mission, plan.label, size)
+        if nat >= DIVE_NAT and nat * float(np.sum(strengths**2)) >= ALL_NAT:
+            return size, nat
+    return None
+
+
+def as_run(mission: Mission, dive: int, rows: np.ndarray, speed: bool) -> Run:
+    """What is logged of a dive."""
+    rng = np.random.default_rng(np.random.SeedSequence([mission.seed, dive, 5]))
+    count, (depth_step, oil_step, angle_step) = len(rows), mission.craft.steps
+
+    def noisy(place: int, noise: float, step: float = 0.0) -> np.ndarray:
+        values = rows[:, place] + noise * rng.standard_normal(count)
+        return np.round(values / step) * step if step > 0.0 else values
+
+    yaw = noisy(at.R_YAW, YAW_NOISE, angle_step)
+    columns = {
+        names.TIME: rows[:, at.R_TIME] - rows[0, at.R_TIME],
+        names.ATTITUDE[0]: noisy(at.R_ROLL, ROLL_NOISE, angle_step),
+        names.ATTITUDE[1]: noisy(at.R_PITCH, PITCH_NOISE, angle_step),
+        names.ATTITUDE[2]: np.angle(np.exp(1j * yaw)),
+        names.DEPTH: noisy(at.R_DEPTH, mission.craft.depth_noise, depth_step),
+        names.OIL: noisy(at.R_OIL, OIL_NOISE, oil_step),
+        names.DENSITY: noisy(at.R_DENSITY, DENSITY_NOISE),
+        names.TEMPERATURE: noisy(at.R_TEMPERATURE, TEMPERATURE_NOISE),
+        names.PUMP: rows[:, at.R_PUMP].copy(),
+    }
+    lost = rng.random(count) < LOST
+    columns[names.DENSITY][lost] = columns[names.TEMPERATURE][lost] = np.nan
+    if speed:
+        columns[names.SPEED] = np.maximum(noisy(at.R_SPEED, SPEED_NOISE) + mission.speed_bias, 0.0)
+    return Run(f"run{dive:02d}", None, columns)
+
+
+def fly_mission(
+    mission: Mission, changes: list[tuple[str | None, float]], speed: bool
+) -> tuple[list[Run], list[np.ndarray]]:
+    """Every dive's run and true horizontal speeds; changes: label and size of each dive."""
+    runs, truth = [], []
+    for dive, (label, size) in enumerate(changes):
+        V = mission.V if label is None or size == 0.0 else with_change(mission.V, label, size)
+        rows = flown(mission, dive, V, mission.seas[dive])
+        runs.append(as_run(mission, dive, rows, speed))
+        at_times = np.arange(0.0, rows[-1, at.R_TIME], TRUTH_EVERY)
+        truth.append(np.interp(at_times, rows[:, at.R_TIME], rows[:, at.R_HORIZONTAL]))
+    return runs, truth
+
+
+def draw_case(seed: int, plan: MissionPlan, counts: WatchCounts) -> MadeMission:
+    """Draw until the mission flies and the change shows; NoCase where it never does."""
+    vehicle = shipped_vehicle(plan.craft)
+    for number in range(TRIES):
+        rng = np.random.default_rng(np.random.SeedSequence([seed, 2001 + plan.number, number]))
+        mission = draw_mission(rng, CRAFTS[plan.craft], vehicle, counts.runs)
+        if not flies(mission):
+            continue
+        size, nat = 0.0, 0.0
+        if plan.label is not None:
+            found = draw_size(rng, mission, plan, counts.judged)
+            if found is None:
+                continue
+            size, nat = found
+        strengths = np.concatenate([np.zeros(counts.reference), plan.strengths(counts.judged)])
+        changes = [(plan.label, size * float(strength)) for strength in strengths]
+        runs, truth = fly_mission(mission, changes, plan.speed)
+        return MadeMission(plan, mission, size, nat, runs, truth)
+    raise NoCase(f"{plan.name}: {plan.label} cannot be seen in {TRIES} drawn missions")
+
+
+def mission_answer(made: MadeMission, counts: WatchCounts) -> dict[str, Any]:
+    """The truth: what changed, from which dive to which, how large; the true speeds of the watched dives, mm/s."""
+    plan = made.plan
+    return {
+        "case": plan.name, "kind": plan.kind, "label": plan.label, "secret": None, "course": plan.course,
+        "from_run": plan.first, "to_run": plan.last, "strengths": plan.strengths(counts.judged).tolist(),
+        "values": [] if plan.label is None else [made.size], "runs": counts.judged, "speed": plan.speed,
+        "craft": plan.craft, "same_unit": True, "nat": made.nat, "water": float(made.mission.seas[0][at.WATER]),
+        "water_time": float(made.mission.seas[0][at.WATER_TIME]), "every_s": TRUTH_EVERY,
+        "horizontal_mm_s": [np.round(1000.0 * one).astype(int).tolist() for one in made.truth[counts.reference :]],
+    }  # fmt: skip
+
+
+def write_dives(folder: Path, craft: str, runs: list[Run]) -> None:
+    """Dives as a case of the shipped vehicle."""
+    density = float(np.nanmean(np.concatenate([run.columns[names.DENSITY] for run in runs])))
+    step = float(np.median(np.concatenate([np.diff(run.t) for run in runs])))
+    write_case(
+        folder, runs, vehicle=craft, site="ocean", log_rate_hz=round(1.0 / step, 5),
+        water_density_kg_m3=round(density, 2), motion_capture=False, suffix=".csv.gz", decimals=DECIMALS,
+    )  # fmt: skip
+
+
+def example_mission(
+    folder: Path, craft: str = "slocum", dives: int = 6, seed: int = 1, change: tuple[str, float, int] | None = None,
+    speed: bool = False,
+) -> None:
+    """A short mission as a case, for a walk or a test. change: label, size, and the dive from which on it is there."""
+    label, size, first = change or (None, 0.0, dives)
+    plan = MissionPlan(0, UNCHANGED if label is None else CHANGED, None, None, None, None, False, craft, speed)
+    made = draw_case(seed, plan, WatchCounts(1, 1, dives, 0))
+    runs, _ = fly_mission(made.mission, [(label, size if n >= first else 0.0) for n in range(dives)], speed)
+    write_dives(folder, craft, runs)

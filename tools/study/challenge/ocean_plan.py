@@ -1,0 +1,52 @@
+"""Which missions of ocean gliders a blind test of `glider gap watch` holds: vehicle, speed log, what changes, when."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tools.study.challenge.watch_plan import (
+    CHANGED,
+    EPISODE,
+    GROWING,
+    STEP,
+    UNCHANGED,
+    VehiclePlan,
+    WatchCounts,
+    draw_span,
+)
+
+MISSIONS = WatchCounts(vehicles=60, unchanged=12, runs=40, reference=12)
+CRAFTS = ("slocum", "seaglider", "seaexplorer")
+# Labels with whether they grow; what does not is a step that stays or an episode, in turn.
+CHANGES = (
+    ("drag", False), ("drag", True), ("attitude_scale", False), ("net_buoyancy", False), ("density_bias", False),
+    ("lift", False),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class MissionPlan(VehiclePlan):
+    """One mission before anything is drawn for it; runs are its dives."""
+
+    craft: str = CRAFTS[0]
+    speed: bool = False  # whether speed through the water was measured
+
+
+def ocean_plan(seed: int, counts: WatchCounts) -> list[MissionPlan]:
+    """The missions in their order; every other one of each change with speed, all vehicles as often as can be."""
+    rng = np.random.default_rng(np.random.SeedSequence([seed, 11]))
+    changed = counts.vehicles - counts.unchanged
+    drawn: list[tuple[str | None, str | None, bool]] = [(None, None, n % 2 == 1) for n in range(counts.unchanged)]
+    for n in range(changed):
+        turn, which = divmod(n, len(CHANGES))
+        label, grows = CHANGES[which]
+        course = GROWING if grows else (STEP, EPISODE)[(turn // 2 + which) % 2]
+        drawn.append((label, course, (turn + which) % 2 == 1))
+    crafts = [CRAFTS[n % len(CRAFTS)] for n in rng.permutation(len(drawn))]
+    plans = []
+    for number, n in enumerate(rng.permutation(len(drawn))):
+        label, course, speed = drawn[n]
+        first, last = (None, None) if course is None else draw_span(rng, course, counts.judged)
+        kind = UNCHANGED if label is None else CHANGED
+        plans.append(MissionPlan(number, kind, label, course, first, last, False, crafts[n], speed))
+    return plans

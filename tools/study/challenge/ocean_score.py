@@ -1,0 +1,87 @@
+"""Watches of ocean gliders' missions against the truth: the figures of any watch, what acts alike, the velocity."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tools.data.errors import InputError
+from tools.data.runs import columns as names
+from tools.data.runs.csvfile import read_table
+from tools.study.challenge.watch_answer import VELOCITY
+from tools.study.challenge.watch_plan import CHANGED
+from tools.study.challenge.watch_score import NEEDED, Watched, WatchScore, gather_watches, score_watches, share
+
+NEEDED_OF_A_MISSION = (*NEEDED, "speed", "horizontal_mm_s", "every_s")
+ON_DEPTH_ALONE = frozenset({"drag", "lift", "attitude_scale"})  # act alike where no speed was measured
+ALWAYS_ALIKE = frozenset({"net_buoyancy", "density_bias"})  # a density read wrong is a weight
+NINETY = 1.6449
+MODELLED = 0.1  # m/s, 1 sigma: where the velocity says more of itself it says that it does not know
+
+
+def twins(truth: dict[str, Any]) -> frozenset[str]:
+    """The labels that no reading of this mission could tell from its own."""
+    label = truth["label"]
+    if label in ON_DEPTH_ALONE and not truth["speed"]:
+        return ON_DEPTH_ALONE
+    return ALWAYS_ALIKE if label in ALWAYS_ALIKE else frozenset({label})
+
+
+def grouped(case: Watched) -> bool | None:
+    """Whether what acts alike on depth alone is said to; None where speed was measured, or something else is named."""
+    if case.truth["speed"] or case.main is None or case.main.label not in ON_DEPTH_ALONE:
+        return None
+    return {case.main.label, *case.main.group} >= ON_DEPTH_ALONE
+
+
+def speeds_held(case: Watched, folder: Path) -> list[bool]:
+    """Of each watched dive without a change, whether its mean true horizontal speed is within the 90 % interval."""
+    held = []
+    for n, true in enumerate(case.truth["horizontal_mm_s"]):
+        if case.changed[n]:
+            continue
+        files = sorted(folder.glob(f"run{n:02d}*.csv*")) + sorted(folder.glob(f"run{n:03d}*.csv*"))
+        if not files:
+            raise InputError(f"no velocity of run {n}", source=folder)
+        held.append(_mean_held(files[0], 1e-3 * np.array(true), float(case.truth["every_s"])))
+    return held
+
+
+def _mean_held(path: Path, true: np.ndarray, every: float) -> bool:
+    """Whether the mean of true speeds, one every so many s, is in that of a velocity file, where it is modelled."""
+    table = read_table(path)
+    t, u, sd = (table.numbers(name) for name in (names.TIME, "u_m_s", "sd_u_m_s"))
+    good = np.isfinite(sd) & (sd < MODELLED)
+    at = np.interp(t[good], every * np.arange(len(true)), true)
+    miss = float(np.mean(u[good] - at))
+    return abs(miss) <= NINETY * float(np.mean(sd[good]))
+
+
+def score_missions(cases: Sequence[Watched], held: Sequence[bool]) -> WatchScore:
+    """Every figure over the missions; held: of each dive asked, whether its speed is in its interval."""
+    found = score_watches(cases)
+    known = [case for case in cases if case.kind == CHANGED]
+    alike = [case.main is not None and case.main.label in twins(case.truth) for case in known]
+    parted = [mark for mark in (grouped(case) for case in cases) if mark is not None]
+    own = [
+        share("label_or_twin", "label right first, or one that acts alike", 0.90, alike),
+        share("one_group", "lift, drag, pitch scale one group on depth", 0.95, parted),
+        share("velocity", "dives' speed within its 90 % interval", 0.85, held),
+        share("velocity_most", "the same, not too often", 0.95, held, True),
+    ]
+    figures = [figure for figure in found.figures if figure.key != "outside_unknown"]
+    return WatchScore(found.cases, [*figures[:-1], *own, figures[-1]])
+
+
+def judge_missions(
+    cases: Path, answers: Path, said: Path, manifest: Path | None = None, partial: bool = False,
+    advance: Callable[[int], None] = lambda n: None,
+) -> WatchScore:
+    """Open, check and score what was said to every mission of a blind test's folder."""
+    found = gather_watches(cases, answers, said, manifest, partial, advance, NEEDED_OF_A_MISSION)
+    held: list[bool] = []
+    for case in found:
+        if case.said is not None:
+            held += speeds_held(case, said / case.name / VELOCITY)
+    return score_missions(found, held)
