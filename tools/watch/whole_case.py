@@ -100,7 +100,9 @@ def diagnose_ocean(case: Case, say: Callable[[str], None] = lambda text: None) -
     near = {label: value + min(alike, evidence[best] - value) for label, value in evidence.items()}
     odds = softmax({NONE: EVIDENCE_NEEDED if matters else EVIDENCE_NEEDED + max(near.values()), **near})
     chances = {label: (1.0 - ERROR_RATE) * p for label, p in odds.items()} | {UNKNOWN: ERROR_RATE}
-    group = [best, *sorted((n for n in near if n != best and near[best] - near[n] <= TIE), key=lambda n: -near[n])]
+    alike_group = problem.one_group if best in problem.one_group else ()
+    tied = sorted((n for n in near if near[best] - near[n] <= TIE), key=lambda n: -near[n])
+    group = [best, *(n for n in alike_group or tied if n != best)]
     effects = problem.kind.catalogue()
     where: dict[tuple[str, str], float] = {}
     for label, chance in chances.items():
@@ -131,7 +133,8 @@ def open_numbers(problem: Problem) -> list[str]:
     """Numbers that [uncertainty] leaves open by more than a tenth, or by as much as their effect's own spread."""
     P, sigma = problem.model.P, problem.model.sigma
     names = {place: name for name, place in PLACES.items()}
-    return [names[k] for k in map(int, np.flatnonzero(sigma > 0.0)) if k in names and sigma[k] > 0.1 * max(abs(P[k]), 1e-12)]
+    free = [int(k) for k in np.flatnonzero(sigma > 0.0) if int(k) in names]
+    return [names[k] for k in free if sigma[k] > 0.1 * max(abs(P[k]), 1e-12)]
 
 
 def left_out_gaps(

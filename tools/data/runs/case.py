@@ -68,7 +68,7 @@ class Case:
     water_density_kg_m3: float
     motion_capture: bool
     runs: list[Run]
-    sensors: Any  # of the vehicle's kind, SensorsTable or OceanSensors: the vehicle's, with the case's entries in their place
+    sensors: Any  # SensorsTable or OceanSensors: the vehicle's, with the case's entries in their place
     disturbance: Any  # DisturbanceTable or OceanDisturbance
     assumed: dict[str, Assumed] = field(default_factory=dict)  # the vehicle's and the case's own
 
