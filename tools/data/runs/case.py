@@ -206,8 +206,12 @@ def write_case(
     disturbance: DisturbancePart | DisturbanceTable | None = None,
     suffix: str = ".csv",
     decimals: dict[str, int] | None = None,
+    digits: int = 2,
+    beside: dict[str, bytes] | None = None,
 ) -> list[Path]:
     """Write runs as a case, run00 on, and return the run files; case.toml comes last, so that a cut one is no case.
+
+    Numbers have `digits` digits at least and all of one case as many; `beside` are other files of the folder, by name.
 
     `vehicle` is a shipped name or a path from the case's folder; with `vehicle_text`, that file is written too, as
     vehicle.toml. `motion_capture` is, if not given, whether any run has it. InputError where the folder already holds a
@@ -230,9 +234,12 @@ def write_case(
         raise InputError("the folder already holds a case: name another, or empty it", source=folder)
     folder.mkdir(parents=True, exist_ok=True)
     files = []
+    digits = max(digits, len(str(len(runs) - 1)))
     for number, run in enumerate(runs):
-        files.append(folder / f"run{number:02d}{suffix}")
+        files.append(folder / f"run{number:0{digits}d}{suffix}")
         write_run(files[-1], run, decimals=decimals)
+    for name, data in (beside or {}).items():
+        csvfile.write_bytes(folder / name, data)
     if vehicle_text is not None:
         csvfile.write_bytes(folder / VEHICLE_FILE, vehicle_text.encode("utf-8"))
     csvfile.write_bytes(folder / CASE_FILE, text.encode("utf-8"))

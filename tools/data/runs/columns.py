@@ -12,9 +12,14 @@ DEPTH = "depth_m"
 MOCAP_POSITION = ("mocap_x_m", "mocap_y_m", "mocap_z_m")
 MOCAP_ATTITUDE = ("mocap_roll_rad", "mocap_pitch_rad", "mocap_yaw_rad")
 MOCAP = MOCAP_POSITION + MOCAP_ATTITUDE
+# Of ocean gliders: buoyancy engine, pitch mass and rudder, the water where they are, speed through it.
+OIL, BATTERY, FIN = "oil_m3", "battery_m", "fin_rad"
+DENSITY, TEMPERATURE, PUMP = "density_kg_m3", "temperature_c", "pump"
+SPEED, VELOCITY = "speed_m_s", ("vn_m_s", "ve_m_s")
+OCEAN = (OIL, BATTERY, FIN, DENSITY, TEMPERATURE, PUMP, SPEED, *VELOCITY)
 
 # In the order in which they are written.
-ALL = (TIME, *COMMANDS, *DRAW_WIRES, *ATTITUDE, *RATES, DEPTH, *MOCAP)
+ALL = (TIME, *COMMANDS, *DRAW_WIRES, *ATTITUDE, *RATES, DEPTH, *MOCAP, *OCEAN)
 KNOWN = frozenset(ALL)
 # Angles that may wrap from pi to -pi between two samples; means and differences must not cross that jump.
 WRAPPING = frozenset((*ATTITUDE, *MOCAP_ATTITUDE))
