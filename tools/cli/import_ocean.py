@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from tools.data.importers.ocean.mission import Mission
     from tools.data.importers.ocean.segment import Segment
 
+SHOWN = 20  # lines about single runs
+
 files_argument = click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
 out_option = click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder for the case.")
 
@@ -60,7 +62,25 @@ def seaglider(files: tuple[Path, ...], out: Path, as_json: bool) -> None:
     _import(files, out, "seaglider", as_json, lambda advance: read_seaglider(list(files), advance))
 
 
-COMMANDS = (slocum, seaglider, seaexplorer)
+@click.command("og1")
+@click.argument("file", type=click.Path(path_type=Path))
+@out_option
+@click.option("--vehicle", type=click.Choice(["slocum", "seaglider", "seaexplorer"]), help="Where the file names none.")
+@json_option
+def og1(file: Path, out: Path, vehicle: str | None, as_json: bool) -> None:
+    """Turn a mission in OceanGliders' common format (OG-1.0, NetCDF) into a case, a run for each dive."""
+    from tools.data.errors import need
+
+    need("ocean")
+    from tools.data.importers.ocean.mission import write_mission
+    from tools.data.importers.ocean.og1 import read_og1
+
+    with progress("import og1", 1) as advance:
+        vehicle, segments = read_og1(file, vehicle, advance)
+    _show(write_mission(segments, out, vehicle), as_json)
+
+
+COMMANDS = (slocum, seaglider, seaexplorer, og1)
 
 
 def _import(
@@ -81,8 +101,10 @@ def _show(mission: "Mission", as_json: bool) -> None:
     """What was left out on standard error; the run files, or all as JSON, on standard output."""
     from tools.data.importers.ocean.mission import total
 
-    for note in mission.notes:
+    for note in mission.notes[:SHOWN]:
         say(note)
+    if len(mission.notes) > SHOWN:
+        say(f"... and {len(mission.notes) - SHOWN} lines more (--json has them all)")
     everything = total(mission.left_out)
     reasons = ", ".join(f"{samples} {reason}" for reason, samples in everything.items()) or "nothing"
     say(f"{len(mission.runs)} runs, {sum(run.rows for run in mission.runs)} rows; left out: {reasons}")

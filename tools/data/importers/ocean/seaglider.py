@@ -99,15 +99,20 @@ def _zero(file: NetCDF) -> float:
 
 def _pump(file: NetCDF, t: np.ndarray, oil: np.ndarray) -> np.ndarray:
     """1 where the log says that the buoyancy engine was moved, or where its volume moves; (rows,)."""
-    runs = np.zeros(len(t), dtype=bool)
+    runs = moving(t, oil) > 0.0
     if file.has("gc_st_secs"):
         begin, end = file.values("gc_st_secs", EPOCH), file.values("gc_end_secs", EPOCH)
         moved = file.values("gc_vbd_secs", netcdf.SECONDS, len(begin)) > 0.0
         for a, b in zip(begin[moved], end[moved], strict=True):
             runs |= (t >= a) & (t <= b)
-    if len(t) > 2:
-        runs |= np.abs(np.nan_to_num(np.gradient(oil, t))) > PUMP_RATE
     return runs.astype(np.float64)
+
+
+def moving(t: np.ndarray, oil: np.ndarray) -> np.ndarray:
+    """1 where the volume of the buoyancy engine moves by more than PUMP_RATE; oil (rows,) m3."""
+    if len(t) < 2:
+        return np.zeros(len(t))
+    return (np.abs(np.nan_to_num(np.gradient(oil, t))) > PUMP_RATE).astype(np.float64)
 
 
 def _add_water(segment: Segment, file: NetCDF, t: np.ndarray) -> None:
