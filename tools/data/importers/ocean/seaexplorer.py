@@ -101,6 +101,8 @@ def _table(path: Path, columns: tuple[str, ...]) -> Table:
     if not path.is_file():
         raise InputError("not a file" if path.exists() else "no such file", source=path)
     table = read_table(path, DIALECT)
+    if not path.name.endswith(".gz") and not path.read_bytes().endswith((b"\n", b"\r")):
+        raise InputError("cut: its last line does not end", source=path)
     for column in columns:
         if column not in table.header:
             raise InputError(f"no column '{column}': not a table of this kind", source=path)

@@ -52,7 +52,7 @@ def read_binary(path: Path, caches: dict[str, Path]) -> Binary:
         if crc not in caches:
             message = f"its list of sensors is in {crc}.cac, which is neither beside the files nor in --cache"
             raise InputError(message, source=path)
-        source, lines = caches[crc], caches[crc].read_bytes().split(b"\n")
+        source, lines = caches[crc], caches[crc].read_bytes().splitlines()
     else:
         source = path
         lines, start = _lines(path, data, start, sensors)
@@ -154,14 +154,16 @@ def _lines(path: Path, data: bytes, start: int, number: int) -> tuple[list[bytes
 
 def _sizes(source: Path, lines: list[bytes], sensors: int, per_cycle: int) -> np.ndarray:
     """Bytes of each sensor of a cycle, by the lines `s: T n place bytes name unit`."""
-    sizes = {}
+    sizes: dict[int, int] = {}
+    if len(lines) < sensors:
+        raise InputError(f"cut: {len(lines)} of {sensors} sensors in this list", source=source)
     for number, line in enumerate(lines[:sensors], start=1):
         words = line.split()
         if len(words) != 7 or words[0] != b"s:" or words[4] not in (b"1", b"2", b"4", b"8"):
             raise InputError("not a line of a list of sensors", source=source, line=number)
         if int(words[3]) >= 0:
             sizes[int(words[3])] = int(words[4])
-    if len(lines) < sensors or sorted(sizes) != list(range(per_cycle)):
+    if sorted(sizes) != list(range(per_cycle)):
         raise InputError(f"not the list of sensors asked for: {len(sizes)} of {per_cycle} in a cycle", source=source)
     return np.array([sizes[place] for place in range(per_cycle)])
 
