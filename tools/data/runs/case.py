@@ -131,12 +131,17 @@ def load_case(folder: Path | str, vehicle: str | None = None) -> Case:
     vehicle: a shipped name or a file that stands in for the vehicle that the case names.
     """
     folder = Path(folder)
+    return _assemble(folder, *load_runs(folder), vehicle)
+
+
+def load_runs(folder: Path) -> tuple[CaseTable, list[Run]]:
+    """case.toml and all runs of a case, without its vehicle; InputError or ConfigError as load_case."""
     table = _read_case_file(folder)
     files = _run_files(folder)
     if len(files) != table.runs:
         message = f"{table.runs} expected, {len(files)} files run*.csv found"
         raise InputError(message, source=folder / CASE_FILE, column="runs")
-    return _assemble(folder, table, [load_run(path) for path in files], vehicle)
+    return table, [load_run(path) for path in files]
 
 
 def load_case_of_run(path: Path | str, vehicle: str | None = None) -> tuple[Case, Run]:

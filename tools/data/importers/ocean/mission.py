@@ -58,7 +58,9 @@ def write_mission(segments: list[Segment], out: Path, vehicle: str) -> Mission:
         if other.start <= one.end:
             raise InputError(f"the same time is in {one.files[0]} too", source=other.files[0])
     for one in flights:
-        one.columns["yaw_rad"] = wrap(one.columns["yaw_rad"])
+        yaw = one.columns["yaw_rad"]
+        one.columns["yaw_rad"] = np.where(np.abs(yaw) > np.pi + 1e-6, wrap(yaw), yaw)  # pi as written is above pi
+        one.columns = {name: one.columns[name] for name in names.in_order(list(one.columns))}
     runs = [Run(f"run{number:03d}", one.files[0], one.columns) for number, one in enumerate(flights)]
     hours = np.array([one.start - flights[0].start for one in flights]) / 3600.0
     for run, one in zip(runs, flights, strict=True):

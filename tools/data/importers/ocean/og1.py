@@ -54,7 +54,8 @@ def read_og1(path: Path, vehicle: str | None, advance: Callable[[int], None]) ->
             columns[name] = clean(name, t, values[rows], left_out)
         latitude, longitude = (_position(file, name, unit, dive, size) for name, unit in POSITIONS)
         start = float(t[0]) if len(t) else 0.0
-        segment = Segment([path], _glider(file), start, columns, latitude, longitude, 0.0, left_out)
+        variation = _variation(file, dive, size)
+        segment = Segment([path], _glider(file), start, columns, latitude, longitude, variation, left_out)
         _add_water(segment, file, t, rows, HOLES_S[vehicle], size)
         if "oil_m3" in columns and "pump" not in columns and not file.has(og1_names.OPTIONAL["oil_m3"][0][0]):
             columns["pump"] = seaglider.moving(t, columns["oil_m3"])
@@ -62,7 +63,7 @@ def read_og1(path: Path, vehicle: str | None, advance: Callable[[int], None]) ->
     advance(1)
     if not segments:
         raise InputError("no row with attitude", source=path, column="PITCH")
-    if "magnetic" in file.about("HEADING", "comment").lower():
+    if "magnetic" in file.about("HEADING", "comment").lower() and not file.has(og1_names.VARIATION):
         segments[0].notes.append("HEADING is magnetic, and so is yaw, of all runs")
     return vehicle, segments
 
@@ -145,6 +146,15 @@ def _position(file: NetCDF, name: str, unit: str, dive: np.ndarray, size: int) -
             if values.size:
                 return float(np.median(values))
     raise InputError("no position", source=file.path, column=name)
+
+
+def _variation(file: NetCDF, dive: np.ndarray, size: int) -> float:
+    """Magnetic variation that is still to be added to a dive's heading, rad; 0 where the file has none."""
+    if not file.has(og1_names.VARIATION):
+        return 0.0
+    values = file.values(og1_names.VARIATION, netcdf.ANGLE, size)[dive]
+    values = values[np.isfinite(values)]
+    return float(np.median(values)) if values.size else 0.0
 
 
 def _add_water(segment: Segment, file: NetCDF, t: np.ndarray, rows: np.ndarray, hole_s: float, size: int) -> None:

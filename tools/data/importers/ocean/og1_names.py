@@ -39,5 +39,6 @@ OPTIONAL: dict[str, Names] = {
     "ve_m_s": (("MEASURED_EAST_VELO_THROUGH_WATER", netcdf.SPEED),),
 }
 PRESSURE, DEPTH, TEMPERATURE, SALINITY, CONDUCTIVITY = "PRES", "DEPTH", "TEMP", "PSAL", "CNDC"
+VARIATION = "MAGNETIC_VARIATION"  # still to be added to HEADING
 DENSITY = "DENSITY"  # in situ; read where the file has neither salinity nor conductivity
 USABLE = np.array([0.0, 1.0, 2.0, 5.0, 8.0])  # flags: not judged, good, probably good, changed, estimated
