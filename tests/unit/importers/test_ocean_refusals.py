@@ -143,6 +143,16 @@ def test_a_seaexplorer_segment_without_its_other_half(tmp_path):
     assert "no column 'Timestamp'" in refused("seaexplorer", swapped[1:], tmp_path / "case")
 
 
+def test_two_files_of_a_segment_that_are_of_different_days(tmp_path):
+    navigation = ocean_files.seaexplorer(tmp_path, flight())[0]
+    (tmp_path / "later").mkdir()
+    _, later = ocean_files.seaexplorer(tmp_path / "later", flight(START + 9000.0))
+    assert "not of the same segment" in refused("seaexplorer", [navigation, later], tmp_path / "case")
+    engineering, _ = slocum(tmp_path)
+    _, later = ocean_files.slocum(tmp_path / "later", flight(START + 9000.0))
+    assert "not of the same segment" in refused("slocum", [engineering, later], tmp_path / "case")
+
+
 def test_other_units_are_refused_by_file_and_variable(tmp_path):
     path = ocean_files.seaglider(tmp_path / "p1.nc", flight())
     for variable, unit in (("ctd_pressure", "bar"), ("eng_pitchAng", None), ("time", "days since 1970-1-1 00:00:00")):

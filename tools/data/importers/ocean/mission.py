@@ -57,11 +57,8 @@ def write_mission(segments: list[Segment], out: Path, vehicle: str) -> Mission:
     for one, other in itertools.pairwise(flights):
         if other.start <= one.end:
             raise InputError(f"the same time is in {one.files[0]} too", source=other.files[0])
-    for one in flights:
-        yaw = one.columns["yaw_rad"]
-        one.columns["yaw_rad"] = np.where(np.abs(yaw) > np.pi + 1e-6, wrap(yaw), yaw)  # pi as written is above pi
-        one.columns = {name: one.columns[name] for name in names.in_order(list(one.columns))}
-    runs = [Run(f"run{number:03d}", one.files[0], one.columns) for number, one in enumerate(flights)]
+    digits = max(3, len(str(len(flights) - 1)))
+    runs = [Run(f"run{number:0{digits}d}", one.files[0], _columns(one)) for number, one in enumerate(flights)]
     hours = np.array([one.start - flights[0].start for one in flights]) / 3600.0
     for run, one in zip(runs, flights, strict=True):
         notes += [f"{run.name} ({one.files[0].name}): {text}" for text in [*_said(one), *one.notes]]
@@ -71,7 +68,7 @@ def write_mission(segments: list[Segment], out: Path, vehicle: str) -> Mission:
     }
     files = write_case(
         out, runs, vehicle=vehicle, site="ocean", log_rate_hz=_rate(runs), water_density_kg_m3=_density(runs),
-        motion_capture=False, suffix=".csv.gz", decimals=DECIMALS, digits=3,
+        motion_capture=False, suffix=".csv.gz", decimals=DECIMALS, digits=digits,
         beside={name: csvfile.encode_table(table) for name, table in beside.items()},
     )  # fmt: skip
     return Mission(out, vehicle, runs, files, hours.tolist(), [one.left_out for one in flights], notes)
@@ -80,6 +77,15 @@ def write_mission(segments: list[Segment], out: Path, vehicle: str) -> Mission:
 def total(left_out: list[dict[str, int]]) -> dict[str, int]:
     """What was left out of all runs together, the most first."""
     return dict(sum((Counter(one) for one in left_out), Counter()).most_common())
+
+
+def _columns(segment: Segment) -> dict[str, np.ndarray]:
+    """A run's columns as they are written: those with samples, in order, yaw wrapped."""
+    found = {name: values for name, values in segment.columns.items() if np.isfinite(values).any()}
+    if "yaw_rad" in found:
+        yaw = found["yaw_rad"]
+        found["yaw_rad"] = np.where(np.abs(yaw) > np.pi + 1e-6, wrap(yaw), yaw)  # pi as written is above pi
+    return {name: found[name] for name in names.in_order(list(found))}
 
 
 def _said(segment: Segment) -> list[str]:

@@ -33,13 +33,12 @@ def read_og1(path: Path, vehicle: str | None, advance: Callable[[int], None]) ->
         raise InputError(f"no mission in {og1_names.CONVENTION}: no {og1_names.ROWS} or no TIME{hint}", source=path)
     vehicle = vehicle or _vehicle(file)
     logged_t = _times(file, size)
-    attitude = {name: _first(file, names, size) for name, names in og1_names.ATTITUDE.items()}
-    others = {
+    logged = {
         name: _first(file, names, size)
-        for name, names in og1_names.OPTIONAL.items()
-        if any(file.has(one) for one, _ in names)
+        for name, names in {**og1_names.ATTITUDE, **og1_names.OPTIONAL}.items()
+        if name == "pitch_rad" or any(file.has(one) for one, _ in names)
     }
-    flown = np.any([np.isfinite(values) for values in attitude.values()], axis=0)
+    flown = np.any([np.isfinite(logged[name]) for name in og1_names.ATTITUDE if name in logged], axis=0)
     numbers = _dives(file, logged_t, flown, size)
     segments = []
     for number in np.unique(numbers[flown & np.isfinite(numbers)]):
@@ -50,7 +49,7 @@ def read_og1(path: Path, vehicle: str | None, advance: Callable[[int], None]) ->
         rows = rows[in_the_mission(logged_t[rows], left_out)]
         t = logged_t[rows]
         columns = {"t_s": t - t[0] if len(t) else t}
-        for name, values in {**attitude, **others}.items():
+        for name, values in logged.items():
             columns[name] = clean(name, t, values[rows], left_out)
         latitude, longitude = (_position(file, name, unit, dive, size) for name, unit in POSITIONS)
         start = float(t[0]) if len(t) else 0.0
@@ -63,7 +62,8 @@ def read_og1(path: Path, vehicle: str | None, advance: Callable[[int], None]) ->
     advance(1)
     if not segments:
         raise InputError("no row with attitude", source=path, column="PITCH")
-    if "magnetic" in file.about("HEADING", "comment").lower() and not file.has(og1_names.VARIATION):
+    magnetic = file.has("HEADING") and "magnetic" in file.about("HEADING", "comment").lower()
+    if magnetic and not file.has(og1_names.VARIATION):
         segments[0].notes.append("HEADING is magnetic, and so is yaw, of all runs")
     return vehicle, segments
 

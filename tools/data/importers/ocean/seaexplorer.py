@@ -18,6 +18,7 @@ from tools.data.importers.ocean.segment import (
     clock_offset,
     count,
     in_the_mission,
+    require_same_time,
 )
 from tools.data.runs.csvfile import Dialect, Table, read_table
 
@@ -139,7 +140,7 @@ def _degrees(table: Table, column: str, largest: float) -> float:
 def _navigated(path: Path) -> Segment:
     """The vehicle's own rows of a navigation table."""
     left_out: dict[str, int] = {}
-    table = _table(path, ("Timestamp", "Lat", "Lon", "Declination", *(column for _, column, _ in NAVIGATION)))
+    table = _table(path, ("Timestamp", "Lat", "Lon", *(column for _, column, _ in NAVIGATION)))
     numbers = {column: table.numbers(column) for _, column, _ in NAVIGATION}
     attitude = np.flatnonzero(np.isfinite(numbers["Pitch"]))
     count(left_out, "rows without attitude", table.rows - len(attitude))
@@ -151,7 +152,7 @@ def _navigated(path: Path) -> Segment:
     columns = {"t_s": t - t[0] if len(t) else t}
     for name, column, factor in NAVIGATION:
         columns[name] = clean(name, t, factor * numbers[column][rows], left_out)
-    declination = table.numbers("Declination")
+    declination = table.numbers("Declination") if "Declination" in table.header else np.array([])
     declination = declination[np.isfinite(declination)]
     parts = NAME.fullmatch(path.name)
     assert parts is not None
@@ -188,6 +189,7 @@ def _water(path: Path, segment: Segment) -> _Water:
     for reason, samples in payload_left.items():
         count(left_out, f"of the CTD {reason}", samples)
     t = t[rows]
+    require_same_time(t, path, segment.start + segment.columns["t_s"], segment.files[0])
     conductivity = clean("conductivity", t, conductivity[rows], left_out)
     temperature = clean("temperature", t, temperature[rows], left_out)
     pressure = clean("pressure", t, pressure[rows], left_out)

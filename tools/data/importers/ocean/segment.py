@@ -130,7 +130,8 @@ def clock_offset(t: np.ndarray, depth: np.ndarray, other_t: np.ndarray, other: n
     shifts = np.arange(-300.0, 301.0, 2.0)
     scatter = np.array([_scatter(t[use], depth[use], other_t[of_other] + s, other[of_other]) for s in shifts])
     best = int(np.argmin(scatter))
-    if not 0 < best < len(shifts) - 1 or not scatter[best] < 0.25 * scatter[len(shifts) // 2]:
+    unmoved = scatter[len(shifts) // 2]
+    if not 0 < best < len(shifts) - 1 or not scatter[best] < 0.25 * unmoved < np.inf:
         return None
     low, middle, high = scatter[best - 1 : best + 2]
     return float(shifts[best] + (low - high) / (low - 2.0 * middle + high))
@@ -138,9 +139,15 @@ def clock_offset(t: np.ndarray, depth: np.ndarray, other_t: np.ndarray, other: n
 
 def _scatter(t: np.ndarray, depth: np.ndarray, other_t: np.ndarray, other: np.ndarray) -> float:
     there = (t >= other_t[0]) & (t <= other_t[-1])
-    if np.count_nonzero(there) < 20:
+    if np.count_nonzero(there) < 0.5 * len(t):
         return np.inf
     return float(np.var(np.interp(t[there], other_t, other) - depth[there]))
+
+
+def require_same_time(t: np.ndarray, path: Path, other_t: np.ndarray, other: Path) -> None:
+    """InputError where two files of a segment have no time in common; t s, either may be empty."""
+    if len(t) and len(other_t) and (t[-1] < other_t[0] or t[0] > other_t[-1]):
+        raise InputError(f"no time in common with {other}: not of the same segment", source=path)
 
 
 def require_unit(found: str | None, allowed: dict[str, float], path: Path, variable: str) -> float:

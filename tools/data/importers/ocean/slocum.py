@@ -21,20 +21,22 @@ from tools.data.importers.ocean.segment import (
     clock_offset,
     count,
     in_the_mission,
+    require_same_time,
     require_unit,
 )
-from tools.data.importers.ocean.slocum_files import Binary, find_caches, in_pairs, read_binary
+from tools.data.importers.ocean.slocum_files import Binary, check_binary, find_caches, in_pairs, unpacked
 
 HOLE_S = 15.0  # CTD values are interpolated over no longer holes
 CLOCKS_S = 5.0  # about one row: a smaller offset of the clocks cannot be told from a sensor's own lag
 INCH = 0.0254
 # Run data, the sensor, its unit in the list of sensors, and the factor to SI.
-NEEDED = (
-    ("pitch_rad", "m_pitch", "rad", 1.0),
+NEEDED = (("pitch_rad", "m_pitch", "rad", 1.0),)
+OPTIONAL = (  # what is sent ashore (sbd) has not all of them
     ("roll_rad", "m_roll", "rad", 1.0),
     ("yaw_rad", "m_heading", "rad", 1.0),
+    ("battery_m", "m_battpos", "in", INCH),
+    ("fin_rad", "m_fin", "rad", 1.0),
 )
-OPTIONAL = (("battery_m", "m_battpos", "in", INCH), ("fin_rad", "m_fin", "rad", 1.0))
 # Buoyancy engines, shallow and deep: volume, and whether the pump runs.
 ENGINES = (("m_ballast_pumped", "m_is_ballast_pump_moving"), ("m_de_oil_vol", "m_is_de_pump_moving"))
 CTD = (("sci_water_cond", "s/m", 1.0), ("sci_water_temp", "degc", 1.0), ("sci_water_pressure", "bar", 10.0))
@@ -52,7 +54,7 @@ def read_slocum(paths: list[Path], caches: Path | None, advance: Callable[[int],
         raise InputError("no engineering or science file among the files")
     known = find_caches(paths, caches) | given
     segments = []
-    for engineering, science in in_pairs([read_binary(path, known) for path in paths]):
+    for engineering, science in in_pairs([check_binary(path, known) for path in paths]):
         segments.append(_segment(engineering, science, known))
         advance(2)
     return segments
@@ -67,11 +69,11 @@ class _Log:
         crc = binary.header["sensor_list_crc"].lower()
         if crc in caches:
             (folder / f"{crc}.cac").write_bytes(caches[crc].read_bytes())
-        unpacked = folder / f"unpacked.{binary.kind}"
-        unpacked.write_bytes(binary.data)
+        copy = folder / f"unpacked.{binary.kind}"
+        copy.write_bytes(unpacked(binary.path))
         self.path = binary.path
         try:
-            self._file = dbdreader.DBD(str(unpacked), cacheDir=str(folder))
+            self._file = dbdreader.DBD(str(copy), cacheDir=str(folder))
         except (dbdreader.DbdError, ValueError, IndexError, KeyError) as error:
             raise InputError(f"cannot be read: {error}".replace("\n", " "), source=self.path) from None
         self.units: dict[str, str] = self._file.parameterUnits
@@ -159,6 +161,7 @@ def _add_water(segment: Segment, ctd: _Log, t: np.ndarray, own: tuple[np.ndarray
     for reason, samples in ctd_left.items():
         count(left_out, f"of the CTD {reason}", samples)
     ctd_t = found[clock][use]
+    require_same_time(ctd_t, ctd.path, t, segment.files[0])
     conductivity = clean("conductivity", ctd_t, conductivity[use], left_out)
     temperature = clean("temperature", ctd_t, temperature[use], left_out)
     pressure = clean("pressure", ctd_t, pressure[use], left_out)

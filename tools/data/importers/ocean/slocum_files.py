@@ -18,10 +18,9 @@ SCIENCE = frozenset(PAIRS.values())
 
 @dataclass
 class Binary:
-    """One binary, whole: its unpacked bytes and its header."""
+    """One binary, whole: its header; its bytes stay on disk, as a mission has many."""
 
     path: Path
-    data: bytes
     header: dict[str, str]
     ends_well: bool  # the mark of the end is there
 
@@ -41,9 +40,9 @@ class Binary:
         return self.segment.rsplit("-", 4)[0]
 
 
-def read_binary(path: Path, caches: dict[str, Path]) -> Binary:
-    """One file, whole, with its sensors; InputError where it is none, is cut, or its header cache is not there."""
-    data = _unpacked(path)
+def check_binary(path: Path, caches: dict[str, Path]) -> Binary:
+    """One file looked through to its end; InputError where it is none, is cut, or its header cache is not there."""
+    data = unpacked(path)
     if not data:
         raise InputError("the file is empty", source=path)
     header, start = _header(path, data)
@@ -58,7 +57,7 @@ def read_binary(path: Path, caches: dict[str, Path]) -> Binary:
         lines, start = _lines(path, data, start, sensors)
     sizes = _sizes(source, lines, sensors, int(header["sensors_per_cycle"]))
     ends_well = _walk(path, data, start, sizes, int(header["state_bytes_per_cycle"]))
-    return Binary(path, data, header, ends_well)
+    return Binary(path, header, ends_well)
 
 
 def find_caches(paths: list[Path], folder: Path | None) -> dict[str, Path]:
@@ -97,7 +96,7 @@ def in_pairs(binaries: list[Binary]) -> list[tuple[Binary, Binary]]:
     return [(one, science[segment]) for segment, one in engineering.items()]
 
 
-def _unpacked(path: Path) -> bytes:
+def unpacked(path: Path) -> bytes:
     """The file's bytes, unpacked where its name says that it is compressed."""
     if not path.is_file():
         raise InputError("not a file" if path.exists() else "no such file", source=path)
