@@ -107,12 +107,22 @@ def _opened(path: Path) -> Any:
     if engine == "scipy":
         _check_whole(path, size)
     try:
+        if engine == "h5netcdf":
+            _walk(path)
         with xarray.open_dataset(path, engine=engine, decode_times=False, decode_timedelta=False) as dataset:
             return dataset.load()
     # What the libraries raise on damage is not said by them: OSError, ValueError, struct.error, KeyError, TypeError.
     except Exception as error:
         what = (str(error) or repr(error)).splitlines()[0].strip("'\"")
         raise InputError(f"cut or damaged: {what}", source=path) from None
+
+
+def _walk(path: Path) -> None:
+    """Look at all objects of a file of version 4: h5py's errors are clean, h5netcdf leaves a half-opened file behind."""
+    import h5py
+
+    with h5py.File(path) as file:
+        file.visititems(lambda _name, _object: None)
 
 
 def _check_whole(path: Path, size: int) -> None:
