@@ -133,7 +133,7 @@ def _check_whole(path: Path, size: int) -> None:
     try:
         with path.open("rb") as file:
             wanted = classic_size(file.read(MAX_HEADER))
-            file.seek(wanted + -wanted % 4)
+            file.seek(min(wanted + -wanted % 4, size))
             behind = file.read(4)
     except (struct.error, KeyError, IndexError):
         raise InputError("cut or damaged within its header", source=path) from None

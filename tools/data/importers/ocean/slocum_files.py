@@ -1,5 +1,6 @@
 """Slocum binaries before they are read: headers, pairs of engineering and science files, header caches, cut files."""
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,6 +9,8 @@ import numpy as np
 from tools.data.errors import InputError
 
 ENCODING = "5"
+# A line of a list of sensors: whether it is sent, its number, its place in a cycle, its bytes, name and unit.
+SENSOR = re.compile(rb"s:\s+[TF]\s+\d+\s+-?\d+\s+[1248]\s+\w+\s+[!-~]+")
 KNOWN_BYTES = 16  # the cycle of known bytes after the header: 's', 'a', 0x1234, a float, a double
 LARGEST = 512_000_000
 # Engineering file, and the science file of the same segment; the second letter c: compressed.
@@ -158,7 +161,7 @@ def _sizes(source: Path, lines: list[bytes], sensors: int, per_cycle: int) -> np
         raise InputError(f"cut: {len(lines)} of {sensors} sensors in this list", source=source)
     for number, line in enumerate(lines[:sensors], start=1):
         words = line.split()
-        if len(words) != 7 or words[0] != b"s:" or words[4] not in (b"1", b"2", b"4", b"8"):
+        if not SENSOR.fullmatch(line.strip()):
             raise InputError("not a line of a list of sensors", source=source, line=number)
         if int(words[3]) >= 0:
             sizes[int(words[3])] = int(words[4])
