@@ -110,8 +110,10 @@ def _stamp(moment: float, digits: str = "seconds") -> str:
 # --- Seaglider: a base station's dive file ---
 
 
-def seaglider(path: Path, one: Flight, glider: int = 77, zero_counts: float = 2900.0, engine: str = "scipy") -> Path:
-    """A dive file of the old format: one time base, classic NetCDF."""
+def seaglider(
+    path: Path, one: Flight, glider: int = 77, zero_counts: float = 2900.0, engine: str = "scipy", two: bool = False
+) -> Path:
+    """A dive file of the old format: one time base, classic NetCDF; or with a CTD on `two`, its own one."""
     import xarray
 
     c = one.columns
@@ -142,6 +144,13 @@ def seaglider(path: Path, one: Flight, glider: int = 77, zero_counts: float = 29
         "gc_end_secs": ("gc_event", [one.t[12]], {"units": "seconds  since 1970-1-1 00:00:00"}),
         "gc_vbd_secs": ("gc_event", [9.0], {"units": "seconds"}),
     }
+    if two:
+        own = {
+            "ctd_time": one.ctd_t, "ctd_pressure": one.pressure, "temperature": one.temperature,
+            "salinity": gsw.SP_from_C(10.0 * one.conductivity, one.temperature, one.pressure),
+            "salinity_qc": np.full(len(one.ctd_t), b"1"), "temperature_qc": np.full(len(one.ctd_t), b"1"),
+        }  # fmt: skip
+        variables |= {name: ("ctd_data_point", values, variables[name][2]) for name, values in own.items()}
     dataset = xarray.Dataset(variables, attrs={"glider": glider, "platform_id": f"SG{glider:03d}"})
     dataset.to_netcdf(path, engine=engine, format="NETCDF3_64BIT" if engine == "scipy" else None)
     return path
@@ -226,6 +235,18 @@ def slocum(folder: Path, one: Flight, name: str = "unit_7-2020-100-0-1", factore
             (folder / f"{crc}.cac").write_bytes(cache)
         paths.append(path)
     return paths
+
+
+def compressed(path: Path) -> Path:
+    """A binary as newer vehicles send it: blocks of 32 KiB packed by LZ4, each behind its length; .dcd for .dbd."""
+    import lz4.block
+
+    data = path.read_bytes()
+    blocks = [lz4.block.compress(data[n : n + 32768], store_size=False) for n in range(0, len(data), 32768)]
+    packed = path.with_suffix(f"{path.suffix[:2]}c{path.suffix[3:]}")
+    packed.write_bytes(b"".join(struct.pack(">H", len(block)) + block for block in blocks))
+    path.unlink()
+    return packed
 
 
 def slocum_binary(sensors: Sensors, name: str, kind: str, crc: str, factored: bool) -> tuple[bytes, bytes]:

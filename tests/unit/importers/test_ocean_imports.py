@@ -90,6 +90,37 @@ def test_a_slocum_logs_rudder_pump_and_its_own_lists_of_sensors(tmp_path):
     assert ",-0.12500,unit_7," in (tmp_path / "case" / "origin.csv").read_text()  # west is positive aboard
 
 
+def test_compressed_binaries_give_the_same(tmp_path):
+    files = ocean_files.slocum(tmp_path, flight(rows=700))
+    bring("slocum", files, tmp_path / "plain")
+    packed = [ocean_files.compressed(path) for path in files]
+    assert {path.suffix for path in packed} == {".dcd", ".ecd"}
+    assert bring("slocum", packed, tmp_path / "case").returncode == 0
+    name = "run000.csv.gz"
+    assert (tmp_path / "case" / name).read_bytes() == (tmp_path / "plain" / name).read_bytes()
+    packed[0].write_bytes(packed[0].read_bytes()[:20_000])
+    assert "cut or damaged" in bring("slocum", packed, tmp_path / "cut").stderr
+
+
+def test_what_is_sent_ashore_may_lack_sensors(tmp_path):
+    one = flight()
+    nothing = np.full(len(one.t), np.nan)
+    for name in ("roll_rad", "fin_rad", "battery_m"):
+        one.columns[name] = nothing
+    assert bring("slocum", ocean_files.slocum(tmp_path, one), tmp_path / "case").returncode == 0
+    run = load_run(tmp_path / "case" / "run000.csv.gz")
+    assert not {"roll_rad", "fin_rad", "battery_m"} & set(run.columns)
+    assert {"pitch_rad", "yaw_rad", "oil_m3"} <= set(run.columns)
+
+
+def test_a_seagliders_ctd_may_have_its_own_times(tmp_path):
+    one = flight()
+    for engine in ("scipy", "h5netcdf"):
+        path = ocean_files.seaglider(tmp_path / f"{engine}.nc", one, engine=engine, two=True)
+        assert bring("seaglider", [path], tmp_path / engine).returncode == 0
+        assert_is_the_flight(load_run(tmp_path / engine / "run000.csv.gz"), one)
+
+
 def test_a_seaglider_pumps_where_its_log_or_its_volume_says_so(tmp_path):
     bring("seaglider", [ocean_files.seaglider(tmp_path / "p1.nc", flight())], tmp_path / "case")
     pump = load_run(tmp_path / "case" / "run000.csv.gz").columns["pump"]

@@ -118,7 +118,7 @@ def _opened(path: Path) -> Any:
 
 
 def _walk(path: Path) -> None:
-    """Look at all objects of a file of version 4: h5py's errors are clean, h5netcdf leaves a half-opened file behind."""
+    """Look at all objects of a file of version 4: h5py's errors are clean, h5netcdf leaves half-opened files behind."""
     import h5py
 
     with h5py.File(path) as file:
