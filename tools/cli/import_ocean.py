@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from tools.data.importers.ocean.segment import Segment
 
 SHOWN = 20  # lines about single runs
+MANY = 20  # files: reading fewer takes seconds
 
 files_argument = click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
 out_option = click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder for the case.")
@@ -75,8 +76,7 @@ def og1(file: Path, out: Path, vehicle: str | None, as_json: bool) -> None:
     from tools.data.importers.ocean.mission import write_mission
     from tools.data.importers.ocean.og1 import read_og1
 
-    with progress("import og1", 1) as advance:
-        vehicle, segments = read_og1(file, vehicle, advance)
+    vehicle, segments = read_og1(file, vehicle)
     _show(write_mission(segments, out, vehicle), as_json)
 
 
@@ -92,8 +92,11 @@ def _import(
 ) -> None:
     from tools.data.importers.ocean.mission import write_mission
 
-    with progress(f"import {vehicle}", len(files)) as advance:
-        segments = read(advance)
+    if len(files) < MANY:
+        segments = read(lambda _: None)
+    else:
+        with progress(f"import {vehicle}", len(files)) as advance:
+            segments = read(advance)
     _show(write_mission(segments, out, vehicle), as_json)
 
 

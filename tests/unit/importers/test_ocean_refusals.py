@@ -16,9 +16,8 @@ def refused(kind: str, files: list[Path], out: Path, *more: object) -> str:
     assert done.returncode == 2, (done.stdout, done.stderr)
     assert done.stdout == ""
     assert not out.exists()
-    lines = [line for line in done.stderr.splitlines() if not line.startswith(f"import {kind}: ")]  # progress
-    assert len(lines) == 1, lines
-    return lines[0]
+    assert len(done.stderr.splitlines()) == 1, done.stderr
+    return done.stderr.strip()
 
 
 def cut(path: Path, share: float = 0.6) -> Path:

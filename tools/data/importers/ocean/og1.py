@@ -2,7 +2,6 @@
 
 import datetime as dt
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +20,7 @@ POSITIONS = ((og1_names.LATITUDE, "degrees_north"), (og1_names.LONGITUDE, "degre
 SURFACED_S, SURFACED_M = 180.0, 2.0
 
 
-def read_og1(path: Path, vehicle: str | None, advance: Callable[[int], None]) -> tuple[str, list[Segment]]:
+def read_og1(path: Path, vehicle: str | None) -> tuple[str, list[Segment]]:
     """The vehicle and the dives of a mission; InputError where the file cannot be used.
 
     vehicle: stands in for what PLATFORM_MODEL says.
@@ -59,7 +58,6 @@ def read_og1(path: Path, vehicle: str | None, advance: Callable[[int], None]) ->
         if "oil_m3" in columns and "pump" not in columns and not file.has(og1_names.OPTIONAL["oil_m3"][0][0]):
             columns["pump"] = seaglider.moving(t, columns["oil_m3"])
         segments.append(segment)
-    advance(1)
     if not segments:
         raise InputError("no row with attitude", source=path, column="PITCH")
     magnetic = file.has("HEADING") and "magnetic" in file.about("HEADING", "comment").lower()
