@@ -17,7 +17,7 @@ def export() -> None:
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="NetCDF file to write.")
 @click.option(
     "--with", "answers", multiple=True, metavar="DIR", type=click.Path(path_type=Path),
-    help="Folder of `gap velocity` or `gap watch`: its answer goes into the file. Several may be given.",
+    help="Folder of `gap velocity`, `watch` or `diagnose`: its answer goes into the file. Several may be given.",
 )  # fmt: skip
 @json_option
 def og1(case: Path, out: Path, answers: tuple[Path, ...], as_json: bool) -> None:

@@ -106,6 +106,23 @@ def test_velocity_and_verdicts_stand_beside_the_measurements(tmp_path, case):
     assert (case / "run000.csv.gz").read_bytes() == (tmp_path / "back" / "run000.csv.gz").read_bytes()
 
 
+def test_the_verdict_of_a_diagnosis_is_that_of_all_rows(tmp_path, case):
+    causes = [{"label": "none", "probability": 0.6}, {"label": "pitch_bias", "probability": 0.4}]
+    answer = {"format": 1, "verdict": "cause", "causes": causes, "selected": ["pitch_bias"]}
+    (tmp_path / "d").mkdir()
+    (tmp_path / "d" / "diagnosis.json").write_text(json.dumps(answer))
+    run_ok("export", "og1", case, "--out", "m.nc", "--with", "d", cwd=tmp_path)
+    file = opened(tmp_path / "m.nc")
+    assert np.unique(file.MISSION_VERDICT.values).tolist() == [1.0]
+    assert file.MISSION_CAUSE.attrs["flag_meanings"] == "pitch_bias"
+    assert np.unique(file.MISSION_CAUSE_PROBABILITY.values).tolist() == [0.4]
+    for spoilt in ("{", "[]", json.dumps(answer | {"verdict": "perhaps"})):
+        (tmp_path / "d" / "diagnosis.json").write_text(spoilt)
+        done = glider("export", "og1", case, "--out", "m2.nc", "--with", "d", cwd=tmp_path)
+        assert done.returncode == 2
+        assert done.stderr.endswith("diagnosis.json: not the answer of `glider gap diagnose`\n")
+
+
 def test_a_measured_speed_goes_along(tmp_path, case):
     path = case / "run000.csv.gz"
     run = load_run(path)
@@ -142,7 +159,10 @@ def test_an_answer_of_other_runs_is_refused(tmp_path, case):
     velocity(tmp_path / "v", case)
     text = (tmp_path / "v" / "run000.csv").read_text().replace("\n15.0,", "\n15.7,")
     (tmp_path / "v" / "run000.csv").write_text(text)
-    for name, said in (("v", "no row of run000 is at this time"), ("case", "neither watch.json nor run000.csv with")):
+    for name, said in (
+        ("v", "no row of run000 is at this time"),
+        ("case", "neither watch.json, diagnosis.json nor run000.csv with"),
+    ):
         done = glider("export", "og1", case, "--out", "m.nc", "--with", name, cwd=tmp_path)
         assert done.returncode == 2
         assert said in done.stderr

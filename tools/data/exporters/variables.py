@@ -1,4 +1,4 @@
-"""What was found out about the runs of a case, as variables by row: velocity through the water, verdicts of a watch."""
+"""What was found out about the runs of a case, as variables by row: velocity through the water, verdicts."""
 
 import json
 from dataclasses import dataclass, field
@@ -11,7 +11,7 @@ from tools.data.errors import InputError
 from tools.data.runs import csvfile
 from tools.data.runs.run import Run
 
-WATCH_FILE = "watch.json"
+WATCH_FILE, DIAGNOSIS_FILE = "watch.json", "diagnosis.json"
 SAME_S = 2e-3  # times of a row in two files: written with three digits
 # Columns of `glider gap velocity`: the variable, its name in words. Those of a model in OG1 begin with GLIDER.
 VELOCITY = {
@@ -35,14 +35,16 @@ class Variable:
 
 
 def found_in(folder: Path, runs: list[Run]) -> list[Variable]:
-    """The variables that an answer's folder holds: velocity run by run, or watch.json; InputError where neither."""
+    """The variables that an answer's folder holds: velocity run by run, verdicts; InputError where it has none."""
     if not folder.is_dir():
         raise InputError("not a folder" if folder.exists() else "no such folder", source=folder)
     found = _velocity(folder, runs)
-    if (folder / WATCH_FILE).is_file():
-        found += _watch(folder / WATCH_FILE, runs)
+    for name, read in ((WATCH_FILE, _watch), (DIAGNOSIS_FILE, _diagnosis)):
+        if (folder / name).is_file():
+            found += read(folder / name, runs)
     if not found:
-        raise InputError(f"neither {WATCH_FILE} nor {runs[0].name}.csv with {', '.join(VELOCITY)}", source=folder)
+        wanted = f"neither {WATCH_FILE}, {DIAGNOSIS_FILE} nor {runs[0].name}.csv with {', '.join(VELOCITY)}"
+        raise InputError(wanted, source=folder)
     return found
 
 
@@ -78,30 +80,63 @@ def _at(run: Run, table: csvfile.Table | None, column: str) -> np.ndarray:
     return values
 
 
+@dataclass(frozen=True)
+class _Verdict:
+    """What was said of a run."""
+
+    verdict: str  # one of VERDICTS
+    label: str | None = None  # of the most probable cause
+    probability: float = np.nan
+    size: float = np.nan
+
+
 def _watch(path: Path, runs: list[Run]) -> list[Variable]:
-    """Verdict, most probable cause and its probability and size, each the same for all rows of a run."""
+    """Verdicts of single runs."""
+    found = {}
     try:
-        answers = {str(one["run"]): one for one in json.loads(path.read_text(encoding="utf-8"))["runs"]}
-        first = {name: one["causes"][0] for name, one in answers.items() if one["causes"]}
-        labels = sorted({str(cause["label"]) for cause in first.values()})
-        numbers: dict[str, tuple[float, ...]] = {}
-        for name, one in answers.items():
-            cause = first.get(name)
+        for one in json.loads(path.read_text(encoding="utf-8"))["runs"]:
             verdict = "skipped" if one["skipped"] else one["verdict"]
-            told = (np.nan, np.nan, np.nan)
-            if cause is not None:
-                size = np.nan if cause["size"] is None else float(cause["size"])
-                told = (float(labels.index(str(cause["label"]))), float(cause["probability"]), size)
-            numbers[name] = (float(VERDICTS.index(verdict)), *told)
+            cause = one["causes"][0] if one["causes"] else None
+            found[str(one["run"])] = _verdict(verdict, cause, None if cause is None else cause["size"])
     except (ValueError, KeyError, TypeError, AttributeError):
         raise InputError("not the answer of `glider gap watch`", source=path) from None
-    nothing = (np.nan,) * 4
-    rows = [np.tile(numbers.get(run.name, nothing), (run.rows, 1)) for run in runs]
+    return _variables("DIVE", "whether the dive's flight changed", runs, [found.get(run.name) for run in runs])
+
+
+def _diagnosis(path: Path, runs: list[Run]) -> list[Variable]:
+    """The one verdict of all runs."""
+    try:
+        answer = json.loads(path.read_text(encoding="utf-8"))
+        cause = next((one for one in answer["causes"] if one["label"] in answer["selected"]), None)
+        found = _verdict(answer["verdict"], cause, None)
+    except (ValueError, KeyError, TypeError, AttributeError):
+        raise InputError("not the answer of `glider gap diagnose`", source=path) from None
+    return _variables("MISSION", "whether the flights are those of the vehicle file", runs, [found] * len(runs))
+
+
+def _verdict(verdict: Any, cause: Any, size: Any) -> _Verdict:
+    """ValueError where it is none of VERDICTS."""
+    VERDICTS.index(verdict)
+    if cause is None:
+        return _Verdict(verdict)
+    return _Verdict(verdict, str(cause["label"]), float(cause["probability"]), np.nan if size is None else float(size))
+
+
+def _variables(prefix: str, words: str, runs: list[Run], found: list[_Verdict | None]) -> list[Variable]:
+    """Verdict, most probable cause, its probability and size, each the same for all rows of a run."""
+    labels = sorted({one.label for one in found if one is not None and one.label is not None})
+    table = np.full((len(runs), 4), np.nan)
+    for row, one in zip(table, found, strict=True):
+        if one is not None:
+            cause = np.nan if one.label is None else float(labels.index(one.label))
+            row[:] = VERDICTS.index(one.verdict), cause, one.probability, one.size
+    columns = [[np.full(run.rows, value) for run, value in zip(runs, column, strict=True)] for column in table.T]
     verdict = {"flag_values": list(range(len(VERDICTS))), "flag_meanings": " ".join(VERDICTS)}
-    cause = {"flag_values": list(range(len(labels))), "flag_meanings": " ".join(labels)} if labels else {}
-    return [
-        Variable("DIVE_VERDICT", "1", "whether the dive's flight changed", [one[:, 0] for one in rows], verdict),
-        Variable("DIVE_CAUSE", "1", "most probable cause of the change", [one[:, 1] for one in rows], cause),
-        Variable("DIVE_CAUSE_PROBABILITY", "1", "probability of that cause", [one[:, 2] for one in rows]),
-        Variable("DIVE_CAUSE_SIZE", "", "size of that cause, in the unit of its label", [one[:, 3] for one in rows]),
+    cause_flags = {"flag_values": list(range(len(labels))), "flag_meanings": " ".join(labels)} if labels else {}
+    variables = [
+        Variable(f"{prefix}_VERDICT", "1", words, columns[0], verdict),
+        Variable(f"{prefix}_CAUSE", "1", "most probable cause", columns[1], cause_flags),
+        Variable(f"{prefix}_CAUSE_PROBABILITY", "1", "probability of that cause", columns[2]),
+        Variable(f"{prefix}_CAUSE_SIZE", "", "size of that cause, in the unit of its label", columns[3]),
     ]
+    return [one for one in variables if one.units or np.isfinite(table[:, 3]).any()]
