@@ -204,3 +204,10 @@ def test_a_flag_that_calls_a_sample_bad_is_heeded(tmp_path):
     run = load_run(tmp_path / "case" / "run000.csv.gz")
     assert np.flatnonzero(np.isnan(run.columns["density_kg_m3"])).tolist() == list(range(50, 80))
     assert np.isfinite(run.columns["depth_m"]).all()
+
+
+def test_many_files_show_how_far_they_are(tmp_path):
+    flights = [flight(START + 7200.0 * n, rows=12) for n in range(10)]
+    done = bring("seaexplorer", write("seaexplorer", tmp_path / "in", flights), tmp_path / "case")
+    assert [line for line in done.stderr.splitlines() if line.startswith("import")][-1] == "import seaexplorer: 20/20"
+    assert len(done.stdout.splitlines()) == 10
