@@ -1,13 +1,16 @@
 """Fixtures for all tests."""
 
+import contextlib
 import os
 import signal
 from pathlib import Path
 
 import pytest
 
-# Tests fill the cores by processes. Before NumPy is loaded: its BLAS otherwise keeps a second core waiting in each.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# Tests fill the cores by processes. Before NumPy and Numba are loaded: in each process, threads beyond the first
+# otherwise keep a core busy waiting for each other. What runs on several threads is a test of its own (test_threads).
+for library in ("OPENBLAS", "NUMBA"):
+    os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
 # A shell starts what it runs in the background with Ctrl-C or a hang-up ignored; programs under test would inherit it.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
@@ -22,25 +25,38 @@ def pytest_addoption(parser):
 
 
 REAL_TIME = "realtime"
+WAITING = 2  # processes that take what waits for the clock; more of these flights at once would be late
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """What waits for the clock first: one process takes all of it, one after the other, beside those that compute."""
+    """Marks what waits for the clock, in the longest of its files first, for the scheduler below."""
+    seconds: dict[Path, float] = {}
     for item in items:
-        if item.get_closest_marker(REAL_TIME):
+        if mark := item.get_closest_marker(REAL_TIME):
             item.add_marker(pytest.mark.xdist_group(REAL_TIME))
-    items.sort(key=lambda item: item.get_closest_marker(REAL_TIME) is None)
+            seconds[item.path] = mark.kwargs.get("seconds", 0.0)
+    items.sort(key=lambda item: -seconds[item.path] if item.get_closest_marker(REAL_TIME) else 1.0)
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config, log):
-    """A file's tests stay with one process: what they share is flown once."""
+    """A file's tests stay with one process: what they share is flown once. Two processes take what waits for the
+    clock, which leaves the cores idle, the others what computes; who has nothing left of his own helps the others.
+    """
     from xdist.scheduler import LoadScopeScheduling
 
     class ByFile(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
-            return REAL_TIME if nodeid.endswith(f"@{REAL_TIME}") else nodeid.split("::")[0]
+            waits = nodeid.endswith(f"@{REAL_TIME}")
+            return nodeid.split("::")[0] + (f"@{REAL_TIME}" if waits else "")
+
+        def _assign_work_unit(self, node) -> None:
+            waits = self.nodes.index(node) < WAITING
+            own = [scope for scope in self.workqueue if scope.endswith(f"@{REAL_TIME}") == waits]
+            if own:
+                self.workqueue.move_to_end(own[0], last=False)
+            super()._assign_work_unit(node)
 
     return ByFile(config, log)
 
@@ -55,3 +71,12 @@ def shared() -> Path:
     if not folder.is_dir():
         pytest.skip("no folder 'shared' beside the repository")
     return folder
+
+
+@pytest.fixture(scope="session", autouse=True)
+def compiled(request) -> None:
+    """The kernels of a flight are in the cache before a program is started that is given so many seconds to fly."""
+    if any(item.get_closest_marker(REAL_TIME) for item in request.session.items):
+        from tools.flight.precompile import ensure_compiled
+
+        ensure_compiled(lambda text: None, lambda label, total: contextlib.nullcontext(lambda n: None))

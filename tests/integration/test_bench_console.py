@@ -13,7 +13,7 @@ import pytest
 from hal.boardfile import calibration_hash, decode_device_file
 from tests.support.bench_session import Twins, session
 
-pytestmark = pytest.mark.realtime
+pytestmark = pytest.mark.realtime(seconds=120)
 
 
 def glider(*arguments, lines=(), **options):
