@@ -1,4 +1,4 @@
-"""The shipped vehicle, which bears with a busy machine: late ticks and twins that had to wait end none of its flights."""
+"""The shipped vehicle, which bears with a busy machine: late ticks and twins that had to wait end no flight of it."""
 
 from pathlib import Path
 
