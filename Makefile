@@ -40,7 +40,7 @@ picture: demo
 
 # Two processes that compute, and two for the tests that wait for the clock (tests/conftest.py).
 test: setup
-	$(BIN)/python -m pytest -n 4 --dist loadgroup --no-loadscope-reorder
+	$(BIN)/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder
 
 check: setup lint types contract test
 

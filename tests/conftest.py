@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import re
 import signal
 from pathlib import Path
 
@@ -24,38 +25,34 @@ def pytest_addoption(parser):
     parser.addoption("--board", help="run the contract tests on this board alone: shipped name or file")
 
 
-REAL_TIME = "realtime"
 WAITING = 2  # processes that take what waits for the clock; more of these flights at once would be late
+ON_THE_CLOCK = re.compile(r"^pytestmark = pytest\.mark\.realtime(?:\(seconds=(\d+)\))?$", re.MULTILINE)
 
 
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items):
-    """Marks what waits for the clock, in the longest of its files first, for the scheduler below."""
-    seconds: dict[Path, float] = {}
-    for item in items:
-        if mark := item.get_closest_marker(REAL_TIME):
-            item.add_marker(pytest.mark.xdist_group(REAL_TIME))
-            seconds[item.path] = mark.kwargs.get("seconds", 0.0)
-    items.sort(key=lambda item: -seconds[item.path] if item.get_closest_marker(REAL_TIME) else 1.0)
+def seconds_on_the_clock(file: Path) -> int | None:
+    """How long a file's tests wait for the clock on the wall, as its mark says (0: it does not); None: not at all."""
+    mark = ON_THE_CLOCK.search(file.read_text(encoding="utf-8"))
+    return None if mark is None else int(mark.group(1) or 0)
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config, log):
-    """A file's tests stay with one process: what they share is flown once. Two processes take what waits for the
-    clock, which leaves the cores idle, the others what computes; who has nothing left of his own helps the others.
+    """A file's tests stay with one process: what they share is flown once. Two processes take the files that wait for
+    the clock, the longest first, which leaves the cores idle, the others those that compute; who has nothing left of
+    his own helps the others.
     """
     from xdist.scheduler import LoadScopeScheduling
 
     class ByFile(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
-            waits = nodeid.endswith(f"@{REAL_TIME}")
-            return nodeid.split("::")[0] + (f"@{REAL_TIME}" if waits else "")
+            return nodeid.split("::")[0]
 
         def _assign_work_unit(self, node) -> None:
             waits = self.nodes.index(node) < WAITING
-            own = [scope for scope in self.workqueue if scope.endswith(f"@{REAL_TIME}") == waits]
+            seconds = {scope: seconds_on_the_clock(config.rootpath / scope) for scope in self.workqueue}
+            own = [scope for scope in seconds if (seconds[scope] is not None) == waits]
             if own:
-                self.workqueue.move_to_end(own[0], last=False)
+                self.workqueue.move_to_end(max(own, key=lambda scope: seconds[scope] or 0), last=False)
             super()._assign_work_unit(node)
 
     return ByFile(config, log)
@@ -76,7 +73,7 @@ def shared() -> Path:
 @pytest.fixture(scope="session", autouse=True)
 def compiled(request) -> None:
     """The kernels of a flight are in the cache before a program is started that is given so many seconds to fly."""
-    if any(item.get_closest_marker(REAL_TIME) for item in request.session.items):
+    if any(item.get_closest_marker("realtime") for item in request.session.items):
         from tools.flight.precompile import ensure_compiled
 
         ensure_compiled(lambda text: None, lambda label, total: contextlib.nullcontext(lambda n: None))
