@@ -17,7 +17,7 @@ import numpy as np
 from firmware.core.jit import CACHE_DIR
 from firmware.core.vehicle.layout import X_NU, X_POS, X_QUAT
 from tools.data.runs import columns as names
-from tools.data.runs.case import load_case, write_case
+from tools.data.runs.case import Case, load_case, write_case
 from tools.data.runs.run import Run
 from tools.diagnose.diagnosis import diagnose
 from tools.inference.model import effect_vector
@@ -39,26 +39,29 @@ STEPS = (  # what is done, and the command
 
 AHEAD = "ahead"  # the argument with which this file compiles
 ROWS = 300  # of a run that is made up, at 10 Hz
-MADE_UP = {"vehicle": "roughie", "site": "nowhere", "log_rate_hz": 10.0, "water_density_kg_m3": 998.0}
+
+
+def made_up(folder: Path, runs: list[Run]) -> Case:
+    """A case of these runs, written into a folder and read back."""
+    write_case(folder, runs, vehicle="roughie", site="nowhere", log_rate_hz=10.0, water_density_kg_m3=998.0)
+    return load_case(folder)
 
 
 def compile_ahead() -> None:
     """Compile what a diagnosis calls, by one of two short flights of the nominal vehicle: a dive and a climb."""
     onboard = (*names.ATTITUDE, *names.RATES, names.DEPTH, *names.DRAW_WIRES)
-    columns = {name: np.zeros(ROWS) for name in (*names.COMMANDS, *onboard)}
+    columns: dict[str, np.ndarray] = {name: np.zeros(ROWS) for name in (*names.COMMANDS, *onboard)}
     columns[names.TIME] = 0.1 * np.arange(ROWS)
     columns[names.COMMANDS[2]] = np.where(columns[names.TIME] < 15.0, 0.1, -0.1)
     with tempfile.TemporaryDirectory() as folder:
-        write_case(Path(folder, "blank"), [Run(name, None, columns) for name in ("run00", "run01")], **MADE_UP)
-        problem = problem_of(load_case(Path(folder, "blank")))
+        problem = problem_of(made_up(Path(folder, "blank"), [Run(name, None, columns) for name in ("run00", "run01")]))
         starts = problem.starts.copy()
         starts[:, X_POS + 2], starts[:, X_QUAT], starts[:, X_NU] = 1.0, 1.0, 0.2
         P, F = problem.model.P, effect_vector(problem.model)
         Z = problem.simulated(P, F, starts, np.random.default_rng(1))
         for run, flown in zip(problem.runs, np.split(Z, 2), strict=True):
             run.columns.update(zip(onboard, flown.T, strict=False))
-        write_case(Path(folder, "flown"), problem.runs, **MADE_UP)
-        diagnose(load_case(Path(folder, "flown")))
+        diagnose(made_up(Path(folder, "flown"), problem.runs))
 
 
 def main() -> int:
@@ -83,4 +86,7 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(compile_ahead() if sys.argv[1:] == [AHEAD] else main())
+    if sys.argv[1:] == [AHEAD]:
+        compile_ahead()
+    else:
+        sys.exit(main())
