@@ -13,6 +13,8 @@ import pytest
 
 from tools.data.log.reader import read_log
 
+pytestmark = pytest.mark.realtime(seconds=30)
+
 HEAD = """
 import fcntl, json, os, struct, subprocess, sys, time
 from pathlib import Path
