@@ -25,7 +25,7 @@ def pytest_addoption(parser):
     parser.addoption("--board", help="run the contract tests on this board alone: shipped name or file")
 
 
-WAITING = 2  # processes that take what waits for the clock; more of these flights at once would be late
+WAITING = 2  # processes, of four or more, that take what waits for the clock: more of these flights would be late
 ON_THE_CLOCK = re.compile(r"^pytestmark = pytest\.mark\.realtime(?:\(seconds=(\d+)\))?$", re.MULTILINE)
 
 
@@ -37,9 +37,9 @@ def seconds_on_the_clock(file: Path) -> int | None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config, log):
-    """A file's tests stay with one process: what they share is flown once. Two processes take the files that wait for
-    the clock, the longest first, which leaves the cores idle, the others those that compute; who has nothing left of
-    his own helps the others.
+    """A file's tests stay with one process: what they share is flown once. Half of the processes, two at most, take the
+    files that wait for the clock, the longest first, which leaves the cores idle, the others those that compute; who
+    has nothing left of his own helps the others.
     """
     from xdist.scheduler import LoadScopeScheduling
 
@@ -48,7 +48,7 @@ def pytest_xdist_make_scheduler(config, log):
             return nodeid.split("::")[0]
 
         def _assign_work_unit(self, node) -> None:
-            waits = self.nodes.index(node) < WAITING
+            waits = self.nodes.index(node) < min(WAITING, max(1, self.numnodes // 2))
             seconds = {scope: seconds_on_the_clock(config.rootpath / scope) for scope in self.workqueue}
             own = [scope for scope in seconds if (seconds[scope] is not None) == waits]
             if own:
