@@ -5,6 +5,9 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 DEMO_STAMP := $(VENV)/.installed-demo
 
+# Python keeps the bytecode of what it reads: the tests start some hundred programs.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: setup demo picture test check lint types contract benchmark deploy clean
 
 # Kernels are compiled here, with a word about it, and again only when they change.
@@ -35,9 +38,9 @@ picture: demo
 	chromium --headless --no-sandbox --disable-gpu --hide-scrollbars --window-size=900,760 \
 	    --screenshot=docs/pictures/diagnosis.png out/demo/diagnosis/report.html
 
-# Two processes that compute, and one for the tests that wait for the clock (tests/conftest.py).
+# Two processes that compute, and two for the tests that wait for the clock (tests/conftest.py).
 test: setup
-	$(BIN)/python -m pytest -n 3 --dist loadgroup --no-loadscope-reorder
+	$(BIN)/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder
 
 check: setup lint types contract test
 

@@ -1,13 +1,17 @@
 """Fixtures for all tests."""
 
+import contextlib
 import os
+import re
 import signal
 from pathlib import Path
 
 import pytest
 
-# Tests fill the cores by processes. Before NumPy is loaded: its BLAS otherwise keeps a second core waiting in each.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# Tests fill the cores by processes. Before NumPy and Numba are loaded: in each process, threads beyond the first
+# otherwise keep a core busy waiting for each other. What runs on several threads is a test of its own (test_threads).
+for library in ("OPENBLAS", "NUMBA"):
+    os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
 # A shell starts what it runs in the background with Ctrl-C or a hang-up ignored; programs under test would inherit it.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
@@ -21,26 +25,35 @@ def pytest_addoption(parser):
     parser.addoption("--board", help="run the contract tests on this board alone: shipped name or file")
 
 
-REAL_TIME = "realtime"
+WAITING = 2  # processes, of four or more, that take what waits for the clock: more of these flights would be late
+ON_THE_CLOCK = re.compile(r"^pytestmark = pytest\.mark\.realtime(?:\(seconds=(\d+)\))?$", re.MULTILINE)
 
 
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items):
-    """What waits for the clock first: one process takes all of it, one after the other, beside those that compute."""
-    for item in items:
-        if item.get_closest_marker(REAL_TIME):
-            item.add_marker(pytest.mark.xdist_group(REAL_TIME))
-    items.sort(key=lambda item: item.get_closest_marker(REAL_TIME) is None)
+def seconds_on_the_clock(file: Path) -> int | None:
+    """How long a file's tests wait for the clock on the wall, as its mark says (0: it does not); None: not at all."""
+    mark = ON_THE_CLOCK.search(file.read_text(encoding="utf-8"))
+    return None if mark is None else int(mark.group(1) or 0)
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config, log):
-    """A file's tests stay with one process: what they share is flown once."""
+    """A file's tests stay with one process: what they share is flown once. Half of the processes, two at most, take the
+    files that wait for the clock, the longest first, which leaves the cores idle, the others those that compute; who
+    has nothing left of his own helps the others.
+    """
     from xdist.scheduler import LoadScopeScheduling
 
     class ByFile(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
-            return REAL_TIME if nodeid.endswith(f"@{REAL_TIME}") else nodeid.split("::")[0]
+            return nodeid.split("::")[0]
+
+        def _assign_work_unit(self, node) -> None:
+            waits = self.nodes.index(node) < min(WAITING, max(1, self.numnodes // 2))
+            seconds = {scope: seconds_on_the_clock(config.rootpath / scope) for scope in self.workqueue}
+            own = [scope for scope in seconds if (seconds[scope] is not None) == waits]
+            if own:
+                self.workqueue.move_to_end(max(own, key=lambda scope: seconds[scope] or 0), last=False)
+            super()._assign_work_unit(node)
 
     return ByFile(config, log)
 
@@ -55,3 +68,12 @@ def shared() -> Path:
     if not folder.is_dir():
         pytest.skip("no folder 'shared' beside the repository")
     return folder
+
+
+@pytest.fixture(scope="session", autouse=True)
+def compiled(request) -> None:
+    """The kernels of a flight are in the cache before a program is started that is given so many seconds to fly."""
+    if any(item.get_closest_marker("realtime") for item in request.session.items):
+        from tools.flight.precompile import ensure_compiled
+
+        ensure_compiled(lambda text: None, lambda label, total: contextlib.nullcontext(lambda n: None))

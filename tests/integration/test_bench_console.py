@@ -9,11 +9,12 @@ import sys
 import time
 
 import pytest
+from support import commands
 
 from hal.boardfile import calibration_hash, decode_device_file
 from tests.support.bench_session import Twins, session
 
-pytestmark = pytest.mark.realtime
+pytestmark = pytest.mark.realtime(seconds=120)
 
 
 def glider(*arguments, lines=(), **options):
@@ -83,7 +84,7 @@ def test_a_script_ends_at_the_first_command_that_fails(twins, tmp_path, lines, c
     script.write_text("\n".join([*lines, "read"]) if code == 2 or len(lines) == 1 else "\n".join(lines))
     if "zero" in lines[0]:
         script.write_text(lines[0])
-    done = glider("bench", "--board", twins.board, "--script", script)
+    done = commands.glider("bench", "--board", twins.board, "--script", script, cwd=tmp_path)
     assert done.returncode == code, done.stdout + done.stderr
     assert said in done.stderr
     assert "Traceback" not in done.stderr

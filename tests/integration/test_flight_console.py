@@ -13,7 +13,7 @@ from support.twinned import DIVE, end_guard, twins, until
 from hal.heartbeat import Guard, Heartbeat, Status
 from hal.state_file import Phase, StateFile
 
-pytestmark = pytest.mark.realtime
+pytestmark = pytest.mark.realtime(seconds=40)
 NOISE = bytes(letter for letter in range(1, 256) if letter != 3) + b"\nenable\nabort\nyes\n\x1a\x1c\x13"
 
 

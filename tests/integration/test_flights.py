@@ -1,21 +1,15 @@
 """Whole flights: missions complete, repeat bit for bit, and fly the same compiled as under the real runtime."""
 
 import json
-import os
-import signal
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
 from support.commands import glider
-from support.patience import patient_vehicle
 
 from firmware.core.layouts import supervisor_layout as sup
 from firmware.core.layouts.control_layout import LEG
-from firmware.faults import Reaction
-from hal.ports import SLOTS
 from hal.recorder.recorder import NullRecorder
 from sim_backend.core.closed_loop import N_END, N_TRACE, fly
 from sim_backend.core.effects import effect_layout as ef
@@ -145,61 +139,6 @@ def test_samples_of_an_exported_log_stand_at_the_times_when_they_were_taken(type
         F[ef.COMMAND_DELAY] = delay
         misfits.append(problem.filter(problem.model.P, F, begin=True).misfit.sum())
     assert misfits[1] > misfits[0] + 100.0
-
-
-@pytest.mark.realtime
-def test_ctrl_c_gives_the_dive_up_and_the_log_is_whole(tmp_path):
-    flight = subprocess.Popen(
-        [sys.executable, "-m", "tools.cli.main", "fly", "--realtime", "--json", "--vehicle", patient_vehicle(tmp_path)],
-        cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ},
-    )  # fmt: skip
-    log = tmp_path / "sawtooth-001.mcap"
-    deadline = time.monotonic() + 60
-    while not (log.exists() and log.stat().st_size > 60_000) and time.monotonic() < deadline:
-        time.sleep(0.1)
-    flight.send_signal(signal.SIGINT)
-    out, err = flight.communicate(timeout=60)
-    result = json.loads(out)
-    assert flight.returncode == 1, err
-    assert result["reason"] == "asked to by the operator"
-    assert result["surfaced"]
-    assert result["records"]["complete"]
-
-
-@pytest.mark.realtime
-def test_a_tick_that_comes_late_finds_the_present():
-    """Not the samples of when it was due: a machine that stood still for a second is no IMU unplugged (row 1)."""
-    flight = build_flight(mission="sawtooth", realtime=True)
-    flight.board.open()
-    runtime = build_runtime(flight, NullRecorder(record_specs(flight)))
-    runtime.arm()
-    try:
-        for _ in range(5):
-            runtime.tick()
-        time.sleep(1.0)
-        runtime.tick()
-        assert runtime.timing.worst_s > 0.9
-        assert runtime.timing.missed >= 40
-        taken = flight.board.world.frame[SLOTS["imu"].all][0]
-        assert flight.board.clock.now() - taken < 0.2
-        for _ in range(5):
-            runtime.tick()
-        assert flight.supervisor.worst(sup.FAULT_IMU_LOST) == Reaction.NOTHING
-    finally:
-        runtime.disarm()
-
-
-@pytest.mark.realtime
-def test_no_sample_is_of_the_future_wherever_the_ticks_fall():
-    """Steps of the world and deadlines begin apart; a sample ahead of the clock is refused as mistimed."""
-    flight = build_flight(mission="sawtooth", realtime=True)
-    flight.board.open()
-    clock, world = flight.board.clock, flight.board.world
-    begin = clock.now() + 0.02
-    for tick in range(40):
-        deadline = begin + 0.0213 * tick
-        clock.sleep_until(deadline)
-        assert deadline - world.dt - 1e-9 < world.time <= clock.now()
 
 
 def test_check_tells_what_is_wrong(tmp_path):

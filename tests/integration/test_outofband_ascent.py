@@ -14,8 +14,8 @@ from hal.outofband.plan import read_plan
 from hal.state_file import Phase, StateFile
 from tools.data.log.reader import read_log
 
-pytestmark = pytest.mark.realtime
-DEEP_M = 1.2
+pytestmark = pytest.mark.realtime(seconds=240)
+DEEP_M = 0.8
 
 
 @pytest.fixture

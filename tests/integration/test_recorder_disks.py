@@ -4,6 +4,7 @@ Each scenario runs in a mount namespace of its own (unshare), where that is allo
 """
 
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +12,8 @@ from pathlib import Path
 import pytest
 
 from tools.data.log.reader import read_log
+
+pytestmark = pytest.mark.realtime(seconds=30)
 
 HEAD = """
 import fcntl, json, os, struct, subprocess, sys, time
@@ -110,6 +113,9 @@ def run(scenario, tmp_path):
     place = tmp_path / "disk"
     place.mkdir()
     probe = f"mount -t tmpfs none {place} && umount {place}"
+    for program in ("unshare", "mount", "mkfs.ext4"):
+        if (program in scenario or program == "unshare") and shutil.which(program) is None:
+            pytest.skip(f"no {program} on this machine")
     if sys.platform != "linux" or subprocess.run(["unshare", "-m", "sh", "-c", probe], capture_output=True).returncode:
         pytest.skip("no right to mount file systems here")
     if "loop" in scenario and not Path("/dev/loop-control").exists():

@@ -57,15 +57,28 @@ def twins(folder: Path):
         process.communicate(timeout=20)
 
 
+ARMING_TRIES = 3
+
+
 @contextmanager
 def flying(board: Path, mission: Path, folder: Path, *extra: str):
-    """`glider fly` on the twins; killed at the end if it still runs, and so is what it left behind."""
+    """`glider fly` on the twins, armed or refused; killed at the end if it still runs, and so is what it left behind.
+
+    Where a device of the twins, kept waiting by a busy machine, was silent in the moment of arming, it is tried again.
+    """
+    log = Path(extra[extra.index("--log") + 1]) if "--log" in extra else folder / "flight.mcap"
     command = [sys.executable, "-m", "tools.cli.main", "fly", "--board", str(board), "--mission", str(mission)]
     command += ["--vehicle", str(patient_vehicle(folder))]
     command += ["--state", str(folder / "state"), "--log", str(folder / "flight.mcap"), "--json", *extra]
-    with (folder / "stdout").open("w") as out, (folder / "stderr").open("a") as err:
-        process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=err)
     try:
+        for _ in range(ARMING_TRIES):
+            with (folder / "stdout").open("w") as out, (folder / "stderr").open("a") as err:
+                process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=err)
+            # what does not arm leaves no log
+            until(lambda process=process: log.exists() or process.poll() is not None, 120.0)
+            last = (folder / "stderr").read_text().rstrip().rpartition("\n")[2]
+            if log.exists() or "not armed: devices" not in last:
+                break
         yield process
     finally:
         process.kill()

@@ -10,7 +10,7 @@ from tools.gap.where import ALLOWED, evidence
 
 
 def measured(world: World, seed: int = 1, spoil=None) -> CaseGap:
-    case, flights = fly_case(world, seed, runs=3)
+    case, flights = fly_case(world, seed, runs=2)
     if spoil is not None:
         for flight in flights:
             spoil(flight.run.columns)

@@ -15,6 +15,8 @@ from hal.outofband.guard import Watch
 from hal.outofband.plan import NAME, AxisPlan, Plan, write_plan
 from hal.state_file import Phase, StateFile
 
+pytestmark = pytest.mark.realtime(seconds=35)
+
 FLIGHT = """
 import os, select, sys, time
 from hal import heartbeat as hb

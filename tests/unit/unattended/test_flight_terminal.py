@@ -14,6 +14,8 @@ from hal.state_file import Phase, StateFile
 from tests.support.twinned import end_guard, until
 from tools.flight.terminal import AGAIN_S, Stop
 
+pytestmark = pytest.mark.realtime(seconds=60)
+
 # --- Ctrl-C ---------------------------------------------------------------------------------------------------------
 
 
