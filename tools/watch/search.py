@@ -10,7 +10,7 @@ from tools.watch.rivals import refined
 from tools.watch.water import named, rougher, water_event
 
 EVIDENCE_NEEDED = 16.0  # nat over no change (docs/WATCH.md)
-BEYOND_CHANCE = 7.5  # nat over the logarithm of how many changes are looked at
+BEYOND_CHANCE = 7.3  # nat over the logarithm of how many changes are looked at
 MOST_EVENTS = 5
 
 
