@@ -114,13 +114,15 @@ class Joint:
         for n, run in enumerate(self.runs):
             cross.append(self.taken_in(n, run.curvature))
             slopes.append(run.slope + run.curvature @ (self.run_values(n) - run.at))
+        tables = [np.array([run.curvature for run in self.runs]), np.array(cross), np.array(slopes)]
+        upto = [np.concatenate([np.zeros_like(one[:1]), np.cumsum(one, axis=0)]) for one in tables]
         found = []
         for span in listed:
-            weights = span.weights(len(self.runs))
-            inside = np.flatnonzero(weights)
-            D = sum(weights[n] ** 2 * self.runs[n].curvature for n in inside)
-            C = sum(weights[n] * cross[n] for n in inside)
-            s = sum(weights[n] * slopes[n] for n in inside)
+            if span.course == STEP:
+                D, C, s = (one[span.end] - one[span.first] for one in upto)
+            else:
+                w = span.weights(len(self.runs))
+                D, C, s = (np.tensordot(share, one, 1) for share, one in zip((w**2, w, w), tables, strict=True))
             solved = self.inverse @ C
             for label in self.shared.labels if only is None else only:
                 found.append(self._change(label, span, D, C, s, solved))
