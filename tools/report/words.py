@@ -26,6 +26,7 @@ PLAIN = {
     "compressibility": "the vehicle grows heavier with depth",
     "current": "the water moves and carries the vehicle along",
     "current_shear": "the water's motion changes with depth",
+    "density_bias": "the water is denser or lighter than its sensor says",
     "depth_lag": "measured depth lags behind the motion",
     "depth_offset": "measured depth is off by a constant",
     "depth_scale": "measured depth is off by a factor",
@@ -56,7 +57,9 @@ PLAIN = {
     "stall": "lift stops growing past an angle of attack",
     "stratification": "the vehicle grows lighter with depth",
     "tether": "a line drags at the tail",
+    "thermal_expansion": "the hull's volume goes with the temperature more or less than modelled",
     "turbulence": "the water is rougher than the vehicle file says",
+    "vertical_water": "the water rises and falls more than it did",
     "waves": "surface waves move the vehicle",
     "weathercock": "the hull turns into or out of sideslip more or less than modelled",
     "yaw_damping": "yawing is damped more or less than modelled",
@@ -79,19 +82,23 @@ FEATURES = {
     "time": "time since the start", "servo": "servo angle", "slider": "slider position", "ballast": "ballast mass",
     "constant": "a constant",
 }  # fmt: skip
+NOTHING, SMALL = 1e-12, 1e-4  # shown as 0, and by a power of ten
 SURE, LITTLE = 0.8, 0.02  # below the first the next answer is named, unless it is below the second
 MEANS = {"none": "no gap", "unknown": "a gap of another kind"}
 READABLE = {"rad": ("deg", 180.0 / math.pi), "rad/s": ("deg/s", 180.0 / math.pi), "1/rad": ("1/deg", math.pi / 180.0)}
 
 
 def number(value: float) -> str:
-    """Three digits that count, with a true minus."""
+    """Three digits that count, with a true minus; a power of ten where they stand far behind the point."""
     if not math.isfinite(value):
         return DASH
-    if abs(value) < 1e-8:
+    if abs(value) <= NOTHING:
         return "0"
-    digits = min(max(0, 2 - math.floor(math.log10(abs(value)))), 9)
-    return f"{value:.{digits}f}".replace("-", MINUS)
+    if abs(value) < SMALL:
+        digits, power = f"{value:.2e}".split("e")
+        return f"{digits}e{int(power)}".replace("-", MINUS)
+    places = max(0, 2 - math.floor(math.log10(abs(value))))
+    return f"{value:.{places}f}".replace("-", MINUS)
 
 
 def percent(share: float) -> str:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from sim_backend.core.effects.catalogue import catalogue
+from sim_backend.ocean.catalogue import catalogue as ocean_catalogue
 from tools.diagnose.noise_probes import CLOCK, TURBULENCE
 from tools.diagnose.record import (
     Answer,
@@ -41,7 +42,7 @@ def record(probabilities, selected=(), groups=None, findings=(), noise=None, whe
 
 
 def test_every_label_has_plain_words():
-    assert set(words.PLAIN) == set(catalogue())
+    assert set(words.PLAIN) == {*catalogue(), *ocean_catalogue()}
     assert set(words.AXES) == {reading.name for reading in ROUGHIE.readings}
 
 
@@ -134,6 +135,7 @@ def test_disorder_claims_no_shrinkage():
 @pytest.mark.parametrize(
     ("value", "text"),
     [(0.0, "0"), (1234.5, "1234"), (12.34, "12.3"), (-0.01234, f"{words.MINUS}0.0123"), (-1e-12, "0"),
+     (-2.284e-5, f"{words.MINUS}2.28e{words.MINUS}5"), (1e-10, f"1.00e{words.MINUS}10"),
      (np.nan, words.DASH)],
 )  # fmt: skip
 def test_numbers(value, text):
