@@ -1,4 +1,4 @@
-"""Today's practice as the benchmark has it: its glide is that of the equations, its fit finds what flew, its threshold."""
+"""Today's practice as the benchmark has it: its glide solves the equations, its fit finds what flew, its threshold."""
 
 import math
 
