@@ -49,6 +49,7 @@ CALLS: tuple[tuple[str, str | None], ...] = (
     ("faults --only 32", "bench"),
     ("benchmark --only memory", None),
     ("benchmark --only campaign", "campaign"),
+    ("benchmark --only ocean", "analysis"),
     ("benchmark --only identify", "test"),
     ("twin --print-sim", None),
     ("twin --dir ports", "bench"),
@@ -58,11 +59,13 @@ CALLS: tuple[tuple[str, str | None], ...] = (
     ("gap readings case", "analysis"),
     ("gap report answer", "analysis"),
     ("gap watch case", "analysis"),
+    ("gap velocity dives --out velocity", None),
     ("gap diagnose case --out answer", "analysis"),
     ("gap challenge make --out blind --seed 1 --single 1 --none 0 --pairs 0 --unknown 0 --jobs 1", None),
     ("gap challenge run --cases blind --out answers", "analysis"),
     ("gap challenge score --cases blind --answers blind/answers.zip --diagnoses answers", "analysis"),
     ("identify case", "identify"),
+    ("identify dives", "analysis"),
     ("reproduce fig5", "analysis"),
     ("reproduce fig4", "identify"),
     ("campaign", "campaign"),
@@ -74,6 +77,10 @@ FILES = {
     "map.toml": 'format = 1\nvehicle = "roughie"\nsite = "pool"\nwater_density_kg_m3 = 998.0\n[time]\ncolumn = "ms"\n'
     'unit = "ms"\n[columns.pitch_rad]\nsource = "deg"\nunit = "deg"\n',
     "capture.tsv": "",
+    "dives/case.toml": 'format = 1\nvehicle = "slocum"\nsite = "ocean"\nlog_rate_hz = 0.25\n'
+    "water_density_kg_m3 = 1026.0\nmotion_capture = false\nruns = 1\n",
+    "dives/run00.csv": "t_s,pitch_rad,depth_m,oil_m3,density_kg_m3\n"
+    + "".join(f"{4 * i},-0.4,{10.0 + 0.6 * i},-0.0002,1026.0\n" for i in range(100)),
     "commands.csv": "t_s,cmd_servo_rad,cmd_slider_m,cmd_ballast_kg,X,Y,Z,phi,theta,psi,u,v,w,p,q,r,servo_rad,slider_m,"
     "ballast_kg\n0,0,-0.02,0.1,0,0,5,0,0,0.3,0.2,0,0,0,0,0,0,0,0\n1,0,-0.02,0.1" + "," * 15 + "\n",
 }  # fmt: skip
@@ -123,6 +130,7 @@ def test_in_a_base_install_every_command_works_or_names_its_extra(base_install):
     python, folder = base_install / "venv" / "bin" / "python", base_install / "calls"
     folder.mkdir()
     for name, text in FILES.items():
+        (folder / name).parent.mkdir(exist_ok=True)
         (folder / name).write_text(text)
     (folder / "calls.json").write_text(json.dumps([call.split() for call, _ in CALLS]))
     done = subprocess.run(

@@ -84,6 +84,7 @@ def predict(run: Path, model: str, out: Path, vehicle: str | None) -> None:
     from tools.data.errors import InputError
     from tools.data.runs.case import load_case_of_run
     from tools.data.runs.run import write_run
+    from tools.inference.kinds import kind_of
     from tools.inference.load import load_model
     from tools.inference.predict import as_run
     from tools.inference.predict import predict as predict_runs
@@ -92,7 +93,7 @@ def predict(run: Path, model: str, out: Path, vehicle: str | None) -> None:
     if out.exists() and run.exists() and out.samefile(run):
         raise InputError("would overwrite the run itself: name another file", source=out, column="--out")
     predicted = predict_runs(case, load_model(model, case), [recorded])[0]
-    write_run(out, as_run(recorded, predicted))
+    write_run(out, as_run(recorded, predicted, kind_of(case.vehicle)))
     say(f"predicted {recorded.rows} rows of {recorded.name} with {model}: {out}")
 
 

@@ -24,14 +24,13 @@ def identify(case: Path, out: Path | None, seed: int, likelihood: str, vehicle: 
     Runs that cannot be fitted are named and left out. With --out: identified.toml (a vehicle file that says where it
     comes from), report.html, posterior.nc (ArviZ).
     """
-    from tools.data.errors import need
-
-    need("analysis")
     from sim_backend.ocean.vehicle import OceanVehicle
+    from tools.data.errors import need
     from tools.data.runs.case import load_case
 
     loaded = load_case(case, vehicle)
     if isinstance(loaded.vehicle, OceanVehicle):
+        need("analysis")
         _identify_ocean(loaded, out, as_json)
         return
     need("identify")

@@ -16,13 +16,16 @@ def readings(case: Path, as_json: bool) -> None:
     A finding has a size with its 90 % interval, the catalogue's label where it has one, and says whether later stages
     see the reading mended (docs/READINGS.md).
     """
-    from tools.data.errors import need
+    from sim_backend.ocean.vehicle import OceanVehicle
+    from tools.data.errors import InputError, need
     from tools.data.runs.case import load_case
     from tools.readings.check import check
 
     need("analysis")
     with progress("readings", 2) as advance:
         loaded = load_case(case)
+        if isinstance(loaded.vehicle, OceanVehicle):
+            raise InputError("an ocean glider: its readings are held against each other by gap watch", source=case)
         advance(1)
         found = check(loaded.runs)
         advance(1)

@@ -15,6 +15,7 @@ import msgspec
 import numpy as np
 
 from sim_backend.core.effects.catalogue import catalogue
+from sim_backend.ocean.vehicle import KIND
 from tools.data.errors import InputError
 from tools.data.plain import as_plain
 from tools.diagnose.stages import STAGES
@@ -120,6 +121,12 @@ class NextRun(msgspec.Struct):
     parts: list[str]
     distance: Number
     mission: str
+
+
+class Asked(msgspec.Struct):
+    """The kind of vehicle that was asked of, where it is said."""
+
+    kind: str = ""
 
 
 class Answer(msgspec.Struct):
@@ -263,6 +270,8 @@ def read_record(folder: Path) -> Record:
     """A diagnosis from its folder; InputError names the file that is missing or not what it should be."""
     if not folder.is_dir():
         raise InputError("no such folder", source=folder)
+    if _read(folder / ANSWER, Asked).kind == KIND:
+        raise InputError("the diagnosis of an ocean glider: no report is drawn of it", source=folder / ANSWER)
     answer, details = _read(folder / ANSWER, Answer), _read(folder / DETAILS, Details)
     _check(answer, details, folder)
     curves = _read_curves(folder / CURVES, len(details.pictures))

@@ -146,8 +146,9 @@ def load_vehicle_text(wanted: str) -> tuple[str, Vehicle]:
     """A vehicle's text and the vehicle."""
     from tools.data.sources import name_or_path
 
+    vehicle = load_vehicle(wanted)  # first: it says of another kind of vehicle that it is one
     text, _ = name_or_path(wanted, "vehicle", "model/vehicles")
-    return text, load_vehicle(wanted)
+    return text, vehicle
 
 
 def log_metadata(flight: Flight, *, seed: int, effects: dict[str, dict[str, float]]) -> dict[str, str]:

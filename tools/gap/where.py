@@ -19,7 +19,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sim_backend.core.effects.catalogue import catalogue
 from tools.gap.cells import Cells, cells_of
 from tools.inference.parameters import NUISANCE, effect_parameters, model_at, nuisance_parameters
 from tools.inference.predict import fly, fly_near, observe
@@ -79,7 +78,7 @@ class Search:
     def __init__(self, problem: Problem, cells: Cells, table: np.ndarray, Y: np.ndarray, weight: np.ndarray):
         """table and Y (rows, N_Y): measured, and as the model predicts it; weight (samples,) of the scored ones."""
         self.problem, self.cells, self.table, self.weight = problem, cells, table, weight
-        effects = catalogue()
+        effects = problem.kind.catalogue()
         by_label = effect_parameters(problem)
         self.free = [*(p for own in by_label.values() for p in own), *nuisance_parameters(problem)]
         self.parts: list[Part | None] = [

@@ -96,5 +96,5 @@ def as_run(run: Run, Y: np.ndarray, kind: Kind = ROUGHIE) -> Run:
     """A prediction (rows, N_Y) with the rows and columns of the measured run, no gaps."""
     read = {reading.column: n for n, reading in enumerate(kind.readings)}
     # time and commands are not predicted, only without gaps
-    columns = {name: Y[:, read[name]] if name in read else held(values) for name, values in run.columns.items()}
+    columns = {name: held(Y[:, read[name]] if name in read else values) for name, values in run.columns.items()}
     return replace(run, columns=columns, path=None)

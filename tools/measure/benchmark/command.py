@@ -21,11 +21,17 @@ def _shown(value: object) -> str:
 @click.option("--only", multiple=True, metavar="NAME", type=click.Choice(list(MEASURES)), help="Measure this alone.")
 @click.option("--repeats", type=click.IntRange(1, 1000), default=5, show_default=True, help="Runs behind each median.")
 @click.option("--plant-c", type=click.Path(exists=True, dir_okay=False, path_type=Path), help="Another C plant.")
+@click.option(
+    "--ocean-cases", type=click.Path(exists=True, file_okay=False, path_type=Path), metavar="DIR",
+    help="Cases of ocean gliders in folders of DIR, for `ocean`.",
+)  # fmt: skip
 @json_option
-def benchmark(only: tuple[str, ...], repeats: int, plant_c: Path | None, as_json: bool) -> None:
+def benchmark(
+    only: tuple[str, ...], repeats: int, plant_c: Path | None, ocean_cases: Path | None, as_json: bool
+) -> None:
     """Measure how fast this machine flies: medians of repeated runs, what is compared taken in turns."""
     names = list(dict.fromkeys(only)) or list(MEASURES)
-    results = run(names, Settings(repeats, plant_c), lambda name: say(f"{name} ..."))
+    results = run(names, Settings(repeats, plant_c, ocean_cases), lambda name: say(f"{name} ..."))
     if as_json:
         print_json(results)
         return

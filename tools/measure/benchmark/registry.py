@@ -19,6 +19,7 @@ class Settings:
 
     repeats: int = 5  # runs of each thing compared; medians are reported
     plant_c: Path | None = None  # another C program to time the plant against
+    ocean_cases: Path | None = None  # folder of cases of ocean gliders, beside the missions of our own making
 
 
 class Measure(NamedTuple):
@@ -38,6 +39,7 @@ MEASURES = {
     "tick": Measure("tick", "the real runtime's tick: time, and that it allocates nothing"),
     "campaign": Measure("campaign", "many flights at once, all cores against one"),
     "identify": Measure("identify", "effective samples a second, beside emcee and NUTS"),
+    "ocean": Measure("ocean", "ocean gliders watched, beside a fit of drag with a threshold"),
     "memory": Measure("memory", "memory of the flying process"),
     "startup": Measure("startup", "from the shell to the first word"),
 }

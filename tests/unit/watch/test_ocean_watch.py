@@ -1,0 +1,211 @@
+"""`glider gap watch`, `gap diagnose` and other commands on missions of ocean gliders that another simulator flew."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.ocean import as_case, fly_dives, without
+
+from sim_backend.ocean.catalogue import NOT_ASKED, ONE_ON_DEPTH, catalogue
+from sim_backend.ocean.vehicle import shipped_vehicles
+from tools.cli.common import report_errors
+from tools.cli.main import cli
+from tools.data.runs import columns as names
+from tools.data.runs.run import load_run
+from tools.watch.usable import usable_dive
+from tools.watch.watch import watch
+
+DIVES, FIRST, SIZE = 8, 4, 0.5
+OTHER_SEED = 2
+
+
+@pytest.fixture(scope="module", params=[False, True], ids=["depth alone", "with speed"])
+def stepped(request, tmp_path_factory):
+    """A mission whose drag steps up, watched; whether its speed was measured."""
+    runs = fly_dives(DIVES, ("drag", SIZE, FIRST), speed=request.param).runs
+    return watch(as_case(tmp_path_factory.mktemp("step") / "case", runs)), request.param
+
+
+@pytest.fixture(scope="module")
+def unchanged(tmp_path_factory):
+    return as_case(tmp_path_factory.mktemp("same") / "case", fly_dives(DIVES, speed=True).runs)
+
+
+def test_a_step_of_drag_is_found_in_its_dive(stepped):
+    found, speed = stepped
+    event = max(found.events, key=lambda one: one.probability)
+    assert len(found.events) == 1
+    assert abs(int(event.from_run.removeprefix("run")) - FIRST) <= 1
+    assert (event.to_run, event.course) == (None, "step")
+    called = [run.verdict == "cause" for run in found.runs]
+    assert sum(a != (n >= FIRST) for n, a in enumerate(called)) <= 1
+    assert event.label in (["drag"] if speed else ONE_ON_DEPTH)
+    if event.label == "drag":
+        low, high = event.sized.ci90
+        assert low < SIZE < high
+
+
+def test_without_speed_drag_lift_and_pitch_scale_are_one(stepped):
+    found, speed = stepped
+    group = found.events[0].group
+    assert group[0] == found.events[0].label
+    if speed:  # drag and lift differ by little in so few dives; a pitch that is wrong does not
+        assert set(group) <= {"drag", "lift"}
+    else:
+        assert set(group) == set(ONE_ON_DEPTH)
+
+
+def test_of_nothing_that_changed_nothing_is_said(unchanged):
+    found = watch(unchanged)
+    assert found.events == []
+    assert [run.verdict for run in found.runs] == ["none"] * DIVES
+
+
+def test_what_all_dives_share_is_no_change(tmp_path):
+    """A vehicle whose drag is half as much again as another's from the first dive on."""
+    assert watch(as_case(tmp_path / "case", fly_dives(6, ("drag", SIZE, 0)).runs)).events == []
+
+
+def blanked(run, name: str, value: float):
+    return replace(run, columns=run.columns | {name: np.full(run.rows, value)})
+
+
+@pytest.mark.parametrize(
+    ("spoil", "reason"),
+    [
+        (lambda run: blanked(run, names.PUMP, 1.0), "the engine runs"),
+        (lambda run: blanked(run, names.ATTITUDE[1], 0.02), "level or too steep"),
+        (lambda run: blanked(run, names.DEPTH, 1.0), "at the surface"),
+        (lambda run: blanked(run, names.OIL, np.nan), f"no readings of {names.OIL}"),
+        (lambda run: replace(run, columns={n: v[:1] for n, v in run.columns.items()}), "no two samples"),
+    ],
+)  # fmt: skip
+def test_why_a_dive_cannot_be_judged(unchanged, spoil, reason):
+    run = unchanged.runs[0]
+    assert usable_dive(run) is run
+    said = usable_dive(spoil(run))
+    assert isinstance(said, str)
+    assert reason in said
+
+
+def test_a_dive_that_cannot_be_judged_is_skipped_with_its_reason(unchanged):
+    runs = list(unchanged.runs)
+    runs[3] = blanked(runs[3], names.PUMP, 1.0)
+    found = watch(replace(without(unchanged, names.DENSITY, (5,)), runs=[
+        *runs[:5], without(unchanged, names.DENSITY, (5,)).runs[5], *runs[6:]
+    ]))  # fmt: skip
+    skipped = {run.run: run.skipped for run in found.runs if run.skipped}
+    assert list(skipped) == ["run03", "run05"]
+    assert "the engine runs 100 %" in skipped["run03"]
+    assert names.DENSITY in skipped["run05"]
+    assert found.events == []
+
+
+# --- commands ---
+@pytest.fixture
+def glider(monkeypatch, capsys):
+    """Run a command: exit code, output, complaints."""
+
+    def run(*arguments) -> tuple[int, str, str]:
+        monkeypatch.setattr("sys.argv", ["glider", *map(str, arguments)])
+        code = report_errors(cli)
+        said = capsys.readouterr()
+        return code, said.out, said.err
+
+    return run
+
+
+FIELDS = {"format", "verdict", "where", "causes", "selected", "gap", "next_run"}  # docs/GAP.md
+
+
+def test_a_diagnosis_is_written_as_any_other(unchanged, glider, tmp_path):
+    out = tmp_path / "answer"
+    code, told, _ = glider("gap", "diagnose", unchanged.folder, "--out", out, "--json")
+    assert code == 0
+    answer = json.loads((out / "diagnosis.json").read_text())
+    assert json.loads(told) == answer
+    assert set(answer) >= FIELDS
+    assert answer["verdict"] == "none"
+    assert answer["selected"] == []
+    labels = [cause["label"] for cause in answer["causes"]]
+    assert labels[0] == "none"
+    assert set(labels) <= {*catalogue(), "none", "unknown"}
+    assert sum(cause["probability"] for cause in answer["causes"]) == pytest.approx(1.0)
+    assert all({"group", "parameters"} <= set(cause) for cause in answer["causes"])
+    assert all(cause["label"] in cause["group"] for cause in answer["causes"])
+    gap = answer["gap"]
+    assert set(gap) == {"before", "recalibrated", "after", "floor", "shrinkage", "closed"}
+    for name in ("before", "recalibrated", "after", "floor"):
+        assert set(gap[name]) == {"depth", "roll", "speed", "total"}
+    assert gap["recalibrated"]["total"] < gap["before"]["total"]
+    assert answer["not_asked"] == NOT_ASKED
+    assert any("Cd0" in caution for caution in answer["cautions"])
+    code, _, said = glider("gap", "report", out)
+    assert (code, len(said.splitlines())) == (2, 1)
+    assert "ocean glider" in said
+
+
+def test_the_gap_is_measured(unchanged, glider, tmp_path):
+    code, told, _ = glider("gap", "measure", unchanged.folder, "--json", "--report", tmp_path / "gap.html")
+    assert code == 0
+    answer = json.loads(told)
+    assert [run["name"] for run in answer["runs"]] == [run.name for run in unchanged.runs]
+    assert set(answer["channels"]) == {"depth", "roll", "speed"}
+    places = {(one["subsystem"], one["element"]) for one in answer["where"]}
+    assert places <= {effect.place for effect in catalogue().values()} | {(n, n) for n in ("allowed", "unexplained")}
+    assert sum(one["share"] for one in answer["where"]) == pytest.approx(1.0)
+    assert "<svg" in (tmp_path / "gap.html").read_text()
+
+
+def test_a_dive_is_predicted(unchanged, glider, tmp_path):
+    run, out = unchanged.runs[0], tmp_path / "run00.csv"
+    assert glider("gap", "predict", run.path, "--out", out)[0] == 0
+    predicted = load_run(out)
+    assert set(predicted.columns) == set(run.columns)
+    assert np.array_equal(predicted.t, run.t)
+    for name, values in predicted.columns.items():
+        assert np.isfinite(values).all(), name
+    assert np.ptp(predicted.columns[names.DEPTH]) > 50.0
+    assert np.array_equal(predicted.columns[names.OIL], run.columns[names.OIL])
+
+
+def test_watched_by_the_command_and_drawn_again(tmp_path, glider):
+    runs = fly_dives(DIVES, ("drag", SIZE, FIRST), speed=True).runs
+    case, out = as_case(tmp_path / "case", runs), tmp_path / "watch"
+    assert glider("gap", "watch", case.folder, "--out", out)[0] == 0
+    answer = json.loads((out / "watch.json").read_text())
+    assert [event["label"] for event in answer["events"]] == ["drag"]
+    assert len(answer["runs"]) == DIVES
+    (out / "report.html").unlink()
+    assert glider("gap", "report", out)[0] == 0
+    assert (out / "report.html").is_file()
+
+
+def test_readings_are_asked_of_the_other_kind(unchanged, glider):
+    code, told, said = glider("gap", "readings", unchanged.folder)
+    assert (code, told) == (2, "")
+    assert "ocean glider" in said.splitlines()[-1]
+
+
+COMMANDS = "t_s,cmd_servo_rad,cmd_slider_m,cmd_ballast_kg\n0.0,0.0,0.0,0.1\n1.0,0.0,0.0,0.1\n"
+ROUGHIE_ONLY = (
+    ("fly",), ("simulate", "{commands}", "--out", "{out}"), ("campaign", "--out", "{out}"),
+    ("campaign", "--design", "identification", "--out", "{out}"), ("tune",),
+    ("reproduce", "fig4", "--out", "{out}"),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("command", ROUGHIE_ONLY, ids=" ".join)
+@pytest.mark.parametrize("named", ["shipped", "file"])
+def test_what_flies_a_roughie_refuses_an_ocean_glider_in_a_line(command, named, glider, tmp_path):
+    (tmp_path / "commands.csv").write_text(COMMANDS)
+    (tmp_path / "mine.toml").write_text(shipped_vehicles()["slocum"])
+    vehicle = "slocum" if named == "shipped" else tmp_path / "mine.toml"
+    filled = [part.format(commands=tmp_path / "commands.csv", out=tmp_path / "out") for part in command]
+    code, told, said = glider(*filled, "--vehicle", vehicle)
+    assert (code, told) == (2, "")
+    assert len(said.splitlines()) == 1
+    assert "ocean glider" in said
+    assert not (tmp_path / "out").exists()
+
