@@ -24,6 +24,8 @@ STUCK = 0.2  # misfit that a tenth of a step's promise must be worth, for parame
 STUCK_TRIED = 2  # hypotheses at most, the best of those that are stuck
 SIDE_STEPS = (0.001, 0.004, 0.015, 0.06)  # of a spread, either way: a delay's misfit has steps, no slope leads on
 
+Point = tuple[list[FreeParameter], np.ndarray, np.ndarray]  # what is free, its values, the nuisance parameters'
+
 
 class Fitter:
     """Fits at one set of gains."""
@@ -45,13 +47,14 @@ class Fitter:
         self.problem, self.gains, self.nuisance, self.temperature = problem, gains, nuisance, 1.0
         free, values = ([], np.zeros(0)) if at is None else (at.free, at.values)
         base = np.zeros(len(nuisance)) if at is None else at.nuisance
-        steps = NUISANCE_STEP * np.vstack([np.zeros(len(base)), np.eye(len(base))])
-        E = self.flown([(free, values, base + step) for step in steps])
-        mean_nis = float(E[0] @ E[0]) / E.shape[1]
+        e0 = self.flown([(free, values, base)])[0]
+        mean_nis = float(e0 @ e0) / len(e0)
         if temper and mean_nis > TEMPER_ABOVE:
             self.temperature = mean_nis
-            E /= np.sqrt(mean_nis)
-        self.base, self.e0 = base, E[0]
+            e0 /= np.sqrt(mean_nis)
+        self.base, self.e0 = base, e0
+        steps = NUISANCE_STEP * np.vstack([np.zeros(len(base)), np.eye(len(base))])
+        E = self.flown([(free, values, base + step) for step in steps], quick=True)
         self.J = (E[1:] - E[0]) / NUISANCE_STEP  # (nuisance, samples)
         self.A = self.J @ self.J.T + self.prior_weight * np.eye(len(base))
         self.chol = np.linalg.cholesky(self.A)
@@ -79,8 +82,12 @@ class Fitter:
         for hypothesis, e in zip(new, self.flown([(c.free, c.values, c.nuisance) for c in new]), strict=True):
             hypothesis.set_innovations(e, self.prior_weight)
 
-    def linearise(self, hypotheses: list["Hypothesis"], coarse: bool = False) -> None:
-        """The columns of every hypothesis's parameters where it stands, and the step they foresee."""
+    def linearise(self, hypotheses: list["Hypothesis"], coarse: bool = False, rough: np.ndarray | None = None) -> None:
+        """The columns of every hypothesis's parameters where it stands, and the step they foresee.
+
+        rough: innovations of all of them, where they stand at one model, by the midpoint rule; columns are then taken
+        by that.
+        """
         self.measure(hypotheses)
         points, steps = [], []
         for hypothesis in hypotheses:
@@ -91,14 +98,15 @@ class Fitter:
                 moved = hypothesis.values.copy()
                 moved[k] += size
                 points.append((hypothesis.free, moved, hypothesis.nuisance))
-        E = iter(self.flown(points))
+        quick = rough is not None
+        E = iter(self.flown(points, quick))
         tables = []
         for hypothesis, sizes in zip(hypotheses, steps, strict=True):
             known = len(hypothesis.known)
             table = np.empty((len(sizes) + 1, len(self.e0)))  # columns, and the innovations where it stands
             table[:known] = hypothesis.known if known else 0.0
             for k in range(known, len(sizes)):
-                table[k] = (next(E) - hypothesis.e) / sizes[k]
+                table[k] = (next(E) - (rough if quick else hypothesis.e)) / sizes[k]
             table[-1] = hypothesis.e
             hypothesis.known = np.empty((0, 0))
             tables.append(table)
@@ -116,9 +124,10 @@ class Fitter:
         for hypothesis in short:
             for share in SHORTER_STEPS:
                 hypothesis.offer(next(E), *hypothesis.step(share), self.prior_weight)
+        least = min((c.best[0] for c in hypotheses), default=np.inf)
         stuck = [c for c in short if c.misfit - c.best[0] < SHORTER_STEPS[-1] * c.expected_fall() > STUCK]
         stuck = sorted(stuck, key=lambda c: c.misfit)[:STUCK_TRIED]
-        points = [(hypothesis, *point) for hypothesis in stuck for point in hypothesis.side_steps()]
+        points = [(c, *point) for c in stuck for point in c.side_steps(c.misfit - c.expected_fall() <= least)]
         aside = self.flown([(c.free, v, a) for c, v, a in points])
         for (hypothesis, values, nuisance), e in zip(points, aside, strict=True):
             hypothesis.offer(e, values, nuisance, self.prior_weight)
@@ -130,12 +139,13 @@ class Fitter:
         self.linearise(hypotheses, coarse)
         self.move(hypotheses)
 
-    def flown(self, points: list[tuple[list[FreeParameter], np.ndarray, np.ndarray]]) -> np.ndarray:
-        """Innovations of models given as (free, values, nuisance), (points, samples)."""
+    def flown(self, points: list[Point], quick: bool = False) -> np.ndarray:
+        """Innovations of models given as (free, values, nuisance), (points, samples); quick: by the midpoint rule."""
         models = [model_at(self.problem, [*self.nuisance, *free], np.concatenate([a, v])) for free, v, a in points]
-        if not models:
-            return np.empty((0, len(self.e0)))
-        return self.problem.follow(models, self.gains) / np.sqrt(self.temperature)
+        E = self.problem.follow(models, self.gains, quick)
+        if self.temperature != 1.0:
+            E /= np.sqrt(self.temperature)
+        return E
 
 
 def bounded_step(normal: np.ndarray, slope: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
@@ -202,8 +212,11 @@ class Hypothesis:
         moved = np.clip(self.values + share * self.full_step[count:], self.low, self.high)
         return moved, self.nuisance + share * self.full_step[:count]
 
-    def side_steps(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Points (values, nuisance) where the whole step brings nothing: without each parameter, and each alone."""
+    def side_steps(self, hopeful: bool) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Points (values, nuisance) where the whole step brings nothing: without each parameter, and each delay alone.
+
+        hopeful: what the step promises would make it the best, or no delay is tried alone.
+        """
         count, points = len(self.nuisance), []
         for k in range(count, len(self.slope)):
             rest = np.delete(np.arange(len(self.slope)), k)
@@ -211,6 +224,8 @@ class Hypothesis:
             low, high = self.room
             step[rest] = bounded_step(self.normal[np.ix_(rest, rest)], self.slope[rest], low[rest], high[rest])
             points.append((self.values + step[count:], self.nuisance + step[:count]))
+            if not (hopeful and self.free[k - count].delays):
+                continue
             for aside in (sign * size for size in SIDE_STEPS for sign in (-1.0, 1.0)):
                 values = self.values.copy()
                 values[k - count] += aside
