@@ -11,7 +11,16 @@ from tools.diagnose.matter import MATTERS, disorder_matters, gap_matters, moveme
 from tools.diagnose.noise_probes import CLOCK, ProbeResult, inflated
 from tools.diagnose.record import NONE, UNKNOWN, Finding
 from tools.diagnose.residuals import UNCLEAN, tests, worst
-from tools.diagnose.search import EVIDENCE_NEEDED, Search, advance_and_prune, converge, first_step, run, screen
+from tools.diagnose.search import (
+    EVIDENCE_NEEDED,
+    UNLIKE,
+    Search,
+    advance_and_prune,
+    converge,
+    first_step,
+    run,
+    screen,
+)
 from tools.diagnose.shrink import (
     Shrinkage,
     case_noise_floor,
@@ -23,7 +32,9 @@ from tools.diagnose.shrink import (
 )
 from tools.diagnose.unknown import LEAST_UNKNOWN, clock_label, disorder, left_share, probability_unknown, remainder_of
 from tools.inference.fit import Hypothesis
+from tools.inference.levels import SENSORS, factors
 from tools.inference.parameters import CLOCK_PLACE
+from tools.inference.problem import Problem
 
 HELD_OUT_SHARE = 0.3  # of the gap that is left on runs left out: an effect beside another must close as much more
 TIE = 6.0  # nat within which two labels are not told apart: what a change of prior spreads can move
@@ -31,9 +42,9 @@ MOST_GROUP = 3
 ERROR_RATE = 0.03  # answers that named something else altogether, of those to the cases it was developed with: 3 of 104
 CERTAIN = 0.9  # of the recalibrated gap: effects beside an unknown one that leave more are not certain
 RIVALS = 5  # further labels fitted in the place of the main one, where it stands beside others
-# Floors by which an effect alone widens the gap, as likely a main cause as one of many small ones there: where others
-# are seen or something is left, and where it is all that can be seen; e-folds.
-LARGE, ALONE, LARGE_WIDTH = 1.7, 0.6, 0.4
+# Floors by which an effect widens the gap, as likely a main cause as one of many small ones there: where noise is not
+# what the file says, so that it may say little of the rest, and where it is; e-folds.
+LARGE, TOLD, LARGE_WIDTH = 2.1, 1.2, 0.25
 SECOND = 0.9  # of the main cause's probability, that none may have where there is an effect at all
 LIKELY = 1e-3  # probability from which an alternative's effect on the windows is looked at
 
@@ -241,9 +252,8 @@ def conclude(
     chances = share_out(chances, main, most_often({label: taken[label] for label in gained}))
     chances = to_none(chances, negligible, movements_of_alternatives(search, evident, main, chances))
     if main in gained:
-        many = left is not None or len(evident.labels) > 1
         floors = sizes[main] / max(calm, 1e-6)
-        chances = doubt_small(chances, main, floors / (LARGE if many else ALONE))
+        chances = doubt_small(chances, main, floors / (TOLD if as_told(problem) else LARGE))
     unknown = probability_unknown(search, bool(gained), bool(ranked), shrinkage, left, noise is not None)
     if not gained and not gap_matters(shrinkage):
         unknown = LEAST_UNKNOWN
@@ -262,6 +272,11 @@ def conclude(
         whiteness=whiteness, unexplained=left_share(shrinkage), gained=gained, negligible=negligible,
         probed=[] if left is None else left.probed, noise=noise, shrinkage=shrinkage,
     )  # fmt: skip
+
+
+def as_told(problem: Problem) -> bool:
+    """Whether the sensors' noise is what the file says."""
+    return all(abs(np.log(factor)) < UNLIKE for name, factor in factors(problem).items() if name in SENSORS)
 
 
 def share_out(chances: dict[str, float], main: str, first: dict[str, float]) -> dict[str, float]:
