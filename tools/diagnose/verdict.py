@@ -254,7 +254,8 @@ def conclude(
     if main in gained:
         floors = sizes[main] / max(calm, 1e-6)
         chances = doubt_small(chances, main, floors / (TOLD if as_told(problem) else LARGE))
-    unknown = probability_unknown(search, bool(gained), bool(ranked), shrinkage, left, noise is not None)
+    by_effects = sum(sizes[label] ** 2 for label in gained)
+    unknown = probability_unknown(search, bool(gained), bool(ranked), shrinkage, left, noise is not None, by_effects)
     if not gained and not gap_matters(shrinkage):
         unknown = LEAST_UNKNOWN
     chances = {name: value * (1.0 - unknown) for name, value in chances.items()} | {UNKNOWN: unknown}
@@ -269,7 +270,7 @@ def conclude(
     return Answer(
         search=search, selected=[label for label in by_size if label in gained], main=top,
         probabilities=chances, groups=groups, hypothesis=selected, null=search.null, findings=findings,
-        whiteness=whiteness, unexplained=left_share(shrinkage), gained=gained, negligible=negligible,
+        whiteness=whiteness, unexplained=left_share(shrinkage, by_effects), gained=gained, negligible=negligible,
         probed=[] if left is None else left.probed, noise=noise, shrinkage=shrinkage,
     )  # fmt: skip
 

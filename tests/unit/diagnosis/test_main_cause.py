@@ -75,9 +75,9 @@ def shrinkage(after: float, floor: float = 0.15, recalibrated: float = 1.0) -> S
     return SimpleNamespace(after=after, floor=floor, recalibrated=recalibrated)
 
 
-def unknown(after: float, left: float, explained: float, evident: bool = True) -> float:
+def unknown(after: float, left: float, explained: float, evident: bool = True, taken: float = 9.0) -> float:
     search = SimpleNamespace(problem=SimpleNamespace(rules=SimpleNamespace(whiteness=True)))
-    return probability_unknown(search, True, evident, shrinkage(after), Remainder(explained, left, []), False)
+    return probability_unknown(search, True, evident, shrinkage(after), Remainder(explained, left, []), False, taken)
 
 
 def test_what_leaves_next_to_no_gap_is_not_unknown_however_many_nat_it_has():
@@ -88,9 +88,14 @@ def test_what_leaves_next_to_no_gap_is_not_unknown_however_many_nat_it_has():
 
 
 def test_a_wide_gap_is_unknown_where_a_sensor_s_small_error_has_nearly_all_the_nat():
-    assert left_share(shrinkage(0.8)) > 0.6
+    assert left_share(shrinkage(0.8), 9.0) > 0.6
     assert unknown(after=0.8, left=1e3, explained=1e6) > 0.6
     assert unknown(after=0.2, left=1e3, explained=1e6) == MORE_UNKNOWN
+
+
+def test_what_is_wider_than_the_effects_themselves_is_unknown_however_wrong_the_recalibrated_model_is():
+    assert left_share(shrinkage(1.2, recalibrated=3.3), taken=0.09) > 0.9
+    assert left_share(shrinkage(1.2, recalibrated=3.3), taken=9.0) < 0.2
 
 
 def test_as_likely_as_not_at_the_width_that_small_effects_leave():
