@@ -126,8 +126,7 @@ def screen(search: Search, beside: Hypothesis, most: int) -> list[Hypothesis]:
         hypothesis.set_innovations(beside.e, fitter.prior_weight)
         hypothesis.known = beside.columns if len(beside.free) else hypothesis.known
         tried.append(hypothesis)
-    rough = fitter.flown([(beside.free, beside.values, beside.nuisance)], quick=True)[0]
-    fitter.linearise(tried, coarse=True, rough=rough)
+    fitter.linearise(tried, coarse=True)
     new = len(beside.free)
 
     def shows(hypothesis: Hypothesis) -> bool:
@@ -138,7 +137,7 @@ def screen(search: Search, beside: Hypothesis, most: int) -> list[Hypothesis]:
         hypothesis.kink_step = THRESHOLD_STEP
         hypothesis.known = hypothesis.columns[:new]
     if hidden:
-        fitter.linearise(hidden, coarse=True, rough=rough)
+        fitter.linearise(hidden, coarse=True)
     shown = [c for c in tried if shows(c)]
     return sorted(shown, key=lambda hypothesis: -hypothesis.expected_evidence())[:most]
 

@@ -47,14 +47,13 @@ class Fitter:
         self.problem, self.gains, self.nuisance, self.temperature = problem, gains, nuisance, 1.0
         free, values = ([], np.zeros(0)) if at is None else (at.free, at.values)
         base = np.zeros(len(nuisance)) if at is None else at.nuisance
-        e0 = self.flown([(free, values, base)])[0]
-        mean_nis = float(e0 @ e0) / len(e0)
+        steps = NUISANCE_STEP * np.vstack([np.zeros(len(base)), np.eye(len(base))])
+        E = self.flown([(free, values, base + step) for step in steps])
+        mean_nis = float(E[0] @ E[0]) / E.shape[1]
         if temper and mean_nis > TEMPER_ABOVE:
             self.temperature = mean_nis
-            e0 /= np.sqrt(mean_nis)
-        self.base, self.e0 = base, e0
-        steps = NUISANCE_STEP * np.vstack([np.zeros(len(base)), np.eye(len(base))])
-        E = self.flown([(free, values, base + step) for step in steps], quick=True)
+            E /= np.sqrt(mean_nis)
+        self.base, self.e0 = base, E[0]
         self.J = (E[1:] - E[0]) / NUISANCE_STEP  # (nuisance, samples)
         self.A = self.J @ self.J.T + self.prior_weight * np.eye(len(base))
         self.chol = np.linalg.cholesky(self.A)
@@ -82,12 +81,8 @@ class Fitter:
         for hypothesis, e in zip(new, self.flown([(c.free, c.values, c.nuisance) for c in new]), strict=True):
             hypothesis.set_innovations(e, self.prior_weight)
 
-    def linearise(self, hypotheses: list["Hypothesis"], coarse: bool = False, rough: np.ndarray | None = None) -> None:
-        """The columns of every hypothesis's parameters where it stands, and the step they foresee.
-
-        rough: innovations of all of them, where they stand at one model, by the midpoint rule; columns are then taken
-        by that.
-        """
+    def linearise(self, hypotheses: list["Hypothesis"], coarse: bool = False) -> None:
+        """The columns of every hypothesis's parameters where it stands, and the step they foresee."""
         self.measure(hypotheses)
         points, steps = [], []
         for hypothesis in hypotheses:
@@ -98,15 +93,14 @@ class Fitter:
                 moved = hypothesis.values.copy()
                 moved[k] += size
                 points.append((hypothesis.free, moved, hypothesis.nuisance))
-        quick = rough is not None
-        E = iter(self.flown(points, quick))
+        E = iter(self.flown(points))
         tables = []
         for hypothesis, sizes in zip(hypotheses, steps, strict=True):
             known = len(hypothesis.known)
             table = np.empty((len(sizes) + 1, len(self.e0)))  # columns, and the innovations where it stands
             table[:known] = hypothesis.known if known else 0.0
             for k in range(known, len(sizes)):
-                table[k] = (next(E) - (rough if quick else hypothesis.e)) / sizes[k]
+                table[k] = (next(E) - hypothesis.e) / sizes[k]
             table[-1] = hypothesis.e
             hypothesis.known = np.empty((0, 0))
             tables.append(table)
@@ -139,10 +133,10 @@ class Fitter:
         self.linearise(hypotheses, coarse)
         self.move(hypotheses)
 
-    def flown(self, points: list[Point], quick: bool = False) -> np.ndarray:
-        """Innovations of models given as (free, values, nuisance), (points, samples); quick: by the midpoint rule."""
+    def flown(self, points: list[Point]) -> np.ndarray:
+        """Innovations of models given as (free, values, nuisance), (points, samples)."""
         models = [model_at(self.problem, [*self.nuisance, *free], np.concatenate([a, v])) for free, v, a in points]
-        E = self.problem.follow(models, self.gains, quick)
+        E = self.problem.follow(models, self.gains)
         if self.temperature != 1.0:
             E /= np.sqrt(self.temperature)
         return E

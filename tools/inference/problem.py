@@ -119,19 +119,16 @@ class Problem:
             K[first:last] = 0.0
         return replace(gains, K=K)
 
-    def follow(self, models: list[tuple[np.ndarray, np.ndarray]], gains: Gains, quick: bool = False) -> np.ndarray:
-        """Whitened innovations of models (P, F) with kept gains, (models, valid samples); quick: by the midpoint rule.
-
-        What the midpoint rule gets wrong is the same for models near each other: it does for their differences.
-        """
+    def follow(self, models: list[tuple[np.ndarray, np.ndarray]], gains: Gains) -> np.ndarray:
+        """Whitened innovations of models (P, F) with kept gains, (models, valid samples)."""
         r = self.recording
         places = np.concatenate([[0], np.cumsum(self.valid.sum(axis=1))])[r.bounds]
         E = np.empty((len(models), places[-1]))
         if models:
             self.kind.follow_runs(
                 np.array([P for P, _ in models]), np.array([F for _, F in models]), np.array(self.kind.drift), r.modes,
-                r.bounds, r.t, self.stamps, r.inputs, self.z, self.starts, gains.W, gains.K, quick, self.valid,
-                places, LOST, E,
+                r.bounds, r.t, self.stamps, r.inputs, self.z, self.starts, gains.W, gains.K, self.valid, places,
+                LOST, E,
             )  # fmt: skip
         return E
 

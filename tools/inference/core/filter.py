@@ -341,11 +341,11 @@ def posed(z):
 
 
 @kernel
-def follow_run(P, F, drift, mode, t, stamps, inputs, z, begin, end, start, W, K, quick, posed, X, path, E):
+def follow_run(P, F, drift, mode, t, stamps, inputs, z, begin, end, start, W, K, posed, X, path, E):
     """A model flown along rows begin .. end - 1 with the gains of filter_run: X, path and E as there.
 
-    Where the gains correct what the model lacks, too, it is followed with the state. quick: by the midpoint rule;
-    posed: whether the path is asked for, without which poses of another time cannot be read.
+    Where the gains correct what the model lacks, too, it is followed with the state. posed: whether the path is asked
+    for, without which poses of another time cannot be read.
     """
     Pw, x = np.empty(N_P), start.copy()
     effective_parameters(P, F, Pw)
@@ -359,7 +359,7 @@ def follow_run(P, F, drift, mode, t, stamps, inputs, z, begin, end, start, W, K,
         if i > begin:
             if posed:
                 pose_of(x, before)
-            propagate(Pw, F, x, mode, t, inputs, i, begin, lacking[:6], zero, work, kept, quick)
+            propagate(Pw, F, x, mode, t, inputs, i, begin, lacking[:6], zero, work, kept, False)
             if count > N_ERR:
                 step_lacking(drift, x, lacking, t[i] - t[i - 1])
             if posed:
@@ -379,11 +379,11 @@ def follow_run(P, F, drift, mode, t, stamps, inputs, z, begin, end, start, W, K,
 
 
 @parallel_kernel
-def follow_runs(Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, K, quick, valid, places, lost_at, E):
+def follow_runs(Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, K, valid, places, lost_at, E):
     """Whitened innovations of models Ps (models, N_P), Fs (models, N_F) with kept gains: E (models, samples).
 
-    Samples are what is `valid` (rows, N_Y), row by row; places (runs + 1): the first of each run. quick: by the
-    midpoint rule. What is larger than lost_at, or no number, is lost_at.
+    Samples are what is `valid` (rows, N_Y), row by row; places (runs + 1): the first of each run. What is
+    larger than lost_at, or no number, is lost_at.
     """
     models = Ps.shape[0]
     for n in prange(models * (len(bounds) - 1)):  # models of a run one after the other: its gains are then near
@@ -393,7 +393,7 @@ def follow_runs(Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, K
         X, path, rows = np.empty((end - begin, ef.N_XF)), np.empty((end - begin, N_PATH)), np.empty((end - begin, N_Y))
         follow_run(
             Ps[m], Fs[m], drift, modes[run], t[begin:end], stamps[begin:end], inputs[begin:end], z[begin:end], 0,
-            end - begin, starts[run], W[begin:end], K[begin:end], quick, posed(z[begin:end]), X, path, rows,
+            end - begin, starts[run], W[begin:end], K[begin:end], posed(z[begin:end]), X, path, rows,
         )  # fmt: skip
         at = places[run]
         for i in range(end - begin):
