@@ -8,9 +8,9 @@ import numpy as np
 from tools.diagnose.search import Search, without_extra_noise
 from tools.gap.measure import RunGap, case_channels, root_mean_square, run_gap
 from tools.inference.fit import NUISANCE_LIMIT, Hypothesis, bounded_step
-from tools.inference.model import nominal_model
+from tools.inference.model import effect_vector, nominal_model
 from tools.inference.parameters import model_at
-from tools.inference.predict import fly, predict
+from tools.inference.predict import fly, fly_windows_from, predict
 from tools.inference.problem import Problem, cut
 
 DRAWS = 2  # simulated repetitions that find the floor
@@ -141,6 +141,36 @@ def left_out_squares(search: Search, hypothesis: Hypothesis) -> np.ndarray:
     """A hypothesis's squared gaps on runs left out, (runs,), windows begun where its own filter stands."""
     runs, _ = gaps(search.problem, left_out(search, hypothesis), own_filter=True)
     return squares(runs)
+
+
+def lacking_squares(search: Search, hypothesis: Hypothesis) -> dict[str, np.ndarray]:
+    """By effect of a hypothesis, how much squared gaps on runs left out, (runs,), grow with a model that lacks it.
+
+    It lacks that one alone: all else stays as it was fitted, and windows begin where the whole model's filter stands.
+    """
+    problem = search.problem.as_recorded
+    found = {label: np.empty(len(problem.runs)) for label in hypothesis.labels}
+    nominal = effect_vector(problem.model)
+    for n, (P, F) in enumerate(left_out(search, hypothesis) if hypothesis.labels else []):
+        part = problem.part(n)
+        gains, listed = part.filter(P, F, begin=True), cut(part).listed[0]
+
+        def square(F: np.ndarray, part=part, P=P, gains=gains, listed=listed) -> float:
+            Y = fly_windows_from(part, P, F, gains)
+            return run_gap(part.kind.measures, part.runs[0], Y, listed).total ** 2
+
+        whole = square(F)
+        for label in hypothesis.labels:
+            without = F.copy()
+            entries = [free.entry for free in hypothesis.free if free.label == label]
+            without[entries] = nominal[entries]
+            found[label][n] = square(without) - whole
+    return found
+
+
+def in_tolerances(grown: np.ndarray) -> float:
+    """Root of the mean by which squared gaps (runs,) grow; 0 where they do not."""
+    return float(np.sqrt(max(grown.mean(), 0.0)))
 
 
 def most_often(taken: dict[str, np.ndarray]) -> dict[str, float]:

@@ -34,10 +34,15 @@ def probability(share: float, middle: float, width: float) -> float:
     return float(np.clip(norm.cdf(z), MORE_UNKNOWN, 1.0 - MORE_UNKNOWN))
 
 
-def left_share(shrinkage: Shrinkage) -> float:
-    """Of the recalibrated model's squared gap beyond the floor, the share that the selected effects leave."""
-    beyond = shrinkage.recalibrated**2 - shrinkage.floor**2
+def left_share(shrinkage: Shrinkage, taken: float) -> float:
+    """Of the squared gap beyond the floor without the selected effects, the share that they leave.
+
+    taken: by how much squared gaps grow with a model that lacks them, all else as fitted. What they leave is held
+    against that, or against the recalibrated model's, whichever is less: fitted to an effect that nobody knows, the
+    recalibrated model may miss more than the nominal one does.
+    """
     left = shrinkage.after**2 - shrinkage.floor**2
+    beyond = min(shrinkage.recalibrated**2 - shrinkage.floor**2, left + taken)
     return float(np.clip(left / beyond, 0.0, 1.0)) if beyond > 0.0 else 0.0
 
 
@@ -115,12 +120,13 @@ def clock_label(search: Search, hypothesis: Hypothesis) -> str:
 
 
 def probability_unknown(
-    search: Search, selected: bool, evident: bool, shrinkage: Shrinkage, left: Remainder | None, noise: bool
-) -> float:
+    search: Search, selected: bool, evident: bool, shrinkage: Shrinkage, left: Remainder | None, noise: bool,
+    taken: float,
+) -> float:  # fmt: skip
     """Probability that the gap is none of the catalogue's, or that there is one where none shows otherwise.
 
     selected, evident: whether any effect is, or is at least there; noise: the search knows of extra noise, which no
-    window's gap shows.
+    window's gap shows; taken: as in left_share.
     """
     if left is None:  # what is left was not asked about, or nothing is
         loose = not selected and not noise and shrinkage.after > max(LOOSE * shrinkage.floor, 1.0)
@@ -135,6 +141,6 @@ def probability_unknown(
         return wide
     shares = (
         probability(left.share, LEFT_OVER, LEFT_WIDTH),
-        probability(left_share(shrinkage), LEFT_GAP, LEFT_GAP_WIDTH),
+        probability(left_share(shrinkage, taken), LEFT_GAP, LEFT_GAP_WIDTH),
     )
     return max(wide * max(shares), MORE_UNKNOWN)

@@ -11,11 +11,30 @@ from tools.diagnose.matter import MATTERS, disorder_matters, gap_matters, moveme
 from tools.diagnose.noise_probes import CLOCK, ProbeResult, inflated
 from tools.diagnose.record import NONE, UNKNOWN, Finding
 from tools.diagnose.residuals import UNCLEAN, tests, worst
-from tools.diagnose.search import EVIDENCE_NEEDED, Search, advance_and_prune, converge, first_step, run, screen
-from tools.diagnose.shrink import Shrinkage, case_noise_floor, left_out_squares, most_often, shrink
+from tools.diagnose.search import (
+    EVIDENCE_NEEDED,
+    UNLIKE,
+    Search,
+    advance_and_prune,
+    converge,
+    first_step,
+    run,
+    screen,
+)
+from tools.diagnose.shrink import (
+    Shrinkage,
+    case_noise_floor,
+    in_tolerances,
+    lacking_squares,
+    left_out_squares,
+    most_often,
+    shrink,
+)
 from tools.diagnose.unknown import LEAST_UNKNOWN, clock_label, disorder, left_share, probability_unknown, remainder_of
 from tools.inference.fit import Hypothesis
+from tools.inference.levels import SENSORS, factors
 from tools.inference.parameters import CLOCK_PLACE
+from tools.inference.problem import Problem
 
 HELD_OUT_SHARE = 0.3  # of the gap that is left on runs left out: an effect beside another must close as much more
 TIE = 6.0  # nat within which two labels are not told apart: what a change of prior spreads can move
@@ -23,9 +42,9 @@ MOST_GROUP = 3
 ERROR_RATE = 0.03  # answers that named something else altogether, of those to the cases it was developed with: 3 of 104
 CERTAIN = 0.9  # of the recalibrated gap: effects beside an unknown one that leave more are not certain
 RIVALS = 5  # further labels fitted in the place of the main one, where it stands beside others
-# Floors by which an effect alone widens the gap, as likely a main cause as one of many small ones there: where others
-# are seen or something is left, and where it is all that can be seen; e-folds.
-LARGE, ALONE, LARGE_WIDTH = 1.7, 0.6, 0.4
+# Floors by which an effect widens the gap, as likely a main cause as one of many small ones there: where noise is not
+# what the file says, so that it may say little of the rest, and where it is; e-folds.
+LARGE, TOLD, LARGE_WIDTH = 2.1, 1.2, 0.25
 SECOND = 0.9  # of the main cause's probability, that none may have where there is an effect at all
 LIKELY = 1e-3  # probability from which an alternative's effect on the windows is looked at
 
@@ -87,8 +106,8 @@ class Worth:
     taken: dict[str, np.ndarray]  # by label, (runs,): by how much the squares grow without it
 
     def tolerances(self, label: str) -> float:
-        """The root of the mean; 0 where the gap does not grow, or for a label that was not asked about."""
-        return float(np.sqrt(max(self.taken[label].mean(), 0.0))) if label in self.taken else 0.0
+        """The root of the mean; 0 where the gap does not grow."""
+        return in_tolerances(self.taken[label])
 
     def share(self, label: str) -> float:
         """The same over the gap with all of them.
@@ -108,11 +127,8 @@ def held_out_worth(search: Search, hypothesis: Hypothesis) -> Worth:
     return Worth(whole, taken)
 
 
-def prune_effects(search: Search) -> tuple[Hypothesis, dict[str, float], Worth | None]:
-    """Backward elimination: the best hypothesis without what does not earn its place; nat that each effect brings.
-
-    Also what each is worth on runs left out, where that was asked: of one alone it was not.
-    """
+def prune_effects(search: Search) -> tuple[Hypothesis, dict[str, float]]:
+    """Backward elimination: the best hypothesis without what does not earn its place; nat that each effect brings."""
     hypothesis = search.best
     while hypothesis.labels:
         gains = {
@@ -122,20 +138,20 @@ def prune_effects(search: Search) -> tuple[Hypothesis, dict[str, float], Worth |
         weakest = min(gains, key=lambda label: gains[label])
         if gains[weakest] >= EVIDENCE_NEEDED:
             if len(hypothesis.labels) == 1:
-                return hypothesis, gains, None
+                return hypothesis, gains
             outside = held_out_worth(search, hypothesis)
             weakest = min(outside.taken, key=outside.tolerances)
             if outside.share(weakest) >= HELD_OUT_SHARE:
-                return hypothesis, gains, outside
+                return hypothesis, gains
         hypothesis = drop(search, hypothesis, weakest)
-    return hypothesis, {}, None
+    return hypothesis, {}
 
 
-def by_held_out_gap(search: Search) -> tuple[Hypothesis, dict[str, float], Worth | None]:
+def by_held_out_gap(search: Search) -> tuple[Hypothesis, dict[str, float]]:
     """The hypothesis of one effect, or of none, with the least gap on runs left out: what evidence is compared with."""
     tried = [search.null, *(hypothesis for hypothesis in search.hypotheses if len(hypothesis.labels) == 1)]
     best = min(tried, key=lambda hypothesis: float(left_out_squares(search, hypothesis).mean()))
-    return best, {label: best.log_evidence(search.fitter) for label in best.labels}, None
+    return best, {label: best.log_evidence(search.fitter) for label in best.labels}
 
 
 def try_rivals(search: Search, hypothesis: Hypothesis, main: str) -> None:
@@ -196,7 +212,7 @@ def conclude(
     `noise` is disorder that the search already knows of: turbulence, waves, or motion capture's clock.
     """
     problem = search.problem
-    evident, gained, worth = prune_effects(search) if problem.rules.evidence else by_held_out_gap(search)
+    evident, gained = prune_effects(search) if problem.rules.evidence else by_held_out_gap(search)
     search.hypotheses = [c for c in search.hypotheses if c is not evident] + ([evident] if evident.labels else [])
     search.gains = problem.filter(*search.model(evident), begin=True)
     findings = tests(problem, search.gains)
@@ -221,23 +237,25 @@ def conclude(
         elif disordered not in moved:
             small.append(disordered)
     negligible = {label: gained.pop(label) for label in small}
-    worth = held_out_worth(search, evident) if worth is None else worth
+    taken = lacking_squares(search, evident)
     calm = case_noise_floor(search, selected)["total"] if disordered else shrinkage.floor
-    if disordered and disordered not in worth.taken:
-        worth.taken[disordered] = np.full(len(problem.runs), max(shrinkage.after**2 - calm**2, 0.0))
+    if disordered and disordered not in taken:
+        taken[disordered] = np.full(len(problem.runs), max(shrinkage.after**2 - calm**2, 0.0))
     ranked = gained or negligible
-    main = max(ranked, key=worth.tolerances) if ranked else ""
+    sizes = {label: in_tolerances(squares) for label, squares in taken.items()}
+    by_size = sorted(ranked, key=lambda label: -sizes[label])
+    main = by_size[0] if ranked else ""
     by_search = problem.rules.evidence and not (noise is not None and main == disordered)
     if by_search and len(evident.labels) > 1:
         try_rivals(search, evident, main)
     chances = posterior(search, evident, main) if by_search else {main or NONE: 1.0}
-    chances = share_out(chances, main, most_often({label: worth.taken[label] for label in gained}))
+    chances = share_out(chances, main, most_often({label: taken[label] for label in gained}))
     chances = to_none(chances, negligible, movements_of_alternatives(search, evident, main, chances))
     if main in gained:
-        many = left is not None or len(evident.labels) > 1
-        floors = worth.tolerances(main) / max(calm, 1e-6)
-        chances = doubt_small(chances, main, floors / (LARGE if many else ALONE))
-    unknown = probability_unknown(search, bool(gained), bool(ranked), shrinkage, left, noise is not None)
+        floors = sizes[main] / max(calm, 1e-6)
+        chances = doubt_small(chances, main, floors / (TOLD if as_told(problem) else LARGE))
+    by_effects = sum(sizes[label] ** 2 for label in gained)
+    unknown = probability_unknown(search, bool(gained), bool(ranked), shrinkage, left, noise is not None, by_effects)
     if not gained and not gap_matters(shrinkage):
         unknown = LEAST_UNKNOWN
     chances = {name: value * (1.0 - unknown) for name, value in chances.items()} | {UNKNOWN: unknown}
@@ -250,11 +268,16 @@ def conclude(
             selected, shrinkage = search.null, shrink(search, search.null)
     groups = grouped(log_posteriors(search, evident, main)) if by_search else {main: [main]}
     return Answer(
-        search=search, selected=sorted(gained, key=worth.tolerances, reverse=True), main=top,
+        search=search, selected=[label for label in by_size if label in gained], main=top,
         probabilities=chances, groups=groups, hypothesis=selected, null=search.null, findings=findings,
-        whiteness=whiteness, unexplained=left_share(shrinkage), gained=gained, negligible=negligible,
+        whiteness=whiteness, unexplained=left_share(shrinkage, by_effects), gained=gained, negligible=negligible,
         probed=[] if left is None else left.probed, noise=noise, shrinkage=shrinkage,
     )  # fmt: skip
+
+
+def as_told(problem: Problem) -> bool:
+    """Whether the sensors' noise is what the file says."""
+    return all(abs(np.log(factor)) < UNLIKE for name, factor in factors(problem).items() if name in SENSORS)
 
 
 def share_out(chances: dict[str, float], main: str, first: dict[str, float]) -> dict[str, float]:

@@ -24,6 +24,8 @@ STUCK = 0.2  # misfit that a tenth of a step's promise must be worth, for parame
 STUCK_TRIED = 2  # hypotheses at most, the best of those that are stuck
 SIDE_STEPS = (0.001, 0.004, 0.015, 0.06)  # of a spread, either way: a delay's misfit has steps, no slope leads on
 
+Point = tuple[list[FreeParameter], np.ndarray, np.ndarray]  # what is free, its values, the nuisance parameters'
+
 
 class Fitter:
     """Fits at one set of gains."""
@@ -116,9 +118,10 @@ class Fitter:
         for hypothesis in short:
             for share in SHORTER_STEPS:
                 hypothesis.offer(next(E), *hypothesis.step(share), self.prior_weight)
+        least = min((c.best[0] for c in hypotheses), default=np.inf)
         stuck = [c for c in short if c.misfit - c.best[0] < SHORTER_STEPS[-1] * c.expected_fall() > STUCK]
         stuck = sorted(stuck, key=lambda c: c.misfit)[:STUCK_TRIED]
-        points = [(hypothesis, *point) for hypothesis in stuck for point in hypothesis.side_steps()]
+        points = [(c, *point) for c in stuck for point in c.side_steps(c.misfit - c.expected_fall() <= least)]
         aside = self.flown([(c.free, v, a) for c, v, a in points])
         for (hypothesis, values, nuisance), e in zip(points, aside, strict=True):
             hypothesis.offer(e, values, nuisance, self.prior_weight)
@@ -130,12 +133,13 @@ class Fitter:
         self.linearise(hypotheses, coarse)
         self.move(hypotheses)
 
-    def flown(self, points: list[tuple[list[FreeParameter], np.ndarray, np.ndarray]]) -> np.ndarray:
+    def flown(self, points: list[Point]) -> np.ndarray:
         """Innovations of models given as (free, values, nuisance), (points, samples)."""
         models = [model_at(self.problem, [*self.nuisance, *free], np.concatenate([a, v])) for free, v, a in points]
-        if not models:
-            return np.empty((0, len(self.e0)))
-        return self.problem.follow(models, self.gains) / np.sqrt(self.temperature)
+        E = self.problem.follow(models, self.gains)
+        if self.temperature != 1.0:
+            E /= np.sqrt(self.temperature)
+        return E
 
 
 def bounded_step(normal: np.ndarray, slope: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
@@ -202,8 +206,11 @@ class Hypothesis:
         moved = np.clip(self.values + share * self.full_step[count:], self.low, self.high)
         return moved, self.nuisance + share * self.full_step[:count]
 
-    def side_steps(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Points (values, nuisance) where the whole step brings nothing: without each parameter, and each alone."""
+    def side_steps(self, hopeful: bool) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Points (values, nuisance) where the whole step brings nothing: without each parameter, and each delay alone.
+
+        hopeful: what the step promises would make it the best, or no delay is tried alone.
+        """
         count, points = len(self.nuisance), []
         for k in range(count, len(self.slope)):
             rest = np.delete(np.arange(len(self.slope)), k)
@@ -211,6 +218,8 @@ class Hypothesis:
             low, high = self.room
             step[rest] = bounded_step(self.normal[np.ix_(rest, rest)], self.slope[rest], low[rest], high[rest])
             points.append((self.values + step[count:], self.nuisance + step[:count]))
+            if not (hopeful and self.free[k - count].delays):
+                continue
             for aside in (sign * size for size in SIDE_STEPS for sign in (-1.0, 1.0)):
                 values = self.values.copy()
                 values[k - count] += aside

@@ -37,6 +37,11 @@ class FreeParameter:
         """Whether it begins at 0 and does nothing, or something else, on the other side."""
         return self.low == 0.0 or self.high == 0.0
 
+    @property
+    def delays(self) -> bool:
+        """Whether it shifts a column in time: the misfit then has steps."""
+        return self.label in catalogue() and catalogue()[self.label].subsystem == "timing"
+
 
 def nuisance_parameters(problem: Problem) -> list[FreeParameter]:
     """What the nominal model allows for: parameters within [uncertainty], and a constant bias of each sensor."""

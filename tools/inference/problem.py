@@ -128,17 +128,16 @@ class Problem:
 
     def follow(self, models: list[tuple[np.ndarray, np.ndarray]], gains: Gains) -> np.ndarray:
         """Whitened innovations of models (P, F) with kept gains, (models, valid samples)."""
-        r, out = self.recording, []
-        block = max(1, int(2e7 // self.z.size))
-        for n in range(0, len(models), block):
-            part = models[n : n + block]
-            E = np.empty((len(part), *self.z.shape))
+        r = self.recording
+        places = np.concatenate([[0], np.cumsum(self.valid.sum(axis=1))])[r.bounds]
+        E = np.empty((len(models), places[-1]))
+        if models:
             self.kind.follow_runs(
-                np.array([P for P, _ in part]), np.array([F for _, F in part]), np.array(self.kind.drift), r.modes,
-                r.bounds, r.t, self.stamps, r.inputs, self.z, self.starts, gains.W, gains.K, E,
+                np.array([P for P, _ in models]), np.array([F for _, F in models]), np.array(self.kind.drift), r.modes,
+                r.bounds, r.t, self.stamps, r.inputs, self.z, self.starts, gains.W, gains.K, self.valid, places,
+                LOST, E,
             )  # fmt: skip
-            out.append(np.clip(np.nan_to_num(E[:, self.valid], nan=LOST), -LOST, LOST))
-        return np.concatenate(out)
+        return E
 
     def part(self, run: int) -> "Problem":
         """One of its runs as a problem of its own."""

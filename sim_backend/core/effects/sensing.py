@@ -59,12 +59,13 @@ def read(F, x, y):
     y[ef.Y_MOCAP_ROLL], y[ef.Y_MOCAP_PITCH], y[ef.Y_MOCAP_YAW] = roll, pitch, yaw
     y[ef.Y_ROLL] = roll - x[ef.X_LAG] + F[ef.ROLL_BIAS]
     y[ef.Y_PITCH] = (1.0 + F[ef.PITCH_SCALE]) * (pitch - x[ef.X_LAG + 1]) + F[ef.PITCH_BIAS]
-    compass = F[ef.COMPASS_S1] * math.sin(yaw) + F[ef.COMPASS_C1] * math.cos(yaw)
-    compass += F[ef.COMPASS_S2] * math.sin(2.0 * yaw) + F[ef.COMPASS_C2] * math.cos(2.0 * yaw)
-    y[ef.Y_YAW] = yaw - x[ef.X_LAG + 2] + compass
+    y[ef.Y_YAW] = yaw - x[ef.X_LAG + 2]
+    if F[ef.COMPASS_S1] != 0.0 or F[ef.COMPASS_C1] != 0.0 or F[ef.COMPASS_S2] != 0.0 or F[ef.COMPASS_C2] != 0.0:
+        y[ef.Y_YAW] += F[ef.COMPASS_S1] * math.sin(yaw) + F[ef.COMPASS_C1] * math.cos(yaw)
+        y[ef.Y_YAW] += F[ef.COMPASS_S2] * math.sin(2.0 * yaw) + F[ef.COMPASS_C2] * math.cos(2.0 * yaw)
     for i in range(3):
         y[ef.Y_P + i] = (1.0 + F[ef.GYRO_SCALE]) * x[X_NU + 3 + i] + F[ef.GYRO_P + i]
-    lever = F[ef.DEPTH_LEVER] * math.sin(pitch)
+    lever = F[ef.DEPTH_LEVER] * math.sin(pitch) if F[ef.DEPTH_LEVER] != 0.0 else 0.0
     y[ef.Y_DEPTH] = (1.0 + F[ef.DEPTH_SCALE]) * (x[X_DOWN] - lever - x[ef.X_LAG_DEPTH]) + F[ef.DEPTH_OFFSET]
     y[ef.Y_DEPTH] += F[ef.GAUGE_TANK] * x[X_BALLAST]
     y[ef.Y_SLIDER] = backlash(x[ef.X_GEAR_SLIDER], x[X_SLIDER], F[ef.SLIDER_PLAY])

@@ -6,7 +6,7 @@ from scipy.optimize import lsq_linear
 from support.cases import make_case
 
 from sim_backend.core.effects import effect_layout as ef
-from tools.inference.fit import Fitter, bounded_step
+from tools.inference.fit import SIDE_STEPS, Fitter, bounded_step
 from tools.inference.parameters import effect_parameters, model_at, nuisance_parameters
 from tools.inference.problem import problem_of
 
@@ -69,3 +69,13 @@ def test_log_evidence_is_that_of_a_linear_gaussian_model(fitter):
         assert one_step == pytest.approx(closed, rel=1e-9)
     _, logdet = np.linalg.slogdet(J @ J.T / fitter.prior_weight + np.eye(len(J)))
     assert fitter.occam == pytest.approx(logdet, rel=1e-9)
+
+
+def test_only_delays_are_tried_aside_and_only_where_they_might_win(fitter):
+    known = effect_parameters(fitter.problem)
+    free = [*known["command_delay"], *known["drag"]]
+    hypothesis = fitter.hypothesis(("command_delay", "drag"), free)
+    fitter.linearise([hypothesis])
+    assert [f.delays for f in free] == [True] + [False] * (len(free) - 1)
+    assert len(hypothesis.side_steps(hopeful=False)) == len(free)
+    assert len(hypothesis.side_steps(hopeful=True)) == len(free) + 2 * len(SIDE_STEPS)

@@ -9,7 +9,7 @@ from support.cases import make_case
 from sim_backend.core.effects import effect_layout as ef
 from tools.diagnose.record import NONE
 from tools.diagnose.search import run
-from tools.diagnose.shrink import most_often
+from tools.diagnose.shrink import in_tolerances, lacking_squares, most_often
 from tools.diagnose.unknown import (
     MORE_UNKNOWN,
     UNFIT,
@@ -19,7 +19,7 @@ from tools.diagnose.unknown import (
     left_share,
     probability_unknown,
 )
-from tools.diagnose.verdict import SECOND, Worth, conclude, doubt_small, share_out
+from tools.diagnose.verdict import SECOND, Worth, conclude, doubt_small, held_out_worth, share_out
 from tools.inference.problem import problem_of
 
 
@@ -27,7 +27,17 @@ def test_worth_is_the_root_of_what_the_gap_grows_by():
     worth = Worth(np.array([1.0, 1.0]), {"drag": np.array([3.0, 5.0]), "lift": np.array([-0.1, 0.0])})
     assert worth.tolerances("drag") == pytest.approx(2.0)
     assert worth.share("drag") == pytest.approx(2.0)
-    assert worth.tolerances("lift") == worth.tolerances("never asked") == 0.0
+    assert worth.tolerances("lift") == 0.0
+
+
+def test_an_effect_is_as_large_as_it_is_where_what_is_allowed_could_take_it(tmp_path):
+    F = np.zeros(ef.N_F)
+    F[ef.NET_MASS_OFFSET], F[ef.PITCH_TRIM] = 0.02, 0.3
+    search = run(problem_of(make_case(tmp_path, F, seed=4)))
+    found = next(one for one in search.ranked() if set(one.labels) == {"net_buoyancy", "pitch_trim"})
+    refitted = held_out_worth(search, found).tolerances("net_buoyancy")
+    lacking = {label: in_tolerances(grown) for label, grown in lacking_squares(search, found).items()}
+    assert lacking["net_buoyancy"] > 1.3 * refitted
 
 
 def test_an_effect_that_takes_most_in_every_run_is_first_in_every_draw():
@@ -65,9 +75,9 @@ def shrinkage(after: float, floor: float = 0.15, recalibrated: float = 1.0) -> S
     return SimpleNamespace(after=after, floor=floor, recalibrated=recalibrated)
 
 
-def unknown(after: float, left: float, explained: float, evident: bool = True) -> float:
+def unknown(after: float, left: float, explained: float, evident: bool = True, taken: float = 9.0) -> float:
     search = SimpleNamespace(problem=SimpleNamespace(rules=SimpleNamespace(whiteness=True)))
-    return probability_unknown(search, True, evident, shrinkage(after), Remainder(explained, left, []), False)
+    return probability_unknown(search, True, evident, shrinkage(after), Remainder(explained, left, []), False, taken)
 
 
 def test_what_leaves_next_to_no_gap_is_not_unknown_however_many_nat_it_has():
@@ -78,9 +88,14 @@ def test_what_leaves_next_to_no_gap_is_not_unknown_however_many_nat_it_has():
 
 
 def test_a_wide_gap_is_unknown_where_a_sensor_s_small_error_has_nearly_all_the_nat():
-    assert left_share(shrinkage(0.8)) > 0.6
+    assert left_share(shrinkage(0.8), 9.0) > 0.6
     assert unknown(after=0.8, left=1e3, explained=1e6) > 0.6
     assert unknown(after=0.2, left=1e3, explained=1e6) == MORE_UNKNOWN
+
+
+def test_what_is_wider_than_the_effects_themselves_is_unknown_however_wrong_the_recalibrated_model_is():
+    assert left_share(shrinkage(1.2, recalibrated=3.3), taken=0.09) > 0.9
+    assert left_share(shrinkage(1.2, recalibrated=3.3), taken=9.0) < 0.2
 
 
 def test_as_likely_as_not_at_the_width_that_small_effects_leave():

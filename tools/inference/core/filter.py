@@ -35,7 +35,7 @@ from tools.inference.core.error_layout import (
     Q_LATE,
     Q_POS,
 )
-from tools.inference.core.gain import corrections, take_measurement, whitened
+from tools.inference.core.gain import take_gain, take_measurement, take_valid
 from tools.inference.core.lacking import (
     L_GYRO,
     N_LACKING,
@@ -53,6 +53,7 @@ from tools.inference.core.step import (
     log_path,
     pose_of,
     propagate,
+    read_now,
     read_row,
 )
 
@@ -110,8 +111,16 @@ def linear_step(Pw, F, x, acc, mode, t, inputs, i, begin, zero, work, kept, move
 
 @kernel
 def linear_reading(F, x, t, stamps, path, i, begin, moved, error, y, y2, H):
-    """H (N_Y, N_ERR), the derivative of what is read at row i, y (N_Y), by the state."""
+    """H (N_Y, N_ERR), the derivative of what is read at row i, y (N_Y), by the state.
+
+    Where no correction of a reading is fitted, none depends on the speeds u, v, w.
+    """
+    still = int(F[ef.LINK]) <= ef.ACTUATOR_LINKS
     for j in range(N_ERR):
+        if still and E_NU <= j < E_NU + 3:
+            for m in range(N_Y):
+                H[m, j] = 0.0
+            continue
         perturbed(x, j, error, moved)
         read_row(F, moved, t, stamps, path, i, begin, y2)
         for m in range(N_Y):
@@ -221,9 +230,8 @@ def lost(x, cov):
 
 @kernel
 def apply_gain(W, K, d, x, error, e):
-    """Whiten a row's innovations d into e, correct x by them, return their sum of squares."""
-    total = whitened(W, d, e)
-    corrections(K, e, error)
+    """Whiten a row's innovations d into e, correct x by them, return their sum of squares; d is used up."""
+    total = take_gain(W, K, d, error, e)
     inject_error(x, error)
     return total
 
@@ -255,10 +263,21 @@ def filter_runs(
 
 
 @kernel
-def follow_run(P, F, drift, mode, t, stamps, inputs, z, begin, end, start, W, K, X, path, E):
+def posed(z):
+    """Whether motion capture saw anything of rows z (rows, N_Y)."""
+    for i in range(len(z)):
+        for m in range(ef.Y_ONBOARD, N_Y):
+            if not math.isnan(z[i, m]):
+                return True
+    return False
+
+
+@kernel
+def follow_run(P, F, drift, mode, t, stamps, inputs, z, begin, end, start, W, K, posed, X, path, E):
     """A model flown along rows begin .. end - 1 with the gains of filter_run: X, path and E as there.
 
-    Where the gains correct what the model lacks, too, it is followed with the state.
+    Where the gains correct what the model lacks, too, it is followed with the state. posed: whether the path is asked
+    for, without which poses of another time cannot be read.
     """
     Pw, x = np.empty(N_P), start.copy()
     effective_parameters(P, F, Pw)
@@ -270,12 +289,17 @@ def follow_run(P, F, drift, mode, t, stamps, inputs, z, begin, end, start, W, K,
         path[begin, n] = 0.0
     for i in range(begin, end):
         if i > begin:
-            pose_of(x, before)
+            if posed:
+                pose_of(x, before)
             propagate(Pw, F, x, mode, t, inputs, i, begin, lacking[:6], zero, work, kept, False)
             if count > N_ERR:
                 step_lacking(drift, x, lacking, t[i] - t[i - 1])
-            log_path(x, before, path, i, begin)
-        read_row(F, x, t, stamps, path, i, begin, y)
+            if posed:
+                log_path(x, before, path, i, begin)
+        if posed:
+            read_row(F, x, t, stamps, path, i, begin, y)
+        else:
+            read_now(F, x, t[i] - t[begin], y)
         innovation(z[i], y, d)
         if count > N_ERR:
             take_gyro_bias(lacking, d)
@@ -287,15 +311,20 @@ def follow_run(P, F, drift, mode, t, stamps, inputs, z, begin, end, start, W, K,
 
 
 @parallel_kernel
-def follow_runs(Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, K, E):
-    """Whitened innovations E (models, rows, N_Y) of models Ps (models, N_P), Fs (models, N_F) with kept gains."""
-    runs = len(bounds) - 1
-    for n in prange(Ps.shape[0] * runs):
-        m, run = n // runs, n % runs
+def follow_runs(Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, K, valid, places, lost_at, E):
+    """Whitened innovations of models Ps (models, N_P), Fs (models, N_F) with kept gains: E (models, samples).
+
+    Samples are what is `valid` (rows, N_Y), row by row; places (runs + 1): the first of each run. What is
+    larger than lost_at, or no number, is lost_at.
+    """
+    models = Ps.shape[0]
+    for n in prange(models * (len(bounds) - 1)):  # models of a run one after the other: its gains are then near
+        m, run = n % models, n // models
         begin, end = bounds[run], bounds[run + 1]
         # scratch of this run alone; indices count from its first row
-        X, path = np.empty((end - begin, ef.N_XF)), np.empty((end - begin, N_PATH))
+        X, path, rows = np.empty((end - begin, ef.N_XF)), np.empty((end - begin, N_PATH)), np.empty((end - begin, N_Y))
         follow_run(
             Ps[m], Fs[m], drift, modes[run], t[begin:end], stamps[begin:end], inputs[begin:end], z[begin:end], 0,
-            end - begin, starts[run], W[begin:end], K[begin:end], X, path, E[m, begin:end],
+            end - begin, starts[run], W[begin:end], K[begin:end], posed(z[begin:end]), X, path, rows,
         )  # fmt: skip
+        take_valid(rows, valid[begin:end], lost_at, E[m, places[run] : places[run + 1]])

@@ -52,7 +52,7 @@ def fly_followed(Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, 
         X, path, E = np.empty((end - begin, ef.N_XF)), np.empty((end - begin, N_PATH)), np.empty((end - begin, N_Y))
         follow_run(
             Ps[m], Fs[m], drift, modes[run], t[begin:end], stamps[begin:end], inputs[begin:end], z[begin:end], 0,
-            end - begin, starts[run], W[begin:end], K[begin:end], X, path, E,
+            end - begin, starts[run], W[begin:end], K[begin:end], True, X, path, E,
         )  # fmt: skip
         for w in range(len(first)):
             if run_of[w] == run:

@@ -54,16 +54,12 @@ def take_measurement(H, cov, R, d, HC, HT, S, L, W, K):
                 total += HC[n, a] * W[m, n]
             K[a, m] = total
     for a in range(count):
-        for b in range(count):
-            total = 0.0
+        for b in range(a + 1):
+            total = 0.5 * (cov[a, b] + cov[b, a])
             for m in range(readings):
-                total += K[a, m] * K[b, m]
-            cov[a, b] -= total
-    for a in range(count):
-        for b in range(a):
-            mean = 0.5 * (cov[a, b] + cov[b, a])
-            cov[a, b] = mean
-            cov[b, a] = mean
+                total -= K[a, m] * K[b, m]
+            cov[a, b] = total
+            cov[b, a] = total
     logarithm = 0.0
     for m in range(readings):
         if not math.isnan(d[m]):
@@ -72,28 +68,43 @@ def take_measurement(H, cov, R, d, HC, HT, S, L, W, K):
 
 
 @kernel
-def whitened(W, d, e):
-    """Innovations d (m), NaN where nothing was measured, whitened by W (m, m) into e (m); their sum of squares."""
-    total = 0.0
+def take_gain(W, K, d, error, e):
+    """Whiten a row's innovations d (m) by W (m, m) into e (m); what they correct the state by, K (n, m), into error (n).
+
+    Returns the sum of squares. d is used up, and NaN where nothing was measured: there W is the identity, K is 0.
+    """
+    total, seen = 0.0, 0  # readings from `seen` on were not measured
     for m in range(len(d)):
+        e[m] = 0.0
         if math.isnan(d[m]):
             e[m] = math.nan
+            d[m] = 0.0
+        else:
+            seen = m + 1
+    for m in range(seen - 1, -1, -1):
+        if math.isnan(e[m]):
             continue
         value = 0.0
         for n in range(m + 1):
-            if not math.isnan(d[n]):
-                value += W[m, n] * d[n]
+            value += W[m, n] * d[n]
         e[m] = value
+        d[m] = value
         total += value * value
+    for a in range(len(error)):
+        value = 0.0
+        for m in range(seen):
+            value += K[a, m] * d[m]
+        error[a] = value
     return total
 
 
 @kernel
-def corrections(K, e, error):
-    """What whitened innovations e (m) correct the state by, K (n, m), into error (n)."""
-    for a in range(len(error)):
-        value = 0.0
-        for m in range(len(e)):
-            if not math.isnan(e[m]):
-                value += K[a, m] * e[m]
-        error[a] = value
+def take_valid(rows, valid, lost_at, samples):
+    """What is `valid` (rows, m) of rows (rows, m), row by row, into samples; beyond lost_at, or no number: lost_at."""
+    at = 0
+    for i in range(rows.shape[0]):
+        for m in range(rows.shape[1]):
+            if valid[i, m]:
+                value = rows[i, m]
+                samples[at] = min(max(value, -lost_at), lost_at) if not math.isnan(value) else lost_at
+                at += 1

@@ -44,7 +44,7 @@ from sim_backend.ocean.core.layout import (
     Y_ROLL,
     Y_SPEED,
 )
-from tools.inference.core.gain import corrections, take_measurement, whitened
+from tools.inference.core.gain import take_gain, take_measurement, take_valid
 
 
 @kernel
@@ -134,8 +134,7 @@ def filter_run(P, F, spectral, R, t, inputs, z, begin, end, start, spread, X, pa
             d[m] = z[i, m] - y[m]
         reading_derivative(x, inputs, i, H)
         misfit += take_measurement(H, cov, R, d, HC, HT, S, L, W[i], K[i])
-        misfit += whitened(W[i], d, E[i])
-        corrections(K[i], E[i], error)
+        misfit += take_gain(W[i], K[i], d, error, E[i])
         for n in range(N_ERR):
             x[n] += error[n]
         x[X_SPEED] = max(x[X_SPEED], 0.0)
@@ -169,8 +168,7 @@ def follow_run(P, F, t, inputs, z, begin, end, start, W, K, X, E):
         read_state(P, F, x, inputs, i, y)
         for m in range(N_Y):
             d[m] = z[i, m] - y[m]
-        whitened(W[i], d, E[i])
-        corrections(K[i], E[i], error)
+        take_gain(W[i], K[i], d, error, E[i])
         for n in range(N_ERR):
             x[n] += error[n]
         x[X_SPEED] = max(x[X_SPEED], 0.0)
@@ -179,17 +177,18 @@ def follow_run(P, F, t, inputs, z, begin, end, start, W, K, X, E):
 
 
 @parallel_kernel
-def follow_runs(Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, K, E):
-    """Whitened innovations E (models, rows, N_Y) of models Ps (models, N_P), Fs (models, N_F) with kept gains."""
-    runs = len(bounds) - 1
-    for n in prange(Ps.shape[0] * runs):
-        m, run = n // runs, n % runs
+def follow_runs(Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, K, valid, places, lost_at, E):
+    """Whitened innovations of models Ps (models, N_P), Fs (models, N_F) with kept gains: as core/filter.follow_runs."""
+    models = Ps.shape[0]
+    for n in prange(models * (len(bounds) - 1)):
+        m, run = n % models, n // models
         begin, end = bounds[run], bounds[run + 1]
-        X = np.empty((end - begin, N_X))
+        X, rows = np.empty((end - begin, N_X)), np.empty((end - begin, N_Y))
         follow_run(
             Ps[m], Fs[m], t[begin:end], inputs[begin:end], z[begin:end], 0, end - begin, starts[run], W[begin:end],
-            K[begin:end], X, E[m, begin:end],
+            K[begin:end], X, rows,
         )  # fmt: skip
+        take_valid(rows, valid[begin:end], lost_at, E[m, places[run] : places[run + 1]])
 
 
 @kernel

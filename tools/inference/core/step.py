@@ -112,15 +112,21 @@ def pose_of(x, before):
 
 
 @kernel
+def read_now(F, x, since, y):
+    """What is read at x, `since` s into the run, into y (N_Y); motion capture of now."""
+    read(F, x, y)
+    link = int(F[ef.LINK])
+    if link > ef.ACTUATOR_LINKS:
+        y[link - ef.ACTUATOR_LINKS - 1] += correction(F, x, since, 0.0)
+
+
+@kernel
 def read_row(F, x, t, stamps, path, i, begin, y):
     """What is read at row i, into y (N_Y); motion capture at its own time, along the path flown.
 
     stamps (rows): the times that the poses which stand in the rows were stamped with, s.
     """
-    read(F, x, y)
-    link = int(F[ef.LINK])
-    if link > ef.ACTUATOR_LINKS:
-        y[link - ef.ACTUATOR_LINKS - 1] += correction(F, x, t[i] - t[begin], 0.0)
+    read_now(F, x, t[i] - t[begin], y)
     at = stamps[i] - mocap_lateness(F, x[ef.X_LATE], stamps[i] - t[begin])
     if at == t[i] or i == begin:
         return
