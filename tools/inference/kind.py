@@ -93,6 +93,7 @@ class Kind:
     form_share: float = 0.0
     one_group: Callable[[Collection[str]], tuple[str, ...]] = _none  # labels that these readings never tell apart
     odds: Mapping[str, float] = field(default_factory=dict)  # of labels that are seldom the cause: nat
+    regime: Callable[[Run], np.ndarray] | None = None  # how a run was flown, in what makes a difference to the model
     learned_runs: int = 4  # of the first, from which a watch without a reference learns what all share
     growth_matters: float = 0.1  # the same of what grows slowly
     matters: float = 0.1  # tolerances: what moves no channel of any window so far is no gap (docs/GAP.md)

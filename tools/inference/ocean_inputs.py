@@ -19,6 +19,7 @@ ROLLED = radians(20.0)  # in a turn the lift is not upright
 SURFACE = 5.0  # m
 UNSEEN = 120.0  # s from the nearest sample of the water
 HOLE = 65.0  # s between rows
+OTHER_DEPTH, OTHER_PITCH, OTHER_OIL = 100.0, radians(3.0), 4e-5  # m, rad, m3: flown otherwise
 BEFORE, AFTER = 20.0, 60.0  # s about what is not steady: speed settles in some 20 s, wings and oil in less
 
 
@@ -83,6 +84,20 @@ def spread_out(t: np.ndarray, state: np.ndarray) -> np.ndarray:
     since = np.where(last >= 0, t - where[np.maximum(last, 0)], np.inf)
     until = np.where(follows < len(where), where[np.minimum(follows, len(where) - 1)] - t, np.inf)
     return (since <= AFTER) | (until <= BEFORE)
+
+
+def regime(run: Run) -> np.ndarray:
+    """How a run was flown, (5,): depth reached, pitch and oil volume of dive and climb, in units that make a difference.
+
+    NaN where it did not glide that way.
+    """
+    t, steady = run.t, ~unsteady(run)
+    pitch, oil = (drawn(t, run.columns[name])[0] for name in (names.ATTITUDE[1], names.OIL))
+    found = [float(np.nanmax(run.columns[names.DEPTH])) / OTHER_DEPTH]
+    for way in (steady & (pitch < 0.0), steady & (pitch > 0.0)):
+        angle, volume = (float(np.median(one[way])) if way.any() else np.nan for one in (pitch, oil))
+        found += [angle / OTHER_PITCH, volume / OTHER_OIL]
+    return np.array(found)
 
 
 def input_table(run: Run) -> np.ndarray:

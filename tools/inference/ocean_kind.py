@@ -19,7 +19,7 @@ from tools.inference.core.ocean import (
     simulate_runs,
 )
 from tools.inference.kind import Kind, Reading
-from tools.inference.ocean_inputs import input_table
+from tools.inference.ocean_inputs import input_table, regime
 
 FIRST_SPEED = 0.2  # m/s
 APART = 29.0  # s at least between readings that are looked at
@@ -114,6 +114,7 @@ OCEAN = Kind(
     unread=_unread,
     form_share=0.1,
     odds=RARE,
+    regime=regime,
     one_group=_one_group,
     learned_runs=24,
     growth_matters=0.75,

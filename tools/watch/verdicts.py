@@ -1,5 +1,6 @@
 """From events to an answer: does a change matter, is its label the cause, how large is it, and in which runs."""
 
+import warnings
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +21,7 @@ MOST_SURE = 0.995
 FEW = 3  # runs of a reference from which it can be learned what runs differ by
 FORM = 0.06  # of a size, 1 sigma: nature's form is not the catalogue's (docs/WATCH.md)
 CI90 = 1.645
+OTHERWISE = 2.0  # times
 LOOKED_AT = 2  # runs of an event in which it has to matter
 VECTORS = ("gyro_bias", "current", "current_shear", "compass")  # labels whose parameters are parts of one length
 
@@ -117,9 +119,30 @@ def matters(history: History, event: Event, number: int) -> bool:
 
 
 def needed_of(history: History, event: Event) -> float:
-    """Tolerances by which a change has to move a channel."""
+    """Tolerances by which a change has to move a channel: twice as many where its runs were flown otherwise.
+
+    A law of drag or lift that is not nature's shows when pitch, buoyancy or depth change, in all runs alike.
+    """
     kind = history.flights.parts[0].kind
-    return kind.growth_matters if event.span.course == GROWING else kind.matters
+    needed = kind.growth_matters if event.span.course == GROWING else kind.matters
+    return needed * (OTHERWISE if flown_otherwise(history, event.span) else 1.0)
+
+
+def flown_otherwise(history: History, span: Span) -> bool:
+    """Whether the runs of a span were flown by another pitch, buoyancy or to another depth than those learned from."""
+    flights = history.flights
+    regime = flights.parts[0].kind.regime
+    if regime is None:
+        return False
+    flown = np.array([regime(part.runs[0]) for part in flights.parts])
+    inside = (span.weights(flights.count) > 0.0) & history.judged
+    usual = flights.reference & ~inside
+    if not usual.any():
+        return False
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # a way that no run flew
+        apart = np.abs(np.nanmedian(flown[inside], axis=0) - np.nanmedian(flown[usual], axis=0))
+    return bool(np.nanmax(apart, initial=0.0) > 1.0)
 
 
 def moved_by(history: History, event: Event, number: int, n: int) -> float:

@@ -69,7 +69,7 @@ def take_measurement(H, cov, R, d, HC, HT, S, L, W, K):
 
 @kernel
 def take_gain(W, K, d, error, e):
-    """Whiten a row's innovations d (m) by W (m, m) into e (m); what they correct the state by, K (n, m), into error (n).
+    """Whiten a row's innovations d (m) by W (m, m) into e (m); what K (n, m) corrects by them into error (n).
 
     Returns the sum of squares. d is used up, and NaN where nothing was measured: there W is the identity, K is 0.
     """
