@@ -87,7 +87,7 @@ def spread_out(t: np.ndarray, state: np.ndarray) -> np.ndarray:
 
 
 def regime(run: Run) -> np.ndarray:
-    """How a run was flown, (5,): depth reached, pitch and oil volume of dive and climb, in units that make a difference.
+    """How a run was flown, (5,): depth reached, pitch and oil of dive and climb, in units that make a difference.
 
     NaN where it did not glide that way.
     """
