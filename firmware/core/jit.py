@@ -17,7 +17,8 @@ from pathlib import Path
 
 PACKAGES_DIR = Path(__file__).resolve().parents[2]
 KERNEL_DIRS = (
-    "firmware/core", "sim_backend/core", "sim_backend/foreign", "sim_backend/ocean/core", "tools/inference/core", "tools/identify/core",
+    "firmware/core", "sim_backend/core", "sim_backend/foreign", "sim_backend/ocean/core",
+    "tools/inference/core", "tools/identify/core",
 )  # fmt: skip
 CONSTANT_FILES = ("hal/ports.py",)  # no kernels, but places in the frame that the kernels freeze
 KEEP_CACHES = 3

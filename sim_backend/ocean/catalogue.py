@@ -64,6 +64,16 @@ EFFECTS = (
 )
 # fmt: on
 
+# What hardly ever changes at sea, against what often does (growth, a lost wing, a bent sensor, ballast, a fouled cell):
+# log odds, nat. 8 are a thousand to three; where readings ask for them all the same, they win.
+RARE = dict.fromkeys(
+    ("ballast_scale", "ballast_leak", "compressibility", "thermal_expansion", "attitude_lag", "climb_dive_asymmetry"),
+    -8.0,
+)
+
+# Of depth rate alone one is the other: each changes the speed at a pitch, by a law that is known to a tenth at best.
+ONE_ON_DEPTH = ("drag", "lift", "attitude_scale")
+
 NOT_ASKED = {
     "depth_scale": "on depth rate it is drag",
     "inertia": "attitude is measured, not predicted",

@@ -1,4 +1,4 @@
-"""An ocean glider's vehicle file, and its way into the parameter vector of the kernels (docs/OCEAN.md, Vehicle files)."""
+"""An ocean glider's vehicle file, and its way into the kernels' parameter vector (docs/OCEAN.md, Vehicle files)."""
 
 from importlib.resources import files
 from typing import Annotated, Literal
@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 import msgspec
 import numpy as np
 
+from firmware.model.vehicle import Assumed
 from hal.strict import Table, decode
 from sim_backend.ocean.core import layout
 
@@ -119,7 +120,7 @@ RELATIVE = ("volume", "Cd0", "Cd1", "lift_slope")
 
 
 class OceanIdentified(Table):
-    """[identified]: what the numbers were found from, and how sure they are together; rows of `covariance` (n, n), SI."""
+    """[identified]: what the numbers were found from, and how sure they are together: `covariance` (n, n), SI."""
 
     runs: Annotated[int, msgspec.Meta(ge=1)]
     from_vehicle: Annotated[str, msgspec.Meta(max_length=1000)]
@@ -156,7 +157,7 @@ class OceanVehicle(Table):
     identified: OceanIdentified | None = None
 
     @property
-    def assumed(self) -> dict[str, object]:
+    def assumed(self) -> dict[str, Assumed]:
         """An ocean glider's file says what is assumed by [uncertainty] alone."""
         return {}
 

@@ -20,8 +20,11 @@ from tools.data.errors import extras, missing_extra
 ROOT = Path(__file__).resolve().parents[2]
 DRIVER = ROOT / "tests" / "support" / "every_command.py"
 PACKAGES = ("firmware", "hal", "sim_backend", "tools")
-NOT_ON_THE_GLIDER = {"matplotlib", "scipy", "jinja2", "pandas", "polars", "pytest", "hypothesis"}
-BROUGHT = ("analysis", "bench", "campaign", "identify")
+NOT_ON_THE_GLIDER = {
+    "matplotlib", "scipy", "jinja2", "pandas", "polars", "xarray", "h5netcdf", "gsw", "dbdreader", "pytest",
+    "hypothesis",
+}  # fmt: skip
+BROUGHT = ("analysis", "bench", "campaign", "identify", "ocean", "slocum")
 
 # In this order, each with the extra that it asks for; None: it does its work without any.
 CALLS: tuple[tuple[str, str | None], ...] = (
@@ -34,6 +37,11 @@ CALLS: tuple[tuple[str, str | None], ...] = (
     ("log repair flight.mcap --out mended.mcap", None),
     ("import csv log.csv --map map.toml --out imported", None),
     ("import qualisys capture.tsv --out captured", "analysis"),
+    ("import slocum one.dbd one.ebd --out slocum", "slocum"),
+    ("import seaglider p0010001.nc --out seaglider", "ocean"),
+    ("import seaexplorer sea001.1.gli.sub.1 sea001.1.pld1.sub.1 --out seaexplorer", "ocean"),
+    ("import og1 mission.nc --out og1", "ocean"),
+    ("export og1 case --out mission.nc", "ocean"),
     ("vehicle new mine.toml", None),
     ("vehicle show mine.toml", None),
     ("simulate commands.csv --out simulated.csv", None),

@@ -107,6 +107,7 @@ def predict(run: Path, model: str, out: Path, vehicle: str | None) -> None:
 @json_option
 def diagnose(case: Path, out: Path, without: str | None, vehicle: str | None, as_json: bool) -> None:
     """Where the simulator is wrong about CASE, which effect causes it, and how far the gap shrinks with it."""
+    from sim_backend.ocean.vehicle import OceanVehicle
     from tools.data.errors import need
     from tools.data.runs.case import load_case
     from tools.diagnose.diagnosis import diagnose as run_diagnosis
@@ -117,6 +118,9 @@ def diagnose(case: Path, out: Path, without: str | None, vehicle: str | None, as
 
     need("analysis")
     loaded = load_case(case, vehicle)
+    if isinstance(loaded.vehicle, OceanVehicle):
+        _diagnose_ocean(loaded, out, as_json)
+        return
     done = 0
     with progress("diagnose", STEPS) as advance:
 
@@ -138,6 +142,27 @@ def diagnose(case: Path, out: Path, without: str | None, vehicle: str | None, as
         say(f"note: {caution}")
     say(sentence(record))
     say(f"answer: {out / 'diagnosis.json'}, report: {out / 'report.html'}")
+
+
+def _diagnose_ocean(case, out: Path, as_json: bool) -> None:
+    """The same of an ocean glider (docs/OCEAN.md, Diagnosis)."""
+    from tools.watch.whole_case import diagnose_ocean, plain, write
+
+    found = diagnose_ocean(case, lambda text: print(text, file=sys.stderr))
+    write(found, out)
+    answer = plain(found)
+    for caution in answer["cautions"]:
+        say(f"note: {caution}")
+    if as_json:
+        print_json(answer)
+    else:
+        gap_table = answer["gap"]
+        click.echo(f"{found.verdict}: {', '.join(answer['selected']) or 'nothing beyond what the vehicle file allows'}")
+        for cause in answer["causes"][:4]:
+            click.echo(f"  {cause['probability']:.2f} {cause['label']}  group {', '.join(cause['group'])}")
+        click.echo("gap " + ", ".join(f"{name} {gap_table[name]['total']:.2f}" for name in
+                                      ("before", "recalibrated", "after", "floor")))  # fmt: skip
+    say(f"answer: {out / 'diagnosis.json'}")
 
 
 @gap.command()

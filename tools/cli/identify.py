@@ -72,9 +72,10 @@ def _identify_ocean(case, out: Path | None, as_json: bool) -> None:
         print_json(plain(found))
         return
     click.echo(f"{'':<18} {'mean':>11} {'sd':>9}   {'90 % interval':<24} unit")
-    for one in [*found.parameters, found.net_mass]:
-        low, high = one.ci90
-        click.echo(f"{one.name:<18} {one.mean:>11.5g} {one.sd:>9.2g}   {f'{low:.5g} to {high:.5g}':<24} {one.unit}")
+    for number in [*found.parameters, found.net_mass]:
+        low, high = number.ci90
+        interval = f"{low:.5g} to {high:.5g}"
+        click.echo(f"{number.name:<18} {number.mean:>11.5g} {number.sd:>9.2g}   {interval:<24} {number.unit}")
     for ridge in found.ridges:
         click.echo(ridge.sentence())
     if found.next_run is not None:

@@ -5,11 +5,16 @@ from pathlib import Path
 import click
 
 from tools.cli.common import json_option, print_json, say
+from tools.cli.import_ocean import COMMANDS
 
 
 @click.group("import")
 def import_() -> None:
     """Bring other recordings into run data."""
+
+
+for _command in COMMANDS:
+    import_.add_command(_command)
 
 
 @import_.command("csv")

@@ -17,6 +17,7 @@ COMMANDS = {
     "twin": ("tools.cli.twin", "twin", "twins of a board's devices on virtual serial ports"),
     "log": ("tools.cli.log", "log", "export, look into or repair an onboard log"),
     "import": ("tools.cli.import_", "import_", "bring other recordings into run data"),
+    "export": ("tools.cli.export", "export", "write a case in a format that others read"),
     "gap": ("tools.cli.gap", "gap", "measure and predict: where simulation and sea disagree"),
     "vehicle": ("tools.cli.vehicle", "vehicle", "a first vehicle file by question and answer; a vehicle at a glance"),
     "identify": ("tools.cli.identify", "identify", "parameters and their distribution from runs (MCMC)"),

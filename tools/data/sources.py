@@ -52,7 +52,7 @@ def _load(wanted: str, kind: str, folder: str, decode: Callable[[str, str], T], 
 
 
 def load_vehicle(wanted: str, base: Path | None = None) -> Vehicle:
-    """A vehicle by shipped name or path; `base` is the folder of the file that names it. ConfigError for another kind."""
+    """A vehicle by shipped name or path; `base` is the folder of the file that names it. ConfigError: another kind."""
     found = load_any_vehicle(wanted, base)
     if isinstance(found, OceanVehicle):
         raise ConfigError(wanted, "an ocean glider: this command flies or asks a ROUGHIE-like vehicle", key="kind")

@@ -15,7 +15,7 @@ from tools.inference.model import Model, effect_vector
 from tools.inference.ocean_inputs import lacking
 from tools.inference.problem import Problem, problem_of
 
-FORM = 0.03  # of a speed, 1 sigma: laws of drag and lift are not nature's
+FORM, MEASURED = 0.03, 0.005  # of a speed, 1 sigma: laws of drag and lift are not nature's; where it was measured
 PITCH_NOISE = 0.005  # rad, 1 sigma from row to row
 HEADING = 0.035  # rad, 1 sigma of a compass that was looked after
 OUT_OF_MODEL = 0.15  # m/s, 1 sigma where the vehicle does not fly steadily
@@ -54,7 +54,8 @@ def of_run(part: Problem) -> Velocity:
     P, F = part.model.P, effect_vector(part.model)
     gains = part.filter(P, F)
     u, w = components(gains.X)
-    var_u, var_w = np.square(FORM * u), np.square(FORM * w)
+    form = MEASURED if part.seen[at.Y_SPEED] else FORM
+    var_u, var_w = np.square(form * u), np.square(form * w)
     for direction in directions(part.model):
         other = part.filter(P + direction, F)
         moved_u, moved_w = components(other.X)

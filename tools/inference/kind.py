@@ -3,8 +3,8 @@
 Recordings, problems, filters and predictions take all of it from here; docs/ADDING.md, A vehicle kind.
 """
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -43,6 +43,11 @@ class Input:
     position: str | None = None  # column of what was seen moving; None: nothing sees it
     reading: int = -1  # its place in y
     unseen: tuple[float, float] | None = None  # where it is neither: spread, and spectral density of its walk
+
+
+def _none(seen: Collection[str]) -> tuple[str, ...]:
+    """No labels."""
+    return ()
 
 
 @dataclass(frozen=True)
@@ -84,6 +89,10 @@ class Kind:
     input_table: Callable[[Run], np.ndarray] | None = None  # (rows, inputs) of a kind whose inputs are measured
     # t (rows,) s, runs' bounds (runs + 1,), inputs: (rows, N_Y) bool, the readings that the observer does not look at
     unread: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray] | None = None
+    # of what an effect explains, by which another may explain less and still be it: a law of drag is not nature's
+    form_share: float = 0.0
+    one_group: Callable[[Collection[str]], tuple[str, ...]] = _none  # labels that these readings never tell apart
+    odds: Mapping[str, float] = field(default_factory=dict)  # of labels that are seldom the cause: nat
     learned_runs: int = 4  # of the first, from which a watch without a reference learns what all share
     growth_matters: float = 0.1  # the same of what grows slowly
     matters: float = 0.1  # tolerances: what moves no channel of any window so far is no gap (docs/GAP.md)

@@ -1,4 +1,4 @@
-"""What drives an ocean glider's model row by row, and where the vehicle does not fly steadily (docs/OCEAN.md, Steady)."""
+"""What drives an ocean glider's model row by row, and where it does not fly steadily (docs/OCEAN.md, Steady)."""
 
 from math import radians
 

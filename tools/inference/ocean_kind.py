@@ -1,11 +1,12 @@
 """Ocean gliders as a kind of vehicle: attitude and buoyancy engine measured, depth predicted (docs/OCEAN.md)."""
 
 import itertools
+from collections.abc import Collection
 from math import radians
 
 import numpy as np
 
-from sim_backend.ocean.catalogue import catalogue
+from sim_backend.ocean.catalogue import ONE_ON_DEPTH, RARE, catalogue
 from sim_backend.ocean.core import layout as at
 from tools.data.runs import columns as names
 from tools.inference.channels import DEGREES, Channel, Measures
@@ -65,6 +66,11 @@ def _unread(t: np.ndarray, bounds: np.ndarray, inputs: np.ndarray) -> np.ndarray
     return found
 
 
+def _one_group(seen: Collection[str]) -> tuple[str, ...]:
+    """Labels that are one without a measured speed."""
+    return () if {"speed", "north"} & set(seen) else ONE_ON_DEPTH
+
+
 OCEAN = Kind(
     name="ocean",
     measures=OCEAN_MEASURES,
@@ -106,6 +112,9 @@ OCEAN = Kind(
     simulate_runs=simulate_runs,
     input_table=input_table,
     unread=_unread,
+    form_share=0.1,
+    odds=RARE,
+    one_group=_one_group,
     learned_runs=12,
     growth_matters=1.0,
     matters=0.5,

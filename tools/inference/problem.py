@@ -84,6 +84,11 @@ class Problem:
         """Which readings these runs have at all, bool of shape (N_Y,)."""
         return np.asarray(self.valid.any(axis=0))
 
+    @property
+    def one_group(self) -> tuple[str, ...]:
+        """Labels that these runs' readings cannot tell apart, whatever the evidence."""
+        return self.kind.one_group([r.name for r, seen in zip(self.kind.readings, self.seen, strict=True) if seen])
+
     def filter(
         self, P: np.ndarray, F: np.ndarray, roughness: float = 1.0, begin: bool = False, more=None, doubt=None,
         speeds=None,

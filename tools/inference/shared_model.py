@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from tools.inference.expansion import Expansion, expand
 from tools.inference.fit import SHORTER_STEPS, bounded_step
 from tools.inference.problem import Problem
-from tools.inference.expansion import Expansion, expand
 from tools.inference.shared_parameters import SharedParameters
 
 ROUGHNESS = (100.0, 10.0, 1.0, 1.0, 1.0)  # of each step

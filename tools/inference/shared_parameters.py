@@ -4,7 +4,8 @@ The shared values are no cause: they make up for whatever the runs have in commo
 effects that cannot be told apart from each other all stand among them.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -25,6 +26,8 @@ class SharedParameters:
     labels: dict[str, list[int]]  # places of each label's parameters in `free`
     limited: dict[str, list[tuple[float, float]]]  # limits of each label's own parameters, spreads
     allowed: float = ALLOWED_PRIOR  # 1 sigma of what the file allows for, of its own
+    odds: Mapping[str, float] = field(default_factory=dict)  # log odds of labels before any run, nat
+    effects: float = EFFECT_PRIOR  # 1 sigma of every label's entry
 
     @property
     def count(self) -> int:
@@ -33,7 +36,7 @@ class SharedParameters:
     @cached_property
     def prior(self) -> np.ndarray:
         """1 sigma of each shared value, in its spreads, (count,)."""
-        return np.array([self.allowed if one.label == NUISANCE else EFFECT_PRIOR for one in self.free])
+        return np.array([self.allowed if one.label == NUISANCE else self.effects for one in self.free])
 
     @cached_property
     def low(self) -> np.ndarray:
@@ -97,4 +100,4 @@ def shared_parameters(problem: Problem) -> SharedParameters:
                 places[one.entry] = len(free)
                 free.append(one)
             labels[label].append(places[one.entry])
-    return SharedParameters(free, labels, limited)
+    return SharedParameters(free, labels, limited, odds=problem.kind.odds)

@@ -80,7 +80,7 @@ def vertical_water(problem: Problem, P: np.ndarray, F: np.ndarray, steady: Stead
 
 
 def first_guess(problem: Problem) -> np.ndarray:
-    """P with the volume and the drag that steady rows ask for: one by search, the other by the median ratio of speeds."""
+    """P with volume and drag as steady rows ask for: the one by search, the other by the median ratio of speeds."""
     steady = steady_rows(problem)
     P, F = problem.model.P.copy(), np.zeros(at.N_F)
     if len(steady.rows) < LEAST:

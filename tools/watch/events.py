@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tools.inference.fit import bounded_step
 from tools.inference.expansion import Expansion
+from tools.inference.fit import bounded_step
 from tools.inference.shared_parameters import SharedParameters
 
 STEP, GROWING = "step", "growing"
@@ -140,5 +140,6 @@ class Joint:
             size = np.zeros(len(columns))
         gain = -float(slope @ size + 0.5 * size @ precision @ size)
         halved = np.log(2.0) * sum((low == 0.0) | (high == 0.0))
-        evidence = gain - 0.5 * float(np.linalg.slogdet(precision)[1]) + float(halved)
+        prior = float(halved) + self.shared.odds.get(label, 0.0)
+        evidence = gain - 0.5 * float(np.linalg.slogdet(precision)[1]) + prior
         return Change(label, span, size, precision, evidence, gain)

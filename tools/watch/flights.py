@@ -4,12 +4,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tools.inference.expansion import Expansion, expand
 from tools.inference.fit import bounded_step
 from tools.inference.problem import Problem
-from tools.inference.expansion import Expansion, expand
-from tools.watch.scatter import learn_scatter, without_deviation
 from tools.inference.shared_model import fit_shared, heat_of
 from tools.inference.shared_parameters import SharedParameters
+from tools.watch.scatter import learn_scatter, without_deviation
 
 LEAST_SIZE = 1e-6  # spreads by which runs may differ
 

@@ -1,10 +1,10 @@
 """What happened over the runs, as far as it is found: events, and what the runs fly by with them."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from collections.abc import Mapping
 from sim_backend.core.effects.base import Effect
 from tools.diagnose.noise_probes import NoiseProbe
 from tools.watch.disorder import WATER, shaken
@@ -89,15 +89,16 @@ def earns_place(history: History, event: Event | Change) -> bool:
     for other in history.events:
         theirs = other.span.weights(count) > 0.0
         mostly_there = (own & theirs).sum() >= 0.5 * own.sum()
-        if mostly_there and akin(history, event.label, other.label, own & theirs) and event.evidence < FURTHER * other.explained:
+        less = event.evidence < FURTHER * other.explained
+        if mostly_there and less and akin(history, event.label, other.label, own & theirs):
             return False
     return True
 
 
 def akin(history: History, one: str, other: str, runs: np.ndarray) -> bool:
-    """Whether two labels move the same readings alike at all, in any of the runs (bool): else one is no form of the other.
+    """Whether two labels move the same readings at all, in any of the runs (bool).
 
-    Disorder is akin to everything.
+    If not, one is no form of the other. Disorder is akin to everything.
     """
     flights, labels = history.flights, history.flights.shared.labels
     if one not in labels or other not in labels:

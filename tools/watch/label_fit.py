@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tools.inference.expansion import at_kink, columns_at
 from tools.inference.fit import EFFECT_STEP, FIRST_STEP, bounded_step
 from tools.inference.problem import Problem
-from tools.inference.expansion import at_kink, columns_at
 from tools.inference.shared_parameters import SharedParameters
 
 STEPS = 5

@@ -5,15 +5,17 @@ from dataclasses import replace
 
 import numpy as np
 
+from tools.inference.expansion import Expansion, expand
 from tools.inference.fit import bounded_step
 from tools.watch.events import GROWING, STEP, Change, Joint, Span
-from tools.inference.expansion import Expansion, expand
 from tools.watch.flights import Flights, numbers
 from tools.watch.history import Event, History, akin, within
 from tools.watch.label_fit import Affected, LabelFit, best_fit, cost_of, values_of
 
 FITTED = 3  # runs in which rivals are fitted
+SMALL = 20  # labels of a catalogue that can be tried whole
 LINEAR_TRIED, ROUGH_TRIED = 4, 5  # labels: by the parabolas of the filter as it is, and by rough ones
+ORDER = 0.1  # of what a label is behind, that stays even where the form may be why
 FINAL = 3  # rivals that are compared over all spans
 BEHIND, BEHIND_SHARE = 40.0, 0.1  # squared sigma, and share of what the best gains, that a rival may be behind
 POORLY = 0.1  # of the excess: what the best of the first rivals may leave before more are tried
@@ -32,7 +34,8 @@ def refined(history: History, joint: Joint, best: Change, changes: Sequence[Chan
     same = [one for one in changes if one.span == best.span and akin(history, one.label, best.label, inside_state)]
     same.sort(key=lambda one: -one.evidence)
     nothing = cost_of(affected, shared, best.label, np.zeros(len(best.size)))
-    fits = {one.label: best_fit(affected, shared, one.label, one.size, False) for one in same[:LINEAR_TRIED]}
+    tried = LINEAR_TRIED if len(shared.labels) > SMALL else len(same)
+    fits = {one.label: best_fit(affected, shared, one.label, one.size, False) for one in same[:tried]}
     samples = sum(flights.raw[n].samples for n in chosen)
     least = min(fits.values(), key=lambda fit: fit.cost)
     promised = sum(max(flights.excess(n), 0.0) for n in chosen)
@@ -54,10 +57,22 @@ def refined(history: History, joint: Joint, best: Change, changes: Sequence[Chan
         found[found.index(winner)] = winner = other
     winner.rivals = {event.label: event.evidence for event in found}
     # labels that were behind already count as far behind as they were in the runs of the fit
+    odds = {fit.label: shared.odds.get(fit.label, 0.0) for fit in ranked}
     for fit in ranked:
-        winner.rivals.setdefault(fit.label, winner.evidence - 0.5 * (fit.cost - ranked[0].cost))
+        own = winner.evidence - 0.5 * (fit.cost - ranked[0].cost) + odds[fit.label] - odds[winner.label]
+        winner.rivals.setdefault(fit.label, own)
     winner.explained = 0.5 * gained * len(inside) / max(1, len(chosen))
+    winner.rivals = by_cause(winner, odds, flights.parts[0].kind.form_share)
     return winner
+
+
+def by_cause(event: Event, odds: dict[str, float], form_share: float) -> dict[str, float]:
+    """Log evidence of labels where a share of what the change explains is left to the form of each."""
+    best, alike = event.rivals[event.label] - odds[event.label], form_share * event.explained
+    return {
+        label: best - max(best - (value - odds[label]) - alike, ORDER * (best - value + odds[label])) + odds[label]
+        for label, value in event.rivals.items()
+    }
 
 
 def by_other_course(history: History, joint: Joint, event: Event) -> Event | None:
@@ -120,7 +135,8 @@ def over_spans(history: History, joint: Joint, span: Span, fit: LabelFit) -> Eve
         halved = float(np.log(2.0) * ((low == 0.0) | (high == 0.0)).sum())
         outside = np.maximum(low - size, 0.0) + np.maximum(size - high, 0.0)
         lost = 0.5 * float(outside @ np.linalg.solve(covariance, outside)) if outside.any() else 0.0
-        found[one] = tried.log_evidence - joint.log_evidence + halved - lost, np.clip(size, low, high), covariance
+        prior = halved - lost + shared.odds.get(fit.label, 0.0)
+        found[one] = tried.log_evidence - joint.log_evidence + prior, np.clip(size, low, high), covariance
     if not found:
         return None
     best = max(found, key=lambda one: found[one][0])

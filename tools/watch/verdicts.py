@@ -155,11 +155,14 @@ def probabilities(one: Settled) -> dict[str, float]:
     return dict(sorted(scaled.items(), key=lambda item: -item[1]))
 
 
-def group_of(one: Settled) -> list[str]:
+def group_of(history: History, one: Settled) -> list[str]:
     """The labels that these runs cannot tell apart from the change's own, itself first."""
     if one.label is None:
         return []
     rivals = one.event.rivals
+    alike = history.flights.parts[0].one_group
+    if one.label in alike:
+        return [one.label, *(label for label in alike if label != one.label)]
     near = [label for label in rivals if rivals[one.label] - rivals[label] <= TIE and label != one.label]
     return [one.label, *sorted(near, key=lambda label: -rivals[label])]
 
@@ -236,8 +239,8 @@ def event_answer(history: History, one: Settled, names: list[str]) -> EventAnswe
     chance = known if one.label else one.probability * unknown
     last = None if still else names[inside[-1]]
     return EventAnswer(
-        one.label, where_of(history, one), group_of(one), names[inside[0]], last, course, float(chance), sized(history, one),
-        sizes,
+        one.label, where_of(history, one), group_of(history, one), names[inside[0]], last, course, float(chance),
+        sized(history, one), sizes,
     )  # fmt: skip
 
 
@@ -254,7 +257,8 @@ def run_verdict(history: History, settled: list[Settled], n: int, name: str, gap
         for label, chance in probabilities(one).items():
             if chance * inside > 0.01 or label == one.label:
                 own = sized(history, one, weight) if label == one.label else Sized(None, None, None)
-                causes.append(RunCause(label, chance * inside, group_of(one) if label == one.label else [label], own))
+                group = group_of(history, one) if label == one.label else [label]
+                causes.append(RunCause(label, chance * inside, group, own))
     causes.sort(key=lambda cause: -cause.probability)
     verdict = CAUSE if causes else (UNKNOWN if unknown else NONE)
     return RunVerdict(name, verdict, causes, gap, None)

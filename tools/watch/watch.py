@@ -11,16 +11,16 @@ from tools.data.runs.run import Run
 from tools.gap.measure import run_gap
 from tools.inference.predict import fly
 from tools.inference.problem import Problem, cut, problem_of
+from tools.inference.shared_parameters import shared_parameters
 from tools.watch.answer import NONE, RunVerdict, Watch
 from tools.watch.events import GROWING
 from tools.watch.flights import Flights
 from tools.watch.history import History
 from tools.watch.search import find_events
-from tools.inference.shared_parameters import shared_parameters
 from tools.watch.usable import ASKED, readings_of, usable, usable_dive
 from tools.watch.verdicts import FEW, event_answer, matters, run_verdict, settle
 
-FIRST_SHARE = 3  # without a reference: one run in so many, as many as their kind asks for at most, are where learning begins
+FIRST_SHARE = 3  # without a reference learning begins with one run in so many, at most as many as their kind says
 
 
 def watch(case: Case, reference: Case | None = None, say: Callable[[str], None] = lambda text: None) -> Watch:
@@ -98,7 +98,7 @@ def looked_at(
 
 
 def unchanged(history: History, learned_from: np.ndarray) -> np.ndarray:
-    """The runs before the first event and behind those that ended, (runs,) bool; `learned_from` where none begins there.
+    """The runs before the first event and behind those that ended, (runs,) bool; else `learned_from`.
 
     What does not matter is no event, and what grows slowly from the first runs on is not theirs alone.
     """

@@ -3,7 +3,7 @@
 Attitude is an input, measured with errors of its own, not a state (docs/OCEAN.md, Model).
 """
 
-# --- vehicle, P ------------------------------------------------------------------------------------------------------
+# --- vehicle, P ---
 MASS = 0  # kg
 VOLUME = 1  # m3, of the hull at the surface at the reference temperature, the buoyancy engine at its zero
 COMPRESSIBILITY = 2  # 1/Pa, of the hull
@@ -24,14 +24,14 @@ WATER_TIME = 16  # s, in which vertical water forgets itself
 ROLL_TIME = 17  # s, the same of the roll
 N_P = 18
 
-# --- effects, F (0 is no effect) ---------------------------------------------------------------------------------------
+# --- effects, F (0 is no effect) ---
 F_DRAG, F_INDUCED, F_LIFT, F_CLIMB_DIVE = 0, 1, 2, 3
 F_NET_MASS, F_LEAK, F_OIL_SCALE, F_COMPRESSIBILITY, F_EXPANSION = 4, 5, 6, 7, 8
 F_DENSITY, F_PITCH_BIAS, F_PITCH_SCALE, F_ATTITUDE_LAG, F_ROLL_TRIM = 9, 10, 11, 12, 13
 F_SPEED_BIAS = 14  # m/s, of the speed that was measured
 N_F = 15
 
-# --- state, x: its errors are its differences --------------------------------------------------------------------------
+# --- state, x: its errors are its differences ---
 X_DEPTH = 0  # m
 X_SPEED = 1  # m/s, along the path through the water
 X_WATER = 2  # m/s, of the water, down positive
@@ -39,15 +39,15 @@ X_ROLL = 3  # rad, beside the trim
 X_GLIDE = 4  # rad, angle of the path through the water, up positive: for the readings, no error of its own
 N_X, N_ERR = 5, 4
 
-# --- inputs of a row ---------------------------------------------------------------------------------------------------
+# --- inputs of a row ---
 U_PITCH, U_PITCH_RATE, U_YAW, U_ROLL, U_OIL, U_DENSITY, U_TEMPERATURE, U_UNSTEADY = 0, 1, 2, 3, 4, 5, 6, 7
 N_U = 8
 
-# --- readings, y -------------------------------------------------------------------------------------------------------
+# --- readings, y ---
 Y_DEPTH, Y_ROLL, Y_SPEED, Y_NORTH, Y_EAST = 0, 1, 2, 3, 4
 N_Y = 5
 
-# --- densities of process noise ------------------------------------------------------------------------------------------
+# --- densities of process noise ---
 Q_DEPTH = 0  # m2/s, walk of the depth: noise of the pitch, fast vertical water
 Q_WATER = 1  # (m/s)2/s, of the vertical water
 Q_ROLL = 2  # rad2/s

@@ -5,7 +5,7 @@ import pytest
 
 from hal.strict import ConfigError
 from tools.data.errors import InputError
-from tools.data.runs.case import CASE_FILE, SensorsPart, load_case, load_case_of_run, write_case
+from tools.data.runs.case import CASE_FILE, SensorsPart, load_case, load_case_of_run, load_runs, write_case
 from tools.data.runs.run import Run
 from tools.data.sources import load_vehicle
 
@@ -144,3 +144,16 @@ def test_all_reference_cases_load(shared):
         assert case.runs
         assert all(run.rows > 100 for run in case.runs)
         assert case.motion_capture == any(run.has_mocap for run in case.runs)
+
+
+def test_a_case_of_many_runs_numbers_them_all_with_as_many_digits(tmp_path):
+    runs = [Run("", None, {"t_s": np.array([0.0, 1.0]), "pitch_rad": np.array([0.1, n / 1000])}) for n in range(101)]
+    files = write_case(
+        tmp_path / "c", runs, vehicle="roughie", site="pool", log_rate_hz=1.0, water_density_kg_m3=1000.0,
+        beside={"mission.csv": b"run,hours_since_start\n"},
+    )  # fmt: skip
+    assert [files[0].name, files[100].name] == ["run000.csv", "run100.csv"]
+    assert (tmp_path / "c" / "mission.csv").read_bytes() == b"run,hours_since_start\n"
+    assert [run.columns["pitch_rad"][1] for run in load_case(tmp_path / "c").runs] == [n / 1000 for n in range(101)]
+    table, again = load_runs(tmp_path / "c")
+    assert (table.vehicle, len(again)) == ("roughie", 101)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from tools.inference.parameters import NUISANCE, FreeParameter
-from tools.watch.events import GROWING, STEP, Joint, Span, spans
 from tools.inference.expansion import Expansion
-from tools.watch.scatter import learn_scatter, log_marginal, without_deviation
+from tools.inference.parameters import NUISANCE, FreeParameter
 from tools.inference.shared_parameters import SharedParameters
+from tools.watch.events import GROWING, STEP, Joint, Span, spans
+from tools.watch.scatter import learn_scatter, log_marginal, without_deviation
 
 RUNS, SEEN = 10, 40  # rows of each run's Jacobian
 FREE = [

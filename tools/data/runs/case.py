@@ -10,10 +10,10 @@ import msgspec
 
 from firmware.model.vehicle import Assumed, DisturbanceTable, NonNegative, SensorsTable, SensorTable, Vehicle
 from hal.strict import MAX_BYTES, Table, decode
+from sim_backend.ocean.vehicle import OceanVehicle
 from tools.data.errors import InputError
 from tools.data.runs import csvfile
 from tools.data.runs.run import Run, load_run, run_name, write_run
-from sim_backend.ocean.vehicle import OceanDisturbance, OceanSensors, OceanVehicle
 from tools.data.sources import load_any_vehicle, read_text
 
 CASE_FILE = "case.toml"
@@ -68,8 +68,8 @@ class Case:
     water_density_kg_m3: float
     motion_capture: bool
     runs: list[Run]
-    sensors: SensorsTable | OceanSensors  # the vehicle's, with the case's entries in their place
-    disturbance: DisturbanceTable | OceanDisturbance
+    sensors: Any  # SensorsTable or OceanSensors: the vehicle's, with the case's entries in their place
+    disturbance: Any  # DisturbanceTable or OceanDisturbance
     assumed: dict[str, Assumed] = field(default_factory=dict)  # the vehicle's and the case's own
 
     @property
@@ -142,12 +142,17 @@ def load_case(folder: Path | str, vehicle: str | None = None) -> Case:
     vehicle: a shipped name or a file that stands in for the vehicle that the case names.
     """
     folder = Path(folder)
+    return _assemble(folder, *load_runs(folder), vehicle)
+
+
+def load_runs(folder: Path) -> tuple[CaseTable, list[Run]]:
+    """case.toml and all runs of a case, without its vehicle; InputError or ConfigError as load_case."""
     table = _read_case_file(folder)
     files = _run_files(folder)
     if len(files) != table.runs:
         message = f"{table.runs} expected, {len(files)} files run*.csv found"
         raise InputError(message, source=folder / CASE_FILE, column="runs")
-    return _assemble(folder, table, [load_run(path) for path in files], vehicle)
+    return table, [load_run(path) for path in files]
 
 
 def load_case_of_run(path: Path | str, vehicle: str | None = None) -> tuple[Case, Run]:
@@ -217,8 +222,12 @@ def write_case(
     disturbance: DisturbancePart | DisturbanceTable | None = None,
     suffix: str = ".csv",
     decimals: dict[str, int] | None = None,
+    digits: int = 2,
+    beside: dict[str, bytes] | None = None,
 ) -> list[Path]:
     """Write runs as a case, run00 on, and return the run files; case.toml comes last, so that a cut one is no case.
+
+    Numbers have `digits` digits at least and all of one case as many; `beside` are other files of the folder, by name.
 
     `vehicle` is a shipped name or a path from the case's folder; with `vehicle_text`, that file is written too, as
     vehicle.toml. `motion_capture` is, if not given, whether any run has it. InputError where the folder already holds a
@@ -241,9 +250,12 @@ def write_case(
         raise InputError("the folder already holds a case: name another, or empty it", source=folder)
     folder.mkdir(parents=True, exist_ok=True)
     files = []
+    digits = max(digits, len(str(len(runs) - 1)))
     for number, run in enumerate(runs):
-        files.append(folder / f"run{number:02d}{suffix}")
+        files.append(folder / f"run{number:0{digits}d}{suffix}")
         write_run(files[-1], run, decimals=decimals)
+    for name, data in (beside or {}).items():
+        csvfile.write_bytes(folder / name, data)
     if vehicle_text is not None:
         csvfile.write_bytes(folder / VEHICLE_FILE, vehicle_text.encode("utf-8"))
     csvfile.write_bytes(folder / CASE_FILE, text.encode("utf-8"))

@@ -4,13 +4,13 @@ Gauss and Newton's steps in everything at once along the observer's innovations,
 (docs/OCEAN.md, Identification). Dives differ by more than their noise says; the covariance is that of a sandwich.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from sim_backend.ocean.core import layout as at
-from sim_backend.ocean.vehicle import PLACES, UNITS, OceanVehicle
+from sim_backend.ocean.vehicle import PLACES, UNITS
 from tools.data.errors import InputError
 from tools.data.runs.case import Case
 from tools.data.runs.run import Run
@@ -25,8 +25,8 @@ from tools.inference.steady import first_guess, steady_rows, vertical_water
 
 MOST_RUNS = 24  # of the mission's first: drag creeps after that
 LEVEL_RUNS = 6
-# Dives that all of them are worth together: what the form of the model misses (a cell that lags in the thermocline, a hull
-# that warms late) is the same in every dive, and no number of them makes it smaller.
+# Dives that all of them are worth together: what the form of the model misses (a cell that lags in the thermocline, a
+# hull that warms late) is the same in every dive, and no number of them makes it smaller.
 WORTH = 3.0
 SHORTEST = 300.0  # s of steady flight, for a run to be learned from
 ROUNDS = 2
@@ -68,7 +68,8 @@ class Ridge:
 
     def sentence(self) -> str:
         """For a person."""
-        return f"{', '.join(self.names)} cannot be told apart by these dives ({100.0 * self.left:.0f} % of what was open is left)"
+        left = f"{100.0 * self.left:.0f} % of what was open is left"
+        return f"{', '.join(self.names)} cannot be told apart by these dives ({left})"
 
 
 @dataclass
@@ -87,7 +88,7 @@ class OceanIdentification:
 
     @property
     def net_mass(self) -> Parameter:
-        """Mass less that of the water of DENSITY that the hull displaces at the reference temperature, heavy positive."""
+        """Mass less that of the water of DENSITY that the hull displaces (reference temperature), heavy positive."""
         volume = next(one for one in self.parameters if one.name == "volume")
         mass = float(self.P[at.MASS]) - DENSITY * volume.mean
         return Parameter("net_mass", mass, DENSITY * volume.sd, "kg", DENSITY * volume.prior_sd)
@@ -95,13 +96,18 @@ class OceanIdentification:
     @property
     def next_run(self) -> dict[str, str] | None:
         """What to fly to part what these dives cannot, in a pilot's words; None where nothing is left."""
-        together = {name for ridge in self.ridges for name in ridge.names}
-        told = [text for names, text in PARTED_BY if together & set(names)]
-        return {"text": "; ".join(told)} if told else None
+        told = parted_by(name for ridge in self.ridges for name in ridge.names)
+        return {"text": told} if told else None
 
     @property
     def water_rms(self) -> float:
         return float(np.sqrt(np.mean(np.square(list(self.water.values())))))
+
+
+def parted_by(names: Iterable[str]) -> str:
+    """What to fly to tell numbers apart, in a pilot's words; nothing where nobody knows."""
+    together = set(names)
+    return "; ".join(text for listed, text in PARTED_BY if together & set(listed))
 
 
 def learnable(runs: list[Run]) -> tuple[list[Run], list[str]]:

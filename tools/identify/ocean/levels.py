@@ -21,8 +21,8 @@ TRIES = 90  # filters of a search
 DEPTH = ("depth", "walk", "water", "water_time")
 ROLL = ("roll_noise", "roll", "roll_time")
 SPEED = ("speed_noise", "velocity_noise", "speed")
-# Waves within the water move it for minutes (a buoyancy period is 5 to 20): what stays longer is an error of the model, and
-# taken for water would hide it.
+# Waves within the water move it for minutes (a buoyancy period is 5 to 20): what stays longer is an error of the model,
+# and taken for water would hide it.
 BOUNDS = {"water": (0.001, 0.02), "water_time": (60.0, 600.0), "roll_time": (10.0, 3600.0)}
 READING = {"depth": "depth", "roll_noise": "roll", "speed_noise": "speed", "velocity_noise": "velocity"}
 
@@ -50,7 +50,7 @@ def with_levels(case: Case, logs: dict[str, float]) -> Case:
 def find_levels(case: Case, problem: Problem, P: np.ndarray, F: np.ndarray) -> Case:
     """The case with the levels that its runs (those of the problem) ask for, the model (P, F) at hand."""
     seen = problem.seen
-    groups = [DEPTH]
+    groups: list[tuple[str, ...]] = [DEPTH]
     if seen[at.Y_ROLL]:
         groups.append(ROLL)
     if seen[at.Y_SPEED] or seen[at.Y_NORTH]:

@@ -1,0 +1,142 @@
+"""NetCDF files, classic and of version 4, as variables with strict units."""
+
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tools.data.errors import InputError
+from tools.data.importers.ocean.netcdf_classic import classic_size
+from tools.data.importers.ocean.segment import require_unit
+
+LARGEST = 4_000_000_000
+MAX_HEADER = 16_000_000
+CLASSIC, HDF5 = b"CDF", b"\x89HDF\r\n\x1a\n"
+METRES = dict.fromkeys(("m", "meters", "metres", "meter", "metre"), 1.0)
+DBAR = dict.fromkeys(("dbar", "decibar", "decibars"), 1.0)
+_DEGREES_CELSIUS = ("degrees_Celsius", "degree_Celsius", "Celsius", "degC", "deg_C", "degree_C", "degrees_C", "°C")
+CELSIUS = dict.fromkeys(_DEGREES_CELSIUS, 1.0)
+SIEMENS = dict.fromkeys(("S/m", "S m-1", "S.m-1", "mhos/m"), 1.0) | dict.fromkeys(("mS/cm", "mS cm-1"), 0.1)
+PRACTICAL = dict.fromkeys(("1e-3", "1", "psu", "PSU", "0.001", "1E-3", "dimensionless"), 1.0)
+ANGLE = dict.fromkeys(("degrees", "degree", "deg", "°"), np.pi / 180.0)
+ANGLE |= dict.fromkeys(("radians", "radian", "rad"), 1.0)
+CUBIC_CENTIMETRES = dict.fromkeys(("cc", "cm^3", "cm3", "cm**3", "mL", "ml"), 1e-6)
+SECONDS = {"seconds": 1.0, "s": 1.0}
+SPEED = dict.fromkeys(("m/s", "m s-1", "m.s-1"), 1.0) | dict.fromkeys(("cm/s", "cm s-1"), 0.01)
+DENSITY = dict.fromkeys(("kg/m3", "kg m-3", "kg.m-3", "kg/m^3"), 1.0)
+
+
+class NetCDF:
+    """An opened file: variables by name, as float64 with NaN where one is missing."""
+
+    def __init__(self, path: Path):
+        self.path = path
+        self._dataset = _opened(path)
+
+    def attribute(self, name: str) -> str:
+        """A global attribute as text; empty where it is not there."""
+        return str(self._dataset.attrs.get(name, "")).strip()
+
+    def has(self, name: str) -> bool:
+        """Whether there is a variable of this name."""
+        return name in self._dataset.variables
+
+    def size(self, dimension: str) -> int | None:
+        """Length of a dimension; None where there is none of this name."""
+        return self._dataset.sizes.get(dimension)
+
+    def about(self, name: str, attribute: str) -> str:
+        """An attribute of a variable as text; empty where it is not there."""
+        return str(self._dataset.variables[name].attrs.get(attribute, "")).strip()
+
+    def text(self, name: str) -> str:
+        """A variable that holds one text; empty where it is not there."""
+        if not self.has(name):
+            return ""
+        value = np.asarray(self._dataset.variables[name].values).ravel()
+        parts = [one.decode("utf-8", "replace") if isinstance(one, bytes) else str(one) for one in value.tolist()]
+        return "".join(parts).strip()
+
+    def values(self, name: str, units: dict[str, float], rows: int | None = None) -> np.ndarray:
+        """A variable in SI, by its unit (`""` among `units`: it may have none); InputError where it is not as asked."""
+        if not self.has(name):
+            raise InputError("the variable is not in this file", source=self.path, column=name)
+        variable = self._dataset.variables[name]
+        factor = require_unit(self.about(name, "units"), units, self.path, name)
+        if variable.dtype.kind not in "fiu":
+            raise InputError("no numbers", source=self.path, column=name)
+        found = factor * np.asarray(variable.values, dtype=np.float64).ravel()
+        if rows is not None and len(found) != rows:
+            raise InputError(f"{len(found)} samples, expected {rows}", source=self.path, column=name)
+        return np.where(np.isfinite(found), found, np.nan)
+
+    def number(self, name: str, units: dict[str, float]) -> float:
+        """A variable that holds one number, in SI."""
+        return float(self.values(name, units, rows=1)[0])
+
+    def flags(self, name: str, rows: int) -> np.ndarray:
+        """Quality flags, numbers or digits, as float64, NaN where there is none; all NaN where the file has none."""
+        if not self.has(name):
+            return np.full(rows, np.nan)
+        values = np.asarray(self._dataset.variables[name].values).ravel()
+        if len(values) != rows:
+            raise InputError(f"{len(values)} samples, expected {rows}", source=self.path, column=name)
+        if values.dtype.kind in "SUO":
+            digits = [one.decode("ascii", "replace") if isinstance(one, bytes) else str(one) for one in values.tolist()]
+            values = np.array([float(one) if one.strip().isdigit() else np.nan for one in digits])
+        return values.astype(np.float64)
+
+
+def _opened(path: Path) -> Any:
+    """The file in memory, as an xarray Dataset; InputError where it is none or is cut."""
+    import xarray
+
+    if not path.is_file():
+        raise InputError("not a file" if path.exists() else "no such file", source=path)
+    size = path.stat().st_size
+    if not size:
+        raise InputError("the file is empty", source=path)
+    if size > LARGEST:
+        raise InputError(f"longer than {LARGEST} bytes", source=path)
+    with path.open("rb") as file:
+        begin = file.read(8)
+    if not (begin.startswith(CLASSIC) or begin == HDF5):
+        raise InputError("not a NetCDF file", source=path)
+    engine = "h5netcdf" if begin == HDF5 else "scipy"
+    if engine == "scipy":
+        _check_whole(path, size)
+    try:
+        if engine == "h5netcdf":
+            _walk(path)
+        with xarray.open_dataset(path, engine=engine, decode_times=False, decode_timedelta=False) as dataset:
+            return dataset.load()
+    # What the libraries raise on damage is not said by them: OSError, ValueError, struct.error, KeyError, TypeError.
+    except Exception as error:
+        what = (str(error) or repr(error)).splitlines()[0].strip("'\"")
+        raise InputError(f"cut or damaged: {what}", source=path) from None
+
+
+def _walk(path: Path) -> None:
+    """Look at all objects of a file of version 4: h5py's errors are clean, h5netcdf leaves half-opened files behind."""
+    import h5py
+
+    with h5py.File(path) as file:
+        file.visititems(lambda _name, _object: None)
+
+
+def _check_whole(path: Path, size: int) -> None:
+    """InputError where a classic file does not end where its header says.
+
+    Base stations of version 2 leave the file twice in one, one copy behind the other; the first one counts.
+    """
+    try:
+        with path.open("rb") as file:
+            wanted = classic_size(file.read(MAX_HEADER))
+            file.seek(min(wanted + -wanted % 4, size))
+            behind = file.read(4)
+    except (struct.error, KeyError, IndexError):
+        raise InputError("cut or damaged within its header", source=path) from None
+    padded = wanted + -wanted % 4
+    if not (wanted <= size <= padded or (behind[:3] == CLASSIC and 2 * wanted <= size <= 2 * padded)):
+        raise InputError(f"cut or damaged: {size} bytes, {wanted} by its header", source=path)
