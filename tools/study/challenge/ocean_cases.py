@@ -28,7 +28,7 @@ DIVE_NAT, ALL_NAT = 4.0, 20.0
 # m/s by which a change moves the depth rate: less is none by definition, and a growth that stays below what a quiet
 # flight is known to is the fouling of any mission (docs/OCEAN.md, Windows)
 MATTERS, GROWTH_MATTERS = 0.005, 0.01
-SIZE_TRIES, TRIES = 12, 40
+SIZE_TRIES, TRIES = 12, 500
 SLOWEST, STEADY = 0.04, 0.45  # m/s, share of the depth about its middle: a dive that sinks slower there is none
 STALLED = 0.12  # rad, angle of attack: with too little lift for its pitch a glider has no glide at all, and falls
 FLATTER = 0.015  # rad: the pitch wanders
