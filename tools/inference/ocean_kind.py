@@ -26,7 +26,7 @@ APART = 29.0  # s at least between readings that are looked at
 
 # 10 minutes are several times what vertical water remembers. 6 m in 10 minutes are 1 cm/s, to which a quiet flight's
 # vertical velocity is known; half of it, 5 mm/s, is what flight models are held to be good for. What creeps over weeks
-# has to be 1 cm/s: seasons, a cell that drifts and a little growth do half of that (docs/OCEAN.md, Windows).
+# has to be half as much again: seasons, a cell that drifts and a little growth do 5 mm/s (docs/OCEAN.md, Windows).
 OCEAN_MEASURES = Measures(
     channels=(
         Channel("depth", (at.Y_DEPTH,), 6.0, unit="m"),
@@ -115,7 +115,7 @@ OCEAN = Kind(
     form_share=0.1,
     odds=RARE,
     one_group=_one_group,
-    learned_runs=12,
-    growth_matters=1.0,
+    learned_runs=24,
+    growth_matters=0.75,
     matters=0.5,
 )

@@ -41,7 +41,7 @@ def watch(case: Case, reference: Case | None = None, say: Callable[[str], None] 
     history = looked_at(parts, problem, learned_from, judged, begins, say)
     if reference is None:
         again = unchanged(history, learned_from)
-        if (again != learned_from).any():
+        if (again != learned_from).any() and again.sum() >= min(FEW, learned_from.sum()):
             say("something changed among the first runs: learning again from those without it")
             learned_from = again
             history = looked_at(parts, problem, learned_from, judged, begins, say)
