@@ -64,12 +64,13 @@ EFFECTS = (
 )
 # fmt: on
 
-# What hardly ever changes at sea, against what often does (growth, a lost wing, a bent sensor, ballast, a fouled cell):
-# log odds, nat. 8 are a thousand to three; where readings ask for them all the same, they win.
-RARE = dict.fromkeys(
-    ("ballast_scale", "ballast_leak", "compressibility", "thermal_expansion", "attitude_lag", "climb_dive_asymmetry"),
-    -8.0,
-)
+# What hardly ever changes at sea, against what often does (growth, ballast, a fouled cell): log odds, nat. 8 are three
+# thousand to one; where readings ask for them all the same, they win. Drag grows more often than a wing is lost or an
+# attitude sensor's scale goes: 3 are twenty to one.
+ODDS = {
+    **dict.fromkeys(("ballast_scale", "ballast_leak", "compressibility", "thermal_expansion"), -8.0),
+    "attitude_lag": -8.0, "climb_dive_asymmetry": -8.0, "lift": -3.0, "attitude_scale": -3.0,
+}  # fmt: skip
 
 # Of depth rate alone one is the other: each changes the speed at a pitch, by a law that is known to a tenth at best.
 ONE_ON_DEPTH = ("drag", "lift", "attitude_scale")

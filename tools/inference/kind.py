@@ -94,6 +94,7 @@ class Kind:
     one_group: Callable[[Collection[str]], tuple[str, ...]] = _none  # labels that these readings never tell apart
     odds: Mapping[str, float] = field(default_factory=dict)  # of labels that are seldom the cause: nat
     regime: Callable[[Run], np.ndarray] | None = None  # how a run was flown, in what makes a difference to the model
+    form: float = 0.06  # of a size, 1 sigma: nature's form is not the catalogue's (docs/WATCH.md)
     learned_runs: int = 4  # of the first, from which a watch without a reference learns what all share
     growth_matters: float = 0.1  # the same of what grows slowly
     matters: float = 0.1  # tolerances: what moves no channel of any window so far is no gap (docs/GAP.md)

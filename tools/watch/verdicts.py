@@ -19,7 +19,6 @@ from tools.watch.unknown import NOTHING, Left, what_is_left
 ROUGH = 6.0  # sigma of a run's mean squared innovation: something changed, though no label says what
 MOST_SURE = 0.995
 FEW = 3  # runs of a reference from which it can be learned what runs differ by
-FORM = 0.06  # of a size, 1 sigma: nature's form is not the catalogue's (docs/WATCH.md)
 CI90 = 1.645
 OTHERWISE = 2.0  # times
 LOOKED_AT = 2  # runs of an event in which it has to matter
@@ -202,8 +201,8 @@ def sized(history: History, one: Settled, weight: float = 1.0) -> Sized:
     units = np.array([own.spread for own in free])
     low, high = history.flights.shared.limits(event.label, history.flights.values)
     values = weight * np.clip(size, low, high) * units
-    C = weight**2 * covariance * np.outer(units, units)
-    sigma = np.sqrt(np.diag(C) + (FORM * values) ** 2)
+    C, form = weight**2 * covariance * np.outer(units, units), history.flights.parts[0].kind.form
+    sigma = np.sqrt(np.diag(C) + (form * values) ** 2)
     parameters = {
         own.name: {"estimate": float(v), "ci90": (float(v - CI90 * s), float(v + CI90 * s)), "unit": own.unit}
         for own, v, s in zip(free, values, sigma, strict=True)
@@ -211,7 +210,7 @@ def sized(history: History, one: Settled, weight: float = 1.0) -> Sized:
     if event.label in VECTORS:
         length = float(np.linalg.norm(values))
         along = values / max(length, 1e-12)
-        spread = float(np.sqrt(along @ C @ along + (FORM * length) ** 2))
+        spread = float(np.sqrt(along @ C @ along + (form * length) ** 2))
         return Sized(length, (max(0.0, length - CI90 * spread), length + CI90 * spread), free[0].unit, parameters)
     main = int(np.argmax(np.abs(values) / np.maximum(sigma, 1e-12)))
     value, spread = float(values[main]), float(sigma[main])

@@ -33,7 +33,6 @@ from tools.inference.shared_parameters import SharedParameters, shared_parameter
 from tools.inference.steady import first_guess
 from tools.watch.answer import CAUSE
 from tools.watch.events import STEP, Change, Joint, Span
-from tools.watch.verdicts import FORM
 from tools.watch.watch import usable_runs
 
 ABSENT = 1e-6  # spreads: of an effect that is not asked for
@@ -112,8 +111,8 @@ def diagnose_ocean(case: Case, say: Callable[[str], None] = lambda text: None) -
               sorted(where.items(), key=lambda item: -item[1])]  # fmt: skip
     return OceanDiagnosis(
         case, [run.name for run in runs], NONE if selected is None else CAUSE, selected, chances,
-        {} if selected is None else {best: group}, sizes(shared, listed), places, gaps, *closings(gaps), evidence,
-        skipped, shared.model(problem, x) if selected is None else with_best.model(problem, y), open_numbers(problem),
+        {} if selected is None else {best: group}, sizes(shared, listed, problem.kind.form), places, gaps,
+        *closings(gaps), evidence, skipped, shared.model(problem, x) if selected is None else with_best.model(problem, y), open_numbers(problem),
     )  # fmt: skip
 
 
@@ -204,14 +203,14 @@ def closings(gaps: dict[str, list[RunGap]]) -> tuple[tuple[float, float, float],
     return (value[0], float(low[0]), float(high[0])), (value[1], float(low[1]), float(high[1]))
 
 
-def sizes(shared: SharedParameters, listed: list[Change]) -> dict[str, tuple[float, float, str, str]]:
+def sizes(shared: SharedParameters, listed: list[Change], form: float) -> dict[str, tuple[float, float, str, str]]:
     """Each label's size alone, SI."""
     found = {}
     for one in listed:
         free = shared.free[shared.labels[one.label][0]]
         value = float(one.size[0]) * free.spread
         sigma = float(np.sqrt(np.linalg.inv(one.precision)[0, 0])) * free.spread
-        found[one.label] = value, float(np.hypot(sigma, FORM * value)), free.unit, free.name
+        found[one.label] = value, float(np.hypot(sigma, form * value)), free.unit, free.name
     return found
 
 

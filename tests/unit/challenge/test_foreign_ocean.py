@@ -7,7 +7,7 @@ from sim_backend.foreign import ocean as at
 from sim_backend.ocean.core import layout
 from sim_backend.ocean.core.glide import steady_speed
 from tools.data.runs import columns as names
-from tools.study.challenge.ocean_cases import fly_mission, nat_of_a_dive, shipped_vehicle, with_change
+from tools.study.challenge.ocean_cases import fly_mission, shipped_vehicle, shown, with_change
 from tools.study.challenge.ocean_design import CRAFTS, Mission, draw_mission
 
 
@@ -77,10 +77,11 @@ def test_each_change_is_what_its_label_says():
 
 def test_evidence_goes_with_the_square_of_the_change_and_against_that_of_the_water():
     made = mission()
-    small, large = nat_of_a_dive(made, "drag", 0.05), nat_of_a_dive(made, "drag", 0.1)
+    (small, slower), (large, slowest) = shown(made, "drag", 0.05), shown(made, "drag", 0.1)
     assert large == pytest.approx(4.0 * small, rel=0.25)
+    assert slowest == pytest.approx(2.0 * slower, rel=0.13)
     made.seas[0][at.WATER] *= 2.0
-    assert nat_of_a_dive(made, "drag", 0.05) == pytest.approx(small / 4.0, rel=1e-9)
+    assert shown(made, "drag", 0.05) == pytest.approx((small / 4.0, slower), rel=1e-9)
 
 
 def settled(V: np.ndarray, roll: float) -> np.ndarray:

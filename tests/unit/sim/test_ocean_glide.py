@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from sim_backend.ocean.catalogue import EFFECTS, NOT_ASKED, ONE_ON_DEPTH, RARE, catalogue
+from sim_backend.ocean.catalogue import EFFECTS, NOT_ASKED, ODDS, ONE_ON_DEPTH, catalogue
 from sim_backend.ocean.core import layout as at
 from sim_backend.ocean.core.glide import (
     angle_of_attack,
@@ -191,7 +191,7 @@ def test_climb_dive_asymmetry_goes_both_ways():
 
 def test_what_is_not_asked_is_in_no_catalogue():
     assert not set(NOT_ASKED) & set(catalogue())
-    assert set(RARE) <= set(catalogue())
+    assert set(ODDS) <= set(catalogue())
     assert set(ONE_ON_DEPTH) <= set(catalogue())
     assert len(catalogue()) == len(EFFECTS)
     entries = [p.entry for _, p in LISTED if p.entry >= 0]

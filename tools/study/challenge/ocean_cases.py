@@ -14,7 +14,7 @@ from tools.data.runs.run import Run
 from tools.study.challenge.cases import NoCase
 from tools.study.challenge.ocean_design import CRAFTS, SPEED_NOISE, Mission, draw_mission
 from tools.study.challenge.ocean_plan import MissionPlan
-from tools.study.challenge.watch_plan import CHANGED, UNCHANGED, WatchCounts
+from tools.study.challenge.watch_plan import CHANGED, GROWING, UNCHANGED, WatchCounts
 
 # Sizes of a change at its full strength, drawn uniformly, in the unit of the catalogue's parameter.
 SIZES = {
@@ -25,9 +25,13 @@ EITHER_WAY = ("attitude_scale", "net_buoyancy", "density_bias")
 # What no observer could place is no case: a first run two dives off is preferred to the true one in some 2 of 100
 # missions where a dive has 4 nat (a normal deviate beyond 2), in 8 where it has 2. All together: as in evidence.py.
 DIVE_NAT, ALL_NAT = 4.0, 20.0
-SIZE_TRIES, TRIES = 12, 40
+# m/s by which a change moves the depth rate: less is none by definition, and a growth that stays below what a quiet
+# flight is known to is the fouling of any mission (docs/OCEAN.md, Windows)
+MATTERS, GROWTH_MATTERS = 0.005, 0.01
+SIZE_TRIES, TRIES = 12, 500
 SLOWEST, STEADY = 0.04, 0.45  # m/s, share of the depth about its middle: a dive that sinks slower there is none
-STALLED = 0.14  # rad, angle of attack: with too little lift for its pitch a glider has no glide at all, and falls
+STALLED = 0.12  # rad, angle of attack: with too little lift for its pitch a glider has no glide at all, and falls
+FLATTER = 0.015  # rad: the pitch wanders
 TRUTH_EVERY = 60.0  # s, at which true speeds are kept
 PITCH_NOISE, ROLL_NOISE, YAW_NOISE, DENSITY_NOISE, TEMPERATURE_NOISE, OIL_NOISE = 0.001, 0.003, 0.01, 0.004, 0.002, 1e-7
 LOST = 0.003  # of the samples of the water
@@ -71,10 +75,11 @@ def with_change(V: np.ndarray, label: str, size: float) -> np.ndarray:
     return V
 
 
-def flown(mission: Mission, dive: int, V: np.ndarray, S: np.ndarray) -> np.ndarray:
-    """Rows (rows, N_R) of a dive without noise."""
+def flown(mission: Mission, dive: int, V: np.ndarray, S: np.ndarray, D: np.ndarray | None = None) -> np.ndarray:
+    """Rows (rows, N_R) of a dive without noise, D in place of what its pilot asks for."""
     out = at.room()
-    count = at.fly_dive(V, mission.dives[dive], S, np.uint64(mission.seed + dive), out)
+    asked = mission.dives[dive] if D is None else D
+    count = at.fly_dive(V, asked, S, np.uint64(mission.seed + dive), out)
     return out[:count].copy()
 
 
@@ -85,9 +90,11 @@ def legs(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def flies(mission: Mission) -> bool:
-    """Whether the first dive goes down and comes up again, at a speed, and gliding."""
-    depth = mission.dives[0][at.DEPTH]
-    rows = flown(mission, 0, mission.V, mission.calm(0))
+    """Whether a dive as flat as the flattest goes down and comes up again, at a speed, and gliding."""
+    D, depth = mission.dives[0].copy(), mission.dives[0][at.DEPTH]
+    D[at.PITCH_DOWN] = max(dive[at.PITCH_DOWN] for dive in mission.dives) + FLATTER
+    D[at.PITCH_UP] = min(dive[at.PITCH_UP] for dive in mission.dives) - FLATTER
+    rows = flown(mission, 0, mission.V, mission.calm(0), D)
     if rows[-1, at.R_DEPTH] > 5.0 or rows[:, at.R_DEPTH].max() < depth:
         return False
     for leg in legs(rows):
@@ -100,11 +107,12 @@ def flies(mission: Mission) -> bool:
     return True
 
 
-def nat_of_a_dive(mission: Mission, label: str, size: float) -> float:
-    """Evidence of a change in an average dive, nat: depth rates with and without it over the water's density at 0 Hz.
+def shown(mission: Mission, label: str, size: float) -> tuple[float, float]:
+    """How a change shows in a dive: by evidence, nat, and by how it moves the depth rate, rms, m/s.
 
-    A mean over T of water that has size s and forgets itself in tau varies by 2 s2 tau / T. What makes the readings of
-    the water wrong shows as the weight that it pretends.
+    Evidence is that of the depth rate over the water's density at 0 Hz: a mean over T of water that has size s and
+    forgets itself in tau varies by 2 s2 tau / T. What makes the readings of the water wrong shows as the weight that it
+    pretends.
     """
     if label == "density_bias":
         V = mission.V.copy()
@@ -112,7 +120,7 @@ def nat_of_a_dive(mission: Mission, label: str, size: float) -> float:
     else:
         V = with_change(mission.V, label, size)
     S = mission.calm(0)
-    total = 0.0
+    total = seconds = 0.0
     for bare, other in zip(legs(flown(mission, 0, mission.V, S)), legs(flown(mission, 0, V, S)), strict=True):
         depths = np.linspace(0.15, 0.9, 200) * mission.dives[0][at.DEPTH]
         rates = []
@@ -121,8 +129,9 @@ def nat_of_a_dive(mission: Mission, label: str, size: float) -> float:
             order = np.argsort(z)
             rates.append(np.maximum(np.interp(depths, z[order], rate[order]), 1e-3))
         total += float(np.sum((rates[1] - rates[0]) ** 2 / rates[0]) * (depths[1] - depths[0]))
+        seconds += float(np.sum(1.0 / rates[0]) * (depths[1] - depths[0]))
     water, time = mission.seas[0][at.WATER], mission.seas[0][at.WATER_TIME]
-    return 0.5 * total / (2.0 * water**2 * time)
+    return 0.5 * total / (2.0 * water**2 * time), float(np.sqrt(total / seconds))
 
 
 def draw_size(rng: np.random.Generator, mission: Mission, plan: MissionPlan, judged: int) -> tuple[float, float] | None:
@@ -135,8 +144,9 @@ def draw_size(rng: np.random.Generator, mission: Mission, plan: MissionPlan, jud
             size = -size
         if not flies(mission.changed(with_change(mission.V, plan.label, size))):
             continue
-        nat = nat_of_a_dive(mission, plan.label, size)
-        if nat >= DIVE_NAT and nat * float(np.sum(strengths**2)) >= ALL_NAT:
+        nat, moved = shown(mission, plan.label, size)
+        matters = moved >= (GROWTH_MATTERS if plan.course == GROWING else MATTERS)
+        if matters and nat >= DIVE_NAT and nat * float(np.sum(strengths**2)) >= ALL_NAT:
             return size, nat
     return None
 
