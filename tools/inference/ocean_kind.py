@@ -25,8 +25,8 @@ FIRST_SPEED = 0.2  # m/s
 APART = 29.0  # s at least between readings that are looked at
 
 # 10 minutes are several times what vertical water remembers. A depth rate that is wrong by 1 cm/s is off by 3.1 m rms
-# over the 9 minutes that are predicted, half a tolerance. What changes has to be 8 mm/s of it, what creeps 12: seasons, a
-# cell that drifts and a little growth did 9 mm/s in 20 days of an open mission (docs/OCEAN.md, Windows).
+# over the 9 minutes that are predicted, half a tolerance. What changes has to be 8 mm/s of it, what creeps 12: seasons,
+# a cell that drifts and a little growth did 9 mm/s in 20 days of an open mission (docs/OCEAN.md, Windows).
 OCEAN_MEASURES = Measures(
     channels=(
         Channel("depth", (at.Y_DEPTH,), 6.0, unit="m"),

@@ -112,7 +112,8 @@ def diagnose_ocean(case: Case, say: Callable[[str], None] = lambda text: None) -
     return OceanDiagnosis(
         case, [run.name for run in runs], NONE if selected is None else CAUSE, selected, chances,
         {} if selected is None else {best: group}, sizes(shared, listed, problem.kind.form), places, gaps,
-        *closings(gaps), evidence, skipped, shared.model(problem, x) if selected is None else with_best.model(problem, y), open_numbers(problem),
+        *closings(gaps), evidence, skipped,
+        shared.model(problem, x) if selected is None else with_best.model(problem, y), open_numbers(problem),
     )  # fmt: skip
 
 
