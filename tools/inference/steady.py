@@ -4,10 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from firmware.core.jit import kernel
 from sim_backend.ocean.core import layout as at
-from sim_backend.ocean.core.glide import net_buoyancy, steady_speed, true_pitch
 from tools.data.runs import columns as names
+from tools.inference.core.ocean import steady_glide
 from tools.inference.ocean_inputs import drawn
 from tools.inference.problem import Problem
 
@@ -52,17 +51,6 @@ def steady_rows(problem: Problem) -> Steady:
     rates = np.concatenate([depth_rate(run.t, run.columns[names.DEPTH]) for run in problem.runs])
     rows = np.flatnonzero((r.inputs[:, at.U_UNSTEADY] == 0.0) & np.isfinite(rates))
     return Steady(rows, problem.run_of[rows], rates[rows])
-
-
-@kernel
-def steady_glide(P, F, z, since, inputs, rows, out):
-    """Speed (m/s) and angle of the path (rad) of steady glides at rows, out (n, 2); depth z (rows), since (rows) s."""
-    for k in range(len(rows)):
-        i = rows[k]
-        u = inputs[i]
-        force = net_buoyancy(P, F, z[i], u[at.U_DENSITY], u[at.U_TEMPERATURE], u[at.U_OIL], since[i])
-        pitch = true_pitch(P, F, u[at.U_PITCH], u[at.U_PITCH_RATE])
-        out[k, 0], out[k, 1] = steady_speed(P, F, pitch, u[at.U_DENSITY], force)
 
 
 def glides(problem: Problem, P: np.ndarray, F: np.ndarray, rows: np.ndarray) -> np.ndarray:

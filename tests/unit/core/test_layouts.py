@@ -66,12 +66,35 @@ def test_the_rule_finds_the_layouts():
     assert len(LAYOUTS) > 8
 
 
+# Vectors of other vehicles, each in layouts of its own: a name has another meaning there.
+OTHERS = {
+    "sim_backend.ocean.core.layout": "ocean", "sim_backend.foreign.ocean": "foreign ocean",
+    "tools.study.challenge.ocean_design": "foreign ocean",
+}  # fmt: skip
+
+
 def test_a_name_has_one_value():
-    values: dict[str, dict[float, list[str]]] = {}
+    values: dict[tuple[str, str], dict[float, list[str]]] = {}
     for module in LAYOUTS:
         for name, value in places(module).items():
-            values.setdefault(name, {}).setdefault(value, []).append(module)
+            values.setdefault((OTHERS.get(module, ""), name), {}).setdefault(value, []).append(module)
     assert {name: by_value for name, by_value in values.items() if len(by_value) > 1} == {}
+
+
+def layouts_named_from(tree: ast.AST) -> set[str]:
+    """The vehicles from whose layouts a module takes bare names in capitals."""
+    return {
+        OTHERS.get(str(node.module), "")
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom) and node.module in LAYOUTS
+        if any(name.name.isupper() for name in node.names)
+    }
+
+
+def test_no_module_takes_names_from_the_layouts_of_two_vehicles():
+    text = "from sim_backend.ocean.core.layout import N_P\nfrom firmware.core.vehicle.layout import N_F"
+    assert layouts_named_from(ast.parse(text)) == {"ocean", ""}
+    assert [str(path) for path in FILES if len(layouts_named_from(TREES[path])) > 1] == []
 
 
 @pytest.mark.parametrize("room", [*ROOMS, "tests"])

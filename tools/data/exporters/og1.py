@@ -73,11 +73,11 @@ def read_origins(folder: Path, runs: list[Run]) -> list[Origin]:
     names, starts, gliders = table.texts("run"), table.texts("start_utc"), table.texts("glider")
     numbers = [table.numbers(name) for name in ("latitude", "longitude", "magnetic_variation_rad")]
     found = {}
-    for row, (name, start, glider) in enumerate(zip(names, starts, gliders, strict=True)):
+    for row, (name, moment_text, glider) in enumerate(zip(names, starts, gliders, strict=True)):
         try:
-            moment = dt.datetime.fromisoformat(start).timestamp()
+            moment = dt.datetime.fromisoformat(moment_text).timestamp()
         except ValueError:
-            raise table.error(f"not a time: {start[:40]!r}", row=row, column="start_utc") from None
+            raise table.error(f"not a time: {moment_text[:40]!r}", row=row, column="start_utc") from None
         latitude, longitude, variation = (float(column[row]) for column in numbers)
         found[name] = Origin(moment, latitude, longitude, variation, glider)
     for run in runs:

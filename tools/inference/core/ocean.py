@@ -10,7 +10,7 @@ import numpy as np
 
 from firmware.core.jit import kernel, parallel_kernel, prange
 from firmware.core.maths.matrices import product
-from sim_backend.ocean.core.glide import glide, net_buoyancy, next_speed, true_pitch
+from sim_backend.ocean.core.glide import glide, net_buoyancy, next_speed, steady_speed, true_pitch
 from sim_backend.ocean.core.layout import (
     F_ROLL_TRIM,
     F_SPEED_BIAS,
@@ -248,3 +248,13 @@ def read_rows(F, X, path, t, bounds, Y):
         Y[i, Y_DEPTH], Y[i, Y_SPEED] = X[i, X_DEPTH], X[i, X_SPEED] + F[F_SPEED_BIAS]
         Y[i, Y_ROLL] = math.nan
 
+
+@kernel
+def steady_glide(P, F, z, since, inputs, rows, out):
+    """Speed (m/s) and angle of the path (rad) of steady glides at rows, out (n, 2); depth z (rows), since (rows) s."""
+    for k in range(len(rows)):
+        i = rows[k]
+        u = inputs[i]
+        force = net_buoyancy(P, F, z[i], u[U_DENSITY], u[U_TEMPERATURE], u[U_OIL], since[i])
+        pitch = true_pitch(P, F, u[U_PITCH], u[U_PITCH_RATE])
+        out[k, 0], out[k, 1] = steady_speed(P, F, pitch, u[U_DENSITY], force)

@@ -124,14 +124,14 @@ def _dives(file: NetCDF, t: np.ndarray, flown: np.ndarray, size: int) -> np.ndar
 
 def _by_surfacings(t: np.ndarray, depth: np.ndarray) -> np.ndarray:
     """Numbers of dives, from 1: the next begins in the middle of a long time near the surface, or behind a hole."""
-    begins = np.zeros(len(t), dtype=bool)
-    begins[1:] = np.diff(t) > SURFACED_S
+    first_rows = np.zeros(len(t), dtype=bool)
+    first_rows[1:] = np.diff(t) > SURFACED_S
     near = np.isfinite(depth) & (depth < SURFACED_M)
     edges = np.flatnonzero(np.diff(np.concatenate(([False], near, [False])).astype(np.int8)))
     for first, behind in zip(edges[::2], edges[1::2], strict=True):
         if first > 0 and behind < len(t) and t[behind - 1] - t[first] > SURFACED_S:
-            begins[(first + behind) // 2] = True
-    return 1.0 + np.cumsum(begins)
+            first_rows[(first + behind) // 2] = True
+    return 1.0 + np.cumsum(first_rows)
 
 
 def _position(file: NetCDF, name: str, unit: str, dive: np.ndarray, size: int) -> float:
