@@ -169,7 +169,7 @@ def test_time_that_runs_back_is_one_line_with_its_place(tmp_path, capsys):
 
 
 def test_without_a_test_of_what_is_left_nobody_is_sure_that_it_is_unknown(pushed, tmp_path):
-    """What is left was not asked about, and something else is given for it."""
+    """What is left was not asked about: unknown is then no more probable than a label that earned no place."""
     case, _, whole = pushed
     assert glider("gap", "diagnose", case.folder, "--out", tmp_path, "--without", "whiteness") == 0
     answer = json.loads((tmp_path / "diagnosis.json").read_text())
@@ -178,7 +178,8 @@ def test_without_a_test_of_what_is_left_nobody_is_sure_that_it_is_unknown(pushed
     )
     assert whole["verdict"] == "unknown"
     assert unsure < 0.2 < 0.8 < sure
-    assert answer["verdict"] == "cause"
+    labels = [cause["probability"] for cause in answer["causes"] if cause["label"] not in ("unknown", "none")]
+    assert max(labels) >= 0.9 * unsure
 
 
 @pytest.mark.parametrize("part", ["nuisance", "evidence"])
