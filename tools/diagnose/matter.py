@@ -11,13 +11,10 @@ from tools.diagnose.shrink import AFTER, FLOOR, Shrinkage, case_noise_floor
 from tools.gap.measure import mean_square
 from tools.inference.channels import errors
 from tools.inference.fit import Hypothesis
+from tools.inference.kind import MATTERS
 from tools.inference.model import effect_vector
 from tools.inference.predict import fly_windows_from
 from tools.inference.problem import Problem, cut
-
-# Tolerances. A tolerance is what a simulator may be off; a tenth of it adds half a percent to a gap of one, and lies
-# below what noise and disturbance leave of a perfect model (0.12 to 0.17 in total), so no prediction is the better.
-MATTERS = 0.1
 
 
 def movements(search: Search, hypothesis: Hypothesis) -> dict[str, float]:

@@ -8,6 +8,7 @@ from sim_backend.ocean.core import layout as at
 from tools.data.runs import columns as names
 from tools.inference.core.ocean import steady_glide
 from tools.inference.ocean_inputs import drawn
+from tools.inference.parameters import FreeParameter
 from tools.inference.problem import Problem
 
 HALF = 30.0  # s either way, over which the depth rate is taken
@@ -65,6 +66,14 @@ def vertical_water(problem: Problem, P: np.ndarray, F: np.ndarray, steady: Stead
     """Vertical velocity of the water at the steady rows, down positive, m/s (n,): measured less modelled depth rate."""
     found = glides(problem, P, F, steady.rows)
     return np.asarray(steady.rate + found[:, 0] * np.sin(found[:, 1]))
+
+
+def first_values(problem: Problem, free: list[FreeParameter]) -> np.ndarray:
+    """Values (count,) of free parameters, in their spreads, at the first guess; 0 of what it does not find."""
+    guess, P = first_guess(problem), problem.model.P
+    return np.array([
+        (guess[f.entry] - P[f.entry]) / f.spread if f.entry >= 0 and f.vector == "P" else 0.0 for f in free
+    ])  # fmt: skip
 
 
 def first_guess(problem: Problem) -> np.ndarray:

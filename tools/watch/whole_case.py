@@ -30,7 +30,7 @@ from tools.inference.predict import fly_windows_from
 from tools.inference.problem import Problem, cut, problem_of
 from tools.inference.shared_model import fit_shared, heat_of
 from tools.inference.shared_parameters import SharedParameters, shared_parameters
-from tools.inference.steady import first_guess
+from tools.inference.steady import first_values
 from tools.watch.answer import CAUSE
 from tools.watch.events import STEP, Change, Joint, Span
 from tools.watch.watch import usable_runs
@@ -75,12 +75,7 @@ def diagnose_ocean(case: Case, say: Callable[[str], None] = lambda text: None) -
     parts = [problem.part(n) for n in range(len(runs))]
     shared = replace(shared_parameters(problem), allowed=1.0, effects=ABSENT)
     heat = max(1.0, len(runs) / WORTH)
-    start = np.zeros(shared.count)
-    guess = first_guess(problem)
-    for k, free in enumerate(shared.free):
-        if free.vector == "P" and free.entry >= 0:
-            start[k] = np.clip((guess[free.entry] - problem.model.P[free.entry]) / free.spread, -3.0, 3.0)
-    x = fit_shared(parts, shared, start, heat)
+    x = fit_shared(parts, shared, first_values(problem, shared.free), heat)
     say(f"{len(runs)} runs; what the vehicle file allows, fitted")
     found = [expand(part, shared, x) for part in parts]
     heat = max(heat, heat_of(found))
@@ -130,7 +125,7 @@ def fitted_with(
 
 
 def open_numbers(problem: Problem) -> list[str]:
-    """Numbers that [uncertainty] leaves open by more than a tenth, or by as much as their effect's own spread."""
+    """Numbers that [uncertainty] leaves open by more than a tenth of their size."""
     P, sigma = problem.model.P, problem.model.sigma
     names = {place: name for name, place in PLACES.items()}
     free = [int(k) for k in np.flatnonzero(sigma > 0.0) if int(k) in names]

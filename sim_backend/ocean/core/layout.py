@@ -40,8 +40,8 @@ X_GLIDE = 4  # rad, angle of the path through the water, up positive: for the re
 N_X, N_ERR = 5, 4
 
 # --- inputs of a row ---
-U_PITCH, U_PITCH_RATE, U_YAW, U_ROLL, U_OIL, U_DENSITY, U_TEMPERATURE, U_UNSTEADY = 0, 1, 2, 3, 4, 5, 6, 7
-N_U = 8
+U_PITCH, U_PITCH_RATE, U_YAW, U_OIL, U_DENSITY, U_TEMPERATURE, U_UNSTEADY = 0, 1, 2, 3, 4, 5, 6
+N_U = 7
 
 # --- readings, y ---
 Y_DEPTH, Y_ROLL, Y_SPEED, Y_NORTH, Y_EAST = 0, 1, 2, 3, 4

@@ -21,7 +21,7 @@ from tools.inference.parameters import NINETY, FreeParameter, nuisance_parameter
 from tools.inference.problem import Problem, problem_of
 from tools.inference.shared_model import fit_shared, heat_of
 from tools.inference.shared_parameters import SharedParameters
-from tools.inference.steady import first_guess, steady_rows, vertical_water
+from tools.inference.steady import first_values, steady_rows, vertical_water
 
 MOST_RUNS = 24  # of the mission's first: drag creeps after that
 LEVEL_RUNS = 6
@@ -133,9 +133,7 @@ def identify_ocean(case: Case, say: Callable[[str], None] = lambda text: None) -
     runs = runs[:MOST_RUNS]
     problem = problem_of(case, runs=runs)
     free = nuisance_parameters(problem)
-    P = first_guess(problem)
-    x = np.array([(P[f.entry] - problem.model.P[f.entry]) / f.spread if f.entry >= 0 and f.vector == "P" else 0.0
-                  for f in free])  # fmt: skip
+    x = first_values(problem, free)
     say(f"{len(runs)} runs, {len(problem.z)} rows; a first guess of volume and drag")
     shared, heat = SharedParameters(free, {}, {}, 1.0), max(1.0, len(runs) / WORTH)
     levels_from = [runs[k] for k in np.unique(np.linspace(0, len(runs) - 1, LEVEL_RUNS).astype(int))]

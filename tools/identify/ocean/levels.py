@@ -13,7 +13,8 @@ from scipy.optimize import minimize
 from sim_backend.ocean.core import layout as at
 from sim_backend.ocean.vehicle import OceanVehicle
 from tools.data.runs.case import Case
-from tools.inference.problem import Problem, problem_of
+from tools.inference.levels import as_said
+from tools.inference.problem import Problem
 
 WIDTH = 2.0  # e-folds, prior 1 sigma of each
 STEP = 0.4  # e-folds, of the first simplex
@@ -69,21 +70,8 @@ def find_levels(case: Case, problem: Problem, P: np.ndarray, F: np.ndarray) -> C
 def cost(logs: np.ndarray, case: Case, problem: Problem, P: np.ndarray, F: np.ndarray, names: tuple[str, ...]) -> float:
     """-2 log likelihood of levels, and their prior's."""
     levelled = with_levels(case, dict(zip(names, logs.tolist(), strict=True)))
-    own = noisier(problem, levelled)
+    own = as_said(replace(problem, case=levelled))
     Pw = P.copy()
     Pw[at.WATER_TIME], Pw[at.ROLL_TIME] = levelled.disturbance.water_time, levelled.disturbance.roll_time
     value = float(own.filter(Pw, F).misfit.sum())
     return value + float(logs @ logs) / WIDTH**2 if np.isfinite(value) else 1e300
-
-
-def noisier(problem: Problem, case: Case) -> Problem:
-    """The problem with the noise of a case."""
-    kind, spectral = problem.kind, problem.spectral.copy()
-    spectral[kind.accelerations] = [getattr(case.disturbance, name) ** 2 * kind.hold for name in kind.disturbance]
-    noise = [getattr(case.sensors, reading.source).noise for reading in kind.readings]
-    return replace(problem, spectral=spectral, R=np.tile(np.square(noise), (len(problem.runs), 1)))
-
-
-def levelled(case: Case, runs: list) -> Problem:
-    """The problem of some of a case's runs."""
-    return problem_of(case, runs=runs)
