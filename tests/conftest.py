@@ -74,6 +74,6 @@ def shared() -> Path:
 def compiled(request) -> None:
     """The kernels of a flight are in the cache before a program is started that is given so many seconds to fly."""
     if any(item.get_closest_marker("realtime") for item in request.session.items):
-        from tools.flight.precompile import ensure_compiled
+        from tools.flight.precompile import FLIGHT, ensure_compiled
 
-        ensure_compiled(lambda text: None, lambda label, total: contextlib.nullcontext(lambda n: None))
+        ensure_compiled(FLIGHT, lambda text: None, lambda label, total: contextlib.nullcontext(lambda n: None))

@@ -88,6 +88,8 @@ class Terminal:
                 self._stream.feed(self.child.read_nonblocking(65_536, timeout=left))
             except pexpect.TIMEOUT:
                 return
+            except pexpect.EOF:
+                raise AssertionError(f"the console has ended:\n{self.text()}") from None
 
     def wait(self, shows: Callable[[], bool], timeout: float = 60.0) -> None:
         """Until the screen shows something."""

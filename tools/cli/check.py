@@ -1,13 +1,15 @@
 """`glider check`: are the files of a flight fit to fly with?"""
 
+import subprocess
 import sys
 from dataclasses import asdict
+from importlib.util import find_spec
 from pathlib import Path
 from typing import NoReturn
 
 import click
 
-from tools.cli.common import DONE, FAILED, json_option, print_json, progress, say
+from tools.cli.common import DONE, FAILED, fail, json_option, print_json, progress, say
 
 
 @click.command()
@@ -16,7 +18,7 @@ from tools.cli.common import DONE, FAILED, json_option, print_json, progress, sa
 @click.option("--board", default="sim", show_default=True, help="Board: shipped name or file.")
 @click.option("--signs", is_flag=True, help="Lead through signs and axes of a board's devices, step by step.")
 @click.option("--live", is_flag=True, help="Health page of the flight under way.")
-@click.option("--compile", "compile_", is_flag=True, help="Compile every kernel that a flight needs, ahead of it.")
+@click.option("--compile", "compile_", is_flag=True, help="Compile every kernel of a flight and of a diagnosis ahead.")
 @click.option("--acknowledge", is_flag=True, help="A person has looked at the flight before: the next may begin.")
 @click.option(
     "--state", "state", type=click.Path(path_type=Path, file_okay=False), help="Folder of state and heartbeat."
@@ -106,13 +108,16 @@ def _stand_by(live: bool, compile_: bool, acknowledge: bool, state: Path | None,
 
     if compile_:
         from firmware.core.jit import CACHE_DIR
-        from tools.flight.precompile import compile_all, ensure_compiled
+        from tools.flight.precompile import FLIGHT, ensure_compiled
 
-        ensure_compiled(say, progress)
+        diagnosis = _compile_diagnosis()
+        ensure_compiled(FLIGHT, say, progress)
+        if diagnosis is not None and diagnosis.wait():
+            fail("glider: the kernels of a diagnosis were not compiled")
         if as_json:
-            print_json(compile_all())
+            print_json(FLIGHT.compile())
         else:
-            say(f"kernels of a flight: {CACHE_DIR or 'plain Python (GLIDER_JIT=0)'}")
+            say(f"kernels: {CACHE_DIR or 'plain Python (GLIDER_JIT=0)'}")
     if acknowledge:
         from tools.flight.keeper import told
 
@@ -129,6 +134,18 @@ def _stand_by(live: bool, compile_: bool, acknowledge: bool, state: Path | None,
             show(folder)
         raise SystemExit(FAILED if snapshot(folder)["problems"] else DONE)
     raise SystemExit(DONE)
+
+
+def _compile_diagnosis() -> subprocess.Popen[bytes] | None:
+    """A process that compiles what a diagnosis calls, beside the flight's; None where it is there, or not installed."""
+    if not find_spec("scipy"):
+        return None
+    from tools.diagnose.precompile import DIAGNOSIS
+
+    stamp = DIAGNOSIS.stamp()
+    if stamp is None or stamp.exists():
+        return None
+    return subprocess.Popen([sys.executable, "-m", "tools.diagnose.precompile"])
 
 
 def arming_list(mission: str, vehicle: str, board: str) -> list[dict]:

@@ -63,6 +63,16 @@ def progress(label: str, total: int, *, bar: bool = True) -> Iterator[Callable[[
     yield advance
 
 
+def compile_diagnosis(case: Any) -> None:
+    """Compile what the diagnosis of a case calls, unless that was done: an ocean glider's kernels are few."""
+    from sim_backend.ocean.vehicle import OceanVehicle
+    from tools.diagnose.precompile import DIAGNOSIS
+    from tools.flight.precompile import ensure_compiled
+
+    if not isinstance(case.vehicle, OceanVehicle):
+        ensure_compiled(DIAGNOSIS, say, progress)
+
+
 def report_errors(command: click.Command) -> int:
     """Run the command line; turn what a user can cause into one line and exit code 2."""
     from hal.strict import ConfigError

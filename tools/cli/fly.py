@@ -71,7 +71,7 @@ def fly(
     from hal.state_file import Phase
     from tools.data.errors import InputError
     from tools.flight.compose import build_flight, log_metadata, parse_effects, record_specs
-    from tools.flight.precompile import ensure_compiled
+    from tools.flight.precompile import FLIGHT, ensure_compiled
     from tools.flight.terminal import Stop, confirm_arming, undisturbed
 
     wanted = parse_effects(effects)
@@ -92,7 +92,7 @@ def fly(
     else:
         recorder = Recorder(path, specs, attachments=flight.texts, metadata=metadata)
 
-    ensure_compiled(say, progress)
+    ensure_compiled(FLIGHT, say, progress)
     if flight.control.controller != "pid":
         for axis in flight.k2_margins:
             if not axis.covered:

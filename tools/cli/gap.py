@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from tools.cli.challenge import challenge
-from tools.cli.common import json_option, print_json, progress, say, vehicle_option
+from tools.cli.common import compile_diagnosis, json_option, print_json, progress, say, vehicle_option
 from tools.cli.readings import readings
 from tools.cli.watch import watch
 
@@ -34,8 +34,9 @@ def measure(case: Path, report: Path | None, vehicle: str | None, as_json: bool)
     from tools.gap.assess import assess
 
     need("analysis")
+    loaded = load_case(case, vehicle)
+    compile_diagnosis(loaded)
     with progress("gap", 3) as advance:
-        loaded = load_case(case, vehicle)
         advance(1)
         found = assess(loaded)
         advance(1)
@@ -122,6 +123,7 @@ def diagnose(case: Path, out: Path, without: str | None, vehicle: str | None, as
     if isinstance(loaded.vehicle, OceanVehicle):
         _diagnose_ocean(loaded, out, as_json)
         return
+    compile_diagnosis(loaded)
     done = 0
     with progress("diagnose", STEPS) as advance:
 

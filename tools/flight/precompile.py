@@ -1,14 +1,17 @@
-"""Kernels compiled ahead, at installation or before the first flight: no flight ever waits for a compiler.
+"""Kernels compiled ahead, at installation or before they are first called: no flight ever waits for a compiler.
 
-A stamp in the cache of compiled kernels says that all of a flight are there. The cache's folder is named by a hash over
-every kernel, so a changed kernel has no stamp. Processes that start at once wait for the first of them.
+A stamp in the cache of compiled kernels says that all of one kind of work are there (FLIGHT;
+tools/diagnose/precompile has another). The cache's folder is named by a hash over every kernel, so a changed kernel
+has no stamp. Processes that start at once wait for the first of them.
 """
 
 import contextlib
 import fcntl
+import hashlib
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -39,29 +42,57 @@ class _Compiled(event.Listener):
             self._advance(1)
 
 
-def _stamp() -> Path | None:
-    """The file that says that all kernels of a flight are in the cache; None without a compiler (GLIDER_JIT=0)."""
-    return None if jit.CACHE_DIR is None else jit.CACHE_DIR / f"flight-numba-{numba_version}"
+@dataclass(frozen=True)
+class Work:
+    """What calls kernels, and has them compiled once."""
+
+    name: str  # of its stamp
+    count: Callable[[], int]  # how many kernels it knows: nearly all of them are called
+    call: Callable[[], None]  # every kernel, as it will be called
+
+    def stamp(self) -> Path | None:
+        """The file that says that all of them are in the cache; None without a compiler (GLIDER_JIT=0).
+
+        Numba's cache knows kernels by where their source stands: another checkout has a stamp of its own.
+        """
+        if jit.CACHE_DIR is None:
+            return None
+        place = hashlib.sha256(str(jit.PACKAGES_DIR).encode()).hexdigest()[:8]
+        return jit.CACHE_DIR / f"{self.name}-{place}-numba-{numba_version}"
+
+    def compile(self, advance: Callable[[int], None] = lambda n: None) -> dict[str, Any]:
+        """Call every kernel: `folder`, `kernels`, `seconds`. `advance(1)` hears of each that had to be compiled."""
+        begin = time.monotonic()
+        with event.install_listener("numba:compile", _Compiled(advance)):
+            self.call()
+        stamp = self.stamp()
+        if stamp is not None:
+            stamp.touch()
+        return {
+            "folder": None if jit.CACHE_DIR is None else str(jit.CACHE_DIR),
+            "kernels": jit.compiled_signatures(),
+            "seconds": time.monotonic() - begin,
+        }
 
 
-def ensure_compiled(say: Callable[[str], None], progress: Progress) -> None:
-    """Compile what a flight needs unless it is there, with a word and a bar; once, however many ask at once."""
-    stamp = _stamp()
+def ensure_compiled(work: Work, say: Callable[[str], None], progress: Progress) -> None:
+    """Compile what some work calls unless it is there, with a word and a bar; once, however many ask at once."""
+    stamp = work.stamp()
     if stamp is None or stamp.exists():
         return
-    with _alone(stamp.parent, lambda: say("another process is compiling the kernels: waiting for it")):
+    with _alone(work, stamp.parent, lambda: say("another process is compiling the kernels: waiting for it")):
         if stamp.exists():
             return
-        say("compiling the kernels, once for this version: about a minute")
-        with progress("compiling", count_kernels()) as advance:
-            done = compile_all(advance)
+        say(f"compiling the kernels of a {work.name}, once for this version: about a minute")
+        with progress("compiling", work.count()) as advance:
+            done = work.compile(advance)
         say(f"compiled in {done['seconds']:.0f} s, kept in {done['folder']}")
 
 
 @contextlib.contextmanager
-def _alone(folder: Path, waiting: Callable[[], None]) -> Iterator[None]:
+def _alone(work: Work, folder: Path, waiting: Callable[[], None]) -> Iterator[None]:
     """Hold the folder's lock; `waiting` is called where somebody else has it. A process that ends lets go of it."""
-    with open(folder / "compiling.lock", "w") as file:
+    with open(folder / f"compiling-{work.name}.lock", "w") as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -70,34 +101,20 @@ def _alone(folder: Path, waiting: Callable[[], None]) -> Iterator[None]:
         yield
 
 
-def count_kernels() -> int:
-    """How many kernels a flight on the simulated board knows: nearly all of them are called."""
+def _count() -> int:
     from tools.flight.compose import build_flight
 
     build_flight(mission="sawtooth", effects=EFFECTS)
     return jit.kernel_count()
 
 
-def compile_all(advance: Callable[[int], None] = lambda n: None) -> dict[str, Any]:
-    """Fly a moment with every controller on the simulated board, once with effects: `folder`, `kernels`, `seconds`.
-
-    `advance(1)` is called for every kernel that had to be compiled.
-    """
+def _fly() -> None:
+    """Fly a moment with every controller on the simulated board, once with effects."""
     from firmware.core.control.controllers import CONTROLLERS
 
-    begin = time.monotonic()
-    with event.install_listener("numba:compile", _Compiled(advance)):
-        for controller in CONTROLLERS:
-            _fly_a_moment(controller, {})
-        _fly_a_moment("pid", EFFECTS)
-    stamp = _stamp()
-    if stamp is not None:
-        stamp.touch()
-    return {
-        "folder": None if jit.CACHE_DIR is None else str(jit.CACHE_DIR),
-        "kernels": jit.compiled_signatures(),
-        "seconds": time.monotonic() - begin,
-    }
+    for controller in CONTROLLERS:
+        _fly_a_moment(controller, {})
+    _fly_a_moment("pid", EFFECTS)
 
 
 def _fly_a_moment(controller: str, effects: dict[str, dict[str, float]]) -> None:
@@ -122,3 +139,6 @@ def _fly_a_moment(controller: str, effects: dict[str, dict[str, float]]) -> None
             runtime.tick()
     finally:
         runtime.disarm()
+
+
+FLIGHT = Work("flight", _count, _fly)

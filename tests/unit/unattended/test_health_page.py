@@ -94,7 +94,7 @@ def test_compiled_ahead_means_compiled():
     """Another process finds every kernel of a flight in the cache."""
     done = json.loads(CliRunner().invoke(check, ["--compile", "--json"]).stdout)
     assert done["kernels"] > 0
-    script = "from tools.flight.precompile import compile_all; n = []; print(compile_all(n.append)['kernels'], len(n))"
+    script = "from tools.flight.precompile import FLIGHT; n = []; print(FLIGHT.compile(n.append)['kernels'], len(n))"
     found = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.split()
     assert int(found[0]) > 0
     assert int(found[1]) == 0

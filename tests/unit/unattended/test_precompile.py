@@ -6,55 +6,53 @@ import threading
 import time
 
 import pytest
+from numba.core import event
 
 from firmware.core import jit
 from tools.flight import precompile
 
 
 @pytest.fixture
-def cache(tmp_path, monkeypatch):
-    """An empty cache, and a compiler that takes a moment; what was said, and how often it compiled."""
-    said, compiled = [], []
+def work(tmp_path, monkeypatch):
+    """Work with an empty cache whose kernels take a moment to compile, and how often it was asked to."""
+    compiled, kernels = [], [object() for _ in range(4)]
 
-    def compile_all(advance):
+    def call():
         compiled.append(1)
-        for _ in range(4):
-            advance(1)
+        for kernel in kernels:
+            event.end_event("numba:compile", {"dispatcher": kernel})
             time.sleep(0.02)
-        precompile._stamp().touch()
-        return {"folder": str(tmp_path), "kernels": 4, "seconds": 0.1}
 
     monkeypatch.setattr(jit, "CACHE_DIR", tmp_path)
-    monkeypatch.setattr(precompile, "compile_all", compile_all)
-    monkeypatch.setattr(precompile, "count_kernels", lambda: 4)
-    return said, compiled
+    return precompile.Work("moment", lambda: 4, call), compiled
 
 
-def ask(said: list[str]) -> None:
+def ask(work: precompile.Work, said: list[str]) -> None:
     @contextlib.contextmanager
     def progress(label, total):
         done = []
         yield done.append
         said.append(f"{label}: {sum(done)}/{total}")
 
-    precompile.ensure_compiled(said.append, progress)
+    precompile.ensure_compiled(work, said.append, progress)
 
 
-def test_the_first_flight_says_that_it_compiles_the_second_nothing(cache):
-    said, compiled = cache
-    assert not precompile._stamp().exists()
-    ask(said)
-    assert [text.split(",")[0] for text in said] == ["compiling the kernels", "compiling: 4/4", "compiled in 0 s"]
-    assert precompile._stamp().exists()
-    ask(said)
+def test_the_first_flight_says_that_it_compiles_the_second_nothing(work):
+    (work, compiled), said = work, []
+    assert not work.stamp().exists()
+    ask(work, said)
+    heads = [text.split(",")[0] for text in said]
+    assert heads == ["compiling the kernels of a moment", "compiling: 4/4", "compiled in 0 s"]
+    assert work.stamp().exists()
+    ask(work, said)
     assert (len(said), len(compiled)) == (3, 1)
 
 
-def test_of_several_at_once_one_compiles_and_the_others_say_that_they_wait(cache, tmp_path):
-    said, compiled = cache
-    with open(tmp_path / "compiling.lock", "w") as other:
+def test_of_several_at_once_one_compiles_and_the_others_say_that_they_wait(work, tmp_path):
+    (work, compiled), said = work, []
+    with open(tmp_path / "compiling-moment.lock", "w") as other:
         fcntl.flock(other, fcntl.LOCK_EX)
-        asking = [threading.Thread(target=ask, args=(said,)) for _ in range(3)]
+        asking = [threading.Thread(target=ask, args=(work, said)) for _ in range(3)]
         for one in asking:
             one.start()
         deadline = time.monotonic() + 20.0
@@ -67,8 +65,15 @@ def test_of_several_at_once_one_compiles_and_the_others_say_that_they_wait(cache
     assert len(compiled) == 1
 
 
-def test_without_a_compiler_there_is_nothing_to_wait_for(cache, monkeypatch):
+def test_without_a_compiler_there_is_nothing_to_wait_for(work, monkeypatch):
     monkeypatch.setattr(jit, "CACHE_DIR", None)
-    said, compiled = cache
-    ask(said)
+    (work, compiled), said = work, []
+    ask(work, said)
     assert said == compiled == []
+
+
+def test_another_checkout_has_a_stamp_of_its_own(work, tmp_path, monkeypatch):
+    """Numba's cache knows kernels by where their source stands."""
+    own = work[0].stamp()
+    monkeypatch.setattr(jit, "PACKAGES_DIR", tmp_path)
+    assert work[0].stamp() != own
