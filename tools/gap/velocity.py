@@ -1,7 +1,9 @@
 """Velocity of an ocean glider through the water, row by row, with its standard deviation (docs/OCEAN.md, Velocity)."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +15,7 @@ from tools.data.runs.case import Case
 from tools.data.runs.run import Run, run_name, write_run
 from tools.inference.model import Model, effect_vector
 from tools.inference.ocean_inputs import lacking
+from tools.inference.parameters import NINETY
 from tools.inference.problem import Problem, problem_of
 
 FORM, MEASURED = 0.03, 0.005  # of a speed, 1 sigma: laws of drag and lift are not nature's; where it was measured
@@ -34,6 +37,7 @@ class Velocity:
     """
 
     run: Run
+    steady: np.ndarray  # (rows,) bool: where the model holds
     columns: dict[str, np.ndarray]  # (rows,) each, COLUMNS
 
 
@@ -46,19 +50,22 @@ def velocities(case: Case, model: Model) -> list[Velocity]:
         if missing is not None:
             raise InputError("an ocean glider's run needs it", source=run.path or run.name, column=missing)
     problem = problem_of(case, model)
-    return [of_run(problem.part(n)) for n in range(len(problem.runs))]
+    F = effect_vector(model)
+    moved = [(model.P + direction, F) for direction in directions(model)]
+    return [of_run(problem.part(n), (model.P, F), moved) for n in range(len(problem.runs))]
 
 
-def of_run(part: Problem) -> Velocity:
-    """The velocity of a problem's only run."""
-    P, F = part.model.P, effect_vector(part.model)
+def of_run(
+    part: Problem, model: tuple[np.ndarray, np.ndarray], moved: Iterable[tuple[np.ndarray, np.ndarray]]
+) -> Velocity:
+    """The velocity of a problem's only run by a model (P, F); `moved`: models 1 sigma off, each its own way."""
+    P, F = model
     gains = part.filter(P, F)
     u, w = components(gains.X)
     form = MEASURED if part.seen[at.Y_SPEED] else FORM
     var_u, var_w = np.square(form * u), np.square(form * w)
-    for direction in directions(part.model):
-        other = part.filter(P + direction, F)
-        moved_u, moved_w = components(other.X)
+    for other in moved:
+        moved_u, moved_w = components(part.filter(*other).X)
         var_u, var_w = var_u + (moved_u - u) ** 2, var_w + (moved_w - w) ** 2
     path = gains.X[:, at.X_GLIDE]
     var_u = var_u + (gains.path[:, 0] * np.cos(path)) ** 2 + (w * PITCH_NOISE) ** 2
@@ -69,7 +76,7 @@ def of_run(part: Problem) -> Velocity:
     yaw = part.recording.inputs[:, at.U_YAW]
     along, across = var_u, (u * HEADING) ** 2
     water = gains.X[:, at.X_WATER]
-    return Velocity(part.runs[0], {
+    return Velocity(part.runs[0], ~unsteady, {
         "u_m_s": u, "w_m_s": w, "vn_m_s": u * np.cos(yaw), "ve_m_s": u * np.sin(yaw), "water_w_m_s": water,
         "sd_u_m_s": np.sqrt(var_u), "sd_w_m_s": np.sqrt(var_w),
         "sd_vn_m_s": np.sqrt(along * np.cos(yaw) ** 2 + across * np.sin(yaw) ** 2),
@@ -90,6 +97,18 @@ def directions(model: Model) -> list[np.ndarray]:
     if model.spread is not None:
         sigma[np.abs(model.spread).max(axis=0) > 0.0] = 0.0
     return [*found, *(np.where(np.arange(len(sigma)) == n, sigma, 0.0) for n in np.flatnonzero(sigma > 0.0))]
+
+
+def mean_speed(found: Velocity) -> dict[str, Any]:
+    """Mean horizontal speed `u_m_s` of the rows flown steadily with its 90 % interval `ci90`, and of the water
+    `water_w_m_s`, rms, m/s; all rows where none is steady.
+
+    Errors of the model are the same in all rows: the mean is no surer than they are.
+    """
+    rows = found.steady if found.steady.any() else np.ones_like(found.steady)
+    mean, sigma = (float(found.columns[name][rows].mean()) for name in ("u_m_s", "sd_u_m_s"))
+    water = float(np.sqrt(np.mean(found.columns["water_w_m_s"][rows] ** 2)))
+    return {"u_m_s": mean, "ci90": [mean - NINETY * sigma, mean + NINETY * sigma], "water_w_m_s": water}
 
 
 def write(found: list[Velocity], out: Path) -> list[Path]:

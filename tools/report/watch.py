@@ -22,12 +22,19 @@ class _Cause(msgspec.Struct):
     unit: str | None
 
 
+class _Velocity(msgspec.Struct):
+    u_m_s: float
+    ci90: tuple[float, float]
+    water_w_m_s: float
+
+
 class _Run(msgspec.Struct):
     run: str
     verdict: str
     causes: list[_Cause]
     gap: float | None
     skipped: str | None
+    velocity: _Velocity | None = None
 
 
 class _Event(msgspec.Struct):
@@ -72,6 +79,22 @@ def _size(one: _Cause | _Event) -> str:
     return f"{words.number(one.size)}{unit} (90 %: {words.number(low)} to {words.number(high)})"
 
 
+def _speed(found: _Velocity | None) -> str:
+    if found is None:
+        return ""
+    low, high = (f"{100.0 * value:.1f}" for value in found.ci90)
+    return f"{100.0 * found.u_m_s:.1f} ({low} to {high})"
+
+
+def _health(found: _Watch) -> str:
+    """How the runs stand, in a sentence."""
+    judged = [run for run in found.runs if run.skipped is None]
+    changed = [run for run in judged if run.verdict != "none"]
+    lasting = [one.label or "an unknown change" for one in found.events if one.to_run is None]
+    now = f"; in the last run still: {words.joined(lasting)}" if lasting else ""
+    return f"{len(judged) - len(changed)} of {len(judged)} runs that could be judged are as before{now}."
+
+
 def _event(one: _Event) -> dict[str, Any]:
     place = " ".join(str(one.where[0][key]) for key in ("subsystem", "element")) if one.where else ""
     if one.label is None:
@@ -92,12 +115,15 @@ def report_html(found: _Watch) -> str:
             "name": run.run, "verdict": run.skipped or run.verdict, "kind": "skipped" if run.skipped else run.verdict,
             "gap": "" if run.gap is None else words.number(run.gap),
             "causes": ", ".join(f"{one.label} {_size(one)}".strip() for one in run.causes[:2]),
+            "speed": _speed(run.velocity),
+            "water": "" if run.velocity is None else f"{100.0 * run.velocity.water_w_m_s:.2f}",
         }
         for run in found.runs
     ]  # fmt: skip
     context = {
         "events": [_event(one) for one in found.events], "runs": runs, "cautions": found.cautions,
-        "reference": words.joined(found.reference),
+        "reference": words.joined(found.reference), "health": _health(found),
+        "speeds": any(run.velocity is not None for run in found.runs),
     }  # fmt: skip
     return render("watch.html", context).replace(" %", "\N{NO-BREAK SPACE}%")
 

@@ -42,12 +42,14 @@ class RunVerdict:
     causes: list[RunCause]
     gap: float | None  # total, of the model that all runs share
     skipped: str | None
+    velocity: dict[str, Any] | None = None  # through the water, of an ocean glider (tools/gap/velocity, mean_speed)
 
     def plain(self) -> dict[str, Any]:
-        return {
+        found = {
             "run": self.run, "verdict": self.verdict, "causes": [cause.plain() for cause in self.causes],
             "gap": self.gap, "skipped": self.skipped,
         }  # fmt: skip
+        return found if self.velocity is None else found | {"velocity": self.velocity}
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,8 @@
 """`glider gap watch`: what is different, since when. The flow from runs to the answer (docs/WATCH.md)."""
 
 from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -9,6 +11,7 @@ from tools.data.errors import InputError
 from tools.data.runs.case import Case
 from tools.data.runs.run import Run
 from tools.gap.measure import run_gap
+from tools.gap.velocity import mean_speed, of_run
 from tools.inference.predict import fly
 from tools.inference.problem import Problem, cut, problem_of
 from tools.inference.shared_parameters import shared_parameters
@@ -53,8 +56,9 @@ def watch(case: Case, reference: Case | None = None, say: Callable[[str], None] 
             verdicts.append(RunVerdict(run.name, NONE, [], None, skipped[n]))
             continue
         k = here.index(n)
-        gap = shared_gap(problem.part(k), history.flights, k)
-        verdicts.append(run_verdict(history, settled, k, run.name, gap))
+        gap = shared_gap(parts[k], history.flights)
+        verdict = run_verdict(history, settled, k, run.name, gap)
+        verdicts.append(replace(verdict, velocity=velocity(parts[k], history, k)))
     events = [event_answer(history, one, told_by) for one in settled]
     learned = [told_by[k] for k in np.flatnonzero(learned_from)]
     return Watch(verdicts, events, learned, cautions(case, reference, learned, skipped, names))
@@ -113,7 +117,16 @@ def unchanged(history: History, learned_from: np.ndarray) -> np.ndarray:
     return ~inside if early else learned_from
 
 
-def shared_gap(part: Problem, flights: Flights, n: int) -> float | None:
+def velocity(part: Problem, history: History, n: int) -> dict[str, Any] | None:
+    """Mean velocity of an ocean glider's run through the water, by what that run flies by; None of other vehicles."""
+    if not isinstance(part.case.vehicle, OceanVehicle):
+        return None
+    shared, own = history.flights.shared, history.flights.raw[n].at
+    moved = (shared.model(part, own + direction) for direction in history.uncertain(n))
+    return mean_speed(of_run(part, shared.model(part, own), moved))
+
+
+def shared_gap(part: Problem, flights: Flights) -> float | None:
     """Total gap of a run to the model that all runs share."""
     Y = fly(part, *flights.shared.model(part, flights.values))
     total = run_gap(part.kind.measures, part.runs[0], Y, cut(part).listed[0]).total

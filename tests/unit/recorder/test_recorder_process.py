@@ -33,7 +33,7 @@ def _fly(recorder, ticks, start=0):
         channel.commit(number / 50)
 
 
-def _await(condition, seconds=5.0):
+def _await(condition, seconds=30.0):
     deadline = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < deadline, "waited in vain"

@@ -5,14 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.ocean import as_case, fly_dives, without
+from support.ocean import Dives, as_case, fly_dives, without
 
 from sim_backend.ocean.catalogue import NOT_ASKED, ONE_ON_DEPTH, catalogue
 from sim_backend.ocean.vehicle import shipped_vehicles
 from tools.cli.common import report_errors
 from tools.cli.main import cli
 from tools.data.runs import columns as names
-from tools.data.runs.run import load_run
+from tools.data.runs.run import Run, load_run
+from tools.inference.ocean_inputs import unsteady
 from tools.watch.usable import usable_dive
 from tools.watch.watch import watch
 
@@ -23,8 +24,12 @@ OTHER_SEED = 2
 @pytest.fixture(scope="module", params=[False, True], ids=["depth alone", "with speed"])
 def stepped(request, tmp_path_factory):
     """A mission whose drag steps up, watched; whether its speed was measured."""
-    runs = fly_dives(DIVES, ("drag", SIZE, FIRST), speed=request.param).runs
-    return watch(as_case(tmp_path_factory.mktemp("step") / "case", runs)), request.param
+    folder = tmp_path_factory.mktemp("step") / "case"
+    return watch(as_case(folder, stepped_dives(request.param).runs)), request.param
+
+
+def stepped_dives(speed: bool) -> Dives:
+    return fly_dives(DIVES, ("drag", SIZE, FIRST), speed=speed)
 
 
 @pytest.fixture(scope="module")
@@ -44,6 +49,22 @@ def test_a_step_of_drag_is_found_in_its_dive(stepped):
     if event.label == "drag":
         low, high = event.sized.ci90
         assert low < SIZE < high
+
+
+def steady_speed(run: Run, true: np.ndarray) -> float:
+    """Mean of the true speed (every 60 s) where the glider flies steadily, m/s."""
+    return float(np.interp(run.t, 60.0 * np.arange(len(true)), true)[~unsteady(run)].mean())
+
+
+def test_each_dive_has_its_mean_speed_with_what_changed(stepped):
+    found, speed = stepped
+    dives = stepped_dives(speed)
+    true = [steady_speed(run, flown) for run, flown in zip(dives.runs, dives.truth, strict=True)]
+    said = [run.velocity for run in found.runs]
+    held = [one["ci90"][0] < value < one["ci90"][1] for one, value in zip(said, true, strict=True)]
+    assert sum(held) >= DIVES - 1
+    widths = [(high - low) / one["u_m_s"] for one in said for low, high in [one["ci90"]]]
+    assert max(widths) < 0.3  # of the speed
 
 
 def test_without_speed_drag_lift_and_pitch_scale_are_one(stepped):
