@@ -13,7 +13,7 @@ from tools.watch.watch import watch
 
 QUIET = 0.01  # m/s
 FIRST = "run015"  # from which on the roll trim is another
-MOST_RUNS = 36  # of a mission: as many again take three times as long
+MOST_RUNS = 24  # of a mission: the step, and half as many runs again behind it
 
 
 def judged(shared: Path, name: str, out: Path) -> tuple[OceanIdentification, Watch, Case]:

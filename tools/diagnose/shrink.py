@@ -120,21 +120,20 @@ def squares(found: list[RunGap]) -> np.ndarray:
     return np.array([gap.total for gap in found]) ** 2
 
 
-def rms(values: np.ndarray, pick: np.ndarray) -> float:
-    """Root mean of squares over picked runs."""
-    return float(np.sqrt(values[pick].mean()))
+def rms(values: np.ndarray, picks: np.ndarray) -> np.ndarray:
+    """Root mean of squares over picked runs, of each row of picks (draws, runs)."""
+    return np.sqrt(values[picks].mean(axis=1))
 
 
 def over_runs(
-    value: Callable[[np.ndarray], float], rng: np.random.Generator, count: int
+    value: Callable[[np.ndarray], np.ndarray], rng: np.random.Generator, count: int
 ) -> tuple[float, tuple[float, float]]:
-    """A figure of picked runs: over all, and its 90 % interval by bootstrap."""
-    whole = np.arange(count)
+    """A figure of picked runs, value(picks (draws, runs)): over all runs, and its 90 % interval by bootstrap."""
+    whole = float(value(np.arange(count)[None])[0])
     if count == 1:
-        return value(whole), (np.nan, np.nan)
-    drawn = np.array([value(rng.choice(whole, count)) for _ in range(BOOTSTRAP)])
-    low, high = np.quantile(drawn, [0.05, 0.95])
-    return value(whole), (float(low), float(high))
+        return whole, (np.nan, np.nan)
+    low, high = np.quantile(value(rng.integers(0, count, (BOOTSTRAP, count))), [0.05, 0.95])
+    return whole, (float(low), float(high))
 
 
 def left_out_squares(search: Search, hypothesis: Hypothesis) -> np.ndarray:
@@ -198,7 +197,7 @@ def shrink_further(search: Search, hypothesis: Hypothesis, before: list[RunGap])
     runs, _ = gaps(search.problem, left_out(search, hypothesis))
     b, a = squares(before), squares(runs)
     rng = np.random.default_rng(SEED)
-    shrunk, ci90 = over_runs(lambda pick: 1.0 - rms(a, pick) / rms(b, pick), rng, len(runs))
+    shrunk, ci90 = over_runs(lambda picks: 1.0 - rms(a, picks) / rms(b, picks), rng, len(runs))
     return Further(runs, float(np.sqrt(a.mean())), shrunk, ci90)
 
 
@@ -207,11 +206,11 @@ def shrinkage_of(runs: dict[str, list[RunGap]], predictions: dict[str, list[np.n
     total = {name: squares(found) for name, found in runs.items()}
     rng, count = np.random.default_rng(SEED), len(runs[BEFORE])
 
-    def closed_of(pick: np.ndarray) -> float:
-        b, a, f = (rms(total[name], pick) for name in (BEFORE, AFTER, FLOOR))
-        return (b - a) / max(b - f, 1e-9)
+    def closed_of(picks: np.ndarray) -> np.ndarray:
+        b, a, f = (rms(total[name], picks) for name in (BEFORE, AFTER, FLOOR))
+        return (b - a) / np.maximum(b - f, 1e-9)
 
-    shrunk, ci90 = over_runs(lambda pick: 1.0 - rms(total[AFTER], pick) / rms(total[BEFORE], pick), rng, count)
+    shrunk, ci90 = over_runs(lambda picks: 1.0 - rms(total[AFTER], picks) / rms(total[BEFORE], picks), rng, count)
     closed, closed_ci90 = over_runs(closed_of, rng, count)
     mean = {name: float(np.sqrt(values.mean())) for name, values in total.items()}
     return Shrinkage(

@@ -32,7 +32,7 @@ class Stage:
     def plain(self) -> dict[str, Any]:
         """The entry in diagnosis.json: channels and total, and the total's 90 % interval over runs."""
         whole = squares(self.gaps)
-        _, ci90 = over_runs(lambda pick: rms(whole, pick), np.random.default_rng(SEED), len(whole))
+        _, ci90 = over_runs(lambda picks: rms(whole, picks), np.random.default_rng(SEED), len(whole))
         return {"stage": self.name, "added": self.added, "gap": by_channel(self.gaps), "ci90": list(ci90)}
 
 
