@@ -151,9 +151,9 @@ class PredictionError:
         normal, slope = np.zeros((len(values), len(values))), np.zeros(len(values))
         for one in cuts:
             e, J = self.columns(values, gains, one)
-            weight, _ = self.weights(e)
-            normal += (J * weight) @ J.T / len(cuts)
-            slope += (J * weight) @ e / len(cuts)
+            weighted = J * (self.weights(e)[0] / len(cuts))
+            normal += weighted @ J.T
+            slope += weighted @ e
         return normal, slope
 
     def columns(self, values: np.ndarray, gains: Gains, windows: Windows) -> tuple[np.ndarray, np.ndarray]:
