@@ -34,6 +34,7 @@ CALLS: tuple[tuple[str, str | None], ...] = (
     ("check --board twin", None),
     ("log info flight.mcap", None),
     ("log export flight.mcap --out case", None),
+    ("log fetch --help", None),  # its work is ssh's: test_log_fetch.py
     ("log repair flight.mcap --out mended.mcap", None),
     ("import csv log.csv --map map.toml --out imported", None),
     ("import qualisys capture.tsv --out captured", "analysis"),

@@ -68,7 +68,7 @@ class Dock:
     def deploy(self, *words: str, cut_after: int = 1 << 60) -> subprocess.CompletedProcess:
         command = [sys.executable, "-m", "tools.deploy.push", NAME, "--root", self.vehicle, "--source", self.source]
         command += ["--build", self.folder / "build", "--python", sys.executable, *words]
-        environment = self.server.cut_after(cut_after) | {"PYTHONPATH": str(ROOT), "PIP_NO_COMPILE": "1"}
+        environment = self.server.reached(there=cut_after) | {"PYTHONPATH": str(ROOT), "PIP_NO_COMPILE": "1"}
         done = subprocess.run(command, cwd=self.folder, env=environment, capture_output=True, text=True, timeout=300)
         if "Could not find a version" in done.stderr:
             pytest.skip("no package index to fetch wheels from")

@@ -13,35 +13,35 @@ import pytest
 
 SSHD = shutil.which("sshd", path=f"{os.environ.get('PATH', '')}:/usr/sbin:/usr/local/sbin")
 NAME = "vehicle"  # what ssh calls it
-# Passes a connection on, and breaks it off after so many bytes on their way there: a cable that is pulled.
+# Passes a connection on, and breaks it off after so many bytes there or back: a cable that is pulled.
 CABLE = """
 import os, select, socket, sys
-line, left = socket.create_connection(("127.0.0.1", int(sys.argv[1]))), int(sys.argv[2])
+line = socket.create_connection(("127.0.0.1", int(sys.argv[1])))
+left = {0: int(sys.argv[2]), line: int(sys.argv[3])}
 while True:
     ready, _, _ = select.select([0, line], [], [])
     for one in ready:
         data = os.read(0, 65536) if one == 0 else line.recv(65536)
-        if one == 0:
-            left -= len(data)
-        if not data or left < 0:
+        left[one] -= len(data)
+        if not data or left[one] < 0:
             sys.exit()
         line.sendall(data) if one == 0 else os.write(1, data)
 """
 
 
 class Server:
-    """`cut_after(bytes)`: the environment in which ssh reaches it, over a cable that holds for so many bytes."""
+    """`reached`: the environment in which ssh reaches it, over a cable that holds for so many bytes there and back."""
 
     def __init__(self, folder: Path, port: int):
         self.folder, self.port = folder, port
         (folder / "cable.py").write_text(CABLE)
 
-    def cut_after(self, count: int = 1 << 60) -> dict[str, str]:
-        config = self.folder / f"config-{count}"
+    def reached(self, there: int = 1 << 60, back: int = 1 << 60) -> dict[str, str]:
+        config = self.folder / f"config-{there}-{back}"
         config.write_text(
             f"Host {NAME}\n HostName 127.0.0.1\n IdentityFile {self.folder}/key\n IdentitiesOnly yes\n"
             f" UserKnownHostsFile {self.folder}/known\n StrictHostKeyChecking accept-new\n LogLevel ERROR\n"
-            f" ProxyCommand {sys.executable} {self.folder}/cable.py {self.port} {count}\n"
+            f" ProxyCommand {sys.executable} {self.folder}/cable.py {self.port} {there} {back}\n"
         )
         return {**os.environ, "GLIDER_SSH": f"ssh -F {config}"}
 

@@ -98,6 +98,10 @@ class Host:
         words = iter(said.splitlines())
         return {path: (int(size), digest.split()[0]) for size, digest, path in zip(words, words, words, strict=True)}
 
+    def digest(self, path: str, size: int) -> str:
+        """SHA-256 of a file's first `size` bytes, hex."""
+        return self.run(f"head -c {size} {shlex.quote(path)} | sha256sum").split()[0]
+
     def get(self, path: str, local: Path, size: int, progress: Progress = lambda n: None) -> None:
         """Bring a file's first `size` bytes here, behind what `local` has of them; nothing is proved here."""
         have = local.stat().st_size if local.exists() else 0
