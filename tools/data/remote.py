@@ -33,9 +33,9 @@ class Host:
 
     def __init__(self, name: str, folder: Path):
         self.name = name
-        own = shlex.split(os.environ.get("GLIDER_SSH", "")) or ["ssh"]
+        self._own = shlex.split(os.environ.get("GLIDER_SSH", "")) or ["ssh"]
         self._folder = folder
-        self._ssh = [*own, *OPTIONS, "-o", f"ControlPath={folder}/%C"]
+        self._ssh = [*self._own, *OPTIONS, "-o", f"ControlPath={folder}/%C"]
 
     def connect(self) -> None:
         """One connection for all commands to come, so that a password is asked for once; RemoteError without one."""
@@ -54,6 +54,11 @@ class Host:
     def command(self, line: str, *, tty: bool = False) -> list[str]:
         """The words that run a shell's line over there."""
         return [*self._ssh, *(["-t"] if tty else []), "--", self.name, line]
+
+    def forward(self, here: Path, there: str) -> list[str]:
+        """The words that lead a socket here to one over there, for as long as they run; a connection of its own."""
+        words = ["-S", "none", "-N", "-o", "ExitOnForwardFailure=yes", "-L", f"{here}:{there}", "--", self.name]
+        return [*self._own, *OPTIONS, *words]
 
     def run(self, line: str) -> str:
         """A shell's line; what it printed. RemoteError with its last line where it failed."""
