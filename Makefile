@@ -8,7 +8,7 @@ DEMO_STAMP := $(VENV)/.installed-demo
 # Python keeps the bytecode of what it reads: the tests start some hundred programs.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: setup demo picture test check lint types contract benchmark deploy clean
+.PHONY: setup demo picture test check lint types contract benchmark deploy rollback clean
 
 # Kernels are compiled here, with a word about it, and again only when they change.
 setup: $(STAMP)
@@ -56,11 +56,15 @@ contract: setup
 benchmark: setup
 	$(BIN)/glider benchmark
 
-# HOST: where ssh reaches the glider's computer. What is committed is installed, with its kernels compiled there.
-deploy:
+# HOST: where ssh reaches the glider's computer. What is committed is installed there beside what flies, checked, and
+# switched to; `rollback` goes back to the release before.
+deploy: $(STAMP)
 	@test -n "$(HOST)" || { echo 'make deploy HOST=user@glider' >&2; exit 2; }
-	git archive HEAD | ssh $(HOST) 'rm -rf glider-src && mkdir glider-src && tar x -C glider-src'
-	ssh -t $(HOST) 'sudo sh glider-src/tools/deploy/install.sh'
+	$(BIN)/python -m tools.deploy.push $(HOST)
+
+rollback: $(STAMP)
+	@test -n "$(HOST)" || { echo 'make rollback HOST=user@glider' >&2; exit 2; }
+	$(BIN)/python -m tools.deploy.push $(HOST) --rollback
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis

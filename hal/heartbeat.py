@@ -24,10 +24,11 @@ W_BEAT_NS, W_TICKS = 8, 9  # the loop's, each tick
 W_MISSED, W_WORST_NS, W_LATE_NS, W_PHASE, W_MODE, W_LEG, W_LEGS = 10, 11, 12, 13, 14, 15, 16  # the loop's, each second
 W_RECORDER_NS, W_RECORDER_LEVEL, W_WRITTEN, W_DROPPED, W_DISK_ERRORS, W_RECORDER_EXPECTED = range(17, 23)
 W_RSS_BYTES, W_FILES = 23, 24
-W_GUARD_NS, W_GUARD_PID, W_GUARD_STATUS = 32, 33, 34  # the out-of-band process's
+W_GUARD_NS, W_GUARD_PID, W_GUARD_STATUS, W_GUARD_STAGE = 32, 33, 34, 35  # the out-of-band process's
 WORDS = 64
 # Values, float64, the loop's, each second.
 V_TIME_S, V_DEPTH_M, V_PITCH_RAD, V_ROLL_RAD, V_BALLAST_KG, V_SLIDER_M, V_BATTERY_V = range(7)
+V_GUARD_DEPTH_M = 7  # the out-of-band process's, on the way up
 VALUES = 16
 _VALUES_AT = 8 * WORDS
 _TEXT_AT, TEXT_BYTES = 1024, 256

@@ -1,9 +1,13 @@
-"""The way up without the flight: pump to its light end, mass aft, servo to the middle; asked again until it is so."""
+"""The way up without the flight: pump to its light end, mass aft, servo to the middle; asked again until it is so.
+
+Where the plan has a pressure transmitter it is seen whether the vehicle rises, and what follows where it does not.
+"""
 
 import struct
 import time
 
-from hal.outofband.plan import AxisPlan, Plan, ServoPlan, WirePlan
+from hal.outofband.plan import CODES, WORDS, AxisPlan, Plan, PressurePlan, ServoPlan, WirePlan
+from hal.outofband.rise import Rise, Stage
 from hal.outofband.wire import (
     Port,
     path_words,
@@ -18,6 +22,12 @@ FAULT, RUNNING = 1, 4  # bits of a drive's status
 CLEAR_S = 2.0  # between two tries to clear an alarm
 AGAIN_S = 5.0  # after which a path that shows no effect is written anew
 SHARE_S = 2.0  # a port that is still held after this is opened all the same
+STUCK_SHARE = 1.0 / 3.0  # of the time to rise; twenty readings of the default 30 s, equal to the last bit: it is stuck
+SAID = {
+    Stage.BLIND: "no depth", Stage.RISING: "under water", Stage.SURFACED: "at the surface",
+    Stage.AGAIN: "does not rise at {depth:.0f} m (row 18): pumping again",
+    Stage.HARDWARE: "does not rise at {depth:.0f} m (row 18): no more feeding of the hardware watchdog",
+}  # fmt: skip
 
 
 class Ascent:
@@ -27,6 +37,11 @@ class Ascent:
         self.plan = plan
         self._ports: dict[str, Port] = {}
         self._axes = [Axis(axis, self) for axis in plan.axes]
+        self._transmitter = None if plan.pressure is None else Transmitter(plan.pressure, self)
+        self._rise = None if plan.pressure is None else Rise(
+            plan.pressure.patience_s, plan.pressure.step_m, plan.pressure.surface_m
+        )  # fmt: skip
+        self.stage, self.depth = Stage.BLIND, float("nan")
         self._began = time.monotonic()
         self.pump_heard_at = 0.0  # monotonic, s; 0: not heard yet
         self.reached_port_at = self._began  # any port
@@ -48,7 +63,19 @@ class Ascent:
                 self.pump_heard_at = time.monotonic()
         if self.plan.servo is not None:
             said.append(self._centre(self.plan.servo))
+        if self._rise is not None and self._transmitter is not None:
+            self._judge(self._rise, self._transmitter.read())
+            said.append(SAID[self.stage].format(depth=self.depth))
         return ", ".join(said)
+
+    def _judge(self, rise: Rise, depth: float | None) -> None:
+        """Row 18: pump again when it is time to."""
+        before, self.stage = self.stage, rise.look(time.monotonic(), depth)
+        if depth is not None:
+            self.depth = depth
+        if self.stage >= Stage.AGAIN and self.stage != before:
+            for axis in self._axes:
+                axis.again()
 
     def _centre(self, servo: ServoPlan) -> str:
         port = self.port(servo.port, servo.baud)
@@ -61,13 +88,43 @@ class Ascent:
             port.close()
 
 
+class Transmitter:
+    """Depth from the pressure transmitter."""
+
+    def __init__(self, plan: PressurePlan, ascent: Ascent):
+        self.plan, self._ascent = plan, ascent
+        self._registers: list[int] | None = None
+        self._changed_at = 0.0
+
+    def read(self) -> float | None:
+        """Depth, m; None where the transmitter says nothing that can be, or always the same."""
+        plan, now = self.plan, time.monotonic()
+        port = self._ascent.port(plan.port, plan.baud)
+        if port is None:
+            return None
+        request = read_frame(plan.id, plan.function, plan.address, plan.words)
+        registers = registers_of(port.exchange(request, 5 + 2 * plan.words), plan.id, plan.function, plan.words)
+        if registers is None:
+            return None
+        words = registers[plan.at : plan.at + WORDS[plan.kind]]
+        if words != self._registers:
+            self._registers, self._changed_at = words, now
+        number = struct.unpack(f">{CODES[plan.kind]}", struct.pack(f">{len(words)}H", *words))[0]
+        pressure = number * plan.pa_per_step - plan.zero_pa
+        if not plan.low_pa <= pressure <= plan.high_pa or now - self._changed_at > STUCK_SHARE * plan.patience_s:
+            return None
+        return (pressure - plan.surface_pa) / plan.pa_per_m
+
+
 class Axis:
     """A drive on its way to an end."""
 
     def __init__(self, plan: AxisPlan, ascent: Ascent):
         self.plan, self._ascent = plan, ascent
         self.answered = False
+        self._end = plan.end_m
         self._zero_drift = 0.0  # counts between the drive's zero and the draw-wire's
+        self._forced = False
         self._written: int | None = None
         self._written_at = self._cleared_at = -1e9
 
@@ -82,13 +139,14 @@ class Axis:
         position = self._read(port, plan.position, 2)
         counts = None if position is None else struct.unpack(">i", struct.pack(">HH", *position))[0]
         self.answered = status is not None or position is not None
-        if status is not None and status[0] & FAULT:
+        if self._forced or (status is not None and status[0] & FAULT):
+            self._forced = False
             self._clear(port)
         if counts is not None and plan.wire is not None:
             measured = self._measure(plan.wire)
             if measured is not None:
                 self._zero_drift = counts - plan.zero_counts - plan.counts_per_m * measured
-        target = round(plan.zero_counts + self._zero_drift + plan.counts_per_m * plan.end_m)
+        target = round(plan.zero_counts + self._zero_drift + plan.counts_per_m * self._end)
         near = plan.tolerance_m * abs(plan.counts_per_m)
         if counts is not None and abs(counts - target) <= near:
             return f"{plan.name} at its end"
@@ -98,6 +156,13 @@ class Axis:
         if moved_on or stands or time.monotonic() - self._written_at > AGAIN_S:
             self._send(port, target)
         return f"{plan.name} on its way" if self.answered else f"{plan.name}: no answer"
+
+    def again(self) -> None:
+        """As if nothing had been done yet, and as far as it goes: the next step clears alarms, whatever the drive says
+        of them, and writes the path anew."""
+        self._end, self._written = self.plan.last_m, None
+        self._written_at = self._cleared_at = -1e9
+        self._forced = True
 
     def _read(self, port: Port, address: int, count: int) -> list[int] | None:
         reply = port.exchange(read_frame(self.plan.id, 3, address, count), 5 + 2 * count)

@@ -6,7 +6,7 @@ flight ends in order. As a service it goes on, and at its start looks at the sta
 when the power went is brought up, whatever has become of its flight.
 
 It feeds the hardware watchdog and systemd's, only while every part answers: the loop, the recorder where one is
-expected, and itself; on the way up, the pump.
+expected, and itself; on the way up, the pump. Where the vehicle does not rise (rise.py) the hardware's is fed no more.
 """
 
 import argparse
@@ -22,6 +22,7 @@ from hal.heartbeat import Guard, Heartbeat, Status
 from hal.notify import notify
 from hal.outofband.ascent import Ascent
 from hal.outofband.plan import NAME, Plan, PlanError, read_plan
+from hal.outofband.rise import Stage
 from hal.realtime import leave_real_time, lock_memory, take_priority
 from hal.state_file import Phase, StateFile
 
@@ -58,14 +59,14 @@ class Feeder:
         except OSError as error:
             say(f"{path}: {error.strerror}: no hardware watchdog")
 
-    def feed(self) -> None:
-        """Hold both off for one more of their periods."""
+    def feed(self, *, hardware: bool = True) -> None:
+        """Hold both off for one more of their periods, or systemd's alone."""
         now = time.monotonic()
         if now < self._next:
             return
         self._next = now + FEED_S
         notify("WATCHDOG=1")
-        if self._fd >= 0:
+        if self._fd >= 0 and hardware:
             with contextlib.suppress(OSError):
                 os.write(self._fd, b"\0")
 
@@ -182,6 +183,9 @@ class Watch:
             words = self._pulse.words
             words[hb.W_GUARD_PID], words[hb.W_GUARD_STATUS] = os.getpid(), status
             words[hb.W_GUARD_NS] = time.monotonic_ns()
+            if self._ascent is not None:
+                words[hb.W_GUARD_STAGE] = self._ascent.stage
+                self._pulse.values[hb.V_GUARD_DEPTH_M] = self._ascent.depth
 
     # --- the way up -------------------------------------------------------------------------------------------------
     def ascend(self, why: str) -> None:
@@ -195,8 +199,7 @@ class Watch:
             self.plan = Plan("", (), None)  # nothing to go up with; asked for again at every round
         self._ascent, self._ascent_began = Ascent(self.plan), time.monotonic()
         self._next_step = 0.0
-        # A disk that hangs must not hold this process up.
-        threading.Thread(target=self._write_state, args=(why,), daemon=True).start()
+        self._remember(why)
 
     def _end_flight(self) -> None:
         """Kill the process that holds the heartbeat, and wait until the system has given its ports back."""
@@ -208,6 +211,10 @@ class Watch:
                     if pid > 1:
                         os.kill(pid, signal.SIGKILL)
             time.sleep(0.01)
+
+    def _remember(self, why: str) -> None:
+        """Given up, on the disk; one that hangs must not hold this process up."""
+        threading.Thread(target=self._write_state, args=(why,), daemon=True).start()
 
     def _write_state(self, why: str) -> None:
         with contextlib.suppress(OSError):
@@ -222,7 +229,10 @@ class Watch:
                 self._read_plan()
                 if self.plan is not None and self.plan.axes:
                     self._ascent = ascent = Ascent(self.plan)
+            before = ascent.stage
             said = ascent.step()
+            if ascent.stage == Stage.HARDWARE != before:
+                self._remember("fault 18: no ascent out of band")
             if said != self._said:
                 self._said = said
                 say(said)
@@ -234,7 +244,7 @@ class Watch:
                 return True
         heard = max(ascent.pump_heard_at, self._ascent_began)
         if time.monotonic() - heard < PUMP_SILENT_S:
-            self.feeder.feed()
+            self.feeder.feed(hardware=ascent.stage != Stage.HARDWARE)
         give_up = ascent.plan.give_up_s
         if give_up and time.monotonic() - ascent.reached_port_at > give_up:
             say(f"no port for {give_up:g} s: nothing is left to bring up")

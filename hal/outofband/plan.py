@@ -6,15 +6,18 @@ alone.
 
 import json
 import os
+import struct
 import zlib
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
 NAME = "outofband.json"
-FORMAT = 1
+FORMAT = 2
 BEAT_LIMIT_S = 1.5  # a heartbeat older than this is gone; with what looking takes, noticed within 2 s
 LONGEST = 20_000  # bytes of a file
+CODES = {"u16": "H", "i16": "h", "u32": "I", "i32": "i", "f32": "f"}  # of struct
+WORDS = {kind: struct.calcsize(code) // 2 for kind, code in CODES.items()}
 
 
 class PlanError(ValueError):
@@ -55,6 +58,7 @@ class AxisPlan:
     zero_counts: float
     counts_per_m: float
     end_m: float
+    last_m: float  # beyond it, where the vehicle does not rise: as far as the drive may go at all
     tolerance_m: float
     rpm: int
     ramp_ms: int
@@ -74,12 +78,36 @@ class ServoPlan:
 
 
 @dataclass(frozen=True)
+class PressurePlan:
+    """The pressure transmitter, and when a vehicle counts as rising; depth = (pressure - zero - surface) / pa_per_m."""
+
+    port: str
+    baud: int
+    id: int
+    function: int
+    address: int
+    words: int  # read together
+    at: int  # where the pressure begins among them
+    kind: str  # u16, i16, u32, i32 or f32, high word first
+    pa_per_step: float
+    zero_pa: float
+    surface_pa: float  # absolute, where depth is zero
+    pa_per_m: float
+    low_pa: float  # readings outside are rejected
+    high_pa: float
+    surface_m: float  # at the surface above this depth
+    step_m: float  # less than this within patience_s is no rise
+    patience_s: float
+
+
+@dataclass(frozen=True)
 class Plan:
     """`axes` in the order in which they are served: the pump first."""
 
     flight: str
     axes: tuple[AxisPlan, ...]
     servo: ServoPlan | None
+    pressure: PressurePlan | None = None
     beat_limit_s: float = BEAT_LIMIT_S
     give_up_s: float = 0.0  # ports gone for so long end the process; 0: never
     watchdog: str = ""  # the hardware watchdog's device; empty: none
@@ -119,13 +147,23 @@ def read_plan(path: Path) -> Plan:
 
 def _plan(table: dict[str, Any]) -> Plan:
     axes = tuple(_made(AxisPlan, {**axis, "wire": _optional(WirePlan, axis["wire"])}) for axis in table["axes"])
-    plan = _made(Plan, {**table, "axes": axes, "servo": _optional(ServoPlan, table["servo"])})
+    servo, pressure = _optional(ServoPlan, table["servo"]), _optional(PressurePlan, table["pressure"])
+    plan = _made(Plan, {**table, "axes": axes, "servo": servo, "pressure": pressure})
     if not axes:
         raise ValueError("no pump")
+    if pressure is not None:
+        _check_pressure(pressure)
     for axis in axes:
         if axis.counts_per_m == 0.0 or (axis.wire is not None and axis.wire.per_m == 0.0):
             raise ValueError(f"{axis.name}: a scale of 0")
     return plan
+
+
+def _check_pressure(pressure: PressurePlan) -> None:
+    if pressure.kind not in CODES or not 0 <= pressure.at <= pressure.words - WORDS[pressure.kind]:
+        raise ValueError("PressurePlan: no such number in its registers")
+    if not (pressure.pa_per_m > 0.0 and pressure.patience_s > 0.0):
+        raise ValueError("PressurePlan: pa_per_m and patience_s have to be positive")
 
 
 _KINDS: dict[Any, tuple[type, ...]] = {

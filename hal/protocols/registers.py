@@ -113,7 +113,7 @@ def from_registers(kind: str, registers: list[int], at: int = 0) -> float:
     return struct.unpack(">" + code, struct.pack(f">{words}H", *registers[at : at + words]))[0]
 
 
-def _steps(value: Value) -> float:
+def step_of(value: Value) -> float:
     """What a step of a register's number is worth, SI (deg C for temperatures)."""
     return value.scale * (UNITS[value.unit].factor if value.unit in UNITS else 1.0)
 
@@ -121,13 +121,13 @@ def _steps(value: Value) -> float:
 def value_of(block: Block, name: str, registers: list[int]) -> float:
     """A named value of a block that was read, in SI (deg C for temperatures)."""
     value = block.value[name]
-    return from_registers(value.type, registers, value.at) * _steps(value)
+    return from_registers(value.type, registers, value.at) * step_of(value)
 
 
 def registers_of(block: Block, name: str, number: float) -> dict[int, int]:
     """The registers that hold a named value, in SI, by address: the inverse of `value_of`."""
     value = block.value[name]
-    words = to_registers(value.type, number / _steps(value))
+    words = to_registers(value.type, number / step_of(value))
     return {block.address + value.at + i: word for i, word in enumerate(words)}
 
 

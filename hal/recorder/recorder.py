@@ -82,8 +82,10 @@ class Recorder:
         epoch_ns: int = 0,
         slots: int = SLOTS,
         sync_period_s: float = SYNC_PERIOD_S,
+        onlookers: str | os.PathLike | None = None,
     ):
-        """`attachments`: name -> text; `metadata`: name -> text; `epoch_ns` is the log time of t = 0.
+        """`attachments`: name -> text; `metadata`: name -> text; `epoch_ns` is the log time of t = 0; `onlookers`: path
+        of the socket for a live view (onlookers.py), None: there is none.
 
         ValueError where two specs share a topic.
         """
@@ -103,6 +105,7 @@ class Recorder:
             "metadata": {**{str(k): str(v) for k, v in (metadata or {}).items()}, RECORDING: os.urandom(8).hex()},
             "epoch_ns": epoch_ns,
             "period_s": sync_period_s,
+            "onlookers": os.fspath(onlookers) if onlookers else "",
         }
         self._config_fd: int | None = _shared_text(json.dumps(config))
         self._process: subprocess.Popen[bytes] | None = None

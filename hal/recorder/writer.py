@@ -17,6 +17,7 @@ import time
 from hal.realtime import leave_real_time
 from hal.recorder import disk, ring
 from hal.recorder.logfile import PART, LogFile
+from hal.recorder.onlookers import Onlookers
 from hal.recorder.schema import specs_from_json
 
 POLL_S = 0.01
@@ -71,6 +72,7 @@ class Recording:
         self._path, self._period_s = path, period_s
         self._next_sync = 0.0
         self._complained = False
+        self.onlookers: Onlookers | None = None
 
     def step(self) -> bool:
         """Take what is there, up to a batch; True if there may be more."""
@@ -81,6 +83,10 @@ class Recording:
             if taken is None:
                 break
             self._write(taken)
+            if self.onlookers is not None:
+                self.onlookers.offer(taken)
+        if self.onlookers is not None:
+            self.onlookers.serve()
         now = time.monotonic()
         self._reader.control[ring.BEAT] = time.monotonic_ns()
         if now >= self._next_sync:
@@ -151,6 +157,17 @@ def read_config(start: dict) -> dict:
         return {**json.loads(os.pread(file.fileno(), size, 0)), **start}
 
 
+def admit(config: dict) -> Onlookers | None:
+    """The socket for a live view, where one was asked for; no recording ends for want of it."""
+    if not config["onlookers"]:
+        return None
+    try:
+        return Onlookers(config["onlookers"], json.loads(config["specs"]), config["metadata"])
+    except OSError as error:
+        complain(f"{config['onlookers']}: {error.strerror or error}: no live view")
+        return None
+
+
 def main() -> int:
     """Exit 0 with the log complete, 1 otherwise."""
     _become_background()
@@ -177,6 +194,7 @@ def main() -> int:
         disk.close(fd, config["path"], keep=False)
         answer({"error": file.last_errno, "message": os.strerror(file.last_errno)})
         return 1
+    recording.onlookers = admit(config)
     answer({"ready": True})
 
     ending = {"ended": "the flight's process died"}
@@ -186,6 +204,8 @@ def main() -> int:
             ending = json.loads(line)
             break
     report = recording.finish(ending)
+    if recording.onlookers is not None:
+        recording.onlookers.close()
     answer(report)
     return 0 if report["complete"] else 1
 

@@ -24,16 +24,19 @@ NOT_ON_THE_GLIDER = {
     "matplotlib", "scipy", "jinja2", "pandas", "polars", "xarray", "h5netcdf", "gsw", "dbdreader", "pytest",
     "hypothesis",
 }  # fmt: skip
-BROUGHT = ("analysis", "bench", "campaign", "identify", "ocean", "slocum")
+BROUGHT = ("analysis", "bench", "campaign", "identify", "live", "ocean", "slocum")
 
 # In this order, each with the extra that it asks for; None: it does its work without any.
 CALLS: tuple[tuple[str, str | None], ...] = (
     ("fly --mission spiral --log flight.mcap", None),
+    ("live", "live"),
+    ("live --layout glider.json", None),
     ("missions", None),
     ("check", None),
     ("check --board twin", None),
     ("log info flight.mcap", None),
     ("log export flight.mcap --out case", None),
+    ("log fetch --help", None),  # its work is ssh's: test_log_fetch.py
     ("log repair flight.mcap --out mended.mcap", None),
     ("import csv log.csv --map map.toml --out imported", None),
     ("import qualisys capture.tsv --out captured", "analysis"),

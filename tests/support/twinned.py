@@ -46,8 +46,8 @@ class Twins:
 
 
 @contextmanager
-def twins(folder: Path):
-    command = [sys.executable, "-m", "tools.cli.main", "twin", "--dir", str(folder)]
+def twins(folder: Path, *extra: str):
+    command = [sys.executable, "-m", "tools.cli.main", "twin", "--dir", str(folder), *extra]
     process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
     try:
         assert process.stdout.readline(), "the twins did not start"

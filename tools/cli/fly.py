@@ -23,6 +23,16 @@ def next_log(mission: str) -> Path:
     raise FileExistsError(f"{mission}-NNN.mcap: no number left")
 
 
+def live_socket(folder: Path | None) -> Path:
+    """Where onlookers find a flight: beside its heartbeat."""
+    from hal.heartbeat import run_folder
+    from tools.flight.live_view import NAME
+
+    folder = folder or run_folder()
+    folder.mkdir(parents=True, exist_ok=True, mode=0o750)
+    return folder / NAME
+
+
 def peak_rss_mb() -> float | None:
     """Largest resident memory of this process so far, MB; None where the system does not say."""
     try:
@@ -47,6 +57,7 @@ def peak_rss_mb() -> float | None:
     type=click.Path(path_type=Path, file_okay=False),
     help="Folder of the vehicle's state and heartbeat, on devices.",
 )
+@click.option("--live", "live", is_flag=True, help="Let `glider live` look on, through a local socket.")
 @click.option("--acknowledge", is_flag=True, help="A person has looked after a flight that was given up or broke off.")
 @click.option("--yes", is_flag=True, help="Arm without asking the person at the terminal, on devices.")
 @click.option("--priority", type=click.IntRange(1, 90), help="Real-time priority (SCHED_FIFO); 50 is usual.")
@@ -55,8 +66,8 @@ def peak_rss_mb() -> float | None:
 @click.option("--effect", "effects", multiple=True, metavar="LABEL:NAME=VALUE", help="Add an effect to the plant.")
 @json_option
 def fly(
-    mission, vehicle, board, log_file, no_log, seed, realtime, state_folder, acknowledge, yes, priority, lock_memory,
-    core, effects, as_json,
+    mission, vehicle, board, log_file, no_log, seed, realtime, state_folder, live, acknowledge, yes, priority,
+    lock_memory, core, effects, as_json,
 ) -> None:  # fmt: skip
     """Fly a mission and record it.
 
@@ -90,7 +101,8 @@ def fly(
     if path is None:
         recorder = NullRecorder(specs)
     else:
-        recorder = Recorder(path, specs, attachments=flight.texts, metadata=metadata)
+        onlookers = live_socket(state_folder) if live else None
+        recorder = Recorder(path, specs, attachments=flight.texts, metadata=metadata, onlookers=onlookers)
 
     ensure_compiled(FLIGHT, say, progress)
     if flight.control.controller != "pid":

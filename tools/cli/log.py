@@ -1,11 +1,11 @@
-"""`glider log`: look into, export or repair an onboard log."""
+"""`glider log`: look into, export, repair an onboard log, or fetch it off the vehicle."""
 
 from pathlib import Path
 from typing import Any
 
 import click
 
-from tools.cli.common import DONE, FAILED, json_option, print_json, say
+from tools.cli.common import DONE, FAILED, json_option, print_json, progress, say
 
 LEVELS = {10: "debug", 20: "info", 30: "warn", 40: "error", 50: "fatal"}
 _SHOWN_EVENTS = 20
@@ -13,7 +13,7 @@ _SHOWN_EVENTS = 20
 
 @click.group()
 def log() -> None:
-    """Export, look into or repair an onboard log."""
+    """Export, look into, repair an onboard log, or fetch it off the vehicle."""
 
 
 def _show(line: str) -> None:
@@ -235,3 +235,41 @@ def repair(file: Path, out: Path | None, as_json: bool) -> None:
             say(f"  {line}")
         click.echo(report.out)
     raise SystemExit(DONE if report.out is None or report.messages else FAILED)
+
+
+@log.command()
+@click.argument("host")
+@click.argument("names", nargs=-1)
+@click.option("--dir", "folder", default="/var/lib/glider/logs", show_default=True, help="Folder of the logs aboard.")
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("logs"), show_default=True)
+@json_option
+def fetch(host: str, names: tuple[str, ...], folder: str, out: Path, as_json: bool) -> None:
+    """Bring logs off the vehicle by ssh: all that are not here yet, or those NAMES (sawtooth-001, spiral-*).
+
+    HOST is what ssh knows, user@glider. A fetch that broke off goes on where it was; a log counts as here only when it
+    has its check sum aboard. Nothing is deleted or written aboard. Exit code 1: not all are here; run it again.
+    """
+    from tools.data.log import fetch as logs
+    from tools.data.remote import host as connect
+
+    done: list[logs.Fetched] = []
+
+    def tell(one: logs.Fetched) -> None:
+        done.append(one)
+        say(one.message or f"{one.name}: {one.bytes} bytes, {one.became}")
+
+    failure = ""
+    try:
+        with connect(host) as vehicle:
+            sizes = logs.list_logs(vehicle, folder, names)
+            if not sizes:
+                failure = f"{host}:{folder}: no log{f' named {chr(32).join(names)}' if names else ''}"
+            with progress(f"from {host}", sum(sizes.values())) as advance:
+                logs.fetch(vehicle, folder, sizes, out, tell, advance)
+    except logs.RemoteError as error:
+        failure = f"{error}{'; fetch again, it goes on where it was' if error.lost else ''}"
+    if failure:
+        say(f"glider: {failure}")
+    if as_json:
+        print_json({"out": str(out), "logs": [vars(one) for one in done], "message": failure})
+    raise SystemExit(FAILED if failure or any(one.became == "refused" for one in done) else DONE)

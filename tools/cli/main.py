@@ -11,6 +11,7 @@ from tools.cli.common import report_errors
 # name -> (module, attribute, one line). The line stands here so that --help need not import the command.
 COMMANDS = {
     "fly": ("tools.cli.fly", "fly", "fly a mission, in simulation or on a board"),
+    "live": ("tools.cli.live", "live", "watch a flight in Foxglove while it flies"),
     "missions": ("tools.cli.missions", "missions", "list the missions"),
     "check": ("tools.cli.check", "check", "check vehicle, board and mission files"),
     "bench": ("tools.cli.bench", "bench", "bench console: read, jog, sweep, calibrate a board's devices"),

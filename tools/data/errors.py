@@ -6,6 +6,7 @@ from importlib import metadata
 from importlib.util import find_spec
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2  # exit codes of every command
+IMPORTED_AS = {"foxglove-sdk": "foxglove"}  # packages that are imported by another name than they are installed by
 
 
 class InputError(ValueError):
@@ -33,7 +34,8 @@ def extras() -> dict[str, tuple[str, ...]]:
         extra = re.search(r"extra == ['\"](\w+)", condition)
         if extra and not asked.startswith("glider["):
             names = re.findall(r"[a-zA-Z][\w-]*", re.split("[<>=!~]", asked)[0])  # dask[distributed] is two
-            found[extra[1]] = (*found.get(extra[1], ()), *(name.replace("-", "_") for name in names))
+            imported = (IMPORTED_AS.get(name, name.replace("-", "_")) for name in names)
+            found[extra[1]] = (*found.get(extra[1], ()), *imported)
     return found
 
 

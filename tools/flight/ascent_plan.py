@@ -1,14 +1,21 @@
 """A plan for the out-of-band process, made of a board file at arming."""
 
+from firmware.core.vehicle.layout import GRAVITY
+from firmware.model.supervisor_settings import SupervisorTable
 from hal.boardfile import DeviceFile, DriveTable, WireTable, preset_of
 from hal.devices import DeviceBoard
-from hal.outofband.plan import AxisPlan, Plan, ServoPlan, WirePlan
+from hal.outofband.plan import AxisPlan, Plan, PressurePlan, ServoPlan, WirePlan
+from hal.protocols.registers import step_of
 
 NEAR_M = 0.0005  # an actuator so near its end has arrived
 
 
-def make_plan(board: DeviceBoard, *, flight: str, watchdog: str = "", give_up_s: float = 0.0) -> Plan:
-    """The board file's addresses, and the ends that its drivers would not pass either."""
+def make_plan(
+    board: DeviceBoard, *, flight: str, settings: SupervisorTable, water_density: float, watchdog: str = "",
+    give_up_s: float = 0.0,
+) -> Plan:  # fmt: skip
+    """The board file's addresses, the ends that its drivers would not pass either, and the vehicle file's numbers for
+    what counts as rising; water_density in kg/m3."""
     file, source = board.file, board.source
     axes = tuple(
         _axis(file, source, drive.name, wire, drive.limits[0] / drive.unit)
@@ -19,7 +26,24 @@ def make_plan(board: DeviceBoard, *, flight: str, watchdog: str = "", give_up_s:
         port=port.path, baud=port.baud, channel=file.servo.channel, number=file.servo.number, crc=file.servo.crc,
         quarter_us=round(4.0 * file.servo.zero_us),
     )  # fmt: skip
-    return Plan(flight=flight, axes=axes, servo=servo, watchdog=watchdog, give_up_s=give_up_s)
+    pressure = _pressure(file, source, settings, board.surface_pressure, GRAVITY * water_density)
+    return Plan(flight=flight, axes=axes, servo=servo, pressure=pressure, watchdog=watchdog, give_up_s=give_up_s)
+
+
+def _pressure(
+    file: DeviceFile, source: str, settings: SupervisorTable, surface_pa: float, pa_per_m: float
+) -> PressurePlan:
+    table = file.beacon
+    registers, port = preset_of(file, "beacon", source), file.port[table.port]
+    block = registers.block["pressure" if "pressure" in registers.block else "all"]
+    value = block.value["pressure"]
+    return PressurePlan(
+        port=port.path, baud=port.baud, id=table.id, function=block.function, address=block.address, words=block.count,
+        at=value.at, kind=value.type, pa_per_step=step_of(value), zero_pa=float(table.zero_pa),
+        surface_pa=float(surface_pa), pa_per_m=float(pa_per_m), low_pa=float(table.range_pa[0]),
+        high_pa=float(table.range_pa[1]), surface_m=float(settings.surface_m), step_m=float(settings.ascent_step_m),
+        patience_s=float(settings.no_ascent_s),
+    )  # fmt: skip
 
 
 def _axis(file: DeviceFile, source: str, name: str, wire: str, end_m: float) -> AxisPlan:
@@ -33,6 +57,7 @@ def _axis(file: DeviceFile, source: str, name: str, wire: str, end_m: float) -> 
         absolute=registers.command["absolute"], trigger=registers.command["trigger"],
         clear_alarm=registers.command["clear_alarm"],
         zero_counts=float(table.zero_counts), counts_per_m=float(table.counts_per_m), end_m=float(end_m),
+        last_m=float(table.limits_m[0]),
         tolerance_m=NEAR_M, rpm=max(1, round(table.rpm)), ramp_ms=table.ramp_ms,
         wire=_wire(file, source, wire) if table.follow == "wire" else None,
     )  # fmt: skip

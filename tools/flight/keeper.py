@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from firmware.core.layouts.supervisor_layout import RECORDER
+from firmware.core.vehicle.seawater import water_density
 from hal import heartbeat as hb
 from hal.devices import DeviceBoard
 from hal.heartbeat import Guard, Heartbeat, Held, Status
@@ -113,9 +114,10 @@ class Keeper:
         board = self._flight.board
         if not isinstance(board, DeviceBoard):
             raise BoardError(f"board '{board.name}' has no devices to bring up")
+        density = float(water_density(0.0, 20.0, self._flight.mission.site.salinity))
         plan = make_plan(
-            board, flight=self._name, watchdog=os.environ.get("GLIDER_WATCHDOG", ""),
-            give_up_s=WITHOUT_PORTS_S if self._twin else 0.0,
+            board, flight=self._name, settings=self._flight.vehicle.supervisor, water_density=density,
+            watchdog=os.environ.get("GLIDER_WATCHDOG", ""), give_up_s=WITHOUT_PORTS_S if self._twin else 0.0,
         )  # fmt: skip
         write_plan(self.state_folder / PLAN, plan)
         self._start_guard(GUARD_START_S)

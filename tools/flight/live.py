@@ -10,11 +10,16 @@ from typing import Any
 from firmware.autopilot import MODES
 from hal import heartbeat as hb
 from hal.heartbeat import Guard, Heartbeat, Status
+from hal.outofband.rise import Stage
 from hal.recorder.condition import Level
 from tools.data.errors import InputError
 
 PERIOD_S = 1.0
 LATE_S = 1.0  # a heartbeat older than this is no good sign
+STAGES = {
+    "blind": "no depth", "rising": "under water", "surfaced": "at the surface", "again": "does not rise, pumping again",
+    "hardware": "does not rise, hardware watchdog no longer fed",
+}  # fmt: skip
 SHELF_S = 5.0  # nor is a watch that was not heard of for so long
 
 
@@ -52,6 +57,8 @@ def snapshot(folder: Path) -> dict[str, Any]:
             "recorder_age_s": look.recorder_age_s, "records_written": words[hb.W_WRITTEN],
             "records_dropped": words[hb.W_DROPPED], "disk_errors": words[hb.W_DISK_ERRORS],
             "resident_mb": words[hb.W_RSS_BYTES] / 1e6, "descriptors": words[hb.W_FILES],
+            "ascent": Stage(stage).name.lower() if (stage := words[hb.W_GUARD_STAGE]) in list(Stage) else "blind",
+            "ascent_depth_m": values[hb.V_GUARD_DEPTH_M] if look.guard == Guard.ASCENDING else float("nan"),
             "out_of_band": look.guard.name.lower(), "out_of_band_age_s": look.guard_age_s,
         }  # fmt: skip
         found["problems"] = _problems(look, alive, found)
@@ -63,7 +70,8 @@ def snapshot(folder: Path) -> dict[str, Any]:
 def _problems(look: hb.Pulse, alive: bool, found: dict[str, Any]) -> list[str]:
     problems = []
     if look.guard == Guard.ASCENDING:
-        problems.append("the out-of-band process is bringing the vehicle up")
+        depth = f", {found['ascent_depth_m']:.1f} m deep" if math.isfinite(found["ascent_depth_m"]) else ""
+        problems.append(f"the out-of-band process is bringing the vehicle up: {STAGES[found['ascent']]}{depth}")
     elif look.status == Status.DONE:
         return ["no flight is under way"]
     elif not alive:

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hal.board import BoardRequest, board_builder
-from hal.outofband.plan import PlanError, read_plan, write_plan
+from hal.outofband.plan import FORMAT, PlanError, read_plan, write_plan
 from tools.data.sources import load_vehicle
 from tools.flight.ascent_plan import make_plan
 from tools.flight.compose import load_board_file
@@ -22,7 +22,10 @@ def plan():
     board = board_builder("devices")(
         BoardRequest(text=file.text, source=file.source, vehicle=load_vehicle("roughie"), water_density=1000.0)
     )
-    return make_plan(board, flight="sawtooth-001", watchdog="/dev/watchdog")
+    settings = load_vehicle("roughie").supervisor
+    return make_plan(
+        board, flight="sawtooth-001", settings=settings, water_density=1000.0, watchdog="/dev/watchdog"
+    )
 
 
 def test_the_plan_is_what_the_board_file_says(plan):
@@ -37,6 +40,13 @@ def test_the_plan_is_what_the_board_file_says(plan):
     assert pump.end_m < 0.0 > slider.end_m
     assert plan.servo is not None
     assert plan.servo.quarter_us == 6000
+    transmitter, settings = plan.pressure, load_vehicle("roughie").supervisor
+    assert transmitter is not None
+    assert (transmitter.id, transmitter.address, transmitter.words, transmitter.kind) == (1, 0x0100, 2, "f32")
+    assert transmitter.pa_per_step == pytest.approx(1e5)  # bar
+    assert transmitter.pa_per_m == pytest.approx(9806.65)
+    assert (transmitter.patience_s, transmitter.step_m) == (settings.no_ascent_s, settings.ascent_step_m)
+    assert [axis.last_m for axis in plan.axes] == [-0.034, -0.062]
     # A broken wire reads below 3.8 mA: what is not believed begins there.
     assert pump.wire.low_m == pytest.approx(max(-0.045, (3800 - 12000) / 160000))
 
@@ -80,6 +90,12 @@ def test_cut_anywhere_or_with_a_flipped_bit_it_is_refused(plan, tmp_path):
         lambda table: table["axes"][0]["wire"].update(per_m=0.0),
         lambda table: table["axes"][0].update(wire=[]),
         lambda table: table.update(axes=None),
+        lambda table: table["pressure"].update(kind="f64"),
+        lambda table: table["pressure"].update(at=1),
+        lambda table: table["pressure"].update(at=-1),
+        lambda table: table["pressure"].update(pa_per_m=0.0),
+        lambda table: table["pressure"].update(patience_s=-1.0),
+        lambda table: table["pressure"].pop("zero_pa"),
     ],
 )
 def test_what_makes_no_sense_is_refused_though_its_sum_is_right(plan, tmp_path, change):
@@ -88,7 +104,7 @@ def test_what_makes_no_sense_is_refused_though_its_sum_is_right(plan, tmp_path, 
     table = json.loads(json.loads(path.read_text())["plan"])
     change(table)
     body = json.dumps(table)
-    path.write_text(json.dumps({"format": 1, "crc32": f"{zlib.crc32(body.encode()):08x}", "plan": body}))
+    path.write_text(json.dumps({"format": FORMAT, "crc32": f"{zlib.crc32(body.encode()):08x}", "plan": body}))
     with pytest.raises(PlanError, match=r"plan\.json: "):
         read_plan(path)
 

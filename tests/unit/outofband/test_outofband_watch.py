@@ -98,7 +98,8 @@ def watch(tmp_path, monkeypatch):
     nowhere = str(tmp_path / "no-port")
     pump = AxisPlan(
         name="pump", port=nowhere, baud=115200, id=8, status=1, position=2, path=3, auxiliary=4, absolute=1, trigger=1,
-        clear_alarm=1, zero_counts=0.0, counts_per_m=1.0, end_m=0.0, tolerance_m=0.1, rpm=1, ramp_ms=1, wire=None,
+        clear_alarm=1, zero_counts=0.0, counts_per_m=1.0, end_m=0.0, last_m=0.0, tolerance_m=0.1, rpm=1, ramp_ms=1,
+        wire=None,
     )  # fmt: skip
     write_plan(tmp_path / NAME, Plan("test", (pump,), None, watchdog=str(tmp_path / "watchdog")))
     found = Watch(tmp_path, tmp_path, service=False)

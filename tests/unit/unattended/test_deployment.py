@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from hal.heartbeat import run_folder, state_folder
+from hal.state_file import Phase, StateFile
 
 ROOT = Path(__file__).resolve().parents[3]
 DEPLOY = ROOT / "tools" / "deploy"
@@ -29,8 +30,8 @@ def test_systemd_finds_nothing_wrong_with_a_unit(name, tmp_path):
         pytest.skip("no systemd here")
     for other in UNITS:
         text = (DEPLOY / other).read_text()
-        for program in ("/opt/glider/bin/python", "/opt/glider/bin/glider"):
-            text = text.replace(program, sys.executable)
+        for program in ("python", "glider"):
+            text = text.replace(f"/opt/glider/releases/@RELEASE@/bin/{program}", sys.executable)
         (tmp_path / other.replace("@.", "@x.")).write_text(text)
     file = tmp_path / name.replace("@.", "@x.")
     done = subprocess.run(["systemd-analyze", "verify", "--man=no", str(file)], capture_output=True, text=True)
@@ -65,19 +66,67 @@ def test_the_units_options_exist():
     assert {word for word in words if word.startswith("--")} <= names
 
 
-def test_the_script_is_good_shell_and_refuses_an_old_python(tmp_path):
-    script = DEPLOY / "install.sh"
-    assert subprocess.run(["sh", "-n", str(script)]).returncode == 0
+@pytest.fixture
+def release(tmp_path):
+    """A release's folder without its wheels, for this machine."""
+    folder = tmp_path / "release"
+    folder.mkdir()
+    shutil.copy(DEPLOY / "install.sh", folder)
+    version = f"{sys.version_info.major}.{sys.version_info.minor}"
+    (folder / "RELEASE").write_text(f"release=x\nversion=1\nmachine={os.uname().machine}\npython={version}\n")
+    (folder / "SHA256SUMS").write_text("")
+    return folder
+
+
+def install(release, root, **settings):
+    environment = {**os.environ, "PYTHON": sys.executable, **settings, "ROOT": str(root)}
+    return subprocess.run(["sh", release / "install.sh"], env=environment, capture_output=True, text=True)
+
+
+def test_the_script_refuses_an_old_python_and_another_machine_before_it_touches_anything(release, tmp_path):
     old = tmp_path / "python3"
     old.write_text("#!/bin/sh\nexit 1\n")
     old.chmod(0o755)
-    done = subprocess.run(
-        ["sh", str(script)], env={**os.environ, "PYTHON": str(old), "DESTDIR": str(tmp_path / "root")},
-        capture_output=True, text=True,
-    )  # fmt: skip
-    assert done.returncode == 2
-    assert done.stderr == "install: Python 3.11 or newer is needed\n"
+    done = install(release, tmp_path / "root", PYTHON=str(old))
+    assert (done.returncode, done.stderr) == (2, "install: Python 3.11 or newer is needed\n")
+    text = (release / "RELEASE").read_text()
+    (release / "RELEASE").write_text(text.replace(os.uname().machine, "pdp11"))
+    done = install(release, tmp_path / "root")
+    assert (done.returncode, done.stderr) == (2, f"install: made for another machine than {os.uname().machine}\n")
+    (release / "RELEASE").unlink()
+    assert install(release, tmp_path / "root").stderr.endswith("this is no release: make deploy HOST=user@glider\n")
     assert not (tmp_path / "root").exists()
+
+
+def test_a_release_passes_its_self_check_unless_vehicle_files_or_state_are_against_it(tmp_path):
+    """The real one, in a process of its own, on the kernels of this tree."""
+    files, state = tmp_path / "etc", tmp_path / "state"
+    files.mkdir()
+    for path in ("hal/boards/roughie.toml", "firmware/model/vehicles/roughie.toml",
+                 "firmware/guidance/missions/sawtooth.toml"):  # fmt: skip
+        shutil.copy(ROOT / path, files / {"boards": "board.toml", "vehicles": "vehicle.toml"}.get(
+            Path(path).parent.name, "sawtooth.toml"))  # fmt: skip
+
+    def check():
+        command = [sys.executable, "-m", "tools.deploy.selfcheck", "--files", files, "--state", state]
+        done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
+        return done.returncode, done.stderr.splitlines()[-1]
+
+    code, said = check()
+    assert code == 0, said
+    assert said.startswith("self-check: flight: ")
+    assert said.endswith(" ticks, log complete")
+
+    with (files / "sawtooth.toml").open("a") as file:
+        file.write("\nwings = 2\n")
+    code, said = check()
+    assert code == 1
+    assert said.startswith(f"self-check: files: FAILED: {files / 'sawtooth.toml'}")
+
+    StateFile(state).write(Phase.DIVING, flight="dive")
+    assert check() == (
+        1, f"self-check: state: FAILED: {state}: the flight before: diving; bring it up and look at it first"
+    )  # fmt: skip
 
 
 def test_the_wishes_are_reported_whatever_comes_of_them():

@@ -27,6 +27,7 @@ def shows() -> list[Show]:
           for code in range(1, 7)),
         *(Show(sup.FAULT_NOT_ARMED, kind, loading.arming(kind), "refuse to arm", 1.0)
           for kind in ("depth not zero", "limits unset", "never calibrated", "wrong hash")),
+        Show(sup.FAULT_NO_ASCENT, "out of band", processes.no_rise, "pump again, then HW", 30.0),
         Show(sup.FAULT_LOOP_HUNG, "process killed", processes.loop_ends(signal.SIGKILL), "OOB", 2.0),
         Show(sup.FAULT_LOOP_HUNG, "loop hung", processes.loop_ends(signal.SIGSTOP), "OOB", 2.0),
         Show(sup.FAULT_LOOP_HUNG, "restart", processes.restart, "ascent only", 2.0),

@@ -63,6 +63,19 @@ def loop_ends(how: signal.Signals) -> Callable[[bool, Path], Came]:
     return show
 
 
+def no_rise(disabled: bool, folder: Path) -> Came:
+    """On the way up out of band the vehicle stays at its depth; in simulated time, the depth read twice a second."""
+    from hal.outofband.guard import STEP_S
+    from hal.outofband.rise import Rise, Stage
+
+    rise = Rise(patience_s=30.0, step_m=0.3, surface_m=0.4)
+    seen: dict[Stage, float] = {}
+    for i in range(200):
+        seen.setdefault(rise.look(STEP_S * i, None if disabled else 10.0), STEP_S * i)
+    both = Stage.AGAIN in seen and Stage.HARDWARE in seen
+    return came(both, "pump again, then HW", "none", after=seen.get(Stage.AGAIN, 0.0))
+
+
 def restart(disabled: bool, folder: Path) -> Came:
     """Killed in every phase after arming: the next start only ascends."""
     from hal.state_file import Phase, StateFile

@@ -1,0 +1,136 @@
+"""`python -m tools.deploy.selfcheck`: is this release fit to take over on the glider's computer?
+
+Asked of a release that is installed beside the one that flies, before it is switched to. It changes nothing but its
+own kernels' cache: no port is opened, and what flies goes on.
+"""
+
+import argparse
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+
+from hal.state_file import StateFile
+from tools.cli.common import DONE, FAILED, progress, say
+
+READY_S = 20.0  # for the out-of-band process to say READY=1 and feed the watchdog
+FLIGHT_S = 300.0
+PLUNGE = """format = 1
+name = "selfcheck"
+time_limit_s = 60.0
+[site]
+name = "simulated pool"
+depth_m = 6.0
+[[leg]]
+duration_s = 4.0
+pitch_deg = -20.0
+ballast_kg = 0.05
+"""
+
+
+class Unfit(RuntimeError):
+    """What a release cannot do; str() says it in a line."""
+
+
+def see_state(folder: Path) -> str:
+    """Nobody is to be brought up: the process that does would be replaced under way."""
+    if not folder.is_dir():
+        return "none yet"
+    found = StateFile(folder).read()
+    if found.must_ascend:
+        raise Unfit(f"{folder}: the flight before: {found.phase.name.lower()}; bring it up and look at it first")
+    return found.phase.name.lower()
+
+
+def see_kernels() -> str:
+    """Compiled for this release, so that its first flight need not."""
+    from firmware.core.jit import CACHE_DIR
+    from tools.flight.precompile import FLIGHT, ensure_compiled
+
+    ensure_compiled(FLIGHT, say, progress)
+    return "plain Python (GLIDER_JIT=0)" if CACHE_DIR is None else str(CACHE_DIR)
+
+
+def see_files(folder: Path) -> str:
+    """The vehicle's own board, vehicle and missions are read, and go together: a newer version may be stricter."""
+    from tools.flight.compose import build_flight
+
+    board, vehicle = folder / "board.toml", folder / "vehicle.toml"
+    missions = [path for path in sorted(folder.glob("*.toml")) if "leg" in tomllib.loads(path.read_text())]
+    for mission in missions:
+        build_flight(mission=str(mission), vehicle=str(vehicle), board=str(board))
+    return f"{len(missions)} missions" if missions else "no mission yet"
+
+
+def see_flight() -> str:
+    """A short flight on the simulated board, recorded and read back."""
+    from tools.data.log.reader import read_log
+
+    with tempfile.TemporaryDirectory() as folder:
+        mission, log = Path(folder, "selfcheck.toml"), Path(folder, "selfcheck.mcap")
+        mission.write_text(PLUNGE)
+        command = [sys.executable, "-m", "tools.cli.main", "fly", "--json", "--mission", str(mission)]
+        command += ["--log", str(log)]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=FLIGHT_S)
+        try:
+            result = json.loads(done.stdout)
+        except ValueError:
+            raise Unfit((done.stderr.strip().splitlines() or ["it said nothing"])[-1]) from None
+        if done.returncode or not read_log(log).complete:
+            raise Unfit(result["reason"] or "its log is not complete")
+    return f"{result['ticks']} ticks, log complete"
+
+
+def see_out_of_band() -> str:
+    """The process that brings the vehicle up starts, feeds systemd's watchdog and ends in order."""
+    with tempfile.TemporaryDirectory() as folder, socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as line:
+        line.bind(f"{folder}/notify")
+        line.settimeout(READY_S)
+        command = [sys.executable, "-m", "hal.outofband", "--service", "--run", folder, "--state", folder]
+        environment = {**os.environ, "NOTIFY_SOCKET": f"{folder}/notify"}
+        with subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True) as process:
+            try:
+                missing = {"READY=1", "WATCHDOG=1"}
+                while missing:
+                    missing.discard(line.recv(1000).decode())
+            except TimeoutError:
+                raise Unfit(f"no {' and '.join(sorted(missing))} within {READY_S:g} s") from None
+            finally:
+                process.send_signal(signal.SIGTERM)
+                process.communicate(timeout=10)
+        if process.returncode:
+            raise Unfit(f"exit code {process.returncode}")
+    return "starts, feeds the watchdog, ends"
+
+
+def main() -> int:
+    """Every check, a line each; exit 1 where one fails."""
+    from hal.ports import BoardError
+    from hal.strict import ConfigError
+    from tools.data.errors import InputError
+
+    parser = argparse.ArgumentParser(prog="python -m tools.deploy.selfcheck", description=__doc__)
+    parser.add_argument("--files", type=Path, required=True, help="folder of board.toml, vehicle.toml, missions")
+    parser.add_argument("--state", type=Path, required=True, help="folder of the vehicle's state")
+    options = parser.parse_args()
+    checks: tuple[tuple[str, Callable[[], str]], ...] = (
+        ("state", lambda: see_state(options.state)), ("files", lambda: see_files(options.files)),
+        ("out of band", see_out_of_band), ("kernels", see_kernels), ("flight", see_flight),
+    )  # fmt: skip
+    for name, check in checks:
+        try:
+            say(f"self-check: {name}: {check()}")
+        except (Unfit, InputError, ConfigError, BoardError, OSError, subprocess.TimeoutExpired) as error:
+            say(f"self-check: {name}: FAILED: {error}")
+            return FAILED
+    return DONE
+
+
+if __name__ == "__main__":
+    sys.exit(main())
