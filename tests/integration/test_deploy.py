@@ -126,7 +126,7 @@ def test_a_vehicle_from_its_first_release_to_a_rollback(dock):
 
     # It goes on where it was: less than the whole is enough. Its self-check says that it is not fit.
     (dock.vehicle / "etc" / "glider" / "unfit").touch()
-    done = dock.deploy(cut_after=BALLAST * 5 // 6)
+    done = dock.deploy(cut_after=BALLAST * 7 // 6)
     assert done.returncode == 1, done.stderr
     assert f"{second} did not pass its self-check: {first} is still what flies" in done.stderr
     assert dock.flies == first
