@@ -15,6 +15,7 @@ Positive = Annotated[float, msgspec.Meta(gt=0.0)]
 NonNegative = Annotated[float, msgspec.Meta(ge=0.0)]
 Share = Annotated[float, msgspec.Meta(ge=-1.0, le=1.0)]
 Angle = Annotated[float, msgspec.Meta(ge=-0.8, le=0.8)]
+Number = Annotated[float, msgspec.Meta(ge=-1e6, le=1e6)]
 
 # names of files and answers -> places in P
 PLACES = {
@@ -154,6 +155,8 @@ class OceanVehicle(Table):
     uncertainty: OceanUncertainty
     attitude: AttitudeTable = AttitudeTable()
     latitude: Annotated[float, msgspec.Meta(ge=-90.0, le=90.0)] = 45.0  # for gravity
+    # by label of the catalogue, its parameters: what this vehicle has beside its numbers
+    effects: dict[str, dict[str, Number]] = msgspec.field(default_factory=dict)
     identified: OceanIdentified | None = None
 
     @property

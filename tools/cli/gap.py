@@ -149,10 +149,12 @@ def diagnose(case: Path, out: Path, without: str | None, vehicle: str | None, as
 
 def _diagnose_ocean(case, out: Path, as_json: bool) -> None:
     """The same of an ocean glider (docs/OCEAN.md, Diagnosis)."""
+    from tools.report.ocean import REPORT, write_ocean_report
     from tools.watch.whole_case import diagnose_ocean, plain, write
 
     found = diagnose_ocean(case, lambda text: print(text, file=sys.stderr))
     write(found, out)
+    write_ocean_report(out)
     answer = plain(found)
     for caution in answer["cautions"]:
         say(f"note: {caution}")
@@ -165,7 +167,7 @@ def _diagnose_ocean(case, out: Path, as_json: bool) -> None:
             click.echo(f"  {cause['probability']:.2f} {cause['label']}  group {', '.join(cause['group'])}")
         click.echo("gap " + ", ".join(f"{name} {gap_table[name]['total']:.2f}" for name in
                                       ("before", "recalibrated", "after", "floor")))  # fmt: skip
-    say(f"answer: {out / 'diagnosis.json'}")
+    say(f"answer: {out / 'diagnosis.json'}, report: {out / REPORT}")
 
 
 @gap.command()
@@ -193,13 +195,19 @@ def velocity(case: Path, model: str, out: Path, as_json: bool) -> None:
 def report(folder: Path) -> None:
     """Draw report.html again from what `glider gap diagnose` or `glider gap watch` left in DIR."""
     from tools.data.errors import need
+    from tools.diagnose.record import is_ocean
     from tools.report.diagnosis import REPORT, write_report
+    from tools.report.ocean import write_ocean_report
     from tools.report.watch import write_watch_report
     from tools.report.words import sentence
     from tools.watch.answer import FILE
 
     need("analysis")
-    say(write_watch_report(folder) if (folder / FILE).is_file() else sentence(write_report(folder)))
+    if (folder / FILE).is_file():
+        said = write_watch_report(folder)
+    else:
+        said = write_ocean_report(folder) if is_ocean(folder) else sentence(write_report(folder))
+    say(said)
     say(f"report: {folder / REPORT}")
 
 

@@ -270,9 +270,7 @@ def read_record(folder: Path) -> Record:
     """A diagnosis from its folder; InputError names the file that is missing or not what it should be."""
     if not folder.is_dir():
         raise InputError("no such folder", source=folder)
-    if _read(folder / ANSWER, Asked).kind == KIND:
-        raise InputError("the diagnosis of an ocean glider: no report is drawn of it", source=folder / ANSWER)
-    answer, details = _read(folder / ANSWER, Answer), _read(folder / DETAILS, Details)
+    answer, details = read_as(folder / ANSWER, Answer), read_as(folder / DETAILS, Details)
     _check(answer, details, folder)
     curves = _read_curves(folder / CURVES, len(details.pictures))
     return Record(answer, details, curves, _read_shown(folder / CURVES, details.shown))
@@ -286,7 +284,12 @@ def _present(path: Path) -> Path:
     return path
 
 
-def _read(path: Path, kind: Any) -> Any:
+def is_ocean(folder: Path) -> bool:
+    """Whether the diagnosis of a folder is an ocean glider's (tools/report/ocean draws it)."""
+    return (folder / ANSWER).is_file() and read_as(folder / ANSWER, Asked).kind == KIND
+
+
+def read_as(path: Path, kind: Any) -> Any:
     try:
         return msgspec.json.decode(_present(path).read_bytes(), type=kind)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:

@@ -1,5 +1,6 @@
 """The model that a prediction flies with: the case's nominal vehicle, or a vehicle file's, with its own effects."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,8 +9,9 @@ from firmware.model.estimator_settings import parameter_sigma
 from firmware.model.vehicle import Vehicle
 from hal.strict import ConfigError
 from sim_backend.core.effects import effect_layout as ef
-from sim_backend.core.effects.base import EffectError
+from sim_backend.core.effects.base import Effect, EffectError
 from sim_backend.core.effects.catalogue import catalogue, check_values
+from sim_backend.ocean.catalogue import catalogue as ocean_catalogue
 from sim_backend.ocean.core import layout as ocean
 from sim_backend.ocean.vehicle import OceanVehicle
 from tools.data.runs.case import Case
@@ -60,8 +62,9 @@ def _directions(C: np.ndarray, places: np.ndarray, count: int) -> np.ndarray:
 
 
 def _ocean_model(name: str, vehicle: OceanVehicle) -> Model:
-    """An ocean glider as a model; its F (ocean.N_F,) has no effects."""
+    """An ocean glider as a model; F (ocean.N_F,) has the effects of its file."""
     P, sigma, F = vehicle.vector(), vehicle.sigma(), np.zeros(ocean.N_F)
+    add_effects(F, vehicle.effects, name, ocean_catalogue())
     found, places = vehicle.identified, vehicle.identified_places
     if found is None or not len(places):
         return Model(name, P, sigma, F)
@@ -82,22 +85,25 @@ def own_effects(vehicle: Vehicle) -> np.ndarray | None:
     return F
 
 
-def add_effects(F: np.ndarray, effects: dict[str, dict[str, float]], source: str) -> None:
-    """Add effects by label to F (N_F,), in place; ConfigError names the key."""
+def add_effects(
+    F: np.ndarray, effects: dict[str, dict[str, float]], source: str, known: Mapping[str, Effect] | None = None
+) -> None:
+    """Add effects by label to F (N_F,), in place; ConfigError names the key. known: another kind's catalogue."""
+    known = catalogue() if known is None else known
     for label, values in effects.items():
         try:
-            checked = check_values(label, values)
+            checked = check_values(label, values, known)
         except EffectError as error:
             raise ConfigError(source, str(error), key=f"effects.{label}") from None
-        for parameter in catalogue()[label].parameters:
+        for parameter in known[label].parameters:
             if parameter.entry >= 0:
                 F[parameter.entry] += checked[parameter.name]
 
 
-def effects_in(F: np.ndarray) -> dict[str, dict[str, float]]:
+def effects_in(F: np.ndarray, known: Mapping[str, Effect] | None = None) -> dict[str, dict[str, float]]:
     """The effects of the catalogue that stand in F (N_F,), as files write them: the way back from add_effects."""
     found: dict[str, dict[str, float]] = {}
-    for label, effect in catalogue().items():
+    for label, effect in (catalogue() if known is None else known).items():
         placed = [p for p in effect.parameters if p.entry >= 0]
         if any(F[p.entry] != 0.0 and p.low <= F[p.entry] <= p.high for p in placed):
             found[label] = {p.name: float(F[p.entry]) for p in placed}

@@ -12,16 +12,17 @@ from typing import Any
 import numpy as np
 
 from sim_backend.ocean.catalogue import NOT_ASKED
-from sim_backend.ocean.vehicle import PLACES
+from sim_backend.ocean.vehicle import PLACES, OceanVehicle
 from tools.data.errors import InputError
 from tools.data.plain import as_plain
 from tools.data.runs.case import Case
 from tools.data.runs.csvfile import write_bytes
 from tools.diagnose.record import ANSWER, NONE, UNKNOWN
 from tools.diagnose.search import EVIDENCE_NEEDED
-from tools.diagnose.shrink import AFTER, BEFORE, FLOOR, RECALIBRATED, by_channel
+from tools.diagnose.shrink import AFTER, BEFORE, FLOOR, RECALIBRATED, by_channel, shrinkage_of
 from tools.diagnose.verdict import ERROR_RATE, TIE, softmax
-from tools.gap.measure import RunGap, root_mean_square, run_gap
+from tools.gap.measure import RunGap, run_gap
+from tools.identify.ocean.files import corrected_text
 from tools.identify.ocean.identify import WORTH, parted_by
 from tools.inference.expansion import Expansion, expand
 from tools.inference.fit import bounded_step
@@ -37,7 +38,7 @@ from tools.watch.watch import usable_runs
 
 ABSENT = 1e-6  # spreads: of an effect that is not asked for
 MOST_RUNS = 40
-SEED, DRAWS, BOOTSTRAP = 20261122, 1, 500
+SEED = 20261122
 CORRECTED = "corrected.toml"
 Model = tuple[np.ndarray, np.ndarray]
 
@@ -186,17 +187,8 @@ def moves(gaps: dict[str, list[RunGap]]) -> float:
 
 def closings(gaps: dict[str, list[RunGap]]) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
     """Shrinkage and how much is closed, each with a 90 % interval over runs."""
-    totals = {name: np.array([one.total for one in runs]) for name, runs in gaps.items()}
-    rng, count = np.random.default_rng(SEED), len(totals[BEFORE])
-
-    def both(chosen: np.ndarray) -> tuple[float, float]:
-        b, a, f = (root_mean_square(totals[name][chosen]) for name in (BEFORE, AFTER, FLOOR))
-        return 1.0 - a / max(b, 1e-9), (b - a) / max(b - f, 1e-9)
-
-    drawn = np.array([both(rng.integers(0, count, count)) for _ in range(BOOTSTRAP)])
-    low, high = np.nanpercentile(drawn, [5.0, 95.0], axis=0)
-    value = both(np.arange(count))
-    return (value[0], float(low[0]), float(high[0])), (value[1], float(low[1]), float(high[1]))
+    found = shrinkage_of(gaps, {})
+    return (found.shrinkage, *found.ci90), (found.closed, *found.closed_ci90)
 
 
 def sizes(shared: SharedParameters, listed: list[Change], form: float) -> dict[str, tuple[float, float, str, str]]:
@@ -228,6 +220,7 @@ def plain(found: OceanDiagnosis) -> dict[str, Any]:
     return {
         "format": 1,
         "kind": "ocean",
+        "case": {"name": found.case.folder.resolve().name, "vehicle": found.case.vehicle.name, "runs": len(found.runs)},
         "verdict": found.verdict,
         "where": found.where,
         "causes": causes,
@@ -264,6 +257,9 @@ def cautions(found: OceanDiagnosis) -> list[str]:
 
 
 def write(found: OceanDiagnosis, out: Path) -> None:
-    """diagnosis.json into a folder."""
+    """diagnosis.json and corrected.toml into a folder."""
+    vehicle = found.case.vehicle
+    assert isinstance(vehicle, OceanVehicle)
     out.mkdir(parents=True, exist_ok=True)
+    write_bytes(out / CORRECTED, corrected_text(vehicle, *found.model).encode("utf-8"))
     write_bytes(out / ANSWER, (json.dumps(as_plain(plain(found)), indent=1) + "\n").encode())

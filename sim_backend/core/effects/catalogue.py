@@ -6,7 +6,7 @@ order here (sim_backend/core/effects/effect_layout). docs/ADDING.md says how to 
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -207,9 +207,11 @@ def catalogue() -> dict[str, Effect]:
     return found
 
 
-def check_values(label: str, values: dict[str, float]) -> dict[str, float]:
-    """The effect's parameters with defaults filled in; EffectError names what is wrong."""
-    effects = catalogue()
+def check_values(
+    label: str, values: dict[str, float], effects: Mapping[str, Effect] | None = None
+) -> dict[str, float]:
+    """The effect's parameters with defaults filled in; EffectError names what is wrong. effects: another catalogue."""
+    effects = catalogue() if effects is None else effects
     if label not in effects:
         raise EffectError(f"no effect '{label}'; known: {', '.join(effects)}")
     known = {parameter.name: parameter for parameter in effects[label].parameters}

@@ -7,12 +7,18 @@ import numpy as np
 import pytest
 from support.ocean import Dives, as_case, fly_dives, without
 
+from hal.strict import ConfigError
 from sim_backend.ocean.catalogue import NOT_ASKED, ONE_ON_DEPTH, catalogue
+from sim_backend.ocean.core import layout as at
 from sim_backend.ocean.vehicle import shipped_vehicles
 from tools.cli.common import report_errors
 from tools.cli.main import cli
 from tools.data.runs import columns as names
 from tools.data.runs.run import Run, load_run
+from tools.data.sources import load_any_vehicle
+from tools.identify.ocean.files import corrected_text, vehicle_text
+from tools.identify.ocean.identify import identify_ocean
+from tools.inference.model import effect_vector, vehicle_model
 from tools.inference.ocean_inputs import unsteady
 from tools.watch.usable import usable_dive
 from tools.watch.watch import watch
@@ -162,9 +168,46 @@ def test_a_diagnosis_is_written_as_any_other(unchanged, glider, tmp_path):
     assert gap["recalibrated"]["total"] < gap["before"]["total"]
     assert answer["not_asked"] == NOT_ASKED
     assert any("Cd0" in caution for caution in answer["cautions"])
-    code, _, said = glider("gap", "report", out)
-    assert (code, len(said.splitlines())) == (2, 1)
-    assert "ocean glider" in said
+    page = (out / "report.html").read_text()
+    assert "No effect beyond what the vehicle file allows" in page
+    (out / "report.html").unlink()
+    assert glider("gap", "report", out)[0] == 0
+    assert (out / "report.html").read_text() == page
+    run = unchanged.runs[0].path
+    predicted = tmp_path / "predicted.csv"
+    assert glider("gap", "predict", run, "--model", out / "corrected.toml", "--out", predicted)[0] == 0
+    assert np.isfinite(load_run(predicted).columns[names.DEPTH]).any()
+
+
+def test_a_corrected_vehicle_is_the_model_that_was_found(unchanged, tmp_path):
+    """Numbers and effects, written and read back; what is not in the catalogue is named."""
+    nominal = vehicle_model("slocum", unchanged.vehicle)
+    P, F = nominal.P.copy(), effect_vector(nominal)
+    P[at.DRAG_0] *= 1.2
+    F[at.F_DRAG], F[at.F_ATTITUDE_LAG] = 0.5, 3.0
+    text = corrected_text(unchanged.vehicle, P, F)
+    (tmp_path / "corrected.toml").write_text(text)
+    again = vehicle_model("corrected", load_any_vehicle(str(tmp_path / "corrected.toml")))
+    assert pytest.approx(P, rel=1e-12) == again.P
+    assert effect_vector(again).tolist() == F.tolist()
+    (tmp_path / "wrong.toml").write_text(text.replace("drag = {", "barnacles = {"))
+    with pytest.raises(ConfigError, match=r"effects\.barnacles"):
+        vehicle_model("wrong", load_any_vehicle(str(tmp_path / "wrong.toml")))
+
+
+def test_the_page_of_a_cause_names_it_with_its_size(tmp_path, glider):
+    case = as_case(tmp_path / "case", fly_dives(DIVES, ("drag", 2.0, 0), speed=True).runs)
+    text = vehicle_text(identify_ocean(as_case(tmp_path / "before", fly_dives(DIVES, speed=True).runs)))
+    (tmp_path / "identified.toml").write_text(text)
+    out = tmp_path / "answer"
+    code, _, _ = glider("gap", "diagnose", case.folder, "--vehicle", tmp_path / "identified.toml", "--out", out)
+    answer = json.loads((out / "diagnosis.json").read_text())
+    assert (code, answer["selected"]) == (0, ["drag"])
+    page = (out / "report.html").read_text()
+    assert "parasitic drag times 1 + scale (drag; " in page.replace("Parasitic", "parasitic")
+    assert "<td>drag, scale</td>" in page
+    corrected = load_any_vehicle(str(out / "corrected.toml"))
+    assert corrected.effects["drag"]["scale"] == pytest.approx(2.0, rel=0.3)
 
 
 def test_the_gap_is_measured(unchanged, glider, tmp_path):

@@ -5,28 +5,36 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+import numpy as np
 
+from sim_backend.ocean.catalogue import catalogue
 from sim_backend.ocean.core import layout as at
 from sim_backend.ocean.vehicle import PLACES, OceanVehicle, decode_ocean_vehicle
 from tools.data.plain import as_plain
 from tools.data.runs.csvfile import write_bytes
 from tools.data.tomltext import toml_text
 from tools.identify.ocean.identify import OceanIdentification
+from tools.inference.model import effects_in
 
 VEHICLE, RESULT = "identified.toml", "identified.json"
 DIGITS = 10  # of a covariance
+
+
+def numbers_table(vehicle: OceanVehicle, P: np.ndarray) -> dict[str, Any]:
+    """A vehicle file's content: the vehicle with the numbers of P (N_P,) in place."""
+    table: dict[str, Any] = msgspec.to_builtins(vehicle)
+    weight, water = ("volume", "compressibility", "thermal_expansion", "oil_scale"), ("Cd0", "Cd1", "lift_slope")
+    table["buoyancy"] |= {name: float(P[PLACES[name]]) for name in weight}
+    table["hydrodynamics"] |= {name: float(P[PLACES[name]]) for name in water}
+    table["attitude"] = {name: float(P[PLACES[name]]) for name in ("pitch_offset", "pitch_scale", "roll_trim")}
+    return table
 
 
 def vehicle_table(found: OceanIdentification) -> dict[str, Any]:
     """The vehicle file's content: the case's vehicle with what was found in place."""
     vehicle = found.case.vehicle
     assert isinstance(vehicle, OceanVehicle)
-    table: dict[str, Any] = msgspec.to_builtins(vehicle)
-    P = found.P
-    weight, water = ("volume", "compressibility", "thermal_expansion", "oil_scale"), ("Cd0", "Cd1", "lift_slope")
-    table["buoyancy"] |= {name: float(P[PLACES[name]]) for name in weight}
-    table["hydrodynamics"] |= {name: float(P[PLACES[name]]) for name in water}
-    table["attitude"] = {name: float(P[PLACES[name]]) for name in ("pitch_offset", "pitch_scale", "roll_trim")}
+    table = numbers_table(vehicle, found.P)
     C = 0.5 * (found.covariance + found.covariance.T)
     table["identified"] = {
         "runs": len(found.problem.runs),
@@ -39,11 +47,21 @@ def vehicle_table(found: OceanIdentification) -> dict[str, Any]:
 
 def vehicle_text(found: OceanIdentification) -> str:
     """identified.toml; checked by reading it back."""
-    text = (
-        "# A vehicle identified by `glider identify`; [identified] says from what, and how sure the numbers are.\n"
-        + toml_text(vehicle_table(found), inline=("sensors",))
-    )
-    decode_ocean_vehicle(text, VEHICLE)
+    said = "A vehicle identified by `glider identify`; [identified] says from what, and how sure the numbers are."
+    return checked_text(said, vehicle_table(found), VEHICLE)
+
+
+def corrected_text(vehicle: OceanVehicle, P: np.ndarray, F: np.ndarray) -> str:
+    """corrected.toml of a diagnosis: the vehicle with its numbers fitted, and the effects of F (N_F,)."""
+    table = numbers_table(vehicle, P) | {"effects": effects_in(F, catalogue())}
+    table.pop("identified", None)
+    return checked_text("A vehicle as `glider gap diagnose` corrects it: [effects] are beside its numbers.", table, "")
+
+
+def checked_text(said: str, table: dict[str, Any], source: str) -> str:
+    """A vehicle file's text; checked by reading it back."""
+    text = f"# {said}\n" + toml_text(table, inline=("sensors", "effects"))
+    decode_ocean_vehicle(text, source)
     return text
 
 

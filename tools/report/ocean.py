@@ -1,0 +1,110 @@
+"""The report of an ocean glider's diagnosis, drawn from its diagnosis.json (docs/OCEAN.md, Diagnosis)."""
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from sim_backend.ocean.catalogue import catalogue
+from tools.diagnose.record import ANSWER, Cause, Gap, Place, number, read_as
+from tools.report import words
+from tools.report.page import render
+
+REPORT = "report.html"
+MOST_RANKED, LEAST = 8, 0.005
+MEANS = {"none": "nothing beyond what the vehicle file allows", "unknown": "a gap of another kind"}
+
+
+class _Stage(msgspec.Struct):
+    stage: str
+    gap: dict[str, float | None]
+
+
+class _Case(msgspec.Struct):
+    name: str
+    vehicle: str
+    runs: int
+
+
+class _Answer(msgspec.Struct):
+    case: _Case
+    verdict: str
+    where: list[Place]
+    causes: list[Cause]
+    selected: list[str]
+    gap: Gap
+    stages: list[_Stage]
+    cautions: list[str]
+    skipped: dict[str, str]
+    evidence: dict[str, float]
+    next_run: dict[str, Any]
+
+
+def sentence(found: _Answer) -> str:
+    """The verdict in one plain sentence."""
+    before, again, after = (words.number(number(one["total"])) for one in
+                            (found.gap.before, found.gap.recalibrated, found.gap.after))  # fmt: skip
+    if not found.selected:
+        return (
+            f"No effect beyond what the vehicle file allows: the total gap of dives left out is {before} tolerances "
+            f"with the file's numbers and {again} with them fitted."
+        )
+    label = found.selected[0]
+    alike = [name for name in found.causes[0].group if name != label]
+    other = f"; these dives cannot tell it from {words.joined(alike)}" if alike else ""
+    return (
+        f"{words.upper(catalogue()[label].summary)} ({label}; {words.small_percent(found.causes[0].probability)} sure)"
+        f"{other}; the total gap of dives left out is {before} tolerances with the file's numbers, {again} with them "
+        f"fitted and {after} with that effect."
+    )
+
+
+def _ranking(found: _Answer) -> list[dict[str, Any]]:
+    effects = catalogue()
+    return [
+        {
+            "label": one.label, "percent": 100.0 * one.probability, "shown": words.small_percent(one.probability),
+            "means": MEANS.get(one.label) or effects[one.label].summary,
+        }
+        for n, one in enumerate(found.causes[:MOST_RANKED]) if one.probability >= LEAST or n < 3
+    ]  # fmt: skip
+
+
+def _sizes(found: _Answer) -> list[dict[str, str]]:
+    rows = []
+    for label in found.selected:
+        cause = next(one for one in found.causes if one.label == label)
+        for name, entry in cause.parameters.items():
+            value, low, high = (words.number(number(v)) for v in (entry.estimate, *entry.ci90))
+            unit = "" if entry.unit == "1" else entry.unit
+            rows.append({"name": f"{label}, {name}", "value": value, "low": low, "high": high, "unit": unit})
+    return rows
+
+
+def report_html(found: _Answer) -> str:
+    """The page's text; MissingExtra without jinja2."""
+    gap = found.gap
+    highest = max([number(one.gap["total"]) for one in found.stages], default=1.0)
+    context = {
+        "case": found.case, "verdict": found.verdict, "sentence": sentence(found), "ranking": _ranking(found),
+        "sizes": _sizes(found), "cautions": [words.upper(line) for line in found.cautions], "skipped": found.skipped,
+        "stages": [
+            {"name": one.stage, "total": words.number(number(one.gap["total"])),
+             "percent": 100.0 * number(one.gap["total"]) / highest}
+            for one in found.stages
+        ],
+        "table": [
+            {"name": name, "cells": [words.number(number(one.get(name))) for one in
+                                     (gap.before, gap.recalibrated, gap.after, gap.floor)]}
+            for name in gap.before
+        ],
+        "next_run": found.next_run.get("text", ""),
+    }  # fmt: skip
+    return render("ocean.html", context).replace(" %", "\N{NO-BREAK SPACE}%")
+
+
+def write_ocean_report(folder: Path) -> str:
+    """Draw the report of an ocean glider's diagnosis from its folder, into it; the verdict, in a sentence."""
+    found = read_as(folder / ANSWER, _Answer)
+    (folder / REPORT).write_text(report_html(found), encoding="utf-8")
+    return sentence(found)
