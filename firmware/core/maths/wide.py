@@ -20,11 +20,12 @@ from firmware.core.maths.wide_type import (
     lane,
     lanes,
     room,
+    spread,
     where,
     with_lane,
 )
 
-__all__ = ["LANES", "anywhere", "as_wide", "everywhere", "lane", "lanes", "room", "where", "with_lane"]
+__all__ = ["LANES", "anywhere", "as_wide", "everywhere", "lane", "lanes", "room", "spread", "where", "with_lane"]
 
 _TURN = (1.5707963267341256, 6.077100506303966e-11, 2.0222662487959506e-21)  # pi / 2, 33 bits, 33 bits, the rest
 _WHOLE = 6755399441055744.0  # 1.5 2^52: a number that it was added to and taken off again is whole

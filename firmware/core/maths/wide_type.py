@@ -20,6 +20,7 @@ import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, types
 from numba.core.errors import TypingError
+from numba.core.typeconv import Conversion
 from numba.extending import intrinsic, lower_builtin, lower_cast, models, overload, register_model, type_callable
 from numba.np import arrayobj
 
@@ -35,8 +36,8 @@ class WideType(types.Type):
         super().__init__(name=f"wide{LANES}")
 
     def can_convert_from(self, typingctx, other):
-        """How well `other` becomes a wide number: not at all (None) but for numbers."""
-        return typingctx.can_convert(other, types.float64) if isinstance(other, (types.Float, types.Integer)) else None
+        """Numbers become wide ones, where no kernel of plain ones fits them better."""
+        return Conversion.safe if isinstance(other, (types.Float, types.Integer)) else None
 
     def unify(self, typingctx, other):
         """A name that holds now a wide number, now a plain one, holds wide ones."""
@@ -48,6 +49,14 @@ class MaskType(types.Type):
 
     def __init__(self):
         super().__init__(name=f"mask{LANES}")
+
+    def can_convert_from(self, typingctx, other):
+        """A plain truth value holds in every lane."""
+        return Conversion.safe if isinstance(other, types.Boolean) else None
+
+    def unify(self, typingctx, other):
+        """As of wide numbers."""
+        return self if isinstance(other, types.Boolean) else None
 
 
 WIDE, MASK = WideType(), MaskType()
@@ -78,6 +87,11 @@ def _splat(builder, value, vector=_VECTOR):
 @lower_cast(types.Integer, WideType)
 def _number_to_wide(context, builder, fromty, toty, value):
     return _splat(builder, context.cast(builder, value, fromty, types.float64))
+
+
+@lower_cast(types.Boolean, MaskType)
+def _truth_to_mask(context, builder, fromty, toty, value):
+    return _splat(builder, context.cast(builder, value, fromty, types.boolean), _TRUTHS)
 
 
 def is_wide(*kinds):
@@ -120,6 +134,11 @@ def _called(name):
     return build
 
 
+def _remainder(builder, a, b):
+    """a - floor(a / b) b: Python's, but where rounding takes a / b to a whole number."""
+    return builder.fsub(a, builder.fmul(_called("floor")(builder, builder.fdiv(a, b)), b))
+
+
 def _compared(sign):
     ordered = sign != "!="  # as of floats: NaN differs from everything, and compares with nothing
     return lambda builder, a, b: (builder.fcmp_ordered if ordered else builder.fcmp_unordered)(sign, a, b)
@@ -134,6 +153,7 @@ for _sign in ("add", "sub", "mul", "truediv"):
     _name = f"f{_sign.removeprefix('true')}"
     _operation(getattr(operator, _sign), 2, lambda builder, a, b, name=_name: getattr(builder, name)(a, b))
     _operation(getattr(operator, f"i{_sign}"), 2, lambda builder, a, b, name=_name: getattr(builder, name)(a, b))
+_operation(operator.mod, 2, lambda builder, a, b: _remainder(builder, a, b))
 _operation(operator.neg, 1, lambda builder, a: builder.fneg(a))
 _operation(abs, 1, _called("fabs"))
 _operation(math.sqrt, 1, _called("sqrt"))
@@ -146,11 +166,21 @@ for _name, _sign in {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "
 
 
 def _joined(function, build):
+    """Make & or | one of masks, too, and of a mask and a truth value."""
+
     @type_callable(function)
     def masks(context):
-        return lambda a, b: MASK if a == b == MASK else None
+        def typer(a, b):
+            known = all(isinstance(kind, (MaskType, types.Boolean)) for kind in (a, b))
+            return MASK if known and MASK in (a, b) else None
 
-    lower_builtin(function, MaskType, MaskType)(lambda context, builder, sig, args: build(builder, *args))
+        return typer
+
+    def lower(context, builder, sig, args):
+        return build(builder, *(context.cast(builder, a, kind, MASK) for a, kind in zip(args, sig.args, strict=True)))
+
+    for signature in ((MaskType, MaskType), (MaskType, types.Boolean), (types.Boolean, MaskType)):
+        lower_builtin(function, *signature)(lower)
 
 
 _joined(operator.and_, lambda builder, a, b: builder.and_(a, b))
@@ -272,6 +302,23 @@ def _with_lane(x, number, value):
     if x == WIDE:
         return lambda x, number, value: _insert(x, number, value)
     return lambda x, number, value: value
+
+
+def spread(value, like):
+    """A value in all lanes of a number like `like`."""
+    return value
+
+
+@intrinsic
+def _as_number(typingctx, value):
+    return WIDE(value), lambda context, builder, sig, args: context.cast(builder, args[0], sig.args[0], WIDE)
+
+
+@overload(spread)
+def _spread(value, like):
+    if like == WIDE and value != WIDE:
+        return lambda value, like: _as_number(value)
+    return lambda value, like: value
 
 
 def as_wide(table):

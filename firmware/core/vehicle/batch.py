@@ -9,7 +9,7 @@ from firmware.core.vehicle.flight import nominal_run
 
 @kernel
 def gather(rows, first, out):
-    """Rows first, first + 1 .. of a table (rows, n), side by side in out (n, LANES); the last row fills what is left."""
+    """Rows first, first + 1 .. of a table (rows, n) side by side in out (n, LANES); the last row fills what is left."""
     for lane in range(LANES):
         row = min(first + lane, len(rows) - 1)
         for i in range(rows.shape[1]):
@@ -26,7 +26,8 @@ def scatter(out, first, rows):
 
 @kernel
 def nominal_batch(Ps, xs, commands, waters, dt, steps):
-    """`steps` Runge-Kutta steps of every vehicle, in place, under held commands: Ps (vehicles, N_P), xs (vehicles, N_X).
+    """`steps` Runge-Kutta steps of every vehicle, in place, under held commands: Ps (vehicles, N_P),
+    xs (vehicles, N_X).
 
     commands (vehicles, 3): servo rad, slider m, ballast kg; waters (vehicles, 3): m/s, NED.
     """
