@@ -14,7 +14,7 @@ from firmware.core.vehicle.state import normalise_attitude, rotation, velocities
 from sim_backend.core import layout as wl
 from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.actuation import effective_actuators, geared, motor_speeds, update_gears
-from sim_backend.core.effects.correction import correction
+from sim_backend.core.effects.correction import correction, link_of
 from sim_backend.core.effects.hydrodynamics import current, effective_coefficients, extra_wrench
 from sim_backend.core.effects.mass import effective_masses, net_mass_of_depth, slider_mass, tank_mass
 from sim_backend.core.effects.sensing import before_lags, update_lags
@@ -57,7 +57,7 @@ def effect_derivative(P, F, x, mode, c_servo, c_slider, c_ballast, since, acc, f
     slider, slider_rate = slider_mass(F, slider, slider_rate)
     tank, tank_rate = tank_mass(F, x[X_BALLAST], db, since)
     X, Y, Z, K, M, N = extra_wrench(P, F, kx, depth, u, v, w, p, q, r)
-    link = int(F[ef.LINK])
+    link = link_of(F)
     if 0 < link <= ef.ACTUATOR_LINKS:
         more = correction(F, x, since, db)
         X += more if link == 1 else 0.0

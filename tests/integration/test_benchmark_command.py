@@ -51,6 +51,10 @@ def test_plant_flies_what_c_flies():
     assert result["steps"] == STEPS
     assert result["max_state_difference"] < 1e-9
     assert result["ratio"] == result["steps_per_s"] / result["c_steps_per_s"]
+    batch = result["batch"]
+    assert 0.0 <= batch["max_state_difference"] < 1e-9
+    assert batch["ratio"] == batch["steps_per_s"] / result["c_steps_per_s"]
+    assert batch["ratio_fast"] == batch["steps_per_s"] / batch["c_fast_steps_per_s"]
     assert result["final_state"][5] > 2.0 * np.pi  # heading runs on
     assert "note" not in result
 
@@ -77,7 +81,8 @@ def test_without_a_compiler_c_is_null_and_says_so(monkeypatch):
     monkeypatch.setattr(plant.shutil, "which", lambda name: None)
     result = plant.measure(Settings(repeats=1), STEPS)
     assert result["ratio"] is result["c_steps_per_s"] is result["max_state_difference"] is None
-    assert result["steps_per_s"] > 0.0
+    assert result["batch"]["ratio"] is result["batch"]["ratio_fast"] is None
+    assert min(result["steps_per_s"], result["batch"]["steps_per_s"]) > 0.0
     assert "no C compiler" in result["note"]
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from firmware.core.layouts import estimator_layout as kf
 from firmware.core.maths.rotations import euler_from_quaternion, quaternion_from_euler
+from firmware.core.maths.steps import RK4
 from firmware.model.estimator_settings import parameter_sigma
 from firmware.model.vehicle import Vehicle
 from sim_backend.core.effects import effect_layout as ef
@@ -109,7 +110,7 @@ def fly(world: World, seed: int, *, P: np.ndarray | None = None, name: str = "ru
                 strength = world.disturbance * np.repeat([disturbance.linear, disturbance.angular], 3)
                 acc[:] = strength * rng.standard_normal(6)
             inputs = np.array([commands[i], commands[i]])
-            propagate(P, F, x, kf.COMMANDED, moments, inputs, 1, 0, acc, zero, work, kept, False)
+            propagate(P, F, x, kf.COMMANDED, moments, inputs, 1, 0, acc, zero, work, kept, RK4)
     sigma = [*3 * [sensors.attitude.noise], *3 * [sensors.gyro.noise], sensors.depth.noise]
     sigma += [sensors.slider.noise, sensors.ballast.noise]
     onboard = (*names.ATTITUDE, *names.RATES, names.DEPTH, *names.DRAW_WIRES)

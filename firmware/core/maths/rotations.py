@@ -7,14 +7,16 @@ the Euler rates of equation (5) break.
 import math
 
 from firmware.core.jit import kernel
+from firmware.core.maths.wide import everywhere, where
 
 
 @kernel
 def wrap_angle(angle):
     """Angle in (-pi, pi]; one that is there already comes back as it is."""
-    if -math.pi < angle <= math.pi:
+    within = (angle > -math.pi) & (angle <= math.pi)
+    if everywhere(within):
         return angle
-    return math.pi - (math.pi - angle) % (2.0 * math.pi)
+    return where(within, angle, math.pi - (math.pi - angle) % (2.0 * math.pi))
 
 
 def wrap(angles):

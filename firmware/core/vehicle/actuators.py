@@ -3,17 +3,14 @@
 import math
 
 from firmware.core.jit import kernel
+from firmware.core.maths.wide import where
 from firmware.core.vehicle import layout
 
 
 @kernel
 def clip(value, low, high):
     """Value held in [low, high]; NaN comes out as low, so that nothing unlimited passes."""
-    if value > high:
-        return high
-    if value >= low:
-        return value
-    return low
+    return where(value > high, high, where(value >= low, value, low))
 
 
 @kernel

@@ -3,6 +3,7 @@
 import math
 
 from firmware.core.jit import kernel
+from firmware.core.maths.wide import everywhere, where
 from firmware.core.vehicle import layout
 
 STILL = 1e-6  # m/s; below this the flow has no direction and alpha = beta = 0
@@ -13,10 +14,12 @@ def flow_angles(u, v, w):
     """Angle of attack, sideslip angle (rad) and squared speed through the water (m2/s2)."""
     v_squared = u * u + v * v + w * w
     speed = math.sqrt(v_squared)
-    if speed < STILL:
+    still = speed < STILL
+    if everywhere(still):
         return 0.0, 0.0, v_squared
     # + 0.0 makes -0.0 a zero like any other: atan2(0, -0.0) is pi, and flow_to_body knows no such flow
-    return math.atan2(w, u + 0.0), math.asin(min(1.0, max(-1.0, v / speed))), v_squared
+    alpha, beta = math.atan2(w, u + 0.0), math.asin(min(1.0, max(-1.0, v / speed)))
+    return where(still, 0.0, alpha), where(still, 0.0, beta), v_squared
 
 
 @kernel
@@ -24,15 +27,18 @@ def flow_to_body(u, v, w, a, b, c):
     """R_bf [a, b, c], equation (3): from flow axes to body axes, with the sines and cosines taken from u, v, w."""
     plane = math.sqrt(u * u + w * w)
     speed = math.sqrt(u * u + v * v + w * w)
-    if speed < STILL:
+    still, across = speed < STILL, plane > 0.0
+    if everywhere(still):
         return a, b, c
+    part = where(across, plane, 1.0)
     sb, cb = v / speed, plane / speed
-    if plane > 0.0:
-        ca, sa = u / plane, w / plane
-    else:
-        ca, sa = 1.0, 0.0
+    ca, sa = where(across, u / part, 1.0), where(across, w / part, 0.0)
     along = cb * a - sb * b
-    return ca * along - sa * c, sb * a + cb * b, sa * along + ca * c
+    return (
+        where(still, a, ca * along - sa * c),
+        where(still, b, sb * a + cb * b),
+        where(still, c, sa * along + ca * c),
+    )  # fmt: skip
 
 
 @kernel
@@ -45,7 +51,7 @@ def water_wrench(P, u, v, w, p, q, r):
     """
     alpha, beta, v_squared = flow_angles(u, v, w)
     drag = (P[layout.K_D0] + P[layout.K_D] * alpha * alpha) * v_squared
-    lift_slope = alpha * alpha if P[layout.LIFT_PRINTED] != 0.0 else alpha
+    lift_slope = where(P[layout.LIFT_PRINTED] != 0.0, alpha * alpha, alpha)
     lift = (P[layout.K_L0] + P[layout.K_L] * lift_slope) * v_squared
     side = P[layout.K_BETA] * beta * v_squared
     F1, F2, F3 = flow_to_body(u, v, w, -drag, side, -lift)

@@ -3,6 +3,7 @@
 import math
 
 from firmware.core.jit import kernel
+from firmware.core.maths.wide import anywhere, everywhere, where
 from firmware.core.vehicle import layout
 from firmware.core.vehicle.actuators import actuator_rate, actuator_table, clip
 from firmware.core.vehicle.state import actuators
@@ -36,8 +37,9 @@ def motor_speeds(P, F, x, mode, c_servo, c_slider, c_ballast):
         dl = actuator_rate(slider, c_slider, *actuator_table(P, layout.SLIDER_MIN))
     if not mode & BALLAST_DRIVEN:
         low, high, rate, tau = actuator_table(P, layout.BALLAST_MIN)
-        if F[ef.PUMP_DROOP] > 0.0 and c_ballast < ballast:
-            rate *= math.exp(-F[ef.PUMP_DROOP] * max(x[layout.X_DOWN], 0.0))
+        if anywhere((F[ef.PUMP_DROOP] > 0.0) & (c_ballast < ballast)):
+            droop = math.exp(-F[ef.PUMP_DROOP] * max(x[layout.X_DOWN], 0.0))
+            rate *= where(c_ballast < ballast, droop, 1.0)
         db = actuator_rate(ballast, c_ballast, low, high, rate, tau)
     return ds, dl, db
 
@@ -45,23 +47,21 @@ def motor_speeds(P, F, x, mode, c_servo, c_slider, c_ballast):
 @kernel
 def backlash(follower, leader, width):
     """Where a follower stands behind a backlash of this width (whole, SI); at 0 it stands with its leader."""
-    if width <= 0.0:
+    if everywhere(width <= 0.0):
         return leader
-    return clip(follower, leader - 0.5 * width, leader + 0.5 * width)
+    return where(width <= 0.0, leader, clip(follower, leader - 0.5 * width, leader + 0.5 * width))
 
 
 @kernel
 def geared(F, x, servo_speed, slider_speed):
     """Rail (rad) and sliding mass (m) behind their motors' backlash and offset, and the speeds of both."""
     servo, slider = x[layout.X_SERVO], x[layout.X_SLIDER]
-    if F[ef.SERVO_PLAY] > 0.0:
+    if anywhere(F[ef.SERVO_PLAY] > 0.0):
         servo = backlash(x[ef.X_GEAR_SERVO], x[layout.X_SERVO], F[ef.SERVO_PLAY])
-        if servo == x[ef.X_GEAR_SERVO]:
-            servo_speed = 0.0
-    if F[ef.SLIDER_PLAY] > 0.0:
+        servo_speed = where((F[ef.SERVO_PLAY] > 0.0) & (servo == x[ef.X_GEAR_SERVO]), 0.0, servo_speed)
+    if anywhere(F[ef.SLIDER_PLAY] > 0.0):
         slider = backlash(x[ef.X_GEAR_SLIDER], x[layout.X_SLIDER], F[ef.SLIDER_PLAY])
-        if slider == x[ef.X_GEAR_SLIDER]:
-            slider_speed = 0.0
+        slider_speed = where((F[ef.SLIDER_PLAY] > 0.0) & (slider == x[ef.X_GEAR_SLIDER]), 0.0, slider_speed)
     return servo + F[ef.SERVO_OFFSET], slider, servo_speed, slider_speed
 
 

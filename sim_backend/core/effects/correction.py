@@ -3,6 +3,7 @@
 import math
 
 from firmware.core.jit import kernel
+from firmware.core.maths.wide import lane, spread
 from firmware.core.vehicle.layout import X_DOWN
 from firmware.core.vehicle.state import rotation, velocities
 from sim_backend.core.effects import effect_layout as ef
@@ -22,9 +23,16 @@ def shapes(x, since, pump):
     speed = max(math.sqrt(squared), SLOWEST)
     _, _, _, _, _, _, kx, _, _ = rotation(x)
     return (
-        1.0, squared / (SPEED * SPEED), x[X_DOWN] / DEPTH, w / speed / ANGLE, v / speed / ANGLE,
-        p / RATE, q / RATE, r / RATE, pump / PUMP, since / TIME, math.tanh(-kx / ef.REST_PITCH),
+        spread(1.0, squared), squared / (SPEED * SPEED), x[X_DOWN] / DEPTH, w / speed / ANGLE, v / speed / ANGLE,
+        p / RATE, q / RATE, r / RATE, spread(pump / PUMP, squared), spread(since / TIME, squared),
+        math.tanh(-kx / ef.REST_PITCH),
     )  # fmt: skip
+
+
+@kernel
+def link_of(F):
+    """The link at which the correction of F enters, 0 for none: one and the same in all lanes."""
+    return int(lane(F[ef.LINK], 0))
 
 
 @kernel

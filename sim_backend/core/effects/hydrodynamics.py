@@ -3,6 +3,7 @@
 import math
 
 from firmware.core.jit import kernel
+from firmware.core.maths.wide import anywhere, where
 from firmware.core.vehicle import layout
 from firmware.core.vehicle.actuators import clip
 from firmware.core.vehicle.water import flow_angles, flow_to_body
@@ -46,25 +47,25 @@ def extra_wrench(P, F, kx, depth, u, v, w, p, q, r):
     X, Y, Z, K, M, N = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     alpha, _, v_squared = flow_angles(u, v, w)
     drag, lift = 0.0, 0.0
-    if F[ef.CLIMB_DIVE] != 0.0:
+    if anywhere(F[ef.CLIMB_DIVE] != 0.0):
         profile = P[layout.K_D0] + P[layout.K_D] * alpha * alpha
         drag += F[ef.CLIMB_DIVE] * math.tanh(-kx / ef.REST_PITCH) * profile * v_squared
-    if F[ef.STALL] > 0.0:
+    if anywhere(F[ef.STALL] > 0.0):
         held = clip(alpha, -1.0 / F[ef.STALL], 1.0 / F[ef.STALL])
-        lost = held * held - alpha * alpha if P[layout.LIFT_PRINTED] != 0.0 else held - alpha
+        lost = where(P[layout.LIFT_PRINTED] != 0.0, held * held - alpha * alpha, held - alpha)
         lift += P[layout.K_L] * lost * v_squared
-    if drag != 0.0 or lift != 0.0:
+    if anywhere(drag != 0.0) or anywhere(lift != 0.0):
         X, Y, Z = flow_to_body(u, v, w, -drag, 0.0, -lift)
-    if F[ef.LINEAR_DRAG] != 0.0:
+    if anywhere(F[ef.LINEAR_DRAG] != 0.0):
         X -= F[ef.LINEAR_DRAG] * u
         Y -= F[ef.LINEAR_DRAG] * v
         Z -= F[ef.LINEAR_DRAG] * w
-    if F[ef.ROLL_TRIM] != 0.0 or F[ef.YAW_TRIM] != 0.0:
+    if anywhere(F[ef.ROLL_TRIM] != 0.0) or anywhere(F[ef.YAW_TRIM] != 0.0):
         K1, M1, N1 = flow_to_body(u, v, w, F[ef.ROLL_TRIM] * v_squared, 0.0, F[ef.YAW_TRIM] * v_squared)
         K += K1
         M += M1
         N += N1
-    if F[ef.TETHER] != 0.0 or F[ef.TETHER_GROWTH] != 0.0:
+    if anywhere(F[ef.TETHER] != 0.0) or anywhere(F[ef.TETHER_GROWTH] != 0.0):
         X1, Y1, Z1, M1, N1 = tether_wrench(F, depth, u, v, w, q, r)
         X += X1
         Y += Y1

@@ -16,11 +16,15 @@ import numpy as np
 from firmware.core.jit import kernel, parallel_kernel, prange
 from firmware.core.maths.matrices import product
 from firmware.core.maths.rotations import wrap_angle
+from firmware.core.maths.steps import MIDPOINT, RK4
+from firmware.core.maths.wide import LANES, as_wide, room
 from firmware.core.vehicle.actuators import clip
+from firmware.core.vehicle.batch import gather
 from firmware.core.vehicle.layout import N_P, SERVO_MAX, SERVO_MIN, X_ACT, X_NU, X_SERVO
 from firmware.core.vehicle.state import rotation
 from sim_backend.core.effect_plant import effective_parameters
 from sim_backend.core.effects import effect_layout as ef
+from sim_backend.core.effects.correction import link_of
 from tools.inference.core.error_layout import (
     E_ACT,
     E_ATT,
@@ -93,7 +97,7 @@ def linear_step(Pw, F, x, acc, mode, t, inputs, i, begin, zero, work, kept, move
     motion capture's clock.
     """
     base[:] = x
-    propagate(Pw, F, base, mode, t, inputs, i, begin, acc, zero, work, kept, True)
+    propagate(Pw, F, base, mode, t, inputs, i, begin, acc, zero, work, kept, MIDPOINT)
     for j in range(E_DOWN):
         Phi[:, j] = 0.0
         Phi[j, j] = 1.0
@@ -101,11 +105,11 @@ def linear_step(Pw, F, x, acc, mode, t, inputs, i, begin, zero, work, kept, move
     Phi[E_LATE, E_LATE] = 1.0
     for j in range(E_DOWN, E_LATE):
         perturbed(x, j, error, moved)
-        propagate(Pw, F, moved, mode, t, inputs, i, begin, acc, zero, work, kept, True)
+        propagate(Pw, F, moved, mode, t, inputs, i, begin, acc, zero, work, kept, MIDPOINT)
         difference(moved, base, error)
         for n in range(N_ERR):
             Phi[n, j] = error[n] / NUDGE
-    propagate(Pw, F, x, mode, t, inputs, i, begin, acc, zero, work, kept, False)
+    propagate(Pw, F, x, mode, t, inputs, i, begin, acc, zero, work, kept, RK4)
     noise_gain(x, t[i] - t[i - 1], Gam)
 
 
@@ -115,7 +119,7 @@ def linear_reading(F, x, t, stamps, path, i, begin, moved, error, y, y2, H):
 
     Where no correction of a reading is fitted, none depends on the speeds u, v, w.
     """
-    still = int(F[ef.LINK]) <= ef.ACTUATOR_LINKS
+    still = link_of(F) <= ef.ACTUATOR_LINKS
     for j in range(N_ERR):
         if still and E_NU <= j < E_NU + 3:
             for m in range(N_Y):
@@ -277,21 +281,23 @@ def follow_run(P, F, drift, mode, t, stamps, inputs, z, begin, end, start, W, K,
     """A model flown along rows begin .. end - 1 with the gains of filter_run: X, path and E as there.
 
     Where the gains correct what the model lacks, too, it is followed with the state. posed: whether the path is asked
-    for, without which poses of another time cannot be read.
+    for, without which poses of another time cannot be read. X without rows is not asked for. P, F, X, path and E of
+    wide numbers fly as many models as have lanes.
     """
-    Pw, x = np.empty(N_P), start.copy()
+    Pw, x = room(P, (N_P,)), room(P, (ef.N_XF,))
     effective_parameters(P, F, Pw)
-    work, kept = np.zeros((4, ef.N_XF)), np.empty(ef.N_XF)
+    x[:] = start
+    work, kept = room(P, (4, ef.N_XF)), room(P, (ef.N_XF,))
     count = K.shape[1]
-    error, zero, before, lacking = np.empty(count), np.zeros(3), np.empty(N_PATH), np.zeros(N_LACKING)
-    y, d = np.empty(N_Y), np.empty(N_Y)
+    error, zero, before, lacking = room(P, (count,)), np.zeros(3), room(P, (N_PATH,)), room(P, (N_LACKING,))
+    y, d = room(P, (N_Y,)), room(P, (N_Y,))
     for n in range(N_PATH):
         path[begin, n] = 0.0
     for i in range(begin, end):
         if i > begin:
             if posed:
                 pose_of(x, before)
-            propagate(Pw, F, x, mode, t, inputs, i, begin, lacking[:6], zero, work, kept, False)
+            propagate(Pw, F, x, mode, t, inputs, i, begin, lacking[:6], zero, work, kept, RK4)
             if count > N_ERR:
                 step_lacking(drift, x, lacking, t[i] - t[i - 1])
             if posed:
@@ -306,8 +312,21 @@ def follow_run(P, F, drift, mode, t, stamps, inputs, z, begin, end, start, W, K,
         apply_gain(W[i], K[i], d, x, error, E[i])
         for n in range(count - N_ERR):
             lacking[n] += error[N_ERR + n]
-        for n in range(ef.N_XF):
-            X[i, n] = x[n]
+        if len(X) > 0:
+            for n in range(ef.N_XF):
+                X[i, n] = x[n]
+
+
+@kernel
+def groups_of(links):
+    """Where groups of at most LANES models begin whose corrections, if any, enter at the same link; and their end."""
+    begins, count = np.empty(len(links) + 1, np.int64), 0
+    for m in range(len(links)):
+        if count == 0 or m == begins[count - 1] + LANES or links[m] != links[begins[count - 1]]:
+            begins[count] = m
+            count += 1
+    begins[count] = len(links)
+    return begins[: count + 1]
 
 
 @parallel_kernel
@@ -317,14 +336,20 @@ def follow_runs(Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, K
     Samples are what is `valid` (rows, N_Y), row by row; places (runs + 1): the first of each run. What is
     larger than lost_at, or no number, is lost_at.
     """
-    models = Ps.shape[0]
-    for n in prange(models * (len(bounds) - 1)):  # models of a run one after the other: its gains are then near
-        m, run = n % models, n // models
+    groups = groups_of(Fs[:, ef.LINK])
+    number = len(groups) - 1
+    for n in prange(number * (len(bounds) - 1)):  # models of a run one after the other: its gains are then near
+        first, last, run = groups[n % number], groups[n % number + 1], n // number
         begin, end = bounds[run], bounds[run + 1]
+        P, F = np.empty((N_P, LANES)), np.empty((ef.N_F, LANES))
+        gather(Ps[first:last], 0, P)
+        gather(Fs[first:last], 0, F)
         # scratch of this run alone; indices count from its first row
-        X, path, rows = np.empty((end - begin, ef.N_XF)), np.empty((end - begin, N_PATH)), np.empty((end - begin, N_Y))
+        path, rows = np.empty((end - begin, N_PATH, LANES)), np.empty((end - begin, N_Y, LANES))
         follow_run(
-            Ps[m], Fs[m], drift, modes[run], t[begin:end], stamps[begin:end], inputs[begin:end], z[begin:end], 0,
-            end - begin, starts[run], W[begin:end], K[begin:end], posed(z[begin:end]), X, path, rows,
+            as_wide(P), as_wide(F), drift, modes[run], t[begin:end], stamps[begin:end], inputs[begin:end],
+            z[begin:end], 0, end - begin, starts[run], W[begin:end], K[begin:end], posed(z[begin:end]),
+            as_wide(np.empty((0, ef.N_XF, LANES))), as_wide(path), as_wide(rows),
         )  # fmt: skip
-        take_valid(rows, valid[begin:end], lost_at, E[m, places[run] : places[run + 1]])
+        for m in range(first, last):
+            take_valid(rows[:, :, m - first], valid[begin:end], lost_at, E[m, places[run] : places[run + 1]])

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from firmware.core.jit import kernel, parallel_kernel, prange
+from firmware.core.maths.steps import RK4
 from firmware.core.vehicle.layout import N_P
 from sim_backend.core.effect_plant import effective_parameters
 from sim_backend.core.effects import effect_layout as ef
@@ -23,7 +24,7 @@ def fly_window(P, F, mode, t, inputs, X, path, first, last, Y):
     flown = path[:last].copy()
     for i in range(first, last):
         pose_of(x, before)
-        propagate(Pw, F, x, mode, t, inputs, i, 0, acc, zero, work, kept, False)
+        propagate(Pw, F, x, mode, t, inputs, i, 0, acc, zero, work, kept, RK4)
         log_path(x, before, flown, i, 0)
         read_row(F, x, t, t, flown, i, 0, Y[i])
 
@@ -78,7 +79,7 @@ def simulate_runs(P, F, spectral, R, modes, bounds, t, inputs, starts, shaken, n
                 for j in range(6):
                     acc[j] = math.sqrt(spectral[Q_ACC + j] / (t[i] - t[i - 1])) * shaken[i, j]
                 pose_of(x, before)
-                propagate(Pw, F, x, modes[run], t, inputs, i, begin, acc, zero, work, kept, False)
+                propagate(Pw, F, x, modes[run], t, inputs, i, begin, acc, zero, work, kept, RK4)
                 log_path(x, before, path, i - begin, 0)
             read_row(F, x, t[begin:], t[begin:], path, i - begin, 0, Z[i])
             for m in range(N_Y):

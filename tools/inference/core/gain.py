@@ -7,6 +7,7 @@ import math
 
 from firmware.core.jit import kernel
 from firmware.core.maths.matrices import product
+from firmware.core.maths.wide import everywhere, where
 
 
 @kernel
@@ -75,20 +76,19 @@ def take_gain(W, K, d, error, e):
     """
     total, seen = 0.0, 0  # readings from `seen` on were not measured
     for m in range(len(d)):
-        e[m] = 0.0
-        if math.isnan(d[m]):
-            e[m] = math.nan
-            d[m] = 0.0
-        else:
+        missing = math.isnan(d[m])
+        e[m], d[m] = where(missing, math.nan, 0.0), where(missing, 0.0, d[m])
+        if not everywhere(missing):
             seen = m + 1
     for m in range(seen - 1, -1, -1):
-        if math.isnan(e[m]):
+        missing = math.isnan(e[m])
+        if everywhere(missing):
             continue
         value = 0.0
         for n in range(m + 1):
             value += W[m, n] * d[n]
-        e[m] = value
-        d[m] = value
+        value = where(missing, 0.0, value)
+        e[m], d[m] = where(missing, math.nan, value), value
         total += value * value
     for a in range(len(error)):
         value = 0.0

@@ -7,12 +7,12 @@ import math
 
 from firmware.core.jit import kernel
 from firmware.core.maths.rotations import wrap_angle
-from firmware.core.maths.steps import MIDPOINT, RK4
+from firmware.core.maths.wide import anywhere, everywhere, lane, lanes, spread, where, with_lane
 from firmware.core.vehicle.layout import X_ACT, X_NU, X_POS, X_QUAT
 from firmware.core.vehicle.state import euler_angles, quaternion
 from sim_backend.core.effect_plant import effect_step
 from sim_backend.core.effects import effect_layout as ef
-from sim_backend.core.effects.correction import correction
+from sim_backend.core.effects.correction import correction, link_of
 from sim_backend.core.effects.sensing import read
 from sim_backend.core.effects.timing import mean_input, mocap_lateness
 from tools.inference.core.error_layout import E_ACT, E_ATT, E_LATE, E_NU, E_POS
@@ -63,33 +63,40 @@ def difference(x, y, error):
 
 
 @kernel
-def propagate(Pw, F, x, mode, t, inputs, i, begin, acc, zero, work, kept, quick):
+def inputs_of_step(delay, t, inputs, i, begin, since, h):
+    """What row i has of the three inputs or, where commands are late by a delay (s), their means over a step of h."""
+    c0, c1, c2 = spread(inputs[i, 0], delay), spread(inputs[i, 1], delay), spread(inputs[i, 2], delay)
+    if anywhere(delay > 0.0):
+        for number in range(lanes(delay)):
+            late = lane(delay, number)
+            if late > 0.0:
+                a = since - late
+                c0 = with_lane(c0, number, mean_input(t, inputs, 0, i, begin, a, a + h))
+                c1 = with_lane(c1, number, mean_input(t, inputs, 1, i, begin, a, a + h))
+                c2 = with_lane(c2, number, mean_input(t, inputs, 2, i, begin, a, a + h))
+    return c0, c1, c2
+
+
+@kernel
+def propagate(Pw, F, x, mode, t, inputs, i, begin, acc, zero, work, kept, method):
     """Fly from row i - 1 to row i, in place; acc (6) added to nu_dot; kept (N_XF), zero (3), work are scratch.
 
-    quick: by the midpoint rule.
+    method: one of firmware/core/maths/steps. x, work and kept of wide numbers fly as many states as have lanes.
     """
     dt = t[i] - t[i - 1]
     steps = max(1, math.ceil(dt / MAX_STEP - 1e-9))
     h, delay = dt / steps, F[ef.COMMAND_DELAY]
     for k in range(steps):
-        if delay > 0.0:
-            a = t[i - 1] + k * h - delay
-            c0 = mean_input(t, inputs, 0, i - 1, begin, a, a + h)
-            c1 = mean_input(t, inputs, 1, i - 1, begin, a, a + h)
-            c2 = mean_input(t, inputs, 2, i - 1, begin, a, a + h)
-        else:
-            c0, c1, c2 = inputs[i - 1, 0], inputs[i - 1, 1], inputs[i - 1, 2]
+        c0, c1, c2 = inputs_of_step(delay, t, inputs, i - 1, begin, t[i - 1] + k * h, h)
         kept[:] = x
         since = t[i - 1] - t[begin] + k * h
-        if quick:
-            effect_step(MIDPOINT, Pw, F, x, mode, c0, c1, c2, since, acc, 0.0, zero, h, work)
-        else:
-            effect_step(RK4, Pw, F, x, mode, c0, c1, c2, since, acc, 0.0, zero, h, work)
+        effect_step(method, Pw, F, x, mode, c0, c1, c2, since, acc, 0.0, zero, h, work)
         worst = 0.0
         for n in range(X_NU, X_ACT):
             worst = max(worst, abs(x[n]))
-        if not worst < LARGEST_SPEED:
-            x[:] = kept
+        if not everywhere(worst < LARGEST_SPEED):
+            for n in range(len(x)):
+                x[n] = where(worst < LARGEST_SPEED, x[n], kept[n])
 
 
 @kernel
@@ -115,7 +122,7 @@ def pose_of(x, before):
 def read_now(F, x, since, y):
     """What is read at x, `since` s into the run, into y (N_Y); motion capture of now."""
     read(F, x, y)
-    link = int(F[ef.LINK])
+    link = link_of(F)
     if link > ef.ACTUATOR_LINKS:
         y[link - ef.ACTUATOR_LINKS - 1] += correction(F, x, since, 0.0)
 
@@ -128,14 +135,20 @@ def read_row(F, x, t, stamps, path, i, begin, y):
     """
     read_now(F, x, t[i] - t[begin], y)
     at = stamps[i] - mocap_lateness(F, x[ef.X_LATE], stamps[i] - t[begin])
-    if at == t[i] or i == begin:
+    if everywhere(at == t[i]) or i == begin:
         return
-    j = i
-    while j > begin + 1 and t[j - 1] > at:
-        j -= 1
-    share = (t[j] - at) / (t[j] - t[j - 1])
-    for n in range(6):
-        y[ef.Y_MOCAP_X + n] -= path[i, n] - path[j, n] + share * (path[j, n] - path[j - 1, n])
+    for number in range(lanes(at)):
+        wanted = lane(at, number)
+        if wanted == t[i]:
+            continue
+        j = i
+        while j > begin + 1 and t[j - 1] > wanted:
+            j -= 1
+        share = (t[j] - wanted) / (t[j] - t[j - 1])
+        for n in range(6):
+            here, a, b = lane(path[i, n], number), lane(path[j, n], number), lane(path[j - 1, n], number)
+            now = lane(y[ef.Y_MOCAP_X + n], number)
+            y[ef.Y_MOCAP_X + n] = with_lane(y[ef.Y_MOCAP_X + n], number, now - (here - a + share * (a - b)))
 
 
 @kernel
@@ -143,5 +156,5 @@ def innovation(z, y, d):
     """z - y into d (N_Y), angles wrapped; NaN where nothing was measured."""
     for j in range(N_Y):
         d[j] = z[j] - y[j]
-        if (j <= ef.Y_YAW or j >= ef.Y_MOCAP_ROLL) and not math.isnan(d[j]):
+        if (j <= ef.Y_YAW or j >= ef.Y_MOCAP_ROLL) and not math.isnan(z[j]):
             d[j] = wrap_angle(d[j])

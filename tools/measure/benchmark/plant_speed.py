@@ -1,6 +1,7 @@
-"""Steps of the nominal plant in a second: one flight, one core, beside the same flight in plain C.
+"""Steps of the nominal plant in a second on one core: one flight, and many at once, beside the same flight in plain C.
 
-The C program (plant.c here, or another of the same protocol) is compiled for this machine and both are run in turns.
+The C program (plant.c here, or another of the same protocol) is compiled for this machine, once by the rules of IEEE
+and once with -ffast-math, and all are run in turns.
 Start, commands and step are the program's: 1 m deep, 0.2 m/s, servo 0.6 rad, slider -0.02 m, ballast 0.1 kg, 0.01 s.
 """
 
@@ -8,7 +9,7 @@ import math
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -22,6 +23,7 @@ from firmware.core.vehicle.flight import nominal_run
 from firmware.model.library import shipped
 from firmware.model.vehicle import decode_vehicle
 from tools.data.errors import InputError
+from tools.measure.benchmark.plant_batch import VEHICLES, Fleet
 from tools.measure.benchmark.registry import Settings
 from tools.measure.benchmark.timing import alternate, median, seconds
 
@@ -30,6 +32,7 @@ DT = 0.01  # s
 COMMANDS = (0.6, -0.02, 0.1)  # rad, m, kg
 STILL_WATER = (0.0, 0.0, 0.0)
 FLAGS = ("-O3", "-march=native")
+FAST = "-ffast-math"
 HEADING_STRIDE = 50  # steps between looks at the heading, which turns by much less than half a circle in them
 C_TIMEOUT_S = 600.0
 
@@ -54,11 +57,11 @@ def final_state(P: np.ndarray, steps: int) -> list[float]:
 
 
 @contextmanager
-def compiled(source: Path, compiler: str) -> Iterator[Path]:
+def compiled(source: Path, compiler: str, *more: str) -> Iterator[Path]:
     """The program made from a C file, for as long as it is needed. InputError with the compiler's first complaint."""
     with tempfile.TemporaryDirectory(prefix="glider-plant-") as folder:
         program = Path(folder) / "plant"
-        command = [compiler, *FLAGS, str(source), "-lm", "-o", str(program)]
+        command = [compiler, *FLAGS, *more, str(source), "-lm", "-o", str(program)]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode != 0:
             complaints = [line for line in done.stderr.splitlines() if "error" in line] or done.stderr.splitlines()
@@ -92,40 +95,53 @@ def kernel_speed(P: np.ndarray, steps: int) -> float:
 
 
 def measure(settings: Settings, steps: int = STEPS) -> dict[str, Any]:
-    """steps_per_s, c_steps_per_s and ratio (medians, taken in turns), final_state and its distance from C's.
+    """steps_per_s, c_steps_per_s and ratio (medians, taken in turns), final_state and its distance from C's; `batch`:
+    the same of VEHICLES vehicles at once, beside C and beside C with -ffast-math (ratio_fast).
 
     Where there is no C to compare with, its figures are null and `note` says why.
     """
     P = decode_vehicle(shipped("model/vehicles")["roughie"], "roughie").vector()
-    state = final_state(P, steps)  # compiles the kernel, too
+    state, fleet = final_state(P, steps), Fleet(P, COMMANDS, start(), DT)  # compiles the kernel, too
+    each = -(-steps // VEHICLES)
     result: dict[str, Any] = {"steps": steps, "final_state": state}
+    batch = fleet.found(each)
+    ours = (lambda: kernel_speed(P, steps), lambda: fleet.speed(each))
     compiler = shutil.which("cc")
     note = "no C compiler (cc) to compare with"
     with as_file(files("tools.measure.benchmark") / "plant.c") as own:
         source = settings.plant_c or own
         try:
             if compiler is not None:
-                return {**against_c(P, source, compiler, state, settings.repeats, steps), **result}
+                return {**against_c(ours, source, compiler, state, batch, settings.repeats, steps), **result}
         except InputError as error:
             if settings.plant_c is not None:
                 raise
             note = str(error)
-    speeds = alternate(settings.repeats, lambda: kernel_speed(P, steps))[0]
+    speed, together = (median(speeds) for speeds in alternate(settings.repeats, *ours))
     nothing = {"c_steps_per_s": None, "ratio": None, "max_state_difference": None}
-    return {"steps_per_s": median(speeds), **nothing, **result, "note": note}
+    none = {"c_fast_steps_per_s": None, "ratio": None, "ratio_fast": None}
+    return {
+        "steps_per_s": speed, **nothing, "batch": {"steps_per_s": together, **none, **batch}, **result, "note": note
+    }  # fmt: skip
 
 
 def against_c(
-    P: np.ndarray, source: Path, compiler: str, state: list[float], repeats: int, steps: int
-) -> dict[str, Any]:
-    """Kernel and C in turns: both speeds, their ratio, the largest difference of `state` from where C ends."""
-    with compiled(source, compiler) as program:
-        speeds, flights = alternate(repeats, lambda: kernel_speed(P, steps), lambda: run_c(program, source, steps))
-    speed, c_speed = median(speeds), median([speed for speed, _ in flights])
+    ours: tuple[Callable[[], float], Callable[[], float]], source: Path, compiler: str, state: list[float],
+    batch: dict[str, Any], repeats: int, steps: int,
+) -> dict[str, Any]:  # fmt: skip
+    """Kernel, batch and both Cs in turns: speeds, their ratios, the largest difference of `state` from where C ends."""
+    with compiled(source, compiler) as program, compiled(source, compiler, FAST) as fast:
+        speeds, together, flights, fast_flights = alternate(
+            repeats, *ours, lambda: run_c(program, source, steps), lambda: run_c(fast, source, steps)
+        )
+    speed, batch_speed = median(speeds), median(together)
+    c_speed, c_fast = median([speed for speed, _ in flights]), median([speed for speed, _ in fast_flights])
+    compared = {"ratio": batch_speed / c_speed, "ratio_fast": batch_speed / c_fast}
     return {
         "steps_per_s": speed,
         "c_steps_per_s": c_speed,
         "ratio": speed / c_speed,
         "max_state_difference": max(abs(a - b) for a, b in zip(state, flights[0][1], strict=True)),
+        "batch": {"steps_per_s": batch_speed, "c_fast_steps_per_s": c_fast, **compared, **batch},
         "c_source": source.name,
     }
