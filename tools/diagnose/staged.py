@@ -143,7 +143,7 @@ class _Stages:
             held = max(cost, 1.0) / (len(cuts[0].first) * len(inside.channels))
             normal, slope = inside.linear(at, gains, cuts)
             normal, slope = normal + held * np.eye(len(at)), slope + held * at
-            e, J = outside.columns(at, outside.gains(at), outside.windows(horizon, 0.0))
+            ((e, J),) = outside.columns(at, outside.gains(at), [outside.windows(horizon, 0.0)])
             first = len(fold.values)
             for label, free in candidates.items():
                 on = np.concatenate([np.arange(len(fold.values)), np.arange(first, first + len(free))])

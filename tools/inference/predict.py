@@ -55,13 +55,13 @@ def fly_near(problem: Problem, models: list[tuple[np.ndarray, np.ndarray]]) -> n
     observer, r, scored = observer_of(problem), problem.recording, cut(problem)
     F = effect_vector(problem.model)
     gains = observer.filter(problem.model.P, F, begin=True, speeds=problem.kind.window_speeds)
-    Y = np.full((len(models), *problem.z.shape), np.nan)
+    Y = np.full((len(models), 1, *problem.z.shape), np.nan)
     problem.kind.fly_followed(
         np.array([P for P, _ in models]), np.array([F for _, F in models]), np.array(problem.kind.drift), r.modes,
         r.bounds, r.t, problem.stamps, r.inputs, observer.z, observer.starts, gains.W, gains.K, scored.first,
-        scored.last, scored.run_of, Y,
+        scored.last, scored.run_of, np.zeros_like(scored.run_of), Y,
     )  # fmt: skip
-    return Y
+    return Y[:, 0]
 
 
 def fly(problem: Problem, P: np.ndarray, F: np.ndarray, own_filter: bool = False) -> np.ndarray:

@@ -15,7 +15,7 @@ the model itself stands.
 - From several starts: the file's values and the best of RANDOM draws of the prior, each taken through all horizons.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -107,14 +107,17 @@ class PredictionError:
         self.observer.starts[:] = self.problem.starts
         return self.observer.filter(*self.model(values), begin=True, speeds=self.problem.kind.window_speeds)
 
-    def fly(self, points: list[np.ndarray], gains: Gains, windows: Windows) -> np.ndarray:
-        """Flights (points, rows, N_Y) of the windows from where the gains hold each model."""
+    def fly(self, points: list[np.ndarray], gains: Gains, cuts: list[Windows]) -> np.ndarray:
+        """Flights (points, cuts, rows, N_Y) of the windows from where the gains hold each model."""
         problem, r = self.problem, self.problem.recording
         Ps, Fs = zip(*(self.model(values) for values in points), strict=True)
-        Y = np.full((len(points), *problem.z.shape), np.nan)
+        Y = np.full((len(points), len(cuts), *problem.z.shape), np.nan)
+        names = ("first", "last", "run_of")
+        first, last, run_of = (np.concatenate([getattr(one, name) for one in cuts]) for name in names)
+        cut_of = np.repeat(np.arange(len(cuts)), [len(one.first) for one in cuts])
         problem.kind.fly_followed(
             np.array(Ps), np.array(Fs), np.array(problem.kind.drift), r.modes, r.bounds, r.t, problem.stamps, r.inputs,
-            self.observer.z, self.observer.starts, gains.W, gains.K, windows.first, windows.last, windows.run_of, Y,
+            self.observer.z, self.observer.starts, gains.W, gains.K, first, last, run_of, cut_of, Y,
         )  # fmt: skip
         return Y
 
@@ -143,26 +146,28 @@ class PredictionError:
     def cost(self, values: np.ndarray, cuts: list[Windows]) -> tuple[float, Gains]:
         """The mean square at values, over cuts into windows, and the observer's gains there."""
         gains = self.gains(values)
-        parts = [self.weights(self.residuals(self.fly([values], gains, one), one)[0])[1] for one in cuts]
+        Y = self.fly([values], gains, cuts)
+        parts = [self.weights(self.residuals(Y[:, n], one)[0])[1] for n, one in enumerate(cuts)]
         return float(np.mean(parts)), gains
 
     def linear(self, values: np.ndarray, gains: Gains, cuts: list[Windows]) -> tuple[np.ndarray, np.ndarray]:
         """Normal matrix (n, n) and slope (n,) of the mean square at values, the gains kept."""
         normal, slope = np.zeros((len(values), len(values))), np.zeros(len(values))
-        for one in cuts:
-            e, J = self.columns(values, gains, one)
+        for e, J in self.columns(values, gains, cuts):
             weighted = J * (self.weights(e)[0] / len(cuts))
             normal += weighted @ J.T
             slope += weighted @ e
         return normal, slope
 
-    def columns(self, values: np.ndarray, gains: Gains, windows: Windows) -> tuple[np.ndarray, np.ndarray]:
-        """Residuals (samples,) and their columns (n, samples) at values; from a kink by a whole sigma."""
+    def columns(self, values: np.ndarray, gains: Gains, cuts: list[Windows]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Of every cut the residuals (samples,) and their columns (n, samples) at values; from a kink by a sigma."""
         size = np.where(self.kinked & (values == 0.0), 1.0, NUDGE)
         size = np.where(values + size <= self.high, size, -size)
         points = [values, *(values + s * row for s, row in zip(size, np.eye(len(values)), strict=True))]
-        E = self.residuals(self.fly(points, gains, windows), windows)
-        return E[0], (E[1:] - E[0]) / size[:, None]
+        Y = self.fly(points, gains, cuts)
+        for n, one in enumerate(cuts):
+            E = self.residuals(Y[:, n], one)
+            yield E[0], (E[1:] - E[0]) / size[:, None]
 
     def descend(self, values: np.ndarray, horizon: float, offsets: tuple[float, ...], steps: int) -> Fitted:
         """Levenberg and Marquardt's steps at one horizon, limits kept."""

@@ -72,7 +72,7 @@ def test_the_normal_matrix_is_the_slope_of_the_cost(case):
     _, slope = fitting.linear(at, gains, cuts)
 
     def cost(values: np.ndarray) -> float:
-        e = fitting.residuals(fitting.fly([values], gains, cuts[0]), cuts[0])[0]
+        e = fitting.residuals(fitting.fly([values], gains, cuts)[:, 0], cuts[0])[0]
         return fitting.weights(e)[1]
 
     for name in ("net_mass", "cg_x", "slider_scale"):

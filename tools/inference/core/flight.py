@@ -6,22 +6,28 @@ import numpy as np
 
 from firmware.core.jit import kernel, parallel_kernel, prange
 from firmware.core.maths.steps import RK4
+from firmware.core.maths.wide import LANES, as_wide, room
+from firmware.core.vehicle.batch import gather
 from firmware.core.vehicle.layout import N_P
 from sim_backend.core.effect_plant import effective_parameters
 from sim_backend.core.effects import effect_layout as ef
 from tools.inference.core.error_layout import N_PATH, Q_ACC
-from tools.inference.core.filter import follow_run
+from tools.inference.core.filter import follow_run, groups_of
 from tools.inference.core.step import N_Y, log_path, pose_of, propagate, read_row
 
 
 @kernel
 def fly_window(P, F, mode, t, inputs, X, path, first, last, Y):
-    """Fly rows first .. last - 1 of a run on from X[first - 1], into Y (rows, N_Y); path (rows, N_PATH) up to there."""
-    Pw, x = np.empty(N_P), X[first - 1].copy()
+    """Fly rows first .. last - 1 of a run on from X[first - 1], into Y (rows, N_Y); path (rows, N_PATH) up to there.
+
+    P, F, X, path and Y of wide numbers fly as many models as have lanes.
+    """
+    Pw, x, flown = room(P, (N_P,)), room(P, (ef.N_XF,)), room(P, (last, N_PATH))
     effective_parameters(P, F, Pw)
-    work, kept = np.zeros((4, ef.N_XF)), np.empty(ef.N_XF)
-    zero, before, acc = np.zeros(3), np.empty(N_PATH), np.zeros(6)
-    flown = path[:last].copy()
+    x[:] = X[first - 1]
+    flown[:first] = path[:first]
+    work, kept = room(P, (4, ef.N_XF)), room(P, (ef.N_XF,))
+    zero, before, acc = np.zeros(3), room(P, (N_PATH,)), np.zeros(6)
     for i in range(first, last):
         pose_of(x, before)
         propagate(Pw, F, x, mode, t, inputs, i, 0, acc, zero, work, kept, RK4)
@@ -41,24 +47,34 @@ def fly_windows(P, F, modes, bounds, t, inputs, X, paths, first, last, run_of, Y
 
 
 @parallel_kernel
-def fly_followed(Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, K, first, last, run_of, Y):
-    """Every model followed along the runs with kept gains, and its windows flown on from there: Y as in fly_windows.
+def fly_followed(Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, K, first, last, run_of, cut_of, Y):
+    """Every model followed along the runs with kept gains, and its windows flown on from there.
 
-    Rows outside the windows are left as they are.
+    Y (models, cuts, rows, N_Y): windows of one cut_of do not overlap; rows outside of them are left as they are.
     """
-    runs = len(bounds) - 1
-    for n in prange(Ps.shape[0] * runs):
-        m, run = n // runs, n % runs
+    groups = groups_of(Fs[:, ef.LINK])
+    number = len(groups) - 1
+    for n in prange(number * (len(bounds) - 1)):
+        begins, ends, run = groups[n % number], groups[n % number + 1], n // number
         begin, end = bounds[run], bounds[run + 1]
-        X, path, E = np.empty((end - begin, ef.N_XF)), np.empty((end - begin, N_PATH)), np.empty((end - begin, N_Y))
+        rows = end - begin
+        P, F = np.empty((N_P, LANES)), np.empty((ef.N_F, LANES))
+        gather(Ps[begins:ends], 0, P)
+        gather(Fs[begins:ends], 0, F)
+        X, path, E = np.empty((rows, ef.N_XF, LANES)), np.empty((rows, N_PATH, LANES)), np.empty((rows, N_Y, LANES))
         follow_run(
-            Ps[m], Fs[m], drift, modes[run], t[begin:end], stamps[begin:end], inputs[begin:end], z[begin:end], 0,
-            end - begin, starts[run], W[begin:end], K[begin:end], True, X, path, E,
+            as_wide(P), as_wide(F), drift, modes[run], t[begin:end], stamps[begin:end], inputs[begin:end],
+            z[begin:end], 0, rows, starts[run], W[begin:end], K[begin:end], True, as_wide(X), as_wide(path), as_wide(E),
         )  # fmt: skip
         for w in range(len(first)):
             if run_of[w] == run:
                 a, b = first[w] - begin, last[w] - begin
-                fly_window(Ps[m], Fs[m], modes[run], t[begin:end], inputs[begin:end], X, path, a, b, Y[m, begin:end])
+                fly_window(
+                    as_wide(P), as_wide(F), modes[run], t[begin:end], inputs[begin:end], as_wide(X), as_wide(path),
+                    a, b, as_wide(E),
+                )  # fmt: skip
+                for m in range(begins, ends):
+                    Y[m, cut_of[w], first[w] : last[w]] = E[a:b, :, m - begins]
 
 
 @parallel_kernel

@@ -208,7 +208,7 @@ def fly_windows(P, F, modes, bounds, t, inputs, X, paths, first, last, run_of, Y
 
 
 @parallel_kernel
-def fly_followed(Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, K, first, last, run_of, Y):
+def fly_followed(Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, K, first, last, run_of, cut_of, Y):
     """Every model followed along the runs with kept gains, and its windows flown on: as core/flight.fly_followed."""
     runs = len(bounds) - 1
     for n in prange(Ps.shape[0] * runs):
@@ -218,7 +218,7 @@ def fly_followed(Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, 
         follow_run(Ps[m], Fs[m], t, inputs, z, begin, end, starts[run], W, K, X, E)
         for w in range(len(first)):
             if run_of[w] == run:
-                fly_window(Ps[m], Fs[m], t, inputs, begin, X, first[w], last[w], Y[m])
+                fly_window(Ps[m], Fs[m], t, inputs, begin, X, first[w], last[w], Y[m, cut_of[w]])
 
 
 @parallel_kernel
