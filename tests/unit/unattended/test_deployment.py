@@ -53,6 +53,7 @@ def test_a_flight_is_never_started_by_itself():
     """No restart, nothing that pulls it in at boot; the watch is, always."""
     flight, watch = unit(UNITS[1]), unit(UNITS[0])
     assert flight["Service"]["Restart"] == "no"
+    assert not {"Requires", "BindsTo", "PartOf", "Requisite"} & set(flight["Unit"])  # these restart what needs them
     assert not flight.has_section("Install")
     assert watch["Service"]["Restart"] == "always"
     assert watch["Install"]["WantedBy"] == "multi-user.target"
