@@ -22,10 +22,11 @@ import numpy as np
 from tools.cli.common import DONE, FAILED, print_json, say
 from tools.data.log.reader import read_log
 from tools.deploy.bundle import make_release, release_name
+from tools.deploy.selfcheck import PLUNGE
 from tools.deploy.wheels import ROOT, Target
 
-SUITE, MIRROR = "bookworm", "http://deb.debian.org/debian"
-PACKAGES = ("python3", "coreutils", "dash", "sed", "grep", "findutils", "libc-bin", "util-linux")
+SUITE = "bookworm"  # as 64-bit Raspberry Pi OS 12
+PACKAGES = ("python3", "coreutils", "dash", "sed", "grep", "findutils", "libc-bin", "libstdc++6", "util-linux")
 BINFMT = Path("/proc/sys/fs/binfmt_misc")
 EMULATOR = "/usr/bin/qemu-aarch64-static"
 # The kernel's way to know such a program (ELF, 64 bits, little-endian, machine 183); F: the emulator is opened now.
@@ -79,13 +80,13 @@ def arm_programs() -> Iterator[None]:
 class Arm:
     """A root file system of the other processor."""
 
-    def __init__(self, root: Path):
-        self.root = root
+    def __init__(self, root: Path, release: str):
+        self.root, self.release = root, release
 
     def make(self) -> None:
         """Debian's packages of Python and a shell, unpacked: none of their scripts has to run in the emulator."""
         command = ["mmdebstrap", "--quiet", "--arch=arm64", "--variant=extract", f"--include={','.join(PACKAGES)}"]
-        command += ["--hook-dir=/usr/share/mmdebstrap/hooks/merged-usr", SUITE, str(self.root), MIRROR]
+        command += ["--hook-dir=/usr/share/mmdebstrap/hooks/merged-usr", SUITE, str(self.root)]
         subprocess.run(command, check=True, stdout=sys.stderr)
         for name in ("proc", "sys", "dev", "root", "tmp"):
             (self.root / name).mkdir(exist_ok=True)
@@ -96,7 +97,7 @@ class Arm:
         return subprocess.run(self.command(*words), text=True, **more)
 
     def command(self, *words: str) -> list[str]:
-        cache = f"{VEHICLE}/var/lib/glider/cache/{release_name()}"  # where the self-check's kernels are
+        cache = f"{VEHICLE}/var/lib/glider/cache/{self.release}"  # where the self-check's kernels are
         settings = ["PATH=/usr/sbin:/usr/bin:/sbin:/bin", "HOME=/root", f"GLIDER_CACHE_DIR={cache}",
                     "GLIDER_STATE_DIR=/root/state", "GLIDER_RUN_DIR=/root/run"]  # fmt: skip
         return ["chroot", str(self.root), "/usr/bin/env", "-i", *settings, *words]
@@ -127,18 +128,30 @@ def install(arm: Arm, release: Path) -> dict[str, Any]:
     return {"pass": done.returncode == 0, "seconds": round(time.monotonic() - begin)}
 
 
-def same_flight(arm: Arm, folder: Path, mission: str, seed: int) -> dict[str, Any]:
-    """A mission on the simulated board, there and here: which numbers of the logs differ, and by how much at most."""
-    words = ["fly", "--mission", mission, "--seed", str(seed), "--json", "--log"]
-    (arm.root / "root/flight.mcap").unlink(missing_ok=True)
-    there = arm.glider(*words, "/root/flight.mcap", stdout=subprocess.PIPE)
-    here_log = folder / "here.mcap"
-    here_log.unlink(missing_ok=True)
-    command = [sys.executable, "-m", "tools.cli.main", *words, str(here_log)]
-    here = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True)
+def same_flight(arm: Arm, folder: Path, mission: str, seed: int, *, compiled: bool) -> dict[str, Any]:
+    """A mission on the simulated board, there and here: which numbers of the logs differ, and by how much at most.
+
+    As plain Python (GLIDER_JIT=0) none has to: a compiler may contract a product and a sum into one rounding, and each
+    processor's does so in places of its own.
+    """
+    words = ["fly", "--seed", str(seed), "--json"]
+    logs_of = (arm.root / "root/flight.mcap", folder / "here.mcap")
+    for log in logs_of:
+        log.unlink(missing_ok=True)
+    for place in (arm.root / "root", folder):
+        (place / "selfcheck.toml").write_text(PLUNGE)
+    jit = f"GLIDER_JIT={int(compiled)}"
+    names = [(f"{place}/selfcheck.toml" if mission == "selfcheck" else mission) for place in ("/root", folder)]
+    there = arm.call(
+        "env", jit, f"{VEHICLE}/opt/glider/current/bin/glider", *words, "--mission", names[0], "--log",
+        "/root/flight.mcap", stdout=subprocess.PIPE,
+    )  # fmt: skip
+    command = [sys.executable, "-m", "tools.cli.main", *words, "--mission", names[1], "--log", str(logs_of[1])]
+    environment = {**os.environ, "GLIDER_JIT": str(int(compiled)), "PYTHONPATH": str(ROOT)}
+    here = subprocess.run(command, env=environment, stdout=subprocess.PIPE, text=True)
     if there.returncode or here.returncode:
         return {"mission": mission, "pass": False, "codes": [there.returncode, here.returncode]}
-    logs = [read_log(path).topics["/tick"] for path in (arm.root / "root/flight.mcap", here_log)]
+    logs = [read_log(path).topics["/tick"] for path in logs_of]
     worst = {}
     for field in logs[0].fields:
         columns = [np.asarray(log.column(field.name)) for log in logs]
@@ -148,7 +161,8 @@ def same_flight(arm: Arm, folder: Path, mission: str, seed: int) -> dict[str, An
             worst[field.name] = float(np.nanmax(np.abs(columns[0] - columns[1])))
     ticks = [log.count for log in logs]
     return {
-        "mission": mission, "pass": ticks[0] == ticks[1], "ticks": ticks, "fields": len(logs[0].fields),
+        "mission": mission, "compiled": compiled, "pass": ticks[0] == ticks[1] and (compiled or not worst),
+        "ticks": ticks, "fields": len(logs[0].fields),
         "bit_for_bit": not worst, "largest_differences": dict(sorted(worst.items(), key=lambda item: -item[1])[:8]),
     }  # fmt: skip
 
@@ -204,7 +218,7 @@ def main() -> int:
         print_json({"skipped": f"{lacking} is missing"})
         return DONE
     options.folder.mkdir(parents=True, exist_ok=True)
-    arm = Arm(options.folder.resolve() / "root")
+    arm = Arm(options.folder.resolve() / "root", release_name())
     result: dict[str, Any] = {}
     with arm_programs():
         if not (arm.root / "usr/bin/python3").exists():
@@ -216,7 +230,10 @@ def main() -> int:
             if result["install"]["pass"]:
                 flights = sorted((ROOT / "tests/data/reference").glob("*.csv"))
                 result["reference"] = [reference(arm, path) for path in flights]
-                result["flights"] = [same_flight(arm, options.folder, name, 2) for name in ("sawtooth", "spiral")]
+                result["flights"] = [
+                    same_flight(arm, options.folder.resolve(), name, 2, compiled=compiled)
+                    for name, compiled in (("selfcheck", False), ("sawtooth", True), ("spiral", True))
+                ]
                 result["killed"] = killed(arm)
                 result["out_of_band"] = out_of_band(arm)
     checks = [item for value in result.values() for item in (value if isinstance(value, list) else [value])]
