@@ -8,7 +8,7 @@ DEMO_STAMP := $(VENV)/.installed-demo
 # Python keeps the bytecode of what it reads: the tests start some hundred programs.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: setup demo picture test check lint types contract benchmark deploy rollback clean
+.PHONY: setup demo picture test check lint types contract benchmark deploy rollback arm64 clean
 
 # Kernels are compiled here, with a word about it, and again only when they change.
 setup: $(STAMP)
@@ -65,6 +65,10 @@ deploy: $(STAMP)
 rollback: $(STAMP)
 	@test -n "$(HOST)" || { echo 'make rollback HOST=user@glider' >&2; exit 2; }
 	$(BIN)/python -m tools.deploy.push $(HOST) --rollback
+
+# A release on an emulated 64-bit ARM computer: installed from its wheels, flown, compared. Root; a quarter of an hour.
+arm64: $(STAMP)
+	$(BIN)/python -m tools.deploy.emulated build/arm64
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis

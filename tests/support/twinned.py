@@ -108,10 +108,10 @@ def end_guard(folder: Path) -> None:
         until(lambda: not Path(f"/proc/{pid}").exists(), 5.0)
 
 
-def until(condition, seconds: float) -> float:
-    """Wait for a condition; how long it took. AssertionError where it does not come."""
+def until(condition, seconds: float, every: float = 0.02) -> float:
+    """Wait for a condition, asked `every` so many s; how long it took. AssertionError where it does not come."""
     begin = time.monotonic()
     while not condition():
         assert time.monotonic() - begin < seconds, "waited in vain"
-        time.sleep(0.02)
+        time.sleep(every)
     return time.monotonic() - begin

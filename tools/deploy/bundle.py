@@ -41,7 +41,7 @@ def make_release(target: Target, folder: Path, root: Path = ROOT) -> Path:
         archive = subprocess.run(["git", "-C", str(root), "archive", "HEAD"], capture_output=True, check=True).stdout
         subprocess.run(["tar", "x", "-C", str(tree)], input=archive, check=True)
         own_wheel(tree, fresh / "wheels")
-        _copy_files(tree, fresh)
+        copy_files(tree, fresh)
     lines = {"release": name, "version": version(root), "machine": target.machine, "python": target.python}
     (fresh / "RELEASE").write_text("".join(f"{key}={text}\n" for key, text in lines.items()))
     files = sorted(path for path in fresh.rglob("*") if path.is_file())
@@ -52,7 +52,7 @@ def make_release(target: Target, folder: Path, root: Path = ROOT) -> Path:
     return release
 
 
-def _copy_files(tree: Path, release: Path) -> None:
+def copy_files(tree: Path, release: Path) -> None:
     """Script, units, and the files that a first vehicle begins with."""
     (release / "units").mkdir()
     (release / "first").mkdir()

@@ -88,7 +88,6 @@ passes() {
 
 # The services lead through /opt/glider/current, so that they change with it.
 services() {
-    [ -e "$root/etc/systemd/system/glider-flight@.service" ] && return
     for unit in glider-outofband.service 'glider-flight@.service'; do
         link "/opt/glider/current/units/$unit" "$root/etc/systemd/system/$unit"
     done

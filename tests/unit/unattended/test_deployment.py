@@ -1,6 +1,7 @@
 """What is put on the glider's computer: units that systemd understands, a script that refuses what it cannot serve."""
 
 import configparser
+import json
 import os
 import shutil
 import subprocess
@@ -53,6 +54,7 @@ def test_a_flight_is_never_started_by_itself():
     """No restart, nothing that pulls it in at boot; the watch is, always."""
     flight, watch = unit(UNITS[1]), unit(UNITS[0])
     assert flight["Service"]["Restart"] == "no"
+    assert not {"Requires", "BindsTo", "PartOf", "Requisite"} & set(flight["Unit"])  # these restart what needs them
     assert not flight.has_section("Install")
     assert watch["Service"]["Restart"] == "always"
     assert watch["Install"]["WantedBy"] == "multi-user.target"
@@ -127,6 +129,16 @@ def test_a_release_passes_its_self_check_unless_vehicle_files_or_state_are_again
     assert check() == (
         1, f"self-check: state: FAILED: {state}: the flight before: diving; bring it up and look at it first"
     )  # fmt: skip
+
+
+def test_where_no_arm_can_be_emulated_it_says_why(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "tools.deploy.emulated", tmp_path / "arm"], cwd=ROOT, capture_output=True, text=True,
+        env={**os.environ, "PATH": str(tmp_path)},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["skipped"] in ("root is missing", "mmdebstrap is missing")
+    assert not (tmp_path / "arm").exists()
 
 
 def test_the_wishes_are_reported_whatever_comes_of_them():
