@@ -38,11 +38,13 @@ def _blank(rng: np.random.Generator, name: str, mocap: bool) -> Run:
 
 
 def make_case(
-    folder: Path, F: np.ndarray, *, seed: int, runs: int = 3, mocap: bool = False, rough: float = 1.0, late=None
-) -> Case:
+    folder: Path, F: np.ndarray, *, seed: int, runs: int = 3, mocap: bool = False, rough: float = 1.0, late=None,
+    moved=None,
+) -> Case:  # fmt: skip
     """A case in `folder` whose vehicle has the effects F (N_F), its parameters and biases drawn as allowed.
 
-    rough: times the disturbance; late(t): by how many seconds motion capture's clock is late, with mocap.
+    rough: times the disturbance; late(t): by how many seconds motion capture's clock is late, with mocap; moved(t): by
+    how many metres (rows, 3) water moves the vehicle.
     """
     rng = np.random.default_rng(seed)
     blank = [_blank(rng, f"run{n:02d}", mocap) for n in range(runs)]
@@ -52,6 +54,10 @@ def make_case(
     problem.spectral[:6] *= rough**2
     Z = problem.simulated(*drawn(problem, F, rng), begins(problem, rng), rng)
     bounds = problem.recording.bounds
+    if moved is not None:
+        away = moved(problem.recording.t)
+        Z[:, ef.Y_MOCAP_X : ef.Y_MOCAP_ROLL] += away
+        Z[:, ef.Y_DEPTH] += away[:, 2]
     made = []
     for n, run in enumerate(blank):
         columns = dict(run.columns)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tools.diagnose.as_read import begun_as_read
 from tools.diagnose.search import Search, without_extra_noise
 from tools.gap.measure import RunGap, case_channels, root_mean_square, run_gap
 from tools.inference.fit import NUISANCE_LIMIT, Hypothesis, bounded_step
@@ -145,7 +146,8 @@ def left_out_squares(search: Search, hypothesis: Hypothesis) -> np.ndarray:
 def lacking_squares(search: Search, hypothesis: Hypothesis) -> dict[str, np.ndarray]:
     """By effect of a hypothesis, how much squared gaps on runs left out, (runs,), grow with a model that lacks it.
 
-    It lacks that one alone: all else stays as it was fitted, and windows begin where the whole model's filter stands.
+    It lacks that one alone: all else stays as it was fitted, and windows begin where the whole model's filter stands,
+    or where the lacking model's readings show the vehicle (as_read).
     """
     problem = search.problem.as_recorded
     found = {label: np.empty(len(problem.runs)) for label in hypothesis.labels}
@@ -154,8 +156,8 @@ def lacking_squares(search: Search, hypothesis: Hypothesis) -> dict[str, np.ndar
         part = problem.part(n)
         gains, listed = part.filter(P, F, begin=True), cut(part).listed[0]
 
-        def square(F: np.ndarray, part=part, P=P, gains=gains, listed=listed) -> float:
-            Y = fly_windows_from(part, P, F, gains)
+        def square(other: np.ndarray, part=part, P=P, F=F, gains=gains, listed=listed) -> float:
+            Y = fly_windows_from(part, P, other, begun_as_read(part, F, other, gains))
             return run_gap(part.kind.measures, part.runs[0], Y, listed).total ** 2
 
         whole = square(F)

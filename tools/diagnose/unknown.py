@@ -7,9 +7,10 @@ from scipy.stats import norm
 
 from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.catalogue import catalogue
-from tools.diagnose.noise_probes import CLOCK, TURBULENCE, WAVES, ProbeResult, probes, run_probes
+from tools.diagnose.noise_probes import CLOCK, TURBULENCE, WAVES, ProbeResult, inflated, probes, run_probes
 from tools.diagnose.search import Search
-from tools.diagnose.shrink import Shrinkage
+from tools.diagnose.shrink import AFTER, FLOOR, Shrinkage
+from tools.diagnose.waves import LINE, line_share
 from tools.inference.fit import Hypothesis
 from tools.inference.parameters import CLOCK_PLACE
 
@@ -18,6 +19,7 @@ LEFT_GAP, LEFT_GAP_WIDTH = 0.17, 0.5  # the same of the squared gap beyond the f
 # Floors that the gap left lies beyond its own floor (root of the difference of squares), at which it is as likely one
 # effect of its own as what small ones leave; e-folds.
 WIDE, WIDE_WIDTH = 1.8, 0.35
+TURNED = ("pitch", "roll", "yaw", "rates")  # channels that a sea does not move
 NOISY, NOISY_WIDTH = 0.2, 0.8  # share of the explainable misfit that is left: disorder is looked for; width in e-folds
 UNFIT = 5.0  # tolerances that the best explanation still misses by: no effect of the catalogue does that
 LOOSE = 3.0  # times the floor, and one tolerance, that no vehicle without a gap is off
@@ -90,15 +92,29 @@ def water_disorder(search: Search, probed: list[ProbeResult]) -> ProbeResult | N
     return first if first.probe.name == TURBULENCE and axes[0] < ONE_AXIS * first.gain else None
 
 
-def disorder(search: Search, left: Remainder) -> ProbeResult | None:
+def waves_beside(search: Search, hypothesis: Hypothesis, left: Remainder) -> ProbeResult | None:
+    """Waves, where no link but turbulence gains more beside a hypothesis, and what they move has a sea's line."""
+    first = next((found for found in left.probed if found.probe.name != TURBULENCE), None)
+    if first is None or first.probe.name != WAVES:
+        return None
+    more, doubt = inflated(search.problem, first.probe, first.scale)
+    gains = search.problem.filter(*search.model(hypothesis), begin=True, more=more, doubt=doubt)
+    return first if line_share(search.problem, gains) >= LINE else None
+
+
+def disorder(search: Search, hypothesis: Hypothesis, left: Remainder) -> ProbeResult | None:
     """The noise that the search has to know of, to see what is beside it; None where there is nothing of the kind.
 
-    Motion capture's clock where its probe gains more than any other link's, its poses' noise apart; turbulence or waves
-    where they are the cause: of all that can be explained, they explain MOSTLY.
+    Motion capture's clock where its probe gains more than any other link's, its poses' noise apart; waves where they
+    show beside the hypothesis; turbulence or waves where they are the cause: of all that can be explained, they explain
+    MOSTLY.
     """
     clock = [found for found in left.probed if found.probe.name == CLOCK and found.gain > CLOCKED * left.left]
     if clock and left.probed[0].probe.element == CLOCK_PLACE[1]:
         return clock[0]
+    beside = waves_beside(search, hypothesis, left)
+    if beside is not None:
+        return beside
     if left.share <= NOISY:
         return None
     found = water_disorder(search, left.probed)
@@ -119,14 +135,33 @@ def clock_label(search: Search, hypothesis: Hypothesis) -> str:
     return min(left, key=lambda label: float(left[label] @ left[label]))
 
 
+def turned_floors(shrinkage: Shrinkage) -> float:
+    """What is left beyond the floor in the channels that a sea does not move, in floors of theirs."""
+    after, floor = shrinkage.channels(AFTER), shrinkage.channels(FLOOR)
+    turned = [name for name in TURNED if name in after]
+    lowest = sum(floor[name] ** 2 for name in turned)
+    beyond = sum(after[name] ** 2 for name in turned) - lowest
+    return float(np.sqrt(max(beyond, 0.0) / max(lowest, 1e-9)))
+
+
+def beside_a_sea(shrinkage: Shrinkage, left: Remainder, sea: ProbeResult) -> float:
+    """Probability of an unknown effect beside waves, which move the vehicle and do not turn it.
+
+    What is left of the misfit is held against what effects explain: the sea explains far more, and nothing of it.
+    """
+    own = max(left.explained - sea.gain, 0.0)
+    share = left.left / max(left.left + own, 1e-9)
+    return probability(turned_floors(shrinkage), WIDE, WIDE_WIDTH) * probability(share, LEFT_OVER, LEFT_WIDTH)
+
+
 def probability_unknown(
-    search: Search, selected: bool, evident: bool, shrinkage: Shrinkage, left: Remainder | None, noise: bool,
-    taken: float,
+    search: Search, selected: bool, evident: bool, shrinkage: Shrinkage, left: Remainder | None,
+    noise: ProbeResult | None, taken: float,
 ) -> float:  # fmt: skip
     """Probability that the gap is none of the catalogue's, or that there is one where none shows otherwise.
 
-    selected, evident: whether any effect is, or is at least there; noise: the search knows of extra noise, which no
-    window's gap shows; taken: as in left_share.
+    selected, evident: whether any effect is, or is at least there; noise: disorder that the search knows of, which no
+    window's floor has; taken: as in left_share.
     """
     if left is None:  # what is left was not asked about, or nothing is
         loose = not selected and not noise and shrinkage.after > max(LOOSE * shrinkage.floor, 1.0)
@@ -135,7 +170,8 @@ def probability_unknown(
     if shrinkage.after > UNFIT:
         return 1.0 - MORE_UNKNOWN
     if noise:
-        return probability(left.share, NOISY, NOISY_WIDTH)
+        disordered = probability(left.share, NOISY, NOISY_WIDTH)
+        return max(disordered, beside_a_sea(shrinkage, left, noise)) if noise.probe.name == WAVES else disordered
     wide = probability(left_floors(shrinkage), WIDE, WIDE_WIDTH)
     if not evident:
         return wide

@@ -219,7 +219,7 @@ def conclude(
     whiteness, left = worst(findings), None
     if whiteness >= UNCLEAN and problem.rules.whiteness:
         left = remainder_of(search, evident, noise)
-        found = disorder(search, left) if noise is None else None
+        found = disorder(search, evident, left) if noise is None else None
         if found is not None:
             return search_again_with_noise(search, evident, gained, found, say)
     moved = movements(search, evident)
@@ -251,11 +251,13 @@ def conclude(
     chances = posterior(search, evident, main) if by_search else {main or NONE: 1.0}
     chances = share_out(chances, main, most_often({label: taken[label] for label in gained}))
     chances = to_none(chances, negligible, movements_of_alternatives(search, evident, main, chances))
+    chances = pass_on(chances, [label for label in by_size if label in gained and label != main])
     if main in gained:
+        main = max(gained, key=lambda label: chances.get(label, 0.0))
         floors = sizes[main] / max(calm, 1e-6)
         chances = doubt_small(chances, main, floors / (TOLD if as_told(problem) else LARGE))
     by_effects = sum(sizes[label] ** 2 for label in gained)
-    unknown = probability_unknown(search, bool(gained), bool(ranked), shrinkage, left, noise is not None, by_effects)
+    unknown = probability_unknown(search, bool(gained), bool(ranked), shrinkage, left, noise, by_effects)
     if not gained and not gap_matters(shrinkage):
         unknown = LEAST_UNKNOWN
     chances = {name: value * (1.0 - unknown) for name, value in chances.items()} | {UNKNOWN: unknown}
@@ -291,6 +293,16 @@ def share_out(chances: dict[str, float], main: str, first: dict[str, float]) -> 
         if label != main:
             shared[label] = shared.get(label, 0.0) + first[label]
     return shared
+
+
+def pass_on(chances: dict[str, float], others: list[str]) -> dict[str, float]:
+    """Probabilities of the main cause, where other effects are there beside it, the largest first.
+
+    Without the main one there is not nothing: the next takes its place.
+    """
+    if not others:
+        return chances
+    return chances | {others[0]: chances.get(others[0], 0.0) + chances[NONE], NONE: 0.0}
 
 
 def doubt_small(chances: dict[str, float], main: str, size: float) -> dict[str, float]:

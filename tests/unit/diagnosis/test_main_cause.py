@@ -19,7 +19,7 @@ from tools.diagnose.unknown import (
     left_share,
     probability_unknown,
 )
-from tools.diagnose.verdict import SECOND, Worth, conclude, doubt_small, held_out_worth, share_out
+from tools.diagnose.verdict import SECOND, Worth, conclude, doubt_small, held_out_worth, pass_on, share_out
 from tools.inference.problem import problem_of
 
 
@@ -58,6 +58,12 @@ def test_what_another_may_take_first_goes_to_it():
     assert shared == pytest.approx({"drag": 0.56, "tether": 0.07, NONE: 0.07, "lift": 0.3})
 
 
+def test_without_the_main_cause_the_next_takes_its_place():
+    found = pass_on({"depth_scale": 0.3, "tether": 0.1, NONE: 0.6}, ["lift", "command_delay"])
+    assert found == pytest.approx({"depth_scale": 0.3, "tether": 0.1, "lift": 0.6, NONE: 0.0})
+    assert pass_on({"drag": 0.4, NONE: 0.6}, []) == {"drag": 0.4, NONE: 0.6}
+
+
 @pytest.mark.parametrize("size", [0.05, 0.5, 1.0])
 def test_a_small_effect_is_never_sure_and_none_never_before_it(size):
     found = doubt_small({"drag": 0.9, "lift": 0.1, NONE: 0.0}, "drag", size)
@@ -77,7 +83,7 @@ def shrinkage(after: float, floor: float = 0.15, recalibrated: float = 1.0) -> S
 
 def unknown(after: float, left: float, explained: float, evident: bool = True, taken: float = 9.0) -> float:
     search = SimpleNamespace(problem=SimpleNamespace(rules=SimpleNamespace(whiteness=True)))
-    return probability_unknown(search, True, evident, shrinkage(after), Remainder(explained, left, []), False, taken)
+    return probability_unknown(search, True, evident, shrinkage(after), Remainder(explained, left, []), None, taken)
 
 
 def test_what_leaves_next_to_no_gap_is_not_unknown_however_many_nat_it_has():

@@ -1,0 +1,61 @@
+"""Waves beside an effect: told by their line from a force that nobody knows, and by a second search from the effect."""
+
+from types import SimpleNamespace
+
+import numpy as np
+from support.cases import make_case
+
+from sim_backend.core.effects import effect_layout as ef
+from tools.diagnose.noise_probes import WAVES, NoiseProbe, ProbeResult
+from tools.diagnose.search import run
+from tools.diagnose.shrink import AFTER, FLOOR
+from tools.diagnose.unknown import Remainder, beside_a_sea
+from tools.diagnose.verdict import conclude
+from tools.diagnose.waves import LINE, line_share
+from tools.inference.problem import problem_of
+
+ROWS = 600
+
+
+def share(signal) -> float:
+    """The line's share of innovations of two runs of a minute: `signal(t)` and white noise in two readings of place."""
+    rng, t = np.random.default_rng(3), np.arange(ROWS) / 10.0
+    E = np.full((2 * ROWS, ef.N_Y), np.nan)
+    E[:, [ef.Y_DEPTH, ef.Y_MOCAP_Z]] = np.tile(signal(t), 2)[:, None] + rng.standard_normal((2 * ROWS, 2))
+    recording = SimpleNamespace(t=np.tile(t, 2), bounds=np.array([0, ROWS, 2 * ROWS]))
+    return line_share(SimpleNamespace(recording=recording), SimpleNamespace(E=E))
+
+
+def sea(t, phase=0.0):
+    """Five components about 4 s."""
+    return sum(np.sin(2.0 * np.pi / 4.0 * f * t + 7.0 * f + phase) for f in (0.87, 0.95, 1.0, 1.06, 1.14))
+
+
+def test_a_sea_has_a_line_and_what_goes_with_the_legs_has_none():
+    assert share(sea) > LINE + 0.1
+    assert share(lambda t: 0.0 * t) < LINE - 0.1
+    legs = share(lambda t: 2.0 * np.exp(-np.mod(t, 20.0) / 3.0) * np.where(np.mod(t, 40.0) < 20.0, 1.0, -1.0))
+    assert legs < LINE - 0.1
+
+
+def beside(after, explained, left=900.0, sea=4e5):
+    """Probability of an unknown effect where pitch is left at `after` beside waves, of a floor of 0.2 tolerances."""
+    table = {AFTER: {"depth": 1.5, "pitch": after, "roll": 0.1}, FLOOR: {"depth": 0.2, "pitch": 0.2, "roll": 0.1}}
+    waves = ProbeResult(NoiseProbe(WAVES, "water", "environment", "water"), sea, 3.0)
+    return beside_a_sea(SimpleNamespace(channels=table.get), Remainder(explained + sea, left, []), waves)
+
+
+def test_what_a_sea_cannot_turn_is_unknown_beside_it_where_no_effect_explains_it():
+    assert beside(after=0.9, explained=50.0) > 0.8
+    assert beside(after=0.9, explained=1e5) < 0.1
+    assert beside(after=0.2, explained=50.0) < 0.1
+
+
+def test_small_waves_hide_nothing_beside_them(tmp_path):
+    F = np.zeros(ef.N_F)
+    F[ef.NET_MASS_OFFSET] = 0.08
+    moved = lambda t: 0.05 * np.stack([sea(t), sea(t, 1.0), sea(t, 2.0)], axis=1)  # noqa: E731
+    answer = conclude(run(problem_of(make_case(tmp_path, F, seed=9, runs=2, mocap=True, moved=moved))))
+    assert answer.noise.probe.name == WAVES
+    assert answer.main == "net_buoyancy"
+    assert answer.probabilities["unknown"] < 0.2
