@@ -1,5 +1,10 @@
-"""The kernels of a diagnosis compiled ahead (tools/flight/precompile): by one of two short flights that are made up."""
+"""The kernels of a diagnosis compiled ahead (tools/flight/precompile): by one of two short flights that are made up.
 
+Those that follow models, which take the longest, are compiled by a process of their own meanwhile.
+"""
+
+import subprocess
+import sys
 import tempfile
 from pathlib import Path
 
@@ -13,9 +18,10 @@ from tools.data.runs.run import Run
 from tools.diagnose.diagnosis import diagnose
 from tools.flight.precompile import Work
 from tools.inference.model import effect_vector
-from tools.inference.problem import problem_of
+from tools.inference.problem import Gains, Problem, problem_of
 
 ROWS = 300  # of a run that is made up, at 10 Hz
+ONBOARD = (*names.ATTITUDE, *names.RATES, names.DEPTH, *names.DRAW_WIRES)
 
 
 def _case(folder: Path, runs: list[Run]) -> Case:
@@ -24,24 +30,51 @@ def _case(folder: Path, runs: list[Run]) -> Case:
     return load_case(folder)
 
 
-def _diagnose_a_moment() -> None:
-    """Diagnose two short flights of the nominal vehicle: a dive and a climb."""
-    onboard = (*names.ATTITUDE, *names.RATES, names.DEPTH, *names.DRAW_WIRES)
-    columns: dict[str, np.ndarray] = {name: np.zeros(ROWS) for name in (*names.COMMANDS, *onboard)}
+FOLLOW = "follow"  # the argument with which this file only follows models
+
+
+def _blank(folder: Path) -> Problem:
+    """Two runs of a dive and a climb, in which nothing was measured."""
+    columns: dict[str, np.ndarray] = {name: np.zeros(ROWS) for name in (*names.COMMANDS, *ONBOARD)}
     columns[names.TIME] = 0.1 * np.arange(ROWS)
     columns[names.COMMANDS[2]] = np.where(columns[names.TIME] < 15.0, 0.1, -0.1)
+    problem = problem_of(_case(Path(folder, "blank"), [Run(name, None, columns) for name in ("run00", "run01")]))
+    problem.starts[:, X_POS + 2], problem.starts[:, X_QUAT], problem.starts[:, X_NU] = 1.0, 1.0, 0.2
+    return problem
+
+
+def _follow_a_moment() -> None:
+    """Follow a model with gains that correct nothing."""
     with tempfile.TemporaryDirectory() as folder:
-        problem = problem_of(_case(Path(folder, "blank"), [Run(name, None, columns) for name in ("run00", "run01")]))
-        starts = problem.starts.copy()
-        starts[:, X_POS + 2], starts[:, X_QUAT], starts[:, X_NU] = 1.0, 1.0, 0.2
+        problem = _blank(Path(folder))
+        (rows, width), runs = problem.z.shape, len(problem.runs)
+        gains = Gains(
+            np.zeros((rows, width, width)), np.zeros((rows, problem.spreads.shape[1], width)),
+            np.zeros((rows, problem.kind.n_state)), np.zeros((rows, problem.kind.n_path)), np.zeros((rows, width)),
+            np.zeros(runs),
+        )  # fmt: skip
+        problem.follow([(problem.model.P, effect_vector(problem.model))], gains)
+
+
+def _diagnose_a_moment() -> None:
+    """Diagnose two short flights of the nominal vehicle."""
+    following = subprocess.Popen([sys.executable, "-m", "tools.diagnose.precompile", FOLLOW])
+    with tempfile.TemporaryDirectory() as folder:
+        problem = _blank(Path(folder))
         P, F = problem.model.P, effect_vector(problem.model)
-        Z = problem.simulated(P, F, starts, np.random.default_rng(1))
+        Z = problem.simulated(P, F, problem.starts.copy(), np.random.default_rng(1))
         for run, flown in zip(problem.runs, np.split(Z, 2), strict=True):
-            run.columns.update(zip(onboard, flown.T, strict=False))
-        diagnose(_case(Path(folder, "flown"), problem.runs))
+            run.columns.update(zip(ONBOARD, flown.T, strict=False))
+        case = _case(Path(folder, "flown"), problem.runs)
+        problem_of(case).filter(P, F, begin=True)
+        following.wait()
+        diagnose(case)
 
 
 DIAGNOSIS = Work("diagnosis", kernel_count, _diagnose_a_moment)
 
 if __name__ == "__main__":
-    DIAGNOSIS.compile()
+    if sys.argv[1:] == [FOLLOW]:
+        _follow_a_moment()
+    else:
+        DIAGNOSIS.compile()
