@@ -77,6 +77,14 @@ class Ascent:
             for axis in self._axes:
                 axis.again()
 
+    def registers(self, plan: WirePlan | PressurePlan) -> list[int] | None:
+        """What stands in a transmitter's registers; None where it does not answer."""
+        port = self.port(plan.port, plan.baud)
+        if port is None:
+            return None
+        request = read_frame(plan.id, plan.function, plan.address, plan.words)
+        return registers_of(port.exchange(request, 5 + 2 * plan.words), plan.id, plan.function, plan.words)
+
     def _centre(self, servo: ServoPlan) -> str:
         port = self.port(servo.port, servo.baud)
         frame = servo_frame(servo.channel, servo.quarter_us, servo.number, servo.crc)
@@ -99,11 +107,7 @@ class Transmitter:
     def read(self) -> float | None:
         """Depth, m; None where the transmitter says nothing that can be, or always the same."""
         plan, now = self.plan, time.monotonic()
-        port = self._ascent.port(plan.port, plan.baud)
-        if port is None:
-            return None
-        request = read_frame(plan.id, plan.function, plan.address, plan.words)
-        registers = registers_of(port.exchange(request, 5 + 2 * plan.words), plan.id, plan.function, plan.words)
+        registers = self._ascent.registers(plan)
         if registers is None:
             return None
         words = registers[plan.at : plan.at + WORDS[plan.kind]]
@@ -176,11 +180,7 @@ class Axis:
 
     def _measure(self, wire: WirePlan) -> float | None:
         """Where the draw-wire says the actuator is, m; None where it says nothing that can be."""
-        port = self._ascent.port(wire.port, wire.baud)
-        if port is None:
-            return None
-        request = read_frame(wire.id, wire.function, wire.address, wire.words)
-        registers = registers_of(port.exchange(request, 5 + 2 * wire.words), wire.id, wire.function, wire.words)
+        registers = self._ascent.registers(wire)
         if registers is None:
             return None
         reading = registers[0] if wire.words == 1 else registers[0] << 16 | registers[1]

@@ -149,7 +149,8 @@ def diagnose(case: Path, out: Path, without: str | None, vehicle: str | None, as
 
 def _diagnose_ocean(case, out: Path, as_json: bool) -> None:
     """The same of an ocean glider (docs/OCEAN.md, Diagnosis)."""
-    from tools.report.ocean import REPORT, write_ocean_report
+    from tools.report.ocean import write_ocean_report
+    from tools.report.page import REPORT
     from tools.watch.whole_case import diagnose_ocean, plain, write
 
     found = diagnose_ocean(case, lambda text: print(text, file=sys.stderr))
@@ -196,8 +197,9 @@ def report(folder: Path) -> None:
     """Draw report.html again from what `glider gap diagnose` or `glider gap watch` left in DIR."""
     from tools.data.errors import need
     from tools.diagnose.record import is_ocean
-    from tools.report.diagnosis import REPORT, write_report
+    from tools.report.diagnosis import write_report
     from tools.report.ocean import write_ocean_report
+    from tools.report.page import REPORT
     from tools.report.watch import write_watch_report
     from tools.report.words import sentence
     from tools.watch.answer import FILE

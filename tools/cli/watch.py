@@ -27,7 +27,8 @@ def watch(case: Path, reference: Path | None, vehicle: str | None, out: Path | N
     need("analysis")
     from tools.data.runs.case import load_case
     from tools.data.runs.csvfile import write_bytes
-    from tools.report.watch import REPORT, write_watch_report
+    from tools.report.page import REPORT
+    from tools.report.watch import write_watch_report
     from tools.watch.answer import FILE
     from tools.watch.watch import watch as watch_runs
 

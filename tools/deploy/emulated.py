@@ -35,8 +35,8 @@ MAGIC = (
     + r"\xff\xff\xff\xff\xff\xff\xff\x00\xff\xff\xff\xff\xff\xff\xff\xff\xfe\xff\xff\xff" + f":{EMULATOR}:F"
 )  # fmt: skip
 VEHICLE = "/vehicle"  # what is installed into, in there
-# Largest difference of a state over a reference flight: position (m), angles (rad), speeds, actuators. As
-# tests/integration/test_reference_flights.py has them.
+# Largest difference of a state over a reference flight: position (m), angles (rad), speeds, actuators
+# (tests/integration/test_reference_flights.py flies them here).
 BOUNDS = (
     (("X", "Y", "Z"), 2e-5),
     (("phi", "theta", "psi"), 5e-5),

@@ -13,9 +13,8 @@ from tools.report import words
 from tools.report.chain_picture import chain_svg
 from tools.report.charts import Chart, Line, svg
 from tools.report.lines import bands, compared, plan_chart
-from tools.report.page import render
+from tools.report.page import REPORT, render
 
-REPORT = "report.html"
 DRAWN = ("depth", "pitch", "roll", "yaw", "xy")
 LEAST, MOST_RANKED = 0.005, 8  # of the ranking
 LEAST_SHARE, MOST_LINKS = 0.01, 7  # of the links

@@ -6,13 +6,12 @@ from typing import Any
 import msgspec
 
 from sim_backend.ocean.catalogue import catalogue
-from tools.diagnose.record import ANSWER, Cause, Gap, Place, number, read_as
+from tools.diagnose.record import ANSWER, Cause, Gap, number, read_as
 from tools.report import words
-from tools.report.page import render
+from tools.report.page import REPORT, render
 
-REPORT = "report.html"
 MOST_RANKED, LEAST = 8, 0.005
-MEANS = {"none": "nothing beyond what the vehicle file allows", "unknown": "a gap of another kind"}
+MEANS = words.MEANS | {"none": "nothing beyond what the vehicle file allows"}
 
 
 class _Stage(msgspec.Struct):
@@ -29,14 +28,12 @@ class _Case(msgspec.Struct):
 class _Answer(msgspec.Struct):
     case: _Case
     verdict: str
-    where: list[Place]
     causes: list[Cause]
     selected: list[str]
     gap: Gap
     stages: list[_Stage]
     cautions: list[str]
     skipped: dict[str, str]
-    evidence: dict[str, float]
     next_run: dict[str, Any]
 
 

@@ -3,6 +3,8 @@
 from importlib.resources import files
 from typing import Any
 
+REPORT = "report.html"  # of a folder of an answer
+
 
 def render(template: str, context: dict[str, Any]) -> str:
     """The text of a page. Every name that the template uses must be in the context."""

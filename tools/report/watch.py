@@ -7,10 +7,9 @@ import msgspec
 
 from tools.data.errors import InputError
 from tools.report import words
-from tools.report.page import render
+from tools.report.page import REPORT, render
 from tools.watch.answer import FILE
 
-REPORT = "report.html"
 MOST_BYTES = 100_000_000
 
 
