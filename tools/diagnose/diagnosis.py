@@ -37,7 +37,6 @@ from tools.diagnose.unknown import LEFT_OVER, UNFIT
 from tools.diagnose.verdict import EVIDENCE_NEEDED, TIE, Answer, conclude
 from tools.gap.mended import findings_of, put_right
 from tools.inference.corrected import corrected_text
-from tools.inference.fit import Hypothesis
 from tools.inference.model import effect_vector, effects_in, nominal_model
 from tools.inference.problem import ALL, problem_of
 from tools.inference.rules import Rules
@@ -161,16 +160,20 @@ def parameters(diagnosis: Diagnosis, label: str) -> dict[str, dict[str, Any]]:
     if diagnosis.staged is not None:
         sizes = diagnosis.staged.sizes.get(label, {})
         return {name: {"estimate": s.estimate, "ci90": list(s.ci90), "unit": s.unit} for name, s in sizes.items()}
-    hypothesis = diagnosis.answer.hypothesis
-    if not len(hypothesis.free) or label not in hypothesis.labels:
+    hypothesis, clock = diagnosis.answer.hypothesis, diagnosis.answer.search.clock
+    if clock is not None and label == clock.label:
+        known = zip(clock.free, clock.values, clock.sd, strict=True)
+    elif label in hypothesis.labels:
+        spread = np.sqrt(np.diag(np.linalg.inv(hypothesis.precision)))
+        known = zip(hypothesis.free, hypothesis.values, spread, strict=True)
+    else:
         return {}
-    spread = np.sqrt(np.diag(np.linalg.inv(hypothesis.precision)))
     found = {}
-    for n, free in enumerate(hypothesis.free):
+    for free, value, sd in known:
         if free.label == label:
-            value, sd = hypothesis.values[n] * free.spread, 1.645 * spread[n] * free.spread
-            low, high = max(value - sd, free.low * free.spread), min(value + sd, free.high * free.spread)
-            found[free.name] = {"estimate": value, "ci90": [low, high], "unit": free.unit}
+            low, high = max(value - 1.645 * sd, free.low), min(value + 1.645 * sd, free.high)
+            estimate, *ci90 = (float(one * free.spread) for one in (value, low, high))
+            found[free.name] = {"estimate": estimate, "ci90": ci90, "unit": free.unit}
     return found
 
 
@@ -239,15 +242,6 @@ def plain(diagnosis: Diagnosis) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def effects_of(hypothesis: Hypothesis) -> dict[str, dict[str, float]]:
-    """A candidate's effects with their values, as a corrected model holds them."""
-    found: dict[str, dict[str, float]] = {}
-    for free, value in zip(hypothesis.free, hypothesis.values, strict=True):
-        if free.label in catalogue():
-            found.setdefault(free.label, {})[free.name] = float(value * free.spread)
-    return found
-
-
 def details(diagnosis: Diagnosis) -> Details:
     """report.json."""
     answer, case = diagnosis.answer, diagnosis.case
@@ -300,20 +294,17 @@ def curves(diagnosis: Diagnosis, n: int) -> Curves:
     return Curves(run.t, diagnosis.search.problem.kind.measures.measured(run), said[BEFORE][n], said[AFTER][n])
 
 
-def model_text(case: Case, search: Search, hypothesis: Hypothesis) -> str:
-    """corrected.toml of a hypothesis."""
-    P, F = search.model(hypothesis)
-    return corrected_text(case.vehicle_name, search.problem.model.P, P, F, effects_of(hypothesis))
+def model_text(case: Case, P: np.ndarray, F: np.ndarray) -> str:
+    """corrected.toml of a model: what differs from the case's vehicle."""
+    nominal = nominal_model(case)
+    own = F - effect_vector(nominal)
+    return corrected_text(case.vehicle_name, nominal.P, P, own, effects_in(own))
 
 
 def corrected(diagnosis: Diagnosis) -> str:
     """corrected.toml: the selected effects, and what was identified where the vehicle had to be."""
-    if diagnosis.staged is None:
-        return model_text(diagnosis.case, diagnosis.search, diagnosis.answer.hypothesis)
-    nominal = nominal_model(diagnosis.case)
-    P, F = diagnosis.staged.model
-    own = F - effect_vector(nominal)
-    return corrected_text(diagnosis.case.vehicle_name, nominal.P, P, own, effects_in(own))
+    staged, search = diagnosis.staged, diagnosis.answer.search
+    return model_text(diagnosis.case, *(search.model(diagnosis.answer.hypothesis) if staged is None else staged.model))
 
 
 def write(diagnosis: Diagnosis, out: Path) -> None:
@@ -325,5 +316,5 @@ def write(diagnosis: Diagnosis, out: Path) -> None:
     (out / "next_run.toml").write_text(diagnosis.mission, encoding="utf-8")
     (out / "corrected.toml").write_text(corrected(diagnosis), encoding="utf-8")
     if diagnosis.correction is not None:
-        text = model_text(diagnosis.case, diagnosis.correction.search, diagnosis.correction.hypothesis)
+        text = model_text(diagnosis.case, *diagnosis.correction.search.model(diagnosis.correction.hypothesis))
         (out / CORRECTION_FILE).write_text(text, encoding="utf-8")

@@ -12,7 +12,6 @@ from tools.gap.measure import mean_square
 from tools.inference.channels import errors
 from tools.inference.fit import Hypothesis
 from tools.inference.kind import MATTERS
-from tools.inference.model import effect_vector
 from tools.inference.predict import fly_windows_from
 from tools.inference.problem import Problem, cut
 
@@ -22,17 +21,15 @@ def movements(search: Search, hypothesis: Hypothesis) -> dict[str, float]:
 
     Windows are flown with it and without it from the same starts, where the filter of the whole model stands.
     """
-    if not hypothesis.labels:
+    effects = search.entries(hypothesis)
+    if not effects:
         return {}
     problem = search.problem.as_recorded
     P, F = search.model(hypothesis)
     gains, found = problem.filter(P, F, begin=True), {}
     whole = fly_windows_from(problem, P, F, gains)
-    nominal = effect_vector(problem.model)
-    for label in hypothesis.labels:
-        entries = [free.entry for free in hypothesis.free if free.label == label]
-        without = F.copy()
-        without[entries] = nominal[entries]
+    for label, entries in effects.items():
+        without = search.lacking(F, entries)
         found[label] = largest(problem, whole, fly_windows_from(problem, P, without, gains))
     return found
 

@@ -12,11 +12,12 @@ import numpy as np
 
 from sim_backend.core.effects.catalogue import catalogue
 from tools.diagnose.sensor_consistency import DISTANT, HOLDS_BELOW, NEARBY, inconsistent_sensor
-from tools.diagnose.time_alignment import aligned
 from tools.inference import levels
 from tools.inference.fit import POOR, THRESHOLD_STEP, Fitter, Hypothesis
+from tools.inference.model import effect_vector, nominal_model
 from tools.inference.parameters import CLOCK_PLACE, FreeParameter, effect_parameters, model_at, nuisance_parameters
 from tools.inference.problem import Gains, Problem
+from tools.inference.time_alignment import aligned
 
 ROUGHNESS = (100.0, 10.0)  # times the disturbance, before the vehicle's own
 TRIED, KEPT, LEFT = 20, 12, 8  # hypotheses: after the screen, after the roughest filter, after the second
@@ -47,6 +48,28 @@ ALIGNED = 3  # times that poses are moved to where the clock found so far says
 NEARLY_UNTEMPERED = 1.05  # temperature: the best hypothesis is near the truth
 
 
+@dataclass(frozen=True)
+class Clock:
+    """The effect of a wandering clock of motion capture: it stands in the model beside which all else is looked for."""
+
+    label: str
+    free: list[FreeParameter]
+    values: np.ndarray  # in spreads
+    sd: np.ndarray
+
+    def within(self, problem: Problem) -> Problem:
+        """The problem, and the one it was made from, of the model with it."""
+        F, recorded = effect_vector(problem.model), problem.recorded
+        for free, value in zip(self.free, self.values, strict=True):
+            F[free.entry] += free.spread * value
+        model = replace(problem.model, F=F)
+        return replace(problem, model=model, recorded=None if recorded is None else replace(recorded, model=model))
+
+    def aligned(self, problem: Problem) -> Problem:
+        """The problem with its poses where this clock says; the model is as it was."""
+        return aligned(problem, effect_vector(self.within(problem).model))
+
+
 @dataclass
 class Search:
     """Where a search stands."""
@@ -58,6 +81,21 @@ class Search:
     null: Hypothesis
     hypotheses: list[Hypothesis]
     gains: Gains
+    clock: Clock | None = None
+    told: bool = False  # whether the sensors' noise is what the file says
+
+    def entries(self, hypothesis: Hypothesis) -> dict[str, list[int]]:
+        """By effect of a hypothesis, the clock's among them, where in F it stands."""
+        own = {} if self.clock is None else {self.clock.label: [free.entry for free in self.clock.free]}
+        return own | {
+            label: [free.entry for free in hypothesis.free if free.label == label] for label in hypothesis.labels
+        }
+
+    def lacking(self, F: np.ndarray, entries: list[int]) -> np.ndarray:
+        """F (N_F,) with these entries as the vehicle file has them."""
+        without = F.copy()
+        without[entries] = effect_vector(nominal_model(self.problem.case))[entries]
+        return without
 
     def free(self, labels: tuple[str, ...]) -> list[FreeParameter]:
         return [f for label in labels for f in self.parameters[label]]
@@ -236,21 +274,21 @@ def first_round(search: Search) -> None:
     search.hypotheses = advance_and_prune(search.fitter, search.hypotheses, search.null.misfit, LEFT, 3)
 
 
-def run(problem: Problem, say: Callable[[str], None] = lambda text: None, first: Hypothesis | None = None) -> Search:
-    """The search over a problem's runs; from the effects of `first`, where those are certain."""
-    problem = levels.sensor_noise(problem, LEAST_LEVEL, MOST_LEVEL).beyond(UNLIKE).applied(problem)
+def run(problem: Problem, say: Callable[[str], None] = lambda text: None, clock: Clock | None = None) -> Search:
+    """The search over a problem's runs; beside the effect of motion capture's clock, where that is certain."""
+    noise = levels.sensor_noise(problem, LEAST_LEVEL, MOST_LEVEL)
+    problem = noise.beyond(UNLIKE).applied(problem)
+    told, problem = as_told(problem, noise), problem if clock is None else clock.within(problem)
     free, known = nuisance_parameters(problem), effect_parameters(problem)
+    if clock is not None:
+        del known[clock.label]
     P, F = model_at(problem, free, np.zeros(len(free)))
     gains = gains_of(problem, (P, F), ROUGHNESS[0])
     fitter = Fitter(problem, gains, free, temper=True)
     null = fitter.hypothesis((), [])
     fitter.measure([null])
-    search = Search(problem, free, known, fitter, null, [], gains)
-    if first is not None:
-        search.hypotheses = [fitter.hypothesis(first.labels, first.free, first.values, first.nuisance)]
-        refilter(search, search.hypotheses[0], 1.0)
-        converge(search.fitter, search.hypotheses[0])
-    elif start_at_inconsistent_sensor(search):
+    search = Search(problem, free, known, fitter, null, [], gains, clock, told)
+    if clock is None and start_at_inconsistent_sensor(search):
         say(f"sensors inconsistent: {search.hypotheses[0].labels[0]}")
     else:
         first_round(search)
@@ -288,12 +326,22 @@ def grow(search: Search, say: Callable[[str], None]) -> None:
             break
 
 
+def as_told(problem: Problem, noise: levels.Levels) -> bool:
+    """Whether the noise of the sensors that say something of it, half of them at least, is what the file says."""
+    factors = levels.factors(problem)
+    seen = [name for name in levels.SENSORS if name in factors]
+    return 2 * len(noise.names) >= len(seen) and all(abs(np.log(factors[name])) < UNLIKE for name in noise.names)
+
+
 def level_disturbance(search: Search) -> bool:
     """The disturbance's level at the best hypothesis, and all taken over to it; whether it is another than before.
 
-    The level is found only here: a model that lacks an effect would have it in its disturbance.
+    The level is found only here: a model that lacks an effect would have it in its disturbance. Of an effect that
+    nobody knows it has that also then: where every sensor's noise is what the file says, the disturbance is too.
     """
     problem = search.problem
+    if search.told:
+        return False
     plain = replace(problem, spectral=levels.as_said(problem).spectral)
     now = levels.disturbance(plain)
     if not now.names:

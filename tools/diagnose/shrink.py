@@ -9,7 +9,7 @@ from tools.diagnose.as_read import begun_as_read
 from tools.diagnose.search import Search, without_extra_noise
 from tools.gap.measure import RunGap, case_channels, root_mean_square, run_gap
 from tools.inference.fit import NUISANCE_LIMIT, Hypothesis, bounded_step
-from tools.inference.model import effect_vector, nominal_model
+from tools.inference.model import nominal_model
 from tools.inference.parameters import model_at
 from tools.inference.predict import fly, fly_windows_from, predict
 from tools.inference.problem import Problem, cut
@@ -149,10 +149,9 @@ def lacking_squares(search: Search, hypothesis: Hypothesis) -> dict[str, np.ndar
     It lacks that one alone: all else stays as it was fitted, and windows begin where the whole model's filter stands,
     or where the lacking model's readings show the vehicle (as_read).
     """
-    problem = search.problem.as_recorded
-    found = {label: np.empty(len(problem.runs)) for label in hypothesis.labels}
-    nominal = effect_vector(problem.model)
-    for n, (P, F) in enumerate(left_out(search, hypothesis) if hypothesis.labels else []):
+    problem, effects = search.problem.as_recorded, search.entries(hypothesis)
+    found = {label: np.empty(len(problem.runs)) for label in effects}
+    for n, (P, F) in enumerate(left_out(search, hypothesis) if effects else []):
         part = problem.part(n)
         gains, listed = part.filter(P, F, begin=True), cut(part).listed[0]
 
@@ -161,11 +160,8 @@ def lacking_squares(search: Search, hypothesis: Hypothesis) -> dict[str, np.ndar
             return run_gap(part.kind.measures, part.runs[0], Y, listed).total ** 2
 
         whole = square(F)
-        for label in hypothesis.labels:
-            without = F.copy()
-            entries = [free.entry for free in hypothesis.free if free.label == label]
-            without[entries] = nominal[entries]
-            found[label][n] = square(without) - whole
+        for label, entries in effects.items():
+            found[label][n] = square(search.lacking(F, entries)) - whole
     return found
 
 
@@ -226,8 +222,12 @@ def shrink(search: Search, hypothesis: Hypothesis) -> Shrinkage:
     rng = np.random.default_rng(SEED)
     flown = predict(problem.case, nominal_model(problem.case), problem.runs)
     listed = cut(problem).listed
-    refitted, Y_refitted = gaps(problem, left_out(search, search.null))
-    after, Y_after = gaps(problem, left_out(search, hypothesis)) if hypothesis.labels else (refitted, Y_refitted)
+    bare, knowing = left_out(search, search.null), search
+    for entries in search.entries(search.null).values():  # a recalibrated model knows of no clock that is late
+        bare, knowing = [(P, search.lacking(F, entries)) for P, F in bare], without_extra_noise(search)
+    refitted, Y_refitted = gaps(knowing.problem, bare)
+    has_effects = bool(search.entries(hypothesis))
+    after, Y_after = gaps(problem, left_out(search, hypothesis)) if has_effects else (refitted, Y_refitted)
     runs = {
         BEFORE: [run_gap(problem.kind.measures, run, flown[n], listed[n]) for n, run in enumerate(problem.runs)],
         RECALIBRATED: refitted,

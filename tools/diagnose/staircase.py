@@ -62,4 +62,8 @@ def stages_of(answer: Answer, case: Case, runs: list[Run]) -> list[Stage]:
         )[0]  # fmt: skip
         steps.append(Stage(f"+ {label}", [label], found))
         hypothesis = drop(answer.search, hypothesis, label)
+    search, clock = answer.search, answer.search.clock
+    if clock is not None and clock.label in answer.selected:
+        found = gaps(search.problem, left_out(search, hypothesis))[0] if kept else shrinkage.runs[AFTER]
+        steps.append(Stage(f"+ {clock.label}", [clock.label], found))
     return stages + steps[::-1]

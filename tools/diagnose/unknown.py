@@ -1,5 +1,6 @@
 """Whether what the selected effects leave is an effect that nobody knows, or disorder: of the water, or of a clock."""
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,7 +9,7 @@ from scipy.stats import norm
 from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.catalogue import catalogue
 from tools.diagnose.noise_probes import CLOCK, TURBULENCE, WAVES, ProbeResult, inflated, probes, run_probes
-from tools.diagnose.search import Search
+from tools.diagnose.search import Clock, Search
 from tools.diagnose.shrink import AFTER, FLOOR, Shrinkage
 from tools.diagnose.waves import LINE, line_share
 from tools.inference.fit import Hypothesis
@@ -121,12 +122,34 @@ def disorder(search: Search, hypothesis: Hypothesis, left: Remainder) -> ProbeRe
     return found if found is not None and found.gain > MOSTLY * (left.explained + left.left) else None
 
 
+def clock_of(search: Search, hypothesis: Hypothesis, gained: dict[str, float], more: np.ndarray) -> Clock | None:
+    """Of a hypothesis the effect of motion capture's clock that brings most, None where it has none.
+
+    Its size is the mean over runs of the course of a clock that wanders by `more` (n_spectral,), its spread what the
+    runs differ by.
+    """
+    labels = sorted((label for label in gained if catalogue()[label].place == CLOCK_PLACE), key=lambda n: -gained[n])
+    if not labels:
+        return None
+    own = [k for k, free in enumerate(hypothesis.free) if free.label == labels[0]]
+    free, values = [hypothesis.free[k] for k in own], hypothesis.values[own]
+    sd = np.sqrt(np.diag(np.linalg.inv(hypothesis.precision)))[own]
+    problem, bounds = search.problem, search.problem.recording.bounds
+    late = problem.filter(*search.model(hypothesis), begin=True, more=more).X[:, ef.X_LATE]
+    shape = problem.since if labels[0] == "clock_skew" else np.ones_like(late)
+    sizes = np.array([shape[a:b] @ late[a:b] / (shape[a:b] @ shape[a:b]) for a, b in itertools.pairwise(bounds)])
+    values[0] += sizes.mean() / free[0].spread
+    if len(sizes) > 1:
+        sd[0] = max(sd[0], sizes.std(ddof=1) / np.sqrt(len(sizes)) / free[0].spread)
+    return Clock(labels[0], free, values, sd)
+
+
 def clock_label(search: Search, hypothesis: Hypothesis) -> str:
     """The label of a clock that wanders: one that was selected; else whether it is late, or ever later.
 
     The clock's error where the filter stands is drawn by a constant and by a line from 0, over all runs at once.
     """
-    for label in hypothesis.labels:
+    for label in search.entries(hypothesis):
         if catalogue()[label].place == CLOCK_PLACE:
             return label
     since, late = search.problem.since, search.gains.X[:, ef.X_LATE]

@@ -13,7 +13,6 @@ from tools.diagnose.record import NONE, UNKNOWN, Finding
 from tools.diagnose.residuals import UNCLEAN, tests, worst
 from tools.diagnose.search import (
     EVIDENCE_NEEDED,
-    UNLIKE,
     Search,
     advance_and_prune,
     converge,
@@ -30,11 +29,16 @@ from tools.diagnose.shrink import (
     most_often,
     shrink,
 )
-from tools.diagnose.unknown import LEAST_UNKNOWN, clock_label, disorder, left_share, probability_unknown, remainder_of
+from tools.diagnose.unknown import (
+    LEAST_UNKNOWN,
+    clock_label,
+    clock_of,
+    disorder,
+    left_share,
+    probability_unknown,
+    remainder_of,
+)
 from tools.inference.fit import Hypothesis
-from tools.inference.levels import SENSORS, factors
-from tools.inference.parameters import CLOCK_PLACE
-from tools.inference.problem import Problem
 
 HELD_OUT_SHARE = 0.3  # of the gap that is left on runs left out: an effect beside another must close as much more
 TIE = 6.0  # nat within which two labels are not told apart: what a change of prior spreads can move
@@ -86,16 +90,6 @@ def drop(search: Search, hypothesis: Hypothesis, label: str) -> Hypothesis:
     converge(search.fitter, less, 4)
     search.hypotheses.append(less)
     return less
-
-
-def clock_of(search: Search, hypothesis: Hypothesis, gained: dict[str, float]) -> Hypothesis | None:
-    """Of a hypothesis the effect of motion capture's clock that brings most, as it stands; None where it has none."""
-    labels = sorted((label for label in gained if catalogue()[label].place == CLOCK_PLACE), key=lambda n: -gained[n])
-    if not labels:
-        return None
-    kept = np.array([f.label == labels[0] for f in hypothesis.free])
-    free = [f for f in hypothesis.free if f.label == labels[0]]
-    return search.fitter.hypothesis((labels[0],), free, hypothesis.values[kept])
 
 
 @dataclass(frozen=True)
@@ -196,12 +190,10 @@ def search_again_with_noise(
     search: Search, hypothesis: Hypothesis, gained: dict[str, float], found: ProbeResult, say: Callable[[str], None]
 ) -> Answer:
     """The answer of a further search, by a filter that knows of the disorder found."""
-    problem, clock = search.problem, None
-    more, _ = inflated(problem, found.probe, found.scale)
-    if found.probe.name == CLOCK:
-        clock = clock_of(search, hypothesis, gained)
-    begin = problem.as_recorded if clock is None else problem
-    return conclude(run(begin.with_extra_noise(more), say, clock), say, found)
+    more, _ = inflated(search.problem, found.probe, found.scale)
+    clock = clock_of(search, hypothesis, gained, more) if found.probe.name == CLOCK else None
+    problem = search.problem.as_recorded if clock is None else clock.aligned(search.problem)
+    return conclude(run(problem.with_extra_noise(more), say, clock), say, found)
 
 
 def conclude(
@@ -232,9 +224,9 @@ def conclude(
     if noise is not None:
         disordered = clock_label(search, evident) if noise.probe.name == CLOCK else noise.probe.name
         gained = gained | {disordered: gained.get(disordered, 0.0) + noise.gain}
-        if disorder_matters(search, selected, shrinkage):
+        if moved.get(disordered, 0.0) >= MATTERS or disorder_matters(search, selected, shrinkage):
             small = [label for label in small if label != disordered]
-        elif disordered not in moved:
+        elif disordered not in small:
             small.append(disordered)
     negligible = {label: gained.pop(label) for label in small}
     taken = lacking_squares(search, evident)
@@ -255,7 +247,7 @@ def conclude(
     if main in gained:
         main = max(gained, key=lambda label: chances.get(label, 0.0))
         floors = sizes[main] / max(calm, 1e-6)
-        chances = doubt_small(chances, main, floors / (TOLD if as_told(problem) else LARGE))
+        chances = doubt_small(chances, main, floors / (TOLD if search.told else LARGE))
     by_effects = sum(sizes[label] ** 2 for label in gained)
     unknown = probability_unknown(search, bool(gained), bool(ranked), shrinkage, left, noise, by_effects)
     if not gained and not gap_matters(shrinkage):
@@ -275,11 +267,6 @@ def conclude(
         whiteness=whiteness, unexplained=left_share(shrinkage, by_effects), gained=gained, negligible=negligible,
         probed=[] if left is None else left.probed, noise=noise, shrinkage=shrinkage,
     )  # fmt: skip
-
-
-def as_told(problem: Problem) -> bool:
-    """Whether the sensors' noise is what the file says."""
-    return all(abs(np.log(factor)) < UNLIKE for name, factor in factors(problem).items() if name in SENSORS)
 
 
 def share_out(chances: dict[str, float], main: str, first: dict[str, float]) -> dict[str, float]:

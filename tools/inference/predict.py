@@ -4,18 +4,23 @@ Windows start where the filter of the flying model stands, which for this purpos
 (core/lacking): of a wrong model taken at its word the starts would be wrong, and the gap would be theirs.
 """
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
 
 from tools.data.runs.case import Case
 from tools.data.runs.run import Run
+from tools.inference.core.error_layout import Q_LATE
 from tools.inference.kind import ROUGHIE, Kind
 from tools.inference.model import Model, effect_vector
 from tools.inference.problem import Gains, Problem, cut, problem_of
 from tools.inference.recording import held
+from tools.inference.time_alignment import aligned, capture_times
 
 COAST = 1.0  # s without motion capture, after which what is onboard takes over
+LATE = 0.4  # s; of a clock farther out the observer sees every pose at its own time
+WANDER = 0.1  # of how late it is, by which such a clock may wander in a second: so late, it is not steady either
 LARGEST = 1e4  # rad, rad/s, m, kg: no vehicle reads more
 
 
@@ -35,8 +40,32 @@ def without_doubled(problem: Problem) -> np.ndarray:
 
 
 def observe(problem: Problem, P: np.ndarray, F: np.ndarray) -> Gains:
-    """The filter that finds where windows start; it looks at no row behind the one where it stands."""
-    return observer_of(problem).filter(P, F, begin=True, speeds=problem.kind.window_speeds)
+    """The filter that finds where windows start; it looks at no row behind the one where it stands, or says so (known).
+
+    Where the model's clock of motion capture is far out, poses stand at their own time (time_alignment): a filter that
+    corrects today's state by old poses is a loop with a delay, and leaves every vehicle.
+    """
+    speeds, late = problem.kind.window_speeds, 0.0
+    if problem.seen[[mocap for _, mocap in problem.kind.doubled]].any():
+        late = float(np.abs(problem.recording.t - capture_times(problem, F)).max())
+    if late < LATE:
+        return observer_of(problem).filter(P, F, begin=True, speeds=speeds)
+    moved, walk = aligned(problem, F), np.zeros(problem.kind.n_spectral)
+    walk[Q_LATE] = (WANDER * late) ** 2
+    known, r = known_rows(moved), moved.recording
+    moved.recording = replace(r, early=known[r.early - 1])
+    gains = observer_of(moved).filter(P, F, begin=True, speeds=speeds, more=walk)
+    gains.X[r.bounds[:-1]] = problem.starts  # by readings as they were recorded
+    return replace(gains, known=known)
+
+
+def known_rows(problem: Problem) -> np.ndarray:
+    """For every row, (rows,), behind which row nothing stands that was recorded later; no run's first row."""
+    found = np.empty(len(problem.stamps), dtype=np.int64)
+    for a, b in itertools.pairwise(problem.recording.bounds):
+        latest = np.maximum.accumulate(problem.stamps[a:b])
+        found[a:b] = a + np.maximum(np.searchsorted(latest, problem.recording.t[a:b], side="right"), 1)
+    return found
 
 
 def observer_of(problem: Problem) -> Problem:
@@ -77,10 +106,11 @@ def fly(problem: Problem, P: np.ndarray, F: np.ndarray, own_filter: bool = False
 def fly_windows_from(problem: Problem, P: np.ndarray, F: np.ndarray, gains: Gains) -> np.ndarray:
     """The same from where a filter stands."""
     r, scored = problem.recording, cut(problem)
+    begin = scored.first if gains.known is None else gains.known[scored.first - 1]
     Y = np.empty_like(problem.z)
     problem.kind.read_rows(F, gains.X, gains.path, r.t, r.bounds, Y)
     problem.kind.fly_windows(
-        P, F, r.modes, r.bounds, r.t, r.inputs, gains.X, gains.path, scored.first, scored.last, scored.run_of, Y
+        P, F, r.modes, r.bounds, r.t, r.inputs, gains.X, gains.path, begin, scored.first, scored.last, scored.run_of, Y
     )
     return Y
 

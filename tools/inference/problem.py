@@ -31,6 +31,8 @@ class Gains:
     path: np.ndarray  # (rows, n_path)
     E: np.ndarray  # (rows, N_Y) whitened innovations, NaN where nothing was measured
     misfit: np.ndarray  # (runs,) -2 log likelihood without its constant
+    # (rows,): behind which row the filter stands that knows of nothing recorded behind a row; None: that row itself
+    known: np.ndarray | None = None
 
 
 @dataclass

@@ -1,9 +1,11 @@
 """Disorder: turbulence, and a clock of motion capture that wanders, told to a second search that sees the rest."""
 
 import numpy as np
+import pytest
 from support.cases import make_case
 
 from sim_backend.core.effects import effect_layout as ef
+from tools.diagnose.diagnosis import model_text
 from tools.diagnose.noise_probes import CLOCK, TURBULENCE
 from tools.diagnose.search import run
 from tools.diagnose.verdict import conclude
@@ -25,3 +27,10 @@ def test_a_clock_that_wanders_is_late_and_hides_nothing_beside_it(tmp_path):
     assert answer.noise.probe.name == CLOCK
     assert set(answer.selected) == {"mocap_delay", "drag"}
     assert answer.probabilities["unknown"] < 0.2
+    clock = answer.search.clock
+    assert clock.values[0] * clock.free[0].spread == pytest.approx(1.2, abs=0.1)
+    assert answer.shrinkage.after < 0.3 * answer.shrinkage.before
+    assert answer.shrinkage.recalibrated < 2.0 * answer.shrinkage.before
+    corrected = model_text(case, *answer.search.model(answer.hypothesis))
+    assert "[effects.mocap_delay]" in corrected
+    assert "[effects.drag]" in corrected

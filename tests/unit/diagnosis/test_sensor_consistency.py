@@ -7,9 +7,9 @@ from support.cases import make_case
 from sim_backend.core.effects import effect_layout as ef
 from tools.diagnose.search import ROUGHNESS
 from tools.diagnose.sensor_consistency import HOLDS_BELOW, inconsistent_sensor, mean_nis
-from tools.diagnose.time_alignment import aligned, sample_at_row
 from tools.inference.parameters import effect_parameters, model_at, nuisance_parameters
 from tools.inference.problem import problem_of
+from tools.inference.time_alignment import aligned, sample_at_row
 
 
 def with_effect(folder, entry, value, **about):

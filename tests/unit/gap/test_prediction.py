@@ -1,7 +1,10 @@
 """Predictions of made-up flights: near the truth, whatever columns are missing."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from support.cases import make_case
 from support.flights import World, case_of, fly, fly_case
 
 from firmware.core.layouts import estimator_layout as kf
@@ -12,6 +15,7 @@ from tools.gap.measure import root_mean_square, run_gap
 from tools.inference.channels import ROUGHIE_MEASURES
 from tools.inference.load import load_model
 from tools.inference.model import nominal_model
+from tools.inference.predict import fly as fly_model
 from tools.inference.predict import fly_windows_from, observe, predict
 from tools.inference.problem import cut, problem_of
 
@@ -55,6 +59,26 @@ def test_without_noise_the_nominal_vehicle_is_predicted_to_the_millimetre():
     world = World(noise=0.0, bias=0.0, disturbance=0.0, uncertainty=0.0, mocap=True)
     case, _ = fly_case(world, 3, runs=2)
     assert total(case) < 0.1
+
+
+@pytest.mark.parametrize("delay", [0.8, 1.5, 2.5])
+def test_poses_that_come_late_are_flown_from_as_those_of_a_right_clock(tmp_path, delay):
+    """Nothing recorded behind a window's start is looked at."""
+    F, none = np.zeros(ef.N_F), np.zeros(ef.N_F)
+    F[ef.MOCAP_DELAY] = delay
+    right = problem_of(make_case(tmp_path / "right", none, seed=3, mocap=True))
+    wandering = make_case(tmp_path / "late", none, seed=3, mocap=True, late=lambda t: delay * (1 + 0.1 * np.sin(t)))
+    late = problem_of(wandering)
+    bounds = late.recording.bounds[1:-1]
+    of_right = total(right.case, np.split(fly_model(right, right.model.P, none), bounds))
+    flown = fly_model(late, late.model.P, F)
+    assert total(late.case, np.split(flown, bounds)) < 1.3 * of_right
+    scored = cut(late)
+    for window in range(2):
+        first, last = scored.first[window], scored.last[window]
+        blind = late.z.copy()
+        blind[first:] = np.nan
+        assert np.array_equal(fly_model(replace(late, z=blind), late.model.P, F)[first:last], flown[first:last])
 
 
 def without(run: Run, *names: str) -> Run:

@@ -8,7 +8,7 @@ from support.cases import make_case
 
 from sim_backend.core.effects import effect_layout as ef
 from tools.diagnose.cautions import cautions
-from tools.diagnose.search import MOST_LEVEL, Search, converge, gains_of, level_disturbance
+from tools.diagnose.search import MOST_LEVEL, Search, as_told, converge, gains_of, level_disturbance
 from tools.inference import levels
 from tools.inference.fit import Fitter
 from tools.inference.parameters import effect_parameters, model_at, nuisance_parameters
@@ -73,6 +73,17 @@ def test_the_disturbance_is_found_at_a_model_that_is_right(tmp_path, rough):
     assert factors == pytest.approx(rough, rel=0.2)
     level_disturbance(search)  # from there it moves no more than the last of its steps
     assert np.sqrt(search.problem.spectral[:6] / before[:6]) == pytest.approx(factors, rel=0.2)
+
+
+def test_where_the_sensors_are_as_told_so_is_the_disturbance(tmp_path, calm):
+    for other, told in ((calm, True), (noisier(calm, {"gyro": 1.5}), False)):
+        found = levels.sensor_noise(other, 0.5, 2.0)
+        assert as_told(found.beyond(0.1).applied(other), found) is told
+    held = replace(calm, z=np.repeat(calm.z[::2], 2, axis=0)[: len(calm.z)])  # readings that say nothing of their noise
+    assert not as_told(held, levels.sensor_noise(held, 0.5, 2.0))
+    search = searched(problem_of(make_case(tmp_path, np.zeros(ef.N_F), seed=4, mocap=True, rough=1.6)))
+    search.told = True
+    assert not level_disturbance(search)
 
 
 def test_what_is_far_rougher_is_no_level_of_the_disturbance(tmp_path):

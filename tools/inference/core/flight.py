@@ -17,33 +17,37 @@ from tools.inference.core.step import N_Y, log_path, pose_of, propagate, read_ro
 
 
 @kernel
-def fly_window(P, F, mode, t, inputs, X, path, first, last, Y):
-    """Fly rows first .. last - 1 of a run on from X[first - 1], into Y (rows, N_Y); path (rows, N_PATH) up to there.
+def fly_window(P, F, mode, t, inputs, X, path, begin, first, last, Y):
+    """Fly a run on from X[begin - 1], rows first .. last - 1 into Y (rows, N_Y); path (rows, N_PATH) up to begin.
 
     P, F, X, path and Y of wide numbers fly as many models as have lanes.
     """
     Pw, x, flown = room(P, (N_P,)), room(P, (ef.N_XF,)), room(P, (last, N_PATH))
     effective_parameters(P, F, Pw)
-    x[:] = X[first - 1]
-    flown[:first] = path[:first]
+    x[:] = X[begin - 1]
+    flown[:begin] = path[:begin]
     work, kept = room(P, (4, ef.N_XF)), room(P, (ef.N_XF,))
     zero, before, acc = np.zeros(3), room(P, (N_PATH,)), np.zeros(6)
-    for i in range(first, last):
+    for i in range(begin, last):
         pose_of(x, before)
         propagate(Pw, F, x, mode, t, inputs, i, 0, acc, zero, work, kept, RK4)
         log_path(x, before, flown, i, 0)
-        read_row(F, x, t, t, flown, i, 0, Y[i])
+        if i >= first:
+            read_row(F, x, t, t, flown, i, 0, Y[i])
 
 
 @parallel_kernel
-def fly_windows(P, F, modes, bounds, t, inputs, X, paths, first, last, run_of, Y):
-    """Fly every window on from where a filter stands: Y (rows, N_Y), rows first .. last - 1.
+def fly_windows(P, F, modes, bounds, t, inputs, X, paths, begin, first, last, run_of, Y):
+    """Fly every window on from where a filter stands in row begin - 1: Y (rows, N_Y), rows first .. last - 1.
 
     X (rows, N_XF) and paths (rows, N_PATH) as filter_runs leaves them. Nothing measured is looked at.
     """
     for w in prange(len(first)):
         a, b = bounds[run_of[w]], bounds[run_of[w] + 1]
-        fly_window(P, F, modes[run_of[w]], t[a:b], inputs[a:b], X[a:b], paths[a:b], first[w] - a, last[w] - a, Y[a:b])
+        fly_window(
+            P, F, modes[run_of[w]], t[a:b], inputs[a:b], X[a:b], paths[a:b], begin[w] - a, first[w] - a, last[w] - a,
+            Y[a:b],
+        )  # fmt: skip
 
 
 @parallel_kernel
@@ -71,7 +75,7 @@ def fly_followed(Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, 
                 a, b = first[w] - begin, last[w] - begin
                 fly_window(
                     as_wide(P), as_wide(F), modes[run], t[begin:end], inputs[begin:end], as_wide(X), as_wide(path),
-                    a, b, as_wide(E),
+                    a, a, b, as_wide(E),
                 )  # fmt: skip
                 for m in range(begins, ends):
                     Y[m, cut_of[w], first[w] : last[w]] = E[a:b, :, m - begins]

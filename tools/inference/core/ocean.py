@@ -192,19 +192,20 @@ def follow_runs(Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, K
 
 
 @kernel
-def fly_window(P, F, t, inputs, begin, X, first, last, Y):
-    """Fly rows first .. last - 1 of a run that begins at row `begin` on from X[first - 1], into Y (rows, N_Y)."""
-    x, Phi = X[first - 1].copy(), np.empty((N_ERR, N_ERR))
-    for i in range(first, last):
-        propagate(P, F, x, t, inputs, i, begin, Phi)
-        read_state(P, F, x, inputs, i, Y[i])
+def fly_window(P, F, t, inputs, bound, X, begin, first, last, Y):
+    """Fly a run whose first row is `bound` on from X[begin - 1], rows first .. last - 1 into Y (rows, N_Y)."""
+    x, Phi = X[begin - 1].copy(), np.empty((N_ERR, N_ERR))
+    for i in range(begin, last):
+        propagate(P, F, x, t, inputs, i, bound, Phi)
+        if i >= first:
+            read_state(P, F, x, inputs, i, Y[i])
 
 
 @parallel_kernel
-def fly_windows(P, F, modes, bounds, t, inputs, X, paths, first, last, run_of, Y):
+def fly_windows(P, F, modes, bounds, t, inputs, X, paths, begin, first, last, run_of, Y):
     """Fly every window on from where a filter stands, as core/flight.fly_windows."""
     for w in prange(len(first)):
-        fly_window(P, F, t, inputs, bounds[run_of[w]], X, first[w], last[w], Y)
+        fly_window(P, F, t, inputs, bounds[run_of[w]], X, begin[w], first[w], last[w], Y)
 
 
 @parallel_kernel
@@ -218,7 +219,7 @@ def fly_followed(Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, 
         follow_run(Ps[m], Fs[m], t, inputs, z, begin, end, starts[run], W, K, X, E)
         for w in range(len(first)):
             if run_of[w] == run:
-                fly_window(Ps[m], Fs[m], t, inputs, begin, X, first[w], last[w], Y[m, cut_of[w]])
+                fly_window(Ps[m], Fs[m], t, inputs, begin, X, first[w], first[w], last[w], Y[m, cut_of[w]])
 
 
 @parallel_kernel
