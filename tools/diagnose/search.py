@@ -5,7 +5,7 @@ it holds any model to the course flown and the misfit is nearly a parabola howev
 at last of what the vehicle file says. Hypotheses that fall behind by far are dropped on the way.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -274,8 +274,27 @@ def first_round(search: Search) -> None:
     search.hypotheses = advance_and_prune(search.fitter, search.hypotheses, search.null.misfit, LEFT, 3)
 
 
-def run(problem: Problem, say: Callable[[str], None] = lambda text: None, clock: Clock | None = None) -> Search:
-    """The search over a problem's runs; beside the effect of motion capture's clock, where that is certain."""
+def take_over(search: Search, known: Hypothesis) -> None:
+    """A hypothesis of another search over the same runs, fitted here and kept; less what stands in the model."""
+    kept = [k for k, free in enumerate(known.free) if free.label in search.parameters]
+    labels = tuple(label for label in known.labels if label in search.parameters)
+    if not labels or any(set(labels) == set(c.labels) for c in search.hypotheses):
+        return
+    found = search.fitter.hypothesis(labels, [known.free[k] for k in kept], known.values[kept], known.nuisance)
+    search.fitter.measure([found])
+    converge(search.fitter, found)
+    search.hypotheses.append(found)
+
+
+def run(
+    problem: Problem, say: Callable[[str], None] = lambda text: None, clock: Clock | None = None,
+    before: Sequence[Hypothesis] = (),
+) -> Search:  # fmt: skip
+    """The search over a problem's runs.
+
+    clock: the effect of motion capture's clock, where that is certain; before: what another search over these runs came
+    to, by a filter that knew less of disorder. Allowed parameters driven to their limits may hide it from the screen.
+    """
     noise = levels.sensor_noise(problem, LEAST_LEVEL, MOST_LEVEL)
     problem = noise.beyond(UNLIKE).applied(problem)
     told, problem = as_told(problem, noise), problem if clock is None else clock.within(problem)
@@ -300,6 +319,8 @@ def run(problem: Problem, say: Callable[[str], None] = lambda text: None, clock:
         if search.best.labels == first:
             break
     say(f"one effect: {' '.join(search.best.labels) or 'none'}")
+    for hypothesis in before:
+        take_over(search, hypothesis)
     grow(search, say)
     if level_disturbance(search):
         grow(search, say)

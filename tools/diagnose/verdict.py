@@ -193,7 +193,7 @@ def search_again_with_noise(
     more, _ = inflated(search.problem, found.probe, found.scale)
     clock = clock_of(search, hypothesis, gained, more) if found.probe.name == CLOCK else None
     problem = search.problem.as_recorded if clock is None else clock.aligned(search.problem)
-    return conclude(run(problem.with_extra_noise(more), say, clock), say, found)
+    return conclude(run(problem.with_extra_noise(more), say, clock, [search.best, hypothesis]), say, found)
 
 
 def conclude(
