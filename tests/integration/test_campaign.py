@@ -3,7 +3,6 @@
 import contextlib
 import json
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -12,6 +11,7 @@ import time
 import numpy as np
 import pytest
 from support import commands
+from support.dask_cluster import dask_cluster
 
 from tools.study.campaign.conduct import fly_campaign
 from tools.study.campaign.plan import build_plan, load_campaign, with_options
@@ -34,32 +34,6 @@ def alone(plan):
 def glider(*arguments, cwd, **options):
     command = [sys.executable, "-m", "tools.cli.main", "campaign", *arguments]
     return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=120, **options)
-
-
-@contextlib.contextmanager
-def dask_cluster(folder, workers=2):
-    """Address of a real scheduler on loopback with worker processes of their own, as a user would start them."""
-    dask = [sys.executable, "-m", "dask"]
-    quiet = {"stdout": subprocess.DEVNULL, "cwd": folder, "text": True, "stderr": subprocess.PIPE}
-    with contextlib.ExitStack() as stack:
-
-        def start(*arguments):
-            process = subprocess.Popen([*dask, *arguments], **quiet)
-            stack.callback(process.wait, 20)
-            stack.callback(process.terminate)
-            return process
-
-        scheduler = start("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--no-show")
-        address = None
-        for line in scheduler.stderr:
-            found = re.search(r"Scheduler at:\s+(tcp://\S+)", line)
-            if found:
-                address = found.group(1)
-                break
-        assert address, "the scheduler did not start"
-        for _ in range(workers):
-            start("worker", address, "--nthreads", "1", "--no-dashboard", "--host", "127.0.0.1", "--no-nanny")
-        yield address
 
 
 @pytest.mark.parametrize("chunk", [1, 4])

@@ -84,12 +84,14 @@ def _given(asked: dict[str, int | None]) -> dict[str, int]:
 @click.option("--cases", required=True, type=folder, help="A blind test's folder, or a folder of cases.")
 @click.option("--out", required=True, type=folder, help="Where the diagnoses go, one folder a case.")
 @click.option("--only", multiple=True, metavar="CASE", help="This case only; may be given again.")
-@click.option("--jobs", default=1, show_default=True, type=click.IntRange(1, 256), help="Cases at a time.")
+@click.option("--jobs", default=1, show_default=True, type=click.IntRange(0, 256), help="At a time; 0: one a core.")
+@click.option("--dask", metavar="ADDRESS", help="On this Dask cluster instead: tcp://HOST:PORT of its scheduler.")
 @click.option("--watch", is_flag=True, help="`glider gap watch` on every vehicle, with its reference.")
 @click.option("--ocean", is_flag=True, help="With --watch: `glider identify` on the reference first; velocity last.")
 @click.argument("extra", nargs=-1, type=click.UNPROCESSED)
 def run(
-    cases: Path, out: Path, only: tuple[str, ...], jobs: int, watch: bool, ocean: bool, extra: tuple[str, ...]
+    cases: Path, out: Path, only: tuple[str, ...], jobs: int, dask: str | None, watch: bool, ocean: bool,
+    extra: tuple[str, ...],
 ) -> None:
     """Run `glider gap diagnose` on every case; those that have a diagnosis are kept.
 
@@ -99,11 +101,12 @@ def run(
     from tools.study.challenge.diagnose_all import DIAGNOSIS, MISSION, WATCH, count_cases
     from tools.study.challenge.diagnose_all import run as run_all
 
-    need("analysis")
+    for extra_needed in ("analysis", *(("campaign",) if dask or jobs != 1 else ())):
+        need(extra_needed)
     _only_with_watch(watch, ocean)
     kind = (MISSION if ocean else WATCH) if watch else DIAGNOSIS
     with progress("diagnosed", len(set(only)) or count_cases(cases)) as advance:
-        done, wrong = run_all(cases, out, extra, jobs, advance, only, kind)
+        done, wrong = run_all(cases, out, extra, jobs, advance, only, kind, dask)
     say(f"{done} diagnosed: {out}")
     if wrong:
         fail("\n".join(wrong))

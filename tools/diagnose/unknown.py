@@ -41,11 +41,11 @@ def left_share(shrinkage: Shrinkage, taken: float) -> float:
     """Of the squared gap beyond the floor without the selected effects, the share that they leave.
 
     taken: by how much squared gaps grow with a model that lacks them, all else as fitted. What they leave is held
-    against that, or against the recalibrated model's, whichever is less: fitted to an effect that nobody knows, the
-    recalibrated model may miss more than the nominal one does.
+    against that, or against what the file's model misses, recalibrated or not, whichever is less: what is allowed may
+    take up much of a large effect, and fitted to one that nobody knows it may miss more than before.
     """
     left = shrinkage.after**2 - shrinkage.floor**2
-    beyond = min(shrinkage.recalibrated**2 - shrinkage.floor**2, left + taken)
+    beyond = min(max(shrinkage.before, shrinkage.recalibrated) ** 2 - shrinkage.floor**2, left + taken)
     return float(np.clip(left / beyond, 0.0, 1.0)) if beyond > 0.0 else 0.0
 
 

@@ -8,7 +8,7 @@ from scipy.stats import norm
 
 from sim_backend.core.effects.catalogue import catalogue
 from tools.diagnose.matter import MATTERS, disorder_matters, gap_matters, movements
-from tools.diagnose.noise_probes import CLOCK, ProbeResult, inflated
+from tools.diagnose.noise_probes import CLOCK, TURBULENCE, ProbeResult, inflated
 from tools.diagnose.record import NONE, UNKNOWN, Finding
 from tools.diagnose.residuals import UNCLEAN, tests, worst
 from tools.diagnose.search import (
@@ -50,6 +50,7 @@ RIVALS = 5  # further labels fitted in the place of the main one, where it stand
 # what the file says, so that it may say little of the rest, and where it is; e-folds.
 LARGE, TOLD, LARGE_WIDTH = 2.1, 1.2, 0.25
 SECOND = 0.9  # of the main cause's probability, that none may have where there is an effect at all
+ROUGH = 0.7  # of what rough water leaves of windows (docs/DIAGNOSIS.md, Thresholds)
 LIKELY = 1e-3  # probability from which an alternative's effect on the windows is looked at
 
 
@@ -189,19 +190,28 @@ def softmax(logs: dict[str, float]) -> dict[str, float]:
 def search_again_with_noise(
     search: Search, hypothesis: Hypothesis, gained: dict[str, float], found: ProbeResult, say: Callable[[str], None]
 ) -> Answer:
-    """The answer of a further search, by a filter that knows of the disorder found."""
+    """The answer of a further search, by a filter that knows of the disorder found.
+
+    Where the windows err by far less than rough water of that strength would have them, it is none: something shakes
+    the vehicle and lets go of it again, as a tail that flaps does. The answer is then the one without it.
+    """
     more, _ = inflated(search.problem, found.probe, found.scale)
     clock = clock_of(search, hypothesis, gained, more) if found.probe.name == CLOCK else None
     problem = search.problem.as_recorded if clock is None else clock.aligned(search.problem)
-    return conclude(run(problem.with_extra_noise(more), say, clock, [search.best, hypothesis]), say, found)
+    answer = conclude(run(problem.with_extra_noise(more), say, clock, [search.best, hypothesis]), say, found)
+    if found.probe.name == TURBULENCE and answer.shrinkage.after < ROUGH * answer.shrinkage.floor:
+        say("not as rough water would have it")
+        return conclude(search, say, calm=True)
+    return answer
 
 
 def conclude(
-    search: Search, say: Callable[[str], None] = lambda text: None, noise: ProbeResult | None = None
+    search: Search, say: Callable[[str], None] = lambda text: None, noise: ProbeResult | None = None, calm: bool = False
 ) -> Answer:
     """The answer of a finished search; its gains are taken anew at the hypothesis with all that is evident.
 
-    `noise` is disorder that the search already knows of: turbulence, waves, or motion capture's clock.
+    `noise` is disorder that the search already knows of: turbulence, waves, or motion capture's clock; calm: none is
+    looked for.
     """
     problem = search.problem
     evident, gained = prune_effects(search) if problem.rules.evidence else by_held_out_gap(search)
@@ -211,7 +221,7 @@ def conclude(
     whiteness, left = worst(findings), None
     if whiteness >= UNCLEAN and problem.rules.whiteness:
         left = remainder_of(search, evident, noise)
-        found = disorder(search, evident, left) if noise is None else None
+        found = disorder(search, evident, left) if noise is None and not calm else None
         if found is not None:
             return search_again_with_noise(search, evident, gained, found, say)
     moved = movements(search, evident)
@@ -230,9 +240,9 @@ def conclude(
             small.append(disordered)
     negligible = {label: gained.pop(label) for label in small}
     taken = lacking_squares(search, evident)
-    calm = case_noise_floor(search, selected)["total"] if disordered else shrinkage.floor
+    floor = case_noise_floor(search, selected)["total"] if disordered else shrinkage.floor
     if disordered and disordered not in taken:
-        taken[disordered] = np.full(len(problem.runs), max(shrinkage.after**2 - calm**2, 0.0))
+        taken[disordered] = np.full(len(problem.runs), max(shrinkage.after**2 - floor**2, 0.0))
     ranked = gained or negligible
     sizes = {label: in_tolerances(squares) for label, squares in taken.items()}
     by_size = sorted(ranked, key=lambda label: -sizes[label])
@@ -246,7 +256,7 @@ def conclude(
     chances = pass_on(chances, [label for label in by_size if label in gained and label != main])
     if main in gained:
         main = max(gained, key=lambda label: chances.get(label, 0.0))
-        floors = sizes[main] / max(calm, 1e-6)
+        floors = sizes[main] / max(floor, 1e-6)
         chances = doubt_small(chances, main, floors / (TOLD if search.told else LARGE))
     by_effects = sum(sizes[label] ** 2 for label in gained)
     unknown = probability_unknown(search, bool(gained), bool(ranked), shrinkage, left, noise, by_effects)

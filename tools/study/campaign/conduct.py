@@ -6,15 +6,16 @@ import io
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from tools.study.campaign.fingerprint import fingerprint
-from tools.study.campaign.flights import CHUNK, COLUMNS, ENDINGS, Job, cut
+from tools.study.campaign.flights import CHUNK, COLUMNS, ENDINGS, Job, compile_loop, cut, fly_chunk
 from tools.study.campaign.plan import Plan
 from tools.study.campaign.store import Store, write_whole
-from tools.study.campaign.workers import check_reachable, fly_here, fly_on_dask
+from tools.study.workers import check_reachable, work_through
 
 FLIGHTS_FILE = "flights.csv"
 
@@ -61,8 +62,9 @@ def fly_campaign(
     missing = [piece for piece in chunks if piece.number not in rows]
     fresh, begin = 0, time.perf_counter()
     if missing:
-        flown = fly_on_dask(job, missing, dask) if dask else fly_here(job, missing, jobs)
-        with contextlib.closing(flown):
+        if not dask and jobs != 1:
+            compile_loop(plan)  # before several processes do
+        with contextlib.closing(work_through(partial(fly_chunk, job), missing, jobs, dask)) as flown:
             for piece, table in flown:
                 if store is not None:
                     store.keep(piece, table)
