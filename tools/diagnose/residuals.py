@@ -7,7 +7,7 @@ many there are (Bonferroni). Spectrum and correlations are taken run by run and 
 import itertools
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtr, ndtri
 
 from firmware.core.vehicle.layout import X_ACT, X_BALLAST, X_DOWN, X_NU, X_QUAT, X_SERVO, X_SLIDER
 from tools.diagnose.record import Finding
@@ -102,7 +102,7 @@ def peak(e: np.ndarray, bounds: np.ndarray) -> float:
         power = np.abs(np.fft.rfft(e[a:b])[1:]) ** 2 / max(1.0, float((e[a:b] ** 2).sum()))
         highest, lines = max(highest, float(power.max(initial=0.0))), lines + len(power)
     chance = -np.expm1(lines * np.log1p(-np.exp(-min(highest, 700.0)))) if highest < 700.0 else 0.0
-    return float(norm.isf(min(max(chance, 1e-300), 1.0 - 1e-12)))
+    return -float(ndtri(min(max(chance, 1e-300), 1.0 - 1e-12)))
 
 
 def goes_with(e: np.ndarray, ok: np.ndarray, values: np.ndarray, bounds: np.ndarray) -> float:
@@ -122,8 +122,8 @@ def worst(found: list[Finding]) -> float:
     """The strongest finding, corrected for how many were looked at: normal under the true model."""
     if not found:
         return 0.0
-    chance = 2.0 * norm.sf(max(abs(f.sigma) for f in found)) * len(found)
-    return float(norm.isf(min(max(chance, 1e-300), 1.0 - 1e-9)))
+    chance = 2.0 * ndtr(-max(abs(f.sigma) for f in found)) * len(found)
+    return -float(ndtri(min(max(chance, 1e-300), 1.0 - 1e-9)))
 
 
 def strongest_left(findings: list[Finding]) -> tuple[Finding | None, Finding | None]:

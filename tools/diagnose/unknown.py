@@ -4,7 +4,7 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.catalogue import catalogue
@@ -34,7 +34,7 @@ RIVALS = 4  # links probed beside water and axes
 def probability(share: float, middle: float, width: float) -> float:
     """Probability that what is left is a gap of its own (docs/DIAGNOSIS.md, Thresholds)."""
     z = (np.log(max(share, 1e-6)) - np.log(middle)) / width
-    return float(np.clip(norm.cdf(z), MORE_UNKNOWN, 1.0 - MORE_UNKNOWN))
+    return float(np.clip(ndtr(z), MORE_UNKNOWN, 1.0 - MORE_UNKNOWN))
 
 
 def left_share(shrinkage: Shrinkage, taken: float) -> float:

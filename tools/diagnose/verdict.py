@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from sim_backend.core.effects.catalogue import catalogue
 from tools.diagnose.matter import MATTERS, disorder_matters, gap_matters, movements
@@ -308,7 +308,7 @@ def doubt_small(chances: dict[str, float], main: str, size: float) -> dict[str, 
     size: of the main one, in sizes at which that is as likely as not. What this takes off the labels goes to none, but
     no more than SECOND of what the main one keeps: there is something.
     """
-    large = float(norm.cdf(np.log(max(size, 1e-6)) / LARGE_WIDTH))
+    large = float(ndtr(np.log(max(size, 1e-6)) / LARGE_WIDTH))
     labels = sum(chance for name, chance in chances.items() if name != NONE)
     least = 1.0 / (1.0 + SECOND * chances[main] / max(labels, 1e-9))  # of the labels' probability that stays
     kept = max(large, least)

@@ -7,7 +7,6 @@ Laplace's approximation around the least misfit gives the evidence.
 """
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
 from tools.inference.parameters import FreeParameter, model_at
 from tools.inference.problem import Gains, Problem
@@ -22,6 +21,7 @@ SHORTER_STEPS = (0.4, 0.1)  # of a step, tried where the whole of it brings less
 POOR = 0.3  # of what it should
 STUCK = 0.2  # misfit that a tenth of a step's promise must be worth, for parameters to be tried apart where it fails
 STUCK_TRIED = 2  # hypotheses at most, the best of those that are stuck
+HELD = 1e-12  # of the largest slope, below which a parameter at its limit has nothing to gain
 SIDE_STEPS = (0.001, 0.004, 0.015, 0.06)  # of a spread, either way: a delay's misfit has steps, no slope leads on
 
 Point = tuple[list[FreeParameter], np.ndarray, np.ndarray]  # what is free, its values, the nuisance parameters'
@@ -143,14 +143,53 @@ class Fitter:
 
 
 def bounded_step(normal: np.ndarray, slope: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """The step d that minimises slope d + d normal d / 2 with low <= d <= high (low <= 0 <= high, normal definite)."""
+    """The step d that minimises slope d + d normal d / 2 with low <= d <= high (low <= 0 <= high, normal definite).
+
+    By an active set (Stark and Parker 1995): whatever leaves its limits is held there; then what would fall is freed,
+    one at a time.
+    """
     step = -np.linalg.solve(normal, slope) if len(slope) else np.zeros(0)
     if (step >= low).all() and (step <= high).all():
         return step
-    root = np.linalg.cholesky(normal)
-    aim = -np.linalg.solve(root, slope)
-    found = lsq_linear(root.T, aim, (low - 1e-12, high + 1e-12), method="bvls")
-    return np.clip(found.x, low, high)
+    held = np.zeros(len(step))  # -1, 1: at its lower, at its upper limit
+    while (outside := np.where(held == 0.0, 1.0 * (step > high) - (step < low), 0.0)).any():
+        held += outside
+        step = _held_step(normal, slope, low, high, held)
+    for _ in range(len(step)):
+        inward = (slope + normal @ step) * held  # what would fall if a parameter left its limit
+        if inward.max() <= HELD * np.abs(slope).max():
+            break
+        held[inward.argmax()] = 0.0
+        step = _freed_step(step, normal, slope, low, high, held)
+    return np.clip(step, low, high)
+
+
+def _freed_step(
+    step: np.ndarray, normal: np.ndarray, slope: np.ndarray, low: np.ndarray, high: np.ndarray, held: np.ndarray
+) -> np.ndarray:
+    """The least of what is free, reached from `step` with a stop at each limit on the way, which `held` then holds."""
+    while True:
+        aim = _held_step(normal, slope, low, high, held)
+        limit = np.where(aim > step, high, low)
+        beyond = (held == 0.0) & ((aim < low) | (aim > high))
+        if not beyond.any():
+            return aim
+        share = np.full(len(step), np.inf)
+        share[beyond] = (limit - step)[beyond] / (aim - step)[beyond]
+        first = share.argmin()
+        step = step + share[first] * np.where(held == 0.0, aim - step, 0.0)
+        held[first] = np.sign(aim[first] - step[first])
+        step[first] = limit[first]
+
+
+def _held_step(
+    normal: np.ndarray, slope: np.ndarray, low: np.ndarray, high: np.ndarray, held: np.ndarray
+) -> np.ndarray:
+    """The least with some parameters held at their limits, the others wherever it leads."""
+    step, free = np.where(held < 0.0, low, high), held == 0.0
+    rest = slope[free] + normal[np.ix_(free, ~free)] @ step[~free]
+    step[free] = -np.linalg.solve(normal[np.ix_(free, free)], rest)
+    return step
 
 
 class Hypothesis:

@@ -9,7 +9,7 @@ G - 1 degrees of freedom, G the number of blocks.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 BLOCK = 10.0  # s; longer than the autocorrelation of attitude and depth residuals on the flights tried (3 to 6 s)
 LEAST_BLOCKS = 5
@@ -26,12 +26,12 @@ class Estimate:
     @property
     def interval(self) -> tuple[float, float]:
         """90 % interval."""
-        half = float(student.ppf(0.95, self.freedom)) * self.error
+        half = float(stdtrit(self.freedom, 0.95)) * self.error
         return self.value - half, self.value + half
 
     def sigma(self, null: float = 0.0) -> float:
         """Distance from `null` in standard errors, made comparable over degrees of freedom by their quantiles."""
-        return abs(self.value - null) / max(self.error, 1e-300) * 1.645 / float(student.ppf(0.95, self.freedom))
+        return abs(self.value - null) / max(self.error, 1e-300) * 1.645 / float(stdtrit(self.freedom, 0.95))
 
     def scaled(self, factor: float) -> "Estimate":
         """The estimate in another unit."""

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from tools.diagnose.noise_probes import NoiseProbe, probes
 from tools.inference.parameters import CLOCK_PLACE
@@ -28,7 +28,7 @@ class Left:
     def probability(self) -> float:
         """That this is no effect of the catalogue."""
         z = (np.log(max(self.share, 1e-6)) - np.log(LEFT_OVER)) / LEFT_WIDTH
-        return float(np.clip(norm.cdf(z), LEAST_PROBABILITY, 1.0 - LEAST_PROBABILITY))
+        return float(np.clip(ndtr(z), LEAST_PROBABILITY, 1.0 - LEAST_PROBABILITY))
 
 
 NOTHING = Left(0.0, [])
