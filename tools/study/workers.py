@@ -6,6 +6,7 @@ import signal
 import socket
 import threading
 from collections.abc import Callable, Generator, Iterable
+from multiprocessing import parent_process
 from typing import Any
 
 from tools.data.errors import InputError
@@ -15,6 +16,18 @@ WORKER_SECONDS = 60
 TRIES = 3  # of a piece whose Dask worker goes away
 Work = Callable[[Any], Any]  # what is done with a piece; it and its pieces can be pickled
 Worked = Generator[tuple[Any, Any], None, None]  # pieces with what came of them, in any order
+
+
+def end_with_parent() -> None:
+    """Initializer of a pool's workers. A parent that is killed cannot tell them, and they would wait forever."""
+    threading.Thread(target=_wait_for_parent, daemon=True).start()
+
+
+def _wait_for_parent() -> None:
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)  # in the middle of whatever the worker does
 
 
 def work_here(work: Work, pieces: Iterable[Any], jobs: int) -> Worked:

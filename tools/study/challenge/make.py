@@ -16,6 +16,7 @@ from tools.data.sources import load_vehicle
 from tools.study.challenge import seal
 from tools.study.challenge.cases import NoCase, answer, draw_case, write
 from tools.study.challenge.plan import Counts, plan
+from tools.study.workers import end_with_parent
 
 VEHICLE = "roughie"
 MAKING = ".making"  # answers until they are sealed
@@ -115,7 +116,8 @@ def make(order: Order, jobs: int = 0, advance: Callable[[int], None] = lambda n:
     if todo:  # the first one here: it compiles the kernels into the cache that the processes share
         failed.append(make_one(order, todo[0], vehicle))
         advance(1)
-    with ProcessPoolExecutor(jobs or os.cpu_count(), mp_context=get_context("spawn")) as pool:
+    spawn = get_context("spawn")
+    with ProcessPoolExecutor(jobs or os.cpu_count(), mp_context=spawn, initializer=end_with_parent) as pool:
         waiting = [pool.submit(make_one, order, case, vehicle) for case in todo[1:]]
         try:
             for done in as_completed(waiting):

@@ -17,6 +17,7 @@ from tools.study.faults.cases import Case, Show
 from tools.study.faults.flights import flown
 from tools.study.faults.scene import build_scene, fly
 from tools.study.faults.shows import shows
+from tools.study.workers import end_with_parent
 
 TWO_TICKS_S = 2 * 0.02
 SEED = 1
@@ -74,7 +75,8 @@ def run(job: tuple[int, str], disabled: int | None = None) -> Outcome:
 
 
 def _quiet() -> None:
-    """Workers hold their tongue: what the parts under test say is not the campaign's."""
+    """Workers hold their tongue, what the parts under test say is not the campaign's, and end with it."""
+    end_with_parent()
     null = os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, 2)
     os.close(null)
