@@ -1,3 +1,5 @@
+"""Workers of a pool end with the process that started them, also where that is killed."""
+
 import signal
 import subprocess
 import sys
