@@ -1,4 +1,4 @@
-"""The kernels of a diagnosis compiled ahead (tools/flight/precompile): by two short flights that are made up, measured and
+"""The kernels of a diagnosis compiled ahead (tools/flight/precompile): two short flights are made up, measured and
 diagnosed.
 
 Those that follow models, which take the longest, are compiled by a process of their own meanwhile.
