@@ -14,7 +14,7 @@ from support import commands
 from hal.boardfile import calibration_hash, decode_device_file
 from tests.support.bench_session import Twins, session
 
-pytestmark = pytest.mark.realtime(seconds=120)
+pytestmark = pytest.mark.realtime(seconds=180)
 
 
 def glider(*arguments, lines=(), **options):

@@ -217,7 +217,7 @@ def test_V_falls_with_real_actuators_whenever_the_margin_says_so(counting_on, sh
     Flights from off the reference, where s is worth bringing in, in vehicles of the box: often enough promised.
     """
     watch = Watch()
-    for seed in range(4):
+    for seed in range(6):
         missed = (0.3, -0.6) if seed % 2 else (-0.3, 0.6)
         law = Law(P, *MODERATE, counting_on, share)
         real_flight(law, seed, strength=0.003, watch=watch, seconds=10.0, missed=missed)
