@@ -38,8 +38,10 @@ picture: demo
 	chromium --headless --no-sandbox --disable-gpu --hide-scrollbars --window-size=900,760 \
 	    --screenshot=docs/pictures/diagnosis.png out/demo/diagnosis/report.html
 
-# Two processes that compute, and two for the tests that wait for the clock (tests/conftest.py).
+# Kernels that several test files share, once. Then two processes that compute, and two for the tests that wait for the
+# clock (tests/conftest.py).
 test: setup
+	@$(BIN)/python -m tests.support.precompile
 	$(BIN)/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder
 
 check: setup lint types contract test

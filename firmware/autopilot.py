@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from firmware.core.control import autopilot as core
-from firmware.core.control.controllers import CONTROLLERS
+from firmware.core.control.controller_rows import CONTROLLERS
 from firmware.core.control.guidance import abort
 from firmware.core.estimation.sensing import longest_age
 from firmware.core.layouts import control_layout as ctl

@@ -92,6 +92,15 @@ CACHE_DIR = _configure()
 
 import numba  # noqa: E402  (the cache folder has to be set first)
 
+# No kernel calls BLAS. Numba looks for SciPy's all the same before the first one runs: a fifth of a second of imports.
+_BLAS = "scipy.linalg.cython_blas"
+if _BLAS not in sys.modules:
+    sys.modules[_BLAS] = None  # type: ignore[assignment]  # how Python is told that there is none
+    try:
+        import numba.np.arraymath
+    finally:
+        del sys.modules[_BLAS]
+
 if CACHE_DIR is not None:
     numba.config.CACHE_DIR = str(CACHE_DIR)  # type: ignore[attr-defined]  # made at run time
 

@@ -14,7 +14,7 @@ from support import commands
 from hal.boardfile import calibration_hash, decode_device_file
 from tests.support.bench_session import Twins, session
 
-pytestmark = pytest.mark.realtime(seconds=120)
+pytestmark = pytest.mark.realtime(seconds=180)
 
 
 def glider(*arguments, lines=(), **options):
@@ -31,7 +31,13 @@ def twins(tmp_path_factory):
 
 
 def bench(twins, *lines, out="."):
+    """From a pipe."""
     return glider("bench", "--board", twins.board, "--out", out, lines=lines)
+
+
+def typed(twins, folder, *lines):
+    """The same in this process, what is left going into a folder."""
+    return commands.glider("bench", "--board", twins.board, "--out", ".", cwd=folder, lines="\n".join(lines) + "\n")
 
 
 def test_a_session_at_a_terminal(tmp_path):
@@ -91,8 +97,8 @@ def test_a_script_ends_at_the_first_command_that_fails(twins, tmp_path, lines, c
     assert twins.board.read_text() == before
 
 
-def test_limits_hold_whatever_is_asked(twins):
-    done = bench(twins, "enable", "goto servo 200", "goto ballast -3", "goto slider 0")
+def test_limits_hold_whatever_is_asked(twins, tmp_path):
+    done = typed(twins, tmp_path, "enable", "goto servo 200", "goto ballast -3", "goto slider 0")
     assert done.returncode == 0, done.stderr
     assert "servo: limited to 60.00 deg" in done.stdout
     state = twins.state()
@@ -100,8 +106,8 @@ def test_limits_hold_whatever_is_asked(twins):
     assert state["ballast_kg"] == pytest.approx(-0.003 * 998.2 * 0.0062, abs=0.004)
 
 
-def test_raw_bytes_and_their_answers(twins):
-    done = bench(twins, "raw imu VNRRG,01", "yes", "raw sensors 01 04 00 00 00 08", "yes")
+def test_raw_bytes_and_their_answers(twins, tmp_path):
+    done = typed(twins, tmp_path, "raw imu VNRRG,01", "yes", "raw sensors 01 04 00 00 00 08", "yes")
     assert "$VNRRG,01,VN-100T-CR" in done.stdout
     assert done.returncode == 1  # the transmitter has no input registers
     assert "exception 2" in done.stderr
@@ -110,7 +116,7 @@ def test_raw_bytes_and_their_answers(twins):
 def test_a_sweep_leaves_run_data_and_a_picture(twins, tmp_path):
     from tools.data.runs.case import load_case
 
-    done = bench(twins, "enable", "goto slider 0", "sweep slider -2 2", out=tmp_path)
+    done = typed(twins, tmp_path, "enable", "goto slider 0", "sweep slider -2 2")
     assert done.returncode == 0, done.stdout + done.stderr
     assert "travel time" in done.stdout
     (run,) = load_case(tmp_path / "sweep-slider-001").runs
@@ -151,15 +157,15 @@ def test_losing_the_console_stops_the_actuators(twins, how):
         time.sleep(0.3)
 
 
-def test_the_bench_refuses_what_has_no_devices():
-    done = glider("bench", "--board", "sim")
+def test_the_bench_refuses_what_has_no_devices(tmp_path):
+    done = commands.glider("bench", "--board", "sim", cwd=tmp_path)
     assert done.returncode == 2
     assert "no devices" in done.stderr
 
 
-def test_check_talks_to_every_device(twins):
+def test_check_talks_to_every_device(twins, tmp_path):
     twins.tell("fault beacon silent")
-    done = glider("check", "--board", twins.board)
+    done = commands.glider("check", "--board", twins.board, cwd=tmp_path)
     twins.tell("fault beacon none")
     assert done.returncode == 1
     assert "model VN-100T-CR" in done.stdout
@@ -191,9 +197,9 @@ def lead(twins, board, actuators):
 SIGNS = ("nose up", "roll to starboard", "turn to starboard", "deeper", "mass forward", "pump in", "servo to starboard")
 
 
-def test_check_leads_through_signs_and_axes(twins):
+def test_check_leads_through_signs_and_axes(twins, tmp_path):
     """Whatever the actuators stood at before: here the mass is further forward than the check will send it."""
-    assert bench(twins, "enable", "goto slider 50").returncode == 0
+    assert typed(twins, tmp_path, "enable", "goto slider 50").returncode == 0
     found = lead(twins, twins.board, actuators=True)
     assert {name: found[name]["pass"] for name in SIGNS} == dict.fromkeys(SIGNS, True), found
     assert re.match(r"pitch \+1[3-7]\.\d deg: right", found["nose up"]["message"])

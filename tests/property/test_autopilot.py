@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from firmware.autopilot import Autopilot, configuration
-from firmware.core.control.controllers import CONTROLLERS
+from firmware.core.control.controller_rows import CONTROLLERS
 from firmware.core.layouts import control_layout as ctl
 from firmware.core.vehicle import layout
 from firmware.guidance.mission import decode_mission

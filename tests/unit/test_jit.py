@@ -103,6 +103,15 @@ def fly(**environment: str) -> np.ndarray:
     return np.array([[float.fromhex(number) for number in line.split()] for line in done.stdout.splitlines()])
 
 
+def test_what_no_kernel_calls_is_not_imported():
+    """Numba asks for SciPy's BLAS, and what only reads files asks for no compiler."""
+    loaded = "import sys; print(*({*sys.modules} & {'scipy.linalg', 'numba'}))"
+    for script, there in ((FLIGHT, "numba"), ("import tools.data.sources", "")):
+        command = [sys.executable, "-c", f"{script}\n{loaded}"]
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+        assert done.stdout.splitlines()[-1] == there
+
+
 def test_compiled_kernels_fly_like_plain_python():
     compiled, plain = fly(GLIDER_JIT="1"), fly(GLIDER_JIT="0")
     assert compiled.shape == (3, 20)
@@ -111,7 +120,8 @@ def test_compiled_kernels_fly_like_plain_python():
 
 
 def test_cache_goes_where_it_is_told(tmp_path):
-    fly(GLIDER_CACHE_DIR=str(tmp_path))
+    turn = "from firmware.core.maths.rotations import wrap_angle; wrap_angle(4.0)"
+    subprocess.run([sys.executable, "-c", turn], env=os.environ | {"GLIDER_CACHE_DIR": str(tmp_path)}, check=True)
     folders = list(tmp_path.glob(f"kernels-{jit.kernels_digest()}-*"))
     assert len(folders) == 1
     assert list(folders[0].rglob("*.nbi"))

@@ -1,4 +1,5 @@
-"""The kernels of a diagnosis compiled ahead (tools/flight/precompile): by one of two short flights that are made up.
+"""The kernels of a diagnosis compiled ahead (tools/flight/precompile): two short flights are made up, measured and
+diagnosed.
 
 Those that follow models, which take the longest, are compiled by a process of their own meanwhile.
 """
@@ -17,6 +18,7 @@ from tools.data.runs.case import Case, load_case, write_case
 from tools.data.runs.run import Run
 from tools.diagnose.diagnosis import diagnose
 from tools.flight.precompile import Work
+from tools.gap.assess import assess
 from tools.inference.model import effect_vector
 from tools.inference.problem import Gains, Problem, problem_of
 
@@ -68,6 +70,7 @@ def _diagnose_a_moment() -> None:
         case = _case(Path(folder, "flown"), problem.runs)
         problem_of(case).filter(P, F, begin=True)
         following.wait()
+        assess(case)
         diagnose(case)
 
 

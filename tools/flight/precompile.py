@@ -110,7 +110,7 @@ def _count() -> int:
 
 def _fly() -> None:
     """Fly a moment with every controller on the simulated board, once with effects."""
-    from firmware.core.control.controllers import CONTROLLERS
+    from firmware.core.control.controller_rows import CONTROLLERS
 
     for controller in CONTROLLERS:
         _fly_a_moment(controller, {})

@@ -14,8 +14,6 @@ from collections.abc import Callable, Iterator
 
 import click
 
-from firmware.autopilot import SURFACED
-
 AGAIN_S = (0.3, 5.0)  # between two presses of Ctrl-C that leave a submerged vehicle: no burst of noise, no afterthought
 IGNORED = (
     "SIGTSTP",
@@ -42,6 +40,9 @@ class Stop:
         now: Callable[[], float] = time.monotonic,
     ):  # fmt: skip
         """`depth`: m, of a vehicle on devices; None in simulation."""
+        from firmware.autopilot import SURFACED  # brings the kernels: only who flies waits for them
+
+        self._surfaced = SURFACED
         self.presses = 0
         self._give_up, self._depth, self._now = give_up, depth, now
         self._before = -math.inf
@@ -52,7 +53,7 @@ class Stop:
         if self.presses == 1:
             self._give_up()
             return
-        deep = self._depth is not None and self._depth() > SURFACED
+        deep = self._depth is not None and self._depth() > self._surfaced
         if not deep or (self.presses > 2 and AGAIN_S[0] <= since <= AGAIN_S[1]):
             raise KeyboardInterrupt
         with contextlib.suppress(OSError):

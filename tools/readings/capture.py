@@ -74,8 +74,8 @@ def _capture_late(table: Table) -> tuple[list[Finding], Estimate] | None:
     """How late motion capture's poses are by the rates, and by how much more as time goes on."""
     if not table.has(*names.RATES, *names.MOCAP_ATTITUDE):
         return None
-    compared = compare(table, names.MOCAP_ATTITUDE, skew=True)
     plain = compare(table, names.MOCAP_ATTITUDE)
+    compared = compare(table, names.MOCAP_ATTITUDE, skew=True, delay=plain.delay)
     late = lateness(plain)
     if late is None:
         return None

@@ -55,23 +55,23 @@ def angle_increments(table: Table, attitude: np.ndarray, euler: bool) -> np.ndar
 
 
 def design(
-    table: Table, attitude: np.ndarray, rates: np.ndarray, delay: float, euler: bool = False, skew: bool = False
+    table: Table, turned: np.ndarray, rates: np.ndarray, delay: float, skew: bool = False
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """A (rows, 3), regressors (rows, 3 axes, k) and which rows are used; within blocks, less their means.
 
-    Regressors of an axis: the three integrals, time, minus the axis' rate, with `skew` also minus time times it.
+    turned (rows, 3): the attitude's increments. Regressors of an axis: the three integrals, time, minus the axis' rate,
+    with `skew` also minus time times it.
     """
-    moved, turned = integrated(table, rates, delay), angle_increments(table, attitude, euler)
+    moved = integrated(table, rates, delay)
     usable = np.isfinite(moved).all(axis=1) & np.isfinite(turned).all(axis=1)
     A, G = summed(turned, usable), summed(moved, usable)
     group = table.block[usable] * 100_003 + pieces(usable)[usable]
     t = table.t[usable]
-    shifted = rates if delay == 0.0 else _shifted(table, rates, delay)
-    G, A = within(G[usable], group), within(A[usable], group)
-    X = []
-    for axis in range(3):
-        w = np.nan_to_num(shifted[usable, axis])
-        X.append(np.column_stack([G, within(t, group), -within(w, group), *([-within(t * w, group)] if skew else [])]))
+    w = np.nan_to_num((rates if delay == 0.0 else _shifted(table, rates, delay))[usable])
+    parts = [A[usable], G[usable], t[:, None], w, *([t[:, None] * w] if skew else [])]
+    ends = np.cumsum([part.shape[1] for part in parts])[:-1]
+    A, G, T, *by_axis = np.split(within(np.column_stack(parts), group), ends, axis=1)
+    X = [np.column_stack([G, T, *(-part[:, axis] for part in by_axis)]) for axis in range(3)]
     return A, np.stack(X, axis=1), usable
 
 
@@ -88,12 +88,27 @@ def _shifted(table: Table, rates: np.ndarray, delay: float) -> np.ndarray:
     return out
 
 
-def compare(table: Table, columns: tuple[str, ...], euler: bool = False, skew: bool = False) -> Compared:
-    """The fits of an attitude on the rates, at the delay (of DELAYS) that leaves least."""
-    attitude, rates = attitude_of(table, columns), rates_of(table)
+def compare(
+    table: Table, columns: tuple[str, ...], euler: bool = False, skew: bool = False, delay: float | None = None
+) -> Compared:
+    """The fits of an attitude on the rates, at the delay that leaves least (of DELAYS), unless it is known."""
+    turned, rates = angle_increments(table, attitude_of(table, columns), euler), rates_of(table)
+    best = _best_delay(table, turned, rates) if delay is None else delay
+    A, X, usable = design(table, turned, rates, best, skew)
+    block = table.block[usable]
+    fits = []
+    for axis in range(3):
+        motion = float(np.sqrt(np.mean(A[:, axis] ** 2))) if len(A) else 0.0
+        enough = motion >= LEAST_MOTION * TOLERANCE[names.ATTITUDE[axis]] * 0.3
+        fits.append(fit(A[:, axis], X[:, axis], block) if enough else None)
+    return Compared(fits, best)
+
+
+def _best_delay(table: Table, turned: np.ndarray, rates: np.ndarray) -> float:
+    """Of DELAYS, the one that leaves least of the attitude's increments."""
     best, least = 0.0, math.inf
     for delay in sorted(DELAYS, key=abs):
-        A, X, _ = design(table, attitude, rates, float(delay), euler)
+        A, X, _ = design(table, turned, rates, float(delay))
         if len(A) < 20:
             continue
         left = 0.0
@@ -104,14 +119,7 @@ def compare(table: Table, columns: tuple[str, ...], euler: bool = False, skew: b
             left += missed / max(float(np.mean(A[:, axis] ** 2)), 1e-12)
         if left < least * 0.98:
             best, least = float(delay), left
-    A, X, usable = design(table, attitude, rates, best, euler, skew)
-    block = table.block[usable]
-    fits = []
-    for axis in range(3):
-        motion = float(np.sqrt(np.mean(A[:, axis] ** 2))) if len(A) else 0.0
-        enough = motion >= LEAST_MOTION * TOLERANCE[names.ATTITUDE[axis]] * 0.3
-        fits.append(fit(A[:, axis], X[:, axis], block) if enough else None)
-    return Compared(fits, best)
+    return best
 
 
 def judge_rates(table: Table) -> list[Finding]:
@@ -222,7 +230,7 @@ def _own_axis(table: Table, delay: float, axis: int) -> tuple[float, bool]:
     attitude, rates = attitude_of(table, names.ATTITUDE), rates_of(table)
     squares = []
     for euler in (False, True):
-        A, X, usable = design(table, attitude, rates, delay, euler)
+        A, X, usable = design(table, angle_increments(table, attitude, euler), rates, delay)
         solved = fit(A[:, axis], X[:, axis][:, [axis, 3]], table.block[usable])
         if solved is None:
             return 1.0, False

@@ -1,11 +1,10 @@
-"""The controllers: a row each for whoever lists them, and which of them flies this tick.
+"""Which of the controllers (controller_rows) flies this tick, and what it wants.
 
 Roll is always (37); a controller wants slider and ballast, and says whether it had an answer (law.OK). Without one the
 PID flies. Whatever is wanted goes through `limited` afterwards (core/autopilot). How to add one: docs/ADDING.md.
 """
 
 import math
-from dataclasses import dataclass
 
 from firmware.core.control.control import roll_law
 from firmware.core.control.law import OK
@@ -16,31 +15,6 @@ from firmware.core.vehicle.actuators import clip
 from firmware.core.vehicle.layout import BALLAST_MAX, BALLAST_MIN, SLIDER_MAX, SLIDER_MIN
 
 BUMP_TIME = 2.0  # s in which what a switch left over fades
-
-
-@dataclass(frozen=True)
-class Controller:
-    """A row: its name in files and on the command line, its number in C, and its title for a reader.
-
-    law_gains: the table of [control] with the law's gains that it flies by.
-    """
-
-    name: str
-    number: float
-    title: str
-    needs_velocities: bool = True
-    law_gains: str = "law"
-
-
-CONTROLLERS = {
-    row.name: row
-    for row in (
-        Controller("pid", ctl.PID, "PID", needs_velocities=False),
-        Controller("law", ctl.LAW, "law"),
-        Controller("hybrid", ctl.HYBRID, "hybrid"),
-        Controller("law+", ctl.LAW_PLUS, "law+", law_gains="law_plus"),
-    )
-}
 
 
 @kernel

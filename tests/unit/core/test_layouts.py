@@ -7,6 +7,7 @@ more in a row (`A, B, C = 0, 1, 2`), one that the glossary lists, or the frame o
 import ast
 import importlib
 import re
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -19,7 +20,12 @@ from sim_backend.core.effects import effect_layout as ef
 ROOT = Path(__file__).resolve().parents[3]
 ROOMS = ("firmware", "sim_backend", "tools")
 FILES = sorted(path for room in ROOMS for path in (ROOT / room).rglob("*.py"))
-TREES = {path: ast.parse(path.read_text()) for path in (*FILES, *sorted((ROOT / "tests").rglob("*.py")))}
+TESTS = sorted((ROOT / "tests").rglob("*.py"))
+
+
+@cache
+def tree_of(path: Path) -> ast.Module:
+    return ast.parse(path.read_text())
 
 
 def module_name(path: Path) -> str:
@@ -40,7 +46,7 @@ def numbers_a_row(statement: ast.stmt) -> bool:
 
 
 def is_layout(path: Path) -> bool:
-    return "layout" in path.stem or any(numbers_a_row(statement) for statement in TREES[path].body)
+    return "layout" in path.stem or any(numbers_a_row(statement) for statement in tree_of(path).body)
 
 
 def places(module: str) -> dict[str, float]:
@@ -58,12 +64,15 @@ def aliases() -> dict[str, str]:
     return {module: alias for alias, module in rows}
 
 
-LAYOUTS = sorted({*(module_name(path) for path in FILES if is_layout(path)), *aliases(), "hal.ports"})
+@cache
+def layouts() -> list[str]:
+    """Names of the layout modules."""
+    return sorted({*(module_name(path) for path in FILES if is_layout(path)), *aliases(), "hal.ports"})
 
 
 def test_the_rule_finds_the_layouts():
-    assert {"firmware.core.vehicle.layout", "sim_backend.core.layout", "tools.study.tuning.loops"} <= {*LAYOUTS}
-    assert len(LAYOUTS) > 8
+    assert {"firmware.core.vehicle.layout", "sim_backend.core.layout", "tools.study.tuning.loops"} <= {*layouts()}
+    assert len(layouts()) > 8
 
 
 # Vectors of other vehicles, each in layouts of its own: a name has another meaning there.
@@ -75,7 +84,7 @@ OTHERS = {
 
 def test_a_name_has_one_value():
     values: dict[tuple[str, str], dict[float, list[str]]] = {}
-    for module in LAYOUTS:
+    for module in layouts():
         for name, value in places(module).items():
             values.setdefault((OTHERS.get(module, ""), name), {}).setdefault(value, []).append(module)
     assert {name: by_value for name, by_value in values.items() if len(by_value) > 1} == {}
@@ -86,7 +95,7 @@ def layouts_named_from(tree: ast.AST) -> set[str]:
     return {
         OTHERS.get(str(node.module), "")
         for node in ast.walk(tree)
-        if isinstance(node, ast.ImportFrom) and node.module in LAYOUTS
+        if isinstance(node, ast.ImportFrom) and node.module in layouts()
         if any(name.name.isupper() for name in node.names)
     }
 
@@ -94,7 +103,7 @@ def layouts_named_from(tree: ast.AST) -> set[str]:
 def test_no_module_takes_names_from_the_layouts_of_two_vehicles():
     text = "from sim_backend.ocean.core.layout import N_P\nfrom firmware.core.vehicle.layout import N_F"
     assert layouts_named_from(ast.parse(text)) == {"ocean", ""}
-    assert [str(path) for path in FILES if len(layouts_named_from(TREES[path])) > 1] == []
+    assert [str(path) for path in FILES if len(layouts_named_from(tree_of(path))) > 1] == []
 
 
 @pytest.mark.parametrize("room", [*ROOMS, "tests"])
@@ -103,9 +112,9 @@ def test_a_layout_has_one_alias(room):
     assert len(known) >= 8
     other = [
         (str(path.relative_to(ROOT)), name.asname or name.name)
-        for path, tree in TREES.items()
+        for path in (*FILES, *TESTS)
         if path.relative_to(ROOT).parts[0] == room
-        for node in ast.walk(tree)
+        for node in ast.walk(tree_of(path))
         if isinstance(node, ast.ImportFrom)
         for name in node.names
         if (name.asname or name.name) != known.get(f"{node.module}.{name.name}", name.asname or name.name)
@@ -132,7 +141,7 @@ def bare_fault_rows(tree: ast.AST) -> list[str]:
 
 def test_rows_of_the_fault_table_have_names():
     assert bare_fault_rows(ast.parse("G[sup.ASKED + 24]; ask(G, 1, sup.LOG); man.worst(2)")) != []
-    assert {str(path): rows for path in FILES if (rows := bare_fault_rows(TREES[path]))} == {}
+    assert {str(path): rows for path in FILES if (rows := bare_fault_rows(tree_of(path)))} == {}
 
 
 STATES = {"x", "X", "start", "starts", "begins", "error", "spread", "spreads", "spectral", "cov"}
@@ -162,7 +171,7 @@ def test_states_are_indexed_by_name(room):
     assert literal_state_indices(ast.parse(f"{', '.join(bare)}, x[X_NU], x[i], X[-1], X[0, X_NU]")) == bare
     here = [path for path in FILES if path.is_relative_to(ROOT / room)]
     assert here
-    assert {str(path): found for path in here if (found := literal_state_indices(TREES[path]))} == {}
+    assert {str(path): found for path in here if (found := literal_state_indices(tree_of(path)))} == {}
 
 
 def test_a_scratch_row_of_the_filter_holds_a_vehicle_and_a_state():

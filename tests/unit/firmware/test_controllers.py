@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from firmware.core.control.controllers import CONTROLLERS
+from firmware.core.control.controller_rows import CONTROLLERS
 from firmware.core.layouts import control_layout as ctl
 from firmware.model.gains import Control
 from hal.strict import decode

@@ -1,5 +1,6 @@
 """A flight's terminal, a real one: what is typed, what is not read, and what happens when it goes away."""
 
+import io
 import json
 import math
 import os
@@ -12,7 +13,7 @@ import pytest
 
 from hal.state_file import Phase, StateFile
 from tests.support.twinned import end_guard, until
-from tools.flight.terminal import AGAIN_S, Stop
+from tools.flight.terminal import AGAIN_S, Stop, confirm_arming
 
 pytestmark = pytest.mark.realtime(seconds=60)
 
@@ -86,7 +87,17 @@ def ended(child):
     return child.before, child.exitstatus
 
 
-@pytest.mark.parametrize("answer", ["", "y", "no", "yes yes", "\x04", "\x00\x1b[A"])
+@pytest.mark.parametrize("answer", ["", "y", "no", "yes yes", "\x00\x1b[A", "yes"])
+def test_only_a_whole_yes_confirms(monkeypatch, capsys, answer):
+    """What is typed at a terminal that asks; of the rest, flights below."""
+    typed = io.StringIO(f"{answer}\n")
+    typed.isatty = lambda: True
+    monkeypatch.setattr("sys.stdin", typed)
+    assert confirm_arming("board, mission") == (answer == "yes")
+    assert QUESTION in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("answer", ["yes yes", "\x04"])
 def test_nothing_arms_without_a_yes(fly, tmp_path, answer):
     child = fly()
     child.expect(QUESTION)

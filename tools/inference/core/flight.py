@@ -58,6 +58,7 @@ def fly_followed(Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, 
     """
     groups = groups_of(Fs[:, ef.LINK])
     number = len(groups) - 1
+    posed = len(first) > 0  # a variable: with a constant, follow_run would be compiled once more
     for n in prange(number * (len(bounds) - 1)):
         begins, ends, run = groups[n % number], groups[n % number + 1], n // number
         begin, end = bounds[run], bounds[run + 1]
@@ -68,7 +69,8 @@ def fly_followed(Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, 
         X, path, E = np.empty((rows, ef.N_XF, LANES)), np.empty((rows, N_PATH, LANES)), np.empty((rows, N_Y, LANES))
         follow_run(
             as_wide(P), as_wide(F), drift, modes[run], t[begin:end], stamps[begin:end], inputs[begin:end],
-            z[begin:end], 0, rows, starts[run], W[begin:end], K[begin:end], True, as_wide(X), as_wide(path), as_wide(E),
+            z[begin:end], 0, rows, starts[run], W[begin:end], K[begin:end], posed, as_wide(X), as_wide(path),
+            as_wide(E),
         )  # fmt: skip
         for w in range(len(first)):
             if run_of[w] == run:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from firmware.core.control.controllers import CONTROLLERS
+from firmware.core.control.controller_rows import CONTROLLERS
 from firmware.core.layouts.control_layout import CONTROLLER
 from sim_backend.board import world_of
 from sim_backend.core.closed_loop import N_END, N_TRACE, fly

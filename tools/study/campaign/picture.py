@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from firmware.core.control.controllers import CONTROLLERS
+from firmware.core.control.controller_rows import CONTROLLERS
 from tools.report.charts import Chart, Line, svg
 from tools.study.campaign.conduct import Flown
 from tools.study.campaign.store import write_whole

@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 
 from firmware.autopilot import Autopilot, configuration
-from firmware.core.control.controllers import CONTROLLERS
+from firmware.core.control.controller_rows import CONTROLLERS
 from firmware.guidance.mission import Mission, decode_mission
 from firmware.model import gains
 from firmware.model.gains import Control

@@ -1,0 +1,87 @@
+"""Kernels that several test files need and `make setup` does not compile: once, by processes of their own beside each
+other, before the tests begin.
+
+`python -m tests.support.precompile` is what `make test` runs; with a name of WORKS it does that alone. What was done
+leaves its stamp in the cache of kernels, so that the next call ends at once.
+"""
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from firmware.core.jit import kernel_count
+from tools.flight.precompile import Work
+
+
+def _identify_a_moment() -> None:
+    """A vehicle identified from two short captured runs, by both likelihoods."""
+    from tools.data.runs.case import load_case, write_case
+    from tools.data.sources import load_vehicle
+    from tools.identify.design import CAPTURE, make_runs
+    from tools.identify.pipeline import ACCELERATIONS, identify
+
+    with tempfile.TemporaryDirectory() as folder:
+        runs, _ = make_runs(load_vehicle("roughie"), 6, [0, 6])
+        about = dict(vehicle="roughie", site="pool", log_rate_hz=50.0, water_density_kg_m3=998.0, sensors=CAPTURE)
+        write_case(Path(folder, "case"), runs, **about)
+        identify(load_case(Path(folder, "case")), likelihood=ACCELERATIONS)
+
+
+def _challenge_a_moment() -> None:
+    """A blind test of one case, in the foreign plant."""
+    from tools.study.challenge.make import Order, make
+    from tools.study.challenge.plan import Counts
+
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder)
+        make(Order(out, 6, Counts(single=0, none=1, pairs=0, unknown=0), out / "answers.zip"), jobs=1)
+
+
+def _fly_a_fleet_a_moment() -> None:
+    """Two flights as campaigns and tunings fly them, one of them with effects."""
+    from sim_backend.fleet import fly_fleet
+    from tools.flight.compose import build_flight
+    from tools.flight.precompile import EFFECTS
+
+    flights = [build_flight(mission="sawtooth", effects=effects) for effects in ({}, EFFECTS)]
+    worlds, pilots = [flight.board.world for flight in flights], [flight.autopilot for flight in flights]
+    fly_fleet(worlds, pilots, max_seconds=2.0, trace_every=1.0)
+
+
+def _glide_a_moment() -> None:
+    """Four dives of an ocean glider: identified, measured, watched."""
+    from tests.support.ocean import as_case, fly_dives
+    from tools.gap.assess import assess
+    from tools.identify.ocean.identify import identify_ocean
+
+    with tempfile.TemporaryDirectory() as folder:
+        case = as_case(Path(folder, "case"), fly_dives(4, speed=True).runs)
+        identify_ocean(case)
+        assess(case)
+
+
+WORKS = (
+    Work("identification", kernel_count, _identify_a_moment),
+    Work("challenge", kernel_count, _challenge_a_moment),
+    Work("fleet", kernel_count, _fly_a_fleet_a_moment),
+    Work("ocean", kernel_count, _glide_a_moment),
+)
+
+
+def main(names: list[str]) -> int:
+    """Exit code: 0, or that of the work that failed."""
+    if names:
+        for work in WORKS:
+            if work.name in names:
+                work.compile()
+        return 0
+    waiting = [work.name for work in WORKS if (stamp := work.stamp()) is not None and not stamp.exists()]
+    if waiting:
+        print(f"compiling kernels that tests share: {', '.join(waiting)}", flush=True)
+    started = [subprocess.Popen([sys.executable, "-m", "tests.support.precompile", name]) for name in waiting]
+    return max((process.wait() for process in started), key=abs, default=0)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
