@@ -21,10 +21,10 @@ from tools.inference.ocean_inputs import lacking
 from tools.inference.parameters import NINETY
 from tools.inference.problem import Problem, problem_of
 
-# Of a speed, 1 sigma: laws of drag and lift are not nature's. Of a row, and of a dive's mean, where the rest averages
-# out and what is left is in the covariance of an identified vehicle already (all dives are worth three): the means of
-# twin missions ask for none (docs/OCEAN.md, Velocity). MEASURED: of both, where the speed was measured.
-FORM, FORM_MEAN, MEASURED = 0.03, 0.01, 0.005
+# Of a speed, 1 sigma: laws of drag and lift are not nature's. Of a row; of one where the speed was measured, and of a
+# dive's mean: what a law is off by in all dives alike is in an identified vehicle's covariance already, since all dives
+# are worth three there, and the means of twin missions ask for no more (docs/OCEAN.md, Velocity).
+FORM, MEASURED = 0.03, 0.005
 PITCH_NOISE = 0.005  # rad, 1 sigma from row to row
 HEADING = 0.035  # rad, 1 sigma of a compass that was looked after
 MEANS = "velocity.json"
@@ -72,8 +72,8 @@ def of_run(
     u, w = components(gains.X)
     unsteady = part.recording.inputs[:, at.U_UNSTEADY] > 0.0
     averaged = averaged_rows(~unsteady)
-    form, form_mean = (MEASURED, MEASURED) if part.seen[at.Y_SPEED] else (FORM, FORM_MEAN)
-    var_u, var_w, var_mean = np.square(form * u), np.square(form * w), (form_mean * float(u[averaged].mean())) ** 2
+    form = MEASURED if part.seen[at.Y_SPEED] else FORM
+    var_u, var_w, var_mean = np.square(form * u), np.square(form * w), (MEASURED * float(u[averaged].mean())) ** 2
     for other in moved:
         moved_u, moved_w = components(part.filter(*other).X)
         var_u, var_w = var_u + (moved_u - u) ** 2, var_w + (moved_w - w) ** 2

@@ -36,6 +36,6 @@ def test_what_no_label_names_is_told_with_its_place(tmp_path):
     left = '{"channel": "depth", "excess": 0.6, "share": 1.0, "regime": "in deep water", "runs": ["run03"]}'
     told = sentence(answer(tmp_path, "unknown", "[]", left))
     assert told == (
-        "An effect that no label names: the depth of dives left out is off by 0.600 tolerances beyond what noise leaves, "
-        "most of it in deep water, most in run03."
+        "An effect that no label names: the depth of dives left out is off by 0.600 tolerances beyond what noise "
+        "leaves, most of it in deep water, most in run03."
     )
