@@ -81,7 +81,8 @@ def diagnose_ocean(case: Case, say: Callable[[str], None] = lambda text: None) -
     shared = replace(shared_parameters(problem), allowed=1.0, effects=ABSENT)
     heat = max(1.0, len(runs) / WORTH)
     x = fit_shared(parts, shared, first_values(problem, shared.free), heat)
-    if isinstance(case.vehicle, OceanVehicle) and case.vehicle.identified is None:  # its noise is any vehicle's
+    identified = isinstance(case.vehicle, OceanVehicle) and case.vehicle.identified is not None
+    if not identified:  # its noise is any vehicle's
         case = find_levels(case, problem_of(case, runs=some_runs(runs)), *shared.model(problem, x))
         problem = problem_of(case, runs=runs)
         parts = [problem.part(n) for n in range(len(runs))]
@@ -90,9 +91,11 @@ def diagnose_ocean(case: Case, say: Callable[[str], None] = lambda text: None) -
     start = whole_model(parts, shared, x, heat)
     say(f"{len(runs)} runs; what the vehicle file allows, fitted")
     sought = seek(parts, start, heat)
+    gaps = left_out_gaps(problem, parts, start, sought.model, heat)
+    if not identified and closes(gaps) < problem.kind.matters:
+        sought.model, gaps = start, left_out_gaps(problem, parts, start, start, heat)
     model, main = sought.model, sought.main
     say(f"most evident: {main.best}, {main.evidence[main.best]:.1f} nat; {len(model.labels)} effects")
-    gaps = left_out_gaps(problem, parts, start, model, heat)
     left = what_is_left(parts, problem, model, gaps[AFTER], gaps[FLOOR])
     rough = rougher_water(problem, parts, start, model, heat, left, gaps)
     chances, group = chances_of(problem, main, bool(model.labels), left.probability)
@@ -232,6 +235,15 @@ def gap_of(part: Problem, model: Model, z: np.ndarray | None = None) -> RunGap:
     """A run's gap to a model whose own filter finds where windows start; z (rows, N_Y) instead of what was measured."""
     Y = fly_windows_from(part, *model, part.filter(*model))
     return run_gap(part.kind.measures, part.runs[0], Y, cut(part).listed[0], z)
+
+
+def closes(gaps: dict[str, list[RunGap]]) -> float:
+    """By how much the effects close a channel's gap on left-out runs at most: root of the difference of squares.
+
+    Asked for where the vehicle was not identified: a file of any such vehicle says too little of one to hold it to.
+    """
+    before, after = by_channel(gaps[RECALIBRATED]), by_channel(gaps[AFTER])
+    return float(np.sqrt(max([0.0, *(before[name] ** 2 - after[name] ** 2 for name in after if name in before)])))
 
 
 def closings(gaps: dict[str, list[RunGap]]) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
