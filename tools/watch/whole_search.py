@@ -19,6 +19,7 @@ from tools.watch.events import STEP, Change, Joint, Span
 MOST_EFFECTS = 3
 TRIED = 4  # labels that are fitted at most before one is taken
 HALF = 0.5  # of the most evident parabola's: far from where they were taken parabolas may be wrong by so much
+ALIKE = 0.98  # cosine of two labels' columns
 REFITS, ENOUGH = 4, 1.0  # times that a fit is taken up again, while it brings so much squared sigma
 SHARES = (0.5, 0.2)  # of the step that parabolas promise, from which a fit begins where the whole leads too far
 Model = tuple[np.ndarray, np.ndarray]
@@ -108,14 +109,26 @@ def with_effect(parts: Sequence[Problem], model: Whole, change: Change, heat: fl
     return whole_model(parts, shared, start, heat, [*model.labels, change.label])
 
 
+def alike(model: Whole, label: str) -> bool:
+    """Whether a label moves the readings as an effect of the model does, or is that: it is none beside it."""
+    A = np.array(sum(one.curvature for one in model.about))
+    for own in model.labels:
+        a, b = model.shared.labels[own], model.shared.labels[label]
+        sizes = np.sqrt(np.outer(np.diag(A)[a], np.diag(A)[b]))
+        if own == label or (np.abs(A[np.ix_(a, b)]) > ALIKE * sizes).all():
+            return True
+    return False
+
+
 def one_round(parts: Sequence[Problem], model: Whole, heat: float) -> Round:
     """Every label over all runs by their parabolas; the most evident ones fitted, until the next is far behind."""
     joint = Joint(model.shared, [one.cooled(heat) for one in model.about], [])
-    listed = [one for one in joint.changes([Span(0, len(parts), STEP)]) if one.label not in model.labels]
+    listed = [one for one in joint.changes([Span(0, len(parts), STEP)]) if not alike(model, one.label)]
     listed.sort(key=lambda one: -one.evidence)
     found = Round(model, {one.label: one for one in listed}, {one.label: one.evidence for one in listed}, {})
     for change in listed[:TRIED]:
-        if found.fitted and change.evidence < min(HALF * listed[0].evidence, found.evidence[found.best] - TIE):
+        near = min(HALF * listed[0].evidence, found.evidence[found.best] - TIE) if found.fitted else -np.inf
+        if found.fitted and change.evidence < max(near, 0.0):
             break
         fit = found.fitted[change.label] = with_effect(parts, model, change, heat)
         found.evidence[change.label] = change.evidence - change.gain + 0.5 * (model.cost - fit.cost)
@@ -150,9 +163,11 @@ def evidence_beside(model: Whole, label: str, heat: float) -> float:
 
 
 def seek(parts: Sequence[Problem], start: Whole, heat: float) -> Sought:
-    """Effects added while they are evident and matter; one that those behind it make needless goes again."""
-    sought = Sought(start)
-    matters = parts[0].kind.matters
+    """Effects added while they are evident and matter; one that those behind it make needless goes again.
+
+    What cannot be told from an effect is none beside it.
+    """
+    sought, matters = Sought(start), parts[0].kind.matters
     while len(sought.model.labels) < MOST_EFFECTS:
         found = one_round(parts, sought.model, heat)
         sought.rounds.append(found)

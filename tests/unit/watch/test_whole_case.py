@@ -16,7 +16,7 @@ from tools.report.ocean import write_ocean_report
 from tools.study.challenge.ocean_cases import as_run, flown, with_change
 from tools.watch.whole_case import diagnose_ocean, plain, write
 
-DIVES = 8
+DIVES = 6
 WRONG = np.radians(4.0)
 
 
@@ -24,7 +24,7 @@ WRONG = np.radians(4.0)
 def identified(tmp_path_factory):
     """The vehicle's file, identified from other dives of its mission."""
     folder = tmp_path_factory.mktemp("before")
-    (folder / "identified.toml").write_text(vehicle_text(identify_ocean(as_case(folder / "case", fly_dives(12).runs))))
+    (folder / "identified.toml").write_text(vehicle_text(identify_ocean(as_case(folder / "case", fly_dives(8).runs))))
     return str(folder / "identified.toml")
 
 
