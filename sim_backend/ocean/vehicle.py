@@ -74,7 +74,8 @@ class OceanSensors(Table):
 
     depth: ReadingTable
     roll: ReadingTable
-    speed: ReadingTable = ReadingTable(noise=0.02, bias=0.01)
+    # of the bias half the 1 cm/s that makers of electromagnetic logs give for a limit
+    speed: ReadingTable = ReadingTable(noise=0.02, bias=0.005)
     velocity: ReadingTable = ReadingTable(noise=0.05)
 
 

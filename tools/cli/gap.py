@@ -163,7 +163,8 @@ def _diagnose_ocean(case, out: Path, as_json: bool) -> None:
         print_json(answer)
     else:
         gap_table = answer["gap"]
-        click.echo(f"{found.verdict}: {', '.join(answer['selected']) or 'nothing beyond what the vehicle file allows'}")
+        nothing = "nothing beyond what the vehicle file allows" if found.left is None else found.left.sentence
+        click.echo(f"{found.verdict}: {', '.join(answer['selected']) or nothing}")
         for cause in answer["causes"][:4]:
             click.echo(f"  {cause['probability']:.2f} {cause['label']}  group {', '.join(cause['group'])}")
         click.echo("gap " + ", ".join(f"{name} {gap_table[name]['total']:.2f}" for name in

@@ -1,5 +1,6 @@
 """Velocity of an ocean glider through the water, row by row, with its standard deviation (docs/OCEAN.md, Velocity)."""
 
+import json
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,17 +11,23 @@ import numpy as np
 from sim_backend.ocean.core import layout as at
 from sim_backend.ocean.vehicle import OceanVehicle
 from tools.data.errors import InputError
+from tools.data.plain import as_plain
 from tools.data.runs import columns as names
 from tools.data.runs.case import Case
+from tools.data.runs.csvfile import write_bytes
 from tools.data.runs.run import Run, run_name, write_run
 from tools.inference.model import Model, effect_vector
 from tools.inference.ocean_inputs import lacking
 from tools.inference.parameters import NINETY
 from tools.inference.problem import Problem, problem_of
 
-FORM, MEASURED = 0.03, 0.005  # of a speed, 1 sigma: laws of drag and lift are not nature's; where it was measured
+# Of a speed, 1 sigma: laws of drag and lift are not nature's. Of a row; of one where the speed was measured, and of a
+# dive's mean: what a law is off by in all dives alike is in an identified vehicle's covariance already, since all dives
+# are worth three there, and the means of twin missions ask for no more (docs/OCEAN.md, Velocity).
+FORM, MEASURED = 0.03, 0.005
 PITCH_NOISE = 0.005  # rad, 1 sigma from row to row
 HEADING = 0.035  # rad, 1 sigma of a compass that was looked after
+MEANS = "velocity.json"
 OUT_OF_MODEL = 0.15  # m/s, 1 sigma where the vehicle does not fly steadily
 COLUMNS = (
     "u_m_s", "w_m_s", "vn_m_s", "ve_m_s", "water_w_m_s", "sd_u_m_s", "sd_w_m_s", "sd_vn_m_s", "sd_ve_m_s",
@@ -39,6 +46,7 @@ class Velocity:
     run: Run
     steady: np.ndarray  # (rows,) bool: where the model holds
     columns: dict[str, np.ndarray]  # (rows,) each, COLUMNS
+    sd_mean_u: float  # m/s, 1 sigma of the mean of u over the steady rows
 
 
 def velocities(case: Case, model: Model) -> list[Velocity]:
@@ -62,15 +70,17 @@ def of_run(
     P, F = model
     gains = part.filter(P, F)
     u, w = components(gains.X)
+    unsteady = part.recording.inputs[:, at.U_UNSTEADY] > 0.0
+    averaged = averaged_rows(~unsteady)
     form = MEASURED if part.seen[at.Y_SPEED] else FORM
-    var_u, var_w = np.square(form * u), np.square(form * w)
+    var_u, var_w, var_mean = np.square(form * u), np.square(form * w), (MEASURED * float(u[averaged].mean())) ** 2
     for other in moved:
         moved_u, moved_w = components(part.filter(*other).X)
         var_u, var_w = var_u + (moved_u - u) ** 2, var_w + (moved_w - w) ** 2
+        var_mean += float((moved_u - u)[averaged].mean()) ** 2
     path = gains.X[:, at.X_GLIDE]
     var_u = var_u + (gains.path[:, 0] * np.cos(path)) ** 2 + (w * PITCH_NOISE) ** 2
     var_w = var_w + (gains.path[:, 0] * np.sin(path)) ** 2 + (u * PITCH_NOISE) ** 2
-    unsteady = part.recording.inputs[:, at.U_UNSTEADY] > 0.0
     var_u[unsteady] += OUT_OF_MODEL**2
     var_w[unsteady] += OUT_OF_MODEL**2
     yaw = part.recording.inputs[:, at.U_YAW]
@@ -82,7 +92,7 @@ def of_run(
         "sd_vn_m_s": np.sqrt(along * np.cos(yaw) ** 2 + across * np.sin(yaw) ** 2),
         "sd_ve_m_s": np.sqrt(along * np.sin(yaw) ** 2 + across * np.cos(yaw) ** 2),
         "sd_water_w_m_s": gains.path[:, 1],
-    })  # fmt: skip
+    }, OUT_OF_MODEL if unsteady.all() else float(np.sqrt(var_mean)))  # fmt: skip
 
 
 def components(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -99,25 +109,33 @@ def directions(model: Model) -> list[np.ndarray]:
     return [*found, *(np.where(np.arange(len(sigma)) == n, sigma, 0.0) for n in np.flatnonzero(sigma > 0.0))]
 
 
+def averaged_rows(steady: np.ndarray) -> np.ndarray:
+    """The rows (bool) that a run's mean is of: those flown steadily, all where there is none."""
+    return steady if steady.any() else np.ones_like(steady)
+
+
 def mean_speed(found: Velocity) -> dict[str, Any]:
     """Mean horizontal speed `u_m_s` of the rows flown steadily with its 90 % interval `ci90`, and of the water
     `water_w_m_s`, rms, m/s; all rows where none is steady.
 
-    Errors of the model are the same in all rows: the mean is no surer than they are.
+    Errors of the model are the same in all rows, but for their sign: a weight makes the way down faster and the way up
+    slower, and is next to none of their mean. The interval is therefore not that of the rows.
     """
-    rows = found.steady if found.steady.any() else np.ones_like(found.steady)
-    mean, sigma = (float(found.columns[name][rows].mean()) for name in ("u_m_s", "sd_u_m_s"))
+    rows, sigma = averaged_rows(found.steady), found.sd_mean_u
+    mean = float(found.columns["u_m_s"][rows].mean())
     water = float(np.sqrt(np.mean(found.columns["water_w_m_s"][rows] ** 2)))
     return {"u_m_s": mean, "ci90": [mean - NINETY * sigma, mean + NINETY * sigma], "water_w_m_s": water}
 
 
 def write(found: list[Velocity], out: Path) -> list[Path]:
-    """A CSV a run into a folder: runNNN.csv with t_s and COLUMNS."""
+    """A CSV a run into a folder, runNNN.csv with t_s and COLUMNS, whose paths come back; MEANS: mean_speed by run."""
     out.mkdir(parents=True, exist_ok=True)
-    files = []
+    files, means = [], {}
     for one in found:
         name = one.run.name if one.run.path is None else run_name(one.run.path)
         files.append(out / f"{name}.csv")
         columns = {names.TIME: one.run.t, **one.columns}
         write_run(files[-1], replace(one.run, columns=columns, extra={}, path=None), decimals=dict.fromkeys(COLUMNS, 5))
+        means[name] = mean_speed(one)
+    write_bytes(out / MEANS, (json.dumps(as_plain({"runs": means}), indent=1) + "\n").encode())
     return files

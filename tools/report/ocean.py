@@ -19,6 +19,15 @@ class _Stage(msgspec.Struct):
     gap: dict[str, float | None]
 
 
+class _Left(msgspec.Struct):
+    """What no label explains."""
+
+    channel: str
+    excess: float
+    regime: str
+    runs: list[str]
+
+
 class _Case(msgspec.Struct):
     name: str
     vehicle: str
@@ -35,12 +44,20 @@ class _Answer(msgspec.Struct):
     cautions: list[str]
     skipped: dict[str, str]
     next_run: dict[str, Any]
+    left: _Left | None = None
 
 
 def sentence(found: _Answer) -> str:
     """The verdict in one plain sentence."""
     before, again, after = (words.number(number(one["total"])) for one in
                             (found.gap.before, found.gap.recalibrated, found.gap.after))  # fmt: skip
+    if found.left is not None:
+        regime = f", most of it {found.left.regime}" if found.left.regime else ""
+        runs = f", most in {words.joined(found.left.runs)}" if found.left.runs else ""
+        return (
+            f"An effect that no label names: the {found.left.channel} of dives left out is off by "
+            f"{words.number(found.left.excess)} tolerances beyond what noise leaves{regime}{runs}."
+        )
     if not found.selected:
         return (
             f"No effect beyond what the vehicle file allows: the total gap of dives left out is {before} tolerances "
@@ -48,11 +65,12 @@ def sentence(found: _Answer) -> str:
         )
     label = found.selected[0]
     alike = [name for name in found.causes[0].group if name != label]
+    more = f", and {words.joined(found.selected[1:])}" if found.selected[1:] else ""
     other = f"; these dives cannot tell it from {words.joined(alike)}" if alike else ""
     return (
         f"{words.upper(catalogue()[label].summary)} ({label}; {words.small_percent(found.causes[0].probability)} sure)"
-        f"{other}; the total gap of dives left out is {before} tolerances with the file's numbers, {again} with them "
-        f"fitted and {after} with that effect."
+        f"{more}{other}; the total gap of dives left out is {before} tolerances with the file's numbers, {again} with "
+        f"them fitted and {after} with {'these effects' if more else 'that effect'}."
     )
 
 

@@ -18,7 +18,7 @@ from tools.inference.shared_parameters import shared_parameters
 from tools.watch.answer import NONE, RunVerdict, Watch
 from tools.watch.events import GROWING
 from tools.watch.flights import Flights
-from tools.watch.history import History
+from tools.watch.history import History, within
 from tools.watch.search import find_events
 from tools.watch.usable import ASKED, readings_of, usable, usable_dive
 from tools.watch.verdicts import FEW, event_answer, matters, run_verdict, settle
@@ -118,10 +118,11 @@ def unchanged(history: History, learned_from: np.ndarray) -> np.ndarray:
 
 
 def velocity(part: Problem, history: History, n: int) -> dict[str, Any] | None:
-    """Mean velocity of an ocean glider's run through the water, by what that run flies by; None of other vehicles."""
+    """Mean velocity of an ocean glider's run through the water, by the model with events; None of other vehicles."""
     if not isinstance(part.case.vehicle, OceanVehicle):
         return None
-    shared, own = history.flights.shared, history.flights.raw[n].at
+    flights = history.flights
+    shared, own = flights.shared, within(flights, history.joint().run_values(n, flights.values))
     moved = (shared.model(part, own + direction) for direction in history.uncertain(n))
     return mean_speed(of_run(part, shared.model(part, own), moved))
 

@@ -17,30 +17,33 @@ from tools.data.errors import InputError
 from tools.data.plain import as_plain
 from tools.data.runs.case import Case
 from tools.data.runs.csvfile import write_bytes
+from tools.diagnose.noise_probes import VERTICAL_WATER
 from tools.diagnose.record import ANSWER, NONE, UNKNOWN
 from tools.diagnose.search import EVIDENCE_NEEDED
 from tools.diagnose.shrink import AFTER, BEFORE, FLOOR, RECALIBRATED, by_channel, shrinkage_of
+from tools.diagnose.unknown import MOSTLY
 from tools.diagnose.verdict import ERROR_RATE, TIE, softmax
-from tools.gap.measure import RunGap, run_gap
+from tools.gap.measure import RunGap, case_channels, root_mean_square, run_gap
 from tools.identify.ocean.files import corrected_text
 from tools.identify.ocean.identify import WORTH, parted_by
-from tools.inference.expansion import Expansion, expand
+from tools.identify.ocean.levels import find_levels, some_runs
+from tools.inference.expansion import expand
 from tools.inference.fit import bounded_step
 from tools.inference.parameters import NINETY
 from tools.inference.predict import fly_windows_from
 from tools.inference.problem import Problem, cut, problem_of
 from tools.inference.shared_model import fit_shared, heat_of
-from tools.inference.shared_parameters import SharedParameters, shared_parameters
+from tools.inference.shared_parameters import shared_parameters
 from tools.inference.steady import first_values
 from tools.watch.answer import CAUSE
-from tools.watch.events import STEP, Change, Joint, Span
 from tools.watch.watch import usable_runs
+from tools.watch.whole_left import Left, disturbed, water_disorder, what_is_left
+from tools.watch.whole_search import Model, Round, Sought, Whole, seek, whole_model
 
 ABSENT = 1e-6  # spreads: of an effect that is not asked for
 MOST_RUNS = 40
-SEED = 20261122
+SEED, DRAWS = 20261122, 4
 CORRECTED = "corrected.toml"
-Model = tuple[np.ndarray, np.ndarray]
 
 
 @dataclass
@@ -50,7 +53,7 @@ class OceanDiagnosis:
     case: Case
     runs: list[str]
     verdict: str
-    selected: str | None
+    selected: list[str]  # the main one first
     probabilities: dict[str, float]
     groups: dict[str, list[str]]
     sizes: dict[str, tuple[float, float, str, str]]  # by label: size, 1 sigma, unit, name of the parameter
@@ -62,6 +65,7 @@ class OceanDiagnosis:
     skipped: dict[str, str]
     model: Model
     allowed: list[str]  # what the vehicle file leaves so open that no effect beside it can be seen
+    left: Left | None  # what no label explains
 
 
 def diagnose_ocean(case: Case, say: Callable[[str], None] = lambda text: None) -> OceanDiagnosis:
@@ -77,52 +81,101 @@ def diagnose_ocean(case: Case, say: Callable[[str], None] = lambda text: None) -
     shared = replace(shared_parameters(problem), allowed=1.0, effects=ABSENT)
     heat = max(1.0, len(runs) / WORTH)
     x = fit_shared(parts, shared, first_values(problem, shared.free), heat)
+    identified = isinstance(case.vehicle, OceanVehicle) and case.vehicle.identified is not None
+    if not identified:  # its noise is any vehicle's
+        case = find_levels(case, problem_of(case, runs=some_runs(runs)), *shared.model(problem, x))
+        problem = problem_of(case, runs=runs)
+        parts = [problem.part(n) for n in range(len(runs))]
+        x = fit_shared(parts, shared, x, heat)
+    heat = max(heat, heat_of([expand(part, shared, x) for part in parts]))
+    start = whole_model(parts, shared, x, heat)
     say(f"{len(runs)} runs; what the vehicle file allows, fitted")
-    found = [expand(part, shared, x) for part in parts]
-    heat = max(heat, heat_of(found))
-    listed = Joint(shared, [one.cooled(heat) for one in found], []).changes([Span(0, len(runs), STEP)])
-    evidence = {one.label: one.evidence for one in listed}
-    by_label = {one.label: one for one in listed}
-    best = max(evidence, key=lambda label: evidence[label])
-    say(f"most evident: {best}, {evidence[best]:.1f} nat")
-    with_best, y = fitted_with(parts, shared, by_label[best], x, heat)
-    gaps = left_out_gaps(problem, parts, (shared, x), (with_best, y), found, heat)
-    matters = moves(gaps) >= problem.kind.matters
-    selected = best if evidence[best] >= EVIDENCE_NEEDED and matters else None
-    if selected is None:
-        gaps[AFTER] = gaps[RECALIBRATED]
-    alike = problem.kind.form_share * max(by_label[best].gain, 0.0)
-    near = {label: value + min(alike, evidence[best] - value) for label, value in evidence.items()}
-    odds = softmax({NONE: EVIDENCE_NEEDED if matters else EVIDENCE_NEEDED + max(near.values()), **near})
-    chances = {label: (1.0 - ERROR_RATE) * p for label, p in odds.items()} | {UNKNOWN: ERROR_RATE}
-    alike_group = problem.one_group if best in problem.one_group else ()
-    tied = sorted((n for n in near if near[best] - near[n] <= TIE), key=lambda n: -near[n])
-    group = [best, *(n for n in alike_group or tied if n != best)]
-    effects = problem.kind.catalogue()
-    where: dict[tuple[str, str], float] = {}
-    for label, chance in chances.items():
-        if label in effects:
-            where[effects[label].place] = where.get(effects[label].place, 0.0) + chance
-    places = [{"subsystem": s, "element": e, "probability": p} for (s, e), p in
-              sorted(where.items(), key=lambda item: -item[1])]  # fmt: skip
+    sought = seek(parts, start, heat)
+    gaps = left_out_gaps(problem, parts, start, sought.model, heat)
+    if not identified and closes(gaps) < problem.kind.matters:
+        sought.model, gaps = start, left_out_gaps(problem, parts, start, start, heat)
+    model, main = sought.model, sought.main
+    say(f"most evident: {main.best}, {main.evidence[main.best]:.1f} nat; {len(model.labels)} effects")
+    left = what_is_left(parts, problem, model, gaps[AFTER], gaps[FLOOR])
+    rough = rougher_water(problem, parts, start, model, heat, left, gaps)
+    chances, group = chances_of(problem, main, bool(model.labels), left.probability)
+    selected = sorted(model.labels, key=lambda label: label != main.best)
+    if rough is not None:
+        gaps[FLOOR], left = rough
+        chances, group = with_water(chances, left.probability), [VERTICAL_WATER]
+        selected = [VERTICAL_WATER, *selected]
+    unknown = left.probability > 0.5
+    verdict = UNKNOWN if unknown else CAUSE if selected else NONE
+    selected = [] if unknown else selected
     return OceanDiagnosis(
-        case, [run.name for run in runs], NONE if selected is None else CAUSE, selected, chances,
-        {} if selected is None else {best: group}, sizes(shared, listed, problem.kind.form), places, gaps,
-        *closings(gaps), evidence, skipped,
-        shared.model(problem, x) if selected is None else with_best.model(problem, y), open_numbers(problem),
+        case, [run.name for run in runs], verdict, selected, chances, {selected[0]: group} if selected else {},
+        sizes(sought, problem.kind.form), places(problem, chances, left if unknown else None), gaps, *closings(gaps),
+        main.evidence, skipped, model.shared.model(problem, model.x), open_numbers(problem), left if unknown else None,
     )  # fmt: skip
 
 
-def fitted_with(
-    parts: list[Problem], shared: SharedParameters, change: Change, x: np.ndarray, heat: float
-) -> tuple[SharedParameters, np.ndarray]:
-    """The model with an effect in all runs, fitted, from what its parabola promises."""
-    own = set(shared.labels[change.label])
-    free = [replace(one, label="") if k in own else one for k, one in enumerate(shared.free)]
-    asked = replace(shared, free=free)
-    y = x.copy()
-    y[shared.labels[change.label]] += change.size
-    return asked, fit_shared(parts, asked, np.clip(y, asked.low, asked.high), heat)
+def rougher_water(
+    problem: Problem, parts: list[Problem], start: Whole, model: Whole, heat: float, left: Left,
+    gaps: dict[str, list[RunGap]],
+) -> tuple[list[RunGap], Left] | None:
+    """The floor in water that is as rough as the readings ask for, and what is left then: where that is nothing, and
+    where the water explains nearly all that can be explained (as turbulence does, tools/diagnose/unknown.py).
+    """
+    if left.probability <= 0.5:
+        return None
+    found = water_disorder(problem, left.probed)
+    explained = 0.5 * heat * (start.cost - model.cost)
+    if found is None or found.gain < MOSTLY * (found.gain + explained):
+        return None
+    rng = np.random.default_rng(SEED)
+    models = [model.shared.model(part, x) for part, x in zip(parts, without_each(model, heat), strict=True)]
+    floor = [floor_of(part, one, disturbed(part, found), rng) for part, one in zip(parts, models, strict=True)]
+    then = what_is_left(parts, problem, model, gaps[AFTER], floor)
+    return None if then.probability > 0.5 else (floor, then)
+
+
+def with_water(chances: dict[str, float], unknown: float) -> dict[str, float]:
+    """Probabilities where rougher water is the main cause."""
+    others = {label: (1.0 - MOSTLY) * p for label, p in chances.items() if label != UNKNOWN}
+    unknown = max(unknown, ERROR_RATE)
+    rest = 1.0 - unknown
+    water = rest - sum(others.values())
+    return others | {VERTICAL_WATER: water, UNKNOWN: unknown}
+
+
+def chances_of(
+    problem: Problem, main: Round, there: bool, unknown: float
+) -> tuple[dict[str, float], list[str]]:
+    """Probabilities of the main cause, of none and of an unknown one, and the labels that are one with the best.
+
+    there: whether an effect was taken into the model.
+    """
+    best, evidence = main.best, main.evidence
+    alike = problem.kind.form_share * max(main.changes[best].gain, 0.0)
+    near = {label: value + min(alike, evidence[best] - value) for label, value in evidence.items()}
+    odds = softmax({NONE: EVIDENCE_NEEDED if there else EVIDENCE_NEEDED + max(near.values()), **near})
+    unknown = max(unknown, ERROR_RATE)
+    chances = {label: (1.0 - unknown) * p for label, p in odds.items()} | {UNKNOWN: unknown}
+    alike_group = problem.one_group if best in problem.one_group else ()
+    tied = sorted((n for n in near if near[best] - near[n] <= TIE), key=lambda n: -near[n])
+    return chances, [best, *(n for n in alike_group or tied if n != best)]
+
+
+def places(problem: Problem, chances: dict[str, float], left: Left | None) -> list[dict[str, Any]]:
+    """Where the cause is, by its labels; of an unknown one by the probes that gain, and where none does by the labels
+    that come nearest to it.
+    """
+    effects, where = problem.kind.catalogue(), dict[tuple[str, str], float]()
+    gains = [] if left is None else [(one.probe.subsystem, one.probe.element, one.gain) for one in left.probed]
+    if sum(gain for _, _, gain in gains) >= EVIDENCE_NEEDED:
+        weights = [((s, e), gain) for s, e, gain in gains if gain > 0.0]
+    else:
+        weights = [(effects[label].place, chance) for label, chance in chances.items() if label in effects]
+    whole = sum(weight for _, weight in weights) if left is not None else 1.0
+    for place, weight in weights:
+        where[place] = where.get(place, 0.0) + weight / max(whole, 1e-12)
+    return [{"subsystem": s, "element": e, "probability": p} for (s, e), p in
+            sorted(where.items(), key=lambda item: -item[1])]  # fmt: skip
 
 
 def open_numbers(problem: Problem) -> list[str]:
@@ -134,32 +187,37 @@ def open_numbers(problem: Problem) -> list[str]:
 
 
 def left_out_gaps(
-    problem: Problem, parts: list[Problem], plain: tuple[SharedParameters, np.ndarray],
-    more: tuple[SharedParameters, np.ndarray], found: list[Expansion], heat: float,
+    problem: Problem, parts: list[Problem], start: Whole, model: Whole, heat: float
 ) -> dict[str, list[RunGap]]:
     """Gaps by run: nominal, recalibrated and corrected without the run, and of simulated runs."""
     rng = np.random.default_rng(SEED)
-    about = [expand(part, more[0], more[1]) for part in parts]
-    steps = {RECALIBRATED: without_each(*plain, found, heat), AFTER: without_each(*more, about, heat)}
+    steps = {RECALIBRATED: without_each(start, heat), AFTER: without_each(model, heat)}
     gaps: dict[str, list[RunGap]] = {BEFORE: [], RECALIBRATED: [], AFTER: [], FLOOR: []}
     for n, part in enumerate(parts):
         models = {
-            BEFORE: (problem.model.P, plain[0].model(part, 0.0 * plain[1])[1]),
-            RECALIBRATED: plain[0].model(part, steps[RECALIBRATED][n]),
-            AFTER: more[0].model(part, steps[AFTER][n]),
+            BEFORE: (problem.model.P, start.shared.model(part, 0.0 * start.x)[1]),
+            RECALIBRATED: start.shared.model(part, steps[RECALIBRATED][n]),
+            AFTER: model.shared.model(part, steps[AFTER][n]),
         }
-        for name, model in models.items():
-            gaps[name].append(gap_of(part, model))
-        model = models[AFTER]
-        z = part.simulated(*model, part.filter(*model).X[:1].copy(), rng)
-        gaps[FLOOR].append(gap_of(replace(part, z=np.where(part.valid, z, np.nan)), model, z))
+        for name, one in models.items():
+            gaps[name].append(gap_of(part, one))
+        gaps[FLOOR].append(floor_of(part, models[AFTER], part, rng))
     return gaps
 
 
-def without_each(
-    shared: SharedParameters, x: np.ndarray, found: list[Expansion], heat: float
-) -> list[np.ndarray]:
+def floor_of(part: Problem, model: Model, noisy: Problem, rng: np.random.Generator) -> RunGap:
+    """A run's gap to the model that is true of it, over DRAWS simulated runs of the noise that `noisy` knows of."""
+    drawn = []
+    for _ in range(DRAWS):
+        z = noisy.simulated(*model, part.filter(*model).X[:1].copy(), rng)
+        drawn.append(gap_of(replace(part, z=np.where(part.valid, z, np.nan)), model, z))
+    channels = case_channels(drawn)
+    return replace(drawn[0], channels=channels, total=root_mean_square(channels.values()))
+
+
+def without_each(model: Whole, heat: float) -> list[np.ndarray]:
     """Values fitted without each run, to first order; of a single run those fitted to it."""
+    shared, x, found = model.shared, model.x, model.about
     if len(found) == 1:
         return [x]
     prior = np.diag(shared.prior**-2.0)
@@ -179,8 +237,11 @@ def gap_of(part: Problem, model: Model, z: np.ndarray | None = None) -> RunGap:
     return run_gap(part.kind.measures, part.runs[0], Y, cut(part).listed[0], z)
 
 
-def moves(gaps: dict[str, list[RunGap]]) -> float:
-    """By how much the effect closes a channel's gap on left-out runs at most: root of the difference of squares."""
+def closes(gaps: dict[str, list[RunGap]]) -> float:
+    """By how much the effects close a channel's gap on left-out runs at most: root of the difference of squares.
+
+    Asked for where the vehicle was not identified: a file of any such vehicle says too little of one to hold it to.
+    """
     before, after = by_channel(gaps[RECALIBRATED]), by_channel(gaps[AFTER])
     return float(np.sqrt(max([0.0, *(before[name] ** 2 - after[name] ** 2 for name in after if name in before)])))
 
@@ -191,12 +252,14 @@ def closings(gaps: dict[str, list[RunGap]]) -> tuple[tuple[float, float, float],
     return (found.shrinkage, *found.ci90), (found.closed, *found.closed_ci90)
 
 
-def sizes(shared: SharedParameters, listed: list[Change], form: float) -> dict[str, tuple[float, float, str, str]]:
-    """Each label's size alone, SI."""
-    found = {}
-    for one in listed:
-        free = shared.free[shared.labels[one.label][0]]
-        value = float(one.size[0]) * free.spread
+def sizes(sought: Sought, form: float) -> dict[str, tuple[float, float, str, str]]:
+    """Each label's size, SI: of those of the model by its fit, of others alone, as their parabola has it."""
+    found, model = {}, sought.model
+    for one in sought.main.changes.values():
+        columns = model.shared.labels[one.label]
+        free = model.shared.free[columns[0]]
+        size = model.x[columns] if one.label in model.labels else one.size
+        value = float(size[0]) * free.spread
         sigma = float(np.sqrt(np.linalg.inv(one.precision)[0, 0])) * free.spread
         found[one.label] = value, float(np.hypot(sigma, form * value)), free.unit, free.name
     return found
@@ -215,7 +278,7 @@ def plain(found: OceanDiagnosis) -> dict[str, Any]:
     table: dict[str, Any] = {name: by_channel(found.gaps[name]) for name in (BEFORE, RECALIBRATED, AFTER, FLOOR)}
     for name, value in (("shrinkage", found.shrinkage), ("closed", found.closed)):
         table[name] = {"value": value[0], "ci90": list(value[1:])}
-    group = found.groups.get(found.selected or "", [])
+    group = found.groups.get(found.selected[0], []) if found.selected else []
     told = parted_by(GROUP_NAMES.get(label, label) for label in group)
     return {
         "format": 1,
@@ -224,18 +287,20 @@ def plain(found: OceanDiagnosis) -> dict[str, Any]:
         "verdict": found.verdict,
         "where": found.where,
         "causes": causes,
-        "selected": [] if found.selected is None else [found.selected],
+        "selected": found.selected,
         "gap": table,
         "next_run": {"text": told} if told else {},
         "readings": [],
         "stages": [
             {"stage": "nominal", "gap": table[BEFORE]}, {"stage": "recalibrated", "gap": table[RECALIBRATED]},
-            *([] if found.selected is None else [{"stage": f"+ {found.selected}", "gap": table[AFTER]}]),
+            *([{"stage": "".join(f"+ {one} " for one in found.selected).strip(), "gap": table[AFTER]}]
+              if found.selected else []),
         ],
         "cautions": cautions(found),
         "not_asked": NOT_ASKED,
         "skipped": found.skipped,
         "evidence": found.evidence,
+        "left": None if found.left is None else found.left.plain(),
     }  # fmt: skip
 
 
@@ -251,6 +316,8 @@ def cautions(found: OceanDiagnosis) -> list[str]:
             f"the vehicle file leaves {', '.join(found.allowed)} open: what they can make up for is no effect here; "
             "identify the vehicle first (glider identify), and ask for what changed (glider gap watch)"
         )
+    if found.left is not None:
+        told.append(found.left.sentence)
     if len(found.runs) == 1:
         told.append("one run only: nothing is left out, the gaps are those of runs that were fitted")
     return told

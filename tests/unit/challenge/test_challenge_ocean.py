@@ -7,6 +7,7 @@ import pytest
 
 from tools.cli.common import report_errors
 from tools.cli.main import cli
+from tools.data.errors import InputError
 from tools.data.runs import columns as names
 from tools.data.runs.case import load_case
 from tools.study.challenge.diagnose_all import MISSION, commands
@@ -14,7 +15,7 @@ from tools.study.challenge.make import make
 from tools.study.challenge.ocean_cases import example_mission
 from tools.study.challenge.ocean_make import OceanOrder
 from tools.study.challenge.ocean_plan import CHANGES, CRAFTS, LIFT_SHOWS, MISSIONS, ocean_plan
-from tools.study.challenge.ocean_score import NEEDED_OF_A_MISSION, judge_missions, score_missions
+from tools.study.challenge.ocean_score import NEEDED_OF_A_MISSION, judge_missions, score_missions, speeds_held
 from tools.study.challenge.seal import open_answers
 from tools.study.challenge.watch_answer import read_watch
 from tools.study.challenge.watch_plan import CHANGED, EPISODE, GROWING, STEP, WatchCounts
@@ -82,6 +83,22 @@ def test_velocity_is_held_to_the_truth(made, tmp_path):
         found = next(figure for figure in score.figures if figure.key == "velocity")
         quiet = sum(not changed for case in score.cases for changed in case.changed)
         assert (found.value, found.of) == (held, quiet)
+
+
+def test_what_is_said_of_a_dives_mean_counts_before_its_rows(made, tmp_path):
+    answer(tmp_path, made, "case000", 1.5)  # within the rows' interval
+    truth = open_answers(made.archive, NEEDED_OF_A_MISSION).cases["case000"]
+    case = Watched("case000", truth, read_watch(tmp_path / "case000" / "watch.json"))
+    folder = tmp_path / "case000" / "velocity"
+    quiet = [f"run{n:02d}" for n, changed in enumerate(case.changed) if not changed]
+    means = {name: np.mean(truth["horizontal_mm_s"][int(name[3:])]) / 1e3 for name in quiet}
+    for width in (-1e-3, 1e-3):
+        told = {name: {"u_m_s": mean, "ci90": [mean - width, mean + width]} for name, mean in means.items()}
+        (folder / "velocity.json").write_text(json.dumps({"runs": told}))
+        assert speeds_held(case, folder) == [width > 0.0] * len(quiet)
+    (folder / "velocity.json").write_text('{"runs": 1}')
+    with pytest.raises(InputError, match=r"velocity\.json"):
+        speeds_held(case, folder)
 
 
 def test_scored_by_the_command(made, tmp_path, monkeypatch, capsys):

@@ -14,11 +14,13 @@ from tools.data.errors import InputError
 from tools.data.runs import columns as names
 from tools.data.runs.case import load_case, write_case
 from tools.data.runs.run import Run, load_run, write_run
-from tools.gap.velocity import COLUMNS, directions, velocities
+from tools.gap.velocity import COLUMNS, MEANS, OUT_OF_MODEL, directions, mean_speed, of_run, velocities
 from tools.identify.ocean.files import vehicle_text
 from tools.identify.ocean.identify import identify_ocean
 from tools.inference.model import nominal_model
 from tools.inference.ocean_inputs import unsteady
+from tools.inference.parameters import NINETY
+from tools.inference.problem import problem_of
 
 DIVES, EVERY = 6, 60.0
 
@@ -52,6 +54,38 @@ def test_it_is_close_to_the_true_speed(mission):
     assert np.sqrt(np.mean(missed**2)) < (0.015 if mission[3] else 0.03)
     assert np.mean(np.abs(missed) < 2.5 * sd) > 0.9
     assert np.sqrt(np.mean(missed**2)) > 0.15 * np.mean(sd)  # nor is it said to be far worse than it is
+
+
+def test_the_mean_of_a_dive_is_surer_than_its_rows(mission):
+    dives, case, found, speed = mission
+    missed, sd = [], []
+    for run, true, one in zip(case.runs, dives.truth, found, strict=True):
+        rows, said = one.steady, mean_speed(one)
+        missed.append(said["u_m_s"] - np.interp(run.t, EVERY * np.arange(len(true)), true)[rows].mean())
+        sd.append((said["ci90"][1] - said["u_m_s"]) / NINETY)
+        assert sd[-1] == pytest.approx(one.sd_mean_u)
+        assert sd[-1] < one.columns["sd_u_m_s"][rows].mean()
+    assert np.abs(missed).max() < 2.5 * np.mean(sd)
+    assert np.mean(sd) < (0.008 if speed else 0.02)
+
+
+def test_a_weight_is_next_to_none_of_a_dives_mean(mission):
+    problem = problem_of(mission[1])
+    heavy = problem.model.P.copy()
+    heavy[at.MASS] += 0.02
+    one = of_run(problem.part(1), (problem.model.P, np.zeros(at.N_F)), [(heavy, np.zeros(at.N_F))])
+    bare = of_run(problem.part(1), (problem.model.P, np.zeros(at.N_F)), [])
+    rows = np.sqrt(one.columns["sd_u_m_s"] ** 2 - bare.columns["sd_u_m_s"] ** 2)[one.steady].mean()
+    assert rows > 0.005
+    assert np.sqrt(one.sd_mean_u**2 - bare.sd_mean_u**2) < 0.3 * rows  # down faster, up slower
+
+
+def test_where_nothing_is_steady_the_mean_is_no_models(mission):
+    problem = problem_of(mission[1]).part(0)
+    problem.recording.inputs[:, at.U_UNSTEADY] = 1.0
+    one = of_run(problem, (problem.model.P, np.zeros(at.N_F)), [])
+    assert one.sd_mean_u == OUT_OF_MODEL
+    assert mean_speed(one)["u_m_s"] == pytest.approx(one.columns["u_m_s"].mean())
 
 
 def test_a_speed_that_was_measured_makes_it_surer(mission):
@@ -116,6 +150,8 @@ def test_a_file_for_each_run(mission, tmp_path, monkeypatch, capsys):
     code, told, _ = glider(monkeypatch, capsys, "gap", "velocity", case.folder, "--model", case.vehicle_name, "--out",
                            out, "--json")  # fmt: skip
     assert code == 0
+    means = json.loads((out / MEANS).read_text())["runs"]
+    assert means == {run.name: mean_speed(one) for run, one in zip(case.runs, found, strict=True)}
     assert [out / f"{run.name}.csv" for run in case.runs] == [type(out)(name) for name in json.loads(told)["files"]]
     for run, one in zip(case.runs, found, strict=True):
         lines = (out / f"{run.name}.csv").read_text().splitlines()

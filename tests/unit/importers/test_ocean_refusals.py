@@ -3,11 +3,15 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.support import ocean_files
 from tests.support.commands import glider
 from tests.support.ocean_files import START, flight
+from tools.data.errors import InputError
+from tools.data.importers.ocean import netcdf
+from tools.data.importers.ocean.og1 import read_og1
 
 
 def refused(kind: str, files: list[Path], out: Path, *more: object) -> str:
@@ -58,6 +62,35 @@ def test_an_empty_a_cut_and_a_missing_file(tmp_path, kind):
         assert "is empty" in refused(kind, files, tmp_path / "case")
         files[n].unlink()
         assert "no such file" in refused(kind, files, tmp_path / "case")
+
+
+def lengthened(path: Path) -> Path:
+    """The file with one byte wrong: a text in HDF5's heap is said to be longer than it is, and the heap has no end."""
+    text = b"sg077"
+    whole = bytearray(path.read_bytes())
+    whole[whole.index(len(text).to_bytes(8, "little") + text)] = 100
+    path.write_bytes(whole)
+    return path
+
+
+def test_a_file_that_hdf5_does_not_come_to_an_end_with(tmp_path, monkeypatch):
+    path = lengthened(ocean_files.og1(tmp_path / "mission.nc", [flight()]))
+    monkeypatch.setattr(netcdf, "TRIAL_S", 1.0)
+    with pytest.raises(InputError) as error:
+        netcdf.NetCDF(path)
+    assert str(error.value) == f"{path}: cut or damaged: not read after 1 s"
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_bytes_overwritten_in_the_middle(tmp_path, seed):
+    path = ocean_files.og1(tmp_path / "mission.nc", [flight()])
+    whole = path.read_bytes()
+    first, behind = len(whole) // 4, len(whole) // 2
+    path.write_bytes(whole[:first] + np.random.default_rng(seed).bytes(behind - first) + whole[behind:])
+    with pytest.raises(InputError) as error:
+        read_og1(path, None)
+    assert str(error.value).startswith(f"{path}: ")
+    assert len(str(error.value).splitlines()) == 1
 
 
 @pytest.mark.parametrize("kind", WRITERS)

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from hal.strict import ConfigError
+from tools.cli.common import report_errors
+from tools.cli.main import cli
 from tools.data.errors import InputError
 from tools.data.runs.case import CASE_FILE, SensorsPart, load_case, load_case_of_run, load_runs, write_case
 from tools.data.runs.run import Run
@@ -157,3 +159,20 @@ def test_a_case_of_many_runs_numbers_them_all_with_as_many_digits(tmp_path):
     assert [run.columns["pitch_rad"][1] for run in load_case(tmp_path / "c").runs] == [n / 1000 for n in range(101)]
     table, again = load_runs(tmp_path / "c")
     assert (table.vehicle, len(again)) == ("roughie", 101)
+
+
+@pytest.mark.parametrize("asked", [("gap", "measure"), ("gap", "watch"), ("identify",)], ids=" ".join)
+def test_an_ocean_gliders_runs_are_not_read_as_anothers(tmp_path, monkeypatch, capsys, asked):
+    columns = {name: np.ones(3) for name in ("oil_m3", "density_kg_m3", "pitch_rad", "depth_m")}
+    write_case(tmp_path / "case", [Run("x", None, {"t_s": np.arange(3.0)} | columns)], **FACTS | {"vehicle": "slocum"})
+    assert load_case(tmp_path / "case").vehicle.kind == "ocean"
+    out = ("--out", str(tmp_path / "out")) if asked == ("identify",) else ()
+    monkeypatch.setattr("sys.argv", ["glider", *asked, str(tmp_path / "case"), "--vehicle", "roughie", *out])
+    assert report_errors(cli) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert len(said.err.splitlines()) == 1
+    assert "roughie is no ocean glider, run00 is an ocean glider's (oil_m3)" in said.err
+    _edit(tmp_path / "case", '"slocum"', '"roughie"')
+    with pytest.raises(InputError, match="name its vehicle"):
+        load_case(tmp_path / "case")

@@ -12,6 +12,7 @@ from firmware.model.vehicle import Assumed, DisturbanceTable, NonNegative, Senso
 from hal.strict import MAX_BYTES, Table, decode
 from sim_backend.ocean.vehicle import OceanVehicle
 from tools.data.errors import InputError
+from tools.data.runs import columns as names
 from tools.data.runs import csvfile
 from tools.data.runs.run import Run, load_run, run_name, write_run
 from tools.data.sources import load_any_vehicle, read_text
@@ -111,6 +112,8 @@ def _read_case_file(folder: Path) -> CaseTable:
 
 def _assemble(folder: Path, table: CaseTable, runs: list[Run], instead: str | None) -> Case:
     vehicle = load_any_vehicle(table.vehicle, folder) if instead is None else load_any_vehicle(instead)
+    if not isinstance(vehicle, OceanVehicle):
+        _refuse_ocean(folder, runs, table.vehicle if instead is None else instead)
     return Case(
         folder=folder,
         vehicle=vehicle,
@@ -124,6 +127,14 @@ def _assemble(folder: Path, table: CaseTable, runs: list[Run], instead: str | No
         disturbance=_replaced(vehicle.disturbance, table.disturbance),
         assumed={**vehicle.assumed, **table.assumed},
     )
+
+
+def _refuse_ocean(folder: Path, runs: list[Run], vehicle: str) -> None:
+    """InputError where a run is an ocean glider's, which the vehicle is not: only those have the volume of oil."""
+    for run in runs:
+        if names.OIL in run.columns:
+            message = f"{vehicle} is no ocean glider, {run.name} is an ocean glider's ({names.OIL}): name its vehicle"
+            raise InputError(message, source=folder, column="vehicle")
 
 
 def _given(part: Table | None) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from sim_backend.ocean.vehicle import PLACES, UNITS
 from tools.data.errors import InputError
 from tools.data.runs.case import Case
 from tools.data.runs.run import Run
-from tools.identify.ocean.levels import find_levels
+from tools.identify.ocean.levels import find_levels, some_runs
 from tools.inference.expansion import Expansion, expand
 from tools.inference.ocean_inputs import lacking, steady_seconds
 from tools.inference.parameters import NINETY, FreeParameter, nuisance_parameters
@@ -24,7 +24,6 @@ from tools.inference.shared_parameters import SharedParameters
 from tools.inference.steady import first_values, steady_rows, vertical_water
 
 MOST_RUNS = 24  # of the mission's first: drag creeps after that
-LEVEL_RUNS = 6
 # Dives that all of them are worth together: what the form of the model misses (a cell that lags in the thermocline, a
 # hull that warms late) is the same in every dive, and no number of them makes it smaller.
 WORTH = 3.0
@@ -136,12 +135,11 @@ def identify_ocean(case: Case, say: Callable[[str], None] = lambda text: None) -
     x = first_values(problem, free)
     say(f"{len(runs)} runs, {len(problem.z)} rows; a first guess of volume and drag")
     shared, heat = SharedParameters(free, {}, {}, 1.0), max(1.0, len(runs) / WORTH)
-    levels_from = [runs[k] for k in np.unique(np.linspace(0, len(runs) - 1, LEVEL_RUNS).astype(int))]
     for _ in range(ROUNDS):
         parts = [problem.part(k) for k in range(len(runs))]
         x = fit_shared(parts, shared, x, heat)
         P, F = shared.model(problem, x)
-        case = find_levels(case, problem_of(case, runs=levels_from), P, F)
+        case = find_levels(case, problem_of(case, runs=some_runs(runs)), P, F)
         problem = problem_of(case, runs=runs)
         say(f"vertical water {100.0 * case.disturbance.water:.2f} cm/s over {case.disturbance.water_time:.0f} s")
     parts = [problem.part(k) for k in range(len(runs))]

@@ -13,9 +13,11 @@ from scipy.optimize import minimize
 from sim_backend.ocean.core import layout as at
 from sim_backend.ocean.vehicle import OceanVehicle
 from tools.data.runs.case import Case
+from tools.data.runs.run import Run
 from tools.inference.levels import as_said
 from tools.inference.problem import Problem
 
+LEVEL_RUNS = 6  # of a mission: their noise is all dives'
 WIDTH = 2.0  # e-folds, prior 1 sigma of each
 STEP = 0.4  # e-folds, of the first simplex
 TRIES = 90  # filters of a search
@@ -26,6 +28,11 @@ SPEED = ("speed_noise", "velocity_noise", "speed")
 # and taken for water would hide it.
 BOUNDS = {"water": (0.001, 0.02), "water_time": (60.0, 600.0), "roll_time": (10.0, 3600.0)}
 READING = {"depth": "depth", "roll_noise": "roll", "speed_noise": "speed", "velocity_noise": "velocity"}
+
+
+def some_runs(runs: list[Run]) -> list[Run]:
+    """Those of a mission's runs from which its noise is found."""
+    return [runs[k] for k in np.unique(np.linspace(0, len(runs) - 1, LEVEL_RUNS).astype(int))]
 
 
 def with_levels(case: Case, logs: dict[str, float]) -> Case:

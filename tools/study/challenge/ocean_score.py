@@ -4,12 +4,14 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from tools.data.errors import InputError
 from tools.data.runs import columns as names
 from tools.data.runs.csvfile import read_table
-from tools.study.challenge.watch_answer import VELOCITY
+from tools.data.runs.run import run_name
+from tools.study.challenge.watch_answer import MEANS, VELOCITY
 from tools.study.challenge.watch_plan import CHANGED
 from tools.study.challenge.watch_score import NEEDED, Watched, WatchScore, gather_watches, score_watches, share
 
@@ -35,25 +37,54 @@ def grouped(case: Watched) -> bool | None:
     return {case.main.label, *case.main.group} >= ON_DEPTH_ALONE
 
 
+class MeanSaid(msgspec.Struct):
+    """Of a dive's mean horizontal speed, m/s."""
+
+    u_m_s: float
+    ci90: tuple[float, float]
+
+
+class MeansSaid(msgspec.Struct):
+    """A velocity.json."""
+
+    runs: dict[str, MeanSaid] = {}
+
+
 def speeds_held(case: Watched, folder: Path) -> list[bool]:
     """Of each watched dive without a change, whether its mean true horizontal speed is within the 90 % interval."""
-    held = []
+    held, means = [], _means_said(folder / MEANS)
     for n, true in enumerate(case.truth["horizontal_mm_s"]):
         if case.changed[n]:
             continue
         files = sorted(folder.glob(f"run{n:02d}*.csv*")) + sorted(folder.glob(f"run{n:03d}*.csv*"))
         if not files:
             raise InputError(f"no velocity of run {n}", source=folder)
-        held.append(_mean_held(files[0], 1e-3 * np.array(true), float(case.truth["every_s"])))
+        said = means.get(run_name(files[0]))
+        held.append(_mean_held(files[0], 1e-3 * np.array(true), float(case.truth["every_s"]), said))
     return held
 
 
-def _mean_held(path: Path, true: np.ndarray, every: float) -> bool:
-    """Whether the mean of true speeds, one every so many s, is in that of a velocity file, where it is modelled."""
+def _means_said(path: Path) -> dict[str, MeanSaid]:
+    """The means of dives that were answered, none where there is no such file; InputError where it is another."""
+    if not path.is_file():
+        return {}
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=MeansSaid).runs
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise InputError(str(error), source=path) from None
+
+
+def _mean_held(path: Path, true: np.ndarray, every: float, said: MeanSaid | None) -> bool:
+    """Whether the mean of true speeds, one every so many s, where a velocity file is modelled, is in its interval.
+
+    That is the one said of the mean; where nothing is said of it, 1.645 mean standard deviations of the rows.
+    """
     table = read_table(path)
     t, u, sd = (table.numbers(name) for name in (names.TIME, "u_m_s", "sd_u_m_s"))
     good = np.isfinite(sd) & (sd < MODELLED)
     at = np.interp(t[good], every * np.arange(len(true)), true)
+    if said is not None:
+        return bool(said.ci90[0] <= np.mean(at) <= said.ci90[1])
     miss = float(np.mean(u[good] - at))
     return abs(miss) <= NINETY * float(np.mean(sd[good]))
 

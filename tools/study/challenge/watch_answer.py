@@ -11,6 +11,7 @@ from tools.study.challenge.diagnosis import MAX_BYTES, Probability
 WATCH_FILE = "watch.json"
 REFERENCE = "reference"  # the folder of the runs before anything changed
 IDENTIFIED, VELOCITY = "identified", "velocity"  # folders of a mission's vehicle and of its velocity
+MEANS = "velocity.json"  # in that: each dive's mean
 
 
 class RunCause(msgspec.Struct):

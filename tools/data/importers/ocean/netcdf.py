@@ -1,16 +1,23 @@
 """NetCDF files, classic and of version 4, as variables with strict units."""
 
+import signal
 import struct
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tools.data.errors import InputError
+from tools.data.importers.ocean import netcdf_trial
 from tools.data.importers.ocean.netcdf_classic import classic_size
 from tools.data.importers.ocean.segment import require_unit
 
 LARGEST = 4_000_000_000
+# s of computing, and one more for so many bytes, after which a file of version 4 is taken for damaged; times that on a
+# clock, where the machine is busy.
+TRIAL_S, PACKED, PATIENCE = 20.0, 5e6, 30.0
 MAX_HEADER = 16_000_000
 CLASSIC, HDF5 = b"CDF", b"\x89HDF\r\n\x1a\n"
 METRES = dict.fromkeys(("m", "meters", "metres", "meter", "metre"), 1.0)
@@ -108,13 +115,34 @@ def _opened(path: Path) -> Any:
         _check_whole(path, size)
     try:
         if engine == "h5netcdf":
+            _try_whole(path, size)
             _walk(path)
         with xarray.open_dataset(path, engine=engine, decode_times=False, decode_timedelta=False) as dataset:
             return dataset.load()
+    except InputError:
+        raise
     # What the libraries raise on damage is not said by them: OSError, ValueError, struct.error, KeyError, TypeError.
     except Exception as error:
         what = (str(error) or repr(error)).splitlines()[0].strip("'\"")
         raise InputError(f"cut or damaged: {what}", source=path) from None
+
+
+def _try_whole(path: Path, size: int) -> None:
+    """InputError where HDF5 does not come to an end with a file, or falls over it: it is read by another process first.
+
+    One byte that is wrong may be enough (a length in the heap of texts). What is raised there is raised here again.
+    """
+    seconds = int(TRIAL_S + size / PACKED)
+    command = [sys.executable, "-m", netcdf_trial.__name__, str(path), str(seconds)]
+    quiet = subprocess.DEVNULL
+    try:
+        ended = subprocess.run(command, stdin=quiet, stdout=quiet, stderr=quiet, timeout=PATIENCE * seconds).returncode
+    except subprocess.TimeoutExpired:
+        ended = -signal.SIGKILL
+    if ended in (-signal.SIGKILL, -signal.SIGXCPU):
+        raise InputError(f"cut or damaged: not read after {seconds} s", source=path)
+    if ended < 0:
+        raise InputError("cut or damaged: HDF5 falls over it", source=path)
 
 
 def _walk(path: Path) -> None:

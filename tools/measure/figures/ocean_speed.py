@@ -1,0 +1,92 @@
+"""How well an ocean glider's mean speed is known: twin missions, identified and asked (docs/OCEAN.md, Velocity).
+
+    python -m tools.measure.figures.ocean_speed --seed 90731 --missions 12
+"""
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import click
+import numpy as np
+
+from tools.data.runs.case import load_case
+from tools.gap.velocity import Velocity, velocities
+from tools.identify.ocean.files import vehicle_text
+from tools.identify.ocean.identify import identify_ocean
+from tools.inference.model import nominal_model
+from tools.inference.parameters import NINETY
+from tools.study.challenge.ocean_cases import TRUTH_EVERY, draw_case, write_dives
+from tools.study.challenge.ocean_plan import CRAFTS, MissionPlan
+from tools.study.challenge.watch_plan import UNCHANGED, WatchCounts
+
+LEARNED, ASKED = 12, 8  # dives
+CM = 100.0
+
+
+@dataclass
+class Asked:
+    """Of one mission's dives, m/s: error of the mean speed, what is said of it, and of its rows, all 1 sigma."""
+
+    speed: bool
+    errors: np.ndarray
+    said: np.ndarray
+    rows: np.ndarray
+
+
+def asked(seed: int, number: int, folder: Path) -> Asked:
+    """A mission drawn, identified from its first dives, and asked for the speed of the others."""
+    plan = MissionPlan(
+        number, UNCHANGED, None, None, None, None, False, CRAFTS[number % 3], (number // 3) % 2 == 1
+    )
+    made = draw_case(seed, plan, WatchCounts(1, 1, LEARNED + ASKED, LEARNED))
+    write_dives(folder / "before", plan.craft, made.runs[:LEARNED])
+    write_dives(folder / "asked", plan.craft, made.runs[LEARNED:])
+    vehicle = folder / "identified.toml"
+    vehicle.write_text(vehicle_text(identify_ocean(load_case(folder / "before"))), encoding="utf-8")
+    case = load_case(folder / "asked", str(vehicle))
+    found = velocities(case, nominal_model(case))
+    errors = [mean_error(one, true) for one, true in zip(found, made.truth[LEARNED:], strict=True)]
+    rows = [one.columns["sd_u_m_s"][one.steady].mean() for one in found]
+    return Asked(plan.speed, np.array(errors), np.array([one.sd_mean_u for one in found]), np.array(rows))
+
+
+def mean_error(found: Velocity, true: np.ndarray) -> float:
+    """Mean horizontal speed found less the true one (every TRUTH_EVERY s), where the vehicle flies steadily, m/s."""
+    at_rows = np.interp(found.run.t, TRUTH_EVERY * np.arange(len(true)), true)
+    return float((found.columns["u_m_s"] - at_rows)[found.steady].mean())
+
+
+def summary(missions: list[Asked]) -> str:
+    """A line: root mean squares over missions in cm/s, z of missions, dives within their 90 % intervals."""
+    means = np.array([one.errors.mean() for one in missions])
+    said, rows = (np.array([getattr(one, name).mean() for one in missions]) for name in ("said", "rows"))
+    within = float(np.sqrt(np.mean([one.errors.var(ddof=1) for one in missions])))
+    held = np.concatenate([np.abs(one.errors) <= NINETY * one.said for one in missions])
+    rms = [CM * float(np.sqrt(np.mean(values**2))) for values in (means, said, rows)]
+    z = means / said
+    return (
+        f"{len(missions)} missions: error {rms[0]:.2f}, said of the mean {rms[1]:.2f}, of rows {rms[2]:.2f} cm/s; "
+        f"z {np.sqrt(np.mean(z**2)):.2f}, farthest {np.abs(z).max():.2f}; dives differ by {CM * within:.3f} cm/s; "
+        f"held {100.0 * held.mean():.0f} % of {len(held)} dives"
+    )
+
+
+@click.command()
+@click.option("--seed", required=True, type=click.IntRange(0, 2**63 - 1))
+@click.option("--missions", default=12, show_default=True, type=click.IntRange(1, 1000))
+def main(seed: int, missions: int) -> None:
+    """Crafts in turn, three missions without a speed log, three with, and so on."""
+    found = []
+    for number in range(missions):
+        with tempfile.TemporaryDirectory() as folder:
+            found.append(asked(seed, number, Path(folder)))
+        error, said = (CM * values.mean() for values in (found[-1].errors, found[-1].said))
+        click.echo(f"{number} {CRAFTS[number % 3]}: {error:.2f} of {said:.2f}", err=True)
+    for name, speed in (("depth alone", False), ("with speed", True)):
+        if any(one.speed == speed for one in found):
+            click.echo(f"{name}, {summary([one for one in found if one.speed == speed])}")
+
+
+if __name__ == "__main__":
+    main()
