@@ -192,10 +192,12 @@ def probability_unknown(
         return 1.0 - MORE_UNKNOWN if unfit else LEAST_UNKNOWN
     if shrinkage.after > UNFIT:
         return 1.0 - MORE_UNKNOWN
+    wide = probability(left_floors(shrinkage), WIDE, WIDE_WIDTH)
     if noise:
         disordered = probability(left.share, NOISY, NOISY_WIDTH)
+        if noise.probe.name == CLOCK:  # it moves no vehicle: windows say as much as with a clock that is right
+            return wide * disordered
         return max(disordered, beside_a_sea(shrinkage, left, noise)) if noise.probe.name == WAVES else disordered
-    wide = probability(left_floors(shrinkage), WIDE, WIDE_WIDTH)
     if not evident:
         return wide
     shares = (

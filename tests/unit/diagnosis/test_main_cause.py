@@ -7,6 +7,7 @@ import pytest
 from support.cases import make_case
 
 from sim_backend.core.effects import effect_layout as ef
+from tools.diagnose.noise_probes import CLOCK, NoiseProbe, ProbeResult
 from tools.diagnose.record import NONE
 from tools.diagnose.search import run
 from tools.diagnose.shrink import in_tolerances, lacking_squares, most_often
@@ -77,13 +78,13 @@ def test_a_large_effect_stays_sure():
     assert doubt_small({"drag": 0.99, NONE: 0.01}, "drag", 4.0)["drag"] > 0.98
 
 
-def shrinkage(after: float, floor: float = 0.15, recalibrated: float = 1.0) -> SimpleNamespace:
-    return SimpleNamespace(after=after, floor=floor, recalibrated=recalibrated)
+def shrinkage(after: float, floor: float = 0.15, recalibrated: float = 1.0, before: float = 1.0) -> SimpleNamespace:
+    return SimpleNamespace(before=before, after=after, floor=floor, recalibrated=recalibrated)
 
 
-def unknown(after: float, left: float, explained: float, evident: bool = True, taken: float = 9.0) -> float:
+def unknown(after: float, left: float, explained: float, evident: bool = True, taken: float = 9.0, noise=None) -> float:
     search = SimpleNamespace(problem=SimpleNamespace(rules=SimpleNamespace(whiteness=True)))
-    return probability_unknown(search, True, evident, shrinkage(after), Remainder(explained, left, []), None, taken)
+    return probability_unknown(search, True, evident, shrinkage(after), Remainder(explained, left, []), noise, taken)
 
 
 def test_what_leaves_next_to_no_gap_is_not_unknown_however_many_nat_it_has():
@@ -102,6 +103,17 @@ def test_a_wide_gap_is_unknown_where_a_sensor_s_small_error_has_nearly_all_the_n
 def test_what_is_wider_than_the_effects_themselves_is_unknown_however_wrong_the_recalibrated_model_is():
     assert left_share(shrinkage(1.2, recalibrated=3.3), taken=0.09) > 0.9
     assert left_share(shrinkage(1.2, recalibrated=3.3), taken=9.0) < 0.2
+
+
+def test_what_the_allowed_parameters_take_up_of_a_large_effect_is_its_own():
+    assert left_share(shrinkage(0.5, recalibrated=0.8, before=2.5), taken=9.0) < 0.1
+    assert left_share(shrinkage(0.5, recalibrated=0.8, before=0.9), taken=9.0) > 0.25
+
+
+def test_beside_a_wandering_clock_what_leaves_no_gap_is_not_unknown():
+    clock = ProbeResult(NoiseProbe(CLOCK, "sensor", "timing", "mocap"), 5e4, 6.0)
+    assert unknown(after=0.2, left=3e4, explained=5e4, noise=clock) < 0.05
+    assert unknown(after=0.9, left=3e4, explained=5e4, noise=clock) > 0.5
 
 
 def test_as_likely_as_not_at_the_width_that_small_effects_leave():
