@@ -41,7 +41,7 @@ from firmware.model.vehicle import decode_vehicle
 SIGMA = parameter_sigma(P, decode_vehicle(VEHICLE_TEXT, "roughie").uncertainty)
 STEP = 0.004  # s, of the flights with ideal actuators
 HELD = 2e-4  # rad/s, m/s: what s may do beside the equations while the actuators are held for a step
-few = settings(repeatable, max_examples=6, phases=[Phase.generate])
+few = settings(repeatable, max_examples=12, phases=[Phase.generate])
 
 
 # --- ideal actuators: V falls outside the layer, the layer is reached and kept ----------------------------------------
