@@ -25,7 +25,7 @@ NOISY, NOISY_WIDTH = 0.2, 0.8  # share of the explainable misfit that is left: d
 UNFIT = 5.0  # tolerances that the best explanation still misses by: no effect of the catalogue does that
 LOOSE = 3.0  # times the floor, and one tolerance, that no vehicle without a gap is off
 ONE_AXIS = 0.65  # of what all axes bring together: where one alone brings as much, it is no turbulence
-MOSTLY = 0.9  # of all that can be explained, for turbulence or waves to be the cause; of the best probe, beside effects
+MOSTLY = 0.9  # of all that can be explained, for turbulence or waves to be the cause
 LEAST_UNKNOWN, MORE_UNKNOWN = 0.002, 0.005  # probability of an unknown effect: nothing is left, or something is
 CLOCKED = 0.5  # of what the best probe gains, that the probe of motion capture's clock must
 RIVALS = 4  # links probed beside water and axes
@@ -93,15 +93,6 @@ def water_disorder(search: Search, probed: list[ProbeResult]) -> ProbeResult | N
     return first if first.probe.name == TURBULENCE and axes[0] < ONE_AXIS * first.gain else None
 
 
-def turbulence_beside(left: Remainder) -> ProbeResult | None:
-    """Turbulence, where no link gains more beside a hypothesis, but for a tenth, nor any axis alone as much."""
-    found = next((one for one in left.probed if one.probe.name == TURBULENCE), None)
-    if found is None or found.gain < MOSTLY * left.left:
-        return None
-    alone = max((one.gain for one in left.probed if one.probe.stage == "force" and one is not found), default=0.0)
-    return found if alone < ONE_AXIS * found.gain else None
-
-
 def waves_beside(search: Search, hypothesis: Hypothesis, left: Remainder) -> ProbeResult | None:
     """Waves, where no link but turbulence gains more beside a hypothesis, and what they move has a sea's line."""
     first = next((found for found in left.probed if found.probe.name != TURBULENCE), None)
@@ -116,8 +107,8 @@ def disorder(search: Search, hypothesis: Hypothesis, left: Remainder) -> ProbeRe
     """The noise that the search has to know of, to see what is beside it; None where there is nothing of the kind.
 
     Motion capture's clock where its probe gains more than any other link's, its poses' noise apart; waves where they
-    show beside the hypothesis, turbulence where it shows there; turbulence or waves where they are the cause: of all
-    that can be explained, they explain MOSTLY.
+    show beside the hypothesis; turbulence or waves where they are the cause: of all that can be explained, they explain
+    MOSTLY.
     """
     clock = [found for found in left.probed if found.probe.name == CLOCK and found.gain > CLOCKED * left.left]
     if clock and left.probed[0].probe.element == CLOCK_PLACE[1]:
@@ -127,9 +118,6 @@ def disorder(search: Search, hypothesis: Hypothesis, left: Remainder) -> ProbeRe
         return beside
     if left.share <= NOISY:
         return None
-    rough = turbulence_beside(left)
-    if rough is not None:
-        return rough
     found = water_disorder(search, left.probed)
     return found if found is not None and found.gain > MOSTLY * (left.explained + left.left) else None
 

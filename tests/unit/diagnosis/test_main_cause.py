@@ -7,7 +7,7 @@ import pytest
 from support.cases import make_case
 
 from sim_backend.core.effects import effect_layout as ef
-from tools.diagnose.noise_probes import CLOCK, TURBULENCE, NoiseProbe, ProbeResult
+from tools.diagnose.noise_probes import CLOCK, NoiseProbe, ProbeResult
 from tools.diagnose.record import NONE
 from tools.diagnose.search import run
 from tools.diagnose.shrink import in_tolerances, lacking_squares, most_often
@@ -19,7 +19,6 @@ from tools.diagnose.unknown import (
     left_floors,
     left_share,
     probability_unknown,
-    turbulence_beside,
 )
 from tools.diagnose.verdict import SECOND, Worth, conclude, doubt_small, held_out_worth, pass_on, share_out
 from tools.inference.problem import problem_of
@@ -115,21 +114,6 @@ def test_beside_a_wandering_clock_what_leaves_no_gap_is_not_unknown():
     clock = ProbeResult(NoiseProbe(CLOCK, "sensor", "timing", "mocap"), 5e4, 6.0)
     assert unknown(after=0.2, left=3e4, explained=5e4, noise=clock) < 0.05
     assert unknown(after=0.9, left=3e4, explained=5e4, noise=clock) > 0.5
-
-
-@pytest.mark.parametrize(
-    ("turbulence", "heave", "other", "there"),
-    [(2.5e4, 1.5e4, 2.6e4, True), (2.5e4, 2.1e4, 2.5e4, False), (2.5e4, 1.5e4, 3.5e4, False), (0.0, 0.0, 1e4, False)],
-)
-def test_turbulence_beside_an_effect_shakes_no_axis_alone(turbulence, heave, other, there):
-    gains = {
-        NoiseProbe("ballast", "actuator", "actuation", "ballast"): other,
-        NoiseProbe(TURBULENCE, "force", "environment", "water"): turbulence,
-        NoiseProbe("heave force", "force", "hydrodynamics", "heave"): heave,
-    }
-    probed = [ProbeResult(probe, gain, 6.0) for probe, gain in sorted(gains.items(), key=lambda one: -one[1])]
-    found = turbulence_beside(Remainder(3e4, probed[0].gain, probed))
-    assert (found is not None) is there
 
 
 def test_as_likely_as_not_at_the_width_that_small_effects_leave():
