@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sim_backend.core.effects.catalogue import catalogue
+from tools.diagnose.clock import Clock
 from tools.diagnose.sensor_consistency import DISTANT, HOLDS_BELOW, NEARBY, inconsistent_sensor
 from tools.inference import levels
 from tools.inference.fit import POOR, THRESHOLD_STEP, Fitter, Hypothesis
@@ -46,28 +47,6 @@ LEVEL_ROUNDS = 2  # Newton steps at a time
 ROUNDS = 3  # of gains at the best label and all labels tried again there, at most
 ALIGNED = 3  # times that poses are moved to where the clock found so far says
 NEARLY_UNTEMPERED = 1.05  # temperature: the best hypothesis is near the truth
-
-
-@dataclass(frozen=True)
-class Clock:
-    """The effect of a wandering clock of motion capture: it stands in the model beside which all else is looked for."""
-
-    label: str
-    free: list[FreeParameter]
-    values: np.ndarray  # in spreads
-    sd: np.ndarray
-
-    def within(self, problem: Problem) -> Problem:
-        """The problem, and the one it was made from, of the model with it."""
-        F, recorded = effect_vector(problem.model), problem.recorded
-        for free, value in zip(self.free, self.values, strict=True):
-            F[free.entry] += free.spread * value
-        model = replace(problem.model, F=F)
-        return replace(problem, model=model, recorded=None if recorded is None else replace(recorded, model=model))
-
-    def aligned(self, problem: Problem) -> Problem:
-        """The problem with its poses where this clock says; the model is as it was."""
-        return aligned(problem, effect_vector(self.within(problem).model))
 
 
 @dataclass

@@ -8,8 +8,9 @@ from scipy.special import ndtr
 
 from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.catalogue import catalogue
+from tools.diagnose.clock import Clock
 from tools.diagnose.noise_probes import CLOCK, TURBULENCE, WAVES, ProbeResult, inflated, probes, run_probes
-from tools.diagnose.search import Clock, Search
+from tools.diagnose.search import Search
 from tools.diagnose.shrink import AFTER, FLOOR, Shrinkage
 from tools.diagnose.waves import LINE, line_share
 from tools.inference.fit import Hypothesis

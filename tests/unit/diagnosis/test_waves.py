@@ -54,7 +54,10 @@ def test_what_a_sea_cannot_turn_is_unknown_beside_it_where_no_effect_explains_it
 def test_small_waves_hide_nothing_beside_them(tmp_path):
     F = np.zeros(ef.N_F)
     F[ef.NET_MASS_OFFSET] = 0.08
-    moved = lambda t: 0.05 * np.stack([sea(t), sea(t, 1.0), sea(t, 2.0)], axis=1)  # noqa: E731
+
+    def moved(t: np.ndarray) -> np.ndarray:
+        return 0.05 * np.stack([sea(t), sea(t, 1.0), sea(t, 2.0)], axis=1)
+
     answer = conclude(run(problem_of(make_case(tmp_path, F, seed=9, runs=2, mocap=True, moved=moved))))
     assert answer.noise.probe.name == WAVES
     assert answer.main == "net_buoyancy"
