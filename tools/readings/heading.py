@@ -12,7 +12,7 @@ import numpy as np
 from tools.data.runs import columns as names
 from tools.readings.findings import OFFSET_MATTERS, SURE, TOLERANCE, Finding, spoken
 from tools.readings.regression import Estimate, Fit, fit, within
-from tools.readings.signals import Table, integrated, pieces, summed, unwrapped
+from tools.readings.signals import Rates, Table, pieces, summed, unwrapped
 
 HEADING = names.ATTITUDE[2]
 BETTER = 0.8  # of the residual, that one regressor has to come to
@@ -52,7 +52,7 @@ def residual_heading(table: Table) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     roll, pitch, yaw = (table.flown(table.columns[name]) for name in names.ATTITUDE)
     rates = np.column_stack([table.columns[name] for name in names.RATES])
     turning = (rates[:, 1] * np.sin(roll) + rates[:, 2] * np.cos(roll)) / np.maximum(np.cos(pitch), 0.2)
-    moved = integrated(table, turning[:, None])
+    moved = Rates(table, turning[:, None]).integrated()
     heading = unwrapped(yaw, table.run)
     usable = np.isfinite(moved[:, 0]) & np.isfinite(heading)
     return heading - summed(moved, usable)[:, 0], pieces(usable), usable

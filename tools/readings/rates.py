@@ -15,7 +15,7 @@ import numpy as np
 from tools.data.runs import columns as names
 from tools.readings.findings import SURE, TOLERANCE, Finding, certain, spoken
 from tools.readings.regression import Estimate, Fit, fit, within
-from tools.readings.signals import Table, body_increments, integrated, pieces, summed, unwrapped
+from tools.readings.signals import Rates, Table, body_increments, pieces, summed, unwrapped
 
 DELAYS = np.arange(-2.0, 2.01, 0.1)  # s, tried before the fit
 DEGREES = 180.0 / math.pi
@@ -38,9 +38,9 @@ def attitude_of(table: Table, columns: tuple[str, ...]) -> np.ndarray:
     return table.flown(np.column_stack([table.columns[name] for name in columns]))
 
 
-def rates_of(table: Table) -> np.ndarray:
+def rates_of(table: Table) -> Rates:
     """Body rates (rows, 3), rad/s."""
-    return np.column_stack([table.columns[name] for name in names.RATES])
+    return Rates(table, np.column_stack([table.columns[name] for name in names.RATES]))
 
 
 def angle_increments(table: Table, attitude: np.ndarray, euler: bool) -> np.ndarray:
@@ -55,37 +55,24 @@ def angle_increments(table: Table, attitude: np.ndarray, euler: bool) -> np.ndar
 
 
 def design(
-    table: Table, turned: np.ndarray, rates: np.ndarray, delay: float, skew: bool = False
+    table: Table, turned: np.ndarray, rates: Rates, delay: float, skew: bool = False
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """A (rows, 3), regressors (rows, 3 axes, k) and which rows are used; within blocks, less their means.
 
     turned (rows, 3): the attitude's increments. Regressors of an axis: the three integrals, time, minus the axis' rate,
     with `skew` also minus time times it.
     """
-    moved = integrated(table, rates, delay)
+    moved = rates.integrated(delay)
     usable = np.isfinite(moved).all(axis=1) & np.isfinite(turned).all(axis=1)
     A, G = summed(turned, usable), summed(moved, usable)
     group = table.block[usable] * 100_003 + pieces(usable)[usable]
     t = table.t[usable]
-    w = np.nan_to_num((rates if delay == 0.0 else _shifted(table, rates, delay))[usable])
+    w = rates.shifted(delay)[usable]
     parts = [A[usable], G[usable], t[:, None], w, *([t[:, None] * w] if skew else [])]
     ends = np.cumsum([part.shape[1] for part in parts])[:-1]
     A, G, T, *by_axis = np.split(within(np.column_stack(parts), group), ends, axis=1)
     X = [np.column_stack([G, T, *(-part[:, axis] for part in by_axis)]) for axis in range(3)]
     return A, np.stack(X, axis=1), usable
-
-
-def _shifted(table: Table, rates: np.ndarray, delay: float) -> np.ndarray:
-    """Rates `delay` s before each row."""
-    out = np.zeros_like(rates)
-    for n in np.unique(table.run):
-        here = table.run == n
-        t = table.t[here]
-        for axis in range(3):
-            good = np.isfinite(rates[here, axis])
-            if good.any():
-                out[here, axis] = np.interp(t - delay, t[good], rates[here, axis][good])
-    return out
 
 
 def compare(
@@ -104,7 +91,7 @@ def compare(
     return Compared(fits, best)
 
 
-def _best_delay(table: Table, turned: np.ndarray, rates: np.ndarray) -> float:
+def _best_delay(table: Table, turned: np.ndarray, rates: Rates) -> float:
     """Of DELAYS, the one that leaves least of the attitude's increments."""
     best, least = 0.0, math.inf
     for delay in sorted(DELAYS, key=abs):
@@ -202,7 +189,7 @@ def _exchanged(body: Compared) -> list[Finding]:
 
 def _euler(table: Table, body: Compared) -> list[Finding]:
     """Rates that are those of the Euler angles instead of the body's."""
-    angles = compare(table, names.ATTITUDE, euler=True)
+    angles = compare(table, names.ATTITUDE, euler=True, delay=body.delay)
     better = []
     for axis in (0, 2):
         of_body, of_angles = body.fits[axis], angles.fits[axis]

@@ -6,6 +6,7 @@ the sums stop (NaN) and go on from 0: a piece of them is known up to a constant,
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -112,25 +113,49 @@ def pieces(usable: np.ndarray) -> np.ndarray:
     return np.cumsum(~usable)
 
 
-def integrated(table: Table, rates: np.ndarray, delay: float = 0.0) -> np.ndarray:
-    """Increments of the integral of rates (rows, 3) up to `delay` s before each row, (rows, 3); NaN over gaps."""
-    dt = steps(table)
-    middle = 0.5 * (rates + np.vstack([np.full((1, rates.shape[1]), np.nan), rates[:-1]]))
-    increments = middle * dt[:, None]
-    if delay == 0.0:
-        return increments
-    moved = np.full_like(increments, np.nan)
-    for n in np.unique(table.run):
-        here = np.flatnonzero(table.run == n)
-        t = table.t[here]
-        filled = np.nan_to_num(increments[here])
-        total = np.cumsum(filled, axis=0)
-        inside = (t - delay >= t[0]) & (t - delay <= t[-1])
-        late = np.column_stack([np.interp(t - delay, t, column) for column in total.T])
-        change = np.vstack([np.full((1, rates.shape[1]), np.nan), np.diff(late, axis=0)])
-        bad = ~inside | ~np.concatenate([[False], inside[:-1]])
-        # A missing rate near the moment itself leaves the increment unknown.
-        holes = np.interp(t - delay, t, (~np.isfinite(increments[here]).all(axis=1)).astype(float)) > 0.0
-        change[bad | holes] = np.nan
-        moved[here] = change
-    return moved
+class Rates:
+    """Rates (rows, k) of a table, their integral, and both some time before each row. Prepared once for many delays."""
+
+    def __init__(self, table: Table, rates: np.ndarray):
+        self.table, self.values = table, rates
+        middle = 0.5 * (rates + np.vstack([np.full((1, rates.shape[1]), np.nan), rates[:-1]]))
+        self.increments = middle * steps(table)[:, None]
+        ends = np.searchsorted(table.run, np.arange(len(table.names) + 1))
+        self._runs = [self._past(slice(begin, end)) for begin, end in pairwise(ends) if end > begin]
+
+    def _past(self, here: slice) -> tuple:
+        """A run: rows, times, integral, where an increment is unknown (1.0), each rate's samples that are there."""
+        t, increments, rates = self.table.t[here], self.increments[here], self.values[here]
+        holes = (~np.isfinite(increments).all(axis=1)).astype(float)
+        known = [np.isfinite(column) for column in rates.T]
+        samples = [(t[good], column[good]) for good, column in zip(known, rates.T, strict=True)]
+        return here, t, np.cumsum(np.nan_to_num(increments), axis=0), holes, samples
+
+    def integrated(self, delay: float = 0.0) -> np.ndarray:
+        """Increments of the integral up to `delay` s before each row, (rows, k); NaN over gaps."""
+        if delay == 0.0:
+            return self.increments
+        moved = np.full_like(self.increments, np.nan)
+        for here, t, total, holes, _ in self._runs:
+            then = t - delay
+            inside = (then >= t[0]) & (then <= t[-1])
+            # A missing rate near the moment itself leaves the increment unknown.
+            known = inside & (np.interp(then, t, holes) == 0.0)
+            known[0] = False
+            known[1:] &= inside[:-1]
+            of_run = moved[here]
+            for axis in range(total.shape[1]):
+                of_run[1:, axis] = np.diff(np.interp(then, t, total[:, axis]))
+            of_run[~known] = np.nan
+        return moved
+
+    def shifted(self, delay: float) -> np.ndarray:
+        """The rates `delay` s before each row, (rows, k), interpolated over missing samples; 0 where there are none."""
+        if delay == 0.0:
+            return np.nan_to_num(self.values)
+        out = np.zeros_like(self.values)
+        for here, t, _, _, samples in self._runs:
+            for axis, (times, values) in enumerate(samples):
+                if len(times):
+                    out[here, axis] = np.interp(t - delay, times, values)
+        return out
