@@ -8,9 +8,7 @@ Start, commands and step are the program's: 1 m deep, 0.2 m/s, servo 0.6 rad, sl
 import math
 import shutil
 import subprocess
-import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Any
@@ -23,6 +21,7 @@ from firmware.core.vehicle.flight import nominal_run
 from firmware.model.library import shipped
 from firmware.model.vehicle import decode_vehicle
 from tools.data.errors import InputError
+from tools.measure.benchmark.c_program import compiled
 from tools.measure.benchmark.plant_batch import VEHICLES, Fleet
 from tools.measure.benchmark.registry import Settings
 from tools.measure.benchmark.timing import alternate, median, seconds
@@ -31,7 +30,6 @@ STEPS = 2_000_000
 DT = 0.01  # s
 COMMANDS = (0.6, -0.02, 0.1)  # rad, m, kg
 STILL_WATER = (0.0, 0.0, 0.0)
-FLAGS = ("-O3", "-march=native")
 FAST = "-ffast-math"
 HEADING_STRIDE = 50  # steps between looks at the heading, which turns by much less than half a circle in them
 C_TIMEOUT_S = 600.0
@@ -54,19 +52,6 @@ def final_state(P: np.ndarray, steps: int) -> list[float]:
         psi += wrap_angle(euler_from_quaternion(*x[layout.X_QUAT : layout.X_NU])[2] - psi)
     phi, theta, _ = euler_from_quaternion(*x[layout.X_QUAT : layout.X_NU])
     return [float(value) for value in (*x[:3], phi, theta, psi, *x[layout.X_NU :])]
-
-
-@contextmanager
-def compiled(source: Path, compiler: str, *more: str) -> Iterator[Path]:
-    """The program made from a C file, for as long as it is needed. InputError with the compiler's first complaint."""
-    with tempfile.TemporaryDirectory(prefix="glider-plant-") as folder:
-        program = Path(folder) / "plant"
-        command = [compiler, *FLAGS, *more, str(source), "-lm", "-o", str(program)]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        if done.returncode != 0:
-            complaints = [line for line in done.stderr.splitlines() if "error" in line] or done.stderr.splitlines()
-            raise InputError(f"does not compile: {complaints[0] if complaints else done.returncode}", source=source)
-        yield program
 
 
 def run_c(program: Path, source: Path, steps: int) -> tuple[float, list[float]]:

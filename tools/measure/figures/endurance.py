@@ -4,11 +4,12 @@ All that flies on devices is there: drivers, wires, twins, recorder, heartbeat, 
 a process that never waits, on another core than the loop's.
 """
 
-import json
 import os
 import subprocess
 import sys
 import tempfile
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +17,15 @@ import numpy as np
 
 from firmware.core.control.telemetry import REC_LATENESS
 from tools.cli.common import progress
+from tools.measure.figures.bare_loop import BareLoop, Punctuality, bare_loop_program, stolen_s
 
 WARM_UP_S = 20.0
 SAMPLE_S = 10.0
 RSS_LIMIT_BYTES = 1_000_000
 BLOCKS_A_TICK = 0.5  # gained over the whole flight, divided by its ticks: less than one block a tick is none
-LATE_S, LATE_KEPT = 0.005, 200
+LATE_S, LATE_KEPT = 0.005, 20_000
+PRIORITY = 50  # real-time, of the loop
+PERIOD_S, WATCH_S = 0.02, 0.001  # of the loop and the bare loop beside it; of the one that watches the machine
 LEG_S = 45.0  # about what one leg takes
 
 
@@ -41,48 +45,63 @@ depth_m = 6.0
 
 
 def measure(seconds: float, *, fifo: bool, load: bool) -> dict[str, Any]:
-    """Fly for so long, then give up and surface; the figures of the loop's process."""
+    """Fly for so long, then give up and surface; the figures of the loop's process, and of bare loops on its core."""
     cores = sorted(os.sched_getaffinity(0))
-    with tempfile.TemporaryDirectory() as place:
+    core = cores[-1]
+    with tempfile.TemporaryDirectory() as place, bare_loop_program() as program:
         mission = Path(place, "endurance.toml")
         mission.write_text(mission_text(seconds))
         busy = _load(cores[0]) if load and len(cores) > 1 else None
-        asleep = _sleeper(cores[-1], seconds, fifo)
+        beside: list[BareLoop] = []
+
+        def start_beside() -> None:
+            about: dict[str, Any] = {"priority": PRIORITY + 1 if fifo else 0, "seconds": seconds, "late_s": WATCH_S}
+            beside.append(BareLoop(program, core=core, period_s=PERIOD_S, **about))
+            beside.extend(BareLoop(program, core=each, period_s=WATCH_S, **about) for each in cores)
+
+        stolen = stolen_s(core)
         try:
-            found = _fly(mission, Path(place), seconds, fifo, cores[-1])
-            machine = json.loads(asleep.communicate(timeout=60.0)[0])
+            found, late = _fly(mission, Path(place), seconds, fifo, core, start_beside)
+            bare, *watches = (loop.end() for loop in beside)
         finally:
-            for process in (busy, asleep):
-                if process is not None:
-                    process.kill()
-                    process.wait()
-    return {**found, "machine": machine, "cores": len(cores), "load_on_other_core": busy is not None, "fifo": fifo}
+            for loop in beside:
+                loop.kill()
+            if busy is not None:
+                busy.kill()
+                busy.wait()
+    stolen = stolen_s(core) - stolen
+    compared = {
+        "bare": bare.summary(), "missed_ratio": found["missed"] / bare.missed if bare.missed else None,
+        "late_ticks": reasons(late, watches.pop(), watches), "stolen_s": round(stolen, 2),
+    }  # fmt: skip
+    return {**found, **compared, "cores": len(cores), "load_on_other_core": busy is not None, "fifo": fifo}
 
 
-SLEEPER = """
-import contextlib, ctypes, json, os, sys, time
-core, seconds, fifo = int(sys.argv[1]), float(sys.argv[2]), sys.argv[3] == "True"
-os.sched_setaffinity(0, {core})
-if fifo:
-    with contextlib.suppress(PermissionError):
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(51))
-    ctypes.CDLL(None).mlockall(3)
-ticks = missed = 0
-worst, due, end = 0.0, time.monotonic(), time.monotonic() + seconds
-while due < end:
-    time.sleep(max(0.0, due - time.monotonic()))
-    late = time.monotonic() - due
-    ticks, worst, due = ticks + 1, max(worst, late), due + 0.02
-    while due < time.monotonic():
-        missed, due = missed + 1, due + 0.02
-print(json.dumps({"ticks": ticks, "missed": missed, "worst_late_s": worst}))
-"""
+def reasons(late: np.ndarray, here: Punctuality, elsewhere: list[Punctuality]) -> dict[str, Any]:
+    """Late ticks by what made them so: how many, the deadlines missed by them, the worst.
 
-
-def _sleeper(core: int, seconds: float, fifo: bool) -> subprocess.Popen[bytes]:
-    """What the machine itself can keep: a process on the loop's core that only sleeps, above its priority, as often."""
-    command = [sys.executable, "-c", SLEEPER, str(core), str(seconds), str(fifo)]
-    return subprocess.Popen(command, stdout=subprocess.PIPE)
+    late (n, 3): when a tick began, how late, how far behind the one before ended, s (of the monotonic clock). here: a
+    bare loop that wakes each millisecond on the flight's core; elsewhere: those of the other cores.
+    machine: for at least half of the lateness the bare loop here was due and not woken either. other_core: the same of
+    another core, on which twins, lines and recorder run. overrun: the tick before lasted past the deadline. waiting:
+    late out of the wait for the deadline, in which the lines are served.
+    """
+    begin, end = late[:, 0] - late[:, 1] - PERIOD_S, late[:, 0]
+    half = 0.5 * late[:, 1]
+    left = np.ones(len(late), dtype=bool)
+    found = {}
+    kinds = {
+        "machine": here.lost_s(begin, end) >= half,
+        "other_core": np.any([loop.lost_s(begin, end) >= half for loop in elsewhere], axis=0),
+        "overrun": late[:, 2] >= half,
+        "waiting": np.ones(len(late), dtype=bool),
+    }
+    for name, which in kinds.items():
+        of_kind = late[left & which, 1]
+        missed = np.floor(of_kind / PERIOD_S).sum()
+        found[name] = {"ticks": len(of_kind), "missed": int(missed), "worst_s": float(of_kind.max(initial=0.0))}
+        left &= ~which
+    return found
 
 
 def _load(core: int) -> subprocess.Popen[bytes]:
@@ -90,7 +109,9 @@ def _load(core: int) -> subprocess.Popen[bytes]:
     return subprocess.Popen([sys.executable, "-c", code])
 
 
-def _fly(mission: Path, folder: Path, seconds: float, fifo: bool, core: int) -> dict[str, Any]:
+def _fly(
+    mission: Path, folder: Path, seconds: float, fifo: bool, core: int, start_beside: Callable[[], None]
+) -> tuple[dict[str, Any], np.ndarray]:
     from hal import realtime
     from hal.recorder.recorder import Recorder
     from tools.flight.compose import build_flight, build_runtime, log_metadata, record_specs
@@ -103,7 +124,7 @@ def _fly(mission: Path, folder: Path, seconds: float, fifo: bool, core: int) -> 
     keeper.claim()
     with keeper:
         if fifo:  # before the twins start: they follow, ten below
-            realtime.take_priority(50)
+            realtime.take_priority(PRIORITY)
         keeper.prepare()
         flight.board.open()
         try:
@@ -116,6 +137,7 @@ def _fly(mission: Path, folder: Path, seconds: float, fifo: bool, core: int) -> 
                     runtime.arm()
                     keeper.flying()
                     samples = Samples(seconds)
+                    start_beside()
                     _ticks(runtime, keeper, recorder, samples, seconds)
                 finally:
                     runtime.disarm()
@@ -127,9 +149,9 @@ def _fly(mission: Path, folder: Path, seconds: float, fifo: bool, core: int) -> 
         keeper.end(surfaced=autopilot.surfaced, orderly=True, reason="long enough")
     figures = _figures(runtime, samples, seconds)
     figures["pass"] = figures["pass"] and autopilot.mode == "flying"
-    return {**figures, "real_time": said, "mode_at_the_end": autopilot.mode,
-            "reason": autopilot.reason,
-            "records": {"written": report.written, "dropped": report.dropped, "complete": report.complete}}  # fmt: skip
+    records = {"written": report.written, "dropped": report.dropped, "complete": report.complete}
+    told = {"real_time": said, "mode_at_the_end": autopilot.mode, "reason": autopilot.reason, "records": records}
+    return {**figures, **told}, samples.late[: min(samples.late_count, LATE_KEPT)]
 
 
 class Samples:
@@ -139,13 +161,13 @@ class Samples:
     def __init__(self, seconds: float):
         self.rows = np.zeros((int(seconds / SAMPLE_S) + 8, 5))
         self.count = 0
-        self.late = np.zeros((LATE_KEPT, 2))  # when and by how much, s
+        self.late = np.zeros((LATE_KEPT, 3))  # as `reasons` takes them
         self.late_count = 0
 
-    def note_late(self, t: float, lateness: float) -> None:
+    def note_late(self, woken: float, lateness: float, behind: float) -> None:
         """A tick that was late enough to ask why."""
         if self.late_count < LATE_KEPT:
-            self.late[self.late_count] = t, lateness
+            self.late[self.late_count] = woken, lateness, behind
         self.late_count += 1
 
     def take(self, t: float, recorder_pid: int) -> None:
@@ -161,13 +183,15 @@ def _ticks(runtime: Any, keeper: Any, recorder: Any, samples: Samples, seconds: 
     """Tick for so long; once a second what a flight does then, and samples after the warm-up."""
     pid, values = recorder.pid, runtime.channel.values
     begin, next_second, next_sample = runtime.deadline, 0.0, min(WARM_UP_S, seconds / 4)
+    now, since = runtime.board.clock.now, time.monotonic() - runtime.board.clock.now()
     with progress("minutes", max(1, round(seconds / 60.0))) as advance:
         minute = 60.0
         while (passed := runtime.deadline - begin) < seconds:
+            deadline, behind = runtime.deadline, now() - runtime.deadline
             runtime.tick()
             lateness = values[REC_LATENESS]
             if lateness > LATE_S:
-                samples.note_late(passed, lateness)
+                samples.note_late(since + deadline + lateness, lateness, behind)
             if passed >= next_second:
                 keeper.second(runtime.timing)
                 next_second = passed + 1.0
@@ -199,7 +223,6 @@ def _figures(runtime: Any, samples: Samples, seconds: float) -> dict[str, Any]:
         "resident_growth_bytes": int(grown),
         "descriptors": [int(first[3]), int(rows[:, 3].max()), int(last[3])],
         "recorder_growth_bytes": int(last[4] - first[4]),
-        "late_at_s": [[round(float(t), 2), round(float(late), 4)] for t, late in samples.late[: samples.late_count]],
         "measured_from_s": float(first[0]),
         "pass": timing.missed == 0 and abs(blocks) < BLOCKS_A_TICK and grown < RSS_LIMIT_BYTES and last[3] <= first[3],
     }
