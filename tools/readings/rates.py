@@ -120,9 +120,25 @@ def judge_rates(table: Table) -> list[Finding]:
     for axis, solved in enumerate(body.fits):
         if solved is None or any(names.RATES[axis] == other.channel for other in exchanged):
             continue
-        found += _scale(table, axis, solved)
-        found += _offset(axis, solved)
+        scale = _scale(table, axis, solved)
+        if scale and scale[0].finding == "scale" and _acquitted(table, axis, scale[0].size):
+            scale = []
+        found += [*scale, *_offset(axis, solved)]
     return found + _late(table, body)
+
+
+def _acquitted(table: Table, axis: int, error: float) -> bool:
+    """Whether motion capture's attitude turns as the rate says: then the onboard attitude has the scale, not the rate.
+
+    It has to be sure that the rate's own error is not `error`, and to put it at less than half of that.
+    """
+    if not table.has(*names.MOCAP_ATTITUDE):
+        return False
+    solved = compare(table, names.MOCAP_ATTITUDE).fits[axis]
+    if solved is None:
+        return False
+    own = inverse(solved[axis])
+    return abs(own.value - 1.0) < 0.5 * abs(error) and own.sigma(1.0 + error) >= SURE
 
 
 def _scale(table: Table, axis: int, solved: Fit) -> list[Finding]:

@@ -108,6 +108,18 @@ def test_a_gyro_bias_is_measured_and_mended():
     assert check(readings.runs).findings == []
 
 
+def test_a_scale_of_the_attitude_is_not_put_down_to_the_gyro():
+    def change(columns):
+        columns["pitch_rad"] *= 1.15
+
+    answer = found(changed(change))
+    assert answer[("pitch_rad", "scale")].label == "attitude_scale"
+    assert answer[("pitch_rad", "scale")].size == pytest.approx(0.15, abs=0.01)
+    assert not any(channel in RATES for channel, _ in answer)
+    # Without motion capture nobody can say which of the two it is: the rate is held against the attitude.
+    assert ("q_rad_s", "scale") in found(changed(change, ONBOARD))
+
+
 def test_swapped_axes_are_named():
     def swapped(columns):
         columns["p_rad_s"], columns["r_rad_s"] = columns["r_rad_s"], columns["p_rad_s"]
