@@ -7,6 +7,7 @@ the hash; tests/unit/test_jit.py holds the rule.
 Set GLIDER_JIT=0 to run every kernel as plain Python (slow, for reading and stepping through).
 """
 
+import errno
 import hashlib
 import os
 import shutil
@@ -56,7 +57,8 @@ def cache_root() -> Path:
         if os.access(candidate, os.W_OK) and _is_ours(candidate):
             return candidate
     tried = ", ".join(map(str, candidates))
-    raise OSError(f"no writable folder of one's own for compiled kernels among {tried}: set GLIDER_CACHE_DIR")
+    lacking = "no writable folder of one's own for compiled kernels: set GLIDER_CACHE_DIR"
+    raise PermissionError(errno.EACCES, lacking, tried)
 
 
 def _is_ours(folder: Path) -> bool:

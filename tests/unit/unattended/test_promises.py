@@ -85,6 +85,21 @@ def test_a_cache_that_others_may_write_into_is_not_read(tmp_path):
         assert "no writable folder of one's own" in done.stderr
 
 
+@pytest.mark.parametrize("command", [("check", "--acknowledge"), ("check", "--compile"), ("gap", "measure", "case")])
+def test_no_place_for_kernels_is_said_in_a_line(command, tmp_path):
+    blocked = tmp_path / "a-file"
+    blocked.write_text("")
+    place = {**os.environ, "GLIDER_CACHE_DIR": str(blocked), "GLIDER_STATE_DIR": str(tmp_path)}
+    (tmp_path / "case").mkdir()
+    done = subprocess.run(
+        [sys.executable, "-m", "tools.cli.main", *command], env={**place, "PYTHONPATH": str(ROOT)}, cwd=tmp_path,
+        capture_output=True, text=True,
+    )  # fmt: skip
+    assert done.returncode == 2
+    (line,) = done.stderr.splitlines()
+    assert line == f"glider: {blocked}: no writable folder of one's own for compiled kernels: set GLIDER_CACHE_DIR"
+
+
 @pytest.fixture
 def open_folder():
     """A folder that every user gets to."""
