@@ -18,7 +18,7 @@ from sim_backend.core.effects import effect_layout as ef
 from tools.study.challenge.diagnose_all import run
 from tools.study.challenge.diagnosis import TIMING
 
-CASES, WORKERS = 4, 4
+CASES, WORKERS = int(os.environ.get("GLIDER_MANY_CASES", "4")), 4  # 4: what time allows in every run of the tests
 
 
 @pytest.fixture(scope="module")
