@@ -52,11 +52,17 @@ def write_plunger(P, E, errors, seed, ballast, count, slot):
 
 
 @kernel
+def is_due(sensors, sensor, t, counters):
+    """Whether it is time for a sensor's next sample."""
+    return t >= counters[wl.C_SAMPLES + sensor] * sensors[sensor, wl.SENSOR_PERIOD] - 1e-9
+
+
+@kernel
 def due_slot(sensors, sensor, t, counters, ring):
     """Number of the sample that a sensor has to take now, its slot stamped; -1: it is not time."""
-    count = counters[wl.C_SAMPLES + sensor]
-    if t < count * sensors[sensor, wl.SENSOR_PERIOD] - 1e-9:
+    if not is_due(sensors, sensor, t, counters):
         return -1
+    count = counters[wl.C_SAMPLES + sensor]
     counters[wl.C_SAMPLES + sensor] = count + 1
     slot = count % wl.DELAY_SLOTS
     ring[sensor, slot, 0] = t + sensors[sensor, wl.SENSOR_DELAY]
@@ -65,20 +71,13 @@ def due_slot(sensors, sensor, t, counters, ring):
 
 
 @kernel
-def sample_sensors(P, F, effects, E, sensors, errors, seed, x, t, counters, ring, y):
-    """Sample every sensor whose time has come into its delay line: the state x, or with effects what `read` says of it.
-
-    effects: whether any of F is set; y (at least N_Y) is scratch.
-    """
+def sample_reading(P, E, sensors, errors, seed, y, t, counters, ring):
+    """Sample every sensor whose time has come into its delay line: y (N_Y) is what they read without noise."""
     for sensor in range(wl.N_SAMPLED):
         count = due_slot(sensors, sensor, t, counters, ring)
         if count < 0:
             continue
         slot = ring[sensor, count % wl.DELAY_SLOTS]
-        if effects:
-            read(F, x, y)
-        else:
-            read_state(x, y)
         if sensor == sup.SENSOR_IMU:
             write_imu(
                 errors, seed, y[ef.Y_ROLL], y[ef.Y_PITCH], y[ef.Y_YAW], y[ef.Y_P], y[ef.Y_Q], y[ef.Y_R], count, slot
@@ -89,6 +88,25 @@ def sample_sensors(P, F, effects, E, sensors, errors, seed, x, t, counters, ring
             slot[2] = measured(errors, seed, y[ef.Y_SLIDER], wl.E_SLIDER, count)
         elif sensor == sup.SENSOR_PLUNGER:
             write_plunger(P, E, errors, seed, y[ef.Y_BALLAST], count, slot)
+
+
+@kernel
+def read_world(F, effects, x, y):
+    """What the sensors read at x without noise into y (at least N_Y); effects: whether any of F is set."""
+    if effects:
+        read(F, x, y)
+    else:
+        read_state(x, y)
+
+
+@kernel
+def sample_sensors(P, F, effects, E, sensors, errors, seed, x, t, counters, ring, y):
+    """Sample every sensor whose time has come: the state x, or with effects what `read` says of it; y is scratch."""
+    for sensor in range(wl.N_SAMPLED):
+        if is_due(sensors, sensor, t, counters):
+            read_world(F, effects, x, y)
+            sample_reading(P, E, sensors, errors, seed, y, t, counters, ring)
+            return
 
 
 @kernel
