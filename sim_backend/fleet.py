@@ -9,7 +9,7 @@ from firmware.autopilot import Autopilot
 from firmware.core.layouts.control_layout import COMPLETED, ESTIMATOR, N_LEG
 from firmware.core.maths.wide import LANES
 from sim_backend.core.closed_loop import END_LEG, END_MODE, END_REASON, END_TIME, N_END, N_TRACE, TRACE
-from sim_backend.core.closed_loop_lanes import fly_batch
+from sim_backend.core.closed_loop_lanes import fly_batch, fly_lanes
 from sim_backend.core.layout import N_WAVE
 from sim_backend.world import World
 
@@ -67,6 +67,19 @@ def stacked(worlds: Sequence[World], pilots: Sequence[Autopilot]) -> tuple:
         np.array([world.sensors for world in worlds]), np.array([world.errors for world in worlds]),
         np.array([world.seed for world in worlds]), np.array([world.x for world in worlds]),
     )  # fmt: skip
+
+
+def fly_group(
+    worlds: Sequence[World], pilots: Sequence[Autopilot], max_ticks: int, every: int, traces: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Fly up to LANES flights of one group on this thread: ends (n, N_END), ticks (n,), and every `every`-th tick into
+    traces (n or more, lines, N_TRACE)."""
+    ends, ticks = np.zeros((len(worlds), N_END)), np.zeros(len(worlds), dtype=np.int64)
+    (members,), (count,) = groups_of(worlds, pilots)
+    fly_lanes(
+        members, int(count), *stacked(worlds, pilots), worlds[0].dt, max_ticks, every, traces, ends, ticks
+    )  # fmt: skip
+    return ends, ticks
 
 
 def fly_fleet(

@@ -138,7 +138,7 @@ def predict_covariance(cov, A, d, dt, work):
         to, row = T0 + i * kf.N_W, i * kf.N_E
         t3, t4, t5, t6, t7, t8 = m[to + 3], m[to + 4], m[to + 5], m[to + 6], m[to + 7], m[to + 8]
         t9, ta, tb, tc, td, te = m[to + 9], m[to + 10], m[to + 11], m[to + 12], m[to + 13], m[to + 14]
-        for j in range(kf.N_MOVING):
+        for j in range(i + 1):  # what is beyond the diagonal comes from the other side of it
             p[row + j] = m[to + j] + dt * (
                 t3 * m[R0 + j] + t4 * m[R0 + kf.N_W + j] + t5 * m[R0 + 2 * kf.N_W + j]
                 + t6 * m[R0 + 3 * kf.N_W + j] + t7 * m[R0 + 4 * kf.N_W + j] + t8 * m[R0 + 5 * kf.N_W + j]

@@ -96,9 +96,9 @@ def subtract_taken(cov, taken, used):
         r0, r1, r2 = taken[k], taken[k + 1], taken[k + 2]
         for i in range(kf.N_E):
             a, b, c, row = r0[i], r1[i], r2[i], cov[i]
-            for j in range(kf.N_E):
+            for j in range(i + 1):
                 row[j] -= a * r0[j] + b * r1[j] + c * r2[j]
-    # rounding may differ between the two sides of the diagonal
+    # one side of the diagonal serves both: rounding might differ
     for i in range(kf.N_E):
         for j in range(i):
             cov[j, i] = cov[i, j]
