@@ -87,11 +87,11 @@ def fly(P_plant, P, C, legs, nav, E, F, waves, sensors, errors, seed, x, dt, max
         t = ticks * C[ctl.DT]
         if effects:
             move_with_effects(
-                P_plant, effective, F, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, queue, work, dt, t
+                effective, F, E, waves, sensors, seed, x, cmd, acc, counters, ring, queue, work, dt, t
             )  # fmt: skip
         else:
-            move(P_plant, F, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, work, dt, t)
-        deliver(sensors, counters[wl.C_STEP] * dt, counters, ring, frame)
+            move(P_plant, F, E, waves, sensors, seed, x, cmd, acc, counters, ring, work, dt, t)
+        deliver(P_plant, E, sensors, errors, seed, counters[wl.C_STEP] * dt, counters, ring, frame)
         if C[ctl.ESTIMATOR] == ctl.GIVEN:
             memory[ctl.NAV_GIVEN : ctl.NAV_GIVEN + N_X] = x[:N_X]
         tick(P, C, legs, frame, est, ap, memory, cmd, t)

@@ -41,16 +41,12 @@ def wide_step(effects, P, F, E, waves, x, cmd, acc, work, y, t, dt):
 
 
 @kernel
-def sample_lanes(members, flying, P_plants, Es, sensors, errors, seeds, y, readings, t, counters, ring):
+def sample_lanes(members, flying, sensors, y, readings, t, counters, ring):
     """Sample the sensors whose time has come, in every lane that flies: y (N_Y, LANES) is what they read at t."""
     for lane in range(LANES):
         if flying[lane]:
-            flight = members[lane]
             take_lane(y, lane, readings[lane])
-            sample_reading(
-                P_plants[flight], Es[flight], sensors[flight], errors[flight], seeds[flight], readings[lane], t,
-                counters[lane], ring[lane],
-            )  # fmt: skip
+            sample_reading(sensors[members[lane]], readings[lane], t, counters[lane], ring[lane])
 
 
 @kernel
@@ -112,7 +108,9 @@ def fly_lanes(
 ):  # fmt: skip
     """Fly the first `count` of members (LANES,), numbers of flights, side by side; the others fill lanes unlooked at.
 
-    All of them have effects, or none; the same kind of estimate; the same step. Of each flight as in fly_batch.
+    All of them have effects, or none; the same kind of estimate; the same step. Of each flight as in fly_batch. Where
+    that step is longer than the filter's (MAX_STEP), a filter that starts later than its neighbour's may differ in the
+    last place.
     """
     Pw, Ew, Fw = np.zeros((N_P, LANES)), np.zeros((wl.N_ENV, LANES)), np.zeros((ef.N_F, LANES))
     sea, x = np.zeros((waves.shape[1], wl.N_WAVE, LANES)), np.zeros((ef.N_XF, LANES))
@@ -142,7 +140,7 @@ def fly_lanes(
         ticks[members[lane]] = 0
     tick, step, t = 0, 0, 0.0
     read_world(as_wide(Fw), effects, as_wide(x), as_wide(y))
-    sample_lanes(members, flying, P_plants, Es, sensors, errors, seeds, y, readings, 0.0, counters, ring)
+    sample_lanes(members, flying, sensors, y, readings, 0.0, counters, ring)
     while flying.any():
         t = tick * Cs[members[0], ctl.DT]
         while step * dt < t - 0.5 * dt:
@@ -155,11 +153,14 @@ def fly_lanes(
                     put_lane(wanted[lane], lane, cmd)
             wide_step(effects, Pw, Fw, Ew, sea, x, cmd, acc, work, y, step * dt, dt)
             step += 1
-            sample_lanes(members, flying, P_plants, Es, sensors, errors, seeds, y, readings, step * dt, counters, ring)
+            sample_lanes(members, flying, sensors, y, readings, step * dt, counters, ring)
         for lane in range(LANES):
             if flying[lane]:
                 flight = members[lane]
-                deliver(sensors[flight], step * dt, counters[lane], ring[lane], frames[lane])
+                deliver(
+                    P_plants[flight], Es[flight], sensors[flight], errors[flight], seeds[flight], step * dt,
+                    counters[lane], ring[lane], frames[lane],
+                )  # fmt: skip
                 sense(P, Cs[flight], frames[lane], ests[lane], t)
         estimate_lanes(P, Cs, members, flying, ests, aps, navs, x, est, filters, sent, t)
         for lane in range(LANES):

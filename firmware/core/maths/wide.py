@@ -1,8 +1,8 @@
 """Wide numbers for kernels: what wide_type makes of them, and sin, cos, tan, atan2, asin as sums without a branch.
 
-Within 1.5 units in the last place for sin and cos of angles up to 100 rad (2.5 up to 1e5 rad), 2.5 for atan2 and asin
-of finite numbers, 3.5 for tan (sin over cos) up to 100 rad; the C library's, which plain numbers have, within 1. exp, tanh and log of a wide number are the C
-library's, lane by lane.
+Within 1.5 units in the last place for sin and cos of angles up to 100 rad (2.5 up to 1e5 rad), 3.5 for tan up to
+100 rad, 2.5 for atan2 and asin of finite numbers; the C library's, which plain numbers have, within 1. exp, tanh and
+log of a wide number are the C library's, lane by lane.
 """
 
 import math

@@ -49,7 +49,7 @@ def linearise_motion(x, y, A):
 
 @kernel
 def linearise(P, x, servo_rate, slider_rate, ballast_rate, A, y):
-    """d(rate of the error state)/d(error state) into A (N_MOVING, N_COUPLED), at x; y (N_POINT) is left for model_error.
+    """d(rate of the error state)/d(error state) into A (N_MOVING, N_COUPLED), at x; y (N_POINT) stays for model_error.
 
     Attitude errors turn gravity (k + k x dtheta) and the way through the water; the accelerations' derivatives are
     forward differences of equation (1), the actuators' speeds held.

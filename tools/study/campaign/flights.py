@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from firmware.core.layouts import control_layout as ctl
-from firmware.core.vehicle import layout
 from firmware.core.maths.wide import LANES
+from firmware.core.vehicle import layout
 from sim_backend.core import closed_loop
 from sim_backend.fleet import fly_group, groups_of
 from tools.data.errors import InputError
