@@ -23,7 +23,7 @@ from sim_backend.core import layout as wl
 from sim_backend.core.closed_loop import add_up, sum_up, write_trace
 from sim_backend.core.effect_plant import commands_in_force, effect_sea_step, set_effects
 from sim_backend.core.effects import effect_layout as ef
-from sim_backend.core.plant import hold_disturbance, plant_step
+from sim_backend.core.plant import hold_disturbance, hold_number, plant_step
 from sim_backend.core.world import deliver, read_world, sample_reading
 
 
@@ -47,6 +47,24 @@ def sample_lanes(members, flying, sensors, y, readings, t, counters, ring):
         if flying[lane]:
             take_lane(y, lane, readings[lane])
             sample_reading(sensors[members[lane]], readings[lane], t, counters[lane], ring[lane])
+
+
+@kernel
+def disturb_lanes(members, flying, Es, seeds, counters, t, accs, acc):
+    """The disturbance from time t on, of every lane that flies, into acc (6, LANES); accs has a row a lane."""
+    for lane in range(LANES):
+        if flying[lane]:
+            hold_disturbance(Es[members[lane]], seeds[members[lane]], counters[lane], t, accs[lane])
+            put_lane(accs[lane], lane, acc)
+
+
+@kernel
+def command_lanes(members, flying, Fs, cmds, step, dt, queue, wanted, cmd):
+    """The commands that a step flies by, late where effects say so, into cmd (3, LANES)."""
+    for lane in range(LANES):
+        if flying[lane]:
+            commands_in_force(Fs[members[lane]], cmds[lane], step, dt, queue[lane], wanted[lane])
+            put_lane(wanted[lane], lane, cmd)
 
 
 @kernel
@@ -87,7 +105,7 @@ def estimate_lanes(P, Cs, members, flying, ests, aps, navs, x, est, nav, sent, t
             if navs[lane, ctl.NAV_RUNNING] == 0.0:
                 start_filter(P, navs[lane], ests[lane], t)
                 put_lane(navs[lane], lane, nav)
-            put_lane(ests[lane], lane, est)
+            put_lane(ests[lane, : ctl.EST_U], lane, est)  # the samples, and before them what the filter writes
             put_lane(aps[lane, ctl.SENT_SERVO : ctl.SENT_SERVO + 3], lane, sent)
             for i in range(N_X):
                 nav[ctl.NAV_GIVEN + i, lane] = x[i, lane]
@@ -138,19 +156,17 @@ def fly_lanes(
     for lane in range(count):
         ends[members[lane]] = 0.0
         ticks[members[lane]] = 0
-    tick, step, t = 0, 0, 0.0
+    tick, step, hold, t = 0, 0, -1, 0.0
     read_world(as_wide(Fw), effects, as_wide(x), as_wide(y))
     sample_lanes(members, flying, sensors, y, readings, 0.0, counters, ring)
     while flying.any():
         t = tick * Cs[members[0], ctl.DT]
         while step * dt < t - 0.5 * dt:
-            for lane in range(LANES):
-                if flying[lane]:
-                    flight = members[lane]
-                    hold_disturbance(Es[flight], seeds[flight], counters[lane], step * dt, accs[lane])
-                    commands_in_force(Fs[flight], cmds[lane], step, dt, queue[lane], wanted[lane])
-                    put_lane(accs[lane], lane, acc)
-                    put_lane(wanted[lane], lane, cmd)
+            if hold_number(step * dt) != hold:
+                hold = hold_number(step * dt)
+                disturb_lanes(members, flying, Es, seeds, counters, step * dt, accs, acc)
+            if effects:
+                command_lanes(members, flying, Fs, cmds, step, dt, queue, wanted, cmd)
             wide_step(effects, Pw, Fw, Ew, sea, x, cmd, acc, work, y, step * dt, dt)
             step += 1
             sample_lanes(members, flying, sensors, y, readings, step * dt, counters, ring)
@@ -169,6 +185,7 @@ def fly_lanes(
             flight, state, ap = members[lane], states[lane], aps[lane]
             end = ends[flight]
             decide(P, Cs[flight], legs[flight, : rows[flight]], ests[lane], ap, navs[lane], cmds[lane], t)
+            put_lane(cmds[lane], lane, cmd)
             take_lane(x, lane, state)
             if ap[ctl.MODE] == ctl.FLYING:
                 add_up(ests[lane], ap, state, last[lane], end)
