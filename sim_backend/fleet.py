@@ -6,8 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from firmware.autopilot import Autopilot
-from firmware.core.layouts.control_layout import COMPLETED, N_LEG
-from sim_backend.core.closed_loop import END_LEG, END_MODE, END_REASON, END_TIME, N_END, N_TRACE, TRACE, fly_many
+from firmware.core.layouts.control_layout import COMPLETED, ESTIMATOR, N_LEG
+from firmware.core.maths.wide import LANES
+from sim_backend.core.closed_loop import END_LEG, END_MODE, END_REASON, END_TIME, N_END, N_TRACE, TRACE
+from sim_backend.core.closed_loop_lanes import fly_batch, fly_lanes
 from sim_backend.core.layout import N_WAVE
 from sim_backend.world import World
 
@@ -35,17 +37,23 @@ class FleetResult:
         return self.traces[:, :, TRACE.index(name)]
 
 
-def fly_fleet(
-    worlds: Sequence[World], pilots: Sequence[Autopilot], *, max_seconds: float, trace_every: float = 0.0
-) -> FleetResult:
-    """Fly pilot i in world i, for all i at once over all cores. The worlds do not move; their states are copied.
+def groups_of(worlds: Sequence[World], pilots: Sequence[Autopilot]) -> tuple[np.ndarray, np.ndarray]:
+    """Flights that go side by side: their numbers (groups, LANES), and how many of a row count (groups,).
 
-    All pilots have the same model and run at the same step. trace_every in s; 0 keeps no trace.
+    Those of a group all have effects, or none has, and their autopilots have the same kind of estimate. A row that is
+    not full is filled with its last flight.
     """
+    kinds: dict[tuple[bool, float], list[int]] = {}
+    for number, (world, pilot) in enumerate(zip(worlds, pilots, strict=True)):
+        kinds.setdefault((bool(world.F.any()), float(pilot.C[ESTIMATOR])), []).append(number)
+    rows = [alike[i : i + LANES] for alike in kinds.values() for i in range(0, len(alike), LANES)]
+    filled = [row + row[-1:] * (LANES - len(row)) for row in rows]
+    return np.array(filled, dtype=np.int64), np.array([len(row) for row in rows], dtype=np.int64)
+
+
+def stacked(worlds: Sequence[World], pilots: Sequence[Autopilot]) -> tuple:
+    """What fly_lanes and fly_batch take of flights, from P_plants to xs; the states are copies."""
     n, first = len(worlds), pilots[0]
-    step = float(first.C[0])
-    every = max(1, round(trace_every / step)) if trace_every else 1
-    lines = int(max_seconds / step) // every + 1 if trace_every else 0
     rows = np.array([len(pilot.legs) for pilot in pilots])
     legs = np.full((n, rows.max(), N_LEG), np.nan)
     waves = np.zeros((n, max(len(world.waves) for world in worlds), N_WAVE))
@@ -53,17 +61,44 @@ def fly_fleet(
     for i, (world, pilot) in enumerate(zip(worlds, pilots, strict=True)):
         legs[i, : rows[i]] = pilot.legs
         waves[i, : len(world.waves)] = world.waves
-    states = np.array([world.x for world in worlds])
-    traces, ends = np.full((n, lines, N_TRACE), np.nan), np.zeros((n, N_END))
-    ticks = np.zeros(n, dtype=np.int64)
-    fly_many(
+    return (
         np.array([world.P for world in worlds]), first.P, np.array([pilot.C for pilot in pilots]), legs, rows,
         first.nav, np.array([world.E for world in worlds]), np.array([world.F for world in worlds]), waves,
-        np.array([world.sensors for world in worlds]),
-        np.array([world.errors for world in worlds]), np.array([world.seed for world in worlds]), states,
-        worlds[0].dt, int(max_seconds / step), every, traces, ends, ticks,
+        np.array([world.sensors for world in worlds]), np.array([world.errors for world in worlds]),
+        np.array([world.seed for world in worlds]), np.array([world.x for world in worlds]),
+    )  # fmt: skip
+
+
+def fly_group(
+    worlds: Sequence[World], pilots: Sequence[Autopilot], max_ticks: int, every: int, traces: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Fly up to LANES flights of one group on this thread: ends (n, N_END), ticks (n,), and every `every`-th tick into
+    traces (n or more, lines, N_TRACE)."""
+    ends, ticks = np.zeros((len(worlds), N_END)), np.zeros(len(worlds), dtype=np.int64)
+    (members,), (count,) = groups_of(worlds, pilots)
+    fly_lanes(
+        members, int(count), *stacked(worlds, pilots), worlds[0].dt, max_ticks, every, traces, ends, ticks
+    )  # fmt: skip
+    return ends, ticks
+
+
+def fly_fleet(
+    worlds: Sequence[World], pilots: Sequence[Autopilot], *, max_seconds: float, trace_every: float = 0.0
+) -> FleetResult:
+    """Fly pilot i in world i, for all i at once over all cores. The worlds do not move; their states are copied.
+
+    All pilots have the same model and run at the same step. trace_every in s; 0 keeps no trace. What comes of a flight
+    does not depend on those beside it.
+    """
+    n, step = len(worlds), float(pilots[0].C[0])
+    every = max(1, round(trace_every / step)) if trace_every else 1
+    lines = int(max_seconds / step) // every + 1 if trace_every else 0
+    traces, ends = np.full((n, lines, N_TRACE), np.nan), np.zeros((n, N_END))
+    ticks, tables = np.zeros(n, dtype=np.int64), stacked(worlds, pilots)
+    fly_batch(
+        *groups_of(worlds, pilots), *tables, worlds[0].dt, int(max_seconds / step), every, traces, ends, ticks
     )  # fmt: skip
     return FleetResult(
         modes=ends[:, END_MODE], reasons=ends[:, END_REASON], seconds=ends[:, END_TIME],
-        legs=ends[:, END_LEG].astype(int), ticks=ticks, ends=ends, states=states, traces=traces,
+        legs=ends[:, END_LEG].astype(int), ticks=ticks, ends=ends, states=tables[-1], traces=traces,
     )  # fmt: skip

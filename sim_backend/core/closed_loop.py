@@ -1,12 +1,13 @@
-"""Whole closed-loop flights in compiled code: world, sensors, autopilot and limits, one flight or many over all cores.
+"""A whole closed-loop flight in compiled code: world, sensors, autopilot and limits.
 
-The kernels are the ones that the real runtime calls; only the Python around them is gone.
+The kernels are the ones that the real runtime calls; only the Python around them is gone. Many flights side by side:
+closed_loop_lanes.
 """
 
 import numpy as np
 
 from firmware.core.control.autopilot import reset, tick
-from firmware.core.jit import kernel, parallel_kernel, prange
+from firmware.core.jit import kernel
 from firmware.core.layouts import control_layout as ctl
 from firmware.core.vehicle.layout import N_P, N_X, X_ACT, X_DOWN, X_EAST, X_NORTH
 from firmware.core.vehicle.state import euler_angles
@@ -53,6 +54,14 @@ def add_up(est, ap, x, last, end):
 
 
 @kernel
+def sum_up(ap, t, flown, end):
+    """How the flight that ended at t (s) did, and the means of its errors over the ticks flown, into end."""
+    end[END_MODE], end[END_REASON], end[END_TIME], end[END_LEG] = ap[ctl.MODE], ap[ctl.REASON], t, ap[ctl.LEG]
+    for i in range(END_ERROR_DEPTH, END_TRAVEL_SERVO):
+        end[i] /= max(flown, 1)
+
+
+@kernel
 def fly(P_plant, P, C, legs, nav, E, F, waves, sensors, errors, seed, x, dt, max_ticks, every, trace, end):
     """Fly one mission from state x (N_XF, in place) until it ends or max_ticks are over; returns the ticks flown.
 
@@ -78,11 +87,11 @@ def fly(P_plant, P, C, legs, nav, E, F, waves, sensors, errors, seed, x, dt, max
         t = ticks * C[ctl.DT]
         if effects:
             move_with_effects(
-                P_plant, effective, F, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, queue, work, dt, t
+                effective, F, E, waves, sensors, seed, x, cmd, acc, counters, ring, queue, work, dt, t
             )  # fmt: skip
         else:
-            move(P_plant, F, E, waves, sensors, errors, seed, x, cmd, acc, counters, ring, work, dt, t)
-        deliver(sensors, counters[wl.C_STEP] * dt, counters, ring, frame)
+            move(P_plant, F, E, waves, sensors, seed, x, cmd, acc, counters, ring, work, dt, t)
+        deliver(P_plant, E, sensors, errors, seed, counters[wl.C_STEP] * dt, counters, ring, frame)
         if C[ctl.ESTIMATOR] == ctl.GIVEN:
             memory[ctl.NAV_GIVEN : ctl.NAV_GIVEN + N_X] = x[:N_X]
         tick(P, C, legs, frame, est, ap, memory, cmd, t)
@@ -92,27 +101,5 @@ def fly(P_plant, P, C, legs, nav, E, F, waves, sensors, errors, seed, x, dt, max
         if ticks % every == 0 and ticks // every < trace.shape[0]:
             write_trace(t, est, ap, cmd, x, trace[ticks // every])
         ticks += 1
-    end[END_MODE], end[END_REASON], end[END_TIME], end[END_LEG] = ap[ctl.MODE], ap[ctl.REASON], t, ap[ctl.LEG]
-    for i in range(END_ERROR_DEPTH, END_TRAVEL_SERVO):
-        end[i] /= max(flown, 1)
+    sum_up(ap, t, flown, end)
     return ticks
-
-
-@parallel_kernel
-def fly_many(
-    P_plants, P, Cs, legs, rows, nav, Es, Fs, waves, sensors, errors, seeds, xs, dt, max_ticks, every, traces, ends,
-    ticks,
-):  # fmt: skip
-    """`fly` for n flights, shared out over all cores; a flight does not depend on how many fly beside it.
-
-    Shared: P and nav (the autopilots' model and filter), dt, max_ticks, every. Of each flight: P_plants (n, N_P),
-    Cs (n, N_C), legs (n, most, N_LEG) of which rows (n,) count, Es (n, N_E), Fs (n, N_F),
-    waves (n, components, N_WAVE), sensors (n, N_SENSORS, N_SENSOR_FIELDS), errors (n, 2, N_ERRORS),
-    seeds (n,) uint64, xs (n, N_XF) in place,
-    traces (n, lines, N_TRACE), ends (n, N_END), ticks (n,) int64.
-    """
-    for i in prange(P_plants.shape[0]):
-        ticks[i] = fly(
-            P_plants[i], P, Cs[i], legs[i, : rows[i]], nav, Es[i], Fs[i], waves[i], sensors[i], errors[i], seeds[i],
-            xs[i], dt, max_ticks, every, traces[i], ends[i],
-        )  # fmt: skip

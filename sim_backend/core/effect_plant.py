@@ -107,18 +107,33 @@ def effect_step(method, P, F, x, mode, c_servo, c_slider, c_ballast, since, acc,
 
 
 @kernel
-def effect_world_step(P, F, E, waves, x, cmd, step, dt, acc, queue, work):
-    """One step (number `step`) of effective parameters P with effects F in this environment, in place.
-
-    The environment's water is that of the middle of the step, the force of surface and floor that of its start; work
-    is (N_WORK, WORK_WIDTH) of scratch.
-    """
-    t = step * dt
-    water, wanted = work[wl.W_WATER, 0:3], work[wl.W_WATER, 3:6]
-    water[0], water[1], water[2] = water_velocity(E, waves, x[X_NORTH], x[X_EAST], x[X_DOWN], t + 0.5 * dt)
-    force = boundary_force(P, E, x, water[2])
+def commands_in_force(F, cmd, step, dt, queue, wanted):
+    """The commands that a step flies by into wanted (3,): cmd (3,), or what it was a delay ago."""
     if F[ef.COMMAND_DELAY] > 0.0:
         delayed_commands(queue, cmd, step, F[ef.COMMAND_DELAY], dt, wanted)
     else:
         wanted[0], wanted[1], wanted[2] = cmd[0], cmd[1], cmd[2]
+
+
+@kernel
+def effect_sea_step(P, F, E, waves, x, wanted, t, dt, acc, work):
+    """One step of effective parameters P with effects F in this environment from time t on, in place.
+
+    wanted (3,): commands in force. The environment's water is that of the middle of the step, the force of surface and
+    floor that of its start.
+    """
+    water = work[wl.W_WATER, 0:3]
+    water[0], water[1], water[2] = water_velocity(E, waves, x[X_NORTH], x[X_EAST], x[X_DOWN], t + 0.5 * dt)
+    force = boundary_force(P, E, x, water[2])
     effect_step(RK4, P, F, x, 0, wanted[0], wanted[1], wanted[2], t, acc, force, water, dt, work)
+
+
+@kernel
+def effect_world_step(P, F, E, waves, x, cmd, step, dt, acc, queue, work):
+    """One step (number `step`) of effective parameters P with effects F in this environment, in place.
+
+    work is (N_WORK, WORK_WIDTH) of scratch.
+    """
+    wanted = work[wl.W_WATER, 3:6]
+    commands_in_force(F, cmd, step, dt, queue, wanted)
+    effect_sea_step(P, F, E, waves, x, wanted, step * dt, dt, acc, work)

@@ -3,6 +3,7 @@
 import math
 
 from firmware.core.jit import kernel
+from firmware.core.maths.wide import anywhere, where
 from firmware.core.vehicle.layout import GRAVITY, M_T, X_DOWN
 from firmware.core.vehicle.state import rotation, velocities
 from sim_backend.core import layout as wl
@@ -42,11 +43,15 @@ def boundary_force(P, E, x, water_d):
     water_d: speed of the water downward, m/s.
     """
     down, force = x[X_DOWN], 0.0
-    if E[wl.ENV_SURFACE_HEIGHT] > 0.0 and down < 0.0:
-        force += P[M_T] * GRAVITY * min(1.0, -down / E[wl.ENV_SURFACE_HEIGHT])
-    if E[wl.ENV_FLOOR_DEPTH] > 0.0 and down > E[wl.ENV_FLOOR_DEPTH]:
+    out = (E[wl.ENV_SURFACE_HEIGHT] > 0.0) & (down < 0.0)
+    if anywhere(out):
+        lost = P[M_T] * GRAVITY * min(1.0, -down / E[wl.ENV_SURFACE_HEIGHT])
+        force += where(out, lost, 0.0)
+    below = (E[wl.ENV_FLOOR_DEPTH] > 0.0) & (down > E[wl.ENV_FLOOR_DEPTH])
+    if anywhere(below):
         _, _, _, _, _, _, r31, r32, r33 = rotation(x)
         u, v, w, _, _, _ = velocities(x)
         down_rate = r31 * u + r32 * v + r33 * w + water_d
-        force -= max(0.0, wl.FLOOR_STIFFNESS * (down - E[wl.ENV_FLOOR_DEPTH]) + wl.FLOOR_DAMPING * down_rate)
+        held = max(0.0, wl.FLOOR_STIFFNESS * (down - E[wl.ENV_FLOOR_DEPTH]) + wl.FLOOR_DAMPING * down_rate)
+        force -= where(below, held, 0.0)
     return force

@@ -36,9 +36,15 @@ def plant_step(P, E, waves, x, cmd, t, dt, acc, work):
 
 
 @kernel
+def hold_number(t):
+    """Which of the disturbance's holds t (s) is in."""
+    return int(t / DISTURBANCE_HOLD + 1e-9)
+
+
+@kernel
 def hold_disturbance(E, seed, counters, t, acc):
     """Refresh the disturbance acceleration when its 0.1 s are over; the same t always gives the same numbers."""
-    hold = int(t / DISTURBANCE_HOLD + 1e-9)
+    hold = hold_number(t)
     if hold == counters[wl.C_HOLD]:
         return
     counters[wl.C_HOLD] = hold

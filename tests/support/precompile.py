@@ -12,6 +12,7 @@ from pathlib import Path
 
 from firmware.core.jit import kernel_count
 from tools.flight.precompile import Work
+from tools.study.precompile import CAMPAIGN
 
 
 def _identify_a_moment() -> None:
@@ -38,17 +39,6 @@ def _challenge_a_moment() -> None:
         make(Order(out, 6, Counts(single=0, none=1, pairs=0, unknown=0), out / "answers.zip"), jobs=1)
 
 
-def _fly_a_fleet_a_moment() -> None:
-    """Two flights as campaigns and tunings fly them, one of them with effects."""
-    from sim_backend.fleet import fly_fleet
-    from tools.flight.compose import build_flight
-    from tools.flight.precompile import EFFECTS
-
-    flights = [build_flight(mission="sawtooth", effects=effects) for effects in ({}, EFFECTS)]
-    worlds, pilots = [flight.board.world for flight in flights], [flight.autopilot for flight in flights]
-    fly_fleet(worlds, pilots, max_seconds=2.0, trace_every=1.0)
-
-
 def _glide_a_moment() -> None:
     """Four dives of an ocean glider: identified, measured, watched."""
     from tests.support.ocean import as_case, fly_dives
@@ -64,7 +54,7 @@ def _glide_a_moment() -> None:
 WORKS = (
     Work("identification", kernel_count, _identify_a_moment),
     Work("challenge", kernel_count, _challenge_a_moment),
-    Work("fleet", kernel_count, _fly_a_fleet_a_moment),
+    CAMPAIGN,
     Work("ocean", kernel_count, _glide_a_moment),
 )
 

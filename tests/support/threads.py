@@ -12,6 +12,7 @@ from pathlib import Path
 import numba
 import numpy as np
 
+from firmware.core.maths.wide import LANES
 from sim_backend.core.effects import effect_layout as ef
 from sim_backend.fleet import fly_fleet
 from tests.support.cases import make_case
@@ -27,8 +28,8 @@ THREADS = 2
 
 
 def fleet(folder: Path) -> list[np.ndarray]:
-    """Closed-loop flights beside each other."""
-    flights = [build_flight(mission="spiral", seed=seed) for seed in range(4)]
+    """Closed-loop flights beside each other, in two groups."""
+    flights = [build_flight(mission="spiral", seed=seed) for seed in range(LANES + 1)]
     worlds, pilots = [flight.board.world for flight in flights], [flight.autopilot for flight in flights]
     found = fly_fleet(worlds, pilots, max_seconds=20.0, trace_every=1.0)
     return [found.states, found.traces]

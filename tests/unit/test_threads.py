@@ -11,7 +11,7 @@ from tests.support.threads import THREADS
 
 # Where the kernels stand that tests.support.threads calls, one way or another.
 SHARED_OUT = {
-    "fly_followed", "fly_many", "fly_open_loop_many", "fly_windows", "filter_runs", "follow_runs", "log_densities",
+    "fly_batch", "fly_followed", "fly_open_loop_many", "fly_windows", "filter_runs", "follow_runs", "log_densities",
     "read_rows", "simulate_runs", "walk_chains",
 }  # fmt: skip
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from tools.cli.common import json_option, print_json, progress, say
+from tools.cli.common import compile_campaign, json_option, print_json, progress, say
 
 PAIR: dict[str, Any] = {"nargs": 2, "type": float, "metavar": "LOW HIGH"}
 # option -> key of the campaign file that it stands in for
@@ -76,6 +76,7 @@ def campaign(campaign, design, out, jobs, dask, chunk, as_json, **options) -> No
     wanted = with_options(wanted, given)
     plan = build_plan(wanted, base)
     folder = out or Path(f"{wanted.name}-campaign")
+    compile_campaign()
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)  # or its processes would outlive it
     try:
         with progress(f"campaign {wanted.name}", plan.flights) as advance:

@@ -73,6 +73,14 @@ def compile_diagnosis(case: Any) -> None:
         ensure_compiled(DIAGNOSIS, say, progress)
 
 
+def compile_campaign() -> None:
+    """Compile what flies many flights side by side, unless that was done."""
+    from tools.flight.precompile import ensure_compiled
+    from tools.study.precompile import CAMPAIGN
+
+    ensure_compiled(CAMPAIGN, say, progress)
+
+
 def report_errors(command: click.Command) -> int:
     """Run the command line; turn what a user can cause into one line and exit code 2."""
     from hal.strict import ConfigError

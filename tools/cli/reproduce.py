@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from tools.cli.common import json_option, print_json, say
+from tools.cli.common import compile_campaign, json_option, print_json, say
 
 FIGURES = ("fig4", "fig5", "fig6", "fig7")
 
@@ -30,6 +30,8 @@ def reproduce(figures, vehicle, seeds, noise, out, as_json) -> None:
     the_vehicle = load_vehicle(vehicle)
     out.mkdir(parents=True, exist_ok=True)
     results = []
+    if set(figures) != {"fig4"}:
+        compile_campaign()
     for name in figures:
         say(f"{name} ...")
         if name == "fig4":

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tools.cli.common import json_option, print_json, progress
+from tools.cli.common import compile_campaign, json_option, print_json, progress
 
 if TYPE_CHECKING:
     from firmware.model.gains import Control
@@ -41,6 +41,7 @@ def tune(vehicle: str, method: str, seed: int, budget: int, as_json: bool) -> No
     control = ruled = rule.tune(the_vehicle, board)
     result: dict[str, Any] = {"method": method, "vehicle": the_vehicle.name}
     if method == "search":
+        compile_campaign()
         with progress("gains tried", 2 * budget) as advance:
             control, found = search.search(the_vehicle, ruled, seed, budget, advance)
         result["seed"] = seed

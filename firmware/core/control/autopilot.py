@@ -49,6 +49,12 @@ def tick(P, C, legs, frame, est, ap, nav, cmd, t):
         take_as_measured(est)
     else:
         navigate(P, C, nav, est, ap, t)
+    decide(P, C, legs, est, ap, nav, cmd, t)
+
+
+@kernel
+def decide(P, C, legs, est, ap, nav, cmd, t):
+    """The part of a tick behind the estimate: legs, targets, controller, limits; cmd (3,) out."""
     sequence(C, legs, est, ap, t)
     if ap[ctl.MODE] == ctl.FLYING:
         follow(C, legs, est, ap)

@@ -33,10 +33,11 @@ from firmware.core.estimation.estimator_update import estimator_update
 from firmware.core.jit import kernel
 from firmware.core.layouts import estimator_layout as kf
 from firmware.core.maths.steps import MIDPOINT, end_stage
+from firmware.core.maths.wide import anywhere, everywhere, where
 from firmware.core.vehicle.actuators import actuator_rates
 from firmware.core.vehicle.flight import add_accelerations, state_derivative
 from firmware.core.vehicle.layout import N_X, SERVO_TAU, X_NU
-from firmware.core.vehicle.linearise import linearise, linearise_motion, model_error
+from firmware.core.vehicle.linearise import N_POINT, linearise, linearise_motion, model_error
 from firmware.core.vehicle.state import actuators, normalise_attitude
 
 T0, R0 = kf.W_T * kf.N_W, kf.W_TURNED * kf.N_W  # in the flat work: T = F cov, and A's columns
@@ -137,7 +138,7 @@ def predict_covariance(cov, A, d, dt, work):
         to, row = T0 + i * kf.N_W, i * kf.N_E
         t3, t4, t5, t6, t7, t8 = m[to + 3], m[to + 4], m[to + 5], m[to + 6], m[to + 7], m[to + 8]
         t9, ta, tb, tc, td, te = m[to + 9], m[to + 10], m[to + 11], m[to + 12], m[to + 13], m[to + 14]
-        for j in range(kf.N_MOVING):
+        for j in range(i + 1):  # what is beyond the diagonal comes from the other side of it
             p[row + j] = m[to + j] + dt * (
                 t3 * m[R0 + j] + t4 * m[R0 + kf.N_W + j] + t5 * m[R0 + 2 * kf.N_W + j]
                 + t6 * m[R0 + 3 * kf.N_W + j] + t7 * m[R0 + 4 * kf.N_W + j] + t8 * m[R0 + 5 * kf.N_W + j]
@@ -179,10 +180,10 @@ def add_process_noise(settings, x, cov, C, d, ds, dl, db, dt):
 
 
 @kernel
-def error_covariance(P, settings, sigma, x, ds, dl, db, A, C, work):
-    """A at x, and C (6, 6), the covariance of the model's error there, from parameters and the draw-wires' biases."""
-    y, g, Pt = work[kf.W_POINT], work[kf.W_SCRATCH + 3], work[kf.W_SCRATCH + 4]
-    linearise(P, x, ds, dl, db, A, y)
+def error_covariance(P, settings, sigma, ds, dl, db, C, work):
+    """C (6, 6), the covariance of the model's error where A was taken, from parameters and the draw-wires' biases."""
+    A, y = work[kf.W_A : kf.W_A + kf.N_MOVING], work[kf.W_POINT]
+    g, Pt = work[kf.W_SCRATCH + 3], work[kf.W_SCRATCH + 4]
     model_error(P, sigma, ds, dl, db, y, C, Pt, g)
     # a biased draw-wire is a mass that is not where the filter has it
     for i in range(6):
@@ -215,29 +216,64 @@ def moved(x, y):
     """Have speeds changed by more than MOVED_SHARE of the speed, or rates by MOVED_RATE, since y = [k, nu, ..]?"""
     change, turn, speed = 0.0, 0.0, 0.0
     for i in range(3):
-        change += (x[X_NU + i] - y[3 + i]) ** 2
-        turn += (x[X_NU + 3 + i] - y[6 + i]) ** 2
+        faster, turning = x[X_NU + i] - y[3 + i], x[X_NU + 3 + i] - y[6 + i]
+        change += faster * faster
+        turn += turning * turning
         speed += y[3 + i] * y[3 + i]
-    return change > kf.MOVED_SHARE * kf.MOVED_SHARE * speed or turn > kf.MOVED_RATE * kf.MOVED_RATE
+    return (change > kf.MOVED_SHARE * kf.MOVED_SHARE * speed) | (turn > kf.MOVED_RATE * kf.MOVED_RATE)
+
+
+@kernel
+def take_over(due, fresh, kept):
+    """The rows of `fresh` into those of `kept` where `due` says so."""
+    for i in range(kept.shape[0]):
+        for j in range(kf.N_COUPLED):
+            kept[i, j] = where(due, fresh[i, j], kept[i, j])
+
+
+@kernel
+def linearise_anew(P, x, ds, dl, db, due, work):
+    """A at x and the point that it is taken at, into work, where `due` says so."""
+    A, y = work[kf.W_A : kf.W_A + kf.N_MOVING], work[kf.W_POINT]
+    if everywhere(due):
+        linearise(P, x, ds, dl, db, A, y)
+        return
+    fresh, point = work[kf.W_T : kf.W_T + kf.N_MOVING], work[kf.W_K]
+    linearise(P, x, ds, dl, db, fresh, point)
+    take_over(due, fresh[kf.E_NU :], A[kf.E_NU :])
+    for i in range(N_POINT):
+        y[i] = where(due, point[i], y[i])
+
+
+@kernel
+def error_anew(P, settings, sigma, ds, dl, db, due, work):
+    """The covariance C of the model's error where A was taken, into work, where `due` says so."""
+    C, fresh = work[kf.W_C : kf.W_C + 6], work[kf.W_DRIVE : kf.W_DRIVE + 6]
+    if everywhere(due):
+        error_covariance(P, settings, sigma, ds, dl, db, C, work)
+        return
+    error_covariance(P, settings, sigma, ds, dl, db, fresh, work)
+    for i in range(6):
+        for j in range(6):
+            C[i, j] = where(due, fresh[i, j], C[i, j])
 
 
 @kernel
 def linearise_where_due(P, settings, sigma, x, ds, dl, db, dt, work):
     """A at x into work; equation (1) linearised anew, and C, where their time is over or speeds have changed."""
-    A, C = work[kf.W_A : kf.W_A + kf.N_MOVING], work[kf.W_C : kf.W_C + 6]
-    turned = work[kf.W_TURNED : kf.W_TURNED + kf.N_COUPLED - kf.E_ATT]
+    A, turned = work[kf.W_A : kf.W_A + kf.N_MOVING], work[kf.W_TURNED : kf.W_TURNED + kf.N_COUPLED - kf.E_ATT]
     held = work[kf.W_HELD]
-    still = not moved(x, work[kf.W_POINT])
-    if still and held[0] >= 0.5 * dt:
+    gone = moved(x, work[kf.W_POINT])
+    due = gone | (held[0] < 0.5 * dt)
+    error_due = due & (gone | (held[1] < 0.5 * dt))
+    if anywhere(due):
+        linearise_anew(P, x, ds, dl, db, due, work)
+    if not everywhere(due):
         linearise_motion(x, work[kf.W_POINT], A)
-    elif still and held[1] >= 0.5 * dt:
-        linearise(P, x, ds, dl, db, A, work[kf.W_POINT])
-        held[0] = kf.HOLD_LINEARISED
-    else:
-        error_covariance(P, settings, sigma, x, ds, dl, db, A, C, work)
-        held[0], held[1] = kf.HOLD_LINEARISED, kf.HOLD_ERROR
-    held[0] -= dt
-    held[1] -= dt
+    if anywhere(error_due):
+        error_anew(P, settings, sigma, ds, dl, db, error_due, work)
+    held[0] = where(due, kf.HOLD_LINEARISED, held[0]) - dt
+    held[1] = where(error_due, kf.HOLD_ERROR, held[1]) - dt
     for k in range(kf.N_COUPLED - kf.E_ATT):
         for i in range(kf.N_MOVING):
             turned[k, i] = A[i, kf.E_ATT + k]
@@ -249,7 +285,9 @@ def estimator_predict(P, settings, sigma, x, cov, inflation, mode, c_servo, c_sl
     A, C, drive = work[kf.W_A : kf.W_A + kf.N_MOVING], work[kf.W_C : kf.W_C + 6], work[kf.W_DRIVE : kf.W_DRIVE + 6]
     k, y, d = work[kf.W_SCRATCH], work[kf.W_SCRATCH + 1], work[kf.W_SCRATCH + 2]
     scratch = work[kf.W_SCRATCH + 3]
-    steps = max(1, math.ceil(dt / kf.MAX_STEP - 1e-9))
+    steps = 1
+    while anywhere(steps < dt / kf.MAX_STEP - 1e-9):
+        steps += 1
     h = dt / steps
     for _ in range(steps):
         ds, dl, db = actuator_speeds(P, x, mode, c_servo, c_slider, c_ballast)
@@ -281,7 +319,8 @@ def estimator_start(P, settings, sigma, x, cov, spread, work):
             cov[i, j] = 0.0
     for i in range(kf.N_E):
         cov[i, i] = spread[i] * spread[i]
-    error_covariance(P, settings, sigma, x, 0.0, 0.0, 0.0, A, C, work)
+    linearise(P, x, 0.0, 0.0, 0.0, A, work[kf.W_POINT])
+    error_covariance(P, settings, sigma, 0.0, 0.0, 0.0, C, work)
     work[kf.W_HELD, 0], work[kf.W_HELD, 1] = 0.0, 0.0
     for i in range(6):
         for j in range(6):

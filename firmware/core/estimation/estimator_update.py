@@ -5,6 +5,7 @@ import math
 from firmware.core.jit import kernel
 from firmware.core.layouts import estimator_layout as kf
 from firmware.core.maths.rotations import wrap_angle
+from firmware.core.maths.wide import anywhere, where
 from firmware.core.vehicle.actuators import clip
 from firmware.core.vehicle.layout import SERVO_MAX, SERVO_MIN, X_ACT, X_DOWN, X_NU, X_QUAT
 from firmware.core.vehicle.state import euler_angles, normalise_attitude, quaternion
@@ -21,18 +22,37 @@ def widen(cov, column, h0, h1, h2, grow):
 
 
 @kernel
-def update_scalar(cov, taken, n, dx, column, h0, h1, h2, other, innovation, R, rejected_for_s, dt):
-    """One measurement, h . error[column : column + 3] + error[other] = innovation, variance R, into dx and row n of
-    `taken`: the covariance is cov less the sum of r r' over rows r of `taken`, and cov itself waits.
+def out_of_gate(cov, v, column, h0, h1, h2, left, seen, R, jumped):
+    """Variance of an innovation that is taken although it is out of the gate: where its quantity has jumped.
 
-    `other` is the sensor's bias in E, 0 where the state has none. rejected_for_s: how long this sensor has
-    been out of the gate. Returns the innovation in sigma, the new `rejected_for_s`, and how many rows there are now.
+    The measured quantity may have jumped: cov + grow h h' is positive definite, and hardly moves anything else.
     """
-    v = taken[n]
+    h = h0 * h0 + h1 * h1 + h2 * h2
+    wanted = (left / kf.GATE) * (left / kf.GATE) - R
+    grow = where(jumped, (wanted - seen) / (h * h), 0.0)
+    v[column] += grow * h * h0
+    v[column + 1] += grow * h * h1
+    v[column + 2] += grow * h * h2
+    widen(cov, column, h0, h1, h2, grow)
+    return where(jumped, wanted, seen) + R
+
+
+@kernel
+def update_scalar(cov, taken, used, m, dx, column, h0, h1, h2, other, innovation, here, R, rejected_for_s, dt):
+    """Measurement number m, h . error[column : column + 3] + error[other] = innovation, variance R, into dx and row m
+    of `taken`: the covariance is cov less the sum of r r' over the rows r that are `used`, and cov itself waits.
+
+    `here`: whether there is a measurement; `other` is the sensor's bias in E, 0 where the state has none.
+    rejected_for_s: how long this sensor has been out of the gate. Returns the innovation in sigma, the new
+    `rejected_for_s`, and the rows used now, a bit each.
+    """
+    v = taken[m]
     bias = 1.0 if other > 0 else 0.0
     for i in range(kf.N_E):
         v[i] = h0 * cov[column, i] + h1 * cov[column + 1, i] + h2 * cov[column + 2, i] + bias * cov[other, i]
-    for k in range(n):
+    for k in range(m):
+        if not used & (1 << k):
+            continue
         r = taken[k]
         along = h0 * r[column] + h1 * r[column + 1] + h2 * r[column + 2] + bias * r[other]
         for i in range(kf.N_E):
@@ -41,39 +61,44 @@ def update_scalar(cov, taken, n, dx, column, h0, h1, h2, other, innovation, R, r
     left = innovation - (h0 * dx[column] + h1 * dx[column + 1] + h2 * dx[column + 2] + bias * dx[other])
     S = seen + R
     score = left / math.sqrt(S)
-    if abs(score) > kf.GATE:
-        rejected_for_s += dt
-        if rejected_for_s < kf.REJECTED_AT_MOST or kf.E_NU <= column < kf.E_ACT:  # not so the gyro
-            return score, rejected_for_s, n
-        # the measured quantity may have jumped: cov + grow h h' is positive definite, and hardly moves anything else
-        h = h0 * h0 + h1 * h1 + h2 * h2
-        wanted = (left / kf.GATE) ** 2 - R
-        grow = (wanted - seen) / (h * h)
-        v[column] += grow * h * h0
-        v[column + 1] += grow * h * h1
-        v[column + 2] += grow * h * h2
-        widen(cov, column, h0, h1, h2, grow)
-        S = wanted + R
-    scale = 1.0 / math.sqrt(S)
+    out = here & (abs(score) > kf.GATE)
+    rejected_for_s = where(here, where(out, rejected_for_s + dt, 0.0), rejected_for_s)
+    take = here & ((abs(score) <= kf.GATE) | math.isnan(score))
+    if anywhere(out):
+        jumped = out & (rejected_for_s >= kf.REJECTED_AT_MOST) & (not kf.E_NU <= column < kf.E_ACT)  # not so the gyro
+        if anywhere(jumped):
+            S = out_of_gate(cov, v, column, h0, h1, h2, left, seen, R, jumped)
+            take = take | jumped
+            rejected_for_s = where(jumped, 0.0, rejected_for_s)
+    if not anywhere(take):
+        return score, rejected_for_s, used
+    scale = where(take, 1.0 / math.sqrt(S), 0.0)
+    step = where(take, left * scale, 0.0)
     for i in range(kf.N_E):
         v[i] *= scale
-        dx[i] += v[i] * (left * scale)
-    return score, 0.0, n + 1
+        dx[i] += v[i] * step
+    return score, rejected_for_s, used | (1 << m)
 
 
 @kernel
-def subtract_taken(cov, taken, n):
-    """cov less r r' for the first n rows r of `taken`, three in one go over cov."""
-    for k in range(n, n + 2):
-        for i in range(kf.N_E):
-            taken[k, i] = 0.0
-    for k in range(0, n, 3):
+def subtract_taken(cov, taken, used):
+    """cov less r r' for the rows r of `taken` that are used, three in one go over cov.
+
+    Which three does not hang on which others are used: so it does not on what is measured in other lanes.
+    """
+    for k in range(0, kf.N_Z, 3):
+        if not used & (7 << k):
+            continue
+        for n in range(k, k + 3):
+            if not used & (1 << n):
+                for i in range(kf.N_E):
+                    taken[n, i] = 0.0
         r0, r1, r2 = taken[k], taken[k + 1], taken[k + 2]
         for i in range(kf.N_E):
             a, b, c, row = r0[i], r1[i], r2[i], cov[i]
-            for j in range(kf.N_E):
+            for j in range(i + 1):
                 row[j] -= a * r0[j] + b * r1[j] + c * r2[j]
-    # rounding may differ between the two sides of the diagonal
+    # one side of the diagonal serves both: rounding might differ
     for i in range(kf.N_E):
         for j in range(i):
             cov[j, i] = cov[i, j]
@@ -111,14 +136,15 @@ def estimator_update(P, settings, x, cov, inflation, z, rejected_for_s, scores, 
     dt is the time since the last update; rejected_for_s (N_Z) is kept between calls. scores (N_Z) gets each innovation
     in sigma, NaN where there was no measurement.
     """
-    dx, taken, n = work[kf.W_SCRATCH], work[kf.W_K : kf.W_K + kf.N_Z + 2], 0
+    dx, taken, used = work[kf.W_SCRATCH], work[kf.W_K : kf.W_K + kf.N_Z], 0
     for i in range(kf.N_E):
         dx[i] = 0.0
     phi, theta, psi = euler_angles(x)
     sf, cf, st, ct = math.sin(phi), math.cos(phi), math.sin(theta), math.cos(theta)
     for m in range(kf.N_Z):
+        here = abs(z[m]) < kf.LARGEST
         scores[m] = math.nan
-        if not abs(z[m]) < kf.LARGEST:
+        if not anywhere(here):
             continue
         axis = m % 3
         column, h0, h1, h2, other = kf.E_NU + 3 + axis, 1.0, 0.0, 0.0, kf.BIAS_OF[m]
@@ -126,12 +152,14 @@ def estimator_update(P, settings, x, cov, inflation, z, rejected_for_s, scores, 
             column = kf.E_ATT
             if axis == 1:
                 h0, h1, h2, innovation = 0.0, cf, -sf, z[m] - theta
-            elif ct < kf.COS_PITCH_MIN:
-                continue
-            elif axis == 0:
-                h1, h2, innovation = sf * st / ct, cf * st / ct, wrap_angle(z[m] - phi)
             else:
-                h0, h1, h2, innovation = 0.0, sf / ct, cf / ct, wrap_angle(z[m] - psi)
+                here = here & (ct >= kf.COS_PITCH_MIN)
+                if not anywhere(here):
+                    continue
+                if axis == 0:
+                    h1, h2, innovation = sf * st / ct, cf * st / ct, wrap_angle(z[m] - phi)
+                else:
+                    h0, h1, h2, innovation = 0.0, sf / ct, cf / ct, wrap_angle(z[m] - psi)
         elif m <= kf.Z_R:
             innovation = z[m] - x[X_NU + 3 + axis]
         elif m == kf.Z_DEPTH:
@@ -142,11 +170,15 @@ def estimator_update(P, settings, x, cov, inflation, z, rejected_for_s, scores, 
             column, innovation = kf.E_POS + axis, z[m] - x[axis]
         if other > 0:
             innovation -= x[kf.X_ERR + other - kf.E_ERR]
-        scores[m], rejected_for_s[m], n = update_scalar(
-            cov, taken, n, dx, column, h0, h1, h2, other, innovation, settings[kf.S_R + m], rejected_for_s[m], dt
-        )
-        if column < kf.E_ACT and abs(scores[m]) > kf.GATE:
+        score, rejected_for_s[m], used = update_scalar(
+            cov, taken, used, m, dx, column, h0, h1, h2, other, innovation, here, settings[kf.S_R + m],
+            rejected_for_s[m], dt,
+        )  # fmt: skip
+        scores[m] = where(here, score, math.nan)
+        out = here & (abs(score) > kf.GATE)
+        if column < kf.E_ACT and anywhere(out):
             which = 0 if column < kf.E_ATT else 1
-            inflation[which] = min(inflation[which] * math.exp(kf.INFLATION_GROWTH * dt), kf.INFLATION_MAX)
-    subtract_taken(cov, taken, n)
+            grown = min(inflation[which] * math.exp(kf.INFLATION_GROWTH * dt), kf.INFLATION_MAX)
+            inflation[which] = where(out, grown, inflation[which])
+    subtract_taken(cov, taken, used)
     inject(P, x, dx)

@@ -11,6 +11,7 @@ from firmware.core.jit import kernel
 from firmware.core.layouts import control_layout as ctl
 from firmware.core.layouts import estimator_layout as kf
 from firmware.core.maths.rotations import euler_rates, quaternion_from_euler
+from firmware.core.maths.wide import anywhere, where
 from firmware.core.vehicle.layout import N_P, N_X, X_BALLAST, X_DOWN, X_EAST, X_NORTH, X_NU, X_QUAT, X_SLIDER
 from firmware.core.vehicle.state import actuators, euler_angles, rotation
 
@@ -20,37 +21,43 @@ EULER_LIMIT = 1.4  # rad; beyond it Euler rates mean nothing and samples are tak
 
 
 @kernel
+def is_new(est, nav, sensor):
+    """Whether this sensor's newest sample has not been used; from now on it has."""
+    newest, used = est[ctl.EST_IMU_TIME + sensor], nav[ctl.NAV_USED + sensor]
+    new = newest > used
+    nav[ctl.NAV_USED + sensor] = where(new, newest, used)
+    return new
+
+
+@kernel
 def new_samples(est, x, nav, t):
     """The measurements of this tick into nav's z, NaN where nothing is new, each carried forward over its age."""
     z = nav[ctl.NAV_Z : ctl.NAV_Z + kf.N_Z]
     for i in range(kf.N_Z):
         z[i] = math.nan
-    if est[ctl.EST_IMU_TIME] > nav[ctl.NAV_USED]:
+    new = is_new(est, nav, 0)
+    if anywhere(new):
         age = t - est[ctl.EST_IMU_TIME]
-        nav[ctl.NAV_USED] = est[ctl.EST_IMU_TIME]
         phi, theta, _ = euler_angles(x)
-        phi_rate, theta_rate, psi_rate = 0.0, 0.0, 0.0
-        if abs(theta) < EULER_LIMIT:
-            phi_rate, theta_rate, psi_rate = euler_rates(phi, theta, x[X_NU + 3], x[X_NU + 4], x[X_NU + 5])
-        z[kf.Z_ROLL] = est[ctl.NEW_ROLL] + phi_rate * age
-        z[kf.Z_PITCH] = est[ctl.NEW_PITCH] + theta_rate * age
-        z[kf.Z_YAW] = est[ctl.NEW_YAW] + psi_rate * age
+        phi_rate, theta_rate, psi_rate = euler_rates(phi, theta, x[X_NU + 3], x[X_NU + 4], x[X_NU + 5])
+        age = where(abs(theta) < EULER_LIMIT, age, 0.0)
+        z[kf.Z_ROLL] = where(new, est[ctl.NEW_ROLL] + phi_rate * age, math.nan)
+        z[kf.Z_PITCH] = where(new, est[ctl.NEW_PITCH] + theta_rate * age, math.nan)
+        z[kf.Z_YAW] = where(new, est[ctl.NEW_YAW] + psi_rate * age, math.nan)
         for i in range(3):
-            z[kf.Z_P + i] = est[ctl.NEW_P + i]
-    if est[ctl.EST_BEACON_TIME] > nav[ctl.NAV_USED + 1]:
-        nav[ctl.NAV_USED + 1] = est[ctl.EST_BEACON_TIME]
-        z[kf.Z_DEPTH] = est[ctl.NEW_DEPTH] + est[ctl.EST_DEPTH_RATE] * (t - est[ctl.EST_BEACON_TIME])
-    if est[ctl.EST_SLIDER_TIME] > nav[ctl.NAV_USED + 2]:
-        nav[ctl.NAV_USED + 2] = est[ctl.EST_SLIDER_TIME]
-        z[kf.Z_SLIDER] = est[ctl.NEW_SLIDER]
-    if est[ctl.EST_PLUNGER_TIME] > nav[ctl.NAV_USED + 3]:
-        nav[ctl.NAV_USED + 3] = est[ctl.EST_PLUNGER_TIME]
-        z[kf.Z_BALLAST] = est[ctl.NEW_BALLAST]
+            z[kf.Z_P + i] = where(new, est[ctl.NEW_P + i], math.nan)
+    carried = est[ctl.NEW_DEPTH] + est[ctl.EST_DEPTH_RATE] * (t - est[ctl.EST_BEACON_TIME])
+    z[kf.Z_DEPTH] = where(is_new(est, nav, 1), carried, math.nan)
+    z[kf.Z_SLIDER] = where(is_new(est, nav, 2), est[ctl.NEW_SLIDER], math.nan)
+    z[kf.Z_BALLAST] = where(is_new(est, nav, 3), est[ctl.NEW_BALLAST], math.nan)
 
 
 @kernel
-def start_filter(P, nav, est, t, x, cov, work):
+def start_filter(P, nav, est, t):
     """The first state: at rest, attitude and depth as first measured, actuators where the draw-wires say."""
+    x = nav[ctl.NAV_X : ctl.NAV_X + kf.N_XE]
+    cov = nav[ctl.NAV_COV : ctl.NAV_COV + kf.N_E * kf.N_E].reshape(kf.N_E, kf.N_E)
+    work = nav[ctl.NAV_WORK : ctl.NAV_WORK + kf.N_WORK_ROWS * kf.N_W].reshape(kf.N_WORK_ROWS, kf.N_W)
     for i in range(kf.N_XE):
         x[i] = 0.0
     x[X_DOWN] = est[ctl.NEW_DEPTH]
@@ -110,42 +117,55 @@ def adapt_process_noise(nav, scores, dt):
     noise on. Roughness multiplies the disturbance's strength, and its square the spectral densities; it moves by the
     scores' logarithm, so that one wild sample does little, and never below what the vehicle file says.
     """
-    total, count = 0.0, 0
+    total, count = 0.0, 0.0
     for i in range(kf.Z_P, kf.Z_R + 1):
-        if not math.isnan(scores[i]):
-            total += scores[i] * scores[i]
-            count += 1
-    if count == 0:
+        unseen = math.isnan(scores[i])
+        score = where(unseen, 0.0, scores[i])
+        total += score * score
+        count += where(unseen, 0.0, 1.0)
+    seen = count > 0.0
+    if not anywhere(seen):
         return
-    step = min(total / count, 4.0) - 1.0
+    step = min(total / where(seen, count, 1.0), 4.0) - 1.0
     roughness = nav[ctl.NAV_ROUGHNESS] * math.exp(step * dt / ROUGHNESS_TIME)
-    roughness = min(max(roughness, 1.0), ROUGHEST)
+    roughness = where(seen, min(max(roughness, 1.0), ROUGHEST), nav[ctl.NAV_ROUGHNESS])
+    linear, angular = ctl.NAV_SETTINGS + kf.S_LINEAR, ctl.NAV_SETTINGS + kf.S_ANGULAR
     nav[ctl.NAV_ROUGHNESS] = roughness
-    nav[ctl.NAV_SETTINGS + kf.S_LINEAR] = nav[ctl.NAV_CALM] * roughness * roughness
-    nav[ctl.NAV_SETTINGS + kf.S_ANGULAR] = nav[ctl.NAV_CALM + 1] * roughness * roughness
+    nav[linear] = where(seen, nav[ctl.NAV_CALM] * roughness * roughness, nav[linear])
+    nav[angular] = where(seen, nav[ctl.NAV_CALM + 1] * roughness * roughness, nav[angular])
 
 
 @kernel
-def navigate(P, C, nav, est, ap, t):
-    """One step of the filter at time t (s): the commands sent last, this tick's samples, the estimate into est."""
-    if est[ctl.EST_STARTED] == 0.0:
-        return
+def step_filter(P, nav, est, sent, given, t):
+    """One step of a filter that runs: the commands sent last, this tick's samples, the estimate into est.
+
+    sent (3,): servo rad, slider m, ballast kg; given: whether the state is said from outside (GIVEN). With nav and est
+    of wide numbers, one step of as many filters.
+    """
     x = nav[ctl.NAV_X : ctl.NAV_X + kf.N_XE]
     cov = nav[ctl.NAV_COV : ctl.NAV_COV + kf.N_E * kf.N_E].reshape(kf.N_E, kf.N_E)
     work = nav[ctl.NAV_WORK : ctl.NAV_WORK + kf.N_WORK_ROWS * kf.N_W].reshape(kf.N_WORK_ROWS, kf.N_W)
-    if nav[ctl.NAV_RUNNING] == 0.0:
-        start_filter(P, nav, est, t, x, cov, work)
     new_samples(est, x, nav, t)
     dt = t - nav[ctl.NAV_TIME]
     nav[ctl.NAV_TIME] = t
     scores = nav[ctl.NAV_SCORES : ctl.NAV_SCORES + kf.N_Z]
     estimator_step(
         P, nav[ctl.NAV_SETTINGS : ctl.NAV_SETTINGS + kf.N_S], nav[ctl.NAV_SIGMA : ctl.NAV_SIGMA + N_P], x, cov,
-        nav[ctl.NAV_INFLATION : ctl.NAV_INFLATION + 2],
-        kf.COMMANDED, ap[ctl.SENT_SERVO], ap[ctl.SENT_SLIDER], ap[ctl.SENT_BALLAST],
+        nav[ctl.NAV_INFLATION : ctl.NAV_INFLATION + 2], kf.COMMANDED, sent[0], sent[1], sent[2],
         dt, nav[ctl.NAV_Z : ctl.NAV_Z + kf.N_Z], nav[ctl.NAV_REJECTED : ctl.NAV_REJECTED + kf.N_Z], scores, work,
     )  # fmt: skip
-    write_state(nav[ctl.NAV_GIVEN : ctl.NAV_GIVEN + N_X] if C[ctl.ESTIMATOR] == ctl.GIVEN else x, est)
+    write_state(nav[ctl.NAV_GIVEN : ctl.NAV_GIVEN + N_X] if given else x, est)
     write_errors(x, cov, est)
     adapt_process_noise(nav, scores, dt)
     est[ctl.ROUGHNESS] = nav[ctl.NAV_ROUGHNESS]
+
+
+@kernel
+def navigate(P, C, nav, est, ap, t):
+    """One step of the filter at time t (s), which starts with the first samples of IMU and beacon."""
+    if est[ctl.EST_STARTED] == 0.0:
+        return
+    if nav[ctl.NAV_RUNNING] == 0.0:
+        start_filter(P, nav, est, t)
+    sent = ap[ctl.SENT_SERVO : ctl.SENT_SERVO + 3]
+    step_filter(P, nav, est, sent, C[ctl.ESTIMATOR] == ctl.GIVEN, t)

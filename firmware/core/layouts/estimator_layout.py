@@ -72,5 +72,5 @@ W_POINT = 1  # what linearise leaves
 W_A, W_TURNED = 2, 2 + N_MOVING  # A, and its columns from E_ATT on as rows
 W_C = W_TURNED + N_COUPLED - E_ATT
 W_DRIVE, W_T, W_K = W_C + 6, W_C + 12, W_C + 12 + N_MOVING
-W_SCRATCH = W_K + N_Z + 2  # two more rows of W_K than measurements: those are taken in threes
+W_SCRATCH = W_K + N_Z
 N_WORK_ROWS = W_SCRATCH + 5

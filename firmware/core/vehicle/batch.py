@@ -8,20 +8,31 @@ from firmware.core.vehicle.flight import nominal_run
 
 
 @kernel
+def put_lane(row, lane, table):
+    """A row (n,) into a lane of a table (n, LANES)."""
+    for i in range(len(row)):
+        table[i, lane] = row[i]
+
+
+@kernel
+def take_lane(table, lane, row):
+    """A lane of a table (n, LANES) into a row (n,)."""
+    for i in range(len(row)):
+        row[i] = table[i, lane]
+
+
+@kernel
 def gather(rows, first, out):
     """Rows first, first + 1 .. of a table (rows, n) side by side in out (n, LANES); the last row fills what is left."""
     for lane in range(LANES):
-        row = min(first + lane, len(rows) - 1)
-        for i in range(rows.shape[1]):
-            out[i, lane] = rows[row, i]
+        put_lane(rows[min(first + lane, len(rows) - 1)], lane, out)
 
 
 @kernel
 def scatter(out, first, rows):
     """The way back of `gather`."""
     for lane in range(min(LANES, len(rows) - first)):
-        for i in range(rows.shape[1]):
-            rows[first + lane, i] = out[i, lane]
+        take_lane(out, lane, rows[first + lane])
 
 
 @kernel

@@ -5,12 +5,14 @@ the actuators. The estimator's other errors act on one of these each, with a fac
 """
 
 from firmware.core.jit import kernel
+from firmware.core.maths.wide import anywhere
 from firmware.core.vehicle.layout import N_P, X_NU
 from firmware.core.vehicle.motion import accelerations
 from firmware.core.vehicle.state import rotation, velocities
 
 _STEP = 1e-5  # of the differences, in SI: truncation and rounding are both below 1e-6 of what is differentiated
 Y_BY_DOWN = 12  # in y: d(nu_dot)/dk, six numbers for each of k's three
+N_POINT = 30  # of y
 
 
 @kernel
@@ -47,7 +49,7 @@ def linearise_motion(x, y, A):
 
 @kernel
 def linearise(P, x, servo_rate, slider_rate, ballast_rate, A, y):
-    """d(rate of the error state)/d(error state) into A (N_MOVING, N_COUPLED), at x; y (30) is left for model_error.
+    """d(rate of the error state)/d(error state) into A (N_MOVING, N_COUPLED), at x; y (N_POINT) stays for model_error.
 
     Attitude errors turn gravity (k + k x dtheta) and the way through the water; the accelerations' derivatives are
     forward differences of equation (1), the actuators' speeds held.
@@ -87,7 +89,7 @@ def model_error(P, sigma, servo_rate, slider_rate, ballast_rate, y, C, Pt, g):
         Pt[j] = P[j]
     a0, a1, a2, a3, a4, a5 = acceleration_at(P, y, servo_rate, slider_rate, ballast_rate)
     for n in range(N_P):
-        if sigma[n] == 0.0:
+        if not anywhere(sigma[n] != 0.0):
             continue
         # a full sigma as the step: the accelerations are linear in nearly all parameters
         Pt[n] = P[n] + sigma[n]

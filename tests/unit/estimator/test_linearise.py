@@ -65,10 +65,11 @@ def test_the_models_error_is_what_drawn_parameters_do():
     filtered = Filter().start(euler=(0.4, -0.5, 1.0), speed=0.4)
     x = filtered.x
     x[9], x[13], x[15] = 0.03, 0.4, 0.15
-    A, C = np.zeros((kf.N_MOVING, kf.N_COUPLED)), np.zeros((6, 6))
+    C = np.zeros((6, 6))
     settings = filtered.settings.copy()
     settings[[kf.S_SLIDER_BIAS, kf.S_BALLAST_BIAS]] = 0.0
-    error_covariance(filtered.P, settings, filtered.sigma, x, 0.0, 0.0, 0.0, A, C, filtered.work)
+    linearise(filtered.P, x, 0.0, 0.0, 0.0, filtered.work[kf.W_A : kf.W_TURNED], filtered.work[kf.W_POINT])
+    error_covariance(filtered.P, settings, filtered.sigma, 0.0, 0.0, 0.0, C, filtered.work)
     rng, drawn, out = np.random.default_rng(1), [], np.zeros(kf.N_XE)
     for _ in range(4000):
         P = filtered.P + filtered.sigma * rng.standard_normal(layout.N_P)

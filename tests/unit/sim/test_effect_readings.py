@@ -123,12 +123,9 @@ def test_samples_with_no_effect_are_the_plain_samples_bit_for_bit():
     for k in range(200):
         made.cmd[:] = 0.5, -0.02, 0.1
         made.advance(0.01 * k)
-        shared = (made.sensors, made.errors, made.seed, made.x, made.time)
         for effects in (False, True):
-            scratch = made.work[wl.W_READ]
-            sample_sensors(
-                made.P, made.F, effects, made.E, *shared, counters[int(effects)], rings[int(effects)], scratch
-            )
+            kept = counters[int(effects)], rings[int(effects)], made.work[wl.W_READ]
+            sample_sensors(made.F, effects, made.sensors, made.x, made.time, *kept)
     assert rings[0][:, 40].all(axis=0).any()
     assert np.array_equal(*rings)
     assert np.array_equal(*counters)

@@ -6,8 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from firmware.core.layouts import control_layout as ctl
+from firmware.core.maths.wide import LANES
 from firmware.core.vehicle import layout
 from sim_backend.core import closed_loop
+from sim_backend.fleet import fly_group, groups_of
 from tools.data.errors import InputError
 from tools.study.campaign.fingerprint import fingerprint
 from tools.study.campaign.plan import Plan
@@ -120,11 +122,7 @@ def _ending(end: np.ndarray, deepest: float, site: float, over: tuple[float, flo
 def compile_loop(plan: Plan) -> None:
     """Compile the loop into the kernels' cache, or find it there, before processes that would each do it themselves."""
     pilot, world = plan.pilot(0, plan.campaign.controllers[0]), draw_world(plan, 0, plan.campaign.first_seed).world
-    closed_loop.fly(
-        world.P, pilot.P, pilot.C, pilot.legs, pilot.nav, world.E, world.F, world.waves, world.sensors,
-        world.errors, world.seed, world.x, world.dt, 0, 1, np.zeros((1, closed_loop.N_TRACE)),
-        np.zeros(closed_loop.N_END),
-    )  # fmt: skip
+    fly_group([world], [pilot], 0, 1, np.zeros((1, 1, closed_loop.N_TRACE)))
 
 
 def fly_chunk(job: Job, chunk: Chunk) -> np.ndarray:
@@ -139,36 +137,35 @@ def fly_chunk(job: Job, chunk: Chunk) -> np.ndarray:
         _checked.add(job.fingerprint)
     every, site = trace_every(plan, chunk.mission), plan.missions[chunk.mission].site.depth_m
     most_ticks = int(_longest(plan, chunk.mission) / plan.step)
-    # One flight after the other from the loop that fly_many shares out over threads: here the cores are shared out
-    # by process, and one trace serves all.
-    trace, end = np.zeros((most_ticks // every + 1, closed_loop.N_TRACE)), np.zeros(closed_loop.N_END)
     command, depth = closed_loop.TRACE.index("servo"), closed_loop.TRACE.index("true_depth")
     pilots = [plan.pilot(chunk.mission, name) for name in plan.campaign.controllers]
     held = bool(np.isfinite(pilots[0].legs[:, ctl.LEG_BALLAST]).any())  # the depth then keeps to no reference
-    rows = []
-    for seed in range(chunk.first_seed, chunk.first_seed + chunk.seeds):
-        drawn = draw_world(plan, chunk.mission, seed)
-        world = drawn.world
-        for number, pilot in enumerate(pilots):
-            ticks = closed_loop.fly(
-                world.P, pilot.P, pilot.C, pilot.legs, pilot.nav, world.E, world.F, world.waves, world.sensors,
-                world.errors, world.seed, world.x.copy(), world.dt, most_ticks, every, trace, end,
-            )  # fmt: skip
-            flown = trace[: (ticks - 1) // every + 1]
+    seeds = range(chunk.first_seed, chunk.first_seed + chunk.seeds)
+    flights = [(seed, drawn, number) for seed in seeds for drawn in [draw_world(plan, chunk.mission, seed)]
+               for number in range(len(pilots))]  # fmt: skip
+    worlds, flown_by = [drawn.world for _, drawn, _ in flights], [pilots[number] for _, _, number in flights]
+    # Here the cores are shared out by process: a group after the other on this thread, and the same traces serve all.
+    traces = np.zeros((LANES, most_ticks // every + 1, closed_loop.N_TRACE))
+    rows: list[tuple] = [()] * len(flights)
+    for members, count in zip(*groups_of(worlds, flown_by), strict=True):
+        members = members[:count]
+        ends, ticks = fly_group([worlds[i] for i in members], [flown_by[i] for i in members], most_ticks, every, traces)
+        for i, end, ticked, trace in zip(members, ends, ticks, traces, strict=False):
+            seed, drawn, number = flights[i]
+            pilot = pilots[number]
+            flown = trace[: (ticked - 1) // every + 1]
             over = _past_limits(pilot.P, flown[:, command : command + 3], every * plan.step)
             deepest = float(flown[:, depth].max())
             attitude = _worst_attitude(flown)
             ended = _ending(end, deepest, site, over, attitude)
-            rows.append(
-                (
-                    chunk.mission, number, seed,
-                    drawn.current, drawn.wave_height, drawn.wave_period, drawn.disturbance, drawn.start_depth,
-                    end[closed_loop.END_MODE] == ctl.COMPLETED, ended == ctl.REASON_NONE, ended,
-                    end[closed_loop.END_LEG], end[closed_loop.END_TIME],
-                    np.nan if held else end[closed_loop.END_ERROR_DEPTH],
-                    end[closed_loop.END_ERROR_PITCH], end[closed_loop.END_ERROR_ROLL],
-                    *end[closed_loop.END_TRAVEL_SERVO : closed_loop.END_TRAVEL_SERVO + 3],
-                    deepest, *over, attitude,
-                )
+            rows[i] = (
+                chunk.mission, number, seed,
+                drawn.current, drawn.wave_height, drawn.wave_period, drawn.disturbance, drawn.start_depth,
+                end[closed_loop.END_MODE] == ctl.COMPLETED, ended == ctl.REASON_NONE, ended,
+                end[closed_loop.END_LEG], end[closed_loop.END_TIME],
+                np.nan if held else end[closed_loop.END_ERROR_DEPTH],
+                end[closed_loop.END_ERROR_PITCH], end[closed_loop.END_ERROR_ROLL],
+                *end[closed_loop.END_TRAVEL_SERVO : closed_loop.END_TRAVEL_SERVO + 3],
+                deepest, *over, attitude,
             )  # fmt: skip
     return np.array(rows, dtype=np.float64)
