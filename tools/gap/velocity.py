@@ -21,9 +21,9 @@ from tools.inference.ocean_inputs import lacking
 from tools.inference.parameters import NINETY
 from tools.inference.problem import Problem, problem_of
 
-# Of a speed, 1 sigma: laws of drag and lift are not nature's. Of a row; of one where the speed was measured, and of a
-# dive's mean: what a law is off by in all dives alike is in an identified vehicle's covariance already, since all dives
-# are worth three there, and the means of twin missions ask for no more (docs/OCEAN.md, Velocity).
+# Of a row's speed, 1 sigma, and of one where speed was measured: laws of drag and lift are not nature's. Of a dive's
+# mean nothing: by how much a law is off in all dives alike is in an identified vehicle's covariance (docs/OCEAN.md,
+# Velocity).
 FORM, MEASURED = 0.03, 0.005
 PITCH_NOISE = 0.005  # rad, 1 sigma from row to row
 HEADING = 0.035  # rad, 1 sigma of a compass that was looked after
@@ -73,7 +73,7 @@ def of_run(
     unsteady = part.recording.inputs[:, at.U_UNSTEADY] > 0.0
     averaged = averaged_rows(~unsteady)
     form = MEASURED if part.seen[at.Y_SPEED] else FORM
-    var_u, var_w, var_mean = np.square(form * u), np.square(form * w), (MEASURED * float(u[averaged].mean())) ** 2
+    var_u, var_w, var_mean = np.square(form * u), np.square(form * w), 0.0
     for other in moved:
         moved_u, moved_w = components(part.filter(*other).X)
         var_u, var_w = var_u + (moved_u - u) ** 2, var_w + (moved_w - w) ** 2
@@ -114,15 +114,22 @@ def averaged_rows(steady: np.ndarray) -> np.ndarray:
     return steady if steady.any() else np.ones_like(steady)
 
 
-def mean_speed(found: Velocity) -> dict[str, Any]:
+def mean_level(part: Problem, model: tuple[np.ndarray, np.ndarray]) -> float:
+    """Mean horizontal speed of a problem's only run by a model (P, F) as mean_speed has it, m/s."""
+    averaged = averaged_rows(part.recording.inputs[:, at.U_UNSTEADY] == 0.0)
+    return float(components(part.filter(*model).X)[0][averaged].mean())
+
+
+def mean_speed(found: Velocity, off: float = 0.0, unsure: float = 0.0) -> dict[str, Any]:
     """Mean horizontal speed `u_m_s` of the rows flown steadily with its 90 % interval `ci90`, and of the water
-    `water_w_m_s`, rms, m/s; all rows where none is steady.
+    `water_w_m_s`, rms, m/s; all rows where none is steady. off, unsure: what models that may be meant as well move the
+    mean by, and 1 sigma of it, m/s.
 
     Errors of the model are the same in all rows, but for their sign: a weight makes the way down faster and the way up
     slower, and is next to none of their mean. The interval is therefore not that of the rows.
     """
-    rows, sigma = averaged_rows(found.steady), found.sd_mean_u
-    mean = float(found.columns["u_m_s"][rows].mean())
+    rows, sigma = averaged_rows(found.steady), float(np.hypot(found.sd_mean_u, unsure))
+    mean = float(found.columns["u_m_s"][rows].mean()) + off
     water = float(np.sqrt(np.mean(found.columns["water_w_m_s"][rows] ** 2)))
     return {"u_m_s": mean, "ci90": [mean - NINETY * sigma, mean + NINETY * sigma], "water_w_m_s": water}
 
