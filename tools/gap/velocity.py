@@ -1,7 +1,7 @@
 """Velocity of an ocean glider through the water, row by row, with its standard deviation (docs/OCEAN.md, Velocity)."""
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -120,18 +120,31 @@ def mean_level(part: Problem, model: tuple[np.ndarray, np.ndarray]) -> float:
     return float(components(part.filter(*model).X)[0][averaged].mean())
 
 
-def mean_speed(found: Velocity, off: float = 0.0, unsure: float = 0.0) -> dict[str, Any]:
+def mean_speed(found: Velocity, moves: Sequence[float] = (0.0,)) -> dict[str, Any]:
     """Mean horizontal speed `u_m_s` of the rows flown steadily with its 90 % interval `ci90`, and of the water
-    `water_w_m_s`, rms, m/s; all rows where none is steady. off, unsure: what models that may be meant as well move the
-    mean by, and 1 sigma of it, m/s.
+    `water_w_m_s`, rms, m/s; all rows where none is steady.
 
     Errors of the model are the same in all rows, but for their sign: a weight makes the way down faster and the way up
     slower, and is next to none of their mean. The interval is therefore not that of the rows.
+
+    moves: by how much models that are as likely as each other move that mean, its own among them, m/s.
     """
-    rows, sigma = averaged_rows(found.steady), float(np.hypot(found.sd_mean_u, unsure))
-    mean = float(found.columns["u_m_s"][rows].mean()) + off
+    rows = averaged_rows(found.steady)
+    means = float(found.columns["u_m_s"][rows].mean()) + np.array(moves, dtype=float)
     water = float(np.sqrt(np.mean(found.columns["water_w_m_s"][rows] ** 2)))
-    return {"u_m_s": mean, "ci90": [mean - NINETY * sigma, mean + NINETY * sigma], "water_w_m_s": water}
+    return {"u_m_s": float(means.mean()), "ci90": interval_over(means, found.sd_mean_u), "water_w_m_s": water}
+
+
+def interval_over(means: np.ndarray, sigma: float) -> list[float]:
+    """The middle 90 % of normal distributions about means (n,), each as likely, of one standard deviation."""
+    if np.ptp(means) == 0.0:
+        return [float(means[0]) - NINETY * sigma, float(means[0]) + NINETY * sigma]
+    from scipy.optimize import brentq
+    from scipy.special import ndtr
+
+    ends = float(means.min()) - 9.0 * sigma, float(means.max()) + 9.0 * sigma
+    tails = ndtr(-NINETY), ndtr(NINETY)
+    return [float(brentq(lambda x, tail=tail: float(ndtr((x - means) / sigma).mean()) - tail, *ends)) for tail in tails]
 
 
 def write(found: list[Velocity], out: Path) -> list[Path]:

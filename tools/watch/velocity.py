@@ -54,23 +54,20 @@ def own_model(problem: Problem, learned_from: np.ndarray) -> OwnModel:
 def velocity(own: OwnModel, history: History, settled: list[Settled], n: int) -> dict[str, Any]:
     """mean_speed of a run by its vehicle with the events that it is in.
 
-    Labels that cannot be told apart are other speeds: the mean is that over the group, and its interval holds how far
-    they are apart.
+    Labels that cannot be told apart are other speeds: mean and interval are those over the group.
     """
     flights = history.flights
     there = [event for event in history.events if event.has_course and weight_of(history, event, n) > 0.0]
     x = own.at(flights)
     for event in there:
         x = with_event(own, history, event, event.label, n, x)
-    part, shared, off, spread = flights.parts[n], flights.shared, 0.0, 0.0
+    part, shared, moves = flights.parts[n], flights.shared, np.zeros(1)
     directions = [within_all(flights, one) for one in own.directions]
     for event in there:
         directions += list(size_directions(history, event, n))
-        moves = group_moves(own, history, event, settled, n, x)
-        off += moves.mean()
-        spread += moves.var()
+        moves = np.add.outer(moves, group_moves(own, history, event, settled, n, x)).ravel()
     moved = (shared.model(part, x + one) for one in directions)
-    return mean_speed(of_run(part, shared.model(part, x), moved), off, float(np.sqrt(spread)))
+    return mean_speed(of_run(part, shared.model(part, x), moved), moves.tolist())
 
 
 def weight_of(history: History, event: Event, n: int) -> float:

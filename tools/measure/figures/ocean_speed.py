@@ -50,7 +50,8 @@ def plan_of(number: int, changed: bool) -> MissionPlan:
 def asked(seed: int, plan: MissionPlan, folder: Path) -> Asked:
     """A mission drawn, identified from its first dives, and asked for the speed of the others.
 
-    Of one that changes the watch is asked, with the first dives for its reference, and the changed dives are taken.
+    Of one that changes the watch is asked, with the first dives for its reference, and the changed dives are taken; an
+    interval that is not even about its mean counts as half its width about its middle.
     """
     made = draw_case(seed, plan, WatchCounts(1, 1, LEARNED + ASKED, LEARNED))
     write_dives(folder / "before", plan.craft, made.runs[:LEARNED])
@@ -64,9 +65,9 @@ def asked(seed: int, plan: MissionPlan, folder: Path) -> Asked:
     rows = np.array([one.columns["sd_u_m_s"][one.steady].mean() for one in found])
     if plan.kind == CHANGED:
         watched = [run.velocity for run in watch(case, load_case(folder / "before", str(vehicle))).runs]
-        told = np.array([(one["u_m_s"], *one["ci90"]) for one in watched if one is not None])
-        errors += told[:, 0] - [float(one.columns["u_m_s"][one.steady].mean()) for one in found]
-        said = (told[:, 2] - told[:, 1]) / (2.0 * NINETY)
+        ends = np.array([one["ci90"] for one in watched if one is not None])
+        errors += ends.mean(axis=1) - [float(one.columns["u_m_s"][one.steady].mean()) for one in found]
+        said = np.ptp(ends, axis=1) / (2.0 * NINETY)
         errors, said, rows = errors[CHANGE:], said[CHANGE:], rows[CHANGE:]
     return Asked(plan.speed, errors, said, rows)
 
