@@ -102,10 +102,11 @@ def components(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def directions(model: Model) -> list[np.ndarray]:
     """Independent directions of the vehicle's numbers, each of 1 sigma, (N_P,)."""
-    found = [] if model.spread is None else list(model.spread)
+    spread = model.spread if model.sure is None else model.sure
+    found = [] if spread is None else list(spread)
     sigma = model.sigma.copy()
-    if model.spread is not None:
-        sigma[np.abs(model.spread).max(axis=0) > 0.0] = 0.0
+    if spread is not None:
+        sigma[np.abs(spread).max(axis=0) > 0.0] = 0.0
     return [*found, *(np.where(np.arange(len(sigma)) == n, sigma, 0.0) for n in np.flatnonzero(sigma > 0.0))]
 
 

@@ -1,13 +1,13 @@
 """Mean speed through the water of an ocean glider's watched runs, by its vehicle with what changed (docs/OCEAN.md)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from tools.gap.velocity import mean_level, mean_speed, of_run
-from tools.identify.ocean.identify import fitted
-from tools.inference.parameters import NUISANCE, nuisance_parameters
+from tools.gap.velocity import directions, mean_level, mean_speed, of_run
+from tools.identify.ocean.identify import covariance, fitted, heat_for
+from tools.inference.parameters import nuisance_parameters
 from tools.inference.problem import Problem
 from tools.inference.shared_parameters import SharedParameters
 from tools.inference.steady import first_values
@@ -24,31 +24,27 @@ class OwnModel:
     """The vehicle by itself: what all runs share beside it makes up for the form of the model, and is no speed."""
 
     values: np.ndarray  # (count of what the file allows,) spreads
-    directions: np.ndarray  # (directions, the same): 1 sigma each
-    sizes: dict[tuple[int, str], np.ndarray]  # by event and label, spreads: found when they are first asked for
+    directions: list[np.ndarray]  # of P (N_P,), 1 sigma each
+    sizes: dict[tuple[int, str], np.ndarray] = field(default_factory=dict)  # by event and label, spreads, once found
 
     def at(self, flights: Flights) -> np.ndarray:
-        """The values of all that runs may share, (count,)."""
-        return within_all(flights, self.values)
-
-
-def within_all(flights: Flights, values: np.ndarray) -> np.ndarray:
-    """What the file allows (count of it, ...) among all that runs may share (count, ...): no effect."""
-    x = np.zeros((*values.shape[:-1], flights.shared.count))
-    x[..., : values.shape[-1]] = values
-    return x
+        """The values of all that runs may share, (count,): no effect."""
+        x = np.zeros(flights.shared.count)
+        x[: len(self.values)] = self.values
+        return x
 
 
 def own_model(problem: Problem, learned_from: np.ndarray) -> OwnModel:
     """An identified vehicle as its file has it; another as the runs that are learned from (runs,) identify it."""
     free = nuisance_parameters(problem)
-    assert all(one.label == NUISANCE for one in free)
     if problem.model.spread is not None:
-        return OwnModel(np.zeros(len(free)), np.eye(len(free)), {})
+        return OwnModel(np.zeros(len(free)), directions(problem.model))
     shared = SharedParameters(free, {}, {}, 1.0)
-    x, C = fitted([problem.part(n) for n in numbers(learned_from)], shared, first_values(problem, free))
-    values, vectors = np.linalg.eigh(C)
-    return OwnModel(x, (vectors * np.sqrt(np.maximum(values, 0.0))).T, {})
+    parts = [problem.part(n) for n in numbers(learned_from)]
+    x, found = fitted(parts, shared, first_values(problem, free))
+    values, vectors = np.linalg.eigh(covariance(found, shared, heat_for(len(parts))))
+    spreads = (vectors * np.sqrt(np.maximum(values, 0.0))).T
+    return OwnModel(x, [shared.model(problem, one)[0] - problem.model.P for one in spreads])
 
 
 def velocity(own: OwnModel, history: History, settled: list[Settled], n: int) -> dict[str, Any]:
@@ -62,12 +58,12 @@ def velocity(own: OwnModel, history: History, settled: list[Settled], n: int) ->
     for event in there:
         x = with_event(own, history, event, event.label, n, x)
     part, shared, moves = flights.parts[n], flights.shared, np.zeros(1)
-    directions = [within_all(flights, one) for one in own.directions]
+    P, F = shared.model(part, x)
+    moved = [(P + one, F) for one in own.directions]
     for event in there:
-        directions += list(size_directions(history, event, n))
+        moved += [shared.model(part, x + one) for one in size_directions(history, event, n)]
         moves = np.add.outer(moves, group_moves(own, history, event, settled, n, x)).ravel()
-    moved = (shared.model(part, x + one) for one in directions)
-    return mean_speed(of_run(part, shared.model(part, x), moved), moves.tolist())
+    return mean_speed(of_run(part, (P, F), moved), moves.tolist())
 
 
 def weight_of(history: History, event: Event, n: int) -> float:

@@ -84,6 +84,7 @@ class OceanIdentification:
     places: list[int]  # of the parameters in P
     parameters: list[Parameter]
     covariance: np.ndarray  # SI, of the parameters
+    allowed: np.ndarray  # SI, the same as wide as other flights may ask for (allowance)
     ridges: list[Ridge]
     water: dict[str, float]  # rms of the vertical water by run, m/s
     left_out: list[str]
@@ -145,12 +146,13 @@ def identify_ocean(case: Case, say: Callable[[str], None] = lambda text: None) -
         case = find_levels(case, problem_of(case, runs=some_runs(runs)), P, F)
         problem = problem_of(case, runs=runs)
         say(f"vertical water {100.0 * case.disturbance.water:.2f} cm/s over {case.disturbance.water_time:.0f} s")
-    x, C = fitted([problem.part(k) for k in range(len(runs))], shared, x)
+    x, found = fitted([problem.part(k) for k in range(len(runs))], shared, x)
+    C, wide = covariance(found, shared, heat), allowance(found, shared, heat)
     P, F = shared.model(problem, x)
     places = [k for k, f in enumerate(free) if f.vector == "P" and f.entry in PLACES.values()]
     return OceanIdentification(
         case, problem, P, [free[k].entry for k in places], parameters(free, places, P, C),
-        C[np.ix_(places, places)] * np.outer(_spreads(free, places), _spreads(free, places)), ridges(free, C),
+        _in_units(C, free, places), _in_units(wide, free, places), ridges(free, C),
         water_by_run(problem, P, F), left_out,
     )  # fmt: skip
 
@@ -160,15 +162,28 @@ def heat_for(runs: int) -> float:
     return max(1.0, runs / WORTH)
 
 
-def fitted(parts: list[Problem], shared: SharedParameters, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The most probable values (count,) of runs, each a problem of its own, and their covariance, in spreads."""
-    heat = heat_for(len(parts))
-    x = fit_shared(parts, shared, start, heat)
-    return x, covariance([expand(part, shared, x, strata=strata(part.runs[0])) for part in parts], shared, heat)
+def fitted(
+    parts: list[Problem], shared: SharedParameters, start: np.ndarray
+) -> tuple[np.ndarray, list[Expansion]]:  # fmt: skip
+    """The most probable values (count,) of runs, each a problem of its own, in spreads, and the runs about them."""
+    x = fit_shared(parts, shared, start, heat_for(len(parts)))
+    return x, [expand(part, shared, x, strata=strata(part.runs[0])) for part in parts]
 
 
-def _spreads(free: list[FreeParameter], places: list[int]) -> np.ndarray:
-    return np.array([free[k].spread for k in places])
+def allowance(found: list[Expansion], shared: SharedParameters, heat: float) -> np.ndarray:
+    """By how much other flights may ask for other values, (count, count) in spreads: all runs weigh as WORTH.
+
+    Flown otherwise, or with an effect beside them, they are met by another error of the form than these runs were.
+    """
+    heat = max(heat, heat_of(found))
+    total = np.sum([one.curvature for one in found], axis=0)
+    return np.asarray(np.linalg.inv(total / heat + np.diag(shared.prior**-2.0)))
+
+
+def _in_units(C: np.ndarray, free: list[FreeParameter], places: list[int]) -> np.ndarray:
+    """The part of a covariance (count, count) in spreads that is of `places`, SI."""
+    spreads = np.array([free[k].spread for k in places])
+    return np.asarray(C[np.ix_(places, places)] * np.outer(spreads, spreads))
 
 
 def strata(run: Run) -> np.ndarray:
