@@ -122,12 +122,16 @@ RELATIVE = ("volume", "Cd0", "Cd1", "lift_slope")
 
 
 class OceanIdentified(Table):
-    """[identified]: what the numbers were found from, and how sure they are together: `covariance` (n, n), SI."""
+    """[identified]: what the numbers were found from, and how sure they are together: `covariance` (n, n), SI.
+
+    allowed: the same, as wide as other flights may ask for; the covariance where it is not there.
+    """
 
     runs: Annotated[int, msgspec.Meta(ge=1)]
     from_vehicle: Annotated[str, msgspec.Meta(max_length=1000)]
     parameters: list[str]
     covariance: list[list[float]]
+    allowed: list[list[float]] | None = None
 
     def __post_init__(self):
         count = len(self.parameters)
@@ -136,11 +140,14 @@ class OceanIdentified(Table):
             raise ValueError(f"parameters: no such parameter: {unknown!r}")
         if len(set(self.parameters)) < count:
             raise ValueError("parameters: one stands there twice")
-        if len(self.covariance) != count or any(len(row) != count for row in self.covariance):
-            raise ValueError(f"covariance: expected {count} rows of {count}, one for each of the parameters")
-        C = np.array(self.covariance).reshape(count, count)
-        if count and (not np.allclose(C, C.T, rtol=1e-6, atol=0.0) or np.any(np.diag(C) < 0.0)):
-            raise ValueError("covariance: not symmetric and positive")
+        for name, rows in (("covariance", self.covariance), ("allowed", self.allowed)):
+            if rows is None:
+                continue
+            if len(rows) != count or any(len(row) != count for row in rows):
+                raise ValueError(f"{name}: expected {count} rows of {count}, one for each of the parameters")
+            C = np.array(rows).reshape(count, count)
+            if count and (not np.allclose(C, C.T, rtol=1e-6, atol=0.0) or np.any(np.diag(C) < 0.0)):
+                raise ValueError(f"{name}: not symmetric and positive")
 
 
 class OceanVehicle(Table):

@@ -6,6 +6,7 @@ from pathlib import Path
 import click
 
 from tools.cli.common import fail, json_option, print_json, progress, say
+from tools.cli.many import again_option, dask_option, jobs_option, need_for
 
 folder = click.Path(path_type=Path, file_okay=False)
 COUNT = click.IntRange(0, 1000)
@@ -84,29 +85,28 @@ def _given(asked: dict[str, int | None]) -> dict[str, int]:
 @click.option("--cases", required=True, type=folder, help="A blind test's folder, or a folder of cases.")
 @click.option("--out", required=True, type=folder, help="Where the diagnoses go, one folder a case.")
 @click.option("--only", multiple=True, metavar="CASE", help="This case only; may be given again.")
-@click.option("--jobs", default=1, show_default=True, type=click.IntRange(0, 256), help="At a time; 0: one a core.")
-@click.option("--dask", metavar="ADDRESS", help="On this Dask cluster instead: tcp://HOST:PORT of its scheduler.")
+@jobs_option
+@dask_option
+@again_option
 @click.option("--watch", is_flag=True, help="`glider gap watch` on every vehicle, with its reference.")
 @click.option("--ocean", is_flag=True, help="With --watch: `glider identify` on the reference first; velocity last.")
 @click.argument("extra", nargs=-1, type=click.UNPROCESSED)
 def run(
-    cases: Path, out: Path, only: tuple[str, ...], jobs: int, dask: str | None, watch: bool, ocean: bool,
-    extra: tuple[str, ...],
+    cases: Path, out: Path, only: tuple[str, ...], jobs: int | None, dask: str | None, again: bool, watch: bool,
+    ocean: bool, extra: tuple[str, ...],
 ) -> None:
     """Run `glider gap diagnose` on every case; those that have a diagnosis are kept.
 
     What stands after `--` is handed on to `gap diagnose`. A case's time counts its whole process.
     """
-    from tools.data.errors import need
     from tools.study.challenge.diagnose_all import DIAGNOSIS, MISSION, WATCH, count_cases
     from tools.study.challenge.diagnose_all import run as run_all
 
-    for extra_needed in ("analysis", *(("campaign",) if dask or jobs != 1 else ())):
-        need(extra_needed)
+    need_for(jobs, dask)
     _only_with_watch(watch, ocean)
     kind = (MISSION if ocean else WATCH) if watch else DIAGNOSIS
     with progress("diagnosed", len(set(only)) or count_cases(cases)) as advance:
-        done, wrong = run_all(cases, out, extra, jobs, advance, only, kind, dask)
+        done, wrong = run_all(cases, out, extra, 1 if jobs is None else jobs, advance, only, kind, dask, again)
     say(f"{done} diagnosed: {out}")
     if wrong:
         fail("\n".join(wrong))

@@ -7,6 +7,7 @@ import click
 
 from tools.cli.challenge import challenge
 from tools.cli.common import compile_diagnosis, json_option, print_json, progress, say, vehicle_option
+from tools.cli.many import ask_all, cases_argument, is_many
 from tools.cli.readings import readings
 from tools.cli.watch import watch
 
@@ -99,7 +100,7 @@ def predict(run: Path, model: str, out: Path, vehicle: str | None) -> None:
 
 
 @gap.command()
-@click.argument("case", type=click.Path(path_type=Path))
+@cases_argument
 @click.option("--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Folder of the answer.")
 @click.option(
     "--without", type=click.Choice(["nuisance", "splice", "whiteness", "evidence"]),
@@ -107,8 +108,27 @@ def predict(run: Path, model: str, out: Path, vehicle: str | None) -> None:
 )  # fmt: skip
 @vehicle_option
 @json_option
-def diagnose(case: Path, out: Path, without: str | None, vehicle: str | None, as_json: bool) -> None:
-    """Where the simulator is wrong about CASE, which effect causes it, and how far the gap shrinks with it."""
+def diagnose(
+    cases: tuple[Path, ...], jobs: int | None, dask: str | None, again: bool, out: Path, without: str | None,
+    vehicle: str | None, as_json: bool,
+) -> None:  # fmt: skip
+    """Where the simulator is wrong about CASE, which effect causes it, and how far the gap shrinks with it.
+
+    Several cases, or one with --jobs, --dask or --again, have their answers in folders of DIR that are called as they
+    are; those that are answered are kept.
+    """
+    if is_many(cases, jobs, dask, again):
+        from tools.study.many_cases import OneCommand
+
+        options = [] if without is None else ["--without", without]
+        asked = OneCommand(("gap", "diagnose"), "diagnosis.json", options, vehicle)
+        ask_all(cases, out, asked, jobs, dask, again, as_json)
+        return
+    _diagnose_one(cases[0], out, without, vehicle, as_json)
+
+
+def _diagnose_one(case: Path, out: Path, without: str | None, vehicle: str | None, as_json: bool) -> None:
+    """The diagnosis of one case, in `out`."""
     from sim_backend.ocean.vehicle import OceanVehicle
     from tools.data.errors import need
     from tools.data.runs.case import load_case

@@ -6,22 +6,40 @@ from pathlib import Path
 import click
 
 from tools.cli.common import json_option, print_json, progress, say, vehicle_option
+from tools.cli.many import ask_all, cases_argument, is_many
 
 folder = click.Path(path_type=Path, file_okay=False)
 
 
 @click.command()
-@click.argument("case", type=click.Path(path_type=Path))
+@cases_argument
 @click.option("--reference", type=folder, metavar="CASE0", help="Runs of the same vehicle before anything changed.")
 @vehicle_option
-@click.option("--out", type=folder, help="Folder of the answer.")
+@click.option("--out", type=folder, help="Folder of the answer; needed with several cases.")
 @json_option
-def watch(case: Path, reference: Path | None, vehicle: str | None, out: Path | None, as_json: bool) -> None:
+def watch(
+    cases: tuple[Path, ...], jobs: int | None, dask: str | None, again: bool, reference: Path | None,
+    vehicle: str | None, out: Path | None, as_json: bool,
+) -> None:  # fmt: skip
     """What changed over the runs of CASE, in their order: in which run, from when to when, why, and how much.
 
     What all runs share, a model that is not quite right or a sensor that is a little off, is no change: it is learned
     from the reference, or without one from the first runs (docs/WATCH.md).
+
+    Each of several cases is watched by itself. Their answers, or that of one with --jobs, --dask or --again, are in
+    folders of DIR that are called as the cases are; those that are answered are kept.
     """
+    if is_many(cases, jobs, dask, again):
+        from tools.study.many_cases import OneCommand
+
+        asked = OneCommand(("gap", "watch"), "watch.json", vehicle=vehicle, reference=reference)
+        ask_all(cases, out, asked, jobs, dask, again, as_json)
+        return
+    _watch_one(cases[0], reference, vehicle, out, as_json)
+
+
+def _watch_one(case: Path, reference: Path | None, vehicle: str | None, out: Path | None, as_json: bool) -> None:
+    """The watch of one case; its answer in `out`, if there is one."""
     from tools.data.errors import need
 
     need("analysis")

@@ -1,7 +1,7 @@
 """Velocity of an ocean glider through the water, row by row, with its standard deviation (docs/OCEAN.md, Velocity)."""
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -21,9 +21,9 @@ from tools.inference.ocean_inputs import lacking
 from tools.inference.parameters import NINETY
 from tools.inference.problem import Problem, problem_of
 
-# Of a speed, 1 sigma: laws of drag and lift are not nature's. Of a row; of one where the speed was measured, and of a
-# dive's mean: what a law is off by in all dives alike is in an identified vehicle's covariance already, since all dives
-# are worth three there, and the means of twin missions ask for no more (docs/OCEAN.md, Velocity).
+# Of a row's speed, 1 sigma, and of one where speed was measured: laws of drag and lift are not nature's. Of a dive's
+# mean nothing: by how much a law is off in all dives alike is in an identified vehicle's covariance (docs/OCEAN.md,
+# Velocity).
 FORM, MEASURED = 0.03, 0.005
 PITCH_NOISE = 0.005  # rad, 1 sigma from row to row
 HEADING = 0.035  # rad, 1 sigma of a compass that was looked after
@@ -73,7 +73,7 @@ def of_run(
     unsteady = part.recording.inputs[:, at.U_UNSTEADY] > 0.0
     averaged = averaged_rows(~unsteady)
     form = MEASURED if part.seen[at.Y_SPEED] else FORM
-    var_u, var_w, var_mean = np.square(form * u), np.square(form * w), (MEASURED * float(u[averaged].mean())) ** 2
+    var_u, var_w, var_mean = np.square(form * u), np.square(form * w), 0.0
     for other in moved:
         moved_u, moved_w = components(part.filter(*other).X)
         var_u, var_w = var_u + (moved_u - u) ** 2, var_w + (moved_w - w) ** 2
@@ -102,10 +102,11 @@ def components(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def directions(model: Model) -> list[np.ndarray]:
     """Independent directions of the vehicle's numbers, each of 1 sigma, (N_P,)."""
-    found = [] if model.spread is None else list(model.spread)
+    spread = model.spread if model.sure is None else model.sure
+    found = [] if spread is None else list(spread)
     sigma = model.sigma.copy()
-    if model.spread is not None:
-        sigma[np.abs(model.spread).max(axis=0) > 0.0] = 0.0
+    if spread is not None:
+        sigma[np.abs(spread).max(axis=0) > 0.0] = 0.0
     return [*found, *(np.where(np.arange(len(sigma)) == n, sigma, 0.0) for n in np.flatnonzero(sigma > 0.0))]
 
 
@@ -114,17 +115,37 @@ def averaged_rows(steady: np.ndarray) -> np.ndarray:
     return steady if steady.any() else np.ones_like(steady)
 
 
-def mean_speed(found: Velocity) -> dict[str, Any]:
+def mean_level(part: Problem, model: tuple[np.ndarray, np.ndarray]) -> float:
+    """Mean horizontal speed of a problem's only run by a model (P, F) as mean_speed has it, m/s."""
+    averaged = averaged_rows(part.recording.inputs[:, at.U_UNSTEADY] == 0.0)
+    return float(components(part.filter(*model).X)[0][averaged].mean())
+
+
+def mean_speed(found: Velocity, moves: Sequence[float] = (0.0,)) -> dict[str, Any]:
     """Mean horizontal speed `u_m_s` of the rows flown steadily with its 90 % interval `ci90`, and of the water
     `water_w_m_s`, rms, m/s; all rows where none is steady.
 
     Errors of the model are the same in all rows, but for their sign: a weight makes the way down faster and the way up
     slower, and is next to none of their mean. The interval is therefore not that of the rows.
+
+    moves: by how much models that are as likely as each other move that mean, its own among them, m/s.
     """
-    rows, sigma = averaged_rows(found.steady), found.sd_mean_u
-    mean = float(found.columns["u_m_s"][rows].mean())
+    rows = averaged_rows(found.steady)
+    means = float(found.columns["u_m_s"][rows].mean()) + np.array(moves, dtype=float)
     water = float(np.sqrt(np.mean(found.columns["water_w_m_s"][rows] ** 2)))
-    return {"u_m_s": mean, "ci90": [mean - NINETY * sigma, mean + NINETY * sigma], "water_w_m_s": water}
+    return {"u_m_s": float(means.mean()), "ci90": interval_over(means, found.sd_mean_u), "water_w_m_s": water}
+
+
+def interval_over(means: np.ndarray, sigma: float) -> list[float]:
+    """The middle 90 % of normal distributions about means (n,), each as likely, of one standard deviation."""
+    if np.ptp(means) == 0.0:
+        return [float(means[0]) - NINETY * sigma, float(means[0]) + NINETY * sigma]
+    from scipy.optimize import brentq
+    from scipy.special import ndtr
+
+    ends = float(means.min()) - 9.0 * sigma, float(means.max()) + 9.0 * sigma
+    tails = ndtr(-NINETY), ndtr(NINETY)
+    return [float(brentq(lambda x, tail=tail: float(ndtr((x - means) / sigma).mean()) - tail, *ends)) for tail in tails]
 
 
 def write(found: list[Velocity], out: Path) -> list[Path]:

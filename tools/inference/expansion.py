@@ -1,7 +1,7 @@
 """A run's misfit about a model, to second order in everything that runs may share or change in."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -26,6 +26,7 @@ class Expansion:
     curvature: np.ndarray  # (count, count)
     nis: float  # mean squared innovation at `at`, of the filter of that model
     samples: int
+    parts: "list[Expansion]" = field(default_factory=list)  # of strata of its samples, where they were asked
 
     @property
     def offset(self) -> np.ndarray:
@@ -81,8 +82,13 @@ def columns_at(
     return e, J
 
 
-def expand(part: Problem, shared: SharedParameters, x: np.ndarray, roughness: float = 1.0) -> Expansion:
-    """A run (a problem of its own) about the model at x, by the gains of that model's filter."""
+def expand(
+    part: Problem, shared: SharedParameters, x: np.ndarray, roughness: float = 1.0, strata: np.ndarray | None = None
+) -> Expansion:
+    """A run (a problem of its own) about the model at x, by the gains of that model's filter.
+
+    strata: a number of every row (rows,); the samples of each number make a part of the expansion.
+    """
     gains = part.filter(*shared.model(part, x), roughness=roughness, begin=True)
 
     def moved(k: int, size: float) -> tuple[np.ndarray, np.ndarray]:
@@ -92,5 +98,14 @@ def expand(part: Problem, shared: SharedParameters, x: np.ndarray, roughness: fl
         return shared.model(part, point)
 
     e, J = columns_at(part, gains, moved, at_kink(shared, x), difference_steps(shared, x))
-    nis = float(e @ e) / max(1, len(e))
-    return Expansion(x.copy(), float(gains.misfit[0]), J @ e, J @ J.T, nis, len(e))
+    found = _parabola(x, float(gains.misfit[0]), e, J)
+    if strata is not None:
+        of_sample = strata[np.nonzero(part.valid)[0]]
+        chosen = [of_sample == number for number in range(int(strata.max()) + 1)]
+        found.parts = [_parabola(x, float(e[own] @ e[own]), e[own], J[:, own]) for own in chosen]
+    return found
+
+
+def _parabola(x: np.ndarray, value: float, e: np.ndarray, J: np.ndarray) -> Expansion:
+    """Of innovations e (samples,) and their derivatives J (count, samples) at x."""
+    return Expansion(x.copy(), value, J @ e, J @ J.T, float(e @ e) / max(1, len(e)), len(e))

@@ -30,6 +30,7 @@ class Model:
     spread: np.ndarray | None = (
         None  # (n, N_P): independent directions of what identification left; sigma covers the rest
     )
+    sure: np.ndarray | None = None  # (n, N_P): of how sure its numbers are, where other flights are allowed more
 
 
 def nominal_model(case: Case) -> Model:
@@ -68,11 +69,17 @@ def _ocean_model(name: str, vehicle: OceanVehicle) -> Model:
     found, places = vehicle.identified, vehicle.identified_places
     if found is None or not len(places):
         return Model(name, P, sigma, F)
-    C = np.array(found.covariance)
-    scale = np.sqrt(np.maximum(np.diag(C), 1e-300))  # a compressibility is 1e-10: its square is lost beside others
-    directions = _directions(C / np.outer(scale, scale), places, ocean.N_P)
-    directions[:, places] *= scale
-    return Model(name, P, sigma, F, spread=directions)
+    sure = _scaled_directions(np.array(found.covariance), places)
+    allowed = sure if found.allowed is None else _scaled_directions(np.array(found.allowed), places)
+    return Model(name, P, sigma, F, spread=allowed, sure=sure)
+
+
+def _scaled_directions(C: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """_directions of numbers whose sizes differ: a compressibility is 1e-10, its square is lost beside others."""
+    scale = np.sqrt(np.maximum(np.diag(C), 1e-300))
+    found = _directions(C / np.outer(scale, scale), places, ocean.N_P)
+    found[:, places] *= scale
+    return found
 
 
 def own_effects(vehicle: Vehicle) -> np.ndarray | None:

@@ -4,6 +4,7 @@ As in tools/diagnose/search.py the data's weight is let in by degrees: first a f
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -22,17 +23,34 @@ def misfit(parts: Sequence[Problem], shared: SharedParameters, x: np.ndarray, ro
     return found if np.isfinite(found) else np.inf
 
 
+@dataclass
+class About:
+    """Expansions of runs about values: those of the last values that were asked for are kept."""
+
+    parts: Sequence[Problem]
+    shared: SharedParameters
+    found: list[Expansion] = field(default_factory=list)
+
+    def __call__(self, x: np.ndarray) -> list[Expansion]:
+        """Of every run about x (count,)."""
+        if not self.found or not np.array_equal(self.found[0].at, x):
+            self.found = [expand(part, self.shared, x) for part in self.parts]
+        return self.found
+
+
 def fit_shared(
-    parts: Sequence[Problem], shared: SharedParameters, start: np.ndarray | None = None, least_heat: float = 1.0
-) -> np.ndarray:
+    parts: Sequence[Problem], shared: SharedParameters, start: np.ndarray | None = None, least_heat: float = 1.0,
+    about: About | None = None,
+) -> np.ndarray:  # fmt: skip
     """The most probable shared values (count,) of runs, each a problem of its own; from `start`, where there is one.
 
-    least_heat: by which the runs' evidence counts for less at least.
+    least_heat: by which the runs' evidence counts for less at least; about: of these runs and parameters, to be kept.
     """
+    about = About(parts, shared) if about is None else about
     x = np.zeros(shared.count) if start is None else start.copy()
     weight = np.diag(shared.prior**-2.0)
     for roughness in ROUGHNESS if start is None else ROUGHNESS[-2:]:
-        found = [expand(part, shared, x, roughness) for part in parts]
+        found = about(x) if roughness == 1.0 else [expand(part, shared, x, roughness) for part in parts]
         heat = max(least_heat, heat_of(found))
         normal = sum(one.curvature for one in found) / heat + weight
         slope = sum(one.slope for one in found) / heat + weight @ x

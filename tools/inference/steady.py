@@ -54,10 +54,17 @@ def steady_rows(problem: Problem) -> Steady:
     return Steady(rows, problem.run_of[rows], rates[rows])
 
 
-def glides(problem: Problem, P: np.ndarray, F: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Speed along the path and its angle at rows, (n, 2)."""
+def depths(problem: Problem) -> np.ndarray:
+    """Depth of every row, missing samples drawn in, m."""
+    return np.concatenate([drawn(run.t, run.columns[names.DEPTH])[0] for run in problem.runs])
+
+
+def glides(
+    problem: Problem, P: np.ndarray, F: np.ndarray, rows: np.ndarray, depth: np.ndarray | None = None
+) -> np.ndarray:
+    """Speed along the path and its angle at rows, (n, 2); depth: depths(problem), where they are known."""
     out = np.empty((len(rows), 2))
-    depth = np.concatenate([drawn(run.t, run.columns[names.DEPTH])[0] for run in problem.runs])
+    depth = depths(problem) if depth is None else depth
     steady_glide(P, F, depth, problem.since, problem.recording.inputs, rows, out)
     return out
 
@@ -84,11 +91,11 @@ def first_guess(problem: Problem) -> np.ndarray:
         return P
     chosen = np.linspace(0, len(steady.rows) - 1, min(ROUGH_ROWS, len(steady.rows))).astype(int)
     rows, rate = steady.rows[chosen], steady.rate[chosen]
-    best, least = P, np.inf
+    best, least, depth = P, np.inf, depths(problem)
     for share in ROUGH_VOLUMES:
         moved = P.copy()
         moved[at.VOLUME] *= 1.0 + share
-        found = glides(problem, moved, F, rows)
+        found = glides(problem, moved, F, rows, depth)
         down = -found[:, 0] * np.sin(found[:, 1])
         gliding = np.abs(down) > 2.0 * at.SLOWEST
         if gliding.mean() < 0.8:

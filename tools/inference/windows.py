@@ -26,9 +26,6 @@ def cut_windows(t: np.ndarray, length: float, look_in: float) -> list[Window]:
     interval = float(np.median(np.diff(t))) if len(t) > 1 else 0.0
     since = t - t[0]
     whole = int(np.floor((since[-1] + interval + _ROUNDING) / length))
-    found = []
-    for k in range(int(since[-1] // length) + 2):
-        first, start, end = np.searchsorted(since, np.array([0.0, look_in, length]) + k * length - _ROUNDING)
-        if first < end:
-            found.append(Window(int(first), int(start), int(end), k < max(whole, 1)))
-    return found
+    begins = np.arange(int(since[-1] // length) + 2) * length
+    rows = np.searchsorted(since, np.array([0.0, look_in, length]) + begins[:, None] - _ROUNDING).tolist()
+    return [Window(a, b, end, k < max(whole, 1)) for k, (a, b, end) in enumerate(rows) if a < end]

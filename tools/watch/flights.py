@@ -85,19 +85,6 @@ class Flights:
         """The values of a run with its own deviation, (count,)."""
         return self.raw[n].at + self.deviation(n)
 
-    def uncertain(self, n: int) -> np.ndarray:
-        """Directions of 1 sigma, (directions, count) spreads, in which the vehicle's numbers may be off in a run.
-
-        Of what the vehicle file says, the reference, and the run; its effects are those found.
-        """
-        allowed = self.shared.groups < 2
-        seen = [self.raw[k].cooled(self.heat).curvature for k in {*numbers(self.reference), n}]
-        precision = np.eye(int(allowed.sum())) + sum(one[np.ix_(allowed, allowed)] for one in seen)
-        values, vectors = np.linalg.eigh(precision)
-        directions = np.zeros((len(values), self.shared.count))
-        directions[:, allowed] = (vectors / np.sqrt(values)).T
-        return directions
-
     def nis(self, n: int) -> float:
         """Mean squared innovation of a run at its own values, by its parabola."""
         one, shift = self.raw[n], self.deviation(n)

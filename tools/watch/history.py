@@ -62,20 +62,6 @@ class History:
         """All runs with the events that have a course."""
         return Joint(self.flights.shared, list(self.flights.runs), self.taken)
 
-    def uncertain(self, n: int) -> np.ndarray:
-        """Directions of 1 sigma, (directions, count) spreads, in which a run's numbers may be off: its vehicle's, and
-        how large the changes are that are there in it.
-        """
-        flights, rows = self.flights, []
-        for event in self.events:
-            weight = float(event.span.weights(flights.count)[n])
-            if event.has_course and weight > 0.0:
-                values, vectors = np.linalg.eigh(event.covariance)
-                own = np.zeros((len(values), flights.shared.count))
-                own[:, flights.shared.labels[event.label]] = weight * (vectors * np.sqrt(np.maximum(values, 0.0))).T
-                rows.append(own)
-        return np.concatenate([flights.uncertain(n), *rows])
-
     def listed(self) -> list[Span]:
         """Every span that an event may have."""
         return spans([bool(one) for one in self.judged], self.begins)

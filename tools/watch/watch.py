@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -11,16 +10,16 @@ from tools.data.errors import InputError
 from tools.data.runs.case import Case
 from tools.data.runs.run import Run
 from tools.gap.measure import run_gap
-from tools.gap.velocity import mean_speed, of_run
 from tools.inference.predict import fly
 from tools.inference.problem import Problem, cut, problem_of
 from tools.inference.shared_parameters import shared_parameters
 from tools.watch.answer import NONE, RunVerdict, Watch
 from tools.watch.events import GROWING
 from tools.watch.flights import Flights
-from tools.watch.history import History, within
+from tools.watch.history import History
 from tools.watch.search import find_events
 from tools.watch.usable import ASKED, readings_of, usable, usable_dive
+from tools.watch.velocity import own_model, velocity
 from tools.watch.verdicts import FEW, event_answer, matters, run_verdict, settle
 
 FIRST_SHARE = 3  # without a reference learning begins with one run in so many, at most as many as their kind says
@@ -50,6 +49,7 @@ def watch(case: Case, reference: Case | None = None, say: Callable[[str], None] 
             history = looked_at(parts, problem, learned_from, judged, begins, say)
     settled = settle(history)
     told_by = [names[n] for n in here]
+    own = own_model(problem, learned_from) if isinstance(case.vehicle, OceanVehicle) else None
     verdicts = []
     for n, run in enumerate(case.runs, start=count):
         if n not in runs:
@@ -58,7 +58,7 @@ def watch(case: Case, reference: Case | None = None, say: Callable[[str], None] 
         k = here.index(n)
         gap = shared_gap(parts[k], history.flights)
         verdict = run_verdict(history, settled, k, run.name, gap)
-        verdicts.append(replace(verdict, velocity=velocity(parts[k], history, k)))
+        verdicts.append(verdict if own is None else replace(verdict, velocity=velocity(own, history, settled, k)))
     events = [event_answer(history, one, told_by) for one in settled]
     learned = [told_by[k] for k in np.flatnonzero(learned_from)]
     return Watch(verdicts, events, learned, cautions(case, reference, learned, skipped, names))
@@ -115,16 +115,6 @@ def unchanged(history: History, learned_from: np.ndarray) -> np.ndarray:
         early |= event.span.first < learned_from.sum()
         inside |= event.span.weights(count) > 0.0
     return ~inside if early else learned_from
-
-
-def velocity(part: Problem, history: History, n: int) -> dict[str, Any] | None:
-    """Mean velocity of an ocean glider's run through the water, by the model with events; None of other vehicles."""
-    if not isinstance(part.case.vehicle, OceanVehicle):
-        return None
-    flights = history.flights
-    shared, own = flights.shared, within(flights, history.joint().run_values(n, flights.values))
-    moved = (shared.model(part, own + direction) for direction in history.uncertain(n))
-    return mean_speed(of_run(part, shared.model(part, own), moved))
 
 
 def shared_gap(part: Problem, flights: Flights) -> float | None:

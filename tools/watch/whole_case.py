@@ -27,12 +27,11 @@ from tools.gap.measure import RunGap, case_channels, root_mean_square, run_gap
 from tools.identify.ocean.files import corrected_text
 from tools.identify.ocean.identify import WORTH, parted_by
 from tools.identify.ocean.levels import find_levels, some_runs
-from tools.inference.expansion import expand
 from tools.inference.fit import bounded_step
 from tools.inference.parameters import NINETY
 from tools.inference.predict import fly_windows_from
 from tools.inference.problem import Problem, cut, problem_of
-from tools.inference.shared_model import fit_shared, heat_of
+from tools.inference.shared_model import About, fit_shared, heat_of
 from tools.inference.shared_parameters import shared_parameters
 from tools.inference.steady import first_values
 from tools.watch.answer import CAUSE
@@ -79,20 +78,21 @@ def diagnose_ocean(case: Case, say: Callable[[str], None] = lambda text: None) -
     problem = problem_of(case, runs=runs)
     parts = [problem.part(n) for n in range(len(runs))]
     shared = replace(shared_parameters(problem), allowed=1.0, effects=ABSENT)
-    heat = max(1.0, len(runs) / WORTH)
-    x = fit_shared(parts, shared, first_values(problem, shared.free), heat)
+    heat, about = max(1.0, len(runs) / WORTH), About(parts, shared)
+    x = fit_shared(parts, shared, first_values(problem, shared.free), heat, about)
     identified = isinstance(case.vehicle, OceanVehicle) and case.vehicle.identified is not None
     if not identified:  # its noise is any vehicle's
         case = find_levels(case, problem_of(case, runs=some_runs(runs)), *shared.model(problem, x))
         problem = problem_of(case, runs=runs)
         parts = [problem.part(n) for n in range(len(runs))]
-        x = fit_shared(parts, shared, x, heat)
-    heat = max(heat, heat_of([expand(part, shared, x) for part in parts]))
-    start = whole_model(parts, shared, x, heat)
+        about = About(parts, shared)
+        x = fit_shared(parts, shared, x, heat, about)
+    heat = max(heat, heat_of(about(x)))
+    start = whole_model(parts, shared, x, heat, about=about)
     say(f"{len(runs)} runs; what the vehicle file allows, fitted")
     sought = seek(parts, start, heat)
     gaps = left_out_gaps(problem, parts, start, sought.model, heat)
-    if not identified and closes(gaps) < problem.kind.matters:
+    if sought.model is not start and not identified and closes(gaps) < problem.kind.matters:
         sought.model, gaps = start, left_out_gaps(problem, parts, start, start, heat)
     model, main = sought.model, sought.main
     say(f"most evident: {main.best}, {main.evidence[main.best]:.1f} nat; {len(model.labels)} effects")
@@ -191,25 +191,27 @@ def left_out_gaps(
 ) -> dict[str, list[RunGap]]:
     """Gaps by run: nominal, recalibrated and corrected without the run, and of simulated runs."""
     rng = np.random.default_rng(SEED)
-    steps = {RECALIBRATED: without_each(start, heat), AFTER: without_each(model, heat)}
+    recalibrated = without_each(start, heat)
+    after = recalibrated if model is start else without_each(model, heat)
     gaps: dict[str, list[RunGap]] = {BEFORE: [], RECALIBRATED: [], AFTER: [], FLOOR: []}
     for n, part in enumerate(parts):
         models = {
             BEFORE: (problem.model.P, start.shared.model(part, 0.0 * start.x)[1]),
-            RECALIBRATED: start.shared.model(part, steps[RECALIBRATED][n]),
-            AFTER: model.shared.model(part, steps[AFTER][n]),
+            RECALIBRATED: start.shared.model(part, recalibrated[n]),
+            AFTER: model.shared.model(part, after[n]),
         }
         for name, one in models.items():
-            gaps[name].append(gap_of(part, one))
+            same = name == AFTER and model is start
+            gaps[name].append(gaps[RECALIBRATED][n] if same else gap_of(part, one))
         gaps[FLOOR].append(floor_of(part, models[AFTER], part, rng))
     return gaps
 
 
 def floor_of(part: Problem, model: Model, noisy: Problem, rng: np.random.Generator) -> RunGap:
     """A run's gap to the model that is true of it, over DRAWS simulated runs of the noise that `noisy` knows of."""
-    drawn = []
+    drawn, begins = [], part.filter(*model).X[:1].copy()
     for _ in range(DRAWS):
-        z = noisy.simulated(*model, part.filter(*model).X[:1].copy(), rng)
+        z = noisy.simulated(*model, begins.copy(), rng)
         drawn.append(gap_of(replace(part, z=np.where(part.valid, z, np.nan)), model, z))
     channels = case_channels(drawn)
     return replace(drawn[0], channels=channels, total=root_mean_square(channels.values()))

@@ -8,11 +8,11 @@ import numpy as np
 from tools.diagnose.matter import largest
 from tools.diagnose.search import EVIDENCE_NEEDED
 from tools.diagnose.verdict import TIE
-from tools.inference.expansion import Expansion, expand
+from tools.inference.expansion import Expansion
 from tools.inference.fit import bounded_step
 from tools.inference.predict import fly_windows_from
 from tools.inference.problem import Problem
-from tools.inference.shared_model import fit_shared, misfit
+from tools.inference.shared_model import About, fit_shared, misfit
 from tools.inference.shared_parameters import SharedParameters
 from tools.watch.events import STEP, Change, Joint, Span
 
@@ -77,19 +77,20 @@ def cost_of(parts: Sequence[Problem], shared: SharedParameters, x: np.ndarray, h
 
 
 def whole_model(
-    parts: Sequence[Problem], shared: SharedParameters, x: np.ndarray, heat: float, labels: Sequence[str] = ()
-) -> Whole:
+    parts: Sequence[Problem], shared: SharedParameters, x: np.ndarray, heat: float, labels: Sequence[str] = (),
+    about: About | None = None,
+) -> Whole:  # fmt: skip
     """The model of all runs fitted from x, until a fit brings no more."""
-    cost = cost_of(parts, shared, x, heat)
+    cost, about = cost_of(parts, shared, x, heat), About(parts, shared) if about is None else about
     for _ in range(REFITS):
-        tried = fit_shared(parts, shared, x, heat)
+        tried = fit_shared(parts, shared, x, heat, about)
         found = cost_of(parts, shared, tried, heat)
         gained = cost - found
         if gained > 0.0:
             x, cost = tried, found
         if gained < ENOUGH:
             break
-    return Whole(shared, x, list(labels), cost, [expand(part, shared, x) for part in parts])
+    return Whole(shared, x, list(labels), cost, about(x))
 
 
 def with_effect(parts: Sequence[Problem], model: Whole, change: Change, heat: float) -> Whole:

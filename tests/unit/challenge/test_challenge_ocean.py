@@ -155,7 +155,7 @@ def test_intervals_may_hold_too_often(tmp_path):
 
 def test_a_mission_is_identified_watched_and_asked_for_its_velocity(tmp_path):
     asked = commands(tmp_path / "cases" / "case000", tmp_path / "part", (), MISSION)
-    before, vehicle = str(tmp_path / "reference" / "case000"), str(tmp_path / "part" / "identified" / "identified.toml")
+    before, vehicle = tmp_path / "reference" / "case000", tmp_path / "part" / "identified" / "identified.toml"
     assert [one[:2] for one in asked] == [["identify", before], ["gap", "watch"], ["gap", "velocity"]]
     assert asked[1][asked[1].index("--reference") + 1] == before
     assert asked[1][asked[1].index("--vehicle") + 1] == asked[2][asked[2].index("--model") + 1] == vehicle

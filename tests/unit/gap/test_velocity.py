@@ -126,11 +126,11 @@ def test_what_is_no_steady_flight_is_not_sure(mission):
 
 def test_directions_are_the_covariance_and_the_rest(mission):
     model = nominal_model(mission[1])
-    assert model.spread is not None
+    assert model.sure is not None
     found = np.array(directions(model))
     whole = found.T @ found
-    seen = np.abs(model.spread).max(axis=0) > 0.0
-    assert whole[np.ix_(seen, seen)] == pytest.approx((model.spread.T @ model.spread)[np.ix_(seen, seen)], rel=1e-9)
+    seen = np.abs(model.sure).max(axis=0) > 0.0
+    assert whole[np.ix_(seen, seen)] == pytest.approx((model.sure.T @ model.sure)[np.ix_(seen, seen)], rel=1e-9)
     assert np.diag(whole)[~seen] == pytest.approx(model.sigma[~seen] ** 2)
     assert whole[at.MASS, at.MASS] == 0.0
 

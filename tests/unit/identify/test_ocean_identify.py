@@ -72,12 +72,12 @@ def test_the_file_reads_back_to_the_same_model(found):
     vehicle = decode_ocean_vehicle(vehicle_text(found), "identified")
     model = vehicle_model("identified", vehicle)
     assert pytest.approx(found.P, rel=1e-12, abs=1e-18) == model.P
-    assert model.spread is not None
     places = [PLACES[one.name] for one in found.parameters]
-    C = model.spread.T @ model.spread
-    scale = np.sqrt(np.diag(found.covariance))
-    back = C[np.ix_(places, places)] / np.outer(scale, scale)
-    assert back == pytest.approx(found.covariance / np.outer(scale, scale), abs=1e-6)
+    for directions, true in ((model.sure, found.covariance), (model.spread, found.allowed)):
+        assert directions is not None
+        C, scale = directions.T @ directions, np.sqrt(np.diag(true))
+        back = C[np.ix_(places, places)] / np.outer(scale, scale)
+        assert back == pytest.approx(true / np.outer(scale, scale), abs=1e-6)
     assert np.sqrt(np.diag(found.covariance)) == pytest.approx([one.sd for one in found.parameters], rel=1e-9)
     assert vehicle.disturbance == found.case.disturbance
     assert vehicle.identified is not None

@@ -35,14 +35,19 @@ def vehicle_table(found: OceanIdentification) -> dict[str, Any]:
     vehicle = found.case.vehicle
     assert isinstance(vehicle, OceanVehicle)
     table = numbers_table(vehicle, found.P)
-    C = 0.5 * (found.covariance + found.covariance.T)
     table["identified"] = {
         "runs": len(found.problem.runs),
         "from_vehicle": found.case.vehicle_name,
         "parameters": [one.name for one in found.parameters],
-        "covariance": [[float(f"{value:.{DIGITS}g}") for value in row] for row in C.tolist()],
+        "covariance": _rows(found.covariance),
+        "allowed": _rows(found.allowed),
     }
     return table
+
+
+def _rows(C: np.ndarray) -> list[list[float]]:
+    """A covariance (n, n) as a file has it."""
+    return [[float(f"{value:.{DIGITS}g}") for value in row] for row in (0.5 * (C + C.T)).tolist()]
 
 
 def vehicle_text(found: OceanIdentification) -> str:

@@ -1,7 +1,8 @@
 """An ocean glider identified from a mission's dives: volume, drag, lift, compression, expansion, attitude, noise.
 
 Gauss and Newton's steps in everything at once along the observer's innovations, held by what the vehicle file allows
-(docs/OCEAN.md, Identification). Dives differ by more than their noise says; the covariance is that of a sandwich.
+(docs/OCEAN.md, Identification). Dives, and their ways and depths, differ by more than their noise says; the covariance
+is that of a sandwich.
 """
 
 from collections.abc import Callable, Iterable
@@ -13,10 +14,11 @@ from sim_backend.ocean.core import layout as at
 from sim_backend.ocean.vehicle import PLACES, UNITS
 from tools.data.errors import InputError
 from tools.data.runs.case import Case
+from tools.data.runs.columns import ATTITUDE, DEPTH
 from tools.data.runs.run import Run
 from tools.identify.ocean.levels import find_levels, some_runs
 from tools.inference.expansion import Expansion, expand
-from tools.inference.ocean_inputs import lacking, steady_seconds
+from tools.inference.ocean_inputs import drawn, lacking, steady_seconds
 from tools.inference.parameters import NINETY, FreeParameter, nuisance_parameters
 from tools.inference.problem import Problem, problem_of
 from tools.inference.shared_model import fit_shared, heat_of
@@ -27,6 +29,7 @@ MOST_RUNS = 24  # of the mission's first: drag creeps after that
 # Dives that all of them are worth together: what the form of the model misses (a cell that lags in the thermocline, a
 # hull that warms late) is the same in every dive, and no number of them makes it smaller.
 WORTH = 3.0
+BANDS = 4  # of depth, of each way: the form's error goes with them (a thermocline takes a quarter of a dive)
 SHORTEST = 300.0  # s of steady flight, for a run to be learned from
 ROUNDS = 2
 DENSITY = 1027.0  # kg/m3, at which the net mass is told
@@ -81,6 +84,7 @@ class OceanIdentification:
     places: list[int]  # of the parameters in P
     parameters: list[Parameter]
     covariance: np.ndarray  # SI, of the parameters
+    allowed: np.ndarray  # SI, the same as wide as other flights may ask for (allowance)
     ridges: list[Ridge]
     water: dict[str, float]  # rms of the vertical water by run, m/s
     left_out: list[str]
@@ -134,7 +138,7 @@ def identify_ocean(case: Case, say: Callable[[str], None] = lambda text: None) -
     free = nuisance_parameters(problem)
     x = first_values(problem, free)
     say(f"{len(runs)} runs, {len(problem.z)} rows; a first guess of volume and drag")
-    shared, heat = SharedParameters(free, {}, {}, 1.0), max(1.0, len(runs) / WORTH)
+    shared, heat = SharedParameters(free, {}, {}, 1.0), heat_for(len(runs))
     for _ in range(ROUNDS):
         parts = [problem.part(k) for k in range(len(runs))]
         x = fit_shared(parts, shared, x, heat)
@@ -142,42 +146,98 @@ def identify_ocean(case: Case, say: Callable[[str], None] = lambda text: None) -
         case = find_levels(case, problem_of(case, runs=some_runs(runs)), P, F)
         problem = problem_of(case, runs=runs)
         say(f"vertical water {100.0 * case.disturbance.water:.2f} cm/s over {case.disturbance.water_time:.0f} s")
-    parts = [problem.part(k) for k in range(len(runs))]
-    x = fit_shared(parts, shared, x, heat)
+    x, found = fitted([problem.part(k) for k in range(len(runs))], shared, x)
+    C, wide = covariance(found, shared, heat), allowance(found, shared, heat)
     P, F = shared.model(problem, x)
-    found = [expand(part, shared, x) for part in parts]
-    C = covariance(found, shared, heat)
     places = [k for k, f in enumerate(free) if f.vector == "P" and f.entry in PLACES.values()]
     return OceanIdentification(
         case, problem, P, [free[k].entry for k in places], parameters(free, places, P, C),
-        C[np.ix_(places, places)] * np.outer(_spreads(free, places), _spreads(free, places)), ridges(free, C),
+        _in_units(C, free, places), _in_units(wide, free, places), ridges(free, C),
         water_by_run(problem, P, F), left_out,
     )  # fmt: skip
 
 
-def _spreads(free: list[FreeParameter], places: list[int]) -> np.ndarray:
-    return np.array([free[k].spread for k in places])
+def heat_for(runs: int) -> float:
+    """By how much the evidence of so many runs counts for less."""
+    return max(1.0, runs / WORTH)
+
+
+def fitted(
+    parts: list[Problem], shared: SharedParameters, start: np.ndarray
+) -> tuple[np.ndarray, list[Expansion]]:  # fmt: skip
+    """The most probable values (count,) of runs, each a problem of its own, in spreads, and the runs about them."""
+    x = fit_shared(parts, shared, start, heat_for(len(parts)))
+    return x, [expand(part, shared, x, strata=strata(part.runs[0])) for part in parts]
+
+
+def allowance(found: list[Expansion], shared: SharedParameters, heat: float) -> np.ndarray:
+    """By how much other flights may ask for other values, (count, count) in spreads: all runs weigh as WORTH.
+
+    Flown otherwise, or with an effect beside them, they are met by another error of the form than these runs were.
+    """
+    heat = max(heat, heat_of(found))
+    total = np.sum([one.curvature for one in found], axis=0)
+    return np.asarray(np.linalg.inv(total / heat + np.diag(shared.prior**-2.0)))
+
+
+def _in_units(C: np.ndarray, free: list[FreeParameter], places: list[int]) -> np.ndarray:
+    """The part of a covariance (count, count) in spreads that is of `places`, SI."""
+    spreads = np.array([free[k].spread for k in places])
+    return np.asarray(C[np.ix_(places, places)] * np.outer(spreads, spreads))
+
+
+def strata(run: Run) -> np.ndarray:
+    """Of each row its way and depth, (rows,): 0 to BANDS - 1 down, BANDS to 2 BANDS - 1 up, the shallowest first."""
+    depth, pitch = (drawn(run.t, run.columns[name])[0] for name in (DEPTH, ATTITUDE[1]))
+    band = np.clip((BANDS * depth / max(float(depth.max()), 1.0)).astype(int), 0, BANDS - 1)
+    return np.asarray(np.where(pitch > 0.0, BANDS + band, band))
 
 
 def covariance(found: list[Expansion], shared: SharedParameters, least_heat: float = 1.0) -> np.ndarray:
-    """Of the values about their most probable ones, (count, count) in spreads.
+    """Of the most probable values about the true ones, (count, count) in spreads: N^-1 (prior + J) N^-1, a sandwich.
 
-    Where dives pull apart by more than their noise says, the spread is that of their pulls (a sandwich), in each
-    direction the larger of the two.
+    N: the precision that the values were found by, evidence over the heat and prior. J: by how much the runs' pulls
+    vary from chance, over the squared heat; in each direction the largest of three:
+    - what the noise levels say;
+    - how the pulls of whole runs differ, from run to run;
+    - how those of all runs together differ from stratum to stratum of way and depth, as the form of the model makes
+      them where it is wrong alike in every run: no number of runs makes that smaller.
+    The heat keeps the values of real vehicles within what is physical, and is no measure of how wrong they are: on twin
+    missions, whose form is nearly right, it is half again too large.
     """
-    heat, prior = max(least_heat, heat_of(found)), np.diag(shared.prior**-2.0)
-    normal = sum(one.curvature for one in found) / heat + prior
-    inverse = np.linalg.inv(normal)
-    if len(found) < 3:
-        return np.asarray(inverse)
-    pulls = np.array([one.slope / heat for one in found])
-    pulls -= pulls.mean(axis=0)
-    meat = pulls.T @ pulls * len(found) / (len(found) - 1.0) + prior
-    # in the directions where both are diagonal, the larger
-    root = np.linalg.cholesky(normal)
-    inner = np.linalg.solve(root, np.linalg.solve(root, meat).T)
+    noise = heat_of(found)
+    heat, prior = max(least_heat, noise), np.diag(shared.prior**-2.0)
+    total = np.sum([one.curvature for one in found], axis=0)
+    inverse = np.linalg.inv(total / heat + prior)
+    meat = prior + total * noise / heat**2
+    pulled = []
+    if len(found) > 2:
+        pulled.append(np.array([one.slope for one in found]) - np.mean([one.slope for one in found], axis=0))
+    if len(found) > 2 and found[0].parts:
+        pulled.append(stratum_pulls(found, total))
+    for pulls in pulled:
+        count = len(pulls)
+        meat = larger(meat, prior + pulls.T @ pulls * count / (count - 1.0) / heat**2)
+    return np.asarray(inverse @ meat @ inverse)
+
+
+def stratum_pulls(found: list[Expansion], total: np.ndarray) -> np.ndarray:
+    """Pulls of every stratum over all runs, (strata, count), less their share of what pulls all strata alike.
+
+    total: curvature of everything (count, count). Shares go with each stratum's own curvature.
+    """
+    slopes = np.sum([[part.slope for part in one.parts] for one in found], axis=0)
+    curvatures = np.sum([[part.curvature for part in one.parts] for one in found], axis=0)
+    alike = np.linalg.pinv(total, hermitian=True) @ slopes.sum(axis=0)
+    return np.asarray(slopes - curvatures @ alike)
+
+
+def larger(A: np.ndarray, B: np.ndarray) -> np.ndarray:
+    """Of two covariances (n, n), A positive, the larger in each of the directions in which both are diagonal."""
+    root = np.linalg.cholesky(A)
+    inner = np.linalg.solve(root, np.linalg.solve(root, B).T)
     values, vectors = np.linalg.eigh(0.5 * (inner + inner.T))
-    back = np.linalg.solve(root.T, vectors)
+    back = root @ vectors
     return np.asarray((back * np.maximum(values, 1.0)) @ back.T)
 
 

@@ -1,6 +1,7 @@
 """How well an ocean glider's mean speed is known: twin missions, identified and asked (docs/OCEAN.md, Velocity).
 
     python -m tools.measure.figures.ocean_speed --seed 90731 --missions 12
+    python -m tools.measure.figures.ocean_speed --seed 90741 --missions 12 --changed
 """
 
 import tempfile
@@ -18,9 +19,12 @@ from tools.inference.model import nominal_model
 from tools.inference.parameters import NINETY
 from tools.study.challenge.ocean_cases import TRUTH_EVERY, draw_case, write_dives
 from tools.study.challenge.ocean_plan import CRAFTS, MissionPlan
-from tools.study.challenge.watch_plan import UNCHANGED, WatchCounts
+from tools.study.challenge.watch_plan import CHANGED, STEP, UNCHANGED, WatchCounts
+from tools.watch.watch import watch
 
 LEARNED, ASKED = 12, 8  # dives
+CHANGE = 3  # of the dives that are asked, the first that is changed
+LABELS = ("drag", "net_buoyancy", "attitude_scale", "density_bias")
 CM = 100.0
 
 
@@ -34,21 +38,38 @@ class Asked:
     rows: np.ndarray
 
 
-def asked(seed: int, number: int, folder: Path) -> Asked:
-    """A mission drawn, identified from its first dives, and asked for the speed of the others."""
-    plan = MissionPlan(
-        number, UNCHANGED, None, None, None, None, False, CRAFTS[number % 3], (number // 3) % 2 == 1
-    )
+def plan_of(number: int, changed: bool) -> MissionPlan:
+    """Crafts in turn, every other three missions with a speed log; changes in turn, steps from dive CHANGE on."""
+    craft, speed = CRAFTS[number % 3], (number // 3) % 2 == 1
+    if not changed:
+        return MissionPlan(number, UNCHANGED, None, None, None, None, False, craft, speed)
+    label = LABELS[(number // 6 + number) % len(LABELS)]
+    return MissionPlan(number, CHANGED, label, STEP, CHANGE, None, False, craft, speed)
+
+
+def asked(seed: int, plan: MissionPlan, folder: Path) -> Asked:
+    """A mission drawn, identified from its first dives, and asked for the speed of the others.
+
+    Of one that changes the watch is asked, with the first dives for its reference, and the changed dives are taken; an
+    interval that is not even about its mean counts as half its width about its middle.
+    """
     made = draw_case(seed, plan, WatchCounts(1, 1, LEARNED + ASKED, LEARNED))
     write_dives(folder / "before", plan.craft, made.runs[:LEARNED])
     write_dives(folder / "asked", plan.craft, made.runs[LEARNED:])
-    vehicle = folder / "identified.toml"
-    vehicle.write_text(vehicle_text(identify_ocean(load_case(folder / "before"))), encoding="utf-8")
-    case = load_case(folder / "asked", str(vehicle))
+    vehicle, before = folder / "identified.toml", load_case(folder / "before")
+    vehicle.write_text(vehicle_text(identify_ocean(before)), encoding="utf-8")
+    case, true = load_case(folder / "asked", str(vehicle)), made.truth[LEARNED:]
     found = velocities(case, nominal_model(case))
-    errors = [mean_error(one, true) for one, true in zip(found, made.truth[LEARNED:], strict=True)]
-    rows = [one.columns["sd_u_m_s"][one.steady].mean() for one in found]
-    return Asked(plan.speed, np.array(errors), np.array([one.sd_mean_u for one in found]), np.array(rows))
+    errors = np.array([mean_error(one, own) for one, own in zip(found, true, strict=True)])
+    said = np.array([one.sd_mean_u for one in found])
+    rows = np.array([one.columns["sd_u_m_s"][one.steady].mean() for one in found])
+    if plan.kind == CHANGED:
+        watched = [run.velocity for run in watch(case, load_case(folder / "before", str(vehicle))).runs]
+        ends = np.array([one["ci90"] for one in watched if one is not None])
+        errors += ends.mean(axis=1) - [float(one.columns["u_m_s"][one.steady].mean()) for one in found]
+        said = np.ptp(ends, axis=1) / (2.0 * NINETY)
+        errors, said, rows = errors[CHANGE:], said[CHANGE:], rows[CHANGE:]
+    return Asked(plan.speed, errors, said, rows)
 
 
 def mean_error(found: Velocity, true: np.ndarray) -> float:
@@ -75,12 +96,13 @@ def summary(missions: list[Asked]) -> str:
 @click.command()
 @click.option("--seed", required=True, type=click.IntRange(0, 2**63 - 1))
 @click.option("--missions", default=12, show_default=True, type=click.IntRange(1, 1000))
-def main(seed: int, missions: int) -> None:
+@click.option("--changed", is_flag=True, help="Missions that change, and what `gap watch` says of their changed dives.")
+def main(seed: int, missions: int, changed: bool) -> None:
     """Crafts in turn, three missions without a speed log, three with, and so on."""
     found = []
     for number in range(missions):
         with tempfile.TemporaryDirectory() as folder:
-            found.append(asked(seed, number, Path(folder)))
+            found.append(asked(seed, plan_of(number, changed), Path(folder)))
         error, said = (CM * values.mean() for values in (found[-1].errors, found[-1].said))
         click.echo(f"{number} {CRAFTS[number % 3]}: {error:.2f} of {said:.2f}", err=True)
     for name, speed in (("depth alone", False), ("with speed", True)):
