@@ -54,24 +54,33 @@ def angle_increments(table: Table, attitude: np.ndarray, euler: bool) -> np.ndar
     return increments
 
 
-def design(
-    table: Table, turned: np.ndarray, rates: np.ndarray, delay: float, skew: bool = False
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A (rows, 3), regressors (rows, 3 axes, k) and which rows are used; within blocks, less their means.
+def moved_and_turned(
+    table: Table, turned: np.ndarray, rates: np.ndarray, delay: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """A (rows, 3), the three integrals and time (rows, 4), both within blocks, less their means; which rows are used,
+    and the block of each of them.
 
-    turned (rows, 3): the attitude's increments. Regressors of an axis: the three integrals, time, minus the axis' rate,
-    with `skew` also minus time times it.
+    turned (rows, 3): the attitude's increments.
     """
     moved = integrated(table, rates, delay)
     usable = np.isfinite(moved).all(axis=1) & np.isfinite(turned).all(axis=1)
     A, G = summed(turned, usable), summed(moved, usable)
     group = table.block[usable] * 100_003 + pieces(usable)[usable]
-    t = table.t[usable]
+    both = within(np.column_stack([A[usable], G[usable], table.t[usable]]), group)
+    return both[:, :3], both[:, 3:], usable, group
+
+
+def design(
+    table: Table, turned: np.ndarray, rates: np.ndarray, delay: float, skew: bool = False
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A (rows, 3), regressors (rows, 3 axes, k) and which rows are used; within blocks, less their means.
+
+    Regressors of an axis: those of moved_and_turned, minus the axis' rate, with `skew` also minus time times it.
+    """
+    A, shared, usable, group = moved_and_turned(table, turned, rates, delay)
     w = np.nan_to_num((rates if delay == 0.0 else _shifted(table, rates, delay))[usable])
-    parts = [A[usable], G[usable], t[:, None], w, *([t[:, None] * w] if skew else [])]
-    ends = np.cumsum([part.shape[1] for part in parts])[:-1]
-    A, G, T, *by_axis = np.split(within(np.column_stack(parts), group), ends, axis=1)
-    X = [np.column_stack([G, T, *(-part[:, axis] for part in by_axis)]) for axis in range(3)]
+    by_axis = [within(part, group) for part in (w, *([table.t[usable, None] * w] if skew else []))]
+    X = [np.column_stack([shared, *(-part[:, axis] for part in by_axis)]) for axis in range(3)]
     return A, np.stack(X, axis=1), usable
 
 
@@ -108,15 +117,12 @@ def _best_delay(table: Table, turned: np.ndarray, rates: np.ndarray) -> float:
     """Of DELAYS, the one that leaves least of the attitude's increments."""
     best, least = 0.0, math.inf
     for delay in sorted(DELAYS, key=abs):
-        A, X, _ = design(table, turned, rates, float(delay))
+        A, regressors, _, _ = moved_and_turned(table, turned, rates, float(delay))
         if len(A) < 20:
             continue
-        left = 0.0
-        for axis in range(3):
-            regressors = X[:, axis, :4]
-            solved = np.linalg.lstsq(regressors, A[:, axis], rcond=None)[0]
-            missed = float(np.mean((A[:, axis] - regressors @ solved) ** 2))
-            left += missed / max(float(np.mean(A[:, axis] ** 2)), 1e-12)
+        solved = np.linalg.lstsq(regressors, A, rcond=None)[0]
+        missed, moved = ((rows**2).mean(axis=0) for rows in (A - regressors @ solved, A))
+        left = float((missed / np.maximum(moved, 1e-12)).sum())
         if left < least * 0.98:
             best, least = float(delay), left
     return best
