@@ -1,6 +1,8 @@
 """Fixtures for all tests."""
 
 import contextlib
+import functools
+import gc
 import os
 import re
 import signal
@@ -26,20 +28,21 @@ def pytest_addoption(parser):
 
 
 WAITING = 2  # processes, of four or more, that take what waits for the clock: more of these flights would be late
-ON_THE_CLOCK = re.compile(r"^pytestmark = pytest\.mark\.realtime(?:\(seconds=(\d+)\))?$", re.MULTILINE)
+MARK = re.compile(r"^pytestmark = pytest\.mark\.(realtime|computes)(?:\(seconds=(\d+)\))?$", re.MULTILINE)
 
 
-def seconds_on_the_clock(file: Path) -> int | None:
-    """How long a file's tests wait for the clock on the wall, as its mark says (0: it does not); None: not at all."""
-    mark = ON_THE_CLOCK.search(file.read_text(encoding="utf-8"))
-    return None if mark is None else int(mark.group(1) or 0)
+@functools.cache
+def marked(file: Path) -> tuple[bool, int]:
+    """Whether a file's tests wait for the clock on the wall, and how long they take, as its mark says (0: not long)."""
+    mark = MARK.search(file.read_text(encoding="utf-8"))
+    return (False, 0) if mark is None else (mark.group(1) == "realtime", int(mark.group(2) or 0))
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config, log):
     """A file's tests stay with one process: what they share is flown once. Half of the processes, two at most, take the
-    files that wait for the clock, the longest first, which leaves the cores idle, the others those that compute; who
-    has nothing left of his own helps the others.
+    files that wait for the clock, which leaves the cores idle, the others those that compute, all of them the longest
+    first, so that none is left alone with one at the end; who has nothing left of his own helps the others.
     """
     from xdist.scheduler import LoadScopeScheduling
 
@@ -49,13 +52,21 @@ def pytest_xdist_make_scheduler(config, log):
 
         def _assign_work_unit(self, node) -> None:
             waits = self.nodes.index(node) < min(WAITING, max(1, self.numnodes // 2))
-            seconds = {scope: seconds_on_the_clock(config.rootpath / scope) for scope in self.workqueue}
-            own = [scope for scope in seconds if (seconds[scope] is not None) == waits]
+            marks = {scope: marked(config.rootpath / scope) for scope in self.workqueue}
+            own = [scope for scope in marks if marks[scope][0] == waits]
             if own:
-                self.workqueue.move_to_end(max(own, key=lambda scope: seconds[scope] or 0), last=False)
+                self.workqueue.move_to_end(max(own, key=lambda scope: marks[scope][1]), last=False)
             super()._assign_work_unit(node)
 
     return ByFile(config, log)
+
+
+def pytest_runtest_setup(item):
+    """What stands before the first test, and again after one that thawed it, is no garbage: a flight that arms has it
+    collected, and half a million objects of the tests' own are a tenth of a second each time.
+    """
+    if gc.get_freeze_count() == 0:
+        gc.freeze()
 
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -11,6 +11,8 @@ from firmware.core.layouts import control_layout as ctl
 from tools.measure.benchmark.allocations import BOXED, blocks_asked_for
 from tools.measure.benchmark.tick import harness, measure_tick
 
+pytestmark = pytest.mark.computes(seconds=20)
+
 # Seven arrays go into the autopilot's kernel, and each costs a 48-byte handle while the call lasts: 336 bytes, and
 # nothing else of size is alive then. See docs/FIGURES.md, Speed.
 PEAK_LIMIT = 400

@@ -17,6 +17,8 @@ from packaging.requirements import Requirement
 from tools.cli.main import cli
 from tools.data.errors import extras, missing_extra
 
+pytestmark = pytest.mark.computes(seconds=25)
+
 ROOT = Path(__file__).resolve().parents[2]
 DRIVER = ROOT / "tests" / "support" / "every_command.py"
 PACKAGES = ("firmware", "hal", "sim_backend", "tools")

@@ -16,6 +16,8 @@ from support.dask_cluster import dask_cluster
 from tools.study.campaign.conduct import fly_campaign
 from tools.study.campaign.plan import build_plan, load_campaign, with_options
 
+pytestmark = pytest.mark.computes(seconds=20)
+
 SMALL = ("--mission", "spiral", "--seeds", "3", "--controller", "law", "--controller", "pid")
 
 
@@ -45,7 +47,8 @@ def test_a_dask_cluster_gives_the_same_bits(plan, alone, tmp_path):
     with dask_cluster(tmp_path) as address:
         table = fly_campaign(plan, dask=address, chunk=2).table
         assert np.array_equal(table, alone, equal_nan=True)
-        done = glider(*SMALL, "--dask", address, "--chunk", "2", "--json", "--out", "far", cwd=tmp_path)
+        far = ("--dask", address, "--chunk", "2", "--json", "--out", "far")
+        done = commands.glider("campaign", *SMALL, *far, cwd=tmp_path)
         from distributed import Client
 
         with Client(address, set_as_default=False) as client:
@@ -53,7 +56,7 @@ def test_a_dask_cluster_gives_the_same_bits(plan, alone, tmp_path):
     assert len(set(names.values())) == 2  # two processes, neither of them this one
     assert os.getpid() not in names.values()
     assert done.returncode == 0, done.stderr
-    near = glider(*SMALL, "--jobs", "1", "--json", "--out", "near", cwd=tmp_path)
+    near = commands.glider("campaign", *SMALL, "--jobs", "1", "--json", "--out", "near", cwd=tmp_path)
     assert (tmp_path / "far" / "flights.csv").read_bytes() == (tmp_path / "near" / "flights.csv").read_bytes()
     assert json.loads(done.stdout)["controllers"] == json.loads(near.stdout)["controllers"]
 

@@ -15,6 +15,8 @@ from tools.study.challenge.make import Order, make, make_one
 from tools.study.challenge.plan import Counts, plan
 from tools.study.challenge.seal import open_answers
 
+pytestmark = pytest.mark.computes(seconds=20)
+
 COUNTS = Counts(single=1, none=1, pairs=0, unknown=1)
 SEED = 6
 

@@ -14,6 +14,8 @@ from pathlib import Path
 import pytest
 from support.sshd import NAME, sshd
 
+pytestmark = pytest.mark.computes(seconds=40)
+
 ROOT = Path(__file__).resolve().parents[2]
 PYPROJECT = """[build-system]
 requires = ["setuptools"]

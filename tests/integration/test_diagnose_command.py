@@ -16,6 +16,8 @@ from tools.inference.corrected import LINKS
 from tools.inference.load import load_model
 from tools.inference.predict import predict
 
+pytestmark = pytest.mark.computes(seconds=40)
+
 
 def glider(*words: object) -> int:
     """The command line's exit code."""

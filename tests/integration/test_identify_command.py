@@ -15,6 +15,8 @@ from tools.data.sources import load_vehicle
 from tools.identify.design import CAPTURE, make_runs
 from tools.inference.vehicle_parameters import coefficient_sizes
 
+pytestmark = pytest.mark.computes(seconds=20)
+
 ABOUT = dict(vehicle="roughie", site="pool", log_rate_hz=50.0, water_density_kg_m3=998.0, sensors=CAPTURE)
 
 

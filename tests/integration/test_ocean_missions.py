@@ -11,6 +11,8 @@ from tools.identify.ocean.identify import OceanIdentification, identify_ocean
 from tools.watch.answer import Watch
 from tools.watch.watch import watch
 
+pytestmark = pytest.mark.computes(seconds=25)
+
 QUIET = 0.01  # m/s
 FIRST = "run015"  # from which on the roll trim is another
 MOST_RUNS = 24  # of a mission: the step, and half as many runs again behind it

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy import signal
 
 from firmware.core.control.control import pid, reference_step, roll_law
 from firmware.core.vehicle.actuators import limited
@@ -20,6 +19,8 @@ finite = st.floats(-1e6, 1e6)
 @given(st.floats(0.05, 2.0), st.floats(0.3, 3.0), st.floats(-5.0, 5.0))
 def test_reference_filter_is_the_second_order_filter(wn, zeta, target):
     """L-ref: wn^2 / (s^2 + 2 zeta wn s + wn^2), against SciPy's step response."""
+    from scipy import signal
+
     dt, steps = 0.02, 500
     t = dt * np.arange(steps + 1)
     _, expected = signal.step(([wn**2], [1.0, 2 * zeta * wn, wn**2]), T=t)

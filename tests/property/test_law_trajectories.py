@@ -38,6 +38,8 @@ from firmware.core.vehicle.actuators import actuator_rates, limited
 from firmware.model.estimator_settings import parameter_sigma
 from firmware.model.vehicle import decode_vehicle
 
+pytestmark = pytest.mark.computes(seconds=30)
+
 SIGMA = parameter_sigma(P, decode_vehicle(VEHICLE_TEXT, "roughie").uncertainty)
 STEP = 0.004  # s, of the flights with ideal actuators
 HELD = 2e-4  # rad/s, m/s: what s may do beside the equations while the actuators are held for a step

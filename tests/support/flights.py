@@ -99,17 +99,16 @@ def fly(world: World, seed: int, *, P: np.ndarray | None = None, name: str = "ru
     zero, work, kept, acc = np.zeros(3), np.zeros((4, ef.N_XF)), np.empty(ef.N_XF), np.zeros(6)
     steps = max(1, round(1.0 / world.rate_hz / STEP))
     moments = np.array([0.0, 1.0 / world.rate_hz / steps])
-    held = -np.inf
+    held, strength = -np.inf, world.disturbance * np.repeat([disturbance.linear, disturbance.angular], 3)
     for i, now in enumerate(t):
+        inputs = np.array([commands[i], commands[i]])
         truth[i] = x
         table[i] = *euler_from_quaternion(*x[3:7]), *x[10:13], x[2], *x[14:16], *x[:2]
         for k in range(steps):
             moment = now + k / world.rate_hz / steps
             if moment - held >= 0.1 - 1e-6:
                 held = moment
-                strength = world.disturbance * np.repeat([disturbance.linear, disturbance.angular], 3)
                 acc[:] = strength * rng.standard_normal(6)
-            inputs = np.array([commands[i], commands[i]])
             propagate(P, F, x, kf.COMMANDED, moments, inputs, 1, 0, acc, zero, work, kept, RK4)
     sigma = [*3 * [sensors.attitude.noise], *3 * [sensors.gyro.noise], sensors.depth.noise]
     sigma += [sensors.slider.noise, sensors.ballast.noise]

@@ -1,8 +1,8 @@
-"""Kernels that several test files need and `make setup` does not compile: once, by processes of their own beside each
-other, before the tests begin.
+"""What several test files need and would each make for themselves: once, by processes of their own beside each other,
+before the tests begin. Kernels that `make setup` does not compile, and Hypothesis' table of all characters.
 
 `python -m tests.support.precompile` is what `make test` runs; with a name of WORKS it does that alone. What was done
-leaves its stamp in the cache of kernels, so that the next call ends at once.
+leaves its stamp in the cache of kernels, the characters their file in .hypothesis, so that the next call ends at once.
 """
 
 import subprocess
@@ -51,6 +51,14 @@ def _glide_a_moment() -> None:
         assess(case)
 
 
+def _list_characters() -> None:
+    """Which characters there are in a text: Hypothesis keeps them in a file, and takes four seconds to find them."""
+    from hypothesis.strategies import text
+
+    text().validate()
+
+
+CHARACTERS = "characters"
 WORKS = (
     Work("identification", kernel_count, _identify_a_moment),
     Work("challenge", kernel_count, _challenge_a_moment),
@@ -65,10 +73,14 @@ def main(names: list[str]) -> int:
         for work in WORKS:
             if work.name in names:
                 work.compile()
+        if CHARACTERS in names:
+            _list_characters()
         return 0
     waiting = [work.name for work in WORKS if (stamp := work.stamp()) is not None and not stamp.exists()]
     if waiting:
         print(f"compiling kernels that tests share: {', '.join(waiting)}", flush=True)
+    if not list(Path(".hypothesis").glob("unicode_data/*/codec-*")):
+        waiting.append(CHARACTERS)
     started = [subprocess.Popen([sys.executable, "-m", "tests.support.precompile", name]) for name in waiting]
     return max((process.wait() for process in started), key=abs, default=0)
 

@@ -15,7 +15,6 @@ which is what the trajectory likelihood (flights.py) is for.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import savgol_filter
 from scipy.spatial.transform import Rotation
 
 from firmware.core.vehicle import layout
@@ -58,6 +57,8 @@ def _even(t: np.ndarray, grid: np.ndarray, values: np.ndarray, wraps: bool = Fal
 
 def kinematics(run: Run, P: np.ndarray) -> Kinematics:
     """Smoothed motion of a run out of its poses; body rates by equation (5) turned round."""
+    from scipy.signal import savgol_filter  # a second to import: for who fits accelerations
+
     rate = 1.0 / float(np.median(np.diff(run.t)))
     grid = np.arange(run.t[0], run.t[-1], 1.0 / rate)
     width = min(_width(rate), 2 * ((len(grid) - 1) // 2) - 1)

@@ -4,7 +4,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy import stats
 
 from tools.diagnose.record import Finding
 from tools.diagnose.residuals import chi, goes_with, lagged, peak, worst
@@ -23,6 +22,8 @@ def draws(function, count: int = 300) -> np.ndarray:
     lambda e: chi(e[:10]),
 ])  # fmt: skip
 def test_white_noise_gives_standard_normal_deviates(function):
+    from scipy import stats
+
     z = draws(function)
     assert stats.kstest(z, "norm").pvalue > 1e-3
 
@@ -43,6 +44,8 @@ def test_colour_shows_in_the_lags():
 
 
 def test_the_worst_finding_is_corrected_for_how_many_were_looked_at():
+    from scipy import stats
+
     few = [Finding("q", "variance", 4.0)]
     many = [Finding("q", f"lag {n}", 0.0) for n in range(500)]
     assert worst(few + many) < worst(few) < 4.0

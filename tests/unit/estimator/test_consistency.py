@@ -1,7 +1,6 @@
 """Is the filter as sure as it may be: normalised squared errors over seeded flights within chi-square bounds."""
 
 import numpy as np
-from scipy.stats import chi2
 from support.estimating import Filter, state_error
 from support.flights import World, fly
 
@@ -37,6 +36,8 @@ def squared_errors(world: World, seeds: range, uncertain: bool) -> np.ndarray:
 
 
 def test_with_disturbance_alone_errors_are_as_large_as_the_filter_says():
+    from scipy.stats import chi2
+
     world = World(uncertainty=0.0, bias=0.0, start_speed=0.3)
     found = squared_errors(world, range(12), uncertain=False)
     n, k = len(found), len(KEPT)
@@ -46,6 +47,8 @@ def test_with_disturbance_alone_errors_are_as_large_as_the_filter_says():
 
 
 def test_with_uncertain_parameters_it_is_not_too_sure():
+    from scipy.stats import chi2
+
     found = squared_errors(World(bias=0.0, start_speed=0.3), range(12), uncertain=True)
     n, k = len(found), len(KEPT)
     assert found.mean() < 1.1 * chi2.ppf(0.9995, n * k) / n

@@ -11,6 +11,8 @@ from tools.study.faults.campaign import Outcome, everything, jobs, run, summary
 from tools.study.faults.cases import Case, Show
 from tools.study.faults.scene import PHASES
 
+pytestmark = pytest.mark.computes(seconds=25)
+
 # One quick case for each row that is flown; the whole campaign is `glider faults`.
 QUICK = {1: "imu silent", 2: "beacon off", 4: "plunger_wire off", 6: "imu backwards", 10: "imu garbage", 15: "past",
          16: "slider alarm kept", 20: "leak", 22: "no number", 24: "every tick late"}  # fmt: skip

@@ -37,8 +37,8 @@ def test_the_start_is_found_nearly_as_good_as_known(mocap, speed, most):
         case, flights = fly_case(World(mocap=mocap, start_speed=speed), seed, runs=2)
         problem, P, F = problem_of(case), nominal_model(case).P, np.zeros(ef.N_F)
         bounds = problem.recording.bounds
-        found.append(total(case, np.split(fly_windows_from(problem, P, F, observe(problem, P, F)), bounds[1:-1])))
         gains = observe(problem, P, F)
+        found.append(total(case, np.split(fly_windows_from(problem, P, F, gains), bounds[1:-1])))
         gains.X[:] = np.concatenate([flight.truth for flight in flights])
         known.append(total(case, np.split(fly_windows_from(problem, P, F, gains), bounds[1:-1])))
     assert root_mean_square(found) < most * root_mean_square(known)

@@ -8,6 +8,8 @@ import pytest
 from tools.data.runs.case import load_case
 from tools.gap.assess import assess
 
+pytestmark = pytest.mark.computes(seconds=20)
+
 
 def no_gap_cases(shared) -> list[str]:
     answers = sorted((shared / "gap" / "answers").glob("*.json"))

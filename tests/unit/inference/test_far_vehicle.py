@@ -15,6 +15,8 @@ from tools.inference.prediction_error import PredictionError, identify_by_predic
 from tools.inference.problem import problem_of
 from tools.inference.vehicle_parameters import parameters
 
+pytestmark = pytest.mark.computes(seconds=15)
+
 TRUE = {
     "CG_OFFSET_X": -0.0023, "NET_MASS_OFFSET": 0.023, "DRAG_0": 0.46, "PITCH_TRIM": 0.37, "LIFT": 0.43,
     "SLIDER_SCALE": -0.4, "BALLAST_SCALE": 0.00099, "DRAG_ALPHA": -0.43, "PITCH_DAMPING": -0.029, "WEATHERCOCK": 0.19,

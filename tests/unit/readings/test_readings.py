@@ -10,6 +10,8 @@ from tools.data.errors import InputError
 from tools.data.runs.run import Run
 from tools.readings.check import check
 
+pytestmark = pytest.mark.computes(seconds=15)
+
 PERIOD = 0.1
 RATES = ("p_rad_s", "q_rad_s", "r_rad_s")
 

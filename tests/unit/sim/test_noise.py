@@ -1,7 +1,6 @@
 """Random numbers by counting: reproducible, independent of order, and distributed as they should be."""
 
 import numpy as np
-from scipy import stats
 
 from sim_backend.core.noise import gaussian, uniform
 
@@ -19,6 +18,8 @@ def test_the_same_place_gives_the_same_number():
 
 
 def test_normal_deviates_are_normal():
+    from scipy import stats
+
     values = draw(1, 0)
     assert stats.kstest(values, "norm").pvalue > 1e-3
     assert abs(values.mean()) < 4 / np.sqrt(N)
@@ -26,6 +27,8 @@ def test_normal_deviates_are_normal():
 
 
 def test_uniform_numbers_are_inside_and_uniform():
+    from scipy import stats
+
     values = np.array([uniform(SEED, 5, i) for i in range(N)])
     assert values.min() > 0.0
     assert values.max() < 1.0

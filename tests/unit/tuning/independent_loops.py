@@ -1,9 +1,10 @@
 """The loops a second time, for the tests: state space with Pade delays, put together by python-control.
 
 Only the plant's matrices are shared with tools/study/tuning; wiring, delays, observer and closing are python-control's.
+It and what it brings take a second to import, which every process of the tests would spend on collecting them: here,
+and where else a test alone needs a large library, it is imported where it is used.
 """
 
-import control
 import numpy as np
 
 from firmware.core.vehicle.layout import M_R, M_S, R_R, R_S, X_B
@@ -16,6 +17,8 @@ REFERENCES = ["pitch_ref", "pitch_rate_ref", "depth_ref", "depth_rate_ref"]
 
 
 def block(A, B, C, D, inputs, outputs):
+    import control
+
     return control.ss(A, B, C, D, inputs=inputs, outputs=outputs)
 
 
@@ -24,6 +27,8 @@ def gain(row, inputs, output):
 
 
 def late(delay, source, output):
+    import control
+
     sys = control.ss(control.tf(*control.pade(delay, ORDER)))
     return block(sys.A, sys.B, sys.C, sys.D, [source], [output])
 
@@ -69,6 +74,8 @@ def wires(slider: float = 1.0, ballast: float = 1.0, further: dict[str, float] |
 
 
 def joined(parts: list, inputs: list[str], outputs: list[str]):
+    import control
+
     return control.interconnect(
         parts, inplist=inputs, outlist=outputs, inputs=[f"in_{name}" for name in inputs],
         outputs=[f"out_{name}" for name in outputs], check_unused=False,

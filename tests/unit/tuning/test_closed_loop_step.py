@@ -1,6 +1,5 @@
 """The linear loops, delays and all, against flights: the difference that a small step of a target makes."""
 
-import control
 import msgspec
 import numpy as np
 import pytest
@@ -42,6 +41,8 @@ def flown(vehicle, board, trim, leg, column):
 
 def predicted(vehicle, board, trim, step, wn, output):
     """The same difference by the linear loops, behind the reference filter (zeta = 1)."""
+    import control
+
     t = np.arange(round(SECONDS / 0.02)) * 0.02
     t = np.maximum(t - 0.02, 0.0)  # the first depth arrives a tick late, and the mission waits for it
     position, rate = step * (1.0 - np.exp(-wn * t) * (1.0 + wn * t)), step * wn * wn * t * np.exp(-wn * t)

@@ -2,7 +2,6 @@
 
 import math
 
-import control
 import msgspec
 import numpy as np
 import pytest
@@ -52,6 +51,8 @@ def test_a_loop_below_one_never_crosses():
 @pytest.mark.parametrize("trim", TRIMS, ids=lambda trim: trim.name)
 def test_frequency_response_and_margins_are_python_controls(vehicle, board, trim, loop):
     """Another wiring, Pade for the delays: the same curve, and python-control's margins of it."""
+    import control
+
     P, plant = vehicle.vector(), linearise(vehicle.vector(), trim)
     theirs = opened(P, plant, Delays.of(board), Control(), loop)
     few = np.geomspace(0.05, 20.0, 50)

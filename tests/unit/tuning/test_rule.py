@@ -1,6 +1,5 @@
 """The rule: it reaches what it states, on the vehicle that ships and on others, and the defaults are its gains."""
 
-import control
 import msgspec
 import numpy as np
 import pytest
@@ -15,6 +14,8 @@ from tools.study.tuning.loops import Delays
 
 def margins_by_python_control(vehicle, board, gains, loop):
     """Smallest phase margin (deg) and fastest crossover (rad/s) over the design trims."""
+    import control
+
     omega, found = np.geomspace(0.05, 30.0, 1500), []
     for trim in DESIGN_TRIMS:
         plant = linearise(vehicle.vector(), trim)

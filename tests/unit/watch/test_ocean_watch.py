@@ -25,6 +25,8 @@ from tools.inference.ocean_inputs import unsteady
 from tools.watch.usable import usable_dive
 from tools.watch.watch import watch
 
+pytestmark = pytest.mark.computes(seconds=20)
+
 DIVES, FIRST, SIZE = 8, 4, 0.5
 OTHER_SEED = 2
 

@@ -16,6 +16,8 @@ from tools.data.runs.case import write_case
 from tools.watch.answer import Watch
 from tools.watch.watch import watch
 
+pytestmark = pytest.mark.computes(seconds=15)
+
 WORLD = World(seconds=40.0, bias=0.2)
 REFERENCE, WATCHED = 3, 4
 COMMON = {layout.K_D0: 0.35, layout.K_L: 0.2, layout.K_MY: -0.15}  # relative: a file that is not right, in all runs

@@ -16,6 +16,8 @@ from tools.report.ocean import write_ocean_report
 from tools.study.challenge.ocean_cases import as_run, flown, with_change
 from tools.watch.whole_case import diagnose_ocean, plain, write
 
+pytestmark = pytest.mark.computes(seconds=25)
+
 DIVES = 6
 WRONG = np.radians(4.0)
 

@@ -90,25 +90,49 @@ def noise_gain(x, dt, Gam):
 
 
 @kernel
-def linear_step(Pw, F, x, acc, mode, t, inputs, i, begin, zero, work, kept, moved, base, error, Phi, Gam):
+def filled(values):
+    """An array (n, LANES) of one vector, in every lane."""
+    many = np.empty((len(values), LANES))
+    for n in range(len(values)):
+        many[n, :] = values[n]
+    return many
+
+
+@kernel
+def linear_step(
+    Pw, F, x, acc, mode, t, inputs, i, begin, zero, work, kept, Pws, Fs, many, states, works, keeps, moved, base, error,
+    Phi, Gam,
+):  # fmt: skip
     """Fly x to row i; Phi (N_ERR, N_ERR) is the step's derivative by the state, Gam (N_ERR, 6) by accelerations.
 
     acc (6) is added to nu_dot. Nothing of a step depends on the place north and east that it starts from, nor on
-    motion capture's clock.
+    motion capture's clock. States that are off by one error each fly beside each other: Pws (N_P), Fs (N_F) are Pw, F
+    as wide numbers; many (6, LANES), states (N_XF, LANES), works and keeps (wide) are scratch.
     """
-    base[:] = x
-    propagate(Pw, F, base, mode, t, inputs, i, begin, acc, zero, work, kept, MIDPOINT)
     for j in range(E_DOWN):
         Phi[:, j] = 0.0
         Phi[j, j] = 1.0
     Phi[:, E_LATE] = 0.0
     Phi[E_LATE, E_LATE] = 1.0
-    for j in range(E_DOWN, E_LATE):
-        perturbed(x, j, error, moved)
-        propagate(Pw, F, moved, mode, t, inputs, i, begin, acc, zero, work, kept, MIDPOINT)
-        difference(moved, base, error)
-        for n in range(N_ERR):
-            Phi[n, j] = error[n] / NUDGE
+    for n in range(6):
+        many[n, :] = acc[n]
+    for first in range(E_DOWN - 1, E_LATE, LANES):  # the first of all is x as it stands, which the others are off from
+        for n in range(LANES):
+            moved[:] = x
+            if E_DOWN <= first + n < E_LATE:
+                perturbed(x, first + n, error, moved)
+            states[:, n] = moved
+        propagate(
+            Pws, Fs, as_wide(states), mode, t, inputs, i, begin, as_wide(many), zero, works, keeps, MIDPOINT
+        )  # fmt: skip
+        if first < E_DOWN:
+            base[:] = states[:, 0]
+        for n in range(LANES):
+            if E_DOWN <= first + n < E_LATE:
+                moved[:] = states[:, n]
+                difference(moved, base, error)
+                for m in range(N_ERR):
+                    Phi[m, first + n] = error[m] / NUDGE
     propagate(Pw, F, x, mode, t, inputs, i, begin, acc, zero, work, kept, RK4)
     noise_gain(x, t[i] - t[i - 1], Gam)
 
@@ -154,6 +178,8 @@ def filter_run(
     effective_parameters(P, F, Pw)
     work, kept, moved, base = np.zeros((4, ef.N_XF)), np.empty(ef.N_XF), np.empty(ef.N_XF), np.empty(ef.N_XF)
     count = len(spread)
+    Pws, Fs, many, states = filled(Pw), filled(F), np.empty((6, LANES)), np.empty((ef.N_XF, LANES))
+    works, keeps = np.zeros((4, ef.N_XF, LANES)), np.empty((ef.N_XF, LANES))
     error, zero, before, lacking = np.empty(count), np.zeros(3), np.empty(N_PATH), np.zeros(N_LACKING)
     Phi, Gam, cov = np.zeros((count, count)), np.empty((count, 6)), np.zeros((count, count))
     carried, turned = np.empty((count, count)), np.empty((count, count))
@@ -171,8 +197,9 @@ def filter_run(
             dt = t[i] - t[i - 1]
             pose_of(x, before)
             linear_step(
-                Pw, F, x, lacking[:6], mode, t, inputs, i, begin, zero, work, kept, moved, base, error, Phi, Gam
-            )
+                Pw, F, x, lacking[:6], mode, t, inputs, i, begin, zero, work, kept, as_wide(Pws), as_wide(Fs), many,
+                states, as_wide(works), as_wide(keeps), moved, base, error, Phi, Gam,
+            )  # fmt: skip
             if count > N_ERR:
                 step_lacking(drift, x, lacking, dt)
                 lacking_columns(drift, dt, Gam, Phi)

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.signal import savgol_filter
 
 from sim_backend.ocean.vehicle import OceanVehicle, gravity
 from tools.data.runs import columns as names
@@ -69,6 +68,8 @@ def even_samples(run: Run) -> Glide | None:
         values = columns[name]
         given = np.isfinite(values)
         return np.interp(s, t[given], values[given])
+
+    from scipy.signal import savgol_filter
 
     depth, pitch, oil = (evened(name) for name in wanted[:3])
     rise = -savgol_filter(depth, SMOOTH, 1, deriv=1, delta=EVEN)

@@ -113,12 +113,13 @@ def make(order: Order, jobs: int = 0, advance: Callable[[int], None] = lambda n:
     todo, failed = missing(order, cases), []
     advance(len(cases) - len(todo))
     vehicle = load_vehicle(VEHICLE)
-    if todo:  # the first one here: it compiles the kernels into the cache that the processes share
-        failed.append(make_one(order, todo[0], vehicle))
+    here = todo if jobs == 1 else todo[:1]  # the first compiles the kernels into the cache that the processes share
+    for case in here:
+        failed.append(make_one(order, case, vehicle))
         advance(1)
     spawn = get_context("spawn")
     with ProcessPoolExecutor(jobs or os.cpu_count(), mp_context=spawn, initializer=end_with_parent) as pool:
-        waiting = [pool.submit(make_one, order, case, vehicle) for case in todo[1:]]
+        waiting = [pool.submit(make_one, order, case, vehicle) for case in todo[len(here) :]]
         try:
             for done in as_completed(waiting):
                 failed.append(done.result())
