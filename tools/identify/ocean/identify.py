@@ -171,13 +171,15 @@ def fitted(
 
 
 def allowance(found: list[Expansion], shared: SharedParameters, heat: float) -> np.ndarray:
-    """By how much other flights may ask for other values, (count, count) in spreads: all runs weigh as WORTH.
+    """By how much other flights may ask for other values, (count, count) in spreads: all runs weigh as WORTH, or as
+    they differ.
 
     Flown otherwise, or with an effect beside them, they are met by another error of the form than these runs were.
     """
-    heat = max(heat, heat_of(found))
-    total = np.sum([one.curvature for one in found], axis=0)
-    return np.asarray(np.linalg.inv(total / heat + np.diag(shared.prior**-2.0)))
+    heat, prior = max(heat, heat_of(found)), np.diag(shared.prior**-2.0)
+    precision = np.sum([one.curvature for one in found], axis=0) / heat + prior
+    inverse = np.linalg.inv(precision)
+    return np.asarray(inverse @ larger(precision, prior + scatter(run_pulls(found)) / heat**2) @ inverse)
 
 
 def _in_units(C: np.ndarray, free: list[FreeParameter], places: list[int]) -> np.ndarray:
@@ -210,26 +212,33 @@ def covariance(found: list[Expansion], shared: SharedParameters, least_heat: flo
     total = np.sum([one.curvature for one in found], axis=0)
     inverse = np.linalg.inv(total / heat + prior)
     meat = prior + total * noise / heat**2
-    pulled = []
-    if len(found) > 2:
-        pulled.append(np.array([one.slope for one in found]) - np.mean([one.slope for one in found], axis=0))
-    if len(found) > 2 and found[0].parts:
-        pulled.append(stratum_pulls(found, total))
-    for pulls in pulled:
-        count = len(pulls)
-        meat = larger(meat, prior + pulls.T @ pulls * count / (count - 1.0) / heat**2)
+    for pulls in (run_pulls(found), stratum_pulls(found, total)):
+        meat = larger(meat, prior + scatter(pulls) / heat**2)
     return np.asarray(inverse @ meat @ inverse)
+
+
+def scatter(pulls: np.ndarray) -> np.ndarray:
+    """What pulls (n, count) say of how their sum varies, (count, count)."""
+    count = len(pulls)
+    return np.asarray(pulls.T @ pulls * count / max(count - 1.0, 1.0))
+
+
+def run_pulls(found: list[Expansion]) -> np.ndarray:
+    """Pulls of every run less their mean, (runs, count); 0 of fewer than three: they do not say how runs differ."""
+    slopes = np.array([one.slope for one in found])
+    return slopes - slopes.mean(axis=0) if len(found) > 2 else 0.0 * slopes
 
 
 def stratum_pulls(found: list[Expansion], total: np.ndarray) -> np.ndarray:
     """Pulls of every stratum over all runs, (strata, count), less their share of what pulls all strata alike.
 
-    total: curvature of everything (count, count). Shares go with each stratum's own curvature.
+    total: curvature of everything (count, count). Shares go with each stratum's own curvature. 0 of fewer than three
+    runs.
     """
     slopes = np.sum([[part.slope for part in one.parts] for one in found], axis=0)
     curvatures = np.sum([[part.curvature for part in one.parts] for one in found], axis=0)
     alike = np.linalg.pinv(total, hermitian=True) @ slopes.sum(axis=0)
-    return np.asarray(slopes - curvatures @ alike)
+    return np.asarray(slopes - curvatures @ alike) * float(len(found) > 2)
 
 
 def larger(A: np.ndarray, B: np.ndarray) -> np.ndarray:
