@@ -6,7 +6,7 @@ OFFSET_MATTERS, since any sensor has a bias. The tolerances are those in which g
 
 SURE is far beyond a normal 5 % point: a case has some sixty comparisons, blocks are few, and what is compared is
 filtered by instruments nobody knows. With it and MATTERS no instrument of the simulated cases without a gap is accused
-(docs/READINGS.md has the count).
+(docs/READINGS.md, How often).
 """
 
 import math
