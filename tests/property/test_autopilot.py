@@ -45,7 +45,7 @@ sample = st.one_of(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(width=6
 
 
 @pytest.mark.parametrize("controller", ["pid", "law", "hybrid", "law+"])
-@settings(deadline=None, derandomize=True, max_examples=40)
+@settings(deadline=None, derandomize=True, max_examples=60)
 @given(st.lists(st.lists(sample, min_size=FRAME_SIZE, max_size=FRAME_SIZE), min_size=3, max_size=12))
 def test_absurd_samples_never_reach_an_actuator(controller, frames):
     pilot = autopilot()

@@ -24,7 +24,7 @@ def test_rough_water_is_turbulence_however_rough(tmp_path):
 def test_a_clock_that_wanders_is_late_and_hides_nothing_beside_it(tmp_path):
     F = np.zeros(ef.N_F)
     F[ef.DRAG_0] = 1.0
-    case = make_case(tmp_path, F, seed=8, runs=2, mocap=True, late=lambda t: 1.2 + 0.25 * np.sin(2.0 * np.pi * t / 7.0))
+    case = make_case(tmp_path, F, seed=8, mocap=True, late=lambda t: 1.2 + 0.25 * np.sin(2.0 * np.pi * t / 7.0))
     answer = conclude(run(problem_of(case)))
     assert answer.noise.probe.name == CLOCK
     assert set(answer.selected) == {"mocap_delay", "drag"}

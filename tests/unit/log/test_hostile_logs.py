@@ -49,7 +49,7 @@ def hostile(draw, stream):
     writer.finish()
 
 
-@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+@settings(max_examples=400, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 @given(data=st.data())
 def test_it_is_read_exported_and_shown_or_refused(tmp_path_factory, data):
     folder = tmp_path_factory.mktemp("hostile")

@@ -115,7 +115,7 @@ def runs(draw):
     return Run("run00", None, columns, extra)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(run=runs())
 def test_run_data_survives_the_way_through_a_log(tmp_path_factory, run):
     folder = tmp_path_factory.mktemp("there")
