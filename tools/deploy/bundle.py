@@ -38,8 +38,7 @@ def make_release(target: Target, folder: Path, root: Path = ROOT) -> Path:
     with tempfile.TemporaryDirectory() as place:
         tree = Path(place, "tree")
         tree.mkdir()
-        archive = subprocess.run(["git", "-C", str(root), "archive", "HEAD"], capture_output=True, check=True).stdout
-        subprocess.run(["tar", "x", "-C", str(tree)], input=archive, check=True)
+        archived(root, name.rpartition("-")[2], tree)
         own_wheel(tree, fresh / "wheels")
         copy_files(tree, fresh)
     lines = {"release": name, "version": version(root), "machine": target.machine, "python": target.python}
@@ -66,6 +65,19 @@ def copy_files(tree: Path, release: Path) -> None:
         ("sawtooth.toml", "firmware/guidance/missions/sawtooth.toml"),
     ):
         shutil.copy(tree / path, release / "first" / name)
+
+
+def archived(root: Path, commit: str, folder: Path, *paths: str) -> None:
+    """What a commit holds, all of it or some paths, into a folder."""
+    command = ["git", "-C", str(root), "archive", commit, *paths]
+    archive = subprocess.run(command, capture_output=True, check=True).stdout
+    subprocess.run(["tar", "x", "-C", str(folder)], input=archive, check=True)
+
+
+def written(release: Path) -> dict[str, str]:
+    """What a release says of itself: release, version, machine, python."""
+    lines = (release / "RELEASE").read_text().splitlines()
+    return {key: text for key, _, text in (line.partition("=") for line in lines)}
 
 
 def uncommitted(root: Path = ROOT) -> list[str]:

@@ -21,6 +21,7 @@ from tools.cli.common import DONE, FAILED, progress, say
 
 READY_S = 20.0  # for the out-of-band process to say READY=1 and feed the watchdog
 FLIGHT_S = 300.0
+PLAIN_PATIENCE = 10.0  # times as long as plain Python: in an emulator, beside other work
 PLUNGE = """format = 1
 name = "selfcheck"
 time_limit_s = 60.0
@@ -48,11 +49,13 @@ def see_state(folder: Path) -> str:
     return found.phase.name.lower()
 
 
-def see_kernels() -> str:
-    """Compiled for this release, so that its first flight need not."""
+def see_kernels(plain: bool) -> str:
+    """Compiled for this release, so that its first flight need not; as plain Python only where that is asked for."""
     from firmware.core.jit import CACHE_DIR
     from tools.flight.precompile import FLIGHT, ensure_compiled
 
+    if CACHE_DIR is None and not plain:
+        raise Unfit("plain Python (GLIDER_JIT=0) is too slow to fly with")
     ensure_compiled(FLIGHT, say, progress)
     return "plain Python (GLIDER_JIT=0)" if CACHE_DIR is None else str(CACHE_DIR)
 
@@ -68,16 +71,21 @@ def see_files(folder: Path) -> str:
     return f"{len(missions)} missions" if missions else "no mission yet"
 
 
-def see_flight() -> str:
-    """A short flight on the simulated board, recorded and read back."""
+def flight_command(mission: str, log: str) -> list[str]:
+    """The flight's words, behind `glider`."""
+    return ["fly", "--json", "--mission", mission, "--log", log]
+
+
+def see_flight(kept: Path | None, patience: float) -> str:
+    """A short flight on the simulated board, recorded and read back; its log stays where `kept` says."""
     from tools.data.log.reader import read_log
 
     with tempfile.TemporaryDirectory() as folder:
-        mission, log = Path(folder, "selfcheck.toml"), Path(folder, "selfcheck.mcap")
+        mission, log = Path(folder, "selfcheck.toml"), kept or Path(folder, "selfcheck.mcap")
         mission.write_text(PLUNGE)
-        command = [sys.executable, "-m", "tools.cli.main", "fly", "--json", "--mission", str(mission)]
-        command += ["--log", str(log)]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=FLIGHT_S)
+        log.unlink(missing_ok=True)
+        command = [sys.executable, "-m", "tools.cli.main", *flight_command(str(mission), str(log))]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=patience * FLIGHT_S)
         try:
             result = json.loads(done.stdout)
         except ValueError:
@@ -87,11 +95,11 @@ def see_flight() -> str:
     return f"{result['ticks']} ticks, log complete"
 
 
-def see_out_of_band() -> str:
+def see_out_of_band(patience: float) -> str:
     """The process that brings the vehicle up starts, feeds systemd's watchdog and ends in order."""
     with tempfile.TemporaryDirectory() as folder, socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as line:
         line.bind(f"{folder}/notify")
-        line.settimeout(READY_S)
+        line.settimeout(patience * READY_S)
         command = [sys.executable, "-m", "hal.outofband", "--service", "--run", folder, "--state", folder]
         environment = {**os.environ, "NOTIFY_SOCKET": f"{folder}/notify"}
         with subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True) as process:
@@ -100,10 +108,10 @@ def see_out_of_band() -> str:
                 while missing:
                     missing.discard(line.recv(1000).decode())
             except TimeoutError:
-                raise Unfit(f"no {' and '.join(sorted(missing))} within {READY_S:g} s") from None
+                raise Unfit(f"no {' and '.join(sorted(missing))} within {patience * READY_S:g} s") from None
             finally:
                 process.send_signal(signal.SIGTERM)
-                process.communicate(timeout=10)
+                process.communicate(timeout=patience * 10.0)
         if process.returncode:
             raise Unfit(f"exit code {process.returncode}")
     return "starts, feeds the watchdog, ends"
@@ -118,10 +126,15 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tools.deploy.selfcheck", description=__doc__)
     parser.add_argument("--files", type=Path, required=True, help="folder of board.toml, vehicle.toml, missions")
     parser.add_argument("--state", type=Path, required=True, help="folder of the vehicle's state")
+    look = "as plain Python, with patience, for a look: never on a vehicle; LOG: its flight's"
+    parser.add_argument("--plain", type=Path, metavar="LOG", help=look)
     options = parser.parse_args()
+    plain: Path | None = options.plain
+    patience = 1.0 if plain is None else PLAIN_PATIENCE
     checks: tuple[tuple[str, Callable[[], str]], ...] = (
         ("state", lambda: see_state(options.state)), ("files", lambda: see_files(options.files)),
-        ("out of band", see_out_of_band), ("kernels", see_kernels), ("flight", see_flight),
+        ("out of band", lambda: see_out_of_band(patience)), ("kernels", lambda: see_kernels(plain is not None)),
+        ("flight", lambda: see_flight(plain, patience)),
     )  # fmt: skip
     for name, check in checks:
         try:

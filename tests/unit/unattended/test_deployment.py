@@ -109,15 +109,19 @@ def test_a_release_passes_its_self_check_unless_vehicle_files_or_state_are_again
         shutil.copy(ROOT / path, files / {"boards": "board.toml", "vehicles": "vehicle.toml"}.get(
             Path(path).parent.name, "sawtooth.toml"))  # fmt: skip
 
-    def check():
+    def check(**settings):
         command = [sys.executable, "-m", "tools.deploy.selfcheck", "--files", files, "--state", state]
-        done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
+        done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, env=os.environ | settings)
         return done.returncode, done.stderr.splitlines()[-1]
 
     code, said = check()
     assert code == 0, said
     assert said.startswith("self-check: flight: ")
     assert said.endswith(" ticks, log complete")
+
+    # nobody's setting makes a vehicle of plain Python
+    code, said = check(GLIDER_JIT="0")
+    assert (code, said) == (1, "self-check: kernels: FAILED: plain Python (GLIDER_JIT=0) is too slow to fly with")
 
     with (files / "sawtooth.toml").open("a") as file:
         file.write("\nwings = 2\n")
