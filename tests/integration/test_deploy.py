@@ -1,4 +1,5 @@
 """`make deploy` over a real sshd: twice, over a cable that breaks, with a release that does not pass, and back again.
+By a user of its own, where root runs the tests, into a folder of that user.
 
 What is deployed is a small project of its own, for speed: the script, units and folders are the real ones, its
 self-check does as a file beside the vehicle's own says. The real self-check has a test of its own.
@@ -46,7 +47,7 @@ class Dock:
 
     def __init__(self, folder: Path, server):
         self.folder, self.server = folder, server
-        self.source, self.vehicle = folder / "source", folder / "vehicle"
+        self.source, self.vehicle = folder / "source", server.account.home / "vehicle"
         deploy = self.source / "tools" / "deploy"
         shutil.copytree(ROOT / "tools" / "deploy", deploy, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
         for package in (deploy.parent, deploy):
@@ -68,9 +69,10 @@ class Dock:
         return f"{version}-{commit.stdout.strip()}"
 
     def deploy(self, *words: str, cut_after: int = 1 << 60) -> subprocess.CompletedProcess:
-        command = [sys.executable, "-m", "tools.deploy.push", NAME, "--root", self.vehicle, "--source", self.source]
-        command += ["--build", self.folder / "build", "--python", sys.executable, *words]
-        environment = self.server.reached(there=cut_after) | {"PYTHONPATH": str(ROOT), "PIP_NO_COMPILE": "1"}
+        command = [sys.executable, "-m", "tools.deploy.push", NAME, "--source", self.source]
+        command += ["--root", f"{self.server.account.home_there}/vehicle", "--python", self.server.account.python_there]
+        command += ["--build", self.folder / "build", *words]
+        environment = self.server.reached(there=cut_after) | {"PYTHONPATH": str(ROOT), "PIP_NO_COMPILE": "0"}
         done = subprocess.run(command, cwd=self.folder, env=environment, capture_output=True, text=True, timeout=300)
         if "Could not find a version" in done.stderr:
             pytest.skip("no package index to fetch wheels from")
@@ -95,7 +97,7 @@ class Dock:
 def dock(tmp_path_factory):
     folder = tmp_path_factory.mktemp("dock")
     (folder / "keys").mkdir()
-    with sshd(folder / "keys") as server:
+    with sshd(folder / "keys", apart=True) as server:
         yield Dock(folder, server)
 
 
@@ -105,6 +107,7 @@ def test_a_vehicle_from_its_first_release_to_a_rollback(dock):
     done = dock.deploy()
     assert done.returncode == 0, done.stderr
     assert dock.flies == first
+    assert {path.lstat().st_uid for path in dock.vehicle.rglob("*")} == {dock.server.account.user}
     assert {path.name for path in (dock.vehicle / "etc" / "glider").iterdir()} == {
         "board.toml", "vehicle.toml", "sawtooth.toml", "flight.env",
     }  # fmt: skip
