@@ -172,11 +172,12 @@ def inside(arm: Arm, release: Path, options: argparse.Namespace) -> None:
     except (Lacking, OSError) as error:
         note({"skipped": str(error)})
         return
-    note({"install": [shown(lambda: install(arm, release), options.beside)]})
-    for name, part in parts(arm, here) if result["install"][0]["pass"] else []:
+    for name, part in [("install", lambda: install(arm, release)), *parts(arm, here)]:
         found = shown(part, options.beside)
         say(f"{name}: {'passed' if found['pass'] else 'FAILED'}")
         note({name: [*result.get(name, []), found]})
+        if name == "install" and not found["pass"]:
+            break
     note({"ended": True})
 
 
