@@ -67,7 +67,8 @@ class Vessel:
     def call(self, *words: str, check: bool = True, **more) -> subprocess.CompletedProcess:
         """A command as root in the container."""
         command = ["nsenter", "--target", str(self.leader), "--all", "--", *map(str, words)]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=300, **more)
+        settings = {key: text for key, text in os.environ.items() if not key.startswith("GLIDER_")}  # this machine's
+        done = subprocess.run(command, capture_output=True, text=True, timeout=300, env=settings, **more)
         assert not check or done.returncode == 0, f"{words}: {done.stdout}{done.stderr}"
         return done
 
