@@ -69,7 +69,7 @@ rollback: $(STAMP)
 	$(BIN)/python -m tools.deploy.push $(HOST) --rollback
 
 # A release on an emulated 64-bit ARM computer: installed from its wheels, flown, compared. Root; a quarter of an hour.
-# QUICK=1: as plain Python all through, four minutes; CI runs it.
+# QUICK=1: as plain Python all through, some four minutes; CI runs it.
 # Outside this folder: /proc and /dev are mounted in it while it runs, and pip and `clean` walk through all that lies here.
 ARM64 ?= /var/tmp/glider-arm64
 arm64: $(STAMP)
