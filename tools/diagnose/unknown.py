@@ -30,6 +30,7 @@ MOSTLY = 0.9  # of all that can be explained, for turbulence or waves to be the 
 LEAST_UNKNOWN, MORE_UNKNOWN = 0.002, 0.005  # probability of an unknown effect: nothing is left, or something is
 CLOCKED = 0.5  # of what the best probe gains, that the probe of motion capture's clock must
 RIVALS = 4  # links probed beside water and axes
+ALONE = 3.0  # times what any other element's noise gains, of what is left at one element alone
 
 
 def probability(share: float, middle: float, width: float) -> float:
@@ -62,6 +63,17 @@ class Remainder:
     explained: float  # by the selected effects over none
     left: float  # by the probe that gains most
     probed: list[ProbeResult]
+
+    @property
+    def alone(self) -> tuple[str, str] | None:
+        """Subsystem and element where all of it enters; None where the noise of others would explain it, too."""
+        gains: dict[tuple[str, str], float] = {}
+        for found in self.probed:
+            place = found.probe.subsystem, found.probe.element
+            gains[place] = max(gains.get(place, 0.0), found.gain)
+        ranked = sorted(gains, key=lambda place: -gains[place])
+        next_gain = gains[ranked[1]] if len(ranked) > 1 else 0.0
+        return ranked[0] if ranked and gains[ranked[0]] > ALONE * next_gain else None
 
     @property
     def share(self) -> float:
@@ -180,12 +192,13 @@ def beside_a_sea(shrinkage: Shrinkage, left: Remainder, sea: ProbeResult) -> flo
 
 def probability_unknown(
     search: Search, selected: bool, evident: bool, shrinkage: Shrinkage, left: Remainder | None,
-    noise: ProbeResult | None, taken: float,
+    noise: ProbeResult | None, taken: float, main: str = "",
 ) -> float:  # fmt: skip
     """Probability that the gap is none of the catalogue's, or that there is one where none shows otherwise.
 
     selected, evident: whether any effect is, or is at least there; noise: disorder that the search knows of, which no
-    window's floor has; taken: as in left_share.
+    window's floor has; taken: as in left_share; main: the effect that takes most. What is left where that one sits, and
+    nowhere else, is no small effect beside it: something there has another form, however narrow the gap it leaves.
     """
     if left is None:  # what is left was not asked about, or nothing is
         loose = not selected and not noise and shrinkage.after > max(LOOSE * shrinkage.floor, 1.0)
@@ -205,4 +218,5 @@ def probability_unknown(
         probability(left.share, LEFT_OVER, LEFT_WIDTH),
         probability(left_share(shrinkage, taken), LEFT_GAP, LEFT_GAP_WIDTH),
     )
-    return max(wide * max(shares), MORE_UNKNOWN)
+    own = main in catalogue() and left.alone == catalogue()[main].place
+    return max(max(shares) * (1.0 if own else wide), MORE_UNKNOWN)

@@ -259,7 +259,7 @@ def conclude(
         floors = sizes[main] / max(floor, 1e-6)
         chances = doubt_small(chances, main, floors / (TOLD if search.told else LARGE))
     by_effects = sum(sizes[label] ** 2 for label in gained)
-    unknown = probability_unknown(search, bool(gained), bool(ranked), shrinkage, left, noise, by_effects)
+    unknown = probability_unknown(search, bool(gained), bool(ranked), shrinkage, left, noise, by_effects, main)
     if not gained and not gap_matters(shrinkage):
         unknown = LEAST_UNKNOWN
     chances = {name: value * (1.0 - unknown) for name, value in chances.items()} | {UNKNOWN: unknown}

@@ -88,18 +88,20 @@ EFFECTS = (
     # a pitch moment that grows with the square of the speed
     _row("hydrodynamics pitch", "pitch_trim", "added to K_M0",
          Parameter("k", "kg", -5.0, 5.0, 0.3, "PITCH_TRIM")),
-    # pitching is damped more or less than its coefficient says
-    _row("hydrodynamics pitch", "pitch_damping", "K_q times 1 + scale",
-         Parameter("scale", "1", -0.98, 8.0, 0.6, "PITCH_DAMPING")),
+    # pitching is damped more or less than its coefficient says, with the speed or, across the flow, with the rate
+    _row("hydrodynamics pitch", "pitch_damping", "pitch moment K_q ((1 + scale) V^2 + across abs(q)) q",
+         Parameter("scale", "1", -0.98, 8.0, 0.6, "PITCH_DAMPING"),
+         Parameter("across", "m2/s", -0.3, 8.0, 0.5, "PITCH_DAMPING_ACROSS")),
     # a yaw moment that grows with the square of the speed
     _row("hydrodynamics yaw", "yaw_trim", "yaw moment over V^2",
          Parameter("k", "kg", -3.0, 3.0, 0.2, "YAW_TRIM")),
     # sideslip turns the bow more or less than its coefficient says
     _row("hydrodynamics yaw", "weathercock", "K_MY times 1 + scale",
          Parameter("scale", "1", -0.95, 5.0, 0.3, "WEATHERCOCK")),
-    # yawing is damped more or less than its coefficient says
-    _row("hydrodynamics yaw", "yaw_damping", "K_r times 1 + scale",
-         Parameter("scale", "1", -0.98, 8.0, 0.6, "YAW_DAMPING")),
+    # yawing is damped more or less than its coefficient says, with the speed or, across the flow, with the rate
+    _row("hydrodynamics yaw", "yaw_damping", "yaw moment K_r ((1 + scale) V^2 + across abs(r)) r",
+         Parameter("scale", "1", -0.98, 8.0, 0.6, "YAW_DAMPING"),
+         Parameter("across", "m2/s", -0.3, 8.0, 0.5, "YAW_DAMPING_ACROSS")),
     # --- mass ----------------------------------------------------------------------------------------------------
     # the vehicle was ballasted heavy or light; the missing mass acts at the origin
     _row("mass net", "net_buoyancy", "a constant net mass at the origin, heavy positive",

@@ -65,6 +65,13 @@ def extra_wrench(P, F, kx, depth, u, v, w, p, q, r):
         K += K1
         M += M1
         N += N1
+    if anywhere(F[ef.PITCH_DAMPING_ACROSS] != 0.0) or anywhere(F[ef.YAW_DAMPING_ACROSS] != 0.0):
+        damped_q = F[ef.PITCH_DAMPING_ACROSS] * P[layout.K_Q] * abs(q) * q
+        damped_r = F[ef.YAW_DAMPING_ACROSS] * P[layout.K_R] * abs(r) * r
+        K2, M2, N2 = flow_to_body(u, v, w, 0.0, damped_q, damped_r)
+        K += K2
+        M += M2
+        N += N2
     if anywhere(F[ef.TETHER] != 0.0) or anywhere(F[ef.TETHER_GROWTH] != 0.0):
         X1, Y1, Z1, M1, N1 = tether_wrench(F, depth, u, v, w, q, r)
         X += X1

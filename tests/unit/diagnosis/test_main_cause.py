@@ -82,9 +82,27 @@ def shrinkage(after: float, floor: float = 0.15, recalibrated: float = 1.0, befo
     return SimpleNamespace(before=before, after=after, floor=floor, recalibrated=recalibrated)
 
 
-def unknown(after: float, left: float, explained: float, evident: bool = True, taken: float = 9.0, noise=None) -> float:
+def unknown(
+    after: float, left: float, explained: float, evident: bool = True, taken: float = 9.0, noise=None,
+    probed=(), main="",
+) -> float:  # fmt: skip
     search = SimpleNamespace(problem=SimpleNamespace(rules=SimpleNamespace(whiteness=True)))
-    return probability_unknown(search, True, evident, shrinkage(after), Remainder(explained, left, []), noise, taken)
+    remainder = Remainder(explained, left, list(probed))
+    return probability_unknown(search, True, evident, shrinkage(after), remainder, noise, taken, main)
+
+
+def gains(**by_name: float) -> list[ProbeResult]:
+    places = {"gyro": ("sensing", "gyro"), "servo": ("actuation", "servo"), "slider": ("actuation", "slider")}
+    return [ProbeResult(NoiseProbe(name, "sensor", *places[name]), gain, 6.0) for name, gain in by_name.items()]
+
+
+def test_what_is_left_at_the_main_cause_alone_is_of_another_form_however_narrow():
+    narrow = {"after": 0.23, "left": 1e5, "explained": 5e5}
+    assert unknown(**narrow, probed=gains(gyro=1e5, servo=2e3), main="gyro_bias") > 0.5
+    assert unknown(**narrow, probed=gains(gyro=1e5, servo=5e4), main="gyro_bias") < 0.2
+    assert unknown(**narrow, probed=gains(slider=1e5, servo=2e3), main="gyro_bias") < 0.2
+    small = narrow | {"left": 5e3}
+    assert unknown(**small, probed=gains(gyro=5e3), main="gyro_bias") < 0.1
 
 
 def test_what_leaves_next_to_no_gap_is_not_unknown_however_many_nat_it_has():

@@ -233,6 +233,19 @@ def test_stall_caps_the_lift_and_only_the_lift(alpha, printed):
     assert drag == pytest.approx((P[layout.K_D0] + P[layout.K_D] * alpha**2) * speed**2)
 
 
+@pytest.mark.parametrize("rate", [0.3, -0.3])
+@pytest.mark.parametrize(
+    ("label", "coefficient", "moment"), [("pitch_damping", layout.K_Q, 4), ("yaw_damping", layout.K_R, 5)]
+)
+def test_damping_across_the_flow_is_against_the_turn_and_squared(rate, label, coefficient, moment):
+    q, r = (rate, 0.0) if moment == 4 else (0.0, rate)
+    wanted = np.zeros(6)
+    wanted[moment] = 0.5 * P[coefficient] * abs(rate) * rate
+    extra = extra_wrench(P, vector(**{label: {"across": 0.5}}), 0.0, 0.0, 0.4, 0.0, 0.0, 0.0, q, r)
+    assert extra == pytest.approx(wanted)
+    assert wanted[moment] * rate < 0.0
+
+
 @pytest.mark.parametrize(("pitch", "sign"), [(0.4, 1.0), (0.0, 0.0), (-0.4, -1.0)])
 def test_climbing_drags_more_and_diving_less(pitch, sign):
     u, v, w = 0.4, 0.02, 0.03
