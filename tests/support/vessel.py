@@ -65,9 +65,10 @@ class Vessel:
         return state in ("running", "degraded")
 
     def call(self, *words: str, check: bool = True, **more) -> subprocess.CompletedProcess:
-        """A command as root in the container."""
+        """A command as root in the container, without the settings that this machine's user has for glider."""
         command = ["nsenter", "--target", str(self.leader), "--all", "--", *map(str, words)]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=300, **more)
+        clean = {name: value for name, value in os.environ.items() if not name.startswith("GLIDER_")}
+        done = subprocess.run(command, capture_output=True, text=True, timeout=300, env=clean, **more)
         assert not check or done.returncode == 0, f"{words}: {done.stdout}{done.stderr}"
         return done
 
