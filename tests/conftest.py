@@ -66,7 +66,7 @@ frozen = False
 
 
 def unfreeze() -> None:
-    """gc.unfreeze, remembered: to count what is frozen goes through all of it, a thirtieth of a second for each test."""
+    """gc.unfreeze, remembered: to count what is frozen goes through all of it, a thirtieth of a second a test."""
     global frozen
     frozen = False
     thaw()

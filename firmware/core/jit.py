@@ -113,14 +113,15 @@ _KERNELS: list = []
 
 
 def _made(dispatcher):
-    """A kernel for whom a constant is a number as any other: Numba compiles one anew for each 0 or 1 that it is given."""
-    template = dispatcher.get_call_template
+    """A kernel that takes a constant as any number: Numba would compile one for each 0 or 1 that a kernel hands it."""
+    if CACHE_DIR is not None:
+        template = dispatcher.get_call_template
 
-    def plain(arguments, keywords):
-        named = {name: numba.types.unliteral(kind) for name, kind in keywords.items()}
-        return template(tuple(numba.types.unliteral(kind) for kind in arguments), named)
+        def plain(arguments, keywords):
+            named = {name: numba.types.unliteral(kind) for name, kind in keywords.items()}
+            return template(tuple(numba.types.unliteral(kind) for kind in arguments), named)
 
-    dispatcher.get_call_template = plain
+        dispatcher.get_call_template = plain
     _KERNELS.append(dispatcher)
     return dispatcher
 

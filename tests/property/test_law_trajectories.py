@@ -69,7 +69,8 @@ def ideal_flight(law: Law, true: np.ndarray, errors, rolled, strength, cover: fl
         for _ in range(3):  # k2, the inputs and the bound settle together
             _, _, g = law(x, references)
             bound = law.error_bound(x, spread)
-            needed = [cover * k2_to_cover(*numbers) for numbers in zip(bound.tolist(), strength.tolist(), g.tolist(), law.eps, strict=True)]
+            axes = zip(bound.tolist(), strength.tolist(), g.tolist(), law.eps, strict=True)
+            needed = [cover * k2_to_cover(*numbers) for numbers in axes]
             law = replace(law, pitch=replace(law.pitch, k2=needed[0]), depth=replace(law.depth, k2=needed[1]))
             x[SLIDER:] = law(x, references)[0]
         _, s, _ = law(x, references)
