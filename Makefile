@@ -46,13 +46,13 @@ test: setup
 
 check: setup lint types contract test
 
-lint: setup
+lint: $(STAMP)
 	$(BIN)/ruff check .
 
-types: setup
+types: $(STAMP)
 	$(BIN)/mypy
 
-contract: setup
+contract: $(STAMP)
 	$(BIN)/lint-imports
 
 benchmark: setup

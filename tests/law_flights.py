@@ -20,6 +20,7 @@ from sim_backend.core.plant import derivative, plant_step
 
 STILL, NO_WAVES, NO_DISTURBANCE = np.zeros(N_ENV), np.zeros((0, N_WAVE)), np.zeros(6)
 SLIDER, BALLAST = layout.X_ACT + 1, layout.X_ACT + 2
+UNHELD = np.full(2, math.inf)  # jerks of actuators without a rate
 STANDING = (0.0, 0.0, 0.0)  # actuators' speeds
 TICK = 0.02  # s
 NEAR = 1e-6  # m, kg: difference of Newton's method
@@ -58,26 +59,28 @@ class Reference:
 
 def down(x: np.ndarray) -> tuple:
     """k, the unit vector down in body axes."""
-    return rotation_nb(*x[3:7])[6:]
+    return rotation_nb(*x[3:7].tolist())[6:]
 
 
 def form_at(vehicle: np.ndarray, x: np.ndarray, speeds=STANDING, form=exact_form) -> tuple:
     """f_theta, f_Z, g_ts, g_tb, g_zs, g_zb with the actuators where x has them."""
-    return form(vehicle, *down(x), *x[7:16], *speeds)
+    return form(vehicle, *down(x), *x[7:16].tolist(), *speeds)
 
 
 def outputs(x: np.ndarray) -> tuple[float, float, float, float]:
     """theta, theta_dot by (9), Z, Z_dot by (16) in still water."""
-    phi, theta, _ = euler_from_quaternion(*x[3:7])
-    u, v, w, _, q, r = x[7:13]
+    Z, *quaternion = x[2:7].tolist()
+    phi, theta, _ = euler_from_quaternion(*quaternion)
+    u, v, w, _, q, r = x[7:13].tolist()
     sf, cf, st, ct = math.sin(phi), math.cos(phi), math.sin(theta), math.cos(theta)
-    return theta, cf * q - sf * r, x[2], -u * st + v * sf * ct + w * cf * ct
+    return theta, cf * q - sf * r, Z, -u * st + v * sf * ct + w * cf * ct
 
 
 def output_accelerations(x: np.ndarray, nu_dot: np.ndarray) -> np.ndarray:
     """theta_dd by (10) and Z_dd by (17), as printed."""
-    phi, theta, _ = euler_from_quaternion(*x[3:7])
-    u, v, w, p, q, r = x[7:13]
+    phi, theta, _ = euler_from_quaternion(*x[3:7].tolist())
+    u, v, w, p, q, r = x[7:13].tolist()
+    nu_dot = nu_dot.tolist()
     sf, cf, st, ct = math.sin(phi), math.cos(phi), math.sin(theta), math.cos(theta)
     phi_dot, theta_dot = p + sf * st / ct * q + cf * st / ct * r, cf * q - sf * r
     theta_dd = cf * nu_dot[4] - sf * nu_dot[5] - (q * sf + r * cf) * phi_dot
@@ -125,22 +128,26 @@ class Law:
         if self.counting_on == "joint":
             return -math.inf, math.inf, -math.inf, math.inf
         if self.counting_on == "present":
-            return x[SLIDER], x[SLIDER], x[BALLAST], x[BALLAST]
-        tables = [self.vehicle[getattr(layout, f"{name}_MIN") :][:4] for name in ("SLIDER", "BALLAST")]
-        horizon = self.vehicle[layout.SLIDER_TAU] + TICK
-        return tuple(bound for i in (0, 1) for bound in reach(x[SLIDER + i], *tables[i], horizon))
+            slider, ballast = x[SLIDER:].tolist()
+            return slider, slider, ballast, ballast
+        slider, ballast = x[SLIDER:].tolist()
+        horizon = float(self.vehicle[layout.SLIDER_TAU]) + TICK
+        return (
+            *reach(slider, *self.vehicle[layout.SLIDER_MIN :][:4].tolist(), horizon),
+            *reach(ballast, *self.vehicle[layout.BALLAST_MIN :][:4].tolist(), horizon),
+        )
 
     def jerks(self, g) -> np.ndarray:
         """Of pitch and depth, for g = [g_ts, g_zb]."""
         if self.share is None:
-            return np.full(2, math.inf)
+            return UNHELD
         return self.share * np.abs(g) * self.vehicle[[layout.SLIDER_RATE, layout.BALLAST_RATE]]
 
     def __call__(self, x, references, speeds=STANDING, disturbance=(0.0, 0.0), form=exact_form):
         """Inputs (2,) slider, ballast; s (2,) of pitch and depth; g_ts and g_zb (2,), at a state."""
         f_t, f_z, *gains = form_at(self.vehicle, x, speeds, form)
         g = np.array([gains[0], gains[3]])
-        jerk_t, jerk_z = self.jerks(g)
+        jerk_t, jerk_z = self.jerks(g).tolist()
         theta, theta_rate, Z, Z_rate = outputs(x)
         pitch, depth = references
         u_s, u_b, s_t, s_z, status = pitch_depth_law(
@@ -188,7 +195,7 @@ class Law:
     def error_bound(self, x, spread, speeds=STANDING) -> np.ndarray:
         """What theta_dd and Z_dd may be off by with the actuators where x has them, (2,)."""
         scratch = np.empty(layout.N_P)
-        return np.array(model_error_bound(self.vehicle, spread, scratch, *down(x), *x[7:16], *speeds))
+        return np.array(model_error_bound(self.vehicle, spread, scratch, *down(x), *x[7:16].tolist(), *speeds))
 
 
 def advance(vehicle: np.ndarray, x: np.ndarray, command, acc: np.ndarray, dt: float, work: np.ndarray) -> None:

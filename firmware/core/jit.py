@@ -106,30 +106,39 @@ if _BLAS not in sys.modules:
 if CACHE_DIR is not None:
     numba.config.CACHE_DIR = str(CACHE_DIR)  # type: ignore[attr-defined]  # made at run time
 
-# Contraction (fused multiply-add) is what a C compiler does by default; NaN and Inf keep their meaning.
-_OPTIONS = dict(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+# Contraction (fused multiply-add) is what a C compiler does by default; NaN and Inf keep their meaning. Nobody calls a
+# kernel from C: the entry for that is not compiled.
+_OPTIONS = dict(cache=True, nogil=True, error_model="numpy", fastmath={"contract"}, no_cfunc_wrapper=True)
 _KERNELS: list = []
+
+
+def _made(dispatcher):
+    """A kernel that takes a constant as any number: Numba would compile one for each 0 or 1 that a kernel hands it."""
+    if CACHE_DIR is not None:
+        template = dispatcher.get_call_template
+
+        def plain(arguments, keywords):
+            named = {name: numba.types.unliteral(kind) for name, kind in keywords.items()}
+            return template(tuple(numba.types.unliteral(kind) for kind in arguments), named)
+
+        dispatcher.get_call_template = plain
+    _KERNELS.append(dispatcher)
+    return dispatcher
 
 
 def kernel(function):
     """Compile a pure function of float64 scalars and arrays; results go to tuples or the caller's `out`."""
-    dispatcher = numba.njit(**_OPTIONS)(function)
-    _KERNELS.append(dispatcher)
-    return dispatcher
+    return _made(numba.njit(**_OPTIONS)(function))
 
 
 def inlined_kernel(function):
     """Compile a kernel that becomes part of every kernel that calls it: small pieces, whose sums are shared there."""
-    dispatcher = numba.njit(**_OPTIONS, forceinline=True)(function)
-    _KERNELS.append(dispatcher)
-    return dispatcher
+    return _made(numba.njit(**_OPTIONS, forceinline=True)(function))
 
 
 def parallel_kernel(function):
     """Compile a kernel whose `prange` loop is shared out over all cores."""
-    dispatcher = numba.njit(**_OPTIONS, parallel=True)(function)
-    _KERNELS.append(dispatcher)
-    return dispatcher
+    return _made(numba.njit(**_OPTIONS, parallel=True)(function))
 
 
 prange = numba.prange

@@ -69,7 +69,8 @@ def ideal_flight(law: Law, true: np.ndarray, errors, rolled, strength, cover: fl
         for _ in range(3):  # k2, the inputs and the bound settle together
             _, _, g = law(x, references)
             bound = law.error_bound(x, spread)
-            needed = [cover * k2_to_cover(*numbers) for numbers in zip(bound, strength, g, law.eps, strict=True)]
+            axes = zip(bound.tolist(), strength.tolist(), g.tolist(), law.eps, strict=True)
+            needed = [cover * k2_to_cover(*numbers) for numbers in axes]
             law = replace(law, pitch=replace(law.pitch, k2=needed[0]), depth=replace(law.depth, k2=needed[1]))
             x[SLIDER:] = law(x, references)[0]
         _, s, _ = law(x, references)
@@ -135,6 +136,7 @@ def test_the_same_adversary_wins_against_less():
 MODERATE = Gains(0.8, 0.01, 0.8, 0.1), Gains(0.3, 0.05, 0.4, 0.05)
 FAST = Gains(1.5, 0.02, 2.0, 0.05), Gains(0.5, 0.2, 1.0, 0.03)
 SUB_STEPS = 4  # plant steps in a tick
+RANGES = LOW.tolist(), HIGH.tolist(), RATE.tolist()
 LEGS = ((0.0, -0.5, 4.0, 0.0), (30.0, 0.5, 1.0, 0.4))  # from s, pitch rad, depth m, roll rad
 
 
@@ -150,7 +152,7 @@ class Watch:
 
     def look(self, law: Law, true, x, references, command, acc) -> None:
         """Compare what decrease_margin promises at this step with the plant's own V_dot."""
-        speeds = actuator_rates(P, *x[layout.X_ACT :], *command)
+        speeds = actuator_rates(P, *x[layout.X_ACT :].tolist(), *command.tolist())
         # with the speeds there are now: what the actuators are short of is all that is left
         wanted, s, g = replace(law, counting_on="joint")(x, references, speeds)
         mismatch = np.reshape(form_at(law.vehicle, x, speeds)[2:], (2, 2)) @ (x[SLIDER:] - wanted)
@@ -193,15 +195,15 @@ def real_flight(
             acc = strength * rng.standard_normal(6)
         _, pitch, depth, roll = [leg for leg in LEGS if leg[0] <= tick * TICK + 1e-9][-1]
         references = references[0].step(pitch, 0.4, TICK), references[1].step(depth, 0.1, TICK)
-        speeds = actuator_rates(P, *x[layout.X_ACT :], *command)
+        speeds = actuator_rates(P, *x[layout.X_ACT :].tolist(), *command.tolist())
         theta, _, Z, _ = outputs(x)
         try:
             inputs = law(x, references, speeds, form=form)[0]
         except NoInputs:
             inputs = command[1:]
-        rolled = euler_from_quaternion(*x[3:7])[0]
-        wanted = roll_law(roll, 0.0, rolled, x[10], 0.3, 0.2), *inputs
-        command = np.array([limited(*a, TICK) for a in zip(wanted, command, LOW, HIGH, RATE, strict=True)])
+        rolled = euler_from_quaternion(*x[3:7].tolist())[0]
+        wanted = roll_law(roll, 0.0, rolled, float(x[10]), 0.3, 0.2), *inputs.tolist()
+        command = np.array([limited(*a, TICK) for a in zip(wanted, command.tolist(), *RANGES, strict=True)])
         errors.append((theta - references[0].position, Z - references[1].position))
         commands.append(command)
         for _ in range(SUB_STEPS):

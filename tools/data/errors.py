@@ -2,7 +2,6 @@
 
 import functools
 import re
-from importlib import metadata
 from importlib.util import find_spec
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2  # exit codes of every command
@@ -28,6 +27,8 @@ class MissingExtra(RuntimeError):
 @functools.cache
 def extras() -> dict[str, tuple[str, ...]]:
     """The packages that each extra of pyproject.toml brings, as they are imported."""
+    from importlib import metadata  # here: --help and most commands do without
+
     found: dict[str, tuple[str, ...]] = {}
     for line in metadata.requires("glider") or ():
         asked, _, condition = line.partition(";")
