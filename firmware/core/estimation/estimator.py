@@ -263,17 +263,18 @@ def linearise_where_due(P, settings, sigma, x, ds, dl, db, dt, work):
     """A at x into work; equation (1) linearised anew, and C, where their time is over or speeds have changed."""
     A, turned = work[kf.W_A : kf.W_A + kf.N_MOVING], work[kf.W_TURNED : kf.W_TURNED + kf.N_COUPLED - kf.E_ATT]
     held = work[kf.W_HELD]
-    gone = moved(x, work[kf.W_POINT])
-    due = gone | (held[0] < 0.5 * dt)
-    error_due = due & (gone | (held[1] < 0.5 * dt))
+    gone, over = moved(x, work[kf.W_POINT]), held[0] < 0.5 * dt
+    error_over = over & (held[1] < 0.5 * dt)
+    due, error_due = gone | over, gone | error_over
     if anywhere(due):
         linearise_anew(P, x, ds, dl, db, due, work)
     if not everywhere(due):
         linearise_motion(x, work[kf.W_POINT], A)
     if anywhere(error_due):
         error_anew(P, settings, sigma, ds, dl, db, error_due, work)
-    held[0] = where(due, kf.HOLD_LINEARISED, held[0]) - dt
-    held[1] = where(error_due, kf.HOLD_ERROR, held[1]) - dt
+    # not from where speeds have changed: filters side by side stay in step, and are linearised at once
+    held[0] = where(over, kf.HOLD_LINEARISED, held[0]) - dt
+    held[1] = where(error_over, kf.HOLD_ERROR, held[1]) - dt
     for k in range(kf.N_COUPLED - kf.E_ATT):
         for i in range(kf.N_MOVING):
             turned[k, i] = A[i, kf.E_ATT + k]
