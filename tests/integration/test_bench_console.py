@@ -13,6 +13,8 @@ from support import commands
 
 from hal.boardfile import calibration_hash, decode_device_file
 from tests.support.bench_session import Twins, session
+from tools.bench.client import Bench
+from tools.flight.compose import load_board_file
 
 pytestmark = pytest.mark.realtime(seconds=180)
 
@@ -59,6 +61,16 @@ def test_a_session_at_a_terminal(tmp_path):
     assert "port sensors   NOT OPEN" in found["unplugged health"]
     assert "valid" in found["plugged"]
     assert found["exit"] == 0
+
+
+def test_the_answer_to_what_ctrl_c_broke_off_is_not_taken_for_the_next(twins):
+    found = load_board_file(str(twins.board))
+    with Bench(found.text, found.source, found.kind, "roughie", twins.board) as one:
+        process = one._process
+        process.stdin.write(json.dumps({"do": "stop", "number": 0}).encode() + b"\n")
+        process.stdin.flush()  # Ctrl-C fell here: nobody reads the answer
+        assert "beacon" in one.snapshot()["sensors"]
+        assert "beacon" in one.snapshot()["sensors"]
 
 
 def test_a_pipe_runs_commands_and_says_what_it_does(twins):

@@ -33,6 +33,7 @@ class Bench:
         self._lock = threading.Lock()
         self._closing = threading.Event()
         self._trouble_since: dict[str, float] = {}
+        self._asked = 0
 
     # --- the process ------------------------------------------------------------------------------------------------
     def __enter__(self) -> "Bench":
@@ -74,20 +75,33 @@ class Bench:
             self._start()
 
     def _exchange(self, request: dict) -> dict:
+        """The answer to a request. One before it that a Ctrl-C broke off is answered too, and passed over."""
         process = self._process
         if process is None:
             raise BenchError("the bench is closed")
         assert process.stdin is not None
         assert process.stdout is not None
+        self._asked += 1
+        number = self._asked
         try:
-            process.stdin.write(json.dumps(request).encode() + b"\n")
+            process.stdin.write(json.dumps({**request, "number": number}).encode() + b"\n")
             process.stdin.flush()
-            line = process.stdout.readline()
+            while line := process.stdout.readline():
+                answer = self._answer_to(number, line)
+                if answer is not None:
+                    return answer
         except (BrokenPipeError, ValueError):
-            line = b""
-        if not line:
-            raise BenchError("the process that holds the ports is gone; actuators hold what they were sent last")
-        return json.loads(line)
+            pass
+        raise BenchError("the process that holds the ports is gone; actuators hold what they were sent last")
+
+    @staticmethod
+    def _answer_to(number: int, line: bytes) -> dict | None:
+        """An answer, where it is to that request; None for another's, and for what is left of a line broken off."""
+        try:
+            answer = json.loads(line)
+        except json.JSONDecodeError:
+            return None
+        return answer if answer.pop("number") == number else None
 
     def _beat(self) -> None:
         while not self._closing.wait(BEAT_S):

@@ -1,7 +1,8 @@
 """The bench's other half: `python -m tools.bench.worker` holds the ports; a console that dies stops the actuators.
 
-Standard input brings a line of JSON (the board), then requests, one a line, each answered by a line of JSON. The end of
-standard input, or silence of HEARTBEAT_S while actuators are enabled, stops them. Nothing moves before `enable`.
+Standard input brings a line of JSON (the board), then requests, one a line, each answered by a line of JSON with its
+`number`. The end of standard input, or silence of HEARTBEAT_S while actuators are enabled, stops them. Nothing moves
+before `enable`.
 """
 
 import json
@@ -225,7 +226,8 @@ def serve(worker: Worker, requests: Requests, say: Callable[[dict], None]) -> No
         worker.step()
         while (request := requests.take()) is not None:
             heard = time.monotonic()
-            say(worker.answer(request))
+            number = request.pop("number")
+            say(worker.answer(request) | {"number": number})
         if worker.enabled and time.monotonic() - heard > HEARTBEAT_S:
             worker.do_enable(False)
 
@@ -238,6 +240,8 @@ def main() -> None:
         time.sleep(0.005)
     if config is None:
         return
+
+    first = {"number": config["number"]}
 
     def say(item: dict) -> None:
         try:
@@ -260,10 +264,10 @@ def main() -> None:
         worker = Worker(board)
         worker.do_enable(False)
         board.wait_for_answers(config.get("wait_s", 2.0))
-        say({"ok": True})
+        say({"ok": True} | first)
         serve(worker, requests, say)
     except BoardError as error:
-        say({"error": str(error)})
+        say({"error": str(error)} | first)
     finally:
         board.close()
 
