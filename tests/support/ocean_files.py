@@ -10,6 +10,7 @@ import gsw
 import numpy as np
 
 LATITUDE, LONGITUDE, SALINITY = 45.25, -20.5, 35.0
+NORTHWARD = 0.003  # deg from the fix before a dive to the one behind it
 START = 1_600_000_000.0  # s since 1970-01-01 UTC
 
 
@@ -82,11 +83,14 @@ def seaexplorer(folder: Path, one: Flight, segment: int = 1, glider: str = "sea0
     """Navigation and payload table of a segment."""
     c = one.columns
     degrees = {name: np.degrees(c[name]) for name in ("pitch_rad", "roll_rad", "yaw_rad")}
-    navigation = ["Timestamp;Heading;Declination;Pitch;Roll;Depth;Lat;Lon;BallastPos;LinPos;"]
-    position = f"{degrees_minutes(LATITUDE):.4f};{degrees_minutes(LONGITUDE):.4f}"
-    for n, moment in enumerate(one.t):
+    navigation = ["Timestamp;NavState;Heading;Declination;Pitch;Roll;Depth;Lat;Lon;BallastPos;LinPos;"]
+    last = len(one.t) - 1
+    for n, moment in enumerate(one.t):  # its position is the last fix until it is afloat again (116), and has another
+        north = LATITUDE + (NORTHWARD if n == last else 0.0)
+        position = f"{degrees_minutes(north):.6f};{degrees_minutes(LONGITUDE):.4f}"
         navigation.append(
-            f"{_stamp(moment)};{degrees['yaw_rad'][n] % 360.0:.6f};5;{degrees['pitch_rad'][n]:.6f};"
+            f"{_stamp(moment)};{116 if n in (0, last) else 100};"
+            f"{degrees['yaw_rad'][n] % 360.0:.6f};5;{degrees['pitch_rad'][n]:.6f};"
             f"{degrees['roll_rad'][n]:.6f};{c['depth_m'][n]:.6f};{position};{1e6 * c['oil_m3'][n]:.4f};"
             f"{1e3 * c['battery_m'][n]:.4f};"
         )
@@ -137,6 +141,8 @@ def seaglider(
         "speed": (rows, np.full(len(one.t), 25.0), {"units": "cm/s"}),
         "magnetic_variation": ((), variation, {}),
         "avg_latitude": ((), LATITUDE, {"units": "degrees_north"}),
+        "log_gps_time": ("gps_info", np.array([one.t[0] - 400.0, one.t[0] - 60.0, one.t[-1] + 90.0]), {"units": epoch}),
+        "log_gps_lat": ("gps_info", LATITUDE + np.array([0.0, 0.0, NORTHWARD]), {"units": "degrees_north"}),
         "log_gps_lon": ("gps_info", np.full(3, LONGITUDE), {"units": "degrees_east"}),
         "log_C_VBD": ((), zero_counts, {}),
         "log_VBD_CNV": ((), -0.25, {}),
@@ -171,7 +177,10 @@ def og1(path: Path, flights: Iterable[Flight], model: str = "Seaglider M1 glider
 
     t = np.concatenate([one.t for one in flights])
     depth = joined("depth_m")
+    north = np.concatenate([[0.0, 0.0, *np.full(len(one.t) - 3, np.nan), NORTHWARD] for one in flights])  # by GPS
     variables = {
+        "LATITUDE_GPS": (rows, LATITUDE + north, {"units": "degrees_north"}),
+        "LONGITUDE_GPS": (rows, LONGITUDE + 0.0 * north, {"units": "degrees_east"}),
         "TIME": (rows, t, {"units": "seconds since 1970-01-01T00:00:00Z"}),
         "LATITUDE": (rows, np.full(len(t), LATITUDE), {"units": "degrees_north"}),
         "LONGITUDE": (rows, np.full(len(t), LONGITUDE), {"units": "degrees_east"}),
@@ -202,7 +211,7 @@ Sensors = dict[str, tuple[str, int, np.ndarray]]  # name: unit, bytes (1, 4 or 8
 
 def slocum(folder: Path, one: Flight, name: str = "unit_7-2020-100-0-1", factored: bool = True) -> list[Path]:
     """Engineering and science binary of a segment, and their header caches where they are `factored`."""
-    c, rows = one.columns, len(one.t)
+    c, rows, north = one.columns, len(one.t), LATITUDE + NORTHWARD
     every = np.zeros(rows)
     engineering: Sensors = {
         "m_present_time": ("timestamp", 8, one.t),
@@ -214,7 +223,7 @@ def slocum(folder: Path, one: Flight, name: str = "unit_7-2020-100-0-1", factore
         "m_battpos": ("in", 4, c["battery_m"] / 0.0254),
         "m_fin": ("rad", 4, c["fin_rad"]),
         "m_pressure": ("bar", 4, gsw.p_from_z(-c["depth_m"], LATITUDE) / 10.0),
-        "m_gps_lat": ("lat", 8, every + degrees_minutes(LATITUDE)),
+        "m_gps_lat": ("lat", 8, np.array([*(every[1:] + degrees_minutes(LATITUDE)), degrees_minutes(north)])),
         "m_gps_lon": ("lon", 8, every + degrees_minutes(LONGITUDE)),
         "m_gps_mag_var": ("rad", 4, every + 0.125),
         "m_speed": ("m/s", 4, every + 0.3),

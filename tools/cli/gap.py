@@ -200,13 +200,18 @@ def _diagnose_ocean(case, out: Path, as_json: bool) -> None:
 def velocity(case: Path, model: str, out: Path, as_json: bool) -> None:
     """Velocity through the water of an ocean glider, with its standard deviation: a CSV for each run of CASE."""
     from tools.data.runs.case import load_case
+    from tools.gap.heading import heading_test
     from tools.gap.velocity import velocities, write
     from tools.inference.load import load_model
 
     loaded = load_case(case, None if model == "nominal" else model)
-    files = write(velocities(loaded, load_model("nominal", loaded)), out)
+    found = velocities(loaded, load_model("nominal", loaded))
+    speeds = [(one.columns["vn_m_s"], one.columns["ve_m_s"]) for one in found]
+    heading = heading_test(loaded.folder, loaded.runs, speeds)
+    files = write(found, out, heading)
+    say(f"heading: {heading.get('says') or heading['why']}")
     if as_json:
-        print_json({"files": [str(path) for path in files]})
+        print_json({"files": [str(path) for path in files], "heading": heading})
     else:
         for path in files:
             click.echo(path)

@@ -148,8 +148,11 @@ def interval_over(means: np.ndarray, sigma: float) -> list[float]:
     return [float(brentq(lambda x, tail=tail: float(ndtr((x - means) / sigma).mean()) - tail, *ends)) for tail in tails]
 
 
-def write(found: list[Velocity], out: Path) -> list[Path]:
-    """A CSV a run into a folder, runNNN.csv with t_s and COLUMNS, whose paths come back; MEANS: mean_speed by run."""
+def write(found: list[Velocity], out: Path, heading: dict[str, Any] | None = None) -> list[Path]:
+    """A CSV a run into a folder, runNNN.csv with t_s and COLUMNS, whose paths come back; MEANS: mean_speed by run.
+
+    heading: what heading_test said of them, into MEANS too.
+    """
     out.mkdir(parents=True, exist_ok=True)
     files, means = [], {}
     for one in found:
@@ -158,5 +161,6 @@ def write(found: list[Velocity], out: Path) -> list[Path]:
         columns = {names.TIME: one.run.t, **one.columns}
         write_run(files[-1], replace(one.run, columns=columns, extra={}, path=None), decimals=dict.fromkeys(COLUMNS, 5))
         means[name] = mean_speed(one)
-    write_bytes(out / MEANS, (json.dumps(as_plain({"runs": means}), indent=1) + "\n").encode())
+    answer = {"runs": means} if heading is None else {"runs": means, "heading": heading}
+    write_bytes(out / MEANS, (json.dumps(as_plain(answer), indent=1) + "\n").encode())
     return files

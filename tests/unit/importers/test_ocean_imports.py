@@ -10,6 +10,7 @@ import pytest
 from tests.support import ocean_files
 from tests.support.commands import glider
 from tests.support.ocean_files import START, Flight, flight
+from tools.data.runs.origin import read_fixes
 from tools.data.runs.run import Run, load_run
 
 # How far a column may be off: half its last written digit, and what single precision or interpolation leaves.
@@ -62,6 +63,13 @@ def test_a_mission_comes_back_as_it_was_flown(tmp_path, kind):
     assert (tmp_path / "case" / "mission.csv").read_text() == "run,hours_since_start\nrun000,0.0000\nrun001,2.0000\n"
     origin = (tmp_path / "case" / "origin.csv").read_text().splitlines()
     assert origin[1].startswith("run000,2020-09-13T12:26:40.000Z,45.25000,-20.50000,")
+    fixes = read_fixes(tmp_path / "case")
+    for one in flights:
+        behind = fixes[np.searchsorted(fixes[:, 0], one.t[-1])]  # the first fix after its last row, or at it
+        assert behind == pytest.approx([behind[0], ocean_files.LATITUDE + ocean_files.NORTHWARD, ocean_files.LONGITUDE])
+        if kind != "seaexplorer":  # which logs a position at its start that is no new fix
+            before = fixes[fixes[:, 0] < one.t[30]][-1]
+            assert before == pytest.approx([before[0], ocean_files.LATITUDE, ocean_files.LONGITUDE], abs=1e-6)
     result = json.loads(done.stdout)
     assert result["rows"] == [120, 80]
     assert result["hours_since_start"] == [0.0, 2.0]

@@ -2,7 +2,6 @@
 
 import datetime as dt
 import os
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +10,8 @@ import numpy as np
 from tools.data.errors import InputError
 from tools.data.exporters.variables import Variable, found_in
 from tools.data.importers.ocean import og1_names
-from tools.data.importers.ocean.mission import ORIGIN_FILE
-from tools.data.runs import csvfile
 from tools.data.runs.case import load_runs
+from tools.data.runs.origin import Origin, read_origins
 from tools.data.runs.run import Run
 
 _ANGLE = ("degrees", 180.0 / np.pi)
@@ -39,17 +37,6 @@ WATER = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Origin:
-    """When and where a run began."""
-
-    start: float  # s since 1970-01-01 UTC
-    latitude: float  # deg
-    longitude: float  # deg
-    variation: float  # magnetic, rad, to be added to yaw
-    glider: str
-
-
 def export_og1(folder: Path, out: Path, answers: list[Path]) -> list[Variable]:
     """Write a case as one file; the variables beside the runs' own. InputError, one line, where that cannot be."""
     table, runs = load_runs(folder)
@@ -62,28 +49,6 @@ def export_og1(folder: Path, out: Path, answers: list[Path]) -> list[Variable]:
     found = [variable for answer in answers for variable in found_in(answer, runs)]
     write_og1(out, table.vehicle, runs, origins, found)
     return found
-
-
-def read_origins(folder: Path, runs: list[Run]) -> list[Origin]:
-    """When and where each run began, by the file that an import left in the case."""
-    path = folder / ORIGIN_FILE
-    if not path.is_file():
-        raise InputError(f"no {ORIGIN_FILE}: when and where its runs began is not known", source=folder)
-    table = csvfile.read_table(path)
-    names, starts, gliders = table.texts("run"), table.texts("start_utc"), table.texts("glider")
-    numbers = [table.numbers(name) for name in ("latitude", "longitude", "magnetic_variation_rad")]
-    found = {}
-    for row, (name, moment_text, glider) in enumerate(zip(names, starts, gliders, strict=True)):
-        try:
-            moment = dt.datetime.fromisoformat(moment_text).timestamp()
-        except ValueError:
-            raise table.error(f"not a time: {moment_text[:40]!r}", row=row, column="start_utc") from None
-        latitude, longitude, variation = (float(column[row]) for column in numbers)
-        found[name] = Origin(moment, latitude, longitude, variation, glider)
-    for run in runs:
-        if run.name not in found:
-            raise InputError(f"{run.name} is not in it", source=path)
-    return [found[run.name] for run in runs]
 
 
 def write_og1(out: Path, vehicle: str, runs: list[Run], origins: list[Origin], variables: list[Variable]) -> None:

@@ -1,6 +1,5 @@
 """Segments of one glider's mission as a case: in order of time, with the hours of each beside it."""
 
-import datetime as dt
 import itertools
 from collections import Counter
 from dataclasses import dataclass
@@ -14,10 +13,10 @@ from tools.data.importers.ocean.segment import Segment
 from tools.data.runs import columns as names
 from tools.data.runs import csvfile
 from tools.data.runs.case import write_case
+from tools.data.runs.origin import FIXES_FILE, ORIGIN_FILE, fix_columns, moment_text
 from tools.data.runs.run import Run
 
 MISSION_FILE = "mission.csv"  # run, hours since the first run's start
-ORIGIN_FILE = "origin.csv"  # run, when and where it began, of which files
 FEWEST_ROWS = 3
 DECIMALS = {
     "t_s": 3, "depth_m": 3, "pitch_rad": 6, "roll_rad": 6, "yaw_rad": 6, "oil_m3": 9, "battery_m": 6, "fin_rad": 5,
@@ -66,6 +65,9 @@ def write_mission(segments: list[Segment], out: Path, vehicle: str) -> Mission:
         MISSION_FILE: {"run": [run.name for run in runs], "hours_since_start": csvfile.as_texts("hours", hours, 4)},
         ORIGIN_FILE: _origin(runs, flights),
     }
+    fixes = np.concatenate([one.fixes for one in flights])
+    if len(fixes):
+        beside[FIXES_FILE] = fix_columns(fixes)
     files = write_case(
         out, runs, vehicle=vehicle, site="ocean", log_rate_hz=_rate(runs), water_density_kg_m3=_density(runs),
         motion_capture=False, suffix=".csv.gz", decimals=DECIMALS, digits=digits,
@@ -94,10 +96,9 @@ def _said(segment: Segment) -> list[str]:
 
 
 def _origin(runs: list[Run], flights: list[Segment]) -> dict[str, list[str]]:
-    starts = [dt.datetime.fromtimestamp(round(one.start, 3), dt.UTC) for one in flights]
     return {
         "run": [run.name for run in runs],
-        "start_utc": [start.isoformat(timespec="milliseconds").replace("+00:00", "Z") for start in starts],
+        "start_utc": [moment_text(one.start) for one in flights],
         "latitude": csvfile.as_texts("latitude", np.array([one.latitude for one in flights]), 5),
         "longitude": csvfile.as_texts("longitude", np.array([one.longitude for one in flights]), 5),
         "magnetic_variation_rad": csvfile.as_texts("variation", np.array([one.variation for one in flights]), 5),

@@ -9,7 +9,7 @@ import numpy as np
 from tools.data.errors import InputError
 from tools.data.importers.ocean import netcdf, og1_names, seaexplorer, seaglider, seawater, slocum
 from tools.data.importers.ocean.netcdf import NetCDF
-from tools.data.importers.ocean.segment import Segment, at_rows, clean, count, in_the_mission
+from tools.data.importers.ocean.segment import Segment, at_rows, clean, count, in_the_mission, usable_fixes
 
 HOLES_S = {"slocum": slocum.HOLE_S, "seaglider": seaglider.HOLE_S, "seaexplorer": seaexplorer.HOLE_S}
 SINCE = re.compile(r"(?P<unit>\w+)\s+since\s+(?P<moment>.+)\Z")
@@ -60,6 +60,7 @@ def read_og1(path: Path, vehicle: str | None) -> tuple[str, list[Segment]]:
         segments.append(segment)
     if not segments:
         raise InputError("no row with attitude", source=path, column="PITCH")
+    segments[0].fixes = _fixes(file, logged_t, size)  # the mission's: between dives rows are of none
     magnetic = file.has("HEADING") and "magnetic" in file.about("HEADING", "comment").lower()
     if magnetic and not file.has(og1_names.VARIATION):
         segments[0].notes.append("HEADING is magnetic, and so is yaw, of all runs")
@@ -138,12 +139,27 @@ def _position(file: NetCDF, name: str, unit: str, dive: np.ndarray, size: int) -
     """Median latitude or longitude of a dive, deg: of its GPS fixes where there are, or as reckoned."""
     for one in (f"{name}_GPS", name):
         if file.has(one):
-            values = file.values(one, dict.fromkeys((unit, unit.replace("degrees", "degree")), 1.0))
+            values = file.values(one, _spellings(unit))
             values = values[dive] if len(values) == size else values[:0]
             values = values[np.isfinite(values) & (np.abs(values) <= 360.0)]
             if values.size:
                 return float(np.median(values))
     raise InputError("no position", source=file.path, column=name)
+
+
+def _fixes(file: NetCDF, t: np.ndarray, size: int) -> np.ndarray:
+    """A mission's fixes by GPS, (n, 3) as a Segment has them; none where the file holds none by row."""
+    found = []
+    for name, unit in POSITIONS:
+        values = file.values(f"{name}_GPS", _spellings(unit)) if file.has(f"{name}_GPS") else np.array([])
+        if len(values) != size:
+            return np.zeros((0, 3))
+        found.append(np.where(_bad(file, f"{name}_GPS", size), np.nan, values))
+    return usable_fixes(t, *found)
+
+
+def _spellings(unit: str) -> dict[str, float]:
+    return dict.fromkeys((unit, unit.replace("degrees", "degree")), 1.0)
 
 
 def _variation(file: NetCDF, dive: np.ndarray, size: int) -> float:

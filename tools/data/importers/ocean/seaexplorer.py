@@ -19,6 +19,7 @@ from tools.data.importers.ocean.segment import (
     count,
     in_the_mission,
     require_same_time,
+    usable_fixes,
 )
 from tools.data.runs.csvfile import Dialect, Table, read_table
 
@@ -41,6 +42,7 @@ CTDS = (("GPCTD", 1.0), ("LEGATO", 0.1))
 QUANTITIES = ("CONDUCTIVITY", "TEMPERATURE", "PRESSURE")
 LARGEST_CONDUCTIVITY = 9.0  # S/m; sea water has 2 to 7
 FLIES_DEG = 90.0
+TRANSMITTING = 116  # NavState: afloat, with GPS and radio
 
 
 @dataclass
@@ -127,11 +129,26 @@ def _times(table: Table, column: str) -> np.ndarray:
     return found
 
 
-def _degrees(table: Table, column: str, largest: float) -> float:
-    """Median position, deg, of degrees and minutes in one number (ddmm.mmm); InputError where there is none."""
+def _positions(table: Table, column: str) -> np.ndarray:
+    """A position by row, deg, of degrees and minutes in one number (ddmm.mmm); NaN where there is none, (rows,)."""
     logged = table.numbers(column)
-    logged = logged[np.isfinite(logged) & (logged != 0.0)]
-    degrees = np.sign(logged) * (np.abs(logged) // 100.0 + np.abs(logged) % 100.0 / 60.0)
+    return np.where(logged == 0.0, np.nan, np.sign(logged) * (np.abs(logged) // 100.0 + np.abs(logged) % 100.0 / 60.0))
+
+
+def _fixes(table: Table, t: np.ndarray) -> np.ndarray:
+    """Fixes, (n, 3) as a Segment has them: rows at the surface whose position is not that of the row before."""
+    if "NavState" not in table.header:
+        return np.zeros((0, 3))
+    latitude, longitude = _positions(table, "Lat"), _positions(table, "Lon")
+    new = np.concatenate(([False], (np.diff(latitude) != 0.0) | (np.diff(longitude) != 0.0)))
+    rows = new & (table.numbers("NavState") == TRANSMITTING)
+    return usable_fixes(t[rows], latitude[rows], longitude[rows])
+
+
+def _degrees(table: Table, column: str, largest: float) -> float:
+    """Median position, deg, of a table's rows; InputError where there is none."""
+    degrees = _positions(table, column)
+    degrees = degrees[np.isfinite(degrees)]
     if not degrees.size or np.abs(degrees).max() > largest:
         raise InputError("no position in degrees and minutes", source=table.path, column=column)
     return float(np.median(degrees))
@@ -146,9 +163,9 @@ def _navigated(path: Path) -> Segment:
     count(left_out, "rows without attitude", table.rows - len(attitude))
     if np.abs(numbers["Pitch"][attitude]).max(initial=0.0) > FLIES_DEG:
         raise InputError("not in degrees: beyond 90", source=path, column="Pitch")
-    t = _times(table, "Timestamp")
-    rows = attitude[in_the_mission(t[attitude], left_out)]
-    t = t[rows]
+    logged_t = _times(table, "Timestamp")
+    rows = attitude[in_the_mission(logged_t[attitude], left_out)]
+    t = logged_t[rows]
     columns = {"t_s": t - t[0] if len(t) else t}
     for name, column, factor in NAVIGATION:
         columns[name] = clean(name, t, factor * numbers[column][rows], left_out)
@@ -159,7 +176,7 @@ def _navigated(path: Path) -> Segment:
     return Segment(
         [path], f"{parts['glider']}.{parts['mission']}", float(t[0]) if len(t) else 0.0, columns,
         _degrees(table, "Lat", 90.0), _degrees(table, "Lon", 180.0),
-        DEG * float(np.median(declination)) if declination.size else 0.0, left_out,
+        DEG * float(np.median(declination)) if declination.size else 0.0, left_out, fixes=_fixes(table, logged_t),
     )  # fmt: skip
 
 

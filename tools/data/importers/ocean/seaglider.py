@@ -8,7 +8,7 @@ import numpy as np
 from tools.data.errors import InputError
 from tools.data.importers.ocean import netcdf, seawater
 from tools.data.importers.ocean.netcdf import NetCDF
-from tools.data.importers.ocean.segment import Segment, at_rows, clean, count, in_the_mission
+from tools.data.importers.ocean.segment import Segment, at_rows, clean, count, in_the_mission, usable_fixes
 
 HOLE_S = 60.0  # CTD values are interpolated over no longer holes: it is sampled every 5 to 30 s
 PUMP_RATE = 3e-7  # m3/s; the volume moves: the engine runs. Its pump makes 1e-6, its potentiometer's noise 1e-8
@@ -19,6 +19,7 @@ CENTIMETRES = {"": 0.01, "cm": 0.01}  # some variables say their unit in their n
 VOLUME = {"": 1e-6, **netcdf.CUBIC_CENTIMETRES}
 DEGREES = {"": np.pi / 180.0, **netcdf.ANGLE}
 COUNTS = {"": 1.0, "1": 1.0}
+ON_EARTH = {"degrees_north": 1.0, "degrees_east": 1.0, "degrees": 1.0, "": 1.0}
 USABLE = (0.0, 1.0, 2.0, 5.0, 8.0)  # quality flags: not judged, good, probably good, changed, interpolated
 
 
@@ -70,6 +71,7 @@ def _dive(path: Path) -> tuple[Segment, float]:
     columns["pump"] = _pump(file, t, columns["oil_m3"])
     glider = file.attribute("platform_id") or f"seaglider {file.attribute('glider')}"
     segment = Segment([path], glider, float(t[0]) if len(t) else 0.0, columns, latitude, longitude, 0.0, left_out)
+    segment.fixes = _fixes(file)
     if not np.isfinite(variation):
         segment.notes.append("no magnetic variation in the file: yaw is magnetic")
     _add_water(segment, file, t)
@@ -78,16 +80,23 @@ def _dive(path: Path) -> tuple[Segment, float]:
 
 def _position(file: NetCDF) -> tuple[float, float]:
     """Latitude and longitude, deg: of the dive's GPS fixes, or the file's means."""
-    degrees = {"degrees_north": 1.0, "degrees_east": 1.0, "degrees": 1.0, "": 1.0}
     found = []
     for mean, fixes in (("avg_latitude", "log_gps_lat"), ("avg_longitude", "log_gps_lon")):
         name = mean if file.has(mean) else fixes
-        values = file.values(name, degrees)
+        values = file.values(name, ON_EARTH)
         values = values[np.isfinite(values)]
         if not values.size:
             raise InputError("no position", source=file.path, column=name)
         found.append(float(values.mean()))
     return found[0], found[1]
+
+
+def _fixes(file: NetCDF) -> np.ndarray:
+    """The fixes before and behind the dive, (n, 3) as a Segment has them."""
+    if not all(file.has(f"log_gps_{name}") for name in ("time", "lat", "lon")):
+        return np.zeros((0, 3))
+    t = file.values("log_gps_time", EPOCH)
+    return usable_fixes(t, *(file.values(f"log_gps_{name}", ON_EARTH, len(t)) for name in ("lat", "lon")))
 
 
 def _zero(file: NetCDF) -> float:

@@ -53,11 +53,21 @@ class Segment:
     variation: float = 0.0  # magnetic, rad, still to be added to yaw_rad; 0 where it is known to be in
     left_out: dict[str, int] = field(default_factory=dict)  # samples by the reason why
     notes: list[str] = field(default_factory=list)
+    # At the surface, before and behind it: (n, 3) s since 1970-01-01 UTC, latitude, longitude, deg
+    fixes: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
 
     @property
     def end(self) -> float:
         """Time of the last row, s since 1970-01-01 UTC."""
         return self.start + float(self.columns["t_s"][-1])
+
+
+def usable_fixes(t: np.ndarray, latitude: np.ndarray, longitude: np.ndarray) -> np.ndarray:
+    """Fixes (n, 3) as a Segment has them, in order, of those on earth and in the age of GPS gliders."""
+    there = np.isfinite(t) & (np.abs(latitude) <= 90.0) & (np.abs(longitude) <= 360.0) & (t >= FIRST_TIME)
+    there &= (latitude != 0.0) | (longitude != 0.0)
+    found = np.column_stack([t, latitude, longitude])[there]
+    return found[np.argsort(found[:, 0], kind="stable")]
 
 
 def count(left_out: dict[str, int], reason: str, samples: int | np.integer) -> None:

@@ -23,6 +23,7 @@ from tools.data.importers.ocean.segment import (
     in_the_mission,
     require_same_time,
     require_unit,
+    usable_fixes,
 )
 from tools.data.importers.ocean.slocum_files import Binary, check_binary, find_caches, in_pairs, unpacked
 
@@ -103,6 +104,17 @@ class _Log:
         return float("nan")
 
 
+    def fixes(self) -> np.ndarray:
+        """Fixes by GPS, (n, 3) as a Segment has them: none where it has no receiver."""
+        if not (self.has("m_gps_lat") and self.has("m_gps_lon")):
+            return np.zeros((0, 3))
+        for kind in ("lat", "lon"):
+            require_unit(self.units[f"m_gps_{kind}"], {kind: 1.0}, self.path, f"m_gps_{kind}")
+        (t, latitude), (t_lon, longitude) = (self._file.get(f"m_gps_{kind}") for kind in ("lat", "lon"))
+        _, first, second = np.intersect1d(t, t_lon, return_indices=True)
+        return usable_fixes(np.asarray(t)[first], np.asarray(latitude)[first], np.asarray(longitude)[second])
+
+
 def _segment(engineering: Binary, science: Binary, caches: dict[str, Path]) -> Segment:
     with tempfile.TemporaryDirectory() as folder:
         log = _Log(engineering, caches, Path(folder))
@@ -139,6 +151,7 @@ def _assemble(engineering: Binary, science: Binary, log: _Log, ctd: _Log) -> Seg
         [engineering.path, science.path], engineering.glider, float(t[0]) if len(t) else 0.0, columns, latitude,
         longitude, _variation(log), left_out,
     )  # fmt: skip
+    segment.fixes = log.fixes()
     for one in (engineering, science):
         if not one.ends_well:
             segment.notes.append(f"{one.path.name} ends without its mark; its cycles are whole")
