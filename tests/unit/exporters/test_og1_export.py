@@ -56,7 +56,9 @@ def test_exporting_twice_gives_the_same_bytes(tmp_path, case):
 def test_the_file_is_as_the_format_asks(tmp_path, case):
     run_ok("export", "og1", case, "--out", "m.nc", cwd=tmp_path)
     file = opened(tmp_path / "m.nc")
-    assert file.sizes == {"N_MEASUREMENTS": 200}
+    fixes = len((case / "fixes.csv").read_text().splitlines()) - 1
+    assert file.sizes == {"N_MEASUREMENTS": 200, "N_FIXES": fixes}
+    assert fixes > 2
     assert "OG-1.0" in file.attrs["Conventions"]
     assert {"TIME", "LATITUDE", "LONGITUDE", "DEPTH", "TRAJECTORY", "PLATFORM_MODEL", "PLATFORM_SERIAL_NUMBER"} <= set(
         file.variables

@@ -11,7 +11,7 @@ from tools.data.errors import InputError
 from tools.data.exporters.variables import Variable, found_in
 from tools.data.importers.ocean import og1_names
 from tools.data.runs.case import load_runs
-from tools.data.runs.origin import Origin, read_origins
+from tools.data.runs.origin import Origin, read_fixes, read_origins
 from tools.data.runs.run import Run
 
 _ANGLE = ("degrees", 180.0 / np.pi)
@@ -47,12 +47,18 @@ def export_og1(folder: Path, out: Path, answers: list[Path]) -> list[Variable]:
         )
     origins = read_origins(folder, runs)
     found = [variable for answer in answers for variable in found_in(answer, runs)]
-    write_og1(out, table.vehicle, runs, origins, found)
+    write_og1(out, table.vehicle, runs, origins, found, read_fixes(folder))
     return found
 
 
-def write_og1(out: Path, vehicle: str, runs: list[Run], origins: list[Origin], variables: list[Variable]) -> None:
-    """Write runs of a vehicle, each with its origin, and variables by row, as a mission in OG-1.0."""
+def write_og1(
+    out: Path, vehicle: str, runs: list[Run], origins: list[Origin], variables: list[Variable],
+    fixes: np.ndarray | None = None,
+) -> None:
+    """Write runs of a vehicle, each with its origin, and variables by row, as a mission in OG-1.0.
+
+    fixes: (n, 3) as tools.data.runs.origin.read_fixes gives them.
+    """
     import xarray
 
     for variable in variables:
@@ -62,7 +68,7 @@ def write_og1(out: Path, vehicle: str, runs: list[Run], origins: list[Origin], v
     first = f"{start:%Y%m%dT%H%M%S}"
     more = {one.name: _variable(one) for one in variables}
     dataset = xarray.Dataset(
-        {**_own(runs, origins), **more, **_platform(vehicle, origins, first)},
+        {**_own(runs, origins), **_fixes(fixes), **more, **_platform(vehicle, origins, first)},
         attrs={
             "title": "OceanGliders trajectory file", "id": f"{origins[0].glider}_{first}", "start_date": first,
             "platform": "sub-surface gliders", "featureType": "trajectory", "Conventions": "CF-1.10,OG-1.0",
@@ -113,6 +119,20 @@ def _own(runs: list[Run], origins: list[Origin]) -> dict[str, Any]:
         about = {"units": "degrees", "long_name": "magnetic variation, positive east"}
         found[og1_names.VARIATION] = (rows, np.degrees(variation), about)
     return found
+
+
+def _fixes(fixes: np.ndarray | None) -> dict[str, Any]:
+    """Fixes at the surface, at times of their own."""
+    if fixes is None:
+        return {}
+    rows, word = og1_names.FIXES, "of fixes by GPS"
+    return {
+        og1_names.TIME_GPS: (
+            rows, fixes[:, 0], {"units": og1_names.EPOCH, "calendar": "gregorian", "long_name": f"time {word}"},
+        ),
+        f"{og1_names.LATITUDE}_GPS": (rows, fixes[:, 1], {"units": "degrees_north", "long_name": f"latitude {word}"}),
+        f"{og1_names.LONGITUDE}_GPS": (rows, fixes[:, 2], {"units": "degrees_east", "long_name": f"longitude {word}"}),
+    }  # fmt: skip
 
 
 def _column(runs: list[Run], column: str) -> np.ndarray:

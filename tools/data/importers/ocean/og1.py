@@ -31,7 +31,7 @@ def read_og1(path: Path, vehicle: str | None) -> tuple[str, list[Segment]]:
         hint = " (a base station's dive file: glider import seaglider)" if file.has("eng_pitchAng") else ""
         raise InputError(f"no mission in {og1_names.CONVENTION}: no {og1_names.ROWS} or no TIME{hint}", source=path)
     vehicle = vehicle or _vehicle(file)
-    logged_t = _times(file, size)
+    logged_t = _times(file, og1_names.TIME)
     logged = {
         name: _first(file, names, size)
         for name, names in {**og1_names.ATTITUDE, **og1_names.OPTIONAL}.items()
@@ -60,7 +60,7 @@ def read_og1(path: Path, vehicle: str | None) -> tuple[str, list[Segment]]:
         segments.append(segment)
     if not segments:
         raise InputError("no row with attitude", source=path, column="PITCH")
-    segments[0].fixes = _fixes(file, logged_t, size)  # the mission's: between dives rows are of none
+    segments[0].fixes = _fixes(file, logged_t)  # the mission's: between dives rows are of none
     magnetic = file.has("HEADING") and "magnetic" in file.about("HEADING", "comment").lower()
     if magnetic and not file.has(og1_names.VARIATION):
         segments[0].notes.append("HEADING is magnetic, and so is yaw, of all runs")
@@ -81,9 +81,9 @@ def _glider(file: NetCDF) -> str:
     return file.text(og1_names.SERIAL) or file.text(og1_names.TRAJECTORY) or file.attribute("id")
 
 
-def _times(file: NetCDF, size: int) -> np.ndarray:
-    """TIME, s since 1970-01-01 UTC, (rows,); InputError where its unit is no time since a date."""
-    unit = file.about(og1_names.TIME, "units")
+def _times(file: NetCDF, name: str) -> np.ndarray:
+    """A variable, s since 1970-01-01 UTC, (rows,); InputError where its unit is no time since a date."""
+    unit = file.about(name, "units")
     parts = SINCE.fullmatch(unit)
     try:
         if parts is None:
@@ -92,9 +92,9 @@ def _times(file: NetCDF, size: int) -> np.ndarray:
         moment = dt.datetime.fromisoformat(parts["moment"].strip().removesuffix(" UTC"))
     except (ValueError, KeyError):
         message = f"unit {unit!r}, expected {og1_names.EPOCH}"
-        raise InputError(message, source=file.path, column=og1_names.TIME) from None
+        raise InputError(message, source=file.path, column=name) from None
     zero = (moment if moment.tzinfo else moment.replace(tzinfo=dt.UTC)).timestamp()
-    return zero + file.values(og1_names.TIME, {unit: factor}, size)
+    return zero + file.values(name, {unit: factor})
 
 
 def _first(file: NetCDF, names: og1_names.Names, size: int) -> np.ndarray:
@@ -147,15 +147,17 @@ def _position(file: NetCDF, name: str, unit: str, dive: np.ndarray, size: int) -
     raise InputError("no position", source=file.path, column=name)
 
 
-def _fixes(file: NetCDF, t: np.ndarray, size: int) -> np.ndarray:
-    """A mission's fixes by GPS, (n, 3) as a Segment has them; none where the file holds none by row."""
-    found = []
-    for name, unit in POSITIONS:
-        values = file.values(f"{name}_GPS", _spellings(unit)) if file.has(f"{name}_GPS") else np.array([])
-        if len(values) != size:
-            return np.zeros((0, 3))
-        found.append(np.where(_bad(file, f"{name}_GPS", size), np.nan, values))
-    return usable_fixes(t, *found)
+def _fixes(file: NetCDF, t: np.ndarray) -> np.ndarray:
+    """A mission's fixes by GPS, (n, 3) as a Segment has them: at times of their own, or at the rows' (t); or none."""
+    if not all(file.has(f"{name}_GPS") for name, _ in POSITIONS):
+        return np.zeros((0, 3))
+    found = [file.values(f"{name}_GPS", _spellings(unit)) for name, unit in POSITIONS]
+    if file.has(og1_names.TIME_GPS):
+        t = _times(file, og1_names.TIME_GPS)
+    if {len(values) for values in found} != {len(t)}:
+        return np.zeros((0, 3))
+    bad = np.any([_bad(file, f"{name}_GPS", len(t)) for name, _ in POSITIONS], axis=0)
+    return usable_fixes(np.where(bad, np.nan, t), *found)
 
 
 def _spellings(unit: str) -> dict[str, float]:

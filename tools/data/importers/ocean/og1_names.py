@@ -6,6 +6,7 @@ from tools.data.importers.ocean import netcdf
 
 ROWS = "N_MEASUREMENTS"  # the dimension
 TIME, LATITUDE, LONGITUDE, DIVE = "TIME", "LATITUDE", "LONGITUDE", "DIVE_NUMBER"
+FIXES, TIME_GPS = "N_FIXES", "TIME_GPS"  # own dimension of fixes that are at no row's time
 DIVES = (DIVE, "divenum", "dive_number")  # which dive a row is of, where a file says so
 MODEL, SERIAL, TRAJECTORY, WMO = "PLATFORM_MODEL", "PLATFORM_SERIAL_NUMBER", "TRAJECTORY", "WMO_IDENTIFIER"
 CONVENTION = "OG-1.0"
