@@ -298,8 +298,11 @@ def run(
         if search.best.labels == first:
             break
     say(f"one effect: {' '.join(search.best.labels) or 'none'}")
+    alone = search.best
     for hypothesis in before:
         take_over(search, hypothesis)
+    if search.best is not alone:  # whose filter was made far from it, and weighs the prior as far
+        refine(search, 1)
     grow(search, say)
     if level_disturbance(search):
         grow(search, say)

@@ -122,9 +122,12 @@ def held_out_worth(search: Search, hypothesis: Hypothesis) -> Worth:
     return Worth(whole, taken)
 
 
-def prune_effects(search: Search) -> tuple[Hypothesis, dict[str, float]]:
-    """Backward elimination: the best hypothesis without what does not earn its place; nat that each effect brings."""
-    hypothesis = search.best
+def prune_effects(search: Search, begin: Hypothesis | None = None) -> tuple[Hypothesis, dict[str, float]]:
+    """Backward elimination: the best hypothesis without what does not earn its place; nat that each effect brings.
+
+    begin: where it begins, in place of the best.
+    """
+    hypothesis = begin or search.best
     while hypothesis.labels:
         gains = {
             label: hypothesis.log_evidence(search.fitter) - drop(search, hypothesis, label).log_evidence(search.fitter)
@@ -206,15 +209,16 @@ def search_again_with_noise(
 
 
 def conclude(
-    search: Search, say: Callable[[str], None] = lambda text: None, noise: ProbeResult | None = None, calm: bool = False
+    search: Search, say: Callable[[str], None] = lambda text: None, noise: ProbeResult | None = None,
+    calm: bool = False, begin: Hypothesis | None = None,
 ) -> Answer:
     """The answer of a finished search; its gains are taken anew at the hypothesis with all that is evident.
 
     `noise` is disorder that the search already knows of: turbulence, waves, or motion capture's clock; calm: none is
-    looked for.
+    looked for; begin: the hypothesis that effects are eliminated from, where it is not the best.
     """
     problem = search.problem
-    evident, gained = prune_effects(search) if problem.rules.evidence else by_held_out_gap(search)
+    evident, gained = prune_effects(search, begin) if problem.rules.evidence else by_held_out_gap(search)
     search.hypotheses = [c for c in search.hypotheses if c is not evident] + ([evident] if evident.labels else [])
     search.gains = problem.filter(*search.model(evident), begin=True)
     findings = tests(problem, search.gains)
@@ -250,7 +254,12 @@ def conclude(
     by_search = problem.rules.evidence and not (noise is not None and main == disordered)
     if by_search and len(evident.labels) > 1:
         try_rivals(search, evident, main)
-    chances = posterior(search, evident, main) if by_search else {main or NONE: 1.0}
+    chances = {main or NONE: 1.0}
+    if by_search:
+        chances = with_least_gap(search, evident, main, posterior(search, evident, main))
+        instead = max(chances, key=lambda label: chances[label])
+        if begin is None and main and instead not in (main, NONE):
+            return conclude(search, say, noise, calm, alternatives(search, evident, main)[instead])
     chances = share_out(chances, main, most_often({label: taken[label] for label in gained}))
     chances = to_none(chances, negligible, movements_of_alternatives(search, evident, main, chances))
     chances = pass_on(chances, [label for label in by_size if label in gained and label != main])
@@ -277,6 +286,21 @@ def conclude(
         whiteness=whiteness, unexplained=left_share(shrinkage, by_effects), gained=gained, negligible=negligible,
         probed=[] if left is None else left.probed, noise=noise, shrinkage=shrinkage,
     )  # fmt: skip
+
+
+def with_least_gap(search: Search, hypothesis: Hypothesis, main: str, chances: dict[str, float]) -> dict[str, float]:
+    """Probabilities where labels have more evidence than the main one, in its place: as often as each leaves the least.
+
+    The least of the gap on runs left out, by bootstrap over runs. Small effects that are there beside a large one can
+    have more nats than it where noise is not what the file says, and take nothing of its gap.
+    """
+    found = alternatives(search, hypothesis, main)
+    ahead = [label for label in found if chances.get(label, 0.0) > chances.get(main, 0.0)]
+    if not main or not ahead:
+        return chances
+    least = most_often({label: -left_out_squares(search, found[label]) for label in (main, *ahead)})
+    together = sum(chances.get(label, 0.0) for label in least)
+    return chances | {label: together * share for label, share in least.items()}
 
 
 def share_out(chances: dict[str, float], main: str, first: dict[str, float]) -> dict[str, float]:
