@@ -7,10 +7,11 @@ import pytest
 from support.cases import make_case
 
 from sim_backend.core.effects import effect_layout as ef
+from tools.diagnose import search as search_module
 from tools.diagnose.noise_probes import CLOCK, NoiseProbe, ProbeResult
 from tools.diagnose.record import NONE
 from tools.diagnose.search import run
-from tools.diagnose.shrink import in_tolerances, lacking_squares, most_often
+from tools.diagnose.shrink import in_tolerances, lacking_squares, left_out_squares, most_often
 from tools.diagnose.unknown import (
     MORE_UNKNOWN,
     UNFIT,
@@ -20,7 +21,17 @@ from tools.diagnose.unknown import (
     left_share,
     probability_unknown,
 )
-from tools.diagnose.verdict import SECOND, Worth, conclude, doubt_small, held_out_worth, pass_on, share_out
+from tools.diagnose.verdict import (
+    SECOND,
+    Worth,
+    conclude,
+    doubt_small,
+    drop,
+    held_out_worth,
+    pass_on,
+    share_out,
+    with_least_gap,
+)
 from tools.inference.problem import problem_of
 
 
@@ -31,10 +42,39 @@ def test_worth_is_the_root_of_what_the_gap_grows_by():
     assert worth.tolerances("lift") == 0.0
 
 
-def test_an_effect_is_as_large_as_it_is_where_what_is_allowed_could_take_it(tmp_path):
+@pytest.fixture(scope="module")
+def two_effects(tmp_path_factory):
+    """The search over runs with two effects."""
     F = np.zeros(ef.N_F)
     F[ef.NET_MASS_OFFSET], F[ef.PITCH_TRIM] = 0.02, 0.3
-    search = run(problem_of(make_case(tmp_path, F, seed=4)))
+    return run(problem_of(make_case(tmp_path_factory.mktemp("two"), F, seed=4)))
+
+
+def test_more_evidence_wins_only_as_far_as_it_closes_the_gap_of_runs_left_out(two_effects):
+    both = next(one for one in two_effects.ranked() if set(one.labels) == {"net_buoyancy", "pitch_trim"})
+    alone = {label: drop(two_effects, both, other) for label, other in (both.labels, both.labels[::-1])}
+    left = {label: float(left_out_squares(two_effects, one).mean()) for label, one in alone.items()}
+    closes, leaves = min(left, key=lambda label: left[label]), max(left, key=lambda label: left[label])
+    for main in (closes, leaves):
+        other = leaves if main == closes else closes
+        chances = {main: 0.01, other: 0.98, NONE: 0.01}
+        found = with_least_gap(two_effects, alone[main], main, chances)
+        assert found[closes] > 0.9
+        assert sum(found.values()) == pytest.approx(1.0)
+    fewer = {closes: 0.6, leaves: 0.4, NONE: 0.0}
+    assert with_least_gap(two_effects, alone[closes], closes, fewer) == fewer
+
+
+def test_a_search_that_takes_over_effects_makes_its_filter_at_them(two_effects, monkeypatch):
+    """Made at the best single effect, it would weigh what is allowed as if all were still as far off."""
+    monkeypatch.setattr(search_module, "MOST_EFFECTS", 2)  # none is added to those taken over, and nothing refined
+    again = run(two_effects.problem.as_recorded, before=[two_effects.best])
+    assert set(again.best.labels) == {"net_buoyancy", "pitch_trim"}
+    assert again.fitter.temperature < 1.05  # 1.3 at the single one
+
+
+def test_an_effect_is_as_large_as_it_is_where_what_is_allowed_could_take_it(two_effects):
+    search = two_effects
     found = next(one for one in search.ranked() if set(one.labels) == {"net_buoyancy", "pitch_trim"})
     refitted = held_out_worth(search, found).tolerances("net_buoyancy")
     lacking = {label: in_tolerances(grown) for label, grown in lacking_squares(search, found).items()}
