@@ -20,8 +20,7 @@ from tools.study.challenge.diagnosis import TIMING
 pytestmark = pytest.mark.computes(seconds=25)
 
 # 4 in every run of the tests; `GLIDER_MANY_CASES=100 pytest ...` is how a hundred were tried.
-CASES = int(os.environ.get("GLIDER_MANY_CASES", "4"))
-WORKERS = 2 if CASES == 4 else 4  # one is killed, and what it had goes to another
+CASES, WORKERS = int(os.environ.get("GLIDER_MANY_CASES", "4")), 4
 
 
 @pytest.fixture(scope="module")
