@@ -2,6 +2,7 @@
 
 import base64
 import io
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -90,9 +91,9 @@ def corner(found: Identified):
         axis.text(n + 0.5, -0.05, name, ha="center", va="top", fontsize=7)
         axis.text(-0.05, up + 0.5, name, ha="right", va="center", rotation="vertical", fontsize=7)
     few = flat[:: max(1, len(flat) // POINTS)]
-    for i, j in zip(*np.tril_indices(count, -1), strict=True):
-        axis.plot(j + place(j, few[:, j]), count - 1 - i + place(i, few[:, i]), ",", color=INK, alpha=0.4)
-        axis.text(i + 0.5, count - 0.5 - j, f"{correlation[j, i]:+.2f}", ha="center", va="center", fontsize=7)
+    for i, j in combinations(range(count), 2):
+        axis.plot(i + place(i, few[:, i]), count - 1 - j + place(j, few[:, j]), ",", color=INK, alpha=0.4)
+        axis.text(j + 0.5, count - 0.5 - i, f"{correlation[i, j]:+.2f}", ha="center", va="center", fontsize=7)
     return figure
 
 
