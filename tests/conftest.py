@@ -6,6 +6,8 @@ import gc
 import os
 import re
 import signal
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -95,6 +97,17 @@ def shared() -> Path:
     if not folder.is_dir():
         pytest.skip("no folder 'shared' beside the repository")
     return folder
+
+
+@pytest.fixture(scope="session", autouse=True)
+def unwritten() -> Iterator[None]:
+    """The vehicle that many tests share is at the end as it was. Read-only it would be another type to Numba, for which
+    the kernels would be compiled again.
+    """
+    yield
+    if (states := sys.modules.get("model_states")) is not None:
+        anew = states.decode_vehicle(states.VEHICLE_TEXT, "roughie").vector()
+        assert states.P.tobytes() == anew.tobytes(), "P was written into"
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -14,8 +14,7 @@ from firmware.model.library import shipped
 from firmware.model.vehicle import decode_vehicle
 
 VEHICLE_TEXT = shipped("model/vehicles")["roughie"]
-P = decode_vehicle(VEHICLE_TEXT, "roughie").vector()
-P.flags.writeable = False
+P = decode_vehicle(VEHICLE_TEXT, "roughie").vector()  # nobody writes into it: conftest.py looks
 ACTUATORS = ("servo", "slider", "ballast")
 LOW, HIGH, RATE, TAU = (
     np.array([P[getattr(layout, f"{name.upper()}_{field}")] for name in ACTUATORS])

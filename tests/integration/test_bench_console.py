@@ -14,7 +14,7 @@ from support import commands
 from hal.boardfile import calibration_hash, decode_device_file
 from tests.support.bench_session import Twins, session
 from tools.bench.client import Bench
-from tools.flight.compose import load_board_file
+from tools.data.boards import load_board_file
 
 pytestmark = pytest.mark.realtime(seconds=180)
 

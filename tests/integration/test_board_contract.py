@@ -12,8 +12,8 @@ import pytest
 from hal.board import BoardRequest, board_builder
 from hal.ports import SLOTS, ActuatorPort, Clock, Hardware, SensorPort, Validity, empty_frame
 from hal.recorder.recorder import NullRecorder
+from tools.data.boards import load_board_file
 from tools.data.sources import load_vehicle
-from tools.flight.compose import load_board_file
 
 VEHICLE = load_vehicle("roughie")
 FITTED = ("imu", "beacon", "slider_wire", "plunger_wire")

@@ -28,21 +28,21 @@ def test_neither_noise_nor_the_loss_of_its_terminal_ends_a_dive(tmp_path):
             child.expect("hands and cables clear", timeout=60)
             assert not (tmp_path / "dive.mcap").exists()
             child.sendline("yes")
-            until(lambda: sea.state()["z_m"] > 1.0 or not child.isalive(), 300.0)
+            until(lambda: sea.state()["z_m"] > 1.0 or not child.isalive(), 300.0, every=0.1)
             child.send(NOISE)
             time.sleep(2.0)
             null = os.open(os.devnull, os.O_RDWR)
             os.dup2(null, child.child_fd)  # the terminal's other end is gone
             os.close(null)
             deeper = sea.state()["z_m"] + 0.5
-            until(lambda: sea.state()["z_m"] > deeper or not child.isalive(), 60.0)
+            until(lambda: sea.state()["z_m"] > deeper or not child.isalive(), 60.0, every=0.1)
             pulse = Heartbeat.open(state).look()
             assert (pulse.status, pulse.guard) == (Status.FLYING, Guard.WATCHING)
             assert StateFile(state).read().phase == Phase.DIVING
             for _ in range(2):  # two of them together: given up, and not left
                 os.kill(child.pid, signal.SIGINT)
                 time.sleep(0.05)
-            until(lambda: not child.isalive(), 180.0)
+            until(lambda: not child.isalive(), 180.0, every=0.1)
             assert StateFile(state).read().phase == Phase.ASHORE
             assert sea.state()["z_m"] < 0.35
         finally:

@@ -62,8 +62,8 @@ def test_a_tick_on_devices_gains_no_memory():
 
     from hal.board import BoardRequest, board_builder
     from hal.ports import SLOTS, empty_frame
+    from tools.data.boards import load_board_file
     from tools.data.sources import load_vehicle
-    from tools.flight.compose import load_board_file
 
     file = load_board_file("twin")
     board = board_builder("twin")(BoardRequest(text=file.text, source=file.source, vehicle=load_vehicle("roughie")))

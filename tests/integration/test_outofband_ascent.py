@@ -27,14 +27,14 @@ def sea(tmp_path):
 
 def dive(sea, tmp_path, flight):
     """Arm, and be well under water; time enough for a busy machine."""
-    until(lambda: sea.state()["z_m"] > DEEP_M or flight.poll() is not None, 300.0)
+    until(lambda: sea.state()["z_m"] > DEEP_M or flight.poll() is not None, 300.0, every=0.1)
     assert StateFile(tmp_path / "state").read().phase == Phase.DIVING
 
 
 def comes_up(sea, tmp_path, began):
     """By the pump, at its light end; the state says so."""
     until(lambda: StateFile(tmp_path / "state").read().phase == Phase.ABORTED, 4.0)
-    until(lambda: sea.state()["z_m"] < 0.3, 120.0)
+    until(lambda: sea.state()["z_m"] < 0.3, 120.0, every=0.1)
     pump = read_plan(tmp_path / "state" / "outofband.json").axes[0]
     until(lambda: abs(sea.state()["ballast_kg"] - pump.end_m * began["kg_per_m"]) < 0.01, 30.0)
     assert sea.state()["slider_m"] < -0.05

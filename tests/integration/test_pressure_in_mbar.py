@@ -16,8 +16,8 @@ from hal.transport.hub import Hub, Link
 from hal.transport.port import SerialPort
 from sim_backend.twins.boardfile import decode_twin_file
 from tests.integration.test_independent_peers import PlainServer, registers
+from tools.data.boards import load_board_file
 from tools.data.sources import load_vehicle
-from tools.flight.compose import load_board_file
 
 pytestmark = pytest.mark.realtime
 

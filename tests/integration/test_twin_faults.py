@@ -7,8 +7,8 @@ import pytest
 from hal.board import BoardRequest, board_builder
 from hal.drivers.samples import Sensor
 from hal.ports import BoardError, Validity
+from tools.data.boards import load_board_file
 from tools.data.sources import load_vehicle
-from tools.flight.compose import load_board_file
 
 pytestmark = pytest.mark.realtime
 

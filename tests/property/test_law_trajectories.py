@@ -67,11 +67,10 @@ def ideal_flight(law: Law, true: np.ndarray, errors, rolled, strength, cover: fl
     s_of, rate_of = [], []
     for _ in range(round(seconds / STEP)):
         for _ in range(3):  # k2, the inputs and the bound settle together
-            _, _, g = law(x, references)
+            _, _, g_ts, _, _, g_zb = form_at(law.vehicle, x)
             bound = law.error_bound(x, spread)
-            axes = zip(bound.tolist(), strength.tolist(), g.tolist(), law.eps, strict=True)
-            needed = [cover * k2_to_cover(*numbers) for numbers in axes]
-            law = replace(law, pitch=replace(law.pitch, k2=needed[0]), depth=replace(law.depth, k2=needed[1]))
+            axes = zip(bound.tolist(), strength.tolist(), (g_ts, g_zb), law.eps, strict=True)
+            law = law.with_k2(*(cover * k2_to_cover(*numbers) for numbers in axes))
             x[SLIDER:] = law(x, references)[0]
         _, s, _ = law(x, references)
         acc = worst(x, s, strength)

@@ -78,7 +78,12 @@ class Terminal:
 
     def text(self) -> str:
         """What stands on the screen."""
-        return "\n".join(line.rstrip() for line in self.screen.display).rstrip()
+        return "\n".join(self._row(y) for y in range(ROWS)).rstrip()
+
+    def _row(self, y: int) -> str:
+        """One line of the screen; `screen.display` measures every character of all of them anew."""
+        row = self.screen.buffer[y]
+        return "".join(row[x].data for x in range(COLUMNS)).rstrip()
 
     def look(self, seconds: float) -> None:
         """Take what comes in the next seconds."""
@@ -100,7 +105,7 @@ class Terminal:
 
     def line(self) -> str:
         """The line that the cursor is on."""
-        return self.screen.display[self.screen.cursor.y].rstrip()
+        return self._row(self.screen.cursor.y)
 
     def ready(self) -> None:
         """Until the prompt is there, and empty."""

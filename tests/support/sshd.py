@@ -124,6 +124,8 @@ def sshd(folder: Path, *, apart: bool = False):
     (folder / "sshd_config").write_text(
         f"Port {port}\nListenAddress 127.0.0.1\nHostKey {folder}/host\nAuthorizedKeysFile {keys}\n"
         "StrictModes no\nUsePAM no\nPidFile none\nPasswordAuthentication no\nPermitRootLogin prohibit-password\n"
+        # No start-up file of whoever runs the tests: some take a second a login.
+        + ("" if apart else f"SetEnv HOME={account.home_there}\n")
     )
     command = [SSHD, "-D", "-f", folder / "sshd_config", "-E", folder / "sshd.log"]
     if apart:

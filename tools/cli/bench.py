@@ -23,8 +23,8 @@ def bench(board: str, vehicle: str, script: Path | None, out: Path) -> None:
     need("bench")
     from tools.bench.client import Bench
     from tools.bench.console import Console, hang_up_ends
+    from tools.data.boards import load_board_file
     from tools.data.sources import load_vehicle, read_text
-    from tools.flight.compose import load_board_file
 
     load_vehicle(vehicle)
     found = load_board_file(board)

@@ -44,9 +44,10 @@ def check(
     from firmware.model.k2_margin import K2Margin
     from hal.ports import BoardError
     from hal.strict import ConfigError
+    from tools.data.boards import load_board_file
     from tools.data.errors import InputError
     from tools.data.sources import load_mission, load_vehicle
-    from tools.flight.compose import build_flight, load_board_file
+    from tools.flight.compose import build_flight
 
     findings: list[dict] = []
     covers: list[K2Margin] = []
@@ -172,7 +173,7 @@ def talk(board: str, vehicle: str, signs: bool) -> list[dict]:
     from sim_backend.twins.boardfile import decode_twin_file
     from tools.bench.client import Bench, BenchError
     from tools.bench.signs import Finding, Signs, look
-    from tools.flight.compose import load_board_file
+    from tools.data.boards import load_board_file
 
     found = load_board_file(board)
     read = decode_twin_file if found.kind == "twin" else decode_device_file

@@ -32,8 +32,8 @@ def tune(vehicle: str, method: str, seed: int, budget: int, as_json: bool) -> No
     need("analysis")
     from hal.strict import decode
     from sim_backend.board import SimBoardFile
+    from tools.data.boards import load_board_file
     from tools.data.sources import load_vehicle
-    from tools.flight.compose import load_board_file
     from tools.study.tuning import rule, search
 
     the_vehicle, file = load_vehicle(vehicle), load_board_file("sim")

@@ -29,9 +29,9 @@ def twin(board, vehicle, folder, seed, stand, faults, print_sim) -> None:
     from hal.board import BoardError
     from sim_backend.twins.boardfile import decode_twin_file, simulated_text
     from sim_backend.twins.service import TwinService, replaced_ports
+    from tools.data.boards import load_board_file
     from tools.data.errors import InputError, need
     from tools.data.sources import load_vehicle
-    from tools.flight.compose import load_board_file
 
     found = load_board_file(board)
     if found.kind == "sim":

@@ -1,11 +1,7 @@
 """The composition root: the one place that builds a flight out of vehicle, mission, board and recorder."""
 
 from dataclasses import dataclass
-from importlib.resources import files
-from pathlib import Path
-from typing import Annotated, Any
-
-import msgspec
+from typing import Any
 
 from firmware.autopilot import Autopilot, configuration
 from firmware.core.vehicle.seawater import water_density
@@ -17,29 +13,14 @@ from firmware.model.vehicle import Vehicle
 from firmware.runtime import Runtime
 from firmware.supervisor import Supervisor
 from firmware.telemetry import TICK
-from hal.board import BoardRequest, board_builder, board_kinds
+from hal.board import BoardRequest, board_builder
 from hal.ports import Board, BoardError, Hardware
 from hal.recorder.schema import DEBUG, ERROR, FATAL, INFO, WARN
-from hal.strict import ConfigError
+from tools.data.boards import load_board_file
 from tools.data.errors import InputError
-from tools.data.sources import load_mission, load_vehicle, read_text
+from tools.data.sources import load_mission, load_vehicle
 
 SEVERITIES = dict(zip(Reaction, (DEBUG, INFO, WARN, WARN, ERROR, FATAL, FATAL), strict=True))
-
-
-class BoardKind(msgspec.Struct):
-    """The one key that every board file has; the rest is its kind's."""
-
-    kind: Annotated[str, msgspec.Meta(min_length=1, max_length=100)]
-
-
-@dataclass
-class BoardFile:
-    """A board file's text, where it came from, and its kind."""
-
-    text: str
-    source: str
-    kind: str
 
 
 @dataclass
@@ -67,27 +48,6 @@ class Flight:
     def twinned(self) -> bool:
         """Whether the devices are twins that the board itself starts: nothing real moves."""
         return self.board.hardware is Hardware.TWINNED
-
-
-def load_board_file(wanted: str) -> BoardFile:
-    """A board by shipped name ("sim") or path."""
-    from hal.strict import decode
-
-    folders = [files("sim_backend").joinpath("boards"), files("hal").joinpath("boards")]
-    shipped = [file for folder in folders if (file := folder.joinpath(f"{wanted}.toml")).is_file()]
-    if shipped and "/" not in wanted:
-        text, source = shipped[0].read_text(encoding="utf-8"), f"{wanted} (shipped)"
-    elif Path(wanted).is_file():
-        text, source = read_text(Path(wanted)), wanted
-    else:
-        names = sorted(
-            entry.name.removesuffix(".toml") for folder in folders for entry in folder.iterdir() if "." in entry.name
-        )
-        raise InputError(f"no board '{wanted}': neither a file nor one of {', '.join(names)}")
-    kind = decode(text, BoardKind, source).kind
-    if kind not in board_kinds():
-        raise ConfigError(source, f"no board of kind '{kind}'; installed: {', '.join(board_kinds())}", key="kind")
-    return BoardFile(text, source, kind)
 
 
 def parse_effects(items: tuple[str, ...]) -> dict[str, dict[str, float]]:

@@ -2,6 +2,7 @@
 
 import base64
 import io
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from tools.report.page import render
 INK, TRUTH, SOFT = "#1d3f72", "#d9480f", "#8a94a3"
 SHOWN = 4  # flights left out with pictures: those whose gap was largest before
 POINTS = 1500  # of the chains, in a corner plot
+PANEL = (0.03, 0.97)  # of its row and column
 DRAWN = ("depth", "pitch", "roll")
 
 
@@ -60,31 +62,38 @@ def corner(found: Identified):
 
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
+    from matplotlib.collections import PatchCollection
+    from matplotlib.patches import Rectangle
 
     flat = found.free.si(found.chains.flat)[:, : len(COEFFICIENTS)]
+    count, low, span = len(COEFFICIENTS), flat.min(axis=0), np.ptp(flat, axis=0) + np.finfo(float).tiny
+
+    def place(n: int, values: np.ndarray) -> np.ndarray:
+        """Values of a coefficient along its column, of width 1; the same upwards along its row."""
+        return PANEL[0] + (PANEL[1] - PANEL[0]) * (0.05 + 0.9 * (values - low[n]) / span[n])
+
+    # One pair of axes for all panels: one for each takes six times as long.
+    figure, axis = plt.subplots(figsize=(11, 11))
+    figure.subplots_adjust(0.05, 0.05, 0.99, 0.99)
+    axis.set(xlim=(0, count), ylim=(0, count))
+    axis.axis("off")
     correlation = np.corrcoef(flat.T)
+    shades = np.triu(np.abs(correlation), 1)
+    corners = [(j + PANEL[0], count - 1 - i + PANEL[0]) for i in range(count) for j in range(count)]
+    panels = [Rectangle(at, PANEL[1] - PANEL[0], PANEL[1] - PANEL[0]) for at in corners]
+    colours = [(0.85, 0.28, 0.06, 0.7 * shade) for shade in shades.flat]
+    axis.add_collection(PatchCollection(panels, facecolors=colours, edgecolors="black", linewidths=0.8))
+    for n, name in enumerate(COEFFICIENTS):
+        up = count - 1 - n
+        often, edges = np.histogram(flat[:, n], bins=30)
+        bars = up + PANEL[0] + (PANEL[1] - PANEL[0]) * often / (1.05 * often.max())
+        axis.stairs(bars, n + place(n, edges), baseline=up + PANEL[0], fill=True, color=INK, alpha=0.6)
+        axis.text(n + 0.5, -0.05, name, ha="center", va="top", fontsize=7)
+        axis.text(-0.05, up + 0.5, name, ha="right", va="center", rotation="vertical", fontsize=7)
     few = flat[:: max(1, len(flat) // POINTS)]
-    count = len(COEFFICIENTS)
-    figure, axes = plt.subplots(count, count, figsize=(11, 11))
-    figure.subplots_adjust(0.05, 0.05, 0.99, 0.99, 0.06, 0.06)
-    for i in range(count):
-        for j in range(count):
-            axis = axes[i, j]
-            axis.set_xticks([])
-            axis.set_yticks([])
-            if i == j:
-                axis.hist(flat[:, i], bins=30, color=INK, alpha=0.6)
-            elif j < i:
-                axis.plot(few[:, j], few[:, i], ",", color=INK, alpha=0.4)
-            else:
-                shade = abs(correlation[i, j])
-                axis.set_facecolor((0.85, 0.28, 0.06, 0.7 * shade))
-                axis.text(0.5, 0.5, f"{correlation[i, j]:+.2f}", ha="center", va="center", fontsize=7,
-                          transform=axis.transAxes)  # fmt: skip
-            if i == count - 1:
-                axis.set_xlabel(COEFFICIENTS[j], fontsize=7)
-            if j == 0:
-                axis.set_ylabel(COEFFICIENTS[i], fontsize=7)
+    for i, j in combinations(range(count), 2):
+        axis.plot(i + place(i, few[:, i]), count - 1 - j + place(j, few[:, j]), ",", color=INK, alpha=0.4)
+        axis.text(j + 0.5, count - 0.5 - i, f"{correlation[i, j]:+.2f}", ha="center", va="center", fontsize=7)
     return figure
 
 

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from hal.board import BoardRequest, board_builder
 from hal.outofband.plan import FORMAT, PlanError, read_plan, write_plan
+from tools.data.boards import load_board_file
 from tools.data.sources import load_vehicle
 from tools.flight.ascent_plan import make_plan
-from tools.flight.compose import load_board_file
 
 
 @pytest.fixture(scope="module")

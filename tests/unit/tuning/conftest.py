@@ -7,8 +7,8 @@ import pytest
 
 from hal.strict import decode
 from sim_backend.board import SimBoardFile
+from tools.data.boards import load_board_file
 from tools.data.sources import load_vehicle
-from tools.flight.compose import load_board_file
 
 sys.path.insert(0, str(Path(__file__).parent))
 

@@ -56,8 +56,8 @@ def same_flight(mission: str, seed: int, fifo: bool) -> None:
 def compare_flights(mission: str, seed: int, folder: Path, *, vehicle: str = "roughie") -> dict[str, Any]:
     """Both flights, logged, and how far they are apart."""
     from sim_backend.twins.boardfile import decode_twin_file, simulated_text
+    from tools.data.boards import load_board_file
     from tools.data.log.reader import read_log
-    from tools.flight.compose import load_board_file
 
     found = load_board_file("twin")
     (folder / "sim.toml").write_text(simulated_text(decode_twin_file(found.text, found.source)))

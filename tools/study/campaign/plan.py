@@ -19,9 +19,9 @@ from firmware.model.vehicle import Vehicle
 from hal.strict import Table, decode
 from sim_backend.board import SimBoardFile
 from sim_backend.core.effects.catalogue import check_board
+from tools.data.boards import load_board_file
 from tools.data.errors import InputError
 from tools.data.sources import load_vehicle, name_or_path, read_text
-from tools.flight.compose import load_board_file
 
 if TYPE_CHECKING:
     Flown = str

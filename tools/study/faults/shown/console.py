@@ -12,7 +12,7 @@ def console(disabled: bool, folder: Path) -> Came:
     enabled, nothing moves, the console goes on."""
     from tools.bench.client import Bench, BenchError
     from tools.bench.commands import Commands
-    from tools.flight.compose import load_board_file
+    from tools.data.boards import load_board_file
 
     file, rng = load_board_file("twin"), random.Random(32)
     said: list[str] = []

@@ -17,8 +17,9 @@ def arming(kind: str) -> Callable[[bool, Path], Came]:
 
         from hal.board import BoardRequest, board_builder
         from sim_backend.board import world_of
+        from tools.data.boards import load_board_file
         from tools.flight.arming import Arming
-        from tools.flight.compose import build_flight, load_board_file
+        from tools.flight.compose import build_flight
 
         flight = build_flight(mission="sawtooth")
         flight.board.open()
@@ -50,7 +51,7 @@ def bad_files(disabled: bool, folder: Path) -> Came:
     from firmware.model.library import shipped
     from firmware.model.vehicle import decode_vehicle
     from hal.boardfile import decode_device_file
-    from tools.flight.compose import load_board_file
+    from tools.data.boards import load_board_file
 
     vehicle, mission = shipped("model/vehicles")["roughie"], shipped("guidance/missions")["sawtooth"]
     board = load_board_file("roughie").text
