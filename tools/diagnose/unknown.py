@@ -210,7 +210,7 @@ def probability_unknown(
     if noise:
         disordered = probability(left.share, NOISY, NOISY_WIDTH)
         if noise.probe.name == CLOCK:  # it moves no vehicle: windows say as much as with a clock that is right
-            return wide * disordered
+            return wide * max(disordered, probability(left_share(shrinkage, taken), LEFT_GAP, LEFT_GAP_WIDTH))
         return max(disordered, beside_a_sea(shrinkage, left, noise)) if noise.probe.name == WAVES else disordered
     if not evident:
         return wide

@@ -172,6 +172,7 @@ def test_beside_a_wandering_clock_what_leaves_no_gap_is_not_unknown():
     clock = ProbeResult(NoiseProbe(CLOCK, "sensor", "timing", "mocap"), 5e4, 6.0)
     assert unknown(after=0.2, left=3e4, explained=5e4, noise=clock) < 0.05
     assert unknown(after=0.9, left=3e4, explained=5e4, noise=clock) > 0.5
+    assert unknown(after=0.9, left=3e3, explained=5e6, noise=clock) > 0.9  # the clock has the nat, and not the gap
 
 
 def test_as_likely_as_not_at_the_width_that_small_effects_leave():
