@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from tools.data.errors import MissingExtra, need
 from tools.data.runs import columns as names
 from tools.data.runs.origin import FIXES_FILE, Origin, read_fixes, read_origins
 from tools.data.runs.run import Run
@@ -84,6 +85,10 @@ def heading_test(folder: Path, runs: Sequence[Run], speeds: Sequence[tuple[np.nd
         return said | {"why": f"{len(legs)} dives from fix to fix, of {FEWEST} at least"}
     if np.linalg.matrix_rank(_design(legs)) < 4:
         return said | {"why": "all dives on one heading"}
+    try:
+        need("analysis")
+    except MissingExtra as missing:  # velocities do without
+        return said | {"why": str(missing)}
     share, turned = coefficients(legs)
     speed = float(np.mean([np.linalg.norm(leg.through_water) / leg.seconds for leg in legs]))
     said |= {"speed_m_s": speed}
