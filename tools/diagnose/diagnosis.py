@@ -16,6 +16,7 @@ from tools.diagnose.correction import Correction, correct
 from tools.diagnose.matter import MATTERS
 from tools.diagnose.next_run import propose
 from tools.diagnose.noise_probes import UNPREDICTABLE
+from tools.diagnose.probabilities import TIE
 from tools.diagnose.record import NONE, UNKNOWN, Curves, Data, Details, Noise, Panel, Picture, write_record
 from tools.diagnose.residuals import UNCLEAN, strongest_left
 from tools.diagnose.search import Search, run
@@ -34,7 +35,7 @@ from tools.diagnose.staged import Staged, staged
 from tools.diagnose.staged_answer import conclusion, findings_in, identified_text
 from tools.diagnose.staircase import Stage, stages_of
 from tools.diagnose.unknown import LEFT_OVER, UNFIT
-from tools.diagnose.verdict import EVIDENCE_NEEDED, TIE, Answer, conclude
+from tools.diagnose.verdict import EVIDENCE_NEEDED, Answer, conclude
 from tools.gap.mended import findings_of, put_right
 from tools.inference.corrected import corrected_text
 from tools.inference.model import effect_vector, effects_in, nominal_model

@@ -1,14 +1,23 @@
 """From fits to an answer: which effects are selected, how probable each label is, and which cannot be told apart."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtr
 
 from sim_backend.core.effects.catalogue import catalogue
 from tools.diagnose.matter import MATTERS, disorder_matters, gap_matters, movements
 from tools.diagnose.noise_probes import CLOCK, TURBULENCE, ProbeResult, inflated
+from tools.diagnose.probabilities import (
+    answer_first,
+    doubt_small,
+    grouped,
+    mix_in_error_rate,
+    pass_on,
+    share_out,
+    softmax,
+    to_none,
+)
 from tools.diagnose.record import NONE, UNKNOWN, Finding
 from tools.diagnose.residuals import UNCLEAN, tests, worst
 from tools.diagnose.search import (
@@ -41,15 +50,11 @@ from tools.diagnose.unknown import (
 from tools.inference.fit import Hypothesis
 
 HELD_OUT_SHARE = 0.3  # of the gap that is left on runs left out: an effect beside another must close as much more
-TIE = 6.0  # nat within which two labels are not told apart: what a change of prior spreads can move
-MOST_GROUP = 3
-ERROR_RATE = 0.03  # answers that named something else altogether, of those to the cases it was developed with: 3 of 104
 CERTAIN = 0.9  # of the recalibrated gap: effects beside an unknown one that leave more are not certain
 RIVALS = 5  # further labels fitted in the place of the main one, where it stands beside others
 # Floors by which an effect widens the gap, as likely a main cause as one of many small ones there: where noise is not
-# what the file says, so that it may say little of the rest, and where it is; e-folds.
-LARGE, TOLD, LARGE_WIDTH = 2.1, 1.2, 0.25
-SECOND = 0.9  # of the main cause's probability, that none may have where there is an effect at all
+# what the file says, so that it may say little of the rest, and where it is.
+LARGE, TOLD = 2.1, 1.2
 ROUGH = 0.7  # of what rough water leaves of windows (docs/DIAGNOSIS.md, Thresholds)
 LIKELY = 1e-3  # probability from which an alternative's effect on the windows is looked at
 
@@ -183,13 +188,6 @@ def evidence_of_alternatives(search: Search, hypothesis: Hypothesis, main: str) 
     return {label: one.log_evidence(search.fitter) for label, one in alternatives(search, hypothesis, main).items()}
 
 
-def softmax(logs: dict[str, float]) -> dict[str, float]:
-    top = max(logs.values())
-    weights = {name: float(np.exp(value - top)) for name, value in logs.items()}
-    total = sum(weights.values())
-    return {name: weight / total for name, weight in weights.items()}
-
-
 def search_again_with_noise(
     search: Search, hypothesis: Hypothesis, gained: dict[str, float], found: ProbeResult, say: Callable[[str], None]
 ) -> Answer:
@@ -303,43 +301,6 @@ def with_least_gap(search: Search, hypothesis: Hypothesis, main: str, chances: d
     return chances | {label: together * share for label, share in least.items()}
 
 
-def share_out(chances: dict[str, float], main: str, first: dict[str, float]) -> dict[str, float]:
-    """Probabilities of the main cause, where others of the selected effects may take more of the gap than it.
-
-    first: how probably each takes the most.
-    """
-    own = first.get(main, 1.0)
-    shared = {label: chance * own for label, chance in chances.items()}
-    for label in first:
-        if label != main:
-            shared[label] = shared.get(label, 0.0) + first[label]
-    return shared
-
-
-def pass_on(chances: dict[str, float], others: list[str]) -> dict[str, float]:
-    """Probabilities of the main cause, where other effects are there beside it, the largest first.
-
-    Without the main one there is not nothing: the next takes its place.
-    """
-    if not others:
-        return chances
-    return chances | {others[0]: chances.get(others[0], 0.0) + chances[NONE], NONE: 0.0}
-
-
-def doubt_small(chances: dict[str, float], main: str, size: float) -> dict[str, float]:
-    """Probabilities where the largest of the effects may be one of many small ones, and nothing the main cause.
-
-    size: of the main one, in sizes at which that is as likely as not. What this takes off the labels goes to none, but
-    no more than SECOND of what the main one keeps: there is something.
-    """
-    large = float(ndtr(np.log(max(size, 1e-6)) / LARGE_WIDTH))
-    labels = sum(chance for name, chance in chances.items() if name != NONE)
-    least = 1.0 / (1.0 + SECOND * chances[main] / max(labels, 1e-9))  # of the labels' probability that stays
-    kept = max(large, least)
-    found = {name: kept * chance for name, chance in chances.items() if name != NONE}
-    return found | {NONE: 1.0 - sum(found.values())}
-
-
 def movements_of_alternatives(
     search: Search, hypothesis: Hypothesis, main: str, chances: dict[str, float]
 ) -> dict[str, float]:
@@ -349,37 +310,6 @@ def movements_of_alternatives(
         for label, one in alternatives(search, hypothesis, main).items()
         if label != main and chances.get(label, 0.0) >= LIKELY
     }
-
-
-def to_none(chances: dict[str, float], negligible: Iterable[str], moved: dict[str, float]) -> dict[str, float]:
-    """Probabilities with those of effects that do not matter given to none: there is no gap with them."""
-    small = {*negligible, *(label for label, far in moved.items() if far < MATTERS)}
-    kept = {label: 0.0 if label in small else chance for label, chance in chances.items()}
-    return kept | {NONE: kept.get(NONE, 0.0) + sum(chance for label, chance in chances.items() if label in small)}
-
-
-def answer_first(chances: dict[str, float], gained: Iterable[str]) -> tuple[str, dict[str, float]]:
-    """The most probable of none, unknown and what was selected; probabilities in which no other label passes it.
-
-    A label that was not selected can only pass by what is mixed in for errors, or where elimination went another way.
-    """
-    top = max((NONE, UNKNOWN, *gained), key=lambda name: chances.get(name, 0.0))
-    capped = {name: min(chance, chances[top]) for name, chance in chances.items()}
-    total = sum(capped.values())
-    return top, {name: capped[name] / total for name in (top, *(name for name in capped if name != top))}
-
-
-def mix_in_error_rate(chances: dict[str, float], main: str) -> dict[str, float]:
-    """Probabilities of which ERROR_RATE goes to all labels: the search may have lost the true one on its way.
-
-    Half of it to those at the place of the main one, which an effect in another form is taken for soonest.
-    """
-    labels = catalogue()
-    beside = [name for name, effect in labels.items() if main and effect.place == labels[main].place and name != main]
-    shares = dict.fromkeys(labels, (0.5 if beside else 1.0) * ERROR_RATE / len(labels))
-    for name in beside:
-        shares[name] += 0.5 * ERROR_RATE / len(beside)
-    return {name: (1.0 - ERROR_RATE) * value + shares.get(name, 0.0) for name, value in chances.items()}
 
 
 def log_posteriors(search: Search, hypothesis: Hypothesis, main: str) -> dict[str, float]:
@@ -395,12 +325,3 @@ def posterior(search: Search, hypothesis: Hypothesis, main: str) -> dict[str, fl
     bare = drop(search, hypothesis, main) if main else search.null
     logs[NONE] = bare.log_evidence(search.fitter)
     return softmax(logs)
-
-
-def grouped(logs: dict[str, float]) -> dict[str, list[str]]:
-    """For every label, those whose evidence these data cannot part from its own."""
-    labels = sorted(logs, key=lambda name: -logs[name])
-    return {
-        label: [label, *(o for o in labels if o != label and abs(logs[o] - logs[label]) < TIE)][:MOST_GROUP]
-        for label in labels
-    }

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tools.diagnose.matter import largest
-from tools.diagnose.verdict import ERROR_RATE, TIE, softmax
+from tools.diagnose.probabilities import ERROR_RATE, TIE, softmax
 from tools.inference.predict import fly_windows_from
 from tools.watch.answer import CAUSE, NONE, UNKNOWN, EventAnswer, RunCause, RunVerdict, Sized
 from tools.watch.disorder import WATER

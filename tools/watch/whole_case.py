@@ -18,11 +18,11 @@ from tools.data.plain import as_plain
 from tools.data.runs.case import Case
 from tools.data.runs.csvfile import write_bytes
 from tools.diagnose.noise_probes import VERTICAL_WATER
+from tools.diagnose.probabilities import ERROR_RATE, TIE, softmax
 from tools.diagnose.record import ANSWER, NONE, UNKNOWN
 from tools.diagnose.search import EVIDENCE_NEEDED
 from tools.diagnose.shrink import AFTER, BEFORE, FLOOR, RECALIBRATED, by_channel, shrinkage_of
 from tools.diagnose.unknown import MOSTLY
-from tools.diagnose.verdict import ERROR_RATE, TIE, softmax
 from tools.gap.measure import RunGap, case_channels, root_mean_square, run_gap
 from tools.identify.ocean.files import corrected_text
 from tools.identify.ocean.identify import WORTH, parted_by

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tools.diagnose.matter import largest
+from tools.diagnose.probabilities import TIE
 from tools.diagnose.search import EVIDENCE_NEEDED
-from tools.diagnose.verdict import TIE
 from tools.inference.expansion import Expansion
 from tools.inference.fit import bounded_step
 from tools.inference.predict import fly_windows_from

@@ -9,6 +9,7 @@ from support.cases import make_case
 from sim_backend.core.effects import effect_layout as ef
 from tools.diagnose import search as search_module
 from tools.diagnose.noise_probes import CLOCK, NoiseProbe, ProbeResult
+from tools.diagnose.probabilities import SECOND, doubt_small, pass_on, share_out
 from tools.diagnose.record import NONE
 from tools.diagnose.search import run
 from tools.diagnose.shrink import in_tolerances, lacking_squares, left_out_squares, most_often
@@ -21,17 +22,7 @@ from tools.diagnose.unknown import (
     left_share,
     probability_unknown,
 )
-from tools.diagnose.verdict import (
-    SECOND,
-    Worth,
-    conclude,
-    doubt_small,
-    drop,
-    held_out_worth,
-    pass_on,
-    share_out,
-    with_least_gap,
-)
+from tools.diagnose.verdict import Worth, conclude, drop, held_out_worth, with_least_gap
 from tools.inference.problem import problem_of
 
 

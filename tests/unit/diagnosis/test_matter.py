@@ -6,9 +6,10 @@ from support.cases import make_case
 
 from sim_backend.core.effects import effect_layout as ef
 from tools.diagnose.matter import MATTERS, excess, movements
+from tools.diagnose.probabilities import answer_first, mix_in_error_rate, to_none
 from tools.diagnose.record import NONE, UNKNOWN
 from tools.diagnose.search import run
-from tools.diagnose.verdict import EVIDENCE_NEEDED, Answer, answer_first, conclude, mix_in_error_rate, to_none
+from tools.diagnose.verdict import EVIDENCE_NEEDED, Answer, conclude
 from tools.inference.problem import problem_of
 
 SMALL, LARGE = 0.004, 0.2  # s; at 0.3 m/s and 0.15 m of tolerance some 0.008 and 0.4 tolerances

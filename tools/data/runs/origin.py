@@ -69,7 +69,8 @@ def read_fixes(folder: Path) -> np.ndarray | None:
 
 
 def fix_columns(fixes: np.ndarray) -> dict[str, list[str]]:
-    """Fixes (n, 3) as read_fixes gives them, as columns of FIXES_FILE; of several at one time the first."""
+    """Fixes (n, 3) as read_fixes gives them, in any order, as columns of FIXES_FILE; of several at one time one."""
+    fixes = fixes[np.lexsort(fixes.T[::-1])]
     fixes = fixes[np.unique(np.round(fixes[:, 0], 3), return_index=True)[1]]
     return {
         "time_utc": [moment_text(t) for t in fixes[:, 0]],

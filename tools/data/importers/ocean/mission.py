@@ -65,7 +65,7 @@ def write_mission(segments: list[Segment], out: Path, vehicle: str) -> Mission:
         MISSION_FILE: {"run": [run.name for run in runs], "hours_since_start": csvfile.as_texts("hours", hours, 4)},
         ORIGIN_FILE: _origin(runs, flights),
     }
-    fixes = np.concatenate([one.fixes for one in flights])
+    fixes = np.concatenate([one.fixes for one in segments])  # of what is no run, too
     if len(fixes):
         beside[FIXES_FILE] = fix_columns(fixes)
     files = write_case(

@@ -103,7 +103,6 @@ class _Log:
                     return float(np.median(values))
         return float("nan")
 
-
     def fixes(self) -> np.ndarray:
         """Fixes by GPS, (n, 3) as a Segment has them: none where it has no receiver."""
         if not (self.has("m_gps_lat") and self.has("m_gps_lon")):

@@ -1,0 +1,100 @@
+"""Arithmetic on probabilities of labels, of none and of unknown, each a dictionary by name that sums to 1."""
+
+from collections.abc import Iterable
+
+import numpy as np
+from scipy.special import ndtr
+
+from sim_backend.core.effects.catalogue import catalogue
+from tools.diagnose.matter import MATTERS
+from tools.diagnose.record import NONE, UNKNOWN
+
+TIE = 6.0  # nat within which two labels are not told apart: what a change of prior spreads can move
+MOST_GROUP = 3
+ERROR_RATE = 0.03  # answers that named something else altogether, of those to the cases it was developed with: 3 of 104
+SECOND = 0.9  # of the main cause's probability, that none may have where there is an effect at all
+LARGE_WIDTH = 0.25  # e-folds of size over which a main cause comes to be as likely as not
+
+
+def softmax(logs: dict[str, float]) -> dict[str, float]:
+    top = max(logs.values())
+    weights = {name: float(np.exp(value - top)) for name, value in logs.items()}
+    total = sum(weights.values())
+    return {name: weight / total for name, weight in weights.items()}
+
+
+def share_out(chances: dict[str, float], main: str, first: dict[str, float]) -> dict[str, float]:
+    """Probabilities of the main cause, where others of the selected effects may take more of the gap than it.
+
+    first: how probably each takes the most.
+    """
+    own = first.get(main, 1.0)
+    shared = {label: chance * own for label, chance in chances.items()}
+    for label in first:
+        if label != main:
+            shared[label] = shared.get(label, 0.0) + first[label]
+    return shared
+
+
+def pass_on(chances: dict[str, float], others: list[str]) -> dict[str, float]:
+    """Probabilities of the main cause, where other effects are there beside it, the largest first.
+
+    Without the main one there is not nothing: the next takes its place.
+    """
+    if not others:
+        return chances
+    return chances | {others[0]: chances.get(others[0], 0.0) + chances[NONE], NONE: 0.0}
+
+
+def doubt_small(chances: dict[str, float], main: str, size: float) -> dict[str, float]:
+    """Probabilities where the largest of the effects may be one of many small ones, and nothing the main cause.
+
+    size: of the main one, in sizes at which that is as likely as not. What this takes off the labels goes to none, but
+    no more than SECOND of what the main one keeps: there is something.
+    """
+    large = float(ndtr(np.log(max(size, 1e-6)) / LARGE_WIDTH))
+    labels = sum(chance for name, chance in chances.items() if name != NONE)
+    least = 1.0 / (1.0 + SECOND * chances[main] / max(labels, 1e-9))  # of the labels' probability that stays
+    kept = max(large, least)
+    found = {name: kept * chance for name, chance in chances.items() if name != NONE}
+    return found | {NONE: 1.0 - sum(found.values())}
+
+
+def to_none(chances: dict[str, float], negligible: Iterable[str], moved: dict[str, float]) -> dict[str, float]:
+    """Probabilities with those of effects that do not matter given to none: there is no gap with them."""
+    small = {*negligible, *(label for label, far in moved.items() if far < MATTERS)}
+    kept = {label: 0.0 if label in small else chance for label, chance in chances.items()}
+    return kept | {NONE: kept.get(NONE, 0.0) + sum(chance for label, chance in chances.items() if label in small)}
+
+
+def answer_first(chances: dict[str, float], gained: Iterable[str]) -> tuple[str, dict[str, float]]:
+    """The most probable of none, unknown and what was selected; probabilities in which no other label passes it.
+
+    A label that was not selected can only pass by what is mixed in for errors, or where elimination went another way.
+    """
+    top = max((NONE, UNKNOWN, *gained), key=lambda name: chances.get(name, 0.0))
+    capped = {name: min(chance, chances[top]) for name, chance in chances.items()}
+    total = sum(capped.values())
+    return top, {name: capped[name] / total for name in (top, *(name for name in capped if name != top))}
+
+
+def mix_in_error_rate(chances: dict[str, float], main: str) -> dict[str, float]:
+    """Probabilities of which ERROR_RATE goes to all labels: the search may have lost the true one on its way.
+
+    Half of it to those at the place of the main one, which an effect in another form is taken for soonest.
+    """
+    labels = catalogue()
+    beside = [name for name, effect in labels.items() if main and effect.place == labels[main].place and name != main]
+    shares = dict.fromkeys(labels, (0.5 if beside else 1.0) * ERROR_RATE / len(labels))
+    for name in beside:
+        shares[name] += 0.5 * ERROR_RATE / len(beside)
+    return {name: (1.0 - ERROR_RATE) * value + shares.get(name, 0.0) for name, value in chances.items()}
+
+
+def grouped(logs: dict[str, float]) -> dict[str, list[str]]:
+    """For every label, those whose evidence these data cannot part from its own."""
+    labels = sorted(logs, key=lambda name: -logs[name])
+    return {
+        label: [label, *(o for o in labels if o != label and abs(logs[o] - logs[label]) < TIE)][:MOST_GROUP]
+        for label in labels
+    }
