@@ -1,6 +1,6 @@
 """Arithmetic on probabilities of labels, of none and of unknown, each a dictionary by name that sums to 1."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from scipy.special import ndtr
@@ -78,16 +78,20 @@ def answer_first(chances: dict[str, float], gained: Iterable[str]) -> tuple[str,
     return top, {name: capped[name] / total for name in (top, *(name for name in capped if name != top))}
 
 
-def mix_in_error_rate(chances: dict[str, float], main: str) -> dict[str, float]:
+def mix_in_error_rate(chances: dict[str, float], main: str, others: Sequence[str] = ()) -> dict[str, float]:
     """Probabilities of which ERROR_RATE goes to all labels: the search may have lost the true one on its way.
 
-    Half of it to those at the place of the main one, which an effect in another form is taken for soonest.
+    A third of it to those at the place of the main one, which an effect in another form is taken for, and a third to
+    `others` that the search found beside it: of nine effects that were not put first, six were among those.
     """
     labels = catalogue()
     beside = [name for name, effect in labels.items() if main and effect.place == labels[main].place and name != main]
-    shares = dict.fromkeys(labels, (0.5 if beside else 1.0) * ERROR_RATE / len(labels))
-    for name in beside:
-        shares[name] += 0.5 * ERROR_RATE / len(beside)
+    others = [name for name in others if name in labels and name != main]
+    favoured = [group for group in (beside, others) if group]
+    shares = dict.fromkeys(labels, (1.0 - len(favoured) / 3.0) * ERROR_RATE / len(labels))
+    for group in favoured:
+        for name in group:
+            shares[name] += ERROR_RATE / 3.0 / len(group)
     return {name: (1.0 - ERROR_RATE) * value + shares.get(name, 0.0) for name, value in chances.items()}
 
 

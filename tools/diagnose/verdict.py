@@ -271,7 +271,7 @@ def conclude(
         unknown = LEAST_UNKNOWN
     chances = {name: value * (1.0 - unknown) for name, value in chances.items()} | {UNKNOWN: unknown}
     likely = main if main in gained else ""
-    chances = mix_in_error_rate({label: 0.0 for label in catalogue()} | chances, likely)
+    chances = mix_in_error_rate({label: 0.0 for label in catalogue()} | chances, likely, evident.labels)
     top, chances = answer_first(chances, gained)
     if top == NONE or (top == UNKNOWN and shrinkage.after > CERTAIN * shrinkage.recalibrated):
         gained = {label: gain for label, gain in gained.items() if label == disordered and top == UNKNOWN}

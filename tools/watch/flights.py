@@ -57,6 +57,11 @@ class Flights:
         """A run flies by another model from now on: the one that its parabola is about."""
         self.raw[n], self.runs[n] = one, self.made(one)
 
+    def let_go(self, n: int) -> None:
+        """A run that flies by a model that nobody knows says nothing of what the others share."""
+        wide = np.maximum(self.sizes, self.shared.prior)
+        self.runs[n] = without_deviation(self.raw[n].cooled(self.heat), wide)
+
     def deviation(self, n: int) -> np.ndarray:
         """A run's own most probable deviation from the model that it flies by, (count,) spreads, within limits.
 

@@ -121,10 +121,16 @@ def take(history: History, event: Event) -> None:
             name, scale = event.probe or (event.label, float(event.size[0]))
             flights.parts[n] = shaken(flights.parts[n], name, scale)
             flights.put(n, flights.expanded(n, flights.runs[n].at))
+            if event.label == "":
+                flights.let_go(n)
     else:
-        joint = history.joint()
-        for n in inside:  # about the shared values of the reference: those of all runs make up for the next event too
-            flights.put(n, flights.expanded(n, within(flights, joint.run_values(n, flights.values))))
+        # about the shared values of the reference (those of all runs make up for the next event too), and the size
+        # that was fitted: parabolas about none of it say nothing of an effect that begins behind a threshold
+        columns, weights = flights.shared.labels[event.label], event.span.weights(flights.count)
+        for n in inside:
+            x = flights.runs[n].at.copy()
+            x[columns] += weights[n] * event.size
+            flights.put(n, flights.expanded(n, within(flights, x)))
     if history.water is not None:
         # what the form of a label leaves is no disorder: it is asked about as what is left of the label
         history.water[:, inside] = -NOT_ROUGH

@@ -19,6 +19,7 @@ ORDER = 0.1  # of what a label is behind, that stays even where the form may be 
 FINAL = 3  # rivals that are compared over all spans
 BEHIND, BEHIND_SHARE = 40.0, 0.1  # squared sigma, and share of what the best gains, that a rival may be behind
 POORLY = 0.1  # of the excess: what the best of the first rivals may leave before more are tried
+AS_EVIDENT = 0.5  # nat
 REACH = 2  # runs about a span's ends between which it is found again
 
 
@@ -90,7 +91,7 @@ def by_other_course(history: History, joint: Joint, event: Event) -> Event | Non
     base = [within(flights, flights.raw[n].at) for n in chosen]
     affected = Affected([flights.parts[n] for n in chosen], [weights[n] for n in chosen], base, flights.heat)
     fit = best_fit(affected, flights.shared, event.label, event.size, False)
-    return over_spans(history, joint, other, fit)
+    return over_spans(history, joint, other, fit, (other.course,))
 
 
 def rough_ranking(affected: Affected, flights: Flights) -> list[tuple[str, np.ndarray]]:
@@ -110,8 +111,13 @@ def rough_ranking(affected: Affected, flights: Flights) -> list[tuple[str, np.nd
     return [(label, size) for _, label, size in sorted(found, key=lambda one: one[0])]
 
 
-def over_spans(history: History, joint: Joint, span: Span, fit: LabelFit) -> Event | None:
-    """A label's evidence over every span near the one it was fitted in, by parabolas about what it fitted."""
+def over_spans(
+    history: History, joint: Joint, span: Span, fit: LabelFit, courses: Sequence[str] = (STEP, GROWING)
+) -> Event | None:
+    """A label's evidence over every span near the one it was fitted in, by parabolas about what it fitted.
+
+    Of spans that are as evident the shortest: in the runs that only others have, the change does not show.
+    """
     flights, shared = history.flights, history.flights.shared
     weights = span.weights(flights.count)
     first = max(history.begins, span.first - REACH)
@@ -125,7 +131,7 @@ def over_spans(history: History, joint: Joint, span: Span, fit: LabelFit) -> Eve
     found: dict[Span, tuple[float, np.ndarray, np.ndarray]] = {}
     for one in history.listed():
         near = abs(one.first - span.first) <= REACH and abs(one.end - span.end) <= REACH
-        if not near:
+        if not near or one.course not in courses:
             continue
         own = one.weights(flights.count)
         runs = [about[n] if own[n] and n in about else flights.runs[n] for n in range(flights.count)]
@@ -139,6 +145,7 @@ def over_spans(history: History, joint: Joint, span: Span, fit: LabelFit) -> Eve
         found[one] = tried.log_evidence - joint.log_evidence + prior, np.clip(size, low, high), covariance
     if not found:
         return None
-    best = max(found, key=lambda one: found[one][0])
+    most = max(value for value, _, _ in found.values())
+    best = min((one for one in found if found[one][0] > most - AS_EVIDENT), key=lambda one: one.end - one.first)
     evidence, size, covariance = found[best]
     return Event(fit.label, best, evidence, {}, size, covariance, 0.0, {one: value[0] for one, value in found.items()})

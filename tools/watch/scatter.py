@@ -17,7 +17,9 @@ from tools.inference.shared_parameters import SharedParameters
 USUAL = np.array([0.05, 0.3, 0.01])  # spreads, by group
 USUAL_WIDTH = 1.0  # e-folds
 PRIOR_RUNS = 1.0
-ITERATIONS = 40
+STARTS = (0.0, 0.03, 0.3)  # spreads, at least: of single sizes, from which the most probable are looked for
+ITERATIONS, SETTLED = 120, 1e-3  # at most; e-folds of a variance by which a step moves none any more
+LEAST_VARIANCE = 1e-12  # squared spreads
 LEAST_RUNS = 2  # with fewer nothing can be learned
 
 
@@ -59,11 +61,25 @@ def learn_scatter(found: Sequence[Expansion], shared: SharedParameters) -> np.nd
 def each_by_itself(found: Sequence[Expansion], shared: SharedParameters, sizes: np.ndarray) -> np.ndarray:
     """Sizes of single parameters where the reference asks for more than their group has, or less.
 
-    A form that is not the model's shows in few parameters. Minorisation and maximisation for variance components; each
-    variance has an inverse gamma prior about its group's, worth PRIOR_RUNS runs.
+    A form that is not the model's shows in few parameters. Each variance has an inverse gamma prior about its group's,
+    worth PRIOR_RUNS runs: one that is far too small for a run may be as probable, near by, as one that holds it, so
+    several starts are made.
     """
-    middle = np.maximum(sizes**2, 1e-12)
-    v = middle.copy()
+    tried = [settled(found, shared, sizes, np.maximum(sizes, least)) for least in STARTS]
+    return max(tried, key=lambda one: log_marginal(found, shared, one) + log_prior(one, sizes))
+
+
+def log_prior(sizes: np.ndarray, usual: np.ndarray) -> float:
+    """Of single sizes about their groups', both (count,): inverse gamma in the variance."""
+    variance = sizes**2
+    return -0.5 * PRIOR_RUNS * float((np.log(variance) + np.maximum(usual**2, LEAST_VARIANCE) / variance).sum())
+
+
+def settled(
+    found: Sequence[Expansion], shared: SharedParameters, usual: np.ndarray, start: np.ndarray
+) -> np.ndarray:
+    """Sizes (count,) led from `start` to the most probable near by: minorisation and maximisation for variances."""
+    middle, v, weight = np.maximum(usual**2, LEAST_VARIANCE), np.maximum(start**2, LEAST_VARIANCE), 0.5 * PRIOR_RUNS
     for _ in range(ITERATIONS):
         runs = [without_deviation(one, np.sqrt(v)) for one in found]
         H = np.diag(shared.prior**-2.0) + sum(one.curvature for one in runs)
@@ -74,6 +90,7 @@ def each_by_itself(found: Sequence[Expansion], shared: SharedParameters, sizes: 
             A = one.curvature
             squares += (one.slope + A @ (x - one.at)) ** 2
             traces += np.maximum(np.diag(A) - np.einsum("ij,jk,ki->i", A, inverse, A), 0.0)
-        weight = 0.5 * PRIOR_RUNS
-        v = np.sqrt((0.5 * v**2 * squares + weight * middle) / (0.5 * traces + weight / v))
+        before, v = v, np.sqrt((0.5 * v**2 * squares + weight * middle) / (0.5 * traces + weight / v))
+        if np.abs(np.log(v / before)).max() < SETTLED:
+            break
     return np.sqrt(v)

@@ -21,7 +21,6 @@ MOST_SURE = 0.995
 FEW = 3  # runs of a reference from which it can be learned what runs differ by
 CI90 = 1.645
 OTHERWISE = 2.0  # times
-LOOKED_AT = 2  # runs of an event in which it has to matter
 VECTORS = ("gyro_bias", "current", "current_shear", "compass")  # labels whose parameters are parts of one length
 
 
@@ -112,7 +111,7 @@ def nameless(history: History, found: list[Settled]) -> list[Settled]:
 def matters(history: History, event: Event, number: int) -> bool:
     """Whether the change moves a channel of some window by as much as its kind of vehicle asks for (docs/GAP.md)."""
     weights = event.span.weights(history.flights.count)
-    inside = sorted(np.flatnonzero(weights * history.judged), key=lambda n: -weights[n])[:LOOKED_AT]
+    inside = sorted(np.flatnonzero(weights * history.judged), key=lambda n: -weights[n])
     needed = needed_of(history, event)
     return any(moved_by(history, event, number, int(n)) >= needed for n in inside)
 

@@ -5,13 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from tools.diagnose.noise_probes import TURBULENCE, WAVES, NoiseProbe, probes
+from tools.diagnose.noise_probes import TURBULENCE, WAVES, NoiseProbe, inflated, probes
 from tools.diagnose.unknown import ONE_AXIS
+from tools.diagnose.waves import LINE, line_share
 from tools.watch.disorder import SCALES, WATER, beyond_reference, shaken, water_gains, water_labels
 from tools.watch.events import GROWING
 from tools.watch.flights import Flights, numbers, roughness_sigma
 from tools.watch.history import NOT_ROUGH, Event, History, within
 from tools.watch.label_fit import values_of
+from tools.watch.unknown import LEFT_OVER
 
 ASKED_ABOVE = 4.0  # sigma of a run's mean squared innovation over the reference's, for disorder to be looked for
 STRETCH = 5.0  # s
@@ -50,7 +52,8 @@ def rough_water(flights: Flights, runs: Sequence[int]) -> np.ndarray:
 def named(history: History, event: Event) -> Event:
     """Disorder by what shakes most: the water, or something else, which no label means.
 
-    Turbulence shakes every axis, and it does so all the time.
+    Turbulence shakes every axis, and it does so all the time. A sea that moves the vehicle by more than moving water
+    alone does may make turbulence gain more than waves: its line of the spectrum tells.
     """
     flights = history.flights
     inside = numbers((event.span.weights(flights.count) > 0.0) & history.judged)
@@ -59,13 +62,36 @@ def named(history: History, event: Event) -> Event:
     gains = beyond_reference(flights, wanted, loudest, PROBED).sum(axis=1).max(axis=1)
     first = int(gains.argmax())
     if TURBULENCE not in [one.name for one in wanted]:  # of a kind whose water moves it one way
-        return replace(event, label=wanted[first].name) if wanted[first].name in WATER else linked(event, wanted, gains)
+        return of_water(event, wanted[first].name) if wanted[first].name in WATER else linked(event, wanted, gains)
     own = gains[[one.name for one in wanted].index(TURBULENCE)]
     axes = [gain for gain, one in zip(gains, wanted, strict=True) if one.stage == "force" and one.name != TURBULENCE]
     even = max(axes) < ONE_AXIS * own and max(burstiness(flights, n) for n in loudest) < BURSTS
     if wanted[first].name == WAVES or (wanted[first].name == TURBULENCE and even):
-        return replace(event, label=wanted[first].name)
+        return of_water(event, wanted[first].name)
+    if wanted[first].name == TURBULENCE and a_sea(flights, loudest, wanted, gains):
+        return of_water(event, WAVES)
     return linked(event, wanted, gains)
+
+
+def of_water(event: Event, label: str) -> Event:
+    """Disorder of the water by its name."""
+    return replace(event, label=label, rivals={label: event.evidence})
+
+
+def a_sea(flights: Flights, runs: Sequence[int], wanted: Sequence[NoiseProbe], gains: np.ndarray) -> bool:
+    """Whether no link but turbulence gains more than waves, and what they move has a sea's line; gains (probes,)."""
+    others = [n for n, one in enumerate(wanted) if one.name != TURBULENCE]
+    waves = wanted[max(others, key=lambda n: gains[n])]
+    if waves.name != WAVES:
+        return False
+    shares = []
+    for n in runs:
+        part = flights.parts[n]
+        model = flights.shared.model(part, flights.own_values(n))
+        each = [inflated(part, waves, scale) for scale in SCALES]
+        tried = [part.filter(*model, more=more, doubt=doubt) for more, doubt in each]
+        shares.append(line_share(part, min(tried, key=lambda one: float(one.misfit[0]))))
+    return min(shares) >= LINE
 
 
 def linked(event: Event, wanted: Sequence[NoiseProbe], gains: np.ndarray) -> Event:
@@ -85,17 +111,21 @@ def burstiness(flights: Flights, n: int) -> float:
 
 
 def rougher(history: History, rough: Event, event: Event) -> bool:
-    """Whether disorder says more of the runs than a label does; of other runs, whether it is the more evident."""
+    """Whether disorder says more of the runs than a label does; of other runs, whether it is the more evident.
+
+    By more than what a label may leave: the form of nature's is never the catalogue's, and of a strong effect that
+    little is more than any chance. What it leaves is asked about then (unknown.py).
+    """
     flights = history.flights
     both = (rough.span.weights(flights.count) > 0.0) & (event.span.weights(flights.count) > 0.0) & history.judged
     if not both.any():
         return rough.evidence > event.evidence
     chosen = sorted(numbers(both), key=lambda n: -roughness_sigma(flights, n))[:PROBED]
-    weights, cost = event.span.weights(flights.count), 0.0
+    weights, by_label, by_disorder = event.span.weights(flights.count), 0.0, 0.0
     for n in chosen:
         x = flights.raw[n].at
-        part = shaken(flights.parts[n], rough.label, float(rough.size[0]))
-        cost += flights.own_cost(part, x)
+        nothing = flights.own_cost(flights.parts[n], x)
+        by_disorder += nothing - flights.own_cost(shaken(flights.parts[n], rough.label, float(rough.size[0])), x)
         changed = values_of(flights.shared, event.label, x, weights[n], event.size)
-        cost -= flights.own_cost(flights.parts[n], within(flights, changed))
-    return cost < 0.0
+        by_label += nothing - flights.own_cost(flights.parts[n], within(flights, changed))
+    return by_label < (1.0 - LEFT_OVER) * by_disorder
