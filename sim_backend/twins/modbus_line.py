@@ -1,25 +1,47 @@
 """A Modbus line's twin: pymodbus's own serial server answers, and between it and the outer port stands the wire.
 
 The wire has the line's speed, the devices' turnaround, and their faults. Only whole requests for devices that are there
-reach the server: pymodbus 3.16 answers for those that are not.
+reach the server: pymodbus 3.16 answers for those that are not. They reach it in memory, one after the other, as through
+the null modem that pymodbus has for its own tests: a pseudo-terminal between would cost more than the server.
 """
 
 import asyncio
-import contextlib
-import os
 import random
 from collections import deque
+from collections.abc import Callable
 from pathlib import Path
 
 from pymodbus.server import ModbusSerialServer
+from pymodbus.server.requesthandler import ServerRequestHandler
 
 from hal.boardfile import PortTable
 from hal.protocols.modbus import ERROR, RtuDecoder, with_check_sum
 from sim_backend.twins.faults import Fault
-from sim_backend.twins.line import Line, open_pty
+from sim_backend.twins.line import Line
 from sim_backend.twins.modbus_devices import RegisterTwin
 
 TURNAROUND_S = 0.002
+
+
+class Handler(ServerRequestHandler):
+    """The server's end of a connection; asked in its own loop, it needs no waking as from another thread."""
+
+    def handle_later(self) -> None:
+        self.asked = self.loop.create_task(self.handle_request())  # kept: a loop only knows its tasks weakly
+
+
+class Within(asyncio.Transport):
+    """What a handler writes to."""
+
+    def __init__(self, written: Callable[[bytes], None]):
+        super().__init__()
+        self._written = written
+
+    def write(self, data: bytes | bytearray | memoryview) -> None:
+        self._written(bytes(data))
+
+    def close(self) -> None:
+        """Nothing is open."""
 
 
 class ModbusTwin:
@@ -31,28 +53,24 @@ class ModbusTwin:
         self._rng = rng
         self._requests = RtuDecoder(requests=True)
         self._replies = RtuDecoder()
-        self._waiting: deque[RegisterTwin] = deque()
-        self._inner = self._inner_slave = -1
+        self._waiting: deque[tuple[RegisterTwin, bytes]] = deque()
         self._server: ModbusSerialServer | None = None
+        self._handler: Handler | None = None
 
     async def start(self) -> None:
-        """Start pymodbus's server on a line of its own, and plug the outer one in."""
-        self._inner, self._inner_slave, path = open_pty()
+        """Make pymodbus's server, connect to it, and plug the line in."""
         self._server = ModbusSerialServer(
-            [device.sim for device in self.devices.values()], port=path, baudrate=self.line.baud
+            [device.sim for device in self.devices.values()], port=str(self.line.link), baudrate=self.line.baud
         )
-        await self._server.serve_forever(background=True)
-        asyncio.get_running_loop().add_reader(self._inner, self._answered)
+        self._handler = Handler(self._server, None, None, None)
+        self._handler.connection_made(Within(self._answered))
         self.line.plug()
 
     async def stop(self) -> None:
         self.line.unplug()
-        asyncio.get_running_loop().remove_reader(self._inner)
-        if self._server is not None:
+        if self._server is not None and self._handler is not None:
+            self._handler.close()
             await self._server.shutdown()
-        for fd in (self._inner, self._inner_slave):
-            with contextlib.suppress(OSError):
-                os.close(fd)
 
     def _received(self, data: bytes) -> None:
         """Requests from outside, on to the server."""
@@ -60,18 +78,21 @@ class ModbusTwin:
             device = self.devices.get(frame.device)
             if device is None or device.fault.kind in ("silent", "babble"):
                 continue
-            self._waiting.append(device)
-            os.write(self._inner, frame.raw)
+            self._waiting.append((device, frame.raw))
+            if len(self._waiting) == 1:
+                self._ask(frame.raw)
 
-    def _answered(self) -> None:
-        """The server's replies, out on the wire."""
-        try:
-            data = os.read(self._inner, 4096)
-        except OSError:
-            return
+    def _ask(self, raw: bytes) -> None:
+        assert self._handler is not None
+        self._handler.data_received(raw)
+
+    def _answered(self, data: bytes) -> None:
+        """The server's reply, out on the wire; then the next request."""
+        device, _ = self._waiting.popleft()
         for frame in self._replies.feed(data):
-            if self._waiting:
-                self._reply(self._waiting.popleft().fault, frame.raw)
+            self._reply(device.fault, frame.raw)
+        if self._waiting:
+            self._ask(self._waiting[0][1])
 
     def _reply(self, fault: Fault, raw: bytes) -> None:
         kind, value = fault.kind, fault.value
