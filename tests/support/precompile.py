@@ -1,10 +1,14 @@
 """What several test files need and would each make for themselves: once, by processes of their own beside each other,
-before the tests begin. Kernels that `make setup` does not compile, and Hypothesis' table of all characters.
+before the tests begin. Kernels that `make setup` does not compile, Hypothesis' table of all characters, and the test
+files' bytecode, with their assertions as pytest writes them.
 
 `python -m tests.support.precompile` is what `make test` runs; with a name of WORKS it does that alone. What was done
-leaves its stamp in the cache of kernels, the characters their file in .hypothesis, so that the next call ends at once.
+leaves its stamp in the cache of kernels, the characters their file in .hypothesis, the bytecode its own files, so that
+the next call ends at once.
 """
 
+import contextlib
+import io
 import subprocess
 import sys
 import tempfile
@@ -58,7 +62,15 @@ def _list_characters() -> None:
     text().validate()
 
 
-CHARACTERS = "characters"
+def _collect_tests() -> None:
+    """The test files read as pytest reads them: otherwise each of its processes would rewrite all of them at once."""
+    import pytest
+
+    with contextlib.redirect_stdout(io.StringIO()):
+        pytest.main(["--collect-only", "-p", "no:cacheprovider"])
+
+
+CHARACTERS, TESTS = "characters", "tests"
 WORKS = (
     Work("identification", kernel_count, _identify_a_moment),
     Work("challenge", kernel_count, _challenge_a_moment),
@@ -75,12 +87,16 @@ def main(names: list[str]) -> int:
                 work.compile()
         if CHARACTERS in names:
             _list_characters()
+        if TESTS in names:
+            _collect_tests()
         return 0
     waiting = [work.name for work in WORKS if (stamp := work.stamp()) is not None and not stamp.exists()]
     if waiting:
         print(f"compiling kernels that tests share: {', '.join(waiting)}", flush=True)
     if not list(Path(".hypothesis").glob("unicode_data/*/codec-*")):
         waiting.append(CHARACTERS)
+    if not list(Path("tests").glob("unit/**/__pycache__/*-pytest-*.pyc")):
+        waiting.append(TESTS)
     started = [subprocess.Popen([sys.executable, "-m", "tests.support.precompile", name]) for name in waiting]
     return max((process.wait() for process in started), key=abs, default=0)
 
