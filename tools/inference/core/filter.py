@@ -207,11 +207,13 @@ def filter_run(
             product(Phi, cov, carried)
             turned[:] = Phi.T
             product(carried, turned, cov)
+            turned[:6] = Gam.T
             for j in range(6):
                 s = spectral[Q_ACC + j] / dt
                 for a in range(count):
-                    for b in range(count):
-                        cov[a, b] += s * Gam[a, j] * Gam[b, j]
+                    if Gam[a, j] != 0.0:
+                        for b in range(count):
+                            cov[a, b] += s * Gam[a, j] * turned[j, b]
             for j in range(3):
                 cov[E_ACT + j, E_ACT + j] += spectral[Q_ACT + j] * dt
                 cov[E_POS + j, E_POS + j] += spectral[Q_POS + j] * dt

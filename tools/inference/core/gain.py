@@ -17,20 +17,22 @@ def take_measurement(H, cov, R, d, HC, HT, S, L, W, K):
     H (m, n), whose rows of what was not measured become 0; R (m) variances; HC, HT, S, L scratch. Out: W (m, m) what
     whitens the innovations, K (n, m) what corrects the state by the whitened ones. Returns log det of their covariance.
     """
-    readings, count = len(d), len(cov)
+    readings, count, seen = len(d), len(cov), 0  # readings from `seen` on were not measured
     # S = H cov H' + R of what was measured, its Cholesky factor L, and W = L^-1; K~ = cov H' L^-T
     for m in range(readings):
         if math.isnan(d[m]):
             H[m, :] = 0.0
-    product(H, cov, HC)
+        else:
+            seen = m + 1
+    product(H[:seen], cov, HC)
     HT[:] = H.T
-    product(HC, HT, S)
-    for m in range(readings):
+    product(HC[:seen], HT, S)
+    for m in range(seen):
         if math.isnan(d[m]):
             S[m, m] = 1.0
         else:
             S[m, m] += R[m]
-    for m in range(readings):
+    for m in range(seen):
         for n in range(m + 1):
             total = S[m, n]
             for k in range(n):
@@ -39,9 +41,10 @@ def take_measurement(H, cov, R, d, HC, HT, S, L, W, K):
                 L[m, m] = math.sqrt(max(total, 1e-18))
             else:
                 L[m, n] = total / L[n, n]
-    for m in range(readings):  # W = L^-1, lower triangular
-        for n in range(readings):
-            W[m, n] = 0.0
+    W[:] = 0.0
+    for m in range(seen, readings):
+        W[m, m] = 1.0
+    for m in range(seen):  # W = L^-1, lower triangular
         W[m, m] = 1.0 / L[m, m]
         for n in range(m):
             total = 0.0
@@ -49,7 +52,8 @@ def take_measurement(H, cov, R, d, HC, HT, S, L, W, K):
                 total -= L[m, k] * W[k, n]
             W[m, n] = total / L[m, m]
     for a in range(count):
-        for m in range(readings):
+        K[a, seen:] = 0.0
+        for m in range(seen):
             total = 0.0
             for n in range(m + 1):
                 total += HC[n, a] * W[m, n]
@@ -57,12 +61,12 @@ def take_measurement(H, cov, R, d, HC, HT, S, L, W, K):
     for a in range(count):
         for b in range(a + 1):
             total = 0.5 * (cov[a, b] + cov[b, a])
-            for m in range(readings):
+            for m in range(seen):
                 total -= K[a, m] * K[b, m]
             cov[a, b] = total
             cov[b, a] = total
     logarithm = 0.0
-    for m in range(readings):
+    for m in range(seen):
         if not math.isnan(d[m]):
             logarithm += 2.0 * math.log(L[m, m])
     return logarithm
