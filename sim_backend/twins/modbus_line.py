@@ -52,7 +52,6 @@ class ModbusTwin:
         self.line = Line(link, port.baud, self._received)
         self._rng = rng
         self._requests = RtuDecoder(requests=True)
-        self._replies = RtuDecoder()
         self._waiting: deque[tuple[RegisterTwin, bytes]] = deque()
         self._server: ModbusSerialServer | None = None
         self._handler: Handler | None = None
@@ -86,11 +85,10 @@ class ModbusTwin:
         assert self._handler is not None
         self._handler.data_received(raw)
 
-    def _answered(self, data: bytes) -> None:
-        """The server's reply, out on the wire; then the next request."""
+    def _answered(self, reply: bytes) -> None:
+        """The server's reply, a frame, out on the wire; then the next request."""
         device, _ = self._waiting.popleft()
-        for frame in self._replies.feed(data):
-            self._reply(device.fault, frame.raw)
+        self._reply(device.fault, reply)
         if self._waiting:
             self._ask(self._waiting[0][1])
 

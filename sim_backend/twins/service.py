@@ -53,6 +53,7 @@ class TwinService:
         for name in boardfile.ROLES:
             if getattr(file, name) is not None:
                 self.registers[name] = self._register_twin(name, source)
+        self._devices: dict[str, Any] = {"imu": self.imu, "servo": self.servo, **self.registers}  # by place
         self.modbus = {
             port: self._modbus_twin(port) for port in file.port if port not in (file.imu.port, file.servo.port)
         }
@@ -89,10 +90,9 @@ class TwinService:
 
     def device(self, name: str) -> Any:
         """A device's twin by its place on the board; FaultError for another name."""
-        found = {"imu": self.imu, "servo": self.servo, **self.registers}
-        if name not in found:
-            raise FaultError(f"no device '{name}'; there are {', '.join(found)}")
-        return found[name]
+        if name not in self._devices:
+            raise FaultError(f"no device '{name}'; there are {', '.join(self._devices)}")
+        return self._devices[name]
 
     # --- running ----------------------------------------------------------------------------------------------------
     async def run(self, ready: Callable[[], None]) -> None:
@@ -135,8 +135,8 @@ class TwinService:
             await asyncio.sleep(max(wait, 0.0))
 
     def _babble(self) -> None:
-        for name in ("imu", "servo", *self.registers):
-            if self.device(name).fault.kind == "babble":
+        for name, device in self._devices.items():
+            if device.fault.kind == "babble":
                 line = self.line_of(name)
                 line.send(self._rng.randbytes(int(line.baud / 10 * STEP_S)))
 
