@@ -21,7 +21,8 @@ class Flights:
     parts: list[Problem]
     shared: SharedParameters
     reference: np.ndarray  # (runs,) bool: before anything changed
-    heat: float = 1.0
+    heat: float = 1.0  # of the reference
+    hot: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (runs,) times that: a form leaves more
     sizes: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (count,) 1 sigma of what runs differ by
     certainty: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # inverse covariance of a run's own values
     values: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (count,) shared
@@ -39,15 +40,19 @@ class Flights:
         self.values = fit_shared([self.parts[n] for n in own], self.shared, start)
         self.raw = [expand(part, self.shared, self.values) for part in self.parts]
         found = [self.raw[n] for n in own]
-        self.heat = heat_of(found)
+        self.heat, self.hot = heat_of(found), np.ones(self.count)
         self.sizes = learn_scatter([one.cooled(self.heat) for one in found], self.shared)
-        self.runs = [self.made(one) for one in self.raw]
+        self.runs = [self.made(n, one) for n, one in enumerate(self.raw)]
         known = np.diag(self.shared.prior**-2.0) + sum(self.runs[n].curvature for n in own)
         self.certainty = np.linalg.inv(np.linalg.inv(known) + np.diag(np.maximum(self.sizes, LEAST_SIZE) ** 2))
 
-    def made(self, one: Expansion) -> Expansion:
-        """A run's parabola as events are judged by it."""
-        return without_deviation(one.cooled(self.heat), self.sizes)
+    def heat_in(self, n: int) -> float:
+        """The heat of a run."""
+        return self.heat * float(self.hot[n])
+
+    def made(self, n: int, one: Expansion) -> Expansion:
+        """A parabola of a run as events are judged by it."""
+        return without_deviation(one.cooled(self.heat_in(n)), self.sizes)
 
     def expanded(self, n: int, x: np.ndarray) -> Expansion:
         """A run's parabola about other values."""
@@ -55,7 +60,12 @@ class Flights:
 
     def put(self, n: int, one: Expansion) -> None:
         """A run flies by another model from now on: the one that its parabola is about."""
-        self.raw[n], self.runs[n] = one, self.made(one)
+        self.raw[n], self.runs[n] = one, self.made(n, one)
+
+    def cool(self, n: int) -> None:
+        """A run that the model of its change leaves rougher than the reference is, says the less of what all share."""
+        self.hot[n] = max(1.0, self.nis(n) / float(self.usual_nis.mean()))
+        self.runs[n] = self.made(n, self.raw[n])
 
     def let_go(self, n: int) -> None:
         """A run that flies by a model that nobody knows says nothing of what the others share."""

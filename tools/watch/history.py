@@ -14,6 +14,7 @@ from tools.watch.flights import Flights, numbers
 NOT_ROUGH = 5.0  # nat that a run that is not rough takes off disorder that would hold there too
 UNLIKE = 0.01  # cosine of two labels' columns, below which they have nothing to do with each other
 FURTHER = 0.15  # of what an event explains in the same runs, that a further event there has to bring
+MOST = 0.5  # of what is left there, that one that is not akin has to bring: what a form leaves may look like anything
 
 
 @dataclass
@@ -67,8 +68,6 @@ class History:
         return spans([bool(one) for one in self.judged], self.begins)
 
 
-
-
 def shaken_place(event: Event) -> tuple[str, str] | None:
     """Where a single link shakes; None of the water."""
     return None if event.place is None else (event.place.subsystem, event.place.element)
@@ -84,13 +83,16 @@ def already(history: History, change: Change) -> bool:
 
 def earns_place(history: History, event: Event | Change) -> bool:
     """Whether an event beside others in the same runs is more than the wrong form of one of them."""
-    count = history.flights.count
-    own = event.span.weights(count) > 0.0
+    flights = history.flights
+    own = event.span.weights(flights.count) > 0.0
+    evidence = event.evidence * float(flights.hot[own].max())  # as others were weighed, before their runs were hot
     for other in history.events:
-        theirs = other.span.weights(count) > 0.0
-        mostly_there = (own & theirs).sum() >= 0.5 * own.sum()
-        less = event.evidence < FURTHER * other.explained
-        if mostly_there and less and akin(history, event.label, other.label, own & theirs):
+        shared = own & (other.span.weights(flights.count) > 0.0)
+        mostly_there = shared.sum() >= 0.5 * own.sum()
+        if not mostly_there or evidence >= FURTHER * other.explained:
+            continue
+        left = 0.5 * sum(max(flights.excess(n), 0.0) for n in numbers(shared & history.judged))
+        if evidence < MOST * left or akin(history, event.label, other.label, shared):
             return False
     return True
 
@@ -131,6 +133,7 @@ def take(history: History, event: Event) -> None:
             x = flights.runs[n].at.copy()
             x[columns] += weights[n] * event.size
             flights.put(n, flights.expanded(n, within(flights, x)))
+            flights.cool(n)
     if history.water is not None:
         # what the form of a label leaves is no disorder: it is asked about as what is left of the label
         history.water[:, inside] = -NOT_ROUGH

@@ -4,7 +4,7 @@ The shared values are held; only the label's own parameters move, so that a step
 is reached by way of filters that expect a rough disturbance, as in tools/diagnose/search.py.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +13,7 @@ from tools.inference.expansion import at_kink, columns_at
 from tools.inference.fit import EFFECT_STEP, FIRST_STEP, bounded_step
 from tools.inference.problem import Problem
 from tools.inference.shared_parameters import SharedParameters
+from tools.watch.flights import Flights
 
 STEPS = 5
 ROUGH = (100.0, 10.0)
@@ -28,7 +29,17 @@ class Affected:
     parts: Sequence[Problem]
     weights: Sequence[float]
     at: Sequence[np.ndarray]  # (count,) values of each run without the change
-    heat: float
+    heats: Sequence[float]
+
+    def each(self) -> Iterator[tuple[Problem, float, np.ndarray, float]]:
+        """Run by run: the problem, its weight, its values and its heat."""
+        return zip(self.parts, self.weights, self.at, self.heats, strict=True)
+
+
+def affected_runs(flights: Flights, chosen: Sequence[int], weights: np.ndarray, base: Sequence[np.ndarray]) -> Affected:
+    """Runs with their weights (runs,) of a span, their values without the change, and their heats."""
+    parts, heats = [flights.parts[n] for n in chosen], [flights.heat_in(n) for n in chosen]
+    return Affected(parts, [float(weights[n]) for n in chosen], base, heats)
 
 
 @dataclass(frozen=True)
@@ -50,9 +61,9 @@ def values_of(shared: SharedParameters, label: str, at: np.ndarray, weight: floa
 def cost_of(runs: Affected, shared: SharedParameters, label: str, size: np.ndarray, roughness: float = 1.0) -> float:
     """-2 log likelihood of the runs with a change of this size, by its own filters, over the heat; and the prior's."""
     found = float(size @ size)
-    for part, weight, at in zip(runs.parts, runs.weights, runs.at, strict=True):
+    for part, weight, at, heat in runs.each():
         model = shared.model(part, values_of(shared, label, at, weight, size))
-        found += float(part.filter(*model, roughness=roughness, begin=True).misfit[0]) / runs.heat
+        found += float(part.filter(*model, roughness=roughness, begin=True).misfit[0]) / heat
     return found if np.isfinite(found) else np.inf
 
 
@@ -72,10 +83,10 @@ def next_step(
     columns, low_high = shared.labels[label], shared.limits(label, runs.at[0])
     normal, slope, cost = np.eye(len(columns)), size.copy(), float(size @ size)
     kept = []
-    for part, weight, at in zip(runs.parts, runs.weights, runs.at, strict=True):
+    for part, weight, at, heat in runs.each():
         x = values_of(shared, label, at, weight, size)
         gains = part.filter(*shared.model(part, x), roughness=roughness, begin=True)
-        cost += float(gains.misfit[0]) / runs.heat
+        cost += float(gains.misfit[0]) / heat
         steps = np.where(np.abs(size) > 0.0, EFFECT_STEP * np.maximum(1.0, np.abs(x[columns])), FIRST_STEP)
         steps = np.where(at_kink(shared, x)[columns], 1.0, steps)
         steps = np.where(x[columns] + steps > shared.high[columns], -steps, steps)
@@ -87,16 +98,16 @@ def next_step(
             return shared.model(part, point)
 
         e, J = columns_at(part, gains, moved, at_kink(shared, x)[columns], steps)
-        normal += weight**2 * J @ J.T / runs.heat
-        slope += weight * J @ e / runs.heat
+        normal += weight**2 * J @ J.T / heat
+        slope += weight * J @ e / heat
         kept.append(gains)
     low, high = low_high
     step = bounded_step(normal, slope, np.minimum(low - size, 0.0), np.maximum(high - size, 0.0))
     tried = [np.clip(size + share * step, low, high) for share in shares]
     misfits = np.array([one @ one for one in tried])
-    for part, weight, at, gains in zip(runs.parts, runs.weights, runs.at, kept, strict=True):
+    for (part, weight, at, heat), gains in zip(runs.each(), kept, strict=True):
         E = part.follow([shared.model(part, values_of(shared, label, at, weight, one)) for one in tried], gains)
-        misfits += (E**2).sum(axis=1) / runs.heat
+        misfits += (E**2).sum(axis=1) / heat
     promised = -float(2.0 * slope @ step + step @ normal @ step)
     return Step(cost if np.isfinite(cost) else np.inf, promised, tried[int(misfits.argmin())])
 

@@ -10,7 +10,7 @@ from tools.inference.fit import bounded_step
 from tools.watch.events import GROWING, STEP, Change, Joint, Span
 from tools.watch.flights import Flights, numbers
 from tools.watch.history import Event, History, akin, within
-from tools.watch.label_fit import Affected, LabelFit, best_fit, cost_of, values_of
+from tools.watch.label_fit import Affected, LabelFit, affected_runs, best_fit, cost_of, values_of
 
 FITTED = 3  # runs in which rivals are fitted
 SMALL = 20  # labels of a catalogue that can be tried whole
@@ -30,7 +30,7 @@ def refined(history: History, joint: Joint, best: Change, changes: Sequence[Chan
     inside = numbers(weights * history.judged)
     chosen = sorted(inside, key=lambda n: (-weights[n], -flights.excess(n)))[:FITTED]
     base = [within(flights, flights.runs[n].at) for n in chosen]
-    affected = Affected([flights.parts[n] for n in chosen], [weights[n] for n in chosen], base, flights.heat)
+    affected = affected_runs(flights, chosen, weights, base)
     inside_state = weights > 0.0
     same = [one for one in changes if one.span == best.span and akin(history, one.label, best.label, inside_state)]
     same.sort(key=lambda one: -one.evidence)
@@ -89,7 +89,7 @@ def by_other_course(history: History, joint: Joint, event: Event) -> Event | Non
     inside = numbers(weights * history.judged)
     chosen = [inside[0], inside[len(inside) // 2], inside[-1]]
     base = [within(flights, flights.raw[n].at) for n in chosen]
-    affected = Affected([flights.parts[n] for n in chosen], [weights[n] for n in chosen], base, flights.heat)
+    affected = affected_runs(flights, chosen, weights, base)
     fit = best_fit(affected, flights.shared, event.label, event.size, False)
     return over_spans(history, joint, other, fit, (other.course,))
 
@@ -98,8 +98,8 @@ def rough_ranking(affected: Affected, flights: Flights) -> list[tuple[str, np.nd
     """Labels by what a filter that lets the vehicle move sees of them, with the sizes it promises."""
     shared = flights.shared
     normal, slope = np.zeros((shared.count, shared.count)), np.zeros(shared.count)
-    for part, weight, at in zip(affected.parts, affected.weights, affected.at, strict=True):
-        one = expand(part, shared, at, 100.0).cooled(flights.heat)
+    for part, weight, at, heat in affected.each():
+        one = expand(part, shared, at, 100.0).cooled(heat)
         normal += weight**2 * one.curvature
         slope += weight * one.slope
     found = []
@@ -127,7 +127,7 @@ def over_spans(
         if history.judged[n]:
             weight = weights[n] or (1.0 if span.course != GROWING or n >= span.end else weights[span.first])
             x = values_of(shared, fit.label, flights.runs[n].at, weight, fit.size)
-            about[n] = flights.made(flights.expanded(n, within(flights, x)))
+            about[n] = flights.made(n, flights.expanded(n, within(flights, x)))
     found: dict[Span, tuple[float, np.ndarray, np.ndarray]] = {}
     for one in history.listed():
         near = abs(one.first - span.first) <= REACH and abs(one.end - span.end) <= REACH

@@ -13,7 +13,7 @@ from tools.inference.shared_parameters import SharedParameters
 from tools.inference.steady import first_values
 from tools.watch.flights import Flights, numbers
 from tools.watch.history import Event, History
-from tools.watch.label_fit import Affected, fit_label, values_of
+from tools.watch.label_fit import affected_runs, fit_label, values_of
 from tools.watch.verdicts import Settled, group_of
 
 FITTED = 3  # runs of an event, from which its size beside the vehicle is found
@@ -103,10 +103,7 @@ def size_of(own: OwnModel, history: History, event: Event, label: str) -> np.nda
     if key not in own.sizes:
         weights = event.span.weights(flights.count)
         chosen = sorted(numbers(weights * history.judged), key=lambda n: -weights[n])[:FITTED]
-        runs = Affected(
-            [flights.parts[n] for n in chosen], [weights[n] for n in chosen], [own.at(flights)] * len(chosen),
-            flights.heat,
-        )  # fmt: skip
+        runs = affected_runs(flights, chosen, weights, [own.at(flights)] * len(chosen))
         start = event.size if label == event.label else np.zeros(len(flights.shared.labels[label]))
         own.sizes[key] = fit_label(runs, flights.shared, label, start).size
     return own.sizes[key]

@@ -7,6 +7,7 @@ import numpy as np
 
 from tools.diagnose.matter import largest
 from tools.diagnose.probabilities import ERROR_RATE, TIE, softmax
+from tools.inference.kind import Kind
 from tools.inference.predict import fly_windows_from
 from tools.watch.answer import CAUSE, NONE, UNKNOWN, EventAnswer, RunCause, RunVerdict, Sized
 from tools.watch.disorder import WATER
@@ -21,6 +22,8 @@ MOST_SURE = 0.995
 FEW = 3  # runs of a reference from which it can be learned what runs differ by
 CI90 = 1.645
 OTHERWISE = 2.0  # times
+ALONE = 3.0  # times (docs/WATCH.md)
+SCATTERED = 3  # changes that touch
 VECTORS = ("gyro_bias", "current", "current_shear", "compass")  # labels whose parameters are parts of one length
 
 
@@ -31,8 +34,12 @@ class Settled:
     event: Event
     left: Left
     probability: float  # that there is such a change
-    unknown: bool
+    outside: float  # probability that it is none of the catalogue
     number: int  # of the event among those with a course; -1: it has none
+
+    @property
+    def unknown(self) -> bool:
+        return self.outside > 0.5
 
     @property
     def label(self) -> str | None:
@@ -51,9 +58,38 @@ def settle(history: History) -> list[Settled]:
             continue
         left = what_is_left(history, event) if event.has_course else NOTHING
         sure = 1.0 / (1.0 + np.exp(-np.clip(event.evidence - EVIDENCE_NEEDED, -50.0, 50.0)))
-        unknown = event.label == "" or left.probability > 0.5
-        found.append(Settled(event, left, min(float(sure), most_sure(history)), unknown, own))
+        outside = 1.0 - ERROR_RATE if event.label == "" else left.probability
+        found.append(Settled(event, left, min(float(sure), most_sure(history)), outside, own))
+    found = one_form(found)
     return one_unknown([*found, *nameless(history, found)])
+
+
+def one_form(found: list[Settled]) -> list[Settled]:
+    """Three changes or more that touch, one of them of one run alone, are one of a form that no label has.
+
+    An unknown form looks like another label, or another size of it, in each run that is flown otherwise.
+    """
+    known = [one for one in found if one.label and one.event.has_course]
+    strange = [
+        group for group in touching(known)
+        if len(group) >= SCATTERED and any(of_one_run(one.event.span) for one in group)
+    ]  # fmt: skip
+    inside = [id(one) for group in strange for one in group]
+    return [replace(one, outside=1.0 - ERROR_RATE) if id(one) in inside else one for one in found]
+
+
+def touching(found: list[Settled]) -> list[list[Settled]]:
+    """Changes in groups: each touches another of its own group, and none of the others."""
+    groups: list[list[Settled]] = []
+    for one in found:
+        near = [group for group in groups if any(touch(one.event.span, other.event.span) for other in group)]
+        groups = [group for group in groups if group not in near] + [[one, *(other for g in near for other in g)]]
+    return groups
+
+
+def of_one_run(span: Span) -> bool:
+    """Whether a span is one run."""
+    return span.end - span.first == 1
 
 
 def one_unknown(found: list[Settled]) -> list[Settled]:
@@ -104,7 +140,7 @@ def nameless(history: History, found: list[Settled]) -> list[Settled]:
         span = Span(int(first), int(end), STEP)
         evidence = float(sum(max(flights.excess(n), 0.0) for n in range(first, end))) / 2.0
         event = Event("", span, evidence, {}, np.zeros(0), np.zeros((0, 0)), 0.0)
-        more.append(Settled(event, what_is_left(history, event), most_sure(history), True, -1))
+        more.append(Settled(event, what_is_left(history, event), most_sure(history), 1.0 - ERROR_RATE, -1))
     return more
 
 
@@ -112,18 +148,18 @@ def matters(history: History, event: Event, number: int) -> bool:
     """Whether the change moves a channel of some window by as much as its kind of vehicle asks for (docs/GAP.md)."""
     weights = event.span.weights(history.flights.count)
     inside = sorted(np.flatnonzero(weights * history.judged), key=lambda n: -weights[n])
-    needed = needed_of(history, event)
+    needed = needed_of(history.flights.parts[0].kind, event.span, flown_otherwise(history, event.span))
     return any(moved_by(history, event, number, int(n)) >= needed for n in inside)
 
 
-def needed_of(history: History, event: Event) -> float:
-    """Tolerances by which a change has to move a channel: twice as many where its runs were flown otherwise.
+def needed_of(kind: Kind, span: Span, otherwise: bool) -> float:
+    """Tolerances by which a change has to move a channel: more where its runs were flown otherwise, or it is one run.
 
-    A law of drag or lift that is not nature's shows when pitch, buoyancy or depth change, in all runs alike.
+    A law of drag or lift that is not nature's shows when pitch, buoyancy or depth change, in all runs alike. And of a
+    run that differs from the others by little nobody knows that it is not how far runs differ.
     """
-    kind = history.flights.parts[0].kind
-    needed = kind.growth_matters if event.span.course == GROWING else kind.matters
-    return needed * (OTHERWISE if flown_otherwise(history, event.span) else 1.0)
+    needed = kind.growth_matters if span.course == GROWING else kind.matters
+    return needed * max(OTHERWISE if otherwise else 1.0, ALONE if of_one_run(span) else 1.0)
 
 
 def flown_otherwise(history: History, span: Span) -> bool:
@@ -170,7 +206,7 @@ def probabilities(one: Settled) -> dict[str, float]:
     """Of the labels that the change may be, most probable first."""
     if one.unknown or not one.event.rivals:
         return {}
-    known = 1.0 - one.left.probability if one.left.probes else 1.0
+    known = 1.0 - one.outside if one.left.probes else 1.0
     chances = softmax(one.event.rivals)
     scaled = {label: chance * (1.0 - ERROR_RATE) * known * one.probability for label, chance in chances.items()}
     return dict(sorted(scaled.items(), key=lambda item: -item[1]))
@@ -256,8 +292,7 @@ def event_answer(history: History, one: Settled, names: list[str]) -> EventAnswe
         own = sized(history, one, float(weights[n]))
         sizes.append({"run": names[n], "size": own.size, "ci90": own.ci90})
     known = max([*probabilities(one).values(), 0.0])
-    unknown = one.left.probability if one.event.has_course else 1.0 - ERROR_RATE
-    chance = known if one.label else one.probability * unknown
+    chance = known if one.label else one.probability * one.outside
     last = None if still else names[inside[-1]]
     return EventAnswer(
         one.label, where_of(history, one), group_of(history, one), names[inside[0]], last, course, float(chance),
@@ -283,5 +318,3 @@ def run_verdict(history: History, settled: list[Settled], n: int, name: str, gap
     causes.sort(key=lambda cause: -cause.probability)
     verdict = CAUSE if causes else (UNKNOWN if unknown else NONE)
     return RunVerdict(name, verdict, causes, gap, None)
-
-

@@ -1,5 +1,7 @@
 """Events over runs from parabolas alone: no flight is flown, the truth is a vector."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from tools.inference.expansion import Expansion
 from tools.inference.parameters import NUISANCE, FreeParameter
 from tools.inference.shared_parameters import SharedParameters
 from tools.watch.events import GROWING, STEP, Joint, Span, spans
+from tools.watch.flights import LEAST_SIZE, Flights
 from tools.watch.scatter import learn_scatter, log_marginal, without_deviation
 
 RUNS, SEEN = 10, 40  # rows of each run's Jacobian
@@ -30,6 +33,13 @@ def runs_of(change: np.ndarray, shared: np.ndarray, seed: int, scatter: float = 
         e = rng.standard_normal(SEEN) - J.T @ truth
         found.append(Expansion(np.zeros(len(FREE)), float(e @ e), J @ e, J @ J.T, float(e @ e) / SEEN, SEEN))
     return found
+
+
+def moved_to(one: Expansion, at: np.ndarray) -> Expansion:
+    """The same parabola about other values."""
+    A, b = one.curvature, one.slope
+    misfit = one.value + 2.0 * float(b @ at) + float(at @ A @ at)
+    return Expansion(at, misfit, b + A @ at, A, misfit / SEEN, SEEN)
 
 
 def best(joint: Joint, begins: int = 1):
@@ -120,3 +130,24 @@ def test_no_event_before_it_may_begin_nor_at_a_run_that_was_not_judged():
     assert all(one.first >= 1 and judged[one.first] and judged[one.end - 1] for one in listed)
     assert Span(1, 4, STEP) in listed
     assert {one.end for one in listed if one.course == GROWING} == {5}
+
+
+def test_a_run_whose_change_has_another_form_says_less_of_what_all_share():
+    """The last run's change is left with errors ten times the others': its pull on the shared values falls."""
+    raw = runs_of(np.zeros((RUNS, len(FREE))), COMMON, 11)
+    rough, smooth = RUNS - 1, RUNS - 2
+    raw[rough] = runs_of(np.zeros((1, len(FREE))), 10.0 * COMMON, 12)[0]
+    raw[smooth] = replace(raw[smooth], nis=0.5 * raw[smooth].nis)
+    flights = Flights([], SHARED, np.arange(RUNS) < 5, 1.0, np.ones(RUNS), np.full(len(FREE), LEAST_SIZE))
+    flights.certainty = np.eye(len(FREE)) / LEAST_SIZE**2
+    flights.raw = [moved_to(one, COMMON) for one in raw]
+    flights.runs = [flights.made(n, one) for n, one in enumerate(flights.raw)]
+    before = Joint(SHARED, list(flights.runs), []).values
+    for n in (rough, smooth):
+        flights.cool(n)
+    after = Joint(SHARED, list(flights.runs), []).values
+
+    assert flights.hot[smooth] == 1.0  # none says more than the reference
+    assert flights.hot[rough] == pytest.approx(flights.nis(rough) / flights.usual_nis.mean())
+    assert flights.hot[rough] > 20.0
+    assert np.abs(after - COMMON).max() < 0.2 * np.abs(before - COMMON).max()

@@ -1,0 +1,49 @@
+"""What is said of events found: which matter, and which are parts of one that no label names."""
+
+import numpy as np
+import pytest
+
+from tools.inference.kind import ROUGHIE
+from tools.watch.events import GROWING, STEP, Span
+from tools.watch.history import Event
+from tools.watch.unknown import NOTHING
+from tools.watch.verdicts import Settled, needed_of, one_form
+
+
+def settled(label: str, first: int, end: int, course: str = STEP) -> Settled:
+    event = Event(label, Span(first, end, course), 100.0, {label: 100.0}, np.array([1.0]), np.eye(1), 100.0)
+    return Settled(event, NOTHING, 0.995, 0.005, 0)
+
+
+ALL_TOUCH = [("pitch_trim", 11, 14, GROWING), ("pitch_damping", 9, 10), ("slider_scale", 12, 13), ("lift", 7, 8)]
+
+
+def test_changes_that_come_and_go_from_run_to_run_are_one_of_an_unknown_form():
+    found = one_form([settled(*one) for one in ALL_TOUCH])
+    assert [one.unknown for one in found] == [True] * 4
+    assert [one.label for one in found] == [None] * 4
+
+
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [
+        (ALL_TOUCH[:2], "two changes may be two changes"),
+        ([("drag", 5, 14), ("lift", 7, 14), ("pump_slow", 9, 14, GROWING)], "none comes and goes with a run"),
+        ([("drag", 5, 6), ("lift", 9, 10), ("pump_slow", 13, 14)], "they have runs without any between them"),
+        ([*ALL_TOUCH[:2], ("turbulence", 12, 13)], "rougher water beside two changes"),
+    ],
+)
+def test_other_changes_keep_their_labels(changes, why):
+    found = [settled(*one) for one in changes]
+    assert one_form(found) == found, why
+
+
+def test_a_change_far_from_those_keeps_its_label():
+    found = one_form([settled("drag", 1, 4), *(settled(*one) for one in ALL_TOUCH)])
+    assert [one.unknown for one in found] == [False, True, True, True, True]
+
+
+def test_of_a_run_alone_more_is_asked_than_of_several():
+    assert needed_of(ROUGHIE, Span(4, 6, STEP), otherwise=False) == ROUGHIE.matters
+    assert needed_of(ROUGHIE, Span(4, 6, STEP), otherwise=True) == 2.0 * ROUGHIE.matters
+    assert needed_of(ROUGHIE, Span(4, 5, STEP), otherwise=False) == 3.0 * ROUGHIE.matters
