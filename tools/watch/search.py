@@ -3,33 +3,48 @@
 from collections.abc import Callable
 
 import numpy as np
+from scipy.stats import t as student
 
 from tools.inference.parameters import CLOCK_PLACE
 from tools.watch.history import Event, History, already, earns_place, shaken_place, take
 from tools.watch.rivals import refined
+from tools.watch.scatter import PRIOR_RUNS
 from tools.watch.water import named, rougher, water_event
 
 EVIDENCE_NEEDED = 16.0  # nat over no change (docs/WATCH.md)
 BEYOND_CHANCE = 7.3  # nat over the logarithm of how many changes are looked at
+FALSE = 0.02  # of the vehicles without a change that may be given one (docs/GAP.md)
+FEW = 3  # runs of a reference from which it can be learned what runs differ by
 MOST_EVENTS = 5
 
 
 def find_events(history: History, say: Callable[[str], None] = lambda text: None) -> None:
     """Events added to the history, the most evident first."""
-    needed = evidence_needed(history)
     for _ in range(MOST_EVENTS):
         event = next_event(history)
-        if event is None or event.evidence < needed or not earns_place(history, event):
+        if event is None or event.evidence < evidence_needed(history, event) or not earns_place(history, event):
             break
         history.events.append(event)
         take(history, event)
         say(f"{event.label or 'unknown'} in runs {event.span.first} to {event.span.end - 1}")
 
 
-def evidence_needed(history: History) -> float:
-    """Nat that an event needs: more where there are more runs, and so more changes that chance may bring."""
-    looked_at = len(history.listed()) * len(history.flights.shared.labels)
-    return max(EVIDENCE_NEEDED, BEYOND_CHANCE + float(np.log(max(looked_at, 1))))
+def evidence_needed(history: History, event: Event) -> float:
+    """Nat that an event needs: more where there are more runs, and so more changes that chance may bring.
+
+    And more where how much runs differ was learned from a few: a change against that is Student's t, squared, by those
+    runs, what is usual, and the event's own runs against each other. (With fewer than FEW nothing was learned, and no
+    event is sure.)
+    """
+    flights = history.flights
+    looked_at = max(len(history.listed()) * len(flights.shared.labels), 1)
+    needed = max(EVIDENCE_NEEDED, BEYOND_CHANCE + float(np.log(looked_at)))
+    learned = int(flights.reference.sum())
+    if not event.has_course or learned < FEW:
+        return needed
+    inside = (event.span.weights(flights.count) > 0.0) & history.judged
+    freedom = learned - 1 + PRIOR_RUNS + int(inside.sum()) - 1
+    return max(needed, 0.5 * float(student.isf(0.5 * FALSE / looked_at, freedom)) ** 2)
 
 
 def next_event(history: History) -> Event | None:

@@ -7,22 +7,19 @@ import numpy as np
 
 from tools.diagnose.matter import largest
 from tools.diagnose.probabilities import ERROR_RATE, TIE, softmax
-from tools.inference.kind import Kind
 from tools.inference.predict import fly_windows_from
 from tools.watch.answer import CAUSE, NONE, UNKNOWN, EventAnswer, RunCause, RunVerdict, Sized
 from tools.watch.disorder import WATER
 from tools.watch.events import GROWING, STEP, Span
 from tools.watch.flights import roughness_sigma
 from tools.watch.history import Event, History, within
-from tools.watch.search import EVIDENCE_NEEDED
+from tools.watch.search import EVIDENCE_NEEDED, FEW
 from tools.watch.unknown import NOTHING, Left, what_is_left
 
 ROUGH = 6.0  # sigma of a run's mean squared innovation: something changed, though no label says what
 MOST_SURE = 0.995
-FEW = 3  # runs of a reference from which it can be learned what runs differ by
 CI90 = 1.645
 OTHERWISE = 2.0  # times
-ALONE = 3.0  # times (docs/WATCH.md)
 SCATTERED = 3  # changes that touch
 VECTORS = ("gyro_bias", "current", "current_shear", "compass")  # labels whose parameters are parts of one length
 
@@ -148,18 +145,18 @@ def matters(history: History, event: Event, number: int) -> bool:
     """Whether the change moves a channel of some window by as much as its kind of vehicle asks for (docs/GAP.md)."""
     weights = event.span.weights(history.flights.count)
     inside = sorted(np.flatnonzero(weights * history.judged), key=lambda n: -weights[n])
-    needed = needed_of(history.flights.parts[0].kind, event.span, flown_otherwise(history, event.span))
+    needed = needed_of(history, event)
     return any(moved_by(history, event, number, int(n)) >= needed for n in inside)
 
 
-def needed_of(kind: Kind, span: Span, otherwise: bool) -> float:
-    """Tolerances by which a change has to move a channel: more where its runs were flown otherwise, or it is one run.
+def needed_of(history: History, event: Event) -> float:
+    """Tolerances by which a change has to move a channel: twice as many where its runs were flown otherwise.
 
-    A law of drag or lift that is not nature's shows when pitch, buoyancy or depth change, in all runs alike. And of a
-    run that differs from the others by little nobody knows that it is not how far runs differ.
+    A law of drag or lift that is not nature's shows when pitch, buoyancy or depth change, in all runs alike.
     """
-    needed = kind.growth_matters if span.course == GROWING else kind.matters
-    return needed * max(OTHERWISE if otherwise else 1.0, ALONE if of_one_run(span) else 1.0)
+    kind = history.flights.parts[0].kind
+    needed = kind.growth_matters if event.span.course == GROWING else kind.matters
+    return needed * (OTHERWISE if flown_otherwise(history, event.span) else 1.0)
 
 
 def flown_otherwise(history: History, span: Span) -> bool:

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from tools.inference.kind import ROUGHIE
 from tools.watch.events import GROWING, STEP, Span
 from tools.watch.history import Event
 from tools.watch.unknown import NOTHING
-from tools.watch.verdicts import Settled, needed_of, one_form
+from tools.watch.verdicts import Settled, one_form
 
 
 def settled(label: str, first: int, end: int, course: str = STEP) -> Settled:
@@ -41,9 +40,3 @@ def test_other_changes_keep_their_labels(changes, why):
 def test_a_change_far_from_those_keeps_its_label():
     found = one_form([settled("drag", 1, 4), *(settled(*one) for one in ALL_TOUCH)])
     assert [one.unknown for one in found] == [False, True, True, True, True]
-
-
-def test_of_a_run_alone_more_is_asked_than_of_several():
-    assert needed_of(ROUGHIE, Span(4, 6, STEP), otherwise=False) == ROUGHIE.matters
-    assert needed_of(ROUGHIE, Span(4, 6, STEP), otherwise=True) == 2.0 * ROUGHIE.matters
-    assert needed_of(ROUGHIE, Span(4, 5, STEP), otherwise=False) == 3.0 * ROUGHIE.matters

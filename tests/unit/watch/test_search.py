@@ -1,0 +1,45 @@
+"""How much evidence a change needs, by what is known of how much runs differ."""
+
+import math
+
+import numpy as np
+from scipy.stats import norm
+
+from tools.inference.parameters import NUISANCE, FreeParameter
+from tools.inference.shared_parameters import SharedParameters
+from tools.watch.events import STEP, Span
+from tools.watch.flights import Flights
+from tools.watch.history import Event, History
+from tools.watch.search import EVIDENCE_NEEDED, FALSE, evidence_needed
+
+FREE = [FreeParameter(NUISANCE, "P[0]", "P", 0, 0.1), FreeParameter("drag", "scale", "F", 0, 0.4, -2.0, 10.0)]
+LABELS = ["drag", *(f"another {n}" for n in range(45))]
+SHARED = SharedParameters(FREE, {label: [1] for label in LABELS}, {label: [(-2.0, 10.0)] for label in LABELS})
+
+
+def needed(learned: int, inside: int, label: str = "drag", watched: int = 9) -> float:
+    flights = Flights([None] * (learned + watched), SHARED, np.arange(learned + watched) < learned)
+    history = History(flights, np.arange(learned + watched) >= learned, learned)
+    event = Event(label, Span(learned, learned + inside, STEP), 0.0, {}, np.zeros(1), np.eye(1), 0.0)
+    return evidence_needed(history, event)
+
+
+def test_a_change_of_one_run_needs_more_where_few_runs_were_learned_from():
+    several = [needed(learned, 1) for learned in (3, 5, 12, 40)]
+    assert several == sorted(several, reverse=True)
+    assert needed(5, 1) > needed(5, 3) > needed(5, 6) > EVIDENCE_NEEDED
+
+
+def test_where_nothing_was_learned_no_event_is_sure_and_none_is_kept_back():
+    assert needed(2, 1) == needed(2, 6) == needed(100_000, 1)
+
+
+def test_with_many_runs_it_is_that_of_a_normal_deviation():
+    looked_at = len(LABELS) * (9 * 10 // 2 + 7)  # steps, and growths of three runs or more up to the last one
+    normal = 0.5 * norm.isf(0.5 * FALSE / looked_at) ** 2
+    assert needed(100_000, 1) == max(EVIDENCE_NEEDED, 7.3 + math.log(looked_at))
+    assert normal < EVIDENCE_NEEDED  # what was needed before holds
+
+
+def test_disorder_is_no_deviation_of_a_run():
+    assert needed(5, 1, "turbulence") == EVIDENCE_NEEDED
