@@ -21,6 +21,7 @@ STARTS = (0.0, 0.03, 0.3)  # spreads, at least: of single sizes, from which the 
 ITERATIONS, SETTLED = 120, 1e-3  # at most; e-folds of a variance by which a step moves none any more
 LEAST_VARIANCE = 1e-12  # squared spreads
 LEAST_RUNS = 2  # with fewer nothing can be learned
+FEW = 3  # with fewer it cannot be known what runs differ by
 
 
 def without_deviation(one: Expansion, sizes: np.ndarray) -> Expansion:

@@ -8,13 +8,12 @@ from scipy.stats import t as student
 from tools.inference.parameters import CLOCK_PLACE
 from tools.watch.history import Event, History, already, earns_place, shaken_place, take
 from tools.watch.rivals import refined
-from tools.watch.scatter import PRIOR_RUNS
+from tools.watch.scatter import FEW, PRIOR_RUNS
 from tools.watch.water import named, rougher, water_event
 
 EVIDENCE_NEEDED = 16.0  # nat over no change (docs/WATCH.md)
 BEYOND_CHANCE = 7.3  # nat over the logarithm of how many changes are looked at
 FALSE = 0.02  # of the vehicles without a change that may be given one (docs/GAP.md)
-FEW = 3  # runs of a reference from which it can be learned what runs differ by
 MOST_EVENTS = 5
 
 

@@ -13,8 +13,10 @@ from tools.watch.disorder import WATER
 from tools.watch.events import GROWING, STEP, Span
 from tools.watch.flights import roughness_sigma
 from tools.watch.history import Event, History, within
-from tools.watch.search import EVIDENCE_NEEDED, FEW
+from tools.watch.scatter import FEW
+from tools.watch.search import EVIDENCE_NEEDED
 from tools.watch.unknown import NOTHING, Left, what_is_left
+from tools.watch.water import asked_above
 
 ROUGH = 6.0  # sigma of a run's mean squared innovation: something changed, though no label says what
 MOST_SURE = 0.995
@@ -124,11 +126,12 @@ def beside(one: Span, other: Span) -> bool:
 def nameless(history: History, found: list[Settled]) -> list[Settled]:
     """Runs in no event that are rougher than the reference by far: a change that no label takes."""
     flights = history.flights
+    least = max(ROUGH, asked_above(int(flights.reference.sum())))
     covered = np.zeros(flights.count, dtype=bool)
     for one in found:
         covered |= one.event.span.weights(flights.count) > 0.0
     rough = np.array([
-        bool(history.judged[n]) and not covered[n] and n >= history.begins and roughness_sigma(flights, n) > ROUGH
+        bool(history.judged[n]) and not covered[n] and n >= history.begins and roughness_sigma(flights, n) > least
         for n in range(flights.count)
     ])  # fmt: skip
     edges = np.flatnonzero(np.diff(np.concatenate([[0], rough.astype(int), [0]])))

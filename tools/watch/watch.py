@@ -17,7 +17,8 @@ from tools.watch.answer import NONE, RunVerdict, Watch
 from tools.watch.events import GROWING
 from tools.watch.flights import Flights
 from tools.watch.history import History
-from tools.watch.search import FEW, find_events
+from tools.watch.scatter import FEW
+from tools.watch.search import find_events
 from tools.watch.usable import ASKED, readings_of, usable, usable_dive
 from tools.watch.velocity import own_model, velocity
 from tools.watch.verdicts import event_answer, matters, run_verdict, settle

@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.stats import norm
+from scipy.stats import t as student
 
 from tools.diagnose.noise_probes import TURBULENCE, WAVES, NoiseProbe, inflated, probes
 from tools.diagnose.unknown import ONE_AXIS
@@ -13,9 +15,10 @@ from tools.watch.events import GROWING
 from tools.watch.flights import Flights, numbers, roughness_sigma
 from tools.watch.history import NOT_ROUGH, Event, History, within
 from tools.watch.label_fit import values_of
+from tools.watch.scatter import FEW, PRIOR_RUNS
 from tools.watch.unknown import LEFT_OVER
 
-ASKED_ABOVE = 4.0  # sigma of a run's mean squared innovation over the reference's, for disorder to be looked for
+ASKED_ABOVE = 4.0  # sigma of a run's mean squared innovation over that of many others, for disorder to be looked for
 STRETCH = 5.0  # s
 BURSTS = 0.65  # turbulence by 0.5 (weak) and less; changes that no label knows come in bursts, by 0.9 and more
 PROBED = 2  # runs in which it is asked what shakes
@@ -43,10 +46,16 @@ def water_event(history: History) -> Event | None:
 def rough_water(flights: Flights, runs: Sequence[int]) -> np.ndarray:
     """Nat that the water's disorder gains in runs, (labels, runs, scales); asked of rough ones only."""
     found = np.full((len(water_labels(flights)), len(runs), len(SCALES)), -NOT_ROUGH)
-    rough = [k for k, n in enumerate(runs) if roughness_sigma(flights, n) > ASKED_ABOVE]
+    least = asked_above(int(flights.reference.sum()))
+    rough = [k for k, n in enumerate(runs) if roughness_sigma(flights, n) > least]
     if rough:
         found[:, rough] = water_gains(flights, [runs[k] for k in rough])
     return found
+
+
+def asked_above(learned: int) -> float:
+    """ASKED_ABOVE where a run is held against a few: Student's t, by the runs learned from and what is usual."""
+    return ASKED_ABOVE if learned < FEW else float(student.isf(norm.sf(ASKED_ABOVE), learned - 1 + PRIOR_RUNS))
 
 
 def named(history: History, event: Event) -> Event:

@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pytest
 from scipy.stats import norm
 
 from tools.inference.parameters import NUISANCE, FreeParameter
@@ -11,6 +12,7 @@ from tools.watch.events import STEP, Span
 from tools.watch.flights import Flights
 from tools.watch.history import Event, History
 from tools.watch.search import EVIDENCE_NEEDED, FALSE, evidence_needed
+from tools.watch.water import ASKED_ABOVE, asked_above
 
 FREE = [FreeParameter(NUISANCE, "P[0]", "P", 0, 0.1), FreeParameter("drag", "scale", "F", 0, 0.4, -2.0, 10.0)]
 LABELS = ["drag", *(f"another {n}" for n in range(45))]
@@ -43,3 +45,10 @@ def test_with_many_runs_it_is_that_of_a_normal_deviation():
 
 def test_disorder_is_no_deviation_of_a_run():
     assert needed(5, 1, "turbulence") == EVIDENCE_NEEDED
+
+
+def test_roughness_beside_a_few_runs_is_asked_about_from_further_up():
+    several = [asked_above(learned) for learned in (3, 5, 12, 40, 100_000)]
+    assert several == sorted(several, reverse=True)
+    assert asked_above(100_000) == pytest.approx(ASKED_ABOVE, abs=1e-3)
+    assert asked_above(2) == ASKED_ABOVE  # how rough runs are usually is taken as it is
