@@ -13,7 +13,7 @@ from tools.watch.water import named, rougher, water_event
 
 EVIDENCE_NEEDED = 16.0  # nat over no change (docs/WATCH.md)
 BEYOND_CHANCE = 7.3  # nat over the logarithm of how many changes are looked at
-FALSE = 0.02  # of the vehicles without a change that may be given one (docs/GAP.md)
+FALSE = 0.05  # of the vehicles without a change that may be given one: of their runs a hundredth or so
 MOST_EVENTS = 5
 
 
