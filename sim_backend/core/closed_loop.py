@@ -7,7 +7,7 @@ closed_loop_lanes.
 import numpy as np
 
 from firmware.core.control.autopilot import reset, tick
-from firmware.core.jit import kernel
+from firmware.core.jit import allocating_kernel, kernel
 from firmware.core.layouts import control_layout as ctl
 from firmware.core.vehicle.layout import N_P, N_X, X_ACT, X_DOWN, X_EAST, X_NORTH
 from firmware.core.vehicle.state import euler_angles
@@ -61,7 +61,7 @@ def sum_up(ap, t, flown, end):
         end[i] /= max(flown, 1)
 
 
-@kernel
+@allocating_kernel
 def fly(P_plant, P, C, legs, nav, E, F, waves, sensors, errors, seed, x, dt, max_ticks, every, trace, end):
     """Fly one mission from state x (N_XF, in place) until it ends or max_ticks are over; returns the ticks flown.
 

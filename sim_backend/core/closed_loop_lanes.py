@@ -12,7 +12,7 @@ import numpy as np
 from firmware.core.control.autopilot import decide, reset
 from firmware.core.estimation.navigation import start_filter, step_filter
 from firmware.core.estimation.sensing import sense, take_as_measured
-from firmware.core.jit import kernel, parallel_kernel, prange
+from firmware.core.jit import allocating_kernel, kernel, parallel_kernel, prange
 from firmware.core.layouts import control_layout as ctl
 from firmware.core.layouts.estimator_layout import S_ANGULAR, S_LINEAR
 from firmware.core.maths.wide import LANES, as_wide
@@ -67,7 +67,7 @@ def command_lanes(members, flying, Fs, cmds, step, dt, queue, wanted, cmd):
             put_lane(wanted[lane], lane, cmd)
 
 
-@kernel
+@allocating_kernel
 def start_lanes(members, P_plants, Es, Fs, waves, xs, P, E, F, sea, x):
     """What the plant flies by and where it begins, of flight members[lane] into each lane. Returns whether F is set.
 
@@ -119,7 +119,7 @@ def estimate_lanes(P, Cs, members, flying, ests, aps, navs, x, est, nav, sent, t
                 navs[lane, ctl.NAV_SETTINGS + i] = nav[ctl.NAV_SETTINGS + i, lane]
 
 
-@kernel
+@allocating_kernel
 def fly_lanes(
     members, count, P_plants, P, Cs, legs, rows, nav, Es, Fs, waves, sensors, errors, seeds, xs, dt, max_ticks, every,
     traces, ends, ticks,

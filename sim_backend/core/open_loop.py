@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from firmware.core.jit import kernel, parallel_kernel, prange
+from firmware.core.jit import allocating_kernel, parallel_kernel, prange
 from firmware.core.vehicle.layout import N_P, N_X
 from sim_backend.core import layout as wl
 from sim_backend.core.effect_plant import effect_world_step, set_effects
@@ -10,7 +10,7 @@ from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.plant import hold_disturbance, plant_step
 
 
-@kernel
+@allocating_kernel
 def fly_open_loop(P, E, F, waves, seed, x, commands, dt, steps_per_row, out):
     """Fly from x (N_XF, in place) under commands (rows, 3), each held for steps_per_row steps of dt; out (rows, N_X).
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from firmware.core.jit import kernel
+from firmware.core.jit import allocating_kernel, kernel
 from firmware.core.maths.rotations import euler_from_quaternion, quaternion_from_euler, rotation_nb
 from firmware.core.vehicle.actuators import clip
 from firmware.core.vehicle.layout import N_P
@@ -119,7 +119,7 @@ def move_row(P, F, waves, seed, x, commands, row, acc, linear, angular, blow, Pw
         foreign_step(P, F, waves, seed, x, commands[c, 0], commands[c, 1], commands[c, 2], t, dt, acc, Pw, work)
 
 
-@kernel
+@allocating_kernel
 def fly_foreign(P, F, waves, errors, linear, angular, seed, x, L, commands, X, Y):
     """A whole run from x (N_FX, in place): commands (rows, 3), states X (rows, N_FX), noisy readings Y (rows, N_FR).
 
@@ -143,7 +143,7 @@ def fly_foreign(P, F, waves, errors, linear, angular, seed, x, L, commands, X, Y
         move_row(P, F, waves, seed, x, commands, row, acc, linear, angular, True, Pw, work)
 
 
-@kernel
+@allocating_kernel
 def fly_on(P, F, waves, seed, commands, X, first, last, Xw, Yw):
     """Windows flown on without noise, disturbance and turbulence: from X[first - 1] over rows first .. last - 1.
 
@@ -163,7 +163,7 @@ def fly_on(P, F, waves, seed, commands, X, first, last, Xw, Yw):
             read_sensors(F, x, row * fo.ROW_S, Yw[n, row - first[n]])
 
 
-@kernel
+@allocating_kernel
 def start_from_readings(F, X, rows):
     """Put depth and attitude of states X (rows, N_FX), in place, at what sensors under effects F make of them."""
     y = np.empty(fo.N_FR)

@@ -9,13 +9,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numba.core.errors import NumbaError
 
 from firmware.core import jit
 
 ROOT = jit.PACKAGES_DIR
 PACKAGES = ("firmware", "hal", "sim_backend", "tools")
 COMPILERS = {
-    "kernel", "inlined_kernel", "parallel_kernel", "njit", "jit", "vectorize", "guvectorize", "stencil", "jitclass",
+    "kernel", "inlined_kernel", "allocating_kernel", "parallel_kernel", "njit", "jit", "vectorize", "guvectorize",
+    "stencil", "jitclass",
 }  # fmt: skip
 
 # Flies through every kernel of the nominal flight and prints what came out, to the last bit.
@@ -35,6 +37,21 @@ for start in ((0.1, -0.2, 3.0, 0.3, 0.05, 0.02), (-2.0, 1.2, -1.0, -0.1, 0.3, 0.
     nominal_run(P, x, 0.6, -0.03, 0.15, 0.1, -0.05, 0.02, 0.01, 300, work)
     print(*(float(value).hex() for value in (*x, *euler_from_quaternion(*x[3:7]), wrap_angle(10.0 * x[3]))))
 """
+
+
+@jit.kernel
+def refused(values):
+    return (2.0 * values).sum()
+
+
+@jit.allocating_kernel
+def allowed(values):
+    return (2.0 * values).sum()
+
+
+@jit.kernel
+def calling(values):
+    return allowed(values)
 
 
 def sources(*words: str) -> list[Path]:
@@ -68,6 +85,15 @@ def test_nothing_is_cached_on_disk_but_by_jit():
         if isinstance(node, ast.keyword) and node.arg == "cache"
     }
     assert asking == {Path("firmware/core/jit.py")}
+
+
+@pytest.mark.skipif(jit.CACHE_DIR is None, reason="plain Python makes what it likes")
+def test_what_a_kernel_may_make_does_not_hang_on_who_calls_it():
+    """An array made in a kernel is refused, and allowed in an allocating one that such a kernel calls first."""
+
+    with pytest.raises(NumbaError, match="NRT required but not enabled"):
+        refused(np.ones(3))
+    assert calling(np.ones(3)) == 6.0
 
 
 @pytest.fixture

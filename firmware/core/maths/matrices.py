@@ -1,6 +1,21 @@
-"""Products of matrices in kernels. Numba's own needs SciPy, which what flies, and predicts, does without."""
+"""Copies and products of arrays in kernels: without an array made on the way, which Numba's make, and without SciPy."""
 
 from firmware.core.jit import kernel
+
+
+@kernel
+def copy(values, out):
+    """out (n,) = values (n,)."""
+    for n in range(len(values)):
+        out[n] = values[n]
+
+
+@kernel
+def transpose(A, out):
+    """out (m, n) = A (n, m) turned over; more rows of out stay."""
+    for i in range(A.shape[0]):
+        for j in range(A.shape[1]):
+            out[j, i] = A[i, j]
 
 
 @kernel

@@ -19,7 +19,6 @@ import operator
 import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, types
-from numba.core.errors import TypingError
 from numba.core.typeconv import Conversion
 from numba.extending import intrinsic, lower_builtin, lower_cast, models, overload, register_model, type_callable
 from numba.np import arrayobj
@@ -328,29 +327,28 @@ def as_wide(table):
     return table[..., 0]
 
 
-@intrinsic
-def _as_wide(typingctx, table):
-    if not isinstance(table, types.Array) or table.dtype != types.float64 or table.layout != "C" or table.ndim < 2:
-        raise TypingError("expected a C-contiguous array of floats of two dimensions or more")
-    seen = types.Array(WIDE, table.ndim - 1, "C", aligned=False)
+@type_callable(as_wide)
+def _as_wide_type(context):
+    def made(table):
+        if isinstance(table, types.Array) and table.dtype == types.float64 and table.layout == "C" and table.ndim >= 2:
+            return types.Array(WIDE, table.ndim - 1, "C", aligned=False)
+        return None
 
-    def codegen(context, builder, sig, args):
-        source = arrayobj.make_array(table)(context, builder, args[0])
-        made = arrayobj.make_array(seen)(context, builder)
-        vectors = builder.bitcast(source.data, context.get_data_type(WIDE).as_pointer())
-        arrayobj.populate_array(
-            made, data=vectors, shape=cgutils.unpack_tuple(builder, source.shape, table.ndim)[:-1],
-            strides=cgutils.unpack_tuple(builder, source.strides, table.ndim)[:-1],
-            itemsize=context.get_constant(types.intp, 8 * LANES), meminfo=source.meminfo, parent=source.parent,
-        )  # fmt: skip
-        return arrayobj.impl_ret_borrowed(context, builder, seen, made._getvalue())
-
-    return seen(table), codegen
+    return made
 
 
-@overload(as_wide)
-def _as_wide_array(table):
-    return lambda table: _as_wide(table)
+@lower_builtin(as_wide, types.Array)
+def _as_wide(context, builder, sig, args):
+    (table,) = sig.args
+    source = arrayobj.make_array(table)(context, builder, args[0])
+    made = arrayobj.make_array(sig.return_type)(context, builder)
+    vectors = builder.bitcast(source.data, context.get_data_type(WIDE).as_pointer())
+    arrayobj.populate_array(
+        made, data=vectors, shape=cgutils.unpack_tuple(builder, source.shape, table.ndim)[:-1],
+        strides=cgutils.unpack_tuple(builder, source.strides, table.ndim)[:-1],
+        itemsize=context.get_constant(types.intp, 8 * LANES), meminfo=source.meminfo, parent=source.parent,
+    )  # fmt: skip
+    return arrayobj.impl_ret_borrowed(context, builder, sig.return_type, made._getvalue())
 
 
 def room(like, shape):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from firmware.core.jit import kernel
+from firmware.core.jit import allocating_kernel, kernel
 from firmware.core.maths.wide import LANES, as_wide
 from firmware.core.vehicle.flight import nominal_run
 
@@ -35,7 +35,7 @@ def scatter(out, first, rows):
         take_lane(out, lane, rows[first + lane])
 
 
-@kernel
+@allocating_kernel
 def nominal_batch(Ps, xs, commands, waters, dt, steps):
     """`steps` Runge-Kutta steps of every vehicle, in place, under held commands: Ps (vehicles, N_P),
     xs (vehicles, N_X).

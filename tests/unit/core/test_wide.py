@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from model_states import P
 
-from firmware.core.jit import kernel
+from firmware.core.jit import allocating_kernel, kernel
 from firmware.core.maths.rotations import quaternion_from_euler
 from firmware.core.maths.wide import LANES, anywhere, as_wide, everywhere, lane, room, where, with_lane
 from firmware.core.vehicle import layout
@@ -21,7 +21,7 @@ def functions(a, b, out):
     out[0], out[1], out[2], out[3], out[4] = math.sin(a), math.cos(a), math.atan2(a, b), math.asin(b), math.tan(a)
 
 
-@kernel
+@allocating_kernel
 def operations(a, b, out):
     """Everything else that a wide number can do, once."""
     c = a

@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from firmware.core.jit import kernel, parallel_kernel, prange
+from firmware.core.jit import allocating_kernel, kernel, parallel_kernel, prange
 from sim_backend.core.noise import gaussian, uniform
 
 WANTED = 0.44  # acceptance of single components that a random walk does best with
@@ -140,7 +140,7 @@ def sweep_levels(levels, weights, square, n, width, steps, seed, number, sweep, 
             steps[g] = adapted(steps[g], took, sweep)
 
 
-@kernel
+@allocating_kernel
 def walk(seed, start, A0, b0, A, b, c, n, width, bounds, base, warm, thin, out):
     """One chain from start (D + G,): out (draws, D + G) after `warm` sweeps, each `thin` on; returns its acceptance."""
     D, groups = len(b0), len(n)

@@ -5,7 +5,8 @@ The terms are those that the plant flies with (firmware/core); nothing of equati
 
 import numpy as np
 
-from firmware.core.jit import kernel
+from firmware.core.jit import allocating_kernel, kernel
+from firmware.core.maths.matrices import copy
 from firmware.core.maths.rotations import rotation_nb_euler
 from firmware.core.vehicle.actuators import clip
 from firmware.core.vehicle.layout import K_D0, K_R, N_P
@@ -16,7 +17,7 @@ from firmware.core.vehicle.water import water_wrench
 N_K = K_R - K_D0 + 1
 
 
-@kernel
+@allocating_kernel
 def momentum_rows(P, attitude, nu, actuators, M, N, K):
     """Rows of d(M nu)/dt = N + K k: M (rows, 6), N (rows, 6), K (rows, 6, 12), k the coefficients of equation (4).
 
@@ -38,7 +39,7 @@ def momentum_rows(P, attitude, nu, actuators, M, N, K):
             P, R[6], R[7], R[8], u, v, w, p, q, r, servo, slider, ballast, 0.0, 0.0, 0.0
         )
         for k in range(N_K):
-            unit[:] = P
+            copy(P, unit)
             unit[K_D0 : K_R + 1] = 0.0
             unit[K_D0 + k] = 1.0
             F = water_wrench(unit, u, v, w, p, q, r)

@@ -13,8 +13,8 @@ import math
 
 import numpy as np
 
-from firmware.core.jit import kernel, parallel_kernel, prange
-from firmware.core.maths.matrices import product
+from firmware.core.jit import allocating_kernel, kernel, parallel_kernel, prange
+from firmware.core.maths.matrices import copy, product, transpose
 from firmware.core.maths.rotations import wrap_angle
 from firmware.core.maths.steps import MIDPOINT, RK4
 from firmware.core.maths.wide import LANES, as_wide, room
@@ -70,7 +70,7 @@ def perturbed(x, j, error, moved):
     """x with its error j at NUDGE, into moved; error (N_ERR or more) is scratch."""
     error[:] = 0.0
     error[j] = NUDGE
-    moved[:] = x
+    copy(x, moved)
     inject_error(moved, error)
 
 
@@ -89,7 +89,7 @@ def noise_gain(x, dt, Gam):
         Gam[E_NU + j, j] = dt
 
 
-@kernel
+@allocating_kernel
 def filled(values):
     """An array (n, LANES) of one vector, in every lane."""
     many = np.empty((len(values), LANES))
@@ -118,18 +118,18 @@ def linear_step(
         many[n, :] = acc[n]
     for first in range(E_DOWN - 1, E_LATE, LANES):  # the first of all is x as it stands, which the others are off from
         for n in range(LANES):
-            moved[:] = x
+            copy(x, moved)
             if E_DOWN <= first + n < E_LATE:
                 perturbed(x, first + n, error, moved)
-            states[:, n] = moved
+            copy(moved, states[:, n])
         propagate(
             Pws, Fs, as_wide(states), mode, t, inputs, i, begin, as_wide(many), zero, works, keeps, MIDPOINT
         )  # fmt: skip
         if first < E_DOWN:
-            base[:] = states[:, 0]
+            copy(states[:, 0], base)
         for n in range(LANES):
             if E_DOWN <= first + n < E_LATE:
-                moved[:] = states[:, n]
+                copy(states[:, n], moved)
                 difference(moved, base, error)
                 for m in range(N_ERR):
                     Phi[m, first + n] = error[m] / NUDGE
@@ -158,7 +158,7 @@ def linear_reading(F, x, t, stamps, path, i, begin, moved, error, y, y2, H):
             H[m, j] = change / NUDGE
 
 
-@kernel
+@allocating_kernel
 def filter_run(
     P, F, spectral, R, sigma, drift, mode, t, stamps, inputs, z, begin, end, start, spread, X, path, E, W, K
 ):
@@ -205,9 +205,9 @@ def filter_run(
                 lacking_columns(drift, dt, Gam, Phi)
             log_path(x, before, path, i, begin)
             product(Phi, cov, carried)
-            turned[:] = Phi.T
+            transpose(Phi, turned)
             product(carried, turned, cov)
-            turned[:6] = Gam.T
+            transpose(Gam, turned)
             for j in range(6):
                 s = spectral[Q_ACC + j] / dt
                 for a in range(count):
@@ -228,7 +228,7 @@ def filter_run(
             for j in range(3):
                 H[ef.Y_P + j, N_ERR + L_GYRO + j] = 1.0
         misfit += take_measurement(H, cov, R, d, HC, HT, S, L, W[i], K[i])
-        base[:] = x
+        copy(x, base)
         misfit += apply_gain(W[i], K[i], d, x, error, E[i])
         for n in range(count - N_ERR):
             lacking[n] += error[N_ERR + n]
@@ -236,8 +236,8 @@ def filter_run(
             x[X_SERVO] = clip(x[X_SERVO], P[SERVO_MIN], P[SERVO_MAX])
             x[ef.X_GEAR_SERVO] = x[X_SERVO] if F[ef.SERVO_PLAY] == 0.0 else x[ef.X_GEAR_SERVO]
         if count > N_ERR and lost(x, cov):  # by readings of no vehicle: it begins anew
-            x[:] = base
-            x[X_NU:X_ACT] = start[X_NU:X_ACT]
+            copy(base, x)
+            copy(start[X_NU:X_ACT], x[X_NU:X_ACT])
             lacking[:] = 0.0
             K[i, :, :] = 0.0
             cov[:] = 0.0
@@ -305,7 +305,7 @@ def posed(z):
     return False
 
 
-@kernel
+@allocating_kernel
 def follow_run(P, F, drift, mode, t, stamps, inputs, z, begin, end, start, W, K, posed, X, path, E):
     """A model flown along rows begin .. end - 1 with the gains of filter_run: X, path and E as there.
 
@@ -315,7 +315,7 @@ def follow_run(P, F, drift, mode, t, stamps, inputs, z, begin, end, start, W, K,
     """
     Pw, x = room(P, (N_P,)), room(P, (ef.N_XF,))
     effective_parameters(P, F, Pw)
-    x[:] = start
+    copy(start, x)
     work, kept = room(P, (4, ef.N_XF)), room(P, (ef.N_XF,))
     count = K.shape[1]
     error, zero, before, lacking = room(P, (count,)), np.zeros(3), room(P, (N_PATH,)), room(P, (N_LACKING,))
@@ -346,7 +346,7 @@ def follow_run(P, F, drift, mode, t, stamps, inputs, z, begin, end, start, W, K,
                 X[i, n] = x[n]
 
 
-@kernel
+@allocating_kernel
 def groups_of(links):
     """Where groups of at most LANES models begin whose corrections, if any, enter at the same link; and their end."""
     begins, count = np.empty(len(links) + 1, np.int64), 0

@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from firmware.core.jit import kernel, parallel_kernel, prange
+from firmware.core.jit import allocating_kernel, parallel_kernel, prange
+from firmware.core.maths.matrices import copy
 from firmware.core.maths.steps import RK4
 from firmware.core.maths.wide import LANES, as_wide, room
 from firmware.core.vehicle.batch import gather
@@ -16,7 +17,7 @@ from tools.inference.core.filter import follow_run, groups_of
 from tools.inference.core.step import N_Y, log_path, pose_of, propagate, read_row
 
 
-@kernel
+@allocating_kernel
 def fly_window(P, F, mode, t, inputs, X, path, begin, first, last, Y):
     """Fly a run on from X[begin - 1], rows first .. last - 1 into Y (rows, N_Y); path (rows, N_PATH) up to begin.
 
@@ -24,7 +25,7 @@ def fly_window(P, F, mode, t, inputs, X, path, begin, first, last, Y):
     """
     Pw, x, flown = room(P, (N_P,)), room(P, (ef.N_XF,)), room(P, (last, N_PATH))
     effective_parameters(P, F, Pw)
-    x[:] = X[begin - 1]
+    copy(X[begin - 1], x)
     flown[:begin] = path[:begin]
     work, kept = room(P, (4, ef.N_XF)), room(P, (ef.N_XF,))
     zero, before, acc = np.zeros(3), room(P, (N_PATH,)), np.zeros(6)

@@ -6,7 +6,7 @@ n errors of the state, m readings; what was not measured is NaN in d.
 import math
 
 from firmware.core.jit import kernel
-from firmware.core.maths.matrices import product
+from firmware.core.maths.matrices import product, transpose
 from firmware.core.maths.wide import everywhere, where
 
 
@@ -25,7 +25,7 @@ def take_measurement(H, cov, R, d, HC, HT, S, L, W, K):
         else:
             seen = m + 1
     product(H[:seen], cov, HC)
-    HT[:] = H.T
+    transpose(H, HT)
     product(HC[:seen], HT, S)
     for m in range(seen):
         if math.isnan(d[m]):

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from firmware.core.jit import kernel
+from firmware.core.jit import allocating_kernel, kernel
 from firmware.core.vehicle.layout import N_P, N_X, X_NU, X_POS
 from firmware.core.vehicle.linearise import model_error
 from firmware.core.vehicle.state import rotation
@@ -49,7 +49,7 @@ def lacking_columns(drift, dt, Gam, Phi):
         Phi[E_POS + j, N_ERR + L_WATER + j] = dt
 
 
-@kernel
+@allocating_kernel
 def add_model_error(P, sigma, x, share, work, cov):
     """A share of the accelerations' covariance that parameters of 1 sigma (N_P) leave at x, to the lacking's in cov."""
     point, C, Pt, g = work[0], np.empty((6, 6)), np.empty(N_P), work[1]

@@ -8,8 +8,8 @@ import math
 
 import numpy as np
 
-from firmware.core.jit import kernel, parallel_kernel, prange
-from firmware.core.maths.matrices import product
+from firmware.core.jit import allocating_kernel, kernel, parallel_kernel, prange
+from firmware.core.maths.matrices import product, transpose
 from sim_backend.ocean.core.glide import glide, net_buoyancy, next_speed, steady_speed, true_pitch
 from sim_backend.ocean.core.layout import (
     F_ROLL_TRIM,
@@ -108,7 +108,7 @@ def reading_derivative(x, inputs, i, H):
     H[Y_EAST, X_SPEED] = math.cos(x[X_GLIDE]) * math.sin(inputs[i, U_YAW])
 
 
-@kernel
+@allocating_kernel
 def filter_run(P, F, spectral, R, t, inputs, z, begin, end, start, spread, X, path, E, W, K):
     """The Kalman filter over rows begin .. end - 1; arguments and results as in core/filter.filter_run.
 
@@ -126,7 +126,7 @@ def filter_run(P, F, spectral, R, t, inputs, z, begin, end, start, spread, X, pa
         if i > begin:
             propagate(P, F, x, t, inputs, i, begin, Phi)
             product(Phi, cov, carried)
-            turned[:] = Phi.T
+            transpose(Phi, turned)
             product(carried, turned, cov)
             add_noise(P, spectral, t[i] - t[i - 1], inputs[i, U_UNSTEADY], cov)
         read_state(P, F, x, inputs, i, y)
@@ -157,7 +157,7 @@ def filter_runs(
         )  # fmt: skip
 
 
-@kernel
+@allocating_kernel
 def follow_run(P, F, t, inputs, z, begin, end, start, W, K, X, E):
     """A model flown along rows begin .. end - 1 with the gains of filter_run: X and E as there."""
     x, Phi, error = start.copy(), np.empty((N_ERR, N_ERR)), np.empty(N_ERR)
@@ -191,7 +191,7 @@ def follow_runs(Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, K
         take_valid(rows, valid[begin:end], lost_at, E[m, places[run] : places[run + 1]])
 
 
-@kernel
+@allocating_kernel
 def fly_window(P, F, t, inputs, bound, X, begin, first, last, Y):
     """Fly a run whose first row is `bound` on from X[begin - 1], rows first .. last - 1 into Y (rows, N_Y)."""
     x, Phi = X[begin - 1].copy(), np.empty((N_ERR, N_ERR))

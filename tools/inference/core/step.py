@@ -6,6 +6,7 @@ Errors of a state are those of core/error_layout.
 import math
 
 from firmware.core.jit import kernel
+from firmware.core.maths.matrices import copy
 from firmware.core.maths.rotations import wrap_angle
 from firmware.core.maths.wide import anywhere, everywhere, lane, lanes, spread, where, with_lane
 from firmware.core.vehicle.layout import X_ACT, X_NU, X_POS, X_QUAT
@@ -88,7 +89,7 @@ def propagate(Pw, F, x, mode, t, inputs, i, begin, acc, zero, work, kept, method
     h, delay = dt / steps, F[ef.COMMAND_DELAY]
     for k in range(steps):
         c0, c1, c2 = inputs_of_step(delay, t, inputs, i - 1, begin, t[i - 1] + k * h, h)
-        kept[:] = x
+        copy(x, kept)
         since = t[i - 1] - t[begin] + k * h
         effect_step(method, Pw, F, x, mode, c0, c1, c2, since, acc, 0.0, zero, h, work)
         worst = 0.0
