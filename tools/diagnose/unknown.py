@@ -11,7 +11,7 @@ from sim_backend.core.effects.catalogue import catalogue
 from tools.diagnose.clock import Clock
 from tools.diagnose.noise_probes import CLOCK, TURBULENCE, WAVES, ProbeResult, inflated, probes, run_probes
 from tools.diagnose.search import Search
-from tools.diagnose.shrink import AFTER, FLOOR, Shrinkage
+from tools.diagnose.shrink import AFTER, FLOOR, Shrinkage, shrink
 from tools.diagnose.waves import LINE, line_share
 from tools.inference.fit import Hypothesis
 from tools.inference.parameters import CLOCK_PLACE
@@ -25,7 +25,7 @@ TURNED = ("pitch", "roll", "yaw", "rates")  # channels that a sea does not move
 NOISY, NOISY_WIDTH = 0.2, 0.8  # share of the explainable misfit that is left: disorder is looked for; width in e-folds
 UNFIT = 5.0  # tolerances that the best explanation still misses by: no effect of the catalogue does that
 LOOSE = 3.0  # times the floor, and one tolerance, that no vehicle without a gap is off
-ONE_AXIS = 0.65  # of what all axes bring together: where one alone brings as much, it is no turbulence
+ONE_AXIS = 0.65  # of what all axes bring together: where one link alone brings as much, it is no turbulence
 MOSTLY = 0.9  # of all that can be explained, for turbulence or waves to be the cause
 LEAST_UNKNOWN, MORE_UNKNOWN = 0.002, 0.005  # probability of an unknown effect: nothing is left, or something is
 CLOCKED = 0.5  # of what the best probe gains, that the probe of motion capture's clock must
@@ -116,12 +116,23 @@ def waves_beside(search: Search, hypothesis: Hypothesis, left: Remainder) -> Pro
     return first if line_share(search.problem, gains) >= LINE else None
 
 
+def turbulence_beside(search: Search, hypothesis: Hypothesis, left: Remainder) -> ProbeResult | None:
+    """Turbulence, where no other link gains nearly as much beside a hypothesis, and the gap left is wide.
+
+    A sensor's small error may have more nats than water that shakes all axes, which the windows show.
+    """
+    first, second = left.probed[:2]
+    if first.probe.name != TURBULENCE or second.gain > ONE_AXIS * first.gain:
+        return None
+    return first if left_floors(shrink(search, hypothesis)) > WIDE else None
+
+
 def disorder(search: Search, hypothesis: Hypothesis, left: Remainder) -> ProbeResult | None:
     """The noise that the search has to know of, to see what is beside it; None where there is nothing of the kind.
 
     Motion capture's clock where its probe gains more than any other link's, its poses' noise apart; waves where they
-    show beside the hypothesis; turbulence or waves where they are the cause: of all that can be explained, they explain
-    MOSTLY.
+    show beside the hypothesis, turbulence where nothing else does; either where it is the cause: of all that can be
+    explained, it explains MOSTLY.
     """
     clock = [found for found in left.probed if found.probe.name == CLOCK and found.gain > CLOCKED * left.left]
     if clock and left.probed[0].probe.element == CLOCK_PLACE[1]:
@@ -129,10 +140,10 @@ def disorder(search: Search, hypothesis: Hypothesis, left: Remainder) -> ProbeRe
     beside = waves_beside(search, hypothesis, left)
     if beside is not None:
         return beside
-    if left.share <= NOISY:
-        return None
-    found = water_disorder(search, left.probed)
-    return found if found is not None and found.gain > MOSTLY * (left.explained + left.left) else None
+    found = water_disorder(search, left.probed) if left.share > NOISY else None
+    if found is not None and found.gain > MOSTLY * (left.explained + left.left):
+        return found
+    return turbulence_beside(search, hypothesis, left)
 
 
 def clock_of(search: Search, hypothesis: Hypothesis, gained: dict[str, float], more: np.ndarray) -> Clock | None:

@@ -127,6 +127,11 @@ def held_out_worth(search: Search, hypothesis: Hypothesis) -> Worth:
     return Worth(whole, taken)
 
 
+def strain(hypothesis: Hypothesis, less: Hypothesis) -> float:
+    """Nat of prior that what is allowed loses where it has to make up for an effect that another hypothesis lacks."""
+    return 0.5 * float((less.nuisance**2).sum() - (hypothesis.nuisance**2).sum())
+
+
 def prune_effects(search: Search, begin: Hypothesis | None = None) -> tuple[Hypothesis, dict[str, float]]:
     """Backward elimination: the best hypothesis without what does not earn its place; nat that each effect brings.
 
@@ -143,9 +148,11 @@ def prune_effects(search: Search, begin: Hypothesis | None = None) -> tuple[Hypo
             if len(hypothesis.labels) == 1:
                 return hypothesis, gains
             outside = held_out_worth(search, hypothesis)
-            weakest = min(outside.taken, key=outside.tolerances)
-            if outside.share(weakest) >= HELD_OUT_SHARE:
+            idle = [label for label in outside.taken if outside.share(label) < HELD_OUT_SHARE]
+            idle = [label for label in idle if strain(hypothesis, drop(search, hypothesis, label)) < EVIDENCE_NEEDED]
+            if not idle:
                 return hypothesis, gains
+            weakest = min(idle, key=outside.tolerances)
         hypothesis = drop(search, hypothesis, weakest)
     return hypothesis, {}
 
@@ -194,13 +201,16 @@ def search_again_with_noise(
     """The answer of a further search, by a filter that knows of the disorder found.
 
     Where the windows err by far less than rough water of that strength would have them, it is none: something shakes
-    the vehicle and lets go of it again, as a tail that flaps does. The answer is then the one without it.
+    the vehicle and lets go of it again, as a tail that flaps does. Nor is it where another effect is the main cause
+    beside it: what nobody knows looks like rough water too, in which a known effect is easily believed. The answer is
+    then the one without it.
     """
     more, _ = inflated(search.problem, found.probe, found.scale)
     clock = clock_of(search, hypothesis, gained, more) if found.probe.name == CLOCK else None
     problem = search.problem.as_recorded if clock is None else clock.aligned(search.problem)
     answer = conclude(run(problem.with_extra_noise(more), say, clock, [search.best, hypothesis]), say, found)
-    if found.probe.name == TURBULENCE and answer.shrinkage.after < ROUGH * answer.shrinkage.floor:
+    calm = answer.main != TURBULENCE or answer.shrinkage.after < ROUGH * answer.shrinkage.floor
+    if found.probe.name == TURBULENCE and calm:
         say("not as rough water would have it")
         return conclude(search, say, calm=True)
     return answer

@@ -21,6 +21,16 @@ def test_rough_water_is_turbulence_however_rough(tmp_path):
     assert 10.0 < answer.noise.scale < 40.0
 
 
+def test_rough_water_is_turbulence_beside_a_sensor_with_more_nats(tmp_path):
+    """Gyros that read a third too much say more of the readings than the water does, and take little of the gap."""
+    F = np.zeros(ef.N_F)
+    F[ef.GYRO_SCALE] = -0.3
+    answer = conclude(run(problem_of(make_case(tmp_path, F, seed=9, runs=2, rough=10.0))))
+    assert answer.main == TURBULENCE
+    assert answer.selected == [TURBULENCE, "gyro_scale"]
+    assert answer.probabilities["unknown"] < 0.1
+
+
 def test_a_clock_that_wanders_is_late_and_hides_nothing_beside_it(tmp_path):
     F = np.zeros(ef.N_F)
     F[ef.DRAG_0] = 1.0

@@ -8,6 +8,7 @@ from support.cases import make_case
 
 from sim_backend.core.effects import effect_layout as ef
 from tools.diagnose import search as search_module
+from tools.diagnose import verdict as verdict_module
 from tools.diagnose.noise_probes import CLOCK, NoiseProbe, ProbeResult
 from tools.diagnose.probabilities import SECOND, doubt_small, pass_on, share_out
 from tools.diagnose.record import NONE
@@ -22,7 +23,16 @@ from tools.diagnose.unknown import (
     left_share,
     probability_unknown,
 )
-from tools.diagnose.verdict import Worth, conclude, drop, held_out_worth, with_least_gap
+from tools.diagnose.verdict import (
+    EVIDENCE_NEEDED,
+    Worth,
+    conclude,
+    drop,
+    held_out_worth,
+    prune_effects,
+    strain,
+    with_least_gap,
+)
 from tools.inference.problem import problem_of
 
 
@@ -54,6 +64,27 @@ def test_more_evidence_wins_only_as_far_as_it_closes_the_gap_of_runs_left_out(tw
         assert sum(found.values()) == pytest.approx(1.0)
     fewer = {closes: 0.6, leaves: 0.4, NONE: 0.0}
     assert with_least_gap(two_effects, alone[closes], closes, fewer) == fewer
+
+
+def test_strain_is_what_the_prior_loses():
+    whole, less = SimpleNamespace(nuisance=np.array([1.0, 0.0])), SimpleNamespace(nuisance=np.array([3.0, -4.0]))
+    assert strain(whole, less) == pytest.approx(12.0)
+    assert strain(less, whole) == pytest.approx(-12.0)
+
+
+@pytest.mark.parametrize(("lost", "stays"), [(EVIDENCE_NEEDED, 2), (EVIDENCE_NEEDED - 0.1, 1)])
+def test_what_is_allowed_takes_no_effect_s_place_that_it_fills_only_at_its_limits(
+    two_effects, monkeypatch, lost, stays
+):
+    def idle(search, hypothesis):
+        return Worth(np.ones(3), {label: np.zeros(3) for label in hypothesis.labels})
+
+    monkeypatch.setattr(verdict_module, "held_out_worth", idle)
+    monkeypatch.setattr(verdict_module, "strain", lambda hypothesis, less: lost)
+    both = next(one for one in two_effects.ranked() if set(one.labels) == {"net_buoyancy", "pitch_trim"})
+    kept, gained = prune_effects(two_effects, both)
+    assert len(kept.labels) == stays
+    assert set(gained) == set(kept.labels)
 
 
 def test_a_search_that_takes_over_effects_makes_its_filter_at_them(two_effects, monkeypatch):
