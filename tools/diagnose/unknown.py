@@ -1,6 +1,7 @@
 """Whether what the selected effects leave is an effect that nobody knows, or disorder: of the water, or of a clock."""
 
 import itertools
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,7 @@ from scipy.special import ndtr
 from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.catalogue import catalogue
 from tools.diagnose.clock import Clock
-from tools.diagnose.noise_probes import CLOCK, TURBULENCE, WAVES, ProbeResult, inflated, probes, run_probes
+from tools.diagnose.noise_probes import CLOCK, TURBULENCE, WAVES, NoiseProbe, ProbeResult, inflated, probes, run_probes
 from tools.diagnose.search import Search
 from tools.diagnose.shrink import AFTER, FLOOR, Shrinkage, shrink
 from tools.diagnose.waves import LINE, line_share
@@ -56,6 +57,17 @@ def left_floors(shrinkage: Shrinkage) -> float:
     return float(np.sqrt(max(shrinkage.after**2 - shrinkage.floor**2, 0.0)) / max(shrinkage.floor, 1e-6))
 
 
+def place_alone(probed: Iterable[tuple[NoiseProbe, float]]) -> tuple[str, str] | None:
+    """Subsystem and element whose noise gains ALONE times what any other's does, of probes and their gains (nat)."""
+    gains: dict[tuple[str, str], float] = {}
+    for probe, gain in probed:
+        place = probe.subsystem, probe.element
+        gains[place] = max(gains.get(place, 0.0), gain)
+    ranked = sorted(gains, key=lambda place: -gains[place])
+    next_gain = gains[ranked[1]] if len(ranked) > 1 else 0.0
+    return ranked[0] if ranked and gains[ranked[0]] > ALONE * next_gain else None
+
+
 @dataclass
 class Remainder:
     """What the selected effects leave, in nat of likelihood that inflating one link's noise gains."""
@@ -67,13 +79,7 @@ class Remainder:
     @property
     def alone(self) -> tuple[str, str] | None:
         """Subsystem and element where all of it enters; None where the noise of others would explain it, too."""
-        gains: dict[tuple[str, str], float] = {}
-        for found in self.probed:
-            place = found.probe.subsystem, found.probe.element
-            gains[place] = max(gains.get(place, 0.0), found.gain)
-        ranked = sorted(gains, key=lambda place: -gains[place])
-        next_gain = gains[ranked[1]] if len(ranked) > 1 else 0.0
-        return ranked[0] if ranked and gains[ranked[0]] > ALONE * next_gain else None
+        return place_alone((found.probe, found.gain) for found in self.probed)
 
     @property
     def share(self) -> float:

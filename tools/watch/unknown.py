@@ -6,12 +6,14 @@ import numpy as np
 from scipy.special import ndtr
 
 from tools.diagnose.noise_probes import NoiseProbe, probes
+from tools.diagnose.unknown import place_alone
 from tools.inference.parameters import CLOCK_PLACE
 from tools.watch.disorder import SCALES, WATER, beyond_reference
 from tools.watch.flights import roughness_sigma
 from tools.watch.history import Event, History
 
 LEFT_OVER, LEFT_WIDTH = 0.145, 1.1  # as in tools/diagnose/unknown.py: the share left at which it is as likely as not
+OWN_LEFT = 0.03  # the same where all of it is left at the sensor of the change's own label (docs/WATCH.md, Thresholds)
 PROBED, REFERENCE = 3, 2  # runs at most
 CLEAN = 5.0  # sigma of the mean squared innovation, below which nothing is left
 LEAST_PROBABILITY = 0.005
@@ -23,11 +25,12 @@ class Left:
 
     share: float
     probes: list[tuple[NoiseProbe, float, float]]  # with gain and scale, the one that gains most first
+    own: bool = False  # whether it is left at the sensor that the event's label is of, and nowhere else
 
     @property
     def probability(self) -> float:
         """That this is no effect of the catalogue."""
-        z = (np.log(max(self.share, 1e-6)) - np.log(LEFT_OVER)) / LEFT_WIDTH
+        z = (np.log(max(self.share, 1e-6)) - np.log(OWN_LEFT if self.own else LEFT_OVER)) / LEFT_WIDTH
         return float(np.clip(ndtr(z), LEAST_PROBABILITY, 1.0 - LEAST_PROBABILITY))
 
 
@@ -49,7 +52,9 @@ def what_is_left(history: History, event: Event) -> Left:
     if event.has_course and found[0][0].element == CLOCK_PLACE[1] and history.effects[event.label].place == CLOCK_PLACE:
         return NOTHING  # a clock that wanders is still one that is wrong
     left = max(found[0][1], 0.0)
-    return Left(left / max(left + explained * len(rough), 1e-9), found)
+    place = history.effects[event.label].place if event.label in history.effects else ("", "")
+    own = place[0] == "sensing" and place == place_alone((probe, gain) for probe, gain, _ in found)
+    return Left(left / max(left + explained * len(rough), 1e-9), found, own)
 
 
 def alone(history: History, event: Event) -> np.ndarray:

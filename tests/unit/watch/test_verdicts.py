@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
+from tools.diagnose.noise_probes import NoiseProbe
+from tools.diagnose.unknown import place_alone
 from tools.watch.events import GROWING, STEP, Span
 from tools.watch.history import Event
-from tools.watch.unknown import NOTHING
+from tools.watch.unknown import NOTHING, Left
 from tools.watch.verdicts import Settled, one_form
 
 
@@ -40,3 +42,13 @@ def test_other_changes_keep_their_labels(changes, why):
 def test_a_change_far_from_those_keeps_its_label():
     found = one_form([settled("drag", 1, 4), *(settled(*one) for one in ALL_TOUCH)])
     assert [one.unknown for one in found] == [False, True, True, True, True]
+
+
+def test_what_is_left_where_the_label_sits_and_nowhere_else_is_another_form():
+    """A gyro whose error grows with depth is no bias, though a bias explains nine tenths of it."""
+    gyro, servo = NoiseProbe("gyro", "sensor", "sensing", "gyro"), NoiseProbe("servo", "actuator", "actuation", "servo")
+    assert place_alone([(servo, 1.0), (gyro, 300.0), (gyro, 20.0)]) == ("sensing", "gyro")
+    assert place_alone([(gyro, 300.0), (servo, 150.0)]) is None
+    assert Left(0.09, []).probability < 0.4
+    assert Left(0.09, [], own=True).probability > 0.8
+    assert Left(0.005, [], own=True).probability < 0.1
