@@ -112,12 +112,15 @@ def test_json_holds_the_result_alone(monkeypatch, capsys):
 
 
 def test_figures_for_people(monkeypatch, capsys):
-    monkeypatch.setattr(sys, "argv", ["glider", "benchmark", "--only", "memory", "--repeats", "1"])
+    monkeypatch.setattr(sys, "argv", ["glider", "benchmark", "--only", "memory,startup,memory", "--repeats", "1"])
     assert report_errors(cli) == 0
-    assert capsys.readouterr().out.startswith("memory.flight_rss_mb")
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == ["memory.flight_rss_mb", "startup.help_s", "startup.first_tick_s"]
 
 
-@pytest.mark.parametrize("options", [["--only", "speed"], ["--repeats", "0"], ["--plant-c", "nowhere.c"]])
+@pytest.mark.parametrize(
+    "options", [["--only", "speed"], ["--only", "memory,speed"], ["--repeats", "0"], ["--plant-c", "nowhere.c"]]
+)
 def test_bad_usage(monkeypatch, capsys, options):
     monkeypatch.setattr(sys, "argv", ["glider", "benchmark", *options])
     assert report_errors(cli) == 2
