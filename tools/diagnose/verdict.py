@@ -148,8 +148,11 @@ def prune_effects(search: Search, begin: Hypothesis | None = None) -> tuple[Hypo
             if len(hypothesis.labels) == 1:
                 return hypothesis, gains
             outside = held_out_worth(search, hypothesis)
-            idle = [label for label in outside.taken if outside.share(label) < HELD_OUT_SHARE]
-            idle = [label for label in idle if strain(hypothesis, drop(search, hypothesis, label)) < EVIDENCE_NEEDED]
+            idle = [
+                label for label in hypothesis.labels
+                if outside.share(label) < HELD_OUT_SHARE
+                and strain(hypothesis, drop(search, hypothesis, label)) < EVIDENCE_NEEDED
+            ]  # fmt: skip
             if not idle:
                 return hypothesis, gains
             weakest = min(idle, key=outside.tolerances)
@@ -209,8 +212,8 @@ def search_again_with_noise(
     clock = clock_of(search, hypothesis, gained, more) if found.probe.name == CLOCK else None
     problem = search.problem.as_recorded if clock is None else clock.aligned(search.problem)
     answer = conclude(run(problem.with_extra_noise(more), say, clock, [search.best, hypothesis]), say, found)
-    calm = answer.main != TURBULENCE or answer.shrinkage.after < ROUGH * answer.shrinkage.floor
-    if found.probe.name == TURBULENCE and calm:
+    rough = answer.main == TURBULENCE and answer.shrinkage.after >= ROUGH * answer.shrinkage.floor
+    if found.probe.name == TURBULENCE and not rough:
         say("not as rough water would have it")
         return conclude(search, say, calm=True)
     return answer
