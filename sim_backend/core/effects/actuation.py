@@ -18,12 +18,24 @@ def effective_actuators(P, F, out):
     out[layout.SERVO_RATE] *= math.exp(-F[ef.SERVO_RATE_LOG])
     out[layout.SERVO_TAU] *= math.exp(F[ef.SERVO_LAG_LOG])
     middle = 0.5 * (P[layout.SERVO_MIN] + P[layout.SERVO_MAX])
-    out[layout.SERVO_MIN] = min(P[layout.SERVO_MIN] + F[ef.SERVO_LIMIT], middle)  # at most all is lost
-    out[layout.SERVO_MAX] = max(P[layout.SERVO_MAX] - F[ef.SERVO_LIMIT], middle)
+    lost = F[ef.SERVO_LIMIT] * (1.0 - F[ef.SERVO_GIVE])
+    out[layout.SERVO_MIN] = min(P[layout.SERVO_MIN] + lost, middle)  # at most all is lost
+    out[layout.SERVO_MAX] = max(P[layout.SERVO_MAX] - lost, middle)
     out[layout.SLIDER_RATE] *= math.exp(-F[ef.SLIDER_RATE_LOG])
     out[layout.SLIDER_TAU] *= math.exp(F[ef.SLIDER_LAG_LOG])
     out[layout.BALLAST_RATE] *= math.exp(-F[ef.PUMP_RATE_LOG])
     out[layout.BALLAST_TAU] *= math.exp(F[ef.PUMP_LAG_LOG])
+
+
+@kernel
+def against_stops(P, F, command):
+    """Angle (rad) that a servo reaches of one commanded, by effective P: into a soft stop it goes by a share of it."""
+    give = F[ef.SERVO_GIVE]
+    if everywhere((give <= 0.0) | (F[ef.SERVO_LIMIT] <= 0.0)):
+        return command
+    soft = give * F[ef.SERVO_LIMIT]
+    low, high = P[layout.SERVO_MIN] + soft, P[layout.SERVO_MAX] - soft
+    return command + (give - 1.0) * (command - clip(command, low, high))
 
 
 @kernel
@@ -32,7 +44,7 @@ def motor_speeds(P, F, x, mode, c_servo, c_slider, c_ballast):
     servo, slider, ballast = actuators(x)
     ds, dl, db = c_servo, c_slider, c_ballast
     if not mode & SERVO_DRIVEN:
-        ds = actuator_rate(servo, c_servo, *actuator_table(P, layout.SERVO_MIN))
+        ds = actuator_rate(servo, against_stops(P, F, c_servo), *actuator_table(P, layout.SERVO_MIN))
     if not mode & SLIDER_DRIVEN:
         dl = actuator_rate(slider, c_slider, *actuator_table(P, layout.SLIDER_MIN))
     if not mode & BALLAST_DRIVEN:

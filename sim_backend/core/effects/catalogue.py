@@ -35,9 +35,10 @@ EFFECTS = (
     # the rail does not hang straight where the servo says 0
     _row("actuation servo", "servo_offset", "constant angle added to the servo",
          Parameter("angle", "rad", -0.8, 0.8, 0.15, "SERVO_OFFSET")),
-    # the servo stops short of the range that its file gives
-    _row("actuation servo", "servo_limit", "taken off the range at both ends",
-         Parameter("loss", "rad", 0.0, 1.0, 0.4, "SERVO_LIMIT")),
+    # the servo stops short of the range that its file gives, at something that may give way
+    _row("actuation servo", "servo_limit",
+         "`loss` taken off the range at both ends; `give` of what is commanded beyond is reached",
+         Parameter("loss", "rad", 0.0, 1.0, 0.4, "SERVO_LIMIT"), Parameter("give", "1", 0.0, 0.9, 0.3, "SERVO_GIVE")),
     # the linear-mass actuator moves slower and follows later than its file says
     _row("actuation slider", "slider_slow", "rate limit divided by e^rate, time constant multiplied by e^lag",
          Parameter("rate", "1", 0.0, 4.0, 1.0, "SLIDER_RATE_LOG"),
@@ -91,7 +92,7 @@ EFFECTS = (
     # pitching is damped more or less than its coefficient says, with the speed or, across the flow, with the rate
     _row("hydrodynamics pitch", "pitch_damping", "pitch moment K_q ((1 + scale) V^2 + across abs(q)) q",
          Parameter("scale", "1", -0.98, 8.0, 0.6, "PITCH_DAMPING"),
-         Parameter("across", "m2/s", -0.3, 8.0, 0.5, "PITCH_DAMPING_ACROSS")),
+         Parameter("across", "m2/s", -1.0, 8.0, 0.5, "PITCH_DAMPING_ACROSS")),
     # a yaw moment that grows with the square of the speed
     _row("hydrodynamics yaw", "yaw_trim", "yaw moment over V^2",
          Parameter("k", "kg", -3.0, 3.0, 0.2, "YAW_TRIM")),
@@ -101,7 +102,7 @@ EFFECTS = (
     # yawing is damped more or less than its coefficient says, with the speed or, across the flow, with the rate
     _row("hydrodynamics yaw", "yaw_damping", "yaw moment K_r ((1 + scale) V^2 + across abs(r)) r",
          Parameter("scale", "1", -0.98, 8.0, 0.6, "YAW_DAMPING"),
-         Parameter("across", "m2/s", -0.3, 8.0, 0.5, "YAW_DAMPING_ACROSS")),
+         Parameter("across", "m2/s", -1.0, 8.0, 0.5, "YAW_DAMPING_ACROSS")),
     # --- mass ----------------------------------------------------------------------------------------------------
     # the vehicle was ballasted heavy or light; the missing mass acts at the origin
     _row("mass net", "net_buoyancy", "a constant net mass at the origin, heavy positive",

@@ -110,6 +110,18 @@ def test_a_servo_stops_short_of_its_range(side, loss, left):
     assert (np.abs(states[:, 13]) <= left + 1e-12).all()
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("beyond", [-0.2, 0.15, 0.35, 5.0])
+def test_a_stop_that_gives_way_lets_the_servo_go_by_a_share(side, beyond):
+    low, high = SERVO.range
+    stop = {1.0: high, -1.0: -low}[side] - 0.4
+    states, _ = flown(
+        quiet({"servo_limit": {"loss": 0.4, "give": 0.25}}), 25.0, held(side * (stop + beyond), 0.0, 0.0)
+    )
+    reached = stop + (0.25 * min(beyond, 0.4) if beyond > 0.0 else beyond)
+    assert states[-1, 13] == pytest.approx(side * reached, abs=1e-6)
+
+
 def test_a_servo_that_loses_more_than_it_has_stands_in_the_middle():
     weak = P.copy()
     weak[layout.SERVO_MIN], weak[layout.SERVO_MAX] = -0.6, 0.8
