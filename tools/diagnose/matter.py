@@ -12,7 +12,7 @@ from tools.gap.measure import mean_square
 from tools.inference.channels import errors
 from tools.inference.fit import Hypothesis
 from tools.inference.kind import MATTERS
-from tools.inference.predict import fly_windows_from
+from tools.inference.predict import at_its_word, fly_windows_from
 from tools.inference.problem import Problem, cut
 
 
@@ -26,7 +26,7 @@ def movements(search: Search, hypothesis: Hypothesis) -> dict[str, float]:
         return {}
     problem = search.problem.as_recorded
     P, F = search.model(hypothesis)
-    gains, found = problem.filter(P, F, begin=True), {}
+    gains, found = at_its_word(problem, P, F), {}
     whole = fly_windows_from(problem, P, F, gains)
     for label, entries in effects.items():
         without = search.lacking(F, entries)

@@ -12,7 +12,7 @@ import numpy as np
 
 from sim_backend.core.effects.catalogue import catalogue
 from tools.diagnose.clock import Clock
-from tools.diagnose.sensor_consistency import DISTANT, HOLDS_BELOW, NEARBY, inconsistent_sensor
+from tools.diagnose.sensor_consistency import DISTANT, HOLDS_BELOW, NEARBY, inconsistent_sensors
 from tools.inference import levels
 from tools.inference.fit import POOR, THRESHOLD_STEP, Fitter, Hypothesis
 from tools.inference.model import effect_vector, nominal_model
@@ -186,23 +186,35 @@ def start_at_inconsistent_sensor(search: Search) -> bool:
     """A sensor or clock that is inconsistent with the others, fitted before all else; False where there is none.
 
     A filter that expects a rough disturbance leans on the readings, and with gyros that turn twice as far as the
-    attitude, or with poses that are a second late, it holds no model to the course flown.
+    attitude, or with poses that are a second late, it holds no model to the course flown. Of a clock both labels are
+    fitted: a constant between two that were tried looks like a line.
     """
     if search.fitter.prior_weight <= HOLDS_BELOW:
         return False
-    found = inconsistent_sensor(search.problem, search.nuisance, search.parameters)
-    if found is None:
+    found = inconsistent_sensors(search.problem, search.nuisance, search.parameters)
+    if not found:
         return False
-    free, value = found
+    first = catalogue()[found[0][0].label].place
+    same = [one for one in found if catalogue()[one[0].label].place == first == CLOCK_PLACE]
+    begun = [begun_at(search, free, value) for free, value in same or found[:1]]
+    best = min(begun, key=lambda one: one.fitter.temperature)
+    search.problem, search.fitter, search.gains = best.problem, best.fitter, best.gains
+    search.null, search.hypotheses = best.null, best.hypotheses
+    return True
+
+
+def begun_at(search: Search, free: FreeParameter, value: float) -> Search:
+    """The search at one effect alone, one of its parameters begun at a value (spreads); a clock's with poses moved."""
     own = search.parameters[free.label]
+    begun = replace(search, hypotheses=[])
     values = np.array([value * (one is free) for one in own])
-    search.hypotheses = [search.fitter.hypothesis((free.label,), own, values)]
+    begun.hypotheses = [begun.fitter.hypothesis((free.label,), own, values)]
     for _ in range(ALIGNED if catalogue()[free.label].place == CLOCK_PLACE else 1):
         if catalogue()[free.label].place == CLOCK_PLACE:
-            search.problem = aligned(search.problem, search.model(search.hypotheses[0])[1])
-        refilter(search, search.hypotheses[0], 1.0)
-        converge(search.fitter, search.hypotheses[0])
-    return True
+            begun.problem = aligned(begun.problem, begun.model(begun.hypotheses[0])[1])
+        refilter(begun, begun.hypotheses[0], 1.0)
+        converge(begun.fitter, begun.hypotheses[0])
+    return begun
 
 
 def first_step(fitter: Fitter, hypotheses: list[Hypothesis]) -> None:
@@ -253,16 +265,33 @@ def first_round(search: Search) -> None:
     search.hypotheses = advance_and_prune(search.fitter, search.hypotheses, search.null.misfit, LEFT, 3)
 
 
-def take_over(search: Search, known: Hypothesis) -> None:
-    """A hypothesis of another search over the same runs, fitted here and kept; less what stands in the model."""
-    kept = [k for k, free in enumerate(known.free) if free.label in search.parameters]
-    labels = tuple(label for label in known.labels if label in search.parameters)
-    if not labels or any(set(labels) == set(c.labels) for c in search.hypotheses):
+def take_over(search: Search, before: Sequence[Hypothesis]) -> None:
+    """Hypotheses of another search over the same runs, kept and fitted here; less what stands in the model.
+
+    Gains are made anew at the one that a filter of its own misses least with, where that is none of this search's: far
+    from it they say nothing of it.
+    """
+    found: list[Hypothesis] = []
+    for known in before:
+        kept = [k for k, free in enumerate(known.free) if free.label in search.parameters]
+        labels = tuple(label for label in known.labels if label in search.parameters)
+        if labels and not any(set(labels) == set(c.labels) for c in [*search.hypotheses, *found]):
+            free, values = [known.free[k] for k in kept], known.values[kept]
+            found.append(search.fitter.hypothesis(labels, free, values, known.nuisance))
+    if not found:
         return
-    found = search.fitter.hypothesis(labels, [known.free[k] for k in kept], known.values[kept], known.nuisance)
-    search.fitter.measure([found])
-    converge(search.fitter, found)
-    search.hypotheses.append(found)
+    alone = search.best
+    missed = [search.problem.filter(*search.model(one), begin=True).misfit.sum() for one in (alone, *found)]
+    search.hypotheses += found
+    search.fitter.measure(found)
+    if np.argmin(missed) > 0:
+        refilter(search, found[int(np.argmin(missed)) - 1], 1.0)
+        search.hypotheses = advance_and_prune(search.fitter, search.hypotheses, search.null.misfit, 2 * LEFT, 3)
+    else:
+        for one in found:
+            converge(search.fitter, one)
+    if search.best.labels != alone.labels:
+        refine(search, 1)
 
 
 def run(
@@ -298,11 +327,7 @@ def run(
         if search.best.labels == first:
             break
     say(f"one effect: {' '.join(search.best.labels) or 'none'}")
-    alone = search.best
-    for hypothesis in before:
-        take_over(search, hypothesis)
-    if search.best is not alone:  # whose filter was made far from it, and weighs the prior as far
-        refine(search, 1)
+    take_over(search, before)
     grow(search, say)
     if level_disturbance(search):
         grow(search, say)

@@ -11,6 +11,7 @@ import numpy as np
 
 from sim_backend.core.effects.catalogue import catalogue
 from tools.inference.parameters import CLOCK_PLACE, FreeParameter, model_at
+from tools.inference.predict import poses_in_place
 from tools.inference.problem import LOST, Gains, Problem
 
 DISTANT = (-10.0, -5.0, -2.0, 2.0, 5.0, 10.0)  # spreads of a parameter, tried as starts
@@ -36,20 +37,22 @@ def suspects(candidates: dict[str, list[FreeParameter]]) -> list[FreeParameter]:
     ]
 
 
-def inconsistent_sensor(
+def inconsistent_sensors(
     problem: Problem, nuisance: list[FreeParameter], candidates: dict[str, list[FreeParameter]]
-) -> tuple[FreeParameter, float] | None:
-    """The parameter, and how many spreads it is out, that reconciles the readings best; None where none does."""
+) -> list[tuple[FreeParameter, float]]:
+    """Of each label that reconciles the readings, its parameter and how many spreads it is out; the best first."""
     own = np.zeros(len(nuisance))
     whole = problem.filter(*model_at(problem, nuisance, own), begin=True)
     bounds = problem.recording.bounds
     missed = [np.nanmean(whole.E[a:b] ** 2) for a, b in itertools.pairwise(bounds)]
     worst = problem.part(int(np.argmax(np.nan_to_num(missed))))
-    first = mean_nis(worst, worst.filter(*model_at(problem, nuisance, own), begin=True))
-    best, least = None, OUT * first
+    most = OUT * mean_nis(worst, worst.filter(*model_at(problem, nuisance, own), begin=True))
+    found: dict[str, tuple[float, FreeParameter, float]] = {}
     for free in suspects(candidates):
         for far in (far for far in (*NEARBY, *DISTANT) if free.low <= far <= free.high):
             model = model_at(problem, [*nuisance, free], np.append(own, far))
-            if (left := mean_nis(worst, worst.filter(*model, begin=True))) < least:
-                best, least = (free, far), left
-    return best
+            placed, walk = poses_in_place(worst, model[1])
+            left = mean_nis(placed, placed.filter(*model, begin=True, more=walk))
+            if left < min(most, found.get(free.label, (np.inf,))[0]):
+                found[free.label] = left, free, far
+    return [(free, far) for _, free, far in sorted(found.values(), key=lambda one: one[0])]

@@ -11,7 +11,7 @@ from tools.gap.measure import RunGap, case_channels, root_mean_square, run_gap
 from tools.inference.fit import NUISANCE_LIMIT, Hypothesis, bounded_step
 from tools.inference.model import nominal_model
 from tools.inference.parameters import model_at
-from tools.inference.predict import fly, fly_windows_from, predict
+from tools.inference.predict import at_its_word, fly, fly_windows_from, predict
 from tools.inference.problem import Problem, cut
 
 DRAWS = 2  # simulated repetitions that find the floor
@@ -153,7 +153,7 @@ def lacking_squares(search: Search, hypothesis: Hypothesis) -> dict[str, np.ndar
     found = {label: np.empty(len(problem.runs)) for label in effects}
     for n, (P, F) in enumerate(left_out(search, hypothesis) if effects else []):
         part = problem.part(n)
-        gains, listed = part.filter(P, F, begin=True), cut(part).listed[0]
+        gains, listed = at_its_word(part, P, F), cut(part).listed[0]
 
         def square(other: np.ndarray, part=part, P=P, F=F, gains=gains, listed=listed) -> float:
             Y = fly_windows_from(part, P, other, begun_as_read(part, F, other, gains))

@@ -40,23 +40,45 @@ def without_doubled(problem: Problem) -> np.ndarray:
 
 
 def observe(problem: Problem, P: np.ndarray, F: np.ndarray) -> Gains:
-    """The filter that finds where windows start; it looks at no row behind the one where it stands, or says so (known).
+    """The filter that finds where windows start.
 
-    Where the model's clock of motion capture is far out, poses stand at their own time (time_alignment): a filter that
-    corrects today's state by old poses is a loop with a delay, and leaves every vehicle.
+    It looks at no row behind the one where it stands, or says so (known).
     """
-    speeds, late = problem.kind.window_speeds, 0.0
-    if problem.seen[[mocap for _, mocap in problem.kind.doubled]].any():
-        late = float(np.abs(problem.recording.t - capture_times(problem, F)).max())
+    placed, walk = poses_in_place(problem, F)
+    gains = observer_of(placed).filter(P, F, begin=True, speeds=problem.kind.window_speeds, more=walk)
+    return as_known(problem, placed, gains)
+
+
+def at_its_word(problem: Problem, P: np.ndarray, F: np.ndarray) -> Gains:
+    """The filter that takes a model at its word, and finds nothing that it lacks."""
+    placed, walk = poses_in_place(problem, F)
+    return as_known(problem, placed, placed.filter(P, F, begin=True, more=walk))
+
+
+def poses_in_place(problem: Problem, F: np.ndarray) -> tuple[Problem, np.ndarray | None]:
+    """The problem with poses at their own time where the model's clock of motion capture is far out, and its walk.
+
+    A filter that corrects today's state by old poses is a loop with a delay, and leaves every vehicle. Where the clock
+    is not far out, the problem itself, and None.
+    """
+    if not problem.seen[[mocap for _, mocap in problem.kind.doubled]].any():
+        return problem, None
+    late = float(np.abs(problem.recording.t - capture_times(problem, F)).max())
     if late < LATE:
-        return observer_of(problem).filter(P, F, begin=True, speeds=speeds)
-    moved, walk = aligned(problem, F), np.zeros(problem.kind.n_spectral)
+        return problem, None
+    placed, walk = aligned(problem, F), np.zeros(problem.kind.n_spectral)
     walk[Q_LATE] = (WANDER * late) ** 2
-    known, r = known_rows(moved), moved.recording
-    moved.recording = replace(r, early=known[r.early - 1])
-    gains = observer_of(moved).filter(P, F, begin=True, speeds=speeds, more=walk)
-    gains.X[r.bounds[:-1]] = problem.starts  # by readings as they were recorded
-    return replace(gains, known=known)
+    r = placed.recording
+    placed.recording = replace(r, early=known_rows(placed)[r.early - 1])
+    return placed, walk
+
+
+def as_known(problem: Problem, placed: Problem, gains: Gains) -> Gains:
+    """Gains of a problem whose poses may have been moved, with what was known at each row."""
+    if placed is problem:
+        return gains
+    gains.X[problem.recording.bounds[:-1]] = problem.starts  # by readings as they were recorded
+    return replace(gains, known=known_rows(placed))
 
 
 def known_rows(problem: Problem) -> np.ndarray:
@@ -69,11 +91,14 @@ def known_rows(problem: Problem) -> np.ndarray:
 
 
 def observer_of(problem: Problem) -> Problem:
-    """The problem as the filter sees it that finds starts."""
-    kind = problem.kind
+    """The problem as the filter sees it that finds starts; poses of a clock known to be wrong replace no reading."""
+    kind, z = problem.kind, problem.z
+    wanders = problem.extra_noise is not None and kind.n_spectral > Q_LATE and problem.extra_noise[Q_LATE] > 0.0
+    if problem.recorded is None and not wanders:
+        z = without_doubled(problem)
     spreads = np.column_stack([problem.spreads, np.tile(kind.lacking_spread, (len(problem.runs), 1))])
     spreads[:, kind.speed_errors] = kind.window_speed_spread
-    return replace(problem, z=without_doubled(problem), starts=problem.starts.copy(), spreads=spreads)
+    return replace(problem, z=z, starts=problem.starts.copy(), spreads=spreads)
 
 
 def fly_near(problem: Problem, models: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
@@ -99,7 +124,7 @@ def fly(problem: Problem, P: np.ndarray, F: np.ndarray, own_filter: bool = False
     own_filter: windows begin where the filter stands that takes the model at its word. So models are compared with each
     other: the observer would take up what tells them apart.
     """
-    gains = problem.filter(P, F, begin=True) if own_filter else observe(problem, P, F)
+    gains = at_its_word(problem, P, F) if own_filter else observe(problem, P, F)
     return fly_windows_from(problem, P, F, gains)
 
 

@@ -15,6 +15,7 @@ from tools.inference.core.error_layout import E_DOWN, E_POS
 from tools.inference.problem import Problem
 
 UNSEEN_SPEED = 0.4  # m/s, by which a vehicle may have left its first pose's place before that was taken
+BEHIND = 0.2  # s behind its own time, at which a pose stands: its clock may wander, and a filter can only look back
 POSES = slice(ef.Y_ONBOARD, ef.N_Y)
 
 
@@ -41,7 +42,7 @@ def aligned(problem: Problem, F: np.ndarray) -> Problem:
     """The problem with its poses where the clock of F says; `recorded` keeps the one it was made from."""
     origin = problem.as_recorded
     t, bounds = origin.recording.t, origin.recording.bounds
-    at = capture_times(origin, F)
+    at = capture_times(origin, F) + BEHIND
     z, stamps = origin.z.copy(), t.copy()
     starts, spreads = origin.starts.copy(), origin.spreads.copy()
     z[:, POSES] = np.nan

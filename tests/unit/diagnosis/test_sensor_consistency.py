@@ -6,10 +6,11 @@ from support.cases import make_case
 
 from sim_backend.core.effects import effect_layout as ef
 from tools.diagnose.search import ROUGHNESS
-from tools.diagnose.sensor_consistency import HOLDS_BELOW, inconsistent_sensor, mean_nis
+from tools.diagnose.sensor_consistency import HOLDS_BELOW, inconsistent_sensors, mean_nis
 from tools.inference.parameters import effect_parameters, model_at, nuisance_parameters
+from tools.inference.predict import fly
 from tools.inference.problem import problem_of
-from tools.inference.time_alignment import aligned, sample_at_row
+from tools.inference.time_alignment import BEHIND, aligned, sample_at_row
 
 
 def with_effect(folder, entry, value, **about):
@@ -36,7 +37,7 @@ def rough_nis(problem):
 def test_the_reading_that_is_far_out_is_named(tmp_path, label, entry, value, mocap):
     problem, _ = with_effect(tmp_path, entry, value, mocap=mocap)
     assert rough_nis(problem) > HOLDS_BELOW
-    free, spreads = inconsistent_sensor(problem, nuisance_parameters(problem), effect_parameters(problem))
+    free, spreads = inconsistent_sensors(problem, nuisance_parameters(problem), effect_parameters(problem))[0]
     assert free.label == label
     assert spreads * free.spread == pytest.approx(value, rel=0.6)
 
@@ -58,6 +59,17 @@ def test_samples_go_to_the_row_of_their_time_once():
     assert fast.tolist() == [0, -1, 1, -1, 2, -1, 3, -1, 4, -1]
 
 
+@pytest.mark.parametrize("delay", [1.4, 1.45, 1.55])
+def test_a_late_clock_s_windows_begin_where_the_vehicle_is(tmp_path, delay):
+    """Of a clock that wanders by a third of a second either way, whatever part of a row it is late by."""
+    case = make_case(tmp_path, np.zeros(ef.N_F), seed=6, mocap=True, late=lambda t: 1.45 + 0.3 * np.sin(t / 7.0))
+    problem, F = problem_of(case), np.zeros(ef.N_F)
+    F[ef.MOCAP_DELAY] = delay
+    for own_filter in (True, False):
+        missed = fly(problem, problem.model.P, F, own_filter)[:, ef.Y_DEPTH] - problem.z[:, ef.Y_DEPTH]
+        assert np.sqrt(np.nanmean(missed**2)) < 0.12
+
+
 @pytest.mark.parametrize("delay", [1.7, -0.8])
 def test_poses_moved_to_their_time_are_foreseen(tmp_path, delay):
     """As those of a right clock; an early one shows poses of the future, which no filter foresees by its past."""
@@ -76,7 +88,7 @@ def test_poses_moved_to_their_time_are_foreseen(tmp_path, delay):
     assert missed(there, F) == pytest.approx(missed(right, none), rel=0.15)
     if delay < 0.0:
         assert missed(problem, F) > 3.0 * missed(there, F)
-    lost = int(abs(delay) * 10) * len(problem.runs)
+    lost = round(abs(delay - BEHIND) * 10) * len(problem.runs)
     assert problem.valid[:, poses].all(axis=1).sum() - there.valid[:, poses].all(axis=1).sum() == lost
     assert there.as_recorded is problem
     assert aligned(there, np.zeros(ef.N_F)).as_recorded is problem
