@@ -1,7 +1,7 @@
 """Whether what the selected effects leave is an effect that nobody knows, or disorder: of the water, or of a clock."""
 
 import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +18,11 @@ from tools.inference.fit import Hypothesis
 from tools.inference.parameters import CLOCK_PLACE
 
 LEFT_OVER, LEFT_WIDTH = 0.145, 1.1  # share of the explainable misfit at which unknown is as likely as not; e-folds
+OWN_LEFT = 0.03  # the same where all of it is left at the sensor of an effect that is there
 LEFT_GAP, LEFT_GAP_WIDTH = 0.17, 0.5  # the same of the squared gap beyond the floor
+NATS = 0.25  # what the misfit counts beside the gap, in their geometric mean
+LEAST_SHARE = 0.05  # of the misfit, in that mean: a sensor's small error may have nearly all the nat
+LEFT_BOTH, LEFT_BOTH_WIDTH = 0.15, 0.8  # the same of that mean
 # Floors that the gap left lies beyond its own floor (root of the difference of squares), at which it is as likely one
 # effect of its own as what small ones leave; e-folds.
 WIDE, WIDE_WIDTH = 1.8, 0.35
@@ -31,6 +35,7 @@ MOSTLY = 0.9  # of all that can be explained, for turbulence or waves to be the 
 LEAST_UNKNOWN, MORE_UNKNOWN = 0.002, 0.005  # probability of an unknown effect: nothing is left, or something is
 CLOCKED = 0.5  # of what the best probe gains, that the probe of motion capture's clock must
 RIVALS = 4  # links probed beside water and axes
+LEAST_WAVES = 100.0  # nat
 ALONE = 3.0  # times what any other element's noise gains, of what is left at one element alone
 
 
@@ -113,24 +118,24 @@ def water_disorder(search: Search, probed: list[ProbeResult]) -> ProbeResult | N
 
 
 def waves_beside(search: Search, hypothesis: Hypothesis, left: Remainder) -> ProbeResult | None:
-    """Waves, where no link but turbulence gains more beside a hypothesis, and what they move has a sea's line."""
-    first = next((found for found in left.probed if found.probe.name != TURBULENCE), None)
-    if first is None or first.probe.name != WAVES:
-        return None
-    more, doubt = inflated(search.problem, first.probe, first.scale)
-    gains = search.problem.filter(*search.model(hypothesis), begin=True, more=more, doubt=doubt)
-    return first if line_share(search.problem, gains) >= LINE else None
+    """Waves, where they gain beside a hypothesis, and what they move has a sea's line.
 
-
-def turbulence_beside(search: Search, hypothesis: Hypothesis, left: Remainder) -> ProbeResult | None:
-    """Turbulence, where no other link gains nearly as much beside a hypothesis, and the gap left is wide.
-
-    A sensor's small error may have more nats than water that shakes all axes, which the windows show.
+    Other links may gain more: what effects leave that the windows do not ask for.
     """
-    first, second = left.probed[:2]
-    if first.probe.name != TURBULENCE or second.gain > ONE_AXIS * first.gain:
+    found = next((one for one in left.probed if one.probe.name == WAVES), None)
+    if found is None or found.gain < LEAST_WAVES:
         return None
-    return first if left_floors(shrink(search, hypothesis)) > WIDE else None
+    more, doubt = inflated(search.problem, found.probe, found.scale)
+    gains = search.problem.filter(*search.model(hypothesis), begin=True, more=more, doubt=doubt)
+    return found if line_share(search.problem, gains) >= LINE else None
+
+
+def turbulence_first(probed: list[ProbeResult]) -> ProbeResult | None:
+    """Turbulence, where no other link gains nearly as much beside a hypothesis."""
+    first = probed[0] if probed else None
+    if first is None or first.probe.name != TURBULENCE or probed[1].gain > ONE_AXIS * first.gain:
+        return None
+    return first
 
 
 def disorder(search: Search, hypothesis: Hypothesis, left: Remainder) -> ProbeResult | None:
@@ -149,7 +154,8 @@ def disorder(search: Search, hypothesis: Hypothesis, left: Remainder) -> ProbeRe
     found = water_disorder(search, left.probed) if left.share > NOISY else None
     if found is not None and found.gain > MOSTLY * (left.explained + left.left):
         return found
-    return turbulence_beside(search, hypothesis, left)
+    water = turbulence_first(left.probed)  # a sensor's small error may have more nats than it: windows show it
+    return water if water is not None and left_floors(shrink(search, hypothesis)) > WIDE else None
 
 
 def clock_of(search: Search, hypothesis: Hypothesis, gained: dict[str, float], more: np.ndarray) -> Clock | None:
@@ -209,13 +215,14 @@ def beside_a_sea(shrinkage: Shrinkage, left: Remainder, sea: ProbeResult) -> flo
 
 def probability_unknown(
     search: Search, selected: bool, evident: bool, shrinkage: Shrinkage, left: Remainder | None,
-    noise: ProbeResult | None, taken: float, main: str = "",
+    noise: ProbeResult | None, taken: float, places: Sequence[tuple[str, str]] = (),
 ) -> float:  # fmt: skip
     """Probability that the gap is none of the catalogue's, or that there is one where none shows otherwise.
 
     selected, evident: whether any effect is, or is at least there; noise: disorder that the search knows of, which no
-    window's floor has; taken: as in left_share; main: the effect that takes most. What is left where that one sits, and
-    nowhere else, is no small effect beside it: something there has another form, however narrow the gap it leaves.
+    window's floor has; taken: as in left_share; places: of the effects, that of the one that takes most first. What is
+    left where that one sits, and nowhere else, is no small effect beside it: something there has another form, however
+    narrow the gap it leaves. So it is with the sensor of any of them.
     """
     if left is None:  # what is left was not asked about, or nothing is
         loose = not selected and not noise and shrinkage.after > max(LOOSE * shrinkage.floor, 1.0)
@@ -231,9 +238,10 @@ def probability_unknown(
         return max(disordered, beside_a_sea(shrinkage, left, noise)) if noise.probe.name == WAVES else disordered
     if not evident:
         return wide
-    shares = (
-        probability(left.share, LEFT_OVER, LEFT_WIDTH),
-        probability(left_share(shrinkage, taken), LEFT_GAP, LEFT_GAP_WIDTH),
-    )
-    own = main in catalogue() and left.alone == catalogue()[main].place
-    return max(max(shares) * (1.0 if own else wide), MORE_UNKNOWN)
+    both = max(left.share, LEAST_SHARE) ** NATS * left_share(shrinkage, taken) ** (1.0 - NATS)
+    form = probability(both, LEFT_BOTH, LEFT_BOTH_WIDTH)
+    if left.alone is not None and left.alone[0] == "sensing" and left.alone in places:
+        return max(form, probability(left.share, OWN_LEFT, LEFT_WIDTH))
+    if left.alone in places[:1]:
+        return max(form, probability(left.share, LEFT_OVER, LEFT_WIDTH))
+    return max(form * wide, MORE_UNKNOWN)

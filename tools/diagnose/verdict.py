@@ -1,7 +1,7 @@
 """From fits to an answer: which effects are selected, how probable each label is, and which cannot be told apart."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -40,14 +40,18 @@ from tools.diagnose.shrink import (
 )
 from tools.diagnose.unknown import (
     LEAST_UNKNOWN,
+    WIDE,
     clock_label,
     clock_of,
     disorder,
+    left_floors,
     left_share,
     probability_unknown,
     remainder_of,
+    turbulence_first,
 )
 from tools.inference.fit import Hypothesis
+from tools.inference.parameters import CLOCK_PLACE
 
 HELD_OUT_SHARE = 0.3  # of the gap that is left on runs left out: an effect beside another must close as much more
 CERTAIN = 0.9  # of the recalibrated gap: effects beside an unknown one that leave more are not certain
@@ -206,17 +210,29 @@ def search_again_with_noise(
     Where the windows err by far less than rough water of that strength would have them, it is none: something shakes
     the vehicle and lets go of it again, as a tail that flaps does. Nor is it where another effect is the main cause
     beside it: what nobody knows looks like rough water too, in which a known effect is easily believed. The answer is
-    then the one without it.
+    then the one without it. Rough water is looked for beside a clock that wanders, too.
     """
     more, _ = inflated(search.problem, found.probe, found.scale)
     clock = clock_of(search, hypothesis, gained, more) if found.probe.name == CLOCK else None
     problem = search.problem.as_recorded if clock is None else clock.aligned(search.problem)
     answer = conclude(run(problem.with_extra_noise(more), say, clock, [search.best, hypothesis]), say, found)
-    rough = answer.main == TURBULENCE and answer.shrinkage.after >= ROUGH * answer.shrinkage.floor
-    if found.probe.name == TURBULENCE and not rough:
+    if found.probe.name == TURBULENCE and not as_rough(answer):
         say("not as rough water would have it")
         return conclude(search, say, calm=True)
+    water = turbulence_first(answer.probed) if found.probe.name == CLOCK else None
+    if water is not None and left_floors(answer.shrinkage) > WIDE:
+        more = more + inflated(answer.search.problem, water.probe, water.scale)[0]
+        rough = conclude(run(problem.with_extra_noise(more), say, clock, [answer.search.best]), say, water)
+        if as_rough(rough):
+            clocks = [label for label in answer.selected if catalogue()[label].place == CLOCK_PLACE]
+            gained = rough.gained | {label: answer.gained[label] for label in clocks}
+            return replace(rough, selected=[*rough.selected, *clocks], gained=gained)
     return answer
+
+
+def as_rough(answer: Answer) -> bool:
+    """Whether turbulence is the main cause of an answer, and windows err as rough water would have them."""
+    return answer.main == TURBULENCE and answer.shrinkage.after >= ROUGH * answer.shrinkage.floor
 
 
 def conclude(
@@ -279,7 +295,8 @@ def conclude(
         floors = sizes[main] / max(floor, 1e-6)
         chances = doubt_small(chances, main, floors / (TOLD if search.told else LARGE))
     by_effects = sum(sizes[label] ** 2 for label in gained)
-    unknown = probability_unknown(search, bool(gained), bool(ranked), shrinkage, left, noise, by_effects, main)
+    places = [catalogue()[label].place for label in (main, *by_size) if label in catalogue()]
+    unknown = probability_unknown(search, bool(gained), bool(ranked), shrinkage, left, noise, by_effects, places)
     if not gained and not gap_matters(shrinkage):
         unknown = LEAST_UNKNOWN
     chances = {name: value * (1.0 - unknown) for name, value in chances.items()} | {UNKNOWN: unknown}

@@ -6,14 +6,12 @@ import numpy as np
 from scipy.special import ndtr
 
 from tools.diagnose.noise_probes import NoiseProbe, probes
-from tools.diagnose.unknown import place_alone
+from tools.diagnose.unknown import LEFT_OVER, LEFT_WIDTH, OWN_LEFT, place_alone
 from tools.inference.parameters import CLOCK_PLACE
 from tools.watch.disorder import SCALES, WATER, beyond_reference
 from tools.watch.flights import roughness_sigma
 from tools.watch.history import Event, History
 
-LEFT_OVER, LEFT_WIDTH = 0.145, 1.1  # as in tools/diagnose/unknown.py: the share left at which it is as likely as not
-OWN_LEFT = 0.03  # the same where all of it is left at the sensor of the change's own label (docs/WATCH.md, Thresholds)
 PROBED, REFERENCE = 3, 2  # runs at most
 CLEAN = 5.0  # sigma of the mean squared innovation, below which nothing is left
 LEAST_PROBABILITY = 0.005

@@ -46,3 +46,23 @@ def test_a_clock_that_wanders_is_late_and_hides_nothing_beside_it(tmp_path):
     corrected = model_text(case, *answer.search.model(answer.hypothesis))
     assert "[effects.mocap_delay]" in corrected
     assert "[effects.drag]" in corrected
+
+
+def test_a_second_search_begins_at_what_the_first_found_however_far_out(tmp_path):
+    """Gyros that turn two and a half times as far hold no filter that does not know of it, and lead it anywhere."""
+    F = np.zeros(ef.N_F)
+    F[ef.GYRO_SCALE] = 1.5
+    case = make_case(tmp_path, F, seed=8, mocap=True, late=lambda t: 0.33 + 0.07 * np.sin(2.0 * np.pi * t / 7.0))
+    answer = conclude(run(problem_of(case)))
+    assert answer.noise.probe.name == CLOCK
+    assert answer.main == "gyro_scale"
+    assert set(answer.selected) == {"gyro_scale", "mocap_delay"}
+    assert answer.probabilities["gyro_scale"] > 0.8
+
+
+def test_rough_water_is_turbulence_beside_a_clock_that_wanders(tmp_path):
+    late = {"late": lambda t: 0.33 + 0.07 * np.sin(2.0 * np.pi * t / 7.0)}
+    answer = conclude(run(problem_of(make_case(tmp_path, np.zeros(ef.N_F), seed=7, mocap=True, rough=10.0, **late))))
+    assert answer.main == TURBULENCE
+    assert set(answer.selected) == {TURBULENCE, "mocap_delay"}
+    assert answer.search.clock.label == "mocap_delay"

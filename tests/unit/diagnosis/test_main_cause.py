@@ -7,6 +7,7 @@ import pytest
 from support.cases import make_case
 
 from sim_backend.core.effects import effect_layout as ef
+from sim_backend.core.effects.catalogue import catalogue
 from tools.diagnose import search as search_module
 from tools.diagnose import verdict as verdict_module
 from tools.diagnose.noise_probes import CLOCK, NoiseProbe, ProbeResult
@@ -146,11 +147,12 @@ def shrinkage(after: float, floor: float = 0.15, recalibrated: float = 1.0, befo
 
 def unknown(
     after: float, left: float, explained: float, evident: bool = True, taken: float = 9.0, noise=None,
-    probed=(), main="",
+    probed=(), effects=(),
 ) -> float:  # fmt: skip
     search = SimpleNamespace(problem=SimpleNamespace(rules=SimpleNamespace(whiteness=True)))
     remainder = Remainder(explained, left, list(probed))
-    return probability_unknown(search, True, evident, shrinkage(after), remainder, noise, taken, main)
+    places = [catalogue()[label].place for label in effects]
+    return probability_unknown(search, True, evident, shrinkage(after), remainder, noise, taken, places)
 
 
 def gains(**by_name: float) -> list[ProbeResult]:
@@ -160,11 +162,19 @@ def gains(**by_name: float) -> list[ProbeResult]:
 
 def test_what_is_left_at_the_main_cause_alone_is_of_another_form_however_narrow():
     narrow = {"after": 0.23, "left": 1e5, "explained": 5e5}
-    assert unknown(**narrow, probed=gains(gyro=1e5, servo=2e3), main="gyro_bias") > 0.5
-    assert unknown(**narrow, probed=gains(gyro=1e5, servo=5e4), main="gyro_bias") < 0.2
-    assert unknown(**narrow, probed=gains(slider=1e5, servo=2e3), main="gyro_bias") < 0.2
+    assert unknown(**narrow, probed=gains(gyro=1e5, servo=2e3), effects=["gyro_bias"]) > 0.5
+    assert unknown(**narrow, probed=gains(gyro=1e5, servo=5e4), effects=["gyro_bias"]) < 0.2
+    assert unknown(**narrow, probed=gains(slider=1e5, servo=2e3), effects=["gyro_bias"]) < 0.2
+    assert unknown(**narrow, probed=gains(slider=1e5, servo=2e3), effects=["slider_slow"]) > 0.5
     small = narrow | {"left": 5e3}
-    assert unknown(**small, probed=gains(gyro=5e3), main="gyro_bias") < 0.1
+    assert unknown(**small, probed=gains(gyro=5e3), effects=["gyro_bias"]) < 0.2
+
+
+def test_what_is_left_at_the_sensor_of_any_effect_alone_is_of_another_form():
+    narrow = {"after": 0.23, "left": 6e4, "explained": 5e5}
+    assert unknown(**narrow, probed=gains(gyro=6e4, servo=2e3), effects=["drag", "gyro_bias"]) > 0.8
+    assert unknown(**narrow, probed=gains(gyro=6e4, servo=2e3), effects=["drag"]) < 0.2
+    assert unknown(**narrow, probed=gains(slider=6e4, servo=2e3), effects=["drag", "slider_slow"]) < 0.2
 
 
 def test_what_leaves_next_to_no_gap_is_not_unknown_however_many_nat_it_has():
