@@ -81,8 +81,11 @@ def sensor_biases(world: World, rng: np.random.Generator) -> np.ndarray:
     return world.bias * np.array(sigma) * rng.standard_normal(kf.N_Z)
 
 
-def fly(world: World, seed: int, *, P: np.ndarray | None = None, name: str = "run00") -> Flight:
-    """One recording; the true vehicle is drawn by the seed unless P gives it."""
+def fly(
+    world: World, seed: int, *, P: np.ndarray | None = None, name: str = "run00",
+    effects: dict[int, float] | None = None,
+) -> Flight:  # fmt: skip
+    """One recording; the true vehicle is drawn by the seed unless P gives it; effects: entries of F."""
     rng = np.random.default_rng(seed)
     if P is None:
         P = drawn_vehicle(world, rng)
@@ -95,6 +98,8 @@ def fly(world: World, seed: int, *, P: np.ndarray | None = None, name: str = "ru
     x[3:7] = quaternion_from_euler(0.0, rng.uniform(-0.3, 0.0), rng.uniform(-3.0, 3.0))
     x[7] = world.start_speed
     F[ef.CURRENT_N], F[ef.CURRENT_E] = world.water
+    for entry, value in (effects or {}).items():
+        F[entry] = value
     truth, table = np.empty((len(t), ef.N_XF)), np.empty((len(t), len(ROUGHIE_MEASURES.columns)))
     zero, work, kept, acc = np.zeros(3), np.zeros((4, ef.N_XF)), np.empty(ef.N_XF), np.zeros(6)
     steps = max(1, round(1.0 / world.rate_hz / STEP))

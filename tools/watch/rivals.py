@@ -23,8 +23,13 @@ AS_EVIDENT = 0.5  # nat
 REACH = 2  # runs about a span's ends between which it is found again
 
 
-def refined(history: History, joint: Joint, best: Change, changes: Sequence[Change]) -> Event | None:
-    """The change fitted without parabolas, with the labels that may be meant as well, and its span found again."""
+def refined(
+    history: History, joint: Joint, best: Change, changes: Sequence[Change], also: Sequence[str] = ()
+) -> Event | None:
+    """The change fitted without parabolas, with the labels that may be meant as well, and its span found again.
+
+    also: labels that are fitted whatever parabolas promise of them.
+    """
     flights, shared = history.flights, history.flights.shared
     weights = best.span.weights(flights.count)
     inside = numbers(weights * history.judged)
@@ -40,12 +45,14 @@ def refined(history: History, joint: Joint, best: Change, changes: Sequence[Chan
     samples = sum(flights.raw[n].samples for n in chosen)
     least = min(fits.values(), key=lambda fit: fit.cost)
     promised = sum(max(flights.excess(n), 0.0) for n in chosen)
+    more = [(label, np.zeros(len(shared.labels[label]))) for label in also]
     if nothing - least.cost < (1.0 - POORLY) * promised and promised > 0.1 * samples:
         ranking = [one for one in rough_ranking(affected, flights) if akin(history, one[0], best.label, inside_state)]
-        for label, size in ranking[:ROUGH_TRIED]:
-            again = best_fit(affected, shared, label, size, True)
-            if label not in fits or again.cost < fits[label].cost:
-                fits[label] = again
+        more += ranking[:ROUGH_TRIED]
+    for label, size in more:
+        again = best_fit(affected, shared, label, size, True)
+        if label not in fits or again.cost < fits[label].cost:
+            fits[label] = again
     ranked = sorted(fits.values(), key=lambda fit: fit.cost)
     gained = nothing - ranked[0].cost
     kept = [fit for fit in ranked if fit.cost - ranked[0].cost <= max(BEHIND, BEHIND_SHARE * gained)][:FINAL]

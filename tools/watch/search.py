@@ -54,11 +54,20 @@ def next_event(history: History) -> Event | None:
     best = max(changes, key=lambda one: one.evidence, default=None)
     event = refined(history, joint, best, changes) if best is not None and best.evidence >= EVIDENCE_NEEDED else None
     rough = water_event(history)
-    if rough is None or rough.evidence < EVIDENCE_NEEDED or (event is not None and not rougher(history, rough, event)):
+    if rough is None or rough.evidence < EVIDENCE_NEEDED:
         return event
-    if not earns_place(history, rough):
+    if event is not None and not rougher(history, rough, event):
         return event
     found = named(history, rough)
-    if event is not None and history.effects[event.label].place == CLOCK_PLACE == shaken_place(found):
+    there = shaken_place(found)
+    if best is not None and event is not None and there is not None:
+        # parabolas promise nothing of what begins behind a threshold: labels of that place are fitted
+        labels = [label for label in history.flights.shared.labels if history.effects[label].place == there]
+        event = refined(history, joint, best, changes, labels) or event
+        if not rougher(history, rough, event):
+            return event
+    if not earns_place(history, rough):
+        return event
+    if event is not None and history.effects[event.label].place == CLOCK_PLACE == there:
         return event  # a clock that wanders is still one that is wrong
     return found

@@ -9,6 +9,7 @@ import pytest
 from support.flights import World, case_of, drawn_vehicle, fly
 
 from firmware.core.vehicle import layout
+from sim_backend.core.effects import effect_layout as ef
 from tools.cli.common import report_errors
 from tools.cli.main import cli
 from tools.data.runs import columns as names
@@ -24,10 +25,13 @@ COMMON = {layout.K_D0: 0.35, layout.K_L: 0.2, layout.K_MY: -0.15}  # relative: a
 HEAVY, RATE = 0.03, 0.02  # kg, rad/s
 
 
-def flown(changed: dict[int, float], seed: int = 40, turned: dict[int, float] | None = None):
+def flown(
+    changed: dict[int, float], seed: int = 40, turned: dict[int, float] | None = None,
+    effects: dict[int, dict[int, float]] | None = None,
+):  # fmt: skip
     """Runs of one vehicle that its file does not describe well.
 
-    changed: by run, kg that it is heavier; turned: rad/s that its pitch rate reads too much.
+    changed: by run, kg that it is heavier; turned: rad/s that its pitch rate reads too much; effects: entries of F.
     """
     P = drawn_vehicle(WORLD, np.random.default_rng(seed))
     for index, share in COMMON.items():
@@ -36,7 +40,7 @@ def flown(changed: dict[int, float], seed: int = 40, turned: dict[int, float] | 
     for n in range(REFERENCE + WATCHED):
         own = P.copy()
         own[layout.NET_MASS] += changed.get(n - REFERENCE, 0.0)
-        run = fly(WORLD, seed + n, P=own, name=f"run{n:02d}").run
+        run = fly(WORLD, seed + n, P=own, name=f"run{n:02d}", effects=(effects or {}).get(n - REFERENCE)).run
         run.columns[names.RATES[1]] += (turned or {}).get(n - REFERENCE, 0.0)
         runs.append(run)
     return case_of(WORLD, runs[:REFERENCE]), case_of(WORLD, runs[REFERENCE:])
@@ -104,6 +108,14 @@ def test_two_changes_each_with_its_own_first_run():
     assert [event.to_run for event in found.values()] == [None, None]
     low, high = found["gyro_bias"].sized.ci90
     assert low <= RATE <= high
+
+
+@pytest.mark.slow
+def test_a_play_is_named_and_not_taken_for_rough_water():
+    play = {ef.SERVO_PLAY: 0.3}
+    reference, case = flown({}, 60, effects={n: play for n in (1, 2, 3)})
+    event = watch(case, reference).events[0]
+    assert (event.label, event.from_run, event.to_run) == ("servo_backlash", "run04", None)
 
 
 def run(monkeypatch, *arguments: object) -> int:
