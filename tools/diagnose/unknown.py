@@ -22,7 +22,7 @@ OWN_LEFT = 0.03  # the same where all of it is left at the sensor of an effect t
 LEFT_GAP, LEFT_GAP_WIDTH = 0.17, 0.5  # the same of the squared gap beyond the floor
 NATS = 0.25  # what the misfit counts beside the gap, in their geometric mean
 LEAST_SHARE = 0.05  # of the misfit, in that mean: a sensor's small error may have nearly all the nat
-LEFT_BOTH, LEFT_BOTH_WIDTH = 0.15, 0.8  # the same of that mean
+LEFT_BOTH, LEFT_BOTH_WIDTH = 0.15, 0.8  # the same of that mean, where the file does not say what noise there is
 # Floors that the gap left lies beyond its own floor (root of the difference of squares), at which it is as likely one
 # effect of its own as what small ones leave; e-folds.
 WIDE, WIDE_WIDTH = 1.8, 0.35
@@ -238,8 +238,12 @@ def probability_unknown(
         return max(disordered, beside_a_sea(shrinkage, left, noise)) if noise.probe.name == WAVES else disordered
     if not evident:
         return wide
-    both = max(left.share, LEAST_SHARE) ** NATS * left_share(shrinkage, taken) ** (1.0 - NATS)
-    form = probability(both, LEFT_BOTH, LEFT_BOTH_WIDTH)
+    gap = left_share(shrinkage, taken)
+    if search.told:  # what is left is no small effect beside the main one: either says enough
+        form = max(probability(left.share, LEFT_OVER, LEFT_WIDTH), probability(gap, LEFT_GAP, LEFT_GAP_WIDTH))
+    else:
+        both = max(left.share, LEAST_SHARE) ** NATS * gap ** (1.0 - NATS)
+        form = probability(both, LEFT_BOTH, LEFT_BOTH_WIDTH)
     if left.alone is not None and left.alone[0] == "sensing" and left.alone in places:
         return max(form, probability(left.share, OWN_LEFT, LEFT_WIDTH))
     if left.alone in places[:1]:

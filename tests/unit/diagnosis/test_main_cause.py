@@ -147,12 +147,13 @@ def shrinkage(after: float, floor: float = 0.15, recalibrated: float = 1.0, befo
 
 def unknown(
     after: float, left: float, explained: float, evident: bool = True, taken: float = 9.0, noise=None,
-    probed=(), effects=(),
+    probed=(), effects=(), told=False, before: float = 1.0,
 ) -> float:  # fmt: skip
-    search = SimpleNamespace(problem=SimpleNamespace(rules=SimpleNamespace(whiteness=True)))
+    search = SimpleNamespace(problem=SimpleNamespace(rules=SimpleNamespace(whiteness=True)), told=told)
     remainder = Remainder(explained, left, list(probed))
     places = [catalogue()[label].place for label in effects]
-    return probability_unknown(search, True, evident, shrinkage(after), remainder, noise, taken, places)
+    missed = shrinkage(after, recalibrated=before, before=before)
+    return probability_unknown(search, True, evident, missed, remainder, noise, taken, places)
 
 
 def gains(**by_name: float) -> list[ProbeResult]:
@@ -188,6 +189,12 @@ def test_a_wide_gap_is_unknown_where_a_sensor_s_small_error_has_nearly_all_the_n
     assert left_share(shrinkage(0.8), 9.0) > 0.6
     assert unknown(after=0.8, left=1e3, explained=1e6) > 0.6
     assert unknown(after=0.2, left=1e3, explained=1e6) == MORE_UNKNOWN
+
+
+def test_misfit_that_closes_with_the_gap_is_a_small_effect_s_unless_the_vehicle_is_known():
+    closed = {"after": 0.5, "before": 3.0, "left": 2.0e4, "explained": 8.0e4}  # a fifth of the misfit, 3 % of the gap
+    assert unknown(**closed, taken=15.0, told=True) > 0.5
+    assert unknown(**closed, taken=15.0) < 0.2
 
 
 def test_what_is_wider_than_the_effects_themselves_is_unknown_however_wrong_the_recalibrated_model_is():
