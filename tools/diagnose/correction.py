@@ -13,9 +13,10 @@ import numpy as np
 
 from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.correction import shapes
+from tools.diagnose.descent import converge
 from tools.diagnose.noise_probes import UNPREDICTABLE, NoiseProbe, ProbeResult
 from tools.diagnose.residuals import pump_speed
-from tools.diagnose.search import Search, converge
+from tools.diagnose.search import Search
 from tools.inference.corrected import LINKS
 from tools.inference.fit import Fitter, Hypothesis
 from tools.inference.model import effect_vector

@@ -51,7 +51,7 @@ def inconsistent_sensors(
     for free in suspects(candidates):
         for far in (far for far in (*NEARBY, *DISTANT) if free.low <= far <= free.high):
             model = model_at(problem, [*nuisance, free], np.append(own, far))
-            placed, walk = poses_in_place(worst, model[1])
+            placed, walk, _ = poses_in_place(worst, model[1])
             left = mean_nis(placed, placed.filter(*model, begin=True, more=walk))
             if left < min(most, found.get(free.label, (np.inf,))[0]):
                 found[free.label] = left, free, far

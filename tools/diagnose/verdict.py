@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sim_backend.core.effects.catalogue import catalogue
+from tools.diagnose.descent import advance_and_prune, converge, first_step
 from tools.diagnose.matter import MATTERS, disorder_matters, gap_matters, movements
 from tools.diagnose.noise_probes import CLOCK, TURBULENCE, ProbeResult, inflated
 from tools.diagnose.probabilities import (
@@ -20,15 +21,7 @@ from tools.diagnose.probabilities import (
 )
 from tools.diagnose.record import NONE, UNKNOWN, Finding
 from tools.diagnose.residuals import UNCLEAN, tests, worst
-from tools.diagnose.search import (
-    EVIDENCE_NEEDED,
-    Search,
-    advance_and_prune,
-    converge,
-    first_step,
-    run,
-    screen,
-)
+from tools.diagnose.search import EVIDENCE_NEEDED, Search, run, screen
 from tools.diagnose.shrink import (
     Shrinkage,
     case_noise_floor,

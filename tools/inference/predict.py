@@ -44,41 +44,42 @@ def observe(problem: Problem, P: np.ndarray, F: np.ndarray) -> Gains:
 
     It looks at no row behind the one where it stands, or says so (known).
     """
-    placed, walk = poses_in_place(problem, F)
+    placed, walk, known = poses_in_place(problem, F)
     gains = observer_of(placed).filter(P, F, begin=True, speeds=problem.kind.window_speeds, more=walk)
-    return as_known(problem, placed, gains)
+    return as_known(problem, gains, known)
 
 
 def at_its_word(problem: Problem, P: np.ndarray, F: np.ndarray) -> Gains:
     """The filter that takes a model at its word, and finds nothing that it lacks."""
-    placed, walk = poses_in_place(problem, F)
-    return as_known(problem, placed, placed.filter(P, F, begin=True, more=walk))
+    placed, walk, known = poses_in_place(problem, F)
+    return as_known(problem, placed.filter(P, F, begin=True, more=walk), known)
 
 
-def poses_in_place(problem: Problem, F: np.ndarray) -> tuple[Problem, np.ndarray | None]:
-    """The problem with poses at their own time where the model's clock of motion capture is far out, and its walk.
+def poses_in_place(problem: Problem, F: np.ndarray) -> tuple[Problem, np.ndarray | None, np.ndarray | None]:
+    """The problem with poses at their own time where the model's clock of motion capture is far out.
 
-    A filter that corrects today's state by old poses is a loop with a delay, and leaves every vehicle. Where the clock
-    is not far out, the problem itself, and None.
+    With the clock's walk (n_spectral,), and what was known at each row (known_rows). A filter that corrects today's
+    state by old poses is a loop with a delay, and leaves every vehicle. Where the clock is not far out, the problem
+    itself, None and None.
     """
     if not problem.seen[[mocap for _, mocap in problem.kind.doubled]].any():
-        return problem, None
+        return problem, None, None
     late = float(np.abs(problem.recording.t - capture_times(problem, F)).max())
     if late < LATE:
-        return problem, None
+        return problem, None, None
     placed, walk = aligned(problem, F), np.zeros(problem.kind.n_spectral)
     walk[Q_LATE] = (WANDER * late) ** 2
-    r = placed.recording
-    placed.recording = replace(r, early=known_rows(placed)[r.early - 1])
-    return placed, walk
+    known, r = known_rows(placed), placed.recording
+    placed.recording = replace(r, early=known[r.early - 1])
+    return placed, walk, known
 
 
-def as_known(problem: Problem, placed: Problem, gains: Gains) -> Gains:
-    """Gains of a problem whose poses may have been moved, with what was known at each row."""
-    if placed is problem:
+def as_known(problem: Problem, gains: Gains, known: np.ndarray | None) -> Gains:
+    """Gains of a problem whose poses have been moved where `known` says so, with what was known at each row."""
+    if known is None:
         return gains
     gains.X[problem.recording.bounds[:-1]] = problem.starts  # by readings as they were recorded
-    return replace(gains, known=known_rows(placed))
+    return replace(gains, known=known)
 
 
 def known_rows(problem: Problem) -> np.ndarray:

@@ -7,7 +7,8 @@ import pytest
 from support.cases import make_case
 
 from sim_backend.core.effects import effect_layout as ef
-from tools.diagnose.search import PRUNE_BEHIND, prune, run
+from tools.diagnose.descent import PRUNE_BEHIND, prune
+from tools.diagnose.search import run
 from tools.inference.problem import problem_of
 
 

@@ -48,21 +48,30 @@ def test_a_clock_that_wanders_is_late_and_hides_nothing_beside_it(tmp_path):
     assert "[effects.drag]" in corrected
 
 
-def test_a_second_search_begins_at_what_the_first_found_however_far_out(tmp_path):
+@pytest.fixture(scope="module")
+def beside_a_clock(tmp_path_factory):
+    """Concludes of runs whose motion capture is a third of a second late and wanders, with what else is given."""
+
+    def concluded(seed: int, gyro_scale: float = 0.0, rough: float = 1.0):
+        F = np.zeros(ef.N_F)
+        F[ef.GYRO_SCALE] = gyro_scale
+        late = {"mocap": True, "late": lambda t: 0.33 + 0.07 * np.sin(2.0 * np.pi * t / 7.0)}
+        return conclude(run(problem_of(make_case(tmp_path_factory.mktemp("late"), F, seed=seed, rough=rough, **late))))
+
+    return concluded
+
+
+def test_a_second_search_begins_at_what_the_first_found_however_far_out(beside_a_clock):
     """Gyros that turn two and a half times as far hold no filter that does not know of it, and lead it anywhere."""
-    F = np.zeros(ef.N_F)
-    F[ef.GYRO_SCALE] = 1.5
-    case = make_case(tmp_path, F, seed=8, mocap=True, late=lambda t: 0.33 + 0.07 * np.sin(2.0 * np.pi * t / 7.0))
-    answer = conclude(run(problem_of(case)))
+    answer = beside_a_clock(8, gyro_scale=1.5)
     assert answer.noise.probe.name == CLOCK
     assert answer.main == "gyro_scale"
     assert set(answer.selected) == {"gyro_scale", "mocap_delay"}
     assert answer.probabilities["gyro_scale"] > 0.8
 
 
-def test_rough_water_is_turbulence_beside_a_clock_that_wanders(tmp_path):
-    late = {"late": lambda t: 0.33 + 0.07 * np.sin(2.0 * np.pi * t / 7.0)}
-    answer = conclude(run(problem_of(make_case(tmp_path, np.zeros(ef.N_F), seed=7, mocap=True, rough=10.0, **late))))
+def test_rough_water_is_turbulence_beside_a_clock_that_wanders(beside_a_clock):
+    answer = beside_a_clock(7, rough=10.0)
     assert answer.main == TURBULENCE
     assert set(answer.selected) == {TURBULENCE, "mocap_delay"}
     assert answer.search.clock.label == "mocap_delay"

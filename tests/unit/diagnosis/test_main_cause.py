@@ -167,8 +167,10 @@ def test_what_is_left_at_the_main_cause_alone_is_of_another_form_however_narrow(
     assert unknown(**narrow, probed=gains(gyro=1e5, servo=5e4), effects=["gyro_bias"]) < 0.2
     assert unknown(**narrow, probed=gains(slider=1e5, servo=2e3), effects=["gyro_bias"]) < 0.2
     assert unknown(**narrow, probed=gains(slider=1e5, servo=2e3), effects=["slider_slow"]) > 0.5
+    small = narrow | {"left": 2.5e3}  # half a percent, of a sensor; of an actuator 1 % is as little
+    assert unknown(**small, probed=gains(gyro=2.5e3), effects=["gyro_bias"]) < 0.1
     small = narrow | {"left": 5e3}
-    assert unknown(**small, probed=gains(gyro=5e3), effects=["gyro_bias"]) < 0.2
+    assert unknown(**small, probed=gains(slider=5e3), effects=["slider_slow"]) < 0.1
 
 
 def test_what_is_left_at_the_sensor_of_any_effect_alone_is_of_another_form():

@@ -8,7 +8,8 @@ from support.cases import make_case
 
 from sim_backend.core.effects import effect_layout as ef
 from tools.diagnose.cautions import cautions
-from tools.diagnose.search import MOST_LEVEL, Search, as_told, converge, gains_of, level_disturbance
+from tools.diagnose.descent import converge
+from tools.diagnose.search import MOST_LEVEL, Search, as_told, gains_of, level_disturbance
 from tools.inference import levels
 from tools.inference.fit import Fitter
 from tools.inference.parameters import effect_parameters, model_at, nuisance_parameters
