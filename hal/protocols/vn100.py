@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from hal.protocols.checksums import xor8
 
-SYNC, DOLLAR, LINE_FEED = 0xFA, 0x24, 0x0A
+SYNC = 0xFA
 LONGEST = 256  # bytes; no text message or group 1 frame is longer
 TIME_STARTUP, YAW_PITCH_ROLL, ANGULAR_RATE, ACCEL = 0, 3, 5, 8  # bits of group 1
 # name, struct code, of the fields of group 1 by bit
@@ -30,6 +30,7 @@ _LOW = [sum(size for bit, size in enumerate(_SIZES[:8]) if mask >> bit & 1) for 
 _HIGH = [sum(size for bit, size in enumerate(_SIZES[8:]) if mask >> bit & 1) for mask in range(128)]
 _START = re.compile(rb"[$\xfa]")
 _TEXT = re.compile(rb"\$([\x20-\x23\x25-\x29\x2b-\x7e]{1,240})\*([0-9A-Fa-f]{4}|[0-9A-Fa-f]{2})\r?\n")
+_LINE = re.compile(rb"\$[\x20-\x23\x25-\x7e]*\r?\n")  # whole, whatever it says; how far the bytes came does not matter
 _TEXT_SO_FAR = re.compile(rb"\$[\x20-\x23\x25-\x7e]*\r?\Z")
 _NUMBER = re.compile(r"[+-]?\d{1,12}(\.\d{0,12})?([eE][+-]?\d{1,3})?\Z")
 
@@ -148,7 +149,7 @@ class Vn100Decoder:
         found = _TEXT.match(window)
         if found is None:
             unfinished = len(window) < LONGEST and _TEXT_SO_FAR.match(window)
-            if not unfinished and LINE_FEED in window:
+            if _LINE.match(window):
                 self.bad += 1
             return (0, None) if unfinished else (1, None)
         body, check = found.groups()

@@ -26,6 +26,10 @@ LEFT_BOTH, LEFT_BOTH_WIDTH = 0.15, 0.8  # the same of that mean, where the file 
 # Floors that the gap left lies beyond its own floor (root of the difference of squares), at which it is as likely one
 # effect of its own as what small ones leave; e-folds.
 WIDE, WIDE_WIDTH = 1.8, 0.35
+# Where the file says what noise there is, it is right about the vehicle: nothing small stands beside the main effect.
+TOLD_LEFT, TOLD_LEFT_WIDTH = 0.11, 0.6  # as LEFT_OVER
+TOLD_GAP, TOLD_GAP_WIDTH = 0.35, 0.5  # as LEFT_GAP
+TOLD_WIDE = 0.8  # as WIDE
 TURNED = ("pitch", "roll", "yaw", "rates")  # channels that a sea does not move
 NOISY, NOISY_WIDTH = 0.2, 0.8  # share of the explainable misfit that is left: disorder is looked for; width in e-folds
 UNFIT = 5.0  # tolerances that the best explanation still misses by: no effect of the catalogue does that
@@ -230,7 +234,7 @@ def probability_unknown(
         return 1.0 - MORE_UNKNOWN if unfit else LEAST_UNKNOWN
     if shrinkage.after > UNFIT:
         return 1.0 - MORE_UNKNOWN
-    wide = probability(left_floors(shrinkage), WIDE, WIDE_WIDTH)
+    wide = probability(left_floors(shrinkage), TOLD_WIDE if search.told and not noise else WIDE, WIDE_WIDTH)
     if noise:
         disordered = probability(left.share, NOISY, NOISY_WIDTH)
         if noise.probe.name == CLOCK:  # it moves no vehicle: windows say as much as with a clock that is right
@@ -239,13 +243,14 @@ def probability_unknown(
     if not evident:
         return wide
     gap = left_share(shrinkage, taken)
+    misfit = probability(left.share, *((TOLD_LEFT, TOLD_LEFT_WIDTH) if search.told else (LEFT_OVER, LEFT_WIDTH)))
     if search.told:  # what is left is no small effect beside the main one: either says enough
-        form = max(probability(left.share, LEFT_OVER, LEFT_WIDTH), probability(gap, LEFT_GAP, LEFT_GAP_WIDTH))
+        form = max(misfit, probability(gap, TOLD_GAP, TOLD_GAP_WIDTH))
     else:
         both = max(left.share, LEAST_SHARE) ** NATS * gap ** (1.0 - NATS)
         form = probability(both, LEFT_BOTH, LEFT_BOTH_WIDTH)
     if left.alone is not None and left.alone[0] == "sensing" and left.alone in places:
         return max(form, probability(left.share, OWN_LEFT, LEFT_WIDTH))
     if left.alone in places[:1]:
-        return max(form, probability(left.share, LEFT_OVER, LEFT_WIDTH))
+        return max(form, misfit)
     return max(form * wide, MORE_UNKNOWN)

@@ -124,6 +124,21 @@ def held_out_worth(search: Search, hypothesis: Hypothesis) -> Worth:
     return Worth(whole, taken)
 
 
+def less_by_worth(search: Search, hypothesis: Hypothesis, taken: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """What effects take (`lacking_squares`), by which they are ranked: of one that is worth less, the geometric mean.
+
+    What a parameter makes up for nearly, as a drag coefficient does for a drag, is soon believed beside a main cause.
+    """
+    if len(hypothesis.labels) < 2:
+        return taken
+    worth = held_out_worth(search, hypothesis)
+    found = dict(taken)
+    for label in hypothesis.labels:
+        size = in_tolerances(taken[label])
+        found[label] = taken[label] * min(worth.tolerances(label) / max(size, 1e-9), 1.0)
+    return found
+
+
 def strain(hypothesis: Hypothesis, less: Hypothesis) -> float:
     """Nat of prior that what is allowed loses where it has to make up for an effect that another hypothesis lacks."""
     return 0.5 * float((less.nuisance**2).sum() - (hypothesis.nuisance**2).sum())
@@ -231,7 +246,7 @@ def as_rough(answer: Answer) -> bool:
 def conclude(
     search: Search, say: Callable[[str], None] = lambda text: None, noise: ProbeResult | None = None,
     calm: bool = False, begin: Hypothesis | None = None,
-) -> Answer:
+) -> Answer:  # fmt: skip
     """The answer of a finished search; its gains are taken anew at the hypothesis with all that is evident.
 
     `noise` is disorder that the search already knows of: turbulence, waves, or motion capture's clock; calm: none is
@@ -269,7 +284,8 @@ def conclude(
         taken[disordered] = np.full(len(problem.runs), max(shrinkage.after**2 - floor**2, 0.0))
     ranked = gained or negligible
     sizes = {label: in_tolerances(squares) for label, squares in taken.items()}
-    by_size = sorted(ranked, key=lambda label: -sizes[label])
+    ranking = less_by_worth(search, evident, taken)
+    by_size = sorted(ranked, key=lambda label: -in_tolerances(ranking[label]))
     main = by_size[0] if ranked else ""
     by_search = problem.rules.evidence and not (noise is not None and main == disordered)
     if by_search and len(evident.labels) > 1:
@@ -280,7 +296,7 @@ def conclude(
         instead = max(chances, key=lambda label: chances[label])
         if begin is None and main and instead not in (main, NONE):
             return conclude(search, say, noise, calm, alternatives(search, evident, main)[instead])
-    chances = share_out(chances, main, most_often({label: taken[label] for label in gained}))
+    chances = share_out(chances, main, most_often({label: ranking[label] for label in gained}))
     chances = to_none(chances, negligible, movements_of_alternatives(search, evident, main, chances))
     chances = pass_on(chances, [label for label in by_size if label in gained and label != main])
     if main in gained:

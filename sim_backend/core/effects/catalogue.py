@@ -114,8 +114,9 @@ EFFECTS = (
     _row("mass net", "compressibility", "net mass at the origin a metre of depth",
          Parameter("slope", "kg/m", 0.0, 0.05, 0.002, "MASS_PER_DEPTH")),
     # denser water below makes the vehicle lighter with depth
-    _row("mass net", "stratification", "net mass at the origin a metre of depth, negative",
-         Parameter("slope", "kg/m", -0.05, 0.0, 0.002, "MASS_PER_DEPTH")),
+    _row("mass net", "stratification", "net mass at the origin a metre of depth below a mixed layer, negative",
+         Parameter("slope", "kg/m", -0.05, 0.0, 0.002, "MASS_PER_DEPTH"),
+         Parameter("mixed", "m", 0.0, 30.0, 1.0, "MIXED_LAYER")),
     # the centre of gravity lies ahead of or behind where trim should have put it
     _row("mass longitudinal", "cg_longitudinal", "offset along x, forward positive",
          Parameter("offset", "m", -0.02, 0.02, 0.0007, "CG_OFFSET_X")),

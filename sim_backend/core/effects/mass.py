@@ -1,6 +1,7 @@
 """Effects of mass: more or less of it, elsewhere, and behind readings that do not show it."""
 
 from firmware.core.jit import kernel
+from firmware.core.maths.wide import everywhere, where
 from firmware.core.vehicle import layout
 from sim_backend.core.effects import effect_layout as ef
 
@@ -18,8 +19,11 @@ def effective_masses(F, out):
 
 @kernel
 def net_mass_of_depth(F, depth):
-    """Net mass (kg) at the origin that the depth (m) makes: a hull squeezed, water that is denser below."""
-    return F[ef.MASS_PER_DEPTH] * depth
+    """Net mass (kg) at the origin that the depth (m) makes: a hull squeezed, denser water below a mixed layer."""
+    if everywhere(F[ef.MIXED_LAYER] <= 0.0):
+        return F[ef.MASS_PER_DEPTH] * depth
+    below = depth - F[ef.MIXED_LAYER]
+    return F[ef.MASS_PER_DEPTH] * where(below < 0.0, 0.0, below)
 
 
 @kernel

@@ -30,6 +30,7 @@ from tools.diagnose.verdict import (
     conclude,
     drop,
     held_out_worth,
+    less_by_worth,
     prune_effects,
     strain,
     with_least_gap,
@@ -102,6 +103,17 @@ def test_an_effect_is_as_large_as_it_is_where_what_is_allowed_could_take_it(two_
     refitted = held_out_worth(search, found).tolerances("net_buoyancy")
     lacking = {label: in_tolerances(grown) for label, grown in lacking_squares(search, found).items()}
     assert lacking["net_buoyancy"] > 1.3 * refitted
+
+
+def test_an_effect_that_is_worth_less_than_it_takes_is_ranked_by_the_geometric_mean(two_effects):
+    search = two_effects
+    found = next(one for one in search.ranked() if set(one.labels) == {"net_buoyancy", "pitch_trim"})
+    lacking, worth = lacking_squares(search, found), held_out_worth(search, found)
+    ranked = less_by_worth(search, found, lacking)
+    for label in found.labels:
+        mean = np.sqrt(in_tolerances(lacking[label]) * worth.tolerances(label))
+        assert in_tolerances(ranked[label]) == pytest.approx(min(mean, in_tolerances(lacking[label])))
+    assert in_tolerances(ranked["net_buoyancy"]) < 0.9 * in_tolerances(lacking["net_buoyancy"])
 
 
 def test_an_effect_that_takes_most_in_every_run_is_first_in_every_draw():
@@ -197,6 +209,14 @@ def test_misfit_that_closes_with_the_gap_is_a_small_effect_s_unless_the_vehicle_
     closed = {"after": 0.5, "before": 3.0, "left": 2.0e4, "explained": 8.0e4}  # a fifth of the misfit, 3 % of the gap
     assert unknown(**closed, taken=15.0, told=True) > 0.5
     assert unknown(**closed, taken=15.0) < 0.2
+
+
+def test_a_narrow_gap_is_a_small_effect_s_unless_the_vehicle_is_known():
+    narrow = {"after": 0.22, "left": 4.0e4, "explained": 6.0e4}  # 1.07 floors
+    assert unknown(**narrow, told=True) > 0.7
+    assert unknown(**narrow) < 0.1
+    assert unknown(**narrow | {"left": 3.0e3}, told=True) < 0.1  # a known effect in another form leaves as much
+    assert unknown(**narrow | {"after": 0.17}, told=True) < 0.5  # half a floor: nobody could see it in a window
 
 
 def test_what_is_wider_than_the_effects_themselves_is_unknown_however_wrong_the_recalibrated_model_is():

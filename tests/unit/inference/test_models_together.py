@@ -13,8 +13,8 @@ MODELS = (
     {"COMPASS_S1": 0.1, "COMPASS_C2": 0.05}, {"STALL": 20.0, "CLIMB_DIVE": 0.3}, {"PUMP_DROOP": 0.1},
     {"MOCAP_DELAY": 0.35, "CLOCK_SKEW": 0.002}, {"TETHER": 1.0, "TETHER_ACROSS": 0.5}, {"LINEAR_DRAG": 0.5},
     {"ROLL_TRIM": 0.1, "YAW_TRIM": 0.1}, {"DEPTH_LEVER": 0.2, "GYRO_SCALE": 0.1}, {"SERVO_LIMIT": 0.3},
-    {"SERVO_LIMIT": 0.4, "SERVO_GIVE": 0.5}, {"LINK": 5.0, "SHAPE": 0.05},
-    {"LINK": 11.0, "SHAPE": 0.02}, {"LINK": 7.0, "SHAPE": 0.02},
+    {"SERVO_LIMIT": 0.4, "SERVO_GIVE": 0.5}, {"MASS_PER_DEPTH": -0.01, "MIXED_LAYER": 1.0},
+    {"LINK": 5.0, "SHAPE": 0.05}, {"LINK": 11.0, "SHAPE": 0.02}, {"LINK": 7.0, "SHAPE": 0.02},
 )  # fmt: skip
 
 

@@ -316,6 +316,13 @@ def test_a_mass_that_changes_with_depth_is_a_net_mass_at_each_depth(label, slope
         assert rates(vector(**{label: {"slope": slope}}), x) == pytest.approx(wanted, abs=1e-13)
 
 
+def test_a_mixed_layer_is_of_one_density_and_denser_water_lies_below_it():
+    stratified = vector(stratification={"slope": -0.002, "mixed": 4.0})
+    for depth, mass in ((0.5, 0.0), (4.0, 0.0), (5.5, -0.003), (24.0, -0.04)):
+        x = a_state(depth)
+        assert rates(stratified, x) == pytest.approx(rates(vector(net_buoyancy={"mass": mass}), x), abs=1e-13)
+
+
 def test_a_vehicle_in_denser_water_below_oscillates_about_its_depth():
     """Stratification makes a spring, compressibility the opposite: light above and heavy below runs away."""
     at_depth = {"net_buoyancy": {"mass": 0.05}, "stratification": {"slope": -0.005}}
