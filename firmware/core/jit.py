@@ -106,9 +106,11 @@ if _BLAS not in sys.modules:
 if CACHE_DIR is not None:
     numba.config.CACHE_DIR = str(CACHE_DIR)  # type: ignore[attr-defined]  # made at run time
 
-# Contraction (fused multiply-add) is what a C compiler does by default; NaN and Inf keep their meaning. Nobody calls a
-# kernel from C: the entry for that is not compiled.
-_OPTIONS = dict(cache=True, nogil=True, error_model="numpy", fastmath={"contract"}, no_cfunc_wrapper=True)
+# No fast math, and no contraction either, which a C compiler does by default: where a product and a sum become one
+# rounding hangs on what is inlined where, so that the same kernel called from two others, or compiled on another
+# computer, would differ in the last bit. Plain operations are what Python does, everywhere. A diagnosis takes 6 % longer.
+# Nobody calls a kernel from C: the entry for that is not compiled.
+_OPTIONS = dict(cache=True, nogil=True, error_model="numpy", fastmath=False, no_cfunc_wrapper=True)
 # Without Numba's memory management a view of an array, which most lines of a kernel make, is a pointer and no more.
 # With it each is counted in and out by two locked instructions: more than half of a closed loop's time.
 # Said of every kernel: what is not said is taken over from the kernel that calls it first.

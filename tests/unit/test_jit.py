@@ -142,8 +142,17 @@ def test_what_no_kernel_calls_is_not_imported():
 def test_compiled_kernels_fly_like_plain_python():
     compiled, plain = fly(GLIDER_JIT="1"), fly(GLIDER_JIT="0")
     assert compiled.shape == (3, 20)
-    # the same operations in the same order, but for multiply and add in one rounding
-    np.testing.assert_allclose(compiled, plain, rtol=1e-12, atol=1e-13)
+    assert np.array_equal(compiled, plain)  # the same operations in the same order, each rounded
+
+
+@jit.kernel
+def multiply_add(a, b, c):
+    return a * b + c
+
+
+def test_a_product_and_a_sum_are_rounded_each():
+    """In one rounding, as a processor's fused multiply-add does, this would be 2^-60 and not 0."""
+    assert multiply_add(1.0 + 2.0**-30, 1.0 - 2.0**-30, -1.0) == 0.0
 
 
 def test_cache_goes_where_it_is_told(tmp_path):

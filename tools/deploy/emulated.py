@@ -62,8 +62,7 @@ def install(arm: Arm, release: Path) -> dict[str, Any]:
 def same_plunge(arm: Arm, here: Here) -> dict[str, Any]:
     """The flight of the self-check as plain Python, there and here: bit for bit.
 
-    As plain Python no number has to differ: a compiler may contract a product and a sum into one rounding, and each
-    processor's does so in places of its own. Where the C libraries differ, `LAST_BITS`.
+    No number has to differ, compiled (`firmware/core/jit.py`) or not. Where the C libraries differ, `LAST_BITS`.
     """
     mission, there, log = arm.root / "root/selfcheck.toml", arm.root / arm.plunge[1:], here.folder / "selfcheck.mcap"
     mission.write_text(PLUNGE)
