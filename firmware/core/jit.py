@@ -108,7 +108,7 @@ if CACHE_DIR is not None:
 
 # No fast math, and no contraction either, which a C compiler does by default: where a product and a sum become one
 # rounding hangs on what is inlined where, so that the same kernel called from two others, or compiled on another
-# computer, would differ in the last bit. Plain operations are what Python does, everywhere. A diagnosis takes 6 % longer.
+# computer, would differ in the last bit. Plain operations are what Python does, anywhere: a diagnosis takes 6 % more.
 # Nobody calls a kernel from C: the entry for that is not compiled.
 _OPTIONS = dict(cache=True, nogil=True, error_model="numpy", fastmath=False, no_cfunc_wrapper=True)
 # Without Numba's memory management a view of an array, which most lines of a kernel make, is a pointer and no more.
