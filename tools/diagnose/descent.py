@@ -8,6 +8,9 @@ from tools.inference.fit import POOR, Fitter, Hypothesis
 PRUNE_BEHIND = 60.0  # nat behind the best: no longer worth a flight, where also behind by
 SHARE = 0.5  # of all that was gained
 STARTED = 4  # hypotheses at most that are given other starts at a time
+# Spreads, tried as starts of what begins only beyond some size: a limit that is a little too tight is far from none
+# at all, and no slope leads from none to it.
+BEYOND = tuple(float(size) for size in np.geomspace(0.2, 3.0, 15))
 CONVERGED = 0.05  # nat; a hypothesis that gains less in a step has converged
 
 
@@ -78,3 +81,4 @@ def first_step(fitter: Fitter, hypotheses: list[Hypothesis]) -> None:
     much = [c for c in hypotheses if c.expected_gain() > 2.0 * PRUNE_BEHIND and c.gained < POOR * c.expected_fall()]
     much = sorted(much, key=lambda c: -c.expected_gain())[:STARTED]
     try_distant_starts(fitter, much, (*NEARBY, *DISTANT), afresh=True)
+    try_distant_starts(fitter, [c for c in much if c.late], BEYOND)

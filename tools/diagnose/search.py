@@ -104,6 +104,12 @@ def screen(search: Search, beside: Hypothesis, most: int) -> list[Hypothesis]:
         tried.append(hypothesis)
     fitter.linearise(tried, coarse=True)
     new = len(beside.free)
+    away = [one for one in tried if one.runs_away(new)]
+    for hypothesis in away:
+        hypothesis.shorter = 0.1
+        hypothesis.known = hypothesis.columns[:new]
+    if away:
+        fitter.linearise(away, coarse=True)
 
     def shows(hypothesis: Hypothesis) -> bool:
         return (hypothesis.columns[new:] ** 2).sum() > VISIBLE

@@ -16,6 +16,7 @@ NUISANCE_LIMIT = 3.5  # prior sigma: bound of nuisance parameters
 EFFECT_STEP = 0.05  # of a spread: difference step of effects
 TEMPER_ABOVE = 1.1  # mean NIS of a sample, above which a fit is tempered
 FIRST_STEP = 0.3  # of a spread, before the first step
+TAME = 10.0  # times the misfit: a first step that moves the innovations by more is taken again, a tenth as far
 THRESHOLD_STEP = 2.0  # spreads, for what begins only beyond some size: a limit that the commands never reached
 SHORTER_STEPS = (0.4, 0.1)  # of a step, tried where the whole of it brings less than
 POOR = 0.3  # of what it should
@@ -203,6 +204,7 @@ class Hypothesis:
         self.misfit, self.gained = np.inf, np.inf
         self.known = np.empty((0, 0))  # columns of the first parameters, where they are known already
         self.kink_step = 1.0  # spreads: difference step of an effect that begins at a kink, there
+        self.shorter = 1.0  # share of a coarse difference step that is taken
 
     def set_innovations(self, e: np.ndarray, prior_weight: float) -> None:
         self.e = e
@@ -213,10 +215,24 @@ class Hypothesis:
         """Step of each derivative, away from the nearer limit; a whole spread where an effect begins at a kink."""
         whole = [min(self.kink_step, max(f.high, -f.low)) if f.kinked else FIRST_STEP for f in self.free]
         sizes = np.array([
-            size if coarse or (f.kinked and v == 0.0) else EFFECT_STEP * max(1.0, abs(v))
+            self.shorter * size if coarse or (f.kinked and v == 0.0) else EFFECT_STEP * max(1.0, abs(v))
             for f, v, size in zip(self.free, self.values, whole, strict=True)
         ])  # fmt: skip
         return np.where(self.values + sizes > self.high, -sizes, sizes)
+
+    @property
+    def late(self) -> bool:
+        """Whether its last effect may begin only beyond some size."""
+        return any(free.kinked for free in self.free if free.label == self.labels[-1])
+
+    def runs_away(self, first: int) -> bool:
+        """Whether a coarse step along a parameter, the first of them numbered `first`, led where nothing is linear.
+
+        A vehicle that rolls over on one side of the truth hides that the other side would explain all.
+        """
+        steps = self.difference_steps(True)[first:]
+        moved = steps**2 * (self.columns[first:] ** 2).sum(axis=1)
+        return bool((moved > TAME * self.e @ self.e).any())
 
     def solve_step(self, fitter: Fitter, table: np.ndarray, projected: np.ndarray) -> None:
         """Normal equations of nuisance and effects' parameters together, and the step they ask for.
