@@ -8,6 +8,7 @@ from tools.inference.fit import POOR, Fitter, Hypothesis
 PRUNE_BEHIND = 60.0  # nat behind the best: no longer worth a flight, where also behind by
 SHARE = 0.5  # of all that was gained
 STARTED = 4  # hypotheses at most that are given other starts at a time
+HOPEFUL = 10.0  # nat that a step of what may begin only beyond some size should bring, for other starts to be tried
 # Spreads, tried as starts of what begins only beyond some size: a limit that is a little too tight is far from none
 # at all, and no slope leads from none to it.
 BEYOND = tuple(float(size) for size in np.geomspace(0.2, 3.0, 15))
@@ -78,7 +79,9 @@ def try_distant_starts(fitter: Fitter, hypotheses: list[Hypothesis], leaps=DISTA
 def first_step(fitter: Fitter, hypotheses: list[Hypothesis]) -> None:
     """The first step of hypotheses; other starts for those to which it should bring much, and brings much less."""
     fitter.move(hypotheses)
-    much = [c for c in hypotheses if c.expected_gain() > 2.0 * PRUNE_BEHIND and c.gained < POOR * c.expected_fall()]
-    much = sorted(much, key=lambda c: -c.expected_gain())[:STARTED]
+    poor = [c for c in hypotheses if c.gained < POOR * c.expected_fall()]
+    poor.sort(key=lambda c: -c.expected_gain())
+    late = [c for c in poor if c.late and c.expected_gain() > 2.0 * HOPEFUL][:STARTED]
+    much = [c for c in poor if c.expected_gain() > 2.0 * PRUNE_BEHIND][:STARTED]
     try_distant_starts(fitter, much, (*NEARBY, *DISTANT), afresh=True)
-    try_distant_starts(fitter, [c for c in much if c.late], BEYOND)
+    try_distant_starts(fitter, late, BEYOND)

@@ -123,7 +123,8 @@ def over_spans(
 ) -> Event | None:
     """A label's evidence over every span near the one it was fitted in, by parabolas about what it fitted.
 
-    Of spans that are as evident the shortest: in the runs that only others have, the change does not show.
+    Of spans that are as evident the shortest: in the runs that only others have, the change does not show. Where the
+    best reaches as far as was looked, it is looked for again about that one.
     """
     flights, shared = history.flights, history.flights.shared
     weights = span.weights(flights.count)
@@ -155,4 +156,8 @@ def over_spans(
     most = max(value for value, _, _ in found.values())
     best = min((one for one in found if found[one][0] > most - AS_EVIDENT), key=lambda one: one.end - one.first)
     evidence, size, covariance = found[best]
+    if (best.first == first < span.first or best.end == end > span.end) and best.course == span.course:
+        further = over_spans(history, joint, best, replace(fit, size=size), courses)
+        if further is not None and further.evidence >= evidence:
+            return further
     return Event(fit.label, best, evidence, {}, size, covariance, 0.0, {one: value[0] for one, value in found.items()})

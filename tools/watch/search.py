@@ -28,6 +28,11 @@ def find_events(history: History, say: Callable[[str], None] = lambda text: None
         say(f"{event.label or 'unknown'} in runs {event.span.first} to {event.span.end - 1}")
 
 
+def acts_at(place: tuple[str, str], there: tuple[str, str]) -> bool:
+    """Whether what is wrong at a place shows at another: commands that come late shake the actuators."""
+    return place == there or (place == ("timing", "command") and there[0] == "actuation")
+
+
 def evidence_needed(history: History, event: Event) -> float:
     """Nat that an event needs: more where there are more runs, and so more changes that chance may bring.
 
@@ -62,7 +67,7 @@ def next_event(history: History) -> Event | None:
     there = shaken_place(found)
     if best is not None and event is not None and there is not None:
         # parabolas promise nothing of what begins behind a threshold: labels of that place are fitted
-        labels = [label for label in history.flights.shared.labels if history.effects[label].place == there]
+        labels = [label for label in history.flights.shared.labels if acts_at(history.effects[label].place, there)]
         event = refined(history, joint, best, changes, labels) or event
         if not rougher(history, rough, event):
             return event
