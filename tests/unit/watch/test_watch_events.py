@@ -1,6 +1,7 @@
 """Events over runs from parabolas alone: no flight is flown, the truth is a vector."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,9 @@ from tools.inference.parameters import NUISANCE, FreeParameter
 from tools.inference.shared_parameters import SharedParameters
 from tools.watch.events import GROWING, STEP, Joint, Span, spans
 from tools.watch.flights import LEAST_SIZE, Flights
+from tools.watch.history import History
+from tools.watch.label_fit import LabelFit
+from tools.watch.rivals import over_spans
 from tools.watch.scatter import learn_scatter, log_marginal, without_deviation
 
 RUNS, SEEN = 10, 40  # rows of each run's Jacobian
@@ -130,6 +134,20 @@ def test_no_event_before_it_may_begin_nor_at_a_run_that_was_not_judged():
     assert all(one.first >= 1 and judged[one.first] and judged[one.end - 1] for one in listed)
     assert Span(1, 4, STEP) in listed
     assert {one.end for one in listed if one.course == GROWING} == {5}
+
+
+@pytest.mark.parametrize("span", [Span(2, 10, STEP), Span(1, 8, STEP), Span(4, 7, STEP)])
+def test_a_change_found_in_one_run_is_followed_to_its_ends(span):
+    runs = runs_of(changed(2, span.weights(RUNS), 1.2), COMMON, 9)
+    flights = SimpleNamespace(
+        count=RUNS, shared=SHARED, runs=runs, made=lambda n, one: one, expanded=lambda n, x: moved_to(runs[n], x)
+    )
+    history = History(flights, np.ones(RUNS, dtype=bool), 1)
+    start = Span(5, 6, STEP)
+    found = over_spans(history, history.joint(), start, LabelFit("lift", np.array([1.2]), 0.0))
+    assert found.span == span
+    with_it = Joint(SHARED, runs, [("lift", span.weights(RUNS))])
+    assert found.evidence == pytest.approx(with_it.log_evidence - history.joint().log_evidence, abs=1e-6)
 
 
 def test_a_run_whose_change_has_another_form_says_less_of_what_all_share():
