@@ -1,6 +1,7 @@
 """Answers sealed: equal bytes for equal answers, and nothing opened that is not what was promised."""
 
 import json
+import shutil
 import zipfile
 
 import pytest
@@ -25,8 +26,8 @@ def sealed(tmp_path):
     return tmp_path
 
 
-def opened(folder):
-    return open_sealed(folder / "answers.zip", folder / MANIFEST, folder / "cases", folder / "held")
+def opened(folder, **how):
+    return open_sealed(folder / "answers.zip", folder / MANIFEST, folder / "cases", folder / "held", **how)
 
 
 def test_sealed_opens_and_gives_the_answers_back(sealed):
@@ -54,6 +55,16 @@ def test_a_case_that_has_changed_is_noticed(sealed, kind):
     (sealed / kind / "case000" / "case.toml").write_text("format = 2\n")
     with pytest.raises(InputError, match="files have changed"):
         opened(sealed)
+
+
+def test_held_flights_need_not_be_there_where_none_is_flown_on(sealed):
+    shutil.rmtree(sealed / "held")
+    assert opened(sealed, wanted=False).cases == {"case000": ANSWER}
+    with pytest.raises(InputError, match="not there"):
+        opened(sealed)
+    (sealed / "cases" / "case000" / "case.toml").write_text("format = 2\n")
+    with pytest.raises(InputError, match="files have changed"):
+        opened(sealed, wanted=False)
 
 
 def test_an_archive_needs_its_manifest(sealed):

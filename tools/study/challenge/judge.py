@@ -38,11 +38,12 @@ def case_folders(cases: Path) -> tuple[Path, Path]:
 
 
 def open_sealed(
-    path: Path, manifest: Path | None, cases: Path, held: Path, needed: tuple[str, ...] = OF_A_DIAGNOSIS
-) -> Answers:
+    path: Path, manifest: Path | None, cases: Path, held: Path, needed: tuple[str, ...] = OF_A_DIAGNOSIS,
+    wanted: bool = True,
+) -> Answers:  # fmt: skip
     """The answers, checked against the manifest if there is one: their own hash and those of the cases.
 
-    An archive without a manifest is an InputError: nobody could tell when it was written.
+    wanted: whether the flights in `held` are, too: where nothing is flown on them, they need not be there. An archive without a manifest is an InputError: nobody could tell when it was written.
     """
     answers = open_answers(path, needed)
     if answers.sha256 is None:
@@ -54,6 +55,8 @@ def open_sealed(
         for kind, folder in (("cases", cases / name), (held.name, held / name)):
             if kind not in promised:
                 raise InputError(f"the manifest is not of cases with '{kind}'", source=manifest)
+            if kind == held.name and not wanted:
+                continue
             if not folder.is_dir():
                 raise InputError("the manifest names it, but it is not there", source=folder)
             if folder_digest(folder) != promised[kind]:
@@ -142,7 +145,7 @@ def judge(
     """Open, check and score; closing: fly the corrected models on the held runs too, which takes the time."""
     folders = case_folders(cases)
     beside = next((path for path in (cases / "manifest.json", cases.parent / "manifest.json") if path.is_file()), None)
-    opened = open_sealed(answers, manifest or beside, *folders)
+    opened = open_sealed(answers, manifest or beside, *folders, wanted=closing)
     found = gather(opened, diagnoses, partial)
     for case in found:
         if closing and case.predictable:
