@@ -43,7 +43,8 @@ def open_sealed(
 ) -> Answers:  # fmt: skip
     """The answers, checked against the manifest if there is one: their own hash and those of the cases.
 
-    wanted: whether the flights in `held` are, too: where nothing is flown on them, they need not be there. An archive without a manifest is an InputError: nobody could tell when it was written.
+    wanted: whether the flights in `held` are, too: where nothing is flown on them, they need not be there. An
+    archive without a manifest is an InputError: nobody could tell when it was written.
     """
     answers = open_answers(path, needed)
     if answers.sha256 is None:
