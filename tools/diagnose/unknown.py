@@ -16,6 +16,7 @@ from tools.diagnose.shrink import AFTER, FLOOR, Shrinkage, shrink
 from tools.diagnose.waves import LINE, line_share
 from tools.inference.fit import Hypothesis
 from tools.inference.parameters import CLOCK_PLACE
+from tools.inference.problem import Problem
 
 LEFT_OVER, LEFT_WIDTH = 0.145, 1.1  # share of the explainable misfit at which unknown is as likely as not; e-folds
 OWN_LEFT = 0.03  # the same where all of it is left at the sensor of an effect that is there
@@ -162,11 +163,15 @@ def disorder(search: Search, hypothesis: Hypothesis, left: Remainder) -> ProbeRe
     return water if water is not None and left_floors(shrink(search, hypothesis)) > WIDE else None
 
 
+OTHER_CLOCK = 0.5  # of the squares that its own label leaves of a clock's course: the other one draws it better
+
+
 def clock_of(search: Search, hypothesis: Hypothesis, gained: dict[str, float], more: np.ndarray) -> Clock | None:
     """Of a hypothesis the effect of motion capture's clock that brings most, None where it has none.
 
     Its size is the mean over runs of the course of a clock that wanders by `more` (n_spectral,), its spread what the
-    runs differ by.
+    runs differ by. Where that course is drawn better by the other label, a constant or a line from 0, it is that one:
+    of two clocks of one hypothesis elimination may have left the wrong one.
     """
     labels = sorted((label for label in gained if catalogue()[label].place == CLOCK_PLACE), key=lambda n: -gained[n])
     if not labels:
@@ -174,14 +179,34 @@ def clock_of(search: Search, hypothesis: Hypothesis, gained: dict[str, float], m
     own = [k for k, free in enumerate(hypothesis.free) if free.label == labels[0]]
     free, values = [hypothesis.free[k] for k in own], hypothesis.values[own]
     sd = np.sqrt(np.diag(np.linalg.inv(hypothesis.precision)))[own]
-    problem, bounds = search.problem, search.problem.recording.bounds
-    late = problem.filter(*search.model(hypothesis), begin=True, more=more).X[:, ef.X_LATE]
-    shape = problem.since if labels[0] == "clock_skew" else np.ones_like(late)
-    sizes = np.array([shape[a:b] @ late[a:b] / (shape[a:b] @ shape[a:b]) for a, b in itertools.pairwise(bounds)])
+    problem, model = search.problem, search.model(hypothesis)
+    late = problem.filter(*model, begin=True, more=more).X[:, ef.X_LATE]
+    whole = late + model[1][ef.MOCAP_DELAY] + model[1][ef.CLOCK_SKEW] * problem.since
+    drawn = {label: run_sizes(problem, whole, label) for label in ("mocap_delay", "clock_skew")}
+    other = "mocap_delay" if labels[0] == "clock_skew" else "clock_skew"
+    better = len(problem.runs) > 1 and drawn[other][1] < OTHER_CLOCK * drawn[labels[0]][1]
+    if better and other in search.parameters:
+        free, sizes = search.parameters[other], drawn[other][0]
+        values, spread = np.zeros(len(free)), sizes.std(ddof=1) / np.sqrt(len(sizes))
+        values[0] = sizes.mean() / free[0].spread
+        return Clock(other, free, values, np.full(len(free), spread / free[0].spread))
+    sizes = run_sizes(problem, late, labels[0])[0]
     values[0] += sizes.mean() / free[0].spread
     if len(sizes) > 1:
         sd[0] = max(sd[0], sizes.std(ddof=1) / np.sqrt(len(sizes)) / free[0].spread)
     return Clock(labels[0], free, values, sd)
+
+
+def run_sizes(problem: Problem, late: np.ndarray, label: str) -> tuple[np.ndarray, float]:
+    """Of a clock's course `late` (rows,) s the constant, or for clock_skew the slope, of each run; and what is left.
+
+    That is of the squares about the mean of the runs, s^2.
+    """
+    shape = problem.since if label == "clock_skew" else np.ones_like(late)
+    runs = itertools.pairwise(problem.recording.bounds)
+    sizes = np.array([shape[a:b] @ late[a:b] / (shape[a:b] @ shape[a:b]) for a, b in runs])
+    left = late - sizes.mean() * shape
+    return sizes, float(left @ left)
 
 
 def clock_label(search: Search, hypothesis: Hypothesis) -> str:
