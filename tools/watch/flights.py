@@ -24,6 +24,7 @@ class Flights:
     heat: float = 1.0  # of the reference
     hot: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (runs,) times that: a form leaves more
     sizes: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (count,) 1 sigma of what runs differ by
+    form: dict[int, np.ndarray] = field(default_factory=dict)  # by run, (count,) 1 sigma: the form of its changes
     certainty: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # inverse covariance of a run's own values
     values: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (count,) shared
     raw: list[Expansion] = field(default_factory=list)  # not cooled, at `values`
@@ -52,7 +53,8 @@ class Flights:
 
     def made(self, n: int, one: Expansion) -> Expansion:
         """A parabola of a run as events are judged by it."""
-        return without_deviation(one.cooled(self.heat_in(n)), self.sizes)
+        sizes = np.hypot(self.sizes, self.form[n]) if n in self.form else self.sizes
+        return without_deviation(one.cooled(self.heat_in(n)), sizes)
 
     def expanded(self, n: int, x: np.ndarray) -> Expansion:
         """A run's parabola about other values."""
@@ -65,6 +67,16 @@ class Flights:
     def cool(self, n: int) -> None:
         """A run that the model of its change leaves rougher than the reference is, says the less of what all share."""
         self.hot[n] = max(1.0, self.nis(n) / float(self.usual_nis.mean()))
+        self.runs[n] = self.made(n, self.raw[n])
+
+    def loosen(self, n: int, change: np.ndarray) -> None:
+        """A run whose change (count,), spreads, may have another form than its label says the less of what all share.
+
+        Each of its values may be off by `form` of what the change would look like, were it taken for that value alone.
+        """
+        A, form = self.raw[n].curvature, self.parts[n].kind.form
+        own = form * np.abs(A @ change) / np.maximum(np.diag(A), 1.0)
+        self.form[n] = np.hypot(self.form.get(n, 0.0), own)
         self.runs[n] = self.made(n, self.raw[n])
 
     def let_go(self, n: int) -> None:

@@ -130,10 +130,13 @@ def take(history: History, event: Event) -> None:
         # that was fitted: parabolas about none of it say nothing of an effect that begins behind a threshold
         columns, weights = flights.shared.labels[event.label], event.span.weights(flights.count)
         for n in inside:
-            x = flights.runs[n].at.copy()
+            before = flights.runs[n].at
+            x = before.copy()
             x[columns] += weights[n] * event.size
-            flights.put(n, flights.expanded(n, within(flights, x)))
+            x = within(flights, x)
+            flights.put(n, flights.expanded(n, x))
             flights.cool(n)
+            flights.loosen(n, x - before)
     if history.water is not None:
         # what the form of a label leaves is no disorder: it is asked about as what is left of the label
         history.water[:, inside] = -NOT_ROUGH

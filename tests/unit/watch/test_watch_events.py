@@ -15,6 +15,7 @@ from tools.watch.history import History
 from tools.watch.label_fit import LabelFit
 from tools.watch.rivals import over_spans
 from tools.watch.scatter import learn_scatter, log_marginal, without_deviation
+from tools.watch.search import EVIDENCE_NEEDED
 
 RUNS, SEEN = 10, 40  # rows of each run's Jacobian
 FREE = [
@@ -169,3 +170,48 @@ def test_a_run_whose_change_has_another_form_says_less_of_what_all_share():
     assert flights.hot[rough] == pytest.approx(flights.nis(rough) / flights.usual_nis.mean())
     assert flights.hot[rough] > 20.0
     assert np.abs(after - COMMON).max() < 0.2 * np.abs(before - COMMON).max()
+
+
+def test_the_form_of_a_strong_change_is_no_change_of_the_runs_before_it():
+    """Drag by 40 spreads whose form looks like a lift of 5 % of it: runs before it had that lift the other way."""
+    rng, size, first = np.random.default_rng(13), 40.0, 3
+    raw = []
+    for n in range(RUNS):
+        J = 4.0 * rng.standard_normal((len(FREE), SEEN))
+        J[2] = J[1] + 0.3 * J[2]  # lift looks like drag
+        truth = np.array([0.0, size, 0.05 * size, 0.0]) if n >= first else np.zeros(len(FREE))
+        e = rng.standard_normal(SEEN) - J.T @ truth
+        raw.append(Expansion(np.zeros(len(FREE)), float(e @ e), J @ e, J @ J.T, float(e @ e) / SEEN, SEEN))
+    change = np.array([0.0, size, 0.0, 0.0])
+    parts = [SimpleNamespace(kind=SimpleNamespace(form=0.06))] * RUNS
+    flights = Flights(parts, SHARED, np.arange(RUNS) < 1, 1.0, np.ones(RUNS), np.full(len(FREE), 0.01))
+    flights.raw = [moved_to(one, change) if n >= first else one for n, one in enumerate(raw)]
+    flights.runs = [flights.made(n, one) for n, one in enumerate(flights.raw)]
+    before = [Span(1, first, STEP)]
+    taken = [("drag", np.arange(RUNS) >= first)]
+
+    def lift_before_it() -> float:
+        joint = Joint(SHARED, list(flights.runs), taken)
+        return joint.changes(before, ["lift"])[0].evidence
+
+    assert lift_before_it() > EVIDENCE_NEEDED
+    for n in range(first, RUNS):
+        flights.loosen(n, change)
+    assert lift_before_it() < 0.0
+    # what is not like the change is known from those runs as before: the third value's form is a few of its sigma
+    A = flights.raw[-1].curvature
+    assert flights.form[RUNS - 1] == pytest.approx(0.06 * np.abs(A @ change) / np.diag(A))
+    assert flights.form[RUNS - 1][1] == pytest.approx(0.06 * size)
+
+
+def test_forms_of_two_changes_in_a_run_add_up_in_squares():
+    flights = Flights([SimpleNamespace(kind=SimpleNamespace(form=0.06))], SHARED, np.ones(1, dtype=bool))
+    A = np.diag([1e4, 4e4, 1e4, 1e4])
+    flights.raw = [Expansion(np.zeros(len(FREE)), 40.0, np.zeros(len(FREE)), A, 1.0, SEEN)]
+    flights.runs, flights.hot, flights.sizes = list(flights.raw), np.ones(1), np.full(len(FREE), 0.01)
+    flights.loosen(0, np.array([0.0, 3.0, 0.0, 0.0]))
+    flights.loosen(0, np.array([0.0, 4.0, 2.0, 0.0]))
+    assert flights.form[0] == pytest.approx(0.06 * np.array([0.0, 5.0, 2.0, 0.0]))
+    # the run knows each value by what it reads, and by what it may differ by
+    apart = flights.form[0] ** 2 + 0.01**2
+    assert np.diag(flights.runs[0].curvature) == pytest.approx(1.0 / (1.0 / np.diag(A) + apart))
