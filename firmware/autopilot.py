@@ -30,7 +30,6 @@ REASONS = {
     ctl.REASON_OPERATOR: "asked to by the operator",
 }
 ESTIMATORS = {"measured": ctl.MEASURED, "filter": ctl.FILTERED, "given": ctl.GIVEN}
-SURFACED = 0.3  # m; shallower than this counts as at the surface
 
 
 def configuration(
@@ -146,11 +145,6 @@ class Autopilot:
     def finished(self) -> bool:
         """True once the mission is completed or given up."""
         return bool(self.ap[ctl.MODE] >= ctl.COMPLETED)
-
-    @property
-    def surfaced(self) -> bool:
-        """True where the vehicle is at the surface, by its own depth."""
-        return bool(self.est[ctl.EST_DEPTH] < SURFACED)
 
     def give_up(self) -> None:
         """Abort, as the operator wishes: ballast out, nose up, to the surface."""

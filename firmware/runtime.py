@@ -10,6 +10,7 @@ import math
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from enum import IntEnum
 from pathlib import Path
 from typing import Any
 
@@ -18,15 +19,25 @@ import numpy as np
 from firmware.autopilot import Autopilot
 from firmware.core.control import telemetry as record
 from firmware.core.jit import freeze_kernels, thaw_kernels
+from firmware.core.layouts import control_layout as ctl
 from firmware.core.layouts import supervisor_layout as sup
 from firmware.faults import Reaction
 from firmware.supervisor import Supervisor
-from hal.ports import SLOTS, Board
+from hal.ports import SLOTS, Board, Hardware
 
 HISTOGRAM_EDGES = np.array([0.0, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, np.inf])  # s
-ASCENT_LIMIT = 180.0  # s
 SHED = 10  # of so many records one is kept while the loop is late
 RESOURCES_S = 10.0  # between two looks at memory and handles
+
+
+class Ending(IntEnum):
+    """Why the loop ended."""
+
+    UNDER_WAY = int(sup.UNDER_WAY)  # it has not
+    SURFACED = int(sup.AT_SURFACE)  # floats, by measured depth, ballast measured at its light end
+    PUMP_GIVEN_UP = int(sup.PUMP_GIVEN_UP)  # at the surface, ballast not at its light end: another has to hold it there
+    NO_WAY_LEFT = int(sup.NO_WAY_LEFT)  # does not rise, and every reaction has been asked for
+    HANDED_OVER = 4  # to the out-of-band process, which takes the ports
 
 
 @dataclass
@@ -129,7 +140,7 @@ class Runtime:
         commands = autopilot.tick(t)
         supervisor.guard(t)
         for i in (0, 1, 2):
-            commands[i] = self._send[i](commands[i])
+            commands[i] = self._take_back(i, commands[i])
         record.fill_record(
             autopilot.frame, autopilot.est, autopilot.ap, commands, t, lateness, self._last_duration, channel.values
         )
@@ -145,6 +156,14 @@ class Runtime:
         self._deadline = deadline + self.dt
         if lateness > self.dt:
             self._skip(t)
+
+    def _take_back(self, i: int, wanted: float) -> float:
+        """Command actuator i; what its device took, after limits of its own, is what filter, anti-windup and stall
+        detector go on from."""
+        taken = self._send[i](wanted)
+        if taken != wanted and wanted == wanted:
+            self._G[sup.SENT + i] = self.autopilot.ap[ctl.SENT_SERVO + i] = taken
+        return taken
 
     def _react(self, t: float) -> None:
         """What is rare: say what is new, call on the out-of-band process and on the hardware."""
@@ -185,24 +204,33 @@ class Runtime:
             self.timing.missed += behind
             self._deadline += behind * self.dt
 
-    def run(self, *, on_second: Callable[[float], None] | None = None, ascent_limit: float = ASCENT_LIMIT) -> Timing:
-        """Tick until the mission has ended, well or not, and the vehicle is at the surface.
+    def _end(self) -> Ending:
+        """Return whether and why the loop is to end; a pump that was given up at the surface is handed over."""
+        ending = Ending(int(self._G[sup.ENDING]))
+        out_of_band = self.board.out_of_band
+        if ending == Ending.PUMP_GIVEN_UP and out_of_band is not None:
+            out_of_band.ascend()
+        handed_over = out_of_band is not None and self.supervisor.reaction >= Reaction.OOB
+        # A drop weight is this process's to release: as long as there is one, the flight goes on beside the ascent.
+        if handed_over and self.board.hardware is not Hardware.NONE and self.board.drop_weight is None:
+            return Ending.HANDED_OVER
+        return ending
 
-        on_second(t) is called once a second. After the mission's end the ascent has ascent_limit s.
+    def run(self, *, on_second: Callable[[float], None] | None = None) -> Ending:
+        """Tick until the mission has ended, well or not, and the vehicle floats or is another's to bring up.
+
+        on_second(t) is called once a second.
         """
-        autopilot = self.autopilot
         shown = 0.0
-        ended = math.inf
         while True:
             self.tick()
             now = self._deadline
             if now - self._looked_at >= RESOURCES_S:
                 self.look_at_resources(now)
-            if autopilot.finished:
-                ended = min(ended, now)
-                known = self.supervisor.depth_known
-                if (autopilot.surfaced and known) or now - ended > ascent_limit:
-                    return self.timing
+            if self._G[sup.HIGHEST] >= sup.OOB or self._G[sup.ENDING] != sup.UNDER_WAY:
+                ending = self._end()
+                if ending != Ending.UNDER_WAY:
+                    return ending
             if on_second is not None and now >= shown:
                 on_second(now)
                 shown = math.floor(now) + 1.0

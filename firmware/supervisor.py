@@ -8,6 +8,7 @@ import math
 import numpy as np
 
 from firmware.autopilot import Autopilot
+from firmware.core.layouts import control_layout as ctl
 from firmware.core.layouts import supervisor_layout as sup
 from firmware.core.supervision.screening import screen
 from firmware.core.supervision.supervisor import guard
@@ -71,8 +72,13 @@ class Supervisor:
         self._said[:] = worst
         return [(Reaction(int(worst[row])), f"fault {row}: {FAULTS[int(row)]}") for row in rows]
 
+    def measured_depth(self) -> float:
+        """Depth by the newest fit sample of the beacon, m; NaN once it has had nothing fit to say for too long."""
+        age = float(self.G[sup.CLOCK]) - float(self.G[sup.TAKEN + sup.SENSOR_BEACON])
+        known = age <= float(self.G[sup.LOST_AFTER + sup.SENSOR_BEACON])
+        return float(self.autopilot.est[ctl.NEW_DEPTH]) if known else math.nan
+
     @property
-    def depth_known(self) -> bool:
-        """False once the beacon has had nothing fit to say for too long."""
-        last = float(self.G[sup.TAKEN + sup.SENSOR_BEACON])
-        return math.isfinite(last) and self.worst(sup.FAULT_PRESSURE_LOST) == Reaction.NOTHING
+    def surface_depth(self) -> float:
+        """Depth, m, above which the vehicle is at the surface."""
+        return float(self.G[sup.SURFACE_DEPTH])

@@ -215,9 +215,10 @@ class DeviceBoard:
         for actuator in self.actuators.values():
             actuator.stop()
 
-    def close(self) -> None:
-        """Stop the actuators and give the ports back. Never raises; twice does no harm."""
-        if any(link.up for link in self.links.values()):
+    def close(self, *, stop: bool = False) -> None:
+        """Give the ports back; the drives hold, or go on to, where they were sent last, or `stop` where they stand.
+        Never raises; twice does no harm."""
+        if stop and any(link.up for link in self.links.values()):
             self.stop()
             self.serve(time.monotonic() + STOPPING_S)
         for link in self.links.values():

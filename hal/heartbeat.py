@@ -14,14 +14,16 @@ from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
 
+from hal.sortie import State
+
 SIZE = 4096
 NAME = "heartbeat"
-MAGIC = 0x676C_6964_6572_0001
+MAGIC = 0x676C_6964_6572_0002
 
 # Words, unsigned 64 bits.
-W_MAGIC, W_PID, W_STATUS, W_PERIOD_NS, W_BORN_NS = range(5)
+W_MAGIC, W_PID, W_STATE, W_PERIOD_NS, W_BORN_NS = range(5)
 W_BEAT_NS, W_TICKS = 8, 9  # the loop's, each tick
-W_MISSED, W_WORST_NS, W_LATE_NS, W_PHASE, W_MODE, W_LEG, W_LEGS = 10, 11, 12, 13, 14, 15, 16  # the loop's, each second
+W_MISSED, W_WORST_NS, W_MODE, W_LEG, W_LEGS = 10, 11, 14, 15, 16  # the loop's, each second
 W_RECORDER_NS, W_RECORDER_LEVEL, W_WRITTEN, W_DROPPED, W_DISK_ERRORS, W_RECORDER_EXPECTED = range(17, 23)
 W_RSS_BYTES, W_FILES = 23, 24
 W_GUARD_NS, W_GUARD_PID, W_GUARD_STATUS, W_GUARD_STAGE = 32, 33, 34, 35  # the out-of-band process's
@@ -32,15 +34,6 @@ V_GUARD_DEPTH_M = 7  # the out-of-band process's, on the way up
 VALUES = 16
 _VALUES_AT = 8 * WORDS
 _TEXT_AT, TEXT_BYTES = 1024, 256
-
-
-class Status(IntEnum):
-    """What the flight says of itself."""
-
-    DONE = 0  # it ended in order, or has not begun: nobody is to take over
-    STARTING = 1
-    FLYING = 2
-    TAKE_OVER = 3  # it wants the out-of-band process to bring the vehicle up
 
 
 class Guard(IntEnum):
@@ -60,7 +53,7 @@ class Pulse:
     """A look at a heartbeat. Ages in s on the monotonic clock; inf where never stamped."""
 
     pid: int
-    status: Status
+    state: State
     period_s: float
     age_s: float
     ticks: int
@@ -102,10 +95,11 @@ class Heartbeat:
             raise Held(f"{path}: a flight is under way") from None
         os.ftruncate(fd, SIZE)
         pulse = cls(fd, path)
-        guard = pulse.words[W_GUARD_NS : W_GUARD_STATUS + 1].tolist()  # its own; it may be there before the flight
+        guard = pulse.words[W_GUARD_NS : W_GUARD_STAGE + 1].tolist()  # its own; it may be there before the flight
         pulse.words[:] = memoryview(bytes(8 * WORDS)).cast("Q")
         pulse.values[:] = memoryview(bytes(8 * VALUES)).cast("d")
-        pulse.words[W_GUARD_NS], pulse.words[W_GUARD_PID], pulse.words[W_GUARD_STATUS] = guard
+        for place, word in enumerate(guard, W_GUARD_NS):
+            pulse.words[place] = word
         pulse._text[:] = flight.encode("utf-8", "replace")[:TEXT_BYTES].ljust(TEXT_BYTES, b"\0")
         pulse.words[W_PID] = os.getpid()
         pulse.words[W_PERIOD_NS] = round(1e9 * period_s)
@@ -134,9 +128,9 @@ class Heartbeat:
         self.words[W_TICKS] += 1
         self.values[V_TIME_S] = t
 
-    def say(self, status: Status) -> None:
-        """Set what the flight says of itself."""
-        self.words[W_STATUS] = status
+    def publish(self, state: State) -> None:
+        """Set the sortie's state."""
+        self.words[W_STATE] = state
 
     # --- whoever looks on -------------------------------------------------------------------------------------------
     @property
@@ -159,7 +153,7 @@ class Heartbeat:
         words, now = self.words, time.monotonic_ns()
         return Pulse(
             pid=words[W_PID],
-            status=Status(words[W_STATUS]) if words[W_STATUS] in list(Status) else Status.TAKE_OVER,
+            state=State(words[W_STATE]) if words[W_STATE] in list(State) else State.ABORTED,
             period_s=words[W_PERIOD_NS] / 1e9,
             age_s=_age(words[W_BEAT_NS], now),
             ticks=words[W_TICKS],

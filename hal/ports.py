@@ -107,6 +107,8 @@ class SensorPort(Protocol):
 class ActuatorPort(Protocol):
     """Servo (rad), slider (m) or ballast pump (kg of net mass, from which the driver makes plunger travel)."""
 
+    limits: tuple[float, float]  # of what is sent, in the port's unit: the vehicle's range within the device's own
+
     def command(self, value: float) -> float:
         """Ask for a position; returns what was really sent after the device's own limits. NaN changes nothing."""
 
@@ -208,8 +210,9 @@ class Board(Protocol):
     def state(self) -> dict[str, float]:
         """Where the plant behind it truly is (x_m, y_m, z_m, servo_rad, slider_m, ballast_kg); empty on a real one."""
 
-    def close(self) -> None:
-        """Close the devices. Never raises."""
+    def close(self, *, stop: bool = False) -> None:
+        """Close the devices; actuators hold, or go on to, where they were sent last, or `stop` where they stand. Never
+        raises; twice does no harm."""
 
 
 class BoardError(RuntimeError):

@@ -1,4 +1,4 @@
-"""What a start has to know of the flight before it: kept in two checked copies, of which the worse one counts.
+"""The sortie's state on the disk, for the next start: two checked copies, of which the worse one counts.
 
 Each copy is a block of 512 bytes in a file of its own: JSON with a sequence number, under a CRC-32. A write brings the
 first copy to the disk before it touches the second, so a cut of power tears one at most; whatever is torn, missing
@@ -11,50 +11,50 @@ import os
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import IntEnum
 from pathlib import Path
+
+from hal.sortie import State
 
 BLOCK = 512  # bytes of a copy: one sector
 NAMES = ("state.a", "state.b")
 TEXT_BYTES = 160  # of the reason, and of the flight's name
-_MAGIC = b"glider-state-1 "
-
-
-class Phase(IntEnum):
-    """How far a flight is; the worse, the larger."""
-
-    ASHORE = 0  # nothing is under way
-    HELD = 1  # a flight was given up and ended at the surface: a person looks before the next one
-    ARMED = 2  # actuators are live
-    DIVING = 3
-    ABORTED = 4  # given up: only the way up is left
-    UNKNOWN = 5  # a copy cannot be trusted
+_MAGIC = b"glider-state-2 "
+# Files written before states had names: a number, in this order.
+_MAGIC_1 = b"glider-state-1 "
+_STATES_1 = (State.ASHORE, State.HELD, State.ARMED, State.DIVING, State.ABORTED, State.UNKNOWN)
+_WORDS = {
+    State.ASHORE: "ashore",
+    State.ENDED: "ended at the surface",
+    State.HELD: "ended at the surface after a fault",
+    State.SURFACED: "broke off at the surface",
+    State.ARMED: "broke off after arming",
+    State.DIVING: "broke off under way",
+    State.ASCENDING: "broke off in an ascent",
+    State.ABORTED: "given up, and not known to have surfaced",
+    State.UNKNOWN: "state not known",
+}
 
 
 @dataclass(frozen=True)
-class FlightState:
-    """The last known phase, of which flight, and why. `trouble`: what is wrong with the copies, empty if nothing."""
+class Record:
+    """The last known state, of which flight, and why. `trouble`: what is wrong with the copies, empty if nothing."""
 
-    phase: Phase
+    state: State
     flight: str = ""
     reason: str = ""
     sequence: int = 0
     trouble: str = ""
 
-    @property
-    def may_start(self) -> bool:
-        """Whether a mission may begin."""
-        return self.phase == Phase.ASHORE
-
-    @property
-    def must_ascend(self) -> bool:
-        """Whether the vehicle may be under water with nobody flying it: bring it up, whatever was planned."""
-        return self.phase > Phase.HELD
+    def describe(self) -> str:
+        """The record in words, with the flight, the reason and what is wrong with the copies."""
+        flight = f" ({self.flight})" if self.flight else ""
+        parts = [f"the flight before{flight}: {_WORDS[self.state]}", self.reason, self.trouble]
+        return "; ".join(filter(None, parts))
 
 
-def encode(state: FlightState) -> bytes:
+def encode(record: Record) -> bytes:
     """A copy's block."""
-    fields = [int(state.phase), state.sequence, state.flight, state.reason]
+    fields = [record.state.name, record.sequence, record.flight, record.reason]
     body = _MAGIC + json.dumps(fields, separators=(",", ":")).encode()
     head = body.ljust(BLOCK - 9)
     if len(head) > BLOCK - 9:
@@ -62,17 +62,18 @@ def encode(state: FlightState) -> bytes:
     return head + f"{zlib.crc32(head):08x}\n".encode()
 
 
-def decode(block: bytes) -> FlightState | str:
+def decode(block: bytes) -> Record | str:
     """The state in a copy's block, or what is wrong with it."""
     if len(block) != BLOCK:
         return f"torn ({len(block)} of {BLOCK} bytes)"
     head, crc = block[: BLOCK - 9], block[BLOCK - 9 :]
-    if crc != f"{zlib.crc32(head):08x}\n".encode() or not head.startswith(_MAGIC):
+    if crc != f"{zlib.crc32(head):08x}\n".encode() or not head.startswith((_MAGIC, _MAGIC_1)):
         return "torn (its check sum fails)"
     try:
-        phase, sequence, flight, reason = json.loads(head[len(_MAGIC) :])
-        return FlightState(Phase(phase), str(flight), str(reason), int(sequence))
-    except (ValueError, TypeError):
+        state, sequence, flight, reason = json.loads(head[len(_MAGIC) :])
+        known = State[state] if head.startswith(_MAGIC) else _STATES_1[state]
+        return Record(known, str(flight), str(reason), int(sequence))
+    except (ValueError, TypeError, LookupError):
         return "not understood"
 
 
@@ -80,44 +81,45 @@ class StateFile:
     """Two copies in `folder`, which is made if need be. OSError where it cannot be written."""
 
     decode = staticmethod(decode)
+    unwritten = Record(State.ASHORE)  # what is read where there is neither copy
 
     def __init__(self, folder: Path | str):
         self.folder = Path(folder)
         self.folder.mkdir(parents=True, exist_ok=True)
         self.paths = tuple(self.folder / name for name in NAMES)
 
-    def read(self) -> FlightState:
+    def read(self) -> Record:
         """The worse of both copies; ashore where there is neither. Never raises over what is in them."""
         copies = [_read_copy(path, self.decode) for path in self.paths]
         if copies == [None, None]:
-            return FlightState(Phase.ASHORE)
-        good = [copy for copy in copies if isinstance(copy, FlightState)]
+            return self.unwritten
+        good = [copy for copy in copies if isinstance(copy, Record)]
         torn = [
             f"{path}: {copy or 'missing beside the other'}"
             for path, copy in zip(self.paths, copies, strict=True)
-            if not isinstance(copy, FlightState)
+            if not isinstance(copy, Record)
         ]
         if not good:
-            return FlightState(Phase.UNKNOWN, trouble="; ".join(torn))
+            return Record(State.UNKNOWN, trouble="; ".join(torn))
         worst = max(good, key=_worseness)
-        last = max(state.sequence for state in good)
+        last = max(record.sequence for record in good)
         if torn:
-            # What the torn copy said is not known; only a phase that means 'ascend' anyway can stand without it.
-            phase = worst.phase if worst.must_ascend else Phase.UNKNOWN
-            return FlightState(phase, worst.flight, worst.reason, last, "; ".join(torn))
-        return FlightState(worst.phase, worst.flight, worst.reason, last)
+            # What the torn copy said is not known; only a state that means 'ascend' anyway can stand without it.
+            state = worst.state if worst.state.must_ascend else State.UNKNOWN
+            return Record(state, worst.flight, worst.reason, last, "; ".join(torn))
+        return Record(worst.state, worst.flight, worst.reason, last)
 
-    def write(self, phase: Phase, *, flight: str = "", reason: str = "") -> FlightState:
-        """Bring a phase to the disk, both copies; returns once it is there (an fsync or two: not for the tick)."""
-        state = FlightState(phase, _cut(flight), _cut(reason), self.read().sequence + 1)
-        block = encode(state)
+    def write(self, state: State, *, flight: str = "", reason: str = "") -> Record:
+        """Bring a state to the disk, both copies; returns once it is there (an fsync or two: not for the tick)."""
+        record = Record(state, _cut(flight), _cut(reason), self.read().sequence + 1)
+        block = encode(record)
         for path in self.paths:
             _write_copy(path, block)
-        return state
+        return record
 
 
-def _worseness(state: FlightState) -> tuple[int, int]:
-    return state.phase, state.sequence
+def _worseness(record: Record) -> tuple[int, int]:
+    return record.state, record.sequence
 
 
 def _cut(text: str) -> str:
@@ -125,7 +127,7 @@ def _cut(text: str) -> str:
     return plain[:TEXT_BYTES]
 
 
-def _read_copy(path: Path, decode: Callable[[bytes], FlightState | str]) -> FlightState | str | None:
+def _read_copy(path: Path, decode: Callable[[bytes], Record | str]) -> Record | str | None:
     """A copy's state, what is wrong with it, or None where there is no such file."""
     try:
         with path.open("rb") as file:

@@ -11,6 +11,7 @@ from hal.board import BoardRequest
 from hal.clocks import MonotonicClock
 from hal.recorder.schema import Field, RecordSpec
 from hal.strict import Table, decode
+from firmware.core.vehicle.layout import X_ACT
 from sim_backend.core import layout as wl
 from sim_backend.core.effects.catalogue import check_board
 from sim_backend.core.world import write_truth
@@ -71,7 +72,7 @@ class SimulatedActuator:
 
     def __init__(self, world: World, index: int, limits: tuple[float, float]):
         self._world, self._commands, self._index = world, world.cmd, index
-        self._low, self._high = limits
+        self.limits = self._low, self._high = limits
 
     def read(self, out: np.ndarray) -> None:
         out[0], out[1], out[2] = self._world.time, ports.Validity.VALID, ports.Condition.WELL
@@ -153,8 +154,10 @@ class SimBoard:
         if self.realtime:
             self.clock = PacedClock(self.world)
 
-    def close(self) -> None:
-        """Nothing to close."""
+    def close(self, *, stop: bool = False) -> None:
+        """Actuators go on to where they were sent, as the plant's, or `stop` where they stand."""
+        if stop:
+            self.world.cmd[:] = self.world.x[X_ACT : X_ACT + 3]
 
     def check_calibration(self) -> str:
         """Nothing to calibrate."""

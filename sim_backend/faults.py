@@ -106,6 +106,7 @@ class FaultyActuator:
 
     def __init__(self, port: Any, world: World, index: int):
         self._port, self._world, self._index = port, world, index
+        self.limits = port.limits
         self._kind, self._since, self._place, self._heard = "", 0.0, 0.0, 0.0
         self._rate = float(world.P[RATES[index]])
         self.reachable = True  # for the out-of-band process

@@ -74,6 +74,7 @@ class SupervisorTable(Table):
     wrong_way_s: Annotated[float, msgspec.Meta(ge=0.1, le=0.3)] = 0.24
     longest_delay_s: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)] = 0.6  # of commands; younger ones prove nothing
     surface_m: Annotated[float, msgspec.Meta(gt=0.0, le=2.0)] = 0.4
+    surfaced_s: Short = 3.0
     memory_mb: Annotated[float, msgspec.Meta(gt=0.0, le=100_000.0)] = 100.0  # grown since arming: ABORT; half: WARN
     handles: Count = 200  # likewise
 
@@ -126,7 +127,7 @@ def settings_vector(
 _UNSET = (
     (sup.BEGAN, 1), (sup.SEEN, sup.N_SENSORS), (sup.SAME_SINCE, sup.N_SENSORS), (sup.LAST, sup.N_VALUES),
     (sup.RAW, sup.N_VALUES), (sup.SINCE, sup.N_TIMERS), (sup.SLOW_TIME, 1), (sup.BAND_MARK, 1), (sup.MINUTE, 1),
-    (sup.LEAK_SEEN, 1), (sup.OOB_SINCE, 1), (sup.MARK, 2), (sup.RING, 4 * sup.N_RING),
+    (sup.LEAK_SEEN, 1), (sup.OOB_SINCE, 1), (sup.MARK, 2), (sup.RING, 4 * sup.N_RING), (sup.PUMP_SINCE, 1),
 )  # fmt: skip
 
 
@@ -151,7 +152,7 @@ def _scalars(
         sup.LOW_VOLTAGE: limits.low_voltage or 0.0, sup.LEAST_VOLTAGE: limits.least_voltage or 0.0,
         sup.VOLTAGE_TIME: table.voltage_s, sup.OVERRUN_RUN: table.overruns, sup.OVERRUN_SHARE: table.overrun_share,
         sup.MISSION_TIME: mission_time, sup.STALL_FACTOR: table.stall_factor, sup.STALL_COUNT: table.stall_tries,
-        sup.STALL_REST: table.stall_rest_s, sup.SURFACE_DEPTH: table.surface_m,
+        sup.STALL_REST: table.stall_rest_s, sup.SURFACE_DEPTH: table.surface_m, sup.SURFACED_TIME: table.surfaced_s,
         sup.WRONG_TICKS: min(max(round(table.wrong_way_s / dt), 2), sup.N_RING - 1),
         sup.DELAY_TICKS: min(max(round(table.longest_delay_s / dt), 2), sup.N_RING - 1),
     }  # fmt: skip

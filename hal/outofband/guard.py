@@ -7,6 +7,8 @@ when the power went is brought up, whatever has become of its flight.
 
 It feeds the hardware watchdog and systemd's, only while every part answers: the loop, the recorder where one is
 expected, and itself; on the way up, the pump. Where the vehicle does not rise (rise.py) the hardware's is fed no more.
+The hardware watchdog is stopped at an end in order alone: a crash leaves it running, so that it resets the computer
+unless a new process feeds it in time.
 """
 
 import argparse
@@ -18,13 +20,14 @@ import time
 from pathlib import Path
 
 from hal import heartbeat as hb
-from hal.heartbeat import Guard, Heartbeat, Status
+from hal.heartbeat import Guard, Heartbeat
 from hal.notify import notify
 from hal.outofband.ascent import Ascent
-from hal.outofband.plan import NAME, Plan, PlanError, read_plan
+from hal.outofband.plan import BEAT_LIMIT_S, NAME, Plan, PlanError, read_plan
 from hal.outofband.rise import Stage
 from hal.realtime import leave_real_time, lock_memory, take_priority
-from hal.state_file import Phase, StateFile
+from hal.sortie import Facts, Party, Refused, State, Trigger, follow
+from hal.state_file import StateFile
 
 POLL_S = 0.05
 STEP_S = 0.5  # between two rounds of the way up
@@ -32,6 +35,7 @@ FEED_S = 0.5
 PUMP_SILENT_S = 60.0  # on the way up; then the watchdog is left to do what it does
 RECORDER_SILENT_S = 30.0  # longer than it takes the flight to notice and replace it
 KILL_S = 2.0  # for a killed process to let go of its ports
+CLOSING_S = 60.0  # at the surface, for a flight to bring log and state to the disk
 PRIORITY = 60  # above the flight's
 
 
@@ -46,42 +50,42 @@ class Feeder:
 
     def __init__(self) -> None:
         self._fd = -1
-        self._path = ""
+        self._missing = ""  # the path that could not be opened, named once
         self._next = 0.0
 
-    def open(self, path: str) -> None:
-        """Start a hardware watchdog; said and left out where there is none."""
-        if not path or path == self._path:
-            return
-        try:
-            self._fd = os.open(path, os.O_WRONLY | os.O_CLOEXEC)
-            self._path = path
-        except OSError as error:
-            say(f"{path}: {error.strerror}: no hardware watchdog")
-
-    def feed(self, *, hardware: bool = True) -> None:
-        """Hold both off for one more of their periods, or systemd's alone."""
+    def feed(self, path: str = "", *, hardware: bool = True) -> None:
+        """Hold both off for one more of their periods, or systemd's alone; the hardware's (`path`) starts with the
+        first feeding."""
         now = time.monotonic()
         if now < self._next:
             return
         self._next = now + FEED_S
         notify("WATCHDOG=1")
+        if self._fd < 0 and path and path != self._missing:
+            self._open(path)
         if self._fd >= 0 and hardware:
             with contextlib.suppress(OSError):
                 os.write(self._fd, b"\0")
 
-    def rest(self) -> None:
-        """Nothing flies: the hardware watchdog is stopped until the next flight, systemd's goes on."""
-        self.close()
-        self.feed()
+    def _open(self, path: str) -> None:
+        try:
+            self._fd = os.open(path, os.O_WRONLY | os.O_CLOEXEC)
+        except OSError as error:
+            self._missing = path
+            say(f"{path}: {error.strerror}: no hardware watchdog")
 
-    def close(self) -> None:
-        """Stop the hardware watchdog: an end in order is no fault."""
+    def stop(self) -> None:
+        """Stop the hardware watchdog (the magic close): for ends in order alone."""
         if self._fd >= 0:
             with contextlib.suppress(OSError):
                 os.write(self._fd, b"V")
+        self.leave()
+
+    def leave(self) -> None:
+        """Close the descriptor and nothing else: a hardware watchdog runs on."""
+        if self._fd >= 0:
             os.close(self._fd)
-        self._fd, self._path = -1, ""
+        self._fd = -1
 
 
 class Watch:
@@ -105,9 +109,9 @@ class Watch:
         self._read_plan()
         if self.service and not self._flight_lives():
             found = StateFile(self.state_folder).read()
-            if found.must_ascend:
+            if found.state.must_ascend:
                 why = found.trouble or found.reason
-                self.ascend(f"at the start: {found.phase.name.lower()}{f' ({why})' if why else ''}")
+                self.ascend(f"at the start: {found.state.name.lower()}{f' ({why})' if why else ''}")
 
     def step(self) -> bool:
         """Look once, act, feed."""
@@ -119,33 +123,52 @@ class Watch:
             return True
         self._stamp(Guard.WATCHING)
         alive, look = pulse.held(), pulse.look()
-        if look.status == Status.DONE:
+        if look.state.at_rest:
             self._seen_alive = False
-            self.feeder.rest()
+            self.feeder.stop()
+            self.feeder.feed()
             return alive or self.service
         if not alive and not self._seen_alive:
-            return self._left_over()
+            return self._ascend_if_abandoned()
         self._seen_alive = True
-        limit = self.plan.beat_limit_s if self.plan is not None else 1.5
         if not alive:
-            self.ascend("the flight's process is gone")
-        elif look.status == Status.TAKE_OVER:
-            self.ascend("the flight asks for it")
-        elif look.status == Status.FLYING and look.age_s > limit:
+            return self._process_gone(look.state)
+        if look.state == State.ABORTED:
+            self.ascend("the flight hands over")
+        elif look.state.beats and look.age_s > self._beat_limit:
             self.ascend(f"no heartbeat for {look.age_s:.1f} s")
+        elif look.state == State.SURFACED and look.age_s > CLOSING_S:
+            self.ascend(f"at the surface, and not closed within {CLOSING_S:g} s")
         elif not look.recorder_expected or look.recorder_age_s < RECORDER_SILENT_S:
-            self.feeder.feed()
+            self.feeder.feed(self._watchdog)
         return True
 
-    def _left_over(self) -> bool:
-        """A heartbeat whose flight was never seen alive: the state says whether it left a vehicle under water."""
+    @property
+    def _beat_limit(self) -> float:
+        return self.plan.beat_limit_s if self.plan is not None else BEAT_LIMIT_S
+
+    @property
+    def _watchdog(self) -> str:
+        return self.plan.watchdog if self.plan is not None else ""
+
+    def _process_gone(self, published: State) -> bool:
+        """The flight's process has ended without a last word; one that died closing may have left the state in order."""
+        if published == State.SURFACED and StateFile(self.state_folder).read().state.at_rest:
+            self._seen_alive = False
+            self.feeder.stop()
+            return self.service
+        self.ascend("the flight's process is gone")
+        return True
+
+    def _ascend_if_abandoned(self) -> bool:
+        """Judge a heartbeat whose flight was never seen alive by the state on the disk."""
         self.feeder.feed()
         now = time.monotonic()
         if now >= self._next_state:
             self._next_state = now + 1.0
             found = StateFile(self.state_folder).read()
-            if found.must_ascend:
-                self.ascend(f"left behind: {found.phase.name.lower()}")
+            if found.state.must_ascend:
+                self.ascend(f"left behind: {found.state.name.lower()}")
         return self.service or self._ascent is not None
 
     def _look_for_pulse(self) -> Heartbeat | None:
@@ -168,8 +191,6 @@ class Watch:
             if self._said != str(error):
                 self._said = str(error)
                 say(str(error))
-            return
-        self.feeder.open(self.plan.watchdog)
 
     def _flight_lives(self) -> bool:
         """Whether a process holds the heartbeat: the system lets go of it when the process ends, however it does."""
@@ -199,26 +220,30 @@ class Watch:
             self.plan = Plan("", (), None)  # nothing to go up with; asked for again at every round
         self._ascent, self._ascent_began = Ascent(self.plan), time.monotonic()
         self._next_step = 0.0
-        self._remember(why)
+        self._record_abort(why)
 
     def _end_flight(self) -> None:
         """Kill the process that holds the heartbeat, and wait until the system has given its ports back."""
         end = time.monotonic() + KILL_S
         while self._pulse is not None and self._pulse.held() and time.monotonic() < end:
             pid = self._pulse.words[hb.W_PID]
-            if self._pulse.words[hb.W_STATUS] != Status.TAKE_OVER or time.monotonic() > end - KILL_S / 2:
+            if self._pulse.words[hb.W_STATE] != State.ABORTED or time.monotonic() > end - KILL_S / 2:
                 with contextlib.suppress(OSError, OverflowError):
                     if pid > 1:
                         os.kill(pid, signal.SIGKILL)
             time.sleep(0.01)
 
-    def _remember(self, why: str) -> None:
-        """Given up, on the disk; one that hangs must not hold this process up."""
+    def _record_abort(self, why: str) -> None:
+        """Bring the state to the disk in a thread: a disk that hangs must not hold this process up."""
         threading.Thread(target=self._write_state, args=(why,), daemon=True).start()
 
     def _write_state(self, why: str) -> None:
-        with contextlib.suppress(OSError):
-            StateFile(self.state_folder).write(Phase.ABORTED, flight=self.plan.flight if self.plan else "", reason=why)
+        with contextlib.suppress(OSError, Refused):
+            file = StateFile(self.state_folder)
+            # A flight that was seen under way and left the state at rest (a disk that refused, say) was still lost.
+            state = max(file.read().state, State.DIVING)
+            aborted = follow(state, Trigger.LOSE, Party.WATCH, Facts())
+            file.write(aborted, flight=self.plan.flight if self.plan else "", reason=why)
 
     def _go_up(self, ascent: Ascent) -> bool:
         now = time.monotonic()
@@ -232,19 +257,21 @@ class Watch:
             before = ascent.stage
             said = ascent.step()
             if ascent.stage == Stage.HARDWARE != before:
-                self._remember("fault 18: no ascent out of band")
+                self._record_abort("fault 18: no ascent out of band")
             if said != self._said:
                 self._said = said
                 say(said)
                 notify(f"STATUS={said}")
             if self.service and self._acknowledged():
-                say("a person has looked: at rest")
-                ascent.close()
-                self._ascent, self._pulse = None, None
-                return True
+                if ascent.stage == Stage.SURFACED:
+                    say("a person has looked: at rest")
+                    ascent.close()
+                    self._ascent, self._pulse = None, None
+                    return True
+                self._record_abort("acknowledged before it was at the surface: the ascent goes on")
         heard = max(ascent.pump_heard_at, self._ascent_began)
         if time.monotonic() - heard < PUMP_SILENT_S:
-            self.feeder.feed(hardware=ascent.stage != Stage.HARDWARE)
+            self.feeder.feed(ascent.plan.watchdog, hardware=ascent.stage != Stage.HARDWARE)
         give_up = ascent.plan.give_up_s
         if give_up and time.monotonic() - ascent.reached_port_at > give_up:
             say(f"no port for {give_up:g} s: nothing is left to bring up")
@@ -256,16 +283,18 @@ class Watch:
         if time.monotonic() - self._ascent_began < 5.0:
             return False
         try:
-            return StateFile(self.state_folder).read().may_start
+            return StateFile(self.state_folder).read().state.may_arm
         except OSError:
             return False
 
-    def close(self) -> None:
-        """Let go of everything."""
+    def close(self, *, in_order: bool) -> None:
+        """Let go of everything; in order, the hardware watchdog is stopped, after a crash it runs on."""
+        if in_order:
+            self.feeder.stop()
+        self.feeder.leave()
         if self._ascent is not None:
             self._ascent.close()
         self._stamp(Guard.ABSENT)
-        self.feeder.close()
 
 
 def main() -> int:
@@ -287,11 +316,13 @@ def main() -> int:
     wishes = f"{take_priority(PRIORITY)}, {lock_memory()}"
     if options.service:
         say(wishes)
-    watch.start()
-    notify("READY=1")
+    in_order = False
     try:
+        watch.start()
+        notify("READY=1")
         while not watch.stopping and watch.step():
             time.sleep(POLL_S)
+        in_order = True
     finally:
-        watch.close()
+        watch.close(in_order=in_order)
     return 0

@@ -75,13 +75,13 @@ class TwinBoard(DeviceBoard):
             self._last_state = json.loads(self.control("state"))
         return self._last_state
 
-    def close(self) -> None:
+    def close(self, *, stop: bool = False) -> None:
         """As any board; the twins end with it."""
         process = self._process
         if process is not None:
             with contextlib.suppress(BoardError, ValueError):
                 self.state()
-            super().close()
+            super().close(stop=stop)
             self._process = None
             for pipe in (process.stdin, process.stdout):
                 assert pipe is not None

@@ -269,7 +269,7 @@ def main() -> None:
     except BoardError as error:
         say({"error": str(error)} | first)
     finally:
-        board.close()
+        board.close(stop=True)
 
 
 if __name__ == "__main__":

@@ -104,9 +104,6 @@ def check(
 
 def _stand_by(live: bool, compile_: bool, acknowledge: bool, state: Path | None, as_json: bool) -> NoReturn:
     """The options that are commands of their own; ends with the exit code."""
-    from hal.heartbeat import state_folder
-    from hal.state_file import Phase, StateFile
-
     if compile_:
         from firmware.core.jit import CACHE_DIR
         from tools.flight.precompile import FLIGHT, ensure_compiled
@@ -120,11 +117,16 @@ def _stand_by(live: bool, compile_: bool, acknowledge: bool, state: Path | None,
         else:
             say(f"kernels: {CACHE_DIR or 'plain Python (GLIDER_JIT=0)'}")
     if acknowledge:
-        from tools.flight.keeper import told
+        from hal.heartbeat import run_folder, state_folder
+        from hal.sortie import Refused
+        from tools.flight.keeper import acknowledge as set_back
+        from tools.flight.keeper import watch_facts
 
-        file = StateFile(state or state_folder())
-        say(f"acknowledged: {told(file.read())}")
-        file.write(Phase.ASHORE, reason="acknowledged")
+        try:
+            before = set_back(state or state_folder(), watch_facts(state or run_folder()))
+        except Refused as refused:
+            fail(f"glider: not acknowledged: {refused}")
+        say(f"acknowledged: {before.describe()}")
     if live:
         from tools.flight.live import find_folder, show, snapshot
 

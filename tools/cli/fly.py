@@ -3,15 +3,18 @@
 import contextlib
 import math
 import signal
-import time
 from pathlib import Path
 
 import click
 
 from tools.cli.common import DONE, FAILED, fail, json_option, print_json, progress, say
 
-ROOM = 512  # records on their way to the disk, past which a simulated flight waits
-SURE_S = 5.0  # of ascent before a flight that was brought up only may count as surfaced
+
+ENDINGS = {
+    "SURFACED": "", "PUMP_GIVEN_UP": "at the surface, but the pump did not bring the ballast to its light end",
+    "NO_WAY_LEFT": "not at the surface after the mission",
+    "HANDED_OVER": "handed over to the out-of-band process, which brings the vehicle up",
+}  # fmt: skip
 
 
 def next_log(mission: str) -> Path:
@@ -75,15 +78,15 @@ def fly(
     terminal, a second Ctrl-C under water wants a third, and a flight that broke off is never resumed: the next start
     only brings the vehicle up. Exit code 1: the flight did not complete.
     """
-    from firmware.core.layouts.control_layout import EST_DEPTH
-    from firmware.core.layouts.supervisor_layout import RESTARTED
-    from hal.ports import BoardError
+    from firmware.core.layouts.control_layout import LEG
+    from firmware.runtime import Ending
+    from hal.ports import BoardError, Hardware
     from hal.recorder.recorder import NullRecorder, Recorder
-    from hal.state_file import Phase
     from tools.data.errors import InputError
+    from tools.flight import sortie
     from tools.flight.compose import build_flight, log_metadata, parse_effects, record_specs
     from tools.flight.precompile import FLIGHT, ensure_compiled
-    from tools.flight.terminal import Stop, confirm_arming, undisturbed
+    from tools.flight.terminal import Stop, undisturbed
 
     wanted = parse_effects(effects)
     try:
@@ -92,77 +95,74 @@ def fly(
         )
     except BoardError as error:
         raise InputError(str(error), source=board) from None
-    specs = record_specs(flight)
     path = None if no_log else (log_file or next_log(flight.mission.name))
     if path is not None and path.exists():
         raise InputError("is there already; a log is never written over", source=path)
-    metadata = log_metadata(flight, seed=seed, effects=wanted)
-    recorder: Recorder | NullRecorder
-    if path is None:
-        recorder = NullRecorder(specs)
-    else:
+
+    def make_recorder() -> Recorder | NullRecorder:
+        specs, metadata = record_specs(flight), log_metadata(flight, seed=seed, effects=wanted)
+        if path is None:
+            return NullRecorder(specs)
         onlookers = live_socket(state_folder) if live else None
-        recorder = Recorder(path, specs, attachments=flight.texts, metadata=metadata, onlookers=onlookers)
+        return Recorder(path, specs, attachments=flight.texts, metadata=metadata, onlookers=onlookers)
 
     ensure_compiled(FLIGHT, say, progress)
     if flight.control.controller != "pid":
         for axis in flight.k2_margins:
             if not axis.covered:
                 say(f"warning: {axis}")
-    wishes = Wishes(priority, lock_memory, core)
-    try:
-        keeper = keep(flight, recorder, path, state_folder, acknowledge)
-    except BoardError as error:
-        fail(f"glider: {board}: not armed: {error}")
-    if keeper is not None and keeper.life.before.phase == Phase.HELD:
-        fail(f"glider: not armed: {keeper.life.reason}; look at it, then --acknowledge")
-    if keeper is not None and keeper.life.ascent_only:
-        say(f"ascending only: {keeper.life.reason}")
-        flight.autopilot.give_up()
-        flight.supervisor.G[RESTARTED] = 1.0
-    elif keeper is not None and not (yes or flight.twinned or confirm_arming(f"{board}, {flight.mission.name}")):
-        fail("glider: not armed: not confirmed")
+    name = flight.mission.name if path is None else path.stem
+    simulated = flight.board.hardware is Hardware.NONE
+    host: sortie.Host = sortie.SimulatedHost(flight, name=name, paced=realtime)
+    if not simulated:
+        host = keep(flight, name, state_folder, acknowledge, yes, board)
+    wishes, supervisor = Wishes(priority, lock_memory, core), flight.supervisor
+    legs, done = len(flight.mission.leg), 0
 
-    stop = Stop(flight.autopilot.give_up, None if keeper is None else lambda: flight.autopilot.est[EST_DEPTH])
+    stop = Stop(flight.autopilot.give_up, supervisor.surface_depth, None if simulated else supervisor.measured_depth)
     before = signal.signal(signal.SIGINT, stop)
     try:
-        with contextlib.nullcontext() if keeper is None else undisturbed(), keeper or contextlib.nullcontext():
-            if keeper is not None:
-                keeper.prepare()
-            flight.board.open()  # what does not arm leaves no log
-            check_arming(flight, path, keeper)
-            with (
-                contextlib.closing(flight.board),
-                recorder,
-                progress(f"flying {flight.mission.name}", len(flight.mission.leg), bar=keeper is None) as advance,
-            ):
-                timing, seconds = _run(flight, recorder, realtime, advance, keeper, wishes)
-                if keeper is not None:
-                    orderly = flight.autopilot.mode == "completed" or stop.presses > 0
-                    keeper.end(surfaced=flight.autopilot.surfaced, orderly=orderly, reason=flight.autopilot.reason)
-                report = recorder.close(ending={"ended": flight.autopilot.mode, "reason": flight.autopilot.reason})
+        with contextlib.nullcontext() if simulated else undisturbed(), contextlib.ExitStack() as stack:
+            advance = None
+
+            def before_loop() -> None:
+                nonlocal advance
+                advance = stack.enter_context(progress(f"flying {flight.mission.name}", legs, bar=simulated))
+                wishes.grant()
+
+            def on_second(t: float) -> None:
+                nonlocal done
+                leg = legs if flight.autopilot.mode == "completed" else int(flight.autopilot.ap[LEG])
+                if leg > done:
+                    with contextlib.suppress(OSError):  # a terminal that is gone, or takes no more
+                        advance(leg - done)
+                    done = leg
+
+            flown = sortie.fly(flight, host, make_recorder, log=path, before_loop=before_loop, on_second=on_second)
+            on_second(flown.seconds)
     except KeyboardInterrupt:
         raise click.Abort from None
     except BoardError as error:
         fail(f"glider: {board}: not armed: {error}")
     finally:
         signal.signal(signal.SIGINT, before)
-    completed = flight.autopilot.mode == "completed" and flight.autopilot.surfaced
-    if keeper is not None and keeper.life.ascent_only:
-        completed = False
+    surfaced = flown.ending == Ending.SURFACED
+    completed = flight.autopilot.mode == "completed" and surfaced and not host.ascent_only
     reason = (
-        (keeper.life.reason if keeper is not None else "")
+        (host.journal.before.describe() if host.ascent_only else "")
         or flight.autopilot.reason
-        or ("" if completed else "not at the surface after the mission")
+        or ("" if completed else ENDINGS[flown.ending.name])
     )
+    timing, report = flown.timing, flown.report
     result = {
         "completed": completed,
-        "seconds": seconds,
+        "seconds": flown.seconds,
         "reason": reason,
         "log": None if path is None else str(path),
         "rms_error": flight.autopilot.rms_errors(),
-        "faults": faults_noticed(flight.supervisor),
-        "surfaced": flight.autopilot.surfaced,
+        "faults": faults_noticed(supervisor),
+        "surfaced": surfaced,
+        "ended": {"by": flown.ending.name.lower(), "state": flown.state.name.lower()},
         "ticks": timing.ticks,
         "missed_ticks": timing.missed,
         "lateness": timing.histogram(),
@@ -216,82 +216,29 @@ def faults_noticed(supervisor) -> list[dict]:
     ]
 
 
-def keep(flight, recorder, path, folder, acknowledge):
-    """What stands around a flight on devices (flight/keeper); None in simulation. The state before it is read."""
-    from hal.ports import Hardware
-    from hal.state_file import Phase
-    from tools.flight.keeper import Keeper
-
-    if flight.board.hardware is Hardware.NONE:
-        return None
-    name = flight.mission.name if path is None else path.stem
-    keeper = Keeper(flight, recorder, name=name, folder=folder, twin=flight.twinned)
-    keeper.claim()
-    if acknowledge and not keeper.life.before.may_start:
-        say(f"acknowledged: {keeper.life.reason}")
-        keeper.life.file.write(Phase.ASHORE, reason="acknowledged")
-        keeper.life.before = keeper.life.file.read()
-    return keeper
-
-
-def check_arming(flight, path, keeper) -> None:
-    """BoardError where the flight is not fit to arm; a vehicle that only has to come up is not asked."""
+def keep(flight, name: str, folder: Path | None, acknowledge: bool, yes: bool, board: str):
+    """The host of a flight on devices (flight/keeper): claimed, and the person asked. Ends with exit code 1 where the
+    vehicle is not to be armed."""
     from hal.ports import BoardError
-    from tools.flight.arming import arm
+    from hal.sortie import State
+    from tools.flight.keeper import Keeper
+    from tools.flight.terminal import confirm_arming
 
-    if keeper is not None and keeper.life.ascent_only:
-        return
+    keeper = Keeper(flight, name=name, folder=folder, twin=flight.twinned)
     try:
-        arm(flight, log=path)
-    except BoardError:
-        flight.board.close()
-        raise
-
-
-def _run(flight, recorder, realtime, advance, keeper, wishes):
-    """Arm, fly, disarm; returns the timing and the flight's length in s."""
-    from firmware.core.layouts.control_layout import LEG
-    from firmware.core.layouts.supervisor_layout import RECORDER
-    from hal.ports import Hardware
-    from tools.flight.compose import build_runtime
-
-    runtime = build_runtime(flight, recorder)
-    simulated = not realtime and flight.board.hardware is Hardware.NONE
-    done = 0
-
-    def on_second(t: float) -> None:
-        nonlocal done
-        leg = int(flight.autopilot.ap[LEG])
-        if leg > done:
-            with contextlib.suppress(OSError):  # a terminal that is gone, or takes no more
-                advance(leg - done)
-            done = leg
-        while simulated and recorder.health().pending > ROOM and recorder.health().alive:
-            time.sleep(0.001)  # simulated time is quicker than a disk
-        if keeper is not None:
-            keeper.second(runtime.timing)
-        else:
-            flight.supervisor.G[RECORDER] = float(recorder.watch().level)
-
-    try:
-        if keeper is not None:
-            keeper.begin()
-            runtime.extras = (*runtime.extras, keeper.beat)
-        wishes.grant()
-        runtime.arm()
-        if keeper is not None:
-            keeper.flying()
-            if keeper.life.ascent_only:  # long enough to know the depth before asking whether this is the surface
-                for _ in range(round(SURE_S / runtime.dt)):
-                    runtime.tick()
-        began = runtime.deadline
-        timing = runtime.run(on_second=on_second)
-        with contextlib.suppress(OSError):
-            advance(len(flight.mission.leg) - done)
-        return timing, flight.board.clock.now() - began
-    finally:
-        runtime.disarm()
-        flight.board.close()
+        acknowledged = keeper.claim(acknowledged=acknowledge)
+    except BoardError as error:
+        fail(f"glider: {board}: not armed: {error}")
+    if acknowledged is not None:
+        say(f"acknowledged: {acknowledged.describe()}")
+    before = keeper.journal.before
+    if before.state == State.HELD:
+        fail(f"glider: not armed: {before.describe()}; look at the vehicle, then --acknowledge")
+    if before.state.must_ascend:
+        say(f"ascending only: {before.describe()}")
+    elif not (yes or flight.twinned or confirm_arming(f"{board}, {flight.mission.name}")):
+        fail("glider: not armed: not confirmed (without a terminal: --yes)")
+    return keeper
 
 
 def _tell(result: dict) -> None:

@@ -44,9 +44,9 @@ def see_state(folder: Path) -> str:
     if not folder.is_dir():
         return "none yet"
     found = StateFile(folder).read()
-    if found.must_ascend:
-        raise Unfit(f"{folder}: the flight before: {found.phase.name.lower()}; bring it up and look at it first")
-    return found.phase.name.lower()
+    if found.state.must_ascend:
+        raise Unfit(f"{folder}: {found.describe()}; bring it up and look at it first")
+    return found.state.name.lower()
 
 
 def see_kernels(plain: bool) -> str:

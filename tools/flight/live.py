@@ -9,9 +9,10 @@ from typing import Any
 
 from firmware.autopilot import MODES
 from hal import heartbeat as hb
-from hal.heartbeat import Guard, Heartbeat, Status
+from hal.heartbeat import Guard, Heartbeat
 from hal.outofband.rise import Stage
 from hal.recorder.condition import Level
+from hal.sortie import State
 from tools.data.errors import InputError
 
 PERIOD_S = 1.0
@@ -20,7 +21,7 @@ STAGES = {
     "blind": "no depth", "rising": "under water", "surfaced": "at the surface", "again": "does not rise, pumping again",
     "hardware": "does not rise, hardware watchdog no longer fed",
 }  # fmt: skip
-SHELF_S = 5.0  # nor is a watch that was not heard of for so long
+GUARD_STALE_S = 5.0  # nor is an out-of-band process that was not heard of for so long
 
 
 def find_folder(wanted: Path | None) -> Path:
@@ -46,7 +47,7 @@ def snapshot(folder: Path) -> dict[str, Any]:
         words, values, look = pulse.words, pulse.values, pulse.look()
         alive = pulse.held()
         found = {
-            "flight": pulse.flight, "pid": look.pid, "alive": alive, "status": look.status.name.lower(),
+            "flight": pulse.flight, "pid": look.pid, "alive": alive, "state": look.state.name.lower(),
             "heartbeat_age_s": look.age_s, "time_s": values[hb.V_TIME_S], "ticks": look.ticks,
             "missed": words[hb.W_MISSED], "worst_late_s": words[hb.W_WORST_NS] / 1e9,
             "mode": MODES.get(float(words[hb.W_MODE]), "?"), "leg": words[hb.W_LEG] + 1, "legs": words[hb.W_LEGS],
@@ -72,13 +73,13 @@ def _problems(look: hb.Pulse, alive: bool, found: dict[str, Any]) -> list[str]:
     if look.guard == Guard.ASCENDING:
         depth = f", {found['ascent_depth_m']:.1f} m deep" if math.isfinite(found["ascent_depth_m"]) else ""
         problems.append(f"the out-of-band process is bringing the vehicle up: {STAGES[found['ascent']]}{depth}")
-    elif look.status == Status.DONE:
+    elif look.state.at_rest:
         return ["no flight is under way"]
     elif not alive:
         problems.append("the flight's process is gone")
-    elif look.status == Status.FLYING and look.age_s > LATE_S:
+    elif look.state.beats and look.age_s > LATE_S:
         problems.append(f"no heartbeat for {look.age_s:.1f} s")
-    if look.guard_age_s > SHELF_S:
+    if look.guard_age_s > GUARD_STALE_S:
         problems.append("no out-of-band process watches")
     if found["recorder"] != "ok":
         problems.append(f"recorder: {found['recorder']}")
@@ -90,7 +91,7 @@ def _problems(look: hb.Pulse, alive: bool, found: dict[str, Any]) -> list[str]:
 
 
 ROWS = (
-    ("flight", "{flight}: {status}, {mode}, leg {leg} of {legs}"),
+    ("flight", "{flight}: {state}, {mode}, leg {leg} of {legs}"),
     ("loop", "{ticks} ticks, {missed} missed, at most {worst_ms:.1f} ms late; heartbeat {heartbeat_age_s:.2f} s old"),
     ("vehicle", "depth {depth_m:.2f} m, pitch {pitch_deg:+.1f} deg, roll {roll_deg:+.1f} deg, {battery_v:.1f} V"),
     ("commands", "slider {slider_mm:+.1f} mm, ballast {ballast_kg:+.3f} kg"),

@@ -24,9 +24,9 @@ IGNORED = (
 
 
 def confirm_arming(what: str) -> bool:
-    """Whether the person at the terminal says yes, in full. Where no terminal asks, the command line was the order."""
+    """Whether the person at the terminal says yes, in full. Where there is no terminal, nobody does."""
     if sys.stdin is None or not sys.stdin.isatty():
-        return True
+        return False
     click.echo(f"{what}: actuators go live once all checks pass; hands and cables clear? (yes/no) ", err=True, nl=False)
     return sys.stdin.readline().strip().lower() == "yes"
 
@@ -36,13 +36,12 @@ class Stop:
     while a vehicle is under water, where nobody's hands are, only one that is meant (AGAIN_S after the one before)."""
 
     def __init__(
-        self, give_up: Callable[[], None], depth: Callable[[], float] | None = None,
+        self, give_up: Callable[[], None], surface: float = 0.0, depth: Callable[[], float] | None = None,
         now: Callable[[], float] = time.monotonic,
     ):  # fmt: skip
-        """`depth`: m, of a vehicle on devices; None in simulation."""
-        from firmware.autopilot import SURFACED  # brings the kernels: only who flies waits for them
-
-        self._surfaced = SURFACED
+        """`surface`: m, the depth above which the vehicle is at the surface; `depth`: m, measured, NaN where it is not
+        known, of a vehicle on devices; None in simulation."""
+        self._surface = surface
         self.presses = 0
         self._give_up, self._depth, self._now = give_up, depth, now
         self._before = -math.inf
@@ -53,7 +52,7 @@ class Stop:
         if self.presses == 1:
             self._give_up()
             return
-        deep = self._depth is not None and self._depth() > self._surfaced
+        deep = self._depth is not None and not self._depth() <= self._surface  # NaN: deep
         if not deep or (self.presses > 2 and AGAIN_S[0] <= since <= AGAIN_S[1]):
             raise KeyboardInterrupt
         with contextlib.suppress(OSError):

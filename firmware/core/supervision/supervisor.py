@@ -11,6 +11,7 @@ from firmware.core.layouts import control_layout as ctl
 from firmware.core.layouts import supervisor_layout as sup
 from firmware.core.supervision import detectors
 from firmware.core.supervision.screening import start_place
+from firmware.core.supervision.surface import watch_surface
 from firmware.core.vehicle import layout
 from firmware.core.vehicle.actuators import actuator_table, limited
 
@@ -130,6 +131,7 @@ def guard(P, C, G, frame, est, ap, cmd, t):
     watch_limits(P, G, cmd)
     settle(G, t)
     act(P, G, cmd, ap, t)
+    watch_surface(P, G, est, ap, scale, t)
     doubtful = (
         G[sup.ASKED + sup.FAULT_DISAGREE] * G[sup.ENABLED + sup.FAULT_DISAGREE]
         + G[sup.ASKED + sup.FAULT_STEEP] * G[sup.ENABLED + sup.FAULT_STEEP]

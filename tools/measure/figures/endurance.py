@@ -112,45 +112,49 @@ def _load(core: int) -> subprocess.Popen[bytes]:
 def _fly(
     mission: Path, folder: Path, seconds: float, fifo: bool, core: int, start_beside: Callable[[], None]
 ) -> tuple[dict[str, Any], np.ndarray]:
+    from firmware.runtime import Ending, Runtime
     from hal import realtime
     from hal.recorder.recorder import Recorder
-    from tools.flight.compose import build_flight, build_runtime, log_metadata, record_specs
+    from tools.flight import sortie
+    from tools.flight.compose import build_flight, log_metadata, record_specs
     from tools.flight.keeper import Keeper
 
     flight = build_flight(mission=str(mission), board="twin")
-    metadata = log_metadata(flight, seed=0, effects={})
-    recorder = Recorder(folder / "log.mcap", record_specs(flight), attachments=flight.texts, metadata=metadata)
-    keeper = Keeper(flight, recorder, name="endurance", folder=folder / "state", twin=True)
+    made: list[Recorder] = []
+    said: list[str] = []
+    samples = Samples(seconds)
+
+    class Enduring(Keeper):
+        def prepare(self) -> None:
+            if fifo:  # before the twins start: they follow, ten below
+                said.append(realtime.take_priority(PRIORITY))
+            super().prepare()
+
+    def make_recorder() -> Recorder:
+        metadata = log_metadata(flight, seed=0, effects={})
+        made.append(Recorder(folder / "log.mcap", record_specs(flight), attachments=flight.texts, metadata=metadata))
+        return made[0]
+
+    def before_loop() -> None:
+        said.extend([realtime.pin_to_core(core)] + ([realtime.lock_memory()] if fifo else []))
+
+    def loop(runtime: Runtime) -> Ending:
+        nonlocal figures, mode
+        start_beside()
+        _ticks(runtime, keeper, made[0], samples, seconds)
+        realtime.unlock_memory()
+        figures, mode = _figures(runtime, samples, seconds), flight.autopilot.mode
+        flight.autopilot.give_up()
+        return runtime.run()
+
+    figures: dict[str, Any] = {}
+    mode = ""
+    keeper = Enduring(flight, name="endurance", folder=folder / "state", twin=True)
     keeper.claim()
-    with keeper:
-        if fifo:  # before the twins start: they follow, ten below
-            realtime.take_priority(PRIORITY)
-        keeper.prepare()
-        flight.board.open()
-        try:
-            with recorder:
-                runtime = build_runtime(flight, recorder)
-                keeper.begin()
-                runtime.extras = (*runtime.extras, keeper.beat)
-                said = [realtime.pin_to_core(core)] + ([realtime.lock_memory()] if fifo else [])
-                try:
-                    runtime.arm()
-                    keeper.flying()
-                    samples = Samples(seconds)
-                    start_beside()
-                    _ticks(runtime, keeper, recorder, samples, seconds)
-                finally:
-                    runtime.disarm()
-                    realtime.unlock_memory()
-                report = recorder.close({"reason": "long enough"})
-        finally:
-            flight.board.close()
-        autopilot = flight.autopilot
-        keeper.end(surfaced=autopilot.surfaced, orderly=True, reason="long enough")
-    figures = _figures(runtime, samples, seconds)
-    figures["pass"] = figures["pass"] and autopilot.mode == "flying"
+    report = sortie.fly(flight, keeper, make_recorder, loop=loop, before_loop=before_loop).report
+    figures["pass"] = figures["pass"] and mode == "flying"
     records = {"written": report.written, "dropped": report.dropped, "complete": report.complete}
-    told = {"real_time": said, "mode_at_the_end": autopilot.mode, "reason": autopilot.reason, "records": records}
+    told = {"real_time": said, "mode_at_the_end": mode, "records": records}
     return {**figures, **told}, samples.late[: min(samples.late_count, LATE_KEPT)]
 
 

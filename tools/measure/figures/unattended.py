@@ -155,40 +155,40 @@ def _in_child(flight: Any, folder: Path, kill_after_s: float | None) -> Told:
 
 
 def _live(flight: Any, folder: Path, pipe: int) -> None:
-    """What `glider fly` does between its start and its end, on the simulated board."""
+    """What `glider fly` does between its start and its end, on the simulated board; each step is told through a pipe:
+    armed, diving, first tick flown, loop over (`E`), ended (`X`); refused, under way at the start."""
     from firmware.core.layouts import control_layout as ctl
+    from hal.ports import BoardError
     from hal.recorder.recorder import NullRecorder
-    from hal.state_file import Phase
-    from tools.flight.compose import build_runtime, record_specs
-    from tools.flight.keeper import Life
+    from tools.flight import sortie
+    from tools.flight.compose import record_specs
+
+    class Telling(sortie.Host):
+        flown = False
+
+        def prepare(self) -> None:
+            super().prepare()
+            os.write(pipe, b"UA" if self.ascent_only else b"A")
+
+        def begin(self, recorder: Any) -> None:
+            super().begin(recorder)
+            os.write(pipe, b"D")
+
+        def beat(self, t: float) -> None:
+            if not self.flown and flight.autopilot.ap[ctl.MODE] == ctl.FLYING:
+                self.flown = True
+                os.write(pipe, b"F")
+
+        def closing(self, ending: Any) -> None:
+            os.write(pipe, b"E")
+            super().closing(ending)
 
     os.write(pipe, b"S")
-    life = Life(folder, "dip")
-    if life.before.phase == Phase.HELD:
+    try:
+        sortie.fly(flight, Telling(flight, name="dip", folder=folder), lambda: NullRecorder(record_specs(flight)))
+    except BoardError:
         os.write(pipe, b"R")
         return
-    if life.ascent_only:
-        os.write(pipe, b"U")
-        flight.autopilot.give_up()
-    life.armed()
-    os.write(pipe, b"A")
-    flight.board.open()
-    life.diving()
-    os.write(pipe, b"D")
-    flown = [False]
-
-    def look(t: float) -> None:
-        if not flown[0] and flight.autopilot.ap[ctl.MODE] == ctl.FLYING:
-            flown[0] = True
-            os.write(pipe, b"F")
-
-    runtime = build_runtime(flight, NullRecorder(record_specs(flight)))
-    runtime.extras = (*runtime.extras, look)
-    runtime.arm()
-    runtime.run()
-    os.write(pipe, b"E")
-    autopilot = flight.autopilot
-    life.ended(surfaced=autopilot.surfaced, orderly=autopilot.mode == "completed", reason=autopilot.reason)
     os.write(pipe, b"X")
 
 
