@@ -204,7 +204,7 @@ class Runtime:
             self.timing.missed += behind
             self._deadline += behind * self.dt
 
-    def _end(self) -> Ending:
+    def ended(self) -> Ending:
         """Return whether and why the loop is to end; a pump that was given up at the surface is handed over."""
         ending = Ending(int(self._G[sup.ENDING]))
         out_of_band = self.board.out_of_band
@@ -228,7 +228,7 @@ class Runtime:
             if now - self._looked_at >= RESOURCES_S:
                 self.look_at_resources(now)
             if self._G[sup.HIGHEST] >= sup.OOB or self._G[sup.ENDING] != sup.UNDER_WAY:
-                ending = self._end()
+                ending = self.ended()
                 if ending != Ending.UNDER_WAY:
                     return ending
             if on_second is not None and now >= shown:

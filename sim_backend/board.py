@@ -6,12 +6,12 @@ from typing import Annotated, Any
 import msgspec
 import numpy as np
 
+from firmware.core.vehicle.layout import X_ACT
 from hal import ports
 from hal.board import BoardRequest
 from hal.clocks import MonotonicClock
 from hal.recorder.schema import Field, RecordSpec
 from hal.strict import Table, decode
-from firmware.core.vehicle.layout import X_ACT
 from sim_backend.core import layout as wl
 from sim_backend.core.effects.catalogue import check_board
 from sim_backend.core.world import write_truth

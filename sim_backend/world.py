@@ -1,5 +1,6 @@
 """A simulated world: a vehicle that may differ from its file, an environment, sensors with noise, rate and delay."""
 
+import copy
 import math
 from dataclasses import dataclass, field
 from typing import Annotated
@@ -125,6 +126,13 @@ class World:
         names = ("x_m", "y_m", "z_m", "servo_rad", "slider_m", "ballast_kg")
         values = (*self.x[X_POS : X_POS + 3], *self.x[X_ACT : X_ACT + 3])
         return dict(zip(names, map(float, values), strict=True))
+
+    def adrift(self, seconds: float) -> float:
+        """Depth (m) so long from now with nobody at the controls, the actuators where they were sent last. This world
+        itself stays where it is."""
+        later = copy.deepcopy(self)
+        later.advance(self.time + seconds)
+        return float(later.x[X_POS + 2])
 
     def advance(self, t_end: float) -> float:
         """Move to t_end (s), under the commands in self.cmd; samples that have arrived are in self.frame."""

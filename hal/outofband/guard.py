@@ -152,7 +152,7 @@ class Watch:
         return self.plan.watchdog if self.plan is not None else ""
 
     def _process_gone(self, published: State) -> bool:
-        """The flight's process has ended without a last word; one that died closing may have left the state in order."""
+        """The flight's process ended without a last word; one that died closing may have left the state in order."""
         if published == State.SURFACED and StateFile(self.state_folder).read().state.at_rest:
             self._seen_alive = False
             self.feeder.stop()

@@ -3,12 +3,12 @@
 import contextlib
 import math
 import signal
+from collections.abc import Callable
 from pathlib import Path
 
 import click
 
 from tools.cli.common import DONE, FAILED, fail, json_option, print_json, progress, say
-
 
 ENDINGS = {
     "SURFACED": "", "PUMP_GIVEN_UP": "at the surface, but the pump did not bring the ballast to its light end",
@@ -123,7 +123,7 @@ def fly(
     before = signal.signal(signal.SIGINT, stop)
     try:
         with contextlib.nullcontext() if simulated else undisturbed(), contextlib.ExitStack() as stack:
-            advance = None
+            advance: Callable[[int], None] | None = None
 
             def before_loop() -> None:
                 nonlocal advance
@@ -133,7 +133,7 @@ def fly(
             def on_second(t: float) -> None:
                 nonlocal done
                 leg = legs if flight.autopilot.mode == "completed" else int(flight.autopilot.ap[LEG])
-                if leg > done:
+                if leg > done and advance is not None:
                     with contextlib.suppress(OSError):  # a terminal that is gone, or takes no more
                         advance(leg - done)
                     done = leg

@@ -1,6 +1,5 @@
 """The host of a flight on devices: its heartbeat, its state across restarts, the out-of-band process, watchdogs."""
 
-import contextlib
 import os
 import shutil
 import subprocess

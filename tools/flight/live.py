@@ -12,7 +12,6 @@ from hal import heartbeat as hb
 from hal.heartbeat import Guard, Heartbeat
 from hal.outofband.rise import Stage
 from hal.recorder.condition import Level
-from hal.sortie import State
 from tools.data.errors import InputError
 
 PERIOD_S = 1.0

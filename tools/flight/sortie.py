@@ -36,7 +36,7 @@ class Journal:
         self.reason = self.before.reason
 
     def arm(self, facts: Facts) -> None:
-        """Arm for the mission, or for an ascent alone after a flight that broke off; BoardError where neither may be."""
+        """Arm for the mission, or for an ascent alone after a flight that broke off. BoardError: neither may be."""
         self.recovering = self.state.must_ascend
         try:
             self.move(Trigger.RECOVER if self.recovering else Trigger.ARM, facts, self.before.reason)

@@ -124,7 +124,7 @@ def guard(P, C, G, frame, est, ap, cmd, t):
     watch_moves(P, G, frame, scale, t)
     if est[ctl.EST_BEACON_TIME] >= 0.0:
         detectors.watch_depth(G, est, ap, t)
-        detectors.watch_ascent(G, est, ap, t)
+    detectors.watch_ascent(G, est, ap, t)
     detectors.watch_attitude(G, est, ap, t)
     detectors.watch_law(P, C, G, ap, t)
     detectors.watch_loop(G, t)

@@ -1,8 +1,9 @@
 """Has the flight ended? A vehicle counts as surfaced once it floats there by measurement, and will go on to.
 
-After the mission's end, or once the dive was given up: measured depth below surface_m for surfaced_s without a break,
-and the ballast measured at its light end. A ballast that makes no progress towards that end for the time of the whole
-way (times stall_factor) is given up: at the surface the flight then hands the pump over to the out-of-band process.
+After the mission's end, or once the dive was given up: every depth measured in the last surfaced_s shallower than
+surface_m, one at least, and the ballast measured at its light end. A ballast that makes no progress towards that end
+for the time of the whole way (times stall_factor) is given up: at the surface the flight then hands the pump over to
+the out-of-band process.
 """
 
 import math
@@ -31,7 +32,8 @@ def watch_surface(P, G, est, ap, scale, t):
     """
     G[sup.ENDING], G[sup.CLOCK] = sup.UNDER_WAY, t
     over = ap[ctl.MODE] >= ctl.COMPLETED
-    shallow = over and not lost(G, sup.SENSOR_BEACON, t) and est[ctl.NEW_DEPTH] < G[sup.SURFACE_DEPTH]
+    known = t - G[sup.TAKEN + sup.SENSOR_BEACON] < G[sup.SURFACED_TIME]
+    shallow = over and known and est[ctl.NEW_DEPTH] < G[sup.SURFACE_DEPTH]
     held = lasting(G, sup.T_SURFACE, shallow, t) >= G[sup.SURFACED_TIME]
     if not over:
         return

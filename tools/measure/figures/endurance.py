@@ -122,7 +122,8 @@ def _fly(
     flight = build_flight(mission=str(mission), board="twin")
     made: list[Recorder] = []
     said: list[str] = []
-    samples = Samples(seconds)
+    samples, mode = Samples(seconds), ""
+    figures: dict[str, Any] = {}
 
     class Enduring(Keeper):
         def prepare(self) -> None:
@@ -147,8 +148,6 @@ def _fly(
         flight.autopilot.give_up()
         return runtime.run()
 
-    figures: dict[str, Any] = {}
-    mode = ""
     keeper = Enduring(flight, name="endurance", folder=folder / "state", twin=True)
     keeper.claim()
     report = sortie.fly(flight, keeper, make_recorder, loop=loop, before_loop=before_loop).report

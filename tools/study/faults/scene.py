@@ -14,7 +14,7 @@ from firmware.autopilot import Autopilot
 from firmware.core.layouts import control_layout as ctl
 from firmware.faults import Reaction
 from firmware.model.supervisor_settings import Limits
-from firmware.runtime import RESOURCES_S, Runtime
+from firmware.runtime import RESOURCES_S, Ending, Runtime
 from firmware.supervisor import Supervisor
 from firmware.telemetry import TICK
 from hal.recorder.recorder import NullRecorder
@@ -25,7 +25,7 @@ from tools.flight.compose import Flight, build_flight
 
 PHASES = ("waiting", "descent", "level", "ascent", "surface")
 SURFACED_M = 0.5
-ASCENT_S = 200.0  # after the mission's end
+ADRIFT_S = 300.0  # after the end of the flight, with the board closed: then the vehicle is looked at
 LINGER_S = 3.0  # behind a fault's time, before a flight at the surface may end
 LONGEST_S = 600.0
 MISSION = """
@@ -61,6 +61,7 @@ class Scene:
     each_tick: Callable[["Scene", float], None] | None = None
     lateness: Callable[[float], float] | None = None
     deepest: float = 0.0
+    left: float | None = None  # m deep ADRIFT_S after the flight's end
     cleanup: list[Callable[[], None]] = field(default_factory=list)
     notes: dict[str, Any] = field(default_factory=dict)
 
@@ -194,25 +195,23 @@ def fly(scene: Scene, row: int, *, allowed_s: float, disabled: int | None = None
 
 
 def _run(runtime: Runtime, scene: Scene, allowed_s: float) -> None:
-    finished, looked = None, 0.0
-    pilot, supervisor = scene.pilot, scene.supervisor
+    """Fly to the flight's end, from where the plant is looked at later, and on for as long as the row may take."""
+    looked = 0.0
     while runtime.deadline < LONGEST_S:
         runtime.tick()
         now = runtime.deadline
         if now - looked >= RESOURCES_S:
             runtime.look_at_resources(now)
             looked = now
-        if not pilot.finished:
-            continue
-        finished = now if finished is None else finished
+        if scene.left is None and runtime.ended() != Ending.UNDER_WAY:
+            scene.left = scene.world.adrift(ADRIFT_S)
         waited = scene.since is None or now - scene.since > allowed_s + LINGER_S
-        up = pilot.surfaced and supervisor.depth_known and waited
-        if up or now - finished > ASCENT_S:
+        if scene.left is not None and waited:
             return
 
 
 def ended(scene: Scene) -> str:
-    """How the flight ended, by the plant's truth."""
-    if scene.deepest < SURFACED_M:
-        return "safe"  # never left the surface
-    return "surfaced" if scene.depth < SURFACED_M else "lost"
+    """How the flight ended, by the plant's truth: ADRIFT_S later, nobody at the controls."""
+    if scene.left is None or scene.left >= SURFACED_M:
+        return "lost"
+    return "safe" if scene.deepest < SURFACED_M else "surfaced"  # safe: never left the surface

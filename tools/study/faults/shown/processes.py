@@ -15,7 +15,7 @@ import sys, time
 from hal import heartbeat as hb
 pulse = hb.Heartbeat.create(sys.argv[1], 0.02, "faults")
 pulse.beat(0.0)
-pulse.say(hb.Status.FLYING)
+pulse.publish(hb.State.DIVING)
 print("flying", flush=True)
 while True:
     pulse.beat(0.0)
@@ -57,7 +57,7 @@ def loop_ends(how: signal.Signals) -> Callable[[bool, Path], Came]:
                     watch.step()
                 noticed = time.monotonic() - begin if watch._ascent is not None else None
                 time.sleep(0.02)
-            watch.close()
+            watch.close(in_order=True)
         return came(noticed is not None, "OOB", "none", after=noticed or 0.0)
 
     return show
@@ -77,15 +77,17 @@ def no_rise(disabled: bool, folder: Path) -> Came:
 
 
 def restart(disabled: bool, folder: Path) -> Came:
-    """Killed in every phase after arming: the next start only ascends."""
-    from hal.state_file import Phase, StateFile
-    from tools.flight.keeper import Life
+    """Killed in every state after arming: the next start only ascends."""
+    from hal.sortie import Facts, State
+    from hal.state_file import StateFile
+    from tools.flight.sortie import Journal
 
     resumed = 0
-    for phase in (Phase.ARMED, Phase.DIVING, Phase.ABORTED):
-        StateFile(folder).write(phase, flight="before")
-        life = Life(folder, "after")
-        ascends = life.ascent_only and not life.file.read().may_start
+    for state in (state for state in State if state.must_ascend):
+        StateFile(folder).write(state, flight="before")
+        journal = Journal(folder, "after")
+        journal.arm(Facts())
+        ascends = journal.recovering and journal.state == State.ASCENDING
         resumed += disabled or not ascends
     return came(not resumed, "ascent only", "resumed")
 

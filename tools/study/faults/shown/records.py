@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from hal import state_file
-from hal.state_file import FlightState, Phase, StateFile
+from hal.sortie import State
+from hal.state_file import Record, StateFile
 from tools.data.errors import InputError
 from tools.data.log.framing import CHUNK_HEAD, Scan
 from tools.data.log.reader import Topic, read_log
@@ -24,12 +25,12 @@ class UncheckedScan(Scan):
 
 
 class Trusting(StateFile):
-    """Reads a copy without its check: the phase is the first digit that can be found."""
+    """Reads a copy without its check: the state is the first name that can be found."""
 
     @staticmethod
-    def decode(block: bytes) -> FlightState:
-        digits = [byte for byte in block if 0x30 <= byte <= 0x39]
-        return FlightState(Phase(min(digits[1] - 0x30, 5) if len(digits) > 1 else 0))
+    def decode(block: bytes) -> Record:
+        names = [state for state in State if state.name.encode() in block]
+        return Record(names[0] if names else State.ASHORE)
 
 
 def full_disk(disabled: bool, folder: Path) -> Came:
@@ -116,20 +117,20 @@ def _ends(whole: bytes) -> np.ndarray:
 
 def torn_state(disabled: bool, folder: Path) -> Came:
     """The power goes at every byte of a write of either copy; what is read has to be as bad as the worse of both."""
-    wrong_phase = 0
-    for old, new in ((Phase.ASHORE, Phase.DIVING), (Phase.DIVING, Phase.ASHORE)):
+    wrong = 0
+    for old, new in ((State.ASHORE, State.DIVING), (State.DIVING, State.ASHORE)):
         for copy in (0, 1):
             for cut in range(0, state_file.BLOCK, 7):
                 file = StateFile(folder)
                 before = file.write(old)
-                block = state_file.encode(FlightState(new, sequence=before.sequence + 1))
+                block = state_file.encode(Record(new, sequence=before.sequence + 1))
                 for path in file.paths[:copy]:
                     path.write_bytes(block)
                 kept = file.paths[copy].read_bytes()
                 torn = block[:cut] + (b"" if cut % 2 else kept[cut:])
                 file.paths[copy].write_bytes(torn)
                 found = (Trusting if disabled else StateFile)(folder).read()
-                untouched = old == Phase.ASHORE and copy == 0 and torn == kept  # nothing of it has changed yet
-                finished = new == Phase.ASHORE and copy == 1 and torn == block  # all of it has
-                wrong_phase += found.phase < Phase.DIVING and not (untouched or finished)
-    return came(not wrong_phase, "the worse wins", f"{wrong_phase} taken for whole")
+                untouched = old == State.ASHORE and copy == 0 and torn == kept  # nothing of it has changed yet
+                finished = new == State.ASHORE and copy == 1 and torn == block  # all of it has
+                wrong += found.state < State.DIVING and not (untouched or finished)
+    return came(not wrong, "the worse wins", f"{wrong} taken for whole")
