@@ -205,14 +205,18 @@ class Runtime:
             self._deadline += behind * self.dt
 
     def ended(self) -> Ending:
-        """Return whether and why the loop is to end; a pump that was given up at the surface is handed over."""
+        """Return whether and why the loop is to end; a pump that was given up at the surface is handed over.
+
+        A drop weight is this process's to release: where there is one, the flight goes on beside the ascent.
+        """
         ending = Ending(int(self._G[sup.ENDING]))
-        out_of_band = self.board.out_of_band
-        if ending == Ending.PUMP_GIVEN_UP and out_of_band is not None:
-            out_of_band.ascend()
+        out_of_band, last_hope = self.board.out_of_band, self.board.drop_weight is not None
+        if ending == Ending.PUMP_GIVEN_UP:
+            if out_of_band is not None:
+                out_of_band.ascend()
+            return Ending.UNDER_WAY if last_hope else ending
         handed_over = out_of_band is not None and self.supervisor.reaction >= Reaction.OOB
-        # A drop weight is this process's to release: as long as there is one, the flight goes on beside the ascent.
-        if handed_over and self.board.hardware is not Hardware.NONE and self.board.drop_weight is None:
+        if handed_over and self.board.hardware is not Hardware.NONE and not last_hope:
             return Ending.HANDED_OVER
         return ending
 

@@ -247,10 +247,11 @@ class Watch:
 
     def _go_up(self, ascent: Ascent) -> bool:
         now = time.monotonic()
-        self._stamp(Guard.ASCENDING)
+        able = bool(ascent.plan.axes)
+        self._stamp(Guard.ASCENDING if able else Guard.WATCHING)
         if now >= self._next_step:
             self._next_step = now + STEP_S
-            if not ascent.plan.axes:
+            if not able:
                 self._read_plan()
                 if self.plan is not None and self.plan.axes:
                     self._ascent = ascent = Ascent(self.plan)
@@ -263,7 +264,7 @@ class Watch:
                 say(said)
                 notify(f"STATUS={said}")
             if self.service and self._acknowledged():
-                if ascent.stage == Stage.SURFACED:
+                if ascent.stage == Stage.SURFACED or not able:
                     say("a person has looked: at rest")
                     ascent.close()
                     self._ascent, self._pulse = None, None

@@ -10,8 +10,9 @@ import pytest
 from support.patience import patient_vehicle
 from support.twinned import DIVE, end_guard, twins, until
 
-from hal.heartbeat import Guard, Heartbeat, Status
-from hal.state_file import Phase, StateFile
+from hal.heartbeat import Guard, Heartbeat
+from hal.sortie import State
+from hal.state_file import StateFile
 
 pytestmark = pytest.mark.realtime(seconds=40)
 NOISE = bytes(letter for letter in range(1, 256) if letter != 3) + b"\nenable\nabort\nyes\n\x1a\x1c\x13"
@@ -37,13 +38,13 @@ def test_neither_noise_nor_the_loss_of_its_terminal_ends_a_dive(tmp_path):
             deeper = sea.state()["z_m"] + 0.5
             until(lambda: sea.state()["z_m"] > deeper or not child.isalive(), 60.0, every=0.1)
             pulse = Heartbeat.open(state).look()
-            assert (pulse.status, pulse.guard) == (Status.FLYING, Guard.WATCHING)
-            assert StateFile(state).read().phase == Phase.DIVING
+            assert (pulse.state, pulse.guard) == (State.DIVING, Guard.WATCHING)
+            assert StateFile(state).read().state == State.DIVING
             for _ in range(2):  # two of them together: given up, and not left
                 os.kill(child.pid, signal.SIGINT)
                 time.sleep(0.05)
             until(lambda: not child.isalive(), 180.0, every=0.1)
-            assert StateFile(state).read().phase == Phase.ASHORE
+            assert StateFile(state).read().state == State.ASHORE
             assert sea.state()["z_m"] < 0.35
         finally:
             child.kill(signal.SIGKILL)

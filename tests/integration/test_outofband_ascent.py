@@ -9,9 +9,10 @@ import sys
 import pytest
 from support.twinned import DIVE, flying, guard_pid, twins, until
 
-from hal.heartbeat import Guard, Heartbeat, Status
+from hal.heartbeat import Guard, Heartbeat
 from hal.outofband.plan import read_plan
-from hal.state_file import Phase, StateFile
+from hal.sortie import State
+from hal.state_file import StateFile
 from tools.data.log.reader import read_log
 
 pytestmark = pytest.mark.realtime(seconds=120)
@@ -28,12 +29,12 @@ def sea(tmp_path):
 def dive(sea, tmp_path, flight):
     """Arm, and be well under water; time enough for a busy machine."""
     until(lambda: sea.state()["z_m"] > DEEP_M or flight.poll() is not None, 300.0, every=0.1)
-    assert StateFile(tmp_path / "state").read().phase == Phase.DIVING
+    assert StateFile(tmp_path / "state").read().state == State.DIVING
 
 
 def comes_up(sea, tmp_path, began):
     """By the pump, at its light end; the state says so."""
-    until(lambda: StateFile(tmp_path / "state").read().phase == Phase.ABORTED, 4.0)
+    until(lambda: StateFile(tmp_path / "state").read().state == State.ABORTED, 4.0)
     until(lambda: sea.state()["z_m"] < 0.3, 120.0, every=0.1)
     pump = read_plan(tmp_path / "state" / "outofband.json").axes[0]
     until(lambda: abs(sea.state()["ballast_kg"] - pump.end_m * began["kg_per_m"]) < 0.01, 30.0)
@@ -64,7 +65,7 @@ def test_a_flight_that_is_killed_is_brought_up_and_not_resumed(sea, tmp_path):
     assert not result["completed"]
     assert "given up and not known to have surfaced" in result["reason"]
     assert set(read_log(tmp_path / "second.mcap").topics["/tick"].column("mode")) == {3.0}
-    assert StateFile(tmp_path / "state").read().phase == Phase.HELD
+    assert StateFile(tmp_path / "state").read().state == State.HELD
     with flying(sea.board, tmp_path / "dive.toml", tmp_path, "--log", str(tmp_path / "third.mcap")) as flight:
         assert flight.wait(60.0) == 1
     assert "not armed: the flight before (second): given up" in (tmp_path / "stderr").read_text()
@@ -115,7 +116,7 @@ def test_a_second_flight_is_refused_and_an_orderly_end_leaves_nobody_watching(se
         flight.send_signal(signal.SIGINT)  # given up by a person
         assert flight.wait(180.0) == 1
         until(lambda: not os.path.exists(f"/proc/{guard}"), 10.0)
-    assert Heartbeat.open(tmp_path / "state").look().status == Status.DONE
+    assert Heartbeat.open(tmp_path / "state").look().state == State.ASHORE
     assert StateFile(tmp_path / "state").read().may_start
     assert sea.state()["z_m"] < 0.35
 

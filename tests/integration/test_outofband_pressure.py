@@ -14,7 +14,8 @@ from support.twinned import twins, until
 from hal.board import BoardRequest, board_builder
 from hal.heartbeat import Heartbeat
 from hal.outofband.plan import NAME, write_plan
-from hal.state_file import Phase, StateFile
+from hal.sortie import State
+from hal.state_file import StateFile
 from tools.data.sources import load_vehicle
 from tools.flight.ascent_plan import make_plan
 from tools.flight.live import snapshot
@@ -41,7 +42,7 @@ def brought_up(sea, folder):
     (folder / "watchdog").touch()
     plan = make_plan(board, flight="dive", settings=settings, water_density=1000.0, watchdog=str(folder / "watchdog"))
     write_plan(folder / NAME, plan)
-    StateFile(folder).write(Phase.DIVING, flight="dive")
+    StateFile(folder).write(State.DIVING, flight="dive")
     Heartbeat.create(folder, 0.02, "dive").close()  # the flight that is gone
     command = [sys.executable, "-m", "hal.outofband", "--service", "--run", str(folder), "--state", str(folder)]
     with (folder / "said").open("w") as file, subprocess.Popen(command, stderr=file) as process:

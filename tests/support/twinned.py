@@ -69,7 +69,7 @@ def flying(board: Path, mission: Path, folder: Path, *extra: str):
     log = Path(extra[extra.index("--log") + 1]) if "--log" in extra else folder / "flight.mcap"
     command = [sys.executable, "-m", "tools.cli.main", "fly", "--board", str(board), "--mission", str(mission)]
     command += ["--vehicle", str(patient_vehicle(folder))]
-    command += ["--state", str(folder / "state"), "--log", str(folder / "flight.mcap"), "--json", *extra]
+    command += ["--yes", "--state", str(folder / "state"), "--log", str(folder / "flight.mcap"), "--json", *extra]
     try:
         for _ in range(ARMING_TRIES):
             with (folder / "stdout").open("w") as out, (folder / "stderr").open("a") as err:

@@ -8,21 +8,22 @@ import time
 import pytest
 
 from hal import heartbeat as hb
-from hal.heartbeat import Guard, Heartbeat, Held, Status
+from hal.heartbeat import Guard, Heartbeat, Held
+from hal.sortie import State
 
 
 def test_what_the_loop_stamps_another_map_sees(tmp_path):
     pulse = Heartbeat.create(tmp_path, 0.02, "sawtooth-001")
     watcher = Heartbeat.open(tmp_path)
     first = watcher.look()
-    assert (first.pid, first.status, first.period_s, first.ticks) == (os.getpid(), Status.DONE, 0.02, 0)
+    assert (first.pid, first.state, first.period_s, first.ticks) == (os.getpid(), State.ASHORE, 0.02, 0)
     assert first.age_s == float("inf")
     assert watcher.flight == "sawtooth-001"
-    pulse.say(Status.FLYING)
+    pulse.publish(State.DIVING)
     for number in range(5):
         pulse.beat(number / 50)
     seen = watcher.look()
-    assert (seen.status, seen.ticks, seen.guard) == (Status.FLYING, 5, Guard.ABSENT)
+    assert (seen.state, seen.ticks, seen.guard) == (State.DIVING, 5, Guard.ABSENT)
     assert 0.0 <= seen.age_s < 1.0
     assert watcher.values[hb.V_TIME_S] == 4 / 50
     time.sleep(0.05)
@@ -43,11 +44,12 @@ def test_one_flight_at_a_time_and_a_dead_ones_place_is_free(tmp_path):
 
 def test_the_guards_words_outlive_a_new_flight(tmp_path):
     first = Heartbeat.create(tmp_path, 0.02)
-    first.words[hb.W_GUARD_STATUS] = Guard.WATCHING
+    first.words[hb.W_GUARD_STATUS], first.words[hb.W_GUARD_STAGE] = Guard.WATCHING, 2
     first.words[hb.W_TICKS] = 7
     first.close()
     second = Heartbeat.create(tmp_path, 0.02)
     assert (second.look().guard, second.look().ticks) == (Guard.WATCHING, 0)
+    assert second.words[hb.W_GUARD_STAGE] == 2
 
 
 @pytest.mark.parametrize("data", [b"", b"x" * 10, b"\xff" * hb.SIZE])
@@ -59,8 +61,8 @@ def test_what_is_no_heartbeat_is_refused(tmp_path, data):
 
 def test_words_that_make_no_sense_read_as_the_worst(tmp_path):
     pulse = Heartbeat.create(tmp_path, 0.02)
-    pulse.words[hb.W_STATUS] = pulse.words[hb.W_GUARD_STATUS] = 99
-    assert (pulse.look().status, pulse.look().guard) == (Status.TAKE_OVER, Guard.ABSENT)
+    pulse.words[hb.W_STATE] = pulse.words[hb.W_GUARD_STATUS] = 99
+    assert (pulse.look().state, pulse.look().guard) == (State.ABORTED, Guard.ABSENT)
 
 
 def test_stamping_gains_no_memory(tmp_path):

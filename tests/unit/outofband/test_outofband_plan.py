@@ -134,7 +134,7 @@ def test_the_process_loads_the_standard_library_and_pyserial_alone():
     assert loaded - set(sys.stdlib_module_names) <= {"__main__", "hal", "serial", "sitecustomize"}
     mine = "import sys, hal.outofband.guard; print(*sorted(m for m in sys.modules if m.startswith('hal.')))"
     done = subprocess.run([sys.executable, "-c", mine], capture_output=True, check=True, text=True)
-    wanted = {"hal.heartbeat", "hal.notify", "hal.realtime", "hal.state_file"}
+    wanted = {"hal.heartbeat", "hal.notify", "hal.realtime", "hal.sortie", "hal.state_file"}
     assert {name for name in done.stdout.split() if not name.startswith("hal.outofband")} == wanted
 
 

@@ -13,7 +13,8 @@ from hal.heartbeat import Guard, Heartbeat
 from hal.outofband import guard
 from hal.outofband.guard import Watch
 from hal.outofband.plan import NAME, AxisPlan, Plan, write_plan
-from hal.state_file import Phase, StateFile
+from hal.sortie import State
+from hal.state_file import StateFile
 
 pytestmark = pytest.mark.realtime(seconds=35)
 
@@ -22,7 +23,7 @@ import os, select, sys, time
 from hal import heartbeat as hb
 pulse = hb.Heartbeat.create(sys.argv[1], 0.02, "test")
 pulse.beat(0.0)
-pulse.say(hb.Status.FLYING)
+pulse.publish(hb.State.DIVING)
 print("flying", flush=True)
 beating = recording = True
 while True:
@@ -36,7 +37,7 @@ while True:
         elif word == "recorder given up":
             pulse.words[hb.W_RECORDER_EXPECTED] = 0
         elif word:
-            pulse.say(hb.Status[word])
+            pulse.publish(hb.State[word])
             print(word, flush=True)
     if beating:
         pulse.beat(1.0)
@@ -105,7 +106,7 @@ def watch(tmp_path, monkeypatch):
     found = Watch(tmp_path, tmp_path, service=False)
     found.start()
     yield found
-    found.close()
+    found.close(in_order=True)
 
 
 def run(watch, seconds, condition=None):
@@ -144,7 +145,7 @@ def test_a_hanging_recorder_is_not_fed_for_one_given_up_is(flight, dog, watch, m
     assert not ascending(watch)
 
 
-@pytest.mark.parametrize("end", ["quiet", signal.SIGSTOP, signal.SIGKILL, "TAKE_OVER"])
+@pytest.mark.parametrize("end", ["quiet", signal.SIGSTOP, signal.SIGKILL, "ABORTED"])
 def test_a_heart_that_stops_is_noticed_within_two_seconds_and_its_process_ended(flight, dog, watch, tmp_path, end):
     assert run(watch, 0.3)
     if isinstance(end, str):
@@ -153,11 +154,11 @@ def test_a_heart_that_stops_is_noticed_within_two_seconds_and_its_process_ended(
         flight.process.send_signal(end)
     began = time.monotonic()
     run(watch, 5.0, lambda: ascending(watch))
-    assert time.monotonic() - began < (4.0 if end == "TAKE_OVER" else 2.0 + 0.5)  # asked politely, it has a second
+    assert time.monotonic() - began < (4.0 if end == "ABORTED" else 2.0 + 0.5)  # asked politely, it has a second
     assert flight.process.wait(5.0) == -signal.SIGKILL
     run(watch, 0.5)
     assert Heartbeat.open(tmp_path).look().guard == Guard.ASCENDING
-    assert StateFile(tmp_path).read().phase == Phase.ABORTED
+    assert StateFile(tmp_path).read().state == State.ABORTED
     assert StateFile(tmp_path).read().flight == "test"
 
 
@@ -177,7 +178,7 @@ def test_on_the_way_up_it_feeds_until_the_pump_was_silent_for_too_long(flight, d
 
 def test_an_end_in_order_stops_the_watchdog_and_the_watch(flight, dog, watch):
     assert run(watch, 0.2)
-    flight.tell("DONE")
+    flight.tell("ENDED")
     run(watch, 0.2)
     assert dog.fed()[2]
     flight.process.kill()
@@ -186,37 +187,37 @@ def test_an_end_in_order_stops_the_watchdog_and_the_watch(flight, dog, watch):
     assert not ascending(watch)
 
 
-@pytest.mark.parametrize("phase", list(Phase))
-def test_what_a_service_does_at_its_start_is_the_states_to_say(tmp_path, phase):
-    StateFile(tmp_path).write(phase, reason="because")
+@pytest.mark.parametrize("state", list(State))
+def test_what_a_service_does_at_its_start_is_the_states_to_say(tmp_path, state):
+    StateFile(tmp_path).write(state, reason="because")
     service = Watch(tmp_path, tmp_path, service=True)
     service.start()
-    assert ascending(service) == (phase > Phase.HELD)
+    assert ascending(service) == state.must_ascend
     assert run(service, 0.3)  # without a plan it has nothing to go up with, and waits for one
-    service.close()
+    service.close(in_order=True)
 
 
 def test_a_service_rests_once_a_person_has_looked(tmp_path, monkeypatch):
     monkeypatch.setattr(guard, "STEP_S", 0.05)
-    StateFile(tmp_path).write(Phase.DIVING)
+    StateFile(tmp_path).write(State.DIVING)
     service = Watch(tmp_path, tmp_path, service=True)
     service.start()
     run(service, 0.3)
-    StateFile(tmp_path).write(Phase.ASHORE)
+    StateFile(tmp_path).write(State.ASHORE)
     run(service, 10.0, lambda: not ascending(service))
     assert not ascending(service)
-    service.close()
+    service.close(in_order=True)
 
 
 def test_a_flight_left_over_from_before_is_judged_by_the_state(flight, tmp_path):
     flight.process.kill()
     flight.process.wait()
-    for phase, wanted in ((Phase.ASHORE, False), (Phase.DIVING, True)):
-        StateFile(tmp_path).write(phase)
+    for state, wanted in ((State.ASHORE, False), (State.DIVING, True)):
+        StateFile(tmp_path).write(state)
         watch = Watch(tmp_path, tmp_path, service=False)
         watch.start()
         assert run(watch, 1.5, lambda watch=watch: ascending(watch)) == wanted
-        watch.close()
+        watch.close(in_order=True)
 
 
 def test_ports_that_never_come_end_a_twins_watch(flight, tmp_path, watch):

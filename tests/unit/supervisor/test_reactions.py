@@ -204,13 +204,13 @@ def test_before_the_first_depth_nothing_is_said_of_it():
     man.est[ctl.NEW_DEPTH] = 5000.0
     man.step(20)
     assert man.supervisor.worst(sup.FAULT_TOO_DEEP) == Reaction.NOTHING
-    assert not man.supervisor.depth_known
+    assert math.isnan(man.supervisor.measured_depth())
 
 
 def test_depth_is_known_until_the_beacon_is_lost():
     man = Watchman()
     man.step(5)
-    assert man.supervisor.depth_known
+    assert man.supervisor.measured_depth() == man.est[ctl.NEW_DEPTH]
     man.silence.add("beacon")
     man.seconds(1.0)
-    assert not man.supervisor.depth_known
+    assert math.isnan(man.supervisor.measured_depth())

@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from hal.heartbeat import run_folder, state_folder
-from hal.state_file import Phase, StateFile
+from hal.sortie import State
+from hal.state_file import StateFile
 
 ROOT = Path(__file__).resolve().parents[3]
 DEPLOY = ROOT / "tools" / "deploy"
@@ -129,9 +130,9 @@ def test_a_release_passes_its_self_check_unless_vehicle_files_or_state_are_again
     assert code == 1
     assert said.startswith(f"self-check: files: FAILED: {files / 'sawtooth.toml'}")
 
-    StateFile(state).write(Phase.DIVING, flight="dive")
+    StateFile(state).write(State.DIVING, flight="dive")
     assert check() == (
-        1, f"self-check: state: FAILED: {state}: the flight before: diving; bring it up and look at it first"
+        1, f"self-check: state: FAILED: {state}: the flight before (dive): broke off under way; bring it up and look at it first"
     )  # fmt: skip
 
 

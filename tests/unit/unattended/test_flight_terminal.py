@@ -12,7 +12,8 @@ from pathlib import Path
 import pexpect
 import pytest
 
-from hal.state_file import Phase, StateFile
+from hal.sortie import State
+from hal.state_file import StateFile
 from tests.support.twinned import end_guard, until
 from tools.flight.terminal import AGAIN_S, Stop, confirm_arming
 
@@ -34,7 +35,7 @@ class Clock:
 def pressed(depth, seconds):
     """Ctrl-C at these times; how often the dive was given up, and the number of presses before it stopped at once."""
     clock, given_up = Clock(), []
-    stop = Stop(lambda: given_up.append(clock.t), depth, clock)
+    stop = Stop(lambda: given_up.append(clock.t), 0.4, depth, clock)
     for number, at in enumerate(seconds, start=1):
         clock.t = 100.0 + at
         try:
@@ -44,15 +45,16 @@ def pressed(depth, seconds):
     return len(given_up), None
 
 
-@pytest.mark.parametrize("depth", [None, lambda: 0.0, lambda: 0.29, lambda: -0.1, lambda: math.nan])
+@pytest.mark.parametrize("depth", [None, lambda: 0.0, lambda: 0.39, lambda: -0.1])
 def test_the_first_gives_up_and_the_second_stops_at_once_where_people_are(depth):
     assert pressed(depth, [0.0, 0.001]) == (1, 2)
     assert pressed(depth, [0.0]) == (1, None)
 
 
-def test_under_water_only_one_that_is_meant_leaves_the_vehicle():
+@pytest.mark.parametrize("metres", [3.0, 0.41, math.nan])  # a depth that is not known may be any
+def test_under_water_only_one_that_is_meant_leaves_the_vehicle(metres):
     def deep():
-        return 3.0
+        return metres
 
     assert pressed(deep, [0.0, 1.0]) == (1, None)
     assert pressed(deep, [0.0, 1.0, 2.0]) == (1, 3)
@@ -111,7 +113,7 @@ def test_nothing_arms_without_a_yes(fly, tmp_path, answer):
     said, code = ended(child)
     assert code == 1
     assert "not armed: not confirmed" in said
-    assert StateFile(tmp_path).read().phase == Phase.ASHORE
+    assert StateFile(tmp_path).read().state == State.ASHORE
 
 
 def test_a_confirmed_start_goes_on_to_the_checks(fly):
@@ -129,7 +131,7 @@ def test_ctrl_c_at_the_question_arms_nothing(fly, tmp_path):
     until(lambda: asleep(child.pid), 60.0)  # Python loses what comes between the question and the wait for the answer
     child.sendintr()
     assert ended(child)[1] == 1
-    assert StateFile(tmp_path).read().phase == Phase.ASHORE
+    assert StateFile(tmp_path).read().state == State.ASHORE
 
 
 def test_who_says_yes_beforehand_is_not_asked(fly):
@@ -138,7 +140,7 @@ def test_who_says_yes_beforehand_is_not_asked(fly):
 
 
 def test_an_ascent_is_never_asked_for(fly, tmp_path):
-    StateFile(tmp_path).write(Phase.DIVING)
+    StateFile(tmp_path).write(State.DIVING)
     child = fly()
     assert child.expect([QUESTION, "ascending only"]) == 1
     assert QUESTION not in ended(child)[0]

@@ -9,9 +9,11 @@ import pytest
 from click.testing import CliRunner
 
 from hal import heartbeat as hb
-from hal.heartbeat import Guard, Heartbeat, Status
+from hal.heartbeat import Guard, Heartbeat
+from hal.outofband.rise import Stage
 from hal.recorder.condition import Level
-from hal.state_file import Phase, StateFile
+from hal.sortie import State
+from hal.state_file import StateFile
 from tools.cli.check import check
 from tools.flight.live import find_folder, lines, snapshot
 
@@ -25,7 +27,7 @@ def pulse(tmp_path):
     found.words[hb.W_GUARD_STATUS], found.words[hb.W_GUARD_NS] = Guard.WATCHING, time.monotonic_ns()
     found.values[hb.V_DEPTH_M], found.values[hb.V_PITCH_RAD] = 2.5, -0.35
     found.beat(12.0)
-    found.say(Status.FLYING)
+    found.publish(State.DIVING)
     yield found
     found.close()
 
@@ -35,7 +37,7 @@ def test_a_good_flight_is_all_well(pulse, tmp_path):
     assert found["problems"] == []
     assert (found["flight"], found["mode"], found["leg"], found["depth_m"]) == ("sawtooth-001", "flying", 2, 2.5)
     page = dict(lines(found))
-    assert page["flight"] == "sawtooth-001: flying, flying, leg 2 of 4"
+    assert page["flight"] == "sawtooth-001: diving, flying, leg 2 of 4"
     assert "depth 2.50 m, pitch -20.1 deg" in page["vehicle"]
     done = CliRunner().invoke(check, ["--live", "--state", str(tmp_path)])
     assert done.exit_code == 0
@@ -52,7 +54,7 @@ def test_a_good_flight_is_all_well(pulse, tmp_path):
         (hb.W_DROPPED, 5, "5 records dropped"),
         (hb.W_GUARD_NS, 1, "no out-of-band process watches"),
         (hb.W_GUARD_STATUS, Guard.ASCENDING, "bringing the vehicle up"),
-        (hb.W_STATUS, Status.DONE, "no flight is under way"),
+        (hb.W_STATE, State.ASHORE, "no flight is under way"),
     ],
 )
 def test_what_is_wrong_is_said_and_is_exit_1(pulse, tmp_path, word, value, said):
@@ -83,11 +85,34 @@ def test_without_a_heartbeat_it_says_where_it_looked(tmp_path, monkeypatch):
 
 
 def test_acknowledging_sets_the_state_back(tmp_path):
-    StateFile(tmp_path).write(Phase.HELD, flight="dive-007", reason="no depth")
+    StateFile(tmp_path).write(State.HELD, flight="dive-007", reason="no depth")
     done = CliRunner().invoke(check, ["--acknowledge", "--state", str(tmp_path)])
     assert done.exit_code == 0
-    assert "dive-007): given up, and ended at the surface; no depth" in done.stderr
-    assert StateFile(tmp_path).read().may_start
+    assert "dive-007): ended at the surface after a fault; no depth" in done.stderr
+    assert StateFile(tmp_path).read().state == State.ASHORE
+
+
+def test_a_flight_under_way_is_not_acknowledged(pulse, tmp_path):
+    StateFile(tmp_path).write(State.DIVING, flight="dive-007")
+    done = CliRunner().invoke(check, ["--acknowledge", "--state", str(tmp_path)])
+    assert (done.exit_code, done.stderr) == (1, "glider: not acknowledged: a flight is under way\n")
+    assert StateFile(tmp_path).read().state == State.DIVING
+
+
+@pytest.mark.parametrize("stage", [Stage.BLIND, Stage.RISING, Stage.AGAIN, Stage.HARDWARE])
+def test_an_ascent_under_way_is_not_acknowledged(pulse, tmp_path, stage):
+    """At any depth: only a vehicle that the out-of-band process sees at the surface is another's to look at."""
+    pulse.words[hb.W_GUARD_STATUS], pulse.words[hb.W_GUARD_STAGE] = Guard.ASCENDING, stage
+    StateFile(tmp_path).write(State.ABORTED, flight="dive-007")
+    pulse.close()
+    Heartbeat.open(tmp_path).words[hb.W_GUARD_NS] = time.monotonic_ns()
+    done = CliRunner().invoke(check, ["--acknowledge", "--state", str(tmp_path)])
+    assert done.exit_code == 1
+    assert "not acknowledged: the out-of-band process is bringing the vehicle up" in done.stderr
+    assert StateFile(tmp_path).read().state == State.ABORTED
+    Heartbeat.open(tmp_path).words[hb.W_GUARD_STAGE] = Stage.SURFACED
+    assert CliRunner().invoke(check, ["--acknowledge", "--state", str(tmp_path)]).exit_code == 0
+    pulse.__init__(Heartbeat.open(tmp_path)._fd, pulse.path)  # for the fixture to close
 
 
 def test_compiled_ahead_means_compiled():

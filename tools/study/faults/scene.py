@@ -27,7 +27,7 @@ PHASES = ("waiting", "descent", "level", "ascent", "surface")
 SURFACED_M = 0.5
 ADRIFT_S = 300.0  # after the end of the flight, with the board closed: then the vehicle is looked at
 LINGER_S = 3.0  # behind a fault's time, before a flight at the surface may end
-LONGEST_S = 600.0
+LONGEST_S = 1200.0
 MISSION = """
 format = 1
 name = "dive"
@@ -57,11 +57,12 @@ class Scene:
     broken: Broken
     phase: str
     begin: Callable[["Scene"], None]
+    at_s: float | None = None  # begins at this time, whatever the phase
     since: float | None = None
     each_tick: Callable[["Scene", float], None] | None = None
     lateness: Callable[[float], float] | None = None
     deepest: float = 0.0
-    left: float | None = None  # m deep ADRIFT_S after the flight's end
+    left: float | None = None  # m deep ADRIFT_S after the flight's end; after LONGEST_S where that does not come
     cleanup: list[Callable[[], None]] = field(default_factory=list)
     notes: dict[str, Any] = field(default_factory=dict)
 
@@ -89,7 +90,9 @@ class Scene:
         return float(self.world.x[2])
 
     def due(self) -> bool:
-        """Whether the phase in which the fault begins is reached."""
+        """Whether the phase in which the fault begins is reached, or its time."""
+        if self.at_s is not None:
+            return self.world.time >= self.at_s
         ap, est = self.pilot.ap, self.pilot.est
         mode, leg, depth = ap[ctl.MODE], int(ap[ctl.LEG]), est[ctl.EST_DEPTH]
         return {
@@ -156,17 +159,24 @@ def build_scene(phase: str, begin: Callable[[Scene], None], setting: Setting, se
     """Everything but the first tick."""
     mission_file.write_text(MISSION.format(limit=setting.mission_s, hold=setting.hold_s, controller=setting.controller))
     flight = build_flight(mission=str(mission_file), seed=seed, effects=setting.effects)
+    scene = set_scene(flight, phase, begin, setting)
+    if phase == "waiting":
+        scene.since = 0.0
+        begin(scene)
+    return scene
+
+
+def set_scene(
+    flight: Flight, phase: str, begin: Callable[[Scene], None], setting: Setting, at_s: float | None = None
+) -> Scene:
+    """A flight, its board broken in, under a case's setting."""
     flight.vehicle = msgspec.structs.replace(flight.vehicle, limits=setting.limits)
     flight.supervisor = Supervisor(
         flight.autopilot, flight.vehicle, flight.mission, dt=1.0 / flight.board.loop_hz, periods=flight.board.periods,
         restarted=setting.restarted,
     )  # fmt: skip
     assert isinstance(flight.board, SimBoard)
-    scene = Scene(flight, break_in(flight.board), phase, begin)
-    if phase == "waiting":
-        scene.since = 0.0
-        begin(scene)
-    return scene
+    return Scene(flight, break_in(flight.board), phase, begin, at_s)
 
 
 def fly(scene: Scene, row: int, *, allowed_s: float, disabled: int | None = None) -> Flown:
@@ -208,10 +218,13 @@ def _run(runtime: Runtime, scene: Scene, allowed_s: float) -> None:
         waited = scene.since is None or now - scene.since > allowed_s + LINGER_S
         if scene.left is not None and waited:
             return
+    if scene.left is None:  # it holds on to the vehicle
+        scene.left = scene.depth
 
 
 def ended(scene: Scene) -> str:
     """How the flight ended, by the plant's truth: ADRIFT_S later, nobody at the controls."""
-    if scene.left is None or scene.left >= SURFACED_M:
+    assert scene.left is not None
+    if scene.left >= SURFACED_M:
         return "lost"
     return "safe" if scene.deepest < SURFACED_M else "surfaced"  # safe: never left the surface
