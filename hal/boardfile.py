@@ -182,6 +182,7 @@ class DeviceFile(Table):
     leak: LeakTable | None = None
     battery: BatteryTable | None = None
     loop_hz: Annotated[float, msgspec.Meta(gt=0.0, le=100.0)] = 50.0
+    armed_depth_m: Annotated[float, msgspec.Meta(ge=0.0, le=5.0)] = 0.0  # of the beacon when armed; 0: in air or awash
     calibration: str = ""  # hash of what was calibrated and looked through; empty: never
 
 

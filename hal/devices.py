@@ -61,7 +61,7 @@ class DeviceBoard:
 
     def __init__(self, file: boardfile.DeviceFile, source: str, vehicle: Any, water_density: float):
         self.name, self.file, self.source, self.loop_hz = file.name, file, source, file.loop_hz
-        self.surface_pressure = file.beacon.surface_pa
+        self.surface_pressure, self.armed_depth = file.beacon.surface_pa, file.armed_depth_m
         self.out_of_band: OutOfBand | None = None
         self.periods = {
             "imu": 1.0 / file.imu.rate_hz,

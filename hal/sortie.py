@@ -86,7 +86,10 @@ class Blocker:
 
 
 UNDER_WAY = Blocker("a flight is under way", lambda facts: facts.flight_under_way)
-BROUGHT_UP = Blocker("the out-of-band process is bringing the vehicle up; with the vehicle in hand, stop that process first", lambda facts: facts.being_brought_up)
+BROUGHT_UP = Blocker(
+    "the out-of-band process is bringing the vehicle up; with the vehicle in hand, stop that process first",
+    lambda facts: facts.being_brought_up,
+)
 FAULT = Blocker("a fault ended the dive", lambda facts: facts.fault)
 
 

@@ -137,6 +137,7 @@ class SimBoard:
         self.file, self.world, self.loop_hz = file, world, file.loop_hz
         self.periods = file.sensors.periods
         self.surface_pressure = float(world.E[wl.ENV_SURFACE_PRESSURE])
+        self.armed_depth = file.start.depth_m
         self.realtime = realtime
         self.clock: ports.Clock = SimulatedClock(world)
         self.leak: ports.SensorPort | None = None

@@ -32,7 +32,7 @@ class TwinBoard(DeviceBoard):
         self._process: subprocess.Popen[bytes] | None = None
         self._last_state: dict[str, float] = {}
         super().__init__(replaced_ports(file, self.folder), request.source, request.vehicle, request.water_density)
-        self.name = "twin"
+        self.name, self.armed_depth = "twin", file.start.depth_m
 
     def connect(self) -> None:
         """Start the twins, then open their ports."""

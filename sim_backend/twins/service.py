@@ -33,7 +33,7 @@ STEP_S = 0.01
 FALL_BEHIND_S = 1.0  # past which the plant's time stands rather than runs after the clock
 HELP = (
     "fault DEVICE KIND [NUMBER]; pose ROLL PITCH YAW DEPTH (deg, m); release; alarm slider|ballast CODE; leak 0|1; "
-    "battery VOLTS; state; quit"
+    "battery VOLTS; state; adrift SECONDS (depth so long from now, nobody at the controls); quit"
 )
 
 
@@ -167,6 +167,8 @@ class TwinService:
             self._input(verb, float(rest[0]))
         elif verb == "state":
             return json.dumps({**self.plant.state(), "slips": self.slips})
+        elif verb == "adrift":
+            return json.dumps({"z_m": self.plant.world.adrift(float(rest[0]))})
         elif verb == "quit":
             self.stop()
         else:

@@ -44,7 +44,7 @@ def test_neither_noise_nor_the_loss_of_its_terminal_ends_a_dive(tmp_path):
                 os.kill(child.pid, signal.SIGINT)
                 time.sleep(0.05)
             until(lambda: not child.isalive(), 180.0, every=0.1)
-            assert StateFile(state).read().state == State.ASHORE
+            assert StateFile(state).read().state == State.ENDED
             assert sea.state()["z_m"] < 0.35
         finally:
             child.kill(signal.SIGKILL)

@@ -63,12 +63,12 @@ def test_a_flight_that_is_killed_is_brought_up_and_not_resumed(sea, tmp_path):
         assert flight.wait(120.0) == 1
     result = json.loads((tmp_path / "stdout").read_text())
     assert not result["completed"]
-    assert "given up and not known to have surfaced" in result["reason"]
+    assert "given up, and not known to have surfaced" in result["reason"]
     assert set(read_log(tmp_path / "second.mcap").topics["/tick"].column("mode")) == {3.0}
     assert StateFile(tmp_path / "state").read().state == State.HELD
     with flying(sea.board, tmp_path / "dive.toml", tmp_path, "--log", str(tmp_path / "third.mcap")) as flight:
         assert flight.wait(60.0) == 1
-    assert "not armed: the flight before (second): given up" in (tmp_path / "stderr").read_text()
+    assert "not armed: the flight before (second): ended at the surface after a fault" in (tmp_path / "stderr").read_text()
     assert not (tmp_path / "third.mcap").exists()
 
 
@@ -116,8 +116,8 @@ def test_a_second_flight_is_refused_and_an_orderly_end_leaves_nobody_watching(se
         flight.send_signal(signal.SIGINT)  # given up by a person
         assert flight.wait(180.0) == 1
         until(lambda: not os.path.exists(f"/proc/{guard}"), 10.0)
-    assert Heartbeat.open(tmp_path / "state").look().state == State.ASHORE
-    assert StateFile(tmp_path / "state").read().may_start
+    assert Heartbeat.open(tmp_path / "state").look().state == State.ENDED
+    assert StateFile(tmp_path / "state").read().state == State.ENDED
     assert sea.state()["z_m"] < 0.35
 
 

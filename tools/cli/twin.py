@@ -41,7 +41,7 @@ def twin(board, vehicle, folder, seed, stand, faults, print_sim) -> None:
         click.echo(simulated_text(file), nl=False)
         return
     need("bench")
-    from tools.bench.boardtext import set_ports
+    from tools.bench.boardtext import set_ports, set_values
 
     the_vehicle = load_vehicle(vehicle)
     folder = Path(tempfile.mkdtemp(prefix="glider-twin-")) if folder is None else folder
@@ -50,6 +50,7 @@ def twin(board, vehicle, folder, seed, stand, faults, print_sim) -> None:
     if len(str(folder)) > 90:
         raise InputError("too long a path for a socket in it", source=folder)
     board_text = set_ports(found.text, {name: str(folder / name) for name in file.port})
+    board_text = set_values(board_text, {"armed_depth_m": file.start.depth_m})  # where the plant floats before it dives
     (folder / "board.toml").write_text(board_text, encoding="utf-8")
 
     async def serve() -> None:

@@ -14,18 +14,21 @@ from pathlib import Path
 import numpy as np
 
 from firmware.core.jit import CACHE_DIR, compiled_signatures
+from firmware.core.layouts import control_layout as ctl
 from firmware.core.vehicle.layout import GRAVITY
 from firmware.core.vehicle.seawater import water_density
-from hal.ports import SLOTS, BoardError, Hardware, Validity, empty_frame
+from hal.ports import ACTUATORS, SLOTS, BoardError, Condition, Hardware, Validity, empty_frame
 from tools.data.errors import InputError
 from tools.flight.compose import Flight
 
 LISTEN_S = 0.4
-ZERO_M = 0.5  # of depth by pressure, at the surface
+# What weather does to the pressure at one place, about its mean; more is a sensor's error, or not the surface.
+WEATHER_PA = 6_000.0
 STEADY_DEG = 45.0
+TURNING_DEG_S = 60.0
+WIRE_SLACK = 0.1  # of an actuator's range, by which its draw-wire may be off
 BYTES_PER_SECOND = 40_000.0  # of a log, generously
 SPARE_BYTES = 50e6
-FITTED = ("imu", "beacon", "slider_wire", "plunger_wire")
 
 
 @dataclass(frozen=True)
@@ -47,6 +50,8 @@ class Arming:
     def __init__(self, flight: Flight, *, folder: Path | None, hardware: bool):
         self.flight, self.folder, self.hardware = flight, folder, hardware
         self.frame = empty_frame()
+        self.pressures: list[float] = []  # Pa, of the fit samples while listening
+        self.surface_pressure = flight.board.surface_pressure  # Pa; as measured, once the zero depth has passed
 
     def run(self, disabled: bool = False) -> list[Check]:
         """Every check, in the order of the list; `disabled`: none of them refuses, to show that they do."""
@@ -57,7 +62,8 @@ class Arming:
     def _list(self) -> dict[str, Callable[[], str]]:
         return {
             "calibration": self.calibration, "devices": self.devices, "zero depth": self.zero_depth,
-            "attitude": self.attitude, "limits": self.limits, "mission": self.mission, "clock": self.clock,
+            "attitude": self.attitude, "actuators": self.actuators, "leak": self.leak, "battery": self.battery,
+            "limits": self.limits, "mission": self.mission, "clock": self.clock,
             "disk": self.disk, "kernels": self.kernels,
         }  # fmt: skip
 
@@ -71,10 +77,13 @@ class Arming:
 
     def _listen(self) -> None:
         """Let time pass and take a sample of everything."""
-        board = self.flight.board
-        begin = board.clock.now()
-        for tick in range(1, round(LISTEN_S * board.loop_hz) + 1):
+        board, beacon = self.flight.board, SLOTS["beacon"]
+        begin, listen = board.clock.now(), max(LISTEN_S, 1.5 * max(board.periods.values()))
+        for tick in range(1, round(listen * board.loop_hz) + 1):
             board.clock.sleep_until(begin + tick / board.loop_hz)
+            board.beacon.read(self.frame[beacon.all])
+            if self.frame[beacon.validity] == Validity.VALID:
+                self.pressures.append(float(self.frame[beacon.values][0]))
         for name, slot in SLOTS.items():
             port = getattr(board, name)
             if port is not None:
@@ -85,27 +94,79 @@ class Arming:
         return self.flight.board.check_calibration()
 
     def devices(self) -> str:
-        silent = self.flight.board.silent()
-        bad = [name for name in FITTED if self.frame[SLOTS[name].validity] != Validity.VALID]
-        bad += [name for name in FITTED if not np.isfinite(self.frame[SLOTS[name].values]).all() and name not in bad]
+        silent, board = self.flight.board.silent(), self.flight.board
+        fitted = [name for name in SLOTS if getattr(board, name) is not None]
+        bad = [name for name in fitted if self.frame[SLOTS[name].validity] != Validity.VALID]
+        bad += [name for name in fitted if not np.isfinite(self.frame[SLOTS[name].values]).all() and name not in bad]
         if silent or bad:
             raise Refused("; ".join(silent) or f"nothing fit from {', '.join(bad)}")
         return "every device answers"
 
     def zero_depth(self) -> str:
-        pressure, temperature = self.frame[SLOTS["beacon"].values]
-        salinity = self.flight.mission.site.salinity
-        density = water_density(0.0, float(temperature), salinity)
-        depth = float(pressure - self.flight.board.surface_pressure) / (density * GRAVITY)
-        if not abs(depth) <= ZERO_M:
-            raise Refused(f"{depth:.2f} m deep, expected the surface, within {ZERO_M:g} m: `zero beacon` in the bench")
-        return f"{depth:.2f} m"
+        """The pressure at the surface, from the beacon where the vehicle is armed: the zero of every depth."""
+        board, (_, temperature) = self.flight.board, self.frame[SLOTS["beacon"].values]
+        density = water_density(0.0, float(temperature), self.flight.mission.site.salinity)
+        measured = float(np.mean(self.pressures)) - density * GRAVITY * board.armed_depth
+        off = measured - board.surface_pressure
+        if not abs(off) <= WEATHER_PA:
+            depth = board.armed_depth + off / (density * GRAVITY)
+            where = f"{board.armed_depth:g} m deep" if board.armed_depth else "in air or awash"
+            raise Refused(
+                f"{depth:.2f} m deep, expected {where}; {off / 100:+.0f} hPa is no weather (within {WEATHER_PA / 100:g}): "
+                "armed_depth_m and [beacon] surface_pa of the board file, or `zero beacon` in the bench"
+            )
+        self.surface_pressure = measured
+        return f"surface at {measured / 100:.1f} hPa, {off / 100:+.1f} from the board file's"
 
     def attitude(self) -> str:
-        roll, pitch = np.degrees(self.frame[SLOTS["imu"].values][:2])
+        angles = np.degrees(self.frame[SLOTS["imu"].values])
+        (roll, pitch), rates = angles[:2], angles[3:]
         if not (abs(roll) <= STEADY_DEG and abs(pitch) <= STEADY_DEG):
             raise Refused(f"roll {roll:.0f}, pitch {pitch:.0f} deg: no attitude to begin from")
+        if not np.abs(rates).max() <= TURNING_DEG_S:
+            raise Refused(f"turns at {np.abs(rates).max():.0f} deg/s: hold it still, or the gyro is off")
         return f"roll {roll:.0f}, pitch {pitch:.0f} deg"
+
+    def actuators(self) -> str:
+        """Every drive well, and slider and plunger where they can be."""
+        bad = []
+        for name in ACTUATORS:
+            condition = self.frame[SLOTS[name].values][0]
+            if condition != Condition.WELL:
+                known = condition in list(Condition)
+                bad.append(f"{name}: {Condition(int(condition)).name.lower() if known else 'condition not known'}")
+        temperature = float(self.frame[SLOTS["beacon"].values][1])
+        density = water_density(0.0, temperature, self.flight.mission.site.salinity)
+        actuators = self.flight.vehicle.actuators
+        for wire, table, scale, unit in (
+            ("slider_wire", actuators.slider, 1.0, "m"),
+            ("plunger_wire", actuators.ballast, density * actuators.ballast.plunger_area, "kg"),
+        ):
+            low, high = table.range
+            place, slack = scale * float(self.frame[SLOTS[wire].values][0]), WIRE_SLACK * (high - low)
+            if place < low - slack or place > high + slack:  # one that is not a number: `devices`
+                bad.append(f"{wire}: at {place:.4g} {unit}, outside {low:.4g} to {high:.4g}")
+        if bad:
+            raise Refused("; ".join(bad))
+        return "all well, within their ranges"
+
+    def leak(self) -> str:
+        if self.flight.board.leak is None:
+            return "not fitted"
+        if self.frame[SLOTS["leak"].values][0] != 0.0:
+            raise Refused("wet")
+        return "dry"
+
+    def battery(self) -> str:
+        limits = self.flight.vehicle.limits
+        if self.flight.board.battery is None:
+            return "not fitted"
+        volts = float(self.frame[SLOTS["battery"].values][0])
+        if limits is None or limits.low_voltage is None:
+            return f"{volts:.1f} V; the vehicle file has no [limits] low_voltage"
+        if not volts >= limits.low_voltage:
+            raise Refused(f"{volts:.1f} V, below the vehicle's low_voltage of {limits.low_voltage:g} V")
+        return f"{volts:.1f} V"
 
     def limits(self) -> str:
         limits = self.flight.vehicle.limits
@@ -169,12 +230,17 @@ def refuse(checks: list[Check]) -> None:
 
 
 def arm(flight: Flight, *, log: Path | None) -> list[Check]:
-    """The checks of a flight on an open board; BoardError where one refuses. Simulated boards are not asked."""
+    """The checks of a flight on an open board; BoardError where one refuses. Simulated boards are not asked.
+
+    Once all have passed, depths of this flight count from the surface pressure that was measured.
+    """
     if flight.board.hardware is Hardware.NONE:
         return []
     folder = None if log is None else log.resolve().parent
     if folder is not None and not folder.is_dir():
         raise InputError("no such folder", source=folder)
-    checks = Arming(flight, folder=folder, hardware=not flight.twinned).run()
+    arming = Arming(flight, folder=folder, hardware=not flight.twinned)
+    checks = arming.run()
     refuse(checks)
+    flight.board.surface_pressure = flight.autopilot.C[ctl.SURFACE_PRESSURE] = arming.surface_pressure
     return checks

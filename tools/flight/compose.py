@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Any
 
+import msgspec
+
 from firmware.autopilot import Autopilot, configuration
 from firmware.core.vehicle.seawater import water_density
 from firmware.faults import Reaction
@@ -14,12 +16,14 @@ from firmware.runtime import Runtime
 from firmware.supervisor import Supervisor
 from firmware.telemetry import TICK
 from hal.board import BoardRequest, board_builder
-from hal.ports import Board, BoardError, Hardware
+from hal.ports import ACTUATORS, Board, BoardError, Hardware
 from hal.recorder.schema import DEBUG, ERROR, FATAL, INFO, WARN
+from hal.strict import ConfigError
 from tools.data.boards import load_board_file
 from tools.data.errors import InputError
 from tools.data.sources import load_mission, load_vehicle
 
+LEAST_REACH = 0.5  # of an end of an actuator's range, which the board has to leave the vehicle
 SEVERITIES = dict(zip(Reaction, (DEBUG, INFO, WARN, WARN, ERROR, FATAL, FATAL), strict=True))
 
 
@@ -92,6 +96,8 @@ def build_flight(
         effects=effects or {},
     )  # fmt: skip
     the_board = board_builder(board_file.kind)(request)
+    limits = {name: getattr(the_board, name).limits for name in ACTUATORS}
+    the_vehicle = within(the_vehicle, limits, board_file.source)
     C = configuration(
         the_vehicle, the_mission, dt=1.0 / the_board.loop_hz, periods=the_board.periods,
         surface_pressure=the_board.surface_pressure,
@@ -100,6 +106,22 @@ def build_flight(
     supervisor = Supervisor(autopilot, the_vehicle, the_mission, dt=1.0 / the_board.loop_hz, periods=the_board.periods)
     texts = {"vehicle.toml": vehicle_text, "mission.toml": mission_text, "board.toml": board_file.text}
     return Flight(the_vehicle, the_mission, the_board, autopilot, supervisor, texts)
+
+
+def within(vehicle: Vehicle, limits: dict[str, tuple[float, float]], source: str) -> Vehicle:
+    """The vehicle with its actuators' ranges narrowed to what a board lets them do; limits: by actuator, in its unit.
+
+    ConfigError where less than LEAST_REACH of an end is left: what lifts, trims and steers the vehicle is not there.
+    """
+    tables = {}
+    for name, (low, high) in limits.items():
+        table = getattr(vehicle.actuators, name)
+        for end, own, left in (("low", table.range[0], low), ("high", table.range[1], high)):
+            if left / own < LEAST_REACH:
+                message = f"the {name}'s {end} end is {left:.4g}, of the vehicle's {own:.4g}: too little to fly with"
+                raise ConfigError(source, message, key=f"{name}.limits")
+        tables[name] = msgspec.structs.replace(table, range=(low, high))
+    return msgspec.structs.replace(vehicle, actuators=msgspec.structs.replace(vehicle.actuators, **tables))
 
 
 def load_vehicle_text(wanted: str) -> tuple[str, Vehicle]:

@@ -31,6 +31,7 @@ from tools.flight.sortie import Host, Journal
 
 GUARD_START_S = 10.0
 GUARD_SILENT_S = 3.0
+SERVICE_LOOKS_S = 1.0  # within which a service that runs finds the heartbeat of a flight
 WITHOUT_PORTS_S = 5.0  # after which the out-of-band process of a twinned flight has nothing left to bring up
 RECORDER_EXPECTED_S = 60.0  # without a recording process, after which the watchdog no longer waits for one
 
@@ -108,7 +109,7 @@ class Keeper(Host):
         self._write_plan(self._flight.board)
         self._start_guard(GUARD_START_S)
         super().prepare()
-        self._pulse.publish(self.journal.state)
+        self._pulse.publish(State.ARMED)  # before an ascent alone too: nothing beats yet
 
     def armed(self) -> None:
         """The plan again, with the surface pressure as measured."""
@@ -203,7 +204,10 @@ class Keeper(Host):
             if time.monotonic() > end or being_brought_up(pulse):
                 raise BoardError("the out-of-band process is bringing the vehicle up")
             time.sleep(0.01)  # at the surface, and acknowledged: it rests in a moment
-        if look.guard == Guard.ABSENT or look.guard_age_s > GUARD_SILENT_S:
+        patience = time.monotonic() + (0.0 if self._twin else SERVICE_LOOKS_S)
+        while (absent := pulse.look().guard_age_s > GUARD_SILENT_S) and time.monotonic() < patience:
+            time.sleep(0.01)
+        if absent:
             self._launch_guard()
         while pulse.look().guard_age_s > GUARD_SILENT_S:
             if time.monotonic() > end or (self._guard is not None and self._guard.poll() is not None):

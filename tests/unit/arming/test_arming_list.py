@@ -6,8 +6,9 @@ import shutil
 import msgspec
 import pytest
 
+from firmware.core.layouts import control_layout as ctl
 from firmware.model.supervisor_settings import Limits
-from hal.ports import BoardError, Hardware, Validity
+from hal.ports import BoardError, Condition, Hardware, Validity
 from tools.flight import arming
 from tools.flight.arming import Arming, Check, arm, refuse
 from tools.flight.compose import build_flight
@@ -32,7 +33,8 @@ def set_limits(flight, limits) -> None:
 def test_a_flight_that_is_fit_passes_every_check(flight, tmp_path):
     set_limits(flight, Limits(working_depth_m=50.0))
     checks = found(flight, tmp_path, hardware=True)
-    names = ["calibration", "devices", "zero depth", "attitude", "limits", "mission", "clock", "disk", "kernels"]
+    names = ["calibration", "devices", "zero depth", "attitude", "actuators", "leak", "battery", "limits", "mission"]
+    names += ["clock", "disk", "kernels"]
     assert list(checks) == names
     assert all(check.passed for check in checks.values()), checks
     refuse(list(checks.values()))
@@ -47,7 +49,9 @@ def one_refused(checks: dict[str, Check], name: str) -> str:
 
 def test_not_at_the_surface_is_refused(flight):
     flight.board.world.x[2] = 2.0
-    assert "2.0" in one_refused(found(flight), "zero depth")
+    reason = one_refused(found(flight), "zero depth")
+    assert "m deep, expected 0.3 m deep; +" in reason
+    assert "hPa is no weather (within 60)" in reason
 
 
 def test_a_device_without_a_sample_is_refused(flight, monkeypatch):
@@ -93,6 +97,73 @@ def test_upside_down_is_no_beginning(flight, monkeypatch):
     assert "roll 115" in one_refused(found(flight), "attitude")
 
 
+class Says:
+    """A port that has read other values."""
+
+    def __init__(self, *values):
+        self.values = values
+
+    def read(self, out):
+        out[0], out[1], out[2:] = 0.0, Validity.VALID, self.values
+
+
+@pytest.mark.parametrize(("wet", "said"), [(0.0, "dry"), (1.0, "wet")])
+def test_a_wet_hull_does_not_dive(flight, wet, said):
+    assert found(flight)["leak"].reason == "not fitted"
+    flight.board.leak = Says(wet)
+    checks = found(flight)
+    assert (one_refused(checks, "leak") if wet else checks["leak"].reason) == said
+
+
+def test_a_battery_that_is_low_already_does_not_dive(flight):
+    assert found(flight)["battery"].reason == "not fitted"
+    flight.board.battery = Says(11.9)
+    set_limits(flight, None)
+    assert found(flight)["battery"].reason == "11.9 V; the vehicle file has no [limits] low_voltage"
+    set_limits(flight, Limits(low_voltage=12.0))
+    assert one_refused(found(flight), "battery") == "11.9 V, below the vehicle's low_voltage of 12 V"
+    set_limits(flight, Limits(low_voltage=11.5))
+    assert found(flight)["battery"].reason == "11.9 V"
+
+
+@pytest.mark.parametrize("name", ["servo", "slider", "ballast"])
+@pytest.mark.parametrize(
+    ("value", "said"), [(Condition.ALARM_KEPT, "alarm_kept"), (Condition.GIVEN_UP, "given_up"), (77.0, "not known")]
+)
+def test_a_drive_in_alarm_does_not_dive(flight, monkeypatch, name, value, said):
+    monkeypatch.setattr(getattr(flight.board, name), "read", Says(value).read)
+    assert one_refused(found(flight), "actuators").endswith(said)
+
+
+@pytest.mark.parametrize(("name", "value"), [("slider_wire", 0.09), ("slider_wire", -0.08), ("plunger_wire", 0.05)])
+def test_a_wire_that_has_its_actuator_out_of_range_is_refused(flight, monkeypatch, name, value):
+    monkeypatch.setattr(getattr(flight.board, name), "read", Says(value).read)
+    assert one_refused(found(flight), "actuators").startswith(f"{name}: at ")
+
+
+def test_a_gyro_that_turns_at_rest_is_refused(flight, monkeypatch):
+    monkeypatch.setattr(flight.board.imu, "read", Says(0.0, 0.0, 0.0, 0.0, -2.0, 0.0).read)
+    assert one_refused(found(flight), "attitude").startswith("turns at 115 deg/s")
+
+
+# --- the zero of depth ------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("hpa", [-45.0, 0.0, 30.0])
+def test_depth_counts_from_the_pressure_at_arming(flight, hpa):
+    """In other weather than the board file's; armed with the beacon 0.3 m deep."""
+    truth = flight.board.surface_pressure
+    flight.board.surface_pressure, flight.board.hardware = truth - 100.0 * hpa, Hardware.TWINNED
+    checks = {check.name: check for check in arm(flight, log=None)}
+    assert "from the board file's" in checks["zero depth"].reason
+    assert flight.board.surface_pressure == flight.autopilot.C[ctl.SURFACE_PRESSURE]
+    assert flight.board.surface_pressure == pytest.approx(truth, abs=300.0)  # 3 cm
+
+
+@pytest.mark.parametrize("hpa", [-70.0, 70.0])
+def test_what_no_weather_does_is_refused(flight, hpa):
+    flight.board.surface_pressure -= 100.0 * hpa
+    assert "is no weather" in one_refused(found(flight), "zero depth")
+
+
 @pytest.mark.parametrize("shift", [0.0, 5.0])
 def test_a_clock_that_stands_or_leaps_is_refused(flight, monkeypatch, shift):
     clock, asked = flight.board.clock, []
@@ -119,7 +190,7 @@ def test_a_folder_that_cannot_be_written_is_refused(flight, tmp_path):
 
 
 def test_a_check_that_breaks_has_not_passed(flight):
-    del flight.board.surface_pressure
+    del flight.board.armed_depth
     assert one_refused(found(flight), "zero depth").startswith("could not be checked: AttributeError")
 
 

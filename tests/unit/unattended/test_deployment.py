@@ -132,7 +132,9 @@ def test_a_release_passes_its_self_check_unless_vehicle_files_or_state_are_again
 
     StateFile(state).write(State.DIVING, flight="dive")
     assert check() == (
-        1, f"self-check: state: FAILED: {state}: the flight before (dive): broke off under way; bring it up and look at it first"
+        1,
+        f"self-check: state: FAILED: {state}: the flight before (dive): broke off under way; "
+        "bring it up and look at it first",
     )  # fmt: skip
 
 
