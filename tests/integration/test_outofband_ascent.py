@@ -68,7 +68,8 @@ def test_a_flight_that_is_killed_is_brought_up_and_not_resumed(sea, tmp_path):
     assert StateFile(tmp_path / "state").read().state == State.HELD
     with flying(sea.board, tmp_path / "dive.toml", tmp_path, "--log", str(tmp_path / "third.mcap")) as flight:
         assert flight.wait(60.0) == 1
-    assert "not armed: the flight before (second): ended at the surface after a fault" in (tmp_path / "stderr").read_text()
+    said = (tmp_path / "stderr").read_text()
+    assert "not armed: the flight before (second): ended at the surface after a fault" in said
     assert not (tmp_path / "third.mcap").exists()
 
 

@@ -112,8 +112,8 @@ class Arming:
             depth = board.armed_depth + off / (density * GRAVITY)
             where = f"{board.armed_depth:g} m deep" if board.armed_depth else "in air or awash"
             raise Refused(
-                f"{depth:.2f} m deep, expected {where}; {off / 100:+.0f} hPa is no weather (within {WEATHER_PA / 100:g}): "
-                "armed_depth_m and [beacon] surface_pa of the board file, or `zero beacon` in the bench"
+                f"{depth:.2f} m deep, expected {where}; {off / 100:+.0f} hPa is no weather (within {WEATHER_PA / 100:g}):"
+                " armed_depth_m and [beacon] surface_pa of the board file, or `zero beacon` in the bench"
             )
         self.surface_pressure = measured
         return f"surface at {measured / 100:.1f} hPa, {off / 100:+.1f} from the board file's"
