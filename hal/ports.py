@@ -157,7 +157,7 @@ class Board(Protocol):
     name: str
     loop_hz: float
     surface_pressure: float  # Pa, absolute, where depth is zero
-    periods: dict[str, float]  # s between two samples: imu, beacon, wires (the slower of both)
+    periods: dict[str, float]  # s between two samples: imu, beacon, wires (the slower of both); leak, battery if fitted
     out_of_band: OutOfBand | None
 
     @property

@@ -129,6 +129,8 @@ class Drive:
     # --- replies ----------------------------------------------------------------------------------------------------
     def _took_position(self, request: Request, registers: list[int], asked_at: float, now: float) -> None:
         before = self.counts
+        if asked_at - self.counts_at > LOST_AFTER_S:
+            self._mover.forget()  # the drive may have been without power
         if request is self._low:
             self.counts = nearest(registers[0], self.counts)
         else:
@@ -289,7 +291,7 @@ class Mover:
         self._refusals.running = 0
         if request in self._stops:
             self.stop_wanted = False
-            self._written = None
+            self.forget()
             self._next = now
         elif request is self._clear:
             self.clear_wanted = False
@@ -297,8 +299,13 @@ class Mover:
         else:
             self._written = self._asked_for
 
+    def forget(self) -> None:
+        """Write the path again: the drive may not have it."""
+        self._written = None
+
     def failed(self, request: Request | None, failure: Failure, exception: int, now: float) -> None:
         health = self._drive.health
+        self.forget()
         if failure is Failure.EXCEPTION:
             health.exceptions += 1
             health.say(now, exception_text(exception))
@@ -307,4 +314,3 @@ class Mover:
                 self._drive.refused(now, exception_text(exception))
         elif failure in (Failure.TIMEOUT, Failure.DAMAGED):
             health.timeouts += 1
-            self._written = None

@@ -156,12 +156,13 @@ def build_scene(phase: str, begin: Callable[[Scene], None], setting: Setting, se
     mission_file.write_text(MISSION.format(limit=setting.mission_s, hold=setting.hold_s, controller=setting.controller))
     flight = build_flight(mission=str(mission_file), seed=seed, effects=setting.effects)
     flight.vehicle = msgspec.structs.replace(flight.vehicle, limits=setting.limits)
+    assert isinstance(flight.board, SimBoard)
+    broken = break_in(flight.board)
     flight.supervisor = Supervisor(
         flight.autopilot, flight.vehicle, flight.mission, dt=1.0 / flight.board.loop_hz, periods=flight.board.periods,
         restarted=setting.restarted,
     )  # fmt: skip
-    assert isinstance(flight.board, SimBoard)
-    scene = Scene(flight, break_in(flight.board), phase, begin)
+    scene = Scene(flight, broken, phase, begin)
     if phase == "waiting":
         scene.since = 0.0
         begin(scene)
