@@ -202,7 +202,9 @@ def read_plan(path: Path) -> Plan:
             raise ValueError("too long")
         outer = json.loads(data)
         body = outer["plan"]
-        if outer["format"] != FORMAT or outer["crc32"] != f"{zlib.crc32(body.encode()):08x}":
+        if outer["format"] != FORMAT:
+            raise ValueError(f"format {outer['format']!r}, expected {FORMAT}: written by another release")
+        if outer["crc32"] != f"{zlib.crc32(body.encode()):08x}":
             raise ValueError("its check sum fails")
         return _plan(json.loads(body))
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:

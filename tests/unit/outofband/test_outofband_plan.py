@@ -120,6 +120,14 @@ def test_what_makes_no_sense_is_refused_though_its_sum_is_right(plan, tmp_path, 
         read_plan(path)
 
 
+def test_a_plan_of_another_release_is_called_that(plan, tmp_path):
+    path = tmp_path / "plan.json"
+    write_plan(path, plan)
+    path.write_text(path.read_text().replace(f'"format": {FORMAT}', '"format": 2'))
+    with pytest.raises(PlanError, match=r"plan\.json: format 2, expected 3: written by another release"):
+        read_plan(path)
+
+
 @settings(max_examples=200, deadline=None)
 @given(data=st.binary(max_size=300) | st.recursive(st.none() | st.integers() | st.text(), st.lists).map(
     lambda value: json.dumps(value).encode()))  # fmt: skip
