@@ -139,6 +139,10 @@ class RegisterMap(Table):
             for name in names:
                 if name not in getattr(self, table):
                     raise ValueError(f"{table}.{name}: missing, role 'drive' needs it")
+        for name, command in (("mode", "absolute"), ("trigger", "trigger")):
+            value, number = self.block["path"].value[name], self.command[command]
+            if not fits(value, number):
+                raise ValueError(f"command.{command}: {number} does not fit {value.type} of block.path.value.{name}")
 
     def _check_path(self) -> None:
         """The path is written whole, so that each of its registers has to be of one known number."""

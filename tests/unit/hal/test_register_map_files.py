@@ -87,6 +87,14 @@ def test_numbers_that_the_registers_cannot_hold_are_refused_by_board_file_and_ke
     assert said in str(error.value)
 
 
+def test_a_command_that_its_register_cannot_hold_is_refused(tmp_path):
+    text = write(tmp_path, "drive", 'mode = { at = 9, type = "u32"', 'mode = { at = 9, type = "i16"')
+    path = tmp_path / "drive.toml"
+    path.write_text(path.read_text().replace("count = 11", "count = 10").replace("absolute = 3", "absolute = 40000"))
+    with pytest.raises(ConfigError, match=r"command.absolute: 40000 does not fit i16 of block.path.value.mode"):
+        decode_device_file(text, "board.toml")
+
+
 def test_a_command_says_so_in_one_line(tmp_path):
     (tmp_path / "board.toml").write_text(write(tmp_path, *REFUSED[6][:3]))
     command = [sys.executable, "-m", "tools.cli.main", "fly", "--board", str(tmp_path / "board.toml"), "--no-log"]
