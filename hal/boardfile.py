@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 
 from hal.ports import SLOTS
-from hal.protocols.registers import RegisterMap, Role, preset, presets
+from hal.protocols.registers import RegisterMap, Role, channel_of, fits, preset, presets
 from hal.strict import ConfigError, Table, decode
 
 Positive = Annotated[float, msgspec.Meta(gt=0.0)]
@@ -267,13 +267,37 @@ def check(file: DeviceFile, source: str) -> None:
         table = getattr(file, name)
         if table is None:
             continue
-        channel = getattr(table, "channel", None)
-        if preset_of(file, name, source).role == "analog" and channel is None:
-            raise ConfigError(source, "missing key", key=f"{name}.channel")
+        channel, registers = getattr(table, "channel", None), preset_of(file, name, source)
+        if registers.role == "analog":
+            _check_channel(registers, channel, name, source)
+        elif registers.role == "drive":
+            _check_drive(registers, table, name, source)
         for place in {(table.port, table.id, channel), (table.port, table.id, None)}:
             other, device = taken.setdefault(place, (name, table.device))
             if other != name and (place[2] == channel or device != table.device):
                 raise ConfigError(source, f"is {other}'s on port '{table.port}' too", key=f"{name}.id")
+
+
+def _check_channel(registers: RegisterMap, channel: int | None, name: str, source: str) -> None:
+    if channel is None:
+        raise ConfigError(source, "missing key", key=f"{name}.channel")
+    if channel_of(registers, channel).places.stop > registers.block["all"].count:
+        raise ConfigError(source, f"'{registers.name}' has no channel {channel}", key=f"{name}.channel")
+
+
+def _check_drive(registers: RegisterMap, table: DriveTable, name: str, source: str) -> None:
+    """Refuse numbers that the registers of a drive could not hold: they would be written as others."""
+    ends = [table.zero_counts + table.counts_per_m * end for end in table.limits_m]
+    path, position = registers.block["path"].value, registers.block["position"].value["position"]
+    for key, value, numbers, unit in (
+        ("limits_m", path["position"], ends, "counts"), ("limits_m", position, ends, "counts"),
+        ("speed_m_s", path["speed"], [table.rpm], "rpm"), ("ramp_ms", path["acceleration"], [table.ramp_ms], "ms"),
+        ("ramp_ms", path["deceleration"], [table.ramp_ms], "ms"),
+    ):  # fmt: skip
+        for number in numbers:
+            if not fits(value, number):
+                text = f"{number:.10g} {unit} do not fit the {value.type} of '{registers.name}'"
+                raise ConfigError(source, text, key=f"{name}.{key}")
 
 
 def decode_device_file(text: str, source: str) -> DeviceFile:

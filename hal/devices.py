@@ -67,6 +67,7 @@ class DeviceBoard:
             "imu": 1.0 / file.imu.rate_hz,
             "beacon": 1.0 / file.beacon.rate_hz,
             "wires": 1.0 / min(file.slider_wire.rate_hz, file.plunger_wire.rate_hz),
+            **{name: 1.0 / table.rate_hz for name in ("leak", "battery") if (table := getattr(file, name)) is not None},
         }
         self.buses: dict[str, ModbusBus] = {}
         self._handlers: dict[str, LineHandler] = {}  # by port

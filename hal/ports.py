@@ -160,7 +160,7 @@ class Board(Protocol):
     loop_hz: float
     surface_pressure: float  # Pa, absolute, where depth is zero: as filed, then as measured at arming
     armed_depth: float  # m, of the beacon below the surface when the vehicle is armed; 0: in air or awash
-    periods: dict[str, float]  # s between two samples: imu, beacon, wires (the slower of both)
+    periods: dict[str, float]  # s between two samples: imu, beacon, wires (the slower of both); leak, battery if fitted
     out_of_band: OutOfBand | None
 
     @property

@@ -165,13 +165,16 @@ class SimulatedEscape:
 
 
 class SimulatedInput:
-    """A leak or battery input that samples five times a second."""
+    """A leak or battery input that samples every PERIOD_S."""
+
+    PERIOD_S = 0.2
 
     def __init__(self, world: World, value: float):
         self._world, self.value = world, value
 
     def read(self, out: np.ndarray) -> None:
-        out[0], out[1], out[2] = math.floor(self._world.time * 5.0 + 1e-6) / 5.0, Validity.VALID, self.value
+        samples = math.floor(self._world.time / self.PERIOD_S + 1e-6)
+        out[0], out[1], out[2] = samples * self.PERIOD_S, Validity.VALID, self.value
 
 
 @dataclass(frozen=True)
@@ -188,6 +191,7 @@ def break_in(board: SimBoard) -> Broken:
     world = board.world
     leak, battery = SimulatedInput(world, 0.0), SimulatedInput(world, 14.0)
     board.leak, board.battery = leak, battery
+    board.periods |= {name: SimulatedInput.PERIOD_S for name in ("leak", "battery")}
     for name in ("imu", "beacon", "slider_wire", "plunger_wire", "leak", "battery"):
         setattr(board, name, FaultySensor(getattr(board, name), world))
     for index, name in enumerate(("servo", "slider")):

@@ -94,19 +94,17 @@ def settings_vector(
 ) -> np.ndarray:  # fmt: skip
     """The supervisor's vector G, shape (N_G,), at the start of a flight.
 
-    dt: the loop's step, s; periods: of imu, beacon, wires, s; site_depth (m; 0: unknown) and mission_time (s) are the
-    mission's; restarted: the flight before this one did not end in order.
+    dt: the loop's step, s; periods: of imu, beacon, wires and, where fitted, leak and battery, s; site_depth (m; 0:
+    unknown) and mission_time (s) are the mission's; restarted: the flight before this one did not end in order.
     """
     G = np.zeros(sup.N_G)
     G[sup.ENABLED : sup.ENABLED + sup.N_ROWS] = 1.0
     G[sup.TICK] = dt
-    slow = 1.0 / 5.0  # leak and battery
     G[sup.PERIOD : sup.PERIOD + sup.N_SENSORS] = [
         periods["imu"],
         periods["beacon"],
         *2 * [periods["wires"]],
-        slow,
-        slow,
+        *(periods.get(name, math.inf) for name in ("leak", "battery")),  # not fitted: no sample is ever old
     ]
     lost = [table.imu_s, table.pressure_s, table.wire_s, table.wire_s, math.inf, math.inf]
     G[sup.LOST_AFTER : sup.LOST_AFTER + sup.N_SENSORS] = lost

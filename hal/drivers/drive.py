@@ -10,14 +10,14 @@ import math
 from collections.abc import Sequence
 
 from hal.boardfile import DriveTable
-from hal.drivers.modbus_sensors import nearest
+from hal.drivers.count import Count
 from hal.drivers.poll import Poll, Refusals, exception_text
 from hal.drivers.samples import Health, Sensor, State
 from hal.ports import SLOTS, STALL_REST_S, STALL_TRIES, Condition, Validity
 from hal.protocols import modbus
 from hal.protocols.modbus import Frame, Request
 from hal.protocols.modbus_master import Failure, ModbusBus
-from hal.protocols.registers import RegisterMap, to_registers
+from hal.protocols.registers import RegisterMap, registers_of, value_of
 
 FAULT, ENABLED, RUNNING = 1, 2, 4  # bits of the status
 STATUS_S = 0.2
@@ -43,7 +43,7 @@ class Drive:
         self.enabled = False
         self.speed_share = 1.0
         self.status = 0
-        self.counts = 0
+        self.counts = 0.0
         self.counts_at = -math.inf
         self.zero_drift = 0.0
         self.stalls = 0
@@ -51,9 +51,10 @@ class Drive:
         self._map, self._wire = registers, wire
         self._drift_known = False
         self._watch = StallDetector(table.stall_m, table.stall_s)
-        self._low = registers.read(table.id, "position_low")
-        position = [registers.read(table.id, "position"), self._low]
-        self._position = Poll(position, 1.0 / table.rate_hz, self._took_position, self.health, in_error=self.refused)
+        self._count = Count(table.id, registers)
+        self._position = Poll(
+            self._count.requests, 1.0 / table.rate_hz, self._took_position, self.health, in_error=self.refused
+        )
         self._status = Poll(
             [registers.read(table.id, "status")], STATUS_S, self._took_status, self.health, in_error=self.refused
         )
@@ -129,11 +130,9 @@ class Drive:
     # --- replies ----------------------------------------------------------------------------------------------------
     def _took_position(self, request: Request, registers: list[int], asked_at: float, now: float) -> None:
         before = self.counts
-        if request is self._low:
-            self.counts = nearest(registers[0], self.counts)
-        else:
-            raw = registers[0] << 16 | registers[1]
-            self.counts = raw - (1 << 32) if raw & 0x80000000 else raw
+        if asked_at - self.counts_at > LOST_AFTER_S:
+            self._mover.forget()  # the drive may have been without power
+        self.counts = self._count.take(request, registers)
         self.counts_at = asked_at
         self._state.answered(now, self._condition())
         if self.health.error != self.fault:
@@ -171,7 +170,7 @@ class Drive:
             self._fail(now, verdict)
 
     def _took_status(self, request: Request, registers: list[int], asked_at: float, now: float) -> None:
-        self.status = registers[0]
+        self.status = int(value_of(self._map.block["status"], "status", registers))
         if not self.status & FAULT:
             return
         if self._mover.clears == 0:
@@ -272,24 +271,35 @@ class Mover:
         return self._paths()
 
     def _paths(self) -> Sequence[Request]:
-        """The whole path, and for when its echo might be mistaken the same without its mode, which stands already."""
+        """Build the requests that send the drive to its target: the whole path, and a variant for when the echo of that
+        could be mistaken for a late one. The variant leaves the mode out, which the drive has already; a map with the
+        mode between other numbers has no variant, and the path waits until no echo is missing."""
         drive, table = self._drive, self._drive.table
         assert drive.target is not None
         self._asked_for = drive.counts_for(drive.target)
-        command = self._map.command
-        words = [
-            command["absolute"], *to_registers("i32", self._asked_for), max(1, round(table.rpm * drive.speed_share)),
-            table.ramp_ms, table.ramp_ms, 0, command["trigger"],
-        ]  # fmt: skip
-        address = self._map.block["path"].address
-        whole = modbus.write_many(self.device, address, words)
-        return whole, modbus.write_many(self.device, address + 1, words[1:])
+        path, command = self._map.block["path"], self._map.command
+        numbers = {
+            "mode": command["absolute"], "position": self._asked_for,
+            "speed": max(1, round(table.rpm * drive.speed_share)), "acceleration": table.ramp_ms,
+            "deceleration": table.ramp_ms, "pause": 0, "trigger": command["trigger"],
+        }  # fmt: skip
+        places: dict[int, int] = {}
+        for name, number in numbers.items():
+            places |= registers_of(path, name, number)
+        mode = path.value["mode"].places
+        first, last = path.address, path.address + path.count
+        spans = [(first, last)]
+        if mode.start == 0:
+            spans.append((first + mode.stop, last))
+        elif mode.stop == path.count:
+            spans.append((first, first + mode.start))
+        return [modbus.write_many(self.device, at, [places[i] for i in range(at, end)]) for at, end in spans]
 
     def answered(self, request: Request, reply: Frame, asked_at: float, now: float) -> None:
         self._refusals.running = 0
         if request in self._stops:
             self.stop_wanted = False
-            self._written = None
+            self.forget()
             self._next = now
         elif request is self._clear:
             self.clear_wanted = False
@@ -297,8 +307,13 @@ class Mover:
         else:
             self._written = self._asked_for
 
+    def forget(self) -> None:
+        """Write the path again: the drive may not have it."""
+        self._written = None
+
     def failed(self, request: Request | None, failure: Failure, exception: int, now: float) -> None:
         health = self._drive.health
+        self.forget()
         if failure is Failure.EXCEPTION:
             health.exceptions += 1
             health.say(now, exception_text(exception))
@@ -307,4 +322,3 @@ class Mover:
                 self._drive.refused(now, exception_text(exception))
         elif failure in (Failure.TIMEOUT, Failure.DAMAGED):
             health.timeouts += 1
-            self._written = None

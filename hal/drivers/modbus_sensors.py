@@ -3,12 +3,13 @@
 from collections.abc import Callable
 
 from hal.boardfile import BatteryTable, BeaconTable, LeakTable, WireTable
+from hal.drivers.count import Count
 from hal.drivers.poll import Poll
 from hal.drivers.samples import Health, Sensor
 from hal.ports import SLOTS
 from hal.protocols import modbus
 from hal.protocols.modbus import Request
-from hal.protocols.registers import RegisterMap, value_of
+from hal.protocols.registers import RegisterMap, channel_of, from_registers, step_of, value_of
 
 TEMPERATURES = (-10.0, 60.0)  # deg C, past which the transmitter is not in water
 
@@ -72,10 +73,10 @@ class AnalogModule:
     """An analog module: one read brings all its channels to the inputs on them."""
 
     def __init__(self, device: int, registers: RegisterMap, inputs: list[tuple[int, Input]]):
-        self._inputs = inputs
+        self._inputs = [(channel_of(registers, channel), item) for channel, item in inputs]
         self.health = Health(f"analog module {device}")
         block = registers.block["all"]
-        last = max(channel for channel, _ in inputs)
+        last = max(value.places.stop for value, _ in self._inputs)
         counts = range(block.count, max(last, block.count - 3) - 1, -1)
         variants = [modbus.read(device, block.function, block.address, count) for count in counts]
         self.poll = Poll(
@@ -92,30 +93,18 @@ class AnalogModule:
             item.damage(now)
 
     def _taken(self, request: Request, registers: list[int], asked_at: float, now: float) -> None:
-        for channel, item in self._inputs:
-            item.take(float(registers[channel - 1]), asked_at, now)
+        for value, item in self._inputs:
+            item.take(step_of(value) * from_registers(value.type, registers, value.at), asked_at, now)
 
 
 class EncoderWire:
     """A draw-wire with an absolute encoder of its own."""
 
     def __init__(self, device: int, registers: RegisterMap, item: Input):
-        self._item, self._map = item, registers
-        self._count = 0
-        self._poll_low = registers.read(device, "low")
+        self._item, self._count = item, Count(device, registers)
         self.poll = Poll(
-            [registers.read(device, "all"), self._poll_low], item.period, self._taken, item.health,
-            in_error=item.fail, damaged=item.damage,
-        )  # fmt: skip
+            self._count.requests, item.period, self._taken, item.health, in_error=item.fail, damaged=item.damage
+        )
 
     def _taken(self, request: Request, registers: list[int], asked_at: float, now: float) -> None:
-        if request is self._poll_low:
-            self._count = nearest(registers[0], self._count)
-        else:
-            self._count = int(value_of(self._map.block["all"], "count", registers))
-        self._item.take(float(self._count), asked_at, now)
-
-
-def nearest(low_word: int, last: int) -> int:
-    """The number nearest to `last` whose low 16 bits are low_word."""
-    return last + ((low_word - last + 0x8000) & 0xFFFF) - 0x8000
+        self._item.take(self._count.take(request, registers), asked_at, now)

@@ -3,20 +3,11 @@
 Where the plan has a pressure transmitter it is seen whether the vehicle rises, and what follows where it does not.
 """
 
-import struct
 import time
 
-from hal.outofband.plan import CODES, WORDS, AxisPlan, Plan, PressurePlan, ServoPlan, WirePlan
+from hal.outofband.plan import AxisPlan, Plan, PressurePlan, ServoPlan, WirePlan
 from hal.outofband.rise import Rise, Stage
-from hal.outofband.wire import (
-    Port,
-    path_words,
-    read_frame,
-    registers_of,
-    servo_frame,
-    write_many_frame,
-    write_one_frame,
-)
+from hal.outofband.wire import Port, number_of, path_words, servo_frame, write_many_frame, write_one_frame
 
 FAULT, RUNNING = 1, 4  # bits of a drive's status
 CLEAR_S = 2.0  # between two tries to clear an alarm
@@ -80,10 +71,7 @@ class Ascent:
     def registers(self, plan: WirePlan | PressurePlan) -> list[int] | None:
         """What stands in a transmitter's registers; None where it does not answer."""
         port = self.port(plan.port, plan.baud)
-        if port is None:
-            return None
-        request = read_frame(plan.id, plan.function, plan.address, plan.words)
-        return registers_of(port.exchange(request, 5 + 2 * plan.words), plan.id, plan.function, plan.words)
+        return None if port is None else port.registers(plan.id, plan.reading)
 
     def _centre(self, servo: ServoPlan) -> str:
         port = self.port(servo.port, servo.baud)
@@ -110,11 +98,11 @@ class Transmitter:
         registers = self._ascent.registers(plan)
         if registers is None:
             return None
-        words = registers[plan.at : plan.at + WORDS[plan.kind]]
+        number = plan.reading.number
+        words = registers[number.places.start : number.places.stop]
         if words != self._registers:
             self._registers, self._changed_at = words, now
-        number = struct.unpack(f">{CODES[plan.kind]}", struct.pack(f">{len(words)}H", *words))[0]
-        pressure = number * plan.pa_per_step - plan.zero_pa
+        pressure = number_of(number, registers) - plan.zero_pa
         if not plan.low_pa <= pressure <= plan.high_pa or now - self._changed_at > STUCK_SHARE * plan.patience_s:
             return None
         return (pressure - plan.surface_pa) / plan.pa_per_m
@@ -138,12 +126,16 @@ class Axis:
         self.answered = False
         port = self._ascent.port(plan.port, plan.baud)
         if port is None:
+            self._written = None  # the drive may have lost its power with the line
             return f"{plan.name}: no port"
-        status = self._read(port, plan.status, 1)
-        position = self._read(port, plan.position, 2)
-        counts = None if position is None else struct.unpack(">i", struct.pack(">HH", *position))[0]
-        self.answered = status is not None or position is not None
-        if self._forced or (status is not None and status[0] & FAULT):
+        bits = port.registers(plan.id, plan.status)
+        status = 0 if bits is None else int(number_of(plan.status.number, bits))
+        position = port.registers(plan.id, plan.position)
+        counts = None if position is None else number_of(plan.position.number, position)
+        self.answered = bits is not None or position is not None
+        if not self.answered:
+            self._written = None
+        if self._forced or status & FAULT:
             self._forced = False
             self._clear(port)
         if counts is not None and plan.wire is not None:
@@ -154,7 +146,7 @@ class Axis:
         near = plan.tolerance_m * abs(plan.counts_per_m)
         if counts is not None and abs(counts - target) <= near:
             return f"{plan.name} at its end"
-        running = status is not None and bool(status[0] & RUNNING)
+        running = bool(status & RUNNING)
         moved_on = self._written is None or abs(target - self._written) > near
         stands = not running and time.monotonic() - self._written_at > 1.0
         if moved_on or stands or time.monotonic() - self._written_at > AGAIN_S:
@@ -168,10 +160,6 @@ class Axis:
         self._written_at = self._cleared_at = -1e9
         self._forced = True
 
-    def _read(self, port: Port, address: int, count: int) -> list[int] | None:
-        reply = port.exchange(read_frame(self.plan.id, 3, address, count), 5 + 2 * count)
-        return registers_of(reply, self.plan.id, 3, count)
-
     def _clear(self, port: Port) -> None:
         now = time.monotonic()
         if now - self._cleared_at > CLEAR_S:
@@ -183,14 +171,15 @@ class Axis:
         registers = self._ascent.registers(wire)
         if registers is None:
             return None
-        reading = registers[0] if wire.words == 1 else registers[0] << 16 | registers[1]
-        metres = (reading - wire.zero) / wire.per_m
+        metres = (number_of(wire.reading.number, registers) - wire.zero) / wire.per_m
         return metres if wire.low_m <= metres <= wire.high_m else None
 
     def _send(self, port: Port, counts: int) -> None:
         plan = self.plan
-        words = path_words(plan.absolute, counts, plan.rpm, plan.ramp_ms, plan.trigger)
-        request = write_many_frame(plan.id, plan.path, words)
+        words = path_words(
+            plan.path, absolute=plan.absolute, counts=counts, rpm=plan.rpm, ramp_ms=plan.ramp_ms, trigger=plan.trigger
+        )
+        request = write_many_frame(plan.id, plan.path.address, words)
         reply = port.exchange(request, 8)
         self._written_at = time.monotonic()
         self._written = counts if reply[:6] == request[:6] else None

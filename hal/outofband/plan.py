@@ -8,16 +8,18 @@ import json
 import os
 import struct
 import zlib
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, is_dataclass
 from pathlib import Path
-from typing import Any
+from types import NoneType
+from typing import Any, get_args, get_origin
 
 NAME = "outofband.json"
-FORMAT = 2
+FORMAT = 3
 BEAT_LIMIT_S = 1.5  # a heartbeat older than this is gone; with what looking takes, noticed within 2 s
 LONGEST = 20_000  # bytes of a file
 CODES = {"u16": "H", "i16": "h", "u32": "I", "i32": "i", "f32": "f"}  # of struct
 WORDS = {kind: struct.calcsize(code) // 2 for kind, code in CODES.items()}
+INTEGERS = ("u16", "i16", "u32", "i32")
 
 
 class PlanError(ValueError):
@@ -25,15 +27,72 @@ class PlanError(ValueError):
 
 
 @dataclass(frozen=True)
+class NumberPlan:
+    """A number among registers that are read or written together."""
+
+    at: int  # its first register, counted from the first of them
+    kind: str  # u16, i16, u32, i32 or f32, high word first
+    step: float  # what 1 of it is worth
+
+    def __post_init__(self) -> None:
+        if self.kind not in CODES or self.at < 0 or not self.step > 0.0:
+            raise ValueError(f"NumberPlan: no such number: {self}")
+
+    @property
+    def places(self) -> range:
+        """Its registers."""
+        return range(self.at, self.at + WORDS[self.kind])
+
+
+def _check_span(name: str, address: int, words: int) -> None:
+    if not (0 <= address <= 0xFFFF and 1 <= words <= 125):
+        raise ValueError(f"{name}: {words} registers from {address}")
+
+
+@dataclass(frozen=True)
+class ReadPlan:
+    """A number to read: `words` registers from `address`, and where it stands among them."""
+
+    function: int
+    address: int
+    words: int
+    number: NumberPlan
+
+    def __post_init__(self) -> None:
+        _check_span("ReadPlan", self.address, self.words)
+        if self.number.places.stop > self.words:
+            raise ValueError("ReadPlan: the number reaches past its registers")
+
+
+@dataclass(frozen=True)
+class PathPlan:
+    """A drive's path to write: `words` registers from `address`, each of which belongs to one of the numbers."""
+
+    address: int
+    words: int
+    mode: NumberPlan
+    position: NumberPlan
+    speed: NumberPlan
+    acceleration: NumberPlan
+    deceleration: NumberPlan
+    pause: NumberPlan
+    trigger: NumberPlan
+
+    def __post_init__(self) -> None:
+        _check_span("PathPlan", self.address, self.words)
+        numbers = [item for item in vars(self).values() if isinstance(item, NumberPlan)]
+        if sorted(place for number in numbers for place in number.places) != [*range(self.words)]:
+            raise ValueError("PathPlan: its numbers do not fill its registers")
+
+
+@dataclass(frozen=True)
 class WirePlan:
-    """A draw-wire: metres = (reading - zero) / per_m; `words` registers, high first, from `address`."""
+    """A draw-wire: metres = (reading - zero) / per_m."""
 
     port: str
     baud: int
     id: int
-    function: int
-    address: int
-    words: int
+    reading: ReadPlan
     zero: float
     per_m: float
     low_m: float  # readings outside are rejected
@@ -42,15 +101,15 @@ class WirePlan:
 
 @dataclass(frozen=True)
 class AxisPlan:
-    """A drive and where to send it. Addresses are those of its registers."""
+    """A drive and where to send it. `auxiliary` is the register that `clear_alarm` is written to."""
 
     name: str
     port: str
     baud: int
     id: int
-    status: int
-    position: int
-    path: int
+    status: ReadPlan
+    position: ReadPlan
+    path: PathPlan
     auxiliary: int
     absolute: int
     trigger: int
@@ -63,6 +122,12 @@ class AxisPlan:
     rpm: int
     ramp_ms: int
     wire: WirePlan | None  # whose reading says where the count begins; None: the drive's own count is trusted
+
+    def __post_init__(self) -> None:
+        if not {self.status.number.kind, self.position.number.kind} <= set(INTEGERS):
+            raise ValueError(f"{self.name}: status and position have to be integers")
+        if self.counts_per_m == 0.0 or (self.wire is not None and self.wire.per_m == 0.0):
+            raise ValueError(f"{self.name}: a scale of 0")
 
 
 @dataclass(frozen=True)
@@ -84,12 +149,7 @@ class PressurePlan:
     port: str
     baud: int
     id: int
-    function: int
-    address: int
-    words: int  # read together
-    at: int  # where the pressure begins among them
-    kind: str  # u16, i16, u32, i32 or f32, high word first
-    pa_per_step: float
+    reading: ReadPlan  # Pa
     zero_pa: float
     surface_pa: float  # absolute, where depth is zero
     pa_per_m: float
@@ -98,6 +158,10 @@ class PressurePlan:
     surface_m: float  # at the surface above this depth
     step_m: float  # less than this within patience_s is no rise
     patience_s: float
+
+    def __post_init__(self) -> None:
+        if not (self.pa_per_m > 0.0 and self.patience_s > 0.0):
+            raise ValueError("PressurePlan: pa_per_m and patience_s have to be positive")
 
 
 @dataclass(frozen=True)
@@ -138,7 +202,9 @@ def read_plan(path: Path) -> Plan:
             raise ValueError("too long")
         outer = json.loads(data)
         body = outer["plan"]
-        if outer["format"] != FORMAT or outer["crc32"] != f"{zlib.crc32(body.encode()):08x}":
+        if outer["format"] != FORMAT:
+            raise ValueError(f"format {outer['format']!r}, expected {FORMAT}: written by another release")
+        if outer["crc32"] != f"{zlib.crc32(body.encode()):08x}":
             raise ValueError("its check sum fails")
         return _plan(json.loads(body))
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
@@ -146,24 +212,10 @@ def read_plan(path: Path) -> Plan:
 
 
 def _plan(table: dict[str, Any]) -> Plan:
-    axes = tuple(_made(AxisPlan, {**axis, "wire": _optional(WirePlan, axis["wire"])}) for axis in table["axes"])
-    servo, pressure = _optional(ServoPlan, table["servo"]), _optional(PressurePlan, table["pressure"])
-    plan = _made(Plan, {**table, "axes": axes, "servo": servo, "pressure": pressure})
-    if not axes:
+    plan: Plan = _decode(Plan, table)
+    if not plan.axes:
         raise ValueError("no pump")
-    if pressure is not None:
-        _check_pressure(pressure)
-    for axis in axes:
-        if axis.counts_per_m == 0.0 or (axis.wire is not None and axis.wire.per_m == 0.0):
-            raise ValueError(f"{axis.name}: a scale of 0")
     return plan
-
-
-def _check_pressure(pressure: PressurePlan) -> None:
-    if pressure.kind not in CODES or not 0 <= pressure.at <= pressure.words - WORDS[pressure.kind]:
-        raise ValueError("PressurePlan: no such number in its registers")
-    if not (pressure.pa_per_m > 0.0 and pressure.patience_s > 0.0):
-        raise ValueError("PressurePlan: pa_per_m and patience_s have to be positive")
 
 
 _KINDS: dict[Any, tuple[type, ...]] = {
@@ -171,20 +223,24 @@ _KINDS: dict[Any, tuple[type, ...]] = {
 }  # fmt: skip
 
 
-def _made(kind: Any, table: dict[str, Any]) -> Any:
-    """A dataclass from exactly its keys, each of its type; numbers finite."""
+def _decode(kind: Any, table: dict[str, Any]) -> Any:
+    """A dataclass from exactly its keys, each of its type, dataclasses in it likewise; numbers finite."""
     names = {field.name: field.type for field in fields(kind)}
     if set(table) != set(names):
         raise ValueError(f"{kind.__name__}: unknown or missing keys {sorted(set(table) ^ set(names))}")
-    for name, wanted in names.items():
-        value = table[name]
-        if wanted in _KINDS:
-            if not isinstance(value, _KINDS[wanted]) or (isinstance(value, bool) and wanted is not bool):
-                raise ValueError(f"{kind.__name__}: {name}: {value!r}")
-            if isinstance(value, float) and not abs(value) < 1e12:
-                raise ValueError(f"{kind.__name__}: {name}: {value!r}")
-    return kind(**table)
+    return kind(**{name: _value(wanted, table[name], f"{kind.__name__}: {name}") for name, wanted in names.items()})
 
 
-def _optional(kind: Any, table: dict[str, Any] | None) -> Any:
-    return None if table is None else _made(kind, table)
+def _value(wanted: Any, value: Any, place: str) -> Any:
+    options = get_args(wanted) or (wanted,)
+    inner = next((option for option in options if is_dataclass(option)), None)
+    if get_origin(wanted) is tuple:
+        return tuple(_decode(inner, item) for item in value)
+    if inner is not None and not (value is None and NoneType in options):
+        return _decode(inner, value)
+    if wanted in _KINDS:
+        if not isinstance(value, _KINDS[wanted]) or (isinstance(value, bool) and wanted is not bool):
+            raise ValueError(f"{place}: {value!r}")
+        if isinstance(value, float) and not abs(value) < 1e12:
+            raise ValueError(f"{place}: {value!r}")
+    return value

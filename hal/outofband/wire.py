@@ -9,6 +9,8 @@ import time
 
 import serial
 
+from hal.outofband.plan import CODES, NumberPlan, PathPlan, ReadPlan
+
 ANSWER_S = 0.25  # a reply's longest delay, its own length beside it
 
 
@@ -41,10 +43,32 @@ def write_many_frame(device: int, address: int, words: list[int]) -> bytes:
     return _closed(struct.pack(f">BBHHB{len(words)}H", device, 16, address, len(words), 2 * len(words), *words))
 
 
-def path_words(absolute: int, counts: int, rpm: int, ramp_ms: int, trigger: int) -> list[int]:
-    """A drive's path 0: mode, position (high word first), speed, both ramps, pause, trigger."""
-    position = min(max(counts, -(1 << 31)), (1 << 31) - 1) & 0xFFFF_FFFF
-    return [absolute, position >> 16, position & 0xFFFF, rpm, ramp_ms, ramp_ms, 0, trigger]
+def number_of(number: NumberPlan, registers: list[int]) -> float:
+    """The number among registers that were read, high word first."""
+    words = [registers[place] for place in number.places]
+    return struct.unpack(f">{CODES[number.kind]}", struct.pack(f">{len(words)}H", *words))[0] * number.step
+
+
+def words_of(number: NumberPlan, value: float) -> list[int]:
+    """The registers of a number to write, high word first; an integer is rounded, and held within its type."""
+    value /= number.step
+    if number.kind != "f32":
+        bits = 16 * len(number.places)
+        low = -(1 << bits - 1) if number.kind[0] == "i" else 0
+        value = round(min(max(value, low), low + (1 << bits) - 1))
+    data = struct.pack(f">{CODES[number.kind]}", value)
+    return list(struct.unpack(f">{len(data) // 2}H", data))
+
+
+def path_words(path: PathPlan, *, absolute: int, counts: float, rpm: int, ramp_ms: int, trigger: int) -> list[int]:
+    """The registers of a drive's path."""
+    words = [0] * path.words
+    for number, value in (
+        (path.mode, absolute), (path.position, counts), (path.speed, rpm), (path.acceleration, ramp_ms),
+        (path.deceleration, ramp_ms), (path.pause, 0), (path.trigger, trigger),
+    ):  # fmt: skip
+        words[number.places.start : number.places.stop] = words_of(number, value)
+    return words
 
 
 def servo_frame(channel: int, quarter_us: int, number: int | None, crc: bool) -> bytes:
@@ -96,6 +120,11 @@ class Port:
     def send(self, data: bytes) -> bool:
         """Put bytes on the line."""
         return self._talk(data, 0) is not None
+
+    def registers(self, device: int, reading: ReadPlan) -> list[int] | None:
+        """What stands in the registers that a number is read with; None where the device does not answer."""
+        request = read_frame(device, reading.function, reading.address, reading.words)
+        return registers_of(self.exchange(request, 5 + 2 * reading.words), device, reading.function, reading.words)
 
     def exchange(self, request: bytes, size: int) -> bytes:
         """A request and its reply of `size` bytes; empty where none came."""

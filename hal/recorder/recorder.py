@@ -10,7 +10,6 @@ import json
 import os
 import select
 import subprocess
-import sys
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -22,6 +21,7 @@ from hal.recorder import ring
 from hal.recorder.condition import FIRST_RETRY_S, HUNG_S, LONGEST_RETRY_S, Condition, Level
 from hal.recorder.producer import Channel, Producer
 from hal.recorder.schema import RECORDING, RecordSpec, specs_to_json
+from hal.spawn import module_command, module_environment
 
 SLOTS = 2048  # twenty seconds of a hundred records a second
 SYNC_PERIOD_S = 0.5  # with the time an fsync takes, at most a second is lost when the power goes
@@ -143,15 +143,13 @@ class Recorder:
         """Start a recording process for the current part; a few milliseconds."""
         assert self._fd is not None
         assert self._config_fd is not None
-        root = Path(__file__).resolve().parents[2]
-        paths = [str(root), *filter(None, [os.environ.get("PYTHONPATH")])]
         self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "hal.recorder.writer"],
+            module_command("hal.recorder.writer"),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             pass_fds=(self._fd, self._config_fd),
             start_new_session=True,  # what a terminal sends to the flight does not reach it
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+            env=module_environment(),
         )
         self._started_at = time.monotonic()
         assert self._process.stdin is not None

@@ -150,8 +150,11 @@ class Hub:
         self._served = self._now()
 
     def _serve(self, until: float) -> None:
+        """Read, then judge, then wait; `service` judges by a time before the reading, so that a reply which had come by
+        that time is never missed, however long the loop was away."""
         while True:
             now = self._now()
+            self._wait(0.0)
             due = until
             for link in self.links:
                 due = min(due, link.service(now))

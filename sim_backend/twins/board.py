@@ -6,7 +6,6 @@ import select
 import shutil
 import socket
 import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
@@ -15,6 +14,7 @@ import msgspec
 from hal.board import BoardRequest
 from hal.devices import DeviceBoard
 from hal.ports import Board, BoardError, Hardware
+from hal.spawn import module_command, module_environment
 from sim_backend.twins.boardfile import TwinFile, decode_twin_file
 from sim_backend.twins.service import replaced_ports
 
@@ -43,8 +43,8 @@ class TwinBoard(DeviceBoard):
             "vehicle": msgspec.to_builtins(request.vehicle),
         }  # fmt: skip
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "sim_backend.twins.service"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-            start_new_session=True,
+            module_command("sim_backend.twins.service"), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            start_new_session=True, env=module_environment(),
         )  # fmt: skip
         assert self._process.stdin is not None
         assert self._process.stdout is not None

@@ -12,7 +12,7 @@ from pymodbus.constants import ExcCodes
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 from hal.boardfile import BatteryTable, DriveTable, LeakTable, WireTable
-from hal.protocols.registers import RegisterMap, registers_of, to_registers
+from hal.protocols.registers import LOW, WORDS, RegisterMap, channel_of, registers_of, step_of, to_registers, value_of
 from sim_backend.twins.faults import Fault
 from sim_backend.twins.plant import TwinPlant
 
@@ -61,6 +61,16 @@ class RegisterTwin(ABC):
     def _place(self, block: str, name: str, number: float) -> dict[int, int]:
         return registers_of(self.map.block[block], name, number)
 
+    def _place_count(self, count: float) -> dict[int, int]:
+        """A count where the whole number stands, and where its low word stands alone."""
+        low, whole, name = LOW[self.map.role]
+        part, number = self.map.block[low].value[name], self.map.block[whole].value[name]
+        places = self._place(whole, name, count)
+        if WORDS[part.type] < WORDS[number.type]:
+            *_, low_word = to_registers(number.type, count / step_of(number))
+            return places | {self.map.block[low].address + part.at: low_word}
+        return places | self._place(low, name, count)
+
 
 class PressureTwin(RegisterTwin):
     """A pressure transmitter."""
@@ -86,7 +96,8 @@ class AnalogTwin(RegisterTwin):
         super().__init__(device, registers, extra=tuple((word, 1) for word in registers.word.values()))
         self._plant = plant
         self._wires: dict[str, tuple[int, WireTable]] = {}
-        self.channels = [0.0] * registers.block["all"].count
+        first = channel_of(registers, 1)
+        self.channels = [0.0] * ((registers.block["all"].count - first.at) // len(first.places))
         self._modes = [3] * (registers.block["modes"].count if "modes" in registers.block else 0)
         self._first_mode = registers.block["modes"].address if self._modes else 0
 
@@ -103,8 +114,11 @@ class AnalogTwin(RegisterTwin):
         for name, (channel, table) in self._wires.items():
             reading = table.zero + table.per_m * self._plant.wire(name)
             self.channels[channel - 1] = 0.0 if self.fault.kind == "nan" else reading  # a broken wire: no current
-        base = self.map.block["all"].address
-        places = {base + i: to_registers("u16", value)[0] for i, value in enumerate(self.channels)}
+        places: dict[int, int] = {}
+        for channel, value in enumerate(self.channels, start=1):
+            place = channel_of(self.map, channel)
+            words = to_registers(place.type, value / step_of(place))
+            places |= {self.map.block["all"].address + i: word for i, word in zip(place.places, words, strict=True)}
         return {**places, **{self._first_mode + i: mode for i, mode in enumerate(self._modes)}}
 
     def written(self, address: int, values: list[int], stored: Any) -> ExcCodes | None:
@@ -125,7 +139,7 @@ class EncoderTwin(RegisterTwin):
 
     def fill(self) -> dict[int, int]:
         count = self._table.zero + self._table.per_m * self._plant.wire(self._name)
-        return self._place("all", "count", count)
+        return self._place_count(count)
 
 
 class DriveTwin(RegisterTwin):
@@ -151,8 +165,8 @@ class DriveTwin(RegisterTwin):
         status |= self.RUNNING if self._going else self.COMMAND_DONE | self.PATH_DONE
         status |= self.HOMED if self._homed else 0
         return {
-            **self._place("status", "status", status), **self._place("position", "position", self._counts()),
-            **self._place("alarm", "alarm", self.alarm),
+            **self._place("status", "status", status), **self._place_count(self._counts()),
+            **(self._place("alarm", "alarm", self.alarm) if "alarm" in self.map.block else {}),
         }  # fmt: skip
 
     def written(self, address: int, values: list[int], stored: Any) -> ExcCodes | None:
@@ -163,7 +177,7 @@ class DriveTwin(RegisterTwin):
             self._profile = self._target = self._counts()
             self._speed, self._going = 0.0, False
             self._plant.drive(self._index, self._plant.actuator(self._index))
-        elif address == word["control"] and values == [command["set_zero"]]:
+        elif address == word["control"] and values == [command.get("set_zero")]:
             self._shift(-self._counts())
             self._homed = True
         elif path.address <= address and address + len(values) <= path.address + path.count:
@@ -181,13 +195,15 @@ class DriveTwin(RegisterTwin):
         self._target += counts
 
     def _path(self, words: list[int]) -> ExcCodes | None:
-        mode, high, low, speed, rise, _fall, _pause, trigger = words
+        path = self.map.block["path"]
+        mode, position, speed, rise, trigger = (
+            value_of(path, name, words) for name in ("mode", "position", "speed", "acceleration", "trigger")
+        )
         if mode != self.map.command["absolute"] or not 1 <= speed <= 6000 or rise == 0:
             return ExcCodes.ILLEGAL_VALUE
         if trigger != self.map.command["trigger"] or self.alarm:
             return None
-        raw = high << 16 | low
-        self._target = float(raw - (1 << 32) if raw & 0x80000000 else raw)
+        self._target = position
         per_rpm = self._table.counts_per_rev / 60.0
         self._top, self._acceleration = speed * per_rpm, 1000.0 * per_rpm / (rise * 1e-3)
         self._going = True

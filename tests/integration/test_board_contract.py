@@ -59,7 +59,9 @@ def test_ports_have_the_shape_of_ports(board):
     assert board.loop_hz > 0
     assert isinstance(board.hardware, Hardware)
     assert board.check_calibration()
-    assert set(board.periods) == {"imu", "beacon", "wires"}
+    inputs = {name for name in ("leak", "battery") if getattr(board, name) is not None}
+    assert set(board.periods) == {"imu", "beacon", "wires"} | inputs
+    assert all(period > 0.0 for period in board.periods.values())
     assert 80_000 < board.surface_pressure < 110_000
 
 

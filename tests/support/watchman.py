@@ -32,7 +32,9 @@ class Watchman:
 
     def __init__(self, *, limits: Limits | None = None, mode: float = ctl.FLYING, fitted: tuple = (),
                  site: float = 1000.0, dt: float = DT, **settings):  # fmt: skip
-        self.dt, periods = dt, {"imu": dt, "beacon": 2 * dt, "wires": 2 * dt}
+        self.slow = max(1, round(0.2 / dt))  # ticks between two samples of leak and battery
+        inputs = {name: self.slow * dt for name in ("leak", "battery")}
+        self.dt, periods = dt, {"imu": dt, "beacon": 2 * dt, "wires": 2 * dt, **inputs}
         vehicle = load_vehicle("roughie")
         table = msgspec.structs.replace(vehicle.supervisor, **settings)
         vehicle = msgspec.structs.replace(vehicle, limits=limits, supervisor=table)
@@ -41,7 +43,6 @@ class Watchman:
         C = configuration(vehicle, mission, dt=dt, periods=periods)
         self.pilot = Autopilot(vehicle, mission, C, source)
         self.supervisor = Supervisor(self.pilot, vehicle, mission, dt=dt, periods=periods)
-        self.slow = max(1, round(0.2 / dt))  # ticks between two samples of leak and battery
         self._share()
         self.fitted = ("imu", "beacon", "slider_wire", "plunger_wire", "servo", "slider", "ballast", *fitted)
         self.t, self.number = -dt, 0

@@ -2,15 +2,14 @@
 
 import json
 import math
-import os
 import subprocess
-import sys
 import threading
 import time
 from pathlib import Path
 from typing import Any
 
 from hal.ports import ACTUATORS
+from hal.spawn import module_command, module_environment
 from tools.bench.units import from_port, to_port
 from tools.data.errors import InputError
 
@@ -46,11 +45,9 @@ class Bench:
         self._end()
 
     def _start(self) -> None:
-        root = Path(__file__).resolve().parents[2]
-        paths = [str(root), *filter(None, [os.environ.get("PYTHONPATH")])]
         self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "tools.bench.worker"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-            start_new_session=True, env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+            module_command("tools.bench.worker"), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            start_new_session=True, env=module_environment(),
         )  # fmt: skip
         config = {"text": self.text, "source": self.source, "kind": self.kind, "vehicle": self.vehicle}
         answer = self._exchange(config)

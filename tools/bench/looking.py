@@ -36,7 +36,7 @@ class Looking(Desk):
             text = f"{'answers' if item['answers'] else 'SILENT':<8} target {target} {UNITS[name]}"
             if "position" in item:
                 places = [from_port(name, item[key], kg) for key in ("position", "measured")]
-                text += f", drive {places[0]:.2f}, wire {places[1]:.2f}, {item['counts']} counts"
+                text += f", drive {places[0]:.2f}, wire {places[1]:.2f}, {item['counts']:.10g} counts"
             elif item["pulse_us"] is not None:
                 text += f", pulse {item['pulse_us']:.2f} us"
         return text + (f"  [{item['error']}]" if item["error"] else "")

@@ -63,7 +63,7 @@ def _actuator(item: dict) -> str:
         return "does not answer"
     said = "FAULT" if item["status"] & 1 else "on" if item["status"] & 2 else "off"
     apart = abs(item["position"] - item["measured"])
-    return f"{said}, at {item['counts']} counts, {apart:.4g} off its wire"
+    return f"{said}, at {item['counts']:.10g} counts, {apart:.4g} off its wire"
 
 
 class Signs:

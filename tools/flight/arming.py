@@ -112,7 +112,7 @@ class Arming:
             depth = board.armed_depth + off / (density * GRAVITY)
             where = f"{board.armed_depth:g} m deep" if board.armed_depth else "in air or awash"
             raise Refused(
-                f"{depth:.2f} m deep, expected {where}; {off / 100:+.0f} hPa is no weather (within {WEATHER_PA / 100:g}):"
+                f"{depth:.2f} m deep, not {where}; {off / 100:+.0f} hPa is no weather ({WEATHER_PA / 100:g} at most):"
                 " armed_depth_m and [beacon] surface_pa of the board file, or `zero beacon` in the bench"
             )
         self.surface_pressure = measured

@@ -4,8 +4,8 @@ from firmware.core.vehicle.layout import GRAVITY
 from firmware.model.supervisor_settings import SupervisorTable
 from hal.boardfile import DeviceFile, DriveTable, WireTable, preset_of
 from hal.devices import DeviceBoard
-from hal.outofband.plan import AxisPlan, Plan, PressurePlan, ServoPlan, WirePlan
-from hal.protocols.registers import step_of
+from hal.outofband.plan import AxisPlan, NumberPlan, PathPlan, Plan, PressurePlan, ReadPlan, ServoPlan, WirePlan
+from hal.protocols.registers import Block, Value, channel_of, step_of
 
 NEAR_M = 0.0005  # an actuator so near its end has arrived
 
@@ -36,14 +36,27 @@ def _pressure(
     table = file.beacon
     registers, port = preset_of(file, "beacon", source), file.port[table.port]
     block = registers.block["pressure" if "pressure" in registers.block else "all"]
-    value = block.value["pressure"]
     return PressurePlan(
-        port=port.path, baud=port.baud, id=table.id, function=block.function, address=block.address, words=block.count,
-        at=value.at, kind=value.type, pa_per_step=step_of(value), zero_pa=float(table.zero_pa),
+        port=port.path, baud=port.baud, id=table.id, reading=_reading(block, block.value["pressure"]),
+        zero_pa=float(table.zero_pa),
         surface_pa=float(surface_pa), pa_per_m=float(pa_per_m), low_pa=float(table.range_pa[0]),
         high_pa=float(table.range_pa[1]), surface_m=float(settings.surface_m), step_m=float(settings.ascent_step_m),
         patience_s=float(settings.no_ascent_s),
     )  # fmt: skip
+
+
+def _number(value: Value) -> NumberPlan:
+    return NumberPlan(at=value.at, kind=value.type, step=float(step_of(value)))
+
+
+def _reading(block: Block, value: Value) -> ReadPlan:
+    """The block that the flight reads, and where the number stands in it."""
+    return ReadPlan(function=block.function, address=block.address, words=block.count, number=_number(value))
+
+
+def _path(block: Block) -> PathPlan:
+    numbers = {name: _number(value) for name, value in block.value.items()}
+    return PathPlan(address=block.address, words=block.count, **numbers)
 
 
 def _axis(file: DeviceFile, source: str, name: str, wire: str, end_m: float) -> AxisPlan:
@@ -52,8 +65,9 @@ def _axis(file: DeviceFile, source: str, name: str, wire: str, end_m: float) -> 
     return AxisPlan(
         name="pump" if name == "ballast" else name,
         port=port.path, baud=port.baud, id=table.id,
-        status=registers.block["status"].address, position=registers.block["position"].address,
-        path=registers.block["path"].address, auxiliary=registers.word["auxiliary"],
+        status=_reading(registers.block["status"], registers.block["status"].value["status"]),
+        position=_reading(registers.block["position"], registers.block["position"].value["position"]),
+        path=_path(registers.block["path"]), auxiliary=registers.word["auxiliary"],
         absolute=registers.command["absolute"], trigger=registers.command["trigger"],
         clear_alarm=registers.command["clear_alarm"],
         zero_counts=float(table.zero_counts), counts_per_m=float(table.counts_per_m), end_m=float(end_m),
@@ -67,13 +81,12 @@ def _wire(file: DeviceFile, source: str, name: str) -> WirePlan:
     table: WireTable = getattr(file, name)
     registers, port = preset_of(file, name, source), file.port[table.port]
     block = registers.block["all"]
-    encoder = registers.role == "encoder"
+    value = block.value["count"] if registers.role == "encoder" else channel_of(registers, table.channel or 1)
     low, high = table.range_m
     if table.broken_below is not None:  # a broken wire reads below this, whichever way it is mounted
         edge = (table.broken_below - table.zero) / table.per_m
         low, high = (max(low, edge), high) if table.per_m > 0.0 else (low, min(high, edge))
     return WirePlan(
-        port=port.path, baud=port.baud, id=table.id, function=block.function,
-        address=block.address + (0 if encoder else (table.channel or 1) - 1), words=2 if encoder else 1,
-        zero=float(table.zero), per_m=float(table.per_m), low_m=float(low), high_m=float(high),
+        port=port.path, baud=port.baud, id=table.id, reading=_reading(block, value), zero=float(table.zero),
+        per_m=float(table.per_m), low_m=float(low), high_m=float(high),
     )  # fmt: skip

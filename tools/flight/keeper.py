@@ -3,7 +3,6 @@
 import os
 import shutil
 import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
@@ -24,6 +23,7 @@ from hal.ports import BATTERY, BoardError, Validity
 from hal.recorder.condition import Level
 from hal.recorder.schema import WARN
 from hal.sortie import Facts, Party, Refused, State, Trigger, follow
+from hal.spawn import module_command, module_environment
 from hal.state_file import Record, StateFile
 from tools.flight.ascent_plan import make_plan
 from tools.flight.compose import Flight
@@ -215,13 +215,9 @@ class Keeper(Host):
             time.sleep(0.01)
 
     def _launch_guard(self) -> None:
-        root = Path(__file__).resolve().parents[2]
-        paths = [str(root), *filter(None, [os.environ.get("PYTHONPATH")])]
         self._guard = subprocess.Popen(
-            [sys.executable, "-P", "-m", "hal.outofband", "--run", str(self.run_folder), "--state",
-             str(self.state_folder)],
-            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, start_new_session=True,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+            module_command("hal.outofband", "--run", str(self.run_folder), "--state", str(self.state_folder)),
+            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, start_new_session=True, env=module_environment(),
         )  # fmt: skip
 
     def _release(self, state: State) -> None:

@@ -50,8 +50,8 @@ def one_refused(checks: dict[str, Check], name: str) -> str:
 def test_not_at_the_surface_is_refused(flight):
     flight.board.world.x[2] = 2.0
     reason = one_refused(found(flight), "zero depth")
-    assert "m deep, expected 0.3 m deep; +" in reason
-    assert "hPa is no weather (within 60)" in reason
+    assert "m deep, not 0.3 m deep; +" in reason
+    assert "hPa is no weather (60 at most)" in reason
 
 
 def test_a_device_without_a_sample_is_refused(flight, monkeypatch):

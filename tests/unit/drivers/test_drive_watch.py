@@ -9,7 +9,9 @@ from hal.drivers.drive import Drive, StallDetector
 from hal.drivers.maestro import Servo
 from hal.drivers.samples import Sensor
 from hal.ports import SLOTS
-from hal.protocols.registers import preset
+from hal.protocols import modbus
+from hal.protocols.modbus_master import ModbusBus
+from hal.protocols.registers import preset, to_registers
 
 SERVO = {"device": "maestro", "port": "p", "channel": 0, "us_per_rad": 600.0, "zero_us": 1500.0}
 
@@ -147,3 +149,79 @@ def test_the_servo_sends_nothing_before_enable_and_repeats_itself_after():
     before = len(sent)
     servo.service(1.0)
     assert all(data[0] == 0xA1 for data in sent[before:])
+
+
+# --- what was written, and may not have arrived ---------------------------------------------------------------------
+class Line:
+    """A bus whose requests are kept; a reply to the last is fed by hand."""
+
+    def __init__(self, item):
+        self.bus, self.sent, self.now = ModbusBus(115_200, timeout_s=0.05, longest_s=0.1), [], 0.0
+        self.bus.attach(lambda data: self.sent.append(data) or True)
+        self.bus.connected(0.0)
+        self.item = item
+        item.enabled = True
+        self.bus.add(item._mover)
+
+    def wait(self, seconds):
+        """Let time pass; what was sent in it."""
+        before, end = len(self.sent), self.now + seconds
+        while self.now < end:
+            self.now += 0.001
+            self.bus.service(self.now)
+        return self.sent[before:]
+
+    def stands(self, counts):
+        """The drive's position, as its poll takes it."""
+        words = to_registers("i32", counts)
+        self.item._took_position(self.item._position._variants[0], words, self.now, self.now)
+
+    def echo(self):
+        """The last request has arrived."""
+        self.bus.feed(modbus.with_check_sum(self.sent[-1][:6]), self.now)
+
+
+@pytest.fixture
+def line():
+    item, _ = drive()
+    line = Line(item)
+    line.stands(0)
+    item.command(0.01)
+    assert line.wait(0.15)
+    line.echo()
+    assert line.wait(0.2) == []  # it was written, and nothing is left to write
+    return line
+
+
+def lose_the_line(line):
+    line.bus.lost(line.now)
+    line.bus.connected(line.now)
+
+
+def refuse(line):
+    sent = line.sent[-1]
+    line.bus.feed(modbus.with_check_sum(bytes((sent[0], sent[1] | 0x80, 4))), line.now)
+
+
+@pytest.mark.parametrize(
+    "fail", [lose_the_line, refuse, lambda line: line.wait(0.1)], ids=["lost", "refused", "silent"]
+)
+def test_a_path_that_may_have_arrived_does_not_hide_the_next(line, fail):
+    """Sent to 40 mm, no echo, and back to 10 mm, which is what was written before: the drive may be on its way to
+    40 mm, so that the path to 10 mm is written again."""
+    line.item.command(0.04)
+    while not (sent := line.wait(0.001)):
+        pass
+    assert len(sent) == 1
+    line.item.command(0.01)
+    fail(line)
+    (path, *_) = [frame for frame in line.wait(1.0) if frame[1] == modbus.WRITE_MANY]
+    begin = 7 + 2 * (0x6201 - int.from_bytes(path[2:4], "big"))  # the path with its mode, or without
+    assert int.from_bytes(path[begin : begin + 4], "big") == 20_000
+
+
+def test_a_drive_that_was_silent_is_written_to_again(line):
+    """It may have been without power: what it was told is gone with it."""
+    line.now += 5.0
+    line.stands(0)
+    assert [frame[1] for frame in line.wait(0.2)][:1] == [modbus.WRITE_MANY]

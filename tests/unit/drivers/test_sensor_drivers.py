@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from hal.boardfile import ImuTable, WireTable
-from hal.drivers.modbus_sensors import nearest, wire
+from hal.drivers.count import nearest
+from hal.drivers.modbus_sensors import wire
 from hal.drivers.samples import FAULTY_AFTER, Sensor
 from hal.drivers.vn100 import Vn100, euler, rotation
 from hal.ports import SLOTS, Validity, empty_frame

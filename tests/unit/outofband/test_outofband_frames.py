@@ -6,8 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hal.outofband import wire
+from hal.outofband.plan import CODES, NumberPlan, PathPlan
 from hal.protocols import maestro, modbus
-from hal.protocols.registers import to_registers
+from hal.protocols.registers import from_registers, to_registers
 
 WORD = st.integers(0, 0xFFFF)
 DEVICE = st.integers(1, 247)
@@ -44,9 +45,27 @@ def test_the_servos_printed_check_sum():
     assert wire.servo_frame(0, 6000, None, True) == bytes.fromhex("8400702E2B")
 
 
-@given(st.integers(-(1 << 31), (1 << 31) - 1))
-def test_positions_are_high_word_first(counts):
-    assert wire.path_words(1, counts, 60, 100, 16)[1:3] == to_registers("i32", counts)
+KINDS, STEPS = st.sampled_from(sorted(CODES)), st.sampled_from([1.0, 0.5, 4.0])
+
+
+@given(KINDS, st.integers(-(1 << 33), 1 << 33), st.integers(0, 3), STEPS)
+def test_numbers_are_those_of_the_drivers(kind, count, at, step):
+    """Every type, past its ends too, written and read as the flight does."""
+    number = NumberPlan(at, kind, step)
+    words = wire.words_of(number, count)
+    assert words == to_registers(kind, count / step)
+    registers = [7] * at + words + [7]
+    assert wire.number_of(number, registers) == from_registers(kind, registers, at) * step
+
+
+def test_a_path_is_written_as_its_map_says():
+    numbers = {name: NumberPlan(at, kind, 1.0) for name, at, kind in (
+        ("position", 0, "i32"), ("speed", 2, "u32"), ("acceleration", 4, "u16"), ("deceleration", 5, "i16"),
+        ("pause", 6, "u32"), ("trigger", 8, "u16"), ("mode", 9, "u16"),
+    )}  # fmt: skip
+    path = PathPlan(0x100, 10, **numbers)
+    words = wire.path_words(path, absolute=1, counts=-70_000, rpm=60, ramp_ms=100, trigger=16)
+    assert words == [0xFFFE, 0xEE90, 0, 60, 100, 100, 0, 0, 16, 1]
 
 
 @given(DEVICE, st.lists(WORD, min_size=1, max_size=8))

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hal.board import BoardRequest, board_builder
-from hal.outofband.plan import FORMAT, PlanError, read_plan, write_plan
+from hal.outofband.plan import FORMAT, NumberPlan, PlanError, ReadPlan, read_plan, write_plan
 from tools.data.boards import load_board_file
 from tools.data.sources import load_vehicle
 from tools.flight.ascent_plan import make_plan
@@ -23,17 +23,19 @@ def plan():
         BoardRequest(text=file.text, source=file.source, vehicle=load_vehicle("roughie"), water_density=1000.0)
     )
     settings = load_vehicle("roughie").supervisor
-    return make_plan(
-        board, flight="sawtooth-001", settings=settings, water_density=1000.0, watchdog="/dev/watchdog"
-    )
+    return make_plan(board, flight="sawtooth-001", settings=settings, water_density=1000.0, watchdog="/dev/watchdog")
 
 
 def test_the_plan_is_what_the_board_file_says(plan):
     pump, slider = plan.axes
-    assert (pump.name, pump.id, pump.counts_per_m, pump.path, pump.status) == ("pump", 8, 5e6, 0x6200, 0x1003)
+    assert (pump.name, pump.id, pump.counts_per_m) == ("pump", 8, 5e6)
+    assert (pump.path.address, pump.path.words, pump.path.position) == (0x6200, 8, NumberPlan(1, "i32", 1.0))
+    assert pump.status == ReadPlan(function=3, address=0x1003, words=1, number=NumberPlan(0, "u16", 1.0))
+    assert pump.position == ReadPlan(function=3, address=0x1014, words=2, number=NumberPlan(0, "i32", 1.0))
     assert (slider.name, slider.id, slider.wire) == ("slider", 7, None)
     assert pump.wire is not None
-    assert (pump.wire.id, pump.wire.function, pump.wire.address) == (2, 4, 1)
+    assert pump.wire.id == 2
+    assert pump.wire.reading == ReadPlan(function=4, address=0, words=8, number=NumberPlan(1, "u16", 1.0))
     area = load_vehicle("roughie").actuators.ballast
     assert pump.end_m == pytest.approx(max(-0.034, area.range[0] / (1000.0 * area.plunger_area)))
     assert slider.end_m == pytest.approx(max(-0.062, load_vehicle("roughie").actuators.slider.range[0]))
@@ -42,8 +44,8 @@ def test_the_plan_is_what_the_board_file_says(plan):
     assert plan.servo.quarter_us == 6000
     transmitter, settings = plan.pressure, load_vehicle("roughie").supervisor
     assert transmitter is not None
-    assert (transmitter.id, transmitter.address, transmitter.words, transmitter.kind) == (1, 0x0100, 2, "f32")
-    assert transmitter.pa_per_step == pytest.approx(1e5)  # bar
+    assert transmitter.id == 1
+    assert transmitter.reading == ReadPlan(function=3, address=0x0100, words=2, number=NumberPlan(0, "f32", 1e5))  # bar
     assert transmitter.pa_per_m == pytest.approx(9806.65)
     assert (transmitter.patience_s, transmitter.step_m) == (settings.no_ascent_s, settings.ascent_step_m)
     assert [axis.last_m for axis in plan.axes] == [-0.034, -0.062]
@@ -90,9 +92,18 @@ def test_cut_anywhere_or_with_a_flipped_bit_it_is_refused(plan, tmp_path):
         lambda table: table["axes"][0]["wire"].update(per_m=0.0),
         lambda table: table["axes"][0].update(wire=[]),
         lambda table: table.update(axes=None),
-        lambda table: table["pressure"].update(kind="f64"),
-        lambda table: table["pressure"].update(at=1),
-        lambda table: table["pressure"].update(at=-1),
+        lambda table: table["pressure"]["reading"]["number"].update(kind="f64"),
+        lambda table: table["pressure"]["reading"]["number"].update(at=1),
+        lambda table: table["pressure"]["reading"]["number"].update(at=-1),
+        lambda table: table["pressure"]["reading"]["number"].update(step=0.0),
+        lambda table: table["pressure"]["reading"].update(words=70_000),
+        lambda table: table["pressure"]["reading"].update(address=-1),
+        lambda table: table["pressure"].update(reading=None),
+        lambda table: table["axes"][0]["status"]["number"].update(kind="f32"),
+        lambda table: table["axes"][0]["path"].update(words=9),
+        lambda table: table["axes"][0]["path"]["speed"].update(at=4),
+        lambda table: table["axes"][0]["path"]["trigger"].update(kind="u32"),
+        lambda table: table["axes"][0]["path"].pop("pause"),
         lambda table: table["pressure"].update(pa_per_m=0.0),
         lambda table: table["pressure"].update(patience_s=-1.0),
         lambda table: table["pressure"].pop("zero_pa"),
@@ -106,6 +117,14 @@ def test_what_makes_no_sense_is_refused_though_its_sum_is_right(plan, tmp_path, 
     body = json.dumps(table)
     path.write_text(json.dumps({"format": FORMAT, "crc32": f"{zlib.crc32(body.encode()):08x}", "plan": body}))
     with pytest.raises(PlanError, match=r"plan\.json: "):
+        read_plan(path)
+
+
+def test_a_plan_of_another_release_is_called_that(plan, tmp_path):
+    path = tmp_path / "plan.json"
+    write_plan(path, plan)
+    path.write_text(path.read_text().replace(f'"format": {FORMAT}', '"format": 2'))
+    with pytest.raises(PlanError, match=r"plan\.json: format 2, expected 3: written by another release"):
         read_plan(path)
 
 

@@ -12,7 +12,7 @@ import pytest
 from hal.heartbeat import Guard, Heartbeat
 from hal.outofband import guard
 from hal.outofband.guard import Watch
-from hal.outofband.plan import NAME, AxisPlan, Plan, write_plan
+from hal.outofband.plan import NAME, AxisPlan, NumberPlan, PathPlan, Plan, ReadPlan, write_plan
 from hal.sortie import State
 from hal.state_file import StateFile
 
@@ -97,10 +97,12 @@ def dog(tmp_path, monkeypatch):
 def watch(tmp_path, monkeypatch):
     monkeypatch.setattr(guard, "FEED_S", 0.05)
     nowhere = str(tmp_path / "no-port")
+    word = [NumberPlan(at, "u16", 1.0) for at in range(7)]
+    register = ReadPlan(function=3, address=1, words=1, number=word[0])
     pump = AxisPlan(
-        name="pump", port=nowhere, baud=115200, id=8, status=1, position=2, path=3, auxiliary=4, absolute=1, trigger=1,
-        clear_alarm=1, zero_counts=0.0, counts_per_m=1.0, end_m=0.0, last_m=0.0, tolerance_m=0.1, rpm=1, ramp_ms=1,
-        wire=None,
+        name="pump", port=nowhere, baud=115200, id=8, status=register, position=register, path=PathPlan(3, 7, *word),
+        auxiliary=4, absolute=1, trigger=1, clear_alarm=1, zero_counts=0.0, counts_per_m=1.0, end_m=0.0, last_m=0.0,
+        tolerance_m=0.1, rpm=1, ramp_ms=1, wire=None,
     )  # fmt: skip
     write_plan(tmp_path / NAME, Plan("test", (pump,), None, watchdog=str(tmp_path / "watchdog")))
     found = Watch(tmp_path, tmp_path, service=False)

@@ -17,9 +17,10 @@ TEXT = SHIPPED.split("[limits]")[0]
 PERIODS = {"imu": 0.02, "beacon": 0.04, "wires": 0.1}
 
 
-def vector(limits=None, dt=0.02, site=6.0, **table):
+def vector(limits=None, dt=0.02, site=6.0, inputs=None, **table):
+    periods = {**PERIODS, **(inputs or {})}
     return settings_vector(
-        limits or Limits(), SupervisorTable(**table), dt=dt, periods=PERIODS, site_depth=site, mission_time=600.0
+        limits or Limits(), SupervisorTable(**table), dt=dt, periods=periods, site_depth=site, mission_time=600.0
     )
 
 
@@ -95,7 +96,9 @@ def test_the_layout_follows_the_frame():
 
 def test_places_in_the_vector_do_not_overlap():
     G = vector()
-    assert list(G[sup.PERIOD : sup.PERIOD + sup.N_SENSORS]) == [0.02, 0.04, 0.1, 0.1, 0.2, 0.2]
+    assert list(G[sup.PERIOD : sup.PERIOD + sup.N_SENSORS]) == [0.02, 0.04, 0.1, 0.1, math.inf, math.inf]
+    slow = vector(inputs={"leak": 1.0, "battery": 0.5})
+    assert list(slow[sup.PERIOD + sup.SENSOR_LEAK : sup.PERIOD + sup.N_SENSORS]) == [1.0, 0.5]
     assert (G[sup.ENABLED : sup.ENABLED + sup.N_ROWS] == 1.0).all()
     assert (G[sup.HIGH : sup.HIGH + sup.N_VALUES] > G[sup.LOW : sup.LOW + sup.N_VALUES]).all()
     singles = [value for name, value in vars(sup).items() if name.isupper() and isinstance(value, int)]

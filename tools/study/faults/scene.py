@@ -171,12 +171,13 @@ def set_scene(
 ) -> Scene:
     """A flight, its board broken in, under a case's setting."""
     flight.vehicle = msgspec.structs.replace(flight.vehicle, limits=setting.limits)
+    assert isinstance(flight.board, SimBoard)
+    broken = break_in(flight.board)
     flight.supervisor = Supervisor(
         flight.autopilot, flight.vehicle, flight.mission, dt=1.0 / flight.board.loop_hz, periods=flight.board.periods,
         restarted=setting.restarted,
     )  # fmt: skip
-    assert isinstance(flight.board, SimBoard)
-    return Scene(flight, break_in(flight.board), phase, begin, at_s)
+    return Scene(flight, broken, phase, begin, at_s)
 
 
 def fly(scene: Scene, row: int, *, allowed_s: float, disabled: int | None = None) -> Flown:
