@@ -68,6 +68,7 @@ FAULTS = {
     sup.FAULT_CONSOLE: "console garbage",
     sup.FAULT_GROWTH: "memory or file handles grow",
     sup.FAULT_PORT: "two programs open one port",
+    sup.FAULT_ESTIMATE: "estimate not finite",
 }
 
 assert len(FAULTS) == sup.N_ROWS - 1

@@ -65,6 +65,7 @@ class SupervisorTable(Table):
     steep_s: Short = 1.8
     law_tries: Count = 3
     law_rest_s: Seconds = 5.0
+    filter_restarts: Count = 3
     voltage_s: Seconds = 9.0
     overruns: Count = 10
     overrun_share: Annotated[float, msgspec.Meta(gt=0.0, le=1.0)] = 0.01
@@ -149,6 +150,7 @@ def _scalars(
         sup.STEEP_PITCH: math.radians(table.steep_deg), sup.STEEP_MARGIN: math.radians(table.steep_margin_deg),
         sup.STEEP_ROLL: math.radians(table.roll_deg), sup.STEEP_TIME: table.steep_s,
         sup.LAW_RUN: table.law_tries, sup.LAW_REST: table.law_rest_s,
+        sup.RESTART_COUNT: table.filter_restarts,
         sup.LOW_VOLTAGE: limits.low_voltage or 0.0, sup.LEAST_VOLTAGE: limits.least_voltage or 0.0,
         sup.VOLTAGE_TIME: table.voltage_s, sup.OVERRUN_RUN: table.overruns, sup.OVERRUN_SHARE: table.overrun_share,
         sup.MISSION_TIME: mission_time, sup.STALL_FACTOR: table.stall_factor, sup.STALL_COUNT: table.stall_tries,

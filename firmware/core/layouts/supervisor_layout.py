@@ -12,9 +12,9 @@ from hal.ports import BALLAST, BATTERY, BEACON, IMU, LEAK, PLUNGER_WIRE, SERVO, 
     FAULT_NOT_ARMED, FAULT_DISAGREE, FAULT_STALL, FAULT_SOFT_LIMIT, FAULT_DRIVE_ALARM, FAULT_TOO_DEEP,
     FAULT_NO_ASCENT, FAULT_OVERTIME, FAULT_LEAK, FAULT_STEEP, FAULT_NO_ANSWER, FAULT_VOLTAGE, FAULT_OVERRUN,
     FAULT_LOOP_HUNG, FAULT_WALL_CLOCK, FAULT_DISK, FAULT_POWER_CUT, FAULT_STATE_FILE, FAULT_FILE, FAULT_SERIAL,
-    FAULT_CONSOLE, FAULT_GROWTH, FAULT_PORT,
-) = range(1, 35)  # fmt: skip
-N_ROWS = 35
+    FAULT_CONSOLE, FAULT_GROWTH, FAULT_PORT, FAULT_ESTIMATE,
+) = range(1, 36)  # fmt: skip
+N_ROWS = 36
 
 # --- reactions, mildest first ---------------------------------------------------------------------------------------
 NOTHING, LOG, WARN, HOLD, ABORT, OOB, HW = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0
@@ -65,7 +65,8 @@ RESTARTED = _W + 35  # 1: an earlier flight did not end in order
 LAW_REST = _W + 36  # s of PID after the law had no answer
 DELAY_TICKS = _W + 37  # ticks for which a command may not show yet, fewer than N_RING
 SURFACED_TIME = _W + 38  # s at the surface before a flight ends
-_H = _W + 39
+RESTART_COUNT = _W + 39  # restarts of the filter in a flight before ABORT
+_H = _W + 40
 
 # --- what the runtime tells ------------------------------------------------------------------------------------------
 LATENESS = _H  # s, of this tick
@@ -116,5 +117,6 @@ SENT_RING = RING + 2 * N_RING  # 2 x N_RING: where they were sent
 ENDING = SENT_RING + 2 * N_RING  # UNDER_WAY ...: has the flight ended?
 PUMP_MARK, PUMP_SINCE = ENDING + 1, ENDING + 2  # kg, s: the last progress of the ballast to its light end
 CLOCK = ENDING + 3  # s, of the last tick
-N_G = ENDING + 4
+RESTARTS_SEEN = ENDING + 4  # of the filter, up to the tick before
+N_G = ENDING + 5
 UNDER_WAY, AT_SURFACE, PUMP_GIVEN_UP, NO_WAY_LEFT = 0.0, 1.0, 2.0, 3.0

@@ -269,6 +269,17 @@ def watch_law(P, C, G, ap, t):
 
 
 @kernel
+def watch_estimate(G, ap):
+    """Row 35: the filter was not finite in this tick and was restarted; a filter that is again and again is given up."""
+    restarts = ap[ctl.FILTER_RESTARTS]
+    if restarts >= G[sup.RESTART_COUNT]:
+        ask(G, sup.FAULT_ESTIMATE, sup.ABORT)
+    elif restarts > G[sup.RESTARTS_SEEN]:
+        ask(G, sup.FAULT_ESTIMATE, sup.WARN)
+    G[sup.RESTARTS_SEEN] = restarts
+
+
+@kernel
 def watch_loop(G, t):
     """Rows 24, 25, 27 and 33: the loop's own time, and what the runtime says of recorder and memory."""
     if not t - G[sup.MINUTE] < 60.0:

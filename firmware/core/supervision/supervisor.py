@@ -127,6 +127,7 @@ def guard(P, C, G, frame, est, ap, cmd, t):
     detectors.watch_ascent(G, est, ap, t)
     detectors.watch_attitude(G, est, ap, t)
     detectors.watch_law(P, C, G, ap, t)
+    detectors.watch_estimate(G, ap)
     detectors.watch_loop(G, t)
     watch_limits(P, G, cmd)
     settle(G, t)

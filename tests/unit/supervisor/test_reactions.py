@@ -43,7 +43,8 @@ def test_every_pair_of_rows_at_every_level_over_every_reaction_before():
 
 
 @settings(derandomize=True, max_examples=300, deadline=None)
-@given(st.lists(st.sampled_from(LEVELS), min_size=34, max_size=34), st.lists(st.booleans(), min_size=34, max_size=34),
+@given(st.lists(st.sampled_from(LEVELS), min_size=len(FAULTS), max_size=len(FAULTS)),
+       st.lists(st.booleans(), min_size=len(FAULTS), max_size=len(FAULTS)),
        st.sampled_from(LEVELS))  # fmt: skip
 def test_any_rows_at_once_and_rows_switched_off(levels, on, before):
     asked, enabled = np.array([6.0, *levels]), np.array([1.0, *map(float, on)])

@@ -122,6 +122,7 @@ SCALARS = {
     "no_ascent_s": sup.ASCENT_TIME, "ascent_step_m": sup.ASCENT_STEP,
     "blind_ascent_s": sup.BLIND_TIME, "same_depth_s": sup.SAME_TIME, "same_depth_m": sup.SAME_BAND,
     "leak_samples": sup.LEAK_COUNT, "steep_s": sup.STEEP_TIME, "law_tries": sup.LAW_RUN, "law_rest_s": sup.LAW_REST,
+    "filter_restarts": sup.RESTART_COUNT,
     "voltage_s": sup.VOLTAGE_TIME, "overruns": sup.OVERRUN_RUN, "overrun_share": sup.OVERRUN_SHARE,
     "stall_factor": sup.STALL_FACTOR, "stall_tries": sup.STALL_COUNT, "stall_rest_s": sup.STALL_REST,
     "surface_m": sup.SURFACE_DEPTH, "imu_s": sup.LOST_AFTER, "pressure_s": sup.LOST_AFTER + 1,
