@@ -20,6 +20,7 @@ Volts = Annotated[float, msgspec.Meta(gt=0.0, le=100.0)]
 Angle = Annotated[float, msgspec.Meta(gt=0.0, le=90.0)]
 Count = Annotated[int, msgspec.Meta(ge=1, le=1000)]
 PI = math.pi
+SLOW_PERIOD_S = 0.2  # between two samples of leak and battery, where a board does not report it
 
 
 class Limits(Table):
@@ -95,19 +96,19 @@ def settings_vector(
 ) -> np.ndarray:  # fmt: skip
     """The supervisor's vector G, shape (N_G,), at the start of a flight.
 
-    dt: the loop's step, s; periods: of imu, beacon, wires, s; site_depth (m; 0: unknown) and mission_time (s) are the
-    mission's; restarted: the flight before this one did not end in order.
+    dt: the loop's step, s; periods: of imu, beacon, wires and, where the board reports them, leak and battery, s;
+    site_depth (m; 0: unknown) and mission_time (s) are the mission's; restarted: the flight before this one did not end
+    in order.
     """
     G = np.zeros(sup.N_G)
     G[sup.ENABLED : sup.ENABLED + sup.N_ROWS] = 1.0
     G[sup.TICK] = dt
-    slow = 1.0 / 5.0  # leak and battery
     G[sup.PERIOD : sup.PERIOD + sup.N_SENSORS] = [
         periods["imu"],
         periods["beacon"],
         *2 * [periods["wires"]],
-        slow,
-        slow,
+        periods.get("leak", SLOW_PERIOD_S),
+        periods.get("battery", SLOW_PERIOD_S),
     ]
     lost = [table.imu_s, table.pressure_s, table.wire_s, table.wire_s, math.inf, math.inf]
     G[sup.LOST_AFTER : sup.LOST_AFTER + sup.N_SENSORS] = lost

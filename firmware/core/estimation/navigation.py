@@ -94,13 +94,12 @@ def stop_filter(nav):
 @kernel
 def is_finite(nav):
     """Return whether every number of the filter's state, and every variance, is finite."""
-    for i in range(ctl.NAV_X, ctl.NAV_X + kf.N_XE):
-        if not math.isfinite(nav[i]):
-            return False
-    for i in range(ctl.NAV_COV, ctl.NAV_COV + kf.N_E * kf.N_E, kf.N_E + 1):
-        if not math.isfinite(nav[i]):
-            return False
-    return True
+    finite = True
+    for i in range(kf.N_XE):
+        finite = finite and math.isfinite(nav[ctl.NAV_X + i])
+    for i in range(kf.N_E):
+        finite = finite and math.isfinite(nav[ctl.NAV_COV + i * (kf.N_E + 1)])
+    return finite
 
 
 @kernel

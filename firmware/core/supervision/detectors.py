@@ -40,9 +40,15 @@ def age(G, sensor, t):
 
 
 @kernel
+def outdated(G, sensor, t):
+    """Return whether the sensor's newest fit sample is older than MAX_AGE_PERIODS of its periods."""
+    return age(G, sensor, t) > longest_age(G[sup.PERIOD + sensor], G[sup.TICK])
+
+
+@kernel
 def lost(G, sensor, t):
     """True where nothing fit has come from a sensor for too long."""
-    return age(G, sensor, t) > max(G[sup.LOST_AFTER + sensor], longest_age(G[sup.PERIOD + sensor], G[sup.TICK]))
+    return outdated(G, sensor, t) and age(G, sensor, t) > G[sup.LOST_AFTER + sensor]
 
 
 @kernel
@@ -60,15 +66,14 @@ def watch_sensors(G, frame, t):
     for sensor in range(sup.N_SENSORS):
         verdict = G[sup.SAMPLE_VERDICT + sensor]
         fitted = sensor <= sup.SENSOR_PLUNGER or math.isfinite(G[sup.TAKEN + sensor])
-        old = fitted and age(G, sensor, t) > longest_age(G[sup.PERIOD + sensor], G[sup.TICK])
-        if verdict == sup.MISTIMED or old:
+        if verdict == sup.MISTIMED or (fitted and outdated(G, sensor, t)):
             ask(G, sup.FAULT_SAMPLE_TIME, sup.LOG)
         if verdict == sup.ABSURD:
             ask(G, sup.FAULT_IMPLAUSIBLE, sup.WARN if G[sup.UNFIT + sensor] >= G[sup.UNFIT_RUN] else sup.LOG)
         if verdict == sup.STUCK:
             ask(G, sup.FAULT_STUCK_SENSOR, sup.WARN)
     watch_leak(G, frame)
-    watch_battery(G, frame, t)
+    watch_battery(G, t)
 
 
 @kernel
@@ -86,12 +91,9 @@ def watch_leak(G, frame):
 
 
 @kernel
-def watch_battery(G, frame, t):
-    """Row 23."""
-    start = sup.STARTS[sup.SENSOR_BATTERY]
-    if frame[start + 1] != sup.VALID:
-        return
-    volts = frame[start + 2]
+def watch_battery(G, t):
+    """Row 23: the newest fit voltage, as long as it is fresh; a silence ends an under-voltage, which has to last."""
+    volts = math.nan if outdated(G, sup.SENSOR_BATTERY, t) else G[sup.LAST + sup.PLACES[sup.SENSOR_BATTERY]]
     if lasting(G, sup.T_LOW, volts < G[sup.LOW_VOLTAGE], t) >= G[sup.VOLTAGE_TIME]:
         ask(G, sup.FAULT_VOLTAGE, sup.WARN)
     if lasting(G, sup.T_LEAST, volts < G[sup.LEAST_VOLTAGE], t) >= G[sup.VOLTAGE_TIME]:
@@ -270,7 +272,7 @@ def watch_law(P, C, G, ap, t):
 
 @kernel
 def watch_estimate(G, ap):
-    """Row 35: the filter was not finite in this tick and was restarted; a filter that is again and again is given up."""
+    """Row 35: the filter was not finite and was restarted in this tick; after so many restarts the dive is given up."""
     restarts = ap[ctl.FILTER_RESTARTS]
     if restarts >= G[sup.RESTART_COUNT]:
         ask(G, sup.FAULT_ESTIMATE, sup.ABORT)

@@ -102,6 +102,14 @@ def test_places_in_the_vector_do_not_overlap():
     assert max(singles) == sup.N_G == len(G)
 
 
+def test_leak_and_battery_are_judged_by_the_periods_of_their_devices():
+    slower = settings_vector(
+        Limits(), SupervisorTable(), dt=0.02, periods={**PERIODS, "leak": 1.0, "battery": 0.5}, site_depth=6.0,
+        mission_time=5.0,
+    )  # fmt: skip
+    assert list(slower[sup.PERIOD + sup.SENSOR_LEAK : sup.PERIOD + sup.N_SENSORS]) == [1.0, 0.5]
+
+
 def test_what_the_mission_and_the_flight_before_say_is_there():
     G = vector()
     assert G[sup.MISSION_TIME] == 600.0

@@ -13,7 +13,7 @@ from firmware.core.maths.rotations import euler_from_quaternion
 from firmware.core.vehicle.layout import CG_X, CG_Y, X_ACT, X_NU, X_QUAT
 from firmware.faults import Reaction
 from firmware.model.supervisor_settings import Limits
-from tools.study.faults.cases import ALL, IN_WATER, MOVING, UNDER_WAY, Case
+from tools.study.faults.cases import IN_WATER, MOVING, UNDER_WAY, Case
 from tools.study.faults.scene import Scene, Setting
 
 NOTHING, LOG, WARN, HOLD, ABORT, OOB, HW = Reaction
