@@ -86,6 +86,7 @@ def test_a_law_that_answers_again_starts_afresh():
         man.ap[ctl.LAW_STATUS] = 0.0
         man.step()
         assert man.G[sup.LAW_FAILED] == 0.0
+    assert man.seconds(5.1) == NOTHING
     man.ap[ctl.LAW_STATUS] = 1.0
     man.pilot.C[ctl.CONTROLLER] = ctl.PID  # the status is an old one
     assert man.step() == NOTHING

@@ -129,12 +129,12 @@ SCALARS = {
     "deep_s": sup.DEEP_TIME, "at_risk_s": sup.RISK_TIME,
     "no_ascent_s": sup.ASCENT_TIME, "ascent_step_m": sup.ASCENT_STEP,
     "blind_ascent_s": sup.BLIND_TIME, "same_depth_s": sup.SAME_TIME, "same_depth_m": sup.SAME_BAND,
-    "leak_samples": sup.LEAK_COUNT, "steep_s": sup.STEEP_TIME, "law_tries": sup.LAW_RUN, "law_rest_s": sup.LAW_REST,
+    "leak_samples": sup.LEAK_COUNT, "steep_s": sup.STEEP_TIME, "law_tries": sup.LAW_RUN,
     "filter_restarts": sup.RESTART_COUNT,
     "voltage_s": sup.VOLTAGE_TIME, "overruns": sup.OVERRUN_RUN, "overrun_share": sup.OVERRUN_SHARE,
     "stall_factor": sup.STALL_FACTOR, "stall_tries": sup.STALL_COUNT, "stall_rest_s": sup.STALL_REST,
     "surface_m": sup.SURFACE_DEPTH, "imu_s": sup.LOST_AFTER, "pressure_s": sup.LOST_AFTER + 1,
-    "wire_s": sup.LOST_AFTER + 2,
+    "wire_s": sup.LOST_AFTER + 2, "law_rest_s": sup.CLEAR_AFTER + sup.FAULT_NO_ANSWER * sup.N_LEVELS + sup.LEVEL_1,
 }  # fmt: skip
 ANGLES = {"disagree_pitch_deg": sup.DISAGREE_PITCH, "steep_deg": sup.STEEP_PITCH, "steep_margin_deg": sup.STEEP_MARGIN,
           "roll_deg": sup.STEEP_ROLL}  # fmt: skip
