@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from firmware.core.layouts import control_layout as ctl
@@ -15,6 +15,7 @@ from firmware.core.layouts import supervisor_layout as sup
 from firmware.core.supervision.supervisor import highest
 from firmware.faults import ABORT, FAULT_TABLE, FAULTS, NEVER, WARN, Reaction, markdown_rows
 from hal.ports import SLOTS, Validity
+from tests.support.examples import examples
 from tests.support.watchman import BALLAST_RANGE, DT, SLIDER_RANGE, Watchman
 from tools.study.faults.flights import flown
 
@@ -44,7 +45,7 @@ def test_every_pair_of_rows_at_every_level_over_every_reaction_before():
         asked[first] = asked[second] = 0.0
 
 
-@settings(derandomize=True, max_examples=300, deadline=None)
+@examples(300)
 @given(st.lists(st.sampled_from(LEVELS), min_size=len(FAULTS), max_size=len(FAULTS)),
        st.lists(st.booleans(), min_size=len(FAULTS), max_size=len(FAULTS)),
        st.sampled_from(LEVELS))  # fmt: skip
@@ -146,7 +147,7 @@ def test_what_the_fault_campaign_expects_of_a_row_is_what_is_documented():
         assert case.expected.name in documented()[case.row][3], case
 
 
-@settings(derandomize=True, max_examples=60, deadline=None)
+@examples(60)
 @given(st.lists(st.tuples(st.sampled_from(LEVELS), st.lists(st.floats(width=64), min_size=3, max_size=3)),
                 min_size=2, max_size=40))  # fmt: skip
 def test_whatever_is_wanted_and_asked_for_what_is_sent_is_finite_within_range_and_rate(story):
