@@ -34,19 +34,20 @@ def highest(asked, enabled, before):
 
 
 @kernel
-def keep_requests(G, t):
-    """Let a reaction below ABORT stand for its clear time (s) after its condition has ended.
+def standing(G, row, t):
+    """Return what a row requests: below ABORT a reaction stands for its clear time (s) after its condition has ended.
 
     Until that time a milder request of the same row does not replace it. From ABORT on `highest` latches a reaction.
     """
-    for row in range(1, sup.N_ROWS):
-        asked = G[sup.ASKED + row]
-        standing = G[sup.KEPT + row] if t < G[sup.KEPT_UNTIL + row] else sup.NOTHING
-        if asked >= sup.ABORT:
-            continue
-        if asked > sup.NOTHING and asked >= standing:
-            G[sup.KEPT + row], G[sup.KEPT_UNTIL + row] = asked, t + G[sup.CLEARS + row]
-        G[sup.ASKED + row] = max(asked, standing)
+    asked, kept = G[sup.ASKED + row], t < G[sup.KEPT_UNTIL + row]
+    if asked == sup.NOTHING and not kept:
+        return sup.NOTHING
+    if asked >= sup.ABORT:
+        return asked
+    if kept and asked < G[sup.KEPT + row]:
+        return G[sup.KEPT + row]
+    G[sup.KEPT + row], G[sup.KEPT_UNTIL + row] = asked, t + G[sup.CLEARS + row]
+    return asked
 
 
 @kernel
@@ -60,6 +61,7 @@ def settle(G, t):
     """This tick's reaction and who asked for it; what each row asked for first and at most."""
     G[sup.CHANGED] = 0.0
     for row in range(1, sup.N_ROWS):
+        G[sup.ASKED + row] = standing(G, row, t)
         asked = G[sup.ASKED + row] * G[sup.ENABLED + row]
         if asked > G[sup.WORST + row]:
             if G[sup.FIRST + row] < 0.0:
@@ -152,7 +154,6 @@ def guard(P, C, G, frame, est, ap, cmd, t):
     detectors.watch_estimate(G, ap)
     detectors.watch_loop(G, t)
     watch_limits(P, G, cmd)
-    keep_requests(G, t)
     settle(G, t)
     act(P, G, cmd, ap, t)
     watch_surface(P, G, est, ap, scale, t)
