@@ -8,7 +8,7 @@ DEMO_STAMP := $(VENV)/.installed-demo
 # Python keeps the bytecode of what it reads: the tests start some hundred programs.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: setup demo picture test check lint types contract benchmark deploy rollback arm64 clean
+.PHONY: setup demo picture test explore check lint types contract benchmark deploy rollback arm64 clean
 
 # Kernels are compiled here, with a word about it, and again only when they change.
 setup: $(STAMP)
@@ -43,6 +43,11 @@ picture: demo
 test: setup
 	@$(BIN)/python -m tests.support.precompile
 	$(BIN)/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder
+
+# Property tests with ten times the examples, others in every run; what fails is printed as a line to reproduce it by.
+explore: setup
+	@$(BIN)/python -m tests.support.precompile
+	$(BIN)/python -m pytest -n 4 --dist loadfile -m hypothesis --hypothesis-profile explore
 
 check: setup lint types contract test
 

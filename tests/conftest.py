@@ -11,6 +11,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+from tests.support.examples import register_profiles
+
+# Property tests: the same examples in every run; `make explore` chooses the other profile (tests/support/examples.py).
+register_profiles()
+settings.load_profile("ci")
 
 # Tests fill the cores by processes. Before NumPy and Numba are loaded: in each process, threads beyond the first
 # otherwise keep a core busy waiting for each other. What runs on several threads is a test of its own (test_threads).

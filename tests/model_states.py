@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-from hypothesis import settings
 from hypothesis import strategies as st
 
 from firmware.core.maths.rotations import quaternion_from_euler
@@ -20,9 +19,6 @@ LOW, HIGH, RATE, TAU = (
     np.array([P[getattr(layout, f"{name.upper()}_{field}")] for name in ACTUATORS])
     for field in ("MIN", "MAX", "RATE", "TAU")
 )
-# The same examples on every run; a kernel may have to be compiled inside the first.
-repeatable = settings(deadline=None, derandomize=True, max_examples=100)
-
 angles = st.floats(-math.pi, math.pi)
 pitches = st.floats(-1.5, 1.5)
 # to the nanometre: below 1e-150 m/s squares underflow, and with them the flow's direction

@@ -10,6 +10,7 @@ import msgspec
 import numpy as np
 
 from firmware.core.layouts import supervisor_layout as sup
+from firmware.faults import FAULT_TABLE
 from hal.ports import STALL_REST_S, STALL_TRIES
 from hal.strict import Table
 
@@ -65,6 +66,7 @@ class SupervisorTable(Table):
     steep_s: Short = 1.8
     law_tries: Count = 3
     law_rest_s: Seconds = 5.0
+    filter_restarts: Count = 3
     voltage_s: Seconds = 9.0
     overruns: Count = 10
     overrun_share: Annotated[float, msgspec.Meta(gt=0.0, le=1.0)] = 0.01
@@ -111,6 +113,8 @@ def settings_vector(
     ranges = np.array(_IMU + _OTHERS)
     G[sup.LOW : sup.LOW + sup.N_VALUES], G[sup.HIGH : sup.HIGH + sup.N_VALUES] = ranges.T
     G[sup.JUMP : sup.JUMP + sup.N_VALUES], G[sup.JUMP_RATE : sup.JUMP_RATE + sup.N_VALUES] = _JUMPS, _JUMP_RATES
+    for place, (reaction, clear_after) in _levels(table).items():
+        G[sup.REACTION + place], G[sup.CLEAR_AFTER + place] = reaction, clear_after
     for place, value in _scalars(limits, table, dt, site_depth, mission_time).items():
         G[place] = value
     G[sup.RESTARTED] = float(restarted)
@@ -127,6 +131,18 @@ _UNSET = (
     (sup.RAW, sup.N_VALUES), (sup.SINCE, sup.N_TIMERS), (sup.SLOW_TIME, 1), (sup.BAND_MARK, 1), (sup.MINUTE, 1),
     (sup.LEAK_SEEN, 1), (sup.OOB_SINCE, 1), (sup.MARK, 2), (sup.RING, 4 * sup.N_RING), (sup.PUMP_SINCE, 1),
 )  # fmt: skip
+
+
+def _levels(table: SupervisorTable) -> dict[int, tuple[float, float]]:
+    """Reaction and clear time (s) of each level of the fault table, by its place."""
+    return {
+        row * sup.N_LEVELS + number: (
+            float(level.reaction),
+            float(getattr(table, level.clear_after) if isinstance(level.clear_after, str) else level.clear_after),
+        )
+        for row, fault in FAULT_TABLE.items()
+        for number, level in enumerate(fault.levels)
+    }
 
 
 def _scalars(
@@ -146,7 +162,7 @@ def _scalars(
         sup.SAME_TIME: table.same_depth_s, sup.SAME_BAND: table.same_depth_m, sup.LEAK_COUNT: table.leak_samples,
         sup.STEEP_PITCH: math.radians(table.steep_deg), sup.STEEP_MARGIN: math.radians(table.steep_margin_deg),
         sup.STEEP_ROLL: math.radians(table.roll_deg), sup.STEEP_TIME: table.steep_s,
-        sup.LAW_RUN: table.law_tries, sup.LAW_REST: table.law_rest_s,
+        sup.LAW_RUN: table.law_tries, sup.RESTART_COUNT: table.filter_restarts,
         sup.LOW_VOLTAGE: limits.low_voltage or 0.0, sup.LEAST_VOLTAGE: limits.least_voltage or 0.0,
         sup.VOLTAGE_TIME: table.voltage_s, sup.OVERRUN_RUN: table.overruns, sup.OVERRUN_SHARE: table.overrun_share,
         sup.MISSION_TIME: mission_time, sup.STALL_FACTOR: table.stall_factor, sup.STALL_COUNT: table.stall_tries,

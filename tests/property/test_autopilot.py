@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from firmware.autopilot import Autopilot, configuration
@@ -12,6 +12,7 @@ from firmware.core.vehicle import layout
 from firmware.guidance.mission import decode_mission
 from firmware.model.library import shipped
 from hal.ports import BEACON, FRAME_SIZE, IMU, PLUNGER_WIRE, SLIDER_WIRE
+from tests.support.examples import examples
 from tools.data.sources import load_mission, load_vehicle
 
 VEHICLE = load_vehicle("roughie")
@@ -45,7 +46,7 @@ sample = st.one_of(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(width=6
 
 
 @pytest.mark.parametrize("controller", ["pid", "law", "hybrid", "law+"])
-@settings(deadline=None, derandomize=True, max_examples=60)
+@examples(60)
 @given(st.lists(st.lists(sample, min_size=FRAME_SIZE, max_size=FRAME_SIZE), min_size=3, max_size=12))
 def test_absurd_samples_never_reach_an_actuator(controller, frames):
     pilot = autopilot()

@@ -4,11 +4,12 @@ import itertools
 import random
 
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from hal.protocols import modbus, vn100
 from hal.protocols.registers import CODES, from_registers, to_registers
+from tests.support.examples import examples
 from tools.study.faults.damaged_streams import codecs, run_codec
 
 CODECS = {codec.name: codec for codec in codecs()}
@@ -30,7 +31,7 @@ DOUBLED_DOLLAR = b"$" + CODECS["vn100"].frames[0]  # a line behind a stray byte,
 
 @given(streams())
 @example((CODECS["vn100"], DOUBLED_DOLLAR, [0, len(DOUBLED_DOLLAR) - 2, len(DOUBLED_DOLLAR)]))
-@settings(max_examples=200, deadline=None)
+@examples(200)
 def test_chunks_do_not_matter(case):
     codec, data, cuts = case
     whole, cut = codec.make(), codec.make()
@@ -41,7 +42,7 @@ def test_chunks_do_not_matter(case):
 
 
 @given(streams(), st.binary(max_size=2000))
-@settings(max_examples=100, deadline=None)
+@examples()
 def test_what_is_kept_is_less_than_a_longest_frame(case, noise):
     codec, data, _ = case
     decoder = codec.make()
@@ -62,7 +63,7 @@ floats = st.floats(width=32, allow_nan=False, allow_infinity=False)
 
 
 @given(st.integers(1, 0x7FFF), st.data())
-@settings(max_examples=100, deadline=None)
+@examples()
 def test_vn100_binary_round_trip(mask, data):
     codes = [code for bit, (_, code) in enumerate(vn100.FIELDS) if mask >> bit & 1]
     values = []
@@ -84,7 +85,7 @@ def test_registers_round_trip(kind, data):
 
 
 @given(st.integers(1, 247), st.integers(0, 0xFFFF - 20), st.lists(st.integers(0, 0xFFFF), min_size=1, max_size=20))
-@settings(max_examples=100, deadline=None)
+@examples()
 def test_modbus_requests_are_read_back(device, address, values):
     twin = modbus.RtuDecoder(requests=True)
     requests = [

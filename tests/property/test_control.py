@@ -4,18 +4,18 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from firmware.core.control.control import pid, reference_step, roll_law
 from firmware.core.vehicle.actuators import limited
+from tests.support.examples import examples
 
-repeatable = settings(deadline=None, derandomize=True, max_examples=200)
 anything = st.floats(allow_nan=True, allow_infinity=True, width=64)
 finite = st.floats(-1e6, 1e6)
 
 
-@repeatable
+@examples(200)
 @given(st.floats(0.05, 2.0), st.floats(0.3, 3.0), st.floats(-5.0, 5.0))
 def test_reference_filter_is_the_second_order_filter(wn, zeta, target):
     """L-ref: wn^2 / (s^2 + 2 zeta wn s + wn^2), against SciPy's step response."""
@@ -31,7 +31,7 @@ def test_reference_filter_is_the_second_order_filter(wn, zeta, target):
     assert np.array(got) == pytest.approx(target * expected, abs=2e-6 * max(1.0, abs(target)))
 
 
-@repeatable
+@examples(200)
 @given(anything, st.floats(-1.0, 1.0), st.floats(0.001, 5.0))
 def test_a_command_never_leaves_its_range_nor_outruns_its_rate(wanted, last, rate):
     sent = limited(wanted, last, -1.0, 1.0, rate, 0.02)
@@ -39,7 +39,7 @@ def test_a_command_never_leaves_its_range_nor_outruns_its_rate(wanted, last, rat
     assert abs(sent - last) <= rate * 0.02 * (1 + 1e-12)
 
 
-@repeatable
+@examples(200)
 @given(st.lists(anything, min_size=1, max_size=50))
 def test_no_sequence_of_wishes_gets_past_the_limits(wishes):
     last = 0.0
@@ -55,7 +55,7 @@ def test_what_is_not_finite_keeps_the_last_command(wanted):
     assert limited(wanted, 0.03, -0.06, 0.06, 0.02, 0.02) == 0.03
 
 
-@repeatable
+@examples(200)
 @given(finite, finite, st.floats(-0.2, 0.2), finite)
 def test_pid_stays_in_range_and_does_not_wind_up(error, error_rate, integral, feedforward):
     out, new_integral = pid(error, error_rate, integral, feedforward, 1.0, 0.5, 0.1, -0.2, 0.2, 0.02)
@@ -82,7 +82,7 @@ def test_pid_removes_a_constant_load():
     assert x == pytest.approx(1.0, abs=1e-6)
 
 
-@repeatable
+@examples(200)
 @given(st.floats(-1, 1), st.floats(-1, 1), st.floats(-1, 1), st.floats(-1, 1))
 def test_roll_law_is_equation_37(ref, ref_rate, roll, roll_rate):
     assert roll_law(ref, ref_rate, roll, roll_rate, 0.3, 0.2) == pytest.approx(

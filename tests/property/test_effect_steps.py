@@ -1,11 +1,14 @@
 """The plant with effects: without any it is the plain plant, and effects go together in any number and order."""
 
 import numpy as np
+import pytest
 from effect_flights import FLOWN
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
-from model_states import actuators, repeatable, states, vehicles
+from model_states import P as VEHICLE
+from model_states import actuators, states, vehicles
 
+from firmware.core.maths.rotations import quaternion_from_euler
 from firmware.core.maths.steps import RK4
 from firmware.core.vehicle import layout
 from sim_backend.core import layout as wl
@@ -14,6 +17,7 @@ from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.actuation import backlash
 from sim_backend.core.effects.catalogue import catalogue
 from sim_backend.core.plant import plant_step
+from tests.support.examples import examples
 
 NO_WAVES = np.zeros((0, wl.N_WAVE))
 STILL = np.zeros(wl.N_ENV)
@@ -44,7 +48,7 @@ def extended(x):
     return whole
 
 
-@settings(repeatable)
+@examples()
 @given(vehicles(), states(), actuators, st.lists(st.floats(-0.05, 0.05), min_size=6, max_size=6))
 def test_without_effects_a_step_is_the_plain_step(vehicle, x, command, acc):
     P, F, acc = np.zeros(layout.N_P), np.zeros(ef.N_F), np.array(acc)
@@ -57,7 +61,7 @@ def test_without_effects_a_step_is_the_plain_step(vehicle, x, command, acc):
     assert (np.abs(plain - other)[: layout.N_X] <= 1e-14 * size).all()
 
 
-@settings(repeatable)
+@examples()
 @given(chosen(), st.randoms(use_true_random=False))
 def test_effects_in_any_order_are_the_same_vector(effects, random):
     order = list(effects)
@@ -65,33 +69,51 @@ def test_effects_in_any_order_are_the_same_vector(effects, random):
     np.testing.assert_array_equal(Plain(effects).F, Plain({label: effects[label] for label in order}).F)
 
 
-@settings(repeatable)
+@examples()
 @given(chosen())
 def test_effects_together_are_the_sum_of_each_alone(effects):
     alone = sum((Plain({label: values}).F for label, values in effects.items()), np.zeros(ef.N_F))
     np.testing.assert_array_equal(Plain(effects).F, alone)
 
 
-@settings(repeatable, max_examples=60)
-@given(chosen(), states(), actuators)
-def test_any_effects_within_their_ranges_leave_a_vehicle_a_vehicle(effects, x, command):
-    """For a second: numbers stay numbers, the attitude a rotation, plays within their widths."""
-    from model_states import P as vehicle
-
+def after_a_second(effects, x, command) -> tuple[np.ndarray, np.ndarray]:
+    """Return the effects' vector, and the extended state a second after x, slowed to 0.6 m/s or rad/s at most."""
     F, P = Plain(effects).F, np.zeros(layout.N_P)
-    effective_parameters(vehicle, F, P)
+    effective_parameters(VEHICLE, F, P)
     state, work = extended(x), np.zeros((wl.N_WORK, wl.WORK_WIDTH))
     speed = max(0.6, float(np.abs(state[7:13]).max()))
     state[7:13] *= 0.6 / speed
     for k in range(100):
         effect_step(RK4, P, F, state, 0, *command, 0.01 * k, np.zeros(6), 0.0, np.zeros(3), 0.01, work)
+    return F, state
+
+
+@pytest.mark.xfail(strict=True, reason="the moment acts in the flow's axes: a flow from astern makes it drive the turn")
+def test_damping_across_the_flow_damps_whichever_way_the_flow_comes():
+    x = np.zeros(layout.N_X)
+    x[3:7] = quaternion_from_euler(3.0, 0.0, 0.0)  # on its back
+    x[12] = -0.6
+    _, state = after_a_second({"yaw_damping": {"scale": 0.0, "across": 2.0}}, x, (0.0, 0.0, 0.0))
+    assert abs(state[12]) < 0.6
+
+
+@examples(60)
+@given(chosen(), states(), actuators)
+def test_any_effects_within_their_ranges_leave_a_vehicle_a_vehicle(effects, x, command):
+    """For a second: numbers stay numbers, the attitude a rotation, plays within their widths.
+
+    Damping across the flow is left out: see the next test.
+    """
+    for label in ("pitch_damping", "yaw_damping"):
+        effects = {**effects, label: {**effects[label], "across": 0.0}} if label in effects else effects
+    F, state = after_a_second(effects, x, command)
     assert np.isfinite(state).all()
     assert abs(np.linalg.norm(state[3:7]) - 1.0) < 1e-12
     for place, gear, width in ((13, ef.X_GEAR_SERVO, F[ef.SERVO_PLAY]), (14, ef.X_GEAR_SLIDER, F[ef.SLIDER_PLAY])):
         assert abs(state[place] - state[gear]) <= 0.5 * width + 1e-12
 
 
-@settings(repeatable)
+@examples()
 @given(st.floats(0.001, 1.0), st.lists(st.floats(-2.0, 2.0), min_size=1, max_size=30))
 def test_play_never_lets_go_and_never_moves_more_than_its_leader(width, way):
     follower, last = 0.0, 0.0

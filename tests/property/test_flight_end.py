@@ -2,13 +2,13 @@
 plant is at the surface five minutes later. By the plant's truth, never by what the flight says of itself."""
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
-from model_states import repeatable
 
 from firmware.core.layouts import supervisor_layout as sup
 from firmware.core.vehicle.layout import NET_MASS
 from firmware.faults import Reaction
+from tests.support.examples import examples
 from tools.data.sources import load_vehicle
 from tools.flight.compose import build_flight
 from tools.study.faults.cases import Case
@@ -46,7 +46,7 @@ def depth_after(mission: str, case: Case, tick: int, sigmas: float) -> float:
     return scene.left
 
 
-@settings(repeatable, max_examples=250)
+@examples(250)
 @given(
     mission=st.sampled_from(sorted(MISSIONS)),
     case=st.sampled_from(ABORTS),

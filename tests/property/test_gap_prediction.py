@@ -1,10 +1,11 @@
 """A prediction never looks ahead: measurements behind a window's first 2 s change nothing in that window."""
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from support.flights import World, case_of, fly
 
+from tests.support.examples import examples
 from tools.data.runs.run import Run
 from tools.inference.channels import ROUGHIE_MEASURES
 from tools.inference.model import nominal_model
@@ -19,7 +20,7 @@ def predicted(run: Run, mocap: bool) -> np.ndarray:
     return predict(case, nominal_model(case), case.runs)[0]
 
 
-@settings(deadline=None, derandomize=True, max_examples=40)
+@examples(40)
 @given(
     mocap=st.booleans(),
     number=st.integers(0, 2),
@@ -43,7 +44,7 @@ def test_what_comes_after_the_start_changes_nothing(mocap, number, later, blank,
     assert np.isfinite(spoiled).all()
 
 
-@settings(deadline=None, derandomize=True, max_examples=15)
+@examples(15)
 @given(mocap=st.booleans(), count=st.integers(20, 599))
 def test_a_run_cut_short_is_predicted_alike_as_far_as_it_goes(mocap, count):
     """From the first window's 2 s on: those rows may know of each other."""

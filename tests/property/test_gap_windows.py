@@ -3,9 +3,10 @@
 import itertools
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.support.examples import examples
 from tools.inference.channels import ROUGHIE_MEASURES
 
 START, WINDOW = ROUGHIE_MEASURES.look_in, ROUGHIE_MEASURES.window
@@ -17,7 +18,7 @@ clocks = st.builds(
 )
 
 
-@settings(deadline=None, derandomize=True)
+@examples()
 @given(clocks)
 def test_windows_cut_the_run(t):
     found = ROUGHIE_MEASURES.windows(t)
@@ -34,7 +35,7 @@ def test_windows_cut_the_run(t):
         assert (since[window.start - window.first :] > begin + START - 1e-5).all()
 
 
-@settings(deadline=None, derandomize=True)
+@examples()
 @given(st.integers(1, 1500), st.sampled_from([1.0, 5.0, 10.0, 20.0, 50.0]))
 def test_whole_windows_at_an_even_rate_are_counted_by_their_samples(count, rate):
     scored = [window for window in ROUGHIE_MEASURES.windows(np.arange(count) / rate) if window.scored]

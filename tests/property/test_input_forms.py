@@ -6,13 +6,13 @@ import re
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from independent.make_reference import VEHICLE
 from independent.nominal import DOWN, GRAVITY, Glider, body_to_ned, euler_angle_rates, skew
 from law_flights import down, form_at, output_accelerations, outputs, plant_rates
 from law_states import actuator_speeds, flying, trimmed_vehicles
-from model_states import P, derivative, repeatable, state
+from model_states import P, derivative, state
 
 from firmware.core.control import input_forms
 from firmware.core.control.input_forms import exact_form, paper_form
@@ -20,6 +20,7 @@ from firmware.core.control.law import OK, STEEP, solve_inputs
 from firmware.core.control.law_plus import on_outputs
 from firmware.core.jit import PACKAGES_DIR
 from firmware.core.vehicle import layout
+from tests.support.examples import examples
 from tools.measure.figures import law
 
 
@@ -35,7 +36,7 @@ def scaled_glider(factors) -> tuple[Glider, np.ndarray]:
     return glider, vehicle
 
 
-@settings(repeatable, max_examples=200)
+@examples(200)
 @given(
     st.tuples(*[st.floats(0.8, 1.25)] * 7), flying(st.floats(-1.4, 1.4)), actuator_speeds,
     st.floats(-0.5, 0.5), st.floats(-1.0, 1.0),
@@ -75,7 +76,7 @@ def input_angles(x: np.ndarray) -> tuple[float, float, float]:
     return math.atan2(k[1], k[2]), math.asin(max(-1.0, min(1.0, -k[0]))), yaw
 
 
-@repeatable
+@examples()
 @given(trimmed_vehicles(), flying(st.floats(-1.57, 1.57)), actuator_speeds, st.booleans())
 def test_the_slider_loses_its_grip_at_the_poles_alone(vehicle, x, speeds, paper):
     """det G = -m_s g^2 ctheta det N with N positive definite: at every roll, phi = +-90 deg included."""
@@ -89,7 +90,7 @@ def test_the_slider_loses_its_grip_at_the_poles_alone(vehicle, x, speeds, paper)
     assert status == (OK if cos_pitch >= 0.1 else STEEP)
 
 
-@repeatable
+@examples()
 @given(flying(), actuator_speeds, st.tuples(*[st.floats(-0.1, 0.1)] * 6))
 def test_accelerations_beside_the_models_add_to_the_outputs(x, speeds, acc):
     command = x[layout.X_ACT :]

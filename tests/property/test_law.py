@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from law_flights import (
     SLIDER,
@@ -25,11 +25,12 @@ from law_flights import (
     worst,
 )
 from law_states import SPREAD, actuator_speeds, closed_loops, flying, forward, trimmed_vehicles, unit
-from model_states import HIGH, LOW, TAU, P, repeatable, state
+from model_states import HIGH, LOW, TAU, P, state
 
 from firmware.core.control.law import k2_to_cover
 from firmware.core.vehicle import layout
 from tests.support.equations import k2_by_29
+from tests.support.examples import examples
 
 
 def settle(law: Law, x, references, speeds=STANDING) -> None:
@@ -43,7 +44,7 @@ def settle(law: Law, x, references, speeds=STANDING) -> None:
         assume(False)
 
 
-@settings(repeatable, max_examples=300)
+@examples(300)
 @given(st.data(), trimmed_vehicles(), st.sampled_from(["joint", "present"]), st.sampled_from([None, 0.1, 0.5]))
 def test_V_falls_as_the_law_says_with_both_inputs_applied(data, vehicle, counting_on, share):
     """V_dot = -k3 s^2 - k2 |g| |s| sat(|s|/eps) sat(|g|/eps) for each axis, V_t of (36) for both, to rounding.
@@ -66,7 +67,7 @@ def test_V_falls_as_the_law_says_with_both_inputs_applied(data, vehicle, countin
     assert found.sum() <= 1e-11 * size.sum()
 
 
-@repeatable
+@examples()
 @given(st.data(), trimmed_vehicles())
 def test_jointly_or_by_present_positions_settled_actuators_are_the_same(data, vehicle):
     x, speeds, references, pitch, depth = data.draw(closed_loops(vehicle, flying(flows=forward)))
@@ -75,7 +76,7 @@ def test_jointly_or_by_present_positions_settled_actuators_are_the_same(data, ve
     np.testing.assert_allclose(wanted, x[SLIDER:], rtol=1e-11, atol=1e-11)
 
 
-@settings(repeatable, max_examples=300)
+@examples(300)
 @given(flying(), st.floats(-1.0, 1.0), st.floats(-0.3, 0.3), st.floats(0.05, 2.0), st.floats(0.001, 0.1), unit)
 def test_k2_of_29_is_where_the_sliding_term_alone_begins_to_win(x, error_rate, acc, k1, k2, error):
     """(28) with the plant's pitch: with k2 above (29) V falls; below, it rises where s has the wrong sign."""
@@ -106,7 +107,7 @@ def uncertain(draw) -> np.ndarray:
     return without_stops(P + draw(st.sampled_from([1.0, 1.0, 0.5])) * SPREAD * signs)
 
 
-@settings(repeatable, max_examples=300)
+@examples(300)
 @given(uncertain(), flying(), actuator_speeds)
 def test_no_vehicle_in_the_box_is_further_off_than_the_bound(true, x, speeds):
     law = Law(without_stops(P), Gains(1, 0, 1, 1), Gains(1, 0, 1, 1))
@@ -148,7 +149,7 @@ def test_a_box_too_wide_for_a_mass_matrix_has_no_bound():
 gentle = flying(st.floats(-1.0, 1.0), forward, st.tuples(*[st.floats(-0.3, 0.3)] * 3))
 
 
-@settings(repeatable, max_examples=300)
+@examples(300)
 @given(st.data(), uncertain(), st.floats(0.0, 0.1), st.floats(0.0, 0.1))
 def test_a_k2_that_covers_keeps_V_falling_in_every_vehicle_of_the_box(data, true, d_pitch, d_depth):
     """Outside the layer, V_dot <= -k3 s^2 with the worst disturbance within d and the law on the believed vehicle."""

@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from law_flights import SLIDER, down, form_at
 from law_states import flying, gains, unit
-from model_states import HIGH, LOW, RATE, TAU, P, repeatable, state
+from model_states import HIGH, LOW, RATE, TAU, P, state
 
 from firmware.core.control.input_forms import exact_form, paper_form
 from firmware.core.control.law import (
@@ -24,9 +24,10 @@ from firmware.core.control.law_plus import reach
 from firmware.core.vehicle import layout
 from firmware.core.vehicle.actuators import actuator_rate, limited
 from tests.support.equations import k2_by_29
+from tests.support.examples import examples
 
 
-@repeatable
+@examples()
 @given(flying(), st.floats(-0.5, 0.5), st.floats(-0.2, 0.2))
 def test_each_axis_counts_on_the_other_only_within_bounds(x, demand_t, demand_z):
     _, _, g_ts, g_tb, g_zs, g_zb = form_at(P, x)
@@ -46,7 +47,7 @@ def test_each_axis_counts_on_the_other_only_within_bounds(x, demand_t, demand_z)
         assert (u_s, u_b) == (joint_s, joint_b)
 
 
-@repeatable
+@examples()
 @given(unit, unit, st.floats(0.0, 3.0), st.sampled_from([0, 1, 2]))
 def test_no_command_takes_an_actuator_out_of_reach(where, command, horizon, which):
     low, high, rate, tau = LOW[which], HIGH[which], RATE[which], TAU[which]
@@ -70,7 +71,7 @@ plausible = st.floats(-2.0, 2.0)
 number = st.one_of(plausible, plausible, plausible, plausible, anything)
 
 
-@settings(repeatable, max_examples=500)
+@examples(500)
 @given(
     st.lists(number, min_size=15, max_size=15), st.lists(number, min_size=6, max_size=6),
     st.lists(number, min_size=10, max_size=10), st.tuples(*[number] * 4), st.floats(LOW[1], HIGH[1]),
@@ -136,7 +137,7 @@ def test_no_grip_at_all_is_no_division_by_zero():
     assert solve_inputs(0.0, 0.0, 0.0, 0.4, 0.1, 0.1, 0.9, *SOUND[-4:]) == (0.0, 0.0, STEEP)
 
 
-@repeatable
+@examples()
 @given(unit, unit, st.floats(-0.3, 0.3), unit, gains(0.1))
 def test_demand_is_30_and_32(error, error_rate, acc, f, gain):
     """As printed, sat written out: u = (1/g)(-k1 e_d + x_dd_ref - f - k3 s) - k2 sat(s/eps) sat(g/eps)."""

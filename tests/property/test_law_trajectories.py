@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
-from hypothesis import Phase, given, settings
+from hypothesis import Phase, given
 from hypothesis import strategies as st
 from law_flights import (
     SLIDER,
@@ -26,7 +26,7 @@ from law_flights import (
     without_stops,
     worst,
 )
-from model_states import HIGH, LOW, RATE, VEHICLE_TEXT, P, repeatable, state
+from model_states import HIGH, LOW, RATE, VEHICLE_TEXT, P, state
 
 from firmware.core.control.control import roll_law
 from firmware.core.control.input_forms import exact_form, paper_form
@@ -37,13 +37,14 @@ from firmware.core.vehicle import layout
 from firmware.core.vehicle.actuators import actuator_rates, limited
 from firmware.model.estimator_settings import parameter_sigma
 from firmware.model.vehicle import decode_vehicle
+from tests.support.examples import examples
 
 pytestmark = pytest.mark.computes(seconds=30)
 
 SIGMA = parameter_sigma(P, decode_vehicle(VEHICLE_TEXT, "roughie").uncertainty)
 STEP = 0.004  # s, of the flights with ideal actuators
 HELD = 2e-4  # rad/s, m/s: what s may do beside the equations while the actuators are held for a step
-few = settings(repeatable, max_examples=12, phases=[Phase.generate])
+few = examples(12, phases=[Phase.generate])
 
 
 # --- ideal actuators: V falls outside the layer, the layer is reached and kept ----------------------------------------

@@ -3,15 +3,16 @@
 import math
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from independent.flights import fly
 from independent.make_reference import VEHICLE
 from independent.nominal import Glider
-from model_states import P, actuators, angles, currents, derivative, repeatable, state, states
+from model_states import P, actuators, angles, currents, derivative, state, states
 
 from firmware.core.vehicle import layout
 from firmware.core.vehicle.flight import nominal_run, nominal_step
+from tests.support.examples import examples
 
 STEP = 0.01
 
@@ -31,7 +32,7 @@ def fly_in_gust(x: np.ndarray, command, strength: np.ndarray, steps: int) -> tup
     return x, way
 
 
-@repeatable
+@examples()
 @given(states(), actuators, currents)
 def test_derivative_differs_by_the_waters_velocity_alone(x, command, water):
     still, moving = derivative(x, command), derivative(x, command, water)
@@ -39,7 +40,7 @@ def test_derivative_differs_by_the_waters_velocity_alone(x, command, water):
     np.testing.assert_array_equal(moving[3:], still[3:])
 
 
-@settings(repeatable, max_examples=20)
+@examples(20)
 @given(states(), st.lists(actuators, min_size=1, max_size=4), currents)
 def test_flight_in_uniformly_moving_water_is_carried_along(x, commands, water):
     still, moving, work = x.copy(), x.copy(), np.zeros((5, layout.N_X))
@@ -50,7 +51,7 @@ def test_flight_in_uniformly_moving_water_is_carried_along(x, commands, water):
     np.testing.assert_array_equal(moving[3:], still[3:])
 
 
-@settings(repeatable, max_examples=20)
+@examples(20)
 @given(angles, currents)
 def test_neutral_hull_follows_accelerating_water(psi, strength):
     x, way = fly_in_gust(state((0.0, 0.0, psi)), (0.0, 0.0, 0.0), np.array(strength), 500)
@@ -59,7 +60,7 @@ def test_neutral_hull_follows_accelerating_water(psi, strength):
     np.testing.assert_allclose(x[layout.X_NU : layout.X_ACT], 0.0, atol=1e-14)
 
 
-@settings(repeatable, max_examples=10)
+@examples(10)
 @given(states(), actuators, currents)
 def test_accelerating_water_carries_any_flight_along(x, command, strength):
     still, _ = fly_in_gust(x, command, np.zeros(3), 300)

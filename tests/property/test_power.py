@@ -1,7 +1,7 @@
 """With the actuators standing still, kinetic and potential energy change by the work of the water's forces alone."""
 
 import numpy as np
-from hypothesis import Phase, given, settings
+from hypothesis import Phase, given
 from hypothesis import strategies as st
 from model_states import (
     P,
@@ -11,7 +11,6 @@ from model_states import (
     full_mass_matrix,
     quaternions,
     rates,
-    repeatable,
     vehicles,
     velocities,
 )
@@ -22,6 +21,7 @@ from firmware.core.vehicle import layout
 from firmware.core.vehicle.flight import nominal_step
 from firmware.core.vehicle.mass import first_moment
 from firmware.core.vehicle.water import water_wrench
+from tests.support.examples import examples
 
 
 def energy(vehicle: np.ndarray, x: np.ndarray) -> float:
@@ -38,7 +38,7 @@ def power(vehicle: np.ndarray, x: np.ndarray) -> float:
     return float(np.dot(water_wrench(vehicle, *x[7:13]), x[7:13]))
 
 
-@repeatable
+@examples()
 @given(vehicles(), quaternions(), velocities, rates, actuators)
 def test_power_balance_of_the_derivative(vehicle, q, V, omega, act):
     x = np.concatenate([np.zeros(3), q, V, omega, act])
@@ -55,7 +55,7 @@ gliding = st.tuples(st.floats(0.3, 0.6), st.floats(-0.1, 0.1), st.floats(-0.1, 0
 gentle = st.tuples(*[st.floats(-0.2, 0.2)] * 3)
 
 
-@settings(repeatable, max_examples=10, phases=[Phase.generate])
+@examples(10, phases=[Phase.generate])
 @given(vehicles(), angles, st.floats(-0.7, 0.7), gliding, gentle, actuators)
 def test_power_balance_along_a_flight(vehicle, phi, theta, V, omega, act):
     q = quaternion_from_euler(0.3 * phi, theta, 1.0)
@@ -67,7 +67,7 @@ def test_power_balance_along_a_flight(vehicle, phi, theta, V, omega, act):
     assert abs(energy(vehicle, x) - before - simpson(powers, dx=dt)) < 1e-6
 
 
-@settings(repeatable, max_examples=20)
+@examples(20)
 @given(quaternions(), rates, actuators)
 def test_no_energy_is_lost_without_water_forces(q, omega, act):
     """All coefficients at zero: the hull swings for ever, about its moving masses, with added mass."""

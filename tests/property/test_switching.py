@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from firmware.core.control import law
@@ -10,6 +10,7 @@ from firmware.core.layouts import control_layout as ctl
 from firmware.core.vehicle import layout
 from firmware.model.gains import Control, HybridTable
 from hal.strict import ConfigError, decode
+from tests.support.examples import examples
 from tools.flight.compose import build_flight
 
 RATES = {"servo": layout.SERVO_RATE, "slider": layout.SLIDER_RATE, "ballast": layout.BALLAST_RATE}
@@ -77,7 +78,7 @@ def test_a_switch_is_bumpless_where_the_water_is_calm():
 switches = st.lists(st.integers(1, 400), min_size=1, max_size=8)  # ticks from one to the next
 
 
-@settings(deadline=None, derandomize=True, max_examples=25)
+@examples(25)
 @given(switches, st.sampled_from([ctl.LAW, ctl.LAW_PLUS]), st.floats(0.0, 0.1), st.integers(0, 1000))
 def test_a_switch_at_any_moment_sends_on_what_was_sent(gaps, law_kind, noise, seed):
     """Whatever the water and the moment, either way: the first command of the other controller is the last of the one.

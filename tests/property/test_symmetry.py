@@ -1,19 +1,20 @@
 """Port and starboard are the same to this vehicle: a flight with everything mirrored is the mirrored flight."""
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
-from model_states import P, actuators, currents, derivative, repeatable, states, vehicles
+from model_states import P, actuators, currents, derivative, states, vehicles
 
 from firmware.core.vehicle import layout
 from firmware.core.vehicle.flight import nominal_run
+from tests.support.examples import examples
 
 # north, east, down, quaternion, nu, actuators: what changes its sign when east is swapped with west
 MIRROR = np.array([1, -1, 1, 1, -1, 1, -1, 1, -1, 1, -1, 1, -1, -1, 1, 1])
 COMMAND, WATER = np.array([-1, 1, 1]), np.array([1, -1, 1])
 
 
-@repeatable
+@examples()
 @given(states(), actuators, currents, vehicles())
 def test_derivative_is_mirrored(x, command, water, vehicle):
     straight = derivative(x, command, water, vehicle)
@@ -21,7 +22,7 @@ def test_derivative_is_mirrored(x, command, water, vehicle):
     np.testing.assert_allclose(mirrored, straight * MIRROR, rtol=1e-13, atol=1e-13)
 
 
-@settings(repeatable, max_examples=20)
+@examples(20)
 @given(states(), st.lists(actuators, min_size=1, max_size=5), currents)
 def test_flight_is_mirrored(x, commands, water):
     straight, mirrored, work = x.copy(), x * MIRROR, np.zeros((5, layout.N_X))

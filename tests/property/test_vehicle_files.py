@@ -4,12 +4,13 @@ import re
 import tomllib
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
-from model_states import VEHICLE_TEXT, repeatable
+from model_states import VEHICLE_TEXT
 
 from firmware.model.vehicle import Vehicle, decode_vehicle
 from hal.strict import ConfigError
+from tests.support.examples import examples
 
 LINES = VEHICLE_TEXT.splitlines()
 WRONG = {
@@ -104,7 +105,7 @@ def test_a_wrong_value_in_an_inline_table_is_named(index, header, name, inner, v
     assert error.line == index + 1
 
 
-@settings(repeatable, max_examples=200)
+@examples(200)
 @given(st.sampled_from(keys()), st.text(min_size=1, max_size=20))
 def test_an_unknown_key_is_named_with_its_line(key, name):
     index, header, _ = key
@@ -125,7 +126,7 @@ def test_an_ordinary_unknown_key_is_found_on_its_line(name):
     assert error.line == index + 1
 
 
-@settings(repeatable, max_examples=300)
+@examples(300)
 @given(st.data())
 def test_damage_raises_nothing_but_config_errors(data):
     """Cut out, doubled or overwritten pieces: either a vehicle or a ConfigError of one line."""
@@ -137,7 +138,7 @@ def test_damage_raises_nothing_but_config_errors(data):
     assert complaint is None or (complaint.startswith("vehicle.toml") and len(complaint.splitlines()) == 1)
 
 
-@settings(repeatable, max_examples=300)
+@examples(300)
 @given(st.one_of(st.text(), st.text(alphabet="[]{}=\"'#.,\n 0123456789abcxeE_-+:T")))
 def test_any_text_raises_nothing_but_config_errors(text):
     with pytest.raises(ConfigError) as caught:

@@ -27,14 +27,13 @@ class Watchman:
     """`step()` is one tick of a flight in which all is well, but for what was changed.
 
     depth, pitch, roll: what the vehicle does; `silence`: sensors and actuators that say nothing; `say`: values a sensor
-    gives instead; `frozen`: sensors that repeat themselves; `wanted`: what the autopilot asks for.
+    gives instead; `frozen`: sensors that repeat themselves; `wanted`: what the autopilot asks for; `slow_s`: time
+    between two samples of leak and battery.
     """
 
     def __init__(self, *, limits: Limits | None = None, mode: float = ctl.FLYING, fitted: tuple = (),
-                 site: float = 1000.0, dt: float = DT, **settings):  # fmt: skip
-        self.slow = max(1, round(0.2 / dt))  # ticks between two samples of leak and battery
-        inputs = {name: self.slow * dt for name in ("leak", "battery")}
-        self.dt, periods = dt, {"imu": dt, "beacon": 2 * dt, "wires": 2 * dt, **inputs}
+                 site: float = 1000.0, dt: float = DT, slow_s: float = 0.2, **settings):  # fmt: skip
+        self.dt, periods = dt, {"imu": dt, "beacon": 2 * dt, "wires": 2 * dt, "leak": slow_s, "battery": slow_s}
         vehicle = load_vehicle("roughie")
         table = msgspec.structs.replace(vehicle.supervisor, **settings)
         vehicle = msgspec.structs.replace(vehicle, limits=limits, supervisor=table)
@@ -43,6 +42,7 @@ class Watchman:
         C = configuration(vehicle, mission, dt=dt, periods=periods)
         self.pilot = Autopilot(vehicle, mission, C, source)
         self.supervisor = Supervisor(self.pilot, vehicle, mission, dt=dt, periods=periods)
+        self.slow = max(1, round(slow_s / dt))  # ticks between two samples of leak and battery
         self._share()
         self.fitted = ("imu", "beacon", "slider_wire", "plunger_wire", "servo", "slider", "ballast", *fitted)
         self.t, self.number = -dt, 0

@@ -6,12 +6,21 @@ import click
 
 from tools.cli.common import DONE, FAILED, json_option, print_json, progress
 
-ROW = click.IntRange(1, 34)
+
+def _row(context: click.Context, option: click.Parameter, row: int | None) -> int | None:
+    """Refuse a number that is no row of the fault table; the table is imported only where a row was given."""
+    if row is not None:
+        from firmware.faults import FAULTS
+
+        if row not in FAULTS:
+            raise click.BadParameter(f"there is no row {row}; rows are {min(FAULTS)} to {max(FAULTS)}.")
+    return row
 
 
 @click.command()
-@click.option("--only", type=ROW, help="This row of the fault table alone.")
-@click.option("--disable-detector", "disabled", type=ROW, help="Switch off what notices this row: it has to fail.")
+@click.option("--only", type=int, callback=_row, metavar="ROW", help="This row of the fault table alone.")
+@click.option("--disable-detector", "disabled", type=int, callback=_row, metavar="ROW",
+              help="Switch off what notices this row: it has to fail.")  # fmt: skip
 @click.option("--workers", default=max(1, os.cpu_count() or 1), type=click.IntRange(1, 256), help="Processes at once.")
 @json_option
 def faults(only: int | None, disabled: int | None, workers: int, as_json: bool) -> None:

@@ -8,11 +8,10 @@ import math
 from firmware.core.control.controllers import steer
 from firmware.core.control.guidance import follow, sequence
 from firmware.core.control.lyapunov_monitor import forget_lyapunov, monitor
-from firmware.core.estimation.navigation import navigate
+from firmware.core.estimation.navigation import navigate, stop_filter
 from firmware.core.estimation.sensing import sense, take_as_measured
 from firmware.core.jit import kernel
 from firmware.core.layouts import control_layout as ctl
-from firmware.core.layouts.estimator_layout import S_ANGULAR, S_LINEAR
 from firmware.core.vehicle import layout
 from firmware.core.vehicle.actuators import actuator_table, limited
 
@@ -72,9 +71,7 @@ def decide(P, C, legs, est, ap, nav, cmd, t):
 @kernel
 def reset(est, ap, nav):
     """Forget everything: no sample seen, nothing commanded, the filter not started, waiting for the first samples."""
-    if nav[ctl.NAV_RUNNING] == 1.0:
-        nav[ctl.NAV_SETTINGS + S_LINEAR], nav[ctl.NAV_SETTINGS + S_ANGULAR] = nav[ctl.NAV_CALM], nav[ctl.NAV_CALM + 1]
-    nav[ctl.NAV_RUNNING] = 0.0
+    stop_filter(nav)
     est[:] = 0.0
     est[ctl.EST_IMU_TIME : ctl.EST_BEACON_TIME + 3] = -1.0
     ap[:] = 0.0

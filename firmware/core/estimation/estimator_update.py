@@ -61,9 +61,10 @@ def update_scalar(cov, taken, used, m, dx, column, h0, h1, h2, other, innovation
     left = innovation - (h0 * dx[column] + h1 * dx[column + 1] + h2 * dx[column + 2] + bias * dx[other])
     S = seen + R
     score = left / math.sqrt(S)
+    fits = abs(score) <= kf.GATE  # false for NaN, which is rejected and never counts as a jump
     out = here & (abs(score) > kf.GATE)
-    rejected_for_s = where(here, where(out, rejected_for_s + dt, 0.0), rejected_for_s)
-    take = here & ((abs(score) <= kf.GATE) | math.isnan(score))
+    rejected_for_s = where(here, where(fits, 0.0, rejected_for_s + dt), rejected_for_s)
+    take = here & fits
     if anywhere(out):
         jumped = out & (rejected_for_s >= kf.REJECTED_AT_MOST) & (not kf.E_NU <= column < kf.E_ACT)  # not so the gyro
         if anywhere(jumped):

@@ -2,6 +2,9 @@
 
 A sample is older than the tick by its delay; it is carried forward by the filter's own rates before it is compared, so
 that a slow beacon does not drag the depth behind. What is missing, late or refused is simply not there this tick.
+
+A filter whose state or variances are not finite is restarted in the same tick from the newest measured values, and the
+restart is counted: the supervisor reports it (row FAULT_ESTIMATE of the fault table).
 """
 
 import math
@@ -80,6 +83,36 @@ def start_filter(P, nav, est, t):
 
 
 @kernel
+def stop_filter(nav):
+    """Stop a filter that runs, and give the process noise the disturbance of the vehicle file back."""
+    if nav[ctl.NAV_RUNNING] == 1.0:
+        nav[ctl.NAV_SETTINGS + kf.S_LINEAR] = nav[ctl.NAV_CALM]
+        nav[ctl.NAV_SETTINGS + kf.S_ANGULAR] = nav[ctl.NAV_CALM + 1]
+    nav[ctl.NAV_RUNNING] = 0.0
+
+
+@kernel
+def is_finite(nav):
+    """Return whether every number of the filter's state, and every variance, is finite."""
+    finite = True
+    for i in range(kf.N_XE):
+        finite = finite and math.isfinite(nav[ctl.NAV_X + i])
+    for i in range(kf.N_E):
+        finite = finite and math.isfinite(nav[ctl.NAV_COV + i * (kf.N_E + 1)])
+    return finite
+
+
+@kernel
+def restart_filter(P, nav, est, north, east, t):
+    """Start the filter anew at time t (s) from the newest measured values; north, east (m): the last position known."""
+    stop_filter(nav)
+    start_filter(P, nav, est, t)
+    nav[ctl.NAV_X + X_NORTH], nav[ctl.NAV_X + X_EAST] = north, east
+    for i in range(3):
+        nav[ctl.NAV_X + X_NU + 3 + i] = est[ctl.NEW_P + i]
+
+
+@kernel
 def write_state(x, est):
     """A state (N_X or longer) as the rest of the autopilot reads it."""
     est[ctl.EST_X], est[ctl.EST_Y], est[ctl.EST_DEPTH] = x[X_NORTH], x[X_EAST], x[X_DOWN]
@@ -107,6 +140,15 @@ def write_errors(x, cov, est):
     )
     est[ctl.SD_PITCH] = math.sqrt(cov[kf.E_ATT + 1, kf.E_ATT + 1])
     est[ctl.SD_U] = math.sqrt(cov[kf.E_NU, kf.E_NU])
+
+
+@kernel
+def write_estimate(nav, est, given):
+    """Write what a filter knows into est; given: the state itself is the one from outside (GIVEN)."""
+    x = nav[ctl.NAV_X : ctl.NAV_X + kf.N_XE]
+    write_state(nav[ctl.NAV_GIVEN : ctl.NAV_GIVEN + N_X] if given else x, est)
+    write_errors(x, nav[ctl.NAV_COV : ctl.NAV_COV + kf.N_E * kf.N_E].reshape(kf.N_E, kf.N_E), est)
+    est[ctl.ROUGHNESS] = nav[ctl.NAV_ROUGHNESS]
 
 
 @kernel
@@ -154,18 +196,25 @@ def step_filter(P, nav, est, sent, given, t):
         nav[ctl.NAV_INFLATION : ctl.NAV_INFLATION + 2], kf.COMMANDED, sent[0], sent[1], sent[2],
         dt, nav[ctl.NAV_Z : ctl.NAV_Z + kf.N_Z], nav[ctl.NAV_REJECTED : ctl.NAV_REJECTED + kf.N_Z], scores, work,
     )  # fmt: skip
-    write_state(nav[ctl.NAV_GIVEN : ctl.NAV_GIVEN + N_X] if given else x, est)
-    write_errors(x, cov, est)
     adapt_process_noise(nav, scores, dt)
-    est[ctl.ROUGHNESS] = nav[ctl.NAV_ROUGHNESS]
+    write_estimate(nav, est, given)
 
 
 @kernel
 def navigate(P, C, nav, est, ap, t):
-    """One step of the filter at time t (s), which starts with the first samples of IMU and beacon."""
+    """Step the filter at time t (s); it starts with the first samples of IMU and beacon.
+
+    A filter that is not finite after its step is restarted: the estimate of this tick is then the measured values, and
+    ap[FILTER_RESTARTS] is one more.
+    """
     if est[ctl.EST_STARTED] == 0.0:
         return
     if nav[ctl.NAV_RUNNING] == 0.0:
         start_filter(P, nav, est, t)
-    sent = ap[ctl.SENT_SERVO : ctl.SENT_SERVO + 3]
-    step_filter(P, nav, est, sent, C[ctl.ESTIMATOR] == ctl.GIVEN, t)
+    given = C[ctl.ESTIMATOR] == ctl.GIVEN
+    north, east = est[ctl.EST_X], est[ctl.EST_Y]
+    step_filter(P, nav, est, ap[ctl.SENT_SERVO : ctl.SENT_SERVO + 3], given, t)
+    if not is_finite(nav):
+        restart_filter(P, nav, est, north, east, t)
+        write_estimate(nav, est, given)
+        ap[ctl.FILTER_RESTARTS] += 1.0

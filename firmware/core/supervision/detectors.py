@@ -1,6 +1,7 @@
-"""The supervisor's detectors: each asks, every tick, for a reaction of its row of the fault table.
+"""The supervisor's detectors: each requests, every tick, a level of its row of the fault table.
 
-They read what was screened (frame, G), what is believed (est) and what the autopilot is at (ap), and write G alone.
+Which reaction a level is, and how long it stands, is data (firmware/faults.py), copied into G. The detectors read what
+was screened (frame, G), what is believed (est) and what the autopilot is at (ap), and write G alone.
 """
 
 import math
@@ -28,9 +29,11 @@ def lasting(G, timer, holds, t):
 
 
 @kernel
-def ask(G, row, reaction):
-    """A row asks for a reaction, beside what it asked for in this tick already."""
-    G[sup.ASKED + row] = max(G[sup.ASKED + row], reaction)
+def request(G, row, level):
+    """Request a level of a row, LEVEL_1 the mildest, unless the row has requested a higher one in this tick."""
+    place = row * sup.N_LEVELS + level
+    if G[sup.REACTION + place] > G[sup.ASKED + row]:
+        G[sup.ASKED + row], G[sup.CLEARS + row] = G[sup.REACTION + place], G[sup.CLEAR_AFTER + place]
 
 
 @kernel
@@ -40,9 +43,15 @@ def age(G, sensor, t):
 
 
 @kernel
+def outdated(G, sensor, t):
+    """Return whether the sensor's newest fit sample is older than MAX_AGE_PERIODS of its periods."""
+    return age(G, sensor, t) > longest_age(G[sup.PERIOD + sensor], G[sup.TICK])
+
+
+@kernel
 def lost(G, sensor, t):
     """True where nothing fit has come from a sensor for too long."""
-    return age(G, sensor, t) > max(G[sup.LOST_AFTER + sensor], longest_age(G[sup.PERIOD + sensor], G[sup.TICK]))
+    return outdated(G, sensor, t) and age(G, sensor, t) > G[sup.LOST_AFTER + sensor]
 
 
 @kernel
@@ -50,25 +59,25 @@ def watch_sensors(G, frame, t):
     """Rows 1, 2, 4, 6, 10, 11, 20 and 23."""
     gone = lasting(G, sup.T_IMU, lost(G, sup.SENSOR_IMU, t) or G[sup.SAMPLE_VERDICT + sup.SENSOR_IMU] == sup.STUCK, t)
     if gone >= 0.0:
-        ask(G, sup.FAULT_IMU_LOST, sup.ABORT if gone >= G[sup.HOLD_TIME] else sup.HOLD)
+        request(G, sup.FAULT_IMU_LOST, sup.LEVEL_2 if gone >= G[sup.HOLD_TIME] else sup.LEVEL_1)
     if lost(G, sup.SENSOR_BEACON, t):
-        ask(G, sup.FAULT_PRESSURE_LOST, sup.ABORT)
+        request(G, sup.FAULT_PRESSURE_LOST, sup.LEVEL_1)
     if lost(G, sup.SENSOR_SLIDER, t):
-        ask(G, sup.FAULT_WIRE_LOST, sup.WARN)
+        request(G, sup.FAULT_WIRE_LOST, sup.LEVEL_1)
     if lost(G, sup.SENSOR_PLUNGER, t):
-        ask(G, sup.FAULT_WIRE_LOST, sup.ABORT)
+        request(G, sup.FAULT_WIRE_LOST, sup.LEVEL_2)
     for sensor in range(sup.N_SENSORS):
         verdict = G[sup.SAMPLE_VERDICT + sensor]
         fitted = sensor <= sup.SENSOR_PLUNGER or math.isfinite(G[sup.TAKEN + sensor])
-        old = fitted and age(G, sensor, t) > longest_age(G[sup.PERIOD + sensor], G[sup.TICK])
-        if verdict == sup.MISTIMED or old:
-            ask(G, sup.FAULT_SAMPLE_TIME, sup.LOG)
+        if verdict == sup.MISTIMED or (fitted and outdated(G, sensor, t)):
+            request(G, sup.FAULT_SAMPLE_TIME, sup.LEVEL_1)
         if verdict == sup.ABSURD:
-            ask(G, sup.FAULT_IMPLAUSIBLE, sup.WARN if G[sup.UNFIT + sensor] >= G[sup.UNFIT_RUN] else sup.LOG)
+            many = G[sup.UNFIT + sensor] >= G[sup.UNFIT_RUN]
+            request(G, sup.FAULT_IMPLAUSIBLE, sup.LEVEL_2 if many else sup.LEVEL_1)
         if verdict == sup.STUCK:
-            ask(G, sup.FAULT_STUCK_SENSOR, sup.WARN)
+            request(G, sup.FAULT_STUCK_SENSOR, sup.LEVEL_1)
     watch_leak(G, frame)
-    watch_battery(G, frame, t)
+    watch_battery(G, t)
 
 
 @kernel
@@ -79,23 +88,17 @@ def watch_leak(G, frame):
         G[sup.LEAK_SEEN] = frame[start]
         if frame[start + 2] > 0.5:
             G[sup.WET] += 1.0
-    if G[sup.WET] >= G[sup.LEAK_COUNT]:
-        ask(G, sup.FAULT_LEAK, sup.ABORT)
-    elif G[sup.WET] > 0.0:
-        ask(G, sup.FAULT_LEAK, sup.WARN)
+            request(G, sup.FAULT_LEAK, sup.LEVEL_2 if G[sup.WET] >= G[sup.LEAK_COUNT] else sup.LEVEL_1)
 
 
 @kernel
-def watch_battery(G, frame, t):
-    """Row 23."""
-    start = sup.STARTS[sup.SENSOR_BATTERY]
-    if frame[start + 1] != sup.VALID:
-        return
-    volts = frame[start + 2]
+def watch_battery(G, t):
+    """Row 23: the newest fit voltage, as long as it is fresh; a silence ends an under-voltage, which has to last."""
+    volts = math.nan if outdated(G, sup.SENSOR_BATTERY, t) else G[sup.LAST + sup.PLACES[sup.SENSOR_BATTERY]]
     if lasting(G, sup.T_LOW, volts < G[sup.LOW_VOLTAGE], t) >= G[sup.VOLTAGE_TIME]:
-        ask(G, sup.FAULT_VOLTAGE, sup.WARN)
+        request(G, sup.FAULT_VOLTAGE, sup.LEVEL_1)
     if lasting(G, sup.T_LEAST, volts < G[sup.LEAST_VOLTAGE], t) >= G[sup.VOLTAGE_TIME]:
-        ask(G, sup.FAULT_VOLTAGE, sup.ABORT)
+        request(G, sup.FAULT_VOLTAGE, sup.LEVEL_2)
 
 
 @kernel
@@ -109,23 +112,23 @@ def silent(G, frame, actuator, t):
 def watch_states(G, frame, t):
     """What actuators say of themselves: rows 3, 5, 9, 14 and 16."""
     if silent(G, frame, 0, t):
-        ask(G, sup.FAULT_SERVO_LOST, sup.WARN)
+        request(G, sup.FAULT_SERVO_LOST, sup.LEVEL_1)
     for actuator in range(3):
         if actuator > 0 and silent(G, frame, actuator, t):
-            ask(G, sup.FAULT_BUS_LOST, sup.ABORT)
+            request(G, sup.FAULT_BUS_LOST, sup.LEVEL_1)
         if frame[sup.STATES[actuator] + 1] != sup.VALID:
             continue
         condition = frame[sup.STATES[actuator] + 2]
         if condition == sup.ALARM:
-            ask(G, sup.FAULT_DRIVE_ALARM, sup.WARN)
+            request(G, sup.FAULT_DRIVE_ALARM, sup.LEVEL_1)
         elif condition == sup.ALARM_KEPT:
-            ask(G, sup.FAULT_DRIVE_ALARM, sup.ABORT)
+            request(G, sup.FAULT_DRIVE_ALARM, sup.LEVEL_2)
         elif condition == sup.RETRYING:
-            ask(G, sup.FAULT_STALL, sup.WARN)
+            request(G, sup.FAULT_STALL, sup.LEVEL_1)
         elif condition == sup.GIVEN_UP or condition == sup.WRONG_WAY:
-            ask(G, sup.FAULT_STALL, sup.ABORT)
+            request(G, sup.FAULT_STALL, sup.LEVEL_2)
         elif condition == sup.MISCONFIGURED:
-            ask(G, sup.FAULT_EXCEPTION, sup.ABORT)
+            request(G, sup.FAULT_EXCEPTION, sup.LEVEL_1)
 
 
 @kernel
@@ -154,7 +157,7 @@ def watch_move(G, i, measured, rate, tau, span, t):
         G[sup.STOPPED + i] = G[sup.ENABLED + sup.FAULT_STALL]
         G[sup.SENT + 1 + i] = measured
     if G[sup.STOPPED + i] == 1.0:
-        ask(G, sup.FAULT_STALL, sup.ABORT)
+        request(G, sup.FAULT_STALL, sup.LEVEL_2)
     else:
         watch_stall(G, i, measured, rate, tau, span, t)
 
@@ -165,7 +168,7 @@ def watch_stall(G, i, measured, rate, tau, span, t):
     off = abs(G[sup.SENT + 1 + i] - measured)
     tolerance = rate * (tau + 0.2) + 0.02 * span
     if t < G[sup.REST_UNTIL + i]:
-        ask(G, sup.FAULT_STALL, sup.WARN)
+        request(G, sup.FAULT_STALL, sup.LEVEL_1)
         return
     moved = abs(measured - G[sup.MARK + i]) > 0.25 * tolerance
     stands = lasting(G, sup.T_STALL + i, off > tolerance and not moved, t)
@@ -178,7 +181,7 @@ def watch_stall(G, i, measured, rate, tau, span, t):
         G[sup.REST_UNTIL + i] = t + G[sup.STALL_REST]
         G[sup.SINCE + sup.T_STALL + i] = math.nan
     if G[sup.STALLS + i] > G[sup.STALL_COUNT]:
-        ask(G, sup.FAULT_STALL, sup.ABORT)
+        request(G, sup.FAULT_STALL, sup.LEVEL_2)
 
 
 @kernel
@@ -200,19 +203,19 @@ def watch_depth(G, est, ap, t):
     rate = depth_rate(G, depth, t)
     against = rate * pitch > 0.0 and abs(pitch) > G[sup.DISAGREE_PITCH] and abs(rate) > G[sup.DISAGREE_RATE]
     if lasting(G, sup.T_DISAGREE, flying and against, t) >= G[sup.DISAGREE_TIME]:
-        ask(G, sup.FAULT_DISAGREE, sup.WARN)
+        request(G, sup.FAULT_DISAGREE, sup.LEVEL_1)
     if lasting(G, sup.T_DEEP, depth > G[sup.WORKING_DEPTH], t) >= G[sup.DEEP_TIME]:
-        ask(G, sup.FAULT_TOO_DEEP, sup.ABORT)
+        request(G, sup.FAULT_TOO_DEEP, sup.LEVEL_1)
     if lasting(G, sup.T_RISK, depth > G[sup.RISK_DEPTH], t) >= G[sup.RISK_TIME]:
-        ask(G, sup.FAULT_TOO_DEEP, sup.OOB)
+        request(G, sup.FAULT_TOO_DEEP, sup.LEVEL_2)
     held = not flying or ap[ctl.REACHED] >= 0.0
     if held or not abs(depth - G[sup.BAND_MARK]) <= G[sup.SAME_BAND]:
         G[sup.BAND_MARK], G[sup.BAND_SINCE] = depth, t
     if t - G[sup.BAND_SINCE] > G[sup.SAME_TIME]:
-        ask(G, sup.FAULT_OVERTIME, sup.ABORT)
+        request(G, sup.FAULT_OVERTIME, sup.LEVEL_1)
     begun = ap[ctl.MODE] == ctl.FLYING or ap[ctl.MODE] == ctl.ABORTED
     if begun and t - ap[ctl.MISSION_START] > G[sup.MISSION_TIME]:
-        ask(G, sup.FAULT_OVERTIME, sup.ABORT)
+        request(G, sup.FAULT_OVERTIME, sup.LEVEL_1)
 
 
 @kernel
@@ -232,7 +235,8 @@ def watch_ascent(G, est, ap, t):
     if math.isnan(G[sup.OOB_SINCE]):
         G[sup.OOB_SINCE] = G[sup.ASCENT_SINCE] = t
     patience = G[sup.BLIND_TIME] if blind else G[sup.ASCENT_TIME]
-    ask(G, sup.FAULT_NO_ASCENT, sup.HW if t - max(G[sup.ASCENT_SINCE], G[sup.OOB_SINCE]) > patience else sup.OOB)
+    in_vain = t - max(G[sup.ASCENT_SINCE], G[sup.OOB_SINCE]) > patience
+    request(G, sup.FAULT_NO_ASCENT, sup.LEVEL_2 if in_vain else sup.LEVEL_1)
 
 
 @kernel
@@ -243,7 +247,7 @@ def watch_attitude(G, est, ap, t):
     over = roll > max(G[sup.STEEP_ROLL], abs(ap[ctl.REF_ROLL]) + G[sup.STEEP_MARGIN])
     bad = lasting(G, sup.T_STEEP, ap[ctl.MODE] == ctl.FLYING and (steep or over), t)
     if bad >= 0.0:
-        ask(G, sup.FAULT_STEEP, sup.ABORT if bad >= G[sup.STEEP_TIME] else sup.WARN)
+        request(G, sup.FAULT_STEEP, sup.LEVEL_2 if bad >= G[sup.STEEP_TIME] else sup.LEVEL_1)
 
 
 @kernel
@@ -256,16 +260,26 @@ def answerless(P, C, ap):
 
 
 @kernel
-def watch_law(P, C, G, ap, t):
-    """Row 22: the PID flies for a while; a law that has no answer again and again is given up."""
+def watch_law(P, C, G, ap):
+    """Row 22: the PID flies as long as the request stands; a law without an answer again and again is given up."""
     if ap[ctl.MODE] != ctl.FLYING:
         return
     if answerless(P, C, ap):
         G[sup.LAW_FAILED] += 1.0
-        G[sup.PID_UNTIL] = t + G[sup.LAW_REST]
-        ask(G, sup.FAULT_NO_ANSWER, sup.ABORT if G[sup.LAW_FAILED] >= G[sup.LAW_RUN] else sup.WARN)
+        request(G, sup.FAULT_NO_ANSWER, sup.LEVEL_2 if G[sup.LAW_FAILED] >= G[sup.LAW_RUN] else sup.LEVEL_1)
     elif C[ctl.CONTROLLER] == ctl.PID or ap[ctl.ACTIVE] != ctl.PID:
         G[sup.LAW_FAILED] = 0.0
+
+
+@kernel
+def watch_estimate(G, ap):
+    """Row 35: the filter was not finite and was restarted in this tick; after so many restarts the dive is given up."""
+    restarts = ap[ctl.FILTER_RESTARTS]
+    if restarts >= G[sup.RESTART_COUNT]:
+        request(G, sup.FAULT_ESTIMATE, sup.LEVEL_2)
+    elif restarts > G[sup.RESTARTS_SEEN]:
+        request(G, sup.FAULT_ESTIMATE, sup.LEVEL_1)
+    G[sup.RESTARTS_SEEN] = restarts
 
 
 @kernel
@@ -276,16 +290,16 @@ def watch_loop(G, t):
     if G[sup.LATENESS] > G[sup.TICK]:
         G[sup.LATE_RUN] += 1.0
         G[sup.LATE_COUNT] += 1.0
-        ask(G, sup.FAULT_OVERRUN, sup.LOG)
+        request(G, sup.FAULT_OVERRUN, sup.LEVEL_1)
     else:
         G[sup.LATE_RUN] = 0.0
     many = G[sup.LATE_COUNT] * G[sup.TICK] > 60.0 * G[sup.OVERRUN_SHARE]
     heavy = lasting(G, sup.T_HEAVY, G[sup.LATE_RUN] >= G[sup.OVERRUN_RUN] or many, t)
     if heavy >= 0.0:
-        ask(G, sup.FAULT_OVERRUN, sup.ABORT if heavy >= G[sup.HOLD_TIME] else sup.HOLD)
+        request(G, sup.FAULT_OVERRUN, sup.LEVEL_3 if heavy >= G[sup.HOLD_TIME] else sup.LEVEL_2)
     if G[sup.RESTARTED] == 1.0:
-        ask(G, sup.FAULT_LOOP_HUNG, sup.ABORT)
+        request(G, sup.FAULT_LOOP_HUNG, sup.LEVEL_1)
     if G[sup.RECORDER] > 0.0:
-        ask(G, sup.FAULT_DISK, sup.WARN if G[sup.RECORDER] > 1.0 else sup.LOG)
+        request(G, sup.FAULT_DISK, sup.LEVEL_2 if G[sup.RECORDER] > 1.0 else sup.LEVEL_1)
     if G[sup.GROWTH] > 0.0:
-        ask(G, sup.FAULT_GROWTH, sup.ABORT if G[sup.GROWTH] > 1.0 else sup.WARN)
+        request(G, sup.FAULT_GROWTH, sup.LEVEL_2 if G[sup.GROWTH] > 1.0 else sup.LEVEL_1)

@@ -34,10 +34,34 @@ def highest(asked, enabled, before):
 
 
 @kernel
+def standing(G, row, t):
+    """Return what a row requests: below ABORT a reaction stands for its clear time (s) after its condition has ended.
+
+    Until that time a milder request of the same row does not replace it. From ABORT on `highest` latches a reaction.
+    """
+    asked, kept = G[sup.ASKED + row], t < G[sup.KEPT_UNTIL + row]
+    if asked == sup.NOTHING and not kept:
+        return sup.NOTHING
+    if asked >= sup.ABORT:
+        return asked
+    if kept and asked < G[sup.KEPT + row]:
+        return G[sup.KEPT + row]
+    G[sup.KEPT + row], G[sup.KEPT_UNTIL + row] = asked, t + G[sup.CLEARS + row]
+    return asked
+
+
+@kernel
+def stands(G, row):
+    """Return whether an enabled row requests a reaction in this tick, or requested one that still stands."""
+    return G[sup.ASKED + row] * G[sup.ENABLED + row] > 0.0
+
+
+@kernel
 def settle(G, t):
     """This tick's reaction and who asked for it; what each row asked for first and at most."""
     G[sup.CHANGED] = 0.0
     for row in range(1, sup.N_ROWS):
+        G[sup.ASKED + row] = standing(G, row, t)
         asked = G[sup.ASKED + row] * G[sup.ENABLED + row]
         if asked > G[sup.WORST + row]:
             if G[sup.FIRST + row] < 0.0:
@@ -63,7 +87,7 @@ def goal(P, G, cmd, ap, i):
         return math.nan
     if G[sup.HIGHEST] == sup.HOLD:
         return G[sup.SENT + i]
-    if i == 0 and G[sup.ASKED + sup.FAULT_SERVO_LOST] * G[sup.ENABLED + sup.FAULT_SERVO_LOST] > 0.0:
+    if i == 0 and stands(G, sup.FAULT_SERVO_LOST):
         return 0.0
     return cmd[i] if math.isfinite(cmd[i]) else G[sup.SENT + i]
 
@@ -90,7 +114,7 @@ def watch_limits(P, G, cmd):
     """Row 15: asked to go past a limit; clamped in `act`."""
     for i in range(3):
         if cmd[i] < P[layout.ACTUATORS[i]] - ROUNDING or cmd[i] > P[layout.ACTUATORS[i] + 1] + ROUNDING:
-            detectors.ask(G, sup.FAULT_SOFT_LIMIT, sup.LOG)
+            detectors.request(G, sup.FAULT_SOFT_LIMIT, sup.LEVEL_1)
 
 
 @kernel
@@ -126,19 +150,15 @@ def guard(P, C, G, frame, est, ap, cmd, t):
         detectors.watch_depth(G, est, ap, t)
     detectors.watch_ascent(G, est, ap, t)
     detectors.watch_attitude(G, est, ap, t)
-    detectors.watch_law(P, C, G, ap, t)
+    detectors.watch_law(P, C, G, ap)
+    detectors.watch_estimate(G, ap)
     detectors.watch_loop(G, t)
     watch_limits(P, G, cmd)
     settle(G, t)
     act(P, G, cmd, ap, t)
     watch_surface(P, G, est, ap, scale, t)
-    doubtful = (
-        G[sup.ASKED + sup.FAULT_DISAGREE] * G[sup.ENABLED + sup.FAULT_DISAGREE]
-        + G[sup.ASKED + sup.FAULT_STEEP] * G[sup.ENABLED + sup.FAULT_STEEP]
-        > 0.0
-    )
-    lawless = G[sup.ENABLED + sup.FAULT_NO_ANSWER] == 1.0 and t < G[sup.PID_UNTIL]
-    ap[ctl.CAUTIOUS] = 1.0 if doubtful or lawless else 0.0
+    cautious = stands(G, sup.FAULT_DISAGREE) or stands(G, sup.FAULT_STEEP) or stands(G, sup.FAULT_NO_ANSWER)
+    ap[ctl.CAUTIOUS] = 1.0 if cautious else 0.0
     if G[sup.HIGHEST] >= sup.ABORT and ap[ctl.MODE] < ctl.COMPLETED:
         abort(ap, ctl.REASON_FAULT + G[sup.HIGHEST_ROW])
     ap[ctl.SUPERVISED] = 1.0

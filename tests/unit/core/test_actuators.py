@@ -5,25 +5,26 @@ import math
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-from model_states import HIGH, LOW, RATE, TAU, P, actuators, derivative, repeatable, state
+from model_states import HIGH, LOW, RATE, TAU, P, actuators, derivative, state
 
 from firmware.core.vehicle import layout
 from firmware.core.vehicle.actuators import actuator_rate, actuator_rates, clip
 from firmware.core.vehicle.flight import nominal_step
+from tests.support.examples import examples
 
 anything = st.one_of(st.floats(allow_nan=True, allow_infinity=True), st.floats(-2.0, 2.0))
 commands = st.tuples(anything, anything, anything)
 ROUNDING = 1e-15
 
 
-@repeatable
+@examples()
 @given(anything, anything, anything, anything, anything, anything)
 def test_speed_is_never_above_the_rate(servo, slider, ballast, cmd_servo, cmd_slider, cmd_ballast):
     speeds = np.array(actuator_rates(P, servo, slider, ballast, cmd_servo, cmd_slider, cmd_ballast))
     assert (np.abs(speeds) <= RATE).all()  # NaN would not be
 
 
-@repeatable
+@examples()
 @given(actuators, st.lists(commands, min_size=1, max_size=20), st.sampled_from([0.001, 0.01, 0.05, 0.1]))
 def test_position_is_never_outside_the_range(act, sequence, dt):
     x, work = state(act=act), np.zeros((5, layout.N_X))
@@ -37,13 +38,13 @@ def test_position_is_never_outside_the_range(act, sequence, dt):
             assert (np.abs(now - before) <= RATE * dt * (1.0 + 1e-9) + ROUNDING).all()
 
 
-@repeatable
+@examples()
 @given(actuators, commands)
 def test_accelerations_stay_finite_whatever_the_commands(act, command):
     assert np.isfinite(derivative(state(nu=(0.3, 0.0, 0.02, 0.0, 0.0, 0.0), act=act), command)).all()
 
 
-@repeatable
+@examples()
 @given(anything, st.floats(-1.0, 0.0), st.floats(0.0, 1.0))
 def test_clip(value, low, high):
     held = clip(value, low, high)

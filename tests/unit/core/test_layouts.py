@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from firmware.core.layouts import estimator_layout as kf
+from firmware.core.layouts.cursor import Cursor
 from firmware.core.vehicle import layout
 from sim_backend.core import layout as wl
 from sim_backend.core.effects import effect_layout as ef
@@ -124,14 +125,15 @@ def test_a_layout_has_one_alias(room):
 
 
 def bare_fault_rows(tree: ast.AST) -> list[str]:
-    """Rows of the fault table by number: `ASKED + 24`, `ask(G, 24, ...)`, `Case(24, ...)`, `worst(24)`."""
+    """Rows of the fault table by number: `ASKED + 24`, `request(G, 24, ...)`, `Case(24, ...)`, `worst(24)`."""
     found = []
     for node in ast.walk(tree):
         if isinstance(node, ast.BinOp) and isinstance(node.left, ast.Attribute):
             row = node.right if node.left.attr in ("ASKED", "ENABLED", "FIRST", "WORST") else None
         elif isinstance(node, ast.Call) and node.args:
             name = getattr(node.func, "id", getattr(node.func, "attr", ""))
-            place = {"ask": 1, "Case": 0, "Show": 0, "worst": 0, "noticed": 0, "disable": 0}.get(name, len(node.args))
+            first = name in ("Case", "Show", "worst", "noticed", "disable")
+            place = 0 if first else 1 if name == "request" else len(node.args)
             row = node.args[place] if place < len(node.args) else None
         else:
             continue
@@ -141,8 +143,35 @@ def bare_fault_rows(tree: ast.AST) -> list[str]:
 
 
 def test_rows_of_the_fault_table_have_names():
-    assert bare_fault_rows(ast.parse("G[sup.ASKED + 24]; ask(G, 1, sup.LOG); man.worst(2)")) != []
+    assert bare_fault_rows(ast.parse("G[sup.ASKED + 24]; request(G, 1, sup.LEVEL_1); man.worst(2)")) != []
     assert {str(path): rows for path in FILES if (rows := bare_fault_rows(tree_of(path)))} == {}
+
+
+def counted_by_hand(tree: ast.Module) -> list[str]:
+    """Places given as numbers, alone or behind another place: `TICK = 7`, `A, B = 0, 1`, `SEEN = BEGAN + 1`."""
+    return [
+        ast.unparse(statement)
+        for statement in tree.body
+        if isinstance(statement, ast.Assign)
+        and any(isinstance(part, ast.Constant) and type(part.value) is int for part in ast.walk(statement.value))
+        and not any(isinstance(part, ast.Call) for part in ast.walk(statement.value))
+        and ast.unparse(statement.targets[0]) not in ("WIDTHS", "N_RING")
+    ]
+
+
+@pytest.mark.parametrize("name", ["supervisor_layout", "control_layout"])
+def test_places_of_supervisor_and_autopilot_are_counted_by_a_cursor(name):
+    assert len(counted_by_hand(ast.parse("A = 7\nA, B = 0, 1\nB = A + 1\nC = 1.0\nD = cursor(6)"))) == 3
+    assert counted_by_hand(tree_of(ROOT / "firmware" / "core" / "layouts" / f"{name}.py")) == []
+
+
+def test_a_cursor_hands_out_plain_numbers_in_turn():
+    cursor = Cursor()
+    a, b, (c, d) = cursor(), cursor(3), cursor.each(2)
+    assert [a, b, c, d, cursor.size] == [0, 1, 4, 5, 6]
+    assert {type(place) for place in (a, b, c, d)} == {int}
+    with pytest.raises(ValueError, match="unpack"):
+        _, _ = cursor.each(3)
 
 
 STATES = {"x", "X", "start", "starts", "begins", "error", "spread", "spreads", "spectral", "cov"}

@@ -16,7 +16,6 @@ from model_states import (
     full_mass_matrix,
     pitches,
     rates,
-    repeatable,
     state,
     velocities,
 )
@@ -30,6 +29,7 @@ from firmware.core.vehicle import layout
 from firmware.core.vehicle.mass import first_moment, inertia
 from firmware.core.vehicle.water import water_wrench
 from firmware.model.vehicle import decode_vehicle
+from tests.support.examples import examples
 
 LEDGER = PACKAGES_DIR / "docs" / "LEDGER.md"
 
@@ -84,7 +84,7 @@ def test_L4_lift_is_linear_in_alpha_and_the_printed_form_selectable():
         assert lift(printed, -alpha) == pytest.approx(lift(printed, alpha), rel=1e-12)
 
 
-@repeatable
+@examples()
 @given(velocities, rates)
 def test_L4_climbing_mirrors_diving(V, omega):
     """With linear lift (and K_L0 = K_M0 = 0) flow from above and flow from below do the same, mirrored.
@@ -98,7 +98,7 @@ def test_L4_climbing_mirrors_diving(V, omega):
     np.testing.assert_allclose(mirrored, moment * np.array([-1, -1, 1]), atol=1e-12)
 
 
-@repeatable
+@examples()
 @given(actuators)
 def test_L41_sliding_mass_is_at_r_s_and_ballast_stays_at_x_b(act):
     servo, slider, ballast = act
@@ -107,7 +107,7 @@ def test_L41_sliding_mass_is_at_r_s_and_ballast_stays_at_x_b(act):
     np.testing.assert_allclose(S - first_moment(P, servo, slider, 0.0), [ballast * P[layout.X_B], 0.0, 0.0], atol=1e-15)
 
 
-@repeatable
+@examples()
 @given(angles, angles, velocities, rates, actuators)
 def test_L17_signs_of_the_depth_acceleration(phi, psi, V, omega, act):
     """(17) as printed, from nu_dot of equation (1), is the derivative of (16) along the motion."""
@@ -148,7 +148,7 @@ def roll_acceleration(x: np.ndarray, nu_dot: np.ndarray, phi: float, theta: floa
     )  # fmt: skip
 
 
-@repeatable
+@examples()
 @given(angles, pitches, velocities, rates, actuators)
 def test_L14_pitch_form_has_the_pitch_moment_and_both_parts(phi, theta, V, omega, act):
     """(14) with T_2 under c_phi and the r_dot part under s_phi; exact where nothing is left out."""
@@ -183,7 +183,7 @@ def test_L14_pitch_form_has_the_pitch_moment_and_both_parts(phi, theta, V, omega
     assert f_t + g_ts * dr_s + g_tb * m_b == pytest.approx(exact, abs=2e-6)
 
 
-@repeatable
+@examples()
 @given(angles, pitches, velocities, rates, actuators)
 def test_L17_depth_form_is_18_and_the_exact_one_all_of_M(phi, theta, V, omega, act):
     (u, v, w), (p, q, r), (_, dr_s, m_b) = V, omega, act
@@ -214,7 +214,7 @@ def test_L17_depth_form_is_18_and_the_exact_one_all_of_M(phi, theta, V, omega, a
     np.testing.assert_allclose(both[1], both[0], rtol=1e-9, atol=1e-9)
 
 
-@repeatable
+@examples()
 @given(angles, pitches, velocities, rates, actuators)
 def test_L22_roll_hangs_from_what_is_below_the_axis(phi, theta, V, omega, act):
     """(22), (23) with sr: exact where nothing is left out, at rest where phi = gamma, and no length along x in it."""

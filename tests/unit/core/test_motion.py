@@ -16,7 +16,6 @@ from model_states import (
     full_mass_matrix,
     pitches,
     rates,
-    repeatable,
     state,
     vehicles,
     velocities,
@@ -26,6 +25,7 @@ from firmware.core.vehicle import layout
 from firmware.core.vehicle.mass import first_moment, first_moment_rate, inertia, translational_mass
 from firmware.core.vehicle.motion import solve_mass_matrix
 from firmware.core.vehicle.water import flow_angles, flow_to_body, water_wrench
+from tests.support.examples import examples
 
 GLIDER = Glider.from_file(VEHICLE)
 forces = st.tuples(*[st.floats(-10.0, 10.0)] * 6)
@@ -34,7 +34,7 @@ component = st.one_of(st.just(0.0), st.floats(1e-3, 1.0), st.floats(-1.0, -1e-3)
 flows = st.tuples(component, component, component)
 
 
-@repeatable
+@examples()
 @given(vehicles(), actuators, forces)
 def test_block_solve_is_the_full_solve(vehicle, act, force):
     M = full_mass_matrix(act, vehicle)
@@ -44,7 +44,7 @@ def test_block_solve_is_the_full_solve(vehicle, act, force):
     np.testing.assert_allclose(ours, np.linalg.solve(M, force), rtol=1e-10, atol=1e-12)
 
 
-@repeatable
+@examples()
 @given(actuators)
 def test_mass_matrix_is_the_independent_one(act):
     M = full_mass_matrix(act)
@@ -53,7 +53,7 @@ def test_mass_matrix_is_the_independent_one(act):
     assert np.linalg.eigvalsh(M).min() > 0.0
 
 
-@repeatable
+@examples()
 @given(actuators, st.tuples(*(st.floats(-rate, rate) for rate in RATE)))
 def test_rate_of_the_first_moment_is_its_derivative(act, act_rate):
     h = 1e-5
@@ -62,7 +62,7 @@ def test_rate_of_the_first_moment_is_its_derivative(act, act_rate):
     np.testing.assert_allclose(first_moment_rate(P, act[0], *act_rate), (ahead - behind) / (2 * h), atol=1e-9)
 
 
-@repeatable
+@examples()
 @given(flows, forces)
 def test_flow_to_body_is_matrix_3(V, wrench):
     alpha, beta, _ = flow_angles(*V)
@@ -72,7 +72,7 @@ def test_flow_to_body_is_matrix_3(V, wrench):
     np.testing.assert_allclose(printed, about(1, -alpha) @ about(2, beta), atol=1e-15)
 
 
-@repeatable
+@examples()
 @given(flows)
 def test_first_flow_axis_is_the_velocity(V):
     speed = float(np.linalg.norm(V))
@@ -80,7 +80,7 @@ def test_first_flow_axis_is_the_velocity(V):
         np.testing.assert_allclose(flow_to_body(*V, speed, 0.0, 0.0), V, atol=1e-15)
 
 
-@repeatable
+@examples()
 @given(velocities, rates)
 def test_water_wrench_is_the_independent_one(V, omega):
     nu = np.array([*V, *omega])
@@ -92,7 +92,7 @@ def test_still_water_does_nothing():
     assert flow_angles(0.0, 0.0, 0.0) == (0.0, 0.0, 0.0)
 
 
-@repeatable
+@examples()
 @given(flows, rates)
 def test_a_zero_has_no_sign(V, omega):
     negative = [-0.0 if speed == 0.0 else speed for speed in V]
@@ -100,7 +100,7 @@ def test_a_zero_has_no_sign(V, omega):
         assert water_wrench(P, *negative, *omega) == water_wrench(P, *V, *omega)
 
 
-@repeatable
+@examples()
 @given(angles, pitches, angles, velocities, rates, actuators, actuators)
 def test_derivative_is_the_independent_one(phi, theta, psi, V, omega, act, command):
     V = tuple(speed + 0.0 for speed in V)  # a zero has no sign here (test_a_zero_has_no_sign), to atan2 it has one

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from model_states import angles, pitches, quaternions, rates, repeatable
+from model_states import angles, pitches, quaternions, rates
 from scipy.spatial.transform import Rotation
 
 from firmware.core.maths.rotations import (
@@ -18,20 +18,21 @@ from firmware.core.maths.rotations import (
     rotation_nb_euler,
     wrap_angle,
 )
+from tests.support.examples import examples
 
 
 def scipy_rotation(q) -> Rotation:
     return Rotation.from_quat([q[1], q[2], q[3], q[0]])
 
 
-@repeatable
+@examples()
 @given(angles, st.floats(-math.pi, math.pi), angles)
 def test_quaternion_of_euler_angles_is_scipys(phi, theta, psi):
     ours = scipy_rotation(quaternion_from_euler(phi, theta, psi))
     assert (ours.inv() * Rotation.from_euler("ZYX", [psi, theta, phi])).magnitude() < 1e-14
 
 
-@repeatable
+@examples()
 @given(angles, pitches, angles)
 def test_euler_angles_come_back(phi, theta, psi):
     back = euler_from_quaternion(*quaternion_from_euler(phi, theta, psi))
@@ -40,7 +41,7 @@ def test_euler_angles_come_back(phi, theta, psi):
     assert abs(wrap_angle(back[2] - psi)) < 1e-12
 
 
-@repeatable
+@examples()
 @given(quaternions())
 def test_euler_angles_are_scipys(q):
     psi, theta, phi = scipy_rotation(q).as_euler("ZYX")
@@ -55,21 +56,21 @@ def test_attitude_survives_euler_angles_at_the_pole(theta):
         assert (scipy_rotation(q).inv() * scipy_rotation(back)).magnitude() < 1e-14
 
 
-@repeatable
+@examples()
 @given(quaternions())
 def test_rotation_matrix_is_scipys(q):
     ours = np.reshape(rotation_nb(*q), (3, 3))
     np.testing.assert_allclose(ours, scipy_rotation(q).as_matrix(), atol=1e-15)
 
 
-@repeatable
+@examples()
 @given(angles, st.floats(-math.pi, math.pi), angles)
 def test_printed_rotation_matrix_is_the_quaternions(phi, theta, psi):
     printed = rotation_nb_euler(phi, theta, psi)
     np.testing.assert_allclose(printed, rotation_nb(*quaternion_from_euler(phi, theta, psi)), atol=1e-15)
 
 
-@repeatable
+@examples()
 @given(quaternions(), rates)
 def test_quaternion_rate_is_a_small_turn_in_body_axes(q, omega):
     h = 1e-6
@@ -80,7 +81,7 @@ def test_quaternion_rate_is_a_small_turn_in_body_axes(q, omega):
     np.testing.assert_allclose(quaternion_rate(*q, *omega), sign * np.array([w, x, y, z]) / (2 * h), atol=1e-9)
 
 
-@repeatable
+@examples()
 @given(angles, st.floats(-1.3, 1.3), angles, rates)
 def test_euler_rates_are_those_of_the_quaternion(phi, theta, psi, omega):
     h = 1e-6
@@ -91,7 +92,7 @@ def test_euler_rates_are_those_of_the_quaternion(phi, theta, psi, omega):
     np.testing.assert_allclose([*euler_rates(phi, theta, omega[0], omega[1], omega[2])], moved, atol=1e-8)
 
 
-@repeatable
+@examples()
 @given(st.floats(-1e4, 1e4))
 def test_wrapped_angle_is_the_same_direction(angle):
     wrapped = wrap_angle(angle)
@@ -99,7 +100,7 @@ def test_wrapped_angle_is_the_same_direction(angle):
     assert abs(math.remainder(wrapped - angle, 2.0 * math.pi)) < 1e-11
 
 
-@repeatable
+@examples()
 @given(st.floats(-math.pi, math.pi, exclude_min=True))
 def test_angle_in_range_is_left_as_it_is(angle):
     assert wrap_angle(angle) == angle

@@ -92,6 +92,20 @@ def test_what_is_missing_or_no_number_changes_nothing():
     np.testing.assert_array_equal(filtered.cov, cov)
 
 
+@pytest.mark.parametrize("broken", ["state", "covariance"])
+def test_a_measurement_whose_score_is_no_number_is_rejected(broken):
+    filtered = Filter().start()
+    if broken == "state":
+        filtered.x[2] = math.nan
+    else:
+        filtered.cov[kf.E_POS + 2, kf.E_POS + 2] = math.nan
+    before = filtered.x.copy()
+    scores = filtered.update(depth=2.0)
+    assert np.isnan(scores[kf.Z_DEPTH])
+    assert filtered.rejected_for_s[kf.Z_DEPTH] == pytest.approx(0.1)
+    np.testing.assert_allclose(filtered.x, before, rtol=1e-14, atol=0.0)
+
+
 def settle(filtered: Filter, seconds: float = 5.0) -> None:
     """Readings that agree with the filter itself, for a while."""
     for _ in range(round(seconds / 0.1)):

@@ -3,10 +3,11 @@
 import gsw
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from firmware.core.vehicle.seawater import water_density
+from tests.support.examples import examples
 
 
 @pytest.mark.parametrize(
@@ -27,7 +28,7 @@ def test_published_check_values(salinity, temperature, bar, density):
     assert water_density(bar * 1e5, temperature, salinity) == pytest.approx(density, abs=2e-5)
 
 
-@settings(deadline=None, derandomize=True)
+@examples()
 @given(st.floats(0, 40), st.floats(0, 38), st.floats(0, 1000))
 def test_agrees_with_teos10_to_its_own_accuracy(temperature, salinity, depth):
     """EOS-80 and TEOS-10 differ by less than 0.1 kg/m3 over the range that gliders see."""

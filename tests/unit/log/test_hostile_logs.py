@@ -5,11 +5,12 @@ import json
 
 import pytest
 from click.testing import CliRunner
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 from mcap.writer import CompressionType, Writer
 
 from hal.recorder import logfile
+from tests.support.examples import examples
 from tools.cli.log import log as log_command
 from tools.data.errors import InputError
 from tools.data.log.reader import read_log
@@ -49,7 +50,7 @@ def hostile(draw, stream):
     writer.finish()
 
 
-@settings(max_examples=400, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+@examples(400, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 @given(data=st.data())
 def test_it_is_read_exported_and_shown_or_refused(tmp_path_factory, data):
     folder = tmp_path_factory.mktemp("hostile")

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mcap.writer import CompressionType, Writer
 
+from tests.support.examples import examples
 from tools.data.errors import InputError
 from tools.data.log.reader import read_log
 from tools.data.log.repair import repair
@@ -86,7 +87,7 @@ def test_a_cut_loses_less_than_the_chunk_it_is_in(small_log, scratch):
     assert whole.topics["/tick"].count == 500
 
 
-@settings(max_examples=250, deadline=None)
+@examples(250)
 @given(place=st.floats(0.0, 1.0, exclude_max=True), bit=st.integers(0, 7))
 def test_a_flipped_bit_is_never_returned_as_data(small_log, scratch, place, bit):
     whole, data = read_log(small_log), bytearray(small_log.read_bytes())
@@ -125,7 +126,7 @@ def test_a_length_that_points_past_whole_chunks_does_not_take_them_along(small_l
         assert log.metadata == whole.metadata
 
 
-@settings(max_examples=100, deadline=None)
+@examples()
 @given(st.lists(st.tuples(st.floats(0.0, 1.0), st.binary(min_size=1, max_size=600)), min_size=1, max_size=5))
 def test_overwritten_pieces_are_never_returned_as_data(small_log, scratch, pieces):
     whole, data = read_log(small_log), bytearray(small_log.read_bytes())
@@ -162,7 +163,7 @@ def test_the_first_chunk_with_the_definitions_may_be_lost(small_log, scratch):
     assert log.events
 
 
-@settings(max_examples=100, deadline=None)
+@examples()
 @given(data=st.binary(max_size=400), magic=st.booleans())
 def test_any_bytes_are_a_log_or_refused(scratch, data, magic):
     path = scratch / "any.mcap"

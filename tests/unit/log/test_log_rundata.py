@@ -6,12 +6,13 @@ import math
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from log_files import METADATA, TICK, VEHICLE, tick_rows, write_small_log
 from support.commands import glider
 
 from hal.strict import ConfigError
+from tests.support.examples import examples
 from tools.cli.log import log as command
 from tools.data.errors import InputError
 from tools.data.log.reader import read_log
@@ -115,7 +116,7 @@ def runs(draw):
     return Run("run00", None, columns, extra)
 
 
-@settings(max_examples=80, deadline=None)
+@examples(80)
 @given(run=runs())
 def test_run_data_survives_the_way_through_a_log(tmp_path_factory, run):
     folder = tmp_path_factory.mktemp("there")

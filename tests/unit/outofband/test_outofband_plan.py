@@ -6,11 +6,12 @@ import sys
 import zlib
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hal.board import BoardRequest, board_builder
 from hal.outofband.plan import FORMAT, NumberPlan, PlanError, ReadPlan, read_plan, write_plan
+from tests.support.examples import examples
 from tools.data.boards import load_board_file
 from tools.data.sources import load_vehicle
 from tools.flight.ascent_plan import make_plan
@@ -128,7 +129,7 @@ def test_a_plan_of_another_release_is_called_that(plan, tmp_path):
         read_plan(path)
 
 
-@settings(max_examples=200, deadline=None)
+@examples(200)
 @given(data=st.binary(max_size=300) | st.recursive(st.none() | st.integers() | st.text(), st.lists).map(
     lambda value: json.dumps(value).encode()))  # fmt: skip
 def test_any_bytes_are_refused_in_one_line(tmp_path_factory, data):

@@ -7,9 +7,10 @@ import time
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.support.examples import examples
 from tools.data.errors import InputError
 from tools.data.runs import columns as names
 from tools.data.runs import csvfile
@@ -122,7 +123,7 @@ def runs(draw):
     return Run("run00", None, columns, extra)
 
 
-@settings(max_examples=150, deadline=None)
+@examples(150)
 @given(run=runs(), packed=st.booleans())
 def test_what_is_written_reads_back_bit_for_bit(tmp_path_factory, run, packed):
     path = tmp_path_factory.mktemp("runs") / ("run00.csv.gz" if packed else "run00.csv")

@@ -3,7 +3,7 @@
 import gsw
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
@@ -19,12 +19,12 @@ from sim_backend.ocean.core.glide import (
     true_pitch,
 )
 from sim_backend.ocean.vehicle import KIND, decode_ocean_vehicle, gravity, shipped_vehicles
+from tests.support.examples import examples
 from tools.inference.core.ocean import propagate, read_state
 
 NO_EFFECT = np.zeros(at.N_F)
 VEHICLES = {name: decode_ocean_vehicle(text, name) for name, text in shipped_vehicles().items()}
 # The same examples on every run; a kernel may have to be compiled inside the first.
-repeatable = settings(deadline=None, derandomize=True, max_examples=100)
 pitches = st.floats(0.12, 0.8) | st.floats(-0.8, -0.12)
 
 
@@ -33,7 +33,7 @@ def vector(name: str = "slocum") -> np.ndarray:
 
 
 # --- the angle of attack and the balance ---
-@repeatable
+@examples()
 @given(pitch=pitches, parasitic=st.floats(0.02, 0.3), induced=st.floats(1.0, 20.0), slope=st.floats(4.0, 12.0))
 def test_the_angle_of_attack_solves_its_equation(pitch, parasitic, induced, slope):
     a = angle_of_attack(pitch, parasitic, induced, slope)
@@ -50,7 +50,7 @@ def test_a_pitch_too_small_to_glide_has_the_largest_angle():
 
 
 @pytest.mark.parametrize("name", sorted(VEHICLES))
-@repeatable
+@examples()
 @given(pitch=st.floats(0.3, 0.7) | st.floats(-0.7, -0.3), weight=st.floats(0.3, 4.0))
 def test_in_a_steady_glide_forces_balance_along_and_across(name, pitch, weight):
     P, density = vector(name), 1027.0
@@ -99,7 +99,7 @@ def test_the_next_speed_is_that_of_the_equation_of_motion(speed, force):
     assert np.all(np.array(errors[1:]) < 0.65 * np.array(errors[:-1]))  # of the first order
 
 
-@repeatable
+@examples()
 @given(speed=st.floats(0.05, 0.8), force=st.floats(0.0, 2.0), dt=st.floats(0.5, 60.0))
 def test_the_derivative_of_the_next_speed(speed, force, dt):
     P, h = vector(), 1e-6
@@ -125,7 +125,7 @@ def test_net_buoyancy_is_that_of_its_closed_form():
     assert net_buoyancy(P, NO_EFFECT, depth, density, 14.0, oil, 0.0) == pytest.approx(expected, rel=1e-6)
 
 
-@repeatable
+@examples()
 @given(latitude=st.floats(-90.0, 90.0))
 def test_gravity_is_that_of_the_sea_surface(latitude):
     assert gravity(latitude) == pytest.approx(float(gsw.grav(latitude, 0.0)), rel=1e-7)

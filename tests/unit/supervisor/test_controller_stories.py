@@ -1,4 +1,4 @@
-"""What the controller asks for, and how late (rows 15, 22, 24).
+"""What the controller asks for, how late, and what the filter hands to it (rows 15, 22, 24, 35).
 
 Each row as a story: all is well, something breaks, it is noticed in time, and what follows.
 """
@@ -86,6 +86,7 @@ def test_a_law_that_answers_again_starts_afresh():
         man.ap[ctl.LAW_STATUS] = 0.0
         man.step()
         assert man.G[sup.LAW_FAILED] == 0.0
+    assert man.seconds(5.1) == NOTHING
     man.ap[ctl.LAW_STATUS] = 1.0
     man.pilot.C[ctl.CONTROLLER] = ctl.PID  # the status is an old one
     assert man.step() == NOTHING
@@ -152,3 +153,27 @@ def test_overruns_of_another_minute_are_forgotten():
         assert late(man) == LOG
         man.step()
     assert man.supervisor.worst(sup.FAULT_OVERRUN) == LOG
+
+
+# --- row 35 ---------------------------------------------------------------------------------------------------------
+def test_a_restart_of_the_filter_warns_for_a_tick_and_the_third_aborts():
+    man = flying()
+    for count in (1.0, 2.0):
+        man.ap[ctl.FILTER_RESTARTS] = count
+        assert man.step() == WARN
+        assert man.supervisor.row == sup.FAULT_ESTIMATE
+        assert man.step() == NOTHING
+        assert man.seconds(5.0) == NOTHING
+    man.ap[ctl.FILTER_RESTARTS] = 3.0
+    assert man.step() == ABORT
+    assert man.supervisor.row == sup.FAULT_ESTIMATE
+    assert man.pilot.reason == "fault 35: estimate not finite"
+
+
+def test_more_restarts_are_borne_where_the_vehicle_file_says_so():
+    man = flying(filter_restarts=5)
+    for count in range(1, 5):
+        man.ap[ctl.FILTER_RESTARTS] = float(count)
+        assert man.step() == WARN
+    man.ap[ctl.FILTER_RESTARTS] = 5.0
+    assert man.step() == ABORT

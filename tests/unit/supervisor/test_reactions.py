@@ -1,22 +1,25 @@
 """Of all reactions asked for the highest wins: every pair of rows, every level, every reaction before; the limits."""
 
+import ast
 import itertools
 import math
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from firmware.core.layouts import control_layout as ctl
 from firmware.core.layouts import supervisor_layout as sup
 from firmware.core.supervision.supervisor import highest
-from firmware.faults import FAULTS, Reaction
+from firmware.faults import ABORT, FAULT_TABLE, FAULTS, NEVER, WARN, Reaction, markdown_rows
 from hal.ports import SLOTS, Validity
+from tests.support.examples import examples
 from tests.support.watchman import BALLAST_RANGE, DT, SLIDER_RANGE, Watchman
 from tools.study.faults.flights import flown
 
+ROOT = Path(__file__).resolve().parents[3]
 LEVELS = [float(level) for level in Reaction]
 ON = np.ones(sup.N_ROWS)
 
@@ -42,8 +45,9 @@ def test_every_pair_of_rows_at_every_level_over_every_reaction_before():
         asked[first] = asked[second] = 0.0
 
 
-@settings(derandomize=True, max_examples=300, deadline=None)
-@given(st.lists(st.sampled_from(LEVELS), min_size=34, max_size=34), st.lists(st.booleans(), min_size=34, max_size=34),
+@examples(300)
+@given(st.lists(st.sampled_from(LEVELS), min_size=len(FAULTS), max_size=len(FAULTS)),
+       st.lists(st.booleans(), min_size=len(FAULTS), max_size=len(FAULTS)),
        st.sampled_from(LEVELS))  # fmt: skip
 def test_any_rows_at_once_and_rows_switched_off(levels, on, before):
     asked, enabled = np.array([6.0, *levels]), np.array([1.0, *map(float, on)])
@@ -55,13 +59,87 @@ def test_any_rows_at_once_and_rows_switched_off(levels, on, before):
 
 def documented() -> dict[int, list[str]]:
     """Rows of the fault table in docs/SUPERVISOR.md: name, seen by, within, reaction, cleared by."""
-    lines = (Path(__file__).resolve().parents[3] / "docs" / "SUPERVISOR.md").read_text().splitlines()
+    lines = (ROOT / "docs" / "SUPERVISOR.md").read_text().splitlines()
     rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines if line.startswith("| ")]
     return {int(row[0]): row[1:] for row in rows if len(row) == 6 and row[0].isdigit()}
 
 
-def test_the_documented_table_has_every_row_by_its_name():
-    assert {number: row[0] for number, row in documented().items()} == FAULTS
+def test_the_documented_table_is_the_one_that_flies():
+    document = (ROOT / "docs" / "SUPERVISOR.md").read_text(encoding="utf-8").splitlines()
+    rows = markdown_rows()
+    assert [line for line in document if line in rows] == rows
+    assert sorted(documented()) == list(FAULTS)
+    assert f"The table has {len(FAULTS)} rows" in "\n".join(document)
+
+
+def test_levels_of_a_row_rise_and_what_is_below_abort_says_what_ends_it():
+    for fault in FAULT_TABLE.values():
+        reactions = [level.reaction for level in fault.levels]
+        assert reactions == sorted(set(reactions)), fault
+        assert len(reactions) <= sup.N_LEVELS
+        for level in fault.levels:
+            assert level.clear_after == NEVER or (level.reaction < ABORT and fault.well), fault
+
+
+def requested(tree: ast.AST) -> set[tuple[str, str]]:
+    """Rows and levels of the calls of `request` by their names; anything but a name or a choice of two is refused."""
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call) and getattr(node.func, "id", getattr(node.func, "attr", "")) == "request":
+            _, row, level = node.args
+            for one in (level.body, level.orelse) if isinstance(level, ast.IfExp) else (level,):
+                found.add((ast.unparse(row), ast.unparse(one)))
+    return found
+
+
+def test_kernels_request_every_level_of_the_table_and_no_other():
+    here = set()
+    for path in (ROOT / "firmware" / "core" / "supervision").glob("*.py"):
+        here |= requested(ast.parse(path.read_text(encoding="utf-8")))
+    names = {value: f"sup.{name}" for name, value in vars(sup).items() if name.startswith("FAULT_")}
+    wanted = {
+        (names[row], f"sup.LEVEL_{number}")
+        for row, fault in FAULT_TABLE.items()
+        for number, _ in enumerate(fault.levels, start=1)
+    }
+    assert here == wanted
+
+
+def test_the_table_is_copied_into_the_supervisors_vector():
+    man = Watchman(law_rest_s=7.0)
+    for row, fault in FAULT_TABLE.items():
+        start = row * sup.N_LEVELS
+        levels = [float(level.reaction) for level in fault.levels]
+        found = man.G[sup.REACTION + start : sup.REACTION + start + sup.N_LEVELS]
+        assert list(found) == levels + [0.0] * (sup.N_LEVELS - len(levels))
+    clear = man.G[sup.CLEAR_AFTER :]
+    assert clear[sup.FAULT_NO_ANSWER * sup.N_LEVELS + sup.LEVEL_1] == 7.0
+    assert clear[sup.FAULT_NO_ANSWER * sup.N_LEVELS + sup.LEVEL_2] == math.inf
+    assert clear[sup.FAULT_LEAK * sup.N_LEVELS + sup.LEVEL_1] == math.inf
+    assert clear[sup.FAULT_DISK * sup.N_LEVELS + sup.LEVEL_1] == 0.0
+
+
+def test_another_table_is_another_reaction():
+    """The kernels take the reaction and its clear time from the vector, not from themselves."""
+    man = Watchman()
+    man.step(5)
+    place = sup.FAULT_DISK * sup.N_LEVELS + sup.LEVEL_1
+    man.G[sup.REACTION + place], man.G[sup.CLEAR_AFTER + place] = WARN, 0.1
+    man.G[sup.RECORDER] = 1.0
+    assert man.step() == WARN
+    man.G[sup.RECORDER] = 0.0
+    assert [man.step() for _ in range(6)] == [WARN] * 4 + [Reaction.NOTHING] * 2
+
+
+def test_a_milder_request_does_not_replace_one_that_stands():
+    man = Watchman()
+    man.step(5)
+    place = sup.FAULT_DISK * sup.N_LEVELS + sup.LEVEL_2
+    man.G[sup.CLEAR_AFTER + place] = 0.1
+    man.G[sup.RECORDER] = 2.0
+    assert man.step() == WARN
+    man.G[sup.RECORDER] = 1.0
+    assert [man.step() for _ in range(6)] == [WARN] * 4 + [Reaction.LOG] * 2
 
 
 def test_what_the_fault_campaign_expects_of_a_row_is_what_is_documented():
@@ -69,7 +147,7 @@ def test_what_the_fault_campaign_expects_of_a_row_is_what_is_documented():
         assert case.expected.name in documented()[case.row][3], case
 
 
-@settings(derandomize=True, max_examples=60, deadline=None)
+@examples(60)
 @given(st.lists(st.tuples(st.sampled_from(LEVELS), st.lists(st.floats(width=64), min_size=3, max_size=3)),
                 min_size=2, max_size=40))  # fmt: skip
 def test_whatever_is_wanted_and_asked_for_what_is_sent_is_finite_within_range_and_rate(story):

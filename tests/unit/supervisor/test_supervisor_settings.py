@@ -105,6 +105,14 @@ def test_places_in_the_vector_do_not_overlap():
     assert max(singles) == sup.N_G == len(G)
 
 
+def test_leak_and_battery_are_judged_by_the_periods_of_their_devices():
+    slower = settings_vector(
+        Limits(), SupervisorTable(), dt=0.02, periods={**PERIODS, "leak": 1.0, "battery": 0.5}, site_depth=6.0,
+        mission_time=5.0,
+    )  # fmt: skip
+    assert list(slower[sup.PERIOD + sup.SENSOR_LEAK : sup.PERIOD + sup.N_SENSORS]) == [1.0, 0.5]
+
+
 def test_what_the_mission_and_the_flight_before_say_is_there():
     G = vector()
     assert G[sup.MISSION_TIME] == 600.0
@@ -124,11 +132,12 @@ SCALARS = {
     "deep_s": sup.DEEP_TIME, "at_risk_s": sup.RISK_TIME,
     "no_ascent_s": sup.ASCENT_TIME, "ascent_step_m": sup.ASCENT_STEP,
     "blind_ascent_s": sup.BLIND_TIME, "same_depth_s": sup.SAME_TIME, "same_depth_m": sup.SAME_BAND,
-    "leak_samples": sup.LEAK_COUNT, "steep_s": sup.STEEP_TIME, "law_tries": sup.LAW_RUN, "law_rest_s": sup.LAW_REST,
+    "leak_samples": sup.LEAK_COUNT, "steep_s": sup.STEEP_TIME, "law_tries": sup.LAW_RUN,
+    "filter_restarts": sup.RESTART_COUNT,
     "voltage_s": sup.VOLTAGE_TIME, "overruns": sup.OVERRUN_RUN, "overrun_share": sup.OVERRUN_SHARE,
     "stall_factor": sup.STALL_FACTOR, "stall_tries": sup.STALL_COUNT, "stall_rest_s": sup.STALL_REST,
     "surface_m": sup.SURFACE_DEPTH, "imu_s": sup.LOST_AFTER, "pressure_s": sup.LOST_AFTER + 1,
-    "wire_s": sup.LOST_AFTER + 2,
+    "wire_s": sup.LOST_AFTER + 2, "law_rest_s": sup.CLEAR_AFTER + sup.FAULT_NO_ANSWER * sup.N_LEVELS + sup.LEVEL_1,
 }  # fmt: skip
 ANGLES = {"disagree_pitch_deg": sup.DISAGREE_PITCH, "steep_deg": sup.STEEP_PITCH, "steep_margin_deg": sup.STEEP_MARGIN,
           "roll_deg": sup.STEEP_ROLL}  # fmt: skip

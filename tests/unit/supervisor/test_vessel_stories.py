@@ -55,6 +55,27 @@ def test_a_dip_of_voltage_is_no_under_voltage():
     assert man.supervisor.worst(sup.FAULT_VOLTAGE) == NOTHING
 
 
+def test_sags_with_a_silence_between_them_are_no_under_voltage():
+    man = flying(dt=COARSE, fitted=("battery",), limits=Limits(low_voltage=12.0, least_voltage=11.0))
+    for _ in range(3):
+        man.say["battery"] = (10.0,)
+        man.silence.clear()
+        man.seconds(0.4)
+        man.silence.add("battery")
+        man.seconds(10.0)
+    assert man.supervisor.worst(sup.FAULT_VOLTAGE) == NOTHING
+    man.silence.clear()
+    assert man.until(ABORT, 10.0) > 8.0
+
+
+def test_under_voltage_is_judged_at_the_rate_of_its_device():
+    """At 1 Hz samples are newer than three periods all the time; at 5 Hz, as without a word on it, they are not."""
+    man = flying(dt=COARSE, fitted=("battery",), slow_s=1.0, limits=Limits(low_voltage=12.0, least_voltage=11.0))
+    man.say["battery"] = (10.0,)
+    assert man.until(ABORT, 11.0) > 8.0
+    assert man.supervisor.worst(sup.FAULT_SAMPLE_TIME) == NOTHING
+
+
 # --- rows 25, 27, 33 ------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize(
     ("place", "value", "row", "reaction"),

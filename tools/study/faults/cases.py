@@ -12,6 +12,7 @@ SAFE, DAMAGE, LOST = "safe", "damaged", "lost"
 UNDER_WAY = ("descent", "level", "ascent")
 MOVING = ("descent", "ascent")
 ALL = PHASES
+IN_WATER = tuple(phase for phase in ALL if phase != "waiting")
 PLAIN = Setting()
 
 

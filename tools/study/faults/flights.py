@@ -10,10 +10,10 @@ import numpy as np
 from firmware.core.layouts import control_layout as ctl
 from firmware.core.layouts import supervisor_layout as sup
 from firmware.core.maths.rotations import euler_from_quaternion
-from firmware.core.vehicle.layout import CG_X, CG_Y, X_ACT, X_QUAT
+from firmware.core.vehicle.layout import CG_X, CG_Y, X_ACT, X_NU, X_QUAT
 from firmware.faults import Reaction
 from firmware.model.supervisor_settings import Limits
-from tools.study.faults.cases import ALL, MOVING, UNDER_WAY, Case
+from tools.study.faults.cases import IN_WATER, MOVING, UNDER_WAY, Case
 from tools.study.faults.scene import Scene, Setting
 
 NOTHING, LOG, WARN, HOLD, ABORT, OOB, HW = Reaction
@@ -60,9 +60,8 @@ def devices() -> list[Case]:
     cases += [
         Case(sup.FAULT_SERVO_LOST, f"servo {kind}", device("servo", kind), WARN, 0.5) for kind in ("silent", "off")
     ]
-    under = tuple(phase for phase in ALL if phase != "waiting")
     cases += [
-        Case(sup.FAULT_SAMPLE_TIME, f"{name} {kind}", device(name, kind), LOG, 4 * SAMPLE_S, under)
+        Case(sup.FAULT_SAMPLE_TIME, f"{name} {kind}", device(name, kind), LOG, 4 * SAMPLE_S, IN_WATER)
         for name in SENSORS
         for kind in ("delayed", "repeated", "backwards", "slow")
     ]
@@ -74,7 +73,7 @@ def devices() -> list[Case]:
         Case(sup.FAULT_IMPLAUSIBLE, f"{name} garbage", device(name, "garbage"), WARN, SAMPLE_S) for name in SENSORS
     ]
     cases += [
-        Case(sup.FAULT_IMPLAUSIBLE, f"{name} jumps", device(name, "jump", drift=JUMPS[name]), WARN, SAMPLE_S, under)
+        Case(sup.FAULT_IMPLAUSIBLE, f"{name} jumps", device(name, "jump", drift=JUMPS[name]), WARN, SAMPLE_S, IN_WATER)
         for name in SENSORS
     ]
     cases.append(Case(sup.FAULT_STUCK_SENSOR, "beacon stuck", device("beacon", "stuck"), WARN, 2.0 + SAMPLE_S, MOVING))
@@ -174,6 +173,23 @@ def no_solution(scene: Scene) -> None:
         return commands
 
     scene.pilot.tick = tick  # type: ignore[method-assign]
+
+
+def no_number_in_the_filter(times: int):
+    """So many times, half a second apart, a number of the Kalman filter's state is none."""
+
+    def begin(scene: Scene) -> None:
+        spoilt = [0]
+
+        def spoil(scene: Scene, t: float) -> None:
+            if spoilt[0] < times and t >= since + 0.5 * spoilt[0] - 1e-9:
+                scene.pilot.nav[ctl.NAV_X + X_NU + spoilt[0]] = math.nan
+                spoilt[0] += 1
+
+        since = scene.world.time
+        scene.each_tick = spoil
+
+    return begin
 
 
 def lateness(pattern):
@@ -289,7 +305,7 @@ def since_too_deep(to: float):
 
 
 def conditions() -> list[Case]:
-    """Rows 13, 15, 17 to 24, 33: what the vehicle, its controller, its loop and its surroundings do."""
+    """Rows 13, 15, 17 to 24, 33, 35: what the vehicle, its controller, its loop and its surroundings do."""
     deep = Limits(working_depth_m=2.0, at_risk_depth_m=5.0)
     risk = Limits(working_depth_m=1.99, at_risk_depth_m=2.0)
     drift = {"drift": (-4_000.0, 0.0)}
@@ -316,6 +332,9 @@ def conditions() -> list[Case]:
         Case(sup.FAULT_NO_ANSWER, "beyond all measure", controller(1e6), ABORT, 0.0, UNDER_WAY),
         Case(sup.FAULT_NO_ANSWER, "law without a solution", no_solution, ABORT, 0.02, UNDER_WAY,
              Setting(controller="law")),
+        Case(sup.FAULT_ESTIMATE, "no number in the filter", no_number_in_the_filter(1), WARN, 0.0, IN_WATER),
+        Case(sup.FAULT_ESTIMATE, "no number in the filter, three times", no_number_in_the_filter(3), ABORT, 0.0,
+             IN_WATER),
         Case(sup.FAULT_VOLTAGE, "voltage low", voltage(11.5), WARN, 10.0, setting=Setting(limits=BATTERY)),
         Case(sup.FAULT_VOLTAGE, "voltage too low", voltage(10.5), ABORT, 10.0, setting=Setting(limits=BATTERY)),
         Case(sup.FAULT_OVERRUN, "one overrun", lateness(lambda n: 0.03 * (n == 1)), LOG, 0.02, late=True),

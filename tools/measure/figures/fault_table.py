@@ -1,0 +1,11 @@
+"""Print the fault table as it stands in docs/SUPERVISOR.md; a test compares the two."""
+
+from firmware.faults import markdown_rows
+
+
+def main() -> None:
+    print(*markdown_rows(), sep="\n")
+
+
+if __name__ == "__main__":
+    main()
