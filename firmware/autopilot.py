@@ -6,7 +6,6 @@ import numpy as np
 
 from firmware.core.control import autopilot as core
 from firmware.core.control.controller_rows import CONTROLLERS
-from firmware.core.control.guidance import abort
 from firmware.core.estimation.sensing import longest_age
 from firmware.core.layouts import control_layout as ctl
 from firmware.core.layouts.estimator_layout import COMMANDED
@@ -147,8 +146,11 @@ class Autopilot:
         return bool(self.ap[ctl.MODE] >= ctl.COMPLETED)
 
     def give_up(self) -> None:
-        """Abort, as the operator wishes: ballast out, nose up, to the surface."""
-        abort(self.ap, ctl.REASON_OPERATOR)
+        """Request an abort for the operator; the next tick takes it: ballast out, nose up, to the surface.
+
+        One number is written, so that a signal handler may call this at any time between two kernels.
+        """
+        self.ap[ctl.STOP_REQUESTED] = 1.0
 
     def rms_errors(self) -> dict[str, float | None]:
         """Rms of estimate less reference while flying: depth_m, pitch_rad, roll_rad; None where not controlled."""

@@ -153,13 +153,10 @@ class Hardware(IntEnum):
     REAL = 2
 
 
-class Board(Protocol):
-    """A vehicle's hardware, or what stands in for it. Optional devices are None."""
+class Ports(Protocol):
+    """What the loop flies by. Optional devices are None."""
 
-    name: str
     loop_hz: float
-    surface_pressure: float  # Pa, absolute, where depth is zero
-    periods: dict[str, float]  # s between two samples: imu, beacon, wires (the slower of both)
     out_of_band: OutOfBand | None
 
     @property
@@ -186,6 +183,15 @@ class Board(Protocol):
     def ballast(self) -> ActuatorPort: ...
     @property
     def drop_weight(self) -> DropWeight | None: ...
+
+
+class Board(Ports, Protocol):
+    """A vehicle's hardware, or what stands in for it."""
+
+    name: str
+    surface_pressure: float  # Pa, absolute, where depth is zero
+    periods: dict[str, float]  # s between two samples: imu, beacon, wires (the slower of both)
+
     @property
     def watchdog(self) -> HardwareWatchdog | None: ...
     @property

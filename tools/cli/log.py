@@ -89,6 +89,7 @@ def _summary(the_log: Any) -> dict[str, Any]:
         "complete": the_log.complete,
         "read_to": the_log.end,
         "damaged": [vars(item) for item in the_log.damages],
+        "began": the_log.began or None,
         "duration_s": the_log.duration_s,
         "topics": {
             name: {
@@ -118,7 +119,7 @@ def info(file: Path, as_json: bool) -> None:
     if as_json:
         print_json(_summary(the_log))
         return
-    _show(f"{file}: {_headline(the_log)}; {the_log.duration_s:.2f} s")
+    _show(f"{file}: {_headline(the_log)}; {f'{the_log.began}, ' if the_log.began else ''}{the_log.duration_s:.2f} s")
     for line in _parts(the_log):
         _show(f"  {line}")
     for name, topic in the_log.topics.items():

@@ -23,7 +23,7 @@ from tools.flight.compose import Flight
 LISTEN_S = 0.4
 ZERO_M = 0.5  # of depth by pressure, at the surface
 STEADY_DEG = 45.0
-BYTES_PER_SECOND = 40_000.0  # of a log, generously
+BYTES_PER_SECOND = 60_000.0  # of a log, generously
 SPARE_BYTES = 50e6
 FITTED = ("imu", "beacon", "slider_wire", "plunger_wire")
 

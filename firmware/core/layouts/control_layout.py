@@ -113,7 +113,9 @@ WANTED_SERVO, WANTED_SLIDER, WANTED_BALLAST = 41, 42, 43  # what the controller 
 CAUTIOUS = 44  # 1: the PID flies, whatever controller is chosen
 AP_REACTION, AP_FAULT_ROW = 45, 46  # the supervisor's, and the row of the fault table that asked for it
 SUPERVISED = 47  # 1: a supervisor guards, and it alone gives the dive up for what it sees
-N_AP = 48
+STOP_REQUESTED = 48  # 1: the operator wants the dive given up; written between two ticks, from a signal handler
+STOP_TAKEN = 49  # STOP_REQUESTED as this tick found it
+N_AP = 50
 
 # --- modes and reasons ----------------------------------------------------------------------------------------------
 WAITING, FLYING, COMPLETED, ABORTED = 0.0, 1.0, 2.0, 3.0

@@ -205,15 +205,13 @@ def power_cuts(seconds: float, every: int) -> None:
 
 def reference_log(path: Path, seconds: float) -> None:
     """A flight on the simulated board at real time, so that the log is brought to the disk as it is in flight."""
-    from hal.recorder.recorder import Recorder
-    from tools.flight.compose import build_flight, build_runtime, log_metadata, record_specs
+    from tools.flight.compose import build_flight, build_recorder, build_runtime
 
     mission = path.with_suffix(".toml")
     mission.write_text(DIP.format(seconds=1000.0).replace("time_limit_s = 60.0", "time_limit_s = 2000.0"))
     flight = build_flight(mission=str(mission), realtime=True)
-    metadata = log_metadata(flight, seed=0, effects={})
-    with Recorder(path, record_specs(flight), attachments=flight.texts, metadata=metadata) as recorder:
-        flight.board.open()
+    flight.board.open()
+    with build_recorder(flight, path) as recorder:
         runtime = build_runtime(flight, recorder)
         runtime.arm()
         try:
