@@ -101,6 +101,18 @@ def filter_memory(vehicle: Vehicle) -> np.ndarray:
     return nav
 
 
+def reason_text(code: float, leg: int, legs: np.ndarray) -> str:
+    """Describe why a dive was given up (a REASON_ code) in which leg (from 0) of `legs`; empty if it was not."""
+    if code > ctl.REASON_FAULT:
+        row = int(code - ctl.REASON_FAULT)
+        return f"fault {row}: {FAULTS[row]}"
+    if code == ctl.REASON_LEG_TIME:
+        target, turn = legs[leg, ctl.LEG_DEPTH], legs[leg, ctl.LEG_TURNED]
+        missed = f"not at {target:g} m" if math.isfinite(target) else f"not turned by {math.degrees(turn):g} deg"
+        return f"leg {leg + 1}: {missed} within {legs[leg, ctl.LEG_TIME_LIMIT]:g} s"
+    return REASONS[code]
+
+
 class Autopilot:
     """Flies one mission with one vehicle. All memory is allocated here; `tick` only writes into it."""
 
@@ -127,18 +139,7 @@ class Autopilot:
     @property
     def reason(self) -> str:
         """Why the dive was given up, with the leg; empty if it was not."""
-        code = float(self.ap[ctl.REASON])
-        if code > ctl.REASON_FAULT:
-            row = int(code - ctl.REASON_FAULT)
-            return f"fault {row}: {FAULTS[row]}"
-        reason = REASONS[code]
-        if self.ap[ctl.REASON] == ctl.REASON_LEG_TIME:
-            row = int(self.ap[ctl.LEG])
-            target, turn = self.legs[row, ctl.LEG_DEPTH], self.legs[row, ctl.LEG_TURNED]
-            limit = self.legs[row, ctl.LEG_TIME_LIMIT]
-            missed = f"not at {target:g} m" if math.isfinite(target) else f"not turned by {math.degrees(turn):g} deg"
-            return f"leg {row + 1}: {missed} within {limit:g} s"
-        return reason
+        return reason_text(float(self.ap[ctl.REASON]), int(self.ap[ctl.LEG]), self.legs)
 
     @property
     def finished(self) -> bool:
