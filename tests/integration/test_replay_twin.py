@@ -1,5 +1,6 @@
 """A flight on wires, its device errors in its log, and the log flown again, to the bit."""
 
+import functools
 import json
 
 import pytest
@@ -23,9 +24,10 @@ def fly(folder, on_second=None):
     log = folder / "dip.mcap"
     for attempt in range(TRIES):
         flight = build_flight(mission=str(folder / "dip.toml"), vehicle=str(patient_vehicle(folder)), board="twin")
-        second = None if on_second is None else (lambda t, flight=flight: on_second(flight, t))
+        make_recorder = functools.partial(build_recorder, flight, log)
+        second = None if on_second is None else functools.partial(on_second, flight)
         try:
-            sortie.fly(flight, sortie.Host(flight, name="dip"), lambda: build_recorder(flight, log), on_second=second)
+            sortie.fly(flight, sortie.Host(flight, name="dip"), make_recorder, on_second=second)
             break
         except BoardError:
             if attempt == TRIES - 1:
