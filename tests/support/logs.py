@@ -32,12 +32,21 @@ ballast_kg = -0.15
 """
 
 
-def fly_dip(folder: Path, on_second: Callable[[Flight, float], None] | None = None) -> Path:
-    """Fly DIP on the simulated board, with leak sensor and battery; on_second(flight, t) may break them. The log."""
+def fly_dip(
+    folder: Path,
+    on_second: Callable[[Flight, float], None] | None = None,
+    before: Callable[[Flight], None] | None = None,
+) -> Path:
+    """Fly DIP on the simulated board, with leak sensor and battery, and return the log.
+
+    on_second(flight, t) may break them; before(flight) is called before arming.
+    """
     mission = folder / "dip.toml"
     mission.write_text(DIP)
     flight = build_flight(mission=str(mission))
     break_in(flight.board)
+    if before is not None:
+        before(flight)
     log = folder / "dip.mcap"
     host = sortie.SimulatedHost(flight, name="dip", paced=False)
     second = None if on_second is None else (lambda t: on_second(flight, t))

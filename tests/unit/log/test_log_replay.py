@@ -8,6 +8,7 @@ import pytest
 from support.commands import glider
 from support.logs import fly_dip, write_changed
 
+from firmware.core.layouts import control_layout as ctl
 from firmware.core.layouts import supervisor_layout as sup
 from firmware.telemetry import TICK
 from hal.recorder.schema import RecordSpec
@@ -70,6 +71,32 @@ def test_what_the_runtime_told_the_supervisor_is_replayed(tmp_path):
     path = fly_dip(tmp_path, tell)
     assert 33.0 in read_log(path).topics["/tick"].column("fault")
     assert replayed(path)[0] == 0
+
+
+def test_an_ascent_after_a_flight_that_broke_off_is_replayed(tmp_path):
+    """As flight/sortie begins one: given up before the first tick, and the supervisor told of the restart."""
+
+    def restart(flight):
+        flight.autopilot.give_up()
+        flight.supervisor.G[sup.RESTARTED] = 1.0
+
+    path = fly_dip(tmp_path, before=restart)
+    assert read_log(path).metadata["restarted"] == "true"
+    assert replayed(path)[0] == 0
+    other = write_changed(path, tmp_path / "other.mcap", metadata={"restarted": "false"})
+    assert replayed(other)[0] == 1
+
+
+def test_a_surface_pressure_measured_at_arming_is_the_replays(tmp_path):
+    def measure(flight):
+        flight.autopilot.C[ctl.SURFACE_PRESSURE] -= 731.5
+
+    path = fly_dip(tmp_path, before=measure)
+    assert replayed(path)[0] == 0
+    other = write_changed(path, tmp_path / "other.mcap", metadata={"surface_pressure_pa": "101325.0"})
+    code, found = replayed(other)
+    assert code == 1
+    assert "depth_m" in found["first"]["fields"]
 
 
 def test_an_actuator_that_takes_less_than_it_was_asked_is_replayed(tmp_path):
