@@ -251,7 +251,7 @@ def measure_cuts(seconds: float, every: int) -> dict[str, Any]:
                     for name, topic in log.topics.items()
                 )
                 wrong += not (good and not log.damages)
-                worst = max(worst, _lost_s(log, ends, cut))
+                worst = max(worst, _lost_s(log, ends, cut, whole.epoch_ns))
                 if done % 5000 == 0:
                     repaired += _repairs(repair, read_log, path, log)
                 advance(1)
@@ -286,13 +286,14 @@ def chunk_ends(path: Path) -> list[Piece]:
     return sorted(found, key=lambda piece: piece.start)
 
 
-def _lost_s(log: Any, pieces: list[Piece], cut: int) -> float:
-    """Seconds between the last record read and the last that the piece at the cut was to bring."""
+def _lost_s(log: Any, pieces: list[Piece], cut: int, epoch_ns: int) -> float:
+    """Seconds between the last record read (none: the flight's start) and the last that the piece at the cut was to
+    bring."""
     begun = [piece.last_ns for piece in pieces if piece.start < cut]
     if not begun:
         return 0.0
     read = [int(topic.times_ns.max()) for topic in log.topics.values() if topic.count]
-    return (max(begun) - max(read, default=0)) / 1e9
+    return (max(begun) - max(read, default=epoch_ns)) / 1e9
 
 
 def _repairs(repair: Any, read_log: Any, path: Path, cut: Any) -> bool:
