@@ -6,7 +6,6 @@ import numpy as np
 
 from firmware.core.control import autopilot as core
 from firmware.core.control.controller_rows import CONTROLLERS
-from firmware.core.control.guidance import abort
 from firmware.core.estimation.sensing import longest_age
 from firmware.core.layouts import control_layout as ctl
 from firmware.core.layouts.estimator_layout import COMMANDED
@@ -102,6 +101,18 @@ def filter_memory(vehicle: Vehicle) -> np.ndarray:
     return nav
 
 
+def reason_text(code: float, leg: int, legs: np.ndarray) -> str:
+    """Describe why a dive was given up (a REASON_ code) in which leg (from 0) of `legs`; empty if it was not."""
+    if code > ctl.REASON_FAULT:
+        row = int(code - ctl.REASON_FAULT)
+        return f"fault {row}: {FAULTS[row]}"
+    if code == ctl.REASON_LEG_TIME:
+        target, turn = legs[leg, ctl.LEG_DEPTH], legs[leg, ctl.LEG_TURNED]
+        missed = f"not at {target:g} m" if math.isfinite(target) else f"not turned by {math.degrees(turn):g} deg"
+        return f"leg {leg + 1}: {missed} within {legs[leg, ctl.LEG_TIME_LIMIT]:g} s"
+    return REASONS[code]
+
+
 class Autopilot:
     """Flies one mission with one vehicle. All memory is allocated here; `tick` only writes into it."""
 
@@ -128,18 +139,7 @@ class Autopilot:
     @property
     def reason(self) -> str:
         """Why the dive was given up, with the leg; empty if it was not."""
-        code = float(self.ap[ctl.REASON])
-        if code > ctl.REASON_FAULT:
-            row = int(code - ctl.REASON_FAULT)
-            return f"fault {row}: {FAULTS[row]}"
-        reason = REASONS[code]
-        if self.ap[ctl.REASON] == ctl.REASON_LEG_TIME:
-            row = int(self.ap[ctl.LEG])
-            target, turn = self.legs[row, ctl.LEG_DEPTH], self.legs[row, ctl.LEG_TURNED]
-            limit = self.legs[row, ctl.LEG_TIME_LIMIT]
-            missed = f"not at {target:g} m" if math.isfinite(target) else f"not turned by {math.degrees(turn):g} deg"
-            return f"leg {row + 1}: {missed} within {limit:g} s"
-        return reason
+        return reason_text(float(self.ap[ctl.REASON]), int(self.ap[ctl.LEG]), self.legs)
 
     @property
     def finished(self) -> bool:
@@ -147,8 +147,11 @@ class Autopilot:
         return bool(self.ap[ctl.MODE] >= ctl.COMPLETED)
 
     def give_up(self) -> None:
-        """Abort, as the operator wishes: ballast out, nose up, to the surface."""
-        abort(self.ap, ctl.REASON_OPERATOR)
+        """Request an abort for the operator; the next tick takes it: ballast out, nose up, to the surface.
+
+        One number is written, so that a signal handler may call this at any time between two kernels.
+        """
+        self.ap[ctl.STOP_REQUESTED] = 1.0
 
     def rms_errors(self) -> dict[str, float | None]:
         """Rms of estimate less reference while flying: depth_m, pitch_rad, roll_rad; None where not controlled."""

@@ -23,7 +23,7 @@ from firmware.core.layouts import control_layout as ctl
 from firmware.core.layouts import supervisor_layout as sup
 from firmware.faults import Reaction
 from firmware.supervisor import Supervisor
-from hal.ports import SLOTS, Board, Hardware
+from hal.ports import FRAME_SIZE, SLOTS, Hardware, Ports
 
 HISTOGRAM_EDGES = np.array([0.0, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, np.inf])  # s
 SHED = 10  # of so many records one is kept while the loop is late
@@ -70,14 +70,14 @@ def rehearse(autopilot: Autopilot, supervisor: Supervisor) -> None:
     pilot.tick(0.0)
     watcher.guard(0.0)
     scratch = np.zeros(record.N_RECORD)
-    record.fill_record(pilot.frame, pilot.est, pilot.ap, pilot.commands, 0.0, 0.0, 0.0, scratch)
+    record.fill_record(pilot.frame, pilot.est, pilot.ap, watcher.G, pilot.commands, 0.0, 0.0, 0.0, scratch)
 
 
 class Runtime:
-    """Runs an autopilot on a board. `tick` is one step; `run` steps until the mission ends."""
+    """Runs an autopilot on a board. `tick` waits and does one `step`; `run` ticks until the mission ends."""
 
     def __init__(
-        self, board: Board, autopilot: Autopilot, supervisor: Supervisor, channel: Any, *,
+        self, board: Ports, autopilot: Autopilot, supervisor: Supervisor, channel: Any, *,
         extras: tuple[Callable[[float], None], ...] = (), on_news: Callable[[float, Reaction, str], Any] | None = None,
         resources: Callable[[], tuple[float, int]] = resources_used,
     ):  # fmt: skip
@@ -99,6 +99,8 @@ class Runtime:
             (port.read, frame[slot.all]) for name, slot in SLOTS.items() if (port := getattr(board, name)) is not None
         )
         self._send = (board.servo.command, board.slider.command, board.ballast.command)
+        self._raw = channel.values[record.REC_FRAME : record.REC_FRAME + FRAME_SIZE]
+        self._asked = channel.values[record.REC_ASKED : record.REC_ASKED + 3]
         self._edges = HISTOGRAM_EDGES[1:-1].tolist()
         self._counts = self.timing.counts
         self._deadline = 0.0
@@ -127,22 +129,37 @@ class Runtime:
 
     def tick(self) -> None:
         """Wait for the deadline, then do one step."""
-        clock, autopilot, supervisor, channel = self._clock, self.autopilot, self.supervisor, self.channel
-        deadline = self._deadline
+        clock, deadline = self._clock, self._deadline
         clock.sleep_until(deadline)
         t = clock.now()
         lateness = t - deadline
+        self.step(t, lateness)
+        self._count(lateness)
+        self._last_duration = clock.now() - t
+        self._deadline = deadline + self.dt
+        if lateness > self.dt:
+            self._skip(t)
+
+    def step(self, t: float, lateness: float) -> None:
+        """One step at time t (s), `lateness` (s) after its deadline: ports to samples, to commands, to ports.
+
+        Its result depends on t, lateness, the samples read, the commands taken, RECORDER, GROWTH, STOP_REQUESTED and
+        the steps before. All of these are recorded, so that a log can be replayed (tools/flight/replay).
+        """
+        autopilot, supervisor, channel = self.autopilot, self.supervisor, self.channel
         for read, slot in self._reads:
             read(slot)
         G = self._G
         G[sup.LATENESS] = lateness
+        self._raw[...] = autopilot.frame
         supervisor.screen(t)
         commands = autopilot.tick(t)
         supervisor.guard(t)
+        self._asked[...] = commands
         for i in (0, 1, 2):
             commands[i] = self._take_back(i, commands[i])
         record.fill_record(
-            autopilot.frame, autopilot.est, autopilot.ap, commands, t, lateness, self._last_duration, channel.values
+            autopilot.frame, autopilot.est, autopilot.ap, G, commands, t, lateness, self._last_duration, channel.values
         )
         self._shed = (self._shed + 1) % SHED if G[sup.ASKED + sup.FAULT_OVERRUN] >= sup.HOLD else 0
         if not self._shed:
@@ -151,11 +168,6 @@ class Runtime:
             extra(t)
         if G[sup.CHANGED]:
             self._react(t)
-        self._count(lateness)
-        self._last_duration = clock.now() - t
-        self._deadline = deadline + self.dt
-        if lateness > self.dt:
-            self._skip(t)
 
     def _take_back(self, i: int, wanted: float) -> float:
         """Command actuator i; what its device took, after limits of its own, is what filter, anti-windup and stall

@@ -1,6 +1,7 @@
 """Names, units and meaning of what a flight records each tick. The places are those of core/telemetry."""
 
-from firmware.core.control.telemetry import N_RECORD
+from firmware.core.control.telemetry import N_RECORD, REC_ASKED, REC_FRAME
+from hal.ports import SLOTS
 from hal.recorder.schema import Field, RecordSpec
 
 _FIELDS = (
@@ -72,8 +73,32 @@ _FIELDS = (
     ("fault", "1", "row of the fault table that asked for it; docs/SUPERVISOR.md"),
 )
 
+# What a replay of the flight needs beside t_s, lateness_s and cmd_*: docs/LOG.md, Replay.
+ASKED = ("asked_servo_rad", "asked_slider_m", "asked_ballast_kg")
+RAW = tuple(
+    (f"raw_{port}_{name}", unit, text)
+    for port, slot in SLOTS.items()
+    for name, unit, text in (
+        ("time", "s", "time of the sample, before screening"),
+        ("validity", "1", "0 missing, 1 valid, 2 stale, 3 fault; before screening"),
+        *((name, unit, "before screening") for name, unit in zip(slot.names, slot.units, strict=True)),
+    )
+)
+_REPLAYED = (
+    *((name, name.rpartition("_")[2], "command before the actuator's own limits") for name in ASKED),
+    *RAW,
+    ("recorder", "1", "the recording: 0 well, 1 dropping, 2 failed"),
+    ("growth", "1", "memory or handles: 0 none, 1 have grown, 2 past their limit"),
+    ("stop", "1", "1: the operator has asked for the dive to be given up"),
+)
+REPLAYED = tuple(name for name, _, _ in _REPLAYED)
+
 TICK = RecordSpec(
-    "/tick", "glider/msg/Tick", tuple(Field(name, unit=unit, description=text) for name, unit, text in _FIELDS)
+    "/tick",
+    "glider/msg/Tick",
+    tuple(Field(name, unit=unit, description=text) for name, unit, text in (*_FIELDS, *_REPLAYED)),
 )
 
-assert len(_FIELDS) == N_RECORD
+assert TICK.width == N_RECORD
+assert TICK.index(ASKED[0]) == REC_ASKED
+assert TICK.index(RAW[0][0]) == REC_FRAME

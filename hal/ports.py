@@ -153,14 +153,10 @@ class Hardware(IntEnum):
     REAL = 2
 
 
-class Board(Protocol):
-    """A vehicle's hardware, or what stands in for it. Optional devices are None."""
+class Ports(Protocol):
+    """What the loop flies by. Optional devices are None."""
 
-    name: str
     loop_hz: float
-    surface_pressure: float  # Pa, absolute, where depth is zero: as filed, then as measured at arming
-    armed_depth: float  # m, of the beacon below the surface when the vehicle is armed; 0: in air or awash
-    periods: dict[str, float]  # s between two samples: imu, beacon, wires (the slower of both); leak, battery if fitted
     out_of_band: OutOfBand | None
 
     @property
@@ -187,6 +183,16 @@ class Board(Protocol):
     def ballast(self) -> ActuatorPort: ...
     @property
     def drop_weight(self) -> DropWeight | None: ...
+
+
+class Board(Ports, Protocol):
+    """A vehicle's hardware, or what stands in for it."""
+
+    name: str
+    surface_pressure: float  # Pa, absolute, where depth is zero: as filed, then as measured at arming
+    armed_depth: float  # m, of the beacon below the surface when the vehicle is armed; 0: in air or awash
+    periods: dict[str, float]  # s between two samples: imu, beacon, wires (the slower of both); leak, battery if fitted
+
     @property
     def watchdog(self) -> HardwareWatchdog | None: ...
     @property

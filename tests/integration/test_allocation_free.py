@@ -84,11 +84,11 @@ def test_an_object_made_every_fiftieth_tick_is_caught(monkeypatch):
 
 
 @njit
-def _many_ticks(n, P, C, legs, frame, est, ap, nav, cmd, out):
+def _many_ticks(n, P, C, legs, frame, est, ap, nav, G, cmd, out):
     for i in range(n):
         t = 0.02 * i
         core.tick(P, C, legs, frame, est, ap, nav, cmd, t)
-        fill_record(frame, est, ap, cmd, t, 0.0, 0.0, out)
+        fill_record(frame, est, ap, G, cmd, t, 0.0, 0.0, out)
 
 
 @njit
@@ -129,7 +129,7 @@ def test_the_compiled_tick_allocates_nothing(controller):
         law_at_work = pilot.ap[ctl.LAW_RAN] == 1.0 and np.isfinite(pilot.ap[ctl.MARGIN_DEPTH])
         assert law_at_work == (controller != "pid")
         arguments = (pilot.P, pilot.C, pilot.legs, pilot.frame, pilot.est, pilot.ap)
-        arguments += (pilot.nav, pilot.commands, np.zeros(N_RECORD))
+        arguments += (pilot.nav, flown.runtime.supervisor.G, pilot.commands, np.zeros(N_RECORD))
         _many_ticks(1, *arguments)
         assert _allocations(lambda: _many_ticks(1000, *arguments)) == _allocations(lambda: _many_ticks(1, *arguments))
 

@@ -37,6 +37,7 @@ CALLS: tuple[tuple[str, str | None], ...] = (
     ("check", None),
     ("check --board twin", None),
     ("log info flight.mcap", None),
+    ("log replay flight.mcap", None),
     ("log export flight.mcap --out case", None),
     ("log fetch --help", None),  # its work is ssh's: test_log_fetch.py
     ("log repair flight.mcap --out mended.mcap", None),

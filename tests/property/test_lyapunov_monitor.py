@@ -11,6 +11,7 @@ from firmware.core.control.law import k2_to_cover
 from firmware.core.control.lyapunov_monitor import WATCH_EVERY
 from firmware.core.control.telemetry import N_RECORD, REC_LYAPUNOV, fill_record
 from firmware.core.layouts import control_layout as ctl
+from firmware.core.layouts import supervisor_layout as sup
 from firmware.core.vehicle import layout
 from tools.flight.compose import build_flight
 
@@ -138,7 +139,7 @@ def test_it_looks_five_times_a_second_and_the_record_has_what_it_saw():
         step(world, pilot, tick)
         world.cmd[...] = pilot.commands
         times.add(float(pilot.ap[ctl.MONITORED]))
-        fill_record(pilot.frame, pilot.est, pilot.ap, pilot.commands, 0.02 * tick, 0.0, 0.0, out)
+        fill_record(pilot.frame, pilot.est, pilot.ap, np.zeros(sup.N_G), pilot.commands, 0.02 * tick, 0.0, 0.0, out)
         assert np.array_equal(out[REC_LYAPUNOV : REC_LYAPUNOV + 4], pilot.ap[VALUES], equal_nan=True)
     gaps = np.diff(sorted(times - {-math.inf}))
     assert gaps == pytest.approx(WATCH_EVERY, abs=1e-9)

@@ -22,6 +22,11 @@ def say(message: str) -> None:
     click.echo(message, err=True)
 
 
+def show(line: str) -> None:
+    """Print a line of the result that quotes a file: nothing in it steers the terminal."""
+    click.echo("".join(letter if letter.isprintable() else "\ufffd" for letter in line))
+
+
 def fail(message: str) -> None:
     """End with exit code 1: the thing asked about failed."""
     say(message)

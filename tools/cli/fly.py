@@ -84,7 +84,7 @@ def fly(
     from hal.recorder.recorder import NullRecorder, Recorder
     from tools.data.errors import InputError
     from tools.flight import sortie
-    from tools.flight.compose import build_flight, log_metadata, parse_effects, record_specs
+    from tools.flight.compose import build_flight, build_recorder, parse_effects, record_specs
     from tools.flight.precompile import FLIGHT, ensure_compiled
     from tools.flight.terminal import Stop, undisturbed
 
@@ -100,11 +100,10 @@ def fly(
         raise InputError("is there already; a log is never written over", source=path)
 
     def make_recorder() -> Recorder | NullRecorder:
-        specs, metadata = record_specs(flight), log_metadata(flight, seed=seed, effects=wanted)
         if path is None:
-            return NullRecorder(specs)
+            return NullRecorder(record_specs(flight))
         onlookers = live_socket(state_folder) if live else None
-        return Recorder(path, specs, attachments=flight.texts, metadata=metadata, onlookers=onlookers)
+        return build_recorder(flight, path, seed=seed, effects=wanted, onlookers=onlookers)
 
     ensure_compiled(FLIGHT, say, progress)
     if flight.control.controller != "pid":

@@ -1,11 +1,13 @@
 """`glider log`: look into, export, repair an onboard log, or fetch it off the vehicle."""
 
+import json
 from pathlib import Path
 from typing import Any
 
 import click
 
-from tools.cli.common import DONE, FAILED, json_option, print_json, progress, say
+from tools.cli.common import DONE, FAILED, json_option, print_json, progress, say, show
+from tools.cli.replay import replay
 
 LEVELS = {10: "debug", 20: "info", 30: "warn", 40: "error", 50: "fatal"}
 _SHOWN_EVENTS = 20
@@ -14,11 +16,6 @@ _SHOWN_EVENTS = 20
 @click.group()
 def log() -> None:
     """Export, look into, repair an onboard log, or fetch it off the vehicle."""
-
-
-def _show(line: str) -> None:
-    """A line that holds what a file says: nothing in it steers the terminal."""
-    click.echo("".join(letter if letter.isprintable() else "\ufffd" for letter in line))
 
 
 def _file(path: Path) -> Path:
@@ -89,6 +86,7 @@ def _summary(the_log: Any) -> dict[str, Any]:
         "complete": the_log.complete,
         "read_to": the_log.end,
         "damaged": [vars(item) for item in the_log.damages],
+        "began": the_log.began or None,
         "duration_s": the_log.duration_s,
         "topics": {
             name: {
@@ -107,6 +105,16 @@ def _summary(the_log: Any) -> dict[str, Any]:
     }
 
 
+def _devices(text: str) -> list[str]:
+    """Error counts of the devices at the flight's end, one a line, out of the log's closing entry."""
+    from tools.flight.device_counts import errors_text
+
+    try:
+        return [f"{name}: {errors_text(health) or 'no errors'}" for name, health in json.loads(text).items()]
+    except (ValueError, KeyError, AttributeError, TypeError):  # not the recorder's
+        return [text]
+
+
 @log.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @json_option
@@ -118,20 +126,24 @@ def info(file: Path, as_json: bool) -> None:
     if as_json:
         print_json(_summary(the_log))
         return
-    _show(f"{file}: {_headline(the_log)}; {the_log.duration_s:.2f} s")
+    show(f"{file}: {_headline(the_log)}; {f'{the_log.began}, ' if the_log.began else ''}{the_log.duration_s:.2f} s")
     for line in _parts(the_log):
-        _show(f"  {line}")
+        show(f"  {line}")
     for name, topic in the_log.topics.items():
         missing = f", {topic.missing} missing" if topic.missing else ""
-        _show(f"  {name:<10} {topic.count} records{missing} ({topic.schema_name}, {len(topic.fields)} numbers)")
+        show(f"  {name:<10} {topic.count} records{missing} ({topic.schema_name}, {len(topic.fields)} numbers)")
     for name, text in the_log.attachments.items():
-        _show(f"  {name:<20} {len(text.encode())} bytes")
+        show(f"  {name:<20} {len(text.encode())} bytes")
     for name, text in {**the_log.metadata, **the_log.ending}.items():
-        _show(f"  {name:<20} {text}")
+        for line in _devices(text) if name == "devices" else [text]:
+            show(f"  {name:<20} {line}")
     for event in the_log.events[:_SHOWN_EVENTS]:
-        _show(f"  {event.time_s:9.2f} s  {LEVELS.get(event.severity, event.severity):<5} {event.text}")
+        show(f"  {event.time_s:9.2f} s  {LEVELS.get(event.severity, event.severity):<5} {event.text}")
     if len(the_log.events) > _SHOWN_EVENTS:
-        _show(f"  and {len(the_log.events) - _SHOWN_EVENTS} more events (--json has them all)")
+        show(f"  and {len(the_log.events) - _SHOWN_EVENTS} more events (--json has them all)")
+
+
+log.add_command(replay)
 
 
 @log.command()

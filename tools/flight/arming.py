@@ -27,7 +27,7 @@ WEATHER_PA = 6_000.0
 STEADY_DEG = 45.0
 TURNING_DEG_S = 60.0
 WIRE_SLACK = 0.1  # of an actuator's range, by which its draw-wire may be off
-BYTES_PER_SECOND = 40_000.0  # of a log, generously
+BYTES_PER_SECOND = 60_000.0  # of a log, generously
 SPARE_BYTES = 50e6
 
 

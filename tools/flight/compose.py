@@ -1,11 +1,16 @@
 """The composition root: the one place that builds a flight out of vehicle, mission, board and recorder."""
 
+import json
+import time
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import msgspec
 
 from firmware.autopilot import Autopilot, configuration
+from firmware.core.layouts.control_layout import SURFACE_PRESSURE
+from firmware.core.layouts.supervisor_layout import RESTARTED
 from firmware.core.vehicle.seawater import water_density
 from firmware.faults import Reaction
 from firmware.guidance.mission import Mission
@@ -17,6 +22,7 @@ from firmware.supervisor import Supervisor
 from firmware.telemetry import TICK
 from hal.board import BoardRequest, board_builder
 from hal.ports import ACTUATORS, Board, BoardError, Hardware
+from hal.recorder.recorder import Recorder
 from hal.recorder.schema import DEBUG, ERROR, FATAL, INFO, WARN
 from hal.strict import ConfigError
 from tools.data.boards import load_board_file
@@ -98,12 +104,10 @@ def build_flight(
     the_board = board_builder(board_file.kind)(request)
     limits = {name: getattr(the_board, name).limits for name in ACTUATORS}
     the_vehicle = within(the_vehicle, limits, board_file.source)
-    C = configuration(
-        the_vehicle, the_mission, dt=1.0 / the_board.loop_hz, periods=the_board.periods,
+    autopilot, supervisor = build_pilot(
+        the_vehicle, the_mission, mission_source, loop_hz=the_board.loop_hz, periods=the_board.periods,
         surface_pressure=the_board.surface_pressure,
     )  # fmt: skip
-    autopilot = Autopilot(the_vehicle, the_mission, C, mission_source)
-    supervisor = Supervisor(autopilot, the_vehicle, the_mission, dt=1.0 / the_board.loop_hz, periods=the_board.periods)
     texts = {"vehicle.toml": vehicle_text, "mission.toml": mission_text, "board.toml": board_file.text}
     return Flight(the_vehicle, the_mission, the_board, autopilot, supervisor, texts)
 
@@ -124,6 +128,21 @@ def within(vehicle: Vehicle, limits: dict[str, tuple[float, float]], source: str
     return msgspec.structs.replace(vehicle, actuators=msgspec.structs.replace(vehicle.actuators, **tables))
 
 
+def build_pilot(
+    vehicle: Vehicle, mission: Mission, source: str, *, loop_hz: float, periods: dict[str, float],
+    surface_pressure: float, restarted: bool = False,
+) -> tuple[Autopilot, Supervisor]:  # fmt: skip
+    """Build the autopilot and the supervisor that watches it, for a flight or for its replay.
+
+    source: of the mission, for errors; periods: of the sensors' samples, s; surface_pressure: Pa; restarted: an earlier
+    flight did not end in order.
+    """
+    dt = 1.0 / loop_hz
+    C = configuration(vehicle, mission, dt=dt, periods=periods, surface_pressure=surface_pressure)
+    autopilot = Autopilot(vehicle, mission, C, source)
+    return autopilot, Supervisor(autopilot, vehicle, mission, dt=dt, periods=periods, restarted=restarted)
+
+
 def load_vehicle_text(wanted: str) -> tuple[str, Vehicle]:
     """A vehicle's text and the vehicle."""
     from tools.data.sources import name_or_path
@@ -134,7 +153,10 @@ def load_vehicle_text(wanted: str) -> tuple[str, Vehicle]:
 
 
 def log_metadata(flight: Flight, *, seed: int, effects: dict[str, dict[str, float]]) -> dict[str, str]:
-    """What a log says of itself; what the simulation hides from the vehicle is not in it, but for the seed."""
+    """What a log says of itself; what the simulation hides from the vehicle is not in it, but for the seed.
+
+    Called once the vehicle is armed: the entries that a replay needs are those that the flight begins with.
+    """
     from importlib.metadata import version
 
     site = flight.mission.site
@@ -148,12 +170,32 @@ def log_metadata(flight: Flight, *, seed: int, effects: dict[str, dict[str, floa
         "water_density_kg_m3": f"{water_density(0.0, 20.0, site.salinity):.2f}",
         "seed": str(seed),
         "effects": ", ".join(effects),
+        "loop_hz": repr(float(flight.board.loop_hz)),
+        "periods_s": json.dumps(flight.board.periods),
+        "surface_pressure_pa": repr(float(flight.autopilot.C[SURFACE_PRESSURE])),
+        "restarted": "true" if flight.supervisor.G[RESTARTED] == 1.0 else "false",
+        "actuator_limits": json.dumps({name: getattr(flight.board, name).limits for name in ACTUATORS}),
     }
 
 
 def record_specs(flight: Flight) -> tuple:
     """What this flight records: the ticks, and the plant's truth where there is a plant."""
     return (TICK, *flight.board.records)
+
+
+def build_recorder(
+    flight: Flight, path: Path, *, seed: int = 0, effects: dict[str, dict[str, float]] | None = None,
+    onlookers: Path | None = None,
+) -> Recorder:  # fmt: skip
+    """Build the recorder of an armed flight, with all that its log says of it; the board is open.
+
+    Its log times are Unix time: the wall clock is read here, once, and the board's clock counts on from it.
+    """
+    return Recorder(
+        path, record_specs(flight), attachments=flight.texts,
+        metadata=log_metadata(flight, seed=seed, effects=effects or {}),
+        epoch_ns=time.time_ns() - round(1e9 * flight.board.clock.now()), onlookers=onlookers,
+    )  # fmt: skip
 
 
 def build_runtime(flight: Flight, recorder: Any) -> Runtime:
@@ -172,4 +214,7 @@ def build_runtime(flight: Flight, recorder: Any) -> Runtime:
     )
 
 
-__all__ = ["BoardError", "Flight", "build_flight", "build_runtime", "load_board_file", "parse_effects", "record_specs"]
+__all__ = [
+    "BoardError", "Flight", "build_flight", "build_pilot", "build_recorder", "build_runtime", "load_board_file",
+    "parse_effects", "record_specs",
+]  # fmt: skip

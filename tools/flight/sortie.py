@@ -20,6 +20,7 @@ from hal.sortie import Facts, Party, Refused, State, Trigger, follow
 from hal.state_file import StateFile
 from tools.flight.arming import arm
 from tools.flight.compose import Flight, build_runtime
+from tools.flight.device_counts import DeviceCounts
 
 RING_ROOM = 512  # records on their way to the disk, past which a simulated flight waits
 
@@ -180,6 +181,7 @@ def fly(
         host.armed()
         recorder = stack.enter_context(make_recorder())
         runtime = build_runtime(flight, recorder)
+        counts = DeviceCounts(board, recorder)
         host.begin(recorder)
         runtime.extras = (*runtime.extras, host.beat)
 
@@ -187,6 +189,7 @@ def fly(
             if on_second is not None:
                 on_second(t)
             host.second(runtime.timing)
+            counts.look(t)
 
         try:
             if before_loop is not None:
@@ -204,5 +207,6 @@ def fly(
         host.closing(ending)
         board.close()
         state = host.end()
-        report = recorder.close(ending={"ended": flight.autopilot.mode, "reason": flight.autopilot.reason})
+        said = {"ended": flight.autopilot.mode, "reason": flight.autopilot.reason, **counts.ending()}
+        report = recorder.close(ending=said)
     return Flown(ending, state, runtime.timing, seconds, report)

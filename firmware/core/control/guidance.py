@@ -70,7 +70,11 @@ def guard_alone(C, est, ap, t):
 
 @kernel
 def sequence(C, legs, est, ap, t):
-    """Move through the legs; a leg over its time aborts, and without a supervisor what `guard_alone` sees."""
+    """Move through the legs; the operator's stop aborts, so does a leg over its time, and without a supervisor what
+    `guard_alone` sees."""
+    ap[ctl.STOP_TAKEN] = ap[ctl.STOP_REQUESTED]
+    if ap[ctl.STOP_TAKEN] == 1.0:
+        abort(ap, ctl.REASON_OPERATOR)
     if ap[ctl.MODE] == ctl.WAITING:
         if est[ctl.EST_STARTED] == 1.0:
             begin_mission(est, ap, t)

@@ -4,7 +4,8 @@ import math
 
 from firmware.core.jit import kernel
 from firmware.core.layouts import control_layout as ctl
-from hal.ports import BEACON
+from firmware.core.layouts import supervisor_layout as sup
+from hal.ports import BEACON, FRAME_SIZE
 
 # Places in the record; firmware/telemetry.py gives them their names.
 REC_T, REC_CMD, REC_SLIDER, REC_BALLAST, REC_ATTITUDE, REC_RATES, REC_DEPTH = 0, 1, 4, 5, 6, 9, 12
@@ -14,7 +15,11 @@ REC_DENSITY, REC_PRESSURE, REC_TEMPERATURE, REC_SAMPLE_TIMES = 28, 29, 30, 31
 REC_ESTIMATE, REC_SPREADS = 35, 48
 REC_LYAPUNOV = 52
 REC_REACTION, REC_FAULT_ROW = 56, 57
-N_RECORD = 58
+# The inputs of a replay, beside t, lateness and the commands that the actuators took. The runtime itself copies
+# REC_ASKED, the commands before the actuators take them, and REC_FRAME, the frame before it is screened.
+REC_ASKED, REC_FRAME = 58, 61
+REC_RECORDER, REC_GROWTH, REC_STOP = REC_FRAME + FRAME_SIZE, REC_FRAME + FRAME_SIZE + 1, REC_FRAME + FRAME_SIZE + 2
+N_RECORD = REC_FRAME + FRAME_SIZE + 3
 
 
 @kernel
@@ -24,8 +29,9 @@ def fresh(value, time, seen):
 
 
 @kernel
-def fill_record(frame, est, ap, cmd, t, lateness, duration, out):
-    """Write one tick into out (N_RECORD,); the sample times that out holds from the tick before tell what is new."""
+def fill_record(frame, est, ap, G, cmd, t, lateness, duration, out):
+    """Write one tick into out (N_RECORD,), but for REC_ASKED and REC_FRAME; the sample times that out holds from the
+    tick before tell what is new."""
     out[REC_T] = t
     out[REC_CMD], out[REC_CMD + 1], out[REC_CMD + 2] = cmd[0], cmd[1], cmd[2]
     imu, beacon = est[ctl.EST_IMU_TIME], est[ctl.EST_BEACON_TIME]
@@ -66,3 +72,4 @@ def fill_record(frame, est, ap, cmd, t, lateness, duration, out):
         out[REC_SPREADS + i] = est[ctl.SD_DEPTH_RATE + i]
         out[REC_LYAPUNOV + i] = ap[ctl.K2_NEED_PITCH + i]
     out[REC_REACTION], out[REC_FAULT_ROW] = ap[ctl.AP_REACTION], ap[ctl.AP_FAULT_ROW]
+    out[REC_RECORDER], out[REC_GROWTH], out[REC_STOP] = G[sup.RECORDER], G[sup.GROWTH], ap[ctl.STOP_TAKEN]

@@ -121,6 +121,8 @@ CAUTIOUS = _ap()  # 1: the PID flies, whatever controller is chosen
 AP_REACTION, AP_FAULT_ROW = _ap.each(2)  # the supervisor's, and the row of the fault table that asked for it
 SUPERVISED = _ap()  # 1: a supervisor guards, and it alone gives the dive up for what it sees
 FILTER_RESTARTS = _ap()  # how often the filter was not finite, and was started anew
+STOP_REQUESTED = _ap()  # 1: the operator wants the dive given up; written between two ticks, from a signal handler
+STOP_TAKEN = _ap()  # STOP_REQUESTED as this tick found it
 N_AP = _ap.size
 
 # --- modes and reasons ----------------------------------------------------------------------------------------------

@@ -180,7 +180,7 @@ def test_a_clock_that_stands_or_leaps_is_refused(flight, monkeypatch, shift):
 def test_a_full_disk_is_refused(flight, tmp_path, monkeypatch):
     usage = shutil.disk_usage(tmp_path)
     monkeypatch.setattr(arming.shutil, "disk_usage", lambda folder: usage._replace(free=60_000_000))
-    assert "60 MB free, a flight may need 74 MB" in one_refused(found(flight, tmp_path), "disk")
+    assert "60 MB free, a flight may need 86 MB" in one_refused(found(flight, tmp_path), "disk")
 
 
 @pytest.mark.skipif(os.getuid() == 0, reason="root may write anywhere")

@@ -115,6 +115,7 @@ def _together(parts: list[Part], absent: dict[int, Path], left_out: list[str]) -
         attachments={name: text for log in reversed(logs) for name, text in log.attachments.items()},
         metadata={key: value for key, value in facts.items() if key != logfile.PART},
         ending={key: value for log in logs for key, value in log.ending.items()},
+        attached_ns=logs[0].attached_ns,
     )
     joined.parts, joined.absent, joined.left_out = parts, absent, left_out
     return joined

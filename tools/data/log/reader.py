@@ -5,6 +5,7 @@ import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -83,6 +84,27 @@ class Log:
     attachments: dict[str, str]
     metadata: dict[str, str]  # written at the start
     ending: dict[str, str]  # written at the end; empty in a cut file
+    attached_ns: int = 0  # log time of the attachments, which is the epoch's
+
+    @property
+    def epoch_ns(self) -> int:
+        """Unix time of the flight's t = 0, ns; 0 where the log gives no date."""
+        try:
+            epoch = int(self.metadata.get("epoch_ns", self.attached_ns))
+        except ValueError:
+            return 0
+        return epoch if abs(epoch) <= _LAST_NS else 0
+
+    @property
+    def began(self) -> str:
+        """Date and time of the first record, ISO 8601, UTC; empty where the log gives no date."""
+        firsts = [int(topic.times_ns.min()) for topic in self.topics.values() if topic.count]
+        if self.epoch_ns <= 0 or not firsts:
+            return ""
+        try:
+            return datetime.fromtimestamp(min(firsts) // 10**9, UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+        except (ValueError, OverflowError, OSError):
+            return ""
 
     @property
     def whole(self) -> bool:
@@ -174,6 +196,7 @@ def _gather(scan: Scan, log: Log) -> dict[int, _Gathered]:
     found: dict[int, _Gathered] = {}
     for item in scan.records():
         if isinstance(item, Attachment):
+            log.attached_ns = min(item.log_time, _LAST_NS)
             if item.name == logfile.SCHEMAS_ATTACHMENT:
                 definitions.learn_from(item)
             else:
@@ -206,16 +229,7 @@ def _take(message: Message, definitions: Definitions, found: dict[int, _Gathered
             severity, text = logfile.decode_event(message.data)
         except (struct.error, ValueError, IndexError):
             return
-        epoch = _epoch_ns(log)
-        log.events.append(Event((message.log_time - epoch) / 1e9, severity, text))
-
-
-def _epoch_ns(log: Log) -> int:
-    try:
-        epoch = int(log.metadata.get("epoch_ns", "0"))
-    except ValueError:
-        return 0
-    return epoch if abs(epoch) <= _LAST_NS else 0
+        log.events.append(Event((message.log_time - log.epoch_ns) / 1e9, severity, text))
 
 
 def _topic(gathered: _Gathered) -> Topic:

@@ -14,6 +14,7 @@ from msgspec import structs
 
 from firmware.model.library import shipped
 from firmware.model.vehicle import decode_vehicle
+from firmware.telemetry import REPLAYED
 from hal.recorder import disk
 from hal.recorder.logfile import LogFile
 from hal.recorder.schema import Field, RecordSpec
@@ -115,6 +116,8 @@ def run_of(log: Log, name: str = "run00") -> Exported:
         raise InputError(f"holds no {TICK} records with {names.TIME}", source=log.path)
     notes = []
     columns = _spread(tick)
+    if log.metadata.get(SOURCE) != RUN_DATA:  # what a replay needs is not run data
+        columns = {column: values for column, values in columns.items() if column not in REPLAYED}
     keep = _increasing(columns[names.TIME])
     if not keep.any():
         raise InputError(f"holds no {TICK} record with a time", source=log.path)

@@ -116,7 +116,7 @@ def _fly(
     from hal import realtime
     from hal.recorder.recorder import Recorder
     from tools.flight import sortie
-    from tools.flight.compose import build_flight, log_metadata, record_specs
+    from tools.flight.compose import build_flight, build_recorder
     from tools.flight.keeper import Keeper
 
     flight = build_flight(mission=str(mission), board="twin")
@@ -132,8 +132,7 @@ def _fly(
             super().prepare()
 
     def make_recorder() -> Recorder:
-        metadata = log_metadata(flight, seed=0, effects={})
-        made.append(Recorder(folder / "log.mcap", record_specs(flight), attachments=flight.texts, metadata=metadata))
+        made.append(build_recorder(flight, folder / "log.mcap"))
         return made[0]
 
     def before_loop() -> None:

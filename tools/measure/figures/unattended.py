@@ -205,15 +205,13 @@ def power_cuts(seconds: float, every: int) -> None:
 
 def reference_log(path: Path, seconds: float) -> None:
     """A flight on the simulated board at real time, so that the log is brought to the disk as it is in flight."""
-    from hal.recorder.recorder import Recorder
-    from tools.flight.compose import build_flight, build_runtime, log_metadata, record_specs
+    from tools.flight.compose import build_flight, build_recorder, build_runtime
 
     mission = path.with_suffix(".toml")
     mission.write_text(DIP.format(seconds=1000.0).replace("time_limit_s = 60.0", "time_limit_s = 2000.0"))
     flight = build_flight(mission=str(mission), realtime=True)
-    metadata = log_metadata(flight, seed=0, effects={})
-    with Recorder(path, record_specs(flight), attachments=flight.texts, metadata=metadata) as recorder:
-        flight.board.open()
+    flight.board.open()
+    with build_recorder(flight, path) as recorder:
         runtime = build_runtime(flight, recorder)
         runtime.arm()
         try:
@@ -253,7 +251,7 @@ def measure_cuts(seconds: float, every: int) -> dict[str, Any]:
                     for name, topic in log.topics.items()
                 )
                 wrong += not (good and not log.damages)
-                worst = max(worst, _lost_s(log, ends, cut))
+                worst = max(worst, _lost_s(log, ends, cut, whole.epoch_ns))
                 if done % 5000 == 0:
                     repaired += _repairs(repair, read_log, path, log)
                 advance(1)
@@ -288,13 +286,14 @@ def chunk_ends(path: Path) -> list[Piece]:
     return sorted(found, key=lambda piece: piece.start)
 
 
-def _lost_s(log: Any, pieces: list[Piece], cut: int) -> float:
-    """Seconds between the last record read and the last that the piece at the cut was to bring."""
+def _lost_s(log: Any, pieces: list[Piece], cut: int, epoch_ns: int) -> float:
+    """Seconds between the last record read (none: the flight's start) and the last that the piece at the cut was to
+    bring."""
     begun = [piece.last_ns for piece in pieces if piece.start < cut]
     if not begun:
         return 0.0
     read = [int(topic.times_ns.max()) for topic in log.topics.values() if topic.count]
-    return (max(begun) - max(read, default=0)) / 1e9
+    return (max(begun) - max(read, default=epoch_ns)) / 1e9
 
 
 def _repairs(repair: Any, read_log: Any, path: Path, cut: Any) -> bool:
