@@ -10,7 +10,7 @@ differs from that of closed_loop.fly by what the loop makes of that (tests/unit/
 import numpy as np
 
 from firmware.core.control.autopilot import decide, reset
-from firmware.core.estimation.navigation import start_filter, step_filter
+from firmware.core.estimation.navigation import is_finite, restart_filter, start_filter, step_filter, write_estimate
 from firmware.core.estimation.sensing import sense, take_as_measured
 from firmware.core.jit import allocating_kernel, kernel, parallel_kernel, prange
 from firmware.core.layouts import control_layout as ctl
@@ -114,7 +114,14 @@ def estimate_lanes(P, Cs, members, flying, ests, aps, navs, x, est, nav, sent, t
     step_filter(P, as_wide(nav), as_wide(est), as_wide(sent), kind == ctl.GIVEN, t)
     for lane in range(LANES):
         if flying[lane] and ests[lane, ctl.EST_STARTED] == 1.0:
+            north, east = ests[lane, ctl.EST_X], ests[lane, ctl.EST_Y]
             take_lane(est, lane, ests[lane])
+            if not is_finite(nav[:, lane]):
+                take_lane(nav, lane, navs[lane])
+                restart_filter(P, navs[lane], ests[lane], north, east, t)
+                write_estimate(navs[lane], ests[lane], kind == ctl.GIVEN)
+                put_lane(navs[lane], lane, nav)
+                aps[lane, ctl.FILTER_RESTARTS] += 1.0
             for i in (S_LINEAR, S_ANGULAR):  # what the controllers' watch sees of the filter
                 navs[lane, ctl.NAV_SETTINGS + i] = nav[ctl.NAV_SETTINGS + i, lane]
 
