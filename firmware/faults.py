@@ -179,6 +179,9 @@ FAULT_TABLE = {
         "estimate not finite", SUPERVISOR, 0.0, (Level(WARN), Level(ABORT, "at `filter_restarts` in a flight")),
         "measured values, filter restarted", "a finite estimate",
     ),
+    sup.FAULT_ACKNOWLEDGED: Fault(
+        "acknowledged while under way", "command line", None, (), "refused", "afloat, by the out-of-band process",
+    ),
 }  # fmt: skip
 FAULTS = {number: fault.name for number, fault in FAULT_TABLE.items()}
 

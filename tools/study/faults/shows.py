@@ -9,7 +9,7 @@ import signal
 
 from firmware.core.layouts import supervisor_layout as sup
 from tools.study.faults.cases import Show
-from tools.study.faults.shown import console, loading, ports, processes, records, wire
+from tools.study.faults.shown import console, ends, loading, ports, processes, records, wire
 
 
 def shows() -> list[Show]:
@@ -26,10 +26,12 @@ def shows() -> list[Show]:
              0.1 if code <= 3 else 1.0)
           for code in range(1, 7)),
         *(Show(sup.FAULT_NOT_ARMED, kind, loading.arming(kind), "refuse to arm", 1.0)
-          for kind in ("depth not zero", "limits unset", "never calibrated", "wrong hash")),
+          for kind in loading.UNFIT),
         Show(sup.FAULT_NO_ASCENT, "out of band", processes.no_rise, "pump again, then HW", 30.0),
         Show(sup.FAULT_LOOP_HUNG, "process killed", processes.loop_ends(signal.SIGKILL), "OOB", 2.0),
         Show(sup.FAULT_LOOP_HUNG, "loop hung", processes.loop_ends(signal.SIGSTOP), "OOB", 2.0),
+        Show(sup.FAULT_LOOP_HUNG, "disk slow at the end", ends.slow_disk, "waited for", 0.0),
+        Show(sup.FAULT_LOOP_HUNG, "out-of-band process breaks off", ends.watch_breaks_off, "watchdog runs on", 0.0),
         Show(sup.FAULT_LOOP_HUNG, "restart", processes.restart, "ascent only", 2.0),
         Show(sup.FAULT_WALL_CLOCK, "an hour on and back", processes.wall_clock, "no effect", 0.0),
         Show(sup.FAULT_DISK, "disk full", records.full_disk, "LOG", 1.0),
@@ -38,5 +40,7 @@ def shows() -> list[Show]:
         Show(sup.FAULT_FILE, "files", loading.bad_files, "refused", 0.0),
         Show(sup.FAULT_SERIAL, "random and mutated bytes", wire.hostile_bytes, "back in step", 1.0),
         Show(sup.FAULT_CONSOLE, "garbage", console.console, "no effect", 0.0),
+        *(Show(sup.FAULT_ACKNOWLEDGED, f"in {name}", ends.acknowledged(ascending), "refused", 0.0)
+          for name, ascending in (("a flight", False), ("an ascent out of band", True))),
         Show(sup.FAULT_PORT, "a second program", ports.two_programs, "refused", 0.0),
     ]  # fmt: skip

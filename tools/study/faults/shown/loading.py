@@ -3,10 +3,16 @@
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from firmware.model.supervisor_settings import Limits
 from hal.strict import ConfigError
 from tools.study.faults.cases import Came, came
+
+UNFIT = (
+    "depth not zero", "no weather's pressure", "limits unset", "never calibrated", "wrong hash", "wet hull",
+    "flat battery", "drive in alarm", "gyro turns", "wire out of range", "tank cannot be emptied",
+)  # fmt: skip
 
 
 def arming(kind: str) -> Callable[[bool, Path], Came]:
@@ -16,17 +22,35 @@ def arming(kind: str) -> Callable[[bool, Path], Came]:
         import msgspec
 
         from hal.board import BoardRequest, board_builder
-        from sim_backend.board import world_of
+        from sim_backend.board import SimBoard
+        from sim_backend.faults import break_in
         from tools.data.boards import load_board_file
         from tools.flight.arming import Arming
         from tools.flight.compose import build_flight
 
         flight = build_flight(mission="sawtooth")
-        flight.board.open()
-        limits = None if kind == "limits unset" else Limits(working_depth_m=50.0)
+        board = flight.board
+        assert isinstance(board, SimBoard)
+        broken = break_in(board)
+        board.open()
+        limits = None if kind == "limits unset" else Limits(working_depth_m=50.0, low_voltage=12.0)
         flight.vehicle = msgspec.structs.replace(flight.vehicle, limits=limits)
         if kind == "depth not zero":
-            world_of(flight.board).x[2] = 3.0
+            board.world.x[2] = 3.0
+        elif kind == "no weather's pressure":
+            board.surface_pressure += 8_000.0
+        elif kind == "wet hull":
+            broken.leak.value = 1.0
+        elif kind == "flat battery":
+            broken.battery.value = 11.0
+        elif kind == "drive in alarm":
+            broken.pump.begin("alarm_kept")
+        elif kind == "gyro turns":
+            board.imu.begin("jump", drift=(0.0, 0.0, 0.0, 2.0, 0.0, 0.0))  # type: ignore[attr-defined]
+        elif kind == "wire out of range":
+            board.slider_wire.begin("jump", drift=(0.1,))  # type: ignore[attr-defined]
+        elif kind == "tank cannot be emptied":
+            return _narrow_tank(disabled, flight.vehicle)
         if kind in ("never calibrated", "wrong hash"):
             file = load_board_file("twin")
             old, new = {
@@ -36,13 +60,27 @@ def arming(kind: str) -> Callable[[bool, Path], Came]:
             text = file.text.replace(old, new)
             request = BoardRequest(text=text, source="board.toml", vehicle=flight.vehicle)
             doubtful = board_builder("twin")(request)
-            flight.board.check_calibration = doubtful.check_calibration  # type: ignore[method-assign]
+            board.check_calibration = doubtful.check_calibration  # type: ignore[method-assign]
             doubtful.close()
         checks = Arming(flight, folder=folder, hardware=True).run(disabled)
         refused = any(not check.passed for check in checks)
         return came(refused, "refuse to arm", "armed")
 
     return show
+
+
+def _narrow_tank(disabled: bool, vehicle: Any) -> Came:
+    """A board file whose drive empties less than half of the tank."""
+    from tools.flight.compose import within
+
+    low, high = vehicle.actuators.ballast.range
+    limits = {name: getattr(vehicle.actuators, name).range for name in ("servo", "slider", "ballast")}
+    limits["ballast"] = (low if disabled else 0.1 * low, high)
+    try:
+        within(vehicle, limits, "board.toml")
+    except ConfigError as error:
+        return came("board.toml: ballast.limits" in str(error), "refuse to arm", str(error))
+    return came(False, "refuse to arm", "armed")
 
 
 def bad_files(disabled: bool, folder: Path) -> Came:

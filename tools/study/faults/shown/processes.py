@@ -24,7 +24,8 @@ while True:
 
 
 @contextlib.contextmanager
-def _beating(folder: Path) -> Iterator[subprocess.Popen]:
+def beating(folder: Path) -> Iterator[subprocess.Popen]:
+    """A process that beats as a flight under way."""
     flight = subprocess.Popen([sys.executable, "-c", BEATING, str(folder)], stdout=subprocess.PIPE)
     assert flight.stdout is not None
     flight.stdout.readline()
@@ -42,7 +43,7 @@ def loop_ends(how: signal.Signals) -> Callable[[bool, Path], Came]:
     def show(disabled: bool, folder: Path) -> Came:
         from hal.outofband.guard import Watch
 
-        with _beating(folder) as flight:
+        with beating(folder) as flight:
             watch = Watch(folder, folder, service=False)
             watch.start()
             end = time.monotonic() + 0.5
