@@ -288,8 +288,7 @@ def chunk_ends(path: Path) -> list[Piece]:
 
 
 def _lost_s(log: Any, pieces: list[Piece], cut: int, began_ns: int) -> float:
-    """Seconds between the last record read (none: the first of the flight) and the last that the piece at the cut was to
-    bring."""
+    """Seconds between the last record read (none: the first) and the last of the piece in which the cut lies."""
     begun = [piece.last_ns for piece in pieces if piece.start < cut]
     if not begun:
         return 0.0
