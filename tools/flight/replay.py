@@ -153,7 +153,7 @@ def build_from_log(log: Log) -> tuple[Autopilot, Supervisor, RecordedBoard]:
             raise InputError(f"its metadata have no {key}: nothing to replay with", source=log.path)
         try:
             values[key] = read(facts[key])
-        except (ValueError, TypeError, KeyError, IndexError, RecursionError):
+        except (ValueError, TypeError, KeyError, IndexError, AttributeError, RecursionError):
             raise InputError(f"its metadata give {key} as {facts[key][:40]!r}", source=log.path) from None
     vehicle = decode_vehicle(texts["vehicle.toml"], f"{log.path}: vehicle.toml")
     source = f"{log.path}: mission.toml"
@@ -172,8 +172,8 @@ def _positive(text: str) -> float:
 
 
 def _periods(text: str) -> dict[str, float]:
-    found = json.loads(text)
-    return {name: _positive(found[name]) for name in ("imu", "beacon", "wires")}
+    found = {name: _positive(period) for name, period in json.loads(text).items()}
+    return {name: found[name] for name in ("imu", "beacon", "wires")} | found
 
 
 def _flag(text: str) -> bool:
