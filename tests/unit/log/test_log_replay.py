@@ -209,7 +209,8 @@ def test_changed_code_decides_otherwise(wet, monkeypatch):
     assert found.abort.row == 20
     assert found.abort_now.row != 20
     assert found.abort_now.tick > found.abort.tick
-    assert found.first_state.fields["fault"] == (20.0, 0.0)
+    recorded, now = found.first_state.fields["fault"]
+    assert recorded == 20.0 != now  # on a busy machine now may be the disk's row
 
 
 @pytest.mark.parametrize("share", [0.3, 0.8, 0.97])
