@@ -70,8 +70,9 @@ def write_changed(
     fd = disk.create(str(path))
     file = disk.DiskFile(fd)
     anew = LogFile(file, [spec], attachments=texts, metadata=facts, epoch_ns=log.epoch_ns)
-    for row, number in zip(data, tick.sequences.tolist(), strict=False):
-        anew.record(0, number, row[0], np.ascontiguousarray(row[: spec.width]).tobytes())
+    times = (tick.times_ns - log.epoch_ns) / 1e9
+    for row, number, time_s in zip(data, tick.sequences.tolist(), times.tolist(), strict=True):
+        anew.record(0, number, time_s, np.ascontiguousarray(row).tobytes())
     anew.finish(log.ending)
     assert file.sync()
     disk.close(fd, str(path), keep=True)

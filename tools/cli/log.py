@@ -111,7 +111,7 @@ def _devices(text: str) -> list[str]:
 
     try:
         return [f"{name}: {errors_text(health) or 'no errors'}" for name, health in json.loads(text).items()]
-    except (ValueError, KeyError, AttributeError, TypeError):  # not the recorder's
+    except (ValueError, KeyError, AttributeError, TypeError, RecursionError):  # not the recorder's
         return [text]
 
 

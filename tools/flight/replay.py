@@ -33,6 +33,9 @@ TOLD = ("recorder", "growth", "stop")
 NEEDED = ("t_s", "lateness_s", *FRAME, *TOLD, *ASKED, *TAKEN)
 INPUTS = {"t_s", "lateness_s", "duration_s", *FRAME, *TOLD}  # every other number of a record is an outcome
 STATES = ("mode", "leg", "reason", "reaction", "fault")
+LONGEST_STEP_S = 3600.0  # of a tick after the one before; a loop that is late skips ticks
+LONGEST_FLIGHT_S = 1e8
+LARGEST_COMMAND = 1e3  # rad, m or kg
 CHUNK = 2048  # ticks compared at once
 VALIDITIES = [slot.validity for slot in SLOTS.values()]
 
@@ -150,7 +153,7 @@ def build_from_log(log: Log) -> tuple[Autopilot, Supervisor, RecordedBoard]:
             raise InputError(f"its metadata have no {key}: nothing to replay with", source=log.path)
         try:
             values[key] = read(facts[key])
-        except (ValueError, TypeError, KeyError, IndexError, RecursionError):
+        except (ValueError, TypeError, KeyError, IndexError, AttributeError, RecursionError):
             raise InputError(f"its metadata give {key} as {facts[key][:40]!r}", source=log.path) from None
     vehicle = decode_vehicle(texts["vehicle.toml"], f"{log.path}: vehicle.toml")
     vehicle = within(vehicle, values["actuator_limits"], f"{log.path}: actuator_limits")
@@ -170,8 +173,8 @@ def _positive(text: str) -> float:
 
 
 def _periods(text: str) -> dict[str, float]:
-    found = json.loads(text)
-    return {name: _positive(found[name]) for name in ("imu", "beacon", "wires", *found)}
+    found = {name: _positive(period) for name, period in json.loads(text).items()}
+    return {name: found[name] for name in ("imu", "beacon", "wires")} | found
 
 
 def _flag(text: str) -> bool:
@@ -199,6 +202,8 @@ def replay_log(log: Log, advance: Callable[[int], None] = lambda _: None) -> Rep
         raise InputError(
             f"its first {int(tick.sequences[0]) - 1} ticks are missing: a replay begins at the first", source=log.path
         )
+    _check_times(log, tick.column("t_s"))
+    _check_taken(log, tick)
     result = Replay(log, tick)
     whole = tick.sequences == np.arange(1, tick.count + 1)
     result.replayed = tick.count if whole.all() else int(np.argmin(whole))
@@ -214,6 +219,26 @@ def replay_log(log: Log, advance: Callable[[int], None] = lambda _: None) -> Rep
     result.abort = first_abort(tick.column("t_s"), recorded, legs)
     result.abort_now = first_abort(tick.column("t_s"), outcomes, legs)
     return result
+
+
+def _check_times(log: Log, t: np.ndarray) -> None:
+    """InputError where the ticks' times do not go on as those of one flight: the filter steps from each to the next."""
+    steps = np.diff(t, prepend=t[0] - 1.0)
+    strange = ~((steps > 0.0) & (steps < LONGEST_STEP_S) & (np.abs(t) < LONGEST_FLIGHT_S))
+    if strange.any():
+        i = int(np.argmax(strange))
+        raise InputError(f"tick {i + 1}: t_s is {t[i]:g}, which is no time of this flight", source=log.path)
+
+
+def _check_taken(log: Log, tick: Topic) -> None:
+    """InputError where an actuator took what is no command: the filter reckons with it unscreened."""
+    for name, wanted in zip(TAKEN, ASKED, strict=True):
+        values = tick.column(name)
+        left_alone = np.isnan(values) & np.isnan(tick.column(wanted))
+        strange = ~(np.abs(values) <= LARGEST_COMMAND) & ~left_alone
+        if strange.any():
+            i = int(np.argmax(strange))
+            raise InputError(f"tick {i + 1}: {name} is {values[i]:g}, which no actuator takes", source=log.path)
 
 
 def _check_states(log: Log, states: dict[str, np.ndarray], legs: np.ndarray) -> None:

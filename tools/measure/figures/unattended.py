@@ -238,6 +238,7 @@ def measure_cuts(seconds: float, every: int) -> dict[str, Any]:
         size = path.stat().st_size
         written = {name: (topic.times_ns.tobytes(), _rows(topic)) for name, topic in whole.topics.items()}
         ends = chunk_ends(path)
+        began_ns = min(int(topic.times_ns[0]) for topic in whole.topics.values() if topic.count)
         wrong, worst, repaired = 0, 0.0, 0
         cuts = range(size, -1, -every)
         with progress("cuts", len(cuts)) as advance:
@@ -251,7 +252,7 @@ def measure_cuts(seconds: float, every: int) -> dict[str, Any]:
                     for name, topic in log.topics.items()
                 )
                 wrong += not (good and not log.damages)
-                worst = max(worst, _lost_s(log, ends, cut, whole.epoch_ns))
+                worst = max(worst, _lost_s(log, ends, cut, began_ns))
                 if done % 5000 == 0:
                     repaired += _repairs(repair, read_log, path, log)
                 advance(1)
@@ -286,14 +287,13 @@ def chunk_ends(path: Path) -> list[Piece]:
     return sorted(found, key=lambda piece: piece.start)
 
 
-def _lost_s(log: Any, pieces: list[Piece], cut: int, epoch_ns: int) -> float:
-    """Seconds between the last record read (none: the flight's start) and the last that the piece at the cut was to
-    bring."""
+def _lost_s(log: Any, pieces: list[Piece], cut: int, began_ns: int) -> float:
+    """Seconds between the last record read (none: the first) and the last of the piece in which the cut lies."""
     begun = [piece.last_ns for piece in pieces if piece.start < cut]
     if not begun:
         return 0.0
     read = [int(topic.times_ns.max()) for topic in log.topics.values() if topic.count]
-    return (max(begun) - max(read, default=epoch_ns)) / 1e9
+    return (max(begun) - max(read, default=began_ns)) / 1e9
 
 
 def _repairs(repair: Any, read_log: Any, path: Path, cut: Any) -> bool:
