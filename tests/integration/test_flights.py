@@ -125,6 +125,19 @@ def test_fly_as_a_user_types_it(typed):
     assert glider("fly", "--mission", "spiral", "--json", "--log", "spiral-001.mcap", cwd=folder).returncode == 2
 
 
+def test_the_progress_of_a_dive_given_up_does_not_say_that_it_was_flown(tmp_path):
+    mission = tmp_path / "late.toml"
+    leg = "[[leg]]\ndepth_m = 4.0\npitch_deg = -20.0\ntime_limit_s = {limit}\n"
+    mission.write_text(
+        'format = 1\nname = "late"\ntime_limit_s = 200.0\n[site]\nname = "pool"\ndepth_m = 6.0\n'
+        + leg.format(limit=4.0) + leg.format(limit=100.0)
+    )  # fmt: skip
+    done = glider("fly", "--mission", "late.toml", "--no-log", cwd=tmp_path)
+    assert done.returncode == 1
+    assert "NOT completed: leg 1" in done.stderr
+    assert "2/2" not in done.stderr
+
+
 def test_samples_of_an_exported_log_stand_at_the_times_when_they_were_taken(typed, tmp_path):
     """A draw-wire's sample comes a tick late; in its row it would be late commands, hundreds of nat of them."""
     export_case(read_log(typed[0] / "spiral-001.mcap"), tmp_path / "case")

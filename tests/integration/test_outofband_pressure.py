@@ -87,7 +87,7 @@ def test_one_that_does_not_rise_is_pumped_again_and_then_left_to_the_hardware(se
             until(lambda: "no more feeding of the hardware watchdog" in said(), 20.0)
             assert not fed(tmp_path)
             found = StateFile(tmp_path).read()
-            assert found.must_ascend
+            assert found.state.must_ascend
             until(lambda: StateFile(tmp_path).read().reason == "fault 18: no ascent out of band", 5.0)
             # What is shown to whoever looks on.
             assert "does not rise, hardware watchdog no longer fed, 5.0 m deep" in snapshot(tmp_path)["problems"][0]

@@ -5,6 +5,7 @@ import json
 import math
 import os
 import signal
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -113,6 +114,15 @@ def test_nothing_arms_without_a_yes(fly, tmp_path, answer):
     said, code = ended(child)
     assert code == 1
     assert "not armed: not confirmed" in said
+    assert StateFile(tmp_path).read().state == State.ASHORE
+
+
+def test_without_a_terminal_nothing_arms_unless_the_command_line_says_yes(tmp_path):
+    command = [sys.executable, "-m", "tools.cli.main", "fly", "--board", "roughie", "--no-log"]
+    command += ["--state", str(tmp_path)]
+    done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 1
+    assert "not armed: not confirmed (without a terminal: --yes)" in done.stderr
     assert StateFile(tmp_path).read().state == State.ASHORE
 
 

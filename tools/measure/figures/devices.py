@@ -2,7 +2,8 @@
 
 same-flight: a mission at real time through drivers, wires and twins, against the same seed on the simulated board
 with the same rates and delays. lateness: the tick's lateness while a device is silent, late, babbling or unplugged,
-against the undisturbed run of the same minutes, in turns.
+against the undisturbed run of the same minutes, in turns. timings: each device broken under water, with the fault
+timings as shipped (tests on busy machines fly with longer ones).
 """
 
 import json
@@ -16,6 +17,7 @@ import click
 import numpy as np
 
 from firmware.core.control.telemetry import REC_LATENESS
+from firmware.core.layouts import supervisor_layout as sup
 from tools.cli.common import DONE, FAILED, print_json, progress
 
 POSITION_LIMIT_M, ATTITUDE_LIMIT_DEG = 0.10, 2.0
@@ -186,6 +188,83 @@ def _one_fault(
     return {
         "device": device, "fault": fault, "ticks": len(bad), **figures, "ratio": ratios,
         "pass": all(ratio <= RATIO_LIMIT for ratio in ratios.values()),
+    }  # fmt: skip
+
+
+# --- the shipped timings --------------------------------------------------------------------------------------------
+ROWS = (
+    ("fault imu unplug", sup.FAULT_IMU_LOST), ("fault beacon silent", sup.FAULT_PRESSURE_LOST),
+    ("fault ballast silent", sup.FAULT_BUS_LOST), ("fault slider_wire silent", sup.FAULT_WIRE_LOST),
+    ("fault servo unplug", sup.FAULT_SERVO_LOST), ("fault beacon stuck", sup.FAULT_STUCK_SENSOR),
+    ("fault ballast stuck", sup.FAULT_STALL), ("leak 1", sup.FAULT_LEAK), ("battery 10", sup.FAULT_VOLTAGE),
+)  # fmt: skip
+DIVE_M, WIRES_S, LINGER_S = 0.6, 0.3, 25.0
+JAMMED_S = 1.5 * (0.4 / 0.03 + 0.3)  # s, of a ballast sent over its whole way
+
+
+@main.command("timings")
+@FIFO
+def timings(fifo: bool) -> None:
+    """Break a device of a twinned flight with the shipped fault timings: when is it noticed, where does it end?
+
+    A row passes if it is noticed within its time, a line's round trip and two ticks, and the plant floats five minutes
+    after the end.
+    """
+    take_priority(fifo)
+    with progress("faults", len(ROWS)) as advance:
+        rows = []
+        for command, row in ROWS:
+            rows.append(time_fault(command, row))
+            advance(1)
+    result = {"fifo": fifo, "faults": rows, "pass": all(row["pass"] for row in rows)}
+    print_json(result)
+    raise SystemExit(DONE if result["pass"] else FAILED)
+
+
+def time_fault(command: str, row: int) -> dict[str, Any]:
+    """One flight of the shipped vehicle, with voltages, on twins; a command to the twins breaks it under water."""
+    import msgspec
+
+    from firmware.faults import FAULT_TABLE
+    from firmware.model.supervisor_settings import Limits
+    from firmware.supervisor import Supervisor
+    from hal.recorder.recorder import NullRecorder
+    from tools.flight import sortie
+    from tools.flight.compose import build_flight, record_specs
+
+    flight = build_flight(mission="sawtooth", board="twin")
+    board: Any = flight.board
+    limits = Limits(working_depth_m=50.0, low_voltage=12.0, least_voltage=11.0)
+    flight.vehicle = msgspec.structs.replace(flight.vehicle, limits=limits)
+    flight.supervisor = Supervisor(
+        flight.autopilot, flight.vehicle, flight.mission, dt=1.0 / board.loop_hz, periods=board.periods
+    )
+    supervisor, begun, adrift = flight.supervisor, float("nan"), float("nan")
+
+    def loop(runtime: Any) -> Any:
+        nonlocal begun, adrift
+        while not (supervisor.measured_depth() > DIVE_M or flight.autopilot.finished):
+            runtime.tick()
+        begun = board.clock.now()
+        board.control(command)
+        end = begun + LINGER_S
+        while supervisor.noticed(row) is None and runtime.deadline < end:
+            runtime.tick()
+        board.control(command.replace(command.split()[-1], "none") if command.startswith("fault") else command)
+        flight.autopilot.give_up()
+        ending = runtime.run()
+        adrift = json.loads(board.control("adrift 300"))["z_m"]
+        return ending
+
+    host = sortie.Host(flight, name="timings")
+    flown = sortie.fly(flight, host, lambda: NullRecorder(record_specs(flight)), loop=loop)
+    noticed = supervisor.noticed(row)
+    after = None if noticed is None else noticed - begun
+    allowed = JAMMED_S if row == sup.FAULT_STALL else FAULT_TABLE[row].within_s or 0.0
+    good = after is not None and after <= allowed + WIRES_S and adrift < 0.5
+    return {
+        "fault": command, "row": row, "noticed_s": after, "allowed_s": allowed, "reaction": supervisor.worst(row).name,
+        "missed_ticks": flown.timing.missed, "ended": flown.ending.name.lower(), "adrift_m": adrift, "pass": good,
     }  # fmt: skip
 
 
