@@ -69,12 +69,13 @@ def cut_log(disabled: bool, folder: Path) -> Came:
 
     path = folder / "whole.mcap"
     fd = disk.create(str(path))
-    file, rows = disk.DiskFile(fd), 2000
+    file, rows, ends = disk.DiskFile(fd), 2000, []
     log = LogFile(file, [TICK], attachments={}, metadata={})
     for number in range(rows):
         log.record(0, number + 1, 0.02 * number, np.full(TICK.width, float(number)).tobytes())
         if number % 25 == 24:
             log.flush()
+            ends.append(file.tell())
     log.finish({})
     file.sync()
     disk.close(fd, str(path), keep=True)
@@ -90,7 +91,7 @@ def cut_log(disabled: bool, folder: Path) -> Came:
         data = np.zeros((0, TICK.width)) if topic is None or topic.data is None else topic.data
         first = data[:, 0]
         wrong += int(np.any(data != np.round(data[:, :1])) or np.any(np.diff(first) <= 0.0))
-        there = 25 * int(np.searchsorted(_ends(whole), cut, side="right"))
+        there = 25 * int(np.searchsorted(ends, cut, side="right"))
         lost = max(lost, 0.02 * (there - int(np.sum(first < there))))
     return came(wrong == 0 and lost <= 1.0, "valid prefix", f"{wrong} damaged, {lost:.1f} s lost", end=DAMAGE)
 
@@ -102,17 +103,6 @@ def _ticks(path: Path, scan: type[Scan]) -> Topic | None:
     except InputError:  # cut before anything of it was there
         return None
     return topic if topic is not None and topic.data is not None else None
-
-
-def _ends(whole: bytes) -> np.ndarray:
-    """Where the chunks of a whole log end."""
-    ends, place = [], 8
-    while place + 9 < len(whole):
-        length = int.from_bytes(whole[place + 1 : place + 9], "little")
-        place += 9 + length
-        if whole[place - 9 - length] == 0x06:
-            ends.append(place)
-    return np.array(ends)
 
 
 def torn_state(disabled: bool, folder: Path) -> Came:
