@@ -17,16 +17,27 @@ import click
 
 ROOT = Path(__file__).resolve().parents[2]
 MUTATED = (
+    "hal/sortie.py", "firmware/core/supervision/surface.py",
     "firmware/core/supervision/supervisor.py", "firmware/core/supervision/detectors.py",
     "firmware/core/supervision/screening.py",
     "firmware/core/vehicle/actuators.py", "firmware/model/supervisor_settings.py",
 )  # fmt: skip
-PARTS = ("firmware", "hal", "sim_backend", "tools", "tests/support", "tests/unit/supervisor", "tests/conftest.py")
+PARTS = (
+    "firmware",
+    "hal",
+    "sim_backend",
+    "tools",
+    "tests/support",
+    "tests/unit/supervisor",
+    "tests/unit/hal/test_sortie.py",
+    "docs/SUPERVISOR.md",
+    "tests/conftest.py",
+)
 CONFIG = """
 [tool.mutmut]
 source_paths = {mutated}
 also_copy = ["firmware", "hal", "sim_backend", "tools", "tests"]
-pytest_add_cli_args_test_selection = ["tests/unit/supervisor"]
+pytest_add_cli_args_test_selection = ["tests/unit/supervisor", "tests/unit/hal/test_sortie.py"]
 max_children = {children}
 
 [tool.pytest.ini_options]

@@ -42,9 +42,9 @@ def watch_surface(P, G, est, ap, scale, t):
     ballast = math.nan if lost(G, sup.SENSOR_PLUNGER, t) else measured_ballast(G, scale)
     if math.isnan(G[sup.PUMP_SINCE]) or ballast < G[sup.PUMP_MARK] - 0.1 * near:
         G[sup.PUMP_MARK], G[sup.PUMP_SINCE] = ballast if math.isfinite(ballast) else math.inf, t
-    if G[sup.HIGHEST] >= sup.HW:
-        G[sup.ENDING] = sup.NO_WAY_LEFT
-    elif held and ballast <= low + near:
+    if held and ballast <= low + near:
         G[sup.ENDING] = sup.AT_SURFACE
+    elif G[sup.HIGHEST] >= sup.HW:
+        G[sup.ENDING] = sup.NO_WAY_LEFT
     elif held and t - G[sup.PUMP_SINCE] > G[sup.STALL_FACTOR] * ((high - low) / rate + tau):
         G[sup.ENDING] = sup.PUMP_GIVEN_UP

@@ -289,6 +289,7 @@ def test_depth_is_known_until_the_beacon_is_lost():
     man = Watchman()
     man.step(5)
     assert man.supervisor.measured_depth() == man.est[ctl.NEW_DEPTH]
+    assert man.supervisor.surface_depth == 0.4
     man.silence.add("beacon")
     man.seconds(1.0)
     assert math.isnan(man.supervisor.measured_depth())
