@@ -12,6 +12,7 @@ import pytest
 from support.twinned import DIVE, end_guard, flying, guard_pid, twins, until
 
 from hal.heartbeat import Heartbeat
+from hal.outofband.plan import read_plan
 from hal.sortie import State
 from hal.state_file import StateFile
 from tools.bench.boardtext import accepted, set_values
@@ -97,6 +98,17 @@ def test_in_other_weather_surfaced_is_said_at_the_surface(folder):
             assert flight.wait(120.0) == 0
         assert sea.state()["z_m"] < 0.35
         assert adrift(sea) < FLOATS_M
+        assert measured_surface(folder) == pytest.approx(101_325.0, abs=500.0)
+        # A flight that broke off: the next only ascends, and knows the surface from it.
+        StateFile(folder / "state").write(State.DIVING, flight="before")
+        with flying(sea.board, folder / "dip.toml", folder, "--log", str(folder / "second.mcap")) as flight:
+            assert flight.wait(120.0) == 1
+        assert json.loads((folder / "stdout").read_text())["surfaced"]
+        assert measured_surface(folder) == pytest.approx(101_325.0, abs=500.0)
+
+
+def measured_surface(folder):
+    return read_plan(folder / "state" / "outofband.json").pressure.surface_pa
 
 
 def test_a_wet_hull_and_a_flat_battery_do_not_arm(folder):

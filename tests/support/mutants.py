@@ -36,7 +36,7 @@ PARTS = (
 CONFIG = """
 [tool.mutmut]
 source_paths = {mutated}
-also_copy = ["firmware", "hal", "sim_backend", "tools", "tests"]
+also_copy = ["firmware", "hal", "sim_backend", "tools", "tests", "docs"]
 pytest_add_cli_args_test_selection = ["tests/unit/supervisor", "tests/unit/hal/test_sortie.py"]
 max_children = {children}
 

@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 
 from firmware.core.jit import CACHE_DIR, compiled_signatures
-from firmware.core.layouts import control_layout as ctl
 from firmware.core.vehicle.layout import GRAVITY
 from firmware.core.vehicle.seawater import water_density
 from hal.ports import ACTUATORS, SLOTS, BoardError, Condition, Hardware, Validity, empty_frame
@@ -242,5 +241,5 @@ def arm(flight: Flight, *, log: Path | None) -> list[Check]:
     arming = Arming(flight, folder=folder, hardware=not flight.twinned)
     checks = arming.run()
     refuse(checks)
-    flight.board.surface_pressure = flight.autopilot.C[ctl.SURFACE_PRESSURE] = arming.surface_pressure
+    flight.count_depth_from(arming.surface_pressure)
     return checks

@@ -54,6 +54,10 @@ class Flight:
         """The gains that count: the mission's, else the vehicle's, else the defaults."""
         return self.mission.control or self.vehicle.control or Control()
 
+    def count_depth_from(self, pressure: float) -> None:
+        """Set the pressure (Pa, absolute) at which depth is zero, for board and autopilot."""
+        self.board.surface_pressure = self.autopilot.C[SURFACE_PRESSURE] = pressure
+
     @property
     def twinned(self) -> bool:
         """Whether the devices are twins that the board itself starts: nothing real moves."""

@@ -1,5 +1,6 @@
 """The host of a flight on devices: its heartbeat, its state across restarts, the out-of-band process, watchdogs."""
 
+import contextlib
 import os
 import shutil
 import subprocess
@@ -17,7 +18,7 @@ from hal.heartbeat import Guard, Heartbeat, Held
 from hal.notify import notify
 from hal.outofband.guard import CLOSING_S
 from hal.outofband.plan import NAME as PLAN
-from hal.outofband.plan import write_plan
+from hal.outofband.plan import PlanError, read_plan, write_plan
 from hal.outofband.rise import Stage
 from hal.ports import BATTERY, BoardError, Validity
 from hal.recorder.condition import Level
@@ -106,6 +107,10 @@ class Keeper(Host):
         assert self._pulse is not None
         if not isinstance(self._flight.board, DeviceBoard):
             raise BoardError(f"board '{self._flight.board.name}' has no devices to bring up")
+        if self.journal.state.must_ascend:  # nothing can be measured now: the surface is where the flight before had it
+            with contextlib.suppress(PlanError):
+                pressure = read_plan(self.state_folder / PLAN).pressure
+                self._flight.count_depth_from(pressure.surface_pa if pressure else self._flight.board.surface_pressure)
         self._write_plan(self._flight.board)
         self._start_guard(GUARD_START_S)
         super().prepare()
