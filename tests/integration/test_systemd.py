@@ -78,7 +78,7 @@ class Sea:
     def acknowledge(self):
         self.computer.call(
             "runuser", "-u", "glider", "--", "env", "GLIDER_STATE_DIR=/var/lib/glider", "GLIDER_RUN_DIR=/run/glider",
-            "/opt/glider/current/bin/glider", "check", "--acknowledge",
+            "/opt/glider/current/bin/glider", "acknowledge",
         )  # fmt: skip
         until(lambda: "at rest" in self.computer.said(OUT_OF_BAND), 10.0)
 
