@@ -147,8 +147,8 @@ def hull_wrench(F, u, v, w, p, q, r):
 def body_wrench(F, u, v, w, p, q, r):
     """Force (N) and moment (N m) of the water on the whole vehicle, body axes; velocities are relative to the water.
 
-    F[FS_DRAG] fouls all friction, F[FS_LIFT] is lift more or less of the wings, F[FS_WEATHERCOCK] of the fin, F[FS_STALL]
-    stalls the wings at 1 / F (rad), F[FS_SIDED_FOULING] grows on the starboard wing.
+    F[FS_DRAG] fouls all friction, F[FS_LIFT] is lift more or less of the wings, F[FS_WEATHERCOCK] of the fin,
+    F[FS_STALL] stalls the wings at 1 / F (rad), F[FS_SIDED_FOULING] grows on the starboard wing.
     """
     wrench, lifts = hull_wrench(F, u, v, w, p, q, r), 0.0
     for number in range(4):
