@@ -59,10 +59,14 @@ FB_ROLL_DRAG = 98  # N m s2, moment per |p| p
 FB_MAST_AREA, FB_MAST_X, FB_MAST_Z = 99, 100, 101  # m2 (drag area), m, m: what stands out of the hull
 FB_DOWNWASH = 102  # of the wings at the tail, in that of an elliptic wing far behind it
 FB_SURFACES = 103
-(B_AREA, B_ASPECT, B_CHORD, B_X, B_Y, B_Z, B_TILT, B_INCIDENCE, B_STALL, B_FRICTION, B_OSWALD) = range(11)
-N_B = 11  # m2, 1, m, m, m, m, rad from z to y, rad, rad, profile drag over a flat plate's, efficiency
+(
+    FBS_AREA, FBS_ASPECT, FBS_CHORD,  # m2, 1, m
+    FBS_X, FBS_Y, FBS_Z, FBS_TILT, FBS_INCIDENCE,  # m, m, m, rad of the normal from z to y, rad
+    FBS_STALL, FBS_FRICTION, FBS_OSWALD,  # rad, profile drag over a flat plate's, span efficiency
+) = range(11)  # fmt: skip
+N_FBS = 11
 STARBOARD, PORT, TAIL, FIN = range(4)  # surfaces
-N_FS = FB_SURFACES + 4 * N_B
+N_FS = FB_SURFACES + 4 * N_FBS
 
 # --- x: the plant's state as in core/vehicle/layout, then what the effects remember ---------------------------------
 X_SERVO_V, X_SERVO_Z, X_SLIDER_Z, X_PUMP_V = 16, 17, 18, 19  # speed, play taken up, play taken up, speed

@@ -29,10 +29,11 @@ def fill_frame(P, surface_pressure, t, y, frame):
 
 @allocating_kernel
 def fly_mission(P, F, waves, errors, linear, angular, seed, x, P_pilot, C, legs, nav, commands, X, Y):
-    """A mission (legs, N_LEG) flown from x (N_FX, in place); the rest as fly_foreign. Returns the autopilot's mode.
+    """Fly a mission (legs, N_LEG) from x (N_FX, in place); other arguments as fly_foreign.
 
     P_pilot (N_P,), C (N_C,), nav (N_NAV,): the autopilot's model, configuration and filter, as Autopilot makes them;
-    none is changed. Rows behind the mission's end are flown on by the autopilot: to the surface.
+    none is changed. After the mission's end the autopilot brings the vehicle to the surface. Returns the autopilot's
+    mode in the last row, and the row in which the mission ended (-1: it did not).
     """
     acc, Pw, work = np.zeros(6), np.empty(N_P), np.empty((3, fo.N_FX))
     frame, cmd, memory = np.zeros(FRAME_SIZE), np.zeros(3), nav.copy()

@@ -141,10 +141,10 @@ def mass_effects(P, F, servo, slider, ballast, down, t, loose, Pw):
     # a weight that sits off the middle is not at the middle's height either
     Pw[layout.CG_Z] += F[fo.FS_CG_VERTICAL] + 0.06 * abs(F[fo.FS_CG_LATERAL]) - 0.06 * abs(F[fo.FS_CG_LONGITUDINAL])
     if F[fo.FS_SHELL] != 0.0:  # water in the starboard wing, running out
-        left, wing = F[fo.FS_SHELL] * math.exp(-t / F[fo.FS_SHELL_TIME]), fo.FB_SURFACES + fo.STARBOARD * fo.N_B
+        left, wing = F[fo.FS_SHELL] * math.exp(-t / F[fo.FS_SHELL_TIME]), fo.FB_SURFACES + fo.STARBOARD * fo.N_FBS
         Pw[layout.NET_MASS] += left
-        Pw[layout.CG_X] += left * F[wing + fo.B_X] / P[layout.M_T]
-        Pw[layout.CG_Y] += left * F[wing + fo.B_Y] / P[layout.M_T]
+        Pw[layout.CG_X] += left * F[wing + fo.FBS_X] / P[layout.M_T]
+        Pw[layout.CG_Y] += left * F[wing + fo.FBS_Y] / P[layout.M_T]
     Pw[layout.CG_X] += F[fo.FS_LOOSE] * loose / P[layout.M_T]
     Pw[layout.J_YY] += F[fo.FS_INERTIA]
     Pw[layout.J_ZZ] += 1.15 * F[fo.FS_INERTIA]

@@ -82,28 +82,28 @@ def surface_force(F, number, more_lift, extra_friction, extra_angle, wash, u, v,
     more_lift: share by which its lift is more; extra_friction, extra_angle: drag coefficient more, and per rad2; wash:
     angle (rad) by which what flies ahead turns the flow down.
     """
-    at = fo.FB_SURFACES + number * fo.N_B
-    x, y, z = F[at + fo.B_X], F[at + fo.B_Y], F[at + fo.B_Z]
+    at = fo.FB_SURFACES + number * fo.N_FBS
+    x, y, z = F[at + fo.FBS_X], F[at + fo.FBS_Y], F[at + fo.FBS_Z]
     ul, vl, wl = u + q * z - r * y, v + r * x - p * z, w + p * y - q * x
-    ny, nz = math.sin(F[at + fo.B_TILT]), math.cos(F[at + fo.B_TILT])
+    ny, nz = math.sin(F[at + fo.FBS_TILT]), math.cos(F[at + fo.FBS_TILT])
     across = ny * vl + nz * wl
     speed = math.sqrt(ul * ul + across * across)
     if speed < STILL:
         return 0.0, 0.0, 0.0, 0.0
     turned = math.atan2(across, ul + 0.0)
-    angle = turned + F[at + fo.B_INCIDENCE] - wash
+    angle = turned + F[at + fo.FBS_INCIDENCE] - wash
     if angle > math.pi:
         angle -= 2.0 * math.pi
     elif angle < -math.pi:
         angle += 2.0 * math.pi
-    friction = 2.0 * blasius_friction(speed * F[at + fo.B_CHORD] / VISCOSITY) * F[at + fo.B_FRICTION]
-    stall = F[at + fo.B_STALL]
+    friction = 2.0 * blasius_friction(speed * F[at + fo.FBS_CHORD] / VISCOSITY) * F[at + fo.FBS_FRICTION]
+    stall = F[at + fo.FBS_STALL]
     if F[fo.FS_STALL] > 0.0 and number <= fo.PORT:
         stall = min(stall, 1.0 / F[fo.FS_STALL])
-    lift, drag = section(angle, F[at + fo.B_ASPECT], stall, friction * (1.0 + F[fo.FS_DRAG]), F[at + fo.B_OSWALD])
+    lift, drag = section(angle, F[at + fo.FBS_ASPECT], stall, friction * (1.0 + F[fo.FS_DRAG]), F[at + fo.FBS_OSWALD])
     lift *= 1.0 + more_lift
     drag += extra_friction + extra_angle * turned * turned
-    pressure = 0.5 * DENSITY * F[at + fo.B_AREA] * speed
+    pressure = 0.5 * DENSITY * F[at + fo.FBS_AREA] * speed
     ahead = pressure * (lift * across - drag * ul)
     normal = pressure * (-lift * ul - drag * across)
     return ahead, ny * normal, nz * normal, lift
@@ -152,18 +152,18 @@ def body_wrench(F, u, v, w, p, q, r):
     """
     wrench, lifts = hull_wrench(F, u, v, w, p, q, r), 0.0
     for number in range(4):
-        at, more, extra, wash = fo.FB_SURFACES + number * fo.N_B, 0.0, 0.0, 0.0
+        at, more, extra, wash = fo.FB_SURFACES + number * fo.N_FBS, 0.0, 0.0, 0.0
         if number <= fo.PORT:
             more = F[fo.FS_LIFT]
             extra = F[fo.FS_SIDED_FOULING] if number == fo.STARBOARD else 0.0
         elif number == fo.FIN:
             more = F[fo.FS_WEATHERCOCK]
         elif u > 0.0:
-            wing = fo.FB_SURFACES + fo.STARBOARD * fo.N_B
-            wash = F[fo.FB_DOWNWASH] * lifts / (math.pi * F[wing + fo.B_ASPECT])
+            wing = fo.FB_SURFACES + fo.STARBOARD * fo.N_FBS
+            wash = F[fo.FB_DOWNWASH] * lifts / (math.pi * F[wing + fo.FBS_ASPECT])
         X, Y, Z, lift = surface_force(
             F, number, more, SIDED_FRICTION * extra, SIDED_ANGLE * extra, wash, u, v, w, p, q, r
         )  # fmt: skip
         lifts += lift
-        wrench = add_at(F[at + fo.B_X], F[at + fo.B_Y], F[at + fo.B_Z], X, Y, Z, wrench)
+        wrench = add_at(F[at + fo.FBS_X], F[at + fo.FBS_Y], F[at + fo.FBS_Z], X, Y, Z, wrench)
     return wrench

@@ -35,7 +35,7 @@ def challenge():
 @click.option("--vehicles", type=click.IntRange(1, 1000), help="With --watch: 40; missions 60.")
 @click.option("--unchanged", type=click.IntRange(0, 1000), help="Of the vehicles: 10; missions 12; --form 20.")
 @click.option("--runs", type=click.IntRange(4, 200), help="Of each vehicle: 14; dives 40.")
-@click.option("--reference", type=click.IntRange(1, 100), help="Of the runs, the first: 5; dives 12.")
+@click.option("--reference", type=click.IntRange(1, 100), help="Of the runs, the first: 5; dives 12; --form 12.")
 def make(
     out: Path, seed: int, messy: bool, single: int | None, none: int | None, pairs: int | None, unknown: int | None,
     answers: Path | None, jobs: int,
@@ -57,7 +57,8 @@ def make(
         from tools.study.challenge.form_make import FormOrder
         from tools.study.challenge.form_plan import FormCounts
 
-        formed = replace(FormCounts(), **_given({"changed": changed, "unchanged": unchanged, "outside": outside}))
+        asked = {"changed": changed, "unchanged": unchanged, "outside": outside, "reference": reference}
+        formed = replace(FormCounts(), **_given(asked))
         if not formed.total:
             raise click.UsageError("no cases: all counts are 0")
         order: Order = FormOrder(out, seed, formed, answers or out / ARCHIVE)

@@ -18,7 +18,7 @@ from tools.data.runs.case import write_case
 from tools.study.challenge.cases import DECIMALS, DENSITY, LOG_RATE, NoCase
 from tools.study.challenge.design import FITTED, HELD, LAKE, POOL, STYLES, RunDesign, Site, draw_run
 from tools.study.challenge.form_fit import fit_flights, fit_forces, formless, residual
-from tools.study.challenge.form_plan import BY_LABEL, CHANGES, OUTSIDE, REFERENCE_RUNS, FormPlan
+from tools.study.challenge.form_plan import BY_LABEL, CHANGES, OUTSIDE, FormCounts, FormPlan
 from tools.study.challenge.form_vehicle import draw_body, draw_form_shapes
 from tools.study.challenge.forms import Form, draw_waves
 from tools.study.challenge.magnitude import find_strength
@@ -136,9 +136,7 @@ def plausible(trial: FormTrial) -> bool:
     return speeds and seen["pitch"] <= PITCH and seen["turn"] >= TURN
 
 
-def draw_healthy(
-    rng: np.random.Generator, vehicle: Vehicle, runs: int = REFERENCE_RUNS
-) -> tuple[FormTrial, list[Flight]] | None:
+def draw_healthy(rng: np.random.Generator, vehicle: Vehicle, runs: int) -> tuple[FormTrial, list[Flight]] | None:
     """A vehicle of another form in the pool and its captured runs; None where it is not plausible or not flyable."""
     P, body = draw_body(rng, vehicle)
     waves = draw_waves(rng)
@@ -195,11 +193,11 @@ def _change(rng: np.random.Generator, trial: FormTrial, form: Form, scale: float
     return (sizes * strength, found) if SHORT * SIZE[0] <= found <= SIZE[1] / SHORT else None
 
 
-def draw_form_case(seed: int, plan: FormPlan, vehicle: Vehicle) -> MadeForm:
+def draw_form_case(seed: int, plan: FormPlan, counts: FormCounts, vehicle: Vehicle) -> MadeForm:
     """Draw vehicles until the change can be had at its size; a label that cannot gives way to another of its kind."""
     for number in range(TRIES):
         rng = np.random.default_rng(np.random.SeedSequence([seed, 5001 + plan.number, number]))
-        found = draw_healthy(rng, vehicle)
+        found = draw_healthy(rng, vehicle, counts.reference)
         if found is None:
             continue
         trial, reference = found

@@ -31,6 +31,6 @@ class FormOrder(Order):
         return form_plan(self.seed, self.counts)
 
     def draw(self, case: FormPlan, vehicle: Vehicle) -> dict[str, Any]:
-        made = draw_form_case(self.seed, case, vehicle)
+        made = draw_form_case(self.seed, case, self.counts, vehicle)
         write_form_case(made, *self.folders)
         return form_answer(made)

@@ -8,8 +8,6 @@ from sim_backend.foreign import foreign_layout as fo
 from tools.study.challenge.forms import FORMS, Form
 from tools.study.challenge.plan import NONE, SINGLE, UNKNOWN
 
-REFERENCE_RUNS = 12
-
 
 @dataclass(frozen=True)
 class FormCounts:
@@ -18,6 +16,7 @@ class FormCounts:
     changed: int = 30
     unchanged: int = 20
     outside: int = 10
+    reference: int = 12  # healthy runs of each, with motion capture, that it is identified from
 
     @property
     def total(self) -> int:

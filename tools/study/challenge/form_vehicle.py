@@ -78,8 +78,8 @@ def draw_body(rng: np.random.Generator, vehicle: Vehicle) -> tuple[np.ndarray, n
 
 
 def _surface(F: np.ndarray, number: int, *values: float) -> None:
-    at = fo.FB_SURFACES + number * fo.N_B
-    F[at : at + fo.N_B] = values
+    at = fo.FB_SURFACES + number * fo.N_FBS
+    F[at : at + fo.N_FBS] = values
 
 
 def draw_form_shapes(
