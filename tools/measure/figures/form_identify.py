@@ -36,7 +36,7 @@ NAMES = ("file", "identified", "nearest")
 
 @dataclass
 class Gaps:
-    """Each model's gaps by channel, `total` among them, over runs left out; fitted: the identified over its own runs."""
+    """Each model's gaps by channel, `total` among them, over runs left out; fitted: the identified's over its own."""
 
     held: dict[str, dict[str, float]]
     fitted: float
