@@ -65,7 +65,7 @@ FB_SURFACES = 103
     FBS_STALL, FBS_FRICTION, FBS_OSWALD,  # rad, profile drag over a flat plate's, span efficiency
 ) = range(11)  # fmt: skip
 N_FBS = 11
-STARBOARD, PORT, TAIL, FIN = range(4)  # surfaces
+SURFACE_STARBOARD, SURFACE_PORT, SURFACE_TAIL, SURFACE_FIN = range(4)
 N_FS = FB_SURFACES + 4 * N_FBS
 
 # --- x: the plant's state as in core/vehicle/layout, then what the effects remember ---------------------------------

@@ -141,7 +141,8 @@ def mass_effects(P, F, servo, slider, ballast, down, t, loose, Pw):
     # a weight that sits off the middle is not at the middle's height either
     Pw[layout.CG_Z] += F[fo.FS_CG_VERTICAL] + 0.06 * abs(F[fo.FS_CG_LATERAL]) - 0.06 * abs(F[fo.FS_CG_LONGITUDINAL])
     if F[fo.FS_SHELL] != 0.0:  # water in the starboard wing, running out
-        left, wing = F[fo.FS_SHELL] * math.exp(-t / F[fo.FS_SHELL_TIME]), fo.FB_SURFACES + fo.STARBOARD * fo.N_FBS
+        left = F[fo.FS_SHELL] * math.exp(-t / F[fo.FS_SHELL_TIME])
+        wing = fo.FB_SURFACES + fo.SURFACE_STARBOARD * fo.N_FBS
         Pw[layout.NET_MASS] += left
         Pw[layout.CG_X] += left * F[wing + fo.FBS_X] / P[layout.M_T]
         Pw[layout.CG_Y] += left * F[wing + fo.FBS_Y] / P[layout.M_T]

@@ -98,7 +98,7 @@ def surface_force(F, number, more_lift, extra_friction, extra_angle, wash, u, v,
         angle += 2.0 * math.pi
     friction = 2.0 * blasius_friction(speed * F[at + fo.FBS_CHORD] / VISCOSITY) * F[at + fo.FBS_FRICTION]
     stall = F[at + fo.FBS_STALL]
-    if F[fo.FS_STALL] > 0.0 and number <= fo.PORT:
+    if F[fo.FS_STALL] > 0.0 and number <= fo.SURFACE_PORT:
         stall = min(stall, 1.0 / F[fo.FS_STALL])
     lift, drag = section(angle, F[at + fo.FBS_ASPECT], stall, friction * (1.0 + F[fo.FS_DRAG]), F[at + fo.FBS_OSWALD])
     lift *= 1.0 + more_lift
@@ -153,13 +153,13 @@ def body_wrench(F, u, v, w, p, q, r):
     wrench, lifts = hull_wrench(F, u, v, w, p, q, r), 0.0
     for number in range(4):
         at, more, extra, wash = fo.FB_SURFACES + number * fo.N_FBS, 0.0, 0.0, 0.0
-        if number <= fo.PORT:
+        if number <= fo.SURFACE_PORT:
             more = F[fo.FS_LIFT]
-            extra = F[fo.FS_SIDED_FOULING] if number == fo.STARBOARD else 0.0
-        elif number == fo.FIN:
+            extra = F[fo.FS_SIDED_FOULING] if number == fo.SURFACE_STARBOARD else 0.0
+        elif number == fo.SURFACE_FIN:
             more = F[fo.FS_WEATHERCOCK]
         elif u > 0.0:
-            wing = fo.FB_SURFACES + fo.STARBOARD * fo.N_FBS
+            wing = fo.FB_SURFACES + fo.SURFACE_STARBOARD * fo.N_FBS
             wash = F[fo.FB_DOWNWASH] * lifts / (math.pi * F[wing + fo.FBS_ASPECT])
         X, Y, Z, lift = surface_force(
             F, number, more, SIDED_FRICTION * extra, SIDED_ANGLE * extra, wash, u, v, w, p, q, r

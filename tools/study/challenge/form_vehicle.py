@@ -48,14 +48,14 @@ def draw_body(rng: np.random.Generator, vehicle: Vehicle) -> tuple[np.ndarray, n
     span, chord, wing_x = rng.uniform(0.55, 0.80), rng.uniform(0.055, 0.075), rng.uniform(-0.02, 0.04)
     dihedral, half = rng.uniform(0.0, 0.08), 0.5 * span
     stall, profile, oswald = rng.uniform(0.17, 0.26), rng.uniform(1.4, 2.2), rng.uniform(0.75, 0.95)
-    for number, side in ((fo.STARBOARD, 1.0), (fo.PORT, -1.0)):
+    for number, side in ((fo.SURFACE_STARBOARD, 1.0), (fo.SURFACE_PORT, -1.0)):
         _surface(
             F, number, half * chord, span / chord, chord, wing_x, side * (0.5 * diameter + 0.45 * half), 0.0,
             -side * dihedral, ANGLE * rng.standard_normal(), stall, profile, oswald,
         )  # fmt: skip
     for number, low, high, aspect, tilt, z in (
-        (fo.TAIL, 0.003, 0.007, rng.uniform(2.5, 4.0), 0.0, 0.0),
-        (fo.FIN, 0.045, 0.070, rng.uniform(1.5, 2.5), 0.5 * pi, rng.uniform(-0.05, 0.0)),
+        (fo.SURFACE_TAIL, 0.003, 0.007, rng.uniform(2.5, 4.0), 0.0, 0.0),
+        (fo.SURFACE_FIN, 0.045, 0.070, rng.uniform(1.5, 2.5), 0.5 * pi, rng.uniform(-0.05, 0.0)),
     ):
         area = rng.uniform(low, high)
         _surface(
