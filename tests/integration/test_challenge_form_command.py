@@ -13,7 +13,7 @@ from tools.study.challenge.form_plan import FormCounts
 from tools.study.challenge.make import make
 from tools.study.challenge.seal import open_answers
 
-pytestmark = pytest.mark.computes(seconds=90)
+pytestmark = pytest.mark.computes(seconds=240)
 
 SEED, COUNTS = 3, FormCounts(changed=1, unchanged=1, outside=0, reference=2)
 FOLDERS = {"cases": 6, "held": 3, "reference": 2, "healthy": 3}
