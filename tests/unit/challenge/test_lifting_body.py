@@ -17,6 +17,8 @@ from tools.study.challenge.form_cases import FormTrial, gross_behaviour, pilot_o
 from tools.study.challenge.form_vehicle import COEFFICIENTS, draw_body, spheroid
 from tools.study.challenge.forms import draw_waves
 
+pytestmark = pytest.mark.computes(seconds=20)
+
 VEHICLE = load_vehicle("roughie")
 MISSIONS = ("sawtooth", "spiral", "circle_to_s")
 
