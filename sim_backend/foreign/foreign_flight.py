@@ -10,7 +10,7 @@ from firmware.core.vehicle.actuators import clip
 from firmware.core.vehicle.layout import N_P
 from sim_backend.core.noise import gaussian, uniform
 from sim_backend.foreign import foreign_layout as fo
-from sim_backend.foreign.foreign_plant import foreign_step, gusts, settled
+from sim_backend.foreign.foreign_plant import foreign_step, gusts, loose_place, settled
 
 SLIDER_PER_PITCH, SLIDER_PER_RATE, SLIDER_PER_BALLAST = 0.030, 0.025, -0.12  # m/rad, m s/rad, m/kg
 SLIDER_MOST = 0.055  # m
@@ -27,6 +27,7 @@ def start_memory(F, x):
         x[stage], x[stage + 1], x[stage + 2] = phi, theta, psi
     x[fo.X_DEPTH_1] = x[fo.X_DEPTH_2] = x[2]
     x[fo.X_ALPHA] = math.atan2(x[9], x[7] + 0.0)
+    x[fo.X_LOOSE] = loose_place(-math.sin(theta))
 
 
 @kernel

@@ -27,24 +27,46 @@ from firmware.core.vehicle.layout import N_X
     FS_FLAP, FS_PUMP_JET, FS_FOULING, FS_ROLL_PITCH, FS_TANGLE, FS_LIFT_LAG,  # N m s, N, 1, kg, kg/m, 1
     FS_GYRO_DEPTH, FS_WIRE_DRIFT, FS_ROLL_PULL,  # rad/s a metre, m, rad
     FS_PITCH_SCALE,  # 1; a label of the catalogue that came later
-) = range(64)  # fmt: skip
-N_STRENGTH = 64
+    # outside the catalogue, of a vehicle of another form
+    FS_SHELL, FS_SIDED_FOULING, FS_LOOSE,  # kg, 1, kg m
+) = range(67)  # fmt: skip
+N_STRENGTH = 67
 
 # --- F: shapes ------------------------------------------------------------------------------------------------------
-FS_EXPONENT = 64  # of the speed in what nominally grows with V^2
-FS_LEAK_START, FS_LEAK_TIME = 65, 66  # s
-FS_TRAPPED_AIR = 67  # 1: compressibility by Boyle's law, 0: saturating exponentially
-FS_DEPTH_SCALE_M = 68  # m over which mass saturates with depth
-FS_LAYER_DEPTH, FS_LAYER_WIDTH = 69, 70  # m, middle and half width of the pycnocline
-FS_COMPASS_PHASE_1, FS_COMPASS_PHASE_2 = 71, 72  # rad
-FS_GUST_TIME = 73  # s, correlation time of turbulence
-FS_JITTER = 74  # share by which a delay wanders
-FS_SKEW_STEP, FS_SKEW_TIME = 75, 76  # s, the mocap clock's step and when
-FS_DRIFT_TIME, FS_DRIFT_PHASE = 77, 78  # s, rad: slow change of what is called constant
-FS_FLAP_OMEGA, FS_FLAP_ZETA = 79, 80  # rad/s, 1
-FS_FOUL_TIME = 81  # s
-FS_LIFT_TIME = 82  # s
-N_FS = 83
+FS_EXPONENT = 67  # of the speed in what nominally grows with V^2
+FS_LEAK_START, FS_LEAK_TIME = 68, 69  # s
+FS_TRAPPED_AIR = 70  # 1: compressibility by Boyle's law, 0: saturating exponentially
+FS_DEPTH_SCALE_M = 71  # m over which mass saturates with depth
+FS_LAYER_DEPTH, FS_LAYER_WIDTH = 72, 73  # m, middle and half width of the pycnocline
+FS_COMPASS_PHASE_1, FS_COMPASS_PHASE_2 = 74, 75  # rad
+FS_GUST_TIME = 76  # s, correlation time of turbulence
+FS_JITTER = 77  # share by which a delay wanders
+FS_SKEW_STEP, FS_SKEW_TIME = 78, 79  # s, the mocap clock's step and when
+FS_DRIFT_TIME, FS_DRIFT_PHASE = 80, 81  # s, rad: slow change of what is called constant
+FS_FLAP_OMEGA, FS_FLAP_ZETA = 82, 83  # rad/s, 1
+FS_FOUL_TIME = 84  # s
+FS_LIFT_TIME = 85  # s
+FS_SHELL_TIME, FS_LOOSE_TIME = 86, 87  # s, over which a flooded shell drains, a loose mass slides
+
+# --- F: the body of a vehicle of another form (lifting_body) ---------------------------------------------------------
+FB_ON = 88  # 1: the water's forces are lifting_body's; 0: those of P
+FB_LENGTH, FB_DIAMETER, FB_WETTED = 89, 90, 91  # m, m, m2: the hull
+FB_FORM_FACTOR = 92  # friction of the hull over that of a flat plate
+FB_BASE_AREA, FB_BASE_X = 93, 94  # m2, m: where the flow leaves the tail
+FB_APPARENT = 95  # k2 - k1 of the hull's apparent masses
+FB_CROSS_ALONG, FB_CROSS_ACROSS = 96, 97  # cross-flow drag coefficient along the flow and across it
+FB_ROLL_DRAG = 98  # N m s2, moment per |p| p
+FB_MAST_AREA, FB_MAST_X, FB_MAST_Z = 99, 100, 101  # m2 (drag area), m, m: what stands out of the hull
+FB_DOWNWASH = 102  # of the wings at the tail, in that of an elliptic wing far behind it
+FB_SURFACES = 103
+(
+    FBS_AREA, FBS_ASPECT, FBS_CHORD,  # m2, 1, m
+    FBS_X, FBS_Y, FBS_Z, FBS_TILT, FBS_INCIDENCE,  # m, m, m, rad of the normal from z to y, rad
+    FBS_STALL, FBS_FRICTION, FBS_OSWALD,  # rad, profile drag over a flat plate's, span efficiency
+) = range(11)  # fmt: skip
+N_FBS = 11
+SURFACE_STARBOARD, SURFACE_PORT, SURFACE_TAIL, SURFACE_FIN = range(4)
+N_FS = FB_SURFACES + 4 * N_FBS
 
 # --- x: the plant's state as in core/vehicle/layout, then what the effects remember ---------------------------------
 X_SERVO_V, X_SERVO_Z, X_SLIDER_Z, X_PUMP_V = 16, 17, 18, 19  # speed, play taken up, play taken up, speed
@@ -53,7 +75,8 @@ X_DEPTH_1, X_DEPTH_2 = 26, 27  # m, two stages of the depth's lag
 X_GUST = 28  # 28..33 m/s2, rad/s2
 X_FLAP, X_FLAP_V = 34, 35  # rad, rad/s
 X_ALPHA = 36  # rad, angle of attack that the lift has followed
-N_FX = 37
+X_LOOSE = 37  # -1 (aft) to 1, where a loose mass lies
+N_FX = 38
 assert N_X == X_SERVO_V
 
 # --- readings: as the first nine columns of a prediction (sim_backend/core/effects/effect_layout) ---

@@ -2,7 +2,8 @@
 
 It flies blind tests of the diagnosis. Each effect keeps its label's meaning (docs/GAP.md, Words) and takes a form that
 the catalogue has not: hysteresis by Bouc and Wen instead of play, second-order or load-dependent actuators, saturating
-depth laws, powers of the speed beside the square. With F = 0 the flight is the nominal one.
+depth laws, powers of the speed beside the square. With F = 0 the flight is the nominal one. A vehicle of another form
+has the water's forces of lifting_body instead of equation (4): its P has no coefficients.
 """
 
 import math
@@ -16,10 +17,12 @@ from firmware.core.vehicle.motion import accelerations
 from firmware.core.vehicle.water import flow_angles, flow_to_body
 from sim_backend.core.noise import gaussian, uniform
 from sim_backend.foreign import foreign_layout as fo
+from sim_backend.foreign.lifting_body import body_wrench
 
 REFERENCE_SPEED = 0.35  # m/s, where powers of the speed other than the square agree with it
 TANGLE_BLOCK = 7.0  # s
 TANGLE_ARM = 0.12  # m to starboard of the tail
+LOOSE_SLOPE = 0.25  # sine of the pitch at which a loose mass has gone most of its way
 
 
 @kernel
@@ -117,8 +120,14 @@ def depth_mass(F, down):
 
 
 @kernel
-def mass_effects(P, F, servo, slider, ballast, down, t, Pw):
-    """P with the effects on masses, into Pw (N_P)."""
+def loose_place(kx):
+    """Where a loose mass comes to lie, -1 (aft) to 1 (forward), from gravity's share along body x."""
+    return math.tanh(kx / LOOSE_SLOPE)
+
+
+@kernel
+def mass_effects(P, F, servo, slider, ballast, down, t, loose, Pw):
+    """P with the effects on masses, into Pw (N_P). loose: where a loose mass lies, -1 to 1."""
     for i in range(N_P):
         Pw[i] = P[i]
     tank = F[fo.FS_BALLAST_SCALE] * ballast * (1.0 + 3.0 * ballast * ballast / 0.04)
@@ -131,6 +140,13 @@ def mass_effects(P, F, servo, slider, ballast, down, t, Pw):
     Pw[layout.CG_Y] += F[fo.FS_CG_LATERAL]
     # a weight that sits off the middle is not at the middle's height either
     Pw[layout.CG_Z] += F[fo.FS_CG_VERTICAL] + 0.06 * abs(F[fo.FS_CG_LATERAL]) - 0.06 * abs(F[fo.FS_CG_LONGITUDINAL])
+    if F[fo.FS_SHELL] != 0.0:  # water in the starboard wing, running out
+        left = F[fo.FS_SHELL] * math.exp(-t / F[fo.FS_SHELL_TIME])
+        wing = fo.FB_SURFACES + fo.SURFACE_STARBOARD * fo.N_FBS
+        Pw[layout.NET_MASS] += left
+        Pw[layout.CG_X] += left * F[wing + fo.FBS_X] / P[layout.M_T]
+        Pw[layout.CG_Y] += left * F[wing + fo.FBS_Y] / P[layout.M_T]
+    Pw[layout.CG_X] += F[fo.FS_LOOSE] * loose / P[layout.M_T]
     Pw[layout.J_YY] += F[fo.FS_INERTIA]
     Pw[layout.J_ZZ] += 1.15 * F[fo.FS_INERTIA]
     Pw[layout.A_Z] *= 1.0 + F[fo.FS_ADDED_MASS]
@@ -255,8 +271,11 @@ def foreign_derivative(P, F, waves, seed, x, servo_cmd, slider_cmd, ballast_cmd,
     gamma, dgamma = servo_motion(P, F, x, servo_cmd, out)
     position, dposition = slider_motion(P, F, x, slider_cmd, r31, out)
     pump = pump_motion(P, F, x, ballast_cmd, out)
-    mass_effects(P, F, gamma, position, x[15], x[2], t, Pw)
+    mass_effects(P, F, gamma, position, x[15], x[2], t, x[fo.X_LOOSE], Pw)
     X, Y, Z, K, M, N, followed = water_effects(P, F, u, v, w, p, q, r, r32, x[2], down_rate, pump, x, t, seed)
+    if F[fo.FB_ON] > 0.5:
+        B1, B2, B3, B4, B5, B6 = body_wrench(F, u, v, w, p, q, r)
+        X, Y, Z, K, M, N = X + B1, Y + B2, Z + B3, K + B4, M + B5, N + B6
     a1, a2, a3, a4, a5, a6 = accelerations(
         Pw, r31, r32, r33, u, v, w, p, q, r, gamma, position, x[15], dgamma, dposition, pump, X, Y, Z, K, M, N
     )
@@ -271,6 +290,8 @@ def foreign_derivative(P, F, waves, seed, x, servo_cmd, slider_cmd, ballast_cmd,
         omega = F[fo.FS_FLAP_OMEGA]
         out[fo.X_FLAP_V] = -omega * (omega * x[fo.X_FLAP] + 2.0 * F[fo.FS_FLAP_ZETA] * x[fo.X_FLAP_V] + 2.0 * q)
     out[fo.X_ALPHA] = followed
+    if F[fo.FS_LOOSE] != 0.0:
+        out[fo.X_LOOSE] = (loose_place(r31) - x[fo.X_LOOSE]) / F[fo.FS_LOOSE_TIME]
     lagging(F, x, out)
 
 

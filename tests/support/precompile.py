@@ -34,13 +34,17 @@ def _identify_a_moment() -> None:
 
 
 def _challenge_a_moment() -> None:
-    """A blind test of one case, in the foreign plant."""
+    """Blind tests of one case each, in the foreign plant: of the file's form and of another."""
+    from tools.study.challenge.form_make import FormOrder
+    from tools.study.challenge.form_plan import FormCounts
     from tools.study.challenge.make import Order, make
     from tools.study.challenge.plan import Counts
 
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)
         make(Order(out, 6, Counts(single=0, none=1, pairs=0, unknown=0), out / "answers.zip"), jobs=1)
+        formed = FormCounts(changed=0, unchanged=1, outside=0, reference=2)
+        make(FormOrder(out / "form", 6, formed, out / "form" / "answers.zip"), jobs=1)
 
 
 def _glide_a_moment() -> None:

@@ -29,14 +29,18 @@ def challenge():
 @click.option("--jobs", default=0, type=click.IntRange(0, 256), help="Processes; one a core by default.")
 @click.option("--watch", is_flag=True, help="A blind test of `gap watch`: vehicles, of which some change.")
 @click.option("--ocean", is_flag=True, help="With --watch: missions of ocean gliders, runs being dives.")
+@click.option("--form", is_flag=True, help="Vehicles of another form than equation (4), identified before they change.")
+@click.option("--changed", type=COUNT, help="With --form: vehicles changed by something of the catalogue: 30.")
+@click.option("--outside", type=COUNT, help="With --form: by something outside the catalogue: 10.")
 @click.option("--vehicles", type=click.IntRange(1, 1000), help="With --watch: 40; missions 60.")
-@click.option("--unchanged", type=click.IntRange(0, 1000), help="Of the vehicles: 10; missions 12.")
+@click.option("--unchanged", type=click.IntRange(0, 1000), help="Of the vehicles: 10; missions 12; --form 20.")
 @click.option("--runs", type=click.IntRange(4, 200), help="Of each vehicle: 14; dives 40.")
-@click.option("--reference", type=click.IntRange(1, 100), help="Of the runs, the first: 5; dives 12.")
+@click.option("--reference", type=click.IntRange(1, 100), help="Of the runs, the first: 5; dives 12; --form 12.")
 def make(
     out: Path, seed: int, messy: bool, single: int | None, none: int | None, pairs: int | None, unknown: int | None,
     answers: Path | None, jobs: int,
-    watch: bool, ocean: bool, vehicles: int | None, unchanged: int | None, runs: int | None, reference: int | None,
+    watch: bool, ocean: bool, form: bool, changed: int | None, outside: int | None, vehicles: int | None,
+    unchanged: int | None, runs: int | None, reference: int | None,
 ) -> None:  # fmt: skip
     """Draw, fly and seal a blind test. Cases that are there are kept: call again to go on after a stop."""
     from tools.study.challenge.make import Order
@@ -48,14 +52,24 @@ def make(
     from tools.study.challenge.watch_make import WatchOrder
     from tools.study.challenge.watch_plan import LEAST_WATCHED, WatchCounts
 
-    _only_with_watch(watch, ocean)
-    if watch:
+    _check_kind(watch, ocean, form)
+    if form:
+        from tools.study.challenge.form_make import FormOrder
+        from tools.study.challenge.form_plan import FormCounts
+
+        asked = {"changed": changed, "unchanged": unchanged, "outside": outside, "reference": reference}
+        formed = replace(FormCounts(), **_given(asked))
+        if not formed.total:
+            raise click.UsageError("no cases: all counts are 0")
+        order: Order = FormOrder(out, seed, formed, answers or out / ARCHIVE)
+        total = formed.total
+    elif watch:
         asked = {"vehicles": vehicles, "unchanged": unchanged, "runs": runs, "reference": reference}
         watched = replace(MISSIONS if ocean else WatchCounts(), **_given(asked))
         if watched.unchanged > watched.vehicles or watched.judged < LEAST_WATCHED:
             few = f"--unchanged at most --vehicles, and {LEAST_WATCHED} runs at least behind the reference"
             raise click.UsageError(few)
-        order: Order = (OceanOrder if ocean else WatchOrder)(out, seed, watched, answers or out / ARCHIVE)
+        order = (OceanOrder if ocean else WatchOrder)(out, seed, watched, answers or out / ARCHIVE)
         total = watched.vehicles
     else:
         asked = {"single": single, "none": none, "pairs": pairs, "unknown": unknown}
@@ -72,9 +86,11 @@ def make(
     say(f"SHA-256 of {order.archive}: {read_manifest(out / MANIFEST)['answers']['sha256']}")
 
 
-def _only_with_watch(watch: bool, ocean: bool) -> None:
+def _check_kind(watch: bool, ocean: bool, form: bool) -> None:
     if ocean and not watch:
         raise click.UsageError("--ocean goes with --watch")
+    if form and watch:
+        raise click.UsageError("--form or --watch, not both")
 
 
 def _given(asked: dict[str, int | None]) -> dict[str, int]:
@@ -90,21 +106,25 @@ def _given(asked: dict[str, int | None]) -> dict[str, int]:
 @again_option
 @click.option("--watch", is_flag=True, help="`glider gap watch` on every vehicle, with its reference.")
 @click.option("--ocean", is_flag=True, help="With --watch: `glider identify` on the reference first; velocity last.")
+@click.option(
+    "--form", is_flag=True, help="`glider identify` on the healthy runs first, then diagnose with that vehicle."
+)
 @click.argument("extra", nargs=-1, type=click.UNPROCESSED)
 def run(
     cases: Path, out: Path, only: tuple[str, ...], jobs: int | None, dask: str | None, again: bool, watch: bool,
-    ocean: bool, extra: tuple[str, ...],
-) -> None:
+    ocean: bool, form: bool, extra: tuple[str, ...],
+) -> None:  # fmt: skip
     """Run `glider gap diagnose` on every case; those that have a diagnosis are kept.
 
-    What stands after `--` is handed on to `gap diagnose`. A case's time counts its whole process.
+    What stands after `--` is handed on to `gap diagnose`; with --form the word REFERENCE in it is the folder of the
+    case's healthy runs. A case's time counts its whole process.
     """
-    from tools.study.challenge.diagnose_all import DIAGNOSIS, MISSION, WATCH, count_cases
+    from tools.study.challenge.diagnose_all import DIAGNOSIS, FORM, MISSION, WATCH, count_cases
     from tools.study.challenge.diagnose_all import run as run_all
 
     need_for(jobs, dask)
-    _only_with_watch(watch, ocean)
-    kind = (MISSION if ocean else WATCH) if watch else DIAGNOSIS
+    _check_kind(watch, ocean, form)
+    kind = (MISSION if ocean else WATCH) if watch else FORM if form else DIAGNOSIS
     with progress("diagnosed", len(set(only)) or count_cases(cases)) as advance:
         done, wrong = run_all(cases, out, extra, 1 if jobs is None else jobs, advance, only, kind, dask, again)
     say(f"{done} diagnosed: {out}")
@@ -121,10 +141,11 @@ def run(
 @click.option("--no-closed", is_flag=True, help="Do not fly the corrected models on the held runs.")
 @click.option("--watch", is_flag=True, help="The answers are those of `gap watch`: <case>/watch.json.")
 @click.option("--ocean", is_flag=True, help="With --watch: of missions; their velocity is scored too.")
+@click.option("--form", is_flag=True, help="Of vehicles of another form: their identified vehicles are scored too.")
 @json_option
 def score(
     cases: Path, answers: Path, diagnoses: Path, manifest: Path | None, partial: bool, no_closed: bool, watch: bool,
-    ocean: bool, as_json: bool,
+    ocean: bool, form: bool, as_json: bool,
 ) -> None:  # fmt: skip
     """Open the sealed answers, check them against the manifest, and score the diagnoses (docs/CHALLENGE.md)."""
     from tools.data.errors import InputError, need
@@ -133,7 +154,7 @@ def score(
     need("analysis")
     if manifest is not None and not manifest.is_file():
         raise InputError("no such file", source=manifest, column="--manifest")
-    _only_with_watch(watch, ocean)
+    _check_kind(watch, ocean, form)
     if watch:
         from tools.study.challenge.ocean_score import judge_missions
         from tools.study.challenge.watch_score import judge_watches
@@ -148,6 +169,8 @@ def score(
             _print_figures(watched.figures)
             _print_watches(watched)
         return
+    if form:
+        from tools.study.challenge.form_score import judge_forms as judge
     with progress("scored", _answered(cases)) as advance:
         found = judge(
             cases, answers, diagnoses, manifest=manifest, partial=partial, closing=not no_closed, advance=advance
@@ -180,13 +203,14 @@ def _print_watches(found) -> None:
 def _print_figures(figures) -> None:
     """One line a figure."""
     for figure in figures:
-        bound = "<=" if figure.at_most else ">="
+        bound, target = "<=" if figure.at_most else ">=", ""
         if figure.count is None:
-            value, target = "-" if figure.value is None else f"{figure.value:.2f}", f"{bound} {figure.target:g}"
+            value = "-" if figure.value is None else f"{figure.value:.2f}"
+            target = target if figure.target is None else f"{bound} {figure.target:g}"
             counted = f"{figure.of} cases"
         else:
             value = "-" if figure.value is None else f"{100.0 * figure.value:.1f} %"
-            target = f"{bound} {100.0 * figure.target:.0f} %"
+            target = target if figure.target is None else f"{bound} {100.0 * figure.target:.0f} %"
             low, high = figure.interval
             counted = f"{figure.count} of {figure.of}, {100.0 * low:.1f} to {100.0 * high:.1f} %"
         mark = {None: "", True: "met", False: "missed"}[figure.met]

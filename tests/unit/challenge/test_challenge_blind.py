@@ -7,7 +7,10 @@ from pathlib import Path
 
 import tools.study
 
-BLIND = ("make", "plan", "forms", "cases", "trial", "design", "magnitude", "messy", "evidence", "seal")
+BLIND = (
+    "make", "plan", "forms", "cases", "trial", "design", "magnitude", "messy", "evidence", "seal",
+    "form_make", "form_plan", "form_cases", "form_fit", "form_vehicle",
+)  # fmt: skip
 FORBIDDEN = ("sim_backend.core.effects", "sim_backend.core.effect", "tools.diagnose", "tools.identify", "tools.cli")
 
 

@@ -8,28 +8,35 @@ from tools.data.errors import InputError
 from tools.study.challenge.diagnosis import FILE, TIMING
 from tools.study.challenge.judge import case_folders
 from tools.study.challenge.seal import as_json
-from tools.study.challenge.watch_answer import IDENTIFIED, REFERENCE, VELOCITY, WATCH_FILE
+from tools.study.challenge.watch_answer import IDENTIFIED, REFERENCE, VEHICLE_FILE, VELOCITY, WATCH_FILE
 from tools.study.many_cases import ANSWER, CASES, Asked, Many, Told, Word, ask, files_of
 
-DIAGNOSIS, WATCH, MISSION = "diagnosis", "watch", "mission"  # kinds of blind tests
-ANSWERS = {DIAGNOSIS: FILE, WATCH: WATCH_FILE, MISSION: WATCH_FILE}
+DIAGNOSIS, WATCH, MISSION, FORM = "diagnosis", "watch", "mission", "form"  # kinds of blind tests
+ANSWERS = {DIAGNOSIS: FILE, WATCH: WATCH_FILE, MISSION: WATCH_FILE, FORM: FILE}
+REFERENCE_WORD = "REFERENCE"  # among what is handed on: the folder of the case's healthy runs
 
 
 def commands(case: Path, part: Path, extra: tuple[str, ...], kind: str) -> list[list[Word]]:
     """What is asked of a case in turn, each a `glider` command without its name; the answers go into `part`.
 
-    A mission's vehicle is identified on the dives before anything changed; with it follow watch and velocity.
+    A mission's vehicle is identified on the dives before anything changed; with it follow watch and velocity. A
+    vehicle of another form is identified on its healthy runs, then diagnosed as the vehicle that was identified.
+    REFERENCE_WORD in `extra` is replaced by the folder of these runs.
     """
     if kind == DIAGNOSIS:
         diagnose: list[Word] = ["gap", "diagnose", case, "--out", part, *extra]
         return [diagnose]
     before = case.parent.parent / REFERENCE / case.name
+    vehicle = part / IDENTIFIED / VEHICLE_FILE
+    identify: list[Word] = ["identify", before, "--out", part / IDENTIFIED]
+    if kind == FORM:
+        handed_on: list[Word] = [before if word == REFERENCE_WORD else word for word in extra]
+        return [identify, ["gap", "diagnose", case, "--vehicle", vehicle, "--out", part, *handed_on]]
     watch: list[Word] = ["gap", "watch", case, "--out", part, *extra, "--reference", before]
     if kind == WATCH:
         return [watch]
-    vehicle = part / IDENTIFIED / "identified.toml"
     return [
-        ["identify", before, "--out", part / IDENTIFIED],
+        identify,
         [*watch, "--vehicle", vehicle],
         ["gap", "velocity", case, "--model", vehicle, "--out", part / VELOCITY],
     ]

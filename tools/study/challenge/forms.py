@@ -123,6 +123,7 @@ def blank() -> np.ndarray:
     F[fo.FS_EXPONENT] = 2.0
     F[fo.FS_LEAK_TIME] = F[fo.FS_DEPTH_SCALE_M] = F[fo.FS_LAYER_WIDTH] = F[fo.FS_GUST_TIME] = F[fo.FS_FLAP_OMEGA] = 1.0
     F[fo.FS_DRIFT_TIME], F[fo.FS_SKEW_TIME], F[fo.FS_LIFT_TIME] = 100.0, 1e9, 1.0
+    F[fo.FS_SHELL_TIME] = F[fo.FS_LOOSE_TIME] = 1.0
     return F
 
 

@@ -16,6 +16,7 @@ from tools.inference.predict import as_run, predict
 from tools.study.challenge.diagnosis import FILE, MODEL, TIMING, read_diagnosis
 from tools.study.challenge.score import Score, Scored, score
 from tools.study.challenge.seal import (
+    MANIFEST,
     OF_A_DIAGNOSIS,
     Answers,
     check_seal,
@@ -39,12 +40,13 @@ def case_folders(cases: Path) -> tuple[Path, Path]:
 
 def open_sealed(
     path: Path, manifest: Path | None, cases: Path, held: Path, needed: tuple[str, ...] = OF_A_DIAGNOSIS,
-    wanted: bool = True,
+    wanted: bool = True, others: tuple[Path, ...] = (),
 ) -> Answers:  # fmt: skip
     """The answers, checked against the manifest if there is one: their own hash and those of the cases.
 
     wanted: whether the flights in `held` are, too: where nothing is flown on them, they need not be there. An
-    archive without a manifest is an InputError: nobody could tell when it was written.
+    archive without a manifest is an InputError: nobody could tell when it was written. others: further folders in which
+    each case has runs.
     """
     answers = open_answers(path, needed)
     if answers.sha256 is None:
@@ -53,7 +55,7 @@ def open_sealed(
         raise InputError("no manifest beside the cases to check the answers against", source=manifest or path)
     check_seal(answers, manifest)
     for name, promised in read_manifest(manifest).get("cases", {}).items():
-        for kind, folder in (("cases", cases / name), (held.name, held / name)):
+        for kind, folder in (("cases", cases / name), *((one.name, one / name) for one in (held, *others))):
             if kind not in promised:
                 raise InputError(f"the manifest is not of cases with '{kind}'", source=manifest)
             if kind == held.name and not wanted:
@@ -89,9 +91,9 @@ def _seconds(path: Path) -> float:
         raise InputError("no number 'seconds' in it", source=path) from None
 
 
-def predicted_total(path: Path, model: str | Path) -> float:
-    """Total gap of a run file as `glider gap predict` predicts it with a model."""
-    case, recorded = load_case_of_run(path)
+def predicted_total(path: Path, model: str | Path, vehicle: Path | None = None) -> float:
+    """Total gap of a run file as `glider gap predict` predicts it with a model; vehicle: in the place of the case's."""
+    case, recorded = load_case_of_run(path, None if vehicle is None else str(vehicle))
     Y = predict(case, load_model(str(model), case), [recorded])[0]
     return run_total(recorded, as_run(recorded, Y))
 
@@ -100,6 +102,14 @@ def run_total(measured: Run, predicted: Run) -> float:
     """Total gap of a prediction in run data: rms over its channels."""
     table = ROUGHIE_MEASURES.measured(predicted)
     return run_gap(ROUGHIE_MEASURES, measured, table, ROUGHIE_MEASURES.windows(measured.t)).total
+
+
+def runs_of(folder: Path) -> list[Path]:
+    """The run files of a case's folder; InputError where there are none."""
+    runs = sorted(folder.glob("run*.csv*"))
+    if not runs:
+        raise InputError("no held runs of this case", source=folder)
+    return runs
 
 
 def closed_share(case: Scored, held: Path, diagnoses: Path) -> float | None:
@@ -111,9 +121,7 @@ def closed_share(case: Scored, held: Path, diagnoses: Path) -> float | None:
     answer's, from true starts.
     """
     model = diagnoses / case.name / MODEL
-    runs = sorted((held / case.name).glob("run*.csv*"))
-    if not runs:
-        raise InputError("no held runs of this case", source=held / case.name)
+    runs = runs_of(held / case.name)
     if case.said is None or not model.is_file():
         return 0.0
     before, perfect = held_total(runs, NOMINAL), perfect_total(case.truth)
@@ -123,14 +131,19 @@ def closed_share(case: Scored, held: Path, diagnoses: Path) -> float | None:
     return (before - after) / (before - perfect)
 
 
-def held_total(runs: list[Path], model: str | Path) -> float:
+def held_total(runs: list[Path], model: str | Path, vehicle: Path | None = None) -> float:
     """A model's total gap over runs: rms of theirs."""
-    return root_mean_square([predicted_total(path, model) for path in runs])
+    return root_mean_square([predicted_total(path, model, vehicle) for path in runs])
 
 
 def perfect_total(truth: dict[str, Any]) -> float:
     """A perfect model's total gap over the held runs."""
     return total(truth["oracle"][truth["runs"] :])
+
+
+def manifest_beside(cases: Path) -> Path | None:
+    """The manifest in or beside a folder of cases, if there is one."""
+    return next((path for path in (cases / MANIFEST, cases.parent / MANIFEST) if path.is_file()), None)
 
 
 def judge(
@@ -145,8 +158,7 @@ def judge(
 ) -> Score:
     """Open, check and score; closing: fly the corrected models on the held runs too, which takes the time."""
     folders = case_folders(cases)
-    beside = next((path for path in (cases / "manifest.json", cases.parent / "manifest.json") if path.is_file()), None)
-    opened = open_sealed(answers, manifest or beside, *folders, wanted=closing)
+    opened = open_sealed(answers, manifest or manifest_beside(cases), *folders, wanted=closing)
     found = gather(opened, diagnoses, partial)
     for case in found:
         if closing and case.predictable:

@@ -47,6 +47,11 @@ class Order:
         return self.out / "held"
 
     @property
+    def folders(self) -> tuple[Path, ...]:
+        """The folders in which a case has runs: the cases' first."""
+        return self.cases, self.held
+
+    @property
     def making(self) -> Path:
         return self.out / MAKING
 
@@ -63,7 +68,7 @@ class Order:
 
 def make_one(order: Order, case: Any, vehicle: Vehicle) -> str | None:
     """Draw and write one case, its answer last; what went wrong, if no such case can be drawn."""
-    for folder in (order.cases, order.held):
+    for folder in order.folders:
         shutil.rmtree(folder / case.name, ignore_errors=True)  # cut off in the middle
     try:
         found = order.draw(case, vehicle)
@@ -84,13 +89,13 @@ def _prepare(order: Order) -> bool:
                 "holds another blind test (other seed, counts or kind): name another folder", source=order.out
             )
         return True
-    for folder in (order.cases, order.held, order.making, order.archive.parent):
+    for folder in (*order.folders, order.making, order.archive.parent):
         folder.mkdir(parents=True, exist_ok=True)
     begun = order.making / seal.PLAN
     if begun.exists() and seal.read_object(begun.read_bytes(), begun) != order.plain:
         raise InputError("holds the beginning of another blind test: name another folder", source=order.out)
     if not begun.exists():
-        if any(order.cases.iterdir()) or any(order.held.iterdir()):
+        if any(any(folder.iterdir()) for folder in order.folders):
             raise InputError("already holds cases of something else: name another folder", source=order.out)
         write_bytes(begun, seal.as_json(order.plain))
     return False
@@ -139,5 +144,5 @@ def _seal(order: Order, cases: list) -> None:
         path = order.making / f"{case.name}.json"
         answers[case.name] = seal.read_object(path.read_bytes(), path)
     sha256 = seal.seal(order.archive, order.plain, answers)
-    seal.write_manifest(order.out / seal.MANIFEST, order.archive, sha256, order.cases, order.held)
+    seal.write_manifest(order.out / seal.MANIFEST, order.archive, sha256, *order.folders)
     shutil.rmtree(order.making)

@@ -75,6 +75,10 @@ class Scored:
     def called_gap(self) -> bool:
         return self.verdict() != "none"
 
+    def called_cause(self) -> bool:
+        """Whether a cause is named; no answer counts too."""
+        return self.verdict() in (None, "cause")
+
     def called_unknown(self) -> bool:
         return self.verdict() == "unknown"
 
@@ -139,7 +143,7 @@ class Figure:
 
     key: str
     name: str  # as in docs/GAP.md, Figures to reach
-    target: float
+    target: float | None  # None: for information
     at_most: bool
     value: float | None
     of: int  # cases that it was counted over
@@ -148,8 +152,8 @@ class Figure:
 
     @property
     def met(self) -> bool | None:
-        """Whether the value reaches the target; None without a value."""
-        if self.value is None:
+        """Whether the value reaches the target; None without a value or a target."""
+        if self.value is None or self.target is None:
             return None
         return self.value <= self.target if self.at_most else self.value >= self.target
 
@@ -177,7 +181,7 @@ class _Share:
     name: str
     kinds: tuple[str, ...]
     holds: Callable[[Scored], bool]
-    target: float
+    target: float | None
     at_most: bool = False
 
 
@@ -211,6 +215,19 @@ MESSY_SHARES = (
 )
 
 
+# Of vehicles of another form, which the identified model does not quite fit.
+FORM_SHARES = (
+    _Share("unchanged_called_cause", "unchanged, called a cause", (NONE,), Scored.called_cause, None, True),
+    _Share("unchanged_called_unknown", "unchanged, called unknown", (NONE,), Scored.called_unknown, None, True),
+    _Share("right_cause_first", "right cause first", (SINGLE,), Scored.first, None),
+    _Share("within_group", "right cause within its group", (SINGLE,), Scored.grouped, None),
+    _Share("in_first_three", "right cause in the first three", (SINGLE,), Scored.first_three, None),
+    _Share("known_called_unknown", "known called unknown", (SINGLE,), Scored.called_unknown, None, True),
+    _Share("unknown_called_unknown", "outside the catalogue, called unknown", (UNKNOWN,), Scored.called_unknown, None),
+    _Share("sure_and_wrong", "sure (> 0.8) and wrong", (NONE, *GAPS), Scored.sure_and_wrong, None, True),
+)
+
+
 def _share(share: _Share, cases: Sequence[Scored]) -> Figure:
     counted = [case for case in cases if case.kind in share.kinds]
     count = sum(share.holds(case) for case in counted)
@@ -219,7 +236,7 @@ def _share(share: _Share, cases: Sequence[Scored]) -> Figure:
     return Figure(share.key, share.name, share.target, share.at_most, value, len(counted), count, interval)
 
 
-def _middle(key: str, name: str, values: list[float], target: float, at_most: bool, middle) -> Figure:
+def _middle(key: str, name: str, values: list[float], target: float | None, at_most: bool, middle) -> Figure:
     return Figure(key, name, target, at_most, float(middle(values)) if values else None, len(values))
 
 
@@ -256,6 +273,24 @@ def _plain_case(case: Scored) -> dict[str, Any]:
         "closed": case.closed,
         "seconds": case.seconds,
     }
+
+
+def score_forms(cases: Sequence[Scored], gaps: Sequence[tuple[float, float]]) -> Score:
+    """Figures of vehicles of another form; gaps: of the file's and the identified model in each one's healthy runs."""
+    figures = [_share(share, cases) for share in FORM_SHARES]
+    closed = [case.closed for case in cases if case.closed is not None]
+    figures.append(_middle("closed", "closed of what the change adds, median", closed, None, False, np.median))
+    worse = sum(identified > file for file, identified in gaps)
+    figures.append(
+        Figure("identified_worse", "identified predicts healthy runs worse", None, True,
+               worse / len(gaps) if gaps else None, len(gaps), worse, wilson(worse, len(gaps)))
+    )  # fmt: skip
+    for n, name in enumerate(("file", "identified")):
+        totals = [pair[n] for pair in gaps]
+        figures.append(_middle(f"healthy_{name}", f"healthy gap, {name}, median", totals, None, True, np.median))
+    seconds = [case.seconds for case in cases if case.seconds is not None]
+    figures.append(_middle("seconds", "seconds a case, the longest", seconds, None, True, max))
+    return Score(list(cases), figures)
 
 
 def score(cases: Sequence[Scored]) -> Score:

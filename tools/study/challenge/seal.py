@@ -55,17 +55,18 @@ def seal(path: Path, plan: dict[str, Any], answers: dict[str, dict[str, Any]]) -
     return digest(path.read_bytes())
 
 
-def write_manifest(path: Path, archive: Path, sha256: str, cases: Path, held: Path) -> None:
+def write_manifest(path: Path, archive: Path, sha256: str, cases: Path, *others: Path) -> None:
     """The part that is published: hashes of the answers and of every case, and nothing of what they hold.
 
-    held: the folder of the other runs of each case, by whose name the manifest knows them.
+    others: the folders of the other runs of each case, by whose names the manifest knows them.
     """
     names = sorted(folder.name for folder in cases.iterdir())
     manifest = {
         "format": FORMAT,
         "answers": {"file": archive.name, "sha256": sha256},
         "cases": {
-            name: {"cases": folder_digest(cases / name), held.name: folder_digest(held / name)} for name in names
+            name: {"cases": folder_digest(cases / name)} | {one.name: folder_digest(one / name) for one in others}
+            for name in names
         },
     }
     write_bytes(path, as_json(manifest))

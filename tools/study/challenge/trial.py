@@ -58,11 +58,7 @@ class Trial:
     def _fly(self, F: np.ndarray, number: int, design: RunDesign) -> Flight:
         rows = design.rows + EXTRA
         commands, X, Y = np.zeros((rows, 3)), np.zeros((rows, fo.N_FX)), np.zeros((rows, fo.N_FR))
-        disturbance = self.flown.disturbance
-        fly_foreign(
-            self.P, F, design.waves, self.errors, disturbance.linear, disturbance.angular, design.seed,
-            design.start.copy(), design.legs, commands, X, Y,
-        )  # fmt: skip
+        self._pilot(F, design, commands, X, Y)
         columns = {names.TIME: np.arange(design.rows) * fo.ROW_S}
         columns |= dict(zip(names.COMMANDS, commands[: design.rows].T, strict=True))
         order = (*names.DRAW_WIRES, *names.ATTITUDE, *names.RATES, names.DEPTH)
@@ -73,6 +69,14 @@ class Trial:
         if self.site.mocap:
             columns |= self._mocap(F, number, X, design.rows)
         return Flight(design, F, commands, X, Run(f"run{number:02d}", None, columns))
+
+    def _pilot(self, F: np.ndarray, design: RunDesign, commands: np.ndarray, X: np.ndarray, Y: np.ndarray) -> None:
+        """Fly a design with effects F: commands, states and readings in place."""
+        disturbance = self.flown.disturbance
+        fly_foreign(
+            self.P, F, design.waves, self.errors, disturbance.linear, disturbance.angular, design.seed,
+            design.start.copy(), design.legs, commands, X, Y,
+        )  # fmt: skip
 
     def _mocap(self, F: np.ndarray, number: int, X: np.ndarray, rows: int) -> dict[str, np.ndarray]:
         """Motion capture's columns: at its own time, with noise and short blind spells."""

@@ -10,7 +10,8 @@ from tools.study.challenge.diagnosis import MAX_BYTES, Probability
 
 WATCH_FILE = "watch.json"
 REFERENCE = "reference"  # the folder of the runs before anything changed
-IDENTIFIED, VELOCITY = "identified", "velocity"  # folders of a mission's vehicle and of its velocity
+IDENTIFIED, VELOCITY = "identified", "velocity"  # folders of an identified vehicle and of a mission's velocity
+VEHICLE_FILE = "identified.toml"  # in IDENTIFIED
 MEANS = "velocity.json"  # in that: each dive's mean
 
 

@@ -1,0 +1,118 @@
+"""What `glider identify` is worth on vehicles of another form: gaps of healthy runs left out, before and after.
+
+    python -m tools.measure.figures.form_identify --seed 3101 --vehicles 12
+
+Vehicles are drawn and flown as in `gap challenge make --form`, all runs healthy and with motion capture. Beside the
+file's and the identified vehicle stands the nearest of equation (4), fitted to true states, from true starts.
+"""
+
+import tempfile
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import click
+import numpy as np
+
+from tools.cli.common import progress
+from tools.data.runs.case import load_case
+from tools.data.sources import load_vehicle
+from tools.gap.measure import RunGap, case_channels, root_mean_square, run_gap
+from tools.identify.files import VEHICLE as IDENTIFIED
+from tools.identify.files import write
+from tools.identify.pipeline import identify
+from tools.inference.channels import ROUGHIE_MEASURES
+from tools.inference.model import nominal_model
+from tools.inference.predict import predict
+from tools.study.challenge.form_cases import draw_healthy, write_flights
+from tools.study.challenge.form_fit import fit_flights, fit_forces, formless
+from tools.study.challenge.make import VEHICLE
+from tools.study.challenge.trial import by_channel, total
+from tools.study.workers import work_here
+
+TRIES, REFINING = 20, 6
+NAMES = ("file", "identified", "nearest")
+
+
+@dataclass
+class Gaps:
+    """Each model's gaps by channel, `total` among them, over runs left out; fitted: the identified's over its own."""
+
+    held: dict[str, dict[str, float]]
+    fitted: float
+
+
+def gaps_of(folder: Path, vehicle: str | None) -> list[RunGap]:
+    """Each run's gaps as `gap predict` predicts it with a vehicle, None: the case's."""
+    case = load_case(folder, vehicle)
+    flown = predict(case, nominal_model(case), case.runs)
+    return [
+        run_gap(ROUGHIE_MEASURES, run, Y, ROUGHIE_MEASURES.windows(run.t))
+        for run, Y in zip(case.runs, flown, strict=True)
+    ]
+
+
+def _with_total(gaps: list[RunGap]) -> dict[str, float]:
+    return case_channels(gaps) | {"total": root_mean_square([gap.total for gap in gaps])}
+
+
+def measure(seed: int, runs: int, held: int, number: int) -> Gaps:
+    """One vehicle drawn, identified from `runs` runs and judged on `held` others."""
+    for attempt in range(TRIES):
+        rng = np.random.default_rng(np.random.SeedSequence([seed, number, attempt]))
+        found = draw_healthy(rng, load_vehicle(VEHICLE), runs + held)
+        if found is not None:
+            break
+    else:
+        raise RuntimeError(f"vehicle {number}: none in {TRIES} draws is plausible and flyable")
+    trial, flights = found
+    near = fit_flights(trial, flights[:REFINING], fit_forces(trial, flights[:runs]))
+    nearest = trial.channels(flights[runs:], near, formless(trial.shapes), plain=True)
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        write_flights(folder / "fitted", trial, flights[:runs])
+        write_flights(folder / "held", trial, flights[runs:])
+        write(identify(load_case(folder / "fitted")), folder / "identified")
+        vehicle = str(folder / "identified" / IDENTIFIED)
+        after = _with_total(gaps_of(folder / "held", vehicle))
+        fitted = _with_total(gaps_of(folder / "fitted", vehicle))["total"]
+        before = _with_total(gaps_of(folder / "held", None))
+    gaps = dict(zip(NAMES, (before, after, by_channel(nearest) | {"total": total(nearest)}), strict=True))
+    return Gaps(gaps, fitted)
+
+
+def table(found: list[Gaps]) -> list[str]:
+    """Lines: by channel each model's median over the vehicles and its worst; then how often identifying was worse."""
+    lines = [f"{'channel':10}" + "".join(f"{name:>12}{'worst':>8}" for name in NAMES)]
+    for channel in found[0].held["file"]:
+        columns = [[one.held[name][channel] for one in found] for name in NAMES]
+        lines.append(f"{channel:10}" + "".join(f"{np.median(values):12.2f}{max(values):8.2f}" for values in columns))
+    worse = sum(one.held["identified"]["total"] > one.held["file"]["total"] for one in found)
+    fitted = np.median([one.fitted for one in found])
+    lines.append(
+        f"{len(found)} vehicles; identified worse than the file in {worse}; in its own runs, median {fitted:.2f}"
+    )
+    return lines
+
+
+@click.command()
+@click.option("--seed", required=True, type=click.IntRange(0))
+@click.option("--vehicles", default=12, show_default=True, type=click.IntRange(1), help="How many are drawn.")
+@click.option("--runs", default=12, show_default=True, type=click.IntRange(2), help="Runs each is identified from.")
+@click.option("--held", default=4, show_default=True, type=click.IntRange(1), help="Runs that are left out.")
+@click.option("--jobs", default=1, show_default=True, type=click.IntRange(0), help="Processes; 0: one a core.")
+def main(seed: int, vehicles: int, runs: int, held: int, jobs: int) -> None:
+    """Gaps in tolerances, by channel."""
+    answers: dict[int, Gaps] = {}
+    with progress("vehicles", vehicles) as advance:
+        for number, found in work_here(partial(measure, seed, runs, held), range(vehicles), jobs):
+            answers[number] = found
+            one = " ".join(f"{name} {found.held[name]['total']:.2f}" for name in NAMES)
+            click.echo(f"vehicle {number}: {one}, in its own runs {found.fitted:.2f}")
+            advance(1)
+    for line in table([answers[number] for number in range(vehicles)]):
+        click.echo(line)
+
+
+if __name__ == "__main__":
+    main()
