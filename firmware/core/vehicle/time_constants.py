@@ -38,7 +38,6 @@ from firmware.core.vehicle.state import velocities
 
 MOST_PARTS = 64  # of a step: enough for 0.1 s of K_p = -80 kg s/rad at 1 m/s; what is faster has left every vehicle
 STABLE_SHARE = 0.9  # of a method's limit: the state changes in the course of a step
-ALL_DRIVEN = 7  # mode: no actuator follows a command, so that none has a time constant
 
 
 @kernel
@@ -62,8 +61,7 @@ def least_inertia(P, x):
 
 @kernel
 def attack_bound(u, w):
-    """An upper bound of the angle of attack's size, rad, without an arc: |w| / u up to pi/2, pi in a flow from astern.
-    """
+    """Return an upper bound of the size of the angle of attack, rad: |w| / u up to pi/2; pi in a flow from astern."""
     ahead = u > 0.0
     return where(ahead, min(abs(w) / where(ahead, u, 1.0), 0.5 * math.pi), math.pi)
 
