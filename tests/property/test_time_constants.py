@@ -27,7 +27,7 @@ from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.hydrodynamics import extra_rate, extra_wrench
 from sim_backend.core.plant import plant_step
 from tests.support.examples import examples
-from tools.inference.core.step import MAX_STEP, propagate
+from tools.inference.core.step import LARGEST_SPEED, MAX_STEP, propagate
 from tools.inference.prediction_error import LIMIT
 from tools.inference.vehicle_parameters import K_SHARE, LINEAR_DAMPING, coefficient_sizes
 
@@ -297,3 +297,13 @@ def test_the_filter_flies_as_with_a_fine_step(vehicle, x, command):
     assert_alike(rows, exact[every - 1 :: every])
     rate = np.sqrt(np.diag(coarse.cov)[kf.E_NU + 3 : kf.E_ACT] / np.diag(fine.cov)[kf.E_NU + 3 : kf.E_ACT])
     assert (rate < 2.0).all()
+
+
+@examples(40)
+@given(identified(), st.tuples(*[st.floats(-19.0, 19.0)] * 6))
+def test_a_model_that_has_left_every_vehicle_stays_a_number(vehicle, nu):
+    """Beyond MOST_PARTS no step is stable: the model is held where it was, whatever overflowed."""
+    x = state((0.0, 0.0, 0.0), nu, (0.0, 0.0, 0.0))
+    flown = predicted(vehicle, x, (0.0, 0.0, 0.0), MAX_STEP, 2.0)
+    assert np.isfinite(flown).all()
+    assert np.abs(flown[:, 7:13]).max() < LARGEST_SPEED

@@ -102,12 +102,12 @@ def propagate(Pw, F, x, mode, t, inputs, i, begin, acc, zero, work, kept, method
         if parts == 0.0:
             divided = effect_parts(method, Pw, F, x, mode, h)
         effect_step(method, Pw, F, x, mode, c0, c1, c2, since, acc, 0.0, zero, h, divided, work)
-        worst = 0.0
-        for n in range(X_NU, X_ACT):
-            worst = max(worst, abs(x[n]))
-        if not everywhere(worst < LARGEST_SPEED):
+        sound = abs(x[X_NU]) < LARGEST_SPEED  # of what is no number, too, this is not true
+        for n in range(X_NU + 1, X_ACT):
+            sound = sound & (abs(x[n]) < LARGEST_SPEED)
+        if not everywhere(sound):
             for n in range(len(x)):
-                x[n] = where(worst < LARGEST_SPEED, x[n], kept[n])
+                x[n] = where(sound, x[n], kept[n])
 
 
 @kernel
