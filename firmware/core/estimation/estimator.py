@@ -292,7 +292,8 @@ def linearise_where_due(P, settings, sigma, x, ds, dl, db, dt, work):
 def estimator_predict(P, settings, sigma, x, cov, inflation, mode, c_servo, c_slider, c_ballast, dt, work):
     """Carry x and cov over dt (s) in sub-steps of at most MAX_STEP and short enough for the vehicle's time constants.
 
-    Actuators as in actuator_speeds. Lanes take as many sub-steps each as its own state asks for.
+    Actuators as in actuator_speeds. Each lane takes as many sub-steps as its own state asks for; a lane that waits for
+    one with more may differ in the last place of its covariance.
     """
     A, C, drive = work[kf.W_A : kf.W_A + kf.N_MOVING], work[kf.W_C : kf.W_C + 6], work[kf.W_DRIVE : kf.W_DRIVE + 6]
     k, y, d = work[kf.W_SCRATCH], work[kf.W_SCRATCH + 1], work[kf.W_SCRATCH + 2]
