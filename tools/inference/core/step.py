@@ -11,7 +11,6 @@ from firmware.core.maths.rotations import wrap_angle
 from firmware.core.maths.wide import anywhere, everywhere, lane, lanes, spread, where, with_lane
 from firmware.core.vehicle.layout import X_ACT, X_NU, X_POS, X_QUAT
 from firmware.core.vehicle.state import euler_angles, quaternion
-from firmware.core.vehicle.time_constants import MOST_PARTS
 from sim_backend.core.effect_plant import effect_parts, effect_step
 from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.correction import correction, link_of
@@ -103,10 +102,10 @@ def propagate(Pw, F, x, mode, t, inputs, i, begin, acc, zero, work, kept, method
         if parts == 0.0:
             divided = effect_parts(method, Pw, F, x, mode, h)
         effect_step(method, Pw, F, x, mode, c0, c1, c2, since, acc, 0.0, zero, h, divided, work)
-        # what is no number is held where a step in MOST_PARTS overflowed; a model that has no numbers itself stays lost
-        sound = (abs(x[X_NU]) < LARGEST_SPEED) | (math.isnan(x[X_NU]) & (divided < MOST_PARTS))
+        # a divided step that overflowed is held; a model that has no numbers itself (its steps are whole) stays lost
+        sound = (abs(x[X_NU]) < LARGEST_SPEED) | (math.isnan(x[X_NU]) & (divided == 1.0))
         for n in range(X_NU + 1, X_ACT):
-            sound = sound & ((abs(x[n]) < LARGEST_SPEED) | (math.isnan(x[n]) & (divided < MOST_PARTS)))
+            sound = sound & ((abs(x[n]) < LARGEST_SPEED) | (math.isnan(x[n]) & (divided == 1.0)))
         if not everywhere(sound):
             for n in range(len(x)):
                 x[n] = where(sound, x[n], kept[n])
