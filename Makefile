@@ -12,7 +12,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 # Kernels are compiled here, with a word about it, and again only when they change.
 setup: $(STAMP)
-	@$(BIN)/glider check --compile
+	@$(BIN)/glider compile
 
 # pip runs again only when the dependencies change. $(call install,EXTRA)
 define install

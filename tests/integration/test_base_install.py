@@ -36,6 +36,9 @@ CALLS: tuple[tuple[str, str | None], ...] = (
     ("missions", None),
     ("check", None),
     ("check --board twin", None),
+    ("compile", None),
+    ("acknowledge --state state", None),
+    ("status --help", None),  # its work is a flight's on devices: test_health_page.py
     ("log info flight.mcap", None),
     ("log replay flight.mcap", None),
     ("log export flight.mcap --out case", None),

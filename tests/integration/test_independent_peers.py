@@ -22,6 +22,7 @@ from hal.protocols.registers import preset
 from hal.transport.hub import Hub, Link
 from hal.transport.port import SerialPort
 from sim_backend.twins.line import open_pty
+from tests.support.twinned import until
 
 
 # --- a plain client on our twins ------------------------------------------------------------------------------------
@@ -87,7 +88,11 @@ def test_a_plain_client_moves_the_slider(client):
     while abs(position() - counts) > 20 and time.monotonic() < end:
         time.sleep(0.05)
     assert position() == pytest.approx(counts, abs=20)
-    assert client.read_holding_registers(0x1003, count=1, device_id=7).registers[0] & 0b110111 == 0b110010
+
+    def status():
+        return client.read_holding_registers(0x1003, count=1, device_id=7).registers[0] & 0b110111
+
+    until(lambda: status() == 0b110010, 5.0)  # it stands, done
     assert not client.write_register(0x6002, 0x40, device_id=7).isError()
     assert client.write_registers(0x6200, [9, *words, 360, 100, 100, 0, 0x10], device_id=7).exception_code == 3
 

@@ -18,7 +18,7 @@ from hal.sortie import State
 from hal.state_file import StateFile
 from tools.data.sources import load_vehicle
 from tools.flight.ascent_plan import make_plan
-from tools.flight.live import snapshot
+from tools.flight.status import snapshot
 
 pytestmark = pytest.mark.realtime(seconds=60)
 PATIENCE_S = 4.0

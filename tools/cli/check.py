@@ -1,15 +1,13 @@
 """`glider check`: are the files of a flight fit to fly with?"""
 
-import subprocess
 import sys
 from dataclasses import asdict
-from importlib.util import find_spec
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import click
 
-from tools.cli.common import DONE, FAILED, fail, json_option, print_json, progress, say
+from tools.cli.common import DONE, FAILED, json_option, print_json, say
 
 
 @click.command()
@@ -17,16 +15,14 @@ from tools.cli.common import DONE, FAILED, fail, json_option, print_json, progre
 @click.option("--mission", default="sawtooth", show_default=True, help="Mission: shipped name or file.")
 @click.option("--board", default="sim", show_default=True, help="Board: shipped name or file.")
 @click.option("--signs", is_flag=True, help="Lead through signs and axes of a board's devices, step by step.")
-@click.option("--live", is_flag=True, help="Health page of the flight under way.")
-@click.option("--compile", "compile_", is_flag=True, help="Compile every kernel of a flight and of a diagnosis ahead.")
-@click.option("--acknowledge", is_flag=True, help="A person has looked at the flight before: the next may begin.")
-@click.option(
-    "--state", "state", type=click.Path(path_type=Path, file_okay=False), help="Folder of state and heartbeat."
-)
+@click.option("--live", is_flag=True, hidden=True)
+@click.option("--compile", "compile_", is_flag=True, hidden=True)
+@click.option("--acknowledge", is_flag=True, hidden=True)
+@click.option("--state", type=click.Path(path_type=Path, file_okay=False), hidden=True)
 @json_option
+@click.pass_context
 def check(
-    vehicle: str, mission: str, board: str, signs: bool, live: bool, compile_: bool, acknowledge: bool,
-    state: Path | None, as_json: bool,
+    context: click.Context, vehicle: str, mission: str, board: str, signs: bool, as_json: bool, **moved: Any
 ) -> None:  # fmt: skip
     """Check vehicle, mission and board files, and that they go together.
 
@@ -34,12 +30,10 @@ def check(
     that was accepted. With --signs a person helps: nose up, roll to starboard, mass forward, pump in. Of the law it
     says whether its k2 covers the vehicle's [uncertainty] and [disturbance]; that it does not is a warning.
 
-    With --live, --compile or --acknowledge it does that alone (docs/UNATTENDED.md).
-
     Exit code 0: all fit to fly with; 1: something is not; each finding in a line of its own.
     """
-    if live or compile_ or acknowledge:
-        _stand_by(live, compile_, acknowledge, state, as_json)
+    if moved["live"] or moved["compile_"] or moved["acknowledge"]:
+        _moved(context, as_json=as_json, **moved)
     from firmware.core.jit import CACHE_DIR
     from firmware.model.k2_margin import K2Margin
     from hal.ports import BoardError
@@ -102,53 +96,21 @@ def check(
     raise SystemExit(DONE if all(good) else FAILED)
 
 
-def _stand_by(live: bool, compile_: bool, acknowledge: bool, state: Path | None, as_json: bool) -> NoReturn:
-    """The options that are commands of their own; ends with the exit code."""
-    if compile_:
-        from firmware.core.jit import CACHE_DIR
-        from tools.flight.precompile import FLIGHT, ensure_compiled
+def _moved(context: click.Context, **asked: Any) -> NoReturn:
+    """What were options of `check` and are commands now: named, then done."""
+    from tools.cli.acknowledge import acknowledge
+    from tools.cli.compile_ import compile_
+    from tools.cli.status import status
 
-        diagnosis = _compile_diagnosis()
-        ensure_compiled(FLIGHT, say, progress)
-        if diagnosis is not None and diagnosis.wait():
-            fail("glider: the kernels of a diagnosis were not compiled")
-        if as_json:
-            print_json(FLIGHT.compile())
-        else:
-            say(f"kernels: {CACHE_DIR or 'plain Python (GLIDER_JIT=0)'}")
-    if acknowledge:
-        from hal.heartbeat import run_folder, state_folder
-        from hal.sortie import Refused
-        from tools.flight.keeper import acknowledge as set_back
-        from tools.flight.keeper import watch_facts
-
-        try:
-            before = set_back(state or state_folder(), watch_facts(state or run_folder()))
-        except Refused as refused:
-            fail(f"glider: not acknowledged: {refused}")
-        say(f"acknowledged: {before.describe()}")
-    if live:
-        from tools.flight.live import find_folder, show, snapshot
-
-        folder = find_folder(state)
-        if as_json:
-            print_json(snapshot(folder))
-        else:
-            show(folder)
-        raise SystemExit(FAILED if snapshot(folder)["problems"] else DONE)
+    state = asked["state"]
+    for option, command, given in (
+        ("compile_", compile_, {"as_json": asked["as_json"]}), ("acknowledge", acknowledge, {"state": state}),
+        ("live", status, {"state": state, "as_json": asked["as_json"]}),
+    ):  # fmt: skip
+        if asked[option]:
+            say(f"`glider check --{option.rstrip('_')}` is now `glider {command.name}`")
+            context.invoke(command, **given)
     raise SystemExit(DONE)
-
-
-def _compile_diagnosis() -> subprocess.Popen[bytes] | None:
-    """A process that compiles what a diagnosis calls, beside the flight's; None where it is there, or not installed."""
-    if not find_spec("scipy"):
-        return None
-    from tools.diagnose.precompile import DIAGNOSIS
-
-    stamp = DIAGNOSIS.stamp()
-    if stamp is None or stamp.exists():
-        return None
-    return subprocess.Popen([sys.executable, "-m", "tools.diagnose.precompile"])
 
 
 def arming_list(mission: str, vehicle: str, board: str) -> list[dict]:

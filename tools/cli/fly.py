@@ -232,7 +232,7 @@ def keep(flight, name: str, folder: Path | None, acknowledge: bool, yes: bool, b
         say(f"acknowledged: {acknowledged.describe()}")
     before = keeper.journal.before
     if before.state == State.HELD:
-        fail(f"glider: not armed: {before.describe()}; look at the vehicle, then --acknowledge")
+        fail(f"glider: not armed: {before.describe()}; look at the vehicle, then `glider acknowledge`")
     if before.state.must_ascend:
         say(f"ascending only: {before.describe()}")
     elif not (yes or flight.twinned or confirm_arming(f"{board}, {flight.mission.name}")):

@@ -42,7 +42,7 @@ class Journal:
         try:
             self.move(Trigger.RECOVER if self.recovering else Trigger.ARM, facts, self.before.reason)
         except Refused as refused:
-            looked = "; look at the vehicle, then --acknowledge" if self.state == State.HELD else ""
+            looked = "; look at the vehicle, then `glider acknowledge`" if self.state == State.HELD else ""
             raise BoardError(f"{self.before.describe() if looked else refused}{looked}") from None
 
     def move(self, trigger: Trigger, facts: Facts | None = None, reason: str = "", *, durable: bool = True) -> State:

@@ -110,9 +110,9 @@ def test_a_pump_without_progress_is_given_up_at_the_surface_alone(depth):
 
 def test_a_pump_that_gets_on_is_not_given_up():
     man = after_the_dive(ballast=0.05, dt=COARSE)
-    for _ in range(75):  # slow: 3 g a second
+    for _ in range(230):  # slow: 1 g a second
         man.seconds(1.0)
-        man.places[1] -= 0.003
+        man.places[1] -= 0.001
         assert ending(man) == Ending.UNDER_WAY
     man.places[1] = LIGHT
     man.seconds(1.0)
@@ -120,10 +120,29 @@ def test_a_pump_that_gets_on_is_not_given_up():
 
 
 def test_without_its_draw_wire_the_ballast_is_nowhere_and_the_pump_given_up():
-    man = after_the_dive(dt=COARSE)
+    man = after_the_dive(ctl.FLYING, ballast=0.05, dt=COARSE)
+    man.follows = True
+    man.seconds(15.0)
+    assert man.places[1] == pytest.approx(LIGHT, abs=0.01)  # light, as it was measured last
+    man.ap[ctl.MODE] = ctl.COMPLETED
+    man.silence.add("plunger_wire")
+    man.seconds(4.0)
+    assert ending(man) == Ending.UNDER_WAY
+    assert seconds_to(man, Ending.PUMP_GIVEN_UP, 30.0) > 10.0
+
+
+def test_a_draw_wire_that_comes_back_shows_the_pump_getting_on():
+    man = after_the_dive(ballast=0.05, dt=COARSE)
+    man.ap[ctl.MODE] = ctl.FLYING
     man.silence.add("plunger_wire")
     man.seconds(2.0)
-    assert seconds_to(man, Ending.PUMP_GIVEN_UP, 30.0) > 10.0
+    man.ap[ctl.MODE] = ctl.COMPLETED
+    man.seconds(5.0)
+    man.silence.discard("plunger_wire")
+    for _ in range(100):
+        man.seconds(1.0)
+        man.places[1] -= 0.002
+        assert ending(man) == Ending.UNDER_WAY
 
 
 def test_when_every_reaction_was_asked_for_it_ends_under_water_too():

@@ -1,4 +1,4 @@
-"""`glider check --live`, `--acknowledge`, `--compile`: what a person sees and does beside a flight."""
+"""`glider status`, `acknowledge`, `compile`: what a person sees and does beside a flight."""
 
 import json
 import subprocess
@@ -14,8 +14,11 @@ from hal.outofband.rise import Stage
 from hal.recorder.condition import Level
 from hal.sortie import State
 from hal.state_file import StateFile
+from tools.cli.acknowledge import acknowledge
 from tools.cli.check import check
-from tools.flight.live import find_folder, lines, snapshot
+from tools.cli.compile_ import compile_
+from tools.cli.status import status
+from tools.flight.status import find_folder, lines, snapshot
 
 
 @pytest.fixture
@@ -39,7 +42,7 @@ def test_a_good_flight_is_all_well(pulse, tmp_path):
     page = dict(lines(found))
     assert page["flight"] == "sawtooth-001: diving, flying, leg 2 of 4"
     assert "depth 2.50 m, pitch -20.1 deg" in page["vehicle"]
-    done = CliRunner().invoke(check, ["--live", "--state", str(tmp_path)])
+    done = CliRunner().invoke(status, ["--state", str(tmp_path)])
     assert done.exit_code == 0
     assert "all well" in done.output
 
@@ -60,7 +63,7 @@ def test_a_good_flight_is_all_well(pulse, tmp_path):
 def test_what_is_wrong_is_said_and_is_exit_1(pulse, tmp_path, word, value, said):
     pulse.words[word] = value
     assert any(said in problem for problem in snapshot(tmp_path)["problems"])
-    done = CliRunner().invoke(check, ["--live", "--json", "--state", str(tmp_path)])
+    done = CliRunner().invoke(status, ["--json", "--state", str(tmp_path)])
     assert done.exit_code == 1
     assert said in " ".join(json.loads(done.stdout)["problems"])
 
@@ -86,7 +89,7 @@ def test_without_a_heartbeat_it_says_where_it_looked(tmp_path, monkeypatch):
 
 def test_acknowledging_sets_the_state_back(tmp_path):
     StateFile(tmp_path).write(State.HELD, flight="dive-007", reason="no depth")
-    done = CliRunner().invoke(check, ["--acknowledge", "--state", str(tmp_path)])
+    done = CliRunner().invoke(acknowledge, ["--state", str(tmp_path)])
     assert done.exit_code == 0
     assert "dive-007): ended at the surface after a fault; no depth" in done.stderr
     assert StateFile(tmp_path).read().state == State.ASHORE
@@ -94,7 +97,7 @@ def test_acknowledging_sets_the_state_back(tmp_path):
 
 def test_a_flight_under_way_is_not_acknowledged(pulse, tmp_path):
     StateFile(tmp_path).write(State.DIVING, flight="dive-007")
-    done = CliRunner().invoke(check, ["--acknowledge", "--state", str(tmp_path)])
+    done = CliRunner().invoke(acknowledge, ["--state", str(tmp_path)])
     assert (done.exit_code, done.stderr) == (1, "glider: not acknowledged: a flight is under way\n")
     assert StateFile(tmp_path).read().state == State.DIVING
 
@@ -106,20 +109,32 @@ def test_an_ascent_under_way_is_not_acknowledged(pulse, tmp_path, stage):
     StateFile(tmp_path).write(State.ABORTED, flight="dive-007")
     pulse.close()
     Heartbeat.open(tmp_path).words[hb.W_GUARD_NS] = time.monotonic_ns()
-    done = CliRunner().invoke(check, ["--acknowledge", "--state", str(tmp_path)])
+    done = CliRunner().invoke(acknowledge, ["--state", str(tmp_path)])
     assert done.exit_code == 1
     assert "not acknowledged: the out-of-band process is bringing the vehicle up" in done.stderr
     assert StateFile(tmp_path).read().state == State.ABORTED
     Heartbeat.open(tmp_path).words[hb.W_GUARD_STAGE] = Stage.SURFACED
-    assert CliRunner().invoke(check, ["--acknowledge", "--state", str(tmp_path)]).exit_code == 0
+    assert CliRunner().invoke(acknowledge, ["--state", str(tmp_path)]).exit_code == 0
     pulse.__init__(Heartbeat.open(tmp_path)._fd, pulse.path)  # for the fixture to close
 
 
 def test_compiled_ahead_means_compiled():
     """Another process finds every kernel of a flight in the cache."""
-    done = json.loads(CliRunner().invoke(check, ["--compile", "--json"]).stdout)
+    done = json.loads(CliRunner().invoke(compile_, ["--json"]).stdout)
     assert done["kernels"] > 0
     script = "from tools.flight.precompile import FLIGHT; n = []; print(FLIGHT.compile(n.append)['kernels'], len(n))"
     found = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.split()
     assert int(found[0]) > 0
     assert int(found[1]) == 0
+
+
+def test_old_spellings_say_the_new_one_and_do_it(pulse, tmp_path):
+    done = CliRunner().invoke(check, ["--live", "--json", "--state", str(tmp_path)])
+    assert done.exit_code == 0
+    assert json.loads(done.stdout)["flight"] == "sawtooth-001"
+    assert "`glider check --live` is now `glider status`" in done.stderr
+    done = CliRunner().invoke(check, ["--acknowledge", "--state", str(tmp_path)])
+    assert done.exit_code == 1
+    assert "is now `glider acknowledge`" in done.stderr
+    assert "not acknowledged: a flight is under way" in done.stderr
+    assert "--live" not in CliRunner().invoke(check, ["--help"]).output
