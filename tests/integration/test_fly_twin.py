@@ -3,6 +3,7 @@
 import sys
 
 import pytest
+from support.logs import DIP
 from support.patience import patient_vehicle
 
 from tools.data.log.reader import read_log
@@ -11,29 +12,11 @@ from tools.measure.figures.devices import ATTITUDE_LIMIT_DEG, POSITION_LIMIT_M, 
 
 pytestmark = pytest.mark.realtime
 
-SHORT = """
-format = 1
-name = "dip"
-time_limit_s = 60.0
-[site]
-name = "pool"
-depth_m = 6.0
-[[leg]]
-duration_s = 4.0
-pitch_deg = -15.0
-roll_deg = 10.0
-ballast_kg = 0.08
-[[leg]]
-duration_s = 2.0
-pitch_deg = 15.0
-ballast_kg = -0.15
-"""
-
 
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory):
     folder = tmp_path_factory.mktemp("flight")
-    (folder / "dip.toml").write_text(SHORT)
+    (folder / "dip.toml").write_text(DIP)
     return folder, compare_flights(str(folder / "dip.toml"), 7, folder, vehicle=str(patient_vehicle(folder)))
 
 

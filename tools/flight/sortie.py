@@ -61,7 +61,7 @@ class Host:
     """
 
     def __init__(self, flight: Flight, *, name: str, folder: Path | None = None):
-        self._flight, self._folder = flight, folder
+        self._flight = flight
         self._recorder: Any = None
         self.journal = Journal(folder, name)
 
