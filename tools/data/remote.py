@@ -91,6 +91,7 @@ class Host:
                         while piece := file.read(PIECE):
                             process.stdin.write(piece)
                             progress(len(piece))
+            with contextlib.suppress(BrokenPipeError):  # what it still held of the last piece
                 process.stdin.close()
             said = process.stderr.read().decode(errors="replace")
         if process.returncode:
