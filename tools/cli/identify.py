@@ -36,9 +36,7 @@ def identify(case: Path, out: Path | None, seed: int, likelihood: str, vehicle: 
     need("identify")
     from tools.identify.pipeline import identify as run_identification
 
-    found = run_identification(
-        loaded, seed, likelihood, lambda text: print(text, file=sys.stderr), leave_out=out is not None
-    )
+    found = run_identification(loaded, seed, likelihood, lambda text: print(text, file=sys.stderr))
     for one in found.left_out:
         say(f"left out: {one}")
     for note in found.notes:

@@ -64,6 +64,11 @@ class Fitted:
     independent: float  # residuals counted as independent
 
     @property
+    def objective(self) -> float:
+        """The misfit with the prior as it is weighed there."""
+        return self.cost + float(self.values @ self.values) * max(self.cost, 1.0) / self.independent
+
+    @property
     def covariance(self) -> np.ndarray:
         """Laplace's approximation, (n, n)."""
         return np.linalg.inv(self.normal)
@@ -211,7 +216,19 @@ class PredictionError:
     @property
     def file_values(self) -> np.ndarray:
         """Where the file stands, (n,)."""
-        return np.clip(np.zeros(len(self.low)), self.low, self.high)
+        return self.clipped(np.zeros(len(self.low)))
+
+    def clipped(self, values: np.ndarray) -> np.ndarray:
+        """Values (n,) within the limits."""
+        return np.clip(np.nan_to_num(values), self.low, self.high)
+
+    def best_of(self, starts: list[np.ndarray], say: Callable[[str], None] = lambda text: None) -> Fitted:
+        """The best end that is reached from several starts through all horizons."""
+        found = []
+        for n, start in enumerate(starts):
+            say(f"prediction error, start {n + 1} of {len(starts)}")
+            found.append(self.through(start))
+        return min(found, key=lambda one: one.objective)
 
     def through(self, values: np.ndarray) -> Fitted:
         """From values through all horizons."""
@@ -231,9 +248,4 @@ def identify_by_prediction(
     """The best fit of what is free; many: from several starts, else from the file's values alone."""
     fitting = PredictionError(problem, free)
     rng = np.random.default_rng(SEED)
-    starts = fitting.starts(rng) if many else [fitting.file_values]
-    found = []
-    for n, start in enumerate(starts):
-        say(f"prediction error, start {n + 1} of {len(starts)}")
-        found.append(fitting.through(start))
-    return min(found, key=lambda one: one.cost + float(one.values @ one.values) * max(one.cost, 1.0) / one.independent)
+    return fitting.best_of(fitting.starts(rng) if many else [fitting.file_values], say)
