@@ -208,7 +208,8 @@ def by_prediction(
     if begin is not None:
         sizes = likelihood.free.si(np.concatenate([begin, np.zeros(len(likelihood.best) - len(begin))]))
         starts.append(dict(zip(COEFFICIENTS, sizes, strict=False)))
-    found = fitting.best_of([fitting.file_values, *(fitting.clipped(free.values(start)) for start in starts)], say)
+    drawn = fitting.draws() if begin is None else []
+    found = fitting.best_of([*(fitting.clipped(free.values(start)) for start in starts), *drawn], say)
     n, low = len(found.values), np.array([f.low for f in free.free])
     statistics = Quadratic(
         found.values, low, (found.normal - np.eye(n))[None], -found.values[None], np.array([found.independent]),

@@ -12,7 +12,7 @@ the model itself stands.
 - Errors within a window are one error: as many independent residuals are counted as there are windows and channels.
   The prior, 1 sigma of each parameter, is weighed against the misfit that is there, so that it holds while little is
   explained and yields as more is.
-- From several starts: the file's values and the best of RANDOM draws of the prior, each taken through all horizons.
+- From several starts: the file's values and the best of others (RANDOM draws of the prior, or fits by other means).
 """
 
 from collections.abc import Callable, Iterator
@@ -37,6 +37,7 @@ BOLDEST = 1.0  # sigma a step
 STILL = 2e-3  # share of the objective, below which a step has converged
 RANDOM, TAKEN = 12, 1  # draws of the prior that are tried, and those that are followed beside the file's own values
 START_SPREAD = 0.7  # sigma of those draws
+APART = 1.0  # posterior sigma a parameter, from which two ends of the first horizon are followed apart
 SEED = 20261122
 
 
@@ -67,6 +68,11 @@ class Fitted:
     def objective(self) -> float:
         """The misfit with the prior as it is weighed there."""
         return self.cost + float(self.values @ self.values) * max(self.cost, 1.0) / self.independent
+
+    def distance(self, values: np.ndarray) -> float:
+        """How far other values are, in posterior sigma: the root mean square over parameters."""
+        away = values - self.values
+        return float(np.sqrt(away @ self.normal @ away / len(away)))
 
     @property
     def covariance(self) -> np.ndarray:
@@ -204,14 +210,10 @@ class PredictionError:
         normal, _ = self.linear(values, gains, cuts)
         return Fitted(values, cost, normal / held + np.eye(n), independent)
 
-    def starts(self, rng: np.random.Generator) -> list[np.ndarray]:
-        """The file's values, and the best of some draws of the prior at the first horizon."""
-        horizon, offsets = HORIZONS[0]
-        cuts, n = [self.windows(horizon, offset) for offset in offsets], len(self.low)
-        drawn = [np.clip(rng.normal(size=n) * START_SPREAD, self.low, self.high) for _ in range(RANDOM)]
-        costs = [self.cost(values, cuts)[0] for values in drawn]
-        best = np.argsort(costs, kind="stable")[:TAKEN]
-        return [self.file_values, *(drawn[k] for k in best)]
+    def draws(self) -> list[np.ndarray]:
+        """Some draws of the prior."""
+        rng, n = np.random.default_rng(SEED), len(self.low)
+        return [np.clip(rng.normal(size=n) * START_SPREAD, self.low, self.high) for _ in range(RANDOM)]
 
     @property
     def file_values(self) -> np.ndarray:
@@ -223,11 +225,28 @@ class PredictionError:
         return np.clip(np.nan_to_num(values), self.low, self.high)
 
     def best_of(self, starts: list[np.ndarray], say: Callable[[str], None] = lambda text: None) -> Fitted:
-        """The best end that is reached from several starts through all horizons."""
+        """The best end that is reached through all horizons from the file's values or others.
+
+        Of the others, the one that costs least at once is taken. What reaches the same place at the first horizon is
+        followed once.
+        """
+        first, *later = zip(HORIZONS, STEPS, strict=True)
+        cuts = [self.windows(first[0][0], offset) for offset in first[0][1]]
+        others = sorted(starts, key=lambda values: self.cost(values, cuts)[0])
+        begun: list[Fitted] = []
+        for n, values in enumerate([self.file_values, *others[:TAKEN]]):
+            say(f"prediction error, start {n + 1}")
+            begun.append(self.descend(values, *first[0], first[1]))
+        begun.sort(key=lambda one: one.objective)
+        best = begun[0]
+        apart = [best, *(one for one in begun[1:] if best.distance(one.values) > APART)]
         found = []
-        for n, start in enumerate(starts):
-            say(f"prediction error, start {n + 1} of {len(starts)}")
-            found.append(self.through(start))
+        for one in apart:
+            values = one.values
+            for (horizon, offsets), steps in later:
+                ended = self.descend(values, horizon, offsets, steps)
+                values = ended.values
+            found.append(ended)
         return min(found, key=lambda one: one.objective)
 
     def through(self, values: np.ndarray) -> Fitted:
@@ -247,5 +266,4 @@ def identify_by_prediction(
 ) -> Fitted:
     """The best fit of what is free; many: from several starts, else from the file's values alone."""
     fitting = PredictionError(problem, free)
-    rng = np.random.default_rng(SEED)
-    return fitting.best_of(fitting.starts(rng) if many else [fitting.file_values], say)
+    return fitting.best_of(fitting.draws(), say) if many else fitting.through(fitting.file_values)
