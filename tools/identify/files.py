@@ -79,6 +79,7 @@ def vehicle_table(found: Identified) -> dict[str, Any]:
     """The vehicle file's content: the case's vehicle with the posterior's mode in place."""
     vehicle = found.case.roughie
     table: dict[str, Any] = msgspec.to_builtins(vehicle)
+    table["form"] = None if found.held is None else found.held.form
     if found.file_stays:
         return table
     P, F, _ = found.free.place(found.read.model, found.best)
@@ -107,10 +108,7 @@ def vehicle_text(found: Identified) -> str:
         if found.file_stays
         else "A vehicle identified by `glider identify`; [identified] says from what, and how sure the numbers are."
     )
-    text = (
-        f"# {said}\n"
-        + toml_text(vehicle_table(found), inline=("sensors",))
-    )
+    text = f"# {said}\n" + toml_text(vehicle_table(found), inline=("sensors",))
     decode_vehicle(text, VEHICLE)
     return text
 

@@ -33,7 +33,7 @@ MOST_STEPS = 6  # with all runs
 CORRELATED = 1.5  # heat, from which the priors weigh more than they did in the first fit: a few steps more
 UNLIKE = 0.3  # logarithm of a level
 FIRST_ROWS, LEVEL_ROWS, MOST_ROWS = 9_000, 5_000, 90_000
-WINDOW_ROWS = 18_000  # that are flown window by window
+WINDOW_ROWS = 9_000  # that are flown window by window
 ODD = 3.0  # times the runs' median of squared innovations, beyond which a run does not belong
 BLOCK = 3.0  # s, stretches of runs whose slopes are compared for the heat
 FAR = 8.0  # posterior sigma; a first fit to some of the runs that is farther off is followed by another step
@@ -217,8 +217,7 @@ def by_prediction(
     )  # fmt: skip
     note = "identified by prediction error, window by window (docs/IDENTIFICATION.md, Of another form)"
     return Fit(
-        likelihood.problem, free, None, statistics, noise.named(fitting.problem), likelihood.left_out,
-        [note],
+        likelihood.problem, free, None, statistics, noise.named(fitting.problem), likelihood.left_out, [note],
     )  # fmt: skip
 
 

@@ -6,22 +6,27 @@ than the runs' scatter allows. Nothing is handed out that flies them worse than 
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from tools.data.runs.case import Case
 from tools.data.runs.run import Run
-from tools.gap.measure import RunGap, case_channels, root_mean_square
-from tools.identify.fit import Fit, fit, fitting_of
+from tools.gap.measure import RunGap, root_mean_square, run_gap, with_total
+from tools.gap.regimes import ALL, gaps_by_regime
+from tools.identify.fit import Fit, by_prediction, fit, fitting_of
 from tools.identify.predict import model_of, predicted
+from tools.inference.channels import ROUGHIE_MEASURES
 from tools.inference.model import Model, effect_vector, nominal_model
+from tools.inference.predict import fly, observe
+from tools.inference.problem import cut, problem_of
 
 MOST = 12  # runs that are predicted; of a longer case evenly chosen ones
 FEW = 3  # runs, up to which the likelihood's fit is made anew without each
 FOLDS = 4  # parts of the runs; the prediction error's fit is refined without each
-REFINED = 5  # steps of that
+REFINED = 3  # steps of that
+SEED = 20261125
 SCATTER = 0.2  # of the logarithm of two candidates' gaps from run to run, before any run was seen: as much as one run
 CLEAR = 2.0  # standard errors of its mean from which another candidate is better than the likelihood's fit
 FILE, LIKELIHOOD, PREDICTION = "file", "likelihood", "prediction error"
@@ -48,7 +53,7 @@ class Candidate:
         return root_mean_square(found) if np.isfinite(found).all() else float("inf")
 
     def plain(self) -> dict[str, float]:
-        return {"total": self.total, **case_channels(self.gaps)}
+        return with_total(self.gaps) | {"total": self.total}
 
 
 @dataclass
@@ -59,6 +64,8 @@ class Held:
     candidates: list[Candidate]  # the file's first
     chosen: Candidate
     why: str
+    P: np.ndarray  # of the file's vehicle
+    floor: Candidate | None = None  # what noise and disturbance would leave of the likelihood's fit
 
     @property
     def before(self) -> list[RunGap]:
@@ -68,10 +75,34 @@ class Held:
     def after(self) -> list[RunGap]:
         return self.chosen.gaps
 
+    def by_regime(self, one: Candidate) -> dict[str, dict[str, float]]:
+        """A candidate's gaps by regime of flight and channel, `total` among them; ALL first."""
+        listed = [ROUGHIE_MEASURES.windows(run.t) for run in self.runs]
+        return gaps_by_regime(ROUGHIE_MEASURES, self.runs, one.flown, listed, self.P)
+
+    @property
+    def form(self) -> dict[str, Any]:
+        """[form] of the vehicle that is handed out."""
+        gaps = {
+            regime: {name: float(f"{gap:.3g}") for name, gap in channels.items() if np.isfinite(gap)}
+            for regime, channels in self.by_regime(self.chosen).items()
+        }
+        return {"runs": len(self.runs), "gaps": gaps}
+
+    @property
+    def worst(self) -> str:
+        """Where what is handed out flies worst: the regime, and the channel there."""
+        found = self.by_regime(self.chosen)
+        regime = max((name for name in found if name != ALL), key=lambda name: found[name]["total"])
+        channel = max((name for name in found[regime] if name != "total"), key=lambda name: found[regime][name])
+        return f"{regime}, {channel}: {found[regime][channel]:.2f} tolerances"
+
     def plain(self) -> dict[str, Any]:
+        before, after = self.by_regime(self.candidates[0]), self.by_regime(self.chosen)
         return {
             "before": self.candidates[0].plain(),
             "after": self.chosen.plain(),
+            "regimes": {name: {"before": before[name], "after": after[name]} for name in after if name != ALL},
             "runs": [
                 {"run": run.name, "before": a.total, "after": b.total}
                 for run, a, b in zip(self.runs, self.before, self.after, strict=True)
@@ -80,6 +111,7 @@ class Held:
             "handed_out": self.chosen.name,
             "why": self.why,
             "candidates": {one.name: one.plain() for one in self.candidates},
+            "floor": None if self.floor is None else self.floor.plain(),
         }
 
 
@@ -95,18 +127,23 @@ def compared(one: Candidate, other: Candidate) -> tuple[float, float]:
     return float(less.mean()), float(np.sqrt(scatter) / len(less))
 
 
+def clearly_better(one: Candidate, other: Candidate) -> bool:
+    """Whether one flies runs left out better by more than their scatter allows."""
+    less, error = compared(one, other)
+    return one.total < other.total and less > CLEAR * error
+
+
 def choose(candidates: list[Candidate]) -> tuple[Candidate, str]:
     """The one that is handed out, and why; candidates: the file's, then the likelihood's, then others."""
     file, chosen, *others = candidates
-    why = "its fit is the most certain, and no other flies runs left out clearly better"
+    why = "the likelihood's fit is the most certain, and none flies runs left out clearly better"
     for other in others:
-        less, error = compared(other, chosen)
-        if other.total < chosen.total and less > CLEAR * error:
-            why = f"runs left out are flown better than by the {chosen.name}: {_apart(other, chosen)}"
+        if clearly_better(other, chosen):
+            why = f"flies runs left out better than the fit by {chosen.name}: {_apart(other, chosen)}"
             chosen = other
     less, error = compared(file, chosen)
     if file.total < chosen.total and less > error:
-        why = f"nothing that was identified flies runs left out better: {_apart(file, chosen)}"
+        why = f"no fit flies runs left out better than the vehicle file: {_apart(file, chosen)}"
         chosen = file
     return chosen, why
 
@@ -165,6 +202,21 @@ class Judge:
             models.append(model_of(self.model, other.free, other.best))
         return self.candidate(LIKELIHOOD, found, ALONE, models)
 
+    def floor(self, found: Fit) -> Candidate:
+        """What noise and disturbance of the file would leave: recordings that the fit simulates, flown by itself."""
+        P, F = model_of(self.model, found.free, found.best)
+        rng, gaps, flown = np.random.default_rng(SEED), [], []
+        for run in self.runs:
+            problem = problem_of(self.case, self.model, [run])
+            starts = observe(problem, P, F).X[problem.recording.bounds[:-1]]
+            Z = problem.simulated(P, F, starts, rng)
+            Y = fly(replace(problem, z=Z), P, F)
+            for onboard, mocap in problem.kind.doubled:  # a channel is motion capture's where nothing is onboard
+                Z[:, onboard] = np.where(np.isnan(Z[:, onboard]), Z[:, mocap], Z[:, onboard])
+            gaps.append(run_gap(problem.kind.measures, run, Y, cut(problem).listed[0], Z))
+            flown.append(Y)
+        return Candidate("noise", None, "simulated", gaps, flown)
+
     def prediction(self, found: Fit) -> Candidate:
         """The prediction error's fit."""
         if len(self.all) == 1:
@@ -180,10 +232,15 @@ class Judge:
 
 
 def judge(
-    case: Case, model: Model, likelihood: Fit, prediction: Fit, say: Callable[[str], None] = lambda text: None
+    case: Case, model: Model, likelihood: Fit, begin: np.ndarray | None, say: Callable[[str], None] = lambda text: None
 ) -> Held:
-    """All candidates, flown in runs that were left out, and which of them is handed out."""
+    """All candidates, flown in runs that were left out, and which of them is handed out.
+
+    Without the prediction error's where the likelihood's fit flies them as well as noise and disturbance allow.
+    """
     court = Judge(case, model, likelihood.problem.runs, say)
-    candidates = [court.file(), court.likelihood(likelihood), court.prediction(prediction)]
+    candidates, floor = [court.file(), court.likelihood(likelihood)], court.floor(likelihood)
+    if clearly_better(floor, candidates[1]):
+        candidates.append(court.prediction(by_prediction(case, model, likelihood, begin, say)))
     chosen, why = choose(candidates)
-    return Held(court.runs, candidates, chosen, why)
+    return Held(court.runs, candidates, chosen, why, case.roughie.vector(), floor)

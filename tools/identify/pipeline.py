@@ -13,7 +13,7 @@ from tools.data.runs.case import Case
 from tools.data.runs.run import Run
 from tools.gap.mended import Mended, mended
 from tools.identify.acceleration_likelihood import fit_accelerations, suited
-from tools.identify.fit import Fit, by_prediction, fit
+from tools.identify.fit import Fit, fit
 from tools.identify.flight_likelihood import Flights
 from tools.identify.held import FILE, Held, judge
 from tools.identify.identifiability import unidentifiable_directions
@@ -56,7 +56,7 @@ class Identified:
     notes: list[str]
     seconds: float
     fit: Fit | None = None  # of the flights
-    held: Held | None = None
+    held: Held | None = None  # None by the accelerations
     check: Check | None = None
     accelerations: Quadratic | None = (
         None  # the other likelihood's statistics of the coefficients, where it could be had
@@ -177,12 +177,12 @@ def identify(
         )  # fmt: skip
     begin = None if first is None else first.mode
     found = fit(case, model, runs, begin, say)
-    held = judge(case, model, found, by_prediction(case, model, found, begin, say), say)
+    held = judge(case, model, found, begin, say)
     kept = min(held.candidates[1:], key=lambda one: one.total) if held.chosen.fit is None else held.chosen
     assert kept.fit is not None
     found = kept.fit
     if held.chosen.fit is None:
-        found.notes.append(f"identified.toml is the vehicle file's: {held.why}")
+        found.notes.append(f"identified.toml holds the vehicle file's own numbers: {held.why}; worst in {held.worst}")
     say("chains")
     chains = sample(found.quadratic, seed)
     free = found.free

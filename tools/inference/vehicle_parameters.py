@@ -20,8 +20,8 @@ from tools.inference.problem import Problem
 
 # 1 sigma before any flight. [uncertainty] says what is left after one: these are what a first vehicle file may be off.
 K_SHARE = 0.5  # of a coefficient's size
-# The same of the damping, one-sided, for a vehicle that nobody identified: strip theory has wings of span b and chord c
-# damp roll by rho a c b^3 / 24 V, with 0.7 m ten times what a bare hull does, and fins at a lever l yaw by rho a S l^2 / 2 V.
+# The same of damping, one-sided, for a vehicle that nobody identified. By strip theory wings of span b and chord c damp
+# roll by rho a c b^3 / 24 V (0.7 m: ten times a bare hull's), a fin of area S at a lever l yaw by rho a S l^2 / 2 V.
 DAMPING, DAMPING_SHARE = ("K_p", "K_q", "K_r"), 3.0
 CAMBER, TRIM_ANGLE = 0.025, 0.03  # rad of attack by which lift and pitch moment may be displaced where a file says 0
 ADDED_SHARE, NET_MASS, CG = 0.15, 0.01, 0.0005  # of added mass and inertia; kg; m
@@ -72,7 +72,7 @@ class Parameters:
         return self.nominal + values * self.spreads
 
     def values(self, si: dict[str, float]) -> np.ndarray:
-        """Values (n,) in units of the priors where these numbers, SI by name, stand; the file's for what is not named."""
+        """Values (n,) in units of the priors at these numbers, SI by name; the file's for what is not named."""
         return np.array([(si.get(f.name, at) - at) / f.spread for f, at in zip(self.free, self.nominal, strict=True)])
 
     def place(self, model: Model, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
