@@ -1,6 +1,6 @@
 """The most probable parameters of a case's flights, the noise's levels, and the runs that do not belong."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +15,7 @@ from tools.identify.screen import LeftOut
 from tools.identify.statistics import Quadratic, collect, heat
 from tools.inference import levels as noise
 from tools.inference.model import Model
-from tools.inference.prediction_error import PredictionError
+from tools.inference.prediction_error import Fitted, PredictionError
 from tools.inference.problem import Problem, problem_of
 from tools.inference.vehicle_parameters import FRAME, Parameters, first_effects, listed, parameters
 
@@ -191,33 +191,43 @@ def fit(
     return Fit(whole.problem, first.free, at, statistics, first.levels, left_out, notes)
 
 
-def fitting_of(case: Case, model: Model, runs: list[Run]) -> PredictionError:
-    """The fit by prediction error to some of these runs, with all that a vehicle may have that nobody identified."""
+def fitting_of(
+    case: Case, model: Model, runs: list[Run], without: Sequence[tuple[str, ...]] = ()
+) -> PredictionError:
+    """The fit by prediction error to some of these runs, with all that a vehicle may have that nobody identified.
+
+    But for terms (names of their parameters) that it is without.
+    """
     problem = problem_of(case, model, [runs[n] for n in some(runs, WINDOW_ROWS)])
-    free = [f for f in parameters(problem, first=True).free if f.vector != FRAME]  # the observer sees by the capture
-    return PredictionError(problem, listed(problem, [*free, *first_effects(problem)]))
+    gone = {name for term in without for name in term}
+    free = [*parameters(problem, first=True).free, *first_effects(problem)]
+    # what the capture's frame is off the observer takes as it is
+    return PredictionError(problem, listed(problem, [f for f in free if f.vector != FRAME and f.name not in gone]))
 
 
 def by_prediction(
     case: Case, model: Model, likelihood: Fit, begin: np.ndarray | None, say: Callable[[str], None]
-) -> Fit:
+) -> Fitted:
     """The fit by prediction error, from the file's values, the likelihood's and first values of the coefficients."""
     fitting = fitting_of(case, model, likelihood.problem.runs)
-    free = fitting.free
     starts = [dict(zip(likelihood.free.names, likelihood.free.si(likelihood.best), strict=True))]
     if begin is not None:
         sizes = likelihood.free.si(np.concatenate([begin, np.zeros(len(likelihood.best) - len(begin))]))
         starts.append(dict(zip(COEFFICIENTS, sizes, strict=False)))
     drawn = fitting.draws() if begin is None else []
-    found = fitting.best_of([*(fitting.clipped(free.values(start)) for start in starts), *drawn], say)
-    n, low = len(found.values), np.array([f.low for f in free.free])
+    return fitting.best_of([*(fitting.clipped(fitting.free.values(start)) for start in starts), *drawn], say)
+
+
+def as_fit(fitting: PredictionError, found: Fitted, likelihood: Fit) -> Fit:
+    """What was fitted by prediction error to the likelihood's runs; noise stays as the case has it."""
+    n, low = len(found.values), np.array([f.low for f in fitting.free.free])
     statistics = Quadratic(
         found.values, low, (found.normal - np.eye(n))[None], -found.values[None], np.array([found.independent]),
         np.array([found.independent]), ("windows",),
     )  # fmt: skip
     note = "identified by prediction error, window by window (docs/IDENTIFICATION.md, Of another form)"
     return Fit(
-        likelihood.problem, free, None, statistics, noise.named(fitting.problem), likelihood.left_out, [note],
+        likelihood.problem, fitting.free, None, statistics, noise.named(fitting.problem), likelihood.left_out, [note]
     )  # fmt: skip
 
 

@@ -5,7 +5,7 @@ intervals are right, where the vehicle obeys equation (4): it is kept unless ano
 than the runs' scatter allows. Nothing is handed out that flies them worse than the file does.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,11 +15,13 @@ from tools.data.runs.case import Case
 from tools.data.runs.run import Run
 from tools.gap.measure import RunGap, root_mean_square, run_gap, with_total
 from tools.gap.regimes import ALL, gaps_by_regime
-from tools.identify.fit import Fit, by_prediction, fit, fitting_of
+from tools.identify.earned import CLEAR, Fold, conditional, mean_and_error, places, unearned
+from tools.identify.fit import Fit, as_fit, by_prediction, fit, fitting_of
 from tools.identify.predict import model_of, predicted
 from tools.inference.channels import ROUGHIE_MEASURES
 from tools.inference.model import Model, effect_vector, nominal_model
 from tools.inference.predict import fly, observe
+from tools.inference.prediction_error import Fitted
 from tools.inference.problem import cut, problem_of
 
 MOST = 12  # runs that are predicted; of a longer case evenly chosen ones
@@ -27,8 +29,6 @@ FEW = 3  # runs, up to which the likelihood's fit is made anew without each
 FOLDS = 4  # parts of the runs; the prediction error's fit is refined without each
 REFINED = 3  # steps of that
 SEED = 20261125
-SCATTER = 0.2  # of the logarithm of two candidates' gaps from run to run, before any run was seen: as much as one run
-CLEAR = 2.0  # standard errors of its mean from which another candidate is better than the likelihood's fit
 FILE, LIKELIHOOD, PREDICTION = "file", "likelihood", "prediction error"
 EARLY = "the fit without the run, by one step from the fit with all"
 ALONE = "a fit of the other runs alone"
@@ -122,9 +122,7 @@ def compared(one: Candidate, other: Candidate) -> tuple[float, float]:
     finite = [value for pair in pairs for value in pair if np.isfinite(value)]
     worst, least = max(finite, default=1.0), 1e-3
     a, b = (np.log(np.maximum(np.nan_to_num(column, nan=worst, posinf=worst), least)) for column in np.array(pairs).T)
-    less = b - a
-    scatter = SCATTER**2 + np.square(less - less.mean()).sum()
-    return float(less.mean()), float(np.sqrt(scatter) / len(less))
+    return mean_and_error(b - a)
 
 
 def clearly_better(one: Candidate, other: Candidate) -> bool:
@@ -217,18 +215,37 @@ class Judge:
             flown.append(Y)
         return Candidate("noise", None, "simulated", gaps, flown)
 
-    def prediction(self, found: Fit) -> Candidate:
-        """The prediction error's fit."""
-        if len(self.all) == 1:
-            return self.candidate(PREDICTION, found, ITSELF, [model_of(self.model, found.free, found.best)])
-        folds = min(FOLDS, len(self.all))
-        parts = [list(range(k, len(self.all), folds)) for k in range(folds)]
-        by_part = []
-        for left_out in parts:
-            self.say(f"without {', '.join(self.all[n].name for n in left_out)}")
-            fitting = fitting_of(self.case, self.model, self.others(left_out))
-            by_part.append(model_of(self.model, found.free, fitting.again(found.best, REFINED).values))
-        return self.candidate(PREDICTION, found, PARTS, [by_part[n % folds] for n in self.picked])
+    def prediction(self, likelihood: Fit, begin: np.ndarray | None) -> Candidate:
+        """The prediction error's fit, without the terms that runs left out do not miss."""
+        whole = by_prediction(self.case, self.model, likelihood, begin, self.say)
+        count = min(FOLDS, len(self.all))
+        parts = [list(range(k, len(self.all), count)) for k in range(count)]
+        folds = [self.fold(part, whole.values) for part in parts]
+        gone = unearned(folds)
+        fitting = fitting_of(self.case, self.model, self.all, gone)
+        fitted = whole
+        if gone:
+            self.say(f"without {', '.join(name for term in gone for name in term)}")
+            fitted = fitting.again(self.kept(whole, folds[0], gone), REFINED)
+            begins = [self.kept(fold.inside, fold, gone) for fold in folds]
+            folds = [self.fold(part, values, gone) for part, values in zip(parts, begins, strict=True)]
+        models = [model_of(self.model, fitting.free, fold.inside.values) for fold in folds]
+        found = as_fit(fitting, fitted, likelihood)
+        return self.candidate(
+            PREDICTION, found, PARTS if count > 1 else ITSELF, [models[n % count] for n in self.picked]
+        )
+
+    def fold(self, left_out: list[int], values: np.ndarray, gone: Sequence[tuple[str, ...]] = ()) -> Fold:
+        """The fit without a part of the runs, from values on; of a single run nothing can be left out."""
+        kept = self.others(left_out) or self.all
+        outside = fitting_of(self.case, self.model, [self.all[n] for n in left_out], gone)
+        return Fold(fitting_of(self.case, self.model, kept, gone).again(values, REFINED), outside)
+
+    @staticmethod
+    def kept(found: Fitted, fold: Fold, gone: list[tuple[str, ...]]) -> np.ndarray:
+        """Values of what stays free without the terms that go."""
+        at = places(fold.outside.free.names, gone)
+        return np.delete(fold.outside.clipped(conditional(found, fold.outside.file_values, at)), at)
 
 
 def judge(
@@ -241,6 +258,6 @@ def judge(
     court = Judge(case, model, likelihood.problem.runs, say)
     candidates, floor = [court.file(), court.likelihood(likelihood)], court.floor(likelihood)
     if clearly_better(floor, candidates[1]):
-        candidates.append(court.prediction(by_prediction(case, model, likelihood, begin, say)))
+        candidates.append(court.prediction(likelihood, begin))
     chosen, why = choose(candidates)
     return Held(court.runs, candidates, chosen, why, case.roughie.vector(), floor)
