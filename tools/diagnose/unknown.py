@@ -11,7 +11,7 @@ from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.catalogue import catalogue
 from tools.diagnose.clock import Clock
 from tools.diagnose.noise_probes import CLOCK, TURBULENCE, WAVES, NoiseProbe, ProbeResult, inflated, probes, run_probes
-from tools.diagnose.search import Search
+from tools.diagnose.search import EVIDENCE_NEEDED, Search
 from tools.diagnose.shrink import AFTER, FLOOR, Shrinkage, shrink
 from tools.diagnose.waves import LINE, line_share
 from tools.inference.fit import Hypothesis
@@ -143,16 +143,38 @@ def turbulence_first(probed: list[ProbeResult]) -> ProbeResult | None:
     return first
 
 
+def clock_first(probed: list[ProbeResult]) -> ProbeResult | None:
+    """Motion capture's clock, where its probe gains more than any other link's, its poses' noise apart."""
+    clock = next((found for found in probed if found.probe.name == CLOCK), None)
+    if clock is None or clock.gain <= CLOCKED * probed[0].gain or probed[0].probe.element != CLOCK_PLACE[1]:
+        return None
+    return clock
+
+
+def wandering_clock(search: Search, hypothesis: Hypothesis, left: Remainder) -> ProbeResult | None:
+    """A clock that gains most of all links, or would beside the rough water that does: it takes the clock's place.
+
+    Water that shakes every axis goes wherever poses say, at whatever time they were taken, and gains for that, too.
+    """
+    if not any(found.probe.name == CLOCK and found.gain > CLOCKED * left.left for found in left.probed):
+        return None
+    if left.probed[0].probe.name != TURBULENCE:
+        return clock_first(left.probed)
+    more, _ = inflated(search.problem, left.probed[0].probe, left.probed[0].scale)
+    rough = search.problem.with_extra_noise(more)
+    found = clock_first(run_probes(rough, *search.model(hypothesis), probes(rough)))
+    return found if found is not None and found.gain > EVIDENCE_NEEDED else None
+
+
 def disorder(search: Search, hypothesis: Hypothesis, left: Remainder) -> ProbeResult | None:
     """The noise that the search has to know of, to see what is beside it; None where there is nothing of the kind.
 
-    Motion capture's clock where its probe gains more than any other link's, its poses' noise apart; waves where they
-    show beside the hypothesis, turbulence where nothing else does; either where it is the cause: of all that can be
-    explained, it explains MOSTLY.
+    Motion capture's clock where it wanders; waves where they show beside the hypothesis, turbulence where nothing else
+    does; either where it is the cause: of all that can be explained, it explains MOSTLY.
     """
-    clock = [found for found in left.probed if found.probe.name == CLOCK and found.gain > CLOCKED * left.left]
-    if clock and left.probed[0].probe.element == CLOCK_PLACE[1]:
-        return clock[0]
+    clock = wandering_clock(search, hypothesis, left)
+    if clock is not None:
+        return clock
     beside = waves_beside(search, hypothesis, left)
     if beside is not None:
         return beside
