@@ -56,6 +56,8 @@ class Search:
     fitter: Fitter
     null: Hypothesis
     hypotheses: list[Hypothesis]
+    # Of the filter at the hypothesis that stands: floors begin there, what is left is tested. Hypotheses are compared
+    # by fitter.gains alone, also where one drops an effect or a run.
     gains: Gains
     clock: Clock | None = None
     told: bool = False  # whether the sensors' noise is what the file says
