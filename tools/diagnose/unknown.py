@@ -146,12 +146,13 @@ def turbulence_first(probed: list[ProbeResult]) -> ProbeResult | None:
 def disorder(search: Search, hypothesis: Hypothesis, left: Remainder) -> ProbeResult | None:
     """The noise that the search has to know of, to see what is beside it; None where there is nothing of the kind.
 
-    Motion capture's clock where its probe gains more than any other link's, its poses' noise apart; waves where they
-    show beside the hypothesis, turbulence where nothing else does; either where it is the cause: of all that can be
-    explained, it explains MOSTLY.
+    Motion capture's clock where its probe gains more than any other link's, its poses' noise apart, and CLOCKED of what
+    turbulence does, which shakes every axis and is asked for beside it; waves where they show beside the hypothesis,
+    turbulence where nothing else does; either where it is the cause: of all that can be explained, it explains MOSTLY.
     """
     clock = [found for found in left.probed if found.probe.name == CLOCK and found.gain > CLOCKED * left.left]
-    if clock and left.probed[0].probe.element == CLOCK_PLACE[1]:
+    links = [found for found in left.probed if found.probe.name != TURBULENCE]
+    if clock and links[0].probe.element == CLOCK_PLACE[1]:
         return clock[0]
     beside = waves_beside(search, hypothesis, left)
     if beside is not None:
