@@ -10,6 +10,7 @@ import numpy as np
 
 from sim_backend.core.effects.catalogue import catalogue
 from tools.data.runs.case import Case
+from tools.diagnose import by_readings
 from tools.diagnose.cautions import cautions, not_asked
 from tools.diagnose.chain import noise_of, panels
 from tools.diagnose.correction import Correction, correct
@@ -32,7 +33,7 @@ from tools.diagnose.shrink import (
     shrinkage_of,
 )
 from tools.diagnose.staged import Staged, staged
-from tools.diagnose.staged_answer import conclusion, findings_in, identified_text
+from tools.diagnose.staged_answer import certain_by_readings, conclusion, findings_in, identified_text
 from tools.diagnose.staircase import Stage, stages_of
 from tools.diagnose.unknown import LEFT_OVER, UNFIT
 from tools.diagnose.verdict import EVIDENCE_NEEDED, Answer, conclude
@@ -108,10 +109,11 @@ def diagnose(case: Case, say: Callable[[str], None] = lambda text: None, rules: 
     found = Diagnosis(case, search, answer, answer.shrinkage, entry, mission, shares, noise, readings=readings)
     if answer.shrinkage.after > UNFIT and rules == ALL:
         take(found, staged(case, say))
-        return found
-    found.stages = stages_of(answer, case, runs)
-    if found.verdict == "unknown":
-        learn(found, say)
+    else:
+        found.stages = stages_of(answer, case, runs)
+        if found.verdict == "unknown":
+            learn(found, say)
+    found.answer = certain_by_readings(found.answer, readings)
     return found
 
 
@@ -157,16 +159,21 @@ def unexplained(diagnosis: Diagnosis) -> dict[str, Any] | None:
 
 
 def parameters(diagnosis: Diagnosis, label: str) -> dict[str, dict[str, Any]]:
-    """Estimate, 90 % interval and unit of each parameter of a selected label, by Laplace's approximation."""
-    if diagnosis.staged is not None:
-        sizes = diagnosis.staged.sizes.get(label, {})
-        return {name: {"estimate": s.estimate, "ci90": list(s.ci90), "unit": s.unit} for name, s in sizes.items()}
+    """Estimate, 90 % interval and unit of each parameter of a selected label, by Laplace's approximation.
+
+    Of one that is not in the corrected model, by what the readings say.
+    """
+    staged = {} if diagnosis.staged is None else diagnosis.staged.sizes
     hypothesis, clock = diagnosis.answer.hypothesis, diagnosis.answer.search.clock
+    if label in staged:
+        return {name: size.plain() for name, size in staged[label].items()}
     if clock is not None and label == clock.label:
         known = zip(clock.free, clock.values, clock.sd, strict=True)
     elif label in hypothesis.labels:
         spread = np.sqrt(np.diag(np.linalg.inv(hypothesis.precision)))
         known = zip(hypothesis.free, hypothesis.values, spread, strict=True)
+    elif label in diagnosis.answer.selected:
+        return {name: size.plain() for name, size in by_readings.sizes(diagnosis.readings).get(label, {}).items()}
     else:
         return {}
     found = {}
@@ -237,8 +244,7 @@ def plain(diagnosis: Diagnosis) -> dict[str, Any]:
         "readings": [one.plain() for one in diagnosis.readings],
         "stages": [stage.plain() for stage in diagnosis.stages],
         "identified": {} if diagnosis.staged is None else {
-            name: {"estimate": s.estimate, "ci90": list(s.ci90), "unit": s.unit}
-            for name, s in diagnosis.staged.vehicle.items()
+            name: size.plain() for name, size in diagnosis.staged.vehicle.items()
         },
     }  # fmt: skip
 
@@ -257,10 +263,17 @@ def details(diagnosis: Diagnosis) -> Details:
     return Details(
         shown=[one.title for one in pictures_of(diagnosis.readings, case.runs)],
         format=1, version=installed(), data=data, evidence={k: float(v) for k, v in answer.gained.items()},
-        corrected=bool(answer.selected), noise=diagnosis.noise, panels=diagnosis.panels,
+        corrected=in_model(diagnosis), noise=diagnosis.noise, panels=diagnosis.panels,
         findings=answer.findings, pictures=[picture(diagnosis, n) for n in drawn_runs(diagnosis)],
         thresholds={"evidence": EVIDENCE_NEEDED, "tie": TIE, "sigma": UNCLEAN, "left": LEFT_OVER, "matters": MATTERS},
     )  # fmt: skip
+
+
+def in_model(diagnosis: Diagnosis) -> bool:
+    """Whether the corrected model has more than a recalibration: effects, a vehicle identified, disorder."""
+    answer = diagnosis.answer
+    known = {*answer.search.entries(answer.hypothesis), *UNPREDICTABLE}
+    return diagnosis.staged is not None or any(label in known for label in answer.selected)
 
 
 def installed() -> str:

@@ -1,4 +1,4 @@
-"""What the stages of a vehicle far from its file come to: its answer, evidence, findings and words."""
+"""What readings and the stages of a vehicle far from its file come to: its answer, evidence, findings and words."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -7,9 +7,10 @@ import numpy as np
 
 from sim_backend.core.effects.catalogue import catalogue
 from tools.data.runs import columns as names
+from tools.diagnose import by_readings
 from tools.diagnose.record import NONE, UNKNOWN
 from tools.diagnose.shrink import Shrinkage
-from tools.diagnose.staged import IDENTIFIED, SURE, Staged
+from tools.diagnose.staged import IDENTIFIED, Staged
 from tools.diagnose.verdict import Answer
 from tools.inference.vehicle_parameters import GAUGE
 from tools.readings.findings import Finding, spoken
@@ -34,14 +35,21 @@ def conclusion(answer: Answer, found: Staged, shrinkage: Shrinkage) -> Answer:
     )  # fmt: skip
 
 
+def certain_by_readings(answer: Answer, findings: list[Finding]) -> Answer:
+    """The answer with every label that readings are certain of by themselves selected, after those of the search."""
+    said = [label for label in by_readings.sizes(findings) if label not in answer.selected]
+    gained = answer.gained | {label: by_readings.nats(findings, label) for label in said}
+    groups = {label: [label] for label in said} | answer.groups
+    negligible = {label: nat for label, nat in answer.negligible.items() if label not in said}
+    return replace(answer, selected=[*answer.selected, *said], gained=gained, groups=groups, negligible=negligible)
+
+
 def nats(found: Staged, label: str, count: int) -> float:
     """Evidence of a label: of what it takes of the gap of runs left out, or of its distance from 0 in the readings."""
     for before, after in pairwise(found.stages):
         if after.added == [label] and after.name.startswith("+"):
             return count * float(np.log(before.total / after.total))
-    sigma = [one.size / max((one.ci90[1] - one.ci90[0]) / (2.0 * SURE), 1e-9) for one in found.read.findings
-             if one.label == label]  # fmt: skip
-    return 0.5 * max((s * s for s in sigma), default=0.0)
+    return by_readings.nats(found.read.findings, label)
 
 
 def identified_text(found: Staged) -> str:
