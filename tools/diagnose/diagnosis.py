@@ -33,9 +33,9 @@ from tools.diagnose.shrink import (
     shrinkage_of,
 )
 from tools.diagnose.staged import Staged, staged
-from tools.diagnose.staged_answer import certain_by_readings, conclusion, findings_in, identified_text
+from tools.diagnose.staged_answer import certain_by_readings, conclusion, findings_in, identified_text, weighed
 from tools.diagnose.staircase import Stage, stages_of
-from tools.diagnose.unknown import LEFT_OVER, UNFIT
+from tools.diagnose.unknown import LEFT_OVER, unfit
 from tools.diagnose.verdict import EVIDENCE_NEEDED, Answer, conclude
 from tools.gap.mended import findings_of, put_right
 from tools.inference.corrected import corrected_text
@@ -103,27 +103,33 @@ def diagnose(case: Case, say: Callable[[str], None] = lambda text: None, rules: 
     search = run(problem_of(case, runs=runs, rules=rules), say)
     answer = conclude(search, say)
     search = answer.search
-    say(f"verdict: {answer.main}")
     entry, mission = propose(search)
     noise, shares = noise_of(answer), panels(verdict_of(answer), answer)
     found = Diagnosis(case, search, answer, answer.shrinkage, entry, mission, shares, noise, readings=readings)
-    if answer.shrinkage.after > UNFIT and rules == ALL:
-        take(found, staged(case, say))
-    else:
+    off = unfit(answer.shrinkage) if rules == ALL else 0.0
+    if off > 0.0:
+        take(found, staged(case, say), off)
+    if found.staged is None:
         found.stages = stages_of(answer, case, runs)
         if found.verdict == "unknown":
             learn(found, say)
     found.answer = certain_by_readings(found.answer, readings)
+    say(f"verdict: {found.answer.main}")
     return found
 
 
-def take(diagnosis: Diagnosis, found: Staged) -> None:
-    """The diagnosis with what the stages of a vehicle far from its file came to."""
+def take(diagnosis: Diagnosis, found: Staged, off: float) -> None:
+    """The diagnosis with what the stages of a vehicle far from its file came to; off: how probably it is.
+
+    The model is the one of the two that leaves less of the gap of runs left out.
+    """
     before = diagnosis.answer.shrinkage
     runs = before.runs | {AFTER: found.stages[-1].gaps, FLOOR: found.floor}
     shrinkage = shrinkage_of(runs, before.predictions | {AFTER: found.predictions})
-    diagnosis.staged, diagnosis.stages, diagnosis.readings = found, found.stages, findings_in(found)
-    diagnosis.shrinkage, diagnosis.answer = shrinkage, conclusion(diagnosis.answer, found, shrinkage)
+    diagnosis.answer = weighed(diagnosis.answer, conclusion(diagnosis.answer, found, shrinkage), off)
+    if shrinkage.after < before.after:
+        diagnosis.staged, diagnosis.stages, diagnosis.readings = found, found.stages, findings_in(found)
+        diagnosis.shrinkage = shrinkage
     diagnosis.panels = panels(verdict_of(diagnosis.answer), diagnosis.answer)
 
 

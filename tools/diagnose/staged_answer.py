@@ -8,6 +8,8 @@ import numpy as np
 from sim_backend.core.effects.catalogue import catalogue
 from tools.data.runs import columns as names
 from tools.diagnose import by_readings
+from tools.diagnose.gates import mixed
+from tools.diagnose.probabilities import answer_first
 from tools.diagnose.record import NONE, UNKNOWN
 from tools.diagnose.shrink import Shrinkage
 from tools.diagnose.staged import IDENTIFIED, Staged
@@ -18,6 +20,7 @@ from tools.readings.findings import Finding, spoken
 # A vehicle that had to be identified was not the file's: what is left of the gap of a first identification is no effect
 # alone, but the rest of the vehicle, and the answer says so; of the other probability each effect has its share.
 UNKNOWN_THEN = 0.9
+CERTAIN = 0.9  # probability from which a label is selected, where two answers are weighed
 
 
 def conclusion(answer: Answer, found: Staged, shrinkage: Shrinkage) -> Answer:
@@ -32,6 +35,23 @@ def conclusion(answer: Answer, found: Staged, shrinkage: Shrinkage) -> Answer:
     return replace(
         answer, selected=found.selected, main=UNKNOWN, probabilities=chances, gained=gained, negligible={},
         groups={label: [label] for label in found.selected}, shrinkage=shrinkage,
+    )  # fmt: skip
+
+
+def weighed(known: Answer, far: Answer, off: float) -> Answer:
+    """Two answers in one: by the vehicle's file, and, with the probability `off`, by the stages of one far from it.
+
+    Selected is the main cause, and what is CERTAIN to be in the answer, whichever is right.
+    """
+    every = [*known.selected, *(label for label in far.selected if label not in known.selected)]
+    there = {label: (1.0 - off) * (label in known.selected) + off * (label in far.selected) for label in every}
+    main, chances = answer_first(mixed(known.probabilities, far.probabilities, off), every)
+    selected = [label for label in every if label == main or there[label] >= CERTAIN]
+    gained = {label: max(one.gained.get(label, 0.0) for one in (known, far)) for label in selected}
+    return replace(
+        known, selected=selected, main=main, probabilities=chances, gained=gained, groups=far.groups | known.groups,
+        shrinkage=far.shrinkage if far.shrinkage.after < known.shrinkage.after else known.shrinkage,
+        negligible={label: nat for label, nat in known.negligible.items() if label not in selected},
     )  # fmt: skip
 
 

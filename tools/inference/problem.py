@@ -187,9 +187,7 @@ def variances(kind: Kind, sensors: SensorsTable | OceanSensors) -> np.ndarray:
     return np.array([max(sigma, LEAST_NOISE) ** 2 for sigma in noise])
 
 
-def problem_of(
-    case: Case, model: Model | None = None, runs: list[Run] | None = None, rules: Rules = ALL
-) -> Problem:
+def problem_of(case: Case, model: Model | None = None, runs: list[Run] | None = None, rules: Rules = ALL) -> Problem:
     """The problem of a case (all of its runs, if none are named)."""
     kind = kind_of(case.vehicle)
     model = nominal_model(case) if model is None else model
