@@ -242,7 +242,8 @@ def run(
     to, by a filter that knew less of disorder. Allowed parameters driven to their limits may hide it from the screen.
     """
     noise = levels.sensor_noise(problem, LEAST_LEVEL, MOST_LEVEL)
-    told, problem = as_told(problem, noise), noise.believed.applied(problem)
+    told = as_told(problem, noise)
+    problem = noise.believed(told).applied(problem)
     problem = problem if clock is None else clock.within(problem)
     free, known = nuisance_parameters(problem), effect_parameters(problem)
     if clock is not None:

@@ -62,10 +62,9 @@ class Levels:
         right, free = ACCURATE**2 + self.sd**2, FREE**2 + self.sd**2
         return 0.5 * (np.log(free / right) - self.log**2 * (1.0 / right - 1.0 / free))
 
-    @property
-    def believed(self) -> "Levels":
-        """The mean of what each may be: as the case names it by as much as the odds say."""
-        return self.moved(self.log * expit(-self.odds))
+    def believed(self, told: float) -> "Levels":
+        """The mean of what each may be: told is the probability that the case names all rightly, odds are each one's."""
+        return self.moved(self.log * (1.0 - told) * expit(-self.odds))
 
     def moved(self, log: np.ndarray) -> "Levels":
         return replace(self, log=log)

@@ -73,7 +73,7 @@ def test_noise_as_the_file_says_is_a_probability_without_a_cliff():
     assert np.abs(np.diff(said)).max() < 0.02
     assert as_told(problem, levels(0.0, 0.0)) < 0.5 < as_told(problem, levels(0.0, 0.0, 0.0))  # others say nothing
     logs = np.linspace(-0.5, 0.5, 2000)
-    believed = np.array([levels(log).believed.log[0] for log in logs])
+    believed = np.array([levels(log).believed(0.0).log[0] for log in logs])
     assert np.abs(np.diff(believed)).max() < 4.0 * np.diff(logs)[0]
     assert abs(believed[np.abs(logs) < 0.03]).max() < 0.01
     assert believed[-1] == pytest.approx(0.5, abs=1e-6)

@@ -123,6 +123,8 @@ def test_noise_that_is_not_white_says_nothing(calm):
 
 
 def test_what_is_within_the_estimate_s_own_error_keeps_what_the_file_says(calm):
-    found = levels.sensor_noise(noisier(calm, {"gyro": 1.5}), 0.5, 2.0).believed
+    noise = levels.sensor_noise(noisier(calm, {"gyro": 1.5}), 0.5, 2.0)
+    found = noise.believed(0.0)
     assert np.exp(found.log[found.names.index("gyro")]) == pytest.approx(1.5, rel=0.1)
     assert all(abs(log) < 0.02 for name, log in zip(found.names, found.log, strict=True) if name != "gyro")
+    assert np.allclose(noise.believed(0.999).log, 0.001 * found.log)  # all are the file's
