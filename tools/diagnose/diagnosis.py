@@ -33,7 +33,14 @@ from tools.diagnose.shrink import (
     shrinkage_of,
 )
 from tools.diagnose.staged import Staged, staged
-from tools.diagnose.staged_answer import certain_by_readings, conclusion, findings_in, identified_text, weighed
+from tools.diagnose.staged_answer import (
+    by_gap_left,
+    certain_by_readings,
+    conclusion,
+    findings_in,
+    identified_text,
+    weighed,
+)
 from tools.diagnose.staircase import Stage, stages_of
 from tools.diagnose.unknown import LEFT_OVER, unfit
 from tools.diagnose.verdict import EVIDENCE_NEEDED, Answer, conclude
@@ -106,7 +113,7 @@ def diagnose(case: Case, say: Callable[[str], None] = lambda text: None, rules: 
     entry, mission = propose(search)
     noise, shares = noise_of(answer), panels(verdict_of(answer), answer)
     found = Diagnosis(case, search, answer, answer.shrinkage, entry, mission, shares, noise, readings=readings)
-    off = unfit(answer.shrinkage) if rules == ALL else 0.0
+    off = unfit(answer.shrinkage, answer.noise) if rules == ALL else 0.0
     if off > 0.0:
         take(found, staged(case, say), off)
     if found.staged is None:
@@ -119,14 +126,15 @@ def diagnose(case: Case, say: Callable[[str], None] = lambda text: None, rules: 
 
 
 def take(diagnosis: Diagnosis, found: Staged, off: float) -> None:
-    """The diagnosis with what the stages of a vehicle far from its file came to; off: how probably it is.
+    """The diagnosis with what the stages of a vehicle far from its file came to; off: how probably it is, before them.
 
     The model is the one of the two that leaves less of the gap of runs left out.
     """
     before = diagnosis.answer.shrinkage
     runs = before.runs | {AFTER: found.stages[-1].gaps, FLOOR: found.floor}
     shrinkage = shrinkage_of(runs, before.predictions | {AFTER: found.predictions})
-    diagnosis.answer = weighed(diagnosis.answer, conclusion(diagnosis.answer, found, shrinkage), off)
+    far = conclusion(diagnosis.answer, found, shrinkage)
+    diagnosis.answer = weighed(diagnosis.answer, far, by_gap_left(off, found, before.after, shrinkage.after))
     if shrinkage.after < before.after:
         diagnosis.staged, diagnosis.stages, diagnosis.readings = found, found.stages, findings_in(found)
         diagnosis.shrinkage = shrinkage

@@ -4,6 +4,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+from scipy.special import expit
 
 from sim_backend.core.effects.catalogue import catalogue
 from tools.data.runs import columns as names
@@ -30,12 +31,27 @@ def conclusion(answer: Answer, found: Staged, shrinkage: Shrinkage) -> Answer:
     total = sum(weight.values())
     chances = dict.fromkeys(catalogue(), 0.0) | {label: (1.0 - UNKNOWN_THEN) * w / total for label, w in weight.items()}
     chances |= {NONE: 0.0, UNKNOWN: UNKNOWN_THEN if weight else 1.0}
-    count = sum(gap.windows * len(gap.channels) for gap in found.stages[0].gaps)
+    count = residuals(found)
     gained = {label: nats(found, label, count) for label in found.selected}
     return replace(
         answer, selected=found.selected, main=UNKNOWN, probabilities=chances, gained=gained, negligible={},
         groups={label: [label] for label in found.selected}, shrinkage=shrinkage,
     )  # fmt: skip
+
+
+def by_gap_left(off: float, found: Staged, known: float, far: float) -> float:
+    """Probability that a vehicle is far from its file, by the gap that either answer leaves of runs left out.
+
+    off: by the first alone. Each window and channel counts as one residual.
+    """
+    if off in (0.0, 1.0):
+        return off
+    return float(expit(np.log(off / (1.0 - off)) + residuals(found) * np.log(known / far)))
+
+
+def residuals(found: Staged) -> int:
+    """How many residuals of the gap count as independent: windows and channels."""
+    return sum(gap.windows * len(gap.channels) for gap in found.stages[0].gaps)
 
 
 def weighed(known: Answer, far: Answer, off: float) -> Answer:

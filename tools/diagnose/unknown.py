@@ -35,8 +35,8 @@ TOLD_GAP, TOLD_GAP_WIDTH = 0.35, 0.5  # as LEFT_GAP
 TOLD_WIDE = 0.8  # as WIDE
 TURNED = ("pitch", "roll", "yaw", "rates")  # channels that a sea does not move
 NOISY, NOISY_WIDTH = 0.2, 0.8  # share of the explainable misfit that is left: disorder is looked for; width in e-folds
-# Tolerances beyond the floor that the best explanation still misses by: with the first an effect of the catalogue may,
-# with the second none does, and the vehicle is not the file's.
+# Tolerances that the best explanation still misses by: with the first an effect of the catalogue may, with the second
+# none does, and the vehicle is not the file's.
 UNFIT = (3.0, 8.0)
 LOOSE, FROM_LOOSE = 3.0, (0.75, 1.33)  # times the floor, and one tolerance, that no vehicle without a gap is off
 ONE_AXIS = 0.65  # of what all axes bring together: where one link alone brings as much, it is no turbulence
@@ -77,9 +77,9 @@ def left_beyond(shrinkage: Shrinkage) -> float:
     return float(np.sqrt(max(shrinkage.after**2 - shrinkage.floor**2, 0.0)))
 
 
-def unfit(shrinkage: Shrinkage) -> float:
-    """Probability that the vehicle is not its file's, by what the best explanation leaves."""
-    return opened(left_beyond(shrinkage), *UNFIT)
+def unfit(shrinkage: Shrinkage, noise: ProbeResult | None) -> float:
+    """Probability that the vehicle is not its file's, by what the best explanation leaves; beyond disorder's floor."""
+    return opened(shrinkage.after if noise is None else left_beyond(shrinkage), *UNFIT)
 
 
 def place_alone(probed: Iterable[tuple[NoiseProbe, float]]) -> tuple[tuple[str, str], float]:
@@ -273,7 +273,7 @@ def probability_unknown(
     left where that one sits, and nowhere else, is no small effect beside it: something there has another form, however
     narrow the gap it leaves. So it is with the sensor of any of them.
     """
-    off = unfit(shrinkage) if search.problem.rules.whiteness else 0.0
+    off = unfit(shrinkage, noise) if search.problem.rules.whiteness else 0.0
     shows = 0.0 if left is None else left.shows
     hidden = shown = LEAST_UNKNOWN  # where what is left was not asked about, or nothing is
     if not selected and not noise and search.problem.rules.whiteness:

@@ -63,7 +63,7 @@ class Levels:
         return 0.5 * (np.log(free / right) - self.log**2 * (1.0 / right - 1.0 / free))
 
     def believed(self, told: float) -> "Levels":
-        """The mean of what each may be: told is the probability that the case names all rightly, odds are each one's."""
+        """The mean of what each may be; told: the probability that the case names all rightly."""
         return self.moved(self.log * (1.0 - told) * expit(-self.odds))
 
     def moved(self, log: np.ndarray) -> "Levels":

@@ -10,9 +10,10 @@ from tools.diagnose.noise_probes import NoiseProbe, ProbeResult
 from tools.diagnose.probabilities import to_none
 from tools.diagnose.record import NONE, UNKNOWN
 from tools.diagnose.search import as_told
-from tools.diagnose.staged_answer import weighed
+from tools.diagnose.staged_answer import by_gap_left, weighed
 from tools.diagnose.unknown import UNFIT, Remainder, probability_unknown
 from tools.diagnose.verdict import Answer
+from tools.gap.measure import RunGap
 from tools.inference.levels import SENSORS, Levels
 
 GYRO = ProbeResult(NoiseProbe("gyro", "sensor", "sensing", "gyro"), 3e4, 6.0)
@@ -93,6 +94,17 @@ def answer(selected: list[str], chances: dict[str, float], after: float) -> Answ
         groups={label: [label] for label in selected}, findings=[], whiteness=9.0, unexplained=0.5,
         gained=dict.fromkeys(selected, 20.0), negligible={}, probed=[], shrinkage=SimpleNamespace(after=after),
     )  # fmt: skip
+
+
+def test_of_two_answers_the_one_that_leaves_less_of_runs_left_out_counts_the_more():
+    gaps = [RunGap("run00", {"depth": 1.0, "pitch": 1.0}, 1.0, 5)] * 2
+    found = SimpleNamespace(stages=[SimpleNamespace(gaps=gaps)])  # 20 residuals
+    assert by_gap_left(0.3, found, 4.0, 4.0) == pytest.approx(0.3)
+    assert by_gap_left(0.3, found, 4.5, 3.0) > 0.99
+    assert by_gap_left(0.3, found, 3.0, 4.5) < 0.01
+    assert by_gap_left(0.0, found, 3.0, 1.0) == 0.0
+    assert by_gap_left(1.0, found, 9.0, 18.0) == 1.0
+    assert by_gap_left(opened(3.0 + 1e-6, *UNFIT), found, 3.0, 1.0) < 1e-2  # where the stages begin to be asked
 
 
 def test_two_answers_are_weighed_without_a_jump():
