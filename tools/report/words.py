@@ -284,7 +284,8 @@ def _unknown(record: Record) -> str:
         likely = answer.where[0]
         said += f", most likely in {likely.subsystem}: {likely.element} ({sure(likely.probability)})"
     known = "with nothing added to the model"
-    added = [label for label in answer.selected if any(label in stage.added for stage in answer.stages)]
+    by_readings = {one.label for one in answer.readings} - {label for stage in answer.stages for label in stage.added}
+    added = [label for label in answer.selected if label not in by_readings]
     if added:
         known = f"with the nearest known effects in the model ({joined(added)})"
     said += f"; {how_far(record, known)}"

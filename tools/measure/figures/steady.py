@@ -1,4 +1,4 @@
-"""How steady a diagnosis is: copies of a case with a millionth of each reading's noise added (docs/GAP.md, Steady).
+"""How steady a diagnosis is: copies with a millionth of each reading's noise added (docs/DIAGNOSIS.md, Steady).
 
     python -m tools.measure.figures.steady CASE... --copies 4 --seed 1
 
