@@ -115,7 +115,6 @@ class PredictionError:
 
     def gains(self, values: np.ndarray) -> Gains:
         """The observer of the model at `values`."""
-        self.observer.starts[:] = self.problem.starts
         return self.observer.filter(*self.model(values), begin=True, speeds=self.problem.kind.window_speeds)
 
     def fly(self, points: list[np.ndarray], gains: Gains, cuts: list[Windows]) -> np.ndarray:
@@ -128,7 +127,7 @@ class PredictionError:
         cut_of = np.repeat(np.arange(len(cuts)), [len(one.first) for one in cuts])
         problem.kind.fly_followed(
             np.array(Ps), np.array(Fs), np.array(problem.kind.drift), r.modes, r.bounds, r.t, problem.stamps, r.inputs,
-            self.observer.z, self.observer.starts, gains.W, gains.K, first, last, run_of, cut_of, Y,
+            self.observer.z, gains.starts, gains.W, gains.K, first, last, run_of, cut_of, Y,
         )  # fmt: skip
         return Y
 
