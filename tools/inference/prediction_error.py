@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tools.inference.channels import errors
+from tools.inference.channels import Channel, errors
 from tools.inference.fit import bounded_step
 from tools.inference.predict import observer_of
 from tools.inference.problem import Gains, Problem
@@ -92,6 +92,7 @@ class PredictionError:
         self.low = np.maximum([f.low for f in free.free], -LIMIT)
         self.high = np.minimum([f.high for f in free.free], LIMIT)
         self.kinked = np.array([f.kinked for f in free.free])
+        self.scales: dict[str, float] = {}  # tolerances by channel that a residual is divided by, 1 where none is given
 
     def model(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(P, F) at values (n,)."""
@@ -135,17 +136,31 @@ class PredictionError:
         """Residuals (models, samples) in tolerances, divided so that their squares add up to a mean over channels."""
         rows, parts = windows.rows, []
         table = self.table[rows]
-        for channel in self.channels:
-            measured = np.isfinite(table[:, list(channel.columns)])
-            if channel.joint:
-                measured[:] = measured.all(axis=1, keepdims=True)
-            if not measured.any():
-                continue
+        for channel, measured in self.measured(table):
             flown = np.array([errors(channel, table, one[rows])[measured] for one in Y])
             flown = np.clip(np.nan_to_num(flown, nan=LARGEST), -LARGEST, LARGEST)
             count = measured.sum() / (len(channel.columns) if channel.joint else 1)
-            parts.append(flown / np.sqrt(count))
+            parts.append(flown / (np.sqrt(count) * self.scales.get(channel.name, 1.0)))
         return np.concatenate(parts, axis=1) / np.sqrt(len(parts))
+
+    def measured(self, table: np.ndarray) -> Iterator[tuple[Channel, np.ndarray]]:
+        """Channels that rows of a table (rows, N_Y) have, and which of their columns were measured, (rows, columns)."""
+        for channel in self.channels:
+            found = np.isfinite(table[:, list(channel.columns)])
+            if channel.joint:
+                found[:] = found.all(axis=1, keepdims=True)
+            if found.any():
+                yield channel, found
+
+    def origins(self, windows: Windows) -> tuple[np.ndarray, np.ndarray]:
+        """Of each residual its run and its channel's number, (samples,) both."""
+        rows = windows.rows
+        runs, of_row, channels = [], self.problem.run_of[rows], []
+        for channel, found in self.measured(self.table[rows]):
+            own = np.broadcast_to(of_row[:, None], found.shape)[found]
+            runs.append(own)
+            channels.append(np.full(len(own), self.channels.index(channel)))
+        return np.concatenate(runs), np.concatenate(channels)
 
     def weights(self, e: np.ndarray) -> tuple[np.ndarray, float]:
         """Of residuals (samples,): each one's weight in the normal equations, and the mean square, large ones tamed."""
