@@ -26,7 +26,7 @@ from tools.inference.fit import bounded_step
 from tools.inference.model import Model, effect_vector, nominal_model
 from tools.inference.parameters import NINETY, FreeParameter, effect_parameters
 from tools.inference.predict import fly, observe
-from tools.inference.prediction_error import HORIZONS, Fitted, PredictionError, identify_by_prediction
+from tools.inference.prediction_error import HORIZONS, Fitted, PredictionError
 from tools.inference.problem import cut, problem_of
 from tools.inference.vehicle_parameters import GAUGE, Parameters, first_effects, listed, parameters
 
@@ -96,7 +96,7 @@ class _Stages:
         for fold in self.folds:
             self.say(f"identified without {', '.join(self.case.runs[n].name for n in fold.left_out)}")
             fitting = self.free(fold.read.model, fold.read.runs, [])
-            fold.values = identify_by_prediction(fitting.problem, fitting.free, many=False).values
+            fold.values = fitting.through(fitting.file_values).values
 
     def models(self, more: list[FreeParameter], values: list[np.ndarray]) -> dict[int, tuple[np.ndarray, np.ndarray]]:
         """By run, the model that has not seen it; constant errors of the sensors are a run's own."""

@@ -191,9 +191,7 @@ def fit(
     return Fit(whole.problem, first.free, at, statistics, first.levels, left_out, notes)
 
 
-def fitting_of(
-    case: Case, model: Model, runs: list[Run], without: Sequence[tuple[str, ...]] = ()
-) -> PredictionError:
+def fitting_of(case: Case, model: Model, runs: list[Run], without: Sequence[tuple[str, ...]] = ()) -> PredictionError:
     """The fit by prediction error to some of these runs, with all that a vehicle may have that nobody identified.
 
     But for terms (names of their parameters) that it is without.

@@ -273,11 +273,3 @@ class PredictionError:
     def again(self, values: np.ndarray, steps: int = STEPS[-1]) -> Fitted:
         """From values that fit already, at the last horizon alone."""
         return self.descend(values, *HORIZONS[-1], steps)
-
-
-def identify_by_prediction(
-    problem: Problem, free: Parameters, say: Callable[[str], None] = lambda text: None, many: bool = True
-) -> Fitted:
-    """The best fit of what is free; many: from several starts, else from the file's values alone."""
-    fitting = PredictionError(problem, free)
-    return fitting.best_of(fitting.draws(), say) if many else fitting.through(fitting.file_values)
