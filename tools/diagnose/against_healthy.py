@@ -1,8 +1,8 @@
 """Diagnosis against healthy runs of the same vehicle: what do a case's runs do that the healthy ones do not?
 
 The vehicle file is one that was identified, and misses healthy runs by what its form cannot do. How far, channel by
-channel, is learned from healthy runs, each flown by a fit to the others; the case's windows are then weighed in units of
-that (docs/DIAGNOSIS.md, Against healthy runs). Every hypothesis is fitted without each of the case's runs and judged on
+channel, is learned from healthy runs, each flown by a fit to the others; the case's windows are then weighed in units
+of that (docs/DIAGNOSIS.md, Against healthy runs). Every hypothesis is fitted without each of the case's runs and judged on
 that run, so that an effect has to shrink what it has not seen:
 
 - no change: what the vehicle file allows;
@@ -28,9 +28,10 @@ from tools.data.runs import columns
 from tools.data.runs.case import Case
 from tools.data.runs.csvfile import write_bytes
 from tools.data.runs.run import Run
-from tools.diagnose.record import ANSWER, NONE, UNKNOWN
+from tools.diagnose.record import AGAINST_HEALTHY, ANSWER, NONE, UNKNOWN
 from tools.diagnose.shrink import AFTER, BEFORE, FLOOR, RECALIBRATED, Shrinkage, by_channel, shrinkage_of
-from tools.gap.measure import RunGap, case_channels, root_mean_square, run_gap
+from tools.gap.measure import RunGap, root_mean_square, run_gap
+from tools.gap.regimes import ALL
 from tools.inference.channels import recorded
 from tools.inference.corrected import corrected_text
 from tools.inference.fit import bounded_step
@@ -44,6 +45,7 @@ from tools.inference.vehicle_parameters import Parameters
 CAUSE = "cause"
 CHANGED, STRANGE = 0.5, 0.15  # prior probability of a change; that something is left beside what is named
 LEFT = 1.5  # 1 sigma of the logarithm of the mean square that something unknown leaves, times what healthy runs leave
+FORM = 0.2  # of a change, 1 sigma, that is not as its label's equations have it
 SITE = 0.25  # 1 sigma of that logarithm from one place and way of flying to another
 PRIOR_RUNS = 1.0  # runs that what is usual of that logarithm's scatter is worth
 USUAL_SCATTER = 0.5
@@ -75,7 +77,7 @@ class Windows(PredictionError):
 
     @property
     def independent(self) -> float:
-        """Residuals counted as independent: one a window and channel."""
+        """Residuals that can be independent: one a window and channel."""
         return float(len(self.cuts[0].first) * len(self.channels))
 
     def linearised(self, values: np.ndarray) -> "Linearised":
@@ -152,19 +154,28 @@ class Healthy:
         squares = float(np.square(self.logs - self.logs.mean()).sum()) + PRIOR_RUNS * USUAL_SCATTER**2
         return float(np.sqrt(squares / self.freedom))
 
+    @property
+    def independent(self) -> float:
+        """Independent residuals of a run: of so many the mean square has this scatter (chi-squared)."""
+        return 2.0 / self.scatter**2
+
 
 def learn(case: Case, runs: list[Run]) -> Healthy:
-    """Every healthy run flown by what the vehicle file allows, fitted to the others."""
+    """Every healthy run flown by what the vehicle file allows, fitted to the others.
+
+    Where the vehicle was identified from these runs they are held too well: [form] has the gaps of runs left out.
+    """
     problem = problem_of(case, runs=runs)
     free = nuisance_parameters(problem)
     every, scales = np.arange(len(free)), dict[str, float]()
+    form = case.roughie.form.gaps[ALL] if case.roughie.form is not None else {}
     for _ in range(2):  # first in tolerances, then in what the first found
         windows = Windows(problem, free, scales)
         at = windows.linearised(windows.file_values)
         left, steps = at.held_out(every, windows.independent)
         measured = np.sqrt(at.by_channel(steps))
         scales = {
-            channel.name: max(float(one) * scales.get(channel.name, 1.0), LEAST_SCALE)
+            channel.name: max(float(one) * scales.get(channel.name, 1.0), form.get(channel.name, 0.0), LEAST_SCALE)
             for channel, one in zip(windows.channels, measured, strict=True)
         }
     share = np.array([np.sum(run_of == n) for n in range(len(runs)) for _, _, _, run_of, _ in at.samples[:1]])
@@ -197,6 +208,7 @@ class Comparison:
     places: dict[str, np.ndarray]  # of each label's parameters in `free`
     nuisance: np.ndarray
     windows: Windows = field(init=False)
+    bare: float = 1.0  # mean square of runs left out without a change
 
     def __post_init__(self) -> None:
         self.windows = Windows(self.problem, self.free, self.healthy.scales)
@@ -205,9 +217,14 @@ class Comparison:
         """Places of what is free under labels."""
         return np.concatenate([self.nuisance, *(self.places[label] for label in labels)])
 
+    @property
+    def independent(self) -> float:
+        """Independent residuals of the case's runs."""
+        return min(self.healthy.independent * len(self.problem.runs), self.windows.independent)
+
     def weight(self, mean_square: float) -> float:
         """Of a mean square of 1: as many independent residuals, of what is there where that is more than usual."""
-        return self.windows.independent / max(mean_square, 1.0)
+        return self.independent / max(mean_square, 1.0)
 
     def fitted(self, labels: tuple[str, ...], begin: np.ndarray) -> Hypothesis | None:
         """Labels led from values (n,) to where they are most probable; None where their flights are lost."""
@@ -220,10 +237,10 @@ class Comparison:
             cost = float(at.value.sum())
             if not np.isfinite(cost):
                 break
-            if best is not None and cost + values @ values / own.independent >= best[0]:
+            if best is not None and cost + values @ values / self.independent >= best[0]:
                 values = 0.5 * (values + best[1])
                 continue
-            best = cost + float(values @ values) / own.independent, values, at
+            best = cost + float(values @ values) / self.independent, values, at
             step = at.step(every, self.weight(cost))
             if np.abs(step).max(initial=0.0) < STILL:
                 break
@@ -240,7 +257,7 @@ class Comparison:
         return Hypothesis(labels, whole, left, others, sd)
 
     def promised(self, begin: Hypothesis) -> list[tuple[float, str, np.ndarray]]:
-        """Labels beside a hypothesis by one linear step: mean square of runs left out, label, values; the best first."""
+        """Labels beside a hypothesis by one linear step, the best first: mean square of runs left out, label, values."""
         at, found = self.windows.linearised(self.windows.clipped(begin.values)), []
         weight = self.weight(begin.mean_square)
         for label in self.places:
@@ -252,14 +269,16 @@ class Comparison:
 
     def nat(self, one: Hypothesis) -> float:
         """Log predictive density of runs left out, their scale known from so many healthy runs only."""
-        count, freedom = self.windows.independent, self.healthy.freedom
+        count, freedom = self.independent, self.healthy.freedom
         return -0.5 * (freedom + count) * float(np.log1p(count * max(one.mean_square, 1e-9) / freedom))
 
     def leftover(self, one: Hypothesis) -> tuple[float, float]:
         """Log densities of what runs left out leave: where that is what healthy runs leave, and where it is more."""
         healthy = self.healthy
         scale = np.sqrt(healthy.scatter**2 * (1.0 / len(healthy.logs) + 1.0 / len(one.left)) + SITE**2)
-        at = np.log(max(one.mean_square, 1e-9)) - np.log(np.exp(healthy.logs).mean())
+        if one.labels:
+            scale = float(np.hypot(scale, np.log1p(FORM**2 * max(self.bare - one.mean_square, 0.0))))
+        at = np.log(max(one.mean_square, 1e-9)) - max(float(np.log(np.exp(healthy.logs).mean())), 0.0)
         shifts = np.linspace(0.0, 4.0 * LEFT, 121)
         prior = 2.0 * norm.pdf(shifts, scale=LEFT) * (shifts[1] - shifts[0])
         nothing = float(student.logpdf(max(at, 0.0) / scale, healthy.freedom))
@@ -310,6 +329,7 @@ def hypotheses(compared: Comparison, say: Callable[[str], None]) -> list[Hypothe
     nothing = compared.fitted((), np.zeros(len(compared.free)))
     if nothing is None:
         raise InputError("the identified vehicle does not fly these runs", source=compared.problem.case.folder)
+    compared.bare = nothing.mean_square
     say(f"no change: {nothing.mean_square:.2f} times what healthy runs leave")
     odds, listed, best = float(np.log(CHANGED / len(compared.places))), [nothing], nothing
     while len(best.labels) < MOST:
@@ -373,9 +393,11 @@ def diagnose_against_healthy(
     first = max(chances, key=lambda name: chances[name])
     verdict = first if first in (NONE, UNKNOWN) else CAUSE
     singles = {one.labels[0]: compared.nat(one) for one in listed if len(one.labels) == 1}
-    near = sorted((n for n, nat in singles.items() if nat > singles.get(first, np.inf) - ALIKE), key=lambda n: -singles[n])
+    near = sorted(
+        (n for n, nat in singles.items() if nat > singles.get(first, np.inf) - ALIKE), key=lambda n: -singles[n]
+    )
     selected = sorted(best.labels, key=lambda label: label != first)
-    gaps = gaps_of(compared, reference, listed[0], best)
+    gaps = gaps_of(compared, listed[0], best)
     P, F = model_of(compared, best.values, best.labels)
     bare = compared.nat(listed[0])
     return AgainstHealthy(
@@ -394,9 +416,7 @@ def model_of(compared: Comparison, values: np.ndarray, labels: Iterable[str]) ->
     return model_at(compared.problem, compared.free, bare)
 
 
-def gaps_of(
-    compared: Comparison, reference: Case, nothing: Hypothesis, best: Hypothesis
-) -> dict[str, list[RunGap]]:
+def gaps_of(compared: Comparison, nothing: Hypothesis, best: Hypothesis) -> dict[str, list[RunGap]]:
     """Gaps of the case's runs by the identified vehicle, by a fit of it and with the change, each without the run; and
     what healthy runs leave."""
     problem = compared.problem
@@ -457,7 +477,7 @@ def plain(found: AgainstHealthy) -> dict[str, Any]:
     runs = [run.name for run in found.case.runs]
     return {
         "format": 1,
-        "kind": "reference",
+        "kind": AGAINST_HEALTHY,
         "case": {"name": found.case.folder.resolve().name, "vehicle": found.case.vehicle_name, "runs": len(runs)},
         "verdict": found.verdict,
         "where": found.where,
