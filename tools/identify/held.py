@@ -186,10 +186,16 @@ class Judge:
         models = [(nominal.P, effect_vector(nominal))] * len(self.runs)
         return self.candidate(FILE, None, "it has seen no run", models)
 
+    def on_its_own(self, found: Fit) -> Candidate:
+        """A fit in the runs that it was made of."""
+        return self.candidate(
+            LIKELIHOOD, found, ITSELF, [model_of(self.model, found.free, found.best)] * len(self.runs)
+        )
+
     def likelihood(self, found: Fit) -> Candidate:
         """The likelihood's fit."""
         if len(self.all) == 1:
-            return self.candidate(LIKELIHOOD, found, ITSELF, [model_of(self.model, found.free, found.best)])
+            return self.on_its_own(found)
         if len(self.all) > FEW:
             models = [model_of(self.model, found.free, without(found, n)) for n in self.picked]
             return self.candidate(LIKELIHOOD, found, EARLY, models)
@@ -253,11 +259,12 @@ def judge(
 ) -> Held:
     """All candidates, flown in runs that were left out, and which of them is handed out.
 
-    Without the prediction error's where the likelihood's fit flies them as well as noise and disturbance allow.
+    Without the prediction error's where the likelihood's fit flies its own runs as well as noise and disturbance allow:
+    what it then lacks in others is data.
     """
     court = Judge(case, model, likelihood.problem.runs, say)
     candidates, floor = [court.file(), court.likelihood(likelihood)], court.floor(likelihood)
-    if clearly_better(floor, candidates[1]):
+    if clearly_better(floor, court.on_its_own(likelihood)):
         candidates.append(court.prediction(likelihood, begin))
     chosen, why = choose(candidates)
     return Held(court.runs, candidates, chosen, why, case.roughie.vector(), floor)
