@@ -10,6 +10,7 @@ from tools.diagnose.noise_probes import NoiseProbe
 from tools.watch.disorder import WATER, shaken
 from tools.watch.events import Change, Joint, Span, spans
 from tools.watch.flights import Flights, numbers
+from tools.watch.lasting import Lasting, lasting
 
 NOT_ROUGH = 5.0  # nat that a run that is not rough takes off disorder that would hold there too
 UNLIKE = 0.01  # cosine of two labels' columns, below which they have nothing to do with each other
@@ -31,6 +32,7 @@ class Event:
     sure_spans: dict[Span, float] = field(default_factory=dict)  # log evidence by span
     probe: tuple[str, float] | None = None  # of disorder that is not the water's: what shakes, and how much
     place: NoiseProbe | None = None  # and the single link that shakes most
+    strange: Lasting | None = None  # what lasts in its runs beside it, before any other event was sought
 
     @property
     def has_course(self) -> bool:
@@ -112,6 +114,18 @@ def akin(history: History, one: str, other: str, runs: np.ndarray) -> bool:
         if (np.abs(A[np.ix_(a, b)]) > UNLIKE * sizes).any():
             return True
     return False
+
+
+def lasts(history: History, event: Event) -> Lasting | None:
+    """What lasts in an event's runs beside it; None of a kind without, and where the event moves other readings."""
+    flights, weights = history.flights, event.span.weights(history.flights.count)
+    runs = numbers((weights > 0.0) & history.judged)
+    if flights.parts[0].kind.input_table is None:
+        return None
+    if not event.has_course:
+        return lasting(flights, runs, weights)
+    beside = lasting(flights, runs, weights, event.label, event.size)
+    return beside if beside.akin else None
 
 
 def take(history: History, event: Event) -> None:

@@ -6,7 +6,8 @@ import numpy as np
 from scipy.stats import t as student
 
 from tools.inference.parameters import CLOCK_PLACE
-from tools.watch.history import Event, History, already, earns_place, shaken_place, take
+from tools.watch.events import Change
+from tools.watch.history import Event, History, already, earns_place, lasts, shaken_place, take
 from tools.watch.rivals import refined
 from tools.watch.scatter import FEW, PRIOR_RUNS
 from tools.watch.water import named, rougher, water_event
@@ -25,6 +26,7 @@ def find_events(history: History, say: Callable[[str], None] = lambda text: None
             break
         history.events.append(event)
         take(history, event)
+        event.strange = lasts(history, event)
         say(f"{event.label or 'unknown'} in runs {event.span.first} to {event.span.end - 1}")
 
 
@@ -55,9 +57,14 @@ def next_event(history: History) -> Event | None:
     """The change that is most evident beside those found: a label's course, or disorder where that explains more."""
     joint = history.joint()
     every = joint.changes(history.listed())
-    changes = [one for one in every if not already(history, one) and earns_place(history, one)]
-    best = max(changes, key=lambda one: one.evidence, default=None)
-    event = refined(history, joint, best, changes) if best is not None and best.evidence >= EVIDENCE_NEEDED else None
+
+    def possible(one: Change) -> bool:
+        return not already(history, one) and earns_place(history, one)
+
+    evident = sorted((one for one in every if one.evidence >= EVIDENCE_NEEDED), key=lambda one: -one.evidence)
+    best = next((one for one in evident if possible(one)), None)
+    changes = [] if best is None else [one for one in every if one.span == best.span and possible(one)]
+    event = None if best is None else refined(history, joint, best, changes)
     rough = water_event(history)
     if rough is None or rough.evidence < EVIDENCE_NEEDED:
         return event

@@ -35,6 +35,7 @@ from tools.inference.shared_model import About, fit_shared, heat_of
 from tools.inference.shared_parameters import shared_parameters
 from tools.inference.steady import first_values
 from tools.watch.answer import CAUSE
+from tools.watch.lasting import NO_WATER, beside_all
 from tools.watch.watch import usable_runs
 from tools.watch.whole_left import Left, disturbed, water_disorder, what_is_left
 from tools.watch.whole_search import Model, Round, Sought, Whole, seek, whole_model
@@ -119,7 +120,8 @@ def rougher_water(
     gaps: dict[str, list[RunGap]],
 ) -> tuple[list[RunGap], Left] | None:
     """The floor in water that is as rough as the readings ask for, and what is left then: where that is nothing, and
-    where the water explains nearly all that can be explained (as turbulence does, tools/diagnose/unknown.py).
+    where the water explains nearly all that can be explained (as turbulence does, tools/diagnose/unknown.py), and nothing
+    that lasts is beside it.
     """
     if left.probability <= 0.5:
         return None
@@ -127,6 +129,9 @@ def rougher_water(
     explained = 0.5 * heat * (start.cost - model.cost)
     if found is None or found.gain < MOSTLY * (found.gain + explained):
         return None
+    beside = beside_all([disturbed(part, found) for part in parts], model.shared, model.x, heat)
+    if beside.chance(NO_WATER) > 0.5 and beside.moves(problem.kind.measures) >= problem.kind.matters:
+        return None  # water has no lasting direction
     rng = np.random.default_rng(SEED)
     models = [model.shared.model(part, x) for part, x in zip(parts, without_each(model, heat), strict=True)]
     floor = [floor_of(part, one, disturbed(part, found), rng) for part, one in zip(parts, models, strict=True)]
