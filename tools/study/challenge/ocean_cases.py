@@ -24,7 +24,7 @@ SIZES = {
     "x_thruster": (0.2, 0.8), "x_line": (2e-4, 2e-3), "x_fouled_wing": (0.05, 0.2), "x_mud": (0.05, 0.2),
 }  # fmt: skip
 EITHER_WAY = ("attitude_scale", "net_buoyancy", "density_bias", "x_fouled_wing")
-WING_DRAG = 0.5  # of the camber's size: drag of grown-over wings that goes with the speed
+WING_DRAG = 0.1  # of the camber's size: drag of grown-over wings that goes with the speed
 # What moves each label that an answer may give by a small size, to ask what it leaves of a change that no label names.
 LABEL_STEPS = {
     "drag": (at.DRAG, 0.01), "climb_dive_asymmetry": (at.CLIMB_DRAG, 0.01), "lift": (at.LIFT, 0.05),
@@ -42,7 +42,7 @@ SIZE_TRIES, TRIES = 12, 500
 SLOWEST, STEADY = 0.04, 0.45  # m/s, share of the depth about its middle: a dive that sinks slower there is none
 STALLED = 0.12  # rad, angle of attack: with too little lift for its pitch a glider has no glide at all, and falls
 FLATTER = 0.015  # rad: the pitch wanders
-NEAREST, NEWTON = 3, 4  # labels that are fitted, with so many steps
+NEAREST, NEWTON, SHARES = 3, 4, (1.0, 0.4, 0.1)  # labels that are fitted, with so many steps, whole or in part
 DEPTHS = 200  # at which the ways of two dives are compared
 TRUTH_EVERY = 60.0  # s, at which true speeds are kept
 PITCH_NOISE, ROLL_NOISE, YAW_NOISE, DENSITY_NOISE, TEMPERATURE_NOISE, OIL_NOISE = 0.001, 0.003, 0.01, 0.004, 0.002, 1e-7
@@ -178,15 +178,15 @@ def left_by_labels(mission: Mission, bare: Course, moved: np.ndarray, seconds: n
 
     def left_by(label: str, steps: int) -> np.ndarray:
         step, size, left = LABEL_STEPS[label][1], 0.0, moved
-        best = left
-        for _ in range(steps):  # Gauss and Newton's, held within what flies
+        for _ in range(steps):  # Gauss and Newton's, the largest share of a step that leaves less
             column = (course(label, size + step) - (moved - left)) / step
-            size += float(column * seconds @ left) / max(float(column**2 @ seconds), 1e-18)
-            left = moved - course(label, size)
-            if not float(left**2 @ seconds) < float(best**2 @ seconds):
-                break
-            best = left
-        return best
+            better = float(column * seconds @ left) / max(float(column**2 @ seconds), 1e-18)
+            for share in SHARES:
+                tried = moved - course(label, size + share * better)
+                if float(tried**2 @ seconds) < float(left**2 @ seconds):
+                    size, left = size + share * better, tried
+                    break
+        return left
 
     def squares(label: str) -> float:
         return float(left_by(label, 1) ** 2 @ seconds)

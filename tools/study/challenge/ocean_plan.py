@@ -31,6 +31,7 @@ OUTSIDE_CHANGES = ("x_thruster", "x_line", "x_fouled_wing", "x_mud")
 LIFT_SHOWS = "seaglider"
 # A Slocum's dive is too short to tell a change that no label names from the label that is nearest to it.
 OUTSIDE_SHOWS = ("seaglider", "seaexplorer")
+STEEP_SHOWS = ("x_fouled_wing",)  # of Seagliders: the flatter glide of the other takes it for a bias of the pitch
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,8 @@ def ocean_plan(seed: int, counts: WatchCounts) -> list[MissionPlan]:
     crafts = [CRAFTS[n % len(CRAFTS)] for n in rng.permutation(len(drawn))]
     crafts = [LIFT_SHOWS if label == "lift" else craft for craft, (label, _, _) in zip(crafts, drawn, strict=True)]
     for n in range(outside):  # the last that were drawn
-        crafts[len(crafts) - outside + n] = OUTSIDE_SHOWS[(n + n // len(OUTSIDE_CHANGES)) % len(OUTSIDE_SHOWS)]
+        shows = OUTSIDE_SHOWS[:1] if drawn[n - outside][0] in STEEP_SHOWS else OUTSIDE_SHOWS
+        crafts[n - outside] = shows[(n + n // len(OUTSIDE_CHANGES)) % len(shows)]
     plans = []
     for number, n in enumerate(rng.permutation(len(drawn))):
         label, course, speed = drawn[n]
