@@ -22,8 +22,8 @@ from tools.watch.flights import Flights, numbers
 SIZE = 0.02  # m/s, 1 sigma of what lasts: as much as the roughest water
 STEP = 1e-3  # m/s
 UNLIKE = 0.01  # SIZE: a label that moves a depth rate by less has nothing to do with it
-# Log odds, nat: of twenty changes that a label explains as well, one is of a kind that none names; and water is named only
-# where it is twenty times as likely as water with something that lasts in it.
+# Log odds, nat: of twenty changes that a label explains as well, one is of a kind that none names; and water is named
+# only where it is twenty times as likely as water with something that lasts in it.
 STRANGE, NO_WATER = -3.0, 3.0
 AXES = (("hydrodynamics", "surge"), ("mass", "net"))  # what turns with the way, what does not
 Model = tuple[np.ndarray, np.ndarray]
@@ -149,7 +149,8 @@ def usual(flights: Flights) -> tuple[np.ndarray, np.ndarray]:
 
 def beside_all(parts: Sequence[Problem], shared: SharedParameters, x: np.ndarray, heat: float) -> Lasting:
     """What lasts in all runs of a case beside the model that they share, all that it allows free."""
-    pull = course_of([pull_of(part, shared, x, heat) for part in parts], [1.0] * len(parts), np.diag(shared.prior**-2.0))
+    each = [pull_of(part, shared, x, heat) for part in parts]
+    pull = course_of(each, [1.0] * len(parts), np.diag(shared.prior**-2.0))
     evidence, c = evidence_of(pull, np.ones(len(pull.slope)))
     return Lasting(evidence, SIZE * c)
 

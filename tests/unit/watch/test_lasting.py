@@ -63,7 +63,8 @@ def test_rougher_water_is_that_and_no_force(before, tmp_path):
 
 
 def test_a_force_that_all_dives_have_is_not_called_water(before, tmp_path):
-    found = diagnose_ocean(load_case(as_case(tmp_path, dives(BEFORE, AFTER, "x_thruster", 0.5), CRAFT).folder, before[1]))
+    case = as_case(tmp_path, dives(BEFORE, AFTER, "x_thruster", 0.5), CRAFT)
+    found = diagnose_ocean(load_case(case.folder, before[1]))
     assert found.verdict != "none"
     assert "vertical_water" not in found.selected
 
