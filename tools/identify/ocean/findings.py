@@ -28,7 +28,7 @@ WORDS = {
     "drag": "drag is {whole:.2f} times the file's ({low:.2f} to {high:.2f})",
     "lift": "lift is {whole:.2f} times the file's ({low:.2f} to {high:.2f})",
     "attitude_scale": "pitch reads {whole:.2f} of the truth ({low:.2f} to {high:.2f}) beside the file",
-    "ballast_scale": "the buoyancy engine moves {whole:.2f} times what it says ({low:.2f} to {high:.2f}) beside the file",
+    "ballast_scale": "the engine moves {whole:.2f} times what it says ({low:.2f} to {high:.2f}) beside the file",
 }
 
 

@@ -42,6 +42,7 @@ SIZE_TRIES, TRIES = 12, 500
 SLOWEST, STEADY = 0.04, 0.45  # m/s, share of the depth about its middle: a dive that sinks slower there is none
 STALLED = 0.12  # rad, angle of attack: with too little lift for its pitch a glider has no glide at all, and falls
 FLATTER = 0.015  # rad: the pitch wanders
+LEAST_STRANGE = 0.1  # of the squares that a change moves: with less left it acts as a label does
 NEAREST, NEWTON, SHARES = 3, 4, (1.0, 0.4, 0.1)  # labels that are fitted, with so many steps, whole or in part
 DEPTHS = 200  # at which the ways of two dives are compared
 TRUTH_EVERY = 60.0  # s, at which true speeds are kept
@@ -153,7 +154,8 @@ def shown(mission: Mission, label: str, size: float) -> tuple[float, float]:
 
     Evidence is that of the depth rate over the water's density at 0 Hz: a mean over T of water that has size s and
     forgets itself in tau varies by 2 s2 tau / T. What makes the readings of the water wrong shows as the weight that it
-    pretends. Of a change that no label names only that shows which the nearest label leaves, whatever its size.
+    pretends. Of a change that no label names only that shows which the nearest label leaves, whatever its size, and
+    nothing where that is less than nature's form and a label's differ by anyhow.
     """
     bare, heavier = course_of(mission, mission.V), mission.V.copy()
     heavier[at.MASS] += 0.01
@@ -161,9 +163,11 @@ def shown(mission: Mission, label: str, size: float) -> tuple[float, float]:
     other = course_of(mission, with_change(mission.V, label, size))
     moved = other.rate - bare.rate + (other.density - bare.density) * mission.V[at.VOLUME] * by_mass
     seconds = bare.step / bare.rate
+    whole = total = float(moved**2 @ seconds)
     if label in OUTSIDE_CHANGES:
-        moved = left_by_labels(mission, bare, moved, seconds)
-    total = float(moved**2 @ seconds)
+        total = float(left_by_labels(mission, bare, moved, seconds) ** 2 @ seconds)
+    if total < LEAST_STRANGE * whole:
+        return 0.0, 0.0
     water, time = mission.seas[0][at.WATER], mission.seas[0][at.WATER_TIME]
     return 0.5 * total / (2.0 * water**2 * time), float(np.sqrt(total / float(seconds.sum())))
 
