@@ -24,7 +24,11 @@ PUMP_RATE, VALVE_RATE, PUMP_DROOP = 25, 26, 27  # m3/s, m3/s, share lost a metre
 WATER_LAG = 28  # s, of the CTD
 DENSITY_BIAS = 29  # kg/m3
 ROW_SHALLOW, ROW_DEEP, DEEP = 30, 31, 32  # s, s, m
-N_V = 33
+THRUST, THRUST_DEPTH = 33, 34  # N along the hull, ahead; m, down to which
+PULL = 35  # N a metre of depth, against the way through the water
+CAMBER, WING_DRAG = 36, 37  # of AREA: lift at no angle of attack; drag that goes with the speed, at STANDARD_SPEED
+MUD = 38  # kg, from apogee on; it is washed out
+N_V = 39
 
 # --- dive, D ---------------------------------------------------------------------------------------------------------
 DEPTH, PITCH_DOWN, PITCH_UP, PITCH_APOGEE = 0, 1, 2, 3  # m; rad, as read
@@ -50,6 +54,8 @@ SMOOTH = 15.0  # s, over which vertical water has a slope
 PITCH_REMEMBERS, ROLL_REMEMBERS, YAW_REMEMBERS = 90.0, 60.0, 900.0  # s
 FASTEST_PITCH = 0.025  # rad/s
 STANDARD_SPEED = 0.25  # m/s, at which parasitic drag is DRAG
+MUD_TIME = 1200.0  # s, in which mud is washed out
+STEADY_PULL = 0.05  # m/s, from which on the pull is whole
 CALM_SURFACE, CALM_DEPTH = 0.6, 30.0  # share by which vertical water is less at the surface; m
 LONGEST = 60000.0  # s of a dive
 
@@ -88,11 +94,11 @@ def net_weight(V, S, z, oil):
 
 
 @kernel
-def rates(V, weight, density, theta, turn, phi, u, v, w):
+def rates(V, weight, density, theta, turn, phi, u, v, w, thrust=0.0, pull=0.0):
     """Accelerations of u, v, w, m/s2, and depth rate through the water, m/s.
 
-    turn: pitch rate, rad/s. Lift a sin(alpha) cos(alpha) (1 + b sin2(alpha)), drag c0 (U / U0)^p + c1 (sin2 alpha +
-    sin2 beta), both turned into body axes.
+    turn: pitch rate, rad/s; thrust, pull: N. Lift a sin(alpha) cos(alpha) (1 + b sin2(alpha)) and that of the camber,
+    drag c0 (U / U0)^p + c1 (sin2 alpha + sin2 beta) and the wings' that goes with U, all turned into body axes.
     """
     speed = math.sqrt(u * u + v * v + w * w) + 1e-9
     alpha = math.atan2(w, u)
@@ -101,8 +107,9 @@ def rates(V, weight, density, theta, turn, phi, u, v, w):
     parasitic = V[DRAG] * (max(speed, 0.03) / STANDARD_SPEED) ** V[DRAG_POWER]
     parasitic *= 1.0 + 0.5 * V[CLIMB_DRAG] * (1.0 if theta > 0.0 else -1.0)
     drag = pressure * (parasitic + V[INDUCED] * (sine * sine + side * side))
-    lift = pressure * V[LIFT] * sine * cosine * (1.0 + V[LIFT_BEND] * sine * sine)
-    ahead = lift * sine - drag * cosine
+    drag += pressure * V[WING_DRAG] * STANDARD_SPEED / max(speed, 0.03) + pull * min(speed / STEADY_PULL, 1.0)
+    lift = pressure * (V[LIFT] * sine * cosine * (1.0 + V[LIFT_BEND] * sine * sine) + V[CAMBER])
+    ahead = thrust + lift * sine - drag * cosine
     down = -lift * cosine - drag * sine
     across = -(pressure * V[SIDE] + drag) * side
     mass_u, mass_v, mass_w = V[MASS] + V[ADDED_AHEAD], V[MASS] + V[ADDED_SIDE], V[MASS] + V[ADDED_DOWN]
@@ -142,7 +149,7 @@ def fly_dive(V, D, S, seed, out):
     water = S[WATER] * gaussian(seed, 1, 0)
     smooth, pitch_off, roll_off, yaw_off = water, 0.0, 0.0, V[YAW_WANDER] * gaussian(seed, 4, 0)
     temperature, potential = sea_temperature(S, z), potential_density(S, z)
-    row, due, second, engine = 0, 0.0, 0, 0.0
+    row, due, second, engine, mud = 0, 0.0, 0, 0.0, 0.0
     while second < LONGEST and row < out.shape[0]:
         water = remembered(water, S[WATER], S[WATER_TIME], seed, 1, second + 1)
         smooth += (water - smooth) / SMOOTH
@@ -164,7 +171,7 @@ def fly_dive(V, D, S, seed, out):
             row += 1
             due = second + (V[ROW_DEEP] if z > V[DEEP] else V[ROW_SHALLOW])
         if phase == 0 and z > D[DEPTH]:
-            phase = 1
+            phase, mud = 1, V[MUD]
         elif phase == 1 and oil > 0.5 * (D[OIL_DOWN] + D[OIL_UP]):
             phase = 2
         elif phase == 2 and z < 1.0:
@@ -174,11 +181,12 @@ def fly_dive(V, D, S, seed, out):
         engine = engine_rate(V, oil, D[OIL_DOWN] if phase == 0 else D[OIL_UP], z)
         for _ in range(STEPS):
             turn = min(max((wanted - theta) / V[PITCH_TIME], -FASTEST_PITCH), FASTEST_PITCH)
-            weight = net_weight(V, S, z, oil)
+            weight = net_weight(V, S, z, oil) + V[GRAVITY] * mud
             density = potential_density(S, z) + squeezed_density(z)
-            du, dv, dw, dz = rates(V, weight, density, theta, turn, phi, u, v, w)
+            thrust, pull = V[THRUST] if z < V[THRUST_DEPTH] else 0.0, V[PULL] * max(z, 0.0)
+            du, dv, dw, dz = rates(V, weight, density, theta, turn, phi, u, v, w, thrust, pull)
             du2, dv2, dw2, dz2 = rates(
-                V, weight, density, theta + turn * dt, turn, phi, u + dt * du, v + dt * dv, w + dt * dw
+                V, weight, density, theta + turn * dt, turn, phi, u + dt * du, v + dt * dv, w + dt * dw, thrust, pull
             )
             u, v, w = u + 0.5 * dt * (du + du2), v + 0.5 * dt * (dv + dv2), w + 0.5 * dt * (dw + dw2)
             z += dt * (0.5 * (dz + dz2) + vertical)
@@ -188,6 +196,7 @@ def fly_dive(V, D, S, seed, out):
                 z, u, v, w = 0.3, 0.9 * u, 0.9 * v, 0.9 * w
         temperature += (sea_temperature(S, z) - temperature) / V[WATER_LAG]
         potential += (potential_density(S, z) - potential) / V[WATER_LAG]
+        mud *= 1.0 - 1.0 / MUD_TIME
         second += 1
     return row
 

@@ -74,6 +74,8 @@ def _identify_ocean(case, out: Path | None, as_json: bool) -> None:
         low, high = number.ci90
         interval = f"{low:.5g} to {high:.5g}"
         click.echo(f"{number.name:<18} {number.mean:>11.5g} {number.sd:>9.2g}   {interval:<24} {number.unit}")
+    for finding in found.findings:
+        click.echo(finding.sentence)
     for ridge in found.ridges:
         click.echo(ridge.sentence())
     if found.next_run is not None:

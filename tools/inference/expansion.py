@@ -89,6 +89,19 @@ def expand(
 
     strata: a number of every row (rows,); the samples of each number make a part of the expansion.
     """
+    gains, e, J = linear(part, shared, x, roughness)
+    found = _parabola(x, float(gains.misfit[0]), e, J)
+    if strata is not None:
+        of_sample = strata[np.nonzero(part.valid)[0]]
+        chosen = [of_sample == number for number in range(int(strata.max()) + 1)]
+        found.parts = [_parabola(x, float(e[own] @ e[own]), e[own], J[:, own]) for own in chosen]
+    return found
+
+
+def linear(
+    part: Problem, shared: SharedParameters, x: np.ndarray, roughness: float = 1.0
+) -> tuple[Gains, np.ndarray, np.ndarray]:
+    """A run's filter at x, its innovations (samples,) and their derivatives (count, samples) by kept gains."""
     gains = part.filter(*shared.model(part, x), roughness=roughness, begin=True)
 
     def moved(k: int, size: float) -> tuple[np.ndarray, np.ndarray]:
@@ -97,13 +110,7 @@ def expand(
             point[k] += size
         return shared.model(part, point)
 
-    e, J = columns_at(part, gains, moved, at_kink(shared, x), difference_steps(shared, x))
-    found = _parabola(x, float(gains.misfit[0]), e, J)
-    if strata is not None:
-        of_sample = strata[np.nonzero(part.valid)[0]]
-        chosen = [of_sample == number for number in range(int(strata.max()) + 1)]
-        found.parts = [_parabola(x, float(e[own] @ e[own]), e[own], J[:, own]) for own in chosen]
-    return found
+    return gains, *columns_at(part, gains, moved, at_kink(shared, x), difference_steps(shared, x))
 
 
 def _parabola(x: np.ndarray, value: float, e: np.ndarray, J: np.ndarray) -> Expansion:

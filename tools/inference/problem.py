@@ -77,6 +77,10 @@ class Problem:
         recorded = None if self.recorded is None else self.recorded.with_extra_noise(more)
         return replace(self, extra_noise=more, recorded=recorded)
 
+    def reading(self, z: np.ndarray) -> "Problem":
+        """The problem with other readings (rows, N_Y), of the same samples."""
+        return replace(self, z=np.where(self.valid, z, np.nan))
+
     @property
     def densities(self) -> np.ndarray:
         """Spectral densities with the extra noise, (n_spectral,)."""

@@ -14,6 +14,7 @@ from tools.inference.fit import bounded_step
 from tools.inference.shared_parameters import SharedParameters
 
 STEP, GROWING = "step", "growing"
+TOGETHER = 512  # spans that are asked about at once
 LEAST_GROWING = 3  # runs in which a growth can be told from a step
 
 
@@ -116,20 +117,46 @@ class Joint:
             slopes.append(run.slope + run.curvature @ (self.run_values(n) - run.at))
         tables = [np.array([run.curvature for run in self.runs]), np.array(cross), np.array(slopes)]
         upto = [np.concatenate([np.zeros_like(one[:1]), np.cumsum(one, axis=0)]) for one in tables]
-        found = []
-        for span in listed:
-            if span.course == STEP:
-                D, C, s = (one[span.end] - one[span.first] for one in upto)
-            else:
-                w = span.weights(len(self.runs))
-                D, C, s = (np.tensordot(share, one, 1) for share, one in zip((w**2, w, w), tables, strict=True))
-            solved = self.inverse @ C
-            for label in self.shared.labels if only is None else only:
-                found.append(self._change(label, span, D, C, s, solved))
-        return found
+        labels = list(self.shared.labels if only is None else only)
+        single = [label for label in labels if len(self.shared.labels[label]) == 1]
+        wide = [label for label in labels if label not in single]
+        found: list[list[Change]] = []
+        for first in range(0, len(listed), TOGETHER):
+            chosen = listed[first : first + TOGETHER]
+            sums = [self._sums(span, tables, upto) for span in chosen]
+            by_label = {label: self._of_one(label, chosen, sums) for label in single}
+            solved = [self.inverse @ one[1] for one in sums] if wide else []
+            for label in wide:
+                by_label[label] = [self._change(label, *one) for one in zip(chosen, sums, solved, strict=True)]
+            found.append([by_label[label][k] for k in range(len(chosen)) for label in labels])
+        return [one for part in found for one in part]
 
-    def _change(self, label: str, span: Span, D, C, s, solved) -> Change:
+    def _sums(self, span: Span, tables: list[np.ndarray], upto: list[np.ndarray]) -> list[np.ndarray]:
+        """Curvature (count, count), that with the unknowns (unknowns, count) and slope (count,) of a span's runs."""
+        if span.course == STEP:
+            return [one[span.end] - one[span.first] for one in upto]
+        w = span.weights(len(self.runs))
+        return [np.tensordot(share, one, 1) for share, one in zip((w**2, w, w), tables, strict=True)]
+
+    def _of_one(self, label: str, among: Sequence[Span], sums: Sequence[Sequence[np.ndarray]]) -> list[Change]:
+        """A label of one parameter over spans."""
+        k = self.shared.labels[label][0]
+        C = np.array([one[1][:, k] for one in sums])
+        precision = np.array([one[0][k, k] for one in sums]) + 1.0 - np.einsum("si,si->s", C @ self.inverse, C)
+        slope = np.array([one[2][k] for one in sums])
+        low, high = self.shared.limits(label, self.values)
+        size = np.clip(-slope / precision, low, high)
+        gain = -(slope * size + 0.5 * size * precision * size)
+        halved = np.log(2.0) * float(((low == 0.0) | (high == 0.0)).sum())
+        evidence = gain - 0.5 * np.log(np.abs(precision)) + halved + self.shared.odds.get(label, 0.0)
+        return [
+            Change(label, span, size[n : n + 1], precision[n : n + 1, None], float(evidence[n]), float(gain[n]))
+            for n, span in enumerate(among)
+        ]
+
+    def _change(self, label: str, span: Span, sums: Sequence[np.ndarray], solved: np.ndarray) -> Change:
         """One label over one span."""
+        D, C, s = sums
         columns = self.shared.labels[label]
         own = np.ix_(columns, columns)
         precision = D[own] + np.eye(len(columns)) - C[:, columns].T @ solved[:, columns]

@@ -25,11 +25,14 @@ class Flights:
     hot: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (runs,) times that: a form leaves more
     sizes: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (count,) 1 sigma of what runs differ by
     form: dict[int, np.ndarray] = field(default_factory=dict)  # by run, (count,) 1 sigma: the form of its changes
+    known: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # precision of the shared values
     certainty: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # inverse covariance of a run's own values
     values: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (count,) shared
     raw: list[Expansion] = field(default_factory=list)  # not cooled, at `values`
     runs: list[Expansion] = field(default_factory=list)  # cooled, deviations integrated out, at what each flies by
-    deviations: dict[int, tuple[Expansion, np.ndarray]] = field(default_factory=dict)  # with what they were found of
+    usual_course: tuple[np.ndarray, np.ndarray] | None = None  # of the reference (tools/watch/lasting.py), once asked
+    # with what they were found of: a run's deviation, and its mean squared innovation there
+    deviations: dict[int, tuple[Expansion, np.ndarray, float]] = field(default_factory=dict)
 
     @property
     def count(self) -> int:
@@ -44,8 +47,8 @@ class Flights:
         self.heat, self.hot = heat_of(found), np.ones(self.count)
         self.sizes = learn_scatter([one.cooled(self.heat) for one in found], self.shared)
         self.runs = [self.made(n, one) for n, one in enumerate(self.raw)]
-        known = np.diag(self.shared.prior**-2.0) + sum(self.runs[n].curvature for n in own)
-        self.certainty = np.linalg.inv(np.linalg.inv(known) + np.diag(np.maximum(self.sizes, LEAST_SIZE) ** 2))
+        self.known = np.diag(self.shared.prior**-2.0) + sum(self.runs[n].curvature for n in own)
+        self.certainty = np.linalg.inv(np.linalg.inv(self.known) + np.diag(np.maximum(self.sizes, LEAST_SIZE) ** 2))
 
     def heat_in(self, n: int) -> float:
         """The heat of a run."""
@@ -89,12 +92,16 @@ class Flights:
 
         Of what the reference leaves unknown of the shared values, and of what runs differ by.
         """
-        one = self.raw[n]
-        known = self.deviations.get(n)
+        return self._own(n)[1]
+
+    def _own(self, n: int) -> tuple[Expansion, np.ndarray, float]:
+        """A run's parabola, its deviation, and its mean squared innovation there; found once for a parabola."""
+        one, known = self.raw[n], self.deviations.get(n)
         if known is None or known[0] is not one:
-            known = one, self.deviation_of(one)
-            self.deviations[n] = known
-        return known[1]
+            shift = self.deviation_of(one)
+            nis = one.nis + float(2.0 * one.slope @ shift + shift @ one.curvature @ shift) / one.samples
+            self.deviations[n] = known = one, shift, nis
+        return known
 
     def deviation_of(self, one: Expansion) -> np.ndarray:
         """The same of any parabola."""
@@ -114,8 +121,7 @@ class Flights:
 
     def nis(self, n: int) -> float:
         """Mean squared innovation of a run at its own values, by its parabola."""
-        one, shift = self.raw[n], self.deviation(n)
-        return one.nis + float(2.0 * one.slope @ shift + shift @ one.curvature @ shift) / one.samples
+        return self._own(n)[2]
 
     @property
     def usual_nis(self) -> np.ndarray:

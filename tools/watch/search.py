@@ -6,7 +6,8 @@ import numpy as np
 from scipy.stats import t as student
 
 from tools.inference.parameters import CLOCK_PLACE
-from tools.watch.history import Event, History, already, earns_place, shaken_place, take
+from tools.watch.events import Change
+from tools.watch.history import Event, History, already, earns_place, lasting_event, lasts, shaken_place, take
 from tools.watch.rivals import refined
 from tools.watch.scatter import FEW, PRIOR_RUNS
 from tools.watch.water import named, rougher, water_event
@@ -20,12 +21,19 @@ MOST_EVENTS = 5
 def find_events(history: History, say: Callable[[str], None] = lambda text: None) -> None:
     """Events added to the history, the most evident first."""
     for _ in range(MOST_EVENTS):
-        event = next_event(history)
-        if event is None or event.evidence < evidence_needed(history, event) or not earns_place(history, event):
+        candidates = (seek(history) for seek in (next_event, lasting_event))
+        event = next((one for one in candidates if one is not None and stands(history, one)), None)
+        if event is None:
             break
         history.events.append(event)
         take(history, event)
+        event.strange = event.strange or lasts(history, event)
         say(f"{event.label or 'unknown'} in runs {event.span.first} to {event.span.end - 1}")
+
+
+def stands(history: History, event: Event) -> bool:
+    """Whether an event is evident enough, and more than the wrong form of another."""
+    return event.evidence >= evidence_needed(history, event) and earns_place(history, event)
 
 
 def acts_at(place: tuple[str, str], there: tuple[str, str]) -> bool:
@@ -55,9 +63,14 @@ def next_event(history: History) -> Event | None:
     """The change that is most evident beside those found: a label's course, or disorder where that explains more."""
     joint = history.joint()
     every = joint.changes(history.listed())
-    changes = [one for one in every if not already(history, one) and earns_place(history, one)]
-    best = max(changes, key=lambda one: one.evidence, default=None)
-    event = refined(history, joint, best, changes) if best is not None and best.evidence >= EVIDENCE_NEEDED else None
+
+    def possible(one: Change) -> bool:
+        return not already(history, one) and earns_place(history, one)
+
+    evident = sorted((one for one in every if one.evidence >= EVIDENCE_NEEDED), key=lambda one: -one.evidence)
+    best = next((one for one in evident if possible(one)), None)
+    changes = [] if best is None else [one for one in every if one.span == best.span and possible(one)]
+    event = None if best is None else refined(history, joint, best, changes)
     rough = water_event(history)
     if rough is None or rough.evidence < EVIDENCE_NEEDED:
         return event

@@ -13,6 +13,7 @@ from tools.watch.disorder import WATER
 from tools.watch.events import GROWING, STEP, Span
 from tools.watch.flights import roughness_sigma
 from tools.watch.history import Event, History, within
+from tools.watch.lasting import NO_WATER, STRANGE
 from tools.watch.scatter import FEW
 from tools.watch.search import EVIDENCE_NEEDED
 from tools.watch.unknown import NOTHING, Left, what_is_left
@@ -48,16 +49,25 @@ class Settled:
 def settle(history: History) -> list[Settled]:
     """The events that matter; those that no label explains, as unknown."""
     found: list[Settled] = []
-    number = 0
+    number, kind = 0, history.flights.parts[0].kind
     for event in history.events:
         own, number = (number, number + 1) if event.has_course else (-1, number)
         if any(one.unknown and beside(one.event.span, event.span) for one in found):
             continue  # what mimics an unknown change is none of its own
         if event.has_course and not matters(history, event, own):
             continue
+        if event.label == "" and event.strange is not None and (
+            event.strange.moves(kind.measures) < needed_of(history, event)
+        ):  # fmt: skip
+            continue
         left = what_is_left(history, event) if event.has_course else NOTHING
         sure = 1.0 / (1.0 + np.exp(-np.clip(event.evidence - EVIDENCE_NEEDED, -50.0, 50.0)))
         outside = 1.0 - ERROR_RATE if event.label == "" else left.probability
+        strange = event.strange
+        if strange is not None and event.label and strange.moves(kind.measures) >= needed_of(history, event):
+            chance = min(strange.chance(STRANGE if event.has_course else NO_WATER), 1.0 - ERROR_RATE)
+            if chance > outside:
+                left, outside = Left(0.0, [(strange.place, chance, 1.0)]), chance
         found.append(Settled(event, left, min(float(sure), most_sure(history)), outside, own))
     found = one_form(found)
     return one_unknown([*found, *nameless(history, found)])

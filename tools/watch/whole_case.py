@@ -17,6 +17,7 @@ from tools.data.errors import InputError
 from tools.data.plain import as_plain
 from tools.data.runs.case import Case
 from tools.data.runs.csvfile import write_bytes
+from tools.data.runs.run import Run
 from tools.diagnose.noise_probes import VERTICAL_WATER
 from tools.diagnose.probabilities import ERROR_RATE, TIE, softmax
 from tools.diagnose.record import ANSWER, NONE, UNKNOWN
@@ -25,8 +26,10 @@ from tools.diagnose.shrink import AFTER, BEFORE, FLOOR, RECALIBRATED, by_channel
 from tools.diagnose.unknown import MOSTLY
 from tools.gap.measure import RunGap, case_channels, root_mean_square, run_gap
 from tools.identify.ocean.files import corrected_text
-from tools.identify.ocean.identify import WORTH, parted_by
+from tools.identify.ocean.findings import Calibration, far_from_file, one_of_each_group
+from tools.identify.ocean.identify import WORTH, precision_of
 from tools.identify.ocean.levels import find_levels, some_runs
+from tools.identify.ocean.next_run import flown, to_find, to_part
 from tools.inference.fit import bounded_step
 from tools.inference.parameters import NINETY
 from tools.inference.predict import fly_windows_from
@@ -35,9 +38,10 @@ from tools.inference.shared_model import About, fit_shared, heat_of
 from tools.inference.shared_parameters import shared_parameters
 from tools.inference.steady import first_values
 from tools.watch.answer import CAUSE
+from tools.watch.lasting import NO_WATER, beside_all
 from tools.watch.watch import usable_runs
 from tools.watch.whole_left import Left, disturbed, water_disorder, what_is_left
-from tools.watch.whole_search import Model, Round, Sought, Whole, seek, whole_model
+from tools.watch.whole_search import ALIKE, Model, Round, Sought, Whole, seek, whole_model
 
 ABSENT = 1e-6  # spreads: of an effect that is not asked for
 MOST_RUNS = 40
@@ -65,6 +69,8 @@ class OceanDiagnosis:
     model: Model
     allowed: list[str]  # what the vehicle file leaves so open that no effect beside it can be seen
     left: Left | None  # what no label explains
+    flown: list[Run]
+    findings: list[Calibration]  # calibrations that the file allows, or nearly, and that are far from it
 
 
 def diagnose_ocean(case: Case, say: Callable[[str], None] = lambda text: None) -> OceanDiagnosis:
@@ -99,19 +105,30 @@ def diagnose_ocean(case: Case, say: Callable[[str], None] = lambda text: None) -
     left = what_is_left(parts, problem, model, gaps[AFTER], gaps[FLOOR])
     rough = rougher_water(problem, parts, start, model, heat, left, gaps)
     chances, group = chances_of(problem, main, bool(model.labels), left.probability)
+    groups = groups_beside(problem, main.before, heat) | {group[0]: group}
     selected = sorted(model.labels, key=lambda label: label != main.best)
     if rough is not None:
         gaps[FLOOR], left = rough
-        chances, group = with_water(chances, left.probability), [VERTICAL_WATER]
+        chances = with_water(chances, left.probability)
         selected = [VERTICAL_WATER, *selected]
     unknown = left.probability > 0.5
     verdict = UNKNOWN if unknown else CAUSE if selected else NONE
     selected = [] if unknown else selected
     return OceanDiagnosis(
-        case, [run.name for run in runs], verdict, selected, chances, {selected[0]: group} if selected else {},
+        case, [run.name for run in runs], verdict, selected, chances, groups,
         sizes(sought, problem.kind.form), places(problem, chances, left if unknown else None), gaps, *closings(gaps),
         main.evidence, skipped, model.shared.model(problem, model.x), open_numbers(problem), left if unknown else None,
+        runs, findings(problem, start, heat),
     )  # fmt: skip
+
+
+def findings(problem: Problem, start: Whole, heat: float) -> list[Calibration]:
+    """Calibrations that the file allows for, fitted without an effect, where they are far from the file."""
+    own = [k for k, one in enumerate(start.shared.free) if not one.label]
+    normal, slope = precision_of(start.about, start.shared, start.x, heat)
+    free = [start.shared.free[k] for k in own]
+    told = far_from_file(free, start.x[own], normal[np.ix_(own, own)], slope[own], problem.model.P, [problem.one_group])
+    return one_of_each_group(told)
 
 
 def rougher_water(
@@ -119,7 +136,8 @@ def rougher_water(
     gaps: dict[str, list[RunGap]],
 ) -> tuple[list[RunGap], Left] | None:
     """The floor in water that is as rough as the readings ask for, and what is left then: where that is nothing, and
-    where the water explains nearly all that can be explained (as turbulence does, tools/diagnose/unknown.py).
+    where the water explains nearly all that can be explained (as turbulence does, tools/diagnose/unknown.py), and
+    nothing that lasts is beside it.
     """
     if left.probability <= 0.5:
         return None
@@ -127,6 +145,9 @@ def rougher_water(
     explained = 0.5 * heat * (start.cost - model.cost)
     if found is None or found.gain < MOSTLY * (found.gain + explained):
         return None
+    beside = beside_all([disturbed(part, found) for part in parts], model.shared, model.x, heat)
+    if beside.chance(NO_WATER) > 0.5 and beside.moves(problem.kind.measures) >= problem.kind.matters:
+        return None  # water has no lasting direction
     rng = np.random.default_rng(SEED)
     models = [model.shared.model(part, x) for part, x in zip(parts, without_each(model, heat), strict=True)]
     floor = [floor_of(part, one, disturbed(part, found), rng) for part, one in zip(parts, models, strict=True)]
@@ -159,6 +180,25 @@ def chances_of(
     alike_group = problem.one_group if best in problem.one_group else ()
     tied = sorted((n for n in near if near[best] - near[n] <= TIE), key=lambda n: -near[n])
     return chances, [best, *(n for n in alike_group or tied if n != best)]
+
+
+def groups_beside(problem: Problem, model: Whole, heat: float) -> dict[str, list[str]]:
+    """By label those that the dives do not tell from it, all that is allowed beside it free; itself first."""
+    shared = model.shared
+    A = np.array(sum(one.curvature for one in model.about)) / heat
+    own = [k for k, one in enumerate(shared.free) if not one.label]
+    allowed = A[np.ix_(own, own)] + np.diag(shared.prior[own] ** -2.0)
+    left = A - A[:, own] @ np.linalg.solve(allowed, A[own, :])
+    found = {}
+    for label, columns in shared.labels.items():
+        group = [label]
+        for other, others in shared.labels.items():
+            sizes = np.sqrt(np.outer(np.diag(left)[columns], np.diag(left)[others]))
+            same = label in problem.one_group and other in problem.one_group
+            if other != label and (same or (np.abs(left[np.ix_(columns, others)]) > ALIKE * sizes).all()):
+                group.append(other)
+        found[label] = group
+    return found
 
 
 def places(problem: Problem, chances: dict[str, float], left: Left | None) -> list[dict[str, Any]]:
@@ -280,8 +320,12 @@ def plain(found: OceanDiagnosis) -> dict[str, Any]:
     table: dict[str, Any] = {name: by_channel(found.gaps[name]) for name in (BEFORE, RECALIBRATED, AFTER, FLOOR)}
     for name, value in (("shrinkage", found.shrinkage), ("closed", found.closed)):
         table[name] = {"value": value[0], "ci90": list(value[1:])}
-    group = found.groups.get(found.selected[0], []) if found.selected else []
-    told = parted_by(GROUP_NAMES.get(label, label) for label in group)
+    how = flown(found.flown)
+    if found.left is not None:
+        told = to_find(found.left.regime, how)
+    else:
+        told = to_part([*(found.groups.get(label, []) for label in found.selected),
+                        *(one.group for one in found.findings)], how)  # fmt: skip
     return {
         "format": 1,
         "kind": "ocean",
@@ -298,16 +342,13 @@ def plain(found: OceanDiagnosis) -> dict[str, Any]:
             *([{"stage": "".join(f"+ {one} " for one in found.selected).strip(), "gap": table[AFTER]}]
               if found.selected else []),
         ],
+        "findings": [one.plain() for one in found.findings],
         "cautions": cautions(found),
         "not_asked": NOT_ASKED,
         "skipped": found.skipped,
         "evidence": found.evidence,
         "left": None if found.left is None else found.left.plain(),
     }  # fmt: skip
-
-
-GROUP_NAMES = {"drag": "Cd0", "lift": "lift_slope", "attitude_scale": "pitch_scale", "net_buoyancy": "volume",
-               "ballast_scale": "oil_scale"}  # fmt: skip
 
 
 def cautions(found: OceanDiagnosis) -> list[str]:
@@ -318,6 +359,7 @@ def cautions(found: OceanDiagnosis) -> list[str]:
             f"the vehicle file leaves {', '.join(found.allowed)} open: what they can make up for is no effect here; "
             "identify the vehicle first (glider identify), and ask for what changed (glider gap watch)"
         )
+    told += [one.sentence for one in found.findings]
     if found.left is not None:
         told.append(found.left.sentence)
     if len(found.runs) == 1:

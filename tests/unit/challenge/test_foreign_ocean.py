@@ -7,8 +7,9 @@ from sim_backend.foreign import ocean as at
 from sim_backend.ocean.core import layout
 from sim_backend.ocean.core.glide import steady_speed
 from tools.data.runs import columns as names
-from tools.study.challenge.ocean_cases import fly_mission, shipped_vehicle, shown, with_change
-from tools.study.challenge.ocean_design import CRAFTS, Mission, draw_mission
+from tools.study.challenge import ocean_cases
+from tools.study.challenge.ocean_cases import flown, fly_mission, legs, shipped_vehicle, shown, with_change
+from tools.study.challenge.ocean_design import CRAFTS, THRUSTER, Mission, draw_mission
 
 
 def mission(craft: str = "slocum", dives: int = 2) -> Mission:
@@ -73,6 +74,47 @@ def test_each_change_is_what_its_label_says():
     assert with_change(V, "density_bias", 0.4)[at.DENSITY_BIAS] == pytest.approx(V[at.DENSITY_BIAS] + 0.4)
     with pytest.raises(ValueError, match="tether"):
         with_change(V, "tether", 1.0)
+
+
+def test_what_no_label_names_acts_where_it_says():
+    made = mission("seaglider")
+    V, S, D = made.V, made.calm(0), made.dives[0]
+    bare = flown(made, 0, V, S)
+    upper = D[at.DEPTH] * THRUSTER
+
+    def leg_times(rows, shallow, deep):
+        """Seconds between two depths on the way down and on the way up."""
+        found = []
+        for leg in legs(rows):
+            t = leg[(leg[:, at.R_DEPTH] > shallow) & (leg[:, at.R_DEPTH] < deep), at.R_TIME]
+            found.append(t[-1] - t[0])
+        return np.array(found)
+
+    def slower(label, size, shallow=0.0, deep=1.0):
+        ends = shallow * D[at.DEPTH], deep * D[at.DEPTH]
+        return leg_times(flown(made, 0, with_change(V, label, size), S), *ends) / leg_times(bare, *ends)
+
+    down, up = slower("x_thruster", 0.3, 0.05, 0.35)
+    assert down < 0.95
+    assert up < 0.95
+    assert upper == pytest.approx(V[at.THRUST_DEPTH], rel=0.1)
+    assert slower("x_thruster", 0.3, 0.5, 0.9) == pytest.approx([1.0, 1.0], abs=0.02)
+    near, far = slower("x_line", 1e-3, 0.05, 0.2), slower("x_line", 1e-3, 0.7, 0.9)
+    assert np.all(far > near + 0.05)
+    down, up = slower("x_mud", 0.1, 0.5, 0.9)
+    assert down == pytest.approx(1.0, abs=0.01)
+    assert up > 1.05
+    down, up = slower("x_fouled_wing", 0.1)
+    assert abs(down - up) > 0.05
+    flipped = slower("x_fouled_wing", -0.1)
+    assert (flipped[0] - flipped[1]) * (down - up) < 0.0
+
+
+def test_of_what_no_label_names_only_that_shows_which_the_nearest_leaves(monkeypatch):
+    made = mission("seaglider")
+    assert shown(made, "x_thruster", 0.3)[0] > 1.0
+    monkeypatch.setattr(ocean_cases, "OUTSIDE_CHANGES", ("drag",))
+    assert shown(made, "drag", 0.3)[1] < 1e-4 < ocean_cases.MATTERS
 
 
 def test_evidence_goes_with_the_square_of_the_change_and_against_that_of_the_water():

@@ -81,6 +81,8 @@ def plain(found: OceanIdentification) -> dict[str, Any]:
              "prior_sd": one.prior_sd} for one in [*found.parameters, found.net_mass]
         ],
         "ridges": [{"names": one.names, "weights": one.weights, "left": one.left} for one in found.ridges],
+        "groups": found.groups,
+        "findings": [one.plain() for one in found.findings],
         "next_run": found.next_run,
         "water": {"sd": d.water, "time": d.water_time, "rms": found.water_rms, "runs": found.water},
         "left_out": found.left_out,

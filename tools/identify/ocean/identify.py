@@ -5,7 +5,7 @@ Gauss and Newton's steps in everything at once along the observer's innovations,
 is that of a sandwich.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,15 @@ from tools.data.errors import InputError
 from tools.data.runs.case import Case
 from tools.data.runs.columns import ATTITUDE, DEPTH
 from tools.data.runs.run import Run
+from tools.identify.ocean.findings import (
+    Calibration,
+    far_from_file,
+    groups_of,
+    one_of_each_group,
+    unopened,
+)
 from tools.identify.ocean.levels import find_levels, some_runs
+from tools.identify.ocean.next_run import flown, to_part
 from tools.inference.expansion import Expansion, expand
 from tools.inference.ocean_inputs import drawn, lacking, steady_seconds
 from tools.inference.parameters import NINETY, FreeParameter, nuisance_parameters
@@ -34,15 +42,6 @@ SHORTEST = 300.0  # s of steady flight, for a run to be learned from
 ROUNDS = 2
 DENSITY = 1027.0  # kg/m3, at which the net mass is told
 RIDGE = 0.6  # of the prior's width that is left: such a direction the dives do not tell
-
-
-# numbers that go together on depth rate, and what parts them
-PARTED_BY = (
-    (("Cd0", "lift_slope", "pitch_scale"),
-     "two dives at 8 degrees more and two at 8 degrees less pitch; a speed log or ADCP parts them surely"),
-    (("volume", "oil_scale"), "two dives with half the buoyancy"),
-    (("compressibility", "thermal_expansion"), "two dives to another depth, or where the temperature is another"),
-)  # fmt: skip
 
 
 @dataclass
@@ -88,6 +87,8 @@ class OceanIdentification:
     ridges: list[Ridge]
     water: dict[str, float]  # rms of the vertical water by run, m/s
     left_out: list[str]
+    groups: list[list[str]]  # of labels that these dives do not part
+    findings: list[Calibration]  # far from the file
 
     @property
     def net_mass(self) -> Parameter:
@@ -99,18 +100,12 @@ class OceanIdentification:
     @property
     def next_run(self) -> dict[str, str] | None:
         """What to fly to part what these dives cannot, in a pilot's words; None where nothing is left."""
-        told = parted_by(name for ridge in self.ridges for name in ridge.names)
+        told = to_part(self.groups, flown(self.problem.runs))
         return {"text": told} if told else None
 
     @property
     def water_rms(self) -> float:
         return float(np.sqrt(np.mean(np.square(list(self.water.values())))))
-
-
-def parted_by(names: Iterable[str]) -> str:
-    """What to fly to tell numbers apart, in a pilot's words; nothing where nobody knows."""
-    together = set(names)
-    return "; ".join(text for listed, text in PARTED_BY if together & set(listed))
 
 
 def learnable(runs: list[Run]) -> tuple[list[Run], list[str]]:
@@ -150,11 +145,46 @@ def identify_ocean(case: Case, say: Callable[[str], None] = lambda text: None) -
     C, wide = covariance(found, shared, heat), allowance(found, shared, heat)
     P, F = shared.model(problem, x)
     places = [k for k, f in enumerate(free) if f.vector == "P" and f.entry in PLACES.values()]
+    left = ridges(free, C)
+    groups = groups_of([one.names for one in left], problem.one_group)
     return OceanIdentification(
         case, problem, P, [free[k].entry for k in places], parameters(free, places, P, C),
-        _in_units(C, free, places), _in_units(wide, free, places), ridges(free, C),
-        water_by_run(problem, P, F), left_out,
+        _in_units(C, free, places), _in_units(wide, free, places), left,
+        water_by_run(problem, P, F), left_out, groups,
+        findings(problem, shared, x, found, C, heat, groups),
     )  # fmt: skip
+
+
+def findings(
+    problem: Problem, shared: SharedParameters, x: np.ndarray, found: list[Expansion], C: np.ndarray, heat: float,
+    groups: list[list[str]],
+) -> list[Calibration]:  # fmt: skip
+    """Calibrations that are far from the file, also of those that it has no uncertainty of: each by itself."""
+    P, count = problem.model.P, len(x)
+    normal, slope = precision_of(found, shared, x, heat)
+    wider = np.maximum(np.diag(C) / np.diag(np.linalg.inv(normal)), 1.0)
+    told = far_from_file(shared.free, x, normal, slope, P, groups, wider)
+    more = unopened(problem.model.sigma)
+    if more:
+        whole = SharedParameters([*shared.free, *more], {}, {}, 1.0, effects=1.0)
+        x = np.concatenate([x, np.zeros(len(more))])
+        about = [expand(problem.part(n), whole, x) for n in range(len(problem.runs))]
+        normal, slope = precision_of(about, whole, x, heat)
+        for k in range(count, count + len(more)):
+            own = [*range(count), k]
+            free = [whole.free[n] for n in own]
+            each = far_from_file(free, x[own], normal[np.ix_(own, own)], slope[own], P, groups, wider.max())
+            told += [one for one in each if not one.name]
+    return one_of_each_group(told)
+
+
+def precision_of(
+    found: list[Expansion], shared: SharedParameters, x: np.ndarray, heat: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Curvature (count, count) and slope (count,) at x of the misfit over the heat, with the prior's."""
+    weight = shared.prior**-2.0
+    normal = sum(one.curvature for one in found) / heat + np.diag(weight)
+    return np.asarray(normal), np.asarray(sum(one.slope for one in found) / heat + weight * x)
 
 
 def heat_for(runs: int) -> float:

@@ -13,15 +13,25 @@ from tools.data.runs.case import write_case
 from tools.data.runs.run import Run
 from tools.study.challenge.cases import NoCase
 from tools.study.challenge.ocean_design import CRAFTS, SPEED_NOISE, Mission, draw_mission
-from tools.study.challenge.ocean_plan import MissionPlan
-from tools.study.challenge.watch_plan import CHANGED, GROWING, UNCHANGED, WatchCounts
+from tools.study.challenge.ocean_plan import OUTSIDE_CHANGES, MissionPlan
+from tools.study.challenge.watch_plan import CHANGED, GROWING, OUTSIDE, UNCHANGED, WatchCounts
 
 # Sizes of a change at its full strength, drawn uniformly, in the unit of the catalogue's parameter.
 SIZES = {
     "drag": (0.1, 0.6), "attitude_scale": (0.05, 0.15), "net_buoyancy": (0.03, 0.15), "density_bias": (0.3, 1.5),
     "lift": (0.2, 0.5),
+    # outside the catalogue, in the unit of what they set in the glider: N, N a metre, of AREA, kg
+    "x_thruster": (0.2, 0.8), "x_line": (2e-4, 2e-3), "x_fouled_wing": (0.05, 0.2), "x_mud": (0.05, 0.2),
 }  # fmt: skip
-EITHER_WAY = ("attitude_scale", "net_buoyancy", "density_bias")
+EITHER_WAY = ("attitude_scale", "net_buoyancy", "density_bias", "x_fouled_wing")
+WING_DRAG = 0.1  # of the camber's size: drag of grown-over wings that goes with the speed
+# What moves each label that an answer may give by a small size, to ask what it leaves of a change that no label names.
+LABEL_STEPS = {
+    "drag": (at.DRAG, 0.01), "climb_dive_asymmetry": (at.CLIMB_DRAG, 0.01), "lift": (at.LIFT, 0.05),
+    "net_buoyancy": (at.MASS, 0.005), "ballast_scale": (at.OIL_SCALE, 0.01), "compressibility": (at.COMPRESSION, 1e-11),
+    "thermal_expansion": (at.EXPANSION, 2e-6), "imu_pitch_bias": (at.PITCH_OFFSET, 0.003),
+    "attitude_scale": (at.PITCH_SCALE, 0.01),
+}  # fmt: skip
 # What no observer could place is no case: a first run two dives off is preferred to the true one in some 2 of 100
 # missions where a dive has 4 nat (a normal deviate beyond 2), in 8 where it has 2. All together: as in evidence.py.
 DIVE_NAT, ALL_NAT = 4.0, 20.0
@@ -32,6 +42,9 @@ SIZE_TRIES, TRIES = 12, 500
 SLOWEST, STEADY = 0.04, 0.45  # m/s, share of the depth about its middle: a dive that sinks slower there is none
 STALLED = 0.12  # rad, angle of attack: with too little lift for its pitch a glider has no glide at all, and falls
 FLATTER = 0.015  # rad: the pitch wanders
+LEAST_STRANGE = 0.1  # of the squares that a change moves: with less left it acts as a label does
+NEAREST, NEWTON, SHARES = 3, 4, (1.0, 0.4, 0.1)  # labels that are fitted, with so many steps, whole or in part
+DEPTHS = 200  # at which the ways of two dives are compared
 TRUTH_EVERY = 60.0  # s, at which true speeds are kept
 PITCH_NOISE, ROLL_NOISE, YAW_NOISE, DENSITY_NOISE, TEMPERATURE_NOISE, OIL_NOISE = 0.001, 0.003, 0.01, 0.004, 0.002, 1e-7
 LOST = 0.003  # of the samples of the water
@@ -57,6 +70,9 @@ def shipped_vehicle(name: str) -> OceanVehicle:
     return decode_ocean_vehicle(shipped_vehicles()[name], name)
 
 
+OUTSIDE_PLACES = {"x_thruster": at.THRUST, "x_line": at.PULL, "x_mud": at.MUD}
+
+
 def with_change(V: np.ndarray, label: str, size: float) -> np.ndarray:
     """The vehicle (N_V,) changed by a label at a size in the catalogue's unit."""
     V = V.copy()
@@ -70,6 +86,11 @@ def with_change(V: np.ndarray, label: str, size: float) -> np.ndarray:
         V[at.VOLUME] *= 1.0 - size / V[at.MASS]
     elif label == "density_bias":
         V[at.DENSITY_BIAS] += size
+    elif label == "x_fouled_wing":
+        V[at.CAMBER] += size
+        V[at.WING_DRAG] += WING_DRAG * abs(size)
+    elif label in OUTSIDE_PLACES:
+        V[OUTSIDE_PLACES[label]] += size
     else:
         raise ValueError(f"no change of an ocean glider: {label!r}")
     return V
@@ -107,31 +128,75 @@ def flies(mission: Mission) -> bool:
     return True
 
 
+@dataclass
+class Course:
+    """The depth rate of a calm dive at depths alike in every dive of a mission, (2 DEPTHS,) of both ways."""
+
+    rate: np.ndarray  # m/s
+    density: np.ndarray  # kg/m3, as it is read
+    step: float  # m
+
+
+def course_of(mission: Mission, V: np.ndarray) -> Course:
+    """The first dive's, flown by a vehicle in a sea without motion."""
+    depths = np.linspace(0.15, 0.9, DEPTHS) * mission.dives[0][at.DEPTH]
+    rates, densities = [], []
+    for leg in legs(flown(mission, 0, V, mission.calm(0))):
+        z, rate = leg[:, at.R_DEPTH], np.abs(np.gradient(leg[:, at.R_DEPTH], leg[:, at.R_TIME]))
+        order = np.argsort(z)
+        rates.append(np.maximum(np.interp(depths, z[order], rate[order]), 1e-3))
+        densities.append(np.interp(depths, z[order], leg[order, at.R_DENSITY]))
+    return Course(np.concatenate(rates), np.concatenate(densities), float(depths[1] - depths[0]))
+
+
 def shown(mission: Mission, label: str, size: float) -> tuple[float, float]:
     """How a change shows in a dive: by evidence, nat, and by how it moves the depth rate, rms, m/s.
 
     Evidence is that of the depth rate over the water's density at 0 Hz: a mean over T of water that has size s and
     forgets itself in tau varies by 2 s2 tau / T. What makes the readings of the water wrong shows as the weight that it
-    pretends.
+    pretends. Of a change that no label names only that shows which the nearest label leaves, whatever its size, and
+    nothing where that is less than nature's form and a label's differ by anyhow.
     """
-    if label == "density_bias":
-        V = mission.V.copy()
-        V[at.MASS] += size * V[at.VOLUME]
-    else:
-        V = with_change(mission.V, label, size)
-    S = mission.calm(0)
-    total = seconds = 0.0
-    for bare, other in zip(legs(flown(mission, 0, mission.V, S)), legs(flown(mission, 0, V, S)), strict=True):
-        depths = np.linspace(0.15, 0.9, 200) * mission.dives[0][at.DEPTH]
-        rates = []
-        for leg in (bare, other):
-            z, rate = leg[:, at.R_DEPTH], np.abs(np.gradient(leg[:, at.R_DEPTH], leg[:, at.R_TIME]))
-            order = np.argsort(z)
-            rates.append(np.maximum(np.interp(depths, z[order], rate[order]), 1e-3))
-        total += float(np.sum((rates[1] - rates[0]) ** 2 / rates[0]) * (depths[1] - depths[0]))
-        seconds += float(np.sum(1.0 / rates[0]) * (depths[1] - depths[0]))
+    bare, heavier = course_of(mission, mission.V), mission.V.copy()
+    heavier[at.MASS] += 0.01
+    by_mass = (course_of(mission, heavier).rate - bare.rate) / 0.01
+    other = course_of(mission, with_change(mission.V, label, size))
+    moved = other.rate - bare.rate + (other.density - bare.density) * mission.V[at.VOLUME] * by_mass
+    seconds = bare.step / bare.rate
+    whole = total = float(moved**2 @ seconds)
+    if label in OUTSIDE_CHANGES:
+        total = float(left_by_labels(mission, bare, moved, seconds) ** 2 @ seconds)
+    if total < LEAST_STRANGE * whole:
+        return 0.0, 0.0
     water, time = mission.seas[0][at.WATER], mission.seas[0][at.WATER_TIME]
-    return 0.5 * total / (2.0 * water**2 * time), float(np.sqrt(total / seconds))
+    return 0.5 * total / (2.0 * water**2 * time), float(np.sqrt(total / float(seconds.sum())))
+
+
+def left_by_labels(mission: Mission, bare: Course, moved: np.ndarray, seconds: np.ndarray) -> np.ndarray:
+    """What is left of moved depth rates (2 DEPTHS,) by the label that comes nearest to them, at its best size."""
+
+    def course(label: str, size: float) -> np.ndarray:
+        V = mission.V.copy()
+        V[LABEL_STEPS[label][0]] += size
+        return course_of(mission, V).rate - bare.rate
+
+    def left_by(label: str, steps: int) -> np.ndarray:
+        step, size, left = LABEL_STEPS[label][1], 0.0, moved
+        for _ in range(steps):  # Gauss and Newton's, the largest share of a step that leaves less
+            column = (course(label, size + step) - (moved - left)) / step
+            better = float(column * seconds @ left) / max(float(column**2 @ seconds), 1e-18)
+            for share in SHARES:
+                tried = moved - course(label, size + share * better)
+                if float(tried**2 @ seconds) < float(left**2 @ seconds):
+                    size, left = size + share * better, tried
+                    break
+        return left
+
+    def squares(label: str) -> float:
+        return float(left_by(label, 1) ** 2 @ seconds)
+
+    nearest = sorted(LABEL_STEPS, key=squares)[:NEAREST]
+    return min((left_by(label, NEWTON) for label in nearest), key=lambda one: float(one**2 @ seconds))
 
 
 def draw_size(rng: np.random.Generator, mission: Mission, plan: MissionPlan, judged: int) -> tuple[float, float] | None:
@@ -217,8 +282,10 @@ def draw_case(seed: int, plan: MissionPlan, counts: WatchCounts) -> MadeMission:
 def mission_answer(made: MadeMission, counts: WatchCounts) -> dict[str, Any]:
     """The truth: what changed, from which dive to which, how large; the true speeds of the watched dives, mm/s."""
     plan = made.plan
+    outside = plan.kind == OUTSIDE
     return {
-        "case": plan.name, "kind": plan.kind, "label": plan.label, "secret": None, "course": plan.course,
+        "case": plan.name, "kind": plan.kind, "label": None if outside else plan.label,
+        "secret": plan.label if outside else None, "course": plan.course,
         "from_run": plan.first, "to_run": plan.last, "strengths": plan.strengths(counts.judged).tolist(),
         "values": [] if plan.label is None else [made.size], "runs": counts.judged, "speed": plan.speed,
         "craft": plan.craft, "same_unit": True, "nat": made.nat, "water": float(made.mission.seas[0][at.WATER]),

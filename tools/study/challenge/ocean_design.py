@@ -8,6 +8,7 @@ from sim_backend.foreign import ocean as at
 from sim_backend.ocean.vehicle import OceanVehicle
 
 CC = 1e-6  # m3
+THRUSTER = 0.4  # of the depth of its dives, down to which a thruster helps, where there is one
 WATER, WATER_TIME = (0.005, 0.02), (120.0, 600.0)  # m/s, s: of vertical water, drawn log-uniformly
 DIVE_WATER = 0.15  # 1 sigma of its logarithm, from dive to dive
 PITCH_VARIES, OIL_VARIES, DEPTH_VARIES = 0.02, 0.03, 0.05  # 1 sigma, from dive to dive: rad, shares
@@ -83,7 +84,7 @@ def draw_mission(rng: np.random.Generator, craft: Craft, vehicle: OceanVehicle, 
     amplitude, zero = rng.uniform(*craft.amplitude), ZERO * rng.standard_normal()
     level = depth * rng.uniform(*NEUTRAL)
     S = seas[0]
-    V[at.VOLUME] = vehicle.buoyancy.volume
+    V[at.VOLUME], V[at.THRUST_DEPTH] = vehicle.buoyancy.volume, THRUSTER * depth
     for _ in range(3):  # the strain goes with the volume: to rounding
         V[at.VOLUME] += at.net_weight(V, S, level, zero) / (V[at.GRAVITY] * at.potential_density(S, level))
     heading = rng.uniform(-np.pi, np.pi)

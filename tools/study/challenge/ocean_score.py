@@ -101,8 +101,7 @@ def score_missions(cases: Sequence[Watched], held: Sequence[bool]) -> WatchScore
         share("velocity", "dives' speed within its 90 % interval", 0.85, held),
         share("velocity_most", "the same, not too often", 0.95, held, True),
     ]
-    figures = [figure for figure in found.figures if figure.key != "outside_unknown"]
-    return WatchScore(found.cases, [*figures[:-1], *own, figures[-1]])
+    return WatchScore(found.cases, [*found.figures[:-1], *own, found.figures[-1]])
 
 
 def judge_missions(
