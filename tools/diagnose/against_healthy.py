@@ -440,12 +440,13 @@ def gap_of(part: Problem, P: np.ndarray, F: np.ndarray) -> RunGap:
 
 
 def sizes(compared: Comparison, one: Hypothesis) -> dict[str, dict[str, dict[str, Any]]]:
-    """Each label's parameters with 90 % intervals, SI."""
+    """Each label's parameters with 90 % intervals, SI; a label's form may make them off by the kind's share."""
     found: dict[str, dict[str, dict[str, Any]]] = {}
     for label in one.labels:
         found[label] = {}
         for k in compared.places[label]:
-            free, value, sd = compared.free[k], one.values[k], one.sigma[k]
+            free, value = compared.free[k], one.values[k]
+            sd = np.hypot(one.sigma[k], compared.problem.kind.form * value)
             ends = [float(np.clip(value + side * NINETY * sd, free.low, free.high)) * free.spread for side in (-1, 1)]
             found[label][free.name] = {"estimate": float(value * free.spread), "ci90": ends, "unit": free.unit}
     return found
