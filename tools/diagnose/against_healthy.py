@@ -2,8 +2,8 @@
 
 The vehicle file is one that was identified, and misses healthy runs by what its form cannot do. How far, channel by
 channel, is learned from healthy runs, each flown by a fit to the others; the case's windows are then weighed in units
-of that (docs/DIAGNOSIS.md, Against healthy runs). Every hypothesis is fitted without each of the case's runs and judged on
-that run, so that an effect has to shrink what it has not seen:
+of that (docs/DIAGNOSIS.md, Against healthy runs). Every hypothesis is fitted without each of the case's runs and judged
+on that run, so that an effect has to shrink what it has not seen:
 
 - no change: what the vehicle file allows;
 - a label's parameters beside that, one label or a few;
@@ -257,7 +257,7 @@ class Comparison:
         return Hypothesis(labels, whole, left, others, sd)
 
     def promised(self, begin: Hypothesis) -> list[tuple[float, str, np.ndarray]]:
-        """Labels beside a hypothesis by one linear step, the best first: mean square of runs left out, label, values."""
+        """Labels beside a hypothesis by one linear step, best first: mean square of runs left out, label, values."""
         at, found = self.windows.linearised(self.windows.clipped(begin.values)), []
         weight = self.weight(begin.mean_square)
         for label in self.places:

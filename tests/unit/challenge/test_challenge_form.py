@@ -93,7 +93,8 @@ def test_a_case_is_identified_then_diagnosed_against_its_healthy_runs():
     identify, diagnose = commands(case, part, ("--json",), FORM)
     reference, vehicle = Path("reference/case003"), part / "identified" / "identified.toml"
     assert identify == ["identify", reference, "--out", part / "identified"]
-    assert diagnose == ["gap", "diagnose", case, "--vehicle", vehicle, "--reference", reference, "--out", part, "--json"]
+    words = ["--vehicle", vehicle, "--reference", reference, "--out", part, "--json"]
+    assert diagnose == ["gap", "diagnose", case, *words]
 
 
 def said(tmp_path: Path, verdict: str, label: str, probability: float):
