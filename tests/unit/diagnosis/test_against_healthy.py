@@ -29,7 +29,7 @@ LABEL = "servo_offset"
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory):
-    """Healthy runs, later ones of the same vehicle unchanged and with a servo askew, and the nearest of equation (4)."""
+    """Healthy runs, later ones of the same vehicle unchanged and with a servo askew, and the nearest file."""
     folder = tmp_path_factory.mktemp("form")
     file = load_vehicle("roughie")
     found = draw_healthy(np.random.default_rng(20), file, HEALTHY + LATER)
