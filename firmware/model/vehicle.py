@@ -203,10 +203,13 @@ class IdentifiedTable(Table):
 class FormTable(Table):
     """[form]: what the vehicle's form leaves, whatever its numbers: gaps of healthy runs left out of identification.
 
-    In tolerances, by regime of flight (`all` beside them) and channel (`total` among them).
+    In tolerances, by regime of flight (`all` beside them) and channel (`total` among them). `scatter`: 1 sigma of the
+    logarithm of a run's mean square; `noise`: the total gap that noise and disturbance alone would leave.
     """
 
     runs: Annotated[int, msgspec.Meta(ge=1)]
+    scatter: NonNegative
+    noise: NonNegative
     gaps: dict[str, dict[str, NonNegative]]
 
 

@@ -133,42 +133,17 @@ def diagnose(
         return
     if reference is not None and without is not None:
         raise click.UsageError("--without is of a diagnosis without a --reference")
-    if reference is not None:
-        _diagnose_against(cases[0], reference, out, vehicle, as_json)
-        return
-    _diagnose_one(cases[0], out, without, vehicle, as_json)
+    _diagnose_one(cases[0], reference, out, without, vehicle, as_json)
 
 
-def _diagnose_against(case: Path, reference: Path, out: Path, vehicle: str | None, as_json: bool) -> None:
-    """The diagnosis of one case against healthy runs (docs/DIAGNOSIS.md, Against healthy runs)."""
+def _diagnose_one(
+    case: Path, reference: Path | None, out: Path, without: str | None, vehicle: str | None, as_json: bool
+) -> None:
+    """The diagnosis of one case, in `out`."""
     from sim_backend.ocean.vehicle import OceanVehicle
     from tools.data.errors import InputError, need
     from tools.data.runs.case import load_case
-    from tools.diagnose.against_healthy import diagnose_against_healthy, plain, write
-    from tools.report.page import REPORT
-    from tools.report.pooled import write_pooled_report
-
-    need("analysis")
-    loaded = load_case(case, vehicle)
-    if isinstance(loaded.vehicle, OceanVehicle):
-        raise InputError("an ocean glider's: `glider gap watch CASE --reference CASE0` asks what changed", source=case)
-    compile_diagnosis(loaded)
-    found = diagnose_against_healthy(loaded, load_case(reference, vehicle), lambda text: print(text, file=sys.stderr))
-    write(found, out)
-    said, answer = write_pooled_report(out), plain(found)
-    if as_json:
-        print_json(answer)
-    for caution in answer["cautions"]:
-        say(f"note: {caution}")
-    say(said)
-    say(f"answer: {out / 'diagnosis.json'}, report: {out / REPORT}")
-
-
-def _diagnose_one(case: Path, out: Path, without: str | None, vehicle: str | None, as_json: bool) -> None:
-    """The diagnosis of one case, in `out`."""
-    from sim_backend.ocean.vehicle import OceanVehicle
-    from tools.data.errors import need
-    from tools.data.runs.case import load_case
+    from tools.diagnose.against_healthy import form_stands_out
     from tools.diagnose.diagnosis import diagnose as run_diagnosis
     from tools.diagnose.diagnosis import plain, write
     from tools.inference.rules import Rules
@@ -178,9 +153,14 @@ def _diagnose_one(case: Path, out: Path, without: str | None, vehicle: str | Non
     need("analysis")
     loaded = load_case(case, vehicle)
     if isinstance(loaded.vehicle, OceanVehicle):
+        if reference is not None:
+            raise InputError("what changed of an ocean glider asks `glider gap watch --reference CASE0`", source=case)
         _diagnose_ocean(loaded, out, as_json)
         return
     compile_diagnosis(loaded)
+    if reference is not None or (without is None and form_stands_out(loaded)):
+        _diagnose_against(loaded, None if reference is None else load_case(reference, vehicle), out, as_json)
+        return
     done = 0
     with progress("diagnose", STEPS) as advance:
 
@@ -202,6 +182,23 @@ def _diagnose_one(case: Path, out: Path, without: str | None, vehicle: str | Non
         say(f"note: {caution}")
     say(sentence(record))
     say(f"answer: {out / 'diagnosis.json'}, report: {out / 'report.html'}")
+
+
+def _diagnose_against(case, reference, out: Path, as_json: bool) -> None:
+    """The same against healthy runs (docs/DIAGNOSIS.md, Against healthy runs)."""
+    from tools.diagnose.against_healthy import diagnose_against_healthy, plain, write
+    from tools.report.page import REPORT
+    from tools.report.pooled import write_pooled_report
+
+    found = diagnose_against_healthy(case, reference, lambda text: print(text, file=sys.stderr))
+    write(found, out)
+    said, answer = write_pooled_report(out), plain(found)
+    if as_json:
+        print_json(answer)
+    for caution in answer["cautions"]:
+        say(f"note: {caution}")
+    say(said)
+    say(f"answer: {out / 'diagnosis.json'}, report: {out / REPORT}")
 
 
 def _diagnose_ocean(case, out: Path, as_json: bool) -> None:

@@ -22,6 +22,8 @@ from scipy.special import logsumexp
 from scipy.stats import norm
 from scipy.stats import t as student
 
+from firmware.model.vehicle import FormTable
+from sim_backend.ocean.vehicle import OceanVehicle
 from tools.data.errors import InputError
 from tools.data.plain import as_plain
 from tools.data.runs import columns
@@ -50,6 +52,9 @@ SITE = 0.25  # 1 sigma of that logarithm from one place and way of flying to ano
 PRIOR_RUNS = 1.0  # runs that what is usual of that logarithm's scatter is worth
 USUAL_SCATTER = 0.5
 LEAST_SCALE = 0.05  # tolerances
+STANDS_OUT = 2.0  # times what noise leaves of healthy runs, in squares, that the form leaves of them: the form decides
+FEW = 4  # healthy runs
+TOTAL = "total"
 REFINED, FURTHER, MOST = 6, 4, 3  # labels fitted in full at first, beside others, and effects at most
 STEPS = 3
 STILL = 0.02  # sigma of the priors, by which a step moves nothing any more
@@ -139,19 +144,21 @@ class Linearised:
 class Healthy:
     """What healthy runs leave: by channel in tolerances, and the logarithm of a run's mean square in those units."""
 
-    runs: list[str]
+    runs: list[str]  # empty where the vehicle file alone says it
     scales: dict[str, float]
-    logs: np.ndarray  # (runs,)
+    count: int  # runs that it is known from
+    level: float  # mean of that logarithm
+    seen: float  # its scatter from run to run, 1 sigma
 
     @property
     def freedom(self) -> float:
         """Degrees of freedom of the logarithms' scatter."""
-        return len(self.logs) - 1 + PRIOR_RUNS
+        return self.count - 1 + PRIOR_RUNS
 
     @property
     def scatter(self) -> float:
-        """1 sigma of the logarithm from run to run."""
-        squares = float(np.square(self.logs - self.logs.mean()).sum()) + PRIOR_RUNS * USUAL_SCATTER**2
+        """1 sigma of the logarithm from run to run, with what is usual as so many runs more."""
+        squares = (self.count - 1) * self.seen**2 + PRIOR_RUNS * USUAL_SCATTER**2
         return float(np.sqrt(squares / self.freedom))
 
     @property
@@ -178,8 +185,23 @@ def learn(case: Case, runs: list[Run]) -> Healthy:
             channel.name: max(float(one) * scales.get(channel.name, 1.0), form.get(channel.name, 0.0), LEAST_SCALE)
             for channel, one in zip(windows.channels, measured, strict=True)
         }
-    share = np.array([np.sum(run_of == n) for n in range(len(runs)) for _, _, _, run_of, _ in at.samples[:1]])
-    return Healthy([run.name for run in runs], scales, np.log(np.maximum(left * share.sum() / share, 1e-6)))
+    run_of = at.samples[0][3]
+    share = np.array([np.mean(run_of == n) for n in range(len(runs))])
+    logs = np.log(np.maximum(left / share, 1e-6))
+    level, scatter = float(np.log(np.exp(logs).mean())), float(logs.std(ddof=1)) if len(logs) > 1 else USUAL_SCATTER
+    return Healthy([run.name for run in runs], scales, len(runs), level, scatter)
+
+
+def of_form(form: FormTable) -> Healthy:
+    """The same as identification wrote it into the vehicle file."""
+    scales = {name: max(gap, LEAST_SCALE) for name, gap in form.gaps[ALL].items() if name != TOTAL}
+    return Healthy([], scales, form.runs, 0.0, form.scatter)
+
+
+def form_stands_out(case: Case) -> bool:
+    """Whether a case's vehicle was identified, and its form leaves more of healthy runs than noise does, in squares."""
+    form = None if isinstance(case.vehicle, OceanVehicle) else case.roughie.form
+    return form is not None and form.gaps[ALL][TOTAL] ** 2 > STANDS_OUT * form.noise**2
 
 
 @dataclass
@@ -275,10 +297,10 @@ class Comparison:
     def leftover(self, one: Hypothesis) -> tuple[float, float]:
         """Log densities of what runs left out leave: where that is what healthy runs leave, and where it is more."""
         healthy = self.healthy
-        scale = np.sqrt(healthy.scatter**2 * (1.0 / len(healthy.logs) + 1.0 / len(one.left)) + SITE**2)
+        scale = np.sqrt(healthy.scatter**2 * (1.0 / healthy.count + 1.0 / len(one.left)) + SITE**2)
         if one.labels:
             scale = float(np.hypot(scale, np.log1p(FORM**2 * max(self.bare - one.mean_square, 0.0))))
-        at = np.log(max(one.mean_square, 1e-9)) - max(float(np.log(np.exp(healthy.logs).mean())), 0.0)
+        at = np.log(max(one.mean_square, 1e-9)) - max(healthy.level, 0.0)
         shifts = np.linspace(0.0, 4.0 * LEFT, 121)
         prior = 2.0 * norm.pdf(shifts, scale=LEFT) * (shifts[1] - shifts[0])
         nothing = float(student.logpdf(max(at, 0.0) / scale, healthy.freedom))
@@ -372,14 +394,20 @@ class AgainstHealthy:
 
 
 def diagnose_against_healthy(
-    case: Case, reference: Case, say: Callable[[str], None] = lambda text: None
+    case: Case, reference: Case | None, say: Callable[[str], None] = lambda text: None
 ) -> AgainstHealthy:
-    """What a case's runs do that healthy runs of the same vehicle do not; InputError without runs of either."""
-    for one in (case, reference):
-        if not one.runs:
-            raise InputError("no runs", source=one.folder)
-    healthy = learn(case, [as_the_case_sees(run, case) for run in reference.runs])
-    say(f"learned from {len(healthy.runs)} healthy runs")
+    """What a case's runs do that healthy runs of the same vehicle do not; InputError where nothing is known of those.
+
+    reference: the healthy runs; None: what [form] of the vehicle file says of them.
+    """
+    if reference is not None:
+        healthy = learn(case, [as_the_case_sees(run, case) for run in reference.runs])
+        say(f"learned from {len(healthy.runs)} healthy runs")
+    elif case.roughie.form is not None:
+        healthy = of_form(case.roughie.form)
+        say(f"{healthy.count} healthy runs, as the vehicle file has them")
+    else:
+        raise InputError("no healthy runs, and a vehicle without [form]", source=case.folder)
     problem = problem_of(case)
     nuisance, effects = nuisance_parameters(problem), effect_parameters(problem)
     free, places = list(nuisance), dict[str, np.ndarray]()
@@ -491,15 +519,22 @@ def plain(found: AgainstHealthy) -> dict[str, Any]:
         "cautions": cautions(found),
         "skipped": {},
         "evidence": found.evidence,
-        "reference": {"runs": found.healthy.runs, "left": found.healthy.scales, "times": found.left},
+        "reference": {
+            "runs": found.healthy.runs, "count": found.healthy.count, "left": found.healthy.scales, "times": found.left
+        },
     }
 
 
 def cautions(found: AgainstHealthy) -> list[str]:
     """What has to be said with the answer."""
     told = []
-    if len(found.healthy.runs) < 4:
-        told.append(f"{len(found.healthy.runs)} healthy runs: how much runs differ though nothing changed is assumed")
+    if found.healthy.count < FEW:
+        told.append(f"{found.healthy.count} healthy runs: how much runs differ though nothing changed is assumed")
+    if not found.healthy.runs:
+        told.append(
+            "what the vehicle's form leaves of healthy runs is taken from its file: --reference HEALTHY says it of "
+            "these readings"
+        )
     if len(found.case.runs) == 1:
         told.append("one run only: nothing is left out, the gaps are those of a run that was fitted")
     return told

@@ -28,6 +28,7 @@ MOST = 12  # runs that are predicted; of a longer case evenly chosen ones
 FEW = 3  # runs, up to which the likelihood's fit is made anew without each
 FOLDS = 4  # parts of the runs; the prediction error's fit is refined without each
 REFINED = 3  # steps of that
+LEAST_GAP = 1e-3  # tolerances
 SEED = 20261125
 FILE, LIKELIHOOD, PREDICTION = "file", "likelihood", "prediction error"
 EARLY = "the fit without the run, by one step from the fit with all"
@@ -87,7 +88,11 @@ class Held:
             regime: {name: float(f"{gap:.3g}") for name, gap in channels.items() if np.isfinite(gap)}
             for regime, channels in self.by_regime(self.chosen).items()
         }
-        return {"runs": len(self.runs), "gaps": gaps}
+        squares = np.log(np.maximum([gap.total for gap in self.after], LEAST_GAP) ** 2)
+        scatter = float(squares.std(ddof=1)) if len(squares) > 1 else 0.0
+        noise = 0.0 if self.floor is None else self.floor.total
+        found = {"scatter": float(f"{scatter:.3g}"), "noise": float(f"{noise:.3g}")}
+        return {"runs": len(self.runs), **found, "gaps": gaps}
 
     @property
     def worst(self) -> str:

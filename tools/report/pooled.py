@@ -10,6 +10,7 @@ import msgspec
 
 from sim_backend.core.effects.catalogue import catalogue as pool_catalogue
 from sim_backend.ocean.catalogue import catalogue as ocean_catalogue
+from sim_backend.ocean.vehicle import KIND
 from tools.diagnose.record import AGAINST_HEALTHY, ANSWER, Cause, Gap, number, read_as
 from tools.report import words
 from tools.report.page import REPORT, render
@@ -40,11 +41,10 @@ class _Case(msgspec.Struct):
 
 
 class _Reference(msgspec.Struct):
-    runs: list[str]
+    count: int
 
 
 class _Answer(msgspec.Struct):
-    kind: str
     case: _Case
     verdict: str
     causes: list[Cause]
@@ -56,6 +56,7 @@ class _Answer(msgspec.Struct):
     next_run: dict[str, Any]
     left: _Left | None = None
     reference: _Reference | None = None
+    kind: str = KIND
 
     @property
     def effects(self):
@@ -149,7 +150,7 @@ def report_html(found: _Answer) -> str:
         "runs": "run" if healthy is not None else "dive",
         "asked": "Probabilities of the one effect that all dives have beside what the vehicle file allows."
         if healthy is None
-        else f"Probabilities of the main change from {len(healthy.runs)} healthy runs.",
+        else f"Probabilities of the main change from {healthy.count} healthy runs.",
         "floor": "what noise and vertical water alone leave" if healthy is None
         else "what the identified vehicle leaves of healthy runs, each flown by a fit to the others",
         "case": found.case, "verdict": found.verdict, "sentence": sentence(found), "ranking": _ranking(found),

@@ -8,14 +8,23 @@ import numpy as np
 import pytest
 
 from firmware.core.vehicle import layout
-from firmware.model.vehicle import COEFFICIENTS, PLACES, Vehicle
+from firmware.model.vehicle import COEFFICIENTS, PLACES, FormTable, Vehicle
 from tools.cli.common import report_errors
 from tools.cli.main import cli
+from tools.data.errors import InputError
 from tools.data.runs.case import load_case
 from tools.data.sources import load_vehicle
 from tools.data.tomltext import toml_text
 from tools.diagnose import against_healthy as against
-from tools.diagnose.against_healthy import Comparison, Healthy, Hypothesis, diagnose_against_healthy, plain, weigh
+from tools.diagnose.against_healthy import (
+    Comparison,
+    Healthy,
+    Hypothesis,
+    diagnose_against_healthy,
+    form_stands_out,
+    plain,
+    weigh,
+)
 from tools.study.challenge.form_cases import draw_healthy, write_flights
 from tools.study.challenge.form_fit import fit_flights, fit_forces
 from tools.study.challenge.form_plan import BY_LABEL
@@ -104,7 +113,7 @@ def test_healthy_runs_are_seen_as_the_case_is(place):
 def compared(logs: list[float], places: int = 40) -> Comparison:
     """A comparison that nothing is flown for."""
     found = object.__new__(Comparison)
-    found.healthy = Healthy(["run"] * len(logs), {}, np.array(logs))
+    found.healthy = Healthy([], {}, len(logs), 0.0, float(np.std(logs, ddof=1)))
     found.places = {f"label{n}": np.array([n]) for n in range(places)}
     found.bare = 1.0
     return found
@@ -131,6 +140,26 @@ def test_a_label_that_does_not_shrink_what_was_left_out_is_none(monkeypatch):
 def command(monkeypatch, *arguments: object) -> int:
     monkeypatch.setattr("sys.argv", ["glider", "gap", "diagnose", *map(str, arguments)])
     return report_errors(cli)
+
+
+def test_a_vehicle_file_that_says_what_its_form_leaves_needs_no_healthy_runs(place):
+    vehicle = str(place / "nearest.toml")
+    unknown = load_case(place / "askew", vehicle)
+    assert not form_stands_out(unknown)
+    with pytest.raises(InputError, match="form"):
+        diagnose_against_healthy(unknown, None)
+    learned = diagnosed(place, "unchanged").healthy
+    total = float(np.sqrt(np.mean(np.square(list(learned.scales.values())))))
+    form = FormTable(HEALTHY, learned.seen, 0.2, {"all": learned.scales | {"total": total}})
+    told = {name: load_case(place / name, vehicle) for name in ("askew", "unchanged")}
+    told = {
+        name: replace(case, vehicle=msgspec.structs.replace(case.roughie, form=form)) for name, case in told.items()
+    }
+    assert form_stands_out(told["askew"])
+    assert diagnose_against_healthy(told["unchanged"], None).verdict == "none"
+    found = diagnose_against_healthy(told["askew"], None)
+    assert (found.verdict, found.selected[0]) == ("cause", LABEL)
+    assert any("--reference" in line for line in plain(found)["cautions"])
 
 
 def test_the_command_leaves_answer_model_and_report(place, tmp_path, monkeypatch, askew):

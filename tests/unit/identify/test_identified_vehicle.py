@@ -33,11 +33,12 @@ def test_written_vehicle_reads_back_as_it_was():
 
 def test_what_the_form_leaves_is_read_back():
     gaps = {"all": {"total": 0.9, "roll": 1.6}, "turning": {"total": 1.2, "roll": 2.1}}
-    form = decode_vehicle(identified() + toml_text({"form": {"runs": 12, "gaps": gaps}}), "v.toml").form
-    assert form.runs == 12
+    table = {"runs": 12, "scatter": 0.5, "noise": 0.2, "gaps": gaps}
+    form = decode_vehicle(identified() + toml_text({"form": table}), "v.toml").form
+    assert (form.runs, form.scatter, form.noise) == (12, 0.5, 0.2)
     assert form.gaps == gaps
     with pytest.raises(ConfigError, match=r"form\.gaps"):
-        decode_vehicle(identified() + toml_text({"form": {"runs": 12, "gaps": {"all": {"roll": -1.0}}}}), "v.toml")
+        decode_vehicle(identified() + toml_text({"form": table | {"gaps": {"all": {"roll": -1.0}}}}), "v.toml")
 
 
 def test_trim_reaches_the_parameters():
