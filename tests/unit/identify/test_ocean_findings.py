@@ -1,4 +1,4 @@
-"""A vehicle file that is wrong about a calibration: it is found with its size; and labels that nothing parts are told."""
+"""A calibration that the vehicle file has wrong is found with its size; labels that nothing parts are told."""
 
 from dataclasses import replace
 
