@@ -200,6 +200,16 @@ class IdentifiedTable(Table):
         return np.array([PLACES[name] for name in self.parameters], dtype=np.int64)
 
 
+class FormTable(Table):
+    """[form]: what the vehicle's form leaves, whatever its numbers: gaps of healthy runs left out of identification.
+
+    In tolerances, by regime of flight (`all` beside them) and channel (`total` among them).
+    """
+
+    runs: Annotated[int, msgspec.Meta(ge=1)]
+    gaps: dict[str, dict[str, NonNegative]]
+
+
 class Vehicle(Table):
     """A vehicle file (docs/MODEL.md, Vehicle file)."""
 
@@ -219,6 +229,7 @@ class Vehicle(Table):
     effects: dict[str, dict[str, Coefficient]] = msgspec.field(default_factory=dict)
     assumed: dict[str, Assumed] = msgspec.field(default_factory=dict)
     identified: IdentifiedTable | None = None
+    form: FormTable | None = None
     limits: Limits | None = None
     supervisor: SupervisorTable = SupervisorTable()
 

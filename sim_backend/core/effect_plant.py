@@ -8,14 +8,16 @@ nominal vehicle flies the plain plant.
 
 from firmware.core.jit import kernel
 from firmware.core.maths.steps import NODE, RK4, end_stage
+from firmware.core.maths.wide import anywhere, where
 from firmware.core.vehicle.flight import add_accelerations, body_derivative
 from firmware.core.vehicle.layout import N_P, N_X, X_BALLAST, X_DOWN, X_EAST, X_NORTH, X_SERVO, X_SLIDER
 from firmware.core.vehicle.state import normalise_attitude, rotation, velocities
+from firmware.core.vehicle.time_constants import damping_rate, lag_rate, parts_of
 from sim_backend.core import layout as wl
 from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.actuation import effective_actuators, geared, motor_speeds, update_gears
 from sim_backend.core.effects.correction import correction, link_of
-from sim_backend.core.effects.hydrodynamics import current, effective_coefficients, extra_wrench
+from sim_backend.core.effects.hydrodynamics import current, effective_coefficients, extra_rate, extra_wrench
 from sim_backend.core.effects.mass import effective_masses, net_mass_of_depth, slider_mass, tank_mass
 from sim_backend.core.effects.sensing import before_lags, update_lags
 from sim_backend.core.effects.timing import delayed_commands
@@ -89,19 +91,30 @@ def update_effect_states(F, x, before, dt):
 
 
 @kernel
-def effect_step(method, P, F, x, mode, c_servo, c_slider, c_ballast, since, acc, force, water, dt, work):
-    """One step of (P effective, F) by a method of firmware/core/maths/steps, in place.
+def effect_parts(method, P, F, x, mode, dt):
+    """Return the number of parts that a step of dt (s) of (P effective, F) from x on needs (time_constants)."""
+    return parts_of(method, dt * max(damping_rate(P, x) + extra_rate(P, F, x), lag_rate(P, mode)))
 
-    x (N_XF); work (4, N_XF) of scratch, or more; the others as in effect_derivative.
+
+@kernel
+def effect_step(method, P, F, x, mode, c_servo, c_slider, c_ballast, since, acc, force, water, dt, parts, work):
+    """One step of (P effective, F) by a method of firmware/core/maths/steps, in place, in `parts` equal parts.
+
+    x (N_XF); work (4, N_XF) of scratch, or more; the others as in effect_derivative. What the effects remember moves
+    once a step.
     """
     k, total, y, before = work[0], work[1], work[2], work[3]
     before_lags(F, x, before)
-    for i in range(ef.N_XF):
-        y[i] = x[i]
-    for stage in range(len(method)):
-        now = since + method[stage][NODE] * dt
-        effect_derivative(P, F, y, mode, c_servo, c_slider, c_ballast, now, acc, force, water, k)
-        end_stage(method, stage, dt, x, k, total, y, N_X)
+    h, part = dt / parts, 0
+    while anywhere(part < parts):
+        ahead = where(part < parts, h, 0.0)  # a lane that is there stays where it is
+        for i in range(ef.N_XF):
+            y[i] = x[i]
+        for stage in range(len(method)):
+            now = since + part * h + method[stage][NODE] * ahead
+            effect_derivative(P, F, y, mode, c_servo, c_slider, c_ballast, now, acc, force, water, k)
+            end_stage(method, stage, ahead, x, k, total, y, N_X)
+        part += 1
     normalise_attitude(x)
     update_effect_states(F, x, before, dt)
 
@@ -125,7 +138,8 @@ def effect_sea_step(P, F, E, waves, x, wanted, t, dt, acc, work):
     water = work[wl.W_WATER, 0:3]
     water[0], water[1], water[2] = water_velocity(E, waves, x[X_NORTH], x[X_EAST], x[X_DOWN], t + 0.5 * dt)
     force = boundary_force(P, E, x, water[2])
-    effect_step(RK4, P, F, x, 0, wanted[0], wanted[1], wanted[2], t, acc, force, water, dt, work)
+    parts = effect_parts(RK4, P, F, x, 0, dt)
+    effect_step(RK4, P, F, x, 0, wanted[0], wanted[1], wanted[2], t, acc, force, water, dt, parts, work)
 
 
 @kernel

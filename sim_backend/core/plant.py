@@ -3,10 +3,12 @@
 from firmware.core.jit import kernel
 from firmware.core.layouts.estimator_layout import DISTURBANCE_HOLD
 from firmware.core.maths.steps import NODE, RK4, end_stage
+from firmware.core.maths.wide import anywhere, where
 from firmware.core.vehicle.actuators import actuator_rates
 from firmware.core.vehicle.flight import add_accelerations, state_derivative
 from firmware.core.vehicle.layout import N_X, X_DOWN, X_EAST, X_NORTH
 from firmware.core.vehicle.state import actuators, normalise_attitude
+from firmware.core.vehicle.time_constants import nominal_parts
 from sim_backend.core import layout as wl
 from sim_backend.core.environment import boundary_force, water_velocity
 from sim_backend.core.noise import gaussian
@@ -25,13 +27,21 @@ def derivative(P, E, waves, x, cmd, t, acc, out):
 
 @kernel
 def plant_step(P, E, waves, x, cmd, t, dt, acc, work):
-    """One Runge-Kutta step of the plant, in place; work is (3, N_X) of scratch, or more."""
+    """One Runge-Kutta step of the plant, in place, in as many parts as its time constants ask for (time_constants).
+
+    work is (3, N_X) of scratch, or more.
+    """
     k, total, y = work[0], work[1], work[2]
-    for i in range(N_X):
-        y[i] = x[i]
-    for stage in range(len(RK4)):
-        derivative(P, E, waves, y, cmd, t + RK4[stage][NODE] * dt, acc, k)
-        end_stage(RK4, stage, dt, x, k, total, y, N_X)
+    parts, part = nominal_parts(RK4, P, x, 0, dt), 0
+    h = dt / parts
+    while anywhere(part < parts):
+        ahead = where(part < parts, h, 0.0)  # a lane that is there stays where it is
+        for i in range(N_X):
+            y[i] = x[i]
+        for stage in range(len(RK4)):
+            derivative(P, E, waves, y, cmd, t + part * h + RK4[stage][NODE] * ahead, acc, k)
+            end_stage(RK4, stage, ahead, x, k, total, y, N_X)
+        part += 1
     normalise_attitude(x)
 
 

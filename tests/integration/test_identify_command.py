@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 
+import msgspec
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -10,7 +11,7 @@ from click.testing import CliRunner
 from firmware.model.vehicle import COEFFICIENTS, decode_vehicle
 from tools.cli.identify import identify
 from tools.data.runs import columns as names
-from tools.data.runs.case import write_case
+from tools.data.runs.case import load_case, write_case
 from tools.data.sources import load_vehicle
 from tools.identify.design import CAPTURE, make_runs
 from tools.inference.vehicle_parameters import coefficient_sizes
@@ -56,6 +57,18 @@ def test_runs_that_cannot_be_fitted_are_named(found):
 def test_flights_left_out_are_predicted_better(found):
     held = found[0]["held_out"]
     assert held["after"]["total"] < 0.5 * held["before"]["total"]
+    assert held["handed_out"] == "likelihood"  # the vehicle obeys equation (4)
+    assert held["candidates"]["likelihood"] == held["after"]
+    for regime in held["regimes"].values():
+        assert regime["after"]["total"] < regime["before"]["total"]
+
+
+def test_the_vehicle_file_says_what_its_form_leaves(found):
+    result, out, _ = found
+    form = decode_vehicle((out / "identified.toml").read_text(encoding="utf-8"), "identified.toml").form
+    assert form.runs == len(result["held_out"]["runs"])
+    assert form.gaps["all"]["total"] == pytest.approx(result["held_out"]["after"]["total"], rel=0.01)
+    assert {"dive", "turning", "straight", "moving"} <= set(form.gaps)
 
 
 def test_files_are_there_and_others_read_them(found):
@@ -88,3 +101,20 @@ def test_a_case_of_nothing_but_bad_runs_is_one_line(tmp_path):
     assert isinstance(ran.exception, InputError)
     assert "none of 2 runs can be used" in str(ran.exception)
     assert "run00.csv" in str(ran.exception)
+
+
+def test_where_no_fit_is_better_the_file_s_vehicle_is_handed_out(tmp_path, monkeypatch):
+    from tools.identify import held
+
+    runs, _ = make_runs(load_vehicle("roughie"), 6, [0, 12, 24, 37])
+    write_case(tmp_path / "case", runs, **ABOUT)
+    monkeypatch.setattr(held, "choose", lambda candidates: (candidates[0], "no fit is better"))
+    ran = CliRunner().invoke(identify, [str(tmp_path / "case"), "--out", str(tmp_path / "out"), "--json"])
+    assert ran.exit_code == 0, ran.output
+    result = json.loads(ran.stdout)
+    assert result["held_out"]["handed_out"] == "file"
+    assert result["held_out"]["after"] == result["held_out"]["before"]
+    assert any("no fit is better; worst in" in note for note in result["notes"])
+    vehicle = decode_vehicle((tmp_path / "out" / "identified.toml").read_text(encoding="utf-8"), "identified.toml")
+    assert vehicle.form.runs == 4
+    assert msgspec.structs.replace(vehicle, form=None) == load_case(tmp_path / "case").roughie

@@ -12,7 +12,7 @@ from firmware.core.maths.rotations import quaternion_from_euler
 from firmware.core.maths.steps import RK4
 from firmware.core.vehicle import layout
 from sim_backend.core import layout as wl
-from sim_backend.core.effect_plant import effect_step, effective_parameters
+from sim_backend.core.effect_plant import effect_parts, effect_step, effective_parameters
 from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.actuation import backlash
 from sim_backend.core.effects.catalogue import catalogue
@@ -56,7 +56,8 @@ def test_without_effects_a_step_is_the_plain_step(vehicle, x, command, acc):
     np.testing.assert_array_equal(P, vehicle)
     plain, other, work = extended(x), extended(x), np.zeros((wl.N_WORK, wl.WORK_WIDTH))
     plant_step(vehicle, STILL, NO_WAVES, plain, np.array(command), 0.0, 0.01, acc, work)
-    effect_step(RK4, P, F, other, 0, *command, 0.0, acc, 0.0, np.zeros(3), 0.01, work)
+    parts = effect_parts(RK4, P, F, other, 0, 0.01)
+    effect_step(RK4, P, F, other, 0, *command, 0.0, acc, 0.0, np.zeros(3), 0.01, parts, work)
     size = 1.0 + np.abs(plain[: layout.N_X])
     assert (np.abs(plain - other)[: layout.N_X] <= 1e-14 * size).all()
 
@@ -84,7 +85,8 @@ def after_a_second(effects, x, command) -> tuple[np.ndarray, np.ndarray]:
     speed = max(0.6, float(np.abs(state[7:13]).max()))
     state[7:13] *= 0.6 / speed
     for k in range(100):
-        effect_step(RK4, P, F, state, 0, *command, 0.01 * k, np.zeros(6), 0.0, np.zeros(3), 0.01, work)
+        parts = effect_parts(RK4, P, F, state, 0, 0.01)
+        effect_step(RK4, P, F, state, 0, *command, 0.01 * k, np.zeros(6), 0.0, np.zeros(3), 0.01, parts, work)
     return F, state
 
 

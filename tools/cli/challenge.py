@@ -116,8 +116,7 @@ def run(
 ) -> None:  # fmt: skip
     """Run `glider gap diagnose` on every case; those that have a diagnosis are kept.
 
-    What stands after `--` is handed on to `gap diagnose`; with --form the word REFERENCE in it is the folder of the
-    case's healthy runs. A case's time counts its whole process.
+    What stands after `--` is handed on to `gap diagnose`. A case's time counts its whole process.
     """
     from tools.study.challenge.diagnose_all import DIAGNOSIS, FORM, MISSION, WATCH, count_cases
     from tools.study.challenge.diagnose_all import run as run_all

@@ -106,13 +106,20 @@ def predict(run: Path, model: str, out: Path, vehicle: str | None) -> None:
     "--without", type=click.Choice(["nuisance", "splice", "whiteness", "evidence"]),
     help="Leave one idea of the diagnosis out, to see what it is worth (docs/DIAGNOSIS.md).",
 )  # fmt: skip
+@click.option(
+    "--reference", type=click.Path(path_type=Path, file_okay=False), metavar="CASE0",
+    help="Healthy runs of the same vehicle: what its model leaves there is no cause.",
+)  # fmt: skip
 @vehicle_option
 @json_option
 def diagnose(
     cases: tuple[Path, ...], jobs: int | None, dask: str | None, again: bool, out: Path, without: str | None,
-    vehicle: str | None, as_json: bool,
+    reference: Path | None, vehicle: str | None, as_json: bool,
 ) -> None:  # fmt: skip
     """Where the simulator is wrong about CASE, which effect causes it, and how far the gap shrinks with it.
+
+    With --reference the runs are held against healthy ones of the same vehicle, which no model flies exactly: give the
+    vehicle that `glider identify` made of them by --vehicle.
 
     Several cases, or one with --jobs, --dask or --again, have their answers in folders of DIR that are called as they
     are; those that are answered are kept.
@@ -121,10 +128,40 @@ def diagnose(
         from tools.study.many_cases import OneCommand
 
         options = [] if without is None else ["--without", without]
-        asked = OneCommand(("gap", "diagnose"), "diagnosis.json", options, vehicle)
+        asked = OneCommand(("gap", "diagnose"), "diagnosis.json", options, vehicle, reference)
         ask_all(cases, out, asked, jobs, dask, again, as_json)
         return
+    if reference is not None and without is not None:
+        raise click.UsageError("--without is of a diagnosis without a --reference")
+    if reference is not None:
+        _diagnose_against(cases[0], reference, out, vehicle, as_json)
+        return
     _diagnose_one(cases[0], out, without, vehicle, as_json)
+
+
+def _diagnose_against(case: Path, reference: Path, out: Path, vehicle: str | None, as_json: bool) -> None:
+    """The diagnosis of one case against healthy runs (docs/DIAGNOSIS.md, Against healthy runs)."""
+    from sim_backend.ocean.vehicle import OceanVehicle
+    from tools.data.errors import InputError, need
+    from tools.data.runs.case import load_case
+    from tools.diagnose.against_healthy import diagnose_against_healthy, plain, write
+    from tools.report.page import REPORT
+    from tools.report.pooled import write_pooled_report
+
+    need("analysis")
+    loaded = load_case(case, vehicle)
+    if isinstance(loaded.vehicle, OceanVehicle):
+        raise InputError("an ocean glider's: `glider gap watch CASE --reference CASE0` asks what changed", source=case)
+    compile_diagnosis(loaded)
+    found = diagnose_against_healthy(loaded, load_case(reference, vehicle), lambda text: print(text, file=sys.stderr))
+    write(found, out)
+    said, answer = write_pooled_report(out), plain(found)
+    if as_json:
+        print_json(answer)
+    for caution in answer["cautions"]:
+        say(f"note: {caution}")
+    say(said)
+    say(f"answer: {out / 'diagnosis.json'}, report: {out / REPORT}")
 
 
 def _diagnose_one(case: Path, out: Path, without: str | None, vehicle: str | None, as_json: bool) -> None:
@@ -169,13 +206,13 @@ def _diagnose_one(case: Path, out: Path, without: str | None, vehicle: str | Non
 
 def _diagnose_ocean(case, out: Path, as_json: bool) -> None:
     """The same of an ocean glider (docs/OCEAN.md, Diagnosis)."""
-    from tools.report.ocean import write_ocean_report
     from tools.report.page import REPORT
+    from tools.report.pooled import write_pooled_report
     from tools.watch.whole_case import diagnose_ocean, plain, write
 
     found = diagnose_ocean(case, lambda text: print(text, file=sys.stderr))
     write(found, out)
-    write_ocean_report(out)
+    write_pooled_report(out)
     answer = plain(found)
     for caution in answer["cautions"]:
         say(f"note: {caution}")
@@ -222,10 +259,10 @@ def velocity(case: Path, model: str, out: Path, as_json: bool) -> None:
 def report(folder: Path) -> None:
     """Draw report.html again from what `glider gap diagnose` or `glider gap watch` left in DIR."""
     from tools.data.errors import need
-    from tools.diagnose.record import is_ocean
+    from tools.diagnose.record import is_pooled
     from tools.report.diagnosis import write_report
-    from tools.report.ocean import write_ocean_report
     from tools.report.page import REPORT
+    from tools.report.pooled import write_pooled_report
     from tools.report.watch import write_watch_report
     from tools.report.words import sentence
     from tools.watch.answer import FILE
@@ -234,7 +271,7 @@ def report(folder: Path) -> None:
     if (folder / FILE).is_file():
         said = write_watch_report(folder)
     else:
-        said = write_ocean_report(folder) if is_ocean(folder) else sentence(write_report(folder))
+        said = write_pooled_report(folder) if is_pooled(folder) else sentence(write_report(folder))
     say(said)
     say(f"report: {folder / REPORT}")
 

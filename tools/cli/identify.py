@@ -21,8 +21,9 @@ from tools.cli.common import json_option, print_json, say, vehicle_option
 def identify(case: Path, out: Path | None, seed: int, likelihood: str, vehicle: str | None, as_json: bool) -> None:
     """Identify the vehicle of CASE from its runs: the twelve coefficients and their distribution, by MCMC.
 
-    Runs that cannot be fitted are named and left out. With --out: identified.toml (a vehicle file that says where it
-    comes from), report.html, posterior.nc (ArviZ).
+    Runs that cannot be fitted are named and left out. What is handed out flies runs that its fit has not seen no worse
+    than the file does. With --out: identified.toml (a vehicle file that says where it comes from), report.html,
+    posterior.nc (ArviZ).
     """
     from sim_backend.ocean.vehicle import OceanVehicle
     from tools.data.errors import need
@@ -36,9 +37,7 @@ def identify(case: Path, out: Path | None, seed: int, likelihood: str, vehicle: 
     need("identify")
     from tools.identify.pipeline import identify as run_identification
 
-    found = run_identification(
-        loaded, seed, likelihood, lambda text: print(text, file=sys.stderr), leave_out=out is not None
-    )
+    found = run_identification(loaded, seed, likelihood, lambda text: print(text, file=sys.stderr))
     for one in found.left_out:
         say(f"left out: {one}")
     for note in found.notes:
@@ -88,6 +87,12 @@ def _tell(found) -> None:
     """The coefficients, and what the runs cannot tell, for a person."""
     from tools.identify.identifiability import sentences, unidentifiable_directions
 
+    if found.held is not None:
+        before, after = found.held.candidates[0].total, found.held.chosen.total
+        click.echo(
+            f"runs left out: {before:.2f} -> {after:.2f} tolerances, worst in {found.held.worst}; handed out: "
+            f"{found.held.chosen.name} ({found.held.why})"
+        )
     click.echo(f"{'':<6} {'mean':>10} {'sd':>9}   {'90 % interval':<22} {'R-hat':>6} {'ESS':>7}  unit")
     for one in found.coefficients:
         low, high = one.ci90

@@ -36,7 +36,7 @@ def links(search: Search, without: Hypothesis, best: Hypothesis) -> list[Link]:
     The two may be one: then the shares are of the link that brings most. No links where hardly anything is brought.
     """
     problem, model = search.problem, search.model(without)
-    bare, fitted = (problem.filter(*search.model(hypothesis)).misfit for hypothesis in (without, best))
+    bare, fitted = (problem.filter(*search.model(hypothesis), begin=True).misfit for hypothesis in (without, best))
     shown = np.argsort(-(bare if best is without else bare - fitted))[:RUNS]
     total: dict[NoiseProbe, float] = {}
     for n in shown.tolist():
@@ -109,5 +109,5 @@ def noise_of(answer: Answer) -> Noise | None:
     if noise.probe.name == CLOCK:
         return Noise(noise.probe.name, float(noise.scale))
     model = search.model(search.null)
-    nis = [float(np.nanmean(one.problem.filter(*model).E ** 2)) for one in (without_extra_noise(search), search)]
-    return Noise(noise.probe.name, float(noise.scale), *nis)
+    filtered = (one.problem.filter(*model, begin=True) for one in (without_extra_noise(search), search))
+    return Noise(noise.probe.name, float(noise.scale), *(float(np.nanmean(own.E**2)) for own in filtered))

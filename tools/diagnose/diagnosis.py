@@ -10,6 +10,7 @@ import numpy as np
 
 from sim_backend.core.effects.catalogue import catalogue
 from tools.data.runs.case import Case
+from tools.diagnose import by_readings
 from tools.diagnose.cautions import cautions, not_asked
 from tools.diagnose.chain import noise_of, panels
 from tools.diagnose.correction import Correction, correct
@@ -32,9 +33,16 @@ from tools.diagnose.shrink import (
     shrinkage_of,
 )
 from tools.diagnose.staged import Staged, staged
-from tools.diagnose.staged_answer import conclusion, findings_in, identified_text
+from tools.diagnose.staged_answer import (
+    by_gap_left,
+    certain_by_readings,
+    conclusion,
+    findings_in,
+    identified_text,
+    weighed,
+)
 from tools.diagnose.staircase import Stage, stages_of
-from tools.diagnose.unknown import LEFT_OVER, UNFIT
+from tools.diagnose.unknown import LEFT_OVER, unfit
 from tools.diagnose.verdict import EVIDENCE_NEEDED, Answer, conclude
 from tools.gap.mended import findings_of, put_right
 from tools.inference.corrected import corrected_text
@@ -102,26 +110,34 @@ def diagnose(case: Case, say: Callable[[str], None] = lambda text: None, rules: 
     search = run(problem_of(case, runs=runs, rules=rules), say)
     answer = conclude(search, say)
     search = answer.search
-    say(f"verdict: {answer.main}")
     entry, mission = propose(search)
     noise, shares = noise_of(answer), panels(verdict_of(answer), answer)
     found = Diagnosis(case, search, answer, answer.shrinkage, entry, mission, shares, noise, readings=readings)
-    if answer.shrinkage.after > UNFIT and rules == ALL:
-        take(found, staged(case, say))
-        return found
-    found.stages = stages_of(answer, case, runs)
-    if found.verdict == "unknown":
-        learn(found, say)
+    off = unfit(answer.shrinkage, answer.noise) if rules == ALL else 0.0
+    if off > 0.0:
+        take(found, staged(case, say), off)
+    if found.staged is None:
+        found.stages = stages_of(answer, case, runs)
+        if found.verdict == "unknown":
+            learn(found, say)
+    found.answer = certain_by_readings(found.answer, readings)
+    say(f"verdict: {found.answer.main}")
     return found
 
 
-def take(diagnosis: Diagnosis, found: Staged) -> None:
-    """The diagnosis with what the stages of a vehicle far from its file came to."""
+def take(diagnosis: Diagnosis, found: Staged, off: float) -> None:
+    """The diagnosis with what the stages of a vehicle far from its file came to; off: how probably it is, before them.
+
+    The model is the one of the two that leaves less of the gap of runs left out.
+    """
     before = diagnosis.answer.shrinkage
     runs = before.runs | {AFTER: found.stages[-1].gaps, FLOOR: found.floor}
     shrinkage = shrinkage_of(runs, before.predictions | {AFTER: found.predictions})
-    diagnosis.staged, diagnosis.stages, diagnosis.readings = found, found.stages, findings_in(found)
-    diagnosis.shrinkage, diagnosis.answer = shrinkage, conclusion(diagnosis.answer, found, shrinkage)
+    far = conclusion(diagnosis.answer, found, shrinkage)
+    diagnosis.answer = weighed(diagnosis.answer, far, by_gap_left(off, found, before.after, shrinkage.after))
+    if shrinkage.after < before.after:
+        diagnosis.staged, diagnosis.stages, diagnosis.readings = found, found.stages, findings_in(found)
+        diagnosis.shrinkage = shrinkage
     diagnosis.panels = panels(verdict_of(diagnosis.answer), diagnosis.answer)
 
 
@@ -157,16 +173,21 @@ def unexplained(diagnosis: Diagnosis) -> dict[str, Any] | None:
 
 
 def parameters(diagnosis: Diagnosis, label: str) -> dict[str, dict[str, Any]]:
-    """Estimate, 90 % interval and unit of each parameter of a selected label, by Laplace's approximation."""
-    if diagnosis.staged is not None:
-        sizes = diagnosis.staged.sizes.get(label, {})
-        return {name: {"estimate": s.estimate, "ci90": list(s.ci90), "unit": s.unit} for name, s in sizes.items()}
+    """Estimate, 90 % interval and unit of each parameter of a selected label, by Laplace's approximation.
+
+    Of one that is not in the corrected model, by what the readings say.
+    """
+    staged = {} if diagnosis.staged is None else diagnosis.staged.sizes
     hypothesis, clock = diagnosis.answer.hypothesis, diagnosis.answer.search.clock
+    if label in staged:
+        return {name: size.plain() for name, size in staged[label].items()}
     if clock is not None and label == clock.label:
         known = zip(clock.free, clock.values, clock.sd, strict=True)
     elif label in hypothesis.labels:
         spread = np.sqrt(np.diag(np.linalg.inv(hypothesis.precision)))
         known = zip(hypothesis.free, hypothesis.values, spread, strict=True)
+    elif label in diagnosis.answer.selected:
+        return {name: size.plain() for name, size in by_readings.sizes(diagnosis.readings).get(label, {}).items()}
     else:
         return {}
     found = {}
@@ -237,8 +258,7 @@ def plain(diagnosis: Diagnosis) -> dict[str, Any]:
         "readings": [one.plain() for one in diagnosis.readings],
         "stages": [stage.plain() for stage in diagnosis.stages],
         "identified": {} if diagnosis.staged is None else {
-            name: {"estimate": s.estimate, "ci90": list(s.ci90), "unit": s.unit}
-            for name, s in diagnosis.staged.vehicle.items()
+            name: size.plain() for name, size in diagnosis.staged.vehicle.items()
         },
     }  # fmt: skip
 
@@ -257,10 +277,17 @@ def details(diagnosis: Diagnosis) -> Details:
     return Details(
         shown=[one.title for one in pictures_of(diagnosis.readings, case.runs)],
         format=1, version=installed(), data=data, evidence={k: float(v) for k, v in answer.gained.items()},
-        corrected=bool(answer.selected), noise=diagnosis.noise, panels=diagnosis.panels,
+        corrected=in_model(diagnosis), noise=diagnosis.noise, panels=diagnosis.panels,
         findings=answer.findings, pictures=[picture(diagnosis, n) for n in drawn_runs(diagnosis)],
         thresholds={"evidence": EVIDENCE_NEEDED, "tie": TIE, "sigma": UNCLEAN, "left": LEFT_OVER, "matters": MATTERS},
     )  # fmt: skip
+
+
+def in_model(diagnosis: Diagnosis) -> bool:
+    """Whether the corrected model has more than a recalibration: effects, a vehicle identified, disorder."""
+    answer = diagnosis.answer
+    known = {*answer.search.entries(answer.hypothesis), *UNPREDICTABLE}
+    return diagnosis.staged is not None or any(label in known for label in answer.selected)
 
 
 def installed() -> str:

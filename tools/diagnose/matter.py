@@ -6,6 +6,7 @@ hundred nat in ten minutes of 10 Hz. What nobody could see in a window is no gap
 
 import numpy as np
 
+from tools.diagnose.gates import opened
 from tools.diagnose.search import Search
 from tools.diagnose.shrink import AFTER, FLOOR, Shrinkage, case_noise_floor
 from tools.gap.measure import mean_square
@@ -58,6 +59,6 @@ def disorder_matters(search: Search, hypothesis: Hypothesis, shrinkage: Shrinkag
     return excess(shrinkage.channels(AFTER), case_noise_floor(search, hypothesis)) >= MATTERS
 
 
-def gap_matters(shrinkage: Shrinkage) -> bool:
-    """Whether what is left exceeds the floor in any channel."""
-    return excess(shrinkage.channels(AFTER), shrinkage.channels(FLOOR)) >= MATTERS
+def gap_matters(shrinkage: Shrinkage) -> float:
+    """How far what is left exceeds the floor in any channel: 0 below MATTERS, 1 from twice that."""
+    return opened(excess(shrinkage.channels(AFTER), shrinkage.channels(FLOOR)), MATTERS, 2.0 * MATTERS)

@@ -107,7 +107,8 @@ def run_probes(
     problem: Problem, P: np.ndarray, F: np.ndarray, wanted: list[NoiseProbe], scales=SCALES, finer=FINER
 ) -> list[ProbeResult]:
     """Every probe of a model, the one that gains most first."""
-    bare = float(problem.filter(P, F).misfit.sum())
+    own = problem.filter(P, F, begin=True)
+    bare = float(own.misfit.sum())
     found = []
     for probe in wanted:
         best, scale = 0.0, 1.0
@@ -115,7 +116,8 @@ def run_probes(
 
         def gain(s: float, probe: NoiseProbe = probe, tried: dict[float, float] = tried) -> float:
             more, doubt = inflated(problem, probe, s)
-            tried[s] = 0.5 * (bare - float(problem.filter(P, F, more=more, doubt=doubt).misfit.sum()))
+            noisy = problem.filter(P, F, more=more, doubt=doubt, starts=own.starts)
+            tried[s] = 0.5 * (bare - float(noisy.misfit.sum()))
             return tried[s]
 
         for s in scales:

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from sim_backend.core.effects.catalogue import catalogue
+from tools.diagnose.gates import opened
 from tools.diagnose.matter import MATTERS
 from tools.diagnose.record import NONE, UNKNOWN
 
@@ -61,10 +62,14 @@ def doubt_small(chances: dict[str, float], main: str, size: float) -> dict[str, 
 
 
 def to_none(chances: dict[str, float], negligible: Iterable[str], moved: dict[str, float]) -> dict[str, float]:
-    """Probabilities with those of effects that do not matter given to none: there is no gap with them."""
-    small = {*negligible, *(label for label, far in moved.items() if far < MATTERS)}
-    kept = {label: 0.0 if label in small else chance for label, chance in chances.items()}
-    return kept | {NONE: kept.get(NONE, 0.0) + sum(chance for label, chance in chances.items() if label in small)}
+    """Probabilities with those of effects that do not matter given to none: there is no gap with them.
+
+    moved: by how much each moves the windows, tolerances; up to twice MATTERS it matters by degrees.
+    """
+    matters = {label: opened(far, MATTERS, 2.0 * MATTERS) for label, far in moved.items()}
+    matters |= dict.fromkeys(negligible, 0.0)
+    kept = {label: chance * matters.get(label, 1.0) for label, chance in chances.items()}
+    return kept | {NONE: kept.get(NONE, 0.0) + sum(chances.values()) - sum(kept.values())}
 
 
 def answer_first(chances: dict[str, float], gained: Iterable[str]) -> tuple[str, dict[str, float]]:

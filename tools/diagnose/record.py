@@ -23,6 +23,7 @@ from tools.readings.pictures import Shown
 
 ANSWER, DETAILS, CURVES = "diagnosis.json", "report.json", "report.npz"
 NONE, UNKNOWN = "none", "unknown"
+AGAINST_HEALTHY = "reference"  # a kind of answer
 MOST_BYTES = 100_000_000
 SHOWN = ("x", "read", "expected", "mended")  # of a picture of a reading
 TABLES = ("measured", "nominal", "corrected")  # (rows, N_Y) of a run that is drawn
@@ -284,9 +285,10 @@ def _present(path: Path) -> Path:
     return path
 
 
-def is_ocean(folder: Path) -> bool:
-    """Whether the diagnosis of a folder is an ocean glider's (tools/report/ocean draws it)."""
-    return (folder / ANSWER).is_file() and read_as(folder / ANSWER, Asked).kind == KIND
+def is_pooled(folder: Path) -> bool:
+    """Whether the diagnosis of a folder asks for what all its runs share: an ocean glider's, or one against healthy
+    runs (tools/report/pooled draws it)."""
+    return (folder / ANSWER).is_file() and read_as(folder / ANSWER, Asked).kind in (KIND, AGAINST_HEALTHY)
 
 
 def read_as(path: Path, kind: Any) -> Any:

@@ -9,10 +9,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import expit
 
 from sim_backend.core.effects.catalogue import catalogue
 from tools.diagnose.clock import Clock
 from tools.diagnose.descent import advance_and_prune, converge, first_step, prune, rebase, try_distant_starts
+from tools.diagnose.gates import opened
 from tools.diagnose.sensor_consistency import HOLDS_BELOW, inconsistent_sensors
 from tools.inference import levels
 from tools.inference.fit import THRESHOLD_STEP, Fitter, Hypothesis
@@ -38,8 +40,8 @@ POLISHED = {1: 3, 2: 2}  # times at most, by the number of effects; once with mo
 # What a file says of noise is taken to be right by a factor of two: beyond that it is an effect, or a reading that is
 # held or coloured.
 LEAST_LEVEL, MOST_LEVEL = 0.5, 2.0
-NO_LEVEL = 2.5  # a disturbance that would have to be as many times the file's is none: it stays what the file says
-UNLIKE = 0.1  # logarithm by which a level is another: what is found of sensors is right by as much (docs/DIAGNOSIS.md)
+NO_LEVEL = 2.5  # a disturbance that would have to be as many times the file's is as likely none: it stays the file's
+UNLIKE = 0.1  # logarithm by which a disturbance begins to be another
 LEVEL_ROUNDS = 2  # Newton steps at a time
 ROUNDS = 3  # of gains at the best label and all labels tried again there, at most
 ALIGNED = 3  # times that poses are moved to where the clock found so far says
@@ -56,9 +58,11 @@ class Search:
     fitter: Fitter
     null: Hypothesis
     hypotheses: list[Hypothesis]
+    # Of the filter at the hypothesis that stands: floors begin there, what is left is tested. Hypotheses are compared
+    # by fitter.gains alone, also where one drops an effect or a run.
     gains: Gains
     clock: Clock | None = None
-    told: bool = False  # whether the sensors' noise is what the file says
+    told: float = 0.0  # probability that the sensors' noise is what the file says
 
     def entries(self, hypothesis: Hypothesis) -> dict[str, list[int]]:
         """By effect of a hypothesis, the clock's among them, where in F it stands."""
@@ -238,8 +242,9 @@ def run(
     to, by a filter that knew less of disorder. Allowed parameters driven to their limits may hide it from the screen.
     """
     noise = levels.sensor_noise(problem, LEAST_LEVEL, MOST_LEVEL)
-    problem = noise.beyond(UNLIKE).applied(problem)
-    told, problem = as_told(problem, noise), problem if clock is None else clock.within(problem)
+    told = as_told(problem, noise)
+    problem = noise.believed(told).applied(problem)
+    problem = problem if clock is None else clock.within(problem)
     free, known = nuisance_parameters(problem), effect_parameters(problem)
     if clock is not None:
         del known[clock.label]
@@ -288,21 +293,24 @@ def grow(search: Search, say: Callable[[str], None]) -> None:
             break
 
 
-def as_told(problem: Problem, noise: levels.Levels) -> bool:
-    """Whether the noise of the sensors that say something of it, half of them at least, is what the file says."""
-    factors = levels.factors(problem)
-    seen = [name for name in levels.SENSORS if name in factors]
-    return 2 * len(noise.names) >= len(seen) and all(abs(np.log(factors[name])) < UNLIKE for name in noise.names)
+def as_told(problem: Problem, noise: levels.Levels) -> float:
+    """Probability that the noise of all sensors is what the file says, as likely as not before they are looked at.
+
+    One whose noise cannot be found says against it what one that is found exactly as the file says speaks for it.
+    """
+    silent = sum(problem.seen[part].any() for part in levels.SENSORS.values()) - len(noise.names)
+    return float(expit(noise.odds.sum() - silent * np.log(levels.FREE / levels.ACCURATE)))
 
 
 def level_disturbance(search: Search) -> bool:
     """The disturbance's level at the best hypothesis, and all taken over to it; whether it is another than before.
 
     The level is found only here: a model that lacks an effect would have it in its disturbance. Of an effect that
-    nobody knows it has that also then: where every sensor's noise is what the file says, the disturbance is too.
+    nobody knows it has that also then: as far as every sensor's noise is what the file says, the disturbance is too.
+    Nothing jumps: a small change, and one beyond what is believed, count by degrees.
     """
     problem = search.problem
-    if search.told:
+    if (1.0 - search.told) * np.log(MOST_LEVEL) < UNLIKE:
         return False
     plain = replace(problem, spectral=levels.as_said(problem).spectral)
     now = levels.disturbance(plain)
@@ -312,11 +320,13 @@ def level_disturbance(search: Search) -> bool:
     before = np.log([factors[name] for name in now.names])
     model = search.model(min([search.null, search.best], key=lambda c: c.misfit))
     found = levels.estimate(plain, lambda p: p.filter(*model, begin=True), now.moved(before), LEVEL_ROUNDS)
-    log = np.clip(found.log, np.log(LEAST_LEVEL), np.log(MOST_LEVEL))
-    log[found.log > np.log(NO_LEVEL)] = 0.0
-    if np.abs(log - before).max() < UNLIKE:
+    log = np.clip(found.log, np.log(LEAST_LEVEL), np.log(MOST_LEVEL)) * (1.0 - search.told)
+    log *= [1.0 - opened(factor, MOST_LEVEL, NO_LEVEL**2 / MOST_LEVEL) for factor in np.exp(found.log)]
+    change = log - before
+    change *= opened(float(np.abs(change).max()), UNLIKE, 2.0 * UNLIKE)
+    if not change.any():
         return False
-    search.problem = now.moved(log - before).applied(problem)
+    search.problem = now.moved(change).applied(problem)
     refilter(search, search.best, 1.0)
     search.hypotheses = advance_and_prune(search.fitter, search.hypotheses, search.null.misfit, 2 * LEFT, 1)
     return True

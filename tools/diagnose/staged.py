@@ -16,6 +16,8 @@ from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.catalogue import catalogue
 from tools.data.runs.case import Case
 from tools.data.runs.run import Run
+from tools.diagnose import by_readings
+from tools.diagnose.by_readings import Size
 from tools.diagnose.shrink import SEED, gaps
 from tools.diagnose.staircase import NOMINAL, READINGS, Stage
 from tools.gap.measure import RunGap, root_mean_square, run_gap
@@ -24,7 +26,7 @@ from tools.inference.fit import bounded_step
 from tools.inference.model import Model, effect_vector, nominal_model
 from tools.inference.parameters import NINETY, FreeParameter, effect_parameters
 from tools.inference.predict import fly, observe
-from tools.inference.prediction_error import HORIZONS, Fitted, PredictionError, identify_by_prediction
+from tools.inference.prediction_error import HORIZONS, Fitted, PredictionError
 from tools.inference.problem import cut, problem_of
 from tools.inference.vehicle_parameters import GAUGE, Parameters, first_effects, listed, parameters
 
@@ -34,13 +36,6 @@ TRIED = 4  # effects fitted in full, of those whose linear step takes most
 REFIT_STEPS = 5
 WORTH = 0.1  # of the squared gap of runs left out, that an effect has to take
 SURE = NINETY  # sigma in the fit to all runs: its 90 % interval leaves 0 out
-@dataclass(frozen=True)
-class Size:
-    """A parameter with its 90 % interval, in its unit."""
-
-    estimate: float
-    ci90: tuple[float, float]
-    unit: str
 
 
 @dataclass
@@ -101,7 +96,7 @@ class _Stages:
         for fold in self.folds:
             self.say(f"identified without {', '.join(self.case.runs[n].name for n in fold.left_out)}")
             fitting = self.free(fold.read.model, fold.read.runs, [])
-            fold.values = identify_by_prediction(fitting.problem, fitting.free, many=False).values
+            fold.values = fitting.through(fitting.file_values).values
 
     def models(self, more: list[FreeParameter], values: list[np.ndarray]) -> dict[int, tuple[np.ndarray, np.ndarray]]:
         """By run, the model that has not seen it; constant errors of the sensors are a run's own."""
@@ -185,9 +180,7 @@ def staged(case: Case, say: Callable[[str], None] = lambda text: None) -> Staged
     nominal = (work.nominal.P, effect_vector(work.nominal))
     stages = [Stage(NOMINAL, [], work.flown(dict.fromkeys(every, nominal))[0])]
     if work.whole.added:
-        models = {
-            n: (fold.read.model.P, effect_vector(fold.read.model)) for fold in work.folds for n in fold.left_out
-        }
+        models = {n: (fold.read.model.P, effect_vector(fold.read.model)) for fold in work.folds for n in fold.left_out}
         stages.append(Stage(READINGS, work.whole.added, work.flown(models)[0]))
     work.identify()
     left, predictions = work.flown(work.models([], [fold.values for fold in work.folds]))
@@ -244,14 +237,8 @@ def _concluded(
         name = one.label or one.name
         own = one.name if one.label else catalogue()[name].parameters[0].name if name in catalogue() else "size"
         by_label.setdefault(name, {})[own] = sizes[first + n]
-    for finding in work.whole.findings:
-        label = str(finding.label)
-        if label in work.whole.labels and label != "gyro_scale":
-            name = finding.channel.partition("_")[0] if label == "gyro_bias" else catalogue()[label].parameters[0].name
-            by_label.setdefault(label, {})[name] = Size(finding.size, finding.ci90, finding.unit)
-    if work.whole.scale is not None:
-        size, low, high = work.whole.scale
-        by_label["gyro_scale"] = {"scale": Size(size, (low, high), "1")}
+    said = by_readings.sizes(work.whole.findings)
+    by_label |= {label: said[label] for label in work.whole.labels if label in said}
     vehicle = dict(zip(fitting.free.names[:first], sizes[:first], strict=True))
     selected = [*work.whole.labels, *(label for label in chosen if label != GAUGE)]
     floor = floor_of(work, P, F)

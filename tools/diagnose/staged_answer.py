@@ -1,15 +1,19 @@
-"""What the stages of a vehicle far from its file come to: its answer, evidence, findings and words."""
+"""What readings and the stages of a vehicle far from its file come to: its answer, evidence, findings and words."""
 
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+from scipy.special import expit
 
 from sim_backend.core.effects.catalogue import catalogue
 from tools.data.runs import columns as names
+from tools.diagnose import by_readings
+from tools.diagnose.gates import mixed
+from tools.diagnose.probabilities import answer_first
 from tools.diagnose.record import NONE, UNKNOWN
 from tools.diagnose.shrink import Shrinkage
-from tools.diagnose.staged import IDENTIFIED, SURE, Staged
+from tools.diagnose.staged import IDENTIFIED, Staged
 from tools.diagnose.verdict import Answer
 from tools.inference.vehicle_parameters import GAUGE
 from tools.readings.findings import Finding, spoken
@@ -17,6 +21,7 @@ from tools.readings.findings import Finding, spoken
 # A vehicle that had to be identified was not the file's: what is left of the gap of a first identification is no effect
 # alone, but the rest of the vehicle, and the answer says so; of the other probability each effect has its share.
 UNKNOWN_THEN = 0.9
+CERTAIN = 0.9  # probability from which a label is selected, where two answers are weighed
 
 
 def conclusion(answer: Answer, found: Staged, shrinkage: Shrinkage) -> Answer:
@@ -26,7 +31,7 @@ def conclusion(answer: Answer, found: Staged, shrinkage: Shrinkage) -> Answer:
     total = sum(weight.values())
     chances = dict.fromkeys(catalogue(), 0.0) | {label: (1.0 - UNKNOWN_THEN) * w / total for label, w in weight.items()}
     chances |= {NONE: 0.0, UNKNOWN: UNKNOWN_THEN if weight else 1.0}
-    count = sum(gap.windows * len(gap.channels) for gap in found.stages[0].gaps)
+    count = residuals(found)
     gained = {label: nats(found, label, count) for label in found.selected}
     return replace(
         answer, selected=found.selected, main=UNKNOWN, probabilities=chances, gained=gained, negligible={},
@@ -34,14 +39,53 @@ def conclusion(answer: Answer, found: Staged, shrinkage: Shrinkage) -> Answer:
     )  # fmt: skip
 
 
+def by_gap_left(off: float, found: Staged, known: float, far: float) -> float:
+    """Probability that a vehicle is far from its file, by the gap that either answer leaves of runs left out.
+
+    off: by the first alone. Each window and channel counts as one residual.
+    """
+    if off in (0.0, 1.0):
+        return off
+    return float(expit(np.log(off / (1.0 - off)) + residuals(found) * np.log(known / far)))
+
+
+def residuals(found: Staged) -> int:
+    """How many residuals of the gap count as independent: windows and channels."""
+    return sum(gap.windows * len(gap.channels) for gap in found.stages[0].gaps)
+
+
+def weighed(known: Answer, far: Answer, off: float) -> Answer:
+    """Two answers in one: by the vehicle's file, and, with the probability `off`, by the stages of one far from it.
+
+    Selected is the main cause, and what is CERTAIN to be in the answer, whichever is right.
+    """
+    every = [*known.selected, *(label for label in far.selected if label not in known.selected)]
+    there = {label: (1.0 - off) * (label in known.selected) + off * (label in far.selected) for label in every}
+    main, chances = answer_first(mixed(known.probabilities, far.probabilities, off), every)
+    selected = [label for label in every if label == main or there[label] >= CERTAIN]
+    gained = {label: max(one.gained.get(label, 0.0) for one in (known, far)) for label in selected}
+    return replace(
+        known, selected=selected, main=main, probabilities=chances, gained=gained, groups=far.groups | known.groups,
+        shrinkage=far.shrinkage if far.shrinkage.after < known.shrinkage.after else known.shrinkage,
+        negligible={label: nat for label, nat in known.negligible.items() if label not in selected},
+    )  # fmt: skip
+
+
+def certain_by_readings(answer: Answer, findings: list[Finding]) -> Answer:
+    """The answer with every label that readings are certain of by themselves selected, after those of the search."""
+    said = [label for label in by_readings.sizes(findings) if label not in answer.selected]
+    gained = answer.gained | {label: by_readings.nats(findings, label) for label in said}
+    groups = {label: [label] for label in said} | answer.groups
+    negligible = {label: nat for label, nat in answer.negligible.items() if label not in said}
+    return replace(answer, selected=[*answer.selected, *said], gained=gained, groups=groups, negligible=negligible)
+
+
 def nats(found: Staged, label: str, count: int) -> float:
     """Evidence of a label: of what it takes of the gap of runs left out, or of its distance from 0 in the readings."""
     for before, after in pairwise(found.stages):
         if after.added == [label] and after.name.startswith("+"):
             return count * float(np.log(before.total / after.total))
-    sigma = [one.size / max((one.ci90[1] - one.ci90[0]) / (2.0 * SURE), 1e-9) for one in found.read.findings
-             if one.label == label]  # fmt: skip
-    return 0.5 * max((s * s for s in sigma), default=0.0)
+    return by_readings.nats(found.read.findings, label)
 
 
 def identified_text(found: Staged) -> str:

@@ -10,8 +10,10 @@ from scipy.special import ndtr
 from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.catalogue import catalogue
 from tools.diagnose.clock import Clock
+from tools.diagnose.gates import opened
 from tools.diagnose.noise_probes import CLOCK, TURBULENCE, WAVES, NoiseProbe, ProbeResult, inflated, probes, run_probes
-from tools.diagnose.search import Search
+from tools.diagnose.residuals import UNCLEAN
+from tools.diagnose.search import EVIDENCE_NEEDED, Search
 from tools.diagnose.shrink import AFTER, FLOOR, Shrinkage, shrink
 from tools.diagnose.waves import LINE, line_share
 from tools.inference.fit import Hypothesis
@@ -33,15 +35,18 @@ TOLD_GAP, TOLD_GAP_WIDTH = 0.35, 0.5  # as LEFT_GAP
 TOLD_WIDE = 0.8  # as WIDE
 TURNED = ("pitch", "roll", "yaw", "rates")  # channels that a sea does not move
 NOISY, NOISY_WIDTH = 0.2, 0.8  # share of the explainable misfit that is left: disorder is looked for; width in e-folds
-UNFIT = 5.0  # tolerances that the best explanation still misses by: no effect of the catalogue does that
-LOOSE = 3.0  # times the floor, and one tolerance, that no vehicle without a gap is off
+# Tolerances that the best explanation still misses by: with the first an effect of the catalogue may, with the second
+# none does, and the vehicle is not the file's.
+UNFIT = (3.0, 8.0)
+LOOSE, FROM_LOOSE = 3.0, (0.75, 1.33)  # times the floor, and one tolerance, that no vehicle without a gap is off
 ONE_AXIS = 0.65  # of what all axes bring together: where one link alone brings as much, it is no turbulence
 MOSTLY = 0.9  # of all that can be explained, for turbulence or waves to be the cause
 LEAST_UNKNOWN, MORE_UNKNOWN = 0.002, 0.005  # probability of an unknown effect: nothing is left, or something is
 CLOCKED = 0.5  # of what the best probe gains, that the probe of motion capture's clock must
 RIVALS = 4  # links probed beside water and axes
 LEAST_WAVES = 100.0  # nat
-ALONE = 3.0  # times what any other element's noise gains, of what is left at one element alone
+ALONE = (2.0, 4.5)  # times what any other element's noise gains: what is left may be, and is, at one element alone
+SHOWS = (UNCLEAN, 1.5 * UNCLEAN)  # sigma of what is left, from which it counts, and in full
 
 
 def probability(share: float, middle: float, width: float) -> float:
@@ -64,18 +69,29 @@ def left_share(shrinkage: Shrinkage, taken: float) -> float:
 
 def left_floors(shrinkage: Shrinkage) -> float:
     """What is left of the gap beyond the floor, in floors."""
-    return float(np.sqrt(max(shrinkage.after**2 - shrinkage.floor**2, 0.0)) / max(shrinkage.floor, 1e-6))
+    return left_beyond(shrinkage) / max(shrinkage.floor, 1e-6)
 
 
-def place_alone(probed: Iterable[tuple[NoiseProbe, float]]) -> tuple[str, str] | None:
-    """Subsystem and element whose noise gains ALONE times what any other's does, of probes and their gains (nat)."""
+def left_beyond(shrinkage: Shrinkage) -> float:
+    """What is left of the gap beyond the floor, in tolerances."""
+    return float(np.sqrt(max(shrinkage.after**2 - shrinkage.floor**2, 0.0)))
+
+
+def unfit(shrinkage: Shrinkage, noise: ProbeResult | None) -> float:
+    """Probability that the vehicle is not its file's, by what the best explanation leaves; beyond disorder's floor."""
+    return opened(shrinkage.after if noise is None else left_beyond(shrinkage), *UNFIT)
+
+
+def place_alone(probed: Iterable[tuple[NoiseProbe, float]]) -> tuple[tuple[str, str], float]:
+    """Subsystem and element whose noise gains most, and how surely it alone does; of probes and their gains (nat)."""
     gains: dict[tuple[str, str], float] = {}
     for probe, gain in probed:
         place = probe.subsystem, probe.element
         gains[place] = max(gains.get(place, 0.0), gain)
     ranked = sorted(gains, key=lambda place: -gains[place])
     next_gain = gains[ranked[1]] if len(ranked) > 1 else 0.0
-    return ranked[0] if ranked and gains[ranked[0]] > ALONE * next_gain else None
+    alone = opened(gains[ranked[0]] / max(next_gain, 1e-9), *ALONE) if ranked else 0.0
+    return (ranked[0], alone) if ranked else (("", ""), 0.0)
 
 
 @dataclass
@@ -85,10 +101,11 @@ class Remainder:
     explained: float  # by the selected effects over none
     left: float  # by the probe that gains most
     probed: list[ProbeResult]
+    shows: float = 1.0  # how far it counts: it is hardly beyond chance, or far
 
     @property
-    def alone(self) -> tuple[str, str] | None:
-        """Subsystem and element where all of it enters; None where the noise of others would explain it, too."""
+    def alone(self) -> tuple[tuple[str, str], float]:
+        """Where most of it enters, and how surely all: not where the noise of others would explain it, too."""
         return place_alone((found.probe, found.gain) for found in self.probed)
 
     @property
@@ -96,14 +113,16 @@ class Remainder:
         return float(np.clip(self.left / max(self.left + self.explained, 1e-9), 0.0, 1.0))
 
 
-def remainder_of(search: Search, hypothesis: Hypothesis, noise: ProbeResult | None) -> Remainder:
-    """The probes at a hypothesis, beside what its effects explain; `noise` explains too."""
+def remainder_of(
+    search: Search, hypothesis: Hypothesis, noise: ProbeResult | None, whiteness: float = np.inf
+) -> Remainder:
+    """The probes at a hypothesis, beside what its effects, and `noise`, explain; whiteness: sigma of what is left."""
     problem = search.problem
     null = float(problem.filter(*search.model(search.null), begin=True).misfit.sum())
     own = float(search.gains.misfit.sum())
     probed = run_probes(problem, *search.model(hypothesis), probes(problem))
     explained = max(0.5 * (null - own), 0.0) + (noise.gain if noise is not None else 0.0)
-    return Remainder(explained, probed[0].gain, probed)
+    return Remainder(explained, probed[0].gain, probed, opened(whiteness, *SHOWS))
 
 
 def water_disorder(search: Search, probed: list[ProbeResult]) -> ProbeResult | None:
@@ -143,16 +162,38 @@ def turbulence_first(probed: list[ProbeResult]) -> ProbeResult | None:
     return first
 
 
+def clock_first(probed: list[ProbeResult]) -> ProbeResult | None:
+    """Motion capture's clock, where its probe gains more than any other link's, its poses' noise apart."""
+    clock = next((found for found in probed if found.probe.name == CLOCK), None)
+    if clock is None or clock.gain <= CLOCKED * probed[0].gain or probed[0].probe.element != CLOCK_PLACE[1]:
+        return None
+    return clock
+
+
+def wandering_clock(search: Search, hypothesis: Hypothesis, left: Remainder) -> ProbeResult | None:
+    """A clock that gains most of all links, or would beside the rough water that does: it takes the clock's place.
+
+    Water that shakes every axis goes wherever poses say, at whatever time they were taken, and gains for that, too.
+    """
+    if not any(found.probe.name == CLOCK and found.gain > CLOCKED * left.left for found in left.probed):
+        return None
+    if left.probed[0].probe.name != TURBULENCE:
+        return clock_first(left.probed)
+    more, _ = inflated(search.problem, left.probed[0].probe, left.probed[0].scale)
+    rough = search.problem.with_extra_noise(more)
+    found = clock_first(run_probes(rough, *search.model(hypothesis), probes(rough)))
+    return found if found is not None and found.gain > EVIDENCE_NEEDED else None
+
+
 def disorder(search: Search, hypothesis: Hypothesis, left: Remainder) -> ProbeResult | None:
     """The noise that the search has to know of, to see what is beside it; None where there is nothing of the kind.
 
-    Motion capture's clock where its probe gains more than any other link's, its poses' noise apart; waves where they
-    show beside the hypothesis, turbulence where nothing else does; either where it is the cause: of all that can be
-    explained, it explains MOSTLY.
+    Motion capture's clock where it wanders; waves where they show beside the hypothesis, turbulence where nothing else
+    does; either where it is the cause: of all that can be explained, it explains MOSTLY.
     """
-    clock = [found for found in left.probed if found.probe.name == CLOCK and found.gain > CLOCKED * left.left]
-    if clock and left.probed[0].probe.element == CLOCK_PLACE[1]:
-        return clock[0]
+    clock = wandering_clock(search, hypothesis, left)
+    if clock is not None:
+        return clock
     beside = waves_beside(search, hypothesis, left)
     if beside is not None:
         return beside
@@ -253,13 +294,29 @@ def probability_unknown(
     left where that one sits, and nowhere else, is no small effect beside it: something there has another form, however
     narrow the gap it leaves. So it is with the sensor of any of them.
     """
-    if left is None:  # what is left was not asked about, or nothing is
-        loose = not selected and not noise and shrinkage.after > max(LOOSE * shrinkage.floor, 1.0)
-        unfit = search.problem.rules.whiteness and (loose or shrinkage.after > UNFIT)
-        return 1.0 - MORE_UNKNOWN if unfit else LEAST_UNKNOWN
-    if shrinkage.after > UNFIT:
-        return 1.0 - MORE_UNKNOWN
-    wide = probability(left_floors(shrinkage), TOLD_WIDE if search.told and not noise else WIDE, WIDE_WIDTH)
+    off = unfit(shrinkage, noise) if search.problem.rules.whiteness else 0.0
+    shows = 0.0 if left is None else left.shows
+    hidden = shown = LEAST_UNKNOWN  # where what is left was not asked about, or nothing is
+    if not selected and not noise and search.problem.rules.whiteness:
+        hidden += (1.0 - MORE_UNKNOWN - hidden) * opened(
+            shrinkage.after / max(LOOSE * shrinkage.floor, 1.0), *FROM_LOOSE
+        )
+    if left is not None:
+        kinds = ((search.told, True), (1.0 - search.told, False))
+        shown = sum(
+            share * unknown_beside(told, evident, shrinkage, left, noise, taken, places)
+            for share, told in kinds if share > 0.0
+        )  # fmt: skip
+    known = hidden + (shown - hidden) * shows
+    return known + (1.0 - MORE_UNKNOWN - known) * off
+
+
+def unknown_beside(
+    told: bool, evident: bool, shrinkage: Shrinkage, left: Remainder, noise: ProbeResult | None, taken: float,
+    places: Sequence[tuple[str, str]],
+) -> float:  # fmt: skip
+    """The same of something left, where every sensor's noise is what the file says (told), or is not."""
+    wide = probability(left_floors(shrinkage), TOLD_WIDE if told and not noise else WIDE, WIDE_WIDTH)
     if noise:
         disordered = probability(left.share, NOISY, NOISY_WIDTH)
         if noise.probe.name == CLOCK:  # it moves no vehicle: windows say as much as with a clock that is right
@@ -268,14 +325,16 @@ def probability_unknown(
     if not evident:
         return wide
     gap = left_share(shrinkage, taken)
-    misfit = probability(left.share, *((TOLD_LEFT, TOLD_LEFT_WIDTH) if search.told else (LEFT_OVER, LEFT_WIDTH)))
-    if search.told:  # what is left is no small effect beside the main one: either says enough
+    misfit = probability(left.share, *((TOLD_LEFT, TOLD_LEFT_WIDTH) if told else (LEFT_OVER, LEFT_WIDTH)))
+    if told:  # what is left is no small effect beside the main one: either says enough
         form = max(misfit, probability(gap, TOLD_GAP, TOLD_GAP_WIDTH))
     else:
         both = max(left.share, LEAST_SHARE) ** NATS * gap ** (1.0 - NATS)
         form = probability(both, LEFT_BOTH, LEFT_BOTH_WIDTH)
-    if left.alone is not None and left.alone[0] == "sensing" and left.alone in places:
-        return max(form, probability(left.share, OWN_LEFT, LEFT_WIDTH))
-    if left.alone in places[:1]:
-        return max(form, misfit)
-    return max(form * wide, MORE_UNKNOWN)
+    beside = max(form * wide, MORE_UNKNOWN)
+    place, alone = left.alone
+    if place[0] == "sensing" and place in places:
+        beside += (max(form, probability(left.share, OWN_LEFT, LEFT_WIDTH)) - beside) * alone
+    elif place in places[:1]:
+        beside += (max(form, misfit) - beside) * alone
+    return beside

@@ -7,9 +7,11 @@ import numpy as np
 
 from sim_backend.core.effects.catalogue import catalogue
 from tools.diagnose.descent import advance_and_prune, converge, first_step
+from tools.diagnose.gates import mixed, opened
 from tools.diagnose.matter import MATTERS, disorder_matters, gap_matters, movements
 from tools.diagnose.noise_probes import CLOCK, TURBULENCE, ProbeResult, inflated
 from tools.diagnose.probabilities import (
+    TIE,
     answer_first,
     doubt_small,
     grouped,
@@ -259,7 +261,7 @@ def conclude(
     findings = tests(problem, search.gains)
     whiteness, left = worst(findings), None
     if whiteness >= UNCLEAN and problem.rules.whiteness:
-        left = remainder_of(search, evident, noise)
+        left = remainder_of(search, evident, noise, whiteness)
         found = disorder(search, evident, left) if noise is None and not calm else None
         if found is not None:
             return search_again_with_noise(search, evident, gained, found, say)
@@ -292,22 +294,26 @@ def conclude(
         try_rivals(search, evident, main)
     chances = {main or NONE: 1.0}
     if by_search:
-        chances = with_least_gap(search, evident, main, posterior(search, evident, main))
-        instead = max(chances, key=lambda label: chances[label])
+        by_evidence = posterior(search, evident, main)
+        by_gap, ahead = with_least_gap(search, evident, main, by_evidence)
+        instead = max(by_gap, key=lambda label: by_gap[label])
         if begin is None and main and instead not in (main, NONE):
             return conclude(search, say, noise, calm, alternatives(search, evident, main)[instead])
+        chances = mixed(by_evidence, by_gap, ahead)
     chances = share_out(chances, main, most_often({label: ranking[label] for label in gained}))
-    chances = to_none(chances, negligible, movements_of_alternatives(search, evident, main, chances))
+    known = {label: moved[label] for label in gained if label in moved and label != disordered}
+    chances = to_none(chances, negligible, known | movements_of_alternatives(search, evident, main, chances))
     chances = pass_on(chances, [label for label in by_size if label in gained and label != main])
     if main in gained:
         main = max(gained, key=lambda label: chances.get(label, 0.0))
         floors = sizes[main] / max(floor, 1e-6)
-        chances = doubt_small(chances, main, floors / (TOLD if search.told else LARGE))
+        small_ones, alone = (doubt_small(chances, main, floors / size) for size in (LARGE, TOLD))
+        chances = mixed(small_ones, alone, search.told)
     by_effects = sum(sizes[label] ** 2 for label in gained)
     places = [catalogue()[label].place for label in (main, *by_size) if label in catalogue()]
     unknown = probability_unknown(search, bool(gained), bool(ranked), shrinkage, left, noise, by_effects, places)
-    if not gained and not gap_matters(shrinkage):
-        unknown = LEAST_UNKNOWN
+    if not gained:
+        unknown = LEAST_UNKNOWN + (unknown - LEAST_UNKNOWN) * gap_matters(shrinkage)
     chances = {name: value * (1.0 - unknown) for name, value in chances.items()} | {UNKNOWN: unknown}
     likely = main if main in gained else ""
     chances = mix_in_error_rate({label: 0.0 for label in catalogue()} | chances, likely, evident.labels)
@@ -325,19 +331,24 @@ def conclude(
     )  # fmt: skip
 
 
-def with_least_gap(search: Search, hypothesis: Hypothesis, main: str, chances: dict[str, float]) -> dict[str, float]:
+def with_least_gap(
+    search: Search, hypothesis: Hypothesis, main: str, chances: dict[str, float]
+) -> tuple[dict[str, float], float]:
     """Probabilities where labels have more evidence than the main one, in its place: as often as each leaves the least.
 
     The least of the gap on runs left out, by bootstrap over runs. Small effects that are there beside a large one can
-    have more nats than it where noise is not what the file says, and take nothing of its gap.
+    have more nats than it where noise is not what the file says, and take nothing of its gap. And how far they are
+    ahead: 0 where they have no more, 1 where as much more as parts two labels.
     """
     found = alternatives(search, hypothesis, main)
     ahead = [label for label in found if chances.get(label, 0.0) > chances.get(main, 0.0)]
     if not main or not ahead:
-        return chances
+        return chances, 0.0
     least = most_often({label: -left_out_squares(search, found[label]) for label in (main, *ahead)})
     together = sum(chances.get(label, 0.0) for label in least)
-    return chances | {label: together * share for label, share in least.items()}
+    most = max(chances[label] for label in ahead)
+    by_gap = chances | {label: together * share for label, share in least.items()}
+    return by_gap, opened(most / max(chances.get(main, 0.0), 1e-300), 1.0, float(np.exp(TIE)))
 
 
 def movements_of_alternatives(

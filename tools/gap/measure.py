@@ -37,13 +37,20 @@ def mean_square(channel: Channel, error: np.ndarray) -> float:
 
 
 def run_gap(
-    measures: Measures, run: Run, Y: np.ndarray, listed: list[Window], table: np.ndarray | None = None
+    measures: Measures,
+    run: Run,
+    Y: np.ndarray,
+    listed: list[Window],
+    table: np.ndarray | None = None,
+    only: np.ndarray | None = None,
 ) -> RunGap:
     """The gap of a run against its prediction Y (rows, N_Y). Channels without a scored sample are left out.
 
-    `table` (rows, N_Y or more) stands in the place of what the run measured.
+    `table` (rows, N_Y or more) stands in the place of what the run measured; only (rows,): rows that count.
     """
     rows, table = scored_rows(listed, run.rows), measures.measured(run) if table is None else table
+    if only is not None:
+        rows &= only
     squares = {
         channel.name: mean_square(channel, errors(channel, table, Y)[rows]) for channel in measures.channels_of(run)
     }
@@ -61,3 +68,8 @@ def case_channels(gaps: list[RunGap]) -> dict[str, float]:
     """Each channel's rms over the runs that have it, in the order of the runs that have most."""
     names = dict.fromkeys(name for gap in sorted(gaps, key=lambda gap: -len(gap.channels)) for name in gap.channels)
     return {name: root_mean_square([gap.channels[name] for gap in gaps if name in gap.channels]) for name in names}
+
+
+def with_total(gaps: list[RunGap]) -> dict[str, float]:
+    """The same with the `total` first."""
+    return {"total": root_mean_square([gap.total for gap in gaps]), **case_channels(gaps)}

@@ -79,6 +79,9 @@ def vehicle_table(found: Identified) -> dict[str, Any]:
     """The vehicle file's content: the case's vehicle with the posterior's mode in place."""
     vehicle = found.case.roughie
     table: dict[str, Any] = msgspec.to_builtins(vehicle)
+    table["form"] = None if found.held is None else found.held.form
+    if found.file_stays:
+        return table
     P, F, _ = found.free.place(found.read.model, found.best)
     table["hydrodynamics"] |= {name: float(P[PLACES[name]]) for name in (*COEFFICIENTS, "D_p", "D_q", "D_r")}
     table["mass"] |= {name: float(P[PLACES[name]]) for name in ("m_t", "m_r", "m_s", "x_b")}
@@ -100,16 +103,20 @@ def vehicle_table(found: Identified) -> dict[str, Any]:
 
 def vehicle_text(found: Identified) -> str:
     """identified.toml; checked by reading it back."""
-    text = (
-        "# A vehicle identified by `glider identify`; [identified] says from what, and how sure the numbers are.\n"
-        + toml_text(vehicle_table(found), inline=("sensors",))
+    said = (
+        "`glider identify` found nothing that flies runs left out better: the vehicle as its file has it."
+        if found.file_stays
+        else "A vehicle identified by `glider identify`; [identified] says from what, and how sure the numbers are."
     )
+    text = f"# {said}\n" + toml_text(vehicle_table(found), inline=("sensors",))
     decode_vehicle(text, VEHICLE)
     return text
 
 
 def corrected(found: Identified) -> str | None:
     """The same as a model on top of the case's own vehicle, where it has effects: draw-wires' scales, readings."""
+    if found.file_stays:
+        return None
     P, F, _ = found.free.place(found.read.model, found.best)
     nominal = nominal_model(found.case)
     F[ef.BIAS : ef.BIAS + ef.N_BIASES] = 0.0

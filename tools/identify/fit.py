@@ -1,10 +1,11 @@
 """The most probable parameters of a case's flights, the noise's levels, and the runs that do not belong."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from firmware.model.vehicle import COEFFICIENTS
 from sim_backend.core.effects import effect_layout as ef
 from tools.data.runs.case import Case
 from tools.data.runs.run import Run
@@ -14,9 +15,9 @@ from tools.identify.screen import LeftOut
 from tools.identify.statistics import Quadratic, collect, heat
 from tools.inference import levels as noise
 from tools.inference.model import Model
-from tools.inference.prediction_error import identify_by_prediction
+from tools.inference.prediction_error import Fitted, PredictionError
 from tools.inference.problem import Problem, problem_of
-from tools.inference.vehicle_parameters import Parameters, first_effects, listed, parameters
+from tools.inference.vehicle_parameters import FRAME, Parameters, first_effects, listed, parameters
 
 LEVELS = 0.0  # in a schedule: the noise's levels are estimated
 # Times the disturbance in the filter's process noise, one step at each: less and less as the model comes closer.
@@ -27,12 +28,12 @@ AGAIN = (1.0, LEVELS, 1.0)  # where the noise is not what the case says
 # Without motion capture a model may foresee every next row and yet fly elsewhere: of the points that the steps pass,
 # from this roughness on, the one is kept from which the fitted runs themselves are flown best, window by window.
 WATCHED = 30.0
-FAR_OFF = 5.0  # tolerances that the file misses the runs by: what next rows are foreseen by says little there
 LOOK = 10.0  # of them, the one at which runs that do not belong are looked for
 MOST_STEPS = 6  # with all runs
 CORRELATED = 1.5  # heat, from which the priors weigh more than they did in the first fit: a few steps more
 UNLIKE = 0.3  # logarithm of a level
 FIRST_ROWS, LEVEL_ROWS, MOST_ROWS = 9_000, 5_000, 90_000
+WINDOW_ROWS = 9_000  # that are flown window by window
 ODD = 3.0  # times the runs' median of squared innovations, beyond which a run does not belong
 BLOCK = 3.0  # s, stretches of runs whose slopes are compared for the heat
 FAR = 8.0  # posterior sigma; a first fit to some of the runs that is farther off is followed by another step
@@ -49,6 +50,11 @@ class Fit:
     levels: noise.Levels
     left_out: list[LeftOut]
     notes: list[str]
+
+    @property
+    def best(self) -> np.ndarray:
+        """The posterior's mode within its limits, in units of the priors, (n,): what files hold."""
+        return np.maximum(self.quadratic.mode, self.quadratic.low)
 
 
 def some(runs: list[Run], rows: int, seed: int = 1) -> list[int]:
@@ -154,10 +160,6 @@ def fit(
     if sum(run.rows for run in runs) > MOST_ROWS:
         runs = [runs[n] for n in some(runs, MOST_ROWS)]
         notes.append(f"{len(runs)} of the runs were fitted, evenly chosen: more rows would tell little and cost time")
-    if not any(run.has_mocap for run in runs):
-        found = by_prediction(case, model, runs, notes, say)
-        if found is not None:
-            return found
     say("first values and noise")
     first = settle(case, model, [runs[n] for n in some(runs, FIRST_ROWS)], begin)
     gone = {one.run for one in first.left_out}
@@ -189,26 +191,42 @@ def fit(
     return Fit(whole.problem, first.free, at, statistics, first.levels, left_out, notes)
 
 
+def fitting_of(case: Case, model: Model, runs: list[Run], without: Sequence[tuple[str, ...]] = ()) -> PredictionError:
+    """The fit by prediction error to some of these runs, with all that a vehicle may have that nobody identified.
+
+    But for terms (names of their parameters) that it is without.
+    """
+    problem = problem_of(case, model, [runs[n] for n in some(runs, WINDOW_ROWS)])
+    gone = {name for term in without for name in term}
+    free = [*parameters(problem, first=True).free, *first_effects(problem)]
+    # what the capture's frame is off the observer takes as it is
+    return PredictionError(problem, listed(problem, [f for f in free if f.vector != FRAME and f.name not in gone]))
+
+
 def by_prediction(
-    case: Case, model: Model, runs: list[Run], notes: list[str], say: Callable[[str], None]
-) -> Fit | None:
-    """The fit by prediction error where the file misses the runs by more than FAR_OFF tolerances, else None."""
-    problem = problem_of(case, model, runs)
-    free = listed(problem, [*parameters(problem, first=True).free, *first_effects(problem)])
-    missed = flown_gap(case, model, runs, parameters(problem), np.zeros(len(parameters(problem).free)))
-    if missed < FAR_OFF:
-        return None
-    notes.append(
-        f"the vehicle file misses these runs by {missed:.1f} tolerances: identified by prediction error, window by "
-        "window (docs/IDENTIFICATION.md, Far from the file)"
-    )
-    found = identify_by_prediction(problem, free, say)
-    n, low = len(found.values), np.array([f.low for f in free.free])
+    case: Case, model: Model, likelihood: Fit, begin: np.ndarray | None, say: Callable[[str], None]
+) -> Fitted:
+    """The fit by prediction error, from the file's values, the likelihood's and first values of the coefficients."""
+    fitting = fitting_of(case, model, likelihood.problem.runs)
+    starts = [dict(zip(likelihood.free.names, likelihood.free.si(likelihood.best), strict=True))]
+    if begin is not None:
+        sizes = likelihood.free.si(np.concatenate([begin, np.zeros(len(likelihood.best) - len(begin))]))
+        starts.append(dict(zip(COEFFICIENTS, sizes, strict=False)))
+    drawn = fitting.draws() if begin is None else []
+    return fitting.best_of([*(fitting.clipped(fitting.free.values(start)) for start in starts), *drawn], say)
+
+
+def as_fit(fitting: PredictionError, found: Fitted, likelihood: Fit) -> Fit:
+    """What was fitted by prediction error to the likelihood's runs; noise stays as the case has it."""
+    n, low = len(found.values), np.array([f.low for f in fitting.free.free])
     statistics = Quadratic(
         found.values, low, (found.normal - np.eye(n))[None], -found.values[None], np.array([found.independent]),
         np.array([found.independent]), ("windows",),
     )  # fmt: skip
-    return Fit(problem, free, None, statistics, noise.named(problem), [], notes)
+    note = "identified by prediction error, window by window (docs/IDENTIFICATION.md, Of another form)"
+    return Fit(
+        likelihood.problem, fitting.free, None, statistics, noise.named(fitting.problem), likelihood.left_out, [note]
+    )  # fmt: skip
 
 
 def foresees(flown: Flights, at: Linear, statistics: Quadratic) -> bool:

@@ -15,7 +15,7 @@ from tools.gap.mended import Mended, mended
 from tools.identify.acceleration_likelihood import fit_accelerations, suited
 from tools.identify.fit import Fit, fit
 from tools.identify.flight_likelihood import Flights
-from tools.identify.held import Held, hold_out
+from tools.identify.held import FILE, Held, judge
 from tools.identify.identifiability import unidentifiable_directions
 from tools.identify.sampler import Chains, Summary, sample, summarise
 from tools.identify.screen import LeftOut, despiked, screen
@@ -23,7 +23,7 @@ from tools.identify.statistics import Quadratic
 from tools.inference.levels import Levels
 from tools.inference.model import nominal_model
 from tools.inference.problem import Problem
-from tools.inference.vehicle_parameters import Parameters
+from tools.inference.vehicle_parameters import Parameters, coefficients
 
 CHECKED = 24  # draws at which the whole likelihood is compared with its linearisation
 ROUGH = 0.3  # effective share of the draws, below which intervals are called rough
@@ -56,7 +56,7 @@ class Identified:
     notes: list[str]
     seconds: float
     fit: Fit | None = None  # of the flights
-    held: Held | None = None
+    held: Held | None = None  # None by the accelerations
     check: Check | None = None
     accelerations: Quadratic | None = (
         None  # the other likelihood's statistics of the coefficients, where it could be had
@@ -79,13 +79,17 @@ class Identified:
         """The posterior's mode within its limits, in units of the priors, (n,): what files hold."""
         return np.maximum(self.quadratic.mode, self.quadratic.low)
 
+    @property
+    def file_stays(self) -> bool:
+        """Whether the vehicle file's own vehicle is handed out, and what was fitted is only reported."""
+        return self.held is not None and self.held.chosen.name == FILE
+
     def compared(self) -> list[dict[str, Any]]:
         """The coefficients by the accelerations' likelihood, beside this one's."""
         if self.accelerations is None:
             return []
-        count = len(COEFFICIENTS)
-        spread = self.free.spreads[:count]
-        mean = self.free.nominal[:count] + self.accelerations.mode * spread
+        spread = np.array([f.spread for f in coefficients(self.read.model.P)])
+        mean = self.free.nominal[: len(COEFFICIENTS)] + self.accelerations.mode * spread
         sd = np.sqrt(np.diag(self.accelerations.covariance)) * spread
         return [
             {"name": one.name, "mean": m, "sd": s, "difference_in_sd": (m - one.mean) / float(np.hypot(s, one.sd))}
@@ -153,9 +157,8 @@ def identify(
     seed: int = 1,
     likelihood: str = FLIGHTS,
     say: Callable[[str], None] = lambda text: None,
-    leave_out: bool = False,
 ) -> Identified:
-    """Identify the vehicle of a case from its runs; with `leave_out`, predict runs that were left out, too."""
+    """Identify the vehicle of a case from its runs: the candidate that flies runs left out best (held.py)."""
     began = time.perf_counter()
     runs, left_out, spikes = usable(case)
     read = mended(case, nominal_model(case), runs)
@@ -172,7 +175,14 @@ def identify(
         return Identified(
             case, read, likelihood, runs, free, first, chains, summaries, left_out, spikes, [], took
         )  # fmt: skip
-    found = fit(case, model, runs, None if first is None else first.mode, say)
+    begin = None if first is None else first.mode
+    found = fit(case, model, runs, begin, say)
+    held = judge(case, model, found, begin, say)
+    kept = min(held.candidates[1:], key=lambda one: one.total) if held.chosen.fit is None else held.chosen
+    assert kept.fit is not None
+    found = kept.fit
+    if held.chosen.fit is None:
+        found.notes.append(f"identified.toml holds the vehicle file's own numbers: {held.why}; worst in {held.worst}")
     say("chains")
     chains = sample(found.quadratic, seed)
     free = found.free
@@ -183,10 +193,6 @@ def identify(
             "the posterior is not normal: its linearisation misses the whole likelihood "
             f"(effective share of draws {check.share:.2f}); intervals are rough, the vehicle file may be far off"
         )
-    held = None
-    if leave_out:
-        say("flights left out")
-        held = hold_out(case, model, found, say)
     return Identified(
         case, read, likelihood, found.problem.runs, free, found.quadratic, chains, summaries, left_out + found.left_out,
         spikes, found.notes, time.perf_counter() - began, found, held, check, first,

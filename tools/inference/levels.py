@@ -10,6 +10,7 @@ import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import expit
 
 from firmware.core.maths.rotations import wrap
 from sim_backend.core.effects import effect_layout as ef
@@ -30,6 +31,9 @@ COLOURED = 0.2  # logarithm by which noise of every second sample may be more th
 MOST_HELD = 0.2  # share of samples that repeat the one before, from which a reading is held or coarse
 NUDGE, LARGEST_STEP, CLOSE = 0.05, 0.8, 0.02
 ROUNDS = 8
+# 1 sigma of a level's logarithm: as it is found where the file is right (nine in ten within 5 %), and as noise is where
+# the file does not say (0.6 to 2 times what it says): docs/DIAGNOSIS.md, Noise levels.
+ACCURATE, FREE = 0.03, 0.35
 
 
 @dataclass(frozen=True)
@@ -52,9 +56,15 @@ class Levels:
         recorded = None if problem.recorded is None else self.applied(problem.recorded)
         return replace(problem, spectral=spectral, R=R, recorded=recorded)
 
-    def beyond(self, least: float) -> "Levels":
-        """These levels, those whose logarithm is less than `least` as the case names them."""
-        return self.moved(np.where(np.abs(self.log) < least, 0.0, self.log))
+    @property
+    def odds(self) -> np.ndarray:
+        """Nat by which each level says that the case names it rightly, rather than that it may be anything."""
+        right, free = ACCURATE**2 + self.sd**2, FREE**2 + self.sd**2
+        return 0.5 * (np.log(free / right) - self.log**2 * (1.0 / right - 1.0 / free))
+
+    def believed(self, told: float) -> "Levels":
+        """The mean of what each may be; told: the probability that the case names all rightly."""
+        return self.moved(self.log * (1.0 - told) * expit(-self.odds))
 
     def moved(self, log: np.ndarray) -> "Levels":
         return replace(self, log=log)

@@ -78,7 +78,9 @@ def as_known(problem: Problem, gains: Gains, known: np.ndarray | None) -> Gains:
     """Gains of a problem whose poses have been moved where `known` says so, with what was known at each row."""
     if known is None:
         return gains
-    gains.X[problem.recording.bounds[:-1]] = problem.starts  # by readings as they were recorded
+    starts, speed = problem.starts.copy(), problem.kind.speed  # by readings as they were recorded
+    starts[:, speed] = gains.starts[:, speed]
+    gains.X[problem.recording.bounds[:-1]] = starts
     return replace(gains, known=known)
 
 
@@ -99,7 +101,7 @@ def observer_of(problem: Problem) -> Problem:
         z = without_doubled(problem)
     spreads = np.column_stack([problem.spreads, np.tile(kind.lacking_spread, (len(problem.runs), 1))])
     spreads[:, kind.speed_errors] = kind.window_speed_spread
-    return replace(problem, z=z, starts=problem.starts.copy(), spreads=spreads)
+    return replace(problem, z=z, spreads=spreads)
 
 
 def fly_near(problem: Problem, models: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
@@ -113,7 +115,7 @@ def fly_near(problem: Problem, models: list[tuple[np.ndarray, np.ndarray]]) -> n
     Y = np.full((len(models), 1, *problem.z.shape), np.nan)
     problem.kind.fly_followed(
         np.array([P for P, _ in models]), np.array([F for _, F in models]), np.array(problem.kind.drift), r.modes,
-        r.bounds, r.t, problem.stamps, r.inputs, observer.z, observer.starts, gains.W, gains.K, scored.first,
+        r.bounds, r.t, problem.stamps, r.inputs, observer.z, gains.starts, gains.W, gains.K, scored.first,
         scored.last, scored.run_of, np.zeros_like(scored.run_of), Y,
     )  # fmt: skip
     return Y[:, 0]

@@ -12,7 +12,7 @@ the model itself stands.
 - Errors within a window are one error: as many independent residuals are counted as there are windows and channels.
   The prior, 1 sigma of each parameter, is weighed against the misfit that is there, so that it holds while little is
   explained and yields as more is.
-- From several starts: the file's values and the best of RANDOM draws of the prior, each taken through all horizons.
+- From several starts: the file's values and the best of others (RANDOM draws of the prior, or fits by other means).
 """
 
 from collections.abc import Callable, Iterator
@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tools.inference.channels import errors
+from tools.inference.channels import Channel, errors
 from tools.inference.fit import bounded_step
 from tools.inference.predict import observer_of
 from tools.inference.problem import Gains, Problem
@@ -37,6 +37,7 @@ BOLDEST = 1.0  # sigma a step
 STILL = 2e-3  # share of the objective, below which a step has converged
 RANDOM, TAKEN = 12, 1  # draws of the prior that are tried, and those that are followed beside the file's own values
 START_SPREAD = 0.7  # sigma of those draws
+APART = 1.0  # posterior sigma a parameter, from which two ends of the first horizon are followed apart
 SEED = 20261122
 
 
@@ -64,6 +65,16 @@ class Fitted:
     independent: float  # residuals counted as independent
 
     @property
+    def objective(self) -> float:
+        """The misfit with the prior as it is weighed there."""
+        return self.cost + float(self.values @ self.values) * max(self.cost, 1.0) / self.independent
+
+    def distance(self, values: np.ndarray) -> float:
+        """How far other values are, in posterior sigma: the root mean square over parameters."""
+        away = values - self.values
+        return float(np.sqrt(away @ self.normal @ away / len(away)))
+
+    @property
     def covariance(self) -> np.ndarray:
         """Laplace's approximation, (n, n)."""
         return np.linalg.inv(self.normal)
@@ -81,6 +92,7 @@ class PredictionError:
         self.low = np.maximum([f.low for f in free.free], -LIMIT)
         self.high = np.minimum([f.high for f in free.free], LIMIT)
         self.kinked = np.array([f.kinked for f in free.free])
+        self.scales: dict[str, float] = {}  # tolerances by channel that a residual is divided by, 1 where none is given
 
     def model(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(P, F) at values (n,)."""
@@ -104,7 +116,6 @@ class PredictionError:
 
     def gains(self, values: np.ndarray) -> Gains:
         """The observer of the model at `values`."""
-        self.observer.starts[:] = self.problem.starts
         return self.observer.filter(*self.model(values), begin=True, speeds=self.problem.kind.window_speeds)
 
     def fly(self, points: list[np.ndarray], gains: Gains, cuts: list[Windows]) -> np.ndarray:
@@ -117,7 +128,7 @@ class PredictionError:
         cut_of = np.repeat(np.arange(len(cuts)), [len(one.first) for one in cuts])
         problem.kind.fly_followed(
             np.array(Ps), np.array(Fs), np.array(problem.kind.drift), r.modes, r.bounds, r.t, problem.stamps, r.inputs,
-            self.observer.z, self.observer.starts, gains.W, gains.K, first, last, run_of, cut_of, Y,
+            self.observer.z, gains.starts, gains.W, gains.K, first, last, run_of, cut_of, Y,
         )  # fmt: skip
         return Y
 
@@ -125,17 +136,31 @@ class PredictionError:
         """Residuals (models, samples) in tolerances, divided so that their squares add up to a mean over channels."""
         rows, parts = windows.rows, []
         table = self.table[rows]
-        for channel in self.channels:
-            measured = np.isfinite(table[:, list(channel.columns)])
-            if channel.joint:
-                measured[:] = measured.all(axis=1, keepdims=True)
-            if not measured.any():
-                continue
+        for channel, measured in self.measured(table):
             flown = np.array([errors(channel, table, one[rows])[measured] for one in Y])
             flown = np.clip(np.nan_to_num(flown, nan=LARGEST), -LARGEST, LARGEST)
             count = measured.sum() / (len(channel.columns) if channel.joint else 1)
-            parts.append(flown / np.sqrt(count))
+            parts.append(flown / (np.sqrt(count) * self.scales.get(channel.name, 1.0)))
         return np.concatenate(parts, axis=1) / np.sqrt(len(parts))
+
+    def measured(self, table: np.ndarray) -> Iterator[tuple[Channel, np.ndarray]]:
+        """Channels that rows of a table (rows, N_Y) have, and which of their columns were measured, (rows, columns)."""
+        for channel in self.channels:
+            found = np.isfinite(table[:, list(channel.columns)])
+            if channel.joint:
+                found[:] = found.all(axis=1, keepdims=True)
+            if found.any():
+                yield channel, found
+
+    def origins(self, windows: Windows) -> tuple[np.ndarray, np.ndarray]:
+        """Of each residual its run and its channel's number, (samples,) both."""
+        rows = windows.rows
+        runs, of_row, channels = [], self.problem.run_of[rows], []
+        for channel, found in self.measured(self.table[rows]):
+            own = np.broadcast_to(of_row[:, None], found.shape)[found]
+            runs.append(own)
+            channels.append(np.full(len(own), self.channels.index(channel)))
+        return np.concatenate(runs), np.concatenate(channels)
 
     def weights(self, e: np.ndarray) -> tuple[np.ndarray, float]:
         """Of residuals (samples,): each one's weight in the normal equations, and the mean square, large ones tamed."""
@@ -199,19 +224,44 @@ class PredictionError:
         normal, _ = self.linear(values, gains, cuts)
         return Fitted(values, cost, normal / held + np.eye(n), independent)
 
-    def starts(self, rng: np.random.Generator) -> list[np.ndarray]:
-        """The file's values, and the best of some draws of the prior at the first horizon."""
-        horizon, offsets = HORIZONS[0]
-        cuts, n = [self.windows(horizon, offset) for offset in offsets], len(self.low)
-        drawn = [np.clip(rng.normal(size=n) * START_SPREAD, self.low, self.high) for _ in range(RANDOM)]
-        costs = [self.cost(values, cuts)[0] for values in drawn]
-        best = np.argsort(costs, kind="stable")[:TAKEN]
-        return [self.file_values, *(drawn[k] for k in best)]
+    def draws(self) -> list[np.ndarray]:
+        """Some draws of the prior."""
+        rng, n = np.random.default_rng(SEED), len(self.low)
+        return [np.clip(rng.normal(size=n) * START_SPREAD, self.low, self.high) for _ in range(RANDOM)]
 
     @property
     def file_values(self) -> np.ndarray:
         """Where the file stands, (n,)."""
-        return np.clip(np.zeros(len(self.low)), self.low, self.high)
+        return self.clipped(np.zeros(len(self.low)))
+
+    def clipped(self, values: np.ndarray) -> np.ndarray:
+        """Values (n,) within the limits."""
+        return np.clip(np.nan_to_num(values), self.low, self.high)
+
+    def best_of(self, starts: list[np.ndarray], say: Callable[[str], None] = lambda text: None) -> Fitted:
+        """The best end that is reached through all horizons from the file's values or others.
+
+        Of the others, the one that costs least at once is taken. What reaches the same place at the first horizon is
+        followed once.
+        """
+        first, *later = zip(HORIZONS, STEPS, strict=True)
+        cuts = [self.windows(first[0][0], offset) for offset in first[0][1]]
+        others = sorted(starts, key=lambda values: self.cost(values, cuts)[0])
+        begun: list[Fitted] = []
+        for n, values in enumerate([self.file_values, *others[:TAKEN]]):
+            say(f"prediction error, start {n + 1}")
+            begun.append(self.descend(values, *first[0], first[1]))
+        begun.sort(key=lambda one: one.objective)
+        best = begun[0]
+        apart = [best, *(one for one in begun[1:] if best.distance(one.values) > APART)]
+        found = []
+        for one in apart:
+            values = one.values
+            for (horizon, offsets), steps in later:
+                ended = self.descend(values, horizon, offsets, steps)
+                values = ended.values
+            found.append(ended)
+        return min(found, key=lambda one: one.objective)
 
     def through(self, values: np.ndarray) -> Fitted:
         """From values through all horizons."""
@@ -223,17 +273,3 @@ class PredictionError:
     def again(self, values: np.ndarray, steps: int = STEPS[-1]) -> Fitted:
         """From values that fit already, at the last horizon alone."""
         return self.descend(values, *HORIZONS[-1], steps)
-
-
-def identify_by_prediction(
-    problem: Problem, free: Parameters, say: Callable[[str], None] = lambda text: None, many: bool = True
-) -> Fitted:
-    """The best fit of what is free; many: from several starts, else from the file's values alone."""
-    fitting = PredictionError(problem, free)
-    rng = np.random.default_rng(SEED)
-    starts = fitting.starts(rng) if many else [fitting.file_values]
-    found = []
-    for n, start in enumerate(starts):
-        say(f"prediction error, start {n + 1} of {len(starts)}")
-        found.append(fitting.through(start))
-    return min(found, key=lambda one: one.cost + float(one.values @ one.values) * max(one.cost, 1.0) / one.independent)

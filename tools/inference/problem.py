@@ -31,6 +31,7 @@ class Gains:
     path: np.ndarray  # (rows, n_path)
     E: np.ndarray  # (rows, N_Y) whitened innovations, NaN where nothing was measured
     misfit: np.ndarray  # (runs,) -2 log likelihood without its constant
+    starts: np.ndarray  # (runs, n_state) where it began
     # (rows,): behind which row the filter stands that knows of nothing recorded behind a row; None: that row itself
     known: np.ndarray | None = None
 
@@ -48,7 +49,7 @@ class Problem:
     runs: list[Run]
     recording: Recording
     z: np.ndarray  # (rows, N_Y) measured
-    starts: np.ndarray  # (runs, n_state)
+    starts: np.ndarray  # (runs, n_state) by the first readings; the first speed is the filter's to find (Gains)
     spreads: np.ndarray  # (runs, n_error)
     spectral: np.ndarray  # (n_spectral,) of accelerations, of walks of actuators, water and motion capture's clock
     R: np.ndarray  # (runs, N_Y)
@@ -97,17 +98,19 @@ class Problem:
 
     def filter(
         self, P: np.ndarray, F: np.ndarray, roughness: float = 1.0, begin: bool = False, more=None, doubt=None,
-        speeds=None,
+        speeds=None, starts=None,
     ) -> Gains:  # fmt: skip
         """The filter of a model over all runs; `roughness` multiplies the disturbance; `begin` seeks the first speed
-        among `speeds`, the kind's if none are given.
+        among `speeds`, the kind's if none are given. Nothing of the problem changes.
 
-        more (n_spectral,) is added to the spectral densities, doubt (N_Y,) to the variances of the measurements.
+        starts (runs, n_state): where other gains began, in place of the problem's; more (n_spectral,) is added to the
+        spectral densities, doubt (N_Y,) to the variances of the measurements.
         """
         kind, (rows, width), runs = self.kind, self.z.shape, len(self.runs)
         made = Gains(
             np.empty((rows, width, width)), np.empty((rows, self.spreads.shape[1], width)),
             np.empty((rows, kind.n_state)), np.empty((rows, kind.n_path)), np.empty((rows, width)), np.empty(runs),
+            (self.starts if starts is None else starts).copy(),
         )  # fmt: skip
         spectral, speeds = self.densities, kind.speeds if speeds is None else speeds
         spectral[kind.accelerations] += self.spectral[kind.accelerations] * (roughness**2 - 1.0)
@@ -119,7 +122,7 @@ class Problem:
         r = self.recording
         kind.filter_runs(
             P, F, spectral, R, self.model.sigma, np.array(kind.drift), r.modes, r.bounds, r.early, r.t, self.stamps,
-            r.inputs, self.z, self.starts, np.array(speeds if begin else ()), self.spreads, made.X, made.path, made.E,
+            r.inputs, self.z, made.starts, np.array(speeds if begin else ()), self.spreads, made.X, made.path, made.E,
             made.W, made.K, made.misfit,
         )  # fmt: skip
         return made
@@ -133,14 +136,14 @@ class Problem:
         return replace(gains, K=K)
 
     def follow(self, models: list[tuple[np.ndarray, np.ndarray]], gains: Gains) -> np.ndarray:
-        """Whitened innovations of models (P, F) with kept gains, (models, valid samples)."""
+        """Whitened innovations of models (P, F) with kept gains, from where those began: (models, valid samples)."""
         r = self.recording
         places = np.concatenate([[0], np.cumsum(self.valid.sum(axis=1))])[r.bounds]
         E = np.empty((len(models), places[-1]))
         if models:
             self.kind.follow_runs(
                 np.array([P for P, _ in models]), np.array([F for _, F in models]), np.array(self.kind.drift), r.modes,
-                r.bounds, r.t, self.stamps, r.inputs, self.z, self.starts, gains.W, gains.K, self.valid, places,
+                r.bounds, r.t, self.stamps, r.inputs, self.z, gains.starts, gains.W, gains.K, self.valid, places,
                 LOST, E,
             )  # fmt: skip
         return E
@@ -155,7 +158,7 @@ class Problem:
             begins=r.begins[run : run + 1],
         )  # fmt: skip
         return replace(
-            self, runs=[self.runs[run]], recording=recording, z=self.z[at], starts=self.starts[run : run + 1].copy(),
+            self, runs=[self.runs[run]], recording=recording, z=self.z[at], starts=self.starts[run : run + 1],
             spreads=self.spreads[run : run + 1], R=self.R[run : run + 1], valid=self.valid[at],
             stamps=self.stamps[at], recorded=None,
             run_of=np.zeros(at.stop - at.start, dtype=np.int64),
@@ -188,9 +191,7 @@ def variances(kind: Kind, sensors: SensorsTable | OceanSensors) -> np.ndarray:
     return np.array([max(sigma, LEAST_NOISE) ** 2 for sigma in noise])
 
 
-def problem_of(
-    case: Case, model: Model | None = None, runs: list[Run] | None = None, rules: Rules = ALL
-) -> Problem:
+def problem_of(case: Case, model: Model | None = None, runs: list[Run] | None = None, rules: Rules = ALL) -> Problem:
     """The problem of a case (all of its runs, if none are named)."""
     kind = kind_of(case.vehicle)
     model = nominal_model(case) if model is None else model

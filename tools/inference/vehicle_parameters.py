@@ -20,6 +20,9 @@ from tools.inference.problem import Problem
 
 # 1 sigma before any flight. [uncertainty] says what is left after one: these are what a first vehicle file may be off.
 K_SHARE = 0.5  # of a coefficient's size
+# The same of damping, one-sided, for a vehicle that nobody identified. By strip theory wings of span b and chord c damp
+# roll by rho a c b^3 / 24 V (0.7 m: ten times a bare hull's), a fin of area S at a lever l yaw by rho a S l^2 / 2 V.
+DAMPING, DAMPING_SHARE = ("K_p", "K_q", "K_r"), 3.0
 CAMBER, TRIM_ANGLE = 0.025, 0.03  # rad of attack by which lift and pitch moment may be displaced where a file says 0
 ADDED_SHARE, NET_MASS, CG = 0.15, 0.01, 0.0005  # of added mass and inertia; kg; m
 FIRST = 10.0  # times these trims, where no motion capture holds the flight
@@ -68,6 +71,10 @@ class Parameters:
         """Values (..., n) in units of the priors as SI."""
         return self.nominal + values * self.spreads
 
+    def values(self, si: dict[str, float]) -> np.ndarray:
+        """Values (n,) in units of the priors at these numbers, SI by name; the file's for what is not named."""
+        return np.array([(si.get(f.name, at) - at) / f.spread for f, at in zip(self.free, self.nominal, strict=True)])
+
     def place(self, model: Model, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The model at values (n,): parameters P, effects F, and the capture's frame (6,)."""
         P, F, frame = model.P.copy(), effect_vector(model), np.zeros(6)
@@ -86,14 +93,16 @@ def coefficient_sizes(P: np.ndarray) -> np.ndarray:
     return np.maximum(size, 1e-3)
 
 
-def coefficients(P: np.ndarray) -> list[FreeParameter]:
-    """The twelve, with priors about the vehicle file's values."""
+def coefficients(P: np.ndarray, first: bool = False) -> list[FreeParameter]:
+    """The twelve, with priors about the vehicle file's values; first: of a vehicle that nobody identified."""
     found = []
     for name, size in zip(COEFFICIENTS, coefficient_sizes(P), strict=True):
         entry = getattr(layout, name.upper())
-        spread = K_SHARE * size
+        damps = first and name in DAMPING
+        spread = (DAMPING_SHARE if damps else K_SHARE) * size
         low = -P[entry] / spread if name in ("K_D0", "K_D") else -inf  # drag does not push
-        found.append(FreeParameter("", name, "P", entry, spread, low, inf, K_UNITS[name]))
+        high = max(-P[entry] / spread, 0.0) if damps else inf  # nor does damping drive
+        found.append(FreeParameter("", name, "P", entry, spread, low, high, K_UNITS[name]))
     return found
 
 
@@ -134,7 +143,7 @@ def _capture(problem: Problem) -> list[FreeParameter]:
 def parameters(problem: Problem, first: bool = False) -> Parameters:
     """What is free for these recordings; first: of a vehicle that nobody identified."""
     mocap = bool(problem.seen[ef.Y_MOCAP_X])
-    free = [*coefficients(problem.model.P), *_masses(problem, 1.0 if mocap else FIRST), *_biases(problem)]
+    free = [*coefficients(problem.model.P, first), *_masses(problem, 1.0 if mocap else FIRST), *_biases(problem)]
     if mocap:
         free += _capture(problem)
     else:

@@ -144,7 +144,7 @@ def flights(found: Identified) -> list[dict[str, Any]]:
             title = f"{channel.name}, {channel.unit}"
             if not np.isfinite(table[:, column]).any():
                 continue
-            said = {"nominal": held.nominal[n][:, column], "corrected": held.identified[n][:, column]}
+            said = {"nominal": held.candidates[0].flown[n][:, column], "corrected": held.chosen.flown[n][:, column]}
             lines = compared(run.t, table[:, column], said, listed, scale, wraps=not down)
             charts.append({"title": title, "svg": svg(Chart(title, "s", lines, down=down), 0.05)})
         shown.append(

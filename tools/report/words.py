@@ -217,10 +217,11 @@ def sentence(record: Record) -> str:
 def _none(record: Record) -> str:
     gap = record.answer.gap
     before, refitted, floor = (number(finite(table["total"])) for table in (gap.before, gap.recalibrated, gap.floor))
+    certain = f"; certain by the readings alone: {joined(record.answer.selected)}" if record.answer.selected else ""
     return (
         f"No gap: noise, disturbance and parameters within their uncertainty explain these runs ({how_sure(record)}); "
         f"on runs left out of the fit the total is {before} tolerances with the nominal model and {refitted} with its "
-        f"parameters refitted, where noise and disturbance alone leave {floor}."
+        f"parameters refitted, where noise and disturbance alone leave {floor}{certain}."
     )
 
 
@@ -283,8 +284,10 @@ def _unknown(record: Record) -> str:
         likely = answer.where[0]
         said += f", most likely in {likely.subsystem}: {likely.element} ({sure(likely.probability)})"
     known = "with nothing added to the model"
-    if answer.selected:
-        known = f"with the nearest known effects in the model ({joined(answer.selected)})"
+    by_readings = {one.label for one in answer.readings} - {label for stage in answer.stages for label in stage.added}
+    added = [label for label in answer.selected if label not in by_readings]
+    if added:
+        known = f"with the nearest known effects in the model ({joined(added)})"
     said += f"; {how_far(record, known)}"
     correction = None if answer.unknown is None else answer.unknown.correction
     if correction is not None:

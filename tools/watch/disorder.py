@@ -25,7 +25,8 @@ def probe_gains(flights: Flights, wanted: Sequence[NoiseProbe], runs: Sequence[i
     for j, n in enumerate(runs):
         part = flights.parts[n]
         model = flights.shared.model(part, flights.own_values(n))
-        bare = float(part.filter(*model).misfit[0])
+        own = part.filter(*model, begin=True)
+        bare = float(own.misfit[0])
         for i, probe in enumerate(wanted):
             best = 0.0
             for k, scale in enumerate(SCALES):
@@ -33,7 +34,8 @@ def probe_gains(flights: Flights, wanted: Sequence[NoiseProbe], runs: Sequence[i
                     gains[i, j, k] = gains[i, j, k - 1]
                     continue
                 more, doubt = inflated(part, probe, scale)
-                value = 0.5 * (bare - float(part.filter(*model, more=more, doubt=doubt).misfit[0])) / flights.heat
+                tried = part.filter(*model, more=more, doubt=doubt, starts=own.starts)
+                value = 0.5 * (bare - float(tried.misfit[0])) / flights.heat
                 gains[i, j, k] = value = value if np.isfinite(value) else -1e9
                 best = max(best, value)
                 if value < best - FAR_BEHIND:

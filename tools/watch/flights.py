@@ -113,7 +113,7 @@ class Flights:
         """-2 log likelihood over the heat of a run, as `part` knows it, at its most probable values about x."""
         one = expand(part, self.shared, x)
         own = one.at + self.deviation_of(one)
-        return float(part.filter(*self.shared.model(part, own)).misfit[0]) / self.heat
+        return float(part.filter(*self.shared.model(part, own), begin=True).misfit[0]) / self.heat
 
     def own_values(self, n: int) -> np.ndarray:
         """The values of a run with its own deviation, (count,)."""

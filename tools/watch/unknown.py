@@ -51,7 +51,8 @@ def what_is_left(history: History, event: Event) -> Left:
         return NOTHING  # a clock that wanders is still one that is wrong
     left = max(found[0][1], 0.0)
     place = history.effects[event.label].place if event.label in history.effects else ("", "")
-    own = place[0] == "sensing" and place == place_alone((probe, gain) for probe, gain, _ in found)
+    first, sure = place_alone((probe, gain) for probe, gain, _ in found)
+    own = place[0] == "sensing" and place == first and sure > 0.5
     return Left(left / max(left + explained * len(rough), 1e-9), found, own)
 
 

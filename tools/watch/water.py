@@ -98,7 +98,7 @@ def a_sea(flights: Flights, runs: Sequence[int], wanted: Sequence[NoiseProbe], g
         part = flights.parts[n]
         model = flights.shared.model(part, flights.own_values(n))
         each = [inflated(part, waves, scale) for scale in SCALES]
-        tried = [part.filter(*model, more=more, doubt=doubt) for more, doubt in each]
+        tried = [part.filter(*model, begin=True, more=more, doubt=doubt) for more, doubt in each]
         shares.append(line_share(part, min(tried, key=lambda one: float(one.misfit[0]))))
     return min(shares) >= LINE
 
@@ -113,7 +113,7 @@ def linked(event: Event, wanted: Sequence[NoiseProbe], gains: np.ndarray) -> Eve
 def burstiness(flights: Flights, n: int) -> float:
     """By how much a run's squared innovations change from one stretch to the next, over how far they exceed 1."""
     part = flights.parts[n]
-    E = part.filter(*flights.shared.model(part, flights.own_values(n))).E
+    E = part.filter(*flights.shared.model(part, flights.own_values(n)), begin=True).E
     rows = max(2, int(STRETCH / np.median(np.diff(part.recording.t))))
     each = [np.nanmean(E[k : k + rows] ** 2) for k in range(0, len(E) - rows + 1, rows)]
     return float(np.std(each) / max(np.mean(each) - 1.0, 0.05))

@@ -3,7 +3,8 @@
 State x, covariance `cov` (N_E, N_E) of the error state and everything else stand in the caller's arrays as
 firmware/core/layouts/estimator_layout has them; a step allocates nothing.
 
-Prediction: equation (1) with the model's error added, in sub-steps of at most MAX_STEP. The model's error is a first
+Prediction: equation (1) with the model's error added, in sub-steps of at most MAX_STEP, and of less where the
+vehicle's time constants ask for it (firmware/core/vehicle/time_constants). The model's error is a first
 order Gauss-Markov process whose variance follows, state by state, from the vehicle file's [uncertainty]: errors of
 parameters stay, so their accelerations change as slowly as the flight does; that is S_ERROR_TIME. The disturbance held
 0.1 s enters as white noise of the same spectral density. The covariance is carried by the flight linearised about
@@ -24,7 +25,7 @@ and comes off in one go. What does not fit:
 nothing it sees can tell from the truth, are not in it.
 
 Valid for |pitch| < 84 deg in roll and yaw (beyond it both are skipped: Euler angles say little there) and for speeds
-up to SPEED_LIMIT, above which the integration at MAX_STEP is not stable. Tested in tests/unit/estimator.
+up to SPEED_LIMIT, where the update holds the estimate. Tested in tests/unit/estimator.
 """
 
 import math
@@ -36,9 +37,10 @@ from firmware.core.maths.steps import MIDPOINT, end_stage
 from firmware.core.maths.wide import anywhere, everywhere, where
 from firmware.core.vehicle.actuators import actuator_rates
 from firmware.core.vehicle.flight import add_accelerations, state_derivative
-from firmware.core.vehicle.layout import N_X, SERVO_TAU, X_NU
+from firmware.core.vehicle.layout import N_X, SERVO_TAU, X_NU, X_QUAT
 from firmware.core.vehicle.linearise import N_POINT, linearise, linearise_motion, model_error
-from firmware.core.vehicle.state import actuators, normalise_attitude
+from firmware.core.vehicle.state import actuators, normalise_attitude, quaternion
+from firmware.core.vehicle.time_constants import nominal_parts
 
 T0, R0 = kf.W_T * kf.N_W, kf.W_TURNED * kf.N_W  # in the flat work: T = F cov, and A's columns
 
@@ -67,7 +69,11 @@ def flight_derivative(P, x, mode, c_servo, c_slider, c_ballast, out):
 
 @kernel
 def predict_state(P, x, mode, c_servo, c_slider, c_ballast, d, dt, k, total, y):
-    """One midpoint step of x in place; the model's error shrinks by d[3:9]. k, total, y are scratch of N_XE."""
+    """One midpoint step of x in place; the model's error shrinks by d[3:9]. k, total, y are scratch of N_XE.
+
+    A lane whose dt is 0 stays as it is, to the bit.
+    """
+    turned = quaternion(x)
     for i in range(kf.N_XE):
         y[i] = x[i]
     for stage in range(len(MIDPOINT)):
@@ -76,6 +82,8 @@ def predict_state(P, x, mode, c_servo, c_slider, c_ballast, d, dt, k, total, y):
     for i in range(6):
         x[kf.X_ERR + i] *= d[3 + i]
     normalise_attitude(x)
+    for i in range(4):
+        x[X_QUAT + i] = where(dt > 0.0, x[X_QUAT + i], turned[i])
 
 
 @kernel
@@ -199,7 +207,7 @@ def scale_error(x, inflation, C, f, dt, drive):
     """Into drive: C, where the model errs by more than its sigma, inflated; at least the error's own square."""
     fade = math.exp(-dt / kf.INFLATION_TIME)
     for n in range(2):
-        inflation[n] = 1.0 + (inflation[n] - 1.0) * fade
+        inflation[n] = where(dt > 0.0, 1.0 + (inflation[n] - 1.0) * fade, inflation[n])
     for i in range(6):
         most = kf.ERROR_LINEAR if i < 3 else kf.ERROR_ANGULAR
         f[i] = math.sqrt(max(1.0, min(inflation[i // 3], most * most / max(C[i, i], 1e-12))))
@@ -263,7 +271,7 @@ def linearise_where_due(P, settings, sigma, x, ds, dl, db, dt, work):
     """A at x into work; equation (1) linearised anew, and C, where their time is over or speeds have changed."""
     A, turned = work[kf.W_A : kf.W_A + kf.N_MOVING], work[kf.W_TURNED : kf.W_TURNED + kf.N_COUPLED - kf.E_ATT]
     held = work[kf.W_HELD]
-    gone, over = moved(x, work[kf.W_POINT]), held[0] < 0.5 * dt
+    gone, over = (dt > 0.0) & moved(x, work[kf.W_POINT]), (dt > 0.0) & (held[0] < 0.5 * dt)
     error_over = over & (held[1] < 0.5 * dt)
     due, error_due = gone | over, gone | error_over
     if anywhere(due):
@@ -282,15 +290,22 @@ def linearise_where_due(P, settings, sigma, x, ds, dl, db, dt, work):
 
 @kernel
 def estimator_predict(P, settings, sigma, x, cov, inflation, mode, c_servo, c_slider, c_ballast, dt, work):
-    """Carry x and cov over dt (s) in sub-steps of at most MAX_STEP, actuators as in actuator_speeds."""
+    """Carry x and cov over dt (s) in sub-steps of at most MAX_STEP and short enough for the vehicle's time constants.
+
+    Actuators as in actuator_speeds. Each lane takes as many sub-steps as its own state asks for; a lane that waits for
+    one with more may differ in the last place of its covariance.
+    """
     A, C, drive = work[kf.W_A : kf.W_A + kf.N_MOVING], work[kf.W_C : kf.W_C + 6], work[kf.W_DRIVE : kf.W_DRIVE + 6]
     k, y, d = work[kf.W_SCRATCH], work[kf.W_SCRATCH + 1], work[kf.W_SCRATCH + 2]
     scratch = work[kf.W_SCRATCH + 3]
     steps = 1
     while anywhere(steps < dt / kf.MAX_STEP - 1e-9):
         steps += 1
-    h = dt / steps
-    for _ in range(steps):
+    count = steps * nominal_parts(MIDPOINT, P, x, mode, dt / steps)
+    step, done = dt / count, 0
+    while anywhere(done < count):
+        h = where(done < count, step, 0.0)  # a lane that is there waits for the others
+        done += 1
         ds, dl, db = actuator_speeds(P, x, mode, c_servo, c_slider, c_ballast)
         if mode & kf.FRESH:
             work[kf.W_HELD, 0], work[kf.W_HELD, 1] = 0.0, 0.0

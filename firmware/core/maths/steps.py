@@ -9,7 +9,7 @@ of the step. Each stage starts from x along the derivative of the one before it.
 
 The derivative is called by name and not handed over: a kernel that is an argument takes its own arguments in a tuple,
 and counting that tuple's references costs a quarter of the step.
-Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.1.
+Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.1; the limits of stability: II, IV.2.
 """
 
 from firmware.core.jit import inlined_kernel
@@ -17,6 +17,16 @@ from firmware.core.jit import inlined_kernel
 NODE, WEIGHT = 0, 1
 RK4 = ((0.0, 1.0 / 6.0), (0.5, 1.0 / 3.0), (0.5, 1.0 / 3.0), (1.0, 1.0 / 6.0))  # the classical one, order 4
 MIDPOINT = ((0.0, 0.0), (0.5, 1.0))  # order 2
+RK4_STABLE, MIDPOINT_STABLE = 2.785, 2.0
+
+
+@inlined_kernel
+def stable_product(method):
+    """Return the largest product of step and rate of decay at which a decaying motion does not grow.
+
+    |R(-z)| <= 1 up to there, with R(z) = 1 + z + z^2/2 (+ z^3/6 + z^4/24 of RK4).
+    """
+    return RK4_STABLE if len(method) == len(RK4) else MIDPOINT_STABLE
 
 
 @inlined_kernel

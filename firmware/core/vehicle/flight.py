@@ -7,10 +7,12 @@ water), servo (rad), slider (m), ballast (kg).
 from firmware.core.jit import inlined_kernel, kernel
 from firmware.core.maths.rotations import quaternion_rate, rotation_nb
 from firmware.core.maths.steps import RK4, end_stage
+from firmware.core.maths.wide import anywhere, where
 from firmware.core.vehicle.actuators import actuator_rates
 from firmware.core.vehicle.layout import N_X, X_BALLAST, X_DOWN, X_EAST, X_NORTH, X_NU, X_QUAT, X_SERVO, X_SLIDER
 from firmware.core.vehicle.motion import accelerations
 from firmware.core.vehicle.state import actuators, normalise_attitude, quaternion, velocities
+from firmware.core.vehicle.time_constants import nominal_parts
 
 
 @inlined_kernel
@@ -67,13 +69,21 @@ def nominal_derivative(P, x, cmd_servo, cmd_slider, cmd_ballast, water_n, water_
 
 @kernel
 def nominal_step(P, x, cmd_servo, cmd_slider, cmd_ballast, water_n, water_e, water_d, dt, work):
-    """One Runge-Kutta step, in place; work is (3, N_X) of scratch, or more."""
+    """One Runge-Kutta step, in place, in as many parts as its time constants ask for (time_constants).
+
+    work is (3, N_X) of scratch, or more.
+    """
     k, total, y = work[0], work[1], work[2]
-    for i in range(N_X):
-        y[i] = x[i]
-    for stage in range(len(RK4)):
-        nominal_derivative(P, y, cmd_servo, cmd_slider, cmd_ballast, water_n, water_e, water_d, k)
-        end_stage(RK4, stage, dt, x, k, total, y, N_X)
+    parts, part = nominal_parts(RK4, P, x, 0, dt), 0
+    h = dt / parts
+    while anywhere(part < parts):
+        ahead = where(part < parts, h, 0.0)  # a lane that is there stays where it is
+        for i in range(N_X):
+            y[i] = x[i]
+        for stage in range(len(RK4)):
+            nominal_derivative(P, y, cmd_servo, cmd_slider, cmd_ballast, water_n, water_e, water_d, k)
+            end_stage(RK4, stage, ahead, x, k, total, y, N_X)
+        part += 1
     normalise_attitude(x)
 
 

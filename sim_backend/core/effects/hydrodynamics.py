@@ -6,6 +6,8 @@ from firmware.core.jit import kernel
 from firmware.core.maths.wide import anywhere, where
 from firmware.core.vehicle import layout
 from firmware.core.vehicle.actuators import clip
+from firmware.core.vehicle.state import velocities
+from firmware.core.vehicle.time_constants import attack_bound, least_inertia
 from firmware.core.vehicle.water import flow_angles, flow_to_body
 from sim_backend.core.effects import effect_layout as ef
 
@@ -80,6 +82,32 @@ def extra_wrench(P, F, kx, depth, u, v, w, p, q, r):
         M += M1
         N += N1
     return X, Y, Z, K, M, N
+
+
+@kernel
+def extra_rate(P, F, x):
+    """An upper bound of the rates of decay that `extra_wrench` adds at x, 1/s (firmware/core/vehicle/time_constants).
+
+    Stall and trims add none: one takes lift away, the others hang on no speed but that of the flow.
+    """
+    u, v, w, _, q, r = velocities(x)
+    mass, _, I2, I3 = least_inertia(P, x)
+    inertia, rate = min(I2, I3), 0.0
+    if anywhere(F[ef.LINEAR_DRAG] != 0.0):
+        rate += abs(F[ef.LINEAR_DRAG]) / mass
+    if anywhere(F[ef.CLIMB_DIVE] != 0.0):
+        alpha = attack_bound(u, w)
+        slope = 2.0 * P[layout.K_D0] + 2.0 * P[layout.K_D] * alpha * (alpha + 1.0)
+        rate += abs(F[ef.CLIMB_DIVE]) * slope * math.sqrt(u * u + v * v + w * w) / mass
+    if anywhere(F[ef.PITCH_DAMPING_ACROSS] != 0.0) or anywhere(F[ef.YAW_DAMPING_ACROSS] != 0.0):
+        rate += 2.0 * abs(F[ef.PITCH_DAMPING_ACROSS] * P[layout.K_Q] * q) / I2
+        rate += 2.0 * abs(F[ef.YAW_DAMPING_ACROSS] * P[layout.K_R] * r) / I3
+    if anywhere(F[ef.TETHER] != 0.0) or anywhere(F[ef.TETHER_GROWTH] != 0.0):
+        vt, wt = v + ef.TAIL * r, w - ef.TAIL * q
+        pull = (F[ef.TETHER] + F[ef.TETHER_GROWTH] * max(x[layout.X_DOWN], 0.0)) * max(1.0, F[ef.TETHER_ACROSS])
+        arm = abs(ef.TAIL) + abs(ef.TAIL_TOP)
+        rate += 2.0 * pull * math.sqrt(u * u + vt * vt + wt * wt) * (1.0 / mass + arm * arm / inertia)
+    return rate
 
 
 @kernel

@@ -5,8 +5,11 @@ import pytest
 
 from firmware.core.control.controller_rows import CONTROLLERS
 from firmware.core.layouts import control_layout as ctl
+from firmware.core.layouts.estimator_layout import MAX_STEP
+from firmware.core.maths.steps import MIDPOINT
 from firmware.core.maths.wide import LANES
-from firmware.core.vehicle.layout import X_NU
+from firmware.core.vehicle.layout import K_P, X_NU
+from firmware.core.vehicle.time_constants import nominal_parts
 from sim_backend.core.closed_loop import N_END, N_TRACE, fly
 from sim_backend.fleet import fly_group, groups_of
 from tools.flight.compose import build_flight
@@ -79,6 +82,25 @@ def test_a_dive_is_that_of_the_scalar_loop_but_for_the_last_places(mission, cont
         assert ticks == alone
         np.testing.assert_allclose(end, ended, rtol=0.0, atol=BOUND)
         np.testing.assert_allclose(trace, scalar, rtol=0.0, atol=BOUND)
+
+
+def test_flights_of_real_wings_are_those_of_the_scalar_loop():
+    """K_p of -40: plant and filter divide their steps, each lane for itself (firmware/core/vehicle/time_constants)."""
+    flights = [flight("spiral", seed, controller) for seed, controller in enumerate(("pid", "law+"))]
+    for world, pilot in flights:
+        world.P, pilot.P = world.P.copy(), pilot.P.copy()
+        world.P[K_P] = pilot.P[K_P] = -40.0
+    ticks, fastest = 2000, 0.0
+    for (_, took, trace), (world, pilot) in zip(flown(flights, ticks), flights, strict=True):
+        scalar, ended = np.full((ticks, N_TRACE), np.nan), np.zeros(N_END)
+        alone = fly(
+            world.P, pilot.P, pilot.C, pilot.legs, pilot.nav, world.E, world.F, world.waves, world.sensors,
+            world.errors, world.seed, world.x, world.dt, len(scalar), 1, scalar, ended,
+        )  # fmt: skip
+        assert took == alone
+        np.testing.assert_allclose(trace, scalar, rtol=0.0, atol=BOUND)
+        fastest = max(fastest, nominal_parts(MIDPOINT, pilot.P, world.x, 0, MAX_STEP))
+    assert fastest > 1.0
 
 
 def test_groups_hold_flights_of_one_kind():

@@ -90,3 +90,26 @@ def test_blanking_what_comes_later_changes_no_earlier_innovation(problem):
         problem.z[:] = kept
     assert np.array_equal(whole.E[:cut], blanked.E[:cut], equal_nan=True)
     assert np.array_equal(whole.X[:cut], blanked.X[:cut])
+
+
+def test_no_call_depends_on_the_calls_before_it(problem):
+    """Filters that begin at other speeds, of the problem and of a variant of it, change nothing of what others say."""
+    own, other = (problem.model.P, np.zeros(ef.N_F)), (problem.model.P * 1.05, np.zeros(ef.N_F))
+    variant = problem.with_extra_noise(np.zeros(problem.kind.n_spectral))
+
+    def asked() -> list[np.ndarray]:
+        gains = problem.filter(*own, begin=True)
+        return [gains.E, gains.starts, problem.follow([own, other], gains), problem.filter(*own).E]
+
+    first, before = asked(), problem.starts.copy()
+    slow, fast = (one.filter(*other, begin=True, speeds=(u,)) for one, u in ((problem, 0.03), (variant, 0.4)))
+    assert not np.array_equal(slow.starts, fast.starts)
+    np.testing.assert_array_equal(problem.starts, before)
+    for one, again in zip(first, asked(), strict=True):
+        np.testing.assert_array_equal(one, again)
+    # kept gains know where they began: a filter from there is theirs
+    for gains in (slow, fast):
+        np.testing.assert_array_equal(problem.filter(*other, starts=gains.starts).E, gains.E)
+    at_slow, at_fast = (problem.follow([other], gains)[0] for gains in (slow, fast))
+    np.testing.assert_allclose(at_slow, slow.E[problem.valid], rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(at_fast, fast.E[problem.valid], rtol=1e-9, atol=1e-9)

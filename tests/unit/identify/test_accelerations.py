@@ -8,6 +8,7 @@ from tools.data.errors import InputError
 from tools.data.runs.run import Run
 from tools.data.sources import load_vehicle
 from tools.identify.acceleration_likelihood import _width, fit_accelerations, kinematics
+from tools.identify.core.regressors import flown_servo
 from tools.identify.design import make_runs
 from tools.inference.model import Model
 from tools.inference.vehicle_parameters import coefficient_sizes
@@ -44,6 +45,21 @@ def test_velocities_are_those_flown():
     assert np.all(speed < 1.0)
     assert speed.mean() * 18.0 > np.linalg.norm(ends[-1] - ends[0])  # no path is shorter than a straight line
     assert world.P.shape == vehicle.vector().shape
+
+
+@pytest.mark.parametrize("time_constant", [0.1, 0.002])
+def test_a_servo_is_flown_exactly_however_fast(time_constant):
+    t = np.arange(41) * 0.05
+    commands = np.where(t < 1.0, 0.5, -2.0)  # the last is beyond its range
+    low, high, rate = -0.7, 0.7, 2.0
+    servo, exact, at = np.empty(41), [0.0], 0.0
+    flown_servo(t, commands, low, high, rate, time_constant, servo)
+    for command in commands[:-1]:
+        for _ in range(1000):
+            at += 5e-5 * np.clip((np.clip(command, low, high) - at) / time_constant, -rate, rate)
+        exact.append(at)
+    np.testing.assert_allclose(servo, exact, atol=1e-4)
+    assert servo[-1] == pytest.approx(low, abs=0.002)
 
 
 def test_bandwidth_is_as_stated():

@@ -31,6 +31,15 @@ def test_written_vehicle_reads_back_as_it_was():
     assert again == vehicle
 
 
+def test_what_the_form_leaves_is_read_back():
+    gaps = {"all": {"total": 0.9, "roll": 1.6}, "turning": {"total": 1.2, "roll": 2.1}}
+    form = decode_vehicle(identified() + toml_text({"form": {"runs": 12, "gaps": gaps}}), "v.toml").form
+    assert form.runs == 12
+    assert form.gaps == gaps
+    with pytest.raises(ConfigError, match=r"form\.gaps"):
+        decode_vehicle(identified() + toml_text({"form": {"runs": 12, "gaps": {"all": {"roll": -1.0}}}}), "v.toml")
+
+
 def test_trim_reaches_the_parameters():
     P = decode_vehicle(identified(), "v.toml").vector()
     assert P[layout.NET_MASS] == 0.002

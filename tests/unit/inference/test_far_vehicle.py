@@ -11,7 +11,7 @@ from tools.data.runs.case import Case
 from tools.diagnose.staged import Staged, staged
 from tools.diagnose.staged_answer import identified_text
 from tools.inference.model import nominal_model
-from tools.inference.prediction_error import PredictionError, identify_by_prediction
+from tools.inference.prediction_error import PredictionError
 from tools.inference.problem import problem_of
 from tools.inference.vehicle_parameters import parameters
 
@@ -87,6 +87,7 @@ def test_a_vehicle_as_its_file_says_stays_there(tmp_path):
     """No parameter leaves its file's value by more than its posterior allows."""
     made = make_case(tmp_path, np.zeros(ef.N_F), seed=32, runs=1)
     problem = problem_of(made)
-    fit = identify_by_prediction(problem, parameters(problem), many=False)
+    fitting = PredictionError(problem, parameters(problem))
+    fit = fitting.through(fitting.file_values)
     assert fit.cost < 1.0
     assert np.abs(fit.values / np.sqrt(np.diag(fit.covariance))).max() < 3.0

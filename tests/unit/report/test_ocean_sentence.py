@@ -3,7 +3,7 @@
 import pytest
 
 from tools.diagnose.record import read_as
-from tools.report.ocean import _Answer, sentence
+from tools.report.pooled import _Answer, sentence
 
 GAP = '"before": {"total": 1.0}, "recalibrated": {"total": 0.5}, "after": {"total": 0.2}, "floor": {"total": 0.2}'
 SHARE = '{"value": 0.5, "ci90": [0.4, 0.6]}'

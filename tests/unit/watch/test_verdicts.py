@@ -47,8 +47,9 @@ def test_a_change_far_from_those_keeps_its_label():
 def test_what_is_left_where_the_label_sits_and_nowhere_else_is_another_form():
     """A gyro whose error grows with depth is no bias, though a bias explains nine tenths of it."""
     gyro, servo = NoiseProbe("gyro", "sensor", "sensing", "gyro"), NoiseProbe("servo", "actuator", "actuation", "servo")
-    assert place_alone([(servo, 1.0), (gyro, 300.0), (gyro, 20.0)]) == ("sensing", "gyro")
-    assert place_alone([(gyro, 300.0), (servo, 150.0)]) is None
+    assert place_alone([(servo, 1.0), (gyro, 300.0), (gyro, 20.0)]) == (("sensing", "gyro"), 1.0)
+    assert place_alone([(gyro, 300.0), (servo, 150.0)])[1] == 0.0
+    assert 0.0 < place_alone([(gyro, 300.0), (servo, 100.0)])[1] < 1.0
     assert Left(0.09, []).probability < 0.4
     assert Left(0.09, [], own=True).probability > 0.8
     assert Left(0.005, [], own=True).probability < 0.1

@@ -12,7 +12,7 @@ from tools.data.runs import columns as names
 from tools.data.runs.case import load_case
 from tools.identify.ocean.files import vehicle_text
 from tools.identify.ocean.identify import identify_ocean
-from tools.report.ocean import write_ocean_report
+from tools.report.pooled import write_pooled_report
 from tools.study.challenge.ocean_cases import as_run, flown, with_change
 from tools.watch.whole_case import diagnose_ocean, plain, write
 
@@ -61,7 +61,7 @@ def test_two_effects_are_both_named(tmp_path, identified):
     assert answer["gap"]["after"]["depth"] < 0.5 * answer["gap"]["recalibrated"]["depth"]
     assert sum(one["probability"] for one in answer["causes"]) == pytest.approx(1.0)
     write(found, tmp_path)
-    told = write_ocean_report(tmp_path)
+    told = write_pooled_report(tmp_path)
     assert all(label in told for label in found.selected)
 
 
@@ -83,7 +83,7 @@ def test_what_no_label_names_is_unknown(tmp_path, identified):
     answer = json.loads((tmp_path / "diagnosis.json").read_text())
     assert answer["left"]["channel"] == "depth"
     assert any("no label explains" in one for one in answer["cautions"])
-    assert "no label" in write_ocean_report(tmp_path)
+    assert "no label" in write_pooled_report(tmp_path)
 
 
 def test_rougher_water_is_no_unknown_effect(tmp_path, identified):

@@ -3,6 +3,8 @@
 The terms are those that the plant flies with (firmware/core); nothing of equation (1) is written twice.
 """
 
+import math
+
 import numpy as np
 
 from firmware.core.jit import allocating_kernel, kernel
@@ -48,12 +50,13 @@ def momentum_rows(P, attitude, nu, actuators, M, N, K):
 
 @kernel
 def flown_servo(t, commands, low, high, rate, time_constant, out):
-    """The nominal servo under its commands from 0 on, out (rows,), rad: it has no sensor (docs/MODEL.md, Actuators)."""
-    at = 0.0
-    for i in range(len(t)):
-        out[i] = at
-        if i + 1 < len(t):
-            steps = max(1, int(np.ceil((t[i + 1] - t[i]) / 0.01 - 1e-9)))
-            h = (t[i + 1] - t[i]) / steps
-            for _ in range(steps):
-                at += h * clip((clip(commands[i], low, high) - at) / time_constant, -rate, rate)
+    """The nominal servo under its commands from 0 on, out (rows,), rad: it has no sensor (docs/MODEL.md, Actuators).
+
+    Exact for commands held from row to row: at its full rate as long as it is far off, then by its lag.
+    """
+    out[:1] = 0.0
+    for i in range(1, len(t)):
+        wanted, dt = clip(commands[i - 1], low, high), t[i] - t[i - 1]
+        off = wanted - out[i - 1]
+        full = clip(abs(off) / rate - time_constant, 0.0, dt)  # s at full rate
+        out[i] = wanted - (off - math.copysign(rate * full, off)) * math.exp((full - dt) / time_constant)

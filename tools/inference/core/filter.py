@@ -22,7 +22,7 @@ from firmware.core.vehicle.actuators import clip
 from firmware.core.vehicle.batch import gather
 from firmware.core.vehicle.layout import N_P, SERVO_MAX, SERVO_MIN, X_ACT, X_NU, X_SERVO
 from firmware.core.vehicle.state import rotation
-from sim_backend.core.effect_plant import effective_parameters
+from sim_backend.core.effect_plant import effect_parts, effective_parameters
 from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.correction import link_of
 from tools.inference.core.error_layout import (
@@ -59,6 +59,7 @@ from tools.inference.core.step import (
     propagate,
     read_now,
     read_row,
+    step_count,
 )
 
 LOST_SPEED = 3.0  # m/s; a glider of this class flies at 0.2 to 0.7: an observer that thinks it faster has lost it
@@ -116,6 +117,9 @@ def linear_step(
     Phi[E_LATE, E_LATE] = 1.0
     for n in range(6):
         many[n, :] = acc[n]
+    # one and the same number for all of them: where one had more than the other, that would be their difference
+    dt = t[i] - t[i - 1]
+    parts = effect_parts(MIDPOINT, Pw, F, x, mode, dt / step_count(dt))
     for first in range(E_DOWN - 1, E_LATE, LANES):  # the first of all is x as it stands, which the others are off from
         for n in range(LANES):
             copy(x, moved)
@@ -123,7 +127,7 @@ def linear_step(
                 perturbed(x, first + n, error, moved)
             copy(moved, states[:, n])
         propagate(
-            Pws, Fs, as_wide(states), mode, t, inputs, i, begin, as_wide(many), zero, works, keeps, MIDPOINT
+            Pws, Fs, as_wide(states), mode, t, inputs, i, begin, as_wide(many), zero, works, keeps, MIDPOINT, parts
         )  # fmt: skip
         if first < E_DOWN:
             copy(states[:, 0], base)
@@ -134,7 +138,7 @@ def linear_step(
                 for m in range(N_ERR):
                     Phi[m, first + n] = error[m] / NUDGE
     propagate(Pw, F, x, mode, t, inputs, i, begin, acc, zero, work, kept, RK4)
-    noise_gain(x, t[i] - t[i - 1], Gam)
+    noise_gain(x, dt, Gam)
 
 
 @kernel

@@ -11,7 +11,7 @@ from firmware.core.maths.rotations import wrap_angle
 from firmware.core.maths.wide import anywhere, everywhere, lane, lanes, spread, where, with_lane
 from firmware.core.vehicle.layout import X_ACT, X_NU, X_POS, X_QUAT
 from firmware.core.vehicle.state import euler_angles, quaternion
-from sim_backend.core.effect_plant import effect_step
+from sim_backend.core.effect_plant import effect_parts, effect_step
 from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.correction import correction, link_of
 from sim_backend.core.effects.sensing import read
@@ -19,7 +19,7 @@ from sim_backend.core.effects.timing import mean_input, mocap_lateness
 from tools.inference.core.error_layout import E_ACT, E_ATT, E_LATE, E_NU, E_POS
 
 N_Y = ef.N_Y
-MAX_STEP = 0.1  # s
+MAX_STEP = 0.1  # s; a step is divided where the vehicle's time constants ask for it
 LARGEST_SPEED = 20.0  # m/s, rad/s: a model that flies faster has left every vehicle, and is held where it was
 
 
@@ -79,25 +79,36 @@ def inputs_of_step(delay, t, inputs, i, begin, since, h):
 
 
 @kernel
-def propagate(Pw, F, x, mode, t, inputs, i, begin, acc, zero, work, kept, method):
+def step_count(dt):
+    """How many steps of at most MAX_STEP a row of dt (s) is flown in."""
+    return max(1, math.ceil(dt / MAX_STEP - 1e-9))
+
+
+@kernel
+def propagate(Pw, F, x, mode, t, inputs, i, begin, acc, zero, work, kept, method, parts=0.0):
     """Fly from row i - 1 to row i, in place; acc (6) added to nu_dot; kept (N_XF), zero (3), work are scratch.
 
-    method: one of firmware/core/maths/steps. x, work and kept of wide numbers fly as many states as have lanes.
+    method: one of firmware/core/maths/steps. x, work and kept of wide numbers fly as many states as have lanes. parts:
+    into how many a step is divided; 0: as the time constants at its start ask for.
     """
     dt = t[i] - t[i - 1]
-    steps = max(1, math.ceil(dt / MAX_STEP - 1e-9))
+    steps = step_count(dt)
     h, delay = dt / steps, F[ef.COMMAND_DELAY]
     for k in range(steps):
         c0, c1, c2 = inputs_of_step(delay, t, inputs, i - 1, begin, t[i - 1] + k * h, h)
         copy(x, kept)
         since = t[i - 1] - t[begin] + k * h
-        effect_step(method, Pw, F, x, mode, c0, c1, c2, since, acc, 0.0, zero, h, work)
-        worst = 0.0
-        for n in range(X_NU, X_ACT):
-            worst = max(worst, abs(x[n]))
-        if not everywhere(worst < LARGEST_SPEED):
+        divided = spread(parts, x[X_NU])
+        if parts == 0.0:
+            divided = effect_parts(method, Pw, F, x, mode, h)
+        effect_step(method, Pw, F, x, mode, c0, c1, c2, since, acc, 0.0, zero, h, divided, work)
+        # a divided step that overflowed is held; a model that has no numbers itself (its steps are whole) stays lost
+        sound = (abs(x[X_NU]) < LARGEST_SPEED) | (math.isnan(x[X_NU]) & (divided == 1.0))
+        for n in range(X_NU + 1, X_ACT):
+            sound = sound & ((abs(x[n]) < LARGEST_SPEED) | (math.isnan(x[n]) & (divided == 1.0)))
+        if not everywhere(sound):
             for n in range(len(x)):
-                x[n] = where(worst < LARGEST_SPEED, x[n], kept[n])
+                x[n] = where(sound, x[n], kept[n])
 
 
 @kernel

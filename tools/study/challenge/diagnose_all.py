@@ -13,15 +13,14 @@ from tools.study.many_cases import ANSWER, CASES, Asked, Many, Told, Word, ask, 
 
 DIAGNOSIS, WATCH, MISSION, FORM = "diagnosis", "watch", "mission", "form"  # kinds of blind tests
 ANSWERS = {DIAGNOSIS: FILE, WATCH: WATCH_FILE, MISSION: WATCH_FILE, FORM: FILE}
-REFERENCE_WORD = "REFERENCE"  # among what is handed on: the folder of the case's healthy runs
 
 
 def commands(case: Path, part: Path, extra: tuple[str, ...], kind: str) -> list[list[Word]]:
     """What is asked of a case in turn, each a `glider` command without its name; the answers go into `part`.
 
     A mission's vehicle is identified on the dives before anything changed; with it follow watch and velocity. A
-    vehicle of another form is identified on its healthy runs, then diagnosed as the vehicle that was identified.
-    REFERENCE_WORD in `extra` is replaced by the folder of these runs.
+    vehicle of another form is identified on its healthy runs, then diagnosed against them as the vehicle that was
+    identified.
     """
     if kind == DIAGNOSIS:
         diagnose: list[Word] = ["gap", "diagnose", case, "--out", part, *extra]
@@ -30,8 +29,9 @@ def commands(case: Path, part: Path, extra: tuple[str, ...], kind: str) -> list[
     vehicle = part / IDENTIFIED / VEHICLE_FILE
     identify: list[Word] = ["identify", before, "--out", part / IDENTIFIED]
     if kind == FORM:
-        handed_on: list[Word] = [before if word == REFERENCE_WORD else word for word in extra]
-        return [identify, ["gap", "diagnose", case, "--vehicle", vehicle, "--out", part, *handed_on]]
+        return [
+            identify, ["gap", "diagnose", case, "--vehicle", vehicle, "--reference", before, "--out", part, *extra]
+        ]  # fmt: skip
     watch: list[Word] = ["gap", "watch", case, "--out", part, *extra, "--reference", before]
     if kind == WATCH:
         return [watch]

@@ -1,17 +1,22 @@
-"""The report of an ocean glider's diagnosis, drawn from its diagnosis.json (docs/OCEAN.md, Diagnosis)."""
+"""The report of a diagnosis that asks for what all runs of a case share, drawn from its diagnosis.json.
+
+An ocean glider's (docs/OCEAN.md, Diagnosis), or one against healthy runs (docs/DIAGNOSIS.md, Against healthy runs).
+"""
 
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
-from sim_backend.ocean.catalogue import catalogue
-from tools.diagnose.record import ANSWER, Cause, Gap, number, read_as
+from sim_backend.core.effects.catalogue import catalogue as pool_catalogue
+from sim_backend.ocean.catalogue import catalogue as ocean_catalogue
+from tools.diagnose.record import AGAINST_HEALTHY, ANSWER, Cause, Gap, number, read_as
 from tools.report import words
 from tools.report.page import REPORT, render
 
 MOST_RANKED, LEAST = 8, 0.005
 MEANS = words.MEANS | {"none": "nothing beyond what the vehicle file allows"}
+HEALTHY_MEANS = words.MEANS | {"none": "nothing that the healthy runs have not"}
 
 
 class _Stage(msgspec.Struct):
@@ -34,7 +39,12 @@ class _Case(msgspec.Struct):
     runs: int
 
 
+class _Reference(msgspec.Struct):
+    runs: list[str]
+
+
 class _Answer(msgspec.Struct):
+    kind: str
     case: _Case
     verdict: str
     causes: list[Cause]
@@ -45,10 +55,44 @@ class _Answer(msgspec.Struct):
     skipped: dict[str, str]
     next_run: dict[str, Any]
     left: _Left | None = None
+    reference: _Reference | None = None
+
+    @property
+    def effects(self):
+        """The catalogue of its labels."""
+        return pool_catalogue() if self.kind == AGAINST_HEALTHY else ocean_catalogue()
+
+
+def sure(found: _Answer) -> str:
+    """How sure the main cause is."""
+    return f"{words.small_percent(found.causes[0].probability)} sure"
+
+
+def against_healthy(found: _Answer) -> str:
+    """The verdict of a diagnosis against healthy runs in one plain sentence."""
+    before, after, floor = (words.number(number(one["total"])) for one in
+                            (found.gap.before, found.gap.after, found.gap.floor))  # fmt: skip
+    gaps = f"the total gap of runs left out is {before} tolerances, of healthy runs {floor}"
+    named = words.joined(found.selected)
+    if found.verdict == "none":
+        return f"No change: {gaps}."
+    if found.verdict == "unknown":
+        beside = f"; nearest to it comes {named}, with which {after} are left" if named else ""
+        return f"A change that no label explains: {gaps}{beside}."
+    label = found.causes[0].label
+    alike = [name for name in found.causes[0].group if name != label]
+    other = f"; these runs cannot tell it from {words.joined(alike)}" if alike else ""
+    more = f", and {words.joined(found.selected[1:])}" if found.selected[1:] else ""
+    return (
+        f"{words.upper(found.effects[label].summary)} ({label}; {sure(found)})"
+        f"{more}{other}; {gaps}, and with it {after}."
+    )
 
 
 def sentence(found: _Answer) -> str:
     """The verdict in one plain sentence."""
+    if found.kind == AGAINST_HEALTHY:
+        return against_healthy(found)
     before, again, after = (words.number(number(one["total"])) for one in
                             (found.gap.before, found.gap.recalibrated, found.gap.after))  # fmt: skip
     if found.left is not None:
@@ -68,18 +112,18 @@ def sentence(found: _Answer) -> str:
     more = f", and {words.joined(found.selected[1:])}" if found.selected[1:] else ""
     other = f"; these dives cannot tell it from {words.joined(alike)}" if alike else ""
     return (
-        f"{words.upper(catalogue()[label].summary)} ({label}; {words.small_percent(found.causes[0].probability)} sure)"
+        f"{words.upper(found.effects[label].summary)} ({label}; {sure(found)})"
         f"{more}{other}; the total gap of dives left out is {before} tolerances with the file's numbers, {again} with "
         f"them fitted and {after} with {'these effects' if more else 'that effect'}."
     )
 
 
 def _ranking(found: _Answer) -> list[dict[str, Any]]:
-    effects = catalogue()
+    effects, means = found.effects, HEALTHY_MEANS if found.kind == AGAINST_HEALTHY else MEANS
     return [
         {
             "label": one.label, "percent": 100.0 * one.probability, "shown": words.small_percent(one.probability),
-            "means": MEANS.get(one.label) or effects[one.label].summary,
+            "means": means.get(one.label) or effects[one.label].summary,
         }
         for n, one in enumerate(found.causes[:MOST_RANKED]) if one.probability >= LEAST or n < 3
     ]  # fmt: skip
@@ -100,7 +144,14 @@ def report_html(found: _Answer) -> str:
     """The page's text; MissingExtra without jinja2."""
     gap = found.gap
     highest = max([number(one.gap["total"]) for one in found.stages], default=1.0)
+    healthy = found.reference
     context = {
+        "runs": "run" if healthy is not None else "dive",
+        "asked": "Probabilities of the one effect that all dives have beside what the vehicle file allows."
+        if healthy is None
+        else f"Probabilities of the main change from {len(healthy.runs)} healthy runs.",
+        "floor": "what noise and vertical water alone leave" if healthy is None
+        else "what the identified vehicle leaves of healthy runs, each flown by a fit to the others",
         "case": found.case, "verdict": found.verdict, "sentence": sentence(found), "ranking": _ranking(found),
         "sizes": _sizes(found), "cautions": [words.upper(line) for line in found.cautions], "skipped": found.skipped,
         "stages": [
@@ -115,11 +166,11 @@ def report_html(found: _Answer) -> str:
         ],
         "next_run": found.next_run.get("text", ""),
     }  # fmt: skip
-    return render("ocean.html", context).replace(" %", "\N{NO-BREAK SPACE}%")
+    return render("pooled.html", context).replace(" %", "\N{NO-BREAK SPACE}%")
 
 
-def write_ocean_report(folder: Path) -> str:
-    """Draw the report of an ocean glider's diagnosis from its folder, into it; the verdict, in a sentence."""
+def write_pooled_report(folder: Path) -> str:
+    """Draw the report of such a diagnosis from its folder, into it; the verdict, in a sentence."""
     found = read_as(folder / ANSWER, _Answer)
     (folder / REPORT).write_text(report_html(found), encoding="utf-8")
     return sentence(found)

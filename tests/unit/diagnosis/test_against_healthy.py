@@ -1,0 +1,154 @@
+"""Diagnosis against healthy runs, on a vehicle that does not obey equation (4)."""
+
+import json
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+
+from firmware.core.vehicle import layout
+from firmware.model.vehicle import COEFFICIENTS, PLACES, Vehicle
+from tools.cli.common import report_errors
+from tools.cli.main import cli
+from tools.data.runs.case import load_case
+from tools.data.sources import load_vehicle
+from tools.data.tomltext import toml_text
+from tools.diagnose import against_healthy as against
+from tools.diagnose.against_healthy import Comparison, Healthy, Hypothesis, diagnose_against_healthy, plain, weigh
+from tools.study.challenge.form_cases import draw_healthy, write_flights
+from tools.study.challenge.form_fit import fit_flights, fit_forces
+from tools.study.challenge.form_plan import BY_LABEL
+from tools.study.challenge.trial import with_effect
+
+pytestmark = pytest.mark.computes(seconds=90)
+
+HEALTHY, LATER = 5, 3
+LABEL = "servo_offset"
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    """Healthy runs, later ones of the same vehicle unchanged and with a servo askew, and the nearest file."""
+    folder = tmp_path_factory.mktemp("form")
+    file = load_vehicle("roughie")
+    found = draw_healthy(np.random.default_rng(20), file, HEALTHY + LATER)
+    assert found is not None
+    trial, flights = found
+    sizes, _ = BY_LABEL[LABEL].draw(np.random.default_rng(1))
+    later = replace(trial, designs=trial.designs[HEALTHY:])
+    askew = later.fly(with_effect(trial.shapes, BY_LABEL[LABEL], sizes, 1.0))
+    write_flights(folder / "healthy", trial, flights[:HEALTHY])
+    write_flights(folder / "unchanged", trial, flights[HEALTHY:])
+    write_flights(folder / "askew", trial, askew)
+    nearest = vehicle_of(file, fit_flights(trial, flights[:HEALTHY], fit_forces(trial, flights[:HEALTHY])))
+    (folder / "nearest.toml").write_text(toml_text(nearest, inline=("sensors",)))
+    return folder
+
+
+def vehicle_of(file: Vehicle, P: np.ndarray) -> dict:
+    table = msgspec.to_builtins(file)
+    table["hydrodynamics"] |= {name: float(P[PLACES[name]]) for name in COEFFICIENTS}
+    table["mass"]["added_mass"] = P[layout.A_X : layout.A_Z + 1].tolist()
+    table["mass"]["added_inertia"] = P[layout.B_X : layout.B_Z + 1].tolist()
+    return {key: value for key, value in table.items() if value not in (None, {})}
+
+
+def diagnosed(place, name):
+    vehicle = str(place / "nearest.toml")
+    return diagnose_against_healthy(load_case(place / name, vehicle), load_case(place / "healthy", vehicle))
+
+
+@pytest.fixture(scope="module")
+def askew(place):
+    return diagnosed(place, "askew")
+
+
+def test_what_the_form_leaves_is_no_cause(place):
+    found = diagnosed(place, "unchanged")
+    assert (found.verdict, found.selected) == ("none", [])
+    assert found.left["none"] < 2.0  # of what healthy runs leave
+
+
+def test_a_change_beside_the_wrong_form_is_found_and_shrinks_what_was_left_out(askew):
+    assert askew.verdict == "cause"
+    assert askew.selected[0] == LABEL
+    (size,) = askew.sizes[LABEL].values()
+    assert size["ci90"][0] < 0.25 < size["ci90"][1]  # rad, as it was drawn
+    assert askew.shrinkage.after < 0.7 * askew.shrinkage.before
+    assert askew.left["none"] > 3.0 > min(askew.left.values())
+
+
+def test_probabilities_add_up_and_a_millionth_of_the_noise_moves_none(place, askew):
+    assert sum(askew.probabilities.values()) == pytest.approx(1.0)
+    vehicle, rng = str(place / "nearest.toml"), np.random.default_rng(5)
+    case = load_case(place / "askew", vehicle)
+    for run in case.runs:
+        for name in ("pitch_rad", "roll_rad", "yaw_rad", "q_rad_s", "depth_m"):
+            run.columns[name] = run.columns[name] + 1e-8 * rng.standard_normal(run.rows)
+    again = diagnose_against_healthy(case, load_case(place / "healthy", vehicle))
+    assert again.selected == askew.selected
+    assert max(abs(again.probabilities[k] - p) for k, p in askew.probabilities.items() if p > 0.01) < 0.02
+
+
+def test_healthy_runs_are_seen_as_the_case_is(place):
+    case = load_case(place / "askew")
+    for run in case.runs:
+        for name in [name for name in run.columns if name.startswith("mocap")]:
+            del run.columns[name]
+    seen = against.as_the_case_sees(load_case(place / "healthy").runs[0], case)
+    assert not seen.has_mocap
+    assert set(seen.columns) == set(case.runs[0].columns)
+
+
+def compared(logs: list[float], places: int = 40) -> Comparison:
+    """A comparison that nothing is flown for."""
+    found = object.__new__(Comparison)
+    found.healthy = Healthy(["run"] * len(logs), {}, np.array(logs))
+    found.places = {f"label{n}": np.array([n]) for n in range(places)}
+    found.bare = 1.0
+    return found
+
+
+@pytest.mark.parametrize(("left", "least", "most"), [(1.0, 0.0, 0.1), (3.0, 0.5, 0.95), (12.0, 0.9, 1.0)])
+def test_unknown_is_what_healthy_runs_do_not_leave(left, least, most, monkeypatch):
+    monkeypatch.setattr(Comparison, "independent", 40.0)
+    at = compared([0.1, -0.2, 0.3, -0.1, 0.0, 0.2, -0.3, 0.05])
+    one = Hypothesis((), np.zeros(40), np.full(6, left / 6.0), np.zeros((6, 40)), np.zeros(40))
+    assert least <= weigh(at, [one]).probabilities()["unknown"] <= most
+
+
+def test_a_label_that_does_not_shrink_what_was_left_out_is_none(monkeypatch):
+    monkeypatch.setattr(Comparison, "independent", 40.0)
+    at = compared([0.1, -0.2, 0.3, -0.1])
+    nothing, label = (
+        Hypothesis(labels, np.zeros(40), np.full(6, left / 6.0), np.zeros((6, 40)), np.zeros(40))
+        for labels, left in (((), 1.0), (("label1",), 1.01))
+    )
+    assert "label1" not in weigh(at, [nothing, label]).probabilities()
+
+
+def command(monkeypatch, *arguments: object) -> int:
+    monkeypatch.setattr("sys.argv", ["glider", "gap", "diagnose", *map(str, arguments)])
+    return report_errors(cli)
+
+
+def test_the_command_leaves_answer_model_and_report(place, tmp_path, monkeypatch, askew):
+    vehicle = place / "nearest.toml"
+    words = [place / "askew", "--reference", place / "healthy", "--vehicle", vehicle, "--out", tmp_path]
+    assert command(monkeypatch, *words) == 0
+    answer = json.loads((tmp_path / "diagnosis.json").read_text())
+    assert answer["selected"] == plain(askew)["selected"]
+    assert answer["gap"]["after"]["total"] < answer["gap"]["before"]["total"]
+    assert answer["reference"]["runs"] == [f"run{n:02d}" for n in range(HEALTHY)]
+    assert "healthy runs" in (tmp_path / "report.html").read_text()
+    assert (tmp_path / "corrected.toml").is_file()
+
+
+def test_what_does_not_go_together_is_refused(place, tmp_path, monkeypatch, capsys):
+    words = [place / "askew", "--reference", place / "healthy", "--without", "splice", "--out", tmp_path]
+    assert command(monkeypatch, *words) == 2
+    assert "--reference" in capsys.readouterr().err
+    assert command(monkeypatch, place / "askew", "--reference", place / "nowhere", "--out", tmp_path) == 2
+    assert "nowhere" in capsys.readouterr().err
+    assert not (tmp_path / "diagnosis.json").exists()

@@ -1,0 +1,44 @@
+"""An answer is a smooth function of the readings: a millionth of their noise moves no verdict."""
+
+import numpy as np
+import pytest
+from support.cases import make_case
+
+from sim_backend.core.effects import effect_layout as ef
+from tools.data.runs import columns as names
+from tools.measure.figures.steady import Said, largest_move, line, moved, said
+
+pytestmark = pytest.mark.computes(seconds=15)
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory):
+    F = np.zeros(ef.N_F)
+    F[ef.DRAG_0], F[ef.GYRO_SCALE] = 0.6, 0.08
+    return make_case(tmp_path_factory.mktemp("steady"), F, seed=6, runs=2)
+
+
+def test_a_copy_s_readings_move_by_a_millionth_of_their_noise_and_its_commands_by_nothing(case):
+    copy, again, other = moved(case, 3), moved(case, 3), moved(case, 4)
+    for run, one, same, apart in zip(case.runs, copy.runs, again.runs, other.runs, strict=True):
+        for name in (*names.COMMANDS, names.TIME):
+            np.testing.assert_array_equal(one.columns[name], run.columns[name])
+        away = one.columns[names.DEPTH] - run.columns[names.DEPTH]
+        assert np.std(away) == pytest.approx(1e-6 * case.sensors.depth.noise, rel=0.2)
+        np.testing.assert_array_equal(one.columns[names.DEPTH], same.columns[names.DEPTH])
+        assert not np.array_equal(one.columns[names.DEPTH], apart.columns[names.DEPTH])
+
+
+def test_an_answer_stays(case):
+    own, copy = said(case), said(moved(case, 1))
+    assert copy.verdict == own.verdict
+    assert copy.selected == own.selected
+    assert largest_move(own, copy)[1] < 0.02
+
+
+def test_what_is_said_of_copies():
+    own = Said("cause", frozenset({"drag"}), {"drag": 0.9, "none": 0.1})
+    other = Said("none", frozenset(), {"drag": 0.4, "none": 0.5, "unknown": 0.1})
+    assert largest_move(own, other) == ("drag", pytest.approx(0.5))
+    text = line("case000", own, [own, other])
+    assert text == "case000: 2 copies, cause 0.900 drag moves by 0.5; another verdict 1, others selected 1"

@@ -1,0 +1,515 @@
+"""Diagnosis against healthy runs of the same vehicle: what do a case's runs do that the healthy ones do not?
+
+The vehicle file is one that was identified, and misses healthy runs by what its form cannot do. How far, channel by
+channel, is learned from healthy runs, each flown by a fit to the others; the case's windows are then weighed in units
+of that (docs/DIAGNOSIS.md, Against healthy runs). Every hypothesis is fitted without each of the case's runs and judged
+on that run, so that an effect has to shrink what it has not seen:
+
+- no change: what the vehicle file allows;
+- a label's parameters beside that, one label or a few;
+- and with each of these, that something more is left than healthy runs leave: unknown.
+"""
+
+import json
+from collections.abc import Callable, Iterable, Sequence, Set
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.special import logsumexp
+from scipy.stats import norm
+from scipy.stats import t as student
+
+from tools.data.errors import InputError
+from tools.data.plain import as_plain
+from tools.data.runs import columns
+from tools.data.runs.case import Case
+from tools.data.runs.csvfile import write_bytes
+from tools.data.runs.run import Run
+from tools.diagnose.record import AGAINST_HEALTHY, ANSWER, NONE, UNKNOWN
+from tools.diagnose.shrink import AFTER, BEFORE, FLOOR, RECALIBRATED, Shrinkage, by_channel, shrinkage_of
+from tools.gap.measure import RunGap, root_mean_square, run_gap
+from tools.gap.regimes import ALL
+from tools.inference.channels import recorded
+from tools.inference.corrected import corrected_text
+from tools.inference.fit import bounded_step
+from tools.inference.model import effect_vector, effects_in, nominal_model
+from tools.inference.parameters import NINETY, FreeParameter, effect_parameters, model_at, nuisance_parameters
+from tools.inference.predict import fly
+from tools.inference.prediction_error import HORIZONS, PredictionError
+from tools.inference.problem import Problem, cut, problem_of
+from tools.inference.vehicle_parameters import Parameters
+
+CAUSE = "cause"
+CHANGED, STRANGE = 0.5, 0.15  # prior probability of a change; that something is left beside what is named
+LEFT = 1.5  # 1 sigma of the logarithm of the mean square that something unknown leaves, times what healthy runs leave
+FORM = 0.2  # of a change, 1 sigma, that is not as its label's equations have it
+SITE = 0.25  # 1 sigma of that logarithm from one place and way of flying to another
+PRIOR_RUNS = 1.0  # runs that what is usual of that logarithm's scatter is worth
+USUAL_SCATTER = 0.5
+LEAST_SCALE = 0.05  # tolerances
+REFINED, FURTHER, MOST = 6, 4, 3  # labels fitted in full at first, beside others, and effects at most
+STEPS = 3
+STILL = 0.02  # sigma of the priors, by which a step moves nothing any more
+ALIKE = 6.0  # nat within which labels are not told apart
+LEAST = 0.005  # a smaller probability is not written down
+CORRECTED = "corrected.toml"
+
+
+class Windows(PredictionError):
+    """Windows of runs with a list of free parameters about a problem's own model."""
+
+    def __init__(self, problem: Problem, free: Sequence[FreeParameter], scales: dict[str, float]):
+        super().__init__(problem, Parameters(list(free), np.zeros(len(free))))
+        self.scales = scales
+
+    def model(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(P, F) at values (n,)."""
+        return model_at(self.problem, self.free.free, values)
+
+    @cached_property
+    def cuts(self) -> list:
+        """The windows, cut in more than one way."""
+        horizon, offsets = HORIZONS[-1]
+        return [self.windows(horizon, offset) for offset in offsets]
+
+    @property
+    def independent(self) -> float:
+        """Residuals that can be independent: one a window and channel."""
+        return float(len(self.cuts[0].first) * len(self.channels))
+
+    def linearised(self, values: np.ndarray) -> "Linearised":
+        """Every run's mean square about values (n,)."""
+        n, runs = len(values), len(self.problem.runs)
+        normal, slope, value = np.zeros((runs, n, n)), np.zeros((runs, n)), np.zeros(runs)
+        squares: list[tuple[np.ndarray, ...]] = []
+        for one, (e, J) in zip(self.cuts, self.columns(values, self.gains(values), self.cuts), strict=True):
+            weight = self.weights(e)[0] / len(self.cuts)
+            run_of, channel_of = self.origins(one)
+            squares.append((e, J, weight, run_of, channel_of))
+            for run in range(runs):
+                own = np.flatnonzero(run_of == run)
+                weighted = J[:, own] * weight[own]
+                normal[run] += weighted @ J[:, own].T
+                slope[run] += weighted @ e[own]
+                value[run] += float(weight[own] @ e[own] ** 2)
+        return Linearised(values, value, slope, normal, self, squares)
+
+
+@dataclass
+class Linearised:
+    """Mean squares of runs, value + 2 slope d + d normal d at values + d; over channels, in healthy runs' units."""
+
+    values: np.ndarray  # (n,)
+    value: np.ndarray  # (runs,)
+    slope: np.ndarray  # (runs, n)
+    normal: np.ndarray  # (runs, n, n)
+    windows: Windows
+    samples: list[tuple[np.ndarray, ...]]
+
+    def step(self, free: np.ndarray, weight: float, without: int | None = None) -> np.ndarray:
+        """The most probable step (n,) in some of the parameters, by all runs but one; weight of a mean square of 1."""
+        kept = np.arange(len(self.value)) != (-1 if without is None else without)
+        normal = weight * self.normal[kept].sum(axis=0)[np.ix_(free, free)] + np.eye(len(free))
+        slope = weight * self.slope[kept].sum(axis=0)[free] + self.values[free]
+        low, high = self.windows.low - self.values, self.windows.high - self.values
+        step = np.zeros(len(self.values))
+        step[free] = bounded_step(normal, slope, np.minimum(low[free], 0.0), np.maximum(high[free], 0.0))
+        return step
+
+    def held_out(self, free: np.ndarray, weight: float) -> tuple[np.ndarray, np.ndarray]:
+        """Mean squares (runs,) of runs left out, and the steps without each, (runs, n)."""
+        runs = len(self.value)
+        steps = np.array([self.step(free, weight, run if runs > 1 else None) for run in range(runs)])
+        left = self.value + 2.0 * (self.slope * steps).sum(axis=1)
+        return left + np.einsum("ri,rij,rj->r", steps, self.normal, steps), steps
+
+    def by_channel(self, steps: np.ndarray) -> np.ndarray:
+        """Mean squares (channels,) of runs at their own steps (runs, n), in the units of the residuals."""
+        found = np.zeros(len(self.windows.channels))
+        for e, J, weight, run_of, channel_of in self.samples:
+            at = e + np.einsum("ns,sn->s", J, steps[run_of])
+            found += np.bincount(channel_of, weight * at * at, len(found))
+        return found * len(found)
+
+
+@dataclass
+class Healthy:
+    """What healthy runs leave: by channel in tolerances, and the logarithm of a run's mean square in those units."""
+
+    runs: list[str]
+    scales: dict[str, float]
+    logs: np.ndarray  # (runs,)
+
+    @property
+    def freedom(self) -> float:
+        """Degrees of freedom of the logarithms' scatter."""
+        return len(self.logs) - 1 + PRIOR_RUNS
+
+    @property
+    def scatter(self) -> float:
+        """1 sigma of the logarithm from run to run."""
+        squares = float(np.square(self.logs - self.logs.mean()).sum()) + PRIOR_RUNS * USUAL_SCATTER**2
+        return float(np.sqrt(squares / self.freedom))
+
+    @property
+    def independent(self) -> float:
+        """Independent residuals of a run: of so many the mean square has this scatter (chi-squared)."""
+        return 2.0 / self.scatter**2
+
+
+def learn(case: Case, runs: list[Run]) -> Healthy:
+    """Every healthy run flown by what the vehicle file allows, fitted to the others.
+
+    Where the vehicle was identified from these runs they are held too well: [form] has the gaps of runs left out.
+    """
+    problem = problem_of(case, runs=runs)
+    free = nuisance_parameters(problem)
+    every, scales = np.arange(len(free)), dict[str, float]()
+    form = case.roughie.form.gaps[ALL] if case.roughie.form is not None else {}
+    for _ in range(2):  # first in tolerances, then in what the first found
+        windows = Windows(problem, free, scales)
+        at = windows.linearised(windows.file_values)
+        left, steps = at.held_out(every, windows.independent)
+        measured = np.sqrt(at.by_channel(steps))
+        scales = {
+            channel.name: max(float(one) * scales.get(channel.name, 1.0), form.get(channel.name, 0.0), LEAST_SCALE)
+            for channel, one in zip(windows.channels, measured, strict=True)
+        }
+    share = np.array([np.sum(run_of == n) for n in range(len(runs)) for _, _, _, run_of, _ in at.samples[:1]])
+    return Healthy([run.name for run in runs], scales, np.log(np.maximum(left * share.sum() / share, 1e-6)))
+
+
+@dataclass
+class Hypothesis:
+    """Labels beside what the vehicle file allows, fitted to the case's runs."""
+
+    labels: tuple[str, ...]
+    values: np.ndarray  # (n,) of every free parameter, those of other labels 0
+    left: np.ndarray  # (runs,) mean squares of runs left out, their sum a mean over channels and runs
+    others: np.ndarray  # (runs, n) values without each run
+    sigma: np.ndarray  # (n,) posterior standard deviations, 0 of what is not free
+
+    @property
+    def mean_square(self) -> float:
+        """Of runs left out, in units of what healthy runs leave."""
+        return float(self.left.sum())
+
+
+@dataclass
+class Comparison:
+    """A case's runs beside what healthy ones leave."""
+
+    problem: Problem
+    healthy: Healthy
+    free: list[FreeParameter]
+    places: dict[str, np.ndarray]  # of each label's parameters in `free`
+    nuisance: np.ndarray
+    windows: Windows = field(init=False)
+    bare: float = 1.0  # mean square of runs left out without a change
+
+    def __post_init__(self) -> None:
+        self.windows = Windows(self.problem, self.free, self.healthy.scales)
+
+    def columns_of(self, labels: Iterable[str]) -> np.ndarray:
+        """Places of what is free under labels."""
+        return np.concatenate([self.nuisance, *(self.places[label] for label in labels)])
+
+    @property
+    def independent(self) -> float:
+        """Independent residuals of the case's runs."""
+        return min(self.healthy.independent * len(self.problem.runs), self.windows.independent)
+
+    def weight(self, mean_square: float) -> float:
+        """Of a mean square of 1: as many independent residuals, of what is there where that is more than usual."""
+        return self.independent / max(mean_square, 1.0)
+
+    def fitted(self, labels: tuple[str, ...], begin: np.ndarray) -> Hypothesis | None:
+        """Labels led from values (n,) to where they are most probable; None where their flights are lost."""
+        free = self.columns_of(labels)
+        own = Windows(self.problem, [self.free[k] for k in free], self.healthy.scales)
+        every, values = np.arange(len(free)), own.clipped(begin[free])
+        best: tuple[float, np.ndarray, Linearised] | None = None
+        for _ in range(STEPS):
+            at = own.linearised(values)
+            cost = float(at.value.sum())
+            if not np.isfinite(cost):
+                break
+            if best is not None and cost + values @ values / self.independent >= best[0]:
+                values = 0.5 * (values + best[1])
+                continue
+            best = cost + float(values @ values) / self.independent, values, at
+            step = at.step(every, self.weight(cost))
+            if np.abs(step).max(initial=0.0) < STILL:
+                break
+            values = own.clipped(values + step)
+        if best is None:
+            return None
+        _, values, at = best
+        weight = self.weight(float(at.value.sum()))
+        left, steps = at.held_out(every, weight)
+        count, sd = len(self.free), np.zeros(len(self.free))
+        sd[free] = np.sqrt(np.diag(np.linalg.inv(weight * at.normal.sum(axis=0) + np.eye(len(free)))))
+        whole, others = np.zeros(count), np.zeros((len(left), count))
+        whole[free], others[:, free] = values + at.step(every, weight), values + steps
+        return Hypothesis(labels, whole, left, others, sd)
+
+    def promised(self, begin: Hypothesis) -> list[tuple[float, str, np.ndarray]]:
+        """Labels beside a hypothesis by one linear step, best first: mean square of runs left out, label, values."""
+        at, found = self.windows.linearised(self.windows.clipped(begin.values)), []
+        weight = self.weight(begin.mean_square)
+        for label in self.places:
+            if label not in begin.labels:
+                free = self.columns_of((*begin.labels, label))
+                left = float(at.held_out(free, weight)[0].sum())
+                found.append((left, label, at.values + at.step(free, weight)))
+        return sorted(found, key=lambda one: one[0])
+
+    def nat(self, one: Hypothesis) -> float:
+        """Log predictive density of runs left out, their scale known from so many healthy runs only."""
+        count, freedom = self.independent, self.healthy.freedom
+        return -0.5 * (freedom + count) * float(np.log1p(count * max(one.mean_square, 1e-9) / freedom))
+
+    def leftover(self, one: Hypothesis) -> tuple[float, float]:
+        """Log densities of what runs left out leave: where that is what healthy runs leave, and where it is more."""
+        healthy = self.healthy
+        scale = np.sqrt(healthy.scatter**2 * (1.0 / len(healthy.logs) + 1.0 / len(one.left)) + SITE**2)
+        if one.labels:
+            scale = float(np.hypot(scale, np.log1p(FORM**2 * max(self.bare - one.mean_square, 0.0))))
+        at = np.log(max(one.mean_square, 1e-9)) - max(float(np.log(np.exp(healthy.logs).mean())), 0.0)
+        shifts = np.linspace(0.0, 4.0 * LEFT, 121)
+        prior = 2.0 * norm.pdf(shifts, scale=LEFT) * (shifts[1] - shifts[0])
+        nothing = float(student.logpdf(max(at, 0.0) / scale, healthy.freedom))
+        more = float(logsumexp(student.logpdf((at - shifts) / scale, healthy.freedom), b=prior))
+        return nothing, more
+
+
+@dataclass
+class Weighed:
+    """Hypotheses with their log weights: with nothing beside them, and with something unknown."""
+
+    listed: list[Hypothesis]
+    alone: list[float]
+    beside: list[float]
+
+    @property
+    def best(self) -> Hypothesis:
+        """The most probable one, whatever is beside it."""
+        return self.listed[int(np.argmax(np.logaddexp(self.alone, self.beside)))]
+
+    def probabilities(self) -> dict[str, float]:
+        """Of none, of each label as the main cause, and of unknown."""
+        whole = float(logsumexp([*self.alone, *self.beside]))
+        found = {NONE: 0.0, UNKNOWN: 0.0}
+        for one, alone, beside in zip(self.listed, self.alone, self.beside, strict=True):
+            name = one.labels[0] if one.labels else NONE
+            found[name] = found.get(name, 0.0) + float(np.exp(alone - whole))
+            found[UNKNOWN] += float(np.exp(beside - whole))
+        return found
+
+
+def weigh(compared: Comparison, listed: list[Hypothesis]) -> Weighed:
+    """The posterior's weights; what does not shrink the gap of runs left out is none."""
+    alone, beside = [], []
+    nothing = listed[0]
+    kept = [nothing, *(one for one in listed[1:] if one.mean_square < nothing.mean_square)]
+    for one in kept:
+        prior = len(one.labels) * np.log(CHANGED / len(compared.places)) if one.labels else np.log1p(-CHANGED)
+        usual, more = compared.leftover(one)
+        at = compared.nat(one) + float(prior)
+        alone.append(at + usual + float(np.log1p(-STRANGE)))
+        beside.append(at + more + float(np.log(STRANGE)))
+    return Weighed(kept, alone, beside)
+
+
+def hypotheses(compared: Comparison, say: Callable[[str], None]) -> list[Hypothesis]:
+    """No change, the labels that promise most, and further ones beside the best while they bring more than chance."""
+    nothing = compared.fitted((), np.zeros(len(compared.free)))
+    if nothing is None:
+        raise InputError("the identified vehicle does not fly these runs", source=compared.problem.case.folder)
+    compared.bare = nothing.mean_square
+    say(f"no change: {nothing.mean_square:.2f} times what healthy runs leave")
+    odds, listed, best = float(np.log(CHANGED / len(compared.places))), [nothing], nothing
+    while len(best.labels) < MOST:
+        promised = compared.promised(best)[: FURTHER if best.labels else REFINED]
+        found = [compared.fitted((*best.labels, label), values) for _, label, values in promised]
+        there = [one for one in found if one is not None]
+        listed += there
+        leading = max(there, key=compared.nat, default=best)
+        if compared.nat(leading) + odds <= compared.nat(best):
+            break
+        best = leading
+        say(f"{', '.join(best.labels)}: {best.mean_square:.2f} times")
+    return listed
+
+
+def as_the_case_sees(run: Run, case: Case) -> Run:
+    """A healthy run with those readings alone that some of the case's runs have: what it leaves is what these show."""
+    there: Set[str] = {name for one in case.runs for name in one.columns if recorded(one, name)}
+    kept = {name: values for name, values in run.columns.items() if name in there or name not in columns.KNOWN}
+    return replace(run, columns=kept)
+
+
+@dataclass
+class AgainstHealthy:
+    """What was found of a case."""
+
+    case: Case
+    healthy: Healthy
+    verdict: str
+    probabilities: dict[str, float]
+    group: list[str]  # labels that the runs do not tell from the main one, itself first
+    selected: list[str]
+    sizes: dict[str, dict[str, dict[str, Any]]]
+    where: list[dict[str, Any]]
+    gaps: dict[str, list[RunGap]]
+    shrinkage: Shrinkage
+    evidence: dict[str, float]  # nat over no change
+    left: dict[str, float]  # by hypothesis, the mean square of runs left out over what healthy runs leave
+    corrected: tuple[np.ndarray, np.ndarray]
+
+
+def diagnose_against_healthy(
+    case: Case, reference: Case, say: Callable[[str], None] = lambda text: None
+) -> AgainstHealthy:
+    """What a case's runs do that healthy runs of the same vehicle do not; InputError without runs of either."""
+    for one in (case, reference):
+        if not one.runs:
+            raise InputError("no runs", source=one.folder)
+    healthy = learn(case, [as_the_case_sees(run, case) for run in reference.runs])
+    say(f"learned from {len(healthy.runs)} healthy runs")
+    problem = problem_of(case)
+    nuisance, effects = nuisance_parameters(problem), effect_parameters(problem)
+    free, places = list(nuisance), dict[str, np.ndarray]()
+    for label, own in effects.items():
+        places[label] = np.arange(len(free), len(free) + len(own))
+        free += own
+    compared = Comparison(problem, healthy, free, places, np.arange(len(nuisance)))
+    listed = hypotheses(compared, say)
+    weighed = weigh(compared, listed)
+    chances, best = weighed.probabilities(), weighed.best
+    first = max(chances, key=lambda name: chances[name])
+    verdict = first if first in (NONE, UNKNOWN) else CAUSE
+    singles = {one.labels[0]: compared.nat(one) for one in listed if len(one.labels) == 1}
+    near = sorted(
+        (n for n, nat in singles.items() if nat > singles.get(first, np.inf) - ALIKE), key=lambda n: -singles[n]
+    )
+    selected = sorted(best.labels, key=lambda label: label != first)
+    gaps = gaps_of(compared, listed[0], best)
+    P, F = model_of(compared, best.values, best.labels)
+    bare = compared.nat(listed[0])
+    return AgainstHealthy(
+        case, healthy, verdict, chances, [first, *(n for n in near if n != first)] if verdict == CAUSE else [],
+        selected, sizes(compared, best), places_of(compared, chances), gaps, shrinkage_of(gaps, {}),
+        {label: nat - bare for label, nat in singles.items()},
+        {", ".join(one.labels) or NONE: one.mean_square for one in listed}, (P, F),
+    )  # fmt: skip
+
+
+def model_of(compared: Comparison, values: np.ndarray, labels: Iterable[str]) -> tuple[np.ndarray, np.ndarray]:
+    """The identified vehicle with labels at values (n,), and nothing else changed."""
+    bare = np.zeros(len(values))
+    for label in labels:
+        bare[compared.places[label]] = values[compared.places[label]]
+    return model_at(compared.problem, compared.free, bare)
+
+
+def gaps_of(compared: Comparison, nothing: Hypothesis, best: Hypothesis) -> dict[str, list[RunGap]]:
+    """Gaps of the case's runs by the identified vehicle, by a fit of it and with the change, each without the run; and
+    what healthy runs leave."""
+    problem = compared.problem
+    parts = [problem.part(n) for n in range(len(problem.runs))]
+    found: dict[str, list[RunGap]] = {BEFORE: [], RECALIBRATED: [], AFTER: []}
+    nominal = nominal_model(problem.case)
+    for n, part in enumerate(parts):
+        found[BEFORE].append(gap_of(part, nominal.P, effect_vector(nominal)))
+        found[RECALIBRATED].append(gap_of(part, *model_at(problem, compared.free, nothing.others[n])))
+        changed = model_of(compared, best.others[n], best.labels)
+        found[AFTER].append(gap_of(part, *changed) if best.labels else found[BEFORE][-1])
+    channels = compared.healthy.scales
+    whole = root_mean_square(channels.values())
+    found[FLOOR] = [replace(one, channels=dict(channels), total=whole) for one in found[BEFORE]]
+    return found
+
+
+def gap_of(part: Problem, P: np.ndarray, F: np.ndarray) -> RunGap:
+    """A run's gap to a model (docs/GAP.md, Measures)."""
+    return run_gap(part.kind.measures, part.runs[0], fly(part, P, F), cut(part).listed[0])
+
+
+def sizes(compared: Comparison, one: Hypothesis) -> dict[str, dict[str, dict[str, Any]]]:
+    """Each label's parameters with 90 % intervals, SI; a label's form may make them off by the kind's share."""
+    found: dict[str, dict[str, dict[str, Any]]] = {}
+    for label in one.labels:
+        found[label] = {}
+        for k in compared.places[label]:
+            free, value = compared.free[k], one.values[k]
+            sd = np.hypot(one.sigma[k], compared.problem.kind.form * value)
+            ends = [float(np.clip(value + side * NINETY * sd, free.low, free.high)) * free.spread for side in (-1, 1)]
+            found[label][free.name] = {"estimate": float(value * free.spread), "ci90": ends, "unit": free.unit}
+    return found
+
+
+def places_of(compared: Comparison, chances: dict[str, float]) -> list[dict[str, Any]]:
+    """Where, most probable first: an unknown change lies where the labels lie that come nearest to it."""
+    effects, where = compared.problem.kind.catalogue(), dict[tuple[str, str], float]()
+    known = {label: p for label, p in chances.items() if label in effects}
+    likeness = 1.0 + chances[UNKNOWN] / max(sum(known.values()), 1e-12)
+    for label, p in known.items():
+        where[effects[label].place] = where.get(effects[label].place, 0.0) + p * likeness
+    ranked = sorted(where.items(), key=lambda item: -item[1])
+    return [{"subsystem": s, "element": e, "probability": p} for (s, e), p in ranked if p >= LEAST]
+
+
+def plain(found: AgainstHealthy) -> dict[str, Any]:
+    """diagnosis.json (docs/GAP.md, Answers)."""
+    causes = [
+        {"label": label, "probability": p, "group": found.group if found.group[:1] == [label] else [label],
+         "parameters": found.sizes.get(label, {})}
+        for label, p in sorted(found.probabilities.items(), key=lambda item: -item[1])
+    ]  # fmt: skip
+    table: dict[str, Any] = {name: by_channel(found.gaps[name]) for name in (BEFORE, RECALIBRATED, AFTER, FLOOR)}
+    for name, value, ci in (("shrinkage", found.shrinkage.shrinkage, found.shrinkage.ci90),
+                            ("closed", found.shrinkage.closed, found.shrinkage.closed_ci90)):  # fmt: skip
+        table[name] = {"value": value, "ci90": list(ci)}
+    changed = [{"stage": " ".join(f"+ {one}" for one in found.selected), "gap": table[AFTER]}]
+    runs = [run.name for run in found.case.runs]
+    return {
+        "format": 1,
+        "kind": AGAINST_HEALTHY,
+        "case": {"name": found.case.folder.resolve().name, "vehicle": found.case.vehicle_name, "runs": len(runs)},
+        "verdict": found.verdict,
+        "where": found.where,
+        "causes": causes,
+        "selected": found.selected,
+        "gap": table,
+        "next_run": {},
+        "readings": [],
+        "stages": [{"stage": "identified", "gap": table[BEFORE]}, *(changed if found.selected else [])],
+        "cautions": cautions(found),
+        "skipped": {},
+        "evidence": found.evidence,
+        "reference": {"runs": found.healthy.runs, "left": found.healthy.scales, "times": found.left},
+    }
+
+
+def cautions(found: AgainstHealthy) -> list[str]:
+    """What has to be said with the answer."""
+    told = []
+    if len(found.healthy.runs) < 4:
+        told.append(f"{len(found.healthy.runs)} healthy runs: how much runs differ though nothing changed is assumed")
+    if len(found.case.runs) == 1:
+        told.append("one run only: nothing is left out, the gaps are those of a run that was fitted")
+    return told
+
+
+def write(found: AgainstHealthy, out: Path) -> None:
+    """diagnosis.json and corrected.toml into a folder."""
+    out.mkdir(parents=True, exist_ok=True)
+    nominal, (P, F) = nominal_model(found.case), found.corrected
+    own = F - effect_vector(nominal)
+    text = corrected_text(found.case.vehicle_name, nominal.P, P, own, effects_in(own))
+    write_bytes(out / CORRECTED, text.encode("utf-8"))
+    write_bytes(out / ANSWER, (json.dumps(as_plain(plain(found)), indent=1) + "\n").encode())

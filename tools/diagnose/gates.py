@@ -1,0 +1,21 @@
+"""Gates that open by degrees: where a figure decides which of two answers is given, both are, each with its weight.
+
+An answer that jumps where a figure passes a limit says more than the figure does: a millionth of the noise can move it
+across (docs/DIAGNOSIS.md, Steady).
+"""
+
+import numpy as np
+
+
+def opened(value: float, shut: float, wide: float) -> float:
+    """How far a gate is open, 0 up to `shut` and 1 from `wide`; smooth in the logarithm of the value between."""
+    if value <= shut:
+        return 0.0
+    share = float(min(np.log(value / shut) / np.log(wide / shut), 1.0))
+    return share * share * (3.0 - 2.0 * share)
+
+
+def mixed(shares: dict[str, float], others: dict[str, float], weight: float) -> dict[str, float]:
+    """Probabilities of two answers, the second with a weight."""
+    names = dict.fromkeys([*shares, *others])
+    return {name: (1.0 - weight) * shares.get(name, 0.0) + weight * others.get(name, 0.0) for name in names}
