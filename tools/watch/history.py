@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sim_backend.core.effects.base import Effect
-from tools.diagnose.noise_probes import VERTICAL_WATER, NoiseProbe
+from tools.diagnose.noise_probes import NoiseProbe
 from tools.watch.disorder import WATER, shaken
 from tools.watch.events import Change, Joint, Span, spans
 from tools.watch.flights import Flights, numbers
-from tools.watch.lasting import STRANGE, Lasting, beside_usual, lasting, over_spans
+from tools.watch.lasting import Lasting, lasting
 
 NOT_ROUGH = 5.0  # nat that a run that is not rough takes off disorder that would hold there too
 UNLIKE = 0.01  # cosine of two labels' columns, below which they have nothing to do with each other
@@ -126,25 +126,6 @@ def lasts(history: History, event: Event) -> Lasting | None:
         return lasting(flights, runs, weights)
     beside = lasting(flights, runs, weights, event.label, event.size)
     return beside if beside.akin else None
-
-
-def lasting_event(history: History) -> Event | None:
-    """A course that lasts in runs that no event has and that no label explains; None where there is none."""
-    flights = history.flights
-    if flights.parts[0].kind.input_table is None:
-        return None
-    free = history.judged.copy()
-    for event in history.events:
-        free &= event.span.weights(flights.count) == 0.0
-    pulls = [beside_usual(flights, n) if free[n] else None for n in range(flights.count)]
-    found = over_spans(flights, pulls, history.listed())
-    if found is None:
-        return None
-    span, course = found
-    scale = float(np.abs(course.size).max()) / flights.parts[0].case.disturbance.water
-    probe = (VERTICAL_WATER, max(scale, 1.0))
-    return Event("", span, course.evidence + STRANGE, {}, np.zeros(0), np.zeros((0, 0)), course.evidence,
-                 probe=probe, place=course.place, strange=course)  # fmt: skip
 
 
 def take(history: History, event: Event) -> None:

@@ -17,7 +17,6 @@ from tools.inference.channels import Measures
 from tools.inference.expansion import linear
 from tools.inference.problem import Gains, Problem
 from tools.inference.shared_parameters import SharedParameters
-from tools.watch.events import STEP, Span
 from tools.watch.flights import Flights, numbers
 
 SIZE = 0.02  # m/s, 1 sigma of what lasts: as much as the roughest water
@@ -156,41 +155,6 @@ def beside_all(parts: Sequence[Problem], shared: SharedParameters, x: np.ndarray
     return Lasting(evidence, SIZE * c)
 
 
-def over_spans(flights: Flights, pulls: Sequence[Pull | None], listed: Sequence[Span]) -> tuple[Span, Lasting] | None:
-    """The span in whose runs most lasts, of spans whose runs all have what they say (not None); None where none has.
-
-    pulls: of every run, of what is beside the usual course.
-    """
-    there = [one is not None for one in pulls]
-    blank = next((one for one in pulls if one is not None), None)
-    possible = [one for one in listed if one.course == STEP and all(there[one.first : one.end])]
-    if blank is None or not possible:
-        return None
-    A = np.cumsum([np.zeros_like(blank.precision), *((one or blank).precision for one in pulls)], axis=0)
-    g = np.cumsum([np.zeros_like(blank.slope), *((one or blank).slope for one in pulls)], axis=0)
-    found: tuple[Span, Lasting] | None = None
-    courses = len(blank.slope) - len(flights.known)
-    for span in possible:
-        whole = Pull(A[span.end] - A[span.first], g[span.end] - g[span.first])
-        evidence, c = evidence_of(course_of([whole], [1.0], flights.known), np.ones(courses))
-        if found is None or evidence > found[1].evidence:
-            found = span, Lasting(evidence, SIZE * c)
-    return found
-
-
-def beside_usual(flights: Flights, n: int) -> Pull:
-    """What a run says of a course beside the usual one, what it has of its own integrated out."""
-    mean, scatter = usual_course(flights)
-    return of_flight(flights, n).less(mean).beside(np.concatenate([scatter, flights.sizes**2]))
-
-
-def usual_course(flights: Flights) -> tuple[np.ndarray, np.ndarray]:
-    """`usual`, once found."""
-    if flights.usual_course is None:
-        flights.usual_course = usual(flights)
-    return flights.usual_course
-
-
 def lasting(
     flights: Flights, runs: Sequence[int], weights: np.ndarray, label: str = "", size: np.ndarray | None = None
 ) -> Lasting:
@@ -199,7 +163,9 @@ def lasting(
     Beside a label that they have, of a size in spreads, the size is free, and the label's form is off by the share of
     its own course that its kind says, in each way and depth by itself: the evidence is that over such a form.
     """
-    mean, scatter = usual_course(flights)
+    if flights.usual_course is None:
+        flights.usual_course = usual(flights)
+    mean, scatter = flights.usual_course
     courses = len(mean)
     known, free = flights.known.copy(), flights.shared.labels.get(label, [])
     known[free, :] = known[:, free] = 0.0

@@ -7,7 +7,7 @@ from scipy.stats import t as student
 
 from tools.inference.parameters import CLOCK_PLACE
 from tools.watch.events import Change
-from tools.watch.history import Event, History, already, earns_place, lasting_event, lasts, shaken_place, take
+from tools.watch.history import Event, History, already, earns_place, lasts, shaken_place, take
 from tools.watch.rivals import refined
 from tools.watch.scatter import FEW, PRIOR_RUNS
 from tools.watch.water import named, rougher, water_event
@@ -21,19 +21,13 @@ MOST_EVENTS = 5
 def find_events(history: History, say: Callable[[str], None] = lambda text: None) -> None:
     """Events added to the history, the most evident first."""
     for _ in range(MOST_EVENTS):
-        candidates = (seek(history) for seek in (next_event, lasting_event))
-        event = next((one for one in candidates if one is not None and stands(history, one)), None)
-        if event is None:
+        event = next_event(history)
+        if event is None or event.evidence < evidence_needed(history, event) or not earns_place(history, event):
             break
         history.events.append(event)
         take(history, event)
-        event.strange = event.strange or lasts(history, event)
+        event.strange = lasts(history, event)
         say(f"{event.label or 'unknown'} in runs {event.span.first} to {event.span.end - 1}")
-
-
-def stands(history: History, event: Event) -> bool:
-    """Whether an event is evident enough, and more than the wrong form of another."""
-    return event.evidence >= evidence_needed(history, event) and earns_place(history, event)
 
 
 def acts_at(place: tuple[str, str], there: tuple[str, str]) -> bool:

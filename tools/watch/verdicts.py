@@ -56,10 +56,6 @@ def settle(history: History) -> list[Settled]:
             continue  # what mimics an unknown change is none of its own
         if event.has_course and not matters(history, event, own):
             continue
-        if event.label == "" and event.strange is not None and (
-            event.strange.moves(kind.measures) < needed_of(history, event)
-        ):  # fmt: skip
-            continue
         left = what_is_left(history, event) if event.has_course else NOTHING
         sure = 1.0 / (1.0 + np.exp(-np.clip(event.evidence - EVIDENCE_NEEDED, -50.0, 50.0)))
         outside = 1.0 - ERROR_RATE if event.label == "" else left.probability
