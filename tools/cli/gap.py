@@ -186,13 +186,13 @@ def _diagnose_one(
 
 def _diagnose_against(case, reference, out: Path, as_json: bool) -> None:
     """The same against healthy runs (docs/DIAGNOSIS.md, Against healthy runs)."""
-    from tools.diagnose.against_healthy import diagnose_against_healthy, plain, write
+    from tools.diagnose.against_answer import write
+    from tools.diagnose.against_healthy import diagnose_against_healthy
     from tools.report.page import REPORT
     from tools.report.pooled import write_pooled_report
 
     found = diagnose_against_healthy(case, reference, lambda text: print(text, file=sys.stderr))
-    write(found, out)
-    said, answer = write_pooled_report(out), plain(found)
+    answer, said = write(found, out), write_pooled_report(out)
     if as_json:
         print_json(answer)
     for caution in answer["cautions"]:

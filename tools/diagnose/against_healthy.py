@@ -10,12 +10,9 @@ on that run, so that an effect has to shrink what it has not seen:
 - and with each of these, that something more is left than healthy runs leave: unknown.
 """
 
-import json
 from collections.abc import Callable, Iterable, Sequence, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.special import logsumexp
@@ -25,23 +22,16 @@ from scipy.stats import t as student
 from firmware.model.vehicle import FormTable
 from sim_backend.ocean.vehicle import OceanVehicle
 from tools.data.errors import InputError
-from tools.data.plain import as_plain
 from tools.data.runs import columns
 from tools.data.runs.case import Case
-from tools.data.runs.csvfile import write_bytes
 from tools.data.runs.run import Run
-from tools.diagnose.record import AGAINST_HEALTHY, ANSWER, NONE, UNKNOWN
-from tools.diagnose.shrink import AFTER, BEFORE, FLOOR, RECALIBRATED, Shrinkage, by_channel, shrinkage_of
-from tools.gap.measure import RunGap, root_mean_square, run_gap
+from tools.diagnose.record import NONE, UNKNOWN
 from tools.gap.regimes import ALL
 from tools.inference.channels import recorded
-from tools.inference.corrected import corrected_text
 from tools.inference.fit import bounded_step
-from tools.inference.model import effect_vector, effects_in, nominal_model
-from tools.inference.parameters import NINETY, FreeParameter, effect_parameters, model_at, nuisance_parameters
-from tools.inference.predict import fly
+from tools.inference.parameters import FreeParameter, effect_parameters, model_at, nuisance_parameters
 from tools.inference.prediction_error import HORIZONS, PredictionError
-from tools.inference.problem import Problem, cut, problem_of
+from tools.inference.problem import Problem, problem_of
 from tools.inference.vehicle_parameters import Parameters
 
 CAUSE = "cause"
@@ -59,8 +49,7 @@ REFINED, FURTHER, MOST = 6, 4, 3  # labels fitted in full at first, beside other
 STEPS = 3
 STILL = 0.02  # sigma of the priors, by which a step moves nothing any more
 ALIKE = 6.0  # nat within which labels are not told apart
-LEAST = 0.005  # a smaller probability is not written down
-CORRECTED = "corrected.toml"
+CERTAIN = 0.9  # probability of a label that is selected beside something unknown
 
 
 class Windows(PredictionError):
@@ -316,10 +305,20 @@ class Weighed:
     alone: list[float]
     beside: list[float]
 
-    @property
-    def best(self) -> Hypothesis:
-        """The most probable one, whatever is beside it."""
-        return self.listed[int(np.argmax(np.logaddexp(self.alone, self.beside)))]
+    def best(self, main: str) -> Hypothesis:
+        """The most probable one with a main cause, NONE or a label; of UNKNOWN the one that it is beside."""
+        weights = np.array(self.beside if main == UNKNOWN else np.logaddexp(self.alone, self.beside))
+        if main != UNKNOWN:
+            weights[[(one.labels[0] if one.labels else NONE) != main for one in self.listed]] = -np.inf
+        return self.listed[int(weights.argmax())]
+
+    def certain(self, one: Hypothesis) -> list[str]:
+        """Labels of a hypothesis that are there whatever else is, CERTAIN."""
+        weights = np.logaddexp(self.alone, self.beside)
+        weights = np.exp(weights - logsumexp(weights))
+        within = {label: sum(w for w, h in zip(weights, self.listed, strict=True) if label in h.labels)
+                  for label in one.labels}  # fmt: skip
+        return [label for label in one.labels if within[label] >= CERTAIN]
 
     def probabilities(self) -> dict[str, float]:
         """Of none, of each label as the main cause, and of unknown."""
@@ -378,19 +377,20 @@ def as_the_case_sees(run: Run, case: Case) -> Run:
 class AgainstHealthy:
     """What was found of a case."""
 
-    case: Case
+    compared: Comparison
     healthy: Healthy
     verdict: str
     probabilities: dict[str, float]
     group: list[str]  # labels that the runs do not tell from the main one, itself first
     selected: list[str]
-    sizes: dict[str, dict[str, dict[str, Any]]]
-    where: list[dict[str, Any]]
-    gaps: dict[str, list[RunGap]]
-    shrinkage: Shrinkage
+    nothing: Hypothesis
+    best: Hypothesis
     evidence: dict[str, float]  # nat over no change
     left: dict[str, float]  # by hypothesis, the mean square of runs left out over what healthy runs leave
-    corrected: tuple[np.ndarray, np.ndarray]
+
+    @property
+    def case(self) -> Case:
+        return self.compared.problem.case
 
 
 def diagnose_against_healthy(
@@ -417,134 +417,17 @@ def diagnose_against_healthy(
     compared = Comparison(problem, healthy, free, places, np.arange(len(nuisance)))
     listed = hypotheses(compared, say)
     weighed = weigh(compared, listed)
-    chances, best = weighed.probabilities(), weighed.best
+    chances = weighed.probabilities()
     first = max(chances, key=lambda name: chances[name])
+    best = weighed.best(first)
     verdict = first if first in (NONE, UNKNOWN) else CAUSE
     singles = {one.labels[0]: compared.nat(one) for one in listed if len(one.labels) == 1}
-    near = sorted(
-        (n for n, nat in singles.items() if nat > singles.get(first, np.inf) - ALIKE), key=lambda n: -singles[n]
-    )
-    selected = sorted(best.labels, key=lambda label: label != first)
-    gaps = gaps_of(compared, listed[0], best)
-    P, F = model_of(compared, best.values, best.labels)
+    least = singles.get(first, np.inf) - ALIKE
+    near = sorted((label for label, nat in singles.items() if nat > least and label != first), key=lambda n: -singles[n])
+    selected = weighed.certain(best) if verdict == UNKNOWN else list(best.labels)
     bare = compared.nat(listed[0])
     return AgainstHealthy(
-        case, healthy, verdict, chances, [first, *(n for n in near if n != first)] if verdict == CAUSE else [],
-        selected, sizes(compared, best), places_of(compared, chances), gaps, shrinkage_of(gaps, {}),
+        compared, healthy, verdict, chances, [first, *near] if verdict == CAUSE else [], selected, listed[0], best,
         {label: nat - bare for label, nat in singles.items()},
-        {", ".join(one.labels) or NONE: one.mean_square for one in listed}, (P, F),
+        {", ".join(one.labels) or NONE: one.mean_square for one in listed},
     )  # fmt: skip
-
-
-def model_of(compared: Comparison, values: np.ndarray, labels: Iterable[str]) -> tuple[np.ndarray, np.ndarray]:
-    """The identified vehicle with labels at values (n,), and nothing else changed."""
-    bare = np.zeros(len(values))
-    for label in labels:
-        bare[compared.places[label]] = values[compared.places[label]]
-    return model_at(compared.problem, compared.free, bare)
-
-
-def gaps_of(compared: Comparison, nothing: Hypothesis, best: Hypothesis) -> dict[str, list[RunGap]]:
-    """Gaps of the case's runs by the identified vehicle, by a fit of it and with the change, each without the run; and
-    what healthy runs leave."""
-    problem = compared.problem
-    parts = [problem.part(n) for n in range(len(problem.runs))]
-    found: dict[str, list[RunGap]] = {BEFORE: [], RECALIBRATED: [], AFTER: []}
-    nominal = nominal_model(problem.case)
-    for n, part in enumerate(parts):
-        found[BEFORE].append(gap_of(part, nominal.P, effect_vector(nominal)))
-        found[RECALIBRATED].append(gap_of(part, *model_at(problem, compared.free, nothing.others[n])))
-        changed = model_of(compared, best.others[n], best.labels)
-        found[AFTER].append(gap_of(part, *changed) if best.labels else found[BEFORE][-1])
-    channels = compared.healthy.scales
-    whole = root_mean_square(channels.values())
-    found[FLOOR] = [replace(one, channels=dict(channels), total=whole) for one in found[BEFORE]]
-    return found
-
-
-def gap_of(part: Problem, P: np.ndarray, F: np.ndarray) -> RunGap:
-    """A run's gap to a model (docs/GAP.md, Measures)."""
-    return run_gap(part.kind.measures, part.runs[0], fly(part, P, F), cut(part).listed[0])
-
-
-def sizes(compared: Comparison, one: Hypothesis) -> dict[str, dict[str, dict[str, Any]]]:
-    """Each label's parameters with 90 % intervals, SI; a label's form may make them off by the kind's share."""
-    found: dict[str, dict[str, dict[str, Any]]] = {}
-    for label in one.labels:
-        found[label] = {}
-        for k in compared.places[label]:
-            free, value = compared.free[k], one.values[k]
-            sd = np.hypot(one.sigma[k], compared.problem.kind.form * value)
-            ends = [float(np.clip(value + side * NINETY * sd, free.low, free.high)) * free.spread for side in (-1, 1)]
-            found[label][free.name] = {"estimate": float(value * free.spread), "ci90": ends, "unit": free.unit}
-    return found
-
-
-def places_of(compared: Comparison, chances: dict[str, float]) -> list[dict[str, Any]]:
-    """Where, most probable first: an unknown change lies where the labels lie that come nearest to it."""
-    effects, where = compared.problem.kind.catalogue(), dict[tuple[str, str], float]()
-    known = {label: p for label, p in chances.items() if label in effects}
-    likeness = 1.0 + chances[UNKNOWN] / max(sum(known.values()), 1e-12)
-    for label, p in known.items():
-        where[effects[label].place] = where.get(effects[label].place, 0.0) + p * likeness
-    ranked = sorted(where.items(), key=lambda item: -item[1])
-    return [{"subsystem": s, "element": e, "probability": p} for (s, e), p in ranked if p >= LEAST]
-
-
-def plain(found: AgainstHealthy) -> dict[str, Any]:
-    """diagnosis.json (docs/GAP.md, Answers)."""
-    causes = [
-        {"label": label, "probability": p, "group": found.group if found.group[:1] == [label] else [label],
-         "parameters": found.sizes.get(label, {})}
-        for label, p in sorted(found.probabilities.items(), key=lambda item: -item[1])
-    ]  # fmt: skip
-    table: dict[str, Any] = {name: by_channel(found.gaps[name]) for name in (BEFORE, RECALIBRATED, AFTER, FLOOR)}
-    for name, value, ci in (("shrinkage", found.shrinkage.shrinkage, found.shrinkage.ci90),
-                            ("closed", found.shrinkage.closed, found.shrinkage.closed_ci90)):  # fmt: skip
-        table[name] = {"value": value, "ci90": list(ci)}
-    changed = [{"stage": " ".join(f"+ {one}" for one in found.selected), "gap": table[AFTER]}]
-    runs = [run.name for run in found.case.runs]
-    return {
-        "format": 1,
-        "kind": AGAINST_HEALTHY,
-        "case": {"name": found.case.folder.resolve().name, "vehicle": found.case.vehicle_name, "runs": len(runs)},
-        "verdict": found.verdict,
-        "where": found.where,
-        "causes": causes,
-        "selected": found.selected,
-        "gap": table,
-        "next_run": {},
-        "readings": [],
-        "stages": [{"stage": "identified", "gap": table[BEFORE]}, *(changed if found.selected else [])],
-        "cautions": cautions(found),
-        "skipped": {},
-        "evidence": found.evidence,
-        "reference": {
-            "runs": found.healthy.runs, "count": found.healthy.count, "left": found.healthy.scales, "times": found.left
-        },
-    }
-
-
-def cautions(found: AgainstHealthy) -> list[str]:
-    """What has to be said with the answer."""
-    told = []
-    if found.healthy.count < FEW:
-        told.append(f"{found.healthy.count} healthy runs: how much runs differ though nothing changed is assumed")
-    if not found.healthy.runs:
-        told.append(
-            "what the vehicle's form leaves of healthy runs is taken from its file: --reference HEALTHY says it of "
-            "these readings"
-        )
-    if len(found.case.runs) == 1:
-        told.append("one run only: nothing is left out, the gaps are those of a run that was fitted")
-    return told
-
-
-def write(found: AgainstHealthy, out: Path) -> None:
-    """diagnosis.json and corrected.toml into a folder."""
-    out.mkdir(parents=True, exist_ok=True)
-    nominal, (P, F) = nominal_model(found.case), found.corrected
-    own = F - effect_vector(nominal)
-    text = corrected_text(found.case.vehicle_name, nominal.P, P, own, effects_in(own))
-    write_bytes(out / CORRECTED, text.encode("utf-8"))
-    write_bytes(out / ANSWER, (json.dumps(as_plain(plain(found)), indent=1) + "\n").encode())

@@ -16,13 +16,13 @@ from tools.data.runs.case import load_case
 from tools.data.sources import load_vehicle
 from tools.data.tomltext import toml_text
 from tools.diagnose import against_healthy as against
+from tools.diagnose.against_answer import plain
 from tools.diagnose.against_healthy import (
     Comparison,
     Healthy,
     Hypothesis,
     diagnose_against_healthy,
     form_stands_out,
-    plain,
     weigh,
 )
 from tools.study.challenge.form_cases import draw_healthy, write_flights
@@ -82,9 +82,10 @@ def test_what_the_form_leaves_is_no_cause(place):
 def test_a_change_beside_the_wrong_form_is_found_and_shrinks_what_was_left_out(askew):
     assert askew.verdict == "cause"
     assert askew.selected[0] == LABEL
-    (size,) = askew.sizes[LABEL].values()
+    answer = plain(askew)
+    (size,) = next(cause for cause in answer["causes"] if cause["label"] == LABEL)["parameters"].values()
     assert size["ci90"][0] < 0.25 < size["ci90"][1]  # rad, as it was drawn
-    assert askew.shrinkage.after < 0.7 * askew.shrinkage.before
+    assert answer["gap"]["after"]["total"] < 0.7 * answer["gap"]["before"]["total"]
     assert askew.left["none"] > 3.0 > min(askew.left.values())
 
 

@@ -1,0 +1,145 @@
+"""The answer of a diagnosis against healthy runs: gaps, sizes and places, as docs/GAP.md has them, into a folder."""
+
+import json
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tools.data.plain import as_plain
+from tools.data.runs.csvfile import write_bytes
+from tools.diagnose.against_healthy import AgainstHealthy, Comparison
+from tools.diagnose.record import AGAINST_HEALTHY, ANSWER, UNKNOWN
+from tools.diagnose.shrink import AFTER, BEFORE, FLOOR, RECALIBRATED, by_channel, shrinkage_of
+from tools.gap.measure import RunGap, root_mean_square, run_gap
+from tools.inference.corrected import corrected_text
+from tools.inference.model import effect_vector, effects_in, nominal_model
+from tools.inference.parameters import NINETY, model_at
+from tools.inference.predict import fly
+from tools.inference.problem import Problem, cut
+
+FEW = 4  # healthy runs
+LEAST = 0.005  # a smaller probability is not written down
+CORRECTED = "corrected.toml"
+
+
+def model_of(compared: Comparison, values: np.ndarray, labels: Iterable[str]) -> tuple[np.ndarray, np.ndarray]:
+    """The identified vehicle with labels at values (n,), and nothing else changed."""
+    bare = np.zeros(len(values))
+    for label in labels:
+        bare[compared.places[label]] = values[compared.places[label]]
+    return model_at(compared.problem, compared.free, bare)
+
+
+def gaps_of(answer: AgainstHealthy) -> dict[str, list[RunGap]]:
+    """Gaps of the case's runs by the identified vehicle, by a fit of it and with the change, each without the run; and
+    what healthy runs leave."""
+    compared, labels = answer.compared, answer.selected
+    problem = compared.problem
+    parts = [problem.part(n) for n in range(len(problem.runs))]
+    found: dict[str, list[RunGap]] = {BEFORE: [], RECALIBRATED: [], AFTER: []}
+    nominal = nominal_model(problem.case)
+    for n, part in enumerate(parts):
+        found[BEFORE].append(gap_of(part, nominal.P, effect_vector(nominal)))
+        found[RECALIBRATED].append(gap_of(part, *model_at(problem, compared.free, answer.nothing.others[n])))
+        changed = model_of(compared, answer.best.others[n], labels)
+        found[AFTER].append(gap_of(part, *changed) if labels else found[BEFORE][-1])
+    channels = compared.healthy.scales
+    whole = root_mean_square(channels.values())
+    found[FLOOR] = [replace(one, channels=dict(channels), total=whole) for one in found[BEFORE]]
+    return found
+
+
+def gap_of(part: Problem, P: np.ndarray, F: np.ndarray) -> RunGap:
+    """A run's gap to a model (docs/GAP.md, Measures)."""
+    return run_gap(part.kind.measures, part.runs[0], fly(part, P, F), cut(part).listed[0])
+
+
+def sizes(answer: AgainstHealthy) -> dict[str, dict[str, dict[str, Any]]]:
+    """Each label's parameters with 90 % intervals, SI; a label's form may make them off by the kind's share."""
+    compared, one = answer.compared, answer.best
+    found: dict[str, dict[str, dict[str, Any]]] = {}
+    for label in answer.selected:
+        found[label] = {}
+        for k in compared.places[label]:
+            free, value = compared.free[k], one.values[k]
+            sd = np.hypot(one.sigma[k], compared.problem.kind.form * value)
+            ends = [float(np.clip(value + side * NINETY * sd, free.low, free.high)) * free.spread for side in (-1, 1)]
+            found[label][free.name] = {"estimate": float(value * free.spread), "ci90": ends, "unit": free.unit}
+    return found
+
+
+def places_of(compared: Comparison, chances: dict[str, float]) -> list[dict[str, Any]]:
+    """Where, most probable first: an unknown change lies where the labels lie that come nearest to it."""
+    effects, where = compared.problem.kind.catalogue(), dict[tuple[str, str], float]()
+    known = {label: p for label, p in chances.items() if label in effects}
+    likeness = 1.0 + chances[UNKNOWN] / max(sum(known.values()), 1e-12)
+    for label, p in known.items():
+        where[effects[label].place] = where.get(effects[label].place, 0.0) + p * likeness
+    ranked = sorted(where.items(), key=lambda item: -item[1])
+    return [{"subsystem": s, "element": e, "probability": p} for (s, e), p in ranked if p >= LEAST]
+
+
+def plain(found: AgainstHealthy) -> dict[str, Any]:
+    """diagnosis.json (docs/GAP.md, Answers)."""
+    estimates, gaps = sizes(found), gaps_of(found)
+    shrinkage = shrinkage_of(gaps, {})
+    causes = [
+        {"label": label, "probability": p, "group": found.group if found.group[:1] == [label] else [label],
+         "parameters": estimates.get(label, {})}
+        for label, p in sorted(found.probabilities.items(), key=lambda item: -item[1])
+    ]  # fmt: skip
+    table: dict[str, Any] = {name: by_channel(gaps[name]) for name in (BEFORE, RECALIBRATED, AFTER, FLOOR)}
+    for name, value, ci in (("shrinkage", shrinkage.shrinkage, shrinkage.ci90),
+                            ("closed", shrinkage.closed, shrinkage.closed_ci90)):  # fmt: skip
+        table[name] = {"value": value, "ci90": list(ci)}
+    changed = [{"stage": " ".join(f"+ {one}" for one in found.selected), "gap": table[AFTER]}]
+    runs = [run.name for run in found.case.runs]
+    return {
+        "format": 1,
+        "kind": AGAINST_HEALTHY,
+        "case": {"name": found.case.folder.resolve().name, "vehicle": found.case.vehicle_name, "runs": len(runs)},
+        "verdict": found.verdict,
+        "where": places_of(found.compared, found.probabilities),
+        "causes": causes,
+        "selected": found.selected,
+        "gap": table,
+        "next_run": {},
+        "readings": [],
+        "stages": [{"stage": "identified", "gap": table[BEFORE]}, *(changed if found.selected else [])],
+        "cautions": cautions(found),
+        "skipped": {},
+        "evidence": found.evidence,
+        "reference": {
+            "runs": found.healthy.runs, "count": found.healthy.count, "left": found.healthy.scales, "times": found.left
+        },
+    }
+
+
+def cautions(found: AgainstHealthy) -> list[str]:
+    """What has to be said with the answer."""
+    told = []
+    if found.healthy.count < FEW:
+        told.append(f"{found.healthy.count} healthy runs: how much runs differ though nothing changed is assumed")
+    if not found.healthy.runs:
+        told.append(
+            "what the vehicle's form leaves of healthy runs is taken from its file: --reference HEALTHY says it of "
+            "these readings"
+        )
+    if len(found.case.runs) == 1:
+        told.append("one run only: nothing is left out, the gaps are those of a run that was fitted")
+    return told
+
+
+def write(found: AgainstHealthy, out: Path) -> dict[str, Any]:
+    """diagnosis.json and corrected.toml into a folder; the answer."""
+    out.mkdir(parents=True, exist_ok=True)
+    nominal, answer = nominal_model(found.case), plain(found)
+    P, F = model_of(found.compared, found.best.values, found.selected)
+    own = F - effect_vector(nominal)
+    text = corrected_text(found.case.vehicle_name, nominal.P, P, own, effects_in(own))
+    write_bytes(out / CORRECTED, text.encode("utf-8"))
+    write_bytes(out / ANSWER, (json.dumps(as_plain(answer), indent=1) + "\n").encode())
+    return answer
