@@ -423,7 +423,7 @@ def diagnose_against_healthy(
     verdict = first if first in (NONE, UNKNOWN) else CAUSE
     singles = {one.labels[0]: compared.nat(one) for one in listed if len(one.labels) == 1}
     least = singles.get(first, np.inf) - ALIKE
-    near = sorted((label for label, nat in singles.items() if nat > least and label != first), key=lambda n: -singles[n])
+    near = [label for label in sorted(singles, key=lambda n: -singles[n]) if singles[label] > least and label != first]
     selected = weighed.certain(best) if verdict == UNKNOWN else list(best.labels)
     bare = compared.nat(listed[0])
     return AgainstHealthy(
