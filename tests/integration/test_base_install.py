@@ -34,6 +34,7 @@ CALLS: tuple[tuple[str, str | None], ...] = (
     ("live", "live"),
     ("live --layout glider.json", None),
     ("missions", None),
+    ("effects", None),
     ("check", None),
     ("check --board twin", None),
     ("compile", None),

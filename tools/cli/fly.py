@@ -66,7 +66,10 @@ def peak_rss_mb() -> float | None:
 @click.option("--priority", type=click.IntRange(1, 90), help="Real-time priority (SCHED_FIFO); 50 is usual.")
 @click.option("--lock-memory", is_flag=True, help="Keep all memory resident (mlockall).")
 @click.option("--core", type=click.IntRange(0, 255), help="Keep the loop on one processor core.")
-@click.option("--effect", "effects", multiple=True, metavar="LABEL:NAME=VALUE", help="Add an effect to the plant.")
+@click.option(
+    "--effect", "effects", multiple=True, metavar="LABEL:NAME=VALUE",
+    help="Add an effect to the plant; LABEL alone: 1 sigma of its prior (glider effects).",
+)  # fmt: skip
 @json_option
 def fly(
     mission, vehicle, board, log_file, no_log, seed, realtime, state_folder, live, acknowledge, yes, priority,
@@ -89,6 +92,9 @@ def fly(
     from tools.flight.terminal import Stop, undisturbed
 
     wanted = parse_effects(effects)
+    for label in (item for item in effects if item in wanted):
+        values = ",".join(f"{name}={value:g}" for name, value in wanted[label].items())
+        say(f"effect {label}:{values}, 1 sigma of its prior")
     try:
         flight = build_flight(
             mission=mission, vehicle=vehicle, board=board, seed=seed, realtime=realtime, effects=wanted

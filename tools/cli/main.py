@@ -14,6 +14,7 @@ COMMANDS = {
     "fly": ("tools.cli.fly", "fly", "fly a mission, in simulation or on a board"),
     "live": ("tools.cli.live", "live", "watch a flight in Foxglove while it flies"),
     "missions": ("tools.cli.missions", "missions", "list the missions"),
+    "effects": ("tools.cli.effects", "effects", "list the effects that a simulated vehicle can have"),
     "check": ("tools.cli.check", "check", "check vehicle, board and mission files"),
     "status": ("tools.cli.status", "status", "health page of the flight under way"),
     "acknowledge": ("tools.cli.acknowledge", "acknowledge", "a person has looked: the next flight may begin"),

@@ -65,9 +65,12 @@ class Flight:
 
 
 def parse_effects(items: tuple[str, ...]) -> dict[str, dict[str, float]]:
-    """`label:parameter=value,...` items as a dictionary; InputError says which item is wrong."""
+    """`label:parameter=value,...` items as a dictionary; InputError says which item is wrong.
+
+    A label alone has 1 sigma of its prior.
+    """
     from sim_backend.core.effects.base import EffectError
-    from sim_backend.core.effects.catalogue import check_flown
+    from sim_backend.core.effects.catalogue import catalogue, check_flown
 
     effects: dict[str, dict[str, float]] = {}
     for item in items:
@@ -79,6 +82,8 @@ def parse_effects(items: tuple[str, ...]) -> dict[str, dict[str, float]]:
                 values[name.strip()] = float(number)
             except ValueError:
                 raise InputError(f"expected label:parameter=number, got '{item}'", source="--effect") from None
+        if not values and label in catalogue():
+            values = catalogue()[label].usual
         try:
             check_flown(label, values)
         except EffectError as error:

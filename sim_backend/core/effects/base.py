@@ -40,6 +40,14 @@ class Effect:
         """Subsystem and element."""
         return self.subsystem, self.element
 
+    @property
+    def usual(self) -> dict[str, float]:
+        """Every parameter 1 sigma of its prior from its default, on the side that it can take."""
+        return {
+            p.name: min(p.default + p.spread, p.high) if p.high > p.default else max(p.default - p.spread, p.low)
+            for p in self.parameters
+        }
+
     def add(self, world: Any, values: dict[str, float]) -> None:
         """Add the effect to a world (or to anything with an effect vector F)."""
         for parameter in self.parameters:

@@ -11,6 +11,9 @@ from sim_backend.board import build_board
 from sim_backend.core.effects import effect_layout as ef
 from sim_backend.core.effects.base import EffectError
 from sim_backend.core.effects.catalogue import apply_effects, catalogue, check_values
+from tools.cli.common import report_errors
+from tools.cli.main import cli
+from tools.flight.compose import parse_effects
 
 ROUGH = {"disturbance_linear": 0.01, "disturbance_angular": 0.02}
 NOMINAL, READ = flown(world(**ROUGH))
@@ -105,3 +108,25 @@ def test_a_sensing_label_errs_in_its_own_readings_only(label):
     others = [i for i in range(len(off)) if i not in own]
     assert np.nanmax(off[others]) < 1e-6  # NaN: not fitted
     assert off[list(own)].max() > 1e-3
+
+
+def test_an_effect_named_alone_has_a_sigma_of_its_prior_and_every_one_of_them_can_be_flown():
+    for label, effect in catalogue().items():
+        if (effect.subsystem, effect.element) == ("timing", "mocap"):
+            continue
+        values = parse_effects((label,))[label]
+        assert values == effect.usual
+        assert all(p.low <= values[p.name] <= p.high and values[p.name] != 0.0 for p in effect.parameters), label
+    assert parse_effects(("drag:scale=0.6",)) == {"drag": {"scale": 0.6}}
+
+
+def test_the_command_lists_effects_with_their_parameters(monkeypatch, capsys):
+    monkeypatch.setattr("sys.argv", ["glider", "effects", "drag"])
+    assert report_errors(cli) == 0
+    said = capsys.readouterr().out
+    assert said.startswith("drag  ")
+    assert "scale" in said
+    assert len(said.splitlines()) == 1 + len(catalogue()["drag"].parameters)
+    monkeypatch.setattr("sys.argv", ["glider", "effects", "dragg"])
+    assert report_errors(cli) == 2
+    assert "no effect 'dragg'" in capsys.readouterr().err
