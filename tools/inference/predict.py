@@ -78,9 +78,7 @@ def as_known(problem: Problem, gains: Gains, known: np.ndarray | None) -> Gains:
     """Gains of a problem whose poses have been moved where `known` says so, with what was known at each row."""
     if known is None:
         return gains
-    starts, speed = problem.starts.copy(), problem.kind.speed  # by readings as they were recorded
-    starts[:, speed] = gains.starts[:, speed]
-    gains.X[problem.recording.bounds[:-1]] = starts
+    gains.X[problem.recording.bounds[:-1]] = problem.starts  # by readings as they were recorded, and no later ones
     return replace(gains, known=known)
 
 
