@@ -43,7 +43,6 @@ PRIOR_RUNS = 1.0  # runs that what is usual of that logarithm's scatter is worth
 USUAL_SCATTER = 0.5
 LEAST_SCALE = 0.05  # tolerances
 STANDS_OUT = 2.0  # times what noise leaves of healthy runs, in squares, that the form leaves of them: the form decides
-FEW = 4  # healthy runs
 TOTAL = "total"
 REFINED, FURTHER, MOST = 6, 4, 3  # labels fitted in full at first, beside others, and effects at most
 STEPS = 3
