@@ -123,6 +123,10 @@ def cautions(found: AgainstHealthy) -> list[str]:
     told = []
     if found.healthy.count < FEW:
         told.append(f"{found.healthy.count} healthy runs: how much runs differ though nothing changed is assumed")
+    if found.case.roughie.identified is None:
+        told.append("the vehicle file is not identified: what it misses healthy runs by hides small changes")
+    if found.verdict == UNKNOWN:
+        told.append("turbulence, waves and a clock that wanders are not asked for here: each would be unknown")
     if not found.healthy.runs:
         told.append(
             "what the vehicle's form leaves of healthy runs is taken from its file: --reference HEALTHY says it of "

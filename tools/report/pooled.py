@@ -152,7 +152,7 @@ def report_html(found: _Answer) -> str:
         if healthy is None
         else f"Probabilities of the main change from {healthy.count} healthy runs.",
         "floor": "what noise and vertical water alone leave" if healthy is None
-        else "what the identified vehicle leaves of healthy runs, each flown by a fit to the others",
+        else "what the identified vehicle leaves of healthy runs left out",
         "case": found.case, "verdict": found.verdict, "sentence": sentence(found), "ranking": _ranking(found),
         "sizes": _sizes(found), "cautions": [words.upper(line) for line in found.cautions], "skipped": found.skipped,
         "stages": [
