@@ -30,7 +30,7 @@ $(DEMO_STAMP): pyproject.toml constraints.txt
 	$(call install,analysis)
 
 demo: $(DEMO_STAMP)
-	@$(BIN)/python -m tools.measure.demo
+	@$(BIN)/python -m glider.tools.measure.demo
 
 # README's picture: the top of the demo's report.
 picture: demo
@@ -67,18 +67,18 @@ benchmark: setup
 # switched to; `rollback` goes back to the release before.
 deploy: $(STAMP)
 	@test -n "$(HOST)" || { echo 'make deploy HOST=user@glider' >&2; exit 2; }
-	$(BIN)/python -m tools.deploy.push $(HOST)
+	$(BIN)/python -m glider.tools.deploy.push $(HOST)
 
 rollback: $(STAMP)
 	@test -n "$(HOST)" || { echo 'make rollback HOST=user@glider' >&2; exit 2; }
-	$(BIN)/python -m tools.deploy.push $(HOST) --rollback
+	$(BIN)/python -m glider.tools.deploy.push $(HOST) --rollback
 
 # A release on an emulated 64-bit ARM computer: installed from its wheels, flown, compared. Root; a quarter of an hour.
 # QUICK=1: as plain Python all through, some four minutes; CI runs it.
 # Outside this folder: /proc and /dev are mounted in it while it runs, and pip and `clean` walk through all that lies here.
 ARM64 ?= /var/tmp/glider-arm64
 arm64: $(STAMP)
-	$(BIN)/python -m tools.deploy.emulated $(ARM64) $(if $(QUICK),--quick)
+	$(BIN)/python -m glider.tools.deploy.emulated $(ARM64) $(if $(QUICK),--quick)
 
 clean:
 	rm -rf --one-file-system $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis

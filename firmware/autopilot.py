@@ -4,19 +4,19 @@ import math
 
 import numpy as np
 
-from firmware.core.control import autopilot as core
-from firmware.core.control.controller_rows import CONTROLLERS
-from firmware.core.estimation.sensing import longest_age
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.layouts.estimator_layout import COMMANDED
-from firmware.core.vehicle.seawater import STANDARD_PRESSURE
-from firmware.faults import FAULTS
-from firmware.guidance.mission import Mission
-from firmware.model.estimator_settings import estimator_settings, first_spread, parameter_sigma
-from firmware.model.gains import Control
-from firmware.model.vehicle import Vehicle
-from hal.ports import empty_frame
-from hal.strict import ConfigError
+from glider.firmware.core.control import autopilot as core
+from glider.firmware.core.control.controller_rows import CONTROLLERS
+from glider.firmware.core.estimation.sensing import longest_age
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.layouts.estimator_layout import COMMANDED
+from glider.firmware.core.vehicle.seawater import STANDARD_PRESSURE
+from glider.firmware.faults import FAULTS
+from glider.firmware.guidance.mission import Mission
+from glider.firmware.model.estimator_settings import estimator_settings, first_spread, parameter_sigma
+from glider.firmware.model.gains import Control
+from glider.firmware.model.vehicle import Vehicle
+from glider.hal.ports import empty_frame
+from glider.hal.strict import ConfigError
 
 MODES = {ctl.WAITING: "waiting", ctl.FLYING: "flying", ctl.COMPLETED: "completed", ctl.ABORTED: "aborted"}
 REASONS = {

@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass
 from enum import IntEnum
 
-from firmware.core.layouts import supervisor_layout as sup
+from glider.firmware.core.layouts import supervisor_layout as sup
 
 
 class Reaction(IntEnum):

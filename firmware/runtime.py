@@ -16,14 +16,14 @@ from typing import Any
 
 import numpy as np
 
-from firmware.autopilot import Autopilot
-from firmware.core.control import telemetry as record
-from firmware.core.jit import freeze_kernels, thaw_kernels
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.layouts import supervisor_layout as sup
-from firmware.faults import Reaction
-from firmware.supervisor import Supervisor
-from hal.ports import FRAME_SIZE, SLOTS, Hardware, Ports
+from glider.firmware.autopilot import Autopilot
+from glider.firmware.core.control import telemetry as record
+from glider.firmware.core.jit import freeze_kernels, thaw_kernels
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.layouts import supervisor_layout as sup
+from glider.firmware.faults import Reaction
+from glider.firmware.supervisor import Supervisor
+from glider.hal.ports import FRAME_SIZE, SLOTS, Hardware, Ports
 
 HISTOGRAM_EDGES = np.array([0.0, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, np.inf])  # s
 SHED = 10  # of so many records one is kept while the loop is late

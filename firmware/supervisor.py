@@ -7,15 +7,15 @@ import math
 
 import numpy as np
 
-from firmware.autopilot import Autopilot
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.layouts import supervisor_layout as sup
-from firmware.core.supervision.screening import screen
-from firmware.core.supervision.supervisor import guard
-from firmware.faults import FAULTS, Reaction
-from firmware.guidance.mission import Mission
-from firmware.model.supervisor_settings import Limits, settings_vector
-from firmware.model.vehicle import Vehicle
+from glider.firmware.autopilot import Autopilot
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.layouts import supervisor_layout as sup
+from glider.firmware.core.supervision.screening import screen
+from glider.firmware.core.supervision.supervisor import guard
+from glider.firmware.faults import FAULTS, Reaction
+from glider.firmware.guidance.mission import Mission
+from glider.firmware.model.supervisor_settings import Limits, settings_vector
+from glider.firmware.model.vehicle import Vehicle
 
 
 class Supervisor:

@@ -1,8 +1,8 @@
 """Names, units and meaning of what a flight records each tick. The places are those of core/telemetry."""
 
-from firmware.core.control.telemetry import N_RECORD, REC_ASKED, REC_FRAME
-from hal.ports import SLOTS
-from hal.recorder.schema import Field, RecordSpec
+from glider.firmware.core.control.telemetry import N_RECORD, REC_ASKED, REC_FRAME
+from glider.hal.ports import SLOTS
+from glider.hal.recorder.schema import Field, RecordSpec
 
 _FIELDS = (
     ("t_s", "s", "time since the start of the flight, onboard clock"),

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from importlib.metadata import entry_points
 from typing import Any
 
-from hal.ports import Board, BoardError
+from glider.hal.ports import Board, BoardError
 
 GROUP = "glider.boards"
 

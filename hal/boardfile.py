@@ -12,9 +12,9 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
-from hal.ports import SLOTS
-from hal.protocols.registers import RegisterMap, Role, channel_of, fits, preset, presets
-from hal.strict import ConfigError, Table, decode
+from glider.hal.ports import SLOTS
+from glider.hal.protocols.registers import RegisterMap, Role, channel_of, fits, preset, presets
+from glider.hal.strict import ConfigError, Table, decode
 
 Positive = Annotated[float, msgspec.Meta(gt=0.0)]
 Name = Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
@@ -188,7 +188,7 @@ class DeviceFile(Table):
 
 # Devices that speak a protocol of their own on a port of their own: place on the board -> name -> who builds its
 # driver, loaded when a board file asks for it. What speaks Modbus is a register map of the role that its place takes.
-DRIVERS = {"imu": {"vn100": "hal.drivers.vn100:build"}, "servo": {"maestro": "hal.drivers.maestro:build"}}
+DRIVERS = {"imu": {"vn100": "glider.hal.drivers.vn100:build"}, "servo": {"maestro": "glider.hal.drivers.maestro:build"}}
 ROLES: dict[str, tuple[Role, ...]] = {
     "beacon": ("pressure",), "slider_wire": ("analog", "encoder"), "plunger_wire": ("analog", "encoder"),
     "leak": ("analog",), "battery": ("analog",), "slider": ("drive",), "ballast": ("drive",),

@@ -9,18 +9,18 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from hal import boardfile
-from hal.board import BoardRequest
-from hal.clocks import MonotonicClock
-from hal.drivers.drive import Drive
-from hal.drivers.maestro import Servo
-from hal.drivers.modbus_sensors import AnalogModule, Beacon, EncoderWire, Input, battery, leak, wire
-from hal.drivers.samples import Sensor
-from hal.ports import ACTUATORS, SENSORS, Board, BoardError, Hardware, OutOfBand, Validity
-from hal.protocols.modbus_master import ModbusBus
-from hal.recorder.schema import RecordSpec
-from hal.transport.hub import Hub, LineHandler, Link
-from hal.transport.port import SerialPort, Unplugged
+from glider.hal import boardfile
+from glider.hal.board import BoardRequest
+from glider.hal.clocks import MonotonicClock
+from glider.hal.drivers.drive import Drive
+from glider.hal.drivers.maestro import Servo
+from glider.hal.drivers.modbus_sensors import AnalogModule, Beacon, EncoderWire, InputRegister, battery, leak, wire
+from glider.hal.drivers.samples import Sensor
+from glider.hal.ports import ACTUATORS, SENSORS, Board, BoardError, Hardware, OutOfBand, Validity
+from glider.hal.protocols.modbus_master import ModbusBus
+from glider.hal.recorder.schema import RecordSpec
+from glider.hal.transport.hub import Hub, LineHandler, SerialLink
+from glider.hal.transport.port import SerialPort, Unplugged
 
 GUARD_S = 0.001  # before a deadline, in which ports are left alone
 FIRST_ANSWER_S = 4.0  # for every device to answer after opening
@@ -51,10 +51,10 @@ class DeviceBoard:
     records: tuple[RecordSpec, ...] = ()
     imu: Sensor
     beacon: Beacon
-    slider_wire: Input
-    plunger_wire: Input
-    leak: Input | None
-    battery: Input | None
+    slider_wire: InputRegister
+    plunger_wire: InputRegister
+    leak: InputRegister | None
+    battery: InputRegister | None
     servo: Servo
     slider: Drive
     ballast: Drive
@@ -106,7 +106,7 @@ class DeviceBoard:
 
     def _build_inputs(self, presets: dict) -> None:
         """Draw-wires, leak and battery: those on one analog module share its reads."""
-        modules: dict[tuple[str, int], list[tuple[int, Input]]] = {}
+        modules: dict[tuple[str, int], list[tuple[int, InputRegister]]] = {}
         maps = {}
         for name in ("slider_wire", "plunger_wire", "leak", "battery"):
             table, item = getattr(self.file, name), getattr(self, name)
@@ -128,9 +128,9 @@ class DeviceBoard:
             self._handlers[port] = self.buses[port]
         return self.buses[port]
 
-    def _link(self, name: str) -> Link:
+    def _link(self, name: str) -> SerialLink:
         table = self.file.port[name]
-        return Link(name, SerialPort(table.path, table.baud), self._handlers[name])
+        return SerialLink(name, SerialPort(table.path, table.baud), self._handlers[name])
 
     # --- opening and closing ----------------------------------------------------------------------------------------
     def open(self) -> None:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
 
-from hal.sortie import State
+from glider.hal.sortie import SortieState
 
 SIZE = 4096
 NAME = "heartbeat"
@@ -44,7 +44,7 @@ class Guard(IntEnum):
     ASCENDING = 2
 
 
-class Held(RuntimeError):
+class HeartbeatHeld(RuntimeError):
     """Another flight holds this heartbeat; str() says which process."""
 
 
@@ -53,7 +53,7 @@ class Pulse:
     """A look at a heartbeat. Ages in s on the monotonic clock; inf where never stamped."""
 
     pid: int
-    state: State
+    state: SortieState
     period_s: float
     age_s: float
     ticks: int
@@ -91,8 +91,10 @@ class Heartbeat:
         else:
             os.close(fd)
             with contextlib.suppress(OSError, ValueError):
-                raise Held(f"{path}: a flight is under way (process {cls.open(folder).words[W_PID]})") from None
-            raise Held(f"{path}: a flight is under way") from None
+                raise HeartbeatHeld(
+                    f"{path}: a flight is under way (process {cls.open(folder).words[W_PID]})"
+                ) from None
+            raise HeartbeatHeld(f"{path}: a flight is under way") from None
         os.ftruncate(fd, SIZE)
         pulse = cls(fd, path)
         guard = pulse.words[W_GUARD_NS : W_GUARD_STAGE + 1].tolist()  # its own; it may be there before the flight
@@ -128,7 +130,7 @@ class Heartbeat:
         self.words[W_TICKS] += 1
         self.values[V_TIME_S] = t
 
-    def publish(self, state: State) -> None:
+    def publish(self, state: SortieState) -> None:
         """Set the sortie's state."""
         self.words[W_STATE] = state
 
@@ -153,7 +155,7 @@ class Heartbeat:
         words, now = self.words, time.monotonic_ns()
         return Pulse(
             pid=words[W_PID],
-            state=State(words[W_STATE]) if words[W_STATE] in list(State) else State.ABORTED,
+            state=SortieState(words[W_STATE]) if words[W_STATE] in list(SortieState) else SortieState.ABORTED,
             period_s=words[W_PERIOD_NS] / 1e9,
             age_s=_age(words[W_BEAT_NS], now),
             ticks=words[W_TICKS],

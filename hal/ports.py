@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from hal.recorder.schema import RecordSpec
+from glider.hal.recorder.schema import RecordSpec
 
 
 class Validity(IntEnum):

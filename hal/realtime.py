@@ -1,4 +1,4 @@
-"""What a process may ask of the system to be punctual: each wish optional, each with what came of it in words."""
+"""What a process may ask of the system to be punctual: each request optional, each with its outcome in words."""
 
 import contextlib
 import ctypes

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from enum import Enum, IntEnum
 
 
-class State(IntEnum):
+class SortieState(IntEnum):
     """States, mildest first: of two copies that differ the larger counts."""
 
     ASHORE = 0  # no sortie
@@ -27,12 +27,12 @@ class State(IntEnum):
     @property
     def may_arm(self) -> bool:
         """Whether a mission may begin."""
-        return self <= State.ENDED
+        return self <= SortieState.ENDED
 
     @property
     def at_rest(self) -> bool:
         """Whether nobody has to bring the vehicle up."""
-        return self <= State.HELD
+        return self <= SortieState.HELD
 
     @property
     def must_ascend(self) -> bool:
@@ -42,7 +42,7 @@ class State(IntEnum):
     @property
     def beats(self) -> bool:
         """Whether the flight's loop runs, so that its heartbeat is expected every tick."""
-        return self in (State.DIVING, State.ASCENDING)
+        return self in (SortieState.DIVING, SortieState.ASCENDING)
 
 
 class Party(Enum):
@@ -97,36 +97,38 @@ FAULT = Blocker("a fault ended the dive", lambda facts: facts.fault)
 class Transition:
     """From any of `sources`, on `trigger` by `party`, to `target`, unless a blocker holds."""
 
-    sources: tuple[State, ...]
+    sources: tuple[SortieState, ...]
     trigger: Trigger
     party: Party
-    target: State
+    target: SortieState
     blockers: tuple[Blocker, ...] = ()
 
 
-_MUST_ASCEND = tuple(state for state in State if state.must_ascend)
-_FLOWN = (State.ARMED, State.DIVING, State.ASCENDING, State.SURFACED)
+_MUST_ASCEND = tuple(state for state in SortieState if state.must_ascend)
+_FLOWN = (SortieState.ARMED, SortieState.DIVING, SortieState.ASCENDING, SortieState.SURFACED)
 TRANSITIONS = (
-    Transition((State.ASHORE, State.ENDED), Trigger.ARM, Party.FLIGHT, State.ARMED, (UNDER_WAY, BROUGHT_UP)),
-    Transition(_MUST_ASCEND, Trigger.RECOVER, Party.FLIGHT, State.ASCENDING, (UNDER_WAY, BROUGHT_UP)),
-    Transition((State.ARMED,), Trigger.DISARM, Party.FLIGHT, State.ASHORE),
-    Transition((State.ARMED,), Trigger.START, Party.FLIGHT, State.DIVING),
-    Transition((State.ASCENDING,), Trigger.START, Party.FLIGHT, State.ASCENDING),
-    Transition((State.DIVING, State.ASCENDING), Trigger.FINISH, Party.FLIGHT, State.ASCENDING),
-    Transition((State.ASCENDING,), Trigger.SURFACE, Party.FLIGHT, State.SURFACED),
-    Transition((State.SURFACED,), Trigger.END, Party.FLIGHT, State.ENDED, (FAULT,)),
-    Transition((State.SURFACED,), Trigger.END, Party.FLIGHT, State.HELD),
-    Transition(_FLOWN, Trigger.HAND_OVER, Party.FLIGHT, State.ABORTED),
-    Transition(_MUST_ASCEND, Trigger.LOSE, Party.WATCH, State.ABORTED),
-    Transition(tuple(State), Trigger.ACKNOWLEDGE, Party.OPERATOR, State.ASHORE, (UNDER_WAY, BROUGHT_UP)),
+    Transition(
+        (SortieState.ASHORE, SortieState.ENDED), Trigger.ARM, Party.FLIGHT, SortieState.ARMED, (UNDER_WAY, BROUGHT_UP)
+    ),
+    Transition(_MUST_ASCEND, Trigger.RECOVER, Party.FLIGHT, SortieState.ASCENDING, (UNDER_WAY, BROUGHT_UP)),
+    Transition((SortieState.ARMED,), Trigger.DISARM, Party.FLIGHT, SortieState.ASHORE),
+    Transition((SortieState.ARMED,), Trigger.START, Party.FLIGHT, SortieState.DIVING),
+    Transition((SortieState.ASCENDING,), Trigger.START, Party.FLIGHT, SortieState.ASCENDING),
+    Transition((SortieState.DIVING, SortieState.ASCENDING), Trigger.FINISH, Party.FLIGHT, SortieState.ASCENDING),
+    Transition((SortieState.ASCENDING,), Trigger.SURFACE, Party.FLIGHT, SortieState.SURFACED),
+    Transition((SortieState.SURFACED,), Trigger.END, Party.FLIGHT, SortieState.ENDED, (FAULT,)),
+    Transition((SortieState.SURFACED,), Trigger.END, Party.FLIGHT, SortieState.HELD),
+    Transition(_FLOWN, Trigger.HAND_OVER, Party.FLIGHT, SortieState.ABORTED),
+    Transition(_MUST_ASCEND, Trigger.LOSE, Party.WATCH, SortieState.ABORTED),
+    Transition(tuple(SortieState), Trigger.ACKNOWLEDGE, Party.OPERATOR, SortieState.ASHORE, (UNDER_WAY, BROUGHT_UP)),
 )
 
 
-class Refused(RuntimeError):
+class SortieRefused(RuntimeError):
     """A transition that is blocked or not in the table; str() says why."""
 
 
-def follow(state: State, trigger: Trigger, party: Party, facts: Facts) -> State:
+def follow(state: SortieState, trigger: Trigger, party: Party, facts: Facts) -> SortieState:
     """Return the state that follows; Refused where none does."""
     reason = f"{party.value}: '{trigger.value}' is not possible in state {state.name.lower()}"
     for row in TRANSITIONS:
@@ -136,4 +138,4 @@ def follow(state: State, trigger: Trigger, party: Party, facts: Facts) -> State:
         if blocker is None:
             return row.target
         reason = blocker.text
-    raise Refused(reason)
+    raise SortieRefused(reason)

@@ -15,7 +15,7 @@ def module_command(module: str, *arguments: str) -> list[str]:
     """Build the command line that runs a module of this project.
 
     Args:
-        module: its dotted name, for example "hal.recorder.writer".
+        module: its dotted name, for example "glider.hal.recorder.writer".
         arguments: what follows it on the command line.
     """
     return [sys.executable, "-P", "-m", module, *arguments]

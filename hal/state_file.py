@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from hal.sortie import State
+from glider.hal.sortie import SortieState
 
 BLOCK = 512  # bytes of a copy: one sector
 NAMES = ("state.a", "state.b")
@@ -21,25 +21,32 @@ TEXT_BYTES = 160  # of the reason, and of the flight's name
 _MAGIC = b"glider-state-2 "
 # Files written before states had names: a number, in this order.
 _MAGIC_1 = b"glider-state-1 "
-_STATES_1 = (State.ASHORE, State.HELD, State.ARMED, State.DIVING, State.ABORTED, State.UNKNOWN)
+_STATES_1 = (
+    SortieState.ASHORE,
+    SortieState.HELD,
+    SortieState.ARMED,
+    SortieState.DIVING,
+    SortieState.ABORTED,
+    SortieState.UNKNOWN,
+)
 _WORDS = {
-    State.ASHORE: "ashore",
-    State.ENDED: "ended at the surface",
-    State.HELD: "ended at the surface after a fault",
-    State.SURFACED: "broke off at the surface",
-    State.ARMED: "broke off after arming",
-    State.DIVING: "broke off under way",
-    State.ASCENDING: "broke off in an ascent",
-    State.ABORTED: "given up, and not known to have surfaced",
-    State.UNKNOWN: "state not known",
+    SortieState.ASHORE: "ashore",
+    SortieState.ENDED: "ended at the surface",
+    SortieState.HELD: "ended at the surface after a fault",
+    SortieState.SURFACED: "broke off at the surface",
+    SortieState.ARMED: "broke off after arming",
+    SortieState.DIVING: "broke off under way",
+    SortieState.ASCENDING: "broke off in an ascent",
+    SortieState.ABORTED: "given up, and not known to have surfaced",
+    SortieState.UNKNOWN: "state not known",
 }
 
 
 @dataclass(frozen=True)
-class Record:
+class StateRecord:
     """The last known state, of which flight, and why. `trouble`: what is wrong with the copies, empty if nothing."""
 
-    state: State
+    state: SortieState
     flight: str = ""
     reason: str = ""
     sequence: int = 0
@@ -52,7 +59,7 @@ class Record:
         return "; ".join(filter(None, parts))
 
 
-def encode(record: Record) -> bytes:
+def encode(record: StateRecord) -> bytes:
     """A copy's block."""
     fields = [record.state.name, record.sequence, record.flight, record.reason]
     body = _MAGIC + json.dumps(fields, separators=(",", ":")).encode()
@@ -62,7 +69,7 @@ def encode(record: Record) -> bytes:
     return head + f"{zlib.crc32(head):08x}\n".encode()
 
 
-def decode(block: bytes) -> Record | str:
+def decode(block: bytes) -> StateRecord | str:
     """The state in a copy's block, or what is wrong with it."""
     if len(block) != BLOCK:
         return f"torn ({len(block)} of {BLOCK} bytes)"
@@ -71,8 +78,8 @@ def decode(block: bytes) -> Record | str:
         return "torn (its check sum fails)"
     try:
         state, sequence, flight, reason = json.loads(head[len(_MAGIC) :])
-        known = State[state] if head.startswith(_MAGIC) else _STATES_1[state]
-        return Record(known, str(flight), str(reason), int(sequence))
+        known = SortieState[state] if head.startswith(_MAGIC) else _STATES_1[state]
+        return StateRecord(known, str(flight), str(reason), int(sequence))
     except (ValueError, TypeError, LookupError):
         return "not understood"
 
@@ -81,44 +88,44 @@ class StateFile:
     """Two copies in `folder`, which is made if need be. OSError where it cannot be written."""
 
     decode = staticmethod(decode)
-    unwritten = Record(State.ASHORE)  # what is read where there is neither copy
+    unwritten = StateRecord(SortieState.ASHORE)  # what is read where there is neither copy
 
     def __init__(self, folder: Path | str):
         self.folder = Path(folder)
         self.folder.mkdir(parents=True, exist_ok=True)
         self.paths = tuple(self.folder / name for name in NAMES)
 
-    def read(self) -> Record:
+    def read(self) -> StateRecord:
         """The worse of both copies; ashore where there is neither. Never raises over what is in them."""
         copies = [_read_copy(path, self.decode) for path in self.paths]
         if copies == [None, None]:
             return self.unwritten
-        good = [copy for copy in copies if isinstance(copy, Record)]
+        good = [copy for copy in copies if isinstance(copy, StateRecord)]
         torn = [
             f"{path}: {copy or 'missing beside the other'}"
             for path, copy in zip(self.paths, copies, strict=True)
-            if not isinstance(copy, Record)
+            if not isinstance(copy, StateRecord)
         ]
         if not good:
-            return Record(State.UNKNOWN, trouble="; ".join(torn))
+            return StateRecord(SortieState.UNKNOWN, trouble="; ".join(torn))
         worst = max(good, key=_worseness)
         last = max(record.sequence for record in good)
         if torn:
             # What the torn copy said is not known; only a state that means 'ascend' anyway can stand without it.
-            state = worst.state if worst.state.must_ascend else State.UNKNOWN
-            return Record(state, worst.flight, worst.reason, last, "; ".join(torn))
-        return Record(worst.state, worst.flight, worst.reason, last)
+            state = worst.state if worst.state.must_ascend else SortieState.UNKNOWN
+            return StateRecord(state, worst.flight, worst.reason, last, "; ".join(torn))
+        return StateRecord(worst.state, worst.flight, worst.reason, last)
 
-    def write(self, state: State, *, flight: str = "", reason: str = "") -> Record:
+    def write(self, state: SortieState, *, flight: str = "", reason: str = "") -> StateRecord:
         """Bring a state to the disk, both copies; returns once it is there (an fsync or two: not for the tick)."""
-        record = Record(state, _cut(flight), _cut(reason), self.read().sequence + 1)
+        record = StateRecord(state, _cut(flight), _cut(reason), self.read().sequence + 1)
         block = encode(record)
         for path in self.paths:
             _write_copy(path, block)
         return record
 
 
-def _worseness(record: Record) -> tuple[int, int]:
+def _worseness(record: StateRecord) -> tuple[int, int]:
     return record.state, record.sequence
 
 
@@ -127,7 +134,7 @@ def _cut(text: str) -> str:
     return plain[:TEXT_BYTES]
 
 
-def _read_copy(path: Path, decode: Callable[[bytes], Record | str]) -> Record | str | None:
+def _read_copy(path: Path, decode: Callable[[bytes], StateRecord | str]) -> StateRecord | str | None:
     """A copy's state, what is wrong with it, or None where there is no such file."""
     try:
         with path.open("rb") as file:

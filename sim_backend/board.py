@@ -6,16 +6,16 @@ from typing import Annotated, Any
 import msgspec
 import numpy as np
 
-from firmware.core.vehicle.layout import X_ACT
-from hal import ports
-from hal.board import BoardRequest
-from hal.clocks import MonotonicClock
-from hal.recorder.schema import Field, RecordSpec
-from hal.strict import Table, decode
-from sim_backend.core import layout as wl
-from sim_backend.core.effects.catalogue import check_board
-from sim_backend.core.world import write_truth
-from sim_backend.world import Environment, SampledSensors, Start, World, build_world
+from glider.firmware.core.vehicle.layout import X_ACT
+from glider.hal import ports
+from glider.hal.board import BoardRequest
+from glider.hal.clocks import MonotonicClock
+from glider.hal.recorder.schema import Field, RecordSpec
+from glider.hal.strict import Table, decode
+from glider.sim_backend.core import layout as wl
+from glider.sim_backend.core.effects.catalogue import check_board
+from glider.sim_backend.core.world import write_truth
+from glider.sim_backend.world import Environment, SampledSensors, Start, World, build_world
 
 TRUTH = RecordSpec(
     "/truth",

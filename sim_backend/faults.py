@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from firmware.core.vehicle.layout import BALLAST_MIN, BALLAST_RATE, NET_MASS, SERVO_RATE, SLIDER_RATE, X_ACT
-from hal.ports import Condition, Validity
-from sim_backend.board import SimBoard
-from sim_backend.world import World
+from glider.firmware.core.vehicle.layout import BALLAST_MIN, BALLAST_RATE, NET_MASS, SERVO_RATE, SLIDER_RATE, X_ACT
+from glider.hal.ports import Condition, Validity
+from glider.sim_backend.board import SimBoard
+from glider.sim_backend.world import World
 
 SENSOR_KINDS = ("silent", "off", "stuck", "garbage", "wrong", "jump", "slow", "delayed", "repeated", "backwards",
                 "intermittent")  # fmt: skip
@@ -31,7 +31,7 @@ PERIOD_S = 1.0  # of what comes and goes
 
 
 class FaultySensor:
-    """A sensor port in front of a well one. `begin(kind, ...)` breaks it, `end()` mends it."""
+    """A sensor port in front of a well one. `begin(kind, ...)` breaks it, `end()` repairs it."""
 
     def __init__(self, port: Any, world: World):
         self._port, self._world = port, world

@@ -1,22 +1,22 @@
-"""Many closed-loop flights from one compiled call: worlds and autopilots stacked, flown, and what came of them."""
+"""Many closed-loop flights from one compiled call: worlds and autopilots stacked, flown, and their outcomes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from firmware.autopilot import Autopilot
-from firmware.core.layouts.control_layout import COMPLETED, ESTIMATOR, N_LEG
-from firmware.core.maths.wide import LANES
-from sim_backend.core.closed_loop import END_LEG, END_MODE, END_REASON, END_TIME, N_END, N_TRACE, TRACE
-from sim_backend.core.closed_loop_lanes import fly_batch, fly_lanes
-from sim_backend.core.layout import N_WAVE
-from sim_backend.world import World
+from glider.firmware.autopilot import Autopilot
+from glider.firmware.core.layouts.control_layout import COMPLETED, ESTIMATOR, N_LEG
+from glider.firmware.core.maths.wide import LANES
+from glider.sim_backend.core.closed_loop import END_LEG, END_MODE, END_REASON, END_TIME, N_END, N_TRACE, TRACE
+from glider.sim_backend.core.closed_loop_lanes import fly_batch, fly_lanes
+from glider.sim_backend.core.layout import N_WAVE
+from glider.sim_backend.world import World
 
 
 @dataclass
 class FleetResult:
-    """What came of n flights: how each ended, its last state, and its trace."""
+    """Outcomes of n flights: how each ended, its last state, and its trace."""
 
     modes: np.ndarray  # (n,) control_layout WAITING .. ABORTED
     reasons: np.ndarray  # (n,)
@@ -46,7 +46,7 @@ def groups_of(worlds: Sequence[World], pilots: Sequence[Autopilot]) -> tuple[np.
     kinds: dict[tuple[bool, float], list[int]] = {}
     for number, (world, pilot) in enumerate(zip(worlds, pilots, strict=True)):
         kinds.setdefault((bool(world.F.any()), float(pilot.C[ESTIMATOR])), []).append(number)
-    rows = [alike[i : i + LANES] for alike in kinds.values() for i in range(0, len(alike), LANES)]
+    rows = [identical[i : i + LANES] for identical in kinds.values() for i in range(0, len(identical), LANES)]
     filled = [row + row[-1:] * (LANES - len(row)) for row in rows]
     return np.array(filled, dtype=np.int64), np.array([len(row) for row in rows], dtype=np.int64)
 

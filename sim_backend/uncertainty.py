@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from firmware.core.vehicle.layout import N_DRAWN, N_P
-from firmware.model.estimator_settings import parameter_sigma
-from firmware.model.vehicle import Vehicle
-from sim_backend.core import layout as wl
+from glider.firmware.core.vehicle.layout import N_DRAWN, N_P
+from glider.firmware.model.estimator_settings import parameter_sigma
+from glider.firmware.model.vehicle import Vehicle
+from glider.sim_backend.core import layout as wl
 
 
 def deviates(rng: np.random.Generator) -> np.ndarray:

@@ -8,19 +8,19 @@ from typing import Annotated
 import msgspec
 import numpy as np
 
-from firmware.core.layouts import supervisor_layout as sup
-from firmware.core.maths.rotations import quaternion_from_euler
-from firmware.core.vehicle.layout import N_P, X_ACT, X_NU, X_POS, X_QUAT
-from firmware.core.vehicle.seawater import STANDARD_PRESSURE, water_density
-from firmware.model.vehicle import Vehicle
-from hal.ports import empty_frame
-from hal.strict import Table
-from sim_backend.core import layout as wl
-from sim_backend.core import world as core
-from sim_backend.core.effects import effect_layout as ef
-from sim_backend.core.effects.catalogue import apply_effects
-from sim_backend.core.environment import wave_row
-from sim_backend.uncertainty import sensor_errors
+from glider.firmware.core.layouts import supervisor_layout as sup
+from glider.firmware.core.maths.rotations import quaternion_from_euler
+from glider.firmware.core.vehicle.layout import N_P, X_ACT, X_NU, X_POS, X_QUAT
+from glider.firmware.core.vehicle.seawater import STANDARD_PRESSURE, water_density
+from glider.firmware.model.vehicle import Vehicle
+from glider.hal.ports import empty_frame
+from glider.hal.strict import Table
+from glider.sim_backend.core import layout as wl
+from glider.sim_backend.core import world as core
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.sim_backend.core.effects.catalogue import apply_effects
+from glider.sim_backend.core.environment import wave_row
+from glider.sim_backend.uncertainty import sensor_errors
 
 PLANT_STEP = 0.01  # s
 SpeedPair = tuple[float, float]
@@ -67,7 +67,7 @@ class SampledSensors(Table):
 
     @property
     def periods(self) -> dict[str, float]:
-        """Seconds between two samples, as hal.ports.Board has them."""
+        """Seconds between two samples, as glider.hal.ports.Board has them."""
         wires = min(self.slider_wire.rate_hz, self.plunger_wire.rate_hz)
         return {"imu": 1.0 / self.imu.rate_hz, "beacon": 1.0 / self.beacon.rate_hz, "wires": 1.0 / wires}
 

@@ -121,6 +121,6 @@ def unwritten() -> Iterator[None]:
 def compiled(request) -> None:
     """The kernels of a flight are in the cache before a program is started that is given so many seconds to fly."""
     if any(item.get_closest_marker("realtime") for item in request.session.items):
-        from tools.flight.precompile import FLIGHT, ensure_compiled
+        from glider.tools.flight.precompile import FLIGHT, ensure_compiled
 
         ensure_compiled(FLIGHT, lambda text: None, lambda label, total: contextlib.nullcontext(lambda n: None))

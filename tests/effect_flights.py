@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from firmware.core.maths.rotations import quaternion_from_euler
-from sim_backend.core.effects.catalogue import catalogue
-from sim_backend.core.effects.effect_layout import N_XF
-from sim_backend.world import Environment, SampledSensors, Start, World, build_world
-from tools.data.sources import load_vehicle
+from glider.firmware.core.maths.rotations import quaternion_from_euler
+from glider.sim_backend.core.effects.catalogue import catalogue
+from glider.sim_backend.core.effects.effect_layout import N_XF
+from glider.sim_backend.world import Environment, SampledSensors, Start, World, build_world
+from glider.tools.data.sources import load_vehicle
 
 VEHICLE = load_vehicle("roughie")
 CALM = {"disturbance_linear": 0.0, "disturbance_angular": 0.0, "surface": False}
@@ -56,7 +56,7 @@ def flown(made: World, seconds: float = 40.0, command=manoeuvre) -> tuple[np.nda
     return np.array(states), np.array(frames)
 
 
-def quiet(effects=None, depth=8.0, pitch=0.0, **environment) -> World:
+def muted(effects=None, depth=8.0, pitch=0.0, **environment) -> World:
     """A world at rest."""
     made = world(effects, **environment)
     made.x[2], made.x[7] = depth, 0.0

@@ -8,15 +8,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from firmware.core.control.control import reference_step
-from firmware.core.control.error_bound import model_error_bound
-from firmware.core.control.input_forms import exact_form
-from firmware.core.control.law import OK, pitch_depth_law
-from firmware.core.control.law_plus import reach
-from firmware.core.maths.rotations import euler_from_quaternion, rotation_nb
-from firmware.core.vehicle import layout
-from sim_backend.core.layout import N_ENV, N_WAVE
-from sim_backend.core.plant import derivative, plant_step
+from glider.firmware.core.control.control import reference_step
+from glider.firmware.core.control.error_bound import model_error_bound
+from glider.firmware.core.control.input_forms import exact_form
+from glider.firmware.core.control.law import OK, pitch_depth_law
+from glider.firmware.core.control.law_plus import reach
+from glider.firmware.core.maths.rotations import euler_from_quaternion, rotation_nb
+from glider.firmware.core.vehicle import layout
+from glider.sim_backend.core.layout import N_ENV, N_WAVE
+from glider.sim_backend.core.plant import derivative, plant_step
 
 STILL, NO_WAVES, NO_DISTURBANCE = np.zeros(N_ENV), np.zeros((0, N_WAVE)), np.zeros(6)
 SLIDER, BALLAST = layout.X_ACT + 1, layout.X_ACT + 2
@@ -166,7 +166,7 @@ class Law:
             raise NoInputs(status)
         return np.array([u_s, u_b]), np.array([s_t, s_z]), g
 
-    def settle(self, x, references, speeds=STANDING, tolerance=1e-14, most=20) -> int:
+    def arbitrate(self, x, references, speeds=STANDING, tolerance=1e-14, most=20) -> int:
         """Put x's slider and ballast where the law wants them with them there; returns the iterations it took.
 
         Newton's method, the derivatives by differences: the mass matrix moves with the inputs, and where forces are

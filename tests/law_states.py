@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from law_flights import Gains, Reference, output_accelerations, outputs, plant_rates, without_stops
 from model_states import RATE, VEHICLE_TEXT, P, actuators, angles, rates, state, vehicles, velocities
 
-from firmware.core.vehicle import layout
-from firmware.model.estimator_settings import parameter_sigma
-from firmware.model.vehicle import decode_vehicle
+from glider.firmware.core.vehicle import layout
+from glider.firmware.model.estimator_settings import parameter_sigma
+from glider.firmware.model.vehicle import decode_vehicle
 
 SPREAD = 3.0 * parameter_sigma(P, decode_vehicle(VEHICLE_TEXT, "roughie").uncertainty)
 actuator_speeds = st.tuples(*(st.floats(-rate, rate) for rate in RATE))

@@ -5,12 +5,12 @@ import math
 import numpy as np
 from hypothesis import strategies as st
 
-from firmware.core.maths.rotations import quaternion_from_euler
-from firmware.core.vehicle import layout
-from firmware.core.vehicle.flight import nominal_derivative
-from firmware.core.vehicle.mass import first_moment, inertia, translational_mass
-from firmware.model.library import shipped
-from firmware.model.vehicle import decode_vehicle
+from glider.firmware.core.maths.rotations import quaternion_from_euler
+from glider.firmware.core.vehicle import layout
+from glider.firmware.core.vehicle.flight import nominal_derivative
+from glider.firmware.core.vehicle.mass import first_moment, inertia, translational_mass
+from glider.firmware.model.library import shipped
+from glider.firmware.model.vehicle import decode_vehicle
 
 VEHICLE_TEXT = shipped("model/vehicles")["roughie"]
 P = decode_vehicle(VEHICLE_TEXT, "roughie").vector()  # nobody writes into it: conftest.py looks

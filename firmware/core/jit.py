@@ -57,8 +57,8 @@ def cache_root() -> Path:
         if os.access(candidate, os.W_OK) and _is_ours(candidate):
             return candidate
     tried = ", ".join(map(str, candidates))
-    lacking = "no writable folder of one's own for compiled kernels: set GLIDER_CACHE_DIR"
-    raise PermissionError(errno.EACCES, lacking, tried)
+    missing = "no writable folder of one's own for compiled kernels: set GLIDER_CACHE_DIR"
+    raise PermissionError(errno.EACCES, missing, tried)
 
 
 def _is_ours(folder: Path) -> bool:
@@ -97,7 +97,7 @@ import numba  # noqa: E402  (the cache folder has to be set first)
 # No kernel calls BLAS. Numba looks for SciPy's all the same before the first one runs: a fifth of a second of imports.
 _BLAS = "scipy.linalg.cython_blas"
 if _BLAS not in sys.modules:
-    sys.modules[_BLAS] = None  # type: ignore[assignment]  # how Python is told that there is none
+    sys.modules[_BLAS] = None  # type: ignore[assignment]  # how Python learns that there is none
     try:
         import numba.np.arraymath
     finally:

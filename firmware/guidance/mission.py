@@ -6,10 +6,10 @@ from typing import Annotated, Literal
 import msgspec
 import numpy as np
 
-from firmware.core.layouts import control_layout as ctl
-from firmware.model.gains import Control
-from firmware.model.vehicle import Vehicle
-from hal.strict import ConfigError, Table, decode
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.model.gains import Control
+from glider.firmware.model.vehicle import Vehicle
+from glider.hal.strict import ConfigError, Table, decode
 
 Seconds = Annotated[float, msgspec.Meta(gt=0.0, le=86400.0)]
 PitchAngle = Annotated[float, msgspec.Meta(ge=-75.0, le=75.0)]

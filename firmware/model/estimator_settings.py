@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from firmware.core.layouts import estimator_layout as kf
-from firmware.core.vehicle import layout
-from firmware.model.vehicle import COEFFICIENTS, DisturbanceTable, SensorsTable, UncertaintyTable
+from glider.firmware.core.layouts import estimator_layout as kf
+from glider.firmware.core.vehicle import layout
+from glider.firmware.model.vehicle import COEFFICIENTS, DisturbanceTable, SensorsTable, UncertaintyTable
 
 # Errors of parameters stay, but the accelerations they cause turn with the flight: with each dive, climb or turn.
 ERROR_TIME = 10.0  # s

@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import msgspec
 
-from firmware.core.control.controller_rows import CONTROLLERS
-from hal.strict import Table
+from glider.firmware.core.control.controller_rows import CONTROLLERS
+from glider.hal.strict import Table
 
 if TYPE_CHECKING:
     Name = str
@@ -80,7 +80,7 @@ class LawGains(Table):
 class HybridTable(Table):
     """When the hybrid hands over to the law, and back: pitch still to go (rad), depth off its reference (m).
 
-    Roughness is the disturbance that the filter sees over the one in the vehicle file, 1 in calm water.
+    The noise scale is the disturbance that the filter sees over the one in the vehicle file, 1 in calm water.
     """
 
     roughness_on: Gain = 8.0

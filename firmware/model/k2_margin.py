@@ -9,15 +9,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from firmware.core.control.control import pitch_feedforward
-from firmware.core.control.error_bound import model_error_bound
-from firmware.core.control.input_forms import exact_form
-from firmware.core.control.law import k2_to_cover
-from firmware.core.vehicle import layout
-from firmware.core.vehicle.mass import swung_moment
-from firmware.model.estimator_settings import parameter_sigma
-from firmware.model.gains import Control, LawGains
-from firmware.model.vehicle import Vehicle
+from glider.firmware.core.control.control import pitch_feedforward
+from glider.firmware.core.control.error_bound import model_error_bound
+from glider.firmware.core.control.input_forms import exact_form
+from glider.firmware.core.control.law import k2_to_cover
+from glider.firmware.core.vehicle import layout
+from glider.firmware.core.vehicle.mass import roll_pendulum_moment
+from glider.firmware.model.estimator_settings import parameter_sigma
+from glider.firmware.model.gains import Control, LawGains
+from glider.firmware.model.vehicle import Vehicle
 
 PITCHES = tuple(math.radians(angle) for angle in (-45.0, -30.0, -15.0, 0.0, 15.0, 30.0, 45.0))
 SPEEDS = (0.2, 0.35, 0.5)  # m/s
@@ -50,7 +50,7 @@ class K2Margin:
 
 def glides(P: np.ndarray) -> Iterator[tuple[tuple, tuple]]:
     """k, nu and actuators of each glide, and the actuators' speeds: at rest."""
-    sr = swung_moment(P)
+    sr = roll_pendulum_moment(P)
     for pitch in PITCHES:
         end = P[layout.BALLAST_MAX] if pitch < 0.0 else P[layout.BALLAST_MIN]
         ballast = BALLAST_SHARE * end if pitch else 0.0

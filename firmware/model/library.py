@@ -5,7 +5,7 @@ from importlib.resources import files
 
 def shipped(kind: str) -> dict[str, str]:
     """Name -> text of the shipped TOML files of a kind: 'model/vehicles' or 'guidance/missions'."""
-    folder = files("firmware").joinpath(*kind.split("/"))
+    folder = files("glider.firmware").joinpath(*kind.split("/"))
     return {
         entry.name.removesuffix(".toml"): entry.read_text(encoding="utf-8")
         for entry in sorted(folder.iterdir(), key=lambda item: item.name)

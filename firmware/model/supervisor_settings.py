@@ -9,10 +9,10 @@ from typing import Annotated
 import msgspec
 import numpy as np
 
-from firmware.core.layouts import supervisor_layout as sup
-from firmware.faults import FAULT_TABLE
-from hal.ports import STALL_REST_S, STALL_TRIES
-from hal.strict import Table
+from glider.firmware.core.layouts import supervisor_layout as sup
+from glider.firmware.faults import FAULT_TABLE
+from glider.hal.ports import STALL_REST_S, STALL_TRIES
+from glider.hal.strict import Table
 
 Seconds = Annotated[float, msgspec.Meta(gt=0.0, le=3600.0)]
 Short = Annotated[float, msgspec.Meta(gt=0.0, le=10.0)]

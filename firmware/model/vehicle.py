@@ -5,10 +5,10 @@ from typing import Annotated
 import msgspec
 import numpy as np
 
-from firmware.core.vehicle import layout
-from firmware.model.gains import Control
-from firmware.model.supervisor_settings import Limits, SupervisorTable
-from hal.strict import Table, decode
+from glider.firmware.core.vehicle import layout
+from glider.firmware.model.gains import Control
+from glider.firmware.model.supervisor_settings import Limits, SupervisorTable
+from glider.hal.strict import Table, decode
 
 Positive = Annotated[float, msgspec.Meta(gt=0.0)]
 NonNegative = Annotated[float, msgspec.Meta(ge=0.0)]
@@ -56,7 +56,7 @@ class MassTable(Table):
 class HydrodynamicsTable(Table):
     """[hydrodynamics]: the twelve coefficients of equation (4), and which lift law they belong to (ledger L4).
 
-    D_p, D_q, D_r, N m s/rad: damping that is linear in the rate, beside the print's, which grows with V^2.
+    D_p, D_q, D_r, N m s/rad: damping that is linear in the rate, beside the paper's, which grows with V^2.
     """
 
     K_D0: NonNegative

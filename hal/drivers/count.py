@@ -3,8 +3,8 @@
 A count is read whole or, while a late reply could be mistaken for that, by the block that holds its low word.
 """
 
-from hal.protocols.modbus import Request
-from hal.protocols.registers import LOW, WORDS, RegisterMap, step_of, value_of
+from glider.hal.protocols.modbus import Request
+from glider.hal.protocols.registers import LOW, WORDS, RegisterMap, step_of, value_of
 
 
 class Count:
@@ -29,10 +29,10 @@ class Count:
             self.value = value_of(self._whole, self._name, registers)
         else:
             part = value_of(self._low, self._name, registers)
-            self.value = nearest(part, self.value, self._span) if self._span else part
+            self.value = unwrap_low_word(part, self.value, self._span) if self._span else part
         return self.value
 
 
-def nearest(part: float, last: float, span: float = 65_536) -> float:
+def unwrap_low_word(part: float, last: float, span: float = 65_536) -> float:
     """Return the number nearest to `last` that differs from `part` by a multiple of `span`."""
     return last + (part - last + span / 2) % span - span / 2

@@ -9,15 +9,15 @@ way is stopped at once. Errors keep the drive still until `reset`.
 import math
 from collections.abc import Sequence
 
-from hal.boardfile import DriveTable
-from hal.drivers.count import Count
-from hal.drivers.poll import Poll, Refusals, exception_text
-from hal.drivers.samples import Health, Sensor, State
-from hal.ports import SLOTS, STALL_REST_S, STALL_TRIES, Condition, Validity
-from hal.protocols import modbus
-from hal.protocols.modbus import Frame, Request
-from hal.protocols.modbus_master import Failure, ModbusBus
-from hal.protocols.registers import RegisterMap, registers_of, value_of
+from glider.hal.boardfile import DriveTable
+from glider.hal.drivers.count import Count
+from glider.hal.drivers.poll import ExceptionCounter, Poll, exception_text
+from glider.hal.drivers.samples import Health, SampleState, Sensor
+from glider.hal.ports import SLOTS, STALL_REST_S, STALL_TRIES, Condition, Validity
+from glider.hal.protocols import modbus
+from glider.hal.protocols.modbus import Frame, Request
+from glider.hal.protocols.modbus_master import Failure, ModbusBus
+from glider.hal.protocols.registers import RegisterMap, registers_of, value_of
 
 FAULT, ENABLED, RUNNING = 1, 2, 4  # bits of the status
 STATUS_S = 0.2
@@ -58,8 +58,8 @@ class Drive:
         self._status = Poll(
             [registers.read(table.id, "status")], STATUS_S, self._took_status, self.health, in_error=self.refused
         )
-        self._mover = Mover(self)
-        self._state = State(SLOTS[name])
+        self._mover = MotionJob(self)
+        self._state = SampleState(SLOTS[name])
         self.start, self.read = self._state.start, self._state.read
 
     def join(self, bus: ModbusBus) -> None:
@@ -222,7 +222,7 @@ class StallDetector:
         return STALLED if shown < 0.25 * abs(moved) else ""
 
 
-class Mover:
+class MotionJob:
     """The job that writes: quick stop, clearing an alarm once, and the path to the target when that has moved."""
 
     def __init__(self, drive: Drive):
@@ -231,7 +231,7 @@ class Mover:
         self.stop_wanted = self.clear_wanted = False
         self.clears = 0
         self.rest_until = -math.inf
-        self._refusals = Refusals()
+        self._refusals = ExceptionCounter()
         self._written: float | None = None
         self._next = -math.inf
         self._stopping = False

@@ -8,10 +8,10 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from hal.boardfile import PortTable, ServoTable
-from hal.drivers.samples import Health, State
-from hal.ports import SLOTS, Condition
-from hal.protocols import maestro
+from glider.hal.boardfile import PortTable, ServoTable
+from glider.hal.drivers.samples import Health, SampleState
+from glider.hal.ports import SLOTS, Condition
+from glider.hal.protocols import maestro
 
 RESEND_S = 0.1
 SHORTEST_S = 0.005  # between two targets
@@ -44,7 +44,7 @@ class Servo:
         self._sent_at = self._asked_at = -math.inf
         self._waiting = False
         self._unanswered = 0
-        state = State(SLOTS["servo"])
+        state = SampleState(SLOTS["servo"])
         self.start, self.read, self._answered = state.start, state.read, state.answered
 
     def command(self, value: float) -> float:

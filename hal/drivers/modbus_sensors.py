@@ -2,14 +2,14 @@
 
 from collections.abc import Callable
 
-from hal.boardfile import BatteryTable, BeaconTable, LeakTable, WireTable
-from hal.drivers.count import Count
-from hal.drivers.poll import Poll
-from hal.drivers.samples import Health, Sensor
-from hal.ports import SLOTS
-from hal.protocols import modbus
-from hal.protocols.modbus import Request
-from hal.protocols.registers import RegisterMap, channel_of, from_registers, step_of, value_of
+from glider.hal.boardfile import BatteryTable, BeaconTable, LeakTable, WireTable
+from glider.hal.drivers.count import Count
+from glider.hal.drivers.poll import Poll
+from glider.hal.drivers.samples import Health, Sensor
+from glider.hal.ports import SLOTS
+from glider.hal.protocols import modbus
+from glider.hal.protocols.modbus import Request
+from glider.hal.protocols.registers import RegisterMap, channel_of, from_registers, step_of, value_of
 
 TEMPERATURES = (-10.0, 60.0)  # deg C, past which the transmitter is not in water
 
@@ -35,7 +35,7 @@ class Beacon(Sensor):
         self.accept(asked_at, (pressure - self._zero, self._temperature), now)
 
 
-class Input(Sensor):
+class InputRegister(Sensor):
     """A sensor of one number that is made of one reading: draw-wire, leak, battery."""
 
     def __init__(self, name: str, period: float, limits: tuple[float, float], convert: Callable[[float], float]):
@@ -48,7 +48,7 @@ class Input(Sensor):
         self.accept(asked_at, (self._convert(reading),), now)
 
 
-def wire(name: str, table: WireTable) -> Input:
+def wire(name: str, table: WireTable) -> InputRegister:
     """A draw-wire: metres from readings; a broken wire reads NaN."""
     floor = table.broken_below
 
@@ -57,22 +57,24 @@ def wire(name: str, table: WireTable) -> Input:
             return float("nan")
         return (reading - table.zero) / table.per_m
 
-    return Input(name, 1.0 / table.rate_hz, table.range_m, convert)
+    return InputRegister(name, 1.0 / table.rate_hz, table.range_m, convert)
 
 
-def leak(table: LeakTable) -> Input:
+def leak(table: LeakTable) -> InputRegister:
     """1 where it is wet, 0 where it is not."""
-    return Input("leak", 1.0 / table.rate_hz, (0.0, 1.0), lambda x: float((x > table.wet_above) != table.inverted))
+    return InputRegister(
+        "leak", 1.0 / table.rate_hz, (0.0, 1.0), lambda x: float((x > table.wet_above) != table.inverted)
+    )
 
 
-def battery(table: BatteryTable) -> Input:
-    return Input("battery", 1.0 / table.rate_hz, table.range_v, lambda x: x / table.per_volt)
+def battery(table: BatteryTable) -> InputRegister:
+    return InputRegister("battery", 1.0 / table.rate_hz, table.range_v, lambda x: x / table.per_volt)
 
 
 class AnalogModule:
     """An analog module: one read brings all its channels to the inputs on them."""
 
-    def __init__(self, device: int, registers: RegisterMap, inputs: list[tuple[int, Input]]):
+    def __init__(self, device: int, registers: RegisterMap, inputs: list[tuple[int, InputRegister]]):
         self._inputs = [(channel_of(registers, channel), item) for channel, item in inputs]
         self.health = Health(f"analog module {device}")
         block = registers.block["all"]
@@ -100,7 +102,7 @@ class AnalogModule:
 class EncoderWire:
     """A draw-wire with an absolute encoder of its own."""
 
-    def __init__(self, device: int, registers: RegisterMap, item: Input):
+    def __init__(self, device: int, registers: RegisterMap, item: InputRegister):
         self._item, self._count = item, Count(device, registers)
         self.poll = Poll(
             self._count.requests, item.period, self._taken, item.health, in_error=item.fail, damaged=item.damage

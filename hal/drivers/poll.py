@@ -2,9 +2,9 @@
 
 from collections.abc import Callable, Sequence
 
-from hal.drivers.samples import Health
-from hal.protocols.modbus import Frame, Request
-from hal.protocols.modbus_master import Failure
+from glider.hal.drivers.samples import Health
+from glider.hal.protocols.modbus import Frame, Request
+from glider.hal.protocols.modbus_master import Failure
 
 CONFIGURATION_FAULTS = (1, 2, 3)  # illegal function, address, value: asking again does not help
 TRIES = 3  # after which other exceptions running are an error too
@@ -19,7 +19,7 @@ def exception_text(code: int) -> str:
     return f"exception {code} ({EXCEPTIONS.get(code, 'unknown')})"
 
 
-class Refusals:
+class ExceptionCounter:
     """Exceptions of one device: 1 to 3 are an error at once, others at the third try running."""
 
     def __init__(self) -> None:
@@ -45,7 +45,7 @@ class Poll:
         self.device, self.period, self.due = variants[0].device, period, 0.0
         self._variants, self._taken, self._health = tuple(variants), taken, health
         self._in_error, self._damaged = in_error, damaged
-        self._refusals = Refusals()
+        self._refusals = ExceptionCounter()
 
     def requests(self, now: float) -> Sequence[Request]:
         self.due = max(self.due + self.period, now)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hal.ports import MAX_AGE_PERIODS, Condition, Slot, Validity
+from glider.hal.ports import MAX_AGE_PERIODS, Condition, Slot, Validity
 
 FAULTY_AFTER = 5  # unfit samples running, past which the device is in error
 DAMAGES = 5  # damaged frames in DAMAGE_S, past which the device is in error, until there were fewer
@@ -38,7 +38,7 @@ class Health:
         self.notes.append((now, text or "well again"))
 
 
-class State:
+class SampleState:
     """How an actuator does, in a slot of its own: when it last answered, and its Condition."""
 
     def __init__(self, slot: Slot):
@@ -121,7 +121,7 @@ class Sensor:
                 return False
         if taken_at <= self._taken_at:
             return True
-        if self._distrusted(now):
+        if self._too_many_crc_errors(now):
             return False
         self._running_unfit = 0
         if health.error:
@@ -143,10 +143,10 @@ class Sensor:
         self.health.damaged += frames
         for _ in range(min(frames, DAMAGES + 1)):
             self._damages.append(now)
-        if self._distrusted(now):
+        if self._too_many_crc_errors(now):
             self.fail(now, f"more than {DAMAGES} damaged frames in {DAMAGE_S:g} s")
 
-    def _distrusted(self, now: float) -> bool:
+    def _too_many_crc_errors(self, now: float) -> bool:
         return len(self._damages) > DAMAGES and now - self._damages[0] <= DAMAGE_S
 
     def age(self, now: float) -> None:

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from hal.boardfile import ImuTable, PortTable
-from hal.drivers.samples import Sensor
-from hal.ports import SLOTS
-from hal.protocols import vn100
-from hal.units import BITS
+from glider.hal.boardfile import ImuTable, PortTable
+from glider.hal.drivers.samples import Sensor
+from glider.hal.ports import SLOTS
+from glider.hal.protocols import vn100
+from glider.hal.units import BITS
 
 ASK_AGAIN_S = 1.0
 PI = math.pi

@@ -1,7 +1,7 @@
-"""`python -m hal.outofband`: see guard.py."""
+"""`python -m glider.hal.outofband`: see guard.py."""
 
 import sys
 
-from hal.outofband.guard import main
+from glider.hal.outofband.guard import main
 
 sys.exit(main())

@@ -5,9 +5,9 @@ Where the plan has a pressure transmitter it is seen whether the vehicle rises, 
 
 import time
 
-from hal.outofband.plan import AxisPlan, Plan, PressurePlan, ServoPlan, WirePlan
-from hal.outofband.rise import Rise, Stage
-from hal.outofband.wire import Port, number_of, path_words, servo_frame, write_many_frame, write_one_frame
+from glider.hal.outofband.plan import AscentPlan, AxisPlan, PressurePlan, ServoPlan, WirePlan
+from glider.hal.outofband.rise import AscentStage, Rise
+from glider.hal.outofband.wire import Port, number_of, path_words, servo_frame, write_many_frame, write_one_frame
 
 FAULT, RUNNING = 1, 4  # bits of a drive's status
 CLEAR_S = 2.0  # between two tries to clear an alarm
@@ -15,16 +15,16 @@ AGAIN_S = 5.0  # after which a path that shows no effect is written anew
 SHARE_S = 2.0  # a port that is still held after this is opened all the same
 STUCK_SHARE = 1.0 / 3.0  # of the time to rise; twenty readings of the default 30 s, equal to the last bit: it is stuck
 SAID = {
-    Stage.BLIND: "no depth", Stage.RISING: "under water", Stage.SURFACED: "at the surface",
-    Stage.AGAIN: "does not rise at {depth:.0f} m (row 18): pumping again",
-    Stage.HARDWARE: "does not rise at {depth:.0f} m (row 18): no more feeding of the hardware watchdog",
+    AscentStage.BLIND: "no depth", AscentStage.RISING: "under water", AscentStage.SURFACED: "at the surface",
+    AscentStage.AGAIN: "does not rise at {depth:.0f} m (row 18): pumping again",
+    AscentStage.HARDWARE: "does not rise at {depth:.0f} m (row 18): no more feeding of the hardware watchdog",
 }  # fmt: skip
 
 
 class Ascent:
     """`step` serves every actuator once; it waits for the lines, a second or two at most where all are dead."""
 
-    def __init__(self, plan: Plan):
+    def __init__(self, plan: AscentPlan):
         self.plan = plan
         self._ports: dict[str, Port] = {}
         self._axes = [Axis(axis, self) for axis in plan.axes]
@@ -32,7 +32,7 @@ class Ascent:
         self._rise = None if plan.pressure is None else Rise(
             plan.pressure.patience_s, plan.pressure.step_m, plan.pressure.surface_m
         )  # fmt: skip
-        self.stage, self.depth = Stage.BLIND, float("nan")
+        self.stage, self.depth = AscentStage.BLIND, float("nan")
         self._began = time.monotonic()
         self.pump_heard_at = 0.0  # monotonic, s; 0: not heard yet
         self.reached_port_at = self._began  # any port
@@ -64,7 +64,7 @@ class Ascent:
         before, self.stage = self.stage, rise.look(time.monotonic(), depth)
         if depth is not None:
             self.depth = depth
-        if self.stage >= Stage.AGAIN and self.stage != before:
+        if self.stage >= AscentStage.AGAIN and self.stage != before:
             for axis in self._axes:
                 axis.again()
 

@@ -1,6 +1,6 @@
 """The out-of-band process: watches the flight's heartbeat, and brings the vehicle up when that stops.
 
-`python -m hal.outofband` with --run and --state (folders). It needs the standard library and pyserial, and nothing of
+`python -m glider.hal.outofband` with --run and --state (folders). It needs the standard library and pyserial, and nothing of
 the flight's code but the places in two small files (heartbeat, state). Unless --service is given it ends when the
 flight ends in order. As a service it goes on, and at its start looks at the state first: a vehicle that was under way
 when the power went is brought up, whatever has become of its flight.
@@ -19,15 +19,15 @@ import threading
 import time
 from pathlib import Path
 
-from hal import heartbeat as hb
-from hal.heartbeat import Guard, Heartbeat
-from hal.notify import notify
-from hal.outofband.ascent import Ascent
-from hal.outofband.plan import BEAT_LIMIT_S, NAME, Plan, PlanError, read_plan
-from hal.outofband.rise import Stage
-from hal.realtime import leave_real_time, lock_memory, take_priority
-from hal.sortie import Facts, Party, Refused, State, Trigger, follow
-from hal.state_file import StateFile
+from glider.hal import heartbeat as hb
+from glider.hal.heartbeat import Guard, Heartbeat
+from glider.hal.notify import notify
+from glider.hal.outofband.ascent import Ascent
+from glider.hal.outofband.plan import BEAT_LIMIT_S, NAME, AscentPlan, PlanError, read_plan
+from glider.hal.outofband.rise import AscentStage
+from glider.hal.realtime import leave_real_time, lock_memory, take_priority
+from glider.hal.sortie import Facts, Party, SortieRefused, SortieState, Trigger, follow
+from glider.hal.state_file import StateFile
 
 POLL_S = 0.05
 STEP_S = 0.5  # between two rounds of the way up
@@ -88,13 +88,13 @@ class Feeder:
         self._fd = -1
 
 
-class Watch:
+class GuardWatch:
     """One process. `step` looks once; it is True until there is nothing left to watch."""
 
     def __init__(self, run: Path, state: Path, *, service: bool):
         self.run_folder, self.state_folder, self.service = run, state, service
         self.feeder = Feeder()
-        self.plan: Plan | None = None
+        self.plan: AscentPlan | None = None
         self._pulse: Heartbeat | None = None
         self._seen_alive = False
         self._ascent: Ascent | None = None
@@ -133,11 +133,11 @@ class Watch:
         self._seen_alive = True
         if not alive:
             return self._process_gone(look.state)
-        if look.state == State.ABORTED:
+        if look.state == SortieState.ABORTED:
             self.ascend("the flight hands over")
         elif look.state.beats and look.age_s > self._beat_limit:
             self.ascend(f"no heartbeat for {look.age_s:.1f} s")
-        elif look.state == State.SURFACED and look.age_s > CLOSING_S:
+        elif look.state == SortieState.SURFACED and look.age_s > CLOSING_S:
             self.ascend(f"at the surface, and not closed within {CLOSING_S:g} s")
         elif not look.recorder_expected or look.recorder_age_s < RECORDER_SILENT_S:
             self.feeder.feed(self._watchdog)
@@ -151,9 +151,9 @@ class Watch:
     def _watchdog(self) -> str:
         return self.plan.watchdog if self.plan is not None else ""
 
-    def _process_gone(self, published: State) -> bool:
+    def _process_gone(self, published: SortieState) -> bool:
         """The flight's process ended without a last word; one that died closing may have left the state in order."""
-        if published == State.SURFACED and StateFile(self.state_folder).read().state.at_rest:
+        if published == SortieState.SURFACED and StateFile(self.state_folder).read().state.at_rest:
             self._seen_alive = False
             self.feeder.stop()
             return self.service
@@ -217,7 +217,7 @@ class Watch:
         if self.plan is None:
             self._read_plan()
         if self.plan is None:
-            self.plan = Plan("", (), None)  # nothing to go up with; asked for again at every round
+            self.plan = AscentPlan("", (), None)  # nothing to go up with; asked for again at every round
         self._ascent, self._ascent_began = Ascent(self.plan), time.monotonic()
         self._next_step = 0.0
         self._record_abort(why)
@@ -227,7 +227,7 @@ class Watch:
         end = time.monotonic() + KILL_S
         while self._pulse is not None and self._pulse.held() and time.monotonic() < end:
             pid = self._pulse.words[hb.W_PID]
-            if self._pulse.words[hb.W_STATE] != State.ABORTED or time.monotonic() > end - KILL_S / 2:
+            if self._pulse.words[hb.W_STATE] != SortieState.ABORTED or time.monotonic() > end - KILL_S / 2:
                 with contextlib.suppress(OSError, OverflowError):
                     if pid > 1:
                         os.kill(pid, signal.SIGKILL)
@@ -238,10 +238,10 @@ class Watch:
         threading.Thread(target=self._write_state, args=(why,), daemon=True).start()
 
     def _write_state(self, why: str) -> None:
-        with contextlib.suppress(OSError, Refused):
+        with contextlib.suppress(OSError, SortieRefused):
             file = StateFile(self.state_folder)
             # A flight that was seen under way and left the state at rest (a disk that refused, say) was still lost.
-            state = max(file.read().state, State.DIVING)
+            state = max(file.read().state, SortieState.DIVING)
             aborted = follow(state, Trigger.LOSE, Party.WATCH, Facts())
             file.write(aborted, flight=self.plan.flight if self.plan else "", reason=why)
 
@@ -257,14 +257,14 @@ class Watch:
                     self._ascent = ascent = Ascent(self.plan)
             before = ascent.stage
             said = ascent.step()
-            if ascent.stage == Stage.HARDWARE != before:
+            if ascent.stage == AscentStage.HARDWARE != before:
                 self._record_abort("fault 18: no ascent out of band")
             if said != self._said:
                 self._said = said
                 say(said)
                 notify(f"STATUS={said}")
             if self.service and self._acknowledged():
-                if ascent.stage == Stage.SURFACED or not able:
+                if ascent.stage == AscentStage.SURFACED or not able:
                     say("a person has looked: at rest")
                     ascent.close()
                     self._ascent, self._pulse = None, None
@@ -272,7 +272,7 @@ class Watch:
                 self._record_abort("acknowledged before it was at the surface: the ascent goes on")
         heard = max(ascent.pump_heard_at, self._ascent_began)
         if time.monotonic() - heard < PUMP_SILENT_S:
-            self.feeder.feed(ascent.plan.watchdog, hardware=ascent.stage != Stage.HARDWARE)
+            self.feeder.feed(ascent.plan.watchdog, hardware=ascent.stage != AscentStage.HARDWARE)
         give_up = ascent.plan.give_up_s
         if give_up and time.monotonic() - ascent.reached_port_at > give_up:
             say(f"no port for {give_up:g} s: nothing is left to bring up")
@@ -300,12 +300,12 @@ class Watch:
 
 def main() -> int:
     """Exit 0 when the flight ended in order, or asked to stop."""
-    parser = argparse.ArgumentParser(prog="python -m hal.outofband", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m glider.hal.outofband", description=__doc__)
     parser.add_argument("--run", type=Path, default=None, help="folder of the heartbeat")
     parser.add_argument("--state", type=Path, default=None, help="folder of state and plan")
     parser.add_argument("--service", action="store_true", help="go on after a flight, and look at the state first")
     options = parser.parse_args()
-    watch = Watch(options.run or hb.run_folder(), options.state or hb.state_folder(), service=options.service)
+    watch = GuardWatch(options.run or hb.run_folder(), options.state or hb.state_folder(), service=options.service)
 
     def stop(*_: object) -> None:
         watch.stopping = True
@@ -314,9 +314,9 @@ def main() -> int:
         signal.signal(number, stop)
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
     leave_real_time()
-    wishes = f"{take_priority(PRIORITY)}, {lock_memory()}"
+    requests = f"{take_priority(PRIORITY)}, {lock_memory()}"
     if options.service:
-        say(wishes)
+        say(requests)
     in_order = False
     try:
         watch.start()

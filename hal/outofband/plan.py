@@ -16,7 +16,7 @@ from typing import Any, get_args, get_origin
 NAME = "outofband.json"
 FORMAT = 3
 BEAT_LIMIT_S = 1.5  # a heartbeat older than this is gone; with what looking takes, noticed within 2 s
-LONGEST = 20_000  # bytes of a file
+MAX_PLAN_BYTES = 20_000  # bytes of a file
 CODES = {"u16": "H", "i16": "h", "u32": "I", "i32": "i", "f32": "f"}  # of struct
 WORDS = {kind: struct.calcsize(code) // 2 for kind, code in CODES.items()}
 INTEGERS = ("u16", "i16", "u32", "i32")
@@ -165,7 +165,7 @@ class PressurePlan:
 
 
 @dataclass(frozen=True)
-class Plan:
+class AscentPlan:
     """`axes` in the order in which they are served: the pump first."""
 
     flight: str
@@ -177,7 +177,7 @@ class Plan:
     watchdog: str = ""  # the hardware watchdog's device; empty: none
 
 
-def write_plan(path: Path, plan: Plan) -> None:
+def write_plan(path: Path, plan: AscentPlan) -> None:
     """Onto the disk, whole or not at all."""
     body = json.dumps(asdict(plan), separators=(",", ":"), sort_keys=True)
     text = json.dumps({"format": FORMAT, "crc32": f"{zlib.crc32(body.encode()):08x}", "plan": body}) + "\n"
@@ -190,15 +190,15 @@ def write_plan(path: Path, plan: Plan) -> None:
     os.replace(fresh, path)
 
 
-def read_plan(path: Path) -> Plan:
+def read_plan(path: Path) -> AscentPlan:
     """A plan as it was written; PlanError for anything else."""
     try:
         with path.open("rb") as file:
-            data = file.read(LONGEST + 1)
+            data = file.read(MAX_PLAN_BYTES + 1)
     except OSError as error:
         raise PlanError(f"{path}: {error.strerror}") from None
     try:
-        if len(data) > LONGEST:
+        if len(data) > MAX_PLAN_BYTES:
             raise ValueError("too long")
         outer = json.loads(data)
         body = outer["plan"]
@@ -211,8 +211,8 @@ def read_plan(path: Path) -> Plan:
         raise PlanError(f"{path}: {error}") from None
 
 
-def _plan(table: dict[str, Any]) -> Plan:
-    plan: Plan = _decode(Plan, table)
+def _plan(table: dict[str, Any]) -> AscentPlan:
+    plan: AscentPlan = _decode(AscentPlan, table)
     if not plan.axes:
         raise ValueError("no pump")
     return plan

@@ -9,7 +9,7 @@ import time
 
 import serial
 
-from hal.outofband.plan import CODES, NumberPlan, PathPlan, ReadPlan
+from glider.hal.outofband.plan import CODES, NumberPlan, PathPlan, ReadPlan
 
 ANSWER_S = 0.25  # a reply's longest delay, its own length beside it
 

@@ -8,7 +8,7 @@ none. Targets are in quarter microseconds. Maestro user's guide, sections 5.c to
 from enum import IntFlag
 from typing import NamedTuple
 
-from hal.protocols.checksums import crc7
+from glider.hal.protocols.checksums import crc7
 
 SET_TARGET, SET_SPEED, SET_ACCELERATION = 0x84, 0x87, 0x89
 GET_POSITION, GET_MOVING, GET_ERRORS, GO_HOME = 0x90, 0x93, 0xA1, 0xA2
@@ -18,7 +18,7 @@ COMMANDS = {
     SET_TARGET: (3, 0), SET_SPEED: (3, 0), SET_ACCELERATION: (3, 0), GET_POSITION: (1, 2), GET_MOVING: (0, 1),
     GET_ERRORS: (0, 2), GO_HOME: (0, 0),
 }  # fmt: skip
-LONGEST = 7  # bytes: AA dev 04 ch lo hi crc
+MAX_FRAME_BYTES = 7  # bytes: AA dev 04 ch lo hi crc
 
 
 class MaestroError(IntFlag):

@@ -20,7 +20,7 @@ READ_HOLDING, READ_INPUT, WRITE_ONE, WRITE_MANY = 3, 4, 6, 16
 FUNCTIONS = (READ_HOLDING, READ_INPUT, WRITE_ONE, WRITE_MANY)
 ERROR = 0x80  # added to the function in an exception reply
 EXCEPTION_SIZE = 5
-LONGEST = 256  # bytes, the standard's longest frame
+MAX_FRAME_BYTES = 256  # bytes, the standard's longest frame
 _REQUESTS = FramerRTU(DecodePDU(True))
 _REPLIES = FramerRTU(DecodePDU(False))
 
@@ -36,7 +36,7 @@ class Request(NamedTuple):
 
     @property
     def reply_signature(self) -> tuple[int, int, int, bytes]:
-        """What its reply can be told by; requests whose replies look alike are never sent while one may be late."""
+        """What its reply is recognised by; requests whose replies look alike are never sent while one may be late."""
         return self.device, self.function, self.reply_size, self.echo
 
 
@@ -170,7 +170,7 @@ class RtuDecoder:
             return -1 if self._requests else EXCEPTION_SIZE
         kind = self._framer.decoder.lookupPduClass(buffer[at : at + 2])
         size = kind.calculateRtuFrameSize(buffer[at : at + 8]) if kind is not None else -1
-        return size if size <= LONGEST else -1
+        return size if size <= MAX_FRAME_BYTES else -1
 
     def _whole(self, frame: bytes) -> Frame | None:
         """The frame, if its check sum holds, pymodbus can read it, and it is the one expected."""

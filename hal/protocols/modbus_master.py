@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
 
-from hal.protocols.modbus import ERROR, READ_HOLDING, READ_INPUT, Frame, Request, RtuDecoder
-from hal.units import BITS
+from glider.hal.protocols.modbus import ERROR, READ_HOLDING, READ_INPUT, Frame, Request, RtuDecoder
+from glider.hal.units import BITS
 
 GIVE_UP_AFTER = 3  # timeouts running, past which a device is asked seldom
 BACK_OFF_S = 0.25
@@ -34,7 +34,7 @@ class Failure(Enum):
     DISCONNECTED = "line lost"
 
 
-class Job(Protocol):
+class PollJob(Protocol):
     """Someone who asks a device again and again."""
 
     device: int
@@ -64,7 +64,7 @@ class BusCounts:
     stray_bytes: int = 0
 
 
-class Ask:
+class OneShot:
     """One request, once; for setting up and for the bench."""
 
     def __init__(self, request: Request, done: Callable[[Frame | None, int], None]):
@@ -98,40 +98,40 @@ class ModbusBus:
         self.byte_s = BITS / baud
         self.gap_s = max(3.5 * self.byte_s, 0.00175)  # Modbus over serial line, section 2.5.1.1
         self.timeout_s, self.longest_s, self.forget_s = timeout_s, max(longest_s, timeout_s), forget_s
-        self.jobs: list[Job] = []
+        self.jobs: list[PollJob] = []
         self.counts = BusCounts()
         self.silent: dict[int, int] = {}  # timeouts running, by device
-        self._asks: deque[Ask] = deque(maxlen=32)
+        self._one_shots: deque[OneShot] = deque(maxlen=32)
         self._send: Callable[[bytes], bool] = lambda data: False
         self._new_decoder = decoder
         self._decoder, self._strays = decoder(), decoder()
         self._window = bytearray()
         self._missing: dict[tuple, float] = {}  # signature of replies that may still come, until when
-        self._job: Job | None = None
+        self._job: PollJob | None = None
         self._request: Request | None = None
         self._asked_at = self._deadline = 0.0
-        self._quiet_until = self._last_byte = -math.inf
+        self._idle_until = self._last_byte = -math.inf
         self._up = False
 
     def attach(self, send: Callable[[bytes], bool]) -> None:
         self._send = send
 
-    def add(self, job: Job) -> None:
+    def add(self, job: PollJob) -> None:
         self.jobs.append(job)
 
     def ask(self, request: Request, done: Callable[[Frame | None, int], None]) -> None:
         """One request before all jobs; done(reply or None, exception code)."""
-        self._asks.append(Ask(request, done))
+        self._one_shots.append(OneShot(request, done))
 
     def connected(self, now: float) -> None:
         self._up = True
-        self._quiet_until = now + self.longest_s  # whoever used the line before may still be answered
+        self._idle_until = now + self.longest_s  # whoever used the line before may still be answered
 
     def lost(self, now: float) -> None:
         self._up = False
         self._end(Failure.DISCONNECTED, 0, now)
-        while self._asks:
-            self._asks.popleft().failed(None, Failure.DISCONNECTED, 0, now)
+        while self._one_shots:
+            self._one_shots.popleft().failed(None, Failure.DISCONNECTED, 0, now)
 
     # --- receiving --------------------------------------------------------------------------------------------------
     def feed(self, data: bytes, now: float) -> None:
@@ -195,7 +195,7 @@ class ModbusBus:
         self.counts.damaged += damaged
         self._missing[request.reply_signature] = now + self.forget_s
         self.silent[request.device] = self.silent.get(request.device, 0) + 1
-        self._quiet_until = max(now, self._asked_at + self.longest_s + request.reply_size * self.byte_s)
+        self._idle_until = max(now, self._asked_at + self.longest_s + request.reply_size * self.byte_s)
         self._end(Failure.DAMAGED if damaged else Failure.TIMEOUT, 0, now)
 
     # --- asking -----------------------------------------------------------------------------------------------------
@@ -223,16 +223,16 @@ class ModbusBus:
     def _free_at(self, now: float) -> float:
         """When the line may be used: no reply is expected, and it has been silent for a gap (or never will be)."""
         silent = self._last_byte + self.gap_s
-        if self._quiet_until > -math.inf and now > self._quiet_until + BABBLE_S:
-            return self._quiet_until
-        return max(self._quiet_until, silent)
+        if self._idle_until > -math.inf and now > self._idle_until + BABBLE_S:
+            return self._idle_until
+        return max(self._idle_until, silent)
 
-    def _next_job(self) -> Job | None:
-        if self._asks:
-            return self._asks[0]
+    def _next_job(self) -> PollJob | None:
+        if self._one_shots:
+            return self._one_shots[0]
         return min(self.jobs, key=_due, default=None)
 
-    def _try(self, job: Job, now: float) -> bool:
+    def _try(self, job: PollJob, now: float) -> bool:
         """Ask for a job, unless it has nothing to ask or all its replies could be mistaken."""
         for signature in [signature for signature, until in self._missing.items() if until <= now]:
             del self._missing[signature]
@@ -247,9 +247,9 @@ class ModbusBus:
         job.due = min(self._missing[request.reply_signature] for request in requests)
         return False
 
-    def _ask(self, job: Job, request: Request, now: float) -> None:
-        if self._asks and job is self._asks[0]:
-            self._asks.popleft()
+    def _ask(self, job: PollJob, request: Request, now: float) -> None:
+        if self._one_shots and job is self._one_shots[0]:
+            self._one_shots.popleft()
         elif self.silent.get(job.device, 0) >= GIVE_UP_AFTER:
             job.due = max(job.due, now + BACK_OFF_S)
         self._job, self._request = job, request
@@ -257,11 +257,11 @@ class ModbusBus:
         self._decoder.bad = 0
         self.counts.requests += 1
         self._asked_at = now + len(request.frame) * self.byte_s
-        self._quiet_until = self._asked_at
+        self._idle_until = self._asked_at
         self._deadline = self._asked_at + self.timeout_s + request.reply_size * self.byte_s
         if not self._send(request.frame):
             self._end(Failure.DISCONNECTED, 0, now)
 
 
-def _due(job: Job) -> float:
+def _due(job: PollJob) -> float:
     return job.due

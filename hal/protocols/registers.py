@@ -12,9 +12,9 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from hal.protocols import modbus
-from hal.strict import ConfigError, Table, decode
-from hal.units import UNITS, units_of
+from glider.hal.protocols import modbus
+from glider.hal.strict import ConfigError, Table, decode
+from glider.hal.units import UNITS, units_of
 
 Address = Annotated[int, msgspec.Meta(ge=0, le=0xFFFF)]
 CODES = {"u16": "H", "i16": "h", "u32": "I", "i32": "i", "f32": "f"}
@@ -234,7 +234,7 @@ def preset(name: str) -> RegisterMap:
 
 @lru_cache(maxsize=32)
 def _shipped(name: str) -> RegisterMap:
-    found = files("hal").joinpath("presets", f"{name}.toml")
+    found = files("glider.hal").joinpath("presets", f"{name}.toml")
     if not name.replace("-", "").isalnum() or not found.is_file():
         raise ConfigError("preset", f"no device '{name}'; known: {', '.join(presets())}")
     return decode(found.read_text(encoding="utf-8"), RegisterMap, f"{name} (preset)")
@@ -242,5 +242,5 @@ def _shipped(name: str) -> RegisterMap:
 
 def presets() -> list[str]:
     """Names of the shipped register maps."""
-    entries = files("hal").joinpath("presets").iterdir()
+    entries = files("glider.hal").joinpath("presets").iterdir()
     return sorted(entry.name.removesuffix(".toml") for entry in entries if entry.name.endswith(".toml"))

@@ -1,7 +1,7 @@
 """VectorNav VN-100: text messages and binary output, bytes in, events out; no port, no clock.
 
 Text: `$HEADER,field,...*CC` CRLF; CC is the XOR of the bytes between $ and * in two hex digits, or their CRC-16
-(XMODEM) in four. `*XX`, with which a device can be told to skip the check, is never taken. Binary: FA, group byte, a
+(XMODEM) in four. `*XX`, with which a device can be set to skip the check, is never taken. Binary: FA, group byte, a
 mask of fields (u16), payload (little-endian), CRC-16 over all after FA, high byte first. Only group 1 is known here;
 VN-100 user manual, sections 3.1 and 5.
 """
@@ -12,10 +12,10 @@ from functools import lru_cache
 from struct import Struct
 from typing import NamedTuple
 
-from hal.protocols.checksums import xor8
+from glider.hal.protocols.checksums import xor8
 
 SYNC = 0xFA
-LONGEST = 256  # bytes; no text message or group 1 frame is longer
+MAX_FRAME_BYTES = 256  # bytes; no text message or group 1 frame is longer
 TIME_STARTUP, YAW_PITCH_ROLL, ANGULAR_RATE, ACCEL = 0, 3, 5, 8  # bits of group 1
 # name, struct code, of the fields of group 1 by bit
 FIELDS = (
@@ -145,10 +145,10 @@ class Vn100Decoder:
 
     def _text(self, buffer: bytes, at: int) -> tuple[int, TextMessage | None]:
         """As _binary."""
-        window = buffer[at : at + LONGEST]
+        window = buffer[at : at + MAX_FRAME_BYTES]
         found = _TEXT.match(window)
         if found is None:
-            unfinished = len(window) < LONGEST and _TEXT_SO_FAR.match(window)
+            unfinished = len(window) < MAX_FRAME_BYTES and _TEXT_SO_FAR.match(window)
             if _LINE.match(window):
                 self.bad += 1
             return (0, None) if unfinished else (1, None)

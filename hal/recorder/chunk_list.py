@@ -57,7 +57,7 @@ class ChunkList:
             )  # fmt: skip
 
 
-def keep_small(writer: Any) -> bool:
+def use_packed_index(writer: Any) -> bool:
     """Have a fresh writer keep its chunks' index so; False where it keeps it somewhere else, and then as it does."""
     if getattr(writer, _LIST, None) != []:
         return False

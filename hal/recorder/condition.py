@@ -1,4 +1,4 @@
-"""How a recording goes, as plain numbers: what the flight looks at once a second, and mends a recording that died."""
+"""How a recording goes, as plain numbers: what the flight looks at once a second, and restarts a recording that died."""
 
 from enum import IntEnum
 
@@ -6,7 +6,7 @@ HUNG_S = 15.0  # without a sign of life; an SD card may take seconds over an fsy
 FIRST_RETRY_S, LONGEST_RETRY_S = 1.0, 64.0
 
 
-class Level(IntEnum):
+class RecorderLevel(IntEnum):
     """The worse, the larger."""
 
     OK = 0
@@ -14,13 +14,13 @@ class Level(IntEnum):
     FAILED = 2  # nobody records: the process died or hangs, and its successor is not there yet
 
 
-class Condition:
+class RecorderCondition:
     """Updated in place by Recorder.watch; numbers only."""
 
     __slots__ = ("beat_ns", "damaged", "disk_errors", "dropped", "errno", "level", "pending", "restarts", "written")
 
     def __init__(self) -> None:
-        self.level = int(Level.OK)
+        self.level = int(RecorderLevel.OK)
         self.pending = 0  # handed over and not yet taken
         self.written = self.dropped = self.damaged = 0
         self.disk_errors = 0

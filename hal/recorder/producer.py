@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from hal.recorder import ring
-from hal.recorder.schema import RecordSpec
+from glider.hal.recorder import ring
+from glider.hal.recorder.schema import RecordSpec
 
 
-class Channel:
+class RecordChannel:
     """A kind of record on its way to the log. `values`, shape (spec.width,), is the caller's to fill, in spec order."""
 
     __slots__ = ("_buffer", "_bytes", "_limit", "_numbers", "_ring", "_sequence", "_slots", "spec", "values")
@@ -70,7 +70,7 @@ class Producer:
         self._event_sequence = 0
         reserve = layout.slots // 16
         self.channels = {
-            spec.topic: Channel(self, spec, number, layout.slots // 2 if spec.spare else layout.slots - reserve)
+            spec.topic: RecordChannel(self, spec, number, layout.slots // 2 if spec.spare else layout.slots - reserve)
             for number, spec in enumerate(specs)
         }
 

@@ -17,11 +17,11 @@ from pathlib import Path
 
 import numpy as np
 
-from hal.recorder import ring
-from hal.recorder.condition import FIRST_RETRY_S, HUNG_S, LONGEST_RETRY_S, Condition, Level
-from hal.recorder.producer import Channel, Producer
-from hal.recorder.schema import RECORDING, RecordSpec, specs_to_json
-from hal.spawn import module_command, module_environment
+from glider.hal.recorder import ring
+from glider.hal.recorder.condition import FIRST_RETRY_S, HUNG_S, LONGEST_RETRY_S, RecorderCondition, RecorderLevel
+from glider.hal.recorder.producer import Producer, RecordChannel
+from glider.hal.recorder.schema import RECORDING, RecordSpec, specs_to_json
+from glider.hal.spawn import module_command, module_environment
 
 SLOTS = 2048  # twenty seconds of a hundred records a second
 SYNC_PERIOD_S = 0.5  # with the time an fsync takes, at most a second is lost when the power goes
@@ -82,10 +82,10 @@ class Recorder:
         epoch_ns: int = 0,
         slots: int = SLOTS,
         sync_period_s: float = SYNC_PERIOD_S,
-        onlookers: str | os.PathLike | None = None,
+        live_stream: str | os.PathLike | None = None,
     ):
-        """`attachments`: name -> text; `metadata`: name -> text; `epoch_ns` is the log time of t = 0; `onlookers`: path
-        of the socket for a live view (onlookers.py), None: there is none.
+        """`attachments`: name -> text; `metadata`: name -> text; `epoch_ns` is the log time of t = 0; `live_stream`: path
+        of the socket for a live view (live_stream.py), None: there is none.
 
         ValueError where two specs share a topic.
         """
@@ -105,19 +105,19 @@ class Recorder:
             "metadata": {**{str(k): str(v) for k, v in (metadata or {}).items()}, RECORDING: os.urandom(8).hex()},
             "epoch_ns": epoch_ns,
             "period_s": sync_period_s,
-            "onlookers": os.fspath(onlookers) if onlookers else "",
+            "onlookers": os.fspath(live_stream) if live_stream else "",
         }
         self._config_fd: int | None = _shared_text(json.dumps(config))
         self._process: subprocess.Popen[bytes] | None = None
         self._ready = False
         self._report: RecorderReport | None = None
-        self.condition = Condition()
+        self.condition = RecorderCondition()
         self._part = 1
         self._heard = b""  # of its answers
         self._retry_at, self._retry_s = 0.0, FIRST_RETRY_S
         self._started_at = 0.0
 
-    def channel(self, topic: str) -> Channel:
+    def channel(self, topic: str) -> RecordChannel:
         """The channel of a spec's topic; KeyError for another."""
         return self._producer.channels[topic]
 
@@ -144,7 +144,7 @@ class Recorder:
         assert self._fd is not None
         assert self._config_fd is not None
         self._process = subprocess.Popen(
-            module_command("hal.recorder.writer"),
+            module_command("glider.hal.recorder.writer"),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             pass_fds=(self._fd, self._config_fd),
@@ -189,7 +189,7 @@ class Recorder:
             alive=self._process is not None and self._process.poll() is None,
         )
 
-    def watch(self) -> Condition:
+    def watch(self) -> RecorderCondition:
         """Look at the recording and replace its process where that died or hangs; returns `condition`, updated.
 
         For once a second: some system calls, and where a process is started a few milliseconds.
@@ -205,14 +205,14 @@ class Recorder:
         condition.beat_ns = control[ring.BEAT]
         silent_s = now - max(condition.beat_ns / 1e9, self._started_at)
         if process is None or not (self._ready or self._part > 1) or self._report is not None:
-            condition.level = int(Level.FAILED)
+            condition.level = int(RecorderLevel.FAILED)
         elif not alive or silent_s > HUNG_S:
-            condition.level = int(Level.FAILED)
+            condition.level = int(RecorderLevel.FAILED)
             self._replace(process, alive, now)
         elif condition.errno or dropped > condition.dropped or condition.beat_ns < self._started_at * 1e9:
-            condition.level = int(Level.DROPPING)
+            condition.level = int(RecorderLevel.DROPPING)
         else:
-            condition.level = int(Level.OK)
+            condition.level = int(RecorderLevel.OK)
             if now - self._started_at > LONGEST_RETRY_S:
                 self._retry_s = FIRST_RETRY_S
         condition.dropped = dropped
@@ -335,7 +335,7 @@ class NullRecorder:
 
     def __init__(self, specs: Sequence[RecordSpec]):
         self._channels = {spec.topic: NullChannel(spec) for spec in specs}
-        self.condition = Condition()
+        self.condition = RecorderCondition()
 
     def channel(self, topic: str) -> NullChannel:
         return self._channels[topic]
@@ -352,7 +352,7 @@ class NullRecorder:
     def health(self) -> RecorderHealth:
         return RecorderHealth(pending=0, written=0, dropped=0, damaged=0, disk_errors=0, errno=0, alive=True)
 
-    def watch(self) -> Condition:
+    def watch(self) -> RecorderCondition:
         return self.condition
 
     def close(self, ending: Mapping[str, str] | None = None) -> RecorderReport:

@@ -88,7 +88,7 @@ def create_shared(size: int) -> int:
 
 
 @dataclass(frozen=True)
-class Taken:
+class RingRecord:
     """A record out of the ring."""
 
     channel: int
@@ -114,7 +114,7 @@ class RingReader:
         """Records handed over and not yet taken."""
         return self.control[HEAD] - self.control[TAIL]
 
-    def take(self) -> Taken | None:
+    def take(self) -> RingRecord | None:
         """The next record, or None where none is ready. One that stays damaged is counted and passed over."""
         number = self.control[TAIL]
         if self.control[HEAD] <= number:
@@ -131,7 +131,7 @@ class RingReader:
         self.control[TAIL] = number + 1
         return taken if taken is not None else self.take()
 
-    def _judge(self, copy: bytes, number: int, crc: int) -> Taken | None:
+    def _judge(self, copy: bytes, number: int, crc: int) -> RingRecord | None:
         found, channel, sequence, time_s = _HEAD.unpack_from(copy)
         if found != number:
             return None
@@ -144,7 +144,7 @@ class RingReader:
         if zlib.crc32(memoryview(copy)[: 8 * (RECORD_HEAD + width)]) != crc:
             return None
         payload = memoryview(copy)[8 * RECORD_HEAD : 8 * (RECORD_HEAD + width)]
-        return Taken(int(channel), int(sequence), time_s, payload)
+        return RingRecord(int(channel), int(sequence), time_s, payload)
 
     def _give_up(self) -> bool:
         now = self._clock()

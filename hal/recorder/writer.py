@@ -1,4 +1,4 @@
-"""The recording process: `python -m hal.recorder.writer`, started by recorder.py.
+"""The recording process: `python -m glider.hal.recorder.writer`, started by recorder.py.
 
 Standard input brings one line of JSON (which shared memory, which configuration, also in shared memory), later one more
 (how the flight ended); its end without that means that the flight is dead. Standard output answers {"ready": true} or
@@ -14,18 +14,18 @@ import signal
 import sys
 import time
 
-from hal.realtime import leave_real_time
-from hal.recorder import disk, ring
-from hal.recorder.logfile import PART, LogFile
-from hal.recorder.onlookers import Onlookers
-from hal.recorder.schema import specs_from_json
+from glider.hal.realtime import leave_real_time
+from glider.hal.recorder import disk, ring
+from glider.hal.recorder.live_stream import LiveStream
+from glider.hal.recorder.logfile import PART, LogFile
+from glider.hal.recorder.schema import specs_from_json
 
 POLL_S = 0.01
 BATCH = 256  # records between two looks at the clock
 LAST_TRIES_S = 10.0  # how long a disk that refuses is asked again once the flight is over
 
 
-class Input:
+class RingInput:
     """Standard input, line by line, without waiting."""
 
     def __init__(self):
@@ -64,7 +64,7 @@ def complain(message: str) -> None:
         return
 
 
-class Recording:
+class LogRecording:
     """Takes records out of the ring and brings them to the disk, whatever the disk says."""
 
     def __init__(self, reader: ring.RingReader, log: LogFile, file: disk.DiskFile, path: str, period_s: float):
@@ -72,7 +72,7 @@ class Recording:
         self._path, self._period_s = path, period_s
         self._next_sync = 0.0
         self._complained = False
-        self.onlookers: Onlookers | None = None
+        self.live_stream: LiveStream | None = None
 
     def step(self) -> bool:
         """Take what is there, up to a batch; True if there may be more."""
@@ -83,10 +83,10 @@ class Recording:
             if taken is None:
                 break
             self._write(taken)
-            if self.onlookers is not None:
-                self.onlookers.offer(taken)
-        if self.onlookers is not None:
-            self.onlookers.serve()
+            if self.live_stream is not None:
+                self.live_stream.offer(taken)
+        if self.live_stream is not None:
+            self.live_stream.serve()
         now = time.monotonic()
         self._reader.control[ring.BEAT] = time.monotonic_ns()
         if now >= self._next_sync:
@@ -95,7 +95,7 @@ class Recording:
             self.sync()
         return taken is not None
 
-    def _write(self, taken: ring.Taken) -> None:
+    def _write(self, taken: ring.RingRecord) -> None:
         if taken.channel == ring.EVENT_CHANNEL:
             severity, length = taken.payload[: 8 * ring.EVENT_HEAD].cast("d")
             start = 8 * ring.EVENT_HEAD
@@ -157,12 +157,12 @@ def read_config(start: dict) -> dict:
         return {**json.loads(os.pread(file.fileno(), size, 0)), **start}
 
 
-def admit(config: dict) -> Onlookers | None:
+def admit(config: dict) -> LiveStream | None:
     """The socket for a live view, where one was asked for; no recording ends for want of it."""
     if not config["onlookers"]:
         return None
     try:
-        return Onlookers(config["onlookers"], json.loads(config["specs"]), config["metadata"])
+        return LiveStream(config["onlookers"], json.loads(config["specs"]), config["metadata"])
     except OSError as error:
         complain(f"{config['onlookers']}: {error.strerror or error}: no live view")
         return None
@@ -171,7 +171,7 @@ def admit(config: dict) -> Onlookers | None:
 def main() -> int:
     """Exit 0 with the log complete, 1 otherwise."""
     _become_background()
-    source = Input()
+    source = RingInput()
     line = None
     while line is None and not source.ended:
         line = source.line(1.0)
@@ -189,12 +189,12 @@ def main() -> int:
     file = disk.DiskFile(fd)
     metadata = {**config["metadata"], **({PART: str(config["part"])} if config["part"] > 1 else {})}
     log = LogFile(file, specs, attachments=config["attachments"], metadata=metadata, epoch_ns=config["epoch_ns"])
-    recording = Recording(reader, log, file, config["path"], config["period_s"])
+    recording = LogRecording(reader, log, file, config["path"], config["period_s"])
     if not recording.sync() and config["part"] == 1:  # no flight starts without room for its log
         disk.close(fd, config["path"], keep=False)
         answer({"error": file.last_errno, "message": os.strerror(file.last_errno)})
         return 1
-    recording.onlookers = admit(config)
+    recording.live_stream = admit(config)
     answer({"ready": True})
 
     ending = {"ended": "the flight's process died"}
@@ -204,8 +204,8 @@ def main() -> int:
             ending = json.loads(line)
             break
     report = recording.finish(ending)
-    if recording.onlookers is not None:
-        recording.onlookers.close()
+    if recording.live_stream is not None:
+        recording.live_stream.close()
     answer(report)
     return 0 if report["complete"] else 1
 

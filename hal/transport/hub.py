@@ -10,7 +10,7 @@ import select
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from hal.transport.port import SerialPort, Unplugged
+from glider.hal.transport.port import SerialPort, Unplugged
 
 RETRY_S = 0.5  # between two tries to open a lost port
 OUT_LIMIT = 1024  # bytes on their way out, past which a line takes no more
@@ -37,7 +37,7 @@ class LineHandler(Protocol):
         """Do what is due; the time at which something will be."""
 
 
-class Link:
+class SerialLink:
     """A port and its handler."""
 
     def __init__(self, name: str, port: SerialPort, handler: LineHandler):
@@ -127,7 +127,7 @@ class Link:
 class Hub:
     """Serves links. `now` is the board's clock."""
 
-    def __init__(self, links: Sequence[Link], now: Callable[[], float]):
+    def __init__(self, links: Sequence[SerialLink], now: Callable[[], float]):
         self.links = tuple(links)
         self._now = now
         self._period = 0.0

@@ -6,16 +6,16 @@ closed_loop_lanes.
 
 import numpy as np
 
-from firmware.core.control.autopilot import reset, tick
-from firmware.core.jit import allocating_kernel, kernel
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.vehicle.layout import N_P, N_X, X_ACT, X_DOWN, X_EAST, X_NORTH
-from firmware.core.vehicle.state import euler_angles
-from hal.ports import FRAME_SIZE
-from sim_backend.core import layout as wl
-from sim_backend.core.effect_plant import set_effects
-from sim_backend.core.effects import effect_layout as ef
-from sim_backend.core.world import deliver, move, move_with_effects
+from glider.firmware.core.control.autopilot import reset, tick
+from glider.firmware.core.jit import allocating_kernel, kernel
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.vehicle.layout import N_P, N_X, X_ACT, X_DOWN, X_EAST, X_NORTH
+from glider.firmware.core.vehicle.state import euler_angles
+from glider.hal.ports import FRAME_SIZE
+from glider.sim_backend.core import layout as wl
+from glider.sim_backend.core.effect_plant import set_effects
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.sim_backend.core.world import deliver, move, move_with_effects
 
 # what is kept of each logged tick
 TRACE = (

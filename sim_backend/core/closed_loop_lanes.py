@@ -9,22 +9,28 @@ differs from that of closed_loop.fly by what the loop makes of that (tests/unit/
 
 import numpy as np
 
-from firmware.core.control.autopilot import decide, reset
-from firmware.core.estimation.navigation import is_finite, restart_filter, start_filter, step_filter, write_estimate
-from firmware.core.estimation.sensing import sense, take_as_measured
-from firmware.core.jit import allocating_kernel, kernel, parallel_kernel, prange
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.layouts.estimator_layout import S_ANGULAR, S_LINEAR
-from firmware.core.maths.wide import LANES, as_wide
-from firmware.core.vehicle.batch import put_lane, take_lane
-from firmware.core.vehicle.layout import N_P, N_X, X_ACT
-from hal.ports import FRAME_SIZE
-from sim_backend.core import layout as wl
-from sim_backend.core.closed_loop import add_up, sum_up, write_trace
-from sim_backend.core.effect_plant import commands_in_force, effect_sea_step, set_effects
-from sim_backend.core.effects import effect_layout as ef
-from sim_backend.core.plant import hold_disturbance, hold_number, plant_step
-from sim_backend.core.world import deliver, read_world, sample_reading
+from glider.firmware.core.control.autopilot import decide, reset
+from glider.firmware.core.estimation.navigation import (
+    is_finite,
+    restart_filter,
+    start_filter,
+    step_filter,
+    write_estimate,
+)
+from glider.firmware.core.estimation.sensing import sense, take_as_measured
+from glider.firmware.core.jit import allocating_kernel, kernel, parallel_kernel, prange
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.layouts.estimator_layout import S_ANGULAR, S_LINEAR
+from glider.firmware.core.maths.wide import LANES, as_wide
+from glider.firmware.core.vehicle.batch import put_lane, take_lane
+from glider.firmware.core.vehicle.layout import N_P, N_X, X_ACT
+from glider.hal.ports import FRAME_SIZE
+from glider.sim_backend.core import layout as wl
+from glider.sim_backend.core.closed_loop import add_up, sum_up, write_trace
+from glider.sim_backend.core.effect_plant import commands_in_force, effect_sea_step, set_effects
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.sim_backend.core.plant import hold_disturbance, hold_number, plant_step
+from glider.sim_backend.core.world import deliver, read_world, sample_reading
 
 
 @kernel

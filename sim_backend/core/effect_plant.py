@@ -6,22 +6,22 @@ physics stand in sim_backend/core/effects, a file for each stage. Where no effec
 nominal vehicle flies the plain plant.
 """
 
-from firmware.core.jit import kernel
-from firmware.core.maths.steps import NODE, RK4, end_stage
-from firmware.core.maths.wide import anywhere, where
-from firmware.core.vehicle.flight import add_accelerations, body_derivative
-from firmware.core.vehicle.layout import N_P, N_X, X_BALLAST, X_DOWN, X_EAST, X_NORTH, X_SERVO, X_SLIDER
-from firmware.core.vehicle.state import normalise_attitude, rotation, velocities
-from firmware.core.vehicle.time_constants import damping_rate, lag_rate, parts_of
-from sim_backend.core import layout as wl
-from sim_backend.core.effects import effect_layout as ef
-from sim_backend.core.effects.actuation import effective_actuators, geared, motor_speeds, update_gears
-from sim_backend.core.effects.correction import correction, link_of
-from sim_backend.core.effects.hydrodynamics import current, effective_coefficients, extra_rate, extra_wrench
-from sim_backend.core.effects.mass import effective_masses, net_mass_of_depth, slider_mass, tank_mass
-from sim_backend.core.effects.sensing import before_lags, update_lags
-from sim_backend.core.effects.timing import delayed_commands
-from sim_backend.core.environment import boundary_force, water_velocity
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.maths.steps import NODE, RK4, end_stage
+from glider.firmware.core.maths.wide import anywhere, where
+from glider.firmware.core.vehicle.flight import add_accelerations, body_derivative
+from glider.firmware.core.vehicle.layout import N_P, N_X, X_BALLAST, X_DOWN, X_EAST, X_NORTH, X_SERVO, X_SLIDER
+from glider.firmware.core.vehicle.state import normalise_attitude, rotation, velocities
+from glider.firmware.core.vehicle.time_constants import damping_rate, lag_rate, parts_of
+from glider.sim_backend.core import layout as wl
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.sim_backend.core.effects.actuation import effective_actuators, geared, motor_speeds, update_gears
+from glider.sim_backend.core.effects.correction import correction, link_of
+from glider.sim_backend.core.effects.hydrodynamics import current, effective_coefficients, extra_rate, extra_wrench
+from glider.sim_backend.core.effects.mass import effective_masses, net_mass_of_depth, slider_mass, tank_mass
+from glider.sim_backend.core.effects.sensing import before_lags, update_lags
+from glider.sim_backend.core.effects.timing import delayed_commands
+from glider.sim_backend.core.environment import boundary_force, water_velocity
 
 
 @kernel

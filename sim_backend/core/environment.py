@@ -2,11 +2,11 @@
 
 import math
 
-from firmware.core.jit import kernel
-from firmware.core.maths.wide import anywhere, where
-from firmware.core.vehicle.layout import GRAVITY, M_T, X_DOWN
-from firmware.core.vehicle.state import rotation, velocities
-from sim_backend.core import layout as wl
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.maths.wide import anywhere, where
+from glider.firmware.core.vehicle.layout import GRAVITY, M_T, X_DOWN
+from glider.firmware.core.vehicle.state import rotation, velocities
+from glider.sim_backend.core import layout as wl
 
 
 @kernel

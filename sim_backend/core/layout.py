@@ -24,7 +24,7 @@ WAVE_AMPLITUDE, WAVE_OMEGA, WAVE_K_N, WAVE_K_E, WAVE_PHASE = 0, 1, 2, 3, 4
 N_WAVE = 5
 
 # --- SENSOR: one row a sensor ---------------------------------------------------------------------------------------
-# IMU, beacon and draw-wires are numbered as aboard, supervisor_layout
+# IMU, beacon and draw-wires are numbered as on the vehicle, supervisor_layout
 N_SAMPLED = 4
 SENSOR_PERIOD, SENSOR_DELAY = 0, 1  # s
 N_SENSOR_FIELDS = 2

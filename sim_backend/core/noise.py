@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from firmware.core.jit import kernel
+from glider.firmware.core.jit import kernel
 
 _STREAM = np.uint64(0xD1B54A32D192ED03)
 _STEP = np.uint64(0x9E3779B97F4A7C15)

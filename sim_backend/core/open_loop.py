@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from firmware.core.jit import allocating_kernel, parallel_kernel, prange
-from firmware.core.vehicle.layout import N_P, N_X
-from sim_backend.core import layout as wl
-from sim_backend.core.effect_plant import effect_world_step, set_effects
-from sim_backend.core.effects import effect_layout as ef
-from sim_backend.core.plant import hold_disturbance, plant_step
+from glider.firmware.core.jit import allocating_kernel, parallel_kernel, prange
+from glider.firmware.core.vehicle.layout import N_P, N_X
+from glider.sim_backend.core import layout as wl
+from glider.sim_backend.core.effect_plant import effect_world_step, set_effects
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.sim_backend.core.plant import hold_disturbance, plant_step
 
 
 @allocating_kernel

@@ -1,17 +1,17 @@
 """The simulated vehicle in its environment: the nominal one in moving water, with surface, floor and disturbance."""
 
-from firmware.core.jit import kernel
-from firmware.core.layouts.estimator_layout import DISTURBANCE_HOLD
-from firmware.core.maths.steps import NODE, RK4, end_stage
-from firmware.core.maths.wide import anywhere, where
-from firmware.core.vehicle.actuators import actuator_rates
-from firmware.core.vehicle.flight import add_accelerations, state_derivative
-from firmware.core.vehicle.layout import N_X, X_DOWN, X_EAST, X_NORTH
-from firmware.core.vehicle.state import actuators, normalise_attitude
-from firmware.core.vehicle.time_constants import nominal_parts
-from sim_backend.core import layout as wl
-from sim_backend.core.environment import boundary_force, water_velocity
-from sim_backend.core.noise import gaussian
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.layouts.estimator_layout import DISTURBANCE_HOLD
+from glider.firmware.core.maths.steps import NODE, RK4, end_stage
+from glider.firmware.core.maths.wide import anywhere, where
+from glider.firmware.core.vehicle.actuators import actuator_rates
+from glider.firmware.core.vehicle.flight import add_accelerations, state_derivative
+from glider.firmware.core.vehicle.layout import N_X, X_DOWN, X_EAST, X_NORTH
+from glider.firmware.core.vehicle.state import actuators, normalise_attitude
+from glider.firmware.core.vehicle.time_constants import nominal_parts
+from glider.sim_backend.core import layout as wl
+from glider.sim_backend.core.environment import boundary_force, water_velocity
+from glider.sim_backend.core.noise import gaussian
 
 
 @kernel

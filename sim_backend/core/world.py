@@ -4,17 +4,17 @@ A world is a handful of arrays (sim_backend/world.py makes them); the same kerne
 and thousands in a campaign.
 """
 
-from firmware.core.jit import kernel
-from firmware.core.layouts import supervisor_layout as sup
-from firmware.core.vehicle.layout import GRAVITY, PLUNGER_AREA, X_NU, X_POS
-from firmware.core.vehicle.state import euler_angles
-from hal.ports import BEACON, IMU, PLUNGER_WIRE, SLIDER_WIRE
-from sim_backend.core import layout as wl
-from sim_backend.core.effect_plant import effect_world_step, set_effects
-from sim_backend.core.effects import effect_layout as ef
-from sim_backend.core.effects.sensing import read, read_state
-from sim_backend.core.noise import gaussian
-from sim_backend.core.plant import hold_disturbance, plant_step
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.layouts import supervisor_layout as sup
+from glider.firmware.core.vehicle.layout import GRAVITY, PLUNGER_AREA, X_NU, X_POS
+from glider.firmware.core.vehicle.state import euler_angles
+from glider.hal.ports import BEACON, IMU, PLUNGER_WIRE, SLIDER_WIRE
+from glider.sim_backend.core import layout as wl
+from glider.sim_backend.core.effect_plant import effect_world_step, set_effects
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.sim_backend.core.effects.sensing import read, read_state
+from glider.sim_backend.core.noise import gaussian
+from glider.sim_backend.core.plant import hold_disturbance, plant_step
 
 
 @kernel

@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 
-from firmware.core.jit import allocating_kernel, kernel
-from firmware.core.maths.rotations import euler_from_quaternion, quaternion_from_euler, rotation_nb
-from firmware.core.vehicle.actuators import clip
-from firmware.core.vehicle.layout import N_P
-from sim_backend.core.noise import gaussian, uniform
-from sim_backend.foreign import foreign_layout as fo
-from sim_backend.foreign.foreign_plant import foreign_step, gusts, loose_place, settled
+from glider.firmware.core.jit import allocating_kernel, kernel
+from glider.firmware.core.maths.rotations import euler_from_quaternion, quaternion_from_euler, rotation_nb
+from glider.firmware.core.vehicle.actuators import clip
+from glider.firmware.core.vehicle.layout import N_P
+from glider.sim_backend.core.noise import gaussian, uniform
+from glider.sim_backend.foreign import foreign_layout as fo
+from glider.sim_backend.foreign.foreign_plant import foreign_step, gusts, loose_place, steady_share
 
 SLIDER_PER_PITCH, SLIDER_PER_RATE, SLIDER_PER_BALLAST = 0.030, 0.025, -0.12  # m/rad, m s/rad, m/kg
 SLIDER_MOST = 0.055  # m
@@ -57,7 +57,7 @@ def read_sensors(F, x, t, y):
     """All readings without bias and noise of the nominal sensors, into y (N_FR)."""
     read_attitude(F, x, t, y)
     p, q, r, scale = x[10], x[11], x[12], F[fo.FS_GYRO_SCALE]
-    steady = settled(F, t)
+    steady = steady_share(F, t)
     y[fo.FR_P] = p * (1.0 + 0.95 * scale) + 0.03 * scale * q + F[fo.FS_GYRO_P] * steady
     y[fo.FR_Q] = q * (1.0 + 1.05 * scale) + 0.03 * scale * r + F[fo.FS_GYRO_Q] * steady + F[fo.FS_GYRO_DEPTH] * x[2]
     y[fo.FR_R] = r * (1.0 + scale) + 0.03 * scale * p + F[fo.FS_GYRO_R] * steady - 0.6 * F[fo.FS_GYRO_DEPTH] * x[2]

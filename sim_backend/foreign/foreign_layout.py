@@ -4,7 +4,7 @@ The foreign plant flies blind tests: the nominal equations, but every effect in 
 An entry of F that is 0 is no effect; entries below N_STRENGTH are strengths, the others only shape them. SI.
 """
 
-from firmware.core.vehicle.layout import N_X
+from glider.firmware.core.vehicle.layout import N_X
 
 # --- F: strengths ---------------------------------------------------------------------------------------------------
 (

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from firmware.core.control.autopilot import reset, tick
-from firmware.core.jit import allocating_kernel, kernel
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.vehicle.layout import GRAVITY, N_P, PLUNGER_AREA
-from hal.ports import BEACON, FRAME_SIZE, IMU, PLUNGER_WIRE, SLIDER_WIRE
-from sim_backend.core.noise import gaussian
-from sim_backend.foreign import foreign_layout as fo
-from sim_backend.foreign.foreign_flight import move_row, read_sensors, start_memory
+from glider.firmware.core.control.autopilot import reset, tick
+from glider.firmware.core.jit import allocating_kernel, kernel
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.vehicle.layout import GRAVITY, N_P, PLUNGER_AREA
+from glider.hal.ports import BEACON, FRAME_SIZE, IMU, PLUNGER_WIRE, SLIDER_WIRE
+from glider.sim_backend.core.noise import gaussian
+from glider.sim_backend.foreign import foreign_layout as fo
+from glider.sim_backend.foreign.foreign_flight import move_row, read_sensors, start_memory
 
 FRESH, TEMPERATURE_C = 998.0, 18.0  # kg/m3, deg C
 

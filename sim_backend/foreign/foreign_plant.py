@@ -8,18 +8,18 @@ has the water's forces of lifting_body instead of equation (4): its P has no coe
 
 import math
 
-from firmware.core.jit import kernel
-from firmware.core.maths.rotations import euler_from_quaternion, quaternion_rate, rotation_nb, wrap_angle
-from firmware.core.maths.steps import MIDPOINT
-from firmware.core.vehicle import layout
-from firmware.core.vehicle.actuators import actuator_rate, actuator_table
-from firmware.core.vehicle.layout import N_P, N_X
-from firmware.core.vehicle.motion import accelerations
-from firmware.core.vehicle.time_constants import nominal_parts
-from firmware.core.vehicle.water import flow_angles, flow_to_body
-from sim_backend.core.noise import gaussian, uniform
-from sim_backend.foreign import foreign_layout as fo
-from sim_backend.foreign.lifting_body import body_wrench
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.maths.rotations import euler_from_quaternion, quaternion_rate, rotation_nb, wrap_angle
+from glider.firmware.core.maths.steps import MIDPOINT
+from glider.firmware.core.vehicle import layout
+from glider.firmware.core.vehicle.actuators import actuator_rate, actuator_table
+from glider.firmware.core.vehicle.layout import N_P, N_X
+from glider.firmware.core.vehicle.motion import accelerations
+from glider.firmware.core.vehicle.time_constants import nominal_parts
+from glider.firmware.core.vehicle.water import flow_angles, flow_to_body
+from glider.sim_backend.core.noise import gaussian, uniform
+from glider.sim_backend.foreign import foreign_layout as fo
+from glider.sim_backend.foreign.lifting_body import body_wrench
 
 REFERENCE_SPEED = 0.35  # m/s, where powers of the speed other than the square agree with it
 TANGLE_BLOCK = 7.0  # s
@@ -101,7 +101,7 @@ def pump_motion(P, F, x, command, out):
 
 
 @kernel
-def settled(F, t):
+def steady_share(F, t):
     """How far what is called constant wanders: 0.9 to 1.1 within a run."""
     return 1.0 + 0.1 * math.sin(2.0 * math.pi * t / F[fo.FS_DRIFT_TIME] + F[fo.FS_DRIFT_PHASE])
 
@@ -135,7 +135,7 @@ def mass_effects(P, F, servo, slider, ballast, down, t, loose, Pw):
     tank = F[fo.FS_BALLAST_SCALE] * ballast * (1.0 + 3.0 * ballast * ballast / 0.04)
     if F[fo.FS_BALLAST_LEAK] != 0.0 and t > F[fo.FS_LEAK_START]:
         tank += F[fo.FS_BALLAST_LEAK] * (1.0 - math.exp(-(t - F[fo.FS_LEAK_START]) / F[fo.FS_LEAK_TIME]))
-    steady = settled(F, t)
+    steady = steady_share(F, t)
     Pw[layout.NET_MASS] += tank + depth_mass(F, down) + F[fo.FS_NET_BUOYANCY] * steady
     moved = F[fo.FS_SLIDER_SCALE] * P[layout.M_S] * slider * (0.8 + 0.4 * slider * slider / 0.0036)
     Pw[layout.CG_X] += (tank * P[layout.X_B] + moved) / P[layout.M_T] + F[fo.FS_CG_LONGITUDINAL]

@@ -12,13 +12,13 @@ stall by Viterna and Corrigan (1982); the tail flies in the wings' downwash.
 
 import math
 
-from firmware.core.jit import kernel
-from sim_backend.foreign import foreign_layout as fo
+from glider.firmware.core.jit import kernel
+from glider.sim_backend.foreign import foreign_layout as fo
 
 DENSITY, VISCOSITY = 998.0, 1.05e-6  # kg/m3, m2/s: fresh water at 18 deg C
 LEAST_HULL, LEAST_WING = 2e4, 1e3  # Reynolds numbers below which friction coefficients grow no more
 STRIPS = 8  # of the hull, for the cross-flow
-STILL = 1e-9  # m/s; below this nothing flows
+STILL_SPEED = 1e-9  # m/s; below this nothing flows
 BLEND = 0.06  # rad over which a lift curve bends into its stall
 SIDED_FRICTION, SIDED_ANGLE = 0.01, 4.0  # what fouls one wing: drag coefficient, and per rad2
 
@@ -88,7 +88,7 @@ def surface_force(F, number, more_lift, extra_friction, extra_angle, wash, u, v,
     ny, nz = math.sin(F[at + fo.FBS_TILT]), math.cos(F[at + fo.FBS_TILT])
     across = ny * vl + nz * wl
     speed = math.sqrt(ul * ul + across * across)
-    if speed < STILL:
+    if speed < STILL_SPEED:
         return 0.0, 0.0, 0.0, 0.0
     turned = math.atan2(across, ul + 0.0)
     angle = turned + F[at + fo.FBS_INCIDENCE] - wash
@@ -128,7 +128,7 @@ def hull_wrench(F, u, v, w, p, q, r):
         x, wide = place * length, F[fo.FB_DIAMETER] * math.sqrt(1.0 - (2.0 * place) ** 6)
         vi, wi = v + r * x, w - q * x
         across = vi * vi + wi * wi
-        bent = across / (across + u * u + STILL)  # the local angle's sine, squared
+        bent = across / (across + u * u + STILL_SPEED)  # the local angle's sine, squared
         coefficient = F[fo.FB_CROSS_ALONG] + (F[fo.FB_CROSS_ACROSS] - F[fo.FB_CROSS_ALONG]) * bent
         pull = half * coefficient * wide * length / STRIPS * math.sqrt(across)
         wrench = add_at(x, 0.0, 0.0, 0.0, -pull * vi, -pull * wi, wrench)

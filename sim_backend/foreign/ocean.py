@@ -9,8 +9,8 @@ import math
 
 import numpy as np
 
-from firmware.core.jit import kernel
-from sim_backend.core.noise import gaussian
+from glider.firmware.core.jit import kernel
+from glider.sim_backend.core.noise import gaussian
 
 # --- vehicle, V ------------------------------------------------------------------------------------------------------
 MASS, VOLUME, COMPRESSION, STIFFENING, EXPANSION = 0, 1, 2, 3, 4  # kg, m3, 1/Pa, 1/Pa, 1/K
@@ -37,7 +37,11 @@ HEADING = 7  # rad
 N_D = 8
 
 # --- sea, S ----------------------------------------------------------------------------------------------------------
-WARM, DEEP_WARM, COLD = 0, 1, 2  # degC: mixed layer; below the thermocline; far down
+MIXED_LAYER_TEMPERATURE, THERMOCLINE_TEMPERATURE, DEEP_TEMPERATURE = (
+    0,
+    1,
+    2,
+)  # degC: mixed layer; below the thermocline; far down
 THERMOCLINE, THICKNESS, DECAY = 3, 4, 5  # m
 SALT, SALT_STEP = 6, 7  # g/kg: far down; of the upper layer less
 FINE, FINE_LENGTH, FINE_PHASE = 8, 9, 10  # K, m, rad
@@ -50,21 +54,25 @@ R_SPEED, R_HORIZONTAL, R_WATER = 9, 10, 11  # m/s through the water: all, horizo
 N_R = 12
 
 STEPS = 5  # of a second
-SMOOTH = 15.0  # s, over which vertical water has a slope
+WATER_SLOPE_S = 15.0  # s, over which vertical water has a slope
 PITCH_REMEMBERS, ROLL_REMEMBERS, YAW_REMEMBERS = 90.0, 60.0, 900.0  # s
 FASTEST_PITCH = 0.025  # rad/s
 STANDARD_SPEED = 0.25  # m/s, at which parasitic drag is DRAG
 MUD_TIME = 1200.0  # s, in which mud is washed out
 STEADY_PULL = 0.05  # m/s, from which on the pull is whole
 CALM_SURFACE, CALM_DEPTH = 0.6, 30.0  # share by which vertical water is less at the surface; m
-LONGEST = 60000.0  # s of a dive
+MAX_DIVE_S = 60000.0  # s of a dive
 
 
 @kernel
 def sea_temperature(S, z):
     """Temperature, degC, at a depth, m."""
-    upper = 0.5 * (S[WARM] - S[DEEP_WARM]) * (1.0 - math.tanh((z - S[THERMOCLINE]) / S[THICKNESS]))
-    deep = S[COLD] + (S[DEEP_WARM] - S[COLD]) * math.exp(-max(z, 0.0) / S[DECAY])
+    upper = (
+        0.5
+        * (S[MIXED_LAYER_TEMPERATURE] - S[THERMOCLINE_TEMPERATURE])
+        * (1.0 - math.tanh((z - S[THERMOCLINE]) / S[THICKNESS]))
+    )
+    deep = S[DEEP_TEMPERATURE] + (S[THERMOCLINE_TEMPERATURE] - S[DEEP_TEMPERATURE]) * math.exp(-max(z, 0.0) / S[DECAY])
     return upper + deep + S[FINE] * math.sin(z / S[FINE_LENGTH] + S[FINE_PHASE]) * math.exp(-max(z, 0.0) / 300.0)
 
 
@@ -122,7 +130,7 @@ def rates(V, weight, density, theta, turn, phi, u, v, w, thrust=0.0, pull=0.0):
 
 @kernel
 def remembered(value, size, time, seed, stream, second):
-    """A process that forgets itself in `time` s and has `size` for its standard deviation, one second on."""
+    """A process that decorrelates in `time` s and has `size` for its standard deviation, one second on."""
     keep = math.exp(-1.0 / time)
     return keep * value + size * math.sqrt(1.0 - keep * keep) * gaussian(seed, stream, second)
 
@@ -150,9 +158,9 @@ def fly_dive(V, D, S, seed, out):
     smooth, pitch_off, roll_off, yaw_off = water, 0.0, 0.0, V[YAW_WANDER] * gaussian(seed, 4, 0)
     temperature, potential = sea_temperature(S, z), potential_density(S, z)
     row, due, second, engine, mud = 0, 0.0, 0, 0.0, 0.0
-    while second < LONGEST and row < out.shape[0]:
+    while second < MAX_DIVE_S and row < out.shape[0]:
         water = remembered(water, S[WATER], S[WATER_TIME], seed, 1, second + 1)
-        smooth += (water - smooth) / SMOOTH
+        smooth += (water - smooth) / WATER_SLOPE_S
         pitch_off = remembered(pitch_off, V[PITCH_WANDER], PITCH_REMEMBERS, seed, 2, second + 1)
         roll_off = remembered(roll_off, V[ROLL_WANDER], ROLL_REMEMBERS, seed, 3, second + 1)
         yaw_off = remembered(yaw_off, V[YAW_WANDER], YAW_REMEMBERS, seed, 4, second + 1)
@@ -203,4 +211,4 @@ def fly_dive(V, D, S, seed, out):
 
 def room() -> np.ndarray:
     """An empty table that any dive fits into, (rows, N_R)."""
-    return np.zeros((int(LONGEST) // 4, N_R))
+    return np.zeros((int(MAX_DIVE_S) // 4, N_R))

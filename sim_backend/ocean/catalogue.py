@@ -7,8 +7,8 @@ are likely to go (docs/OCEAN.md, Labels).
 from dataclasses import replace
 from functools import cache
 
-from sim_backend.core.effects.base import Effect, Parameter
-from sim_backend.ocean.core import layout
+from glider.sim_backend.core.effects.base import Effect, Parameter
+from glider.sim_backend.ocean.core import layout
 
 
 def _row(place: str, label: str, summary: str, *parameters: Parameter) -> Effect:
@@ -55,7 +55,7 @@ EFFECTS = (
     # pitch reads a multiple of the truth
     _row("sensing attitude", "attitude_scale", "pitch reads 1 + scale times the truth",
          Parameter("scale", "1", -0.6, 1.0, 0.1, "F_PITCH_SCALE")),
-    # the water rises and falls more than it did: its course nobody can foresee
+    # the water rises and falls more than it did: its time history is unpredictable
     _row("environment water", "vertical_water", "vertical velocity of the water times 1 + scale",
          Parameter("scale", "1", 0.0, 20.0, 1.0)),
     # the attitude comes late

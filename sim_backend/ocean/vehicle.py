@@ -6,9 +6,9 @@ from typing import Annotated, Literal
 import msgspec
 import numpy as np
 
-from firmware.model.vehicle import Assumed
-from hal.strict import Table, decode
-from sim_backend.ocean.core import layout
+from glider.firmware.model.vehicle import Assumed
+from glider.hal.strict import Table, decode
+from glider.sim_backend.ocean.core import layout
 
 KIND = "ocean"
 Positive = Annotated[float, msgspec.Meta(gt=0.0)]
@@ -80,7 +80,7 @@ class OceanSensors(Table):
 
 
 class OceanDisturbance(Table):
-    """[disturbance]: vertical water, 1 sigma m/s, with the time, s, in which it forgets itself; walk, m/s over 1 s.
+    """[disturbance]: vertical water, 1 sigma m/s, with the time, s, in which it decorrelates; walk, m/s over 1 s.
 
     roll, rad, and roll_time, s: by how much and how long the roll leaves its trim.
     """
@@ -211,7 +211,7 @@ def gravity(latitude: float) -> float:
 
 def shipped_vehicles() -> dict[str, str]:
     """Name -> text of the shipped ocean gliders."""
-    folder = files("sim_backend").joinpath("ocean", "vehicles")
+    folder = files("glider.sim_backend").joinpath("ocean", "vehicles")
     return {
         entry.name.removesuffix(".toml"): entry.read_text(encoding="utf-8")
         for entry in sorted(folder.iterdir(), key=lambda item: item.name) if entry.name.endswith(".toml")

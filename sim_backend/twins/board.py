@@ -11,12 +11,12 @@ from pathlib import Path
 
 import msgspec
 
-from hal.board import BoardRequest
-from hal.devices import DeviceBoard
-from hal.ports import Board, BoardError, Hardware
-from hal.spawn import module_command, module_environment
-from sim_backend.twins.boardfile import TwinFile, decode_twin_file
-from sim_backend.twins.service import replaced_ports
+from glider.hal.board import BoardRequest
+from glider.hal.devices import DeviceBoard
+from glider.hal.ports import Board, BoardError, Hardware
+from glider.hal.spawn import module_command, module_environment
+from glider.sim_backend.twins.boardfile import TwinFile, decode_twin_file
+from glider.sim_backend.twins.service import replaced_ports
 
 START_S = 180.0  # for the twins to be there, their kernels compiled
 
@@ -43,7 +43,7 @@ class TwinBoard(DeviceBoard):
             "vehicle": msgspec.to_builtins(request.vehicle),
         }  # fmt: skip
         self._process = subprocess.Popen(
-            module_command("sim_backend.twins.service"), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            module_command("glider.sim_backend.twins.service"), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
             start_new_session=True, env=module_environment(),
         )  # fmt: skip
         assert self._process.stdin is not None

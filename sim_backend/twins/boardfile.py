@@ -2,14 +2,14 @@
 
 import msgspec
 
-from hal import boardfile
-from hal.boardfile import DeviceFile
-from hal.protocols.vn100 import FLIGHT_MASK, payload_size
-from hal.strict import ConfigError, decode
-from hal.units import BITS
-from sim_backend.core.effects.catalogue import check_board
-from sim_backend.twins.modbus_line import TURNAROUND_S
-from sim_backend.world import Environment, SampledSensor, Start
+from glider.hal import boardfile
+from glider.hal.boardfile import DeviceFile
+from glider.hal.protocols.vn100 import FLIGHT_MASK, payload_size
+from glider.hal.strict import ConfigError, decode
+from glider.hal.units import BITS
+from glider.sim_backend.core.effects.catalogue import check_board
+from glider.sim_backend.twins.modbus_line import TURNAROUND_S
+from glider.sim_backend.world import Environment, SampledSensor, Start
 
 PLANT_HZ = 100.0
 

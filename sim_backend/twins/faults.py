@@ -23,14 +23,14 @@ class FaultError(ValueError):
 
 
 @dataclass
-class Fault:
+class TwinFault:
     """What a device does wrong now."""
 
     kind: str = "none"
     value: float = 0.0
 
 
-def parse_fault(text: str) -> Fault:
+def parse_fault(text: str) -> TwinFault:
     """`late 0.2` or `silent` as a Fault."""
     kind, *rest = text.split()
     if kind not in FAULTS:
@@ -39,11 +39,11 @@ def parse_fault(text: str) -> Fault:
     if meaning is None and rest:
         raise FaultError(f"'{kind}' takes no number")
     if meaning is None:
-        return Fault(kind)
+        return TwinFault(kind)
     try:
         (value,) = (float(item) for item in rest)
     except ValueError:
         raise FaultError(f"'{kind}' takes one number: {meaning}") from None
     if not 0.0 <= value <= 255.0:
         raise FaultError(f"'{kind}': expected 0 to 255, got {value:g}")
-    return Fault(kind, value)
+    return TwinFault(kind, value)

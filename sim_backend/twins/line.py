@@ -11,7 +11,7 @@ import tty
 from collections.abc import Callable
 from pathlib import Path
 
-from hal.units import BITS
+from glider.hal.units import BITS
 
 CHUNK = 4096
 

@@ -11,17 +11,26 @@ from typing import Any
 from pymodbus.constants import ExcCodes
 from pymodbus.simulator import DataType, SimData, SimDevice
 
-from hal.boardfile import BatteryTable, DriveTable, LeakTable, WireTable
-from hal.protocols.registers import LOW, WORDS, RegisterMap, channel_of, registers_of, step_of, to_registers, value_of
-from sim_backend.twins.faults import Fault
-from sim_backend.twins.plant import TwinPlant
+from glider.hal.boardfile import BatteryTable, DriveTable, LeakTable, WireTable
+from glider.hal.protocols.registers import (
+    LOW,
+    WORDS,
+    RegisterMap,
+    channel_of,
+    registers_of,
+    step_of,
+    to_registers,
+    value_of,
+)
+from glider.sim_backend.twins.faults import TwinFault
+from glider.sim_backend.twins.plant import TwinPlant
 
 
 class RegisterTwin(ABC):
     """A device with registers. `extra` are further addresses, with their counts, that it has."""
 
     def __init__(self, device: int, registers: RegisterMap, extra: tuple[tuple[int, int], ...] = ()):
-        self.device, self.map, self.fault = device, registers, Fault()
+        self.device, self.map, self.fault = device, registers, TwinFault()
         self._held: dict[int, list[int]] = {}
         places: dict[int, int] = {}
         for start, count in (*((b.address, b.count) for b in registers.block.values()), *extra):
@@ -90,7 +99,7 @@ class PressureTwin(RegisterTwin):
 
 
 class AnalogTwin(RegisterTwin):
-    """An analog module: draw-wires by the plant, leak and battery as told."""
+    """An analog module: draw-wires by the plant, leak and battery as commanded."""
 
     def __init__(self, device: int, registers: RegisterMap, plant: TwinPlant):
         super().__init__(device, registers, extra=tuple((word, 1) for word in registers.word.values()))

@@ -14,11 +14,11 @@ from pathlib import Path
 from pymodbus.server import ModbusSerialServer
 from pymodbus.server.requesthandler import ServerRequestHandler
 
-from hal.boardfile import PortTable
-from hal.protocols.modbus import ERROR, RtuDecoder, with_check_sum
-from sim_backend.twins.faults import Fault
-from sim_backend.twins.line import Line
-from sim_backend.twins.modbus_devices import RegisterTwin
+from glider.hal.boardfile import PortTable
+from glider.hal.protocols.modbus import ERROR, RtuDecoder, with_check_sum
+from glider.sim_backend.twins.faults import TwinFault
+from glider.sim_backend.twins.line import Line
+from glider.sim_backend.twins.modbus_devices import RegisterTwin
 
 TURNAROUND_S = 0.002
 
@@ -92,7 +92,7 @@ class ModbusTwin:
         if self._waiting:
             self._ask(self._waiting[0][1])
 
-    def _reply(self, fault: Fault, raw: bytes) -> None:
+    def _reply(self, fault: TwinFault, raw: bytes) -> None:
         kind, value = fault.kind, fault.value
         if kind == "wrong_id":
             raw = with_check_sum(bytes((raw[0] % 247 + 1,)) + raw[1:-2])

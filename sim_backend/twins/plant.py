@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from firmware.core.maths.rotations import quaternion_from_euler
-from firmware.core.vehicle.layout import X_ACT, X_NU, X_POS, X_QUAT
-from hal.ports import BEACON, IMU, PLUNGER_WIRE, SLIDER_WIRE
-from sim_backend.core import layout as wl
-from sim_backend.core.effects.effect_layout import X_LAG
-from sim_backend.world import Environment, SampledSensor, SampledSensors, Start, World, build_world
+from glider.firmware.core.maths.rotations import quaternion_from_euler
+from glider.firmware.core.vehicle.layout import X_ACT, X_NU, X_POS, X_QUAT
+from glider.hal.ports import BEACON, IMU, PLUNGER_WIRE, SLIDER_WIRE
+from glider.sim_backend.core import layout as wl
+from glider.sim_backend.core.effects.effect_layout import X_LAG
+from glider.sim_backend.world import Environment, SampledSensor, SampledSensors, Start, World, build_world
 
 AT_ONCE = SampledSensor(rate_hz=100.0, delay_s=0.0)  # the lines add the delays
 CMD_SERVO, CMD_SLIDER, CMD_BALLAST = 0, 1, 2
@@ -46,7 +46,7 @@ class TwinPlant:
 
     @property
     def commands(self) -> np.ndarray:
-        """Servo (rad), slider (m), ballast (kg), as its actuators are told."""
+        """Servo (rad), slider (m), ballast (kg), as its actuators are commanded."""
         return self.world.cmd
 
     def first_command(self) -> None:

@@ -5,13 +5,13 @@ import math
 import random
 from pathlib import Path
 
-from firmware.core.vehicle.layout import GRAVITY
-from hal.boardfile import ImuTable, PortTable, ServoTable
-from hal.drivers.vn100 import euler, rotation
-from hal.protocols import maestro, vn100
-from sim_backend.twins.faults import Fault
-from sim_backend.twins.line import Line
-from sim_backend.twins.plant import CMD_SERVO, TwinPlant
+from glider.firmware.core.vehicle.layout import GRAVITY
+from glider.hal.boardfile import ImuTable, PortTable, ServoTable
+from glider.hal.drivers.vn100 import euler, rotation
+from glider.hal.protocols import maestro, vn100
+from glider.sim_backend.twins.faults import TwinFault
+from glider.sim_backend.twins.line import Line
+from glider.sim_backend.twins.plant import CMD_SERVO, TwinPlant
 
 MODEL = "VN-100T-CR"
 DEAD_MAN_S = 1.0  # the servo board's serial timeout
@@ -21,7 +21,7 @@ class Vn100Twin:
     """Answers commands and streams binary output at the rate set, the plant's attitude and rates in it."""
 
     def __init__(self, link: Path, port: PortTable, table: ImuTable, plant: TwinPlant, rng: random.Random):
-        self.fault = Fault()
+        self.fault = TwinFault()
         self.line = Line(link, port.baud, self._received)
         self._plant, self._rng = plant, rng
         self._R_db = rotation(*(math.radians(angle) for angle in table.mount_deg)).T
@@ -101,7 +101,7 @@ class MaestroTwin:
     """Takes targets, keeps an error word, and goes home when nobody has spoken for a while."""
 
     def __init__(self, link: Path, port: PortTable, table: ServoTable, plant: TwinPlant, rng: random.Random):
-        self.fault = Fault()
+        self.fault = TwinFault()
         self.line = Line(link, port.baud, self._received)
         self._table, self._plant, self._rng = table, plant, rng
         number = 12 if table.number is None else table.number

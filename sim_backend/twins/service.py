@@ -1,6 +1,6 @@
 """The twins of a board, moved by the plant in real time, with a line of commands for faults.
 
-`python -m sim_backend.twins.service` is how a flight starts them: a line of JSON on standard input says what, a line of
+`python -m glider.sim_backend.twins.service` is how a flight starts them: a line of JSON on standard input says what, a line of
 JSON on standard output says that they are there, and the end of standard input ends them.
 """
 
@@ -18,17 +18,17 @@ from typing import Any
 
 import msgspec
 
-from firmware.model.vehicle import Vehicle
-from hal import boardfile
-from hal.strict import ConfigError
-from sim_backend.twins.boardfile import TwinFile, decode_twin_file
-from sim_backend.twins.faults import Fault, FaultError, parse_fault
-from sim_backend.twins.modbus_devices import AnalogTwin, DriveTwin, EncoderTwin, PressureTwin, RegisterTwin
-from sim_backend.twins.modbus_line import ModbusTwin
-from sim_backend.twins.plant import CMD_BALLAST, CMD_SLIDER, TwinPlant
-from sim_backend.twins.serial_devices import MaestroTwin, Vn100Twin
+from glider.firmware.model.vehicle import Vehicle
+from glider.hal import boardfile
+from glider.hal.strict import ConfigError
+from glider.sim_backend.twins.boardfile import TwinFile, decode_twin_file
+from glider.sim_backend.twins.faults import FaultError, TwinFault, parse_fault
+from glider.sim_backend.twins.modbus_devices import AnalogTwin, DriveTwin, EncoderTwin, PressureTwin, RegisterTwin
+from glider.sim_backend.twins.modbus_line import ModbusTwin
+from glider.sim_backend.twins.plant import CMD_BALLAST, CMD_SLIDER, TwinPlant
+from glider.sim_backend.twins.serial_devices import MaestroTwin, Vn100Twin
 
-LINE_TWINS = {"vn100": Vn100Twin, "maestro": MaestroTwin}  # by the names of hal.boardfile.DRIVERS
+LINE_TWINS = {"vn100": Vn100Twin, "maestro": MaestroTwin}  # by the names of glider.hal.boardfile.DRIVERS
 STEP_S = 0.01
 FALL_BEHIND_S = 1.0  # past which the plant's time stands rather than runs after the clock
 HELP = (
@@ -175,7 +175,7 @@ class TwinService:
             raise ValueError(verb)
         return "ok"
 
-    def _fault(self, name: str, fault: Fault) -> None:
+    def _fault(self, name: str, fault: TwinFault) -> None:
         device, line = self.device(name), self.line_of(name)
         if fault.kind == "unplug":
             line.unplug()

@@ -5,11 +5,11 @@ import pytest
 from numba import njit
 from numba.core.runtime import _nrt_python, rtsys
 
-from firmware.core.control import autopilot as core
-from firmware.core.control.telemetry import N_RECORD, fill_record
-from firmware.core.layouts import control_layout as ctl
-from tools.measure.benchmark.allocations import BOXED, blocks_asked_for
-from tools.measure.benchmark.tick import harness, measure_tick
+from glider.firmware.core.control import autopilot as core
+from glider.firmware.core.control.telemetry import N_RECORD, fill_record
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.tools.measure.benchmark.allocations import BOXED, blocks_asked_for
+from glider.tools.measure.benchmark.tick import harness, measure_tick
 
 pytestmark = pytest.mark.computes(seconds=20)
 

@@ -14,8 +14,8 @@ import click
 import pytest
 from packaging.requirements import Requirement
 
-from tools.cli.main import cli
-from tools.data.errors import extras, missing_extra
+from glider.tools.cli.main import cli
+from glider.tools.data.errors import extras, missing_extra
 
 pytestmark = pytest.mark.computes(seconds=25)
 
@@ -161,7 +161,7 @@ def test_the_extras_are_those_of_the_package():
     assert set(BROUGHT) <= set(extras())
     assert {"dask", "distributed", "joblib", "jinja2"} == set(extras()["campaign"])
     assert "'glider[identify]'" in str(missing_extra(ModuleNotFoundError(name="arviz.stats")))
-    assert missing_extra(ModuleNotFoundError(name="tools.nothing")) is None
+    assert missing_extra(ModuleNotFoundError(name="glider.tools.nothing")) is None
 
 
 def test_what_flies_asks_for_few_packages():

@@ -11,16 +11,16 @@ import time
 import pytest
 from support import commands
 
-from hal.boardfile import calibration_hash, decode_device_file
+from glider.hal.boardfile import calibration_hash, decode_device_file
+from glider.tools.bench.client import Bench
+from glider.tools.data.boards import load_board_file
 from tests.support.bench_session import Twins, session
-from tools.bench.client import Bench
-from tools.data.boards import load_board_file
 
 pytestmark = pytest.mark.realtime(seconds=180)
 
 
 def glider(*arguments, lines=(), **options):
-    command = [sys.executable, "-m", "tools.cli.main", *(str(item) for item in arguments)]
+    command = [sys.executable, "-m", "glider.tools.cli.main", *(str(item) for item in arguments)]
     text = "".join(f"{line}\n" for line in lines)
     return subprocess.run(command, input=text, capture_output=True, text=True, timeout=120, **options)
 
@@ -126,7 +126,7 @@ def test_raw_bytes_and_their_answers(twins, tmp_path):
 
 
 def test_a_sweep_leaves_run_data_and_a_picture(twins, tmp_path):
-    from tools.data.runs.case import load_case
+    from glider.tools.data.runs.case import load_case
 
     done = typed(twins, tmp_path, "enable", "goto slider 0", "sweep slider -2 2")
     assert done.returncode == 0, done.stdout + done.stderr
@@ -138,7 +138,7 @@ def test_a_sweep_leaves_run_data_and_a_picture(twins, tmp_path):
 
 def start(twins):
     """A console on a pipe that is left open, with the slider on its way from end to end."""
-    command = [sys.executable, "-m", "tools.cli.main", "bench", "--board", str(twins.board)]
+    command = [sys.executable, "-m", "glider.tools.cli.main", "bench", "--board", str(twins.board)]
     process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
     process.stdin.write("enable\ngoto slider -55\ngoto slider 55\n")
     process.stdin.flush()
@@ -186,7 +186,7 @@ def test_check_talks_to_every_device(twins, tmp_path):
 
 def lead(twins, board, actuators):
     """`glider check --signs` with a person who turns the stand when asked to; its findings."""
-    command = [sys.executable, "-m", "tools.cli.main", "check", "--board", str(board), "--signs", "--json"]
+    command = [sys.executable, "-m", "glider.tools.cli.main", "check", "--board", str(board), "--signs", "--json"]
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     process = subprocess.Popen(command, text=True, **pipes)
     poses = {"level": "0 0 40 0.3", "nose by": "0 15 40 0.3", "side down": "15 0 40 0.3", "nose to": "0 0 55 0.3"}

@@ -11,12 +11,12 @@ from independent.flights import fly
 from independent.make_reference import VEHICLE
 from independent.nominal import Glider
 
-from tools.cli.common import report_errors
-from tools.cli.main import cli
-from tools.data.errors import InputError
-from tools.measure.benchmark import plant_speed as plant
-from tools.measure.benchmark.registry import MEASURES, Settings, run
-from tools.measure.benchmark.timing import alternate, median, process_seconds, seconds
+from glider.tools.cli.common import report_errors
+from glider.tools.cli.main import cli
+from glider.tools.data.errors import InputError
+from glider.tools.measure.benchmark import plant_speed as plant
+from glider.tools.measure.benchmark.registry import MEASURES, Settings, run
+from glider.tools.measure.benchmark.timing import alternate, median, process_seconds, seconds
 
 needs_cc = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 STEPS = 5000

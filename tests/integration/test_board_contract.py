@@ -9,11 +9,11 @@ import time
 import numpy as np
 import pytest
 
-from hal.board import BoardRequest, board_builder
-from hal.ports import SLOTS, ActuatorPort, Clock, Hardware, SensorPort, Validity, empty_frame
-from hal.recorder.recorder import NullRecorder
-from tools.data.boards import load_board_file
-from tools.data.sources import load_vehicle
+from glider.hal.board import BoardRequest, board_builder
+from glider.hal.ports import SLOTS, ActuatorPort, Clock, Hardware, SensorPort, Validity, empty_frame
+from glider.hal.recorder.recorder import NullRecorder
+from glider.tools.data.boards import load_board_file
+from glider.tools.data.sources import load_vehicle
 
 VEHICLE = load_vehicle("roughie")
 FITTED = ("imu", "beacon", "slider_wire", "plunger_wire")

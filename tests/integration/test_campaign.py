@@ -13,8 +13,8 @@ import pytest
 from support import commands
 from support.dask_cluster import dask_cluster
 
-from tools.study.campaign.conduct import fly_campaign
-from tools.study.campaign.plan import build_plan, load_campaign, with_options
+from glider.tools.study.campaign.conduct import fly_campaign
+from glider.tools.study.campaign.plan import build_plan, load_campaign, with_options
 
 pytestmark = pytest.mark.computes(seconds=20)
 
@@ -34,7 +34,7 @@ def alone(plan):
 
 
 def glider(*arguments, cwd, **options):
-    command = [sys.executable, "-m", "tools.cli.main", "campaign", *arguments]
+    command = [sys.executable, "-m", "glider.tools.cli.main", "campaign", *arguments]
     return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=120, **options)
 
 
@@ -75,7 +75,19 @@ def gone(group, seconds=20.0):
 
 @pytest.mark.parametrize("terminal", [True, False])
 def test_interrupted_and_resumed_is_the_same_as_flown_through(plan, alone, tmp_path, terminal):
-    command = [sys.executable, "-m", "tools.cli.main", "campaign", *SMALL, "--jobs", "2", "--chunk", "2", "--out", "c"]
+    command = [
+        sys.executable,
+        "-m",
+        "glider.tools.cli.main",
+        "campaign",
+        *SMALL,
+        "--jobs",
+        "2",
+        "--chunk",
+        "2",
+        "--out",
+        "c",
+    ]
     process = subprocess.Popen(
         command, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
     )

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from firmware.model.library import shipped
-from tools.cli.common import report_errors
-from tools.cli.main import cli
-from tools.data.runs.case import load_case
-from tools.data.sources import load_vehicle
-from tools.study.challenge.make import Order, make, make_one
-from tools.study.challenge.plan import Counts, plan
-from tools.study.challenge.seal import open_answers
+from glider.firmware.model.library import shipped
+from glider.tools.cli.common import report_errors
+from glider.tools.cli.main import cli
+from glider.tools.data.runs.case import load_case
+from glider.tools.data.sources import load_vehicle
+from glider.tools.study.challenge.make import Order, make, make_one
+from glider.tools.study.challenge.plan import Counts, plan
+from glider.tools.study.challenge.seal import open_answers
 
 pytestmark = pytest.mark.computes(seconds=20)
 

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from tools.cli.common import report_errors
-from tools.cli.main import cli
-from tools.data.runs.case import load_case
-from tools.study.challenge.form_make import FormOrder
-from tools.study.challenge.form_plan import FormCounts
-from tools.study.challenge.make import make
-from tools.study.challenge.seal import open_answers
+from glider.tools.cli.common import report_errors
+from glider.tools.cli.main import cli
+from glider.tools.data.runs.case import load_case
+from glider.tools.study.challenge.form_make import FormOrder
+from glider.tools.study.challenge.form_plan import FormCounts
+from glider.tools.study.challenge.make import make
+from glider.tools.study.challenge.seal import open_answers
 
 pytestmark = pytest.mark.computes(seconds=240)
 

@@ -69,7 +69,7 @@ class Dock:
         return f"{version}-{commit.stdout.strip()}"
 
     def deploy(self, *words: str, cut_after: int = 1 << 60) -> subprocess.CompletedProcess:
-        command = [sys.executable, "-m", "tools.deploy.push", NAME, "--source", self.source]
+        command = [sys.executable, "-m", "glider.tools.deploy.push", NAME, "--source", self.source]
         command += ["--root", f"{self.server.account.home_there}/vehicle", "--python", self.server.account.python_there]
         command += ["--build", self.folder / "build", *words]
         environment = self.server.reached(there=cut_after) | {"PYTHONPATH": str(ROOT), "PIP_NO_COMPILE": "0"}
@@ -177,7 +177,7 @@ def test_a_damaged_release_is_refused(dock, tmp_path):
 @pytest.mark.parametrize("name", ["-oProxyCommand=touch /tmp/x", "", "two words"])
 def test_a_name_that_is_no_host_is_refused(name):
     done = subprocess.run(
-        [sys.executable, "-m", "tools.deploy.push", "--root", "/nowhere", "--", name],
+        [sys.executable, "-m", "glider.tools.deploy.push", "--root", "/nowhere", "--", name],
         capture_output=True, text=True, env={**os.environ, "PYTHONPATH": str(ROOT)},
     )  # fmt: skip
     assert done.returncode == 1

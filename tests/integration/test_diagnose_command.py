@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from support.cases import make_case
 
-from sim_backend.core.effects import effect_layout as ef
-from tools.cli.common import report_errors
-from tools.cli.main import cli
-from tools.data.runs import columns as names
-from tools.gap.measure import run_gap
-from tools.inference.channels import ROUGHIE_MEASURES
-from tools.inference.corrected import LINKS
-from tools.inference.load import load_model
-from tools.inference.predict import predict
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.cli.common import report_errors
+from glider.tools.cli.main import cli
+from glider.tools.data.runs import columns as names
+from glider.tools.gap.measure import run_gap
+from glider.tools.inference.channels import ROUGHIE_MEASURES
+from glider.tools.inference.corrected import LINKS
+from glider.tools.inference.load import load_model
+from glider.tools.inference.predict import predict
 
 pytestmark = pytest.mark.computes(seconds=40)
 

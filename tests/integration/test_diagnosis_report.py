@@ -11,12 +11,12 @@ import pytest
 from support.flights import World, fly_case
 from support.pages import assert_offline
 
-from firmware.core.vehicle import layout
-from tools.cli.common import report_errors
-from tools.cli.main import cli
-from tools.data.runs.case import load_case, write_case
-from tools.inference.corrected import load_corrected
-from tools.inference.model import nominal_model
+from glider.firmware.core.vehicle import layout
+from glider.tools.cli.common import report_errors
+from glider.tools.cli.main import cli
+from glider.tools.data.runs.case import load_case, write_case
+from glider.tools.inference.corrected import load_corrected
+from glider.tools.inference.model import nominal_model
 
 HEAVY = 0.06  # kg, 12 times what [uncertainty] allows for
 PHONE = (390, 844)  # CSS pixels
@@ -63,7 +63,7 @@ def said(folder) -> str:
     """What the command says on standard error; its files lie in `answer` beside the case."""
     with pytest.MonkeyPatch.context() as patch:
         lines: list[str] = []
-        patch.setattr("tools.cli.gap.say", lines.append)
+        patch.setattr("glider.tools.cli.gap.say", lines.append)
         assert glider("gap", "diagnose", folder, "--out", folder.parent / "answer") == 0
     return "\n".join(lines)
 
@@ -117,10 +117,13 @@ def test_a_damaged_diagnosis_is_one_line_and_exit_2(folder, page, tmp_path, caps
 
 
 def test_drawing_a_report_fits_nothing():
-    script = "import sys, tools.report.diagnosis; print(*sys.modules)"
+    script = "import sys, glider.tools.report.diagnosis; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.split()
-    assert "tools.report.words" in loaded
-    fitting = {"tools.inference.fit", *(f"tools.diagnose.{name}" for name in ("search", "verdict", "chain", "shrink"))}
+    assert "glider.tools.report.words" in loaded
+    fitting = {
+        "glider.tools.inference.fit",
+        *(f"glider.tools.diagnose.{name}" for name in ("search", "verdict", "chain", "shrink")),
+    }
     assert not fitting & set(loaded)
 
 

@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 from support.twinned import DIVE, end_guard, flying, guard_pid, twins, until
 
-from hal.heartbeat import Heartbeat
-from hal.outofband.plan import read_plan
-from hal.sortie import State
-from hal.state_file import StateFile
-from tools.bench.boardtext import accepted, set_values
+from glider.hal.heartbeat import Heartbeat
+from glider.hal.outofband.plan import read_plan
+from glider.hal.sortie import SortieState
+from glider.hal.state_file import StateFile
+from glider.tools.bench.boardtext import accepted, set_values
 
 pytestmark = pytest.mark.realtime(seconds=150)
 FLOATS_M = 0.5
@@ -79,7 +79,7 @@ def test_given_up_in_the_first_seconds_a_heavy_vehicle_floats(folder, at):
         assert result["surfaced"]
         assert sea.state()["ballast_kg"] < -0.17
         assert adrift(sea) < FLOATS_M
-        assert StateFile(folder / "state").read().state == State.ENDED
+        assert StateFile(folder / "state").read().state == SortieState.ENDED
 
 
 def test_a_mission_that_completes_heavy_ends_light(folder):
@@ -100,7 +100,7 @@ def test_in_other_weather_surfaced_is_said_at_the_surface(folder):
         assert adrift(sea) < FLOATS_M
         assert measured_surface(folder) == pytest.approx(101_325.0, abs=500.0)
         # A flight that broke off: the next only ascends, and knows the surface from it.
-        StateFile(folder / "state").write(State.DIVING, flight="before")
+        StateFile(folder / "state").write(SortieState.DIVING, flight="before")
         with flying(sea.board, folder / "dip.toml", folder, "--log", str(folder / "second.mcap")) as flight:
             assert flight.wait(120.0) == 1
         assert json.loads((folder / "stdout").read_text())["surfaced"]
@@ -121,13 +121,22 @@ def test_a_wet_hull_and_a_flat_battery_do_not_arm(folder):
             ("battery 10", "battery 15", "battery: 10.0 V, below the vehicle's low_voltage of 12 V"),
         ):
             sea.control(wrong)
-            command = [sys.executable, "-m", "tools.cli.main", "fly", "--board", str(sea.board), "--yes", "--no-log"]
+            command = [
+                sys.executable,
+                "-m",
+                "glider.tools.cli.main",
+                "fly",
+                "--board",
+                str(sea.board),
+                "--yes",
+                "--no-log",
+            ]
             command += ["--vehicle", str(folder / "low.toml"), "--state", str(folder / "state")]
             done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
             assert done.returncode == 1
             assert said in done.stderr
             assert "not armed: " in done.stderr
-            assert StateFile(folder / "state").read().state == State.ASHORE
+            assert StateFile(folder / "state").read().state == SortieState.ASHORE
             sea.control(mend)
 
 
@@ -139,7 +148,7 @@ def slow(fd):
     honest(fd)
 os.fsync = slow
 sys.argv[0] = "glider"
-from tools.cli.main import main
+from glider.tools.cli.main import main
 main()
 """
 
@@ -155,14 +164,14 @@ def test_a_slow_disk_at_the_end_is_waited_for(folder):
             end_guard(folder / "state")
         assert done.returncode in (0, 1), done.stderr  # 1: a busy machine's late ticks; never killed
         assert json.loads(done.stdout)["surfaced"]
-        assert StateFile(folder / "state").read().state in (State.ENDED, State.HELD)
+        assert StateFile(folder / "state").read().state in (SortieState.ENDED, SortieState.HELD)
         assert adrift(sea) < FLOATS_M
 
 
 def test_ctrl_c_in_the_ascent_after_a_fault_leaves_what_a_person_must_look_at(folder):
     state = folder / "state"
     with twins(folder / "t") as sea:
-        StateFile(state).write(State.ABORTED, flight="before", reason="leak")
+        StateFile(state).write(SortieState.ABORTED, flight="before", reason="leak")
         with flying(sea.board, folder / "leg.toml", folder) as flight:
             until(lambda: ticks(folder) > 20 or flight.poll() is not None, 120.0)
             os.kill(flight.pid, signal.SIGINT)
@@ -175,7 +184,7 @@ def test_ctrl_c_in_the_ascent_after_a_fault_leaves_what_a_person_must_look_at(fo
 def test_a_services_watch_that_stops_is_replaced(folder):
     state = folder / "state"
     state.mkdir()
-    command = [sys.executable, "-m", "hal.outofband", "--service", "--run", str(state), "--state", str(state)]
+    command = [sys.executable, "-m", "glider.hal.outofband", "--service", "--run", str(state), "--state", str(state)]
     with twins(folder / "t") as sea, subprocess.Popen(command) as service:
         try:
             with flying(sea.board, folder / "dive.toml", folder) as flight:

@@ -12,8 +12,8 @@ import pytest
 from support.patience import patient_vehicle
 from support.twinned import until
 
-from tools.data.log.parts import FlightLog, read_flight
-from tools.data.log.repair import repair
+from glider.tools.data.log.parts import FlightLog, read_flight
+from glider.tools.data.log.repair import repair
 
 pytestmark = pytest.mark.realtime
 
@@ -24,7 +24,7 @@ def recorders_of(pid):
     for folder in Path("/proc").glob("[0-9]*"):
         try:
             parent = int((folder / "stat").read_text().rsplit(")", 1)[1].split()[1])
-            if parent == pid and b"hal.recorder.writer" in (folder / "cmdline").read_bytes():
+            if parent == pid and b"glider.hal.recorder.writer" in (folder / "cmdline").read_bytes():
                 found.append(int(folder.name))
         except OSError:  # gone meanwhile
             continue
@@ -33,7 +33,16 @@ def recorders_of(pid):
 
 def test_a_recording_process_killed_in_flight_costs_half_a_second_and_no_more(tmp_path):
     first, second = tmp_path / "dive.mcap", tmp_path / "dive-part2.mcap"
-    command = ["-m", "tools.cli.main", "fly", "--realtime", "--log", str(first), "--vehicle", patient_vehicle(tmp_path)]
+    command = [
+        "-m",
+        "glider.tools.cli.main",
+        "fly",
+        "--realtime",
+        "--log",
+        str(first),
+        "--vehicle",
+        patient_vehicle(tmp_path),
+    ]
     flight = subprocess.Popen([sys.executable, *command], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         until(lambda: first.exists() and first.stat().st_size > 60_000, 120.0)

@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 from support.commands import glider
 
-from firmware.core.layouts import supervisor_layout as sup
-from firmware.core.layouts.control_layout import LEG
-from firmware.runtime import Ending
-from hal.recorder.recorder import NullRecorder
-from sim_backend.core.closed_loop import N_END, N_TRACE, fly
-from sim_backend.core.effects import effect_layout as ef
-from sim_backend.fleet import fly_fleet
-from tools.data.log.reader import read_log
-from tools.data.log.rundata import export_case
-from tools.data.runs.case import load_case
-from tools.flight.compose import build_flight, build_runtime, record_specs
-from tools.inference.problem import problem_of
+from glider.firmware.core.layouts import supervisor_layout as sup
+from glider.firmware.core.layouts.control_layout import LEG
+from glider.firmware.runtime import Ending
+from glider.hal.recorder.recorder import NullRecorder
+from glider.sim_backend.core.closed_loop import N_END, N_TRACE, fly
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.sim_backend.fleet import fly_fleet
+from glider.tools.data.log.reader import read_log
+from glider.tools.data.log.rundata import export_case
+from glider.tools.data.runs.case import load_case
+from glider.tools.flight.compose import build_flight, build_runtime, record_specs
+from glider.tools.inference.problem import problem_of
 
 MANY = {
     "command_delay": {"delay": 0.355},
@@ -109,7 +109,7 @@ def test_a_hidden_difference_shows_in_the_flight():
 def typed(tmp_path_factory):
     """A flight as a user types it: its folder, and what it said."""
     folder = tmp_path_factory.mktemp("typed")
-    command = [sys.executable, "-m", "tools.cli.main", "fly", "--mission", "spiral", "--json"]
+    command = [sys.executable, "-m", "glider.tools.cli.main", "fly", "--mission", "spiral", "--json"]
     return folder, subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
 
 

@@ -11,18 +11,18 @@ import pytest
 from support.patience import patient_vehicle
 from support.twinned import until
 
-from firmware.core.layouts import supervisor_layout as sup
-from firmware.faults import Reaction
-from hal.ports import SLOTS
-from hal.recorder.recorder import NullRecorder
-from tools.flight.compose import build_flight, build_runtime, record_specs
+from glider.firmware.core.layouts import supervisor_layout as sup
+from glider.firmware.faults import Reaction
+from glider.hal.ports import SLOTS
+from glider.hal.recorder.recorder import NullRecorder
+from glider.tools.flight.compose import build_flight, build_runtime, record_specs
 
 pytestmark = pytest.mark.realtime
 
 
 def test_ctrl_c_gives_the_dive_up_and_the_log_is_whole(tmp_path):
     flight = subprocess.Popen(
-        [sys.executable, "-m", "tools.cli.main", "fly", "--realtime", "--json", "--vehicle", patient_vehicle(tmp_path)],
+        [sys.executable, "-m", "glider.tools.cli.main", "fly", "--realtime", "--json", "--vehicle", patient_vehicle(tmp_path)],
         cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ},
     )  # fmt: skip
     log = tmp_path / "sawtooth-001.mcap"

@@ -6,9 +6,9 @@ import pytest
 from support.logs import DIP
 from support.patience import patient_vehicle
 
-from tools.data.log.reader import read_log
-from tools.data.log.rundata import export_case
-from tools.measure.figures.devices import ATTITUDE_LIMIT_DEG, POSITION_LIMIT_M, compare_flights
+from glider.tools.data.log.reader import read_log
+from glider.tools.data.log.rundata import export_case
+from glider.tools.measure.figures.devices import ATTITUDE_LIMIT_DEG, POSITION_LIMIT_M, compare_flights
 
 pytestmark = pytest.mark.realtime
 
@@ -43,10 +43,10 @@ def test_a_tick_on_devices_gains_no_memory():
     """Over a thousand ticks on the twin the interpreter's blocks do not grow; reads and commands make nothing."""
     import tracemalloc
 
-    from hal.board import BoardRequest, board_builder
-    from hal.ports import SLOTS, empty_frame
-    from tools.data.boards import load_board_file
-    from tools.data.sources import load_vehicle
+    from glider.hal.board import BoardRequest, board_builder
+    from glider.hal.ports import SLOTS, empty_frame
+    from glider.tools.data.boards import load_board_file
+    from glider.tools.data.sources import load_vehicle
 
     file = load_board_file("twin")
     board = board_builder("twin")(BoardRequest(text=file.text, source=file.source, vehicle=load_vehicle("roughie")))
@@ -89,7 +89,7 @@ def test_a_board_that_does_not_arm_says_why_in_a_line_and_leaves_no_log(tmp_path
     """The example is nobody's vehicle: nobody has looked its calibration through."""
     import subprocess
 
-    command = [sys.executable, "-m", "tools.cli.main", "fly", "--board", "roughie", "--yes"]
+    command = [sys.executable, "-m", "glider.tools.cli.main", "fly", "--board", "roughie", "--yes"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
     assert done.returncode == 1
     assert "not armed: roughie (shipped): never calibrated" in done.stderr

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from firmware.model.vehicle import COEFFICIENTS, decode_vehicle
-from tools.cli.identify import identify
-from tools.data.runs import columns as names
-from tools.data.runs.case import load_case, write_case
-from tools.data.sources import load_vehicle
-from tools.identify.design import CAPTURE, make_runs
-from tools.inference.vehicle_parameters import coefficient_sizes
+from glider.firmware.model.vehicle import COEFFICIENTS, decode_vehicle
+from glider.tools.cli.identify import identify
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.case import load_case, write_case
+from glider.tools.data.sources import load_vehicle
+from glider.tools.identify.design import CAPTURE, make_runs
+from glider.tools.inference.vehicle_parameters import coefficient_sizes
 
 pytestmark = pytest.mark.computes(seconds=20)
 
@@ -89,7 +89,7 @@ def test_files_are_there_and_others_read_them(found):
 
 
 def test_a_case_of_nothing_but_bad_runs_is_one_line(tmp_path):
-    from tools.data.errors import InputError
+    from glider.tools.data.errors import InputError
 
     runs, _ = make_runs(load_vehicle("roughie"), 6, [0, 6])
     bad = [
@@ -104,7 +104,7 @@ def test_a_case_of_nothing_but_bad_runs_is_one_line(tmp_path):
 
 
 def test_where_no_fit_is_better_the_file_s_vehicle_is_handed_out(tmp_path, monkeypatch):
-    from tools.identify import held
+    from glider.tools.identify import held
 
     runs, _ = make_runs(load_vehicle("roughie"), 6, [0, 12, 24, 37])
     write_case(tmp_path / "case", runs, **ABOUT)

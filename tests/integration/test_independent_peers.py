@@ -13,15 +13,15 @@ from pymodbus.client import ModbusSerialClient
 from pymodbus.server import ModbusSerialServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
-from hal.boardfile import BeaconTable, DriveTable, WireTable
-from hal.drivers.drive import Drive
-from hal.drivers.modbus_sensors import AnalogModule, Beacon, wire
-from hal.ports import Validity
-from hal.protocols.modbus_master import ModbusBus
-from hal.protocols.registers import preset
-from hal.transport.hub import Hub, Link
-from hal.transport.port import SerialPort
-from sim_backend.twins.line import open_pty
+from glider.hal.boardfile import BeaconTable, DriveTable, WireTable
+from glider.hal.drivers.drive import Drive
+from glider.hal.drivers.modbus_sensors import AnalogModule, Beacon, wire
+from glider.hal.ports import Validity
+from glider.hal.protocols.modbus_master import ModbusBus
+from glider.hal.protocols.registers import preset
+from glider.hal.transport.hub import Hub, SerialLink
+from glider.hal.transport.port import SerialPort
+from glider.sim_backend.twins.line import open_pty
 from tests.support.twinned import until
 
 
@@ -30,7 +30,7 @@ from tests.support.twinned import until
 def ports(tmp_path_factory):
     """`glider twin`, running."""
     folder = tmp_path_factory.mktemp("twins")
-    command = [sys.executable, "-m", "tools.cli.main", "twin", "--dir", str(folder), "--stand"]
+    command = [sys.executable, "-m", "glider.tools.cli.main", "twin", "--dir", str(folder), "--stand"]
     process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     for line in process.stderr:
         if b"are there" in line:
@@ -157,7 +157,7 @@ def test_our_drivers_read_and_move_what_a_plain_server_has():
         drive.join(bus)
         drive.enabled = True
         drive.command(0.03)
-        link = Link("p", SerialPort(server.path, 115_200), bus)
+        link = SerialLink("p", SerialPort(server.path, 115_200), bus)
         link.open(time.monotonic())
         hub = Hub([link], time.monotonic)
         hub.serve(time.monotonic() + 1.0)

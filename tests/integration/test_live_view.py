@@ -15,11 +15,11 @@ import pytest
 from support.sshd import NAME, sshd
 from support.twinned import until
 
-from hal.recorder import onlookers
-from hal.recorder.recorder import Recorder
-from hal.recorder.schema import Field, RecordSpec
-from tools.data.log.reader import read_log
-from tools.flight.live_view import VIEW, Line, layout
+from glider.hal.recorder import live_stream
+from glider.hal.recorder.recorder import Recorder
+from glider.hal.recorder.schema import Field, RecordSpec
+from glider.tools.data.log.reader import read_log
+from glider.tools.flight.live_view import VIEW, LogLine, layout
 
 pytestmark = pytest.mark.realtime(seconds=30)
 SPEC = RecordSpec("/tick", "glider/msg/Tick", tuple(Field(f"x{i}", "1") for i in range(60)))
@@ -27,7 +27,7 @@ SPEC = RecordSpec("/tick", "glider/msg/Tick", tuple(Field(f"x{i}", "1") for i in
 
 @pytest.fixture
 def recorder(tmp_path):
-    with Recorder(tmp_path / "a.mcap", (SPEC,), metadata={"mission": "m"}, onlookers=tmp_path / "live") as found:
+    with Recorder(tmp_path / "a.mcap", (SPEC,), metadata={"mission": "m"}, live_stream=tmp_path / "live") as found:
         yield found
 
 
@@ -39,7 +39,7 @@ def write(recorder, count, t=0.0):
 
 
 def test_an_onlooker_gets_ten_a_second_and_all_events_and_the_log_is_whole(recorder, tmp_path):
-    line = Line(tmp_path / "live")
+    line = LogLine(tmp_path / "live")
     assert line.metadata["mission"] == "m"
     records = line.records()
     time.sleep(0.2)
@@ -56,7 +56,7 @@ def test_an_onlooker_gets_ten_a_second_and_all_events_and_the_log_is_whole(recor
 
 def test_one_who_does_not_read_and_one_too_many_hold_up_nobody(recorder, tmp_path):
     deaf = []
-    for _ in range(onlookers.MOST + 1):
+    for _ in range(live_stream.MAX_CONNECTIONS + 1):
         line = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         line.connect(str(tmp_path / "live"))
         deaf.append(line)
@@ -82,7 +82,7 @@ def test_without_being_asked_for_there_is_no_socket(tmp_path):
 
 
 def test_a_place_where_no_socket_can_be_costs_the_view_alone(tmp_path, capfd):
-    with Recorder(tmp_path / "a.mcap", (SPEC,), onlookers=tmp_path / "nowhere" / "live") as recorder:
+    with Recorder(tmp_path / "a.mcap", (SPEC,), live_stream=tmp_path / "nowhere" / "live") as recorder:
         write(recorder, 10)
         assert recorder.close().complete
     assert "no live view" in capfd.readouterr().err
@@ -102,8 +102,9 @@ def test_the_layout_shows_topics_that_are_there():
 def test_a_flight_on_twins_is_seen_by_the_protocols_own_client_over_ssh(tmp_path):
     (tmp_path / "keys").mkdir()
     with sshd(tmp_path / "keys") as server, contextlib.ExitStack() as ends:
+
         def start(*words, **more):
-            command = [sys.executable, "-m", "tools.cli.main", *words]
+            command = [sys.executable, "-m", "glider.tools.cli.main", *words]
             process = ends.enter_context(subprocess.Popen(command, text=True, **more))
             ends.callback(process.kill)
             return process

@@ -35,7 +35,7 @@ def aboard(tmp_path):
 @pytest.fixture
 def fetch(server, aboard, tmp_path):
     def call(*words, **cable):
-        command = [sys.executable, "-m", "tools.cli.main", "log", "fetch", NAME, *words]
+        command = [sys.executable, "-m", "glider.tools.cli.main", "log", "fetch", NAME, *words]
         command += ["--dir", aboard, "--out", tmp_path / "here", "--json"]
         environment = server.reached(**cable) | {"PYTHONPATH": str(ROOT)}
         done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120)

@@ -13,9 +13,9 @@ import pytest
 from support.cases import make_case
 from support.dask_cluster import dask_cluster
 
-from sim_backend.core.effects import effect_layout as ef
-from tools.study.challenge.diagnose_all import run
-from tools.study.challenge.diagnosis import TIMING
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.study.challenge.diagnose_all import run
+from glider.tools.study.challenge.diagnosis import TIMING
 
 pytestmark = pytest.mark.computes(seconds=25)
 

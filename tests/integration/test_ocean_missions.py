@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from tools.data.runs.case import Case, load_case
-from tools.identify.ocean.files import VEHICLE, write
-from tools.identify.ocean.identify import OceanIdentification, identify_ocean
-from tools.watch.answer import Watch
-from tools.watch.watch import watch
+from glider.tools.data.runs.case import Case, load_case
+from glider.tools.identify.ocean.files import VEHICLE, write
+from glider.tools.identify.ocean.identify import OceanIdentification, identify_ocean
+from glider.tools.watch.answer import WatchAnswer
+from glider.tools.watch.watch import watch
 
 pytestmark = pytest.mark.computes(seconds=25)
 
@@ -18,7 +18,7 @@ FIRST = "run015"  # from which on the roll trim is another
 MOST_RUNS = 24  # of a mission: the step, and half as many runs again behind it
 
 
-def judged(shared: Path, name: str, out: Path) -> tuple[OceanIdentification, Watch, Case]:
+def judged(shared: Path, name: str, out: Path) -> tuple[OceanIdentification, WatchAnswer, Case]:
     """A case identified and watched with the vehicle that was found."""
     folder = shared / "data" / "ocean" / name
     if not folder.is_dir():
@@ -66,6 +66,6 @@ def test_nothing_else_is_called(slocum, seaglider):
     other = [run for run in found.runs if {cause.label for cause in run.causes if cause.probability > 0.1}
              - {"roll_trim"}]  # fmt: skip
     assert len({run.run for run in [*called, *other]}) <= 0.02 * len(found.runs)
-    _, quiet, _ = seaglider
-    assert quiet.events == []
-    assert [run.verdict for run in quiet.runs] == ["none"] * len(quiet.runs)
+    _, muted, _ = seaglider
+    assert muted.events == []
+    assert [run.verdict for run in muted.runs] == ["none"] * len(muted.runs)

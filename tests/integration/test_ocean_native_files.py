@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from glider.tools.data.runs.run import load_run
 from tests.support.commands import glider
-from tools.data.runs.run import load_run
 
 # Half the last digit that those runs are written with, and one count of a digit that was rounded twice.
 TOLERANCES = {

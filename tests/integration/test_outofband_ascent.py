@@ -9,11 +9,11 @@ import sys
 import pytest
 from support.twinned import DIVE, flying, guard_pid, twins, until
 
-from hal.heartbeat import Guard, Heartbeat
-from hal.outofband.plan import read_plan
-from hal.sortie import State
-from hal.state_file import StateFile
-from tools.data.log.reader import read_log
+from glider.hal.heartbeat import Guard, Heartbeat
+from glider.hal.outofband.plan import read_plan
+from glider.hal.sortie import SortieState
+from glider.hal.state_file import StateFile
+from glider.tools.data.log.reader import read_log
 
 pytestmark = pytest.mark.realtime(seconds=120)
 DEEP_M = 0.8
@@ -29,12 +29,12 @@ def sea(tmp_path):
 def dive(sea, tmp_path, flight):
     """Arm, and be well under water; time enough for a busy machine."""
     until(lambda: sea.state()["z_m"] > DEEP_M or flight.poll() is not None, 300.0, every=0.1)
-    assert StateFile(tmp_path / "state").read().state == State.DIVING
+    assert StateFile(tmp_path / "state").read().state == SortieState.DIVING
 
 
 def comes_up(sea, tmp_path, began):
     """By the pump, at its light end; the state says so."""
-    until(lambda: StateFile(tmp_path / "state").read().state == State.ABORTED, 4.0)
+    until(lambda: StateFile(tmp_path / "state").read().state == SortieState.ABORTED, 4.0)
     until(lambda: sea.state()["z_m"] < 0.3, 120.0, every=0.1)
     pump = read_plan(tmp_path / "state" / "outofband.json").axes[0]
     until(lambda: abs(sea.state()["ballast_kg"] - pump.end_m * began["kg_per_m"]) < 0.01, 30.0)
@@ -65,7 +65,7 @@ def test_a_flight_that_is_killed_is_brought_up_and_not_resumed(sea, tmp_path):
     assert not result["completed"]
     assert "given up, and not known to have surfaced" in result["reason"]
     assert set(read_log(tmp_path / "second.mcap").topics["/tick"].column("mode")) == {3.0}
-    assert StateFile(tmp_path / "state").read().state == State.HELD
+    assert StateFile(tmp_path / "state").read().state == SortieState.HELD
     with flying(sea.board, tmp_path / "dive.toml", tmp_path, "--log", str(tmp_path / "third.mcap")) as flight:
         assert flight.wait(60.0) == 1
     said = (tmp_path / "stderr").read_text()
@@ -92,7 +92,7 @@ def test_with_the_watch_killed_too_the_next_service_brings_it_up(sea, tmp_path):
         flight.kill()
         flight.wait()
     sea.control("alarm ballast 3")  # and the pump's drive has stopped with an alarm
-    command = [sys.executable, "-m", "hal.outofband", "--service", "--run", str(tmp_path / "run")]
+    command = [sys.executable, "-m", "glider.hal.outofband", "--service", "--run", str(tmp_path / "run")]
     (tmp_path / "run").mkdir()
     with subprocess.Popen([*command, "--state", str(tmp_path / "state")]) as service:
         try:
@@ -106,7 +106,7 @@ def test_a_second_flight_is_refused_and_an_orderly_end_leaves_nobody_watching(se
     with flying(sea.board, tmp_path / "dive.toml", tmp_path) as flight:
         dive(sea, tmp_path, flight)
         guard = guard_pid(tmp_path / "state")
-        command = [sys.executable, "-m", "tools.cli.main", "fly", "--board", str(sea.board), "--no-log"]
+        command = [sys.executable, "-m", "glider.tools.cli.main", "fly", "--board", str(sea.board), "--no-log"]
         command += ["--vehicle", str(tmp_path / "patient.toml")]
         done = subprocess.run(
             [*command, "--state", str(tmp_path / "state"), "--acknowledge"], capture_output=True, text=True, timeout=60
@@ -117,14 +117,14 @@ def test_a_second_flight_is_refused_and_an_orderly_end_leaves_nobody_watching(se
         flight.send_signal(signal.SIGINT)  # given up by a person
         assert flight.wait(180.0) == 1
         until(lambda: not os.path.exists(f"/proc/{guard}"), 10.0)
-    assert Heartbeat.open(tmp_path / "state").look().state == State.ENDED
-    assert StateFile(tmp_path / "state").read().state == State.ENDED
+    assert Heartbeat.open(tmp_path / "state").look().state == SortieState.ENDED
+    assert StateFile(tmp_path / "state").read().state == SortieState.ENDED
     assert sea.state()["z_m"] < 0.35
 
 
 def _kg_per_m():
-    from firmware.core.vehicle.seawater import water_density
-    from tools.data.sources import load_vehicle
+    from glider.firmware.core.vehicle.seawater import water_density
+    from glider.tools.data.sources import load_vehicle
 
     return float(water_density(0.0, 20.0, 0.0)) * load_vehicle("roughie").actuators.ballast.plunger_area
 

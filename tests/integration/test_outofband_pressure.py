@@ -11,14 +11,14 @@ import msgspec
 import pytest
 from support.twinned import twins, until
 
-from hal.board import BoardRequest, board_builder
-from hal.heartbeat import Heartbeat
-from hal.outofband.plan import NAME, write_plan
-from hal.sortie import State
-from hal.state_file import StateFile
-from tools.data.sources import load_vehicle
-from tools.flight.ascent_plan import make_plan
-from tools.flight.status import snapshot
+from glider.hal.board import BoardRequest, board_builder
+from glider.hal.heartbeat import Heartbeat
+from glider.hal.outofband.plan import NAME, write_plan
+from glider.hal.sortie import SortieState
+from glider.hal.state_file import StateFile
+from glider.tools.data.sources import load_vehicle
+from glider.tools.flight.ascent_plan import make_plan
+from glider.tools.flight.status import snapshot
 
 pytestmark = pytest.mark.realtime(seconds=60)
 PATIENCE_S = 4.0
@@ -42,9 +42,9 @@ def brought_up(sea, folder):
     (folder / "watchdog").touch()
     plan = make_plan(board, flight="dive", settings=settings, water_density=1000.0, watchdog=str(folder / "watchdog"))
     write_plan(folder / NAME, plan)
-    StateFile(folder).write(State.DIVING, flight="dive")
+    StateFile(folder).write(SortieState.DIVING, flight="dive")
     Heartbeat.create(folder, 0.02, "dive").close()  # the flight that is gone
-    command = [sys.executable, "-m", "hal.outofband", "--service", "--run", str(folder), "--state", str(folder)]
+    command = [sys.executable, "-m", "glider.hal.outofband", "--service", "--run", str(folder), "--state", str(folder)]
     with (folder / "said").open("w") as file, subprocess.Popen(command, stderr=file) as process:
         try:
             yield lambda: (folder / "said").read_text()

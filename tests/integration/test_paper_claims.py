@@ -4,20 +4,20 @@ import msgspec
 import numpy as np
 import pytest
 
-from firmware.autopilot import configuration
-from firmware.core.layouts import control_layout as ctl
-from firmware.guidance.mission import decode_mission
-from firmware.model.gains import Control, Law
-from firmware.model.library import shipped
-from tools.data.sources import load_vehicle
-from tools.study.campaign.fingerprint import fingerprint
-from tools.study.campaign.flights import COLUMNS, TUMBLED, Job, cut, fly_chunk
-from tools.study.campaign.plan import build_plan, load_campaign
-from tools.study.reproduce import tracking
-from tools.study.reproduce.design import Variant, fly_design
+from glider.firmware.autopilot import configuration
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.guidance.mission import decode_mission
+from glider.firmware.model.gains import Control, Law
+from glider.firmware.model.library import shipped
+from glider.tools.data.sources import load_vehicle
+from glider.tools.study.campaign.fingerprint import fingerprint
+from glider.tools.study.campaign.flights import COLUMNS, TUMBLED, FlightJob, cut, fly_chunk
+from glider.tools.study.campaign.plan import build_plan, load_campaign
+from glider.tools.study.reproduce import tracking
+from glider.tools.study.reproduce.design import Variant, fly_design
 
 VEHICLE = load_vehicle("roughie")
-NOISE = tracking.ROUGH * VEHICLE.disturbance.linear
+NOISE = tracking.PAPER_DISTURBANCE_SCALE * VEHICLE.disturbance.linear
 SEEDS = range(100, 106)
 
 
@@ -81,7 +81,7 @@ def test_no_flight_tumbles_in_rough_water(controller):
     """Parameters at three times [uncertainty], currents, waves and biases: the worlds of the robustness campaign."""
     campaign, base = load_campaign("robustness")
     plan = build_plan(msgspec.structs.replace(campaign, controllers=[controller], seeds=5, first_seed=900), base)
-    job = Job(plan, fingerprint(plan))
+    job = FlightJob(plan, fingerprint(plan))
     rows = np.concatenate([fly_chunk(job, chunk) for chunk in cut(plan)])
     assert not (rows[:, COLUMNS.index("ended")] == TUMBLED).any()
     assert rows[:, COLUMNS.index("within_limits")].mean() >= 0.9

@@ -5,19 +5,19 @@ import time
 import pytest
 from pymodbus.simulator import SimDevice
 
-from hal.board import BoardRequest, board_builder
-from hal.boardfile import BeaconTable, calibration_hash
-from hal.drivers.modbus_sensors import Beacon
-from hal.ports import Validity
-from hal.protocols.modbus_master import ModbusBus
-from hal.protocols.registers import preset
-from hal.strict import ConfigError
-from hal.transport.hub import Hub, Link
-from hal.transport.port import SerialPort
-from sim_backend.twins.boardfile import decode_twin_file
+from glider.hal.board import BoardRequest, board_builder
+from glider.hal.boardfile import BeaconTable, calibration_hash
+from glider.hal.drivers.modbus_sensors import Beacon
+from glider.hal.ports import Validity
+from glider.hal.protocols.modbus_master import ModbusBus
+from glider.hal.protocols.registers import preset
+from glider.hal.strict import ConfigError
+from glider.hal.transport.hub import Hub, SerialLink
+from glider.hal.transport.port import SerialPort
+from glider.sim_backend.twins.boardfile import decode_twin_file
+from glider.tools.data.boards import load_board_file
+from glider.tools.data.sources import load_vehicle
 from tests.integration.test_independent_peers import PlainServer, registers
-from tools.data.boards import load_board_file
-from tools.data.sources import load_vehicle
 
 pytestmark = pytest.mark.realtime
 
@@ -50,7 +50,7 @@ def transmitter(tmp_path):
 
 
 def served(server, bus):
-    link = Link("p", SerialPort(server.path, 115_200), bus)
+    link = SerialLink("p", SerialPort(server.path, 115_200), bus)
     link.open(time.monotonic())
     Hub([link], time.monotonic).serve(time.monotonic() + 1.0)
     link.port.close()

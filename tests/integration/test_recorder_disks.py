@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tools.data.log.reader import read_log
+from glider.tools.data.log.reader import read_log
 
 pytestmark = pytest.mark.realtime(seconds=30)
 
@@ -19,9 +19,9 @@ HEAD = """
 import fcntl, json, os, struct, subprocess, sys, time
 from pathlib import Path
 import numpy as np
-from hal.recorder.condition import Level
-from hal.recorder.recorder import Recorder
-from hal.recorder.schema import Field, RecordSpec
+from glider.hal.recorder.condition import Level
+from glider.hal.recorder.recorder import Recorder
+from glider.hal.recorder.schema import Field, RecordSpec
 
 TICK = RecordSpec("/tick", "glider/msg/Tick", (Field("n", "1"), Field("filling", "1", "", 200)))
 place = Path(sys.argv[1])
@@ -176,7 +176,7 @@ def test_a_flight_goes_on_to_its_end_over_a_full_disk(tmp_path):
     """`glider fly` in simulation, a megabyte for its log of seven."""
     scenario = """
 mount("-t", "tmpfs", "-o", "size=1m", "none")
-from tools.cli.main import main
+from glider.tools.cli.main import main
 sys.argv = ["glider", "fly", "--json", "--log", str(place / "x.mcap")]
 try:
     main()

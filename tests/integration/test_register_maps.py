@@ -10,14 +10,14 @@ from pymodbus.client import ModbusSerialClient
 from pymodbus.simulator import SimDevice
 from support.twinned import twins, until
 
-from hal.board import BoardRequest, board_builder
-from hal.outofband.ascent import Ascent
-from hal.outofband.plan import NAME, read_plan, write_plan
+from glider.hal.board import BoardRequest, board_builder
+from glider.hal.outofband.ascent import Ascent
+from glider.hal.outofband.plan import NAME, read_plan, write_plan
+from glider.tools.data.sources import load_vehicle
+from glider.tools.flight.ascent_plan import make_plan
 from tests.integration.test_independent_peers import PlainServer, registers
 from tests.integration.test_outofband_pressure import brought_up, under_water
 from tests.support.register_maps import board_text, write_maps
-from tools.data.sources import load_vehicle
-from tools.flight.ascent_plan import make_plan
 
 pytestmark = pytest.mark.realtime(seconds=60)
 VEHICLE = load_vehicle("roughie")

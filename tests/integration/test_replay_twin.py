@@ -8,10 +8,10 @@ from support.commands import glider
 from support.logs import DIP
 from support.patience import patient_vehicle
 
-from hal.ports import BoardError
-from tools.data.log.reader import read_log
-from tools.flight import sortie
-from tools.flight.compose import build_flight, build_recorder
+from glider.hal.ports import BoardError
+from glider.tools.data.log.reader import read_log
+from glider.tools.flight import sortie
+from glider.tools.flight.compose import build_flight, build_recorder
 
 pytestmark = pytest.mark.realtime
 
@@ -27,7 +27,7 @@ def fly(folder, on_second=None):
         make_recorder = functools.partial(build_recorder, flight, log)
         second = None if on_second is None else functools.partial(on_second, flight)
         try:
-            sortie.fly(flight, sortie.Host(flight, name="dip"), make_recorder, on_second=second)
+            sortie.fly(flight, sortie.FlightHost(flight, name="dip"), make_recorder, on_second=second)
             break
         except BoardError:
             if attempt == TRIES - 1:

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from support.commands import glider
 
-from tools.cli.common import report_errors
-from tools.cli.main import cli
-from tools.study.simulate import COLUMNS
+from glider.tools.cli.common import report_errors
+from glider.tools.cli.main import cli
+from glider.tools.flight.simulate import COLUMNS
 
 FLIGHT = Path(__file__).resolve().parents[1] / "data" / "reference" / "down_and_up.csv"
 HEADER = ",".join(COLUMNS)

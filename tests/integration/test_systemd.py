@@ -16,7 +16,7 @@ from support.patience import patient_vehicle
 from support.twinned import DIVE
 from support.vessel import RELEASE, vessel
 
-from tools.data.remote import file_digest
+from glider.tools.data.remote import file_digest
 
 pytestmark = pytest.mark.realtime(seconds=150)
 OUT_OF_BAND, FLIGHT = "glider-outofband.service", "glider-flight@dive.service"
@@ -152,7 +152,7 @@ def test_a_release_whose_service_does_not_start_is_taken_back(sea):
     shutil.copytree(root / "opt/glider/releases" / RELEASE, bad)
     unit = bad / "units" / OUT_OF_BAND
     text = unit.read_text()
-    unit.write_text(text.replace("-m hal.outofband", "-m hal.nothing"))
+    unit.write_text(text.replace("-m glider.hal.outofband", "-m glider.hal.nothing"))
     assert unit.read_text() != text
     shutil.copytree(root / "root/bundle", bundle)
     (bundle / "RELEASE").write_text((bundle / "RELEASE").read_text().replace(RELEASE, "0.1-bad"))

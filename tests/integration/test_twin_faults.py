@@ -4,11 +4,11 @@ import time
 
 import pytest
 
-from hal.board import BoardRequest, board_builder
-from hal.drivers.samples import Sensor
-from hal.ports import BoardError, Validity
-from tools.data.boards import load_board_file
-from tools.data.sources import load_vehicle
+from glider.hal.board import BoardRequest, board_builder
+from glider.hal.drivers.samples import Sensor
+from glider.hal.ports import BoardError, Validity
+from glider.tools.data.boards import load_board_file
+from glider.tools.data.sources import load_vehicle
 
 pytestmark = pytest.mark.realtime
 
@@ -151,7 +151,7 @@ def test_leak_and_battery(board):
 
 
 def test_a_port_has_one_owner(board):
-    from hal.transport.port import Busy, SerialPort
+    from glider.hal.transport.port import Busy, SerialPort
 
     path = board.links["imu"].port.path
     with pytest.raises(Busy, match="held by another program"):
@@ -174,7 +174,7 @@ def test_a_board_with_a_silent_device_does_not_open_and_says_which(monkeypatch):
         broken.control("fault beacon silent")
 
     monkeypatch.setattr(broken, "connect", connect_and_break)
-    monkeypatch.setattr("hal.devices.FIRST_ANSWER_S", 0.5)
+    monkeypatch.setattr("glider.hal.devices.FIRST_ANSWER_S", 0.5)
     with pytest.raises(BoardError, match=r"^beacon \(keller-33x, port sensors, id 1\): does not answer$"):
         broken.open()
 

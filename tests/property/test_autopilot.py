@@ -5,15 +5,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firmware.autopilot import Autopilot, configuration
-from firmware.core.control.controller_rows import CONTROLLERS
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.vehicle import layout
-from firmware.guidance.mission import decode_mission
-from firmware.model.library import shipped
-from hal.ports import BEACON, FRAME_SIZE, IMU, PLUNGER_WIRE, SLIDER_WIRE
+from glider.firmware.autopilot import Autopilot, configuration
+from glider.firmware.core.control.controller_rows import CONTROLLERS
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.vehicle import layout
+from glider.firmware.guidance.mission import decode_mission
+from glider.firmware.model.library import shipped
+from glider.hal.ports import BEACON, FRAME_SIZE, IMU, PLUNGER_WIRE, SLIDER_WIRE
+from glider.tools.data.sources import load_mission, load_vehicle
 from tests.support.examples import examples
-from tools.data.sources import load_mission, load_vehicle
 
 VEHICLE = load_vehicle("roughie")
 PERIODS = {"imu": 0.02, "beacon": 0.04, "wires": 0.04}

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from hal.protocols import modbus, vn100
-from hal.protocols.registers import CODES, from_registers, to_registers
+from glider.hal.protocols import modbus, vn100
+from glider.hal.protocols.registers import CODES, from_registers, to_registers
+from glider.tools.study.faults.damaged_streams import codecs, run_codec
 from tests.support.examples import examples
-from tools.study.faults.damaged_streams import codecs, run_codec
 
 CODECS = {codec.name: codec for codec in codecs()}
 FRAMED = [name for name in CODECS if name != "maestro replies"]  # which have no frames to find

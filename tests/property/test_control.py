@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firmware.core.control.control import pid, reference_step, roll_law
-from firmware.core.vehicle.actuators import limited
+from glider.firmware.core.control.control import pid, reference_step, roll_law
+from glider.firmware.core.vehicle.actuators import limited
 from tests.support.examples import examples
 
 anything = st.floats(allow_nan=True, allow_infinity=True, width=64)

@@ -8,15 +8,15 @@ from hypothesis import strategies as st
 from model_states import P as VEHICLE
 from model_states import actuators, states, vehicles
 
-from firmware.core.maths.rotations import quaternion_from_euler
-from firmware.core.maths.steps import RK4
-from firmware.core.vehicle import layout
-from sim_backend.core import layout as wl
-from sim_backend.core.effect_plant import effect_parts, effect_step, effective_parameters
-from sim_backend.core.effects import effect_layout as ef
-from sim_backend.core.effects.actuation import backlash
-from sim_backend.core.effects.catalogue import catalogue
-from sim_backend.core.plant import plant_step
+from glider.firmware.core.maths.rotations import quaternion_from_euler
+from glider.firmware.core.maths.steps import RK4
+from glider.firmware.core.vehicle import layout
+from glider.sim_backend.core import layout as wl
+from glider.sim_backend.core.effect_plant import effect_parts, effect_step, effective_parameters
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.sim_backend.core.effects.actuation import backlash
+from glider.sim_backend.core.effects.catalogue import catalogue
+from glider.sim_backend.core.plant import plant_step
 from tests.support.examples import examples
 
 NO_WAVES = np.zeros((0, wl.N_WAVE))

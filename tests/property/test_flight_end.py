@@ -5,15 +5,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firmware.core.layouts import supervisor_layout as sup
-from firmware.core.vehicle.layout import NET_MASS
-from firmware.faults import Reaction
+from glider.firmware.core.layouts import supervisor_layout as sup
+from glider.firmware.core.vehicle.layout import NET_MASS
+from glider.firmware.faults import Reaction
+from glider.tools.data.sources import load_vehicle
+from glider.tools.flight.compose import build_flight
+from glider.tools.study.faults.cases import FaultCase
+from glider.tools.study.faults.flights import flown
+from glider.tools.study.faults.scene import SURFACED_M, fly, set_scene
 from tests.support.examples import examples
-from tools.data.sources import load_vehicle
-from tools.flight.compose import build_flight
-from tools.study.faults.cases import Case
-from tools.study.faults.flights import flown
-from tools.study.faults.scene import SURFACED_M, fly, set_scene
 
 pytestmark = pytest.mark.computes(seconds=65)
 
@@ -27,12 +27,12 @@ def operator(scene):
 
 
 ABORTS = [
-    Case(sup.FAULT_EXCEPTION, "operator", operator, Reaction.NOTHING, 0.0),
+    FaultCase(sup.FAULT_EXCEPTION, "operator", operator, Reaction.NOTHING, 0.0),
     *[case for case in flown() if case.expected >= Reaction.ABORT],
 ]
 
 
-def depth_after(mission: str, case: Case, tick: int, sigmas: float) -> float:
+def depth_after(mission: str, case: FaultCase, tick: int, sigmas: float) -> float:
     """Depth of the plant (m) five minutes after the end of a flight that a case befell at a tick."""
     flight = build_flight(mission=mission, effects=case.setting.effects)
     scene = set_scene(flight, "", case.begin, case.setting, at_s=tick / flight.board.loop_hz)

@@ -5,11 +5,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.flights import World, case_of, fly
 
+from glider.tools.data.runs.run import Run
+from glider.tools.inference.channels import ROUGHIE_MEASURES
+from glider.tools.inference.model import nominal_model
+from glider.tools.inference.predict import predict
 from tests.support.examples import examples
-from tools.data.runs.run import Run
-from tools.inference.channels import ROUGHIE_MEASURES
-from tools.inference.model import nominal_model
-from tools.inference.predict import predict
 
 FLIGHTS = {mocap: fly(World(mocap=mocap), 5).run for mocap in (False, True)}
 PREDICTIONS = {}

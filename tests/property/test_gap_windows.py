@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+from glider.tools.inference.channels import ROUGHIE_MEASURES
 from tests.support.examples import examples
-from tools.inference.channels import ROUGHIE_MEASURES
 
 START, WINDOW = ROUGHIE_MEASURES.look_in, ROUGHIE_MEASURES.window
 

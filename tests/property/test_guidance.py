@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from firmware.core.layouts import control_layout as ctl
-from firmware.guidance.mission import decode_mission
-from sim_backend.core.closed_loop import N_END, N_TRACE, fly
-from tools.flight.compose import build_flight
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.guidance.mission import decode_mission
+from glider.sim_backend.core.closed_loop import N_END, N_TRACE, fly
+from glider.tools.flight.compose import build_flight
 
 HEAD = 'format = 1\nname = "m"\ntime_limit_s = 600.0\n[site]\nname = "deep"\ndepth_m = 60.0\n'
 ENTRY = "[[leg]]\nduration_s = 25.0\npitch_deg = {pitch}\nballast_kg = {ballast}\n"

@@ -8,10 +8,10 @@ from independent.nominal import Glider
 from model_states import P, state
 from scipy.spatial.transform import Rotation
 
-from firmware.core.maths.rotations import euler_from_quaternion
-from firmware.core.maths.steps import MIDPOINT, RK4, end_stage
-from firmware.core.vehicle import layout
-from firmware.core.vehicle.flight import nominal_run, nominal_step
+from glider.firmware.core.maths.rotations import euler_from_quaternion
+from glider.firmware.core.maths.steps import MIDPOINT, RK4, end_stage
+from glider.firmware.core.vehicle import layout
+from glider.firmware.core.vehicle.flight import nominal_run, nominal_step
 
 
 def flown(x: np.ndarray, act, dt: float, seconds: float, vehicle: np.ndarray = P) -> np.ndarray:

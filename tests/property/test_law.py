@@ -27,19 +27,19 @@ from law_flights import (
 from law_states import SPREAD, actuator_speeds, closed_loops, flying, forward, trimmed_vehicles, unit
 from model_states import HIGH, LOW, TAU, P, state
 
-from firmware.core.control.law import k2_to_cover
-from firmware.core.vehicle import layout
+from glider.firmware.core.control.law import k2_to_cover
+from glider.firmware.core.vehicle import layout
 from tests.support.equations import k2_by_29
 from tests.support.examples import examples
 
 
-def settle(law: Law, x, references, speeds=STANDING) -> None:
+def arbitrate(law: Law, x, references, speeds=STANDING) -> None:
     """Put the actuators where the law wants them; a state at which there is no such place is none of the examples.
 
     There are such states: a mass far out turns the nose, but is itself to be turned.
     """
     try:
-        law.settle(x, references, speeds)
+        law.arbitrate(x, references, speeds)
     except NeverSettled:
         assume(False)
 
@@ -54,7 +54,7 @@ def test_V_falls_as_the_law_says_with_both_inputs_applied(data, vehicle, countin
     """
     x, speeds, references, pitch, depth = data.draw(closed_loops(vehicle, flying(flows=forward)))
     law = Law(vehicle, pitch, depth, counting_on, share)
-    settle(law, x, references, speeds)
+    arbitrate(law, x, references, speeds)
     command = x[layout.X_ACT :] + speeds * TAU
     np.testing.assert_allclose(plant_rates(vehicle, x, command)[layout.X_ACT :], speeds, atol=1e-12)
     _, s, g = law(x, references, speeds)
@@ -71,7 +71,7 @@ def test_V_falls_as_the_law_says_with_both_inputs_applied(data, vehicle, countin
 @given(st.data(), trimmed_vehicles())
 def test_jointly_or_by_present_positions_settled_actuators_are_the_same(data, vehicle):
     x, speeds, references, pitch, depth = data.draw(closed_loops(vehicle, flying(flows=forward)))
-    settle(Law(vehicle, pitch, depth, "joint"), x, references, speeds)
+    arbitrate(Law(vehicle, pitch, depth, "joint"), x, references, speeds)
     wanted = Law(vehicle, pitch, depth, "present")(x, references, speeds)[0]
     np.testing.assert_allclose(wanted, x[SLIDER:], rtol=1e-11, atol=1e-11)
 
@@ -160,7 +160,7 @@ def test_a_k2_that_covers_keeps_V_falling_in_every_vehicle_of_the_box(data, true
     strength, eps = np.array([d_pitch, d_depth]), np.array([pitch.eps, depth.eps])
     for _ in range(30):  # k2 moves the inputs, and they the bound
         law = Law(believed, pitch, depth)
-        settle(law, x, references)
+        arbitrate(law, x, references)
         _, s, g = law(x, references)
         bound = law.error_bound(x, SPREAD)
         needed = [k2_to_cover(*numbers) for numbers in zip(bound, strength, g, eps, strict=True)]

@@ -10,8 +10,8 @@ from law_flights import SLIDER, down, form_at
 from law_states import flying, gains, unit
 from model_states import HIGH, LOW, RATE, TAU, P, state
 
-from firmware.core.control.input_forms import exact_form, paper_form
-from firmware.core.control.law import (
+from glider.firmware.core.control.input_forms import exact_form, paper_form
+from glider.firmware.core.control.law import (
     NOT_FINITE,
     OK,
     STEEP,
@@ -20,9 +20,9 @@ from firmware.core.control.law import (
     pitch_depth_law,
     solve_inputs,
 )
-from firmware.core.control.law_plus import reach
-from firmware.core.vehicle import layout
-from firmware.core.vehicle.actuators import actuator_rate, limited
+from glider.firmware.core.control.law_plus import reach
+from glider.firmware.core.vehicle import layout
+from glider.firmware.core.vehicle.actuators import actuator_rate, limited
 from tests.support.equations import k2_by_29
 from tests.support.examples import examples
 

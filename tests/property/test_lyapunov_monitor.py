@@ -7,13 +7,13 @@ import pytest
 from law_flights import Gains, Law, Reference, lyapunov_rate, plant_rates
 from law_states import SPREAD
 
-from firmware.core.control.law import k2_to_cover
-from firmware.core.control.lyapunov_monitor import WATCH_EVERY
-from firmware.core.control.telemetry import N_RECORD, REC_LYAPUNOV, fill_record
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.layouts import supervisor_layout as sup
-from firmware.core.vehicle import layout
-from tools.flight.compose import build_flight
+from glider.firmware.core.control.law import k2_to_cover
+from glider.firmware.core.control.lyapunov_monitor import WATCH_EVERY
+from glider.firmware.core.control.telemetry import N_RECORD, REC_LYAPUNOV, fill_record
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.layouts import supervisor_layout as sup
+from glider.firmware.core.vehicle import layout
+from glider.tools.flight.compose import build_flight
 
 SIGMA = SPREAD / 3.0
 VALUES = slice(ctl.K2_NEED_PITCH, ctl.MARGIN_DEPTH + 1)
@@ -89,7 +89,7 @@ def test_the_need_is_the_model_error_bound_and_the_disturbance_seen():
         looked += 1
         law, speeds = law_of(pilot), plant_rates(pilot.P, world.x, sent)[layout.X_ACT :]
         bound = law.error_bound(world.x, SIGMA, speeds)
-        seen = pilot.nav[ctl.NAV_ROUGHNESS] * 0.003
+        seen = pilot.nav[ctl.NAV_NOISE_SCALE] * 0.003
         _, _, g = law(world.x, (Reference(0.0), Reference(0.0)), speeds)
         for axis, index in enumerate((ctl.K2_NEED_PITCH, ctl.K2_NEED_DEPTH)):
             assert pilot.ap[index] == pytest.approx(k2_to_cover(bound[axis], seen, g[axis], law.eps[axis]), rel=1e-9)

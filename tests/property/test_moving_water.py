@@ -10,8 +10,8 @@ from independent.make_reference import VEHICLE
 from independent.nominal import Glider
 from model_states import P, actuators, angles, currents, derivative, state, states
 
-from firmware.core.vehicle import layout
-from firmware.core.vehicle.flight import nominal_run, nominal_step
+from glider.firmware.core.vehicle import layout
+from glider.firmware.core.vehicle.flight import nominal_run, nominal_step
 from tests.support.examples import examples
 
 STEP = 0.01

@@ -16,11 +16,11 @@ from model_states import (
 )
 from scipy.integrate import simpson
 
-from firmware.core.maths.rotations import quaternion_from_euler, rotation_nb
-from firmware.core.vehicle import layout
-from firmware.core.vehicle.flight import nominal_step
-from firmware.core.vehicle.mass import first_moment
-from firmware.core.vehicle.water import water_wrench
+from glider.firmware.core.maths.rotations import quaternion_from_euler, rotation_nb
+from glider.firmware.core.vehicle import layout
+from glider.firmware.core.vehicle.flight import nominal_step
+from glider.firmware.core.vehicle.mass import first_moment
+from glider.firmware.core.vehicle.water import water_wrench
 from tests.support.examples import examples
 
 

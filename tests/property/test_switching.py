@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firmware.core.control import law
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.vehicle import layout
-from firmware.model.gains import Control, HybridTable
-from hal.strict import ConfigError, decode
+from glider.firmware.core.control import law
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.vehicle import layout
+from glider.firmware.model.gains import Control, HybridTable
+from glider.hal.strict import ConfigError, decode
+from glider.tools.flight.compose import build_flight
 from tests.support.examples import examples
-from tools.flight.compose import build_flight
 
 RATES = {"servo": layout.SERVO_RATE, "slider": layout.SLIDER_RATE, "ballast": layout.BALLAST_RATE}
 
@@ -44,9 +44,9 @@ def test_transitions_are_the_laws_and_steady_flight_the_pids():
 
 def test_rough_water_is_the_laws():
     _, calm = flown(ctl.HYBRID, 0.003)
-    _, rough = flown(ctl.HYBRID, 0.1)
-    assert rough[:, 1].mean() > calm[:, 1].mean()
-    assert rough[500:, 1].mean() > 0.9
+    _, noise_scale = flown(ctl.HYBRID, 0.1)
+    assert noise_scale[:, 1].mean() > calm[:, 1].mean()
+    assert noise_scale[500:, 1].mean() > 0.9
 
 
 @pytest.mark.parametrize("noise", [0.003, 0.03, 0.1])

@@ -5,8 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from model_states import P, actuators, currents, derivative, states, vehicles
 
-from firmware.core.vehicle import layout
-from firmware.core.vehicle.flight import nominal_run
+from glider.firmware.core.vehicle import layout
+from glider.firmware.core.vehicle.flight import nominal_run
 from tests.support.examples import examples
 
 # north, east, down, quaternion, nu, actuators: what changes its sign when east is swapped with west

@@ -10,26 +10,26 @@ from hypothesis import strategies as st
 from model_states import LOW, P, pitches, quaternions, state
 from support.estimating import Filter
 
-from firmware.core.jit import kernel
-from firmware.core.layouts import estimator_layout as kf
-from firmware.core.maths.steps import MIDPOINT, RK4, end_stage, stable_product
-from firmware.core.maths.wide import LANES, as_wide
-from firmware.core.vehicle import layout
-from firmware.core.vehicle.batch import nominal_batch
-from firmware.core.vehicle.flight import nominal_run
-from firmware.core.vehicle.motion import accelerations
-from firmware.core.vehicle.time_constants import MOST_PARTS, STABLE_SHARE, damping_rate, lag_rate, nominal_parts
-from firmware.core.vehicle.water import water_wrench
-from firmware.model.vehicle import COEFFICIENTS
-from sim_backend.core import layout as wl
-from sim_backend.core.effect_plant import effect_parts, effective_parameters
-from sim_backend.core.effects import effect_layout as ef
-from sim_backend.core.effects.hydrodynamics import extra_rate, extra_wrench
-from sim_backend.core.plant import plant_step
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.layouts import estimator_layout as kf
+from glider.firmware.core.maths.steps import MIDPOINT, RK4, end_stage, stable_product
+from glider.firmware.core.maths.wide import LANES, as_wide
+from glider.firmware.core.vehicle import layout
+from glider.firmware.core.vehicle.batch import nominal_batch
+from glider.firmware.core.vehicle.flight import nominal_run
+from glider.firmware.core.vehicle.motion import accelerations
+from glider.firmware.core.vehicle.time_constants import MOST_PARTS, STABLE_SHARE, damping_rate, lag_rate, nominal_parts
+from glider.firmware.core.vehicle.water import water_wrench
+from glider.firmware.model.vehicle import COEFFICIENTS
+from glider.sim_backend.core import layout as wl
+from glider.sim_backend.core.effect_plant import effect_parts, effective_parameters
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.sim_backend.core.effects.hydrodynamics import extra_rate, extra_wrench
+from glider.sim_backend.core.plant import plant_step
+from glider.tools.inference.core.step import LARGEST_SPEED, MAX_STEP, propagate
+from glider.tools.inference.prediction_error import LIMIT
+from glider.tools.inference.vehicle_parameters import K_SHARE, LINEAR_DAMPING, coefficient_sizes
 from tests.support.examples import examples
-from tools.inference.core.step import LARGEST_SPEED, MAX_STEP, propagate
-from tools.inference.prediction_error import LIMIT
-from tools.inference.vehicle_parameters import K_SHARE, LINEAR_DAMPING, coefficient_sizes
 
 K_P_OF_REAL_WINGS = -22.0  # kg s/rad, eleven times the shipped vehicle's
 SIGNED = (layout.K_L, layout.K_BETA, layout.K_P, layout.K_M, layout.K_Q, layout.K_MY, layout.K_R)

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from model_states import VEHICLE_TEXT
 
-from firmware.model.vehicle import Vehicle, decode_vehicle
-from hal.strict import ConfigError
+from glider.firmware.model.vehicle import Vehicle, decode_vehicle
+from glider.hal.strict import ConfigError
 from tests.support.examples import examples
 
 LINES = VEHICLE_TEXT.splitlines()
@@ -132,8 +132,8 @@ def test_damage_raises_nothing_but_config_errors(data):
     """Cut out, doubled or overwritten pieces: either a vehicle or a ConfigError of one line."""
     begin = data.draw(st.integers(0, len(VEHICLE_TEXT)))
     end = data.draw(st.integers(begin, min(begin + 200, len(VEHICLE_TEXT))))
-    absurd = st.sampled_from(["", "9" * 5000, "[" * 3000, "{a=" * 50, "\x00"])
-    piece = data.draw(st.one_of(st.text(max_size=30), absurd))
+    implausible = st.sampled_from(["", "9" * 5000, "[" * 3000, "{a=" * 50, "\x00"])
+    piece = data.draw(st.one_of(st.text(max_size=30), implausible))
     complaint = refused(VEHICLE_TEXT[:begin] + piece + VEHICLE_TEXT[end:])
     assert complaint is None or (complaint.startswith("vehicle.toml") and len(complaint.splitlines()) == 1)
 

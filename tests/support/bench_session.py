@@ -26,7 +26,17 @@ class Twins:
 
     def __init__(self, folder: Path, *, wrong: dict[str, tuple[str, str]] | None = None):
         self.folder = folder
-        command = [sys.executable, "-m", "tools.cli.main", "twin", "--dir", str(folder), "--stand", "--seed", "5"]
+        command = [
+            sys.executable,
+            "-m",
+            "glider.tools.cli.main",
+            "twin",
+            "--dir",
+            str(folder),
+            "--stand",
+            "--seed",
+            "5",
+        ]
         self.process = subprocess.Popen(
             command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE
         )
@@ -70,7 +80,7 @@ class Terminal:
 
     def __init__(self, board: Path, out: Path):
         environment = {**os.environ, "TERM": "xterm", "PROMPT_TOOLKIT_NO_CPR": "1"}
-        command = ["-m", "tools.cli.main", "bench", "--board", str(board), "--out", str(out)]
+        command = ["-m", "glider.tools.cli.main", "bench", "--board", str(board), "--out", str(out)]
         self.child = pexpect.spawn(sys.executable, command, env=environment, dimensions=(ROWS, COLUMNS))
         self.screen = pyte.Screen(COLUMNS, ROWS)
         self._stream = pyte.ByteStream(self.screen)

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
-from sim_backend.core.effects import effect_layout as ef
-from sim_backend.uncertainty import deviates
-from tools.data.runs import columns as names
-from tools.data.runs.case import Case, load_case, write_case
-from tools.data.runs.run import Run
-from tools.inference.problem import Problem, problem_of
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.sim_backend.uncertainty import deviates
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.case import Case, load_case, write_case
+from glider.tools.data.runs.run import Run
+from glider.tools.inference.problem import Problem, problem_of
 
 RATE = 10.0  # Hz
 SECONDS = 45.0

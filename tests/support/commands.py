@@ -10,8 +10,8 @@ from pathlib import Path
 
 def glider(*arguments: object, cwd: Path, lines: str = "") -> subprocess.CompletedProcess[str]:
     """What came of it: exit code, standard output and error; `lines` is standard input. -1: it ended in a traceback."""
-    from tools.cli.common import report_errors
-    from tools.cli.main import cli
+    from glider.tools.cli.common import report_errors
+    from glider.tools.cli.main import cli
 
     words = [str(argument) for argument in arguments]
     out, err, code, before = io.StringIO(), io.StringIO(), -1, (sys.argv, sys.stdin)

@@ -4,12 +4,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from firmware.core.estimation.estimator import estimator_predict, estimator_start, estimator_update
-from firmware.core.layouts import estimator_layout as kf
-from firmware.core.maths.rotations import quaternion_from_euler
-from firmware.model.estimator_settings import estimator_settings, first_spread, parameter_sigma
-from firmware.model.vehicle import Vehicle
-from tools.data.sources import load_vehicle
+from glider.firmware.core.estimation.estimator import estimator_predict, estimator_start, estimator_update
+from glider.firmware.core.layouts import estimator_layout as kf
+from glider.firmware.core.maths.rotations import quaternion_from_euler
+from glider.firmware.model.estimator_settings import estimator_settings, first_spread, parameter_sigma
+from glider.firmware.model.vehicle import Vehicle
+from glider.tools.data.sources import load_vehicle
 
 
 @dataclass

@@ -9,18 +9,18 @@ from pathlib import Path
 
 import numpy as np
 
-from firmware.core.layouts import estimator_layout as kf
-from firmware.core.maths.rotations import euler_from_quaternion, quaternion_from_euler
-from firmware.core.maths.steps import RK4
-from firmware.model.estimator_settings import parameter_sigma
-from firmware.model.vehicle import Vehicle
-from sim_backend.core.effects import effect_layout as ef
-from tools.data.runs import columns as names
-from tools.data.runs.case import Case
-from tools.data.runs.run import Run
-from tools.data.sources import load_vehicle
-from tools.inference.channels import ROUGHIE_MEASURES
-from tools.inference.core.step import propagate
+from glider.firmware.core.layouts import estimator_layout as kf
+from glider.firmware.core.maths.rotations import euler_from_quaternion, quaternion_from_euler
+from glider.firmware.core.maths.steps import RK4
+from glider.firmware.model.estimator_settings import parameter_sigma
+from glider.firmware.model.vehicle import Vehicle
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.case import Case
+from glider.tools.data.runs.run import Run
+from glider.tools.data.sources import load_vehicle
+from glider.tools.inference.channels import ROUGHIE_MEASURES
+from glider.tools.inference.core.step import propagate
 
 STEP = 0.02  # s
 

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 
-from firmware.telemetry import TICK
-from hal.recorder import disk
-from hal.recorder.logfile import LogFile
-from sim_backend.faults import break_in
-from tools.data.log.reader import read_log
-from tools.flight import sortie
-from tools.flight.compose import Flight, build_flight, build_recorder
+from glider.firmware.telemetry import TICK
+from glider.hal.recorder import disk
+from glider.hal.recorder.logfile import LogFile
+from glider.sim_backend.faults import break_in
+from glider.tools.data.log.reader import read_log
+from glider.tools.flight import sortie
+from glider.tools.flight.compose import Flight, build_flight, build_recorder
 
 DIP = """
 format = 1

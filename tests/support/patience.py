@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from tools.data.sources import name_or_path
+from glider.tools.data.sources import name_or_path
 
 PATIENT = """overruns = 1000
 overrun_share = 1.0

@@ -14,17 +14,17 @@ import sys
 import tempfile
 from pathlib import Path
 
-from firmware.core.jit import kernel_count
-from tools.flight.precompile import Work
-from tools.study.precompile import CAMPAIGN
+from glider.firmware.core.jit import kernel_count
+from glider.tools.flight.precompile import Work
+from glider.tools.study.precompile import CAMPAIGN
 
 
 def _identify_a_moment() -> None:
     """A vehicle identified from two short captured runs, by both likelihoods."""
-    from tools.data.runs.case import load_case, write_case
-    from tools.data.sources import load_vehicle
-    from tools.identify.design import CAPTURE, make_runs
-    from tools.identify.pipeline import ACCELERATIONS, identify
+    from glider.tools.data.runs.case import load_case, write_case
+    from glider.tools.data.sources import load_vehicle
+    from glider.tools.identify.design import CAPTURE, make_runs
+    from glider.tools.identify.pipeline import ACCELERATIONS, identify
 
     with tempfile.TemporaryDirectory() as folder:
         runs, _ = make_runs(load_vehicle("roughie"), 6, [0, 6])
@@ -35,10 +35,10 @@ def _identify_a_moment() -> None:
 
 def _challenge_a_moment() -> None:
     """Blind tests of one case each, in the foreign plant: of the file's form and of another."""
-    from tools.study.challenge.form_make import FormOrder
-    from tools.study.challenge.form_plan import FormCounts
-    from tools.study.challenge.make import Order, make
-    from tools.study.challenge.plan import Counts
+    from glider.tools.study.challenge.form_make import FormOrder
+    from glider.tools.study.challenge.form_plan import FormCounts
+    from glider.tools.study.challenge.make import Order, make
+    from glider.tools.study.challenge.plan import Counts
 
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)
@@ -49,9 +49,9 @@ def _challenge_a_moment() -> None:
 
 def _glide_a_moment() -> None:
     """Four dives of an ocean glider: identified, measured, watched."""
+    from glider.tools.gap.assess import assess
+    from glider.tools.identify.ocean.identify import identify_ocean
     from tests.support.ocean import as_case, fly_dives
-    from tools.gap.assess import assess
-    from tools.identify.ocean.identify import identify_ocean
 
     with tempfile.TemporaryDirectory() as folder:
         case = as_case(Path(folder, "case"), fly_dives(4, speed=True).runs)

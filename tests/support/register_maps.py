@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from tools.data.boards import load_board_file
+from glider.tools.data.boards import load_board_file
 
 # Its number begins where it begins in no shipped map, between registers that hold something else.
 DRIVE = """

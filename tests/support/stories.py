@@ -1,7 +1,7 @@
 """How the supervisor's stories begin, and the words they are told in."""
 
-from firmware.core.layouts import supervisor_layout as sup
-from firmware.faults import Reaction
+from glider.firmware.core.layouts import supervisor_layout as sup
+from glider.firmware.faults import Reaction
 from tests.support.watchman import DT, Watchman
 
 NOTHING, LOG, WARN, HOLD, ABORT, OOB, HW = Reaction

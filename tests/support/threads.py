@@ -12,17 +12,17 @@ from pathlib import Path
 import numba
 import numpy as np
 
-from firmware.core.maths.wide import LANES
-from sim_backend.core.effects import effect_layout as ef
-from sim_backend.fleet import fly_fleet
+from glider.firmware.core.maths.wide import LANES
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.sim_backend.fleet import fly_fleet
+from glider.tools.data.sources import load_vehicle
+from glider.tools.flight.compose import build_flight
+from glider.tools.identify.design import make_runs
+from glider.tools.identify.sampler import sample, whiten
+from glider.tools.identify.statistics import collect
+from glider.tools.inference.predict import fly_near, fly_windows_from
+from glider.tools.inference.problem import problem_of
 from tests.support.cases import make_case
-from tools.data.sources import load_vehicle
-from tools.flight.compose import build_flight
-from tools.identify.design import make_runs
-from tools.identify.sampler import sample, whiten
-from tools.identify.statistics import collect
-from tools.inference.predict import fly_near, fly_windows_from
-from tools.inference.problem import problem_of
 
 THREADS = 2
 

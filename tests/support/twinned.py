@@ -47,7 +47,7 @@ class Twins:
 
 @contextmanager
 def twins(folder: Path, *extra: str):
-    command = [sys.executable, "-m", "tools.cli.main", "twin", "--dir", str(folder), *extra]
+    command = [sys.executable, "-m", "glider.tools.cli.main", "twin", "--dir", str(folder), *extra]
     process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
     try:
         assert process.stdout.readline(), "the twins did not start"
@@ -67,7 +67,7 @@ def flying(board: Path, mission: Path, folder: Path, *extra: str):
     Where a device of the twins, kept waiting by a busy machine, was silent in the moment of arming, it is tried again.
     """
     log = Path(extra[extra.index("--log") + 1]) if "--log" in extra else folder / "flight.mcap"
-    command = [sys.executable, "-m", "tools.cli.main", "fly", "--board", str(board), "--mission", str(mission)]
+    command = [sys.executable, "-m", "glider.tools.cli.main", "fly", "--board", str(board), "--mission", str(mission)]
     command += ["--vehicle", str(patient_vehicle(folder))]
     command += ["--yes", "--state", str(folder / "state"), "--log", str(folder / "flight.mcap"), "--json", *extra]
     try:
@@ -88,7 +88,7 @@ def flying(board: Path, mission: Path, folder: Path, *extra: str):
 
 def guard_pid(folder: Path) -> int:
     """The out-of-band process that stamps a heartbeat."""
-    from hal.heartbeat import W_GUARD_PID, Heartbeat
+    from glider.hal.heartbeat import W_GUARD_PID, Heartbeat
 
     pulse = Heartbeat.open(folder)
     pid = pulse.words[W_GUARD_PID]
@@ -103,7 +103,7 @@ def end_guard(folder: Path) -> None:
         command = Path(f"/proc/{pid}/cmdline").read_bytes()
     except (OSError, ValueError):
         return
-    if b"hal.outofband" in command:
+    if b"glider.hal.outofband" in command:
         os.kill(pid, signal.SIGTERM)
         until(lambda: not Path(f"/proc/{pid}").exists(), 5.0)
 

@@ -15,9 +15,9 @@ from pathlib import Path
 
 import pytest
 
-from firmware.core import jit
-from tools.data.remote import file_digest
-from tools.deploy.bundle import copy_files
+from glider.firmware.core import jit
+from glider.tools.data.remote import file_digest
+from glider.tools.deploy.bundle import copy_files
 
 ROOT = Path(__file__).resolve().parents[2]
 RELEASE = "0.0-trial"
@@ -147,7 +147,7 @@ def _furnish(root: Path) -> None:
     (root / "etc/hostname").write_text("vessel\n")
     here = root / "opt/glider/releases" / RELEASE
     (here / "bin").mkdir(parents=True)
-    for name, words in (("python", ""), ("glider", "-m tools.cli.main")):
+    for name, words in (("python", ""), ("glider", "-m glider.tools.cli.main")):
         (here / "bin" / name).write_text(PROGRAM.format(root=ROOT, python=sys.executable, words=words))
         (here / "bin" / name).chmod(0o755)
     for unit in ("glider-flight@.service", "glider-outofband.service"):

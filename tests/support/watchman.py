@@ -9,14 +9,14 @@ import math
 import msgspec
 import numpy as np
 
-from firmware.autopilot import Autopilot, configuration
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.layouts import supervisor_layout as sup
-from firmware.faults import Reaction
-from firmware.model.supervisor_settings import Limits
-from firmware.supervisor import Supervisor
-from hal.ports import SLOTS, Validity
-from tools.data.sources import load_mission, load_vehicle
+from glider.firmware.autopilot import Autopilot, configuration
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.layouts import supervisor_layout as sup
+from glider.firmware.faults import Reaction
+from glider.firmware.model.supervisor_settings import Limits
+from glider.firmware.supervisor import Supervisor
+from glider.hal.ports import SLOTS, Validity
+from glider.tools.data.sources import load_mission, load_vehicle
 
 DT = 0.02
 SLIDER_RANGE, BALLAST_RANGE = (-0.06, 0.06), (-0.20, 0.20)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numba.core.errors import NumbaError
 
-from firmware.core import jit
+from glider.firmware.core import jit
 
 ROOT = jit.PACKAGES_DIR
 PACKAGES = ("firmware", "hal", "sim_backend", "tools")
@@ -23,11 +23,11 @@ COMPILERS = {
 # Flies through every kernel of the nominal flight and prints what came out, to the last bit.
 FLIGHT = """
 import numpy as np
-from firmware.core.vehicle import layout
-from firmware.core.vehicle.flight import nominal_run
-from firmware.core.maths.rotations import euler_from_quaternion, quaternion_from_euler, wrap_angle
-from firmware.model.library import shipped
-from firmware.model.vehicle import decode_vehicle
+from glider.firmware.core.vehicle import layout
+from glider.firmware.core.vehicle.flight import nominal_run
+from glider.firmware.core.maths.rotations import euler_from_quaternion, quaternion_from_euler, wrap_angle
+from glider.firmware.model.library import shipped
+from glider.firmware.model.vehicle import decode_vehicle
 
 P = decode_vehicle(shipped("model/vehicles")["roughie"], "roughie").vector()
 for start in ((0.1, -0.2, 3.0, 0.3, 0.05, 0.02), (-2.0, 1.2, -1.0, -0.1, 0.3, 0.2), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)):
@@ -133,7 +133,7 @@ def fly(**environment: str) -> np.ndarray:
 def test_what_no_kernel_calls_is_not_imported():
     """Numba asks for SciPy's BLAS, and what only reads files asks for no compiler."""
     loaded = "import sys; print(*({*sys.modules} & {'scipy.linalg', 'numba'}))"
-    for script, there in ((FLIGHT, "numba"), ("import tools.data.sources", "")):
+    for script, there in ((FLIGHT, "numba"), ("import glider.tools.data.sources", "")):
         command = [sys.executable, "-c", f"{script}\n{loaded}"]
         done = subprocess.run(command, capture_output=True, text=True, check=True)
         assert done.stdout.splitlines()[-1] == there
@@ -156,7 +156,7 @@ def test_a_product_and_a_sum_are_rounded_each():
 
 
 def test_cache_goes_where_it_is_told(tmp_path):
-    turn = "from firmware.core.maths.rotations import wrap_angle; wrap_angle(4.0)"
+    turn = "from glider.firmware.core.maths.rotations import wrap_angle; wrap_angle(4.0)"
     subprocess.run([sys.executable, "-c", turn], env=os.environ | {"GLIDER_CACHE_DIR": str(tmp_path)}, check=True)
     folders = list(tmp_path.glob(f"kernels-{jit.kernels_digest()}-*"))
     assert len(folders) == 1

@@ -6,7 +6,7 @@ import os
 import subprocess
 import sys
 
-from firmware.core import jit
+from glider.firmware.core import jit
 from tests.support.threads import THREADS
 
 # Where the kernels stand that tests.support.threads calls, one way or another.

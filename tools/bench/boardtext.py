@@ -8,8 +8,8 @@ from typing import Any
 
 import tomlkit
 
-from hal.boardfile import DeviceFile, calibration_hash, check
-from hal.strict import decode
+from glider.hal.boardfile import DeviceFile, calibration_hash, check
+from glider.hal.strict import decode
 
 
 def set_ports(text: str, paths: Mapping[str, str]) -> str:

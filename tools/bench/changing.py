@@ -4,14 +4,14 @@ import math
 import time
 from typing import Any
 
-from hal.boardfile import DeviceFile, calibration_hash
-from hal.ports import ACTUATORS
-from hal.strict import ConfigError, decode
-from tools.bench import boardtext, calibrate
-from tools.bench.client import BenchError, check_actuator
-from tools.bench.desk import UsageError, number
-from tools.bench.moving import Moving
-from tools.bench.units import UNITS, WIRES
+from glider.hal.boardfile import DeviceFile, calibration_hash
+from glider.hal.ports import ACTUATORS
+from glider.hal.strict import ConfigError, decode
+from glider.tools.bench import boardtext, calibrate
+from glider.tools.bench.client import BenchError, check_actuator
+from glider.tools.bench.desk import UsageError, number
+from glider.tools.bench.moving import Moving
+from glider.tools.bench.units import UNITS, WIRES
 
 CALIBRATION_SHARES = (-0.8, -0.4, 0.0, 0.4, 0.8)
 

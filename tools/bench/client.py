@@ -8,10 +8,10 @@ import time
 from pathlib import Path
 from typing import Any
 
-from hal.ports import ACTUATORS
-from hal.spawn import module_command, module_environment
-from tools.bench.units import from_port, to_port
-from tools.data.errors import InputError
+from glider.hal.ports import ACTUATORS
+from glider.hal.spawn import module_command, module_environment
+from glider.tools.bench.units import from_port, to_port
+from glider.tools.data.errors import InputError
 
 BEAT_S = 0.5
 THERE, STANDS = 0.3, 0.03  # mm from the goal; mm in 0.1 s
@@ -46,7 +46,7 @@ class Bench:
 
     def _start(self) -> None:
         self._process = subprocess.Popen(
-            module_command("tools.bench.worker"), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            module_command("glider.tools.bench.worker"), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
             start_new_session=True, env=module_environment(),
         )  # fmt: skip
         config = {"text": self.text, "source": self.source, "kind": self.kind, "vehicle": self.vehicle}

@@ -2,11 +2,11 @@
 
 import time
 
-from hal.protocols.vn100 import TextMessage, Vn100Decoder, encode_text
-from tools.bench.changing import Changing
-from tools.bench.client import BenchError
-from tools.bench.desk import UsageError, number
-from tools.bench.looking import Looking
+from glider.hal.protocols.vn100 import TextMessage, Vn100Decoder, encode_text
+from glider.tools.bench.changing import Changing
+from glider.tools.bench.client import BenchError
+from glider.tools.bench.desk import UsageError, number
+from glider.tools.bench.looking import Looking
 
 
 class Commands(Looking, Changing):

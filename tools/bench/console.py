@@ -17,12 +17,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from hal.ports import ACTUATORS
-from tools.bench.client import Bench, BenchError
-from tools.bench.commands import Commands
-from tools.bench.desk import UsageError
-from tools.bench.units import WIRES
-from tools.data.errors import BAD_INPUT, DONE, FAILED
+from glider.hal.ports import ACTUATORS
+from glider.tools.bench.client import Bench, BenchError
+from glider.tools.bench.commands import Commands
+from glider.tools.bench.desk import UsageError
+from glider.tools.bench.units import WIRES
+from glider.tools.data.errors import BAD_INPUT, DONE, FAILED
 
 HISTORY = "GLIDER_BENCH_HISTORY"
 WATCH_S = 0.2
@@ -32,7 +32,7 @@ def table_of(state: dict) -> Any:
     """A snapshot as a table."""
     from rich.table import Table
 
-    from tools.bench.units import UNITS, from_port, shown_values
+    from glider.tools.bench.units import UNITS, from_port, shown_values
 
     table = Table(title=f"{state['name']}: {'ENABLED' if state['enabled'] else 'not enabled'}; any key ends")
     for heading in ("device", "state", "values", "trouble"):

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from tools.bench.client import Bench, BenchError
+from glider.tools.bench.client import Bench, BenchError
 
 
 class UsageError(BenchError):

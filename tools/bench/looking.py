@@ -2,9 +2,9 @@
 
 import math
 
-from tools.bench.client import BenchError
-from tools.bench.desk import Desk, UsageError, number
-from tools.bench.units import UNITS, from_port, shown_values
+from glider.tools.bench.client import BenchError
+from glider.tools.bench.desk import Desk, UsageError, number
+from glider.tools.bench.units import UNITS, from_port, shown_values
 
 
 class Looking(Desk):

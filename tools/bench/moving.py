@@ -3,10 +3,10 @@
 import time
 from typing import Any
 
-from tools.bench import record, sweep
-from tools.bench.client import BenchError, check_actuator
-from tools.bench.desk import Desk, number
-from tools.bench.units import UNITS, from_port, to_port
+from glider.tools.bench import record, sweep
+from glider.tools.bench.client import BenchError, check_actuator
+from glider.tools.bench.desk import Desk, number
+from glider.tools.bench.units import UNITS, from_port, to_port
 
 MOVE_LIMIT_S = 30.0
 
@@ -16,11 +16,11 @@ class Moving(Desk):
 
     def do_enable(self) -> None:
         """enable: let actuators move; nothing does before. At a terminal it asks whether hands are clear."""
-        question = "actuators will move when told; hands and cables clear? (yes/no) "
+        question = "actuators will move when commanded; hands and cables clear? (yes/no) "
         if not self.scripted and self.ask(question).lower() not in ("y", "yes"):
             raise BenchError("not enabled")
         self.bench.ask("enable", on=True)
-        self.say("enabled: actuators move when told")
+        self.say("enabled: actuators move when commanded")
 
     def do_disable(self) -> None:
         """disable: stop, and move no more."""
@@ -70,7 +70,7 @@ class Moving(Desk):
         check_actuator(actuator)
         state = self.bench.snapshot()
         limits = self.bench.limits(actuator, state)
-        ends = tuple(sweep.SHARE * end for end in limits) if not low else (number(low), number(high or "x"))
+        ends = tuple(sweep.TRAVEL_SHARE * end for end in limits) if not low else (number(low), number(high or "x"))
         if not limits[0] <= ends[0] < ends[1] <= limits[1]:
             raise BenchError(f"expected LOW < HIGH within {limits[0]:.2f} to {limits[1]:.2f} {UNITS[actuator]}")
         result = sweep.SweepResult(actuator, UNITS[actuator], *ends)
@@ -81,7 +81,7 @@ class Moving(Desk):
 
     def _speed(self, actuator: str) -> float:
         """What an actuator can do, by the vehicle's file, in deg/s or mm/s."""
-        from tools.data.sources import load_vehicle
+        from glider.tools.data.sources import load_vehicle
 
         vehicle: Any = load_vehicle(self.bench.vehicle)
         kg_per_m = self.bench.snapshot()["kg_per_m"]

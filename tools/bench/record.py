@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tools.bench.worker import ROW
-from tools.data.errors import InputError
+from glider.tools.bench.worker import ROW
+from glider.tools.data.errors import InputError
 
 KEPT = tuple(name for name in ROW if name != "t_s")
 

@@ -9,19 +9,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from firmware.core.vehicle.layout import GRAVITY
-from firmware.core.vehicle.seawater import STANDARD_PRESSURE
-from tools.bench.client import Bench, BenchError
-from tools.bench.units import UNITS, WIRES, shown_values
+from glider.firmware.core.vehicle.layout import GRAVITY
+from glider.firmware.core.vehicle.seawater import STANDARD_PRESSURE
+from glider.tools.bench.client import Bench, BenchError
+from glider.tools.bench.units import UNITS, WIRES, shown_values
 
 LEAST_DEG, LEAST_M = 5.0, 0.002
-SHARE = 0.5  # of an actuator's way
+TRAVEL_SHARE = 0.5  # of an actuator's way
 MOVE_S = 30.0
 WATER = 998.2  # kg/m3
 
 
 @dataclass
-class Finding:
+class SignFinding:
     """One thing looked at."""
 
     check: str
@@ -29,19 +29,19 @@ class Finding:
     message: str
 
 
-def look(bench: Bench) -> list[Finding]:
+def look(bench: Bench) -> list[SignFinding]:
     """What each device says."""
     time.sleep(0.5)  # rates and errors show
     state = bench.snapshot()
     found = [
-        Finding(f"port {name}", port["up"], f"{port['bytes_in']} bytes in" if port["up"] else port["trouble"])
+        SignFinding(f"port {name}", port["up"], f"{port['bytes_in']} bytes in" if port["up"] else port["trouble"])
         for name, port in state["ports"].items()
     ]
     for name, item in state["sensors"].items():
         text = item["error"] or f"{item['validity']}: {shown_values(name, item['values'])}{_more(name, item, state)}"
-        found.append(Finding(name, item["validity"] == "valid", text))
+        found.append(SignFinding(name, item["validity"] == "valid", text))
     for name, item in state["actuators"].items():
-        found.append(Finding(name, item["answers"] and not item["error"], item["error"] or _actuator(item)))
+        found.append(SignFinding(name, item["answers"] and not item["error"], item["error"] or _actuator(item)))
     return found
 
 
@@ -73,7 +73,7 @@ class Signs:
         self._bench, self._say, self._ask = bench, say, ask
         self._level: list[float] = []
 
-    def run(self) -> list[Finding]:
+    def run(self) -> list[SignFinding]:
         """Every step, in order."""
         self._ask("Hold the hull level, nose where you like, and press Enter. ")
         self._level = self._attitude()
@@ -85,7 +85,7 @@ class Signs:
         ]
         answer = self._ask("Now the actuators move, over half their way. Hands and cables clear? (yes/no) ")
         if answer.lower() not in ("y", "yes"):
-            return [*found, Finding("actuators", False, "not moved: not clear")]
+            return [*found, SignFinding("actuators", False, "not moved: not clear")]
         self._bench.ask("enable", on=True)
         try:
             found += [
@@ -101,46 +101,46 @@ class Signs:
         values = self._bench.snapshot()["sensors"]["imu"]["values"]
         return [math.nan if value is None else math.degrees(value) for value in values[:3]]
 
-    def _turn(self, what: str, question: str, axis: int) -> Finding:
+    def _turn(self, what: str, question: str, axis: int) -> SignFinding:
         if self._ask(question) == "skip":
-            return Finding(what, False, "left out")
+            return SignFinding(what, False, "left out")
         change = (self._attitude()[axis] - self._level[axis] + 180.0) % 360.0 - 180.0
         name = ("roll", "pitch", "yaw")[axis]
         if not abs(change) >= LEAST_DEG:
-            return Finding(what, False, f"{name} changed by {change:.1f} deg only; another axis, or no motion")
+            return SignFinding(what, False, f"{name} changed by {change:.1f} deg only; another axis, or no motion")
         verdict = "right" if change > 0 else "WRONG SIGN: see imu.mount_deg"
-        return Finding(what, change > 0, f"{name} {change:+.1f} deg: {verdict}")
+        return SignFinding(what, change > 0, f"{name} {change:+.1f} deg: {verdict}")
 
-    def _deeper(self) -> Finding:
+    def _deeper(self) -> SignFinding:
         before = self._bench.snapshot()["sensors"]["beacon"]["values"][0]
         if self._ask("Lower it by 10 cm of water, or press on the transmitter's port, Enter (or `skip`). ") == "skip":
-            return Finding("deeper", False, "left out")
+            return SignFinding("deeper", False, "left out")
         after = self._bench.snapshot()["sensors"]["beacon"]["values"][0]
         if before is None or after is None:
-            return Finding("deeper", False, "the beacon gives no reading")
-        return Finding("deeper", after - before > 300.0, f"pressure {after - before:+.0f} Pa")
+            return SignFinding("deeper", False, "the beacon gives no reading")
+        return SignFinding("deeper", after - before > 300.0, f"pressure {after - before:+.0f} Pa")
 
-    def _move(self, name: str, what: str, question: str) -> Finding:
+    def _move(self, name: str, what: str, question: str) -> SignFinding:
         high = self._bench.limits(name)[1]
         wire = WIRES.get(name)
         try:
             # From the middle: from beyond the goal it would move the other way.
             self._bench.wait_there(name, self._bench.target(name, 0.0), MOVE_S)
             before = self._wire(wire)
-            sent = self._bench.target(name, SHARE * high)
+            sent = self._bench.target(name, TRAVEL_SHARE * high)
             there = self._bench.wait_there(name, sent, MOVE_S)
             moved = self._wire(wire) - before
             seen = self._ask(question).lower() in ("y", "yes")
             self._bench.wait_there(name, self._bench.target(name, 0.0), MOVE_S)
         except BenchError as error:
-            return Finding(what, False, str(error))
+            return SignFinding(what, False, str(error))
         if not seen:
-            return Finding(what, False, f"the other way: change the sign of {_scale_of(name)}")
+            return SignFinding(what, False, f"the other way: change the sign of {_scale_of(name)}")
         if wire is not None and not moved > LEAST_M:
-            return Finding(what, False, f"{wire} moved {1e3 * moved:+.1f} mm: change the sign of {wire}.per_m")
+            return SignFinding(what, False, f"{wire} moved {1e3 * moved:+.1f} mm: change the sign of {wire}.per_m")
         if not there:
-            return Finding(what, False, f"did not get to {sent:.1f} {UNITS[name]}")
-        return Finding(what, True, "right" if wire is None else f"right; {wire} {1e3 * moved:+.1f} mm")
+            return SignFinding(what, False, f"did not get to {sent:.1f} {UNITS[name]}")
+        return SignFinding(what, True, "right" if wire is None else f"right; {wire} {1e3 * moved:+.1f} mm")
 
     def _wire(self, wire: str | None) -> float:
         if wire is None:

@@ -1,4 +1,4 @@
-"""A sweep of an actuator: what it is told, in which order, and what its answers say of it.
+"""A sweep of an actuator: what it is commanded, in which order, and what its answers say of it.
 
 Five parts. A step from end to end and back gives the travel time. Slow triangles at two speeds give lag and backlash:
 going up and coming down, the position follows the command late by `lag` seconds and, backlash between them, lies on
@@ -16,7 +16,7 @@ REVERSALS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6)  # deg, mm
 REST_S = 0.8
 HOLD_S = 0.7  # at either end of a reversal
 UPDATE_S = 0.04  # between two targets of a ramp
-SHARE = 0.8  # of the way between the limits
+TRAVEL_SHARE = 0.8  # of the way between the limits
 
 
 @dataclass

@@ -6,8 +6,8 @@ The ballast pump is moved by its plunger's travel, which a ruler can check; net 
 import math
 from typing import Any
 
-from hal.ports import SLOTS
-from hal.units import UNITS as SI
+from glider.hal.ports import SLOTS
+from glider.hal.units import UNITS as SI
 
 UNITS = {"servo": "deg", "slider": "mm", "ballast": "mm"}
 WIRES = {"slider": "slider_wire", "ballast": "plunger_wire"}

@@ -1,4 +1,4 @@
-"""The bench's other half: `python -m tools.bench.worker` holds the ports; a console that dies stops the actuators.
+"""The bench's other half: `python -m glider.tools.bench.worker` holds the ports; a console that dies stops the actuators.
 
 Standard input brings a line of JSON (the board), then requests, one a line, each answered by a line of JSON with its
 `number`. The end of standard input, or silence of HEARTBEAT_S while actuators are enabled, stops them. Nothing moves
@@ -15,16 +15,16 @@ from typing import Any
 
 import numpy as np
 
-from hal.board import BoardRequest, board_builder
-from hal.devices import DeviceBoard
-from hal.drivers.drive import Drive
-from hal.drivers.maestro import Servo
-from hal.ports import BoardError
-from hal.protocols import modbus
-from hal.protocols.modbus import Frame
-from hal.transport.port import Unplugged
-from tools.bench.units import finite
-from tools.data.sources import load_vehicle
+from glider.hal.board import BoardRequest, board_builder
+from glider.hal.devices import DeviceBoard
+from glider.hal.drivers.drive import Drive
+from glider.hal.drivers.maestro import Servo
+from glider.hal.ports import BoardError
+from glider.hal.protocols import modbus
+from glider.hal.protocols.modbus import Frame
+from glider.hal.transport.port import Unplugged
+from glider.tools.bench.units import finite
+from glider.tools.data.sources import load_vehicle
 
 STEP_S = 0.01
 HEARTBEAT_S = 3.0

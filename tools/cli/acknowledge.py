@@ -4,8 +4,8 @@ from pathlib import Path
 
 import click
 
-from tools.cli.common import fail, say
-from tools.cli.status import STATE
+from glider.tools.cli.common import fail, say
+from glider.tools.cli.status import STATE
 
 
 @click.command()
@@ -15,13 +15,13 @@ def acknowledge(state: Path | None) -> None:
 
     Refused (exit code 1) while a flight is under way, or the out-of-band process brings the vehicle up.
     """
-    from hal.heartbeat import run_folder, state_folder
-    from hal.sortie import Refused
-    from tools.flight.keeper import acknowledge as set_back
-    from tools.flight.keeper import watch_facts
+    from glider.hal.heartbeat import run_folder, state_folder
+    from glider.hal.sortie import SortieRefused
+    from glider.tools.flight.keeper import acknowledge as set_back
+    from glider.tools.flight.keeper import watch_facts
 
     try:
         before = set_back(state or state_folder(), watch_facts(state or run_folder()))
-    except Refused as refused:
+    except SortieRefused as refused:
         fail(f"glider: not acknowledged: {refused}")
     say(f"acknowledged: {before.describe()}")

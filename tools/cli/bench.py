@@ -18,13 +18,13 @@ def bench(board: str, vehicle: str, script: Path | None, out: Path) -> None:
     --script or from a pipe run until one fails. Nothing moves before `enable`, limits always hold, and losing the
     console stops the actuators. Exit code 1: a command of a script failed; 2: one was not understood.
     """
-    from tools.data.errors import InputError, need
+    from glider.tools.data.errors import InputError, need
 
     need("bench")
-    from tools.bench.client import Bench
-    from tools.bench.console import Console, hang_up_ends
-    from tools.data.boards import load_board_file
-    from tools.data.sources import load_vehicle, read_text
+    from glider.tools.bench.client import Bench
+    from glider.tools.bench.console import Console, hang_up_ends
+    from glider.tools.data.boards import load_board_file
+    from glider.tools.data.sources import load_vehicle, read_text
 
     load_vehicle(vehicle)
     found = load_board_file(board)

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from tools.cli.common import compile_campaign, json_option, print_json, progress, say
+from glider.tools.cli.common import compile_campaign, json_option, print_json, progress, say
 
 PAIR: dict[str, Any] = {"nargs": 2, "type": float, "metavar": "LOW HIGH"}
 # option -> key of the campaign file that it stands in for
@@ -62,14 +62,14 @@ def campaign(campaign, design, out, jobs, dask, chunk, as_json, **options) -> No
         return
     import msgspec
 
-    from tools.data.errors import need
+    from glider.tools.data.errors import need
 
     need("campaign")
-    from tools.study.campaign.conduct import FLIGHTS_FILE, fly_campaign, write_flights
-    from tools.study.campaign.picture import write_page
-    from tools.study.campaign.plan import build_plan, load_campaign, with_options
-    from tools.study.campaign.store import write_whole
-    from tools.study.campaign.summary import summarise
+    from glider.tools.study.campaign.conduct import FLIGHTS_FILE, fly_campaign, write_flights
+    from glider.tools.study.campaign.picture import write_page
+    from glider.tools.study.campaign.plan import build_plan, load_campaign, with_options
+    from glider.tools.study.campaign.store import write_whole
+    from glider.tools.study.campaign.summary import summarise
 
     wanted, base = load_campaign(campaign)
     given = {KEYS[name]: None if value == () else value for name, value in options.items()}
@@ -100,9 +100,9 @@ def _make_runs(folder: Path, options: dict[str, Any], as_json: bool) -> None:
     """The identification design as a case; the truth goes beside it as truth.json."""
     import json
 
-    from tools.data.errors import InputError, need
-    from tools.data.sources import load_vehicle
-    from tools.identify.design import grid, truth, write_design
+    from glider.tools.data.errors import InputError, need
+    from glider.tools.data.sources import load_vehicle
+    from glider.tools.identify.design import grid, truth, write_design
 
     need("analysis")
     given = [

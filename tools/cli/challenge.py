@@ -5,8 +5,8 @@ from pathlib import Path
 
 import click
 
-from tools.cli.common import fail, json_option, print_json, progress, say
-from tools.cli.many import again_option, dask_option, jobs_option, need_for
+from glider.tools.cli.common import fail, json_option, print_json, progress, say
+from glider.tools.cli.many import again_option, dask_option, jobs_option, need_for
 
 folder = click.Path(path_type=Path, file_okay=False)
 COUNT = click.IntRange(0, 1000)
@@ -43,19 +43,19 @@ def make(
     unchanged: int | None, runs: int | None, reference: int | None,
 ) -> None:  # fmt: skip
     """Draw, fly and seal a blind test. Cases that are there are kept: call again to go on after a stop."""
-    from tools.study.challenge.make import Order
-    from tools.study.challenge.make import make as make_all
-    from tools.study.challenge.ocean_make import OceanOrder
-    from tools.study.challenge.ocean_plan import MISSIONS
-    from tools.study.challenge.plan import MESSY, Counts
-    from tools.study.challenge.seal import ARCHIVE, MANIFEST, read_manifest
-    from tools.study.challenge.watch_make import WatchOrder
-    from tools.study.challenge.watch_plan import LEAST_WATCHED, WatchCounts
+    from glider.tools.study.challenge.make import Order
+    from glider.tools.study.challenge.make import make as make_all
+    from glider.tools.study.challenge.ocean_make import OceanOrder
+    from glider.tools.study.challenge.ocean_plan import MISSIONS
+    from glider.tools.study.challenge.plan import MESSY, Counts
+    from glider.tools.study.challenge.seal import ARCHIVE, MANIFEST, read_manifest
+    from glider.tools.study.challenge.watch_make import WatchOrder
+    from glider.tools.study.challenge.watch_plan import LEAST_WATCHED, WatchCounts
 
     _check_kind(watch, ocean, form)
     if form:
-        from tools.study.challenge.form_make import FormOrder
-        from tools.study.challenge.form_plan import FormCounts
+        from glider.tools.study.challenge.form_make import FormOrder
+        from glider.tools.study.challenge.form_plan import FormCounts
 
         asked = {"changed": changed, "unchanged": unchanged, "outside": outside, "reference": reference}
         formed = replace(FormCounts(), **_given(asked))
@@ -118,8 +118,8 @@ def run(
 
     What stands after `--` is handed on to `gap diagnose`. A case's time counts its whole process.
     """
-    from tools.study.challenge.diagnose_all import DIAGNOSIS, FORM, MISSION, WATCH, count_cases
-    from tools.study.challenge.diagnose_all import run as run_all
+    from glider.tools.study.challenge.diagnose_all import DIAGNOSIS, FORM, MISSION, WATCH, count_cases
+    from glider.tools.study.challenge.diagnose_all import run as run_all
 
     need_for(jobs, dask)
     _check_kind(watch, ocean, form)
@@ -147,16 +147,16 @@ def score(
     ocean: bool, form: bool, as_json: bool,
 ) -> None:  # fmt: skip
     """Open the sealed answers, check them against the manifest, and score the diagnoses (docs/CHALLENGE.md)."""
-    from tools.data.errors import InputError, need
-    from tools.study.challenge.judge import judge
+    from glider.tools.data.errors import InputError, need
+    from glider.tools.study.challenge.judge import judge
 
     need("analysis")
     if manifest is not None and not manifest.is_file():
         raise InputError("no such file", source=manifest, column="--manifest")
     _check_kind(watch, ocean, form)
     if watch:
-        from tools.study.challenge.ocean_score import judge_missions
-        from tools.study.challenge.watch_score import judge_watches
+        from glider.tools.study.challenge.ocean_score import judge_missions
+        from glider.tools.study.challenge.watch_score import judge_watches
 
         with progress("scored", _answered(cases)) as advance:
             watched = (judge_missions if ocean else judge_watches)(
@@ -169,7 +169,7 @@ def score(
             _print_watches(watched)
         return
     if form:
-        from tools.study.challenge.form_score import judge_forms as judge
+        from glider.tools.study.challenge.form_score import judge_forms as judge
     with progress("scored", _answered(cases)) as advance:
         found = judge(
             cases, answers, diagnoses, manifest=manifest, partial=partial, closing=not no_closed, advance=advance
@@ -181,7 +181,7 @@ def score(
 
 
 def _answered(cases: Path) -> int:
-    from tools.study.challenge.diagnose_all import count_cases
+    from glider.tools.study.challenge.diagnose_all import count_cases
 
     return count_cases(cases)
 

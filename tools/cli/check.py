@@ -7,7 +7,7 @@ from typing import Any, NoReturn
 
 import click
 
-from tools.cli.common import DONE, FAILED, json_option, print_json, say
+from glider.tools.cli.common import DONE, FAILED, json_option, print_json, say
 
 
 @click.command()
@@ -34,14 +34,14 @@ def check(
     """
     if moved["live"] or moved["compile_"] or moved["acknowledge"]:
         _moved(context, as_json=as_json, **moved)
-    from firmware.core.jit import CACHE_DIR
-    from firmware.model.k2_margin import K2Margin
-    from hal.ports import BoardError
-    from hal.strict import ConfigError
-    from tools.data.boards import load_board_file
-    from tools.data.errors import InputError
-    from tools.data.sources import load_mission, load_vehicle
-    from tools.flight.compose import build_flight
+    from glider.firmware.core.jit import CACHE_DIR
+    from glider.firmware.model.k2_margin import K2Margin
+    from glider.hal.ports import BoardError
+    from glider.hal.strict import ConfigError
+    from glider.tools.data.boards import load_board_file
+    from glider.tools.data.errors import InputError
+    from glider.tools.data.sources import load_mission, load_vehicle
+    from glider.tools.flight.compose import build_flight
 
     findings: list[dict] = []
     covers: list[K2Margin] = []
@@ -77,7 +77,7 @@ def check(
     good = [look("vehicle", see_vehicle), look("mission", see_mission), look("board", see_board)]
     if all(good):
         good.append(look("together", see_all))
-    for cover in covers:  # a warning at most: the law flies all the same, only that V falls is then not promised
+    for cover in covers:  # a warning at most: the law flies all the same, only that V falls is then not guaranteed
         finding = {"check": "law", "pass": True, "warning": not cover.covered, "message": str(cover)}
         findings.append({**finding, **asdict(cover)})
     if all(good) and load_board_file(board).kind != "sim":
@@ -98,9 +98,9 @@ def check(
 
 def _moved(context: click.Context, **asked: Any) -> NoReturn:
     """What were options of `check` and are commands now: named, then done."""
-    from tools.cli.acknowledge import acknowledge
-    from tools.cli.compile_ import compile_
-    from tools.cli.status import status
+    from glider.tools.cli.acknowledge import acknowledge
+    from glider.tools.cli.compile_ import compile_
+    from glider.tools.cli.status import status
 
     state = asked["state"]
     for option, command, given in (
@@ -117,9 +117,9 @@ def arming_list(mission: str, vehicle: str, board: str) -> list[dict]:
     """Findings of the arming list, as `glider fly` would have them; the board is opened and given back."""
     import contextlib
 
-    from hal.ports import BoardError
-    from tools.flight.arming import Arming
-    from tools.flight.compose import build_flight
+    from glider.hal.ports import BoardError
+    from glider.tools.flight.arming import Arming
+    from glider.tools.flight.compose import build_flight
 
     flight = build_flight(mission=mission, vehicle=vehicle, board=board)
     try:
@@ -133,25 +133,25 @@ def arming_list(mission: str, vehicle: str, board: str) -> list[dict]:
 
 def talk(board: str, vehicle: str, signs: bool) -> list[dict]:
     """Findings of a board's devices; ports are given back and actuators stopped before this returns."""
-    from hal.boardfile import DeviceFile, calibration_hash, decode_device_file
-    from sim_backend.twins.boardfile import decode_twin_file
-    from tools.bench.client import Bench, BenchError
-    from tools.bench.signs import Finding, Signs, look
-    from tools.data.boards import load_board_file
+    from glider.hal.boardfile import DeviceFile, calibration_hash, decode_device_file
+    from glider.sim_backend.twins.boardfile import decode_twin_file
+    from glider.tools.bench.client import Bench, BenchError
+    from glider.tools.bench.signs import SignFinding, Signs, look
+    from glider.tools.data.boards import load_board_file
 
     found = load_board_file(board)
     read = decode_twin_file if found.kind == "twin" else decode_device_file
     file: DeviceFile = read(found.text, found.source)
     accepted = file.calibration == calibration_hash(file)
     said = "as accepted" if accepted else "not the one accepted, or never accepted; see glider bench, `accept`"
-    items = [Finding("calibration", accepted, said)]
+    items = [SignFinding("calibration", accepted, said)]
     try:
         with Bench(found.text, found.source, found.kind, vehicle, None) as bench:
             items += look(bench)
             if signs:
                 items += Signs(bench, say, _ask).run()
     except BenchError as error:
-        items.append(Finding("devices", False, str(error)))
+        items.append(SignFinding("devices", False, str(error)))
     return [{"check": item.check, "pass": item.passed, "message": item.message} for item in items]
 
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import click
 
-from tools.data.errors import BAD_INPUT, DONE, FAILED, InputError, MissingExtra, missing_extra
-from tools.data.plain import as_plain
+from glider.tools.data.errors import BAD_INPUT, DONE, FAILED, InputError, MissingExtra, missing_extra
+from glider.tools.data.plain import as_plain
 
 vehicle_option = click.option(
     "--vehicle", metavar="FILE", help="A shipped vehicle or a vehicle file, in the place of the case's own."
@@ -70,9 +70,9 @@ def progress(label: str, total: int, *, bar: bool = True) -> Iterator[Callable[[
 
 def compile_diagnosis(case: Any) -> None:
     """Compile what the diagnosis of a case calls, unless that was done: an ocean glider's kernels are few."""
-    from sim_backend.ocean.vehicle import OceanVehicle
-    from tools.diagnose.precompile import DIAGNOSIS
-    from tools.flight.precompile import ensure_compiled
+    from glider.sim_backend.ocean.vehicle import OceanVehicle
+    from glider.tools.diagnose.precompile import DIAGNOSIS
+    from glider.tools.flight.precompile import ensure_compiled
 
     if not isinstance(case.vehicle, OceanVehicle):
         ensure_compiled(DIAGNOSIS, say, progress)
@@ -80,15 +80,15 @@ def compile_diagnosis(case: Any) -> None:
 
 def compile_campaign() -> None:
     """Compile what flies many flights side by side, unless that was done."""
-    from tools.flight.precompile import ensure_compiled
-    from tools.study.precompile import CAMPAIGN
+    from glider.tools.flight.precompile import ensure_compiled
+    from glider.tools.study.precompile import CAMPAIGN
 
     ensure_compiled(CAMPAIGN, say, progress)
 
 
 def report_errors(command: click.Command) -> int:
     """Run the command line; turn what a user can cause into one line and exit code 2."""
-    from hal.strict import ConfigError
+    from glider.hal.strict import ConfigError
 
     try:
         command(standalone_mode=False)

@@ -6,7 +6,7 @@ from importlib.util import find_spec
 
 import click
 
-from tools.cli.common import fail, json_option, print_json, progress, say
+from glider.tools.cli.common import fail, json_option, print_json, progress, say
 
 
 @click.command("compile")
@@ -16,8 +16,8 @@ def compile_(as_json: bool) -> None:
 
     Once for a version of the code: later starts load them.
     """
-    from firmware.core.jit import CACHE_DIR
-    from tools.flight.precompile import FLIGHT, ensure_compiled
+    from glider.firmware.core.jit import CACHE_DIR
+    from glider.tools.flight.precompile import FLIGHT, ensure_compiled
 
     diagnosis = _compile_diagnosis()
     ensure_compiled(FLIGHT, say, progress)
@@ -33,9 +33,9 @@ def _compile_diagnosis() -> subprocess.Popen[bytes] | None:
     """A process that compiles what a diagnosis calls, beside the flight's; None where it is there, or not installed."""
     if not find_spec("scipy"):
         return None
-    from tools.diagnose.precompile import DIAGNOSIS
+    from glider.tools.diagnose.precompile import DIAGNOSIS
 
     stamp = DIAGNOSIS.stamp()
     if stamp is None or stamp.exists():
         return None
-    return subprocess.Popen([sys.executable, "-m", "tools.diagnose.precompile"])
+    return subprocess.Popen([sys.executable, "-m", "glider.tools.diagnose.precompile"])

@@ -2,7 +2,7 @@
 
 import click
 
-from tools.cli.common import json_option, print_json
+from glider.tools.cli.common import json_option, print_json
 
 
 @click.command()
@@ -13,8 +13,8 @@ def effects(labels: tuple[str, ...], as_json: bool) -> None:
 
     Example: glider effects drag; glider fly --effect drag:scale=0.3 --no-log
     """
-    from sim_backend.core.effects.catalogue import catalogue
-    from tools.data.errors import InputError
+    from glider.sim_backend.core.effects.catalogue import catalogue
+    from glider.tools.data.errors import InputError
 
     known = catalogue()
     for label in labels:

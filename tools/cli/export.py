@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from tools.cli.common import json_option, print_json, say
+from glider.tools.cli.common import json_option, print_json, say
 
 
 @click.group("export")
@@ -22,10 +22,10 @@ def export() -> None:
 @json_option
 def og1(case: Path, out: Path, answers: tuple[Path, ...], as_json: bool) -> None:
     """Write an ocean glider's case as a mission in OceanGliders' common format (OG-1.0)."""
-    from tools.data.errors import need
+    from glider.tools.data.errors import need
 
     need("ocean")
-    from tools.data.exporters.og1 import export_og1
+    from glider.tools.data.exporters.og1 import export_og1
 
     found = export_og1(case, out, list(answers))
     for one in found:

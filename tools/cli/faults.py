@@ -4,13 +4,13 @@ import os
 
 import click
 
-from tools.cli.common import DONE, FAILED, json_option, print_json, progress
+from glider.tools.cli.common import DONE, FAILED, json_option, print_json, progress
 
 
 def _row(context: click.Context, option: click.Parameter, row: int | None) -> int | None:
     """Refuse a number that is no row of the fault table; the table is imported only where a row was given."""
     if row is not None:
-        from firmware.faults import FAULTS
+        from glider.firmware.faults import FAULTS
 
         if row not in FAULTS:
             raise click.BadParameter(f"there is no row {row}; rows are {min(FAULTS)} to {max(FAULTS)}.")
@@ -29,7 +29,7 @@ def faults(only: int | None, disabled: int | None, workers: int, as_json: bool) 
     A row passes if each of its cases is noticed within its time and two ticks, causes the reaction expected, and ends
     at the surface or safe. Exit code 1: a row failed.
     """
-    from tools.study.faults.campaign import jobs, run_all, summary
+    from glider.tools.study.faults.campaign import jobs, run_all, summary
 
     with progress("faults", len(jobs(only))) as advance:
         result = summary(list(run_all(only, disabled, workers, advance)))

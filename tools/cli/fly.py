@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from tools.cli.common import DONE, FAILED, fail, json_option, print_json, progress, say
+from glider.tools.cli.common import DONE, FAILED, fail, json_option, print_json, progress, say
 
 ENDINGS = {
     "SURFACED": "", "PUMP_GIVEN_UP": "at the surface, but the pump did not bring the ballast to its light end",
@@ -28,8 +28,8 @@ def next_log(mission: str) -> Path:
 
 def live_socket(folder: Path | None) -> Path:
     """Where onlookers find a flight: beside its heartbeat."""
-    from hal.heartbeat import run_folder
-    from tools.flight.live_view import NAME
+    from glider.hal.heartbeat import run_folder
+    from glider.tools.flight.live_view import NAME
 
     folder = folder or run_folder()
     folder.mkdir(parents=True, exist_ok=True, mode=0o750)
@@ -81,15 +81,15 @@ def fly(
     terminal, a second Ctrl-C under water wants a third, and a flight that broke off is never resumed: the next start
     only brings the vehicle up. Exit code 1: the flight did not complete.
     """
-    from firmware.core.layouts.control_layout import LEG
-    from firmware.runtime import Ending
-    from hal.ports import BoardError, Hardware
-    from hal.recorder.recorder import NullRecorder, Recorder
-    from tools.data.errors import InputError
-    from tools.flight import sortie
-    from tools.flight.compose import build_flight, build_recorder, parse_effects, record_specs
-    from tools.flight.precompile import FLIGHT, ensure_compiled
-    from tools.flight.terminal import Stop, undisturbed
+    from glider.firmware.core.layouts.control_layout import LEG
+    from glider.firmware.runtime import Ending
+    from glider.hal.ports import BoardError, Hardware
+    from glider.hal.recorder.recorder import NullRecorder, Recorder
+    from glider.tools.data.errors import InputError
+    from glider.tools.flight import sortie
+    from glider.tools.flight.compose import build_flight, build_recorder, parse_effects, record_specs
+    from glider.tools.flight.precompile import FLIGHT, ensure_compiled
+    from glider.tools.flight.terminal import Stop, terminal_detached
 
     wanted = parse_effects(effects)
     for label in (item for item in effects if item in wanted):
@@ -108,8 +108,8 @@ def fly(
     def make_recorder() -> Recorder | NullRecorder:
         if path is None:
             return NullRecorder(record_specs(flight))
-        onlookers = live_socket(state_folder) if live else None
-        return build_recorder(flight, path, seed=seed, effects=wanted, onlookers=onlookers)
+        live_stream = live_socket(state_folder) if live else None
+        return build_recorder(flight, path, seed=seed, effects=wanted, live_stream=live_stream)
 
     ensure_compiled(FLIGHT, say, progress)
     if flight.control.controller != "pid":
@@ -118,22 +118,22 @@ def fly(
                 say(f"warning: {axis}")
     name = flight.mission.name if path is None else path.stem
     simulated = flight.board.hardware is Hardware.NONE
-    host: sortie.Host = sortie.SimulatedHost(flight, name=name, paced=realtime)
+    host: sortie.FlightHost = sortie.SimulatedHost(flight, name=name, paced=realtime)
     if not simulated:
         host = keep(flight, name, state_folder, acknowledge, yes, board)
-    wishes, supervisor = Wishes(priority, lock_memory, core), flight.supervisor
+    options, supervisor = RealTimeOptions(priority, lock_memory, core), flight.supervisor
     legs, done = len(flight.mission.leg), 0
 
     stop = Stop(flight.autopilot.give_up, supervisor.surface_depth, None if simulated else supervisor.measured_depth)
     before = signal.signal(signal.SIGINT, stop)
     try:
-        with contextlib.nullcontext() if simulated else undisturbed(), contextlib.ExitStack() as stack:
+        with contextlib.nullcontext() if simulated else terminal_detached(), contextlib.ExitStack() as stack:
             advance: Callable[[int], None] | None = None
 
             def before_loop() -> None:
                 nonlocal advance
                 advance = stack.enter_context(progress(f"flying {flight.mission.name}", legs, bar=simulated))
-                wishes.grant()
+                options.apply()
 
             def on_second(t: float) -> None:
                 nonlocal done
@@ -178,7 +178,7 @@ def fly(
             "complete": report.complete,
             "parts": report.parts,
         },
-        "real_time": wishes.said,
+        "real_time": options.said,
     }
     result["devices"], result["truth"] = flight.board.health(), flight.board.state()
     if as_json:
@@ -188,16 +188,16 @@ def fly(
     raise SystemExit(DONE if completed else FAILED)
 
 
-class Wishes:
-    """What the flight asks of the system to be punctual, and what came of it."""
+class RealTimeOptions:
+    """What the flight asks of the system to be punctual, and its outcome."""
 
     def __init__(self, priority: int | None, lock_memory: bool, core: int | None):
         self._priority, self._lock_memory, self._core = priority, lock_memory, core
         self.said: list[str] = []
 
-    def grant(self) -> None:
+    def apply(self) -> None:
         """Ask, just before the loop: what the flight has started keeps its own ways. Said where anything was asked."""
-        from hal import realtime
+        from glider.hal import realtime
 
         if self._core is not None:
             self.said.append(realtime.pin_to_core(self._core))
@@ -212,7 +212,7 @@ class Wishes:
 
 def faults_noticed(supervisor) -> list[dict]:
     """Rows of the fault table that asked for something: when first, and for what at most."""
-    from firmware.faults import FAULTS
+    from glider.firmware.faults import FAULTS
 
     return [
         {"number": row, "name": FAULTS[row], "noticed_s": at, "reaction": supervisor.worst(row).name}
@@ -224,12 +224,12 @@ def faults_noticed(supervisor) -> list[dict]:
 def keep(flight, name: str, folder: Path | None, acknowledge: bool, yes: bool, board: str):
     """The host of a flight on devices (flight/keeper): claimed, and the person asked. Ends with exit code 1 where the
     vehicle is not to be armed."""
-    from hal.ports import BoardError
-    from hal.sortie import State
-    from tools.flight.keeper import Keeper
-    from tools.flight.terminal import confirm_arming
+    from glider.hal.ports import BoardError
+    from glider.hal.sortie import SortieState
+    from glider.tools.flight.keeper import FlightSupervision
+    from glider.tools.flight.terminal import confirm_arming
 
-    keeper = Keeper(flight, name=name, folder=folder, twin=flight.twinned)
+    keeper = FlightSupervision(flight, name=name, folder=folder, twin=flight.twinned)
     try:
         acknowledged = keeper.claim(acknowledged=acknowledge)
     except BoardError as error:
@@ -237,7 +237,7 @@ def keep(flight, name: str, folder: Path | None, acknowledge: bool, yes: bool, b
     if acknowledged is not None:
         say(f"acknowledged: {acknowledged.describe()}")
     before = keeper.journal.before
-    if before.state == State.HELD:
+    if before.state == SortieState.HELD:
         fail(f"glider: not armed: {before.describe()}; look at the vehicle, then `glider acknowledge`")
     if before.state.must_ascend:
         say(f"ascending only: {before.describe()}")

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import click
 
-from tools.cli.challenge import challenge
-from tools.cli.common import compile_diagnosis, json_option, print_json, progress, say, vehicle_option
-from tools.cli.many import ask_all, cases_argument, is_many
-from tools.cli.readings import readings
-from tools.cli.watch import watch
+from glider.tools.cli.challenge import challenge
+from glider.tools.cli.common import compile_diagnosis, json_option, print_json, progress, say, vehicle_option
+from glider.tools.cli.many import cases_argument, is_many, run_batch_command
+from glider.tools.cli.readings import readings
+from glider.tools.cli.watch import watch
 
 STEPS = 7  # of a diagnosis: screen, up to three effects, verdict, how far, report
 
@@ -30,9 +30,9 @@ def measure(case: Path, report: Path | None, vehicle: str | None, as_json: bool)
     Gaps are root mean square errors in tolerances: at 1 the simulator is off by as much as may be. Without --json a
     report is written too, to <case>-gap.html in the working directory unless --report names a file.
     """
-    from tools.data.errors import need
-    from tools.data.runs.case import load_case
-    from tools.gap.assess import assess
+    from glider.tools.data.errors import need
+    from glider.tools.data.runs.case import load_case
+    from glider.tools.gap.assess import assess
 
     need("analysis")
     loaded = load_case(case, vehicle)
@@ -44,7 +44,7 @@ def measure(case: Path, report: Path | None, vehicle: str | None, as_json: bool)
         if report is None and not as_json:
             report = Path(f"{case.resolve().name}-gap.html")
         if report is not None:
-            from tools.report.gap import write_report
+            from glider.tools.report.gap import write_report
 
             write_report(report, found)
         advance(1)
@@ -83,13 +83,13 @@ def _print_table(found) -> None:
 @vehicle_option
 def predict(run: Path, model: str, out: Path, vehicle: str | None) -> None:
     """Predict RUN (a run file beside its case.toml): its rows and columns, no gaps, window by window."""
-    from tools.data.errors import InputError
-    from tools.data.runs.case import load_case_of_run
-    from tools.data.runs.run import write_run
-    from tools.inference.kinds import kind_of
-    from tools.inference.load import load_model
-    from tools.inference.predict import as_run
-    from tools.inference.predict import predict as predict_runs
+    from glider.tools.data.errors import InputError
+    from glider.tools.data.runs.case import load_case_of_run
+    from glider.tools.data.runs.run import write_run
+    from glider.tools.inference.kinds import kind_of
+    from glider.tools.inference.load import load_model
+    from glider.tools.inference.predict import as_run
+    from glider.tools.inference.predict import predict as predict_runs
 
     case, recorded = load_case_of_run(run, vehicle)
     if out.exists() and run.exists() and out.samefile(run):
@@ -125,11 +125,11 @@ def diagnose(
     are; those that are answered are kept.
     """
     if is_many(cases, jobs, dask, again):
-        from tools.study.many_cases import OneCommand
+        from glider.tools.study.many_cases import OneCommand
 
         options = [] if without is None else ["--without", without]
         asked = OneCommand(("gap", "diagnose"), "diagnosis.json", options, vehicle, reference)
-        ask_all(cases, out, asked, jobs, dask, again, as_json)
+        run_batch_command(cases, out, asked, jobs, dask, again, as_json)
         return
     if reference is not None and without is not None:
         raise click.UsageError("--without is of a diagnosis without a --reference")
@@ -140,15 +140,15 @@ def _diagnose_one(
     case: Path, reference: Path | None, out: Path, without: str | None, vehicle: str | None, as_json: bool
 ) -> None:
     """The diagnosis of one case, in `out`."""
-    from sim_backend.ocean.vehicle import OceanVehicle
-    from tools.data.errors import InputError, need
-    from tools.data.runs.case import load_case
-    from tools.diagnose.against_healthy import form_stands_out
-    from tools.diagnose.diagnosis import diagnose as run_diagnosis
-    from tools.diagnose.diagnosis import plain, write
-    from tools.inference.rules import Rules
-    from tools.report.diagnosis import write_report
-    from tools.report.words import sentence
+    from glider.sim_backend.ocean.vehicle import OceanVehicle
+    from glider.tools.data.errors import InputError, need
+    from glider.tools.data.runs.case import load_case
+    from glider.tools.diagnose.against_healthy import form_stands_out
+    from glider.tools.diagnose.diagnosis import diagnose as run_diagnosis
+    from glider.tools.diagnose.diagnosis import plain, write
+    from glider.tools.inference.rules import Rules
+    from glider.tools.report.diagnosis import write_report
+    from glider.tools.report.words import sentence
 
     need("analysis")
     loaded = load_case(case, vehicle)
@@ -186,10 +186,10 @@ def _diagnose_one(
 
 def _diagnose_against(case, reference, out: Path, as_json: bool) -> None:
     """The same against healthy runs (docs/DIAGNOSIS.md, Against healthy runs)."""
-    from tools.diagnose.against_answer import write
-    from tools.diagnose.against_healthy import diagnose_against_healthy
-    from tools.report.page import REPORT
-    from tools.report.pooled import write_pooled_report
+    from glider.tools.diagnose.against_answer import write
+    from glider.tools.diagnose.against_healthy import diagnose_against_healthy
+    from glider.tools.report.page import REPORT
+    from glider.tools.report.pooled import write_pooled_report
 
     found = diagnose_against_healthy(case, reference, lambda text: print(text, file=sys.stderr))
     answer, said = write(found, out), write_pooled_report(out)
@@ -203,9 +203,9 @@ def _diagnose_against(case, reference, out: Path, as_json: bool) -> None:
 
 def _diagnose_ocean(case, out: Path, as_json: bool) -> None:
     """The same of an ocean glider (docs/OCEAN.md, Diagnosis)."""
-    from tools.report.page import REPORT
-    from tools.report.pooled import write_pooled_report
-    from tools.watch.whole_case import diagnose_ocean, plain, write
+    from glider.tools.report.page import REPORT
+    from glider.tools.report.pooled import write_pooled_report
+    from glider.tools.watch.whole_case import diagnose_ocean, plain, write
 
     found = diagnose_ocean(case, lambda text: print(text, file=sys.stderr))
     write(found, out)
@@ -233,10 +233,10 @@ def _diagnose_ocean(case, out: Path, as_json: bool) -> None:
 @json_option
 def velocity(case: Path, model: str, out: Path, as_json: bool) -> None:
     """Velocity through the water of an ocean glider, with its standard deviation: a CSV for each run of CASE."""
-    from tools.data.runs.case import load_case
-    from tools.gap.heading import heading_test
-    from tools.gap.velocity import velocities, write
-    from tools.inference.load import load_model
+    from glider.tools.data.runs.case import load_case
+    from glider.tools.gap.heading import heading_test
+    from glider.tools.gap.velocity import velocities, write
+    from glider.tools.inference.load import load_model
 
     loaded = load_case(case, None if model == "nominal" else model)
     found = velocities(loaded, load_model("nominal", loaded))
@@ -255,14 +255,14 @@ def velocity(case: Path, model: str, out: Path, as_json: bool) -> None:
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 def report(folder: Path) -> None:
     """Draw report.html again from what `glider gap diagnose` or `glider gap watch` left in DIR."""
-    from tools.data.errors import need
-    from tools.diagnose.record import is_pooled
-    from tools.report.diagnosis import write_report
-    from tools.report.page import REPORT
-    from tools.report.pooled import write_pooled_report
-    from tools.report.watch import write_watch_report
-    from tools.report.words import sentence
-    from tools.watch.answer import FILE
+    from glider.tools.data.errors import need
+    from glider.tools.diagnose.record import is_pooled
+    from glider.tools.report.diagnosis import write_report
+    from glider.tools.report.page import REPORT
+    from glider.tools.report.pooled import write_pooled_report
+    from glider.tools.report.watch import write_watch_report
+    from glider.tools.report.words import sentence
+    from glider.tools.watch.answer import FILE
 
     need("analysis")
     if (folder / FILE).is_file():

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from tools.cli.common import json_option, print_json, say, vehicle_option
+from glider.tools.cli.common import json_option, print_json, say, vehicle_option
 
 
 @click.command()
@@ -25,9 +25,9 @@ def identify(case: Path, out: Path | None, seed: int, likelihood: str, vehicle: 
     than the file does. With --out: identified.toml (a vehicle file that says where it comes from), report.html,
     posterior.nc (ArviZ).
     """
-    from sim_backend.ocean.vehicle import OceanVehicle
-    from tools.data.errors import need
-    from tools.data.runs.case import load_case
+    from glider.sim_backend.ocean.vehicle import OceanVehicle
+    from glider.tools.data.errors import need
+    from glider.tools.data.runs.case import load_case
 
     loaded = load_case(case, vehicle)
     if isinstance(loaded.vehicle, OceanVehicle):
@@ -35,7 +35,7 @@ def identify(case: Path, out: Path | None, seed: int, likelihood: str, vehicle: 
         _identify_ocean(loaded, out, as_json)
         return
     need("identify")
-    from tools.identify.pipeline import identify as run_identification
+    from glider.tools.identify.pipeline import identify as run_identification
 
     found = run_identification(loaded, seed, likelihood, lambda text: print(text, file=sys.stderr))
     for one in found.left_out:
@@ -43,8 +43,8 @@ def identify(case: Path, out: Path | None, seed: int, likelihood: str, vehicle: 
     for note in found.notes:
         say(note)
     if out is not None:
-        from tools.identify.files import VEHICLE, write
-        from tools.report.identified import write_report
+        from glider.tools.identify.files import VEHICLE, write
+        from glider.tools.report.identified import write_report
 
         write(found, out)
         write_report(out / "report.html", found)
@@ -57,8 +57,8 @@ def identify(case: Path, out: Path | None, seed: int, likelihood: str, vehicle: 
 
 def _identify_ocean(case, out: Path | None, as_json: bool) -> None:
     """The same of an ocean glider: no chains, its posterior is close to normal (docs/OCEAN.md, Identification)."""
-    from tools.identify.ocean.files import VEHICLE, plain, write
-    from tools.identify.ocean.identify import identify_ocean
+    from glider.tools.identify.ocean.files import VEHICLE, plain, write
+    from glider.tools.identify.ocean.identify import identify_ocean
 
     found = identify_ocean(case, lambda text: print(text, file=sys.stderr))
     for one in found.left_out:
@@ -76,8 +76,8 @@ def _identify_ocean(case, out: Path | None, as_json: bool) -> None:
         click.echo(f"{number.name:<18} {number.mean:>11.5g} {number.sd:>9.2g}   {interval:<24} {number.unit}")
     for finding in found.findings:
         click.echo(finding.sentence)
-    for ridge in found.ridges:
-        click.echo(ridge.sentence())
+    for weak_direction in found.ridges:
+        click.echo(weak_direction.sentence())
     if found.next_run is not None:
         click.echo(f"to part them: {found.next_run['text']}")
     click.echo(f"vertical water {100.0 * found.water_rms:.2f} cm/s rms over {len(found.water)} runs")
@@ -85,7 +85,7 @@ def _identify_ocean(case, out: Path | None, as_json: bool) -> None:
 
 def _tell(found) -> None:
     """The coefficients, and what the runs cannot tell, for a person."""
-    from tools.identify.identifiability import sentences, unidentifiable_directions
+    from glider.tools.identify.identifiability import sentences, unidentifiable_directions
 
     if found.held is not None:
         before, after = found.held.candidates[0].total, found.held.chosen.total

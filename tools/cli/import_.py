@@ -4,8 +4,8 @@ from pathlib import Path
 
 import click
 
-from tools.cli.common import json_option, print_json, say
-from tools.cli.import_ocean import COMMANDS
+from glider.tools.cli.common import json_option, print_json, say
+from glider.tools.cli.import_ocean import COMMANDS
 
 
 @click.group("import")
@@ -25,8 +25,8 @@ for _command in COMMANDS:
 @json_option
 def csv(files: tuple[Path, ...], mapping: str, out: Path | None, strict: bool, as_json: bool) -> None:
     """Turn CSV logs (.csv or .csv.gz), one a run, into a case, by a mapping file (docs/IMPORT.md)."""
-    from tools.data.importers.csvlog import import_csv
-    from tools.data.runs.run import run_name
+    from glider.tools.data.importers.csvlog import import_csv
+    from glider.tools.data.runs.run import run_name
 
     folder = files[0].parent / f"{run_name(files[0])}.case" if out is None else out
     imported = import_csv(list(files), mapping, folder, strict)
@@ -51,8 +51,8 @@ def csv(files: tuple[Path, ...], mapping: str, out: Path | None, strict: bool, a
 @json_option
 def qualisys(files, log, body, vehicle, out, as_json) -> None:
     """Turn 6DOF exports (TSV) of Qualisys into a case, aligned in time with the onboard logs of another case."""
-    from tools.data.errors import need
-    from tools.data.importers.captured import import_qualisys
+    from glider.tools.data.errors import need
+    from glider.tools.data.importers.captured import import_qualisys
 
     need("analysis")
     written, offsets = import_qualisys(list(files), log, body, vehicle, out)

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tools.cli.common import json_option, print_json, progress, say
+from glider.tools.cli.common import json_option, print_json, progress, say
 
 if TYPE_CHECKING:
-    from tools.data.importers.ocean.mission import Mission
-    from tools.data.importers.ocean.segment import Segment
+    from glider.tools.data.importers.ocean.mission import ImportedMission
+    from glider.tools.data.importers.ocean.segment import Segment
 
 SHOWN = 20  # lines about single runs
 MANY = 20  # files: reading fewer takes seconds
@@ -26,11 +26,11 @@ out_option = click.option("--out", required=True, type=click.Path(path_type=Path
 @json_option
 def slocum(files: tuple[Path, ...], out: Path, cache: Path | None, as_json: bool) -> None:
     """Turn binaries of a Slocum (.dbd with .ebd, .sbd with .tbd, ...) into a case, a run for each segment."""
-    from tools.data.errors import need
+    from glider.tools.data.errors import need
 
     need("slocum")
     need("ocean")
-    from tools.data.importers.ocean.slocum import read_slocum
+    from glider.tools.data.importers.ocean.slocum import read_slocum
 
     _import(files, out, "slocum", as_json, lambda advance: read_slocum(list(files), cache, advance))
 
@@ -41,10 +41,10 @@ def slocum(files: tuple[Path, ...], out: Path, cache: Path | None, as_json: bool
 @json_option
 def seaexplorer(files: tuple[Path, ...], out: Path, as_json: bool) -> None:
     """Turn a SeaExplorer's navigation and payload tables (.gli., .pld1.) into a case, a run for each segment."""
-    from tools.data.errors import need
+    from glider.tools.data.errors import need
 
     need("ocean")
-    from tools.data.importers.ocean.seaexplorer import read_seaexplorer
+    from glider.tools.data.importers.ocean.seaexplorer import read_seaexplorer
 
     _import(files, out, "seaexplorer", as_json, lambda advance: read_seaexplorer(list(files), advance))
 
@@ -55,10 +55,10 @@ def seaexplorer(files: tuple[Path, ...], out: Path, as_json: bool) -> None:
 @json_option
 def seaglider(files: tuple[Path, ...], out: Path, as_json: bool) -> None:
     """Turn a base station's dive files of a Seaglider (p*.nc) into a case, a run for each dive."""
-    from tools.data.errors import need
+    from glider.tools.data.errors import need
 
     need("ocean")
-    from tools.data.importers.ocean.seaglider import read_seaglider
+    from glider.tools.data.importers.ocean.seaglider import read_seaglider
 
     _import(files, out, "seaglider", as_json, lambda advance: read_seaglider(list(files), advance))
 
@@ -70,11 +70,11 @@ def seaglider(files: tuple[Path, ...], out: Path, as_json: bool) -> None:
 @json_option
 def og1(file: Path, out: Path, vehicle: str | None, as_json: bool) -> None:
     """Turn a mission in OceanGliders' common format (OG-1.0, NetCDF) into a case, a run for each dive."""
-    from tools.data.errors import need
+    from glider.tools.data.errors import need
 
     need("ocean")
-    from tools.data.importers.ocean.mission import write_mission
-    from tools.data.importers.ocean.og1 import read_og1
+    from glider.tools.data.importers.ocean.mission import write_mission
+    from glider.tools.data.importers.ocean.og1 import read_og1
 
     vehicle, segments = read_og1(file, vehicle)
     _show(write_mission(segments, out, vehicle), as_json)
@@ -90,7 +90,7 @@ def _import(
     as_json: bool,
     read: Callable[[Callable[[int], None]], "list[Segment]"],
 ) -> None:
-    from tools.data.importers.ocean.mission import write_mission
+    from glider.tools.data.importers.ocean.mission import write_mission
 
     if len(files) < MANY:
         segments = read(lambda _: None)
@@ -100,9 +100,9 @@ def _import(
     _show(write_mission(segments, out, vehicle), as_json)
 
 
-def _show(mission: "Mission", as_json: bool) -> None:
+def _show(mission: "ImportedMission", as_json: bool) -> None:
     """What was left out on standard error; the run files, or all as JSON, on standard output."""
-    from tools.data.importers.ocean.mission import total
+    from glider.tools.data.importers.ocean.mission import total
 
     for note in mission.notes[:SHOWN]:
         say(note)

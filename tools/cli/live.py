@@ -9,9 +9,9 @@ from pathlib import Path
 
 import click
 
-from tools.cli.common import DONE, fail, say
+from glider.tools.cli.common import DONE, fail, say
 
-ABOARD = "/run/glider/live"
+ONBOARD = "/run/glider/live"
 FORWARD_S = 15.0
 
 
@@ -27,9 +27,9 @@ def live(host: str | None, path: str | None, port: int, layout: Path | None) -> 
     user@glider; without it a flight on this computer is shown. Ends with the flight, or by Ctrl-C; the flight does not
     notice.
     """
-    from hal.heartbeat import run_folder
-    from tools.data.errors import InputError, need
-    from tools.flight import live_view
+    from glider.hal.heartbeat import run_folder
+    from glider.tools.data.errors import InputError, need
+    from glider.tools.flight import live_view
 
     if layout is not None:
         if layout.exists():
@@ -37,10 +37,12 @@ def live(host: str | None, path: str | None, port: int, layout: Path | None) -> 
         layout.write_text(live_view.layout(), encoding="utf-8")
         return
     need("live")
-    with _reach(host, path or ABOARD) if host else contextlib.nullcontext(
-        Path(path) if path else run_folder() / live_view.NAME
-    ) as socket:
-        line = live_view.Line(socket)
+    with (
+        _reach(host, path or ONBOARD)
+        if host
+        else contextlib.nullcontext(Path(path) if path else run_folder() / live_view.NAME) as socket
+    ):
+        line = live_view.LogLine(socket)
         view = live_view.View(line, port)
         say(f"{line.metadata.get('mission', 'a flight')}: ws://localhost:{view.server.port}")
         try:
@@ -59,8 +61,8 @@ def live(host: str | None, path: str | None, port: int, layout: Path | None) -> 
 @contextlib.contextmanager
 def _reach(host: str, path: str) -> Iterator[Path]:
     """A socket here that leads to one there; exit 1 where ssh does not get there."""
-    from tools.data.remote import RemoteError
-    from tools.data.remote import host as connect
+    from glider.tools.data.remote import RemoteError
+    from glider.tools.data.remote import host as connect
 
     try:
         with connect(host) as vehicle, tempfile.TemporaryDirectory(prefix="glider-live-") as folder:

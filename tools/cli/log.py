@@ -6,8 +6,8 @@ from typing import Any
 
 import click
 
-from tools.cli.common import DONE, FAILED, json_option, print_json, progress, say, show
-from tools.cli.replay import replay
+from glider.tools.cli.common import DONE, FAILED, json_option, print_json, progress, say, show
+from glider.tools.cli.replay import replay
 
 LEVELS = {10: "debug", 20: "info", 30: "warn", 40: "error", 50: "fatal"}
 _SHOWN_EVENTS = 20
@@ -19,7 +19,7 @@ def log() -> None:
 
 
 def _file(path: Path) -> Path:
-    from tools.data.errors import InputError
+    from glider.tools.data.errors import InputError
 
     if path.is_dir():
         raise InputError("a folder, where a log was expected", source=path)
@@ -37,7 +37,7 @@ def _state(the_log: Any) -> str:
 
 def _parts(the_log: Any) -> list[str]:
     """A flight's files, one a line, with what is missing before each; none for a log of one file."""
-    from tools.data.log.parts import FlightLog
+    from glider.tools.data.log.parts import FlightLog
 
     if not isinstance(the_log, FlightLog):
         return []
@@ -53,8 +53,8 @@ def _before(part: Any) -> str:
 
 def _headline(the_log: Any) -> str:
     """How it is with a log, in words."""
-    from hal.recorder.logfile import PART
-    from tools.data.log.parts import FlightLog
+    from glider.hal.recorder.logfile import PART
+    from glider.tools.data.log.parts import FlightLog
 
     if isinstance(the_log, FlightLog):
         return f"in {len(the_log.parts)} parts"
@@ -64,7 +64,7 @@ def _headline(the_log: Any) -> str:
 
 def _parts_summary(the_log: Any) -> dict[str, Any]:
     """What --json says of a flight's parts; nothing for a log of one file."""
-    from tools.data.log.parts import FlightLog
+    from glider.tools.data.log.parts import FlightLog
 
     if not isinstance(the_log, FlightLog):
         return {}
@@ -107,7 +107,7 @@ def _summary(the_log: Any) -> dict[str, Any]:
 
 def _devices(text: str) -> list[str]:
     """Error counts of the devices at the flight's end, one a line, out of the log's closing entry."""
-    from tools.flight.device_counts import errors_text
+    from glider.tools.flight.device_counts import errors_text
 
     try:
         return [f"{name}: {errors_text(health) or 'no errors'}" for name, health in json.loads(text).items()]
@@ -120,7 +120,7 @@ def _devices(text: str) -> list[str]:
 @json_option
 def info(file: Path, as_json: bool) -> None:
     """What is in a log, with the parts it goes on in: topics, counts, texts, events, and whether it is complete."""
-    from tools.data.log.parts import read_flight
+    from glider.tools.data.log.parts import read_flight
 
     the_log = read_flight(_file(file))
     if as_json:
@@ -153,7 +153,7 @@ log.add_command(replay)
 @json_option
 def export(sources: tuple[Path, ...], out: Path | None, vehicle: str | None, as_json: bool) -> None:
     """Turn logs into run data (a case folder, a run a log), or run data (a case's folder or run file) into a log."""
-    from tools.data.errors import InputError
+    from glider.tools.data.errors import InputError
 
     run_data = [source for source in sources if source.is_dir() or source.name.endswith((".csv", ".csv.gz"))]
     if run_data and len(sources) > 1:
@@ -173,8 +173,8 @@ def export(sources: tuple[Path, ...], out: Path | None, vehicle: str | None, as_
 
 
 def _to_case(sources: tuple[Path, ...], out: Path | None, vehicle: str | None) -> dict[str, Any]:
-    from tools.data.log.parts import read_flight
-    from tools.data.log.rundata import export_case
+    from glider.tools.data.log.parts import read_flight
+    from glider.tools.data.log.rundata import export_case
 
     logs = [read_flight(source) for source in sources]
     folder = _case_beside(sources[0]) if out is None else out
@@ -191,8 +191,8 @@ def _case_beside(source: Path) -> Path:
 
 def _to_logs(source: Path, out: Path | None) -> list[Path]:
     """One log a run: --out names it, or for several runs the folder that takes them; else beside the run."""
-    from tools.data.log.rundata import write_log
-    from tools.data.runs.case import load_case, load_case_of_run
+    from glider.tools.data.log.rundata import write_log
+    from glider.tools.data.runs.case import load_case, load_case_of_run
 
     if source.is_dir():
         case = load_case(source)
@@ -216,7 +216,7 @@ def repair(file: Path, out: Path | None, as_json: bool) -> None:
 
     The originals stay.
     """
-    from tools.data.log.repair import repair as repair_log
+    from glider.tools.data.log.repair import repair as repair_log
 
     report = repair_log(_file(file), out)
     lost = [vars(item) for item in report.damages]
@@ -252,17 +252,17 @@ def repair(file: Path, out: Path | None, as_json: bool) -> None:
 @log.command()
 @click.argument("host")
 @click.argument("names", nargs=-1)
-@click.option("--dir", "folder", default="/var/lib/glider/logs", show_default=True, help="Folder of the logs aboard.")
+@click.option("--dir", "folder", default="/var/lib/glider/logs", show_default=True, help="Folder of the onboard logs.")
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("logs"), show_default=True)
 @json_option
 def fetch(host: str, names: tuple[str, ...], folder: str, out: Path, as_json: bool) -> None:
     """Bring logs off the vehicle by ssh: all that are not here yet, or those NAMES (sawtooth-001, spiral-*).
 
     HOST is what ssh knows, user@glider. A fetch that broke off goes on where it was; a log counts as here only when it
-    has its check sum aboard. Nothing is deleted or written aboard. Exit code 1: not all are here; run it again.
+    has its check sum onboard. Nothing is deleted or written onboard. Exit code 1: not all are here; run it again.
     """
-    from tools.data.log import fetch as logs
-    from tools.data.remote import host as connect
+    from glider.tools.data.log import fetch as logs
+    from glider.tools.data.remote import host as connect
 
     done: list[logs.Fetched] = []
 

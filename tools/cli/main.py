@@ -7,32 +7,44 @@ import sys
 
 import click
 
-from tools.cli.common import report_errors
+from glider.tools.cli.common import report_errors
 
 # name -> (module, attribute, one line). The line stands here so that --help need not import the command.
 COMMANDS = {
-    "fly": ("tools.cli.fly", "fly", "fly a mission, in simulation or on a board"),
-    "live": ("tools.cli.live", "live", "watch a flight in Foxglove while it flies"),
-    "missions": ("tools.cli.missions", "missions", "list the missions"),
-    "effects": ("tools.cli.effects", "effects", "list the effects that a simulated vehicle can have"),
-    "check": ("tools.cli.check", "check", "check vehicle, board and mission files"),
-    "status": ("tools.cli.status", "status", "health page of the flight under way"),
-    "acknowledge": ("tools.cli.acknowledge", "acknowledge", "a person has looked: the next flight may begin"),
-    "compile": ("tools.cli.compile_", "compile_", "compile every kernel ahead"),
-    "bench": ("tools.cli.bench", "bench", "bench console: read, jog, sweep, calibrate a board's devices"),
-    "twin": ("tools.cli.twin", "twin", "twins of a board's devices on virtual serial ports"),
-    "log": ("tools.cli.log", "log", "export, look into or repair an onboard log"),
-    "import": ("tools.cli.import_", "import_", "bring other recordings into run data"),
-    "export": ("tools.cli.export", "export", "write a case in a format that others read"),
-    "gap": ("tools.cli.gap", "gap", "measure and predict: where simulation and sea disagree"),
-    "vehicle": ("tools.cli.vehicle", "vehicle", "a first vehicle file by question and answer; a vehicle at a glance"),
-    "identify": ("tools.cli.identify", "identify", "parameters and their distribution from runs (MCMC)"),
-    "reproduce": ("tools.cli.reproduce", "reproduce", "the paper's figures flown again: pictures and numbers"),
-    "campaign": ("tools.cli.campaign", "campaign", "many simulated flights at once, on all cores or on a Dask cluster"),
-    "tune": ("tools.cli.tune", "tune", "gains of the pitch and depth PID, by rule or by search"),
-    "simulate": ("tools.cli.simulate", "simulate", "open-loop nominal flight from a file of commands"),
-    "faults": ("tools.cli.faults", "faults", "fly the fault table: noticed after, reaction, how it ended"),
-    "benchmark": ("tools.measure.benchmark.command", "benchmark", "the speed figures, each as a ratio in one run"),
+    "fly": ("glider.tools.cli.fly", "fly", "fly a mission, in simulation or on a board"),
+    "live": ("glider.tools.cli.live", "live", "watch a flight in Foxglove while it flies"),
+    "missions": ("glider.tools.cli.missions", "missions", "list the missions"),
+    "effects": ("glider.tools.cli.effects", "effects", "list the effects that a simulated vehicle can have"),
+    "check": ("glider.tools.cli.check", "check", "check vehicle, board and mission files"),
+    "status": ("glider.tools.cli.status", "status", "health page of the flight under way"),
+    "acknowledge": ("glider.tools.cli.acknowledge", "acknowledge", "a person has looked: the next flight may begin"),
+    "compile": ("glider.tools.cli.compile_", "compile_", "compile every kernel ahead"),
+    "bench": ("glider.tools.cli.bench", "bench", "bench console: read, jog, sweep, calibrate a board's devices"),
+    "twin": ("glider.tools.cli.twin", "twin", "twins of a board's devices on virtual serial ports"),
+    "log": ("glider.tools.cli.log", "log", "export, look into or repair an onboard log"),
+    "import": ("glider.tools.cli.import_", "import_", "bring other recordings into run data"),
+    "export": ("glider.tools.cli.export", "export", "write a case in a format that others read"),
+    "gap": ("glider.tools.cli.gap", "gap", "measure and predict: where simulation and sea disagree"),
+    "vehicle": (
+        "glider.tools.cli.vehicle",
+        "vehicle",
+        "a first vehicle file by question and answer; a vehicle at a glance",
+    ),
+    "identify": ("glider.tools.cli.identify", "identify", "parameters and their distribution from runs (MCMC)"),
+    "reproduce": ("glider.tools.cli.reproduce", "reproduce", "the paper's figures flown again: pictures and numbers"),
+    "campaign": (
+        "glider.tools.cli.campaign",
+        "campaign",
+        "many simulated flights at once, on all cores or on a Dask cluster",
+    ),
+    "tune": ("glider.tools.cli.tune", "tune", "gains of the pitch and depth PID, by rule or by search"),
+    "simulate": ("glider.tools.cli.simulate", "simulate", "open-loop nominal flight from a file of commands"),
+    "faults": ("glider.tools.cli.faults", "faults", "fly the fault table: noticed after, reaction, how it ended"),
+    "benchmark": (
+        "glider.tools.measure.benchmark.command",
+        "benchmark",
+        "the speed figures, each as a ratio in one run",
+    ),
 }
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from tools.cli.common import fail, print_json, progress, say
+from glider.tools.cli.common import fail, print_json, progress, say
 
 jobs_option = click.option(
     "--jobs", type=click.IntRange(0, 256), help="Cases at a time, each in a process of its own: 1; 0: one a core."
@@ -23,7 +23,7 @@ def cases_argument(command: Callable[..., Any]) -> Callable[..., Any]:
 
 def need_for(jobs: int | None, dask: str | None) -> None:
     """MissingExtra where something is missing that work here or on a cluster takes."""
-    from tools.data.errors import need
+    from glider.tools.data.errors import need
 
     need("analysis")
     if dask or jobs not in (None, 1):
@@ -35,18 +35,18 @@ def is_many(cases: Sequence[Path], jobs: int | None, dask: str | None, again: bo
     return len(cases) > 1 or jobs is not None or dask is not None or again
 
 
-def ask_all(
+def run_batch_command(
     cases: Sequence[Path], out: Path | None, asked: Any, jobs: int | None, dask: str | None, again: bool, as_json: bool,
 ) -> None:  # fmt: skip
-    """Ask many cases by a many_cases.OneCommand; what failed is told, and exit code 1."""
-    from tools.study.many_cases import Many, ask
+    """Ask many cases by a many_cases.OneCommand; failures are reported, and exit code 1."""
+    from glider.tools.study.many_cases import Many, run_batch
 
     if out is None:
         raise click.UsageError("several cases need --out, a folder of their answers")
     need_for(jobs, dask)
     many = Many(cases, out, asked.answer, 1 if jobs is None else jobs, dask, again)
     with progress("answered", len(cases)) as advance:
-        done, wrong = ask(many, asked, advance=advance)
+        done, wrong = run_batch(many, asked, advance=advance)
     if as_json:
         print_json({"cases": _answers(many), "failed": wrong})
     kept = len(cases) - done - len(wrong)

@@ -2,15 +2,15 @@
 
 import click
 
-from tools.cli.common import json_option, print_json
+from glider.tools.cli.common import json_option, print_json
 
 
 @click.command()
 @json_option
 def missions(as_json: bool) -> None:
     """List the shipped missions."""
-    from firmware.guidance.mission import decode_mission
-    from firmware.model.library import shipped
+    from glider.firmware.guidance.mission import decode_mission
+    from glider.firmware.model.library import shipped
 
     found = [decode_mission(text, name) for name, text in shipped("guidance/missions").items()]
     if as_json:

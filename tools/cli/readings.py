@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from tools.cli.common import json_option, print_json, progress
+from glider.tools.cli.common import json_option, print_json, progress
 
 
 @click.command()
@@ -14,12 +14,12 @@ def readings(case: Path, as_json: bool) -> None:
     """What is wrong with the readings of CASE: each held against the others, without a vehicle file.
 
     A finding has a size with its 90 % interval, the catalogue's label where it has one, and says whether later stages
-    see the reading mended (docs/READINGS.md).
+    see the reading corrected (docs/READINGS.md).
     """
-    from sim_backend.ocean.vehicle import OceanVehicle
-    from tools.data.errors import InputError, need
-    from tools.data.runs.case import load_case
-    from tools.readings.check import check
+    from glider.sim_backend.ocean.vehicle import OceanVehicle
+    from glider.tools.data.errors import InputError, need
+    from glider.tools.data.runs.case import load_case
+    from glider.tools.readings.check import check
 
     need("analysis")
     with progress("readings", 2) as advance:
@@ -36,4 +36,4 @@ def readings(case: Path, as_json: bool) -> None:
         click.echo("nothing found: the readings agree with each other as far as these flights can show")
     for one in found.findings:
         label = f"  [{one.label}]" if one.label else ""
-        click.echo(f"{one.finding:11}{one.text}{label}{'  (mended)' if one.mended else ''}")
+        click.echo(f"{one.finding:11}{one.text}{label}{'  (corrected)' if one.mended else ''}")

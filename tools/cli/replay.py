@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from tools.cli.common import DONE, FAILED, json_option, print_json, progress, say, show
+from glider.tools.cli.common import DONE, FAILED, json_option, print_json, progress, say, show
 
 AROUND_S = (-10.0, -1.0, -0.1, None, 0.0, None, 1.0)  # columns: s from the abort; None: the tick before, the one after
 CHECKED = ("est_depth_m", "asked_servo_rad", "asked_slider_m", "asked_ballast_kg", "lateness_s", "recorder", "growth",
@@ -29,7 +29,7 @@ def nearest_ticks(replay: Any) -> list[int]:
 
 def inputs_around(replay: Any) -> dict[str, list[Any]]:
     """Return the recorded inputs and states of those ticks: a row's name -> a value for each tick, t_s first."""
-    from hal.ports import SLOTS, Validity
+    from glider.hal.ports import SLOTS, Validity
 
     ticks = nearest_ticks(replay)
 
@@ -115,7 +115,7 @@ def _differences(replay: Any) -> list[str]:
 
 
 def _states(difference: Any) -> dict[str, tuple[float, float]]:
-    from tools.flight.replay import STATES
+    from glider.tools.flight.replay import STATES
 
     return {name: pair for name, pair in difference.fields.items() if name in STATES}
 
@@ -164,9 +164,9 @@ def replay(file: Path, as_json: bool) -> None:
     Vehicle, mission and settings are the log's own, the code is the present one. Exit code 0: the same; 1: something
     differs, and the page says from which tick on. Of a dive that was given up it shows the inputs around that tick.
     """
-    from tools.data.log.parts import read_flight
-    from tools.flight.precompile import FLIGHT, ensure_compiled
-    from tools.flight.replay import replay_log
+    from glider.tools.data.log.parts import read_flight
+    from glider.tools.flight.precompile import FLIGHT, ensure_compiled
+    from glider.tools.flight.replay import replay_log
 
     log = read_flight(file)
     ensure_compiled(FLIGHT, say, progress)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from tools.cli.common import compile_campaign, json_option, print_json, say
+from glider.tools.cli.common import compile_campaign, json_option, print_json, say
 
 FIGURES = ("fig4", "fig5", "fig6", "fig7")
 
@@ -21,11 +21,11 @@ def reproduce(figures, vehicle, seeds, noise, out, as_json) -> None:
 
     One picture a figure, FIGURE.png; one JSON object a figure with --json (a list where several are asked for).
     """
-    from tools.data.errors import need
-    from tools.data.sources import load_vehicle
+    from glider.tools.data.errors import need
+    from glider.tools.data.sources import load_vehicle
 
     need("identify" if "fig4" in figures else "analysis")
-    from tools.study.reproduce.figures import reproduce_circle, reproduce_tracking
+    from glider.tools.study.reproduce.figures import reproduce_circle, reproduce_tracking
 
     the_vehicle = load_vehicle(vehicle)
     out.mkdir(parents=True, exist_ok=True)
@@ -35,7 +35,7 @@ def reproduce(figures, vehicle, seeds, noise, out, as_json) -> None:
     for name in figures:
         say(f"{name} ...")
         if name == "fig4":
-            from tools.study.reproduce.fig4 import reproduce_fig4
+            from glider.tools.study.reproduce.fig4 import reproduce_fig4
 
             result = reproduce_fig4(vehicle, the_vehicle, out)
         elif name == "fig7":

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from tools.cli.common import progress
+from glider.tools.cli.common import progress
 
 LONG_STEPS = 5e6  # a few seconds of computing: from here on a person wants to see it move
 
@@ -41,8 +41,8 @@ def simulate(commands: Path, out: Path, vehicle: str, water: tuple[float, float]
     X, Y, Z, phi, theta, psi, u, v, w (relative to the water), p, q, r, servo_rad, slider_m, ballast_kg. Each command
     holds from the row it stands in. The result has the same columns at the same times.
     """
-    from tools.data.sources import load_vehicle, read_text
-    from tools.study.simulate import check_dt, expected_steps, fly_commands, read_commands, write_flight
+    from glider.tools.data.sources import load_vehicle, read_text
+    from glider.tools.flight.simulate import check_dt, expected_steps, fly_commands, read_commands, write_flight
 
     P = load_vehicle(vehicle).vector()
     check_dt(P, dt)

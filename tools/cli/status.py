@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from tools.cli.common import DONE, FAILED, json_option, print_json
+from glider.tools.cli.common import DONE, FAILED, json_option, print_json
 
 STATE = click.option(
     "--state",
@@ -21,7 +21,7 @@ def status(state: Path | None, as_json: bool) -> None:
 
     At a terminal the page is renewed once a second until Ctrl-C. Exit code 1: something is not well.
     """
-    from tools.flight.status import find_folder, show, snapshot
+    from glider.tools.flight.status import find_folder, show, snapshot
 
     folder = find_folder(state)
     if as_json:

@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tools.cli.common import compile_campaign, json_option, print_json, progress
+from glider.tools.cli.common import compile_campaign, json_option, print_json, progress
 
 if TYPE_CHECKING:
-    from firmware.model.gains import Control
-    from tools.study.tuning.rule import Row
+    from glider.firmware.model.gains import Control
+    from glider.tools.study.tuning.rule import Row
 
 BUDGET = 180  # candidates a loop
 
@@ -27,14 +27,14 @@ def tune(vehicle: str, method: str, seed: int, budget: int, as_json: bool) -> No
     best under noise, with the rule's beside them; takes minutes. Both end with a [control] table to paste into a
     vehicle or mission file. The reference filters stay as the vehicle has them.
     """
-    from tools.data.errors import need
+    from glider.tools.data.errors import need
 
     need("analysis")
-    from hal.strict import decode
-    from sim_backend.board import SimBoardFile
-    from tools.data.boards import load_board_file
-    from tools.data.sources import load_vehicle
-    from tools.study.tuning import rule, search
+    from glider.hal.strict import decode
+    from glider.sim_backend.board import SimBoardFile
+    from glider.tools.data.boards import load_board_file
+    from glider.tools.data.sources import load_vehicle
+    from glider.tools.study.tuning import rule, search
 
     the_vehicle, file = load_vehicle(vehicle), load_board_file("sim")
     board = decode(file.text, SimBoardFile, file.source)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from tools.cli.common import say
+from glider.tools.cli.common import say
 
 
 @click.command()
@@ -26,12 +26,12 @@ def twin(board, vehicle, folder, seed, stand, faults, print_sim) -> None:
     vehicle stands still until the servo is first commanded. Commands on standard input or the socket `control`:
     `help` lists them.
     """
-    from hal.board import BoardError
-    from sim_backend.twins.boardfile import decode_twin_file, simulated_text
-    from sim_backend.twins.service import TwinService, replaced_ports
-    from tools.data.boards import load_board_file
-    from tools.data.errors import InputError, need
-    from tools.data.sources import load_vehicle
+    from glider.hal.board import BoardError
+    from glider.sim_backend.twins.boardfile import decode_twin_file, simulated_text
+    from glider.sim_backend.twins.service import TwinService, replaced_ports
+    from glider.tools.data.boards import load_board_file
+    from glider.tools.data.errors import InputError, need
+    from glider.tools.data.sources import load_vehicle
 
     found = load_board_file(board)
     if found.kind == "sim":
@@ -41,7 +41,7 @@ def twin(board, vehicle, folder, seed, stand, faults, print_sim) -> None:
         click.echo(simulated_text(file), nl=False)
         return
     need("bench")
-    from tools.bench.boardtext import set_ports, set_values
+    from glider.tools.bench.boardtext import set_ports, set_values
 
     the_vehicle = load_vehicle(vehicle)
     folder = Path(tempfile.mkdtemp(prefix="glider-twin-")) if folder is None else folder

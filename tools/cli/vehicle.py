@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from tools.cli.common import json_option, print_json, say
+from glider.tools.cli.common import json_option, print_json, say
 
 
 @click.group()
@@ -17,9 +17,9 @@ def vehicle() -> None:
 @click.option("--name", help="Of the vehicle.  [default: the file's]")
 def new(out: Path, name: str | None) -> None:
     """Ask for weighed masses and measured lengths, one by one, and write a first vehicle file OUT."""
-    from tools.data.errors import InputError
-    from tools.data.first_vehicle import QUESTIONS, first_vehicle
-    from tools.data.runs.csvfile import write_bytes
+    from glider.tools.data.errors import InputError
+    from glider.tools.data.first_vehicle import QUESTIONS, first_vehicle
+    from glider.tools.data.runs.csvfile import write_bytes
 
     if out.exists():
         raise InputError("is there already: name another file", source=out)
@@ -39,14 +39,14 @@ def show(wanted: str, as_json: bool) -> None:
     """A vehicle at a glance: masses, actuators, coefficients and how sure they are."""
     import msgspec
 
-    from tools.data.sources import load_vehicle
-    from tools.inference.model import vehicle_model
+    from glider.tools.data.sources import load_vehicle
+    from glider.tools.inference.model import vehicle_model
 
     loaded = load_vehicle(wanted)
     if as_json:
         print_json(msgspec.to_builtins(loaded))
         return
-    from firmware.model.vehicle import COEFFICIENTS, PLACES
+    from glider.firmware.model.vehicle import COEFFICIENTS, PLACES
 
     model, m, a = vehicle_model(wanted, loaded), loaded.mass, loaded.actuators
     click.echo(f"{loaded.name}: {m.m_t:g} kg, of which {m.m_r:g} turn and {m.m_s:g} slide; ballast at {m.x_b:g} m")

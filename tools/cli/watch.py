@@ -5,8 +5,8 @@ from pathlib import Path
 
 import click
 
-from tools.cli.common import json_option, print_json, progress, say, vehicle_option
-from tools.cli.many import ask_all, cases_argument, is_many
+from glider.tools.cli.common import json_option, print_json, progress, say, vehicle_option
+from glider.tools.cli.many import cases_argument, is_many, run_batch_command
 
 folder = click.Path(path_type=Path, file_okay=False)
 
@@ -30,25 +30,25 @@ def watch(
     folders of DIR that are called as the cases are; those that are answered are kept.
     """
     if is_many(cases, jobs, dask, again):
-        from tools.study.many_cases import OneCommand
+        from glider.tools.study.many_cases import OneCommand
 
         asked = OneCommand(("gap", "watch"), "watch.json", vehicle=vehicle, reference=reference)
-        ask_all(cases, out, asked, jobs, dask, again, as_json)
+        run_batch_command(cases, out, asked, jobs, dask, again, as_json)
         return
     _watch_one(cases[0], reference, vehicle, out, as_json)
 
 
 def _watch_one(case: Path, reference: Path | None, vehicle: str | None, out: Path | None, as_json: bool) -> None:
     """The watch of one case; its answer in `out`, if there is one."""
-    from tools.data.errors import need
+    from glider.tools.data.errors import need
 
     need("analysis")
-    from tools.data.runs.case import load_case
-    from tools.data.runs.csvfile import write_bytes
-    from tools.report.page import REPORT
-    from tools.report.watch import write_watch_report
-    from tools.watch.answer import FILE
-    from tools.watch.watch import watch as watch_runs
+    from glider.tools.data.runs.case import load_case
+    from glider.tools.data.runs.csvfile import write_bytes
+    from glider.tools.report.page import REPORT
+    from glider.tools.report.watch import write_watch_report
+    from glider.tools.watch.answer import FILE
+    from glider.tools.watch.watch import watch as watch_runs
 
     loaded = load_case(case, vehicle)
     before = None if reference is None else load_case(reference, vehicle)
@@ -59,7 +59,7 @@ def _watch_one(case: Path, reference: Path | None, vehicle: str | None, out: Pat
     if out is not None:
         import json
 
-        from tools.data.plain import as_plain
+        from glider.tools.data.plain import as_plain
 
         out.mkdir(parents=True, exist_ok=True)
         write_bytes(out / FILE, (json.dumps(as_plain(found.plain()), indent=1) + "\n").encode())
@@ -77,26 +77,28 @@ def _watch_one(case: Path, reference: Path | None, vehicle: str | None, out: Pat
 
 def lines(found) -> list[str]:
     """The answer for a terminal: runs, then events."""
-    told = []
+    sentences = []
     for run in found.runs:
         if run.skipped is not None:
-            told.append(f"{run.run:12} skipped  {run.skipped}")
+            sentences.append(f"{run.run:12} skipped  {run.skipped}")
             continue
         causes = ", ".join(f"{cause.label} {_size(cause.sized)}" for cause in run.causes[:2])
         gap = "-" if run.gap is None else f"{run.gap:.2f}"
-        told.append(f"{run.run:12} {run.verdict:8} gap {gap:>6}  {causes}".rstrip())
-    told.append("")
+        sentences.append(f"{run.run:12} {run.verdict:8} gap {gap:>6}  {causes}".rstrip())
+    sentences.append("")
     if not found.events:
-        told.append("nothing changed, as far as these runs can show")
+        sentences.append("nothing changed, as far as these runs can show")
     for event in found.events:
         until = "and is still there" if event.to_run is None else f"to {event.to_run}"
         place = f"{event.where[0]['subsystem']} {event.where[0]['element']}" if event.where else ""
         name = event.label or f"unknown ({place})"
         others = [label for label in event.group if label != event.label]
-        alike = f"; may as well be {', '.join(others)}" if others else ""
+        confounded = f"; may as well be {', '.join(others)}" if others else ""
         size = _size(event.sized)
-        told.append(f"{name} {size} from {event.from_run} {until}, {event.course}, {event.probability:.2f}{alike}")
-    return told
+        sentences.append(
+            f"{name} {size} from {event.from_run} {until}, {event.course}, {event.probability:.2f}{confounded}"
+        )
+    return sentences
 
 
 def _size(sized) -> str:

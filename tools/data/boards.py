@@ -7,10 +7,10 @@ from typing import Annotated
 
 import msgspec
 
-from hal.board import board_kinds
-from hal.strict import ConfigError, decode
-from tools.data.errors import InputError
-from tools.data.sources import read_text
+from glider.hal.board import board_kinds
+from glider.hal.strict import ConfigError, decode
+from glider.tools.data.errors import InputError
+from glider.tools.data.sources import read_text
 
 
 class BoardKind(msgspec.Struct):
@@ -30,7 +30,7 @@ class BoardFile:
 
 def load_board_file(wanted: str) -> BoardFile:
     """A board by shipped name ("sim") or path."""
-    folders = [files("sim_backend").joinpath("boards"), files("hal").joinpath("boards")]
+    folders = [files("glider.sim_backend").joinpath("boards"), files("glider.hal").joinpath("boards")]
     shipped = [file for folder in folders if (file := folder.joinpath(f"{wanted}.toml")).is_file()]
     if shipped and "/" not in wanted:
         text, source = shipped[0].read_text(encoding="utf-8"), f"{wanted} (shipped)"

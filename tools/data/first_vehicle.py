@@ -11,9 +11,9 @@ from typing import Any
 
 import msgspec
 
-from firmware.model.vehicle import decode_vehicle
-from tools.data.sources import load_vehicle
-from tools.data.tomltext import toml_text
+from glider.firmware.model.vehicle import decode_vehicle
+from glider.tools.data.sources import load_vehicle
+from glider.tools.data.tomltext import toml_text
 
 PATTERN, PATTERN_LENGTH = "roughie", 1.2  # the shipped vehicle, m
 WATER = 1000.0  # kg/m3

@@ -28,7 +28,7 @@ class RemoteError(RuntimeError):
         self.lost = lost
 
 
-class Host:
+class RemoteHost:
     """A connection; `with remote.host(NAME) as vehicle`."""
 
     def __init__(self, name: str, folder: Path):
@@ -115,9 +115,12 @@ class Host:
         if have >= size:
             return
         line = f"tail -c +{have + 1} {shlex.quote(path)} | head -c {size - have}"
-        with local.open("ab") as file, subprocess.Popen(
-            self.command(line), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE
-        ) as process:
+        with (
+            local.open("ab") as file,
+            subprocess.Popen(
+                self.command(line), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+            ) as process,
+        ):
             assert process.stdout is not None
             assert process.stderr is not None
             while piece := process.stdout.read1(PIECE):  # type: ignore[attr-defined]
@@ -136,12 +139,12 @@ class Host:
 
 
 @contextlib.contextmanager
-def host(name: str) -> Iterator[Host]:
+def host(name: str) -> Iterator[RemoteHost]:
     """A computer by the name that ssh knows, USER@HOST or an alias; RemoteError where that is an option or no name."""
     if not name or name.startswith("-") or any(letter.isspace() or not letter.isprintable() for letter in name):
         raise RemoteError(f"{name!r}: not a host")
     with tempfile.TemporaryDirectory(prefix="glider-ssh-") as folder:
-        found = Host(name, Path(folder))
+        found = RemoteHost(name, Path(folder))
         found.connect()
         try:
             yield found

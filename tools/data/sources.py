@@ -5,24 +5,24 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
-from firmware.guidance.mission import Mission, decode_mission
-from firmware.model.library import shipped
-from firmware.model.vehicle import Vehicle, decode_vehicle
-from hal.strict import ConfigError
-from sim_backend.ocean.vehicle import KIND, OceanVehicle, decode_ocean_vehicle, shipped_vehicles
-from tools.data.errors import InputError
+from glider.firmware.guidance.mission import Mission, decode_mission
+from glider.firmware.model.library import shipped
+from glider.firmware.model.vehicle import Vehicle, decode_vehicle
+from glider.hal.strict import ConfigError
+from glider.sim_backend.ocean.vehicle import KIND, OceanVehicle, decode_ocean_vehicle, shipped_vehicles
+from glider.tools.data.errors import InputError
 
 T = TypeVar("T")
-LONGEST = 256_000_000  # characters of any text file
+MAX_TEXT_CHARACTERS = 256_000_000  # characters of any text file
 
 
 def read_text(path: Path) -> str:
     """A text file's content; InputError where it cannot be read."""
     try:
         with path.open(encoding="utf-8") as file:
-            text = file.read(LONGEST + 1)
-        if len(text) > LONGEST:
-            raise InputError(f"longer than {LONGEST} characters", source=path)
+            text = file.read(MAX_TEXT_CHARACTERS + 1)
+        if len(text) > MAX_TEXT_CHARACTERS:
+            raise InputError(f"longer than {MAX_TEXT_CHARACTERS} characters", source=path)
         return text
     except UnicodeDecodeError as error:
         raise InputError(f"not UTF-8 text (byte {error.start})", source=path) from None

@@ -31,26 +31,26 @@ ALONE = (
 )  # fmt: skip
 
 
-class Lacking(RuntimeError):
+class EmulationUnavailable(RuntimeError):
     """This computer cannot do it; str() says in a line why."""
 
 
 def look() -> None:
-    """Lacking, where a program, a right, or room is missing."""
+    """A program, a right, or room is missing."""
     if os.geteuid() != 0:
-        raise Lacking("root is missing")
+        raise EmulationUnavailable("root is missing")
     for program in PROGRAMS:
         if shutil.which(program) is None:
-            raise Lacking(f"{program} is missing")
+            raise EmulationUnavailable(f"{program} is missing")
     (available,) = re.findall(r"^MemAvailable: *(\d+) kB", Path("/proc/meminfo").read_text(), re.MULTILINE)
     memory = 1024.0 * float(available)
     if memory < FREE_MEMORY:
-        raise Lacking(f"{memory / 1e9:.1f} GB of memory free, {FREE_MEMORY / 1e9:.0f} wanted")
+        raise EmulationUnavailable(f"{memory / 1e9:.1f} GB of memory free, {FREE_MEMORY / 1e9:.0f} wanted")
     mount = ("mount", "-t", "binfmt_misc", "binfmt_misc", str(BINFMT))
     done = subprocess.run([*ALONE, *mount], capture_output=True, text=True)
     if done.returncode:
         said = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
-        raise Lacking(f"no emulator can be registered (a namespace's own wants Linux 6.7): {said}")
+        raise EmulationUnavailable(f"no emulator can be registered (a namespace's own wants Linux 6.7): {said}")
 
 
 class Arm:
@@ -67,13 +67,13 @@ class Arm:
         if (self.root / "usr/bin/python3").exists():
             return
         if shutil.disk_usage(self.root.parent).free < FREE_DISK:
-            raise Lacking(f"{self.root.parent}: less than {FREE_DISK / 1e9:.0f} GB free")
+            raise EmulationUnavailable(f"{self.root.parent}: less than {FREE_DISK / 1e9:.0f} GB free")
         fresh = self.root.with_name(self.root.name + ".new")
         shutil.rmtree(fresh, ignore_errors=True)
         command = ["mmdebstrap", "--quiet", "--arch=arm64", "--variant=extract", f"--include={','.join(PACKAGES)}"]
         command += ["--hook-dir=/usr/share/mmdebstrap/hooks/merged-usr", SUITE, str(fresh)]
         if subprocess.run(command, stdout=sys.stderr).returncode:
-            raise Lacking(f"Debian {SUITE} for arm64 cannot be had")
+            raise EmulationUnavailable(f"Debian {SUITE} for arm64 cannot be had")
         for name in ("proc", "sys", "dev", "root", "tmp"):
             (fresh / name).mkdir(exist_ok=True)
         (fresh / "etc/passwd").write_text("root:x:0:0:root:/root:/bin/sh\n")
@@ -87,10 +87,10 @@ class Arm:
             for name in ("proc", "dev", "sys"):
                 _mount("--rbind", f"/{name}", str(self.root / name))
         except OSError as error:
-            raise Lacking(f"no emulator can be registered: {error}") from None
+            raise EmulationUnavailable(f"no emulator can be registered: {error}") from None
         done = self.call("python3", "-c", "import platform; print(platform.machine())", capture_output=True)
         if done.stdout != "aarch64\n":
-            raise Lacking(f"no program of arm64 runs here: {done.stdout}{done.stderr}".strip())
+            raise EmulationUnavailable(f"no program of arm64 runs here: {done.stdout}{done.stderr}".strip())
 
     def call(self, *words: str, **more: Any) -> subprocess.CompletedProcess:
         """A program in there."""
@@ -111,4 +111,4 @@ class Arm:
 def _mount(*words: str) -> None:
     done = subprocess.run(["mount", *words], capture_output=True, text=True)
     if done.returncode:
-        raise Lacking(done.stderr.strip())
+        raise EmulationUnavailable(done.stderr.strip())

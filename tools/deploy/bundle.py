@@ -1,10 +1,10 @@
 """A release: all that is brought to the glider's computer, in one folder under check sums.
 
-    RELEASE       what it is and for which computer, KEY=VALUE
-    install.sh    what installs it there
-    units/        services, rules, settings
-    wheels/       the project and all it needs
-    SHA256SUMS    of everything above
+RELEASE       what it is and for which computer, KEY=VALUE
+install.sh    what installs it there
+units/        services, rules, settings
+wheels/       the project and all it needs
+SHA256SUMS    of everything above
 """
 
 import os
@@ -13,8 +13,8 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-from tools.data.remote import file_digest
-from tools.deploy.wheels import ROOT, Target, own_wheel, version, wheelhouse
+from glider.tools.data.remote import file_digest
+from glider.tools.deploy.wheels import ROOT, Target, own_wheel, version, wheelhouse
 
 SUMS = "SHA256SUMS"
 UNITS = ("glider-outofband.service", "glider-flight@.service", "60-glider.rules", "flight.env")

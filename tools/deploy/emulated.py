@@ -1,4 +1,4 @@
-"""`python -m tools.deploy.emulated FOLDER`: does a release install and fly on a 64-bit ARM computer?
+"""`python -m glider.tools.deploy.emulated FOLDER`: does a release install and fly on a 64-bit ARM computer?
 
 From nothing: Debian for arm64 (mmdebstrap), run by an emulator of the processor (qemu-user), a release of what is
 committed installed in it by its own script, from its wheels alone; its self-check; and flights compared with the same
@@ -23,14 +23,14 @@ from typing import Any
 
 import numpy as np
 
-from tools.cli.common import DONE, FAILED, print_json, say
-from tools.data.log.reader import read_log
-from tools.data.plain import as_plain
-from tools.deploy.alike import Here, compared, same_maths
-from tools.deploy.arm import ALONE, Arm, Lacking, look
-from tools.deploy.bundle import make_release, written
-from tools.deploy.selfcheck import PLUNGE, flight_command
-from tools.deploy.wheels import Target
+from glider.tools.cli.common import DONE, FAILED, print_json, say
+from glider.tools.data.log.reader import read_log
+from glider.tools.data.plain import as_plain
+from glider.tools.deploy.arm import ALONE, Arm, EmulationUnavailable, look
+from glider.tools.deploy.bundle import make_release, written
+from glider.tools.deploy.compared import Here, compared, same_maths
+from glider.tools.deploy.selfcheck import PLUNGE, flight_command
+from glider.tools.deploy.wheels import Target
 
 RESULT = "result.json"
 # Largest difference of a state over a reference flight: position (m), angles (rad), speeds, actuators
@@ -70,7 +70,7 @@ def same_plunge(arm: Arm, here: Here) -> dict[str, Any]:
     if not there.exists():  # its self-check flew it, where that flew as plain Python
         words = flight_command("/root/selfcheck.toml", arm.plunge)
         arm.call("env", "GLIDER_JIT=0", *arm.glider(*words), stdout=subprocess.DEVNULL)
-    here.call("-m", "tools.cli.main", *flight_command(str(mission), str(log)), compiled=False)
+    here.call("-m", "glider.tools.cli.main", *flight_command(str(mission), str(log)), compiled=False)
     found = compared("selfcheck", [there, log])
     found["same_maths"] = same_maths(arm, here)
     if not found["bit_for_bit"]:
@@ -85,7 +85,7 @@ def same_flight(arm: Arm, here: Here, mission: str, seed: int) -> dict[str, Any]
         log.unlink(missing_ok=True)
     words = ["fly", "--seed", str(seed), "--json", "--mission", mission, "--log"]
     arm.call(*arm.glider(*words, "/root/flight.mcap"), stdout=subprocess.DEVNULL)
-    here.call("-m", "tools.cli.main", *words, str(logs[1]), compiled=True)
+    here.call("-m", "glider.tools.cli.main", *words, str(logs[1]), compiled=True)
     return compared(mission, logs)
 
 
@@ -168,7 +168,7 @@ def inside(arm: Arm, release: Path, options: argparse.Namespace) -> None:
     try:
         arm.start()
         here = Here.of(release, options.folder / "here")
-    except (Lacking, OSError) as error:
+    except (EmulationUnavailable, OSError) as error:
         note({"skipped": str(error)})
         return
     for name, part in [("install", lambda: install(arm, release)), *parts(arm, here)]:
@@ -186,22 +186,22 @@ def computer(release: Path, options: argparse.Namespace) -> Arm:
 
 
 def had(options: argparse.Namespace) -> Path:
-    """The release; it and Debian are made where they are not there yet; Lacking where they cannot be had."""
+    """The release; it and Debian are made where they are not there yet; EmulationUnavailable where they cannot be had."""
     look()
     try:
         options.folder.mkdir(parents=True, exist_ok=True)
         release = make_release(Target(), options.folder / "build")
         computer(release, options).make()
     except (RuntimeError, subprocess.CalledProcessError, OSError) as error:  # git's and pip's words; a full disk
-        raise Lacking(str(error).strip().splitlines()[-1]) from None
+        raise EmulationUnavailable(str(error).strip().splitlines()[-1]) from None
     return release
 
 
 def enter(release: Path, options: argparse.Namespace) -> dict[str, Any]:
-    """The rest in namespaces of its own, as long as --limit says. What came of it."""
+    """The rest in namespaces of its own, as long as --limit says. Outcome."""
     found = options.folder / RESULT
     found.write_text("{}")
-    command = [*ALONE, sys.executable, "-m", "tools.deploy.emulated", *sys.argv[1:], "--inside", str(release)]
+    command = [*ALONE, sys.executable, "-m", "glider.tools.deploy.emulated", *sys.argv[1:], "--inside", str(release)]
     try:
         subprocess.run(command, timeout=options.limit, stdout=sys.stderr)
     except subprocess.TimeoutExpired:
@@ -217,7 +217,7 @@ def passed(result: dict[str, Any]) -> bool:
 
 def main() -> int:
     """Exit 0: all passed, or what it needs is not here (`skipped`); 1: something did not pass."""
-    parser = argparse.ArgumentParser(prog="python -m tools.deploy.emulated", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m glider.tools.deploy.emulated", description=__doc__)
     parser.add_argument("folder", type=Path, help="for the system and what comes of it; a system that is there is used")
     parser.add_argument("--quick", action="store_true", help="as plain Python all through, and one reference flight")
     parser.add_argument("--beside", type=Path, help="only in time that others leave; they are done when it is gone")
@@ -235,7 +235,7 @@ def main() -> int:
     begin = time.monotonic()
     try:
         result = enter(had(options), options)
-    except Lacking as error:
+    except EmulationUnavailable as error:
         result = {"skipped": str(error)}
     result |= {"pass": passed(result), "seconds": round(time.monotonic() - begin)}
     print_json(result)

@@ -87,7 +87,7 @@ passes() {
     cache=$state/cache/$1 python=$opt/releases/$1/bin/python
     set --
     if [ -n "$root" ] && [ "${GLIDER_JIT:-}" = 0 ]; then set -- --plain "$cache/selfcheck.mcap"; fi
-    (cd / && as_glider env GLIDER_CACHE_DIR="$cache" "$python" -m tools.deploy.selfcheck \
+    (cd / && as_glider env GLIDER_CACHE_DIR="$cache" "$python" -m glider.tools.deploy.selfcheck \
         --files "$etc" --state "$state" "$@")
 }
 

@@ -1,4 +1,4 @@
-"""`python -m tools.deploy.push HOST`: what is committed becomes what flies on the glider's computer (`make deploy`).
+"""`python -m glider.tools.deploy.push HOST`: what is committed becomes what flies on the glider's computer (`make deploy`).
 
 A release is made here with all its wheels, brought over by ssh, installed beside the one that flies, checked there, and
 switched to. Broken off anywhere it is begun again and goes on; what flies is the old release or the new one, whole.
@@ -10,18 +10,16 @@ import subprocess
 import sys
 from pathlib import Path
 
-from tools.cli.common import BAD_INPUT, DONE, FAILED, progress, say
-from tools.data.remote import Host, RemoteError, host
-from tools.deploy.bundle import make_release, release_name, uncommitted
-from tools.deploy.wheels import ROOT, Target
+from glider.tools.cli.common import BAD_INPUT, DONE, FAILED, progress, say
+from glider.tools.data.remote import RemoteError, RemoteHost, host
+from glider.tools.deploy.bundle import make_release, release_name, uncommitted
+from glider.tools.deploy.wheels import ROOT, Target
 
 INCOMING = "glider-incoming"  # in the home of who logs in, or beside the folder that is installed into
-PYTHON = (
-    'import platform as p, sys; print(p.machine(), "%d.%d" % sys.version_info[:2], p.libc_ver()[1] or "2.17")'
-)
+PYTHON = 'import platform as p, sys; print(p.machine(), "%d.%d" % sys.version_info[:2], p.libc_ver()[1] or "2.17")'
 
 
-def look(vehicle: Host, python: str, root: str) -> tuple[Target, str, str]:
+def look(vehicle: RemoteHost, python: str, root: str) -> tuple[Target, str, str]:
     """What computer that is, the release that is installed and the one that flies; both empty where none is."""
     opt = f"{shlex.quote(root)}/opt/glider"
     said = vehicle.run(
@@ -33,7 +31,7 @@ def look(vehicle: Host, python: str, root: str) -> tuple[Target, str, str]:
     return Target(machine, version, int(libc.split(".")[1])), installed, current.rpartition("/")[2]
 
 
-def bring(vehicle: Host, release: Path, root: str) -> str:
+def bring(vehicle: RemoteHost, release: Path, root: str) -> str:
     """A release's files into the folder of incoming ones, where those of others are removed. Where they are."""
     incoming = f"{root}.incoming" if root else INCOMING
     folder = f"{incoming}/{release.name}"
@@ -44,7 +42,7 @@ def bring(vehicle: Host, release: Path, root: str) -> str:
     return folder
 
 
-def install(vehicle: Host, folder: str, words: str, settings: str) -> int:
+def install(vehicle: RemoteHost, folder: str, words: str, settings: str) -> int:
     """The release's own script, as root; what it says goes to this terminal."""
     script = f"env {settings} sh {shlex.quote(folder)}/install.sh {words}"
     if not settings_root(settings) and words != "list":
@@ -57,7 +55,7 @@ def settings_root(settings: str) -> str:
     return next((word.partition("=")[2] for word in shlex.split(settings) if word.startswith("ROOT=")), "")
 
 
-def deploy(vehicle: Host, build: Path, source: Path, settings: str, python: str) -> int:
+def deploy(vehicle: RemoteHost, build: Path, source: Path, settings: str, python: str) -> int:
     """Make, bring, install; DONE at once where just that release is installed."""
     changed = uncommitted(source)
     if changed:
@@ -78,7 +76,7 @@ def deploy(vehicle: Host, build: Path, source: Path, settings: str, python: str)
 
 def main() -> int:
     """Exit 0: it flies, or did before; 1: it was given up, and what flew before flies; 2: refused."""
-    parser = argparse.ArgumentParser(prog="python -m tools.deploy.push", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m glider.tools.deploy.push", description=__doc__)
     parser.add_argument("host", help="user@glider, as ssh knows it")
     parser.add_argument("--rollback", action="store_true", help="back to the release before")
     parser.add_argument("--list", action="store_true", help="what is installed there; * is what flies")

@@ -1,4 +1,4 @@
-"""`python -m tools.deploy.selfcheck`: is this release fit to take over on the glider's computer?
+"""`python -m glider.tools.deploy.selfcheck`: is this release fit to take over on the glider's computer?
 
 Asked of a release that is installed beside the one that flies, before it is switched to. It changes nothing but its
 own kernels' cache: no port is opened, and what flies goes on.
@@ -16,8 +16,8 @@ import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
-from hal.state_file import StateFile
-from tools.cli.common import DONE, FAILED, progress, say
+from glider.hal.state_file import StateFile
+from glider.tools.cli.common import DONE, FAILED, progress, say
 
 READY_S = 20.0  # for the out-of-band process to say READY=1 and feed the watchdog
 FLIGHT_S = 300.0
@@ -51,8 +51,8 @@ def see_state(folder: Path) -> str:
 
 def see_kernels(plain: bool) -> str:
     """Compiled for this release, so that its first flight need not; as plain Python only where that is asked for."""
-    from firmware.core.jit import CACHE_DIR
-    from tools.flight.precompile import FLIGHT, ensure_compiled
+    from glider.firmware.core.jit import CACHE_DIR
+    from glider.tools.flight.precompile import FLIGHT, ensure_compiled
 
     if CACHE_DIR is None and not plain:
         raise Unfit("plain Python (GLIDER_JIT=0) is too slow to fly with")
@@ -62,7 +62,7 @@ def see_kernels(plain: bool) -> str:
 
 def see_files(folder: Path) -> str:
     """The vehicle's own board, vehicle and missions are read, and go together: a newer version may be stricter."""
-    from tools.flight.compose import build_flight
+    from glider.tools.flight.compose import build_flight
 
     board, vehicle = folder / "board.toml", folder / "vehicle.toml"
     missions = [path for path in sorted(folder.glob("*.toml")) if "leg" in tomllib.loads(path.read_text())]
@@ -78,13 +78,13 @@ def flight_command(mission: str, log: str) -> list[str]:
 
 def see_flight(kept: Path | None, patience: float) -> str:
     """A short flight on the simulated board, recorded and read back; its log stays where `kept` says."""
-    from tools.data.log.reader import read_log
+    from glider.tools.data.log.reader import read_log
 
     with tempfile.TemporaryDirectory() as folder:
         mission, log = Path(folder, "selfcheck.toml"), kept or Path(folder, "selfcheck.mcap")
         mission.write_text(PLUNGE)
         log.unlink(missing_ok=True)
-        command = [sys.executable, "-m", "tools.cli.main", *flight_command(str(mission), str(log))]
+        command = [sys.executable, "-m", "glider.tools.cli.main", *flight_command(str(mission), str(log))]
         done = subprocess.run(command, capture_output=True, text=True, timeout=patience * FLIGHT_S)
         try:
             result = json.loads(done.stdout)
@@ -100,7 +100,7 @@ def see_out_of_band(patience: float) -> str:
     with tempfile.TemporaryDirectory() as folder, socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as line:
         line.bind(f"{folder}/notify")
         line.settimeout(patience * READY_S)
-        command = [sys.executable, "-m", "hal.outofband", "--service", "--run", folder, "--state", folder]
+        command = [sys.executable, "-m", "glider.hal.outofband", "--service", "--run", folder, "--state", folder]
         environment = {**os.environ, "NOTIFY_SOCKET": f"{folder}/notify"}
         with subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True) as process:
             try:
@@ -119,11 +119,11 @@ def see_out_of_band(patience: float) -> str:
 
 def main() -> int:
     """Every check, a line each; exit 1 where one fails."""
-    from hal.ports import BoardError
-    from hal.strict import ConfigError
-    from tools.data.errors import InputError
+    from glider.hal.ports import BoardError
+    from glider.hal.strict import ConfigError
+    from glider.tools.data.errors import InputError
 
-    parser = argparse.ArgumentParser(prog="python -m tools.deploy.selfcheck", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m glider.tools.deploy.selfcheck", description=__doc__)
     parser.add_argument("--files", type=Path, required=True, help="folder of board.toml, vehicle.toml, missions")
     parser.add_argument("--state", type=Path, required=True, help="folder of the vehicle's state")
     look = "as plain Python, with patience, for a look: never on a vehicle; LOG: its flight's"

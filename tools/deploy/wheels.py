@@ -1,6 +1,6 @@
 """Wheels of everything that flies, for another computer: nothing is compiled there, and it needs no network.
 
-`python -m tools.deploy.wheels` asks pip, without fetching anything, whether all of it has wheels for a 64-bit ARM
+`python -m glider.tools.deploy.wheels` asks pip, without fetching anything, whether all of it has wheels for a 64-bit ARM
 computer; the result as JSON.
 """
 
@@ -15,7 +15,7 @@ import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
-from tools.cli.common import DONE, FAILED, print_json
+from glider.tools.cli.common import DONE, FAILED, print_json
 
 ROOT = Path(__file__).resolve().parents[2]
 OLDEST_GLIBC = 17  # of 2.17: manylinux2014, the oldest that wheels are made for today
@@ -61,17 +61,17 @@ def wheelhouse(root: Path, target: Target, folder: Path) -> Path:
     named by just that."""
     constraints = (root / "constraints.txt").read_text()
     name = hashlib.sha256("\n".join([*wanted(root), constraints, *target.options()]).encode()).hexdigest()[:12]
-    house = folder / f"{target}-{name}"
-    if not house.is_dir():
-        fresh = house.with_name(house.name + ".new")
+    wheelhouse_folder = folder / f"{target}-{name}"
+    if not wheelhouse_folder.is_dir():
+        fresh = wheelhouse_folder.with_name(wheelhouse_folder.name + ".new")
         shutil.rmtree(fresh, ignore_errors=True)
         fresh.mkdir(parents=True)
         _pip(
             "download", *target.options(), "--constraint", str(root / "constraints.txt"), "--dest", str(fresh),
             "pip", *wanted(root),
         )  # fmt: skip
-        fresh.rename(house)
-    return house
+        fresh.rename(wheelhouse_folder)
+    return wheelhouse_folder
 
 
 def own_wheel(root: Path, folder: Path) -> Path:

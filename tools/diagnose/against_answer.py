@@ -8,20 +8,20 @@ from typing import Any
 
 import numpy as np
 
-from tools.data.plain import as_plain
-from tools.data.runs.csvfile import write_bytes
-from tools.diagnose.against_healthy import AgainstHealthy, Comparison
-from tools.diagnose.record import AGAINST_HEALTHY, ANSWER, UNKNOWN
-from tools.diagnose.shrink import AFTER, BEFORE, FLOOR, RECALIBRATED, by_channel, shrinkage_of
-from tools.gap.measure import RunGap, root_mean_square, run_gap
-from tools.inference.corrected import corrected_text
-from tools.inference.model import effect_vector, effects_in, nominal_model
-from tools.inference.parameters import NINETY, model_at
-from tools.inference.predict import fly
-from tools.inference.problem import Problem, cut
+from glider.tools.data.plain import as_plain
+from glider.tools.data.runs.csvfile import write_bytes
+from glider.tools.diagnose.against_healthy import AgainstHealthy, Comparison
+from glider.tools.diagnose.record import AGAINST_HEALTHY, ANSWER, UNKNOWN
+from glider.tools.diagnose.shrink import AFTER, BEFORE, FLOOR, RECALIBRATED, by_channel, shrinkage_of
+from glider.tools.gap.measure import RunGap, root_mean_square, run_gap
+from glider.tools.inference.corrected import corrected_text
+from glider.tools.inference.model import effect_vector, effects_in, nominal_model
+from glider.tools.inference.parameters import NINETY, model_at
+from glider.tools.inference.predict import fly
+from glider.tools.inference.problem import Problem, cut
 
-FEW = 4  # healthy runs
-LEAST = 0.005  # a smaller probability is not written down
+FEW_HEALTHY_RUNS = 4  # healthy runs
+LEAST_PROBABILITY = 0.005  # a smaller probability is not written down
 CORRECTED = "corrected.toml"
 
 
@@ -79,7 +79,7 @@ def places_of(compared: Comparison, chances: dict[str, float]) -> list[dict[str,
     for label, p in known.items():
         where[effects[label].place] = where.get(effects[label].place, 0.0) + p * likeness
     ranked = sorted(where.items(), key=lambda item: -item[1])
-    return [{"subsystem": s, "element": e, "probability": p} for (s, e), p in ranked if p >= LEAST]
+    return [{"subsystem": s, "element": e, "probability": p} for (s, e), p in ranked if p >= LEAST_PROBABILITY]
 
 
 def plain(found: AgainstHealthy) -> dict[str, Any]:
@@ -113,28 +113,31 @@ def plain(found: AgainstHealthy) -> dict[str, Any]:
         "skipped": {},
         "evidence": found.evidence,
         "reference": {
-            "runs": found.healthy.runs, "count": found.healthy.count, "left": found.healthy.scales, "times": found.left
+            "runs": found.healthy.runs,
+            "count": found.healthy.count,
+            "left": found.healthy.scales,
+            "times": found.left,
         },
     }
 
 
 def cautions(found: AgainstHealthy) -> list[str]:
     """What has to be said with the answer."""
-    told = []
-    if found.healthy.count < FEW:
-        told.append(f"{found.healthy.count} healthy runs: how much runs differ though nothing changed is assumed")
+    sentences = []
+    if found.healthy.count < FEW_HEALTHY_RUNS:
+        sentences.append(f"{found.healthy.count} healthy runs: how much runs differ though nothing changed is assumed")
     if found.case.roughie.identified is None:
-        told.append("the vehicle file is not identified: what it misses healthy runs by hides small changes")
+        sentences.append("the vehicle file is not identified: what it misses healthy runs by hides small changes")
     if found.verdict == UNKNOWN:
-        told.append("turbulence, waves and a clock that wanders are not asked for here: each would be unknown")
+        sentences.append("turbulence, waves and a clock that wanders are not asked for here: each would be unknown")
     if not found.healthy.runs:
-        told.append(
+        sentences.append(
             "what the vehicle's form leaves of healthy runs is taken from its file: --reference HEALTHY says it of "
             "these readings"
         )
     if len(found.case.runs) == 1:
-        told.append("one run only: nothing is left out, the gaps are those of a run that was fitted")
-    return told
+        sentences.append("one run only: nothing is left out, the gaps are those of a run that was fitted")
+    return sentences
 
 
 def write(found: AgainstHealthy, out: Path) -> dict[str, Any]:

@@ -19,20 +19,20 @@ from scipy.special import logsumexp
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from firmware.model.vehicle import FormTable
-from sim_backend.ocean.vehicle import OceanVehicle
-from tools.data.errors import InputError
-from tools.data.runs import columns
-from tools.data.runs.case import Case
-from tools.data.runs.run import Run
-from tools.diagnose.record import NONE, UNKNOWN
-from tools.gap.regimes import ALL
-from tools.inference.channels import recorded
-from tools.inference.fit import bounded_step
-from tools.inference.parameters import FreeParameter, effect_parameters, model_at, nuisance_parameters
-from tools.inference.prediction_error import HORIZONS, PredictionError
-from tools.inference.problem import Problem, problem_of
-from tools.inference.vehicle_parameters import Parameters
+from glider.firmware.model.vehicle import FormTable
+from glider.sim_backend.ocean.vehicle import OceanVehicle
+from glider.tools.data.errors import InputError
+from glider.tools.data.runs import columns
+from glider.tools.data.runs.case import Case
+from glider.tools.data.runs.run import Run
+from glider.tools.diagnose.record import NONE, UNKNOWN
+from glider.tools.gap.regimes import ALL
+from glider.tools.inference.channels import recorded
+from glider.tools.inference.fit import bounded_step
+from glider.tools.inference.parameters import FreeParameter, effect_parameters, model_at, nuisance_parameters
+from glider.tools.inference.prediction_error import HORIZONS, PredictionError
+from glider.tools.inference.problem import Problem, problem_of
+from glider.tools.inference.vehicle_parameters import Parameters
 
 CAUSE = "cause"
 CHANGED, STRANGE = 0.5, 0.15  # prior probability of a change; that something is left beside what is named
@@ -44,14 +44,14 @@ USUAL_SCATTER = 0.5
 LEAST_SCALE = 0.05  # tolerances
 STANDS_OUT = 2.0  # times what noise leaves of healthy runs, in squares, that the form leaves of them: the form decides
 TOTAL = "total"
-REFINED, FURTHER, MOST = 6, 4, 3  # labels fitted in full at first, beside others, and effects at most
+REFIT_STEPS, REFIT_FURTHER, MAX_EFFECTS = 6, 4, 3  # labels fitted in full at first, beside others, and effects at most
 STEPS = 3
-STILL = 0.02  # sigma of the priors, by which a step moves nothing any more
-ALIKE = 6.0  # nat within which labels are not told apart
-CERTAIN = 0.9  # probability of a label that is selected beside something unknown
+CONVERGED_SIGMA = 0.02  # sigma of the priors, by which a step moves nothing any more
+CONFOUNDED_NAT = 6.0  # nat within which labels are not distinguished
+SELECTED_PROBABILITY = 0.9  # probability of a label that is selected beside something unknown
 
 
-class Windows(PredictionError):
+class HeldOutWindows(PredictionError):
     """Windows of runs with a list of free parameters about a problem's own model."""
 
     def __init__(self, problem: Problem, free: Sequence[FreeParameter], scales: dict[str, float]):
@@ -99,7 +99,7 @@ class Linearised:
     value: np.ndarray  # (runs,)
     slope: np.ndarray  # (runs, n)
     normal: np.ndarray  # (runs, n, n)
-    windows: Windows
+    windows: HeldOutWindows
     samples: list[tuple[np.ndarray, ...]]
 
     def step(self, free: np.ndarray, weight: float, without: int | None = None) -> np.ndarray:
@@ -165,7 +165,7 @@ def learn(case: Case, runs: list[Run]) -> Healthy:
     every, scales = np.arange(len(free)), dict[str, float]()
     form = case.roughie.form.gaps[ALL] if case.roughie.form is not None else {}
     for _ in range(2):  # first in tolerances, then in what the first found
-        windows = Windows(problem, free, scales)
+        windows = HeldOutWindows(problem, free, scales)
         at = windows.linearised(windows.file_values)
         left, steps = at.held_out(every, windows.independent)
         measured = np.sqrt(at.by_channel(steps))
@@ -193,7 +193,7 @@ def form_stands_out(case: Case) -> bool:
 
 
 @dataclass
-class Hypothesis:
+class HealthyHypothesis:
     """Labels beside what the vehicle file allows, fitted to the case's runs."""
 
     labels: tuple[str, ...]
@@ -217,11 +217,11 @@ class Comparison:
     free: list[FreeParameter]
     places: dict[str, np.ndarray]  # of each label's parameters in `free`
     nuisance: np.ndarray
-    windows: Windows = field(init=False)
+    windows: HeldOutWindows = field(init=False)
     bare: float = 1.0  # mean square of runs left out without a change
 
     def __post_init__(self) -> None:
-        self.windows = Windows(self.problem, self.free, self.healthy.scales)
+        self.windows = HeldOutWindows(self.problem, self.free, self.healthy.scales)
 
     def columns_of(self, labels: Iterable[str]) -> np.ndarray:
         """Places of what is free under labels."""
@@ -236,10 +236,10 @@ class Comparison:
         """Of a mean square of 1: as many independent residuals, of what is there where that is more than usual."""
         return self.independent / max(mean_square, 1.0)
 
-    def fitted(self, labels: tuple[str, ...], begin: np.ndarray) -> Hypothesis | None:
+    def fitted(self, labels: tuple[str, ...], begin: np.ndarray) -> HealthyHypothesis | None:
         """Labels led from values (n,) to where they are most probable; None where their flights are lost."""
         free = self.columns_of(labels)
-        own = Windows(self.problem, [self.free[k] for k in free], self.healthy.scales)
+        own = HeldOutWindows(self.problem, [self.free[k] for k in free], self.healthy.scales)
         every, values = np.arange(len(free)), own.clipped(begin[free])
         best: tuple[float, np.ndarray, Linearised] | None = None
         for _ in range(STEPS):
@@ -252,7 +252,7 @@ class Comparison:
                 continue
             best = cost + float(values @ values) / self.independent, values, at
             step = at.step(every, self.weight(cost))
-            if np.abs(step).max(initial=0.0) < STILL:
+            if np.abs(step).max(initial=0.0) < CONVERGED_SIGMA:
                 break
             values = own.clipped(values + step)
         if best is None:
@@ -264,9 +264,9 @@ class Comparison:
         sd[free] = np.sqrt(np.diag(np.linalg.inv(weight * at.normal.sum(axis=0) + np.eye(len(free)))))
         whole, others = np.zeros(count), np.zeros((len(left), count))
         whole[free], others[:, free] = values + at.step(every, weight), values + steps
-        return Hypothesis(labels, whole, left, others, sd)
+        return HealthyHypothesis(labels, whole, left, others, sd)
 
-    def promised(self, begin: Hypothesis) -> list[tuple[float, str, np.ndarray]]:
+    def predicted_gain(self, begin: HealthyHypothesis) -> list[tuple[float, str, np.ndarray]]:
         """Labels beside a hypothesis by one linear step, best first: mean square of runs left out, label, values."""
         at, found = self.windows.linearised(self.windows.clipped(begin.values)), []
         weight = self.weight(begin.mean_square)
@@ -277,12 +277,12 @@ class Comparison:
                 found.append((left, label, at.values + at.step(free, weight)))
         return sorted(found, key=lambda one: one[0])
 
-    def nat(self, one: Hypothesis) -> float:
+    def nat(self, one: HealthyHypothesis) -> float:
         """Log predictive density of runs left out, their scale known from so many healthy runs only."""
         count, freedom = self.independent, self.healthy.freedom
         return -0.5 * (freedom + count) * float(np.log1p(count * max(one.mean_square, 1e-9) / freedom))
 
-    def leftover(self, one: Hypothesis) -> tuple[float, float]:
+    def leftover(self, one: HealthyHypothesis) -> tuple[float, float]:
         """Log densities of what runs left out leave: where that is what healthy runs leave, and where it is more."""
         healthy = self.healthy
         scale = np.sqrt(healthy.scatter**2 * (1.0 / healthy.count + 1.0 / len(one.left)) + SITE**2)
@@ -300,24 +300,24 @@ class Comparison:
 class Weighed:
     """Hypotheses with their log weights: with nothing beside them, and with something unknown."""
 
-    listed: list[Hypothesis]
+    listed: list[HealthyHypothesis]
     alone: list[float]
     beside: list[float]
 
-    def best(self, main: str) -> Hypothesis:
+    def best(self, main: str) -> HealthyHypothesis:
         """The most probable one with a main cause, NONE or a label; of UNKNOWN the one that it is beside."""
         weights = np.array(self.beside if main == UNKNOWN else np.logaddexp(self.alone, self.beside))
         if main != UNKNOWN:
             weights[[(one.labels[0] if one.labels else NONE) != main for one in self.listed]] = -np.inf
         return self.listed[int(weights.argmax())]
 
-    def certain(self, one: Hypothesis) -> list[str]:
+    def certain(self, one: HealthyHypothesis) -> list[str]:
         """Labels of a hypothesis that are there whatever else is, CERTAIN."""
         weights = np.logaddexp(self.alone, self.beside)
         weights = np.exp(weights - logsumexp(weights))
         within = {label: sum(w for w, h in zip(weights, self.listed, strict=True) if label in h.labels)
                   for label in one.labels}  # fmt: skip
-        return [label for label in one.labels if within[label] >= CERTAIN]
+        return [label for label in one.labels if within[label] >= SELECTED_PROBABILITY]
 
     def probabilities(self) -> dict[str, float]:
         """Of none, of each label as the main cause, and of unknown."""
@@ -330,7 +330,7 @@ class Weighed:
         return found
 
 
-def weigh(compared: Comparison, listed: list[Hypothesis]) -> Weighed:
+def weigh(compared: Comparison, listed: list[HealthyHypothesis]) -> Weighed:
     """The posterior's weights; what does not shrink the gap of runs left out is none."""
     alone, beside = [], []
     nothing = listed[0]
@@ -344,7 +344,7 @@ def weigh(compared: Comparison, listed: list[Hypothesis]) -> Weighed:
     return Weighed(kept, alone, beside)
 
 
-def hypotheses(compared: Comparison, say: Callable[[str], None]) -> list[Hypothesis]:
+def hypotheses(compared: Comparison, say: Callable[[str], None]) -> list[HealthyHypothesis]:
     """No change, the labels that promise most, and further ones beside the best while they bring more than chance."""
     nothing = compared.fitted((), np.zeros(len(compared.free)))
     if nothing is None:
@@ -352,9 +352,9 @@ def hypotheses(compared: Comparison, say: Callable[[str], None]) -> list[Hypothe
     compared.bare = nothing.mean_square
     say(f"no change: {nothing.mean_square:.2f} times what healthy runs leave")
     odds, listed, best = float(np.log(CHANGED / len(compared.places))), [nothing], nothing
-    while len(best.labels) < MOST:
-        promised = compared.promised(best)[: FURTHER if best.labels else REFINED]
-        found = [compared.fitted((*best.labels, label), values) for _, label, values in promised]
+    while len(best.labels) < MAX_EFFECTS:
+        predicted_gain = compared.predicted_gain(best)[: REFIT_FURTHER if best.labels else REFIT_STEPS]
+        found = [compared.fitted((*best.labels, label), values) for _, label, values in predicted_gain]
         there = [one for one in found if one is not None]
         listed += there
         leading = max(there, key=compared.nat, default=best)
@@ -382,8 +382,8 @@ class AgainstHealthy:
     probabilities: dict[str, float]
     group: list[str]  # labels that the runs do not tell from the main one, itself first
     selected: list[str]
-    nothing: Hypothesis
-    best: Hypothesis
+    nothing: HealthyHypothesis
+    best: HealthyHypothesis
     evidence: dict[str, float]  # nat over no change
     left: dict[str, float]  # by hypothesis, the mean square of runs left out over what healthy runs leave
 
@@ -421,7 +421,7 @@ def diagnose_against_healthy(
     best = weighed.best(first)
     verdict = first if first in (NONE, UNKNOWN) else CAUSE
     singles = {one.labels[0]: compared.nat(one) for one in listed if len(one.labels) == 1}
-    least = singles.get(first, np.inf) - ALIKE
+    least = singles.get(first, np.inf) - CONFOUNDED_NAT
     near = [label for label in sorted(singles, key=lambda n: -singles[n]) if singles[label] > least and label != first]
     selected = weighed.certain(best) if verdict == UNKNOWN else list(best.labels)
     bare = compared.nat(listed[0])

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from firmware.core.maths.rotations import quaternion_from_euler
-from firmware.core.vehicle.layout import X_DOWN, X_NU, X_QUAT
-from firmware.core.vehicle.state import euler_angles
-from sim_backend.core.effects import effect_layout as ef
-from tools.inference.problem import Gains, Problem, cut
+from glider.firmware.core.maths.rotations import quaternion_from_euler
+from glider.firmware.core.vehicle.layout import X_DOWN, X_NU, X_QUAT
+from glider.firmware.core.vehicle.state import euler_angles
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.inference.problem import Gains, Problem, cut
 
 
 def begun_as_read(problem: Problem, F: np.ndarray, other: np.ndarray, gains: Gains) -> Gains:

@@ -6,10 +6,10 @@ Whatever the model of the vehicle comes to, readings that contradict each other 
 from dataclasses import dataclass
 from typing import Any
 
-from sim_backend.core.effects.catalogue import catalogue
-from tools.gap.mended import one_scale
-from tools.inference.parameters import NINETY
-from tools.readings.findings import Finding
+from glider.sim_backend.core.effects.catalogue import catalogue
+from glider.tools.gap.corrected import one_scale
+from glider.tools.inference.parameters import NINETY
+from glider.tools.readings.findings import Finding
 
 
 @dataclass(frozen=True)

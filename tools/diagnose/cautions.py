@@ -4,15 +4,15 @@ import itertools
 
 import numpy as np
 
-from sim_backend.core.effects.catalogue import catalogue
-from tools.data.runs import columns as names
-from tools.diagnose.noise_probes import UNPREDICTABLE
-from tools.inference.levels import factors
-from tools.inference.parameters import effect_parameters
-from tools.inference.problem import Problem
+from glider.sim_backend.core.effects.catalogue import catalogue
+from glider.tools.data.runs import columns as names
+from glider.tools.diagnose.noise_probes import UNPREDICTABLE
+from glider.tools.inference.levels import factors
+from glider.tools.inference.parameters import effect_parameters
+from glider.tools.inference.problem import Problem
 
 SPARSE, LONG = 0.2, 5.0  # share of samples missing; s without a sample
-UNLIKE = 1.25  # times what a file says of noise, or less by as much
+NOISE_FACTOR_REPORTED = 1.25  # times what a file says of noise, or less by as much
 PARTS = {
     "onboard attitude": names.ATTITUDE,
     "gyro": names.RATES,
@@ -42,10 +42,10 @@ def not_asked(problem: Problem) -> list[str]:
 
 
 def _without_commands(problem: Problem) -> list[str]:
-    lacking = [run.name for run in problem.runs if not run.has_commands]
-    if not lacking:
+    missing_noise = [run.name for run in problem.runs if not run.has_commands]
+    if not missing_noise:
         return []
-    where = "" if len(lacking) == len(problem.runs) else f" in {', '.join(lacking)}"
+    where = "" if len(missing_noise) == len(problem.runs) else f" in {', '.join(missing_noise)}"
     return [
         f"no commands{where}: the flights are driven by the draw-wires, the servo is guessed, and how actuators follow "
         "their commands cannot be judged"
@@ -55,14 +55,14 @@ def _without_commands(problem: Problem) -> list[str]:
 def _without_columns(problem: Problem) -> list[str]:
     found = []
     for part, wanted in PARTS.items():
-        lacking = [run.name for run in problem.runs if not any(name in run.columns for name in wanted)]
+        missing_noise = [run.name for run in problem.runs if not any(name in run.columns for name in wanted)]
         partly = [
             (run.name, [name for name in wanted if name not in run.columns])
             for run in problem.runs
-            if run.name not in lacking and not run.has(*wanted)
+            if run.name not in missing_noise and not run.has(*wanted)
         ]
-        if lacking:
-            where = "" if len(lacking) == len(problem.runs) else f" in {', '.join(lacking)}"
+        if missing_noise:
+            where = "" if len(missing_noise) == len(problem.runs) else f" in {', '.join(missing_noise)}"
             found.append(f"no {part}{where}: {WITHOUT[part]}")
         for run, missing in partly:
             found.append(f"{run}: column {', '.join(missing)} is missing: what it would show cannot be seen")
@@ -92,14 +92,14 @@ def _holes(problem: Problem) -> list[str]:
 
 def _noise(problem: Problem) -> list[str]:
     """Noise that is not what the case says."""
-    unlike = [
+    differs = [
         f"{name.replace('_', ' ')} {factor:.2g}"
         for name, factor in factors(problem).items()
-        if abs(np.log(factor)) > np.log(UNLIKE)
+        if abs(np.log(factor)) > np.log(NOISE_FACTOR_REPORTED)
     ]
-    if not unlike:
+    if not differs:
         return []
-    return [f"noise is not what the vehicle file says: {', '.join(unlike)} times that (taken from these runs)"]
+    return [f"noise is not what the vehicle file says: {', '.join(differs)} times that (taken from these runs)"]
 
 
 def _few(problem: Problem) -> list[str]:

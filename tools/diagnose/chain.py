@@ -8,13 +8,13 @@ Shares do not add up: an error of the pump can be taken up by its own speed, and
 
 import numpy as np
 
-from sim_backend.core.effects.catalogue import catalogue
-from tools.diagnose.noise_probes import CLOCK, TURBULENCE, WAVES, NoiseProbe, ProbeResult, probes, run_probes
-from tools.diagnose.record import NONE, UNKNOWN, Link, Noise, Panel
-from tools.diagnose.search import Search, without_extra_noise
-from tools.diagnose.stages import ACTUATOR, FORCE, MOTION, SENSOR, STAGES, stage_of
-from tools.diagnose.verdict import Answer, drop, evidence_of_alternatives
-from tools.inference.fit import Hypothesis
+from glider.sim_backend.core.effects.catalogue import catalogue
+from glider.tools.diagnose.noise_probes import CLOCK, TURBULENCE, WAVES, NoiseProbe, ProbeResult, probes, run_probes
+from glider.tools.diagnose.record import NONE, UNKNOWN, LinkRecord, Noise, Panel
+from glider.tools.diagnose.search import Search, without_extra_noise
+from glider.tools.diagnose.stages import ACTUATOR, FORCE, MOTION, SENSOR, STAGES, stage_of
+from glider.tools.diagnose.verdict import Answer, drop, evidence_of_alternatives
+from glider.tools.inference.fit import Hypothesis
 
 SCALES = (3.0, 12.0, 50.0)  # of a probe's unit: coarser than for a verdict
 STAGE_OF_PROBE = {"actuator": ACTUATOR, "force": FORCE, "water": MOTION, "sensor": SENSOR}
@@ -27,10 +27,10 @@ LINK_OF_PLACE = {
 }  # fmt: skip
 RUNS = 1  # that are probed
 PANELS = 2  # one for each effect, the first ones
-LEAST = 10.0  # nat that the best explanation must bring, or there is nothing to share out
+MIN_EVIDENCE_NAT = 10.0  # nat that the best explanation must bring, or there is nothing to share out
 
 
-def links(search: Search, without: Hypothesis, best: Hypothesis) -> list[Link]:
+def links(search: Search, without: Hypothesis, best: Hypothesis) -> list[LinkRecord]:
     """Every link's share of what `best` brings over `without`, in the order of the chain, by the run that shows most.
 
     The two may be one: then the shares are of the link that brings most. No links where hardly anything is brought.
@@ -46,35 +46,37 @@ def links(search: Search, without: Hypothesis, best: Hypothesis) -> list[Link]:
     return shared_out(probed, 0.5 * float((bare - fitted)[shown].sum()))
 
 
-def shared_out(probed: list[ProbeResult], brought: float) -> list[Link]:
+def shared_out(probed: list[ProbeResult], brought: float) -> list[LinkRecord]:
     """Shares of probes of the best explanation's nat: the effects' or, where that is more, a probe's own."""
     brought = max([brought, *(found.gain for found in probed)])
-    if brought < LEAST:
+    if brought < MIN_EVIDENCE_NAT:
         return []
     shared = []
     for found in probed:
         name = NAMES.get(found.probe.name, found.probe.name)
-        shared.append(Link(STAGE_OF_PROBE[found.probe.stage], name, float(np.clip(found.gain / brought, 0.0, 1.0))))
+        shared.append(
+            LinkRecord(STAGE_OF_PROBE[found.probe.stage], name, float(np.clip(found.gain / brought, 0.0, 1.0)))
+        )
     return ordered(shared)
 
 
-def by_effects(search: Search, without: Hypothesis, best: Hypothesis, label: str) -> list[Link]:
+def by_effects(search: Search, without: Hypothesis, best: Hypothesis, label: str) -> list[LinkRecord]:
     """The same by effects of the catalogue that the search has tried in the place of `label`: a link's best counts."""
     bare, effects = without.log_evidence(search.fitter), catalogue()
     brought = best.log_evidence(search.fitter) - bare
-    if brought < LEAST:
+    if brought < MIN_EVIDENCE_NAT:
         return []
     shared = []
     for other, value in evidence_of_alternatives(search, best, label).items():
         place = effects[other].subsystem, effects[other].element
         share = float(np.clip((value - bare) / brought, 0.0, 1.0))
-        shared.append(Link(stage_of(*place), LINK_OF_PLACE.get(place[1], place[1]), share))
+        shared.append(LinkRecord(stage_of(*place), LINK_OF_PLACE.get(place[1], place[1]), share))
     return ordered(shared)
 
 
-def ordered(shared: list[Link]) -> list[Link]:
+def ordered(shared: list[LinkRecord]) -> list[LinkRecord]:
     """Each link once, with its largest share, in the order of the chain."""
-    most: dict[tuple[str, str], Link] = {}
+    most: dict[tuple[str, str], LinkRecord] = {}
     for link in shared:
         known = most.get((link.stage, link.name))
         most[link.stage, link.name] = link if known is None or known.share < link.share else known

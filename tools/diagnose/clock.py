@@ -4,14 +4,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tools.inference.model import effect_vector
-from tools.inference.parameters import FreeParameter
-from tools.inference.problem import Problem
-from tools.inference.time_alignment import aligned
+from glider.tools.inference.model import effect_vector
+from glider.tools.inference.parameters import FreeParameter
+from glider.tools.inference.problem import Problem
+from glider.tools.inference.time_alignment import aligned
 
 
 @dataclass(frozen=True)
-class Clock:
+class ClockModel:
     """The effect of a wandering clock of motion capture: it stands in the model beside which all else is looked for."""
 
     label: str

@@ -11,16 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from sim_backend.core.effects import effect_layout as ef
-from sim_backend.core.effects.correction import shapes
-from tools.diagnose.descent import converge
-from tools.diagnose.noise_probes import UNPREDICTABLE, NoiseProbe, ProbeResult
-from tools.diagnose.residuals import pump_speed
-from tools.diagnose.search import Search
-from tools.inference.corrected import LINKS
-from tools.inference.fit import Fitter, Hypothesis
-from tools.inference.model import effect_vector
-from tools.inference.parameters import FreeParameter
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.sim_backend.core.effects.correction import shapes
+from glider.tools.diagnose.descent import converge
+from glider.tools.diagnose.noise_probes import UNPREDICTABLE, NoiseProbe, ProbeResult
+from glider.tools.diagnose.residuals import pump_speed
+from glider.tools.diagnose.search import Search
+from glider.tools.inference.corrected import LINKS
+from glider.tools.inference.fit import Fitter, Hypothesis
+from glider.tools.inference.model import effect_vector
+from glider.tools.inference.parameters import FreeParameter
 
 LABEL = "correction"
 LINKS_TRIED = 3

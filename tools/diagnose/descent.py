@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from tools.diagnose.sensor_consistency import DISTANT, NEARBY
-from tools.inference.fit import POOR, Fitter, Hypothesis
+from glider.tools.diagnose.sensor_consistency import DISTANT, NEARBY
+from glider.tools.inference.fit import POOR, Fitter, Hypothesis
 
 PRUNE_BEHIND = 60.0  # nat behind the best: no longer worth a flight, where also behind by
-SHARE = 0.5  # of all that was gained
+PRUNE_GAIN_SHARE = 0.5  # of all that was gained
 STARTED = 4  # hypotheses at most that are given other starts at a time
 HOPEFUL = 10.0  # nat that a step of what may begin only beyond some size should bring, for other starts to be tried
 # Spreads, tried as starts of what begins only beyond some size: a limit that is a little too tight is far from none
@@ -31,7 +31,7 @@ def prune(hypotheses: list[Hypothesis], worst: float, most: int, least_kept: int
     hoped = {id(c): c.misfit - (c.gained if np.isfinite(c.gained) else 0.0) for c in hypotheses}
     hypotheses = sorted(hypotheses, key=lambda c: hoped[id(c)])
     least = min(c.misfit for c in hypotheses)
-    margin = max(2.0 * PRUNE_BEHIND, SHARE * (worst - least))
+    margin = max(2.0 * PRUNE_BEHIND, PRUNE_GAIN_SHARE * (worst - least))
     return [c for n, c in enumerate(hypotheses) if n < least_kept or hoped[id(c)] - least <= margin][:most]
 
 
@@ -48,7 +48,7 @@ def advance_and_prune(
     return hypotheses
 
 
-def rebase(fitter: Fitter, hypotheses: list[Hypothesis]) -> list[Hypothesis]:
+def transfer(fitter: Fitter, hypotheses: list[Hypothesis]) -> list[Hypothesis]:
     """Hypotheses taken over to another fitter, with where they stand."""
     return [fitter.hypothesis(c.labels, c.free, c.values, c.nuisance) for c in hypotheses]
 

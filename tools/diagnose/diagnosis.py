@@ -8,20 +8,20 @@ from typing import Any
 
 import numpy as np
 
-from sim_backend.core.effects.catalogue import catalogue
-from tools.data.runs.case import Case
-from tools.diagnose import by_readings
-from tools.diagnose.cautions import cautions, not_asked
-from tools.diagnose.chain import noise_of, panels
-from tools.diagnose.correction import Correction, correct
-from tools.diagnose.matter import MATTERS
-from tools.diagnose.next_run import propose
-from tools.diagnose.noise_probes import UNPREDICTABLE
-from tools.diagnose.probabilities import TIE
-from tools.diagnose.record import NONE, UNKNOWN, Curves, Data, Details, Noise, Panel, Picture, write_record
-from tools.diagnose.residuals import UNCLEAN, strongest_left
-from tools.diagnose.search import Search, run
-from tools.diagnose.shrink import (
+from glider.sim_backend.core.effects.catalogue import catalogue
+from glider.tools.data.runs.case import Case
+from glider.tools.diagnose import by_readings
+from glider.tools.diagnose.cautions import cautions, not_asked
+from glider.tools.diagnose.chain import noise_of, panels
+from glider.tools.diagnose.correction import Correction, correct
+from glider.tools.diagnose.materiality import MATERIAL_TOLERANCES
+from glider.tools.diagnose.next_run import propose
+from glider.tools.diagnose.noise_probes import UNPREDICTABLE
+from glider.tools.diagnose.probabilities import TIE
+from glider.tools.diagnose.record import NONE, UNKNOWN, Curves, Data, Details, Noise, Panel, Picture, write_record
+from glider.tools.diagnose.residuals import UNCLEAN, strongest_left
+from glider.tools.diagnose.search import Search, run
+from glider.tools.diagnose.shrink import (
     AFTER,
     BEFORE,
     FLOOR,
@@ -32,8 +32,8 @@ from tools.diagnose.shrink import (
     shrink_further,
     shrinkage_of,
 )
-from tools.diagnose.staged import Staged, staged
-from tools.diagnose.staged_answer import (
+from glider.tools.diagnose.staged import Staged, staged
+from glider.tools.diagnose.staged_answer import (
     by_gap_left,
     certain_by_readings,
     conclusion,
@@ -41,19 +41,19 @@ from tools.diagnose.staged_answer import (
     identified_text,
     weighed,
 )
-from tools.diagnose.staircase import Stage, stages_of
-from tools.diagnose.unknown import LEFT_OVER, unfit
-from tools.diagnose.verdict import EVIDENCE_NEEDED, Answer, conclude
-from tools.gap.mended import findings_of, put_right
-from tools.inference.corrected import corrected_text
-from tools.inference.model import effect_vector, effects_in, nominal_model
-from tools.inference.problem import ALL, problem_of
-from tools.inference.rules import Rules
-from tools.readings.findings import Finding
-from tools.readings.pictures import pictures_of
+from glider.tools.diagnose.unknown import LEFT_OVER, unfit
+from glider.tools.diagnose.verdict import EVIDENCE_NEEDED, Answer, conclude
+from glider.tools.diagnose.waterfall import Stage, stages_of
+from glider.tools.gap.corrected import findings_of, fix_axes_signs_units
+from glider.tools.inference.corrected import corrected_text
+from glider.tools.inference.model import effect_vector, effects_in, nominal_model
+from glider.tools.inference.problem import ALL, problem_of
+from glider.tools.inference.rules import Rules
+from glider.tools.readings.findings import Finding
+from glider.tools.readings.pictures import pictures_of
 
 CORRECTION_FILE = "data_driven.toml"
-WORTH = 0.001  # a smaller probability is not written down
+LEAST_PROBABILITY = 0.001  # a smaller probability is not written down
 DRAWN_RUNS = 2  # with the largest gaps
 
 
@@ -85,7 +85,7 @@ class Diagnosis:
         """What these runs cannot say, a line each."""
         found = cautions(self.answer.search.problem)
         found += [
-            f"{label} is there ({nat:.0f} nat of evidence), but moves no channel of any window by {MATTERS:g} of its "
+            f"{label} is there ({nat:.0f} nat of evidence), but moves no channel of any window by {MATERIAL_TOLERANCES:g} of its "
             "tolerance: no gap"
             for label, nat in self.answer.negligible.items()
         ]
@@ -106,7 +106,7 @@ def verdict_of(answer: Answer) -> str:
 def diagnose(case: Case, say: Callable[[str], None] = lambda text: None, rules: Rules = ALL) -> Diagnosis:
     """Diagnose a case; `say` hears how far the search is."""
     readings = findings_of(case.runs)
-    runs = put_right(case.runs, readings)
+    runs = fix_axes_signs_units(case.runs, readings)
     search = run(problem_of(case, runs=runs, rules=rules), say)
     answer = conclude(search, say)
     search = answer.search
@@ -219,9 +219,9 @@ def places(answer: Answer) -> list[dict[str, Any]]:
         add((effects[label].subsystem, effects[label].element), p + likeness)
     for label in answer.selected:
         place = (effects[label].subsystem, effects[label].element)
-        weight[place] = max(weight.get(place, 0.0), WORTH)
+        weight[place] = max(weight.get(place, 0.0), LEAST_PROBABILITY)
     ranked = sorted(weight.items(), key=lambda item: -item[1])
-    return [{"subsystem": s, "element": e, "probability": p} for (s, e), p in ranked if p >= WORTH]
+    return [{"subsystem": s, "element": e, "probability": p} for (s, e), p in ranked if p >= LEAST_PROBABILITY]
 
 
 def gap_table(shrinkage: Shrinkage, answer: Answer) -> dict[str, Any]:
@@ -279,7 +279,7 @@ def details(diagnosis: Diagnosis) -> Details:
         format=1, version=installed(), data=data, evidence={k: float(v) for k, v in answer.gained.items()},
         corrected=in_model(diagnosis), noise=diagnosis.noise, panels=diagnosis.panels,
         findings=answer.findings, pictures=[picture(diagnosis, n) for n in drawn_runs(diagnosis)],
-        thresholds={"evidence": EVIDENCE_NEEDED, "tie": TIE, "sigma": UNCLEAN, "left": LEFT_OVER, "matters": MATTERS},
+        thresholds={"evidence": EVIDENCE_NEEDED, "tie": TIE, "sigma": UNCLEAN, "left": LEFT_OVER, "matters": MATERIAL_TOLERANCES},
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""The next run: the manoeuvre whose outcome the leading explanations foresee most differently.
+"""The next run: the manoeuvre whose outcome the leading explanations predict most differently.
 
 A handful of safe manoeuvres are flown by each explanation's model, open loop and from the same start, as the windows of
 the gap are; two explanations are as far apart as their predictions in tolerances. The manoeuvre that parts the least
@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from firmware.core.maths.rotations import wrap
-from firmware.core.vehicle.layout import X_DOWN, X_NU, X_QUAT
-from firmware.core.vehicle.mass import swung_moment
-from sim_backend.core.effects import effect_layout as ef
-from tools.diagnose.search import Search
-from tools.inference.problem import Problem
+from glider.firmware.core.maths.rotations import wrap
+from glider.firmware.core.vehicle.layout import X_DOWN, X_NU, X_QUAT
+from glider.firmware.core.vehicle.mass import roll_pendulum_moment
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.diagnose.search import Search
+from glider.tools.inference.problem import Problem
 
 SECONDS, RATE = 90.0, 10.0  # s, Hz
 EXPLANATIONS = 3
@@ -66,7 +66,7 @@ def commands(vehicle, manoeuvre: Manoeuvre, t: np.ndarray) -> np.ndarray:
     phase = (t // half).astype(int)
     diving = phase % 2 == 0
     ballast = np.where(diving, manoeuvre.ballast, -manoeuvre.ballast)
-    sr = swung_moment(vehicle.vector())
+    sr = roll_pendulum_moment(vehicle.vector())
     pitch = np.radians(np.where(diving, -manoeuvre.pitch, manoeuvre.pitch))
     slider = -(sr * np.tan(pitch) + ballast * m.x_b) / m.m_s
     servo = np.radians(np.where(diving, manoeuvre.roll[0], manoeuvre.roll[1]))

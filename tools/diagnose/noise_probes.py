@@ -10,13 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim_backend.core.effects import effect_layout as ef
-from sim_backend.ocean.core import layout as ocean
-from tools.inference.problem import Problem
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.sim_backend.ocean.core import layout as ocean
+from glider.tools.inference.problem import Problem
 
 TURBULENCE, WAVES, CLOCK = "turbulence", "waves", "motion capture's clock"
 VERTICAL_WATER = "vertical_water"
-UNPREDICTABLE = (TURBULENCE, WAVES, VERTICAL_WATER)  # labels whose course nobody can foresee
+UNPREDICTABLE = (TURBULENCE, WAVES, VERTICAL_WATER)  # labels whose time history is unpredictable
 
 
 @dataclass(frozen=True)

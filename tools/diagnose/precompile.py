@@ -11,16 +11,16 @@ from pathlib import Path
 
 import numpy as np
 
-from firmware.core.jit import kernel_count
-from firmware.core.vehicle.layout import X_NU, X_POS, X_QUAT
-from tools.data.runs import columns as names
-from tools.data.runs.case import Case, load_case, write_case
-from tools.data.runs.run import Run
-from tools.diagnose.diagnosis import diagnose
-from tools.flight.precompile import Work
-from tools.gap.assess import assess
-from tools.inference.model import effect_vector
-from tools.inference.problem import Gains, Problem, problem_of
+from glider.firmware.core.jit import kernel_count
+from glider.firmware.core.vehicle.layout import X_NU, X_POS, X_QUAT
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.case import Case, load_case, write_case
+from glider.tools.data.runs.run import Run
+from glider.tools.diagnose.diagnosis import diagnose
+from glider.tools.flight.precompile import Work
+from glider.tools.gap.assess import assess
+from glider.tools.inference.model import effect_vector
+from glider.tools.inference.problem import Gains, Problem, problem_of
 
 ROWS = 300  # of a run that is made up, at 10 Hz
 ONBOARD = (*names.ATTITUDE, *names.RATES, names.DEPTH, *names.DRAW_WIRES)
@@ -60,7 +60,7 @@ def _follow_a_moment() -> None:
 
 def _diagnose_a_moment() -> None:
     """Diagnose two short flights of the nominal vehicle."""
-    following = subprocess.Popen([sys.executable, "-m", "tools.diagnose.precompile", FOLLOW])
+    following = subprocess.Popen([sys.executable, "-m", "glider.tools.diagnose.precompile", FOLLOW])
     with tempfile.TemporaryDirectory() as folder:
         problem = _blank(Path(folder))
         P, F = problem.model.P, effect_vector(problem.model)

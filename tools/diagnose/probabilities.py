@@ -5,15 +5,15 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from scipy.special import ndtr
 
-from sim_backend.core.effects.catalogue import catalogue
-from tools.diagnose.gates import opened
-from tools.diagnose.matter import MATTERS
-from tools.diagnose.record import NONE, UNKNOWN
+from glider.sim_backend.core.effects.catalogue import catalogue
+from glider.tools.diagnose.gates import opened
+from glider.tools.diagnose.materiality import MATERIAL_TOLERANCES
+from glider.tools.diagnose.record import NONE, UNKNOWN
 
-TIE = 6.0  # nat within which two labels are not told apart: what a change of prior spreads can move
+TIE = 6.0  # nat within which two labels are not distinguished: what a change of prior spreads can move
 MOST_GROUP = 3
 ERROR_RATE = 0.03  # answers that named something else altogether, of those to the cases it was developed with: 3 of 104
-SECOND = 0.9  # of the main cause's probability, that none may have where there is an effect at all
+MAX_NONE_RATIO = 0.9  # of the main cause's probability, that none may have where there is an effect at all
 LARGE_WIDTH = 0.25  # e-folds of size over which a main cause comes to be as likely as not
 
 
@@ -55,7 +55,7 @@ def doubt_small(chances: dict[str, float], main: str, size: float) -> dict[str, 
     """
     large = float(ndtr(np.log(max(size, 1e-6)) / LARGE_WIDTH))
     labels = sum(chance for name, chance in chances.items() if name != NONE)
-    least = 1.0 / (1.0 + SECOND * chances[main] / max(labels, 1e-9))  # of the labels' probability that stays
+    least = 1.0 / (1.0 + MAX_NONE_RATIO * chances[main] / max(labels, 1e-9))  # of the labels' probability that stays
     kept = max(large, least)
     found = {name: kept * chance for name, chance in chances.items() if name != NONE}
     return found | {NONE: 1.0 - sum(found.values())}
@@ -66,9 +66,9 @@ def to_none(chances: dict[str, float], negligible: Iterable[str], moved: dict[st
 
     moved: by how much each moves the windows, tolerances; up to twice MATTERS it matters by degrees.
     """
-    matters = {label: opened(far, MATTERS, 2.0 * MATTERS) for label, far in moved.items()}
-    matters |= dict.fromkeys(negligible, 0.0)
-    kept = {label: chance * matters.get(label, 1.0) for label, chance in chances.items()}
+    material = {label: opened(far, MATERIAL_TOLERANCES, 2.0 * MATERIAL_TOLERANCES) for label, far in moved.items()}
+    material |= dict.fromkeys(negligible, 0.0)
+    kept = {label: chance * material.get(label, 1.0) for label, chance in chances.items()}
     return kept | {NONE: kept.get(NONE, 0.0) + sum(chances.values()) - sum(kept.values())}
 
 

@@ -14,12 +14,12 @@ from typing import Annotated, Any, Literal
 import msgspec
 import numpy as np
 
-from sim_backend.core.effects.catalogue import catalogue
-from sim_backend.ocean.vehicle import KIND
-from tools.data.errors import InputError
-from tools.data.plain import as_plain
-from tools.diagnose.stages import STAGES
-from tools.readings.pictures import Shown
+from glider.sim_backend.core.effects.catalogue import catalogue
+from glider.sim_backend.ocean.vehicle import KIND
+from glider.tools.data.errors import InputError
+from glider.tools.data.plain import as_plain
+from glider.tools.diagnose.stages import STAGES
+from glider.tools.readings.pictures import Shown
 
 ANSWER, DETAILS, CURVES = "diagnosis.json", "report.json", "report.npz"
 NONE, UNKNOWN = "none", "unknown"
@@ -40,7 +40,7 @@ class Place(msgspec.Struct):
     probability: float
 
 
-class Estimate(msgspec.Struct):
+class EstimateRecord(msgspec.Struct):
     """A parameter of an effect, SI."""
 
     estimate: Number
@@ -48,13 +48,13 @@ class Estimate(msgspec.Struct):
     unit: str
 
 
-class Cause(msgspec.Struct):
+class CauseRecord(msgspec.Struct):
     """A label, `none` or `unknown`."""
 
     label: str
     probability: float
     group: list[str]
-    parameters: dict[str, Estimate]
+    parameters: dict[str, EstimateRecord]
 
 
 class Interval(msgspec.Struct):
@@ -75,7 +75,7 @@ class Gap(msgspec.Struct):
     closed: Interval
 
 
-class Correction(msgspec.Struct):
+class CorrectionRecord(msgspec.Struct):
     """A data-driven correction of an unknown gap: its link, its shapes (rms in `unit`), and what it does."""
 
     link: str
@@ -89,10 +89,10 @@ class Correction(msgspec.Struct):
 class Unexplained(msgspec.Struct):
     """What is known of an unknown gap."""
 
-    correction: Correction | None = None
+    correction: CorrectionRecord | None = None
 
 
-class Reading(msgspec.Struct):
+class ReadingRecord(msgspec.Struct):
     """Something wrong with a reading (docs/READINGS.md)."""
 
     channel: str
@@ -106,8 +106,8 @@ class Reading(msgspec.Struct):
     text: str
 
 
-class Step(msgspec.Struct):
-    """A stage of the staircase: gaps of runs left out, in tolerances, and the total's 90 % interval."""
+class StepRecord(msgspec.Struct):
+    """A stage of the waterfall: gaps of runs left out, in tolerances, and the total's 90 % interval."""
 
     stage: str
     added: list[str]
@@ -124,38 +124,38 @@ class NextRun(msgspec.Struct):
     mission: str
 
 
-class Asked(msgspec.Struct):
+class QuestionRecord(msgspec.Struct):
     """The kind of vehicle that was asked of, where it is said."""
 
     kind: str = ""
 
 
-class Answer(msgspec.Struct):
+class AnswerRecord(msgspec.Struct):
     """diagnosis.json, as far as a report says it."""
 
     format: Format
     verdict: Literal["none", "cause", "unknown"]
     where: list[Place]
-    causes: Annotated[list[Cause], msgspec.Meta(min_length=2)]
+    causes: Annotated[list[CauseRecord], msgspec.Meta(min_length=2)]
     selected: list[str]
     gap: Gap
     unknown: Unexplained | None
     cautions: list[str]
     next_run: NextRun
-    readings: list[Reading] = []
-    stages: list[Step] = []
+    readings: list[ReadingRecord] = []
+    stages: list[StepRecord] = []
 
     @property
     def main(self) -> str:
         """The most probable: a label, `none` or `unknown`."""
         return self.causes[0].label
 
-    def cause(self, label: str) -> Cause:
+    def cause(self, label: str) -> CauseRecord:
         """The entry of a label."""
         return next(cause for cause in self.causes if cause.label == label)
 
 
-class Finding(msgspec.Struct, frozen=True):
+class FindingRecord(msgspec.Struct, frozen=True):
     """One test of whitened innovations: what is left in a channel, and what it is correlated with."""
 
     channel: str
@@ -163,7 +163,7 @@ class Finding(msgspec.Struct, frozen=True):
     sigma: float
 
 
-class Link(msgspec.Struct, frozen=True):
+class LinkRecord(msgspec.Struct, frozen=True):
     """A link of the chain: of what the best explanation brings, the share that it brings, 0 to 1."""
 
     stage: str
@@ -175,7 +175,7 @@ class Panel(msgspec.Struct):
     """Links' shares of what a label brings; label "": of what the likeliest link brings, or of an unknown rest."""
 
     label: str
-    links: list[Link]
+    links: list[LinkRecord]
 
 
 class Noise(msgspec.Struct):
@@ -220,7 +220,7 @@ class Details(msgspec.Struct):
     corrected: bool  # whether the corrected model holds any effect
     noise: Noise | None
     panels: list[Panel]
-    findings: list[Finding]
+    findings: list[FindingRecord]
     pictures: list[Picture]
     thresholds: dict[str, float]
     shown: list[str] = []  # titles of the pictures of readings
@@ -237,10 +237,10 @@ class Curves:
 
 
 @dataclass(frozen=True)
-class Record:
+class DiagnosisRecord:
     """A diagnosis as its folder holds it."""
 
-    answer: Answer
+    answer: AnswerRecord
     details: Details
     curves: list[Curves]  # of the runs in details.pictures
     shown: list[Shown] = field(default_factory=list)  # of details.shown
@@ -267,14 +267,14 @@ def write_record(
     np.savez_compressed(folder / CURVES, allow_pickle=False, **tables)
 
 
-def read_record(folder: Path) -> Record:
+def read_record(folder: Path) -> DiagnosisRecord:
     """A diagnosis from its folder; InputError names the file that is missing or not what it should be."""
     if not folder.is_dir():
         raise InputError("no such folder", source=folder)
-    answer, details = read_as(folder / ANSWER, Answer), read_as(folder / DETAILS, Details)
+    answer, details = read_as(folder / ANSWER, AnswerRecord), read_as(folder / DETAILS, Details)
     _check(answer, details, folder)
     curves = _read_curves(folder / CURVES, len(details.pictures))
-    return Record(answer, details, curves, _read_shown(folder / CURVES, details.shown))
+    return DiagnosisRecord(answer, details, curves, _read_shown(folder / CURVES, details.shown))
 
 
 def _present(path: Path) -> Path:
@@ -288,7 +288,7 @@ def _present(path: Path) -> Path:
 def is_pooled(folder: Path) -> bool:
     """Whether the diagnosis of a folder asks for what all its runs share: an ocean glider's, or one against healthy
     runs (tools/report/pooled draws it)."""
-    return (folder / ANSWER).is_file() and read_as(folder / ANSWER, Asked).kind in (KIND, AGAINST_HEALTHY)
+    return (folder / ANSWER).is_file() and read_as(folder / ANSWER, QuestionRecord).kind in (KIND, AGAINST_HEALTHY)
 
 
 def read_as(path: Path, kind: Any) -> Any:
@@ -298,7 +298,7 @@ def read_as(path: Path, kind: Any) -> Any:
         raise InputError(str(error), source=path) from None
 
 
-def _check(answer: Answer, details: Details, folder: Path) -> None:
+def _check(answer: AnswerRecord, details: Details, folder: Path) -> None:
     """InputError where a file names what no catalogue holds, or where the two files are of different diagnoses."""
     known = {*catalogue(), NONE, UNKNOWN}
     named = [cause.label for cause in answer.causes] + answer.selected

@@ -9,9 +9,9 @@ import itertools
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from firmware.core.vehicle.layout import X_ACT, X_BALLAST, X_DOWN, X_NU, X_QUAT, X_SERVO, X_SLIDER
-from tools.diagnose.record import Finding
-from tools.inference.problem import Gains, Problem
+from glider.firmware.core.vehicle.layout import X_ACT, X_BALLAST, X_DOWN, X_NU, X_QUAT, X_SERVO, X_SLIDER
+from glider.tools.diagnose.record import FindingRecord
+from glider.tools.inference.problem import Gains, Problem
 
 LAGS = ((1, 2), (3, 10), (11, 60))  # samples, in groups
 SHAPES = ("variance", "mean", "lag", "spectrum")  # tests of a channel by itself; the others are correlations
@@ -53,7 +53,7 @@ def pump_speed(problem: Problem, gains: Gains) -> np.ndarray:
     return speed
 
 
-def tests(problem: Problem, gains: Gains) -> list[Finding]:
+def tests(problem: Problem, gains: Gains) -> list[FindingRecord]:
     """Every test of every channel, the strongest first."""
     found = []
     E = gains.E
@@ -66,16 +66,16 @@ def tests(problem: Problem, gains: Gains) -> list[Finding]:
         if count < 100:
             continue
         filled = np.where(ok, e, 0.0)
-        found.append(Finding(channel, "variance", float(((filled**2).sum() - count) / np.sqrt(2.0 * count))))
+        found.append(FindingRecord(channel, "variance", float(((filled**2).sum() - count) / np.sqrt(2.0 * count))))
         # mean of each run: N(0, 1) each
         means = [filled[a:b].sum() / np.sqrt(max(1, ok[a:b].sum())) for a, b in itertools.pairwise(bounds)]
-        found.append(Finding(channel, "mean", chi(np.array(means))))
+        found.append(FindingRecord(channel, "mean", chi(np.array(means))))
         for low, high in LAGS:
             z = np.array([lagged(filled, ok, bounds, lag) for lag in range(low, high + 1)])
-            found.append(Finding(channel, f"lag {low}-{high}", chi(z)))
-        found.append(Finding(channel, "spectrum", peak(filled, bounds)))
+            found.append(FindingRecord(channel, f"lag {low}-{high}", chi(z)))
+        found.append(FindingRecord(channel, "spectrum", peak(filled, bounds)))
         for name, values in with_what.items():
-            found.append(Finding(channel, name, goes_with(filled, ok, values, bounds)))
+            found.append(FindingRecord(channel, name, goes_with(filled, ok, values, bounds)))
     return sorted(found, key=lambda f: -abs(f.sigma))
 
 
@@ -118,7 +118,7 @@ def goes_with(e: np.ndarray, ok: np.ndarray, values: np.ndarray, bounds: np.ndar
     return total / np.sqrt(weight) if weight > 1e-12 else 0.0
 
 
-def worst(found: list[Finding]) -> float:
+def worst(found: list[FindingRecord]) -> float:
     """The strongest finding, corrected for how many were looked at: normal under the true model."""
     if not found:
         return 0.0
@@ -126,7 +126,7 @@ def worst(found: list[Finding]) -> float:
     return -float(ndtri(min(max(chance, 1e-300), 1.0 - 1e-9)))
 
 
-def strongest_left(findings: list[Finding]) -> tuple[Finding | None, Finding | None]:
+def strongest_left(findings: list[FindingRecord]) -> tuple[FindingRecord | None, FindingRecord | None]:
     """The strongest finding, and the strongest that is a correlation, in the same channel if that has one.
 
     None where they are too weak.

@@ -11,25 +11,35 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import expit
 
-from sim_backend.core.effects.catalogue import catalogue
-from tools.diagnose.clock import Clock
-from tools.diagnose.descent import advance_and_prune, converge, first_step, prune, rebase, try_distant_starts
-from tools.diagnose.gates import opened
-from tools.diagnose.sensor_consistency import HOLDS_BELOW, inconsistent_sensors
-from tools.inference import levels
-from tools.inference.fit import THRESHOLD_STEP, Fitter, Hypothesis
-from tools.inference.model import effect_vector, nominal_model
-from tools.inference.parameters import CLOCK_PLACE, FreeParameter, effect_parameters, model_at, nuisance_parameters
-from tools.inference.problem import Gains, Problem
-from tools.inference.time_alignment import aligned
+from glider.sim_backend.core.effects.catalogue import catalogue
+from glider.tools.diagnose.clock import ClockModel
+from glider.tools.diagnose.descent import advance_and_prune, converge, first_step, prune, transfer, try_distant_starts
+from glider.tools.diagnose.gates import opened
+from glider.tools.diagnose.sensor_consistency import HOLDS_BELOW, inconsistent_sensors
+from glider.tools.inference import levels
+from glider.tools.inference.fit import THRESHOLD_STEP, Fitter, Hypothesis
+from glider.tools.inference.model import effect_vector, nominal_model
+from glider.tools.inference.parameters import (
+    CLOCK_PLACE,
+    FreeParameter,
+    effect_parameters,
+    model_at,
+    nuisance_parameters,
+)
+from glider.tools.inference.problem import Gains, Problem
+from glider.tools.inference.time_alignment import aligned
 
-ROUGHNESS = (100.0, 10.0)  # times the disturbance, before the vehicle's own
-TRIED, KEPT, LEFT = 20, 12, 8  # hypotheses: after the screen, after the roughest filter, after the second
+PROCESS_NOISE_SCALES = (100.0, 10.0)  # times the disturbance, before the vehicle's own
+HYPOTHESES_TRIED, KEPT, LEFT = (
+    20,
+    12,
+    8,
+)  # hypotheses: after the screen, after the filter with the largest process noise, after the second
 SETTLING = 1  # steps of all hypotheses before any is dropped
 MOST_EFFECTS = 5
 LEADING, PARTNERS_TRIED = 3, 5  # hypotheses beside which a second effect is tried, and how many beside each
 FAR_OFF = 10.0  # mean NIS of the best of three effects, beyond which no further one is small, nor explains it
-FURTHER = 3  # effects tried as a third or further one, beside the best hypothesis
+FURTHER_EFFECTS_TRIED = 3  # effects tried as a third or further one, beside the best hypothesis
 SHORT_LIST = 3  # hypotheses led on from the third effect on
 # Nat of evidence that an effect brings, or it is left out (docs/DIAGNOSIS.md, Thresholds): the prior odds of none to a
 # label, so that a label is as probable as none where it would just be selected.
@@ -41,7 +51,7 @@ POLISHED = {1: 3, 2: 2}  # times at most, by the number of effects; once with mo
 # held or coloured.
 LEAST_LEVEL, MOST_LEVEL = 0.5, 2.0
 NO_LEVEL = 2.5  # a disturbance that would have to be as many times the file's is as likely none: it stays the file's
-UNLIKE = 0.1  # logarithm by which a disturbance begins to be another
+LEAST_LOG_LEVEL = 0.1  # logarithm by which a disturbance begins to be another
 LEVEL_ROUNDS = 2  # Newton steps at a time
 ROUNDS = 3  # of gains at the best label and all labels tried again there, at most
 ALIGNED = 3  # times that poses are moved to where the clock found so far says
@@ -61,8 +71,8 @@ class Search:
     # Of the filter at the hypothesis that stands: floors begin there, what is left is tested. Hypotheses are compared
     # by fitter.gains alone, also where one drops an effect or a run.
     gains: Gains
-    clock: Clock | None = None
-    told: float = 0.0  # probability that the sensors' noise is what the file says
+    clock: ClockModel | None = None
+    well_specified: float = 0.0  # probability that the sensors' noise is what the file says
 
     def entries(self, hypothesis: Hypothesis) -> dict[str, list[int]]:
         """By effect of a hypothesis, the clock's among them, where in F it stands."""
@@ -71,7 +81,7 @@ class Search:
             label: [free.entry for free in hypothesis.free if free.label == label] for label in hypothesis.labels
         }
 
-    def lacking(self, F: np.ndarray, entries: list[int]) -> np.ndarray:
+    def without_effect(self, F: np.ndarray, entries: list[int]) -> np.ndarray:
         """F (N_F,) with these entries as the vehicle file has them."""
         without = F.copy()
         without[entries] = effect_vector(nominal_model(self.problem.case))[entries]
@@ -118,9 +128,9 @@ def screen(search: Search, beside: Hypothesis, most: int) -> list[Hypothesis]:
     def shows(hypothesis: Hypothesis) -> bool:
         return (hypothesis.columns[new:] ** 2).sum() > VISIBLE
 
-    hidden = [c for c in tried if not shows(c) and all(f.kinked for f in c.free[new:])]
+    hidden = [c for c in tried if not shows(c) and all(f.one_sided for f in c.free[new:])]
     for hypothesis in hidden:
-        hypothesis.kink_step = THRESHOLD_STEP
+        hypothesis.bound_step = THRESHOLD_STEP
         hypothesis.known = hypothesis.columns[:new]
     if hidden:
         fitter.linearise(hidden, coarse=True)
@@ -158,7 +168,7 @@ def begun_at(search: Search, free: FreeParameter, value: float) -> Search:
     for _ in range(ALIGNED if catalogue()[free.label].place == CLOCK_PLACE else 1):
         if catalogue()[free.label].place == CLOCK_PLACE:
             begun.problem = aligned(begun.problem, begun.model(begun.hypotheses[0])[1])
-        refilter(begun, begun.hypotheses[0], 1.0)
+        recompute_gains(begun, begun.hypotheses[0], 1.0)
         converge(begun.fitter, begun.hypotheses[0])
     return begun
 
@@ -170,28 +180,28 @@ def without_extra_noise(search: Search) -> Search:
     return replace(search, problem=replace(problem, extra_noise=None, recorded=recorded))
 
 
-def gains_of(problem: Problem, model: tuple[np.ndarray, np.ndarray], roughness: float) -> Gains:
+def gains_of(problem: Problem, model: tuple[np.ndarray, np.ndarray], process_noise_scale: float) -> Gains:
     """Gains of a filter with a model."""
-    gains = problem.filter(*model, roughness=roughness, begin=True)
-    return gains if problem.rules.splice else problem.unheld(gains)
+    gains = problem.filter(*model, process_noise_scale=process_noise_scale, begin=True)
+    return gains if problem.rules.splice else problem.open_loop_gains(gains)
 
 
-def refilter(search: Search, at: Hypothesis, roughness: float) -> None:
+def recompute_gains(search: Search, at: Hypothesis, process_noise_scale: float) -> None:
     """New gains and a new fitter at a hypothesis; all hypotheses are taken over."""
     problem = search.problem
-    search.gains = gains_of(problem, search.model(at), roughness)
+    search.gains = gains_of(problem, search.model(at), process_noise_scale)
     search.fitter = Fitter(problem, search.gains, search.nuisance, at, temper=True)
-    search.hypotheses = rebase(search.fitter, search.hypotheses)
-    search.null = rebase(search.fitter, [search.null])[0]
+    search.hypotheses = transfer(search.fitter, search.hypotheses)
+    search.null = transfer(search.fitter, [search.null])[0]
     search.fitter.measure(search.hypotheses)
     converge(search.fitter, search.null, 1 if len(at.labels) > 1 else 6)
 
 
 def first_round(search: Search) -> None:
-    """Every label tried in the roughest filter, and the likely ones led on to the vehicle's own disturbance."""
+    """Every label tried in the filter with the largest process noise, and the likely ones led on to the vehicle's own disturbance."""
     fitter, null = search.fitter, search.null
     fitter.linearise([null])
-    tried = screen(search, null, TRIED)
+    tried = screen(search, null, HYPOTHESES_TRIED)
     converge(fitter, null)
     fitter.move(tried)
     try_distant_starts(fitter, tried)
@@ -199,7 +209,7 @@ def first_round(search: Search) -> None:
         fitter.advance(tried)
     kept = prune(tried, null.misfit, KEPT, KEPT)
     search.hypotheses = advance_and_prune(fitter, kept, null.misfit, KEPT, 3 - SETTLING)
-    refilter(search, min([*search.hypotheses, search.null], key=lambda c: c.misfit), ROUGHNESS[1])
+    recompute_gains(search, min([*search.hypotheses, search.null], key=lambda c: c.misfit), PROCESS_NOISE_SCALES[1])
     search.hypotheses = advance_and_prune(search.fitter, search.hypotheses, search.null.misfit, LEFT, 3)
 
 
@@ -223,17 +233,17 @@ def take_over(search: Search, before: Sequence[Hypothesis]) -> None:
     search.hypotheses += found
     search.fitter.measure(found)
     if np.argmin(missed) > 0:
-        refilter(search, found[int(np.argmin(missed)) - 1], 1.0)
+        recompute_gains(search, found[int(np.argmin(missed)) - 1], 1.0)
         search.hypotheses = advance_and_prune(search.fitter, search.hypotheses, search.null.misfit, 2 * LEFT, 3)
     else:
         for one in found:
             converge(search.fitter, one)
     if search.best.labels != alone.labels:
-        refine(search, 1)
+        relinearise(search, 1)
 
 
 def run(
-    problem: Problem, say: Callable[[str], None] = lambda text: None, clock: Clock | None = None,
+    problem: Problem, say: Callable[[str], None] = lambda text: None, clock: ClockModel | None = None,
     before: Sequence[Hypothesis] = (),
 ) -> Search:  # fmt: skip
     """The search over a problem's runs.
@@ -242,25 +252,25 @@ def run(
     to, by a filter that knew less of disorder. Allowed parameters driven to their limits may hide it from the screen.
     """
     noise = levels.sensor_noise(problem, LEAST_LEVEL, MOST_LEVEL)
-    told = as_told(problem, noise)
-    problem = noise.believed(told).applied(problem)
+    well_specified = noise_matches_file(problem, noise)
+    problem = noise.believed(well_specified).applied(problem)
     problem = problem if clock is None else clock.within(problem)
     free, known = nuisance_parameters(problem), effect_parameters(problem)
     if clock is not None:
         del known[clock.label]
     P, F = model_at(problem, free, np.zeros(len(free)))
-    gains = gains_of(problem, (P, F), ROUGHNESS[0])
+    gains = gains_of(problem, (P, F), PROCESS_NOISE_SCALES[0])
     fitter = Fitter(problem, gains, free, temper=True)
     null = fitter.hypothesis((), [])
     fitter.measure([null])
-    search = Search(problem, free, known, fitter, null, [], gains, clock, told)
+    search = Search(problem, free, known, fitter, null, [], gains, clock, well_specified)
     if clock is None and start_at_inconsistent_sensor(search):
         say(f"sensors inconsistent: {search.hypotheses[0].labels[0]}")
     else:
         first_round(search)
         say(f"screened {len(known)} labels")
     for _ in range(ROUNDS):
-        refine(search, POLISHED[1])
+        relinearise(search, POLISHED[1])
         first = search.best.labels
         rescreen(search)
         if search.best.labels == first:
@@ -285,7 +295,7 @@ def grow(search: Search, say: Callable[[str], None]) -> None:
         if count > 2:
             listed = [c for c in search.ranked() if len(c.labels) >= count - 1][:SHORT_LIST]
             search.hypotheses = listed if any(c is before for c in listed) else [*listed, before]
-        refine(search, POLISHED.get(count, 1))
+        relinearise(search, POLISHED.get(count, 1))
         say(f"{count} effects: {' '.join(search.best.labels)}")
         fewer = [c.log_evidence(search.fitter) for c in search.hypotheses if len(c.labels) < count]
         least = max(fewer, default=-np.inf)
@@ -293,7 +303,7 @@ def grow(search: Search, say: Callable[[str], None]) -> None:
             break
 
 
-def as_told(problem: Problem, noise: levels.Levels) -> float:
+def noise_matches_file(problem: Problem, noise: levels.Levels) -> float:
     """Probability that the noise of all sensors is what the file says, as likely as not before they are looked at.
 
     One whose noise cannot be found says against it what one that is found exactly as the file says speaks for it.
@@ -310,7 +320,7 @@ def level_disturbance(search: Search) -> bool:
     Nothing jumps: a small change, and one beyond what is believed, count by degrees.
     """
     problem = search.problem
-    if (1.0 - search.told) * np.log(MOST_LEVEL) < UNLIKE:
+    if (1.0 - search.well_specified) * np.log(MOST_LEVEL) < LEAST_LOG_LEVEL:
         return False
     plain = replace(problem, spectral=levels.as_said(problem).spectral)
     now = levels.disturbance(plain)
@@ -320,14 +330,14 @@ def level_disturbance(search: Search) -> bool:
     before = np.log([factors[name] for name in now.names])
     model = search.model(min([search.null, search.best], key=lambda c: c.misfit))
     found = levels.estimate(plain, lambda p: p.filter(*model, begin=True), now.moved(before), LEVEL_ROUNDS)
-    log = np.clip(found.log, np.log(LEAST_LEVEL), np.log(MOST_LEVEL)) * (1.0 - search.told)
+    log = np.clip(found.log, np.log(LEAST_LEVEL), np.log(MOST_LEVEL)) * (1.0 - search.well_specified)
     log *= [1.0 - opened(factor, MOST_LEVEL, NO_LEVEL**2 / MOST_LEVEL) for factor in np.exp(found.log)]
     change = log - before
-    change *= opened(float(np.abs(change).max()), UNLIKE, 2.0 * UNLIKE)
+    change *= opened(float(np.abs(change).max()), LEAST_LOG_LEVEL, 2.0 * LEAST_LOG_LEVEL)
     if not change.any():
         return False
     search.problem = now.moved(change).applied(problem)
-    refilter(search, search.best, 1.0)
+    recompute_gains(search, search.best, 1.0)
     search.hypotheses = advance_and_prune(search.fitter, search.hypotheses, search.null.misfit, 2 * LEFT, 1)
     return True
 
@@ -345,10 +355,10 @@ def rescreen(search: Search) -> None:
     search.hypotheses = advance_and_prune(search.fitter, [*search.hypotheses, *new], search.null.misfit, 2 * LEFT, 3)
 
 
-def refine(search: Search, times: int) -> None:
+def relinearise(search: Search, times: int) -> None:
     """Gains and columns at the best hypothesis, and all led on; again while that one is far away."""
     for _ in range(times):
-        refilter(search, min([*search.hypotheses, search.null], key=lambda c: c.misfit), 1.0)
+        recompute_gains(search, min([*search.hypotheses, search.null], key=lambda c: c.misfit), 1.0)
         search.hypotheses = advance_and_prune(search.fitter, search.hypotheses, search.null.misfit, 2 * LEFT, 3)
         if search.fitter.prior_weight < NEARLY_UNTEMPERED:
             break
@@ -360,7 +370,7 @@ def add_effects(search: Search, count: int) -> bool:
     search.fitter.linearise(leading)
     more: dict[tuple[str, ...], Hypothesis] = {}
     for n, hypothesis in enumerate(leading):
-        tried = screen(search, hypothesis, PARTNERS_TRIED if count == 2 else FURTHER)
+        tried = screen(search, hypothesis, PARTNERS_TRIED if count == 2 else FURTHER_EFFECTS_TRIED)
         if n == 0 and (not tried or tried[0].expected_evidence() - hypothesis.expected_evidence() < PARTNER_EVIDENCE):
             return False
         more |= {tuple(sorted(c.labels)): c for c in tried}

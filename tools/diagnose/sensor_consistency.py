@@ -9,15 +9,17 @@ import itertools
 
 import numpy as np
 
-from sim_backend.core.effects.catalogue import catalogue
-from tools.inference.parameters import CLOCK_PLACE, FreeParameter, model_at
-from tools.inference.predict import poses_in_place
-from tools.inference.problem import LOST, Gains, Problem
+from glider.sim_backend.core.effects.catalogue import catalogue
+from glider.tools.inference.parameters import CLOCK_PLACE, FreeParameter, model_at
+from glider.tools.inference.predict import poses_in_place
+from glider.tools.inference.problem import LOST, Gains, Problem
 
 DISTANT = (-10.0, -5.0, -2.0, 2.0, 5.0, 10.0)  # spreads of a parameter, tried as starts
 NEARBY = (-1.0, -0.5, 0.5, 1.0, 1.5)  # likewise, nearer
 HOLDS_BELOW = 30.0  # squared innovations a sample: beyond that a filter does not hold its model to the course flown
-OUT = 0.5  # of the squared innovations, that are left at most where the right reading is set about right
+MAX_REMAINING_SHARE = (
+    0.5  # of the squared innovations, that are left at most where the right reading is set about right
+)
 
 
 def mean_nis(problem: Problem, gains: Gains) -> float:
@@ -46,7 +48,7 @@ def inconsistent_sensors(
     bounds = problem.recording.bounds
     missed = [np.nanmean(whole.E[a:b] ** 2) for a, b in itertools.pairwise(bounds)]
     worst = problem.part(int(np.argmax(np.nan_to_num(missed))))
-    most = OUT * mean_nis(worst, worst.filter(*model_at(problem, nuisance, own), begin=True))
+    most = MAX_REMAINING_SHARE * mean_nis(worst, worst.filter(*model_at(problem, nuisance, own), begin=True))
     found: dict[str, tuple[float, FreeParameter, float]] = {}
     for free in suspects(candidates):
         for far in (far for far in (*NEARBY, *DISTANT) if free.low <= far <= free.high):

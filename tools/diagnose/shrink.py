@@ -5,14 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tools.diagnose.as_read import begun_as_read
-from tools.diagnose.search import Search, without_extra_noise
-from tools.gap.measure import RunGap, case_channels, root_mean_square, run_gap
-from tools.inference.fit import NUISANCE_LIMIT, Hypothesis, bounded_step
-from tools.inference.model import nominal_model
-from tools.inference.parameters import model_at
-from tools.inference.predict import at_its_word, fly, fly_windows_from, predict
-from tools.inference.problem import Problem, cut
+from glider.tools.diagnose.as_read import begun_as_read
+from glider.tools.diagnose.search import Search, without_extra_noise
+from glider.tools.gap.measure import RunGap, case_channels, root_mean_square, run_gap
+from glider.tools.inference.fit import NUISANCE_LIMIT, Hypothesis, bounded_step
+from glider.tools.inference.model import nominal_model
+from glider.tools.inference.parameters import model_at
+from glider.tools.inference.predict import at_its_word, fly, fly_windows_from, predict
+from glider.tools.inference.problem import Problem, cut
 
 DRAWS = 2  # simulated repetitions that find the floor
 SEED = 20261121
@@ -143,11 +143,11 @@ def left_out_squares(search: Search, hypothesis: Hypothesis) -> np.ndarray:
     return squares(runs)
 
 
-def lacking_squares(search: Search, hypothesis: Hypothesis) -> dict[str, np.ndarray]:
+def ablation_importance(search: Search, hypothesis: Hypothesis) -> dict[str, np.ndarray]:
     """By effect of a hypothesis, how much squared gaps on runs left out, (runs,), grow with a model that lacks it.
 
     It lacks that one alone: all else stays as it was fitted, and windows begin where the whole model's filter stands,
-    or where the lacking model's readings show the vehicle (as_read).
+    or where the readings of a model without the effect show the vehicle (as_read).
     """
     problem, effects = search.problem.as_recorded, search.entries(hypothesis)
     found = {label: np.empty(len(problem.runs)) for label in effects}
@@ -161,7 +161,7 @@ def lacking_squares(search: Search, hypothesis: Hypothesis) -> dict[str, np.ndar
 
         whole = square(F)
         for label, entries in effects.items():
-            found[label][n] = square(search.lacking(F, entries)) - whole
+            found[label][n] = square(search.without_effect(F, entries)) - whole
     return found
 
 
@@ -224,7 +224,7 @@ def shrink(search: Search, hypothesis: Hypothesis) -> Shrinkage:
     listed = cut(problem).listed
     bare, knowing = left_out(search, search.null), search
     for entries in search.entries(search.null).values():  # a recalibrated model knows of no clock that is late
-        bare, knowing = [(P, search.lacking(F, entries)) for P, F in bare], without_extra_noise(search)
+        bare, knowing = [(P, search.without_effect(F, entries)) for P, F in bare], without_extra_noise(search)
     refitted, Y_refitted = gaps(knowing.problem, bare)
     has_effects = bool(search.entries(hypothesis))
     after, Y_after = gaps(problem, left_out(search, hypothesis)) if has_effects else (refitted, Y_refitted)

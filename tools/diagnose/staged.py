@@ -12,37 +12,37 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sim_backend.core.effects import effect_layout as ef
-from sim_backend.core.effects.catalogue import catalogue
-from tools.data.runs.case import Case
-from tools.data.runs.run import Run
-from tools.diagnose import by_readings
-from tools.diagnose.by_readings import Size
-from tools.diagnose.shrink import SEED, gaps
-from tools.diagnose.staircase import NOMINAL, READINGS, Stage
-from tools.gap.measure import RunGap, root_mean_square, run_gap
-from tools.gap.mended import Mended, mended
-from tools.inference.fit import bounded_step
-from tools.inference.model import Model, effect_vector, nominal_model
-from tools.inference.parameters import NINETY, FreeParameter, effect_parameters
-from tools.inference.predict import fly, observe
-from tools.inference.prediction_error import HORIZONS, Fitted, PredictionError
-from tools.inference.problem import cut, problem_of
-from tools.inference.vehicle_parameters import GAUGE, Parameters, first_effects, listed, parameters
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.sim_backend.core.effects.catalogue import catalogue
+from glider.tools.data.runs.case import Case
+from glider.tools.data.runs.run import Run
+from glider.tools.diagnose import by_readings
+from glider.tools.diagnose.by_readings import Size
+from glider.tools.diagnose.shrink import SEED, gaps
+from glider.tools.diagnose.waterfall import NOMINAL, READINGS, Stage
+from glider.tools.gap.corrected import ReadingCorrections, correct_readings
+from glider.tools.gap.measure import RunGap, root_mean_square, run_gap
+from glider.tools.inference.fit import bounded_step
+from glider.tools.inference.model import Model, effect_vector, nominal_model
+from glider.tools.inference.parameters import NINETY, FreeParameter, effect_parameters
+from glider.tools.inference.predict import fly, observe
+from glider.tools.inference.prediction_error import HORIZONS, Fitted, PredictionError
+from glider.tools.inference.problem import cut, problem_of
+from glider.tools.inference.vehicle_parameters import GAUGE, Parameters, first_effects, listed, parameters
 
 IDENTIFIED = "identified"  # its stage
 FOLDS, ALONE = 4, 6  # parts of many runs; runs up to which each is left out alone
-TRIED = 4  # effects fitted in full, of those whose linear step takes most
+EFFECTS_FITTED = 4  # effects fitted in full, of those whose linear step takes most
 REFIT_STEPS = 5
-WORTH = 0.1  # of the squared gap of runs left out, that an effect has to take
-SURE = NINETY  # sigma in the fit to all runs: its 90 % interval leaves 0 out
+LEAST_GAP_REDUCTION = 0.1  # of the squared gap of runs left out, that an effect has to take
+CERTAIN_SIGMA = NINETY  # sigma in the fit to all runs: its 90 % interval leaves 0 out
 
 
 @dataclass
 class Staged:
     """What the stages came to."""
 
-    read: Mended
+    read: ReadingCorrections
     stages: list[Stage]
     selected: list[str]  # labels: of readings first, then by the order in which they were added
     sizes: dict[str, dict[str, Size]]  # by label (or GAUGE), of the fit to all runs
@@ -58,7 +58,7 @@ class _Fold:
     """A part of the runs that is predicted by a fit to the others."""
 
     left_out: list[int]
-    read: Mended
+    read: ReadingCorrections
     values: np.ndarray
 
 
@@ -66,14 +66,14 @@ class _Stages:
     def __init__(self, case: Case, say: Callable[[str], None]):
         self.case, self.say = case, say
         self.nominal = nominal_model(case)
-        self.whole = mended(case, self.nominal)
+        self.whole = correct_readings(case, self.nominal)
         runs = len(case.runs)
         parts = [[n] for n in range(runs)] if runs <= ALONE else [list(range(k, runs, FOLDS)) for k in range(FOLDS)]
         self.folds = []
         for left_out in parts:
             # What the readings say is found without the run, too; of a single run nothing can be left out.
             kept = [run for n, run in enumerate(case.runs) if n not in left_out] or case.runs
-            self.folds.append(_Fold(left_out, mended(case, self.nominal, kept), np.empty(0)))
+            self.folds.append(_Fold(left_out, correct_readings(case, self.nominal, kept), np.empty(0)))
 
     def free(self, model: Model, runs: list[Run], more: list[FreeParameter]) -> PredictionError:
         """The fitting of everything identified, and more, to runs."""
@@ -123,7 +123,9 @@ class _Stages:
         }
         return {label: free for label, free in (own | known).items() if label not in self.whole.added}
 
-    def linear_worth(self, added: list[FreeParameter], candidates: dict[str, list[FreeParameter]]) -> dict[str, float]:
+    def linear_importance(
+        self, added: list[FreeParameter], candidates: dict[str, list[FreeParameter]]
+    ) -> dict[str, float]:
         """Mean square left on runs left out after one linear step with each candidate, by label."""
         more = [*added, *(f for free in candidates.values() for f in free)]
         found = dict.fromkeys(candidates, 0.0)
@@ -154,7 +156,7 @@ class _Stages:
         fitting = self.free(self.whole.model, self.whole.runs, more)
         found = fitting.again(np.clip(np.mean(values, axis=0), fitting.low, fitting.high), REFIT_STEPS)
         sd = np.sqrt(np.diag(found.covariance))
-        return bool((np.abs(found.values[-new:]) > SURE * sd[-new:]).any())
+        return bool((np.abs(found.values[-new:]) > CERTAIN_SIGMA * sd[-new:]).any())
 
     def refitted(self, more: list[FreeParameter], new: int) -> list[np.ndarray]:
         """Every fold's values with `new` parameters more at the end, from where it stands."""
@@ -162,15 +164,17 @@ class _Stages:
         for fold in self.folds:
             fitting = self.free(fold.read.model, fold.read.runs, more)
             begin = np.concatenate([fold.values, np.zeros(new)])
-            begin[-new:] = np.where(fitting.kinked[-new:], np.where(fitting.high[-new:] > 0.0, 0.5, -0.5), 0.0)
+            begin[-new:] = np.where(fitting.one_sided[-new:], np.where(fitting.high[-new:] > 0.0, 0.5, -0.5), 0.0)
             found.append(fitting.again(begin, REFIT_STEPS).values)
         return found
 
 
-def worth_it(before: list[RunGap], after: list[RunGap], folds: list[list[int]]) -> bool:
+def reduces_gap(before: list[RunGap], after: list[RunGap], folds: list[list[int]]) -> bool:
     """Whether a stage takes WORTH of the squared gap of runs left out, and some of it in every part of them."""
     b, a = np.array([gap.total for gap in before]) ** 2, np.array([gap.total for gap in after]) ** 2
-    return bool(a.sum() <= (1.0 - WORTH) * b.sum()) and all(a[part].sum() < b[part].sum() for part in folds)
+    return bool(a.sum() <= (1.0 - LEAST_GAP_REDUCTION) * b.sum()) and all(
+        a[part].sum() < b[part].sum() for part in folds
+    )
 
 
 def staged(case: Case, say: Callable[[str], None] = lambda text: None) -> Staged:
@@ -192,15 +196,15 @@ def staged(case: Case, say: Callable[[str], None] = lambda text: None) -> Staged
     parts = [fold.left_out for fold in work.folds]
     while candidates and len(case.runs) > 1:  # a fit to the run itself decides nothing
         say(f"causes beside the vehicle: {len(chosen) + 1}")
-        worth = work.linear_worth(added, candidates)
+        importance = work.linear_importance(added, candidates)
         best = None
-        for label in sorted(worth, key=lambda name: worth[name])[:TRIED]:
+        for label in sorted(importance, key=lambda name: importance[name])[:EFFECTS_FITTED]:
             own = candidates[label]
             values = work.refitted([*added, *own], len(own))
             left, flown = work.flown(work.models([*added, *own], values))
             new = np.array([at[-len(own) :] for at in values])
-            alike = bool((np.abs(np.sign(new).sum(axis=0)) == len(new)).any())
-            if alike and work.sure([*added, *own], len(own), values) and worth_it(stages[-1].gaps, left, parts):
+            same_sign = bool((np.abs(np.sign(new).sum(axis=0)) == len(new)).any())
+            if same_sign and work.sure([*added, *own], len(own), values) and reduces_gap(stages[-1].gaps, left, parts):
                 total = root_mean_square([gap.total for gap in left])
                 if best is None or total < best[0]:
                     best = (total, label, values, left, flown)
@@ -258,8 +262,8 @@ def sizes_of(free: Parameters, found: Fitted) -> list[Size]:
     sd = np.sqrt(np.diag(found.covariance))
     sizes = []
     for n, one in enumerate(free.free):
-        low = max(found.values[n] - SURE * sd[n], one.low)
-        high = min(found.values[n] + SURE * sd[n], one.high)
+        low = max(found.values[n] - CERTAIN_SIGMA * sd[n], one.low)
+        high = min(found.values[n] + CERTAIN_SIGMA * sd[n], one.high)
         at = free.nominal[n] + one.spread * np.array([found.values[n], low, high])
         sizes.append(Size(float(at[0]), (float(at[1]), float(at[2])), one.unit))
     return sizes

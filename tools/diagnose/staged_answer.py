@@ -6,22 +6,22 @@ from itertools import pairwise
 import numpy as np
 from scipy.special import expit
 
-from sim_backend.core.effects.catalogue import catalogue
-from tools.data.runs import columns as names
-from tools.diagnose import by_readings
-from tools.diagnose.gates import mixed
-from tools.diagnose.probabilities import answer_first
-from tools.diagnose.record import NONE, UNKNOWN
-from tools.diagnose.shrink import Shrinkage
-from tools.diagnose.staged import IDENTIFIED, Staged
-from tools.diagnose.verdict import Answer
-from tools.inference.vehicle_parameters import GAUGE
-from tools.readings.findings import Finding, spoken
+from glider.sim_backend.core.effects.catalogue import catalogue
+from glider.tools.data.runs import columns as names
+from glider.tools.diagnose import by_readings
+from glider.tools.diagnose.gates import mixed
+from glider.tools.diagnose.probabilities import answer_first
+from glider.tools.diagnose.record import NONE, UNKNOWN
+from glider.tools.diagnose.shrink import Shrinkage
+from glider.tools.diagnose.staged import IDENTIFIED, Staged
+from glider.tools.diagnose.verdict import Answer
+from glider.tools.inference.vehicle_parameters import GAUGE
+from glider.tools.readings.findings import Finding, spoken
 
 # A vehicle that had to be identified was not the file's: what is left of the gap of a first identification is no effect
 # alone, but the rest of the vehicle, and the answer says so; of the other probability each effect has its share.
 UNKNOWN_THEN = 0.9
-CERTAIN = 0.9  # probability from which a label is selected, where two answers are weighed
+SELECTED_PROBABILITY = 0.9  # probability from which a label is selected, where two answers are weighed
 
 
 def conclusion(answer: Answer, found: Staged, shrinkage: Shrinkage) -> Answer:
@@ -62,7 +62,7 @@ def weighed(known: Answer, far: Answer, off: float) -> Answer:
     every = [*known.selected, *(label for label in far.selected if label not in known.selected)]
     there = {label: (1.0 - off) * (label in known.selected) + off * (label in far.selected) for label in every}
     main, chances = answer_first(mixed(known.probabilities, far.probabilities, off), every)
-    selected = [label for label in every if label == main or there[label] >= CERTAIN]
+    selected = [label for label in every if label == main or there[label] >= SELECTED_PROBABILITY]
     gained = {label: max(one.gained.get(label, 0.0) for one in (known, far)) for label in selected}
     return replace(
         known, selected=selected, main=main, probabilities=chances, gained=gained, groups=far.groups | known.groups,

@@ -7,18 +7,27 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr
 
-from sim_backend.core.effects import effect_layout as ef
-from sim_backend.core.effects.catalogue import catalogue
-from tools.diagnose.clock import Clock
-from tools.diagnose.gates import opened
-from tools.diagnose.noise_probes import CLOCK, TURBULENCE, WAVES, NoiseProbe, ProbeResult, inflated, probes, run_probes
-from tools.diagnose.residuals import UNCLEAN
-from tools.diagnose.search import EVIDENCE_NEEDED, Search
-from tools.diagnose.shrink import AFTER, FLOOR, Shrinkage, shrink
-from tools.diagnose.waves import LINE, line_share
-from tools.inference.fit import Hypothesis
-from tools.inference.parameters import CLOCK_PLACE
-from tools.inference.problem import Problem
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.sim_backend.core.effects.catalogue import catalogue
+from glider.tools.diagnose.clock import ClockModel
+from glider.tools.diagnose.gates import opened
+from glider.tools.diagnose.noise_probes import (
+    CLOCK,
+    TURBULENCE,
+    WAVES,
+    NoiseProbe,
+    ProbeResult,
+    inflated,
+    probes,
+    run_probes,
+)
+from glider.tools.diagnose.residuals import UNCLEAN
+from glider.tools.diagnose.search import EVIDENCE_NEEDED, Search
+from glider.tools.diagnose.shrink import AFTER, FLOOR, Shrinkage, shrink
+from glider.tools.diagnose.waves import LINE, line_share
+from glider.tools.inference.fit import Hypothesis
+from glider.tools.inference.parameters import CLOCK_PLACE
+from glider.tools.inference.problem import Problem
 
 LEFT_OVER, LEFT_WIDTH = 0.145, 1.1  # share of the explainable misfit at which unknown is as likely as not; e-folds
 OWN_LEFT = 0.03  # the same where all of it is left at the sensor of an effect that is there
@@ -28,11 +37,11 @@ LEAST_SHARE = 0.05  # of the misfit, in that mean: a sensor's small error may ha
 LEFT_BOTH, LEFT_BOTH_WIDTH = 0.15, 0.8  # the same of that mean, where the file does not say what noise there is
 # Floors that the gap left lies beyond its own floor (root of the difference of squares), at which it is as likely one
 # effect of its own as what small ones leave; e-folds.
-WIDE, WIDE_WIDTH = 1.8, 0.35
+UNKNOWN_GAP_RATIO_AT_HALF, UNKNOWN_GAP_RATIO_WIDTH = 1.8, 0.35
 # Where the file says what noise there is, it is right about the vehicle: nothing small stands beside the main effect.
-TOLD_LEFT, TOLD_LEFT_WIDTH = 0.11, 0.6  # as LEFT_OVER
-TOLD_GAP, TOLD_GAP_WIDTH = 0.35, 0.5  # as LEFT_GAP
-TOLD_WIDE = 0.8  # as WIDE
+SPECIFIED_LEFT, SPECIFIED_LEFT_WIDTH = 0.11, 0.6  # as LEFT_OVER
+SPECIFIED_GAP, SPECIFIED_GAP_WIDTH = 0.35, 0.5  # as LEFT_GAP
+SPECIFIED_WIDE = 0.8  # as WIDE
 TURNED = ("pitch", "roll", "yaw", "rates")  # channels that a sea does not move
 NOISY, NOISY_WIDTH = 0.2, 0.8  # share of the explainable misfit that is left: disorder is looked for; width in e-folds
 # Tolerances that the best explanation still misses by: with the first an effect of the catalogue may, with the second
@@ -125,7 +134,7 @@ def remainder_of(
     return Remainder(explained, probed[0].gain, probed, opened(whiteness, *SHOWS))
 
 
-def water_disorder(search: Search, probed: list[ProbeResult]) -> ProbeResult | None:
+def excess_water_noise_of(search: Search, probed: list[ProbeResult]) -> ProbeResult | None:
     """Turbulence or waves, where water in disorder explains the recalibrated model's misfit better than any one link.
 
     Turbulence shakes every axis: where one alone brings most of it, something else shakes that axis. `probed`: at the
@@ -180,8 +189,8 @@ def wandering_clock(search: Search, hypothesis: Hypothesis, left: Remainder) -> 
     if left.probed[0].probe.name != TURBULENCE:
         return clock_first(left.probed)
     more, _ = inflated(search.problem, left.probed[0].probe, left.probed[0].scale)
-    rough = search.problem.with_extra_noise(more)
-    found = clock_first(run_probes(rough, *search.model(hypothesis), probes(rough)))
+    noisy = search.problem.with_extra_noise(more)
+    found = clock_first(run_probes(noisy, *search.model(hypothesis), probes(noisy)))
     return found if found is not None and found.gain > EVIDENCE_NEEDED else None
 
 
@@ -197,17 +206,17 @@ def disorder(search: Search, hypothesis: Hypothesis, left: Remainder) -> ProbeRe
     beside = waves_beside(search, hypothesis, left)
     if beside is not None:
         return beside
-    found = water_disorder(search, left.probed) if left.share > NOISY else None
+    found = excess_water_noise_of(search, left.probed) if left.share > NOISY else None
     if found is not None and found.gain > MOSTLY * (left.explained + left.left):
         return found
     water = turbulence_first(left.probed)  # a sensor's small error may have more nats than it: windows show it
-    return water if water is not None and left_floors(shrink(search, hypothesis)) > WIDE else None
+    return water if water is not None and left_floors(shrink(search, hypothesis)) > UNKNOWN_GAP_RATIO_AT_HALF else None
 
 
 OTHER_CLOCK = 0.5  # of the squares that its own label leaves of a clock's course: the other one draws it better
 
 
-def clock_of(search: Search, hypothesis: Hypothesis, gained: dict[str, float], more: np.ndarray) -> Clock | None:
+def clock_of(search: Search, hypothesis: Hypothesis, gained: dict[str, float], more: np.ndarray) -> ClockModel | None:
     """Of a hypothesis the effect of motion capture's clock that brings most, None where it has none.
 
     Its size is the mean over runs of the course of a clock that wanders by `more` (n_spectral,), its spread what the
@@ -230,12 +239,12 @@ def clock_of(search: Search, hypothesis: Hypothesis, gained: dict[str, float], m
         free, sizes = search.parameters[other], drawn[other][0]
         values, spread = np.zeros(len(free)), sizes.std(ddof=1) / np.sqrt(len(sizes))
         values[0] = sizes.mean() / free[0].spread
-        return Clock(other, free, values, np.full(len(free), spread / free[0].spread))
+        return ClockModel(other, free, values, np.full(len(free), spread / free[0].spread))
     sizes = run_sizes(problem, late, labels[0])[0]
     values[0] += sizes.mean() / free[0].spread
     if len(sizes) > 1:
         sd[0] = max(sd[0], sizes.std(ddof=1) / np.sqrt(len(sizes)) / free[0].spread)
-    return Clock(labels[0], free, values, sd)
+    return ClockModel(labels[0], free, values, sd)
 
 
 def run_sizes(problem: Problem, late: np.ndarray, label: str) -> tuple[np.ndarray, float]:
@@ -280,7 +289,9 @@ def beside_a_sea(shrinkage: Shrinkage, left: Remainder, sea: ProbeResult) -> flo
     """
     own = max(left.explained - sea.gain, 0.0)
     share = left.left / max(left.left + own, 1e-9)
-    return probability(turned_floors(shrinkage), WIDE, WIDE_WIDTH) * probability(share, LEFT_OVER, LEFT_WIDTH)
+    return probability(turned_floors(shrinkage), UNKNOWN_GAP_RATIO_AT_HALF, UNKNOWN_GAP_RATIO_WIDTH) * probability(
+        share, LEFT_OVER, LEFT_WIDTH
+    )
 
 
 def probability_unknown(
@@ -302,21 +313,25 @@ def probability_unknown(
             shrinkage.after / max(LOOSE * shrinkage.floor, 1.0), *FROM_LOOSE
         )
     if left is not None:
-        kinds = ((search.told, True), (1.0 - search.told, False))
+        kinds = ((search.well_specified, True), (1.0 - search.well_specified, False))
         shown = sum(
-            share * unknown_beside(told, evident, shrinkage, left, noise, taken, places)
-            for share, told in kinds if share > 0.0
+            share * unknown_beside(well_specified, evident, shrinkage, left, noise, taken, places)
+            for share, well_specified in kinds if share > 0.0
         )  # fmt: skip
     known = hidden + (shown - hidden) * shows
     return known + (1.0 - MORE_UNKNOWN - known) * off
 
 
 def unknown_beside(
-    told: bool, evident: bool, shrinkage: Shrinkage, left: Remainder, noise: ProbeResult | None, taken: float,
+    well_specified: bool, evident: bool, shrinkage: Shrinkage, left: Remainder, noise: ProbeResult | None, taken: float,
     places: Sequence[tuple[str, str]],
 ) -> float:  # fmt: skip
-    """The same of something left, where every sensor's noise is what the file says (told), or is not."""
-    wide = probability(left_floors(shrinkage), TOLD_WIDE if told and not noise else WIDE, WIDE_WIDTH)
+    """The same of something left, where every sensor's noise is what the file says (well specified), or is not."""
+    wide = probability(
+        left_floors(shrinkage),
+        SPECIFIED_WIDE if well_specified and not noise else UNKNOWN_GAP_RATIO_AT_HALF,
+        UNKNOWN_GAP_RATIO_WIDTH,
+    )
     if noise:
         disordered = probability(left.share, NOISY, NOISY_WIDTH)
         if noise.probe.name == CLOCK:  # it moves no vehicle: windows say as much as with a clock that is right
@@ -325,9 +340,11 @@ def unknown_beside(
     if not evident:
         return wide
     gap = left_share(shrinkage, taken)
-    misfit = probability(left.share, *((TOLD_LEFT, TOLD_LEFT_WIDTH) if told else (LEFT_OVER, LEFT_WIDTH)))
-    if told:  # what is left is no small effect beside the main one: either says enough
-        form = max(misfit, probability(gap, TOLD_GAP, TOLD_GAP_WIDTH))
+    misfit = probability(
+        left.share, *((SPECIFIED_LEFT, SPECIFIED_LEFT_WIDTH) if well_specified else (LEFT_OVER, LEFT_WIDTH))
+    )
+    if well_specified:  # what is left is no small effect beside the main one: either says enough
+        form = max(misfit, probability(gap, SPECIFIED_GAP, SPECIFIED_GAP_WIDTH))
     else:
         both = max(left.share, LEAST_SHARE) ** NATS * gap ** (1.0 - NATS)
         form = probability(both, LEFT_BOTH, LEFT_BOTH_WIDTH)

@@ -1,16 +1,16 @@
-"""From fits to an answer: which effects are selected, how probable each label is, and which cannot be told apart."""
+"""From fits to an answer: which effects are selected, how probable each label is, and which cannot be distinguished."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sim_backend.core.effects.catalogue import catalogue
-from tools.diagnose.descent import advance_and_prune, converge, first_step
-from tools.diagnose.gates import mixed, opened
-from tools.diagnose.matter import MATTERS, disorder_matters, gap_matters, movements
-from tools.diagnose.noise_probes import CLOCK, TURBULENCE, ProbeResult, inflated
-from tools.diagnose.probabilities import (
+from glider.sim_backend.core.effects.catalogue import catalogue
+from glider.tools.diagnose.descent import advance_and_prune, converge, first_step
+from glider.tools.diagnose.gates import mixed, opened
+from glider.tools.diagnose.materiality import MATERIAL_TOLERANCES, excess_noise_is_material, gap_is_material, movements
+from glider.tools.diagnose.noise_probes import CLOCK, TURBULENCE, ProbeResult, inflated
+from glider.tools.diagnose.probabilities import (
     TIE,
     answer_first,
     doubt_small,
@@ -21,21 +21,21 @@ from tools.diagnose.probabilities import (
     softmax,
     to_none,
 )
-from tools.diagnose.record import NONE, UNKNOWN, Finding
-from tools.diagnose.residuals import UNCLEAN, tests, worst
-from tools.diagnose.search import EVIDENCE_NEEDED, Search, run, screen
-from tools.diagnose.shrink import (
+from glider.tools.diagnose.record import NONE, UNKNOWN, FindingRecord
+from glider.tools.diagnose.residuals import UNCLEAN, tests, worst
+from glider.tools.diagnose.search import EVIDENCE_NEEDED, Search, run, screen
+from glider.tools.diagnose.shrink import (
     Shrinkage,
+    ablation_importance,
     case_noise_floor,
     in_tolerances,
-    lacking_squares,
     left_out_squares,
     most_often,
     shrink,
 )
-from tools.diagnose.unknown import (
+from glider.tools.diagnose.unknown import (
     LEAST_UNKNOWN,
-    WIDE,
+    UNKNOWN_GAP_RATIO_AT_HALF,
     clock_label,
     clock_of,
     disorder,
@@ -45,17 +45,19 @@ from tools.diagnose.unknown import (
     remainder_of,
     turbulence_first,
 )
-from tools.inference.fit import Hypothesis
-from tools.inference.parameters import CLOCK_PLACE
+from glider.tools.inference.fit import Hypothesis
+from glider.tools.inference.parameters import CLOCK_PLACE
 
 HELD_OUT_SHARE = 0.3  # of the gap that is left on runs left out: an effect beside another must close as much more
-CERTAIN = 0.9  # of the recalibrated gap: effects beside an unknown one that leave more are not certain
+MAX_UNEXPLAINED_GAP_SHARE = (
+    0.9  # of the recalibrated gap: effects beside an unknown one that leave more are not certain
+)
 RIVALS = 5  # further labels fitted in the place of the main one, where it stands beside others
 # Floors by which an effect widens the gap, as likely a main cause as one of many small ones there: where noise is not
 # what the file says, so that it may say little of the rest, and where it is.
-LARGE, TOLD = 2.1, 1.2
-ROUGH = 0.7  # of what rough water leaves of windows (docs/DIAGNOSIS.md, Thresholds)
-LIKELY = 1e-3  # probability from which an alternative's effect on the windows is looked at
+LARGE, SPECIFIED = 2.1, 1.2
+TURBULENCE_GAP_SHARE = 0.7  # of what rough water leaves of windows (docs/DIAGNOSIS.md, Thresholds)
+ALTERNATIVE_PROBABILITY = 1e-3  # probability from which an alternative's effect on the windows is looked at
 
 
 @dataclass
@@ -69,7 +71,7 @@ class Answer:
     groups: dict[str, list[str]]
     hypothesis: Hypothesis  # the corrected model
     null: Hypothesis  # recalibrated
-    findings: list[Finding]
+    findings: list[FindingRecord]
     whiteness: float  # sigma of what is left, corrected for the number of tests
     unexplained: float  # of the squared gap beyond the floor, the share that the selected effects leave
     gained: dict[str, float]  # nat that each selected effect brings
@@ -98,7 +100,7 @@ def drop(search: Search, hypothesis: Hypothesis, label: str) -> Hypothesis:
 
 
 @dataclass(frozen=True)
-class Worth:
+class HeldOutImportance:
     """What each effect of a hypothesis takes off the gap on runs left out, the rest fitted anew without it."""
 
     whole: np.ndarray  # (runs,) squared gaps with all of them
@@ -117,31 +119,31 @@ class Worth:
         return self.tolerances(label) / max(float(np.sqrt(self.whole.mean())), 1e-6)
 
 
-def held_out_worth(search: Search, hypothesis: Hypothesis) -> Worth:
+def held_out_importance(search: Search, hypothesis: Hypothesis) -> HeldOutImportance:
     """What each effect of a hypothesis is worth on runs left out."""
     whole = left_out_squares(search, hypothesis)
     taken = {
         label: left_out_squares(search, drop(search, hypothesis, label)) - whole for label in hypothesis.labels
     }  # fmt: skip
-    return Worth(whole, taken)
+    return HeldOutImportance(whole, taken)
 
 
-def less_by_worth(search: Search, hypothesis: Hypothesis, taken: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """What effects take (`lacking_squares`), by which they are ranked: of one that is worth less, the geometric mean.
+def rank_by_importance(search: Search, hypothesis: Hypothesis, taken: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """What effects take (`ablation_importance`), by which they are ranked: of one that is worth less, the geometric mean.
 
     What a parameter makes up for nearly, as a drag coefficient does for a drag, is soon believed beside a main cause.
     """
     if len(hypothesis.labels) < 2:
         return taken
-    worth = held_out_worth(search, hypothesis)
+    importance = held_out_importance(search, hypothesis)
     found = dict(taken)
     for label in hypothesis.labels:
         size = in_tolerances(taken[label])
-        found[label] = taken[label] * min(worth.tolerances(label) / max(size, 1e-9), 1.0)
+        found[label] = taken[label] * min(importance.tolerances(label) / max(size, 1e-9), 1.0)
     return found
 
 
-def strain(hypothesis: Hypothesis, less: Hypothesis) -> float:
+def nuisance_prior_cost(hypothesis: Hypothesis, less: Hypothesis) -> float:
     """Nat of prior that what is allowed loses where it has to make up for an effect that another hypothesis lacks."""
     return 0.5 * float((less.nuisance**2).sum() - (hypothesis.nuisance**2).sum())
 
@@ -161,11 +163,11 @@ def prune_effects(search: Search, begin: Hypothesis | None = None) -> tuple[Hypo
         if gains[weakest] >= EVIDENCE_NEEDED:
             if len(hypothesis.labels) == 1:
                 return hypothesis, gains
-            outside = held_out_worth(search, hypothesis)
+            outside = held_out_importance(search, hypothesis)
             idle = [
                 label for label in hypothesis.labels
                 if outside.share(label) < HELD_OUT_SHARE
-                and strain(hypothesis, drop(search, hypothesis, label)) < EVIDENCE_NEEDED
+                and nuisance_prior_cost(hypothesis, drop(search, hypothesis, label)) < EVIDENCE_NEEDED
             ]  # fmt: skip
             if not idle:
                 return hypothesis, gains
@@ -226,23 +228,23 @@ def search_again_with_noise(
     clock = clock_of(search, hypothesis, gained, more) if found.probe.name == CLOCK else None
     problem = search.problem.as_recorded if clock is None else clock.aligned(search.problem)
     answer = conclude(run(problem.with_extra_noise(more), say, clock, [search.best, hypothesis]), say, found)
-    if found.probe.name == TURBULENCE and not as_rough(answer):
+    if found.probe.name == TURBULENCE and not as_inflated(answer):
         say("not as rough water would have it")
         return conclude(search, say, calm=True)
     water = turbulence_first(answer.probed) if found.probe.name == CLOCK else None
-    if water is not None and left_floors(answer.shrinkage) > WIDE:
+    if water is not None and left_floors(answer.shrinkage) > UNKNOWN_GAP_RATIO_AT_HALF:
         more = more + inflated(answer.search.problem, water.probe, water.scale)[0]
-        rough = conclude(run(problem.with_extra_noise(more), say, clock, [answer.search.best]), say, water)
-        if as_rough(rough):
+        noisy = conclude(run(problem.with_extra_noise(more), say, clock, [answer.search.best]), say, water)
+        if as_inflated(noisy):
             clocks = [label for label in answer.selected if catalogue()[label].place == CLOCK_PLACE]
-            gained = rough.gained | {label: answer.gained[label] for label in clocks}
-            return replace(rough, selected=[*rough.selected, *clocks], gained=gained)
+            gained = noisy.gained | {label: answer.gained[label] for label in clocks}
+            return replace(noisy, selected=[*noisy.selected, *clocks], gained=gained)
     return answer
 
 
-def as_rough(answer: Answer) -> bool:
+def as_inflated(answer: Answer) -> bool:
     """Whether turbulence is the main cause of an answer, and windows err as rough water would have them."""
-    return answer.main == TURBULENCE and answer.shrinkage.after >= ROUGH * answer.shrinkage.floor
+    return answer.main == TURBULENCE and answer.shrinkage.after >= TURBULENCE_GAP_SHARE * answer.shrinkage.floor
 
 
 def conclude(
@@ -266,7 +268,7 @@ def conclude(
         if found is not None:
             return search_again_with_noise(search, evident, gained, found, say)
     moved = movements(search, evident)
-    small = [label for label in evident.labels if moved[label] < MATTERS]
+    small = [label for label in evident.labels if moved[label] < MATERIAL_TOLERANCES]
     selected = evident
     for label in small:
         selected = drop(search, selected, label)
@@ -275,18 +277,18 @@ def conclude(
     if noise is not None:
         disordered = clock_label(search, evident) if noise.probe.name == CLOCK else noise.probe.name
         gained = gained | {disordered: gained.get(disordered, 0.0) + noise.gain}
-        if moved.get(disordered, 0.0) >= MATTERS or disorder_matters(search, selected, shrinkage):
+        if moved.get(disordered, 0.0) >= MATERIAL_TOLERANCES or excess_noise_is_material(search, selected, shrinkage):
             small = [label for label in small if label != disordered]
         elif disordered not in small:
             small.append(disordered)
     negligible = {label: gained.pop(label) for label in small}
-    taken = lacking_squares(search, evident)
+    taken = ablation_importance(search, evident)
     floor = case_noise_floor(search, selected)["total"] if disordered else shrinkage.floor
     if disordered and disordered not in taken:
         taken[disordered] = np.full(len(problem.runs), max(shrinkage.after**2 - floor**2, 0.0))
     ranked = gained or negligible
     sizes = {label: in_tolerances(squares) for label, squares in taken.items()}
-    ranking = less_by_worth(search, evident, taken)
+    ranking = rank_by_importance(search, evident, taken)
     by_size = sorted(ranked, key=lambda label: -in_tolerances(ranking[label]))
     main = by_size[0] if ranked else ""
     by_search = problem.rules.evidence and not (noise is not None and main == disordered)
@@ -307,18 +309,18 @@ def conclude(
     if main in gained:
         main = max(gained, key=lambda label: chances.get(label, 0.0))
         floors = sizes[main] / max(floor, 1e-6)
-        small_ones, alone = (doubt_small(chances, main, floors / size) for size in (LARGE, TOLD))
-        chances = mixed(small_ones, alone, search.told)
+        small_ones, alone = (doubt_small(chances, main, floors / size) for size in (LARGE, SPECIFIED))
+        chances = mixed(small_ones, alone, search.well_specified)
     by_effects = sum(sizes[label] ** 2 for label in gained)
     places = [catalogue()[label].place for label in (main, *by_size) if label in catalogue()]
     unknown = probability_unknown(search, bool(gained), bool(ranked), shrinkage, left, noise, by_effects, places)
     if not gained:
-        unknown = LEAST_UNKNOWN + (unknown - LEAST_UNKNOWN) * gap_matters(shrinkage)
+        unknown = LEAST_UNKNOWN + (unknown - LEAST_UNKNOWN) * gap_is_material(shrinkage)
     chances = {name: value * (1.0 - unknown) for name, value in chances.items()} | {UNKNOWN: unknown}
     likely = main if main in gained else ""
     chances = mix_in_error_rate({label: 0.0 for label in catalogue()} | chances, likely, evident.labels)
     top, chances = answer_first(chances, gained)
-    if top == NONE or (top == UNKNOWN and shrinkage.after > CERTAIN * shrinkage.recalibrated):
+    if top == NONE or (top == UNKNOWN and shrinkage.after > MAX_UNEXPLAINED_GAP_SHARE * shrinkage.recalibrated):
         gained = {label: gain for label, gain in gained.items() if label == disordered and top == UNKNOWN}
         if selected.labels:
             selected, shrinkage = search.null, shrink(search, search.null)
@@ -358,7 +360,7 @@ def movements_of_alternatives(
     return {
         label: movements(search, one)[label]
         for label, one in alternatives(search, hypothesis, main).items()
-        if label != main and chances.get(label, 0.0) >= LIKELY
+        if label != main and chances.get(label, 0.0) >= ALTERNATIVE_PROBABILITY
     }
 
 

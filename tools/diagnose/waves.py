@@ -1,4 +1,4 @@
-"""Waves told from a force that nobody knows: they move the vehicle by one line of the spectrum, in all runs the same.
+"""Waves distinguished from a force that nobody knows: they move the vehicle by one line of the spectrum, in all runs the same.
 
 Both make the probe of moving water gain. What a force leaves goes with the legs flown, at periods of ten seconds and
 more; a sea goes with its own period.
@@ -8,8 +8,8 @@ import itertools
 
 import numpy as np
 
-from sim_backend.core.effects import effect_layout as ef
-from tools.inference.problem import Gains, Problem
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.inference.problem import Gains, Problem
 
 PLACES = (ef.Y_DEPTH, ef.Y_MOCAP_X, ef.Y_MOCAP_Y, ef.Y_MOCAP_Z)  # readings that see where the vehicle is
 PERIODS = (2.0, 10.0)  # s, of surface waves (docs/GAP.md, Words)

@@ -13,12 +13,12 @@ from pathlib import Path
 
 import numpy as np
 
-from firmware.core.jit import CACHE_DIR, compiled_signatures
-from firmware.core.vehicle.layout import GRAVITY
-from firmware.core.vehicle.seawater import water_density
-from hal.ports import ACTUATORS, SLOTS, BoardError, Condition, Hardware, Validity, empty_frame
-from tools.data.errors import InputError
-from tools.flight.compose import Flight
+from glider.firmware.core.jit import CACHE_DIR, compiled_signatures
+from glider.firmware.core.vehicle.layout import GRAVITY
+from glider.firmware.core.vehicle.seawater import water_density
+from glider.hal.ports import ACTUATORS, SLOTS, BoardError, Condition, Hardware, Validity, empty_frame
+from glider.tools.data.errors import InputError
+from glider.tools.flight.compose import Flight
 
 LISTEN_S = 0.4
 # What weather does to the pressure at one place, about its mean; more is a sensor's error, or not the surface.
@@ -31,7 +31,7 @@ SPARE_BYTES = 50e6
 
 
 @dataclass(frozen=True)
-class Check:
+class ArmingCheck:
     """One thing looked at before a flight."""
 
     name: str
@@ -39,7 +39,7 @@ class Check:
     reason: str
 
 
-class Refused(Exception):
+class ArmingRefused(Exception):
     """A check's reason to refuse."""
 
 
@@ -52,11 +52,11 @@ class Arming:
         self.pressures: list[float] = []  # Pa, of the fit samples while listening
         self.surface_pressure = flight.board.surface_pressure  # Pa; as measured, once the zero depth has passed
 
-    def run(self, disabled: bool = False) -> list[Check]:
+    def run(self, disabled: bool = False) -> list[ArmingCheck]:
         """Every check, in the order of the list; `disabled`: none of them refuses, to show that they do."""
         self._listen()
         checks = [self._one(name, work) for name, work in self._list().items()]
-        return [Check(item.name, True, item.reason) for item in checks] if disabled else checks
+        return [ArmingCheck(item.name, True, item.reason) for item in checks] if disabled else checks
 
     def _list(self) -> dict[str, Callable[[], str]]:
         return {
@@ -66,13 +66,13 @@ class Arming:
             "disk": self.disk, "kernels": self.kernels,
         }  # fmt: skip
 
-    def _one(self, name: str, work: Callable[[], str]) -> Check:
+    def _one(self, name: str, work: Callable[[], str]) -> ArmingCheck:
         try:
-            return Check(name, True, work())
-        except (Refused, BoardError) as error:
-            return Check(name, False, str(error))
+            return ArmingCheck(name, True, work())
+        except (ArmingRefused, BoardError) as error:
+            return ArmingCheck(name, False, str(error))
         except Exception as error:  # whatever goes wrong in a check, it has not passed
-            return Check(name, False, f"could not be checked: {type(error).__name__}: {error}")
+            return ArmingCheck(name, False, f"could not be checked: {type(error).__name__}: {error}")
 
     def _listen(self) -> None:
         """Let time pass and take a sample of everything."""
@@ -98,7 +98,7 @@ class Arming:
         bad = [name for name in fitted if self.frame[SLOTS[name].validity] != Validity.VALID]
         bad += [name for name in fitted if not np.isfinite(self.frame[SLOTS[name].values]).all() and name not in bad]
         if silent or bad:
-            raise Refused("; ".join(silent) or f"nothing fit from {', '.join(bad)}")
+            raise ArmingRefused("; ".join(silent) or f"nothing fit from {', '.join(bad)}")
         return "every device answers"
 
     def zero_depth(self) -> str:
@@ -110,7 +110,7 @@ class Arming:
         if not abs(off) <= WEATHER_PA:
             depth = board.armed_depth + off / (density * GRAVITY)
             where = f"{board.armed_depth:g} m deep" if board.armed_depth else "in air or awash"
-            raise Refused(
+            raise ArmingRefused(
                 f"{depth:.2f} m deep, not {where}; {off / 100:+.0f} hPa is no weather ({WEATHER_PA / 100:g} at most):"
                 " armed_depth_m and [beacon] surface_pa of the board file, or `zero beacon` in the bench"
             )
@@ -121,9 +121,9 @@ class Arming:
         angles = np.degrees(self.frame[SLOTS["imu"].values])
         (roll, pitch), rates = angles[:2], angles[3:]
         if not (abs(roll) <= STEADY_DEG and abs(pitch) <= STEADY_DEG):
-            raise Refused(f"roll {roll:.0f}, pitch {pitch:.0f} deg: no attitude to begin from")
+            raise ArmingRefused(f"roll {roll:.0f}, pitch {pitch:.0f} deg: no attitude to begin from")
         if not np.abs(rates).max() <= TURNING_DEG_S:
-            raise Refused(f"turns at {np.abs(rates).max():.0f} deg/s: hold it still, or the gyro is off")
+            raise ArmingRefused(f"turns at {np.abs(rates).max():.0f} deg/s: hold it still, or the gyro is off")
         return f"roll {roll:.0f}, pitch {pitch:.0f} deg"
 
     def actuators(self) -> str:
@@ -146,14 +146,14 @@ class Arming:
             if place < low - slack or place > high + slack:  # one that is not a number: `devices`
                 bad.append(f"{wire}: at {place:.4g} {unit}, outside {low:.4g} to {high:.4g}")
         if bad:
-            raise Refused("; ".join(bad))
+            raise ArmingRefused("; ".join(bad))
         return "all well, within their ranges"
 
     def leak(self) -> str:
         if self.flight.board.leak is None:
             return "not fitted"
         if self.frame[SLOTS["leak"].values][0] != 0.0:
-            raise Refused("wet")
+            raise ArmingRefused("wet")
         return "dry"
 
     def battery(self) -> str:
@@ -164,14 +164,14 @@ class Arming:
         if limits is None or limits.low_voltage is None:
             return f"{volts:.1f} V; the vehicle file has no [limits] low_voltage"
         if not volts >= limits.low_voltage:
-            raise Refused(f"{volts:.1f} V, below the vehicle's low_voltage of {limits.low_voltage:g} V")
+            raise ArmingRefused(f"{volts:.1f} V, below the vehicle's low_voltage of {limits.low_voltage:g} V")
         return f"{volts:.1f} V"
 
     def limits(self) -> str:
         limits = self.flight.vehicle.limits
         depth = None if limits is None else limits.working_depth_m
         if depth is None and self.hardware:
-            raise Refused("the vehicle file has no [limits] working_depth_m")
+            raise ArmingRefused("the vehicle file has no [limits] working_depth_m")
         if depth is None:
             return f"no working depth; the site's {self.flight.mission.site.depth_m:g} m counts"
         return f"working depth {depth:g} m"
@@ -180,7 +180,9 @@ class Arming:
         limits, mission = self.flight.vehicle.limits, self.flight.mission
         deepest = max((leg.depth_m for leg in mission.leg if leg.depth_m is not None), default=0.0)
         if limits is not None and limits.working_depth_m is not None and deepest > limits.working_depth_m:
-            raise Refused(f"{mission.name} goes to {deepest:g} m, deeper than the hull's {limits.working_depth_m:g} m")
+            raise ArmingRefused(
+                f"{mission.name} goes to {deepest:g} m, deeper than the hull's {limits.working_depth_m:g} m"
+            )
         return f"{mission.name}: {len(mission.leg)} legs"
 
     def clock(self) -> str:
@@ -189,25 +191,25 @@ class Arming:
         clock.sleep_until(before + 0.02)
         passed = clock.now() - before
         if not 0.019 <= passed < 1.0:
-            raise Refused(f"20 ms of the board's clock took {1e3 * passed:.1f} ms")
+            raise ArmingRefused(f"20 ms of the board's clock took {1e3 * passed:.1f} ms")
         return "runs"
 
     def disk(self) -> str:
         if self.folder is None:
             return "no log"
         if not os.access(self.folder, os.W_OK):
-            raise Refused(f"{self.folder}: cannot be written")
+            raise ArmingRefused(f"{self.folder}: cannot be written")
         needed = SPARE_BYTES + BYTES_PER_SECOND * self.flight.mission.time_limit_s
         free = shutil.disk_usage(self.folder).free
         if free < needed:
-            raise Refused(f"{self.folder}: {free / 1e6:.0f} MB free, a flight may need {needed / 1e6:.0f} MB")
+            raise ArmingRefused(f"{self.folder}: {free / 1e6:.0f} MB free, a flight may need {needed / 1e6:.0f} MB")
         return f"{free / 1e6:.0f} MB free"
 
     def kernels(self) -> str:
-        from firmware.runtime import rehearse
+        from glider.firmware.runtime import rehearse
 
         if CACHE_DIR is None and self.hardware:
-            raise Refused("plain Python (GLIDER_JIT=0) is too slow to fly with")
+            raise ArmingRefused("plain Python (GLIDER_JIT=0) is too slow to fly with")
         rehearse(self.flight.autopilot, self.flight.supervisor)
         before, took = compiled_signatures(), 1.0
         for _ in range(5):  # the quickest: the machine may have been at something else
@@ -215,20 +217,22 @@ class Arming:
             rehearse(self.flight.autopilot, self.flight.supervisor)
             took = min(took, time.perf_counter() - begin)
         if compiled_signatures() != before:
-            raise Refused("kernels compile anew in every rehearsal")
+            raise ArmingRefused("kernels compile anew in every rehearsal")
         if self.hardware and took > 1.0 / self.flight.board.loop_hz:
-            raise Refused(f"a rehearsal takes {1e3 * took:.0f} ms, a tick has {1e3 / self.flight.board.loop_hz:.0f} ms")
+            raise ArmingRefused(
+                f"a rehearsal takes {1e3 * took:.0f} ms, a tick has {1e3 / self.flight.board.loop_hz:.0f} ms"
+            )
         return f"compiled; a rehearsed tick takes {1e3 * took:.1f} ms"
 
 
-def refuse(checks: list[Check]) -> None:
+def refuse(checks: list[ArmingCheck]) -> None:
     """BoardError with every reason; nothing where all is fit."""
     reasons = [f"{check.name}: {check.reason}" for check in checks if not check.passed]
     if reasons:
         raise BoardError("; ".join(reasons))
 
 
-def arm(flight: Flight, *, log: Path | None) -> list[Check]:
+def arm(flight: Flight, *, log: Path | None) -> list[ArmingCheck]:
     """The checks of a flight on an open board; BoardError where one refuses. Simulated boards are not asked.
 
     Once all have passed, depths of this flight count from the surface pressure that was measured.

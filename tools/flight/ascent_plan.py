@@ -1,11 +1,20 @@
 """A plan for the out-of-band process, made of a board file at arming."""
 
-from firmware.core.vehicle.layout import GRAVITY
-from firmware.model.supervisor_settings import SupervisorTable
-from hal.boardfile import DeviceFile, DriveTable, WireTable, preset_of
-from hal.devices import DeviceBoard
-from hal.outofband.plan import AxisPlan, NumberPlan, PathPlan, Plan, PressurePlan, ReadPlan, ServoPlan, WirePlan
-from hal.protocols.registers import Block, Value, channel_of, step_of
+from glider.firmware.core.vehicle.layout import GRAVITY
+from glider.firmware.model.supervisor_settings import SupervisorTable
+from glider.hal.boardfile import DeviceFile, DriveTable, WireTable, preset_of
+from glider.hal.devices import DeviceBoard
+from glider.hal.outofband.plan import (
+    AscentPlan,
+    AxisPlan,
+    NumberPlan,
+    PathPlan,
+    PressurePlan,
+    ReadPlan,
+    ServoPlan,
+    WirePlan,
+)
+from glider.hal.protocols.registers import Block, Value, channel_of, step_of
 
 NEAR_M = 0.0005  # an actuator so near its end has arrived
 
@@ -13,7 +22,7 @@ NEAR_M = 0.0005  # an actuator so near its end has arrived
 def make_plan(
     board: DeviceBoard, *, flight: str, settings: SupervisorTable, water_density: float, watchdog: str = "",
     give_up_s: float = 0.0,
-) -> Plan:  # fmt: skip
+) -> AscentPlan:  # fmt: skip
     """The board file's addresses, the ends that its drivers would not pass either, and the vehicle file's numbers for
     what counts as rising; water_density in kg/m3."""
     file, source = board.file, board.source
@@ -27,7 +36,7 @@ def make_plan(
         quarter_us=round(4.0 * file.servo.zero_us),
     )  # fmt: skip
     pressure = _pressure(file, source, settings, board.surface_pressure, GRAVITY * water_density)
-    return Plan(flight=flight, axes=axes, servo=servo, pressure=pressure, watchdog=watchdog, give_up_s=give_up_s)
+    return AscentPlan(flight=flight, axes=axes, servo=servo, pressure=pressure, watchdog=watchdog, give_up_s=give_up_s)
 
 
 def _pressure(

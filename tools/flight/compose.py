@@ -8,26 +8,26 @@ from typing import Any
 
 import msgspec
 
-from firmware.autopilot import Autopilot, configuration
-from firmware.core.layouts.control_layout import SURFACE_PRESSURE
-from firmware.core.layouts.supervisor_layout import RESTARTED
-from firmware.core.vehicle.seawater import water_density
-from firmware.faults import Reaction
-from firmware.guidance.mission import Mission
-from firmware.model.gains import Control
-from firmware.model.k2_margin import K2Margin, k2_margins
-from firmware.model.vehicle import Vehicle
-from firmware.runtime import Runtime
-from firmware.supervisor import Supervisor
-from firmware.telemetry import TICK
-from hal.board import BoardRequest, board_builder
-from hal.ports import ACTUATORS, Board, BoardError, Hardware
-from hal.recorder.recorder import Recorder
-from hal.recorder.schema import DEBUG, ERROR, FATAL, INFO, WARN
-from hal.strict import ConfigError
-from tools.data.boards import load_board_file
-from tools.data.errors import InputError
-from tools.data.sources import load_mission, load_vehicle
+from glider.firmware.autopilot import Autopilot, configuration
+from glider.firmware.core.layouts.control_layout import SURFACE_PRESSURE
+from glider.firmware.core.layouts.supervisor_layout import RESTARTED
+from glider.firmware.core.vehicle.seawater import water_density
+from glider.firmware.faults import Reaction
+from glider.firmware.guidance.mission import Mission
+from glider.firmware.model.gains import Control
+from glider.firmware.model.k2_margin import K2Margin, k2_margins
+from glider.firmware.model.vehicle import Vehicle
+from glider.firmware.runtime import Runtime
+from glider.firmware.supervisor import Supervisor
+from glider.firmware.telemetry import TICK
+from glider.hal.board import BoardRequest, board_builder
+from glider.hal.ports import ACTUATORS, Board, BoardError, Hardware
+from glider.hal.recorder.recorder import Recorder
+from glider.hal.recorder.schema import DEBUG, ERROR, FATAL, INFO, WARN
+from glider.hal.strict import ConfigError
+from glider.tools.data.boards import load_board_file
+from glider.tools.data.errors import InputError
+from glider.tools.data.sources import load_mission, load_vehicle
 
 LEAST_REACH = 0.5  # of an end of an actuator's range, which the board has to leave the vehicle
 SEVERITIES = dict(zip(Reaction, (DEBUG, INFO, WARN, WARN, ERROR, FATAL, FATAL), strict=True))
@@ -69,8 +69,8 @@ def parse_effects(items: tuple[str, ...]) -> dict[str, dict[str, float]]:
 
     A label alone has 1 sigma of its prior.
     """
-    from sim_backend.core.effects.base import EffectError
-    from sim_backend.core.effects.catalogue import catalogue, check_flown
+    from glider.sim_backend.core.effects.base import EffectError
+    from glider.sim_backend.core.effects.catalogue import catalogue, check_flown
 
     effects: dict[str, dict[str, float]] = {}
     for item in items:
@@ -154,7 +154,7 @@ def build_pilot(
 
 def load_vehicle_text(wanted: str) -> tuple[str, Vehicle]:
     """A vehicle's text and the vehicle."""
-    from tools.data.sources import name_or_path
+    from glider.tools.data.sources import name_or_path
 
     vehicle = load_vehicle(wanted)  # first: it says of another kind of vehicle that it is one
     text, _ = name_or_path(wanted, "vehicle", "model/vehicles")
@@ -194,7 +194,7 @@ def record_specs(flight: Flight) -> tuple:
 
 def build_recorder(
     flight: Flight, path: Path, *, seed: int = 0, effects: dict[str, dict[str, float]] | None = None,
-    onlookers: Path | None = None,
+    live_stream: Path | None = None,
 ) -> Recorder:  # fmt: skip
     """Build the recorder of an armed flight, with all that its log says of it; the board is open.
 
@@ -203,7 +203,7 @@ def build_recorder(
     return Recorder(
         path, record_specs(flight), attachments=flight.texts,
         metadata=log_metadata(flight, seed=seed, effects=effects or {}),
-        epoch_ns=time.time_ns() - round(1e9 * flight.board.clock.now()), onlookers=onlookers,
+        epoch_ns=time.time_ns() - round(1e9 * flight.board.clock.now()), live_stream=live_stream,
     )  # fmt: skip
 
 

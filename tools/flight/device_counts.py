@@ -3,8 +3,8 @@
 import json
 from typing import Any
 
-from hal.ports import Board
-from hal.recorder.schema import WARN
+from glider.hal.ports import Board
+from glider.hal.recorder.schema import WARN
 
 COUNTS = ("timeouts", "exceptions", "damaged", "unfit")  # of a device's health that count errors
 

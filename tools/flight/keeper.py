@@ -9,26 +9,26 @@ import time
 from pathlib import Path
 from typing import Any
 
-from firmware.core.layouts.supervisor_layout import RECORDER
-from firmware.core.vehicle.seawater import water_density
-from firmware.runtime import Ending, Timing
-from hal import heartbeat as hb
-from hal.devices import DeviceBoard
-from hal.heartbeat import Guard, Heartbeat, Held
-from hal.notify import notify
-from hal.outofband.guard import CLOSING_S
-from hal.outofband.plan import NAME as PLAN
-from hal.outofband.plan import PlanError, read_plan, write_plan
-from hal.outofband.rise import Stage
-from hal.ports import BATTERY, BoardError, Validity
-from hal.recorder.condition import Level
-from hal.recorder.schema import WARN
-from hal.sortie import Facts, Party, Refused, State, Trigger, follow
-from hal.spawn import module_command, module_environment
-from hal.state_file import Record, StateFile
-from tools.flight.ascent_plan import make_plan
-from tools.flight.compose import Flight
-from tools.flight.sortie import Host, Journal
+from glider.firmware.core.layouts.supervisor_layout import RECORDER
+from glider.firmware.core.vehicle.seawater import water_density
+from glider.firmware.runtime import Ending, Timing
+from glider.hal import heartbeat as hb
+from glider.hal.devices import DeviceBoard
+from glider.hal.heartbeat import Guard, Heartbeat, HeartbeatHeld
+from glider.hal.notify import notify
+from glider.hal.outofband.guard import CLOSING_S
+from glider.hal.outofband.plan import NAME as PLAN
+from glider.hal.outofband.plan import PlanError, read_plan, write_plan
+from glider.hal.outofband.rise import AscentStage
+from glider.hal.ports import BATTERY, BoardError, Validity
+from glider.hal.recorder.condition import RecorderLevel
+from glider.hal.recorder.schema import WARN
+from glider.hal.sortie import Facts, Party, SortieRefused, SortieState, Trigger, follow
+from glider.hal.spawn import module_command, module_environment
+from glider.hal.state_file import StateFile, StateRecord
+from glider.tools.flight.ascent_plan import make_plan
+from glider.tools.flight.compose import Flight
+from glider.tools.flight.sortie import FlightHost, Journal
 
 GUARD_START_S = 10.0
 GUARD_SILENT_S = 3.0
@@ -53,10 +53,10 @@ def being_brought_up(pulse: Heartbeat) -> bool:
     """Whether the out-of-band process ascends and has not found the surface."""
     look = pulse.look()
     ascending = look.guard == Guard.ASCENDING and look.guard_age_s < GUARD_SILENT_S
-    return ascending and pulse.words[hb.W_GUARD_STAGE] != Stage.SURFACED
+    return ascending and pulse.words[hb.W_GUARD_STAGE] != AscentStage.SURFACED
 
 
-def acknowledge(state_folder: Path, facts: Facts) -> Record:
+def acknowledge(state_folder: Path, facts: Facts) -> StateRecord:
     """Set the state back to ashore, as an operator who has looked; returns what it was. Refused while a flight is under
     way, or while the out-of-band process brings the vehicle up."""
     file = StateFile(state_folder)
@@ -65,7 +65,7 @@ def acknowledge(state_folder: Path, facts: Facts) -> Record:
     return before
 
 
-class Keeper(Host):
+class FlightSupervision(FlightHost):
     """The host of a flight on devices: `claim` first, then a context around the flight."""
 
     def __init__(self, flight: Flight, *, name: str, folder: Path | None, twin: bool):
@@ -80,21 +80,21 @@ class Keeper(Host):
         self._recorder_seen = time.monotonic()
 
     # --- steps of a flight ------------------------------------------------------------------------------------------
-    def claim(self, *, acknowledged: bool = False) -> Record | None:
+    def claim(self, *, acknowledged: bool = False) -> StateRecord | None:
         """Become the vehicle's one flight and read the state before it; with `acknowledged`, set it back first.
 
         Returns the record that was set back, if one was. BoardError where another flight or an ascent is under way.
         """
         try:
             self._pulse = Heartbeat.create(self.run_folder, 1.0 / self._flight.board.loop_hz, self._name)
-        except (Held, OSError) as error:
+        except (HeartbeatHeld, OSError) as error:
             raise BoardError(str(error)) from None
         found = None
         if acknowledged and not StateFile(self.state_folder).read().state.may_arm:
             try:
                 found = acknowledge(self.state_folder, self.facts())
-            except Refused as refused:
-                self._release(State.ASHORE)
+            except SortieRefused as refused:
+                self._release(SortieState.ASHORE)
                 raise BoardError(str(refused)) from None
         self.journal = Journal(self.state_folder, self._name)
         return found
@@ -114,7 +114,7 @@ class Keeper(Host):
         self._write_plan(self._flight.board)
         self._start_guard(GUARD_START_S)
         super().prepare()
-        self._pulse.publish(State.ARMED)  # before an ascent alone too: nothing beats yet
+        self._pulse.publish(SortieState.ARMED)  # before an ascent alone too: nothing beats yet
 
     def armed(self) -> None:
         """The plan again, with the surface pressure as measured."""
@@ -136,13 +136,13 @@ class Keeper(Host):
     def ascend(self) -> None:
         """The supervisor gives the pump away: the out-of-band process takes over."""
         if self._pulse is not None:
-            self._pulse.publish(State.ABORTED)
+            self._pulse.publish(SortieState.ABORTED)
 
     def second(self, timing: Timing) -> None:
         """Once a second, between two ticks: publish, see to recorder and out-of-band process."""
         pulse = self._pulse
         assert pulse is not None
-        if self.journal.state == State.DIVING and self._flight.autopilot.finished:
+        if self.journal.state == SortieState.DIVING and self._flight.autopilot.finished:
             pulse.publish(self.journal.move(Trigger.FINISH, durable=False))
         self._publish_flight(pulse, timing)
         self._publish_recorder(pulse)
@@ -157,18 +157,18 @@ class Keeper(Host):
         assert self._pulse is not None
         notify(f"WATCHDOG_USEC={round(1e6 * CLOSING_S)}")
         notify("WATCHDOG=1")
-        self._pulse.publish(State.SURFACED if ending == Ending.SURFACED else State.ABORTED)
+        self._pulse.publish(SortieState.SURFACED if ending == Ending.SURFACED else SortieState.ABORTED)
         super().closing(ending)
 
-    def end(self) -> State:
+    def end(self) -> SortieState:
         """The board is closed: at the surface all is done, else the out-of-band process goes on."""
         state = super().end()
-        self._release(State.ASHORE if self._twin and state.must_ascend else state)
+        self._release(SortieState.ASHORE if self._twin and state.must_ascend else state)
         return state
 
     # --- parts ------------------------------------------------------------------------------------------------------
     def _publish_flight(self, pulse: Heartbeat, timing: Any) -> None:
-        from firmware.core.layouts import control_layout as ctl
+        from glider.firmware.core.layouts import control_layout as ctl
 
         words, values, autopilot = pulse.words, pulse.values, self._flight.autopilot
         words[hb.W_MISSED], words[hb.W_WORST_NS] = timing.missed, int(1e9 * timing.worst_s)
@@ -183,7 +183,7 @@ class Keeper(Host):
 
     def _publish_recorder(self, pulse: Heartbeat) -> None:
         words, condition, now = pulse.words, self._recorder.watch(), time.monotonic()
-        if condition.level != Level.FAILED:
+        if condition.level != RecorderLevel.FAILED:
             self._recorder_seen = now
         words[hb.W_RECORDER_NS], words[hb.W_RECORDER_LEVEL] = condition.beat_ns, condition.level
         words[hb.W_WRITTEN], words[hb.W_DROPPED] = condition.written, condition.dropped
@@ -221,11 +221,11 @@ class Keeper(Host):
 
     def _launch_guard(self) -> None:
         self._guard = subprocess.Popen(
-            module_command("hal.outofband", "--run", str(self.run_folder), "--state", str(self.state_folder)),
+            module_command("glider.hal.outofband", "--run", str(self.run_folder), "--state", str(self.state_folder)),
             stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, start_new_session=True, env=module_environment(),
         )  # fmt: skip
 
-    def _release(self, state: State) -> None:
+    def _release(self, state: SortieState) -> None:
         """Publish the last state and let go of the heartbeat; an out-of-band process of our own ends by it."""
         if self._pulse is None:
             return
@@ -248,7 +248,7 @@ class Keeper(Host):
         super().__exit__(kind, error, trace)
         person = kind is not None and issubclass(kind, KeyboardInterrupt)
         under_way = self.journal.state.must_ascend and not (self._twin or person)
-        self._release(State.ABORTED if under_way else State.ASHORE)
+        self._release(SortieState.ABORTED if under_way else SortieState.ASHORE)
 
 
 def resident_bytes(pid: int | str = "self") -> int:

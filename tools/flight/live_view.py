@@ -1,6 +1,6 @@
 """A flight watched from the laptop: what its recording process passes on, in Foxglove's WebSocket protocol.
 
-Aboard there is the socket of hal/recorder/onlookers.py and nothing else; the server is the laptop's own. Topics as in
+Onboard there is the socket of hal/recorder/live_stream.py and nothing else; the server is the laptop's own. Topics as in
 the log (/tick, /events), beside them /view (angles in degrees, reaction and fault in words) and /pose for a 3D panel.
 """
 
@@ -13,15 +13,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from firmware.autopilot import MODES
-from firmware.core.maths.rotations import quaternion_from_euler
-from firmware.faults import FAULTS, Reaction
-from hal.recorder import onlookers, ring, schema
-from hal.recorder.logfile import encode_event
-from hal.recorder.schema import RecordSpec, specs_from_json
-from tools.data.errors import InputError
+from glider.firmware.autopilot import MODES
+from glider.firmware.core.maths.rotations import quaternion_from_euler
+from glider.firmware.faults import FAULTS, Reaction
+from glider.hal.recorder import live_stream, ring, schema
+from glider.hal.recorder.logfile import encode_event
+from glider.hal.recorder.schema import RecordSpec, specs_from_json
+from glider.tools.data.errors import InputError
 
-LONGEST = 1 << 20  # bytes of anything on this line
+MAX_MESSAGE_BYTES = 1 << 20  # bytes of anything on this line
 NAME = "live"  # the socket, beside the heartbeat
 VIEW = {  # of /view, from /tick: degrees where the name says so
     "depth_m": "est_depth_m", "ref_depth_m": "ref_depth_m", "depth_rate_m_s": "est_depth_rate_m_s",
@@ -32,7 +32,7 @@ VIEW = {  # of /view, from /tick: degrees where the name says so
 
 
 @dataclass(frozen=True)
-class Record:
+class LiveRecord:
     """A record of a flight under way: numbers by the spec of its topic; an event has a severity and a text instead."""
 
     spec: RecordSpec | None
@@ -43,7 +43,7 @@ class Record:
     data: bytes = b""  # the numbers as they came
 
 
-class Line:
+class LogLine:
     """The connection to a recording process. InputError where there is none, or where something else answers."""
 
     def __init__(self, path: Path):
@@ -67,24 +67,24 @@ class Line:
 
     def _take(self) -> bytes:
         """What comes next; empty at the end."""
-        head = self._read(onlookers.HEAD.size)
-        if len(head) < onlookers.HEAD.size:
+        head = self._read(live_stream.HEAD.size)
+        if len(head) < live_stream.HEAD.size:
             return b""
-        (size,) = onlookers.HEAD.unpack(head)
-        if size > LONGEST:
+        (size,) = live_stream.HEAD.unpack(head)
+        if size > MAX_MESSAGE_BYTES:
             raise ValueError("no line of a flight")
         data = self._read(size)
         return data if len(data) == size else b""
 
-    def records(self) -> Iterator[Record]:
+    def records(self) -> Iterator[LiveRecord]:
         """Until the flight ends. ValueError where what comes is no record."""
         while data := self._take():
-            channel, time_s = onlookers.RECORD.unpack_from(data)
-            body = data[onlookers.RECORD.size :]
+            channel, time_s = live_stream.RECORD.unpack_from(data)
+            body = data[live_stream.RECORD.size :]
             if channel == ring.EVENT_CHANNEL and body:
-                yield Record(None, time_s, memoryview(b""), body[0], body[1:].decode("utf-8", "replace"))
+                yield LiveRecord(None, time_s, memoryview(b""), body[0], body[1:].decode("utf-8", "replace"))
             elif 0 <= channel < len(self.specs) and len(body) == 8 * self.specs[channel].width:
-                yield Record(self.specs[channel], time_s, memoryview(body).cast("d"), data=body)
+                yield LiveRecord(self.specs[channel], time_s, memoryview(body).cast("d"), data=body)
             else:
                 raise ValueError("no record of a flight")
 
@@ -92,7 +92,7 @@ class Line:
         self._line.close()
 
 
-def viewed(record: Record) -> dict[str, Any]:
+def viewed(record: LiveRecord) -> dict[str, Any]:
     """/view of a tick; a number that is not there is null."""
     assert record.spec is not None
     found: dict[str, Any] = {"time_s": record.time_s}
@@ -111,14 +111,12 @@ def viewed(record: Record) -> dict[str, Any]:
 class View:
     """Foxglove's server and its channels. OSError-like errors of its own where the port is taken."""
 
-    def __init__(self, line: Line, port: int):
+    def __init__(self, line: LogLine, port: int):
         import foxglove
 
         self._fg = foxglove
         self._context = foxglove.Context()
-        self._channels = {
-            spec.topic: self._channel(spec.topic, spec.schema_name, spec.text()) for spec in line.specs
-        }
+        self._channels = {spec.topic: self._channel(spec.topic, spec.schema_name, spec.text()) for spec in line.specs}
         self._events = self._channel(schema.EVENTS_TOPIC, schema.LOG_SCHEMA_NAME, schema.LOG_SCHEMA)
         self._view = foxglove.Channel("/view", context=self._context)
         self._pose = foxglove.channels.FrameTransformChannel("/pose", context=self._context)
@@ -130,11 +128,9 @@ class View:
 
     def _channel(self, topic: str, name: str, text: str) -> Any:
         kind = self._fg.Schema(name=name, encoding=schema.SCHEMA_ENCODING, data=text.encode())
-        return self._fg.Channel(
-            topic, schema=kind, message_encoding=schema.MESSAGE_ENCODING, context=self._context
-        )
+        return self._fg.Channel(topic, schema=kind, message_encoding=schema.MESSAGE_ENCODING, context=self._context)
 
-    def show(self, record: Record) -> None:
+    def show(self, record: LiveRecord) -> None:
         """Pass a record on, stamped with the laptop's time."""
         now = time.time_ns()
         if record.spec is None:
@@ -145,7 +141,7 @@ class View:
             self._view.log(viewed(record), log_time=now)
             self._pose.log(self._transform(record, now), log_time=now)
 
-    def _transform(self, record: Record, now: int) -> Any:
+    def _transform(self, record: LiveRecord, now: int) -> Any:
         """Body in the world for a 3D panel: x north, y west, z up, from north, east, down."""
         messages, spec = self._fg.messages, record.spec
         assert spec is not None
@@ -171,4 +167,4 @@ def layout() -> str:
     """Foxglove's layout file for these topics, as text: depth, attitude, references, faults, events, pose."""
     from importlib.resources import files
 
-    return files("tools.flight").joinpath("live_layout.json").read_text(encoding="utf-8")
+    return files("glider.tools.flight").joinpath("live_layout.json").read_text(encoding="utf-8")

@@ -18,7 +18,7 @@ from typing import Any
 from numba import __version__ as numba_version
 from numba.core import event
 
-from firmware.core import jit
+from glider.firmware.core import jit
 
 TICKS = 200
 EFFECTS: dict[str, dict[str, float]] = {"drag": {"scale": 0.1}}  # any: one plant flies them all
@@ -102,7 +102,7 @@ def _alone(work: Work, folder: Path, waiting: Callable[[], None]) -> Iterator[No
 
 
 def _count() -> int:
-    from tools.flight.compose import build_flight
+    from glider.tools.flight.compose import build_flight
 
     build_flight(mission="sawtooth", effects=EFFECTS)
     return jit.kernel_count()
@@ -110,7 +110,7 @@ def _count() -> int:
 
 def _fly() -> None:
     """Fly a moment with every controller on the simulated board, once with effects."""
-    from firmware.core.control.controller_rows import CONTROLLERS
+    from glider.firmware.core.control.controller_rows import CONTROLLERS
 
     for controller in CONTROLLERS:
         _fly_a_moment(controller, {})
@@ -121,10 +121,10 @@ def _fly_a_moment(controller: str, effects: dict[str, dict[str, float]]) -> None
     """TICKS of a mission, recording nothing."""
     import msgspec
 
-    from firmware.autopilot import Autopilot, configuration
-    from firmware.model.gains import Control
-    from hal.recorder.recorder import NullRecorder
-    from tools.flight.compose import build_flight, build_runtime, record_specs
+    from glider.firmware.autopilot import Autopilot, configuration
+    from glider.firmware.model.gains import Control
+    from glider.hal.recorder.recorder import NullRecorder
+    from glider.tools.flight.compose import build_flight, build_runtime, record_specs
 
     flight = build_flight(mission="sawtooth", effects=effects)
     control = msgspec.structs.replace(flight.vehicle.control or Control(), controller=controller)

@@ -12,26 +12,26 @@ from typing import Any
 
 import numpy as np
 
-from firmware.autopilot import MODES, REASONS, Autopilot, reason_text
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.layouts import supervisor_layout as sup
-from firmware.faults import FAULTS, Reaction
-from firmware.guidance.mission import decode_mission
-from firmware.model.vehicle import decode_vehicle
-from firmware.runtime import Runtime
-from firmware.supervisor import Supervisor
-from firmware.telemetry import ASKED, RAW, TICK
-from hal.ports import ACTUATORS, SLOTS, DropWeight, Hardware, OutOfBand, Slot
-from hal.recorder.recorder import NullChannel
-from tools.data.errors import InputError
-from tools.data.log.reader import Log, Topic
-from tools.flight.compose import build_pilot, within
+from glider.firmware.autopilot import MODES, REASONS, Autopilot, reason_text
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.layouts import supervisor_layout as sup
+from glider.firmware.faults import FAULTS, Reaction
+from glider.firmware.guidance.mission import decode_mission
+from glider.firmware.model.vehicle import decode_vehicle
+from glider.firmware.runtime import Runtime
+from glider.firmware.supervisor import Supervisor
+from glider.firmware.telemetry import ASKED, RAW, TICK
+from glider.hal.ports import ACTUATORS, SLOTS, DropWeight, Hardware, OutOfBand, Slot
+from glider.hal.recorder.recorder import NullChannel
+from glider.tools.data.errors import InputError
+from glider.tools.data.log.reader import Log, Topic
+from glider.tools.flight.compose import build_pilot, within
 
 TAKEN = ("cmd_servo_rad", "cmd_slider_m", "cmd_ballast_kg")
 FRAME = tuple(name for name, _, _ in RAW)
-TOLD = ("recorder", "growth", "stop")
-NEEDED = ("t_s", "lateness_s", *FRAME, *TOLD, *ASKED, *TAKEN)
-INPUTS = {"t_s", "lateness_s", "duration_s", *FRAME, *TOLD}  # every other number of a record is an outcome
+EXTERNAL = ("recorder", "growth", "stop")
+NEEDED = ("t_s", "lateness_s", *FRAME, *EXTERNAL, *ASKED, *TAKEN)
+INPUTS = {"t_s", "lateness_s", "duration_s", *FRAME, *EXTERNAL}  # every other number of a record is an outcome
 STATES = ("mode", "leg", "reason", "reaction", "fault")
 LONGEST_STEP_S = 3600.0  # of a tick after the one before; a loop that is late skips ticks
 LONGEST_FLIGHT_S = 1e8
@@ -118,7 +118,7 @@ class Abort:
 
 @dataclass
 class Replay:
-    """What came of a replay. `validity`: of the frame's slots as screening left them, (replayed, len(SLOTS))."""
+    """Outcome of a replay. `validity`: of the frame's slots as screening left them, (replayed, len(SLOTS))."""
 
     log: Log
     tick: Topic
@@ -272,11 +272,11 @@ def _fly(
     for begin in range(0, result.replayed, CHUNK):
         rows = slice(begin, min(begin + CHUNK, result.replayed))
         frames = np.column_stack([columns[name][rows] for name in FRAME])
-        told = np.column_stack([columns[name][rows] for name in ("t_s", "lateness_s", *TOLD)]).tolist()
+        external = np.column_stack([columns[name][rows] for name in ("t_s", "lateness_s", *EXTERNAL)]).tolist()
         asked = np.column_stack([columns[name][rows] for name in ASKED]).tolist()
         taken = np.column_stack([columns[name][rows] for name in TAKEN]).tolist()
         now = np.empty((len(frames), len(names)))
-        for i, (t, lateness, recorder, growth, stop) in enumerate(told):
+        for i, (t, lateness, recorder, growth, stop) in enumerate(external):
             board.frame, board.asked, board.taken, board.clock.time = frames[i], asked[i], taken[i], t
             supervisor.G[sup.RECORDER], supervisor.G[sup.GROWTH] = recorder, growth
             pilot.ap[ctl.STOP_REQUESTED] = stop

@@ -1,6 +1,6 @@
 """The procedure of one flight, from arming to its end: the only place that opens a board, flies and closes it again.
 
-`glider fly`, the endurance flight and the trial of kills differ in their `Host` (what stands around the flight) and in
+`glider fly`, the endurance flight and the trial of kills differ in their `FlightHost` (what stands around the flight) and in
 their loop. Which state follows which is said by hal/sortie; this module moves it for the flight.
 """
 
@@ -11,22 +11,22 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.layouts.supervisor_layout import RECORDER, RESTARTED
-from firmware.faults import Reaction
-from firmware.runtime import Ending, Runtime, Timing
-from hal.ports import BoardError
-from hal.sortie import Facts, Party, Refused, State, Trigger, follow
-from hal.state_file import StateFile
-from tools.flight.arming import arm
-from tools.flight.compose import Flight, build_runtime
-from tools.flight.device_counts import DeviceCounts
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.layouts.supervisor_layout import RECORDER, RESTARTED
+from glider.firmware.faults import Reaction
+from glider.firmware.runtime import Ending, Runtime, Timing
+from glider.hal.ports import BoardError
+from glider.hal.sortie import Facts, Party, SortieRefused, SortieState, Trigger, follow
+from glider.hal.state_file import StateFile
+from glider.tools.flight.arming import arm
+from glider.tools.flight.compose import Flight, build_runtime
+from glider.tools.flight.device_counts import DeviceCounts
 
 RING_ROOM = 512  # records on their way to the disk, past which a simulated flight waits
 
 
 class Journal:
-    """The sortie's state as this flight moves it. `move` follows hal.sortie.TRANSITIONS for the flight."""
+    """The sortie's state as this flight moves it. `move` follows glider.hal.sortie.TRANSITIONS for the flight."""
 
     def __init__(self, folder: Path | str | None, flight: str):
         """folder: of the state file; None: nothing outlives the flight."""
@@ -41,11 +41,13 @@ class Journal:
         self.recovering = self.state.must_ascend
         try:
             self.move(Trigger.RECOVER if self.recovering else Trigger.ARM, facts, self.before.reason)
-        except Refused as refused:
-            looked = "; look at the vehicle, then `glider acknowledge`" if self.state == State.HELD else ""
+        except SortieRefused as refused:
+            looked = "; look at the vehicle, then `glider acknowledge`" if self.state == SortieState.HELD else ""
             raise BoardError(f"{self.before.describe() if looked else refused}{looked}") from None
 
-    def move(self, trigger: Trigger, facts: Facts | None = None, reason: str = "", *, durable: bool = True) -> State:
+    def move(
+        self, trigger: Trigger, facts: Facts | None = None, reason: str = "", *, durable: bool = True
+    ) -> SortieState:
         """Take a transition; `durable`: bring it to the disk before this returns (OSError where it refuses)."""
         state = follow(self.state, trigger, Party.FLIGHT, facts or Facts())
         if durable and self.file is not None:
@@ -54,7 +56,7 @@ class Journal:
         return state
 
 
-class Host:
+class FlightHost:
     """What stands around a flight. This one: nothing but a journal; `keeper.Keeper` is the host of a flight on devices.
 
     A context: left by an exception, it leaves the sortie in a state from which the right party goes on.
@@ -99,7 +101,7 @@ class Host:
     def closing(self, ending: Ending) -> None:
         """The loop is over: the vehicle floats, or the out-of-band process is to bring it up."""
         journal = self.journal
-        if journal.state == State.DIVING:
+        if journal.state == SortieState.DIVING:
             journal.move(Trigger.FINISH, durable=False)
         if ending == Ending.SURFACED:
             journal.move(Trigger.SURFACE, durable=False)
@@ -107,9 +109,9 @@ class Host:
             with contextlib.suppress(OSError):  # a disk that refuses changes nothing about who brings it up
                 journal.move(Trigger.HAND_OVER, reason=self._flight.autopilot.reason)
 
-    def end(self) -> State:
+    def end(self) -> SortieState:
         """The board is closed; returns the state in which the sortie is left."""
-        if self.journal.state == State.SURFACED:
+        if self.journal.state == SortieState.SURFACED:
             with contextlib.suppress(OSError):
                 self.journal.move(Trigger.END, Facts(fault=self._faulty()), self._flight.autopilot.reason)
         return self.journal.state
@@ -121,17 +123,17 @@ class Host:
         in_order = autopilot.mode == "completed" or autopilot.ap[ctl.REASON] == ctl.REASON_OPERATOR
         return self.ascent_only or not in_order or supervisor.reaction >= Reaction.ABORT
 
-    def __enter__(self) -> "Host":
+    def __enter__(self) -> "FlightHost":
         return self
 
     def __exit__(self, kind: Any, error: Any, trace: Any) -> None:
         """A flight that broke off before its first tick has left nothing behind."""
-        if self.journal.state == State.ARMED:
+        if self.journal.state == SortieState.ARMED:
             with contextlib.suppress(OSError):
                 self.journal.move(Trigger.DISARM, reason=self.journal.before.reason)
 
 
-class SimulatedHost(Host):
+class SimulatedHost(FlightHost):
     """The host of a simulated flight: time waits for the disk instead of the other way round."""
 
     def __init__(self, flight: Flight, *, name: str, paced: bool):
@@ -146,21 +148,21 @@ class SimulatedHost(Host):
 
 
 @dataclass(frozen=True)
-class Flown:
+class FlightResult:
     """How a flight went. `state`: the sortie's, as it was left; `seconds`: of the loop; `report`: the recorder's."""
 
     ending: Ending
-    state: State
+    state: SortieState
     timing: Timing
     seconds: float
     report: Any
 
 
 def fly(
-    flight: Flight, host: Host, make_recorder: Callable[[], Any], *, log: Path | None = None,
+    flight: Flight, host: FlightHost, make_recorder: Callable[[], Any], *, log: Path | None = None,
     loop: Callable[[Runtime], Ending] | None = None, on_second: Callable[[float], None] | None = None,
     before_loop: Callable[[], None] | None = None,
-) -> Flown:  # fmt: skip
+) -> FlightResult:  # fmt: skip
     """Fly a flight from arming to its end and return how it went.
 
     make_recorder(): called once the vehicle is armed, so that what does not arm leaves no log (`log`: its path, for the
@@ -209,4 +211,4 @@ def fly(
         state = host.end()
         said = {"ended": flight.autopilot.mode, "reason": flight.autopilot.reason, **counts.ending()}
         report = recorder.close(ending=said)
-    return Flown(ending, state, runtime.timing, seconds, report)
+    return FlightResult(ending, state, runtime.timing, seconds, report)

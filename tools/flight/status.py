@@ -7,12 +7,12 @@ import time
 from pathlib import Path
 from typing import Any
 
-from firmware.autopilot import MODES
-from hal import heartbeat as hb
-from hal.heartbeat import Guard, Heartbeat
-from hal.outofband.rise import Stage
-from hal.recorder.condition import Level
-from tools.data.errors import InputError
+from glider.firmware.autopilot import MODES
+from glider.hal import heartbeat as hb
+from glider.hal.heartbeat import Guard, Heartbeat
+from glider.hal.outofband.rise import AscentStage
+from glider.hal.recorder.condition import RecorderLevel
+from glider.tools.data.errors import InputError
 
 PERIOD_S = 1.0
 LATE_S = 1.0  # a heartbeat older than this is no good sign
@@ -53,11 +53,11 @@ def snapshot(folder: Path) -> dict[str, Any]:
             "depth_m": values[hb.V_DEPTH_M], "pitch_deg": math.degrees(values[hb.V_PITCH_RAD]),
             "roll_deg": math.degrees(values[hb.V_ROLL_RAD]), "slider_m": values[hb.V_SLIDER_M],
             "ballast_kg": values[hb.V_BALLAST_KG], "battery_v": values[hb.V_BATTERY_V],
-            "recorder": Level(words[hb.W_RECORDER_LEVEL]).name.lower() if words[hb.W_RECORDER_LEVEL] < 3 else "?",
+            "recorder": RecorderLevel(words[hb.W_RECORDER_LEVEL]).name.lower() if words[hb.W_RECORDER_LEVEL] < 3 else "?",
             "recorder_age_s": look.recorder_age_s, "records_written": words[hb.W_WRITTEN],
             "records_dropped": words[hb.W_DROPPED], "disk_errors": words[hb.W_DISK_ERRORS],
             "resident_mb": words[hb.W_RSS_BYTES] / 1e6, "descriptors": words[hb.W_FILES],
-            "ascent": Stage(stage).name.lower() if (stage := words[hb.W_GUARD_STAGE]) in list(Stage) else "blind",
+            "ascent": AscentStage(stage).name.lower() if (stage := words[hb.W_GUARD_STAGE]) in list(AscentStage) else "blind",
             "ascent_depth_m": values[hb.V_GUARD_DEPTH_M] if look.guard == Guard.ASCENDING else float("nan"),
             "out_of_band": look.guard.name.lower(), "out_of_band_age_s": look.guard_age_s,
         }  # fmt: skip

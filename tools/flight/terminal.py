@@ -60,7 +60,7 @@ class Stop:
 
 
 @contextlib.contextmanager
-def undisturbed() -> Iterator[None]:
+def terminal_detached() -> Iterator[None]:
     """A flight that its terminal cannot stop, halt or hold up: keys that stop or suspend a program do nothing, a
     terminal that goes away does nothing, one that takes no more (Ctrl-S, a line that hangs) holds nobody up. What was
     typed meanwhile is thrown away, so that no shell runs it afterwards.

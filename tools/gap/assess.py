@@ -5,15 +5,15 @@ from typing import Any
 
 import numpy as np
 
-from tools.data.errors import InputError
-from tools.data.runs.case import Case
-from tools.gap.measure import RunGap, case_channels, root_mean_square, run_gap
-from tools.gap.where import Share, where
-from tools.inference.channels import Measures
-from tools.inference.model import Model, effect_vector, nominal_model
-from tools.inference.predict import fly
-from tools.inference.problem import cut, problem_of
-from tools.inference.windows import Window
+from glider.tools.data.errors import InputError
+from glider.tools.data.runs.case import Case
+from glider.tools.gap.measure import RunGap, case_channels, root_mean_square, run_gap
+from glider.tools.gap.where import Share, where
+from glider.tools.inference.channels import Measures
+from glider.tools.inference.model import Model, effect_vector, nominal_model
+from glider.tools.inference.predict import fly
+from glider.tools.inference.problem import cut, problem_of
+from glider.tools.inference.windows import Window
 
 
 @dataclass

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from firmware.core.maths.rotations import wrap
-from tools.data.runs.run import Run
-from tools.inference.channels import Measures
-from tools.inference.windows import Window
+from glider.firmware.core.maths.rotations import wrap
+from glider.tools.data.runs.run import Run
+from glider.tools.inference.channels import Measures
+from glider.tools.inference.windows import Window
 
 
 @dataclass
@@ -66,7 +66,7 @@ def cells_of(
             count = len(rows) / (len(channel.columns) if channel.joint else 1)
             _, within = np.unique(windows, return_inverse=True)
             share = 1.0 / (count * len(of_run) * len(scored))
-            alike = (channel.tolerance, channel.wrapped, share, names.index(channel.name))
-            parts.append((rows, columns, *(np.full(len(rows), value) for value in alike), cell + within))
+            common = (channel.tolerance, channel.wrapped, share, names.index(channel.name))
+            parts.append((rows, columns, *(np.full(len(rows), value) for value in common), cell + within))
             cell += int(within.max()) + 1
     return Cells(names, *(np.concatenate(part) for part in zip(*parts, strict=True)))

@@ -19,23 +19,23 @@ from typing import Any
 
 import numpy as np
 
-from tools.data.errors import MissingExtra, need
-from tools.data.runs import columns as names
-from tools.data.runs.origin import FIXES_FILE, Origin, read_fixes, read_origins
-from tools.data.runs.run import Run
+from glider.tools.data.errors import MissingExtra, need
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.origin import FIXES_FILE, Origin, read_fixes, read_origins
+from glider.tools.data.runs.run import Run
 
 WET_M = 5.0  # deeper than this it dives: pressure at the surface is off by up to 3 m
 COVERED = 0.8  # share of the time between two fixes that has to be logged in dives
-FEWEST = 8  # legs, for four numbers and the size of the current
+MIN_LEGS = 8  # legs, for four numbers and the size of the current
 AXIS, FLATTENING = 6378137.0, 1.0 / 298.257223563  # WGS84
-TIMES_H = (3.0, 6.0, 12.0, 24.0, 48.0, 96.0, 192.0, 384.0)  # in which a current forgets itself
+TIMES_H = (3.0, 6.0, 12.0, 24.0, 48.0, 96.0, 192.0, 384.0)  # in which a current decorrelates
 WHITE = (0.02, 0.1, 0.25, 0.5, 0.75, 0.98)  # share of its variance that is of one leg alone
-SURE = 0.99  # two-sided: one quiet mission in a hundred is accused
-MATTERS = 0.01  # m/s of the speed
+TEST_CONFIDENCE = 0.99  # two-sided: one unchanged mission in a hundred is falsely flagged
+MATERIAL_SPEED = 0.01  # m/s of the speed
 
 
 @dataclass
-class Leg:
+class HeadingLeg:
     """From fix to fix."""
 
     hours: float  # of its middle, since 1970-01-01 UTC
@@ -81,8 +81,8 @@ def heading_test(folder: Path, runs: Sequence[Run], speeds: Sequence[tuple[np.nd
         return {"legs": 0, "why": f"no {FIXES_FILE} beside the runs: no position at the surface"}
     legs, left_out = legs_between(found, read_origins(folder, runs), runs, speeds)
     said: dict[str, Any] = {"legs": len(legs), "left_out": left_out}
-    if len(legs) < FEWEST:
-        return said | {"why": f"{len(legs)} dives from fix to fix, of {FEWEST} at least"}
+    if len(legs) < MIN_LEGS:
+        return said | {"why": f"{len(legs)} dives from fix to fix, of {MIN_LEGS} at least"}
     if np.linalg.matrix_rank(_design(legs)) < 4:
         return said | {"why": "all dives on one heading"}
     try:
@@ -99,8 +99,8 @@ def heading_test(folder: Path, runs: Sequence[Run], speeds: Sequence[tuple[np.nd
     return said | {"says": _sentence(said, share, turned)}
 
 
-def coefficients(legs: Sequence[Leg]) -> tuple[Posterior, Posterior]:
-    """Share of the speed that is lacking, and angle (rad) that the heading is turned by; of FEWEST legs at least."""
+def coefficients(legs: Sequence[HeadingLeg]) -> tuple[Posterior, Posterior]:
+    """Share of the speed that is missing, and angle (rad) that the heading is turned by; of FEWEST legs at least."""
     t = np.array([leg.hours for leg in legs])
     X = _design(legs)
     current = np.concatenate([(leg.over_ground - leg.through_water) / leg.seconds for leg in legs])
@@ -126,7 +126,7 @@ def coefficients(legs: Sequence[Leg]) -> tuple[Posterior, Posterior]:
     return share, turned
 
 
-def _design(legs: Sequence[Leg]) -> np.ndarray:
+def _design(legs: Sequence[HeadingLeg]) -> np.ndarray:
     """Of a leg's current: mean north, mean east, the velocity through the water, and that turned; (2 legs, 4)."""
     north, east = np.array([leg.through_water / leg.seconds for leg in legs]).T
     ones, none = np.ones(len(legs)), np.zeros(len(legs))
@@ -134,9 +134,11 @@ def _design(legs: Sequence[Leg]) -> np.ndarray:
 
 
 def legs_between(
-    fixes: np.ndarray, origins: Sequence[Origin], runs: Sequence[Run],
+    fixes: np.ndarray,
+    origins: Sequence[Origin],
+    runs: Sequence[Run],
     speeds: Sequence[tuple[np.ndarray, np.ndarray]],
-) -> tuple[list[Leg], dict[str, int]]:
+) -> tuple[list[HeadingLeg], dict[str, int]]:
     """Legs in their order, and of how many runs none is made by the reason; fixes as read_fixes has them.
 
     Runs between the same two fixes are one leg. Headings are turned by the magnetic variation that is to be added.
@@ -167,7 +169,7 @@ def legs_between(
             continue
         middle = 0.5 * float(fixes[after, 0] + fixes[before, 0]) / 3600.0
         through = np.sum([moved for _, moved in parts], axis=0)
-        legs.append(Leg(middle, seconds, moved_between(fixes[before, 1:], fixes[after, 1:]), through))
+        legs.append(HeadingLeg(middle, seconds, moved_between(fixes[before, 1:], fixes[after, 1:]), through))
     return sorted(legs, key=lambda leg: leg.hours), dict(left_out)
 
 
@@ -199,7 +201,7 @@ def _sentence(said: dict[str, Any], share: Posterior, turned: Posterior) -> str:
 def _shown(one: Posterior, size: float) -> bool:
     """Whether a coefficient has its sign for sure and its speed (m/s) matters."""
     below = one.below(0.0)
-    return max(below, 1.0 - below) > 0.5 * (1.0 + SURE) and abs(size) >= MATTERS
+    return max(below, 1.0 - below) > 0.5 * (1.0 + TEST_CONFIDENCE) and abs(size) >= MATERIAL_SPEED
 
 
 def _size(said: dict[str, Any], name: str) -> str:

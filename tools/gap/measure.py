@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tools.data.runs.run import Run
-from tools.inference.channels import Channel, Measures, errors
-from tools.inference.windows import Window
+from glider.tools.data.runs.run import Run
+from glider.tools.inference.channels import Channel, Measures, errors
+from glider.tools.inference.windows import Window
 
 
 @dataclass

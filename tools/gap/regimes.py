@@ -1,22 +1,22 @@
 """Regimes of flight: every sample of a run is of one side of each of four pairs, by what was measured alone.
 
-Where a model of a vehicle is wrong it seldom is so everywhere: gaps are told by regime.
+Where a model of a vehicle is wrong it seldom is so everywhere: gaps are reported by regime.
 """
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from firmware.core.vehicle import layout
-from tools.data.runs import columns as names
-from tools.data.runs.run import Run
-from tools.gap.measure import RunGap, run_gap, with_total
-from tools.inference.channels import Measures
-from tools.inference.windows import Window
+from glider.firmware.core.vehicle import layout
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.run import Run
+from glider.tools.gap.measure import RunGap, run_gap, with_total
+from glider.tools.inference.channels import Measures
+from glider.tools.inference.windows import Window
 
 PAIRS = (("dive", "climb"), ("turning", "straight"), ("moving", "held"), ("fast", "slow"))  # moving: an actuator
 REGIMES = tuple(name for pair in PAIRS for name in pair)
 ALL = "all"
-SMOOTH = 1.0  # s, over which rates are taken
+RATE_SMOOTHING_S = 1.0  # s, over which rates are taken
 TURNING = np.radians(2.0)  # rad/s of heading; half a circle in a window and a half
 MOVING = 0.1  # of an actuator's largest rate
 FAST = 0.1  # m/s of depth
@@ -28,7 +28,7 @@ def _rate(t: np.ndarray, values: np.ndarray, wraps: bool = False) -> np.ndarray:
     if seen.sum() < 3:
         return np.zeros(len(t))
     whole = np.interp(t, t[seen], np.unwrap(values[seen]) if wraps else values[seen])
-    width = max(1, round(SMOOTH / max(float(np.median(np.diff(t))), 1e-3)))
+    width = max(1, round(RATE_SMOOTHING_S / max(float(np.median(np.diff(t))), 1e-3)))
     smooth = uniform_filter1d(whole, width, mode="nearest")
     return np.asarray(np.gradient(smooth, t))
 
@@ -41,11 +41,11 @@ def regimes_of(measures: Measures, run: Run, P: np.ndarray) -> dict[str, np.ndar
     turning = np.abs(_rate(run.t, read[names.ATTITUDE[2]], wraps=True)) > TURNING
     moving = np.zeros(run.rows, dtype=bool)
     servo, slider, ballast = names.COMMANDS
-    for name, told, at in (
+    for name, column, at in (
         (servo, servo, layout.SERVO_RATE), (names.DRAW_WIRES[0], slider, layout.SLIDER_RATE),
         (names.DRAW_WIRES[1], ballast, layout.BALLAST_RATE),
     ):  # fmt: skip
-        values = run.columns.get(name, run.columns.get(told))
+        values = run.columns.get(name, run.columns.get(column))
         if values is not None:
             moving |= np.abs(_rate(run.t, values)) > MOVING * P[at]
     first = {"dive": sinking > 0.0, "turning": turning, "moving": moving, "fast": np.abs(sinking) > FAST}

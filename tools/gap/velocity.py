@@ -8,18 +8,18 @@ from typing import Any
 
 import numpy as np
 
-from sim_backend.ocean.core import layout as at
-from sim_backend.ocean.vehicle import OceanVehicle
-from tools.data.errors import InputError
-from tools.data.plain import as_plain
-from tools.data.runs import columns as names
-from tools.data.runs.case import Case
-from tools.data.runs.csvfile import write_bytes
-from tools.data.runs.run import Run, run_name, write_run
-from tools.inference.model import Model, effect_vector
-from tools.inference.ocean_inputs import lacking
-from tools.inference.parameters import NINETY
-from tools.inference.problem import Problem, problem_of
+from glider.sim_backend.ocean.core import layout as at
+from glider.sim_backend.ocean.vehicle import OceanVehicle
+from glider.tools.data.errors import InputError
+from glider.tools.data.plain import as_plain
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.case import Case
+from glider.tools.data.runs.csvfile import write_bytes
+from glider.tools.data.runs.run import Run, run_name, write_run
+from glider.tools.inference.model import Model, effect_vector
+from glider.tools.inference.ocean_inputs import missing_input
+from glider.tools.inference.parameters import NINETY
+from glider.tools.inference.problem import Problem, problem_of
 
 # Of a row's speed, 1 sigma, and of one where speed was measured: laws of drag and lift are not nature's. Of a dive's
 # mean nothing: by how much a law is off in all dives alike is in an identified vehicle's covariance (docs/OCEAN.md,
@@ -54,7 +54,7 @@ def velocities(case: Case, model: Model) -> list[Velocity]:
     if not isinstance(case.vehicle, OceanVehicle):
         raise InputError("velocity is asked of ocean gliders", source=case.folder, column="vehicle")
     for run in case.runs:
-        missing = lacking(run)
+        missing = missing_input(run)
         if missing is not None:
             raise InputError("an ocean glider's run needs it", source=run.path or run.name, column=missing)
     problem = problem_of(case, model)

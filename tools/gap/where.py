@@ -10,7 +10,7 @@ by more than CLAIM and a flight with it bears that out. What a part takes of the
 allowed explains of the rest goes to `allowed`.
 
 Limits: columns are secants at one size, so that large effects (a stall, seconds of delay) are shared out coarsely;
-parts with nearly the same column (a servo offset, a lateral centre of gravity, a roll trim) cannot be told apart by it,
+parts with nearly the same column (a servo offset, a lateral centre of gravity, a roll trim) cannot be distinguished by it,
 the first takes all; a part whose shape is not among the effects' lands in `unexplained` or in its nearest likeness. It
 names no cause.
 """
@@ -19,15 +19,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tools.gap.cells import Cells, cells_of
-from tools.inference.parameters import NUISANCE, effect_parameters, model_at, nuisance_parameters
-from tools.inference.predict import fly, fly_near, observe
-from tools.inference.problem import Problem, cut
+from glider.tools.gap.cells import Cells, cells_of
+from glider.tools.inference.parameters import NUISANCE, effect_parameters, model_at, nuisance_parameters
+from glider.tools.inference.predict import fly, fly_near, observe
+from glider.tools.inference.problem import Problem, cut
 
 EFFECTIVE = 4.0  # independent samples a window and channel: 18 s of residuals that hang together for some 4 s
 CLAIM = 5.0  # nat of evidence that a part has to bring
 MOST_PARTS = 4
-LEAST = 0.005  # a smaller share is not worth a line
+LEAST_SHARE = 0.005  # a smaller share is not worth a line
 CANDIDATES, SCALES = 8, (0.1, 0.25, 0.5, 1.0, 1.5)  # parts whose likely amplitude is flown, and at what shares of it
 ALLOWED_SIGMA = 3.0  # beyond it a parameter or a bias is no longer one that the nominal allows for
 DRAWS = 3  # simulated recordings that find the floor
@@ -72,7 +72,7 @@ def evidence(G: np.ndarray, b: np.ndarray, variance: np.ndarray) -> tuple[float,
     return 0.5 * float(weighed @ solved) - 0.5 * float(np.linalg.slogdet(A)[1]), root * solved
 
 
-class Search:
+class PartSearch:
     """The parts found so far, and how far along each direction the model was moved for them."""
 
     def __init__(self, problem: Problem, cells: Cells, table: np.ndarray, Y: np.ndarray, weight: np.ndarray):
@@ -145,7 +145,7 @@ def where(problem: Problem, Y: np.ndarray) -> list[Share]:
     table = np.concatenate([measures.measured(run) for run in problem.runs])
     cells = cells_of(measures, problem.runs, problem.recording.bounds, cut(problem).listed, table)
     floor = floor_of(problem, cells)
-    search = Search(problem, cells, table, Y, np.sqrt(EFFECTIVE / cells.cell_sizes() / floor[cells.channel]))
+    search = PartSearch(problem, cells, table, Y, np.sqrt(EFFECTIVE / cells.cell_sizes() / floor[cells.channel]))
     chosen, left = search.run()
 
     squares = np.minimum.accumulate([cells.squared_gap(residual) for residual in left])
@@ -156,6 +156,6 @@ def where(problem: Problem, Y: np.ndarray) -> list[Share]:
     mean = np.clip(mean, -ALLOWED_SIGMA, ALLOWED_SIGMA)
     by_columns = remaining - cells.squared_gap(left[-1] - search.columns.T @ mean)
     by_allowed = min(remaining, max(0.0, by_columns) + cells.squared_gap(np.sqrt(floor[cells.channel]))) / whole
-    shares = sorted((share for share in shares if share.share >= LEAST), key=lambda share: -share.share)
+    shares = sorted((share for share in shares if share.share >= LEAST_SHARE), key=lambda share: -share.share)
     unexplained = max(0.0, 1.0 - by_allowed - sum(share.share for share in shares))
     return [*shares, Share(ALLOWED, ALLOWED, by_allowed), Share(UNEXPLAINED, UNEXPLAINED, unexplained)]

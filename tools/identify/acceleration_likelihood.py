@@ -17,17 +17,17 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from firmware.core.vehicle import layout
-from firmware.model.vehicle import COEFFICIENTS
-from tools.data.errors import InputError
-from tools.data.runs import columns as names
-from tools.data.runs.run import Run
-from tools.identify.core.regressors import N_K, flown_servo, momentum_rows
-from tools.identify.statistics import Quadratic, collect, heat
-from tools.inference.model import Model
-from tools.inference.vehicle_parameters import Parameters, coefficients
+from glider.firmware.core.vehicle import layout
+from glider.firmware.model.vehicle import COEFFICIENTS
+from glider.tools.data.errors import InputError
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.run import Run
+from glider.tools.identify.core.regressors import N_K, flown_servo, momentum_rows
+from glider.tools.identify.statistics import Quadratic, collect, inflation
+from glider.tools.inference.model import Model
+from glider.tools.inference.vehicle_parameters import Parameters, coefficients
 
-SMOOTH = 0.6  # s, of the local cubic
+SMOOTHING_S = 0.6  # s, of the local cubic
 STRETCH = 1.5  # s, of a test function; one begins every third of it
 HOLE = 0.2  # s that are bridged where poses are missing
 REWEIGHTED = 6  # times that the axes' variances are taken from the residuals
@@ -47,7 +47,7 @@ class Kinematics:
 
 
 def _width(rate: float) -> int:
-    return max(2 * round(0.5 * SMOOTH * rate) + 1, 7)
+    return max(2 * round(0.5 * SMOOTHING_S * rate) + 1, 7)
 
 
 def _even(t: np.ndarray, grid: np.ndarray, values: np.ndarray, wraps: bool = False) -> np.ndarray:
@@ -145,4 +145,4 @@ def fit_accelerations(model: Model, runs: list[Run]) -> tuple[Quadratic, Paramet
     J, e = J0 * weight, (e0 + values @ J0) * weight
     low = np.array([f.low for f in free.free])
     statistics = collect(values, low, e, J, axis, AXES)
-    return statistics.cooled(max(heat(e, J, block_of), 1.0)), free
+    return statistics.tempered(max(inflation(e, J, block_of), 1.0)), free

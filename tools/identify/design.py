@@ -1,7 +1,7 @@
 """The paper's 45 gliding runs (section 4.1), flown by the project's plant and seen by draw-wires and motion capture.
 
 Ballast at 1, 0.6 and 0.2 times its largest value, slider at 1, 0.5 and 0.1, servo at 1, 0.8, 0.6, 0.4 and 0.2, about
-900 samples each, starting with a small forward speed. Beyond the print: dives and climbs take turns, sides are drawn,
+900 samples each, starting with a small forward speed. Beyond the paper: dives and climbs take turns, sides are drawn,
 and half-way the servo turns over and the slider comes back by a quarter of its largest value: a flight held at one
 setting says little about damping.
 """
@@ -13,21 +13,25 @@ from typing import Any
 
 import numpy as np
 
-from firmware.core.maths.rotations import quaternion_from_euler, wrap
-from firmware.core.vehicle import layout
-from firmware.model.estimator_settings import parameter_sigma
-from firmware.model.vehicle import COEFFICIENTS, SensorTable, Vehicle
-from sim_backend.core import layout as wl
-from sim_backend.core.effects import effect_layout as ef
-from sim_backend.core.open_loop import fly_open_loop_many
-from sim_backend.uncertainty import deviates
-from tools.data.runs import columns as names
-from tools.data.runs.case import SensorsPart, write_case
-from tools.data.runs.run import Run
-from tools.inference.vehicle_parameters import coefficient_sizes
+from glider.firmware.core.maths.rotations import quaternion_from_euler, wrap
+from glider.firmware.core.vehicle import layout
+from glider.firmware.model.estimator_settings import parameter_sigma
+from glider.firmware.model.vehicle import COEFFICIENTS, SensorTable, Vehicle
+from glider.sim_backend.core import layout as wl
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.sim_backend.core.open_loop import fly_open_loop_many
+from glider.sim_backend.uncertainty import deviates
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.case import SensorsPart, write_case
+from glider.tools.data.runs.run import Run
+from glider.tools.inference.vehicle_parameters import coefficient_sizes
 
 BALLAST, SLIDER, SERVO = (1.0, 0.6, 0.2), (1.0, 0.5, 0.1), (1.0, 0.8, 0.6, 0.4, 0.2)
-LARGEST = (0.9, 0.75, 1.0)  # of the ranges of servo, slider and ballast: with all of the slider it would stand on end
+RANGE_SHARES = (
+    0.9,
+    0.75,
+    1.0,
+)  # of the ranges of servo, slider and ballast: with all of the slider it would stand on end
 BACK = 0.25  # of the largest slider position, by which it comes back half-way
 RATE, ROWS, STEP = 50.0, 900, 0.01  # Hz, samples a run, s of the plant
 SHALLOW, DEEP = 0.7, 5.3  # m
@@ -41,7 +45,7 @@ BLANKS = 0.002  # of the samples at which the capture loses the vehicle, for up 
 
 
 @dataclass(frozen=True)
-class World:
+class DesignWorld:
     """What is flown: the true vehicle and how its capture sees it."""
 
     P: np.ndarray  # (N_P,)
@@ -53,7 +57,7 @@ class World:
         return {name: float(self.P[getattr(layout, name.upper())]) for name in COEFFICIENTS}
 
 
-def draw_world(vehicle: Vehicle, rng: np.random.Generator) -> World:
+def draw_world(vehicle: Vehicle, rng: np.random.Generator) -> DesignWorld:
     """A vehicle whose coefficients are off by up to COEFFICIENTS_OFF, the rest as [uncertainty] and [sensors] say."""
     P = vehicle.vector()
     sigma = parameter_sigma(P, vehicle.uncertainty)
@@ -64,7 +68,7 @@ def draw_world(vehicle: Vehicle, rng: np.random.Generator) -> World:
         P[entry] = vehicle.vector()[entry] + COEFFICIENTS_OFF * size * rng.uniform(-1.0, 1.0)
     bias = np.array([vehicle.sensors.slider.bias, vehicle.sensors.ballast.bias]) * rng.standard_normal(2)
     frame = np.concatenate([0.005 * rng.standard_normal(3), 0.005 * rng.standard_normal(3)])
-    return World(P, bias, frame, float(rng.uniform(0.0, 0.02)))
+    return DesignWorld(P, bias, frame, float(rng.uniform(0.0, 0.02)))
 
 
 def grid() -> list[tuple[float, float, float]]:
@@ -75,7 +79,9 @@ def grid() -> list[tuple[float, float, float]]:
 def commands(vehicle: Vehicle, rng: np.random.Generator, picked: list[int], rows: int = ROWS) -> np.ndarray:
     """Commands (runs, rows, 3) of the picked combinations, by their numbers in the grid."""
     a = vehicle.actuators
-    largest = [share * table.range[1] for share, table in zip(LARGEST, (a.servo, a.slider, a.ballast), strict=True)]
+    largest = [
+        share * table.range[1] for share, table in zip(RANGE_SHARES, (a.servo, a.slider, a.ballast), strict=True)
+    ]
     out = np.empty((len(picked), rows, 3))
     for n, number in enumerate(picked):
         ballast, slider, servo = grid()[number]
@@ -99,7 +105,7 @@ def starts(rng: np.random.Generator, commanded: np.ndarray) -> np.ndarray:
     return x
 
 
-def fly(vehicle: Vehicle, world: World, rng: np.random.Generator, commanded: np.ndarray) -> np.ndarray:
+def fly(vehicle: Vehicle, world: DesignWorld, rng: np.random.Generator, commanded: np.ndarray) -> np.ndarray:
     """True states (runs, rows, N_X) under commands, with the vehicle file's disturbance, far from surface and floor."""
     count = len(commanded)
     E = np.zeros((count, wl.N_ENV))
@@ -113,7 +119,7 @@ def fly(vehicle: Vehicle, world: World, rng: np.random.Generator, commanded: np.
     return X
 
 
-def captured(X: np.ndarray, world: World, sensors: SensorsPart, rng: np.random.Generator) -> np.ndarray:
+def captured(X: np.ndarray, world: DesignWorld, sensors: SensorsPart, rng: np.random.Generator) -> np.ndarray:
     """Poses (rows, 6) of states (rows, N_X): the capture's body, late, noisy, now and then lost."""
     from scipy.spatial.transform import Rotation
 
@@ -135,7 +141,7 @@ def captured(X: np.ndarray, world: World, sensors: SensorsPart, rng: np.random.G
 
 def make_runs(
     vehicle: Vehicle, seed: int, picked: list[int] | None = None, square: bool = False
-) -> tuple[list[Run], World]:
+) -> tuple[list[Run], DesignWorld]:
     """Runs of a vehicle drawn with `seed` (all 45, or some by number), as recorded, and the truth.
 
     square: the capture's body sits on the vehicle's axes and its clock is the onboard one.
@@ -161,7 +167,7 @@ def make_runs(
 
 def write_design(
     folder: Path, vehicle_name: str, vehicle: Vehicle, seed: int, picked: list[int] | None = None
-) -> World:
+) -> DesignWorld:
     """The design as a case in `folder`; the truth is returned, not written."""
     runs, world = make_runs(vehicle, seed, picked)
     own = Path(vehicle_name)
@@ -173,7 +179,7 @@ def write_design(
     return world
 
 
-def truth(world: World) -> dict[str, Any]:
+def truth(world: DesignWorld) -> dict[str, Any]:
     """The truth as JSON: coefficients, and how the capture sees the vehicle."""
     return {
         **world.coefficients(),

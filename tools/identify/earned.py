@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tools.inference.prediction_error import HORIZONS, Fitted, PredictionError
-from tools.inference.vehicle_parameters import FIRST_EFFECTS, GAUGE, LINEAR_DAMPING
+from glider.tools.inference.prediction_error import HORIZONS, Fitted, PredictionError
+from glider.tools.inference.vehicle_parameters import FIRST_EFFECTS, GAUGE, LINEAR_DAMPING
 
 TERMS = (tuple(LINEAR_DAMPING), ("x_b",), *((name,) for name in FIRST_EFFECTS), (GAUGE,))
 SCATTER = 0.2  # of the logarithm of two models' gaps from run to run, before any run was seen: as much as one run

@@ -10,17 +10,17 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from firmware.core.jit import kernels_digest
-from firmware.core.vehicle import layout
-from firmware.model.vehicle import COEFFICIENTS, PLACES, Vehicle, decode_vehicle
-from sim_backend.core.effects import effect_layout as ef
-from tools.data.runs.case import CASE_FILE
-from tools.data.runs.csvfile import write_bytes
-from tools.data.tomltext import toml_text
-from tools.identify.pipeline import Identified
-from tools.inference.corrected import corrected_text
-from tools.inference.levels import DISTURBANCE
-from tools.inference.model import effect_vector, effects_in, nominal_model
+from glider.firmware.core.jit import kernels_digest
+from glider.firmware.core.vehicle import layout
+from glider.firmware.model.vehicle import COEFFICIENTS, PLACES, Vehicle, decode_vehicle
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.data.runs.case import CASE_FILE
+from glider.tools.data.runs.csvfile import write_bytes
+from glider.tools.data.tomltext import toml_text
+from glider.tools.identify.pipeline import Identified
+from glider.tools.inference.corrected import corrected_text
+from glider.tools.inference.levels import DISTURBANCE
+from glider.tools.inference.model import effect_vector, effects_in, nominal_model
 
 VEHICLE, CORRECTED, POSTERIOR, RESULT = "identified.toml", "corrected.toml", "posterior.nc", "identified.json"
 DIGITS = 10  # of a covariance
@@ -140,7 +140,7 @@ def write_posterior(found: Identified, path: Path) -> None:
 
 def write(found: Identified, out: Path) -> Vehicle:
     """All files but the report into a folder; returns the vehicle as it will be read."""
-    from tools.data.plain import as_plain
+    from glider.tools.data.plain import as_plain
 
     out.mkdir(parents=True, exist_ok=True)
     text = vehicle_text(found)

@@ -5,19 +5,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from firmware.model.vehicle import COEFFICIENTS
-from sim_backend.core.effects import effect_layout as ef
-from tools.data.runs.case import Case
-from tools.data.runs.run import Run
-from tools.identify.flight_likelihood import Flights, Linear
-from tools.identify.predict import flown_gap
-from tools.identify.screen import LeftOut
-from tools.identify.statistics import Quadratic, collect, heat
-from tools.inference import levels as noise
-from tools.inference.model import Model
-from tools.inference.prediction_error import Fitted, PredictionError
-from tools.inference.problem import Problem, problem_of
-from tools.inference.vehicle_parameters import FRAME, Parameters, first_effects, listed, parameters
+from glider.firmware.model.vehicle import COEFFICIENTS
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.data.runs.case import Case
+from glider.tools.data.runs.run import Run
+from glider.tools.identify.flight_likelihood import Linear, TrajectoryLikelihood
+from glider.tools.identify.predict import flown_gap
+from glider.tools.identify.screen import LeftOut
+from glider.tools.identify.statistics import Quadratic, collect, inflation
+from glider.tools.inference import levels as noise
+from glider.tools.inference.model import Model
+from glider.tools.inference.prediction_error import Fitted, PredictionError
+from glider.tools.inference.problem import Problem, problem_of
+from glider.tools.inference.vehicle_parameters import FRAME, Parameters, first_effects, listed, parameters
 
 LEVELS = 0.0  # in a schedule: the noise's levels are estimated
 # Times the disturbance in the filter's process noise, one step at each: less and less as the model comes closer.
@@ -25,22 +25,24 @@ SCHEDULE = (100.0, 10.0, 3.0, 1.0, LEVELS)
 FROM_START = (10.0, 1.0, LEVELS)  # where the accelerations have given first values
 UNSEEN = (100.0, 30.0, LEVELS, 10.0, LEVELS, 3.0, 1.0, LEVELS, 1.0, 1.0, LEVELS, 1.0, 1.0)  # without motion capture
 AGAIN = (1.0, LEVELS, 1.0)  # where the noise is not what the case says
-# Without motion capture a model may foresee every next row and yet fly elsewhere: of the points that the steps pass,
-# from this roughness on, the one is kept from which the fitted runs themselves are flown best, window by window.
+# Without motion capture a model may predict every next row and yet fly elsewhere: of the points that the steps pass,
+# from this process-noise scale on, the one is kept from which the fitted runs themselves are flown best, window by window.
 WATCHED = 30.0
 LOOK = 10.0  # of them, the one at which runs that do not belong are looked for
 MOST_STEPS = 6  # with all runs
-CORRELATED = 1.5  # heat, from which the priors weigh more than they did in the first fit: a few steps more
-UNLIKE = 0.3  # logarithm of a level
+CORRELATED = (
+    1.5  # variance inflation, from which the priors weigh more than they did in the first fit: a few steps more
+)
+LEAST_LEVEL_CHANGE = 0.3  # logarithm of a level
 FIRST_ROWS, LEVEL_ROWS, MOST_ROWS = 9_000, 5_000, 90_000
 WINDOW_ROWS = 9_000  # that are flown window by window
-ODD = 3.0  # times the runs' median of squared innovations, beyond which a run does not belong
-BLOCK = 3.0  # s, stretches of runs whose slopes are compared for the heat
-FAR = 8.0  # posterior sigma; a first fit to some of the runs that is farther off is followed by another step
+OUTLIER_RUN_FACTOR = 3.0  # times the runs' median of squared innovations, beyond which a run does not belong
+BLOCK = 3.0  # s, stretches of runs whose slopes are compared for the variance inflation
+REFIT_SIGMA = 8.0  # posterior sigma; a first fit to some of the runs that is farther off is followed by another step
 
 
 @dataclass
-class Fit:
+class IdentificationFit:
     """What the sampler and the report need."""
 
     problem: Problem  # of the runs kept, noise at its levels
@@ -80,7 +82,7 @@ def odd_runs(problem: Problem, e: np.ndarray) -> list[LeftOut]:
     squares = squared_by_run(problem, e)
     usual = float(np.median(squares))
     found = []
-    for n in np.flatnonzero(squares > ODD * max(usual, 1.0)):
+    for n in np.flatnonzero(squares > OUTLIER_RUN_FACTOR * max(usual, 1.0)):
         run = problem.runs[n]
         reason = f"misses every model that fits the others: squared innovations {squares[n] / usual:.3g} times theirs"
         found.append(LeftOut(run.name, run.path, "", reason))
@@ -98,9 +100,9 @@ class First:
     left_out: list[LeftOut]
 
 
-def flights(first: First, problem: Problem | None = None) -> Flights:
+def flights(first: First, problem: Problem | None = None) -> TrajectoryLikelihood:
     """Its flights with noise at its levels; of another problem of the same vehicle, if one is given."""
-    return Flights(first.levels.applied(first.problem if problem is None else problem), first.free)
+    return TrajectoryLikelihood(first.levels.applied(first.problem if problem is None else problem), first.free)
 
 
 def level(case: Case, first: First) -> noise.Levels:
@@ -110,7 +112,7 @@ def level(case: Case, first: First) -> noise.Levels:
     return noise.estimate(part, lambda p: flights(first).filter(first.values, problem=p), first.levels)
 
 
-def settle(case: Case, model: Model, runs: list[Run], begin: np.ndarray | None) -> First:
+def initial_fit(case: Case, model: Model, runs: list[Run], begin: np.ndarray | None) -> First:
     """First values from these runs, the filter's process noise less and less; names runs that do not belong."""
     problem = problem_of(case, model, runs)
     free = parameters(problem)
@@ -121,23 +123,23 @@ def settle(case: Case, model: Model, runs: list[Run], begin: np.ndarray | None) 
     stages = list((FROM_START if begin is not None else SCHEDULE) if mocap else UNSEEN)
     passed: list[tuple[float, np.ndarray, noise.Levels]] = []
     while stages:
-        roughness = stages.pop(0)
-        if roughness == LEVELS:
+        process_noise_scale = stages.pop(0)
+        if process_noise_scale == LEVELS:
             before, first.levels = first.levels, level(case, first)
-            if not stages and np.abs(first.levels.log - before.log).max() > UNLIKE:
+            if not stages and np.abs(first.levels.log - before.log).max() > LEAST_LEVEL_CHANGE:
                 stages = list(AGAIN)
             continue
         flown = flights(first)
-        at = flown.linear(first.values, roughness)
+        at = flown.linear(first.values, process_noise_scale)
         first.values = flown.step(at)
-        if not mocap and roughness <= WATCHED:
+        if not mocap and process_noise_scale <= WATCHED:
             passed.append((flown_gap(case, model, runs, free, first.values), first.values, first.levels))
-        if roughness != LOOK or len(runs) < 4 or first.left_out:
+        if process_noise_scale != LOOK or len(runs) < 4 or first.left_out:
             continue
         odd = odd_runs(problem, flown.follow([first.values], at.gains)[0])
         if odd and len(odd) <= len(runs) // 2:
             gone = {one.run for one in odd}
-            again = settle(case, model, [run for run in runs if run.name not in gone], None)
+            again = initial_fit(case, model, [run for run in runs if run.name not in gone], None)
             again.left_out += odd
             return again
     if passed:
@@ -151,7 +153,7 @@ def fit(
     runs: list[Run],
     begin: np.ndarray | None = None,
     say: Callable[[str], None] = lambda text: None,
-) -> Fit:
+) -> IdentificationFit:
     """Fit a case's runs: coefficients, everything else that is free, and the levels of the noise.
 
     begin: first values of the coefficients in units of their priors, if something is known of them.
@@ -161,7 +163,7 @@ def fit(
         runs = [runs[n] for n in some(runs, MOST_ROWS)]
         notes.append(f"{len(runs)} of the runs were fitted, evenly chosen: more rows would tell little and cost time")
     say("first values and noise")
-    first = settle(case, model, [runs[n] for n in some(runs, FIRST_ROWS)], begin)
+    first = initial_fit(case, model, [runs[n] for n in some(runs, FIRST_ROWS)], begin)
     gone = {one.run for one in first.left_out}
     runs = [run for run in runs if run.name not in gone]
     say(f"{len(runs)} runs")
@@ -176,11 +178,11 @@ def fit(
     mocap = bool(whole.problem.seen[ef.Y_MOCAP_X])
     for _ in range(MOST_STEPS if mocap else 0):
         away = np.abs((statistics.mode - at.values) / np.sqrt(np.diag(statistics.covariance))).max()
-        near = FAR if statistics.heat < CORRELATED else 1.0
+        near = REFIT_SIGMA if statistics.inflation < CORRELATED else 1.0
         if away < near and foresees(whole, at, statistics):
             break
         say("a further step")
-        at = whole.linear(whole.step(at, statistics.heat))
+        at = whole.linear(whole.step(at, statistics.inflation))
         statistics = gather(whole, at)
     if not mocap:
         notes.append("without motion capture: the point that flies the fitted runs best stands for the mode")
@@ -188,7 +190,7 @@ def fit(
     elif not foresees(whole, at, statistics):
         notes.append("the misfit is no parabola about its least: the best values found stand for the mode")
         statistics = statistics.centred()
-    return Fit(whole.problem, first.free, at, statistics, first.levels, left_out, notes)
+    return IdentificationFit(whole.problem, first.free, at, statistics, first.levels, left_out, notes)
 
 
 def fitting_of(case: Case, model: Model, runs: list[Run], without: Sequence[tuple[str, ...]] = ()) -> PredictionError:
@@ -204,7 +206,7 @@ def fitting_of(case: Case, model: Model, runs: list[Run], without: Sequence[tupl
 
 
 def by_prediction(
-    case: Case, model: Model, likelihood: Fit, begin: np.ndarray | None, say: Callable[[str], None]
+    case: Case, model: Model, likelihood: IdentificationFit, begin: np.ndarray | None, say: Callable[[str], None]
 ) -> Fitted:
     """The fit by prediction error, from the file's values, the likelihood's and first values of the coefficients."""
     fitting = fitting_of(case, model, likelihood.problem.runs)
@@ -216,7 +218,7 @@ def by_prediction(
     return fitting.best_of([*(fitting.clipped(fitting.free.values(start)) for start in starts), *drawn], say)
 
 
-def as_fit(fitting: PredictionError, found: Fitted, likelihood: Fit) -> Fit:
+def as_fit(fitting: PredictionError, found: Fitted, likelihood: IdentificationFit) -> IdentificationFit:
     """What was fitted by prediction error to the likelihood's runs; noise stays as the case has it."""
     n, low = len(found.values), np.array([f.low for f in fitting.free.free])
     statistics = Quadratic(
@@ -224,31 +226,31 @@ def as_fit(fitting: PredictionError, found: Fitted, likelihood: Fit) -> Fit:
         np.array([found.independent]), ("windows",),
     )  # fmt: skip
     note = "identified by prediction error, window by window (docs/IDENTIFICATION.md, Of another form)"
-    return Fit(
+    return IdentificationFit(
         likelihood.problem, fitting.free, None, statistics, noise.named(fitting.problem), likelihood.left_out, [note]
     )  # fmt: skip
 
 
-def foresees(flown: Flights, at: Linear, statistics: Quadratic) -> bool:
+def foresees(flown: TrajectoryLikelihood, at: Linear, statistics: Quadratic) -> bool:
     """Whether the step to the linearised mode brings half at least of the fall in misfit that it foresees."""
     foreseen = float(statistics.slope @ np.linalg.solve(statistics.normal, statistics.slope))
     if foreseen < 1.0:
         return True
     mode = np.maximum(statistics.mode, flown.low)
     e = flown.follow([mode], at.gains)[0]
-    before = float(at.e @ at.e) / statistics.heat + float(at.values @ at.values)
-    after = float(e @ e) / statistics.heat + float(mode @ mode)
+    before = float(at.e @ at.e) / statistics.inflation + float(at.values @ at.values)
+    after = float(e @ e) / statistics.inflation + float(mode @ mode)
     return before - after > 0.5 * foreseen
 
 
-def gather(flown: Flights, at: Linear) -> Quadratic:
-    """Sufficient statistics at a point, cooled where errors along the runs are correlated."""
+def gather(flown: TrajectoryLikelihood, at: Linear) -> Quadratic:
+    """Sufficient statistics at a point, tempered where errors along the runs are correlated."""
     problem = flown.problem
     group = np.broadcast_to(noise.group_of_reading(), problem.z.shape)[problem.valid]
     statistics = collect(at.values, flown.low, at.e, at.J, group, tuple(noise.SENSORS))
     e = at.e + (statistics.mode - at.values) @ at.J
-    found = heat(e, at.J, blocks(problem))
-    return statistics.cooled(found) if found > 1.0 else statistics
+    found = inflation(e, at.J, blocks(problem))
+    return statistics.tempered(found) if found > 1.0 else statistics
 
 
 def blocks(problem: Problem) -> np.ndarray:

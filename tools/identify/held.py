@@ -11,23 +11,23 @@ from typing import Any
 
 import numpy as np
 
-from tools.data.runs.case import Case
-from tools.data.runs.run import Run
-from tools.gap.measure import RunGap, root_mean_square, run_gap, with_total
-from tools.gap.regimes import ALL, gaps_by_regime
-from tools.identify.earned import CLEAR, Fold, conditional, mean_and_error, places, unearned
-from tools.identify.fit import Fit, as_fit, by_prediction, fit, fitting_of
-from tools.identify.predict import model_of, predicted
-from tools.inference.channels import ROUGHIE_MEASURES
-from tools.inference.model import Model, effect_vector, nominal_model
-from tools.inference.predict import fly, observe
-from tools.inference.prediction_error import Fitted
-from tools.inference.problem import cut, problem_of
+from glider.tools.data.runs.case import Case
+from glider.tools.data.runs.run import Run
+from glider.tools.gap.measure import RunGap, root_mean_square, run_gap, with_total
+from glider.tools.gap.regimes import ALL, gaps_by_regime
+from glider.tools.identify.earned import CLEAR, Fold, conditional, mean_and_error, places, unearned
+from glider.tools.identify.fit import IdentificationFit, as_fit, by_prediction, fit, fitting_of
+from glider.tools.identify.predict import model_of, predicted
+from glider.tools.inference.channels import ROUGHIE_MEASURES
+from glider.tools.inference.model import Model, effect_vector, nominal_model
+from glider.tools.inference.predict import fly, observe
+from glider.tools.inference.prediction_error import Fitted
+from glider.tools.inference.problem import cut, problem_of
 
-MOST = 12  # runs that are predicted; of a longer case evenly chosen ones
-FEW = 3  # runs, up to which the likelihood's fit is made anew without each
+MAX_PREDICTED_RUNS = 12  # runs that are predicted; of a longer case evenly chosen ones
+MAX_LEAVE_ONE_OUT_RUNS = 3  # runs, up to which the likelihood's fit is made anew without each
 FOLDS = 4  # parts of the runs; the prediction error's fit is refined without each
-REFINED = 3  # steps of that
+REFIT_STEPS = 3  # steps of that
 LEAST_GAP = 1e-3  # tolerances
 SEED = 20261125
 FILE, LIKELIHOOD, PREDICTION = "file", "likelihood", "prediction error"
@@ -42,7 +42,7 @@ class Candidate:
     """A vehicle that may be handed out, and how it flies runs that its fit has not seen."""
 
     name: str
-    fit: Fit | None  # None: the file's vehicle
+    fit: IdentificationFit | None  # None: the file's vehicle
     how: str  # it was kept from seeing them
     gaps: list[RunGap]
     flown: list[np.ndarray]  # (rows, N_Y)
@@ -58,7 +58,7 @@ class Candidate:
 
 
 @dataclass
-class Held:
+class HeldOut:
     """Runs left out, every candidate's gaps there, and which was handed out."""
 
     runs: list[Run]
@@ -155,13 +155,13 @@ def _apart(one: Candidate, other: Candidate) -> str:
     return f"{one.total:.2f} tolerances, not {other.total:.2f}"
 
 
-def without(found: Fit, run: int) -> np.ndarray:
+def without(found: IdentificationFit, run: int) -> np.ndarray:
     """The most probable values without one of the runs, by one step from the fit with all."""
     assert found.at is not None
     of = np.broadcast_to(found.problem.run_of[:, None], found.problem.z.shape)[found.problem.valid]
     kept = np.flatnonzero(of == run)
     J, e = found.at.J[:, kept], found.at.e[kept]
-    q, scale = found.quadratic, 1.0 / found.quadratic.heat
+    q, scale = found.quadratic, 1.0 / found.quadratic.inflation
     normal = q.normal - scale * (J @ J.T)
     low = np.array([f.low for f in found.free.free])
     return np.maximum(q.at - np.linalg.solve(normal, q.slope - scale * (J @ e)), low)
@@ -174,10 +174,12 @@ class Judge:
         self.case, self.model, self.say = case, model, say
         self.all = runs
         recorded = {run.name: run for run in case.runs}  # with their spikes, as everybody measures them
-        self.picked = np.unique(np.linspace(0, len(runs) - 1, min(MOST, len(runs))).astype(int)).tolist()
+        self.picked = np.unique(np.linspace(0, len(runs) - 1, min(MAX_PREDICTED_RUNS, len(runs))).astype(int)).tolist()
         self.runs = [recorded[runs[n].name] for n in self.picked]
 
-    def candidate(self, name: str, fit: Fit | None, how: str, models: list[tuple[np.ndarray, np.ndarray]]) -> Candidate:
+    def candidate(
+        self, name: str, fit: IdentificationFit | None, how: str, models: list[tuple[np.ndarray, np.ndarray]]
+    ) -> Candidate:
         """A candidate, flown in each run by the model that has not seen it."""
         found = [predicted(self.case, self.model, run, *one) for run, one in zip(self.runs, models, strict=True)]
         return Candidate(name, fit, how, [gap for gap, _ in found], [Y for _, Y in found])
@@ -191,17 +193,17 @@ class Judge:
         models = [(nominal.P, effect_vector(nominal))] * len(self.runs)
         return self.candidate(FILE, None, "it has seen no run", models)
 
-    def on_its_own(self, found: Fit) -> Candidate:
+    def on_its_own(self, found: IdentificationFit) -> Candidate:
         """A fit in the runs that it was made of."""
         return self.candidate(
             LIKELIHOOD, found, ITSELF, [model_of(self.model, found.free, found.best)] * len(self.runs)
         )
 
-    def likelihood(self, found: Fit) -> Candidate:
+    def likelihood(self, found: IdentificationFit) -> Candidate:
         """The likelihood's fit."""
         if len(self.all) == 1:
             return self.on_its_own(found)
-        if len(self.all) > FEW:
+        if len(self.all) > MAX_LEAVE_ONE_OUT_RUNS:
             models = [model_of(self.model, found.free, without(found, n)) for n in self.picked]
             return self.candidate(LIKELIHOOD, found, EARLY, models)
         models = []
@@ -211,7 +213,7 @@ class Judge:
             models.append(model_of(self.model, other.free, other.best))
         return self.candidate(LIKELIHOOD, found, ALONE, models)
 
-    def floor(self, found: Fit) -> Candidate:
+    def floor(self, found: IdentificationFit) -> Candidate:
         """What noise and disturbance of the file would leave: recordings that the fit simulates, flown by itself."""
         P, F = model_of(self.model, found.free, found.best)
         rng, gaps, flown = np.random.default_rng(SEED), [], []
@@ -226,7 +228,7 @@ class Judge:
             flown.append(Y)
         return Candidate("noise", None, "simulated", gaps, flown)
 
-    def prediction(self, likelihood: Fit, begin: np.ndarray | None) -> Candidate:
+    def prediction(self, likelihood: IdentificationFit, begin: np.ndarray | None) -> Candidate:
         """The prediction error's fit, without the terms that runs left out do not miss."""
         whole = by_prediction(self.case, self.model, likelihood, begin, self.say)
         count = min(FOLDS, len(self.all))
@@ -237,7 +239,7 @@ class Judge:
         fitted = whole
         if gone:
             self.say(f"without {', '.join(name for term in gone for name in term)}")
-            fitted = fitting.again(self.kept(whole, folds[0], gone), REFINED)
+            fitted = fitting.again(self.kept(whole, folds[0], gone), REFIT_STEPS)
             begins = [self.kept(fold.inside, fold, gone) for fold in folds]
             folds = [self.fold(part, values, gone) for part, values in zip(parts, begins, strict=True)]
         models = [model_of(self.model, fitting.free, fold.inside.values) for fold in folds]
@@ -250,7 +252,7 @@ class Judge:
         """The fit without a part of the runs, from values on; of a single run nothing can be left out."""
         kept = self.others(left_out) or self.all
         outside = fitting_of(self.case, self.model, [self.all[n] for n in left_out], gone)
-        return Fold(fitting_of(self.case, self.model, kept, gone).again(values, REFINED), outside)
+        return Fold(fitting_of(self.case, self.model, kept, gone).again(values, REFIT_STEPS), outside)
 
     @staticmethod
     def kept(found: Fitted, fold: Fold, gone: list[tuple[str, ...]]) -> np.ndarray:
@@ -260,8 +262,12 @@ class Judge:
 
 
 def judge(
-    case: Case, model: Model, likelihood: Fit, begin: np.ndarray | None, say: Callable[[str], None] = lambda text: None
-) -> Held:
+    case: Case,
+    model: Model,
+    likelihood: IdentificationFit,
+    begin: np.ndarray | None,
+    say: Callable[[str], None] = lambda text: None,
+) -> HeldOut:
     """All candidates, flown in runs that were left out, and which of them is handed out.
 
     Without the prediction error's where the likelihood's fit flies its own runs as well as noise and disturbance allow:
@@ -272,4 +278,4 @@ def judge(
     if clearly_better(floor, court.on_its_own(likelihood)):
         candidates.append(court.prediction(likelihood, begin))
     chosen, why = choose(candidates)
-    return Held(court.runs, candidates, chosen, why, case.roughie.vector(), floor)
+    return HeldOut(court.runs, candidates, chosen, why, case.roughie.vector(), floor)

@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from firmware.model.vehicle import COEFFICIENTS
-from tools.inference.vehicle_parameters import Parameters
+from glider.firmware.model.vehicle import COEFFICIENTS
+from glider.tools.inference.vehicle_parameters import Parameters
 
-WIDE = 0.5  # of the prior's sigma: a combination that stays wider is unidentifiable
+UNIDENTIFIABLE_PRIOR_SHARE = 0.5  # of the prior's sigma: a combination that stays wider is unidentifiable
 LOADING = 0.3  # of a combination, for a parameter to be named in it
 WORDS = {
     "K_D0": "drag at no angle", "K_D": "drag growing with the angle of attack", "K_L0": "lift at no angle",
@@ -58,7 +58,7 @@ def unidentifiable_directions(free: Parameters, draws: np.ndarray) -> list[Unide
     found = []
     for value, vector in sorted(zip(values, vectors.T, strict=True), key=lambda pair: -pair[0]):
         width = float(np.sqrt(max(value, 0.0)))
-        if width < WIDE:
+        if width < UNIDENTIFIABLE_PRIOR_SHARE:
             break
         order = np.argsort(-np.abs(vector))
         parts = [(free.names[listed[i]], float(vector[i])) for i in order if abs(vector[i]) >= LOADING]
@@ -72,8 +72,8 @@ def unidentifiable_directions(free: Parameters, draws: np.ndarray) -> list[Unide
 def sentences(free: Parameters, draws: np.ndarray) -> list[str]:
     """In plain words, coefficient by coefficient: what the runs identify and what not."""
     spread = draws.std(axis=0)
-    known = [n for n in looked_for(free) if spread[n] < WIDE]
-    unknown = [n for n in looked_for(free) if spread[n] >= WIDE]
+    known = [n for n in looked_for(free) if spread[n] < UNIDENTIFIABLE_PRIOR_SHARE]
+    unknown = [n for n in looked_for(free) if spread[n] >= UNIDENTIFIABLE_PRIOR_SHARE]
 
     def words(which: list[int]) -> str:
         return ", ".join(f"{WORDS[free.names[n]]} ({free.names[n]})" for n in which)

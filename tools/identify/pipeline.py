@@ -7,31 +7,31 @@ from typing import Any
 
 import numpy as np
 
-from firmware.model.vehicle import COEFFICIENTS
-from tools.data.errors import InputError
-from tools.data.runs.case import Case
-from tools.data.runs.run import Run
-from tools.gap.mended import Mended, mended
-from tools.identify.acceleration_likelihood import fit_accelerations, suited
-from tools.identify.fit import Fit, fit
-from tools.identify.flight_likelihood import Flights
-from tools.identify.held import FILE, Held, judge
-from tools.identify.identifiability import unidentifiable_directions
-from tools.identify.sampler import Chains, Summary, sample, summarise
-from tools.identify.screen import LeftOut, despiked, screen
-from tools.identify.statistics import Quadratic
-from tools.inference.levels import Levels
-from tools.inference.model import nominal_model
-from tools.inference.problem import Problem
-from tools.inference.vehicle_parameters import Parameters, coefficients
+from glider.firmware.model.vehicle import COEFFICIENTS
+from glider.tools.data.errors import InputError
+from glider.tools.data.runs.case import Case
+from glider.tools.data.runs.run import Run
+from glider.tools.gap.corrected import ReadingCorrections, correct_readings
+from glider.tools.identify.acceleration_likelihood import fit_accelerations, suited
+from glider.tools.identify.fit import IdentificationFit, fit
+from glider.tools.identify.flight_likelihood import TrajectoryLikelihood
+from glider.tools.identify.held import FILE, HeldOut, judge
+from glider.tools.identify.identifiability import unidentifiable_directions
+from glider.tools.identify.sampler import Chains, Summary, sample, summarise
+from glider.tools.identify.screen import LeftOut, despiked, screen
+from glider.tools.identify.statistics import Quadratic
+from glider.tools.inference.levels import Levels
+from glider.tools.inference.model import nominal_model
+from glider.tools.inference.problem import Problem
+from glider.tools.inference.vehicle_parameters import Parameters, coefficients
 
 CHECKED = 24  # draws at which the whole likelihood is compared with its linearisation
-ROUGH = 0.3  # effective share of the draws, below which intervals are called rough
+LEAST_EFFECTIVE_SHARE = 0.3  # effective share of the draws, below which intervals are called rough
 FLIGHTS, ACCELERATIONS = "flights", "accelerations"
 
 
 @dataclass(frozen=True)
-class Check:
+class PosteriorCheck:
     """How well the linearised likelihood stands for the whole one at draws of the posterior."""
 
     draws: int
@@ -44,7 +44,7 @@ class Identified:
     """What was found."""
 
     case: Case
-    read: Mended  # what the readings say of each other, and the model that reads as they do
+    read: ReadingCorrections  # what the readings say of each other, and the model that reads as they do
     likelihood: str
     runs: list[Run]  # that were fitted, without spikes
     free: Parameters
@@ -55,9 +55,9 @@ class Identified:
     spikes: int
     notes: list[str]
     seconds: float
-    fit: Fit | None = None  # of the flights
-    held: Held | None = None  # None by the accelerations
-    check: Check | None = None
+    fit: IdentificationFit | None = None  # of the flights
+    held: HeldOut | None = None  # None by the accelerations
+    check: PosteriorCheck | None = None
     accelerations: Quadratic | None = (
         None  # the other likelihood's statistics of the coefficients, where it could be had
     )
@@ -107,7 +107,7 @@ class Identified:
             "readings": [one.plain() for one in self.read.findings],
             "also_free": [one.plain() for one in self.summaries[len(COEFFICIENTS) :]],
             "runs": [run.name for run in self.runs],
-            "heat": self.quadratic.heat,
+            "heat": self.quadratic.inflation,
             "spikes_removed": self.spikes,
             "seed": self.chains.seed,
             "notes": self.notes,
@@ -128,16 +128,16 @@ class Identified:
         return result
 
 
-def check_linearised(found: Fit, chains: Chains, draws: int = CHECKED) -> Check:
+def check_linearised(found: IdentificationFit, chains: Chains, draws: int = CHECKED) -> PosteriorCheck:
     """The whole likelihood (gains kept) at draws of the posterior, against its linearisation."""
     flat = chains.flat
     picked = flat[np.linspace(0, len(flat) - 1, draws).astype(int)]
     assert found.at is not None
-    E = Flights(found.problem, found.free).follow(list(picked), found.at.gains)
-    whole = np.square(E).sum(axis=1) / found.quadratic.heat
+    E = TrajectoryLikelihood(found.problem, found.free).follow(list(picked), found.at.gains)
+    whole = np.square(E).sum(axis=1) / found.quadratic.inflation
     log = -0.5 * (whole - found.quadratic.misfit(picked))
     weights = np.exp(log - log.max())
-    return Check(draws, float(log.std(ddof=1)), float(weights.sum() ** 2 / (weights @ weights) / draws))
+    return PosteriorCheck(draws, float(log.std(ddof=1)), float(weights.sum() ** 2 / (weights @ weights) / draws))
 
 
 def usable(case: Case) -> tuple[list[Run], list[LeftOut], int]:
@@ -161,7 +161,7 @@ def identify(
     """Identify the vehicle of a case from its runs: the candidate that flies runs left out best (held.py)."""
     began = time.perf_counter()
     runs, left_out, spikes = usable(case)
-    read = mended(case, nominal_model(case), runs)
+    read = correct_readings(case, nominal_model(case), runs)
     runs, model = read.runs, read.model
     first = None
     if likelihood == ACCELERATIONS or suited(runs):
@@ -188,7 +188,7 @@ def identify(
     free = found.free
     summaries = summarise(free.names, [f.unit for f in free.free], free.si(chains.values))
     check = None if found.at is None else check_linearised(found, chains)
-    if check is not None and check.share < ROUGH:
+    if check is not None and check.share < LEAST_EFFECTIVE_SHARE:
         found.notes.append(
             "the posterior is not normal: its linearisation misses the whole likelihood "
             f"(effective share of draws {check.share:.2f}); intervals are rough, the vehicle file may be far off"

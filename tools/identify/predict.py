@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from sim_backend.core.effects import effect_layout as ef
-from tools.data.runs.case import Case
-from tools.data.runs.run import Run
-from tools.gap.measure import RunGap, root_mean_square, run_gap
-from tools.inference.model import Model
-from tools.inference.predict import fly
-from tools.inference.problem import cut, problem_of
-from tools.inference.vehicle_parameters import Parameters
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.data.runs.case import Case
+from glider.tools.data.runs.run import Run
+from glider.tools.gap.measure import RunGap, root_mean_square, run_gap
+from glider.tools.inference.model import Model
+from glider.tools.inference.predict import fly
+from glider.tools.inference.problem import cut, problem_of
+from glider.tools.inference.vehicle_parameters import Parameters
 
 
 def predicted(

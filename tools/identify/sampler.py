@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tools.identify.core.metropolis import log_densities, walk_chains
-from tools.identify.statistics import LEVEL_WIDTH, Quadratic
+from glider.tools.identify.core.metropolis import log_densities, walk_chains
+from glider.tools.identify.statistics import LEVEL_WIDTH, Quadratic
 
-CHAINS, WARM, DRAWS, THIN = 4, 1000, 2500, 4
-APART = 2.0  # posterior sigma about the mode from which chains start
+CHAINS, WARMUP_DRAWS, DRAWS, THIN = 4, 1000, 2500, 4
+START_SIGMA = 2.0  # posterior sigma about the mode from which chains start
 
 
 @dataclass
@@ -69,14 +69,19 @@ def whiten(quadratic: Quadratic) -> Whitened:
 
 
 def sample(
-    quadratic: Quadratic, seed: int, chains: int = CHAINS, warm: int = WARM, draws: int = DRAWS, thin: int = THIN
+    quadratic: Quadratic,
+    seed: int,
+    chains: int = CHAINS,
+    warm: int = WARMUP_DRAWS,
+    draws: int = DRAWS,
+    thin: int = THIN,
 ) -> Chains:
     """Metropolis-Hastings chains, one after the other of the seeds; the same draws for the same seed, bit for bit."""
     white = whiten(quadratic)
     n, groups = len(quadratic.at), len(quadratic.groups)
     rng = np.random.default_rng(seed)
     starts = np.zeros((chains, n + groups))
-    starts[:, :n] = APART * rng.standard_normal((chains, n))
+    starts[:, :n] = START_SIGMA * rng.standard_normal((chains, n))
     for start in starts:  # back towards the mode until within the limits
         while np.any(white.bounds @ start[:n] + white.base < 0.0):
             start[:n] *= 0.5

@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tools.data.runs import columns as names
-from tools.data.runs.run import Run
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.run import Run
 
 LARGEST_ROLL_PITCH, LARGEST_YAW = 1.65, 60.0  # rad: beyond, an angle is in degrees (yaw may be continuous: ten turns)
-FASTEST = 5.0  # m/s through the capture's volume: beyond, it counts in millimetres
-WIDEST = 60.0  # m; no capture sees farther
-SLOW = 0.08  # m/s, below which the way a hull moves says nothing about its axes
+MAX_CAPTURE_SPEED = 5.0  # m/s through the capture's volume: beyond, it counts in millimetres
+MAX_CAPTURE_SPAN = 60.0  # m; no capture sees farther
+LEAST_HULL_SPEED = 0.08  # m/s, below which the way a hull moves says nothing about its axes
 FROZEN = 0.5  # s for which a pose may stand still to the last digit
 AHEAD = 0.6  # of the motion's energy, along the hull, at least; the slowest of sound glides had 0.76
 EARLIEST = 1.0  # s that the two clocks may be apart
@@ -57,9 +57,9 @@ def wrong_units(run: Run) -> tuple[str, str] | None:
             continue
         seen = np.isfinite(values)
         speed = np.abs(np.diff(values[seen])) / np.diff(run.t[seen])
-        if np.median(speed) > FASTEST:
+        if np.median(speed) > MAX_CAPTURE_SPEED:
             return name, f"moves at {np.median(speed):.4g} m/s: millimetres?"
-        if np.ptp(values[seen]) > WIDEST and name != names.DEPTH:
+        if np.ptp(values[seen]) > MAX_CAPTURE_SPAN and name != names.DEPTH:
             return name, f"spans {np.ptp(values[seen]):.4g} m, more than a capture sees: millimetres?"
     for name, limit in ((names.DRAW_WIRES[0], 1.0), (names.COMMANDS[1], 1.0), (names.COMMANDS[0], 2.0)):
         values = np.abs(_finite(run, name))
@@ -110,7 +110,7 @@ def swapped(run: Run) -> tuple[str, str] | None:
     middle = Rotation.from_euler("ZYX", poses[:-1, :2:-1])
     body = middle.inv().apply(velocity)
     speed = np.linalg.norm(body, axis=1)
-    moving = speed > SLOW
+    moving = speed > LEAST_HULL_SPEED
     if moving.sum() < 5:
         return None
     ahead = float(np.sum(np.sign(body[moving, 0]) * body[moving, 0] ** 2) / np.sum(speed[moving] ** 2))

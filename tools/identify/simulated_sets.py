@@ -1,6 +1,6 @@
 """Twin experiments: how often the 90 % intervals hold the truth.
 
-`python -m tools.identify.simulated_sets` prints the figures.
+`python -m glider.tools.identify.simulated_sets` prints the figures.
 
 Data sets of the project's own plant, each of another vehicle, another capture and another disturbance; each identified
 by the trajectory likelihood and by the accelerations'.
@@ -14,12 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
-from firmware.model.vehicle import COEFFICIENTS, Vehicle
-from tools.data.runs.case import load_case
-from tools.data.sources import load_vehicle
-from tools.identify.design import grid, write_design
-from tools.identify.pipeline import identify
-from tools.inference.vehicle_parameters import coefficient_sizes
+from glider.firmware.model.vehicle import COEFFICIENTS, Vehicle
+from glider.tools.data.runs.case import load_case
+from glider.tools.data.sources import load_vehicle
+from glider.tools.identify.design import grid, write_design
+from glider.tools.identify.pipeline import identify
+from glider.tools.inference.vehicle_parameters import coefficient_sizes
 
 RUNS = 5  # of the 45, drawn anew for each data set
 
@@ -38,7 +38,7 @@ def one(vehicle: Vehicle, seed: int, runs: int = RUNS) -> dict[str, dict[str, fl
             "error": abs(s.mean - truth[s.name]) / sizes[s.name],
             "z": (s.mean - truth[s.name]) / s.sd,
             "z_accelerations": (other[s.name]["mean"] - truth[s.name]) / other[s.name]["sd"],
-            "heat": found.quadratic.heat,
+            "heat": found.quadratic.inflation,
         }
         for s in found.coefficients
     }

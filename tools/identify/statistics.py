@@ -13,7 +13,7 @@ class Quadratic:
     """Log posterior of d = values - at and of noise levels, by groups of samples (core/metropolis has the formula).
 
     A (G, n, n), b (G, n), c (G,), count (G,): of the likelihood; the prior is |at + d|^2 / 2, and d >= low - at.
-    `heat` is by what the likelihood's logarithm was divided, because errors along a run are correlated.
+    `inflation` is by what the likelihood's logarithm was divided, because errors along a run are correlated.
     """
 
     at: np.ndarray
@@ -23,7 +23,7 @@ class Quadratic:
     c: np.ndarray
     count: np.ndarray
     groups: tuple[str, ...]
-    heat: float = 1.0
+    inflation: float = 1.0
 
     @property
     def normal(self) -> np.ndarray:
@@ -44,18 +44,18 @@ class Quadratic:
         """Most probable values at noise levels of 1, without limits."""
         return self.at - np.linalg.solve(self.normal, self.slope)
 
-    def cooled(self, heat: float) -> "Quadratic":
-        """The same with the likelihood's logarithm divided by `heat`."""
+    def tempered(self, inflation: float) -> "Quadratic":
+        """The same with the likelihood's logarithm divided by `inflation`."""
         return Quadratic(
-            self.at, self.low, self.A / heat, self.b / heat, self.c / heat, self.count / heat, self.groups,
-            self.heat * heat,
+            self.at, self.low, self.A / inflation, self.b / inflation, self.c / inflation, self.count / inflation, self.groups,
+            self.inflation * inflation,
         )  # fmt: skip
 
     def centred(self) -> "Quadratic":
         """The same with its mode at `at` itself: Laplace's approximation about the best values that were found."""
         b = np.zeros_like(self.b)
         b[0] = -self.at
-        return Quadratic(self.at, self.low, self.A, b, self.c, self.count, self.groups, self.heat)
+        return Quadratic(self.at, self.low, self.A, b, self.c, self.count, self.groups, self.inflation)
 
     def misfit(self, values: np.ndarray) -> np.ndarray:
         """The likelihood's part of -2 log posterior at values (k, n), noise levels of 1: (k,)."""
@@ -81,11 +81,11 @@ def collect(
     return Quadratic(values, low, np.array(A), np.array(b), np.array(c), count, tuple(names[g] for g in kept))
 
 
-def heat(e: np.ndarray, J: np.ndarray, block: np.ndarray) -> float:
+def inflation(e: np.ndarray, J: np.ndarray, block: np.ndarray) -> float:
     """How much more the likelihood's slope varies from block to block of the recordings than independent errors would.
 
     1 for white residuals of unit variance. `block` (samples,) numbers stretches of runs. In coordinates in which the
-    normal matrix is the identity, the mean square of the blocks' slopes over what their own normal matrices foresee
+    normal matrix is the identity, the mean square of the blocks' slopes over what their own normal matrices predict
     once the parameters are fitted to these same residuals: the block bootstrap's variance of the estimate, averaged
     over all directions. Samples of a block stand together.
     """

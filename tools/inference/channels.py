@@ -8,10 +8,10 @@ from math import radians
 
 import numpy as np
 
-from firmware.core.maths.rotations import wrap
-from tools.data.runs import columns as names
-from tools.data.runs.run import Run
-from tools.inference.windows import Window, cut_windows
+from glider.firmware.core.maths.rotations import wrap
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.run import Run
+from glider.tools.inference.windows import Window, cut_windows
 
 DEGREES = 180.0 / np.pi
 

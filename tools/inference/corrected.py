@@ -6,12 +6,12 @@ from typing import Annotated
 import msgspec
 import numpy as np
 
-from firmware.core.vehicle import layout
-from hal.strict import ConfigError, Table, decode
-from sim_backend.core.effects import effect_layout as ef
-from tools.data.sources import read_text
-from tools.inference.kind import ROUGHIE
-from tools.inference.model import Model, add_effects, effect_vector
+from glider.firmware.core.vehicle import layout
+from glider.hal.strict import ConfigError, Table, decode
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.data.sources import read_text
+from glider.tools.inference.kind import ROUGHIE
+from glider.tools.inference.model import Model, add_effects, effect_vector
 
 LINKS = (
     "surge force", "sway force", "heave force", "roll moment", "pitch moment", "yaw moment", "servo", "slider",

@@ -5,13 +5,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tools.inference.fit import NUISANCE_STEP, THRESHOLD_STEP
-from tools.inference.problem import Gains, Problem
-from tools.inference.shared_parameters import HARDLY, SharedParameters
+from glider.tools.inference.fit import NUISANCE_STEP, THRESHOLD_STEP
+from glider.tools.inference.problem import Gains, Problem
+from glider.tools.inference.shared_parameters import BOUND_TOLERANCE, SharedParameters
 
 STEP = 0.1  # of a label's spread: difference step
 HIDDEN = 1.0  # sigma: a whole spread that moves less may be a threshold that was not reached
-FAR, NEAR = 30.0, 8.0  # sigma in all: steps that move more are too long, and how far they go instead
+LONG_STEP_SIGMA, SHORTENED_STEP_SIGMA = (
+    30.0,
+    8.0,
+)  # sigma in all: steps that move more are too long, and how far they go instead
 PAST_THRESHOLD = 0.1  # of a long step's derivative: a short one that sees less has not reached a threshold
 Moved = Callable[[int, float], tuple[np.ndarray, np.ndarray]]
 
@@ -38,20 +41,22 @@ class Expansion:
         """Value at x = 0."""
         return float(self.value - 2.0 * self.slope @ self.at + self.at @ self.curvature @ self.at)
 
-    def cooled(self, heat: float) -> "Expansion":
+    def tempered(self, inflation: float) -> "Expansion":
         """The same with squared innovations that count for less."""
-        return Expansion(self.at, self.value / heat, self.slope / heat, self.curvature / heat, self.nis, self.samples)
+        return Expansion(
+            self.at, self.value / inflation, self.slope / inflation, self.curvature / inflation, self.nis, self.samples
+        )
 
 
-def at_kink(shared: SharedParameters, x: np.ndarray) -> np.ndarray:
+def at_bound(shared: SharedParameters, x: np.ndarray) -> np.ndarray:
     """Of each parameter, whether it has a kink and is hardly past it, (count,) bool."""
-    return shared.kinked & (np.abs(x) < HARDLY)
+    return shared.one_sided & (np.abs(x) < BOUND_TOLERANCE)
 
 
 def difference_steps(shared: SharedParameters, x: np.ndarray) -> np.ndarray:
     """Step of each derivative at x, away from the nearer limit; a whole spread where an effect begins at a kink."""
     steps = np.where(shared.groups == 2, STEP * np.maximum(1.0, np.abs(x)), NUISANCE_STEP)
-    begins = at_kink(shared, x)
+    begins = at_bound(shared, x)
     steps[begins] = np.minimum(1.0, np.maximum(shared.high, -shared.low)[begins])
     return np.where(x + steps > shared.high, -steps, steps)
 
@@ -68,11 +73,13 @@ def columns_at(
     E = part.follow([models(-1, 0.0), *(models(k, float(size)) for k, size in enumerate(steps))], gains)
     e, J = E[0], (E[1:] - E[0]) / steps[:, None]
     norms = np.sqrt((J**2).sum(axis=1))
-    far = np.flatnonzero(norms * np.abs(steps) > FAR)
+    far = np.flatnonzero(norms * np.abs(steps) > LONG_STEP_SIGMA)
     hidden = np.flatnonzero(begins & (norms < HIDDEN))
     again = np.concatenate([far, hidden]).astype(int)
     if len(again):
-        scales = np.concatenate([NEAR / (norms[far] * np.abs(steps[far])), np.full(len(hidden), THRESHOLD_STEP)])
+        scales = np.concatenate(
+            [SHORTENED_STEP_SIGMA / (norms[far] * np.abs(steps[far])), np.full(len(hidden), THRESHOLD_STEP)]
+        )
         sizes = steps[again] * scales
         moved = part.follow([models(int(k), float(size)) for k, size in zip(again, sizes, strict=True)], gains)
         new = (moved - e) / sizes[:, None]
@@ -83,13 +90,17 @@ def columns_at(
 
 
 def expand(
-    part: Problem, shared: SharedParameters, x: np.ndarray, roughness: float = 1.0, strata: np.ndarray | None = None
+    part: Problem,
+    shared: SharedParameters,
+    x: np.ndarray,
+    process_noise_scale: float = 1.0,
+    strata: np.ndarray | None = None,
 ) -> Expansion:
     """A run (a problem of its own) about the model at x, by the gains of that model's filter.
 
     strata: a number of every row (rows,); the samples of each number make a part of the expansion.
     """
-    gains, e, J = linear(part, shared, x, roughness)
+    gains, e, J = linear(part, shared, x, process_noise_scale)
     found = _parabola(x, float(gains.misfit[0]), e, J)
     if strata is not None:
         of_sample = strata[np.nonzero(part.valid)[0]]
@@ -99,10 +110,10 @@ def expand(
 
 
 def linear(
-    part: Problem, shared: SharedParameters, x: np.ndarray, roughness: float = 1.0
+    part: Problem, shared: SharedParameters, x: np.ndarray, process_noise_scale: float = 1.0
 ) -> tuple[Gains, np.ndarray, np.ndarray]:
     """A run's filter at x, its innovations (samples,) and their derivatives (count, samples) by kept gains."""
-    gains = part.filter(*shared.model(part, x), roughness=roughness, begin=True)
+    gains = part.filter(*shared.model(part, x), process_noise_scale=process_noise_scale, begin=True)
 
     def moved(k: int, size: float) -> tuple[np.ndarray, np.ndarray]:
         point = x.copy()
@@ -110,7 +121,7 @@ def linear(
             point[k] += size
         return shared.model(part, point)
 
-    return gains, *columns_at(part, gains, moved, at_kink(shared, x), difference_steps(shared, x))
+    return gains, *columns_at(part, gains, moved, at_bound(shared, x), difference_steps(shared, x))
 
 
 def _parabola(x: np.ndarray, value: float, e: np.ndarray, J: np.ndarray) -> Expansion:

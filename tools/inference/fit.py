@@ -8,8 +8,8 @@ Laplace's approximation around the least misfit gives the evidence.
 
 import numpy as np
 
-from tools.inference.parameters import FreeParameter, model_at
-from tools.inference.problem import Gains, Problem
+from glider.tools.inference.parameters import FreeParameter, model_at
+from glider.tools.inference.problem import Gains, Problem
 
 NUISANCE_STEP = 0.3  # of a prior sigma: difference step of nuisance parameters
 NUISANCE_LIMIT = 3.5  # prior sigma: bound of nuisance parameters
@@ -83,7 +83,7 @@ class Fitter:
             hypothesis.set_innovations(e, self.prior_weight)
 
     def linearise(self, hypotheses: list["Hypothesis"], coarse: bool = False) -> None:
-        """The columns of every hypothesis's parameters where it stands, and the step they foresee."""
+        """The columns of every hypothesis's parameters where it stands, and the step they predict."""
         self.measure(hypotheses)
         points, steps = [], []
         for hypothesis in hypotheses:
@@ -203,7 +203,7 @@ class Hypothesis:
         self.e: np.ndarray = np.empty(0)
         self.misfit, self.gained = np.inf, np.inf
         self.known = np.empty((0, 0))  # columns of the first parameters, where they are known already
-        self.kink_step = 1.0  # spreads: difference step of an effect that begins at a kink, there
+        self.bound_step = 1.0  # spreads: difference step of an effect that begins at a kink, there
         self.shorter = 1.0  # share of a coarse difference step that is taken
 
     def set_innovations(self, e: np.ndarray, prior_weight: float) -> None:
@@ -213,9 +213,9 @@ class Hypothesis:
 
     def difference_steps(self, coarse: bool) -> np.ndarray:
         """Step of each derivative, away from the nearer limit; a whole spread where an effect begins at a kink."""
-        whole = [min(self.kink_step, max(f.high, -f.low)) if f.kinked else FIRST_STEP for f in self.free]
+        whole = [min(self.bound_step, max(f.high, -f.low)) if f.one_sided else FIRST_STEP for f in self.free]
         sizes = np.array([
-            self.shorter * size if coarse or (f.kinked and v == 0.0) else EFFECT_STEP * max(1.0, abs(v))
+            self.shorter * size if coarse or (f.one_sided and v == 0.0) else EFFECT_STEP * max(1.0, abs(v))
             for f, v, size in zip(self.free, self.values, whole, strict=True)
         ])  # fmt: skip
         return np.where(self.values + sizes > self.high, -sizes, sizes)
@@ -223,7 +223,7 @@ class Hypothesis:
     @property
     def late(self) -> bool:
         """Whether its last effect may begin only beyond some size."""
-        return any(free.kinked for free in self.free if free.label == self.labels[-1])
+        return any(free.one_sided for free in self.free if free.label == self.labels[-1])
 
     def runs_away(self, first: int) -> bool:
         """Whether a coarse step along a parameter, the first of them numbered `first`, led where nothing is linear.
@@ -264,7 +264,7 @@ class Hypothesis:
     def side_steps(self, hopeful: bool) -> list[tuple[np.ndarray, np.ndarray]]:
         """Points (values, nuisance) where the whole step brings nothing: without each parameter, and each delay alone.
 
-        hopeful: what the step promises would make it the best, or no delay is tried alone.
+        hopeful: what the step predicts would make it the best, or no delay is tried alone.
         """
         count, points = len(self.nuisance), []
         for k in range(count, len(self.slope)):
@@ -301,7 +301,7 @@ class Hypothesis:
 
     def log_evidence(self, fitter: Fitter) -> float:
         """By Laplace's approximation, up to a constant of the data and the gains."""
-        doubled = 2.0 * np.log(2.0) * sum(f.kinked for f in self.free)  # half of a prior lies on one side
+        doubled = 2.0 * np.log(2.0) * sum(f.one_sided for f in self.free)  # half of a prior lies on one side
         logdet = float(np.linalg.slogdet(self.precision)[1]) if len(self.free) else 0.0
         value = -0.5 * (self.misfit + fitter.occam + logdet - doubled)
         return float(value) if np.isfinite(value) else -np.inf

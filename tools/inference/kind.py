@@ -8,20 +8,20 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from firmware.core.layouts import estimator_layout as kf
-from firmware.core.maths.rotations import quaternion_from_euler
-from firmware.core.vehicle.layout import X_BALLAST, X_DOWN, X_EAST, X_NORTH, X_NU, X_QUAT, X_SLIDER
-from firmware.model.estimator_settings import UNSEEN_SERVO_WALK
-from sim_backend.core.effects import effect_layout as ef
-from sim_backend.core.effects.base import Effect
-from sim_backend.core.effects.catalogue import catalogue
-from tools.data.runs import columns as names
-from tools.data.runs.run import Run
-from tools.inference.channels import ROUGHIE_MEASURES, Measures
-from tools.inference.core.error_layout import E_ACT, E_NU, N_ERR, N_PATH, N_SPECTRAL, Q_ACC, Q_ACT
-from tools.inference.core.filter import filter_runs, follow_runs
-from tools.inference.core.flight import fly_followed, fly_windows, read_rows, simulate_runs
-from tools.inference.core.lacking import LACKING_SPREAD
+from glider.firmware.core.layouts import estimator_layout as kf
+from glider.firmware.core.maths.rotations import quaternion_from_euler
+from glider.firmware.core.vehicle.layout import X_BALLAST, X_DOWN, X_EAST, X_NORTH, X_NU, X_QUAT, X_SLIDER
+from glider.firmware.model.estimator_settings import UNSEEN_SERVO_WALK
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.sim_backend.core.effects.base import Effect
+from glider.sim_backend.core.effects.catalogue import catalogue
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.run import Run
+from glider.tools.inference.channels import ROUGHIE_MEASURES, Measures
+from glider.tools.inference.core.error_layout import E_ACT, E_NU, N_ERR, N_PATH, N_SPECTRAL, Q_ACC, Q_ACT
+from glider.tools.inference.core.filter import filter_runs, follow_runs
+from glider.tools.inference.core.flight import fly_followed, fly_windows, read_rows, simulate_runs
+from glider.tools.inference.core.model_error import MODEL_ERROR_SD
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Input:
 
 # Tolerances. A tolerance is what a simulator may be off; a tenth of it adds half a percent to a gap of one, and lies
 # below what noise and disturbance leave of a perfect model (0.12 to 0.17 in total), so no prediction is the better.
-MATTERS = 0.1
+MATERIAL_TOLERANCES = 0.1
 
 
 def _none(seen: Collection[str]) -> tuple[str, ...]:
@@ -77,13 +77,15 @@ class Kind:
     disturbance: tuple[str, ...]  # entries of [disturbance], of each acceleration, held `hold` s
     hold: float
     walks: tuple[float, ...]  # of actuators, which go as the model says
-    rough_walks: tuple[float, ...]  # times the roughness squared, of filters that are not to trust the model
+    inflated_walks: tuple[
+        float, ...
+    ]  # times the process-noise scale squared, of filters that are not to trust the model
     first_state: Callable[[np.ndarray], np.ndarray]  # by the first readings (prediction columns)
     spread: tuple[float, ...]  # (n_error,) about it
     speeds: tuple[float, ...]  # tried
     window_speeds: tuple[float, ...]  # tried by the filter that finds where windows start
     window_speed_spread: tuple[float, ...]
-    lacking_spread: tuple[float, ...]  # of what the model lacks
+    model_error_sd: tuple[float, ...]  # of what the model lacks
     drift: tuple[float, ...]
     filter_runs: Callable[..., None]
     follow_runs: Callable[..., None]
@@ -101,8 +103,10 @@ class Kind:
     regime: Callable[[Run], np.ndarray] | None = None  # how a run was flown, in what makes a difference to the model
     form: float = 0.06  # of a size, 1 sigma: nature's form is not the catalogue's (docs/WATCH.md)
     learned_runs: int = 4  # of the first, from which a watch without a reference learns what all share
-    growth_matters: float = MATTERS  # the same of what grows slowly
-    matters: float = MATTERS  # tolerances: what moves no channel of any window so far is no gap (docs/GAP.md)
+    material_growth: float = MATERIAL_TOLERANCES  # the same of what grows slowly
+    material: float = (
+        MATERIAL_TOLERANCES  # tolerances: what moves no channel of any window so far is no gap (docs/GAP.md)
+    )
 
 
 def _first_state(first: np.ndarray) -> np.ndarray:
@@ -159,14 +163,14 @@ ROUGHIE = Kind(
     disturbance=(*3 * ("linear",), *3 * ("angular",)),
     hold=kf.DISTURBANCE_HOLD,
     walks=(1e-8, 1e-12, 1e-12),
-    rough_walks=(1e-6, 4e-10, 2.5e-9),
+    inflated_walks=(1e-6, 4e-10, 2.5e-9),
     first_state=_first_state,
     # m, rad, m/s, rad/s about readings; rad, m, kg where commanded: they begin at 0 and at the draw-wires
     spread=(*3 * (0.05,), *3 * (0.05,), 0.1, 0.03, 0.03, *3 * (0.05,), 1e-4, 3e-4, 5e-4, 0.0),
     speeds=(0.03, 0.2, 0.4),  # m/s
     window_speeds=(0.0, 0.1, 0.2, 0.3, 0.45, 0.6),
     window_speed_spread=(0.05, 0.02, 0.02),
-    lacking_spread=LACKING_SPREAD,
+    model_error_sd=MODEL_ERROR_SD,
     drift=(10.0, 0.0005**2, 0.005**2),  # s, (rad/s)2/s, (m/s)2/s
     filter_runs=filter_runs,
     follow_runs=follow_runs,

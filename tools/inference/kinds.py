@@ -2,9 +2,9 @@
 
 from typing import Any
 
-from sim_backend.ocean.vehicle import OceanVehicle
-from tools.inference.kind import ROUGHIE, Kind
-from tools.inference.ocean_kind import OCEAN
+from glider.sim_backend.ocean.vehicle import OceanVehicle
+from glider.tools.inference.kind import ROUGHIE, Kind
+from glider.tools.inference.ocean_kind import OCEAN
 
 
 def kind_of(vehicle: Any) -> Kind:

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import expit
 
-from firmware.core.maths.rotations import wrap
-from sim_backend.core.effects import effect_layout as ef
-from tools.inference.problem import Gains, Problem, variances
+from glider.firmware.core.maths.rotations import wrap
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.inference.problem import Gains, Problem, variances
 
 DISTURBANCE = {"disturbance_linear": slice(0, 3), "disturbance_angular": slice(3, 6)}  # of the spectral densities
 SENSORS = {
@@ -26,10 +26,10 @@ WIDTH = 2.0  # prior 1 sigma of a level's logarithm
 DIFFERENCES = 3  # taken of readings: of a vehicle's motion in four samples next to nothing is left
 SPREAD_OF_DIFFERENCE = 20.0**0.5  # 1 sigma of the third difference of white noise of 1
 MEDIAN_OF_NORMAL = 0.6745  # median size of a normal deviate of 1 sigma
-FEWEST = 200  # differences that say anything
+MIN_DIFFERENCES = 200  # differences that say anything
 COLOURED = 0.2  # logarithm by which noise of every second sample may be more than that of all
 MOST_HELD = 0.2  # share of samples that repeat the one before, from which a reading is held or coarse
-NUDGE, LARGEST_STEP, CLOSE = 0.05, 0.8, 0.02
+DIFFERENCE_STEP, LARGEST_STEP, CLOSE = 0.05, 0.8, 0.02
 ROUNDS = 8
 # 1 sigma of a level's logarithm: as it is found where the file is right (nine in ten within 5 %), and as noise is where
 # the file does not say (0.6 to 2 times what it says): docs/DIAGNOSIS.md, Noise levels.
@@ -62,9 +62,9 @@ class Levels:
         right, free = ACCURATE**2 + self.sd**2, FREE**2 + self.sd**2
         return 0.5 * (np.log(free / right) - self.log**2 * (1.0 / right - 1.0 / free))
 
-    def believed(self, told: float) -> "Levels":
-        """The mean of what each may be; told: the probability that the case names all rightly."""
-        return self.moved(self.log * (1.0 - told) * expit(-self.odds))
+    def believed(self, well_specified: float) -> "Levels":
+        """The mean of what each may be; well_specified: the probability that the case names all rightly."""
+        return self.moved(self.log * (1.0 - well_specified) * expit(-self.odds))
 
     def moved(self, log: np.ndarray) -> "Levels":
         return replace(self, log=log)
@@ -122,7 +122,7 @@ def sensor_noise(problem: Problem, least: float, most: float) -> Levels:
     names, logs, sds = [], [], []
     for name, part in SENSORS.items():
         sizes, apart = (_relative(problem, part, stride) for stride in (1, 2))
-        if min(len(sizes), len(apart)) < FEWEST:
+        if min(len(sizes), len(apart)) < MIN_DIFFERENCES:
             continue
         log, other = (float(np.log(max(np.median(found), 1e-9) / MEDIAN_OF_NORMAL)) for found in (sizes, apart))
         if other - log > COLOURED:
@@ -147,7 +147,7 @@ def _differences(problem: Problem, reading: int, stride: int) -> list[np.ndarray
         steps = values[stride:] - values[:-stride]
         steps = wrap(steps) if reading in ANGLES else steps
         given = np.isfinite(steps)
-        if given.sum() < FEWEST // 4 or (steps[given] == 0.0).mean() > MOST_HELD:
+        if given.sum() < MIN_DIFFERENCES // 4 or (steps[given] == 0.0).mean() > MOST_HELD:
             continue
         left = steps
         for _ in range(DIFFERENCES - 1):
@@ -174,10 +174,12 @@ def estimate(problem: Problem, filtered, levels: Levels, rounds: int = ROUNDS) -
     sd = np.full(len(log), levels.width)
     for _ in range(rounds):
         slope, bend = np.empty(len(log)), np.empty(len(log))
-        for i, row in enumerate(np.eye(len(log)) * NUDGE):
+        for i, row in enumerate(np.eye(len(log)) * DIFFERENCE_STEP):
             above, below = objective(log + row), objective(log - row)
-            slope[i] = (above - below) / (2.0 * NUDGE)
-            bend[i] = max((above - 2.0 * at + below) / NUDGE**2, 2.0 / levels.width**2, abs(slope[i]) / LARGEST_STEP)
+            slope[i] = (above - below) / (2.0 * DIFFERENCE_STEP)
+            bend[i] = max(
+                (above - 2.0 * at + below) / DIFFERENCE_STEP**2, 2.0 / levels.width**2, abs(slope[i]) / LARGEST_STEP
+            )
         sd = np.sqrt(2.0 / bend)
         step = -slope / bend
         moved = objective(log + step)

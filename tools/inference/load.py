@@ -2,13 +2,13 @@
 
 from pathlib import Path
 
-from hal.strict import ConfigError
-from tools.data.runs.case import Case
-from tools.data.sources import load_any_vehicle, read_text
-from tools.inference.corrected import is_corrected, load_corrected
-from tools.inference.kind import ROUGHIE
-from tools.inference.kinds import kind_of
-from tools.inference.model import NOMINAL, Model, nominal_model, vehicle_model
+from glider.hal.strict import ConfigError
+from glider.tools.data.runs.case import Case
+from glider.tools.data.sources import load_any_vehicle, read_text
+from glider.tools.inference.corrected import is_corrected, load_corrected
+from glider.tools.inference.kind import ROUGHIE
+from glider.tools.inference.kinds import kind_of
+from glider.tools.inference.model import NOMINAL, Model, nominal_model, vehicle_model
 
 
 def load_model(wanted: str, case: Case) -> Model:

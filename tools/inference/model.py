@@ -5,16 +5,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from firmware.model.estimator_settings import parameter_sigma
-from firmware.model.vehicle import Vehicle
-from hal.strict import ConfigError
-from sim_backend.core.effects import effect_layout as ef
-from sim_backend.core.effects.base import Effect, EffectError
-from sim_backend.core.effects.catalogue import catalogue, check_values
-from sim_backend.ocean.catalogue import catalogue as ocean_catalogue
-from sim_backend.ocean.core import layout as ocean
-from sim_backend.ocean.vehicle import OceanVehicle
-from tools.data.runs.case import Case
+from glider.firmware.model.estimator_settings import parameter_sigma
+from glider.firmware.model.vehicle import Vehicle
+from glider.hal.strict import ConfigError
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.sim_backend.core.effects.base import Effect, EffectError
+from glider.sim_backend.core.effects.catalogue import catalogue, check_values
+from glider.sim_backend.ocean.catalogue import catalogue as ocean_catalogue
+from glider.sim_backend.ocean.core import layout as ocean
+from glider.sim_backend.ocean.vehicle import OceanVehicle
+from glider.tools.data.runs.case import Case
 
 NOMINAL = "nominal"  # its name
 
@@ -49,7 +49,7 @@ def vehicle_model(name: str, vehicle: Vehicle | OceanVehicle) -> Model:
     if found is None or not found.parameters:
         return Model(name, P, sigma, F)
     C = np.array(found.covariance)
-    # The observer takes parameters as independent, which a posterior seldom is: it is told the lesser of the two.
+    # The observer takes parameters as independent, which a posterior seldom is: it gets the lesser of the two.
     sigma[found.places] = np.minimum(sigma[found.places], np.sqrt(np.maximum(np.diag(C), 0.0)))
     return Model(name, P, sigma, F, spread=_directions(C, found.places, len(P)))
 

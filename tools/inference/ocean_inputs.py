@@ -4,16 +4,16 @@ from math import radians
 
 import numpy as np
 
-from sim_backend.ocean.core import layout as at
-from tools.data.errors import InputError
-from tools.data.runs import columns as names
-from tools.data.runs.run import Run
-from tools.inference.channels import recorded
+from glider.sim_backend.ocean.core import layout as at
+from glider.tools.data.errors import InputError
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.run import Run
+from glider.tools.inference.channels import recorded
 
 NEEDED = (names.ATTITUDE[1], names.DEPTH, names.OIL, names.DENSITY)
 TEMPERATURE = 10.0  # degC where none was recorded: the expansion of the hull is then nothing to be asked for
 PUMPED = 2e-6  # m3 by which the engine's volume moves from row to row
-FLATTEST, STEEPEST = radians(10.0), radians(50.0)  # pitch of a glide that the angle of attack is known in
+FLATTEST_PITCH, STEEPEST_PITCH = radians(10.0), radians(50.0)  # pitch of a glide that the angle of attack is known in
 TURNING = radians(0.7)  # rad/s of pitch
 ROLLED = radians(20.0)  # in a turn the lift is not upright
 SURFACE = 5.0  # m
@@ -34,7 +34,7 @@ def drawn(t: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.interp(t, t[given], values[given]), away
 
 
-def lacking(run: Run) -> str | None:
+def missing_input(run: Run) -> str | None:
     """The first column that the model is driven by and the run has nothing of; None where all are there."""
     return next((name for name in NEEDED if not recorded(run, name)), None)
 
@@ -56,7 +56,7 @@ def states(run: Run) -> dict[str, np.ndarray]:
     return {
         "at the surface": depth < SURFACE,
         "the engine runs": pumping,
-        "level or too steep": (np.abs(pitch) < FLATTEST) | (np.abs(pitch) > STEEPEST),
+        "level or too steep": (np.abs(pitch) < FLATTEST_PITCH) | (np.abs(pitch) > STEEPEST_PITCH),
         "pitching": np.abs(rate) > TURNING,
         "on its side": rolled,
         "no samples of the water": dry > UNSEEN,
@@ -102,7 +102,7 @@ def regime(run: Run) -> np.ndarray:
 
 def input_table(run: Run) -> np.ndarray:
     """The inputs of every row, (rows, N_U), SI; InputError where one is not there at all."""
-    missing = lacking(run)
+    missing = missing_input(run)
     if missing is not None:
         raise InputError("an ocean glider's run needs it", source=run.path or run.name, column=missing)
     t, table = run.t, np.zeros((run.rows, at.N_U))

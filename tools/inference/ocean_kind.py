@@ -6,11 +6,11 @@ from math import radians
 
 import numpy as np
 
-from sim_backend.ocean.catalogue import ODDS, ONE_ON_DEPTH, catalogue
-from sim_backend.ocean.core import layout as at
-from tools.data.runs import columns as names
-from tools.inference.channels import DEGREES, Channel, Measures
-from tools.inference.core.ocean import (
+from glider.sim_backend.ocean.catalogue import ODDS, ONE_ON_DEPTH, catalogue
+from glider.sim_backend.ocean.core import layout as at
+from glider.tools.data.runs import columns as names
+from glider.tools.inference.channels import DEGREES, Channel, Measures
+from glider.tools.inference.core.ocean import (
     filter_runs,
     fly_followed,
     fly_windows,
@@ -18,11 +18,11 @@ from tools.inference.core.ocean import (
     read_rows,
     simulate_runs,
 )
-from tools.inference.kind import Kind, Reading
-from tools.inference.ocean_inputs import input_table, regime
+from glider.tools.inference.kind import Kind, Reading
+from glider.tools.inference.ocean_inputs import input_table, regime
 
 FIRST_SPEED = 0.2  # m/s
-APART = 29.0  # s at least between readings that are looked at
+MIN_READING_INTERVAL_S = 29.0  # s at least between readings that are looked at
 
 # 10 minutes are several times what vertical water remembers. A depth rate that is wrong by 1 cm/s is off by 3.1 m rms
 # over the 9 minutes that are predicted, half a tolerance. What changes has to be 8 mm/s of it, what creeps 12: seasons,
@@ -59,7 +59,7 @@ def _unread(t: np.ndarray, bounds: np.ndarray, inputs: np.ndarray) -> np.ndarray
     for a, b in itertools.pairwise(bounds):
         last = -np.inf
         for i in range(a, b):
-            if t[i] - last < APART:
+            if t[i] - last < MIN_READING_INTERVAL_S:
                 found[i] = True
             else:
                 last = t[i]
@@ -96,13 +96,13 @@ OCEAN = Kind(
     disturbance=("walk", "water_rate", "roll_rate", "speed"),
     hold=1.0,
     walks=(),
-    rough_walks=(),
+    inflated_walks=(),
     first_state=_first_state,
     spread=(2.0, 0.1, 0.01, 0.3),
     speeds=(),
     window_speeds=(),
     window_speed_spread=(0.1,),
-    lacking_spread=(),
+    model_error_sd=(),
     drift=(0.0,),
     filter_runs=filter_runs,
     follow_runs=follow_runs,
@@ -117,7 +117,7 @@ OCEAN = Kind(
     regime=regime,
     one_group=_one_group,
     learned_runs=24,
-    growth_matters=0.6,
-    matters=0.4,
+    material_growth=0.6,
+    material=0.4,
     form=0.1,
 )

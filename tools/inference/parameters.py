@@ -4,13 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from firmware.model.vehicle import PLACES
-from hal.strict import ConfigError
-from sim_backend.core.effects import effect_layout as ef
-from sim_backend.core.effects.base import Effect
-from sim_backend.core.effects.catalogue import catalogue
-from tools.inference.model import effect_vector
-from tools.inference.problem import Problem
+from glider.firmware.model.vehicle import PLACES
+from glider.hal.strict import ConfigError
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.sim_backend.core.effects.base import Effect
+from glider.sim_backend.core.effects.catalogue import catalogue
+from glider.tools.inference.model import effect_vector
+from glider.tools.inference.problem import Problem
 
 NINETY = 1.645  # sigma on either side that hold 90 %
 NUISANCE = ""  # the label of what is no effect
@@ -33,7 +33,7 @@ class FreeParameter:
     along_effects: tuple[tuple[int, float], ...] = ()  # entries of F that move with them
 
     @property
-    def kinked(self) -> bool:
+    def one_sided(self) -> bool:
         """Whether it begins at 0 and does nothing, or something else, on the other side."""
         return self.low == 0.0 or self.high == 0.0
 

@@ -1,7 +1,7 @@
 """What the model says a recorded flight should have been: every window flown on from its start (docs/GAP.md, Measures).
 
 Windows start where the filter of the flying model stands, which for this purpose also finds what the model lacks
-(core/lacking): of a wrong model taken at its word the starts would be wrong, and the gap would be theirs.
+(core/model_error): of a wrong model taken at its word the starts would be wrong, and the gap would be theirs.
 """
 
 import itertools
@@ -9,28 +9,28 @@ from dataclasses import replace
 
 import numpy as np
 
-from tools.data.runs.case import Case
-from tools.data.runs.run import Run
-from tools.inference.core.error_layout import Q_LATE
-from tools.inference.kind import ROUGHIE, Kind
-from tools.inference.model import Model, effect_vector
-from tools.inference.problem import Gains, Problem, cut, problem_of
-from tools.inference.recording import held
-from tools.inference.time_alignment import aligned, capture_times
+from glider.tools.data.runs.case import Case
+from glider.tools.data.runs.run import Run
+from glider.tools.inference.core.error_layout import Q_LATE
+from glider.tools.inference.kind import ROUGHIE, Kind
+from glider.tools.inference.model import Model, effect_vector
+from glider.tools.inference.problem import Gains, Problem, cut, problem_of
+from glider.tools.inference.recording import held
+from glider.tools.inference.time_alignment import aligned, capture_times
 
 COAST = 1.0  # s without motion capture, after which what is onboard takes over
-LATE = 0.4  # s; of a clock farther out the observer sees every pose at its own time
+LATE_CLOCK_S = 0.4  # s; of a clock farther out the observer sees every pose at its own time
 WANDER = 0.1  # of how late it is, by which such a clock may wander in a second: so late, it is not steady either
-LARGEST = 1e4  # rad, rad/s, m, kg: no vehicle reads more
+LARGEST_READING = 1e4  # rad, rad/s, m, kg: no vehicle reads more
 
 
 def without_doubled(problem: Problem) -> np.ndarray:
-    """What was measured, (rows, N_Y), less the absurd, and less what is onboard where motion capture sees the vehicle.
+    """What was measured, (rows, N_Y), less implausible samples, and less what is onboard where motion capture sees the vehicle.
 
     An offset of attitude or depth is then in the gap and not in the start, and two sensors that disagree cannot pull
     the filter apart. Where motion capture has not seen the vehicle for COAST seconds, onboard takes over.
     """
-    z, bounds = np.where(np.abs(problem.z) < LARGEST, problem.z, np.nan), problem.recording.bounds
+    z, bounds = np.where(np.abs(problem.z) < LARGEST_READING, problem.z, np.nan), problem.recording.bounds
     for n, run in enumerate(problem.runs):
         part = z[bounds[n] : bounds[n + 1]]
         for onboard, mocap in problem.kind.doubled:
@@ -65,7 +65,7 @@ def poses_in_place(problem: Problem, F: np.ndarray) -> tuple[Problem, np.ndarray
     if not problem.seen[[mocap for _, mocap in problem.kind.doubled]].any():
         return problem, None, None
     late = float(np.abs(problem.recording.t - capture_times(problem, F)).max())
-    if late < LATE:
+    if late < LATE_CLOCK_S:
         return problem, None, None
     placed, walk = aligned(problem, F), np.zeros(problem.kind.n_spectral)
     walk[Q_LATE] = (WANDER * late) ** 2
@@ -97,7 +97,7 @@ def observer_of(problem: Problem) -> Problem:
     wanders = problem.extra_noise is not None and kind.n_spectral > Q_LATE and problem.extra_noise[Q_LATE] > 0.0
     if problem.recorded is None and not wanders:
         z = without_doubled(problem)
-    spreads = np.column_stack([problem.spreads, np.tile(kind.lacking_spread, (len(problem.runs), 1))])
+    spreads = np.column_stack([problem.spreads, np.tile(kind.model_error_sd, (len(problem.runs), 1))])
     spreads[:, kind.speed_errors] = kind.window_speed_spread
     return replace(problem, z=z, spreads=spreads)
 

@@ -20,24 +20,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tools.inference.channels import Channel, errors
-from tools.inference.fit import bounded_step
-from tools.inference.predict import observer_of
-from tools.inference.problem import Gains, Problem
-from tools.inference.vehicle_parameters import Parameters
+from glider.tools.inference.channels import Channel, errors
+from glider.tools.inference.fit import bounded_step
+from glider.tools.inference.predict import observer_of
+from glider.tools.inference.problem import Gains, Problem
+from glider.tools.inference.vehicle_parameters import Parameters
 
 HORIZONS = ((4.0, (0.0,)), (8.0, (0.0, 4.0)), (18.0, (0.0, 10.0)))  # s, and where the first window begins
 STEPS = (8, 8, 12)  # at most, at each
 LOOK_IN = 2.0  # s of a run before its first window
 LINEAR = 4.0  # tolerances from which a residual counts linearly
-LARGEST = 200.0  # tolerances: a flight that is lost is lost
-NUDGE = 0.02  # of a prior's sigma, for columns
+MAX_COUNTED_TOLERANCES = 200.0  # tolerances: a flight that is lost is lost
+DIFFERENCE_STEP = 0.02  # of a prior's sigma, for columns
 LIMIT = 5.0  # sigma that a parameter goes at most
 BOLDEST = 1.0  # sigma a step
-STILL = 2e-3  # share of the objective, below which a step has converged
+CONVERGED_SHARE = 2e-3  # share of the objective, below which a step has converged
 RANDOM, TAKEN = 12, 1  # draws of the prior that are tried, and those that are followed beside the file's own values
 START_SPREAD = 0.7  # sigma of those draws
-APART = 1.0  # posterior sigma a parameter, from which two ends of the first horizon are followed apart
+SEPARATE_ENDS_SIGMA = 1.0  # posterior sigma a parameter, from which two ends of the first horizon are followed apart
 SEED = 20261122
 
 
@@ -91,7 +91,7 @@ class PredictionError:
         self.channels = list({c.name: c for run in problem.runs for c in measures.channels_of(run)}.values())
         self.low = np.maximum([f.low for f in free.free], -LIMIT)
         self.high = np.minimum([f.high for f in free.free], LIMIT)
-        self.kinked = np.array([f.kinked for f in free.free])
+        self.one_sided = np.array([f.one_sided for f in free.free])
         self.scales: dict[str, float] = {}  # tolerances by channel that a residual is divided by, 1 where none is given
 
     def model(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -138,7 +138,9 @@ class PredictionError:
         table = self.table[rows]
         for channel, measured in self.measured(table):
             flown = np.array([errors(channel, table, one[rows])[measured] for one in Y])
-            flown = np.clip(np.nan_to_num(flown, nan=LARGEST), -LARGEST, LARGEST)
+            flown = np.clip(
+                np.nan_to_num(flown, nan=MAX_COUNTED_TOLERANCES), -MAX_COUNTED_TOLERANCES, MAX_COUNTED_TOLERANCES
+            )
             count = measured.sum() / (len(channel.columns) if channel.joint else 1)
             parts.append(flown / (np.sqrt(count) * self.scales.get(channel.name, 1.0)))
         return np.concatenate(parts, axis=1) / np.sqrt(len(parts))
@@ -186,7 +188,7 @@ class PredictionError:
 
     def columns(self, values: np.ndarray, gains: Gains, cuts: list[Windows]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Of every cut the residuals (samples,) and their columns (n, samples) at values; from a kink by a sigma."""
-        size = np.where(self.kinked & (values == 0.0), 1.0, NUDGE)
+        size = np.where(self.one_sided & (values == 0.0), 1.0, DIFFERENCE_STEP)
         size = np.where(values + size <= self.high, size, -size)
         points = [values, *(values + s * row for s, row in zip(size, np.eye(len(values)), strict=True))]
         Y = self.fly(points, gains, cuts)
@@ -219,7 +221,7 @@ class PredictionError:
                 break
             values, cost, gains, damping = tried, found, at, max(damping / 4.0, 1e-5)
             held = max(cost, 1.0) / independent
-            if fall < STILL * objective:
+            if fall < CONVERGED_SHARE * objective:
                 break
         normal, _ = self.linear(values, gains, cuts)
         return Fitted(values, cost, normal / held + np.eye(n), independent)
@@ -253,7 +255,7 @@ class PredictionError:
             begun.append(self.descend(values, *first[0], first[1]))
         begun.sort(key=lambda one: one.objective)
         best = begun[0]
-        apart = [best, *(one for one in begun[1:] if best.distance(one.values) > APART)]
+        apart = [best, *(one for one in begun[1:] if best.distance(one.values) > SEPARATE_ENDS_SIGMA)]
         found = []
         for one in apart:
             values = one.values

@@ -4,17 +4,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from firmware.model.vehicle import SensorsTable
-from sim_backend.ocean.vehicle import OceanSensors
-from tools.data.runs.case import Case
-from tools.data.runs.run import Run
-from tools.inference.channels import recorded
-from tools.inference.kind import Kind
-from tools.inference.kinds import kind_of
-from tools.inference.model import Model, nominal_model
-from tools.inference.recording import Recording, record
-from tools.inference.rules import Rules
-from tools.inference.windows import Window
+from glider.firmware.model.vehicle import SensorsTable
+from glider.sim_backend.ocean.vehicle import OceanSensors
+from glider.tools.data.runs.case import Case
+from glider.tools.data.runs.run import Run
+from glider.tools.inference.channels import recorded
+from glider.tools.inference.kind import Kind
+from glider.tools.inference.kinds import kind_of
+from glider.tools.inference.model import Model, nominal_model
+from glider.tools.inference.recording import Recording, record
+from glider.tools.inference.rules import Rules
+from glider.tools.inference.windows import Window
 
 ALL = Rules()
 LEAST_NOISE = 1e-6
@@ -97,10 +97,10 @@ class Problem:
         return self.kind.one_group([r.name for r, seen in zip(self.kind.readings, self.seen, strict=True) if seen])
 
     def filter(
-        self, P: np.ndarray, F: np.ndarray, roughness: float = 1.0, begin: bool = False, more=None, doubt=None,
+        self, P: np.ndarray, F: np.ndarray, process_noise_scale: float = 1.0, begin: bool = False, more=None, doubt=None,
         speeds=None, starts=None,
     ) -> Gains:  # fmt: skip
-        """The filter of a model over all runs; `roughness` multiplies the disturbance; `begin` seeks the first speed
+        """The filter of a model over all runs; `process_noise_scale` multiplies the disturbance; `begin` seeks the first speed
         among `speeds`, the kind's if none are given. Nothing of the problem changes.
 
         starts (runs, n_state): where other gains began, in place of the problem's; more (n_spectral,) is added to the
@@ -113,9 +113,9 @@ class Problem:
             (self.starts if starts is None else starts).copy(),
         )  # fmt: skip
         spectral, speeds = self.densities, kind.speeds if speeds is None else speeds
-        spectral[kind.accelerations] += self.spectral[kind.accelerations] * (roughness**2 - 1.0)
-        if roughness > 1.0:
-            spectral[kind.actuator_walks] += np.array(kind.rough_walks) * roughness**2
+        spectral[kind.accelerations] += self.spectral[kind.accelerations] * (process_noise_scale**2 - 1.0)
+        if process_noise_scale > 1.0:
+            spectral[kind.actuator_walks] += np.array(kind.inflated_walks) * process_noise_scale**2
         if more is not None:
             spectral += more
         R = self.R if doubt is None else self.R + doubt
@@ -127,7 +127,7 @@ class Problem:
         )  # fmt: skip
         return made
 
-    def unheld(self, gains: Gains) -> Gains:
+    def open_loop_gains(self, gains: Gains) -> Gains:
         """Gains with which windows fly on commands alone, from their first 2 s on."""
         scored = cut(self)
         K = gains.K.copy()
@@ -167,9 +167,9 @@ class Problem:
     def simulated(self, P: np.ndarray, F: np.ndarray, starts: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """What would have been measured, were (P, F) the truth: (rows, N_Y), NaN where nothing was."""
         r, Z = self.recording, np.empty_like(self.z)
-        shaken = rng.standard_normal((len(Z), len(self.kind.disturbance)))
+        disturbance_draws = rng.standard_normal((len(Z), len(self.kind.disturbance)))
         self.kind.simulate_runs(
-            P, F, self.densities, self.R, r.modes, r.bounds, r.t, r.inputs, starts, shaken,
+            P, F, self.densities, self.R, r.modes, r.bounds, r.t, r.inputs, starts, disturbance_draws,
             rng.standard_normal(Z.shape), Z,
         )  # fmt: skip
         Z[~self.valid] = np.nan
@@ -221,7 +221,7 @@ def problem_of(case: Case, model: Model | None = None, runs: list[Run] | None = 
 
 
 @dataclass
-class Scored:
+class ScoringWindows:
     """Windows of the runs as docs/GAP.md, Windows, cuts them, in rows of the table."""
 
     listed: list[list[Window]]
@@ -230,12 +230,12 @@ class Scored:
     run_of: np.ndarray
 
 
-def cut(problem: Problem) -> Scored:
+def cut(problem: Problem) -> ScoringWindows:
     """The windows of all runs."""
     listed = [problem.kind.measures.windows(run.t) for run in problem.runs]
     flat = [(n, window) for n, found in enumerate(listed) for window in found if window.start < window.end]
     offset = problem.recording.bounds[:-1]
-    return Scored(
+    return ScoringWindows(
         listed,
         np.array([offset[n] + window.start for n, window in flat], dtype=np.int64),
         np.array([offset[n] + window.end for n, window in flat], dtype=np.int64),

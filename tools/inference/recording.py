@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tools.data.runs.run import Run
-from tools.inference.channels import recorded
-from tools.inference.kind import Kind
+from glider.tools.data.runs.run import Run
+from glider.tools.inference.channels import recorded
+from glider.tools.inference.kind import Kind
 
 
 @dataclass

@@ -8,18 +8,21 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tools.inference.expansion import Expansion, expand
-from tools.inference.fit import SHORTER_STEPS, bounded_step
-from tools.inference.problem import Problem
-from tools.inference.shared_parameters import SharedParameters
+from glider.tools.inference.expansion import Expansion, expand
+from glider.tools.inference.fit import SHORTER_STEPS, bounded_step
+from glider.tools.inference.problem import Problem
+from glider.tools.inference.shared_parameters import SharedParameters
 
-ROUGHNESS = (100.0, 10.0, 1.0, 1.0, 1.0)  # of each step
-ENOUGH = 2.0  # squared sigma that the last step's parabola still promises: no further step
+PROCESS_NOISE_SCALES = (100.0, 10.0, 1.0, 1.0, 1.0)  # of each step
+CONVERGED_GAIN = 2.0  # squared sigma that the last step's parabola still predicts: no further step
 
 
-def misfit(parts: Sequence[Problem], shared: SharedParameters, x: np.ndarray, roughness: float) -> float:
+def misfit(parts: Sequence[Problem], shared: SharedParameters, x: np.ndarray, process_noise_scale: float) -> float:
     """-2 log likelihood of a model's own filters over runs."""
-    found = sum(float(part.filter(*shared.model(part, x), roughness=roughness, begin=True).misfit[0]) for part in parts)
+    found = sum(
+        float(part.filter(*shared.model(part, x), process_noise_scale=process_noise_scale, begin=True).misfit[0])
+        for part in parts
+    )
     return found if np.isfinite(found) else np.inf
 
 
@@ -39,7 +42,7 @@ class About:
 
 
 def fit_shared(
-    parts: Sequence[Problem], shared: SharedParameters, start: np.ndarray | None = None, least_heat: float = 1.0,
+    parts: Sequence[Problem], shared: SharedParameters, start: np.ndarray | None = None, least_inflation: float = 1.0,
     about: About | None = None,
 ) -> np.ndarray:  # fmt: skip
     """The most probable shared values (count,) of runs, each a problem of its own; from `start`, where there is one.
@@ -49,19 +52,21 @@ def fit_shared(
     about = About(parts, shared) if about is None else about
     x = np.zeros(shared.count) if start is None else start.copy()
     weight = np.diag(shared.prior**-2.0)
-    for roughness in ROUGHNESS if start is None else ROUGHNESS[-2:]:
-        found = about(x) if roughness == 1.0 else [expand(part, shared, x, roughness) for part in parts]
-        heat = max(least_heat, heat_of(found))
-        normal = sum(one.curvature for one in found) / heat + weight
-        slope = sum(one.slope for one in found) / heat + weight @ x
+    for process_noise_scale in PROCESS_NOISE_SCALES if start is None else PROCESS_NOISE_SCALES[-2:]:
+        found = (
+            about(x) if process_noise_scale == 1.0 else [expand(part, shared, x, process_noise_scale) for part in parts]
+        )
+        inflation = max(least_inflation, inflation_of(found))
+        normal = sum(one.curvature for one in found) / inflation + weight
+        slope = sum(one.slope for one in found) / inflation + weight @ x
         step = bounded_step(normal, slope, np.minimum(shared.low - x, 0.0), np.maximum(shared.high - x, 0.0))
-        promised = -float(2.0 * slope @ step + step @ normal @ step)
-        if roughness == 1.0 and promised < ENOUGH:
+        predicted_gain = -float(2.0 * slope @ step + step @ normal @ step)
+        if process_noise_scale == 1.0 and predicted_gain < CONVERGED_GAIN:
             break
-        best, least = x, sum(one.value for one in found) / heat + x @ weight @ x
+        best, least = x, sum(one.value for one in found) / inflation + x @ weight @ x
         for share in (1.0, *SHORTER_STEPS):
             tried = np.clip(x + share * step, shared.low, shared.high)
-            value = misfit(parts, shared, tried, roughness) / heat + tried @ weight @ tried
+            value = misfit(parts, shared, tried, process_noise_scale) / inflation + tried @ weight @ tried
             if value < least:
                 best, least = tried, value
                 break
@@ -69,7 +74,7 @@ def fit_shared(
     return x
 
 
-def heat_of(found: Sequence[Expansion]) -> float:
+def inflation_of(found: Sequence[Expansion]) -> float:
     """Mean squared innovation of runs, 1 at least: by so much their evidence counts for less."""
     samples = sum(one.samples for one in found)
     return max(1.0, sum(one.nis * one.samples for one in found) / max(1, samples))

@@ -1,7 +1,7 @@
 """What all runs may share: one value of every parameter, bias and effect, each about what the vehicle file says.
 
 The shared values are no cause: they make up for whatever the runs have in common, by whichever of them do it. So
-effects that cannot be told apart from each other all stand among them.
+effects that cannot be distinguished from each other all stand among them.
 """
 
 from collections.abc import Mapping
@@ -10,12 +10,12 @@ from functools import cached_property
 
 import numpy as np
 
-from tools.inference.parameters import NUISANCE, FreeParameter, effect_parameters, model_at, nuisance_parameters
-from tools.inference.problem import Problem
+from glider.tools.inference.parameters import NUISANCE, FreeParameter, effect_parameters, model_at, nuisance_parameters
+from glider.tools.inference.problem import Problem
 
 ALLOWED_PRIOR = 3.0  # times [uncertainty] and [sensors]: a file that is not quite right
 EFFECT_PRIOR = 0.5  # spreads of a label
-HARDLY = 0.05  # spreads past a kink
+BOUND_TOLERANCE = 0.05  # spreads past a kink
 
 
 @dataclass(frozen=True)
@@ -47,8 +47,8 @@ class SharedParameters:
         return np.array([one.high for one in self.free])
 
     @cached_property
-    def kinked(self) -> np.ndarray:
-        return np.array([one.kinked for one in self.free])
+    def one_sided(self) -> np.ndarray:
+        return np.array([one.one_sided for one in self.free])
 
     @cached_property
     def groups(self) -> np.ndarray:
@@ -69,7 +69,9 @@ class SharedParameters:
                            for k, limit in zip(self.labels[label], own, strict=True)])  # fmt: skip
         low, high = np.array(own).T
         values = at[self.labels[label]]
-        noise = ((low == 0.0) | (high == 0.0)) & (np.abs(values) < HARDLY)  # there is no less of what is not there
+        noise = ((low == 0.0) | (high == 0.0)) & (
+            np.abs(values) < BOUND_TOLERANCE
+        )  # there is no less of what is not there
         values = np.where(shared | noise, 0.0, values)
         return np.minimum(low - values, 0.0), np.maximum(high - values, 0.0)
 

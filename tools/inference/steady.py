@@ -4,17 +4,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim_backend.ocean.core import layout as at
-from tools.data.runs import columns as names
-from tools.inference.core.ocean import steady_glide
-from tools.inference.ocean_inputs import drawn
-from tools.inference.parameters import FreeParameter
-from tools.inference.problem import Problem
+from glider.sim_backend.ocean.core import layout as at
+from glider.tools.data.runs import columns as names
+from glider.tools.inference.core.ocean import steady_glide
+from glider.tools.inference.ocean_inputs import drawn
+from glider.tools.inference.parameters import FreeParameter
+from glider.tools.inference.problem import Problem
 
-HALF = 30.0  # s either way, over which the depth rate is taken
-LEAST = 3  # samples of it
-ROUGH_ROWS = 4000  # are enough for a first guess
-ROUGH_VOLUMES = np.linspace(-0.02, 0.02, 81)  # share of the volume
+HALF_WINDOW_S = 30.0  # s either way, over which the depth rate is taken
+MIN_SAMPLES = 3  # samples of it
+TRANSIENT_ROWS = 4000  # are enough for a first guess
+TRANSIENT_VOLUMES = np.linspace(-0.02, 0.02, 81)  # share of the volume
 
 
 @dataclass
@@ -31,10 +31,10 @@ def _sums(values: np.ndarray, first: np.ndarray, end: np.ndarray) -> np.ndarray:
     return total[end] - total[first]
 
 
-def depth_rate(t: np.ndarray, depth: np.ndarray, half: float = HALF) -> np.ndarray:
+def depth_rate(t: np.ndarray, depth: np.ndarray, half: float = HALF_WINDOW_S) -> np.ndarray:
     """Slope of the depth (rows,) m over `half` s either way by least squares, m/s; NaN where there are too few."""
     given = np.isfinite(depth)
-    if given.sum() < LEAST:
+    if given.sum() < MIN_SAMPLES:
         return np.full(len(t), np.nan)
     s, z = t[given] - t[given][0], depth[given]
     first, end = np.searchsorted(t[given], t - half), np.searchsorted(t[given], t + half, side="right")
@@ -43,7 +43,7 @@ def depth_rate(t: np.ndarray, depth: np.ndarray, half: float = HALF) -> np.ndarr
     around = _sums(s * s, first, end) - count * mean_s**2
     slope = (_sums(s * z, first, end) - count * mean_s * mean_z) / np.maximum(around, 1e-9)
     centred = np.abs(mean_s + t[given][0] - t) < half / 3.0
-    return np.where((end - first >= LEAST) & centred, slope, np.nan)
+    return np.where((end - first >= MIN_SAMPLES) & centred, slope, np.nan)
 
 
 def steady_rows(problem: Problem) -> Steady:
@@ -87,17 +87,17 @@ def first_guess(problem: Problem) -> np.ndarray:
     """P with volume and drag as steady rows ask for: the one by search, the other by the median ratio of speeds."""
     steady = steady_rows(problem)
     P, F = problem.model.P.copy(), np.zeros(at.N_F)
-    if len(steady.rows) < LEAST:
+    if len(steady.rows) < MIN_SAMPLES:
         return P
-    chosen = np.linspace(0, len(steady.rows) - 1, min(ROUGH_ROWS, len(steady.rows))).astype(int)
+    chosen = np.linspace(0, len(steady.rows) - 1, min(TRANSIENT_ROWS, len(steady.rows))).astype(int)
     rows, rate = steady.rows[chosen], steady.rate[chosen]
     best, least, depth = P, np.inf, depths(problem)
-    for share in ROUGH_VOLUMES:
+    for share in TRANSIENT_VOLUMES:
         moved = P.copy()
         moved[at.VOLUME] *= 1.0 + share
         found = glides(problem, moved, F, rows, depth)
         down = -found[:, 0] * np.sin(found[:, 1])
-        gliding = np.abs(down) > 2.0 * at.SLOWEST
+        gliding = np.abs(down) > 2.0 * at.LEAST_FLOW_SPEED
         if gliding.mean() < 0.8:
             continue
         ratio = float(np.median(np.abs(rate[gliding]) / np.abs(down[gliding])))

@@ -9,13 +9,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from firmware.core.vehicle.layout import X_DOWN, X_POS
-from sim_backend.core.effects import effect_layout as ef
-from tools.inference.core.error_layout import E_DOWN, E_POS
-from tools.inference.problem import Problem
+from glider.firmware.core.vehicle.layout import X_DOWN, X_POS
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.inference.core.error_layout import E_DOWN, E_POS
+from glider.tools.inference.problem import Problem
 
 UNSEEN_SPEED = 0.4  # m/s, by which a vehicle may have left its first pose's place before that was taken
-BEHIND = 0.2  # s behind its own time, at which a pose stands: its clock may wander, and a filter can only look back
+POSE_LAG_S = 0.2  # s behind its own time, at which a pose stands: its clock may wander, and a filter can only look back
 POSES = slice(ef.Y_ONBOARD, ef.N_Y)
 
 
@@ -42,7 +42,7 @@ def aligned(problem: Problem, F: np.ndarray) -> Problem:
     """The problem with its poses where the clock of F says; `recorded` keeps the one it was made from."""
     origin = problem.as_recorded
     t, bounds = origin.recording.t, origin.recording.bounds
-    at = capture_times(origin, F) + BEHIND
+    at = capture_times(origin, F) + POSE_LAG_S
     z, stamps = origin.z.copy(), t.copy()
     starts, spreads = origin.starts.copy(), origin.spreads.copy()
     z[:, POSES] = np.nan

@@ -10,13 +10,13 @@ from math import inf
 
 import numpy as np
 
-from firmware.core.vehicle import layout
-from firmware.model.vehicle import COEFFICIENTS, PLACES
-from sim_backend.core.effects import effect_layout as ef
-from sim_backend.core.effects.catalogue import catalogue
-from tools.inference.model import Model, effect_vector
-from tools.inference.parameters import FreeParameter, assumed
-from tools.inference.problem import Problem
+from glider.firmware.core.vehicle import layout
+from glider.firmware.model.vehicle import COEFFICIENTS, PLACES
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.sim_backend.core.effects.catalogue import catalogue
+from glider.tools.inference.model import Model, effect_vector
+from glider.tools.inference.parameters import FreeParameter, assumed
+from glider.tools.inference.problem import Problem
 
 # 1 sigma before any flight. [uncertainty] says what is left after one: these are what a first vehicle file may be off.
 K_SHARE = 0.5  # of a coefficient's size
@@ -28,7 +28,7 @@ ADDED_SHARE, NET_MASS, CG = 0.15, 0.01, 0.0005  # of added mass and inertia; kg;
 FIRST = 10.0  # times these trims, where no motion capture holds the flight
 WIRE_SCALE = 0.5  # of what a draw-wire says, there: a first calibration may be far off
 # Of a vehicle that nobody identified, where its file misses its flights by far: damping that is linear in the rate (N m
-# s/rad; about what the print's does at 0.3 m/s), and the tank's place (m).
+# s/rad; about what the paper's does at 0.3 m/s), and the tank's place (m).
 FIRST_EFFECTS = {"stall": 2.0, "pressure_lever": 0.15}  # 1/rad, m
 # A gauge that is vented into a hull of some ten litres of air reads about a metre less a kilogram of water in the tank.
 GAUGE, GAUGE_SPREAD = "depth_with_ballast", 0.5  # its name in [readings]; m/kg

@@ -11,10 +11,10 @@ import sys
 import time
 from pathlib import Path
 
-from tools.diagnose.precompile import DIAGNOSIS
-from tools.study.challenge.seal import ARCHIVE, open_answers
+from glider.tools.diagnose.precompile import DIAGNOSIS
+from glider.tools.study.challenge.seal import ARCHIVE, open_answers
 
-OUT = Path("out/demo")
+OUT_FOLDER = Path("out/demo")
 CASE = "case000"
 
 STEPS = (  # what is done, and the command
@@ -29,22 +29,24 @@ STEPS = (  # what is done, and the command
 
 def main() -> int:
     """Run the steps in OUT; returns the exit code of the first that fails, else 0."""
-    shutil.rmtree(OUT, ignore_errors=True)
-    OUT.mkdir(parents=True)
+    shutil.rmtree(OUT_FOLDER, ignore_errors=True)
+    OUT_FOLDER.mkdir(parents=True)
     begin, ahead = time.monotonic(), None
     stamp = DIAGNOSIS.stamp()
     if stamp is not None and not stamp.exists():
         print("The first time, kernels are compiled on the way: about a minute of what follows.", flush=True)
-        ahead = subprocess.Popen([sys.executable, "-m", "tools.diagnose.precompile"], stderr=subprocess.DEVNULL)
+        ahead = subprocess.Popen([sys.executable, "-m", "glider.tools.diagnose.precompile"], stderr=subprocess.DEVNULL)
     for number, (title, command) in enumerate(STEPS, start=1):
         print(f"\n{number}. {title}\n   $ glider {command}", flush=True)
-        done = subprocess.run([sys.executable, "-m", "tools.cli.main", *command.split()], cwd=OUT)
+        done = subprocess.run([sys.executable, "-m", "glider.tools.cli.main", *command.split()], cwd=OUT_FOLDER)
         if done.returncode:
             return done.returncode
         if ahead is not None:
             ahead.wait()
-    hidden = open_answers(OUT / "blind" / ARCHIVE).cases[CASE]["labels"]
-    print(f"\nThe sealed answer: {', '.join(hidden)}. The report: {OUT / 'diagnosis' / 'report.html'} (opens offline)")
+    hidden = open_answers(OUT_FOLDER / "blind" / ARCHIVE).cases[CASE]["labels"]
+    print(
+        f"\nThe sealed answer: {', '.join(hidden)}. The report: {OUT_FOLDER / 'diagnosis' / 'report.html'} (opens offline)"
+    )
     print(f"{time.monotonic() - begin:.0f} s")
     return 0
 

@@ -11,18 +11,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from tools.data.runs import columns as names
-from tools.readings.findings import OFFSET_MATTERS, SURE, TOLERANCE, Finding, certain, spoken
-from tools.readings.rates import compare, lateness, rms
-from tools.readings.regression import Estimate, Fit, fit
-from tools.readings.signals import Table, steps, unwrapped
+from glider.tools.data.runs import columns as names
+from glider.tools.readings.findings import CERTAIN_SIGMA, MATERIAL_OFFSET, TOLERANCE, Finding, certain, spoken
+from glider.tools.readings.rates import compare, lateness, rms
+from glider.tools.readings.regression import Estimate, Fit, fit
+from glider.tools.readings.signals import SignalTable, steps, unwrapped
 
 LAG_TURNS = 4
 RATE_SPAN = 0.5  # s over which a derivative is taken
 BIAS_LABEL = {"roll_rad": "imu_roll_bias", "pitch_rad": "imu_pitch_bias", "yaw_rad": "compass"}
 
 
-def judge_capture(table: Table) -> list[Finding]:
+def judge_capture(table: SignalTable) -> list[Finding]:
     """What is wrong between the vehicle's readings and motion capture."""
     late = _capture_late(table)
     found, delay = (late[0], late[1]) if late is not None else ([], Estimate(0.0, 0.0, 30))
@@ -36,7 +36,7 @@ def judge_capture(table: Table) -> list[Finding]:
     return found
 
 
-def advanced(table: Table, columns: tuple[str, ...], delay: float) -> Table:
+def advanced(table: SignalTable, columns: tuple[str, ...], delay: float) -> SignalTable:
     """The table with these columns as they were read `delay` s later: a late instrument put right."""
     moved = dict(table.columns)
     for name in columns:
@@ -56,7 +56,7 @@ def advanced(table: Table, columns: tuple[str, ...], delay: float) -> Table:
     return replace(table, columns=moved)
 
 
-def derivative(table: Table, values: np.ndarray) -> np.ndarray:
+def derivative(table: SignalTable, values: np.ndarray) -> np.ndarray:
     """Central difference over RATE_SPAN, (rows,), per second; NaN near a gap or a run's end."""
     half = max(1, round(0.5 * RATE_SPAN / table.period))
     out = np.full(len(values), np.nan)
@@ -70,7 +70,7 @@ def derivative(table: Table, values: np.ndarray) -> np.ndarray:
     return out
 
 
-def _capture_late(table: Table) -> tuple[list[Finding], Estimate] | None:
+def _capture_late(table: SignalTable) -> tuple[list[Finding], Estimate] | None:
     """How late motion capture's poses are by the rates, and by how much more as time goes on."""
     if not table.has(*names.RATES, *names.MOCAP_ATTITUDE):
         return None
@@ -85,13 +85,13 @@ def _capture_late(table: Table) -> tuple[list[Finding], Estimate] | None:
     found = []
     skew = _skew(compared)
     length = float(max(table.t))
-    if skew is not None and skew.sigma() >= SURE and abs(skew.value) * length * max(speed, 0.1) >= 0.015:
+    if skew is not None and skew.sigma() >= CERTAIN_SIGMA and abs(skew.value) * length * max(speed, 0.1) >= 0.015:
         text = f"Motion capture's clock gains {spoken(skew.value, skew.interval, 's/s')} on the vehicle's."
         found.append(
             Finding("mocap", "rates", "drift", skew.value, skew.interval, "s/s", "clock_skew", True, text,
                     {"skew": skew.value})
         )  # fmt: skip
-    elif late.sigma() >= SURE and abs(late.value) * max(speed, 0.1) >= 0.1 * 0.15:
+    elif late.sigma() >= CERTAIN_SIGMA and abs(late.value) * max(speed, 0.1) >= 0.1 * 0.15:
         text = f"Motion capture's poses come {spoken(late.value, late.interval, 's')} after the rates."
         found.append(
             Finding("mocap", "rates", "delay", late.value, late.interval, "s", "mocap_delay", True, text,
@@ -114,7 +114,7 @@ def _skew(compared) -> Estimate | None:
     return Estimate(value, 1.0 / math.sqrt(weight.sum()), min(one.freedom for one in found))
 
 
-def _angle(table: Table, onboard: str, mocap: str) -> list[Finding]:
+def _angle(table: SignalTable, onboard: str, mocap: str) -> list[Finding]:
     """Bias and scale of an onboard angle; harmonics of a heading."""
     own, other = (table.flown(unwrapped(table.columns[name], table.run)) for name in (onboard, mocap))
     turns = 2.0 * np.pi * np.round((own - other) / (2.0 * np.pi))
@@ -130,7 +130,7 @@ def _angle(table: Table, onboard: str, mocap: str) -> list[Finding]:
         return []
     found = []
     bias = solved[0]
-    if certain(bias, abs(bias.value), onboard, worth=OFFSET_MATTERS):
+    if certain(bias, abs(bias.value), onboard, least_motion=MATERIAL_OFFSET):
         text = f"{onboard} reads {spoken(bias.value, bias.interval, 'rad')} beside motion capture."
         found.append(
             Finding(onboard, mocap, "offset", bias.value, bias.interval, "rad", BIAS_LABEL[onboard], True, text,
@@ -155,7 +155,7 @@ def _harmonics(solved, onboard: str, mocap: str) -> list[Finding]:
     sure = [max(solved[2 + n].sigma(), solved[3 + n].sigma()) for n in (0, 2)]
     order = int(np.argmax(size))
     n = 2 + 2 * order
-    if sure[order] < SURE or size[order] < 0.35 * TOLERANCE[onboard]:
+    if sure[order] < CERTAIN_SIGMA or size[order] < 0.35 * TOLERANCE[onboard]:
         return []
     leading = max((solved[n], solved[n + 1]), key=lambda one: abs(one.value))
     error = Estimate(size[order], leading.error, leading.freedom)
@@ -163,7 +163,7 @@ def _harmonics(solved, onboard: str, mocap: str) -> list[Finding]:
     return [Finding(onboard, mocap, "goes_with", error.value, error.interval, "rad", "compass", False, text)]
 
 
-def _depth(table: Table, late: Estimate) -> list[Finding]:
+def _depth(table: SignalTable, late: Estimate) -> list[Finding]:
     """Offset, scale, lag and lever of the depth."""
     pitch_name = names.MOCAP_ATTITUDE[1] if table.has(names.MOCAP_ATTITUDE[1]) else names.ATTITUDE[1]
     if not table.has(pitch_name):
@@ -206,7 +206,7 @@ def _depth(table: Table, late: Estimate) -> list[Finding]:
             )  # fmt: skip
     if offset is not None:
         constant = offset[0]
-        if certain(constant, abs(constant.value), names.DEPTH, worth=OFFSET_MATTERS):
+        if certain(constant, abs(constant.value), names.DEPTH, least_motion=MATERIAL_OFFSET):
             text = f"The depth reads {spoken(constant.value, constant.interval, 'm')} beside motion capture."
             found.append(
                 Finding(names.DEPTH, names.MOCAP_POSITION[2], "offset", constant.value, constant.interval, "m",

@@ -1,6 +1,6 @@
-"""All checks of the readings of a case, in their order, and the runs with the mended readings.
+"""All checks of the readings of a case, in their order, and the runs with the corrected readings.
 
-Rates are mended before the heading is compared with them, motion capture's clock before anything is compared with it.
+Rates are corrected before the heading is compared with them, motion capture's clock before anything is compared with it.
 No vehicle file is read: columns and units are enough.
 """
 
@@ -8,19 +8,31 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tools.data.errors import InputError
-from tools.data.runs import columns as names
-from tools.data.runs.run import Run
-from tools.readings.capture import advanced, judge_capture
-from tools.readings.findings import Finding
-from tools.readings.heading import judge_heading
-from tools.readings.rates import judge_rates
-from tools.readings.samples import judge_clock, judge_samples
-from tools.readings.signals import Table, table_of
-from tools.readings.stretches import flying, judge_stretches
-from tools.readings.surface import judge_surface
+from glider.tools.data.errors import InputError
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.run import Run
+from glider.tools.readings.capture import advanced, judge_capture
+from glider.tools.readings.findings import Finding
+from glider.tools.readings.heading import judge_heading
+from glider.tools.readings.rates import judge_rates
+from glider.tools.readings.samples import judge_clock, judge_samples
+from glider.tools.readings.signals import SignalTable, table_of
+from glider.tools.readings.stretches import flying, judge_stretches
+from glider.tools.readings.surface import judge_surface
 
-ORDER = ("axes", "units", "sign", "scale", "offset", "delay", "drift", "goes_with", "saturated", "held", "not_flying")
+FINDINGS_ORDER = (
+    "axes",
+    "units",
+    "sign",
+    "scale",
+    "offset",
+    "delay",
+    "drift",
+    "goes_with",
+    "saturated",
+    "held",
+    "not_flying",
+)
 
 
 @dataclass(frozen=True)
@@ -42,22 +54,22 @@ def check(runs: list[Run]) -> Readings:
         return Readings(ordered(samples), runs)
     table = table_of(runs, flies)
     rates = judge_rates(table)
-    mended = mend(table, rates)
+    mended = apply_corrections(table, rates)
     found = [*rates, *judge_capture(mended), *judge_heading(mended), *judge_surface(runs), *samples]
-    return Readings(ordered(found), mended_runs(runs, mend(table, found)))
+    return Readings(ordered(found), corrected_runs(runs, apply_corrections(table, found)))
 
 
 def ordered(findings: list[Finding]) -> list[Finding]:
     """By what is to be settled first."""
-    return sorted(findings, key=lambda one: ORDER.index(one.finding))
+    return sorted(findings, key=lambda one: FINDINGS_ORDER.index(one.finding))
 
 
 def _recorded(run: Run, name: str) -> bool:
     return name in run.columns and bool(np.isfinite(run.columns[name]).any())
 
 
-def mend(table: Table, findings: list[Finding]) -> Table:
-    """The table with what can be mended put right."""
+def apply_corrections(table: SignalTable, findings: list[Finding]) -> SignalTable:
+    """The table with what can be corrected."""
     columns = dict(table.columns)
     for one in findings:
         if not one.mended or one.channel not in columns:
@@ -85,7 +97,7 @@ def mend(table: Table, findings: list[Finding]) -> Table:
     return moved
 
 
-def mended_runs(runs: list[Run], table: Table) -> list[Run]:
+def corrected_runs(runs: list[Run], table: SignalTable) -> list[Run]:
     """The table's columns as runs again."""
     out = []
     for n, run in enumerate(runs):

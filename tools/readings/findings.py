@@ -5,18 +5,18 @@ its channel by MATTERS of the channel's tolerance, root mean square over the fli
 OFFSET_MATTERS, since any sensor has a bias. The tolerances are those in which gaps are counted (docs/GAP.md, Measures).
 
 SURE is far beyond a normal 5 % point: a case has some sixty comparisons, blocks are few, and what is compared is
-filtered by instruments nobody knows. With it and MATTERS no instrument of the simulated cases without a gap is accused
+filtered by instruments nobody knows. With it and MATTERS no instrument of the simulated cases without a gap is falsely flagged
 (docs/READINGS.md, How often).
 """
 
 import math
 from dataclasses import dataclass, field
 
-from tools.readings.regression import Estimate
+from glider.tools.readings.regression import Estimate
 
-SURE = 6.0  # standard errors
-MATTERS = 0.1  # of a tolerance
-OFFSET_MATTERS = 0.35  # of a tolerance; 3.5 sigma of the bias of the sensors that the vehicle is shipped with
+CERTAIN_SIGMA = 6.0  # standard errors
+MATERIAL_TOLERANCES = 0.1  # of a tolerance
+MATERIAL_OFFSET = 0.35  # of a tolerance; 3.5 sigma of the bias of the sensors that the vehicle is shipped with
 TOLERANCE = {
     "roll_rad": math.radians(1.5), "pitch_rad": math.radians(1.5), "yaw_rad": math.radians(4.0),
     "p_rad_s": math.radians(2.0), "q_rad_s": math.radians(2.0), "r_rad_s": math.radians(2.0),
@@ -51,9 +51,11 @@ class Finding:
         }  # fmt: skip
 
 
-def certain(estimate: Estimate, moves: float, channel: str, null: float = 0.0, worth: float = MATTERS) -> bool:
+def certain(
+    estimate: Estimate, moves: float, channel: str, null: float = 0.0, least_motion: float = MATERIAL_TOLERANCES
+) -> bool:
     """Whether an estimate is a finding: sure, and moving its channel by enough (`moves`, in the channel's unit)."""
-    return estimate.sigma(null) >= SURE and moves >= worth * TOLERANCE[channel]
+    return estimate.sigma(null) >= CERTAIN_SIGMA and moves >= least_motion * TOLERANCE[channel]
 
 
 def spoken(value: float, interval: tuple[float, float], unit: str = "", digits: int = 3) -> str:

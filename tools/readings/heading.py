@@ -1,6 +1,6 @@
 """The heading against the yaw rate, and what the difference goes with.
 
-The Euler rate of the heading by the mended rates, integrated, is what the heading should do; what it does beside, over
+The Euler rate of the heading by the corrected rates, integrated, is what the heading should do; what it does beside, over
 a whole unbroken piece of a run, is compared with the heading itself (a compass disturbed by its own mount), with
 pitch and roll (a tilt that is not compensated) and with the actuators' positions (iron or currents that move).
 """
@@ -9,17 +9,17 @@ import math
 
 import numpy as np
 
-from tools.data.runs import columns as names
-from tools.readings.findings import OFFSET_MATTERS, SURE, TOLERANCE, Finding, spoken
-from tools.readings.regression import Estimate, Fit, fit, within
-from tools.readings.signals import Rates, Table, pieces, summed, unwrapped
+from glider.tools.data.runs import columns as names
+from glider.tools.readings.findings import CERTAIN_SIGMA, MATERIAL_OFFSET, TOLERANCE, Finding, spoken
+from glider.tools.readings.regression import Estimate, Fit, fit, within
+from glider.tools.readings.signals import Rates, SignalTable, pieces, summed, unwrapped
 
 HEADING = names.ATTITUDE[2]
 BETTER = 0.8  # of the residual, that one regressor has to come to
 LEAST_STEP = 200  # rows of a piece that is long enough for slow errors
 
 
-def judge_heading(table: Table) -> list[Finding]:
+def judge_heading(table: SignalTable) -> list[Finding]:
     """What the heading's error goes with, if with anything; only where motion capture gives no heading."""
     if not table.has(*names.RATES, *names.ATTITUDE) or table.has(names.MOCAP_ATTITUDE[2]):
         return []
@@ -42,12 +42,12 @@ def judge_heading(table: Table) -> list[Finding]:
         good = usable & np.isfinite(columns).all(axis=1)
         moved = within(columns[good], group[good]) @ solved.coefficients[1:]
         moves = float(np.sqrt(np.mean(moved**2)))
-        if ratio < BETTER and sure >= SURE and moves >= OFFSET_MATTERS * TOLERANCE[HEADING] * 0.5:
+        if ratio < BETTER and sure >= CERTAIN_SIGMA and moves >= MATERIAL_OFFSET * TOLERANCE[HEADING] * 0.5:
             best = (name, solved, ratio) if best is None or ratio < best[2] else best
     return [] if best is None else [_said(*best)]
 
 
-def residual_heading(table: Table) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def residual_heading(table: SignalTable) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Heading less the integral of its Euler rate, rad, its piece, and which rows are used; (rows,) each."""
     roll, pitch, yaw = (table.flown(table.columns[name]) for name in names.ATTITUDE)
     rates = np.column_stack([table.columns[name] for name in names.RATES])
@@ -58,7 +58,7 @@ def residual_heading(table: Table) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return heading - summed(moved, usable)[:, 0], pieces(usable), usable
 
 
-def _fitted(table: Table, error, columns, group, usable) -> Fit | None:
+def _fitted(table: SignalTable, error, columns, group, usable) -> Fit | None:
     """The error on time (a gyro's bias) and the columns, within pieces; blocks of time for the errors."""
     X = np.column_stack([table.t, *columns])
     good = usable & np.isfinite(X).all(axis=1)

@@ -12,14 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tools.data.runs import columns as names
-from tools.readings.findings import SURE, TOLERANCE, Finding, certain, spoken
-from tools.readings.regression import Estimate, Fit, fit, within
-from tools.readings.signals import Rates, Table, body_increments, pieces, summed, unwrapped
+from glider.tools.data.runs import columns as names
+from glider.tools.readings.findings import CERTAIN_SIGMA, TOLERANCE, Finding, certain, spoken
+from glider.tools.readings.regression import Estimate, Fit, fit, within
+from glider.tools.readings.signals import Rates, SignalTable, body_increments, pieces, summed, unwrapped
 
 DELAYS = np.arange(-2.0, 2.01, 0.1)  # s, tried before the fit
 DEGREES = 180.0 / math.pi
-NEAR = 0.2  # of a whole unit's factor, for a scale to be a matter of units
+UNIT_FACTOR_TOLERANCE = 0.2  # of a whole unit's factor, for a scale to be a matter of units
 FOREIGN = 2.0  # times its own axis, that another must bring for the axes to be exchanged
 EULER = 0.7  # of the residual, that Euler rates must come to for the rates to be of the Euler angles
 LEAST_MOTION = 3.0  # tolerances, rms within a block, below which an axis has not moved enough to be judged
@@ -33,17 +33,17 @@ class Compared:
     delay: float
 
 
-def attitude_of(table: Table, columns: tuple[str, ...]) -> np.ndarray:
+def attitude_of(table: SignalTable, columns: tuple[str, ...]) -> np.ndarray:
     """Attitude (rows, 3), rad, NaN where the vehicle does not fly."""
     return table.flown(np.column_stack([table.columns[name] for name in columns]))
 
 
-def rates_of(table: Table) -> Rates:
+def rates_of(table: SignalTable) -> Rates:
     """Body rates (rows, 3), rad/s."""
     return Rates(table, np.column_stack([table.columns[name] for name in names.RATES]))
 
 
-def angle_increments(table: Table, attitude: np.ndarray, euler: bool) -> np.ndarray:
+def angle_increments(table: SignalTable, attitude: np.ndarray, euler: bool) -> np.ndarray:
     """Increments of the body's rotation, or of the Euler angles, (rows, 3); NaN at a run's first row."""
     if euler:
         plain = np.column_stack([unwrapped(column, table.run) for column in attitude.T])
@@ -55,7 +55,7 @@ def angle_increments(table: Table, attitude: np.ndarray, euler: bool) -> np.ndar
 
 
 def moved_and_turned(
-    table: Table, turned: np.ndarray, rates: Rates, delay: float
+    table: SignalTable, turned: np.ndarray, rates: Rates, delay: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """A (rows, 3), the three integrals and time (rows, 4), both within blocks, less their means; which rows are used,
     and the block of each of them.
@@ -71,7 +71,7 @@ def moved_and_turned(
 
 
 def design(
-    table: Table, turned: np.ndarray, rates: Rates, delay: float, skew: bool = False
+    table: SignalTable, turned: np.ndarray, rates: Rates, delay: float, skew: bool = False
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """A (rows, 3), regressors (rows, 3 axes, k) and which rows are used; within blocks, less their means.
 
@@ -85,7 +85,7 @@ def design(
 
 
 def compare(
-    table: Table, columns: tuple[str, ...], euler: bool = False, skew: bool = False, delay: float | None = None
+    table: SignalTable, columns: tuple[str, ...], euler: bool = False, skew: bool = False, delay: float | None = None
 ) -> Compared:
     """The fits of an attitude on the rates, at the delay that leaves least (of DELAYS), unless it is known."""
     turned, rates = angle_increments(table, attitude_of(table, columns), euler), rates_of(table)
@@ -100,7 +100,7 @@ def compare(
     return Compared(fits, best)
 
 
-def _best_delay(table: Table, turned: np.ndarray, rates: Rates) -> float:
+def _best_delay(table: SignalTable, turned: np.ndarray, rates: Rates) -> float:
     """Of DELAYS, the one that leaves least of the attitude's increments."""
     best, least = 0.0, math.inf
     for delay in sorted(DELAYS, key=abs):
@@ -115,7 +115,7 @@ def _best_delay(table: Table, turned: np.ndarray, rates: Rates) -> float:
     return best
 
 
-def judge_rates(table: Table) -> list[Finding]:
+def judge_rates(table: SignalTable) -> list[Finding]:
     """What is wrong between rates and the onboard attitude."""
     if not table.has(*names.RATES, *names.ATTITUDE):
         return []
@@ -133,7 +133,7 @@ def judge_rates(table: Table) -> list[Finding]:
     return found + _late(table, body)
 
 
-def _acquitted(table: Table, axis: int, error: float) -> bool:
+def _acquitted(table: SignalTable, axis: int, error: float) -> bool:
     """Whether motion capture's attitude turns as the rate says: then the onboard attitude has the scale, not the rate.
 
     It has to be sure that the rate's own error is not `error`, and to put it at less than half of that.
@@ -144,10 +144,10 @@ def _acquitted(table: Table, axis: int, error: float) -> bool:
     if solved is None:
         return False
     own = inverse(solved[axis])
-    return abs(own.value - 1.0) < 0.5 * abs(error) and own.sigma(1.0 + error) >= SURE
+    return abs(own.value - 1.0) < 0.5 * abs(error) and own.sigma(1.0 + error) >= CERTAIN_SIGMA
 
 
-def _scale(table: Table, axis: int, solved: Fit) -> list[Finding]:
+def _scale(table: SignalTable, axis: int, solved: Fit) -> list[Finding]:
     """Sign, units or scale of one rate."""
     name, angle, slope = names.RATES[axis], names.ATTITUDE[axis], solved[axis]
     motion = rms(table.flown(table.columns[name]))
@@ -156,7 +156,7 @@ def _scale(table: Table, axis: int, solved: Fit) -> list[Finding]:
         return []
     size, (low, high) = scale.value, scale.interval
     against = f"derivative of {angle}"
-    if abs(abs(size) * DEGREES - 1.0) < NEAR or abs(abs(size) / DEGREES - 1.0) < NEAR:
+    if abs(abs(size) * DEGREES - 1.0) < UNIT_FACTOR_TOLERANCE or abs(abs(size) / DEGREES - 1.0) < UNIT_FACTOR_TOLERANCE:
         unit = "degrees where radians are meant" if abs(size) > 1.0 else "radians where degrees were taken for them"
         text = f"{name} is {size:.3g} times the rate of the attitude: {unit}."
         return [Finding(name, against, "units", size, (low, high), "1", None, True, text, {"gain": size})]
@@ -195,7 +195,7 @@ def _exchanged(body: Compared) -> list[Finding]:
         own = abs(solved.coefficients[axis])
         other = max((n for n in range(3) if n != axis), key=lambda n: abs(solved.coefficients[n]))
         slope = solved[other]
-        if abs(slope.value) < FOREIGN * own or slope.sigma() < SURE or abs(slope.value) < 0.3:
+        if abs(slope.value) < FOREIGN * own or slope.sigma() < CERTAIN_SIGMA or abs(slope.value) < 0.3:
             continue
         name, source = names.RATES[axis], names.RATES[other]
         size = spoken(slope.value, slope.interval)
@@ -209,7 +209,7 @@ def _exchanged(body: Compared) -> list[Finding]:
     return found
 
 
-def _euler(table: Table, body: Compared) -> list[Finding]:
+def _euler(table: SignalTable, body: Compared) -> list[Finding]:
     """Rates that are those of the Euler angles instead of the body's."""
     angles = compare(table, names.ATTITUDE, euler=True, delay=body.delay)
     better = []
@@ -234,7 +234,7 @@ def _euler(table: Table, body: Compared) -> list[Finding]:
     ]  # fmt: skip
 
 
-def _own_axis(table: Table, delay: float, axis: int) -> tuple[float, bool]:
+def _own_axis(table: SignalTable, delay: float, axis: int) -> tuple[float, bool]:
     """Residual of the Euler angle on its rate over that of the body's, and whether it is less in nearly every block."""
     attitude, rates = attitude_of(table, names.ATTITUDE), rates_of(table)
     squares = []
@@ -256,7 +256,7 @@ def lateness(body: Compared) -> Estimate | None:
     """How much later the attitude comes than the rates, s: the axes' estimates by their weights."""
     found = []
     for axis, solved in enumerate(body.fits):
-        if solved is not None and abs(solved.coefficients[axis]) > 0.01 and solved[axis].sigma() > SURE:
+        if solved is not None and abs(solved.coefficients[axis]) > 0.01 and solved[axis].sigma() > CERTAIN_SIGMA:
             found.append(solved[4].scaled(1.0 / solved.coefficients[axis]))
     if not found:
         return None
@@ -267,7 +267,7 @@ def lateness(body: Compared) -> Estimate | None:
     return Estimate(value + body.delay, error, min(one.freedom for one in found))
 
 
-def _late(table: Table, body: Compared) -> list[Finding]:
+def _late(table: SignalTable, body: Compared) -> list[Finding]:
     """The attitude later than the rates, or earlier."""
     late = lateness(body)
     if late is None:
@@ -275,7 +275,7 @@ def _late(table: Table, body: Compared) -> list[Finding]:
     attitude = attitude_of(table, names.ATTITUDE)
     turning = [rms(column) for column in (body_increments(attitude) / table.period).T]
     moves = max(abs(late.value) * rate / TOLERANCE[name] for rate, name in zip(turning, names.ATTITUDE, strict=True))
-    if late.sigma() < SURE or moves < 0.1:
+    if late.sigma() < CERTAIN_SIGMA or moves < 0.1:
         return []
     text = f"The attitude comes {spoken(late.value, late.interval, 's')} after the rates."
     label = "attitude_lag" if late.value > 0.0 else None

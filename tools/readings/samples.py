@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from tools.data.runs import columns as names
-from tools.data.runs.run import Run
-from tools.readings.findings import TOLERANCE, Finding
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.run import Run
+from glider.tools.readings.findings import TOLERANCE, Finding
 
 MOVING = (*names.ATTITUDE, *names.RATES, names.DEPTH)  # what does not stand still in flight
 HELD_SHARE = 0.2  # of the rows of a moving reading, that repeat the row before

@@ -10,15 +10,15 @@ from itertools import pairwise
 
 import numpy as np
 
-from tools.data.runs import columns as names
-from tools.data.runs.run import Run
-from tools.readings.regression import blocks_of
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.run import Run
+from glider.tools.readings.regression import blocks_of
 
 LONGEST_STEP = 0.5  # s between two samples that are still integrated over
 
 
 @dataclass(frozen=True)
-class Table:
+class SignalTable:
     """All runs behind each other: `t` (rows,) s from each run's start, `run` its number, `columns` by name."""
 
     names: tuple[str, ...]  # of the runs
@@ -47,7 +47,7 @@ class Table:
         return np.where(self.flying if values.ndim == 1 else self.flying[:, None], values, np.nan)
 
 
-def table_of(runs: list[Run], flying: list[np.ndarray] | None = None) -> Table:
+def table_of(runs: list[Run], flying: list[np.ndarray] | None = None) -> SignalTable:
     """The runs as a table; a column that a run lacks is NaN there. `flying` holds a bool per row and run."""
     known = [name for name in names.ALL if name != names.TIME and any(name in run.columns for run in runs)]
     columns = {
@@ -56,10 +56,10 @@ def table_of(runs: list[Run], flying: list[np.ndarray] | None = None) -> Table:
     t = np.concatenate([run.t - run.t[0] for run in runs])
     number = np.repeat(np.arange(len(runs)), [run.rows for run in runs])
     flies = np.ones(len(t), dtype=bool) if flying is None else np.concatenate(flying)
-    return Table(tuple(run.name for run in runs), t, number, columns, flies)
+    return SignalTable(tuple(run.name for run in runs), t, number, columns, flies)
 
 
-def steps(table: Table) -> np.ndarray:
+def steps(table: SignalTable) -> np.ndarray:
     """Time to the row before, (rows,) s; NaN at a run's first row and over a gap."""
     dt = np.diff(table.t, prepend=np.nan)
     dt[np.flatnonzero(np.diff(table.run)) + 1] = np.nan
@@ -116,7 +116,7 @@ def pieces(usable: np.ndarray) -> np.ndarray:
 class Rates:
     """Rates (rows, k) of a table, their integral, and both some time before each row. Prepared once for many delays."""
 
-    def __init__(self, table: Table, rates: np.ndarray):
+    def __init__(self, table: SignalTable, rates: np.ndarray):
         self.table, self.values = table, rates
         middle = 0.5 * (rates + np.vstack([np.full((1, rates.shape[1]), np.nan), rates[:-1]]))
         self.increments = middle * steps(table)[:, None]

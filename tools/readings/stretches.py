@@ -1,15 +1,15 @@
 """Stretches of a run in which the vehicle does not fly: at the surface, lying still, hauled or handled.
 
 They are left out of every comparison and said as findings. A vehicle at the surface moves on the waves and is held up
-by what is out of the water; one on the bottom, in a net or against a wall does not move though it is told to; one in
+by what is out of the water; one on the bottom, in a net or against a wall does not move though it is commanded to; one in
 somebody's hands turns faster than it can by itself.
 """
 
 import numpy as np
 
-from tools.data.runs import columns as names
-from tools.data.runs.run import Run
-from tools.readings.findings import Finding
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.run import Run
+from glider.tools.readings.findings import Finding
 
 SPAN = 8.0  # s that a stretch lasts at least
 SURFACE = 0.25  # m about the surface: a hull of a metre that is partly out of the water, and a gauge that is off

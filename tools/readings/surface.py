@@ -8,11 +8,11 @@ noise: means over SLICE seconds are compared.
 
 import numpy as np
 
-from tools.data.runs import columns as names
-from tools.data.runs.run import Run
-from tools.readings.findings import SURE, TOLERANCE, Finding, spoken
-from tools.readings.regression import Estimate
-from tools.readings.stretches import states
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.run import Run
+from glider.tools.readings.findings import CERTAIN_SIGMA, TOLERANCE, Finding, spoken
+from glider.tools.readings.regression import Estimate
+from glider.tools.readings.stretches import states
 
 SLICE = 2.0  # s
 LEAST_SLICES = 8
@@ -60,7 +60,7 @@ def judge_surface(runs: list[Run]) -> list[Finding]:
                 continue
             estimate = slope(rows[:, 0], [usable[other] for other in (*taken, name)], run)
             moves = abs(estimate.value) * float(np.ptp(usable[name]))
-            if estimate.sigma() >= SURE and moves >= 0.5 * TOLERANCE[names.DEPTH]:
+            if estimate.sigma() >= CERTAIN_SIGMA and moves >= 0.5 * TOLERANCE[names.DEPTH]:
                 best = (name, estimate) if best is None or estimate.sigma() > best[1].sigma() else best
         if best is None:
             break

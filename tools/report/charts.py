@@ -11,7 +11,7 @@ MOST_POINTS = 700
 
 
 @dataclass
-class Line:
+class Curve:
     """One series: points (n,), NaN breaks it; `style` is a CSS class."""
 
     x: np.ndarray
@@ -34,7 +34,7 @@ class Chart:
 
     title: str
     x_unit: str  # behind the last number of the x axis
-    lines: list[Line]
+    lines: list[Curve]
     bands: list[Band] = field(default_factory=list)
     down: bool = False
     square: bool = False
@@ -61,7 +61,7 @@ def _range(values: list[np.ndarray], least: float) -> tuple[float, float]:
     return low - margin, high + margin
 
 
-def _thin(line: Line) -> tuple[np.ndarray, np.ndarray]:
+def _thin(line: Curve) -> tuple[np.ndarray, np.ndarray]:
     """At most MOST_POINTS points; breaks stay."""
     stride = max(1, int(np.ceil(len(line.x) / MOST_POINTS)))
     if stride == 1:

@@ -5,24 +5,24 @@ from typing import Any
 
 import numpy as np
 
-from sim_backend.core.effects.catalogue import catalogue
-from tools.diagnose.noise_probes import CLOCK, UNPREDICTABLE
-from tools.diagnose.record import Curves, Panel, Picture, Record, number, read_record
-from tools.inference.channels import ROUGHIE_MEASURES
-from tools.report import words
-from tools.report.chain_picture import chain_svg
-from tools.report.charts import Chart, Line, svg
-from tools.report.lines import bands, compared, plan_chart
-from tools.report.page import REPORT, render
+from glider.sim_backend.core.effects.catalogue import catalogue
+from glider.tools.diagnose.noise_probes import CLOCK, UNPREDICTABLE
+from glider.tools.diagnose.record import Curves, DiagnosisRecord, Panel, Picture, number, read_record
+from glider.tools.inference.channels import ROUGHIE_MEASURES
+from glider.tools.report import words
+from glider.tools.report.chain_picture import chain_svg
+from glider.tools.report.charts import Chart, Curve, svg
+from glider.tools.report.lines import bands, compared, plan_chart
+from glider.tools.report.page import REPORT, render
 
 DRAWN = ("depth", "pitch", "roll", "yaw", "xy")
-LEAST, MOST_RANKED = 0.005, 8  # of the ranking
+LEAST_PROBABILITY, MOST_RANKED = 0.005, 8  # of the ranking
 LEAST_SHARE, MOST_LINKS = 0.01, 7  # of the links
-SHORT = {"force and moment": "force"}
+SHORT_NAMES = {"force and moment": "force"}
 MOST_LEFT = 8  # channels in which something is left
 
 
-def _panel(record: Record, panel: Panel) -> dict[str, Any]:
+def _panel(record: DiagnosisRecord, panel: Panel) -> dict[str, Any]:
     """A list of links with their shares, largest first within what is shown, in the order of the chain."""
     answer, found = record.answer, panel.links
     if panel.label:
@@ -34,12 +34,13 @@ def _panel(record: Record, panel: Panel) -> dict[str, Any]:
     largest = sorted(found, key=lambda link: -link.share)[:MOST_LINKS]
     kept = [link for link in found if link in largest and link.share >= LEAST_SHARE]
     rows = [
-        {"stage": SHORT.get(link.stage, link.stage), "name": link.name, "percent": 100.0 * link.share} for link in kept
+        {"stage": SHORT_NAMES.get(link.stage, link.stage), "name": link.name, "percent": 100.0 * link.share}
+        for link in kept
     ]
     return {"title": title, "rows": rows}
 
 
-def _ranking(record: Record) -> list[dict[str, Any]]:
+def _ranking(record: DiagnosisRecord) -> list[dict[str, Any]]:
     effects = catalogue()
     return [
         {
@@ -50,11 +51,11 @@ def _ranking(record: Record) -> list[dict[str, Any]]:
             "shown": words.small_percent(cause.probability),
         }
         for n, cause in enumerate(record.answer.causes[:MOST_RANKED])
-        if cause.probability >= LEAST or n < 3
+        if cause.probability >= LEAST_PROBABILITY or n < 3
     ]
 
 
-def _effects(record: Record) -> list[dict[str, Any]]:
+def _effects(record: DiagnosisRecord) -> list[dict[str, Any]]:
     """The selected effects: what they mean, and their parameters with 90 % intervals."""
     found = []
     for label in record.answer.selected:
@@ -71,7 +72,7 @@ def _effects(record: Record) -> list[dict[str, Any]]:
     return found
 
 
-def _noise(record: Record) -> dict[str, str] | None:
+def _noise(record: DiagnosisRecord) -> dict[str, str] | None:
     """Water in disorder: mean NIS without and with it."""
     noise = record.details.noise
     if noise is None or noise.name == CLOCK:
@@ -80,7 +81,7 @@ def _noise(record: Record) -> dict[str, str] | None:
     return {"name": noise.name, "before": before, "after": after}
 
 
-def _pictures(record: Record) -> list[dict[str, Any]]:
+def _pictures(record: DiagnosisRecord) -> list[dict[str, Any]]:
     """The drawn runs: measured, nominal and corrected."""
     return [
         {
@@ -109,7 +110,7 @@ def _charts(run: Picture, curves: Curves) -> list[dict[str, Any]]:
     return drawn
 
 
-def _table(record: Record) -> list[dict[str, Any]]:
+def _table(record: DiagnosisRecord) -> list[dict[str, Any]]:
     """Channels, then the total, by the four models."""
     gap = record.answer.gap
     tables = (gap.before, gap.recalibrated, gap.after, gap.floor)
@@ -119,7 +120,7 @@ def _table(record: Record) -> list[dict[str, Any]]:
     ]
 
 
-def _groups(record: Record) -> list[str]:
+def _groups(record: DiagnosisRecord) -> list[str]:
     """Labels that these data cannot distinguish, of those that matter."""
     answer, said = record.answer, []
     for label in dict.fromkeys([answer.main, *answer.selected]):
@@ -129,7 +130,7 @@ def _groups(record: Record) -> list[str]:
     return said
 
 
-def _correction(record: Record) -> dict[str, str] | None:
+def _correction(record: DiagnosisRecord) -> dict[str, str] | None:
     """What a data-driven correction of an unknown gap is like, and does."""
     found = None if record.answer.unknown is None else record.answer.unknown.correction
     if found is None:
@@ -143,7 +144,7 @@ def _correction(record: Record) -> dict[str, str] | None:
     }  # fmt: skip
 
 
-def _staircase(record: Record) -> list[dict[str, Any]]:
+def _waterfall(record: DiagnosisRecord) -> list[dict[str, Any]]:
     """The stages: how far the gap of runs left out is, after what."""
     stages = record.answer.stages
     highest = max((number(one.gap["total"]) for one in stages), default=1.0)
@@ -157,23 +158,23 @@ def _staircase(record: Record) -> list[dict[str, Any]]:
     return rows
 
 
-def _readings(record: Record) -> list[dict[str, Any]]:
+def _readings(record: DiagnosisRecord) -> list[dict[str, Any]]:
     """What is wrong with the readings, a sentence each, with the catalogue's label."""
     return [{"text": one.text, "label": one.label, "mended": one.mended} for one in record.answer.readings]
 
 
-def _shown(record: Record) -> list[dict[str, str]]:
+def _shown(record: DiagnosisRecord) -> list[dict[str, str]]:
     """Pictures of the data behind the readings' findings."""
     drawn = []
     for one in record.shown:
-        lines = [Line(one.x, one.expected, "nominal"), Line(one.x, one.read, "measured")]
+        lines = [Curve(one.x, one.expected, "nominal"), Curve(one.x, one.read, "measured")]
         if np.isfinite(one.mended).any():
-            lines.append(Line(one.x, one.mended, "corrected"))
+            lines.append(Curve(one.x, one.mended, "corrected"))
         drawn.append({"title": one.title, "svg": svg(Chart(one.title, "", lines))})
     return drawn
 
 
-def _context(record: Record) -> dict[str, Any]:
+def _context(record: DiagnosisRecord) -> dict[str, Any]:
     answer, details = record.answer, record.details
     data, gap, effects = details.data, answer.gap, catalogue()
     others = [label for label in answer.selected if label != answer.main and answer.verdict == "cause"]
@@ -195,7 +196,7 @@ def _context(record: Record) -> dict[str, Any]:
         "effects": _effects(record),
         "noise": _noise(record),
         "pictures": _pictures(record),
-        "stages": _staircase(record),
+        "stages": _waterfall(record),
         "readings": _readings(record),
         "shown": _shown(record),
         "corrected": "corrected" if details.corrected else "recalibrated",
@@ -224,12 +225,12 @@ def _share(value: float | None, ci90: tuple[float | None, float | None]) -> str:
     return f"{words.percent(number(value))} ({words.interval(*map(number, ci90))})"
 
 
-def report_html(record: Record) -> str:
+def report_html(record: DiagnosisRecord) -> str:
     """The page's text; MissingExtra without jinja2."""
     return render("diagnosis.html", _context(record)).replace(" %", "\N{NO-BREAK SPACE}%")
 
 
-def write_report(folder: Path) -> Record:
+def write_report(folder: Path) -> DiagnosisRecord:
     """Draw the report of a diagnosis from its folder, into it; InputError where the folder holds none."""
     record = read_record(folder)
     (folder / REPORT).write_text(report_html(record), encoding="utf-8")

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from tools.gap.assess import CaseGap
-from tools.inference.channels import Channel
-from tools.report.charts import Chart, svg
-from tools.report.lines import bands, compared, plan_chart
-from tools.report.page import render
+from glider.tools.gap.assess import CaseGap
+from glider.tools.inference.channels import Channel
+from glider.tools.report.charts import Chart, svg
+from glider.tools.report.lines import bands, compared, plan_chart
+from glider.tools.report.page import render
 
 MOST_RUNS = 12  # with pictures; of a longer case those with the largest gaps
 RATE_NAMES = ("roll rate p", "pitch rate q", "yaw rate r")
@@ -45,7 +45,7 @@ def _charts(found: CaseGap, n: int) -> list[dict[str, Any]]:
     return drawn
 
 
-def _heat(value: float | None) -> int:
+def tint_of(value: float | None) -> int:
     """Shade of a table cell, 0 (none) to 5: twice the gap is one shade more."""
     if value is None or not math.isfinite(value) or value < 0.5:
         return 0
@@ -59,7 +59,7 @@ def _context(found: CaseGap) -> dict[str, Any]:
 
     def cells(channels: dict[str, float], total: float) -> list[dict[str, Any]]:
         values = [*(channels.get(name) for name in names), total]
-        return [{"value": value, "heat": _heat(value)} for value in values]
+        return [{"value": value, "tint": tint_of(value)} for value in values]
 
     shares = [
         {

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from firmware.model.vehicle import COEFFICIENTS
-from tools.identify.identifiability import sentences, unidentifiable_directions
-from tools.identify.pipeline import Identified
-from tools.inference.channels import ROUGHIE_MEASURES
-from tools.inference.levels import SENSORS, group_of_reading
-from tools.report.charts import Chart, Line, svg
-from tools.report.lines import compared
-from tools.report.page import render
+from glider.firmware.model.vehicle import COEFFICIENTS
+from glider.tools.identify.identifiability import sentences, unidentifiable_directions
+from glider.tools.identify.pipeline import Identified
+from glider.tools.inference.channels import ROUGHIE_MEASURES
+from glider.tools.inference.levels import SENSORS, group_of_reading
+from glider.tools.report.charts import Chart, Curve, svg
+from glider.tools.report.lines import compared
+from glider.tools.report.page import render
 
 INK, TRUTH, SOFT = "#1d3f72", "#d9480f", "#8a94a3"
 SHOWN = 4  # flights left out with pictures: those whose gap was largest before
@@ -125,7 +125,7 @@ def residual_chart(found: Identified) -> str | None:
     density, _ = np.histogram(found.fit.at.e, edges, density=True)
     normal = np.exp(-0.5 * middle**2) / np.sqrt(2.0 * np.pi)
     return svg(
-        Chart("whitened innovations", "sigma", [Line(middle, density, "measured"), Line(middle, normal, "predicted")])
+        Chart("whitened innovations", "sigma", [Curve(middle, density, "measured"), Curve(middle, normal, "predicted")])
     )
 
 
@@ -161,7 +161,7 @@ def report_html(found: Identified) -> str:
         "runs": len(found.runs), "seconds": found.seconds, "likelihood": found.likelihood,
         "summaries": [one.plain() for one in found.coefficients],
         "others": [one.plain() for one in found.summaries[len(COEFFICIENTS) :]],
-        "told": sentences(found.free, found.chains.flat),
+        "sentences": sentences(found.free, found.chains.flat),
         "blind": [one.sentence() for one in unidentifiable_directions(found.free, found.chains.flat)],
         "left_out": [str(one) for one in found.left_out], "spikes": found.spikes, "notes": found.notes,
         "marginals": png(marginals(found)), "corner": png(corner(found)),
@@ -169,7 +169,7 @@ def report_html(found: Identified) -> str:
             {"name": name.replace("_", " "), "factor": float(np.exp(log))}
             for name, log in zip(found.levels.names, found.levels.log, strict=True)
         ],
-        "heat": found.quadratic.heat, "check": found.check, "residuals": residual_rows(found),
+        "inflation": found.quadratic.inflation, "check": found.check, "residuals": residual_rows(found),
         "residual_chart": residual_chart(found), "held": held, "flights": flights(found),
         "compared": found.compared(), "acceptance": float(found.chains.acceptance.mean()),
         "chains": found.chains.values.shape[0], "draws": found.chains.values.shape[1],

@@ -2,20 +2,20 @@
 
 import numpy as np
 
-from firmware.core.maths.rotations import wrap
-from tools.inference.windows import Window
-from tools.report.charts import Band, Chart, Line
+from glider.firmware.core.maths.rotations import wrap
+from glider.tools.inference.windows import Window
+from glider.tools.report.charts import Band, Chart, Curve
 
 
-def broken(x: np.ndarray, y: np.ndarray, listed: list[Window], style: str) -> Line:
+def broken(x: np.ndarray, y: np.ndarray, listed: list[Window], style: str) -> Curve:
     """A predicted line, which starts anew with each window."""
     begins = [window.first for window in listed[1:]]
-    return Line(np.insert(x, begins, x[begins]), np.insert(y, begins, np.nan), style)
+    return Curve(np.insert(x, begins, x[begins]), np.insert(y, begins, np.nan), style)
 
 
 def compared(
     t: np.ndarray, seen: np.ndarray, said: dict[str, np.ndarray], listed: list[Window], scale: float, wraps: bool
-) -> list[Line]:
+) -> list[Curve]:
     """Lines of a measured column (rows,) and of predictions of it by style, times `scale`.
 
     wraps: angles in rad; the measured ones run on without jumps of a turn, the predicted ones stand by those next to
@@ -27,7 +27,7 @@ def compared(
         beside = np.interp(t, t[valid], seen[valid]) if valid.any() else np.zeros_like(t)
         said = {style: beside + wrap(values - beside) for style, values in said.items()}
     return [
-        Line(t, seen * scale, "measured"),
+        Curve(t, seen * scale, "measured"),
         *(broken(t, values * scale, listed, style) for style, values in said.items()),
     ]
 
@@ -35,7 +35,7 @@ def compared(
 def plan_chart(table: np.ndarray, said: dict[str, np.ndarray], columns: tuple, listed: list[Window]) -> Chart:
     """The way over ground, measured (rows, columns) and predicted by style; columns: those of north and east."""
     north, east = columns
-    lines = [Line(table[:, east], table[:, north], "measured")]
+    lines = [Curve(table[:, east], table[:, north], "measured")]
     lines += [broken(Y[:, east], Y[:, north], listed, style) for style, Y in said.items()]
     return Chart("plan, north up, m", "east", lines, square=True)
 

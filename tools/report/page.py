@@ -10,7 +10,7 @@ def render(template: str, context: dict[str, Any]) -> str:
     """The text of a page. Every name that the template uses must be in the context."""
     from jinja2 import Environment, StrictUndefined
 
-    folder = files("tools.report")
+    folder = files("glider.tools.report")
     text = folder.joinpath(template).read_text(encoding="utf-8")
     style = folder.joinpath("page.css").read_text(encoding="utf-8")
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)

@@ -8,14 +8,14 @@ from typing import Any
 
 import msgspec
 
-from sim_backend.core.effects.catalogue import catalogue as pool_catalogue
-from sim_backend.ocean.catalogue import catalogue as ocean_catalogue
-from sim_backend.ocean.vehicle import KIND
-from tools.diagnose.record import AGAINST_HEALTHY, ANSWER, Cause, Gap, number, read_as
-from tools.report import words
-from tools.report.page import REPORT, render
+from glider.sim_backend.core.effects.catalogue import catalogue as pool_catalogue
+from glider.sim_backend.ocean.catalogue import catalogue as ocean_catalogue
+from glider.sim_backend.ocean.vehicle import KIND
+from glider.tools.diagnose.record import AGAINST_HEALTHY, ANSWER, CauseRecord, Gap, number, read_as
+from glider.tools.report import words
+from glider.tools.report.page import REPORT, render
 
-MOST_RANKED, LEAST = 8, 0.005
+MOST_RANKED, LEAST_PROBABILITY = 8, 0.005
 MEANS = words.MEANS | {"none": "nothing beyond what the vehicle file allows"}
 HEALTHY_MEANS = words.MEANS | {"none": "nothing that the healthy runs have not"}
 
@@ -47,7 +47,7 @@ class _Reference(msgspec.Struct):
 class _Answer(msgspec.Struct):
     case: _Case
     verdict: str
-    causes: list[Cause]
+    causes: list[CauseRecord]
     selected: list[str]
     gap: Gap
     stages: list[_Stage]
@@ -81,8 +81,8 @@ def against_healthy(found: _Answer) -> str:
         beside = f"; nearest to it comes {named}, with which {after} are left" if named else ""
         return f"A change that no label explains: {gaps}{beside}."
     label = found.causes[0].label
-    alike = [name for name in found.causes[0].group if name != label]
-    other = f"; these runs cannot tell it from {words.joined(alike)}" if alike else ""
+    confounded = [name for name in found.causes[0].group if name != label]
+    other = f"; these runs cannot tell it from {words.joined(confounded)}" if confounded else ""
     more = f", and {words.joined(found.selected[1:])}" if found.selected[1:] else ""
     return (
         f"{words.upper(found.effects[label].summary)} ({label}; {sure(found)})"
@@ -109,9 +109,9 @@ def sentence(found: _Answer) -> str:
             f"with the file's numbers and {again} with them fitted."
         )
     label = found.selected[0]
-    alike = [name for name in found.causes[0].group if name != label]
+    confounded = [name for name in found.causes[0].group if name != label]
     more = f", and {words.joined(found.selected[1:])}" if found.selected[1:] else ""
-    other = f"; these dives cannot tell it from {words.joined(alike)}" if alike else ""
+    other = f"; these dives cannot tell it from {words.joined(confounded)}" if confounded else ""
     return (
         f"{words.upper(found.effects[label].summary)} ({label}; {sure(found)})"
         f"{more}{other}; the total gap of dives left out is {before} tolerances with the file's numbers, {again} with "
@@ -126,7 +126,7 @@ def _ranking(found: _Answer) -> list[dict[str, Any]]:
             "label": one.label, "percent": 100.0 * one.probability, "shown": words.small_percent(one.probability),
             "means": means.get(one.label) or effects[one.label].summary,
         }
-        for n, one in enumerate(found.causes[:MOST_RANKED]) if one.probability >= LEAST or n < 3
+        for n, one in enumerate(found.causes[:MOST_RANKED]) if one.probability >= LEAST_PROBABILITY or n < 3
     ]  # fmt: skip
 
 

@@ -5,10 +5,10 @@ from typing import Any
 
 import msgspec
 
-from tools.data.errors import InputError
-from tools.report import words
-from tools.report.page import REPORT, render
-from tools.watch.answer import FILE
+from glider.tools.data.errors import InputError
+from glider.tools.report import words
+from glider.tools.report.page import REPORT, render
+from glider.tools.watch.answer import FILE
 
 MOST_BYTES = 100_000_000
 

@@ -3,11 +3,11 @@
 import math
 from typing import Any
 
-from sim_backend.core.effects.catalogue import catalogue
-from tools.diagnose.noise_probes import CLOCK, TURBULENCE, UNPREDICTABLE
-from tools.diagnose.record import Finding, Gap, Record
-from tools.diagnose.record import number as finite
-from tools.diagnose.residuals import SHAPES, UNCLEAN, strongest_left
+from glider.sim_backend.core.effects.catalogue import catalogue
+from glider.tools.diagnose.noise_probes import CLOCK, TURBULENCE, UNPREDICTABLE
+from glider.tools.diagnose.record import DiagnosisRecord, FindingRecord, Gap
+from glider.tools.diagnose.record import number as finite
+from glider.tools.diagnose.residuals import SHAPES, UNCLEAN, strongest_left
 
 MINUS, DASH = "\N{MINUS SIGN}", "\N{EN DASH}"
 PLAIN = {
@@ -58,7 +58,7 @@ PLAIN = {
     "stratification": "the vehicle grows lighter with depth",
     "tether": "a line drags at the tail",
     "thermal_expansion": "the hull's volume goes with the temperature more or less than modelled",
-    "turbulence": "the water is rougher than the vehicle file says",
+    "turbulence": "the water is more turbulent than the vehicle file says",
     "vertical_water": "the water rises and falls more than it did",
     "waves": "surface waves move the vehicle",
     "weathercock": "the hull turns into or out of sideslip more or less than modelled",
@@ -82,8 +82,11 @@ FEATURES = {
     "time": "time since the start", "servo": "servo angle", "slider": "slider position", "ballast": "ballast mass",
     "constant": "a constant",
 }  # fmt: skip
-NOTHING, SMALL = 1e-12, 1e-4  # shown as 0, and by a power of ten
-SURE, LITTLE = 0.8, 0.02  # below the first the next answer is named, unless it is below the second
+SHOWN_AS_ZERO, SHOWN_AS_POWER = 1e-12, 1e-4  # shown as 0, and by a power of ten
+SURE_PROBABILITY, LITTLE_PROBABILITY = (
+    0.8,
+    0.02,
+)  # below the first the next answer is named, unless it is below the second
 MEANS = {"none": "no gap", "unknown": "a gap of another kind"}
 READABLE = {"rad": ("deg", 180.0 / math.pi), "rad/s": ("deg/s", 180.0 / math.pi), "1/rad": ("1/deg", math.pi / 180.0)}
 
@@ -92,9 +95,9 @@ def number(value: float) -> str:
     """Three digits that count, with a true minus; a power of ten where they stand far behind the point."""
     if not math.isfinite(value):
         return DASH
-    if abs(value) <= NOTHING:
+    if abs(value) <= SHOWN_AS_ZERO:
         return "0"
-    if abs(value) < SMALL:
+    if abs(value) < SHOWN_AS_POWER:
         digits, power = f"{value:.2e}".split("e")
         return f"{digits}e{int(power)}".replace("-", MINUS)
     places = max(0, 2 - math.floor(math.log10(abs(value))))
@@ -180,7 +183,7 @@ def interval(low: float, high: float) -> str:
     return f"90 % interval {percent(low).removesuffix(' %')} to {percent(high)}"
 
 
-def how_far(record: Record, with_what: str) -> str:
+def how_far(record: DiagnosisRecord, with_what: str) -> str:
     """The shrinkage on runs left out, and what recalibration alone does."""
     gap = record.answer.gap
     return (
@@ -195,26 +198,26 @@ def alone(gap: Gap) -> str:
     return f"makes it {percent(-share)} larger" if share < -0.005 else f"shrinks it by {percent(max(share, 0.0))}"
 
 
-def how_sure(record: Record) -> str:
+def how_sure(record: DiagnosisRecord) -> str:
     """`97 % sure`; where that is little, what else it may be."""
     first, second = record.answer.causes[:2]
-    if first.probability >= SURE or second.probability < LITTLE:
+    if first.probability >= SURE_PROBABILITY or second.probability < LITTLE_PROBABILITY:
         return f"{sure(first.probability)} sure"
     other = MEANS.get(second.label, second.label)
     return f"only {sure(first.probability)} sure, else {other} at {sure(second.probability)}"
 
 
-def sentence(record: Record) -> str:
+def sentence(record: DiagnosisRecord) -> str:
     """The verdict in one plain sentence: what, where, how sure, how far."""
     answer = record.answer
     if answer.verdict == "none":
         return _none(record)
     if answer.verdict == "unknown":
         return _unknown(record)
-    return _disorder(record) if answer.main in UNPREDICTABLE else _causes(record)
+    return _excess_noise(record) if answer.main in UNPREDICTABLE else _causes(record)
 
 
-def _none(record: Record) -> str:
+def _none(record: DiagnosisRecord) -> str:
     gap = record.answer.gap
     before, refitted, floor = (number(finite(table["total"])) for table in (gap.before, gap.recalibrated, gap.floor))
     certain = f"; certain by the readings alone: {joined(record.answer.selected)}" if record.answer.selected else ""
@@ -225,13 +228,13 @@ def _none(record: Record) -> str:
     )
 
 
-def _causes(record: Record) -> str:
+def _causes(record: DiagnosisRecord) -> str:
     answer = record.answer
     others = [label for label in answer.selected if label != answer.main]
-    alike = [label for label in answer.cause(answer.main).group if label != answer.main]
+    confounded = [label for label in answer.cause(answer.main).group if label != answer.main]
     said = f"{PLAIN[answer.main]} ({answer.main}, {place(answer.main)}; {how_sure(record)})"
-    if alike:
-        said += f", which these data cannot distinguish from {joined(alike)}"
+    if confounded:
+        said += f", which these data cannot distinguish from {joined(confounded)}"
     if others:
         said += f", and also {joined([f'{PLAIN[label]} ({label}, {place(label)})' for label in others])}"
     if record.details.noise is not None and record.details.noise.name == CLOCK:
@@ -241,7 +244,7 @@ def _causes(record: Record) -> str:
     return f"{upper(head + said)}; {far}."
 
 
-def _disorder(record: Record) -> str:
+def _excess_noise(record: DiagnosisRecord) -> str:
     answer, noise = record.answer, record.details.noise
     size = ""
     if answer.main == TURBULENCE and noise is not None:
@@ -255,7 +258,7 @@ def _disorder(record: Record) -> str:
     )
 
 
-def _identified(record: Record) -> str:
+def _identified(record: DiagnosisRecord) -> str:
     """A vehicle that had to be identified: what is certain, how far it helps, what is left."""
     answer = record.answer
     first, last = (finite(answer.stages[n].gap["total"]) for n in (0, -1))
@@ -269,7 +272,7 @@ def _identified(record: Record) -> str:
     return f"{said}."
 
 
-def _unknown(record: Record) -> str:
+def _unknown(record: DiagnosisRecord) -> str:
     answer = record.answer
     if any(stage.stage == "identified" for stage in answer.stages):
         return _identified(record)
@@ -303,7 +306,7 @@ def feature(name: str) -> str:
     return FEATURES.get(name, name)
 
 
-def finding(found: Finding, rate_hz: float) -> str:
+def finding(found: FindingRecord, rate_hz: float) -> str:
     """What a test says, after the channel's name."""
     if found.test == "variance":
         return "larger than noise and disturbance allow" if found.sigma > 0 else "smaller than expected"
@@ -317,7 +320,7 @@ def finding(found: Finding, rate_hz: float) -> str:
     return f"correlated with {feature(found.test)}"
 
 
-def described(record: Record) -> list[dict[str, Any]]:
+def described(record: DiagnosisRecord) -> list[dict[str, Any]]:
     """What is left by channel, strongest first: channel, axis, its shape, its correlations, sigma."""
     rows: dict[str, dict[str, Any]] = {}
     for found in record.details.findings:

@@ -11,23 +11,23 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from firmware.model.library import shipped
-from hal.strict import ConfigError, decode
-from sim_backend.ocean.vehicle import shipped_vehicles
-from tools.data.errors import InputError
-from tools.data.runs.case import CASE_FILE, CaseTable
-from tools.data.runs.csvfile import write_bytes
-from tools.data.sources import name_or_path, read_text
-from tools.study.workers import check_reachable, work_through
+from glider.firmware.model.library import shipped
+from glider.hal.strict import ConfigError, decode
+from glider.sim_backend.ocean.vehicle import shipped_vehicles
+from glider.tools.data.errors import InputError
+from glider.tools.data.runs.case import CASE_FILE, CaseTable
+from glider.tools.data.runs.csvfile import write_bytes
+from glider.tools.data.sources import name_or_path, read_text
+from glider.tools.study.workers import check_reachable, work_through
 
-LONGEST = 900.0  # s of a command
+TIMEOUT_S = 900.0  # s of a command
 CASES, REFERENCE, VEHICLE, ANSWER = Path("cases"), Path("reference"), Path("vehicle.toml"), Path("answer")
 Word = str | Path  # a path is below the folder in which a case is worked on
 Advance = Callable[[int], None]
 
 
 @dataclass(frozen=True)
-class Asked:
+class CaseJob:
     """A case, what is asked of it, and every file that takes, by its path: another computer may answer."""
 
     name: str
@@ -37,8 +37,8 @@ class Asked:
 
 
 @dataclass(frozen=True)
-class Told:
-    """What came of it: the files of the answer, or what went wrong."""
+class Result:
+    """Outcome: the files of the answer, or what went wrong."""
 
     files: dict[str, bytes] = field(default_factory=dict)
     seconds: float = 0.0
@@ -52,7 +52,7 @@ def files_of(folder: Path, below: Path) -> dict[str, bytes]:
     return {str(below / path.relative_to(folder)): path.read_bytes() for path in found}
 
 
-def answer(asked: Asked) -> Told:
+def answer(asked: CaseJob) -> Result:
     """What is asked of a case, in a folder of its own that is gone afterwards."""
     with tempfile.TemporaryDirectory(prefix="glider-") as folder:
         root, begun = Path(folder), time.perf_counter()
@@ -61,18 +61,18 @@ def answer(asked: Asked) -> Told:
             (root / name).write_bytes(content)
         for command in asked.commands:
             words = [str(root / word) if isinstance(word, Path) else word for word in command]
-            program = [sys.executable, "-m", "tools.cli.main", *words]
+            program = [sys.executable, "-m", "glider.tools.cli.main", *words]
             try:
-                ended = subprocess.run(program, capture_output=True, text=True, timeout=LONGEST)
+                ended = subprocess.run(program, capture_output=True, text=True, timeout=TIMEOUT_S)
             except subprocess.TimeoutExpired:
-                return Told(wrong=f"{asked.name}: not done after {LONGEST:.0f} s")
+                return Result(wrong=f"{asked.name}: not done after {TIMEOUT_S:.0f} s")
             if ended.returncode != 0:
                 break
         seconds = time.perf_counter() - begun
         if ended.returncode != 0 or not (root / ANSWER / asked.answer).is_file():
             lines = _without(root, ended.stderr).strip().splitlines() or [f"no {asked.answer}"]
-            return Told(wrong=f"{asked.name}: exit {ended.returncode}: {lines[-1]}")
-        return Told(files_of(root / ANSWER, Path()), seconds, len(os.sched_getaffinity(0)))
+            return Result(wrong=f"{asked.name}: exit {ended.returncode}: {lines[-1]}")
+        return Result(files_of(root / ANSWER, Path()), seconds, len(os.sched_getaffinity(0)))
 
 
 def _without(root: Path, text: str) -> str:
@@ -123,15 +123,15 @@ class Many:
                 if self.again or not file.is_file()}  # fmt: skip
 
 
-def ask(
+def run_batch(
     many: Many,
-    asked_of: Callable[[str, Path], Asked],
-    kept: Callable[[Told], dict[str, bytes]] = lambda told: told.files,
+    asked_of: Callable[[str, Path], CaseJob],
+    kept: Callable[[Result], dict[str, bytes]] = lambda result: result.files,
     advance: Advance = lambda n: None,
 ) -> tuple[int, list[str]]:
     """Ask what has not been answered; how many were, and what failed, a line each.
 
-    asked_of: what is asked of a case (name, folder); kept: the files that are left of what came of it.
+    asked_of: what is asked of a case (name, folder); kept: the files that are left of its outcome.
     """
     todo = many.todo()
     if many.dask:
@@ -141,18 +141,18 @@ def ask(
     wrong: list[str] = []
     pieces = _readable(todo, asked_of, wrong, advance)
     with contextlib.closing(work_through(answer, pieces, many.jobs, many.dask)) as work:
-        for asked, told in work:
-            if told.wrong:
-                wrong.append(told.wrong)
+        for asked, result in work:
+            if result.wrong:
+                wrong.append(result.wrong)
             else:
-                keep(kept(told), many.out, asked.name)
+                keep(kept(result), many.out, asked.name)
             advance(1)
     return len(todo) - len(wrong), sorted(wrong)
 
 
 def _readable(
-    todo: dict[str, Path], asked_of: Callable[[str, Path], Asked], wrong: list[str], advance: Advance
-) -> Iterator[Asked]:
+    todo: dict[str, Path], asked_of: Callable[[str, Path], CaseJob], wrong: list[str], advance: Advance
+) -> Iterator[CaseJob]:
     """What is asked of each case; one whose files cannot be read goes to what is wrong, and stops no other."""
     for name, case in todo.items():
         try:
@@ -166,7 +166,7 @@ def _readable(
 
 @dataclass(frozen=True)
 class OneCommand:
-    """`glider WORDS CASE --out ... OPTIONS` of any case, for `ask`; files that it names beside the case go along."""
+    """`glider WORDS CASE --out ... OPTIONS` of any case, for `run_batch`; files that it names beside the case go along."""
 
     words: Sequence[str]
     answer: str
@@ -174,7 +174,7 @@ class OneCommand:
     vehicle: str | None = None  # a shipped name or a file, in the place of each case's
     reference: Path | None = None  # a case that all are compared with
 
-    def __call__(self, name: str, case: Path) -> Asked:
+    def __call__(self, name: str, case: Path) -> CaseJob:
         """What is asked of a case; InputError where a file is not there."""
         command: list[Word] = [*self.words, CASES / name, "--out", ANSWER, *self.options]
         files = files_of(case, CASES / name)
@@ -190,7 +190,7 @@ class OneCommand:
                 raise InputError("no such folder", source=self.reference)
             command += ["--reference", REFERENCE]
             files |= files_of(self.reference, REFERENCE)
-        return Asked(name, files, [command], self.answer)
+        return CaseJob(name, files, [command], self.answer)
 
 
 def shipped_names() -> set[str]:

@@ -9,13 +9,13 @@ from collections.abc import Callable, Generator, Iterable
 from multiprocessing import parent_process
 from typing import Any
 
-from tools.data.errors import InputError
+from glider.tools.data.errors import InputError
 
 CONNECT_SECONDS = 10
 WORKER_SECONDS = 60
 TRIES = 3  # of a piece whose Dask worker goes away
 Work = Callable[[Any], Any]  # what is done with a piece; it and its pieces can be pickled
-Worked = Generator[tuple[Any, Any], None, None]  # pieces with what came of them, in any order
+Worked = Generator[tuple[Any, Any], None, None]  # pieces with their outcomes, in any order
 
 
 def end_with_parent() -> None:

@@ -76,7 +76,7 @@ class EventAnswer:
 
 
 @dataclass(frozen=True)
-class Watch:
+class WatchAnswer:
     """The answer, and what has to be said with it."""
 
     runs: list[RunVerdict]

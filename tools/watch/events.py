@@ -9,13 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tools.inference.expansion import Expansion
-from tools.inference.fit import bounded_step
-from tools.inference.shared_parameters import SharedParameters
+from glider.tools.inference.expansion import Expansion
+from glider.tools.inference.fit import bounded_step
+from glider.tools.inference.shared_parameters import SharedParameters
 
 STEP, GROWING = "step", "growing"
 TOGETHER = 512  # spans that are asked about at once
-LEAST_GROWING = 3  # runs in which a growth can be told from a step
+LEAST_GROWING = 3  # runs in which a growth can be distinguished from a step
 
 
 @dataclass(frozen=True)

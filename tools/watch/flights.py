@@ -4,32 +4,32 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tools.inference.expansion import Expansion, expand
-from tools.inference.fit import bounded_step
-from tools.inference.problem import Problem
-from tools.inference.shared_model import fit_shared, heat_of
-from tools.inference.shared_parameters import SharedParameters
-from tools.watch.scatter import learn_scatter, without_deviation
+from glider.tools.inference.expansion import Expansion, expand
+from glider.tools.inference.fit import bounded_step
+from glider.tools.inference.problem import Problem
+from glider.tools.inference.shared_model import fit_shared, inflation_of
+from glider.tools.inference.shared_parameters import SharedParameters
+from glider.tools.watch.scatter import learn_scatter, without_deviation
 
 LEAST_SIZE = 1e-6  # spreads by which runs may differ
 
 
 @dataclass
-class Flights:
+class RunEnsemble:
     """Every run with the model that it is thought to fly by, and its parabola about that."""
 
     parts: list[Problem]
     shared: SharedParameters
     reference: np.ndarray  # (runs,) bool: before anything changed
-    heat: float = 1.0  # of the reference
-    hot: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (runs,) times that: a form leaves more
+    inflation: float = 1.0  # of the reference
+    run_inflation: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (runs,) times that: a form leaves more
     sizes: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (count,) 1 sigma of what runs differ by
     form: dict[int, np.ndarray] = field(default_factory=dict)  # by run, (count,) 1 sigma: the form of its changes
     known: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # precision of the shared values
     certainty: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # inverse covariance of a run's own values
     values: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (count,) shared
-    raw: list[Expansion] = field(default_factory=list)  # not cooled, at `values`
-    runs: list[Expansion] = field(default_factory=list)  # cooled, deviations integrated out, at what each flies by
+    raw: list[Expansion] = field(default_factory=list)  # not tempered, at `values`
+    runs: list[Expansion] = field(default_factory=list)  # tempered, deviations integrated out, at what each flies by
     usual_course: tuple[np.ndarray, np.ndarray] | None = None  # of the reference (tools/watch/lasting.py), once asked
     # with what they were found of: a run's deviation, and its mean squared innovation there
     deviations: dict[int, tuple[Expansion, np.ndarray, float]] = field(default_factory=dict)
@@ -39,25 +39,25 @@ class Flights:
         return len(self.parts)
 
     def learn(self, start: np.ndarray | None = None) -> None:
-        """The shared model, the heat and the scatter, from the reference."""
+        """The shared model, the variance inflation and the scatter, from the reference."""
         own = numbers(self.reference)
         self.values = fit_shared([self.parts[n] for n in own], self.shared, start)
         self.raw = [expand(part, self.shared, self.values) for part in self.parts]
         found = [self.raw[n] for n in own]
-        self.heat, self.hot = heat_of(found), np.ones(self.count)
-        self.sizes = learn_scatter([one.cooled(self.heat) for one in found], self.shared)
+        self.inflation, self.run_inflation = inflation_of(found), np.ones(self.count)
+        self.sizes = learn_scatter([one.tempered(self.inflation) for one in found], self.shared)
         self.runs = [self.made(n, one) for n, one in enumerate(self.raw)]
         self.known = np.diag(self.shared.prior**-2.0) + sum(self.runs[n].curvature for n in own)
         self.certainty = np.linalg.inv(np.linalg.inv(self.known) + np.diag(np.maximum(self.sizes, LEAST_SIZE) ** 2))
 
-    def heat_in(self, n: int) -> float:
-        """The heat of a run."""
-        return self.heat * float(self.hot[n])
+    def inflation_in_run(self, n: int) -> float:
+        """The variance inflation of a run."""
+        return self.inflation * float(self.run_inflation[n])
 
     def made(self, n: int, one: Expansion) -> Expansion:
         """A parabola of a run as events are judged by it."""
         sizes = np.hypot(self.sizes, self.form[n]) if n in self.form else self.sizes
-        return without_deviation(one.cooled(self.heat_in(n)), sizes)
+        return without_deviation(one.tempered(self.inflation_in_run(n)), sizes)
 
     def expanded(self, n: int, x: np.ndarray) -> Expansion:
         """A run's parabola about other values."""
@@ -67,9 +67,9 @@ class Flights:
         """A run flies by another model from now on: the one that its parabola is about."""
         self.raw[n], self.runs[n] = one, self.made(n, one)
 
-    def cool(self, n: int) -> None:
-        """A run that the model of its change leaves rougher than the reference is, says the less of what all share."""
-        self.hot[n] = max(1.0, self.nis(n) / float(self.usual_nis.mean()))
+    def inflate_run(self, n: int) -> None:
+        """A run that the model of its change leaves noisier than the reference is, says the less of what all share."""
+        self.run_inflation[n] = max(1.0, self.nis(n) / float(self.usual_nis.mean()))
         self.runs[n] = self.made(n, self.raw[n])
 
     def loosen(self, n: int, change: np.ndarray) -> None:
@@ -85,7 +85,7 @@ class Flights:
     def let_go(self, n: int) -> None:
         """A run that flies by a model that nobody knows says nothing of what the others share."""
         wide = np.maximum(self.sizes, self.shared.prior)
-        self.runs[n] = without_deviation(self.raw[n].cooled(self.heat), wide)
+        self.runs[n] = without_deviation(self.raw[n].tempered(self.inflation), wide)
 
     def deviation(self, n: int) -> np.ndarray:
         """A run's own most probable deviation from the model that it flies by, (count,) spreads, within limits.
@@ -105,15 +105,15 @@ class Flights:
 
     def deviation_of(self, one: Expansion) -> np.ndarray:
         """The same of any parabola."""
-        cooled = one.cooled(self.heat)
+        tempered = one.tempered(self.inflation)
         low, high = np.minimum(self.shared.low - one.at, 0.0), np.maximum(self.shared.high - one.at, 0.0)
-        return bounded_step(cooled.curvature + self.certainty, cooled.slope, low, high)
+        return bounded_step(tempered.curvature + self.certainty, tempered.slope, low, high)
 
     def own_cost(self, part: Problem, x: np.ndarray) -> float:
-        """-2 log likelihood over the heat of a run, as `part` knows it, at its most probable values about x."""
+        """-2 log likelihood over the variance inflation of a run, as `part` knows it, at its most probable values about x."""
         one = expand(part, self.shared, x)
         own = one.at + self.deviation_of(one)
-        return float(part.filter(*self.shared.model(part, own), begin=True).misfit[0]) / self.heat
+        return float(part.filter(*self.shared.model(part, own), begin=True).misfit[0]) / self.inflation
 
     def own_values(self, n: int) -> np.ndarray:
         """The values of a run with its own deviation, (count,)."""
@@ -129,11 +129,11 @@ class Flights:
         return np.array([self.nis(n) for n in numbers(self.reference)])
 
     def excess(self, n: int) -> float:
-        """Squared innovations of a run beyond what the reference has of them, over the heat."""
-        return float((self.nis(n) - self.usual_nis.mean()) * self.raw[n].samples / self.heat)
+        """Squared innovations of a run beyond what the reference has of them, over the variance inflation."""
+        return float((self.nis(n) - self.usual_nis.mean()) * self.raw[n].samples / self.inflation)
 
 
-def roughness_sigma(flights: Flights, n: int) -> float:
+def excess_nis_sigma(flights: RunEnsemble, n: int) -> float:
     """How far a run's mean squared innovation lies above the reference's, by the model it flies by, in sigma."""
     values = flights.usual_nis
     chance = 2.0 / flights.runs[n].samples

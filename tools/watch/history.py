@@ -5,21 +5,21 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sim_backend.core.effects.base import Effect
-from tools.diagnose.noise_probes import NoiseProbe
-from tools.watch.disorder import WATER, shaken
-from tools.watch.events import Change, Joint, Span, spans
-from tools.watch.flights import Flights, numbers
-from tools.watch.lasting import Lasting, lasting
+from glider.sim_backend.core.effects.base import Effect
+from glider.tools.diagnose.noise_probes import NoiseProbe
+from glider.tools.watch.events import Change, Joint, Span, spans
+from glider.tools.watch.excess_noise import WATER, with_inflated_noise
+from glider.tools.watch.flights import RunEnsemble, numbers
+from glider.tools.watch.lasting import Lasting, lasting
 
-NOT_ROUGH = 5.0  # nat that a run that is not rough takes off disorder that would hold there too
-UNLIKE = 0.01  # cosine of two labels' columns, below which they have nothing to do with each other
-FURTHER = 0.15  # of what an event explains in the same runs, that a further event there has to bring
-MOST = 0.5  # of what is left there, that one that is not akin has to bring: what a form leaves may look like anything
+CLEAN_RUN_NAT = 5.0  # nat that a run that is not rough takes off disorder that would hold there too
+LEAST_COSINE = 0.01  # cosine of two labels' columns, below which they have nothing to do with each other
+FURTHER_EVENT_SHARE = 0.15  # of what an event explains in the same runs, that a further event there has to bring
+UNRELATED_EVENT_SHARE = 0.5  # of what is left there, that one that is not confounded has to bring: what a form leaves may look like anything
 
 
 @dataclass
-class Event:
+class ChangeEvent:
     """A change over a span of runs."""
 
     label: str  # of the catalogue, with parameters or of water's disorder; "" for disorder of something else
@@ -32,7 +32,7 @@ class Event:
     sure_spans: dict[Span, float] = field(default_factory=dict)  # log evidence by span
     probe: tuple[str, float] | None = None  # of disorder that is not the water's: what shakes, and how much
     place: NoiseProbe | None = None  # and the single link that shakes most
-    strange: Lasting | None = None  # what lasts in its runs beside it, before any other event was sought
+    strange: Lasting | None = None  # what lasts in its runs beside it, before any other event was searched
 
     @property
     def has_course(self) -> bool:
@@ -44,10 +44,10 @@ class Event:
 class History:
     """Where the search stands."""
 
-    flights: Flights
+    flights: RunEnsemble
     judged: np.ndarray  # (runs,) bool
     begins: int  # the first run with which an event may begin
-    events: list[Event] = field(default_factory=list)
+    events: list[ChangeEvent] = field(default_factory=list)
     water: np.ndarray | None = None  # nat that the water's disorder gains, (labels, runs, scales)
 
     @property
@@ -70,7 +70,7 @@ class History:
         return spans([bool(one) for one in self.judged], self.begins)
 
 
-def shaken_place(event: Event) -> tuple[str, str] | None:
+def noise_location(event: ChangeEvent) -> tuple[str, str] | None:
     """Where a single link shakes; None of the water."""
     return None if event.place is None else (event.place.subsystem, event.place.element)
 
@@ -83,26 +83,28 @@ def already(history: History, change: Change) -> bool:
     )
 
 
-def earns_place(history: History, event: Event | Change) -> bool:
+def earns_place(history: History, event: ChangeEvent | Change) -> bool:
     """Whether an event beside others in the same runs is more than the wrong form of one of them."""
     flights = history.flights
     own = event.span.weights(flights.count) > 0.0
-    evidence = event.evidence * float(flights.hot[own].max())  # as others were weighed, before their runs were hot
+    evidence = event.evidence * float(
+        flights.run_inflation[own].max()
+    )  # as others were weighed, before their runs were hot
     for other in history.events:
         shared = own & (other.span.weights(flights.count) > 0.0)
         mostly_there = shared.sum() >= 0.5 * own.sum()
-        if not mostly_there or evidence >= FURTHER * other.explained:
+        if not mostly_there or evidence >= FURTHER_EVENT_SHARE * other.explained:
             continue
         left = 0.5 * sum(max(flights.excess(n), 0.0) for n in numbers(shared & history.judged))
-        if evidence < MOST * left or akin(history, event.label, other.label, shared):
+        if evidence < UNRELATED_EVENT_SHARE * left or confounded(history, event.label, other.label, shared):
             return False
     return True
 
 
-def akin(history: History, one: str, other: str, runs: np.ndarray) -> bool:
+def confounded(history: History, one: str, other: str, runs: np.ndarray) -> bool:
     """Whether two labels move the same readings at all, in any of the runs (bool).
 
-    If not, one is no form of the other. Disorder is akin to everything.
+    If not, one is no form of the other. Disorder is confounded with everything.
     """
     flights, labels = history.flights, history.flights.shared.labels
     if one not in labels or other not in labels:
@@ -111,12 +113,12 @@ def akin(history: History, one: str, other: str, runs: np.ndarray) -> bool:
     for n in numbers(runs):
         A = flights.raw[n].curvature
         sizes = np.sqrt(np.outer(np.diag(A)[a], np.diag(A)[b]))
-        if (np.abs(A[np.ix_(a, b)]) > UNLIKE * sizes).any():
+        if (np.abs(A[np.ix_(a, b)]) > LEAST_COSINE * sizes).any():
             return True
     return False
 
 
-def lasts(history: History, event: Event) -> Lasting | None:
+def lasts(history: History, event: ChangeEvent) -> Lasting | None:
     """What lasts in an event's runs beside it; None of a kind without, and where the event moves other readings."""
     flights, weights = history.flights, event.span.weights(history.flights.count)
     runs = numbers((weights > 0.0) & history.judged)
@@ -125,17 +127,17 @@ def lasts(history: History, event: Event) -> Lasting | None:
     if not event.has_course:
         return lasting(flights, runs, weights)
     beside = lasting(flights, runs, weights, event.label, event.size)
-    return beside if beside.akin else None
+    return beside if beside.confounded else None
 
 
-def take(history: History, event: Event) -> None:
+def take(history: History, event: ChangeEvent) -> None:
     """The runs of an event about the model that has it; without a course, with the noise that it is."""
     flights = history.flights
     inside = numbers(event.span.weights(flights.count))
     if not event.has_course:
         for n in inside:
             name, scale = event.probe or (event.label, float(event.size[0]))
-            flights.parts[n] = shaken(flights.parts[n], name, scale)
+            flights.parts[n] = with_inflated_noise(flights.parts[n], name, scale)
             flights.put(n, flights.expanded(n, flights.runs[n].at))
             if event.label == "":
                 flights.let_go(n)
@@ -149,13 +151,13 @@ def take(history: History, event: Event) -> None:
             x[columns] += weights[n] * event.size
             x = within(flights, x)
             flights.put(n, flights.expanded(n, x))
-            flights.cool(n)
+            flights.inflate_run(n)
             flights.loosen(n, x - before)
     if history.water is not None:
         # what the form of a label leaves is no disorder: it is asked about as what is left of the label
-        history.water[:, inside] = -NOT_ROUGH
+        history.water[:, inside] = -CLEAN_RUN_NAT
 
 
-def within(flights: Flights, x: np.ndarray) -> np.ndarray:
+def within(flights: RunEnsemble, x: np.ndarray) -> np.ndarray:
     """Values inside the limits of what runs may share."""
     return np.clip(x, flights.shared.low, flights.shared.high)

@@ -9,17 +9,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tools.inference.expansion import at_kink, columns_at
-from tools.inference.fit import EFFECT_STEP, FIRST_STEP, bounded_step
-from tools.inference.problem import Problem
-from tools.inference.shared_parameters import SharedParameters
-from tools.watch.flights import Flights
+from glider.tools.inference.expansion import at_bound, columns_at
+from glider.tools.inference.fit import EFFECT_STEP, FIRST_STEP, bounded_step
+from glider.tools.inference.problem import Problem
+from glider.tools.inference.shared_parameters import SharedParameters
+from glider.tools.watch.flights import RunEnsemble
 
 STEPS = 5
-ROUGH = (100.0, 10.0)
-ENOUGH = 1.0  # squared sigma that a step promises: no further step
-APART = (0.1, 0.4, 0.9, 1.3, 1.7, 2.1)  # spreads: further starts of what begins at a kink, or behind a threshold
-SHARES = (1.0, 0.4, 0.1, 0.02)  # of a step that is tried
+PROCESS_NOISE_SCALES = (100.0, 10.0)
+CONVERGED_GAIN = 1.0  # squared sigma that a step predicts: no further step
+FURTHER_STARTS = (
+    0.1,
+    0.4,
+    0.9,
+    1.3,
+    1.7,
+    2.1,
+)  # spreads: further starts of what begins at a kink, or behind a threshold
+STEP_SHARES = (1.0, 0.4, 0.1, 0.02)  # of a step that is tried
 
 
 @dataclass
@@ -29,17 +36,19 @@ class Affected:
     parts: Sequence[Problem]
     weights: Sequence[float]
     at: Sequence[np.ndarray]  # (count,) values of each run without the change
-    heats: Sequence[float]
+    inflations: Sequence[float]
 
     def each(self) -> Iterator[tuple[Problem, float, np.ndarray, float]]:
-        """Run by run: the problem, its weight, its values and its heat."""
-        return zip(self.parts, self.weights, self.at, self.heats, strict=True)
+        """Run by run: the problem, its weight, its values and its variance inflation."""
+        return zip(self.parts, self.weights, self.at, self.inflations, strict=True)
 
 
-def affected_runs(flights: Flights, chosen: Sequence[int], weights: np.ndarray, base: Sequence[np.ndarray]) -> Affected:
-    """Runs with their weights (runs,) of a span, their values without the change, and their heats."""
-    parts, heats = [flights.parts[n] for n in chosen], [flights.heat_in(n) for n in chosen]
-    return Affected(parts, [float(weights[n]) for n in chosen], base, heats)
+def affected_runs(
+    flights: RunEnsemble, chosen: Sequence[int], weights: np.ndarray, base: Sequence[np.ndarray]
+) -> Affected:
+    """Runs with their weights (runs,) of a span, their values without the change, and their variance inflations."""
+    parts, inflations = [flights.parts[n] for n in chosen], [flights.inflation_in_run(n) for n in chosen]
+    return Affected(parts, [float(weights[n]) for n in chosen], base, inflations)
 
 
 @dataclass(frozen=True)
@@ -48,7 +57,7 @@ class LabelFit:
 
     label: str
     size: np.ndarray  # spreads, of its parameters
-    cost: float  # -2 log likelihood over the heat, and the prior's
+    cost: float  # -2 log likelihood over the variance inflation, and the prior's
 
 
 def values_of(shared: SharedParameters, label: str, at: np.ndarray, weight: float, size: np.ndarray) -> np.ndarray:
@@ -58,37 +67,44 @@ def values_of(shared: SharedParameters, label: str, at: np.ndarray, weight: floa
     return x
 
 
-def cost_of(runs: Affected, shared: SharedParameters, label: str, size: np.ndarray, roughness: float = 1.0) -> float:
-    """-2 log likelihood of the runs with a change of this size, by its own filters, over the heat; and the prior's."""
+def cost_of(
+    runs: Affected, shared: SharedParameters, label: str, size: np.ndarray, process_noise_scale: float = 1.0
+) -> float:
+    """-2 log likelihood of the runs with a change of this size, by its own filters, over the variance inflation; and the prior's."""
     found = float(size @ size)
-    for part, weight, at, heat in runs.each():
+    for part, weight, at, inflation in runs.each():
         model = shared.model(part, values_of(shared, label, at, weight, size))
-        found += float(part.filter(*model, roughness=roughness, begin=True).misfit[0]) / heat
+        found += float(part.filter(*model, process_noise_scale=process_noise_scale, begin=True).misfit[0]) / inflation
     return found if np.isfinite(found) else np.inf
 
 
 @dataclass
-class Step:
+class LabelStep:
     """Where a label's size stands, by its own filters, and where its parabola and the kept gains lead from there."""
 
     cost: float
-    promised: float
+    predicted_gain: float
     to: np.ndarray
 
 
 def next_step(
-    runs: Affected, shared: SharedParameters, label: str, size: np.ndarray, roughness: float, shares: Sequence[float]
-) -> Step:
+    runs: Affected,
+    shared: SharedParameters,
+    label: str,
+    size: np.ndarray,
+    process_noise_scale: float,
+    shares: Sequence[float],
+) -> LabelStep:
     """The cost of a size, and the share of the Gauss-Newton step within its limits that does best with gains kept."""
     columns, low_high = shared.labels[label], shared.limits(label, runs.at[0])
     normal, slope, cost = np.eye(len(columns)), size.copy(), float(size @ size)
     kept = []
-    for part, weight, at, heat in runs.each():
+    for part, weight, at, inflation in runs.each():
         x = values_of(shared, label, at, weight, size)
-        gains = part.filter(*shared.model(part, x), roughness=roughness, begin=True)
-        cost += float(gains.misfit[0]) / heat
+        gains = part.filter(*shared.model(part, x), process_noise_scale=process_noise_scale, begin=True)
+        cost += float(gains.misfit[0]) / inflation
         steps = np.where(np.abs(size) > 0.0, EFFECT_STEP * np.maximum(1.0, np.abs(x[columns])), FIRST_STEP)
-        steps = np.where(at_kink(shared, x)[columns], 1.0, steps)
+        steps = np.where(at_bound(shared, x)[columns], 1.0, steps)
         steps = np.where(x[columns] + steps > shared.high[columns], -steps, steps)
 
         def moved(k: int, step: float, part: Problem = part, x: np.ndarray = x) -> tuple[np.ndarray, np.ndarray]:
@@ -97,34 +113,34 @@ def next_step(
                 point[columns[k]] += step
             return shared.model(part, point)
 
-        e, J = columns_at(part, gains, moved, at_kink(shared, x)[columns], steps)
-        normal += weight**2 * J @ J.T / heat
-        slope += weight * J @ e / heat
+        e, J = columns_at(part, gains, moved, at_bound(shared, x)[columns], steps)
+        normal += weight**2 * J @ J.T / inflation
+        slope += weight * J @ e / inflation
         kept.append(gains)
     low, high = low_high
     step = bounded_step(normal, slope, np.minimum(low - size, 0.0), np.maximum(high - size, 0.0))
     tried = [np.clip(size + share * step, low, high) for share in shares]
     misfits = np.array([one @ one for one in tried])
-    for (part, weight, at, heat), gains in zip(runs.each(), kept, strict=True):
+    for (part, weight, at, inflation), gains in zip(runs.each(), kept, strict=True):
         E = part.follow([shared.model(part, values_of(shared, label, at, weight, one)) for one in tried], gains)
-        misfits += (E**2).sum(axis=1) / heat
-    promised = -float(2.0 * slope @ step + step @ normal @ step)
-    return Step(cost if np.isfinite(cost) else np.inf, promised, tried[int(misfits.argmin())])
+        misfits += (E**2).sum(axis=1) / inflation
+    predicted_gain = -float(2.0 * slope @ step + step @ normal @ step)
+    return LabelStep(cost if np.isfinite(cost) else np.inf, predicted_gain, tried[int(misfits.argmin())])
 
 
 def fit_label(
-    runs: Affected, shared: SharedParameters, label: str, start: np.ndarray, roughness: Sequence[float] = ()
+    runs: Affected, shared: SharedParameters, label: str, start: np.ndarray, process_noise_scale: Sequence[float] = ()
 ) -> LabelFit:
-    """The label led to its least misfit from `start` (spreads), through filters of each roughness first."""
+    """The label led to its least misfit from `start` (spreads), through filters of each process-noise scale first."""
     size = start.copy()
-    for rough in roughness:
-        size = next_step(runs, shared, label, size, rough, SHARES).to
+    for noise_scale in process_noise_scale:
+        size = next_step(runs, shared, label, size, noise_scale, STEP_SHARES).to
     best, least, whole = size, np.inf, True
     for _ in range(STEPS):
-        step = next_step(runs, shared, label, size, 1.0, SHARES if whole else SHARES[1:])
+        step = next_step(runs, shared, label, size, 1.0, STEP_SHARES if whole else STEP_SHARES[1:])
         if step.cost < least:
             best, least, whole = size, step.cost, True
-            if step.promised < ENOUGH:
+            if step.predicted_gain < CONVERGED_GAIN:
                 break
             size = step.to
         elif whole:  # the filter of the new model sees it otherwise: half way back
@@ -139,12 +155,12 @@ def best_fit(runs: Affected, shared: SharedParameters, label: str, linear: np.nd
     nothing = np.zeros(len(linear))
     starts = [linear, nothing]
     low, high = shared.limits(label, runs.at[0])
-    if at_kink(shared, runs.at[0])[shared.labels[label]].any():  # a threshold leads nowhere before it is reached
-        far = [sign * size for size in APART for sign in (1.0, -1.0)]
+    if at_bound(shared, runs.at[0])[shared.labels[label]].any():  # a threshold leads nowhere before it is reached
+        far = [sign * size for size in FURTHER_STARTS for sign in (1.0, -1.0)]
         alone = [np.clip(size * one, low, high) for one in np.eye(len(linear)) for size in far]
         starts += [one for one in alone if one.any()]
     start = min(starts, key=lambda size: cost_of(runs, shared, label, size))
     fits = [fit_label(runs, shared, label, start)]
     if strong:
-        fits.append(fit_label(runs, shared, label, nothing, ROUGH))
+        fits.append(fit_label(runs, shared, label, nothing, PROCESS_NOISE_SCALES))
     return min(fits, key=lambda fit: fit.cost)

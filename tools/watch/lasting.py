@@ -10,18 +10,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim_backend.ocean.core import layout as at
-from tools.diagnose.noise_probes import NoiseProbe
-from tools.identify.ocean.identify import BANDS, strata
-from tools.inference.channels import Measures
-from tools.inference.expansion import linear
-from tools.inference.problem import Gains, Problem
-from tools.inference.shared_parameters import SharedParameters
-from tools.watch.flights import Flights, numbers
+from glider.sim_backend.ocean.core import layout as at
+from glider.tools.diagnose.noise_probes import NoiseProbe
+from glider.tools.identify.ocean.identify import BANDS, strata
+from glider.tools.inference.channels import Measures
+from glider.tools.inference.expansion import linear
+from glider.tools.inference.problem import Gains, Problem
+from glider.tools.inference.shared_parameters import SharedParameters
+from glider.tools.watch.flights import RunEnsemble, numbers
 
-SIZE = 0.02  # m/s, 1 sigma of what lasts: as much as the roughest water
+SIZE = 0.02  # m/s, 1 sigma of what lasts: as much as the most turbulent water
 DIFFERENCE = 1e-3  # m/s, of a derivative
-UNLIKE = 0.01  # SIZE: a label that moves a depth rate by less has nothing to do with it
+LEAST_MOTION = 0.01  # SIZE: a label that moves a depth rate by less has nothing to do with it
 # Log odds, nat: of twenty changes that a label explains as well, one is of a kind that none names; and water is named
 # only where it is twenty times as likely as water with something that lasts in it.
 STRANGE, NO_WATER = -3.0, 3.0
@@ -55,7 +55,7 @@ class Lasting:
 
     evidence: float  # nat over no such course, or over what the form of a label leaves
     size: np.ndarray  # (courses,) m/s
-    akin: bool = True  # whether the label beside it moves depth or speed at all
+    confounded: bool = True  # whether the label beside it moves depth or speed at all
 
     def chance(self, odds: float) -> float:
         """Probability that there is such a course, by its log odds (nat) before any run was seen."""
@@ -96,11 +96,11 @@ def columns(part: Problem, model: Model, gains: Gains, e: np.ndarray) -> np.ndar
     return np.asarray((np.array(found) - e) * (SIZE / DIFFERENCE))
 
 
-def pull_of(part: Problem, shared: SharedParameters, x: np.ndarray, heat: float) -> Pull:
+def pull_of(part: Problem, shared: SharedParameters, x: np.ndarray, inflation: float) -> Pull:
     """Of a run about the model at x (count,)."""
     gains, e, J = linear(part, shared, x)
     both = np.concatenate([columns(part, shared.model(part, x), gains, e), J])
-    return Pull(both @ both.T / heat, both @ e / heat)
+    return Pull(both @ both.T / inflation, both @ e / inflation)
 
 
 def course_of(pulls: Sequence[Pull], weights: Sequence[float], known: np.ndarray) -> Pull:
@@ -128,12 +128,12 @@ def evidence_of(pull: Pull, variance: np.ndarray) -> tuple[float, np.ndarray]:
     return float(-0.5 * (root * pull.slope) @ c - 0.5 * np.linalg.slogdet(inner)[1]), root * c
 
 
-def of_flight(flights: Flights, n: int) -> Pull:
+def of_flight(flights: RunEnsemble, n: int) -> Pull:
     """Of a watched run about the model that it flies by."""
-    return pull_of(flights.parts[n], flights.shared, flights.raw[n].at, flights.heat)
+    return pull_of(flights.parts[n], flights.shared, flights.raw[n].at, flights.inflation)
 
 
-def usual(flights: Flights) -> tuple[np.ndarray, np.ndarray]:
+def usual(flights: RunEnsemble) -> tuple[np.ndarray, np.ndarray]:
     """The course that the runs learned from have all the same, in SIZE, and the variance by which they differ in it."""
     pulls = [of_flight(flights, n) for n in numbers(flights.reference)]
     courses = len(pulls[0].slope) - flights.shared.count
@@ -147,16 +147,16 @@ def usual(flights: Flights) -> tuple[np.ndarray, np.ndarray]:
     return c, np.maximum((scores - sure).sum(axis=0) / np.maximum((sure**2).sum(axis=0), 1e-12), 0.0)
 
 
-def beside_all(parts: Sequence[Problem], shared: SharedParameters, x: np.ndarray, heat: float) -> Lasting:
+def beside_all(parts: Sequence[Problem], shared: SharedParameters, x: np.ndarray, inflation: float) -> Lasting:
     """What lasts in all runs of a case beside the model that they share, all that it allows free."""
-    each = [pull_of(part, shared, x, heat) for part in parts]
+    each = [pull_of(part, shared, x, inflation) for part in parts]
     pull = course_of(each, [1.0] * len(parts), np.diag(shared.prior**-2.0))
     evidence, c = evidence_of(pull, np.ones(len(pull.slope)))
     return Lasting(evidence, SIZE * c)
 
 
 def lasting(
-    flights: Flights, runs: Sequence[int], weights: np.ndarray, label: str = "", size: np.ndarray | None = None
+    flights: RunEnsemble, runs: Sequence[int], weights: np.ndarray, label: str = "", size: np.ndarray | None = None
 ) -> Lasting:
     """What lasts in runs beside the models that they fly by, beyond what the runs learned from have.
 
@@ -180,4 +180,4 @@ def lasting(
     A = np.sum([w**2 * one.precision for w, one in zip(shares, each, strict=True)], axis=0)
     like = np.linalg.solve(A[:courses, :courses] + np.eye(courses), A[:courses][:, [courses + k for k in free]] @ size)
     of_form, _ = evidence_of(pull, (flights.parts[0].kind.form * like) ** 2)
-    return Lasting(evidence - of_form, SIZE * c, bool(np.abs(like).max() > UNLIKE))
+    return Lasting(evidence - of_form, SIZE * c, bool(np.abs(like).max() > LEAST_MOTION))

@@ -5,27 +5,30 @@ from dataclasses import replace
 
 import numpy as np
 
-from tools.inference.expansion import Expansion, expand
-from tools.inference.fit import bounded_step
-from tools.watch.events import GROWING, STEP, Change, Joint, Span
-from tools.watch.flights import Flights, numbers
-from tools.watch.history import Event, History, akin, within
-from tools.watch.label_fit import Affected, LabelFit, affected_runs, best_fit, cost_of, values_of
+from glider.tools.inference.expansion import Expansion, expand
+from glider.tools.inference.fit import bounded_step
+from glider.tools.watch.events import GROWING, STEP, Change, Joint, Span
+from glider.tools.watch.flights import RunEnsemble, numbers
+from glider.tools.watch.history import ChangeEvent, History, confounded, within
+from glider.tools.watch.label_fit import Affected, LabelFit, affected_runs, best_fit, cost_of, values_of
 
 FITTED = 3  # runs in which rivals are fitted
 SMALL = 20  # labels of a catalogue that can be tried whole
-LINEAR_TRIED, ROUGH_TRIED = 4, 5  # labels: by the parabolas of the filter as it is, and by rough ones
-ORDER = 0.1  # of what a label is behind, that stays even where the form may be why
+LINEAR_TRIED, INFLATED_TRIED = 4, 5  # labels: by the parabolas of the filter as it is, and by rough ones
+KEPT_EVIDENCE_SHARE = 0.1  # of what a label is behind, that stays even where the form may be why
 FINAL = 3  # rivals that are compared over all spans
-BEHIND, BEHIND_SHARE = 40.0, 0.1  # squared sigma, and share of what the best gains, that a rival may be behind
-POORLY = 0.1  # of the excess: what the best of the first rivals may leave before more are tried
+MAX_RIVAL_DEFICIT, MAX_RIVAL_DEFICIT_SHARE = (
+    40.0,
+    0.1,
+)  # squared sigma, and share of what the best gains, that a rival may be behind
+MAX_UNEXPLAINED_SHARE = 0.1  # of the excess: what the best of the first rivals may leave before more are tried
 AS_EVIDENT = 0.5  # nat
-REACH = 2  # runs about a span's ends between which it is found again
+SPAN_SEARCH_RUNS = 2  # runs about a span's ends between which it is found again
 
 
-def refined(
+def refit_event(
     history: History, joint: Joint, best: Change, changes: Sequence[Change], also: Sequence[str] = ()
-) -> Event | None:
+) -> ChangeEvent | None:
     """The change fitted without parabolas, with the labels that may be meant as well, and its span found again.
 
     also: labels that are fitted whatever parabolas promise of them.
@@ -37,25 +40,31 @@ def refined(
     base = [within(flights, flights.runs[n].at) for n in chosen]
     affected = affected_runs(flights, chosen, weights, base)
     inside_state = weights > 0.0
-    same = [one for one in changes if one.span == best.span and akin(history, one.label, best.label, inside_state)]
+    same = [
+        one for one in changes if one.span == best.span and confounded(history, one.label, best.label, inside_state)
+    ]
     same.sort(key=lambda one: -one.evidence)
     nothing = cost_of(affected, shared, best.label, np.zeros(len(best.size)))
     tried = LINEAR_TRIED if len(shared.labels) > SMALL else len(same)
     fits = {one.label: best_fit(affected, shared, one.label, one.size, False) for one in same[:tried]}
     samples = sum(flights.raw[n].samples for n in chosen)
     least = min(fits.values(), key=lambda fit: fit.cost)
-    promised = sum(max(flights.excess(n), 0.0) for n in chosen)
+    predicted_gain = sum(max(flights.excess(n), 0.0) for n in chosen)
     more = [(label, np.zeros(len(shared.labels[label]))) for label in also]
-    if nothing - least.cost < (1.0 - POORLY) * promised and promised > 0.1 * samples:
-        ranking = [one for one in rough_ranking(affected, flights) if akin(history, one[0], best.label, inside_state)]
-        more += ranking[:ROUGH_TRIED]
+    if nothing - least.cost < (1.0 - MAX_UNEXPLAINED_SHARE) * predicted_gain and predicted_gain > 0.1 * samples:
+        ranking = [
+            one for one in inflated_ranking(affected, flights) if confounded(history, one[0], best.label, inside_state)
+        ]
+        more += ranking[:INFLATED_TRIED]
     for label, size in more:
         again = best_fit(affected, shared, label, size, True)
         if label not in fits or again.cost < fits[label].cost:
             fits[label] = again
     ranked = sorted(fits.values(), key=lambda fit: fit.cost)
     gained = nothing - ranked[0].cost
-    kept = [fit for fit in ranked if fit.cost - ranked[0].cost <= max(BEHIND, BEHIND_SHARE * gained)][:FINAL]
+    kept = [
+        fit for fit in ranked if fit.cost - ranked[0].cost <= max(MAX_RIVAL_DEFICIT, MAX_RIVAL_DEFICIT_SHARE * gained)
+    ][:FINAL]
     found = [one for one in (over_spans(history, joint, best.span, fit) for fit in kept) if one is not None]
     if not found:
         return None
@@ -74,16 +83,18 @@ def refined(
     return winner
 
 
-def by_cause(event: Event, odds: dict[str, float], form_share: float) -> dict[str, float]:
+def by_cause(event: ChangeEvent, odds: dict[str, float], form_share: float) -> dict[str, float]:
     """Log evidence of labels where a share of what the change explains is left to the form of each."""
-    best, alike = event.rivals[event.label] - odds[event.label], form_share * event.explained
+    best, confounded = event.rivals[event.label] - odds[event.label], form_share * event.explained
     return {
-        label: best - max(best - (value - odds[label]) - alike, ORDER * (best - value + odds[label])) + odds[label]
+        label: best
+        - max(best - (value - odds[label]) - confounded, KEPT_EVIDENCE_SHARE * (best - value + odds[label]))
+        + odds[label]
         for label, value in event.rivals.items()
     }
 
 
-def by_other_course(history: History, joint: Joint, event: Event) -> Event | None:
+def by_other_course(history: History, joint: Joint, event: ChangeEvent) -> ChangeEvent | None:
     """A change that is still there fitted as growing where it is a step, and the other way; None where it ended.
 
     Parabolas about a step say little of the small sizes that a growth begins with.
@@ -101,12 +112,12 @@ def by_other_course(history: History, joint: Joint, event: Event) -> Event | Non
     return over_spans(history, joint, other, fit, (other.course,))
 
 
-def rough_ranking(affected: Affected, flights: Flights) -> list[tuple[str, np.ndarray]]:
-    """Labels by what a filter that lets the vehicle move sees of them, with the sizes it promises."""
+def inflated_ranking(affected: Affected, flights: RunEnsemble) -> list[tuple[str, np.ndarray]]:
+    """Labels by what a filter that lets the vehicle move sees of them, with the sizes it predicts."""
     shared = flights.shared
     normal, slope = np.zeros((shared.count, shared.count)), np.zeros(shared.count)
-    for part, weight, at, heat in affected.each():
-        one = expand(part, shared, at, 100.0).cooled(heat)
+    for part, weight, at, inflation in affected.each():
+        one = expand(part, shared, at, 100.0).tempered(inflation)
         normal += weight**2 * one.curvature
         slope += weight * one.slope
     found = []
@@ -120,7 +131,7 @@ def rough_ranking(affected: Affected, flights: Flights) -> list[tuple[str, np.nd
 
 def over_spans(
     history: History, joint: Joint, span: Span, fit: LabelFit, courses: Sequence[str] = (STEP, GROWING)
-) -> Event | None:
+) -> ChangeEvent | None:
     """A label's evidence over every span near the one it was fitted in, by parabolas about what it fitted.
 
     Of spans that are as evident the shortest: in the runs that only others have, the change does not show. Where the
@@ -128,8 +139,8 @@ def over_spans(
     """
     flights, shared = history.flights, history.flights.shared
     weights = span.weights(flights.count)
-    first = max(history.begins, span.first - REACH)
-    end = min(flights.count, span.end + REACH)
+    first = max(history.begins, span.first - SPAN_SEARCH_RUNS)
+    end = min(flights.count, span.end + SPAN_SEARCH_RUNS)
     about: dict[int, Expansion] = {}
     for n in range(first, end):
         if history.judged[n]:
@@ -138,7 +149,7 @@ def over_spans(
             about[n] = flights.made(n, flights.expanded(n, within(flights, x)))
     found: dict[Span, tuple[float, np.ndarray, np.ndarray]] = {}
     for one in history.listed():
-        near = abs(one.first - span.first) <= REACH and abs(one.end - span.end) <= REACH
+        near = abs(one.first - span.first) <= SPAN_SEARCH_RUNS and abs(one.end - span.end) <= SPAN_SEARCH_RUNS
         if not near or one.course not in courses:
             continue
         own = one.weights(flights.count)
@@ -160,4 +171,6 @@ def over_spans(
         further = over_spans(history, joint, best, replace(fit, size=size), courses)
         if further is not None and further.evidence >= evidence:
             return further
-    return Event(fit.label, best, evidence, {}, size, covariance, 0.0, {one: value[0] for one, value in found.items()})
+    return ChangeEvent(
+        fit.label, best, evidence, {}, size, covariance, 0.0, {one: value[0] for one, value in found.items()}
+    )

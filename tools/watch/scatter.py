@@ -11,17 +11,17 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.optimize import minimize
 
-from tools.inference.expansion import Expansion
-from tools.inference.shared_parameters import SharedParameters
+from glider.tools.inference.expansion import Expansion
+from glider.tools.inference.shared_parameters import SharedParameters
 
 USUAL = np.array([0.05, 0.3, 0.01])  # spreads, by group
 USUAL_WIDTH = 1.0  # e-folds
 PRIOR_RUNS = 1.0
 STARTS = (0.0, 0.03, 0.3)  # spreads, at least: of single sizes, from which the most probable are looked for
-ITERATIONS, SETTLED = 120, 1e-3  # at most; e-folds of a variance by which a step moves none any more
+ITERATIONS, CONVERGED_LOG_VARIANCE = 120, 1e-3  # at most; e-folds of a variance by which a step moves none any more
 LEAST_VARIANCE = 1e-12  # squared spreads
 LEAST_RUNS = 2  # with fewer nothing can be learned
-FEW = 3  # with fewer it cannot be known what runs differ by
+MIN_SCATTER_RUNS = 3  # with fewer it cannot be known what runs differ by
 
 
 def without_deviation(one: Expansion, sizes: np.ndarray) -> Expansion:
@@ -66,7 +66,7 @@ def each_by_itself(found: Sequence[Expansion], shared: SharedParameters, sizes: 
     worth PRIOR_RUNS runs: one that is far too small for a run may be as probable, near by, as one that holds it, so
     several starts are made.
     """
-    tried = [settled(found, shared, sizes, np.maximum(sizes, least)) for least in STARTS]
+    tried = [mm_iterate(found, shared, sizes, np.maximum(sizes, least)) for least in STARTS]
     return max(tried, key=lambda one: log_marginal(found, shared, one) + log_prior(one, sizes))
 
 
@@ -76,7 +76,7 @@ def log_prior(sizes: np.ndarray, usual: np.ndarray) -> float:
     return -0.5 * PRIOR_RUNS * float((np.log(variance) + np.maximum(usual**2, LEAST_VARIANCE) / variance).sum())
 
 
-def settled(
+def mm_iterate(
     found: Sequence[Expansion], shared: SharedParameters, usual: np.ndarray, start: np.ndarray
 ) -> np.ndarray:
     """Sizes (count,) led from `start` to the most probable near by: minorisation and maximisation for variances."""
@@ -92,6 +92,6 @@ def settled(
             squares += (one.slope + A @ (x - one.at)) ** 2
             traces += np.maximum(np.diag(A) - np.einsum("ij,jk,ki->i", A, inverse, A), 0.0)
         before, v = v, np.sqrt((0.5 * v**2 * squares + weight * middle) / (0.5 * traces + weight / v))
-        if np.abs(np.log(v / before)).max() < SETTLED:
+        if np.abs(np.log(v / before)).max() < CONVERGED_LOG_VARIANCE:
             break
     return np.sqrt(v)

@@ -5,12 +5,12 @@ from collections.abc import Callable
 import numpy as np
 from scipy.stats import t as student
 
-from tools.inference.parameters import CLOCK_PLACE
-from tools.watch.events import Change
-from tools.watch.history import Event, History, already, earns_place, lasts, shaken_place, take
-from tools.watch.rivals import refined
-from tools.watch.scatter import FEW, PRIOR_RUNS
-from tools.watch.water import named, rougher, water_event
+from glider.tools.inference.parameters import CLOCK_PLACE
+from glider.tools.watch.events import Change
+from glider.tools.watch.history import ChangeEvent, History, already, earns_place, lasts, noise_location, take
+from glider.tools.watch.rivals import refit_event
+from glider.tools.watch.scatter import MIN_SCATTER_RUNS, PRIOR_RUNS
+from glider.tools.watch.water import named, noise_beats_label, water_event
 
 EVIDENCE_NEEDED = 16.0  # nat over no change (docs/WATCH.md)
 BEYOND_CHANCE = 7.3  # nat over the logarithm of how many changes are looked at
@@ -35,7 +35,7 @@ def acts_at(place: tuple[str, str], there: tuple[str, str]) -> bool:
     return place == there or (place == ("timing", "command") and there[0] == "actuation")
 
 
-def evidence_needed(history: History, event: Event) -> float:
+def evidence_needed(history: History, event: ChangeEvent) -> float:
     """Nat that an event needs: more where there are more runs, and so more changes that chance may bring.
 
     And more where how much runs differ was learned from a few: a change against that is Student's t, squared, by those
@@ -46,14 +46,14 @@ def evidence_needed(history: History, event: Event) -> float:
     looked_at = max(len(history.listed()) * len(flights.shared.labels), 1)
     needed = max(EVIDENCE_NEEDED, BEYOND_CHANCE + float(np.log(looked_at)))
     learned = int(flights.reference.sum())
-    if not event.has_course or learned < FEW:
+    if not event.has_course or learned < MIN_SCATTER_RUNS:
         return needed
     inside = (event.span.weights(flights.count) > 0.0) & history.judged
     freedom = learned - 1 + PRIOR_RUNS + int(inside.sum()) - 1
     return max(needed, 0.5 * float(student.isf(0.5 * FALSE / looked_at, freedom)) ** 2)
 
 
-def next_event(history: History) -> Event | None:
+def next_event(history: History) -> ChangeEvent | None:
     """The change that is most evident beside those found: a label's course, or disorder where that explains more."""
     joint = history.joint()
     every = joint.changes(history.listed())
@@ -64,21 +64,21 @@ def next_event(history: History) -> Event | None:
     evident = sorted((one for one in every if one.evidence >= EVIDENCE_NEEDED), key=lambda one: -one.evidence)
     best = next((one for one in evident if possible(one)), None)
     changes = [] if best is None else [one for one in every if one.span == best.span and possible(one)]
-    event = None if best is None else refined(history, joint, best, changes)
-    rough = water_event(history)
-    if rough is None or rough.evidence < EVIDENCE_NEEDED:
+    event = None if best is None else refit_event(history, joint, best, changes)
+    noisy = water_event(history)
+    if noisy is None or noisy.evidence < EVIDENCE_NEEDED:
         return event
-    if event is not None and not rougher(history, rough, event):
+    if event is not None and not noise_beats_label(history, noisy, event):
         return event
-    found = named(history, rough)
-    there = shaken_place(found)
+    found = named(history, noisy)
+    there = noise_location(found)
     if best is not None and event is not None and there is not None:
         # parabolas promise nothing of what begins behind a threshold: labels of that place are fitted
         labels = [label for label in history.flights.shared.labels if acts_at(history.effects[label].place, there)]
-        event = refined(history, joint, best, changes, labels) or event
-        if not rougher(history, rough, event):
+        event = refit_event(history, joint, best, changes, labels) or event
+        if not noise_beats_label(history, noisy, event):
             return event
-    if not earns_place(history, rough):
+    if not earns_place(history, noisy):
         return event
     if event is not None and history.effects[event.label].place == CLOCK_PLACE == there:
         return event  # a clock that wanders is still one that is wrong

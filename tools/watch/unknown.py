@@ -5,20 +5,20 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr
 
-from tools.diagnose.noise_probes import NoiseProbe, probes
-from tools.diagnose.unknown import LEFT_OVER, LEFT_WIDTH, OWN_LEFT, place_alone
-from tools.inference.parameters import CLOCK_PLACE
-from tools.watch.disorder import SCALES, WATER, beyond_reference
-from tools.watch.flights import roughness_sigma
-from tools.watch.history import Event, History
+from glider.tools.diagnose.noise_probes import NoiseProbe, probes
+from glider.tools.diagnose.unknown import LEFT_OVER, LEFT_WIDTH, OWN_LEFT, place_alone
+from glider.tools.inference.parameters import CLOCK_PLACE
+from glider.tools.watch.excess_noise import SCALES, WATER, beyond_reference
+from glider.tools.watch.flights import excess_nis_sigma
+from glider.tools.watch.history import ChangeEvent, History
 
 PROBED, REFERENCE = 3, 2  # runs at most
-CLEAN = 5.0  # sigma of the mean squared innovation, below which nothing is left
+CLEAN_NIS_SIGMA = 5.0  # sigma of the mean squared innovation, below which nothing is left
 LEAST_PROBABILITY = 0.005
 
 
 @dataclass(frozen=True)
-class Left:
+class Residual:
     """What an event leaves in its runs: nat that the best probe gains there, over that and what the event explains."""
 
     share: float
@@ -32,31 +32,31 @@ class Left:
         return float(np.clip(ndtr(z), LEAST_PROBABILITY, 1.0 - LEAST_PROBABILITY))
 
 
-NOTHING = Left(0.0, [])
+NO_RESIDUAL = Residual(0.0, [])
 
 
-def what_is_left(history: History, event: Event) -> Left:
+def what_is_left(history: History, event: ChangeEvent) -> Residual:
     """Of an event in the runs that it has for itself."""
     runs = alone(history, event)
     explained = event.explained / max(1, int((event.span.weights(history.flights.count) > 0.0).sum()))
     flights = history.flights
-    rough = sorted(runs, key=lambda n: -roughness_sigma(flights, n))[:PROBED]
-    if not rough or roughness_sigma(flights, rough[0]) < CLEAN:
-        return NOTHING
-    wanted = [probe for probe in probes(flights.parts[rough[0]]) if probe.name not in WATER]
-    together = beyond_reference(flights, wanted, rough, REFERENCE).sum(axis=1)
+    noisy = sorted(runs, key=lambda n: -excess_nis_sigma(flights, n))[:PROBED]
+    if not noisy or excess_nis_sigma(flights, noisy[0]) < CLEAN_NIS_SIGMA:
+        return NO_RESIDUAL
+    wanted = [probe for probe in probes(flights.parts[noisy[0]]) if probe.name not in WATER]
+    together = beyond_reference(flights, wanted, noisy, REFERENCE).sum(axis=1)
     order = np.argsort(-together.max(axis=1))
     found = [(wanted[n], float(together[n].max()), SCALES[int(together[n].argmax())]) for n in order]
     if event.has_course and found[0][0].element == CLOCK_PLACE[1] and history.effects[event.label].place == CLOCK_PLACE:
-        return NOTHING  # a clock that wanders is still one that is wrong
+        return NO_RESIDUAL  # a clock that wanders is still one that is wrong
     left = max(found[0][1], 0.0)
     place = history.effects[event.label].place if event.label in history.effects else ("", "")
     first, sure = place_alone((probe, gain) for probe, gain, _ in found)
     own = place[0] == "sensing" and place == first and sure > 0.5
-    return Left(left / max(left + explained * len(rough), 1e-9), found, own)
+    return Residual(left / max(left + explained * len(noisy), 1e-9), found, own)
 
 
-def alone(history: History, event: Event) -> np.ndarray:
+def alone(history: History, event: ChangeEvent) -> np.ndarray:
     """The runs that have this event and no other of another span; all of its runs, where there are none."""
     count = history.flights.count
     own = event.span.weights(count) > 0.0

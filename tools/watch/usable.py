@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from tools.data.runs import columns as names
-from tools.data.runs.run import Run
-from tools.inference.channels import recorded
-from tools.inference.ocean_inputs import lacking, steady_seconds
-from tools.inference.ocean_inputs import states as dive_states
-from tools.readings.stretches import flying, states
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.run import Run
+from glider.tools.inference.channels import recorded
+from glider.tools.inference.ocean_inputs import missing_input, steady_seconds
+from glider.tools.inference.ocean_inputs import states as dive_states
+from glider.tools.readings.stretches import flying, states
 
 SHORTEST_DIVE = 300.0  # s of an ocean glider's steady flight: as long as vertical water remembers itself
 SHORTEST = 15.0  # s of flight; the filter needs some seconds to find how a run began
@@ -52,15 +52,15 @@ def usable_dive(run: Run) -> Run | str:
     """The same of an ocean glider's run: it has to fly steadily for a while."""
     if run.rows < 2:
         return "no two samples"
-    missing = lacking(run)
+    missing = missing_input(run)
     if missing is not None:
         return f"no readings of {missing}"
     steady, whole = steady_seconds(run), float(run.t[-1] - run.t[0])
     if steady >= SHORTEST_DIVE:
         return run
     found = sorted(((float(state.mean()), why) for why, state in dive_states(run).items()), reverse=True)
-    told = ", ".join(f"{why} {100.0 * share:.0f} %" for share, why in found[:2] if share > 0.05)
-    return f"flies steadily for {steady:.0f} s of {whole:.0f} s only: {told or 'short stretches'}"
+    listed = ", ".join(f"{why} {100.0 * share:.0f} %" for share, why in found[:2] if share > 0.05)
+    return f"flies steadily for {steady:.0f} s of {whole:.0f} s only: {listed or 'short stretches'}"
 
 
 def readings_of(runs: list[Run]) -> set[str]:

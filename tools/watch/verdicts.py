@@ -5,34 +5,34 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tools.diagnose.matter import largest
-from tools.diagnose.probabilities import ERROR_RATE, TIE, softmax
-from tools.inference.predict import fly_windows_from
-from tools.watch.answer import CAUSE, NONE, UNKNOWN, EventAnswer, RunCause, RunVerdict, Sized
-from tools.watch.disorder import WATER
-from tools.watch.events import GROWING, STEP, Span
-from tools.watch.flights import roughness_sigma
-from tools.watch.history import Event, History, within
-from tools.watch.lasting import NO_WATER, STRANGE
-from tools.watch.scatter import FEW
-from tools.watch.search import EVIDENCE_NEEDED
-from tools.watch.unknown import NOTHING, Left, what_is_left
-from tools.watch.water import asked_above
+from glider.tools.diagnose.materiality import largest
+from glider.tools.diagnose.probabilities import ERROR_RATE, TIE, softmax
+from glider.tools.inference.predict import fly_windows_from
+from glider.tools.watch.answer import CAUSE, NONE, UNKNOWN, EventAnswer, RunCause, RunVerdict, Sized
+from glider.tools.watch.events import GROWING, STEP, Span
+from glider.tools.watch.excess_noise import WATER
+from glider.tools.watch.flights import excess_nis_sigma
+from glider.tools.watch.history import ChangeEvent, History, within
+from glider.tools.watch.lasting import NO_WATER, STRANGE
+from glider.tools.watch.scatter import MIN_SCATTER_RUNS
+from glider.tools.watch.search import EVIDENCE_NEEDED
+from glider.tools.watch.unknown import NO_RESIDUAL, Residual, what_is_left
+from glider.tools.watch.water import asked_above
 
-ROUGH = 6.0  # sigma of a run's mean squared innovation: something changed, though no label says what
+EXCESS_NIS_SIGMA = 6.0  # sigma of a run's mean squared innovation: something changed, though no label says what
 MOST_SURE = 0.995
 CI90 = 1.645
-OTHERWISE = 2.0  # times
+ALTERNATIVE_FACTOR = 2.0  # times
 SCATTERED = 3  # changes that touch
 VECTORS = ("gyro_bias", "current", "current_shear", "compass")  # labels whose parameters are parts of one length
 
 
 @dataclass
-class Settled:
+class ResolvedEvent:
     """An event that stands, and what is thought of it."""
 
-    event: Event
-    left: Left
+    event: ChangeEvent
+    left: Residual
     probability: float  # that there is such a change
     outside: float  # probability that it is none of the catalogue
     number: int  # of the event among those with a course; -1: it has none
@@ -46,30 +46,30 @@ class Settled:
         return None if self.unknown else self.event.label
 
 
-def settle(history: History) -> list[Settled]:
+def resolve_events(history: History) -> list[ResolvedEvent]:
     """The events that matter; those that no label explains, as unknown."""
-    found: list[Settled] = []
+    found: list[ResolvedEvent] = []
     number, kind = 0, history.flights.parts[0].kind
     for event in history.events:
         own, number = (number, number + 1) if event.has_course else (-1, number)
         if any(one.unknown and beside(one.event.span, event.span) for one in found):
             continue  # what mimics an unknown change is none of its own
-        if event.has_course and not matters(history, event, own):
+        if event.has_course and not material(history, event, own):
             continue
-        left = what_is_left(history, event) if event.has_course else NOTHING
+        left = what_is_left(history, event) if event.has_course else NO_RESIDUAL
         sure = 1.0 / (1.0 + np.exp(-np.clip(event.evidence - EVIDENCE_NEEDED, -50.0, 50.0)))
         outside = 1.0 - ERROR_RATE if event.label == "" else left.probability
         strange = event.strange
         if strange is not None and event.label and strange.moves(kind.measures) >= needed_of(history, event):
             chance = min(strange.chance(STRANGE if event.has_course else NO_WATER), 1.0 - ERROR_RATE)
             if chance > outside:
-                left, outside = Left(0.0, [(strange.place, chance, 1.0)]), chance
-        found.append(Settled(event, left, min(float(sure), most_sure(history)), outside, own))
+                left, outside = Residual(0.0, [(strange.place, chance, 1.0)]), chance
+        found.append(ResolvedEvent(event, left, min(float(sure), most_sure(history)), outside, own))
     found = one_form(found)
-    return one_unknown([*found, *nameless(history, found)])
+    return one_unknown([*found, *unattributed_changes(history, found)])
 
 
-def one_form(found: list[Settled]) -> list[Settled]:
+def one_form(found: list[ResolvedEvent]) -> list[ResolvedEvent]:
     """Three changes or more that touch, one of them of one run alone, are one of a form that no label has.
 
     An unknown form looks like another label, or another size of it, in each run that is flown otherwise.
@@ -83,9 +83,9 @@ def one_form(found: list[Settled]) -> list[Settled]:
     return [replace(one, outside=1.0 - ERROR_RATE) if id(one) in inside else one for one in found]
 
 
-def touching(found: list[Settled]) -> list[list[Settled]]:
+def touching(found: list[ResolvedEvent]) -> list[list[ResolvedEvent]]:
     """Changes in groups: each touches another of its own group, and none of the others."""
-    groups: list[list[Settled]] = []
+    groups: list[list[ResolvedEvent]] = []
     for one in found:
         near = [group for group in groups if any(touch(one.event.span, other.event.span) for other in group)]
         groups = [group for group in groups if group not in near] + [[one, *(other for g in near for other in g)]]
@@ -97,9 +97,9 @@ def of_one_run(span: Span) -> bool:
     return span.end - span.first == 1
 
 
-def one_unknown(found: list[Settled]) -> list[Settled]:
+def one_unknown(found: list[ResolvedEvent]) -> list[ResolvedEvent]:
     """Unknown changes of runs that overlap or follow on each other are one, at the place of the first."""
-    kept: list[Settled] = []
+    kept: list[ResolvedEvent] = []
     for one in found:
         other = next((k for k in kept if k.unknown and one.unknown and touch(k.event.span, one.event.span)), None)
         if other is None:
@@ -121,7 +121,7 @@ def touch(one: Span, other: Span) -> bool:
 def most_sure(history: History) -> float:
     """How probable an event can be at most: of what one or two runs share nobody knows that the next ones share it."""
     learned = int(history.flights.reference.sum())
-    return MOST_SURE if learned >= FEW else learned / (learned + 1.0)
+    return MOST_SURE if learned >= MIN_SCATTER_RUNS else learned / (learned + 1.0)
 
 
 def beside(one: Span, other: Span) -> bool:
@@ -129,28 +129,28 @@ def beside(one: Span, other: Span) -> bool:
     return abs(one.first - other.first) <= 1 and abs(one.end - other.end) <= 1
 
 
-def nameless(history: History, found: list[Settled]) -> list[Settled]:
-    """Runs in no event that are rougher than the reference by far: a change that no label takes."""
+def unattributed_changes(history: History, found: list[ResolvedEvent]) -> list[ResolvedEvent]:
+    """Runs in no event that are noisier than the reference by far: a change that no label takes."""
     flights = history.flights
-    least = max(ROUGH, asked_above(int(flights.reference.sum())))
+    least = max(EXCESS_NIS_SIGMA, asked_above(int(flights.reference.sum())))
     covered = np.zeros(flights.count, dtype=bool)
     for one in found:
         covered |= one.event.span.weights(flights.count) > 0.0
-    rough = np.array([
-        bool(history.judged[n]) and not covered[n] and n >= history.begins and roughness_sigma(flights, n) > least
+    noisy = np.array([
+        bool(history.judged[n]) and not covered[n] and n >= history.begins and excess_nis_sigma(flights, n) > least
         for n in range(flights.count)
     ])  # fmt: skip
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], rough.astype(int), [0]])))
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], noisy.astype(int), [0]])))
     more = []
     for first, end in zip(edges[::2], edges[1::2], strict=True):
         span = Span(int(first), int(end), STEP)
         evidence = float(sum(max(flights.excess(n), 0.0) for n in range(first, end))) / 2.0
-        event = Event("", span, evidence, {}, np.zeros(0), np.zeros((0, 0)), 0.0)
-        more.append(Settled(event, what_is_left(history, event), most_sure(history), 1.0 - ERROR_RATE, -1))
+        event = ChangeEvent("", span, evidence, {}, np.zeros(0), np.zeros((0, 0)), 0.0)
+        more.append(ResolvedEvent(event, what_is_left(history, event), most_sure(history), 1.0 - ERROR_RATE, -1))
     return more
 
 
-def matters(history: History, event: Event, number: int) -> bool:
+def material(history: History, event: ChangeEvent, number: int) -> bool:
     """Whether the change moves a channel of some window by as much as its kind of vehicle asks for (docs/GAP.md)."""
     weights = event.span.weights(history.flights.count)
     inside = sorted(np.flatnonzero(weights * history.judged), key=lambda n: -weights[n])
@@ -158,14 +158,14 @@ def matters(history: History, event: Event, number: int) -> bool:
     return any(moved_by(history, event, number, int(n)) >= needed for n in inside)
 
 
-def needed_of(history: History, event: Event) -> float:
+def needed_of(history: History, event: ChangeEvent) -> float:
     """Tolerances by which a change has to move a channel: twice as many where its runs were flown otherwise.
 
     A law of drag or lift that is not nature's shows when pitch, buoyancy or depth change, in all runs alike.
     """
     kind = history.flights.parts[0].kind
-    needed = kind.growth_matters if event.span.course == GROWING else kind.matters
-    return needed * (OTHERWISE if flown_otherwise(history, event.span) else 1.0)
+    needed = kind.material_growth if event.span.course == GROWING else kind.material
+    return needed * (ALTERNATIVE_FACTOR if flown_otherwise(history, event.span) else 1.0)
 
 
 def flown_otherwise(history: History, span: Span) -> bool:
@@ -185,7 +185,7 @@ def flown_otherwise(history: History, span: Span) -> bool:
     return bool(np.nanmax(apart, initial=0.0) > 1.0)
 
 
-def moved_by(history: History, event: Event, number: int, n: int) -> float:
+def moved_by(history: History, event: ChangeEvent, number: int, n: int) -> float:
     """The largest rms, in tolerances, by which a change moves a channel of a window of run n."""
     flights, shared = history.flights, history.flights.shared
     weights = event.span.weights(flights.count)
@@ -199,7 +199,7 @@ def moved_by(history: History, event: Event, number: int, n: int) -> float:
     return largest(part, Y, fly_windows_from(part, *shared.model(part, within(flights, without)), gains))
 
 
-def membership(event: Event, count: int) -> np.ndarray:
+def membership(event: ChangeEvent, count: int) -> np.ndarray:
     """Probability of each run to be in the event, by the evidence of its spans, (runs,)."""
     if not event.sure_spans:
         return (event.span.weights(count) > 0.0).astype(float)
@@ -208,7 +208,7 @@ def membership(event: Event, count: int) -> np.ndarray:
     return np.asarray(sum(chances[str(n)] * own for n, own in enumerate(inside)))
 
 
-def probabilities(one: Settled) -> dict[str, float]:
+def probabilities(one: ResolvedEvent) -> dict[str, float]:
     """Of the labels that the change may be, most probable first."""
     if one.unknown or not one.event.rivals:
         return {}
@@ -218,19 +218,19 @@ def probabilities(one: Settled) -> dict[str, float]:
     return dict(sorted(scaled.items(), key=lambda item: -item[1]))
 
 
-def group_of(history: History, one: Settled) -> list[str]:
+def group_of(history: History, one: ResolvedEvent) -> list[str]:
     """The labels that these runs cannot tell apart from the change's own, itself first."""
     if one.label is None:
         return []
     rivals = one.event.rivals
-    alike = history.flights.parts[0].one_group
-    if one.label in alike:
-        return [one.label, *(label for label in alike if label != one.label)]
+    confounded = history.flights.parts[0].one_group
+    if one.label in confounded:
+        return [one.label, *(label for label in confounded if label != one.label)]
     near = [label for label in rivals if rivals[one.label] - rivals[label] <= TIE and label != one.label]
     return [one.label, *sorted(near, key=lambda label: -rivals[label])]
 
 
-def sized(history: History, one: Settled, weight: float = 1.0) -> Sized:
+def sized(history: History, one: ResolvedEvent, weight: float = 1.0) -> Sized:
     """The change's size at a share of it, in the unit of its main parameter."""
     event = one.event
     if one.label is None:
@@ -258,15 +258,15 @@ def sized(history: History, one: Settled, weight: float = 1.0) -> Sized:
     return Sized(value, (value - CI90 * spread, value + CI90 * spread), free[main].unit, parameters)
 
 
-def water_size(event: Event) -> Sized:
-    """Of turbulence: by how much rougher the water is, less one, as the catalogue says it; of waves nothing."""
+def water_size(event: ChangeEvent) -> Sized:
+    """Of turbulence: by how much more turbulent the water is, less one, as the catalogue says it; of waves nothing."""
     scale, spread = float(event.size[0]), float(np.sqrt(event.covariance[0, 0]))
     if event.label != "turbulence":
         return Sized(None, None, None)
     return Sized(scale - 1.0, (scale - 1.0 - CI90 * spread, scale - 1.0 + CI90 * spread), "1")
 
 
-def where_of(history: History, one: Settled) -> list[dict[str, object]]:
+def where_of(history: History, one: ResolvedEvent) -> list[dict[str, object]]:
     """Places of the change, most probable first."""
     chances: dict[tuple[str, str], float] = {}
     if one.label is not None:
@@ -286,8 +286,8 @@ def where_of(history: History, one: Settled) -> list[dict[str, object]]:
     return [{"subsystem": s, "element": e, "probability": p} for (s, e), p in ranked if p > 0.005]
 
 
-def event_answer(history: History, one: Settled, names: list[str]) -> EventAnswer:
-    """An event as it is told; names: of all runs."""
+def event_answer(history: History, one: ResolvedEvent, names: list[str]) -> EventAnswer:
+    """An event as it is reported; names: of all runs."""
     span, count = one.event.span, history.flights.count
     inside = np.flatnonzero((span.weights(count) > 0.0) & history.judged)
     still = int(inside[-1]) == int(np.flatnonzero(history.judged)[-1])
@@ -306,11 +306,11 @@ def event_answer(history: History, one: Settled, names: list[str]) -> EventAnswe
     )  # fmt: skip
 
 
-def run_verdict(history: History, settled: list[Settled], n: int, name: str, gap: float | None) -> RunVerdict:
+def run_verdict(history: History, resolved: list[ResolvedEvent], n: int, name: str, gap: float | None) -> RunVerdict:
     """One run by the events that it is in."""
     count = history.flights.count
     causes, unknown = [], False
-    for one in settled:
+    for one in resolved:
         weight = float(one.event.span.weights(count)[n])
         if weight == 0.0:
             continue

@@ -5,35 +5,35 @@ from dataclasses import replace
 
 import numpy as np
 
-from sim_backend.ocean.vehicle import OceanVehicle
-from tools.data.errors import InputError
-from tools.data.runs.case import Case
-from tools.data.runs.run import Run
-from tools.gap.measure import run_gap
-from tools.inference.predict import fly
-from tools.inference.problem import Problem, cut, problem_of
-from tools.inference.shared_parameters import shared_parameters
-from tools.watch.answer import NONE, RunVerdict, Watch
-from tools.watch.events import GROWING
-from tools.watch.flights import Flights
-from tools.watch.history import History
-from tools.watch.scatter import FEW
-from tools.watch.search import find_events
-from tools.watch.usable import ASKED, readings_of, usable, usable_dive
-from tools.watch.velocity import own_model, velocity
-from tools.watch.verdicts import event_answer, matters, run_verdict, settle
+from glider.sim_backend.ocean.vehicle import OceanVehicle
+from glider.tools.data.errors import InputError
+from glider.tools.data.runs.case import Case
+from glider.tools.data.runs.run import Run
+from glider.tools.gap.measure import run_gap
+from glider.tools.inference.predict import fly
+from glider.tools.inference.problem import Problem, cut, problem_of
+from glider.tools.inference.shared_parameters import shared_parameters
+from glider.tools.watch.answer import NONE, RunVerdict, WatchAnswer
+from glider.tools.watch.events import GROWING
+from glider.tools.watch.flights import RunEnsemble
+from glider.tools.watch.history import History
+from glider.tools.watch.scatter import MIN_SCATTER_RUNS
+from glider.tools.watch.search import find_events
+from glider.tools.watch.usable import ASKED, readings_of, usable, usable_dive
+from glider.tools.watch.velocity import own_model, velocity
+from glider.tools.watch.verdicts import event_answer, material, resolve_events, run_verdict
 
 FIRST_SHARE = 3  # without a reference learning begins with one run in so many, at most as many as their kind says
 
 
-def watch(case: Case, reference: Case | None = None, say: Callable[[str], None] = lambda text: None) -> Watch:
+def watch(case: Case, reference: Case | None = None, say: Callable[[str], None] = lambda text: None) -> WatchAnswer:
     """What changed over the runs of a case; InputError where there is nothing to compare them with."""
     before = [] if reference is None else reference.runs
     runs, skipped = usable_runs([*before, *case.runs], isinstance(case.vehicle, OceanVehicle))
     count = len(before)
     here = sorted(runs)
-    told = [f"{reference.folder.name}/{run.name}" for run in before] if reference is not None else []
-    names = [*told, *(run.name for run in case.runs)]
+    reference_names = [f"{reference.folder.name}/{run.name}" for run in before] if reference is not None else []
+    names = [*reference_names, *(run.name for run in case.runs)]
     judged = np.array([reference is None or n >= count for n in here], dtype=bool)
     if not judged.any() or (reference is not None and judged.all()) or len(here) < 2:
         raise InputError(nothing_to_compare(skipped, names, count), source=case.folder)
@@ -44,12 +44,12 @@ def watch(case: Case, reference: Case | None = None, say: Callable[[str], None] 
     history = looked_at(parts, problem, learned_from, judged, begins, say)
     if reference is None:
         again = unchanged(history, learned_from)
-        if (again != learned_from).any() and again.sum() >= min(FEW, learned_from.sum()):
+        if (again != learned_from).any() and again.sum() >= min(MIN_SCATTER_RUNS, learned_from.sum()):
             say("something changed among the first runs: learning again from those without it")
             learned_from = again
             history = looked_at(parts, problem, learned_from, judged, begins, say)
-    settled = settle(history)
-    told_by = [names[n] for n in here]
+    resolved = resolve_events(history)
+    run_names = [names[n] for n in here]
     own = own_model(problem, learned_from) if isinstance(case.vehicle, OceanVehicle) else None
     verdicts = []
     for n, run in enumerate(case.runs, start=count):
@@ -58,11 +58,11 @@ def watch(case: Case, reference: Case | None = None, say: Callable[[str], None] 
             continue
         k = here.index(n)
         gap = shared_gap(parts[k], history.flights)
-        verdict = run_verdict(history, settled, k, run.name, gap)
-        verdicts.append(verdict if own is None else replace(verdict, velocity=velocity(own, history, settled, k)))
-    events = [event_answer(history, one, told_by) for one in settled]
-    learned = [told_by[k] for k in np.flatnonzero(learned_from)]
-    return Watch(verdicts, events, learned, cautions(case, reference, learned, skipped, names))
+        verdict = run_verdict(history, resolved, k, run.name, gap)
+        verdicts.append(verdict if own is None else replace(verdict, velocity=velocity(own, history, resolved, k)))
+    events = [event_answer(history, one, run_names) for one in resolved]
+    learned = [run_names[k] for k in np.flatnonzero(learned_from)]
+    return WatchAnswer(verdicts, events, learned, cautions(case, reference, learned, skipped, names))
 
 
 def usable_runs(runs: list[Run], ocean: bool = False) -> tuple[dict[int, Run], dict[int, str]]:
@@ -90,11 +90,15 @@ def first_runs(count: int, most: int) -> np.ndarray:
 
 
 def looked_at(
-    parts: list[Problem], problem: Problem, learned_from: np.ndarray, judged: np.ndarray, begins: int,
+    parts: list[Problem],
+    problem: Problem,
+    learned_from: np.ndarray,
+    judged: np.ndarray,
+    begins: int,
     say: Callable[[str], None],
 ) -> History:
     """The shared model learned, and the events found."""
-    flights = Flights(list(parts), shared_parameters(problem), learned_from)
+    flights = RunEnsemble(list(parts), shared_parameters(problem), learned_from)
     flights.learn()
     say(f"learned from {int(learned_from.sum())} runs what all share")
     history = History(flights, judged, begins)
@@ -111,14 +115,14 @@ def unchanged(history: History, learned_from: np.ndarray) -> np.ndarray:
     inside, early = np.zeros(count, dtype=bool), False
     for event in history.events:
         own, number = number, number + int(event.has_course)
-        if event.span.course == GROWING or (event.has_course and not matters(history, event, own)):
+        if event.span.course == GROWING or (event.has_course and not material(history, event, own)):
             continue
         early |= event.span.first < learned_from.sum()
         inside |= event.span.weights(count) > 0.0
     return ~inside if early else learned_from
 
 
-def shared_gap(part: Problem, flights: Flights) -> float | None:
+def shared_gap(part: Problem, flights: RunEnsemble) -> float | None:
     """Total gap of a run to the model that all runs share."""
     Y = fly(part, *flights.shared.model(part, flights.values))
     total = run_gap(part.kind.measures, part.runs[0], Y, cut(part).listed[0]).total
@@ -138,7 +142,7 @@ def cautions(
 ) -> list[str]:
     """What has to be said with the answer."""
     found = []
-    if len(learned) < FEW:
+    if len(learned) < MIN_SCATTER_RUNS:
         found.append(
             f"only {len(learned)} run{'' if len(learned) == 1 else 's'} to learn from: how much runs differ though "
             "nothing changed is assumed, not learned, and a model that is wrong may pass for a change"

@@ -7,16 +7,23 @@ import numpy as np
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from tools.diagnose.noise_probes import TURBULENCE, WAVES, NoiseProbe, inflated, probes
-from tools.diagnose.unknown import ONE_AXIS
-from tools.diagnose.waves import LINE, line_share
-from tools.watch.disorder import SCALES, WATER, beyond_reference, shaken, water_gains, water_labels
-from tools.watch.events import GROWING
-from tools.watch.flights import Flights, numbers, roughness_sigma
-from tools.watch.history import NOT_ROUGH, Event, History, within
-from tools.watch.label_fit import values_of
-from tools.watch.scatter import FEW, PRIOR_RUNS
-from tools.watch.unknown import LEFT_OVER
+from glider.tools.diagnose.noise_probes import TURBULENCE, WAVES, NoiseProbe, inflated, probes
+from glider.tools.diagnose.unknown import ONE_AXIS
+from glider.tools.diagnose.waves import LINE, line_share
+from glider.tools.watch.events import GROWING
+from glider.tools.watch.excess_noise import (
+    SCALES,
+    WATER,
+    beyond_reference,
+    water_gains,
+    water_labels,
+    with_inflated_noise,
+)
+from glider.tools.watch.flights import RunEnsemble, excess_nis_sigma, numbers
+from glider.tools.watch.history import CLEAN_RUN_NAT, ChangeEvent, History, within
+from glider.tools.watch.label_fit import values_of
+from glider.tools.watch.scatter import MIN_SCATTER_RUNS, PRIOR_RUNS
+from glider.tools.watch.unknown import LEFT_OVER
 
 ASKED_ABOVE = 4.0  # sigma of a run's mean squared innovation over that of many others, for disorder to be looked for
 STRETCH = 5.0  # s
@@ -24,41 +31,45 @@ BURSTS = 0.65  # turbulence by 0.5 (weak) and less; changes that no label knows 
 PROBED = 2  # runs in which it is asked what shakes
 
 
-def water_event(history: History) -> Event | None:
+def water_event(history: History) -> ChangeEvent | None:
     """The water's disorder over the span where it gains most; None where it gains nothing."""
     flights, best = history.flights, None
     if history.water is None:
-        history.water = rough_water(flights, range(flights.count))
-    shaken_before = [event.span.weights(flights.count) > 0.0 for event in history.events if not event.has_course]
+        history.water = excess_water_noise(flights, range(flights.count))
+    inflated_before = [event.span.weights(flights.count) > 0.0 for event in history.events if not event.has_course]
     for span in history.listed():
         inside = span.weights(flights.count) > 0.0
-        if span.course == GROWING or any((inside & before).any() for before in shaken_before):
+        if span.course == GROWING or any((inside & before).any() for before in inflated_before):
             continue
         for label, gains in zip(water_labels(flights), history.water, strict=True):
             together = gains[inside].sum(axis=0)
             k = int(together.argmax())
             if best is None or together[k] > best.evidence:
                 size, gain = np.array([SCALES[k]]), float(together[k])
-                best = Event(label, span, gain, {label: gain}, size, np.diag(size**2 / 16.0), gain)
+                best = ChangeEvent(label, span, gain, {label: gain}, size, np.diag(size**2 / 16.0), gain)
     return best
 
 
-def rough_water(flights: Flights, runs: Sequence[int]) -> np.ndarray:
+def excess_water_noise(flights: RunEnsemble, runs: Sequence[int]) -> np.ndarray:
     """Nat that the water's disorder gains in runs, (labels, runs, scales); asked of rough ones only."""
-    found = np.full((len(water_labels(flights)), len(runs), len(SCALES)), -NOT_ROUGH)
+    found = np.full((len(water_labels(flights)), len(runs), len(SCALES)), -CLEAN_RUN_NAT)
     least = asked_above(int(flights.reference.sum()))
-    rough = [k for k, n in enumerate(runs) if roughness_sigma(flights, n) > least]
-    if rough:
-        found[:, rough] = water_gains(flights, [runs[k] for k in rough])
+    noisy = [k for k, n in enumerate(runs) if excess_nis_sigma(flights, n) > least]
+    if noisy:
+        found[:, noisy] = water_gains(flights, [runs[k] for k in noisy])
     return found
 
 
 def asked_above(learned: int) -> float:
     """ASKED_ABOVE where a run is held against a few: Student's t, by the runs learned from and what is usual."""
-    return ASKED_ABOVE if learned < FEW else float(student.isf(norm.sf(ASKED_ABOVE), learned - 1 + PRIOR_RUNS))
+    return (
+        ASKED_ABOVE
+        if learned < MIN_SCATTER_RUNS
+        else float(student.isf(norm.sf(ASKED_ABOVE), learned - 1 + PRIOR_RUNS))
+    )
 
 
-def named(history: History, event: Event) -> Event:
+def named(history: History, event: ChangeEvent) -> ChangeEvent:
     """Disorder by what shakes most: the water, or something else, which no label means.
 
     Turbulence shakes every axis, and it does so all the time. A sea that moves the vehicle by more than moving water
@@ -66,28 +77,28 @@ def named(history: History, event: Event) -> Event:
     """
     flights = history.flights
     inside = numbers((event.span.weights(flights.count) > 0.0) & history.judged)
-    loudest = sorted(inside, key=lambda n: -roughness_sigma(flights, n))[:PROBED]
-    wanted = probes(flights.parts[loudest[0]])
-    gains = beyond_reference(flights, wanted, loudest, PROBED).sum(axis=1).max(axis=1)
+    largest_nis = sorted(inside, key=lambda n: -excess_nis_sigma(flights, n))[:PROBED]
+    wanted = probes(flights.parts[largest_nis[0]])
+    gains = beyond_reference(flights, wanted, largest_nis, PROBED).sum(axis=1).max(axis=1)
     first = int(gains.argmax())
     if TURBULENCE not in [one.name for one in wanted]:  # of a kind whose water moves it one way
         return of_water(event, wanted[first].name) if wanted[first].name in WATER else linked(event, wanted, gains)
     own = gains[[one.name for one in wanted].index(TURBULENCE)]
     axes = [gain for gain, one in zip(gains, wanted, strict=True) if one.stage == "force" and one.name != TURBULENCE]
-    even = max(axes) < ONE_AXIS * own and max(burstiness(flights, n) for n in loudest) < BURSTS
+    even = max(axes) < ONE_AXIS * own and max(burstiness(flights, n) for n in largest_nis) < BURSTS
     if wanted[first].name == WAVES or (wanted[first].name == TURBULENCE and even):
         return of_water(event, wanted[first].name)
-    if wanted[first].name == TURBULENCE and a_sea(flights, loudest, wanted, gains):
+    if wanted[first].name == TURBULENCE and a_sea(flights, largest_nis, wanted, gains):
         return of_water(event, WAVES)
     return linked(event, wanted, gains)
 
 
-def of_water(event: Event, label: str) -> Event:
+def of_water(event: ChangeEvent, label: str) -> ChangeEvent:
     """Disorder of the water by its name."""
     return replace(event, label=label, rivals={label: event.evidence})
 
 
-def a_sea(flights: Flights, runs: Sequence[int], wanted: Sequence[NoiseProbe], gains: np.ndarray) -> bool:
+def a_sea(flights: RunEnsemble, runs: Sequence[int], wanted: Sequence[NoiseProbe], gains: np.ndarray) -> bool:
     """Whether no link but turbulence gains more than waves, and what they move has a sea's line; gains (probes,)."""
     others = [n for n, one in enumerate(wanted) if one.name != TURBULENCE]
     waves = wanted[max(others, key=lambda n: gains[n])]
@@ -103,14 +114,14 @@ def a_sea(flights: Flights, runs: Sequence[int], wanted: Sequence[NoiseProbe], g
     return min(shares) >= LINE
 
 
-def linked(event: Event, wanted: Sequence[NoiseProbe], gains: np.ndarray) -> Event:
+def linked(event: ChangeEvent, wanted: Sequence[NoiseProbe], gains: np.ndarray) -> ChangeEvent:
     """Disorder that no label means, at the single link that shakes most."""
     first = int(gains.argmax())
     link = max((n for n, one in enumerate(wanted) if one.name not in WATER), key=lambda n: gains[n])
     return replace(event, label="", rivals={}, probe=(wanted[first].name, float(event.size[0])), place=wanted[link])
 
 
-def burstiness(flights: Flights, n: int) -> float:
+def burstiness(flights: RunEnsemble, n: int) -> float:
     """By how much a run's squared innovations change from one stretch to the next, over how far they exceed 1."""
     part = flights.parts[n]
     E = part.filter(*flights.shared.model(part, flights.own_values(n)), begin=True).E
@@ -119,22 +130,24 @@ def burstiness(flights: Flights, n: int) -> float:
     return float(np.std(each) / max(np.mean(each) - 1.0, 0.05))
 
 
-def rougher(history: History, rough: Event, event: Event) -> bool:
+def noise_beats_label(history: History, noisy: ChangeEvent, event: ChangeEvent) -> bool:
     """Whether disorder says more of the runs than a label does; of other runs, whether it is the more evident.
 
     By more than what a label may leave: the form of nature's is never the catalogue's, and of a strong effect that
     little is more than any chance. What it leaves is asked about then (unknown.py).
     """
     flights = history.flights
-    both = (rough.span.weights(flights.count) > 0.0) & (event.span.weights(flights.count) > 0.0) & history.judged
+    both = (noisy.span.weights(flights.count) > 0.0) & (event.span.weights(flights.count) > 0.0) & history.judged
     if not both.any():
-        return rough.evidence > event.evidence
-    chosen = sorted(numbers(both), key=lambda n: -roughness_sigma(flights, n))[:PROBED]
-    weights, by_label, by_disorder = event.span.weights(flights.count), 0.0, 0.0
+        return noisy.evidence > event.evidence
+    chosen = sorted(numbers(both), key=lambda n: -excess_nis_sigma(flights, n))[:PROBED]
+    weights, by_label, by_excess_noise = event.span.weights(flights.count), 0.0, 0.0
     for n in chosen:
         x = flights.raw[n].at
         nothing = flights.own_cost(flights.parts[n], x)
-        by_disorder += nothing - flights.own_cost(shaken(flights.parts[n], rough.label, float(rough.size[0])), x)
+        by_excess_noise += nothing - flights.own_cost(
+            with_inflated_noise(flights.parts[n], noisy.label, float(noisy.size[0])), x
+        )
         changed = values_of(flights.shared, event.label, x, weights[n], event.size)
         by_label += nothing - flights.own_cost(flights.parts[n], within(flights, changed))
-    return by_label < (1.0 - LEFT_OVER) * by_disorder
+    return by_label < (1.0 - LEFT_OVER) * by_excess_noise

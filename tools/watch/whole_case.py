@@ -11,37 +11,45 @@ from typing import Any
 
 import numpy as np
 
-from sim_backend.ocean.catalogue import NOT_ASKED
-from sim_backend.ocean.vehicle import PLACES, OceanVehicle
-from tools.data.errors import InputError
-from tools.data.plain import as_plain
-from tools.data.runs.case import Case
-from tools.data.runs.csvfile import write_bytes
-from tools.data.runs.run import Run
-from tools.diagnose.noise_probes import VERTICAL_WATER
-from tools.diagnose.probabilities import ERROR_RATE, TIE, softmax
-from tools.diagnose.record import ANSWER, NONE, UNKNOWN
-from tools.diagnose.search import EVIDENCE_NEEDED
-from tools.diagnose.shrink import AFTER, BEFORE, FLOOR, RECALIBRATED, by_channel, shrinkage_of
-from tools.diagnose.unknown import MOSTLY
-from tools.gap.measure import RunGap, case_channels, root_mean_square, run_gap
-from tools.identify.ocean.files import corrected_text
-from tools.identify.ocean.findings import Calibration, far_from_file, one_of_each_group
-from tools.identify.ocean.identify import WORTH, precision_of
-from tools.identify.ocean.levels import find_levels, some_runs
-from tools.identify.ocean.next_run import flown, to_find, to_part
-from tools.inference.fit import bounded_step
-from tools.inference.parameters import NINETY
-from tools.inference.predict import fly_windows_from
-from tools.inference.problem import Problem, cut, problem_of
-from tools.inference.shared_model import About, fit_shared, heat_of
-from tools.inference.shared_parameters import shared_parameters
-from tools.inference.steady import first_values
-from tools.watch.answer import CAUSE
-from tools.watch.lasting import NO_WATER, beside_all
-from tools.watch.watch import usable_runs
-from tools.watch.whole_left import Left, disturbed, water_disorder, what_is_left
-from tools.watch.whole_search import ALIKE, Model, Round, Sought, Whole, seek, whole_model
+from glider.sim_backend.ocean.catalogue import NOT_ASKED
+from glider.sim_backend.ocean.vehicle import PLACES, OceanVehicle
+from glider.tools.data.errors import InputError
+from glider.tools.data.plain import as_plain
+from glider.tools.data.runs.case import Case
+from glider.tools.data.runs.csvfile import write_bytes
+from glider.tools.data.runs.run import Run
+from glider.tools.diagnose.noise_probes import VERTICAL_WATER
+from glider.tools.diagnose.probabilities import ERROR_RATE, TIE, softmax
+from glider.tools.diagnose.record import ANSWER, NONE, UNKNOWN
+from glider.tools.diagnose.search import EVIDENCE_NEEDED
+from glider.tools.diagnose.shrink import AFTER, BEFORE, FLOOR, RECALIBRATED, by_channel, shrinkage_of
+from glider.tools.diagnose.unknown import MOSTLY
+from glider.tools.gap.measure import RunGap, case_channels, root_mean_square, run_gap
+from glider.tools.identify.ocean.files import corrected_text
+from glider.tools.identify.ocean.findings import Calibration, far_from_file, one_of_each_group
+from glider.tools.identify.ocean.identify import EFFECTIVE_DIVES, precision_of
+from glider.tools.identify.ocean.levels import find_levels, some_runs
+from glider.tools.identify.ocean.next_run import flown, to_find, to_part
+from glider.tools.inference.fit import bounded_step
+from glider.tools.inference.parameters import NINETY
+from glider.tools.inference.predict import fly_windows_from
+from glider.tools.inference.problem import Problem, cut, problem_of
+from glider.tools.inference.shared_model import About, fit_shared, inflation_of
+from glider.tools.inference.shared_parameters import shared_parameters
+from glider.tools.inference.steady import first_values
+from glider.tools.watch.answer import CAUSE
+from glider.tools.watch.lasting import NO_WATER, beside_all
+from glider.tools.watch.watch import usable_runs
+from glider.tools.watch.whole_left import UnexplainedResidual, disturbed, excess_water_noise_of, what_is_left
+from glider.tools.watch.whole_search import (
+    CONFOUNDED_COSINE,
+    Model,
+    Round,
+    SelectionResult,
+    Whole,
+    forward_select,
+    whole_model,
+)
 
 ABSENT = 1e-6  # spreads: of an effect that is not asked for
 MOST_RUNS = 40
@@ -68,7 +76,7 @@ class OceanDiagnosis:
     skipped: dict[str, str]
     model: Model
     allowed: list[str]  # what the vehicle file leaves so open that no effect beside it can be seen
-    left: Left | None  # what no label explains
+    left: UnexplainedResidual | None  # what no label explains
     flown: list[Run]
     findings: list[Calibration]  # calibrations that the file allows, or nearly, and that are far from it
 
@@ -84,31 +92,31 @@ def diagnose_ocean(case: Case, say: Callable[[str], None] = lambda text: None) -
     problem = problem_of(case, runs=runs)
     parts = [problem.part(n) for n in range(len(runs))]
     shared = replace(shared_parameters(problem), allowed=1.0, effects=ABSENT)
-    heat, about = max(1.0, len(runs) / WORTH), About(parts, shared)
-    x = fit_shared(parts, shared, first_values(problem, shared.free), heat, about)
+    inflation, about = max(1.0, len(runs) / EFFECTIVE_DIVES), About(parts, shared)
+    x = fit_shared(parts, shared, first_values(problem, shared.free), inflation, about)
     identified = isinstance(case.vehicle, OceanVehicle) and case.vehicle.identified is not None
     if not identified:  # its noise is any vehicle's
         case = find_levels(case, problem_of(case, runs=some_runs(runs)), *shared.model(problem, x))
         problem = problem_of(case, runs=runs)
         parts = [problem.part(n) for n in range(len(runs))]
         about = About(parts, shared)
-        x = fit_shared(parts, shared, x, heat, about)
-    heat = max(heat, heat_of(about(x)))
-    start = whole_model(parts, shared, x, heat, about=about)
+        x = fit_shared(parts, shared, x, inflation, about)
+    inflation = max(inflation, inflation_of(about(x)))
+    start = whole_model(parts, shared, x, inflation, about=about)
     say(f"{len(runs)} runs; what the vehicle file allows, fitted")
-    sought = seek(parts, start, heat)
-    gaps = left_out_gaps(problem, parts, start, sought.model, heat)
-    if sought.model is not start and not identified and closes(gaps) < problem.kind.matters:
-        sought.model, gaps = start, left_out_gaps(problem, parts, start, start, heat)
-    model, main = sought.model, sought.main
+    selection = forward_select(parts, start, inflation)
+    gaps = left_out_gaps(problem, parts, start, selection.model, inflation)
+    if selection.model is not start and not identified and closes(gaps) < problem.kind.material:
+        selection.model, gaps = start, left_out_gaps(problem, parts, start, start, inflation)
+    model, main = selection.model, selection.main
     say(f"most evident: {main.best}, {main.evidence[main.best]:.1f} nat; {len(model.labels)} effects")
     left = what_is_left(parts, problem, model, gaps[AFTER], gaps[FLOOR])
-    rough = rougher_water(problem, parts, start, model, heat, left, gaps)
+    noisy = with_excess_water_noise(problem, parts, start, model, inflation, left, gaps)
     chances, group = chances_of(problem, main, bool(model.labels), left.probability)
-    groups = groups_beside(problem, main.before, heat) | {group[0]: group}
+    groups = groups_beside(problem, main.before, inflation) | {group[0]: group}
     selected = sorted(model.labels, key=lambda label: label != main.best)
-    if rough is not None:
-        gaps[FLOOR], left = rough
+    if noisy is not None:
+        gaps[FLOOR], left = noisy
         chances = with_water(chances, left.probability)
         selected = [VERTICAL_WATER, *selected]
     unknown = left.probability > 0.5
@@ -116,47 +124,54 @@ def diagnose_ocean(case: Case, say: Callable[[str], None] = lambda text: None) -
     selected = [] if unknown else selected
     return OceanDiagnosis(
         case, [run.name for run in runs], verdict, selected, chances, groups,
-        sizes(sought, problem.kind.form), places(problem, chances, left if unknown else None), gaps, *closings(gaps),
+        sizes(selection, problem.kind.form), places(problem, chances, left if unknown else None), gaps, *closings(gaps),
         main.evidence, skipped, model.shared.model(problem, model.x), open_numbers(problem), left if unknown else None,
-        runs, findings(problem, start, heat),
+        runs, findings(problem, start, inflation),
     )  # fmt: skip
 
 
-def findings(problem: Problem, start: Whole, heat: float) -> list[Calibration]:
+def findings(problem: Problem, start: Whole, inflation: float) -> list[Calibration]:
     """Calibrations that the file allows for, fitted without an effect, where they are far from the file."""
     own = [k for k, one in enumerate(start.shared.free) if not one.label]
-    normal, slope = precision_of(start.about, start.shared, start.x, heat)
+    normal, slope = precision_of(start.about, start.shared, start.x, inflation)
     free = [start.shared.free[k] for k in own]
-    told = far_from_file(free, start.x[own], normal[np.ix_(own, own)], slope[own], problem.model.P, [problem.one_group])
-    return one_of_each_group(told)
+    sentences = far_from_file(
+        free, start.x[own], normal[np.ix_(own, own)], slope[own], problem.model.P, [problem.one_group]
+    )
+    return one_of_each_group(sentences)
 
 
-def rougher_water(
-    problem: Problem, parts: list[Problem], start: Whole, model: Whole, heat: float, left: Left,
+def with_excess_water_noise(
+    problem: Problem,
+    parts: list[Problem],
+    start: Whole,
+    model: Whole,
+    inflation: float,
+    left: UnexplainedResidual,
     gaps: dict[str, list[RunGap]],
-) -> tuple[list[RunGap], Left] | None:
+) -> tuple[list[RunGap], UnexplainedResidual] | None:
     """The floor in water that is as rough as the readings ask for, and what is left then: where that is nothing, and
     where the water explains nearly all that can be explained (as turbulence does, tools/diagnose/unknown.py), and
     nothing that lasts is beside it.
     """
     if left.probability <= 0.5:
         return None
-    found = water_disorder(problem, left.probed)
-    explained = 0.5 * heat * (start.cost - model.cost)
+    found = excess_water_noise_of(problem, left.probed)
+    explained = 0.5 * inflation * (start.cost - model.cost)
     if found is None or found.gain < MOSTLY * (found.gain + explained):
         return None
-    beside = beside_all([disturbed(part, found) for part in parts], model.shared, model.x, heat)
-    if beside.chance(NO_WATER) > 0.5 and beside.moves(problem.kind.measures) >= problem.kind.matters:
+    beside = beside_all([disturbed(part, found) for part in parts], model.shared, model.x, inflation)
+    if beside.chance(NO_WATER) > 0.5 and beside.moves(problem.kind.measures) >= problem.kind.material:
         return None  # water has no lasting direction
     rng = np.random.default_rng(SEED)
-    models = [model.shared.model(part, x) for part, x in zip(parts, without_each(model, heat), strict=True)]
+    models = [model.shared.model(part, x) for part, x in zip(parts, without_each(model, inflation), strict=True)]
     floor = [floor_of(part, one, disturbed(part, found), rng) for part, one in zip(parts, models, strict=True)]
     then = what_is_left(parts, problem, model, gaps[AFTER], floor)
     return None if then.probability > 0.5 else (floor, then)
 
 
 def with_water(chances: dict[str, float], unknown: float) -> dict[str, float]:
-    """Probabilities where rougher water is the main cause."""
+    """Probabilities where excess water noise is the main cause."""
     others = {label: (1.0 - MOSTLY) * p for label, p in chances.items() if label != UNKNOWN}
     unknown = max(unknown, ERROR_RATE)
     rest = 1.0 - unknown
@@ -164,28 +179,26 @@ def with_water(chances: dict[str, float], unknown: float) -> dict[str, float]:
     return others | {VERTICAL_WATER: water, UNKNOWN: unknown}
 
 
-def chances_of(
-    problem: Problem, main: Round, there: bool, unknown: float
-) -> tuple[dict[str, float], list[str]]:
+def chances_of(problem: Problem, main: Round, there: bool, unknown: float) -> tuple[dict[str, float], list[str]]:
     """Probabilities of the main cause, of none and of an unknown one, and the labels that are one with the best.
 
     there: whether an effect was taken into the model.
     """
     best, evidence = main.best, main.evidence
-    alike = problem.kind.form_share * max(main.changes[best].gain, 0.0)
-    near = {label: value + min(alike, evidence[best] - value) for label, value in evidence.items()}
+    confounded = problem.kind.form_share * max(main.changes[best].gain, 0.0)
+    near = {label: value + min(confounded, evidence[best] - value) for label, value in evidence.items()}
     odds = softmax({NONE: EVIDENCE_NEEDED if there else EVIDENCE_NEEDED + max(near.values()), **near})
     unknown = max(unknown, ERROR_RATE)
     chances = {label: (1.0 - unknown) * p for label, p in odds.items()} | {UNKNOWN: unknown}
-    alike_group = problem.one_group if best in problem.one_group else ()
+    confounded_group = problem.one_group if best in problem.one_group else ()
     tied = sorted((n for n in near if near[best] - near[n] <= TIE), key=lambda n: -near[n])
-    return chances, [best, *(n for n in alike_group or tied if n != best)]
+    return chances, [best, *(n for n in confounded_group or tied if n != best)]
 
 
-def groups_beside(problem: Problem, model: Whole, heat: float) -> dict[str, list[str]]:
+def groups_beside(problem: Problem, model: Whole, inflation: float) -> dict[str, list[str]]:
     """By label those that the dives do not tell from it, all that is allowed beside it free; itself first."""
     shared = model.shared
-    A = np.array(sum(one.curvature for one in model.about)) / heat
+    A = np.array(sum(one.curvature for one in model.about)) / inflation
     own = [k for k, one in enumerate(shared.free) if not one.label]
     allowed = A[np.ix_(own, own)] + np.diag(shared.prior[own] ** -2.0)
     left = A - A[:, own] @ np.linalg.solve(allowed, A[own, :])
@@ -195,13 +208,13 @@ def groups_beside(problem: Problem, model: Whole, heat: float) -> dict[str, list
         for other, others in shared.labels.items():
             sizes = np.sqrt(np.outer(np.diag(left)[columns], np.diag(left)[others]))
             same = label in problem.one_group and other in problem.one_group
-            if other != label and (same or (np.abs(left[np.ix_(columns, others)]) > ALIKE * sizes).all()):
+            if other != label and (same or (np.abs(left[np.ix_(columns, others)]) > CONFOUNDED_COSINE * sizes).all()):
                 group.append(other)
         found[label] = group
     return found
 
 
-def places(problem: Problem, chances: dict[str, float], left: Left | None) -> list[dict[str, Any]]:
+def places(problem: Problem, chances: dict[str, float], left: UnexplainedResidual | None) -> list[dict[str, Any]]:
     """Where the cause is, by its labels; of an unknown one by the probes that gain, and where none does by the labels
     that come nearest to it.
     """
@@ -227,12 +240,12 @@ def open_numbers(problem: Problem) -> list[str]:
 
 
 def left_out_gaps(
-    problem: Problem, parts: list[Problem], start: Whole, model: Whole, heat: float
+    problem: Problem, parts: list[Problem], start: Whole, model: Whole, inflation: float
 ) -> dict[str, list[RunGap]]:
     """Gaps by run: nominal, recalibrated and corrected without the run, and of simulated runs."""
     rng = np.random.default_rng(SEED)
-    recalibrated = without_each(start, heat)
-    after = recalibrated if model is start else without_each(model, heat)
+    recalibrated = without_each(start, inflation)
+    after = recalibrated if model is start else without_each(model, inflation)
     gaps: dict[str, list[RunGap]] = {BEFORE: [], RECALIBRATED: [], AFTER: [], FLOOR: []}
     for n, part in enumerate(parts):
         models = {
@@ -257,18 +270,23 @@ def floor_of(part: Problem, model: Model, noisy: Problem, rng: np.random.Generat
     return replace(drawn[0], channels=channels, total=root_mean_square(channels.values()))
 
 
-def without_each(model: Whole, heat: float) -> list[np.ndarray]:
+def without_each(model: Whole, inflation: float) -> list[np.ndarray]:
     """Values fitted without each run, to first order; of a single run those fitted to it."""
     shared, x, found = model.shared, model.x, model.about
     if len(found) == 1:
         return [x]
     prior = np.diag(shared.prior**-2.0)
-    normal = sum(one.curvature for one in found) / heat + prior
-    slope = sum(one.slope for one in found) / heat + prior @ x
+    normal = sum(one.curvature for one in found) / inflation + prior
+    slope = sum(one.slope for one in found) / inflation + prior @ x
     low, high = np.minimum(shared.low - x, 0.0), np.maximum(shared.high - x, 0.0)
     still = bounded_step(normal, slope, low, high)
     return [
-        x + np.clip(bounded_step(normal - one.curvature / heat, slope - one.slope / heat, low, high) - still, low, high)
+        x
+        + np.clip(
+            bounded_step(normal - one.curvature / inflation, slope - one.slope / inflation, low, high) - still,
+            low,
+            high,
+        )
         for one in found
     ]
 
@@ -294,10 +312,10 @@ def closings(gaps: dict[str, list[RunGap]]) -> tuple[tuple[float, float, float],
     return (found.shrinkage, *found.ci90), (found.closed, *found.closed_ci90)
 
 
-def sizes(sought: Sought, form: float) -> dict[str, tuple[float, float, str, str]]:
+def sizes(selection: SelectionResult, form: float) -> dict[str, tuple[float, float, str, str]]:
     """Each label's size, SI: of those of the model by its fit, of others alone, as their parabola has it."""
-    found, model = {}, sought.model
-    for one in sought.main.changes.values():
+    found, model = {}, selection.model
+    for one in selection.main.changes.values():
         columns = model.shared.labels[one.label]
         free = model.shared.free[columns[0]]
         size = model.x[columns] if one.label in model.labels else one.size
@@ -322,9 +340,9 @@ def plain(found: OceanDiagnosis) -> dict[str, Any]:
         table[name] = {"value": value[0], "ci90": list(value[1:])}
     how = flown(found.flown)
     if found.left is not None:
-        told = to_find(found.left.regime, how)
+        sentences = to_find(found.left.regime, how)
     else:
-        told = to_part([*(found.groups.get(label, []) for label in found.selected),
+        sentences = to_part([*(found.groups.get(label, []) for label in found.selected),
                         *(one.group for one in found.findings)], how)  # fmt: skip
     return {
         "format": 1,
@@ -335,7 +353,7 @@ def plain(found: OceanDiagnosis) -> dict[str, Any]:
         "causes": causes,
         "selected": found.selected,
         "gap": table,
-        "next_run": {"text": told} if told else {},
+        "next_run": {"text": sentences} if sentences else {},
         "readings": [],
         "stages": [
             {"stage": "nominal", "gap": table[BEFORE]}, {"stage": "recalibrated", "gap": table[RECALIBRATED]},
@@ -353,18 +371,18 @@ def plain(found: OceanDiagnosis) -> dict[str, Any]:
 
 def cautions(found: OceanDiagnosis) -> list[str]:
     """What has to be said with the answer."""
-    told = []
+    sentences = []
     if found.allowed:
-        told.append(
+        sentences.append(
             f"the vehicle file leaves {', '.join(found.allowed)} open: what they can make up for is no effect here; "
             "identify the vehicle first (glider identify), and ask for what changed (glider gap watch)"
         )
-    told += [one.sentence for one in found.findings]
+    sentences += [one.sentence for one in found.findings]
     if found.left is not None:
-        told.append(found.left.sentence)
+        sentences.append(found.left.sentence)
     if len(found.runs) == 1:
-        told.append("one run only: nothing is left out, the gaps are those of runs that were fitted")
-    return told
+        sentences.append("one run only: nothing is left out, the gaps are those of runs that were fitted")
+    return sentences
 
 
 def write(found: OceanDiagnosis, out: Path) -> None:

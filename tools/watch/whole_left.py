@@ -10,31 +10,31 @@ from typing import Any
 
 import numpy as np
 
-from sim_backend.ocean.core import layout as at
-from tools.diagnose.noise_probes import VERTICAL_WATER, ProbeResult, inflated, probes, run_probes
-from tools.diagnose.search import EVIDENCE_NEEDED
-from tools.diagnose.unknown import LEFT_GAP, LEFT_GAP_WIDTH, WIDE_WIDTH, probability
-from tools.gap.measure import RunGap, mean_square, scored_rows
-from tools.identify.ocean.levels import BOUNDS
-from tools.inference.channels import errors
-from tools.inference.predict import fly_windows_from
-from tools.inference.problem import Problem, cut
-from tools.watch.whole_search import Model, Whole
+from glider.sim_backend.ocean.core import layout as at
+from glider.tools.diagnose.noise_probes import VERTICAL_WATER, ProbeResult, inflated, probes, run_probes
+from glider.tools.diagnose.search import EVIDENCE_NEEDED
+from glider.tools.diagnose.unknown import LEFT_GAP, LEFT_GAP_WIDTH, UNKNOWN_GAP_RATIO_WIDTH, probability
+from glider.tools.gap.measure import RunGap, mean_square, scored_rows
+from glider.tools.identify.ocean.levels import BOUNDS
+from glider.tools.inference.channels import errors
+from glider.tools.inference.predict import fly_windows_from
+from glider.tools.inference.problem import Problem, cut
+from glider.tools.watch.whole_search import Model, Whole
 
 THIRDS = ("shallow", "middle", "deep")  # of the runs' depth
 STEERED = {"roll"}  # channels in which a vehicle is steered: what moves them is a helm, and no gap
 STANDS_OUT = 1.5  # times the mean square of all rows, that a regime has
-CLEAN = 0.002  # probability of an unknown effect where nothing exceeds the floor
+NOTHING_LEFT_PROBABILITY = 0.002  # probability of an unknown effect where nothing exceeds the floor
 
 
 @dataclass
-class Left:
+class UnexplainedResidual:
     """What is left, in tolerances of one channel."""
 
     channel: str = ""
     excess: float = 0.0  # root of the difference of squares of gap and floor
     share: float = 1.0  # of the squared gap that there would be without the effects
-    probability: float = CLEAN  # that it is an effect that no label names
+    probability: float = NOTHING_LEFT_PROBABILITY  # that it is an effect that no label names
     regime: str = ""  # where most of it is
     runs: list[str] = field(default_factory=list)  # those that have most of it, where it is not in all alike
     probed: list[ProbeResult] = field(default_factory=list)
@@ -52,15 +52,15 @@ class Left:
         return f"{self.channel} is off by {self.excess:.1f} tolerances that no label explains{regime}{runs}"
 
 
-def water_disorder(problem: Problem, probed: Sequence[ProbeResult]) -> ProbeResult | None:
+def excess_water_noise_of(problem: Problem, probed: Sequence[ProbeResult]) -> ProbeResult | None:
     """The probe of the vertical water, where it gains more than any other, and what an effect needs; None where water
     would have to move more than any that is identified.
     """
     found = probed[0] if probed else None
     if found is None or found.probe.name != VERTICAL_WATER or found.gain < EVIDENCE_NEEDED:
         return None
-    roughest = BOUNDS["water"][1] / problem.case.disturbance.water
-    return found if np.hypot(1.0, found.scale) <= roughest else None
+    largest_excess = BOUNDS["water"][1] / problem.case.disturbance.water
+    return found if np.hypot(1.0, found.scale) <= largest_excess else None
 
 
 def disturbed(part: Problem, disorder: ProbeResult) -> Problem:
@@ -79,7 +79,7 @@ def beyond_floor(after: list[RunGap], floor: list[RunGap], channel: str) -> tupl
 
 def what_is_left(
     parts: Sequence[Problem], problem: Problem, model: Whole, after: list[RunGap], floor: list[RunGap]
-) -> Left:
+) -> UnexplainedResidual:
     """Of the model's gaps `after` run by run beyond the floor's.
 
     What has to matter is the least that is likely: the mean over runs less its standard error.
@@ -90,9 +90,9 @@ def what_is_left(
     least = {name: mean - error for name, (mean, error) in beyond.items()}
     channel = max(least, key=lambda name: least[name], default="")
     if not channel or least[channel] <= 0.0:
-        return Left(channel)
+        return UnexplainedResidual(channel)
     square = beyond[channel][0]
-    chance = probability(float(np.sqrt(least[channel])), problem.kind.matters, WIDE_WIDTH)
+    chance = probability(float(np.sqrt(least[channel])), problem.kind.material, UNKNOWN_GAP_RATIO_WIDTH)
     share = 1.0
     if model.labels:
         share = square / (square + taken(parts, model, channel))
@@ -101,7 +101,7 @@ def what_is_left(
     regime, runs = most_of_it(parts, model, channel, lowest)
     P, F = model.shared.model(problem, model.x)
     probed = run_probes(problem, P, F, probes(problem))
-    return Left(channel, float(np.sqrt(square)), share, chance, regime, runs, probed)
+    return UnexplainedResidual(channel, float(np.sqrt(square)), share, chance, regime, runs, probed)
 
 
 def missed(part: Problem, model: Model, channel: str) -> tuple[np.ndarray, np.ndarray]:

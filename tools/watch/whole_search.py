@@ -5,23 +5,23 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tools.diagnose.matter import largest
-from tools.diagnose.probabilities import TIE
-from tools.diagnose.search import EVIDENCE_NEEDED
-from tools.inference.expansion import Expansion
-from tools.inference.fit import bounded_step
-from tools.inference.predict import fly_windows_from
-from tools.inference.problem import Problem
-from tools.inference.shared_model import About, fit_shared, misfit
-from tools.inference.shared_parameters import SharedParameters
-from tools.watch.events import STEP, Change, Joint, Span
+from glider.tools.diagnose.materiality import largest
+from glider.tools.diagnose.probabilities import TIE
+from glider.tools.diagnose.search import EVIDENCE_NEEDED
+from glider.tools.inference.expansion import Expansion
+from glider.tools.inference.fit import bounded_step
+from glider.tools.inference.predict import fly_windows_from
+from glider.tools.inference.problem import Problem
+from glider.tools.inference.shared_model import About, fit_shared, misfit
+from glider.tools.inference.shared_parameters import SharedParameters
+from glider.tools.watch.events import STEP, Change, Joint, Span
 
 MOST_EFFECTS = 3
-TRIED = 4  # labels that are fitted at most before one is taken
-HALF = 0.5  # of the most evident parabola's: far from where they were taken parabolas may be wrong by so much
-ALIKE = 0.98  # cosine of two labels' columns
-REFITS, ENOUGH = 4, 1.0  # times that a fit is taken up again, while it brings so much squared sigma
-SHARES = (0.5, 0.2)  # of the step that parabolas promise, from which a fit begins where the whole leads too far
+MAX_FITTED_LABELS = 4  # labels that are fitted at most before one is taken
+PARABOLA_SHARE = 0.5  # of the most evident parabola's: far from where they were taken parabolas may be wrong by so much
+CONFOUNDED_COSINE = 0.98  # cosine of two labels' columns
+REFITS, CONVERGED_GAIN = 4, 1.0  # times that a fit is taken up again, while it brings so much squared sigma
+STEP_SHARES = (0.5, 0.2)  # of the step that parabolas promise, from which a fit begins where the whole leads too far
 Model = tuple[np.ndarray, np.ndarray]
 
 
@@ -32,7 +32,7 @@ class Whole:
     shared: SharedParameters  # the effects' entries are free as the file's are
     x: np.ndarray  # (count,) spreads
     labels: list[str]
-    cost: float  # -2 log likelihood over the heat, and the prior's
+    cost: float  # -2 log likelihood over the variance inflation, and the prior's
     about: list[Expansion]  # run by run
 
     def without(self, label: str) -> np.ndarray:
@@ -58,7 +58,7 @@ class Round:
 
 
 @dataclass
-class Sought:
+class SelectionResult:
     """The search's end: the model, and the rounds that led to it."""
 
     model: Whole
@@ -71,70 +71,72 @@ class Sought:
         return max(taken, key=lambda one: one.evidence[one.best], default=self.rounds[0])
 
 
-def cost_of(parts: Sequence[Problem], shared: SharedParameters, x: np.ndarray, heat: float) -> float:
-    """-2 log likelihood of all runs over the heat, and the prior's."""
-    return misfit(parts, shared, x, 1.0) / heat + float(x @ (x / shared.prior**2))
+def cost_of(parts: Sequence[Problem], shared: SharedParameters, x: np.ndarray, inflation: float) -> float:
+    """-2 log likelihood of all runs over the variance inflation, and the prior's."""
+    return misfit(parts, shared, x, 1.0) / inflation + float(x @ (x / shared.prior**2))
 
 
 def whole_model(
-    parts: Sequence[Problem], shared: SharedParameters, x: np.ndarray, heat: float, labels: Sequence[str] = (),
+    parts: Sequence[Problem], shared: SharedParameters, x: np.ndarray, inflation: float, labels: Sequence[str] = (),
     about: About | None = None,
 ) -> Whole:  # fmt: skip
     """The model of all runs fitted from x, until a fit brings no more."""
-    cost, about = cost_of(parts, shared, x, heat), About(parts, shared) if about is None else about
+    cost, about = cost_of(parts, shared, x, inflation), About(parts, shared) if about is None else about
     for _ in range(REFITS):
-        tried = fit_shared(parts, shared, x, heat, about)
-        found = cost_of(parts, shared, tried, heat)
+        tried = fit_shared(parts, shared, x, inflation, about)
+        found = cost_of(parts, shared, tried, inflation)
         gained = cost - found
         if gained > 0.0:
             x, cost = tried, found
-        if gained < ENOUGH:
+        if gained < CONVERGED_GAIN:
             break
     return Whole(shared, x, list(labels), cost, about(x))
 
 
-def with_effect(parts: Sequence[Problem], model: Whole, change: Change, heat: float) -> Whole:
+def with_effect(parts: Sequence[Problem], model: Whole, change: Change, inflation: float) -> Whole:
     """The model with one effect more, fitted from what the parabolas promise of it and of all else beside it."""
     own = set(model.shared.labels[change.label])
     free = [replace(one, label="") if k in own else one for k, one in enumerate(model.shared.free)]
     shared = replace(model.shared, free=free)
     weight = np.diag(shared.prior**-2.0)
-    normal = sum(one.curvature for one in model.about) / heat + weight
-    slope = sum(one.slope for one in model.about) / heat + weight @ model.x
+    normal = sum(one.curvature for one in model.about) / inflation + weight
+    slope = sum(one.slope for one in model.about) / inflation + weight @ model.x
     low, high = np.minimum(shared.low - model.x, 0.0), np.maximum(shared.high - model.x, 0.0)
     step = bounded_step(normal, slope, low, high)
     alone = np.zeros_like(step)
     alone[model.shared.labels[change.label]] = change.size
-    starts = [np.clip(model.x + one, shared.low, shared.high) for one in (step, *(k * step for k in SHARES), alone)]
-    start = min(starts, key=lambda x: cost_of(parts, shared, x, heat))
-    return whole_model(parts, shared, start, heat, [*model.labels, change.label])
+    starts = [
+        np.clip(model.x + one, shared.low, shared.high) for one in (step, *(k * step for k in STEP_SHARES), alone)
+    ]
+    start = min(starts, key=lambda x: cost_of(parts, shared, x, inflation))
+    return whole_model(parts, shared, start, inflation, [*model.labels, change.label])
 
 
-def alike(model: Whole, label: str) -> bool:
+def confounded(model: Whole, label: str) -> bool:
     """Whether a label moves the readings as an effect of the model does, or is that: it is none beside it."""
     A = np.array(sum(one.curvature for one in model.about))
     for own in model.labels:
         a, b = model.shared.labels[own], model.shared.labels[label]
         sizes = np.sqrt(np.outer(np.diag(A)[a], np.diag(A)[b]))
-        if own == label or (np.abs(A[np.ix_(a, b)]) > ALIKE * sizes).all():
+        if own == label or (np.abs(A[np.ix_(a, b)]) > CONFOUNDED_COSINE * sizes).all():
             return True
     return False
 
 
-def one_round(parts: Sequence[Problem], model: Whole, heat: float) -> Round:
+def one_round(parts: Sequence[Problem], model: Whole, inflation: float) -> Round:
     """Every label over all runs by their parabolas; the most evident ones fitted, until the next is far behind."""
-    joint = Joint(model.shared, [one.cooled(heat) for one in model.about], [])
-    listed = [one for one in joint.changes([Span(0, len(parts), STEP)]) if not alike(model, one.label)]
+    joint = Joint(model.shared, [one.tempered(inflation) for one in model.about], [])
+    listed = [one for one in joint.changes([Span(0, len(parts), STEP)]) if not confounded(model, one.label)]
     listed.sort(key=lambda one: -one.evidence)
     found = Round(model, {one.label: one for one in listed}, {one.label: one.evidence for one in listed}, {})
-    for change in listed[:TRIED]:
-        near = min(HALF * listed[0].evidence, found.evidence[found.best] - TIE) if found.fitted else -np.inf
+    for change in listed[:MAX_FITTED_LABELS]:
+        near = min(PARABOLA_SHARE * listed[0].evidence, found.evidence[found.best] - TIE) if found.fitted else -np.inf
         if found.fitted and change.evidence < max(near, 0.0):
             break
-        fit = found.fitted[change.label] = with_effect(parts, model, change, heat)
+        fit = found.fitted[change.label] = with_effect(parts, model, change, inflation)
         found.evidence[change.label] = change.evidence - change.gain + 0.5 * (model.cost - fit.cost)
     most = found.evidence[found.best]
-    for label in set(found.changes) - set(found.fitted):  # a parabola promises too much far from where it was taken
+    for label in set(found.changes) - set(found.fitted):  # a parabola predicts too much far from where it was taken
         found.evidence[label] = min(found.evidence[label], most)
     found.moved = moved_by(parts, found.fitted[found.best], found.best)
     return found
@@ -142,7 +144,7 @@ def one_round(parts: Sequence[Problem], model: Whole, heat: float) -> Round:
 
 def moved_by(parts: Sequence[Problem], model: Whole, label: str) -> float:
     """The largest rms, in tolerances, by which an effect moves a channel of a window: with it and without, all else
-    alike, as matter.movements has it.
+    alike, as materiality.movements has it.
     """
     found = 0.0
     for part in parts:
@@ -153,39 +155,39 @@ def moved_by(parts: Sequence[Problem], model: Whole, label: str) -> float:
     return found
 
 
-def evidence_beside(model: Whole, label: str, heat: float) -> float:
+def evidence_beside(model: Whole, label: str, inflation: float) -> float:
     """Nat of an effect of a model over its lack, everything else free, by the parabolas about the model."""
     columns = model.shared.labels[label]
-    normal = sum(one.curvature for one in model.about) / heat + np.diag(model.shared.prior**-2.0)
+    normal = sum(one.curvature for one in model.about) / inflation + np.diag(model.shared.prior**-2.0)
     precision = np.linalg.inv(np.linalg.inv(normal)[np.ix_(columns, columns)])
     size = model.x[columns]
     weighed = 0.5 * float(size @ precision @ size) - 0.5 * float(np.linalg.slogdet(precision)[1])
     return weighed + model.shared.odds.get(label, 0.0)
 
 
-def seek(parts: Sequence[Problem], start: Whole, heat: float) -> Sought:
+def forward_select(parts: Sequence[Problem], start: Whole, inflation: float) -> SelectionResult:
     """Effects added while they are evident and matter; one that those behind it make needless goes again.
 
-    What cannot be told from an effect is none beside it.
+    What cannot be distinguished from an effect is none beside it.
     """
-    sought, matters = Sought(start), parts[0].kind.matters
-    while len(sought.model.labels) < MOST_EFFECTS:
-        found = one_round(parts, sought.model, heat)
-        sought.rounds.append(found)
-        if found.evidence[found.best] < EVIDENCE_NEEDED or found.moved < matters:
+    selection, material = SelectionResult(start), parts[0].kind.material
+    while len(selection.model.labels) < MOST_EFFECTS:
+        found = one_round(parts, selection.model, inflation)
+        selection.rounds.append(found)
+        if found.evidence[found.best] < EVIDENCE_NEEDED or found.moved < material:
             break
-        sought.model = found.fitted[found.best]
-        before = {one: evidence_beside(sought.model, one, heat) for one in found.before.labels}
+        selection.model = found.fitted[found.best]
+        before = {one: evidence_beside(selection.model, one, inflation) for one in found.before.labels}
         weakest = min(before, key=lambda label: before[label], default="")
         if weakest and before[weakest] < EVIDENCE_NEEDED:
-            sought.model = lacking(parts, sought.model, weakest, heat)
+            selection.model = refit_without(parts, selection.model, weakest, inflation)
             break
-    return sought
+    return selection
 
 
-def lacking(parts: Sequence[Problem], model: Whole, label: str, heat: float) -> Whole:
+def refit_without(parts: Sequence[Problem], model: Whole, label: str, inflation: float) -> Whole:
     """The model without one of its effects, fitted."""
     own = set(model.shared.labels[label])
     free = [replace(one, label=label) if k in own else one for k, one in enumerate(model.shared.free)]
     kept = [one for one in model.labels if one != label]
-    return whole_model(parts, replace(model.shared, free=free), model.without(label), heat, kept)
+    return whole_model(parts, replace(model.shared, free=free), model.without(label), inflation, kept)

@@ -5,15 +5,15 @@
 
 import math
 
-from firmware.core.control.controllers import steer
-from firmware.core.control.guidance import follow, sequence
-from firmware.core.control.lyapunov_monitor import forget_lyapunov, monitor
-from firmware.core.estimation.navigation import navigate, stop_filter
-from firmware.core.estimation.sensing import sense, take_as_measured
-from firmware.core.jit import kernel
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.vehicle import layout
-from firmware.core.vehicle.actuators import actuator_table, limited
+from glider.firmware.core.control.controllers import steer
+from glider.firmware.core.control.guidance import follow, sequence
+from glider.firmware.core.control.lyapunov_monitor import forget_lyapunov, monitor
+from glider.firmware.core.estimation.navigation import navigate, stop_filter
+from glider.firmware.core.estimation.sensing import sense, take_as_measured
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.vehicle import layout
+from glider.firmware.core.vehicle.actuators import actuator_table, limited
 
 
 @kernel

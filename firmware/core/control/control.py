@@ -2,8 +2,8 @@
 
 import math
 
-from firmware.core.jit import kernel
-from firmware.core.vehicle.actuators import clip
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.vehicle.actuators import clip
 
 
 @kernel

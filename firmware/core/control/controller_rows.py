@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.layouts import control_layout as ctl
 
 
 @dataclass(frozen=True)

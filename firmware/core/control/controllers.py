@@ -6,13 +6,13 @@ PID flies. Whatever is wanted goes through `limited` afterwards (core/autopilot)
 
 import math
 
-from firmware.core.control.control import roll_law
-from firmware.core.control.law import OK
-from firmware.core.control.steering import angle_rates, depth_is_held, law_inputs, pid_inputs, start_pid
-from firmware.core.jit import kernel
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.vehicle.actuators import clip
-from firmware.core.vehicle.layout import BALLAST_MAX, BALLAST_MIN, SLIDER_MAX, SLIDER_MIN
+from glider.firmware.core.control.control import roll_law
+from glider.firmware.core.control.law import OK
+from glider.firmware.core.control.steering import angle_rates, depth_is_held, law_inputs, pid_inputs, start_pid
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.vehicle.actuators import clip
+from glider.firmware.core.vehicle.layout import BALLAST_MAX, BALLAST_MIN, SLIDER_MAX, SLIDER_MIN
 
 BUMP_TIME = 2.0  # s in which what a switch left over fades
 
@@ -37,17 +37,17 @@ def choose(C, legs, est, ap, t):
     depth_off = abs(est[ctl.EST_DEPTH] - ap[ctl.REF_DEPTH]) if depth_is_held(legs, ap) else 0.0
     if ap[ctl.ACTIVE] == ctl.LAW:
         calm = (
-            est[ctl.ROUGHNESS] < C[ctl.HYBRID_ROUGHNESS_OFF]
+            est[ctl.NOISE_SCALE] < C[ctl.HYBRID_ROUGHNESS_OFF]
             and pitch_left < C[ctl.HYBRID_PITCH_OFF]
             and depth_off < C[ctl.HYBRID_DEPTH_OFF]
         )
         return ctl.PID if calm else ctl.LAW
-    rough = (
-        est[ctl.ROUGHNESS] > C[ctl.HYBRID_ROUGHNESS_ON]
+    noise_scale = (
+        est[ctl.NOISE_SCALE] > C[ctl.HYBRID_ROUGHNESS_ON]
         or pitch_left > C[ctl.HYBRID_PITCH_ON]
         or depth_off > C[ctl.HYBRID_DEPTH_ON]
     )
-    return ctl.LAW if rough else ctl.PID
+    return ctl.LAW if noise_scale else ctl.PID
 
 
 @kernel

@@ -15,12 +15,12 @@ diagonal (Gershgorin). A bound and no estimate: all parameters at their worst to
 
 import math
 
-from firmware.core.control.input_forms import level
-from firmware.core.jit import kernel
-from firmware.core.vehicle.layout import CG_X, CG_Z, M_T, N_P
-from firmware.core.vehicle.mass import first_moment, inertia, translational_mass
-from firmware.core.vehicle.motion import momentum, momentum_rate, solve_mass_matrix
-from firmware.core.vehicle.water import water_wrench
+from glider.firmware.core.control.input_forms import level
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.vehicle.layout import CG_X, CG_Z, M_T, N_P
+from glider.firmware.core.vehicle.mass import first_moment, inertia, translational_mass
+from glider.firmware.core.vehicle.motion import momentum, momentum_rate, solve_mass_matrix
+from glider.firmware.core.vehicle.water import water_wrench
 
 
 @kernel

@@ -2,11 +2,11 @@
 
 import math
 
-from firmware.core.control.control import reference_step
-from firmware.core.jit import kernel
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.maths.rotations import wrap_angle
-from firmware.core.vehicle.actuators import clip
+from glider.firmware.core.control.control import reference_step
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.maths.rotations import wrap_angle
+from glider.firmware.core.vehicle.actuators import clip
 
 LEVEL = 0.17  # rad; flatter than this a glider has no grip to turn by
 

@@ -18,11 +18,11 @@ theta = +-90 deg alone, whatever the roll. Nothing here needs an angle: k, down 
 
 import math
 
-from firmware.core.jit import kernel
-from firmware.core.vehicle.layout import GRAVITY, M_S, M_T, X_B
-from firmware.core.vehicle.mass import first_moment, inertia, swung_moment, translational_mass
-from firmware.core.vehicle.motion import momentum_rate, solve_mass_matrix
-from firmware.core.vehicle.water import water_wrench
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.vehicle.layout import GRAVITY, M_S, M_T, X_B
+from glider.firmware.core.vehicle.mass import first_moment, inertia, roll_pendulum_moment, translational_mass
+from glider.firmware.core.vehicle.motion import momentum_rate, solve_mass_matrix
+from glider.firmware.core.vehicle.water import water_wrench
 
 
 @kernel
@@ -108,7 +108,7 @@ def paper_form(
     sf, cf, st, ct = level(kx, ky, kz)
     F1, F2, F3, _, T2, T3 = water_wrench(P, u, v, w, p, q, r)
     I1, I2, I3, _, _, _ = inertia(P, servo, slider, ballast)
-    sr = swung_moment(P)
+    sr = roll_pendulum_moment(P)
     turn = sf * q + cf * r
     pitch = ((I3 - I1) * p * r - GRAVITY * st * sr * math.cos(servo) + T2) / I2
     yaw = ((I1 - I2) * p * q + GRAVITY * st * sr * math.sin(servo) + T3) / I3
@@ -129,7 +129,7 @@ def roll_form(P, kx, ky, kz, u, v, w, p, q, r, servo, slider, ballast):
     _, _, _, T1, T2, T3 = water_wrench(P, u, v, w, p, q, r)
     I1, I2, I3, _, _, _ = inertia(P, servo, slider, ballast)
     S1 = P[M_S] * slider + ballast * P[X_B]
-    sr = swung_moment(P)
+    sr = roll_pendulum_moment(P)
     phi_dot, theta_dot, _ = output_rates(kx, ky, kz, u, v, w, p, q, r)
     H = tt * (cf * q - sf * r) * phi_dot + (sf * q + cf * r) * theta_dot / (ct * ct)
     J = (

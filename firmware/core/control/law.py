@@ -29,8 +29,8 @@ without a solution, the status is STEEP, and where anything is NaN or infinite i
 
 import math
 
-from firmware.core.jit import kernel
-from firmware.core.vehicle.actuators import clip
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.vehicle.actuators import clip
 
 OK, STEEP, NOT_FINITE = 0, 1, 2
 COS_PITCH_MIN = 0.1  # as for the estimator's Euler angles
@@ -139,6 +139,6 @@ def decrease_margin(s, g, k2, k3, eps, jerk, mismatch, model_error, disturbance)
     """By how much V = s^2/2 is sure to fall with real actuators, as an acceleration: V_dot <= -|s| margin.
 
     mismatch: what the form gives for x_dd with the actuators where they are and moving as they do, less what the law
-    wanted, g_ii (u_i - wanted_i) + g_ij (u_j - wanted_j). Not positive: nothing is promised.
+    wanted, g_ii (u_i - wanted_i) + g_ij (u_j - wanted_j). Not positive: nothing is guaranteed.
     """
     return abs(feedback(s, g, k2, k3, eps, jerk)) - abs(mismatch) - model_error - disturbance

@@ -10,12 +10,12 @@ should be: a saturated actuator is in the model, and since the law itself integr
 
 import math
 
-from firmware.core.control.input_forms import level
-from firmware.core.jit import kernel
+from glider.firmware.core.control.input_forms import level
+from glider.firmware.core.jit import kernel
 
 # Of the jerk that an actuator's rate gives. One would be the fastest braking without lag; the rest is left for the lag
 # and for what the reference asks for. Measured in docs/CONTROL.md.
-SHARE = 0.3
+BOUNDARY_LAYER_SHARE = 0.3
 
 
 @kernel

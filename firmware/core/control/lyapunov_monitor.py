@@ -5,7 +5,7 @@ Every WATCH_EVERY s while the law flies, for pitch and, where the law commands t
 - need: the smallest k2 that covers a vehicle within one sigma of [uncertainty], all parameters at their worst together,
   and the disturbance that the filter sees (law.k2_to_cover, error_bound).
 - margin: what is left with the actuators where they are (law.decrease_margin): positive, V is sure to fall by
-  |s| margin; not positive, nothing is promised. Estimates are taken for the truth. docs/CONTROL.md.
+  |s| margin; not positive, nothing is guaranteed. Estimates are taken for the truth. docs/CONTROL.md.
 
 Both are worked out with the exact form, whichever the law flies with, and without the observer's share of f: what
 either makes of the commands is in the mismatch.
@@ -13,15 +13,15 @@ either makes of the commands is in the mismatch.
 
 import math
 
-from firmware.core.control.error_bound import model_error_bound
-from firmware.core.control.input_forms import exact_form
-from firmware.core.control.law import decrease_margin, feedback, k2_to_cover
-from firmware.core.control.law_plus import SHARE
-from firmware.core.control.steering import angle_rates, depth_is_held, form_point
-from firmware.core.jit import kernel
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.layouts.estimator_layout import DISTURBANCE_HOLD, N_W, S_ANGULAR, S_LINEAR, W_SCRATCH
-from firmware.core.vehicle.layout import BALLAST_RATE, N_P, SLIDER_RATE
+from glider.firmware.core.control.error_bound import model_error_bound
+from glider.firmware.core.control.input_forms import exact_form
+from glider.firmware.core.control.law import decrease_margin, feedback, k2_to_cover
+from glider.firmware.core.control.law_plus import BOUNDARY_LAYER_SHARE
+from glider.firmware.core.control.steering import angle_rates, depth_is_held, form_point
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.layouts.estimator_layout import DISTURBANCE_HOLD, N_W, S_ANGULAR, S_LINEAR, W_SCRATCH
+from glider.firmware.core.vehicle.layout import BALLAST_RATE, N_P, SLIDER_RATE
 
 WATCH_EVERY = 0.2  # s; the bound takes longer than the law itself
 
@@ -62,7 +62,10 @@ def monitor(P, C, legs, nav, est, ap, t):
     f_t, f_z, g_ts, g_tb, g_zs, g_zb = exact_form(P, *form_point(P, est, ap))
     jerk_t = jerk_z = math.inf
     if C[ctl.CONTROLLER] == ctl.LAW_PLUS:
-        jerk_t, jerk_z = SHARE * abs(g_ts) * P[SLIDER_RATE], SHARE * abs(g_zb) * P[BALLAST_RATE]
+        jerk_t, jerk_z = (
+            BOUNDARY_LAYER_SHARE * abs(g_ts) * P[SLIDER_RATE],
+            BOUNDARY_LAYER_SHARE * abs(g_zb) * P[BALLAST_RATE],
+        )
     _, pitch_rate = angle_rates(est)
     ap[ctl.K2_NEED_PITCH] = k2_to_cover(off_t, d_t, g_ts, C[ctl.PITCH_EPS])
     ap[ctl.MARGIN_PITCH] = axis_margin(

@@ -5,15 +5,15 @@ Both share the estimate, the references and the limits; they differ in nothing e
 
 import math
 
-from firmware.core.control.control import pid, pitch_feedforward
-from firmware.core.control.input_forms import exact_form, paper_form
-from firmware.core.control.law import pitch_depth_law
-from firmware.core.control.law_plus import SHARE, on_outputs, reach
-from firmware.core.jit import kernel
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.vehicle import layout
-from firmware.core.vehicle.actuators import actuator_rates, actuator_table, clip
-from firmware.core.vehicle.mass import swung_moment
+from glider.firmware.core.control.control import pid, pitch_feedforward
+from glider.firmware.core.control.input_forms import exact_form, paper_form
+from glider.firmware.core.control.law import pitch_depth_law
+from glider.firmware.core.control.law_plus import BOUNDARY_LAYER_SHARE, on_outputs, reach
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.vehicle import layout
+from glider.firmware.core.vehicle.actuators import actuator_rates, actuator_table, clip
+from glider.firmware.core.vehicle.mass import roll_pendulum_moment
 
 
 @kernel
@@ -56,7 +56,7 @@ def pid_inputs(P, C, legs, est, ap, pitch_rate):
 @kernel
 def slider_feedforward(P, est, ap):
     """Where gravity alone holds the reference pitch, ballast as it is, m."""
-    sr = swung_moment(P)
+    sr = roll_pendulum_moment(P)
     low, high = P[layout.SLIDER_MIN], P[layout.SLIDER_MAX]
     return pitch_feedforward(sr, P[layout.M_S], P[layout.X_B], ap[ctl.REF_PITCH], est[ctl.EST_BALLAST], low, high)
 
@@ -122,7 +122,10 @@ def law_inputs(P, C, legs, est, ap, pitch_rate):
     f_t, f_z, g_ts, g_tb, g_zs, g_zb, ct = form_at(P, C, est, ap)
     jerk_t = jerk_z = math.inf
     if C[ctl.CONTROLLER] == ctl.LAW_PLUS:
-        jerk_t, jerk_z = SHARE * abs(g_ts) * P[layout.SLIDER_RATE], SHARE * abs(g_zb) * P[layout.BALLAST_RATE]
+        jerk_t, jerk_z = (
+            BOUNDARY_LAYER_SHARE * abs(g_ts) * P[layout.SLIDER_RATE],
+            BOUNDARY_LAYER_SHARE * abs(g_zb) * P[layout.BALLAST_RATE],
+        )
     slider, ballast, ap[ctl.S_PITCH], ap[ctl.S_DEPTH], status = pitch_depth_law(
         f_t, f_z, g_ts, g_tb, g_zs, g_zb, ct,
         est[ctl.EST_PITCH] - ap[ctl.REF_PITCH], pitch_rate - ap[ctl.REF_PITCH_RATE], ap[ctl.REF_PITCH_ACC],

@@ -2,10 +2,10 @@
 
 import math
 
-from firmware.core.jit import kernel
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.layouts import supervisor_layout as sup
-from hal.ports import BEACON, FRAME_SIZE
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.layouts import supervisor_layout as sup
+from glider.hal.ports import BEACON, FRAME_SIZE
 
 # Places in the record; firmware/telemetry.py gives them their names.
 REC_T, REC_CMD, REC_SLIDER, REC_BALLAST, REC_ATTITUDE, REC_RATES, REC_DEPTH = 0, 1, 4, 5, 6, 9, 12

@@ -30,17 +30,17 @@ up to SPEED_LIMIT, where the update holds the estimate. Tested in tests/unit/est
 
 import math
 
-from firmware.core.estimation.estimator_update import estimator_update
-from firmware.core.jit import kernel
-from firmware.core.layouts import estimator_layout as kf
-from firmware.core.maths.steps import MIDPOINT, end_stage
-from firmware.core.maths.wide import anywhere, everywhere, where
-from firmware.core.vehicle.actuators import actuator_rates
-from firmware.core.vehicle.flight import add_accelerations, state_derivative
-from firmware.core.vehicle.layout import N_X, SERVO_TAU, X_NU, X_QUAT
-from firmware.core.vehicle.linearise import N_POINT, linearise, linearise_motion, model_error
-from firmware.core.vehicle.state import actuators, normalise_attitude, quaternion
-from firmware.core.vehicle.time_constants import nominal_parts
+from glider.firmware.core.estimation.estimator_update import estimator_update
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.layouts import estimator_layout as kf
+from glider.firmware.core.maths.steps import MIDPOINT, end_stage
+from glider.firmware.core.maths.wide import anywhere, everywhere, where
+from glider.firmware.core.vehicle.actuators import actuator_rates
+from glider.firmware.core.vehicle.flight import add_accelerations, state_derivative
+from glider.firmware.core.vehicle.layout import N_X, SERVO_TAU, X_NU, X_QUAT
+from glider.firmware.core.vehicle.linearise import N_POINT, linearise, linearise_motion, model_error
+from glider.firmware.core.vehicle.state import actuators, normalise_attitude, quaternion
+from glider.firmware.core.vehicle.time_constants import nominal_parts
 
 T0, R0 = kf.W_T * kf.N_W, kf.W_TURNED * kf.N_W  # in the flat work: T = F cov, and A's columns
 

@@ -2,13 +2,13 @@
 
 import math
 
-from firmware.core.jit import kernel
-from firmware.core.layouts import estimator_layout as kf
-from firmware.core.maths.rotations import wrap_angle
-from firmware.core.maths.wide import anywhere, where
-from firmware.core.vehicle.actuators import clip
-from firmware.core.vehicle.layout import SERVO_MAX, SERVO_MIN, X_ACT, X_DOWN, X_NU, X_QUAT
-from firmware.core.vehicle.state import euler_angles, normalise_attitude, quaternion
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.layouts import estimator_layout as kf
+from glider.firmware.core.maths.rotations import wrap_angle
+from glider.firmware.core.maths.wide import anywhere, where
+from glider.firmware.core.vehicle.actuators import clip
+from glider.firmware.core.vehicle.layout import SERVO_MAX, SERVO_MIN, X_ACT, X_DOWN, X_NU, X_QUAT
+from glider.firmware.core.vehicle.state import euler_angles, normalise_attitude, quaternion
 
 
 @kernel
@@ -143,7 +143,7 @@ def estimator_update(P, settings, x, cov, inflation, z, rejected_for_s, scores, 
     phi, theta, psi = euler_angles(x)
     sf, cf, st, ct = math.sin(phi), math.cos(phi), math.sin(theta), math.cos(theta)
     for m in range(kf.N_Z):
-        here = abs(z[m]) < kf.LARGEST
+        here = abs(z[m]) < kf.LARGEST_READING
         scores[m] = math.nan
         if not anywhere(here):
             continue

@@ -1,4 +1,4 @@
-"""The estimator aboard: the Kalman filter stepped once a tick with whatever samples are new.
+"""The onboard estimator: the Kalman filter stepped once a tick with whatever samples are new.
 
 A sample is older than the tick by its delay; it is carried forward by the filter's own rates before it is compared, so
 that a slow beacon does not drag the depth behind. What is missing, late or refused is simply not there this tick.
@@ -9,17 +9,17 @@ restart is counted: the supervisor reports it (row FAULT_ESTIMATE of the fault t
 
 import math
 
-from firmware.core.estimation.estimator import estimator_start, estimator_step
-from firmware.core.jit import kernel
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.layouts import estimator_layout as kf
-from firmware.core.maths.rotations import euler_rates, quaternion_from_euler
-from firmware.core.maths.wide import anywhere, where
-from firmware.core.vehicle.layout import N_P, N_X, X_BALLAST, X_DOWN, X_EAST, X_NORTH, X_NU, X_QUAT, X_SLIDER
-from firmware.core.vehicle.state import actuators, euler_angles, rotation
+from glider.firmware.core.estimation.estimator import estimator_start, estimator_step
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.layouts import estimator_layout as kf
+from glider.firmware.core.maths.rotations import euler_rates, quaternion_from_euler
+from glider.firmware.core.maths.wide import anywhere, where
+from glider.firmware.core.vehicle.layout import N_P, N_X, X_BALLAST, X_DOWN, X_EAST, X_NORTH, X_NU, X_QUAT, X_SLIDER
+from glider.firmware.core.vehicle.state import actuators, euler_angles, rotation
 
-ROUGHNESS_TIME = 0.7  # s, in which the roughness follows scores that are twice (or half) what they should be
-ROUGHEST = 300.0  # times the vehicle file's disturbance
+NOISE_SCALE_TIME = 0.7  # s, in which the noise scale follows scores that are twice (or half) what they should be
+LARGEST_NOISE_SCALE = 300.0  # times the vehicle file's disturbance
 EULER_LIMIT = 1.4  # rad; beyond it Euler rates mean nothing and samples are taken as they are
 
 
@@ -77,7 +77,7 @@ def start_filter(P, nav, est, t):
     settings, sigma = nav[ctl.NAV_SETTINGS : ctl.NAV_SETTINGS + kf.N_S], nav[ctl.NAV_SIGMA : ctl.NAV_SIGMA + N_P]
     estimator_start(P, settings, sigma, x, cov, spread, work)
     nav[ctl.NAV_RUNNING], nav[ctl.NAV_TIME] = 1.0, t
-    nav[ctl.NAV_ROUGHNESS] = 1.0
+    nav[ctl.NAV_NOISE_SCALE] = 1.0
     nav[ctl.NAV_CALM] = nav[ctl.NAV_SETTINGS + kf.S_LINEAR]
     nav[ctl.NAV_CALM + 1] = nav[ctl.NAV_SETTINGS + kf.S_ANGULAR]
 
@@ -148,7 +148,7 @@ def write_estimate(nav, est, given):
     x = nav[ctl.NAV_X : ctl.NAV_X + kf.N_XE]
     write_state(nav[ctl.NAV_GIVEN : ctl.NAV_GIVEN + N_X] if given else x, est)
     write_errors(x, nav[ctl.NAV_COV : ctl.NAV_COV + kf.N_E * kf.N_E].reshape(kf.N_E, kf.N_E), est)
-    est[ctl.ROUGHNESS] = nav[ctl.NAV_ROUGHNESS]
+    est[ctl.NOISE_SCALE] = nav[ctl.NAV_NOISE_SCALE]
 
 
 @kernel
@@ -156,7 +156,7 @@ def adapt_process_noise(nav, scores, dt):
     """Adapt the process noise to the water: the gyro's squared innovations over their variance average 1 where it fits.
 
     A filter with the noise of calm water lags behind rough water, and one with that of rough water hands the gyro's
-    noise on. Roughness multiplies the disturbance's strength, and its square the spectral densities; it moves by the
+    noise on. The noise scale multiplies the disturbance's strength, and its square the spectral densities; it moves by the
     scores' logarithm, so that one wild sample does little, and never below what the vehicle file says.
     """
     total, count = 0.0, 0.0
@@ -169,12 +169,12 @@ def adapt_process_noise(nav, scores, dt):
     if not anywhere(seen):
         return
     step = min(total / where(seen, count, 1.0), 4.0) - 1.0
-    roughness = nav[ctl.NAV_ROUGHNESS] * math.exp(step * dt / ROUGHNESS_TIME)
-    roughness = where(seen, min(max(roughness, 1.0), ROUGHEST), nav[ctl.NAV_ROUGHNESS])
+    noise_scale = nav[ctl.NAV_NOISE_SCALE] * math.exp(step * dt / NOISE_SCALE_TIME)
+    noise_scale = where(seen, min(max(noise_scale, 1.0), LARGEST_NOISE_SCALE), nav[ctl.NAV_NOISE_SCALE])
     linear, angular = ctl.NAV_SETTINGS + kf.S_LINEAR, ctl.NAV_SETTINGS + kf.S_ANGULAR
-    nav[ctl.NAV_ROUGHNESS] = roughness
-    nav[linear] = where(seen, nav[ctl.NAV_CALM] * roughness * roughness, nav[linear])
-    nav[angular] = where(seen, nav[ctl.NAV_CALM + 1] * roughness * roughness, nav[angular])
+    nav[ctl.NAV_NOISE_SCALE] = noise_scale
+    nav[linear] = where(seen, nav[ctl.NAV_CALM] * noise_scale * noise_scale, nav[linear])
+    nav[angular] = where(seen, nav[ctl.NAV_CALM + 1] * noise_scale * noise_scale, nav[angular])
 
 
 @kernel

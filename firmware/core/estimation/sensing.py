@@ -2,11 +2,11 @@
 
 import math
 
-from firmware.core.jit import kernel
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.vehicle.layout import GRAVITY, PLUNGER_AREA
-from firmware.core.vehicle.seawater import water_density
-from hal.ports import BEACON, IMU, MAX_AGE_PERIODS, PLUNGER_WIRE, SLIDER_WIRE
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.vehicle.layout import GRAVITY, PLUNGER_AREA
+from glider.firmware.core.vehicle.seawater import water_density
+from glider.hal.ports import BEACON, IMU, MAX_AGE_PERIODS, PLUNGER_WIRE, SLIDER_WIRE
 
 
 @kernel

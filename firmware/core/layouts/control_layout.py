@@ -3,9 +3,9 @@
 Missions come as a matrix, one row a leg; nav is the estimator's own memory. SI and radians.
 """
 
-from firmware.core.layouts.cursor import Cursor
-from firmware.core.layouts.estimator_layout import N_E, N_S, N_W, N_WORK_ROWS, N_XE, N_Z
-from firmware.core.vehicle.layout import N_P, N_X
+from glider.firmware.core.layouts.cursor import Cursor
+from glider.firmware.core.layouts.estimator_layout import N_E, N_S, N_W, N_WORK_ROWS, N_XE, N_Z
+from glider.firmware.core.vehicle.layout import N_P, N_X
 
 # --- C: configuration -----------------------------------------------------------------------------------------------
 _c = Cursor()
@@ -28,7 +28,7 @@ ESTIMATOR = _c()  # MEASURED, FILTERED or GIVEN
 CONTROLLER, FORM = _c.each(2)  # PID, LAW, HYBRID, LAW_PLUS; EXACT or PAPER
 PITCH_K1, PITCH_K2, PITCH_K3, PITCH_EPS = _c.each(4)  # 1/s, m, 1/s, rad/s
 DEPTH_K1, DEPTH_K2, DEPTH_K3, DEPTH_EPS = _c.each(4)  # 1/s, kg, 1/s, m/s
-HYBRID_ROUGHNESS_ON, HYBRID_ROUGHNESS_OFF = _c.each(2)  # roughness past which the law takes over, and back
+HYBRID_ROUGHNESS_ON, HYBRID_ROUGHNESS_OFF = _c.each(2)  # noise scale past which the law takes over, and back
 HYBRID_PITCH_ON, HYBRID_PITCH_OFF = _c.each(2)  # rad still to go to the pitch target
 HYBRID_DEPTH_ON, HYBRID_DEPTH_OFF = _c.each(2)  # m off the depth reference
 HYBRID_DWELL = _c()  # s for which a choice stands at least
@@ -57,7 +57,7 @@ EST_SERVO = _est()  # rad
 EST_X, EST_Y = _est.each(2)  # m north and east of the start, by dead reckoning
 EST_WATER_N, EST_WATER_E = _est.each(2)  # m/s
 SD_DEPTH_RATE, SD_PITCH, SD_U = _est.each(3)  # 1 sigma: m/s, rad, m/s
-ROUGHNESS = _est()  # disturbance seen over the one in the vehicle file, 1 or more
+NOISE_SCALE = _est()  # disturbance seen over the one in the vehicle file, 1 or more
 MODEL_ERROR = _est(6)  # accelerations beside the model's, body axes, m/s2, rad/s2
 N_EST = _est.size
 
@@ -65,7 +65,7 @@ N_EST = _est.size
 _nav = Cursor()
 NAV_RUNNING, NAV_TIME = _nav.each(2)  # 1: started; s
 NAV_USED = _nav(4)  # times of the samples used, by sensor
-NAV_ROUGHNESS = _nav()  # disturbance seen over the one in the vehicle file, 1 or more
+NAV_NOISE_SCALE = _nav()  # disturbance seen over the one in the vehicle file, 1 or more
 NAV_CALM = _nav(2)  # the spectral densities of the vehicle file's disturbance
 NAV_SETTINGS = _nav(N_S)
 NAV_SIGMA = _nav(N_P)

@@ -7,7 +7,7 @@ Error state (N_E = 26): position (NED, m), attitude (rotation vector in body axe
 then what nothing turns: the model's error, the gyro's bias, the water.
 """
 
-from firmware.core.vehicle.layout import N_X
+from glider.firmware.core.vehicle.layout import N_X
 
 E_POS, E_ATT, E_NU, E_ACT, E_ERR, E_GYRO, E_WATER = 0, 3, 6, 12, 15, 21, 24
 N_MOVING = E_ACT  # rows of the linearised flight's matrix A: position, attitude, nu
@@ -62,7 +62,7 @@ GYRO_WANDER = 0.2  # 1/s
 SPEED_LIMIT, RATE_LIMIT = 1.5, 3.0  # m/s, rad/s
 STOP_MARGIN = 0.25  # share of an actuator's range
 COS_PITCH_MIN = 0.1
-LARGEST = 1e6  # a reading beyond it, or an infinite one, is none
+LARGEST_READING = 1e6  # a reading beyond it, or an infinite one, is none
 
 # --- rows of `work` (N_WORK_ROWS, N_W) ------------------------------------------------------------------------------
 # The first of them hold the linearised flight from step to step; the others are scratch.

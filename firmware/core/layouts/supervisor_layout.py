@@ -1,7 +1,7 @@
 """Where things stand in the supervisor's vector G: settings, what the runtime tells it, and its memory. SI."""
 
-from firmware.core.layouts.cursor import Cursor
-from hal.ports import BALLAST, BATTERY, BEACON, IMU, LEAK, PLUNGER_WIRE, SERVO, SLIDER, SLIDER_WIRE
+from glider.firmware.core.layouts.cursor import Cursor
+from glider.hal.ports import BALLAST, BATTERY, BEACON, IMU, LEAK, PLUNGER_WIRE, SERVO, SLIDER, SLIDER_WIRE
 
 # --- rows of the fault table: firmware/faults.py says of each who sees it, how soon, and what is done ----------------
 _row = Cursor()
@@ -32,8 +32,8 @@ _value = Cursor()
 PLACES = tuple(_value(width) for width in WIDTHS)  # of their values in the tables below
 N_VALUES = _value.size
 STATES = (SERVO, SLIDER, BALLAST)  # slots in which actuators say how they do
-FIT, MISTIMED, ABSURD, STUCK = 0.0, 1.0, 2.0, 3.0  # the verdict on a sample
-# hal.ports.Validity and hal.ports.Condition as the frame holds them
+FIT, MISTIMED, IMPLAUSIBLE, STUCK = 0.0, 1.0, 2.0, 3.0  # the verdict on a sample
+# glider.hal.ports.Validity and glider.hal.ports.Condition as the frame holds them
 VALID, FAULT = 1.0, 3.0
 WELL, ALARM, ALARM_KEPT, RETRYING, GIVEN_UP, WRONG_WAY, MISCONFIGURED = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0
 

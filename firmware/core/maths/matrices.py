@@ -1,6 +1,6 @@
 """Copies and products of arrays in kernels: without an array made on the way, which Numba's make, and without SciPy."""
 
-from firmware.core.jit import kernel
+from glider.firmware.core.jit import kernel
 
 
 @kernel

@@ -6,8 +6,8 @@ the Euler rates of equation (5) break.
 
 import math
 
-from firmware.core.jit import kernel
-from firmware.core.maths.wide import everywhere, where
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.maths.wide import everywhere, where
 
 
 @kernel

@@ -12,7 +12,7 @@ and counting that tuple's references costs a quarter of the step.
 Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.1; the limits of stability: II, IV.2.
 """
 
-from firmware.core.jit import inlined_kernel
+from glider.firmware.core.jit import inlined_kernel
 
 NODE, WEIGHT = 0, 1
 RK4 = ((0.0, 1.0 / 6.0), (0.5, 1.0 / 3.0), (0.5, 1.0 / 3.0), (1.0, 1.0 / 6.0))  # the classical one, order 4

@@ -9,8 +9,8 @@ import math
 
 from numba.extending import overload
 
-from firmware.core.jit import inlined_kernel
-from firmware.core.maths.wide_type import (
+from glider.firmware.core.jit import inlined_kernel
+from glider.firmware.core.maths.wide_type import (
     LANES,
     WIDE,
     anywhere,

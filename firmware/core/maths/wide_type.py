@@ -23,7 +23,7 @@ from numba.core.typeconv import Conversion
 from numba.extending import intrinsic, lower_builtin, lower_cast, models, overload, register_model, type_callable
 from numba.np import arrayobj
 
-from firmware.core.jit import CACHE_DIR
+from glider.firmware.core.jit import CACHE_DIR
 
 LANES = 4 if CACHE_DIR is not None else 1
 

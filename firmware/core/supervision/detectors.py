@@ -6,11 +6,11 @@ was screened (frame, G), what is believed (est) and what the autopilot is at (ap
 
 import math
 
-from firmware.core.estimation.sensing import longest_age
-from firmware.core.jit import kernel
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.layouts import supervisor_layout as sup
-from firmware.core.vehicle.layout import BALLAST_MAX, BALLAST_MIN, SERVO_MAX, SERVO_MIN, SLIDER_MAX, SLIDER_MIN
+from glider.firmware.core.estimation.sensing import longest_age
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.layouts import supervisor_layout as sup
+from glider.firmware.core.vehicle.layout import BALLAST_MAX, BALLAST_MIN, SERVO_MAX, SERVO_MIN, SLIDER_MAX, SLIDER_MIN
 
 LAG = 1.0  # s of the depth that lags, from which its rate is made
 SPANS = ((SERVO_MIN, SERVO_MAX), (SLIDER_MIN, SLIDER_MAX), (BALLAST_MIN, BALLAST_MAX))
@@ -18,7 +18,7 @@ IMPOSSIBLE = 100.0  # ranges; what a controller wants beyond that is no answer
 
 
 @kernel
-def lasting(G, timer, holds, t):
+def held_for(G, timer, holds, t):
     """For how long a condition has held, s; -1 where it does not."""
     if not holds:
         G[sup.SINCE + timer] = math.nan
@@ -57,7 +57,7 @@ def lost(G, sensor, t):
 @kernel
 def watch_sensors(G, frame, t):
     """Rows 1, 2, 4, 6, 10, 11, 20 and 23."""
-    gone = lasting(G, sup.T_IMU, lost(G, sup.SENSOR_IMU, t) or G[sup.SAMPLE_VERDICT + sup.SENSOR_IMU] == sup.STUCK, t)
+    gone = held_for(G, sup.T_IMU, lost(G, sup.SENSOR_IMU, t) or G[sup.SAMPLE_VERDICT + sup.SENSOR_IMU] == sup.STUCK, t)
     if gone >= 0.0:
         request(G, sup.FAULT_IMU_LOST, sup.LEVEL_2 if gone >= G[sup.HOLD_TIME] else sup.LEVEL_1)
     if lost(G, sup.SENSOR_BEACON, t):
@@ -71,7 +71,7 @@ def watch_sensors(G, frame, t):
         fitted = sensor <= sup.SENSOR_PLUNGER or math.isfinite(G[sup.TAKEN + sensor])
         if verdict == sup.MISTIMED or (fitted and outdated(G, sensor, t)):
             request(G, sup.FAULT_SAMPLE_TIME, sup.LEVEL_1)
-        if verdict == sup.ABSURD:
+        if verdict == sup.IMPLAUSIBLE:
             many = G[sup.UNFIT + sensor] >= G[sup.UNFIT_RUN]
             request(G, sup.FAULT_IMPLAUSIBLE, sup.LEVEL_2 if many else sup.LEVEL_1)
         if verdict == sup.STUCK:
@@ -95,9 +95,9 @@ def watch_leak(G, frame):
 def watch_battery(G, t):
     """Row 23: the newest fit voltage, as long as it is fresh; a silence ends an under-voltage, which has to last."""
     volts = math.nan if outdated(G, sup.SENSOR_BATTERY, t) else G[sup.LAST + sup.PLACES[sup.SENSOR_BATTERY]]
-    if lasting(G, sup.T_LOW, volts < G[sup.LOW_VOLTAGE], t) >= G[sup.VOLTAGE_TIME]:
+    if held_for(G, sup.T_LOW, volts < G[sup.LOW_VOLTAGE], t) >= G[sup.VOLTAGE_TIME]:
         request(G, sup.FAULT_VOLTAGE, sup.LEVEL_1)
-    if lasting(G, sup.T_LEAST, volts < G[sup.LEAST_VOLTAGE], t) >= G[sup.VOLTAGE_TIME]:
+    if held_for(G, sup.T_LEAST, volts < G[sup.LEAST_VOLTAGE], t) >= G[sup.VOLTAGE_TIME]:
         request(G, sup.FAULT_VOLTAGE, sup.LEVEL_2)
 
 
@@ -171,7 +171,7 @@ def watch_stall(G, i, measured, rate, tau, span, t):
         request(G, sup.FAULT_STALL, sup.LEVEL_1)
         return
     moved = abs(measured - G[sup.MARK + i]) > 0.25 * tolerance
-    stands = lasting(G, sup.T_STALL + i, off > tolerance and not moved, t)
+    stands = held_for(G, sup.T_STALL + i, off > tolerance and not moved, t)
     if stands <= 0.0:
         G[sup.MARK + i] = measured
     if moved:
@@ -202,11 +202,11 @@ def watch_depth(G, est, ap, t):
     flying = ap[ctl.MODE] == ctl.FLYING
     rate = depth_rate(G, depth, t)
     against = rate * pitch > 0.0 and abs(pitch) > G[sup.DISAGREE_PITCH] and abs(rate) > G[sup.DISAGREE_RATE]
-    if lasting(G, sup.T_DISAGREE, flying and against, t) >= G[sup.DISAGREE_TIME]:
+    if held_for(G, sup.T_DISAGREE, flying and against, t) >= G[sup.DISAGREE_TIME]:
         request(G, sup.FAULT_DISAGREE, sup.LEVEL_1)
-    if lasting(G, sup.T_DEEP, depth > G[sup.WORKING_DEPTH], t) >= G[sup.DEEP_TIME]:
+    if held_for(G, sup.T_DEEP, depth > G[sup.WORKING_DEPTH], t) >= G[sup.DEEP_TIME]:
         request(G, sup.FAULT_TOO_DEEP, sup.LEVEL_1)
-    if lasting(G, sup.T_RISK, depth > G[sup.RISK_DEPTH], t) >= G[sup.RISK_TIME]:
+    if held_for(G, sup.T_RISK, depth > G[sup.RISK_DEPTH], t) >= G[sup.RISK_TIME]:
         request(G, sup.FAULT_TOO_DEEP, sup.LEVEL_2)
     held = not flying or ap[ctl.REACHED] >= 0.0
     if held or not abs(depth - G[sup.BAND_MARK]) <= G[sup.SAME_BAND]:
@@ -245,13 +245,13 @@ def watch_attitude(G, est, ap, t):
     pitch, roll = abs(est[ctl.NEW_PITCH]), abs(est[ctl.NEW_ROLL])
     steep = pitch > max(G[sup.STEEP_PITCH], abs(ap[ctl.REF_PITCH]) + G[sup.STEEP_MARGIN])
     over = roll > max(G[sup.STEEP_ROLL], abs(ap[ctl.REF_ROLL]) + G[sup.STEEP_MARGIN])
-    bad = lasting(G, sup.T_STEEP, ap[ctl.MODE] == ctl.FLYING and (steep or over), t)
+    bad = held_for(G, sup.T_STEEP, ap[ctl.MODE] == ctl.FLYING and (steep or over), t)
     if bad >= 0.0:
         request(G, sup.FAULT_STEEP, sup.LEVEL_2 if bad >= G[sup.STEEP_TIME] else sup.LEVEL_1)
 
 
 @kernel
-def answerless(P, C, ap):
+def control_law_failed(P, C, ap):
     """True where the control law had no answer in this tick, or one beyond all measure."""
     for i in range(3):
         if not abs(ap[ctl.WANTED_SERVO + i]) <= IMPOSSIBLE * (P[SPANS[i][1]] - P[SPANS[i][0]]):  # NaN too
@@ -264,7 +264,7 @@ def watch_law(P, C, G, ap):
     """Row 22: the PID flies as long as the request stands; a law without an answer again and again is given up."""
     if ap[ctl.MODE] != ctl.FLYING:
         return
-    if answerless(P, C, ap):
+    if control_law_failed(P, C, ap):
         G[sup.LAW_FAILED] += 1.0
         request(G, sup.FAULT_NO_ANSWER, sup.LEVEL_2 if G[sup.LAW_FAILED] >= G[sup.LAW_RUN] else sup.LEVEL_1)
     elif C[ctl.CONTROLLER] == ctl.PID or ap[ctl.ACTIVE] != ctl.PID:
@@ -294,7 +294,7 @@ def watch_loop(G, t):
     else:
         G[sup.LATE_RUN] = 0.0
     many = G[sup.LATE_COUNT] * G[sup.TICK] > 60.0 * G[sup.OVERRUN_SHARE]
-    heavy = lasting(G, sup.T_HEAVY, G[sup.LATE_RUN] >= G[sup.OVERRUN_RUN] or many, t)
+    heavy = held_for(G, sup.T_HEAVY, G[sup.LATE_RUN] >= G[sup.OVERRUN_RUN] or many, t)
     if heavy >= 0.0:
         request(G, sup.FAULT_OVERRUN, sup.LEVEL_3 if heavy >= G[sup.HOLD_TIME] else sup.LEVEL_2)
     if G[sup.RESTARTED] == 1.0:

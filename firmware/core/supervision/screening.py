@@ -5,11 +5,11 @@ What is not fit is marked as FAULT in the frame, so that the estimator does with
 
 import math
 
-from firmware.core.estimation.sensing import longest_age
-from firmware.core.jit import kernel
-from firmware.core.layouts import supervisor_layout as sup
-from firmware.core.vehicle.layout import BALLAST_MAX, BALLAST_MIN, SLIDER_MAX, SLIDER_MIN
-from hal.ports import IMU
+from glider.firmware.core.estimation.sensing import longest_age
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.layouts import supervisor_layout as sup
+from glider.firmware.core.vehicle.layout import BALLAST_MAX, BALLAST_MIN, SLIDER_MAX, SLIDER_MIN
+from glider.hal.ports import IMU
 
 LOWS, HIGHS = (SLIDER_MIN, BALLAST_MIN), (SLIDER_MAX, BALLAST_MAX)
 
@@ -38,7 +38,7 @@ def keep(G, frame, sensor, table):
 
 
 @kernel
-def absurd(G, frame, sensor, elapsed):
+def implausible(G, frame, sensor, elapsed):
     """True where a value is not finite, out of its physical range, or farther from the last than anything moves."""
     start, place = sup.STARTS[sensor] + 2, sup.PLACES[sensor]
     for i in range(sup.WIDTHS[sensor]):
@@ -81,15 +81,15 @@ def stuck(P, G, frame, sensor, t):
 
 @kernel
 def judge(P, G, frame, sensor, t):
-    """The verdict on a sample not seen before: FIT, MISTIMED, ABSURD or STUCK."""
+    """The verdict on a sample not seen before: FIT, MISTIMED, IMPLAUSIBLE or STUCK."""
     time, last = frame[sup.STARTS[sensor]], G[sup.TAKEN + sensor]
     still = stuck(P, G, frame, sensor, t)
     if G[sup.ENABLED + sup.FAULT_SAMPLE_TIME] == 1.0:
         oldest = t - longest_age(G[sup.PERIOD + sensor], G[sup.TICK])
         if not oldest <= time <= t + 1e-6 or time <= last:
             return sup.MISTIMED
-    if G[sup.ENABLED + sup.FAULT_IMPLAUSIBLE] == 1.0 and absurd(G, frame, sensor, max(time - last, 0.0)):
-        return sup.ABSURD
+    if G[sup.ENABLED + sup.FAULT_IMPLAUSIBLE] == 1.0 and implausible(G, frame, sensor, max(time - last, 0.0)):
+        return sup.IMPLAUSIBLE
     return sup.STUCK if still else sup.FIT
 
 

@@ -5,15 +5,15 @@
 
 import math
 
-from firmware.core.control.guidance import abort
-from firmware.core.jit import kernel
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.layouts import supervisor_layout as sup
-from firmware.core.supervision import detectors
-from firmware.core.supervision.screening import start_place
-from firmware.core.supervision.surface import watch_surface
-from firmware.core.vehicle import layout
-from firmware.core.vehicle.actuators import actuator_table, limited
+from glider.firmware.core.control.guidance import abort
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.layouts import supervisor_layout as sup
+from glider.firmware.core.supervision import detectors
+from glider.firmware.core.supervision.screening import start_place
+from glider.firmware.core.supervision.surface import watch_surface
+from glider.firmware.core.vehicle import layout
+from glider.firmware.core.vehicle.actuators import actuator_table, limited
 
 ROUNDING = 1e-9
 
@@ -57,7 +57,7 @@ def stands(G, row):
 
 
 @kernel
-def settle(G, t):
+def arbitrate(G, t):
     """This tick's reaction and who asked for it; what each row asked for first and at most."""
     G[sup.CHANGED] = 0.0
     for row in range(1, sup.N_ROWS):
@@ -154,7 +154,7 @@ def guard(P, C, G, frame, est, ap, cmd, t):
     detectors.watch_estimate(G, ap)
     detectors.watch_loop(G, t)
     watch_limits(P, G, cmd)
-    settle(G, t)
+    arbitrate(G, t)
     act(P, G, cmd, ap, t)
     watch_surface(P, G, est, ap, scale, t)
     cautious = stands(G, sup.FAULT_DISAGREE) or stands(G, sup.FAULT_STEEP) or stands(G, sup.FAULT_NO_ANSWER)

@@ -8,12 +8,12 @@ the out-of-band process.
 
 import math
 
-from firmware.core.jit import kernel
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.layouts import supervisor_layout as sup
-from firmware.core.supervision.detectors import lasting, lost
-from firmware.core.vehicle.actuators import actuator_table
-from firmware.core.vehicle.layout import ACTUATORS
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.layouts import supervisor_layout as sup
+from glider.firmware.core.supervision.detectors import held_for, lost
+from glider.firmware.core.vehicle.actuators import actuator_table
+from glider.firmware.core.vehicle.layout import ACTUATORS
 
 LIGHT_RANGE_SHARE = 0.05  # of the ballast's range: nearer to its light end, it is there
 
@@ -34,7 +34,7 @@ def watch_surface(P, G, est, ap, scale, t):
     over = ap[ctl.MODE] >= ctl.COMPLETED
     known = t - G[sup.TAKEN + sup.SENSOR_BEACON] < G[sup.SURFACED_TIME]
     shallow = over and known and est[ctl.NEW_DEPTH] < G[sup.SURFACE_DEPTH]
-    held = lasting(G, sup.T_SURFACE, shallow, t) >= G[sup.SURFACED_TIME]
+    held = held_for(G, sup.T_SURFACE, shallow, t) >= G[sup.SURFACED_TIME]
     if not over:
         return
     low, high, rate, tau = actuator_table(P, ACTUATORS[2])

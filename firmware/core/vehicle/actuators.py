@@ -2,9 +2,9 @@
 
 import math
 
-from firmware.core.jit import kernel
-from firmware.core.maths.wide import where
-from firmware.core.vehicle import layout
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.maths.wide import where
+from glider.firmware.core.vehicle import layout
 
 
 @kernel

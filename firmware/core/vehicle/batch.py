@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from firmware.core.jit import allocating_kernel, kernel
-from firmware.core.maths.wide import LANES, as_wide
-from firmware.core.vehicle.flight import nominal_run
+from glider.firmware.core.jit import allocating_kernel, kernel
+from glider.firmware.core.maths.wide import LANES, as_wide
+from glider.firmware.core.vehicle.flight import nominal_run
 
 
 @kernel

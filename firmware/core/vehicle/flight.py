@@ -4,15 +4,15 @@ State x (N_X = 16): position north, east, down (m), attitude quaternion, nu = u 
 water), servo (rad), slider (m), ballast (kg).
 """
 
-from firmware.core.jit import inlined_kernel, kernel
-from firmware.core.maths.rotations import quaternion_rate, rotation_nb
-from firmware.core.maths.steps import RK4, end_stage
-from firmware.core.maths.wide import anywhere, where
-from firmware.core.vehicle.actuators import actuator_rates
-from firmware.core.vehicle.layout import N_X, X_BALLAST, X_DOWN, X_EAST, X_NORTH, X_NU, X_QUAT, X_SERVO, X_SLIDER
-from firmware.core.vehicle.motion import accelerations
-from firmware.core.vehicle.state import actuators, normalise_attitude, quaternion, velocities
-from firmware.core.vehicle.time_constants import nominal_parts
+from glider.firmware.core.jit import inlined_kernel, kernel
+from glider.firmware.core.maths.rotations import quaternion_rate, rotation_nb
+from glider.firmware.core.maths.steps import RK4, end_stage
+from glider.firmware.core.maths.wide import anywhere, where
+from glider.firmware.core.vehicle.actuators import actuator_rates
+from glider.firmware.core.vehicle.layout import N_X, X_BALLAST, X_DOWN, X_EAST, X_NORTH, X_NU, X_QUAT, X_SERVO, X_SLIDER
+from glider.firmware.core.vehicle.motion import accelerations
+from glider.firmware.core.vehicle.state import actuators, normalise_attitude, quaternion, velocities
+from glider.firmware.core.vehicle.time_constants import nominal_parts
 
 
 @inlined_kernel

@@ -4,11 +4,11 @@ Only rows that are not trivial stand in the matrix A (N_MOVING, N_COUPLED): posi
 the actuators. The estimator's other errors act on one of these each, with a factor of one (estimator_layout).
 """
 
-from firmware.core.jit import kernel
-from firmware.core.maths.wide import anywhere
-from firmware.core.vehicle.layout import N_P, X_NU
-from firmware.core.vehicle.motion import accelerations
-from firmware.core.vehicle.state import rotation, velocities
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.maths.wide import anywhere
+from glider.firmware.core.vehicle.layout import N_P, X_NU
+from glider.firmware.core.vehicle.motion import accelerations
+from glider.firmware.core.vehicle.state import rotation, velocities
 
 _STEP = 1e-5  # of the differences, in SI: truncation and rounding are both below 1e-6 of what is differentiated
 Y_BY_DOWN = 12  # in y: d(nu_dot)/dk, six numbers for each of k's three

@@ -2,12 +2,12 @@
 
 import math
 
-from firmware.core.jit import inlined_kernel, kernel
-from firmware.core.vehicle import layout
+from glider.firmware.core.jit import inlined_kernel, kernel
+from glider.firmware.core.vehicle import layout
 
 
 @inlined_kernel
-def swung_moment(P):
+def roll_pendulum_moment(P):
     """m_r R_r + m_s R_s, kg m: what the servo swings, times the distance from its axis."""
     return P[layout.M_R] * P[layout.R_R] + P[layout.M_S] * P[layout.R_S]
 
@@ -19,7 +19,7 @@ def first_moment(P, servo, slider, ballast):
     What the fixed hull trims out (ledger L1) is not in S: at gamma = 0, dr_s = 0, m_b = 0 only the pendulum is left.
     """
     gamma, dr_s, m_b = servo, slider, ballast
-    sr = swung_moment(P)
+    sr = roll_pendulum_moment(P)
     return (
         P[layout.M_S] * dr_s + m_b * P[layout.X_B] + P[layout.M_T] * P[layout.CG_X],
         sr * math.sin(gamma) + P[layout.M_T] * P[layout.CG_Y],
@@ -30,7 +30,7 @@ def first_moment(P, servo, slider, ballast):
 @kernel
 def first_moment_rate(P, servo, servo_rate, slider_rate, ballast_rate):
     """dS/dt from the actuators' speeds, kg m/s: what enters M_dot (the change of Jt is left out)."""
-    sr = swung_moment(P)
+    sr = roll_pendulum_moment(P)
     return (
         P[layout.M_S] * slider_rate + ballast_rate * P[layout.X_B],
         sr * math.cos(servo) * servo_rate,

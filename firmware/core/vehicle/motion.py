@@ -4,10 +4,10 @@ M = [[diag(m1, m2, m3), -S^], [S^, Jt]] with a diagonal upper left block, so eli
 symmetric 3 x 3 system for the rotations (Schur complement).
 """
 
-from firmware.core.jit import inlined_kernel, kernel
-from firmware.core.vehicle.layout import GRAVITY, NET_MASS
-from firmware.core.vehicle.mass import first_moment, first_moment_rate, inertia, translational_mass
-from firmware.core.vehicle.water import water_wrench
+from glider.firmware.core.jit import inlined_kernel, kernel
+from glider.firmware.core.vehicle.layout import GRAVITY, NET_MASS
+from glider.firmware.core.vehicle.mass import first_moment, first_moment_rate, inertia, translational_mass
+from glider.firmware.core.vehicle.water import water_wrench
 
 
 @inlined_kernel

@@ -1,13 +1,13 @@
 """Density of water from pressure, temperature and salinity: the UNESCO 1983 equation of state (EOS-80).
 
 Fofonoff and Millard, UNESCO technical papers in marine science 44 (1983). Valid for 0-42 PSU, -2-40 deg C,
-0-1000 bar; temperatures outside are held at the range's ends, so that a bad sample cannot make an absurd density.
+0-1000 bar; temperatures outside are held at the range's ends, so that a bad sample cannot make an implausible density.
 """
 
 import math
 
-from firmware.core.jit import kernel
-from firmware.core.vehicle.actuators import clip
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.vehicle.actuators import clip
 
 PA_PER_BAR = 1e5
 STANDARD_PRESSURE = 101325.0  # Pa, of the atmosphere at sea level

@@ -2,9 +2,9 @@
 
 import math
 
-from firmware.core.jit import inlined_kernel, kernel
-from firmware.core.maths.rotations import euler_from_quaternion, rotation_nb
-from firmware.core.vehicle.layout import X_BALLAST, X_NU, X_QUAT, X_SERVO, X_SLIDER
+from glider.firmware.core.jit import inlined_kernel, kernel
+from glider.firmware.core.maths.rotations import euler_from_quaternion, rotation_nb
+from glider.firmware.core.vehicle.layout import X_BALLAST, X_NU, X_QUAT, X_SERVO, X_SLIDER
 
 
 @inlined_kernel

@@ -28,13 +28,13 @@ margin. Rates of growth need no parts: an unstable vehicle diverges in any integ
 
 import math
 
-from firmware.core.jit import inlined_kernel, kernel
-from firmware.core.maths.steps import stable_product
-from firmware.core.maths.wide import anywhere, spread, where
-from firmware.core.vehicle import layout
-from firmware.core.vehicle.layout import X_BALLAST, X_SLIDER
-from firmware.core.vehicle.mass import swung_moment, translational_mass
-from firmware.core.vehicle.state import velocities
+from glider.firmware.core.jit import inlined_kernel, kernel
+from glider.firmware.core.maths.steps import stable_product
+from glider.firmware.core.maths.wide import anywhere, spread, where
+from glider.firmware.core.vehicle import layout
+from glider.firmware.core.vehicle.layout import X_BALLAST, X_SLIDER
+from glider.firmware.core.vehicle.mass import roll_pendulum_moment, translational_mass
+from glider.firmware.core.vehicle.state import velocities
 
 MOST_PARTS = 64  # of a step: enough for 0.1 s of K_p = -80 kg s/rad at 1 m/s; what is faster has left every vehicle
 STABLE_SHARE = 0.9  # of a method's limit: the state changes in the course of a step
@@ -46,7 +46,7 @@ def least_inertia(P, x):
     m1, m2, m3 = translational_mass(P, x[X_BALLAST])
     smallest = min(m1, min(m2, m3))
     m_r, m_s, x_r, x_s = P[layout.M_R], P[layout.M_S], P[layout.X_R], P[layout.R_SX0] + x[X_SLIDER]
-    across = abs(swung_moment(P)) + P[layout.M_T] * (abs(P[layout.CG_Y]) + abs(P[layout.CG_Z]))
+    across = abs(roll_pendulum_moment(P)) + P[layout.M_T] * (abs(P[layout.CG_Y]) + abs(P[layout.CG_Z]))
     along = m_s * x[X_SLIDER] + x[X_BALLAST] * P[layout.X_B] + P[layout.M_T] * P[layout.CG_X]
     tank = x[X_BALLAST] * P[layout.X_B] * P[layout.X_B]
     masses_along = m_r * x_r * x_r + m_s * x_s * x_s + tank

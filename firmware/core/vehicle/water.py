@@ -2,11 +2,11 @@
 
 import math
 
-from firmware.core.jit import kernel
-from firmware.core.maths.wide import everywhere, where
-from firmware.core.vehicle import layout
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.maths.wide import everywhere, where
+from glider.firmware.core.vehicle import layout
 
-STILL = 1e-6  # m/s; below this the flow has no direction and alpha = beta = 0
+STILL_SPEED = 1e-6  # m/s; below this the flow has no direction and alpha = beta = 0
 
 
 @kernel
@@ -14,7 +14,7 @@ def flow_angles(u, v, w):
     """Angle of attack, sideslip angle (rad) and squared speed through the water (m2/s2)."""
     v_squared = u * u + v * v + w * w
     speed = math.sqrt(v_squared)
-    still = speed < STILL
+    still = speed < STILL_SPEED
     if everywhere(still):
         return 0.0, 0.0, v_squared
     # + 0.0 makes -0.0 a zero like any other: atan2(0, -0.0) is pi, and flow_to_body knows no such flow
@@ -27,7 +27,7 @@ def flow_to_body(u, v, w, a, b, c):
     """R_bf [a, b, c], equation (3): from flow axes to body axes, with the sines and cosines taken from u, v, w."""
     plane = math.sqrt(u * u + w * w)
     speed = math.sqrt(u * u + v * v + w * w)
-    still, across = speed < STILL, plane > 0.0
+    still, across = speed < STILL_SPEED, plane > 0.0
     if everywhere(still):
         return a, b, c
     part = where(across, plane, 1.0)
@@ -47,7 +47,7 @@ def water_wrench(P, u, v, w, p, q, r):
 
     D = (K_D0 + K_D alpha^2) V^2, SF = K_beta beta V^2, L = (K_L0 + K_L alpha) V^2 (ledger L4; K_L alpha^2 with
     LIFT_PRINTED), T_DL1 = (K_MR beta + K_p p) V^2, T_DL2 = (K_M0 + K_M alpha + K_q q) V^2,
-    T_DL3 = (K_MY beta + K_r r) V^2; beside the print D_p p, D_q q, D_r r on the body's axes, which damp at rest too.
+    T_DL3 = (K_MY beta + K_r r) V^2; beside the paper's terms D_p p, D_q q, D_r r on the body's axes, which damp at rest too.
     """
     alpha, beta, v_squared = flow_angles(u, v, w)
     drag = (P[layout.K_D0] + P[layout.K_D] * alpha * alpha) * v_squared

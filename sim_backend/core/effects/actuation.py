@@ -2,12 +2,12 @@
 
 import math
 
-from firmware.core.jit import kernel
-from firmware.core.maths.wide import anywhere, everywhere, where
-from firmware.core.vehicle import layout
-from firmware.core.vehicle.actuators import actuator_rate, actuator_table, clip
-from firmware.core.vehicle.state import actuators
-from sim_backend.core.effects import effect_layout as ef
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.maths.wide import anywhere, everywhere, where
+from glider.firmware.core.vehicle import layout
+from glider.firmware.core.vehicle.actuators import actuator_rate, actuator_table, clip
+from glider.firmware.core.vehicle.state import actuators
+from glider.sim_backend.core.effects import effect_layout as ef
 
 SERVO_DRIVEN, SLIDER_DRIVEN, BALLAST_DRIVEN = 1, 2, 4  # mode: this actuator's input is a speed, not a command
 

@@ -11,10 +11,10 @@ from dataclasses import replace
 from functools import cache
 from typing import Any
 
-from hal.strict import ConfigError
-from sim_backend.core.effects import water_motion
-from sim_backend.core.effects.base import Effect, EffectError, Parameter
-from sim_backend.core.layout import LONGEST_DELAY
+from glider.hal.strict import ConfigError
+from glider.sim_backend.core.effects import water_motion
+from glider.sim_backend.core.effects.base import Effect, EffectError, Parameter
+from glider.sim_backend.core.layout import LONGEST_DELAY
 
 
 def _row(place: str, label: str, summary: str, *parameters: Parameter, apply: Callable[..., None] | None = None):
@@ -140,7 +140,7 @@ EFFECTS = (
     # the water moves faster the deeper
     _row("environment water", "current_shear", "velocity of the water a metre of depth",
          Parameter("north", "1/s", -0.3, 0.3, 0.02, "SHEAR_N"), Parameter("east", "1/s", -0.3, 0.3, 0.02, "SHEAR_E")),
-    # the water is rougher, or calmer, than its file says
+    # the water is more or less turbulent than its file says
     _row("environment water", "turbulence", "strength of the disturbance times 1 + scale",
          Parameter("scale", "1", -1.0, 50.0, 2.0), apply=water_motion.scale_disturbance),
     # a swell runs over the vehicle, dying out with depth
@@ -211,9 +211,7 @@ def catalogue() -> dict[str, Effect]:
     return found
 
 
-def check_values(
-    label: str, values: dict[str, float], effects: Mapping[str, Effect] | None = None
-) -> dict[str, float]:
+def check_values(label: str, values: dict[str, float], effects: Mapping[str, Effect] | None = None) -> dict[str, float]:
     """The effect's parameters with defaults filled in; EffectError names what is wrong. effects: another catalogue."""
     effects = catalogue() if effects is None else effects
     if label not in effects:
@@ -236,7 +234,7 @@ def check_flown(label: str, values: dict[str, float]) -> dict[str, float]:
     checked = check_values(label, values)
     effect = catalogue()[label]
     if (effect.subsystem, effect.element) == ("timing", "mocap"):
-        raise EffectError(f"effect {label} is one of motion capture's clock: no flight aboard has motion capture")
+        raise EffectError(f"effect {label} is one of motion capture's clock: no flight has motion capture")
     return checked
 
 

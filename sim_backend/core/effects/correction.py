@@ -2,14 +2,14 @@
 
 import math
 
-from firmware.core.jit import kernel
-from firmware.core.maths.wide import lane, spread
-from firmware.core.vehicle.layout import X_DOWN
-from firmware.core.vehicle.state import rotation, velocities
-from sim_backend.core.effects import effect_layout as ef
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.maths.wide import lane, spread
+from glider.firmware.core.vehicle.layout import X_DOWN
+from glider.firmware.core.vehicle.state import rotation, velocities
+from glider.sim_backend.core.effects import effect_layout as ef
 
 SPEED, DEPTH, ANGLE, RATE, PUMP, TIME = 0.3, 5.0, 0.1, 0.1, 0.03, 60.0  # of a glide: m/s, m, rad, rad/s, kg/s, s
-SLOWEST = 0.05  # m/s, below which angles of flow grow no more
+LEAST_FLOW_SPEED = 0.05  # m/s, below which angles of flow grow no more
 
 
 @kernel
@@ -20,7 +20,7 @@ def shapes(x, since, pump):
     """
     u, v, w, p, q, r = velocities(x)
     squared = u * u + v * v + w * w
-    speed = max(math.sqrt(squared), SLOWEST)
+    speed = max(math.sqrt(squared), LEAST_FLOW_SPEED)
     _, _, _, _, _, _, kx, _, _ = rotation(x)
     return (
         spread(1.0, squared), squared / (SPEED * SPEED), x[X_DOWN] / DEPTH, w / speed / ANGLE, v / speed / ANGLE,

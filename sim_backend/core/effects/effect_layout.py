@@ -5,8 +5,8 @@ The names of the first entries (ef.DRAG_0 and so on) are those that the catalogu
 (sim_backend/core/effects/catalogue), where units and meanings stand.
 """
 
-from firmware.core.vehicle.layout import N_X
-from sim_backend.core.effects.catalogue import ENTRIES
+from glider.firmware.core.vehicle.layout import N_X
+from glider.sim_backend.core.effects.catalogue import ENTRIES
 
 globals().update({name: number for number, name in enumerate(ENTRIES)})
 

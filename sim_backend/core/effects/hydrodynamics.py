@@ -2,14 +2,14 @@
 
 import math
 
-from firmware.core.jit import kernel
-from firmware.core.maths.wide import anywhere, where
-from firmware.core.vehicle import layout
-from firmware.core.vehicle.actuators import clip
-from firmware.core.vehicle.state import velocities
-from firmware.core.vehicle.time_constants import attack_bound, least_inertia
-from firmware.core.vehicle.water import flow_angles, flow_to_body
-from sim_backend.core.effects import effect_layout as ef
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.maths.wide import anywhere, where
+from glider.firmware.core.vehicle import layout
+from glider.firmware.core.vehicle.actuators import clip
+from glider.firmware.core.vehicle.state import velocities
+from glider.firmware.core.vehicle.time_constants import attack_bound, least_inertia
+from glider.firmware.core.vehicle.water import flow_angles, flow_to_body
+from glider.sim_backend.core.effects import effect_layout as ef
 
 
 @kernel

@@ -1,9 +1,9 @@
 """Effects of mass: more or less of it, elsewhere, and behind readings that do not show it."""
 
-from firmware.core.jit import kernel
-from firmware.core.maths.wide import everywhere, where
-from firmware.core.vehicle import layout
-from sim_backend.core.effects import effect_layout as ef
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.maths.wide import everywhere, where
+from glider.firmware.core.vehicle import layout
+from glider.sim_backend.core.effects import effect_layout as ef
 
 
 @kernel

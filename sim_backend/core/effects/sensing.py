@@ -2,13 +2,13 @@
 
 import math
 
-from firmware.core.jit import kernel
-from firmware.core.maths.rotations import wrap_angle
-from firmware.core.maths.wide import anywhere, where
-from firmware.core.vehicle.layout import X_BALLAST, X_DOWN, X_EAST, X_NORTH, X_NU, X_SLIDER
-from firmware.core.vehicle.state import euler_angles
-from sim_backend.core.effects import effect_layout as ef
-from sim_backend.core.effects.actuation import backlash
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.maths.rotations import wrap_angle
+from glider.firmware.core.maths.wide import anywhere, where
+from glider.firmware.core.vehicle.layout import X_BALLAST, X_DOWN, X_EAST, X_NORTH, X_NU, X_SLIDER
+from glider.firmware.core.vehicle.state import euler_angles
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.sim_backend.core.effects.actuation import backlash
 
 
 @kernel

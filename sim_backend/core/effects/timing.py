@@ -7,8 +7,8 @@ recording has them in rows (`mean_input`).
 
 import math
 
-from firmware.core.jit import kernel
-from sim_backend.core.effects import effect_layout as ef
+from glider.firmware.core.jit import kernel
+from glider.sim_backend.core.effects import effect_layout as ef
 
 
 @kernel

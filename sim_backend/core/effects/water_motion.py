@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from sim_backend.core.environment import wave_row
-from sim_backend.core.layout import ENV_ACC_ANGULAR, ENV_ACC_LINEAR, STREAM_WAVES
-from sim_backend.core.noise import uniform
+from glider.sim_backend.core.environment import wave_row
+from glider.sim_backend.core.layout import ENV_ACC_ANGULAR, ENV_ACC_LINEAR, STREAM_WAVES
+from glider.sim_backend.core.noise import uniform
 
 COMPONENTS = 5  # of a narrow spectrum
 SPACING = 0.05  # between their frequencies, of the middle one

@@ -2,8 +2,8 @@
 
 import math
 
-from firmware.core.jit import kernel
-from sim_backend.ocean.core.layout import (
+from glider.firmware.core.jit import kernel
+from glider.sim_backend.ocean.core.layout import (
     ADDED_MASS,
     AREA,
     COMPRESSIBILITY,
@@ -25,13 +25,13 @@ from sim_backend.ocean.core.layout import (
     F_PITCH_BIAS,
     F_PITCH_SCALE,
     GRAVITY,
+    LEAST_FLOW_SPEED,
     LIFT_SLOPE,
     MASS,
     OIL_SCALE,
     PASCALS_A_METRE,
     PITCH_OFFSET,
     PITCH_SCALE,
-    SLOWEST,
     STEEPEST_ANGLE,
     TEMPERATURE,
     THERMAL_EXPANSION,
@@ -110,8 +110,8 @@ def next_speed(P, speed, dt, force, drag):
     mass = P[MASS] + P[ADDED_MASS]
     c = dt * drag / mass
     ahead = speed + dt * force / mass
-    if ahead <= SLOWEST:
-        return SLOWEST, 0.0
+    if ahead <= LEAST_FLOW_SPEED:
+        return LEAST_FLOW_SPEED, 0.0
     root = math.sqrt(1.0 + 4.0 * c * ahead)
     return 2.0 * ahead / (1.0 + root), 1.0 / root
 
@@ -123,5 +123,5 @@ def steady_speed(P, F, pitch, density, buoyancy):
     for _ in range(8):
         path, drag = glide(P, F, speed, pitch, density)
         force = buoyancy * math.sin(path)
-        speed = math.sqrt(force / drag) if force > 0.0 else SLOWEST
-    return max(speed, SLOWEST), path
+        speed = math.sqrt(force / drag) if force > 0.0 else LEAST_FLOW_SPEED
+    return max(speed, LEAST_FLOW_SPEED), path

@@ -20,7 +20,7 @@ PITCH_SCALE = 12  # pitch reads so many times the truth
 ROLL_TRIM = 13  # rad, mean roll
 GRAVITY = 14  # m/s2
 ADDED_MASS = 15  # kg, along the path
-WATER_TIME = 16  # s, in which vertical water forgets itself
+WATER_TIME = 16  # s, in which vertical water decorrelates
 ROLL_TIME = 17  # s, the same of the roll
 N_P = 18
 

@@ -6,12 +6,12 @@ import shutil
 import msgspec
 import pytest
 
-from firmware.core.layouts import control_layout as ctl
-from firmware.model.supervisor_settings import Limits
-from hal.ports import BoardError, Condition, Hardware, Validity
-from tools.flight import arming
-from tools.flight.arming import Arming, Check, arm, refuse
-from tools.flight.compose import build_flight
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.model.supervisor_settings import Limits
+from glider.hal.ports import BoardError, Condition, Hardware, Validity
+from glider.tools.flight import arming
+from glider.tools.flight.arming import Arming, ArmingCheck, arm, refuse
+from glider.tools.flight.compose import build_flight
 
 
 @pytest.fixture
@@ -21,7 +21,7 @@ def flight():
     return flight
 
 
-def found(flight, folder=None, hardware=False, **more) -> dict[str, Check]:
+def found(flight, folder=None, hardware=False, **more) -> dict[str, ArmingCheck]:
     checks = Arming(flight, folder=folder, hardware=hardware).run(**more)
     return {check.name: check for check in checks}
 
@@ -40,7 +40,7 @@ def test_a_flight_that_is_fit_passes_every_check(flight, tmp_path):
     refuse(list(checks.values()))
 
 
-def one_refused(checks: dict[str, Check], name: str) -> str:
+def one_refused(checks: dict[str, ArmingCheck], name: str) -> str:
     assert [check.name for check in checks.values() if not check.passed] == [name]
     with pytest.raises(BoardError, match=f"^{name}: "):
         refuse(list(checks.values()))

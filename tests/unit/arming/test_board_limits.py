@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.layouts import supervisor_layout as sup
-from firmware.core.vehicle import layout
-from firmware.faults import Reaction
-from firmware.runtime import Ending
-from hal.recorder.recorder import NullRecorder
-from hal.strict import ConfigError
-from tools.bench.boardtext import set_values
-from tools.cli.check import check
-from tools.cli.fly import fly
-from tools.flight.compose import build_flight, build_runtime, record_specs
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.layouts import supervisor_layout as sup
+from glider.firmware.core.vehicle import layout
+from glider.firmware.faults import Reaction
+from glider.firmware.runtime import Ending
+from glider.hal.recorder.recorder import NullRecorder
+from glider.hal.strict import ConfigError
+from glider.tools.bench.boardtext import set_values
+from glider.tools.cli.check import check
+from glider.tools.cli.fly import fly
+from glider.tools.flight.compose import build_flight, build_runtime, record_specs
 
 TWIN = Path("sim_backend/boards/twin.toml").read_text()
 
@@ -31,7 +31,7 @@ def board(tmp_path, **limits_m):
 
 def plunger(tmp_path, share):
     """The twin's board file with a plunger that goes so far of its way to each end."""
-    from sim_backend.twins.boardfile import decode_twin_file
+    from glider.sim_backend.twins.boardfile import decode_twin_file
 
     vehicle = build_flight(mission="sawtooth").vehicle.actuators.ballast
     end = vehicle.range[1] / (998.2 * vehicle.plunger_area)

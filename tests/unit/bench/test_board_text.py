@@ -2,10 +2,10 @@
 
 import pytest
 
-from hal.boardfile import calibration_hash, decode_device_file
-from hal.strict import ConfigError
+from glider.hal.boardfile import calibration_hash, decode_device_file
+from glider.hal.strict import ConfigError
+from glider.tools.bench.boardtext import accepted, keep_old, replace_file, set_ports, set_values
 from tests.unit.hal.test_boardfile import TEXT, TWIN
-from tools.bench.boardtext import accepted, keep_old, replace_file, set_ports, set_values
 
 
 def test_only_what_is_set_changes():

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from tools.bench import record, sweep
-from tools.bench.calibrate import fit
-from tools.bench.client import BenchError
+from glider.tools.bench import record, sweep
+from glider.tools.bench.calibrate import fit
+from glider.tools.bench.client import BenchError
 
 STEP = 0.01
 
@@ -85,7 +85,7 @@ def test_places_too_near_each_other_are_no_line(places):
 
 
 def test_a_record_is_run_data(tmp_path):
-    from tools.data.runs.case import load_case
+    from glider.tools.data.runs.case import load_case
 
     rows = [[100.0 + 0.01 * i, None, 0.001 * i, None, 0.0, 0.0, 0.001 * i, 0.0, None, None] for i in range(50)]
     record.write_case(tmp_path / "case", record.table(rows), "roughie")

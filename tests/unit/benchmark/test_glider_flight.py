@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from support.ocean import as_case, fly_dives
 
-from sim_backend.foreign import ocean as foreign
-from sim_backend.ocean.core import layout as at
-from sim_backend.ocean.core.glide import net_buoyancy, steady_speed
-from tools.data.runs import columns as names
-from tools.measure.benchmark import ocean as measure
-from tools.measure.benchmark.glider_flight import (
+from glider.sim_backend.foreign import ocean as foreign
+from glider.sim_backend.ocean.core import layout as at
+from glider.sim_backend.ocean.core.glide import net_buoyancy, steady_speed
+from glider.tools.data.runs import columns as names
+from glider.tools.measure.benchmark import ocean as measure
+from glider.tools.measure.benchmark.glider_flight import (
     EVEN,
     MOVED,
     Glide,
@@ -21,15 +21,15 @@ from tools.measure.benchmark.glider_flight import (
     rises,
     water_rms,
 )
-from tools.study.challenge.ocean_cases import shipped_vehicle
+from glider.tools.study.challenge.ocean_cases import shipped_vehicle
 
 DIVES, REFERENCE, FIRST = 10, 5, 7
 
 
 @pytest.mark.parametrize("craft", ["slocum", "seaglider", "seaexplorer"])
 @pytest.mark.parametrize("pitch", [-0.42, 0.38])
-def test_its_glide_is_the_observers_where_that_is_steady(craft, pitch):
-    vehicle = shipped_vehicle(craft)
+def test_its_glide_is_the_observers_where_that_is_steady(vehicle_class, pitch):
+    vehicle = shipped_vehicle(vehicle_class)
     P, nothing, oil = vehicle.vector(), np.zeros(at.N_F), math.copysign(2.2e-4, pitch)
     density = P[at.MASS] / P[at.VOLUME] + 0.2
     glide = Glide(*(np.array([value]) for value in (pitch, density, 14.0, 8e5, oil, 0.0)))
@@ -100,9 +100,12 @@ def test_both_ways_judge_the_same_dives(changed, tmp_path):
     own, practice = measure.ours(case, REFERENCE, true), measure.theirs(case, REFERENCE, true)
     assert own.called.shape == practice.called.shape == true.shape
     assert np.array_equal(own.called, true)
-    told = measure.figures([own], [practice], "a_")
-    assert told["a_found"] == told["a_practice_found"] == 1.0
-    assert told["a_false_alarms"] == 0.0
-    assert told["a_w_rms_cm_s_ratio"] == told["a_w_rms_cm_s"] / told["a_practice_w_rms_cm_s"]
-    assert told["a_dives"] == DIVES - REFERENCE
-    assert 0.2 < told["a_w_rms_cm_s"] < 3.0
+    figures_by_name = measure.figures([own], [practice], "a_")
+    assert figures_by_name["a_found"] == figures_by_name["a_practice_found"] == 1.0
+    assert figures_by_name["a_false_alarms"] == 0.0
+    assert (
+        figures_by_name["a_w_rms_cm_s_ratio"]
+        == figures_by_name["a_w_rms_cm_s"] / figures_by_name["a_practice_w_rms_cm_s"]
+    )
+    assert figures_by_name["a_dives"] == DIVES - REFERENCE
+    assert 0.2 < figures_by_name["a_w_rms_cm_s"] < 3.0

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from tools.measure.figures.ocean_speed import Asked, summary
+from glider.tools.measure.figures.ocean_speed import SpeedQuery, summary
 
 
 def test_errors_of_missions_and_of_dives_within_them():
-    two = [Asked(False, np.array([0.01, 0.012]), np.full(2, 0.01), np.full(2, 0.02)),
-           Asked(False, np.array([-0.02, -0.018]), np.full(2, 0.01), np.full(2, 0.02))]  # fmt: skip
+    two = [SpeedQuery(False, np.array([0.01, 0.012]), np.full(2, 0.01), np.full(2, 0.02)),
+           SpeedQuery(False, np.array([-0.02, -0.018]), np.full(2, 0.01), np.full(2, 0.02))]  # fmt: skip
     told = summary(two)
     assert "2 missions: error 1.55, said of the mean 1.00, of rows 2.00 cm/s; z 1.55, farthest 1.90;" in told
     assert "dives differ by 0.141 cm/s; held 50 % of 4 dives" in told

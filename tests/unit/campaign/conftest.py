@@ -2,7 +2,7 @@
 
 import pytest
 
-from tools.study.campaign.plan import build_plan, load_campaign, with_options
+from glider.tools.study.campaign.plan import build_plan, load_campaign, with_options
 
 
 @pytest.fixture(scope="session")

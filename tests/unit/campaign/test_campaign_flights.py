@@ -6,19 +6,19 @@ import msgspec
 import numpy as np
 import pytest
 
-from firmware.core.layouts import control_layout as ctl
-from sim_backend.core.closed_loop import TRACE
-from sim_backend.fleet import fly_fleet
-from tools.data.errors import InputError
-from tools.study.campaign.conduct import fly_campaign
-from tools.study.campaign.fingerprint import fingerprint
-from tools.study.campaign.flights import (
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.sim_backend.core.closed_loop import TRACE
+from glider.sim_backend.fleet import fly_fleet
+from glider.tools.data.errors import InputError
+from glider.tools.study.campaign.conduct import fly_campaign
+from glider.tools.study.campaign.fingerprint import fingerprint
+from glider.tools.study.campaign.flights import (
     COLUMNS,
     PAST_LIMITS,
     STILL_FLYING,
     TUMBLED,
     UNSEEN_DEPTH,
-    Job,
+    FlightJob,
     _ending,
     _past_limits,
     _worst_attitude,
@@ -26,7 +26,7 @@ from tools.study.campaign.flights import (
     fly_chunk,
     trace_every,
 )
-from tools.study.campaign.worlds import draw_world
+from glider.tools.study.campaign.worlds import draw_world
 
 
 def test_chunks_cover_every_flight_once(plan_of):
@@ -57,8 +57,8 @@ def test_a_campaigns_flight_is_the_fleets(plan_of):
 def test_a_chunk_of_another_version_is_refused(plan_of):
     plan = plan_of()
     with pytest.raises(InputError, match="another version"):
-        fly_chunk(Job(plan, "0" * 16), cut(plan)[0])
-    assert len(fly_chunk(Job(plan, fingerprint(plan)), cut(plan, 1)[0])) == 3
+        fly_chunk(FlightJob(plan, "0" * 16), cut(plan)[0])
+    assert len(fly_chunk(FlightJob(plan, fingerprint(plan)), cut(plan, 1)[0])) == 3
 
 
 def end(mode, reason=ctl.REASON_NONE):

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from firmware.core.control.controller_rows import CONTROLLERS
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.layouts.estimator_layout import MAX_STEP
-from firmware.core.maths.steps import MIDPOINT
-from firmware.core.maths.wide import LANES
-from firmware.core.vehicle.layout import K_P, X_NU
-from firmware.core.vehicle.time_constants import nominal_parts
-from sim_backend.core.closed_loop import N_END, N_TRACE, fly
-from sim_backend.fleet import fly_group, groups_of
-from tools.flight.compose import build_flight
+from glider.firmware.core.control.controller_rows import CONTROLLERS
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.layouts.estimator_layout import MAX_STEP
+from glider.firmware.core.maths.steps import MIDPOINT
+from glider.firmware.core.maths.wide import LANES
+from glider.firmware.core.vehicle.layout import K_P, X_NU
+from glider.firmware.core.vehicle.time_constants import nominal_parts
+from glider.sim_backend.core.closed_loop import N_END, N_TRACE, fly
+from glider.sim_backend.fleet import fly_group, groups_of
+from glider.tools.flight.compose import build_flight
 
 TICKS = 400  # 8 s: the filter runs, and the dive begins
 EFFECTS = {

@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 
-from firmware.autopilot import Autopilot, configuration
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.maths.wide import LANES
-from firmware.core.vehicle.layout import N_X, X_NU
-from sim_backend.core.closed_loop_lanes import estimate_lanes
-from sim_backend.core.effects import effect_layout as ef
-from tools.data.sources import load_mission, load_vehicle
+from glider.firmware.autopilot import Autopilot, configuration
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.maths.wide import LANES
+from glider.firmware.core.vehicle.layout import N_X, X_NU
+from glider.sim_backend.core.closed_loop_lanes import estimate_lanes
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.data.sources import load_mission, load_vehicle
 
 DT = 0.02
 BROKEN = 2

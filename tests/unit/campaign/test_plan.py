@@ -7,11 +7,11 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from firmware.model.gains import Control
-from hal.strict import ConfigError
-from tools.data.errors import InputError
-from tools.study.campaign.fingerprint import fingerprint
-from tools.study.campaign.plan import build_plan, load_campaign, shipped_campaigns, with_options
+from glider.firmware.model.gains import Control
+from glider.hal.strict import ConfigError
+from glider.tools.data.errors import InputError
+from glider.tools.study.campaign.fingerprint import fingerprint
+from glider.tools.study.campaign.plan import build_plan, load_campaign, shipped_campaigns, with_options
 
 TEXT = 'format = 1\nname = "one"\nmissions = ["spiral"]\ncontrollers = ["pid"]\nseeds = 3\n'
 
@@ -87,7 +87,7 @@ def test_a_campaign_nobody_has():
 
 
 def test_files_that_a_campaign_names_stand_beside_it(campaign_file, tmp_path):
-    from firmware.model.library import shipped
+    from glider.firmware.model.library import shipped
 
     path = campaign_file("", TEXT.replace('"spiral"', '"mine.toml"'))
     (tmp_path / "mine.toml").write_text(shipped("guidance/missions")["spiral"].replace('"spiral"', '"mine"'))
@@ -110,5 +110,5 @@ def test_a_fingerprint_notices_what_changes_a_flight(plan_of, monkeypatch):
     control = Control()
     other = msgspec.structs.replace(control, pitch=msgspec.structs.replace(control.pitch, kp=0.21))
     assert fingerprint(replace(plan, vehicle=msgspec.structs.replace(plan.vehicle, control=other))) != found
-    monkeypatch.setattr("tools.study.campaign.fingerprint.kernels_digest", lambda: "other kernels")
+    monkeypatch.setattr("glider.tools.study.campaign.fingerprint.kernels_digest", lambda: "other kernels")
     assert fingerprint(plan) != found

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from tools.data.errors import InputError
-from tools.study.campaign.conduct import fly_campaign
-from tools.study.campaign.fingerprint import fingerprint
-from tools.study.campaign.flights import COLUMNS, cut
-from tools.study.campaign.store import MANIFEST, Store
+from glider.tools.data.errors import InputError
+from glider.tools.study.campaign.conduct import fly_campaign
+from glider.tools.study.campaign.fingerprint import fingerprint
+from glider.tools.study.campaign.flights import COLUMNS, cut
+from glider.tools.study.campaign.store import MANIFEST, Store
 
 
 def rows(n):
@@ -50,7 +50,7 @@ def test_another_campaign_or_other_software_is_refused(plan_of, tmp_path, monkey
     Store(tmp_path, plan, fingerprint(plan), 60)
     with pytest.raises(InputError, match="holds flights of another campaign"):
         Store(tmp_path, plan, "0" * 16, 60)
-    monkeypatch.setattr("tools.study.campaign.store.kernels_digest", lambda: "new")
+    monkeypatch.setattr("glider.tools.study.campaign.store.kernels_digest", lambda: "new")
     with pytest.raises(InputError, match="holds flights of other software"):
         Store(tmp_path, plan, "0" * 16, 60)
 

@@ -5,10 +5,10 @@ import csv
 import numpy as np
 import pytest
 
-from tools.study.campaign.conduct import Flown, write_flights
-from tools.study.campaign.flights import COLUMNS, ENDINGS
-from tools.study.campaign.picture import page
-from tools.study.campaign.summary import completed_by_all, summarise, wilson
+from glider.tools.study.campaign.conduct import FlownChunk, write_flights
+from glider.tools.study.campaign.flights import COLUMNS, ENDINGS
+from glider.tools.study.campaign.picture import page
+from glider.tools.study.campaign.summary import completed_by_all, summarise, wilson
 
 LEG_TIME = next(code for code, text in ENDINGS.items() if text == "leg over its time limit")
 
@@ -32,7 +32,7 @@ def flown(plan_of):
     put("pitch_error_rad", np.radians(np.tile([1.0, 2.0], 6)))
     for name, value in (("completed", 0.0), ("within_limits", 0.0), ("ended", LEG_TIME), ("pitch_error_rad", 9.0)):
         table[2, COLUMNS.index(name)] = value
-    return Flown(plan, table, 12, 3.0)
+    return FlownChunk(plan, table, 12, 3.0)
 
 
 @pytest.mark.parametrize("n", [1, 10, 1000])

@@ -6,10 +6,10 @@ import msgspec
 import numpy as np
 import pytest
 
-from sim_backend.core import layout as wl
-from sim_backend.core.effects.effect_layout import DRAG_0
-from tools.study.campaign.fingerprint import fingerprint
-from tools.study.campaign.worlds import draw_world
+from glider.sim_backend.core import layout as wl
+from glider.sim_backend.core.effects.effect_layout import DRAG_0
+from glider.tools.study.campaign.fingerprint import fingerprint
+from glider.tools.study.campaign.worlds import draw_world
 
 
 def arrays(world):

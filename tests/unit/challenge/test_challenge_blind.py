@@ -5,17 +5,23 @@ import subprocess
 import sys
 from pathlib import Path
 
-import tools.study
+import glider.tools.study
 
 BLIND = (
     "make", "plan", "forms", "cases", "trial", "design", "magnitude", "messy", "evidence", "seal",
     "form_make", "form_plan", "form_cases", "form_fit", "form_vehicle",
 )  # fmt: skip
-FORBIDDEN = ("sim_backend.core.effects", "sim_backend.core.effect", "tools.diagnose", "tools.identify", "tools.cli")
+FORBIDDEN = (
+    "glider.sim_backend.core.effects",
+    "glider.sim_backend.core.effect",
+    "glider.tools.diagnose",
+    "glider.tools.identify",
+    "glider.tools.cli",
+)
 
 
 def test_what_makes_the_cases_never_sees_effects_or_diagnosis():
-    names = [f"tools.study.challenge.{name}" for name in BLIND]
+    names = [f"glider.tools.study.challenge.{name}" for name in BLIND]
     script = f"import sys, {', '.join(names)}; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.split()
     assert set(names) <= set(loaded)
@@ -34,6 +40,6 @@ def imported(path: Path) -> set[str]:
 
 
 def test_no_study_imports_a_command():
-    files = sorted(Path(tools.study.__path__[0]).rglob("*.py"))
+    files = sorted(Path(glider.tools.study.__path__[0]).rglob("*.py"))
     assert len(files) > 30
-    assert [path.name for path in files if any(name.startswith("tools.cli") for name in imported(path))] == []
+    assert [path.name for path in files if any(name.startswith("glider.tools.cli") for name in imported(path))] == []

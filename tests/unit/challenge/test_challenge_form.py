@@ -6,20 +6,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim_backend.foreign import foreign_layout as fo
-from tools.data.sources import load_vehicle
-from tools.study.challenge import form_score
-from tools.study.challenge.design import POOL
-from tools.study.challenge.diagnose_all import FORM, commands
-from tools.study.challenge.diagnosis import read_diagnosis
-from tools.study.challenge.form_cases import draw_healthy
-from tools.study.challenge.form_fit import fit_flights, fit_forces, residual
-from tools.study.challenge.form_plan import BY_LABEL, CHANGES, OUTSIDE, FormCounts, form_plan
-from tools.study.challenge.form_score import closed_change
-from tools.study.challenge.forms import FORMS
-from tools.study.challenge.plan import NONE, SINGLE, UNKNOWN
-from tools.study.challenge.score import Scored, score_forms
-from tools.study.challenge.trial import total
+from glider.sim_backend.foreign import foreign_layout as fo
+from glider.tools.data.sources import load_vehicle
+from glider.tools.study.challenge import form_score
+from glider.tools.study.challenge.design import POOL
+from glider.tools.study.challenge.diagnose_all import FORM, commands
+from glider.tools.study.challenge.diagnosis import read_diagnosis
+from glider.tools.study.challenge.form_cases import draw_healthy
+from glider.tools.study.challenge.form_fit import fit_flights, fit_forces, residual
+from glider.tools.study.challenge.form_plan import BY_LABEL, CHANGES, OUTSIDE, FormCounts, form_plan
+from glider.tools.study.challenge.form_score import closed_change
+from glider.tools.study.challenge.forms import FORMS
+from glider.tools.study.challenge.plan import NONE, SINGLE, UNKNOWN
+from glider.tools.study.challenge.score import ScoredCase, score_forms
+from glider.tools.study.challenge.trial import total
 
 VEHICLE = load_vehicle("roughie")
 
@@ -110,12 +110,12 @@ def said(tmp_path: Path, verdict: str, label: str, probability: float):
 def test_figures_by_their_definition(tmp_path):
     places = [[["mass", "net"]]]
     cases = [
-        Scored("a", {"labels": [], "places": []}, said(tmp_path, "cause", "drag", 0.9)),
-        Scored("b", {"labels": [], "places": []}, said(tmp_path, "unknown", "unknown", 0.7)),
-        Scored("c", {"labels": [], "places": []}, said(tmp_path, "none", "none", 0.9)),
-        Scored("d", {"labels": ["drag"], "places": places}, said(tmp_path, "cause", "drag", 0.9), closed=0.5),
-        Scored("e", {"labels": ["lift"], "places": places}, None, closed=0.0),
-        Scored("f", {"labels": ["unknown"], "places": places}, said(tmp_path, "unknown", "unknown", 0.9)),
+        ScoredCase("a", {"labels": [], "places": []}, said(tmp_path, "cause", "drag", 0.9)),
+        ScoredCase("b", {"labels": [], "places": []}, said(tmp_path, "unknown", "unknown", 0.7)),
+        ScoredCase("c", {"labels": [], "places": []}, said(tmp_path, "none", "none", 0.9)),
+        ScoredCase("d", {"labels": ["drag"], "places": places}, said(tmp_path, "cause", "drag", 0.9), closed=0.5),
+        ScoredCase("e", {"labels": ["lift"], "places": places}, None, closed=0.0),
+        ScoredCase("f", {"labels": ["unknown"], "places": places}, said(tmp_path, "unknown", "unknown", 0.9)),
     ]
     found = score_forms(cases, [(4.0, 1.0), (4.0, 5.0)]).plain()["figures"]
     counts = {key: (figure.get("count"), figure["of"]) for key, figure in found.items() if "count" in figure}

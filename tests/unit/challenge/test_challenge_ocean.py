@@ -5,16 +5,16 @@ import json
 import numpy as np
 import pytest
 
-from tools.cli.common import report_errors
-from tools.cli.main import cli
-from tools.data.errors import InputError
-from tools.data.runs import columns as names
-from tools.data.runs.case import load_case
-from tools.study.challenge.diagnose_all import MISSION, commands
-from tools.study.challenge.make import make
-from tools.study.challenge.ocean_cases import example_mission
-from tools.study.challenge.ocean_make import OceanOrder
-from tools.study.challenge.ocean_plan import (
+from glider.tools.cli.common import report_errors
+from glider.tools.cli.main import cli
+from glider.tools.data.errors import InputError
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.case import load_case
+from glider.tools.study.challenge.diagnose_all import MISSION, commands
+from glider.tools.study.challenge.make import make
+from glider.tools.study.challenge.ocean_cases import example_mission
+from glider.tools.study.challenge.ocean_make import OceanOrder
+from glider.tools.study.challenge.ocean_plan import (
     CHANGES,
     CRAFTS,
     LIFT_SHOWS,
@@ -23,11 +23,11 @@ from tools.study.challenge.ocean_plan import (
     OUTSIDE_SHOWS,
     ocean_plan,
 )
-from tools.study.challenge.ocean_score import NEEDED_OF_A_MISSION, judge_missions, score_missions, speeds_held
-from tools.study.challenge.seal import open_answers
-from tools.study.challenge.watch_answer import read_watch
-from tools.study.challenge.watch_plan import CHANGED, EPISODE, GROWING, OUTSIDE, STEP, UNCHANGED, WatchCounts
-from tools.study.challenge.watch_score import Watched
+from glider.tools.study.challenge.ocean_score import NEEDED_OF_A_MISSION, judge_missions, score_missions, speeds_held
+from glider.tools.study.challenge.seal import open_answers
+from glider.tools.study.challenge.watch_answer import read_watch
+from glider.tools.study.challenge.watch_plan import CHANGED, EPISODE, GROWING, OUTSIDE, STEP, UNCHANGED, WatchCounts
+from glider.tools.study.challenge.watch_score import Watched
 
 FEW = WatchCounts(vehicles=2, unchanged=1, runs=6, reference=2)
 
@@ -40,13 +40,13 @@ def test_every_change_as_often_half_of_them_with_speed():
     assert all(changes.count(change) in (6, 7) for change in CHANGES)
     strange = [plan for plan in plans if plan.kind == OUTSIDE]
     assert all(sum(plan.label == label for plan in strange) in (2, 3) for label in OUTSIDE_CHANGES)
-    assert {plan.craft for plan in strange} == set(OUTSIDE_SHOWS)
+    assert {plan.vehicle_class for plan in strange} == set(OUTSIDE_SHOWS)
     for label in [None, *dict(CHANGES), *OUTSIDE_CHANGES]:
         own = [plan for plan in plans if plan.label == label]
         assert abs(sum(plan.speed for plan in own) - len(own) / 2) <= 0.5
     assert {plan.course for plan in plans if plan.label == "lift"} == {STEP, EPISODE}
-    assert {plan.craft for plan in plans if plan.label == "lift"} == {LIFT_SHOWS}
-    assert {plan.craft for plan in plans if plan.label == "drag"} == set(CRAFTS)
+    assert {plan.vehicle_class for plan in plans if plan.label == "lift"} == {LIFT_SHOWS}
+    assert {plan.vehicle_class for plan in plans if plan.label == "drag"} == set(CRAFTS)
     assert ocean_plan(3, MISSIONS) == plans != ocean_plan(4, MISSIONS)
 
 
@@ -93,8 +93,8 @@ def test_velocity_is_held_to_the_truth(made, tmp_path):
             answer(folder, made, name, shift)
         score = judge_missions(made.out, made.archive, folder)
         found = next(figure for figure in score.figures if figure.key == "velocity")
-        quiet = sum(not changed for case in score.cases for changed in case.changed)
-        assert (found.value, found.of) == (held, quiet)
+        muted = sum(not changed for case in score.cases for changed in case.changed)
+        assert (found.value, found.of) == (held, muted)
 
 
 def test_what_is_said_of_a_dives_mean_counts_before_its_rows(made, tmp_path):
@@ -102,12 +102,12 @@ def test_what_is_said_of_a_dives_mean_counts_before_its_rows(made, tmp_path):
     truth = open_answers(made.archive, NEEDED_OF_A_MISSION).cases["case000"]
     case = Watched("case000", truth, read_watch(tmp_path / "case000" / "watch.json"))
     folder = tmp_path / "case000" / "velocity"
-    quiet = [f"run{n:02d}" for n, changed in enumerate(case.changed) if not changed]
-    means = {name: np.mean(truth["horizontal_mm_s"][int(name[3:])]) / 1e3 for name in quiet}
+    muted = [f"run{n:02d}" for n, changed in enumerate(case.changed) if not changed]
+    means = {name: np.mean(truth["horizontal_mm_s"][int(name[3:])]) / 1e3 for name in muted}
     for width in (-1e-3, 1e-3):
-        told = {name: {"u_m_s": mean, "ci90": [mean - width, mean + width]} for name, mean in means.items()}
-        (folder / "velocity.json").write_text(json.dumps({"runs": told}))
-        assert speeds_held(case, folder) == [width > 0.0] * len(quiet)
+        result = {name: {"u_m_s": mean, "ci90": [mean - width, mean + width]} for name, mean in means.items()}
+        (folder / "velocity.json").write_text(json.dumps({"runs": result}))
+        assert speeds_held(case, folder) == [width > 0.0] * len(muted)
     (folder / "velocity.json").write_text('{"runs": 1}')
     with pytest.raises(InputError, match=r"velocity\.json"):
         speeds_held(case, folder)

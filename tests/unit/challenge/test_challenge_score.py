@@ -5,9 +5,9 @@ import math
 
 import pytest
 
-from tools.data.errors import InputError
-from tools.study.challenge.diagnosis import Cause, Diagnosis, Where, read_diagnosis
-from tools.study.challenge.score import Scored, by_label, score, wilson
+from glider.tools.data.errors import InputError
+from glider.tools.study.challenge.diagnosis import AnsweredCause, AnswerFile, Where, read_diagnosis
+from glider.tools.study.challenge.score import ScoredCase, by_label, score, wilson
 
 SURGE, NET = ["hydrodynamics", "surge"], ["mass", "net"]
 
@@ -16,29 +16,29 @@ def truth(*labels: str, places=(SURGE,), secret=()) -> dict:
     return {"labels": list(labels), "places": [[place] for place in places], "secret": list(secret)}
 
 
-def said(verdict, *causes, where="hydrodynamics", selected=(), group=()) -> Diagnosis:
-    listed = [Cause(label, probability) for label, probability in causes]
+def said(verdict, *causes, where="hydrodynamics", selected=(), group=()) -> AnswerFile:
+    listed = [AnsweredCause(label, probability) for label, probability in causes]
     listed[0].group = list(group)
-    return Diagnosis(1, verdict, [Where(where, "surge", 0.9)], listed, list(selected))
+    return AnswerFile(1, verdict, [Where(where, "surge", 0.9)], listed, list(selected))
 
 
 @pytest.fixture
-def cases() -> list[Scored]:
+def cases() -> list[ScoredCase]:
     """Two without a gap, four single, two pairs, two outside the catalogue."""
     return [
-        Scored("a", truth(places=()), said("none", ("none", 0.9), ("drag", 0.1)), seconds=10.0),
-        Scored("b", truth(places=()), said("cause", ("drag", 0.85), ("none", 0.15)), seconds=20.0),
-        Scored("c", truth("drag"), said("cause", ("drag", 0.5), ("lift", 0.5), selected=["drag"]), closed=0.99),
-        Scored("d", truth("drag"), said("cause", ("lift", 0.7), ("drag", 0.3), group=["lift", "drag"]), closed=0.5),
-        Scored("e", truth("lift"), said("cause", ("lift", 1.0), where="mass", group=list("abcd")), closed=0.97),
-        Scored("f", truth("tether"), said("none", ("none", 0.9), ("a", 0.06), ("b", 0.02), ("tether", 0.02)),
+        ScoredCase("a", truth(places=()), said("none", ("none", 0.9), ("drag", 0.1)), seconds=10.0),
+        ScoredCase("b", truth(places=()), said("cause", ("drag", 0.85), ("none", 0.15)), seconds=20.0),
+        ScoredCase("c", truth("drag"), said("cause", ("drag", 0.5), ("lift", 0.5), selected=["drag"]), closed=0.99),
+        ScoredCase("d", truth("drag"), said("cause", ("lift", 0.7), ("drag", 0.3), group=["lift", "drag"]), closed=0.5),
+        ScoredCase("e", truth("lift"), said("cause", ("lift", 1.0), where="mass", group=list("abcd")), closed=0.97),
+        ScoredCase("f", truth("tether"), said("none", ("none", 0.9), ("a", 0.06), ("b", 0.02), ("tether", 0.02)),
                closed=0.0),
-        Scored("g", truth("drag", "net_buoyancy", places=(SURGE, NET)),
+        ScoredCase("g", truth("drag", "net_buoyancy", places=(SURGE, NET)),
                said("cause", ("drag", 0.6), ("net_buoyancy", 0.4), selected=["net_buoyancy", "drag"])),
-        Scored("h", truth("drag", "net_buoyancy", places=(SURGE, NET)),
+        ScoredCase("h", truth("drag", "net_buoyancy", places=(SURGE, NET)),
                said("unknown", ("unknown", 0.9), ("drag", 0.1), selected=["drag"])),
-        Scored("i", truth("unknown", secret=["x_a"]), said("unknown", ("unknown", 1.0))),
-        Scored("j", truth("unknown", secret=["x_a"]), said("cause", ("drag", 0.6), ("unknown", 0.4))),
+        ScoredCase("i", truth("unknown", secret=["x_a"]), said("unknown", ("unknown", 1.0))),
+        ScoredCase("j", truth("unknown", secret=["x_a"]), said("cause", ("drag", 0.6), ("unknown", 0.4))),
     ]  # fmt: skip
 
 
@@ -72,8 +72,8 @@ def test_log_loss_closed_and_seconds(cases):
 
 
 def test_no_answer_is_wrong_wherever_it_counts():
-    cases = [Scored("a", truth(places=()), None), Scored("b", truth("drag"), None), Scored("c", truth("unknown"), None),
-             Scored("d", truth("drag", "net_buoyancy"), None)]  # fmt: skip
+    cases = [ScoredCase("a", truth(places=()), None), ScoredCase("b", truth("drag"), None), ScoredCase("c", truth("unknown"), None),
+             ScoredCase("d", truth("drag", "net_buoyancy"), None)]  # fmt: skip
     found = counted(cases)
     assert found["no_gap_called_gap"] == (1, 1)
     assert found["effects_seen"] == (0, 3)
@@ -87,7 +87,7 @@ def test_no_answer_is_wrong_wherever_it_counts():
 def test_naming_everything_names_nothing():
     pair = truth("drag", "net_buoyancy")
     answer = said("cause", ("drag", 1.0), selected=["drag", "net_buoyancy", "lift", "tether"])
-    found = counted([Scored("a", pair, answer)])
+    found = counted([ScoredCase("a", pair, answer)])
     assert found["two_both_named"] == (0, 1)
     assert found["two_one_named"] == (0, 1)
 
@@ -151,4 +151,4 @@ def test_odds_are_of_the_likeliest_label_against_none(cases):
     found = [case.odds() for case in cases]
     assert found[:2] == pytest.approx([math.log(0.1 / 0.9), math.log(0.85 / 0.15)])
     assert found[2] is None  # none has no probability
-    assert Scored("k", truth(), None).odds() is None
+    assert ScoredCase("k", truth(), None).odds() is None

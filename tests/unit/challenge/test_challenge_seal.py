@@ -6,9 +6,9 @@ import zipfile
 
 import pytest
 
-from tools.data.errors import InputError
-from tools.study.challenge.judge import open_sealed
-from tools.study.challenge.seal import MANIFEST, open_answers, seal, write_manifest
+from glider.tools.data.errors import InputError
+from glider.tools.study.challenge.judge import open_sealed
+from glider.tools.study.challenge.seal import MANIFEST, open_answers, seal, write_manifest
 
 ANSWER = {"labels": ["drag"], "places": [[["hydrodynamics", "surge"]]], "before": [], "oracle": [], "runs": 6}
 

@@ -5,17 +5,17 @@ import json
 import numpy as np
 import pytest
 
-from tools.cli.common import report_errors
-from tools.cli.main import cli
-from tools.data.errors import InputError
-from tools.data.runs.case import load_case
-from tools.data.sources import load_vehicle
-from tools.study.challenge.make import make
-from tools.study.challenge.seal import open_answers
-from tools.study.challenge.watch_answer import read_watch
-from tools.study.challenge.watch_cases import draw_vehicle
-from tools.study.challenge.watch_make import WatchOrder
-from tools.study.challenge.watch_plan import (
+from glider.tools.cli.common import report_errors
+from glider.tools.cli.main import cli
+from glider.tools.data.errors import InputError
+from glider.tools.data.runs.case import load_case
+from glider.tools.data.sources import load_vehicle
+from glider.tools.study.challenge.make import make
+from glider.tools.study.challenge.seal import open_answers
+from glider.tools.study.challenge.watch_answer import read_watch
+from glider.tools.study.challenge.watch_cases import draw_vehicle
+from glider.tools.study.challenge.watch_make import WatchOrder
+from glider.tools.study.challenge.watch_plan import (
     CHANGED,
     EPISODE,
     GROWING,
@@ -25,7 +25,7 @@ from tools.study.challenge.watch_plan import (
     WatchCounts,
     watch_plan,
 )
-from tools.study.challenge.watch_score import NEEDED, Watched, score_watches
+from glider.tools.study.challenge.watch_score import NEEDED, Watched, score_watches
 
 
 def test_counts_courses_and_spans():

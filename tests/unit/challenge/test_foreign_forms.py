@@ -5,14 +5,14 @@ import re
 import numpy as np
 import pytest
 
-from firmware.core.vehicle.flight import nominal_run
-from firmware.core.vehicle.layout import N_X
-from sim_backend.foreign import foreign_layout as fo
-from sim_backend.foreign.foreign_flight import fly_foreign, fly_on
-from tools.data.sources import load_vehicle
-from tools.study.challenge.design import LAKE, POOL, draw_runs
-from tools.study.challenge.forms import FORMS, KNOWN, SECRET, blank, draw_shapes, draw_waves
-from tools.study.challenge.trial import Trial, draw_trial, flyable, predictable, total, with_effect
+from glider.firmware.core.vehicle.flight import nominal_run
+from glider.firmware.core.vehicle.layout import N_X
+from glider.sim_backend.foreign import foreign_layout as fo
+from glider.sim_backend.foreign.foreign_flight import fly_foreign, fly_on
+from glider.tools.data.sources import load_vehicle
+from glider.tools.study.challenge.design import LAKE, POOL, draw_runs
+from glider.tools.study.challenge.forms import FORMS, KNOWN, SECRET, blank, draw_shapes, draw_waves
+from glider.tools.study.challenge.trial import Trial, draw_trial, flyable, predictable, total, with_effect
 
 VEHICLE = load_vehicle("roughie")
 

@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from sim_backend.foreign import ocean as at
-from sim_backend.ocean.core import layout
-from sim_backend.ocean.core.glide import steady_speed
-from tools.data.runs import columns as names
-from tools.study.challenge import ocean_cases
-from tools.study.challenge.ocean_cases import flown, fly_mission, legs, shipped_vehicle, shown, with_change
-from tools.study.challenge.ocean_design import CRAFTS, THRUSTER, Mission, draw_mission
+from glider.sim_backend.foreign import ocean as at
+from glider.sim_backend.ocean.core import layout
+from glider.sim_backend.ocean.core.glide import steady_speed
+from glider.tools.data.runs import columns as names
+from glider.tools.study.challenge import ocean_cases
+from glider.tools.study.challenge.ocean_cases import flown, fly_mission, legs, shipped_vehicle, shown, with_change
+from glider.tools.study.challenge.ocean_design import CRAFTS, THRUSTER, MissionDesign, draw_mission
 
 
-def mission(craft: str = "slocum", dives: int = 2) -> Mission:
-    return draw_mission(np.random.default_rng(4), CRAFTS[craft], shipped_vehicle(craft), dives)
+def mission(vehicle_class: str = "slocum", dives: int = 2) -> MissionDesign:
+    return draw_mission(np.random.default_rng(4), CRAFTS[vehicle_class], shipped_vehicle(vehicle_class), dives)
 
 
 @pytest.mark.parametrize("pitch", [-0.45, -0.3, 0.4])
@@ -43,8 +43,8 @@ def test_climbing_mirrors_diving_but_for_its_drag():
 
 
 @pytest.mark.parametrize("craft", sorted(CRAFTS))
-def test_a_dive_goes_to_its_depth_and_back(craft):
-    made = mission(craft, 2)
+def test_a_dive_goes_to_its_depth_and_back(vehicle_class):
+    made = mission(vehicle_class, 2)
     runs, truth = fly_mission(made, [(None, 0.0)] * 2, speed=True)
     for run, D, fast in zip(runs, made.dives, truth, strict=True):
         depth = run.columns[names.DEPTH]
@@ -114,7 +114,7 @@ def test_of_what_no_label_names_only_that_shows_which_the_nearest_leaves(monkeyp
     made = mission("seaglider")
     assert shown(made, "x_thruster", 0.3)[0] > 1.0
     monkeypatch.setattr(ocean_cases, "OUTSIDE_CHANGES", ("drag",))
-    assert shown(made, "drag", 0.3)[1] < 1e-4 < ocean_cases.MATTERS
+    assert shown(made, "drag", 0.3)[1] < 1e-4 < ocean_cases.MATERIAL_SPEED
 
 
 def test_evidence_goes_with_the_square_of_the_change_and_against_that_of_the_water():
@@ -126,7 +126,7 @@ def test_evidence_goes_with_the_square_of_the_change_and_against_that_of_the_wat
     assert shown(made, "drag", 0.05) == pytest.approx((small / 4.0, slower), rel=1e-9)
 
 
-def settled(V: np.ndarray, roll: float) -> np.ndarray:
+def steady_share(V: np.ndarray, roll: float) -> np.ndarray:
     state = np.array([0.3, 0.0, 0.02])
     for _ in range(4000):
         state += 0.1 * np.array(at.rates(V, 1.8, 1026.0, -0.4, 0.0, roll, *state)[:3])
@@ -135,7 +135,7 @@ def settled(V: np.ndarray, roll: float) -> np.ndarray:
 
 def test_on_its_side_it_slips_to_the_low_side_and_is_slower_by_little():
     V = mission().V
-    upright, heeled = settled(V, 0.0), settled(V, 0.3)
+    upright, heeled = steady_share(V, 0.0), steady_share(V, 0.3)
     assert upright[1] == 0.0
     assert 0.003 < heeled[1] < 0.05
     assert 0.95 < heeled[0] / upright[0] < 1.05

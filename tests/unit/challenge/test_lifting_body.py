@@ -5,17 +5,17 @@ import math
 import numpy as np
 import pytest
 
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.vehicle import layout
-from sim_backend.foreign import foreign_layout as fo
-from sim_backend.foreign import lifting_body as body
-from sim_backend.foreign.foreign_flight import fly_foreign
-from sim_backend.foreign.foreign_mission import fly_mission
-from tools.data.sources import load_mission, load_vehicle
-from tools.study.challenge.design import POOL, draw_run
-from tools.study.challenge.form_cases import FormTrial, gross_behaviour, pilot_of, plausible
-from tools.study.challenge.form_vehicle import COEFFICIENTS, draw_body, spheroid
-from tools.study.challenge.forms import draw_waves
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.vehicle import layout
+from glider.sim_backend.foreign import foreign_layout as fo
+from glider.sim_backend.foreign import lifting_body as body
+from glider.sim_backend.foreign.foreign_flight import fly_foreign
+from glider.sim_backend.foreign.foreign_mission import fly_mission
+from glider.tools.data.sources import load_mission, load_vehicle
+from glider.tools.study.challenge.design import POOL, draw_run
+from glider.tools.study.challenge.form_cases import FormTrial, gross_behaviour, pilot_of, plausible
+from glider.tools.study.challenge.form_vehicle import COEFFICIENTS, draw_body, spheroid
+from glider.tools.study.challenge.forms import draw_waves
 
 pytestmark = pytest.mark.computes(seconds=20)
 

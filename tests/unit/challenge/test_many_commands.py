@@ -6,9 +6,9 @@ import shutil
 import pytest
 from support.ocean import as_case, fly_dives
 
-from tools.cli.common import report_errors
-from tools.cli.main import cli
-from tools.study.many_cases import CASES, REFERENCE, VEHICLE, OneCommand
+from glider.tools.cli.common import report_errors
+from glider.tools.cli.main import cli
+from glider.tools.study.many_cases import CASES, REFERENCE, VEHICLE, OneCommand
 
 
 def run(capsys, *words: object) -> tuple[int, str, str]:
@@ -33,11 +33,11 @@ def test_several_are_watched_what_fails_is_named_and_what_is_there_is_kept(missi
     good, bad = missions
     out, alone = tmp_path / "out", tmp_path / "alone"
     assert run(capsys, "gap", "watch", good, "--out", alone)[0] == 0
-    code, told, said = run(capsys, "gap", "watch", good, bad, "--out", out, "--json")
+    code, result, said = run(capsys, "gap", "watch", good, bad, "--out", out, "--json")
     assert code == 1
     assert any(line.startswith("bad: exit 2: ") and "case.toml" in line for line in said.splitlines())
-    assert list(json.loads(told)["cases"]) == ["good"]
-    assert len(json.loads(told)["failed"]) == 1
+    assert list(json.loads(result)["cases"]) == ["good"]
+    assert len(json.loads(result)["failed"]) == 1
     assert [path.name for path in out.iterdir()] == ["good"]
     for file in sorted(alone.iterdir()):
         assert (out / "good" / file.name).read_bytes() == file.read_bytes(), file.name

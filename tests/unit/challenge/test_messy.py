@@ -3,16 +3,24 @@
 import numpy as np
 import pytest
 
-from tools.data.runs import columns as names
-from tools.data.sources import load_vehicle
-from tools.study.challenge.design import POOL
-from tools.study.challenge.diagnosis import Cause, Diagnosis
-from tools.study.challenge.forms import FORMS
-from tools.study.challenge.make import Order
-from tools.study.challenge.messy import BIAS, DISTURBANCE, MOST, NOISE, draw_factors, small_one, small_ones
-from tools.study.challenge.plan import MESSY, Counts, plan
-from tools.study.challenge.score import Scored, score
-from tools.study.challenge.trial import Trial, draw_trial, flyable
+from glider.tools.data.runs import columns as names
+from glider.tools.data.sources import load_vehicle
+from glider.tools.study.challenge.design import POOL
+from glider.tools.study.challenge.diagnosis import AnsweredCause, AnswerFile
+from glider.tools.study.challenge.forms import FORMS
+from glider.tools.study.challenge.make import Order
+from glider.tools.study.challenge.messy import (
+    BIAS,
+    DISTURBANCE,
+    LARGEST_SMALL_GAP,
+    NOISE,
+    draw_factors,
+    small_one,
+    small_ones,
+)
+from glider.tools.study.challenge.plan import MESSY, Counts, plan
+from glider.tools.study.challenge.score import ScoredCase, score
+from glider.tools.study.challenge.trial import Trial, draw_trial, flyable
 
 VEHICLE = load_vehicle("roughie")
 
@@ -52,7 +60,7 @@ def test_a_messy_vehicle_flies_with_its_own_noise_and_its_file_says_another(tria
 def test_a_small_effect_is_visible_but_at_most_by_the_factor_allowed(trial):
     found = small_one(np.random.default_rng(3), trial, FORMS["drag"])
     assert found is not None
-    assert 1.1 < found.visible <= MOST
+    assert 1.1 < found.visible <= LARGEST_SMALL_GAP
     assert found.strength < FORMS["drag"].most
 
 
@@ -82,16 +90,16 @@ def truth(*labels: str, secret=()) -> dict:
     return {"labels": list(labels), "places": [], "secret": list(secret), "small": small}
 
 
-def said(verdict: str, *causes: tuple[str, float]) -> Diagnosis:
-    return Diagnosis(1, verdict, [], [Cause(*cause) for cause in causes], [])
+def said(verdict: str, *causes: tuple[str, float]) -> AnswerFile:
+    return AnswerFile(1, verdict, [], [AnsweredCause(*cause) for cause in causes], [])
 
 
 def test_without_a_large_effect_small_ones_may_have_some_probability_but_none_is_sure():
-    shared = Scored("a", truth(), said("cause", ("gyro_bias", 0.5), ("none", 0.4), ("drag", 0.1)))
-    sure = Scored("b", truth(), said("cause", ("gyro_bias", 0.9), ("none", 0.1)))
-    none = Scored("c", truth(), said("none", ("none", 0.95), ("drag", 0.05)))
-    unknown = Scored("d", truth(), said("unknown", ("unknown", 0.9), ("none", 0.1)))
-    silent = Scored("e", truth(), None)
+    shared = ScoredCase("a", truth(), said("cause", ("gyro_bias", 0.5), ("none", 0.4), ("drag", 0.1)))
+    sure = ScoredCase("b", truth(), said("cause", ("gyro_bias", 0.9), ("none", 0.1)))
+    none = ScoredCase("c", truth(), said("none", ("none", 0.95), ("drag", 0.05)))
+    unknown = ScoredCase("d", truth(), said("unknown", ("unknown", 0.9), ("none", 0.1)))
+    silent = ScoredCase("e", truth(), None)
     found = {figure.key: (figure.count, figure.of) for figure in score([shared, sure, none, unknown, silent]).figures}
     assert found["small_sure"] == (3, 5)  # b, d, e
     assert found["small_called_gap"] == (4, 5)
@@ -101,8 +109,8 @@ def test_without_a_large_effect_small_ones_may_have_some_probability_but_none_is
 
 
 def test_beside_a_large_effect_a_small_one_is_wrong():
-    right = Scored("a", truth("drag"), said("cause", ("drag", 0.9), ("gyro_bias", 0.1)))
-    wrong = Scored("b", truth("drag"), said("cause", ("gyro_bias", 0.9), ("drag", 0.1)))
+    right = ScoredCase("a", truth("drag"), said("cause", ("drag", 0.9), ("gyro_bias", 0.1)))
+    wrong = ScoredCase("b", truth("drag"), said("cause", ("gyro_bias", 0.9), ("drag", 0.1)))
     found = {figure.key: (figure.count, figure.of) for figure in score([right, wrong]).figures}
     assert found["right_cause_first"] == (1, 2)
     assert found["in_first_three"] == (2, 2)

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from firmware.core import jit
+from glider.firmware.core import jit
 
 pytestmark = pytest.mark.realtime(seconds=60)
 
@@ -14,7 +14,7 @@ WORKING = """
 import time
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
-from tools.study.workers import end_with_parent
+from glider.tools.study.workers import end_with_parent
 
 def work(_):
     print("at work", flush=True)

@@ -1,7 +1,7 @@
 """Layout modules: a name has one value wherever it stands, and a layout one alias.
 
 A slip between two layouts compiles and flies. A layout is a module called so, a module that numbers three places or
-more in a row (`A, B, C = 0, 1, 2`), one that the glossary lists, or the frame of hal.ports.
+more in a row (`A, B, C = 0, 1, 2`), one that the glossary lists, or the frame of glider.hal.ports.
 """
 
 import ast
@@ -12,11 +12,11 @@ from pathlib import Path
 
 import pytest
 
-from firmware.core.layouts import estimator_layout as kf
-from firmware.core.layouts.cursor import Cursor
-from firmware.core.vehicle import layout
-from sim_backend.core import layout as wl
-from sim_backend.core.effects import effect_layout as ef
+from glider.firmware.core.layouts import estimator_layout as kf
+from glider.firmware.core.layouts.cursor import Cursor
+from glider.firmware.core.vehicle import layout
+from glider.sim_backend.core import layout as wl
+from glider.sim_backend.core.effects import effect_layout as ef
 
 ROOT = Path(__file__).resolve().parents[3]
 ROOMS = ("firmware", "sim_backend", "tools")
@@ -68,18 +68,22 @@ def aliases() -> dict[str, str]:
 @cache
 def layouts() -> list[str]:
     """Names of the layout modules."""
-    return sorted({*(module_name(path) for path in FILES if is_layout(path)), *aliases(), "hal.ports"})
+    return sorted({*(module_name(path) for path in FILES if is_layout(path)), *aliases(), "glider.hal.ports"})
 
 
 def test_the_rule_finds_the_layouts():
-    assert {"firmware.core.vehicle.layout", "sim_backend.core.layout", "tools.study.tuning.loops"} <= {*layouts()}
+    assert {
+        "glider.firmware.core.vehicle.layout",
+        "glider.sim_backend.core.layout",
+        "glider.tools.study.tuning.loops",
+    } <= {*layouts()}
     assert len(layouts()) > 8
 
 
 # Vectors of other vehicles, each in layouts of its own: a name has another meaning there.
 OTHERS = {
-    "sim_backend.ocean.core.layout": "ocean", "sim_backend.foreign.ocean": "foreign ocean",
-    "tools.study.challenge.ocean_design": "foreign ocean",
+    "glider.sim_backend.ocean.core.layout": "ocean", "glider.sim_backend.foreign.ocean": "foreign ocean",
+    "glider.tools.study.challenge.ocean_design": "foreign ocean",
 }  # fmt: skip
 
 
@@ -102,7 +106,7 @@ def layouts_named_from(tree: ast.AST) -> set[str]:
 
 
 def test_no_module_takes_names_from_the_layouts_of_two_vehicles():
-    text = "from sim_backend.ocean.core.layout import N_P\nfrom firmware.core.vehicle.layout import N_F"
+    text = "from glider.sim_backend.ocean.core.layout import N_P\nfrom glider.firmware.core.vehicle.layout import N_F"
     assert layouts_named_from(ast.parse(text)) == {"ocean", ""}
     assert [str(path) for path in FILES if len(layouts_named_from(tree_of(path))) > 1] == []
 

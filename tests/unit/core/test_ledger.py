@@ -20,15 +20,15 @@ from model_states import (
     velocities,
 )
 
-from firmware.core.control.control import reference_step
-from firmware.core.control.input_forms import exact_form, paper_form, roll_form
-from firmware.core.control.law import axis_demand
-from firmware.core.jit import PACKAGES_DIR
-from firmware.core.maths.rotations import euler_rates, rotation_nb, rotation_nb_euler
-from firmware.core.vehicle import layout
-from firmware.core.vehicle.mass import first_moment, inertia
-from firmware.core.vehicle.water import water_wrench
-from firmware.model.vehicle import decode_vehicle
+from glider.firmware.core.control.control import reference_step
+from glider.firmware.core.control.input_forms import exact_form, paper_form, roll_form
+from glider.firmware.core.control.law import axis_demand
+from glider.firmware.core.jit import PACKAGES_DIR
+from glider.firmware.core.maths.rotations import euler_rates, rotation_nb, rotation_nb_euler
+from glider.firmware.core.vehicle import layout
+from glider.firmware.core.vehicle.mass import first_moment, inertia
+from glider.firmware.core.vehicle.water import water_wrench
+from glider.firmware.model.vehicle import decode_vehicle
 from tests.support.examples import examples
 
 LEDGER = PACKAGES_DIR / "docs" / "LEDGER.md"

@@ -21,10 +21,10 @@ from model_states import (
     velocities,
 )
 
-from firmware.core.vehicle import layout
-from firmware.core.vehicle.mass import first_moment, first_moment_rate, inertia, translational_mass
-from firmware.core.vehicle.motion import solve_mass_matrix
-from firmware.core.vehicle.water import flow_angles, flow_to_body, water_wrench
+from glider.firmware.core.vehicle import layout
+from glider.firmware.core.vehicle.mass import first_moment, first_moment_rate, inertia, translational_mass
+from glider.firmware.core.vehicle.motion import solve_mass_matrix
+from glider.firmware.core.vehicle.water import flow_angles, flow_to_body, water_wrench
 from tests.support.examples import examples
 
 GLIDER = Glider.from_file(VEHICLE)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from model_states import angles, pitches, quaternions, rates
 from scipy.spatial.transform import Rotation
 
-from firmware.core.maths.rotations import (
+from glider.firmware.core.maths.rotations import (
     euler_from_quaternion,
     euler_rates,
     quaternion_from_euler,

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from model_states import P
 
-from firmware.core.jit import allocating_kernel, kernel
-from firmware.core.maths.rotations import quaternion_from_euler
-from firmware.core.maths.wide import LANES, anywhere, as_wide, everywhere, lane, room, where, with_lane
-from firmware.core.vehicle import layout
-from firmware.core.vehicle.batch import nominal_batch
-from firmware.core.vehicle.flight import nominal_run
+from glider.firmware.core.jit import allocating_kernel, kernel
+from glider.firmware.core.maths.rotations import quaternion_from_euler
+from glider.firmware.core.maths.wide import LANES, anywhere, as_wide, everywhere, lane, room, where, with_lane
+from glider.firmware.core.vehicle import layout
+from glider.firmware.core.vehicle.batch import nominal_batch
+from glider.firmware.core.vehicle.flight import nominal_run
 
 LIBRARY = 0.6  # units in the last place by which the C library, which is the measure here, may be wrong itself
 

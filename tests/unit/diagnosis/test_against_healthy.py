@@ -7,28 +7,28 @@ import msgspec
 import numpy as np
 import pytest
 
-from firmware.core.vehicle import layout
-from firmware.model.vehicle import COEFFICIENTS, PLACES, FormTable, Vehicle
-from tools.cli.common import report_errors
-from tools.cli.main import cli
-from tools.data.errors import InputError
-from tools.data.runs.case import load_case
-from tools.data.sources import load_vehicle
-from tools.data.tomltext import toml_text
-from tools.diagnose import against_healthy as against
-from tools.diagnose.against_answer import plain
-from tools.diagnose.against_healthy import (
+from glider.firmware.core.vehicle import layout
+from glider.firmware.model.vehicle import COEFFICIENTS, PLACES, FormTable, Vehicle
+from glider.tools.cli.common import report_errors
+from glider.tools.cli.main import cli
+from glider.tools.data.errors import InputError
+from glider.tools.data.runs.case import load_case
+from glider.tools.data.sources import load_vehicle
+from glider.tools.data.tomltext import toml_text
+from glider.tools.diagnose import against_healthy as against
+from glider.tools.diagnose.against_answer import plain
+from glider.tools.diagnose.against_healthy import (
     Comparison,
     Healthy,
-    Hypothesis,
+    HealthyHypothesis,
     diagnose_against_healthy,
     form_stands_out,
     weigh,
 )
-from tools.study.challenge.form_cases import draw_healthy, write_flights
-from tools.study.challenge.form_fit import fit_flights, fit_forces
-from tools.study.challenge.form_plan import BY_LABEL
-from tools.study.challenge.trial import with_effect
+from glider.tools.study.challenge.form_cases import draw_healthy, write_flights
+from glider.tools.study.challenge.form_fit import fit_flights, fit_forces
+from glider.tools.study.challenge.form_plan import BY_LABEL
+from glider.tools.study.challenge.trial import with_effect
 
 pytestmark = pytest.mark.computes(seconds=90)
 
@@ -124,7 +124,7 @@ def compared(logs: list[float], places: int = 40) -> Comparison:
 def test_unknown_is_what_healthy_runs_do_not_leave(left, least, most, monkeypatch):
     monkeypatch.setattr(Comparison, "independent", 40.0)
     at = compared([0.1, -0.2, 0.3, -0.1, 0.0, 0.2, -0.3, 0.05])
-    one = Hypothesis((), np.zeros(40), np.full(6, left / 6.0), np.zeros((6, 40)), np.zeros(40))
+    one = HealthyHypothesis((), np.zeros(40), np.full(6, left / 6.0), np.zeros((6, 40)), np.zeros(40))
     assert least <= weigh(at, [one]).probabilities()["unknown"] <= most
 
 
@@ -132,7 +132,7 @@ def test_a_label_that_does_not_shrink_what_was_left_out_is_none(monkeypatch):
     monkeypatch.setattr(Comparison, "independent", 40.0)
     at = compared([0.1, -0.2, 0.3, -0.1])
     nothing, label = (
-        Hypothesis(labels, np.zeros(40), np.full(6, left / 6.0), np.zeros((6, 40)), np.zeros(40))
+        HealthyHypothesis(labels, np.zeros(40), np.full(6, left / 6.0), np.zeros((6, 40)), np.zeros(40))
         for labels, left in (((), 1.0), (("label1",), 1.01))
     )
     assert "label1" not in weigh(at, [nothing, label]).probabilities()
@@ -152,13 +152,14 @@ def test_a_vehicle_file_that_says_what_its_form_leaves_needs_no_healthy_runs(pla
     learned = diagnosed(place, "unchanged").healthy
     total = float(np.sqrt(np.mean(np.square(list(learned.scales.values())))))
     form = FormTable(HEALTHY, learned.seen, 0.2, {"all": learned.scales | {"total": total}})
-    told = {name: load_case(place / name, vehicle) for name in ("askew", "unchanged")}
-    told = {
-        name: replace(case, vehicle=msgspec.structs.replace(case.roughie, form=form)) for name, case in told.items()
+    sentences = {name: load_case(place / name, vehicle) for name in ("askew", "unchanged")}
+    sentences = {
+        name: replace(case, vehicle=msgspec.structs.replace(case.roughie, form=form))
+        for name, case in sentences.items()
     }
-    assert form_stands_out(told["askew"])
-    assert diagnose_against_healthy(told["unchanged"], None).verdict == "none"
-    found = diagnose_against_healthy(told["askew"], None)
+    assert form_stands_out(sentences["askew"])
+    assert diagnose_against_healthy(sentences["unchanged"], None).verdict == "none"
+    found = diagnose_against_healthy(sentences["askew"], None)
     assert (found.verdict, found.selected[0]) == ("cause", LABEL)
     assert any("--reference" in line for line in plain(found)["cautions"])
 

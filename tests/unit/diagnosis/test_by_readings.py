@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from support.cases import make_case
 
-from sim_backend.core.effects import effect_layout as ef
-from tools.data.runs.case import load_case
-from tools.diagnose import by_readings
-from tools.diagnose.diagnosis import diagnose, plain
-from tools.gap.mended import findings_of
-from tools.inference.rules import Rules
-from tools.readings.findings import Finding
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.data.runs.case import load_case
+from glider.tools.diagnose import by_readings
+from glider.tools.diagnose.diagnosis import diagnose, plain
+from glider.tools.gap.corrected import findings_of
+from glider.tools.inference.rules import Rules
+from glider.tools.readings.findings import Finding
 
 pytestmark = pytest.mark.computes(seconds=60)
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from support.cases import make_case
 
-from sim_backend.core.effects import effect_layout as ef
-from sim_backend.core.effects.catalogue import catalogue
-from tools.diagnose.descent import PRUNE_BEHIND, prune
-from tools.diagnose.search import run
-from tools.inference.problem import problem_of
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.sim_backend.core.effects.catalogue import catalogue
+from glider.tools.diagnose.descent import PRUNE_BEHIND, prune
+from glider.tools.diagnose.search import run
+from glider.tools.inference.problem import problem_of
 
 
 def candidate(name, misfit, gained):

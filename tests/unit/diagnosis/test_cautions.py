@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from support.cases import make_case
 
-from sim_backend.core.effects import effect_layout as ef
-from tools.data.runs import columns as names
-from tools.data.runs.case import Case
-from tools.diagnose.cautions import cautions, not_asked
-from tools.inference.problem import problem_of
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.case import Case
+from glider.tools.diagnose.cautions import cautions, not_asked
+from glider.tools.inference.problem import problem_of
 
 
 @pytest.fixture(scope="module")

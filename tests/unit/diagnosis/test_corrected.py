@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from firmware.core.vehicle import layout
-from hal.strict import ConfigError
-from sim_backend.core.effects import effect_layout as ef
-from tools.data.sources import load_vehicle
-from tools.inference.corrected import LINKS, corrected_text, load_corrected
-from tools.inference.model import Model
+from glider.firmware.core.vehicle import layout
+from glider.hal.strict import ConfigError
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.data.sources import load_vehicle
+from glider.tools.inference.corrected import LINKS, corrected_text, load_corrected
+from glider.tools.inference.model import Model
 
 
 @pytest.fixture

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from support.cases import begins, drawn, make_case
 
-from sim_backend.core.effects import effect_layout as ef
-from sim_backend.core.effects.timing import mean_input
-from tools.diagnose.residuals import tests as residual_tests
-from tools.inference.core.error_layout import N_ERR
-from tools.inference.core.step import difference, inject_error
-from tools.inference.problem import problem_of
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.sim_backend.core.effects.timing import mean_input
+from glider.tools.diagnose.residuals import tests as residual_tests
+from glider.tools.inference.core.error_layout import N_ERR
+from glider.tools.inference.core.step import difference, inject_error
+from glider.tools.inference.problem import problem_of
 
 
 @pytest.fixture(scope="module")

@@ -5,10 +5,10 @@ import pytest
 from scipy.optimize import lsq_linear
 from support.cases import make_case
 
-from sim_backend.core.effects import effect_layout as ef
-from tools.inference.fit import SIDE_STEPS, Fitter, bounded_step
-from tools.inference.parameters import effect_parameters, model_at, nuisance_parameters
-from tools.inference.problem import problem_of
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.inference.fit import SIDE_STEPS, Fitter, bounded_step
+from glider.tools.inference.parameters import effect_parameters, model_at, nuisance_parameters
+from glider.tools.inference.problem import problem_of
 
 
 def test_steps_within_limits_are_those_of_bounded_least_squares():
@@ -29,7 +29,7 @@ def fitter(tmp_path_factory):
     F = np.zeros(ef.N_F)
     F[ef.PITCH_BIAS] = 0.04
     problem = problem_of(make_case(tmp_path_factory.mktemp("fit"), F, seed=2))
-    gains = problem.filter(problem.model.P, np.zeros(ef.N_F), roughness=20.0, begin=True)
+    gains = problem.filter(problem.model.P, np.zeros(ef.N_F), process_noise_scale=20.0, begin=True)
     return Fitter(problem, gains, nuisance_parameters(problem), temper=True)
 
 

@@ -5,16 +5,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tools.diagnose.gates import mixed, opened
-from tools.diagnose.noise_probes import NoiseProbe, ProbeResult
-from tools.diagnose.probabilities import to_none
-from tools.diagnose.record import NONE, UNKNOWN
-from tools.diagnose.search import as_told
-from tools.diagnose.staged_answer import by_gap_left, weighed
-from tools.diagnose.unknown import UNFIT, Remainder, probability_unknown
-from tools.diagnose.verdict import Answer
-from tools.gap.measure import RunGap
-from tools.inference.levels import SENSORS, Levels
+from glider.tools.diagnose.gates import mixed, opened
+from glider.tools.diagnose.noise_probes import NoiseProbe, ProbeResult
+from glider.tools.diagnose.probabilities import to_none
+from glider.tools.diagnose.record import NONE, UNKNOWN
+from glider.tools.diagnose.search import noise_matches_file
+from glider.tools.diagnose.staged_answer import by_gap_left, weighed
+from glider.tools.diagnose.unknown import UNFIT, Remainder, probability_unknown
+from glider.tools.diagnose.verdict import Answer
+from glider.tools.gap.measure import RunGap
+from glider.tools.inference.levels import SENSORS, Levels
 
 GYRO = ProbeResult(NoiseProbe("gyro", "sensor", "sensing", "gyro"), 3e4, 6.0)
 
@@ -37,7 +37,7 @@ def figures(**changed) -> dict[str, float]:
 
 
 def unknown(f: dict[str, float], selected: bool = True, asked: bool = True) -> float:
-    search = SimpleNamespace(problem=SimpleNamespace(rules=SimpleNamespace(whiteness=True)), told=f["told"])
+    search = SimpleNamespace(problem=SimpleNamespace(rules=SimpleNamespace(whiteness=True)), well_specified=f["told"])
     missed = SimpleNamespace(before=f["before"], recalibrated=f["before"], after=f["after"], floor=f["floor"])
     servo = ProbeResult(NoiseProbe("servo", "actuator", "actuation", "servo"), f["next"], 6.0)
     left = Remainder(f["explained"], f["left"], [GYRO, servo], opened(f["shows"], 6.0, 9.0)) if asked else None
@@ -49,16 +49,18 @@ def unknown(f: dict[str, float], selected: bool = True, asked: bool = True) -> f
     ("taken", 0.01, 100.0), ("told", 1e-3, 1.0), ("next", 1.0, 1e6), ("shows", 1.0, 100.0),
 ])  # fmt: skip
 @pytest.mark.parametrize("told", [0.0, 1.0])
-def test_the_probability_of_unknown_has_no_cliff_in_any_of_its_figures(name, low, high, told):
+def test_the_probability_of_unknown_has_no_cliff_in_any_of_its_figures(name, low, high, well_specified):
     for selected, asked in ((True, True), (False, True), (False, False), (True, False)):
         values = np.geomspace(low, high, 4000)
-        found = np.array([unknown(figures(told=told) | {name: value}, selected, asked) for value in values])
+        found = np.array(
+            [unknown(figures(well_specified=well_specified) | {name: value}, selected, asked) for value in values]
+        )
         assert np.abs(np.diff(found)).max() < 0.02
 
 
 def test_unknown_is_sure_where_the_vehicle_is_not_the_file_s_and_untouched_where_it_may_be():
     assert unknown(figures(after=UNFIT[1] + 0.1)) > 0.99
-    near = figures(after=2.0, before=30.0, left=10.0, taken=900.0, told=0.0)
+    near = figures(after=2.0, before=30.0, left=10.0, taken=900.0, well_specified=0.0)
     assert unknown(near) < 0.1
 
 
@@ -68,11 +70,13 @@ def levels(*logs: float) -> Levels:
 
 def test_noise_as_the_file_says_is_a_probability_without_a_cliff():
     problem = SimpleNamespace(seen=np.arange(15) < 9)  # five sensors
-    said = [as_told(problem, levels(0.01, -0.02, 0.0, 0.02, log)) for log in np.linspace(0.0, 0.5, 2000)]
+    said = [noise_matches_file(problem, levels(0.01, -0.02, 0.0, 0.02, log)) for log in np.linspace(0.0, 0.5, 2000)]
     assert said[0] > 0.99
     assert said[-1] < 1e-6
     assert np.abs(np.diff(said)).max() < 0.02
-    assert as_told(problem, levels(0.0, 0.0)) < 0.5 < as_told(problem, levels(0.0, 0.0, 0.0))  # others say nothing
+    assert (
+        noise_matches_file(problem, levels(0.0, 0.0)) < 0.5 < noise_matches_file(problem, levels(0.0, 0.0, 0.0))
+    )  # others say nothing
     logs = np.linspace(-0.5, 0.5, 2000)
     believed = np.array([levels(log).believed(0.0).log[0] for log in logs])
     assert np.abs(np.diff(believed)).max() < 4.0 * np.diff(logs)[0]

@@ -6,43 +6,43 @@ import numpy as np
 import pytest
 from support.cases import make_case
 
-from sim_backend.core.effects import effect_layout as ef
-from sim_backend.core.effects.catalogue import catalogue
-from tools.diagnose import search as search_module
-from tools.diagnose import verdict as verdict_module
-from tools.diagnose.noise_probes import CLOCK, NoiseProbe, ProbeResult
-from tools.diagnose.probabilities import SECOND, doubt_small, pass_on, share_out
-from tools.diagnose.record import NONE
-from tools.diagnose.search import run
-from tools.diagnose.shrink import in_tolerances, lacking_squares, left_out_squares, most_often
-from tools.diagnose.unknown import (
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.sim_backend.core.effects.catalogue import catalogue
+from glider.tools.diagnose import search as search_module
+from glider.tools.diagnose import verdict as verdict_module
+from glider.tools.diagnose.noise_probes import CLOCK, NoiseProbe, ProbeResult
+from glider.tools.diagnose.probabilities import MAX_NONE_RATIO, doubt_small, pass_on, share_out
+from glider.tools.diagnose.record import NONE
+from glider.tools.diagnose.search import run
+from glider.tools.diagnose.shrink import ablation_importance, in_tolerances, left_out_squares, most_often
+from glider.tools.diagnose.unknown import (
     MORE_UNKNOWN,
     UNFIT,
-    WIDE,
+    UNKNOWN_GAP_RATIO_AT_HALF,
     Remainder,
     left_floors,
     left_share,
     probability_unknown,
 )
-from tools.diagnose.verdict import (
+from glider.tools.diagnose.verdict import (
     EVIDENCE_NEEDED,
-    Worth,
+    HeldOutImportance,
     conclude,
     drop,
-    held_out_worth,
-    less_by_worth,
+    held_out_importance,
+    nuisance_prior_cost,
     prune_effects,
-    strain,
+    rank_by_importance,
     with_least_gap,
 )
-from tools.inference.problem import problem_of
+from glider.tools.inference.problem import problem_of
 
 
 def test_worth_is_the_root_of_what_the_gap_grows_by():
-    worth = Worth(np.array([1.0, 1.0]), {"drag": np.array([3.0, 5.0]), "lift": np.array([-0.1, 0.0])})
-    assert worth.tolerances("drag") == pytest.approx(2.0)
-    assert worth.share("drag") == pytest.approx(2.0)
-    assert worth.tolerances("lift") == 0.0
+    importance = HeldOutImportance(np.array([1.0, 1.0]), {"drag": np.array([3.0, 5.0]), "lift": np.array([-0.1, 0.0])})
+    assert importance.tolerances("drag") == pytest.approx(2.0)
+    assert importance.share("drag") == pytest.approx(2.0)
+    assert importance.tolerances("lift") == 0.0
 
 
 @pytest.fixture(scope="module")
@@ -71,8 +71,8 @@ def test_more_evidence_wins_only_as_far_as_it_closes_the_gap_of_runs_left_out(tw
 
 def test_strain_is_what_the_prior_loses():
     whole, less = SimpleNamespace(nuisance=np.array([1.0, 0.0])), SimpleNamespace(nuisance=np.array([3.0, -4.0]))
-    assert strain(whole, less) == pytest.approx(12.0)
-    assert strain(less, whole) == pytest.approx(-12.0)
+    assert nuisance_prior_cost(whole, less) == pytest.approx(12.0)
+    assert nuisance_prior_cost(less, whole) == pytest.approx(-12.0)
 
 
 @pytest.mark.parametrize(("lost", "stays"), [(EVIDENCE_NEEDED, 2), (EVIDENCE_NEEDED - 0.1, 1)])
@@ -80,7 +80,7 @@ def test_what_is_allowed_takes_no_effect_s_place_that_it_fills_only_at_its_limit
     two_effects, monkeypatch, lost, stays
 ):
     def idle(search, hypothesis):
-        return Worth(np.ones(3), {label: np.zeros(3) for label in hypothesis.labels})
+        return HeldOutImportance(np.ones(3), {label: np.zeros(3) for label in hypothesis.labels})
 
     monkeypatch.setattr(verdict_module, "held_out_worth", idle)
     monkeypatch.setattr(verdict_module, "strain", lambda hypothesis, less: lost)
@@ -101,20 +101,20 @@ def test_a_search_that_takes_over_effects_makes_its_filter_at_them(two_effects, 
 def test_an_effect_is_as_large_as_it_is_where_what_is_allowed_could_take_it(two_effects):
     search = two_effects
     found = next(one for one in search.ranked() if set(one.labels) == {"net_buoyancy", "pitch_trim"})
-    refitted = held_out_worth(search, found).tolerances("net_buoyancy")
-    lacking = {label: in_tolerances(grown) for label, grown in lacking_squares(search, found).items()}
-    assert lacking["net_buoyancy"] > 1.3 * refitted
+    refitted = held_out_importance(search, found).tolerances("net_buoyancy")
+    without_effect = {label: in_tolerances(grown) for label, grown in ablation_importance(search, found).items()}
+    assert without_effect["net_buoyancy"] > 1.3 * refitted
 
 
 def test_an_effect_that_is_worth_less_than_it_takes_is_ranked_by_the_geometric_mean(two_effects):
     search = two_effects
     found = next(one for one in search.ranked() if set(one.labels) == {"net_buoyancy", "pitch_trim"})
-    lacking, worth = lacking_squares(search, found), held_out_worth(search, found)
-    ranked = less_by_worth(search, found, lacking)
+    without_effect, importance = ablation_importance(search, found), held_out_importance(search, found)
+    ranked = rank_by_importance(search, found, without_effect)
     for label in found.labels:
-        mean = np.sqrt(in_tolerances(lacking[label]) * worth.tolerances(label))
-        assert in_tolerances(ranked[label]) == pytest.approx(min(mean, in_tolerances(lacking[label])))
-    assert in_tolerances(ranked["net_buoyancy"]) < 0.9 * in_tolerances(lacking["net_buoyancy"])
+        mean = np.sqrt(in_tolerances(without_effect[label]) * importance.tolerances(label))
+        assert in_tolerances(ranked[label]) == pytest.approx(min(mean, in_tolerances(without_effect[label])))
+    assert in_tolerances(ranked["net_buoyancy"]) < 0.9 * in_tolerances(without_effect["net_buoyancy"])
 
 
 def test_an_effect_that_takes_most_in_every_run_is_first_in_every_draw():
@@ -146,7 +146,7 @@ def test_a_small_effect_is_never_sure_and_none_never_before_it(size):
     found = doubt_small({"drag": 0.9, "lift": 0.1, NONE: 0.0}, "drag", size)
     assert sum(found.values()) == pytest.approx(1.0)
     assert found["drag"] < 0.6
-    assert found[NONE] <= SECOND * found["drag"] + 1e-9
+    assert found[NONE] <= MAX_NONE_RATIO * found["drag"] + 1e-9
     assert found["lift"] / found["drag"] == pytest.approx(1.0 / 9.0)
 
 
@@ -160,9 +160,11 @@ def shrinkage(after: float, floor: float = 0.15, recalibrated: float = 1.0, befo
 
 def unknown(
     after: float, left: float, explained: float, evident: bool = True, taken: float = 9.0, noise=None,
-    probed=(), effects=(), told=False, before: float = 1.0,
+    probed=(), effects=(), well_specified=False, before: float = 1.0,
 ) -> float:  # fmt: skip
-    search = SimpleNamespace(problem=SimpleNamespace(rules=SimpleNamespace(whiteness=True)), told=told)
+    search = SimpleNamespace(
+        problem=SimpleNamespace(rules=SimpleNamespace(whiteness=True)), well_specified=well_specified
+    )
     remainder = Remainder(explained, left, list(probed))
     places = [catalogue()[label].place for label in effects]
     missed = shrinkage(after, recalibrated=before, before=before)
@@ -208,16 +210,20 @@ def test_a_wide_gap_is_unknown_where_a_sensor_s_small_error_has_nearly_all_the_n
 
 def test_misfit_that_closes_with_the_gap_is_a_small_effect_s_unless_the_vehicle_is_known():
     closed = {"after": 0.5, "before": 3.0, "left": 2.0e4, "explained": 8.0e4}  # a fifth of the misfit, 3 % of the gap
-    assert unknown(**closed, taken=15.0, told=True) > 0.5
+    assert unknown(**closed, taken=15.0, well_specified=True) > 0.5
     assert unknown(**closed, taken=15.0) < 0.2
 
 
 def test_a_narrow_gap_is_a_small_effect_s_unless_the_vehicle_is_known():
     narrow = {"after": 0.22, "left": 4.0e4, "explained": 6.0e4}  # 1.07 floors
-    assert unknown(**narrow, told=True) > 0.7
+    assert unknown(**narrow, well_specified=True) > 0.7
     assert unknown(**narrow) < 0.1
-    assert unknown(**narrow | {"left": 3.0e3}, told=True) < 0.1  # a known effect in another form leaves as much
-    assert unknown(**narrow | {"after": 0.17}, told=True) < 0.5  # half a floor: nobody could see it in a window
+    assert (
+        unknown(**narrow | {"left": 3.0e3}, well_specified=True) < 0.1
+    )  # a known effect in another form leaves as much
+    assert (
+        unknown(**narrow | {"after": 0.17}, well_specified=True) < 0.5
+    )  # half a floor: nobody could see it in a window
 
 
 def test_what_is_wider_than_the_effects_themselves_is_unknown_however_wrong_the_recalibrated_model_is():
@@ -238,7 +244,7 @@ def test_beside_a_wandering_clock_what_leaves_no_gap_is_not_unknown():
 
 
 def test_as_likely_as_not_at_the_width_that_small_effects_leave():
-    after = 0.15 * np.sqrt(1.0 + WIDE**2)
+    after = 0.15 * np.sqrt(1.0 + UNKNOWN_GAP_RATIO_AT_HALF**2)
     assert unknown(after, left=1e9, explained=0.0, evident=False) == pytest.approx(0.5)
     assert unknown(UNFIT[1] + 0.1, left=1.0, explained=1e9) > 0.99
 
@@ -246,7 +252,7 @@ def test_as_likely_as_not_at_the_width_that_small_effects_leave():
 def test_the_main_cause_takes_the_most_of_the_gap_however_many_nat_a_sensor_s_small_error_has(tmp_path):
     F = np.zeros(ef.N_F)
     F[ef.DRAG_0], F[ef.GYRO_SCALE] = 1.2, 0.15
-    answer = conclude(run(problem_of(make_case(tmp_path, F, seed=6, mocap=True, rough=1.5))))
+    answer = conclude(run(problem_of(make_case(tmp_path, F, seed=6, mocap=True, noisy=1.5))))
     assert answer.main == answer.selected[0] == "drag"
     assert "gyro_scale" in answer.selected
     assert answer.gained["gyro_scale"] > answer.gained["drag"]

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from support.cases import make_case
 
-from sim_backend.core.effects import effect_layout as ef
-from tools.diagnose.matter import MATTERS, excess, movements
-from tools.diagnose.probabilities import answer_first, mix_in_error_rate, to_none
-from tools.diagnose.record import NONE, UNKNOWN
-from tools.diagnose.search import run
-from tools.diagnose.verdict import EVIDENCE_NEEDED, Answer, conclude
-from tools.inference.problem import problem_of
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.diagnose.materiality import MATERIAL_TOLERANCES, excess, movements
+from glider.tools.diagnose.probabilities import answer_first, mix_in_error_rate, to_none
+from glider.tools.diagnose.record import NONE, UNKNOWN
+from glider.tools.diagnose.search import run
+from glider.tools.diagnose.verdict import EVIDENCE_NEEDED, Answer, conclude
+from glider.tools.inference.problem import problem_of
 
 SMALL, LARGE = 0.004, 0.2  # s; at 0.3 m/s and 0.15 m of tolerance some 0.008 and 0.4 tolerances
 
@@ -43,13 +43,13 @@ def test_a_clock_that_is_late_enough_to_matter_is_the_cause(tmp_path):
     assert answer.main == "mocap_delay"
     assert answer.selected == ["mocap_delay"]
     assert answer.negligible == {}
-    assert movements(answer.search, answer.hypothesis)["mocap_delay"] > MATTERS
+    assert movements(answer.search, answer.hypothesis)["mocap_delay"] > MATERIAL_TOLERANCES
     assert agrees(answer)
 
 
 def test_probability_of_what_does_not_matter_is_that_of_none():
     chances = {"drag": 0.5, "lift": 0.3, "clock_skew": 0.15, NONE: 0.05}
-    found = to_none(chances, ["clock_skew"], {"lift": 0.5 * MATTERS, "drag": 2.0 * MATTERS})
+    found = to_none(chances, ["clock_skew"], {"lift": 0.5 * MATERIAL_TOLERANCES, "drag": 2.0 * MATERIAL_TOLERANCES})
     assert found == pytest.approx({"drag": 0.5, "lift": 0.0, "clock_skew": 0.0, NONE: 0.5})
 
 

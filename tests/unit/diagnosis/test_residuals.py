@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tools.diagnose.record import Finding
-from tools.diagnose.residuals import chi, goes_with, lagged, peak, worst
+from glider.tools.diagnose.record import FindingRecord
+from glider.tools.diagnose.residuals import chi, goes_with, lagged, peak, worst
 
 BOUNDS = np.array([0, 700, 1500, 2100])
 
@@ -46,8 +46,8 @@ def test_colour_shows_in_the_lags():
 def test_the_worst_finding_is_corrected_for_how_many_were_looked_at():
     from scipy import stats
 
-    few = [Finding("q", "variance", 4.0)]
-    many = [Finding("q", f"lag {n}", 0.0) for n in range(500)]
+    few = [FindingRecord("q", "variance", 4.0)]
+    many = [FindingRecord("q", f"lag {n}", 0.0) for n in range(500)]
     assert worst(few + many) < worst(few) < 4.0
     assert worst([]) == 0.0
     assert SimpleNamespace(sigma=worst(few)).sigma == pytest.approx(stats.norm.isf(2.0 * stats.norm.sf(4.0)))

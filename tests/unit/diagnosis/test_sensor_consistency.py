@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from support.cases import make_case
 
-from sim_backend.core.effects import effect_layout as ef
-from tools.diagnose.search import ROUGHNESS
-from tools.diagnose.sensor_consistency import HOLDS_BELOW, inconsistent_sensors, mean_nis
-from tools.inference.parameters import effect_parameters, model_at, nuisance_parameters
-from tools.inference.predict import fly
-from tools.inference.problem import problem_of
-from tools.inference.time_alignment import BEHIND, aligned, sample_at_row
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.diagnose.search import PROCESS_NOISE_SCALES
+from glider.tools.diagnose.sensor_consistency import HOLDS_BELOW, inconsistent_sensors, mean_nis
+from glider.tools.inference.parameters import effect_parameters, model_at, nuisance_parameters
+from glider.tools.inference.predict import fly
+from glider.tools.inference.problem import problem_of
+from glider.tools.inference.time_alignment import POSE_LAG_S, aligned, sample_at_row
 
 
 def with_effect(folder, entry, value, **about):
@@ -21,7 +21,9 @@ def with_effect(folder, entry, value, **about):
 
 def rough_nis(problem):
     free = nuisance_parameters(problem)
-    gains = problem.filter(*model_at(problem, free, np.zeros(len(free))), roughness=ROUGHNESS[0], begin=True)
+    gains = problem.filter(
+        *model_at(problem, free, np.zeros(len(free))), process_noise_scale=PROCESS_NOISE_SCALES[0], begin=True
+    )
     return mean_nis(problem, gains)
 
 
@@ -88,7 +90,7 @@ def test_poses_moved_to_their_time_are_foreseen(tmp_path, delay):
     assert missed(there, F) == pytest.approx(missed(right, none), rel=0.15)
     if delay < 0.0:
         assert missed(problem, F) > 3.0 * missed(there, F)
-    lost = round(abs(delay - BEHIND) * 10) * len(problem.runs)
+    lost = round(abs(delay - POSE_LAG_S) * 10) * len(problem.runs)
     assert problem.valid[:, poses].all(axis=1).sum() - there.valid[:, poses].all(axis=1).sum() == lost
     assert there.as_recorded is problem
     assert aligned(there, np.zeros(ef.N_F)).as_recorded is problem

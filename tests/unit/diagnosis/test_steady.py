@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from support.cases import make_case
 
-from sim_backend.core.effects import effect_layout as ef
-from tools.data.runs import columns as names
-from tools.measure.figures.steady import Said, largest_move, line, moved, said
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.data.runs import columns as names
+from glider.tools.measure.figures.steady import Said, largest_move, line, moved, said
 
 pytestmark = pytest.mark.computes(seconds=15)
 

@@ -5,14 +5,14 @@ from types import SimpleNamespace
 import numpy as np
 from support.cases import make_case
 
-from sim_backend.core.effects import effect_layout as ef
-from tools.diagnose.noise_probes import WAVES, NoiseProbe, ProbeResult
-from tools.diagnose.search import run
-from tools.diagnose.shrink import AFTER, FLOOR
-from tools.diagnose.unknown import Remainder, beside_a_sea
-from tools.diagnose.verdict import conclude
-from tools.diagnose.waves import LINE, line_share
-from tools.inference.problem import problem_of
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.diagnose.noise_probes import WAVES, NoiseProbe, ProbeResult
+from glider.tools.diagnose.search import run
+from glider.tools.diagnose.shrink import AFTER, FLOOR
+from glider.tools.diagnose.unknown import Remainder, beside_a_sea
+from glider.tools.diagnose.verdict import conclude
+from glider.tools.diagnose.waves import LINE, line_share
+from glider.tools.inference.problem import problem_of
 
 ROWS = 600
 

@@ -2,17 +2,17 @@
 
 import pytest
 
-from hal.boardfile import BeaconTable, DriveTable, ServoTable
-from hal.drivers.drive import Drive
-from hal.drivers.maestro import Servo
-from hal.drivers.modbus_sensors import Beacon
-from hal.drivers.poll import TRIES
-from hal.drivers.samples import DAMAGES, Sensor
-from hal.ports import SLOTS, Condition, Validity, empty_frame
-from hal.protocols import maestro, modbus
-from hal.protocols.modbus_master import Failure
-from hal.protocols.registers import preset, to_registers
-from tools.study.faults.wire import Line
+from glider.hal.boardfile import BeaconTable, DriveTable, ServoTable
+from glider.hal.drivers.drive import Drive
+from glider.hal.drivers.maestro import Servo
+from glider.hal.drivers.modbus_sensors import Beacon
+from glider.hal.drivers.poll import TRIES
+from glider.hal.drivers.samples import DAMAGES, Sensor
+from glider.hal.ports import SLOTS, Condition, Validity, empty_frame
+from glider.hal.protocols import maestro, modbus
+from glider.hal.protocols.modbus_master import Failure
+from glider.hal.protocols.registers import preset, to_registers
+from glider.tools.study.faults.wire import WireLine
 
 
 def sensor() -> Sensor:
@@ -49,7 +49,7 @@ def test_a_burst_counts_frame_by_frame():
 
 
 def beacon_on(reply):
-    line = Line(reply, lambda rng: 0.002, seed=1)
+    line = WireLine(reply, lambda rng: 0.002, seed=1)
     item = Beacon(BeaconTable(device="keller-33x", port="p"), preset("keller-33x"))
     item.start(0.0)
     line.bus.add(item.poll)
@@ -96,7 +96,7 @@ def test_other_exceptions_have_three_tries(code):
 
 def test_a_damaged_reply_is_told_from_silence():
     seen = []
-    line = Line(lambda frame, number: good(frame, number)[:-1] + b"\x00", lambda rng: 0.002, seed=1)
+    line = WireLine(lambda frame, number: good(frame, number)[:-1] + b"\x00", lambda rng: 0.002, seed=1)
 
     class Job:
         device, due = 1, 0.0

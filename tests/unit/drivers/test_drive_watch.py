@@ -4,14 +4,14 @@ import math
 
 import pytest
 
-from hal.boardfile import DriveTable
-from hal.drivers.drive import Drive, StallDetector
-from hal.drivers.maestro import Servo
-from hal.drivers.samples import Sensor
-from hal.ports import SLOTS
-from hal.protocols import modbus
-from hal.protocols.modbus_master import ModbusBus
-from hal.protocols.registers import preset, to_registers
+from glider.hal.boardfile import DriveTable
+from glider.hal.drivers.drive import Drive, StallDetector
+from glider.hal.drivers.maestro import Servo
+from glider.hal.drivers.samples import Sensor
+from glider.hal.ports import SLOTS
+from glider.hal.protocols import modbus
+from glider.hal.protocols.modbus_master import ModbusBus
+from glider.hal.protocols.registers import preset, to_registers
 
 SERVO = {"device": "maestro", "port": "p", "channel": 0, "us_per_rad": 600.0, "zero_us": 1500.0}
 
@@ -123,7 +123,7 @@ def test_without_a_good_wire_the_drive_counts_on():
 
 
 def test_servo_pulses_stay_within_the_files_limits():
-    from hal.boardfile import ServoTable
+    from glider.hal.boardfile import ServoTable
 
     servo = Servo(ServoTable(limits_us=(1000.0, 2100.0), **SERVO), (-1.0472, 1.0472))
     assert servo.limits == pytest.approx((-500 / 600, 1.0))
@@ -133,7 +133,7 @@ def test_servo_pulses_stay_within_the_files_limits():
 
 
 def test_the_servo_sends_nothing_before_enable_and_repeats_itself_after():
-    from hal.boardfile import ServoTable
+    from glider.hal.boardfile import ServoTable
 
     servo, sent = Servo(ServoTable(limits_us=(1000.0, 2100.0), **SERVO), (-1.0, 1.0)), []
     servo.attach(lambda data: sent.append(data) or True)

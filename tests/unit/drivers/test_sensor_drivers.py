@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from hal.boardfile import ImuTable, WireTable
-from hal.drivers.count import nearest
-from hal.drivers.modbus_sensors import wire
-from hal.drivers.samples import FAULTY_AFTER, Sensor
-from hal.drivers.vn100 import Vn100, euler, rotation
-from hal.ports import SLOTS, Validity, empty_frame
-from hal.protocols import vn100
+from glider.hal.boardfile import ImuTable, WireTable
+from glider.hal.drivers.count import unwrap_low_word
+from glider.hal.drivers.modbus_sensors import wire
+from glider.hal.drivers.samples import FAULTY_AFTER, Sensor
+from glider.hal.drivers.vn100 import Vn100, euler, rotation
+from glider.hal.ports import SLOTS, Validity, empty_frame
+from glider.hal.protocols import vn100
 
 
 def sensor():
@@ -80,7 +80,7 @@ def test_a_broken_wire_is_no_sample():
     ("low", "last", "found"), [(5, 0, 5), (0xFFFF, 0, -1), (0, 65_535, 65_536), (10, -65_530, -65_526)]
 )
 def test_a_low_word_is_the_nearest_count(low, last, found):
-    assert nearest(low, last) == found
+    assert unwrap_low_word(low, last) == found
 
 
 def feed_imu(imu, roll, pitch, yaw, rates=(0.0, 0.0, 0.0), now=1.0):

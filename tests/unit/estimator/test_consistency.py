@@ -4,7 +4,7 @@ import numpy as np
 from support.estimating import Filter, state_error
 from support.flights import World, fly
 
-from firmware.core.layouts import estimator_layout as kf
+from glider.firmware.core.layouts import estimator_layout as kf
 
 # Depth, attitude and nu; position north and east is dead reckoning, actuators are known but for their noise.
 KEPT = [2, *range(kf.E_ATT, kf.E_ACT)]

@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from firmware.autopilot import Autopilot, configuration
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.layouts import estimator_layout as kf
-from firmware.core.vehicle.layout import X_DOWN, X_NU, X_QUAT
-from hal.ports import BEACON, IMU, PLUNGER_WIRE, SLIDER_WIRE
-from tools.data.sources import load_mission, load_vehicle
+from glider.firmware.autopilot import Autopilot, configuration
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.layouts import estimator_layout as kf
+from glider.firmware.core.vehicle.layout import X_DOWN, X_NU, X_QUAT
+from glider.hal.ports import BEACON, IMU, PLUNGER_WIRE, SLIDER_WIRE
+from glider.tools.data.sources import load_mission, load_vehicle
 
 DT = 0.02
 DEPTH, ROLL, PITCH = 1.5, 0.05, -0.3
@@ -79,7 +79,7 @@ def test_the_tick_of_a_restart_has_the_measured_values_and_the_last_position(pil
     assert est[[ctl.EST_SLIDER, ctl.EST_BALLAST]] == pytest.approx(est[[ctl.NEW_SLIDER, ctl.NEW_BALLAST]])
     assert (est[[ctl.EST_X, ctl.EST_Y]] == place).all()
     assert place.any()
-    assert est[ctl.ROUGHNESS] == 1.0
+    assert est[ctl.NOISE_SCALE] == 1.0
 
 
 def test_a_restart_forgets_the_roughness_of_the_water(pilot):

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from support.estimating import Filter, state_error
 
-from firmware.core.estimation.estimator import estimator_step
-from firmware.core.layouts import estimator_layout as kf
-from firmware.core.vehicle.flight import nominal_run
-from firmware.core.vehicle.layout import N_X
-from firmware.core.vehicle.linearise import linearise
+from glider.firmware.core.estimation.estimator import estimator_step
+from glider.firmware.core.layouts import estimator_layout as kf
+from glider.firmware.core.vehicle.flight import nominal_run
+from glider.firmware.core.vehicle.layout import N_X
+from glider.firmware.core.vehicle.linearise import linearise
 
 HERE = dict(roll=0.0, pitch=-0.2, yaw=0.5, p=0.0, q=0.0, r=0.0, depth=2.0, slider=0.0, ballast=0.0)
 
@@ -106,7 +106,7 @@ def test_a_measurement_whose_score_is_no_number_is_rejected(broken):
     np.testing.assert_allclose(filtered.x, before, rtol=1e-14, atol=0.0)
 
 
-def settle(filtered: Filter, seconds: float = 5.0) -> None:
+def arbitrate(filtered: Filter, seconds: float = 5.0) -> None:
     """Readings that agree with the filter itself, for a while."""
     for _ in range(round(seconds / 0.1)):
         filtered.predict(0.1)
@@ -114,7 +114,7 @@ def settle(filtered: Filter, seconds: float = 5.0) -> None:
 
 
 def readings(filtered: Filter) -> dict[str, float]:
-    from firmware.core.maths.rotations import euler_from_quaternion
+    from glider.firmware.core.maths.rotations import euler_from_quaternion
 
     angles = euler_from_quaternion(*filtered.x[3:7])
     values = (*angles, *filtered.x[10:13], filtered.x[2], filtered.x[14], filtered.x[15])
@@ -123,7 +123,7 @@ def readings(filtered: Filter) -> dict[str, float]:
 
 def test_a_spike_moves_nothing():
     filtered = Filter().start()
-    settle(filtered)
+    arbitrate(filtered)
     filtered.predict(0.1)
     x = filtered.x.copy()
     scores = filtered.update(depth=x[2] + 5.0)
@@ -133,7 +133,7 @@ def test_a_spike_moves_nothing():
 
 def test_a_sensor_that_stays_away_is_followed_in_the_end():
     filtered = Filter().start()
-    settle(filtered)
+    arbitrate(filtered)
     speed = filtered.x[7:10].copy()
     jump = filtered.x[2] + 0.5
     for _ in range(round(kf.REJECTED_AT_MOST / 0.1) + 3):
@@ -147,7 +147,7 @@ def test_a_sensor_that_stays_away_is_followed_in_the_end():
 
 def test_a_gyro_that_disagrees_with_the_attitude_is_not_believed():
     filtered = Filter().start()
-    settle(filtered)
+    arbitrate(filtered)
     for _ in range(100):
         filtered.predict(0.1)
         filtered.update(**{**readings(filtered), "q": 0.5})

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from glider.tools.data.runs.run import load_run
 from tests.support import ocean_files
 from tests.support.commands import glider
 from tests.support.ocean_files import START, flight
-from tools.data.runs.run import load_run
 
 
 def run_ok(*words: object, cwd: Path):

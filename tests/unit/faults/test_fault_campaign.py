@@ -5,11 +5,11 @@ import json
 import pytest
 from click.testing import CliRunner
 
-from firmware.faults import FAULTS
-from tools.study.faults import campaign
-from tools.study.faults.campaign import Outcome, everything, jobs, run, summary
-from tools.study.faults.cases import Case, Show
-from tools.study.faults.scene import PHASES
+from glider.firmware.faults import FAULTS
+from glider.tools.study.faults import campaign
+from glider.tools.study.faults.campaign import FaultOutcome, everything, jobs, run, summary
+from glider.tools.study.faults.cases import FaultCase, Show
+from glider.tools.study.faults.scene import PHASES
 
 pytestmark = pytest.mark.computes(seconds=25)
 
@@ -35,7 +35,7 @@ def test_every_row_of_the_table_has_a_case():
 
 def test_every_phase_of_a_mission_has_faults_begin_in_it():
     cases = everything()
-    seen = {phase for index, phase in jobs() if isinstance(cases[index], Case)}
+    seen = {phase for index, phase in jobs() if isinstance(cases[index], FaultCase)}
     assert seen == set(PHASES)
     assert len(jobs()) > 300
 
@@ -68,9 +68,9 @@ def test_a_show_passes_and_fails_without_what_notices_it(row):
 def test_what_counts_as_passed(change, passed):
     outcome = {"row": 2, "case": "x", "phase": "descent", "noticed_s": 0.5, "allowed_s": 0.5, "reaction": "ABORT",
                "expected": "ABORT", "ended": "surfaced", **change}  # fmt: skip
-    one = Outcome(**outcome)
+    one = FaultOutcome(**outcome)
     assert one.passed == passed
-    found = summary([one, Outcome(**{**outcome, "noticed_s": 0.1, "reaction": "ABORT", "ended": "surfaced"})])
+    found = summary([one, FaultOutcome(**{**outcome, "noticed_s": 0.1, "reaction": "ABORT", "ended": "surfaced"})])
     assert (found["passed"], found["failed"]) == ((1, 0) if passed else (0, 1))
     assert found["neither_surfaced_nor_safe"] == (change.get("ended", "surfaced") not in ("surfaced", "safe"))
     assert found["faults"][0]["number"] == 2
@@ -81,8 +81,8 @@ def test_a_vehicle_that_stays_below_is_called_lost():
     from pathlib import Path
     from tempfile import TemporaryDirectory
 
-    from tools.study.faults.flights import pump_fails_in_abort
-    from tools.study.faults.scene import Setting, build_scene, fly
+    from glider.tools.study.faults.flights import pump_fails_in_abort
+    from glider.tools.study.faults.scene import Setting, build_scene, fly
 
     with TemporaryDirectory() as folder:
         scene = build_scene("descent", pump_fails_in_abort("stuck"), Setting(), 1, Path(folder, "m.toml"))
@@ -91,7 +91,7 @@ def test_a_vehicle_that_stays_below_is_called_lost():
 
 
 def test_the_command_line(monkeypatch):
-    from tools.cli.faults import faults
+    from glider.tools.cli.faults import faults
 
     def here(only, disabled, workers, advance):
         return [run(job, disabled) for job in jobs(only)[:2]]

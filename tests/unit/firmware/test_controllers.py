@@ -7,11 +7,11 @@ import msgspec
 import numpy as np
 import pytest
 
-from firmware.core.control.controller_rows import CONTROLLERS
-from firmware.core.layouts import control_layout as ctl
-from firmware.model.gains import Control
-from hal.strict import decode
-from tools.flight.compose import build_flight
+from glider.firmware.core.control.controller_rows import CONTROLLERS
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.model.gains import Control
+from glider.hal.strict import decode
+from glider.tools.flight.compose import build_flight
 
 CONTROL_PAGE = Path(__file__).resolve().parents[3] / "docs" / "CONTROL.md"
 

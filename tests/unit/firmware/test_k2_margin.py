@@ -10,12 +10,12 @@ from law_flights import output_accelerations, plant_rates
 from model_states import state
 from support.commands import glider
 
-from firmware.core.vehicle import layout
-from firmware.model.estimator_settings import parameter_sigma
-from firmware.model.gains import Control, Law, LawGains
-from firmware.model.k2_margin import K2Margin, glides, k2_asked, k2_margins
-from firmware.model.vehicle import UncertaintyTable
-from tools.data.sources import load_vehicle
+from glider.firmware.core.vehicle import layout
+from glider.firmware.model.estimator_settings import parameter_sigma
+from glider.firmware.model.gains import Control, Law, LawGains
+from glider.firmware.model.k2_margin import K2Margin, glides, k2_asked, k2_margins
+from glider.firmware.model.vehicle import UncertaintyTable
+from glider.tools.data.sources import load_vehicle
 
 VEHICLE = load_vehicle("roughie")
 EPS = (0.1, 0.1)

@@ -2,10 +2,10 @@
 
 import pytest
 
-from firmware.guidance.mission import decode_mission
-from firmware.model.library import shipped
-from hal.strict import ConfigError
-from tools.data.sources import load_vehicle
+from glider.firmware.guidance.mission import decode_mission
+from glider.firmware.model.library import shipped
+from glider.hal.strict import ConfigError
+from glider.tools.data.sources import load_vehicle
 
 GOOD = shipped("guidance/missions")["sawtooth"]
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firmware.core.vehicle.seawater import water_density
+from glider.firmware.core.vehicle.seawater import water_density
 from tests.support.examples import examples
 
 

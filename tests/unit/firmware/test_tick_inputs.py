@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from firmware.core.control.telemetry import REC_FRAME
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.layouts import supervisor_layout as sup
-from firmware.telemetry import RAW, TICK
-from hal.ports import FRAME_SIZE, SLOTS, Validity
-from hal.recorder.recorder import NullRecorder
-from sim_backend.faults import break_in
-from tools.flight.compose import build_flight, build_runtime, record_specs
+from glider.firmware.core.control.telemetry import REC_FRAME
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.layouts import supervisor_layout as sup
+from glider.firmware.telemetry import RAW, TICK
+from glider.hal.ports import FRAME_SIZE, SLOTS, Validity
+from glider.hal.recorder.recorder import NullRecorder
+from glider.sim_backend.faults import break_in
+from glider.tools.flight.compose import build_flight, build_runtime, record_specs
 
 
 @pytest.fixture

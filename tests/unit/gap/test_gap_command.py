@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from support.flights import World, fly_case
 
-from tools.cli.common import report_errors
-from tools.cli.main import cli
-from tools.data.runs.case import write_case
-from tools.data.runs.run import load_run
+from glider.tools.cli.common import report_errors
+from glider.tools.cli.main import cli
+from glider.tools.data.runs.case import write_case
+from glider.tools.data.runs.run import load_run
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +74,7 @@ def test_predict_writes_rows_and_columns_of_the_run(folder, monkeypatch, capsys,
 
 
 def test_a_vehicle_file_predicts(folder, monkeypatch, tmp_path):
-    from firmware.model.library import shipped
+    from glider.firmware.model.library import shipped
 
     model = tmp_path / "mine.toml"
     model.write_text(shipped("model/vehicles")["roughie"])

@@ -7,18 +7,18 @@ import numpy as np
 import pytest
 from support.ocean import as_case, fly_dives
 
+from glider.tools.data.errors import InputError
+from glider.tools.data.runs.csvfile import write_table
+from glider.tools.data.runs.origin import FIXES_FILE, ORIGIN_FILE, fix_columns, moment_text, read_fixes
+from glider.tools.gap.heading import HeadingLeg, coefficients, moved_between
 from tests.support.commands import glider
-from tools.data.errors import InputError
-from tools.data.runs.csvfile import write_table
-from tools.data.runs.origin import FIXES_FILE, ORIGIN_FILE, fix_columns, moment_text, read_fixes
-from tools.gap.heading import Leg, coefficients, moved_between
 
 SPEED, TURNED = 0.06, 0.03  # share of the speed that a model lacks, rad to starboard
 START = 1_600_000_000.0
 METRES = 111_132.0  # of a degree of latitude at 45 degrees, by tables of WGS84
 
 
-def legs(seed: int, count: int = 15, hours: float = 3.0) -> list[Leg]:
+def legs(seed: int, count: int = 15, hours: float = 3.0) -> list[HeadingLeg]:
     """Legs on courses that turn by right angles, in a current of 10 cm/s that forgets itself in 36 hours."""
     rng = np.random.default_rng(seed)
     t = hours * np.arange(count)
@@ -27,7 +27,7 @@ def legs(seed: int, count: int = 15, hours: float = 3.0) -> list[Leg]:
     course = np.cumsum(rng.choice([0.0, 0.5 * np.pi, -0.5 * np.pi], count, p=[0.6, 0.2, 0.2]))
     swum = 0.25 * np.column_stack([np.cos(course), np.sin(course)]) * rng.uniform(0.9, 1.1, (count, 1))
     true = (1.0 + SPEED) * swum + TURNED * np.column_stack([-swum[:, 1], swum[:, 0]])
-    return [Leg(a, 3600.0 * hours, (b + c) * 3600.0 * hours, d * 3600.0 * hours)
+    return [HeadingLeg(a, 3600.0 * hours, (b + c) * 3600.0 * hours, d * 3600.0 * hours)
             for a, b, c, d in zip(t, true, current, swum, strict=True)]  # fmt: skip
 
 

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from sim_backend.core.effects import effect_layout as ef
-from tools.data.runs.run import Run
-from tools.gap.measure import run_gap
-from tools.inference.channels import ROUGHIE_MEASURES
-from tools.inference.predict import as_run
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.data.runs.run import Run
+from glider.tools.gap.measure import run_gap
+from glider.tools.inference.channels import ROUGHIE_MEASURES
+from glider.tools.inference.predict import as_run
 
 TOLERANCE = {"depth_m": 0.05, "pitch_rad": math.radians(1.5), "roll_rad": math.radians(1.5), "yaw_rad": math.radians(4)}
 

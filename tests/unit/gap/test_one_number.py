@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from support.flights import World, fly_case
 
-from sim_backend.core.effects import effect_layout as ef
-from tools.diagnose.shrink import gaps
-from tools.gap.assess import assess
-from tools.gap.measure import root_mean_square, run_gap
-from tools.identify.predict import predicted
-from tools.inference.channels import ROUGHIE_MEASURES
-from tools.inference.model import nominal_model
-from tools.inference.predict import predict
-from tools.inference.problem import problem_of
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.diagnose.shrink import gaps
+from glider.tools.gap.assess import assess
+from glider.tools.gap.measure import root_mean_square, run_gap
+from glider.tools.identify.predict import predicted
+from glider.tools.inference.channels import ROUGHIE_MEASURES
+from glider.tools.inference.model import nominal_model
+from glider.tools.inference.predict import predict
+from glider.tools.inference.problem import problem_of
 
 
 @pytest.mark.parametrize("mocap", [False, True])

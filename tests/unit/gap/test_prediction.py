@@ -7,17 +7,17 @@ import pytest
 from support.cases import make_case
 from support.flights import World, case_of, fly, fly_case
 
-from firmware.core.layouts import estimator_layout as kf
-from firmware.core.vehicle import layout
-from sim_backend.core.effects import effect_layout as ef
-from tools.data.runs.run import Run
-from tools.gap.measure import root_mean_square, run_gap
-from tools.inference.channels import ROUGHIE_MEASURES
-from tools.inference.load import load_model
-from tools.inference.model import nominal_model
-from tools.inference.predict import fly as fly_model
-from tools.inference.predict import fly_windows_from, observe, predict
-from tools.inference.problem import cut, problem_of
+from glider.firmware.core.layouts import estimator_layout as kf
+from glider.firmware.core.vehicle import layout
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.data.runs.run import Run
+from glider.tools.gap.measure import root_mean_square, run_gap
+from glider.tools.inference.channels import ROUGHIE_MEASURES
+from glider.tools.inference.load import load_model
+from glider.tools.inference.model import nominal_model
+from glider.tools.inference.predict import fly as fly_model
+from glider.tools.inference.predict import fly_windows_from, observe, predict
+from glider.tools.inference.problem import cut, problem_of
 
 
 def total(case, predictions=None) -> float:
@@ -179,7 +179,7 @@ def test_commands_that_come_late_are_held():
 
 
 def test_a_vehicle_file_is_a_model(tmp_path):
-    from firmware.model.library import shipped
+    from glider.firmware.model.library import shipped
 
     case, _ = fly_case(World(uncertainty=0.0, changes={layout.K_D0: 1.5}), 15, runs=2)
     text = shipped("model/vehicles")["roughie"].replace("K_D0 = 3.0", "K_D0 = 4.5")

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from firmware.core.vehicle import layout
-from tools.data.runs.run import Run
-from tools.data.sources import load_vehicle
-from tools.gap.measure import run_gap
-from tools.gap.regimes import ALL, PAIRS, REGIMES, gaps_by_regime, regimes_of
-from tools.inference.channels import ROUGHIE_MEASURES
+from glider.firmware.core.vehicle import layout
+from glider.tools.data.runs.run import Run
+from glider.tools.data.sources import load_vehicle
+from glider.tools.gap.measure import run_gap
+from glider.tools.gap.regimes import ALL, PAIRS, REGIMES, gaps_by_regime, regimes_of
+from glider.tools.inference.channels import ROUGHIE_MEASURES
 
 P = load_vehicle("roughie").vector()
 COUNT = 800  # at 10 Hz

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from tools.data.runs.case import load_case
-from tools.gap.assess import assess
+from glider.tools.data.runs.case import load_case
+from glider.tools.gap.assess import assess
 
 pytestmark = pytest.mark.computes(seconds=20)
 

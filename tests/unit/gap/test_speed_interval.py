@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tools.gap.velocity import interval_over
+from glider.tools.gap.velocity import interval_over
 
 
 def test_of_one_model_it_is_the_normal_one():

@@ -7,20 +7,20 @@ import numpy as np
 import pytest
 from support.ocean import as_case, fly_dives, without
 
-from sim_backend.ocean.core import layout as at
-from tools.cli.common import report_errors
-from tools.cli.main import cli
-from tools.data.errors import InputError
-from tools.data.runs import columns as names
-from tools.data.runs.case import load_case, write_case
-from tools.data.runs.run import Run, load_run, write_run
-from tools.gap.velocity import COLUMNS, MEANS, OUT_OF_MODEL, directions, mean_speed, of_run, velocities
-from tools.identify.ocean.files import vehicle_text
-from tools.identify.ocean.identify import identify_ocean
-from tools.inference.model import nominal_model
-from tools.inference.ocean_inputs import unsteady
-from tools.inference.parameters import NINETY
-from tools.inference.problem import problem_of
+from glider.sim_backend.ocean.core import layout as at
+from glider.tools.cli.common import report_errors
+from glider.tools.cli.main import cli
+from glider.tools.data.errors import InputError
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.case import load_case, write_case
+from glider.tools.data.runs.run import Run, load_run, write_run
+from glider.tools.gap.velocity import COLUMNS, MEANS, OUT_OF_MODEL, directions, mean_speed, of_run, velocities
+from glider.tools.identify.ocean.files import vehicle_text
+from glider.tools.identify.ocean.identify import identify_ocean
+from glider.tools.inference.model import nominal_model
+from glider.tools.inference.ocean_inputs import unsteady
+from glider.tools.inference.parameters import NINETY
+from glider.tools.inference.problem import problem_of
 
 DIVES, EVERY = 6, 60.0
 
@@ -147,12 +147,12 @@ def glider(monkeypatch, capsys, *arguments) -> tuple[int, str, str]:
 def test_a_file_for_each_run(mission, tmp_path, monkeypatch, capsys):
     _, case, found, _ = mission
     out = tmp_path / "velocity"
-    code, told, _ = glider(monkeypatch, capsys, "gap", "velocity", case.folder, "--model", case.vehicle_name, "--out",
+    code, flagged, _ = glider(monkeypatch, capsys, "gap", "velocity", case.folder, "--model", case.vehicle_name, "--out",
                            out, "--json")  # fmt: skip
     assert code == 0
     means = json.loads((out / MEANS).read_text())["runs"]
     assert means == {run.name: mean_speed(one) for run, one in zip(case.runs, found, strict=True)}
-    assert [out / f"{run.name}.csv" for run in case.runs] == [type(out)(name) for name in json.loads(told)["files"]]
+    assert [out / f"{run.name}.csv" for run in case.runs] == [type(out)(name) for name in json.loads(flagged)["files"]]
     for run, one in zip(case.runs, found, strict=True):
         lines = (out / f"{run.name}.csv").read_text().splitlines()
         assert lines[0].split(",") == [names.TIME, *COLUMNS]
@@ -164,8 +164,8 @@ def test_a_file_for_each_run(mission, tmp_path, monkeypatch, capsys):
 
 def refused(monkeypatch, capsys, folder, out) -> str:
     """What is said of a case that is refused: one line."""
-    code, told, said = glider(monkeypatch, capsys, "gap", "velocity", folder, "--out", out)
-    assert (code, told) == (2, "")
+    code, flagged, said = glider(monkeypatch, capsys, "gap", "velocity", folder, "--out", out)
+    assert (code, flagged) == (2, "")
     assert len(said.splitlines()) == 1
     assert not out.exists()
     return said
@@ -184,12 +184,12 @@ def test_another_kind_of_vehicle_is_refused(tmp_path, monkeypatch, capsys):
 @pytest.mark.parametrize("column", [names.OIL, names.DENSITY, names.ATTITUDE[1], names.DEPTH])
 def test_a_run_without_what_drives_the_model_is_refused(tmp_path, monkeypatch, capsys, column):
     case = as_case(tmp_path / "case", fly_dives(2).runs)
-    lacking = without(case, column).runs[1]
-    write_run(case.runs[1].path, lacking)
+    missing_input = without(case, column).runs[1]
+    write_run(case.runs[1].path, missing_input)
     assert column not in load_run(case.runs[1].path).columns
     said = refused(monkeypatch, capsys, case.folder, tmp_path / "out")
     assert case.runs[1].path.name in said
     assert column in said
-    empty = replace(lacking, columns=lacking.columns | {column: np.full(lacking.rows, np.nan)})
+    empty = replace(missing_input, columns=missing_input.columns | {column: np.full(missing_input.rows, np.nan)})
     with pytest.raises(InputError, match=column):
         velocities(replace(case, runs=[empty]), nominal_model(case))

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from support.flights import World, fly_case
 
-from firmware.core.vehicle import layout
-from tools.gap.assess import CaseGap, assess
-from tools.gap.where import ALLOWED, evidence
+from glider.firmware.core.vehicle import layout
+from glider.tools.gap.assess import CaseGap, assess
+from glider.tools.gap.where import ALLOWED, evidence
 
 
 def measured(world: World, seed: int = 1, spoil=None) -> CaseGap:

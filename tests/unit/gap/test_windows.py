@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tools.inference.channels import ROUGHIE_MEASURES
+from glider.tools.inference.channels import ROUGHIE_MEASURES
 
 
 def rows(count: int, rate: float = 10.0, begin: float = 0.0) -> list[tuple[int, int, int, bool]]:

@@ -5,14 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from hal.boardfile import DRIVERS, calibration_hash, decode_device_file, driver_builder, known_devices
-from hal.ports import SLOTS
-from hal.strict import ConfigError
-from sim_backend.twins.boardfile import decode_twin_file, simulated_text
-from sim_backend.twins.service import LINE_TWINS
+from glider.hal.boardfile import DRIVERS, calibration_hash, decode_device_file, driver_builder, known_devices
+from glider.hal.ports import SLOTS
+from glider.hal.strict import ConfigError
+from glider.sim_backend.twins.boardfile import decode_twin_file, simulated_text
+from glider.sim_backend.twins.service import LINE_TWINS
 
-TEXT = files("hal").joinpath("boards", "roughie.toml").read_text(encoding="utf-8")
-TWIN = files("sim_backend").joinpath("boards", "twin.toml").read_text(encoding="utf-8")
+TEXT = files("glider.hal").joinpath("boards", "roughie.toml").read_text(encoding="utf-8")
+TWIN = files("glider.sim_backend").joinpath("boards", "twin.toml").read_text(encoding="utf-8")
 
 
 def test_the_documented_example_reads():
@@ -77,8 +77,8 @@ def test_the_hash_sees_calibration_and_nothing_else(old, new, same):
 
 
 def test_the_simulated_board_of_a_twin_has_its_rates_and_reads():
-    from hal.strict import decode
-    from sim_backend.board import SimBoardFile
+    from glider.hal.strict import decode
+    from glider.sim_backend.board import SimBoardFile
 
     text = TWIN.replace("temperature_c = 20.0", "temperature_c = 12.0\nwave = [{ height_m = 0.3, period_s = 4.0 }]")
     file = decode(simulated_text(decode_twin_file(text, "twin.toml")), SimBoardFile, "sim")

@@ -7,23 +7,23 @@ import time
 
 import pytest
 
-from hal import heartbeat as hb
-from hal.heartbeat import Guard, Heartbeat, Held
-from hal.sortie import State
+from glider.hal import heartbeat as hb
+from glider.hal.heartbeat import Guard, Heartbeat, HeartbeatHeld
+from glider.hal.sortie import SortieState
 
 
 def test_what_the_loop_stamps_another_map_sees(tmp_path):
     pulse = Heartbeat.create(tmp_path, 0.02, "sawtooth-001")
     watcher = Heartbeat.open(tmp_path)
     first = watcher.look()
-    assert (first.pid, first.state, first.period_s, first.ticks) == (os.getpid(), State.ASHORE, 0.02, 0)
+    assert (first.pid, first.state, first.period_s, first.ticks) == (os.getpid(), SortieState.ASHORE, 0.02, 0)
     assert first.age_s == float("inf")
     assert watcher.flight == "sawtooth-001"
-    pulse.publish(State.DIVING)
+    pulse.publish(SortieState.DIVING)
     for number in range(5):
         pulse.beat(number / 50)
     seen = watcher.look()
-    assert (seen.state, seen.ticks, seen.guard) == (State.DIVING, 5, Guard.ABSENT)
+    assert (seen.state, seen.ticks, seen.guard) == (SortieState.DIVING, 5, Guard.ABSENT)
     assert 0.0 <= seen.age_s < 1.0
     assert watcher.values[hb.V_TIME_S] == 4 / 50
     time.sleep(0.05)
@@ -31,11 +31,11 @@ def test_what_the_loop_stamps_another_map_sees(tmp_path):
 
 
 def test_one_flight_at_a_time_and_a_dead_ones_place_is_free(tmp_path):
-    code = "import sys, time; from hal.heartbeat import Heartbeat; Heartbeat.create(sys.argv[1], 0.02)"
+    code = "import sys, time; from glider.hal.heartbeat import Heartbeat; Heartbeat.create(sys.argv[1], 0.02)"
     code += "; print(1, flush=True); time.sleep(60)"
     with subprocess.Popen([sys.executable, "-c", code, str(tmp_path)], stdout=subprocess.PIPE) as other:
         other.stdout.readline()
-        with pytest.raises(Held, match=f"a flight is under way .process {other.pid}."):
+        with pytest.raises(HeartbeatHeld, match=f"a flight is under way .process {other.pid}."):
             Heartbeat.create(tmp_path, 0.02)
         other.kill()
     pulse = Heartbeat.create(tmp_path, 0.02)
@@ -62,7 +62,7 @@ def test_what_is_no_heartbeat_is_refused(tmp_path, data):
 def test_words_that_make_no_sense_read_as_the_worst(tmp_path):
     pulse = Heartbeat.create(tmp_path, 0.02)
     pulse.words[hb.W_STATE] = pulse.words[hb.W_GUARD_STATUS] = 99
-    assert (pulse.look().state, pulse.look().guard) == (State.ABORTED, Guard.ABSENT)
+    assert (pulse.look().state, pulse.look().guard) == (SortieState.ABORTED, Guard.ABSENT)
 
 
 def test_stamping_gains_no_memory(tmp_path):

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from hal import ports
-from hal.board import board_builder, board_kinds
-from hal.ports import FRAME_SIZE, SLOTS, BoardError, Validity, empty_frame
+from glider.hal import ports
+from glider.hal.board import board_builder, board_kinds
+from glider.hal.ports import FRAME_SIZE, SLOTS, BoardError, Validity, empty_frame
 
 
 def test_slots_fill_the_frame_and_do_not_overlap():

@@ -5,9 +5,9 @@ import sys
 
 import pytest
 
-from hal.boardfile import decode_device_file
-from hal.spawn import ROOT
-from hal.strict import ConfigError
+from glider.hal.boardfile import decode_device_file
+from glider.hal.spawn import ROOT
+from glider.hal.strict import ConfigError
 from tests.support.register_maps import ANALOG, DRIVE, ENCODER, PRESSURE, board_text, write_maps
 
 MAPS = {"drive": DRIVE, "encoder": ENCODER, "analog": ANALOG, "pressure": PRESSURE}
@@ -97,7 +97,15 @@ def test_a_command_that_its_register_cannot_hold_is_refused(tmp_path):
 
 def test_a_command_says_so_in_one_line(tmp_path):
     (tmp_path / "board.toml").write_text(write(tmp_path, *REFUSED[6][:3]))
-    command = [sys.executable, "-m", "tools.cli.main", "fly", "--board", str(tmp_path / "board.toml"), "--no-log"]
+    command = [
+        sys.executable,
+        "-m",
+        "glider.tools.cli.main",
+        "fly",
+        "--board",
+        str(tmp_path / "board.toml"),
+        "--no-log",
+    ]
     done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
     assert done.returncode == 2
     (line,) = done.stderr.strip().splitlines()

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from hal import sortie
-from hal.sortie import TRANSITIONS, Facts, Party, Refused, State, Trigger, follow
+from glider.hal import sortie
+from glider.hal.sortie import TRANSITIONS, Facts, Party, SortieRefused, SortieState, Trigger, follow
 
 FACTS = [Facts(*values) for values in itertools.product((False, True), repeat=3)]
-EVERY = list(itertools.product(State, Trigger, Party, FACTS))
+EVERY = list(itertools.product(SortieState, Trigger, Party, FACTS))
 DOCS = Path(__file__).resolve().parents[3] / "docs" / "SUPERVISOR.md"
 
 
@@ -19,7 +19,7 @@ def after(state, trigger, party, facts):
     """The state that follows, None where that is refused."""
     try:
         return follow(state, trigger, party, facts)
-    except Refused:
+    except SortieRefused:
         return None
 
 
@@ -46,17 +46,17 @@ def violations():
             # To rest from under way: closed at the surface, disarmed before the first tick, or a person who looked.
             state.must_ascend and to.at_rest and (state, trigger) not in TO_REST and party is not Party.OPERATOR,
             party is Party.OPERATOR and (busy or trigger is not Trigger.ACKNOWLEDGE),
-            party is Party.WATCH and to is not State.ABORTED,
+            party is Party.WATCH and to is not SortieState.ABORTED,
             # After a fault only a person makes the vehicle ready again; nobody arms over another.
-            state is State.HELD and to is not State.HELD and party is not Party.OPERATOR,
-            to is State.ENDED and facts.fault,
-            to is State.HELD and not facts.fault,
-            to is State.ARMED and (busy or not state.may_arm),
+            state is SortieState.HELD and to is not SortieState.HELD and party is not Party.OPERATOR,
+            to is SortieState.ENDED and facts.fault,
+            to is SortieState.HELD and not facts.fault,
+            to is SortieState.ARMED and (busy or not state.may_arm),
             trigger is Trigger.RECOVER and busy,
-            to is State.SURFACED and state is not State.ASCENDING,
-            to is State.DIVING and state is not State.ARMED,
-            to not in (TARGETS[trigger], State.ASCENDING if trigger is Trigger.START else State.HELD),
-            to is State.HELD and trigger is not Trigger.END,
+            to is SortieState.SURFACED and state is not SortieState.ASCENDING,
+            to is SortieState.DIVING and state is not SortieState.ARMED,
+            to not in (TARGETS[trigger], SortieState.ASCENDING if trigger is Trigger.START else SortieState.HELD),
+            to is SortieState.HELD and trigger is not Trigger.END,
             # Nothing but arming, or a person, moves a vehicle at rest.
             state.at_rest and trigger is not Trigger.ARM and party is not Party.OPERATOR,
         ]
@@ -64,18 +64,18 @@ def violations():
     return found
 
 
-FLOWN = (State.ARMED, State.DIVING, State.ASCENDING, State.SURFACED)
+FLOWN = (SortieState.ARMED, SortieState.DIVING, SortieState.ASCENDING, SortieState.SURFACED)
 TARGETS = {
-    Trigger.ARM: State.ARMED, Trigger.RECOVER: State.ASCENDING, Trigger.DISARM: State.ASHORE,
-    Trigger.START: State.DIVING, Trigger.FINISH: State.ASCENDING, Trigger.SURFACE: State.SURFACED,
-    Trigger.END: State.ENDED, Trigger.HAND_OVER: State.ABORTED, Trigger.LOSE: State.ABORTED,
-    Trigger.ACKNOWLEDGE: State.ASHORE,
+    Trigger.ARM: SortieState.ARMED, Trigger.RECOVER: SortieState.ASCENDING, Trigger.DISARM: SortieState.ASHORE,
+    Trigger.START: SortieState.DIVING, Trigger.FINISH: SortieState.ASCENDING, Trigger.SURFACE: SortieState.SURFACED,
+    Trigger.END: SortieState.ENDED, Trigger.HAND_OVER: SortieState.ABORTED, Trigger.LOSE: SortieState.ABORTED,
+    Trigger.ACKNOWLEDGE: SortieState.ASHORE,
 }  # fmt: skip
-TO_REST = ((State.SURFACED, Trigger.END), (State.ARMED, Trigger.DISARM))
+TO_REST = ((SortieState.SURFACED, Trigger.END), (SortieState.ARMED, Trigger.DISARM))
 COURSE = (
-    (State.ARMED, Trigger.DISARM), (State.ARMED, Trigger.START), (State.ASCENDING, Trigger.START),
-    (State.DIVING, Trigger.FINISH), (State.ASCENDING, Trigger.FINISH), (State.ASCENDING, Trigger.SURFACE),
-    (State.SURFACED, Trigger.END),
+    (SortieState.ARMED, Trigger.DISARM), (SortieState.ARMED, Trigger.START), (SortieState.ASCENDING, Trigger.START),
+    (SortieState.DIVING, Trigger.FINISH), (SortieState.ASCENDING, Trigger.FINISH), (SortieState.ASCENDING, Trigger.SURFACE),
+    (SortieState.SURFACED, Trigger.END),
 )  # fmt: skip
 
 
@@ -84,19 +84,19 @@ def test_nothing_happens_that_may_not_and_nothing_is_refused_that_must():
 
 
 def test_a_sortie_runs_its_course():
-    state = State.ASHORE
+    state = SortieState.ASHORE
     for trigger in (Trigger.ARM, Trigger.START, Trigger.FINISH, Trigger.SURFACE, Trigger.END):
         state = follow(state, trigger, Party.FLIGHT, Facts())
-    assert state == State.ENDED
-    with pytest.raises(Refused, match="flight: 'first tick' is not possible in state ended"):
+    assert state == SortieState.ENDED
+    with pytest.raises(SortieRefused, match="flight: 'first tick' is not possible in state ended"):
         follow(state, Trigger.START, Party.FLIGHT, Facts())
 
 
 def test_properties_of_states():
-    assert [state.name for state in State if state.may_arm] == ["ASHORE", "ENDED"]
-    assert [state.name for state in State if state.at_rest] == ["ASHORE", "ENDED", "HELD"]
-    assert all(state.must_ascend != state.at_rest for state in State)
-    assert [state.name for state in State if state.beats] == ["DIVING", "ASCENDING"]
+    assert [state.name for state in SortieState if state.may_arm] == ["ASHORE", "ENDED"]
+    assert [state.name for state in SortieState if state.at_rest] == ["ASHORE", "ENDED", "HELD"]
+    assert all(state.must_ascend != state.at_rest for state in SortieState)
+    assert [state.name for state in SortieState if state.beats] == ["DIVING", "ASCENDING"]
 
 
 @pytest.mark.parametrize(
@@ -104,8 +104,8 @@ def test_properties_of_states():
     [("flight_under_way", "a flight is under way"), ("being_brought_up", "is bringing the vehicle up; with the")],
 )
 def test_an_acknowledgement_is_refused_while_another_is_at_it(fact, text):
-    for state in State:
-        with pytest.raises(Refused, match=text):
+    for state in SortieState:
+        with pytest.raises(SortieRefused, match=text):
             follow(state, Trigger.ACKNOWLEDGE, Party.OPERATOR, Facts(**{fact: True}))
 
 
@@ -113,9 +113,9 @@ def mutants():
     """Tables with one thing changed: an entry gone, a source added or gone, another target or party, a blocker gone."""
     for place, row in enumerate(TRANSITIONS):
         others = [
-            *[dataclasses.replace(row, target=state) for state in State if state is not row.target],
+            *[dataclasses.replace(row, target=state) for state in SortieState if state is not row.target],
             *[dataclasses.replace(row, party=party) for party in Party if party is not row.party],
-            *[dataclasses.replace(row, sources=(*row.sources, s)) for s in State if s not in row.sources],
+            *[dataclasses.replace(row, sources=(*row.sources, s)) for s in SortieState if s not in row.sources],
             *[dataclasses.replace(row, sources=tuple(s for s in row.sources if s is not gone)) for gone in row.sources],
             *[
                 dataclasses.replace(row, blockers=tuple(b for b in row.blockers if b is not gone))

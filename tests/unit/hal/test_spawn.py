@@ -6,13 +6,13 @@ import sys
 
 import pytest
 
-from hal.board import BoardRequest, board_builder
-from hal.recorder.recorder import Recorder
-from hal.recorder.schema import Field, RecordSpec
-from hal.spawn import ROOT, module_command, module_environment
-from tools.bench.client import Bench
-from tools.data.boards import load_board_file
-from tools.data.sources import load_vehicle
+from glider.hal.board import BoardRequest, board_builder
+from glider.hal.recorder.recorder import Recorder
+from glider.hal.recorder.schema import Field, RecordSpec
+from glider.hal.spawn import ROOT, module_command, module_environment
+from glider.tools.bench.client import Bench
+from glider.tools.data.boards import load_board_file
+from glider.tools.data.sources import load_vehicle
 
 pytestmark = pytest.mark.realtime
 SPEC = RecordSpec("/x", "glider_msgs/msg/X", (Field("x", "m"),))
@@ -29,11 +29,11 @@ def elsewhere(tmp_path, monkeypatch):
 
 
 def test_a_module_is_that_of_the_project(elsewhere):
-    command = module_command("hal.outofband", "--help")
+    command = module_command("glider.hal.outofband", "--help")
     assert command[0] == sys.executable
     done = subprocess.run(command, env=module_environment(), capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
-    assert "python -m hal.outofband" in done.stdout
+    assert "python -m glider.hal.outofband" in done.stdout
 
 
 @pytest.mark.parametrize("before", [None, "", "/a/b"])

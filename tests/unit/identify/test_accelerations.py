@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from firmware.model.vehicle import COEFFICIENTS
-from tools.data.errors import InputError
-from tools.data.runs.run import Run
-from tools.data.sources import load_vehicle
-from tools.identify.acceleration_likelihood import _width, fit_accelerations, kinematics
-from tools.identify.core.regressors import flown_servo
-from tools.identify.design import make_runs
-from tools.inference.model import Model
-from tools.inference.vehicle_parameters import coefficient_sizes
+from glider.firmware.model.vehicle import COEFFICIENTS
+from glider.tools.data.errors import InputError
+from glider.tools.data.runs.run import Run
+from glider.tools.data.sources import load_vehicle
+from glider.tools.identify.acceleration_likelihood import _width, fit_accelerations, kinematics
+from glider.tools.identify.core.regressors import flown_servo
+from glider.tools.identify.design import make_runs
+from glider.tools.inference.model import Model
+from glider.tools.inference.vehicle_parameters import coefficient_sizes
 
 
 def errors(seed: int, square: bool) -> np.ndarray:

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from tools.data.runs.case import load_case
-from tools.data.sources import load_vehicle
-from tools.identify.files import VEHICLE, write
-from tools.identify.pipeline import Identified, identify
-from tools.measure.figures.form_identify import gaps_of, with_total
-from tools.study.challenge.form_cases import draw_healthy, write_flights
+from glider.tools.data.runs.case import load_case
+from glider.tools.data.sources import load_vehicle
+from glider.tools.identify.files import VEHICLE, write
+from glider.tools.identify.pipeline import Identified, identify
+from glider.tools.measure.figures.form_identify import gaps_of, with_total
+from glider.tools.study.challenge.form_cases import draw_healthy, write_flights
 
 pytestmark = pytest.mark.computes(seconds=40)
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from tools.gap.measure import RunGap
-from tools.identify.earned import conditional, mean_and_error
-from tools.identify.held import FILE, LIKELIHOOD, PREDICTION, Candidate, choose
-from tools.inference.prediction_error import Fitted
+from glider.tools.gap.measure import RunGap
+from glider.tools.identify.earned import conditional, mean_and_error
+from glider.tools.identify.held import FILE, LIKELIHOOD, PREDICTION, Candidate, choose
+from glider.tools.inference.prediction_error import Fitted
 
 RUNS = 12
 

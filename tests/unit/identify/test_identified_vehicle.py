@@ -4,12 +4,12 @@ import msgspec
 import numpy as np
 import pytest
 
-from firmware.core.vehicle import layout
-from firmware.model.vehicle import decode_vehicle
-from hal.strict import ConfigError
-from tools.data.sources import load_vehicle
-from tools.data.tomltext import toml_text
-from tools.inference.model import vehicle_model
+from glider.firmware.core.vehicle import layout
+from glider.firmware.model.vehicle import decode_vehicle
+from glider.hal.strict import ConfigError
+from glider.tools.data.sources import load_vehicle
+from glider.tools.data.tomltext import toml_text
+from glider.tools.inference.model import vehicle_model
 
 NAMES = ["K_D0", "K_L", "added_mass_z", "cg_x"]
 

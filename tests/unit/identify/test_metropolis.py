@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from tools.identify.core.metropolis import log_density
-from tools.identify.sampler import sample, summarise, whiten
-from tools.identify.statistics import collect, heat
+from glider.tools.identify.core.metropolis import log_density
+from glider.tools.identify.sampler import sample, summarise, whiten
+from glider.tools.identify.statistics import collect, inflation
 
 
 def regression(rng, samples=400, n=5, noise=(1.0, 2.0)):
@@ -81,8 +81,8 @@ def test_heat_is_one_for_white_errors_and_more_for_errors_that_last():
     block = np.repeat(np.arange(blocks), samples // blocks)
     white = rng.standard_normal(samples)
     lasting = np.convolve(rng.standard_normal(samples + 9), np.ones(10) / np.sqrt(10.0), "valid")
-    assert heat(white, J, block) == pytest.approx(1.0, abs=0.25)
-    assert heat(lasting, J, block) > 5.0
+    assert inflation(white, J, block) == pytest.approx(1.0, abs=0.25)
+    assert inflation(lasting, J, block) > 5.0
 
 
 def test_centred_statistics_have_their_mode_where_they_were_taken():

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from support.ocean import fly_dives
 
-from tools.data.runs import columns as names
-from tools.identify.ocean.identify import BANDS, covariance, larger, strata, stratum_pulls
-from tools.inference.expansion import Expansion
-from tools.inference.parameters import FreeParameter
-from tools.inference.shared_parameters import SharedParameters
+from glider.tools.data.runs import columns as names
+from glider.tools.identify.ocean.identify import BANDS, covariance, larger, strata, stratum_pulls
+from glider.tools.inference.expansion import Expansion
+from glider.tools.inference.parameters import FreeParameter
+from glider.tools.inference.shared_parameters import SharedParameters
 
 RUNS, HEAT, CURVATURE = 12, 4.0, 25.0  # curvature of a run in each of two numbers
 SHARED = SharedParameters([FreeParameter("", name, "P", n, 1.0) for n, name in enumerate("ab")], {}, {}, 1.0)
@@ -46,8 +46,8 @@ def test_pulls_that_differ_make_their_direction_less_sure(of_run, of_stratum, co
 
 
 def test_what_pulls_all_strata_alike_is_no_error_of_the_form():
-    alike = [parabola((5.0, 1.0), 1.0 / (2 * BANDS)) for _ in range(2 * BANDS)]
-    found = [parabola((40.0, 8.0), parts=alike) for _ in range(RUNS)]
+    common = [parabola((5.0, 1.0), 1.0 / (2 * BANDS)) for _ in range(2 * BANDS)]
+    found = [parabola((40.0, 8.0), parts=common) for _ in range(RUNS)]
     assert np.allclose(stratum_pulls(found, RUNS * CURVATURE * np.eye(2)), 0.0, atol=1e-9)
 
 

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from support.ocean import as_case, fly_dives
 
-from sim_backend.foreign import ocean as foreign
-from sim_backend.ocean.catalogue import ONE_ON_DEPTH
-from tools.identify.ocean.files import plain
-from tools.identify.ocean.findings import Calibration, groups_of, one_of_each_group
-from tools.identify.ocean.identify import identify_ocean
-from tools.identify.ocean.next_run import flown, to_find, to_part
-from tools.watch.whole_case import diagnose_ocean
-from tools.watch.whole_case import plain as plain_diagnosis
+from glider.sim_backend.foreign import ocean as foreign
+from glider.sim_backend.ocean.catalogue import ONE_ON_DEPTH
+from glider.tools.identify.ocean.files import plain
+from glider.tools.identify.ocean.findings import Calibration, groups_of, one_of_each_group
+from glider.tools.identify.ocean.identify import identify_ocean
+from glider.tools.identify.ocean.next_run import flown, to_find, to_part
+from glider.tools.watch.whole_case import diagnose_ocean
+from glider.tools.watch.whole_case import plain as plain_diagnosis
 
 pytestmark = pytest.mark.computes(seconds=25)
 
@@ -67,13 +67,13 @@ def test_drag_that_the_file_leaves_open_is_a_finding_of_identification_and_of_a_
     assert answer["groups"] == identified.groups
     assert any(set(group) >= set(ONE_ON_DEPTH) for group in answer["groups"])
     assert {"label", "size", "ci90", "unit", "text"} <= set(answer["findings"][0])
-    told = plain_diagnosis(diagnosed)
-    assert told["findings"]
-    assert all(one["text"] in told["cautions"] for one in told["findings"])
-    groups = {one["label"]: one["group"] for one in told["causes"]}
+    questions = plain_diagnosis(diagnosed)
+    assert questions["findings"]
+    assert all(one["text"] in questions["cautions"] for one in questions["findings"])
+    groups = {one["label"]: one["group"] for one in questions["causes"]}
     assert set(groups["lift"]) >= set(ONE_ON_DEPTH)
     assert groups["lift"][0] == "lift"
-    assert "degrees of pitch" in told["next_run"]["text"]
+    assert "degrees of pitch" in questions["next_run"]["text"]
 
 
 def calibration(label: str, size: float, group: tuple[str, ...]) -> Calibration:

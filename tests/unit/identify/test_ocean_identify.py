@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from support.ocean import as_case, fly_dives, without
 
-from sim_backend.foreign import ocean as foreign
-from sim_backend.ocean.vehicle import PLACES, UNITS, decode_ocean_vehicle
-from tools.cli.common import report_errors
-from tools.cli.main import cli
-from tools.data.errors import InputError
-from tools.data.runs import columns as names
-from tools.identify.ocean.files import RESULT, VEHICLE, plain, vehicle_text, write
-from tools.identify.ocean.identify import MOST_RUNS, identify_ocean, learnable
-from tools.inference.model import vehicle_model
+from glider.sim_backend.foreign import ocean as foreign
+from glider.sim_backend.ocean.vehicle import PLACES, UNITS, decode_ocean_vehicle
+from glider.tools.cli.common import report_errors
+from glider.tools.cli.main import cli
+from glider.tools.data.errors import InputError
+from glider.tools.data.runs import columns as names
+from glider.tools.identify.ocean.files import RESULT, VEHICLE, plain, vehicle_text, write
+from glider.tools.identify.ocean.identify import MOST_RUNS, identify_ocean, learnable
+from glider.tools.inference.model import vehicle_model
 
 DIVES, SIGMAS = 8, 3.0
 # what means the same to the vehicle that flew and to the model
@@ -95,13 +95,13 @@ def test_the_command_finds_the_same_bit_for_bit(found, case, tmp_path, monkeypat
 
 
 def test_without_speed_drag_lift_and_pitch_scale_go_together(found, on_depth):
-    named = {name for ridge in on_depth.ridges for name in ridge.names}
+    named = {name for weak_direction in on_depth.ridges for name in weak_direction.names}
     assert {"lift_slope", "pitch_scale"} <= named
     assert on_depth.next_run is not None
     assert "pitch" in on_depth.next_run["text"]
-    for ridge in on_depth.ridges:
-        assert 0.6 <= ridge.left <= 1.01
-        assert len(ridge.names) == len(ridge.weights)
+    for weak_direction in on_depth.ridges:
+        assert 0.6 <= weak_direction.left <= 1.01
+        assert len(weak_direction.names) == len(weak_direction.weights)
     for name in ("Cd0", "pitch_offset", "volume"):
         with_speed, alone = (next(p.sd for p in one.parameters if p.name == name) for one in (found, on_depth))
         assert with_speed < alone, name
@@ -118,8 +118,8 @@ def test_fields_of_the_answer(found):
     assert {one["name"] for one in answer["parameters"]} == {*SAME, "net_mass"}
     assert set(answer["water"]) == {"sd", "time", "rms", "runs"}
     assert answer["left_out"] == []
-    for ridge in answer["ridges"]:
-        assert set(ridge["names"]) <= set(PLACES)
+    for weak_direction in answer["ridges"]:
+        assert set(weak_direction["names"]) <= set(PLACES)
 
 
 def test_net_mass_is_what_is_heavier_than_the_water(found):
@@ -140,4 +140,3 @@ def test_runs_that_tell_nothing_are_left_out_with_their_reason(case):
     with pytest.raises(InputError, match=f"no {names.DENSITY}"):
         identify_ocean(without(case, names.DENSITY))
     assert MOST_RUNS >= DIVES
-

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from tools.data.runs import columns as names
-from tools.data.runs.run import Run
-from tools.data.sources import load_vehicle
-from tools.identify.design import make_runs
-from tools.identify.screen import clock_offset, despiked, screen
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.run import Run
+from glider.tools.data.sources import load_vehicle
+from glider.tools.identify.design import make_runs
+from glider.tools.identify.screen import clock_offset, despiked, screen
 
 
 @pytest.fixture(scope="module")

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from hal.strict import ConfigError
-from tools.cli.import_ import import_
-from tools.data.errors import InputError
-from tools.data.importers.csvlog import import_csv
-from tools.data.importers.mapping import UNITS, decode_map, load_map
-from tools.data.runs.case import load_case
+from glider.hal.strict import ConfigError
+from glider.tools.cli.import_ import import_
+from glider.tools.data.errors import InputError
+from glider.tools.data.importers.csvlog import import_csv
+from glider.tools.data.importers.mapping import UNITS, decode_map, load_map
+from glider.tools.data.runs.case import load_case
 
 MAP = """\
 format = 1
@@ -201,7 +201,7 @@ def test_values_that_cannot_be_are_missing(folder):
 
 
 def test_a_vehicle_file_beside_the_mapping_goes_with_the_case(folder):
-    from firmware.model.library import shipped
+    from glider.firmware.model.library import shipped
 
     (folder / "mine.toml").write_text(shipped("model/vehicles")["roughie"].replace("m_t = 13.0", "m_t = 12.0"))
     _import(folder, text=MAP.replace('"roughie"', '"mine.toml"'))

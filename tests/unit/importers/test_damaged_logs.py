@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from hal.strict import ConfigError
-from tools.cli.import_ import import_
-from tools.data.errors import InputError
-from tools.data.importers.csvlog import import_csv
-from tools.data.importers.mapping import decode_map
-from tools.data.importers.resample import in_force, longest_course
-from tools.data.runs.case import load_case
+from glider.hal.strict import ConfigError
+from glider.tools.cli.import_ import import_
+from glider.tools.data.errors import InputError
+from glider.tools.data.importers.csvlog import import_csv
+from glider.tools.data.importers.mapping import decode_map
+from glider.tools.data.importers.resample import longest_increasing, zero_order_hold
+from glider.tools.data.runs.case import load_case
 
 MAP = """\
 format = 1
@@ -180,14 +180,14 @@ def test_the_longest_course_of_times():
     wrong = rng.choice(500, 40, replace=False)
     damaged = t.copy()
     damaged[wrong] = rng.uniform(-1e6, 1e6, 40)
-    found = longest_course(damaged)
+    found = longest_increasing(damaged)
     assert (np.diff(damaged[found]) > 0.0).all()
     assert set(np.delete(np.arange(500), wrong)) <= set(found.tolist())
-    assert longest_course(t).tolist() == list(range(500))
-    assert longest_course(np.array([3.0, 3.0, 3.0])).size == 1
+    assert longest_increasing(t).tolist() == list(range(500))
+    assert longest_increasing(np.array([3.0, 3.0, 3.0])).size == 1
 
 
 def test_a_command_is_held_and_never_averaged():
     t, command = np.array([0.0, 0.5, 1.0, 2.2]), np.array([np.nan, 0.1, np.nan, -0.1])
-    np.testing.assert_array_equal(in_force(t, command, np.arange(6) / 2), [np.nan, 0.1, 0.1, 0.1, 0.1, -0.1])
-    np.testing.assert_array_equal(in_force(t, np.full(4, np.nan), np.arange(2.0)), [np.nan, np.nan])
+    np.testing.assert_array_equal(zero_order_hold(t, command, np.arange(6) / 2), [np.nan, 0.1, 0.1, 0.1, 0.1, -0.1])
+    np.testing.assert_array_equal(zero_order_hold(t, np.full(4, np.nan), np.arange(2.0)), [np.nan, np.nan])

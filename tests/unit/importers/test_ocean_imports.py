@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from glider.tools.data.runs.origin import read_fixes
+from glider.tools.data.runs.run import Run, load_run
 from tests.support import ocean_files
 from tests.support.commands import glider
 from tests.support.ocean_files import START, Flight, flight
-from tools.data.runs.origin import read_fixes
-from tools.data.runs.run import Run, load_run
 
 # How far a column may be off: half its last written digit, and what single precision or interpolation leaves.
 TOLERANCES = {

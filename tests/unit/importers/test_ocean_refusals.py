@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from glider.tools.data.errors import InputError
+from glider.tools.data.importers.ocean import netcdf
+from glider.tools.data.importers.ocean.og1 import read_og1
 from tests.support import ocean_files
 from tests.support.commands import glider
 from tests.support.ocean_files import START, flight
-from tools.data.errors import InputError
-from tools.data.importers.ocean import netcdf
-from tools.data.importers.ocean.og1 import read_og1
 
 
 def refused(kind: str, files: list[Path], out: Path, *more: object) -> str:

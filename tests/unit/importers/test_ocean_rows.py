@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.io import netcdf_file
 
+from glider.tools.data.errors import InputError
+from glider.tools.data.importers.ocean.netcdf import NetCDF
+from glider.tools.data.importers.ocean.netcdf_classic import classic_size
+from glider.tools.data.importers.ocean.segment import DAY, at_rows, clean, clock_offset, in_the_mission, require_unit
 from tests.support.ocean_files import START, flight, og1, seaglider
-from tools.data.errors import InputError
-from tools.data.importers.ocean.netcdf import NetCDF
-from tools.data.importers.ocean.netcdf_classic import classic_size
-from tools.data.importers.ocean.segment import DAY, at_rows, clean, clock_offset, in_the_mission, require_unit
 
 
 def test_times_outside_the_mission_are_taken_out_and_counted():

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tools.data.errors import InputError
-from tools.data.importers.align import aligned, find_offset
-from tools.data.importers.captured import import_qualisys
-from tools.data.importers.qualisys import read_capture
-from tools.data.runs import columns as names
-from tools.data.runs.case import load_case, write_case
-from tools.data.runs.run import Run
+from glider.tools.data.errors import InputError
+from glider.tools.data.importers.align import aligned, find_offset
+from glider.tools.data.importers.captured import import_qualisys
+from glider.tools.data.importers.qualisys import read_capture
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.case import load_case, write_case
+from glider.tools.data.runs.run import Run
 
 RATE = 50.0
 UP = np.diag([1.0, -1.0, -1.0])

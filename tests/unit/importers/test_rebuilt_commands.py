@@ -5,11 +5,11 @@ from importlib.resources import files
 import numpy as np
 import pytest
 
-from hal.strict import ConfigError
-from tools.data.errors import InputError
-from tools.data.importers.csvlog import import_csv
-from tools.data.importers.mapping import decode_map
-from tools.data.runs.case import load_case
+from glider.hal.strict import ConfigError
+from glider.tools.data.errors import InputError
+from glider.tools.data.importers.csvlog import import_csv
+from glider.tools.data.importers.mapping import decode_map
+from glider.tools.data.runs.case import load_case
 
 LOW, HIGH, RATE, HZ = -0.2, 0.2, 0.03, 20.0  # kg, kg/s; the log's rows a second
 MAP = """\
@@ -106,7 +106,7 @@ def test_commands_are_in_force_from_their_row_also_at_another_rate(tmp_path):
 
 
 def test_the_pump_of_2015_ran_in_and_out_in_turn(shared, tmp_path):
-    mapping = (files("tools.data.importers") / "maps" / "roughie2015.toml").read_text()
+    mapping = (files("glider.tools.data.importers") / "maps" / "roughie2015.toml").read_text()
     rule = 'follows = "ballast_kg"\nlow = -0.2\nhigh = 0.19\nrate = 0.015\n'
     (tmp_path / "map.toml").write_text(f"{mapping}\n[commands.cmd_ballast_kg]\n{rule}")
     raw = [shared / "data" / "roughie2015" / "raw" / f"flight{n}.csv.gz" for n in (1, 2)]

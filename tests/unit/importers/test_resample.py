@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firmware.core.maths.rotations import wrap
-from tools.data.importers.resample import bins_of, body_rates, fill_gaps, means
+from glider.firmware.core.maths.rotations import wrap
+from glider.tools.data.importers.resample import bins_of, body_rates, fill_gaps, means
 
 
 def test_a_row_is_the_mean_of_what_lies_within_half_a_period_of_it():

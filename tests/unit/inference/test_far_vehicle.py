@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from support.cases import make_case
 
-from sim_backend.core.effects import effect_layout as ef
-from tools.data.runs.case import Case
-from tools.diagnose.staged import Staged, staged
-from tools.diagnose.staged_answer import identified_text
-from tools.inference.model import nominal_model
-from tools.inference.prediction_error import PredictionError
-from tools.inference.problem import problem_of
-from tools.inference.vehicle_parameters import parameters
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.data.runs.case import Case
+from glider.tools.diagnose.staged import Staged, staged
+from glider.tools.diagnose.staged_answer import identified_text
+from glider.tools.inference.model import nominal_model
+from glider.tools.inference.prediction_error import PredictionError
+from glider.tools.inference.problem import problem_of
+from glider.tools.inference.vehicle_parameters import parameters
 
 pytestmark = pytest.mark.computes(seconds=15)
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from hal.strict import ConfigError
-from tools.data.runs.case import load_case, write_case
-from tools.data.runs.run import Run
-from tools.inference.load import load_model
+from glider.hal.strict import ConfigError
+from glider.tools.data.runs.case import load_case, write_case
+from glider.tools.data.runs.run import Run
+from glider.tools.inference.load import load_model
 
 FACTS = {"site": "sea", "log_rate_hz": 1.0, "water_density_kg_m3": 1025.0}
 

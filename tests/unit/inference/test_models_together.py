@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from support.cases import make_case
 
-from sim_backend.core.effects import effect_layout as ef
-from tools.inference.problem import LOST, problem_of
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.inference.problem import LOST, problem_of
 
 # entries of F for each model: every branch of the physics is taken by some, and no two lanes take the same
 MODELS = (
@@ -29,7 +29,7 @@ def vector(entries):
 def problem(request, tmp_path_factory):
     made = problem_of(make_case(tmp_path_factory.mktemp("together"), vector({}), seed=4, runs=2, mocap=True))
     if request.param:
-        made.spreads = np.hstack([made.spreads, np.tile(made.kind.lacking_spread, (len(made.runs), 1))])
+        made.spreads = np.hstack([made.spreads, np.tile(made.kind.model_error_sd, (len(made.runs), 1))])
     return made
 
 

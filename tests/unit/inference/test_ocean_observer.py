@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from support.ocean import as_case, fly_dives, without
 
-from sim_backend.foreign import ocean as foreign
-from sim_backend.ocean.core import layout as at
-from tools.data.errors import InputError
-from tools.data.runs import columns as names
-from tools.data.runs.run import Run, load_run
-from tools.inference.core.ocean import propagate, read_state, reading_derivative
-from tools.inference.ocean_inputs import AFTER, BEFORE, input_table, spread_out, states, unsteady
-from tools.inference.ocean_kind import APART
-from tools.inference.predict import predict
-from tools.inference.problem import problem_of
-from tools.inference.steady import depth_rate, first_guess
+from glider.sim_backend.foreign import ocean as foreign
+from glider.sim_backend.ocean.core import layout as at
+from glider.tools.data.errors import InputError
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.run import Run, load_run
+from glider.tools.inference.core.ocean import propagate, read_state, reading_derivative
+from glider.tools.inference.ocean_inputs import AFTER, BEFORE, input_table, spread_out, states, unsteady
+from glider.tools.inference.ocean_kind import MIN_READING_INTERVAL_S
+from glider.tools.inference.predict import predict
+from glider.tools.inference.problem import problem_of
+from glider.tools.inference.steady import depth_rate, first_guess
 
 NO_EFFECT = np.zeros(at.N_F)
 DIVES, DRAWS = 6, 12
@@ -116,8 +116,8 @@ def test_readings_that_are_looked_at_are_half_a_minute_apart(problem):
     r, looked = problem.recording, problem.valid.any(axis=1)
     for a, b in zip(r.bounds[:-1], r.bounds[1:], strict=True):
         t = r.t[a:b][looked[a:b]]
-        assert np.all(np.diff(t) >= APART)
-        assert np.max(np.diff(t)) < APART + 10.0
+        assert np.all(np.diff(t) >= MIN_READING_INTERVAL_S)
+        assert np.max(np.diff(t)) < MIN_READING_INTERVAL_S + 10.0
     rough = r.inputs[:, at.U_UNSTEADY] > 0.0
     assert problem.valid[rough, at.Y_DEPTH].any()
     assert not problem.valid[rough][:, [at.Y_ROLL, at.Y_SPEED]].any()

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
-from firmware.model.library import shipped
-from hal.recorder import disk
-from hal.recorder.logfile import LogFile
-from hal.recorder.schema import INFO, Field, RecordSpec
+from glider.firmware.model.library import shipped
+from glider.hal.recorder import disk
+from glider.hal.recorder.logfile import LogFile
+from glider.hal.recorder.schema import INFO, Field, RecordSpec
 
 TICK = RecordSpec(
     "/tick",

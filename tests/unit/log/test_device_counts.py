@@ -1,7 +1,7 @@
 """Error counts of devices in words: what has changed, and how they stand."""
 
-from hal.drivers.samples import Health
-from tools.flight.device_counts import errors_text
+from glider.hal.drivers.samples import Health
+from glider.tools.flight.device_counts import errors_text
 
 
 def test_a_well_device_has_no_words():

@@ -9,12 +9,12 @@ from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 from mcap.writer import CompressionType, Writer
 
-from hal.recorder import logfile
+from glider.hal.recorder import logfile
+from glider.tools.cli.log import log as log_command
+from glider.tools.data.errors import InputError
+from glider.tools.data.log.reader import read_log
+from glider.tools.data.log.rundata import export_case
 from tests.support.examples import examples
-from tools.cli.log import log as log_command
-from tools.data.errors import InputError
-from tools.data.log.reader import read_log
-from tools.data.log.rundata import export_case
 
 NUMBER = st.integers(0, 2**64 - 1) | st.sampled_from([0, 1, 2**63 - 1, 2**63, 2**64 - 1])
 TEXT = st.text(max_size=40) | st.sampled_from(

@@ -8,16 +8,16 @@ import numpy as np
 from log_files import METADATA, TICK
 from support.commands import glider
 
-from firmware.core.layouts import control_layout as ctl
-from firmware.telemetry import REPLAYED
-from hal.recorder import disk
-from hal.recorder.logfile import LogFile
-from hal.recorder.schema import INFO
-from tools.data.log.reader import read_log
-from tools.data.log.rundata import run_of
-from tools.flight import sortie
-from tools.flight.arming import BYTES_PER_SECOND
-from tools.flight.compose import build_flight, build_recorder
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.telemetry import REPLAYED
+from glider.hal.recorder import disk
+from glider.hal.recorder.logfile import LogFile
+from glider.hal.recorder.schema import INFO
+from glider.tools.data.log.reader import read_log
+from glider.tools.data.log.rundata import run_of
+from glider.tools.flight import sortie
+from glider.tools.flight.arming import BYTES_PER_SECOND
+from glider.tools.flight.compose import build_flight, build_recorder
 
 EPOCH = 1_800_000_000 * 10**9
 SHORT = """

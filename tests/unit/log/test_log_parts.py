@@ -9,15 +9,15 @@ import pytest
 from click.testing import CliRunner
 from log_files import METADATA, TICK, TRUTH, VEHICLE, write_small_log
 
-from hal.recorder.recorder import Recorder
-from hal.recorder.schema import INFO
-from tools.cli.log import log as log_command
-from tools.data.errors import InputError
-from tools.data.log.parts import FlightLog, read_flight
-from tools.data.log.reader import read_log
-from tools.data.log.repair import repair
-from tools.data.log.rundata import run_of
-from tools.data.runs.case import load_case
+from glider.hal.recorder.recorder import Recorder
+from glider.hal.recorder.schema import INFO
+from glider.tools.cli.log import log as log_command
+from glider.tools.data.errors import InputError
+from glider.tools.data.log.parts import FlightLog, read_flight
+from glider.tools.data.log.reader import read_log
+from glider.tools.data.log.repair import repair
+from glider.tools.data.log.rundata import run_of
+from glider.tools.data.runs.case import load_case
 
 BETWEEN = 13  # ticks that a recording process takes with it when it dies
 

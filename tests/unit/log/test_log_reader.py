@@ -6,10 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mcap.writer import CompressionType, Writer
 
+from glider.tools.data.errors import InputError
+from glider.tools.data.log.reader import read_log
+from glider.tools.data.log.repair import repair
 from tests.support.examples import examples
-from tools.data.errors import InputError
-from tools.data.log.reader import read_log
-from tools.data.log.repair import repair
 
 
 @pytest.fixture(scope="session")

@@ -8,14 +8,14 @@ import pytest
 from support.commands import glider
 from support.logs import fly_dip, write_changed
 
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.layouts import supervisor_layout as sup
-from firmware.telemetry import TICK
-from hal.recorder.schema import RecordSpec
-from tools.data.log.parts import read_flight
-from tools.data.log.reader import read_log
-from tools.data.sources import name_or_path
-from tools.flight.replay import STATES, TAKEN, replay_log
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.layouts import supervisor_layout as sup
+from glider.firmware.telemetry import TICK
+from glider.hal.recorder.schema import RecordSpec
+from glider.tools.data.log.parts import read_flight
+from glider.tools.data.log.reader import read_log
+from glider.tools.data.sources import name_or_path
+from glider.tools.flight.replay import STATES, TAKEN, replay_log
 
 WET_AT = 3.0
 
@@ -196,7 +196,7 @@ def test_a_changed_setting_decides_otherwise(wet, tmp_path):
 
 def test_changed_code_decides_otherwise(wet, monkeypatch):
     """A supervisor without its leak detector lets the flight go on."""
-    from firmware.supervisor import Supervisor
+    from glider.firmware.supervisor import Supervisor
 
     honest = Supervisor.__init__
 

@@ -11,16 +11,16 @@ from hypothesis import strategies as st
 from log_files import METADATA, TICK, VEHICLE, tick_rows, write_small_log
 from support.commands import glider
 
-from hal.strict import ConfigError
+from glider.hal.strict import ConfigError
+from glider.tools.cli.log import log as command
+from glider.tools.data.errors import InputError
+from glider.tools.data.log.reader import read_log
+from glider.tools.data.log.rundata import export_case, run_of, write_log
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.case import SensorsPart, load_case, write_case
+from glider.tools.data.runs.run import Run
+from glider.tools.data.sources import load_vehicle
 from tests.support.examples import examples
-from tools.cli.log import log as command
-from tools.data.errors import InputError
-from tools.data.log.reader import read_log
-from tools.data.log.rundata import export_case, run_of, write_log
-from tools.data.runs import columns as names
-from tools.data.runs.case import SensorsPart, load_case, write_case
-from tools.data.runs.run import Run
-from tools.data.sources import load_vehicle
 
 FACTS = {"vehicle": "roughie", "site": "pool", "log_rate_hz": 10.0, "water_density_kg_m3": 998.0}
 

@@ -5,10 +5,10 @@ import random
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hal.outofband import wire
-from hal.outofband.plan import CODES, NumberPlan, PathPlan
-from hal.protocols import maestro, modbus
-from hal.protocols.registers import from_registers, to_registers
+from glider.hal.outofband import wire
+from glider.hal.outofband.plan import CODES, NumberPlan, PathPlan
+from glider.hal.protocols import maestro, modbus
+from glider.hal.protocols.registers import from_registers, to_registers
 
 WORD = st.integers(0, 0xFFFF)
 DEVICE = st.integers(1, 247)

@@ -4,12 +4,12 @@ import pytest
 from pymodbus.client import ModbusSerialClient
 from pymodbus.simulator import SimDevice
 
-from hal.board import BoardRequest, board_builder
-from hal.outofband.ascent import Ascent
+from glider.hal.board import BoardRequest, board_builder
+from glider.hal.outofband.ascent import Ascent
+from glider.tools.data.boards import load_board_file
+from glider.tools.data.sources import load_vehicle
+from glider.tools.flight.ascent_plan import make_plan
 from tests.integration.test_independent_peers import PlainServer, registers
-from tools.data.boards import load_board_file
-from tools.data.sources import load_vehicle
-from tools.flight.ascent_plan import make_plan
 
 pytestmark = pytest.mark.realtime
 

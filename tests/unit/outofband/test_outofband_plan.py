@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hal.board import BoardRequest, board_builder
-from hal.outofband.plan import FORMAT, NumberPlan, PlanError, ReadPlan, read_plan, write_plan
+from glider.hal.board import BoardRequest, board_builder
+from glider.hal.outofband.plan import FORMAT, NumberPlan, PlanError, ReadPlan, read_plan, write_plan
+from glider.tools.data.boards import load_board_file
+from glider.tools.data.sources import load_vehicle
+from glider.tools.flight.ascent_plan import make_plan
 from tests.support.examples import examples
-from tools.data.boards import load_board_file
-from tools.data.sources import load_vehicle
-from tools.flight.ascent_plan import make_plan
 
 
 @pytest.fixture(scope="module")
@@ -148,14 +148,20 @@ def test_a_missing_or_endless_file_is_refused(tmp_path):
 
 
 def test_the_process_loads_the_standard_library_and_pyserial_alone():
-    code = "import sys, hal.outofband.guard; print(*sorted({m.split('.')[0] for m in sys.modules}))"
+    code = "import sys, glider.hal.outofband.guard; print(*sorted({m.split('.')[0] for m in sys.modules}))"
     done = subprocess.run([sys.executable, "-S", "-c", PATHS + code], capture_output=True, check=True, text=True)
     loaded = set(done.stdout.split())
     assert loaded - set(sys.stdlib_module_names) <= {"__main__", "hal", "serial", "sitecustomize"}
-    mine = "import sys, hal.outofband.guard; print(*sorted(m for m in sys.modules if m.startswith('hal.')))"
+    mine = "import sys, glider.hal.outofband.guard; print(*sorted(m for m in sys.modules if m.startswith('hal.')))"
     done = subprocess.run([sys.executable, "-c", mine], capture_output=True, check=True, text=True)
-    wanted = {"hal.heartbeat", "hal.notify", "hal.realtime", "hal.sortie", "hal.state_file"}
-    assert {name for name in done.stdout.split() if not name.startswith("hal.outofband")} == wanted
+    wanted = {
+        "glider.hal.heartbeat",
+        "glider.hal.notify",
+        "glider.hal.realtime",
+        "glider.hal.sortie",
+        "glider.hal.state_file",
+    }
+    assert {name for name in done.stdout.split() if not name.startswith("glider.hal.outofband")} == wanted
 
 
 PATHS = f"import sys; sys.path[:] = {sys.path!r}; "

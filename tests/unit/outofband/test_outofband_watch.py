@@ -9,18 +9,18 @@ import time
 
 import pytest
 
-from hal.heartbeat import Guard, Heartbeat
-from hal.outofband import guard
-from hal.outofband.guard import Watch
-from hal.outofband.plan import NAME, AxisPlan, NumberPlan, PathPlan, Plan, ReadPlan, write_plan
-from hal.sortie import State
-from hal.state_file import StateFile
+from glider.hal.heartbeat import Guard, Heartbeat
+from glider.hal.outofband import guard
+from glider.hal.outofband.guard import GuardWatch
+from glider.hal.outofband.plan import NAME, AscentPlan, AxisPlan, NumberPlan, PathPlan, ReadPlan, write_plan
+from glider.hal.sortie import SortieState
+from glider.hal.state_file import StateFile
 
 pytestmark = pytest.mark.realtime(seconds=35)
 
 FLIGHT = """
 import os, select, sys, time
-from hal import heartbeat as hb
+from glider.hal import heartbeat as hb
 pulse = hb.Heartbeat.create(sys.argv[1], 0.02, "test")
 pulse.beat(0.0)
 pulse.publish(hb.State.DIVING)
@@ -104,8 +104,8 @@ def watch(tmp_path, monkeypatch):
         auxiliary=4, absolute=1, trigger=1, clear_alarm=1, zero_counts=0.0, counts_per_m=1.0, end_m=0.0, last_m=0.0,
         tolerance_m=0.1, rpm=1, ramp_ms=1, wire=None,
     )  # fmt: skip
-    write_plan(tmp_path / NAME, Plan("test", (pump,), None, watchdog=str(tmp_path / "watchdog")))
-    found = Watch(tmp_path, tmp_path, service=False)
+    write_plan(tmp_path / NAME, AscentPlan("test", (pump,), None, watchdog=str(tmp_path / "watchdog")))
+    found = GuardWatch(tmp_path, tmp_path, service=False)
     found.start()
     yield found
     found.close(in_order=True)
@@ -160,7 +160,7 @@ def test_a_heart_that_stops_is_noticed_within_two_seconds_and_its_process_ended(
     assert flight.process.wait(5.0) == -signal.SIGKILL
     run(watch, 0.5)
     assert Heartbeat.open(tmp_path).look().guard == Guard.ASCENDING
-    assert StateFile(tmp_path).read().state == State.ABORTED
+    assert StateFile(tmp_path).read().state == SortieState.ABORTED
     assert StateFile(tmp_path).read().flight == "test"
 
 
@@ -189,10 +189,10 @@ def test_an_end_in_order_stops_the_watchdog_and_the_watch(flight, dog, watch):
     assert not ascending(watch)
 
 
-@pytest.mark.parametrize("state", list(State))
+@pytest.mark.parametrize("state", list(SortieState))
 def test_what_a_service_does_at_its_start_is_the_states_to_say(tmp_path, state):
     StateFile(tmp_path).write(state, reason="because")
-    service = Watch(tmp_path, tmp_path, service=True)
+    service = GuardWatch(tmp_path, tmp_path, service=True)
     service.start()
     assert ascending(service) == state.must_ascend
     assert run(service, 0.3)  # without a plan it has nothing to go up with, and waits for one
@@ -201,11 +201,11 @@ def test_what_a_service_does_at_its_start_is_the_states_to_say(tmp_path, state):
 
 def test_a_service_rests_once_a_person_has_looked(tmp_path, monkeypatch):
     monkeypatch.setattr(guard, "STEP_S", 0.05)
-    StateFile(tmp_path).write(State.DIVING)
-    service = Watch(tmp_path, tmp_path, service=True)
+    StateFile(tmp_path).write(SortieState.DIVING)
+    service = GuardWatch(tmp_path, tmp_path, service=True)
     service.start()
     run(service, 0.3)
-    StateFile(tmp_path).write(State.ASHORE)
+    StateFile(tmp_path).write(SortieState.ASHORE)
     run(service, 10.0, lambda: not ascending(service))
     assert not ascending(service)
     service.close(in_order=True)
@@ -214,9 +214,9 @@ def test_a_service_rests_once_a_person_has_looked(tmp_path, monkeypatch):
 def test_a_flight_left_over_from_before_is_judged_by_the_state(flight, tmp_path):
     flight.process.kill()
     flight.process.wait()
-    for state, wanted in ((State.ASHORE, False), (State.DIVING, True)):
+    for state, wanted in ((SortieState.ASHORE, False), (SortieState.DIVING, True)):
         StateFile(tmp_path).write(state)
-        watch = Watch(tmp_path, tmp_path, service=False)
+        watch = GuardWatch(tmp_path, tmp_path, service=False)
         watch.start()
         assert run(watch, 1.5, lambda watch=watch: ascending(watch)) == wanted
         watch.close(in_order=True)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from hal.protocols import maestro, modbus, vn100
+from glider.hal.protocols import maestro, modbus, vn100
 
 YMR = (
     "VNYMR,+010.071,+000.278,-002.026,-01.0208,-01.0110,+02.4580,+00.040,+00.322,-09.802,-0.001222,-0.000450,-0.001218"

@@ -4,10 +4,10 @@ from binascii import crc_hqx
 
 import pytest
 
-from hal.protocols import maestro, modbus, vn100
-from hal.protocols.checksums import crc7, xor8
-from hal.protocols.registers import from_registers, preset, presets, to_registers, value_of
-from hal.strict import ConfigError
+from glider.hal.protocols import maestro, modbus, vn100
+from glider.hal.protocols.checksums import crc7, xor8
+from glider.hal.protocols.registers import from_registers, preset, presets, to_registers, value_of
+from glider.hal.strict import ConfigError
 
 DRIVE = preset("leadshine-cs2rs")
 

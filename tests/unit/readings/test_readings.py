@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tools.data.errors import InputError
-from tools.data.runs.run import Run
-from tools.readings.check import check
+from glider.tools.data.errors import InputError
+from glider.tools.data.runs.run import Run
+from glider.tools.readings.check import check
 
 pytestmark = pytest.mark.computes(seconds=15)
 

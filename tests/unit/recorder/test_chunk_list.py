@@ -5,8 +5,8 @@ from io import BytesIO
 from mcap.records import ChunkIndex
 from mcap.writer import CompressionType, Writer
 
-from hal.recorder import logfile
-from hal.recorder.chunk_list import ChunkList, keep_small
+from glider.hal.recorder import logfile
+from glider.hal.recorder.chunk_list import ChunkList, use_packed_index
 
 
 def index(number):
@@ -30,7 +30,7 @@ def test_what_is_kept_comes_back():
 def write(small):
     stream = BytesIO()
     writer = Writer(stream, chunk_size=1000, compression=CompressionType.NONE, enable_data_crcs=True)
-    assert not small or keep_small(writer)
+    assert not small or use_packed_index(writer)
     writer.start()
     channels = [writer.register_channel(topic, "cdr", 0) for topic in ("/a", "/b")]
     for number in range(2000):
@@ -50,4 +50,4 @@ def test_our_logs_are_written_so():
 
 
 def test_a_writer_that_keeps_it_elsewhere_is_left_alone():
-    assert not keep_small(object())
+    assert not use_packed_index(object())

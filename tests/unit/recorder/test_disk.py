@@ -5,7 +5,7 @@ import resource
 
 import pytest
 
-from hal.recorder import disk
+from glider.hal.recorder import disk
 
 
 @pytest.fixture

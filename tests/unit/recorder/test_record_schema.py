@@ -2,7 +2,7 @@
 
 import pytest
 
-from hal.recorder.schema import Field, RecordSpec, parse_fields, specs_from_json, specs_to_json
+from glider.hal.recorder.schema import Field, RecordSpec, parse_fields, specs_from_json, specs_to_json
 
 SPEC = RecordSpec(
     "/tick",

@@ -13,10 +13,10 @@ import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
-from hal.recorder.condition import Level
-from hal.recorder.recorder import NullRecorder, Recorder
-from hal.recorder.schema import ERROR, INFO, Field, RecordSpec
-from tools.data.log.reader import read_log
+from glider.hal.recorder.condition import RecorderLevel
+from glider.hal.recorder.recorder import NullRecorder, Recorder
+from glider.hal.recorder.schema import ERROR, INFO, Field, RecordSpec
+from glider.tools.data.log.reader import read_log
 
 TICK = RecordSpec(
     "/tick",
@@ -180,9 +180,9 @@ def test_a_recording_process_that_dies_does_not_stop_the_flight(tmp_path):
 
 FLIGHT = """
 import sys, time, json
-from hal.recorder.condition import Level
-from hal.recorder.recorder import Recorder
-from hal.recorder.schema import Field, RecordSpec
+from glider.hal.recorder.condition import Level
+from glider.hal.recorder.recorder import Recorder
+from glider.hal.recorder.schema import Field, RecordSpec
 spec = RecordSpec("/tick", "glider/msg/Tick", (Field("t_s", "s", "time"), Field("n", "1", "number")))
 recorder = Recorder(sys.argv[1], [spec], metadata={"vehicle": "roughie"})
 recorder.start()
@@ -242,7 +242,7 @@ def test_the_recording_process_loads_little_and_the_flight_loads_no_mcap():
         done = subprocess.run([sys.executable, "-c", code.format(module)], capture_output=True, check=True, text=True)
         return set(json.loads(done.stdout))
 
-    writer, flight = loaded("hal.recorder.writer"), loaded("hal.recorder.recorder")
+    writer, flight = loaded("glider.hal.recorder.writer"), loaded("glider.hal.recorder.recorder")
     assert "mcap" in writer
     assert not writer & {"numba", "numpy", "msgspec", "firmware", "sim_backend", "tools"}
     assert not flight & {"numba", "mcap", "msgspec", "firmware", "sim_backend", "tools"}
@@ -273,16 +273,19 @@ def test_a_recording_process_that_dies_is_replaced_and_nothing_handed_over_later
     path = tmp_path / "x.mcap"
     recorder = Recorder(path, [TICK], sync_period_s=0.05)
     recorder.start()
-    assert recorder.watch().level in (Level.OK, Level.DROPPING)  # it may not have looked at the ring yet
+    assert recorder.watch().level in (
+        RecorderLevel.OK,
+        RecorderLevel.DROPPING,
+    )  # it may not have looked at the ring yet
     _fly(recorder, 100)
     _await(lambda: recorder.health().written == 100)
-    _watch_until(recorder, lambda condition: condition.level == Level.OK)
+    _watch_until(recorder, lambda condition: condition.level == RecorderLevel.OK)
     time.sleep(0.3)  # so that these are on the disk
     recorder._process.kill()
     _await(lambda: not recorder.health().alive)
     _fly(recorder, 50, start=100)
-    assert recorder.watch().level == Level.FAILED
-    _watch_until(recorder, lambda condition: condition.level == Level.OK and condition.pending == 0)
+    assert recorder.watch().level == RecorderLevel.FAILED
+    _watch_until(recorder, lambda condition: condition.level == RecorderLevel.OK and condition.pending == 0)
     _fly(recorder, 50, start=150)
     report = recorder.close({"reason": "done"})
     assert (report.parts, report.complete, report.dropped) == (2, False, 0)
@@ -299,18 +302,18 @@ def test_a_recording_process_that_dies_is_replaced_and_nothing_handed_over_later
 
 def test_a_recording_process_that_hangs_is_replaced(tmp_path, monkeypatch):
     with Recorder(tmp_path / "x.mcap", [TICK]) as recorder:
-        _watch_until(recorder, lambda condition: condition.level == Level.OK)
+        _watch_until(recorder, lambda condition: condition.level == RecorderLevel.OK)
         os.kill(recorder._process.pid, signal.SIGSTOP)
         with monkeypatch.context() as patch:  # for this process alone: the next may take its time to start
-            patch.setattr("hal.recorder.recorder.HUNG_S", 0.5)
-            _watch_until(recorder, lambda condition: condition.level == Level.FAILED)
+            patch.setattr("glider.hal.recorder.recorder.HUNG_S", 0.5)
+            _watch_until(recorder, lambda condition: condition.level == RecorderLevel.FAILED)
             _watch_until(recorder, lambda condition: condition.restarts == 1)
-        _watch_until(recorder, lambda condition: condition.level == Level.OK)
+        _watch_until(recorder, lambda condition: condition.level == RecorderLevel.OK)
         assert recorder.close().parts == 2
 
 
 def test_a_folder_that_is_gone_is_tried_again_ever_more_seldom(tmp_path, monkeypatch):
-    monkeypatch.setattr("hal.recorder.recorder.FIRST_RETRY_S", 0.1)
+    monkeypatch.setattr("glider.hal.recorder.recorder.FIRST_RETRY_S", 0.1)
     folder = tmp_path / "card"
     folder.mkdir()
     recorder = Recorder(folder / "x.mcap", [TICK])
@@ -318,26 +321,26 @@ def test_a_folder_that_is_gone_is_tried_again_ever_more_seldom(tmp_path, monkeyp
     folder.rename(tmp_path / "gone")  # the card is pulled: the open file may live on, a new one cannot be made
     recorder._process.kill()
     _watch_until(recorder, lambda condition: condition.restarts >= 2)
-    assert recorder.condition.level == Level.FAILED
+    assert recorder.condition.level == RecorderLevel.FAILED
     folder.mkdir()
-    _watch_until(recorder, lambda condition: condition.level == Level.OK)
+    _watch_until(recorder, lambda condition: condition.level == RecorderLevel.OK)
     assert recorder.close().parts == recorder.condition.restarts + 1
 
 
 def test_a_refusing_disk_and_a_full_ring_are_seen_as_dropping(tmp_path):
     path = tmp_path / "x.mcap"
     with Recorder(path, [TICK], sync_period_s=0.05) as recorder:
-        _watch_until(recorder, lambda condition: condition.level == Level.OK)
+        _watch_until(recorder, lambda condition: condition.level == RecorderLevel.OK)
         pid = recorder._process.pid
         _, hard = resource.prlimit(pid, resource.RLIMIT_FSIZE)
         resource.prlimit(pid, resource.RLIMIT_FSIZE, (path.stat().st_size + 10, hard))
         _fly(recorder, 100)
-        _watch_until(recorder, lambda condition: condition.level == Level.DROPPING and condition.errno)
+        _watch_until(recorder, lambda condition: condition.level == RecorderLevel.DROPPING and condition.errno)
         resource.prlimit(pid, resource.RLIMIT_FSIZE, (hard, hard))
-        _watch_until(recorder, lambda condition: condition.level == Level.OK)
+        _watch_until(recorder, lambda condition: condition.level == RecorderLevel.OK)
         os.kill(pid, signal.SIGSTOP)
         _fly(recorder, 3000)
         condition = recorder.watch()
         os.kill(pid, signal.SIGCONT)
-        assert condition.level == Level.DROPPING
+        assert condition.level == RecorderLevel.DROPPING
         assert condition.dropped > 0

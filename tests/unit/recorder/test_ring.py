@@ -10,9 +10,9 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from hal.recorder import ring
-from hal.recorder.producer import Producer
-from hal.recorder.schema import INFO, Field, RecordSpec
+from glider.hal.recorder import ring
+from glider.hal.recorder.producer import Producer
+from glider.hal.recorder.schema import INFO, Field, RecordSpec
 
 TICK = RecordSpec("/tick", "glider/msg/Tick", tuple(Field(f"x{place}", "m") for place in range(60)))
 TRUTH = RecordSpec("/truth", "glider/msg/Truth", (Field("a", "m"), Field("b", "m")), spare=True)
@@ -151,9 +151,9 @@ def test_layouts_that_cannot_work_are_refused(slots, payload):
 
 PRODUCER = """
 import sys, time
-from hal.recorder import ring
-from hal.recorder.producer import Producer
-from hal.recorder.schema import Field, RecordSpec
+from glider.hal.recorder import ring
+from glider.hal.recorder.producer import Producer
+from glider.hal.recorder.schema import Field, RecordSpec
 spec = RecordSpec("/tick", "glider/msg/Tick", tuple(Field(f"x{i}", "m") for i in range(60)))
 producer = Producer(int(sys.argv[1]), ring.Layout(64, ring.MIN_PAYLOAD + 20), (spec,))
 print("go", flush=True)

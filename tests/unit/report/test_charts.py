@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from tools.report.charts import HEIGHT, LEFT, RIGHT, TOP, WIDTH, Band, Chart, Line, label, svg, ticks
+from glider.tools.report.charts import HEIGHT, LEFT, RIGHT, TOP, WIDTH, Band, Chart, Curve, label, svg, ticks
 
 
 @pytest.mark.parametrize(("low", "high"), [(0.0, 1.0), (-53.2, 27.9), (0.0123, 0.0127), (-1e4, 3e5), (59.9, 61.0)])
@@ -30,7 +30,7 @@ def points(text: str, style: str) -> np.ndarray:
 
 def chart(y: np.ndarray, **options) -> str:
     t = np.arange(len(y), dtype=float)
-    return svg(Chart("depth <m>", "s", [Line(t, y, "measured")], [Band(0.0, 2.0, "start")], **options))
+    return svg(Chart("depth <m>", "s", [Curve(t, y, "measured")], [Band(0.0, 2.0, "start")], **options))
 
 
 def test_the_picture_is_well_formed_and_within_its_box():
@@ -68,7 +68,7 @@ def test_a_long_line_is_thinned_but_keeps_its_breaks():
 
 def test_a_plan_has_one_scale_on_both_axes():
     x, y = np.array([0.0, 10.0, 10.0]), np.array([0.0, 0.0, 3.0])
-    drawn = points(svg(Chart("plan", "east", [Line(x, y, "measured")], square=True)), "measured")
+    drawn = points(svg(Chart("plan", "east", [Curve(x, y, "measured")], square=True)), "measured")
     assert abs(drawn[1, 0] - drawn[0, 0]) / 10.0 == pytest.approx(abs(drawn[2, 1] - drawn[1, 1]) / 3.0, rel=0.02)
 
 

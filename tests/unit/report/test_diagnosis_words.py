@@ -3,42 +3,42 @@
 import numpy as np
 import pytest
 
-from sim_backend.core.effects.catalogue import catalogue
-from sim_backend.ocean.catalogue import catalogue as ocean_catalogue
-from tools.diagnose.noise_probes import CLOCK, TURBULENCE
-from tools.diagnose.record import (
-    Answer,
-    Cause,
+from glider.sim_backend.core.effects.catalogue import catalogue
+from glider.sim_backend.ocean.catalogue import catalogue as ocean_catalogue
+from glider.tools.diagnose.noise_probes import CLOCK, TURBULENCE
+from glider.tools.diagnose.record import (
+    AnswerRecord,
+    CauseRecord,
     Data,
     Details,
-    Finding,
+    DiagnosisRecord,
+    FindingRecord,
     Gap,
     Interval,
     NextRun,
     Noise,
     Place,
-    Record,
     Unexplained,
 )
-from tools.inference.kind import ROUGHIE
-from tools.report import words
+from glider.tools.inference.kind import ROUGHIE
+from glider.tools.report import words
 
 FAR = {"before": 4.0, "recalibrated": 3.0, "after": 0.5, "floor": 0.4}
 
 
-def record(probabilities, selected=(), groups=None, findings=(), noise=None, where=(), **far) -> Record:
+def record(probabilities, selected=(), groups=None, findings=(), noise=None, where=(), **far) -> DiagnosisRecord:
     """A diagnosis of these numbers, as its folder would hold it."""
     ranked = sorted(({"none": 0.0, "unknown": 0.0} | probabilities).items(), key=lambda item: -item[1])
-    causes = [Cause(label, p, (groups or {}).get(label, [label]), {}) for label, p in ranked]
+    causes = [CauseRecord(label, p, (groups or {}).get(label, [label]), {}) for label, p in ranked]
     tables = ({"total": value} for value in (FAR | far).values())
     gap = Gap(*tables, Interval(0.875, (0.81, 0.93)), Interval(0.97, (0.9, 1.0)))
     main = causes[0].label
-    answer = Answer(
+    answer = AnswerRecord(
         1, main if main in ("none", "unknown") else "cause", [Place(*one) for one in where], causes, list(selected),
         gap, Unexplained(), [], NextRun("a dive", [], None, "next_run.toml"),
     )  # fmt: skip
     data = Data("case", "roughie", "pond", 3, 180.0, 10.0, False, [], [])
-    return Record(answer, Details(1, "0", data, {}, bool(selected), noise, [], list(findings), [], {}), [])
+    return DiagnosisRecord(answer, Details(1, "0", data, {}, bool(selected), noise, [], list(findings), [], {}), [])
 
 
 def test_every_label_has_plain_words():
@@ -85,8 +85,8 @@ def test_no_gap_claims_no_shrinkage():
 
 
 UNEXPLAINED = [
-    Finding("r", "lag 11-60", 40.0), Finding("r", "variance", 30.0), Finding("depth", "speed", -25.0),
-    Finding("r", "pump running", 12.0), Finding("q", "time", 3.0),
+    FindingRecord("r", "lag 11-60", 40.0), FindingRecord("r", "variance", 30.0), FindingRecord("depth", "speed", -25.0),
+    FindingRecord("r", "pump running", 12.0), FindingRecord("q", "time", 3.0),
 ]  # fmt: skip
 
 

@@ -9,9 +9,9 @@ import pytest
 from support.flights import World, fly_case
 from support.pages import assert_offline
 
-from tools.gap.assess import CaseGap, assess
-from tools.report import gap as gap_report
-from tools.report.gap import report_html, write_report
+from glider.tools.gap.assess import CaseGap, assess
+from glider.tools.report import gap as gap_report
+from glider.tools.report.gap import report_html, write_report
 
 
 @pytest.fixture(scope="module")

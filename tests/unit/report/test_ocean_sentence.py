@@ -2,8 +2,8 @@
 
 import pytest
 
-from tools.diagnose.record import read_as
-from tools.report.pooled import _Answer, sentence
+from glider.tools.diagnose.record import read_as
+from glider.tools.report.pooled import _Answer, sentence
 
 GAP = '"before": {"total": 1.0}, "recalibrated": {"total": 0.5}, "after": {"total": 0.2}, "floor": {"total": 0.2}'
 SHARE = '{"value": 0.5, "ci90": [0.4, 0.6]}'

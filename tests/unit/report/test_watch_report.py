@@ -4,9 +4,9 @@ import json
 
 import pytest
 
-from tools.cli.common import report_errors
-from tools.cli.main import cli
-from tools.report.watch import write_watch_report
+from glider.tools.cli.common import report_errors
+from glider.tools.cli.main import cli
+from glider.tools.report.watch import write_watch_report
 
 EVENT = {
     "label": "drag", "where": [{"subsystem": "hydrodynamics", "element": "surge", "probability": 0.9}],

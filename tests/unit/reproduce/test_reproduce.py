@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from support.commands import glider
 
-from firmware.model.gains import Control
-from sim_backend.core.closed_loop import TRACE
-from tools.data.sources import load_vehicle
-from tools.study.reproduce import circle, tracking
-from tools.study.reproduce.design import LAST, Batch, Variant, fly_design, mission_of
+from glider.firmware.model.gains import Control
+from glider.sim_backend.core.closed_loop import TRACE
+from glider.tools.data.sources import load_vehicle
+from glider.tools.study.reproduce import circle, tracking
+from glider.tools.study.reproduce.design import LAST, Batch, Variant, fly_design, mission_of
 
 VEHICLE = load_vehicle("roughie")
 

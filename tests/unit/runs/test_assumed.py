@@ -5,18 +5,18 @@ import numpy as np
 import pytest
 from support.cases import make_case
 
-from firmware.core.vehicle import layout
-from firmware.core.vehicle.water import water_wrench
-from firmware.model.vehicle import decode_vehicle
-from hal.strict import ConfigError
-from sim_backend.core.effects import effect_layout as ef
-from tools.data.runs.case import load_case
-from tools.data.sources import load_vehicle
-from tools.data.tomltext import toml_text
-from tools.inference.model import effects_in, nominal_model, vehicle_model
-from tools.inference.parameters import nuisance_parameters
-from tools.inference.problem import problem_of
-from tools.inference.vehicle_parameters import parameters
+from glider.firmware.core.vehicle import layout
+from glider.firmware.core.vehicle.water import water_wrench
+from glider.firmware.model.vehicle import decode_vehicle
+from glider.hal.strict import ConfigError
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.data.runs.case import load_case
+from glider.tools.data.sources import load_vehicle
+from glider.tools.data.tomltext import toml_text
+from glider.tools.inference.model import effects_in, nominal_model, vehicle_model
+from glider.tools.inference.parameters import nuisance_parameters
+from glider.tools.inference.problem import problem_of
+from glider.tools.inference.vehicle_parameters import parameters
 
 
 def text(**tables) -> str:

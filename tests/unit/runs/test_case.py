@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from hal.strict import ConfigError
-from tools.cli.common import report_errors
-from tools.cli.main import cli
-from tools.data.errors import InputError
-from tools.data.runs.case import CASE_FILE, SensorsPart, load_case, load_case_of_run, load_runs, write_case
-from tools.data.runs.run import Run
-from tools.data.sources import load_vehicle
+from glider.hal.strict import ConfigError
+from glider.tools.cli.common import report_errors
+from glider.tools.cli.main import cli
+from glider.tools.data.errors import InputError
+from glider.tools.data.runs.case import CASE_FILE, SensorsPart, load_case, load_case_of_run, load_runs, write_case
+from glider.tools.data.runs.run import Run
+from glider.tools.data.sources import load_vehicle
 
 FACTS = {"vehicle": "roughie", "site": "pool", "log_rate_hz": 10.0, "water_density_kg_m3": 998.0}
 
@@ -117,7 +117,7 @@ def test_folders_that_are_no_case(tmp_path, folder):
 
 
 def test_a_vehicle_file_is_looked_for_beside_the_case(folder):
-    from firmware.model.library import shipped
+    from glider.firmware.model.library import shipped
 
     text = shipped("model/vehicles")["roughie"].replace('name = "roughie"', 'name = "heavy"')
     (folder / "heavy.toml").write_text(text)

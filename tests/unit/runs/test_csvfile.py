@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from glider.tools.data.errors import InputError
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs import csvfile
+from glider.tools.data.runs.run import Run, load_run, write_run
 from tests.support.examples import examples
-from tools.data.errors import InputError
-from tools.data.runs import columns as names
-from tools.data.runs import csvfile
-from tools.data.runs.run import Run, load_run, write_run
 
 GOOD = "t_s,depth_m,note\n0.0,1.0,a\n0.1,,b\n0.2,3,c\n"
 

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from effect_flights import FLOWN, MOCAP, at_spread, flown, world
 
-from firmware.core.vehicle.layout import X_BALLAST, X_SERVO, X_SLIDER
-from hal.board import BoardRequest
-from hal.strict import ConfigError
-from sim_backend.board import build_board
-from sim_backend.core.effects import effect_layout as ef
-from sim_backend.core.effects.base import EffectError
-from sim_backend.core.effects.catalogue import apply_effects, catalogue, check_values
-from tools.cli.common import report_errors
-from tools.cli.main import cli
-from tools.flight.compose import parse_effects
+from glider.firmware.core.vehicle.layout import X_BALLAST, X_SERVO, X_SLIDER
+from glider.hal.board import BoardRequest
+from glider.hal.strict import ConfigError
+from glider.sim_backend.board import build_board
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.sim_backend.core.effects.base import EffectError
+from glider.sim_backend.core.effects.catalogue import apply_effects, catalogue, check_values
+from glider.tools.cli.common import report_errors
+from glider.tools.cli.main import cli
+from glider.tools.flight.compose import parse_effects
 
 ROUGH = {"disturbance_linear": 0.01, "disturbance_angular": 0.02}
 NOMINAL, READ = flown(world(**ROUGH))

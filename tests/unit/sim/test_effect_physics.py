@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from effect_flights import VEHICLE, flown, held, quiet
 
-from firmware.core.maths.rotations import quaternion_from_euler, rotation_nb
-from firmware.core.vehicle import layout
-from firmware.core.vehicle.water import water_wrench
-from sim_backend.core.effect_plant import effect_derivative, effective_parameters
-from sim_backend.core.effects import effect_layout as ef
-from sim_backend.core.effects.actuation import BALLAST_DRIVEN, SLIDER_DRIVEN, backlash
-from sim_backend.core.effects.catalogue import apply_effects
-from sim_backend.core.effects.hydrodynamics import extra_wrench, tether_wrench
+from glider.firmware.core.maths.rotations import quaternion_from_euler, rotation_nb
+from glider.firmware.core.vehicle import layout
+from glider.firmware.core.vehicle.water import water_wrench
+from glider.sim_backend.core.effect_plant import effect_derivative, effective_parameters
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.sim_backend.core.effects.actuation import BALLAST_DRIVEN, SLIDER_DRIVEN, backlash
+from glider.sim_backend.core.effects.catalogue import apply_effects
+from glider.sim_backend.core.effects.hydrodynamics import extra_wrench, tether_wrench
 
 P = VEHICLE.vector()
 SERVO, SLIDER, BALLAST = (VEHICLE.actuators.servo, VEHICLE.actuators.slider, VEHICLE.actuators.ballast)
@@ -115,9 +115,7 @@ def test_a_servo_stops_short_of_its_range(side, loss, left):
 def test_a_stop_that_gives_way_lets_the_servo_go_by_a_share(side, beyond):
     low, high = SERVO.range
     stop = {1.0: high, -1.0: -low}[side] - 0.4
-    states, _ = flown(
-        quiet({"servo_limit": {"loss": 0.4, "give": 0.25}}), 25.0, held(side * (stop + beyond), 0.0, 0.0)
-    )
+    states, _ = flown(quiet({"servo_limit": {"loss": 0.4, "give": 0.25}}), 25.0, held(side * (stop + beyond), 0.0, 0.0))
     reached = stop + (0.25 * min(beyond, 0.4) if beyond > 0.0 else beyond)
     assert states[-1, 13] == pytest.approx(side * reached, abs=1e-6)
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from effect_flights import flown, world
 
-from firmware.core.maths.rotations import euler_from_quaternion, quaternion_from_euler
-from sim_backend.core import layout as wl
-from sim_backend.core.effect_plant import update_effect_states
-from sim_backend.core.effects import effect_layout as ef
-from sim_backend.core.effects.catalogue import apply_effects
-from sim_backend.core.effects.sensing import read
-from sim_backend.core.world import sample_sensors
+from glider.firmware.core.maths.rotations import euler_from_quaternion, quaternion_from_euler
+from glider.sim_backend.core import layout as wl
+from glider.sim_backend.core.effect_plant import update_effect_states
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.sim_backend.core.effects.catalogue import apply_effects
+from glider.sim_backend.core.effects.sensing import read
+from glider.sim_backend.core.world import sample_sensors
 
 
 class Plain:

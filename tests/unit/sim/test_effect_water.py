@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from effect_flights import flown, held, quiet, world
 
-from sim_backend.core import layout as wl
-from sim_backend.core.effects.timing import delayed_commands, mean_input
+from glider.sim_backend.core import layout as wl
+from glider.sim_backend.core.effects.timing import delayed_commands, mean_input
 
 GRAVITY = 9.80665
 

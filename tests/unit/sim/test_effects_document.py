@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from sim_backend.core.effects.catalogue import catalogue
+from glider.sim_backend.core.effects.catalogue import catalogue
 
 DOCS = Path(__file__).parents[3] / "docs"
 TEXT = (DOCS / "EFFECTS.md").read_text(encoding="utf-8")

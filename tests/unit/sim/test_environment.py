@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from firmware.core.maths.rotations import euler_from_quaternion
-from firmware.core.vehicle.layout import N_X
-from sim_backend.core.environment import water_velocity
-from sim_backend.core.open_loop import fly_open_loop, fly_open_loop_many
-from sim_backend.core.plant import hold_disturbance, plant_step
-from sim_backend.world import Environment, SampledSensor, SampledSensors, Start, Wave, build_world
-from tools.data.sources import load_vehicle
+from glider.firmware.core.maths.rotations import euler_from_quaternion
+from glider.firmware.core.vehicle.layout import N_X
+from glider.sim_backend.core.environment import water_velocity
+from glider.sim_backend.core.open_loop import fly_open_loop, fly_open_loop_many
+from glider.sim_backend.core.plant import hold_disturbance, plant_step
+from glider.sim_backend.world import Environment, SampledSensor, SampledSensors, Start, Wave, build_world
+from glider.tools.data.sources import load_vehicle
 
 VEHICLE = load_vehicle("roughie")
 CALM = dict(disturbance_linear=0.0, disturbance_angular=0.0)
@@ -102,12 +102,12 @@ def test_disturbance_is_held_and_has_its_strength():
 def test_the_disturbance_enters_after_the_mass_matrix():
     """The same strength on every axis, whatever the added mass: nu_dot itself is shifted."""
     w = world()
-    quiet, moved = w.x.copy(), w.x.copy()
+    muted, moved = w.x.copy(), w.x.copy()
     acc = np.array([0.01, -0.02, 0.03, 0.01, 0.02, -0.01])
     dt = 1e-5
-    plant_step(w.P, w.E, w.waves, quiet, w.cmd, 0.0, dt, np.zeros(6), w.work)
+    plant_step(w.P, w.E, w.waves, muted, w.cmd, 0.0, dt, np.zeros(6), w.work)
     plant_step(w.P, w.E, w.waves, moved, w.cmd, 0.0, dt, acc, w.work)
-    assert (moved - quiet)[7:13] / dt == pytest.approx(acc, rel=1e-3)
+    assert (moved - muted)[7:13] / dt == pytest.approx(acc, rel=1e-3)
 
 
 def test_many_flights_are_the_flights_one_by_one_bit_for_bit():

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sim_backend.core.noise import gaussian, uniform
+from glider.sim_backend.core.noise import gaussian, uniform
 
 SEED = np.uint64(2026)
 N = 20_000

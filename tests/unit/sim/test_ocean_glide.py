@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from sim_backend.ocean.catalogue import EFFECTS, NOT_ASKED, ODDS, ONE_ON_DEPTH, catalogue
-from sim_backend.ocean.core import layout as at
-from sim_backend.ocean.core.glide import (
+from glider.sim_backend.ocean.catalogue import EFFECTS, NOT_ASKED, ODDS, ONE_ON_DEPTH, catalogue
+from glider.sim_backend.ocean.core import layout as at
+from glider.sim_backend.ocean.core.glide import (
     angle_of_attack,
     drag_coefficients,
     glide,
@@ -18,9 +18,9 @@ from sim_backend.ocean.core.glide import (
     steady_speed,
     true_pitch,
 )
-from sim_backend.ocean.vehicle import KIND, decode_ocean_vehicle, gravity, shipped_vehicles
+from glider.sim_backend.ocean.vehicle import KIND, decode_ocean_vehicle, gravity, shipped_vehicles
+from glider.tools.inference.core.ocean import propagate, read_state
 from tests.support.examples import examples
-from tools.inference.core.ocean import propagate, read_state
 
 NO_EFFECT = np.zeros(at.N_F)
 VEHICLES = {name: decode_ocean_vehicle(text, name) for name, text in shipped_vehicles().items()}
@@ -70,7 +70,7 @@ def test_climbing_mirrors_diving():
 
 
 def test_weight_against_the_pitch_stands_still():
-    assert steady_speed(vector(), NO_EFFECT, -0.4, 1026.0, 1.0)[0] == at.SLOWEST
+    assert steady_speed(vector(), NO_EFFECT, -0.4, 1026.0, 1.0)[0] == at.LEAST_FLOW_SPEED
 
 
 def test_the_seaglider_law_of_drag_goes_with_a_power_of_the_pressure():
@@ -110,9 +110,9 @@ def test_the_derivative_of_the_next_speed(speed, force, dt):
 
 def test_any_step_is_stable():
     P = vector()
-    settled = np.sqrt(0.9 / 8.0)
-    assert next_speed(P, 0.1, 1e5, 0.9, 8.0)[0] == pytest.approx(settled, rel=1e-2)
-    assert next_speed(P, 0.1, 60.0, -2.0, 8.0) == (at.SLOWEST, 0.0)
+    steady_share = np.sqrt(0.9 / 8.0)
+    assert next_speed(P, 0.1, 1e5, 0.9, 8.0)[0] == pytest.approx(steady_share, rel=1e-2)
+    assert next_speed(P, 0.1, 60.0, -2.0, 8.0) == (at.LEAST_FLOW_SPEED, 0.0)
 
 
 # --- what drives it ---

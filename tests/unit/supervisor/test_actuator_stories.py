@@ -7,9 +7,9 @@ import math
 
 import pytest
 
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.layouts import supervisor_layout as sup
-from hal.ports import Condition, Validity
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.layouts import supervisor_layout as sup
+from glider.hal.ports import Condition, Validity
 from tests.support.stories import ABORT, NOTHING, TWO_TICKS, WARN, flying
 from tests.support.watchman import BALLAST_RANGE, DT, SLIDER_RANGE, Watchman
 

@@ -7,9 +7,9 @@ import math
 
 import pytest
 
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.layouts import supervisor_layout as sup
-from firmware.faults import Reaction
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.layouts import supervisor_layout as sup
+from glider.firmware.faults import Reaction
 from tests.support.stories import ABORT, HOLD, LOG, NOTHING, WARN, flying
 from tests.support.watchman import Watchman
 

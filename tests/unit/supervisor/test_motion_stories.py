@@ -5,9 +5,9 @@ Each row as a story: all is well, something breaks, it is noticed in time, and w
 
 import pytest
 
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.layouts import supervisor_layout as sup
-from firmware.model.supervisor_settings import Limits
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.layouts import supervisor_layout as sup
+from glider.firmware.model.supervisor_settings import Limits
 from tests.support.stories import ABORT, COARSE, HW, NOTHING, OOB, TWO_TICKS, WARN, flying, rising
 
 

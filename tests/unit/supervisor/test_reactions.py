@@ -10,14 +10,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.layouts import supervisor_layout as sup
-from firmware.core.supervision.supervisor import highest
-from firmware.faults import ABORT, FAULT_TABLE, FAULTS, NEVER, WARN, Reaction, markdown_rows
-from hal.ports import SLOTS, Validity
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.layouts import supervisor_layout as sup
+from glider.firmware.core.supervision.supervisor import highest
+from glider.firmware.faults import ABORT, FAULT_TABLE, FAULTS, NEVER, WARN, Reaction, markdown_rows
+from glider.hal.ports import SLOTS, Validity
+from glider.tools.study.faults.flights import flown
 from tests.support.examples import examples
 from tests.support.watchman import BALLAST_RANGE, DT, SLIDER_RANGE, Watchman
-from tools.study.faults.flights import flown
 
 ROOT = Path(__file__).resolve().parents[3]
 LEVELS = [float(level) for level in Reaction]

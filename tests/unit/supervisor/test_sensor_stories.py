@@ -8,10 +8,10 @@ import math
 import numpy as np
 import pytest
 
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.layouts import supervisor_layout as sup
-from firmware.model.supervisor_settings import Limits
-from hal.ports import SLOTS, Validity
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.layouts import supervisor_layout as sup
+from glider.firmware.model.supervisor_settings import Limits
+from glider.hal.ports import SLOTS, Validity
 from tests.support.stories import ABORT, HOLD, LOG, NOTHING, TWO_TICKS, WARN, flying, rising
 from tests.support.watchman import BALLAST_RANGE, DT, SLIDER_RANGE, Watchman
 
@@ -127,7 +127,7 @@ def test_a_slow_sensor_is_old_after_three_periods():
     assert man.supervisor.row == sup.FAULT_SAMPLE_TIME
 
 
-ABSURD = {
+IMPLAUSIBLE = {
     "imu": [(math.nan, -0.3, 0, 0, 0, 0), (0, math.inf, 0, 0, 0, 0), (0, -0.3, 4.0, 0, 0, 0), (0, 1.9, 0, 0, 0, 0),
             (1.0, -0.3, 0, 0, 0, 0), (0, -0.3, 0, 11.0, 0, 0), (0, -0.3, 0, 0, 5.0, 0), (0, -0.3, 0, 0, 0, -5.0),
             (0, 0.3, 0, 0, 0, 0), (0, -0.3, 1.0, 0, 0, 0)],
@@ -139,7 +139,7 @@ ABSURD = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("name", "values"), [(name, values) for name in ABSURD for values in ABSURD[name]])
+@pytest.mark.parametrize(("name", "values"), [(name, values) for name in IMPLAUSIBLE for values in IMPLAUSIBLE[name]])
 def test_an_absurd_sample_is_rejected_and_five_running_are_an_error(name, values):
     man = flying(fitted=("leak", "battery"))
     due = {"imu": 1, "leak": 10, "battery": 10}.get(name, 2)

@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from firmware.core.layouts import supervisor_layout as sup
-from firmware.model.library import shipped
-from firmware.model.supervisor_settings import Limits, SupervisorTable, settings_vector
-from firmware.model.vehicle import decode_vehicle
-from hal.ports import SLOTS
-from hal.strict import ConfigError
+from glider.firmware.core.layouts import supervisor_layout as sup
+from glider.firmware.model.library import shipped
+from glider.firmware.model.supervisor_settings import Limits, SupervisorTable, settings_vector
+from glider.firmware.model.vehicle import decode_vehicle
+from glider.hal.ports import SLOTS
+from glider.hal.strict import ConfigError
 
 SHIPPED = shipped("model/vehicles")["roughie"]
 TEXT = SHIPPED.split("[limits]")[0]

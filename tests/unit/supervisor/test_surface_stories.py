@@ -2,9 +2,9 @@
 
 import pytest
 
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.layouts import supervisor_layout as sup
-from firmware.runtime import Ending
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.layouts import supervisor_layout as sup
+from glider.firmware.runtime import Ending
 from tests.support.stories import COARSE, flying
 from tests.support.watchman import KG_PER_M, Watchman
 

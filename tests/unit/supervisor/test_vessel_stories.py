@@ -5,8 +5,8 @@ Each row as a story: all is well, something breaks, it is noticed in time, and w
 
 import pytest
 
-from firmware.core.layouts import supervisor_layout as sup
-from firmware.model.supervisor_settings import Limits
+from glider.firmware.core.layouts import supervisor_layout as sup
+from glider.firmware.model.supervisor_settings import Limits
 from tests.support.stories import ABORT, COARSE, LOG, NOTHING, WARN, flying
 
 

@@ -6,11 +6,11 @@ import time
 
 import pytest
 
-from hal.protocols import modbus
-from hal.protocols.modbus_master import ModbusBus
-from hal.transport.hub import RETRY_S, SPARE, Hub, Link
-from hal.transport.port import Busy, SerialPort, Unplugged
-from sim_backend.twins.line import open_pty
+from glider.hal.protocols import modbus
+from glider.hal.protocols.modbus_master import ModbusBus
+from glider.hal.transport.hub import RETRY_S, SPARE, Hub, SerialLink
+from glider.hal.transport.port import Busy, SerialPort, Unplugged
+from glider.sim_backend.twins.line import open_pty
 
 
 class Recorder:
@@ -46,7 +46,7 @@ def pty():
 
 def linked(path, baud=115_200):
     handler = Recorder()
-    link = Link("port", SerialPort(path, baud), handler)
+    link = SerialLink("port", SerialPort(path, baud), handler)
     return link, handler, Hub([link], time.monotonic)
 
 
@@ -170,7 +170,7 @@ def test_a_reply_that_came_while_the_loop_was_away_is_read_before_it_is_missed(p
     late, and the next request follows without the quiet time after a timeout."""
     master, path = pty
     bus, taken = ModbusBus(115_200, timeout_s=0.05, longest_s=0.1), []
-    link = Link("port", SerialPort(path, 115_200), bus)
+    link = SerialLink("port", SerialPort(path, 115_200), bus)
     hub = Hub([link], time.monotonic)
     link.open(time.monotonic())
     hub.serve(time.monotonic() + 0.12)  # until the line counts as quiet

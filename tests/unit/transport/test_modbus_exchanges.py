@@ -5,18 +5,18 @@ import random
 
 import pytest
 
-from hal.drivers.poll import Poll
-from hal.drivers.samples import Health
-from hal.protocols import modbus
-from hal.protocols.modbus_master import ModbusBus
-from tools.study.faults.wire import Line, Stamped, stamp_reply
+from glider.hal.drivers.poll import Poll
+from glider.hal.drivers.samples import Health
+from glider.hal.protocols import modbus
+from glider.hal.protocols.modbus_master import ModbusBus
+from glider.tools.study.faults.wire import Stamped, WireLine, stamp_reply
 
 EXCHANGES = 100_000
 
 
 def exchange(delay, seed, exchanges=EXCHANGES, forget_s=0.5, longest_s=0.1):
     """Three devices, two of them asked for the same registers; every reply carries its request's number."""
-    line = Line(stamp_reply, delay, seed, timeout_s=0.03, longest_s=longest_s, forget_s=forget_s)
+    line = WireLine(stamp_reply, delay, seed, timeout_s=0.03, longest_s=longest_s, forget_s=forget_s)
     jobs = [Stamped(line, device, period) for device, period in ((1, 0.02), (2, 0.02), (3, 0.05))]
     while line.requests < exchanges:
         line.run(line.now + 1.0)
@@ -58,7 +58,7 @@ def test_the_measurement_can_fail():
 def test_a_silent_device_leaves_the_line_to_the_others():
     """With device 1 dead, the others are answered as often as without it, but for its few timeouts."""
     dead, asked = {1}, [0]
-    line = Line(stamp_reply, lambda rng: math.inf if asked[0] in dead else 0.002, 3, timeout_s=0.02, longest_s=0.02)
+    line = WireLine(stamp_reply, lambda rng: math.inf if asked[0] in dead else 0.002, 3, timeout_s=0.02, longest_s=0.02)
     forward = line._sent
 
     def note(frame):
@@ -80,8 +80,8 @@ def test_exceptions_are_counted_and_slow_the_poll_down(code):
     def slave(frame, number):
         return modbus.with_check_sum(bytes((frame[0], frame[1] | 0x80, code)))
 
-    line = Line(slave, lambda rng: 0.002, 4, timeout_s=0.02, longest_s=0.02)
-    job = Stamped(line, 1, 0.02, ask=4)
+    line = WireLine(slave, lambda rng: 0.002, 4, timeout_s=0.02, longest_s=0.02)
+    job = Stamped(line, 1, 0.02, run_batch=4)
     line.run(10.0)
     assert job.delivered == 0
     assert 0 <= line.requests - line.bus.counts.exceptions <= 1
@@ -92,8 +92,8 @@ def test_replies_in_anothers_name_are_counted_as_wrong():
     def slave(frame, number):
         return modbus.with_check_sum(bytes((9, 3, 8)) + bytes(8))
 
-    line = Line(slave, lambda rng: 0.002, 5, timeout_s=0.02, longest_s=0.02)
-    job = Stamped(line, 1, 0.02, ask=4)
+    line = WireLine(slave, lambda rng: 0.002, 5, timeout_s=0.02, longest_s=0.02)
+    job = Stamped(line, 1, 0.02, run_batch=4)
     line.run(5.0)
     assert job.delivered == 0
     assert line.bus.counts.wrong == line.bus.counts.timeouts > 8

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tools.data.remote import Host, RemoteError
+from glider.tools.data.remote import RemoteError, RemoteHost
 
 CUT = """#!/bin/sh
 for line in "$@"; do :; done
@@ -24,5 +24,5 @@ def test_a_cut_while_files_go_over_is_a_lost_connection(taken, sizes, tmp_path, 
         files[path] = str(tmp_path / "there" / f"file{n}")
     for _ in range(5):  # whether the pipe is closed before the last write or behind it is chance
         with pytest.raises(RemoteError) as told:
-            Host("vehicle", tmp_path).put(files)
+            RemoteHost("vehicle", tmp_path).put(files)
         assert told.value.lost

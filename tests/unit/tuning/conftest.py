@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from hal.strict import decode
-from sim_backend.board import SimBoardFile
-from tools.data.boards import load_board_file
-from tools.data.sources import load_vehicle
+from glider.hal.strict import decode
+from glider.sim_backend.board import SimBoardFile
+from glider.tools.data.boards import load_board_file
+from glider.tools.data.sources import load_vehicle
 
 sys.path.insert(0, str(Path(__file__).parent))
 

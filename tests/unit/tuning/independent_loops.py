@@ -7,10 +7,10 @@ and where else a test alone needs a large library, it is imported where it is us
 
 import numpy as np
 
-from firmware.core.vehicle.layout import M_R, M_S, R_R, R_S, X_B
-from firmware.model.gains import Control
-from tools.study.tuning.linear_plant import Plant
-from tools.study.tuning.loops import Delays
+from glider.firmware.core.vehicle.layout import M_R, M_S, R_R, R_S, X_B
+from glider.firmware.model.gains import Control
+from glider.tools.study.tuning.linear_plant import Plant
+from glider.tools.study.tuning.loops import Delays
 
 ORDER = 4  # of the Pade approximation
 REFERENCES = ["pitch_ref", "pitch_rate_ref", "depth_ref", "depth_rate_ref"]

@@ -6,14 +6,14 @@ import pytest
 from independent_loops import closed
 from test_plant import flight_state
 
-from firmware.autopilot import Autopilot, configuration
-from firmware.core.vehicle.layout import N_X, X_POS
-from firmware.guidance.mission import Leg, Mission, Site
-from firmware.model.gains import Control
-from sim_backend.core.closed_loop import N_END, N_TRACE, TRACE, fly
-from sim_backend.world import Environment, Start, build_world
-from tools.study.tuning.linear_plant import DESIGN_TRIMS, OTHER_TRIMS, linearise, steady_glide
-from tools.study.tuning.loops import Delays
+from glider.firmware.autopilot import Autopilot, configuration
+from glider.firmware.core.vehicle.layout import N_X, X_POS
+from glider.firmware.guidance.mission import Leg, Mission, Site
+from glider.firmware.model.gains import Control
+from glider.sim_backend.core.closed_loop import N_END, N_TRACE, TRACE, fly
+from glider.sim_backend.world import Environment, Start, build_world
+from glider.tools.study.tuning.linear_plant import DESIGN_TRIMS, OTHER_TRIMS, linearise, steady_glide
+from glider.tools.study.tuning.loops import Delays
 
 SECONDS = 30.0
 QUIET = Environment(surface=False, disturbance_linear=0.0, disturbance_angular=0.0)

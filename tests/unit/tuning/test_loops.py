@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from independent_loops import closed, opened
 
-from firmware.model.gains import Control
-from tools.study.tuning.linear_plant import DESIGN_TRIMS, OTHER_TRIMS, linearise
-from tools.study.tuning.loops import OMEGA, Delays, depth_terms, margins, open_loop, pitch_terms
+from glider.firmware.model.gains import Control
+from glider.tools.study.tuning.linear_plant import DESIGN_TRIMS, OTHER_TRIMS, linearise
+from glider.tools.study.tuning.loops import OMEGA, Delays, depth_terms, margins, open_loop, pitch_terms
 
 TRIMS = [*DESIGN_TRIMS, *OTHER_TRIMS]
 FACTOR = {"pitch": "slider", "depth": "ballast"}

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from firmware.core.maths.rotations import euler_from_quaternion, quaternion_from_euler
-from firmware.core.vehicle import layout
-from firmware.core.vehicle.flight import nominal_run
-from tools.data.errors import InputError
-from tools.study.tuning.linear_plant import (
+from glider.firmware.core.maths.rotations import euler_from_quaternion, quaternion_from_euler
+from glider.firmware.core.vehicle import layout
+from glider.firmware.core.vehicle.flight import nominal_run
+from glider.tools.data.errors import InputError
+from glider.tools.study.tuning.linear_plant import (
     DESIGN_TRIMS,
     LIN_BALLAST,
     LIN_PITCH,

@@ -4,13 +4,21 @@ import msgspec
 import numpy as np
 import pytest
 
-from firmware.model.gains import BEST_TUNED, Control, DepthGains, PitchGains
-from sim_backend.core.closed_loop import END_ERROR_DEPTH, END_ERROR_PITCH, END_TRAVEL_SLIDER, N_END, N_TRACE, TRACE, fly
-from tools.flight.compose import build_flight
-from tools.study.tuning import manoeuvres, search
+from glider.firmware.model.gains import BEST_TUNED, Control, DepthGains, PitchGains
+from glider.sim_backend.core.closed_loop import (
+    END_ERROR_DEPTH,
+    END_ERROR_PITCH,
+    END_TRAVEL_SLIDER,
+    N_END,
+    N_TRACE,
+    TRACE,
+    fly,
+)
+from glider.tools.flight.compose import build_flight
+from glider.tools.study.tuning import manoeuvres, search
 
 BAD = Control(pitch=PitchGains(kp=0.02, ki=0.002, kd=0.03), depth=DepthGains(kp=0.1), estimator="measured")
-FEW = search.Flights(range(1), (0.03,))
+FEW = search.TuningFlights(range(1), (0.03,))
 
 
 def test_a_small_search_improves_on_a_bad_start_and_repeats(vehicle):
@@ -34,18 +42,18 @@ def test_a_vehicle_that_flies_the_law_keeps_it(vehicle):
 
 def test_every_strength_counts_alike_and_travel_little(vehicle):
     error = np.ones((6, 3, 2)) * np.array([1.0, 2.0, 4.0])[:, None]
-    still = search.cost(vehicle, "pitch", manoeuvres.Score(error, np.zeros((6, 3, 2, 3))))
+    still = search.cost(vehicle, "pitch", manoeuvres.ManoeuvreScore(error, np.zeros((6, 3, 2, 3))))
     assert still == pytest.approx(2.0)
     one_more_percent = error.copy()
     one_more_percent[:, 0] *= 1.01
-    moved = manoeuvres.Score(one_more_percent, np.zeros((6, 3, 2, 3)))
+    moved = manoeuvres.ManoeuvreScore(one_more_percent, np.zeros((6, 3, 2, 3)))
     one_more_percent_there = error.copy()
     one_more_percent_there[:, 2] *= 1.01
-    there = manoeuvres.Score(one_more_percent_there, np.zeros((6, 3, 2, 3)))
+    there = manoeuvres.ManoeuvreScore(one_more_percent_there, np.zeros((6, 3, 2, 3)))
     assert search.cost(vehicle, "pitch", moved) == pytest.approx(search.cost(vehicle, "pitch", there))
     travel = np.zeros((6, 3, 2, 3))
     travel[..., 1] = 0.12  # a full stroke of the slider a minute
-    assert search.cost(vehicle, "pitch", manoeuvres.Score(error, travel)) == pytest.approx(2.0 * 1.002)
+    assert search.cost(vehicle, "pitch", manoeuvres.ManoeuvreScore(error, travel)) == pytest.approx(2.0 * 1.002)
 
 
 def test_gains_have_three_digits_and_only_their_loop_changes():
@@ -97,7 +105,7 @@ def test_the_sums_kept_of_a_flight_are_those_of_its_trace():
 
 
 def measured_configuration(flight):
-    from firmware.autopilot import configuration
+    from glider.firmware.autopilot import configuration
 
     mission = msgspec.structs.replace(flight.mission, control=Control(estimator="measured"))
     board = flight.board

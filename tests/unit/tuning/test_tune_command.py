@@ -6,10 +6,10 @@ import tomllib
 import pytest
 from click.testing import CliRunner
 
-from firmware.guidance.mission import decode_mission
-from firmware.model.gains import Control
-from tools.cli.tune import tune
-from tools.data.errors import InputError
+from glider.firmware.guidance.mission import decode_mission
+from glider.firmware.model.gains import Control
+from glider.tools.cli.tune import tune
+from glider.tools.data.errors import InputError
 
 MISSION = 'format = 1\nname = "m"\ntime_limit_s = 60.0\n[site]\nname = "pool"\ndepth_m = 6.0\n[[leg]]\ndepth_m = 5.0\n'
 
@@ -48,7 +48,7 @@ def test_the_table_goes_into_a_mission_as_it_is(ruled):
 
 
 def test_another_vehicle_is_tuned_for_itself(tmp_path, ruled):
-    from tools.data.sources import name_or_path
+    from glider.tools.data.sources import name_or_path
 
     text, _ = name_or_path("roughie", "vehicle", "model/vehicles")
     file = tmp_path / "heavy.toml"
@@ -61,10 +61,10 @@ def test_another_vehicle_is_tuned_for_itself(tmp_path, ruled):
 
 
 def test_search_prints_both_sets_side_by_side(monkeypatch):
-    from tools.study.tuning import search
+    from glider.tools.study.tuning import search
 
-    monkeypatch.setattr(search, "SEARCHED", search.Flights(range(1), (0.03,)))
-    monkeypatch.setattr(search, "REPORTED", search.Flights(range(7, 8), (0.003, 0.1)))
+    monkeypatch.setattr(search, "SEARCHED", search.TuningFlights(range(1), (0.03,)))
+    monkeypatch.setattr(search, "REPORTED", search.TuningFlights(range(7, 8), (0.003, 0.1)))
     result = json.loads(run("--method", "search", "--seed", "2", "--budget", "6", "--json").stdout)
     assert result["method"] == "search"
     assert result["seed"] == 2

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from hal.heartbeat import run_folder, state_folder
-from hal.sortie import State
-from hal.state_file import StateFile
+from glider.hal.heartbeat import run_folder, state_folder
+from glider.hal.sortie import SortieState
+from glider.hal.state_file import StateFile
 
 ROOT = Path(__file__).resolve().parents[3]
 DEPLOY = ROOT / "tools" / "deploy"
@@ -62,7 +62,7 @@ def test_a_flight_is_never_started_by_itself():
 
 
 def test_the_units_options_exist():
-    from tools.cli.fly import fly
+    from glider.tools.cli.fly import fly
 
     names = {name for option in fly.params for name in option.opts}
     words = unit(UNITS[1])["Service"]["ExecStart"].split()
@@ -111,7 +111,7 @@ def test_a_release_passes_its_self_check_unless_vehicle_files_or_state_are_again
             Path(path).parent.name, "sawtooth.toml"))  # fmt: skip
 
     def check(**settings):
-        command = [sys.executable, "-m", "tools.deploy.selfcheck", "--files", files, "--state", state]
+        command = [sys.executable, "-m", "glider.tools.deploy.selfcheck", "--files", files, "--state", state]
         done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, env=os.environ | settings)
         return done.returncode, done.stderr.splitlines()[-1]
 
@@ -130,7 +130,7 @@ def test_a_release_passes_its_self_check_unless_vehicle_files_or_state_are_again
     assert code == 1
     assert said.startswith(f"self-check: files: FAILED: {files / 'sawtooth.toml'}")
 
-    StateFile(state).write(State.DIVING, flight="dive")
+    StateFile(state).write(SortieState.DIVING, flight="dive")
     assert check() == (
         1,
         f"self-check: state: FAILED: {state}: the flight before (dive): broke off under way; "
@@ -140,7 +140,7 @@ def test_a_release_passes_its_self_check_unless_vehicle_files_or_state_are_again
 
 def test_where_no_arm_can_be_emulated_it_says_why(tmp_path):
     done = subprocess.run(
-        [sys.executable, "-m", "tools.deploy.emulated", tmp_path / "arm"], cwd=ROOT, capture_output=True, text=True,
+        [sys.executable, "-m", "glider.tools.deploy.emulated", tmp_path / "arm"], cwd=ROOT, capture_output=True, text=True,
         env={**os.environ, "PATH": str(tmp_path)},
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
@@ -152,7 +152,7 @@ def test_the_wishes_are_reported_whatever_comes_of_them():
     """Each is optional: in a process without the right to it, it is said and nothing else happens."""
     code = (
         "import os, resource\n"
-        "from hal import realtime as r\n"
+        "from glider.hal import realtime as r\n"
         "os.setuid(65534) if os.getuid() == 0 else None\n"
         "resource.setrlimit(resource.RLIMIT_MEMLOCK, (0, 0))\n"
         "print(r.take_priority(50)); print(r.lock_memory()); print(r.pin_to_core(9999)); print(r.pin_to_core(0))\n"

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from tools.deploy.alike import compared, difference
-from tools.deploy.emulated import passed, shown
+from glider.tools.deploy.compared import compared, difference
+from glider.tools.deploy.emulated import passed, shown
 
 
 def test_the_largest_difference_of_two_columns():

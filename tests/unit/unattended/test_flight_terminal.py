@@ -13,10 +13,10 @@ from pathlib import Path
 import pexpect
 import pytest
 
-from hal.sortie import State
-from hal.state_file import StateFile
+from glider.hal.sortie import SortieState
+from glider.hal.state_file import StateFile
+from glider.tools.flight.terminal import AGAIN_S, Stop, confirm_arming
 from tests.support.twinned import end_guard, until
-from tools.flight.terminal import AGAIN_S, Stop, confirm_arming
 
 pytestmark = pytest.mark.realtime(seconds=60)
 
@@ -73,7 +73,17 @@ def fly(tmp_path):
     started = []
 
     def start(*extra):
-        command = ["-m", "tools.cli.main", "fly", "--board", "roughie", "--no-log", "--state", str(tmp_path), *extra]
+        command = [
+            "-m",
+            "glider.tools.cli.main",
+            "fly",
+            "--board",
+            "roughie",
+            "--no-log",
+            "--state",
+            str(tmp_path),
+            *extra,
+        ]
         child = pexpect.spawn(sys.executable, command, timeout=120, encoding="utf-8")
         started.append(child)
         return child
@@ -114,16 +124,16 @@ def test_nothing_arms_without_a_yes(fly, tmp_path, answer):
     said, code = ended(child)
     assert code == 1
     assert "not armed: not confirmed" in said
-    assert StateFile(tmp_path).read().state == State.ASHORE
+    assert StateFile(tmp_path).read().state == SortieState.ASHORE
 
 
 def test_without_a_terminal_nothing_arms_unless_the_command_line_says_yes(tmp_path):
-    command = [sys.executable, "-m", "tools.cli.main", "fly", "--board", "roughie", "--no-log"]
+    command = [sys.executable, "-m", "glider.tools.cli.main", "fly", "--board", "roughie", "--no-log"]
     command += ["--state", str(tmp_path)]
     done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 1
     assert "not armed: not confirmed (without a terminal: --yes)" in done.stderr
-    assert StateFile(tmp_path).read().state == State.ASHORE
+    assert StateFile(tmp_path).read().state == SortieState.ASHORE
 
 
 def test_a_confirmed_start_goes_on_to_the_checks(fly):
@@ -141,7 +151,7 @@ def test_ctrl_c_at_the_question_arms_nothing(fly, tmp_path):
     until(lambda: asleep(child.pid), 60.0)  # Python loses what comes between the question and the wait for the answer
     child.sendintr()
     assert ended(child)[1] == 1
-    assert StateFile(tmp_path).read().state == State.ASHORE
+    assert StateFile(tmp_path).read().state == SortieState.ASHORE
 
 
 def test_who_says_yes_beforehand_is_not_asked(fly):
@@ -150,7 +160,7 @@ def test_who_says_yes_beforehand_is_not_asked(fly):
 
 
 def test_an_ascent_is_never_asked_for(fly, tmp_path):
-    StateFile(tmp_path).write(State.DIVING)
+    StateFile(tmp_path).write(SortieState.DIVING)
     child = fly()
     assert child.expect([QUESTION, "ascending only"]) == 1
     assert QUESTION not in ended(child)[0]
@@ -159,7 +169,7 @@ def test_an_ascent_is_never_asked_for(fly, tmp_path):
 # --- in flight --------------------------------------------------------------------------------------------------------
 LOOP = """
 import contextlib, json, os, select, sys, time
-from tools.flight.terminal import undisturbed
+from glider.tools.flight.terminal import undisturbed
 with undisturbed() if sys.argv[2] == "undisturbed" else contextlib.nullcontext():
     print("flying", flush=True)
     longest, before, end = 0.0, time.monotonic(), time.monotonic() + 1.0

@@ -8,17 +8,17 @@ import time
 import pytest
 from click.testing import CliRunner
 
-from hal import heartbeat as hb
-from hal.heartbeat import Guard, Heartbeat
-from hal.outofband.rise import Stage
-from hal.recorder.condition import Level
-from hal.sortie import State
-from hal.state_file import StateFile
-from tools.cli.acknowledge import acknowledge
-from tools.cli.check import check
-from tools.cli.compile_ import compile_
-from tools.cli.status import status
-from tools.flight.status import find_folder, lines, snapshot
+from glider.hal import heartbeat as hb
+from glider.hal.heartbeat import Guard, Heartbeat
+from glider.hal.outofband.rise import AscentStage
+from glider.hal.recorder.condition import RecorderLevel
+from glider.hal.sortie import SortieState
+from glider.hal.state_file import StateFile
+from glider.tools.cli.acknowledge import acknowledge
+from glider.tools.cli.check import check
+from glider.tools.cli.compile_ import compile_
+from glider.tools.cli.status import status
+from glider.tools.flight.status import find_folder, lines, snapshot
 
 
 @pytest.fixture
@@ -30,7 +30,7 @@ def pulse(tmp_path):
     found.words[hb.W_GUARD_STATUS], found.words[hb.W_GUARD_NS] = Guard.WATCHING, time.monotonic_ns()
     found.values[hb.V_DEPTH_M], found.values[hb.V_PITCH_RAD] = 2.5, -0.35
     found.beat(12.0)
-    found.publish(State.DIVING)
+    found.publish(SortieState.DIVING)
     yield found
     found.close()
 
@@ -52,12 +52,12 @@ def test_a_good_flight_is_all_well(pulse, tmp_path):
     [
         (hb.W_BEAT_NS, 1, "no heartbeat for"),
         (hb.W_MISSED, 3, "3 ticks missed"),
-        (hb.W_RECORDER_LEVEL, Level.FAILED, "recorder: failed"),
+        (hb.W_RECORDER_LEVEL, RecorderLevel.FAILED, "recorder: failed"),
         (hb.W_RECORDER_LEVEL, 77, "recorder: ?"),
         (hb.W_DROPPED, 5, "5 records dropped"),
         (hb.W_GUARD_NS, 1, "no out-of-band process watches"),
         (hb.W_GUARD_STATUS, Guard.ASCENDING, "bringing the vehicle up"),
-        (hb.W_STATE, State.ASHORE, "no flight is under way"),
+        (hb.W_STATE, SortieState.ASHORE, "no flight is under way"),
     ],
 )
 def test_what_is_wrong_is_said_and_is_exit_1(pulse, tmp_path, word, value, said):
@@ -78,7 +78,7 @@ def test_a_dead_flight_is_seen(pulse, tmp_path):
 def test_without_a_heartbeat_it_says_where_it_looked(tmp_path, monkeypatch):
     monkeypatch.setenv("GLIDER_RUN_DIR", str(tmp_path / "run"))
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    from tools.data.errors import InputError
+    from glider.tools.data.errors import InputError
 
     with pytest.raises(InputError, match="run: no flight has left a heartbeat"):
         find_folder(None)
@@ -88,32 +88,32 @@ def test_without_a_heartbeat_it_says_where_it_looked(tmp_path, monkeypatch):
 
 
 def test_acknowledging_sets_the_state_back(tmp_path):
-    StateFile(tmp_path).write(State.HELD, flight="dive-007", reason="no depth")
+    StateFile(tmp_path).write(SortieState.HELD, flight="dive-007", reason="no depth")
     done = CliRunner().invoke(acknowledge, ["--state", str(tmp_path)])
     assert done.exit_code == 0
     assert "dive-007): ended at the surface after a fault; no depth" in done.stderr
-    assert StateFile(tmp_path).read().state == State.ASHORE
+    assert StateFile(tmp_path).read().state == SortieState.ASHORE
 
 
 def test_a_flight_under_way_is_not_acknowledged(pulse, tmp_path):
-    StateFile(tmp_path).write(State.DIVING, flight="dive-007")
+    StateFile(tmp_path).write(SortieState.DIVING, flight="dive-007")
     done = CliRunner().invoke(acknowledge, ["--state", str(tmp_path)])
     assert (done.exit_code, done.stderr) == (1, "glider: not acknowledged: a flight is under way\n")
-    assert StateFile(tmp_path).read().state == State.DIVING
+    assert StateFile(tmp_path).read().state == SortieState.DIVING
 
 
-@pytest.mark.parametrize("stage", [Stage.BLIND, Stage.RISING, Stage.AGAIN, Stage.HARDWARE])
+@pytest.mark.parametrize("stage", [AscentStage.BLIND, AscentStage.RISING, AscentStage.AGAIN, AscentStage.HARDWARE])
 def test_an_ascent_under_way_is_not_acknowledged(pulse, tmp_path, stage):
     """At any depth: only a vehicle that the out-of-band process sees at the surface is another's to look at."""
     pulse.words[hb.W_GUARD_STATUS], pulse.words[hb.W_GUARD_STAGE] = Guard.ASCENDING, stage
-    StateFile(tmp_path).write(State.ABORTED, flight="dive-007")
+    StateFile(tmp_path).write(SortieState.ABORTED, flight="dive-007")
     pulse.close()
     Heartbeat.open(tmp_path).words[hb.W_GUARD_NS] = time.monotonic_ns()
     done = CliRunner().invoke(acknowledge, ["--state", str(tmp_path)])
     assert done.exit_code == 1
     assert "not acknowledged: the out-of-band process is bringing the vehicle up" in done.stderr
-    assert StateFile(tmp_path).read().state == State.ABORTED
-    Heartbeat.open(tmp_path).words[hb.W_GUARD_STAGE] = Stage.SURFACED
+    assert StateFile(tmp_path).read().state == SortieState.ABORTED
+    Heartbeat.open(tmp_path).words[hb.W_GUARD_STAGE] = AscentStage.SURFACED
     assert CliRunner().invoke(acknowledge, ["--state", str(tmp_path)]).exit_code == 0
     pulse.__init__(Heartbeat.open(tmp_path)._fd, pulse.path)  # for the fixture to close
 
@@ -122,7 +122,9 @@ def test_compiled_ahead_means_compiled():
     """Another process finds every kernel of a flight in the cache."""
     done = json.loads(CliRunner().invoke(compile_, ["--json"]).stdout)
     assert done["kernels"] > 0
-    script = "from tools.flight.precompile import FLIGHT; n = []; print(FLIGHT.compile(n.append)['kernels'], len(n))"
+    script = (
+        "from glider.tools.flight.precompile import FLIGHT; n = []; print(FLIGHT.compile(n.append)['kernels'], len(n))"
+    )
     found = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.split()
     assert int(found[0]) > 0
     assert int(found[1]) == 0

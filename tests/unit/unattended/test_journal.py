@@ -4,12 +4,12 @@ import itertools
 
 import pytest
 
-from firmware.runtime import Ending
-from hal.ports import BoardError
-from hal.sortie import State
-from hal.state_file import StateFile
-from tools.flight.compose import build_flight
-from tools.flight.sortie import Host
+from glider.firmware.runtime import Ending
+from glider.hal.ports import BoardError
+from glider.hal.sortie import SortieState
+from glider.hal.state_file import StateFile
+from glider.tools.flight.compose import build_flight
+from glider.tools.flight.sortie import FlightHost
 
 
 @pytest.fixture(scope="module")
@@ -20,10 +20,10 @@ def flight():
 def start(flight, folder, steps, *, ending=Ending.SURFACED, mode=2.0, reaction=0.0, error=None):
     """One start that gets through so many steps and is then killed (or left by `error`); whether it would fly the
     mission. mode: 2 completed, 3 given up."""
-    from firmware.core.layouts import control_layout as ctl
-    from firmware.core.layouts import supervisor_layout as sup
+    from glider.firmware.core.layouts import control_layout as ctl
+    from glider.firmware.core.layouts import supervisor_layout as sup
 
-    host = Host(flight, name="test", folder=folder)
+    host = FlightHost(flight, name="test", folder=folder)
     flight.autopilot.ap[ctl.MODE], flight.supervisor.G[sup.HIGHEST] = mode, reaction
     flight.autopilot.ap[ctl.REASON] = ctl.REASON_NONE if mode == 2.0 else ctl.REASON_LEG_TIME
     todo = (host.prepare, lambda: host.begin(None), lambda: host.closing(ending), host.end)
@@ -43,9 +43,9 @@ def left(folder):
 
 def test_an_undisturbed_flight_may_be_followed_by_another(flight, tmp_path):
     assert start(flight, tmp_path, 4)
-    assert left(tmp_path) == State.ENDED
+    assert left(tmp_path) == SortieState.ENDED
     assert start(flight, tmp_path, 4)
-    assert left(tmp_path) == State.ENDED
+    assert left(tmp_path) == SortieState.ENDED
 
 
 @pytest.mark.parametrize("killed", list(itertools.product(range(5), repeat=3)))
@@ -61,12 +61,12 @@ def test_whatever_is_killed_in_whatever_order_nothing_is_resumed(flight, tmp_pat
 @pytest.mark.parametrize(
     ("how", "state"),
     [
-        ({}, State.ENDED),
-        ({"mode": 3.0}, State.HELD),
-        ({"reaction": 4.0}, State.HELD),  # a fault on the way up from a mission completed
-        ({"ending": Ending.PUMP_GIVEN_UP}, State.ABORTED),
-        ({"ending": Ending.NO_WAY_LEFT}, State.ABORTED),
-        ({"ending": Ending.HANDED_OVER, "mode": 3.0}, State.ABORTED),
+        ({}, SortieState.ENDED),
+        ({"mode": 3.0}, SortieState.HELD),
+        ({"reaction": 4.0}, SortieState.HELD),  # a fault on the way up from a mission completed
+        ({"ending": Ending.PUMP_GIVEN_UP}, SortieState.ABORTED),
+        ({"ending": Ending.NO_WAY_LEFT}, SortieState.ABORTED),
+        ({"ending": Ending.HANDED_OVER, "mode": 3.0}, SortieState.ABORTED),
     ],
 )
 def test_how_it_ended_decides_about_the_next(flight, tmp_path, how, state):
@@ -81,19 +81,19 @@ def test_how_it_ended_decides_about_the_next(flight, tmp_path, how, state):
 def test_a_vehicle_brought_up_is_held_whatever_the_mission_said(flight, tmp_path):
     start(flight, tmp_path, 2)
     assert not start(flight, tmp_path, 4)
-    assert left(tmp_path) == State.HELD
+    assert left(tmp_path) == SortieState.HELD
     assert not start(flight, tmp_path, 4)
-    assert left(tmp_path) == State.HELD
+    assert left(tmp_path) == SortieState.HELD
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, BoardError, ValueError])
-@pytest.mark.parametrize(("steps", "state"), [(1, State.ASHORE), (2, State.DIVING)])
+@pytest.mark.parametrize(("steps", "state"), [(1, SortieState.ASHORE), (2, SortieState.DIVING)])
 def test_who_breaks_off_leaves_nothing_behind_before_the_first_tick_alone(flight, tmp_path, error, steps, state):
     start(flight, tmp_path, steps, error=error)
     assert left(tmp_path) == state
 
 
-@pytest.mark.parametrize("state", [State.HELD, State.DIVING, State.ABORTED, State.UNKNOWN])
+@pytest.mark.parametrize("state", [SortieState.HELD, SortieState.DIVING, SortieState.ABORTED, SortieState.UNKNOWN])
 def test_ctrl_c_in_an_ascent_leaves_what_a_person_must_look_after(flight, tmp_path, state):
     """Stopped in the ascent of an aborted dive: the next start must not take the vehicle for well."""
     StateFile(tmp_path).write(state, flight="before", reason="leak")

@@ -8,8 +8,8 @@ import time
 import pytest
 from numba.core import event
 
-from firmware.core import jit
-from tools.flight import precompile
+from glider.firmware.core import jit
+from glider.tools.flight import precompile
 
 
 @pytest.fixture

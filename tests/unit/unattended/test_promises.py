@@ -15,12 +15,12 @@ FLY = """
 import sys
 seen = []
 sys.addaudithook(lambda name, args: seen.append((name, repr(args)[:200])) if name.startswith("socket.") else None)
-from tools.cli.main import cli
+from glider.tools.cli.main import cli
 try:
     cli(["fly", "--mission", sys.argv[1], "--log", sys.argv[2], "--json"], standalone_mode=False)
 except SystemExit as end:
     assert end.code == 0, end.code
-import hal.outofband.guard, hal.recorder.writer, hal.devices
+import glider.hal.outofband.guard, glider.hal.recorder.writer, glider.hal.devices
 print(*seen, sep="\\n")
 """
 DIP = """
@@ -70,7 +70,7 @@ def test_no_code_is_made_out_of_data(package):
 def test_a_cache_that_others_may_write_into_is_not_read(tmp_path):
     folder = tmp_path / "cache"
     folder.mkdir()
-    code = "from firmware.core.jit import cache_root; print(cache_root())"
+    code = "from glider.firmware.core.jit import cache_root; print(cache_root())"
     command = [sys.executable, "-c", code]
     place = {**os.environ, "GLIDER_CACHE_DIR": str(folder)}
     done = subprocess.run(command, env=place, cwd=ROOT, capture_output=True, text=True)
@@ -92,7 +92,7 @@ def test_no_place_for_kernels_is_said_in_a_line(command, tmp_path):
     place = {**os.environ, "GLIDER_CACHE_DIR": str(blocked), "GLIDER_STATE_DIR": str(tmp_path)}
     (tmp_path / "case").mkdir()
     done = subprocess.run(
-        [sys.executable, "-m", "tools.cli.main", *command], env={**place, "PYTHONPATH": str(ROOT)}, cwd=tmp_path,
+        [sys.executable, "-m", "glider.tools.cli.main", *command], env={**place, "PYTHONPATH": str(ROOT)}, cwd=tmp_path,
         capture_output=True, text=True,
     )  # fmt: skip
     assert done.returncode == 2
@@ -108,13 +108,13 @@ def open_folder():
 
 
 def test_a_heartbeats_folder_of_somebody_else_is_refused(open_folder):
-    from hal.heartbeat import Heartbeat
+    from glider.hal.heartbeat import Heartbeat
 
     if os.getuid() != 0:
         pytest.skip("only root can give a folder away")
     tmp_path = open_folder
     os.chown(tmp_path, 12345, 12345)
-    code = "import os, sys\nfrom hal.heartbeat import Heartbeat\nos.setuid(54321)\nHeartbeat.create(sys.argv[1], 0.02)"
+    code = "import os, sys\nfrom glider.hal.heartbeat import Heartbeat\nos.setuid(54321)\nHeartbeat.create(sys.argv[1], 0.02)"
     tmp_path.chmod(0o777)
     done = subprocess.run([sys.executable, "-c", code, str(tmp_path)], cwd=ROOT, capture_output=True, text=True)
     assert "belongs to somebody else" in done.stderr
@@ -127,12 +127,12 @@ def test_a_heartbeats_folder_of_somebody_else_is_refused(open_folder):
 
 
 def test_a_text_file_without_end_is_not_read_to_it(tmp_path, monkeypatch):
-    from tools.data.errors import InputError
-    from tools.data.sources import read_text
+    from glider.tools.data.errors import InputError
+    from glider.tools.data.sources import read_text
 
     path = tmp_path / "x.toml"
     with path.open("wb") as file:
         file.truncate(2**40)  # a terabyte of nothing
-    monkeypatch.setattr("tools.data.sources.LONGEST", 1_000_000)
+    monkeypatch.setattr("glider.tools.data.sources.MAX_TEXT_CHARACTERS", 1_000_000)
     with pytest.raises(InputError, match=r"x\.toml: longer than 1000000 characters"):
         read_text(path)

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from tools.inference.parameters import NUISANCE, FreeParameter
-from tools.inference.shared_parameters import SharedParameters
-from tools.watch.events import STEP, Span
-from tools.watch.flights import Flights
-from tools.watch.history import Event, History
-from tools.watch.search import EVIDENCE_NEEDED, FALSE, evidence_needed
-from tools.watch.water import ASKED_ABOVE, asked_above
+from glider.tools.inference.parameters import NUISANCE, FreeParameter
+from glider.tools.inference.shared_parameters import SharedParameters
+from glider.tools.watch.events import STEP, Span
+from glider.tools.watch.flights import RunEnsemble
+from glider.tools.watch.history import ChangeEvent, History
+from glider.tools.watch.search import EVIDENCE_NEEDED, FALSE, evidence_needed
+from glider.tools.watch.water import ASKED_ABOVE, asked_above
 
 FREE = [FreeParameter(NUISANCE, "P[0]", "P", 0, 0.1), FreeParameter("drag", "scale", "F", 0, 0.4, -2.0, 10.0)]
 LABELS = ["drag", *(f"another {n}" for n in range(45))]
@@ -20,9 +20,9 @@ SHARED = SharedParameters(FREE, {label: [1] for label in LABELS}, {label: [(-2.0
 
 
 def needed(learned: int, inside: int, label: str = "drag", watched: int = 9) -> float:
-    flights = Flights([None] * (learned + watched), SHARED, np.arange(learned + watched) < learned)
+    flights = RunEnsemble([None] * (learned + watched), SHARED, np.arange(learned + watched) < learned)
     history = History(flights, np.arange(learned + watched) >= learned, learned)
-    event = Event(label, Span(learned, learned + inside, STEP), 0.0, {}, np.zeros(1), np.eye(1), 0.0)
+    event = ChangeEvent(label, Span(learned, learned + inside, STEP), 0.0, {}, np.zeros(1), np.eye(1), 0.0)
     return evidence_needed(history, event)
 
 

@@ -5,18 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sim_backend.foreign import ocean as foreign
+from glider.sim_backend.foreign import ocean as foreign
+from glider.tools.data.runs.case import load_case
+from glider.tools.identify.ocean.files import vehicle_text
+from glider.tools.identify.ocean.identify import BANDS, identify_ocean
+from glider.tools.inference.problem import problem_of
+from glider.tools.inference.shared_parameters import shared_parameters
+from glider.tools.study.challenge.ocean_cases import as_run, flown, with_change
+from glider.tools.watch.flights import RunEnsemble
+from glider.tools.watch.lasting import STRANGE, beside_all, lasting
+from glider.tools.watch.watch import watch
+from glider.tools.watch.whole_case import diagnose_ocean
 from tests.support.ocean import as_case, drawn
-from tools.data.runs.case import load_case
-from tools.identify.ocean.files import vehicle_text
-from tools.identify.ocean.identify import BANDS, identify_ocean
-from tools.inference.problem import problem_of
-from tools.inference.shared_parameters import shared_parameters
-from tools.study.challenge.ocean_cases import as_run, flown, with_change
-from tools.watch.flights import Flights
-from tools.watch.lasting import STRANGE, beside_all, lasting
-from tools.watch.watch import watch
-from tools.watch.whole_case import diagnose_ocean
 
 pytestmark = pytest.mark.computes(seconds=40)
 
@@ -24,13 +24,13 @@ CRAFT, BEFORE, AFTER = "seaglider", 6, 4
 ROUGHER = 3.0
 
 
-def dives(first: int, count: int, label: str | None = None, size: float = 0.0, rougher: float = 1.0):
+def dives(first: int, count: int, label: str | None = None, size: float = 0.0, noise_beats_label: float = 1.0):
     """Dives of a mission by a vehicle that is changed, in water that moves so many times as much."""
     mission, runs = drawn(CRAFT, 1), []
     V = mission.V if label is None else with_change(mission.V, label, size)
     for n in range(first, first + count):
         S = mission.seas[n].copy()
-        S[foreign.WATER] *= rougher
+        S[foreign.WATER] *= noise_beats_label
         runs.append(as_run(mission, n, flown(mission, n, V, S), False))
     return runs
 
@@ -58,7 +58,7 @@ def test_a_force_that_lasts_is_unknown_and_no_water(before, tmp_path, label, siz
 
 
 def test_rougher_water_is_that_and_no_force(before, tmp_path):
-    found = watched(tmp_path, before, dives(BEFORE, AFTER, rougher=ROUGHER))
+    found = watched(tmp_path, before, dives(BEFORE, AFTER, noise_beats_label=ROUGHER))
     assert [event.label for event in found.events] == ["vertical_water"]
 
 
@@ -76,7 +76,7 @@ def flights(before):
     runs = [*load_case(reference, vehicle).runs, *dives(BEFORE, AFTER)]
     problem = problem_of(load_case(reference, vehicle), runs=runs)
     parts = [problem.part(n) for n in range(len(runs))]
-    found = Flights(parts, shared_parameters(problem), np.arange(len(runs)) < BEFORE)
+    found = RunEnsemble(parts, shared_parameters(problem), np.arange(len(runs)) < BEFORE)
     found.learn()
     return found
 
@@ -97,26 +97,26 @@ def sunk(flights, rates):
 
 def test_what_is_the_same_in_every_dive_lasts_and_what_changes_its_way_does_not(flights):
     assert sunk(flights, [(0.0, 0.0)] * AFTER).evidence < 0.0
-    alike = sunk(flights, [(0.02, -0.02)] * AFTER)
-    assert alike.evidence > 10.0
-    assert alike.chance(STRANGE) > 0.99
-    assert np.median(alike.size[:BANDS]) == pytest.approx(0.02, rel=0.4)
-    assert np.median(alike.size[BANDS:]) == pytest.approx(-0.02, rel=0.4)
-    assert alike.place.element == "surge"
+    confounded = sunk(flights, [(0.02, -0.02)] * AFTER)
+    assert confounded.evidence > 10.0
+    assert confounded.chance(STRANGE) > 0.99
+    assert np.median(confounded.size[:BANDS]) == pytest.approx(0.02, rel=0.4)
+    assert np.median(confounded.size[BANDS:]) == pytest.approx(-0.02, rel=0.4)
+    assert confounded.place.element == "surge"
     assert sunk(flights, [(0.02, 0.02)] * AFTER).place.element == "net"
     to_and_fro = sunk(flights, [(0.02 * s, -0.02 * s) for s in (1.0, -1.0, 1.0, -1.0)])
-    assert to_and_fro.evidence < 0.2 * alike.evidence
+    assert to_and_fro.evidence < 0.2 * confounded.evidence
     half = sunk(flights, [(0.01, -0.01)] * AFTER)
     assert half.moves(flights.parts[0].kind.measures) == pytest.approx(
-        0.5 * alike.moves(flights.parts[0].kind.measures), rel=0.3
+        0.5 * confounded.moves(flights.parts[0].kind.measures), rel=0.3
     )
 
 
 def test_nothing_lasts_beside_the_vehicle_that_flew(before, flights):
     parts, shared = flights.parts[:BEFORE], replace(flights.shared, allowed=1.0, effects=1e-6)
     x = np.zeros(shared.count)
-    calm = beside_all(parts, shared, x, flights.heat)
-    strange = beside_all([sunk_part(part) for part in parts], shared, x, flights.heat)
+    calm = beside_all(parts, shared, x, flights.inflation)
+    strange = beside_all([sunk_part(part) for part in parts], shared, x, flights.inflation)
     assert strange.evidence > calm.evidence + 10.0
 
 

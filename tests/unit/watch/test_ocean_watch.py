@@ -7,23 +7,23 @@ import numpy as np
 import pytest
 from support.ocean import Dives, as_case, fly_dives, without
 
-from hal.strict import ConfigError
-from sim_backend.ocean.catalogue import NOT_ASKED, ONE_ON_DEPTH, catalogue
-from sim_backend.ocean.core import layout as at
-from sim_backend.ocean.vehicle import shipped_vehicles
-from tools.cli.common import report_errors
-from tools.cli.main import cli
-from tools.data.runs import columns as names
-from tools.data.runs.case import load_case
-from tools.data.runs.run import Run, load_run
-from tools.data.sources import load_any_vehicle
-from tools.gap.velocity import mean_speed, velocities
-from tools.identify.ocean.files import corrected_text, vehicle_text
-from tools.identify.ocean.identify import identify_ocean
-from tools.inference.model import effect_vector, nominal_model, vehicle_model
-from tools.inference.ocean_inputs import unsteady
-from tools.watch.usable import usable_dive
-from tools.watch.watch import watch
+from glider.hal.strict import ConfigError
+from glider.sim_backend.ocean.catalogue import NOT_ASKED, ONE_ON_DEPTH, catalogue
+from glider.sim_backend.ocean.core import layout as at
+from glider.sim_backend.ocean.vehicle import shipped_vehicles
+from glider.tools.cli.common import report_errors
+from glider.tools.cli.main import cli
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.case import load_case
+from glider.tools.data.runs.run import Run, load_run
+from glider.tools.data.sources import load_any_vehicle
+from glider.tools.gap.velocity import mean_speed, velocities
+from glider.tools.identify.ocean.files import corrected_text, vehicle_text
+from glider.tools.identify.ocean.identify import identify_ocean
+from glider.tools.inference.model import effect_vector, nominal_model, vehicle_model
+from glider.tools.inference.ocean_inputs import unsteady
+from glider.tools.watch.usable import usable_dive
+from glider.tools.watch.watch import watch
 
 pytestmark = pytest.mark.computes(seconds=20)
 
@@ -88,9 +88,9 @@ def test_dives_as_before_have_the_speed_of_gap_velocity(tmp_path):
     found = watch(own)
     assert not found.events
     for run, one in zip(found.runs, velocities(own, nominal_model(own)), strict=True):
-        told = mean_speed(one)
-        assert run.velocity["u_m_s"] == pytest.approx(told["u_m_s"], abs=1e-5)
-        assert run.velocity["ci90"] == pytest.approx(told["ci90"], abs=1e-4)
+        flagged = mean_speed(one)
+        assert run.velocity["u_m_s"] == pytest.approx(flagged["u_m_s"], abs=1e-5)
+        assert run.velocity["ci90"] == pytest.approx(flagged["ci90"], abs=1e-4)
 
 
 def test_without_speed_drag_lift_and_pitch_scale_are_one(stepped):
@@ -168,10 +168,10 @@ FIELDS = {"format", "verdict", "where", "causes", "selected", "gap", "next_run"}
 
 def test_a_diagnosis_is_written_as_any_other(unchanged, glider, tmp_path):
     out = tmp_path / "answer"
-    code, told, _ = glider("gap", "diagnose", unchanged.folder, "--out", out, "--json")
+    code, flagged, _ = glider("gap", "diagnose", unchanged.folder, "--out", out, "--json")
     assert code == 0
     answer = json.loads((out / "diagnosis.json").read_text())
-    assert json.loads(told) == answer
+    assert json.loads(flagged) == answer
     assert set(answer) >= FIELDS
     assert answer["verdict"] == "none"
     assert answer["selected"] == []
@@ -231,9 +231,9 @@ def test_the_page_of_a_cause_names_it_with_its_size(tmp_path, glider):
 
 
 def test_the_gap_is_measured(unchanged, glider, tmp_path):
-    code, told, _ = glider("gap", "measure", unchanged.folder, "--json", "--report", tmp_path / "gap.html")
+    code, flagged, _ = glider("gap", "measure", unchanged.folder, "--json", "--report", tmp_path / "gap.html")
     assert code == 0
-    answer = json.loads(told)
+    answer = json.loads(flagged)
     assert [run["name"] for run in answer["runs"]] == [run.name for run in unchanged.runs]
     assert set(answer["channels"]) == {"depth", "roll", "speed"}
     places = {(one["subsystem"], one["element"]) for one in answer["where"]}
@@ -267,8 +267,8 @@ def test_watched_by_the_command_and_drawn_again(tmp_path, glider):
 
 
 def test_readings_are_asked_of_the_other_kind(unchanged, glider):
-    code, told, said = glider("gap", "readings", unchanged.folder)
-    assert (code, told) == (2, "")
+    code, flagged, said = glider("gap", "readings", unchanged.folder)
+    assert (code, flagged) == (2, "")
     assert "ocean glider" in said.splitlines()[-1]
 
 
@@ -287,9 +287,8 @@ def test_what_flies_a_roughie_refuses_an_ocean_glider_in_a_line(command, named, 
     (tmp_path / "mine.toml").write_text(shipped_vehicles()["slocum"])
     vehicle = "slocum" if named == "shipped" else tmp_path / "mine.toml"
     filled = [part.format(commands=tmp_path / "commands.csv", out=tmp_path / "out") for part in command]
-    code, told, said = glider(*filled, "--vehicle", vehicle)
-    assert (code, told) == (2, "")
+    code, flagged, said = glider(*filled, "--vehicle", vehicle)
+    assert (code, flagged) == (2, "")
     assert len(said.splitlines()) == 1
     assert "ocean glider" in said
     assert not (tmp_path / "out").exists()
-

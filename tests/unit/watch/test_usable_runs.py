@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from support.flights import World, fly
 
-from tools.data.runs import columns as names
-from tools.data.runs.run import Run
-from tools.watch.usable import readings_of, usable
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.run import Run
+from glider.tools.watch.usable import readings_of, usable
 
 
 @pytest.fixture(scope="module")

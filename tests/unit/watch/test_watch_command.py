@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from support.flights import World, case_of, drawn_vehicle, fly
 
-from firmware.core.vehicle import layout
-from sim_backend.core.effects import effect_layout as ef
-from tools.cli.common import report_errors
-from tools.cli.main import cli
-from tools.data.runs import columns as names
-from tools.data.runs.case import write_case
-from tools.watch.answer import Watch
-from tools.watch.watch import watch
+from glider.firmware.core.vehicle import layout
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.cli.common import report_errors
+from glider.tools.cli.main import cli
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.case import write_case
+from glider.tools.watch.answer import WatchAnswer
+from glider.tools.watch.watch import watch
 
 pytestmark = pytest.mark.computes(seconds=15)
 
@@ -47,14 +47,14 @@ def flown(
 
 
 @pytest.fixture(scope="module")
-def unchanged() -> Watch:
+def unchanged() -> WatchAnswer:
     reference, case = flown({})
     short = replace(case.runs[1], columns={name: values[:50] for name, values in case.runs[1].columns.items()})
     return watch(replace(case, runs=[case.runs[0], short, *case.runs[2:]]), reference)
 
 
 @pytest.fixture(scope="module")
-def episode() -> Watch:
+def episode() -> WatchAnswer:
     reference, case = flown({1: HEAVY, 2: HEAVY})
     return watch(case, reference)
 
@@ -88,15 +88,15 @@ def test_an_episode_its_runs_its_label_and_its_size(episode):
 
 @pytest.mark.slow
 def test_the_json_is_that_of_the_contract(episode):
-    told = json.loads(json.dumps(episode.plain()))
-    assert set(told["runs"][0]) == {"run", "verdict", "causes", "gap", "skipped"}
-    cause = told["runs"][1]["causes"][0]
+    reference_names = json.loads(json.dumps(episode.plain()))
+    assert set(reference_names["runs"][0]) == {"run", "verdict", "causes", "gap", "skipped"}
+    cause = reference_names["runs"][1]["causes"][0]
     assert set(cause) == {"label", "probability", "group", "size", "ci90", "unit"}
     assert cause["label"] == "net_buoyancy"
     assert {"label", "where", "group", "from_run", "to_run", "probability", "size", "ci90", "unit"} <= set(
-        told["events"][0]
+        reference_names["events"][0]
     )
-    assert all(run["gap"] > 0.0 for run in told["runs"])
+    assert all(run["gap"] > 0.0 for run in reference_names["runs"])
 
 
 @pytest.mark.slow

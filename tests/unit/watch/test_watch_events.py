@@ -6,16 +6,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tools.inference.expansion import Expansion
-from tools.inference.parameters import NUISANCE, FreeParameter
-from tools.inference.shared_parameters import SharedParameters
-from tools.watch.events import GROWING, STEP, Joint, Span, spans
-from tools.watch.flights import LEAST_SIZE, Flights
-from tools.watch.history import History
-from tools.watch.label_fit import LabelFit
-from tools.watch.rivals import over_spans
-from tools.watch.scatter import learn_scatter, log_marginal, without_deviation
-from tools.watch.search import EVIDENCE_NEEDED
+from glider.tools.inference.expansion import Expansion
+from glider.tools.inference.parameters import NUISANCE, FreeParameter
+from glider.tools.inference.shared_parameters import SharedParameters
+from glider.tools.watch.events import GROWING, STEP, Joint, Span, spans
+from glider.tools.watch.flights import LEAST_SIZE, RunEnsemble
+from glider.tools.watch.history import History
+from glider.tools.watch.label_fit import LabelFit
+from glider.tools.watch.rivals import over_spans
+from glider.tools.watch.scatter import learn_scatter, log_marginal, without_deviation
+from glider.tools.watch.search import EVIDENCE_NEEDED
 
 RUNS, SEEN = 10, 40  # rows of each run's Jacobian
 FREE = [
@@ -154,21 +154,21 @@ def test_a_change_found_in_one_run_is_followed_to_its_ends(span):
 def test_a_run_whose_change_has_another_form_says_less_of_what_all_share():
     """The last run's change is left with errors ten times the others': its pull on the shared values falls."""
     raw = runs_of(np.zeros((RUNS, len(FREE))), COMMON, 11)
-    rough, smooth = RUNS - 1, RUNS - 2
-    raw[rough] = runs_of(np.zeros((1, len(FREE))), 10.0 * COMMON, 12)[0]
+    noisy, smooth = RUNS - 1, RUNS - 2
+    raw[noisy] = runs_of(np.zeros((1, len(FREE))), 10.0 * COMMON, 12)[0]
     raw[smooth] = replace(raw[smooth], nis=0.5 * raw[smooth].nis)
-    flights = Flights([], SHARED, np.arange(RUNS) < 5, 1.0, np.ones(RUNS), np.full(len(FREE), LEAST_SIZE))
+    flights = RunEnsemble([], SHARED, np.arange(RUNS) < 5, 1.0, np.ones(RUNS), np.full(len(FREE), LEAST_SIZE))
     flights.certainty = np.eye(len(FREE)) / LEAST_SIZE**2
     flights.raw = [moved_to(one, COMMON) for one in raw]
     flights.runs = [flights.made(n, one) for n, one in enumerate(flights.raw)]
     before = Joint(SHARED, list(flights.runs), []).values
-    for n in (rough, smooth):
-        flights.cool(n)
+    for n in (noisy, smooth):
+        flights.inflate_run(n)
     after = Joint(SHARED, list(flights.runs), []).values
 
-    assert flights.hot[smooth] == 1.0  # none says more than the reference
-    assert flights.hot[rough] == pytest.approx(flights.nis(rough) / flights.usual_nis.mean())
-    assert flights.hot[rough] > 20.0
+    assert flights.run_inflation[smooth] == 1.0  # none says more than the reference
+    assert flights.run_inflation[noisy] == pytest.approx(flights.nis(noisy) / flights.usual_nis.mean())
+    assert flights.run_inflation[noisy] > 20.0
     assert np.abs(after - COMMON).max() < 0.2 * np.abs(before - COMMON).max()
 
 
@@ -184,7 +184,7 @@ def test_the_form_of_a_strong_change_is_no_change_of_the_runs_before_it():
         raw.append(Expansion(np.zeros(len(FREE)), float(e @ e), J @ e, J @ J.T, float(e @ e) / SEEN, SEEN))
     change = np.array([0.0, size, 0.0, 0.0])
     parts = [SimpleNamespace(kind=SimpleNamespace(form=0.06))] * RUNS
-    flights = Flights(parts, SHARED, np.arange(RUNS) < 1, 1.0, np.ones(RUNS), np.full(len(FREE), 0.01))
+    flights = RunEnsemble(parts, SHARED, np.arange(RUNS) < 1, 1.0, np.ones(RUNS), np.full(len(FREE), 0.01))
     flights.raw = [moved_to(one, change) if n >= first else one for n, one in enumerate(raw)]
     flights.runs = [flights.made(n, one) for n, one in enumerate(flights.raw)]
     before = [Span(1, first, STEP)]
@@ -205,10 +205,10 @@ def test_the_form_of_a_strong_change_is_no_change_of_the_runs_before_it():
 
 
 def test_forms_of_two_changes_in_a_run_add_up_in_squares():
-    flights = Flights([SimpleNamespace(kind=SimpleNamespace(form=0.06))], SHARED, np.ones(1, dtype=bool))
+    flights = RunEnsemble([SimpleNamespace(kind=SimpleNamespace(form=0.06))], SHARED, np.ones(1, dtype=bool))
     A = np.diag([1e4, 4e4, 1e4, 1e4])
     flights.raw = [Expansion(np.zeros(len(FREE)), 40.0, np.zeros(len(FREE)), A, 1.0, SEEN)]
-    flights.runs, flights.hot, flights.sizes = list(flights.raw), np.ones(1), np.full(len(FREE), 0.01)
+    flights.runs, flights.run_inflation, flights.sizes = list(flights.raw), np.ones(1), np.full(len(FREE), 0.01)
     flights.loosen(0, np.array([0.0, 3.0, 0.0, 0.0]))
     flights.loosen(0, np.array([0.0, 4.0, 2.0, 0.0]))
     assert flights.form[0] == pytest.approx(0.06 * np.array([0.0, 5.0, 2.0, 0.0]))

@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sim_backend.foreign import ocean as foreign
+from glider.sim_backend.foreign import ocean as foreign
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.case import load_case
+from glider.tools.identify.ocean.files import vehicle_text
+from glider.tools.identify.ocean.identify import identify_ocean
+from glider.tools.report.pooled import write_pooled_report
+from glider.tools.study.challenge.ocean_cases import as_run, flown, with_change
+from glider.tools.watch.whole_case import diagnose_ocean, plain, write
 from tests.support.ocean import as_case, drawn, fly_dives
-from tools.data.runs import columns as names
-from tools.data.runs.case import load_case
-from tools.identify.ocean.files import vehicle_text
-from tools.identify.ocean.identify import identify_ocean
-from tools.report.pooled import write_pooled_report
-from tools.study.challenge.ocean_cases import as_run, flown, with_change
-from tools.watch.whole_case import diagnose_ocean, plain, write
 
 pytestmark = pytest.mark.computes(seconds=25)
 
@@ -30,12 +30,12 @@ def identified(tmp_path_factory):
     return str(folder / "identified.toml")
 
 
-def flown_by(V, rougher=1.0):
+def flown_by(V, noise_beats_label=1.0):
     """The first dives of the mission by another vehicle, in water that moves so many times as much."""
     mission, runs = drawn("slocum", 1), []
     for n in range(DIVES):
         S = mission.seas[n].copy()
-        S[foreign.WATER] *= rougher
+        S[foreign.WATER] *= noise_beats_label
         runs.append(as_run(mission, n, flown(mission, n, V, S), False))
     return runs
 
@@ -61,8 +61,8 @@ def test_two_effects_are_both_named(tmp_path, identified):
     assert answer["gap"]["after"]["depth"] < 0.5 * answer["gap"]["recalibrated"]["depth"]
     assert sum(one["probability"] for one in answer["causes"]) == pytest.approx(1.0)
     write(found, tmp_path)
-    told = write_pooled_report(tmp_path)
-    assert all(label in told for label in found.selected)
+    flagged = write_pooled_report(tmp_path)
+    assert all(label in flagged for label in found.selected)
 
 
 def test_what_no_label_names_is_unknown(tmp_path, identified):

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from tools.data.errors import InputError
-from tools.data.exporters.variables import Variable, found_in
-from tools.data.importers.ocean import og1_names
-from tools.data.runs.case import load_runs
-from tools.data.runs.origin import Origin, read_fixes, read_origins
-from tools.data.runs.run import Run
+from glider.tools.data.errors import InputError
+from glider.tools.data.exporters.variables import Variable, found_in
+from glider.tools.data.importers.ocean import og1_names
+from glider.tools.data.runs.case import load_runs
+from glider.tools.data.runs.origin import Origin, read_fixes, read_origins
+from glider.tools.data.runs.run import Run
 
 _ANGLE = ("degrees", 180.0 / np.pi)
 # Run data, the words of its variable, its unit there and the factor to it.
@@ -52,12 +52,16 @@ def export_og1(folder: Path, out: Path, answers: list[Path]) -> list[Variable]:
 
 
 def write_og1(
-    out: Path, vehicle: str, runs: list[Run], origins: list[Origin], variables: list[Variable],
+    out: Path,
+    vehicle: str,
+    runs: list[Run],
+    origins: list[Origin],
+    variables: list[Variable],
     fixes: np.ndarray | None = None,
 ) -> None:
     """Write runs of a vehicle, each with its origin, and variables by row, as a mission in OG-1.0.
 
-    fixes: (n, 3) as tools.data.runs.origin.read_fixes gives them.
+    fixes: (n, 3) as glider.tools.data.runs.origin.read_fixes gives them.
     """
     import xarray
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from tools.data.errors import InputError
-from tools.data.runs import csvfile
-from tools.data.runs.run import Run
+from glider.tools.data.errors import InputError
+from glider.tools.data.runs import csvfile
+from glider.tools.data.runs.run import Run
 
 WATCH_FILE, DIAGNOSIS_FILE = "watch.json", "diagnosis.json"
 SAME_S = 2e-3  # times of a row in two files: written with three digits
@@ -64,7 +64,7 @@ def _velocity(folder: Path, runs: list[Run]) -> list[Variable]:
     return found
 
 
-def _at(run: Run, table: csvfile.Table | None, column: str) -> np.ndarray:
+def _at(run: Run, table: csvfile.CsvTable | None, column: str) -> np.ndarray:
     """A column of a table at the run's rows, by their times; InputError for a time that is none of the run's."""
     values = np.full(run.rows, np.nan)
     if table is None or column not in table.header:

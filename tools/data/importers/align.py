@@ -4,16 +4,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from firmware.core.maths.rotations import wrap
-from tools.data.errors import InputError
-from tools.data.importers.qualisys import Capture
-from tools.data.runs import columns as names
-from tools.data.runs.run import Run
+from glider.firmware.core.maths.rotations import wrap
+from glider.tools.data.errors import InputError
+from glider.tools.data.importers.qualisys import Capture
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.run import Run
 
 STEP = 0.05  # s, of the search
-LEAST = 5.0  # s that both must have in common
+MIN_OVERLAP_S = 5.0  # s that both must have in common
 WORST = 0.5  # of the signals' variance, that may be left unexplained at the best offset
-SURE = 0.2  # s, 1 sigma of the offset
+MAX_SD_S = 0.2  # s, 1 sigma of the offset
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,10 @@ def find_offset(run: Run, capture: Capture) -> Offset:
     log = [_grid(run.t, run.columns[name], t) for name, _ in pairs]
     own = np.arange(0.0, capture.t[-1], STEP)
     seen = [_grid(capture.t, capture.pose[:, n], own) for _, n in pairs]
-    count, lags = int(LEAST / STEP), range(-len(own) + int(LEAST / STEP), len(t) - int(LEAST / STEP) + 1)
+    count, lags = (
+        int(MIN_OVERLAP_S / STEP),
+        range(-len(own) + int(MIN_OVERLAP_S / STEP), len(t) - int(MIN_OVERLAP_S / STEP) + 1),
+    )
     left = np.full(len(lags), np.inf)
     for k, lag in enumerate(lags):
         a, b = max(lag, 0), min(lag + len(own), len(t))

@@ -2,13 +2,13 @@
 
 from pathlib import Path
 
-from tools.data.errors import InputError
-from tools.data.importers.align import Offset, aligned, find_offset
-from tools.data.importers.qualisys import Capture, read_capture
-from tools.data.runs import columns as names
-from tools.data.runs.case import load_case, write_case
-from tools.data.runs.run import Run
-from tools.data.sources import load_vehicle
+from glider.tools.data.errors import InputError
+from glider.tools.data.importers.align import Offset, aligned, find_offset
+from glider.tools.data.importers.qualisys import Capture, read_capture
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.case import load_case, write_case
+from glider.tools.data.runs.run import Run
+from glider.tools.data.sources import load_vehicle
 
 DENSITY = 998.0  # kg/m3, fresh water at 20 deg C
 

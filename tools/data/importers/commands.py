@@ -11,9 +11,9 @@ from typing import Annotated
 import msgspec
 import numpy as np
 
-from hal.strict import Table
+from glider.hal.strict import Table
 
-NEAR = 0.05  # of the way between the stops: as near to one counts as there
+STOP_TOLERANCE = 0.05  # of the way between the stops: as near to one counts as there
 
 SI = Annotated[float, msgspec.Meta(ge=-1e12, le=1e12)]
 Positive = Annotated[float, msgspec.Meta(gt=0.0)]
@@ -87,7 +87,7 @@ def spans(direction: np.ndarray) -> list[tuple[int, int]]:
 
 def rebuild(table: CommandTable, direction: np.ndarray, where: np.ndarray) -> Rebuilt:
     """The command, from the directions and readings (SI, NaN where missing) at the log's rows."""
-    command, near = np.empty(len(where)), NEAR * (table.high - table.low)
+    command, near = np.empty(len(where)), STOP_TOLERANCE * (table.high - table.low)
     known = where[np.isfinite(where)]
     now, arrived, short = (float(known[0]) if known.size else np.nan), 0, 0
     for n, (begin, end) in enumerate(spans(direction)):

@@ -8,16 +8,16 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from firmware.model.library import shipped
-from tools.data.errors import InputError
-from tools.data.importers import resample
-from tools.data.importers.commands import CommandTable, rebuild, says, seen_direction
-from tools.data.importers.mapping import TIME_UNITS, ColumnTable, CutTable, MapTable, load_map
-from tools.data.runs import columns as names
-from tools.data.runs import csvfile
-from tools.data.runs.case import write_case
-from tools.data.runs.run import Run
-from tools.data.sources import name_or_path
+from glider.firmware.model.library import shipped
+from glider.tools.data.errors import InputError
+from glider.tools.data.importers import resample
+from glider.tools.data.importers.commands import CommandTable, rebuild, says, seen_direction
+from glider.tools.data.importers.mapping import TIME_UNITS, ColumnTable, CutTable, MapTable, load_map
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs import csvfile
+from glider.tools.data.runs.case import write_case
+from glider.tools.data.runs.run import Run
+from glider.tools.data.sources import name_or_path
 
 MAX_ROWS = 10_000_000  # of one run: what a mistaken time unit would ask for
 
@@ -171,7 +171,7 @@ class _Source:
         good = np.flatnonzero(self.keep & ~np.isnan(logged))
         if not good.size:
             raise InputError("no row has a time", source=self.path, column=time.column)
-        kept = good[resample.longest_course(logged[good])]
+        kept = good[resample.longest_increasing(logged[good])]
         wrong = np.setdiff1d(np.flatnonzero(self.keep), kept)
         # Differences first: whole milliseconds or nanoseconds since long ago are exact, their seconds are not.
         whole = round(1.0 / per_unit)
@@ -224,7 +224,7 @@ def _rows(
     columns = {names.TIME: grid}
     for name, column in values.items():
         if name in names.COMMANDS:
-            columns[name] = resample.in_force(t, column, grid + cut.start_s)
+            columns[name] = resample.zero_order_hold(t, column, grid + cut.start_s)
             continue
         angle = name in names.WRAPPING
         mean = resample.means(column, bins, count, angle)

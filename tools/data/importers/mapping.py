@@ -12,14 +12,14 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from firmware.core.vehicle.layout import GRAVITY
-from hal.strict import ConfigError, Table, decode, locate
-from hal.units import UNITS, units_of
-from tools.data.errors import InputError
-from tools.data.importers.commands import CommandTable
-from tools.data.runs import columns as names
-from tools.data.runs.csvfile import Dialect
-from tools.data.sources import read_text
+from glider.firmware.core.vehicle.layout import GRAVITY
+from glider.hal.strict import ConfigError, Table, decode, locate
+from glider.hal.units import UNITS, units_of
+from glider.tools.data.errors import InputError
+from glider.tools.data.importers.commands import CommandTable
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.csvfile import Dialect
+from glider.tools.data.sources import read_text
 
 # 'counts' is for values that `scale` alone turns into the target's SI unit.
 COLUMN_UNITS = units_of("length", "angle", "rate", "mass", "pressure", "counts")
@@ -160,7 +160,7 @@ def load_map(wanted: str) -> tuple[MapTable, Path]:
     """A mapping by shipped name or by path, and the folder that its vehicle file is looked for in."""
     shipped = {
         entry.name.removesuffix(".toml"): entry.read_text(encoding="utf-8")
-        for entry in files("tools.data.importers").joinpath("maps").iterdir()
+        for entry in files("glider.tools.data.importers").joinpath("maps").iterdir()
         if entry.name.endswith(".toml")
     }
     if wanted in shipped:

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from firmware.core.maths.rotations import euler_from_quaternion
-from tools.data.errors import InputError
-from tools.data.sources import read_text
+from glider.firmware.core.maths.rotations import euler_from_quaternion
+from glider.tools.data.errors import InputError
+from glider.tools.data.sources import read_text
 
 FIELDS = 16  # X Y Z, three angles, residual, nine of the matrix
 TURN = np.diag([1.0, -1.0, -1.0])  # Z up to Z down

@@ -4,10 +4,10 @@ from bisect import bisect_left
 
 import numpy as np
 
-from firmware.core.maths.rotations import wrap
+from glider.firmware.core.maths.rotations import wrap
 
 
-def longest_course(t: np.ndarray) -> np.ndarray:
+def longest_increasing(t: np.ndarray) -> np.ndarray:
     """The rows of the longest course of times that go on, each later than the one before; t (rows,) without gaps.
 
     Leaves out the fewest rows, whichever way a damaged time is off: one far ahead costs itself, not all behind it.
@@ -27,7 +27,7 @@ def longest_course(t: np.ndarray) -> np.ndarray:
     return np.array(course[::-1])
 
 
-def in_force(t: np.ndarray, values: np.ndarray, grid_s: np.ndarray) -> np.ndarray:
+def zero_order_hold(t: np.ndarray, values: np.ndarray, grid_s: np.ndarray) -> np.ndarray:
     """A command at the rows of `grid_s`: the last that was logged, at `t`, until then; NaN before the first."""
     known = np.isfinite(values)
     place = np.searchsorted(t[known], grid_s + 1e-9, side="right")

@@ -1,6 +1,6 @@
 """Logs off the vehicle, over ssh: each goes on where a broken connection left it, and counts only under its check sum.
 
-Nothing is ever deleted or written aboard. Here a log is `NAME.part` until it is whole and proved.
+Nothing is ever deleted or written onboard. Here a log is `NAME.part` until it is whole and proved.
 """
 
 import fnmatch
@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from tools.data.remote import PART, Host, Progress, RemoteError, file_digest
+from glider.tools.data.remote import PART, Progress, RemoteError, RemoteHost, file_digest
 
 
 @dataclass(frozen=True)
@@ -25,11 +25,11 @@ class Fetched:
     message: str = ""
 
 
-def list_logs(vehicle: Host, folder: str, patterns: tuple[str, ...]) -> dict[str, int]:
+def list_logs(vehicle: RemoteHost, folder: str, patterns: tuple[str, ...]) -> dict[str, int]:
     """Name -> bytes of the logs in a vehicle's folder, by name; RemoteError where there is no such folder."""
     quoted = shlex.quote(folder)
     said = vehicle.run(
-        f"cd {quoted} && for f in *.mcap; do [ -f \"$f\" ] && printf '%s %s\\n' \"$(wc -c <\"$f\")\" \"$f\"; done; "
+        f'cd {quoted} && for f in *.mcap; do [ -f "$f" ] && printf \'%s %s\\n\' "$(wc -c <"$f")" "$f"; done; '
         f"[ -d {quoted} ]"
     )
     sizes = {name: int(size) for size, _, name in (line.partition(" ") for line in said.splitlines())}
@@ -41,7 +41,7 @@ def list_logs(vehicle: Host, folder: str, patterns: tuple[str, ...]) -> dict[str
 
 
 def fetch(
-    vehicle: Host, folder: str, sizes: dict[str, int], out: Path,
+    vehicle: RemoteHost, folder: str, sizes: dict[str, int], out: Path,
     tell: Callable[[Fetched], None] = lambda one: None, progress: Progress = lambda n: None,
 ) -> list[Fetched]:  # fmt: skip
     """Bring logs into a folder here, the shortest first; RemoteError where the connection breaks: call it again."""
@@ -54,7 +54,7 @@ def fetch(
     return done
 
 
-def _fetch(vehicle: Host, path: str, size: int, local: Path, progress: Progress) -> Fetched:
+def _fetch(vehicle: RemoteHost, path: str, size: int, local: Path, progress: Progress) -> Fetched:
     """One log: behind what is here of it, if that is its beginning."""
     part = local.with_name(local.name + PART)
     have = local.stat().st_size if local.exists() else None
@@ -74,7 +74,9 @@ def _fetch(vehicle: Host, path: str, size: int, local: Path, progress: Progress)
     digest = file_digest(part)
     if digest != vehicle.digest(path, size):
         part.unlink()
-        return Fetched(local.name, size, "refused", message=f"{path}: another check sum than aboard: fetch it again")
+        return Fetched(
+            local.name, size, "refused", message=f"{path}: another check sum than the onboard one: fetch it again"
+        )
     with part.open("rb") as file:
         os.fsync(file.fileno())
     part.replace(local)

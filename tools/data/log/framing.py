@@ -20,7 +20,7 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Footer, Message, Metadata, Schema
 from mcap.writer import MCAP0_MAGIC
 
-from hal.recorder.logfile import CRC_KEY, metadata_crc
+from glider.hal.recorder.logfile import CRC_KEY, metadata_crc
 
 _RECORD = struct.Struct("<BQ")
 CHUNK_HEAD = struct.Struct("<QQQII")  # start, end, size unpacked, checksum, length of the compression's name

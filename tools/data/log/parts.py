@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from hal.recorder import logfile, schema
-from hal.recorder.recorder import part_path
-from tools.data.errors import InputError
-from tools.data.log.reader import Log, Topic, read_log
+from glider.hal.recorder import logfile, schema
+from glider.hal.recorder.recorder import part_path
+from glider.tools.data.errors import InputError
+from glider.tools.data.log.reader import Log, Topic, read_log
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from mcap.records import Attachment, Channel, Message, Metadata, Schema
 
-from hal.recorder import logfile
-from hal.recorder.schema import (
+from glider.hal.recorder import logfile
+from glider.hal.recorder.schema import (
     CDR_HEADER,
     EVENTS_TOPIC,
     LOG_SCHEMA_NAME,
@@ -22,8 +22,8 @@ from hal.recorder.schema import (
     parse_fields,
     specs_from_json,
 )
-from tools.data.errors import InputError
-from tools.data.log.framing import Damage, Scan, chunk_records
+from glider.tools.data.errors import InputError
+from glider.tools.data.log.framing import Damage, Scan, chunk_records
 
 _LAST_NS = 2**63 - 1
 
@@ -62,7 +62,7 @@ class Topic:
 
 
 @dataclass(frozen=True)
-class Event:
+class LogEvent:
     """A line of text, time in s since the log's epoch."""
 
     time_s: float
@@ -80,7 +80,7 @@ class Log:
     end: int  # bytes read; a cut file's torn rest lies behind
     damages: list[Damage]
     topics: dict[str, Topic]
-    events: list[Event]
+    events: list[LogEvent]
     attachments: dict[str, str]
     metadata: dict[str, str]  # written at the start
     ending: dict[str, str]  # written at the end; empty in a cut file
@@ -229,7 +229,7 @@ def _take(message: Message, definitions: Definitions, found: dict[int, _Gathered
             severity, text = logfile.decode_event(message.data)
         except (struct.error, ValueError, IndexError):
             return
-        log.events.append(Event((message.log_time - log.epoch_ns) / 1e9, severity, text))
+        log.events.append(LogEvent((message.log_time - log.epoch_ns) / 1e9, severity, text))
 
 
 def _topic(gathered: _Gathered) -> Topic:

@@ -11,11 +11,11 @@ from pathlib import Path
 from mcap.records import Attachment, Channel, Message, Metadata, Schema
 from mcap.writer import Writer
 
-from hal.recorder import disk, logfile
-from tools.data.errors import InputError
-from tools.data.log.framing import Damage, Scan, chunk_records
-from tools.data.log.parts import FlightLog, later_parts, read_flight
-from tools.data.log.reader import Definitions, opened
+from glider.hal.recorder import disk, logfile
+from glider.tools.data.errors import InputError
+from glider.tools.data.log.framing import Damage, Scan, chunk_records
+from glider.tools.data.log.parts import FlightLog, later_parts, read_flight
+from glider.tools.data.log.reader import Definitions, opened
 
 REPAIR = "glider_repair"  # metadata record of a repaired log
 

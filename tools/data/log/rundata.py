@@ -12,18 +12,18 @@ from typing import Any
 import numpy as np
 from msgspec import structs
 
-from firmware.model.library import shipped
-from firmware.model.vehicle import decode_vehicle
-from firmware.telemetry import REPLAYED
-from hal.recorder import disk
-from hal.recorder.logfile import LogFile
-from hal.recorder.schema import Field, RecordSpec
-from hal.strict import Table, decode
-from tools.data.errors import InputError
-from tools.data.log.reader import Log, Topic
-from tools.data.runs import columns as names
-from tools.data.runs import csvfile
-from tools.data.runs.case import (
+from glider.firmware.model.library import shipped
+from glider.firmware.model.vehicle import decode_vehicle
+from glider.firmware.telemetry import REPLAYED
+from glider.hal.recorder import disk
+from glider.hal.recorder.logfile import LogFile
+from glider.hal.recorder.schema import Field, RecordSpec
+from glider.hal.strict import Table, decode
+from glider.tools.data.errors import InputError
+from glider.tools.data.log.reader import Log, Topic
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs import csvfile
+from glider.tools.data.runs.case import (
     CASE_FILE,
     VEHICLE_FILE,
     Case,
@@ -33,8 +33,8 @@ from tools.data.runs.case import (
     case_text,
     write_case,
 )
-from tools.data.runs.run import Run
-from tools.data.sources import name_or_path
+from glider.tools.data.runs.run import Run
+from glider.tools.data.sources import name_or_path
 
 TICK, TRUTH = "/tick", "/truth"
 EXTRA_FILE = "extra.csv"  # an imported run's columns that are no numbers, behind its time
@@ -144,7 +144,7 @@ def run_of(log: Log, name: str = "run00") -> Exported:
             continue
         numbers[column] = np.array(values)
     if EXTRA_FILE in log.attachments:
-        table = csvfile.Table(log.path / EXTRA_FILE, log.attachments[EXTRA_FILE].encode("utf-8"))
+        table = csvfile.CsvTable(log.path / EXTRA_FILE, log.attachments[EXTRA_FILE].encode("utf-8"))
         if table.rows == tick.count:
             for column in table.header[1:]:
                 words = table.texts(column)

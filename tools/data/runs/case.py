@@ -8,14 +8,14 @@ from typing import Annotated, Any
 
 import msgspec
 
-from firmware.model.vehicle import Assumed, DisturbanceTable, NonNegative, SensorsTable, SensorTable, Vehicle
-from hal.strict import MAX_BYTES, Table, decode
-from sim_backend.ocean.vehicle import OceanVehicle
-from tools.data.errors import InputError
-from tools.data.runs import columns as names
-from tools.data.runs import csvfile
-from tools.data.runs.run import Run, load_run, run_name, write_run
-from tools.data.sources import load_any_vehicle, read_text
+from glider.firmware.model.vehicle import Assumed, DisturbanceTable, NonNegative, SensorsTable, SensorTable, Vehicle
+from glider.hal.strict import MAX_BYTES, Table, decode
+from glider.sim_backend.ocean.vehicle import OceanVehicle
+from glider.tools.data.errors import InputError
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs import csvfile
+from glider.tools.data.runs.run import Run, load_run, run_name, write_run
+from glider.tools.data.sources import load_any_vehicle, read_text
 
 CASE_FILE = "case.toml"
 VEHICLE_FILE = "vehicle.toml"  # beside it, where the vehicle is not a shipped one
@@ -242,7 +242,7 @@ def write_case(
 
     `vehicle` is a shipped name or a path from the case's folder; with `vehicle_text`, that file is written too, as
     vehicle.toml. `motion_capture` is, if not given, whether any run has it. InputError where the folder already holds a
-    case: runs of two cases in one folder could not be told apart.
+    case: runs of two cases in one folder could not be distinguished.
     """
     folder = Path(folder)
     if motion_capture is None:

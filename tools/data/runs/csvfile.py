@@ -15,9 +15,9 @@ from typing import Annotated, BinaryIO, Literal
 import msgspec
 import numpy as np
 
-from hal.strict import Table as StrictTable
-from tools.data.errors import InputError
-from tools.data.runs.records import Line, LineTable, joined, over_lines, told_apart
+from glider.hal.strict import Table as StrictTable
+from glider.tools.data.errors import InputError
+from glider.tools.data.runs.records import Line, LineTable, distinguishable, joined, over_lines
 
 MAX_BYTES = 256_000_000  # unpacked; an hour at 50 Hz with forty columns of full precision is half of it
 _NUMBERS = msgspec.json.Decoder(list[float | None])
@@ -41,7 +41,7 @@ def _read_bounded(path: Path) -> bytes:
 
 
 class Dialect(StrictTable):
-    """How a table is written: as run data by default, as other loggers do if told. [text] of a mapping file."""
+    """How a table is written: as run data by default, as other loggers do on request. [text] of a mapping file."""
 
     delimiter: Annotated[str, msgspec.Meta(min_length=1, max_length=1)] = ","
     decimal: Literal[".", ","] = "."
@@ -56,7 +56,7 @@ class Dialect(StrictTable):
     bad_fields: Literal["refuse", "missing", "drop"] = "refuse"  # fields that are no number; drop: with their row
 
     def __post_init__(self):
-        if not told_apart(self.line):
+        if not distinguishable(self.line):
             raise ValueError("line: expected lines of different numbers of fields, or of different `begins`")
         if any(line.begins for line in self.line) and not self.header:
             raise ValueError("header: missing; records of lines with `begins` have none of their own")
@@ -67,7 +67,7 @@ class Dialect(StrictTable):
         return self.broken_rows != "refuse" or self.bad_fields != "refuse"
 
 
-class Table:
+class CsvTable:
     """A CSV file's header and its fields, still text, by column. `broken` has the lines of broken rows left out,
     `joined` counts those that were put together."""
 
@@ -245,9 +245,9 @@ def _complaint(field: str) -> str:
     return f"not a number: {shown}" + (" (a missing sample is an empty field)" if value is not None else "")
 
 
-def read_table(path: Path, dialect: Dialect = Dialect()) -> Table:
+def read_table(path: Path, dialect: Dialect = Dialect()) -> CsvTable:
     """A CSV or .csv.gz file as text columns; InputError where it is none, is damaged or is too long."""
-    return Table(path, _read_bounded(path), dialect)
+    return CsvTable(path, _read_bounded(path), dialect)
 
 
 def as_texts(name: str, values: np.ndarray, places: int | None = None) -> list[str]:

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from tools.data.errors import InputError
-from tools.data.runs import csvfile
-from tools.data.runs.csvfile import Table
-from tools.data.runs.run import Run
+from glider.tools.data.errors import InputError
+from glider.tools.data.runs import csvfile
+from glider.tools.data.runs.csvfile import CsvTable
+from glider.tools.data.runs.run import Run
 
 ORIGIN_FILE = "origin.csv"  # run, when and where it began, of which files
 FIXES_FILE = "fixes.csv"  # of the whole mission: when, where
@@ -85,7 +85,7 @@ def moment_text(seconds: float) -> str:
     return moment.isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
-def _moments(table: Table, column: str) -> np.ndarray:
+def _moments(table: CsvTable, column: str) -> np.ndarray:
     """A column of times, s since 1970-01-01 UTC, (rows,)."""
     found = np.empty(table.rows)
     for row, text in enumerate(table.texts(column)):
@@ -97,7 +97,7 @@ def _moments(table: Table, column: str) -> np.ndarray:
     return found
 
 
-def _require(table: Table, *columns: str) -> None:
+def _require(table: CsvTable, *columns: str) -> None:
     for column in columns:
         if column not in table.header:
             raise InputError("no such column", source=table.path, column=column)

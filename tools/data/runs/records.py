@@ -9,7 +9,7 @@ from typing import Annotated
 
 import msgspec
 
-from hal.strict import Table
+from glider.hal.strict import Table
 
 Line = tuple[int, list[str]]
 
@@ -21,7 +21,7 @@ class LineTable(Table):
     begins: str = ""
 
 
-def told_apart(lines: tuple[LineTable, ...]) -> bool:
+def distinguishable(lines: tuple[LineTable, ...]) -> bool:
     """Whether no line of a record can be taken for another of its lines."""
     return len({(line.fields, line.begins) for line in lines}) == len(lines) and not any(
         one.fields == other.fields and not (one.begins and other.begins)

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tools.data.runs import columns as names
-from tools.data.runs import csvfile
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs import csvfile
 
 
 @dataclass

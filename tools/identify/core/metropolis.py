@@ -16,8 +16,8 @@ import math
 
 import numpy as np
 
-from firmware.core.jit import allocating_kernel, kernel, parallel_kernel, prange
-from sim_backend.core.noise import gaussian, uniform
+from glider.firmware.core.jit import allocating_kernel, kernel, parallel_kernel, prange
+from glider.sim_backend.core.noise import gaussian, uniform
 
 WANTED = 0.44  # acceptance of single components that a random walk does best with
 WALK, DECIDE = 0, 1  # streams of random numbers

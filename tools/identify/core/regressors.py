@@ -7,14 +7,14 @@ import math
 
 import numpy as np
 
-from firmware.core.jit import allocating_kernel, kernel
-from firmware.core.maths.matrices import copy
-from firmware.core.maths.rotations import rotation_nb_euler
-from firmware.core.vehicle.actuators import clip
-from firmware.core.vehicle.layout import K_D0, K_R, N_P
-from firmware.core.vehicle.mass import first_moment, inertia, translational_mass
-from firmware.core.vehicle.motion import momentum, momentum_rate
-from firmware.core.vehicle.water import water_wrench
+from glider.firmware.core.jit import allocating_kernel, kernel
+from glider.firmware.core.maths.matrices import copy
+from glider.firmware.core.maths.rotations import rotation_nb_euler
+from glider.firmware.core.vehicle.actuators import clip
+from glider.firmware.core.vehicle.layout import K_D0, K_R, N_P
+from glider.firmware.core.vehicle.mass import first_moment, inertia, translational_mass
+from glider.firmware.core.vehicle.motion import momentum, momentum_rate
+from glider.firmware.core.vehicle.water import water_wrench
 
 N_K = K_R - K_D0 + 1
 

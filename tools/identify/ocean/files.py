@@ -7,14 +7,14 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from sim_backend.ocean.catalogue import catalogue
-from sim_backend.ocean.core import layout as at
-from sim_backend.ocean.vehicle import PLACES, OceanVehicle, decode_ocean_vehicle
-from tools.data.plain import as_plain
-from tools.data.runs.csvfile import write_bytes
-from tools.data.tomltext import toml_text
-from tools.identify.ocean.identify import OceanIdentification
-from tools.inference.model import effects_in
+from glider.sim_backend.ocean.catalogue import catalogue
+from glider.sim_backend.ocean.core import layout as at
+from glider.sim_backend.ocean.vehicle import PLACES, OceanVehicle, decode_ocean_vehicle
+from glider.tools.data.plain import as_plain
+from glider.tools.data.runs.csvfile import write_bytes
+from glider.tools.data.tomltext import toml_text
+from glider.tools.identify.ocean.identify import OceanIdentification
+from glider.tools.inference.model import effects_in
 
 VEHICLE, RESULT = "identified.toml", "identified.json"
 DIGITS = 10  # of a covariance

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from sim_backend.ocean.catalogue import catalogue
-from sim_backend.ocean.vehicle import PLACES, RELATIVE
-from tools.inference.parameters import NINETY, FreeParameter, of_effect
+from glider.sim_backend.ocean.catalogue import catalogue
+from glider.sim_backend.ocean.vehicle import PLACES, RELATIVE
+from glider.tools.inference.parameters import NINETY, FreeParameter, of_effect
 
 # names of a vehicle file -> the label by which the catalogue has it
 LABELS = {
@@ -23,7 +23,7 @@ LABELS = {
 # those that are calibrations: trim and volume are of a mission, not of a vehicle
 CALIBRATIONS = ("Cd0", "lift_slope", "pitch_scale", "pitch_offset", "oil_scale", "compressibility", "thermal_expansion")
 WIDER = 3.0  # times [uncertainty]: a file that is not quite right
-SURE = 3.0  # nat: twenty to one
+CERTAIN_NAT = 3.0  # nat: twenty to one
 WORDS = {
     "drag": "drag is {whole:.2f} times the file's ({low:.2f} to {high:.2f})",
     "lift": "lift is {whole:.2f} times the file's ({low:.2f} to {high:.2f})",
@@ -54,12 +54,12 @@ class Calibration:
         """For a person."""
         low, high = self.ci90
         if self.label in WORDS:
-            told = WORDS[self.label].format(whole=1.0 + self.size, low=1.0 + low, high=1.0 + high)
+            text = WORDS[self.label].format(whole=1.0 + self.size, low=1.0 + low, high=1.0 + high)
         else:
-            told = f"{self.name} is {self.size:.3g} {self.unit} beside the file's ({low:.3g} to {high:.3g})"
-        told += ", which the file leaves open" if self.within else ", more than the file allows"
+            text = f"{self.name} is {self.size:.3g} {self.unit} beside the file's ({low:.3g} to {high:.3g})"
+        text += ", which the file leaves open" if self.within else ", more than the file allows"
         others = [label for label in self.group if label != self.label]
-        return told + (f"; or it is {' or '.join(others)}: these dives do not part them" if others else "")
+        return text + (f"; or it is {' or '.join(others)}: these dives do not part them" if others else "")
 
     def plain(self) -> dict[str, Any]:
         """As it is written."""
@@ -75,8 +75,8 @@ def far_from_file(
 ) -> list[Calibration]:  # fmt: skip
     """Calibrations that are far from the file P, by a parabola about x (count,) in spreads of the file's.
 
-    normal, slope: curvature with the priors', and half the derivative at x, of the misfit over the heat.
-    inflated: variances over those that the parabola promises. A calibration is far if it is more likely by WIDER times
+    normal, slope: curvature with the priors', and half the derivative at x, of the misfit over the variance inflation.
+    inflated: variances over those that the parabola predicts. A calibration is far if it is more likely by WIDER times
     what the file allows, or by how far its label is likely to go, than by the file; or if it is sure to be off by more
     than its label's spread, where the file leaves so much open.
     """
@@ -102,8 +102,8 @@ def far_from_file(
         gained = log_normal(mean, variance + wide) - log_normal(mean, variance + allowed)
         shrunk = wide / (wide + variance)
         size, sd = mean * shrunk, float(np.sqrt(variance * shrunk))
-        certain = 0.5 * (size / sd) ** 2 >= SURE
-        if certain and (gained >= SURE or abs(size) >= likely):
+        certain = 0.5 * (size / sd) ** 2 >= CERTAIN_NAT
+        if certain and (gained >= CERTAIN_NAT or abs(size) >= likely):
             scale = one.spread / unit
             group = next(([label, *(g for g in group if g != label)] for group in groups if label in group), [label])
             found.append(Calibration(label, name, file, float(size * scale), abs(sd * scale), effect.unit,

@@ -1,7 +1,7 @@
 """Noise of an ocean glider's mission, found with the model at hand: depth sensor, vertical water, roll, speed.
 
 Vertical water is coloured; how long it remembers itself is found with how strong it is. Depth and roll are separate
-in the likelihood, so they are sought one after the other (Nelder and Mead, over logarithms).
+in the likelihood, so they are searched one after the other (Nelder and Mead, over logarithms).
 """
 
 from dataclasses import replace
@@ -10,12 +10,12 @@ import msgspec
 import numpy as np
 from scipy.optimize import minimize
 
-from sim_backend.ocean.core import layout as at
-from sim_backend.ocean.vehicle import OceanVehicle
-from tools.data.runs.case import Case
-from tools.data.runs.run import Run
-from tools.inference.levels import as_said
-from tools.inference.problem import Problem
+from glider.sim_backend.ocean.core import layout as at
+from glider.sim_backend.ocean.vehicle import OceanVehicle
+from glider.tools.data.runs.case import Case
+from glider.tools.data.runs.run import Run
+from glider.tools.inference.levels import as_said
+from glider.tools.inference.problem import Problem
 
 LEVEL_RUNS = 6  # of a mission: their noise is all dives'
 WIDTH = 2.0  # e-folds, prior 1 sigma of each

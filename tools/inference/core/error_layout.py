@@ -2,10 +2,10 @@
 
 Errors (N_ERR): position (NED, m), attitude (rotation vector, body, rad), nu, servo, slider, ballast, as the flying
 filter has them; then how late motion capture is (s). Behind them, where the filter finds it, what the model lacks
-(core/lacking).
+(core/model_error).
 """
 
-from firmware.core.layouts.estimator_layout import E_ACT, E_ATT, E_NU, E_POS
+from glider.firmware.core.layouts.estimator_layout import E_ACT, E_ATT, E_NU, E_POS
 
 __all__ = ["E_ACT", "E_ATT", "E_DOWN", "E_LATE", "E_NU", "E_POS", "N_ERR", "N_PATH", "N_SPECTRAL", "Q_ACC", "Q_ACT",
            "Q_LATE", "Q_POS"]  # fmt: skip

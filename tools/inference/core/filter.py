@@ -1,4 +1,4 @@
-"""Kernels of the diagnosis: what a model with effects fails to foresee of a recording, row by row.
+"""Kernels of the diagnosis: what a model with effects fails to predict of a recording, row by row.
 
 A Kalman filter follows each run with a given model; what its one-step predictions miss, divided by how much they may
 miss, are the whitened innovations: for the true model white, of unit variance, whatever the disturbance did to the
@@ -13,19 +13,19 @@ import math
 
 import numpy as np
 
-from firmware.core.jit import allocating_kernel, kernel, parallel_kernel, prange
-from firmware.core.maths.matrices import copy, product, transpose
-from firmware.core.maths.rotations import wrap_angle
-from firmware.core.maths.steps import MIDPOINT, RK4
-from firmware.core.maths.wide import LANES, as_wide, room
-from firmware.core.vehicle.actuators import clip
-from firmware.core.vehicle.batch import gather
-from firmware.core.vehicle.layout import N_P, SERVO_MAX, SERVO_MIN, X_ACT, X_NU, X_SERVO
-from firmware.core.vehicle.state import rotation
-from sim_backend.core.effect_plant import effect_parts, effective_parameters
-from sim_backend.core.effects import effect_layout as ef
-from sim_backend.core.effects.correction import link_of
-from tools.inference.core.error_layout import (
+from glider.firmware.core.jit import allocating_kernel, kernel, parallel_kernel, prange
+from glider.firmware.core.maths.matrices import copy, product, transpose
+from glider.firmware.core.maths.rotations import wrap_angle
+from glider.firmware.core.maths.steps import MIDPOINT, RK4
+from glider.firmware.core.maths.wide import LANES, as_wide, room
+from glider.firmware.core.vehicle.actuators import clip
+from glider.firmware.core.vehicle.batch import gather
+from glider.firmware.core.vehicle.layout import N_P, SERVO_MAX, SERVO_MIN, X_ACT, X_NU, X_SERVO
+from glider.firmware.core.vehicle.state import rotation
+from glider.sim_backend.core.effect_plant import effect_parts, effective_parameters
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.sim_backend.core.effects.correction import link_of
+from glider.tools.inference.core.error_layout import (
     E_ACT,
     E_ATT,
     E_DOWN,
@@ -39,17 +39,17 @@ from tools.inference.core.error_layout import (
     Q_LATE,
     Q_POS,
 )
-from tools.inference.core.gain import take_gain, take_measurement, take_valid
-from tools.inference.core.lacking import (
+from glider.tools.inference.core.gain import take_gain, take_measurement, take_valid
+from glider.tools.inference.core.model_error import (
     L_GYRO,
-    N_LACKING,
+    N_MODEL_ERROR,
     add_drift,
     add_model_error,
-    lacking_columns,
-    step_lacking,
+    model_error_columns,
+    step_model_error,
     take_gyro_bias,
 )
-from tools.inference.core.step import (
+from glider.tools.inference.core.step import (
     N_Y,
     difference,
     inject_error,
@@ -63,14 +63,14 @@ from tools.inference.core.step import (
 )
 
 LOST_SPEED = 3.0  # m/s; a glider of this class flies at 0.2 to 0.7: an observer that thinks it faster has lost it
-NUDGE = 1e-5  # of the state's unit, for derivatives
+DIFFERENCE_STEP = 1e-5  # of the state's unit, for derivatives
 
 
 @kernel
 def perturbed(x, j, error, moved):
-    """x with its error j at NUDGE, into moved; error (N_ERR or more) is scratch."""
+    """x with its error j at DIFFERENCE_STEP, into moved; error (N_ERR or more) is scratch."""
     error[:] = 0.0
-    error[j] = NUDGE
+    error[j] = DIFFERENCE_STEP
     copy(x, moved)
     inject_error(moved, error)
 
@@ -136,7 +136,7 @@ def linear_step(
                 copy(states[:, n], moved)
                 difference(moved, base, error)
                 for m in range(N_ERR):
-                    Phi[m, first + n] = error[m] / NUDGE
+                    Phi[m, first + n] = error[m] / DIFFERENCE_STEP
     propagate(Pw, F, x, mode, t, inputs, i, begin, acc, zero, work, kept, RK4)
     noise_gain(x, dt, Gam)
 
@@ -159,7 +159,7 @@ def linear_reading(F, x, t, stamps, path, i, begin, moved, error, y, y2, H):
             change = y2[m] - y[m]
             if m <= ef.Y_YAW or m >= ef.Y_MOCAP_ROLL:
                 change = wrap_angle(change)
-            H[m, j] = change / NUDGE
+            H[m, j] = change / DIFFERENCE_STEP
 
 
 @allocating_kernel
@@ -169,7 +169,7 @@ def filter_run(
     """The Kalman filter over rows begin .. end - 1. Returns -2 log likelihood without its constant.
 
     With a spread of N_ERR the model is taken at its word but for `spectral`; with N_ERR + N_LACKING the filter also
-    finds what the model lacks (core/lacking): sigma (N_P) and drift (N_DRIFT) say how much that may be.
+    finds what the model lacks (core/model_error): sigma (N_P) and drift (N_DRIFT) say how much that may be.
 
     P (N_P), F (N_F); spectral (N_SPECTRAL): spectral densities of the accelerations ((m/s2)2 s, (rad/s2)2 s), walks
     of servo, slider, ballast, of the position and of motion capture's clock (per s); R (N_Y) measurements' variances;
@@ -184,7 +184,7 @@ def filter_run(
     count = len(spread)
     Pws, Fs, many, states = filled(Pw), filled(F), np.empty((6, LANES)), np.empty((ef.N_XF, LANES))
     works, keeps = np.zeros((4, ef.N_XF, LANES)), np.empty((ef.N_XF, LANES))
-    error, zero, before, lacking = np.empty(count), np.zeros(3), np.empty(N_PATH), np.zeros(N_LACKING)
+    error, zero, before, model_error = np.empty(count), np.zeros(3), np.empty(N_PATH), np.zeros(N_MODEL_ERROR)
     Phi, Gam, cov = np.zeros((count, count)), np.empty((count, 6)), np.zeros((count, count))
     carried, turned = np.empty((count, count)), np.empty((count, count))
     H, L, y, y2, d = np.zeros((N_Y, count)), np.empty((N_Y, N_Y)), np.empty(N_Y), np.empty(N_Y), np.empty(N_Y)
@@ -201,12 +201,12 @@ def filter_run(
             dt = t[i] - t[i - 1]
             pose_of(x, before)
             linear_step(
-                Pw, F, x, lacking[:6], mode, t, inputs, i, begin, zero, work, kept, as_wide(Pws), as_wide(Fs), many,
+                Pw, F, x, model_error[:6], mode, t, inputs, i, begin, zero, work, kept, as_wide(Pws), as_wide(Fs), many,
                 states, as_wide(works), as_wide(keeps), moved, base, error, Phi, Gam,
             )  # fmt: skip
             if count > N_ERR:
-                step_lacking(drift, x, lacking, dt)
-                lacking_columns(drift, dt, Gam, Phi)
+                step_model_error(drift, x, model_error, dt)
+                model_error_columns(drift, dt, Gam, Phi)
             log_path(x, before, path, i, begin)
             product(Phi, cov, carried)
             transpose(Phi, turned)
@@ -228,21 +228,21 @@ def filter_run(
         innovation(z[i], y, d)
         linear_reading(F, x, t, stamps, path, i, begin, moved, error, y, y2, H)
         if count > N_ERR:
-            take_gyro_bias(lacking, d)
+            take_gyro_bias(model_error, d)
             for j in range(3):
                 H[ef.Y_P + j, N_ERR + L_GYRO + j] = 1.0
         misfit += take_measurement(H, cov, R, d, HC, HT, S, L, W[i], K[i])
         copy(x, base)
         misfit += apply_gain(W[i], K[i], d, x, error, E[i])
         for n in range(count - N_ERR):
-            lacking[n] += error[N_ERR + n]
+            model_error[n] += error[N_ERR + n]
         if count > N_ERR:  # a servo that nobody reads or commands turns no further than its stops
             x[X_SERVO] = clip(x[X_SERVO], P[SERVO_MIN], P[SERVO_MAX])
             x[ef.X_GEAR_SERVO] = x[X_SERVO] if F[ef.SERVO_PLAY] == 0.0 else x[ef.X_GEAR_SERVO]
         if count > N_ERR and lost(x, cov):  # by readings of no vehicle: it begins anew
             copy(base, x)
             copy(start[X_NU:X_ACT], x[X_NU:X_ACT])
-            lacking[:] = 0.0
+            model_error[:] = 0.0
             K[i, :, :] = 0.0
             cov[:] = 0.0
             for j in range(count):
@@ -322,7 +322,7 @@ def follow_run(P, F, drift, mode, t, stamps, inputs, z, begin, end, start, W, K,
     copy(start, x)
     work, kept = room(P, (4, ef.N_XF)), room(P, (ef.N_XF,))
     count = K.shape[1]
-    error, zero, before, lacking = room(P, (count,)), np.zeros(3), room(P, (N_PATH,)), room(P, (N_LACKING,))
+    error, zero, before, model_error = room(P, (count,)), np.zeros(3), room(P, (N_PATH,)), room(P, (N_MODEL_ERROR,))
     y, d = room(P, (N_Y,)), room(P, (N_Y,))
     for n in range(N_PATH):
         path[begin, n] = 0.0
@@ -330,9 +330,9 @@ def follow_run(P, F, drift, mode, t, stamps, inputs, z, begin, end, start, W, K,
         if i > begin:
             if posed:
                 pose_of(x, before)
-            propagate(Pw, F, x, mode, t, inputs, i, begin, lacking[:6], zero, work, kept, RK4)
+            propagate(Pw, F, x, mode, t, inputs, i, begin, model_error[:6], zero, work, kept, RK4)
             if count > N_ERR:
-                step_lacking(drift, x, lacking, t[i] - t[i - 1])
+                step_model_error(drift, x, model_error, t[i] - t[i - 1])
             if posed:
                 log_path(x, before, path, i, begin)
         if posed:
@@ -341,10 +341,10 @@ def follow_run(P, F, drift, mode, t, stamps, inputs, z, begin, end, start, W, K,
             read_now(F, x, t[i] - t[begin], y)
         innovation(z[i], y, d)
         if count > N_ERR:
-            take_gyro_bias(lacking, d)
+            take_gyro_bias(model_error, d)
         apply_gain(W[i], K[i], d, x, error, E[i])
         for n in range(count - N_ERR):
-            lacking[n] += error[N_ERR + n]
+            model_error[n] += error[N_ERR + n]
         if len(X) > 0:
             for n in range(ef.N_XF):
                 X[i, n] = x[n]

@@ -4,17 +4,17 @@ import math
 
 import numpy as np
 
-from firmware.core.jit import allocating_kernel, parallel_kernel, prange
-from firmware.core.maths.matrices import copy
-from firmware.core.maths.steps import RK4
-from firmware.core.maths.wide import LANES, as_wide, room
-from firmware.core.vehicle.batch import gather
-from firmware.core.vehicle.layout import N_P
-from sim_backend.core.effect_plant import effective_parameters
-from sim_backend.core.effects import effect_layout as ef
-from tools.inference.core.error_layout import N_PATH, Q_ACC
-from tools.inference.core.filter import follow_run, groups_of
-from tools.inference.core.step import N_Y, log_path, pose_of, propagate, read_row
+from glider.firmware.core.jit import allocating_kernel, parallel_kernel, prange
+from glider.firmware.core.maths.matrices import copy
+from glider.firmware.core.maths.steps import RK4
+from glider.firmware.core.maths.wide import LANES, as_wide, room
+from glider.firmware.core.vehicle.batch import gather
+from glider.firmware.core.vehicle.layout import N_P
+from glider.sim_backend.core.effect_plant import effective_parameters
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.inference.core.error_layout import N_PATH, Q_ACC
+from glider.tools.inference.core.filter import follow_run, groups_of
+from glider.tools.inference.core.step import N_Y, log_path, pose_of, propagate, read_row
 
 
 @allocating_kernel
@@ -85,10 +85,10 @@ def fly_followed(Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, 
 
 
 @parallel_kernel
-def simulate_runs(P, F, spectral, R, modes, bounds, t, inputs, starts, shaken, noise, Z):
+def simulate_runs(P, F, spectral, R, modes, bounds, t, inputs, starts, disturbance_draws, noise, Z):
     """What would be measured, were (P, F) the truth: Z (rows, N_Y).
 
-    shaken (rows, 6) and noise (rows, N_Y): standard normal deviates of the disturbance and of the sensors.
+    disturbance_draws (rows, 6) and noise (rows, N_Y): standard normal deviates of the disturbance and of the sensors.
     """
     for run in prange(len(bounds) - 1):
         begin = bounds[run]
@@ -100,7 +100,7 @@ def simulate_runs(P, F, spectral, R, modes, bounds, t, inputs, starts, shaken, n
         for i in range(begin, bounds[run + 1]):
             if i > begin:
                 for j in range(6):
-                    acc[j] = math.sqrt(spectral[Q_ACC + j] / (t[i] - t[i - 1])) * shaken[i, j]
+                    acc[j] = math.sqrt(spectral[Q_ACC + j] / (t[i] - t[i - 1])) * disturbance_draws[i, j]
                 pose_of(x, before)
                 propagate(Pw, F, x, modes[run], t, inputs, i, begin, acc, zero, work, kept, RK4)
                 log_path(x, before, path, i - begin, 0)

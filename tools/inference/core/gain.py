@@ -5,9 +5,9 @@ n errors of the state, m readings; what was not measured is NaN in d.
 
 import math
 
-from firmware.core.jit import kernel
-from firmware.core.maths.matrices import product, transpose
-from firmware.core.maths.wide import everywhere, where
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.maths.matrices import product, transpose
+from glider.firmware.core.maths.wide import everywhere, where
 
 
 @kernel

@@ -8,10 +8,10 @@ import math
 
 import numpy as np
 
-from firmware.core.jit import allocating_kernel, kernel, parallel_kernel, prange
-from firmware.core.maths.matrices import product, transpose
-from sim_backend.ocean.core.glide import glide, net_buoyancy, next_speed, steady_speed, true_pitch
-from sim_backend.ocean.core.layout import (
+from glider.firmware.core.jit import allocating_kernel, kernel, parallel_kernel, prange
+from glider.firmware.core.maths.matrices import product, transpose
+from glider.sim_backend.ocean.core.glide import glide, net_buoyancy, next_speed, steady_speed, true_pitch
+from glider.sim_backend.ocean.core.layout import (
     F_ROLL_TRIM,
     F_SPEED_BIAS,
     N_ERR,
@@ -44,7 +44,7 @@ from sim_backend.ocean.core.layout import (
     Y_ROLL,
     Y_SPEED,
 )
-from tools.inference.core.gain import take_gain, take_measurement, take_valid
+from glider.tools.inference.core.gain import take_gain, take_measurement, take_valid
 
 
 @kernel
@@ -61,7 +61,7 @@ def propagate(P, F, x, t, inputs, i, begin, Phi):
     speed, kept = next_speed(P, x[X_SPEED], dt, force * math.sin(path), drag)
     down = -math.sin(path)
     memory = math.exp(-dt / P[WATER_TIME])
-    way = P[WATER_TIME] * (1.0 - memory)  # of 1 m/s of water that forgets itself
+    way = P[WATER_TIME] * (1.0 - memory)  # of 1 m/s of water that decorrelates
     x[X_DEPTH] += 0.5 * (x[X_SPEED] + speed) * down * dt + way * x[X_WATER]
     x[X_SPEED], x[X_GLIDE] = speed, path
     x[X_WATER] *= memory
@@ -149,7 +149,7 @@ def filter_runs(
     P, F, spectral, R, sigma, drift, modes, bounds, early, t, stamps, inputs, z, starts, speeds, spreads,
     X, path, E, W, K, misfit,
 ):  # fmt: skip
-    """filter_run for every run. The first speed is uncertain in `spreads`: none is sought among `speeds`."""
+    """filter_run for every run. The first speed is uncertain in `spreads`: none is searched among `speeds`."""
     for run in prange(len(bounds) - 1):
         misfit[run] = filter_run(
             P, F, spectral, R[run], t, inputs, z, bounds[run], bounds[run + 1], starts[run], spreads[run], X, path, E,
@@ -223,8 +223,8 @@ def fly_followed(Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, 
 
 
 @parallel_kernel
-def simulate_runs(P, F, spectral, R, modes, bounds, t, inputs, starts, shaken, noise, Z):
-    """What would be measured, were (P, F) the truth: Z (rows, N_Y); shaken (rows, N_SPECTRAL), noise (rows, N_Y)."""
+def simulate_runs(P, F, spectral, R, modes, bounds, t, inputs, starts, disturbance_draws, noise, Z):
+    """What would be measured, were (P, F) the truth: Z (rows, N_Y); disturbance_draws (rows, N_SPECTRAL), noise (rows, N_Y)."""
     for run in prange(len(bounds) - 1):
         begin = bounds[run]
         x, Phi, cov = starts[run].copy(), np.empty((N_ERR, N_ERR)), np.zeros((N_ERR, N_ERR))
@@ -234,7 +234,7 @@ def simulate_runs(P, F, spectral, R, modes, bounds, t, inputs, starts, shaken, n
                 cov[:] = 0.0
                 add_noise(P, spectral, t[i] - t[i - 1], 0.0, cov)
                 for n in range(N_ERR):
-                    x[n] += math.sqrt(cov[n, n]) * shaken[i, n]
+                    x[n] += math.sqrt(cov[n, n]) * disturbance_draws[i, n]
                 x[X_SPEED] = max(x[X_SPEED], 0.0)
             read_state(P, F, x, inputs, i, Z[i])
             for m in range(N_Y):

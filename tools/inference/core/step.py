@@ -5,18 +5,18 @@ Errors of a state are those of core/error_layout.
 
 import math
 
-from firmware.core.jit import kernel
-from firmware.core.maths.matrices import copy
-from firmware.core.maths.rotations import wrap_angle
-from firmware.core.maths.wide import anywhere, everywhere, lane, lanes, spread, where, with_lane
-from firmware.core.vehicle.layout import X_ACT, X_NU, X_POS, X_QUAT
-from firmware.core.vehicle.state import euler_angles, quaternion
-from sim_backend.core.effect_plant import effect_parts, effect_step
-from sim_backend.core.effects import effect_layout as ef
-from sim_backend.core.effects.correction import correction, link_of
-from sim_backend.core.effects.sensing import read
-from sim_backend.core.effects.timing import mean_input, mocap_lateness
-from tools.inference.core.error_layout import E_ACT, E_ATT, E_LATE, E_NU, E_POS
+from glider.firmware.core.jit import kernel
+from glider.firmware.core.maths.matrices import copy
+from glider.firmware.core.maths.rotations import wrap_angle
+from glider.firmware.core.maths.wide import anywhere, everywhere, lane, lanes, spread, where, with_lane
+from glider.firmware.core.vehicle.layout import X_ACT, X_NU, X_POS, X_QUAT
+from glider.firmware.core.vehicle.state import euler_angles, quaternion
+from glider.sim_backend.core.effect_plant import effect_parts, effect_step
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.sim_backend.core.effects.correction import correction, link_of
+from glider.sim_backend.core.effects.sensing import read
+from glider.sim_backend.core.effects.timing import mean_input, mocap_lateness
+from glider.tools.inference.core.error_layout import E_ACT, E_ATT, E_LATE, E_NU, E_POS
 
 N_Y = ef.N_Y
 MAX_STEP = 0.1  # s; a step is divided where the vehicle's time constants ask for it

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 DOMAINS = (1, 2)  # PYMEM_DOMAIN_MEM (what lists and dicts hold) and PYMEM_DOMAIN_OBJ (objects)
-LARGEST = 4095  # sizes from here on are counted together
+LARGEST_SIZE = 4095  # sizes from here on are counted together
 BOXED = 64  # bytes; no scalar object is larger
 
 
@@ -45,22 +45,22 @@ def _hooks(domain: int) -> tuple[_Allocator, _Allocator, np.ndarray, list]:
     malloc = ctypes.CFUNCTYPE(pointer, pointer, size)(original.malloc)
     calloc = ctypes.CFUNCTYPE(pointer, pointer, size, size)(original.calloc)
     realloc = ctypes.CFUNCTYPE(pointer, pointer, pointer, size)(original.realloc)
-    counts = np.zeros(LARGEST + 1, dtype=np.int64)
+    counts = np.zeros(LARGEST_SIZE + 1, dtype=np.int64)
     table = types.CPointer(types.int64)
 
     @cfunc(types.voidptr(table, types.intp))
     def counting_malloc(by_size, n):
-        by_size[min(n, LARGEST)] += 1
+        by_size[min(n, LARGEST_SIZE)] += 1
         return malloc(0, n)
 
     @cfunc(types.voidptr(table, types.intp, types.intp))
     def counting_calloc(by_size, k, n):
-        by_size[min(k * n, LARGEST)] += 1
+        by_size[min(k * n, LARGEST_SIZE)] += 1
         return calloc(0, k, n)
 
     @cfunc(types.voidptr(table, types.voidptr, types.intp))
     def counting_realloc(by_size, p, n):
-        by_size[min(n, LARGEST)] += 1
+        by_size[min(n, LARGEST_SIZE)] += 1
         return realloc(0, p, n)
 
     wrappers: list[Any] = [counting_malloc, counting_calloc, counting_realloc]

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from tools.data.errors import InputError
+from glider.tools.data.errors import InputError
 
 FLAGS = ("-O3", "-march=native")
 

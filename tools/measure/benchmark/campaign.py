@@ -5,16 +5,16 @@ from typing import Any
 
 import joblib
 
-from tools.measure.benchmark.registry import Settings
-from tools.measure.benchmark.timing import alternate, median
-from tools.study.campaign.conduct import fly_campaign
-from tools.study.campaign.plan import Plan, build_plan, load_campaign, with_options
+from glider.tools.measure.benchmark.registry import Settings
+from glider.tools.measure.benchmark.timing import alternate, median
+from glider.tools.study.campaign.conduct import fly_campaign
+from glider.tools.study.campaign.plan import CampaignPlan, build_plan, load_campaign, with_options
 
 OPTIONS = {"missions": ["sawtooth"], "controllers": ["pid", "law"], "seeds": 60}
 CHUNK = 10  # flights: many enough chunks that no core is left alone at the end
 
 
-def fly_all(plan: Plan, jobs: int) -> float:
+def fly_all(plan: CampaignPlan, jobs: int) -> float:
     """Fly the whole plan in a number of processes, keeping nothing; flights a second."""
     before = time.perf_counter()
     flown = fly_campaign(plan, jobs=jobs, chunk=CHUNK)

@@ -10,20 +10,20 @@ from typing import Any
 
 import numpy as np
 
-from firmware.autopilot import Autopilot
-from firmware.core.control.controller_rows import CONTROLLERS
-from firmware.core.layouts.control_layout import CONTROLLER
-from firmware.core.maths.wide import LANES
-from sim_backend.board import world_of
-from sim_backend.core.closed_loop import N_END, N_TRACE, fly
-from sim_backend.fleet import fly_group
-from sim_backend.world import World
-from tools.flight.compose import build_flight
-from tools.measure.benchmark.registry import Settings
-from tools.measure.benchmark.timing import median
+from glider.firmware.autopilot import Autopilot
+from glider.firmware.core.control.controller_rows import CONTROLLERS
+from glider.firmware.core.layouts.control_layout import CONTROLLER
+from glider.firmware.core.maths.wide import LANES
+from glider.sim_backend.board import world_of
+from glider.sim_backend.core.closed_loop import N_END, N_TRACE, fly
+from glider.sim_backend.fleet import fly_group
+from glider.sim_backend.world import World
+from glider.tools.flight.compose import build_flight
+from glider.tools.measure.benchmark.registry import Settings
+from glider.tools.measure.benchmark.timing import median
 
 MISSION = "sawtooth"
-LONGEST = 50_000  # ticks
+MAX_TICKS = 50_000  # ticks
 
 
 Flight = tuple[World, Autopilot]
@@ -44,7 +44,7 @@ def one_by_one(flights: Sequence[Flight]) -> tuple[int, float]:
     for (world, pilot), x in zip(flights, states, strict=True):
         ticks += fly(
             world.P, pilot.P, pilot.C, pilot.legs, pilot.nav, world.E, world.F, world.waves, world.sensors,
-            world.errors, world.seed, x, world.dt, LONGEST, LONGEST, trace, end,
+            world.errors, world.seed, x, world.dt, MAX_TICKS, MAX_TICKS, trace, end,
         )  # fmt: skip
     return ticks, time.thread_time() - before
 
@@ -54,7 +54,7 @@ def side_by_side(flights: Sequence[Flight]) -> tuple[int, float]:
     worlds, pilots = zip(*flights, strict=True)
     trace = np.zeros((len(flights), 1, N_TRACE))
     before = time.thread_time()
-    _, ticks = fly_group(worlds, pilots, LONGEST, LONGEST, trace)
+    _, ticks = fly_group(worlds, pilots, MAX_TICKS, MAX_TICKS, trace)
     return int(ticks.sum()), time.thread_time() - before
 
 

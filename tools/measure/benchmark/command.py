@@ -4,8 +4,8 @@ from pathlib import Path
 
 import click
 
-from tools.cli.common import json_option, print_json, say
-from tools.measure.benchmark.registry import MEASURES, Settings, run
+from glider.tools.cli.common import json_option, print_json, say
+from glider.tools.measure.benchmark.registry import MEASURES, Settings, run
 
 
 def _shown(value: object) -> str:
@@ -37,9 +37,7 @@ def _measures(context: click.Context, parameter: click.Parameter, given: tuple[s
     help="Cases of ocean gliders in folders of DIR, for `ocean`.",
 )  # fmt: skip
 @json_option
-def benchmark(
-    only: list[str], repeats: int, plant_c: Path | None, ocean_cases: Path | None, as_json: bool
-) -> None:
+def benchmark(only: list[str], repeats: int, plant_c: Path | None, ocean_cases: Path | None, as_json: bool) -> None:
     """Measure how fast this machine flies: medians of repeated runs, what is compared taken in turns."""
     results = run(only or list(MEASURES), Settings(repeats, plant_c, ocean_cases), lambda name: say(f"{name} ..."))
     if as_json:

@@ -12,21 +12,21 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from sim_backend.ocean.vehicle import OceanVehicle, gravity
-from tools.data.runs import columns as names
-from tools.data.runs.run import Run
+from glider.sim_backend.ocean.vehicle import OceanVehicle, gravity
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.run import Run
 
 THRESHOLD = 3.0  # robust standard deviations
 ROBUST = 1.4826  # median absolute deviation of a normal deviate to its standard deviation
 EVEN = 10.0  # s, to which a dive is brought
-SMOOTH = 7  # samples of a slope of the depth
+DEPTH_RATE_SAMPLES = 7  # samples of a slope of the depth
 ENDS = 0.1  # share of the depth at either end that is left out
-SHALLOWEST, FLATTEST, STEEPEST = 10.0, np.radians(11.0), np.radians(45.0)
-SETTLED = 60.0  # s behind a move of the engine
+SHALLOWEST_DEPTH, FLATTEST_PITCH, STEEPEST_PITCH = 10.0, np.radians(11.0), np.radians(45.0)
+SETTLING_S = 60.0  # s behind a move of the engine
 MOVED = 5e-6  # m3 from one even sample to the next: the engine moves
-FEWEST = 20  # samples of a dive
+MIN_DIVE_SAMPLES = 20  # samples of a dive
 ITERATIONS = 8  # of the angle of attack
-ORDER = 0.25  # m/s: speed at which a drag that is no square law is told
+REFERENCE_SPEED = 0.25  # m/s: speed at which a drag that is no square law is reported
 
 
 @dataclass
@@ -61,7 +61,7 @@ def even_samples(run: Run) -> Glide | None:
             return None
     columns.setdefault(names.TEMPERATURE, np.full(len(t), 10.0))
     s = np.arange(t[0], t[-1], EVEN)
-    if len(s) < 2 * SMOOTH:
+    if len(s) < 2 * DEPTH_RATE_SAMPLES:
         return None
 
     def evened(name: str) -> np.ndarray:
@@ -72,13 +72,13 @@ def even_samples(run: Run) -> Glide | None:
     from scipy.signal import savgol_filter
 
     depth, pitch, oil = (evened(name) for name in wanted[:3])
-    rise = -savgol_filter(depth, SMOOTH, 1, deriv=1, delta=EVEN)
+    rise = -savgol_filter(depth, DEPTH_RATE_SAMPLES, 1, deriv=1, delta=EVEN)
     moving = np.abs(np.gradient(oil)) > MOVED
-    reach = int(SETTLED / EVEN)
+    reach = int(SETTLING_S / EVEN)
     moving = np.convolve(moving, np.ones(2 * reach + 1), mode="same") > 0.5
     deepest = float(depth.max())
-    steady = ~moving & (np.abs(pitch) > FLATTEST) & (np.abs(pitch) < STEEPEST) & (rise * pitch > 0.0)
-    steady &= (depth > max(SHALLOWEST, ENDS * deepest)) & (depth < (1.0 - ENDS) * deepest)
+    steady = ~moving & (np.abs(pitch) > FLATTEST_PITCH) & (np.abs(pitch) < STEEPEST_PITCH) & (rise * pitch > 0.0)
+    steady &= (depth > max(SHALLOWEST_DEPTH, ENDS * deepest)) & (depth < (1.0 - ENDS) * deepest)
     given = np.isfinite(columns[names.DENSITY])
     holes = np.abs(s[:, None] - t[given][np.clip(np.searchsorted(t[given], s)[:, None] - [0, 1], 0, given.sum() - 1)])
     steady &= holes.min(axis=1) < 120.0
@@ -95,7 +95,7 @@ def rises(vehicle: OceanVehicle, glide: Glide, drag: float, volume: float) -> np
     lifted = glide.density * (volume * (1.0 + strain) + hull.oil_scale * glide.oil) - hull.mass
     force, side = gravity(vehicle.latitude) * lifted, np.sign(pitch)
     steep, attack = np.abs(pitch), np.full(len(pitch), 0.03)
-    speed, parasitic = np.full(len(pitch), ORDER), np.full(len(pitch), drag)
+    speed, parasitic = np.full(len(pitch), REFERENCE_SPEED), np.full(len(pitch), drag)
     for _ in range(ITERATIONS):
         q = 0.5 * glide.density * speed**2
         parasitic = drag * (np.maximum(q, 1.0) / 32.0) ** water.drag_exponent
@@ -133,7 +133,7 @@ def drag_of(vehicle: OceanVehicle, glide: Glide, drag: float, volume: float) -> 
 def practise(vehicle: OceanVehicle, runs: list[Run], reference: int) -> Practice:
     """A mission whose first `reference` dives are taken as unchanged."""
     glides = [even_samples(run) for run in runs]
-    usable = [one is not None and len(one.rise) >= FEWEST for one in glides]
+    usable = [one is not None and len(one.rise) >= MIN_DIVE_SAMPLES for one in glides]
     first = [n for n in range(reference) if usable[n]]
     drag, changed = np.full(len(runs), np.nan), np.zeros(len(runs), dtype=bool)
     if not first:
@@ -150,6 +150,6 @@ def practise(vehicle: OceanVehicle, runs: list[Run], reference: int) -> Practice
 
 def water_rms(vehicle: OceanVehicle, runs: list[Run], drag: float, volume: float) -> float:
     """Root mean square of the depth rate less that of the glide, m/s, over the steady samples of runs."""
-    glides = [one for run in runs if (one := even_samples(run)) is not None and len(one.rise) >= FEWEST]
+    glides = [one for run in runs if (one := even_samples(run)) is not None and len(one.rise) >= MIN_DIVE_SAMPLES]
     left = np.concatenate([one.rise - rises(vehicle, one, drag, volume) for one in glides])
     return float(np.sqrt(np.mean(left**2)))

@@ -14,15 +14,15 @@ from typing import Any
 import emcee  # first: the extra that brings it brings all the rest
 import numpy as np
 
-from firmware.model.vehicle import COEFFICIENTS
-from tools.data.runs.case import load_case
-from tools.data.sources import load_vehicle
-from tools.identify.design import write_design
-from tools.identify.fit import fit
-from tools.identify.sampler import APART, Whitened, sample, whiten
-from tools.identify.statistics import Quadratic
-from tools.measure.benchmark.registry import Settings
-from tools.measure.benchmark.timing import alternate, median
+from glider.firmware.model.vehicle import COEFFICIENTS
+from glider.tools.data.runs.case import load_case
+from glider.tools.data.sources import load_vehicle
+from glider.tools.identify.design import write_design
+from glider.tools.identify.fit import fit
+from glider.tools.identify.sampler import START_SIGMA, Whitened, sample, whiten
+from glider.tools.identify.statistics import Quadratic
+from glider.tools.measure.benchmark.registry import Settings
+from glider.tools.measure.benchmark.timing import alternate, median
 
 RUNS, SEED = list(range(0, 45, 5)), 1
 DRAWS = 10_000
@@ -35,7 +35,7 @@ def posterior() -> Quadratic:
     with tempfile.TemporaryDirectory() as folder:
         write_design(Path(folder), "roughie", load_vehicle("roughie"), SEED, RUNS)
         case = load_case(folder)
-        from tools.inference.model import nominal_model
+        from glider.tools.inference.model import nominal_model
 
         return fit(case, nominal_model(case), case.runs).quadratic
 
@@ -58,7 +58,7 @@ def emcee_ess(statistics: Quadratic, white: Whitened, evolving: bool = False) ->
     walkers = 2 * (size + 1)
     rng = np.random.default_rng(SEED)
     start = np.column_stack([
-        APART * rng.standard_normal((walkers, len(statistics.at))),
+        START_SIGMA * rng.standard_normal((walkers, len(statistics.at))),
         0.01 * rng.standard_normal((walkers, len(statistics.groups))),
     ])  # fmt: skip
     start[~np.isfinite(white.log_densities(start))] *= 0.1
@@ -91,7 +91,7 @@ def nuts_ess(statistics: Quadratic, white: Whitened) -> tuple[float, float] | No
         return prior + jnp.sum(count * levels + 0.5 * jnp.exp(-2.0 * levels) * square)
 
     rng = np.random.default_rng(SEED)
-    start = APART * rng.standard_normal((4, n + len(c)))
+    start = START_SIGMA * rng.standard_normal((4, n + len(c)))
     start[:, n:] *= 0.005
     mcmc = MCMC(NUTS(potential_fn=energy), num_warmup=TUNE, num_samples=KEPT, num_chains=4, chain_method="vectorized",
                 progress_bar=False)  # fmt: skip

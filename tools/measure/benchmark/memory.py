@@ -5,8 +5,8 @@ import subprocess
 import tempfile
 from typing import Any
 
-from tools.measure.benchmark.registry import Settings
-from tools.measure.benchmark.startup import glider_command
+from glider.tools.measure.benchmark.registry import Settings
+from glider.tools.measure.benchmark.startup import glider_command
 
 
 def measure(settings: Settings) -> dict[str, Any]:

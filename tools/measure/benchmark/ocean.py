@@ -13,17 +13,17 @@ from typing import Any
 
 import numpy as np
 
-from sim_backend.ocean.vehicle import OceanVehicle, decode_ocean_vehicle
-from tools.data.runs.case import CASE_FILE, Case, load_case
-from tools.identify.ocean.files import vehicle_text
-from tools.identify.ocean.identify import identify_ocean
-from tools.measure.benchmark.glider_flight import practise, water_rms
-from tools.measure.benchmark.registry import Settings
-from tools.measure.benchmark.timing import seconds
-from tools.study.challenge.ocean_cases import example_mission
-from tools.study.challenge.ocean_plan import CRAFTS
-from tools.watch.answer import NONE
-from tools.watch.watch import watch
+from glider.sim_backend.ocean.vehicle import OceanVehicle, decode_ocean_vehicle
+from glider.tools.data.runs.case import CASE_FILE, Case, load_case
+from glider.tools.identify.ocean.files import vehicle_text
+from glider.tools.identify.ocean.identify import identify_ocean
+from glider.tools.measure.benchmark.glider_flight import practise, water_rms
+from glider.tools.measure.benchmark.registry import Settings
+from glider.tools.measure.benchmark.timing import seconds
+from glider.tools.study.challenge.ocean_cases import example_mission
+from glider.tools.study.challenge.ocean_plan import CRAFTS
+from glider.tools.watch.answer import NONE
+from glider.tools.watch.watch import watch
 
 DIVES, REFERENCE, FIRST = 20, 8, 14  # of a mission; learned from; the first changed dive
 DRAG = 0.3
@@ -84,27 +84,31 @@ def rms_of(vehicle: OceanVehicle, rest: Case, changed: np.ndarray, drag: float, 
 
 def figures(own: list[Judged], practice: list[Judged], head: str = "") -> dict[str, Any]:
     """What both ways make of the same missions."""
-    told: dict[str, Any] = {}
+    figures_by_name: dict[str, Any] = {}
     for name, listed in (("", own), ("practice_", practice)):
         called, changed = (np.concatenate([getattr(one, key) for one in listed]) for key in ("called", "changed"))
-        told[f"{head}{name}w_rms_cm_s"] = CENTIMETRES * float(np.sqrt(np.mean([one.rms**2 for one in listed])))
-        told[f"{head}{name}false_alarms"] = float(called[~changed].mean())
+        figures_by_name[f"{head}{name}w_rms_cm_s"] = CENTIMETRES * float(
+            np.sqrt(np.mean([one.rms**2 for one in listed]))
+        )
+        figures_by_name[f"{head}{name}false_alarms"] = float(called[~changed].mean())
         if changed.any():
-            told[f"{head}{name}found"] = float(called[changed].mean())
-        told[f"{head}{name}seconds"] = sum(one.seconds for one in listed)
+            figures_by_name[f"{head}{name}found"] = float(called[changed].mean())
+        figures_by_name[f"{head}{name}seconds"] = sum(one.seconds for one in listed)
     for key in ("w_rms_cm_s", "seconds"):
-        told[f"{head}{key}_ratio"] = told[f"{head}{key}"] / told[f"{head}practice_{key}"]
-    told[f"{head}dives"] = int(sum(len(one.called) for one in own))
-    return told
+        figures_by_name[f"{head}{key}_ratio"] = (
+            figures_by_name[f"{head}{key}"] / figures_by_name[f"{head}practice_{key}"]
+        )
+    figures_by_name[f"{head}dives"] = int(sum(len(one.called) for one in own))
+    return figures_by_name
 
 
 def made_missions(folder: Path) -> list[tuple[Case, np.ndarray]]:
     """Missions of every craft, unchanged and with more drag, with which of the judged dives are changed."""
     made = []
-    for craft in CRAFTS:
+    for vehicle_class in CRAFTS:
         for change in (None, ("drag", DRAG, FIRST)):
-            own = folder / f"{craft}-{'same' if change is None else 'drag'}"
-            example_mission(own, craft, DIVES, SEED, change)
+            own = folder / f"{vehicle_class}-{'same' if change is None else 'drag'}"
+            example_mission(own, vehicle_class, DIVES, SEED, change)
             changed = np.arange(REFERENCE, DIVES) >= (DIVES if change is None else FIRST)
             made.append((load_case(own), changed))
     return made
@@ -120,7 +124,7 @@ def measure(settings: Settings) -> dict[str, Any]:
         case, changed = missions[0]
         ours(replace(case, runs=case.runs[:3]), 2, changed[:1])  # compiles
         both = [(ours(case, REFERENCE, changed), theirs(case, REFERENCE, changed)) for case, changed in missions]
-    told = figures([one for one, _ in both], [other for _, other in both])
+    figures_by_name = figures([one for one, _ in both], [other for _, other in both])
     for path in [] if settings.ocean_cases is None else sorted(settings.ocean_cases.iterdir()):
         if not (path / CASE_FILE).is_file():
             continue
@@ -129,5 +133,5 @@ def measure(settings: Settings) -> dict[str, Any]:
             continue
         reference = min(MOST_REFERENCE, len(case.runs) // 2)
         same = np.zeros(len(case.runs) - reference, dtype=bool)
-        told |= figures([ours(case, reference, same)], [theirs(case, reference, same)], f"{path.name}_")
-    return told
+        figures_by_name |= figures([ours(case, reference, same)], [theirs(case, reference, same)], f"{path.name}_")
+    return figures_by_name

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from firmware.core.maths.wide import LANES
-from firmware.core.vehicle import layout
-from firmware.core.vehicle.batch import nominal_batch
-from firmware.core.vehicle.flight import nominal_run
-from tools.measure.benchmark.timing import seconds
+from glider.firmware.core.maths.wide import LANES
+from glider.firmware.core.vehicle import layout
+from glider.firmware.core.vehicle.batch import nominal_batch
+from glider.firmware.core.vehicle.flight import nominal_run
+from glider.tools.measure.benchmark.timing import seconds
 
 VEHICLES = 64
 SPREAD = 0.05  # of every parameter and command, either way

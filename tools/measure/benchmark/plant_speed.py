@@ -15,16 +15,16 @@ from typing import Any
 
 import numpy as np
 
-from firmware.core.maths.rotations import euler_from_quaternion, wrap_angle
-from firmware.core.vehicle import layout
-from firmware.core.vehicle.flight import nominal_run
-from firmware.model.library import shipped
-from firmware.model.vehicle import decode_vehicle
-from tools.data.errors import InputError
-from tools.measure.benchmark.c_program import compiled
-from tools.measure.benchmark.plant_batch import VEHICLES, Fleet
-from tools.measure.benchmark.registry import Settings
-from tools.measure.benchmark.timing import alternate, median, seconds
+from glider.firmware.core.maths.rotations import euler_from_quaternion, wrap_angle
+from glider.firmware.core.vehicle import layout
+from glider.firmware.core.vehicle.flight import nominal_run
+from glider.firmware.model.library import shipped
+from glider.firmware.model.vehicle import decode_vehicle
+from glider.tools.data.errors import InputError
+from glider.tools.measure.benchmark.c_program import compiled
+from glider.tools.measure.benchmark.plant_batch import VEHICLES, Fleet
+from glider.tools.measure.benchmark.registry import Settings
+from glider.tools.measure.benchmark.timing import alternate, median, seconds
 
 STEPS = 2_000_000
 DT = 0.01  # s
@@ -93,7 +93,7 @@ def measure(settings: Settings, steps: int = STEPS) -> dict[str, Any]:
     ours = (lambda: kernel_speed(P, steps), lambda: fleet.speed(each))
     compiler = shutil.which("cc")
     note = "no C compiler (cc) to compare with"
-    with as_file(files("tools.measure.benchmark") / "plant.c") as own:
+    with as_file(files("glider.tools.measure.benchmark") / "plant.c") as own:
         source = settings.plant_c or own
         try:
             if compiler is not None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from tools.data.errors import InputError
+from glider.tools.data.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Measure(NamedTuple):
 
     def load(self) -> Callable[[Settings], dict[str, Any]]:
         """The function itself; its module is imported now."""
-        return importlib.import_module(f"tools.measure.benchmark.{self.module}").measure
+        return importlib.import_module(f"glider.tools.measure.benchmark.{self.module}").measure
 
 
 MEASURES = {
@@ -46,7 +46,7 @@ MEASURES = {
 
 
 def run(names: list[str], settings: Settings, started: Callable[[str], None] | None = None) -> dict[str, Any]:
-    """Results by name of measure, in the order of `names`; `started` is told before each."""
+    """Results by name of measure, in the order of `names`; `started` is called before each."""
     unknown = [name for name in names if name not in MEASURES]
     if unknown:
         raise InputError(f"no measure '{unknown[0]}': expected one of {', '.join(MEASURES)}")

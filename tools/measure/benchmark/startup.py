@@ -5,20 +5,20 @@ import subprocess
 import sys
 from pathlib import Path
 
-from tools.measure.benchmark.registry import Settings
-from tools.measure.benchmark.tick import harness
-from tools.measure.benchmark.timing import median, process_seconds, seconds
+from glider.tools.measure.benchmark.registry import Settings
+from glider.tools.measure.benchmark.tick import harness
+from glider.tools.measure.benchmark.timing import median, process_seconds, seconds
 
 
 def glider_command() -> list[str]:
     """The installed `glider` of this interpreter; without one, the module behind it."""
     beside = shutil.which("glider", path=str(Path(sys.executable).parent))
-    return [beside] if beside else [sys.executable, "-m", "tools.cli.main"]
+    return [beside] if beside else [sys.executable, "-m", "glider.tools.cli.main"]
 
 
 def _first_tick() -> None:
     """Start a process that gets ready to fly, and wait until it has ticked once."""
-    command = [sys.executable, "-m", "tools.measure.benchmark.startup"]
+    command = [sys.executable, "-m", "glider.tools.measure.benchmark.startup"]
     with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
         assert process.stdout is not None
         if process.stdout.readline() != b"ticked\n":

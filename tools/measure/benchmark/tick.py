@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from firmware.core.jit import compiled_signatures
-from firmware.runtime import Runtime
-from tools.measure.benchmark.allocations import blocks_asked_for
-from tools.measure.benchmark.registry import Settings
+from glider.firmware.core.jit import compiled_signatures
+from glider.firmware.runtime import Runtime
+from glider.tools.measure.benchmark.allocations import blocks_asked_for
+from glider.tools.measure.benchmark.registry import Settings
 
 WARM_UP = 2000
 TICKS = 100_000
@@ -116,8 +116,8 @@ class Harness:
 @contextmanager
 def harness(mission: str = ENDLESS) -> Iterator[Harness]:
     """An armed runtime on the simulated board, recording to a temporary file."""
-    from hal.recorder.recorder import Recorder
-    from tools.flight.compose import build_flight, build_runtime, record_specs
+    from glider.hal.recorder.recorder import Recorder
+    from glider.tools.flight.compose import build_flight, build_runtime, record_specs
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "mission.toml")

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from firmware.runtime import HISTOGRAM_EDGES
-from tools.data.errors import InputError
-from tools.measure.benchmark.c_program import compiled
+from glider.firmware.runtime import HISTOGRAM_EDGES
+from glider.tools.data.errors import InputError
+from glider.tools.measure.benchmark.c_program import compiled
 
 TIMEOUT_S = 60.0  # beyond the time it is to run
 
@@ -76,7 +76,10 @@ def bare_loop_program() -> Iterator[Path]:
     compiler = shutil.which("cc")
     if compiler is None:
         raise InputError("no C compiler (cc) to compile the bare loop with")
-    with as_file(files("tools.measure.figures") / "bare_loop.c") as source, compiled(source, compiler) as program:
+    with (
+        as_file(files("glider.tools.measure.figures") / "bare_loop.c") as source,
+        compiled(source, compiler) as program,
+    ):
         yield program
 
 

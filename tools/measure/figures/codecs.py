@@ -1,13 +1,13 @@
-"""`python -m tools.measure.figures.codecs`: damaged bytes through every codec (tools/study/faults/damaged_streams.py);
-prints what came of them as JSON."""
+"""`python -m glider.tools.measure.figures.codecs`: damaged bytes through every codec (tools/study/faults/damaged_streams.py);
+prints their outcomes as JSON."""
 
 import random
 from dataclasses import asdict
 
 import click
 
-from tools.cli.common import FAILED, print_json, progress
-from tools.study.faults.damaged_streams import codecs, run_codec
+from glider.tools.cli.common import FAILED, print_json, progress
+from glider.tools.study.faults.damaged_streams import codecs, run_codec
 
 BYTES = 10_000_000
 

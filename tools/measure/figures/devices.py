@@ -1,4 +1,4 @@
-"""`python -m tools.measure.figures.devices`: what is claimed of the real drivers, measured against twins, as JSON.
+"""`python -m glider.tools.measure.figures.devices`: what is claimed of the real drivers, measured against twins, as JSON.
 
 same-flight: a mission at real time through drivers, wires and twins, against the same seed on the simulated board
 with the same rates and delays. lateness: the tick's lateness while a device is silent, late, babbling or unplugged,
@@ -16,9 +16,9 @@ from typing import Any
 import click
 import numpy as np
 
-from firmware.core.control.telemetry import REC_LATENESS
-from firmware.core.layouts import supervisor_layout as sup
-from tools.cli.common import DONE, FAILED, print_json, progress
+from glider.firmware.core.control.telemetry import REC_LATENESS
+from glider.firmware.core.layouts import supervisor_layout as sup
+from glider.tools.cli.common import DONE, FAILED, print_json, progress
 
 POSITION_LIMIT_M, ATTITUDE_LIMIT_DEG = 0.10, 2.0
 RATIO_LIMIT = 1.5
@@ -57,9 +57,9 @@ def same_flight(mission: str, seed: int, fifo: bool) -> None:
 
 def compare_flights(mission: str, seed: int, folder: Path, *, vehicle: str = "roughie") -> dict[str, Any]:
     """Both flights, logged, and how far they are apart."""
-    from sim_backend.twins.boardfile import decode_twin_file, simulated_text
-    from tools.data.boards import load_board_file
-    from tools.data.log.reader import read_log
+    from glider.sim_backend.twins.boardfile import decode_twin_file, simulated_text
+    from glider.tools.data.boards import load_board_file
+    from glider.tools.data.log.reader import read_log
 
     found = load_board_file("twin")
     (folder / "sim.toml").write_text(simulated_text(decode_twin_file(found.text, found.source)))
@@ -85,7 +85,7 @@ def fly(mission: str, vehicle: str, board: str, seed: int, log: Path) -> dict[st
     import subprocess
     import sys
 
-    command = [sys.executable, "-m", "tools.cli.main", "fly", "--mission", mission, "--vehicle", vehicle]
+    command = [sys.executable, "-m", "glider.tools.cli.main", "fly", "--mission", mission, "--vehicle", vehicle]
     command += ["--board", board, "--seed", str(seed)]
     done = subprocess.run([*command, "--log", str(log), "--json"], stdout=subprocess.PIPE, check=False)
     return json.loads(done.stdout)
@@ -110,7 +110,7 @@ AXES = ("roll", "pitch", "yaw")
 
 def _quaternions(angles: np.ndarray) -> np.ndarray:
     """Unit quaternions (n, 4) of roll, pitch and yaw (n, 3)."""
-    from firmware.core.maths.rotations import quaternion_from_euler
+    from glider.firmware.core.maths.rotations import quaternion_from_euler
 
     return np.array([quaternion_from_euler(*row) for row in angles])
 
@@ -131,11 +131,11 @@ def lateness(block: float, turns: int, fifo: bool) -> None:
 
 def measure_lateness(block: float, turns: int, faults: Any) -> list[dict[str, Any]]:
     """One flight of the real runtime on twins; in turns, each fault comes and goes."""
-    from firmware.runtime import Runtime
-    from firmware.telemetry import TICK
-    from hal.recorder.recorder import NullRecorder
-    from tools.flight.compose import build_flight
-    from tools.measure.benchmark.tick import ENDLESS
+    from glider.firmware.runtime import Runtime
+    from glider.firmware.telemetry import TICK
+    from glider.hal.recorder.recorder import NullRecorder
+    from glider.tools.flight.compose import build_flight
+    from glider.tools.measure.benchmark.tick import ENDLESS
 
     with tempfile.TemporaryDirectory() as folder:
         mission = Path(folder, "endless.toml")
@@ -171,17 +171,17 @@ def _one_fault(
 ) -> dict[str, Any]:
     """Lateness (s) of disturbed and undisturbed blocks in turns; the first 0.2 s of each are not counted."""
     late: dict[bool, list[np.ndarray]] = {False: [], True: []}
-    settle = round(0.2 / runtime.dt)
+    settling_ticks = round(0.2 / runtime.dt)
     for _ in range(turns):
         for disturbed in (False, True):
             board.control(f"fault {device} {fault if disturbed else 'none'}")
-            _run_ticks(runtime, channel, settle)
+            _run_ticks(runtime, channel, settling_ticks)
             late[disturbed].append(_run_ticks(runtime, channel, ticks))
         board.control(f"fault {device} none")
         advance(1)
-    quiet, bad = (np.concatenate(late[key]) for key in (False, True))
+    calm, bad = (np.concatenate(late[key]) for key in (False, True))
     figures = {
-        name: {"undisturbed_us": 1e6 * float(of(quiet)), "disturbed_us": 1e6 * float(of(bad))}
+        name: {"undisturbed_us": 1e6 * float(of(calm)), "disturbed_us": 1e6 * float(of(bad))}
         for name, of in (("median", np.median), ("p99", lambda x: np.percentile(x, 99)))
     }
     ratios = {name: row["disturbed_us"] / row["undisturbed_us"] for name, row in figures.items()}
@@ -225,12 +225,12 @@ def time_fault(command: str, row: int) -> dict[str, Any]:
     """One flight of the shipped vehicle, with voltages, on twins; a command to the twins breaks it under water."""
     import msgspec
 
-    from firmware.faults import FAULT_TABLE
-    from firmware.model.supervisor_settings import Limits
-    from firmware.supervisor import Supervisor
-    from hal.recorder.recorder import NullRecorder
-    from tools.flight import sortie
-    from tools.flight.compose import build_flight, record_specs
+    from glider.firmware.faults import FAULT_TABLE
+    from glider.firmware.model.supervisor_settings import Limits
+    from glider.firmware.supervisor import Supervisor
+    from glider.hal.recorder.recorder import NullRecorder
+    from glider.tools.flight import sortie
+    from glider.tools.flight.compose import build_flight, record_specs
 
     flight = build_flight(mission="sawtooth", board="twin")
     board: Any = flight.board
@@ -256,7 +256,7 @@ def time_fault(command: str, row: int) -> dict[str, Any]:
         adrift = json.loads(board.control("adrift 300"))["z_m"]
         return ending
 
-    host = sortie.Host(flight, name="timings")
+    host = sortie.FlightHost(flight, name="timings")
     flown = sortie.fly(flight, host, lambda: NullRecorder(record_specs(flight)), loop=loop)
     noticed = supervisor.noticed(row)
     after = None if noticed is None else noticed - begun

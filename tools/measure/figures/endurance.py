@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from firmware.core.control.telemetry import REC_LATENESS
-from tools.cli.common import progress
-from tools.measure.figures.bare_loop import BareLoop, Punctuality, bare_loop_program, stolen_s
+from glider.firmware.core.control.telemetry import REC_LATENESS
+from glider.tools.cli.common import progress
+from glider.tools.measure.figures.bare_loop import BareLoop, Punctuality, bare_loop_program, stolen_s
 
 WARM_UP_S = 20.0
 SAMPLE_S = 10.0
@@ -112,12 +112,12 @@ def _load(core: int) -> subprocess.Popen[bytes]:
 def _fly(
     mission: Path, folder: Path, seconds: float, fifo: bool, core: int, start_beside: Callable[[], None]
 ) -> tuple[dict[str, Any], np.ndarray]:
-    from firmware.runtime import Ending, Runtime
-    from hal import realtime
-    from hal.recorder.recorder import Recorder
-    from tools.flight import sortie
-    from tools.flight.compose import build_flight, build_recorder
-    from tools.flight.keeper import Keeper
+    from glider.firmware.runtime import Ending, Runtime
+    from glider.hal import realtime
+    from glider.hal.recorder.recorder import Recorder
+    from glider.tools.flight import sortie
+    from glider.tools.flight.compose import build_flight, build_recorder
+    from glider.tools.flight.keeper import FlightSupervision
 
     flight = build_flight(mission=str(mission), board="twin")
     made: list[Recorder] = []
@@ -125,7 +125,7 @@ def _fly(
     samples, mode = Samples(seconds), ""
     figures: dict[str, Any] = {}
 
-    class Enduring(Keeper):
+    class Enduring(FlightSupervision):
         def prepare(self) -> None:
             if fifo:  # before the twins start: they follow, ten below
                 said.append(realtime.take_priority(PRIORITY))
@@ -152,8 +152,8 @@ def _fly(
     report = sortie.fly(flight, keeper, make_recorder, loop=loop, before_loop=before_loop).report
     figures["pass"] = figures["pass"] and mode == "flying"
     records = {"written": report.written, "dropped": report.dropped, "complete": report.complete}
-    told = {"real_time": said, "mode_at_the_end": mode, "records": records}
-    return {**figures, **told}, samples.late[: min(samples.late_count, LATE_KEPT)]
+    described = {"real_time": said, "mode_at_the_end": mode, "records": records}
+    return {**figures, **described}, samples.late[: min(samples.late_count, LATE_KEPT)]
 
 
 class Samples:
@@ -174,7 +174,7 @@ class Samples:
 
     def take(self, t: float, recorder_pid: int) -> None:
         """One row; the interpreter's blocks first, so that the looking itself is not in them."""
-        from tools.flight.keeper import open_files, resident_bytes
+        from glider.tools.flight.keeper import open_files, resident_bytes
 
         blocks = sys.getallocatedblocks()
         self.rows[self.count] = (t, blocks, resident_bytes(), open_files(), resident_bytes(recorder_pid))

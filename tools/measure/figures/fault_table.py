@@ -1,6 +1,6 @@
 """Print the fault table as it stands in docs/SUPERVISOR.md; a test compares the two."""
 
-from firmware.faults import markdown_rows
+from glider.firmware.faults import markdown_rows
 
 
 def main() -> None:

@@ -1,6 +1,6 @@
 """What `glider identify` is worth on vehicles of another form: gaps of healthy runs left out, before and after.
 
-    python -m tools.measure.figures.form_identify --seed 3101 --vehicles 12
+    python -m glider.tools.measure.figures.form_identify --seed 3101 --vehicles 12
 
 Vehicles are drawn and flown as in `gap challenge make --form`, all runs healthy; those left out have motion capture,
 and those fitted unless --no-mocap. Beside the file's and the identified vehicle stands the nearest of equation (4),
@@ -15,22 +15,22 @@ from pathlib import Path
 import click
 import numpy as np
 
-from tools.cli.common import progress
-from tools.data.runs import columns as names
-from tools.data.runs.case import Case, load_case
-from tools.data.sources import load_vehicle
-from tools.gap.measure import RunGap, run_gap, with_total
-from tools.identify.files import VEHICLE as IDENTIFIED
-from tools.identify.files import write
-from tools.identify.pipeline import identify
-from tools.inference.channels import ROUGHIE_MEASURES
-from tools.inference.model import nominal_model
-from tools.inference.predict import predict
-from tools.study.challenge.form_cases import draw_healthy, write_flights
-from tools.study.challenge.form_fit import fit_flights, fit_forces, formless
-from tools.study.challenge.make import VEHICLE
-from tools.study.challenge.trial import by_channel, total
-from tools.study.workers import work_here
+from glider.tools.cli.common import progress
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.case import Case, load_case
+from glider.tools.data.sources import load_vehicle
+from glider.tools.gap.measure import RunGap, run_gap, with_total
+from glider.tools.identify.files import VEHICLE as IDENTIFIED
+from glider.tools.identify.files import write
+from glider.tools.identify.pipeline import identify
+from glider.tools.inference.channels import ROUGHIE_MEASURES
+from glider.tools.inference.model import nominal_model
+from glider.tools.inference.predict import predict
+from glider.tools.study.challenge.form_cases import draw_healthy, write_flights
+from glider.tools.study.challenge.form_fit import fit_flights, fit_forces, formless
+from glider.tools.study.challenge.make import VEHICLE
+from glider.tools.study.challenge.trial import by_channel, total
+from glider.tools.study.workers import work_here
 
 TRIES, REFINING = 20, 6
 NAMES = ("file", "identified", "nearest")

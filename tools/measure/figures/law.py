@@ -1,6 +1,6 @@
 """The law's figures over glides of the shipped vehicle.
 
-`python -m tools.measure.figures.law` prints tables of docs/CONTROL.md.
+`python -m glider.tools.measure.figures.law` prints tables of docs/CONTROL.md.
 
 What the `paper` form leaves out against the exact one, in theta_dd, Z_dd, the input gains and the roll form (22); and
 the k2 that covers what [uncertainty] and [disturbance] leave of the exact one.
@@ -11,16 +11,22 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from firmware.core.control.error_bound import model_error_bound
-from firmware.core.control.input_forms import exact_form, output_accelerations, output_rates, paper_form, roll_form
-from firmware.core.control.law import k2_to_cover
-from firmware.core.maths.rotations import euler_from_quaternion, quaternion_from_euler, rotation_nb
-from firmware.core.vehicle import layout
-from firmware.core.vehicle.flight import nominal_derivative, nominal_run
-from firmware.core.vehicle.motion import accelerations
-from firmware.model.estimator_settings import parameter_sigma
-from firmware.model.vehicle import Vehicle
-from tools.data.sources import load_vehicle
+from glider.firmware.core.control.error_bound import model_error_bound
+from glider.firmware.core.control.input_forms import (
+    exact_form,
+    output_accelerations,
+    output_rates,
+    paper_form,
+    roll_form,
+)
+from glider.firmware.core.control.law import k2_to_cover
+from glider.firmware.core.maths.rotations import euler_from_quaternion, quaternion_from_euler, rotation_nb
+from glider.firmware.core.vehicle import layout
+from glider.firmware.core.vehicle.flight import nominal_derivative, nominal_run
+from glider.firmware.core.vehicle.motion import accelerations
+from glider.firmware.model.estimator_settings import parameter_sigma
+from glider.firmware.model.vehicle import Vehicle
+from glider.tools.data.sources import load_vehicle
 
 SEED = 1
 STATES, COVER_STATES = 20_000, 2_000
@@ -31,8 +37,8 @@ ATTACK, SIDESLIP = math.radians(8.0), math.radians(5.0)  # +-
 RATE = 0.1  # rad/s, +-
 # steady glides: settled when no acceleration is above this after the time
 SETTLING_S, STEP = 240.0, 0.02
-SETTLED = 1e-3  # m/s2, rad/s2
-STEEPEST = math.radians(60.0)
+STEADY_ACCELERATION = 1e-3  # m/s2, rad/s2
+STEEPEST_PITCH = math.radians(60.0)
 
 Sample = tuple[np.ndarray, np.ndarray]  # state (N_X,), speeds of the actuators (3,)
 ROWS = ("theta_dd, rad/s2", "Z_dd, m/s2", "phi_dd, rad/s2", "g_theta, share", "g_Z, share")
@@ -76,7 +82,7 @@ def steady_glides(P: np.ndarray) -> Iterator[Sample]:
                 nominal_run(P, x, *command, 0.0, 0.0, 0.0, STEP, round(SETTLING_S / STEP), work)
                 nominal_derivative(P, x, *command, 0.0, 0.0, 0.0, rates)
                 _, pitch, _ = euler_from_quaternion(*x[3:7])
-                if np.abs(rates[7:13]).max() < SETTLED and abs(pitch) < STEEPEST:
+                if np.abs(rates[7:13]).max() < STEADY_ACCELERATION and abs(pitch) < STEEPEST_PITCH:
                     yield x, np.zeros(3)
 
 

@@ -1,7 +1,7 @@
 """How well an ocean glider's mean speed is known: twin missions, identified and asked (docs/OCEAN.md, Velocity).
 
-    python -m tools.measure.figures.ocean_speed --seed 90731 --missions 12
-    python -m tools.measure.figures.ocean_speed --seed 90741 --missions 12 --changed
+python -m glider.tools.measure.figures.ocean_speed --seed 90731 --missions 12
+python -m glider.tools.measure.figures.ocean_speed --seed 90741 --missions 12 --changed
 """
 
 import tempfile
@@ -11,16 +11,16 @@ from pathlib import Path
 import click
 import numpy as np
 
-from tools.data.runs.case import load_case
-from tools.gap.velocity import Velocity, velocities
-from tools.identify.ocean.files import vehicle_text
-from tools.identify.ocean.identify import identify_ocean
-from tools.inference.model import nominal_model
-from tools.inference.parameters import NINETY
-from tools.study.challenge.ocean_cases import TRUTH_EVERY, draw_case, write_dives
-from tools.study.challenge.ocean_plan import CRAFTS, MissionPlan
-from tools.study.challenge.watch_plan import CHANGED, STEP, UNCHANGED, WatchCounts
-from tools.watch.watch import watch
+from glider.tools.data.runs.case import load_case
+from glider.tools.gap.velocity import Velocity, velocities
+from glider.tools.identify.ocean.files import vehicle_text
+from glider.tools.identify.ocean.identify import identify_ocean
+from glider.tools.inference.model import nominal_model
+from glider.tools.inference.parameters import NINETY
+from glider.tools.study.challenge.ocean_cases import TRUTH_EVERY, draw_case, write_dives
+from glider.tools.study.challenge.ocean_plan import CRAFTS, MissionPlan
+from glider.tools.study.challenge.watch_plan import CHANGED, STEP, UNCHANGED, WatchCounts
+from glider.tools.watch.watch import watch
 
 LEARNED, ASKED = 12, 8  # dives
 CHANGE = 3  # of the dives that are asked, the first that is changed
@@ -29,7 +29,7 @@ CM = 100.0
 
 
 @dataclass
-class Asked:
+class SpeedQuery:
     """Of one mission's dives, m/s: error of the mean speed, what is said of it, and of its rows, all 1 sigma."""
 
     speed: bool
@@ -40,22 +40,22 @@ class Asked:
 
 def plan_of(number: int, changed: bool) -> MissionPlan:
     """Crafts in turn, every other three missions with a speed log; changes in turn, steps from dive CHANGE on."""
-    craft, speed = CRAFTS[number % 3], (number // 3) % 2 == 1
+    vehicle_class, speed = CRAFTS[number % 3], (number // 3) % 2 == 1
     if not changed:
-        return MissionPlan(number, UNCHANGED, None, None, None, None, False, craft, speed)
+        return MissionPlan(number, UNCHANGED, None, None, None, None, False, vehicle_class, speed)
     label = LABELS[(number // 6 + number) % len(LABELS)]
-    return MissionPlan(number, CHANGED, label, STEP, CHANGE, None, False, craft, speed)
+    return MissionPlan(number, CHANGED, label, STEP, CHANGE, None, False, vehicle_class, speed)
 
 
-def asked(seed: int, plan: MissionPlan, folder: Path) -> Asked:
+def asked(seed: int, plan: MissionPlan, folder: Path) -> SpeedQuery:
     """A mission drawn, identified from its first dives, and asked for the speed of the others.
 
     Of one that changes the watch is asked, with the first dives for its reference, and the changed dives are taken; an
     interval that is not even about its mean counts as half its width about its middle.
     """
     made = draw_case(seed, plan, WatchCounts(1, 1, LEARNED + ASKED, LEARNED))
-    write_dives(folder / "before", plan.craft, made.runs[:LEARNED])
-    write_dives(folder / "asked", plan.craft, made.runs[LEARNED:])
+    write_dives(folder / "before", plan.vehicle_class, made.runs[:LEARNED])
+    write_dives(folder / "asked", plan.vehicle_class, made.runs[LEARNED:])
     vehicle, before = folder / "identified.toml", load_case(folder / "before")
     vehicle.write_text(vehicle_text(identify_ocean(before)), encoding="utf-8")
     case, true = load_case(folder / "asked", str(vehicle)), made.truth[LEARNED:]
@@ -69,7 +69,7 @@ def asked(seed: int, plan: MissionPlan, folder: Path) -> Asked:
         errors += ends.mean(axis=1) - [float(one.columns["u_m_s"][one.steady].mean()) for one in found]
         said = np.ptp(ends, axis=1) / (2.0 * NINETY)
         errors, said, rows = errors[CHANGE:], said[CHANGE:], rows[CHANGE:]
-    return Asked(plan.speed, errors, said, rows)
+    return SpeedQuery(plan.speed, errors, said, rows)
 
 
 def mean_error(found: Velocity, true: np.ndarray) -> float:
@@ -78,7 +78,7 @@ def mean_error(found: Velocity, true: np.ndarray) -> float:
     return float((found.columns["u_m_s"] - at_rows)[found.steady].mean())
 
 
-def summary(missions: list[Asked]) -> str:
+def summary(missions: list[SpeedQuery]) -> str:
     """A line: root mean squares over missions in cm/s, z of missions, dives within their 90 % intervals."""
     means = np.array([one.errors.mean() for one in missions])
     said, rows = (np.array([getattr(one, name).mean() for one in missions]) for name in ("said", "rows"))

@@ -1,6 +1,6 @@
-"""How often `glider gap readings` finds what is wrong, and accuses what is not: cases of the blind test's own drawing.
+"""How often `glider gap readings` finds what is wrong, and flags what is not: cases of the blind test's own drawing.
 
-    python -m tools.measure.figures.readings_share --seed 91001 --none 100 --each 10
+    python -m glider.tools.measure.figures.readings_share --seed 91001 --none 100 --each 10
 
 A label's cases are drawn as in `gap challenge make`: half weak, half strong, flown in the foreign plant.
 """
@@ -12,14 +12,14 @@ from pathlib import Path
 
 import click
 
-from tools.cli.common import progress
-from tools.data.runs.case import load_case
-from tools.data.sources import load_vehicle
-from tools.readings.check import check
-from tools.study.challenge.cases import NoCase, draw_case, write
-from tools.study.challenge.make import VEHICLE
-from tools.study.challenge.plan import NONE, SINGLE, CasePlan
-from tools.study.workers import work_here
+from glider.tools.cli.common import progress
+from glider.tools.data.runs.case import load_case
+from glider.tools.data.sources import load_vehicle
+from glider.tools.readings.check import check
+from glider.tools.study.challenge.cases import NoCase, draw_case, write
+from glider.tools.study.challenge.make import VEHICLE
+from glider.tools.study.challenge.plan import NONE, SINGLE, CasePlan
+from glider.tools.study.workers import work_here
 
 BY_CAPTURE = (
     "mocap_delay", "clock_skew", "imu_pitch_bias", "imu_roll_bias", "compass", "attitude_scale", "depth_offset",
@@ -40,7 +40,7 @@ def plans(none: int, each: int) -> list[CasePlan]:
     return found
 
 
-def accused(seed: int, plan: CasePlan) -> tuple[str, ...]:
+def flagged(seed: int, plan: CasePlan) -> tuple[str, ...]:
     """A case drawn and its readings checked: the label of each finding, its kind where it has none."""
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
@@ -53,10 +53,10 @@ def accused(seed: int, plan: CasePlan) -> tuple[str, ...]:
 
 
 def table(answers: dict[CasePlan, tuple[str, ...]]) -> list[str]:
-    """Lines: cases without a gap and what was accused in them, then each label's share by site and strength."""
+    """Lines: cases without a gap and what was flagged in them, then each label's share by site and strength."""
     drawn = {plan: found for plan, found in answers.items() if found != (NOT_DRAWN,)}
     clean = [found for plan, found in drawn.items() if plan.kind == NONE]
-    lines = [f"without a gap: {len(clean)} cases, accused in {sum(map(bool, clean))}: {_counted(clean)}"]
+    lines = [f"without a gap: {len(clean)} cases, flagged in {sum(map(bool, clean))}: {_counted(clean)}"]
     groups: dict[tuple[str, bool], list[CasePlan]] = {}
     for plan in drawn:
         if plan.kind == SINGLE:
@@ -87,7 +87,7 @@ def main(seed: int, none: int, each: int, jobs: int) -> None:
     todo = plans(none, each)
     answers = {}
     with progress("cases", len(todo)) as advance:
-        for plan, found in work_here(partial(accused, seed), todo, jobs):
+        for plan, found in work_here(partial(flagged, seed), todo, jobs):
             answers[plan] = found
             advance(1)
     for line in table({plan: answers[plan] for plan in todo}):

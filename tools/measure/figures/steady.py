@@ -1,6 +1,6 @@
 """How steady a diagnosis is: copies with a millionth of each reading's noise added (docs/DIAGNOSIS.md, Steady).
 
-    python -m tools.measure.figures.steady CASE... --copies 4 --seed 1
+    python -m glider.tools.measure.figures.steady CASE... --copies 4 --seed 1
 
 Prints, for each case, the largest move of a probability and of which entry, and whether verdict and `selected` stayed.
 """
@@ -11,12 +11,12 @@ from pathlib import Path
 import click
 import numpy as np
 
-from tools.cli.common import progress
-from tools.data.runs.case import Case, load_case
-from tools.diagnose.diagnosis import diagnose
-from tools.inference.kinds import kind_of
+from glider.tools.cli.common import progress
+from glider.tools.data.runs.case import Case, load_case
+from glider.tools.diagnose.diagnosis import diagnose
+from glider.tools.inference.kinds import kind_of
 
-SHARE = 1e-6  # of a reading's noise
+NOISE_SHARE = 1e-6  # of a reading's noise
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ def moved(case: Case, seed: int) -> Case:
         columns = dict(run.columns)
         for reading in kind_of(case.vehicle).readings:
             if reading.column in columns:
-                sigma = SHARE * getattr(case.sensors, reading.source).noise
+                sigma = NOISE_SHARE * getattr(case.sensors, reading.source).noise
                 values = columns[reading.column]
                 columns[reading.column] = values + sigma * rng.standard_normal(len(values))
         runs.append(replace(run, columns=columns))

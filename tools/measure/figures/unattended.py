@@ -1,4 +1,4 @@
-"""`python -m tools.measure.figures.unattended`: what is claimed of flights that nobody watches, measured, as JSON.
+"""`python -m glider.tools.measure.figures.unattended`: what is claimed of flights that nobody watches, measured, as JSON.
 
 kills: a flight killed (-9) at random instants and started again, by the rule that `glider fly` goes by (tools/
 unattended.py Life): how many dives were resumed. power-cuts: a log of a flight cut at every byte: what is read of it.
@@ -18,7 +18,7 @@ from typing import Any
 
 import click
 
-from tools.cli.common import DONE, FAILED, print_json, progress
+from glider.tools.cli.common import DONE, FAILED, print_json, progress
 
 DIP = """
 format = 1
@@ -41,7 +41,7 @@ LOST_LIMIT_S = 1.0
 
 @click.group()
 def main() -> None:
-    """Measure what is promised of unattended flights."""
+    """Measure what is guaranteed of unattended flights."""
 
 
 # --- kills ----------------------------------------------------------------------------------------------------------
@@ -56,8 +56,8 @@ def kills(kills: int, seed: int) -> None:
 
 
 @dataclass
-class Told:
-    """What a flight that may have been killed had told by then."""
+class FlightReport:
+    """What a flight that may have been killed had reported by then."""
 
     steps: str = ""  # A armed, D diving (both on the disk), F flew a tick of the mission, E ended, X that on the disk
     refused: bool = False
@@ -72,7 +72,7 @@ class Told:
 
 def measure_kills(count: int, seed: int) -> dict[str, Any]:
     """Each trial: a flight killed, its restart killed too, a last one left alone."""
-    from tools.flight.compose import build_flight
+    from glider.tools.flight.compose import build_flight
 
     rng = random.Random(seed)
     with tempfile.TemporaryDirectory() as place:
@@ -95,18 +95,18 @@ def measure_kills(count: int, seed: int) -> dict[str, Any]:
                 for last in (False, False, True):
                     if not last and found["kills"] == count:
                         continue
-                    told = _in_child(flight, folder, None if last else rng.uniform(0.0, 1.05 * whole_s))
-                    found["resumed"] += under_way and "F" in told.steps
-                    found["ascended_only"] += under_way and told.ascent_only
-                    found["refused"] += told.refused
-                    under_way = under_way or told.under_way
-                    if "X" in told.steps:
+                    flight_report = _in_child(flight, folder, None if last else rng.uniform(0.0, 1.05 * whole_s))
+                    found["resumed"] += under_way and "F" in flight_report.steps
+                    found["ascended_only"] += under_way and flight_report.ascent_only
+                    found["refused"] += flight_report.refused
+                    under_way = under_way or flight_report.under_way
+                    if "X" in flight_report.steps:
                         under_way = False
                     if not last:
                         found["kills"] += 1
-                        found["under_way"] += told.under_way
-                        found["ended_before"] += "X" in told.steps
-                        step = told.steps[-1:] or "before arming"
+                        found["under_way"] += flight_report.under_way
+                        found["ended_before"] += "X" in flight_report.steps
+                        step = flight_report.steps[-1:] or "before arming"
                         by_step[step] = by_step.get(step, 0) + 1
                         advance(1)
     return {**found, "killed_after": by_step, "whole_flight_s": whole_s, "seed": seed, "pass": found["resumed"] == 0}
@@ -114,9 +114,9 @@ def measure_kills(count: int, seed: int) -> dict[str, Any]:
 
 def _warm(flight: Any) -> None:
     """Everything compiled and loaded before the first fork."""
-    import tools.flight.keeper  # noqa: F401
-    from hal.recorder.recorder import NullRecorder
-    from tools.flight.compose import build_runtime, record_specs
+    import glider.tools.flight.keeper  # noqa: F401
+    from glider.hal.recorder.recorder import NullRecorder
+    from glider.tools.flight.compose import build_runtime, record_specs
 
     flight.board.open()
     runtime = build_runtime(flight, NullRecorder(record_specs(flight)))
@@ -125,7 +125,7 @@ def _warm(flight: Any) -> None:
     runtime.disarm()
 
 
-def _in_child(flight: Any, folder: Path, kill_after_s: float | None) -> Told:
+def _in_child(flight: Any, folder: Path, kill_after_s: float | None) -> FlightReport:
     """One start of the flight in a process of its own."""
     ours, theirs = os.pipe()
     pid = os.fork()
@@ -151,19 +151,19 @@ def _in_child(flight: Any, folder: Path, kill_after_s: float | None) -> Told:
         raise RuntimeError("a flight that nobody killed broke off")
     text = data.decode()
     steps = "".join(letter for letter in text if letter in "ADFEX")
-    return Told(steps, "R" in text, "U" in text, time.monotonic() - begin)
+    return FlightReport(steps, "R" in text, "U" in text, time.monotonic() - begin)
 
 
 def _live(flight: Any, folder: Path, pipe: int) -> None:
-    """What `glider fly` does between its start and its end, on the simulated board; each step is told through a pipe:
+    """What `glider fly` does between its start and its end, on the simulated board; each step is reported through a pipe:
     armed, diving, first tick flown, loop over (`E`), ended (`X`); refused, under way at the start."""
-    from firmware.core.layouts import control_layout as ctl
-    from hal.ports import BoardError
-    from hal.recorder.recorder import NullRecorder
-    from tools.flight import sortie
-    from tools.flight.compose import record_specs
+    from glider.firmware.core.layouts import control_layout as ctl
+    from glider.hal.ports import BoardError
+    from glider.hal.recorder.recorder import NullRecorder
+    from glider.tools.flight import sortie
+    from glider.tools.flight.compose import record_specs
 
-    class Telling(sortie.Host):
+    class Telling(sortie.FlightHost):
         flown = False
 
         def prepare(self) -> None:
@@ -205,7 +205,7 @@ def power_cuts(seconds: float, every: int) -> None:
 
 def reference_log(path: Path, seconds: float) -> None:
     """A flight on the simulated board at real time, so that the log is brought to the disk as it is in flight."""
-    from tools.flight.compose import build_flight, build_recorder, build_runtime
+    from glider.tools.flight.compose import build_flight, build_recorder, build_runtime
 
     mission = path.with_suffix(".toml")
     mission.write_text(DIP.format(seconds=1000.0).replace("time_limit_s = 60.0", "time_limit_s = 2000.0"))
@@ -228,8 +228,8 @@ def measure_cuts(seconds: float, every: int) -> dict[str, Any]:
     Lost is what had happened when the byte at the cut was written and is not read: the time from the last record that
     is read to the last of the piece (chunk) in which the cut lies.
     """
-    from tools.data.log.reader import read_log
-    from tools.data.log.repair import repair
+    from glider.tools.data.log.reader import read_log
+    from glider.tools.data.log.repair import repair
 
     with tempfile.TemporaryDirectory() as place:
         path = Path(place, "reference.mcap")
@@ -318,7 +318,7 @@ def _repairs(repair: Any, read_log: Any, path: Path, cut: Any) -> bool:
 @click.option("--no-load", is_flag=True, help="Without the busy process on the other core.")
 def endurance(minutes: float, fifo: bool, no_load: bool) -> None:
     """Fly on twins at real time beside load: missed ticks, lateness, memory, descriptors."""
-    from tools.measure.figures.endurance import measure
+    from glider.tools.measure.figures.endurance import measure
 
     result = measure(minutes * 60.0, fifo=fifo, load=not no_load)
     print_json(result)

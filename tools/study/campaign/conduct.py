@@ -11,20 +11,20 @@ from pathlib import Path
 
 import numpy as np
 
-from tools.study.campaign.fingerprint import fingerprint
-from tools.study.campaign.flights import CHUNK, COLUMNS, ENDINGS, Job, compile_loop, cut, fly_chunk
-from tools.study.campaign.plan import Plan
-from tools.study.campaign.store import Store, write_whole
-from tools.study.workers import check_reachable, work_through
+from glider.tools.study.campaign.fingerprint import fingerprint
+from glider.tools.study.campaign.flights import CHUNK, COLUMNS, ENDINGS, FlightJob, compile_loop, cut, fly_chunk
+from glider.tools.study.campaign.plan import CampaignPlan
+from glider.tools.study.campaign.store import Store, write_whole
+from glider.tools.study.workers import check_reachable, work_through
 
 FLIGHTS_FILE = "flights.csv"
 
 
 @dataclass
-class Flown:
+class FlownChunk:
     """All flights of a campaign."""
 
-    plan: Plan
+    plan: CampaignPlan
     table: np.ndarray  # (flights, len(COLUMNS)), in the order mission, seed, controller
     fresh: int  # flights flown now; the others were there
     seconds: float  # that those took
@@ -35,22 +35,22 @@ class Flown:
 
 
 def fly_campaign(
-    plan: Plan,
+    plan: CampaignPlan,
     folder: Path | None = None,
     *,
     jobs: int = 0,
     dask: str | None = None,
     chunk: int = CHUNK,
     advance: Callable[[int], None] = lambda flights: None,
-) -> Flown:
-    """Fly what is not yet in the folder (None: keep nothing); advance(n) is told of flights as they are done.
+) -> FlownChunk:
+    """Fly what is not yet in the folder (None: keep nothing); advance(n) is called with the flights as they are done.
 
     jobs: processes, 0 for one a core; dask: address of a scheduler, which then gets the same chunks instead. The
     result does not depend on any of them.
     """
     if dask:
         check_reachable(dask)
-    job = Job(plan, fingerprint(plan))
+    job = FlightJob(plan, fingerprint(plan))
     store = None if folder is None else Store(folder, plan, job.fingerprint, chunk)
     chunks = cut(plan, chunk if store is None else store.chunk)
     rows: dict[int, np.ndarray] = {}
@@ -71,10 +71,10 @@ def fly_campaign(
                 rows[piece.number] = table
                 fresh += len(table)
                 advance(len(table))
-    return Flown(plan, np.concatenate([rows[n] for n in range(len(chunks))]), fresh, time.perf_counter() - begin)
+    return FlownChunk(plan, np.concatenate([rows[n] for n in range(len(chunks))]), fresh, time.perf_counter() - begin)
 
 
-def write_flights(path: Path, flown: Flown) -> None:
+def write_flights(path: Path, flown: FlownChunk) -> None:
     """All flights as CSV, one line each, with names where the table has numbers."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")

@@ -6,12 +6,12 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from firmware.core.jit import kernels_digest
-from tools.study.campaign.plan import Plan, software
-from tools.study.campaign.worlds import draw_world
+from glider.firmware.core.jit import kernels_digest
+from glider.tools.study.campaign.plan import CampaignPlan, software
+from glider.tools.study.campaign.worlds import draw_world
 
 
-def fingerprint(plan: Plan) -> str:
+def fingerprint(plan: CampaignPlan) -> str:
     """Hash over the campaign, this software, and the arrays that flights are made of, 16 hex digits.
 
     Gains, references, a vehicle's numbers or the way worlds are drawn may change with nothing changed in the campaign:

@@ -5,15 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.maths.wide import LANES
-from firmware.core.vehicle import layout
-from sim_backend.core import closed_loop
-from sim_backend.fleet import fly_group, groups_of
-from tools.data.errors import InputError
-from tools.study.campaign.fingerprint import fingerprint
-from tools.study.campaign.plan import Plan
-from tools.study.campaign.worlds import draw_world
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.maths.wide import LANES
+from glider.firmware.core.vehicle import layout
+from glider.sim_backend.core import closed_loop
+from glider.sim_backend.fleet import fly_group, groups_of
+from glider.tools.data.errors import InputError
+from glider.tools.study.campaign.fingerprint import fingerprint
+from glider.tools.study.campaign.plan import CampaignPlan
+from glider.tools.study.campaign.worlds import draw_world
 
 # what is kept of each flight, one column each; SI
 COLUMNS = (
@@ -57,14 +57,14 @@ class Chunk:
 
 
 @dataclass(frozen=True)
-class Job:
+class FlightJob:
     """What goes to a worker, once: the plan, and the fingerprint that the worker must find too."""
 
-    plan: Plan
+    plan: CampaignPlan
     fingerprint: str
 
 
-def cut(plan: Plan, flights: int = CHUNK) -> list[Chunk]:
+def cut(plan: CampaignPlan, flights: int = CHUNK) -> list[Chunk]:
     """The campaign in chunks of about `flights` flights, in the order of the results: mission, seed, controller."""
     each = max(1, flights // len(plan.campaign.controllers))
     end = plan.campaign.first_seed + plan.campaign.seeds
@@ -76,12 +76,12 @@ def cut(plan: Plan, flights: int = CHUNK) -> list[Chunk]:
     return [Chunk(n, mission, first, min(each, end - first)) for n, (mission, first) in enumerate(starts)]
 
 
-def trace_every(plan: Plan, mission: int) -> int:
+def trace_every(plan: CampaignPlan, mission: int) -> int:
     """Ticks from one line of the trace to the next, by the mission's length."""
     return 1 + int(_longest(plan, mission) / plan.step) // MOST_LINES
 
 
-def _longest(plan: Plan, mission: int) -> float:
+def _longest(plan: CampaignPlan, mission: int) -> float:
     """Seconds after which a flight is over: the autopilot itself gives up before."""
     return plan.missions[mission].time_limit_s + 5.0
 
@@ -119,13 +119,13 @@ def _ending(end: np.ndarray, deepest: float, site: float, over: tuple[float, flo
     return ctl.REASON_NONE
 
 
-def compile_loop(plan: Plan) -> None:
+def compile_loop(plan: CampaignPlan) -> None:
     """Compile the loop into the kernels' cache, or find it there, before processes that would each do it themselves."""
     pilot, world = plan.pilot(0, plan.campaign.controllers[0]), draw_world(plan, 0, plan.campaign.first_seed).world
     fly_group([world], [pilot], 0, 1, np.zeros((1, 1, closed_loop.N_TRACE)))
 
 
-def fly_chunk(job: Job, chunk: Chunk) -> np.ndarray:
+def fly_chunk(job: FlightJob, chunk: Chunk) -> np.ndarray:
     """Fly a chunk; one row of COLUMNS a flight, shape (seeds x controllers, len(COLUMNS)).
 
     InputError where this process would not fly what the campaign's own would.

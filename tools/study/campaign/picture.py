@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from firmware.core.control.controller_rows import CONTROLLERS
-from tools.report.charts import Chart, Line, svg
-from tools.study.campaign.conduct import Flown
-from tools.study.campaign.store import write_whole
-from tools.study.campaign.summary import completed_by_all, summarise, wilson
+from glider.firmware.core.control.controller_rows import CONTROLLERS
+from glider.tools.report.charts import Chart, Curve, svg
+from glider.tools.study.campaign.conduct import FlownChunk
+from glider.tools.study.campaign.store import write_whole
+from glider.tools.study.campaign.summary import completed_by_all, summarise, wilson
 
 BINS = 5
 POINTS = 200  # of a distribution
@@ -31,11 +31,11 @@ def _style(number: int) -> str:
     return f"c{number % 5}"
 
 
-def _own(flown: Flown, number: int) -> np.ndarray:
+def _own(flown: FlownChunk, number: int) -> np.ndarray:
     return flown.column("controller") == number
 
 
-def _distributions(flown: Flown) -> list[Chart]:
+def _distributions(flown: FlownChunk) -> list[Chart]:
     """Share of flights (%) with an error up to x, for each controller, in worlds that all of them completed."""
     charts = []
     common = completed_by_all(flown)
@@ -48,12 +48,12 @@ def _distributions(flown: Flown) -> list[Chart]:
         lines = []
         for number in range(len(flown.plan.campaign.controllers)):
             own = np.sort(values[known & _own(flown, number)])
-            lines.append(Line(x, 100.0 * np.searchsorted(own, x, side="right") / len(own), _style(number)))
+            lines.append(Curve(x, 100.0 * np.searchsorted(own, x, side="right") / len(own), _style(number)))
         charts.append(Chart(f"flights (%) with a mean {title.split(',')[0]} up to", unit, lines))
     return charts
 
 
-def _against(flown: Flown, column: str, name: str, unit: str) -> list[Chart]:
+def _against(flown: FlownChunk, column: str, name: str, unit: str) -> list[Chart]:
     """Flights completed (%, with 90 % intervals) and median errors against something drawn, in BINS even bins."""
     drawn = flown.column(column)
     low, high = float(drawn.min()), float(drawn.max())
@@ -62,8 +62,8 @@ def _against(flown: Flown, column: str, name: str, unit: str) -> list[Chart]:
     bins = np.minimum((BINS * (drawn - low) / (high - low)).astype(int), BINS - 1)
     middles = low + (np.arange(BINS) + 0.5) * (high - low) / BINS
     within, common = flown.column("within_limits"), completed_by_all(flown)
-    shares = [Line(np.array([low, high]), np.array([0.0, 100.0]), "unseen")]  # so that the axis shows 0 to 100
-    medians: list[list[Line]] = [[] for _ in ERRORS]
+    shares = [Curve(np.array([low, high]), np.array([0.0, 100.0]), "unseen")]  # so that the axis shows 0 to 100
+    medians: list[list[Curve]] = [[] for _ in ERRORS]
     controllers = len(flown.plan.campaign.controllers)
     for number in range(controllers):
         own = _own(flown, number)
@@ -72,12 +72,12 @@ def _against(flown: Flown, column: str, name: str, unit: str) -> list[Chart]:
         counts = [(int(within[own & (bins == b)].sum()), int((own & (bins == b)).sum())) for b in range(BINS)]
         share = np.array([100.0 * k / n if n else np.nan for k, n in counts])
         ends = np.array([(*(100.0 * end for end in wilson(k, n)), np.nan) if n else 3 * (np.nan,) for k, n in counts])
-        shares.append(Line(x, share, _style(number)))
-        shares.append(Line(np.repeat(x, 3), ends.ravel(), f"{_style(number)} interval"))
+        shares.append(Curve(x, share, _style(number)))
+        shares.append(Curve(np.repeat(x, 3), ends.ravel(), f"{_style(number)} interval"))
         for (error, _, _, scale), lines in zip(ERRORS, medians, strict=True):
             values = flown.column(error) * scale
             chosen = [values[own & common & (bins == b) & np.isfinite(values)] for b in range(BINS)]
-            lines.append(Line(x, np.array([np.median(v) if v.size else np.nan for v in chosen]), _style(number)))
+            lines.append(Curve(x, np.array([np.median(v) if v.size else np.nan for v in chosen]), _style(number)))
     charts = [Chart(f"completed, %, against {name}", unit, shares)]
     for (_, title, _, _), lines in zip(ERRORS, medians, strict=True):
         if any(np.isfinite(line.y).any() for line in lines):
@@ -85,7 +85,7 @@ def _against(flown: Flown, column: str, name: str, unit: str) -> list[Chart]:
     return charts
 
 
-def _context(flown: Flown) -> dict[str, Any]:
+def _context(flown: FlownChunk) -> dict[str, Any]:
     campaign, result = flown.plan.campaign, summarise(flown)
     charts = _distributions(flown)
     for column, name, unit in CONDITIONS:
@@ -116,15 +116,15 @@ def _context(flown: Flown) -> dict[str, Any]:
     }
 
 
-def page(flown: Flown) -> str:
+def page(flown: FlownChunk) -> str:
     """The page's text."""
     from jinja2 import Environment, StrictUndefined
 
-    template = files("tools.study.campaign").joinpath("page.html").read_text(encoding="utf-8")
+    template = files("glider.tools.study.campaign").joinpath("page.html").read_text(encoding="utf-8")
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     return environment.from_string(template).render(_context(flown))
 
 
-def write_page(path: Path, flown: Flown) -> None:
+def write_page(path: Path, flown: FlownChunk) -> None:
     """Write the page to a file."""
     write_whole(path, page(flown).encode())

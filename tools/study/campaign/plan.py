@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import msgspec
 import numpy as np
 
-from firmware.autopilot import Autopilot, configuration
-from firmware.core.control.controller_rows import CONTROLLERS
-from firmware.guidance.mission import Mission, decode_mission
-from firmware.model import gains
-from firmware.model.gains import Control
-from firmware.model.vehicle import Vehicle
-from hal.strict import Table, decode
-from sim_backend.board import SimBoardFile
-from sim_backend.core.effects.catalogue import check_board
-from tools.data.boards import load_board_file
-from tools.data.errors import InputError
-from tools.data.sources import load_vehicle, name_or_path, read_text
+from glider.firmware.autopilot import Autopilot, configuration
+from glider.firmware.core.control.controller_rows import CONTROLLERS
+from glider.firmware.guidance.mission import Mission, decode_mission
+from glider.firmware.model import gains
+from glider.firmware.model.gains import Control
+from glider.firmware.model.vehicle import Vehicle
+from glider.hal.strict import Table, decode
+from glider.sim_backend.board import SimBoardFile
+from glider.sim_backend.core.effects.catalogue import check_board
+from glider.tools.data.boards import load_board_file
+from glider.tools.data.errors import InputError
+from glider.tools.data.sources import load_vehicle, name_or_path, read_text
 
 if TYPE_CHECKING:
     Flown = str
@@ -95,7 +95,7 @@ class Campaign(Table):
 
 def shipped_campaigns() -> dict[str, str]:
     """Name -> text of the campaigns that come with the package."""
-    folder = files("tools.study.campaign").joinpath("campaigns")
+    folder = files("glider.tools.study.campaign").joinpath("campaigns")
     entries = sorted(folder.iterdir(), key=lambda entry: entry.name)
     return {e.name.removesuffix(".toml"): e.read_text(encoding="utf-8") for e in entries if e.name.endswith(".toml")}
 
@@ -128,7 +128,7 @@ def with_options(campaign: Campaign, options: dict[str, Any]) -> Campaign:
 
 
 @dataclass(frozen=True)
-class Plan:
+class CampaignPlan:
     """A campaign with every file that it names: all that a worker needs, wherever it runs."""
 
     campaign: Campaign
@@ -167,7 +167,7 @@ def _control(controller: str, base: Control) -> Control:
         raise InputError(str(error)) from None
 
 
-def build_plan(campaign: Campaign, base: Path | None = None) -> Plan:
+def build_plan(campaign: Campaign, base: Path | None = None) -> CampaignPlan:
     """Read what the campaign names; ConfigError or InputError where it cannot be flown."""
     missions = []
     for wanted in campaign.missions:
@@ -181,7 +181,7 @@ def build_plan(campaign: Campaign, base: Path | None = None) -> Plan:
         raise InputError(f"a campaign flies in simulation, board '{campaign.board}' is of kind '{board.kind}'")
     file = decode(board.text, SimBoardFile, board.source)
     check_board(file.effects, board.source)
-    plan = Plan(campaign, load_vehicle(campaign.vehicle, base), tuple(missions), file)
+    plan = CampaignPlan(campaign, load_vehicle(campaign.vehicle, base), tuple(missions), file)
     for number in range(len(missions)):
         for controller in campaign.controllers:
             plan.pilot(number, controller)  # refuses what the vehicle cannot do

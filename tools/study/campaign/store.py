@@ -9,10 +9,10 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from firmware.core.jit import kernels_digest
-from tools.data.errors import InputError
-from tools.study.campaign.flights import COLUMNS, Chunk
-from tools.study.campaign.plan import Plan, software
+from glider.firmware.core.jit import kernels_digest
+from glider.tools.data.errors import InputError
+from glider.tools.study.campaign.flights import COLUMNS, Chunk
+from glider.tools.study.campaign.plan import CampaignPlan, software
 
 MANIFEST = "campaign.json"
 UNFINISHED = ".part"
@@ -43,7 +43,7 @@ def write_whole(path: Path, content: bytes) -> None:
 class Store:
     """The folder of one campaign; `chunk` is the size (flights) it was begun with, which it keeps."""
 
-    def __init__(self, folder: Path, plan: Plan, fingerprint: str, chunk: int):
+    def __init__(self, folder: Path, plan: CampaignPlan, fingerprint: str, chunk: int):
         """Begin the folder, or go on with it; InputError where it holds anything else."""
         self.folder, self.chunk, self.fingerprint = folder, chunk, fingerprint
         path = folder / MANIFEST

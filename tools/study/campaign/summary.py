@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from tools.study.campaign.conduct import Flown
-from tools.study.campaign.flights import ENDINGS
+from glider.tools.study.campaign.conduct import FlownChunk
+from glider.tools.study.campaign.flights import ENDINGS
 
 Z90 = 1.6448536269514722  # of a two-sided 90 % interval
 ALL = "all"
@@ -40,14 +40,14 @@ def _spread(values: np.ndarray) -> dict[str, float | None]:
     return {"mean": float(values.mean()), "median": float(np.median(values)), "p90": float(np.percentile(values, 90.0))}
 
 
-def completed_by_all(flown: Flown) -> np.ndarray:
+def completed_by_all(flown: FlownChunk) -> np.ndarray:
     """True for each flight whose world every controller completed: errors are compared there, shape (flights,)."""
     controllers = len(flown.plan.campaign.controllers)
     worlds = flown.column("within_limits").reshape(-1, controllers)  # the table's order has controllers innermost
     return np.repeat(worlds.all(axis=1), controllers)
 
 
-def _entry(flown: Flown, which: np.ndarray, common: np.ndarray) -> dict[str, Any]:
+def _entry(flown: FlownChunk, which: np.ndarray, common: np.ndarray) -> dict[str, Any]:
     """One controller's result over the flights chosen by `which`, errors and ways over those also in `common`."""
     within = flown.column("within_limits")[which] == 1.0
     codes, counts = np.unique(flown.column("ended")[which][~within], return_counts=True)
@@ -64,7 +64,7 @@ def _entry(flown: Flown, which: np.ndarray, common: np.ndarray) -> dict[str, Any
     return entry
 
 
-def summarise(flown: Flown) -> dict[str, Any]:
+def summarise(flown: FlownChunk) -> dict[str, Any]:
     """The campaign's result: an entry for each controller over all missions, and for each mission (`by_mission`)."""
     campaign = flown.plan.campaign
     common, mission = completed_by_all(flown), flown.column("mission")

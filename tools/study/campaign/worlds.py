@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
-from sim_backend.core.effects.catalogue import apply_effects
-from sim_backend.uncertainty import draw_parameters
-from sim_backend.world import Wave, World, build_world
-from tools.study.campaign.plan import Plan
+from glider.sim_backend.core.effects.catalogue import apply_effects
+from glider.sim_backend.uncertainty import draw_parameters
+from glider.sim_backend.world import Wave, World, build_world
+from glider.tools.study.campaign.plan import CampaignPlan
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class DrawnWorld:
     start_depth: float  # m
 
 
-def draw_world(plan: Plan, mission: int, seed: int) -> DrawnWorld:
+def draw_world(plan: CampaignPlan, mission: int, seed: int) -> DrawnWorld:
     """The world of a seed in a mission (by its number).
 
     Everything is drawn whether or not it counts: a limit of zero does not move the draws behind it, so that campaigns

@@ -6,14 +6,23 @@ from typing import Any
 
 import numpy as np
 
-from firmware.model.vehicle import Vehicle
-from tools.data.runs import columns as names
-from tools.data.runs.case import write_case
-from tools.study.challenge.design import FITTED, LAKE, POOL
-from tools.study.challenge.magnitude import LEAST, Magnitude, choose
-from tools.study.challenge.messy import COUNT, LARGE, Factors, draw_factors, small_ones
-from tools.study.challenge.plan import UNKNOWN, CasePlan, forms_of
-from tools.study.challenge.trial import Flight, Trial, draw_trial, flyable, predictable, redraw, total, with_effect
+from glider.firmware.model.vehicle import Vehicle
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.case import write_case
+from glider.tools.study.challenge.design import FITTED, LAKE, POOL
+from glider.tools.study.challenge.magnitude import LEAST_GAP_FLOORS, Magnitude, choose
+from glider.tools.study.challenge.messy import COUNT, LARGE, Factors, draw_factors, small_ones
+from glider.tools.study.challenge.plan import UNKNOWN, CasePlan, forms_of
+from glider.tools.study.challenge.trial import (
+    Trial,
+    TrialFlight,
+    draw_trial,
+    flyable,
+    predictable,
+    redraw,
+    total,
+    with_effect,
+)
 
 LOG_RATE, DENSITY = 10.0, 998.0  # Hz, kg/m3
 TRIES, GIVE_WAY = 48, 4  # an error of the gyro that grows with depth shows in one messy vehicle of many
@@ -31,7 +40,7 @@ class Made:
     trial: Trial
     F: np.ndarray
     magnitudes: list[Magnitude]
-    flights: list[Flight]
+    flights: list[TrialFlight]
     tries: int
     small: list[Magnitude]  # beside them, of a messy case
     factors: Factors | None  # on noise, of a messy case
@@ -52,7 +61,7 @@ def draw_case(seed: int, plan: CasePlan, vehicle: Vehicle) -> Made:
             continue
         found = []
         for form, weak in zip(forms_of(plan), plan.weak, strict=True):
-            size = choose(rng, trial, form, weak != (number >= GIVE_WAY), LARGE if plan.messy else LEAST)
+            size = choose(rng, trial, form, weak != (number >= GIVE_WAY), LARGE if plan.messy else LEAST_GAP_FLOORS)
             if size is None:
                 break
             found.append(size)

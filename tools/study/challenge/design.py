@@ -5,9 +5,9 @@ from math import radians
 
 import numpy as np
 
-from firmware.core.maths.rotations import quaternion_from_euler
-from firmware.core.vehicle.layout import X_ACT, X_NU, X_POS, X_QUAT
-from sim_backend.foreign import foreign_layout as fo
+from glider.firmware.core.maths.rotations import quaternion_from_euler
+from glider.firmware.core.vehicle.layout import X_ACT, X_NU, X_POS, X_QUAT
+from glider.sim_backend.foreign import foreign_layout as fo
 
 FITTED, HELD = 6, 3
 LEGS = 24
@@ -16,7 +16,7 @@ STYLES = ("glide", "spiral", "steps", "fixed", "glide", "steps")
 
 
 @dataclass(frozen=True)
-class Site:
+class DesignSite:
     """Where the case is flown: depths in m, lengths in s."""
 
     name: str
@@ -33,8 +33,8 @@ class Site:
         return sum(self.upper) / 2.0, sum(self.lower) / 2.0
 
 
-POOL = Site("pool", (1.6, 2.6), (2.0, 2.8), (3.0, 4.0), (0.05, 8.0), (60.0, 85.0), True)
-LAKE = Site("lake", (1.5, 4.0), (3.0, 5.0), (7.0, 12.0), (0.05, 30.0), (90.0, 150.0), False)
+POOL = DesignSite("pool", (1.6, 2.6), (2.0, 2.8), (3.0, 4.0), (0.05, 8.0), (60.0, 85.0), True)
+LAKE = DesignSite("lake", (1.5, 4.0), (3.0, 5.0), (7.0, 12.0), (0.05, 30.0), (90.0, 150.0), False)
 
 
 @dataclass
@@ -54,7 +54,7 @@ def _servo(rng: np.random.Generator, style: str) -> float:
     return 0.0 if rng.random() < 0.35 else rng.uniform(-0.85, 0.85)
 
 
-def _leg(rng: np.random.Generator, site: Site, style: str, dive: bool, servo: float) -> np.ndarray:
+def _leg(rng: np.random.Generator, site: DesignSite, style: str, dive: bool, servo: float) -> np.ndarray:
     leg, sign = np.zeros(fo.N_L), 1.0 if dive else -1.0
     leg[fo.L_PITCH] = -sign * radians(rng.uniform(18.0, 42.0))
     leg[fo.L_BALLAST] = sign * rng.uniform(0.08, 0.19)
@@ -73,7 +73,7 @@ def _leg(rng: np.random.Generator, site: Site, style: str, dive: bool, servo: fl
     return leg
 
 
-def draw_run(rng: np.random.Generator, site: Site, style: str, waves: np.ndarray) -> RunDesign:
+def draw_run(rng: np.random.Generator, site: DesignSite, style: str, waves: np.ndarray) -> RunDesign:
     """A run in a style of STYLES: start, legs, length, seed, phases of the waves."""
     servo, legs = _servo(rng, style), []
     for number in range(LEGS):
@@ -91,7 +91,7 @@ def draw_run(rng: np.random.Generator, site: Site, style: str, waves: np.ndarray
     return RunDesign(x, np.array(legs), rows, np.uint64(rng.integers(0, 2**63)), own)
 
 
-def draw_runs(rng: np.random.Generator, site: Site, waves: np.ndarray) -> list[RunDesign]:
+def draw_runs(rng: np.random.Generator, site: DesignSite, waves: np.ndarray) -> list[RunDesign]:
     """The fitted runs, one of each style in any order, then the held ones."""
     styles = [*rng.permutation(STYLES), *rng.choice(STYLES, HELD)]
     return [draw_run(rng, site, str(style), waves) for style in styles]

@@ -4,12 +4,12 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from tools.data.errors import InputError
-from tools.study.challenge.diagnosis import FILE, TIMING
-from tools.study.challenge.judge import case_folders
-from tools.study.challenge.seal import as_json
-from tools.study.challenge.watch_answer import IDENTIFIED, REFERENCE, VEHICLE_FILE, VELOCITY, WATCH_FILE
-from tools.study.many_cases import ANSWER, CASES, Asked, Many, Told, Word, ask, files_of
+from glider.tools.data.errors import InputError
+from glider.tools.study.challenge.diagnosis import FILE, TIMING
+from glider.tools.study.challenge.judge import case_folders
+from glider.tools.study.challenge.seal import as_json
+from glider.tools.study.challenge.watch_answer import IDENTIFIED, REFERENCE, VEHICLE_FILE, VELOCITY, WATCH_FILE
+from glider.tools.study.many_cases import ANSWER, CASES, CaseJob, Many, Result, Word, files_of, run_batch
 
 DIAGNOSIS, WATCH, MISSION, FORM = "diagnosis", "watch", "mission", "form"  # kinds of blind tests
 ANSWERS = {DIAGNOSIS: FILE, WATCH: WATCH_FILE, MISSION: WATCH_FILE, FORM: FILE}
@@ -42,17 +42,17 @@ def commands(case: Path, part: Path, extra: tuple[str, ...], kind: str) -> list[
     ]
 
 
-def asked_of(name: str, case: Path, extra: tuple[str, ...], kind: str) -> Asked:
+def asked_of(name: str, case: Path, extra: tuple[str, ...], kind: str) -> CaseJob:
     """What is asked of a case of a blind test, with its reference where a kind needs one."""
     found = files_of(case, CASES / name)
     if kind != DIAGNOSIS:
         found |= files_of(case.parent.parent / REFERENCE / name, Path(REFERENCE) / name)
-    return Asked(name, found, commands(CASES / name, ANSWER, extra, kind), ANSWERS[kind])
+    return CaseJob(name, found, commands(CASES / name, ANSWER, extra, kind), ANSWERS[kind])
 
 
-def timed(told: Told) -> dict[str, bytes]:
+def timed(result: Result) -> dict[str, bytes]:
     """An answer's files, and how long it took."""
-    return told.files | {TIMING: as_json({"seconds": told.seconds, "cores": told.cores})}
+    return result.files | {TIMING: as_json({"seconds": result.seconds, "cores": result.cores})}
 
 
 def run(
@@ -77,7 +77,7 @@ def run(
     if not found:
         raise InputError("no cases in this folder", source=folder)
     asked = partial(asked_of, extra=extra, kind=kind)
-    return ask(Many(found, out, ANSWERS[kind], jobs, dask, again), asked, timed, advance)
+    return run_batch(Many(found, out, ANSWERS[kind], jobs, dask, again), asked, timed, advance)
 
 
 def count_cases(cases: Path) -> int:

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from tools.data.errors import InputError
+from glider.tools.data.errors import InputError
 
 FILE = "diagnosis.json"
 MODEL = "corrected.toml"
@@ -22,19 +22,19 @@ class Where(msgspec.Struct):
     probability: Probability
 
 
-class Cause(msgspec.Struct):
+class AnsweredCause(msgspec.Struct):
     label: str
     probability: Probability
     group: list[str] = msgspec.field(default_factory=list)
 
 
-class Diagnosis(msgspec.Struct):
+class AnswerFile(msgspec.Struct):
     """Verdict, places and causes most probable first, and the effects that the corrected model holds."""
 
     format: Annotated[int, msgspec.Meta(ge=1, le=1)]
     verdict: Literal["none", "cause", "unknown"]
     where: list[Where]
-    causes: Annotated[list[Cause], msgspec.Meta(min_length=1)]
+    causes: Annotated[list[AnsweredCause], msgspec.Meta(min_length=1)]
     selected: list[str]
 
     def probability(self, *labels: str) -> float:
@@ -42,12 +42,12 @@ class Diagnosis(msgspec.Struct):
         return sum(cause.probability for cause in self.causes if cause.label in labels)
 
 
-def read_diagnosis(path: Path) -> Diagnosis:
+def read_diagnosis(path: Path) -> AnswerFile:
     """A diagnosis, sorted as it should be; InputError with the place in the file where it is not one."""
     if path.stat().st_size > MAX_BYTES:
         raise InputError(f"longer than {MAX_BYTES} bytes", source=path)
     try:
-        found = msgspec.json.decode(path.read_bytes(), type=Diagnosis)
+        found = msgspec.json.decode(path.read_bytes(), type=AnswerFile)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise InputError(str(error), source=path) from None
     labels = [cause.label for cause in found.causes]

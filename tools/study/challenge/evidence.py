@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from firmware.model.estimator_settings import parameter_sigma
-from firmware.model.vehicle import Vehicle
-from tools.inference.channels import ROUGHIE_MEASURES, errors
-from tools.study.challenge.trial import Flight, Trial
+from glider.firmware.model.estimator_settings import parameter_sigma
+from glider.firmware.model.vehicle import Vehicle
+from glider.tools.inference.channels import ROUGHIE_MEASURES, errors
+from glider.tools.study.challenge.trial import Trial, TrialFlight
 
 THIN = 5  # rows
 MEMORY = 20.0  # rows over which a gap is autocorrelated: as many count as one
@@ -13,7 +13,7 @@ STEPS = 6  # of the search, its Jacobian kept
 BIASES = 9
 
 
-def evidence(trial: Trial, flights: list[Flight], F: np.ndarray, floor: dict[str, float]) -> float:
+def evidence(trial: Trial, flights: list[TrialFlight], F: np.ndarray, floor: dict[str, float]) -> float:
     """Evidence (nat) for a model with effects F over one with none, when both may take all that is allowed.
 
     Half the difference of the least regularised squares over the parameters (priors of [uncertainty] about the file's
@@ -52,19 +52,19 @@ def evidence(trial: Trial, flights: list[Flight], F: np.ndarray, floor: dict[str
     return float(0.5 * (costs[1] - costs[0]))
 
 
-def _rows(flight: Flight) -> np.ndarray:
+def _rows(flight: TrialFlight) -> np.ndarray:
     rows = [np.arange(w.start, w.end, THIN) for w in flight.windows if w.scored]
     return np.concatenate(rows)
 
 
-def _errors(flight: Flight, Y: np.ndarray, floor: dict[str, float]) -> np.ndarray:
+def _errors(flight: TrialFlight, Y: np.ndarray, floor: dict[str, float]) -> np.ndarray:
     """Errors of a prediction at the thinned rows, channel by channel, in weighed floors; what is missing is 0."""
     rows, table = _rows(flight), ROUGHIE_MEASURES.measured(flight.run)
     parts = [errors(c, table[rows], Y[rows]).ravel() / floor[c.name] for c in ROUGHIE_MEASURES.channels_of(flight.run)]
     return np.nan_to_num(np.concatenate(parts)) * np.sqrt(THIN / MEMORY)
 
 
-def _biases(vehicle: Vehicle, flight: Flight, floor: dict[str, float]) -> np.ndarray:
+def _biases(vehicle: Vehicle, flight: TrialFlight, floor: dict[str, float]) -> np.ndarray:
     """What 1 sigma of each sensor's bias does to `_errors`, (errors, BIASES)."""
     sensors = vehicle.sensors
     tables = (*3 * (sensors.attitude,), *3 * (sensors.gyro,), sensors.depth, sensors.slider, sensors.ballast)

@@ -7,30 +7,30 @@ from typing import Any
 
 import numpy as np
 
-from firmware.autopilot import Autopilot, configuration
-from firmware.guidance.mission import Leg, Mission
-from firmware.guidance.mission import Site as Water
-from firmware.model.vehicle import Vehicle
-from sim_backend.foreign import foreign_layout as fo
-from sim_backend.foreign.foreign_mission import fly_mission
-from sim_backend.uncertainty import sensor_errors
-from tools.data.runs.case import write_case
-from tools.study.challenge.cases import DECIMALS, DENSITY, LOG_RATE, NoCase
-from tools.study.challenge.design import FITTED, HELD, LAKE, POOL, STYLES, RunDesign, Site, draw_run
-from tools.study.challenge.form_fit import fit_flights, fit_forces, formless, residual
-from tools.study.challenge.form_plan import BY_LABEL, CHANGES, OUTSIDE, FormCounts, FormPlan
-from tools.study.challenge.form_vehicle import draw_body, draw_form_shapes
-from tools.study.challenge.forms import Form, draw_waves
-from tools.study.challenge.magnitude import find_strength
-from tools.study.challenge.plan import UNKNOWN
-from tools.study.challenge.trial import Flight, Trial, flyable, poses, predictable, total, with_effect
+from glider.firmware.autopilot import Autopilot, configuration
+from glider.firmware.guidance.mission import Leg, Mission
+from glider.firmware.guidance.mission import Site as Water
+from glider.firmware.model.vehicle import Vehicle
+from glider.sim_backend.foreign import foreign_layout as fo
+from glider.sim_backend.foreign.foreign_mission import fly_mission
+from glider.sim_backend.uncertainty import sensor_errors
+from glider.tools.data.runs.case import write_case
+from glider.tools.study.challenge.cases import DECIMALS, DENSITY, LOG_RATE, NoCase
+from glider.tools.study.challenge.design import FITTED, HELD, LAKE, POOL, STYLES, DesignSite, RunDesign, draw_run
+from glider.tools.study.challenge.form_fit import fit_flights, fit_forces, formless, residual
+from glider.tools.study.challenge.form_plan import BY_LABEL, CHANGES, OUTSIDE, FormCounts, FormPlan
+from glider.tools.study.challenge.form_vehicle import draw_body, draw_form_shapes
+from glider.tools.study.challenge.forms import Form, draw_waves
+from glider.tools.study.challenge.magnitude import find_strength
+from glider.tools.study.challenge.plan import UNKNOWN
+from glider.tools.study.challenge.trial import Trial, TrialFlight, flyable, poses, predictable, total, with_effect
 
 PERIODS = {name: fo.ROW_S for name in ("imu", "beacon", "wires")}
 BY_AUTOPILOT = 2 / 3  # of the runs: missions; the others by the foreign pilot, whose steps part more
 BY_DEPTH = 0.15  # of the legs: the depth loop moves the ballast
 LEG_LIMIT, MISSION_LIMIT = 300.0, 1800.0  # s
 SIZE = (1.5, 6.0)  # gap that a change makes, in healthy residuals
-SHORT = 0.9  # of the least, that a bisection may fall short
+BISECTION_SHARE = 0.9  # of the least, that a bisection may fall short
 TRIES, GIVE_WAY, REDRAWN = 30, 10, 60  # vehicles a case; from then on another label; runs drawn again
 REFINING = 6  # reference runs that the nearest vehicle of equation (4) is refined on
 SPEED, PITCH, TURN = (0.2, 0.5), 0.14, 0.5  # m/s median in steady glides; rad from what was asked; rad in 30 s
@@ -38,7 +38,7 @@ PROBE = "probe"
 
 
 @dataclass
-class MissionDesign(RunDesign):
+class SawtoothDesign(RunDesign):
     """A run that the shipped autopilot flies."""
 
     mission: Mission = field(kw_only=True)
@@ -49,7 +49,7 @@ class FormTrial(Trial):
     """A vehicle of another form at a site; `shapes` hold its body."""
 
     def _pilot(self, F: np.ndarray, design: RunDesign, commands: np.ndarray, X: np.ndarray, Y: np.ndarray) -> None:
-        if not isinstance(design, MissionDesign):
+        if not isinstance(design, SawtoothDesign):
             super()._pilot(F, design, commands, X, Y)
             return
         autopilot, disturbance = pilot_of(self.vehicle, design.mission), self.flown.disturbance
@@ -64,7 +64,7 @@ def pilot_of(vehicle: Vehicle, mission: Mission) -> Autopilot:
     return Autopilot(vehicle, mission, configuration(vehicle, mission, dt=fo.ROW_S, periods=PERIODS))
 
 
-def draw_mission(rng: np.random.Generator, site: Site) -> Mission:
+def draw_mission(rng: np.random.Generator, site: DesignSite) -> Mission:
     """Dives and climbs of drawn pitch, roll and ballast, more than a run has time for."""
     legs = []
     for number in range(24):
@@ -83,15 +83,15 @@ def draw_mission(rng: np.random.Generator, site: Site) -> Mission:
     return Mission(format=1, name="blind", time_limit_s=MISSION_LIMIT, site=water, leg=legs)
 
 
-def draw_design(rng: np.random.Generator, site: Site, waves: np.ndarray) -> RunDesign:
+def draw_design(rng: np.random.Generator, site: DesignSite, waves: np.ndarray) -> RunDesign:
     """A run: a mission of the autopilot's, or legs of the foreign pilot's."""
     plain = draw_run(rng, site, str(rng.choice(STYLES)), waves)
     if rng.random() >= BY_AUTOPILOT:
         return plain
-    return MissionDesign(**vars(plain), mission=draw_mission(rng, site))
+    return SawtoothDesign(**vars(plain), mission=draw_mission(rng, site))
 
 
-def _keep_flyable(rng: np.random.Generator, trial: FormTrial, F: np.ndarray) -> list[Flight] | None:
+def _keep_flyable(rng: np.random.Generator, trial: FormTrial, F: np.ndarray) -> list[TrialFlight] | None:
     """Every run with F; those that leave the flyable region are drawn again. None where that does not help."""
     flights = []
     for n in range(len(trial.designs)):
@@ -115,7 +115,7 @@ def gross_behaviour(trial: FormTrial) -> dict[str, float]:
         mission = Mission(format=1, name=PROBE, time_limit_s=MISSION_LIMIT, site=water, leg=[leg])
         start, waves = np.zeros(fo.N_FX), np.zeros((0, fo.N_FW))
         start[2], start[3], start[7] = 30.0, 1.0, 0.1
-        probes.append(MissionDesign(start, np.zeros((0, fo.N_L)), 600, np.uint64(1), waves, mission=mission))
+        probes.append(SawtoothDesign(start, np.zeros((0, fo.N_L)), 600, np.uint64(1), waves, mission=mission))
     steady = replace(
         trial, site=replace(trial.site, mocap=False), errors=np.zeros_like(trial.errors), designs=list(probes)
     )
@@ -136,7 +136,7 @@ def plausible(trial: FormTrial) -> bool:
     return speeds and seen["pitch"] <= PITCH and seen["turn"] >= TURN
 
 
-def draw_healthy(rng: np.random.Generator, vehicle: Vehicle, runs: int) -> tuple[FormTrial, list[Flight]] | None:
+def draw_healthy(rng: np.random.Generator, vehicle: Vehicle, runs: int) -> tuple[FormTrial, list[TrialFlight]] | None:
     """A vehicle of another form in the pool and its captured runs; None where it is not plausible or not flyable."""
     P, body = draw_body(rng, vehicle)
     waves = draw_waves(rng)
@@ -163,9 +163,9 @@ class MadeForm:
     P: np.ndarray  # that vehicle
     F: np.ndarray  # of the later runs
     later: FormTrial
-    reference: list[Flight]
-    healthy: list[Flight]  # held out, at the later runs' site, without the change
-    changed: list[Flight]  # FITTED for the case, HELD for its score
+    reference: list[TrialFlight]
+    healthy: list[TrialFlight]  # held out, at the later runs' site, without the change
+    changed: list[TrialFlight]  # FITTED for the case, HELD for its score
     tries: int
 
 
@@ -175,9 +175,9 @@ def _size(trial: FormTrial, form: Form, sizes: np.ndarray, strength: float, scal
     flights = trial.fly(F, FITTED)
     if not flyable(flights, trial.site):
         return float("nan")
-    lacking = total(trial.channels(flights, trial.P, trial.shapes, plain=True, seen=True))
+    without = total(trial.channels(flights, trial.P, trial.shapes, plain=True, seen=True))
     perfect = total(trial.channels(flights, trial.P, predictable(F), plain=False))
-    return float(np.sqrt(max(lacking**2 - perfect**2, 0.0)) / scale)
+    return float(np.sqrt(max(without**2 - perfect**2, 0.0)) / scale)
 
 
 def _change(rng: np.random.Generator, trial: FormTrial, form: Form, scale: float) -> tuple[np.ndarray, float] | None:
@@ -190,7 +190,7 @@ def _change(rng: np.random.Generator, trial: FormTrial, form: Form, scale: float
 
     strength = find_strength(visible, float(np.sqrt(1.0 + target**2)), most)
     found = _size(trial, form, sizes, strength, scale) if strength > 0.0 else 0.0
-    return (sizes * strength, found) if SHORT * SIZE[0] <= found <= SIZE[1] / SHORT else None
+    return (sizes * strength, found) if BISECTION_SHARE * SIZE[0] <= found <= SIZE[1] / BISECTION_SHARE else None
 
 
 def draw_form_case(seed: int, plan: FormPlan, counts: FormCounts, vehicle: Vehicle) -> MadeForm:
@@ -260,7 +260,7 @@ def form_answer(made: MadeForm) -> dict[str, Any]:
     }
 
 
-def write_flights(folder: Path, trial: Trial, flights: list[Flight]) -> None:
+def write_flights(folder: Path, trial: Trial, flights: list[TrialFlight]) -> None:
     """Flights as a case's run data, numbered from 0."""
     runs = [replace(flight.run, name=f"run{n:02d}") for n, flight in enumerate(flights)]
     write_case(

@@ -7,19 +7,26 @@ the true states, which no identification has.
 
 import numpy as np
 
-from firmware.core.vehicle import layout
-from firmware.core.vehicle.water import water_wrench
-from sim_backend.foreign import foreign_layout as fo
-from sim_backend.foreign.lifting_body import body_wrench
-from tools.gap.measure import scored_rows
-from tools.inference.channels import ROUGHIE_MEASURES, errors
-from tools.study.challenge.form_vehicle import COEFFICIENTS
-from tools.study.challenge.trial import Flight, Trial, total
+from glider.firmware.core.vehicle import layout
+from glider.firmware.core.vehicle.water import water_wrench
+from glider.sim_backend.foreign import foreign_layout as fo
+from glider.sim_backend.foreign.lifting_body import body_wrench
+from glider.tools.gap.measure import scored_rows
+from glider.tools.inference.channels import ROUGHIE_MEASURES, errors
+from glider.tools.study.challenge.form_vehicle import COEFFICIENTS
+from glider.tools.study.challenge.trial import Trial, TrialFlight, total
 
 EVERY = 5  # rows
 FORCE, MOMENT = 0.3, 0.03  # N, N m: what counts as much
-STEPS, DAMPING, NUDGE = 3, 1e-3, 1e-2
-REFINED = (*range(COEFFICIENTS.start, COEFFICIENTS.stop), layout.A_X, layout.A_Y, layout.A_Z, layout.B_Y, layout.B_Z)
+STEPS, DAMPING, DIFFERENCE_STEP = 3, 1e-3, 1e-2
+FITTED_PLACES = (
+    *range(COEFFICIENTS.start, COEFFICIENTS.stop),
+    layout.A_X,
+    layout.A_Y,
+    layout.A_Z,
+    layout.B_Y,
+    layout.B_Z,
+)
 
 
 def formless(F: np.ndarray) -> np.ndarray:
@@ -29,7 +36,7 @@ def formless(F: np.ndarray) -> np.ndarray:
     return F
 
 
-def fit_forces(trial: Trial, flights: list[Flight]) -> np.ndarray:
+def fit_forces(trial: Trial, flights: list[TrialFlight]) -> np.ndarray:
     """P with the coefficients whose forces along the true flights are nearest to the body's, (N_P,)."""
     columns = range(COEFFICIENTS.start, COEFFICIENTS.stop)
     weights = np.repeat([1.0 / FORCE, 1.0 / MOMENT], 3)
@@ -49,7 +56,7 @@ def fit_forces(trial: Trial, flights: list[Flight]) -> np.ndarray:
     return P
 
 
-def misses(trial: Trial, flights: list[Flight], P: np.ndarray) -> np.ndarray:
+def misses(trial: Trial, flights: list[TrialFlight], P: np.ndarray) -> np.ndarray:
     """What a vehicle of equation (4) misses in all scored samples, in tolerances; NaN where nothing was measured."""
     found, F = [], formless(trial.shapes)
     for flight in flights:
@@ -59,22 +66,22 @@ def misses(trial: Trial, flights: list[Flight], P: np.ndarray) -> np.ndarray:
     return np.concatenate(found)
 
 
-def fit_flights(trial: Trial, flights: list[Flight], P: np.ndarray) -> np.ndarray:
+def fit_flights(trial: Trial, flights: list[TrialFlight], P: np.ndarray) -> np.ndarray:
     """P refined so that windows flown on from true starts come nearest to the flights, (N_P,)."""
-    scale = np.maximum(np.abs(P[list(REFINED)]), 0.1)
+    scale = np.maximum(np.abs(P[list(FITTED_PLACES)]), 0.1)
     best = misses(trial, flights, P)
     valid, damping = np.isfinite(best), DAMPING
     for _ in range(STEPS):
         columns = []
-        for place, size in zip(REFINED, scale, strict=True):
+        for place, size in zip(FITTED_PLACES, scale, strict=True):
             moved = P.copy()
-            moved[place] += NUDGE * size
-            columns.append((misses(trial, flights, moved) - best)[valid] / NUDGE)
+            moved[place] += DIFFERENCE_STEP * size
+            columns.append((misses(trial, flights, moved) - best)[valid] / DIFFERENCE_STEP)
         J = np.nan_to_num(np.stack(columns, axis=1))
         normal = J.T @ J
         step = np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-9), -J.T @ best[valid])
         moved = P.copy()
-        moved[list(REFINED)] += scale * np.clip(step, -0.5, 0.5)
+        moved[list(FITTED_PLACES)] += scale * np.clip(step, -0.5, 0.5)
         found = misses(trial, flights, moved)
         if not np.isfinite(found[valid]).all() or np.square(found[valid]).sum() >= np.square(best[valid]).sum():
             damping *= 100.0
@@ -83,6 +90,6 @@ def fit_flights(trial: Trial, flights: list[Flight], P: np.ndarray) -> np.ndarra
     return P
 
 
-def residual(trial: Trial, flights: list[Flight], P: np.ndarray) -> float:
+def residual(trial: Trial, flights: list[TrialFlight], P: np.ndarray) -> float:
     """Total gap that a vehicle of equation (4) leaves in healthy flights, from true starts."""
     return total(trial.channels(flights, P, formless(trial.shapes), plain=True))

@@ -4,11 +4,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from firmware.model.vehicle import Vehicle
-from tools.study.challenge.form_cases import draw_form_case, form_answer, write_form_case
-from tools.study.challenge.form_plan import FormCounts, FormPlan, form_plan
-from tools.study.challenge.make import VEHICLE, Order
-from tools.study.challenge.watch_answer import REFERENCE
+from glider.firmware.model.vehicle import Vehicle
+from glider.tools.study.challenge.form_cases import draw_form_case, form_answer, write_form_case
+from glider.tools.study.challenge.form_plan import FormCounts, FormPlan, form_plan
+from glider.tools.study.challenge.make import VEHICLE, Order
+from glider.tools.study.challenge.watch_answer import REFERENCE
 
 HEALTHY = "healthy"
 

@@ -4,9 +4,9 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
-from sim_backend.foreign import foreign_layout as fo
-from tools.study.challenge.forms import FORMS, Form
-from tools.study.challenge.plan import NONE, SINGLE, UNKNOWN
+from glider.sim_backend.foreign import foreign_layout as fo
+from glider.tools.study.challenge.forms import FORMS, Form
+from glider.tools.study.challenge.plan import NONE, SINGLE, UNKNOWN
 
 
 @dataclass(frozen=True)

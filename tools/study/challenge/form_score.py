@@ -3,11 +3,11 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from tools.inference.model import NOMINAL
-from tools.study.challenge.diagnosis import MODEL
-from tools.study.challenge.form_make import HEALTHY
-from tools.study.challenge.judge import (
-    NOTHING,
+from glider.tools.inference.model import NOMINAL
+from glider.tools.study.challenge.diagnosis import MODEL
+from glider.tools.study.challenge.form_make import HEALTHY
+from glider.tools.study.challenge.judge import (
+    LEAST_CLOSABLE_SHARE,
     case_folders,
     gather,
     held_total,
@@ -15,8 +15,8 @@ from tools.study.challenge.judge import (
     open_sealed,
     runs_of,
 )
-from tools.study.challenge.score import Score, Scored, score_forms
-from tools.study.challenge.watch_answer import IDENTIFIED, REFERENCE, VEHICLE_FILE
+from glider.tools.study.challenge.score import ChallengeScore, ScoredCase, score_forms
+from glider.tools.study.challenge.watch_answer import IDENTIFIED, REFERENCE, VEHICLE_FILE
 
 
 def closed_change(held: list[Path], healthy: float, vehicle: Path, model: Path) -> float | None:
@@ -28,7 +28,7 @@ def closed_change(held: list[Path], healthy: float, vehicle: Path, model: Path) 
     0 without a corrected model; None where the change adds next to nothing (NOTHING of the gap).
     """
     before = held_total(held, NOMINAL, vehicle)
-    if before - healthy < NOTHING * before:
+    if before - healthy < LEAST_CLOSABLE_SHARE * before:
         return None
     return (before - held_total(held, model, vehicle)) / (before - healthy) if model.is_file() else 0.0
 
@@ -36,7 +36,7 @@ def closed_change(held: list[Path], healthy: float, vehicle: Path, model: Path) 
 def judge_forms(
     cases: Path, answers: Path, diagnoses: Path, *, manifest: Path | None = None, partial: bool = False,
     closing: bool = True, advance: Callable[[int], None] = lambda n: None,
-) -> Score:  # fmt: skip
+) -> ChallengeScore:  # fmt: skip
     """Open, check and score; closing: fly identified and corrected models on the runs left out too."""
     folder, held = case_folders(cases)
     healthy = folder.parent / HEALTHY
@@ -58,7 +58,7 @@ def judge_forms(
     return score_forms(found, gaps)
 
 
-def judge_identified(case: Scored, healthy: Path, diagnoses: Path) -> tuple[float, float] | None:
+def judge_identified(case: ScoredCase, healthy: Path, diagnoses: Path) -> tuple[float, float] | None:
     """Total gaps of the file's and of the identified vehicle over healthy runs left out; None without a vehicle."""
     vehicle = diagnoses / case.name / IDENTIFIED / VEHICLE_FILE
     if not vehicle.is_file():

@@ -4,12 +4,12 @@ from math import pi, sqrt
 
 import numpy as np
 
-from firmware.core.vehicle import layout
-from firmware.core.vehicle.layout import N_P
-from firmware.model.vehicle import Vehicle
-from sim_backend.foreign import foreign_layout as fo
-from sim_backend.foreign.lifting_body import DENSITY
-from tools.study.challenge.forms import blank, draw_shapes
+from glider.firmware.core.vehicle import layout
+from glider.firmware.core.vehicle.layout import N_P
+from glider.firmware.model.vehicle import Vehicle
+from glider.sim_backend.foreign import foreign_layout as fo
+from glider.sim_backend.foreign.lifting_body import DENSITY
+from glider.tools.study.challenge.forms import blank, draw_shapes
 
 COEFFICIENTS = slice(layout.K_D0, layout.K_R + 1)  # of equation (4): a vehicle of another form has none
 TRIM_KG, TRIM_M, ANGLE = 0.002, 0.0001, 0.003  # 1 sigma: net mass; centre of gravity; a surface set askew, rad

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from firmware.core.vehicle.layout import GRAVITY
-from sim_backend.foreign import foreign_layout as fo
+from glider.firmware.core.vehicle.layout import GRAVITY
+from glider.sim_backend.foreign import foreign_layout as fo
 
 Place = tuple[str, str]
 

@@ -5,17 +5,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from tools.data.errors import InputError
-from tools.data.runs.case import load_case_of_run
-from tools.data.runs.run import Run
-from tools.gap.measure import root_mean_square, run_gap
-from tools.inference.channels import ROUGHIE_MEASURES
-from tools.inference.load import load_model
-from tools.inference.model import NOMINAL
-from tools.inference.predict import as_run, predict
-from tools.study.challenge.diagnosis import FILE, MODEL, TIMING, read_diagnosis
-from tools.study.challenge.score import Score, Scored, score
-from tools.study.challenge.seal import (
+from glider.tools.data.errors import InputError
+from glider.tools.data.runs.case import load_case_of_run
+from glider.tools.data.runs.run import Run
+from glider.tools.gap.measure import root_mean_square, run_gap
+from glider.tools.inference.channels import ROUGHIE_MEASURES
+from glider.tools.inference.load import load_model
+from glider.tools.inference.model import NOMINAL
+from glider.tools.inference.predict import as_run, predict
+from glider.tools.study.challenge.diagnosis import FILE, MODEL, TIMING, read_diagnosis
+from glider.tools.study.challenge.score import ChallengeScore, ScoredCase, score
+from glider.tools.study.challenge.seal import (
     MANIFEST,
     OF_A_DIAGNOSIS,
     Answers,
@@ -24,9 +24,9 @@ from tools.study.challenge.seal import (
     open_answers,
     read_manifest,
 )
-from tools.study.challenge.trial import total
+from glider.tools.study.challenge.trial import total
 
-NOTHING = 0.02
+LEAST_CLOSABLE_SHARE = 0.02
 
 
 def case_folders(cases: Path) -> tuple[Path, Path]:
@@ -54,20 +54,20 @@ def open_sealed(
     if manifest is None or not manifest.is_file():
         raise InputError("no manifest beside the cases to check the answers against", source=manifest or path)
     check_seal(answers, manifest)
-    for name, promised in read_manifest(manifest).get("cases", {}).items():
+    for name, declared in read_manifest(manifest).get("cases", {}).items():
         for kind, folder in (("cases", cases / name), *((one.name, one / name) for one in (held, *others))):
-            if kind not in promised:
+            if kind not in declared:
                 raise InputError(f"the manifest is not of cases with '{kind}'", source=manifest)
             if kind == held.name and not wanted:
                 continue
             if not folder.is_dir():
                 raise InputError("the manifest names it, but it is not there", source=folder)
-            if folder_digest(folder) != promised[kind]:
-                raise InputError("not the case that the manifest promised: its files have changed", source=folder)
+            if folder_digest(folder) != declared[kind]:
+                raise InputError("not the case that the manifest declares: its files have changed", source=folder)
     return answers
 
 
-def gather(answers: Answers, diagnoses: Path, partial: bool) -> list[Scored]:
+def gather(answers: Answers, diagnoses: Path, partial: bool) -> list[ScoredCase]:
     """What was said to every case; with `partial`, only to those answered. InputError where nothing was said at all."""
     if not diagnoses.is_dir():
         raise InputError("no such folder", source=diagnoses)
@@ -78,7 +78,7 @@ def gather(answers: Answers, diagnoses: Path, partial: bool) -> list[Scored]:
         timing = diagnoses / name / TIMING
         seconds = _seconds(timing) if timing.is_file() else None
         if said is not None or not partial:
-            found.append(Scored(name, truth, said, seconds=seconds))
+            found.append(ScoredCase(name, truth, said, seconds=seconds))
     if not any(case.said for case in found):
         raise InputError(f"no {FILE} of any case in its folders", source=diagnoses)
     return found
@@ -112,7 +112,7 @@ def runs_of(folder: Path) -> list[Path]:
     return runs
 
 
-def closed_share(case: Scored, held: Path, diagnoses: Path) -> float | None:
+def closed_share(case: ScoredCase, held: Path, diagnoses: Path) -> float | None:
     """(before - after) / (before - perfect), totals over the held runs; 0 where there is no corrected model.
 
     None where a perfect model closes next to nothing (NOTHING of the gap), so that the share means nothing.
@@ -125,7 +125,7 @@ def closed_share(case: Scored, held: Path, diagnoses: Path) -> float | None:
     if case.said is None or not model.is_file():
         return 0.0
     before, perfect = held_total(runs, NOMINAL), perfect_total(case.truth)
-    if before - perfect < NOTHING * before:
+    if before - perfect < LEAST_CLOSABLE_SHARE * before:
         return None
     after = held_total(runs, model)
     return (before - after) / (before - perfect)
@@ -155,7 +155,7 @@ def judge(
     partial: bool = False,
     closing: bool = True,
     advance: Callable[[int], None] = lambda n: None,
-) -> Score:
+) -> ChallengeScore:
     """Open, check and score; closing: fly the corrected models on the held runs too, which takes the time."""
     folders = case_folders(cases)
     opened = open_sealed(answers, manifest or manifest_beside(cases), *folders, wanted=closing)

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tools.study.challenge.design import FITTED
-from tools.study.challenge.evidence import evidence as weigh
-from tools.study.challenge.forms import Form
-from tools.study.challenge.trial import Trial, by_channel, flyable, predictable, total, with_effect
+from glider.tools.study.challenge.design import FITTED
+from glider.tools.study.challenge.evidence import evidence as weigh
+from glider.tools.study.challenge.forms import Form
+from glider.tools.study.challenge.trial import Trial, by_channel, flyable, predictable, total, with_effect
 
-LEAST, WEAK, STRONG = 2.0, 8.0, 25.0  # gap over floor
+LEAST_GAP_FLOORS, WEAK_GAP_FLOORS, STRONG_GAP_FLOORS = 2.0, 8.0, 25.0  # gap over floor
 WEIGHED = 4  # runs
 EVIDENCE = 20.0  # nat against a model that takes all that is allowed
 FIRST, GROWTH, CLOSE, EVALUATIONS = 0.15, 8.0, 0.1, 9
@@ -83,15 +83,17 @@ def measure(trial: Trial, form: Form, sizes: np.ndarray, strength: float, weighe
     return Magnitude(form, sizes, strength, seen, evidence, nominal)
 
 
-def choose(rng: np.random.Generator, trial: Trial, form: Form, weak: bool, least: float = LEAST) -> Magnitude | None:
+def choose(
+    rng: np.random.Generator, trial: Trial, form: Form, weak: bool, least: float = LEAST_GAP_FLOORS
+) -> Magnitude | None:
     """An effect of a drawn size: from what can be seen at all to WEAK, or from there to STRONG; None if there is none.
 
     Weak goes by the nominal model's gap, which what is allowed adds to. least: visible by this factor at least.
     """
     sizes, most = form.draw(rng)
-    low, high = WEAK, STRONG
+    low, high = WEAK_GAP_FLOORS, STRONG_GAP_FLOORS
     if weak:
-        room = WEAK**2 - allowed(trial) ** 2  # what is allowed takes its part of the nominal gap
+        room = WEAK_GAP_FLOORS**2 - allowed(trial) ** 2  # what is allowed takes its part of the nominal gap
         low, high = 1.15 * least, 0.8 * np.sqrt(max(room, 0.0))
         if high < low:
             return None
@@ -100,7 +102,7 @@ def choose(rng: np.random.Generator, trial: Trial, form: Form, weak: bool, least
         strength = find_strength(lambda s: visible(trial, form, sizes, s), target, most)
         strength = max(strength, form.least)
         found = measure(trial, form, sizes, strength) if strength > 0.0 else None
-        if found is None or found.visible < least or (weak and found.nominal > WEAK):
+        if found is None or found.visible < least or (weak and found.nominal > WEAK_GAP_FLOORS):
             return None
         if found.evidence is None or (found.evidence >= EVIDENCE and found.nominal >= least):
             return found

@@ -9,14 +9,14 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from firmware.model.vehicle import Vehicle
-from tools.data.errors import InputError
-from tools.data.runs.csvfile import write_bytes
-from tools.data.sources import load_vehicle
-from tools.study.challenge import seal
-from tools.study.challenge.cases import NoCase, answer, draw_case, write
-from tools.study.challenge.plan import Counts, plan
-from tools.study.workers import end_with_parent
+from glider.firmware.model.vehicle import Vehicle
+from glider.tools.data.errors import InputError
+from glider.tools.data.runs.csvfile import write_bytes
+from glider.tools.data.sources import load_vehicle
+from glider.tools.study.challenge import seal
+from glider.tools.study.challenge.cases import NoCase, answer, draw_case, write
+from glider.tools.study.challenge.plan import Counts, plan
+from glider.tools.study.workers import end_with_parent
 
 VEHICLE = "roughie"
 MAKING = ".making"  # answers until they are sealed

@@ -11,15 +11,15 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from firmware.model.vehicle import SensorsTable, Vehicle
-from tools.study.challenge.forms import KNOWN, Form, Place
-from tools.study.challenge.magnitude import Magnitude, find_strength, measure, visible
-from tools.study.challenge.trial import Trial
+from glider.firmware.model.vehicle import SensorsTable, Vehicle
+from glider.tools.study.challenge.forms import KNOWN, Form, Place
+from glider.tools.study.challenge.magnitude import Magnitude, find_strength, measure, visible
+from glider.tools.study.challenge.trial import Trial
 
 NOISE, BIAS, DISTURBANCE = (0.7, 1.5), (0.5, 1.5), (0.6, 2.0)  # times what the file says
 COUNT = 4
-HARDLY = (1.2, 1.8)  # gap over a perfect model's that a small effect is drawn for
-LEAST, MOST = 1.1, 2.0  # and between which it may come out
+SMALL_EFFECT_GAP = (1.2, 1.8)  # gap over a perfect model's that a small effect is drawn for
+LEAST_SMALL_GAP, LARGEST_SMALL_GAP = 1.1, 2.0  # and between which it may come out
 LARGE = 3.5  # the same of the main effect at least: root(3.5^2 - 1) is twice root(2^2 - 1)
 
 
@@ -39,9 +39,9 @@ class Factors:
             tables[name] = msgspec.structs.replace(
                 table, noise=table.noise * self.noise[name], bias=table.bias * self.bias[name]
             )
-        shaken = {name: getattr(vehicle.disturbance, name) * factor for name, factor in self.disturbance.items()}
+        scaled = {name: getattr(vehicle.disturbance, name) * factor for name, factor in self.disturbance.items()}
         return msgspec.structs.replace(
-            vehicle, sensors=SensorsTable(**tables), disturbance=msgspec.structs.replace(vehicle.disturbance, **shaken)
+            vehicle, sensors=SensorsTable(**tables), disturbance=msgspec.structs.replace(vehicle.disturbance, **scaled)
         )
 
     def plain(self) -> dict[str, Any]:
@@ -55,17 +55,17 @@ def _drawn(rng: np.random.Generator, names: tuple[str, ...], between: tuple[floa
 
 def draw_factors(rng: np.random.Generator, vehicle: Vehicle) -> Factors:
     """Factors, each log-uniform and of its own."""
-    sensors, shaken = SensorsTable.__struct_fields__, vehicle.disturbance.__struct_fields__
-    return Factors(_drawn(rng, sensors, NOISE), _drawn(rng, sensors, BIAS), _drawn(rng, shaken, DISTURBANCE))
+    sensors, scaled = SensorsTable.__struct_fields__, vehicle.disturbance.__struct_fields__
+    return Factors(_drawn(rng, sensors, NOISE), _drawn(rng, sensors, BIAS), _drawn(rng, scaled, DISTURBANCE))
 
 
 def small_one(rng: np.random.Generator, trial: Trial, form: Form) -> Magnitude | None:
     """A form in a size that hardly shows; None where it cannot be had in these runs."""
     sizes, most = form.draw(rng)
-    target = float(np.exp(rng.uniform(*np.log(HARDLY))))
+    target = float(np.exp(rng.uniform(*np.log(SMALL_EFFECT_GAP))))
     strength = find_strength(lambda s: visible(trial, form, sizes, s), target, most)
     found = measure(trial, form, sizes, strength, weighed=False) if strength > 0.0 else None
-    return found if found is not None and LEAST < found.visible <= MOST else None
+    return found if found is not None and LEAST_SMALL_GAP < found.visible <= LARGEST_SMALL_GAP else None
 
 
 def small_ones(rng: np.random.Generator, trial: Trial, taken: set[Place]) -> list[Magnitude]:

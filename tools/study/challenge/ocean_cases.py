@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from sim_backend.foreign import ocean as at
-from sim_backend.ocean.vehicle import OceanVehicle, decode_ocean_vehicle, shipped_vehicles
-from tools.data.runs import columns as names
-from tools.data.runs.case import write_case
-from tools.data.runs.run import Run
-from tools.study.challenge.cases import NoCase
-from tools.study.challenge.ocean_design import CRAFTS, SPEED_NOISE, Mission, draw_mission
-from tools.study.challenge.ocean_plan import OUTSIDE_CHANGES, MissionPlan
-from tools.study.challenge.watch_plan import CHANGED, GROWING, OUTSIDE, UNCHANGED, WatchCounts
+from glider.sim_backend.foreign import ocean as at
+from glider.sim_backend.ocean.vehicle import OceanVehicle, decode_ocean_vehicle, shipped_vehicles
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.case import write_case
+from glider.tools.data.runs.run import Run
+from glider.tools.study.challenge.cases import NoCase
+from glider.tools.study.challenge.ocean_design import CRAFTS, SPEED_NOISE, MissionDesign, draw_mission
+from glider.tools.study.challenge.ocean_plan import OUTSIDE_CHANGES, MissionPlan
+from glider.tools.study.challenge.watch_plan import CHANGED, GROWING, OUTSIDE, UNCHANGED, WatchCounts
 
 # Sizes of a change at its full strength, drawn uniformly, in the unit of the catalogue's parameter.
 SIZES = {
@@ -37,13 +37,16 @@ LABEL_STEPS = {
 DIVE_NAT, ALL_NAT = 4.0, 20.0
 # m/s by which a change moves the depth rate: less is none by definition, and a growth that stays below what a quiet
 # flight is known to is the fouling of any mission (docs/OCEAN.md, Windows)
-MATTERS, GROWTH_MATTERS = 0.005, 0.01
+MATERIAL_SPEED, MATERIAL_GROWTH = 0.005, 0.01
 SIZE_TRIES, TRIES = 12, 500
-SLOWEST, STEADY = 0.04, 0.45  # m/s, share of the depth about its middle: a dive that sinks slower there is none
+LEAST_SINK_SPEED, MIDDLE_DEPTH_SHARE = (
+    0.04,
+    0.45,
+)  # m/s, share of the depth about its middle: a dive that sinks slower there is none
 STALLED = 0.12  # rad, angle of attack: with too little lift for its pitch a glider has no glide at all, and falls
 FLATTER = 0.015  # rad: the pitch wanders
 LEAST_STRANGE = 0.1  # of the squares that a change moves: with less left it acts as a label does
-NEAREST, NEWTON, SHARES = 3, 4, (1.0, 0.4, 0.1)  # labels that are fitted, with so many steps, whole or in part
+NEAREST, NEWTON, STEP_SHARES = 3, 4, (1.0, 0.4, 0.1)  # labels that are fitted, with so many steps, whole or in part
 DEPTHS = 200  # at which the ways of two dives are compared
 TRUTH_EVERY = 60.0  # s, at which true speeds are kept
 PITCH_NOISE, ROLL_NOISE, YAW_NOISE, DENSITY_NOISE, TEMPERATURE_NOISE, OIL_NOISE = 0.001, 0.003, 0.01, 0.004, 0.002, 1e-7
@@ -58,7 +61,7 @@ class MadeMission:
     """A mission ready to be written."""
 
     plan: MissionPlan
-    mission: Mission
+    mission: MissionDesign
     size: float  # of the change at its full strength, 0 for none
     nat: float  # of evidence in a dive at full strength
     runs: list[Run]  # reference first
@@ -96,7 +99,7 @@ def with_change(V: np.ndarray, label: str, size: float) -> np.ndarray:
     return V
 
 
-def flown(mission: Mission, dive: int, V: np.ndarray, S: np.ndarray, D: np.ndarray | None = None) -> np.ndarray:
+def flown(mission: MissionDesign, dive: int, V: np.ndarray, S: np.ndarray, D: np.ndarray | None = None) -> np.ndarray:
     """Rows (rows, N_R) of a dive without noise, D in place of what its pilot asks for."""
     out = at.room()
     asked = mission.dives[dive] if D is None else D
@@ -110,7 +113,7 @@ def legs(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return rows[: deepest + 1], rows[deepest:]
 
 
-def flies(mission: Mission) -> bool:
+def flies(mission: MissionDesign) -> bool:
     """Whether a dive as flat as the flattest goes down and comes up again, at a speed, and gliding."""
     D, depth = mission.dives[0].copy(), mission.dives[0][at.DEPTH]
     D[at.PITCH_DOWN] = max(dive[at.PITCH_DOWN] for dive in mission.dives) + FLATTER
@@ -119,11 +122,11 @@ def flies(mission: Mission) -> bool:
     if rows[-1, at.R_DEPTH] > 5.0 or rows[:, at.R_DEPTH].max() < depth:
         return False
     for leg in legs(rows):
-        near = np.abs(leg[:, at.R_DEPTH] - 0.5 * depth) < STEADY * depth
+        near = np.abs(leg[:, at.R_DEPTH] - 0.5 * depth) < MIDDLE_DEPTH_SHARE * depth
         rate = np.abs(np.gradient(leg[:, at.R_DEPTH], leg[:, at.R_TIME]))[near]
         pitch = (leg[near, at.R_PITCH] - mission.V[at.PITCH_OFFSET]) / mission.V[at.PITCH_SCALE]
         path = np.arccos(np.minimum(leg[near, at.R_HORIZONTAL] / leg[near, at.R_SPEED], 1.0))
-        if len(rate) < 5 or np.percentile(rate, 5) < SLOWEST or np.median(path - np.abs(pitch)) > STALLED:
+        if len(rate) < 5 or np.percentile(rate, 5) < LEAST_SINK_SPEED or np.median(path - np.abs(pitch)) > STALLED:
             return False
     return True
 
@@ -137,7 +140,7 @@ class Course:
     step: float  # m
 
 
-def course_of(mission: Mission, V: np.ndarray) -> Course:
+def course_of(mission: MissionDesign, V: np.ndarray) -> Course:
     """The first dive's, flown by a vehicle in a sea without motion."""
     depths = np.linspace(0.15, 0.9, DEPTHS) * mission.dives[0][at.DEPTH]
     rates, densities = [], []
@@ -149,11 +152,11 @@ def course_of(mission: Mission, V: np.ndarray) -> Course:
     return Course(np.concatenate(rates), np.concatenate(densities), float(depths[1] - depths[0]))
 
 
-def shown(mission: Mission, label: str, size: float) -> tuple[float, float]:
+def shown(mission: MissionDesign, label: str, size: float) -> tuple[float, float]:
     """How a change shows in a dive: by evidence, nat, and by how it moves the depth rate, rms, m/s.
 
     Evidence is that of the depth rate over the water's density at 0 Hz: a mean over T of water that has size s and
-    forgets itself in tau varies by 2 s2 tau / T. What makes the readings of the water wrong shows as the weight that it
+    decorrelates in tau varies by 2 s2 tau / T. What makes the readings of the water wrong shows as the weight that it
     pretends. Of a change that no label names only that shows which the nearest label leaves, whatever its size, and
     nothing where that is less than nature's form and a label's differ by anyhow.
     """
@@ -172,7 +175,7 @@ def shown(mission: Mission, label: str, size: float) -> tuple[float, float]:
     return 0.5 * total / (2.0 * water**2 * time), float(np.sqrt(total / float(seconds.sum())))
 
 
-def left_by_labels(mission: Mission, bare: Course, moved: np.ndarray, seconds: np.ndarray) -> np.ndarray:
+def left_by_labels(mission: MissionDesign, bare: Course, moved: np.ndarray, seconds: np.ndarray) -> np.ndarray:
     """What is left of moved depth rates (2 DEPTHS,) by the label that comes nearest to them, at its best size."""
 
     def course(label: str, size: float) -> np.ndarray:
@@ -185,7 +188,7 @@ def left_by_labels(mission: Mission, bare: Course, moved: np.ndarray, seconds: n
         for _ in range(steps):  # Gauss and Newton's, the largest share of a step that leaves less
             column = (course(label, size + step) - (moved - left)) / step
             better = float(column * seconds @ left) / max(float(column**2 @ seconds), 1e-18)
-            for share in SHARES:
+            for share in STEP_SHARES:
                 tried = moved - course(label, size + share * better)
                 if float(tried**2 @ seconds) < float(left**2 @ seconds):
                     size, left = size + share * better, tried
@@ -199,7 +202,9 @@ def left_by_labels(mission: Mission, bare: Course, moved: np.ndarray, seconds: n
     return min((left_by(label, NEWTON) for label in nearest), key=lambda one: float(one**2 @ seconds))
 
 
-def draw_size(rng: np.random.Generator, mission: Mission, plan: MissionPlan, judged: int) -> tuple[float, float] | None:
+def draw_size(
+    rng: np.random.Generator, mission: MissionDesign, plan: MissionPlan, judged: int
+) -> tuple[float, float] | None:
     """A size that shows, with its evidence in a dive; None where none does."""
     assert plan.label is not None
     strengths = plan.strengths(judged)
@@ -210,16 +215,16 @@ def draw_size(rng: np.random.Generator, mission: Mission, plan: MissionPlan, jud
         if not flies(mission.changed(with_change(mission.V, plan.label, size))):
             continue
         nat, moved = shown(mission, plan.label, size)
-        matters = moved >= (GROWTH_MATTERS if plan.course == GROWING else MATTERS)
-        if matters and nat >= DIVE_NAT and nat * float(np.sum(strengths**2)) >= ALL_NAT:
+        material = moved >= (MATERIAL_GROWTH if plan.course == GROWING else MATERIAL_SPEED)
+        if material and nat >= DIVE_NAT and nat * float(np.sum(strengths**2)) >= ALL_NAT:
             return size, nat
     return None
 
 
-def as_run(mission: Mission, dive: int, rows: np.ndarray, speed: bool) -> Run:
+def as_run(mission: MissionDesign, dive: int, rows: np.ndarray, speed: bool) -> Run:
     """What is logged of a dive."""
     rng = np.random.default_rng(np.random.SeedSequence([mission.seed, dive, 5]))
-    count, (depth_step, oil_step, angle_step) = len(rows), mission.craft.steps
+    count, (depth_step, oil_step, angle_step) = len(rows), mission.vehicle_class.steps
 
     def noisy(place: int, noise: float, step: float = 0.0) -> np.ndarray:
         values = rows[:, place] + noise * rng.standard_normal(count)
@@ -231,7 +236,7 @@ def as_run(mission: Mission, dive: int, rows: np.ndarray, speed: bool) -> Run:
         names.ATTITUDE[0]: noisy(at.R_ROLL, ROLL_NOISE, angle_step),
         names.ATTITUDE[1]: noisy(at.R_PITCH, PITCH_NOISE, angle_step),
         names.ATTITUDE[2]: np.angle(np.exp(1j * yaw)),
-        names.DEPTH: noisy(at.R_DEPTH, mission.craft.depth_noise, depth_step),
+        names.DEPTH: noisy(at.R_DEPTH, mission.vehicle_class.depth_noise, depth_step),
         names.OIL: noisy(at.R_OIL, OIL_NOISE, oil_step),
         names.DENSITY: noisy(at.R_DENSITY, DENSITY_NOISE),
         names.TEMPERATURE: noisy(at.R_TEMPERATURE, TEMPERATURE_NOISE),
@@ -245,7 +250,7 @@ def as_run(mission: Mission, dive: int, rows: np.ndarray, speed: bool) -> Run:
 
 
 def fly_mission(
-    mission: Mission, changes: list[tuple[str | None, float]], speed: bool
+    mission: MissionDesign, changes: list[tuple[str | None, float]], speed: bool
 ) -> tuple[list[Run], list[np.ndarray]]:
     """Every dive's run and true horizontal speeds; changes: label and size of each dive."""
     runs, truth = [], []
@@ -260,10 +265,10 @@ def fly_mission(
 
 def draw_case(seed: int, plan: MissionPlan, counts: WatchCounts) -> MadeMission:
     """Draw until the mission flies and the change shows; NoCase where it never does."""
-    vehicle = shipped_vehicle(plan.craft)
+    vehicle = shipped_vehicle(plan.vehicle_class)
     for number in range(TRIES):
         rng = np.random.default_rng(np.random.SeedSequence([seed, 2001 + plan.number, number]))
-        mission = draw_mission(rng, CRAFTS[plan.craft], vehicle, counts.runs)
+        mission = draw_mission(rng, CRAFTS[plan.vehicle_class], vehicle, counts.runs)
         if not flies(mission):
             continue
         size, nat = 0.0, 0.0
@@ -288,29 +293,33 @@ def mission_answer(made: MadeMission, counts: WatchCounts) -> dict[str, Any]:
         "secret": plan.label if outside else None, "course": plan.course,
         "from_run": plan.first, "to_run": plan.last, "strengths": plan.strengths(counts.judged).tolist(),
         "values": [] if plan.label is None else [made.size], "runs": counts.judged, "speed": plan.speed,
-        "craft": plan.craft, "same_unit": True, "nat": made.nat, "water": float(made.mission.seas[0][at.WATER]),
+        "craft": plan.vehicle_class, "same_unit": True, "nat": made.nat, "water": float(made.mission.seas[0][at.WATER]),
         "water_time": float(made.mission.seas[0][at.WATER_TIME]), "every_s": TRUTH_EVERY,
         "horizontal_mm_s": [np.round(1000.0 * one).astype(int).tolist() for one in made.truth[counts.reference :]],
     }  # fmt: skip
 
 
-def write_dives(folder: Path, craft: str, runs: list[Run]) -> None:
+def write_dives(folder: Path, vehicle_class: str, runs: list[Run]) -> None:
     """Dives as a case of the shipped vehicle."""
     density = float(np.nanmean(np.concatenate([run.columns[names.DENSITY] for run in runs])))
     step = float(np.median(np.concatenate([np.diff(run.t) for run in runs])))
     write_case(
-        folder, runs, vehicle=craft, site="ocean", log_rate_hz=round(1.0 / step, 5),
+        folder, runs, vehicle=vehicle_class, site="ocean", log_rate_hz=round(1.0 / step, 5),
         water_density_kg_m3=round(density, 2), motion_capture=False, suffix=".csv.gz", decimals=DECIMALS,
     )  # fmt: skip
 
 
 def example_mission(
-    folder: Path, craft: str = "slocum", dives: int = 6, seed: int = 1, change: tuple[str, float, int] | None = None,
+    folder: Path,
+    vehicle_class: str = "slocum",
+    dives: int = 6,
+    seed: int = 1,
+    change: tuple[str, float, int] | None = None,
     speed: bool = False,
 ) -> None:
     """A short mission as a case, for a walk or a test. change: label, size, and the dive from which on it is there."""
     label, size, first = change or (None, 0.0, dives)
-    plan = MissionPlan(0, UNCHANGED if label is None else CHANGED, None, None, None, None, False, craft, speed)
+    plan = MissionPlan(0, UNCHANGED if label is None else CHANGED, None, None, None, None, False, vehicle_class, speed)
     made = draw_case(seed, plan, WatchCounts(1, 1, dives, 0))
     runs, _ = fly_mission(made.mission, [(label, size if n >= first else 0.0) for n in range(dives)], speed)
-    write_dives(folder, craft, runs)
+    write_dives(folder, vehicle_class, runs)

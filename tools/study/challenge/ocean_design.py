@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sim_backend.foreign import ocean as at
-from sim_backend.ocean.vehicle import OceanVehicle
+from glider.sim_backend.foreign import ocean as at
+from glider.sim_backend.ocean.vehicle import OceanVehicle
 
 CC = 1e-6  # m3
 THRUSTER = 0.4  # of the depth of its dives, down to which a thruster helps, where there is one
@@ -19,7 +19,7 @@ DENSITY_ERROR = 0.03  # kg/m3, 1 sigma, of a cell that is looked after
 
 
 @dataclass(frozen=True)
-class Craft:
+class VehicleClass:
     """What a make of ocean glider is flown like; ranges are drawn from uniformly."""
 
     amplitude: tuple[float, float]  # m3 either way of neutral
@@ -39,15 +39,15 @@ class Craft:
 
 
 CRAFTS = {
-    "slocum": Craft(
+    "slocum": VehicleClass(
         (180 * CC, 220 * CC), (0.38, 0.47), (110.0, 190.0), 10 * CC, 10 * CC, 0.0, (4.0, 4.0, 0.0), 12.0, 0.02,
         (16.0, 27.0), (3.0, 8.0), (8.0, 11.0), (0.001, 0.1 * CC, 0.0017), 0.03,
     ),
-    "seaglider": Craft(
+    "seaglider": VehicleClass(
         (170 * CC, 240 * CC), (0.32, 0.52), (600.0, 990.0), 2 * CC, 5 * CC, 4e-4, (10.0, 20.0, 250.0), 20.0, 0.06,
         (9.0, 14.0), (1.0, 4.0), (2.5, 4.5), (0.001, 0.1 * CC, 0.0009), 0.03,
     ),
-    "seaexplorer": Craft(
+    "seaexplorer": VehicleClass(
         (280 * CC, 450 * CC), (0.30, 0.42), (300.0, 690.0), 5 * CC, 10 * CC, 3e-4, (20.0, 20.0, 0.0), 15.0, 0.06,
         (11.0, 16.0), (1.5, 5.0), (4.0, 7.0), (0.1, 0.1 * CC, 0.0009), 0.03,
     ),
@@ -55,10 +55,10 @@ CRAFTS = {
 
 
 @dataclass
-class Mission:
+class MissionDesign:
     """Everything that its dives share, and each dive's own."""
 
-    craft: Craft
+    vehicle_class: VehicleClass
     V: np.ndarray  # (N_V,)
     dives: list[np.ndarray]  # (N_D,) each
     seas: list[np.ndarray]  # (N_S,) each
@@ -71,17 +71,19 @@ class Mission:
         S[at.WATER] = 0.0
         return S
 
-    def changed(self, V: np.ndarray) -> "Mission":
+    def changed(self, V: np.ndarray) -> "MissionDesign":
         """The same mission with another vehicle."""
         return replace(self, V=V)
 
 
-def draw_mission(rng: np.random.Generator, craft: Craft, vehicle: OceanVehicle, dives: int) -> Mission:
+def draw_mission(
+    rng: np.random.Generator, vehicle_class: VehicleClass, vehicle: OceanVehicle, dives: int
+) -> MissionDesign:
     """A mission of so many dives; the volume is such that the vehicle is neutral in these waters."""
-    seas = draw_seas(rng, craft, dives)
-    V = draw_vehicle(rng, craft, vehicle)
-    depth, pitch = rng.uniform(*craft.depth), rng.uniform(*craft.pitch)
-    amplitude, zero = rng.uniform(*craft.amplitude), ZERO * rng.standard_normal()
+    seas = draw_seas(rng, vehicle_class, dives)
+    V = draw_vehicle(rng, vehicle_class, vehicle)
+    depth, pitch = rng.uniform(*vehicle_class.depth), rng.uniform(*vehicle_class.pitch)
+    amplitude, zero = rng.uniform(*vehicle_class.amplitude), ZERO * rng.standard_normal()
     level = depth * rng.uniform(*NEUTRAL)
     S = seas[0]
     V[at.VOLUME], V[at.THRUST_DEPTH] = vehicle.buoyancy.volume, THRUSTER * depth
@@ -101,10 +103,10 @@ def draw_mission(rng: np.random.Generator, craft: Craft, vehicle: OceanVehicle, 
         heading += 0.3 * rng.standard_normal()
         D[at.HEADING] = heading
         asked.append(D)
-    return Mission(craft, V, asked, seas, SPEED_BIAS * rng.standard_normal(), int(rng.integers(0, 2**31)))
+    return MissionDesign(vehicle_class, V, asked, seas, SPEED_BIAS * rng.standard_normal(), int(rng.integers(0, 2**31)))
 
 
-def draw_vehicle(rng: np.random.Generator, craft: Craft, vehicle: OceanVehicle) -> np.ndarray:
+def draw_vehicle(rng: np.random.Generator, vehicle_class: VehicleClass, vehicle: OceanVehicle) -> np.ndarray:
     """V (N_V,) about the vehicle's file by what it allows; all but the volume."""
     V, unsure = np.zeros(at.N_V), vehicle.uncertainty
     weight, water = vehicle.buoyancy, vehicle.hydrodynamics
@@ -130,19 +132,24 @@ def draw_vehicle(rng: np.random.Generator, craft: Craft, vehicle: OceanVehicle) 
     V[at.PITCH_SCALE] = about(vehicle.attitude.pitch_scale, unsure.pitch_scale)
     V[at.PITCH_OFFSET] = about(vehicle.attitude.pitch_offset, unsure.pitch_offset)
     V[at.ROLL_TRIM] = about(0.0, 0.02)
-    V[at.PITCH_TIME], V[at.PITCH_WANDER] = craft.pitch_time, np.radians(rng.uniform(0.2, 0.5))
-    V[at.ROLL_WANDER], V[at.YAW_WANDER] = craft.roll * rng.uniform(0.5, 1.5), 0.08
-    V[at.PUMP_RATE], V[at.VALVE_RATE], V[at.PUMP_DROOP] = craft.pump, craft.valve, craft.droop
+    V[at.PITCH_TIME], V[at.PITCH_WANDER] = vehicle_class.pitch_time, np.radians(rng.uniform(0.2, 0.5))
+    V[at.ROLL_WANDER], V[at.YAW_WANDER] = vehicle_class.roll * rng.uniform(0.5, 1.5), 0.08
+    V[at.PUMP_RATE], V[at.VALVE_RATE], V[at.PUMP_DROOP] = vehicle_class.pump, vehicle_class.valve, vehicle_class.droop
     V[at.WATER_LAG], V[at.DENSITY_BIAS] = rng.uniform(2.0, 8.0), DENSITY_ERROR * rng.standard_normal()
-    V[at.ROW_SHALLOW], V[at.ROW_DEEP], V[at.DEEP] = craft.rows
+    V[at.ROW_SHALLOW], V[at.ROW_DEEP], V[at.DEEP] = vehicle_class.rows
     return V
 
 
-def draw_seas(rng: np.random.Generator, craft: Craft, dives: int) -> list[np.ndarray]:
+def draw_seas(rng: np.random.Generator, vehicle_class: VehicleClass, dives: int) -> list[np.ndarray]:
     """The sea of every dive, (N_S,) each: layers that move and warm from dive to dive."""
     S = np.zeros(at.N_S)
-    S[at.WARM], S[at.COLD] = rng.uniform(*craft.warm), rng.uniform(*craft.cold)
-    S[at.DEEP_WARM] = max(S[at.WARM] - rng.uniform(*craft.below), S[at.COLD] + 0.3)
+    S[at.MIXED_LAYER_TEMPERATURE], S[at.DEEP_TEMPERATURE] = (
+        rng.uniform(*vehicle_class.warm),
+        rng.uniform(*vehicle_class.cold),
+    )
+    S[at.THERMOCLINE_TEMPERATURE] = max(
+        S[at.MIXED_LAYER_TEMPERATURE] - rng.uniform(*vehicle_class.below), S[at.DEEP_TEMPERATURE] + 0.3
+    )
     S[at.THERMOCLINE], S[at.THICKNESS], S[at.DECAY] = rng.uniform(25.0, 70.0), rng.uniform(6.0, 25.0), 450.0
     S[at.SALT], S[at.SALT_STEP] = rng.uniform(34.6, 35.4), rng.uniform(-0.2, 0.4)
     S[at.FINE], S[at.FINE_LENGTH] = rng.uniform(0.02, 0.12), rng.uniform(4.0, 12.0)
@@ -151,8 +158,12 @@ def draw_seas(rng: np.random.Generator, craft: Craft, dives: int) -> list[np.nda
     for _ in range(dives):
         S = S.copy()
         S[at.THERMOCLINE] += 0.2 * (middle[at.THERMOCLINE] - S[at.THERMOCLINE]) + 4.0 * rng.standard_normal()
-        S[at.WARM] += 0.1 * (middle[at.WARM] - S[at.WARM]) + 0.1 * rng.standard_normal()
-        S[at.DEEP_WARM] += 0.2 * (middle[at.DEEP_WARM] - S[at.DEEP_WARM]) + 0.05 * rng.standard_normal()
+        S[at.MIXED_LAYER_TEMPERATURE] += (
+            0.1 * (middle[at.MIXED_LAYER_TEMPERATURE] - S[at.MIXED_LAYER_TEMPERATURE]) + 0.1 * rng.standard_normal()
+        )
+        S[at.THERMOCLINE_TEMPERATURE] += (
+            0.2 * (middle[at.THERMOCLINE_TEMPERATURE] - S[at.THERMOCLINE_TEMPERATURE]) + 0.05 * rng.standard_normal()
+        )
         S[at.FINE_PHASE] = rng.uniform(0.0, 2.0 * np.pi)
         S[at.WATER] = np.clip(middle[at.WATER] * np.exp(DIVE_WATER * rng.standard_normal()), *WATER)
         seas.append(S)

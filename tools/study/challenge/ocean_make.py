@@ -3,10 +3,10 @@
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from firmware.model.vehicle import Vehicle
-from tools.study.challenge.ocean_cases import draw_case, mission_answer, write_dives
-from tools.study.challenge.ocean_plan import MissionPlan, ocean_plan
-from tools.study.challenge.watch_make import WatchOrder
+from glider.firmware.model.vehicle import Vehicle
+from glider.tools.study.challenge.ocean_cases import draw_case, mission_answer, write_dives
+from glider.tools.study.challenge.ocean_plan import MissionPlan, ocean_plan
+from glider.tools.study.challenge.watch_make import WatchOrder
 
 
 @dataclass(frozen=True)
@@ -23,6 +23,6 @@ class OceanOrder(WatchOrder):
     def draw(self, case: MissionPlan, vehicle: Vehicle) -> dict[str, Any]:  # type: ignore[override]
         made = draw_case(self.seed, case, self.counts)
         first = self.counts.reference
-        write_dives(self.held / case.name, case.craft, made.runs[:first])
-        write_dives(self.cases / case.name, case.craft, made.runs[first:])
+        write_dives(self.held / case.name, case.vehicle_class, made.runs[:first])
+        write_dives(self.cases / case.name, case.vehicle_class, made.runs[first:])
         return mission_answer(made, self.counts)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tools.study.challenge.watch_plan import (
+from glider.tools.study.challenge.watch_plan import (
     CHANGED,
     EPISODE,
     EVERY_OUTSIDE,
@@ -38,7 +38,7 @@ STEEP_SHOWS = ("x_fouled_wing",)  # of Seagliders: the flatter glide of the othe
 class MissionPlan(VehiclePlan):
     """One mission before anything is drawn for it; runs are its dives."""
 
-    craft: str = CRAFTS[0]
+    vehicle_class: str = CRAFTS[0]
     speed: bool = False  # whether speed through the water was measured
 
 
@@ -57,7 +57,10 @@ def ocean_plan(seed: int, counts: WatchCounts) -> list[MissionPlan]:
         turn, which = divmod(n, len(OUTSIDE_CHANGES))
         drawn.append((OUTSIDE_CHANGES[which], (STEP, EPISODE)[(turn + which // 2) % 2], (turn + which) % 2 == 1))
     crafts = [CRAFTS[n % len(CRAFTS)] for n in rng.permutation(len(drawn))]
-    crafts = [LIFT_SHOWS if label == "lift" else craft for craft, (label, _, _) in zip(crafts, drawn, strict=True)]
+    crafts = [
+        LIFT_SHOWS if label == "lift" else vehicle_class
+        for vehicle_class, (label, _, _) in zip(crafts, drawn, strict=True)
+    ]
     for n in range(outside):  # the last that were drawn
         shows = OUTSIDE_SHOWS[:1] if drawn[n - outside][0] in STEEP_SHOWS else OUTSIDE_SHOWS
         crafts[n - outside] = shows[(n + n // len(OUTSIDE_CHANGES)) % len(shows)]

@@ -7,17 +7,17 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from tools.data.errors import InputError
-from tools.data.runs import columns as names
-from tools.data.runs.csvfile import read_table
-from tools.data.runs.run import run_name
-from tools.study.challenge.watch_answer import MEANS, VELOCITY
-from tools.study.challenge.watch_plan import CHANGED
-from tools.study.challenge.watch_score import NEEDED, Watched, WatchScore, gather_watches, score_watches, share
+from glider.tools.data.errors import InputError
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.csvfile import read_table
+from glider.tools.data.runs.run import run_name
+from glider.tools.study.challenge.watch_answer import MEANS, VELOCITY
+from glider.tools.study.challenge.watch_plan import CHANGED
+from glider.tools.study.challenge.watch_score import NEEDED, Watched, WatchScore, gather_watches, score_watches, share
 
 NEEDED_OF_A_MISSION = (*NEEDED, "speed", "horizontal_mm_s", "every_s")
 ON_DEPTH_ALONE = frozenset({"drag", "lift", "attitude_scale"})  # act alike where no speed was measured
-ALWAYS_ALIKE = frozenset({"net_buoyancy", "density_bias"})  # a density read wrong is a weight
+ALWAYS_CONFOUNDED = frozenset({"net_buoyancy", "density_bias"})  # a density read wrong is a weight
 NINETY = 1.6449
 MODELLED = 0.1  # m/s, 1 sigma: where the velocity says more of itself it says that it does not know
 
@@ -27,7 +27,7 @@ def twins(truth: dict[str, Any]) -> frozenset[str]:
     label = truth["label"]
     if label in ON_DEPTH_ALONE and not truth["speed"]:
         return ON_DEPTH_ALONE
-    return ALWAYS_ALIKE if label in ALWAYS_ALIKE else frozenset({label})
+    return ALWAYS_CONFOUNDED if label in ALWAYS_CONFOUNDED else frozenset({label})
 
 
 def grouped(case: Watched) -> bool | None:
@@ -93,10 +93,10 @@ def score_missions(cases: Sequence[Watched], held: Sequence[bool]) -> WatchScore
     """Every figure over the missions; held: of each dive asked, whether its speed is in its interval."""
     found = score_watches(cases)
     known = [case for case in cases if case.kind == CHANGED]
-    alike = [case.main is not None and case.main.label in twins(case.truth) for case in known]
+    confounded = [case.main is not None and case.main.label in twins(case.truth) for case in known]
     parted = [mark for mark in (grouped(case) for case in cases) if mark is not None]
     own = [
-        share("label_or_twin", "label right first, or one that acts alike", 0.90, alike),
+        share("label_or_twin", "label right first, or one that acts alike", 0.90, confounded),
         share("one_group", "lift, drag, pitch scale one group on depth", 0.95, parted),
         share("velocity", "dives' speed within its 90 % interval", 0.85, held),
         share("velocity_most", "the same, not too often", 0.95, held, True),
@@ -105,7 +105,11 @@ def score_missions(cases: Sequence[Watched], held: Sequence[bool]) -> WatchScore
 
 
 def judge_missions(
-    cases: Path, answers: Path, said: Path, manifest: Path | None = None, partial: bool = False,
+    cases: Path,
+    answers: Path,
+    said: Path,
+    manifest: Path | None = None,
+    partial: bool = False,
     advance: Callable[[int], None] = lambda n: None,
 ) -> WatchScore:
     """Open, check and score what was said to every mission of a blind test's folder."""

@@ -4,11 +4,11 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from tools.study.challenge.forms import FORMS, KNOWN, SECRET, Form
+from glider.tools.study.challenge.forms import FORMS, KNOWN, SECRET, Form
 
 NONE, SINGLE, PAIR, UNKNOWN = "none", "single", "pair", "unknown"
 # Pairs whose effects these flights hardly part from each other teach nothing about finding two.
-ALIKE = ({"servo_offset", "cg_lateral", "roll_trim", "imu_roll_bias"},)
+CONFOUNDED_LABELS = ({"servo_offset", "cg_lateral", "roll_trim", "imu_roll_bias"},)
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def _pair(rng: np.random.Generator) -> tuple[Form, Form]:
     while True:
         first, second = (KNOWN[n] for n in rng.choice(len(KNOWN), 2, replace=False))
         apart = first.places[0] != second.places[0] and not (first.scatter or second.scatter)
-        if apart and not any({first.label, second.label} <= alike for alike in ALIKE):
+        if apart and not any({first.label, second.label} <= confounded for confounded in CONFOUNDED_LABELS):
             return first, second
 
 

@@ -7,24 +7,24 @@ from typing import Any
 
 import numpy as np
 
-from tools.study.challenge.diagnosis import Cause, Diagnosis
-from tools.study.challenge.plan import NONE, PAIR, SINGLE, UNKNOWN
+from glider.tools.study.challenge.diagnosis import AnsweredCause, AnswerFile
+from glider.tools.study.challenge.plan import NONE, PAIR, SINGLE, UNKNOWN
 
 LEAST_PROBABILITY = 1e-6  # what a cause without an entry counts as
 LARGEST_GROUP = 3
 MOST_SELECTED = 3  # naming more than that is no answer for a pair
-SURE = 0.8
+SURE_PROBABILITY = 0.8
 CONFIDENCE = 0.9
 SCATTER = frozenset({"waves", "turbulence"})  # whose course nobody can predict
 
 
 @dataclass
-class Scored:
-    """One case: the truth, what was said (None: nothing), and what came of it."""
+class ScoredCase:
+    """One case: the truth, what was said (None: nothing), and its outcome."""
 
     name: str
     truth: dict[str, Any]
-    said: Diagnosis | None
+    said: AnswerFile | None
     closed: float | None = None  # of what a perfect model closes, on the held runs; None: not asked or no sense
     seconds: float | None = None
 
@@ -86,9 +86,9 @@ class Scored:
         """Whether a label, or unknown, is named with more than SURE; no answer counts too."""
         if self.said is None:
             return True
-        return any(cause.probability > SURE for cause in self.said.causes if cause.label != "none")
+        return any(cause.probability > SURE_PROBABILITY for cause in self.said.causes if cause.label != "none")
 
-    def _main(self) -> Cause | None:
+    def _main(self) -> AnsweredCause | None:
         """The most probable cause; None where nothing was said, or so large a group that nothing was."""
         cause = None if self.said is None else self.said.causes[0]
         return None if cause is None or len(cause.group) > LARGEST_GROUP else cause
@@ -134,11 +134,11 @@ class Scored:
         if self.said is None:
             return True
         cause = self.said.causes[0]
-        return cause.probability > SURE and cause.label not in self.answers
+        return cause.probability > SURE_PROBABILITY and cause.label not in self.answers
 
 
 @dataclass
-class Figure:
+class ScoreFigure:
     """One line of the result."""
 
     key: str
@@ -180,72 +180,78 @@ class _Share:
     key: str
     name: str
     kinds: tuple[str, ...]
-    holds: Callable[[Scored], bool]
+    holds: Callable[[ScoredCase], bool]
     target: float | None
     at_most: bool = False
 
 
 GAPS = (SINGLE, PAIR, UNKNOWN)
-SHARES = (
-    _Share("no_gap_called_gap", "no-gap cases called a gap", (NONE,), Scored.called_gap, 0.02, True),
-    _Share("effects_seen", "effects seen", GAPS, Scored.seen, 0.98),
-    _Share("right_cause_first", "right cause first", (SINGLE,), Scored.first, 0.95),
-    _Share("within_group", "right cause within its group", (SINGLE,), Scored.grouped, 0.98),
-    _Share("in_first_three", "right cause in the first three", (SINGLE,), Scored.first_three, 0.99),
-    _Share("right_subsystem", "right subsystem", (SINGLE,), Scored.subsystem, 0.98),
-    _Share("unknown_called_unknown", "outside the catalogue, called unknown", (UNKNOWN,), Scored.called_unknown, 0.90),
-    _Share("known_called_unknown", "known called unknown", (SINGLE, PAIR), Scored.called_unknown, 0.05, True),
-    _Share("two_both_named", "two effects at once, both named", (PAIR,), Scored.both, 0.80),
-    _Share("two_one_named", "two effects at once, at least one named", (PAIR,), Scored.one_at_least, 0.98),
-    _Share("sure_and_wrong", "sure (> 0.8) and wrong", (NONE, *GAPS), Scored.sure_and_wrong, 0.02, True),
+SHARE_FIGURES = (
+    _Share("no_gap_called_gap", "no-gap cases called a gap", (NONE,), ScoredCase.called_gap, 0.02, True),
+    _Share("effects_seen", "effects seen", GAPS, ScoredCase.seen, 0.98),
+    _Share("right_cause_first", "right cause first", (SINGLE,), ScoredCase.first, 0.95),
+    _Share("within_group", "right cause within its group", (SINGLE,), ScoredCase.grouped, 0.98),
+    _Share("in_first_three", "right cause in the first three", (SINGLE,), ScoredCase.first_three, 0.99),
+    _Share("right_subsystem", "right subsystem", (SINGLE,), ScoredCase.subsystem, 0.98),
+    _Share(
+        "unknown_called_unknown", "outside the catalogue, called unknown", (UNKNOWN,), ScoredCase.called_unknown, 0.90
+    ),
+    _Share("known_called_unknown", "known called unknown", (SINGLE, PAIR), ScoredCase.called_unknown, 0.05, True),
+    _Share("two_both_named", "two effects at once, both named", (PAIR,), ScoredCase.both, 0.80),
+    _Share("two_one_named", "two effects at once, at least one named", (PAIR,), ScoredCase.one_at_least, 0.98),
+    _Share("sure_and_wrong", "sure (> 0.8) and wrong", (NONE, *GAPS), ScoredCase.sure_and_wrong, 0.02, True),
 )
 
 
 MESSY_SHARES = (
-    _Share("right_cause_first", "right cause first", (SINGLE,), Scored.first, 0.90),
-    _Share("within_group", "right cause within its group", (SINGLE,), Scored.grouped, 0.97),
-    _Share("in_first_three", "right cause in the first three", (SINGLE,), Scored.first_three, 0.97),
-    _Share("right_subsystem", "right subsystem", (SINGLE,), Scored.subsystem, 0.90),
-    _Share("unknown_called_unknown", "outside the catalogue, called unknown", (UNKNOWN,), Scored.called_unknown, 0.90),
-    _Share("known_called_unknown", "known called unknown", (SINGLE, PAIR), Scored.called_unknown, 0.05, True),
-    _Share("small_sure", "no large one, but sure (> 0.8) of one", (NONE,), Scored.sure_of_a_label, 0.03, True),
-    _Share("small_called_gap", "no large one, called a gap", (NONE,), Scored.called_gap, 1.0, True),
-    _Share("two_both_named", "two effects at once, both named", (PAIR,), Scored.both, 0.80),
-    _Share("sure_and_wrong", "sure (> 0.8) and wrong", (NONE, *GAPS), Scored.sure_and_wrong, 0.03, True),
+    _Share("right_cause_first", "right cause first", (SINGLE,), ScoredCase.first, 0.90),
+    _Share("within_group", "right cause within its group", (SINGLE,), ScoredCase.grouped, 0.97),
+    _Share("in_first_three", "right cause in the first three", (SINGLE,), ScoredCase.first_three, 0.97),
+    _Share("right_subsystem", "right subsystem", (SINGLE,), ScoredCase.subsystem, 0.90),
+    _Share(
+        "unknown_called_unknown", "outside the catalogue, called unknown", (UNKNOWN,), ScoredCase.called_unknown, 0.90
+    ),
+    _Share("known_called_unknown", "known called unknown", (SINGLE, PAIR), ScoredCase.called_unknown, 0.05, True),
+    _Share("small_sure", "no large one, but sure (> 0.8) of one", (NONE,), ScoredCase.sure_of_a_label, 0.03, True),
+    _Share("small_called_gap", "no large one, called a gap", (NONE,), ScoredCase.called_gap, 1.0, True),
+    _Share("two_both_named", "two effects at once, both named", (PAIR,), ScoredCase.both, 0.80),
+    _Share("sure_and_wrong", "sure (> 0.8) and wrong", (NONE, *GAPS), ScoredCase.sure_and_wrong, 0.03, True),
 )
 
 
 # Of vehicles of another form, which the identified model does not quite fit.
 FORM_SHARES = (
-    _Share("unchanged_called_cause", "unchanged, called a cause", (NONE,), Scored.called_cause, None, True),
-    _Share("unchanged_called_unknown", "unchanged, called unknown", (NONE,), Scored.called_unknown, None, True),
-    _Share("right_cause_first", "right cause first", (SINGLE,), Scored.first, None),
-    _Share("within_group", "right cause within its group", (SINGLE,), Scored.grouped, None),
-    _Share("in_first_three", "right cause in the first three", (SINGLE,), Scored.first_three, None),
-    _Share("known_called_unknown", "known called unknown", (SINGLE,), Scored.called_unknown, None, True),
-    _Share("unknown_called_unknown", "outside the catalogue, called unknown", (UNKNOWN,), Scored.called_unknown, None),
-    _Share("sure_and_wrong", "sure (> 0.8) and wrong", (NONE, *GAPS), Scored.sure_and_wrong, None, True),
+    _Share("unchanged_called_cause", "unchanged, called a cause", (NONE,), ScoredCase.called_cause, None, True),
+    _Share("unchanged_called_unknown", "unchanged, called unknown", (NONE,), ScoredCase.called_unknown, None, True),
+    _Share("right_cause_first", "right cause first", (SINGLE,), ScoredCase.first, None),
+    _Share("within_group", "right cause within its group", (SINGLE,), ScoredCase.grouped, None),
+    _Share("in_first_three", "right cause in the first three", (SINGLE,), ScoredCase.first_three, None),
+    _Share("known_called_unknown", "known called unknown", (SINGLE,), ScoredCase.called_unknown, None, True),
+    _Share(
+        "unknown_called_unknown", "outside the catalogue, called unknown", (UNKNOWN,), ScoredCase.called_unknown, None
+    ),
+    _Share("sure_and_wrong", "sure (> 0.8) and wrong", (NONE, *GAPS), ScoredCase.sure_and_wrong, None, True),
 )
 
 
-def _share(share: _Share, cases: Sequence[Scored]) -> Figure:
+def _share(share: _Share, cases: Sequence[ScoredCase]) -> ScoreFigure:
     counted = [case for case in cases if case.kind in share.kinds]
     count = sum(share.holds(case) for case in counted)
     value = count / len(counted) if counted else None
     interval = wilson(count, len(counted))
-    return Figure(share.key, share.name, share.target, share.at_most, value, len(counted), count, interval)
+    return ScoreFigure(share.key, share.name, share.target, share.at_most, value, len(counted), count, interval)
 
 
-def _middle(key: str, name: str, values: list[float], target: float | None, at_most: bool, middle) -> Figure:
-    return Figure(key, name, target, at_most, float(middle(values)) if values else None, len(values))
+def _middle(key: str, name: str, values: list[float], target: float | None, at_most: bool, middle) -> ScoreFigure:
+    return ScoreFigure(key, name, target, at_most, float(middle(values)) if values else None, len(values))
 
 
 @dataclass
-class Score:
+class ChallengeScore:
     """A blind test scored."""
 
-    cases: list[Scored]
-    figures: list[Figure] = field(default_factory=list)
+    cases: list[ScoredCase]
+    figures: list[ScoreFigure] = field(default_factory=list)
 
     def plain(self) -> dict[str, Any]:
         """The result as `--json` prints it."""
@@ -258,7 +264,7 @@ class Score:
         }
 
 
-def _plain_case(case: Scored) -> dict[str, Any]:
+def _plain_case(case: ScoredCase) -> dict[str, Any]:
     said = case.said
     return {
         "name": case.name,
@@ -275,14 +281,14 @@ def _plain_case(case: Scored) -> dict[str, Any]:
     }
 
 
-def score_forms(cases: Sequence[Scored], gaps: Sequence[tuple[float, float]]) -> Score:
+def score_forms(cases: Sequence[ScoredCase], gaps: Sequence[tuple[float, float]]) -> ChallengeScore:
     """Figures of vehicles of another form; gaps: of the file's and the identified model in each one's healthy runs."""
     figures = [_share(share, cases) for share in FORM_SHARES]
     closed = [case.closed for case in cases if case.closed is not None]
     figures.append(_middle("closed", "closed of what the change adds, median", closed, None, False, np.median))
     worse = sum(identified > file for file, identified in gaps)
     figures.append(
-        Figure("identified_worse", "identified predicts healthy runs worse", None, True,
+        ScoreFigure("identified_worse", "identified predicts healthy runs worse", None, True,
                worse / len(gaps) if gaps else None, len(gaps), worse, wilson(worse, len(gaps)))
     )  # fmt: skip
     for n, name in enumerate(("file", "identified")):
@@ -290,12 +296,12 @@ def score_forms(cases: Sequence[Scored], gaps: Sequence[tuple[float, float]]) ->
         figures.append(_middle(f"healthy_{name}", f"healthy gap, {name}, median", totals, None, True, np.median))
     seconds = [case.seconds for case in cases if case.seconds is not None]
     figures.append(_middle("seconds", "seconds a case, the longest", seconds, None, True, max))
-    return Score(list(cases), figures)
+    return ChallengeScore(list(cases), figures)
 
 
-def score(cases: Sequence[Scored]) -> Score:
+def score(cases: Sequence[ScoredCase]) -> ChallengeScore:
     """Every figure of docs/GAP.md over the cases; those of messy cases where small effects act in any of them."""
-    shares = MESSY_SHARES if any(case.messy for case in cases) else SHARES
+    shares = MESSY_SHARES if any(case.messy for case in cases) else SHARE_FIGURES
     figures = [_share(share, cases) for share in shares]
     losses = [case.log_loss() for case in cases]
     closed = [case.closed for case in cases if case.closed is not None]
@@ -304,10 +310,10 @@ def score(cases: Sequence[Scored]) -> Score:
     figures.append(_middle("closed", "closed of what a perfect model closes, median", closed, 0.95, False, np.median))
     figures.append(_middle("seconds", "seconds a case, the longest", seconds, 60.0, True, max))
     figures.append(_middle("seconds_median", "seconds a case, median", seconds, 20.0, True, np.median))
-    return Score(list(cases), figures)
+    return ChallengeScore(list(cases), figures)
 
 
-def by_label(cases: Sequence[Scored]) -> dict[str, dict[str, Any]]:
+def by_label(cases: Sequence[ScoredCase]) -> dict[str, dict[str, Any]]:
     """One line a label: its single cases, and how many of them were seen, first, in the group, in the right place.
 
     Effects outside the catalogue stand under their own names, `first` being what called them unknown; so does `none`.

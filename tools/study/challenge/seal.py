@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tools.data.errors import InputError
-from tools.data.runs.csvfile import write_bytes
+from glider.tools.data.errors import InputError
+from glider.tools.data.runs.csvfile import write_bytes
 
 MANIFEST, ARCHIVE = "manifest.json", "answers.zip"
 PLAN = "plan.json"
@@ -92,10 +92,10 @@ def read_manifest(path: Path) -> dict[str, Any]:
 
 
 def check_seal(answers: Answers, manifest: Path) -> None:
-    """InputError unless the archive is the one that the manifest promised."""
-    promised = read_manifest(manifest)["answers"]["sha256"]
-    if answers.sha256 != promised:
-        raise InputError(f"SHA-256 {answers.sha256}, but {manifest} promised {promised}", source=answers.source)
+    """InputError unless the archive is the one that the manifest declares."""
+    declared = read_manifest(manifest)["answers"]["sha256"]
+    if answers.sha256 != declared:
+        raise InputError(f"SHA-256 {answers.sha256}, but {manifest} declares {declared}", source=answers.source)
 
 
 def open_answers(path: Path, needed: tuple[str, ...] = OF_A_DIAGNOSIS) -> Answers:

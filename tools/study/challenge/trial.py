@@ -5,26 +5,26 @@ from functools import cached_property
 
 import numpy as np
 
-from firmware.core.maths.rotations import wrap
-from firmware.core.vehicle.layout import N_X, X_ACT
-from firmware.model.vehicle import Vehicle
-from sim_backend.foreign import foreign_layout as fo
-from sim_backend.foreign.foreign_flight import fly_foreign, fly_on, pose_rows, start_from_readings
-from sim_backend.uncertainty import draw_parameters, sensor_errors
-from tools.data.runs import columns as names
-from tools.data.runs.run import Run
-from tools.gap.measure import root_mean_square, run_gap
-from tools.inference.channels import ROUGHIE_MEASURES
-from tools.inference.windows import Window
-from tools.study.challenge.design import STYLES, RunDesign, Site, draw_run, draw_runs
-from tools.study.challenge.forms import Form, draw_shapes, draw_waves
+from glider.firmware.core.maths.rotations import wrap
+from glider.firmware.core.vehicle.layout import N_X, X_ACT
+from glider.firmware.model.vehicle import Vehicle
+from glider.sim_backend.foreign import foreign_layout as fo
+from glider.sim_backend.foreign.foreign_flight import fly_foreign, fly_on, pose_rows, start_from_readings
+from glider.sim_backend.uncertainty import draw_parameters, sensor_errors
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.run import Run
+from glider.tools.gap.measure import root_mean_square, run_gap
+from glider.tools.inference.channels import ROUGHIE_MEASURES
+from glider.tools.inference.windows import Window
+from glider.tools.study.challenge.design import STYLES, DesignSite, RunDesign, draw_run, draw_runs
+from glider.tools.study.challenge.forms import Form, draw_shapes, draw_waves
 
 EXTRA = 40  # rows flown past the end: a fast motion capture clock looks ahead
 TUMBLED_PITCH, TUMBLED_ROLL, TOO_FAST = 1.31, 1.57, 1.5  # rad, rad, m/s
 
 
 @dataclass
-class Flight:
+class TrialFlight:
     """One run flown: truth and record."""
 
     design: RunDesign
@@ -43,7 +43,7 @@ class Trial:
     """A drawn vehicle and its designs; `fly` flies them with any effects."""
 
     vehicle: Vehicle
-    site: Site
+    site: DesignSite
     P: np.ndarray  # (N_P,) the true parameters, within [uncertainty]
     shapes: np.ndarray  # F without effects
     errors: np.ndarray  # (2, N_FR) bias and noise
@@ -51,11 +51,11 @@ class Trial:
     noise_seed: int
     flown: Vehicle  # with the noise and disturbance that it has; `vehicle` has what its file says
 
-    def fly(self, F: np.ndarray, runs: int | None = None) -> list[Flight]:
+    def fly(self, F: np.ndarray, runs: int | None = None) -> list[TrialFlight]:
         """Fly the first `runs` designs (all, if None) with effects F."""
         return [self._fly(F, n, design) for n, design in enumerate(self.designs[:runs])]
 
-    def _fly(self, F: np.ndarray, number: int, design: RunDesign) -> Flight:
+    def _fly(self, F: np.ndarray, number: int, design: RunDesign) -> TrialFlight:
         rows = design.rows + EXTRA
         commands, X, Y = np.zeros((rows, 3)), np.zeros((rows, fo.N_FX)), np.zeros((rows, fo.N_FR))
         self._pilot(F, design, commands, X, Y)
@@ -68,7 +68,7 @@ class Trial:
             columns[name] = wrap(columns[name])
         if self.site.mocap:
             columns |= self._mocap(F, number, X, design.rows)
-        return Flight(design, F, commands, X, Run(f"run{number:02d}", None, columns))
+        return TrialFlight(design, F, commands, X, Run(f"run{number:02d}", None, columns))
 
     def _pilot(self, F: np.ndarray, design: RunDesign, commands: np.ndarray, X: np.ndarray, Y: np.ndarray) -> None:
         """Fly a design with effects F: commands, states and readings in place."""
@@ -90,7 +90,7 @@ class Trial:
         return dict(zip(names.MOCAP, pose.T, strict=True))
 
     def predict(
-        self, flight: Flight, P: np.ndarray, F: np.ndarray, plain: bool = False, seen: bool = False
+        self, flight: TrialFlight, P: np.ndarray, F: np.ndarray, plain: bool = False, seen: bool = False
     ) -> np.ndarray:
         """The flight's windows flown on from the truth with another model, (rows, 11); plain: of nominal form.
 
@@ -122,7 +122,7 @@ class Trial:
         return Y
 
     def channels(
-        self, flights: list[Flight], P: np.ndarray, F: np.ndarray, plain: bool, seen: bool = False
+        self, flights: list[TrialFlight], P: np.ndarray, F: np.ndarray, plain: bool, seen: bool = False
     ) -> list[dict[str, float]]:
         """Channel gaps of every flight for a model."""
         flown = [(f, self.predict(f, P, F, plain, seen)) for f in flights]
@@ -146,7 +146,7 @@ def mocap_pose(F: np.ndarray, pose: np.ndarray, rows: np.ndarray) -> np.ndarray:
     return np.stack([np.interp(t - late + ahead, at, column) for column in pose.T], axis=1)
 
 
-def draw_trial(rng: np.random.Generator, vehicle: Vehicle, site: Site, flown: Vehicle | None = None) -> Trial:
+def draw_trial(rng: np.random.Generator, vehicle: Vehicle, site: DesignSite, flown: Vehicle | None = None) -> Trial:
     """A vehicle as identification leaves it, sensors with their biases, and its runs.
 
     flown: the vehicle with the noise that it really has, where that is not what its file says.
@@ -173,7 +173,7 @@ def redraw(rng: np.random.Generator, trial: Trial, F: np.ndarray, tries: int) ->
     return False
 
 
-def flyable(flights: list[Flight], site: Site) -> bool:
+def flyable(flights: list[TrialFlight], site: DesignSite) -> bool:
     """Whether no run tumbles, runs away or leaves the depths of the site."""
     for flight in flights:
         X = flight.X

@@ -5,8 +5,8 @@ from typing import Literal
 
 import msgspec
 
-from tools.data.errors import InputError
-from tools.study.challenge.diagnosis import MAX_BYTES, Probability
+from glider.tools.data.errors import InputError
+from glider.tools.study.challenge.diagnosis import MAX_BYTES, Probability
 
 WATCH_FILE = "watch.json"
 REFERENCE = "reference"  # the folder of the runs before anything changed
@@ -15,7 +15,7 @@ VEHICLE_FILE = "identified.toml"  # in IDENTIFIED
 MEANS = "velocity.json"  # in that: each dive's mean
 
 
-class RunCause(msgspec.Struct):
+class AnsweredRunCause(msgspec.Struct):
     label: str
     probability: Probability
     group: list[str] = msgspec.field(default_factory=list)
@@ -24,7 +24,7 @@ class RunCause(msgspec.Struct):
 class RunSaid(msgspec.Struct):
     run: str
     verdict: Literal["none", "cause", "unknown"]
-    causes: list[RunCause]
+    causes: list[AnsweredRunCause]
     skipped: str | None = None
 
 

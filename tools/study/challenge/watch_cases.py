@@ -10,16 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from firmware.model.vehicle import Vehicle
-from sim_backend.foreign import foreign_layout as fo
-from sim_backend.uncertainty import draw_parameters, sensor_errors
-from tools.data.runs.case import write_case
-from tools.study.challenge.cases import DECIMALS, DENSITY, LOG_RATE, NoCase
-from tools.study.challenge.design import LAKE, POOL, STYLES, draw_run
-from tools.study.challenge.forms import FORMS, KNOWN, Form, draw_shapes, draw_waves
-from tools.study.challenge.magnitude import find_strength, visible
-from tools.study.challenge.trial import Flight, Trial, flyable, with_effect
-from tools.study.challenge.watch_plan import VehiclePlan, WatchCounts
+from glider.firmware.model.vehicle import Vehicle
+from glider.sim_backend.foreign import foreign_layout as fo
+from glider.sim_backend.uncertainty import draw_parameters, sensor_errors
+from glider.tools.data.runs.case import write_case
+from glider.tools.study.challenge.cases import DECIMALS, DENSITY, LOG_RATE, NoCase
+from glider.tools.study.challenge.design import LAKE, POOL, STYLES, draw_run
+from glider.tools.study.challenge.forms import FORMS, KNOWN, Form, draw_shapes, draw_waves
+from glider.tools.study.challenge.magnitude import find_strength, visible
+from glider.tools.study.challenge.trial import Trial, TrialFlight, flyable, with_effect
+from glider.tools.study.challenge.watch_plan import VehiclePlan, WatchCounts
 
 WIDER = 2.0  # times [uncertainty] and the sensors' biases
 WANDER = 0.3  # of a sensor's bias, from run to run
@@ -35,7 +35,7 @@ COMMON = (
 )  # fmt: skip  # of those that remember nothing
 COMMON_VISIBLE = (1.3, 3.0)  # gap of a model that lacks it, over a perfect one's
 VISIBLE = (2.0, 10.0)  # the same of a change at its full size
-SHORT = 0.9  # of the least, that a bisection may fall short
+BISECTION_SHARE = 0.9  # of the least, that a bisection may fall short
 SECONDS = (60.0, 90.0)  # of a run
 TRIES, REDRAWN = 12, 40
 
@@ -50,7 +50,7 @@ class MadeVehicle:
     strength: float
     sizes: np.ndarray  # of the entries of F at strength 1
     visible: float
-    flights: list[Flight]  # reference first
+    flights: list[TrialFlight]  # reference first
 
 
 def _trial(rng: np.random.Generator, vehicle: Vehicle, plan: VehiclePlan, runs: int) -> Trial:
@@ -88,7 +88,7 @@ def _drawn_size(
     return sizes, find_strength(lambda strength: visible(trial, form, sizes, strength), target, most)
 
 
-def _fly(rng: np.random.Generator, trial: Trial, effects: list[np.ndarray]) -> list[Flight] | None:
+def _fly(rng: np.random.Generator, trial: Trial, effects: list[np.ndarray]) -> list[TrialFlight] | None:
     """Every run with its own F; what leaves the flyable region is drawn again. None where that does not help."""
     flights = []
     for n, F in enumerate(effects):
@@ -123,7 +123,7 @@ def draw_vehicle(seed: int, plan: VehiclePlan, counts: WatchCounts, vehicle: Veh
         if form is not None:
             sizes, strength = _drawn_size(rng, trial, form, VISIBLE)
             seen = visible(trial, form, sizes, strength) if strength > 0.0 else 0.0
-            if not seen >= SHORT * VISIBLE[0]:
+            if not seen >= BISECTION_SHARE * VISIBLE[0]:
                 continue
         effects = [trial.shapes] * counts.reference
         for share in plan.strengths(counts.judged):

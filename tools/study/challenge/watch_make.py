@@ -4,11 +4,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from firmware.model.vehicle import Vehicle
-from tools.study.challenge.make import VEHICLE, Order
-from tools.study.challenge.watch_answer import REFERENCE
-from tools.study.challenge.watch_cases import draw_vehicle, watch_answer, write_vehicle
-from tools.study.challenge.watch_plan import VehiclePlan, WatchCounts, watch_plan
+from glider.firmware.model.vehicle import Vehicle
+from glider.tools.study.challenge.make import VEHICLE, Order
+from glider.tools.study.challenge.watch_answer import REFERENCE
+from glider.tools.study.challenge.watch_cases import draw_vehicle, watch_answer, write_vehicle
+from glider.tools.study.challenge.watch_plan import VehiclePlan, WatchCounts, watch_plan
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from tools.study.challenge.forms import KNOWN, SECRET, Form
+from glider.tools.study.challenge.forms import KNOWN, SECRET, Form
 
 UNCHANGED, CHANGED, OUTSIDE = "unchanged", "changed", "outside"
 STEP, EPISODE, GROWING = "step", "episode", "growing"

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from tools.data.errors import InputError
-from tools.study.challenge.diagnosis import TIMING
-from tools.study.challenge.judge import open_sealed
-from tools.study.challenge.score import LARGEST_GROUP, Figure, wilson
-from tools.study.challenge.watch_answer import REFERENCE, WATCH_FILE, EventSaid, WatchSaid, read_watch
-from tools.study.challenge.watch_plan import CHANGED, OUTSIDE, UNCHANGED
+from glider.tools.data.errors import InputError
+from glider.tools.study.challenge.diagnosis import TIMING
+from glider.tools.study.challenge.judge import open_sealed
+from glider.tools.study.challenge.score import LARGEST_GROUP, ScoreFigure, wilson
+from glider.tools.study.challenge.watch_answer import REFERENCE, WATCH_FILE, EventSaid, WatchSaid, read_watch
+from glider.tools.study.challenge.watch_plan import CHANGED, OUTSIDE, UNCHANGED
 
 NEEDED = ("kind", "label", "from_run", "to_run", "strengths", "values", "runs")
 # Labels whose strength in the foreign plant is the size of the catalogue's parameter, in its unit, whatever the form:
@@ -83,9 +83,9 @@ class Watched:
         return self.main.ci90[0] <= true <= self.main.ci90[1]
 
 
-def share(key: str, name: str, target: float, marks: Sequence[bool], at_most: bool = False) -> Figure:
+def share(key: str, name: str, target: float, marks: Sequence[bool], at_most: bool = False) -> ScoreFigure:
     value = sum(marks) / len(marks) if marks else None
-    return Figure(key, name, target, at_most, value, len(marks), sum(marks), wilson(sum(marks), len(marks)))
+    return ScoreFigure(key, name, target, at_most, value, len(marks), sum(marks), wilson(sum(marks), len(marks)))
 
 
 @dataclass
@@ -93,7 +93,7 @@ class WatchScore:
     """A blind test of watches scored."""
 
     cases: list[Watched]
-    figures: list[Figure]
+    figures: list[ScoreFigure]
 
     def plain(self) -> dict[str, Any]:
         """The result as `--json` prints it."""
@@ -136,13 +136,18 @@ def score_watches(cases: Sequence[Watched]) -> WatchScore:
     ]
     seconds = [case.seconds for case in cases if case.seconds is not None]
     longest = max(seconds) if seconds else None
-    figures.append(Figure("seconds", "seconds a vehicle, the longest", 120.0, True, longest, len(seconds)))
+    figures.append(ScoreFigure("seconds", "seconds a vehicle, the longest", 120.0, True, longest, len(seconds)))
     return WatchScore(list(cases), figures)
 
 
 def gather_watches(
-    cases: Path, answers: Path, said: Path, manifest: Path | None = None, partial: bool = False,
-    advance: Callable[[int], None] = lambda n: None, needed: tuple[str, ...] = NEEDED,
+    cases: Path,
+    answers: Path,
+    said: Path,
+    manifest: Path | None = None,
+    partial: bool = False,
+    advance: Callable[[int], None] = lambda n: None,
+    needed: tuple[str, ...] = NEEDED,
 ) -> list[Watched]:
     """Open and check the answers, and gather what was said to every vehicle of a blind test's folder."""
     folder = cases / "cases" if (cases / "cases").is_dir() else cases
@@ -164,7 +169,11 @@ def gather_watches(
 
 
 def judge_watches(
-    cases: Path, answers: Path, said: Path, manifest: Path | None = None, partial: bool = False,
+    cases: Path,
+    answers: Path,
+    said: Path,
+    manifest: Path | None = None,
+    partial: bool = False,
     advance: Callable[[int], None] = lambda n: None,
 ) -> WatchScore:
     """Open, check and score what was said to every vehicle of a blind test's folder."""

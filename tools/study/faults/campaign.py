@@ -12,12 +12,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from firmware.faults import FAULTS
-from tools.study.faults.cases import Case, Show
-from tools.study.faults.flights import flown
-from tools.study.faults.scene import build_scene, fly
-from tools.study.faults.shows import shows
-from tools.study.workers import end_with_parent
+from glider.firmware.faults import FAULTS
+from glider.tools.study.faults.cases import FaultCase, Show
+from glider.tools.study.faults.flights import flown
+from glider.tools.study.faults.scene import build_scene, fly
+from glider.tools.study.faults.shows import shows
+from glider.tools.study.workers import end_with_parent
 
 TWO_TICKS_S = 2 * 0.02
 SEED = 1
@@ -25,7 +25,7 @@ GOOD = ("surfaced", "safe")
 
 
 @dataclass(frozen=True)
-class Outcome:
+class FaultOutcome:
     """One case in one phase."""
 
     row: int
@@ -48,33 +48,40 @@ def jobs(only: int | None = None) -> list[tuple[int, str]]:
     found = []
     for index, case in enumerate(everything()):
         if only is None or case.row == only:
-            found += [(index, phase) for phase in (case.phases if isinstance(case, Case) else ("-",))]
+            found += [(index, phase) for phase in (case.phases if isinstance(case, FaultCase) else ("-",))]
     return found
 
 
-def everything() -> list[Case | Show]:
+def everything() -> list[FaultCase | Show]:
     return [*shows(), *flown()]
 
 
-def run(job: tuple[int, str], disabled: int | None = None) -> Outcome:
+def run(job: tuple[int, str], disabled: int | None = None) -> FaultOutcome:
     """One case in one phase, in this process; `disabled`: the row whose detector is switched off."""
     index, phase = job
     case = everything()[index]
     with tempfile.TemporaryDirectory(prefix="glider-faults-") as folder:
         if isinstance(case, Show):
             noticed, reaction, ended = case.run(disabled == case.row, Path(folder))
-            return Outcome(case.row, case.name, phase, noticed, case.allowed_s, reaction, case.expected, ended)
+            return FaultOutcome(case.row, case.name, phase, noticed, case.allowed_s, reaction, case.expected, ended)
         scene = build_scene(phase, case.begin, case.setting, SEED, Path(folder, "mission.toml"))
         if case.late:
             scene.notes["late"] = True
-        came = fly(scene, case.row, allowed_s=case.allowed_s, disabled=disabled)
+        observed = fly(scene, case.row, allowed_s=case.allowed_s, disabled=disabled)
         scene.finish()
-    return Outcome(
-        case.row, case.name, phase, came.noticed_s, case.allowed_s, came.reaction.name, case.expected.name, came.ended
+    return FaultOutcome(
+        case.row,
+        case.name,
+        phase,
+        observed.noticed_s,
+        case.allowed_s,
+        observed.reaction.name,
+        case.expected.name,
+        observed.ended,
     )
 
 
-def _quiet() -> None:
+def _muted() -> None:
     """Workers hold their tongue, what the parts under test say is not the campaign's, and end with it."""
     end_with_parent()
     null = os.open(os.devnull, os.O_WRONLY)
@@ -82,17 +89,19 @@ def _quiet() -> None:
     os.close(null)
 
 
-def run_all(only: int | None, disabled: int | None, workers: int, advance: Callable[[int], None]) -> Iterator[Outcome]:
+def run_all(
+    only: int | None, disabled: int | None, workers: int, advance: Callable[[int], None]
+) -> Iterator[FaultOutcome]:
     """Every outcome, in the order of the jobs."""
     wanted = jobs(only)
-    with ProcessPoolExecutor(workers, initializer=_quiet) as pool:
+    with ProcessPoolExecutor(workers, initializer=_muted) as pool:
         futures = [pool.submit(run, job, disabled) for job in wanted]
         for future in futures:
             yield future.result()
             advance(1)
 
 
-def summary(outcomes: list[Outcome]) -> dict[str, Any]:
+def summary(outcomes: list[FaultOutcome]) -> dict[str, Any]:
     """The campaign as JSON: per row the slowest notice against its time, the reactions, the worst end."""
     faults = []
     for number, name in FAULTS.items():
@@ -107,8 +116,8 @@ def summary(outcomes: list[Outcome]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _row(number: int, name: str, outcomes: list[Outcome]) -> dict[str, Any]:
-    def margin(outcome: Outcome) -> float:
+def _row(number: int, name: str, outcomes: list[FaultOutcome]) -> dict[str, Any]:
+    def margin(outcome: FaultOutcome) -> float:
         return float("inf") if outcome.noticed_s is None else outcome.noticed_s - outcome.allowed_s
 
     worst = max(outcomes, key=margin)

@@ -4,10 +4,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from firmware.faults import Reaction
-from tools.study.faults.scene import PHASES, Setting
+from glider.firmware.faults import Reaction
+from glider.tools.study.faults.scene import PHASES, Setting
 
-Came = tuple[float | None, str, str]  # of a fault that is shown: noticed after s, reaction, how it ended
+GroundOutcome = tuple[float | None, str, str]  # of a fault that is shown: noticed after s, reaction, how it ended
 SAFE, DAMAGE, LOST = "safe", "damaged", "lost"
 UNDER_WAY = ("descent", "level", "ascent")
 MOVING = ("descent", "ascent")
@@ -16,13 +16,13 @@ IN_WATER = tuple(phase for phase in ALL if phase != "waiting")
 PLAIN = Setting()
 
 
-def came(good: bool, well: str, ill: str, *, end: str = LOST, after: float = 0.0) -> Came:
+def observed(good: bool, well: str, ill: str, *, end: str = LOST, after: float = 0.0) -> GroundOutcome:
     """A fault's outcome: noticed `after` s with the reaction `well`, safe; else never, `ill`, ended as `end` says."""
     return (after, well, SAFE) if good else (None, ill, end)
 
 
 @dataclass(frozen=True)
-class Case:
+class FaultCase:
     """A fault that is flown. `expected`: the highest reaction that the row itself has to ask for."""
 
     row: int
@@ -37,13 +37,13 @@ class Case:
 
 @dataclass(frozen=True)
 class Show:
-    """A fault that no flight is needed for: `run(disabled, folder)` does the real thing, and says what came of it.
+    """A fault that no flight is needed for: `run(disabled, folder)` does the real thing, and says its outcome.
 
     It returns (noticed after s or None, reaction in words, how it ended).
     """
 
     row: int
     name: str
-    run: Callable[[bool, Any], Came]
+    run: Callable[[bool, Any], GroundOutcome]
     expected: str
     allowed_s: float

@@ -11,8 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from hal.protocols import maestro, modbus, vn100
-from hal.protocols.registers import preset
+from glider.hal.protocols import maestro, modbus, vn100
+from glider.hal.protocols.registers import preset
 
 ROUND = 4096  # bytes of damage a round
 
@@ -28,8 +28,8 @@ class Codec:
 
 
 @dataclass
-class Outcome:
-    """What came of one codec's bytes."""
+class StreamOutcome:
+    """Outcome of one codec's bytes."""
 
     codec: str
     bytes: int = 0
@@ -65,11 +65,11 @@ def codecs(
     commands = [maestro.set_target(0, 6000, crc=True), maestro.encode(maestro.GET_ERRORS, crc=True)]
     return [
         Codec("vn100", imu, [vn100.encode_text(text), vn100.encode_text("VNERR,03"), binary], 256),
-        Codec("modbus replies", rtu, replies, modbus.LONGEST),
-        Codec("modbus requests", lambda: rtu(requests=True), [r.frame for r in requests], modbus.LONGEST),
-        Codec("modbus expected reply", lambda: _expecting(rtu), [replies[0]], modbus.LONGEST),
-        Codec("maestro commands", lambda: maestro.CommandDecoder(crc=True), commands, maestro.LONGEST),
-        Codec("maestro replies", _MaestroReplies, [b"\x28\x00"], maestro.LONGEST),
+        Codec("modbus replies", rtu, replies, modbus.MAX_FRAME_BYTES),
+        Codec("modbus requests", lambda: rtu(requests=True), [r.frame for r in requests], modbus.MAX_FRAME_BYTES),
+        Codec("modbus expected reply", lambda: _expecting(rtu), [replies[0]], modbus.MAX_FRAME_BYTES),
+        Codec("maestro commands", lambda: maestro.CommandDecoder(crc=True), commands, maestro.MAX_FRAME_BYTES),
+        Codec("maestro replies", _MaestroReplies, [b"\x28\x00"], maestro.MAX_FRAME_BYTES),
     ]
 
 
@@ -111,9 +111,9 @@ def damage(rng: random.Random, frames: list[bytes], size: int) -> bytes:
     return bytes(out)
 
 
-def run_codec(codec: Codec, total: int, rng: random.Random, advance: Callable[[int], None]) -> Outcome:
+def run_codec(codec: Codec, total: int, rng: random.Random, advance: Callable[[int], None]) -> StreamOutcome:
     """Feed `total` bytes of damage, and good frames behind every ROUND of it."""
-    outcome, decoder = Outcome(codec.name), codec.make()
+    outcome, decoder = StreamOutcome(codec.name), codec.make()
     while outcome.bytes < total:
         bad = damage(rng, codec.frames, min(ROUND, total - outcome.bytes))
         _feed(decoder, bad, codec, outcome, rng)
@@ -131,7 +131,9 @@ def run_codec(codec: Codec, total: int, rng: random.Random, advance: Callable[[i
     return outcome
 
 
-def _feed(decoder: Any, data: bytes, codec: Codec, outcome: Outcome, rng: random.Random, *, whole: bool = False) -> int:
+def _feed(
+    decoder: Any, data: bytes, codec: Codec, outcome: StreamOutcome, rng: random.Random, *, whole: bool = False
+) -> int:
     """Feed data in chunks of any size; how many events came."""
     at = found = 0
     while at < len(data):

@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from firmware.core.layouts import control_layout as ctl
-from firmware.core.layouts import supervisor_layout as sup
-from firmware.core.maths.rotations import euler_from_quaternion
-from firmware.core.vehicle.layout import CG_X, CG_Y, X_ACT, X_NU, X_QUAT
-from firmware.faults import Reaction
-from firmware.model.supervisor_settings import Limits
-from tools.study.faults.cases import IN_WATER, MOVING, UNDER_WAY, Case
-from tools.study.faults.scene import Scene, Setting
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.core.layouts import supervisor_layout as sup
+from glider.firmware.core.maths.rotations import euler_from_quaternion
+from glider.firmware.core.vehicle.layout import CG_X, CG_Y, X_ACT, X_NU, X_QUAT
+from glider.firmware.faults import Reaction
+from glider.firmware.model.supervisor_settings import Limits
+from glider.tools.study.faults.cases import IN_WATER, MOVING, UNDER_WAY, FaultCase
+from glider.tools.study.faults.scene import Scene, Setting
 
 NOTHING, LOG, WARN, HOLD, ABORT, OOB, HW = Reaction
 SAMPLE_S = 0.04  # between two samples of the slowest of IMU, beacon and draw-wires
@@ -34,51 +34,56 @@ def device(name: str, kind: str, **more: Any):
     return begin
 
 
-def devices() -> list[Case]:
+def devices() -> list[FaultCase]:
     """Rows 1 to 6, 9 to 11, 14, 16: what a device can do wrong."""
     cases = [
-        Case(sup.FAULT_IMU_LOST, f"imu {kind}", device("imu", kind), ABORT, 0.2)
+        FaultCase(sup.FAULT_IMU_LOST, f"imu {kind}", device("imu", kind), ABORT, 0.2)
         for kind in ("silent", "off", "stuck", "garbage")
     ]
     cases += [
-        Case(sup.FAULT_IMU_LOST, f"imu {kind}", device("imu", kind), HOLD, 0.2) for kind in ("slow", "intermittent")
+        FaultCase(sup.FAULT_IMU_LOST, f"imu {kind}", device("imu", kind), HOLD, 0.2)
+        for kind in ("slow", "intermittent")
     ]
     cases += [
-        Case(sup.FAULT_PRESSURE_LOST, f"beacon {kind}", device("beacon", kind), ABORT, 0.5)
+        FaultCase(sup.FAULT_PRESSURE_LOST, f"beacon {kind}", device("beacon", kind), ABORT, 0.5)
         for kind in ("silent", "off", "garbage", "slow", "intermittent")
     ]
     cases += [
-        Case(sup.FAULT_BUS_LOST, f"{name} {kind}", device(name, kind), ABORT, 0.5)
+        FaultCase(sup.FAULT_BUS_LOST, f"{name} {kind}", device(name, kind), ABORT, 0.5)
         for name in ("slider", "ballast")
         for kind in ("silent", "off")
     ]
     cases += [
-        Case(sup.FAULT_WIRE_LOST, f"{name} {kind}", device(name, kind), reaction, 0.5)
+        FaultCase(sup.FAULT_WIRE_LOST, f"{name} {kind}", device(name, kind), reaction, 0.5)
         for name, reaction in (("slider_wire", WARN), ("plunger_wire", ABORT))
         for kind in ("silent", "off", "garbage")
     ]
     cases += [
-        Case(sup.FAULT_SERVO_LOST, f"servo {kind}", device("servo", kind), WARN, 0.5) for kind in ("silent", "off")
+        FaultCase(sup.FAULT_SERVO_LOST, f"servo {kind}", device("servo", kind), WARN, 0.5) for kind in ("silent", "off")
     ]
     cases += [
-        Case(sup.FAULT_SAMPLE_TIME, f"{name} {kind}", device(name, kind), LOG, 4 * SAMPLE_S, IN_WATER)
+        FaultCase(sup.FAULT_SAMPLE_TIME, f"{name} {kind}", device(name, kind), LOG, 4 * SAMPLE_S, IN_WATER)
         for name in SENSORS
         for kind in ("delayed", "repeated", "backwards", "slow")
     ]
     cases += [
-        Case(sup.FAULT_EXCEPTION, f"{name} refuses", device(name, "misconfigured"), ABORT, 0.1)
+        FaultCase(sup.FAULT_EXCEPTION, f"{name} refuses", device(name, "misconfigured"), ABORT, 0.1)
         for name in ("slider", "ballast")
     ]
     cases += [
-        Case(sup.FAULT_IMPLAUSIBLE, f"{name} garbage", device(name, "garbage"), WARN, SAMPLE_S) for name in SENSORS
+        FaultCase(sup.FAULT_IMPLAUSIBLE, f"{name} garbage", device(name, "garbage"), WARN, SAMPLE_S) for name in SENSORS
     ]
     cases += [
-        Case(sup.FAULT_IMPLAUSIBLE, f"{name} jumps", device(name, "jump", drift=JUMPS[name]), WARN, SAMPLE_S, IN_WATER)
+        FaultCase(
+            sup.FAULT_IMPLAUSIBLE, f"{name} jumps", device(name, "jump", drift=JUMPS[name]), WARN, SAMPLE_S, IN_WATER
+        )
         for name in SENSORS
     ]
-    cases.append(Case(sup.FAULT_STUCK_SENSOR, "beacon stuck", device("beacon", "stuck"), WARN, 2.0 + SAMPLE_S, MOVING))
+    cases.append(
+        FaultCase(sup.FAULT_STUCK_SENSOR, "beacon stuck", device("beacon", "stuck"), WARN, 2.0 + SAMPLE_S, MOVING)
+    )
     cases += [
-        Case(sup.FAULT_STUCK_SENSOR, f"{name} stuck", stuck_wire(name, index), WARN, 2.0 + SAMPLE_S, UNDER_WAY)
+        FaultCase(sup.FAULT_STUCK_SENSOR, f"{name} stuck", stuck_wire(name, index), WARN, 2.0 + SAMPLE_S, UNDER_WAY)
         for name, index in (("slider_wire", 1), ("plunger_wire", 2))
     ]
     return cases
@@ -101,22 +106,24 @@ def stuck_wire(name: str, index: int):
     return begin
 
 
-def actuators() -> list[Case]:
+def actuators() -> list[FaultCase]:
     """Rows 14 and 16."""
     ways = {"slider": 1.5 * (0.12 / 0.02 + 0.15), "ballast": 1.5 * (0.4 / 0.03 + 0.3)}
     cases = [
-        Case(sup.FAULT_STALL, "slider jams", device("slider", "stuck"), ABORT, ways["slider"], MOVING),
-        Case(sup.FAULT_STALL, "ballast jams", device("ballast", "stuck"), ABORT, ways["ballast"], ("descent",)),
+        FaultCase(sup.FAULT_STALL, "slider jams", device("slider", "stuck"), ABORT, ways["slider"], MOVING),
+        FaultCase(sup.FAULT_STALL, "ballast jams", device("ballast", "stuck"), ABORT, ways["ballast"], ("descent",)),
     ]
     cases += [
-        Case(sup.FAULT_STALL, f"{name} given up by its drive", device(name, "stalled"), ABORT, 0.1) for name in ways
+        FaultCase(sup.FAULT_STALL, f"{name} given up by its drive", device(name, "stalled"), ABORT, 0.1)
+        for name in ways
     ]
     cases += [
-        Case(sup.FAULT_STALL, f"{name} runs the wrong way", wrong_way(name), ABORT, 0.3, ("level",)) for name in ways
+        FaultCase(sup.FAULT_STALL, f"{name} runs the wrong way", wrong_way(name), ABORT, 0.3, ("level",))
+        for name in ways
     ]
-    cases += [Case(sup.FAULT_DRIVE_ALARM, f"{name} alarm", device(name, "alarm"), WARN, 0.2) for name in ways]
+    cases += [FaultCase(sup.FAULT_DRIVE_ALARM, f"{name} alarm", device(name, "alarm"), WARN, 0.2) for name in ways]
     cases += [
-        Case(sup.FAULT_DRIVE_ALARM, f"{name} alarm kept", device(name, "alarm_kept"), ABORT, 0.2) for name in ways
+        FaultCase(sup.FAULT_DRIVE_ALARM, f"{name} alarm kept", device(name, "alarm_kept"), ABORT, 0.2) for name in ways
     ]
     return cases
 
@@ -226,8 +233,8 @@ def nothing(scene: Scene) -> None:
     """The setting is the fault."""
 
 
-def told(place: int, value: float):
-    """The runtime is told by another part."""
+def informed(place: int, value: float):
+    """The runtime is informed by another part."""
 
     def begin(scene: Scene) -> None:
         scene.supervisor.G[place] = value
@@ -304,55 +311,55 @@ def since_too_deep(to: float):
     return look
 
 
-def conditions() -> list[Case]:
+def conditions() -> list[FaultCase]:
     """Rows 13, 15, 17 to 24, 33, 35: what the vehicle, its controller, its loop and its surroundings do."""
     deep = Limits(working_depth_m=2.0, at_risk_depth_m=5.0)
     risk = Limits(working_depth_m=1.99, at_risk_depth_m=2.0)
     drift = {"drift": (-4_000.0, 0.0)}
     cases = [
-        Case(sup.FAULT_DISAGREE, "pressure drifts", device("beacon", "wrong", **drift), WARN, 5.0, ("descent",)),
-        Case(sup.FAULT_SOFT_LIMIT, "past the slider's range", controller(0.09), LOG, 0.0, UNDER_WAY),
-        Case(sup.FAULT_SOFT_LIMIT, "past the servo's range", controller(-2.0, index=0), LOG, 0.0, UNDER_WAY),
-        Case(sup.FAULT_SOFT_LIMIT, "past the ballast's range", controller(0.5, index=2), LOG, 0.0, ("descent",)),
-        Case(sup.FAULT_TOO_DEEP, "deeper than the working depth", too_deep(2.0), ABORT, 1.0, ("descent",),
+        FaultCase(sup.FAULT_DISAGREE, "pressure drifts", device("beacon", "wrong", **drift), WARN, 5.0, ("descent",)),
+        FaultCase(sup.FAULT_SOFT_LIMIT, "past the slider's range", controller(0.09), LOG, 0.0, UNDER_WAY),
+        FaultCase(sup.FAULT_SOFT_LIMIT, "past the servo's range", controller(-2.0, index=0), LOG, 0.0, UNDER_WAY),
+        FaultCase(sup.FAULT_SOFT_LIMIT, "past the ballast's range", controller(0.5, index=2), LOG, 0.0, ("descent",)),
+        FaultCase(sup.FAULT_TOO_DEEP, "deeper than the working depth", too_deep(2.0), ABORT, 1.0, ("descent",),
              Setting(limits=deep)),
-        Case(sup.FAULT_TOO_DEEP, "deeper than the at-risk depth", too_deep(2.0), OOB, 0.2, ("descent",),
+        FaultCase(sup.FAULT_TOO_DEEP, "deeper than the at-risk depth", too_deep(2.0), OOB, 0.2, ("descent",),
              Setting(limits=risk)),
-        Case(sup.FAULT_NO_ASCENT, "pump hears nothing", pump_fails_in_abort("silent"), OOB, 30.0, ("descent",)),
-        Case(sup.FAULT_NO_ASCENT, "pump jams", pump_fails_in_abort("stuck"), HW, 30.0, ("descent",)),
-        Case(sup.FAULT_OVERTIME, "too light to dive", nothing, ABORT, 120.0, ("waiting",),
+        FaultCase(sup.FAULT_NO_ASCENT, "pump hears nothing", pump_fails_in_abort("silent"), OOB, 30.0, ("descent",)),
+        FaultCase(sup.FAULT_NO_ASCENT, "pump jams", pump_fails_in_abort("stuck"), HW, 30.0, ("descent",)),
+        FaultCase(sup.FAULT_OVERTIME, "too light to dive", nothing, ABORT, 120.0, ("waiting",),
              Setting(effects={"net_buoyancy": {"mass": -0.3}})),
-        Case(sup.FAULT_OVERTIME, "mission overtime", nothing, ABORT, 41.0, ("waiting",), Setting(mission_s=40.0)),
-        Case(sup.FAULT_LEAK, "leak, one sample", leak(1), WARN, 1.0),
-        Case(sup.FAULT_LEAK, "leak", leak(1000), ABORT, 1.0),
-        Case(sup.FAULT_STEEP, "mass shifted forward", tipped(CG_X, 0.04), ABORT, 2.0, MOVING),
-        Case(sup.FAULT_STEEP, "mass shifted to the side", tipped(CG_Y, 0.05), ABORT, 2.0, UNDER_WAY),
-        Case(sup.FAULT_NO_ANSWER, "no number, once", controller(math.nan, 1), WARN, 0.0, UNDER_WAY),
-        Case(sup.FAULT_NO_ANSWER, "no number", controller(math.nan), ABORT, 0.0, UNDER_WAY),
-        Case(sup.FAULT_NO_ANSWER, "beyond all measure", controller(1e6), ABORT, 0.0, UNDER_WAY),
-        Case(sup.FAULT_NO_ANSWER, "law without a solution", no_solution, ABORT, 0.02, UNDER_WAY,
+        FaultCase(sup.FAULT_OVERTIME, "mission overtime", nothing, ABORT, 41.0, ("waiting",), Setting(mission_s=40.0)),
+        FaultCase(sup.FAULT_LEAK, "leak, one sample", leak(1), WARN, 1.0),
+        FaultCase(sup.FAULT_LEAK, "leak", leak(1000), ABORT, 1.0),
+        FaultCase(sup.FAULT_STEEP, "mass shifted forward", tipped(CG_X, 0.04), ABORT, 2.0, MOVING),
+        FaultCase(sup.FAULT_STEEP, "mass shifted to the side", tipped(CG_Y, 0.05), ABORT, 2.0, UNDER_WAY),
+        FaultCase(sup.FAULT_NO_ANSWER, "no number, once", controller(math.nan, 1), WARN, 0.0, UNDER_WAY),
+        FaultCase(sup.FAULT_NO_ANSWER, "no number", controller(math.nan), ABORT, 0.0, UNDER_WAY),
+        FaultCase(sup.FAULT_NO_ANSWER, "beyond all measure", controller(1e6), ABORT, 0.0, UNDER_WAY),
+        FaultCase(sup.FAULT_NO_ANSWER, "law without a solution", no_solution, ABORT, 0.02, UNDER_WAY,
              Setting(controller="law")),
-        Case(sup.FAULT_ESTIMATE, "no number in the filter", no_number_in_the_filter(1), WARN, 0.0, IN_WATER),
-        Case(sup.FAULT_ESTIMATE, "no number in the filter, three times", no_number_in_the_filter(3), ABORT, 0.0,
+        FaultCase(sup.FAULT_ESTIMATE, "no number in the filter", no_number_in_the_filter(1), WARN, 0.0, IN_WATER),
+        FaultCase(sup.FAULT_ESTIMATE, "no number in the filter, three times", no_number_in_the_filter(3), ABORT, 0.0,
              IN_WATER),
-        Case(sup.FAULT_VOLTAGE, "voltage low", voltage(11.5), WARN, 10.0, setting=Setting(limits=BATTERY)),
-        Case(sup.FAULT_VOLTAGE, "voltage too low", voltage(10.5), ABORT, 10.0, setting=Setting(limits=BATTERY)),
-        Case(sup.FAULT_OVERRUN, "one overrun", lateness(lambda n: 0.03 * (n == 1)), LOG, 0.02, late=True),
-        Case(sup.FAULT_OVERRUN, "every tick late", lateness(lambda n: 0.03), ABORT, 0.02, late=True),
-        Case(sup.FAULT_OVERRUN, "one in ten late", lateness(lambda n: 0.03 * (n % 10 == 0)), ABORT, 0.2,
+        FaultCase(sup.FAULT_VOLTAGE, "voltage low", voltage(11.5), WARN, 10.0, setting=Setting(limits=BATTERY)),
+        FaultCase(sup.FAULT_VOLTAGE, "voltage too low", voltage(10.5), ABORT, 10.0, setting=Setting(limits=BATTERY)),
+        FaultCase(sup.FAULT_OVERRUN, "one overrun", lateness(lambda n: 0.03 * (n == 1)), LOG, 0.02, late=True),
+        FaultCase(sup.FAULT_OVERRUN, "every tick late", lateness(lambda n: 0.03), ABORT, 0.02, late=True),
+        FaultCase(sup.FAULT_OVERRUN, "one in ten late", lateness(lambda n: 0.03 * (n % 10 == 0)), ABORT, 0.2,
              UNDER_WAY, late=True,
              setting=Setting(hold_s=60.0)),
-        Case(sup.FAULT_LOOP_HUNG, "restarted", nothing, ABORT, 0.02, ("waiting",), Setting(restarted=True)),
-        Case(sup.FAULT_DISK, "recorder drops", told(sup.RECORDER, 1.0), LOG, 0.0),
-        Case(sup.FAULT_DISK, "recorder failed", told(sup.RECORDER, 2.0), WARN, 0.0),
-        Case(sup.FAULT_GROWTH, "handles are not given back", handles(130), WARN, 60.0, UNDER_WAY, Setting(hold_s=30.0)),
-        Case(sup.FAULT_GROWTH, "handles, without end", handles(260), ABORT, 60.0, UNDER_WAY, Setting(hold_s=30.0)),
-        Case(sup.FAULT_GROWTH, "memory is not given back", memory(70), WARN, 60.0, ("descent",), Setting(hold_s=30.0)),
-        Case(sup.FAULT_GROWTH, "memory, without end", memory(160), ABORT, 60.0, ("descent",), Setting(hold_s=30.0)),
+        FaultCase(sup.FAULT_LOOP_HUNG, "restarted", nothing, ABORT, 0.02, ("waiting",), Setting(restarted=True)),
+        FaultCase(sup.FAULT_DISK, "recorder drops", informed(sup.RECORDER, 1.0), LOG, 0.0),
+        FaultCase(sup.FAULT_DISK, "recorder failed", informed(sup.RECORDER, 2.0), WARN, 0.0),
+        FaultCase(sup.FAULT_GROWTH, "handles are not given back", handles(130), WARN, 60.0, UNDER_WAY, Setting(hold_s=30.0)),
+        FaultCase(sup.FAULT_GROWTH, "handles, without end", handles(260), ABORT, 60.0, UNDER_WAY, Setting(hold_s=30.0)),
+        FaultCase(sup.FAULT_GROWTH, "memory is not given back", memory(70), WARN, 60.0, ("descent",), Setting(hold_s=30.0)),
+        FaultCase(sup.FAULT_GROWTH, "memory, without end", memory(160), ABORT, 60.0, ("descent",), Setting(hold_s=30.0)),
     ]  # fmt: skip
     return cases
 
 
-def flown() -> list[Case]:
+def flown() -> list[FaultCase]:
     """Every case that is flown."""
     return devices() + actuators() + conditions()

@@ -10,18 +10,18 @@ from typing import Any
 
 import msgspec
 
-from firmware.autopilot import Autopilot
-from firmware.core.layouts import control_layout as ctl
-from firmware.faults import Reaction
-from firmware.model.supervisor_settings import Limits
-from firmware.runtime import RESOURCES_S, Ending, Runtime
-from firmware.supervisor import Supervisor
-from firmware.telemetry import TICK
-from hal.recorder.recorder import NullRecorder
-from sim_backend.board import SimBoard
-from sim_backend.faults import Broken, break_in
-from sim_backend.world import World
-from tools.flight.compose import Flight, build_flight
+from glider.firmware.autopilot import Autopilot
+from glider.firmware.core.layouts import control_layout as ctl
+from glider.firmware.faults import Reaction
+from glider.firmware.model.supervisor_settings import Limits
+from glider.firmware.runtime import RESOURCES_S, Ending, Runtime
+from glider.firmware.supervisor import Supervisor
+from glider.firmware.telemetry import TICK
+from glider.hal.recorder.recorder import NullRecorder
+from glider.sim_backend.board import SimBoard
+from glider.sim_backend.faults import Broken, break_in
+from glider.sim_backend.world import World
+from glider.tools.flight.compose import Flight, build_flight
 
 PHASES = ("waiting", "descent", "level", "ascent", "surface")
 SURFACED_M = 0.5
@@ -131,8 +131,8 @@ class Setting:
 
 
 @dataclass(frozen=True)
-class Flown:
-    """What came of a case."""
+class SceneResult:
+    """Outcome of a case."""
 
     noticed_s: float | None
     reaction: Reaction
@@ -180,7 +180,7 @@ def set_scene(
     return Scene(flight, broken, phase, begin, at_s)
 
 
-def fly(scene: Scene, row: int, *, allowed_s: float, disabled: int | None = None) -> Flown:
+def fly(scene: Scene, row: int, *, allowed_s: float, disabled: int | None = None) -> SceneResult:
     """Fly it to its end, and a little on; what `row` made of the fault."""
     board, supervisor, pilot = scene.board, scene.supervisor, scene.pilot
     if disabled is not None:
@@ -197,7 +197,7 @@ def fly(scene: Scene, row: int, *, allowed_s: float, disabled: int | None = None
         runtime.disarm()
     noticed = supervisor.noticed(row)
     since = scene.since
-    return Flown(
+    return SceneResult(
         None if noticed is None or since is None else noticed - since,
         supervisor.worst(row),
         "never begun" if since is None else ended(scene),

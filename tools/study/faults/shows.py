@@ -7,9 +7,9 @@ row has to fail, which shows that it is this that notices.
 
 import signal
 
-from firmware.core.layouts import supervisor_layout as sup
-from tools.study.faults.cases import Show
-from tools.study.faults.shown import console, ends, loading, ports, processes, records, wire
+from glider.firmware.core.layouts import supervisor_layout as sup
+from glider.tools.study.faults.cases import Show
+from glider.tools.study.faults.shown import console, ends, loading, ports, processes, records, wire
 
 
 def shows() -> list[Show]:

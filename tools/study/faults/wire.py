@@ -6,13 +6,13 @@ import random
 from collections.abc import Callable
 from typing import Any
 
-from hal.drivers.poll import Poll
-from hal.drivers.samples import Health
-from hal.protocols import modbus
-from hal.protocols.modbus_master import ModbusBus
+from glider.hal.drivers.poll import Poll
+from glider.hal.drivers.samples import Health
+from glider.hal.protocols import modbus
+from glider.hal.protocols.modbus_master import ModbusBus
 
 
-class Line:
+class WireLine:
     """slave(frame, number of the request) gives a reply's bytes; delay(rng) the seconds before it, inf: never.
 
     Replies come whole or in two pieces, and damage each other where they overlap. Time moves only by `run`.
@@ -62,8 +62,8 @@ class Line:
 class Stamped(Poll):
     """A poll that compares the number in what it is given with that of the request on the line."""
 
-    def __init__(self, line: Line, device: int, period: float, ask: int | None = None):
-        counts = (4, 2, 3) if ask is None else (ask,)
+    def __init__(self, line: WireLine, device: int, period: float, run_batch: int | None = None):
+        counts = (4, 2, 3) if run_batch is None else (run_batch,)
         variants = [modbus.read(device, 3, 0x0100, count) for count in counts]
         super().__init__(variants, period, self._check, Health("stamped"))
         self._line, self.delivered, self.misdelivered = line, 0, 0

@@ -6,25 +6,25 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from firmware.autopilot import Autopilot, configuration
-from firmware.model.gains import Control
-from firmware.model.vehicle import Vehicle
-from sim_backend.fleet import FleetResult, fly_fleet
-from tools.data.sources import load_mission
-from tools.study.reproduce.design import PERIODS, STEP, drawn_world
+from glider.firmware.autopilot import Autopilot, configuration
+from glider.firmware.model.gains import Control
+from glider.firmware.model.vehicle import Vehicle
+from glider.sim_backend.fleet import FleetResult, fly_fleet
+from glider.tools.data.sources import load_mission
+from glider.tools.study.reproduce.design import PERIODS, STEP, drawn_world
 
 MISSION = "circle_to_s"
 CIRCLE_LEGS = range(1, 5)  # the first leg gets the glide going
 HULL = 1.2  # m
 START = 1.0  # m deep
-LONGEST = 400.0  # s
+MAX_FLIGHT_S = 400.0  # s
 TRACE_EVERY = 0.2  # s
 STRENGTHS = (0.0, 0.003, 0.03, 0.1)
 
 
 @dataclass
 class Circles:
-    """Flights of the manoeuvre: strength and seed of each, and what came of them."""
+    """Flights of the manoeuvre: strength and seed of each, and their outcomes."""
 
     strengths: np.ndarray
     seeds: np.ndarray
@@ -39,7 +39,7 @@ def fly_circles(vehicle: Vehicle, controller: str, strengths: tuple[float, ...],
     pairs = [(strength, seed) for strength in strengths for seed in range(seeds)]
     worlds = [drawn_world(vehicle, strength, seed, START) for strength, seed in pairs]
     pilots = [Autopilot(vehicle, mission, C, source) for _ in pairs]
-    result = fly_fleet(worlds, pilots, max_seconds=LONGEST, trace_every=TRACE_EVERY)
+    result = fly_fleet(worlds, pilots, max_seconds=MAX_FLIGHT_S, trace_every=TRACE_EVERY)
     return Circles(np.array([s for s, _ in pairs]), np.array([n for _, n in pairs]), result)
 
 

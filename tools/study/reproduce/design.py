@@ -11,13 +11,13 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from firmware.autopilot import Autopilot, configuration
-from firmware.guidance.mission import Leg, Mission, Site
-from firmware.model.gains import Control
-from firmware.model.vehicle import Vehicle
-from sim_backend.fleet import FleetResult, fly_fleet
-from sim_backend.uncertainty import draw_parameters
-from sim_backend.world import Environment, SampledSensors, Start, World, build_world
+from glider.firmware.autopilot import Autopilot, configuration
+from glider.firmware.guidance.mission import Leg, Mission, Site
+from glider.firmware.model.gains import Control
+from glider.firmware.model.vehicle import Vehicle
+from glider.sim_backend.fleet import FleetResult, fly_fleet
+from glider.sim_backend.uncertainty import draw_parameters
+from glider.sim_backend.world import Environment, SampledSensors, Start, World, build_world
 
 SECONDS = 60.0
 START_DEPTH = 30.0
@@ -42,7 +42,7 @@ class Variant:
 
 @dataclass
 class Batch:
-    """Flights of one design: what each was (keys), and what came of it."""
+    """Flights of one design: what each was (keys), and its outcome."""
 
     keys: list[dict[str, Any]] = field(default_factory=list)
     result: FleetResult | None = None

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from firmware.model.vehicle import COEFFICIENTS, Vehicle
-from tools.data.runs.case import load_case
-from tools.identify.design import write_design
-from tools.identify.pipeline import identify
-from tools.inference.vehicle_parameters import coefficient_sizes
-from tools.report.identified import marginals
+from glider.firmware.model.vehicle import COEFFICIENTS, Vehicle
+from glider.tools.data.runs.case import load_case
+from glider.tools.identify.design import write_design
+from glider.tools.identify.pipeline import identify
+from glider.tools.inference.vehicle_parameters import coefficient_sizes
+from glider.tools.report.identified import marginals
 
 SEED = 4
 

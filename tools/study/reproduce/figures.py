@@ -3,21 +3,21 @@
 from pathlib import Path
 from typing import Any
 
-from firmware.model.vehicle import Vehicle
-from tools.study.reproduce import circle, pictures, tracking
-from tools.study.reproduce.design import fly_design
+from glider.firmware.model.vehicle import Vehicle
+from glider.tools.study.reproduce import circle, pictures, tracking
+from glider.tools.study.reproduce.design import fly_design
 
 FIGURES = {"fig5": tracking.FIG5, "fig6": tracking.FIG6}
 SHOWN_EVERY = 0.2  # s
 CONTROLLERS = ("law", "hybrid", "pid", "pid_tuned", "law+")
 
 
-def counted(figure: tracking.Figure) -> tuple[float, ...]:
+def counted(figure: tracking.TrackingFigure) -> tuple[float, ...]:
     """The targets that the means are over: the paper's larger pitch angles, every depth but the one held."""
     return tracking.BIG if figure is tracking.FIG5 else tuple(target for target in figure.targets if target)
 
 
-def groups(figure: tracking.Figure) -> dict[str, tuple[float, ...]]:
+def groups(figure: tracking.TrackingFigure) -> dict[str, tuple[float, ...]]:
     """Targets that are compared together, by name."""
     if figure is tracking.FIG5:
         return {"45 deg": (45.0, -45.0), "30 and 45 deg": tracking.BIG}
@@ -25,7 +25,7 @@ def groups(figure: tracking.Figure) -> dict[str, tuple[float, ...]]:
     return {"changes": changes, "ascents": tuple(change for change in changes if change < 0.0)}
 
 
-def _table(rows: list[dict[str, Any]], figure: tracking.Figure) -> list[dict[str, Any]]:
+def _table(rows: list[dict[str, Any]], figure: tracking.TrackingFigure) -> list[dict[str, Any]]:
     """A line a strength: mean tracking error (%) over the targets that count and, for depths, the share completed."""
     table = []
     for strength in sorted({row["noise"] for row in rows}):
@@ -39,7 +39,7 @@ def _table(rows: list[dict[str, Any]], figure: tracking.Figure) -> list[dict[str
     return table
 
 
-def _says(figure: tracking.Figure, rows: list[dict], marked: float | None, table: list[dict]) -> str:
+def _says(figure: tracking.TrackingFigure, rows: list[dict], marked: float | None, table: list[dict]) -> str:
     """What the sweep says of the paper's claim, in a sentence."""
     if marked is None:
         strongest = table[-1]["noise"]
@@ -57,7 +57,7 @@ def reproduce_tracking(name: str, vehicle: Vehicle, seeds: int, noise: float | N
     sweep = tracking.fly_figure(figure, vehicle, tracking.STRENGTHS, seeds, ("estimated",))
     swept = tracking.summary(figure, sweep)
     marked = tracking.strength_at(swept, "pid", counted(figure), tracking.PAPER_PID_ERROR)
-    chosen = noise if noise is not None else tracking.ROUGH * vehicle.disturbance.linear
+    chosen = noise if noise is not None else tracking.PAPER_DISTURBANCE_SCALE * vehicle.disturbance.linear
     both = tracking.fly_figure(figure, vehicle, (chosen,), seeds, ("estimated", "true"))
     cases = tracking.summary(figure, both)
     legs = {target: figure.leg(target) for target in figure.targets}

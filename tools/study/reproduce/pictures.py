@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from tools.study.reproduce import circle, tracking
-from tools.study.reproduce.design import Batch
+from glider.tools.study.reproduce import circle, tracking
+from glider.tools.study.reproduce.design import Batch
 
 COLOURS = {"law": "#1b5e9b", "hybrid": "#2a8f5b", "pid": "#c4572a", "pid_tuned": "#8c6bb1", "law+": "#444444"}
 NAMES = {"law": "law", "hybrid": "hybrid", "pid": "PID by rule", "pid_tuned": "PID best-tuned", "law+": "law+"}
@@ -19,7 +19,12 @@ def _figure(**options: Any):
 
 
 def tracking_picture(
-    figure: tracking.Figure, rows: list[dict[str, Any]], shown: Batch, noise: float, marked: float | None, path: Path
+    figure: tracking.TrackingFigure,
+    rows: list[dict[str, Any]],
+    shown: Batch,
+    noise: float,
+    marked: float | None,
+    path: Path,
 ) -> None:
     """Flights of one seed against their references, and the mean error against the noise's strength, into a PNG."""
     assert shown.result is not None

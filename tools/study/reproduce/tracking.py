@@ -7,20 +7,20 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from firmware.model.gains import BEST_TUNED, Control
-from firmware.model.vehicle import Vehicle
-from sim_backend.core.closed_loop import END_ERROR_DEPTH, END_ERROR_PITCH
-from tools.study.reproduce import design
+from glider.firmware.model.gains import BEST_TUNED, Control
+from glider.firmware.model.vehicle import Vehicle
+from glider.sim_backend.core.closed_loop import END_ERROR_DEPTH, END_ERROR_PITCH
+from glider.tools.study.reproduce import design
 
 STRENGTHS = (0.0, 0.003, 0.01, 0.03, 0.06, 0.1, 0.2, 0.3, 0.5)  # m/s2 and rad/s2
-ROUGH = 10.0  # times the vehicle file's disturbance: the strength of the JSON unless one is given
+PAPER_DISTURBANCE_SCALE = 10.0  # times the vehicle file's disturbance: the strength of the JSON unless one is given
 COMPLETE_WITHIN = 0.2  # m of the target depth at the end
 BIG = (30.0, -30.0, 45.0, -45.0)  # deg, the paper's "larger target final values"
 PAPER_PID_ERROR = 13.0  # % that the paper prints for its PID there
 
 
 @dataclass(frozen=True)
-class Figure:
+class TrackingFigure:
     """What figures 5 and 6 differ in."""
 
     name: str
@@ -33,8 +33,10 @@ class Figure:
     offset: float  # what is taken off the trace's value, in the target's unit
 
 
-FIG5 = Figure("fig5", "deg", design.PITCH_TARGETS, design.pitch_leg, END_ERROR_PITCH, "true_pitch", 180.0 / np.pi, 0.0)
-FIG6 = Figure(
+FIG5 = TrackingFigure(
+    "fig5", "deg", design.PITCH_TARGETS, design.pitch_leg, END_ERROR_PITCH, "true_pitch", 180.0 / np.pi, 0.0
+)
+FIG6 = TrackingFigure(
     "fig6", "m", design.DEPTH_TARGETS, design.depth_leg, END_ERROR_DEPTH, "true_depth", 1.0, design.START_DEPTH
 )
 
@@ -50,14 +52,14 @@ def variants(vehicle: Vehicle) -> list[design.Variant]:
     return [*made, design.Variant("pid_tuned", tuned)]
 
 
-def tracking_error(figure: Figure, batch: design.Batch) -> np.ndarray:
+def tracking_error(figure: TrackingFigure, batch: design.Batch) -> np.ndarray:
     """Mean |measured - reference| of each flight in percent of its target (of 1 m where that is 0), shape (n,)."""
     assert batch.result is not None
     size = np.array([abs(key["target"]) or 1.0 for key in batch.keys])
     return 100.0 * batch.result.ends[:, figure.error_column] * figure.scale / size
 
 
-def final_error(figure: Figure, batch: design.Batch) -> np.ndarray:
+def final_error(figure: TrackingFigure, batch: design.Batch) -> np.ndarray:
     """Mean |true value - target| over the last 5 s of each flight, deg or m, shape (n,)."""
     assert batch.result is not None
     target = np.array([key["target"] for key in batch.keys])
@@ -72,7 +74,7 @@ def interval(values: np.ndarray, rng: np.random.Generator) -> tuple[float, float
     return float(low), float(high)
 
 
-def summary(figure: Figure, batch: design.Batch) -> list[dict[str, Any]]:
+def summary(figure: TrackingFigure, batch: design.Batch) -> list[dict[str, Any]]:
     """One entry a target, controller, strength and state: the mean over seeds, with its interval."""
     errors, finals = tracking_error(figure, batch), final_error(figure, batch)
     rng = np.random.default_rng(0)
@@ -99,7 +101,7 @@ def summary(figure: Figure, batch: design.Batch) -> list[dict[str, Any]]:
     return rows
 
 
-def compare(figure: Figure, batch: design.Batch, targets: tuple[float, ...]) -> list[dict[str, Any]]:
+def compare(figure: TrackingFigure, batch: design.Batch, targets: tuple[float, ...]) -> list[dict[str, Any]]:
     """One entry a strength, state and controller, over several targets together: means and 90 % intervals over seeds.
 
     A seed is the same vehicle, water and sensors for all controllers, so `less_pid_tuned_ci90`, the interval of what a
@@ -167,7 +169,12 @@ def error_at(rows: list[dict], controller: str, targets: tuple[float, ...], stre
 
 
 def fly_figure(
-    figure: Figure, vehicle: Vehicle, strengths: tuple[float, ...], seeds: int, states: tuple[str, ...], chosen=None
+    figure: TrackingFigure,
+    vehicle: Vehicle,
+    strengths: tuple[float, ...],
+    seeds: int,
+    states: tuple[str, ...],
+    chosen=None,
 ) -> design.Batch:
     """All flights of a figure."""
     legs = {target: figure.leg(target) for target in figure.targets}

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import fsolve
 
-from firmware.core.maths.rotations import quaternion_from_euler
-from firmware.core.vehicle import layout
-from firmware.core.vehicle.flight import nominal_derivative
-from firmware.core.vehicle.mass import swung_moment
-from tools.data.errors import InputError
+from glider.firmware.core.maths.rotations import quaternion_from_euler
+from glider.firmware.core.vehicle import layout
+from glider.firmware.core.vehicle.flight import nominal_derivative
+from glider.firmware.core.vehicle.mass import roll_pendulum_moment
+from glider.tools.data.errors import InputError
 
 LIN_DEPTH, LIN_PITCH, LIN_U, LIN_W, LIN_Q, LIN_SLIDER, LIN_BALLAST = range(7)
 OUTPUTS = ("pitch", "pitch_rate", "depth", "ballast")  # rad, rad/s, m, kg
@@ -42,7 +42,7 @@ def _glide(degrees: float) -> Trim:
     return Trim(math.radians(degrees), -math.copysign(0.1, degrees))
 
 
-# The glides that the rule tunes about, and the others that its margins are told at: the paper's pitch targets, and the
+# The glides that the rule tunes about, and the others that its margins are stated at: the paper's pitch targets, and the
 # vehicle at rest, where every manoeuvre begins and a change of depth ends.
 DESIGN_TRIMS = (_glide(-20.0), _glide(20.0))
 OTHER_TRIMS = (Trim(0.0, 0.0), *(_glide(degrees) for degrees in (-10.0, 10.0, -30.0, 30.0, -45.0, 45.0)))
@@ -87,7 +87,7 @@ def steady_glide(P: np.ndarray, trim: Trim) -> np.ndarray:
         return derivative(P, state, state[LIN_SLIDER], trim.ballast)[[LIN_U, LIN_W, LIN_Q]]
 
     # slow, a little along the flow, the slider where gravity alone holds the pitch
-    sr = swung_moment(P)
+    sr = roll_pendulum_moment(P)
     slider = -(sr * math.tan(trim.pitch) + trim.ballast * P[layout.X_B]) / P[layout.M_S]
     found, _, good, _ = fsolve(unrest, [0.3, 0.03 * math.copysign(1.0, trim.ballast), slider], full_output=True)
     unrest(found)

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from firmware.core.vehicle.layout import M_S, X_B
-from firmware.model.gains import DepthGains, PitchGains
-from sim_backend.board import SimBoardFile
-from sim_backend.world import SampledSensor
-from tools.study.tuning.linear_plant import Plant
+from glider.firmware.core.vehicle.layout import M_S, X_B
+from glider.firmware.model.gains import DepthGains, PitchGains
+from glider.sim_backend.board import SimBoardFile
+from glider.sim_backend.world import SampledSensor
+from glider.tools.study.tuning.linear_plant import Plant
 
 OMEGA = np.geomspace(1e-3, 100.0, 3000)  # rad/s
 OUT_PITCH, OUT_PITCH_RATE, OUT_DEPTH, OUT_BALLAST = range(4)  # plant.OUTPUTS

@@ -10,19 +10,19 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
-from firmware.model.gains import Control
-from firmware.model.vehicle import Vehicle
-from sim_backend.core.closed_loop import END_TRAVEL_BALLAST, END_TRAVEL_SERVO
-from tools.study.reproduce.design import SECONDS, Variant, fly_design
-from tools.study.reproduce.tracking import FIG5, FIG6, tracking_error
+from glider.firmware.model.gains import Control
+from glider.firmware.model.vehicle import Vehicle
+from glider.sim_backend.core.closed_loop import END_TRAVEL_BALLAST, END_TRAVEL_SERVO
+from glider.tools.study.reproduce.design import SECONDS, Variant, fly_design
+from glider.tools.study.reproduce.tracking import FIG5, FIG6, tracking_error
 
 STRENGTHS = (0.003, 0.03, 0.1)  # m/s2 and rad/s2, 1 sigma
 FIGURES = {"pitch": FIG5, "depth": FIG6}
 
 
 @dataclass(frozen=True)
-class Score:
-    """What came of one set of gains: flights by target, strength and seed."""
+class ManoeuvreScore:
+    """Outcomes of one set of gains: flights by target, strength and seed."""
 
     error: np.ndarray  # (targets, strengths, seeds), percent of the target
     travel: np.ndarray  # (targets, strengths, seeds, 3), rad, m and kg that servo, slider and ballast went in a minute
@@ -30,7 +30,7 @@ class Score:
 
 def fly(
     vehicle: Vehicle, loop: str, controls: Sequence[Control], seeds: range, strengths: Sequence[float] = STRENGTHS
-) -> list[Score]:
+) -> list[ManoeuvreScore]:
     """Score the PID of all controls on a loop's manoeuvres, "pitch" or "depth", in one call over all cores."""
     figure = FIGURES[loop]
     legs = {target: figure.leg(target) for target in figure.targets}
@@ -41,4 +41,4 @@ def fly(
     shape = (len(controls), len(legs), len(strengths), len(seeds))
     errors = tracking_error(figure, batch).reshape(shape)
     travel = batch.result.ends[:, END_TRAVEL_SERVO : END_TRAVEL_BALLAST + 1].reshape(*shape, 3) * 60.0 / SECONDS
-    return [Score(error, gone) for error, gone in zip(errors, travel, strict=True)]
+    return [ManoeuvreScore(error, gone) for error, gone in zip(errors, travel, strict=True)]

@@ -19,18 +19,18 @@ import msgspec
 import numpy as np
 from scipy.optimize import fsolve
 
-from firmware.core.vehicle.layout import BALLAST_RATE, SLIDER_RATE
-from firmware.model.gains import Control, DepthGains, PitchGains
-from firmware.model.vehicle import Vehicle
-from sim_backend.board import SimBoardFile
-from tools.data.errors import InputError
-from tools.study.tuning.linear_plant import DESIGN_TRIMS, OTHER_TRIMS, Trim, linearise
-from tools.study.tuning.loops import OMEGA, Delays, Margins, depth_terms, margins, open_loop, pitch_terms
+from glider.firmware.core.vehicle.layout import BALLAST_RATE, SLIDER_RATE
+from glider.firmware.model.gains import Control, DepthGains, PitchGains
+from glider.firmware.model.vehicle import Vehicle
+from glider.sim_backend.board import SimBoardFile
+from glider.tools.data.errors import InputError
+from glider.tools.study.tuning.linear_plant import DESIGN_TRIMS, OTHER_TRIMS, Trim, linearise
+from glider.tools.study.tuning.loops import OMEGA, Delays, Margins, depth_terms, margins, open_loop, pitch_terms
 
 PHASE_MARGIN = 60.0  # deg
 FASTER = 3.0
 OBSERVER = 10.0
-SHARE = 0.03
+MAX_GAIN_LOSS_SHARE = 0.03
 LARGEST_STEP = {"pitch": math.radians(45.0), "depth": 5.0}  # rad, m: the paper's
 EXACT = 1e-4  # relative in crossover, deg in margin
 
@@ -48,7 +48,7 @@ class Row:
 def crossover_wanted(terms: np.ndarray, loop: str, wn: float, rate: float) -> float:
     """The crossover of step 1 (rad/s), from the terms of the design trims (trims, 3, n)."""
     # |C| = 1 / |plant| at a crossover: an error a there makes the actuator swing at a omega / |plant|
-    speed = SHARE * LARGEST_STEP[loop] * OMEGA / np.abs(terms[:, 0]).min(axis=0)
+    speed = MAX_GAIN_LOSS_SHARE * LARGEST_STEP[loop] * OMEGA / np.abs(terms[:, 0]).min(axis=0)
     too_fast = np.nonzero(speed > rate)[0]
     fastest = OMEGA[too_fast[0]] if len(too_fast) else OMEGA[-1]
     return float(min(FASTER * wn, fastest))

@@ -18,9 +18,9 @@ import msgspec
 import numpy as np
 from scipy.optimize import Bounds, differential_evolution, minimize
 
-from firmware.model.gains import Control
-from firmware.model.vehicle import Vehicle
-from tools.study.tuning.manoeuvres import FIGURES, STRENGTHS, Score, fly
+from glider.firmware.model.gains import Control
+from glider.firmware.model.vehicle import Vehicle
+from glider.tools.study.tuning.manoeuvres import FIGURES, STRENGTHS, ManoeuvreScore, fly
 
 TRAVEL_PRICE = 0.002
 LOW = {"pitch": (0.01, 0.001, 0.01), "depth": (0.05, 0.001, 0.1)}  # kp, ki, kd
@@ -29,7 +29,7 @@ POPULATION = 20
 
 
 @dataclass(frozen=True)
-class Flights:
+class TuningFlights:
     """Which flights gains are scored on, beside the targets; `fine`: seeds of the simplex, None: the same."""
 
     seeds: range
@@ -37,8 +37,8 @@ class Flights:
     fine: range | None = None
 
 
-SEARCHED = Flights(range(1000, 1003), fine=range(1000, 1008))
-REPORTED = Flights(range(2000, 2016))
+SEARCHED = TuningFlights(range(1000, 1003), fine=range(1000, 1008))
+REPORTED = TuningFlights(range(2000, 2016))
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ def with_gains(control: Control, loop: str, gains: np.ndarray) -> Control:
     return msgspec.structs.replace(control, **{loop: table})
 
 
-def cost(vehicle: Vehicle, loop: str, score: Score) -> float:
+def cost(vehicle: Vehicle, loop: str, score: ManoeuvreScore) -> float:
     """What the search makes small."""
     errors = score.error.mean(axis=(0, 2))  # of each strength
     index, actuator = (1, vehicle.actuators.slider) if loop == "pitch" else (2, vehicle.actuators.ballast)
@@ -75,8 +75,10 @@ def cost(vehicle: Vehicle, loop: str, score: Score) -> float:
 class _Trials:
     """Flies candidates (logarithms of gains) of one loop about one control, and remembers the best."""
 
-    def __init__(self, vehicle: Vehicle, loop: str, control: Control, flights: Flights, told: Callable[[int], None]):
-        self.vehicle, self.loop, self.control, self.flights, self.told = vehicle, loop, control, flights, told
+    def __init__(
+        self, vehicle: Vehicle, loop: str, control: Control, flights: TuningFlights, advance: Callable[[int], None]
+    ):
+        self.vehicle, self.loop, self.control, self.flights, self.advance = vehicle, loop, control, flights, advance
         self.low, self.high = np.log(LOW[loop]), np.log(HIGH[loop])
         self.flown, self.best, self.best_cost = 0, control, np.inf
 
@@ -87,7 +89,7 @@ class _Trials:
         scores = fly(self.vehicle, self.loop, controls, self.flights.seeds, self.flights.strengths)
         values = np.array([cost(self.vehicle, self.loop, score) for score in scores])
         self.flown += len(controls)
-        self.told(len(controls))
+        self.advance(len(controls))
         if values.min() < self.best_cost:
             self.best, self.best_cost = controls[int(values.argmin())], float(values.min())
         return values
@@ -98,8 +100,8 @@ class _Trials:
 
 
 def search_loop(
-    vehicle: Vehicle, loop: str, begin: Control, seed: int, budget: int, flights: Flights | None = None,
-    told: Callable[[int], None] = lambda flown: None,
+    vehicle: Vehicle, loop: str, begin: Control, seed: int, budget: int, flights: TuningFlights | None = None,
+    advance: Callable[[int], None] = lambda flown: None,
 ) -> Found:  # fmt: skip
     """Search kp, ki, kd of a loop, beginning with those of `begin`; about `budget` candidates are flown."""
     flights = flights or SEARCHED
@@ -107,7 +109,7 @@ def search_loop(
 
     # a law has no use for samples as they come; what is tuned is the PID in any case
     quick = msgspec.structs.replace(begin, controller="pid", estimator="measured")
-    broad = _Trials(vehicle, loop, quick, flights, told)
+    broad = _Trials(vehicle, loop, quick, flights, advance)
     population = min(POPULATION, max(5, budget // 3))
     start = broad.low + (broad.high - broad.low) * rng.random((population, 3))
     start[0] = broad.place(begin)
@@ -117,7 +119,7 @@ def search_loop(
     )  # fmt: skip
 
     closer = replace(flights, seeds=flights.fine or flights.seeds)
-    fine = _Trials(vehicle, loop, begin, closer, told)
+    fine = _Trials(vehicle, loop, begin, closer, advance)
     before = float(fine.costs(fine.place(begin)[:, None])[0])
     middle = fine.place(broad.best)
     minimize(
@@ -131,12 +133,12 @@ def search_loop(
 
 
 def search(
-    vehicle: Vehicle, begin: Control, seed: int, budget: int, told: Callable[[int], None] = lambda flown: None
+    vehicle: Vehicle, begin: Control, seed: int, budget: int, advance: Callable[[int], None] = lambda flown: None
 ) -> tuple[Control, dict[str, Found]]:
     """Pitch first, then depth with the pitch found; `begin` is where both start, the rule's gains."""
     control, found = begin, {}
     for loop in ("pitch", "depth"):
-        found[loop] = search_loop(vehicle, loop, control, seed, budget, told=told)
+        found[loop] = search_loop(vehicle, loop, control, seed, budget, advance=advance)
         control = found[loop].control
     return control, found
 

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from firmware.core.maths.rotations import wrap
-from tools.data.errors import InputError
-from tools.data.importers.ocean.segment import Segment
-from tools.data.runs import columns as names
-from tools.data.runs import csvfile
-from tools.data.runs.case import write_case
-from tools.data.runs.origin import FIXES_FILE, ORIGIN_FILE, fix_columns, moment_text
-from tools.data.runs.run import Run
+from glider.firmware.core.maths.rotations import wrap
+from glider.tools.data.errors import InputError
+from glider.tools.data.importers.ocean.segment import Segment
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs import csvfile
+from glider.tools.data.runs.case import write_case
+from glider.tools.data.runs.origin import FIXES_FILE, ORIGIN_FILE, fix_columns, moment_text
+from glider.tools.data.runs.run import Run
 
 MISSION_FILE = "mission.csv"  # run, hours since the first run's start
 FEWEST_ROWS = 3
@@ -25,7 +25,7 @@ DECIMALS = {
 
 
 @dataclass
-class Mission:
+class ImportedMission:
     """A case that was written, what of the files is not in it, and what else a person should know of it."""
 
     folder: Path
@@ -37,7 +37,7 @@ class Mission:
     notes: list[str]
 
 
-def write_mission(segments: list[Segment], out: Path, vehicle: str) -> Mission:
+def write_mission(segments: list[Segment], out: Path, vehicle: str) -> ImportedMission:
     """Write segments as the runs of a case; InputError where they are not of one glider, overlap, or hold no flight."""
     gliders = sorted({segment.glider for segment in segments})
     if len(gliders) > 1:
@@ -73,7 +73,7 @@ def write_mission(segments: list[Segment], out: Path, vehicle: str) -> Mission:
         motion_capture=False, suffix=".csv.gz", decimals=DECIMALS, digits=digits,
         beside={name: csvfile.encode_table(table) for name, table in beside.items()},
     )  # fmt: skip
-    return Mission(out, vehicle, runs, files, hours.tolist(), [one.left_out for one in flights], notes)
+    return ImportedMission(out, vehicle, runs, files, hours.tolist(), [one.left_out for one in flights], notes)
 
 
 def total(left_out: list[dict[str, int]]) -> dict[str, int]:

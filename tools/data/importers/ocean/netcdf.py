@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from tools.data.errors import InputError
-from tools.data.importers.ocean import netcdf_trial
-from tools.data.importers.ocean.netcdf_classic import classic_size
-from tools.data.importers.ocean.segment import require_unit
+from glider.tools.data.errors import InputError
+from glider.tools.data.importers.ocean import netcdf_trial
+from glider.tools.data.importers.ocean.netcdf_classic import classic_size
+from glider.tools.data.importers.ocean.segment import require_unit
 
-LARGEST = 4_000_000_000
+MAX_FILE_BYTES = 4_000_000_000
 # s of computing, and one more for so many bytes, after which a file of version 4 is taken for damaged; times that on a
 # clock, where the machine is busy.
 TRIAL_S, PACKED, PATIENCE = 20.0, 5e6, 30.0
@@ -104,8 +104,8 @@ def _opened(path: Path) -> Any:
     size = path.stat().st_size
     if not size:
         raise InputError("the file is empty", source=path)
-    if size > LARGEST:
-        raise InputError(f"longer than {LARGEST} bytes", source=path)
+    if size > MAX_FILE_BYTES:
+        raise InputError(f"longer than {MAX_FILE_BYTES} bytes", source=path)
     with path.open("rb") as file:
         begin = file.read(8)
     if not (begin.startswith(CLASSIC) or begin == HDF5):
@@ -134,9 +134,9 @@ def _try_whole(path: Path, size: int) -> None:
     """
     seconds = int(TRIAL_S + size / PACKED)
     command = [sys.executable, "-m", netcdf_trial.__name__, str(path), str(seconds)]
-    quiet = subprocess.DEVNULL
+    muted = subprocess.DEVNULL
     try:
-        ended = subprocess.run(command, stdin=quiet, stdout=quiet, stderr=quiet, timeout=PATIENCE * seconds).returncode
+        ended = subprocess.run(command, stdin=muted, stdout=muted, stderr=muted, timeout=PATIENCE * seconds).returncode
     except subprocess.TimeoutExpired:
         ended = -signal.SIGKILL
     if ended in (-signal.SIGKILL, -signal.SIGXCPU):

@@ -1,6 +1,6 @@
 """All of a NetCDF file of version 4 read once, by a process of its own: over a damaged one HDF5 may hang, or fall.
 
-    python -m tools.data.importers.ocean.netcdf_trial FILE SECONDS
+    python -m glider.tools.data.importers.ocean.netcdf_trial FILE SECONDS
 
 The process is ended by the system after so many seconds of its own computing, however busy the machine is.
 """

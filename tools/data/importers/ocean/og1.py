@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from tools.data.errors import InputError
-from tools.data.importers.ocean import netcdf, og1_names, seaexplorer, seaglider, seawater, slocum
-from tools.data.importers.ocean.netcdf import NetCDF
-from tools.data.importers.ocean.segment import Segment, at_rows, clean, count, in_the_mission, usable_fixes
+from glider.tools.data.errors import InputError
+from glider.tools.data.importers.ocean import netcdf, og1_names, seaexplorer, seaglider, seawater, slocum
+from glider.tools.data.importers.ocean.netcdf import NetCDF
+from glider.tools.data.importers.ocean.segment import Segment, at_rows, clean, count, in_the_mission, usable_fixes
 
 HOLES_S = {"slocum": slocum.HOLE_S, "seaglider": seaglider.HOLE_S, "seaexplorer": seaexplorer.HOLE_S}
 SINCE = re.compile(r"(?P<unit>\w+)\s+since\s+(?P<moment>.+)\Z")

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tools.data.importers.ocean import netcdf
+from glider.tools.data.importers.ocean import netcdf
 
 ROWS = "N_MEASUREMENTS"  # the dimension
 TIME, LATITUDE, LONGITUDE, DIVE = "TIME", "LATITUDE", "LONGITUDE", "DIVE_NUMBER"

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from tools.data.errors import InputError
-from tools.data.importers.ocean import seawater
-from tools.data.importers.ocean.segment import (
+from glider.tools.data.errors import InputError
+from glider.tools.data.importers.ocean import seawater
+from glider.tools.data.importers.ocean.segment import (
     OUT_OF_WATER_DBAR,
     Segment,
     at_rows,
@@ -21,10 +21,10 @@ from tools.data.importers.ocean.segment import (
     require_same_time,
     usable_fixes,
 )
-from tools.data.runs.csvfile import Dialect, Table, read_table
+from glider.tools.data.runs.csvfile import CsvTable, Dialect, read_table
 
 HOLE_S = 65.0  # CTD values are interpolated over no longer holes: it gives one in 30 s
-CLOCKS_S = 20.0  # one row: a smaller offset of the clocks cannot be told from a sensor's own lag
+CLOCKS_S = 20.0  # one row: a smaller offset of the clocks cannot be distinguished from a sensor's own lag
 DEG = np.pi / 180.0
 NAME = re.compile(r"(?P<glider>\w+)\.(?P<mission>\d+)\.(?P<kind>gli|pld\d)\.(sub|raw)\.(?P<segment>\d+)(\.gz)?\Z")
 DIALECT = Dialect(delimiter=";", missing=("NaN", "nan"))
@@ -100,7 +100,7 @@ def _pairs(paths: list[Path]) -> list[tuple[Path, Path]]:
     return [(found["gli"][segment], found["pld"][segment]) for segment in sorted(found["gli"])]
 
 
-def _table(path: Path, columns: tuple[str, ...]) -> Table:
+def _table(path: Path, columns: tuple[str, ...]) -> CsvTable:
     if not path.is_file():
         raise InputError("not a file" if path.exists() else "no such file", source=path)
     table = read_table(path, DIALECT)
@@ -112,7 +112,7 @@ def _table(path: Path, columns: tuple[str, ...]) -> Table:
     return table
 
 
-def _times(table: Table, column: str) -> np.ndarray:
+def _times(table: CsvTable, column: str) -> np.ndarray:
     """Times of a table, s since 1970-01-01 UTC, NaN where there is none, (rows,)."""
     found = np.full(table.rows, np.nan)
     for row, text in enumerate(table.texts(column)):
@@ -129,13 +129,13 @@ def _times(table: Table, column: str) -> np.ndarray:
     return found
 
 
-def _positions(table: Table, column: str) -> np.ndarray:
+def _positions(table: CsvTable, column: str) -> np.ndarray:
     """A position by row, deg, of degrees and minutes in one number (ddmm.mmm); NaN where there is none, (rows,)."""
     logged = table.numbers(column)
     return np.where(logged == 0.0, np.nan, np.sign(logged) * (np.abs(logged) // 100.0 + np.abs(logged) % 100.0 / 60.0))
 
 
-def _fixes(table: Table, t: np.ndarray) -> np.ndarray:
+def _fixes(table: CsvTable, t: np.ndarray) -> np.ndarray:
     """Fixes, (n, 3) as a Segment has them: rows at the surface whose position is not that of the row before."""
     if "NavState" not in table.header:
         return np.zeros((0, 3))
@@ -145,7 +145,7 @@ def _fixes(table: Table, t: np.ndarray) -> np.ndarray:
     return usable_fixes(t[rows], latitude[rows], longitude[rows])
 
 
-def _degrees(table: Table, column: str, largest: float) -> float:
+def _degrees(table: CsvTable, column: str, largest: float) -> float:
     """Median position, deg, of a table's rows; InputError where there is none."""
     degrees = _positions(table, column)
     degrees = degrees[np.isfinite(degrees)]

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from tools.data.errors import InputError
-from tools.data.importers.ocean import netcdf, seawater
-from tools.data.importers.ocean.netcdf import NetCDF
-from tools.data.importers.ocean.segment import Segment, at_rows, clean, count, in_the_mission, usable_fixes
+from glider.tools.data.errors import InputError
+from glider.tools.data.importers.ocean import netcdf, seawater
+from glider.tools.data.importers.ocean.netcdf import NetCDF
+from glider.tools.data.importers.ocean.segment import Segment, at_rows, clean, count, in_the_mission, usable_fixes
 
 HOLE_S = 60.0  # CTD values are interpolated over no longer holes: it is sampled every 5 to 30 s
 PUMP_RATE = 3e-7  # m3/s; the volume moves: the engine runs. Its pump makes 1e-6, its potentiometer's noise 1e-8

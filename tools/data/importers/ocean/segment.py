@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tools.data.errors import InputError
-from tools.data.importers.resample import fill_gaps, longest_course
+from glider.tools.data.errors import InputError
+from glider.tools.data.importers.resample import fill_gaps, longest_increasing
 
 DAY = 86400.0
 LONGEST_S = 7 * DAY  # of one segment or dive: the longest of years at sea stay under two days
@@ -88,7 +88,7 @@ def in_the_mission(t: np.ndarray, left_out: dict[str, int]) -> np.ndarray:
     middle = np.median(t[possible]) if possible.size else np.nan
     inside = possible[np.abs(t[possible] - middle) <= LONGEST_S]
     count(left_out, "at a time outside the mission", len(timed) - len(inside))
-    kept = inside[longest_course(t[inside])] if inside.size else inside
+    kept = inside[longest_increasing(t[inside])] if inside.size else inside
     count(left_out, "whose time does not go on", len(inside) - len(kept))
     return kept
 

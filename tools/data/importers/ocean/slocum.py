@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from tools.data.errors import InputError
-from tools.data.importers.ocean import seawater
-from tools.data.importers.ocean.segment import (
+from glider.tools.data.errors import InputError
+from glider.tools.data.importers.ocean import seawater
+from glider.tools.data.importers.ocean.segment import (
     OUT_OF_WATER_DBAR,
     Segment,
     at_rows,
@@ -25,10 +25,10 @@ from tools.data.importers.ocean.segment import (
     require_unit,
     usable_fixes,
 )
-from tools.data.importers.ocean.slocum_files import Binary, check_binary, find_caches, in_pairs, unpacked
+from glider.tools.data.importers.ocean.slocum_files import Binary, check_binary, find_caches, in_pairs, unpacked
 
 HOLE_S = 15.0  # CTD values are interpolated over no longer holes
-CLOCKS_S = 5.0  # about one row: a smaller offset of the clocks cannot be told from a sensor's own lag
+CLOCKS_S = 5.0  # about one row: a smaller offset of the clocks cannot be distinguished from a sensor's own lag
 INCH = 0.0254
 # Run data, the sensor, its unit in the list of sensors, and the factor to SI.
 NEEDED = (("pitch_rad", "m_pitch", "rad", 1.0),)

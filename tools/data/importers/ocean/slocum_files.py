@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from tools.data.errors import InputError
+from glider.tools.data.errors import InputError
 
 ENCODING = "5"
 # A line of a list of sensors: whether it is sent, its number, its place in a cycle, its bytes, name and unit.
 SENSOR = re.compile(rb"s:\s+[TF]\s+\d+\s+-?\d+\s+[1248]\s+\w+\s+[!-~]+")
 KNOWN_BYTES = 16  # the cycle of known bytes after the header: 's', 'a', 0x1234, a float, a double
-LARGEST = 512_000_000
+MAX_FILE_BYTES = 512_000_000
 # Engineering file, and the science file of the same segment; the second letter c: compressed.
 PAIRS = {"dbd": "ebd", "mbd": "nbd", "sbd": "tbd", "dcd": "ecd", "mcd": "ncd", "scd": "tcd"}
 ENGINEERING = frozenset(PAIRS)
@@ -103,8 +103,8 @@ def unpacked(path: Path) -> bytes:
     """The file's bytes, unpacked where its name says that it is compressed."""
     if not path.is_file():
         raise InputError("not a file" if path.exists() else "no such file", source=path)
-    if path.stat().st_size > LARGEST:
-        raise InputError(f"longer than {LARGEST} bytes", source=path)
+    if path.stat().st_size > MAX_FILE_BYTES:
+        raise InputError(f"longer than {MAX_FILE_BYTES} bytes", source=path)
     suffix = path.suffix.lower()
     if not (len(suffix) == 4 and suffix[2] == "c" and suffix[1:] in ENGINEERING | SCIENCE):
         return path.read_bytes()

@@ -4,15 +4,15 @@ import contextlib
 import random
 from pathlib import Path
 
-from tools.study.faults.cases import Came, came
+from glider.tools.study.faults.cases import GroundOutcome, observed
 
 
-def console(disabled: bool, folder: Path) -> Came:
+def console(disabled: bool, folder: Path) -> GroundOutcome:
     """Garbage typed at the bench of a twinned board, `enable` among it, questions answered by more of it: nothing is
     enabled, nothing moves, the console goes on."""
-    from tools.bench.client import Bench, BenchError
-    from tools.bench.commands import Commands
-    from tools.data.boards import load_board_file
+    from glider.tools.bench.client import Bench, BenchError
+    from glider.tools.bench.commands import Commands
+    from glider.tools.data.boards import load_board_file
 
     file, rng = load_board_file("twin"), random.Random(32)
     said: list[str] = []
@@ -37,4 +37,4 @@ def console(disabled: bool, folder: Path) -> Came:
         state = bench.snapshot()
     moved = any(item["target"] is not None for item in state["actuators"].values())
     good = not state["enabled"] and not moved and survived == 150
-    return came(good, "no effect", "actuators moved")
+    return observed(good, "no effect", "actuators moved")

@@ -7,13 +7,13 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from tools.study.faults.cases import Came, came
-from tools.study.faults.shown.processes import beating
+from glider.tools.study.faults.cases import GroundOutcome, observed
+from glider.tools.study.faults.shown.processes import beating
 
 CLOSING = """
 import sys, time
-from hal import heartbeat as hb
-from hal.state_file import StateFile
+from glider.hal import heartbeat as hb
+from glider.hal.state_file import StateFile
 pulse = hb.Heartbeat.create(sys.argv[1], 0.02, "faults")
 pulse.publish(hb.State.DIVING)
 for _ in range(25):
@@ -27,7 +27,7 @@ pulse.publish(hb.State.ENDED)
 BREAKING = """
 import sys
 from pathlib import Path
-from hal.outofband import guard
+from glider.hal.outofband import guard
 folder, in_order = Path(sys.argv[1]), sys.argv[2] == "True"
 steps = [0]
 def step(self):
@@ -45,15 +45,15 @@ guard.main()
 """
 
 
-def slow_disk(disabled: bool, folder: Path) -> Came:
+def slow_disk(disabled: bool, folder: Path) -> GroundOutcome:
     """A flight at the surface takes 3 s to bring its state to the disk, without a beat; `disabled`: it still says that
     it dives."""
-    from hal.outofband.guard import Watch
+    from glider.hal.outofband.guard import GuardWatch
 
     said = "DIVING" if disabled else "SURFACED"
     command = [sys.executable, "-c", CLOSING, str(folder), said]
     with subprocess.Popen(command) as flight:
-        watch, taken = Watch(folder, folder, service=False), False
+        watch, taken = GuardWatch(folder, folder, service=False), False
         watch.start()
         begin = time.monotonic()
         while flight.poll() is None and not taken and time.monotonic() - begin < 20.0:
@@ -62,10 +62,10 @@ def slow_disk(disabled: bool, folder: Path) -> Came:
             time.sleep(0.02)
         flight.kill()
         watch.close(in_order=True)
-    return came(not taken, "waited for", "taken for lost")
+    return observed(not taken, "waited for", "taken for lost")
 
 
-def watch_breaks_off(disabled: bool, folder: Path) -> Came:
+def watch_breaks_off(disabled: bool, folder: Path) -> GroundOutcome:
     """The out-of-band process ends by a defect: the hardware watchdog, a file here, is not stopped by the magic close.
 
     `disabled`: it closes as at an end in order.
@@ -74,29 +74,29 @@ def watch_breaks_off(disabled: bool, folder: Path) -> Came:
     command = [sys.executable, "-c", BREAKING, str(folder), str(disabled)]
     broke = subprocess.run(command, stderr=subprocess.DEVNULL, check=False).returncode
     written = (folder / "watchdog").read_bytes()
-    return came(broke != 0 and bool(written) and b"V" not in written, "watchdog runs on", "watchdog stopped")
+    return observed(broke != 0 and bool(written) and b"V" not in written, "watchdog runs on", "watchdog stopped")
 
 
-def acknowledged(ascending: bool) -> Callable[[bool, Path], Came]:
+def acknowledged(ascending: bool) -> Callable[[bool, Path], GroundOutcome]:
     """An operator acknowledges while a flight, or an ascent out of band, is under way. `disabled`: nobody looks."""
 
-    def show(disabled: bool, folder: Path) -> Came:
-        from hal import heartbeat as hb
-        from hal.outofband.rise import Stage
-        from hal.sortie import Facts, Refused, State
-        from hal.state_file import StateFile
-        from tools.flight.keeper import acknowledge, watch_facts
+    def show(disabled: bool, folder: Path) -> GroundOutcome:
+        from glider.hal import heartbeat as hb
+        from glider.hal.outofband.rise import AscentStage
+        from glider.hal.sortie import Facts, SortieRefused, SortieState
+        from glider.hal.state_file import StateFile
+        from glider.tools.flight.keeper import acknowledge, watch_facts
 
-        StateFile(folder).write(State.ABORTED if ascending else State.DIVING)
+        StateFile(folder).write(SortieState.ABORTED if ascending else SortieState.DIVING)
         with beating(folder) as flight:
             if ascending:
                 flight.kill()
                 flight.wait()
                 words = hb.Heartbeat.open(folder).words
-                words[hb.W_GUARD_STATUS], words[hb.W_GUARD_STAGE] = hb.Guard.ASCENDING, Stage.RISING
+                words[hb.W_GUARD_STATUS], words[hb.W_GUARD_STAGE] = hb.Guard.ASCENDING, AscentStage.RISING
                 words[hb.W_GUARD_NS] = time.monotonic_ns()
-            with contextlib.suppress(Refused):
+            with contextlib.suppress(SortieRefused):
                 acknowledge(folder, Facts() if disabled else watch_facts(folder))
-        return came(not StateFile(folder).read().state.may_arm, "refused", "state set back")
+        return observed(not StateFile(folder).read().state.may_arm, "refused", "state set back")
 
     return show

@@ -5,9 +5,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from firmware.model.supervisor_settings import Limits
-from hal.strict import ConfigError
-from tools.study.faults.cases import Came, came
+from glider.firmware.model.supervisor_settings import Limits
+from glider.hal.strict import ConfigError
+from glider.tools.study.faults.cases import GroundOutcome, observed
 
 UNFIT = (
     "depth not zero", "no weather's pressure", "limits unset", "never calibrated", "wrong hash", "wet hull",
@@ -15,18 +15,18 @@ UNFIT = (
 )  # fmt: skip
 
 
-def arming(kind: str) -> Callable[[bool, Path], Came]:
+def arming(kind: str) -> Callable[[bool, Path], GroundOutcome]:
     """A vehicle that is not fit to arm; calibrations are those of a real board file."""
 
-    def show(disabled: bool, folder: Path) -> Came:
+    def show(disabled: bool, folder: Path) -> GroundOutcome:
         import msgspec
 
-        from hal.board import BoardRequest, board_builder
-        from sim_backend.board import SimBoard
-        from sim_backend.faults import break_in
-        from tools.data.boards import load_board_file
-        from tools.flight.arming import Arming
-        from tools.flight.compose import build_flight
+        from glider.hal.board import BoardRequest, board_builder
+        from glider.sim_backend.board import SimBoard
+        from glider.sim_backend.faults import break_in
+        from glider.tools.data.boards import load_board_file
+        from glider.tools.flight.arming import Arming
+        from glider.tools.flight.compose import build_flight
 
         flight = build_flight(mission="sawtooth")
         board = flight.board
@@ -64,14 +64,14 @@ def arming(kind: str) -> Callable[[bool, Path], Came]:
             doubtful.close()
         checks = Arming(flight, folder=folder, hardware=True).run(disabled)
         refused = any(not check.passed for check in checks)
-        return came(refused, "refuse to arm", "armed")
+        return observed(refused, "refuse to arm", "armed")
 
     return show
 
 
-def _narrow_tank(disabled: bool, vehicle: Any) -> Came:
+def _narrow_tank(disabled: bool, vehicle: Any) -> GroundOutcome:
     """A board file whose drive empties less than half of the tank."""
-    from tools.flight.compose import within
+    from glider.tools.flight.compose import within
 
     low, high = vehicle.actuators.ballast.range
     limits = {name: getattr(vehicle.actuators, name).range for name in ("servo", "slider", "ballast")}
@@ -79,17 +79,17 @@ def _narrow_tank(disabled: bool, vehicle: Any) -> Came:
     try:
         within(vehicle, limits, "board.toml")
     except ConfigError as error:
-        return came("board.toml: ballast.limits" in str(error), "refuse to arm", str(error))
-    return came(False, "refuse to arm", "armed")
+        return observed("board.toml: ballast.limits" in str(error), "refuse to arm", str(error))
+    return observed(False, "refuse to arm", "armed")
 
 
-def bad_files(disabled: bool, folder: Path) -> Came:
+def bad_files(disabled: bool, folder: Path) -> GroundOutcome:
     """Files with an unknown key, a wrong type, NaN, out of limits, too deep, no end."""
-    from firmware.guidance.mission import decode_mission
-    from firmware.model.library import shipped
-    from firmware.model.vehicle import decode_vehicle
-    from hal.boardfile import decode_device_file
-    from tools.data.boards import load_board_file
+    from glider.firmware.guidance.mission import decode_mission
+    from glider.firmware.model.library import shipped
+    from glider.firmware.model.vehicle import decode_vehicle
+    from glider.hal.boardfile import decode_device_file
+    from glider.tools.data.boards import load_board_file
 
     vehicle, mission = shipped("model/vehicles")["roughie"], shipped("guidance/missions")["sawtooth"]
     board = load_board_file("roughie").text
@@ -111,4 +111,4 @@ def bad_files(disabled: bool, folder: Path) -> Came:
             tomllib.loads(text) if disabled else decode(text, "file.toml")
         except ConfigError as error:
             refused += "file.toml:" in str(error) and key in str(error) and "\n" not in str(error)
-    return came(refused == len(bad), "refused", f"{len(bad) - refused} of {len(bad)} read")
+    return observed(refused == len(bad), "refused", f"{len(bad) - refused} of {len(bad)} read")

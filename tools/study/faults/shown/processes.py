@@ -8,11 +8,11 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from tools.study.faults.cases import Came, came
+from glider.tools.study.faults.cases import GroundOutcome, observed
 
 BEATING = """
 import sys, time
-from hal import heartbeat as hb
+from glider.hal import heartbeat as hb
 pulse = hb.Heartbeat.create(sys.argv[1], 0.02, "faults")
 pulse.beat(0.0)
 pulse.publish(hb.State.DIVING)
@@ -37,14 +37,14 @@ def beating(folder: Path) -> Iterator[subprocess.Popen]:
         flight.stdout.close()
 
 
-def loop_ends(how: signal.Signals) -> Callable[[bool, Path], Came]:
+def loop_ends(how: signal.Signals) -> Callable[[bool, Path], GroundOutcome]:
     """A process that flies is killed, or hangs; the out-of-band process watches its heartbeat, in real time."""
 
-    def show(disabled: bool, folder: Path) -> Came:
-        from hal.outofband.guard import Watch
+    def show(disabled: bool, folder: Path) -> GroundOutcome:
+        from glider.hal.outofband.guard import GuardWatch
 
         with beating(folder) as flight:
-            watch = Watch(folder, folder, service=False)
+            watch = GuardWatch(folder, folder, service=False)
             watch.start()
             end = time.monotonic() + 0.5
             while time.monotonic() < end:
@@ -59,38 +59,38 @@ def loop_ends(how: signal.Signals) -> Callable[[bool, Path], Came]:
                 noticed = time.monotonic() - begin if watch._ascent is not None else None
                 time.sleep(0.02)
             watch.close(in_order=True)
-        return came(noticed is not None, "OOB", "none", after=noticed or 0.0)
+        return observed(noticed is not None, "OOB", "none", after=noticed or 0.0)
 
     return show
 
 
-def no_rise(disabled: bool, folder: Path) -> Came:
+def no_rise(disabled: bool, folder: Path) -> GroundOutcome:
     """On the way up out of band the vehicle stays at its depth; in simulated time, the depth read twice a second."""
-    from hal.outofband.guard import STEP_S
-    from hal.outofband.rise import Rise, Stage
+    from glider.hal.outofband.guard import STEP_S
+    from glider.hal.outofband.rise import AscentStage, Rise
 
     rise = Rise(patience_s=30.0, step_m=0.3, surface_m=0.4)
-    seen: dict[Stage, float] = {}
+    seen: dict[AscentStage, float] = {}
     for i in range(200):
         seen.setdefault(rise.look(STEP_S * i, None if disabled else 10.0), STEP_S * i)
-    both = Stage.AGAIN in seen and Stage.HARDWARE in seen
-    return came(both, "pump again, then HW", "none", after=seen.get(Stage.AGAIN, 0.0))
+    both = AscentStage.AGAIN in seen and AscentStage.HARDWARE in seen
+    return observed(both, "pump again, then HW", "none", after=seen.get(AscentStage.AGAIN, 0.0))
 
 
-def restart(disabled: bool, folder: Path) -> Came:
+def restart(disabled: bool, folder: Path) -> GroundOutcome:
     """Killed in every state after arming: the next start only ascends."""
-    from hal.sortie import Facts, State
-    from hal.state_file import StateFile
-    from tools.flight.sortie import Journal
+    from glider.hal.sortie import Facts, SortieState
+    from glider.hal.state_file import StateFile
+    from glider.tools.flight.sortie import Journal
 
     resumed = 0
-    for state in (state for state in State if state.must_ascend):
+    for state in (state for state in SortieState if state.must_ascend):
         StateFile(folder).write(state, flight="before")
         journal = Journal(folder, "after")
         journal.arm(Facts())
-        ascends = journal.recovering and journal.state == State.ASCENDING
+        ascends = journal.recovering and journal.state == SortieState.ASCENDING
         resumed += disabled or not ascends
-    return came(not resumed, "ascent only", "resumed")
+    return observed(not resumed, "ascent only", "resumed")
 
 
 @contextlib.contextmanager
@@ -104,9 +104,9 @@ def _wall_set_on(shift: float) -> Iterator[None]:
         time.time = honest
 
 
-def wall_clock(disabled: bool, folder: Path) -> Came:
+def wall_clock(disabled: bool, folder: Path) -> GroundOutcome:
     """The wall clock is set an hour on and back while the board's clock runs."""
-    from hal.clocks import MonotonicClock
+    from glider.hal.clocks import MonotonicClock
 
     class WallClock(MonotonicClock):
         def __init__(self) -> None:
@@ -126,4 +126,4 @@ def wall_clock(disabled: bool, folder: Path) -> Came:
             begin = time.monotonic()
             clock.sleep_until(before + 0.01)
             worst = max(worst, abs(clock.now() - before - (time.monotonic() - begin)))
-    return came(worst < 0.5, "no effect", f"{worst:.0f} s")
+    return observed(worst < 0.5, "no effect", f"{worst:.0f} s")

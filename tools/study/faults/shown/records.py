@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from hal import state_file
-from hal.sortie import State
-from hal.state_file import Record, StateFile
-from tools.data.errors import InputError
-from tools.data.log.framing import CHUNK_HEAD, Scan
-from tools.data.log.reader import Topic, read_log
-from tools.study.faults.cases import DAMAGE, SAFE, Came, came
+from glider.hal import state_file
+from glider.hal.sortie import SortieState
+from glider.hal.state_file import StateFile, StateRecord
+from glider.tools.data.errors import InputError
+from glider.tools.data.log.framing import CHUNK_HEAD, Scan
+from glider.tools.data.log.reader import Topic, read_log
+from glider.tools.study.faults.cases import DAMAGE, SAFE, GroundOutcome, observed
 
 
 class UncheckedScan(Scan):
@@ -28,15 +28,15 @@ class Trusting(StateFile):
     """Reads a copy without its check: the state is the first name that can be found."""
 
     @staticmethod
-    def decode(block: bytes) -> Record:
-        names = [state for state in State if state.name.encode() in block]
-        return Record(names[0] if names else State.ASHORE)
+    def decode(block: bytes) -> StateRecord:
+        names = [state for state in SortieState if state.name.encode() in block]
+        return StateRecord(names[0] if names else SortieState.ASHORE)
 
 
-def full_disk(disabled: bool, folder: Path) -> Came:
+def full_disk(disabled: bool, folder: Path) -> GroundOutcome:
     """The disk takes no more (a limit on file size) while records come; flying and recording go on."""
-    from firmware.telemetry import TICK
-    from hal.recorder.recorder import Recorder
+    from glider.firmware.telemetry import TICK
+    from glider.hal.recorder.recorder import Recorder
 
     path = folder / "full.mcap"
     recorder = Recorder(path, (TICK,))
@@ -61,11 +61,11 @@ def full_disk(disabled: bool, folder: Path) -> Came:
     return noticed, "LOG" if noticed is not None else "none", SAFE
 
 
-def cut_log(disabled: bool, folder: Path) -> Came:
+def cut_log(disabled: bool, folder: Path) -> GroundOutcome:
     """A log with a torn sector at 300 places: what is read has to be what was written, all of it up to there."""
-    from firmware.telemetry import TICK
-    from hal.recorder import disk
-    from hal.recorder.logfile import LogFile
+    from glider.firmware.telemetry import TICK
+    from glider.hal.recorder import disk
+    from glider.hal.recorder.logfile import LogFile
 
     path = folder / "whole.mcap"
     fd = disk.create(str(path))
@@ -93,7 +93,7 @@ def cut_log(disabled: bool, folder: Path) -> Came:
         wrong += int(np.any(data != np.round(data[:, :1])) or np.any(np.diff(first) <= 0.0))
         there = 25 * int(np.searchsorted(ends, cut, side="right"))
         lost = max(lost, 0.02 * (there - int(np.sum(first < there))))
-    return came(wrong == 0 and lost <= 1.0, "valid prefix", f"{wrong} damaged, {lost:.1f} s lost", end=DAMAGE)
+    return observed(wrong == 0 and lost <= 1.0, "valid prefix", f"{wrong} damaged, {lost:.1f} s lost", end=DAMAGE)
 
 
 def _ticks(path: Path, scan: type[Scan]) -> Topic | None:
@@ -105,22 +105,22 @@ def _ticks(path: Path, scan: type[Scan]) -> Topic | None:
     return topic if topic is not None and topic.data is not None else None
 
 
-def torn_state(disabled: bool, folder: Path) -> Came:
+def torn_state(disabled: bool, folder: Path) -> GroundOutcome:
     """The power goes at every byte of a write of either copy; what is read has to be as bad as the worse of both."""
     wrong = 0
-    for old, new in ((State.ASHORE, State.DIVING), (State.DIVING, State.ASHORE)):
+    for old, new in ((SortieState.ASHORE, SortieState.DIVING), (SortieState.DIVING, SortieState.ASHORE)):
         for copy in (0, 1):
             for cut in range(0, state_file.BLOCK, 7):
                 file = StateFile(folder)
                 before = file.write(old)
-                block = state_file.encode(Record(new, sequence=before.sequence + 1))
+                block = state_file.encode(StateRecord(new, sequence=before.sequence + 1))
                 for path in file.paths[:copy]:
                     path.write_bytes(block)
                 kept = file.paths[copy].read_bytes()
                 torn = block[:cut] + (b"" if cut % 2 else kept[cut:])
                 file.paths[copy].write_bytes(torn)
                 found = (Trusting if disabled else StateFile)(folder).read()
-                untouched = old == State.ASHORE and copy == 0 and torn == kept  # nothing of it has changed yet
-                finished = new == State.ASHORE and copy == 1 and torn == block  # all of it has
-                wrong += found.state < State.DIVING and not (untouched or finished)
-    return came(not wrong, "the worse wins", f"{wrong} taken for whole")
+                untouched = old == SortieState.ASHORE and copy == 0 and torn == kept  # nothing of it has changed yet
+                finished = new == SortieState.ASHORE and copy == 1 and torn == block  # all of it has
+                wrong += found.state < SortieState.DIVING and not (untouched or finished)
+    return observed(not wrong, "the worse wins", f"{wrong} taken for whole")

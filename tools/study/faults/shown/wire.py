@@ -8,15 +8,15 @@ import random
 from collections.abc import Callable
 from pathlib import Path
 
-from hal.boardfile import BeaconTable, ImuTable
-from hal.drivers.modbus_sensors import Beacon
-from hal.drivers.vn100 import Vn100
-from hal.ports import Validity
-from hal.protocols import modbus, vn100
-from hal.protocols.registers import preset, to_registers
-from tools.study.faults.cases import DAMAGE, SAFE, Came, came
-from tools.study.faults.damaged_streams import codecs, run_codec
-from tools.study.faults.wire import Line, Stamped, stamp_reply
+from glider.hal.boardfile import BeaconTable, ImuTable
+from glider.hal.drivers.modbus_sensors import Beacon
+from glider.hal.drivers.vn100 import Vn100
+from glider.hal.ports import Validity
+from glider.hal.protocols import modbus, vn100
+from glider.hal.protocols.registers import preset, to_registers
+from glider.tools.study.faults.cases import DAMAGE, SAFE, GroundOutcome, observed
+from glider.tools.study.faults.damaged_streams import codecs, run_codec
+from glider.tools.study.faults.wire import Stamped, WireLine, stamp_reply
 
 RATE_HZ = 100.0
 
@@ -42,7 +42,7 @@ class AnyFrame(modbus.RtuDecoder):
         return end - at if end - at > 6 else 0
 
 
-def damaged_imu(disabled: bool, folder: Path) -> Came:
+def damaged_imu(disabled: bool, folder: Path) -> GroundOutcome:
     """A frame with flipped bits every eight seconds; with the sixth the device is in error, and none is delivered."""
     driver = Vn100(ImuTable(device="vn100", port="p"), 115_200)
     if disabled:
@@ -63,7 +63,7 @@ def damaged_imu(disabled: bool, folder: Path) -> Came:
     return noticed, "device in error" if noticed else "none", DAMAGE if wrong else SAFE
 
 
-def damaged_beacon(disabled: bool, folder: Path) -> Came:
+def damaged_beacon(disabled: bool, folder: Path) -> GroundOutcome:
     """Modbus replies with a broken check sum, one in a hundred."""
     values = [*to_registers("f32", 1.2), *to_registers("f32", 18.0)]
     broken: list[float] = []  # when
@@ -78,7 +78,7 @@ def damaged_beacon(disabled: bool, folder: Path) -> Came:
         return reply
 
     decoder = UncheckedModbus if disabled else modbus.RtuDecoder
-    line = Line(slave, lambda rng: 0.002, seed=7, decoder=decoder)
+    line = WireLine(slave, lambda rng: 0.002, seed=7, decoder=decoder)
     beacon = Beacon(BeaconTable(device="keller-33x", port="p"), preset("keller-33x"))
     beacon.start(0.0)
     line.bus.add(beacon.poll)
@@ -98,10 +98,10 @@ def _late(rng: random.Random) -> float:
     return rng.uniform(0.03, 0.1) if luck < 0.15 else rng.uniform(0.001, 0.03)
 
 
-def late_replies(disabled: bool, folder: Path) -> Came:
+def late_replies(disabled: bool, folder: Path) -> GroundOutcome:
     """20,000 exchanges, one in twenty lost and one in ten late; every reply carries its request's number."""
     forget_s, longest_s = (0.0, 0.0) if disabled else (0.5, 0.1)
-    line = Line(stamp_reply, _late, seed=1, timeout_s=0.03, forget_s=forget_s, longest_s=longest_s)
+    line = WireLine(stamp_reply, _late, seed=1, timeout_s=0.03, forget_s=forget_s, longest_s=longest_s)
     jobs = [Stamped(line, device, 0.02) for device in (1, 2, 3)]
     while line.requests < 20_000:
         line.run(line.now + 1.0)
@@ -110,15 +110,15 @@ def late_replies(disabled: bool, folder: Path) -> Came:
     return 0.03 if seen else None, "never delivered" if not wrong else f"{wrong} delivered", DAMAGE if wrong else SAFE
 
 
-def foreign_reply(change: Callable[[bytes], bytes]) -> Callable[[bool, Path], Came]:
+def foreign_reply(change: Callable[[bytes], bytes]) -> Callable[[bool, Path], GroundOutcome]:
     """Replies in another's name, of another function, of another length."""
 
-    def show(disabled: bool, folder: Path) -> Came:
+    def show(disabled: bool, folder: Path) -> GroundOutcome:
         decoder = AnyFrame if disabled else modbus.RtuDecoder
-        line = Line(
+        line = WireLine(
             lambda frame, number: change(stamp_reply(frame, number)), lambda rng: 0.002, seed=2, decoder=decoder
         )
-        job = Stamped(line, 1, 0.02, ask=3)
+        job = Stamped(line, 1, 0.02, run_batch=3)
         line.run(2.0)
         counts = line.bus.counts
         if job.delivered:
@@ -140,11 +140,11 @@ def wrong_length(reply: bytes) -> bytes:
     return modbus.with_check_sum(reply[:2] + bytes((reply[2] + 2,)) + reply[3:-2] + b"\0\0")
 
 
-def exception(code: int) -> Callable[[bool, Path], Came]:
+def exception(code: int) -> Callable[[bool, Path], GroundOutcome]:
     """The beacon answers every request with an exception."""
 
-    def show(disabled: bool, folder: Path) -> Came:
-        line = Line(
+    def show(disabled: bool, folder: Path) -> GroundOutcome:
+        line = WireLine(
             lambda frame, number: modbus.with_check_sum(bytes((frame[0], frame[1] | 0x80, code))), lambda rng: 0.002, 3
         )
         beacon = Beacon(BeaconTable(device="keller-33x", port="p"), preset("keller-33x"))
@@ -163,7 +163,7 @@ def exception(code: int) -> Callable[[bool, Path], Came]:
     return show
 
 
-def hostile_bytes(disabled: bool, folder: Path) -> Came:
+def hostile_bytes(disabled: bool, folder: Path) -> GroundOutcome:
     """Damage through every codec: back in step within a longest frame, no exception, nothing made up, little kept."""
     bad, made_up = 0, 0
     chosen = codecs(UncheckedImu, UncheckedModbus) if disabled else codecs()
@@ -174,4 +174,4 @@ def hostile_bytes(disabled: bool, folder: Path) -> Came:
             decoder, rng = codec.make(), random.Random(31)
             made_up += sum(len(decoder.feed(rng.randbytes(512))) for _ in range(400))
     good = not bad and not made_up
-    return came(good, "back in step", f"{made_up} made up", end=DAMAGE, after=256 * 10 / 9600)
+    return observed(good, "back in step", f"{made_up} made up", end=DAMAGE, after=256 * 10 / 9600)

@@ -9,18 +9,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sim_backend.core.effects import effect_layout as ef
-from sim_backend.core.effects.catalogue import catalogue
-from tools.data.errors import InputError
-from tools.data.runs import columns as names
-from tools.data.runs.case import Case
-from tools.data.runs.run import Run
-from tools.inference.model import Model, effect_vector
-from tools.inference.parameters import NINETY
-from tools.inference.vehicle_parameters import GAUGE
-from tools.readings.check import check, mend, mended_runs
-from tools.readings.findings import Finding
-from tools.readings.signals import table_of
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.sim_backend.core.effects.catalogue import catalogue
+from glider.tools.data.errors import InputError
+from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.case import Case
+from glider.tools.data.runs.run import Run
+from glider.tools.inference.model import Model, effect_vector
+from glider.tools.inference.parameters import NINETY
+from glider.tools.inference.vehicle_parameters import GAUGE
+from glider.tools.readings.check import apply_corrections, check, corrected_runs
+from glider.tools.readings.findings import Finding
+from glider.tools.readings.signals import table_of
 
 # effects of a constant size, by label: the one entry of F that a finding's size is
 SIZED = {
@@ -30,11 +30,11 @@ SIZED = {
 }  # fmt: skip
 # Axes of a gyro have one scale where they differ by less than standard errors, or than a share of it: the rate about
 # the vertical is compared with a compass, whose errors that turn with the heading look like some of it.
-ALIKE, NEARLY = 3.0, 0.3
+NEAR_SIGMA, NEARLY = 3.0, 0.3
 
 
 @dataclass(frozen=True)
-class Mended:
+class ReadingCorrections:
     """What was found, the runs with what only runs can be rid of, and the model that reads as the instruments do."""
 
     findings: list[Finding]
@@ -57,7 +57,7 @@ def findings_of(runs: list[Run]) -> list[Finding]:
         return []
 
 
-def mended(case: Case, model: Model, runs: list[Run] | None = None) -> Mended:
+def correct_readings(case: Case, model: Model, runs: list[Run] | None = None) -> ReadingCorrections:
     """The runs (all of the case, if none are given) and the model, by what the readings of the runs say."""
     runs = case.runs if runs is None else runs
     findings = findings_of(runs)
@@ -83,15 +83,17 @@ def mended(case: Case, model: Model, runs: list[Run] | None = None) -> Mended:
     else:
         rest += [one for one in findings if one.label == "gyro_scale"]
     if rest:
-        runs = mended_runs(runs, mend(table_of(runs), rest))
+        runs = corrected_runs(runs, apply_corrections(table_of(runs), rest))
         added += [f"{one.channel} {one.finding}" for one in rest]
-    return Mended(findings, runs, replace(model, F=F if F.any() else model.F), list(dict.fromkeys(added)), scale)
+    return ReadingCorrections(
+        findings, runs, replace(model, F=F if F.any() else model.F), list(dict.fromkeys(added)), scale
+    )
 
 
-def put_right(runs: list[Run], findings: list[Finding]) -> list[Run]:
+def fix_axes_signs_units(runs: list[Run], findings: list[Finding]) -> list[Run]:
     """The runs with what no effect of the catalogue stands for put right: axes, signs, units."""
     wrong = [one for one in findings if one.mended and one.label is None and one.channel in names.ALL]
-    return mended_runs(runs, mend(table_of(runs), wrong)) if wrong else runs
+    return corrected_runs(runs, apply_corrections(table_of(runs), wrong)) if wrong else runs
 
 
 def one_scale(found: list[Finding]) -> tuple[float, float, float] | None:
@@ -106,7 +108,7 @@ def one_scale(found: list[Finding]) -> tuple[float, float, float] | None:
     weight = error**-2.0
     mean = float((weight * size).sum() / weight.sum())
     apart = np.abs(size - mean)
-    if not np.all((apart < ALIKE * error) | (apart < NEARLY * abs(1.0 + mean))):
+    if not np.all((apart < NEAR_SIGMA * error) | (apart < NEARLY * abs(1.0 + mean))):
         return None
     scatter = max(1.0, float(np.sqrt((weight * apart**2).sum() / (len(found) - 1))))
     half = NINETY * scatter / float(np.sqrt(weight.sum()))

@@ -1,18 +1,29 @@
-"""The staircase: how far the gap of runs left out is, after what (docs/DIAGNOSIS.md, Stages)."""
+"""The waterfall: how far the gap of runs left out is, after what (docs/DIAGNOSIS.md, Stages)."""
 
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from tools.data.runs.case import Case
-from tools.data.runs.run import Run
-from tools.diagnose.shrink import AFTER, BEFORE, RECALIBRATED, SEED, by_channel, gaps, left_out, over_runs, rms, squares
-from tools.diagnose.verdict import Answer, drop
-from tools.gap.measure import RunGap, root_mean_square, run_gap
-from tools.inference.model import nominal_model
-from tools.inference.predict import predict
-from tools.inference.problem import cut, problem_of
+from glider.tools.data.runs.case import Case
+from glider.tools.data.runs.run import Run
+from glider.tools.diagnose.shrink import (
+    AFTER,
+    BEFORE,
+    RECALIBRATED,
+    SEED,
+    by_channel,
+    gaps,
+    left_out,
+    over_runs,
+    rms,
+    squares,
+)
+from glider.tools.diagnose.verdict import Answer, drop
+from glider.tools.gap.measure import RunGap, root_mean_square, run_gap
+from glider.tools.inference.model import nominal_model
+from glider.tools.inference.predict import predict
+from glider.tools.inference.problem import cut, problem_of
 
 NOMINAL, READINGS, RECALIBRATED_STAGE = "nominal", "readings", "recalibrated"  # names of stages
 

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from firmware.core.maths.rotations import euler_from_quaternion, quaternion_from_euler, wrap_angle
-from firmware.core.vehicle import layout
-from firmware.core.vehicle.flight import nominal_run
-from tools.data.errors import InputError
+from glider.firmware.core.maths.rotations import euler_from_quaternion, quaternion_from_euler, wrap_angle
+from glider.firmware.core.vehicle import layout
+from glider.firmware.core.vehicle.flight import nominal_run
+from glider.tools.data.errors import InputError
 
 TIME = "t_s"
 COMMANDS = ("cmd_servo_rad", "cmd_slider_m", "cmd_ballast_kg")
@@ -164,7 +164,7 @@ def fly_commands(
     """The states at the table's times, shape (n, 15), flown by the nominal model in water moving at N, E (m/s).
 
     Each interval between rows is cut into equal steps of at most dt. psi runs on through +-pi. Raises InputError for a
-    table that this vehicle cannot fly and for a flight that diverges. `advance` is told of every row.
+    table that this vehicle cannot fly and for a flight that diverges. `advance` is called for every row.
     """
     check_dt(P, dt)
     check_start(P, table)

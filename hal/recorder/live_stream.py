@@ -14,16 +14,16 @@ import os
 import socket
 import struct
 
-from hal.recorder import ring
+from glider.hal.recorder import ring
 
 HEAD = struct.Struct("<I")
 RECORD = struct.Struct("<id")
 PERIOD_S = 0.1  # between two records of a channel; events all go
-MOST = 4  # onlookers at once
+MAX_CONNECTIONS = 4  # onlookers at once
 BACKLOG = 1 << 18  # bytes that wait for one of them
 
 
-class Onlookers:
+class LiveStream:
     """`serve` now and then, `offer` each record. OSError where the socket cannot be made."""
 
     def __init__(self, path: str, specs: list[dict], metadata: dict[str, str]):
@@ -34,20 +34,20 @@ class Onlookers:
         self._connected: dict[socket.socket, bytearray] = {}
         with contextlib.suppress(FileNotFoundError):
             os.unlink(path)  # of a recording process before this one
-        self._door = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_NONBLOCK | socket.SOCK_CLOEXEC)
+        self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_NONBLOCK | socket.SOCK_CLOEXEC)
         mask = os.umask(0o117)  # the vehicle's user and group
         try:
-            self._door.bind(path)
+            self._listener.bind(path)
         finally:
             os.umask(mask)
-        self._door.listen(MOST)
+        self._listener.listen(MAX_CONNECTIONS)
 
     def serve(self) -> None:
-        """Let in who knocks, and pass on what waits."""
+        """Accept waiting connections and forward what is queued."""
         with contextlib.suppress(OSError):
-            line, _ = self._door.accept()
+            line, _ = self._listener.accept()
             line.setblocking(False)
-            if len(self._connected) < MOST:
+            if len(self._connected) < MAX_CONNECTIONS:
                 self._connected[line] = bytearray(self._greeting)
             else:
                 line.close()
@@ -60,7 +60,7 @@ class Onlookers:
             except OSError:
                 self._leave(line)
 
-    def offer(self, taken: ring.Taken) -> None:
+    def offer(self, taken: ring.RingRecord) -> None:
         """A record on its way to the log."""
         if not self._connected:
             return
@@ -89,6 +89,6 @@ class Onlookers:
         self.serve()
         for line in list(self._connected):
             self._leave(line)
-        self._door.close()
+        self._listener.close()
         with contextlib.suppress(OSError):
             os.unlink(self.path)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from support.cases import make_case
 
-from sim_backend.core.effects import effect_layout as ef
-from tools.gap.mended import mended, put_right
-from tools.inference.model import nominal_model
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.gap.corrected import correct_readings, fix_axes_signs_units
+from glider.tools.inference.model import nominal_model
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +24,7 @@ def changed(case, **columns):
 
 
 def test_a_clean_case_is_left_alone(plain):
-    found = mended(plain, nominal_model(plain))
+    found = correct_readings(plain, nominal_model(plain))
     assert found.added == []
     assert found.model.F is None
     assert found.runs is plain.runs
@@ -32,7 +32,7 @@ def test_a_clean_case_is_left_alone(plain):
 
 def test_one_scale_of_three_axes_is_the_model_s(plain):
     case = changed(plain, **{f"{a}_rad_s": lambda c, a=a: 0.4 * c[f"{a}_rad_s"] for a in "pqr"})
-    found = mended(case, nominal_model(case))
+    found = correct_readings(case, nominal_model(case))
     assert found.labels == ["gyro_scale"]
     assert found.model.F[ef.GYRO_SCALE] == pytest.approx(-0.6, abs=0.02)
     size, low, high = found.scale
@@ -42,8 +42,8 @@ def test_one_scale_of_three_axes_is_the_model_s(plain):
 
 def test_exchanged_axes_are_put_right_in_the_runs(plain):
     case = changed(plain, q_rad_s=lambda c: c["r_rad_s"], r_rad_s=lambda c: c["q_rad_s"])
-    found = mended(case, nominal_model(case))
-    right = put_right(case.runs, found.findings)
+    found = correct_readings(case, nominal_model(case))
+    right = fix_axes_signs_units(case.runs, found.findings)
     for run, mended_run, was in zip(found.runs, right, plain.runs, strict=True):
         for name in ("q_rad_s", "r_rad_s"):
             assert np.nanmax(np.abs(run.columns[name] - was.columns[name])) < 1e-9
@@ -52,6 +52,6 @@ def test_exchanged_axes_are_put_right_in_the_runs(plain):
 
 def test_one_axis_that_reads_half_is_put_right_for_identification_and_left_to_the_search(plain):
     case = changed(plain, q_rad_s=lambda c: 0.5 * c["q_rad_s"])
-    found = mended(case, nominal_model(case))
+    found = correct_readings(case, nominal_model(case))
     assert found.added == ["q_rad_s scale"]
-    assert put_right(case.runs, found.findings) is case.runs
+    assert fix_axes_signs_units(case.runs, found.findings) is case.runs

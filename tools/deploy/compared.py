@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from tools.data.log.reader import read_log
-from tools.deploy.arm import Arm
-from tools.deploy.bundle import archived, written
-from tools.deploy.wheels import ROOT
+from glider.tools.data.log.reader import read_log
+from glider.tools.deploy.arm import Arm
+from glider.tools.deploy.bundle import archived, written
+from glider.tools.deploy.wheels import ROOT
 
 REFERENCE = "tests/data/reference"
 # Times and what the host says of itself: different in any two flights.

@@ -10,40 +10,40 @@ import math
 
 import numpy as np
 
-from firmware.core.jit import allocating_kernel, kernel
-from firmware.core.vehicle.layout import N_P, N_X, X_NU, X_POS
-from firmware.core.vehicle.linearise import model_error
-from firmware.core.vehicle.state import rotation
-from sim_backend.core.effects import effect_layout as ef
-from tools.inference.core.error_layout import E_POS, N_ERR
+from glider.firmware.core.jit import allocating_kernel, kernel
+from glider.firmware.core.vehicle.layout import N_P, N_X, X_NU, X_POS
+from glider.firmware.core.vehicle.linearise import model_error
+from glider.firmware.core.vehicle.state import rotation
+from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.inference.core.error_layout import E_POS, N_ERR
 
-L_GYRO, L_WATER = 6, 9  # of the lacking, behind m/s2 and rad/s2 (body): rad/s, m/s north and east
-N_LACKING = 11
+L_GYRO, L_WATER = 6, 9  # of the model error, behind m/s2 and rad/s2 (body): rad/s, m/s north and east
+N_MODEL_ERROR = 11
 D_TIME, D_GYRO, D_WATER = 0, 1, 2  # drift: s over which accelerations fade; walks, (rad/s)2/s and (m/s)2/s
 N_DRIFT = 3
 # 1 sigma before the first measurement; of the accelerations it is the parameters'
-LACKING_SPREAD = (*6 * (0.0,), *3 * (0.003,), *2 * (0.05,))  # rad/s, m/s
+MODEL_ERROR_SD = (*6 * (0.0,), *3 * (0.003,), *2 * (0.05,))  # rad/s, m/s
 
 
 @kernel
-def step_lacking(drift, x, lacking, dt):
-    """A step of dt of the lacking (N_LACKING), in place, and of the position that the water carries."""
+def step_model_error(drift, x, error_states, dt):
+    """A step of dt of the model error (N_MODEL_ERROR), in place, and of the position that the water carries."""
     fade = math.exp(-dt / drift[D_TIME])
     for j in range(L_GYRO):
-        lacking[j] *= fade
+        error_states[j] *= fade
     for j in range(2):
-        x[X_POS + j] += dt * lacking[L_WATER + j]
+        x[X_POS + j] += dt * error_states[L_WATER + j]
 
 
 @kernel
-def lacking_columns(drift, dt, Gam, Phi):
-    """The lacking's columns of Phi; Gam (N_ERR, 6) is the step's derivative by accelerations."""
+def model_error_columns(drift, dt, Gam, Phi):
+    """The model error's columns of Phi; Gam (N_ERR, 6) is the step's derivative by accelerations."""
     fade = math.exp(-dt / drift[D_TIME])
     for j in range(L_GYRO):
         for a in range(N_ERR):
             Phi[a, N_ERR + j] = Gam[a, j]
         Phi[N_ERR + j, N_ERR + j] = fade
-    for j in range(L_GYRO, N_LACKING):
+    for j in range(L_GYRO, N_MODEL_ERROR):
         Phi[N_ERR + j, N_ERR + j] = 1.0
     for j in range(2):
         Phi[E_POS + j, N_ERR + L_WATER + j] = dt
@@ -51,7 +51,7 @@ def lacking_columns(drift, dt, Gam, Phi):
 
 @allocating_kernel
 def add_model_error(P, sigma, x, share, work, cov):
-    """A share of the accelerations' covariance that parameters of 1 sigma (N_P) leave at x, to the lacking's in cov."""
+    """A share of the accelerations' covariance that parameters of 1 sigma (N_P) leave at x, to the model error's in cov."""
     point, C, Pt, g = work[0], np.empty((6, 6)), np.empty(N_P), work[1]
     _, _, _, _, _, _, point[0], point[1], point[2] = rotation(x)
     for n in range(N_X - X_NU):
@@ -64,7 +64,7 @@ def add_model_error(P, sigma, x, share, work, cov):
 
 @kernel
 def add_drift(P, sigma, drift, x, dt, work, cov):
-    """What dt adds to the lacking's covariance: as much of the model's error as keeps it where it is, and walks."""
+    """What dt adds to the model error's covariance: as much of the model's error as keeps it where it is, and walks."""
     add_model_error(P, sigma, x, 1.0 - math.exp(-2.0 * dt / drift[D_TIME]), work, cov)
     for j in range(3):
         cov[N_ERR + L_GYRO + j, N_ERR + L_GYRO + j] += drift[D_GYRO] * dt
@@ -73,7 +73,7 @@ def add_drift(P, sigma, drift, x, dt, work, cov):
 
 
 @kernel
-def take_gyro_bias(lacking, d):
+def take_gyro_bias(error_states, d):
     """Take the gyro's errors out of innovations d (N_Y)."""
     for j in range(3):
-        d[ef.Y_P + j] -= lacking[L_GYRO + j]
+        d[ef.Y_P + j] -= error_states[L_GYRO + j]

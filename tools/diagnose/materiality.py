@@ -6,15 +6,15 @@ hundred nat in ten minutes of 10 Hz. What nobody could see in a window is no gap
 
 import numpy as np
 
-from tools.diagnose.gates import opened
-from tools.diagnose.search import Search
-from tools.diagnose.shrink import AFTER, FLOOR, Shrinkage, case_noise_floor
-from tools.gap.measure import mean_square
-from tools.inference.channels import errors
-from tools.inference.fit import Hypothesis
-from tools.inference.kind import MATTERS
-from tools.inference.predict import at_its_word, fly_windows_from
-from tools.inference.problem import Problem, cut
+from glider.tools.diagnose.gates import opened
+from glider.tools.diagnose.search import Search
+from glider.tools.diagnose.shrink import AFTER, FLOOR, Shrinkage, case_noise_floor
+from glider.tools.gap.measure import mean_square
+from glider.tools.inference.channels import errors
+from glider.tools.inference.fit import Hypothesis
+from glider.tools.inference.kind import MATERIAL_TOLERANCES
+from glider.tools.inference.predict import at_its_word, fly_windows_from
+from glider.tools.inference.problem import Problem, cut
 
 
 def movements(search: Search, hypothesis: Hypothesis) -> dict[str, float]:
@@ -30,7 +30,7 @@ def movements(search: Search, hypothesis: Hypothesis) -> dict[str, float]:
     gains, found = at_its_word(problem, P, F), {}
     whole = fly_windows_from(problem, P, F, gains)
     for label, entries in effects.items():
-        without = search.lacking(F, entries)
+        without = search.without_effect(F, entries)
         found[label] = largest(problem, whole, fly_windows_from(problem, P, without, gains))
     return found
 
@@ -54,11 +54,13 @@ def excess(after: dict[str, float], floor: dict[str, float]) -> float:
     return float(np.sqrt(max([0.0, *beyond])))
 
 
-def disorder_matters(search: Search, hypothesis: Hypothesis, shrinkage: Shrinkage) -> bool:
+def excess_noise_is_material(search: Search, hypothesis: Hypothesis, shrinkage: Shrinkage) -> bool:
     """Whether disorder that the search knows of shows in the gap, beyond what the case's own noise leaves."""
-    return excess(shrinkage.channels(AFTER), case_noise_floor(search, hypothesis)) >= MATTERS
+    return excess(shrinkage.channels(AFTER), case_noise_floor(search, hypothesis)) >= MATERIAL_TOLERANCES
 
 
-def gap_matters(shrinkage: Shrinkage) -> float:
+def gap_is_material(shrinkage: Shrinkage) -> float:
     """How far what is left exceeds the floor in any channel: 0 below MATTERS, 1 from twice that."""
-    return opened(excess(shrinkage.channels(AFTER), shrinkage.channels(FLOOR)), MATTERS, 2.0 * MATTERS)
+    return opened(
+        excess(shrinkage.channels(AFTER), shrinkage.channels(FLOOR)), MATERIAL_TOLERANCES, 2.0 * MATERIAL_TOLERANCES
+    )
