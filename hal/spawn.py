@@ -1,14 +1,16 @@
 """How one of this project's modules is started as a process of its own. Standard library alone.
 
-`-P` keeps the working directory out of the module path, and the folder that this package was loaded from leads
-PYTHONPATH. Otherwise a package named `hal` or `tools` in the working directory would be imported instead.
+`-P` keeps the working directory out of the module path, and the folder that `glider` was loaded from leads PYTHONPATH.
+Otherwise another package of that name in the working directory would be imported instead.
 """
 
 import os
 import sys
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
+import glider
+
+ROOT = Path(glider.__file__).resolve().parents[1]
 
 
 def module_command(module: str, *arguments: str) -> list[str]:
@@ -22,6 +24,6 @@ def module_command(module: str, *arguments: str) -> list[str]:
 
 
 def module_environment() -> dict[str, str]:
-    """Return this process's environment, with the project's folder first in PYTHONPATH."""
+    """Return this process's environment, with the folder of `glider` first in PYTHONPATH."""
     paths = [str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
     return {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}

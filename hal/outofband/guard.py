@@ -1,9 +1,9 @@
 """The out-of-band process: watches the flight's heartbeat, and brings the vehicle up when that stops.
 
-`python -m glider.hal.outofband` with --run and --state (folders). It needs the standard library and pyserial, and nothing of
-the flight's code but the places in two small files (heartbeat, state). Unless --service is given it ends when the
-flight ends in order. As a service it goes on, and at its start looks at the state first: a vehicle that was under way
-when the power went is brought up, whatever has become of its flight.
+`python -m glider.hal.outofband` with --run and --state (folders). It needs the standard library and pyserial, and
+nothing of the flight's code but the places in two small files (heartbeat, state). Unless --service is given it ends
+when the flight ends in order. As a service it goes on, and at its start looks at the state first: a vehicle that was
+under way when the power went is brought up, whatever has become of its flight.
 
 It feeds the hardware watchdog and systemd's, only while every part answers: the loop, the recorder where one is
 expected, and itself; on the way up, the pump. Where the vehicle does not rise (rise.py) the hardware's is fed no more.

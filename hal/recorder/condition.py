@@ -1,4 +1,6 @@
-"""How a recording goes, as plain numbers: what the flight looks at once a second, and restarts a recording that died."""
+"""How a recording goes, as plain numbers: what the flight looks at once a second, and restarts a recording that
+died.
+"""
 
 from enum import IntEnum
 

@@ -84,8 +84,8 @@ class Recorder:
         sync_period_s: float = SYNC_PERIOD_S,
         live_stream: str | os.PathLike | None = None,
     ):
-        """`attachments`: name -> text; `metadata`: name -> text; `epoch_ns` is the log time of t = 0; `live_stream`: path
-        of the socket for a live view (live_stream.py), None: there is none.
+        """`attachments`: name -> text; `metadata`: name -> text; `epoch_ns` is the log time of t = 0; `live_stream`:
+        path of the socket for a live view (live_stream.py), None: there is none.
 
         ValueError where two specs share a topic.
         """

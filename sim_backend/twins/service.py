@@ -1,7 +1,7 @@
 """The twins of a board, moved by the plant in real time, with a line of commands for faults.
 
-`python -m glider.sim_backend.twins.service` is how a flight starts them: a line of JSON on standard input says what, a line of
-JSON on standard output says that they are there, and the end of standard input ends them.
+`python -m glider.sim_backend.twins.service` is how a flight starts them: a line of JSON on standard input says
+what, a line of JSON on standard output says that they are there, and the end of standard input ends them.
 """
 
 import asyncio

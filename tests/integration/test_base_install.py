@@ -16,6 +16,7 @@ from packaging.requirements import Requirement
 
 from glider.tools.cli.main import cli
 from glider.tools.data.errors import extras, missing_extra
+from glider.tools.data.version import DISTRIBUTION
 
 pytestmark = pytest.mark.computes(seconds=25)
 
@@ -127,10 +128,10 @@ def base_install(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("base")
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder / "venv"], check=True)
     (site,) = (folder / "venv").glob("lib/python*/site-packages")
-    for package in needed("glider", set()):
+    for package in needed(DISTRIBUTION, set()):
         one = distribution(package)
         for top in {Path(file).parts[0] for file in one.files} - {".."}:
-            if package != "glider" or top.endswith(".dist-info"):  # the project itself is this tree
+            if package != DISTRIBUTION or top.endswith(".dist-info"):  # the project itself is this tree
                 (site / top).symlink_to(Path(one.locate_file(top)))
     return folder
 
@@ -151,7 +152,7 @@ def test_in_a_base_install_every_command_works_or_names_its_extra(base_install):
     wrong = []
     for (_, extra), one in zip(CALLS, json.loads(done.stdout), strict=True):
         lines = [line for line in one["err"].splitlines() if not line.endswith(" ...")]  # it names what it begins with
-        asks = len(lines) == 1 and lines[0].endswith(f"pip install 'glider[{extra}]'") and one["out"] == ""
+        asks = len(lines) == 1 and lines[0].endswith(f"pip install '{DISTRIBUTION}[{extra}]'") and one["out"] == ""
         if "Traceback" in one["err"] or not (one["code"] == 0 if extra is None else one["code"] == 2 and asks):
             wrong.append((extra, one))
     assert wrong == []
@@ -160,34 +161,64 @@ def test_in_a_base_install_every_command_works_or_names_its_extra(base_install):
 def test_the_extras_are_those_of_the_package():
     assert set(BROUGHT) <= set(extras())
     assert {"dask", "distributed", "joblib", "jinja2"} == set(extras()["campaign"])
-    assert "'glider[identify]'" in str(missing_extra(ModuleNotFoundError(name="arviz.stats")))
+    assert "'underwater-glider[identify]'" in str(missing_extra(ModuleNotFoundError(name="arviz.stats")))
     assert missing_extra(ModuleNotFoundError(name="glider.tools.nothing")) is None
 
 
 def test_what_flies_asks_for_few_packages():
-    packages = needed("glider", set())
+    packages = needed(DISTRIBUTION, set())
     assert {"numba", "numpy", "pyserial"} <= packages
     assert not packages & NOT_ON_THE_GLIDER
 
 
-@pytest.mark.slow
-def test_a_wheel_holds_every_file_of_the_packages(tmp_path):
-    """Of a copy: building leaves its own folders behind."""
-    for name in PACKAGES:
-        shutil.copytree(ROOT / name, tmp_path / "tree" / name, ignore=shutil.ignore_patterns("__pycache__"))
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory) -> Path:
+    """The project's wheel, of a copy of the tree: building leaves its own folders behind."""
+    folder = tmp_path_factory.mktemp("wheel")
+    for name in (*PACKAGES, "glider"):
+        skipped = shutil.ignore_patterns("__pycache__")
+        shutil.copytree(ROOT / name, folder / "tree" / name, symlinks=True, ignore=skipped)
     for name in ("pyproject.toml", "README.md", "LICENSE"):
-        shutil.copy(ROOT / name, tmp_path / "tree")
+        shutil.copy(ROOT / name, folder / "tree")
     build = [sys.executable, "-m", "pip", "wheel", "--no-deps", "--disable-pip-version-check"]
-    done = subprocess.run([*build, "-w", tmp_path, tmp_path / "tree"], capture_output=True, text=True)
+    done = subprocess.run([*build, "-w", folder, folder / "tree"], capture_output=True, text=True)
     if done.returncode != 0 and "Could not find a version" in done.stderr + done.stdout:
         pytest.skip("no package index to fetch setuptools from")
     assert done.returncode == 0, done.stderr
-    (wheel,) = tmp_path.glob("glider-*.whl")
+    (built,) = folder.glob("underwater_glider-*.whl")
+    return built
+
+
+@pytest.mark.slow
+def test_a_wheel_holds_every_file_of_the_packages(wheel):
     with zipfile.ZipFile(wheel) as archive:
-        held = {name for name in archive.namelist() if name.split("/")[0] in PACKAGES}
+        held = {name for name in archive.namelist() if ".dist-info/" not in name}
         (metadata,) = [archive.read(name) for name in archive.namelist() if name.endswith("METADATA")]
     tree = [path for name in PACKAGES for path in (ROOT / name).rglob("*")]
-    assert held == {str(p.relative_to(ROOT)) for p in tree if p.is_file() and "__pycache__" not in p.parts}
+    files = {f"glider/{p.relative_to(ROOT)}" for p in tree if p.is_file() and "__pycache__" not in p.parts}
+    assert held == files | {"glider/__init__.py", "glider/py.typed"}
     asked = {line.removeprefix("Requires-Dist: ") for line in metadata.decode().splitlines() if "Requires-Dist" in line}
     declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["dependencies"]
     assert {Requirement(line) for line in asked if "extra ==" not in line} == {Requirement(line) for line in declared}
+
+
+@pytest.mark.slow
+def test_packages_called_hal_and_tools_are_neither_shadowed_nor_in_the_way(wheel, tmp_path):
+    """Beside stand-ins of others' packages, as robotpy's `hal`, a mission is flown and both import as before."""
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(tmp_path / "site")
+    for name in PACKAGES:
+        (tmp_path / "site" / name).mkdir()
+        (tmp_path / "site" / name / "__init__.py").write_text("OWNER = 'somebody else'\n")
+    program = (
+        "import firmware, hal, sim_backend, tools\n"
+        "assert {one.OWNER for one in (firmware, hal, sim_backend, tools)} == {'somebody else'}\n"
+        "import glider.tools.cli.main as command\n"
+        "command.main()\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, "fly", "--mission", "spiral", "--log", "flight.mcap"], cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(tmp_path / "site")}, capture_output=True, text=True, timeout=300,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "flight.mcap").stat().st_size > 100_000

@@ -22,13 +22,13 @@ PYPROJECT = """[build-system]
 requires = ["setuptools"]
 build-backend = "setuptools.build_meta"
 [project]
-name = "glider"
+name = "underwater-glider"
 version = "{version}"
 dependencies = ["pyserial>=3.5"]
 [tool.setuptools.packages.find]
-include = ["tools*"]
+include = ["glider*"]
 [tool.setuptools.package-data]
-tools = ["**/ballast"]
+"glider.tools" = ["**/ballast"]
 """
 # `unfit` beside the vehicle's files: it does not pass; `cut`: the power goes in the middle of it, once.
 SELFCHECK = """
@@ -50,8 +50,11 @@ class Dock:
         self.source, self.vehicle = folder / "source", server.account.home / "vehicle"
         deploy = self.source / "tools" / "deploy"
         shutil.copytree(ROOT / "tools" / "deploy", deploy, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
-        for package in (deploy.parent, deploy):
-            (package / "__init__.py").touch()
+        package = self.source / "glider"
+        package.mkdir()
+        (package / "tools").symlink_to("../tools")
+        for folder_of_package in (package, deploy.parent, deploy):
+            (folder_of_package / "__init__.py").touch()
         (deploy / "selfcheck.py").write_text(SELFCHECK)
         for path in ("hal/boards", "firmware/model/vehicles", "firmware/guidance/missions"):
             shutil.copytree(ROOT / path, self.source / path)

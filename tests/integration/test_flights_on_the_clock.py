@@ -22,7 +22,8 @@ pytestmark = pytest.mark.realtime
 
 def test_ctrl_c_gives_the_dive_up_and_the_log_is_whole(tmp_path):
     flight = subprocess.Popen(
-        [sys.executable, "-m", "glider.tools.cli.main", "fly", "--realtime", "--json", "--vehicle", patient_vehicle(tmp_path)],
+        [sys.executable, "-m", "glider.tools.cli.main", "fly", "--realtime", "--json",
+         "--vehicle", patient_vehicle(tmp_path)],
         cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ},
     )  # fmt: skip
     log = tmp_path / "sawtooth-001.mcap"

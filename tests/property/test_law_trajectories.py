@@ -242,8 +242,8 @@ VARIANTS = {
     "moderate, present, paper form": (MODERATE, dict(counting_on="present"), dict(form=paper_form)),
     "moderate, reach": (MODERATE, dict(counting_on="reach"), {}),
     "moderate, law+": (MODERATE, dict(counting_on="reach", share=BOUNDARY_LAYER_SHARE), {}),
-    "moderate, law+, paper form": (MODERATE, dict(counting_on="reach", share=BOUNDARY_LAYER_SHARE), dict(form=paper_form)),
-    "fast, present": (FAST, dict(counting_on="present"), {}),
+    "moderate, law+, paper form": (MODERATE, dict(counting_on="reach", share=BOUNDARY_LAYER_SHARE),
+    dict(form=paper_form)), "fast, present": (FAST, dict(counting_on="present"), {}),
     "fast, law+": (FAST, dict(counting_on="reach", share=BOUNDARY_LAYER_SHARE), {}),
 }  # fmt: skip
 

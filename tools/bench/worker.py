@@ -1,4 +1,4 @@
-"""The bench's other half: `python -m glider.tools.bench.worker` holds the ports; a console that dies stops the actuators.
+"""The bench's other half: `python -m glider.tools.bench.worker` holds the ports; a dead console stops the actuators.
 
 Standard input brings a line of JSON (the board), then requests, one a line, each answered by a line of JSON with its
 `number`. The end of standard input, or silence of HEARTBEAT_S while actuators are enabled, stops them. Nothing moves

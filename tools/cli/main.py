@@ -8,6 +8,7 @@ import sys
 import click
 
 from glider.tools.cli.common import report_errors
+from glider.tools.data.version import DISTRIBUTION
 
 # name -> (module, attribute, one line). The line stands here so that --help need not import the command.
 COMMANDS = {
@@ -66,7 +67,7 @@ class LazyGroup(click.Group):
 
 
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
-@click.version_option(package_name="glider")
+@click.version_option(package_name=DISTRIBUTION)
 def cli():
     """Fly an underwater glider, in the sea or in simulation, and find out why the two disagree."""
 

@@ -4,6 +4,8 @@ import functools
 import re
 from importlib.util import find_spec
 
+from glider.tools.data.version import DISTRIBUTION
+
 DONE, FAILED, BAD_INPUT = 0, 1, 2  # exit codes of every command
 IMPORTED_AS = {"foxglove-sdk": "foxglove"}  # packages that are imported by another name than they are installed by
 
@@ -21,7 +23,7 @@ class MissingExtra(RuntimeError):
     """A command needs packages that the base install leaves out."""
 
     def __init__(self, package: str, extra: str):
-        super().__init__(f"this command needs {package}: pip install 'glider[{extra}]'")
+        super().__init__(f"this command needs {package}: pip install '{DISTRIBUTION}[{extra}]'")
 
 
 @functools.cache
@@ -30,10 +32,10 @@ def extras() -> dict[str, tuple[str, ...]]:
     from importlib import metadata  # here: --help and most commands do without
 
     found: dict[str, tuple[str, ...]] = {}
-    for line in metadata.requires("glider") or ():
+    for line in metadata.requires(DISTRIBUTION) or ():
         asked, _, condition = line.partition(";")
         extra = re.search(r"extra == ['\"](\w+)", condition)
-        if extra and not asked.startswith("glider["):
+        if extra and not asked.startswith(f"{DISTRIBUTION}["):
             names = re.findall(r"[a-zA-Z][\w-]*", re.split("[<>=!~]", asked)[0])  # dask[distributed] is two
             imported = (IMPORTED_AS.get(name, name.replace("-", "_")) for name in names)
             found[extra[1]] = (*found.get(extra[1], ()), *imported)

@@ -14,9 +14,16 @@ import tempfile
 from pathlib import Path
 
 from glider.tools.data.remote import file_digest
+from glider.tools.data.version import COMMIT_FILE
 from glider.tools.deploy.wheels import ROOT, Target, own_wheel, version, wheelhouse
 
 SUMS = "SHA256SUMS"
+# Left out of the wheel that goes onboard: verification, and what a laptop computes after a flight.
+NOT_ONBOARD = (
+    "sim_backend/foreign", "tools/deploy/arm.py", "tools/deploy/compared.py", "tools/deploy/emulated.py",
+    "tools/diagnose", "tools/gap", "tools/identify", "tools/inference", "tools/measure", "tools/readings",
+    "tools/report", "tools/study", "tools/watch",
+)  # fmt: skip
 UNITS = ("glider-outofband.service", "glider-flight@.service", "60-glider.rules", "flight.env")
 
 
@@ -39,8 +46,10 @@ def make_release(target: Target, folder: Path, root: Path = ROOT) -> Path:
         tree = Path(place, "tree")
         tree.mkdir()
         archived(root, name.rpartition("-")[2], tree)
-        own_wheel(tree, fresh / "wheels")
+        (tree / "glider" / COMMIT_FILE).write_text(name.rpartition("-")[2] + "\n")
         copy_files(tree, fresh)
+        take_out(tree)
+        own_wheel(tree, fresh / "wheels")
     lines = {"release": name, "version": version(root), "machine": target.machine, "python": target.python}
     (fresh / "RELEASE").write_text("".join(f"{key}={text}\n" for key, text in lines.items()))
     files = sorted(path for path in fresh.rglob("*") if path.is_file())
@@ -49,6 +58,16 @@ def make_release(target: Target, folder: Path, root: Path = ROOT) -> Path:
     shutil.rmtree(release, ignore_errors=True)
     fresh.rename(release)
     return release
+
+
+def take_out(tree: Path) -> None:
+    """Remove from a tree what does not go onboard (NOT_ONBOARD)."""
+    for name in NOT_ONBOARD:
+        path = tree / name
+        if path.is_dir():
+            shutil.rmtree(path)
+        else:
+            path.unlink(missing_ok=True)
 
 
 def copy_files(tree: Path, release: Path) -> None:

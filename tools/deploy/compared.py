@@ -44,7 +44,7 @@ class Here:
         """Of a release's own wheel, and of the commit that it was made of."""
         shutil.rmtree(folder, ignore_errors=True)
         (folder / "sources").mkdir(parents=True)
-        (wheel,) = (release / "wheels").glob("glider-*.whl")
+        (wheel,) = (release / "wheels").glob("underwater_glider-*.whl")
         with zipfile.ZipFile(wheel) as archive:
             archive.extractall(folder / "sources")
         archived(ROOT, written(release)["release"].rpartition("-")[2], folder, REFERENCE)

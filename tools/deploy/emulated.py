@@ -27,10 +27,10 @@ from glider.tools.cli.common import DONE, FAILED, print_json, say
 from glider.tools.data.log.reader import read_log
 from glider.tools.data.plain import as_plain
 from glider.tools.deploy.arm import ALONE, Arm, EmulationUnavailable, look
-from glider.tools.deploy.bundle import make_release, written
+from glider.tools.deploy.bundle import archived, make_release, written
 from glider.tools.deploy.compared import Here, compared, same_maths
 from glider.tools.deploy.selfcheck import PLUNGE, flight_command
-from glider.tools.deploy.wheels import Target
+from glider.tools.deploy.wheels import ROOT, Target
 
 RESULT = "result.json"
 # Largest difference of a state over a reference flight: position (m), angles (rad), speeds, actuators
@@ -126,8 +126,16 @@ def killed(arm: Arm, seconds: float) -> dict[str, Any]:
 
 
 def out_of_band(arm: Arm) -> dict[str, Any]:
-    """Row 25 of the fault table in there: a process that flies is killed, or hangs, and the watch notices."""
-    done = arm.call(*arm.glider("faults", "--only", "25", "--json"), stdout=subprocess.PIPE)
+    """Row 25 of the fault table in there: a process that flies is killed, or hangs, and the watch notices.
+
+    The fault table is no part of a release: it is run from the sources of the release's commit, by its Python.
+    """
+    sources = arm.root / "root/sources"
+    if not sources.exists():
+        sources.mkdir()
+        archived(ROOT, arm.release.rpartition("-")[2], sources)
+    python = ["env", "PYTHONPATH=/root/sources", f"{arm.vehicle}/opt/glider/current/bin/python", "-m"]
+    done = arm.call(*python, "glider.tools.cli.main", "faults", "--only", "25", "--json", stdout=subprocess.PIPE)
     (row,) = json.loads(done.stdout)["faults"]
     cases = {case["case"]: case["noticed_s"] for case in row["cases"]}
     return {"pass": row["pass"], "noticed_s": cases, "allowed_s": row["cases"][0]["allowed_s"]}
@@ -186,7 +194,9 @@ def computer(release: Path, options: argparse.Namespace) -> Arm:
 
 
 def had(options: argparse.Namespace) -> Path:
-    """The release; it and Debian are made where they are not there yet; EmulationUnavailable where they cannot be had."""
+    """The release; it and Debian are made where they are not there yet; EmulationUnavailable where they cannot be
+    had.
+    """
     look()
     try:
         options.folder.mkdir(parents=True, exist_ok=True)

@@ -61,7 +61,7 @@ unpack() {
     rm -rf "$here"
     "$python" -m venv --without-pip "$here"
     "$here/bin/python" "$(echo wheels/pip-*.whl)/pip" install --quiet --disable-pip-version-check --no-index --find-links wheels \
-        "glider==$(written . version)"
+        "underwater-glider==$(written . version)"
     cp -R RELEASE install.sh units "$here/"
     sed -i "s|@RELEASE@|$name|g" "$here"/units/*.service
     sync

@@ -1,4 +1,4 @@
-"""`python -m glider.tools.deploy.push HOST`: what is committed becomes what flies on the glider's computer (`make deploy`).
+"""`python -m glider.tools.deploy.push HOST`: installs the committed tree on the glider's computer (`make deploy`).
 
 A release is made here with all its wheels, brought over by ssh, installed beside the one that flies, checked there, and
 switched to. Broken off anywhere it is begun again and goes on; what flies is the old release or the new one, whole.

@@ -1,7 +1,7 @@
 """Wheels of everything that flies, for another computer: nothing is compiled there, and it needs no network.
 
-`python -m glider.tools.deploy.wheels` asks pip, without fetching anything, whether all of it has wheels for a 64-bit ARM
-computer; the result as JSON.
+`python -m glider.tools.deploy.wheels` asks pip, without fetching anything, whether all of it has wheels for a 64-bit
+ARM computer; the result as JSON.
 """
 
 import hashlib
@@ -77,7 +77,7 @@ def wheelhouse(root: Path, target: Target, folder: Path) -> Path:
 def own_wheel(root: Path, folder: Path) -> Path:
     """The project's own wheel, of a tree that may be written into, in `folder`."""
     _pip("wheel", "--no-deps", "--wheel-dir", str(folder), str(root))
-    (wheel,) = folder.glob("glider-*.whl")
+    (wheel,) = folder.glob("underwater_glider-*.whl")
     return wheel
 
 

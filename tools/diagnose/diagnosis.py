@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from glider.sim_backend.core.effects.catalogue import catalogue
 from glider.tools.data.runs.case import Case
+from glider.tools.data.version import software
 from glider.tools.diagnose import by_readings
 from glider.tools.diagnose.cautions import cautions, not_asked
 from glider.tools.diagnose.chain import noise_of, panels
@@ -85,8 +85,8 @@ class Diagnosis:
         """What these runs cannot say, a line each."""
         found = cautions(self.answer.search.problem)
         found += [
-            f"{label} is there ({nat:.0f} nat of evidence), but moves no channel of any window by {MATERIAL_TOLERANCES:g} of its "
-            "tolerance: no gap"
+            f"{label} is there ({nat:.0f} nat of evidence), but moves no channel of any window by "
+            f"{MATERIAL_TOLERANCES:g} of its tolerance: no gap"
             for label, nat in self.answer.negligible.items()
         ]
         if self.staged is not None:
@@ -276,11 +276,12 @@ def details(diagnosis: Diagnosis) -> Details:
     )  # fmt: skip
     return Details(
         shown=[one.title for one in pictures_of(diagnosis.readings, case.runs)],
-        format=1, version=installed(), data=data, evidence={k: float(v) for k, v in answer.gained.items()},
+        format=1, version=software().removeprefix("glider "), data=data,
+        evidence={k: float(v) for k, v in answer.gained.items()},
         corrected=in_model(diagnosis), noise=diagnosis.noise, panels=diagnosis.panels,
         findings=answer.findings, pictures=[picture(diagnosis, n) for n in drawn_runs(diagnosis)],
-        thresholds={"evidence": EVIDENCE_NEEDED, "tie": TIE, "sigma": UNCLEAN, "left": LEFT_OVER, "matters": MATERIAL_TOLERANCES},
-    )  # fmt: skip
+        thresholds={"evidence": EVIDENCE_NEEDED, "tie": TIE, "sigma": UNCLEAN, "left": LEFT_OVER, "matters":
+    MATERIAL_TOLERANCES}, )  # fmt: skip
 
 
 def in_model(diagnosis: Diagnosis) -> bool:
@@ -288,14 +289,6 @@ def in_model(diagnosis: Diagnosis) -> bool:
     answer = diagnosis.answer
     known = {*answer.search.entries(answer.hypothesis), *UNPREDICTABLE}
     return diagnosis.staged is not None or any(label in known for label in answer.selected)
-
-
-def installed() -> str:
-    """The version of this program."""
-    try:
-        return version("glider")
-    except PackageNotFoundError:
-        return "not installed"
 
 
 def drawn_runs(diagnosis: Diagnosis) -> list[int]:

@@ -198,7 +198,9 @@ def recompute_gains(search: Search, at: Hypothesis, process_noise_scale: float) 
 
 
 def first_round(search: Search) -> None:
-    """Every label tried in the filter with the largest process noise, and the likely ones led on to the vehicle's own disturbance."""
+    """Every label tried in the filter with the largest process noise, and the likely ones led on to the vehicle's own
+    disturbance.
+    """
     fitter, null = search.fitter, search.null
     fitter.linearise([null])
     tried = screen(search, null, HYPOTHESES_TRIED)

@@ -129,7 +129,8 @@ def held_out_importance(search: Search, hypothesis: Hypothesis) -> HeldOutImport
 
 
 def rank_by_importance(search: Search, hypothesis: Hypothesis, taken: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """What effects take (`ablation_importance`), by which they are ranked: of one that is worth less, the geometric mean.
+    """What effects take (`ablation_importance`), by which they are ranked: of one that is worth less, the geometric
+    mean.
 
     What a parameter makes up for nearly, as a drag coefficient does for a drag, is soon believed beside a main cause.
     """

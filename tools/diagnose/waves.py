@@ -1,4 +1,5 @@
-"""Waves distinguished from a force that nobody knows: they move the vehicle by one line of the spectrum, in all runs the same.
+"""Waves distinguished from a force that nobody knows: they move the vehicle by one line of the spectrum, in all runs
+the same.
 
 Both make the probe of moving water gain. What a force leaves goes with the legs flown, at periods of ten seconds and
 more; a sea goes with its own period.

@@ -28,6 +28,7 @@ from glider.hal.strict import ConfigError
 from glider.tools.data.boards import load_board_file
 from glider.tools.data.errors import InputError
 from glider.tools.data.sources import load_mission, load_vehicle
+from glider.tools.data.version import software
 
 LEAST_REACH = 0.5  # of an end of an actuator's range, which the board has to leave the vehicle
 SEVERITIES = dict(zip(Reaction, (DEBUG, INFO, WARN, WARN, ERROR, FATAL, FATAL), strict=True))
@@ -166,11 +167,9 @@ def log_metadata(flight: Flight, *, seed: int, effects: dict[str, dict[str, floa
 
     Called once the vehicle is armed: the entries that a replay needs are those that the flight begins with.
     """
-    from importlib.metadata import version
-
     site = flight.mission.site
     return {
-        "software": f"glider {version('glider')}",
+        "software": software(),
         "vehicle": flight.vehicle.name,
         "mission": flight.mission.name,
         "board": flight.board.name,

@@ -1,7 +1,8 @@
 """A flight watched from the laptop: what its recording process passes on, in Foxglove's WebSocket protocol.
 
-Onboard there is the socket of hal/recorder/live_stream.py and nothing else; the server is the laptop's own. Topics as in
-the log (/tick, /events), beside them /view (angles in degrees, reaction and fault in words) and /pose for a 3D panel.
+Onboard there is the socket of hal/recorder/live_stream.py and nothing else; the server is the laptop's own. Topics as
+in the log (/tick, /events), beside them /view (angles in degrees, reaction and fault in words) and /pose for a 3D
+panel.
 """
 
 import json

@@ -34,7 +34,7 @@ OUTSIDE = 0.05  # share of its range by which a measured actuator may stand outs
 
 
 @dataclass(frozen=True)
-class CommandTable:
+class CommandColumns:
     """What a command file says: n rows, each command holding from the time of its row."""
 
     times: np.ndarray  # (n,), s, increasing
@@ -72,7 +72,7 @@ def _header(names: list[str], source: str, line: int) -> dict[str, int]:
     return places
 
 
-def read_commands(text: str, source: str) -> CommandTable:
+def read_commands(text: str, source: str) -> CommandColumns:
     """A command file's text as a table; InputError with file, line and column where it cannot be flown."""
     reader = csv.reader(io.StringIO(text.removeprefix("\ufeff"), newline=""))
     places: dict[str, int] = {}
@@ -105,10 +105,10 @@ def read_commands(text: str, source: str) -> CommandTable:
         raise InputError(f"not CSV: {error}", source=source, line=reader.line_num) from None
     if not times:
         raise InputError("no rows" if places else "empty: expected a header and rows", source=source)
-    return CommandTable(np.array(times), np.array(commands), start, tuple(labels), source, tuple(lines))
+    return CommandColumns(np.array(times), np.array(commands), start, tuple(labels), source, tuple(lines))
 
 
-def check_start(P: np.ndarray, table: CommandTable) -> None:
+def check_start(P: np.ndarray, table: CommandColumns) -> None:
     """InputError where the first row holds a state that this vehicle cannot be in."""
     source, line = table.source, table.lines[0]
     for name, value in zip(VELOCITY, table.start[6:12], strict=True):
@@ -156,7 +156,7 @@ def _flown(x: np.ndarray) -> bool:
 
 def fly_commands(
     P: np.ndarray,
-    table: CommandTable,
+    table: CommandColumns,
     water: tuple[float, float] = (0.0, 0.0),
     dt: float = DEFAULT_DT,
     advance: Callable[[int], None] | None = None,
@@ -196,12 +196,12 @@ def fly_commands(
     return states
 
 
-def expected_steps(table: CommandTable, dt: float) -> float:
+def expected_steps(table: CommandColumns, dt: float) -> float:
     """About how many steps a table takes."""
     return float(table.times[-1] - table.times[0]) / dt if dt > 0.0 else 0.0
 
 
-def write_flight(table: CommandTable, states: np.ndarray) -> str:
+def write_flight(table: CommandColumns, states: np.ndarray) -> str:
     """A flight as CSV: the columns of COLUMNS; times and commands stand as they were written, states with 12 digits."""
     rows = [",".join(COLUMNS)]
     for labels, state in zip(table.labels, states, strict=True):

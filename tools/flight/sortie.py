@@ -1,7 +1,7 @@
 """The procedure of one flight, from arming to its end: the only place that opens a board, flies and closes it again.
 
-`glider fly`, the endurance flight and the trial of kills differ in their `FlightHost` (what stands around the flight) and in
-their loop. Which state follows which is said by hal/sortie; this module moves it for the flight.
+`glider fly`, the endurance flight and the trial of kills differ in their `FlightHost` (what stands around the flight)
+and in their loop. Which state follows which is said by hal/sortie; this module moves it for the flight.
 """
 
 import contextlib

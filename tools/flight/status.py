@@ -53,12 +53,12 @@ def snapshot(folder: Path) -> dict[str, Any]:
             "depth_m": values[hb.V_DEPTH_M], "pitch_deg": math.degrees(values[hb.V_PITCH_RAD]),
             "roll_deg": math.degrees(values[hb.V_ROLL_RAD]), "slider_m": values[hb.V_SLIDER_M],
             "ballast_kg": values[hb.V_BALLAST_KG], "battery_v": values[hb.V_BATTERY_V],
-            "recorder": RecorderLevel(words[hb.W_RECORDER_LEVEL]).name.lower() if words[hb.W_RECORDER_LEVEL] < 3 else "?",
-            "recorder_age_s": look.recorder_age_s, "records_written": words[hb.W_WRITTEN],
+            "recorder": RecorderLevel(words[hb.W_RECORDER_LEVEL]).name.lower() if words[hb.W_RECORDER_LEVEL] < 3 else
+            "?", "recorder_age_s": look.recorder_age_s, "records_written": words[hb.W_WRITTEN],
             "records_dropped": words[hb.W_DROPPED], "disk_errors": words[hb.W_DISK_ERRORS],
             "resident_mb": words[hb.W_RSS_BYTES] / 1e6, "descriptors": words[hb.W_FILES],
-            "ascent": AscentStage(stage).name.lower() if (stage := words[hb.W_GUARD_STAGE]) in list(AscentStage) else "blind",
-            "ascent_depth_m": values[hb.V_GUARD_DEPTH_M] if look.guard == Guard.ASCENDING else float("nan"),
+            "ascent": AscentStage(stage).name.lower() if (stage := words[hb.W_GUARD_STAGE]) in list(AscentStage) else
+            "blind", "ascent_depth_m": values[hb.V_GUARD_DEPTH_M] if look.guard == Guard.ASCENDING else float("nan"),
             "out_of_band": look.guard.name.lower(), "out_of_band_age_s": look.guard_age_s,
         }  # fmt: skip
         found["problems"] = _problems(look, alive, found)

@@ -10,9 +10,9 @@ by more than CLAIM and a flight with it bears that out. What a part takes of the
 allowed explains of the rest goes to `allowed`.
 
 Limits: columns are secants at one size, so that large effects (a stall, seconds of delay) are shared out coarsely;
-parts with nearly the same column (a servo offset, a lateral centre of gravity, a roll trim) cannot be distinguished by it,
-the first takes all; a part whose shape is not among the effects' lands in `unexplained` or in its nearest likeness. It
-names no cause.
+parts with nearly the same column (a servo offset, a lateral centre of gravity, a roll trim) cannot be distinguished by
+it, the first takes all; a part whose shape is not among the effects' lands in `unexplained` or in its nearest
+likeness. It names no cause.
 """
 
 from dataclasses import dataclass, replace

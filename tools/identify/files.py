@@ -3,7 +3,6 @@
 import datetime
 import hashlib
 import json
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from glider.sim_backend.core.effects import effect_layout as ef
 from glider.tools.data.runs.case import CASE_FILE
 from glider.tools.data.runs.csvfile import write_bytes
 from glider.tools.data.tomltext import toml_text
+from glider.tools.data.version import software
 from glider.tools.identify.pipeline import Identified
 from glider.tools.inference.corrected import corrected_text
 from glider.tools.inference.levels import DISTURBANCE
@@ -49,7 +49,7 @@ def provenance(found: Identified) -> dict[str, Any]:
     return {
         "data": data_hash(found),
         "runs": len(found.runs),
-        "revision": f"glider {version('glider')} {kernels_digest()}",
+        "revision": f"{software()} {kernels_digest()}",
         "date": datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%MZ"),
         "from_vehicle": found.case.vehicle_name,
         "parameters": [found.free.names[n] for n in listed],

@@ -26,7 +26,8 @@ FROM_START = (10.0, 1.0, LEVELS)  # where the accelerations have given first val
 UNSEEN = (100.0, 30.0, LEVELS, 10.0, LEVELS, 3.0, 1.0, LEVELS, 1.0, 1.0, LEVELS, 1.0, 1.0)  # without motion capture
 AGAIN = (1.0, LEVELS, 1.0)  # where the noise is not what the case says
 # Without motion capture a model may predict every next row and yet fly elsewhere: of the points that the steps pass,
-# from this process-noise scale on, the one is kept from which the fitted runs themselves are flown best, window by window.
+# from this process-noise scale on, the one is kept from which the fitted runs themselves are flown best, window by
+# window.
 WATCHED = 30.0
 LOOK = 10.0  # of them, the one at which runs that do not belong are looked for
 MOST_STEPS = 6  # with all runs

@@ -94,7 +94,9 @@ class TrajectoryLikelihood:
         return Linear(values, E[0], (E[1:] - E[0]) / size[:, None], gains)
 
     def step(self, at: Linear, inflation: float = 1.0) -> np.ndarray:
-        """The Gauss-Newton step from a point, or a share of it; tempered where the misfit is large, or by `inflation`."""
+        """The Gauss-Newton step from a point, or a share of it; tempered where the misfit is large, or by
+        `inflation`.
+        """
         squares = float(at.e @ at.e) / len(at.e)
         weight = min(1.0 / squares if squares > TEMPERED_ABOVE else 1.0, 1.0 / inflation)
         normal = weight * (at.J @ at.J.T) + np.eye(len(at.values))

@@ -47,8 +47,8 @@ class Quadratic:
     def tempered(self, inflation: float) -> "Quadratic":
         """The same with the likelihood's logarithm divided by `inflation`."""
         return Quadratic(
-            self.at, self.low, self.A / inflation, self.b / inflation, self.c / inflation, self.count / inflation, self.groups,
-            self.inflation * inflation,
+            self.at, self.low, self.A / inflation, self.b / inflation, self.c / inflation, self.count / inflation,
+            self.groups, self.inflation * inflation,
         )  # fmt: skip
 
     def centred(self) -> "Quadratic":

@@ -25,7 +25,8 @@ LARGEST_READING = 1e4  # rad, rad/s, m, kg: no vehicle reads more
 
 
 def without_doubled(problem: Problem) -> np.ndarray:
-    """What was measured, (rows, N_Y), less implausible samples, and less what is onboard where motion capture sees the vehicle.
+    """What was measured, (rows, N_Y), less implausible samples, and less what is onboard where motion capture sees the
+    vehicle.
 
     An offset of attitude or depth is then in the gap and not in the start, and two sensors that disagree cannot pull
     the filter apart. Where motion capture has not seen the vehicle for COAST seconds, onboard takes over.

@@ -97,11 +97,11 @@ class Problem:
         return self.kind.one_group([r.name for r, seen in zip(self.kind.readings, self.seen, strict=True) if seen])
 
     def filter(
-        self, P: np.ndarray, F: np.ndarray, process_noise_scale: float = 1.0, begin: bool = False, more=None, doubt=None,
-        speeds=None, starts=None,
+        self, P: np.ndarray, F: np.ndarray, process_noise_scale: float = 1.0, begin: bool = False, more=None,
+        doubt=None, speeds=None, starts=None,
     ) -> Gains:  # fmt: skip
-        """The filter of a model over all runs; `process_noise_scale` multiplies the disturbance; `begin` seeks the first speed
-        among `speeds`, the kind's if none are given. Nothing of the problem changes.
+        """The filter of a model over all runs; `process_noise_scale` multiplies the disturbance; `begin` seeks the
+        first speed among `speeds`, the kind's if none are given. Nothing of the problem changes.
 
         starts (runs, n_state): where other gains began, in place of the problem's; more (n_spectral,) is added to the
         spectral densities, doubt (N_Y,) to the variances of the measurements.

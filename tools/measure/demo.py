@@ -44,9 +44,8 @@ def main() -> int:
         if ahead is not None:
             ahead.wait()
     hidden = open_answers(OUT_FOLDER / "blind" / ARCHIVE).cases[CASE]["labels"]
-    print(
-        f"\nThe sealed answer: {', '.join(hidden)}. The report: {OUT_FOLDER / 'diagnosis' / 'report.html'} (opens offline)"
-    )
+    report = OUT_FOLDER / "diagnosis" / "report.html"
+    print(f"\nThe sealed answer: {', '.join(hidden)}. The report: {report} (opens offline)")
     print(f"{time.monotonic() - begin:.0f} s")
     return 0
 

@@ -1,6 +1,7 @@
 """All checks of the readings of a case, in their order, and the runs with the corrected readings.
 
-Rates are corrected before the heading is compared with them, motion capture's clock before anything is compared with it.
+Rates are corrected before the heading is compared with them, motion capture's clock before anything is compared with
+it.
 No vehicle file is read: columns and units are enough.
 """
 

@@ -5,8 +5,8 @@ its channel by MATTERS of the channel's tolerance, root mean square over the fli
 OFFSET_MATTERS, since any sensor has a bias. The tolerances are those in which gaps are counted (docs/GAP.md, Measures).
 
 SURE is far beyond a normal 5 % point: a case has some sixty comparisons, blocks are few, and what is compared is
-filtered by instruments nobody knows. With it and MATTERS no instrument of the simulated cases without a gap is falsely flagged
-(docs/READINGS.md, How often).
+filtered by instruments nobody knows. With it and MATTERS no instrument of the simulated cases without a gap is falsely
+flagged (docs/READINGS.md, How often).
 """
 
 import math

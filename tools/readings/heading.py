@@ -1,7 +1,7 @@
 """The heading against the yaw rate, and what the difference goes with.
 
-The Euler rate of the heading by the corrected rates, integrated, is what the heading should do; what it does beside, over
-a whole unbroken piece of a run, is compared with the heading itself (a compass disturbed by its own mount), with
+The Euler rate of the heading by the corrected rates, integrated, is what the heading should do; what it does beside,
+over a whole unbroken piece of a run, is compared with the heading itself (a compass disturbed by its own mount), with
 pitch and roll (a tilt that is not compensated) and with the actuators' positions (iron or currents that move).
 """
 

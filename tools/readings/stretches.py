@@ -1,8 +1,8 @@
 """Stretches of a run in which the vehicle does not fly: at the surface, lying still, hauled or handled.
 
 They are left out of every comparison and said as findings. A vehicle at the surface moves on the waves and is held up
-by what is out of the water; one on the bottom, in a net or against a wall does not move though it is commanded to; one in
-somebody's hands turns faster than it can by itself.
+by what is out of the water; one on the bottom, in a net or against a wall does not move though it is commanded to; one
+in somebody's hands turns faster than it can by itself.
 """
 
 import numpy as np

@@ -166,7 +166,9 @@ def _readable(
 
 @dataclass(frozen=True)
 class OneCommand:
-    """`glider WORDS CASE --out ... OPTIONS` of any case, for `run_batch`; files that it names beside the case go along."""
+    """`glider WORDS CASE --out ... OPTIONS` of any case, for `run_batch`; files that it names beside the case go
+    along.
+    """
 
     words: Sequence[str]
     answer: str

@@ -1,7 +1,7 @@
 """Runs that are noisier than the reference: which link of the chain shakes, and whether it is the water.
 
-The time history of turbulence or waves is unpredictable, and an effect that nobody knows has no course either that a fit
-could find; but the likelihood that a noise probe gains in a run, beyond what it gains in the reference, says where.
+The time history of turbulence or waves is unpredictable, and an effect that nobody knows has no course either that a
+fit could find; but the likelihood that a noise probe gains in a run, beyond what it gains in the reference, says where.
 """
 
 from collections.abc import Sequence
@@ -20,7 +20,9 @@ FAR_BEHIND = 50.0  # nat behind its best: a probe is not tried at larger scales
 
 
 def probe_gains(flights: RunEnsemble, wanted: Sequence[NoiseProbe], runs: Sequence[int]) -> np.ndarray:
-    """Nat over the variance inflation that probes gain in runs at the models that they fly by, (probes, runs, scales)."""
+    """Nat over the variance inflation that probes gain in runs at the models that they fly by, (probes, runs,
+    scales).
+    """
     gains = np.zeros((len(wanted), len(runs), len(SCALES)))
     for j, n in enumerate(runs):
         part = flights.parts[n]

@@ -110,7 +110,9 @@ class RunEnsemble:
         return bounded_step(tempered.curvature + self.certainty, tempered.slope, low, high)
 
     def own_cost(self, part: Problem, x: np.ndarray) -> float:
-        """-2 log likelihood over the variance inflation of a run, as `part` knows it, at its most probable values about x."""
+        """-2 log likelihood over the variance inflation of a run, as `part` knows it, at its most probable values
+        about x.
+        """
         one = expand(part, self.shared, x)
         own = one.at + self.deviation_of(one)
         return float(part.filter(*self.shared.model(part, own), begin=True).misfit[0]) / self.inflation

@@ -15,7 +15,8 @@ from glider.tools.watch.lasting import Lasting, lasting
 CLEAN_RUN_NAT = 5.0  # nat that a run that is not rough takes off disorder that would hold there too
 LEAST_COSINE = 0.01  # cosine of two labels' columns, below which they have nothing to do with each other
 FURTHER_EVENT_SHARE = 0.15  # of what an event explains in the same runs, that a further event there has to bring
-UNRELATED_EVENT_SHARE = 0.5  # of what is left there, that one that is not confounded has to bring: what a form leaves may look like anything
+# of what is left there, that one that is not confounded has to bring: what a form leaves may look like anything
+UNRELATED_EVENT_SHARE = 0.5
 
 
 @dataclass

@@ -70,7 +70,9 @@ def values_of(shared: SharedParameters, label: str, at: np.ndarray, weight: floa
 def cost_of(
     runs: Affected, shared: SharedParameters, label: str, size: np.ndarray, process_noise_scale: float = 1.0
 ) -> float:
-    """-2 log likelihood of the runs with a change of this size, by its own filters, over the variance inflation; and the prior's."""
+    """-2 log likelihood of the runs with a change of this size, by its own filters, over the variance inflation; and
+    the prior's.
+    """
     found = float(size @ size)
     for part, weight, at, inflation in runs.each():
         model = shared.model(part, values_of(shared, label, at, weight, size))

@@ -156,8 +156,8 @@ def adapt_process_noise(nav, scores, dt):
     """Adapt the process noise to the water: the gyro's squared innovations over their variance average 1 where it fits.
 
     A filter with the noise of calm water lags behind rough water, and one with that of rough water hands the gyro's
-    noise on. The noise scale multiplies the disturbance's strength, and its square the spectral densities; it moves by the
-    scores' logarithm, so that one wild sample does little, and never below what the vehicle file says.
+    noise on. The noise scale multiplies the disturbance's strength, and its square the spectral densities; it moves by
+    the scores' logarithm, so that one wild sample does little, and never below what the vehicle file says.
     """
     total, count = 0.0, 0.0
     for i in range(kf.Z_P, kf.Z_R + 1):

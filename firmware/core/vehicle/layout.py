@@ -1,8 +1,8 @@
 """Where each parameter stands in the parameter vector `P` and each state in the state vector `x` of the kernels.
 
 Kernels take plain float64 vectors, so that a batch of vehicles is a matrix and a derivative a difference of two
-vectors. These names are the only way in: `glider.firmware.model` fills the vector from a vehicle file by the same names.
-Units are SI and radians throughout.
+vectors. These names are the only way in: `glider.firmware.model` fills the vector from a vehicle file by the same
+names. Units are SI and radians throughout.
 """
 
 # --- P: the vehicle -------------------------------------------------------------------------------------------------

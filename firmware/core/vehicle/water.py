@@ -47,7 +47,8 @@ def water_wrench(P, u, v, w, p, q, r):
 
     D = (K_D0 + K_D alpha^2) V^2, SF = K_beta beta V^2, L = (K_L0 + K_L alpha) V^2 (ledger L4; K_L alpha^2 with
     LIFT_PRINTED), T_DL1 = (K_MR beta + K_p p) V^2, T_DL2 = (K_M0 + K_M alpha + K_q q) V^2,
-    T_DL3 = (K_MY beta + K_r r) V^2; beside the paper's terms D_p p, D_q q, D_r r on the body's axes, which damp at rest too.
+    T_DL3 = (K_MY beta + K_r r) V^2; beside the paper's terms D_p p, D_q q, D_r r on the body's axes, which damp at
+    rest too.
     """
     alpha, beta, v_squared = flow_angles(u, v, w)
     drag = (P[layout.K_D0] + P[layout.K_D] * alpha * alpha) * v_squared

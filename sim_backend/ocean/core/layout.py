@@ -56,7 +56,7 @@ N_SPECTRAL = 4
 
 DRAG_PRESSURE = 32.0  # Pa, q at 0.25 m/s
 PASCALS_A_METRE = 1.0e4  # of seawater, for the hull's compression
-SLOWEST = 0.005  # m/s; a vehicle that stands still has no angle of attack
+LEAST_FLOW_SPEED = 0.005  # m/s; a vehicle that stands still has no angle of attack
 UNSTEADY_WALK = 0.05**2 * 10.0  # m2/s added to the walk of the depth where the vehicle does not fly steadily
 UNSTEADY_SPEED = 0.05**2 / 10.0  # (m/s)2/s, the same of the speed
 STEEPEST_ANGLE = 0.25  # rad, largest angle of attack looked for

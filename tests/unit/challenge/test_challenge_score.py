@@ -72,7 +72,8 @@ def test_log_loss_closed_and_seconds(cases):
 
 
 def test_no_answer_is_wrong_wherever_it_counts():
-    cases = [ScoredCase("a", truth(places=()), None), ScoredCase("b", truth("drag"), None), ScoredCase("c", truth("unknown"), None),
+    cases = [ScoredCase("a", truth(places=()), None), ScoredCase("b", truth("drag"), None), ScoredCase("c",
+    truth("unknown"), None),
              ScoredCase("d", truth("drag", "net_buoyancy"), None)]  # fmt: skip
     found = counted(cases)
     assert found["no_gap_called_gap"] == (1, 1)

@@ -30,7 +30,7 @@ def tree_of(path: Path) -> ast.Module:
 
 
 def module_name(path: Path) -> str:
-    return ".".join(path.relative_to(ROOT).with_suffix("").parts)
+    return "glider." + ".".join(path.relative_to(ROOT).with_suffix("").parts)
 
 
 def numbers_a_row(statement: ast.stmt) -> bool:

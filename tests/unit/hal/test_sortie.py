@@ -74,8 +74,8 @@ TARGETS = {
 TO_REST = ((SortieState.SURFACED, Trigger.END), (SortieState.ARMED, Trigger.DISARM))
 COURSE = (
     (SortieState.ARMED, Trigger.DISARM), (SortieState.ARMED, Trigger.START), (SortieState.ASCENDING, Trigger.START),
-    (SortieState.DIVING, Trigger.FINISH), (SortieState.ASCENDING, Trigger.FINISH), (SortieState.ASCENDING, Trigger.SURFACE),
-    (SortieState.SURFACED, Trigger.END),
+    (SortieState.DIVING, Trigger.FINISH), (SortieState.ASCENDING, Trigger.FINISH), (SortieState.ASCENDING,
+    Trigger.SURFACE), (SortieState.SURFACED, Trigger.END),
 )  # fmt: skip
 
 

@@ -151,16 +151,12 @@ def test_the_process_loads_the_standard_library_and_pyserial_alone():
     code = "import sys, glider.hal.outofband.guard; print(*sorted({m.split('.')[0] for m in sys.modules}))"
     done = subprocess.run([sys.executable, "-S", "-c", PATHS + code], capture_output=True, check=True, text=True)
     loaded = set(done.stdout.split())
-    assert loaded - set(sys.stdlib_module_names) <= {"__main__", "hal", "serial", "sitecustomize"}
-    mine = "import sys, glider.hal.outofband.guard; print(*sorted(m for m in sys.modules if m.startswith('hal.')))"
+    assert loaded - set(sys.stdlib_module_names) <= {"__main__", "glider", "serial", "sitecustomize"}
+    mine = (
+        "import sys, glider.hal.outofband.guard; print(*sorted(m for m in sys.modules if m.startswith('glider.hal.')))"
+    )
     done = subprocess.run([sys.executable, "-c", mine], capture_output=True, check=True, text=True)
-    wanted = {
-        "glider.hal.heartbeat",
-        "glider.hal.notify",
-        "glider.hal.realtime",
-        "glider.hal.sortie",
-        "glider.hal.state_file",
-    }
+    wanted = {f"glider.hal.{name}" for name in ("heartbeat", "notify", "realtime", "sortie", "state_file")}
     assert {name for name in done.stdout.split() if not name.startswith("glider.hal.outofband")} == wanted
 
 

@@ -66,6 +66,6 @@ def test_nothing_to_share_out():
 
 
 def test_a_link_counts_once_with_its_best():
-    assert ordered([LinkRecord("sensor", "gyro", 0.2), LinkRecord("command", "delay", 0.1), LinkRecord("sensor", "gyro", 0.7)]) == [
-        LinkRecord("command", "delay", 0.1), LinkRecord("sensor", "gyro", 0.7)
+    assert ordered([LinkRecord("sensor", "gyro", 0.2), LinkRecord("command", "delay", 0.1), LinkRecord("sensor",
+        "gyro", 0.7)]) == [ LinkRecord("command", "delay", 0.1), LinkRecord("sensor", "gyro", 0.7)
     ]  # fmt: skip

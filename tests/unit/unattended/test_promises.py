@@ -114,7 +114,8 @@ def test_a_heartbeats_folder_of_somebody_else_is_refused(open_folder):
         pytest.skip("only root can give a folder away")
     tmp_path = open_folder
     os.chown(tmp_path, 12345, 12345)
-    code = "import os, sys\nfrom glider.hal.heartbeat import Heartbeat\nos.setuid(54321)\nHeartbeat.create(sys.argv[1], 0.02)"
+    code = "import os, sys\nfrom glider.hal.heartbeat import Heartbeat\nos.setuid(54321)\n"
+    code += "Heartbeat.create(sys.argv[1], 0.02)"
     tmp_path.chmod(0o777)
     done = subprocess.run([sys.executable, "-c", code, str(tmp_path)], cwd=ROOT, capture_output=True, text=True)
     assert "belongs to somebody else" in done.stderr

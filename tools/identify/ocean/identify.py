@@ -228,14 +228,14 @@ def strata(run: Run) -> np.ndarray:
 def covariance(found: list[Expansion], shared: SharedParameters, least_inflation: float = 1.0) -> np.ndarray:
     """Of the most probable values about the true ones, (count, count) in spreads: N^-1 (prior + J) N^-1, a sandwich.
 
-    N: the precision that the values were found by, evidence over the variance inflation and prior. J: by how much the runs' pulls
-    vary from chance, over the squared variance inflation; in each direction the largest of three:
+    N: the precision that the values were found by, evidence over the variance inflation and prior. J: by how much the
+    runs' pulls vary from chance, over the squared variance inflation; in each direction the largest of three:
     - what the noise levels say;
     - how the pulls of whole runs differ, from run to run;
     - how those of all runs together differ from stratum to stratum of way and depth, as the form of the model makes
       them where it is wrong alike in every run: no number of runs makes that smaller.
-    The variance inflation keeps the values of real vehicles within what is physical, and is no measure of how wrong they are: on twin
-    missions, whose form is nearly right, it is half again too large.
+    The variance inflation keeps the values of real vehicles within what is physical, and is no measure of how wrong
+    they are: on twin missions, whose form is nearly right, it is half again too large.
     """
     noise = inflation_of(found)
     inflation, prior = max(least_inflation, noise), np.diag(shared.prior**-2.0)

@@ -65,7 +65,8 @@ def _oil(one: FlownRange) -> str:
 
 
 def _depth(one: FlownRange) -> str:
-    return f"command two dives to {RANGE_SHARE * one.depth:.0f} m (they went to {one.depth:.0f} m), pitch and oil as before"
+    shallower = RANGE_SHARE * one.depth
+    return f"command two dives to {shallower:.0f} m (they went to {one.depth:.0f} m), pitch and oil as before"
 
 
 def _speed(one: FlownRange) -> str:

@@ -51,7 +51,9 @@ def model_error_columns(drift, dt, Gam, Phi):
 
 @allocating_kernel
 def add_model_error(P, sigma, x, share, work, cov):
-    """A share of the accelerations' covariance that parameters of 1 sigma (N_P) leave at x, to the model error's in cov."""
+    """A share of the accelerations' covariance that parameters of 1 sigma (N_P) leave at x, to the model error's in
+    cov.
+    """
     point, C, Pt, g = work[0], np.empty((6, 6)), np.empty(N_P), work[1]
     _, _, _, _, _, _, point[0], point[1], point[2] = rotation(x)
     for n in range(N_X - X_NU):

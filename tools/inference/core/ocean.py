@@ -224,7 +224,9 @@ def fly_followed(Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, 
 
 @parallel_kernel
 def simulate_runs(P, F, spectral, R, modes, bounds, t, inputs, starts, disturbance_draws, noise, Z):
-    """What would be measured, were (P, F) the truth: Z (rows, N_Y); disturbance_draws (rows, N_SPECTRAL), noise (rows, N_Y)."""
+    """What would be measured, were (P, F) the truth: Z (rows, N_Y); disturbance_draws (rows, N_SPECTRAL), noise
+    (rows, N_Y).
+    """
     for run in prange(len(bounds) - 1):
         begin = bounds[run]
         x, Phi, cov = starts[run].copy(), np.empty((N_ERR, N_ERR)), np.zeros((N_ERR, N_ERR))

@@ -1,1 +1,1 @@
-"""Figures of the docs, each by `python -m glider.tools.measure.figures.NAME`: measured again whenever the code has changed."""
+"""Figures of the docs, each by `python -m glider.tools.measure.figures.NAME`: measured again when the code changes."""

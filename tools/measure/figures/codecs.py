@@ -1,5 +1,5 @@
-"""`python -m glider.tools.measure.figures.codecs`: damaged bytes through every codec (tools/study/faults/damaged_streams.py);
-prints their outcomes as JSON."""
+"""`python -m glider.tools.measure.figures.codecs`: damaged bytes through every codec
+(tools/study/faults/damaged_streams.py); prints their outcomes as JSON."""
 
 import random
 from dataclasses import asdict

@@ -1,4 +1,4 @@
-"""`python -m glider.tools.measure.figures.devices`: what is claimed of the real drivers, measured against twins, as JSON.
+"""`python -m glider.tools.measure.figures.devices`: claims about the real drivers, measured against twins, as JSON.
 
 same-flight: a mission at real time through drivers, wires and twins, against the same seed on the simulated board
 with the same rates and delays. lateness: the tick's lateness while a device is silent, late, babbling or unplugged,

@@ -1,4 +1,4 @@
-"""`python -m glider.tools.measure.figures.unattended`: what is claimed of flights that nobody watches, measured, as JSON.
+"""`python -m glider.tools.measure.figures.unattended`: claims about unattended flights, measured, as JSON.
 
 kills: a flight killed (-9) at random instants and started again, by the rule that `glider fly` goes by (tools/
 unattended.py Life): how many dives were resumed. power-cuts: a log of a flight cut at every byte: what is read of it.
@@ -155,8 +155,8 @@ def _in_child(flight: Any, folder: Path, kill_after_s: float | None) -> FlightRe
 
 
 def _live(flight: Any, folder: Path, pipe: int) -> None:
-    """What `glider fly` does between its start and its end, on the simulated board; each step is reported through a pipe:
-    armed, diving, first tick flown, loop over (`E`), ended (`X`); refused, under way at the start."""
+    """What `glider fly` does between its start and its end, on the simulated board; each step is reported through a
+    pipe: armed, diving, first tick flown, loop over (`E`), ended (`X`); refused, under way at the start."""
     from glider.firmware.core.layouts import control_layout as ctl
     from glider.hal.ports import BoardError
     from glider.hal.recorder.recorder import NullRecorder

@@ -7,7 +7,8 @@ import msgspec
 import numpy as np
 
 from glider.firmware.core.jit import kernels_digest
-from glider.tools.study.campaign.plan import CampaignPlan, software
+from glider.tools.data.version import release
+from glider.tools.study.campaign.plan import CampaignPlan
 from glider.tools.study.campaign.worlds import draw_world
 
 
@@ -20,7 +21,7 @@ def fingerprint(plan: CampaignPlan) -> str:
     digest = hashlib.sha256()
     for part in (plan.campaign, plan.board):
         digest.update(msgspec.json.encode(part))
-    digest.update(f"{software()} {kernels_digest()}".encode())
+    digest.update(f"{release()} {kernels_digest()}".encode())
     for name in ("flights.py", "worlds.py"):  # what is counted, and how worlds are drawn
         digest.update(Path(__file__).with_name(name).read_bytes())
     for number, mission in enumerate(plan.missions):

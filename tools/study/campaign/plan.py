@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -186,8 +185,3 @@ def build_plan(campaign: Campaign, base: Path | None = None) -> CampaignPlan:
         for controller in campaign.controllers:
             plan.pilot(number, controller)  # refuses what the vehicle cannot do
     return plan
-
-
-def software() -> str:
-    """This program's version."""
-    return f"glider {version('glider')}"

@@ -11,8 +11,9 @@ import numpy as np
 
 from glider.firmware.core.jit import kernels_digest
 from glider.tools.data.errors import InputError
+from glider.tools.data.version import release
 from glider.tools.study.campaign.flights import COLUMNS, Chunk
-from glider.tools.study.campaign.plan import CampaignPlan, software
+from glider.tools.study.campaign.plan import CampaignPlan
 
 MANIFEST = "campaign.json"
 UNFINISHED = ".part"
@@ -56,7 +57,7 @@ class Store:
             raise InputError("is there already and holds no campaign: name another with --out", source=folder)
         folder.mkdir(parents=True, exist_ok=True)
         manifest = Manifest(
-            1, fingerprint, software(), kernels_digest(), chunk, list(COLUMNS), msgspec.to_builtins(plan.campaign)
+            1, fingerprint, release(), kernels_digest(), chunk, list(COLUMNS), msgspec.to_builtins(plan.campaign)
         )
         write_whole(path, json.dumps(msgspec.to_builtins(manifest), indent=1).encode())
 
@@ -67,7 +68,7 @@ class Store:
         except msgspec.DecodeError as error:
             raise InputError(f"not a campaign's manifest: {error}", source=path) from None
         if found.fingerprint != self.fingerprint:
-            own = software(), kernels_digest()
+            own = release(), kernels_digest()
             other = (found.software, found.kernels) != own
             what = f"other software ({found.software}, kernels {found.kernels})" if other else "another campaign"
             raise InputError(f"holds flights of {what}: name another folder with --out", source=self.folder)

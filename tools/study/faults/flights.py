@@ -352,11 +352,11 @@ def conditions() -> list[FaultCase]:
         FaultCase(sup.FAULT_LOOP_HUNG, "restarted", nothing, ABORT, 0.02, ("waiting",), Setting(restarted=True)),
         FaultCase(sup.FAULT_DISK, "recorder drops", informed(sup.RECORDER, 1.0), LOG, 0.0),
         FaultCase(sup.FAULT_DISK, "recorder failed", informed(sup.RECORDER, 2.0), WARN, 0.0),
-        FaultCase(sup.FAULT_GROWTH, "handles are not given back", handles(130), WARN, 60.0, UNDER_WAY, Setting(hold_s=30.0)),
-        FaultCase(sup.FAULT_GROWTH, "handles, without end", handles(260), ABORT, 60.0, UNDER_WAY, Setting(hold_s=30.0)),
-        FaultCase(sup.FAULT_GROWTH, "memory is not given back", memory(70), WARN, 60.0, ("descent",), Setting(hold_s=30.0)),
-        FaultCase(sup.FAULT_GROWTH, "memory, without end", memory(160), ABORT, 60.0, ("descent",), Setting(hold_s=30.0)),
-    ]  # fmt: skip
+        FaultCase(sup.FAULT_GROWTH, "handles are not given back", handles(130), WARN, 60.0, UNDER_WAY,
+        Setting(hold_s=30.0)), FaultCase(sup.FAULT_GROWTH, "handles, without end", handles(260), ABORT, 60.0,
+        UNDER_WAY, Setting(hold_s=30.0)), FaultCase(sup.FAULT_GROWTH, "memory is not given back", memory(70), WARN,
+        60.0, ("descent",), Setting(hold_s=30.0)), FaultCase(sup.FAULT_GROWTH, "memory, without end", memory(160),
+    ABORT, 60.0, ("descent",), Setting(hold_s=30.0)), ]  # fmt: skip
     return cases
 
 

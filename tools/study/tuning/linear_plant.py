@@ -42,8 +42,8 @@ def _glide(degrees: float) -> Trim:
     return Trim(math.radians(degrees), -math.copysign(0.1, degrees))
 
 
-# The glides that the rule tunes about, and the others that its margins are stated at: the paper's pitch targets, and the
-# vehicle at rest, where every manoeuvre begins and a change of depth ends.
+# The glides that the rule tunes about, and the others that its margins are stated at: the paper's pitch targets, and
+# the vehicle at rest, where every manoeuvre begins and a change of depth ends.
 DESIGN_TRIMS = (_glide(-20.0), _glide(20.0))
 OTHER_TRIMS = (Trim(0.0, 0.0), *(_glide(degrees) for degrees in (-10.0, 10.0, -30.0, 30.0, -45.0, 45.0)))
 
