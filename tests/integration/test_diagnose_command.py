@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from support.cases import make_case
+from support.commands import glider as run_glider
 
 from glider.sim_backend.core.effects import effect_layout as ef
 from glider.tools.cli.common import report_errors
@@ -154,9 +155,37 @@ def test_a_vehicle_that_does_not_fit_is_to_be_identified_first(tmp_path, capsys)
     assert answer["verdict"] != "none"
     assert "note: no commands" in said.err
     assert "note: one run only" in said.err
-    assert answer["gap"]["shrinkage"]["ci90"] == [None, None]
+    for share in ("shrinkage", "closed"):  # of runs left out, of which there is none
+        assert answer["gap"][share] == {"value": None, "ci90": [None, None]}
+    page = (tmp_path / "out" / "report.html").read_text()
+    for text in (*answer["cautions"], page, said.err):
+        assert "left out" not in text
+        assert "without run00" not in text
     assert answer["stages"][0]["stage"] == "nominal"
     assert answer["stages"][-1]["gap"]["total"] < 0.5 * answer["stages"][0]["gap"]["total"]
+
+
+def test_the_first_diagnosis_of_the_readme_contradicts_itself_nowhere(tmp_path):
+    """One flight of the shipped vehicle: 25 Hz sensors in a log of 50 Hz, afloat on its tail in the end."""
+    for words in (
+        ("fly", "--mission", "spiral"), ("log", "export", "spiral-001.mcap"),
+        ("gap", "diagnose", "spiral-001", "--out", "answer"),
+    ):  # fmt: skip
+        done = run_glider(*words, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+    sentence, *verdict = done.stdout.splitlines()
+    assert sentence.startswith("No gap: noise, disturbance and parameters within their uncertainty explain these runs")
+    assert "; the total of this run, to which all was fitted, is " in sentence
+    assert verdict[0] == "verdict: none"
+    assert verdict[1].endswith("  none")
+    assert "verdict: none (no candidate earned its place)" in done.stderr
+    answer = json.loads((tmp_path / "answer" / "diagnosis.json").read_text())
+    assert [one["finding"] for one in answer["readings"]] == ["not_flying"]
+    assert answer["gap"]["shrinkage"]["value"] is None
+    page = (tmp_path / "answer" / "report.html").read_text()
+    for text in (sentence, done.stderr, page, *answer["cautions"]):
+        for wrong in ("runs left out", "without this run", "without it", "missing", "unknown to", "closed"):
+            assert wrong not in text
 
 
 def test_time_that_runs_back_is_one_line_with_its_place(tmp_path, capsys):

@@ -1,5 +1,7 @@
 """A small case from files to its report, and the report in a real browser at a phone's width."""
 
+import contextlib
+import io
 import json
 import re
 import shutil
@@ -60,12 +62,10 @@ def glider(*words: object) -> int:
 
 @pytest.fixture(scope="module")
 def said(folder) -> str:
-    """What the command says on standard error; its files lie in `answer` beside the case."""
-    with pytest.MonkeyPatch.context() as patch:
-        lines: list[str] = []
-        patch.setattr("glider.tools.cli.gap.say", lines.append)
+    """What the command prints on standard output; its files lie in `answer` beside the case."""
+    with contextlib.redirect_stdout(io.StringIO()) as out:
         assert glider("gap", "diagnose", folder, "--out", folder.parent / "answer") == 0
-    return "\n".join(lines)
+    return out.getvalue()
 
 
 @pytest.fixture(scope="module")
@@ -78,19 +78,27 @@ def test_the_cause_is_found_and_said(folder, said):
     assert found["verdict"] == "cause"
     assert found["selected"][0] == "net_buoyancy"
     assert "the vehicle is ballasted heavy or light (net_buoyancy, mass: net" in said.lower()
+    mass = found["causes"][0]["parameters"]["mass"]["estimate"]
+    assert f"mass {1000.0 * mass:.1f} g, 90 %: " in said
+    assert "heavy positive" in said
+    _, verdict, first, *_, gaps = said.strip().splitlines()
+    assert verdict == f"verdict: cause, {', '.join(found['selected'])}"
+    assert first.split()[:2] == [f"{found['causes'][0]['probability']:.2f}", "net_buoyancy"]
+    assert gaps.startswith(f"gap in tolerances: before {found['gap']['before']['total']:.2f}, recalibrated ")
     case = load_case(folder)
     load_corrected(folder.parent / "answer" / "corrected.toml", nominal_model(case))
     low, high = found["causes"][0]["parameters"]["mass"]["ci90"]
     assert low < HEAVY < high or abs(found["causes"][0]["parameters"]["mass"]["estimate"] - HEAVY) < 0.02
 
 
-def test_it_is_drawn_again_from_what_is_on_disk(folder, page, tmp_path):
-    """Also where the case has moved: the folder holds what the pictures show."""
+def test_it_is_drawn_again_from_what_is_on_disk(folder, said, page, tmp_path, capsys):
+    """Also where the case has moved: the folder holds what the pictures show. The verdict is printed again."""
     again = tmp_path / "again"
     shutil.copytree(folder.parent / "answer", again)
     (again / "report.html").unlink()
     assert glider("gap", "report", again) == 0
     assert (again / "report.html").read_bytes() == page.encode()
+    assert capsys.readouterr().out == said
 
 
 @pytest.mark.parametrize(

@@ -65,10 +65,10 @@ def campaign(campaign, design, out, jobs, dask, chunk, as_json, **options) -> No
     from glider.tools.data.errors import need
 
     need("campaign")
+    from glider.tools.data.files import check_writable, write_bytes
     from glider.tools.study.campaign.conduct import FLIGHTS_FILE, fly_campaign, write_flights
     from glider.tools.study.campaign.picture import write_page
     from glider.tools.study.campaign.plan import build_plan, load_campaign, with_options
-    from glider.tools.study.campaign.store import write_whole
     from glider.tools.study.campaign.summary import summarise
 
     wanted, base = load_campaign(campaign)
@@ -76,6 +76,7 @@ def campaign(campaign, design, out, jobs, dask, chunk, as_json, **options) -> No
     wanted = with_options(wanted, given)
     plan = build_plan(wanted, base)
     folder = out or Path(f"{wanted.name}-campaign")
+    check_writable(folder)
     compile_campaign()
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)  # or its processes would outlive it
     try:
@@ -89,7 +90,7 @@ def campaign(campaign, design, out, jobs, dask, chunk, as_json, **options) -> No
     write_flights(folder / FLIGHTS_FILE, flown)
     write_page(folder / "campaign.html", flown)
     result = {**summarise(flown), "folder": str(folder), "picture": str(folder / "campaign.html")}
-    write_whole(folder / "summary.json", msgspec.json.format(msgspec.json.encode(result), indent=1))
+    write_bytes(folder / "summary.json", msgspec.json.format(msgspec.json.encode(result), indent=1))
     if as_json:
         print_json(result)
     else:
@@ -101,6 +102,7 @@ def _make_runs(folder: Path, options: dict[str, Any], as_json: bool) -> None:
     import json
 
     from glider.tools.data.errors import InputError, need
+    from glider.tools.data.files import check_writable, write_bytes
     from glider.tools.data.sources import load_vehicle
     from glider.tools.identify.design import grid, truth, write_design
 
@@ -111,8 +113,9 @@ def _make_runs(folder: Path, options: dict[str, Any], as_json: bool) -> None:
     if given:
         raise InputError(f"--{given[0].replace('_', '-')} means nothing with --design", source="options")
     wanted, seed = options["vehicle"] or "roughie", options["first_seed"] or 0
+    check_writable(folder)
     world = write_design(folder, wanted, load_vehicle(wanted), seed)
-    (folder / "truth.json").write_text(json.dumps(truth(world), indent=1) + "\n", encoding="utf-8")
+    write_bytes(folder / "truth.json", (json.dumps(truth(world), indent=1) + "\n").encode())
     if as_json:
         print_json({"case": str(folder), "runs": len(grid()), "seed": seed, "truth": truth(world)})
     else:

@@ -43,6 +43,7 @@ def make(
     unchanged: int | None, runs: int | None, reference: int | None,
 ) -> None:  # fmt: skip
     """Draw, fly and seal a blind test. Cases that are there are kept: call again to go on after a stop."""
+    from glider.tools.data.files import check_writable
     from glider.tools.study.challenge.make import Order
     from glider.tools.study.challenge.make import make as make_all
     from glider.tools.study.challenge.ocean_make import OceanOrder
@@ -53,6 +54,7 @@ def make(
     from glider.tools.study.challenge.watch_plan import LEAST_WATCHED, WatchCounts
 
     _check_kind(watch, ocean, form)
+    check_writable(out)
     if form:
         from glider.tools.study.challenge.form_make import FormOrder
         from glider.tools.study.challenge.form_plan import FormCounts
@@ -118,10 +120,12 @@ def run(
 
     What stands after `--` is handed on to `gap diagnose`. A case's time counts its whole process.
     """
+    from glider.tools.data.files import check_writable
     from glider.tools.study.challenge.diagnose_all import DIAGNOSIS, FORM, MISSION, WATCH, count_cases
     from glider.tools.study.challenge.diagnose_all import run as run_all
 
     need_for(jobs, dask)
+    check_writable(out)
     _check_kind(watch, ocean, form)
     kind = (MISSION if ocean else WATCH) if watch else FORM if form else DIAGNOSIS
     with progress("diagnosed", len(set(only)) or count_cases(cases)) as advance:

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from glider.tools.data.errors import BAD_INPUT, DONE, FAILED, InputError, MissingExtra, missing_extra
+from glider.tools.data.errors import BAD_INPUT, DONE, FAILED, STOPPED, InputError, MissingExtra, missing_extra
 from glider.tools.data.plain import as_plain
 
 vehicle_option = click.option(
@@ -97,9 +97,12 @@ def report_errors(command: click.Command) -> int:
     except click.ClickException as error:
         error.show()
         return BAD_INPUT
-    except click.Abort:
+    except click.Abort as error:
+        if isinstance(error.__context__, EOFError):
+            say("glider: the input ended before all was asked")
+            return BAD_INPUT
         say("stopped")
-        return FAILED
+        return STOPPED
     except (ConfigError, InputError, MissingExtra) as error:
         say(f"glider: {error}")
         return BAD_INPUT
@@ -109,13 +112,13 @@ def report_errors(command: click.Command) -> int:
             raise
         say(f"glider: {missing}")
         return BAD_INPUT
-    except OSError as error:
-        if error.filename is None:
-            raise
-        say(f"glider: {error.filename}: {error.strerror}")
-        return BAD_INPUT
     except BrokenPipeError:
         return DONE
+    except OSError as error:
+        where = "" if error.filename is None else f"{error.filename}: "
+        with contextlib.suppress(OSError):
+            say(f"glider: {where}{error.strerror or error}")
+        return BAD_INPUT
     except SystemExit as error:
         return int(error.code or 0) if not isinstance(error.code, str) else FAILED
     return DONE

@@ -25,6 +25,9 @@ def og1(case: Path, out: Path, answers: tuple[Path, ...], as_json: bool) -> None
     from glider.tools.data.errors import need
 
     need("ocean")
+    from glider.tools.data.files import check_writable
+
+    check_writable(out.parent)
     from glider.tools.data.exporters.og1 import export_og1
 
     found = export_og1(case, out, list(answers))

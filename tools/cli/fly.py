@@ -79,7 +79,7 @@ def fly(
 
     The first Ctrl-C gives the dive up and surfaces, the second stops at once. On devices, arming is confirmed at the
     terminal, a second Ctrl-C under water wants a third, and a flight that broke off is never resumed: the next start
-    only brings the vehicle up. Exit code 1: the flight did not complete.
+    only brings the vehicle up. Exit code 1: the flight, or its log, is not complete.
     """
     from glider.firmware.core.layouts.control_layout import LEG
     from glider.firmware.runtime import Ending
@@ -177,6 +177,8 @@ def fly(
             "dropped": report.dropped,
             "complete": report.complete,
             "parts": report.parts,
+            "error": report.error,
+            "readable_s": None if path is None or report.complete else readable_s(path),
         },
         "real_time": options.said,
     }
@@ -185,7 +187,20 @@ def fly(
         print_json(result)
     else:
         _tell(result)
-    raise SystemExit(DONE if completed else FAILED)
+    # A recording process that was replaced has left a log in parts, and half a second missing.
+    recorded = report.complete or (report.parts > 1 and not report.error)
+    raise SystemExit(DONE if completed and recorded else FAILED)
+
+
+def readable_s(log: Path) -> float:
+    """Seconds of a flight that can be read from its log, parts included; 0 where it is no log."""
+    from glider.tools.data.errors import InputError
+    from glider.tools.data.log.parts import read_flight
+
+    try:
+        return read_flight(log).duration_s
+    except (InputError, OSError):
+        return 0.0
 
 
 class RealTimeOptions:
@@ -271,6 +286,10 @@ def _tell(result: dict) -> None:
         if records["dropped"]:
             say(f"{records['dropped']} records dropped")
     elif not records["complete"]:
-        say(f"the log is not complete: {records['dropped']} records dropped")
+        why = f" ({records['error']})" if records["error"] else ""
+        say(
+            f"the log is not complete{why}: {records['readable_s']:.1f} of {result['seconds']:.1f} s can be read from "
+            f"it, {records['dropped']} records were dropped"
+        )
     if result["log"]:
         click.echo(result["log"])

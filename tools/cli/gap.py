@@ -2,6 +2,7 @@
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -11,6 +12,7 @@ from glider.tools.cli.many import cases_argument, is_many, run_batch_command
 from glider.tools.cli.readings import readings
 from glider.tools.cli.watch import watch
 
+CAUSES, LEAST = 4, 0.01  # shown of a diagnosis at most; the probability of one that is shown
 STEPS = 7  # of a diagnosis: screen, up to three effects, verdict, how far, report
 
 
@@ -31,18 +33,21 @@ def measure(case: Path, report: Path | None, vehicle: str | None, as_json: bool)
     report is written too, to <case>-gap.html in the working directory unless --report names a file.
     """
     from glider.tools.data.errors import need
+    from glider.tools.data.files import check_writable
     from glider.tools.data.runs.case import load_case
     from glider.tools.gap.assess import assess
 
     need("analysis")
     loaded = load_case(case, vehicle)
+    if report is None and not as_json:
+        report = Path(f"{case.resolve().name}-gap.html")
+    if report is not None:
+        check_writable(report.parent)
     compile_diagnosis(loaded)
     with progress("gap", 3) as advance:
         advance(1)
         found = assess(loaded)
         advance(1)
-        if report is None and not as_json:
-            report = Path(f"{case.resolve().name}-gap.html")
         if report is not None:
             from glider.tools.report.gap import write_report
 
@@ -84,6 +89,7 @@ def _print_table(found) -> None:
 def predict(run: Path, model: str, out: Path, vehicle: str | None) -> None:
     """Predict RUN (a run file beside its case.toml): its rows and columns, no gaps, window by window."""
     from glider.tools.data.errors import InputError
+    from glider.tools.data.files import check_writable
     from glider.tools.data.runs.case import load_case_of_run
     from glider.tools.data.runs.run import write_run
     from glider.tools.inference.kinds import kind_of
@@ -94,6 +100,7 @@ def predict(run: Path, model: str, out: Path, vehicle: str | None) -> None:
     case, recorded = load_case_of_run(run, vehicle)
     if out.exists() and run.exists() and out.samefile(run):
         raise InputError("would overwrite the run itself: name another file", source=out, column="--out")
+    check_writable(out.parent)
     predicted = predict_runs(case, load_model(model, case), [recorded])[0]
     write_run(out, as_run(recorded, predicted, kind_of(case.vehicle)))
     say(f"predicted {recorded.rows} rows of {recorded.name} with {model}: {out}")
@@ -142,6 +149,7 @@ def _diagnose_one(
     """The diagnosis of one case, in `out`."""
     from glider.sim_backend.ocean.vehicle import OceanVehicle
     from glider.tools.data.errors import InputError, need
+    from glider.tools.data.files import check_writable
     from glider.tools.data.runs.case import load_case
     from glider.tools.diagnose.against_healthy import form_stands_out
     from glider.tools.diagnose.diagnosis import diagnose as run_diagnosis
@@ -152,6 +160,7 @@ def _diagnose_one(
 
     need("analysis")
     loaded = load_case(case, vehicle)
+    check_writable(out)
     if isinstance(loaded.vehicle, OceanVehicle):
         if reference is not None:
             raise InputError("what changed of an ocean glider asks `glider gap watch --reference CASE0`", source=case)
@@ -176,54 +185,55 @@ def _diagnose_one(
         write(found, out)
         record = write_report(out)
         advance(1)
-    if as_json:
-        print_json(plain(found))
-    for caution in record.answer.cautions:
-        say(f"note: {caution}")
-    say(sentence(record))
-    say(f"answer: {out / 'diagnosis.json'}, report: {out / 'report.html'}")
+    _print_answer(plain(found), sentence(record), out, as_json)
 
 
 def _diagnose_against(case, reference, out: Path, as_json: bool) -> None:
     """The same against healthy runs (docs/DIAGNOSIS.md, Against healthy runs)."""
     from glider.tools.diagnose.against_answer import write
     from glider.tools.diagnose.against_healthy import diagnose_against_healthy
-    from glider.tools.report.page import REPORT
     from glider.tools.report.pooled import write_pooled_report
 
     found = diagnose_against_healthy(case, reference, lambda text: print(text, file=sys.stderr))
-    answer, said = write(found, out), write_pooled_report(out)
-    if as_json:
-        print_json(answer)
-    for caution in answer["cautions"]:
-        say(f"note: {caution}")
-    say(said)
-    say(f"answer: {out / 'diagnosis.json'}, report: {out / REPORT}")
+    answer = write(found, out)
+    _print_answer(answer, write_pooled_report(out), out, as_json)
 
 
 def _diagnose_ocean(case, out: Path, as_json: bool) -> None:
     """The same of an ocean glider (docs/OCEAN.md, Diagnosis)."""
-    from glider.tools.report.page import REPORT
     from glider.tools.report.pooled import write_pooled_report
     from glider.tools.watch.whole_case import diagnose_ocean, plain, write
 
     found = diagnose_ocean(case, lambda text: print(text, file=sys.stderr))
     write(found, out)
-    write_pooled_report(out)
-    answer = plain(found)
+    _print_answer(plain(found), write_pooled_report(out), out, as_json)
+
+
+def _print_answer(answer: dict[str, Any], sentence: str, out: Path, as_json: bool) -> None:
+    """Print the verdict on standard output, or the answer alone as JSON; what limits it on standard error."""
+    from glider.tools.report.page import REPORT
+
     for caution in answer["cautions"]:
         say(f"note: {caution}")
     if as_json:
         print_json(answer)
     else:
-        gap_table = answer["gap"]
-        nothing = "nothing beyond what the vehicle file allows" if found.left is None else found.left.sentence
-        click.echo(f"{found.verdict}: {', '.join(answer['selected']) or nothing}")
-        for cause in answer["causes"][:4]:
-            click.echo(f"  {cause['probability']:.2f} {cause['label']}  group {', '.join(cause['group'])}")
-        click.echo("gap " + ", ".join(f"{name} {gap_table[name]['total']:.2f}" for name in
-                                      ("before", "recalibrated", "after", "floor")))  # fmt: skip
+        for line in (sentence, *_verdict(answer)):
+            click.echo(line)
     say(f"answer: {out / 'diagnosis.json'}, report: {out / REPORT}")
+
+
+def _verdict(answer: dict[str, Any]) -> list[str]:
+    """The verdict, causes with their probabilities and groups, and the gap, a line each."""
+    lines = [f"verdict: {answer['verdict']}{''.join(f', {label}' for label in answer['selected'])}"]
+    for n, cause in enumerate(answer["causes"][:CAUSES]):
+        if n == 0 or cause["probability"] >= LEAST:
+            others = [label for label in cause["group"] if label != cause["label"]]
+            confounded = f"  or {', '.join(others)}, which these data cannot distinguish" if others else ""
+            lines.append(f"  {cause['probability']:.2f}  {cause['label']}{confounded}")
+    totals = {name: answer["gap"][name]["total"] for name in ("before", "recalibrated", "after", "floor")}
+    gaps = ", ".join(f"{name} {value:.2f}" for name, value in totals.items() if value is not None)
+    return [*lines, f"gap in tolerances: {gaps}"]
 
 
 @gap.command()
@@ -233,12 +243,14 @@ def _diagnose_ocean(case, out: Path, as_json: bool) -> None:
 @json_option
 def velocity(case: Path, model: str, out: Path, as_json: bool) -> None:
     """Velocity through the water of an ocean glider, with its standard deviation: a CSV for each run of CASE."""
+    from glider.tools.data.files import check_writable
     from glider.tools.data.runs.case import load_case
     from glider.tools.gap.heading import heading_test
     from glider.tools.gap.velocity import velocities, write
     from glider.tools.inference.load import load_model
 
     loaded = load_case(case, None if model == "nominal" else model)
+    check_writable(out)
     found = velocities(loaded, load_model("nominal", loaded))
     speeds = [(one.columns["vn_m_s"], one.columns["ve_m_s"]) for one in found]
     heading = heading_test(loaded.folder, loaded.runs, speeds)
@@ -254,9 +266,11 @@ def velocity(case: Path, model: str, out: Path, as_json: bool) -> None:
 @gap.command()
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 def report(folder: Path) -> None:
-    """Draw report.html again from what `glider gap diagnose` or `glider gap watch` left in DIR."""
+    """Draw report.html again from what `glider gap diagnose` or `glider gap watch` left in DIR; print its verdict."""
+    import json
+
     from glider.tools.data.errors import need
-    from glider.tools.diagnose.record import is_pooled
+    from glider.tools.diagnose.record import ANSWER, is_pooled
     from glider.tools.report.diagnosis import write_report
     from glider.tools.report.page import REPORT
     from glider.tools.report.pooled import write_pooled_report
@@ -269,7 +283,10 @@ def report(folder: Path) -> None:
         said = write_watch_report(folder)
     else:
         said = write_pooled_report(folder) if is_pooled(folder) else sentence(write_report(folder))
-    say(said)
+    click.echo(said)
+    if not (folder / FILE).is_file():
+        for line in _verdict(json.loads((folder / ANSWER).read_text(encoding="utf-8"))):
+            click.echo(line)
     say(f"report: {folder / REPORT}")
 
 

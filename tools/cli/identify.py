@@ -27,9 +27,12 @@ def identify(case: Path, out: Path | None, seed: int, likelihood: str, vehicle: 
     """
     from glider.sim_backend.ocean.vehicle import OceanVehicle
     from glider.tools.data.errors import need
+    from glider.tools.data.files import check_writable
     from glider.tools.data.runs.case import load_case
 
     loaded = load_case(case, vehicle)
+    if out is not None:
+        check_writable(out)
     if isinstance(loaded.vehicle, OceanVehicle):
         need("analysis")
         _identify_ocean(loaded, out, as_json)

@@ -25,10 +25,12 @@ for _command in COMMANDS:
 @json_option
 def csv(files: tuple[Path, ...], mapping: str, out: Path | None, strict: bool, as_json: bool) -> None:
     """Turn CSV logs (.csv or .csv.gz), one a run, into a case, by a mapping file (docs/IMPORT.md)."""
+    from glider.tools.data.files import check_writable
     from glider.tools.data.importers.csvlog import import_csv
     from glider.tools.data.runs.run import run_name
 
     folder = files[0].parent / f"{run_name(files[0])}.case" if out is None else out
+    check_writable(folder)
     imported = import_csv(list(files), mapping, folder, strict)
     for note in imported.notes:
         say(note)
@@ -52,9 +54,11 @@ def csv(files: tuple[Path, ...], mapping: str, out: Path | None, strict: bool, a
 def qualisys(files, log, body, vehicle, out, as_json) -> None:
     """Turn 6DOF exports (TSV) of Qualisys into a case, aligned in time with the onboard logs of another case."""
     from glider.tools.data.errors import need
+    from glider.tools.data.files import check_writable
     from glider.tools.data.importers.captured import import_qualisys
 
     need("analysis")
+    check_writable(out)
     written, offsets = import_qualisys(list(files), log, body, vehicle, out)
     for path, offset in zip(files, offsets, strict=True):
         if offset is not None:

@@ -73,9 +73,11 @@ def og1(file: Path, out: Path, vehicle: str | None, as_json: bool) -> None:
     from glider.tools.data.errors import need
 
     need("ocean")
+    from glider.tools.data.files import check_writable
     from glider.tools.data.importers.ocean.mission import write_mission
     from glider.tools.data.importers.ocean.og1 import read_og1
 
+    check_writable(out)
     vehicle, segments = read_og1(file, vehicle)
     _show(write_mission(segments, out, vehicle), as_json)
 
@@ -90,8 +92,10 @@ def _import(
     as_json: bool,
     read: Callable[[Callable[[int], None]], "list[Segment]"],
 ) -> None:
+    from glider.tools.data.files import check_writable
     from glider.tools.data.importers.ocean.mission import write_mission
 
+    check_writable(out)
     if len(files) < MANY:
         segments = read(lambda _: None)
     else:

@@ -120,9 +120,12 @@ def _devices(text: str) -> list[str]:
 @json_option
 def info(file: Path, as_json: bool) -> None:
     """What is in a log, with the parts it goes on in: topics, counts, texts, events, and whether it is complete."""
+    from glider.tools.data.errors import InputError
     from glider.tools.data.log.parts import read_flight
 
     the_log = read_flight(_file(file))
+    if the_log.size == 0:
+        raise InputError("empty: nothing was recorded in it", source=file)
     if as_json:
         print_json(_summary(the_log))
         return
@@ -173,11 +176,13 @@ def export(sources: tuple[Path, ...], out: Path | None, vehicle: str | None, as_
 
 
 def _to_case(sources: tuple[Path, ...], out: Path | None, vehicle: str | None) -> dict[str, Any]:
+    from glider.tools.data.files import check_writable
     from glider.tools.data.log.parts import read_flight
     from glider.tools.data.log.rundata import export_case
 
     logs = [read_flight(source) for source in sources]
     folder = _case_beside(sources[0]) if out is None else out
+    check_writable(folder)
     exported = export_case(logs[0], folder, vehicle=vehicle, more=logs[1:])
     states = [line for log in logs if not log.whole for line in _parts(log) or [_state(log)]]
     notes = [*states, *exported.notes]

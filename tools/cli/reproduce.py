@@ -22,12 +22,14 @@ def reproduce(figures, vehicle, seeds, noise, out, as_json) -> None:
     One picture a figure, FIGURE.png; one JSON object a figure with --json (a list where several are asked for).
     """
     from glider.tools.data.errors import need
+    from glider.tools.data.files import check_writable
     from glider.tools.data.sources import load_vehicle
 
     need("identify" if "fig4" in figures else "analysis")
     from glider.tools.study.reproduce.figures import reproduce_circle, reproduce_tracking
 
     the_vehicle = load_vehicle(vehicle)
+    check_writable(out)
     out.mkdir(parents=True, exist_ok=True)
     results = []
     if set(figures) != {"fig4"}:

@@ -41,13 +41,15 @@ def simulate(commands: Path, out: Path, vehicle: str, water: tuple[float, float]
     X, Y, Z, phi, theta, psi, u, v, w (relative to the water), p, q, r, servo_rad, slider_m, ballast_kg. Each command
     holds from the row it stands in. The result has the same columns at the same times.
     """
+    from glider.tools.data.files import check_writable, write_bytes
     from glider.tools.data.sources import load_vehicle, read_text
     from glider.tools.flight.simulate import check_dt, expected_steps, fly_commands, read_commands, write_flight
 
     P = load_vehicle(vehicle).vector()
     check_dt(P, dt)
+    check_writable(out.parent)
     table = read_commands(read_text(commands), str(commands))
     long = expected_steps(table, dt) > LONG_STEPS
     with progress("simulate", len(table.times) - 1) if long else contextlib.nullcontext() as advance:
         states = fly_commands(P, table, water, dt, advance)
-    out.write_text(write_flight(table, states), encoding="utf-8")
+    write_bytes(out, write_flight(table, states).encode("utf-8"))

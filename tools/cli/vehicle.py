@@ -18,11 +18,12 @@ def vehicle() -> None:
 def new(out: Path, name: str | None) -> None:
     """Ask for weighed masses and measured lengths, one by one, and write a first vehicle file OUT."""
     from glider.tools.data.errors import InputError
+    from glider.tools.data.files import check_writable, write_bytes
     from glider.tools.data.first_vehicle import QUESTIONS, first_vehicle
-    from glider.tools.data.runs.csvfile import write_bytes
 
     if out.exists():
         raise InputError("is there already: name another file", source=out)
+    check_writable(out.parent)
     answers = {}
     for q in QUESTIONS:
         words = f"{q.words[:1].upper()}{q.words[1:]}, {q.unit}"

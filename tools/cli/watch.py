@@ -43,8 +43,8 @@ def _watch_one(case: Path, reference: Path | None, vehicle: str | None, out: Pat
     from glider.tools.data.errors import need
 
     need("analysis")
+    from glider.tools.data.files import check_writable, write_bytes
     from glider.tools.data.runs.case import load_case
-    from glider.tools.data.runs.csvfile import write_bytes
     from glider.tools.report.page import REPORT
     from glider.tools.report.watch import write_watch_report
     from glider.tools.watch.answer import FILE
@@ -52,6 +52,8 @@ def _watch_one(case: Path, reference: Path | None, vehicle: str | None, out: Pat
 
     loaded = load_case(case, vehicle)
     before = None if reference is None else load_case(reference, vehicle)
+    if out is not None:
+        check_writable(out)
     with progress("watch", 2) as advance:
         advance(1)
         found = watch_runs(loaded, before, lambda text: print(text, file=sys.stderr))

@@ -6,7 +6,7 @@ from importlib.util import find_spec
 
 from glider.tools.data.version import DISTRIBUTION
 
-DONE, FAILED, BAD_INPUT = 0, 1, 2  # exit codes of every command
+DONE, FAILED, BAD_INPUT, STOPPED = 0, 1, 2, 130  # exit codes of every command; the last after Ctrl-C
 IMPORTED_AS = {"foxglove-sdk": "foxglove"}  # packages that are imported by another name than they are installed by
 
 

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from glider.tools.data.files import write_files
 from glider.tools.data.plain import as_plain
-from glider.tools.data.runs.csvfile import write_bytes
 from glider.tools.diagnose.against_healthy import AgainstHealthy, Comparison
+from glider.tools.diagnose.cautions import below_floor
 from glider.tools.diagnose.record import AGAINST_HEALTHY, ANSWER, UNKNOWN
 from glider.tools.diagnose.shrink import AFTER, BEFORE, FLOOR, RECALIBRATED, by_channel, shrinkage_of
 from glider.tools.gap.measure import RunGap, root_mean_square, run_gap
@@ -136,17 +137,19 @@ def cautions(found: AgainstHealthy) -> list[str]:
             "these readings"
         )
     if len(found.case.runs) == 1:
-        sentences.append("one run only: nothing is left out, the gaps are those of a run that was fitted")
-    return sentences
+        sentences.append("one run only: the gaps are those of the run that was fitted, and not checked on other data")
+    left = found.compared.healthy.scales
+    floor = {**left, "total": root_mean_square(left.values())}
+    return sentences + below_floor(floor, "healthy runs leave")
 
 
 def write(found: AgainstHealthy, out: Path) -> dict[str, Any]:
     """diagnosis.json and corrected.toml into a folder; the answer."""
-    out.mkdir(parents=True, exist_ok=True)
     nominal, answer = nominal_model(found.case), plain(found)
     P, F = model_of(found.compared, found.best.values, found.selected)
     own = F - effect_vector(nominal)
     text = corrected_text(found.case.vehicle_name, nominal.P, P, own, effects_in(own))
-    write_bytes(out / CORRECTED, text.encode("utf-8"))
-    write_bytes(out / ANSWER, (json.dumps(as_plain(answer), indent=1) + "\n").encode())
+    out.mkdir(parents=True, exist_ok=True)
+    answered = (json.dumps(as_plain(answer), indent=1) + "\n").encode()
+    write_files({out / CORRECTED: text.encode("utf-8"), out / ANSWER: answered})
     return answer

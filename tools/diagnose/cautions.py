@@ -1,17 +1,18 @@
 """What a case cannot say, in plain words: columns that are not there, stretches without samples, one run, a bad fit."""
 
-import itertools
+from collections.abc import Mapping
 
 import numpy as np
 
 from glider.sim_backend.core.effects.catalogue import catalogue
 from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.sampling import missing_share, own_period
 from glider.tools.diagnose.noise_probes import UNPREDICTABLE
 from glider.tools.inference.levels import factors
 from glider.tools.inference.parameters import effect_parameters
 from glider.tools.inference.problem import Problem
 
-SPARSE, LONG = 0.2, 5.0  # share of samples missing; s without a sample
+SPARSE, LONG = 0.2, 5.0  # share missing of the samples at the sensor's own rate; s without a sample
 NOISE_FACTOR_REPORTED = 1.25  # times what a file says of noise, or less by as much
 PARTS = {
     "onboard attitude": names.ATTITUDE,
@@ -82,12 +83,22 @@ def _holes(problem: Problem) -> list[str]:
                 holed.append(f"{name} (no sample)")
                 continue
             at = np.concatenate([run.t[:1], run.t[ok], run.t[-1:]])
-            longest = max(b - a for a, b in itertools.pairwise(at))
-            if 1.0 - ok.mean() > SPARSE or longest > LONG:
-                holed.append(f"{name} ({100.0 * (1.0 - ok.mean()):.0f} % missing, up to {longest:.0f} s)")
+            longest, missing = float(np.diff(at).max()), missing_share(run.t, values)
+            if missing > SPARSE or longest > max(LONG, 2.0 * own_period(run.t, values)):
+                holed.append(f"{name} ({100.0 * missing:.0f} % missing, up to {longest:.0f} s)")
         if holed:
             found.append(f"{run.name}: {', '.join(holed)}: less can be seen there")
     return found
+
+
+def below_floor(floor: Mapping[str, float], why: str = "noise and disturbance alone leave") -> list[str]:
+    """Whether the floor hides what would be a gap: a line where that of a channel or the total is above 1 tolerance."""
+    high = {name: value for name, value in floor.items() if value > 1.0}
+    if not high:
+        return []
+    said = [f"{value:.2g}" if name == "total" else f"{name} {value:.2g}" for name, value in high.items()]
+    where = said[-1] if "total" in high else ", ".join(said)
+    return [f"{why} {where} tolerances: a gap below that cannot be seen in these runs"]
 
 
 def _noise(problem: Problem) -> list[str]:
@@ -105,7 +116,7 @@ def _noise(problem: Problem) -> list[str]:
 def _few(problem: Problem) -> list[str]:
     found = []
     if len(problem.runs) == 1:
-        found.append("one run only: nothing can be left out, so that figures after a fit are not checked on other data")
+        found.append("one run only: figures after a fit are of the run that was fitted, and not checked on other data")
     look_in = problem.kind.measures.look_in
     short = [run.name for run in problem.runs if run.t[-1] - run.t[0] <= look_in]
     if short:

@@ -1,7 +1,7 @@
 """The diagnosis of a case: where the simulator is wrong, why, how far the gap shrinks (docs/GAP.md, Answers)."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ from glider.sim_backend.core.effects.catalogue import catalogue
 from glider.tools.data.runs.case import Case
 from glider.tools.data.version import software
 from glider.tools.diagnose import by_readings
-from glider.tools.diagnose.cautions import cautions, not_asked
+from glider.tools.diagnose.cautions import below_floor, cautions, not_asked
 from glider.tools.diagnose.chain import noise_of, panels
 from glider.tools.diagnose.correction import Correction, correct
 from glider.tools.diagnose.materiality import MATERIAL_TOLERANCES
@@ -51,6 +51,7 @@ from glider.tools.inference.problem import ALL, problem_of
 from glider.tools.inference.rules import Rules
 from glider.tools.readings.findings import Finding
 from glider.tools.readings.pictures import pictures_of
+from glider.tools.readings.stretches import without_afloat
 
 CORRECTION_FILE = "data_driven.toml"
 LEAST_PROBABILITY = 0.001  # a smaller probability is not written down
@@ -89,6 +90,7 @@ class Diagnosis:
             f"{MATERIAL_TOLERANCES:g} of its tolerance: no gap"
             for label, nat in self.answer.negligible.items()
         ]
+        found += below_floor(self.shrinkage.channels(FLOOR))
         if self.staged is not None:
             found.insert(0, identified_text(self.staged))
         return found
@@ -106,6 +108,7 @@ def verdict_of(answer: Answer) -> str:
 def diagnose(case: Case, say: Callable[[str], None] = lambda text: None, rules: Rules = ALL) -> Diagnosis:
     """Diagnose a case; `say` hears how far the search is."""
     readings = findings_of(case.runs)
+    case = replace(case, runs=[without_afloat(run) for run in case.runs])
     runs = fix_axes_signs_units(case.runs, readings)
     search = run(problem_of(case, runs=runs, rules=rules), say)
     answer = conclude(search, say)
@@ -121,7 +124,8 @@ def diagnose(case: Case, say: Callable[[str], None] = lambda text: None, rules: 
         if found.verdict == "unknown":
             learn(found, say)
     found.answer = certain_by_readings(found.answer, readings)
-    say(f"verdict: {found.answer.main}")
+    unearned = found.verdict == NONE and not found.answer.selected
+    say(f"verdict: {found.answer.main}{' (no candidate earned its place)' if unearned else ''}")
     return found
 
 
@@ -332,10 +336,8 @@ def write(diagnosis: Diagnosis, out: Path) -> None:
     """Everything that a diagnosis leaves behind, but for the report, into a folder."""
     shown = pictures_of(diagnosis.readings, diagnosis.case.runs)
     drawn = [curves(diagnosis, n) for n in drawn_runs(diagnosis)]
-    write_record(out, plain(diagnosis), details(diagnosis), drawn, shown)
-
-    (out / "next_run.toml").write_text(diagnosis.mission, encoding="utf-8")
-    (out / "corrected.toml").write_text(corrected(diagnosis), encoding="utf-8")
+    beside = {"next_run.toml": diagnosis.mission, "corrected.toml": corrected(diagnosis)}
     if diagnosis.correction is not None:
-        text = model_text(diagnosis.case, *diagnosis.correction.search.model(diagnosis.correction.hypothesis))
-        (out / CORRECTION_FILE).write_text(text, encoding="utf-8")
+        learned = diagnosis.correction.search.model(diagnosis.correction.hypothesis)
+        beside[CORRECTION_FILE] = model_text(diagnosis.case, *learned)
+    write_record(out, plain(diagnosis), details(diagnosis), drawn, shown, beside)

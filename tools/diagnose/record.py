@@ -4,6 +4,7 @@ The answer's keys are those of docs/GAP.md; those of the other two are in docs/D
 finite are null.
 """
 
+import io
 import json
 import math
 import zipfile
@@ -17,6 +18,7 @@ import numpy as np
 from glider.sim_backend.core.effects.catalogue import catalogue
 from glider.sim_backend.ocean.vehicle import KIND
 from glider.tools.data.errors import InputError
+from glider.tools.data.files import write_files
 from glider.tools.data.plain import as_plain
 from glider.tools.diagnose.stages import STAGES
 from glider.tools.readings.pictures import Shown
@@ -252,19 +254,27 @@ def number(value: Number) -> float:
 
 
 def write_record(
-    folder: Path, answer: dict[str, Any], details: Details, curves: list[Curves], shown: list[Shown]
-) -> None:
-    """The three files of a diagnosis; `answer` holds what Answer does, and whatever else others read."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, value in ((ANSWER, answer), (DETAILS, msgspec.to_builtins(details, enc_hook=float))):
-        (folder / name).write_text(json.dumps(as_plain(value), indent=1) + "\n", encoding="utf-8")
+    folder: Path, answer: dict[str, Any], details: Details, curves: list[Curves], shown: list[Shown],
+    beside: dict[str, str],
+) -> None:  # fmt: skip
+    """Write the three files of a diagnosis and texts by name beside them, all or none.
+
+    `answer` holds what Answer does, and whatever else others read.
+    """
     tables = {}
     for n, run in enumerate(curves):
         tables[f"t_{n}"] = run.t
         tables |= {f"{name}_{n}": getattr(run, name).astype(np.float32) for name in TABLES}
     for n, one in enumerate(shown):
         tables |= {f"shown_{name}_{n}": getattr(one, name).astype(np.float32) for name in SHOWN}
-    np.savez_compressed(folder / CURVES, allow_pickle=False, **tables)
+    packed = io.BytesIO()
+    np.savez_compressed(packed, allow_pickle=False, **tables)
+    objects = {ANSWER: answer, DETAILS: msgspec.to_builtins(details, enc_hook=float)}
+    texts = {name: json.dumps(as_plain(value), indent=1) + "\n" for name, value in objects.items()} | beside
+    folder.mkdir(parents=True, exist_ok=True)
+    write_files(
+        {folder / name: text.encode("utf-8") for name, text in texts.items()} | {folder / CURVES: packed.getvalue()}
+    )
 
 
 def read_record(folder: Path) -> DiagnosisRecord:

@@ -277,7 +277,7 @@ def run(
         rescreen(search)
         if search.best.labels == first:
             break
-    say(f"one effect: {' '.join(search.best.labels) or 'none'}")
+    say(f"best candidate with one effect: {' '.join(search.best.labels) or 'none'}")
     take_over(search, before)
     grow(search, say)
     if level_disturbance(search):
@@ -298,7 +298,7 @@ def grow(search: Search, say: Callable[[str], None]) -> None:
             listed = [c for c in search.ranked() if len(c.labels) >= count - 1][:SHORT_LIST]
             search.hypotheses = listed if any(c is before for c in listed) else [*listed, before]
         relinearise(search, POLISHED.get(count, 1))
-        say(f"{count} effects: {' '.join(search.best.labels)}")
+        say(f"best candidate with up to {count} effects: {' '.join(search.best.labels)}")
         fewer = [c.log_evidence(search.fitter) for c in search.hypotheses if len(c.labels) < count]
         least = max(fewer, default=-np.inf)
         if search.best.log_evidence(search.fitter) < least + EVIDENCE_NEEDED:

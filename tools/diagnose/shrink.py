@@ -129,7 +129,10 @@ def rms(values: np.ndarray, picks: np.ndarray) -> np.ndarray:
 def over_runs(
     value: Callable[[np.ndarray], np.ndarray], rng: np.random.Generator, count: int
 ) -> tuple[float, tuple[float, float]]:
-    """A figure of picked runs, value(picks (draws, runs)): over all runs, and its 90 % interval by bootstrap."""
+    """A figure of picked runs, value(picks (draws, runs)): over all runs, and its 90 % interval by bootstrap.
+
+    Of a single run there is no interval.
+    """
     whole = float(value(np.arange(count)[None])[0])
     if count == 1:
         return whole, (np.nan, np.nan)
@@ -196,11 +199,15 @@ def shrink_further(search: Search, hypothesis: Hypothesis, before: list[RunGap])
     b, a = squares(before), squares(runs)
     rng = np.random.default_rng(SEED)
     shrunk, ci90 = over_runs(lambda picks: 1.0 - rms(a, picks) / rms(b, picks), rng, len(runs))
-    return Further(runs, float(np.sqrt(a.mean())), shrunk, ci90)
+    return Further(runs, float(np.sqrt(a.mean())), shrunk if len(runs) > 1 else np.nan, ci90)
 
 
 def shrinkage_of(runs: dict[str, list[RunGap]], predictions: dict[str, list[np.ndarray]]) -> Shrinkage:
-    """What follows from the four models' gaps by run."""
+    """What follows from the four models' gaps by run.
+
+    Shrinkage is one of runs left out, so NaN for a single run. Closed is NaN too where there may be nothing to close:
+    unless the 90 % interval of before - floor is above 0.
+    """
     total = {name: squares(found) for name, found in runs.items()}
     rng, count = np.random.default_rng(SEED), len(runs[BEFORE])
 
@@ -210,6 +217,11 @@ def shrinkage_of(runs: dict[str, list[RunGap]], predictions: dict[str, list[np.n
 
     shrunk, ci90 = over_runs(lambda picks: 1.0 - rms(total[AFTER], picks) / rms(total[BEFORE], picks), rng, count)
     closed, closed_ci90 = over_runs(closed_of, rng, count)
+    _, beyond = over_runs(lambda picks: rms(total[BEFORE], picks) - rms(total[FLOOR], picks), rng, count)
+    if count == 1:
+        shrunk = np.nan
+    if not beyond[0] > 0.0:
+        closed, closed_ci90 = np.nan, (np.nan, np.nan)
     mean = {name: float(np.sqrt(values.mean())) for name, values in total.items()}
     return Shrinkage(
         runs, mean[BEFORE], mean[RECALIBRATED], mean[AFTER], mean[FLOOR], shrunk, ci90, closed, closed_ci90, predictions

@@ -94,7 +94,8 @@ class _Stages:
     def identify(self) -> None:
         """Every fold's fit of the vehicle."""
         for fold in self.folds:
-            self.say(f"identified without {', '.join(self.case.runs[n].name for n in fold.left_out)}")
+            how = "without" if len(self.case.runs) > 1 else "from"
+            self.say(f"identified {how} {', '.join(self.case.runs[n].name for n in fold.left_out)}")
             fitting = self.free(fold.read.model, fold.read.runs, [])
             fold.values = fitting.through(fitting.file_values).values
 

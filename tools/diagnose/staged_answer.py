@@ -97,9 +97,10 @@ def identified_text(found: Staged) -> str:
         for name, size in ((name, found.vehicle.get(f"{name}_scale")) for name in ("slider", "ballast"))
         if size is not None and not size.ci90[0] <= 0.0 <= size.ci90[1]
     ]
+    of = "of runs left out" if len(found.stages[0].gaps) > 1 else "of the same run"
     return (
         f"the vehicle file misses these runs by {first:.1f} tolerances, so the vehicle was identified from them: that "
-        f"leaves {left:.1f} of runs left out, with all that was found {last:.1f}" + "".join(f"; {one}" for one in wires)
+        f"leaves {left:.1f} {of}, with all that was found {last:.1f}" + "".join(f"; {one}" for one in wires)
     )
 
 

@@ -11,10 +11,10 @@ import numpy as np
 from glider.sim_backend.ocean.core import layout as at
 from glider.sim_backend.ocean.vehicle import OceanVehicle
 from glider.tools.data.errors import InputError
+from glider.tools.data.files import write_bytes
 from glider.tools.data.plain import as_plain
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs.case import Case
-from glider.tools.data.runs.csvfile import write_bytes
 from glider.tools.data.runs.run import Run, run_name, write_run
 from glider.tools.inference.model import Model, effect_vector
 from glider.tools.inference.ocean_inputs import missing_input

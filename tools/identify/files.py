@@ -13,8 +13,8 @@ from glider.firmware.core.jit import kernels_digest
 from glider.firmware.core.vehicle import layout
 from glider.firmware.model.vehicle import COEFFICIENTS, PLACES, Vehicle, decode_vehicle
 from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.data.files import whole, write_files
 from glider.tools.data.runs.case import CASE_FILE
-from glider.tools.data.runs.csvfile import write_bytes
 from glider.tools.data.tomltext import toml_text
 from glider.tools.data.version import software
 from glider.tools.identify.pipeline import Identified
@@ -135,7 +135,8 @@ def write_posterior(found: Identified, path: Path) -> None:
     posterior = {name: draws[:, :, n] for n, name in enumerate(found.free.names)}
     posterior |= {f"log_noise_{name}": found.chains.levels[:, :, g] for g, name in enumerate(found.chains.groups)}
     data = arviz.from_dict(posterior=posterior, attrs={"likelihood": found.likelihood, "seed": found.chains.seed})
-    data.to_netcdf(str(path))
+    with whole(path) as (temporary,):
+        data.to_netcdf(str(temporary))
 
 
 def write(found: Identified, out: Path) -> Vehicle:
@@ -144,10 +145,9 @@ def write(found: Identified, out: Path) -> Vehicle:
 
     out.mkdir(parents=True, exist_ok=True)
     text = vehicle_text(found)
-    write_bytes(out / VEHICLE, text.encode("utf-8"))
     model = corrected(found)
-    if model is not None:
-        write_bytes(out / CORRECTED, model.encode("utf-8"))
+    texts = {VEHICLE: text, RESULT: json.dumps(as_plain(found.plain()), indent=1) + "\n"}
+    texts |= {} if model is None else {CORRECTED: model}
     write_posterior(found, out / POSTERIOR)
-    write_bytes(out / RESULT, (json.dumps(as_plain(found.plain()), indent=1) + "\n").encode("utf-8"))
+    write_files({out / name: one.encode("utf-8") for name, one in texts.items()})
     return decode_vehicle(text, VEHICLE)

@@ -4,6 +4,7 @@ import numpy as np
 
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs.run import Run
+from glider.tools.data.runs.sampling import expected_samples
 from glider.tools.readings.findings import TOLERANCE, Finding
 
 MOVING = (*names.ATTITUDE, *names.RATES, names.DEPTH)  # what does not stand still in flight
@@ -36,8 +37,8 @@ def _share(count: int, of: int) -> tuple[float, tuple[float, float]]:
 
 
 def _missing(name: str, series) -> Finding | None:
-    count = sum(int(np.isnan(values).sum()) for _, values in series)
-    size, interval = _share(count, sum(len(values) for _, values in series))
+    expected = sum(expected_samples(t, values) for t, values in series)
+    size, interval = _share(expected - sum(int(np.isfinite(values).sum()) for _, values in series), expected)
     if size < MISSING_SHARE or name in names.MOCAP:  # cameras lose sight; that is no fault of theirs
         return None
     text = f"{name}: {100.0 * size:.1f} % of the samples are missing."

@@ -5,15 +5,19 @@ by what is out of the water; one on the bottom, in a net or against a wall does 
 in somebody's hands turns faster than it can by itself.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs.run import Run
+from glider.tools.data.runs.sampling import own_period
 from glider.tools.readings.findings import Finding
 
 SPAN = 8.0  # s that a stretch lasts at least
 SURFACE = 0.25  # m about the surface: a hull of a metre that is partly out of the water, and a gauge that is off
 SURFACE_RANGE = 0.1  # m that the depth moves within SPAN there: waves, no dive
+LEAST_SAID = 1.0  # s; a shorter end afloat is left out without a word
 STILL_ANGLE, STILL_DEPTH = 0.004, 0.02  # rad, m: ranges within STILL_SPAN of a vehicle that lies on something
 STILL_SPAN = 15.0  # s
 HANDLED_RATE = 1.5  # rad/s; the fastest turns of gliders of this class are some 0.5 rad/s
@@ -49,8 +53,11 @@ def states(run: Run) -> dict[str, np.ndarray]:
     depth = run.columns.get(names.DEPTH, run.columns.get(names.MOCAP_POSITION[2]))
     attitude = [run.columns[name] for name in names.ATTITUDE if name in run.columns]
     if depth is not None and np.isfinite(depth).any():
+        depth = between_samples(t, depth)
+        found["afloat at the end"] = afloat_at_end(t, depth)
         shallow = depth < SURFACE + max(0.0, float(np.nanmin(depth)))
-        found["at the surface"] = lasting(t, shallow & (rolling_range(t, depth, SPAN) < SURFACE_RANGE), SPAN)
+        surface = shallow & (rolling_range(t, depth, SPAN) < SURFACE_RANGE) & ~found["afloat at the end"]
+        found["at the surface"] = lasting(t, surface, SPAN)
         still = rolling_range(t, depth, STILL_SPAN) < STILL_DEPTH
         for values in attitude:
             still &= rolling_range(t, np.unwrap(np.nan_to_num(values)), STILL_SPAN) < STILL_ANGLE
@@ -64,6 +71,33 @@ def states(run: Run) -> dict[str, np.ndarray]:
             fast |= np.nan_to_num(np.abs(np.gradient(values, t))) > HANDLED_RATE
     found["handled or hauled"] = lasting(t, near(t, fast, 0.5 * HANDLED_SPAN), 2.0 * HANDLED_SPAN)
     return found
+
+
+def between_samples(t: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Values, interpolated in rows between samples of a sensor that is slower than the log; NaN in holes stays."""
+    ok = np.isfinite(values)
+    if ok.all() or ok.sum() < 2:
+        return values
+    return np.where(near(t, ok, own_period(t, values)), np.interp(t, t[ok], values[ok]), np.nan)
+
+
+def afloat_at_end(t: np.ndarray, depth: np.ndarray) -> np.ndarray:
+    """Rows, bool, behind the last at which the vehicle is deeper than its hull; none where it never dived.
+
+    What of the hull is out of the water carries no model here, and with a light ballast it stands on its tail.
+    """
+    deep = np.flatnonzero(depth >= SURFACE)
+    return np.arange(len(t)) > (deep[-1] if len(deep) else len(t))
+
+
+def without_afloat(run: Run) -> Run:
+    """The run up to where the vehicle comes up for good; the same where it does not."""
+    if names.DEPTH not in run.columns:
+        return run
+    state = afloat_at_end(run.t, between_samples(run.t, run.columns[names.DEPTH]))
+    if not state.any():
+        return run
+    return replace(run, columns={name: values[~state] for name, values in run.columns.items()}, extra={})
 
 
 def near(t: np.ndarray, state: np.ndarray, span: float) -> np.ndarray:
@@ -84,7 +118,7 @@ def flying(run: Run) -> np.ndarray:
 
 
 def judge_stretches(runs: list[Run]) -> list[Finding]:
-    """One finding for every reason and run."""
+    """One finding for every reason and run, of LEAST_SAID at least."""
     said = []
     for run in runs:
         for reason, state in states(run).items():
@@ -92,6 +126,8 @@ def judge_stretches(runs: list[Run]) -> list[Finding]:
                 continue
             period = float(np.median(np.diff(run.t)))
             seconds = float(state.sum() * period)
+            if seconds < LEAST_SAID:
+                continue
             first, last = run.t[state][0], run.t[state][-1]
             text = f"{run.name}: {reason} for {seconds:.0f} s between {first:.0f} and {last:.0f} s; left out."
             said.append(Finding("vehicle", "depth", "not_flying", seconds, (seconds, seconds), "s", None, True, text))

@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 
 from glider.sim_backend.core.effects.catalogue import catalogue
+from glider.tools.data.files import write_bytes
 from glider.tools.diagnose.noise_probes import CLOCK, UNPREDICTABLE
-from glider.tools.diagnose.record import Curves, DiagnosisRecord, Panel, Picture, number, read_record
+from glider.tools.diagnose.record import Curves, DiagnosisRecord, Interval, Panel, Picture, number, read_record
 from glider.tools.inference.channels import ROUGHIE_MEASURES
 from glider.tools.report import words
 from glider.tools.report.chain_picture import chain_svg
@@ -46,7 +47,7 @@ def _ranking(record: DiagnosisRecord) -> list[dict[str, Any]]:
         {
             "label": cause.label,
             "place": words.place(cause.label) if cause.label in effects else "",
-            "means": words.MEANS.get(cause.label) or words.PLAIN[cause.label],
+            "means": words.means(cause.label, record.answer.gap) or words.PLAIN[cause.label],
             "percent": 100.0 * cause.probability,
             "shown": words.small_percent(cause.probability),
         }
@@ -66,7 +67,7 @@ def _effects(record: DiagnosisRecord) -> list[dict[str, Any]]:
             value, low, high = map(words.number, values)
             rows.append({"name": name, "unit": unit, "value": value, "low": low, "high": high})
         found.append({
-            "label": label, "place": words.place(label), "plain": words.upper(words.PLAIN[label]),
+            "label": label, "place": words.place(label), "plain": words.upper(words.directed(record, label)),
             "summary": effect.summary, "rows": rows, "nat": words.nats(record.details.evidence[label]),
         })  # fmt: skip
     return found
@@ -136,10 +137,10 @@ def _correction(record: DiagnosisRecord) -> dict[str, str] | None:
     if found is None:
         return None
     shapes = [f"{words.feature(name)} ({words.quantity(rms, found.unit)} rms)" for name, rms in found.goes_with.items()]
-    share = found.shrinkage
+    share = words.left_of(number(record.answer.gap.before["total"]), number(found.gap["total"]))
     return {
         "link": found.link, "shapes": words.joined(shapes), "file": found.model,
-        "far": f"{words.change(number(share.value))} ({words.interval(*map(number, share.ci90))})",
+        "far": words.with_interval(words.change(share), found.shrinkage),
         "after": words.number(number(found.gap["total"])),
     }  # fmt: skip
 
@@ -185,6 +186,7 @@ def _context(record: DiagnosisRecord) -> dict[str, Any]:
         "seconds": f"{data.seconds:.0f}",
         "rate": f"{data.log_rate_hz:g}",
         "verdict": answer.verdict,
+        "blind": answer.verdict == "none" and words.blind(gap),
         "sentence": words.sentence(record),
         "chain": chain_svg(
             [] if answer.verdict == "none" else answer.where,
@@ -201,8 +203,9 @@ def _context(record: DiagnosisRecord) -> dict[str, Any]:
         "shown": _shown(record),
         "corrected": "corrected" if details.corrected else "recalibrated",
         "table": _table(record),
-        "shrinkage": _share(gap.shrinkage.value, gap.shrinkage.ci90),
-        "closed": _share(gap.closed.value, gap.closed.ci90),
+        "which": words.which(record).removesuffix(","),
+        "shrinkage": _share(gap.shrinkage),
+        "closed": _share(gap.closed),
         "alone": words.alone(gap),
         "predictable": answer.main not in UNPREDICTABLE,
         "tolerances": [
@@ -221,8 +224,9 @@ def _context(record: DiagnosisRecord) -> dict[str, Any]:
     }
 
 
-def _share(value: float | None, ci90: tuple[float | None, float | None]) -> str:
-    return f"{words.percent(number(value))} ({words.interval(*map(number, ci90))})"
+def _share(share: Interval) -> str:
+    """A share with its interval; "" where there is none."""
+    return "" if share.value is None else words.with_interval(words.percent(share.value), share)
 
 
 def report_html(record: DiagnosisRecord) -> str:
@@ -233,5 +237,5 @@ def report_html(record: DiagnosisRecord) -> str:
 def write_report(folder: Path) -> DiagnosisRecord:
     """Draw the report of a diagnosis from its folder, into it; InputError where the folder holds none."""
     record = read_record(folder)
-    (folder / REPORT).write_text(report_html(record), encoding="utf-8")
+    write_bytes(folder / REPORT, report_html(record).encode("utf-8"))
     return record

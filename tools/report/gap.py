@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from glider.tools.data.files import write_bytes
 from glider.tools.gap.assess import CaseGap
 from glider.tools.inference.channels import Channel
 from glider.tools.report.charts import Chart, svg
@@ -102,4 +103,4 @@ def report_html(found: CaseGap) -> str:
 
 def write_report(path: Path, found: CaseGap) -> None:
     """Write the page to a file."""
-    path.write_text(report_html(found), encoding="utf-8")
+    write_bytes(path, report_html(found).encode("utf-8"))

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from glider.firmware.model.vehicle import COEFFICIENTS
+from glider.tools.data.files import write_bytes
 from glider.tools.identify.identifiability import sentences, unidentifiable_directions
 from glider.tools.identify.pipeline import Identified
 from glider.tools.inference.channels import ROUGHIE_MEASURES
@@ -179,4 +180,4 @@ def report_html(found: Identified) -> str:
 
 def write_report(path: Path, found: Identified) -> None:
     """Write the page to a file."""
-    path.write_text(report_html(found), encoding="utf-8")
+    write_bytes(path, report_html(found).encode("utf-8"))

@@ -11,6 +11,7 @@ import msgspec
 from glider.sim_backend.core.effects.catalogue import catalogue as pool_catalogue
 from glider.sim_backend.ocean.catalogue import catalogue as ocean_catalogue
 from glider.sim_backend.ocean.vehicle import KIND
+from glider.tools.data.files import write_bytes
 from glider.tools.diagnose.record import AGAINST_HEALTHY, ANSWER, CauseRecord, Gap, number, read_as
 from glider.tools.report import words
 from glider.tools.report.page import REPORT, render
@@ -64,6 +65,19 @@ class _Answer(msgspec.Struct):
         return pool_catalogue() if self.kind == AGAINST_HEALTHY else ocean_catalogue()
 
 
+def which(found: _Answer) -> str:
+    """The runs or dives that figures are of: of a single one nothing can be left out."""
+    one = "run" if found.kind == AGAINST_HEALTHY else "dive"
+    return f"{one}s left out" if found.case.runs > 1 else f"this {one}, to which all was fitted,"
+
+
+def size(found: _Answer, label: str) -> str:
+    """The size of a selected label, behind a semicolon."""
+    cause = next(one for one in found.causes if one.label == label)
+    said = words.size_of(found.effects[label], cause.parameters)
+    return f"; {said}" if said else ""
+
+
 def sure(found: _Answer) -> str:
     """How sure the main cause is."""
     return f"{words.small_percent(found.causes[0].probability)} sure"
@@ -73,10 +87,11 @@ def against_healthy(found: _Answer) -> str:
     """The verdict of a diagnosis against healthy runs in one plain sentence."""
     before, after, floor = (words.number(number(one["total"])) for one in
                             (found.gap.before, found.gap.after, found.gap.floor))  # fmt: skip
-    gaps = f"the total gap of runs left out is {before} tolerances, of healthy runs {floor}"
+    gaps = f"the total gap of {which(found)} is {before} tolerances, of healthy runs {floor}"
     named = words.joined(found.selected)
     if found.verdict == "none":
-        return f"No change: {gaps}."
+        below = f" above {floor} tolerances, and one below cannot be seen" if words.blind(found.gap) else ""
+        return f"No change{below}: {gaps}."
     if found.verdict == "unknown":
         beside = f"; nearest to it comes {named}, with which {after} are left" if named else ""
         return f"A change that no label explains: {gaps}{beside}."
@@ -85,7 +100,7 @@ def against_healthy(found: _Answer) -> str:
     other = f"; these runs cannot tell it from {words.joined(confounded)}" if confounded else ""
     more = f", and {words.joined(found.selected[1:])}" if found.selected[1:] else ""
     return (
-        f"{words.upper(found.effects[label].summary)} ({label}; {sure(found)})"
+        f"{words.upper(found.effects[label].summary)} ({label}{size(found, label)}; {sure(found)})"
         f"{more}{other}; {gaps}, and with it {after}."
     )
 
@@ -100,12 +115,16 @@ def sentence(found: _Answer) -> str:
         regime = f", most of it {found.left.regime}" if found.left.regime else ""
         runs = f", most in {words.joined(found.left.runs)}" if found.left.runs else ""
         return (
-            f"An effect that no label names: the {found.left.channel} of dives left out is off by "
+            f"An effect that no label names: the {found.left.channel} of {which(found)} is off by "
             f"{words.number(found.left.excess)} tolerances beyond what noise leaves{regime}{runs}."
         )
     if not found.selected:
+        none = "No effect beyond what the vehicle file allows"
+        if words.blind(found.gap):
+            floor = words.number(number(found.gap.floor["total"]))
+            none = f"No effect above {floor} tolerances, which noise alone leaves, and one below cannot be seen"
         return (
-            f"No effect beyond what the vehicle file allows: the total gap of dives left out is {before} tolerances "
+            f"{none}: the total gap of {which(found)} is {before} tolerances "
             f"with the file's numbers and {again} with them fitted."
         )
     label = found.selected[0]
@@ -113,8 +132,8 @@ def sentence(found: _Answer) -> str:
     more = f", and {words.joined(found.selected[1:])}" if found.selected[1:] else ""
     other = f"; these dives cannot tell it from {words.joined(confounded)}" if confounded else ""
     return (
-        f"{words.upper(found.effects[label].summary)} ({label}; {sure(found)})"
-        f"{more}{other}; the total gap of dives left out is {before} tolerances with the file's numbers, {again} with "
+        f"{words.upper(found.effects[label].summary)} ({label}{size(found, label)}; {sure(found)})"
+        f"{more}{other}; the total gap of {which(found)} is {before} tolerances with the file's numbers, {again} with "
         f"them fitted and {after} with {'these effects' if more else 'that effect'}."
     )
 
@@ -147,12 +166,14 @@ def report_html(found: _Answer) -> str:
     highest = max([number(one.gap["total"]) for one in found.stages], default=1.0)
     healthy = found.reference
     context = {
+        "which": which(found).removesuffix(","),
+        "blind": found.verdict == "none" and words.blind(gap),
         "runs": "run" if healthy is not None else "dive",
         "asked": "Probabilities of the one effect that all dives have beside what the vehicle file allows."
         if healthy is None
         else f"Probabilities of the main change from {healthy.count} healthy runs.",
         "floor": "what noise and vertical water alone leave" if healthy is None
-        else "what the identified vehicle leaves of healthy runs left out",
+        else "what the identified vehicle leaves of healthy runs that its fit has not seen",
         "case": found.case, "verdict": found.verdict, "sentence": sentence(found), "ranking": _ranking(found),
         "sizes": _sizes(found), "cautions": [words.upper(line) for line in found.cautions], "skipped": found.skipped,
         "stages": [
@@ -173,5 +194,5 @@ def report_html(found: _Answer) -> str:
 def write_pooled_report(folder: Path) -> str:
     """Draw the report of such a diagnosis from its folder, into it; the verdict, in a sentence."""
     found = read_as(folder / ANSWER, _Answer)
-    (folder / REPORT).write_text(report_html(found), encoding="utf-8")
+    write_bytes(folder / REPORT, report_html(found).encode("utf-8"))
     return sentence(found)

@@ -6,6 +6,7 @@ from typing import Any
 import msgspec
 
 from glider.tools.data.errors import InputError
+from glider.tools.data.files import write_bytes
 from glider.tools.report import words
 from glider.tools.report.page import REPORT, render
 from glider.tools.watch.answer import FILE
@@ -130,7 +131,7 @@ def report_html(found: _Watch) -> str:
 def write_watch_report(folder: Path) -> str:
     """Draw the report of a watch from its folder, into it; what changed, in a sentence."""
     found = read_watch(folder)
-    (folder / REPORT).write_text(report_html(found), encoding="utf-8")
+    write_bytes(folder / REPORT, report_html(found).encode("utf-8"))
     if not found.events:
         return "Nothing changed, as far as these runs can show."
     named = [f"{one.label or 'an unknown change'} since {one.from_run}" for one in found.events]

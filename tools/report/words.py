@@ -3,9 +3,10 @@
 import math
 from typing import Any
 
+from glider.sim_backend.core.effects.base import Effect
 from glider.sim_backend.core.effects.catalogue import catalogue
 from glider.tools.diagnose.noise_probes import CLOCK, TURBULENCE, UNPREDICTABLE
-from glider.tools.diagnose.record import DiagnosisRecord, FindingRecord, Gap
+from glider.tools.diagnose.record import DiagnosisRecord, EstimateRecord, FindingRecord, Gap, Interval
 from glider.tools.diagnose.record import number as finite
 from glider.tools.diagnose.residuals import SHAPES, UNCLEAN, strongest_left
 
@@ -87,6 +88,7 @@ SURE_PROBABILITY, LITTLE_PROBABILITY = (
     0.8,
     0.02,
 )  # below the first the next answer is named, unless it is below the second
+FACTORS = {"1 + {}": lambda value: 1.0 + value, "e^{}": math.exp}  # of rows of the catalogue, by their parameter's name
 MEANS = {"none": "no gap", "unknown": "a gap of another kind"}
 READABLE = {"rad": ("deg", 180.0 / math.pi), "rad/s": ("deg/s", 180.0 / math.pi), "1/rad": ("1/deg", math.pi / 180.0)}
 
@@ -168,6 +170,62 @@ def left_of(before: float, after: float) -> float:
     return 1.0 - after / before if before > 0.0 else math.nan
 
 
+def named(record: DiagnosisRecord, label: str) -> str:
+    """An effect in plain words, with its sign, label, place and size; the bracket is left open."""
+    size = size_of(catalogue()[label], record.answer.cause(label).parameters)
+    return f"{directed(record, label)} ({label}, {place(label)}{f'; {size}' if size else ''}"
+
+
+def directed(record: DiagnosisRecord, label: str) -> str:
+    """Plain words of an effect: `more or less` is more, or less, where all parameters that are sure have one sign."""
+    known = [one for one in record.answer.cause(label).parameters.values() if one.estimate is not None]
+    signs = {math.copysign(1.0, finite(one.estimate)) for one in (clear(known) or known)}
+    word = " more or less" if len(signs) != 1 else " more" if signs == {1.0} else " less"
+    return PLAIN[label].replace(" more or less", word)
+
+
+def clear(parameters: list[EstimateRecord]) -> list[EstimateRecord]:
+    """Parameters whose 90 % interval leaves out 0."""
+    return [one for one in parameters if finite(one.ci90[0]) > 0.0 or finite(one.ci90[1]) < 0.0]
+
+
+def size_of(effect: Effect, parameters: dict[str, EstimateRecord]) -> str:
+    """An effect's size: the quantity that its row of the catalogue multiplies, or parameters with their units.
+
+    Only parameters that are sure, unless none is; "" where nothing was estimated.
+    """
+    known = {name: one for name, one in parameters.items() if one.estimate is not None}
+    certain = clear(list(known.values())) or list(known.values())
+    said = [_size(effect, name, one) for name, one in known.items() if any(one is sure_one for sure_one in certain)]
+    signs = [clause for clause in effect.summary.split(", ") if clause.endswith("positive")] if said else []
+    return ", ".join(["; ".join(said), *signs])
+
+
+def _size(effect: Effect, name: str, one: EstimateRecord) -> str:
+    """A parameter's size, by the clause of the effect's row that multiplies something by it, where one does."""
+    for form, factor in FACTORS.items():
+        written = form.format(name)
+        clause = next((part for part in effect.summary.split(", ") if written in part), None)
+        if clause is None:
+            continue
+        low, high = (factor(finite(end)) for end in one.ci90)
+        times = sized(EstimateRecord(factor(finite(one.estimate)), (low, high), "1"))
+        head = clause[: clause.index("1 + " if form.startswith("1") else written)]
+        if "(" in head:
+            return f"{name} by a factor of {times}"
+        return f"{f'{name}: ' if clause.count('1 + ') > 1 else ''}{head}{times}"
+    return f"{name} {sized(one, effect.subsystem in ('mass', 'actuation'))}"
+
+
+def sized(one: EstimateRecord, mass: bool = True) -> str:
+    """An estimate in the unit that is easiest to read, with its 90 % interval where there is one."""
+    ends = [finite(end) for end in one.ci90]
+    whole = all(map(math.isfinite, ends))
+    values, unit = scaled([finite(one.estimate), *(ends if whole else [])], one.unit, mass)
+    shown = [number(value) for value in values]
+    return f"{shown[0]}{f' {unit}' if unit else ''}" + (f", 90 %: {shown[1]} to {shown[2]}" if whole else "")
+
+
 def change(share: float) -> str:
     """`shrinks by 12 %` or, where it does not, `grows by 3 %`."""
     return f"grows by {percent(-share)}" if share < -0.005 else f"shrinks by {percent(max(share, 0.0))}"
@@ -183,13 +241,35 @@ def interval(low: float, high: float) -> str:
     return f"90 % interval {percent(low).removesuffix(' %')} to {percent(high)}"
 
 
+def which(record: DiagnosisRecord) -> str:
+    """The runs that figures are of: of a single run nothing can be left out."""
+    return "on runs left out of the fit" if record.details.data.runs > 1 else "of this run, to which all was fitted,"
+
+
 def how_far(record: DiagnosisRecord, with_what: str) -> str:
-    """The shrinkage on runs left out, and what recalibration alone does."""
+    """How far the gap shrinks, with the interval where there is one, and what recalibration alone does."""
     gap = record.answer.gap
+    share = left_of(finite(gap.before["total"]), finite(gap.after["total"]))
     return (
-        f"{with_what} the gap on runs left out of the fit {change(finite(gap.shrinkage.value))} "
-        f"({interval(*map(finite, gap.shrinkage.ci90))}), while refitting the nominal parameters alone {alone(gap)}"
+        f"{with_what} the gap {which(record)} {with_interval(change(share), gap.shrinkage)}, while refitting the "
+        f"nominal parameters alone {alone(gap)}"
     )
+
+
+def with_interval(said: str, share: Interval) -> str:
+    """What is said of a share, with its 90 % interval where there is one."""
+    low, high = map(finite, share.ci90)
+    return f"{said} ({interval(low, high)})" if math.isfinite(low) and math.isfinite(high) else said
+
+
+def blind(gap: Gap) -> bool:
+    """Whether the floor itself is above one tolerance: then no gap may be said to be none."""
+    return finite(gap.floor["total"]) > 1.0
+
+
+def means(label: str, gap: Gap) -> str:
+    """What `none` and `unknown` mean; "" for an effect."""
+    return "no gap above the floor" if label == "none" and blind(gap) else MEANS.get(label, "")
 
 
 def alone(gap: Gap) -> str:
@@ -203,7 +283,7 @@ def how_sure(record: DiagnosisRecord) -> str:
     first, second = record.answer.causes[:2]
     if first.probability >= SURE_PROBABILITY or second.probability < LITTLE_PROBABILITY:
         return f"{sure(first.probability)} sure"
-    other = MEANS.get(second.label, second.label)
+    other = means(second.label, record.answer.gap) or second.label
     return f"only {sure(first.probability)} sure, else {other} at {sure(second.probability)}"
 
 
@@ -221,9 +301,16 @@ def _none(record: DiagnosisRecord) -> str:
     gap = record.answer.gap
     before, refitted, floor = (number(finite(table["total"])) for table in (gap.before, gap.recalibrated, gap.floor))
     certain = f"; certain by the readings alone: {joined(record.answer.selected)}" if record.answer.selected else ""
+    if blind(gap):
+        said = (
+            f"A gap below {floor} tolerances cannot be seen in these runs: noise and disturbance alone leave as much. "
+            f"Nothing stands out above that ({how_sure(record)})"
+        )
+    else:
+        said = "No gap: noise, disturbance and parameters within their uncertainty explain these runs "
+        said += f"({how_sure(record)})"
     return (
-        f"No gap: noise, disturbance and parameters within their uncertainty explain these runs ({how_sure(record)}); "
-        f"on runs left out of the fit the total is {before} tolerances with the nominal model and {refitted} with its "
+        f"{said}; the total {which(record)} is {before} tolerances with the nominal model and {refitted} with its "
         f"parameters refitted, where noise and disturbance alone leave {floor}{certain}."
     )
 
@@ -232,11 +319,11 @@ def _causes(record: DiagnosisRecord) -> str:
     answer = record.answer
     others = [label for label in answer.selected if label != answer.main]
     confounded = [label for label in answer.cause(answer.main).group if label != answer.main]
-    said = f"{PLAIN[answer.main]} ({answer.main}, {place(answer.main)}; {how_sure(record)})"
+    said = f"{named(record, answer.main)}; {how_sure(record)})"
     if confounded:
         said += f", which these data cannot distinguish from {joined(confounded)}"
     if others:
-        said += f", and also {joined([f'{PLAIN[label]} ({label}, {place(label)})' for label in others])}"
+        said += f", and also {joined([f'{named(record, label)})' for label in others])}"
     if record.details.noise is not None and record.details.noise.name == CLOCK:
         said += "; that clock's delay varies with time"
     head = {0: "", 1: "Two effects at once: "}.get(len(others), f"{len(others) + 1} effects at once: ")
@@ -250,11 +337,12 @@ def _excess_noise(record: DiagnosisRecord) -> str:
     if answer.main == TURBULENCE and noise is not None:
         size = f", about {noise.scale:.2g} times as rough"
     others = [label for label in answer.selected if label != answer.main]
-    beside = f", and also {joined([f'{PLAIN[o]} ({o}, {place(o)})' for o in others])}" if others else ""
+    beside = f", and also {joined([f'{named(record, o)})' for o in others])}" if others else ""
     return (
         f"{upper(PLAIN[answer.main])}{size} ({answer.main}, {place(answer.main)}; {how_sure(record)}){beside}; its "
-        f"time course is random, so that knowing it shrinks no gap, and on runs left out of the fit refitting the "
-        f"nominal parameters {alone(answer.gap)}, to {number(finite(answer.gap.recalibrated['total']))} tolerances."
+        f"time course is random, so that knowing it shrinks no gap. The gap {which(record)} is "
+        f"{number(finite(answer.gap.before['total']))} tolerances, and refitting the nominal parameters "
+        f"{alone(answer.gap)}, to {number(finite(answer.gap.recalibrated['total']))}."
     )
 
 
@@ -266,8 +354,9 @@ def _identified(record: DiagnosisRecord) -> str:
     unnamed = [one.text for one in answer.readings if one.label is None and one.finding == "goes_with"]
     said = "Certain: " + "; ".join(certain) if certain else "No effect of the catalogue is certain"
     said += (
-        f". With {'that and ' if certain or unnamed else ''}the vehicle identified from these runs, runs left out are "
-        f"missed by {number(last)} tolerances instead of {number(first)}. What is left has no cause with a name yet"
+        f". With {'that and ' if certain or unnamed else ''}the vehicle identified from these runs, the gap "
+        f"{which(record)} is {number(last)} tolerances instead of {number(first)}. What is left has no cause with a "
+        "name yet"
     )
     return f"{said}."
 
@@ -294,7 +383,7 @@ def _unknown(record: DiagnosisRecord) -> str:
     said += f"; {how_far(record, known)}"
     correction = None if answer.unknown is None else answer.unknown.correction
     if correction is not None:
-        share = finite(correction.shrinkage.value)
+        share = left_of(finite(answer.gap.before["total"]), finite(correction.gap["total"]))
         does = f"shrink it by {percent(max(share, 0.0))}" if share >= -0.005 else f"enlarge it by {percent(-share)}"
         features = joined([feature(name) for name in correction.goes_with])
         said += f"; a data-driven correction of the {correction.link}, a function of {features}, would {does}"

@@ -15,8 +15,8 @@ from glider.firmware.model.library import shipped
 from glider.hal.strict import ConfigError, decode
 from glider.sim_backend.ocean.vehicle import shipped_vehicles
 from glider.tools.data.errors import InputError
+from glider.tools.data.files import check_writable, write_bytes
 from glider.tools.data.runs.case import CASE_FILE, CaseTable
-from glider.tools.data.runs.csvfile import write_bytes
 from glider.tools.data.sources import name_or_path, read_text
 from glider.tools.study.workers import check_reachable, work_through
 
@@ -136,6 +136,7 @@ def run_batch(
     todo = many.todo()
     if many.dask:
         check_reachable(many.dask)
+    check_writable(many.out)
     many.out.mkdir(parents=True, exist_ok=True)
     advance(len(many.cases) - len(todo))
     wrong: list[str] = []

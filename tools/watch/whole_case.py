@@ -14,10 +14,11 @@ import numpy as np
 from glider.sim_backend.ocean.catalogue import NOT_ASKED
 from glider.sim_backend.ocean.vehicle import PLACES, OceanVehicle
 from glider.tools.data.errors import InputError
+from glider.tools.data.files import write_files
 from glider.tools.data.plain import as_plain
 from glider.tools.data.runs.case import Case
-from glider.tools.data.runs.csvfile import write_bytes
 from glider.tools.data.runs.run import Run
+from glider.tools.diagnose.cautions import below_floor
 from glider.tools.diagnose.noise_probes import VERTICAL_WATER
 from glider.tools.diagnose.probabilities import ERROR_RATE, TIE, softmax
 from glider.tools.diagnose.record import ANSWER, NONE, UNKNOWN
@@ -381,8 +382,8 @@ def cautions(found: OceanDiagnosis) -> list[str]:
     if found.left is not None:
         sentences.append(found.left.sentence)
     if len(found.runs) == 1:
-        sentences.append("one run only: nothing is left out, the gaps are those of runs that were fitted")
-    return sentences
+        sentences.append("one dive only: the gaps are those of the dive that was fitted, and not checked on other data")
+    return sentences + below_floor(by_channel(found.gaps[FLOOR]))
 
 
 def write(found: OceanDiagnosis, out: Path) -> None:
@@ -390,5 +391,5 @@ def write(found: OceanDiagnosis, out: Path) -> None:
     vehicle = found.case.vehicle
     assert isinstance(vehicle, OceanVehicle)
     out.mkdir(parents=True, exist_ok=True)
-    write_bytes(out / CORRECTED, corrected_text(vehicle, *found.model).encode("utf-8"))
-    write_bytes(out / ANSWER, (json.dumps(as_plain(plain(found)), indent=1) + "\n").encode())
+    answer = (json.dumps(as_plain(plain(found)), indent=1) + "\n").encode()
+    write_files({out / CORRECTED: corrected_text(vehicle, *found.model).encode("utf-8"), out / ANSWER: answer})

@@ -40,7 +40,7 @@ def test_a_damaged_chunk_counts_as_not_flown(plan_of, tmp_path, damage):
 def test_a_folder_keeps_its_chunks_and_loses_what_was_half_written(plan_of, tmp_path):
     plan = plan_of()
     Store(tmp_path, plan, fingerprint(plan), 6)
-    (tmp_path / "chunk-000000.npy.7.part").write_bytes(b"half")
+    (tmp_path / ".chunk-000000.npy.7.tmp").write_bytes(b"half")
     assert Store(tmp_path, plan, fingerprint(plan), 60).chunk == 6
     assert [path.name for path in tmp_path.iterdir()] == [MANIFEST]
 

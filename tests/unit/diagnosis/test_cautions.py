@@ -9,7 +9,7 @@ from support.cases import make_case
 from glider.sim_backend.core.effects import effect_layout as ef
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs.case import Case
-from glider.tools.diagnose.cautions import cautions, not_asked
+from glider.tools.diagnose.cautions import below_floor, cautions, not_asked
 from glider.tools.inference.problem import problem_of
 
 
@@ -47,6 +47,31 @@ def test_a_long_hole_is_named_with_its_column_and_length(case):
     depth[100:180] = np.nan
     (line,) = cautions(problem_of(changed(case, **{names.DEPTH: depth})))
     assert line == "run00: depth_m (18 % missing, up to 8 s): less can be seen there"
+
+
+def test_a_sensor_that_is_slower_than_the_log_is_whole(case):
+    """Every second row, and of another one every second or third: their own rates."""
+    rows = np.arange(len(case.runs[0].t))
+    half, uneven = case.runs[0].columns[names.DEPTH].copy(), case.runs[0].columns[names.DRAW_WIRES[0]].copy()
+    half[rows % 2 == 1] = np.nan
+    uneven[~np.isin(rows % 5, (0, 2))] = np.nan
+    slower = {names.DEPTH: half, names.DRAW_WIRES[0]: uneven}
+    assert cautions(problem_of(changed(case, **slower))) == []
+    half[100:260] = np.nan
+    (line,) = cautions(problem_of(changed(case, **slower)))
+    assert line == "run00: depth_m (36 % missing, up to 16 s): less can be seen there"
+
+
+@pytest.mark.parametrize(
+    ("floor", "said"),
+    [({"depth": 0.4, "yaw": 0.9, "total": 0.6}, []),
+     ({"depth": 0.4, "yaw": 1.3, "total": 0.6}, ["noise and disturbance alone leave yaw 1.3 tolerances: a gap"]),
+     ({"depth": 2.4, "yaw": 1.3, "total": 2.18}, ["noise and disturbance alone leave 2.2 tolerances: a gap below"])],
+)  # fmt: skip
+def test_a_floor_above_a_tolerance_is_said(floor, said):
+    lines = below_floor(floor)
+    assert len(lines) == len(said)
+    assert all(line.startswith(begin) for line, begin in zip(lines, said, strict=True))
 
 
 def test_short_blind_spells_are_usual(case):

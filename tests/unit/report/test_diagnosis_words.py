@@ -9,36 +9,50 @@ from glider.tools.diagnose.noise_probes import CLOCK, TURBULENCE
 from glider.tools.diagnose.record import (
     AnswerRecord,
     CauseRecord,
+    CorrectionRecord,
     Data,
     Details,
     DiagnosisRecord,
+    EstimateRecord,
     FindingRecord,
     Gap,
     Interval,
     NextRun,
     Noise,
     Place,
+    StepRecord,
     Unexplained,
 )
 from glider.tools.inference.kind import ROUGHIE
 from glider.tools.report import words
+from glider.tools.report.diagnosis import report_html
 
+THRESHOLDS = {"evidence": 12.0, "tie": 6.0, "sigma": 6.0, "left": 0.1, "matters": 0.1}
 FAR = {"before": 4.0, "recalibrated": 3.0, "after": 0.5, "floor": 0.4}
 
 
-def record(probabilities, selected=(), groups=None, findings=(), noise=None, where=(), **far) -> DiagnosisRecord:
-    """A diagnosis of these numbers, as its folder would hold it."""
+def record(
+    probabilities, selected=(), groups=None, findings=(), noise=None, where=(), runs=3, sizes=None, stages=(), **far
+) -> DiagnosisRecord:
+    """A diagnosis of these numbers, as its folder would hold it; sizes: by label, parameters."""
     ranked = sorted(({"none": 0.0, "unknown": 0.0} | probabilities).items(), key=lambda item: -item[1])
-    causes = [CauseRecord(label, p, (groups or {}).get(label, [label]), {}) for label, p in ranked]
+    causes = [
+        CauseRecord(label, p, (groups or {}).get(label, [label]), (sizes or {}).get(label, {}))
+        for label, p in [*ranked, *((label, 0.0) for label in selected if label not in dict(ranked))]
+    ]
     tables = ({"total": value} for value in (FAR | far).values())
-    gap = Gap(*tables, Interval(0.875, (0.81, 0.93)), Interval(0.97, (0.9, 1.0)))
+    none = Interval(None, (None, None))  # of one run nothing can be left out
+    shares = (Interval(0.875, (0.81, 0.93)), Interval(0.97, (0.9, 1.0))) if runs > 1 else (none, none)
+    gap = Gap(*tables, *shares)
     main = causes[0].label
     answer = AnswerRecord(
         1, main if main in ("none", "unknown") else "cause", [Place(*one) for one in where], causes, list(selected),
-        gap, Unexplained(), [], NextRun("a dive", [], None, "next_run.toml"),
+        gap, Unexplained(), [], NextRun("a dive", [], None, "next_run.toml"), stages=list(stages),
     )  # fmt: skip
-    data = Data("case", "roughie", "pond", 3, 180.0, 10.0, False, [], [])
-    return DiagnosisRecord(answer, Details(1, "0", data, {}, bool(selected), noise, [], list(findings), [], {}), [])
+    data = Data("case", "roughie", "pond", runs, 180.0, 10.0, False, [], [])
+    evidence = dict.fromkeys(selected, 50.0)
+    details = Details(1, "0", data, evidence, bool(selected), noise, [], list(findings), [], THRESHOLDS)
+    return DiagnosisRecord(answer, details, [])
 
 
 def test_every_label_has_plain_words():
@@ -53,6 +67,91 @@ def test_one_cause_says_what_where_how_sure_and_how_far():
         "the gap on runs left out of the fit shrinks by 88 % (90 % interval 81 to 93 %), while refitting the nominal "
         "parameters alone shrinks it by 25 %."
     )
+
+
+PARTS_OF_NOTHING = ("left out", "unknown to unknown", "unknown %", "closed", "nan", "not checked on it")
+
+
+def of_one_run() -> list[DiagnosisRecord]:
+    """A diagnosis of one run for every kind of verdict, and one of a vehicle that had to be identified."""
+    none = Interval(None, (None, None))
+    correction = CorrectionRecord("heave force", "N", {"depth": 0.1}, "data_driven.toml", {"total": 1.0}, none)
+    learned = record({"unknown": 0.9}, runs=1)
+    learned.answer.unknown = Unexplained(correction)
+    steps = [StepRecord("nominal", [], {"total": 6.0}), StepRecord("identified", [], {"total": 2.0})]
+    return [
+        record({"none": 0.98}, runs=1), record({"none": 0.98}, runs=1, floor=2.0),
+        record({"drag": 0.98}, ["drag"], runs=1), record({"turbulence": 0.9}, ["turbulence"], runs=1),
+        learned, record({"unknown": 0.9}, runs=1, stages=steps),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("found", of_one_run())
+def test_of_one_run_nothing_is_left_out(found):
+    for text in (words.sentence(found), report_html(found)):
+        assert not any(part in text for part in PARTS_OF_NOTHING)
+    assert "of this run, to which all was fitted" in words.sentence(found)
+
+
+def test_one_run_with_a_cause_says_how_far_it_was_fitted():
+    said = words.sentence(record({"pump_slow": 0.97}, ["pump_slow"], runs=1))
+    assert said.endswith(
+        "; with that in the model the gap of this run, to which all was fitted, shrinks by 88 %, while refitting the "
+        "nominal parameters alone shrinks it by 25 %."
+    )
+
+
+def test_no_gap_is_never_said_where_the_floor_is_above_a_tolerance():
+    found = record({"none": 0.6, "drag": 0.4}, before=1.9, recalibrated=1.9, after=1.9, floor=2.18)
+    said = words.sentence(found)
+    assert said.startswith(
+        "A gap below 2.18 tolerances cannot be seen in these runs: noise and disturbance alone leave as much. Nothing "
+        "stands out above that (only 60 % sure, else drag at 40 %); the total on runs left out of the fit is 1.90 "
+    )
+    assert "no gap above the floor" in report_html(found)
+    assert 'class="verdict blind"' in report_html(found)
+    assert "No gap" not in said + report_html(found)
+    doubted = words.sentence(record({"drag": 0.6, "none": 0.4}, ["drag"], floor=1.2))
+    assert "else no gap above the floor at 40 %" in doubted
+
+
+@pytest.mark.parametrize(
+    ("label", "size", "said"),
+    [
+        ("drag", {"scale": EstimateRecord(0.5, (0.43, 0.57), "1"), "induced": EstimateRecord(0.1, (-0.2, 0.4), "1")},
+         "The hull drags more than its coefficients say (drag, hydrodynamics: surge; K_D0 times 1.50, 90 %: 1.43 to "
+         "1.57; 97 % sure)"),
+        ("drag", {"scale": EstimateRecord(-0.3, (-0.4, -0.2), "1")},
+         "The hull drags less than its coefficients say (drag, hydrodynamics: surge; K_D0 times 0.700, 90 %: 0.600 to "
+         "0.800; 97 % sure)"),
+        ("inertia", {"pitch": EstimateRecord(0.742, (0.6, 0.9), "1"), "yaw": EstimateRecord(0.0, (-0.2, 0.2), "1")},
+         "The hull resists turning more than modelled (inertia, mass: inertia; pitch: hull inertia times 1.74, 90 %: "
+         "1.60 to 1.90; 97 % sure)"),
+        ("pump_slow", {"rate": EstimateRecord(0.6, (0.535, 0.665), "1")},
+         "(pump_slow, actuation: ballast; rate limit divided by 1.82, 90 %: 1.71 to 1.94; 97 % sure)"),
+        ("cg_longitudinal", {"offset": EstimateRecord(-0.0015, (-0.002, -0.001), "m")},
+         f"offset {words.MINUS}1.50 mm, 90 %: {words.MINUS}2.00 to {words.MINUS}1.00, forward positive; 97 % sure)"),
+        ("net_buoyancy", {"mass": EstimateRecord(0.06, (None, None), "kg")}, "; mass 60.0 g, heavy positive; 97 % sure)"),
+        ("pitch_damping", {"scale": EstimateRecord(0.3, (0.2, 0.4), "1")}, "; scale by a factor of 1.30, 90 %: 1.20 to 1.40"),
+    ],
+)  # fmt: skip
+def test_the_sentence_gives_sign_and_size(label, size, said):
+    assert said in words.sentence(record({label: 0.97}, [label], sizes={label: size}))
+
+
+@pytest.mark.parametrize("effect", [*catalogue().values(), *ocean_catalogue().values()], ids=lambda one: one.label)
+def test_every_effect_has_a_size_in_words(effect):
+    """A parameter that is a factor is said as one; the others have their unit."""
+    for parameter in effect.parameters:
+        value = 0.5 * max(parameter.low, parameter.high, key=abs)
+        said = words.size_of(
+            effect, {parameter.name: EstimateRecord(value, (0.9 * value, 1.1 * value), parameter.unit)}
+        )
+        assert ", 90 %: " in said
+        if parameter.unit == "1" and f"1 + {parameter.name}" in effect.summary:
+            assert words.number(1.0 + value) in said
+        elif parameter.unit not in ("1", *words.READABLE):
+            assert any(unit in said for unit in (parameter.unit, parameter.unit.removeprefix("k"), "mm"))
 
 
 def test_what_cannot_be_told_apart_is_in_the_sentence():

@@ -150,7 +150,7 @@ def test_ctrl_c_at_the_question_arms_nothing(fly, tmp_path):
     child.expect(QUESTION)
     until(lambda: asleep(child.pid), 60.0)  # Python loses what comes between the question and the wait for the answer
     child.sendintr()
-    assert ended(child)[1] == 1
+    assert ended(child)[1] == 130
     assert StateFile(tmp_path).read().state == SortieState.ASHORE
 
 

@@ -1,7 +1,6 @@
 """A case of an ocean glider as a mission in OceanGliders' common format (OG-1.0), with what was found out about it."""
 
 import datetime as dt
-import os
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +8,7 @@ import numpy as np
 
 from glider.tools.data.errors import InputError
 from glider.tools.data.exporters.variables import Variable, found_in
+from glider.tools.data.files import whole
 from glider.tools.data.importers.ocean import og1_names
 from glider.tools.data.runs.case import load_runs
 from glider.tools.data.runs.origin import Origin, read_fixes, read_origins
@@ -79,13 +79,9 @@ def write_og1(
             "platform_vocabulary": "https://vocab.nerc.ac.uk/collection/L06/current/27",
         },
     )  # fmt: skip
-    temporary = out.with_name(f".{out.name}.{os.getpid()}.tmp")
     packed = {name: {"zlib": True} for name, one in dataset.variables.items() if one.dims}
-    try:
+    with whole(out) as (temporary,):
         dataset.to_netcdf(temporary, engine="h5netcdf", encoding=packed)
-        os.replace(temporary, out)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def _by_row(runs: list[Run], values: list[Any]) -> np.ndarray:

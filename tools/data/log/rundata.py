@@ -4,6 +4,7 @@ The tick record's fields that run data knows become its columns; the others (ref
 their own names, which readers of run data keep and ignore; a simulation's truth follows as `true_*`.
 """
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -314,6 +315,6 @@ def _write(
         log.finish({"written": str(len(t)), "dropped": "0", "damaged": "0"})
         done = file.sync()
         if not done:
-            raise OSError(file.last_errno, "the log could not be written", str(path))
+            raise OSError(file.last_errno, os.strerror(file.last_errno), str(path))
     finally:
         disk.close(fd, str(path), keep=done)

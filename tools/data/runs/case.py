@@ -12,8 +12,8 @@ from glider.firmware.model.vehicle import Assumed, DisturbanceTable, NonNegative
 from glider.hal.strict import MAX_BYTES, Table, decode
 from glider.sim_backend.ocean.vehicle import OceanVehicle
 from glider.tools.data.errors import InputError
+from glider.tools.data.files import write_bytes
 from glider.tools.data.runs import columns as names
-from glider.tools.data.runs import csvfile
 from glider.tools.data.runs.run import Run, load_run, run_name, write_run
 from glider.tools.data.sources import load_any_vehicle, read_text
 
@@ -260,14 +260,22 @@ def write_case(
     if folder.is_dir() and ((folder / CASE_FILE).exists() or _run_files(folder)):
         raise InputError("the folder already holds a case: name another, or empty it", source=folder)
     folder.mkdir(parents=True, exist_ok=True)
-    files = []
     digits = max(digits, len(str(len(runs) - 1)))
-    for number, run in enumerate(runs):
-        files.append(folder / f"run{number:0{digits}d}{suffix}")
-        write_run(files[-1], run, decimals=decimals)
-    for name, data in (beside or {}).items():
-        csvfile.write_bytes(folder / name, data)
+    files = [folder / f"run{number:0{digits}d}{suffix}" for number in range(len(runs))]
+    others = dict(beside or {})
     if vehicle_text is not None:
-        csvfile.write_bytes(folder / VEHICLE_FILE, vehicle_text.encode("utf-8"))
-    csvfile.write_bytes(folder / CASE_FILE, text.encode("utf-8"))
+        others[VEHICLE_FILE] = vehicle_text.encode("utf-8")
+    others[CASE_FILE] = text.encode("utf-8")
+    written: list[Path] = []
+    try:
+        for path, run in zip(files, runs, strict=True):
+            write_run(path, run, decimals=decimals)
+            written.append(path)
+        for name, data in others.items():
+            write_bytes(folder / name, data)
+            written.append(folder / name)
+    except OSError:
+        for path in written:
+            path.unlink(missing_ok=True)  # half a case is none
+        raise
     return files

@@ -5,7 +5,6 @@ import csv
 import gzip
 import io
 import math
-import os
 import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -17,6 +16,7 @@ import numpy as np
 
 from glider.hal.strict import Table as StrictTable
 from glider.tools.data.errors import InputError
+from glider.tools.data.files import write_bytes
 from glider.tools.data.runs.records import Line, LineTable, distinguishable, joined, over_lines
 
 MAX_BYTES = 256_000_000  # unpacked; an hour at 50 Hz with forty columns of full precision is half of it
@@ -289,14 +289,3 @@ def write_table(path: Path, columns: dict[str, list[str]]) -> None:
     if path.name.endswith(".gz"):
         data = gzip.compress(data, compresslevel=6, mtime=0)  # no time inside: equal runs are equal files
     write_bytes(path, data)
-
-
-def write_bytes(path: Path, data: bytes) -> None:
-    """A file, whole or not at all."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        temporary.write_bytes(data)
-        os.replace(temporary, path)
-    except OSError:
-        temporary.unlink(missing_ok=True)
-        raise

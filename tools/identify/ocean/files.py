@@ -10,8 +10,8 @@ import numpy as np
 from glider.sim_backend.ocean.catalogue import catalogue
 from glider.sim_backend.ocean.core import layout as at
 from glider.sim_backend.ocean.vehicle import PLACES, OceanVehicle, decode_ocean_vehicle
+from glider.tools.data.files import write_files
 from glider.tools.data.plain import as_plain
-from glider.tools.data.runs.csvfile import write_bytes
 from glider.tools.data.tomltext import toml_text
 from glider.tools.identify.ocean.identify import OceanIdentification
 from glider.tools.inference.model import effects_in
@@ -93,5 +93,5 @@ def plain(found: OceanIdentification) -> dict[str, Any]:
 def write(found: OceanIdentification, out: Path) -> None:
     """All files into a folder."""
     out.mkdir(parents=True, exist_ok=True)
-    write_bytes(out / VEHICLE, vehicle_text(found).encode("utf-8"))
-    write_bytes(out / RESULT, (json.dumps(as_plain(plain(found)), indent=1) + "\n").encode("utf-8"))
+    result = (json.dumps(as_plain(plain(found)), indent=1) + "\n").encode("utf-8")
+    write_files({out / VEHICLE: vehicle_text(found).encode("utf-8"), out / RESULT: result})

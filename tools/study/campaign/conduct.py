@@ -11,10 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
+from glider.tools.data.files import write_bytes
 from glider.tools.study.campaign.fingerprint import fingerprint
 from glider.tools.study.campaign.flights import CHUNK, COLUMNS, ENDINGS, FlightJob, compile_loop, cut, fly_chunk
 from glider.tools.study.campaign.plan import CampaignPlan
-from glider.tools.study.campaign.store import Store, write_whole
+from glider.tools.study.campaign.store import Store
 from glider.tools.study.workers import check_reachable, work_through
 
 FLIGHTS_FILE = "flights.csv"
@@ -88,4 +89,4 @@ def write_flights(path: Path, flown: FlownChunk) -> None:
             values[name] = int(values[name])
         values["leg"] += 1  # legs count from 1 to a reader
         writer.writerow("" if value != value else value for value in values.values())
-    write_whole(path, text.getvalue().encode())
+    write_bytes(path, text.getvalue().encode())

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from glider.firmware.core.control.controller_rows import CONTROLLERS
+from glider.tools.data.files import write_bytes
 from glider.tools.report.charts import Chart, Curve, svg
 from glider.tools.study.campaign.conduct import FlownChunk
-from glider.tools.study.campaign.store import write_whole
 from glider.tools.study.campaign.summary import completed_by_all, summarise, wilson
 
 BINS = 5
@@ -127,4 +127,4 @@ def page(flown: FlownChunk) -> str:
 
 def write_page(path: Path, flown: FlownChunk) -> None:
     """Write the page to a file."""
-    write_whole(path, page(flown).encode())
+    write_bytes(path, page(flown).encode())

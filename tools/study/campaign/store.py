@@ -2,7 +2,6 @@
 
 import contextlib
 import json
-import os
 import zipfile
 from pathlib import Path
 
@@ -11,12 +10,12 @@ import numpy as np
 
 from glider.firmware.core.jit import kernels_digest
 from glider.tools.data.errors import InputError
+from glider.tools.data.files import UNFINISHED, write_bytes
 from glider.tools.data.version import release
 from glider.tools.study.campaign.flights import COLUMNS, Chunk
 from glider.tools.study.campaign.plan import CampaignPlan
 
 MANIFEST = "campaign.json"
-UNFINISHED = ".part"
 
 
 class Manifest(msgspec.Struct):
@@ -29,16 +28,6 @@ class Manifest(msgspec.Struct):
     chunk: int  # flights a chunk
     columns: list[str]
     campaign: dict
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file that is either not there or whole, whatever happens in between."""
-    part = path.with_name(f"{path.name}.{os.getpid()}{UNFINISHED}")
-    with part.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(part, path)
 
 
 class Store:
@@ -59,7 +48,7 @@ class Store:
         manifest = Manifest(
             1, fingerprint, release(), kernels_digest(), chunk, list(COLUMNS), msgspec.to_builtins(plan.campaign)
         )
-        write_whole(path, json.dumps(msgspec.to_builtins(manifest), indent=1).encode())
+        write_bytes(path, json.dumps(msgspec.to_builtins(manifest), indent=1).encode(), kept=True)
 
     def _same(self, path: Path) -> int:
         """The chunk size of a folder begun by the same campaign and software."""
@@ -83,7 +72,7 @@ class Store:
 
         buffer = io.BytesIO()
         np.save(buffer, rows)
-        write_whole(self._path(chunk), buffer.getvalue())
+        write_bytes(self._path(chunk), buffer.getvalue(), kept=True)
 
     def read(self, chunk: Chunk, controllers: int) -> np.ndarray | None:
         """A finished chunk's rows; None if it has not been flown, or its file is damaged."""

@@ -11,7 +11,7 @@ from typing import Any
 
 from glider.firmware.model.vehicle import Vehicle
 from glider.tools.data.errors import InputError
-from glider.tools.data.runs.csvfile import write_bytes
+from glider.tools.data.files import write_bytes
 from glider.tools.data.sources import load_vehicle
 from glider.tools.study.challenge import seal
 from glider.tools.study.challenge.cases import NoCase, answer, draw_case, write

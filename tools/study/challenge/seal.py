@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from glider.tools.data.errors import InputError
-from glider.tools.data.runs.csvfile import write_bytes
+from glider.tools.data.files import write_bytes
 
 MANIFEST, ARCHIVE = "manifest.json", "answers.zip"
 PLAN = "plan.json"

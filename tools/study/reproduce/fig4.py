@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from glider.firmware.model.vehicle import COEFFICIENTS, Vehicle
+from glider.tools.data.files import whole
 from glider.tools.data.runs.case import load_case
 from glider.tools.identify.design import write_design
 from glider.tools.identify.pipeline import identify
@@ -26,7 +27,8 @@ def reproduce_fig4(vehicle_name: str, vehicle: Vehicle, out: Path) -> dict[str, 
     truth, sizes = world.coefficients(), coefficient_sizes(vehicle.vector())
     picture = out / "fig4.png"
     figure = marginals(found, truth)
-    figure.savefig(picture, dpi=130)
+    with whole(picture) as (temporary,):
+        figure.savefig(temporary, format="png", dpi=130)
     plt.close(figure)
     table = [
         {

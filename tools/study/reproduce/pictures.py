@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from glider.tools.data.files import whole
 from glider.tools.study.reproduce import circle, tracking
 from glider.tools.study.reproduce.design import Batch
 
@@ -16,6 +17,11 @@ def _figure(**options: Any):
     from matplotlib.figure import Figure
 
     return Figure(layout="constrained", **options)
+
+
+def _save(sheet: Any, path: Path) -> None:
+    with whole(path) as (temporary,):
+        sheet.savefig(temporary, format="png", dpi=110)
 
 
 def tracking_picture(
@@ -63,7 +69,7 @@ def tracking_picture(
     error.tick_params(labelsize=7)
     error.legend(fontsize=6)
     sheet.suptitle(f"{figure.name}: noise {noise:g} in the flights shown", fontsize=10)
-    sheet.savefig(path, dpi=110)
+    _save(sheet, path)
 
 
 def circle_picture(flown: circle.Circles, path: Path) -> None:
@@ -91,4 +97,4 @@ def circle_picture(flown: circle.Circles, path: Path) -> None:
         space.set_zlabel("depth, m", fontsize=8)
         for ax in (top, space):
             ax.tick_params(labelsize=7)
-    sheet.savefig(path, dpi=110)
+    _save(sheet, path)
