@@ -147,7 +147,8 @@ def glider(monkeypatch, capsys, *arguments) -> tuple[int, str, str]:
 def test_a_file_for_each_run(mission, tmp_path, monkeypatch, capsys):
     _, case, found, _ = mission
     out = tmp_path / "velocity"
-    code, flagged, _ = glider(monkeypatch, capsys, "gap", "velocity", case.folder, "--model", case.vehicle_name, "--out",
+    code, flagged, _ = glider(monkeypatch, capsys, "gap", "velocity", case.folder, "--model", case.vehicle_name,
+    "--out",
                            out, "--json")  # fmt: skip
     assert code == 0
     means = json.loads((out / MEANS).read_text())["runs"]

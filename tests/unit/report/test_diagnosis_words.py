@@ -131,8 +131,10 @@ def test_no_gap_is_never_said_where_the_floor_is_above_a_tolerance():
          "(pump_slow, actuation: ballast; rate limit divided by 1.82, 90 %: 1.71 to 1.94; 97 % sure)"),
         ("cg_longitudinal", {"offset": EstimateRecord(-0.0015, (-0.002, -0.001), "m")},
          f"offset {words.MINUS}1.50 mm, 90 %: {words.MINUS}2.00 to {words.MINUS}1.00, forward positive; 97 % sure)"),
-        ("net_buoyancy", {"mass": EstimateRecord(0.06, (None, None), "kg")}, "; mass 60.0 g, heavy positive; 97 % sure)"),
-        ("pitch_damping", {"scale": EstimateRecord(0.3, (0.2, 0.4), "1")}, "; scale by a factor of 1.30, 90 %: 1.20 to 1.40"),
+        ("net_buoyancy", {"mass": EstimateRecord(0.06, (None, None), "kg")},
+         "; mass 60.0 g, heavy positive; 97 % sure)"),
+        ("pitch_damping", {"scale": EstimateRecord(0.3, (0.2, 0.4), "1")},
+         "; scale by a factor of 1.30, 90 %: 1.20 to 1.40"),
     ],
 )  # fmt: skip
 def test_the_sentence_gives_sign_and_size(label, size, said):
