@@ -17,8 +17,9 @@ setup: $(STAMP)
 # pip runs again only when the dependencies change. $(call install,EXTRA)
 define install
 @$(PYTHON) -c 'import sys; sys.exit("glider needs Python 3.11 or newer, this is " + sys.version.split()[0]) if sys.version_info < (3, 11) else None'
+@echo 'Installing into $(VENV), then compiling kernels: 1 to 6 minutes, the first time alone'
 @test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[$(1)]'
+$(BIN)/python -m pip install --disable-pip-version-check --constraint constraints.txt --editable '.[$(1)]'
 @touch $@
 endef
 

@@ -61,6 +61,10 @@ def test_a_session_at_a_terminal(tmp_path):
     assert "port sensors   NOT OPEN" in found["unplugged health"]
     assert "valid" in found["plugged"]
     assert found["exit"] == 0
+    assert "expected a number, got 'abc'; again, or empty to leave it out" in found["calibrate"]
+    assert "did you mean goto?" in found["mistyped"]
+    assert "slider: 500 mm is outside -12.00 to 12.00 mm; it stays where it is" in found["outside"]
+    assert re.search(r"sweeping slider: \d+ of 31 s, (on its way|step up)$", found["sweeping"])
 
 
 def test_the_answer_to_what_ctrl_c_broke_off_is_not_taken_for_the_next(twins):
@@ -88,6 +92,10 @@ def test_a_pipe_runs_commands_and_says_what_it_does(twins):
     [
         (["goto slider 5"], 1, "goto slider 5: nothing moves before `enable`"),
         (["dance"], 2, "no command 'dance'; `help` lists them"),
+        (["swepp slider"], 2, "no command 'swepp'; `help` lists them; did you mean sweep?"),
+        (["enable", "goto slidr 5"], 1, "there are servo, slider, ballast; did you mean slider?"),
+        (["read becon"], 2, "did you mean beacon?"),
+        (["enable", "calibrate ballast", "1.5x"], 2, "expected a number, got '1.5x'"),
         (["goto slider"], 2, "usage: goto ACTUATOR POSITION"),
         (["raw sensors 01 03 01 00 00 04", "no"], 1, "not sent"),
         (["raw sensors 01 63 01", "yes"], 1, "not one whole Modbus request"),
@@ -109,13 +117,43 @@ def test_a_script_ends_at_the_first_command_that_fails(twins, tmp_path, lines, c
     assert twins.board.read_text() == before
 
 
-def test_limits_hold_whatever_is_asked(twins, tmp_path):
-    done = typed(twins, tmp_path, "enable", "goto servo 200", "goto ballast -3", "goto slider 0")
-    assert done.returncode == 0, done.stderr
-    assert "servo: limited to 60.00 deg" in done.stdout
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("goto slider 500", "slider: 500 mm is outside -60.00 to 60.00 mm; it stays where it is"),
+        ("goto servo -200", "servo: -200 deg is outside -60.00 to 60.00 deg"),
+        ("jog slider 70", "slider: 70 mm is outside"),
+    ],
+)
+def test_a_place_outside_the_limits_is_refused_and_nothing_moves(twins, tmp_path, line, said):
+    done = typed(twins, tmp_path, "enable", "goto slider 0", "goto servo 0", line, "goto slider 20")
+    assert done.returncode == 1
+    assert said in done.stderr
     state = twins.state()
-    assert state["servo_rad"] == pytest.approx(1.0472, abs=0.001)
-    assert state["ballast_kg"] == pytest.approx(-0.003 * 998.2 * 0.0062, abs=0.004)
+    assert state["slider_m"] == pytest.approx(0.0, abs=0.0005)
+    assert state["servo_rad"] == pytest.approx(0.0, abs=0.001)
+
+
+def test_the_limits_as_they_are_shown_are_within_them(twins, tmp_path):
+    done = typed(twins, tmp_path, "limits ballast")
+    low = done.stdout.split("ballast")[-1].split()[0]
+    done = typed(twins, tmp_path, "enable", f"goto ballast {low}", "goto servo 60", "wait 1.5")
+    assert done.returncode == 0, done.stderr
+    assert twins.state()["servo_rad"] == pytest.approx(1.0472, abs=0.001)
+    assert twins.state()["ballast_kg"] == pytest.approx(float(low) * 1e-3 * 998.2 * 0.0062, abs=0.004)
+
+
+def test_help_breaks_between_words(twins, tmp_path, monkeypatch):
+    from glider.tools.bench.commands import Commands
+
+    for columns in (60, 100):
+        monkeypatch.setenv("COLUMNS", str(columns))
+        done = typed(twins, tmp_path, "?", "help calibrate", "exit", "never reached")
+        assert done.returncode == 0, done.stderr
+        assert max(map(len, done.stdout.splitlines())) < columns
+        assert "quit: stop the actuators" in done.stdout
+        words = {word for name in Commands.names() for word in getattr(Commands, f"do_{name}").__doc__.split()}
+        assert set(done.stdout.split()) <= words | {">", "?", "help", "calibrate", "exit"}
 
 
 def test_raw_bytes_and_their_answers(twins, tmp_path):
@@ -130,6 +168,9 @@ def test_a_sweep_leaves_run_data_and_a_picture(twins, tmp_path):
 
     done = typed(twins, tmp_path, "enable", "goto slider 0", "sweep slider -2 2")
     assert done.returncode == 0, done.stdout + done.stderr
+    shown = re.findall(r"^sweeping slider: (\d+) of \d+ s, (.*)$", done.stdout, re.MULTILINE)
+    assert [int(seconds) for seconds, _ in shown[:2]] == [0, 10]
+    assert shown[0][1] == "on its way"
     assert "travel time" in done.stdout
     (run,) = load_case(tmp_path / "sweep-slider-001").runs
     assert run.columns["cmd_slider_m"].max() == pytest.approx(0.002)

@@ -167,21 +167,28 @@ def session(folder: Path, *, sweep: bool) -> tuple[str, dict]:
         found["not confirmed"] = terminal.text()
         enable(terminal)
         terminal.start("calibrate slider")
-        for _ in range(5):
+        for place in range(5):
             terminal.wait(lambda: terminal.line() == "where is it really, mm?")
+            if place == 1:
+                terminal.start("abc")  # a slip of the finger
+                terminal.wait(lambda: terminal.line() == "where is it really, mm?")
             terminal.start(f"{1e3 * twins.state()['slider_m']:.1f}")  # the ruler
+        terminal.answer("write ", "yse")  # another
         terminal.answer("write ", "yes")
         terminal.ready()
         found["calibrate"] = terminal.text()
         found["board"] = twins.board.read_text()
         enable(terminal)
+        found["mistyped"] = terminal.type("gotoo slider 8")
+        found["outside"] = terminal.type("goto slider 500")
         found["goto"] = terminal.type("goto slider 8")
         found["slider_m"] = twins.state()["slider_m"]
         if sweep:
             terminal.type("sweep slider")
         terminal.start("sweep slider")
         terminal.wait(lambda: "sweeping slider" in terminal.text().splitlines()[-1])
-        terminal.look(1.0)
+        terminal.look(1.5)
+        found["sweeping"] = terminal.text()
         terminal.child.send(b" ")
         terminal.ready()
         found["key"] = terminal.text()

@@ -42,12 +42,12 @@ class Changing(Moving):
         for share in CALIBRATION_SHARES:
             self._move(name, middle + share * half)
             time.sleep(0.0 if name == "servo" else 0.5)
-            answer = self.ask(f"where is it really, {unit}? ")
-            if not answer:
+            place = self.ask_number(f"where is it really, {unit}? ")
+            if place is None:
                 continue
             state = self.bench.snapshot()
             item = state["actuators"][name]
-            places.append(number(answer))
+            places.append(place)
             drives.append(item["pulse_us"] if name == "servo" else item["counts"])
             if name in WIRES:
                 wires.append(self._mean_reading(WIRES[name]))
@@ -64,10 +64,10 @@ class Changing(Moving):
         places: list[float] = []
         readings: list[float] = []
         while True:
-            answer = self.ask(f"put it to a place and say which, mm (empty: {len(places)} places are enough): ")
-            if not answer:
+            place = self.ask_number(f"put it to a place and say which, mm (empty: {len(places)} places are enough): ")
+            if place is None:
                 break
-            places.append(number(answer))
+            places.append(place)
             readings.append(self._mean_reading(name))
             self.say(f"{name} reads {readings[-1]:g}")
         found = calibrate.fit(places, readings, 5.0)
@@ -153,7 +153,7 @@ class Changing(Moving):
             text = boardtext.accepted(boardtext.set_values(self.bench.text, changes), str(path))
         except ConfigError as error:
             raise BenchError(f"would not be a good board file: {error}") from None
-        if self.ask(f"write {path}? (yes/no) ").lower() not in ("y", "yes"):
+        if not self.ask_yes(f"write {path}?", again=True):
             raise BenchError("not written")
         kept = boardtext.keep_old(path)
         boardtext.replace_file(path, text)

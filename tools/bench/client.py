@@ -12,6 +12,7 @@ from glider.hal.ports import ACTUATORS
 from glider.hal.spawn import module_command, module_environment
 from glider.tools.bench.units import from_port, to_port
 from glider.tools.data.errors import InputError
+from glider.tools.data.spelling import did_you_mean
 
 BEAT_S = 0.5
 THERE, STANDS = 0.3, 0.03  # mm from the goal; mm in 0.1 s
@@ -172,5 +173,5 @@ class Bench:
 
 def check_actuator(name: str) -> str:
     if name not in ACTUATORS:
-        raise BenchError(f"no actuator '{name}'; there are {', '.join(ACTUATORS)}")
+        raise BenchError(f"no actuator '{name}'; there are {', '.join(ACTUATORS)}{did_you_mean(name, ACTUATORS)}")
     return name

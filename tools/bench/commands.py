@@ -1,12 +1,19 @@
 """What can be typed at the bench: one method a command; its docstring is its help, its first line the short one."""
 
+import inspect
+import shutil
+import textwrap
 import time
+from collections.abc import Callable
 
 from glider.hal.protocols.vn100 import TextMessage, Vn100Decoder, encode_text
 from glider.tools.bench.changing import Changing
 from glider.tools.bench.client import BenchError
 from glider.tools.bench.desk import UsageError, number
 from glider.tools.bench.looking import Looking
+from glider.tools.data.spelling import did_you_mean
+
+ALIASES = {"?": "help", "exit": "quit"}
 
 
 class Commands(Looking, Changing):
@@ -21,9 +28,7 @@ class Commands(Looking, Changing):
         words = line.split("#")[0].split()
         if not words:
             return
-        method = getattr(self, f"do_{words[0]}", None)
-        if method is None:
-            raise UsageError(f"no command '{words[0]}'; `help` lists them")
+        method = self._method(words[0])
         try:
             method(*words[1:])
         except TypeError as error:
@@ -32,16 +37,24 @@ class Commands(Looking, Changing):
             usage = (method.__doc__ or "").splitlines()[0]
             raise UsageError(f"usage: {usage}") from None
 
+    def _method(self, name: str) -> Callable[..., None]:
+        """The method of a command that was typed; UsageError where there is none."""
+        known = self.names()
+        if (name := ALIASES.get(name, name)) not in known:
+            raise UsageError(f"no command '{name}'; `help` lists them{did_you_mean(name, known)}")
+        method: Callable[..., None] = getattr(self, f"do_{name}")
+        return method
+
     def do_help(self, name: str = "") -> None:
-        """help [COMMAND]: what can be typed."""
+        """help [COMMAND]: what can be typed; `?` for short."""
+        width = min(shutil.get_terminal_size((100, 24)).columns, 110) - 1
         if name:
-            method = getattr(self, f"do_{name}", None)
-            if method is None:
-                raise UsageError(f"no command '{name}'")
-            self.say("\n".join(line.strip() for line in (method.__doc__ or "").strip().splitlines()))
+            words = inspect.cleandoc(self._method(name).__doc__ or "")
+            self.say("\n".join(textwrap.fill(part, width) for part in words.split("\n\n")))
             return
         for item in self.names():
-            self.say("  " + (getattr(self, f"do_{item}").__doc__ or "").splitlines()[0])
+            line = "  " + (getattr(self, f"do_{item}").__doc__ or "").splitlines()[0]
+            self.say(textwrap.fill(line, width, subsequent_indent="      ", break_on_hyphens=False))
 
     def do_raw(self, port: str, *data: str) -> None:
         """raw PORT BYTES...: hex bytes to a port, after a confirmation; on Modbus lines the check sum is added.
@@ -60,7 +73,7 @@ class Commands(Looking, Changing):
                 raw = bytes.fromhex(text).hex()
             except ValueError:
                 raise UsageError(f"expected hex bytes, got '{text}'") from None
-        if self.ask("limits do not hold for raw bytes; send them? (yes/no) ").lower() not in ("y", "yes"):
+        if not self.ask_yes("limits do not hold for raw bytes; send them?"):
             raise BenchError("not sent")
         answer = bytes.fromhex(self.bench.ask("raw", port=port, data=raw))
         messages = [item for item in Vn100Decoder().feed(answer) if isinstance(item, TextMessage)]
@@ -78,5 +91,5 @@ class Commands(Looking, Changing):
             time.sleep(min(0.05, max(0.0, end - time.monotonic())))
 
     def do_quit(self) -> None:
-        """quit: stop the actuators and leave."""
+        """quit: stop the actuators and leave; so do `exit` and Ctrl-D."""
         raise SystemExit(0)

@@ -19,13 +19,14 @@ from typing import Any
 
 from glider.hal.ports import ACTUATORS
 from glider.tools.bench.client import Bench, BenchError
-from glider.tools.bench.commands import Commands
+from glider.tools.bench.commands import ALIASES, Commands
 from glider.tools.bench.desk import UsageError
 from glider.tools.bench.units import WIRES
 from glider.tools.data.errors import BAD_INPUT, DONE, FAILED
 
 HISTORY = "GLIDER_BENCH_HISTORY"
 WATCH_S = 0.2
+NOTE_S, PLAIN_NOTE_S = 1.0, 10.0  # between two notes, at a terminal and elsewhere
 
 
 def table_of(state: dict) -> Any:
@@ -76,10 +77,22 @@ class Console:
         self.bench = bench
         self._pressed: Callable[[], bool] = lambda: False
         self._lines: Iterator[str] | None = None
-        self.commands = Commands(bench, self.say, self.ask, lambda: self._pressed(), self._show, out)
+        self._noted = -math.inf  # when a note was last shown
+        self.commands = Commands(bench, self.say, self.ask, lambda: self._pressed(), self._show, out, self.note)
 
     def say(self, text: str) -> None:
         print(text, flush=True)
+
+    def note(self, text: str) -> None:
+        """How far something is: one line that is written over once a second, elsewhere than at a terminal one now and
+        then; empty: take it away."""
+        terminal, now = sys.stdout.isatty(), time.monotonic()
+        if not text:
+            self._noted = -math.inf
+            print(end="\r\x1b[K" if terminal else "", flush=True)
+        elif now - self._noted >= (NOTE_S if terminal else PLAIN_NOTE_S):
+            self._noted = now
+            print(f"\r\x1b[K{text}" if terminal else text, end="" if terminal else "\n", flush=True)
 
     # --- a script or a pipe -----------------------------------------------------------------------------------------
     def run_lines(self, lines: Iterator[str], source: str) -> int:
@@ -159,7 +172,7 @@ class Console:
             "calibrate": {**actuators, **wires}, "zero": {**actuators, **wires, "imu": None, "beacon": None},
             "raw": {name: None for name in state["ports"]}, "help": {name: None for name in Commands.names()},
         }  # fmt: skip
-        return {name: arguments.get(name) for name in Commands.names()}
+        return {name: arguments.get(name) for name in [*Commands.names(), *ALIASES]}
 
     def _show(self, snapshot: Callable[[], dict], seconds: float) -> None:
         """A live table at a terminal; elsewhere a line a second."""

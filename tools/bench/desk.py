@@ -28,6 +28,27 @@ class Desk:
     def __init__(
         self, bench: Bench, say: Callable[[str], None], ask: Callable[[str], str],
         pressed: Callable[[], bool], show_table: Callable[[Callable[[], Any], float], None], out: Path,
+        note: Callable[[str], None],
     ):  # fmt: skip
+        """note(text): how far something is that takes its time; the next replaces it, an empty one takes it away."""
         self.scripted = False  # an `enable` in a script was written with time to think, and is not asked about
         self.bench, self.say, self.ask, self.pressed, self._show, self.out = bench, say, ask, pressed, show_table, out
+        self.note = note
+
+    def ask_number(self, question: str) -> float | None:
+        """A number, or None for an empty answer. A person who mistypes is asked again; a script's answer has to do."""
+        while answer := self.ask(question):
+            try:
+                return number(answer)
+            except UsageError as error:
+                if self.scripted:
+                    raise
+                self.say(f"  {error}; again, or empty to leave it out")
+        return None
+
+    def ask_yes(self, question: str, *, again: bool = False) -> bool:
+        """Whether the answer is yes; `again`: a person who answers neither yes nor no is asked again."""
+        while (answer := self.ask(f"{question} (yes/no) ").lower()) not in ("y", "yes"):
+            if self.scripted or not again or answer in ("", "n", "no"):
+                return False
+        return True

@@ -5,6 +5,7 @@ import math
 from glider.tools.bench.client import BenchError
 from glider.tools.bench.desk import Desk, UsageError, number
 from glider.tools.bench.units import UNITS, from_port, shown_values
+from glider.tools.data.spelling import did_you_mean
 
 
 class Looking(Desk):
@@ -15,7 +16,7 @@ class Looking(Desk):
         state = self.bench.snapshot()
         known = [*state["sensors"], *state["actuators"]]
         if device and device not in known:
-            raise UsageError(f"no device '{device}'; there are {', '.join(known)}")
+            raise UsageError(f"no device '{device}'; there are {', '.join(known)}{did_you_mean(device, known)}")
         for name in [device] if device else known:
             self.say(f"{name:<13} {self.describe(name, state)}")
         if device in state["sensors"] and state["sensors"][device]["validity"] != "valid":

@@ -9,6 +9,7 @@ from glider.tools.bench.desk import Desk, number
 from glider.tools.bench.units import UNITS, from_port, to_port
 
 MOVE_LIMIT_S = 30.0
+AS_SHOWN = 0.005  # deg, mm: limits are shown to two places, and what is shown may be typed
 
 
 class Moving(Desk):
@@ -16,8 +17,7 @@ class Moving(Desk):
 
     def do_enable(self) -> None:
         """enable: let actuators move; nothing does before. At a terminal it asks whether hands are clear."""
-        question = "actuators will move when commanded; hands and cables clear? (yes/no) "
-        if not self.scripted and self.ask(question).lower() not in ("y", "yes"):
+        if not self.scripted and not self.ask_yes("actuators will move when commanded; hands and cables clear?"):
             raise BenchError("not enabled")
         self.bench.ask("enable", on=True)
         self.say("enabled: actuators move when commanded")
@@ -37,7 +37,10 @@ class Moving(Desk):
         self.bench.ask("reset")
 
     def do_goto(self, actuator: str, position: str) -> None:
-        """goto ACTUATOR POSITION: move there (servo deg, slider mm, ballast mm of plunger) and wait."""
+        """goto ACTUATOR POSITION: move there (servo deg, slider mm, ballast mm of plunger) and wait.
+
+        A position outside the limits is refused; `limits` shows them.
+        """
         self._move(check_actuator(actuator), number(position))
 
     def do_jog(self, actuator: str, step: str) -> None:
@@ -51,10 +54,10 @@ class Moving(Desk):
         self._move(actuator, here + number(step))
 
     def _move(self, name: str, goal: float) -> float:
+        unit, (low, high) = UNITS[name], self.bench.limits(name)
+        if not low - AS_SHOWN <= goal <= high + AS_SHOWN:
+            raise BenchError(f"{name}: {goal:g} {unit} is outside {low:.2f} to {high:.2f} {unit}; it stays where it is")
         sent = self.bench.target(name, goal)
-        unit = UNITS[name]
-        if abs(sent - goal) > 1e-6:
-            self.say(f"{name}: limited to {sent:.2f} {unit}")
         there = self.bench.wait_there(name, sent, MOVE_LIMIT_S, self.pressed)
         where = self.bench.place(name)
         self.say(f"{name}: at {where:.2f} {unit}" + ("" if there else f", not at {sent:.2f}"))
@@ -92,8 +95,9 @@ class Moving(Desk):
         try:
             steps = [(t, actuator, to_port(actuator, value, kg_per_m)) for t, value in the_plan.targets]
             self.bench.ask("profile", steps=steps)
-            end = time.monotonic() + the_plan.seconds
-            while time.monotonic() < end:
+            begin = time.monotonic()
+            while (now := time.monotonic() - begin) < the_plan.seconds:
+                self.note(f"sweeping {actuator}: {now:.0f} of {the_plan.seconds:.0f} s, {the_plan.part(now)}")
                 if self.pressed():
                     self.bench.stop()
                     raise BenchError("stopped")
@@ -104,6 +108,7 @@ class Moving(Desk):
                     raise
                 time.sleep(0.1)
         finally:
+            self.note("")
             rows = self.bench.ask("record", on=False)
         return rows
 

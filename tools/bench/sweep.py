@@ -16,6 +16,7 @@ REVERSALS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6)  # deg, mm
 REST_S = 0.8
 HOLD_S = 0.7  # at either end of a reversal
 UPDATE_S = 0.04  # between two targets of a ramp
+IN_WORDS = {"up": "step up", "down": "step down", "slow": "slow triangle", "quick": "quick triangle"}
 TRAVEL_SHARE = 0.8  # of the way between the limits
 
 
@@ -29,6 +30,11 @@ class SweepPlan:
     @property
     def seconds(self) -> float:
         return self.targets[-1][0] + REST_S
+
+    def part(self, t: float) -> str:
+        """The part under way at time t (s), in words."""
+        name = next((name for name, (begin, end) in reversed(self.parts.items()) if begin <= t <= end), "on its way")
+        return IN_WORDS.get(name, name)
 
 
 @dataclass

@@ -3,6 +3,8 @@
 import contextlib
 import functools
 import sys
+import threading
+import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -11,6 +13,7 @@ import click
 from glider.tools.data.errors import BAD_INPUT, DONE, FAILED, STOPPED, InputError, MissingExtra, missing_extra
 from glider.tools.data.plain import as_plain
 
+SILENT_S = 15.0  # of a plain progress without a line
 vehicle_option = click.option(
     "--vehicle", metavar="FILE", help="A shipped vehicle or a vehicle file, in the place of the case's own."
 )
@@ -45,17 +48,21 @@ def _advance_bar(bar: Any, task: Any, n: int = 1) -> None:
 
 
 @contextlib.contextmanager
-def progress(label: str, total: int, *, bar: bool = True) -> Iterator[Callable[[int], None]]:
-    """A progress bar on a terminal, plain lines at every tenth elsewhere (or without `bar`); yields advance(n)."""
-    if bar and sys.stderr.isatty():
-        from rich.console import Console
-        from rich.progress import Progress
+def progress(label: str, total: int) -> Iterator[Callable[[int], None]]:
+    """A progress bar with a clock on a terminal; elsewhere a line at every tenth, and after SILENT_S without one.
 
-        with Progress(console=Console(stderr=True), transient=True) as shown_bar:
+    Yields advance(n).
+    """
+    if sys.stderr.isatty():
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+
+        parts = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
+        with Progress(*parts, console=Console(stderr=True), transient=True) as shown_bar:
             task = shown_bar.add_task(label, total=total)
             yield functools.partial(_advance_bar, shown_bar, task)
         return
-    done, shown = 0, 0
+    done, shown, begin, ended, spoke = 0, 0, time.monotonic(), threading.Event(), threading.Event()
 
     def advance(n: int = 1) -> None:
         nonlocal done, shown
@@ -63,9 +70,22 @@ def progress(label: str, total: int, *, bar: bool = True) -> Iterator[Callable[[
         tenth = 10 * done // max(total, 1)
         if tenth > shown:
             shown = tenth
+            spoke.set()
             say(f"{label}: {done}/{total}")
 
-    yield advance
+    def speak(out: Any) -> None:
+        while not ended.wait(SILENT_S):
+            if not spoke.is_set():
+                click.echo(f"{label}: {done}/{total}, {time.monotonic() - begin:.0f} s", file=out)
+            spoke.clear()
+
+    speaker = threading.Thread(target=speak, args=(sys.stderr,), daemon=True)
+    speaker.start()
+    try:
+        yield advance
+    finally:
+        ended.set()
+        speaker.join()
 
 
 def compile_diagnosis(case: Any) -> None:

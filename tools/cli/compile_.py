@@ -1,7 +1,5 @@
 """`glider compile`: every kernel compiled ahead."""
 
-import subprocess
-import sys
 from importlib.util import find_spec
 
 import click
@@ -19,23 +17,15 @@ def compile_(as_json: bool) -> None:
     from glider.firmware.core.jit import CACHE_DIR
     from glider.tools.flight.precompile import FLIGHT, ensure_compiled
 
-    diagnosis = _compile_diagnosis()
+    aside = None
+    if find_spec("scipy"):
+        from glider.tools.diagnose.precompile import compile_aside, wait_for
+
+        aside = compile_aside()
     ensure_compiled(FLIGHT, say, progress)
-    if diagnosis is not None and diagnosis.wait():
+    if aside is not None and wait_for(aside, progress):
         fail("glider: the kernels of a diagnosis were not compiled")
     if as_json:
         print_json(FLIGHT.compile())
     else:
         say(f"kernels: {CACHE_DIR or 'plain Python (GLIDER_JIT=0)'}")
-
-
-def _compile_diagnosis() -> subprocess.Popen[bytes] | None:
-    """A process that compiles what a diagnosis calls, beside the flight's; None where it is there, or not installed."""
-    if not find_spec("scipy"):
-        return None
-    from glider.tools.diagnose.precompile import DIAGNOSIS
-
-    stamp = DIAGNOSIS.stamp()
-    if stamp is None or stamp.exists():
-        return None
-    return subprocess.Popen([sys.executable, "-m", "glider.tools.diagnose.precompile"])

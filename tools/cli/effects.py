@@ -9,10 +9,7 @@ from glider.tools.cli.common import json_option, print_json
 @click.argument("labels", metavar="[LABEL]...", nargs=-1)
 @json_option
 def effects(labels: tuple[str, ...], as_json: bool) -> None:
-    """List the effects of the catalogue with their parameters: range, 1 sigma of the prior, unit (docs/EFFECTS.md).
-
-    Example: glider effects drag; glider fly --effect drag:scale=0.3 --no-log
-    """
+    """List the effects of the catalogue with their parameters: range, 1 sigma of the prior, unit (docs/EFFECTS.md)."""
     from glider.sim_backend.core.effects.catalogue import catalogue
     from glider.tools.data.errors import InputError
 

@@ -77,9 +77,10 @@ def fly(
 ) -> None:  # fmt: skip
     """Fly a mission and record it.
 
-    The first Ctrl-C gives the dive up and surfaces, the second stops at once. On devices, arming is confirmed at the
-    terminal, a second Ctrl-C under water wants a third, and a flight that broke off is never resumed: the next start
-    only brings the vehicle up. Exit code 1: the flight, or its log, is not complete.
+    With --realtime and on devices a status line shows time, depth, pitch, leg and what is left of it. The first Ctrl-C
+    gives the dive up and surfaces, the second stops at once. On devices, arming is confirmed at the terminal, a second
+    Ctrl-C under water wants a third, and a flight that broke off is never resumed: the next start only brings the
+    vehicle up. Exit code 1: the flight, or its log, is not complete.
     """
     from glider.firmware.core.layouts.control_layout import LEG
     from glider.firmware.runtime import Ending
@@ -88,6 +89,7 @@ def fly(
     from glider.tools.data.errors import InputError
     from glider.tools.flight import sortie
     from glider.tools.flight.compose import build_flight, build_recorder, parse_effects, record_specs
+    from glider.tools.flight.display import Display
     from glider.tools.flight.precompile import FLIGHT, ensure_compiled
     from glider.tools.flight.terminal import Stop, terminal_detached
 
@@ -123,8 +125,12 @@ def fly(
         host = keep(flight, name, state_folder, acknowledge, yes, board)
     options, supervisor = RealTimeOptions(priority, lock_memory, core), flight.supervisor
     legs, done = len(flight.mission.leg), 0
-
-    stop = Stop(flight.autopilot.give_up, supervisor.surface_depth, None if simulated else supervisor.measured_depth)
+    hurried = simulated and not realtime
+    display = Display(flight, quiet=hurried)
+    stop = Stop(
+        flight.autopilot.give_up, supervisor.surface_depth, None if simulated else supervisor.measured_depth,
+        tell=display.tell,
+    )  # fmt: skip
     before = signal.signal(signal.SIGINT, stop)
     try:
         with contextlib.nullcontext() if simulated else terminal_detached(), contextlib.ExitStack() as stack:
@@ -132,24 +138,30 @@ def fly(
 
             def before_loop() -> None:
                 nonlocal advance
-                advance = stack.enter_context(progress(f"flying {flight.mission.name}", legs, bar=simulated))
+                if hurried:
+                    advance = stack.enter_context(progress(f"flying {flight.mission.name}", legs))
                 options.apply()
 
             def on_second(t: float) -> None:
                 nonlocal done
+                display.second(t)
                 leg = legs if flight.autopilot.mode == "completed" else int(flight.autopilot.ap[LEG])
                 if leg > done and advance is not None:
-                    with contextlib.suppress(OSError):  # a terminal that is gone, or takes no more
-                        advance(leg - done)
+                    advance(leg - done)
                     done = leg
 
             flown = sortie.fly(flight, host, make_recorder, log=path, before_loop=before_loop, on_second=on_second)
-            on_second(flown.seconds)
+            if advance is not None:
+                advance(legs - done if flight.autopilot.mode == "completed" else 0)
     except KeyboardInterrupt:
+        display.end()
+        if path is not None and path.exists():
+            say(f"the log up to here: {path}")
         raise click.Abort from None
     except BoardError as error:
         fail(f"glider: {board}: not armed: {error}")
     finally:
+        display.end()
         signal.signal(signal.SIGINT, before)
     surfaced = flown.ending == Ending.SURFACED
     completed = flight.autopilot.mode == "completed" and surfaced and not host.ascent_only

@@ -63,9 +63,12 @@ def measure(case: Path, report: Path | None, vehicle: str | None, as_json: bool)
 
 def _print_table(found) -> None:
     """Runs by channels, then the parts, on standard output."""
-    names = list(found.channels)
+    from glider.tools.data.runs.origin import flights_of, with_flight
+
+    names, flights = list(found.channels), flights_of(found.case.runs)
     width = max(8, *(len(name) + 2 for name in names))
-    first = max(8, *(len(run.name) + 2 for run in found.runs))
+    runs = {run.name: with_flight(run.name, flights) for run in found.runs}
+    first = max(8, *(len(shown) + 2 for shown in runs.values()))
 
     def line(head: str, cells: list[str]) -> None:
         click.echo(head.ljust(first) + "".join(cell.rjust(width) for cell in cells))
@@ -73,7 +76,7 @@ def _print_table(found) -> None:
     line("", [*names, "total"])
     for run in found.runs:
         cells = [f"{run.channels[name]:.2f}" if name in run.channels else "-" for name in names]
-        line(run.name, [*cells, f"{run.total:.2f}"])
+        line(runs[run.name], [*cells, f"{run.total:.2f}"])
     line("all", [*(f"{found.channels[name]:.2f}" for name in names), f"{found.total:.2f}"])
     click.echo("\nshare of the squared gap")
     for share in found.where:

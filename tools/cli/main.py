@@ -9,6 +9,8 @@ import click
 
 from glider.tools.cli.common import report_errors
 from glider.tools.data.version import DISTRIBUTION
+from glider.tools.cli.help import complete
+from glider.tools.data.spelling import did_you_mean
 
 # name -> (module, attribute, one line). The line stands here so that --help need not import the command.
 COMMANDS = {
@@ -59,7 +61,12 @@ class LazyGroup(click.Group):
         if name not in COMMANDS:
             return None
         module, attribute, _ = COMMANDS[name]
-        return getattr(importlib.import_module(module), attribute)
+        return complete(getattr(importlib.import_module(module), attribute), name)
+
+    def resolve_command(self, ctx, args):
+        if args[0] not in COMMANDS and not args[0].startswith("-"):
+            ctx.fail(f"No such command '{args[0]}'{did_you_mean(args[0], COMMANDS)}")
+        return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx, formatter):
         with formatter.section("Commands"):
@@ -70,6 +77,9 @@ class LazyGroup(click.Group):
 @click.version_option(package_name=DISTRIBUTION)
 def cli():
     """Fly an underwater glider, in the sea or in simulation, and find out why the two disagree."""
+
+
+complete(cli, "")
 
 
 def main() -> None:

@@ -1,6 +1,7 @@
 """`glider gap watch`: what is different since when."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -45,6 +46,11 @@ def _watch_one(case: Path, reference: Path | None, vehicle: str | None, out: Pat
     need("analysis")
     from glider.tools.data.files import check_writable, write_bytes
     from glider.tools.data.runs.case import load_case
+<<<<<<< HEAD
+=======
+    from glider.tools.data.runs.csvfile import write_bytes
+    from glider.tools.data.runs.origin import flights_of
+>>>>>>> adbf007 (A flight shows its state; bench refuses what is out of range; examples in every help; the flight's name travels with the run)
     from glider.tools.report.page import REPORT
     from glider.tools.report.watch import write_watch_report
     from glider.tools.watch.answer import FILE
@@ -57,6 +63,7 @@ def _watch_one(case: Path, reference: Path | None, vehicle: str | None, out: Pat
     with progress("watch", 2) as advance:
         advance(1)
         found = watch_runs(loaded, before, lambda text: print(text, file=sys.stderr))
+        found = replace(found, flights=flights_of(loaded.runs))
         advance(1)
     if out is not None:
         import json
@@ -79,27 +86,31 @@ def _watch_one(case: Path, reference: Path | None, vehicle: str | None, out: Pat
 
 def lines(found) -> list[str]:
     """The answer for a terminal: runs, then events."""
+    from glider.tools.data.runs.origin import with_flight
+
     sentences = []
+    names = {run.run: with_flight(run.run, found.flights) for run in found.runs}
+    width = max(map(len, names.values()), default=0)
     for run in found.runs:
+        name = names[run.run].ljust(max(width, 12))
         if run.skipped is not None:
-            sentences.append(f"{run.run:12} skipped  {run.skipped}")
+            sentences.append(f"{name} skipped  {run.skipped}")
             continue
         causes = ", ".join(f"{cause.label} {_size(cause.sized)}" for cause in run.causes[:2])
         gap = "-" if run.gap is None else f"{run.gap:.2f}"
-        sentences.append(f"{run.run:12} {run.verdict:8} gap {gap:>6}  {causes}".rstrip())
+        sentences.append(f"{name} {run.verdict:8} gap {gap:>6}  {causes}".rstrip())
     sentences.append("")
     if not found.events:
         sentences.append("nothing changed, as far as these runs can show")
     for event in found.events:
-        until = "and is still there" if event.to_run is None else f"to {event.to_run}"
+        until = "and is still there" if event.to_run is None else f"to {names.get(event.to_run, event.to_run)}"
         place = f"{event.where[0]['subsystem']} {event.where[0]['element']}" if event.where else ""
         name = event.label or f"unknown ({place})"
         others = [label for label in event.group if label != event.label]
         confounded = f"; may as well be {', '.join(others)}" if others else ""
         size = _size(event.sized)
-        sentences.append(
-            f"{name} {size} from {event.from_run} {until}, {event.course}, {event.probability:.2f}{confounded}"
-        )
+        since = names.get(event.from_run, event.from_run)
+        sentences.append(f"{name} {size} from {since} {until}, {event.course}, {event.probability:.2f}{confounded}")
     return sentences
 
 

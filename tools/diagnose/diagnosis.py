@@ -10,6 +10,7 @@ import numpy as np
 from glider.sim_backend.core.effects.catalogue import catalogue
 from glider.tools.data.runs.case import Case
 from glider.tools.data.version import software
+from glider.tools.data.runs.origin import flights_of
 from glider.tools.diagnose import by_readings
 from glider.tools.diagnose.cautions import below_floor, cautions, not_asked
 from glider.tools.diagnose.chain import noise_of, panels
@@ -276,7 +277,7 @@ def details(diagnosis: Diagnosis) -> Details:
     data = Data(
         case.folder.resolve().name, case.vehicle.name, case.site, len(runs),
         float(sum(run.t[-1] - run.t[0] for run in runs)), float(case.log_rate_hz), case.motion_capture, columns,
-        sorted(channels),
+        sorted(channels), flights_of(runs),
     )  # fmt: skip
     return Details(
         shown=[one.title for one in pictures_of(diagnosis.readings, case.runs)],

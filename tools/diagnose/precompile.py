@@ -4,12 +4,14 @@ diagnosed.
 Those that follow models, which take the longest, are compiled by a process of their own meanwhile.
 """
 
+import contextlib
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
 import numpy as np
+from numba.core import event
 
 from glider.firmware.core.jit import kernel_count
 from glider.firmware.core.vehicle.layout import X_NU, X_POS, X_QUAT
@@ -17,7 +19,7 @@ from glider.tools.data.runs import columns as names
 from glider.tools.data.runs.case import Case, load_case, write_case
 from glider.tools.data.runs.run import Run
 from glider.tools.diagnose.diagnosis import diagnose
-from glider.tools.flight.precompile import Work
+from glider.tools.flight.precompile import Compiled, Progress, Work
 from glider.tools.gap.assess import assess
 from glider.tools.inference.model import effect_vector
 from glider.tools.inference.problem import Gains, Problem, problem_of
@@ -74,10 +76,36 @@ def _diagnose_a_moment() -> None:
         diagnose(case)
 
 
+EXPECTED = 2 * kernel_count()  # about as many as two processes compile, each of them those that are imported here
 DIAGNOSIS = Work("diagnosis", kernel_count, _diagnose_a_moment)
+
+
+def compile_aside() -> subprocess.Popen[bytes] | None:
+    """A process that compiles what a diagnosis calls; None where that is compiled already. `wait_for` ends it."""
+    stamp = DIAGNOSIS.stamp()
+    if stamp is None or stamp.exists():
+        return None
+    return subprocess.Popen([sys.executable, "-m", "glider.tools.diagnose.precompile"], stdout=subprocess.PIPE)
+
+
+def wait_for(process: subprocess.Popen[bytes], progress: Progress) -> int:
+    """Wait for `compile_aside`, showing how many kernels are compiled; its exit code."""
+    assert process.stdout is not None
+    with progress("compiling what a diagnosis calls", EXPECTED) as advance, process.stdout as compiled:
+        for _ in compiled:
+            advance(1)
+    return process.wait()
+
+
+def _say_one(n: int) -> None:
+    """Write a line for a kernel that is compiled, to `wait_for`."""
+    with contextlib.suppress(OSError):  # nobody waits any more
+        print(flush=True)
+
 
 if __name__ == "__main__":
     if sys.argv[1:] == [FOLLOW]:
-        _follow_a_moment()
+        with event.install_listener("numba:compile", Compiled(_say_one)):
+            _follow_a_moment()
     else:
-        DIAGNOSIS.compile()
+        DIAGNOSIS.compile(_say_one)

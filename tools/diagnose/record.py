@@ -201,6 +201,7 @@ class Data(msgspec.Struct):
     motion_capture: bool
     columns: list[str]
     channels: list[str]
+    flights: dict[str, str] = {}  # run -> file and date of its flight, where they are known
 
 
 class Picture(msgspec.Struct):

@@ -26,7 +26,7 @@ EFFECTS: dict[str, dict[str, float]] = {"drag": {"scale": 0.1}}  # any: one plan
 Progress = Callable[[str, int], AbstractContextManager[Callable[[int], None]]]
 
 
-class _Compiled(event.Listener):
+class Compiled(event.Listener):
     """Calls `advance(1)` for every kernel that is compiled for the first time."""
 
     def __init__(self, advance: Callable[[int], None]):
@@ -63,7 +63,7 @@ class Work:
     def compile(self, advance: Callable[[int], None] = lambda n: None) -> dict[str, Any]:
         """Call every kernel: `folder`, `kernels`, `seconds`. `advance(1)` hears of each that had to be compiled."""
         begin = time.monotonic()
-        with event.install_listener("numba:compile", _Compiled(advance)):
+        with event.install_listener("numba:compile", Compiled(advance)):
             self.call()
         stamp = self.stamp()
         if stamp is not None:
@@ -83,7 +83,7 @@ def ensure_compiled(work: Work, say: Callable[[str], None], progress: Progress) 
     with _alone(work, stamp.parent, lambda: say("another process is compiling the kernels: waiting for it")):
         if stamp.exists():
             return
-        say(f"compiling the kernels of a {work.name}, once for this version: about a minute")
+        say(f"compiling the kernels of a {work.name}, once for this version: 1 to 4 minutes")
         with progress("compiling", work.count()) as advance:
             done = work.compile(advance)
         say(f"compiled in {done['seconds']:.0f} s, kept in {done['folder']}")

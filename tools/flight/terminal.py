@@ -37,26 +37,27 @@ class Stop:
 
     def __init__(
         self, give_up: Callable[[], None], surface: float = 0.0, depth: Callable[[], float] | None = None,
-        now: Callable[[], float] = time.monotonic,
+        now: Callable[[], float] = time.monotonic, *, tell: Callable[[str], object] = lambda text: None,
     ):  # fmt: skip
         """`surface`: m, the depth above which the vehicle is at the surface; `depth`: m, measured, NaN where it is not
-        known, of a vehicle on devices; None in simulation."""
+        known, of a vehicle on devices; None in simulation; tell(text): a line for the person, from a signal handler."""
         self._surface = surface
         self.presses = 0
-        self._give_up, self._depth, self._now = give_up, depth, now
+        self._give_up, self._depth, self._now, self._tell = give_up, depth, now, tell
         self._before = -math.inf
 
     def __call__(self, *_: object) -> None:
         self.presses += 1
         since, self._before = self._now() - self._before, self._now()
+        deep = self._depth is not None and not self._depth() <= self._surface  # NaN: deep
         if self.presses == 1:
             self._give_up()
-            return
-        deep = self._depth is not None and not self._depth() <= self._surface  # NaN: deep
-        if not deep or (self.presses > 2 and AGAIN_S[0] <= since <= AGAIN_S[1]):
+            again = "twice more, a second apart, leaves it under water" if deep else "again stops at once"
+            self._tell(f"surfacing; Ctrl-C {again}")
+        elif not deep or (self.presses > 2 and AGAIN_S[0] <= since <= AGAIN_S[1]):
             raise KeyboardInterrupt
-        with contextlib.suppress(OSError):
-            click.echo("coming up; Ctrl-C once more, in a second, leaves the vehicle where it is", err=True)
+        else:
+            self._tell("surfacing; Ctrl-C once more, in a second, leaves the vehicle where it is")
 
 
 @contextlib.contextmanager

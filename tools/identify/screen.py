@@ -1,6 +1,6 @@
 """Runs that cannot be fitted: wrong units, swapped axes, a frozen capture, clocks far apart. Named, and left out."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -202,4 +202,4 @@ def despiked(run: Run) -> tuple[Run, int]:
             changed = x.copy()
             changed[np.flatnonzero(seen)[wild]] = np.nan
             columns[name], count = changed, count + int(wild.sum())
-    return Run(run.name, run.path, columns, run.extra), count
+    return replace(run, columns=columns), count

@@ -11,7 +11,8 @@ import sys
 import time
 from pathlib import Path
 
-from glider.tools.diagnose.precompile import DIAGNOSIS
+from glider.tools.cli.common import progress
+from glider.tools.diagnose.precompile import compile_aside, wait_for
 from glider.tools.study.challenge.seal import ARCHIVE, open_answers
 
 OUT_FOLDER = Path("out/demo")
@@ -31,18 +32,17 @@ def main() -> int:
     """Run the steps in OUT; returns the exit code of the first that fails, else 0."""
     shutil.rmtree(OUT_FOLDER, ignore_errors=True)
     OUT_FOLDER.mkdir(parents=True)
-    begin, ahead = time.monotonic(), None
-    stamp = DIAGNOSIS.stamp()
-    if stamp is not None and not stamp.exists():
-        print("The first time, kernels are compiled on the way: about a minute of what follows.", flush=True)
-        ahead = subprocess.Popen([sys.executable, "-m", "glider.tools.diagnose.precompile"], stderr=subprocess.DEVNULL)
+    begin, ahead = time.monotonic(), compile_aside()
+    if ahead is not None:
+        print("The first time, kernels are compiled on the way: 1 to 4 minutes of what follows.", flush=True)
     for number, (title, command) in enumerate(STEPS, start=1):
         print(f"\n{number}. {title}\n   $ glider {command}", flush=True)
         done = subprocess.run([sys.executable, "-m", "glider.tools.cli.main", *command.split()], cwd=OUT_FOLDER)
         if done.returncode:
             return done.returncode
         if ahead is not None:
-            ahead.wait()
+            wait_for(ahead, progress)
+            ahead = None
     hidden = open_answers(OUT_FOLDER / "blind" / ARCHIVE).cases[CASE]["labels"]
     report = OUT_FOLDER / "diagnosis" / "report.html"
     print(f"\nThe sealed answer: {', '.join(hidden)}. The report: {report} (opens offline)")

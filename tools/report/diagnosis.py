@@ -7,6 +7,7 @@ import numpy as np
 
 from glider.sim_backend.core.effects.catalogue import catalogue
 from glider.tools.data.files import write_bytes
+from glider.tools.data.runs.origin import with_flight
 from glider.tools.diagnose.noise_probes import CLOCK, UNPREDICTABLE
 from glider.tools.diagnose.record import Curves, DiagnosisRecord, Interval, Panel, Picture, number, read_record
 from glider.tools.inference.channels import ROUGHIE_MEASURES
@@ -86,7 +87,8 @@ def _pictures(record: DiagnosisRecord) -> list[dict[str, Any]]:
     """The drawn runs: measured, nominal and corrected."""
     return [
         {
-            "name": run.name, "before": words.number(number(run.before["total"])),
+            "name": with_flight(run.name, record.details.data.flights),
+            "before": words.number(number(run.before["total"])),
             "after": words.number(number(run.after["total"])), "charts": _charts(run, curves),
         }
         for run, curves in zip(record.details.pictures, record.curves, strict=True)

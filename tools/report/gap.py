@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from glider.tools.data.files import write_bytes
+from glider.tools.data.runs.origin import flights_of, with_flight
 from glider.tools.gap.assess import CaseGap
 from glider.tools.inference.channels import Channel
 from glider.tools.report.charts import Chart, svg
@@ -75,6 +76,7 @@ def _context(found: CaseGap) -> dict[str, Any]:
         for c in found.measures.channels
         if c.name in names
     ]
+    flights = flights_of(found.case.runs)
     return {
         "case": found.case.folder.resolve().name,
         "vehicle": found.case.vehicle.name,
@@ -84,12 +86,19 @@ def _context(found: CaseGap) -> dict[str, Any]:
         "model": found.model.name,
         "total": found.total,
         "names": names,
-        "runs": [{"name": run.name, "cells": cells(run.channels, run.total)} for run in found.runs],
+        "runs": [
+            {"name": with_flight(run.name, flights), "cells": cells(run.channels, run.total)} for run in found.runs
+        ],
         "all": cells(found.channels, found.total),
         "shares": shares,
         "tolerances": tolerances,
         "pictures": [
-            {"name": found.runs[n].name, "total": found.runs[n].total, "charts": _charts(found, n)} for n in shown
+            {
+                "name": with_flight(found.runs[n].name, flights),
+                "total": found.runs[n].total,
+                "charts": _charts(found, n),
+            }
+            for n in shown
         ],
         "left_out": len(found.runs) - len(shown),
         "commands": all(run.has_commands for run in found.case.runs),

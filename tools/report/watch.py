@@ -7,6 +7,7 @@ import msgspec
 
 from glider.tools.data.errors import InputError
 from glider.tools.data.files import write_bytes
+from glider.tools.data.runs.origin import with_flight
 from glider.tools.report import words
 from glider.tools.report.page import REPORT, render
 from glider.tools.watch.answer import FILE
@@ -56,6 +57,7 @@ class _Watch(msgspec.Struct):
     events: list[_Event]
     reference: list[str]
     cautions: list[str]
+    flights: dict[str, str] = {}
 
 
 def read_watch(folder: Path) -> _Watch:
@@ -95,7 +97,7 @@ def _health(found: _Watch) -> str:
     return f"{len(judged) - len(changed)} of {len(judged)} runs that could be judged are as before{now}."
 
 
-def _event(one: _Event) -> dict[str, Any]:
+def _event(one: _Event, flights: dict[str, str]) -> dict[str, Any]:
     place = " ".join(str(one.where[0][key]) for key in ("subsystem", "element")) if one.where else ""
     if one.label is None:
         said = f"No effect of the catalogue explains it{f'; most likely in {place}' if place else ''}"
@@ -104,7 +106,9 @@ def _event(one: _Event) -> dict[str, Any]:
     others = [label for label in one.group if label != one.label]
     return {
         "name": one.label or "unknown", "said": said, "size": _size(one), "alike": words.joined(others),
-        "from": one.from_run, "to": one.to_run, "course": one.course, "percent": 100.0 * one.probability,
+        "from": with_flight(one.from_run, flights),
+        "to": None if one.to_run is None else with_flight(one.to_run, flights),
+        "course": one.course, "percent": 100.0 * one.probability,
     }  # fmt: skip
 
 
@@ -112,7 +116,8 @@ def report_html(found: _Watch) -> str:
     """The page's text; MissingExtra without jinja2."""
     runs = [
         {
-            "name": run.run, "verdict": run.skipped or run.verdict, "kind": "skipped" if run.skipped else run.verdict,
+            "name": with_flight(run.run, found.flights),
+            "verdict": run.skipped or run.verdict, "kind": "skipped" if run.skipped else run.verdict,
             "gap": "" if run.gap is None else words.number(run.gap),
             "causes": ", ".join(f"{one.label} {_size(one)}".strip() for one in run.causes[:2]),
             "speed": _speed(run.velocity),
@@ -121,7 +126,7 @@ def report_html(found: _Watch) -> str:
         for run in found.runs
     ]  # fmt: skip
     context = {
-        "events": [_event(one) for one in found.events], "runs": runs, "cautions": found.cautions,
+        "events": [_event(one, found.flights) for one in found.events], "runs": runs, "cautions": found.cautions,
         "reference": words.joined(found.reference), "health": _health(found),
         "speeds": any(run.velocity is not None for run in found.runs),
     }  # fmt: skip
@@ -134,5 +139,7 @@ def write_watch_report(folder: Path) -> str:
     write_bytes(folder / REPORT, report_html(found).encode("utf-8"))
     if not found.events:
         return "Nothing changed, as far as these runs can show."
-    named = [f"{one.label or 'an unknown change'} since {one.from_run}" for one in found.events]
+    named = [
+        f"{one.label or 'an unknown change'} since {with_flight(one.from_run, found.flights)}" for one in found.events
+    ]
     return f"{words.upper(words.joined(named))}."

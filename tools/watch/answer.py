@@ -83,9 +83,11 @@ class WatchAnswer:
     events: list[EventAnswer]
     reference: list[str]
     cautions: list[str]
+    flights: dict[str, str] = field(default_factory=dict)  # run -> file and date of its flight, where they are known
 
     def plain(self) -> dict[str, Any]:
-        return {
+        found = {
             "format": 1, "runs": [run.plain() for run in self.runs], "events": [one.plain() for one in self.events],
             "reference": self.reference, "cautions": self.cautions,
         }  # fmt: skip
+        return found | {"flights": self.flights} if self.flights else found

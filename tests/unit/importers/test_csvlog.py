@@ -179,7 +179,8 @@ def test_dates_are_times_too(folder):
     (folder / "a.csv").write_text("\n".join(["millis,adc,pitch,yaw", *rows]))
     text = MAP.replace('unit = "ms"', 'unit = "iso8601"')
     _import(folder, text=text)
-    assert load_case(folder / "out").runs[0].rows == 20
+    run = load_case(folder / "out").runs[0]
+    assert (run.rows, run.flight) == (20, "a.csv, 2015-07-23")
     (folder / "a.csv").write_text("\n".join(["millis,adc,pitch,yaw", *rows, "yesterday,1,1,1"]))
     with pytest.raises(InputError, match="not a date"):
         _import(folder, out="other", text=text)

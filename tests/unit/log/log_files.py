@@ -35,7 +35,7 @@ def tick_rows(count: int) -> np.ndarray:
     return rows
 
 
-def write_small_log(path: Path, rows: np.ndarray, *, attachments=None, metadata=None) -> Path:
+def write_small_log(path: Path, rows: np.ndarray, *, attachments=None, metadata=None, epoch_ns=0) -> Path:
     """Ticks, a truth every other tick, an event every hundredth; a new chunk at every 16 kB and every 150 ticks."""
     fd = disk.create(str(path))
     file = disk.DiskFile(fd)
@@ -44,6 +44,7 @@ def write_small_log(path: Path, rows: np.ndarray, *, attachments=None, metadata=
         [TICK, TRUTH],
         attachments={"vehicle.toml": VEHICLE, "mission.toml": "x = 1\n"} if attachments is None else attachments,
         metadata=METADATA if metadata is None else metadata,
+        epoch_ns=epoch_ns,
     )
     for number, row in enumerate(rows):
         time_s = number / 50

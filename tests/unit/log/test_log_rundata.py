@@ -176,13 +176,35 @@ def test_several_logs_are_one_case_of_several_runs(small_log, tmp_path):
     assert found["rows"] == 560
     assert [run.rows for run in load_case(tmp_path / "both").runs] == [500, 60]
     elsewhere = write_small_log(tmp_path / "sea.mcap", tick_rows(60), metadata={**METADATA, "site": "sea"})
-    with pytest.raises(InputError, match="site is not that of"):
+    with pytest.raises(InputError, match=r"sea.mcap: site sea, in .*: one case has one site; export the two apart"):
         export_case(read_log(small_log), tmp_path / "no", more=[read_log(elsewhere)])
     heavy = {"vehicle.toml": VEHICLE.replace("m_t = 13.0", "m_t = 13.5")}
     other = write_small_log(tmp_path / "other.mcap", tick_rows(60), attachments=heavy)
     with pytest.raises(InputError, match="another vehicle"):
         export_case(read_log(small_log), tmp_path / "no", more=[read_log(other)])
     assert not (tmp_path / "no").exists()
+
+
+def test_the_flight_of_a_run_goes_with_it_into_a_case_and_back_through_a_log(tmp_path):
+    dated = write_small_log(tmp_path / "w06.mcap", tick_rows(60), epoch_ns=1_795_168_800 * 10**9)
+    undated = write_small_log(tmp_path / "w07.mcap", tick_rows(60))
+    first = read_log(dated)
+    assert first.began == "2026-11-20T10:00:00Z"
+    export_case(first, tmp_path / "case", more=[read_log(undated)])
+    runs = load_case(tmp_path / "case").runs
+    assert [run.flight for run in runs] == ["w06.mcap, 2026-11-20", "w07.mcap"]
+    made = CliRunner().invoke(command, ["export", str(tmp_path / "case"), "--out", str(tmp_path / "logs")])
+    assert made.exit_code == 0, made.output
+    back = [read_log(tmp_path / "logs" / f"run0{n}.mcap") for n in (0, 1)]
+    export_case(back[0], tmp_path / "back", more=back[1:])
+    assert (tmp_path / "back" / "origin.csv").read_bytes() == (tmp_path / "case" / "origin.csv").read_bytes()
+
+
+@pytest.mark.parametrize("text", ["", "run,start_utc\n", "run,start_utc,files\nrun00,2026\n", "\x00\xff"])
+def test_an_origin_that_cannot_be_read_leaves_runs_their_names(small_log, tmp_path, text):
+    export_case(read_log(small_log), tmp_path / "case")
+    (tmp_path / "case" / "origin.csv").write_text(text)
+    assert [run.flight for run in load_case(tmp_path / "case").runs] == [""]
 
 
 def test_info_says_what_is_there(small_log, tmp_path):

@@ -6,7 +6,9 @@ import pytest
 
 from glider.tools.cli.common import report_errors
 from glider.tools.cli.main import cli
+from glider.tools.cli.watch import lines
 from glider.tools.report.watch import write_watch_report
+from glider.tools.watch.answer import EventAnswer, RunVerdict, Sized, WatchAnswer
 
 EVENT = {
     "label": "drag", "where": [{"subsystem": "hydrodynamics", "element": "surge", "probability": 0.9}],
@@ -36,6 +38,25 @@ def test_events_and_runs_are_said(tmp_path):
     page = (tmp_path / "report.html").read_text()
     for text in ("drag, from run03", "still there", "cannot tell it from linear_drag", "too short", "few runs", "0.31"):
         assert text in page
+
+
+def test_runs_have_the_names_of_their_flights_where_they_are_known(tmp_path):
+    said = write_watch_report(answer(tmp_path, flights={"run03": "w04.mcap, 2026-11-20", "run04": "w05.mcap"}))
+    assert said == "Drag since run03 (w04.mcap, 2026-11-20)."
+    page = (tmp_path / "report.html").read_text()
+    assert "drag, from run03 (w04.mcap, 2026-11-20)" in page
+    for cell in ("run02", "run03 (w04.mcap, 2026-11-20)", "run04 (w05.mcap)"):
+        assert f"<td>{cell}</td>" in page
+
+
+def test_a_terminal_has_them_too():
+    size = Sized(0.31, (0.2, 0.42), "1")
+    runs = [RunVerdict("run02", "none", [], 0.8, None), RunVerdict("run03", "cause", [], 2.1, None)]
+    event = EventAnswer("drag", [], ["drag"], "run03", None, "step", 0.93, size, [])
+    sentences = lines(WatchAnswer(runs, [event], ["run00"], [], {"run03": "w04.mcap, 2026-11-20"}))
+    assert sentences[1].startswith("run03 (w04.mcap, 2026-11-20) cause")
+    assert sentences[0].index("none") == sentences[1].index("cause")
+    assert "from run03 (w04.mcap, 2026-11-20) and is still there" in sentences[-1]
 
 
 def test_no_event_is_said_so(tmp_path):

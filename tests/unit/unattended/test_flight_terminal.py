@@ -63,6 +63,31 @@ def test_under_water_only_one_that_is_meant_leaves_the_vehicle(metres):
     assert pressed(deep, [(AGAIN_S[1] + 1.0) * n for n in range(50)]) == (1, None)  # one now and then
 
 
+@pytest.mark.parametrize(
+    ("depth", "said"),
+    [
+        (None, ["surfacing; Ctrl-C again stops at once"]),
+        (lambda: 0.1, ["surfacing; Ctrl-C again stops at once"]),
+        (
+            lambda: 3.0,
+            [
+                "surfacing; Ctrl-C twice more, a second apart, leaves it under water",
+                "surfacing; Ctrl-C once more, in a second, leaves the vehicle where it is",
+            ],
+        ),
+    ],
+)
+def test_each_press_says_what_the_next_does(depth, said):
+    told, clock = [], Clock()
+    stop = Stop(lambda: None, 0.4, depth, clock, tell=told.append)
+    for _ in said:
+        stop(signal.SIGINT, None)
+        clock.t += 1.0
+    with pytest.raises(KeyboardInterrupt):
+        stop(signal.SIGINT, None)
+    assert told == said
+
+
 # --- arming -----------------------------------------------------------------------------------------------------------
 QUESTION = "hands and cables clear"
 

@@ -1,6 +1,6 @@
 """Motion capture beside an onboard log: the two clocks' offset, and poses at the log's rows."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -88,4 +88,4 @@ def aligned(run: Run, capture: Capture, offset: Offset) -> Run:
         if n >= 3:
             value = wrap(value)
         columns[name] = np.where(inside, value, np.nan)
-    return Run(run.name, run.path, columns, run.extra)
+    return replace(run, columns=columns)

@@ -13,9 +13,9 @@ from glider.tools.data.sources import load_vehicle
 DENSITY = 998.0  # kg/m3, fresh water at 20 deg C
 
 
-def _alone(number: int, capture: Capture) -> Run:
+def _alone(number: int, path: Path, capture: Capture) -> Run:
     columns = {names.TIME: capture.t} | dict(zip(names.MOCAP, capture.pose.T, strict=True))
-    return Run(f"run{number:02d}", None, columns)
+    return Run(f"run{number:02d}", path, columns, source=path.name)
 
 
 def import_qualisys(
@@ -28,7 +28,8 @@ def import_qualisys(
         own = Path(vehicle)
         text = own.read_text(encoding="utf-8") if own.is_file() else None
         written = write_case(
-            out, [_alone(n, capture) for n, capture in enumerate(captures)], vehicle=vehicle, vehicle_text=text,
+            out, [_alone(n, *one) for n, one in enumerate(zip(files, captures, strict=True))],
+            vehicle=vehicle, vehicle_text=text,
             site="pool", log_rate_hz=captures[0].rate_hz, water_density_kg_m3=DENSITY, motion_capture=True,
         )  # fmt: skip
         return written, [None] * len(captures)

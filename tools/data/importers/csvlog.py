@@ -2,7 +2,7 @@
 
 import fnmatch
 from dataclasses import dataclass, field
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
 
 import msgspec
@@ -16,6 +16,7 @@ from glider.tools.data.importers.mapping import TIME_UNITS, ColumnTable, CutTabl
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs import csvfile
 from glider.tools.data.runs.case import write_case
+from glider.tools.data.runs.origin import moment_text
 from glider.tools.data.runs.run import Run
 from glider.tools.data.sources import name_or_path
 
@@ -78,6 +79,7 @@ class _Source:
         for column in [mapping.time.column, *asked]:
             if column not in self.table.header:
                 raise InputError(f"no column '{column}'; it has {', '.join(self.table.header)}", source=path)
+        self.began: datetime | None = None  # the first row's date and time; without a time zone they are UTC
         self.left_out: dict[str, list[int]] = {}  # lines, by the reason why
         self.notes: list[str] = []
         if self.table.broken:
@@ -133,7 +135,8 @@ class _Source:
         extra = {
             target: csvfile.as_texts(target, columns[target], item.decimals) for target, item in mapping.extra.items()
         }
-        return Run(name=name, path=self.path, columns=numbers, extra=extra)
+        start = "" if self.began is None else moment_text(self.began.timestamp() + cut.start_s)
+        return Run(name, self.path, numbers, extra, self.path.name, start)
 
     def _converted(self, target: str, item: ColumnTable) -> np.ndarray:
         """Logged numbers in SI; what is outside `valid` is missing."""
@@ -197,6 +200,7 @@ class _Source:
             try:
                 moment = datetime.fromisoformat(text.strip())
                 first = first or moment
+                self.began = first if first.tzinfo else first.replace(tzinfo=UTC)
                 seconds[row] = (moment - first).total_seconds()
             except (ValueError, TypeError):  # no date, or some with and some without a time zone
                 if self.mapping.text.bad_fields == "refuse":

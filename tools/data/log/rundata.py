@@ -41,6 +41,7 @@ TICK, TRUTH = "/tick", "/truth"
 EXTRA_FILE = "extra.csv"  # an imported run's columns that are no numbers, behind its time
 # Metadata of a log that was made from run data: there a column of gaps was recorded, elsewhere it was not.
 SOURCE, RUN_DATA = "source", "run data"
+FLIGHT_FILE, FLIGHT_START = "flight_file", "flight_start_utc"  # of the flight that the run data were made of
 _UNITS = (("_rad_s", "rad/s"), ("_rad", "rad"), ("_kg", "kg"), ("_m", "m"), ("_s", "s"))
 
 
@@ -152,7 +153,8 @@ def run_of(log: Log, name: str = "run00") -> Exported:
                 extra[column] = [words[row] for row in np.flatnonzero(keep)]
         else:
             notes.append(f"{', '.join(table.header[1:])} left out: they are no numbers, and the log is cut")
-    return Exported(Run(name=name, path=None, columns=numbers, extra=extra), notes)
+    source, start = log.metadata.get(FLIGHT_FILE, log.path.name), log.metadata.get(FLIGHT_START, log.began)
+    return Exported(Run(name, None, numbers, extra, source, start), notes)
 
 
 def export_case(log: Log, folder: Path, *, vehicle: str | None = None, more: Sequence[Log] = ()) -> Exported:
@@ -167,7 +169,11 @@ def export_case(log: Log, folder: Path, *, vehicle: str | None = None, more: Seq
     for other in more:
         for key in ("site", "log_rate_hz", "water_density_kg_m3"):
             if other.metadata.get(key) != log.metadata.get(key):
-                raise InputError(f"{key} is not that of {log.path.name}: no run of the same case", source=other.path)
+                here, there = (one.metadata.get(key, "not given") for one in (log, other))
+                raise InputError(
+                    f"{key} {there}, in {log.path.name} {here}: one case has one {key}; export the two apart, "
+                    "each with an --out of its own", source=other.path,
+                )  # fmt: skip
         if _vehicle(other, vehicle) != (vehicle_name, vehicle_text):
             raise InputError(f"another vehicle than that of {log.path.name}", source=other.path)
         found = run_of(other, f"run{len(runs):02d}")
@@ -296,6 +302,7 @@ def write_log(path: Path | str, case: Case, run: Run) -> Path:
         "site": case.site,
         "log_rate_hz": repr(case.log_rate_hz),
         "water_density_kg_m3": repr(case.water_density_kg_m3),
+        **({FLIGHT_FILE: run.source, FLIGHT_START: run.start_utc} if run.flight else {}),
     }
     _write(path, spec, np.column_stack(values), run.t, attachments, metadata)
     return path

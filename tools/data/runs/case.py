@@ -14,6 +14,8 @@ from glider.sim_backend.ocean.vehicle import OceanVehicle
 from glider.tools.data.errors import InputError
 from glider.tools.data.files import write_bytes
 from glider.tools.data.runs import columns as names
+from glider.tools.data.runs import csvfile
+from glider.tools.data.runs.origin import ORIGIN_FILE, flight_columns, set_flights
 from glider.tools.data.runs.run import Run, load_run, run_name, write_run
 from glider.tools.data.sources import load_any_vehicle, read_text
 
@@ -102,6 +104,8 @@ def _run_files(folder: Path) -> list[Path]:
 def _read_case_file(folder: Path) -> CaseTable:
     path = folder / CASE_FILE
     if not folder.is_dir():
+        if folder.suffix == ".mcap":
+            raise InputError(f"{folder.name} is an onboard log: glider log export {folder} first")
         raise InputError("not a folder" if folder.exists() else "no such folder", source=folder)
     if not path.is_file():
         raise InputError(f"no {CASE_FILE} in this folder", source=folder)
@@ -163,7 +167,9 @@ def load_runs(folder: Path) -> tuple[CaseTable, list[Run]]:
     if len(files) != table.runs:
         message = f"{table.runs} expected, {len(files)} files run*.csv found"
         raise InputError(message, source=folder / CASE_FILE, column="runs")
-    return table, [load_run(path) for path in files]
+    runs = [load_run(path) for path in files]
+    set_flights(folder, runs)
+    return table, runs
 
 
 def load_case_of_run(path: Path | str, vehicle: str | None = None) -> tuple[Case, Run]:
@@ -176,6 +182,7 @@ def load_case_of_run(path: Path | str, vehicle: str | None = None) -> tuple[Case
         raise InputError("not a file" if path.exists() else "no such file", source=path)
     table = _read_case_file(path.parent)
     run = load_run(path)
+    set_flights(path.parent, [run])
     return _assemble(path.parent, table, [run], vehicle), run
 
 
@@ -239,6 +246,7 @@ def write_case(
     """Write runs as a case, run00 on, and return the run files; case.toml comes last, so that a cut one is no case.
 
     Numbers have `digits` digits at least and all of one case as many; `beside` are other files of the folder, by name.
+    Of which flights the runs are goes into origin.csv, where a run knows it.
 
     `vehicle` is a shipped name or a path from the case's folder; with `vehicle_text`, that file is written too, as
     vehicle.toml. `motion_capture` is, if not given, whether any run has it. InputError where the folder already holds a
@@ -263,6 +271,9 @@ def write_case(
     digits = max(digits, len(str(len(runs) - 1)))
     files = [folder / f"run{number:0{digits}d}{suffix}" for number in range(len(runs))]
     others = dict(beside or {})
+    if ORIGIN_FILE not in others and any(run.flight for run in runs):
+        columns = flight_columns(runs) | {"run": [run_name(path) for path in files]}
+        others[ORIGIN_FILE] = csvfile.encode_table(columns)
     if vehicle_text is not None:
         others[VEHICLE_FILE] = vehicle_text.encode("utf-8")
     others[CASE_FILE] = text.encode("utf-8")

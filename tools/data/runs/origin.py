@@ -1,7 +1,7 @@
-"""When and where the runs of a mission began, and its fixes at the surface: files beside imported runs."""
+"""Of which flights the runs of a case are, when and where they began, and fixes at the surface: files beside them."""
 
 import datetime as dt
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -44,6 +44,38 @@ def read_origins(folder: Path, runs: Sequence[Run]) -> list[Origin]:
         if run.name not in found:
             raise InputError(f"{run.name} is not in it", source=path)
     return [found[run.name] for run in runs]
+
+
+def flight_columns(runs: Sequence[Run]) -> dict[str, list[str]]:
+    """Of which flights the runs are, as columns of ORIGIN_FILE."""
+    return {
+        "run": [run.name for run in runs],
+        "start_utc": [run.start_utc for run in runs],
+        "files": [run.source for run in runs],
+    }
+
+
+def set_flights(folder: Path, runs: Sequence[Run]) -> None:
+    """Set `source` and `start_utc` of runs by the case's ORIGIN_FILE; where it does not say, they stay empty."""
+    try:
+        table = csvfile.read_table(folder / ORIGIN_FILE)
+        _require(table, "run", "start_utc", "files")
+    except InputError:  # a file that only read_origins needs
+        return
+    rows = zip(table.texts("run"), table.texts("start_utc"), table.texts("files"), strict=True)
+    said = {name: (files, start) for name, start, files in rows}
+    for run in runs:
+        run.source, run.start_utc = said.get(run.name, ("", ""))
+
+
+def flights_of(runs: Iterable[Run]) -> dict[str, str]:
+    """Run -> its flight in words, of those that know it."""
+    return {run.name: run.flight for run in runs if run.flight}
+
+
+def with_flight(name: str, flights: Mapping[str, str]) -> str:
+    """'run05 (w06.mcap, 2026-11-20)', or the run's name alone."""
+    return f"{name} ({flights[name]})" if name in flights else name
 
 
 def read_fixes(folder: Path) -> np.ndarray | None:

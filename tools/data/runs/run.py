@@ -17,11 +17,18 @@ class Run:
     path: Path | None
     columns: dict[str, np.ndarray]  # float64, SI, NaN = missing sample
     extra: dict[str, list[str]] = field(default_factory=dict)  # unknown columns, as they stood
+    source: str = ""  # name of the log or recording that it was made of
+    start_utc: str = ""  # when it began, ISO 8601; empty where nobody knows
 
     @property
     def t(self) -> np.ndarray:
         """Time since the start of the run, onboard clock, s; strictly increasing, never missing."""
         return self.columns[names.TIME]
+
+    @property
+    def flight(self) -> str:
+        """'w06.mcap, 2026-11-20': of which flight it is, as far as that is known."""
+        return ", ".join(part for part in (self.source, self.start_utc[:10]) if part)
 
     @property
     def rows(self) -> int:

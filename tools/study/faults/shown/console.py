@@ -22,7 +22,7 @@ def console(disabled: bool, folder: Path) -> GroundOutcome:
         return "yes" if disabled else rng.choice(words)
 
     with Bench(file.text, file.source, file.kind, "roughie", None) as bench:
-        commands = Commands(bench, said.append, answer, lambda: True, lambda *a: None, folder)
+        commands = Commands(bench, said.append, answer, lambda: True, lambda *a: None, folder, lambda text: None)
         survived = 0
         for _ in range(150):
             line = "".join(map(chr, (rng.randrange(1, 0x250) for _ in range(12))))
