@@ -126,7 +126,7 @@ def fly(
     options, supervisor = RealTimeOptions(priority, lock_memory, core), flight.supervisor
     legs, done = len(flight.mission.leg), 0
     hurried = simulated and not realtime
-    display = Display(flight, quiet=hurried)
+    display = Display(flight, muted=hurried)
     stop = Stop(
         flight.autopilot.give_up, supervisor.surface_depth, None if simulated else supervisor.measured_depth,
         tell=display.tell,

@@ -8,9 +8,9 @@ import sys
 import click
 
 from glider.tools.cli.common import report_errors
-from glider.tools.data.version import DISTRIBUTION
 from glider.tools.cli.help import complete
 from glider.tools.data.spelling import did_you_mean
+from glider.tools.data.version import DISTRIBUTION
 
 # name -> (module, attribute, one line). The line stands here so that --help need not import the command.
 COMMANDS = {

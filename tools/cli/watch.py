@@ -46,11 +46,7 @@ def _watch_one(case: Path, reference: Path | None, vehicle: str | None, out: Pat
     need("analysis")
     from glider.tools.data.files import check_writable, write_bytes
     from glider.tools.data.runs.case import load_case
-<<<<<<< HEAD
-=======
-    from glider.tools.data.runs.csvfile import write_bytes
     from glider.tools.data.runs.origin import flights_of
->>>>>>> adbf007 (A flight shows its state; bench refuses what is out of range; examples in every help; the flight's name travels with the run)
     from glider.tools.report.page import REPORT
     from glider.tools.report.watch import write_watch_report
     from glider.tools.watch.answer import FILE

@@ -9,8 +9,8 @@ import numpy as np
 
 from glider.sim_backend.core.effects.catalogue import catalogue
 from glider.tools.data.runs.case import Case
-from glider.tools.data.version import software
 from glider.tools.data.runs.origin import flights_of
+from glider.tools.data.version import software
 from glider.tools.diagnose import by_readings
 from glider.tools.diagnose.cautions import below_floor, cautions, not_asked
 from glider.tools.diagnose.chain import noise_of, panels

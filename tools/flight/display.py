@@ -29,11 +29,11 @@ def write_at_once(text: str) -> bool:
 class Display:
     """The status of one flight: renewed once a second on a terminal, elsewhere a line every PLAIN_S and at a new leg.
 
-    `quiet`: only what `tell` is given, of a flight faster than the clock on the wall, which has a bar.
+    `muted`: only what `tell` is given, of a flight faster than the clock on the wall, which has a bar.
     """
 
-    def __init__(self, flight: Flight, *, quiet: bool = False):
-        self._flight, self._muted = flight, quiet
+    def __init__(self, flight: Flight, *, muted: bool = False):
+        self._flight, self._muted = flight, muted
         self._terminal = os.isatty(STDERR)
         self._began = math.nan
         self._shown: tuple[float, str, int] = (-math.inf, "", -1)  # when, mode and leg of the last plain line

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-SETTLED = 0.98  # of the intervals between samples that a regular sensor keeps
+REGULAR_SHARE = 0.98  # of the intervals between samples that a regular sensor keeps
 JITTER = 0.25  # of a row, by which a row's time may be off
 
 
@@ -19,7 +19,7 @@ def own_period(t: np.ndarray, values: np.ndarray) -> float:
     usual = float(np.median(between))
     longest = usual + (1.0 + JITTER) * row
     # Between one row and two, a slower sensor and lost samples look alike, but for the order in which they come.
-    if usual < 1.5 * row and np.quantile(between, SETTLED) > (2.0 + JITTER) * row:
+    if usual < 1.5 * row and np.quantile(between, REGULAR_SHARE) > (2.0 + JITTER) * row:
         longest = 1.5 * row
     return float(between[between <= longest].mean())
 
