@@ -25,6 +25,7 @@ ACTUATORS = ("servo_rad", "slider_m", "ballast_kg")
 STATES = POSE + VELOCITY + ACTUATORS
 COLUMNS = (TIME, *COMMANDS, *STATES)
 PSI = STATES.index("psi")
+POSITIONS, ANGLES, VELOCITIES, STROKES = slice(0, 3), slice(3, 6), slice(6, 12), slice(12, 15)  # of STATES
 
 DEFAULT_DT = 0.01  # s
 MAX_STEPS = 1e9  # some ten minutes of computing; a longer flight is a time column in the wrong unit
@@ -111,13 +112,13 @@ def read_commands(text: str, source: str) -> CommandColumns:
 def check_start(P: np.ndarray, table: CommandColumns) -> None:
     """InputError where the first row holds a state that this vehicle cannot be in."""
     source, line = table.source, table.lines[0]
-    for name, value in zip(VELOCITY, table.start[6:12], strict=True):
+    for name, value in zip(VELOCITY, table.start[VELOCITIES], strict=True):
         limit = MAX_SPEED if name in "uvw" else MAX_RATE
         if abs(value) > limit:
             unit = "m/s" if name in "uvw" else "rad/s"
             raise InputError(f"{value:g} {unit} is no speed of a glider", source=source, line=line, column=name)
     ranges = (layout.SERVO_MIN, layout.SLIDER_MIN, layout.BALLAST_MIN)
-    for name, value, place in zip(ACTUATORS, table.start[12:15], ranges, strict=True):
+    for name, value, place in zip(ACTUATORS, table.start[STROKES], ranges, strict=True):
         low, high = P[place], P[place + 1]
         if not low - OUTSIDE * (high - low) <= value <= high + OUTSIDE * (high - low):
             message = f"{value:g} is outside the actuator's range, {low:g} to {high:g}"
@@ -136,9 +137,9 @@ def check_dt(P: np.ndarray, dt: float) -> None:
 def _kernel_state(start: np.ndarray) -> np.ndarray:
     """The kernels' state vector, shape (N_X,), of the fifteen states of a row."""
     x = np.zeros(layout.N_X)
-    x[:3] = start[:3]
-    x[layout.X_QUAT : layout.X_QUAT + 4] = quaternion_from_euler(start[3], start[4], start[5])
-    x[layout.X_NU :] = start[6:]
+    x[layout.X_POS : layout.X_QUAT] = start[POSITIONS]
+    x[layout.X_QUAT : layout.X_QUAT + 4] = quaternion_from_euler(*start[ANGLES])
+    x[layout.X_NU :] = start[VELOCITIES.start :]
     return x
 
 
@@ -146,7 +147,7 @@ def _row(x: np.ndarray, psi: float) -> np.ndarray:
     """The fifteen states of a kernels' state vector; psi as near as can be to the psi before."""
     q0, q1, q2, q3 = x[layout.X_QUAT : layout.X_QUAT + 4]
     phi, theta, wrapped = euler_from_quaternion(q0, q1, q2, q3)
-    return np.array([*x[:3], phi, theta, psi + wrap_angle(wrapped - psi), *x[layout.X_NU :]])
+    return np.array([*x[layout.X_POS : layout.X_QUAT], phi, theta, psi + wrap_angle(wrapped - psi), *x[layout.X_NU :]])
 
 
 def _flown(x: np.ndarray) -> bool:

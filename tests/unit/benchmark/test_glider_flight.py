@@ -26,7 +26,7 @@ from glider.tools.study.challenge.ocean_cases import shipped_vehicle
 DIVES, REFERENCE, FIRST = 10, 5, 7
 
 
-@pytest.mark.parametrize("craft", ["slocum", "seaglider", "seaexplorer"])
+@pytest.mark.parametrize("vehicle_class", ["slocum", "seaglider", "seaexplorer"])
 @pytest.mark.parametrize("pitch", [-0.42, 0.38])
 def test_its_glide_is_the_observers_where_that_is_steady(vehicle_class, pitch):
     vehicle = shipped_vehicle(vehicle_class)

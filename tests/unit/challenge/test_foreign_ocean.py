@@ -42,7 +42,7 @@ def test_climbing_mirrors_diving_but_for_its_drag():
     assert at.rates(V, -1.5, 1026.0, 0.4, -0.01, 0.1, 0.3, -0.01, -0.02)[0] < up[0]
 
 
-@pytest.mark.parametrize("craft", sorted(CRAFTS))
+@pytest.mark.parametrize("vehicle_class", sorted(CRAFTS))
 def test_a_dive_goes_to_its_depth_and_back(vehicle_class):
     made = mission(vehicle_class, 2)
     runs, truth = fly_mission(made, [(None, 0.0)] * 2, speed=True)

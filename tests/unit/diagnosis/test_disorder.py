@@ -15,7 +15,7 @@ pytestmark = pytest.mark.computes(seconds=20)
 
 
 def test_rough_water_is_turbulence_however_rough(tmp_path):
-    answer = conclude(run(problem_of(make_case(tmp_path, np.zeros(ef.N_F), seed=7, runs=2, mocap=True, noisy=20.0))))
+    answer = conclude(run(problem_of(make_case(tmp_path, np.zeros(ef.N_F), seed=7, runs=2, mocap=True, rough=20.0))))
     assert answer.main == TURBULENCE
     assert answer.noise.probe.name == TURBULENCE
     assert 10.0 < answer.noise.scale < 40.0
@@ -25,7 +25,7 @@ def test_rough_water_is_turbulence_beside_a_sensor_with_more_nats(tmp_path):
     """Gyros that read a third too much say more of the readings than the water does, and take little of the gap."""
     F = np.zeros(ef.N_F)
     F[ef.GYRO_SCALE] = -0.3
-    answer = conclude(run(problem_of(make_case(tmp_path, F, seed=9, runs=2, noisy=10.0))))
+    answer = conclude(run(problem_of(make_case(tmp_path, F, seed=9, runs=2, rough=10.0))))
     assert answer.main == TURBULENCE
     assert answer.selected == [TURBULENCE, "gyro_scale"]
     assert answer.probabilities["unknown"] < 0.1
@@ -52,11 +52,11 @@ def test_a_clock_that_wanders_is_late_and_hides_nothing_beside_it(tmp_path):
 def beside_a_clock(tmp_path_factory):
     """Concludes of runs whose motion capture is a third of a second late and wanders, with what else is given."""
 
-    def concluded(seed: int, gyro_scale: float = 0.0, noisy: float = 1.0):
+    def concluded(seed: int, gyro_scale: float = 0.0, rough: float = 1.0):
         F = np.zeros(ef.N_F)
         F[ef.GYRO_SCALE] = gyro_scale
         late = {"mocap": True, "late": lambda t: 0.33 + 0.07 * np.sin(2.0 * np.pi * t / 7.0)}
-        return conclude(run(problem_of(make_case(tmp_path_factory.mktemp("late"), F, seed=seed, noisy=noisy, **late))))
+        return conclude(run(problem_of(make_case(tmp_path_factory.mktemp("late"), F, seed=seed, rough=rough, **late))))
 
     return concluded
 
@@ -71,7 +71,7 @@ def test_a_second_search_begins_at_what_the_first_found_however_far_out(beside_a
 
 
 def test_rough_water_is_turbulence_beside_a_clock_that_wanders(beside_a_clock):
-    answer = beside_a_clock(7, noisy=10.0)
+    answer = beside_a_clock(7, rough=10.0)
     assert answer.main == TURBULENCE
     assert set(answer.selected) == {TURBULENCE, "mocap_delay"}
     assert answer.search.clock.label == "mocap_delay"

@@ -48,7 +48,7 @@ def unknown(f: dict[str, float], selected: bool = True, asked: bool = True) -> f
     ("after", 0.1, 12.0), ("floor", 0.05, 3.0), ("before", 0.5, 20.0), ("left", 1.0, 1e6), ("explained", 1.0, 1e6),
     ("taken", 0.01, 100.0), ("told", 1e-3, 1.0), ("next", 1.0, 1e6), ("shows", 1.0, 100.0),
 ])  # fmt: skip
-@pytest.mark.parametrize("told", [0.0, 1.0])
+@pytest.mark.parametrize("well_specified", [0.0, 1.0])
 def test_the_probability_of_unknown_has_no_cliff_in_any_of_its_figures(name, low, high, well_specified):
     for selected, asked in ((True, True), (False, True), (False, False), (True, False)):
         values = np.geomspace(low, high, 4000)

@@ -82,7 +82,7 @@ def test_what_is_allowed_takes_no_effect_s_place_that_it_fills_only_at_its_limit
     def idle(search, hypothesis):
         return HeldOutImportance(np.ones(3), {label: np.zeros(3) for label in hypothesis.labels})
 
-    monkeypatch.setattr(verdict_module, "held_out_worth", idle)
+    monkeypatch.setattr(verdict_module, "held_out_importance", idle)
     monkeypatch.setattr(verdict_module, "strain", lambda hypothesis, less: lost)
     both = next(one for one in two_effects.ranked() if set(one.labels) == {"net_buoyancy", "pitch_trim"})
     kept, gained = prune_effects(two_effects, both)
@@ -252,7 +252,7 @@ def test_as_likely_as_not_at_the_width_that_small_effects_leave():
 def test_the_main_cause_takes_the_most_of_the_gap_however_many_nat_a_sensor_s_small_error_has(tmp_path):
     F = np.zeros(ef.N_F)
     F[ef.DRAG_0], F[ef.GYRO_SCALE] = 1.2, 0.15
-    answer = conclude(run(problem_of(make_case(tmp_path, F, seed=6, mocap=True, noisy=1.5))))
+    answer = conclude(run(problem_of(make_case(tmp_path, F, seed=6, mocap=True, rough=1.5))))
     assert answer.main == answer.selected[0] == "drag"
     assert "gyro_scale" in answer.selected
     assert answer.gained["gyro_scale"] > answer.gained["drag"]

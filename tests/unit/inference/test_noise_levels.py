@@ -66,12 +66,12 @@ def searched(problem: Problem) -> Search:
 
 
 @pytest.mark.parametrize("rough", [1.6, 0.6])
-def test_the_disturbance_is_found_at_a_model_that_is_right(tmp_path, noisy):
-    search = searched(problem_of(make_case(tmp_path, np.zeros(ef.N_F), seed=4, runs=6, mocap=True, noisy=noisy)))
+def test_the_disturbance_is_found_at_a_model_that_is_right(tmp_path, rough):
+    search = searched(problem_of(make_case(tmp_path, np.zeros(ef.N_F), seed=4, runs=6, mocap=True, rough=rough)))
     before = search.problem.spectral.copy()
     assert level_disturbance(search)
     factors = np.sqrt(search.problem.spectral[:6] / before[:6])
-    assert factors == pytest.approx(noisy, rel=0.2)
+    assert factors == pytest.approx(rough, rel=0.2)
     level_disturbance(search)  # from there it moves no more than the last of its steps
     assert np.sqrt(search.problem.spectral[:6] / before[:6]) == pytest.approx(factors, rel=0.2)
 
@@ -84,13 +84,13 @@ def test_where_the_sensors_are_as_told_so_is_the_disturbance(tmp_path, calm):
     assert well_specified[1] < 0.01
     held = replace(calm, z=np.repeat(calm.z[::2], 2, axis=0)[: len(calm.z)])  # readings that say nothing of their noise
     assert noise_matches_file(held, levels.sensor_noise(held, 0.5, 2.0)) < 0.01
-    search = searched(problem_of(make_case(tmp_path, np.zeros(ef.N_F), seed=4, mocap=True, noisy=1.6)))
+    search = searched(problem_of(make_case(tmp_path, np.zeros(ef.N_F), seed=4, mocap=True, rough=1.6)))
     search.well_specified = 1.0
     assert not level_disturbance(search)
 
 
 def test_what_is_far_rougher_is_no_level_of_the_disturbance(tmp_path):
-    search = searched(problem_of(make_case(tmp_path, np.zeros(ef.N_F), seed=4, mocap=True, noisy=12.0)))
+    search = searched(problem_of(make_case(tmp_path, np.zeros(ef.N_F), seed=4, mocap=True, rough=12.0)))
     level_disturbance(search)
     said = problem_of(search.problem.case).spectral[:6]
     assert (search.problem.spectral[:6] <= MOST_LEVEL**2 * said * 1.001).all()

@@ -226,7 +226,9 @@ def test_a_clock_that_wanders_is_said_to():
 
 def test_disorder_claims_no_shrinkage():
     said = words.sentence(record({"turbulence": 0.96}, ["turbulence"], noise=Noise(TURBULENCE, 3.6, 5.0, 1.0)))
-    assert said.startswith("The water is rougher than the vehicle file says, about 3.6 times as rough (turbulence, env")
+    assert said.startswith(
+        "The water is more turbulent than the vehicle file says, about 3.6 times as rough (turbulence, env"
+    )
     assert "its time course is random, so that knowing it shrinks no gap" in said
     assert "88 %" not in said
     said = words.sentence(record({"waves": 0.96}, ["waves"], noise=Noise("waves", 6.0, 5.0, 1.0)))
