@@ -16,6 +16,7 @@ from glider.tools.readings.findings import Finding
 
 SPAN = 8.0  # s that a stretch lasts at least
 SURFACE = 0.25  # m about the surface: a hull of a metre that is partly out of the water, and a gauge that is off
+HIGHEST = -1.0  # m, of a depth at the surface
 SURFACE_RANGE = 0.1  # m that the depth moves within SPAN there: waves, no dive
 LEAST_SAID = 1.0  # s; a shorter end afloat is left out without a word
 STILL_ANGLE, STILL_DEPTH = 0.004, 0.02  # rad, m: ranges within STILL_SPAN of a vehicle that lies on something
@@ -84,10 +85,12 @@ def between_samples(t: np.ndarray, values: np.ndarray) -> np.ndarray:
 def afloat_at_end(t: np.ndarray, depth: np.ndarray) -> np.ndarray:
     """Rows, bool, behind the last at which the vehicle is deeper than its hull; none where it never dived.
 
-    What of the hull is out of the water carries no model here, and with a light ballast it stands on its tail.
+    What of the hull is out of the water carries no model here, and with a light ballast it stands on its tail. Readings
+    higher than a gauge's zero can be off (HIGHEST) are no surface.
     """
     deep = np.flatnonzero(depth >= SURFACE)
-    return np.arange(len(t)) > (deep[-1] if len(deep) else len(t))
+    tail = np.arange(len(t)) > (deep[-1] if len(deep) else len(t))
+    return tail & (np.nanmin(depth[tail], initial=0.0) > HIGHEST)
 
 
 def without_afloat(run: Run) -> Run:

@@ -83,7 +83,7 @@ def test_what_is_allowed_takes_no_effect_s_place_that_it_fills_only_at_its_limit
         return HeldOutImportance(np.ones(3), {label: np.zeros(3) for label in hypothesis.labels})
 
     monkeypatch.setattr(verdict_module, "held_out_importance", idle)
-    monkeypatch.setattr(verdict_module, "strain", lambda hypothesis, less: lost)
+    monkeypatch.setattr(verdict_module, "nuisance_prior_cost", lambda hypothesis, less: lost)
     both = next(one for one in two_effects.ranked() if set(one.labels) == {"net_buoyancy", "pitch_trim"})
     kept, gained = prune_effects(two_effects, both)
     assert len(kept.labels) == stays
