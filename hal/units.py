@@ -26,6 +26,8 @@ UNITS = {
     "kg": Unit("mass", 1.0),
     "g": Unit("mass", 0.001),
     "lb": Unit("mass", 0.45359237),
+    "ml": Unit("volume", 1e-6),
+    "l": Unit("volume", 1e-3),
     "Pa": Unit("pressure", 1.0),
     "hPa": Unit("pressure", 100.0),
     "kPa": Unit("pressure", 1e3),

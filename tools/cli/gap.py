@@ -32,17 +32,22 @@ def measure(case: Path, report: Path | None, vehicle: str | None, as_json: bool)
     Gaps are root mean square errors in tolerances: at 1 the simulator is off by as much as may be. Without --json a
     report is written too, to <case>-gap.html in the working directory unless --report names a file.
     """
+    from glider.sim_backend.ocean.vehicle import OceanVehicle
     from glider.tools.data.errors import need
     from glider.tools.data.files import check_writable
     from glider.tools.data.runs.case import load_case
     from glider.tools.gap.assess import assess
 
     need("analysis")
+    from glider.tools.readings.check import disagreement
+
     loaded = load_case(case, vehicle)
     if report is None and not as_json:
         report = Path(f"{case.resolve().name}-gap.html")
     if report is not None:
         check_writable(report.parent)
+    for text in [] if isinstance(loaded.vehicle, OceanVehicle) else disagreement(loaded.runs):
+        say(f"note: {text}")
     compile_diagnosis(loaded)
     with progress("gap", 3) as advance:
         advance(1)

@@ -30,7 +30,7 @@ def identify(case: Path, out: Path | None, seed: int, likelihood: str, vehicle: 
     from glider.tools.data.files import check_writable
     from glider.tools.data.runs.case import load_case
 
-    loaded = load_case(case, vehicle)
+    loaded = load_case(case, vehicle, leave_out=True)
     if out is not None:
         check_writable(out)
     if isinstance(loaded.vehicle, OceanVehicle):

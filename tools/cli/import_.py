@@ -18,24 +18,42 @@ for _command in COMMANDS:
 
 
 @import_.command("csv")
-@click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("--map", "mapping", required=True, metavar="NAME or FILE", help="Mapping: shipped name or TOML file.")
+@click.argument("files", nargs=-1, type=click.Path(path_type=Path))
+@click.option("--map", "mapping", metavar="NAME or FILE", help="Mapping: shipped name or TOML file.")
+@click.option("--template", type=click.Path(path_type=Path, dir_okay=False), help="Write a mapping to fill in.")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for the case.  [default: beside the first file]")
 @click.option("--strict", is_flag=True, help="Refuse damaged rows, also where the mapping leaves them out.")
 @json_option
-def csv(files: tuple[Path, ...], mapping: str, out: Path | None, strict: bool, as_json: bool) -> None:
-    """Turn CSV logs (.csv or .csv.gz), one a run, into a case, by a mapping file (docs/IMPORT.md)."""
+def csv(
+    files: tuple[Path, ...], mapping: str | None, template: Path | None, out: Path | None, strict: bool, as_json: bool
+) -> None:
+    """Turn CSV logs (.csv or .csv.gz), one a run, into a case, by a mapping file (docs/IMPORT.md).
+
+    With --template a mapping with every key is written, and nothing imported.
+    """
     from glider.tools.data.files import check_writable
     from glider.tools.data.importers.csvlog import import_csv
+    from glider.tools.data.importers.mapping import write_template
+    from glider.tools.data.runs.overview import lines, overview
     from glider.tools.data.runs.run import run_name
 
+    if template is not None:
+        if files or mapping is not None:
+            raise click.UsageError("--template writes a mapping and imports nothing: give neither files nor --map")
+        write_template(template)
+        say(f"mapping to fill in: {template}")
+        return
+    if not files or mapping is None:
+        raise click.UsageError("give the logs and --map (--template FILE writes a mapping to fill in)")
     folder = files[0].parent / f"{run_name(files[0])}.case" if out is None else out
     check_writable(folder)
     imported = import_csv(list(files), mapping, folder, strict)
-    for note in imported.notes:
+    for note in [*imported.notes, *([] if as_json else lines(imported.runs))]:
         say(note)
     if as_json:
         print_json({
+            "columns": [one.plain() for one in overview(imported.runs)],
+            "seconds": [float(run.t[-1] - run.t[0]) for run in imported.runs],
             "case": str(folder), "files": [str(path) for path in imported.files],
             "rows": [run.rows for run in imported.runs], "left_out": imported.left_out, "notes": imported.notes,
         })  # fmt: skip
@@ -56,10 +74,13 @@ def qualisys(files, log, body, vehicle, out, as_json) -> None:
     from glider.tools.data.errors import need
     from glider.tools.data.files import check_writable
     from glider.tools.data.importers.captured import import_qualisys
+    from glider.tools.data.runs.case import load_runs
+    from glider.tools.data.runs.overview import lines, overview
 
     need("analysis")
     check_writable(out)
     written, offsets = import_qualisys(list(files), log, body, vehicle, out)
+    runs = load_runs(out)[1]
     for path, offset in zip(files, offsets, strict=True):
         if offset is not None:
             say(f"{path}: {offset.seconds:+.3f} s to the log's clock (1 sigma {offset.sd:.3f} s)")
@@ -67,7 +88,10 @@ def qualisys(files, log, body, vehicle, out, as_json) -> None:
         rows = [
             {"offset_s": None, "sd_s": None} if o is None else {"offset_s": o.seconds, "sd_s": o.sd} for o in offsets
         ]
-        print_json({"case": str(out), "files": [str(path) for path in written], "clocks": rows})
+        columns = [one.plain() for one in overview(runs)]
+        print_json({"case": str(out), "files": [str(path) for path in written], "clocks": rows, "columns": columns})
     else:
+        for line in lines(runs):
+            say(line)
         for path in written:
             click.echo(path)

@@ -50,7 +50,7 @@ from glider.tools.inference.corrected import corrected_text
 from glider.tools.inference.model import effect_vector, effects_in, nominal_model
 from glider.tools.inference.problem import ALL, problem_of
 from glider.tools.inference.rules import Rules
-from glider.tools.readings.findings import Finding
+from glider.tools.readings.findings import WHOLE, Finding
 from glider.tools.readings.pictures import pictures_of
 from glider.tools.readings.stretches import without_afloat
 
@@ -94,7 +94,7 @@ class Diagnosis:
         found += below_floor(self.shrinkage.channels(FLOOR))
         if self.staged is not None:
             found.insert(0, identified_text(self.staged))
-        return found
+        return [*(one.text for one in self.readings if one.finding in WHOLE and not one.mended), *found]
 
     @property
     def verdict(self) -> str:

@@ -8,10 +8,10 @@ import numpy as np
 from glider.firmware.model.vehicle import COEFFICIENTS
 from glider.sim_backend.core.effects import effect_layout as ef
 from glider.tools.data.runs.case import Case
+from glider.tools.data.runs.gate import LeftOut
 from glider.tools.data.runs.run import Run
 from glider.tools.identify.flight_likelihood import Linear, TrajectoryLikelihood
 from glider.tools.identify.predict import flown_gap
-from glider.tools.identify.screen import LeftOut
 from glider.tools.identify.statistics import Quadratic, collect, inflation
 from glider.tools.inference import levels as noise
 from glider.tools.inference.model import Model

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from glider.firmware.model.vehicle import COEFFICIENTS
-from glider.tools.data.errors import InputError
 from glider.tools.data.runs.case import Case
+from glider.tools.data.runs.gate import LeftOut
 from glider.tools.data.runs.run import Run
 from glider.tools.gap.corrected import ReadingCorrections, correct_readings
 from glider.tools.identify.acceleration_likelihood import fit_accelerations, suited
@@ -18,7 +18,7 @@ from glider.tools.identify.flight_likelihood import TrajectoryLikelihood
 from glider.tools.identify.held import FILE, HeldOut, judge
 from glider.tools.identify.identifiability import unidentifiable_directions
 from glider.tools.identify.sampler import Chains, Summary, sample, summarise
-from glider.tools.identify.screen import LeftOut, despiked, screen
+from glider.tools.identify.screen import despiked, screen
 from glider.tools.identify.statistics import Quadratic
 from glider.tools.inference.levels import Levels
 from glider.tools.inference.model import nominal_model
@@ -142,12 +142,10 @@ def check_linearised(found: IdentificationFit, chains: Chains, draws: int = CHEC
 
 def usable(case: Case) -> tuple[list[Run], list[LeftOut], int]:
     """Runs that may be fitted, without their spikes; InputError, naming the first, where there is none."""
-    kept, left_out = screen(case.runs, case.motion_capture)
+    kept, unfit = screen(case.runs, case.motion_capture)
+    left_out = [*case.left_out, *unfit]
     if not kept:
-        first = left_out[0]
-        raise InputError(
-            f"{first.reason} (none of {len(case.runs)} runs can be used)", source=first.path, column=first.column
-        )
+        raise left_out[0].error(len(left_out))
     cleaned = [despiked(run) for run in kept]
     return [run for run, _ in cleaned], left_out, sum(count for _, count in cleaned)
 

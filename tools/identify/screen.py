@@ -1,17 +1,14 @@
-"""Runs that cannot be fitted: wrong units, swapped axes, a frozen capture, clocks far apart. Named, and left out."""
+"""Runs that cannot be fitted, beside the impossible (gate.py): swapped axes, a frozen capture, clocks far apart."""
 
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from glider.tools.data.runs import columns as names
+from glider.tools.data.runs.gate import LeftOut, impossible
 from glider.tools.data.runs.run import Run
 
-LARGEST_ROLL_PITCH, LARGEST_YAW = 1.65, 60.0  # rad: beyond, an angle is in degrees (yaw may be continuous: ten turns)
-MAX_CAPTURE_SPEED = 5.0  # m/s through the capture's volume: beyond, it counts in millimetres
-MAX_CAPTURE_SPAN = 60.0  # m; no capture sees farther
 LEAST_HULL_SPEED = 0.08  # m/s, below which the way a hull moves says nothing about its axes
 FROZEN = 0.5  # s for which a pose may stand still to the last digit
 AHEAD = 0.6  # of the motion's energy, along the hull, at least; the slowest of sound glides had 0.76
@@ -19,58 +16,9 @@ EARLIEST = 1.0  # s that the two clocks may be apart
 FULL = 0.2  # of a run's rows with a whole pose, at least
 
 
-@dataclass(frozen=True)
-class LeftOut:
-    """A run that is not fitted, and why."""
-
-    run: str
-    path: Path | None
-    column: str
-    reason: str
-
-    def __str__(self) -> str:
-        where = str(self.path) if self.path is not None else self.run
-        return f"{where}: {self.column}: {self.reason}" if self.column else f"{where}: {self.reason}"
-
-
 def _finite(run: Run, name: str) -> np.ndarray:
     values = run.columns.get(name, np.zeros(0))
     return values[np.isfinite(values)]
-
-
-def wrong_units(run: Run) -> tuple[str, str] | None:
-    """Angles in degrees, lengths in millimetres or centimetres."""
-    for group in (names.ATTITUDE, names.MOCAP_ATTITUDE):
-        for n, name in enumerate(group):
-            values = np.abs(_finite(run, name))
-            limit = (np.pi + 0.1, LARGEST_ROLL_PITCH, LARGEST_YAW)[n]
-            if len(values) and np.quantile(values, 0.9) > limit:
-                what = "degrees?" if values.max() > 7.0 else "no roll or pitch: axes swapped?"
-                return name, f"up to {values.max():.4g} rad: {what}"
-    for name in names.RATES:
-        values = np.abs(_finite(run, name))
-        if len(values) and np.quantile(values, 0.9) > 3.0:
-            return name, f"up to {values.max():.4g} rad/s: degrees a second?"
-    for name in (*names.MOCAP_POSITION, names.DEPTH):
-        values = run.columns.get(name)
-        if values is None or np.isfinite(values).sum() < 3:
-            continue
-        seen = np.isfinite(values)
-        speed = np.abs(np.diff(values[seen])) / np.diff(run.t[seen])
-        if np.median(speed) > MAX_CAPTURE_SPEED:
-            return name, f"moves at {np.median(speed):.4g} m/s: millimetres?"
-        if np.ptp(values[seen]) > MAX_CAPTURE_SPAN and name != names.DEPTH:
-            return name, f"spans {np.ptp(values[seen]):.4g} m, more than a capture sees: millimetres?"
-    for name, limit in ((names.DRAW_WIRES[0], 1.0), (names.COMMANDS[1], 1.0), (names.COMMANDS[0], 2.0)):
-        values = np.abs(_finite(run, name))
-        if len(values) and values.max() > limit:
-            unit = "millimetres" if name.endswith("_m") else "degrees"
-            return name, f"up to {values.max():.4g}: {unit}?"
-    for name in (names.DRAW_WIRES[1], names.COMMANDS[2]):
-        values = np.abs(_finite(run, name))
-        if len(values) and values.max() > 5.0:
-            return name, f"up to {values.max():.4g} kg: grams?"
-    return None
 
 
 def _poses(run: Run) -> tuple[np.ndarray, np.ndarray]:
@@ -177,7 +125,7 @@ def screen(runs: list[Run], mocap: bool) -> tuple[list[Run], list[LeftOut]]:
     """The runs that may be fitted, and those that may not with the first reason found."""
     kept, out = [], []
     for run in runs:
-        found = wrong_units(run) or empty(run, mocap) or frozen(run) or swapped(run) or clocks_apart(run)
+        found = impossible(run) or empty(run, mocap) or frozen(run) or swapped(run) or clocks_apart(run)
         if found is None:
             kept.append(run)
         else:

@@ -13,8 +13,9 @@ from glider.tools.data.errors import InputError
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs.run import Run
 from glider.tools.readings.capture import advanced, judge_capture
-from glider.tools.readings.findings import Finding
+from glider.tools.readings.findings import WHOLE, Finding
 from glider.tools.readings.heading import judge_heading
+from glider.tools.readings.pairs import said, weigh
 from glider.tools.readings.rates import judge_rates
 from glider.tools.readings.samples import judge_clock, judge_samples
 from glider.tools.readings.signals import SignalTable, table_of
@@ -54,10 +55,20 @@ def check(runs: list[Run]) -> Readings:
     if not any(state.any() for state in flies):
         return Readings(ordered(samples), runs)
     table = table_of(runs, flies)
-    rates = judge_rates(table)
+    weighed = weigh(table)
+    rates = judge_rates(table, weighed)
+    if weighed is not None and not any(one.channel in weighed.fault.columns for one in rates if one.finding in WHOLE):
+        rates = [*said(weighed), *rates]
     mended = apply_corrections(table, rates)
     found = [*rates, *judge_capture(mended), *judge_heading(mended), *judge_surface(runs), *samples]
     return Readings(ordered(found), corrected_runs(runs, apply_corrections(table, found)))
+
+
+def disagreement(runs: list[Run]) -> list[str]:
+    """Signs, units and axes alone that attitude, rates and depth disagree in, a sentence each; quick if none."""
+    flies = [flying(run) for run in runs]
+    weighed = weigh(table_of(runs, flies)) if any(state.any() for state in flies) else None
+    return [] if weighed is None else [one.text for one in said(weighed)]
 
 
 def ordered(findings: list[Finding]) -> list[Finding]:
@@ -81,7 +92,8 @@ def apply_corrections(table: SignalTable, findings: list[Finding]) -> SignalTabl
         if "gain" in made:
             values = values / made["gain"]
         if "from" in made:
-            values = made["sign"] * table.columns[names.RATES[int(made["from"])]]
+            group = names.ATTITUDE if one.channel in names.ATTITUDE else names.RATES
+            values = made["sign"] * table.columns[group[int(made["from"])]]
         if "depth_scale" in made:
             values = values / (1.0 + made["depth_scale"])
         if "pressure_lever" in made or "pitch" in made:

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from glider.tools.readings.regression import Estimate
 
 CERTAIN_SIGMA = 6.0  # standard errors
+WHOLE = ("sign", "units", "axes")  # findings that are right or wrong, and have no size to fit
 MATERIAL_TOLERANCES = 0.1  # of a tolerance
 MATERIAL_OFFSET = 0.35  # of a tolerance; 3.5 sigma of the bias of the sensors that the vehicle is shipped with
 TOLERANCE = {

@@ -8,17 +8,17 @@ nothing that could be seen.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from glider.tools.data.runs import columns as names
-from glider.tools.readings.findings import CERTAIN_SIGMA, TOLERANCE, Finding, certain, spoken
+from glider.tools.readings.findings import CERTAIN_SIGMA, TOLERANCE, WHOLE, Finding, certain, spoken
+from glider.tools.readings.pairs import DEGREES, Weighed
 from glider.tools.readings.regression import Estimate, Fit, fit, within
 from glider.tools.readings.signals import Rates, SignalTable, body_increments, pieces, summed, unwrapped
 
 DELAYS = np.arange(-2.0, 2.01, 0.1)  # s, tried before the fit
-DEGREES = 180.0 / math.pi
 UNIT_FACTOR_TOLERANCE = 0.2  # of a whole unit's factor, for a scale to be a matter of units
 FOREIGN = 2.0  # times its own axis, that another must bring for the axes to be exchanged
 EULER = 0.7  # of the residual, that Euler rates must come to for the rates to be of the Euler angles
@@ -115,18 +115,34 @@ def _best_delay(table: SignalTable, turned: np.ndarray, rates: Rates) -> float:
     return best
 
 
-def judge_rates(table: SignalTable) -> list[Finding]:
-    """What is wrong between rates and the onboard attitude."""
+def judge_rates(table: SignalTable, weighed: Weighed | None = None) -> list[Finding]:
+    """What is wrong between rates and the onboard attitude; `weighed`: what of it is a matter of sign, unit or axes."""
     if not table.has(*names.RATES, *names.ATTITUDE):
         return []
     body = compare(table, names.ATTITUDE)
-    found = _euler(table, body)
     exchanged = _exchanged(body)
-    found += exchanged
+    found = _single(table, body, exchanged, [_scale(table, axis, solved) for axis, solved in enumerate(body.fits)])
+    if weighed is None:  # a mixture that no single fault explains: said, and left as it is
+        return [replace(one, mended=one.mended and one.finding not in WHOLE) for one in found]
+    accused = weighed.fault.columns if weighed.decided else ()
+    of_rates = {one.channel for one in found if one.finding == weighed.fault.kind and one.channel in accused}
+    if accused and of_rates == set(accused):  # measured with its size
+        return [
+            replace(one, text=f"{one.text[:-1]} ({weighed.odds_said}).") if one.channel in accused
+            and one.finding in WHOLE else one for one in found
+        ]  # fmt: skip
+    if not weighed.decided:
+        return []
+    return judge_rates(weighed.fault.fix_axes_signs_units(table))
+
+
+def _single(table: SignalTable, body: Compared, exchanged: list[Finding], scales: list[list[Finding]]) -> list[Finding]:
+    """What is wrong with rates beside an attitude that is right."""
+    found = [*_euler(table, body), *exchanged]
     for axis, solved in enumerate(body.fits):
         if solved is None or any(names.RATES[axis] == other.channel for other in exchanged):
             continue
-        scale = _scale(table, axis, solved)
+        scale = scales[axis]
         if scale and scale[0].finding == "scale" and _acquitted(table, axis, scale[0].size):
             scale = []
         found += [*scale, *_offset(axis, solved)]
@@ -147,8 +163,10 @@ def _acquitted(table: SignalTable, axis: int, error: float) -> bool:
     return abs(own.value - 1.0) < 0.5 * abs(error) and own.sigma(1.0 + error) >= CERTAIN_SIGMA
 
 
-def _scale(table: SignalTable, axis: int, solved: Fit) -> list[Finding]:
+def _scale(table: SignalTable, axis: int, solved: Fit | None) -> list[Finding]:
     """Sign, units or scale of one rate."""
+    if solved is None:
+        return []
     name, angle, slope = names.RATES[axis], names.ATTITUDE[axis], solved[axis]
     motion = rms(table.flown(table.columns[name]))
     scale = inverse(slope)

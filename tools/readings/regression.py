@@ -65,6 +65,8 @@ def blocks_of(t: np.ndarray, run: np.ndarray) -> np.ndarray:
 
 def within(values: np.ndarray, block: np.ndarray) -> np.ndarray:
     """Values (rows,) or (rows, k) less their mean over each block."""
+    if not len(values):
+        return values
     _, at = np.unique(block, return_inverse=True)
     count = np.bincount(at).astype(float)
     columns = values.reshape(len(values), -1)

@@ -301,3 +301,51 @@ def test_the_flights_of_2015_are_reproduced(shared, tmp_path):
             wrong |= np.abs(mine.columns[name] - values) > 1.01e-5
             np.testing.assert_allclose(mine.columns[name], values, atol=0.01)
         assert np.count_nonzero(wrong) == between[number]
+
+
+def test_the_template_is_a_mapping_that_names_every_column_and_key(tmp_path):
+    from glider.tools.data.importers.mapping import ColumnTable, MapTable
+    from glider.tools.data.runs import columns as names
+
+    path = tmp_path / "mine.toml"
+    ran = CliRunner().invoke(import_, ["csv", "--template", str(path)])
+    assert ran.exit_code == 0, ran.output
+    assert set(decode_map(path.read_text(), "mine.toml").columns) == {"depth_m"}
+    lines = path.read_text().splitlines()
+    last = next(n for n, line in enumerate(lines) if line.startswith("# Units")) + 2
+    whole = [line[2:] if line.startswith("# ") and n > last and not line.startswith(("# One", "# Roll")) else line
+             for n, line in enumerate(lines)]  # fmt: skip
+    everything = decode_map("\n".join(whole), "mine.toml")
+    onboard = {*names.COMMANDS, *names.DRAW_WIRES, *names.ATTITUDE, *names.RATES, names.DEPTH}
+    assert set(everything.columns) == onboard
+    assert all(name in path.read_text() for name in MapTable.__struct_fields__ if name != "commands")
+    assert all(name in path.read_text() for name in ColumnTable.__struct_fields__ if name != "words")
+    again = CliRunner().invoke(import_, ["csv", "--template", str(path)])
+    assert isinstance(again.exception, InputError)
+    assert CliRunner().invoke(import_, ["csv"]).exit_code == 2
+
+
+def test_a_volume_of_ballast_is_a_mass_of_the_water(folder):
+    text = MAP + '\n[columns.ballast_kg]\nsource = "adc"\nunit = "ml"\n'
+    run = _import(folder, text=text).runs[0]
+    counts = np.array([float(text) for text in run.extra["adc_counts"]])
+    seen = np.isfinite(run.columns["ballast_kg"])
+    assert run.columns["ballast_kg"][seen] == pytest.approx(counts[seen] * 1e-3, abs=1e-4)  # of 1000 kg/m3
+
+
+def test_a_wrong_unit_is_said_at_its_key(folder):
+    with pytest.raises(ConfigError, match=r"map\.toml:14: columns\.depth_m\.unit: expected one of m, cm"):
+        _import(folder, text=MAP.replace('unit = "ft"', 'unit = "furlong"'))
+    with pytest.raises(ConfigError, match=r"map\.toml:14: columns\.depth_m\.unit: 'deg' is no unit of length"):
+        _import(folder, text=MAP.replace('unit = "ft"', 'unit = "deg"'))
+
+
+def test_after_an_import_one_table_says_what_is_in_it(folder):
+    asked = ["csv", str(folder / "a.csv"), "--map", str(folder / "map.toml"), "--out"]
+    ran = CliRunner().invoke(import_, [*asked, str(folder / "c")])
+    (line,) = (line for line in ran.stderr.splitlines() if line.startswith("depth_m"))
+    depth = load_case(folder / "c").runs[0].columns["depth_m"]
+    assert line.split()[1:4] == ["m", f"{np.nanmin(depth):.4g}", f"{np.nanmax(depth):.4g}"]
+    plain = json.loads(CliRunner().invoke(import_, [*asked, str(folder / "d"), "--json"]).stdout)
+    assert [one["name"] for one in plain["columns"]] == ["t_s", "pitch_rad", "yaw_rad", "depth_m"]
+    assert plain["seconds"] == [pytest.approx(2.0, abs=0.11)]

@@ -28,7 +28,7 @@ METADATA = {"vehicle": "roughie", "site": "pool", "log_rate_hz": "50", "water_de
 
 def tick_rows(count: int) -> np.ndarray:
     """The log's tick records, shape (count, TICK.width)."""
-    rows = np.random.default_rng(7).normal(size=(count, TICK.width))
+    rows = np.random.default_rng(7).normal(scale=0.1, size=(count, TICK.width))
     rows[:, 0] = np.arange(count) / 50
     rows[::3, 1] = np.nan
     rows[:, 3] = np.nan

@@ -7,6 +7,7 @@ from glider.tools.data.importers.align import Offset, aligned, find_offset
 from glider.tools.data.importers.qualisys import Capture, read_capture
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs.case import load_case, write_case
+from glider.tools.data.runs.gate import refuse_impossible
 from glider.tools.data.runs.run import Run
 from glider.tools.data.sources import load_vehicle
 
@@ -27,9 +28,10 @@ def import_qualisys(
         load_vehicle(vehicle)
         own = Path(vehicle)
         text = own.read_text(encoding="utf-8") if own.is_file() else None
+        alone = [_alone(n, *one) for n, one in enumerate(zip(files, captures, strict=True))]
+        refuse_impossible(alone)
         written = write_case(
-            out, [_alone(n, *one) for n, one in enumerate(zip(files, captures, strict=True))],
-            vehicle=vehicle, vehicle_text=text,
+            out, alone, vehicle=vehicle, vehicle_text=text,
             site="pool", log_rate_hz=captures[0].rate_hz, water_density_kg_m3=DENSITY, motion_capture=True,
         )  # fmt: skip
         return written, [None] * len(captures)
@@ -44,6 +46,7 @@ def import_qualisys(
             raise InputError(f"with {path.name}: {error}") from None
         runs.append(aligned(run, capture, offset))
         offsets.append(offset)
+    refuse_impossible(runs)
     beside = case.folder / case.vehicle_name
     text = beside.read_text(encoding="utf-8") if beside.is_file() else None
     written = write_case(

@@ -17,6 +17,7 @@ from glider.tools.data.runs import columns as names
 from glider.tools.data.runs import csvfile
 from glider.tools.data.runs.case import write_case
 from glider.tools.data.runs.origin import moment_text
+from glider.tools.data.runs.gate import refuse_impossible, wrong_times
 from glider.tools.data.runs.run import Run
 from glider.tools.data.sources import name_or_path
 
@@ -50,6 +51,7 @@ def import_csv(paths: list[Path], map_name: str, out: Path, strict: bool = False
     sources = [_Source(path, mapping) for path in paths]
     runs = [source.run(f"run{number:02d}") for number, source in enumerate(sources)]
     notes = [note for source in sources for note in source.said()]
+    refuse_impossible(runs)
     rate = mapping.rate_hz
     if rate is None:
         steps = np.concatenate([np.diff(run.t) for run in runs])
@@ -141,7 +143,9 @@ class _Source:
     def _converted(self, target: str, item: ColumnTable) -> np.ndarray:
         """Logged numbers in SI; what is outside `valid` is missing."""
         logged = self.numbers[target][self.keep]
-        values = item.factor(self.mapping.water_density_kg_m3) * (logged - item.zero) + item.offset
+        values = (
+            item.factor(self.mapping.water_density_kg_m3, target.endswith("_kg")) * (logged - item.zero) + item.offset
+        )
         if item.valid is not None:
             outside = (values < item.valid[0]) | (values > item.valid[1])
             values[outside] = np.nan
@@ -213,6 +217,9 @@ def _rows(
 ) -> dict[str, np.ndarray]:
     """The run's columns, t_s first: even means at rate_hz, or the rows as they are."""
     end = t[-1] if cut.end_s is None else cut.end_s
+    wrong = None if names.OIL in values else wrong_times(t[(t >= cut.start_s) & (t <= end)])
+    if wrong is not None:
+        raise InputError(wrong, source=path, column=mapping.time.column)
     if mapping.rate_hz is None:
         use = (t >= cut.start_s) & ((t < end) | (cut.end_s is None))
         if not use.any():

@@ -18,13 +18,13 @@ from glider.hal.units import UNITS, units_of
 from glider.tools.data.errors import InputError
 from glider.tools.data.importers.commands import CommandTable
 from glider.tools.data.runs import columns as names
-from glider.tools.data.runs.csvfile import Dialect
+from glider.tools.data.runs.csvfile import Dialect, write_bytes
 from glider.tools.data.sources import read_text
 
 # 'counts' is for values that `scale` alone turns into the target's SI unit.
-COLUMN_UNITS = units_of("length", "angle", "rate", "mass", "pressure", "counts")
+COLUMN_UNITS = units_of("length", "angle", "rate", "mass", "volume", "pressure", "counts")
 TIME_UNITS = {name: UNITS[name].factor for name in units_of("time")}
-_KINDS = (("_rad_s", "rate"), ("_rad", "angle"), ("_kg", "mass"), ("_m", "length"))
+_KINDS = (("_rad_s", "rate"), ("_rad", "angle"), ("_kg", "mass"), ("_m", "length"), (names.OIL, "volume"))
 
 Factor = Annotated[float, msgspec.Meta(ge=-1e12, le=1e12)]
 
@@ -50,9 +50,11 @@ class ColumnTable(Table):
         if self.valid is not None and not self.valid[0] < self.valid[1]:
             raise ValueError(f"valid: expected [low, high] with low < high, got {list(self.valid)}")
 
-    def factor(self, density: float) -> float:
-        """From logged steps to SI; a pressure becomes a depth of water of this density, kg/m3."""
+    def factor(self, density: float, mass: bool = False) -> float:
+        """From logged steps to SI; a pressure becomes a depth of water of this density, kg/m3, a volume its `mass`."""
         kind, factor = UNITS[self.unit]
+        if kind == "volume" and mass:
+            factor *= density
         if kind == "pressure":
             factor /= density * GRAVITY
         return self.sign * self.scale * factor
@@ -109,9 +111,10 @@ def _check(mapping: MapTable, source: str) -> None:
             raise ConfigError(
                 source, f"no column of run data (put it in [extra], or use {known})", key=f"columns.{name}"
             )
-        wanted = next(kind for ending, kind in _KINDS if name.endswith(ending))
+        wanted = next((kind for ending, kind in _KINDS if name.endswith(ending)), "counts")
         kind = UNITS[column.unit].kind
-        if kind not in (wanted, "counts") and not (kind == "pressure" and name == names.DEPTH):
+        also = {"length": "pressure" if name == names.DEPTH else wanted, "mass": "volume"}.get(wanted, wanted)
+        if kind not in (wanted, also, "counts"):
             raise ConfigError(source, f"{column.unit!r} is no unit of {wanted}", key=f"columns.{name}.unit")
     for name in mapping.extra:
         if name in names.KNOWN or not name.strip():
@@ -134,9 +137,21 @@ def decode_map(text: str, source: str) -> MapTable:
     try:
         mapping = decode(text, MapTable, source)
     except ConfigError as error:
-        raise _with_column(error, text, source) from None
-    _check(mapping, source)
+        raise _at_key(_with_column(error, text, source), text) from None
+    try:
+        _check(mapping, source)
+    except ConfigError as error:
+        raise ConfigError(source, error.message, key=error.key, line=locate(text, [*error.key.split(".")])) from None
     return mapping
+
+
+def _at_key(error: ConfigError, text: str) -> ConfigError:
+    """An error that a table says of one of its keys, at that key."""
+    key, colon, message = error.message.partition(": ")
+    if not colon or not key.isidentifier():
+        return error
+    path: list[str | int] = [*error.key.split("."), key]
+    return ConfigError(error.source, message, key=f"{error.key}.{key}", line=locate(text, path))
 
 
 _BY_NAME = {"columns": ColumnTable, "extra": ColumnTable, "commands": CommandTable}
@@ -154,6 +169,13 @@ def _with_column(error: ConfigError, text: str, source: str) -> ConfigError:
             path: list[str | int] = [group, name, *rest]
             return ConfigError(source, error.message, key=".".join(map(str, path)), line=locate(text, path))
     return error
+
+
+def write_template(path: Path) -> None:
+    """A mapping with every key, commented, to be filled in; InputError where the file is there already."""
+    if path.exists():
+        raise InputError("is there already: name another file", source=path)
+    write_bytes(path, files("glider.tools.data.importers").joinpath("template.toml").read_bytes())
 
 
 def load_map(wanted: str) -> tuple[MapTable, Path]:

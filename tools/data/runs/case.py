@@ -16,6 +16,7 @@ from glider.tools.data.files import write_bytes
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs import csvfile
 from glider.tools.data.runs.origin import ORIGIN_FILE, flight_columns, set_flights
+from glider.tools.data.runs.gate import LeftOut, parted, wrong_rate
 from glider.tools.data.runs.run import Run, load_run, run_name, write_run
 from glider.tools.data.sources import load_any_vehicle, read_text
 
@@ -74,6 +75,7 @@ class Case:
     sensors: Any  # SensorsTable or OceanSensors: the vehicle's, with the case's entries in their place
     disturbance: Any  # DisturbanceTable or OceanDisturbance
     assumed: dict[str, Assumed] = field(default_factory=dict)  # the vehicle's and the case's own
+    left_out: list[LeftOut] = field(default_factory=list)  # runs that hold what no run can, if they were to be left out
 
     @property
     def roughie(self) -> Vehicle:
@@ -114,10 +116,17 @@ def _read_case_file(folder: Path) -> CaseTable:
     return decode(read_text(path), CaseTable, str(path))
 
 
-def _assemble(folder: Path, table: CaseTable, runs: list[Run], instead: str | None) -> Case:
+def _assemble(folder: Path, table: CaseTable, runs: list[Run], instead: str | None, leave_out: bool = False) -> Case:
     vehicle = load_any_vehicle(table.vehicle, folder) if instead is None else load_any_vehicle(instead)
-    if not isinstance(vehicle, OceanVehicle):
+    ocean = isinstance(vehicle, OceanVehicle)
+    if not ocean:
         _refuse_ocean(folder, runs, table.vehicle if instead is None else instead)
+    runs, out = parted(runs, ocean)
+    if out and not (leave_out and runs):
+        raise out[0].error(len(out) if leave_out else 0)
+    contradicted = None if ocean else wrong_rate(runs, table.log_rate_hz)
+    if contradicted is not None:
+        raise InputError(contradicted, source=folder / CASE_FILE, column="log_rate_hz")
     return Case(
         folder=folder,
         vehicle=vehicle,
@@ -130,6 +139,7 @@ def _assemble(folder: Path, table: CaseTable, runs: list[Run], instead: str | No
         sensors=_replaced(vehicle.sensors, table.sensors),
         disturbance=_replaced(vehicle.disturbance, table.disturbance),
         assumed={**vehicle.assumed, **table.assumed},
+        left_out=out,
     )
 
 
@@ -151,13 +161,14 @@ def _replaced(whole: Any, part: Table) -> Any:
     return msgspec.structs.replace(whole, **_given(part))
 
 
-def load_case(folder: Path | str, vehicle: str | None = None) -> Case:
+def load_case(folder: Path | str, vehicle: str | None = None, leave_out: bool = False) -> Case:
     """A case with all its runs; InputError or ConfigError, one line, where it cannot be used.
 
-    vehicle: a shipped name or a file that stands in for the vehicle that the case names.
+    vehicle: a shipped name or a file that stands in for the vehicle that the case names. A run that holds what none can
+    (gate.py) is refused, or with `leave_out` left out, as long as others remain.
     """
     folder = Path(folder)
-    return _assemble(folder, *load_runs(folder), vehicle)
+    return _assemble(folder, *load_runs(folder), vehicle, leave_out)
 
 
 def load_runs(folder: Path) -> tuple[CaseTable, list[Run]]:

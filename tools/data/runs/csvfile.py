@@ -67,11 +67,14 @@ class Dialect(StrictTable):
         return self.broken_rows != "refuse" or self.bad_fields != "refuse"
 
 
+RUN_DATA = Dialect()
+
+
 class CsvTable:
     """A CSV file's header and its fields, still text, by column. `broken` has the lines of broken rows left out,
     `joined` counts those that were put together."""
 
-    def __init__(self, path: Path, data: bytes, dialect: Dialect = Dialect()):
+    def __init__(self, path: Path, data: bytes, dialect: Dialect = RUN_DATA):
         self.path = path
         self._dialect = dialect
         self._text, self._above = self._decoded(data)
@@ -107,7 +110,8 @@ class CsvTable:
         if broken and (self._dialect.broken_rows == "refuse" or not good):
             number, row = broken[0]
             few = "too few" if len(row) < width else "too many"
-            raise self.error(f"{few} fields: expected {width}, got {len(row)}", line=number)
+            way = "" if self._dialect is RUN_DATA else ' (text.broken_rows = "drop" or "join" lets such rows pass)'
+            raise self.error(f"{few} fields: expected {width}, got {len(row)}{way}", line=number)
         self.broken = sorted([*self.broken, *(number for number, _ in broken)])
         return good
 
@@ -245,7 +249,7 @@ def _complaint(field: str) -> str:
     return f"not a number: {shown}" + (" (a missing sample is an empty field)" if value is not None else "")
 
 
-def read_table(path: Path, dialect: Dialect = Dialect()) -> CsvTable:
+def read_table(path: Path, dialect: Dialect = RUN_DATA) -> CsvTable:
     """A CSV or .csv.gz file as text columns; InputError where it is none, is damaged or is too long."""
     return CsvTable(path, _read_bounded(path), dialect)
 

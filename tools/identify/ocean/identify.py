@@ -126,6 +126,7 @@ def learnable(runs: list[Run]) -> tuple[list[Run], list[str]]:
 def identify_ocean(case: Case, say: Callable[[str], None] = lambda text: None) -> OceanIdentification:
     """The vehicle of a case, from its first dives; InputError where none can be learned from."""
     runs, left_out = learnable(case.runs)
+    left_out = [*map(str, case.left_out), *left_out]
     if not runs:
         raise InputError(f"no run flies steadily for {SHORTEST:.0f} s: {left_out[0]}", source=case.folder)
     runs = runs[:MOST_RUNS]

@@ -13,6 +13,7 @@ from glider.tools.data.importers.ocean.segment import Segment
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs import csvfile
 from glider.tools.data.runs.case import write_case
+from glider.tools.data.runs.gate import refuse_impossible
 from glider.tools.data.runs.origin import FIXES_FILE, ORIGIN_FILE, fix_columns, moment_text
 from glider.tools.data.runs.run import Run
 
@@ -68,6 +69,7 @@ def write_mission(segments: list[Segment], out: Path, vehicle: str) -> ImportedM
     fixes = np.concatenate([one.fixes for one in segments])  # of what is no run, too
     if len(fixes):
         beside[FIXES_FILE] = fix_columns(fixes)
+    refuse_impossible(runs, ocean=True)
     files = write_case(
         out, runs, vehicle=vehicle, site="ocean", log_rate_hz=_rate(runs), water_density_kg_m3=_density(runs),
         motion_capture=False, suffix=".csv.gz", decimals=DECIMALS, digits=digits,
