@@ -24,11 +24,11 @@ from glider.tools.readings.signals import Rates, SignalTable, body_increments, p
 
 DECIDED = math.log(20.0)  # nat of odds, from which one of the two is falsely flagged
 DEGREES = 180.0 / math.pi
-ROUGH = 0.02  # rad that summed rates and attitude may differ by within a block, whatever is right
+ATTITUDE_MISMATCH = 0.02  # rad that summed rates and attitude may differ by within a block, whatever is right
 SCALE_SD = 0.1  # of a gyro's scale, logarithm; a share UNFORESEEN of gyros may have any
 ANY_SCALE_SD = 1.5
 UNFORESEEN = 0.05
-UNLIKE = 0.3  # of an axis' motion that its rate leaves, for a fault to be looked for
+SUSPECT_SHARE = 0.3  # of an axis' motion that its rate leaves, for a fault to be looked for
 FAULTY = 1e-3  # of cases have any one of these faults
 RATE, RATE_SD = math.log(0.1), 1.2  # of the logarithm of rms rates, rad/s
 SPEEDS = 0.3 * np.exp(0.7 * np.linspace(-2.0, 2.0, 9))  # m/s, with weights of a normal distribution
@@ -129,8 +129,8 @@ def suspicious(table: SignalTable) -> bool:
     """Whether it is worth asking: an axis on which the rates do not account for the attitude, or a glide tail first."""
     if table.has(*names.RATES, *names.ATTITUDE):
         for axis in summed_up(table, names.ATTITUDE):
-            if axis.motion > ROUGH**2 and (
-                axis.left > UNLIKE * axis.motion or abs(axis.log_slope) > 0.5 * math.log(DEGREES)
+            if axis.motion > ATTITUDE_MISMATCH**2 and (
+                axis.left > SUSPECT_SHARE * axis.motion or abs(axis.log_slope) > 0.5 * math.log(DEGREES)
             ):
                 return True
     pitch = names.ATTITUDE[1]
@@ -198,7 +198,7 @@ def consistent(table: SignalTable, columns: tuple[str, ...]) -> float:
     total = 0.0
     for axis in summed_up(table, columns):
         total += _scale(min(axis.log_slope, 3.0 * ANY_SCALE_SD))
-        total -= 0.5 * axis.blocks * math.log((axis.left + ROUGH**2) / (axis.motion + ROUGH**2))
+        total -= 0.5 * axis.blocks * math.log((axis.left + ATTITUDE_MISMATCH**2) / (axis.motion + ATTITUDE_MISMATCH**2))
     return total
 
 
@@ -241,7 +241,7 @@ def captured(table: SignalTable) -> float:
         good = np.isfinite(apart)
         if good.sum() > 20:
             blocks = len(np.unique(table.block[good]))
-            total -= 0.5 * blocks * math.log(float(np.var(apart[good])) + ROUGH**2)
+            total -= 0.5 * blocks * math.log(float(np.var(apart[good])) + ATTITUDE_MISMATCH**2)
     return total
 
 

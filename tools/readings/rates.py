@@ -124,11 +124,11 @@ def judge_rates(table: SignalTable, weighed: Weighed | None = None) -> list[Find
     found = _single(table, body, exchanged, [_scale(table, axis, solved) for axis, solved in enumerate(body.fits)])
     if weighed is None:  # a mixture that no single fault explains: said, and left as it is
         return [replace(one, mended=one.mended and one.finding not in WHOLE) for one in found]
-    accused = weighed.fault.columns if weighed.decided else ()
-    of_rates = {one.channel for one in found if one.finding == weighed.fault.kind and one.channel in accused}
-    if accused and of_rates == set(accused):  # measured with its size
+    at_fault = weighed.fault.columns if weighed.decided else ()
+    of_rates = {one.channel for one in found if one.finding == weighed.fault.kind and one.channel in at_fault}
+    if at_fault and of_rates == set(at_fault):  # measured with its size
         return [
-            replace(one, text=f"{one.text[:-1]} ({weighed.odds_said}).") if one.channel in accused
+            replace(one, text=f"{one.text[:-1]} ({weighed.odds_said}).") if one.channel in at_fault
             and one.finding in WHOLE else one for one in found
         ]  # fmt: skip
     if not weighed.decided:

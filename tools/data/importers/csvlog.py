@@ -16,8 +16,8 @@ from glider.tools.data.importers.mapping import TIME_UNITS, ColumnTable, CutTabl
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs import csvfile
 from glider.tools.data.runs.case import write_case
-from glider.tools.data.runs.origin import moment_text
 from glider.tools.data.runs.gate import refuse_impossible, wrong_times
+from glider.tools.data.runs.origin import moment_text
 from glider.tools.data.runs.run import Run
 from glider.tools.data.sources import name_or_path
 

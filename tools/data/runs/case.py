@@ -15,8 +15,8 @@ from glider.tools.data.errors import InputError
 from glider.tools.data.files import write_bytes
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs import csvfile
-from glider.tools.data.runs.origin import ORIGIN_FILE, flight_columns, set_flights
 from glider.tools.data.runs.gate import LeftOut, parted, wrong_rate
+from glider.tools.data.runs.origin import ORIGIN_FILE, flight_columns, set_flights
 from glider.tools.data.runs.run import Run, load_run, run_name, write_run
 from glider.tools.data.sources import load_any_vehicle, read_text
 

@@ -1,7 +1,7 @@
 """What no run of a glider can hold: refused by every command that reads a case, and by every import, in one line.
 
-Units, sizes, speeds and times alone; that two readings disagree is for glider.tools.readings to weigh. Limits lie well beyond
-every flight recorded so far (gliders of a pool, a lake and the ocean; a blimp), a wrong unit far beyond them.
+Units, sizes, speeds and times alone; that two readings disagree is for glider.tools.readings to weigh. Limits lie well
+beyond every flight recorded so far (gliders of a pool, a lake and the ocean; a blimp), a wrong unit far beyond them.
 """
 
 from collections.abc import Sequence
