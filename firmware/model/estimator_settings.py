@@ -36,6 +36,8 @@ def parameter_sigma(P: np.ndarray, uncertainty: UncertaintyTable) -> np.ndarray:
         sigma[index] = uncertainty.mass * P[index]
     for index in (layout.A_Y, layout.A_Z, layout.B_Y, layout.B_Z):
         sigma[index] = uncertainty.added * P[index]
+    for index in (layout.X_B, layout.R_R, layout.R_S):
+        sigma[index] = uncertainty.length * abs(P[index])
     sigma[layout.NET_MASS] = uncertainty.net_mass
     sigma[layout.CG_X : layout.CG_Z + 1] = uncertainty.cg
     return sigma

@@ -26,6 +26,7 @@ COEFFICIENTS = ("K_D0", "K_D", "K_L0", "K_L", "K_beta", "K_MR", "K_p", "K_M0", "
 PLACES = {
     **{name: getattr(layout, name.upper()) for name in COEFFICIENTS},
     "m_t": layout.M_T, "m_r": layout.M_R, "m_s": layout.M_S,
+    **{f"J_{axis}": layout.J_XX + n for n, axis in enumerate("xyz")}, "R_r": layout.R_R, "R_s": layout.R_S,
     **{f"added_mass_{axis}": layout.A_X + n for n, axis in enumerate("xyz")},
     **{f"added_inertia_{axis}": layout.B_X + n for n, axis in enumerate("xyz")},
     "x_b": layout.X_B, **{name: getattr(layout, name.upper()) for name in ("D_p", "D_q", "D_r")},
@@ -131,13 +132,14 @@ class DisturbanceTable(Table):
 
 
 class UncertaintyTable(Table):
-    """1 sigma of what identification leaves; K, mass, added relative, net_mass in kg, cg in m."""
+    """1 sigma of what is left open; K, mass, added and length (of x_b, R_r, R_s) relative, net_mass in kg, cg in m."""
 
     K: NonNegative
     mass: NonNegative
     added: NonNegative
     net_mass: NonNegative
     cg: NonNegative
+    length: NonNegative = 0.0
 
 
 class TrimTable(Table):

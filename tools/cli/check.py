@@ -7,7 +7,7 @@ from typing import Any, NoReturn
 
 import click
 
-from glider.tools.cli.common import DONE, FAILED, json_option, print_json, say
+from glider.tools.cli.common import DONE, FAILED, json_option, print_json, say, say_assumed
 
 
 @click.command()
@@ -57,6 +57,7 @@ def check(
 
     def see_vehicle() -> str:
         found = load_vehicle(vehicle)
+        say_assumed(vehicle, found.assumed)
         return f"{found.name}: {found.mass.m_t:g} kg, ballast {found.actuators.ballast.range[0]:+g} to " + (
             f"{found.actuators.ballast.range[1]:+g} kg"
         )

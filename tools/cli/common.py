@@ -6,6 +6,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import click
@@ -23,6 +24,14 @@ json_option = click.option("--json", "as_json", is_flag=True, help="Print the re
 def say(message: str) -> None:
     """A message for the person at the terminal, on standard error."""
     click.echo(message, err=True)
+
+
+def say_assumed(name: str, assumed: Iterable[str]) -> None:
+    """One note where a vehicle's numbers were never measured, and what to do about it."""
+    from glider.tools.data.first_vehicle import in_words
+
+    if words := in_words(assumed):
+        say(f"note: {name} has assumed numbers ({words}): `glider identify` first; until then a gap may be theirs")
 
 
 def show(line: str) -> None:

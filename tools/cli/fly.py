@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from glider.tools.cli.common import DONE, FAILED, fail, json_option, print_json, progress, say
+from glider.tools.cli.common import DONE, FAILED, fail, json_option, print_json, progress, say, say_assumed
 
 ENDINGS = {
     "SURFACED": "", "PUMP_GIVEN_UP": "at the surface, but the pump did not bring the ballast to its light end",
@@ -122,6 +122,7 @@ def fly(
     simulated = flight.board.hardware is Hardware.NONE
     host: sortie.FlightHost = sortie.SimulatedHost(flight, name=name, paced=realtime)
     if not simulated:
+        say_assumed(vehicle, flight.vehicle.assumed)
         host = keep(flight, name, state_folder, acknowledge, yes, board)
     options, supervisor = RealTimeOptions(priority, lock_memory, core), flight.supervisor
     legs, done = len(flight.mission.leg), 0

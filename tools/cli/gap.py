@@ -7,7 +7,15 @@ from typing import Any
 import click
 
 from glider.tools.cli.challenge import challenge
-from glider.tools.cli.common import compile_diagnosis, json_option, print_json, progress, say, vehicle_option
+from glider.tools.cli.common import (
+    compile_diagnosis,
+    json_option,
+    print_json,
+    progress,
+    say,
+    say_assumed,
+    vehicle_option,
+)
 from glider.tools.cli.many import cases_argument, is_many, run_batch_command
 from glider.tools.cli.readings import readings
 from glider.tools.cli.watch import watch
@@ -42,6 +50,7 @@ def measure(case: Path, report: Path | None, vehicle: str | None, as_json: bool)
     from glider.tools.readings.check import disagreement
 
     loaded = load_case(case, vehicle)
+    say_assumed(loaded.vehicle_name, loaded.assumed)
     if report is None and not as_json:
         report = Path(f"{case.resolve().name}-gap.html")
     if report is not None:
@@ -106,6 +115,7 @@ def predict(run: Path, model: str, out: Path, vehicle: str | None) -> None:
     from glider.tools.inference.predict import predict as predict_runs
 
     case, recorded = load_case_of_run(run, vehicle)
+    say_assumed(case.vehicle_name, case.assumed)
     if out.exists() and run.exists() and out.samefile(run):
         raise InputError("would overwrite the run itself: name another file", source=out, column="--out")
     check_writable(out.parent)
@@ -174,6 +184,7 @@ def _diagnose_one(
             raise InputError("what changed of an ocean glider asks `glider gap watch --reference CASE0`", source=case)
         _diagnose_ocean(loaded, out, as_json)
         return
+    say_assumed(loaded.vehicle_name, loaded.assumed)
     compile_diagnosis(loaded)
     if reference is not None or (without is None and form_stands_out(loaded)):
         _diagnose_against(loaded, None if reference is None else load_case(reference, vehicle), out, as_json)

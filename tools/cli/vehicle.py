@@ -1,10 +1,15 @@
 """`glider vehicle`: a first vehicle file by question and answer, and a vehicle at a glance."""
 
+import sys
 from pathlib import Path
+from typing import TYPE_CHECKING, TextIO
 
 import click
 
 from glider.tools.cli.common import json_option, print_json, say
+
+if TYPE_CHECKING:
+    from glider.tools.data.first_vehicle import FirstVehicle, Question
 
 
 @click.group()
@@ -16,21 +21,78 @@ def vehicle() -> None:
 @click.argument("out", type=click.Path(path_type=Path, dir_okay=False))
 @click.option("--name", help="Of the vehicle.  [default: the file's]")
 def new(out: Path, name: str | None) -> None:
-    """Ask for weighed masses and measured lengths, one by one, and write a first vehicle file OUT."""
+    """Ask for weighed masses, measured lengths and a swing test, one by one, and write a first vehicle file OUT.
+
+    An empty answer takes the number in brackets and calls it assumed; < goes back. Answers may come from a pipe, a line
+    each.
+
+    Example: glider vehicle new mine.toml
+    """
     from glider.tools.data.errors import InputError
     from glider.tools.data.files import check_writable, write_bytes
-    from glider.tools.data.first_vehicle import QUESTIONS, first_vehicle
 
     if out.exists():
         raise InputError("is there already: name another file", source=out)
     check_writable(out.parent)
-    answers = {}
-    for q in QUESTIONS:
-        words = f"{q.words[:1].upper()}{q.words[1:]}, {q.unit}"
-        answers[q.key] = click.prompt(words, default=q.usual, type=click.FloatRange(q.low, q.high), err=True)
-    text = first_vehicle(name or out.stem, answers)
-    write_bytes(out, text.encode("utf-8"))
+    found = interview(sys.stdin, sys.stdin.isatty())
+    write_bytes(out, found.text(name or out.stem).encode("utf-8"))
     say(f"{out}: fly it (`glider fly --vehicle {out}`), then `glider identify` on the logs")
+
+
+def interview(answers: TextIO, person: bool) -> "FirstVehicle":
+    """The questions one by one; a person is asked again where an answer is wrong, a pipe's is an InputError."""
+    from glider.tools.data.errors import InputError
+    from glider.tools.data.first_vehicle import QUESTIONS, FirstVehicle
+
+    found, n, observed = FirstVehicle(), 0, list[int]()
+    say("Enter takes the number in brackets, which the file then calls assumed; < goes back a question.")
+    while n < len(QUESTIONS):
+        asked = QUESTIONS[n]
+        if not found.asks(asked.key):
+            n += 1
+            continue
+        number = f"{n + 1}/{len(QUESTIONS)}"
+        usual = found.value(asked.key)
+        whence = "your answer" if asked.key in found.answers else found.whence(asked.key)
+        if usual is not None:
+            hint = f" [{usual:.4g}, {whence}]"
+        else:
+            hint = " [not done: scaled from the shipped vehicle]" if asked.key.endswith("_period") else ""
+        click.echo(f"{number:>5} {asked.words[:1].upper()}{asked.words[1:]}, {asked.unit}{hint}: ", nl=False, err=True)
+        line = answers.readline()
+        if not person:
+            say("")
+        if not line:
+            raise InputError(f"the answers end at question {number}: {asked.words}")
+        said = line.strip()
+        if said in ("<", "back"):
+            wrong = None if observed else "this is the first question"
+            n = observed.pop() if observed else n
+        else:
+            wrong = _take(found, asked, said)
+            if wrong is None:
+                observed.append(n)
+                n += 1
+        if wrong is not None:
+            if not person:
+                raise InputError(f"question {number}, {asked.words}: {wrong}")
+            say(f"      {wrong}")
+    return found
+
+
+def _take(found: "FirstVehicle", asked: "Question", said: str) -> str | None:
+    """An answer into what was found; what is wrong with it, in a line."""
+    if not said:
+        none = found.value(asked.key) is None and not asked.key.endswith("_period")
+        return "there is no number to take: measure it, or < to go back" if none else None
+    try:
+        value = float(said.replace(",", "."))
+    except ValueError:
+        return f"not a number: {said!r} (expected {asked.low:g} to {asked.high:g} {asked.unit}, Enter, or <)"
+    wrong = found.wrong(asked.key, value)
+    if wrong is None:
+        found.answers[asked.key] = value
+    return wrong
 
 
 @vehicle.command()
@@ -56,6 +118,10 @@ def show(wanted: str, as_json: bool) -> None:
         click.echo(f"  {name:<8} {low:g} to {high:g} {unit}, {table.rate:g} {unit}/s, lag {table.time_constant:g} s")
     for name in COEFFICIENTS:
         click.echo(f"  {name:<8} {model.P[PLACES[name]]:>9.4g} +- {model.sigma[PLACES[name]]:.2g}")
+    if loaded.assumed:
+        from glider.tools.data.first_vehicle import in_words
+
+        click.echo(f"assumed: {in_words(loaded.assumed)} (`glider identify` finds them)")
     if loaded.identified is not None:
         found = loaded.identified
         click.echo(f"identified {found.date} from {found.runs} runs (data {found.data}) by {found.revision}")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from glider.tools.cli.common import json_option, print_json, progress, say, vehicle_option
+from glider.tools.cli.common import json_option, print_json, progress, say, say_assumed, vehicle_option
 from glider.tools.cli.many import cases_argument, is_many, run_batch_command
 
 folder = click.Path(path_type=Path, file_okay=False)
@@ -53,6 +53,7 @@ def _watch_one(case: Path, reference: Path | None, vehicle: str | None, out: Pat
     from glider.tools.watch.watch import watch as watch_runs
 
     loaded = load_case(case, vehicle)
+    say_assumed(loaded.vehicle_name, loaded.assumed)
     before = None if reference is None else load_case(reference, vehicle)
     if out is not None:
         check_writable(out)

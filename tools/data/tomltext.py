@@ -19,7 +19,7 @@ def _value(value: Any) -> str:
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False)
     if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {_value(item)}" for key, item in value.items()) + " }"
+        return "{ " + ", ".join(f"{key} = {_value(item)}" for key, item in value.items() if item is not None) + " }"
     parts = [_value(item) for item in value]
     line = "[" + ", ".join(parts) + "]"
     if len(line) <= WIDTH and not any(isinstance(item, list | tuple) for item in value):

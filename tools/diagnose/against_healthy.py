@@ -26,6 +26,7 @@ from glider.tools.data.runs import columns
 from glider.tools.data.runs.case import Case
 from glider.tools.data.runs.run import Run
 from glider.tools.diagnose.record import NONE, UNKNOWN
+from glider.tools.gap.corrected import submerged
 from glider.tools.gap.regimes import ALL
 from glider.tools.inference.channels import recorded
 from glider.tools.inference.fit import bounded_step
@@ -399,8 +400,9 @@ def diagnose_against_healthy(
 
     reference: the healthy runs; None: what [form] of the vehicle file says of them.
     """
+    case = submerged(case)
     if reference is not None:
-        healthy = learn(case, [as_the_case_sees(run, case) for run in reference.runs])
+        healthy = learn(case, [as_the_case_sees(run, case) for run in submerged(reference).runs])
         say(f"learned from {len(healthy.runs)} healthy runs")
     elif case.roughie.form is not None:
         healthy = of_form(case.roughie.form)

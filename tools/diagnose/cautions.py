@@ -4,7 +4,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from glider.firmware.model.vehicle import PLACES
 from glider.sim_backend.core.effects.catalogue import catalogue
+from glider.tools.data.first_vehicle import in_words
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs.sampling import missing_share, own_period
 from glider.tools.diagnose.noise_probes import UNPREDICTABLE
@@ -32,14 +34,25 @@ WITHOUT = {
 
 def cautions(problem: Problem) -> list[str]:
     """Everything about these runs that limits what can be concluded, a line each."""
-    found = [*_without_commands(problem), *_without_columns(problem), *_holes(problem), *_few(problem)]
-    return [*found, *_noise(problem)]
+    found = [*_assumed(problem), *_without_commands(problem), *_without_columns(problem), *_holes(problem)]
+    return [*found, *_few(problem), *_noise(problem)]
 
 
 def not_asked(problem: Problem) -> list[str]:
     """Labels that these runs cannot show at all, and that are therefore not among the causes tried."""
     tried = effect_parameters(problem)
     return [label for label in catalogue() if label not in tried and label not in UNPREDICTABLE]  # asked otherwise
+
+
+def _assumed(problem: Problem) -> list[str]:
+    """Numbers of the vehicle that nobody measured: what one of them may do is no cause."""
+    guessed = [name for name in problem.case.assumed if name in PLACES]
+    if not guessed:
+        return []
+    return [
+        f"the vehicle file has assumed numbers ({in_words(guessed)}): what they may do is not told from a cause; "
+        "`glider identify` on healthy runs first, then diagnose by identified.toml"
+    ]
 
 
 def _without_commands(problem: Problem) -> list[str]:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from glider.firmware.model.vehicle import COEFFICIENTS
 from glider.sim_backend.core.effects.catalogue import catalogue
 from glider.tools.data.runs.case import Case
 from glider.tools.data.runs.origin import flights_of
@@ -45,14 +46,13 @@ from glider.tools.diagnose.staged_answer import (
 from glider.tools.diagnose.unknown import LEFT_OVER, unfit
 from glider.tools.diagnose.verdict import EVIDENCE_NEEDED, Answer, conclude
 from glider.tools.diagnose.waterfall import Stage, stages_of
-from glider.tools.gap.corrected import findings_of, fix_axes_signs_units
+from glider.tools.gap.corrected import findings_of, fix_axes_signs_units, submerged
 from glider.tools.inference.corrected import corrected_text
 from glider.tools.inference.model import effect_vector, effects_in, nominal_model
 from glider.tools.inference.problem import ALL, problem_of
 from glider.tools.inference.rules import Rules
 from glider.tools.readings.findings import WHOLE, Finding
 from glider.tools.readings.pictures import pictures_of
-from glider.tools.readings.stretches import without_afloat
 
 CORRECTION_FILE = "data_driven.toml"
 LEAST_PROBABILITY = 0.001  # a smaller probability is not written down
@@ -108,8 +108,7 @@ def verdict_of(answer: Answer) -> str:
 
 def diagnose(case: Case, say: Callable[[str], None] = lambda text: None, rules: Rules = ALL) -> Diagnosis:
     """Diagnose a case; `say` hears how far the search is."""
-    readings = findings_of(case.runs)
-    case = replace(case, runs=[without_afloat(run) for run in case.runs])
+    readings, recorded, case = findings_of(case.runs), case, submerged(case)
     runs = fix_axes_signs_units(case.runs, readings)
     search = run(problem_of(case, runs=runs, rules=rules), say)
     answer = conclude(search, say)
@@ -117,9 +116,9 @@ def diagnose(case: Case, say: Callable[[str], None] = lambda text: None, rules: 
     entry, mission = propose(search)
     noise, shares = noise_of(answer), panels(verdict_of(answer), answer)
     found = Diagnosis(case, search, answer, answer.shrinkage, entry, mission, shares, noise, readings=readings)
-    off = unfit(answer.shrinkage, answer.noise) if rules == ALL else 0.0
+    off = (1.0 if never_identified(case) else unfit(answer.shrinkage, answer.noise)) if rules == ALL else 0.0
     if off > 0.0:
-        take(found, staged(case, say), off)
+        take(found, staged(recorded, say), off)
     if found.staged is None:
         found.stages = stages_of(answer, case, runs)
         if found.verdict == "unknown":
@@ -128,6 +127,11 @@ def diagnose(case: Case, say: Callable[[str], None] = lambda text: None, rules: 
     unearned = found.verdict == NONE and not found.answer.selected
     say(f"verdict: {found.answer.main}{' (no candidate earned its place)' if unearned else ''}")
     return found
+
+
+def never_identified(case: Case) -> bool:
+    """Whether the vehicle file itself calls the water's forces a guess: then the vehicle is not its file's."""
+    return any(name in COEFFICIENTS for name in case.assumed)
 
 
 def take(diagnosis: Diagnosis, found: Staged, off: float) -> None:

@@ -20,7 +20,7 @@ from glider.tools.diagnose import by_readings
 from glider.tools.diagnose.by_readings import Size
 from glider.tools.diagnose.shrink import SEED, gaps
 from glider.tools.diagnose.waterfall import NOMINAL, READINGS, Stage
-from glider.tools.gap.corrected import ReadingCorrections, correct_readings
+from glider.tools.gap.corrected import ReadingCorrections, correct_readings, submerged
 from glider.tools.gap.measure import RunGap, root_mean_square, run_gap
 from glider.tools.inference.fit import bounded_step
 from glider.tools.inference.model import Model, effect_vector, nominal_model
@@ -64,7 +64,7 @@ class _Fold:
 
 class _Stages:
     def __init__(self, case: Case, say: Callable[[str], None]):
-        self.case, self.say = case, say
+        self.say = say
         self.nominal = nominal_model(case)
         self.whole = correct_readings(case, self.nominal)
         runs = len(case.runs)
@@ -74,6 +74,7 @@ class _Stages:
             # What the readings say is found without the run, too; of a single run nothing can be left out.
             kept = [run for n, run in enumerate(case.runs) if n not in left_out] or case.runs
             self.folds.append(_Fold(left_out, correct_readings(case, self.nominal, kept), np.empty(0)))
+        self.case = submerged(case)
 
     def free(self, model: Model, runs: list[Run], more: list[FreeParameter]) -> PredictionError:
         """The fitting of everything identified, and more, to runs."""
@@ -265,6 +266,6 @@ def sizes_of(free: Parameters, found: Fitted) -> list[Size]:
     for n, one in enumerate(free.free):
         low = max(found.values[n] - CERTAIN_SIGMA * sd[n], one.low)
         high = min(found.values[n] + CERTAIN_SIGMA * sd[n], one.high)
-        at = free.nominal[n] + one.spread * np.array([found.values[n], low, high])
+        at = one.moved(free.nominal[n], np.array([found.values[n], low, high]))
         sizes.append(Size(float(at[0]), (float(at[1]), float(at[2])), one.unit))
     return sizes

@@ -7,6 +7,7 @@ import numpy as np
 
 from glider.tools.data.errors import InputError
 from glider.tools.data.runs.case import Case
+from glider.tools.gap.corrected import submerged
 from glider.tools.gap.measure import RunGap, case_channels, root_mean_square, run_gap
 from glider.tools.gap.where import Share, where
 from glider.tools.inference.channels import Measures
@@ -45,6 +46,7 @@ class CaseGap:
 
 def assess(case: Case, model: Model | None = None) -> CaseGap:
     """Measure a case against a model (nominal, if none is given); InputError where no sample can be scored."""
+    case = submerged(case)
     model = nominal_model(case) if model is None else model
     problem = problem_of(case, model)
     Y = fly(problem, model.P, effect_vector(model))

@@ -11,6 +11,7 @@ import numpy as np
 
 from glider.sim_backend.core.effects import effect_layout as ef
 from glider.sim_backend.core.effects.catalogue import catalogue
+from glider.sim_backend.ocean.vehicle import OceanVehicle
 from glider.tools.data.errors import InputError
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs.case import Case
@@ -21,6 +22,7 @@ from glider.tools.inference.vehicle_parameters import GAUGE
 from glider.tools.readings.check import apply_corrections, check, corrected_runs
 from glider.tools.readings.findings import Finding
 from glider.tools.readings.signals import table_of
+from glider.tools.readings.stretches import out_of_water, under_water
 
 # effects of a constant size, by label: the one entry of F that a finding's size is
 SIZED = {
@@ -47,6 +49,13 @@ class ReadingCorrections:
     def labels(self) -> list[str]:
         """Labels of the catalogue among what was added."""
         return [name for name in self.added if name in catalogue()]
+
+
+def submerged(case: Case) -> Case:
+    """The case without what was measured out of the water; readings are compared with each other before."""
+    if isinstance(case.vehicle, OceanVehicle):
+        return case
+    return replace(case, runs=[under_water(run) for run in case.runs])
 
 
 def findings_of(runs: list[Run]) -> list[Finding]:
@@ -85,6 +94,8 @@ def correct_readings(case: Case, model: Model, runs: list[Run] | None = None) ->
     if rest:
         runs = corrected_runs(runs, apply_corrections(table_of(runs), rest))
         added += [f"{one.channel} {one.finding}" for one in rest]
+    if any(out_of_water(run).any() for run in runs):
+        runs = [under_water(run) for run in runs]
     return ReadingCorrections(
         findings, runs, replace(model, F=F if F.any() else model.F), list(dict.fromkeys(added)), scale
     )

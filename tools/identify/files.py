@@ -60,9 +60,11 @@ def provenance(found: Identified) -> dict[str, Any]:
 def _uncertainty(found: Identified, old: dict[str, float]) -> dict[str, float]:
     """[uncertainty]: what is left, as far as five numbers can say it; [identified] has it all."""
     by_name = {one.name: one for one in found.summaries}
+    # What flies takes them as independent (tools/inference/model.alone).
+    alone = dict(zip(found.free.names, found.free.alone(found.quadratic.normal).tolist(), strict=True))
 
     def relative(names: list[str], fallback: float) -> float:
-        shares = [by_name[n].sd / abs(by_name[n].mean) for n in names if n in by_name and by_name[n].mean != 0.0]
+        shares = [alone[n] / abs(by_name[n].mean) for n in names if n in by_name and by_name[n].mean != 0.0]
         return float(f"{max(shares):.3g}") if shares else fallback
 
     steady = [name for name in COEFFICIENTS if name not in ("K_L0", "K_M0")]  # those two may be near 0
@@ -71,6 +73,7 @@ def _uncertainty(found: Identified, old: dict[str, float]) -> dict[str, float]:
         "mass": relative(["m_t", "m_r", "m_s"], old["mass"]),
         "added": relative([f"added_{what}_{axis}" for what in ("mass", "inertia") for axis in "yz"], old["added"]),
         "net_mass": by_name["net_mass"].sd if "net_mass" in by_name else old["net_mass"],
+        "length": relative(["x_b", "R_r", "R_s"], old["length"]),
         "cg": max((by_name[f"cg_{axis}"].sd for axis in "xyz" if f"cg_{axis}" in by_name), default=old["cg"]),
     }
 
@@ -84,7 +87,8 @@ def vehicle_table(found: Identified) -> dict[str, Any]:
         return table
     P, F, _ = found.free.place(found.read.model, found.best)
     table["hydrodynamics"] |= {name: float(P[PLACES[name]]) for name in (*COEFFICIENTS, "D_p", "D_q", "D_r")}
-    table["mass"] |= {name: float(P[PLACES[name]]) for name in ("m_t", "m_r", "m_s", "x_b")}
+    table["mass"] |= {name: float(P[PLACES[name]]) for name in ("m_t", "m_r", "m_s", "R_r", "R_s", "x_b")}
+    table["mass"]["J"] = P[layout.J_XX : layout.J_ZZ + 1].tolist()
     table["mass"]["added_mass"] = P[layout.A_X : layout.A_Z + 1].tolist()
     table["mass"]["added_inertia"] = P[layout.B_X : layout.B_Z + 1].tolist()
     table["trim"] = {"net_mass": float(P[layout.NET_MASS]), "cg": P[layout.CG_X : layout.CG_Z + 1].tolist()}
@@ -98,6 +102,7 @@ def vehicle_table(found: Identified) -> dict[str, Any]:
     if found.fit is None or found.fit.at is not None:  # else the observer stays as it was in the fit
         table["uncertainty"] = _uncertainty(found, table["uncertainty"])
     table["identified"] = provenance(found)
+    table["assumed"] = {name: one for name, one in table["assumed"].items() if name not in found.free.names}
     return table
 
 
@@ -108,7 +113,7 @@ def vehicle_text(found: Identified) -> str:
         if found.file_stays
         else "A vehicle identified by `glider identify`; [identified] says from what, and how sure the numbers are."
     )
-    text = f"# {said}\n" + toml_text(vehicle_table(found), inline=("sensors",))
+    text = f"# {said}\n" + toml_text(vehicle_table(found), inline=("sensors", "assumed"))
     decode_vehicle(text, VEHICLE)
     return text
 

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from glider.firmware.model.vehicle import COEFFICIENTS
 from glider.sim_backend.core.effects import effect_layout as ef
 from glider.tools.data.runs.case import Case
 from glider.tools.data.runs.gate import LeftOut
@@ -113,13 +112,13 @@ def level(case: Case, first: First) -> noise.Levels:
     return noise.estimate(part, lambda p: flights(first).filter(first.values, problem=p), first.levels)
 
 
-def initial_fit(case: Case, model: Model, runs: list[Run], begin: np.ndarray | None) -> First:
+def initial_fit(case: Case, model: Model, runs: list[Run], begin: dict[str, float] | None) -> First:
     """First values from these runs, the filter's process noise less and less; names runs that do not belong."""
     problem = problem_of(case, model, runs)
     free = parameters(problem)
     first = First(problem, free, np.zeros(len(free.free)), noise.named(problem), [])
     if begin is not None:
-        first.values[: len(begin)] = begin
+        first.values = free.values(begin)
     mocap = bool(problem.seen[ef.Y_MOCAP_X])
     stages = list((FROM_START if begin is not None else SCHEDULE) if mocap else UNSEEN)
     passed: list[tuple[float, np.ndarray, noise.Levels]] = []
@@ -152,12 +151,12 @@ def fit(
     case: Case,
     model: Model,
     runs: list[Run],
-    begin: np.ndarray | None = None,
+    begin: dict[str, float] | None = None,
     say: Callable[[str], None] = lambda text: None,
 ) -> IdentificationFit:
     """Fit a case's runs: coefficients, everything else that is free, and the levels of the noise.
 
-    begin: first values of the coefficients in units of their priors, if something is known of them.
+    begin: first values of the coefficients, SI by name, if something is known of them.
     """
     notes: list[str] = []
     if sum(run.rows for run in runs) > MOST_ROWS:
@@ -207,14 +206,13 @@ def fitting_of(case: Case, model: Model, runs: list[Run], without: Sequence[tupl
 
 
 def by_prediction(
-    case: Case, model: Model, likelihood: IdentificationFit, begin: np.ndarray | None, say: Callable[[str], None]
+    case: Case, model: Model, likelihood: IdentificationFit, begin: dict[str, float] | None, say: Callable[[str], None]
 ) -> Fitted:
     """The fit by prediction error, from the file's values, the likelihood's and first values of the coefficients."""
     fitting = fitting_of(case, model, likelihood.problem.runs)
     starts = [dict(zip(likelihood.free.names, likelihood.free.si(likelihood.best), strict=True))]
     if begin is not None:
-        sizes = likelihood.free.si(np.concatenate([begin, np.zeros(len(likelihood.best) - len(begin))]))
-        starts.append(dict(zip(COEFFICIENTS, sizes, strict=False)))
+        starts.append(begin)
     drawn = fitting.draws() if begin is None else []
     return fitting.best_of([*(fitting.clipped(fitting.free.values(start)) for start in starts), *drawn], say)
 

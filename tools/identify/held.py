@@ -181,8 +181,19 @@ class Judge:
         self, name: str, fit: IdentificationFit | None, how: str, models: list[tuple[np.ndarray, np.ndarray]]
     ) -> Candidate:
         """A candidate, flown in each run by the model that has not seen it."""
-        found = [predicted(self.case, self.model, run, *one) for run, one in zip(self.runs, models, strict=True)]
+        model = self.noise_matches_file(fit)
+        found = [predicted(self.case, model, run, *one) for run, one in zip(self.runs, models, strict=True)]
         return Candidate(name, fit, how, [gap for gap, _ in found], [Y for _, Y in found])
+
+    def noise_matches_file(self, fit: IdentificationFit | None) -> Model:
+        """The model with numbers that the file calls assumed as sure as a fit is of them: no observer holds a guess."""
+        if fit is None:
+            return self.model
+        sigma = self.model.sigma.copy()
+        for f, size in zip(fit.free.free, fit.free.alone(fit.quadratic.normal), strict=True):
+            if f.vector == "P" and f.name in self.case.assumed:
+                sigma[f.entry] = min(sigma[f.entry], size)
+        return replace(self.model, sigma=sigma)
 
     def others(self, left_out: list[int]) -> list[Run]:
         return [run for n, run in enumerate(self.all) if n not in left_out]
@@ -218,7 +229,7 @@ class Judge:
         P, F = model_of(self.model, found.free, found.best)
         rng, gaps, flown = np.random.default_rng(SEED), [], []
         for run in self.runs:
-            problem = problem_of(self.case, self.model, [run])
+            problem = problem_of(self.case, self.noise_matches_file(found), [run])
             starts = observe(problem, P, F).X[problem.recording.bounds[:-1]]
             Z = problem.simulated(P, F, starts, rng)
             Y = fly(replace(problem, z=Z), P, F)
@@ -228,7 +239,7 @@ class Judge:
             flown.append(Y)
         return Candidate("noise", None, "simulated", gaps, flown)
 
-    def prediction(self, likelihood: IdentificationFit, begin: np.ndarray | None) -> Candidate:
+    def prediction(self, likelihood: IdentificationFit, begin: dict[str, float] | None) -> Candidate:
         """The prediction error's fit, without the terms that runs left out do not miss."""
         whole = by_prediction(self.case, self.model, likelihood, begin, self.say)
         count = min(FOLDS, len(self.all))
@@ -265,7 +276,7 @@ def judge(
     case: Case,
     model: Model,
     likelihood: IdentificationFit,
-    begin: np.ndarray | None,
+    begin: dict[str, float] | None,
     say: Callable[[str], None] = lambda text: None,
 ) -> HeldOut:
     """All candidates, flown in runs that were left out, and which of them is handed out.

@@ -11,7 +11,7 @@ from glider.firmware.model.vehicle import COEFFICIENTS
 from glider.tools.data.runs.case import Case
 from glider.tools.data.runs.gate import LeftOut
 from glider.tools.data.runs.run import Run
-from glider.tools.gap.corrected import ReadingCorrections, correct_readings
+from glider.tools.gap.corrected import ReadingCorrections, correct_readings, submerged
 from glider.tools.identify.acceleration_likelihood import fit_accelerations, suited
 from glider.tools.identify.fit import IdentificationFit, fit
 from glider.tools.identify.flight_likelihood import TrajectoryLikelihood
@@ -160,7 +160,7 @@ def identify(
     began = time.perf_counter()
     runs, left_out, spikes = usable(case)
     read = correct_readings(case, nominal_model(case), runs)
-    runs, model = read.runs, read.model
+    runs, model, case = read.runs, read.model, submerged(case)
     first = None
     if likelihood == ACCELERATIONS or suited(runs):
         say("accelerations")
@@ -173,7 +173,7 @@ def identify(
         return Identified(
             case, read, likelihood, runs, free, first, chains, summaries, left_out, spikes, [], took
         )  # fmt: skip
-    begin = None if first is None else first.mode
+    begin = None if first is None else dict(zip(COEFFICIENTS, free.si(first.mode).tolist(), strict=True))
     found = fit(case, model, runs, begin, say)
     held = judge(case, model, found, begin, say)
     kept = min(held.candidates[1:], key=lambda one: one.total) if held.chosen.fit is None else held.chosen

@@ -49,9 +49,19 @@ def vehicle_model(name: str, vehicle: Vehicle | OceanVehicle) -> Model:
     if found is None or not found.parameters:
         return Model(name, P, sigma, F)
     C = np.array(found.covariance)
-    # The observer takes parameters as independent, which a posterior seldom is: it gets the lesser of the two.
-    sigma[found.places] = np.minimum(sigma[found.places], np.sqrt(np.maximum(np.diag(C), 0.0)))
+    sigma[found.places] = np.minimum(sigma[found.places], alone(C))
     return Model(name, P, sigma, F, spread=_directions(C, found.places, len(P)))
+
+
+def alone(C: np.ndarray) -> np.ndarray:
+    """1 sigma of each of some parameters while the others stay, of their covariance C (n, n): (n,).
+
+    The observer takes parameters as independent, which a posterior seldom is. Flights of the kind that were fitted are
+    foreseen as well by independent parameters of these sizes as by all together, correlated as they are.
+    """
+    size = np.sqrt(np.maximum(np.diag(C), 1e-300))
+    precision = np.linalg.inv(C / np.outer(size, size) + 1e-9 * np.eye(len(C)))
+    return np.asarray(size / np.sqrt(np.maximum(np.diag(precision), 1.0)))
 
 
 def _directions(C: np.ndarray, places: np.ndarray, count: int) -> np.ndarray:

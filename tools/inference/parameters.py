@@ -1,6 +1,7 @@
 """What may differ: the parameters that a diagnosis fits, each in units of how far it is likely to go."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -13,13 +14,18 @@ from glider.tools.inference.model import effect_vector
 from glider.tools.inference.problem import Problem
 
 NINETY = 1.645  # sigma on either side that hold 90 %
+LEAST_RATIO = 1e-3  # of a number that keeps its sign
 NUISANCE = ""  # the label of what is no effect
+ASSUMED_UNITS = {"m": "kg", "J": "kg m2", "x": "m", "R": "m", "net": "kg", "cg": "m"}  # by a name's first part
 CLOCK_PLACE = ("timing", "mocap")  # of the labels by which motion capture's clock is wrong
 
 
 @dataclass(frozen=True)
 class FreeParameter:
-    """A parameter that is free in a fit: `entry` of P or F moves by `spread` for each unit; limits in those units."""
+    """A parameter that is free in a fit: `entry` of P or F moves by `spread` for each unit; limits in those units.
+
+    Where `factor` is above 1, the entry (and `base`) is multiplied by it for each unit instead: it keeps its sign.
+    """
 
     label: str  # of its effect; NUISANCE for what [uncertainty] and [sensors] allow
     name: str
@@ -31,6 +37,21 @@ class FreeParameter:
     unit: str = ""
     along: tuple[tuple[int, float], ...] = ()  # entries of P that move together, in place of `entry`
     along_effects: tuple[tuple[int, float], ...] = ()  # entries of F that move with them
+    factor: float = 1.0
+    base: float = 0.0  # 1 of a scale, which stands for 1 + scale
+
+    def moved(self, entry: np.ndarray | float, value: np.ndarray | float) -> Any:
+        """The entry of P or F, moved by a value in units of the spread."""
+        if self.factor > 1.0:
+            return (entry + self.base) * self.factor**value - self.base
+        return entry + self.spread * value
+
+    def value(self, entry: float, wanted: float) -> float:
+        """The way back from `moved`: the value that brings the entry to the wanted number."""
+        if self.factor > 1.0:
+            ratio = (wanted + self.base) / (entry + self.base)
+            return float(np.log(max(ratio, LEAST_RATIO)) / np.log(self.factor))
+        return (wanted - entry) / self.spread
 
     @property
     def one_sided(self) -> bool:
@@ -77,7 +98,7 @@ def assumable() -> dict[str, tuple[str, int]]:
 def assumed(problem: Problem) -> list[FreeParameter]:
     """What the vehicle or case file calls assumed, as free as it says; ConfigError names what is no number of either.
 
-    A factor f is 1 sigma of (f - 1) times the value, of a scale's 1 + value; a range holds 90 %.
+    A factor is 1 sigma of the value's logarithm, of a scale's 1 + value; a range holds 90 %.
     """
     found, known = [], assumable()
     P, F = problem.model.P, effect_vector(problem.model)
@@ -86,14 +107,15 @@ def assumed(problem: Problem) -> list[FreeParameter]:
             raise ConfigError(problem.case.vehicle_name, "no such number to be assumed", key=f"assumed.{name}")
         vector, entry = known[name]
         value = float((P if vector == "P" else F)[entry])
-        limits = (-np.inf, np.inf)
+        unit = ASSUMED_UNITS.get(name.split("_")[0], "")
         if one.factor is not None:
-            whole = 1.0 + value if name.endswith("_scale") else value
-            if whole == 0.0:
+            base = 1.0 if name.endswith("_scale") else 0.0
+            if base + value == 0.0:
                 raise ConfigError(
                     problem.case.vehicle_name, "is 0: a factor says nothing, give a range", key=f"assumed.{name}"
                 )
-            spread = (one.factor - 1.0) * abs(whole)
+            spread = float(np.log(one.factor)) * abs(base + value)
+            found.append(FreeParameter("", name, vector, entry, spread, unit=unit, factor=one.factor, base=base))
         else:
             assert one.range is not None
             low, high = one.range
@@ -103,7 +125,7 @@ def assumed(problem: Problem) -> list[FreeParameter]:
                 raise ConfigError(
                     problem.case.vehicle_name, f"the file's own value {value:g} is not in it", key=f"assumed.{name}"
                 )
-        found.append(FreeParameter("", name, vector, entry, spread, *limits))
+            found.append(FreeParameter("", name, vector, entry, spread, *limits, unit))
     return found
 
 
@@ -145,7 +167,8 @@ def model_at(problem: Problem, free: list[FreeParameter], values: np.ndarray) ->
     F = effect_vector(problem.model)
     for parameter, value in zip(free, values, strict=True):
         if not parameter.along and not parameter.along_effects:
-            (P if parameter.vector == "P" else F)[parameter.entry] += parameter.spread * value
+            vector = P if parameter.vector == "P" else F
+            vector[parameter.entry] = parameter.moved(vector[parameter.entry], value)
         for entry, size in parameter.along:
             P[entry] += size * value
         for entry, size in parameter.along_effects:

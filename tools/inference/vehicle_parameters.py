@@ -42,6 +42,7 @@ ADDED = {
     "added_mass_x": layout.A_X, "added_mass_y": layout.A_Y, "added_mass_z": layout.A_Z,
     "added_inertia_x": layout.B_X, "added_inertia_y": layout.B_Y, "added_inertia_z": layout.B_Z,
 }  # fmt: skip
+LENGTHS = ("x_b", "R_r", "R_s")
 CENTRE = {"cg_x": layout.CG_X, "cg_y": layout.CG_Y, "cg_z": layout.CG_Z}
 K_UNITS = {
     "K_D0": "kg/m", "K_D": "kg/m/rad2", "K_L0": "kg/m", "K_L": "kg/m/rad", "K_beta": "kg/m/rad", "K_MR": "kg/rad",
@@ -67,20 +68,25 @@ class Parameters:
         """1 sigma of the priors, (n,), SI."""
         return np.array([f.spread for f in self.free])
 
+    def alone(self, normal: np.ndarray) -> np.ndarray:
+        """1 sigma of each, SI, while the others stay (n,); normal (n, n): the posterior's, in units of the priors."""
+        return self.spreads / np.sqrt(np.diag(normal))
+
     def si(self, values: np.ndarray) -> np.ndarray:
         """Values (..., n) in units of the priors as SI."""
-        return self.nominal + values * self.spreads
+        columns = [f.moved(at, values[..., n]) for n, (f, at) in enumerate(zip(self.free, self.nominal, strict=True))]
+        return np.stack(columns, axis=-1)
 
     def values(self, si: dict[str, float]) -> np.ndarray:
         """Values (n,) in units of the priors at these numbers, SI by name; the file's for what is not named."""
-        return np.array([(si.get(f.name, at) - at) / f.spread for f, at in zip(self.free, self.nominal, strict=True)])
+        return np.array([f.value(at, si.get(f.name, at)) for f, at in zip(self.free, self.nominal, strict=True)])
 
     def place(self, model: Model, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The model at values (n,): parameters P, effects F, and the capture's frame (6,)."""
         P, F, frame = model.P.copy(), effect_vector(model), np.zeros(6)
         vectors = {"P": P, "F": F, FRAME: frame}
         for f, value in zip(self.free, values, strict=True):
-            vectors[f.vector][f.entry] += f.spread * value
+            vectors[f.vector][f.entry] = f.moved(vectors[f.vector][f.entry], value)
         return P, F, frame
 
 
@@ -109,6 +115,7 @@ def coefficients(P: np.ndarray, first: bool = False) -> list[FreeParameter]:
 def _masses(problem: Problem, scale: float) -> list[FreeParameter]:
     P, u = problem.model.P, problem.case.roughie.uncertainty
     found = [FreeParameter("", name, "P", entry, u.mass * P[entry], unit="kg") for name, entry in MASSES.items()]
+    found += [FreeParameter("", name, "P", PLACES[name], u.length * P[PLACES[name]], unit="m") for name in LENGTHS]
     share = max(u.added, ADDED_SHARE)
     for name, entry in ADDED.items():
         found.append(FreeParameter("", name, "P", entry, share * P[entry], unit="kg m2" if "inertia" in name else "kg"))
@@ -149,6 +156,7 @@ def parameters(problem: Problem, first: bool = False) -> Parameters:
     else:
         free += [of_effect(problem, name, WIRE_SCALE) for name in ("ballast_scale", "slider_scale")]
     if first:
+        free = [f for f in free if f.name != "x_b"]
         free += [*_damping(problem), FreeParameter("", "x_b", "P", layout.X_B, TANK_ARM, unit="m")]
     return listed(problem, _as_assumed(problem, free))
 
@@ -189,5 +197,5 @@ def _as_assumed(problem: Problem, free: list[FreeParameter]) -> list[FreeParamet
     kept = []
     for f in free:
         one = said.pop((f.vector, f.entry), None)
-        kept.append(f if one is None else replace(f, spread=one.spread, low=one.low, high=one.high))
+        kept.append(f if one is None else replace(one, name=f.name, unit=f.unit))
     return [*kept, *said.values()]

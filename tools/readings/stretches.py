@@ -19,6 +19,8 @@ SURFACE = 0.25  # m about the surface: a hull of a metre that is partly out of t
 HIGHEST = -1.0  # m, of a depth at the surface
 SURFACE_RANGE = 0.1  # m that the depth moves within SPAN there: waves, no dive
 LEAST_SAID = 1.0  # s; a shorter end afloat is left out without a word
+OUT, OUT_SPAN = 0.05, 0.5  # m, less than a hull's radius: partly out of the water, however short; s before and after
+MOST_OUT = 0.5  # of a run; more of it is a gauge that is far off
 STILL_ANGLE, STILL_DEPTH = 0.004, 0.02  # rad, m: ranges within STILL_SPAN of a vehicle that lies on something
 STILL_SPAN = 15.0  # s
 HANDLED_RATE = 1.5  # rad/s; the fastest turns of gliders of this class are some 0.5 rad/s
@@ -93,16 +95,6 @@ def afloat_at_end(t: np.ndarray, depth: np.ndarray) -> np.ndarray:
     return tail & (np.nanmin(depth[tail], initial=0.0) > HIGHEST)
 
 
-def without_afloat(run: Run) -> Run:
-    """The run up to where the vehicle comes up for good; the same where it does not."""
-    if names.DEPTH not in run.columns:
-        return run
-    state = afloat_at_end(run.t, between_samples(run.t, run.columns[names.DEPTH]))
-    if not state.any():
-        return run
-    return replace(run, columns={name: values[~state] for name, values in run.columns.items()}, extra={})
-
-
 def near(t: np.ndarray, state: np.ndarray, span: float) -> np.ndarray:
     """Rows within `span` s of a row in the state."""
     at = t[state]
@@ -118,6 +110,33 @@ def flying(run: Run) -> np.ndarray:
     """Whether the vehicle flies, (rows,) bool."""
     found = states(run)
     return ~np.any(list(found.values()), axis=0) if found else np.ones(run.rows, dtype=bool)
+
+
+def out_of_water(run: Run) -> np.ndarray:
+    """Rows, however few, in which the gauge reads less than a hull's radius, and those afloat at the end, (rows,) bool.
+
+    None where the gauge has another zero.
+    """
+    t, nothing = run.t, np.zeros(run.rows, dtype=bool)
+    depth = run.columns.get(names.DEPTH, np.full(run.rows, np.nan))
+    seen = np.isfinite(depth)
+    if not seen.any() or float(depth[seen].min()) < -SURFACE:
+        return nothing
+    found = near(t, np.interp(t, t[seen], depth[seen]) < OUT, OUT_SPAN)
+    afloat = afloat_at_end(t, between_samples(t, depth))
+    return afloat | found if found.mean() < MOST_OUT else afloat
+
+
+def under_water(run: Run) -> Run:
+    """The run without what was measured out of the water: no model has the force of a hull that is partly out of it."""
+    out = out_of_water(run)
+    if not out.any():
+        return run
+    columns = {
+        name: values if name in (names.TIME, *names.COMMANDS) else np.where(out, np.nan, values)
+        for name, values in run.columns.items()
+    }
+    return replace(run, columns=columns)
 
 
 def judge_stretches(runs: list[Run]) -> list[Finding]:

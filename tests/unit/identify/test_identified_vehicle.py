@@ -52,7 +52,9 @@ def test_covariance_becomes_what_the_diagnosis_allows():
     model = vehicle_model("v", vehicle)
     places = vehicle.identified.places
     assert np.allclose((model.spread.T @ model.spread)[np.ix_(places, places)], vehicle.identified.covariance)
-    assert model.sigma[layout.K_L] == pytest.approx(np.hypot(0.1, 0.3))
+    others_stay = 1.0 / np.sqrt(np.diag(np.linalg.inv(vehicle.identified.covariance)))
+    assert model.sigma[layout.K_L] == pytest.approx(others_stay[1], rel=1e-4)
+    assert model.sigma[layout.K_L] < 0.95 * np.hypot(0.1, 0.3)
     plain = vehicle_model("r", load_vehicle("roughie"))
     assert plain.spread is None
     assert model.sigma[layout.K_M] == plain.sigma[layout.K_M]  # not named: as [uncertainty] says

@@ -13,6 +13,8 @@ from glider.sim_backend.core.effects import effect_layout as ef
 from glider.tools.data.runs.case import load_case
 from glider.tools.data.sources import load_vehicle
 from glider.tools.data.tomltext import toml_text
+from glider.tools.diagnose.cautions import cautions
+from glider.tools.diagnose.diagnosis import never_identified
 from glider.tools.inference.model import effects_in, nominal_model, vehicle_model
 from glider.tools.inference.parameters import nuisance_parameters
 from glider.tools.inference.problem import problem_of
@@ -64,11 +66,49 @@ def test_an_assumed_number_is_as_free_as_it_says(tmp_path):
     problem = problem_of(case)
     for free in (parameters(problem).free, nuisance_parameters(problem)):
         by_place = {(one.vector, one.entry): one for one in free}
-        assert by_place["P", layout.X_B].spread == pytest.approx(0.5 * problem.model.P[layout.X_B])
+        tank, x_b = by_place["P", layout.X_B], problem.model.P[layout.X_B]
+        assert tank.moved(x_b, 1.0) == pytest.approx(1.5 * x_b)
+        assert tank.moved(x_b, -1.0) == pytest.approx(x_b / 1.5)
+        assert tank.value(x_b, tank.moved(x_b, 0.7)) == pytest.approx(0.7)
         wire = by_place["F", ef.SLIDER_SCALE]
         assert wire.spread == pytest.approx(0.3 / 1.645)
         assert wire.low * wire.spread == pytest.approx(-0.3)
     assert len({(f.vector, f.entry) for f in nuisance_parameters(problem)}) == len(nuisance_parameters(problem))
+
+
+def test_values_go_to_si_and_back_however_a_number_is_free(tmp_path):
+    said = {"J_y": {"factor": 2.0}, "K_q": {"factor": 3.0}, "slider_scale": {"factor": 1.5}}
+    problem = problem_of(case_with(tmp_path, assumed=said))
+    free = parameters(problem)
+    values = np.clip(np.linspace(-0.9, 0.9, len(free.free)), [f.low for f in free.free], [f.high for f in free.free])
+    si = free.si(values)
+    np.testing.assert_allclose(free.values(dict(zip(free.names, si, strict=True))), values, atol=1e-9)
+    P, F, _ = free.place(problem.model, values)
+    at = dict(zip(free.names, values, strict=True))
+    assert P[layout.J_YY] == pytest.approx(problem.model.P[layout.J_YY] * 2.0 ** at["J_y"])
+    assert P[layout.K_Q] == pytest.approx(problem.model.P[layout.K_Q] * 3.0 ** at["K_q"])
+    assert 1.0 + F[ef.SLIDER_SCALE] == pytest.approx(1.5 ** at["slider_scale"])
+    np.testing.assert_allclose(free.si(np.stack([values, 0.0 * values])), [si, free.nominal])
+
+
+def test_a_guessed_vehicle_is_not_its_files_and_the_diagnosis_says_so(tmp_path):
+    guessed = case_with(tmp_path / "a", assumed={"K_D0": {"factor": 2.0}, "J_y": {"factor": 2.0}})
+    wires = case_with(tmp_path / "b", assumed={"slider_scale": {"factor": 1.5}})
+    assert never_identified(guessed)
+    assert not never_identified(wires)
+    said = [line for line in cautions(problem_of(guessed)) if "assumed" in line]
+    assert len(said) == 1
+    assert "water forces, inertia" in said[0]
+    assert not [line for line in cautions(problem_of(wires)) if "assumed" in line]
+
+
+def test_what_was_identified_is_assumed_no_more(tmp_path):
+    found = {
+        "data": "0", "runs": 1, "revision": "", "date": "", "from_vehicle": "", "parameters": ["x_b"],
+        "covariance": [[1e-6]],
+    }  # fmt: skip
+    assumed = {"x_b": {"factor": 1.5}, "J_y": {"factor": 2.0}}
+    assert set(case_with(tmp_path, assumed=assumed, identified=found).assumed) == {"J_y"}
 
 
 @pytest.mark.parametrize(

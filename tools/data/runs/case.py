@@ -74,7 +74,7 @@ class Case:
     runs: list[Run]
     sensors: Any  # SensorsTable or OceanSensors: the vehicle's, with the case's entries in their place
     disturbance: Any  # DisturbanceTable or OceanDisturbance
-    assumed: dict[str, Assumed] = field(default_factory=dict)  # the vehicle's and the case's own
+    assumed: dict[str, Assumed] = field(default_factory=dict)  # the vehicle's and the case's, but what was identified
     left_out: list[LeftOut] = field(default_factory=list)  # runs that hold what no run can, if they were to be left out
 
     @property
@@ -118,6 +118,7 @@ def _read_case_file(folder: Path) -> CaseTable:
 
 def _assemble(folder: Path, table: CaseTable, runs: list[Run], instead: str | None, leave_out: bool = False) -> Case:
     vehicle = load_any_vehicle(table.vehicle, folder) if instead is None else load_any_vehicle(instead)
+    known = [] if vehicle.identified is None else vehicle.identified.parameters
     ocean = isinstance(vehicle, OceanVehicle)
     if not ocean:
         _refuse_ocean(folder, runs, table.vehicle if instead is None else instead)
@@ -138,7 +139,7 @@ def _assemble(folder: Path, table: CaseTable, runs: list[Run], instead: str | No
         runs=runs,
         sensors=_replaced(vehicle.sensors, table.sensors),
         disturbance=_replaced(vehicle.disturbance, table.disturbance),
-        assumed={**vehicle.assumed, **table.assumed},
+        assumed={name: one for name, one in {**vehicle.assumed, **table.assumed}.items() if name not in known},
         left_out=out,
     )
 

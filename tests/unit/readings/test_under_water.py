@@ -1,0 +1,42 @@
+"""What was measured while the hull is partly out of the water is no flight, however short."""
+
+import numpy as np
+import pytest
+
+from glider.tools.data.runs.run import Run
+from glider.tools.readings.stretches import under_water
+
+
+def run(depth, every=1):
+    """A run of 10 Hz with this depth, read in every so-manieth row."""
+    t = np.arange(len(depth)) / 10.0
+    read = np.where(np.arange(len(t)) % every == 0, depth, np.nan)
+    return Run("run00", None, {"t_s": t, "cmd_servo_rad": 0.1 + 0.0 * t, "pitch_rad": 0.2 + 0.0 * t, "depth_m": read})
+
+
+def course(end):
+    """Up from 2 m to `end` (m) at 5 cm/s, where it stays: 60 s in all."""
+    return np.maximum(2.0 - 0.05 * np.arange(0.0, 60.0, 0.1), end)
+
+
+@pytest.mark.parametrize("every", [1, 3])
+def test_the_last_seconds_afloat_are_gone_but_times_and_commands(every):
+    before = run(course(-0.01), every)
+    after = under_water(before)
+    afloat = np.arange(0.0, 60.0, 0.1) > 39.0 - 0.5
+    assert np.isnan(after.columns["pitch_rad"][afloat][10:]).all()
+    assert np.isfinite(after.columns["pitch_rad"][~afloat][:-10]).all()
+    np.testing.assert_array_equal(after.t, before.t)
+    assert np.isfinite(after.columns["cmd_servo_rad"]).all()
+
+
+@pytest.mark.parametrize(
+    "depth",
+    [course(0.3), course(-0.01) - 1.5, 0.0 * course(0.3) + 0.02],
+    ids=["submerged", "another zero", "all of it"],
+)
+def test_what_never_came_up_or_has_another_zero_stays(depth):
+    before = run(depth)
+    after = under_water(before)
+    for name, values in before.columns.items():
+        np.testing.assert_array_equal(after.columns[name], values)
