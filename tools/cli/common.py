@@ -5,7 +5,6 @@ import functools
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 

@@ -53,9 +53,9 @@ def interview(answers: TextIO, person: bool) -> "FirstVehicle":
             continue
         number = f"{n + 1}/{len(QUESTIONS)}"
         usual = found.value(asked.key)
-        whence = "your answer" if asked.key in found.answers else found.whence(asked.key)
+        source_words = "your answer" if asked.key in found.answers else found.source_words(asked.key)
         if usual is not None:
-            hint = f" [{usual:.4g}, {whence}]"
+            hint = f" [{usual:.4g}, {source_words}]"
         else:
             hint = " [not done: scaled from the shipped vehicle]" if asked.key.endswith("_period") else ""
         click.echo(f"{number:>5} {asked.words[:1].upper()}{asked.words[1:]}, {asked.unit}{hint}: ", nl=False, err=True)

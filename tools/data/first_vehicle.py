@@ -126,7 +126,7 @@ class FirstVehicle:
         scale = math.prod(r**power for r, power in zip(self.ratios, asked.powers, strict=True) if power)
         return float(math.degrees(found) if asked.unit.startswith("deg") else found) * scale
 
-    def whence(self, key: str) -> str:
+    def source_words(self, key: str) -> str:
         """Where the default comes from, in words."""
         names = ("mass", "length", "diameter")
         by = [n for n, r, power in zip(names, self.ratios, ASKED[key].powers, strict=True) if power and r != 1.0]

@@ -1,7 +1,7 @@
 """The diagnosis of a case: where the simulator is wrong, why, how far the gap shrinks (docs/GAP.md, Answers)."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 

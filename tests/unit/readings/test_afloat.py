@@ -7,7 +7,7 @@ import pytest
 
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs.run import Run
-from glider.tools.readings.stretches import flying, judge_stretches, states, without_afloat
+from glider.tools.readings.stretches import flying, judge_stretches, states, under_water
 
 T = 0.02 * np.arange(3500)  # 70 s of 50 Hz
 
@@ -30,23 +30,23 @@ def test_the_end_afloat_is_no_flight_however_often_the_depth_is_read(every):
     assert not flying(run)[state].any()
     (said,) = [one.text for one in judge_stretches([run]) if "afloat" in one.text]
     assert said == f"run00: afloat at the end for 11 s between {T[state][0]:.0f} and 70 s; left out."
-    kept = without_afloat(run)
-    assert kept.rows == len(T) - state.sum()
-    assert np.array_equal(kept.columns[names.DEPTH], run.columns[names.DEPTH][: kept.rows], equal_nan=True)
+    kept = under_water(run).columns[names.DEPTH]
+    assert np.isnan(kept[state]).all()
+    assert np.isfinite(kept[~state]).any()
 
 
 def test_a_flight_that_ends_under_water_is_whole():
     run = dive(last=0.3)
-    assert without_afloat(run) is run
+    assert not states(run)["afloat at the end"].any()
 
 
 def test_a_few_seconds_at_the_surface_between_two_dives_stay():
     run = dive()
     again = np.where(T > 65.0, 0.3, run.columns[names.DEPTH])
     run = replace(run, columns=run.columns | {names.DEPTH: again})
-    assert without_afloat(run) is run
+    assert not states(run)["afloat at the end"].any()
 
 
 def test_a_vehicle_that_never_dived_is_not_left_out():
     shallow = replace(dive(), columns={names.TIME: T, names.DEPTH: 0.1 + 0.05 * np.sin(T)})
-    assert without_afloat(shallow) is shallow
+    assert not states(shallow)["afloat at the end"].any()
