@@ -186,12 +186,12 @@ class Judge:
         return Candidate(name, fit, how, [gap for gap, _ in found], [Y for _, Y in found])
 
     def noise_matches_file(self, fit: IdentificationFit | None) -> Model:
-        """The model with numbers that the file calls assumed as sure as a fit is of them: no observer holds a guess."""
-        if fit is None:
+        """The model that the observer has: of a file of guesses its numbers as sure as a fit is of them."""
+        if fit is None or not self.case.assumed:
             return self.model
         sigma = self.model.sigma.copy()
         for f, size in zip(fit.free.free, fit.free.alone(fit.quadratic.normal), strict=True):
-            if f.vector == "P" and f.name in self.case.assumed:
+            if f.vector == "P":
                 sigma[f.entry] = min(sigma[f.entry], size)
         return replace(self.model, sigma=sigma)
 
