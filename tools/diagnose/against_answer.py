@@ -87,10 +87,11 @@ def plain(found: AgainstHealthy) -> dict[str, Any]:
     """diagnosis.json (docs/GAP.md, Answers)."""
     estimates, gaps = sizes(found), gaps_of(found)
     shrinkage = shrinkage_of(gaps, {})
+    chances = dict.fromkeys(found.selected, 0.0) | found.probabilities  # a second effect need not be a main cause
     causes = [
         {"label": label, "probability": p, "group": found.group if found.group[:1] == [label] else [label],
          "parameters": estimates.get(label, {})}
-        for label, p in sorted(found.probabilities.items(), key=lambda item: -item[1])
+        for label, p in sorted(chances.items(), key=lambda item: -item[1])
     ]  # fmt: skip
     table: dict[str, Any] = {name: by_channel(gaps[name]) for name in (BEFORE, RECALIBRATED, AFTER, FLOOR)}
     for name, value, ci in (("shrinkage", shrinkage.shrinkage, shrinkage.ci90),

@@ -16,7 +16,7 @@ from glider.tools.data.runs.case import load_case
 from glider.tools.data.sources import load_vehicle
 from glider.tools.data.tomltext import toml_text
 from glider.tools.diagnose import against_healthy as against
-from glider.tools.diagnose.against_answer import plain
+from glider.tools.diagnose.against_answer import plain, write
 from glider.tools.diagnose.against_healthy import (
     Comparison,
     Healthy,
@@ -25,6 +25,7 @@ from glider.tools.diagnose.against_healthy import (
     form_stands_out,
     weigh,
 )
+from glider.tools.report.pooled import write_pooled_report
 from glider.tools.study.challenge.form_cases import draw_healthy, write_flights
 from glider.tools.study.challenge.form_fit import fit_flights, fit_forces
 from glider.tools.study.challenge.form_plan import BY_LABEL
@@ -87,6 +88,14 @@ def test_a_change_beside_the_wrong_form_is_found_and_shrinks_what_was_left_out(a
     assert size["ci90"][0] < 0.25 < size["ci90"][1]  # rad, as it was drawn
     assert answer["gap"]["after"]["total"] < 0.7 * answer["gap"]["before"]["total"]
     assert askew.left["none"] > 3.0 > min(askew.left.values())
+
+
+def test_a_selected_label_that_is_no_main_cause_is_in_the_answer_and_the_report_is_drawn(askew, tmp_path):
+    second = replace(askew, probabilities={label: p for label, p in askew.probabilities.items() if label != LABEL})
+    write(second, tmp_path)
+    causes = json.loads((tmp_path / "diagnosis.json").read_text())["causes"]
+    assert [one["probability"] for one in causes if one["label"] == LABEL] == [0.0]
+    assert LABEL in write_pooled_report(tmp_path)
 
 
 def test_probabilities_add_up_and_a_millionth_of_the_noise_moves_none(place, askew):
