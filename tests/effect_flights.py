@@ -56,7 +56,7 @@ def flown(made: World, seconds: float = 40.0, command=manoeuvre) -> tuple[np.nda
     return np.array(states), np.array(frames)
 
 
-def muted(effects=None, depth=8.0, pitch=0.0, **environment) -> World:
+def quiet(effects=None, depth=8.0, pitch=0.0, **environment) -> World:
     """A world at rest."""
     made = world(effects, **environment)
     made.x[2], made.x[7] = depth, 0.0

@@ -19,7 +19,7 @@ HEAD = """
 import fcntl, json, os, struct, subprocess, sys, time
 from pathlib import Path
 import numpy as np
-from glider.hal.recorder.condition import Level
+from glider.hal.recorder.condition import RecorderLevel
 from glider.hal.recorder.recorder import Recorder
 from glider.hal.recorder.schema import Field, RecordSpec
 
@@ -56,7 +56,7 @@ with Recorder(place / "x.mcap", [TICK], sync_period_s=0.05) as recorder:
     until(lambda: recorder.watch().errno)
     full = recorder.condition.level, os.strerror(recorder.condition.errno)
     mount("-o", "remount,size=20m")
-    until(lambda: recorder.watch().level == Level.OK)
+    until(lambda: recorder.watch().level == RecorderLevel.OK)
     report = recorder.close()
 os.system(f"cp {place}/x.mcap {sys.argv[2]}")
 tell(report, full=full)
@@ -173,7 +173,7 @@ def test_a_read_only_disk_is_refused_before_the_flight(tmp_path):
 
 
 def test_a_flight_goes_on_to_its_end_over_a_full_disk(tmp_path):
-    """`glider fly` in simulation, a megabyte for its log of seven."""
+    """`glider fly` in simulation, a megabyte for its log of seven: exit code 1, for the log is not complete."""
     scenario = """
 mount("-t", "tmpfs", "-o", "size=1m", "none")
 from glider.tools.cli.main import main
@@ -185,7 +185,7 @@ except SystemExit as end:
 os.system(f"cp {place}/x.mcap {place.parent}/out.mcap")
 """
     found = run(scenario, tmp_path)
-    assert found["code"] == 0
+    assert found["code"] == 1
     assert found["size"] > 500_000
     log = read_log(tmp_path / "out.mcap")
     assert log.topics["/tick"].count > 500

@@ -109,7 +109,8 @@ def told(folder: Path, answers: dict[str, float]) -> Story:
         assert glider("import", "csv", *files, "--map", folder / "map.toml", "--out", folder / kind) == 0
     assert glider("identify", folder / "healthy", "--out", folder / "found") == 0
     file = folder / "found" / "identified.toml"
-    assert glider("gap", "diagnose", folder / "drag", "--vehicle", file, "--out", folder / "answer") == 0
+    held = "--vehicle", file, "--reference", folder / "healthy"
+    assert glider("gap", "diagnose", folder / "drag", *held, "--out", folder / "answer") == 0
     answer = json.loads((folder / "answer" / "diagnosis.json").read_text())
     return Story(load_vehicle(str(folder / "mine.toml")), load_vehicle(str(file)), answer)
 

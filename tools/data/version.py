@@ -29,7 +29,7 @@ def commit() -> str:
     tree = Path(glider.__file__).resolve().parents[1]
     if not (tree / ".git").exists():
         return ""
-    command = ["git", "-C", str(tree), "rev-parse", "--short=12", "HEAD"]
+    command = ["git", "-C", str(tree), "rev-parse", "--short=7", "HEAD"]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=5.0, check=False)
     except (OSError, subprocess.TimeoutExpired):
@@ -43,5 +43,5 @@ def release() -> str:
 
 
 def software() -> str:
-    """Return name, version and commit: "glider 0.1.0 (4ea54ce0c1d2)"."""
+    """Return name, version and commit: "glider 0.1.0 (4ea54ce)"."""
     return release() + (f" ({commit()})" if commit() else "")

@@ -46,7 +46,7 @@ def make_release(target: Target, folder: Path, root: Path = ROOT) -> Path:
         tree = Path(place, "tree")
         tree.mkdir()
         archived(root, name.rpartition("-")[2], tree)
-        (tree / "glider" / COMMIT_FILE).write_text(name.rpartition("-")[2] + "\n")
+        (tree / "glider" / COMMIT_FILE).write_text(name.rpartition("-")[2][:7] + "\n")
         copy_files(tree, fresh)
         take_out(tree)
         own_wheel(tree, fresh / "wheels")

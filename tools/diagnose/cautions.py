@@ -50,8 +50,8 @@ def _assumed(problem: Problem) -> list[str]:
     if not guessed:
         return []
     return [
-        f"the vehicle file has assumed numbers ({in_words(guessed)}): what they may do cannot be distinguished from a cause; "
-        "`glider identify` on healthy runs first, then diagnose by identified.toml"
+        f"the vehicle file has assumed numbers ({in_words(guessed)}): what they may do cannot be distinguished from a "
+        "cause; `glider identify` on healthy runs first, then diagnose by identified.toml"
     ]
 
 

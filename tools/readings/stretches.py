@@ -128,7 +128,10 @@ def out_of_water(run: Run) -> np.ndarray:
 
 
 def under_water(run: Run) -> Run:
-    """The run without what was measured out of the water: no model has the force of a hull that is partly out of it."""
+    """The run without what was measured out of the water: no model has the force of a hull that is partly out of it.
+
+    What it measured at the surface between dives is missing; rows behind the last under water are cut off.
+    """
     out = out_of_water(run)
     if not out.any():
         return run
@@ -136,7 +139,10 @@ def under_water(run: Run) -> Run:
         name: values if name in (names.TIME, *names.COMMANDS) else np.where(out, np.nan, values)
         for name, values in run.columns.items()
     }
-    return replace(run, columns=columns)
+    end = int(np.flatnonzero(~out)[-1]) + 1 if not out.all() else run.rows
+    if end == run.rows:
+        return replace(run, columns=columns)
+    return replace(run, columns={name: values[:end] for name, values in columns.items()}, extra={})
 
 
 def judge_stretches(runs: list[Run]) -> list[Finding]:

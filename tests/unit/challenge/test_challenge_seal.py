@@ -46,7 +46,7 @@ def test_equal_answers_are_equal_archives(tmp_path):
 
 def test_other_answers_are_not_opened(sealed):
     seal(sealed / "answers.zip", {"seed": 3}, {"case000": ANSWER | {"labels": ["lift"]}})
-    with pytest.raises(InputError, match="promised"):
+    with pytest.raises(InputError, match="declares"):
         opened(sealed)
 
 

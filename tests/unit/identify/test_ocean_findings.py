@@ -24,7 +24,7 @@ CRAFT, DIVES, WRONG, MORE = "seaglider", 8, -0.14, 0.7
 @pytest.fixture(scope="module")
 def pitch_wrong(tmp_path_factory):
     """A mission with a speed log whose pitch sensor reads far less than the file allows; true scale."""
-    dives = fly_dives(DIVES, ("attitude_scale", WRONG, 0), speed=True, craft=CRAFT)
+    dives = fly_dives(DIVES, ("attitude_scale", WRONG, 0), speed=True, vehicle_class=CRAFT)
     case = as_case(tmp_path_factory.mktemp("pitch") / "case", dives.runs, CRAFT)
     return case, float(dives.mission.V[foreign.PITCH_SCALE]) + WRONG
 
@@ -54,7 +54,7 @@ def test_also_where_the_file_has_no_uncertainty_of_it(pitch_wrong):
 
 
 def test_drag_that_the_file_leaves_open_is_a_finding_of_identification_and_of_a_diagnosis(tmp_path):
-    dives = fly_dives(DIVES, ("drag", MORE, 0), craft=CRAFT)
+    dives = fly_dives(DIVES, ("drag", MORE, 0), vehicle_class=CRAFT)
     case = as_case(tmp_path / "case", dives.runs, CRAFT)
     true = dives.mission.V[foreign.DRAG] * (1.0 + MORE) / case.vehicle.hydrodynamics.Cd0 - 1.0
     identified, diagnosed = identify_ocean(case), diagnose_ocean(case)
@@ -96,7 +96,7 @@ def test_groups_are_labels_of_directions_that_nothing_was_learned_of():
 
 
 def test_the_next_dives_are_commands_by_how_it_was_flown():
-    dives = fly_dives(3, craft=CRAFT)
+    dives = fly_dives(3, vehicle_class=CRAFT)
     how = flown(dives.runs)
     asked = dives.mission.dives[0]
     assert how.depth == pytest.approx(asked[foreign.DEPTH], rel=0.2)

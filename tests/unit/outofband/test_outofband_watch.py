@@ -23,7 +23,7 @@ import os, select, sys, time
 from glider.hal import heartbeat as hb
 pulse = hb.Heartbeat.create(sys.argv[1], 0.02, "test")
 pulse.beat(0.0)
-pulse.publish(hb.State.DIVING)
+pulse.publish(hb.SortieState.DIVING)
 print("flying", flush=True)
 beating = recording = True
 while True:
@@ -37,7 +37,7 @@ while True:
         elif word == "recorder given up":
             pulse.words[hb.W_RECORDER_EXPECTED] = 0
         elif word:
-            pulse.publish(hb.State[word])
+            pulse.publish(hb.SortieState[word])
             print(word, flush=True)
     if beating:
         pulse.beat(1.0)

@@ -20,12 +20,23 @@ def course(end):
 
 
 @pytest.mark.parametrize("every", [1, 3])
-def test_the_last_seconds_afloat_are_gone_but_times_and_commands(every):
+def test_the_last_seconds_afloat_are_cut_off(every):
     before = run(course(-0.01), every)
     after = under_water(before)
-    afloat = np.arange(0.0, 60.0, 0.1) > 39.0 - 0.5
-    assert np.isnan(after.columns["pitch_rad"][afloat][10:]).all()
-    assert np.isfinite(after.columns["pitch_rad"][~afloat][:-10]).all()
+    afloat = np.arange(0.0, 60.0, 0.1) > 35.0
+    assert after.rows == pytest.approx((~afloat).sum(), abs=10)
+    for name, values in after.columns.items():
+        np.testing.assert_array_equal(values, before.columns[name][: after.rows])
+
+
+def test_a_moment_at_the_surface_between_two_dives_is_missing_but_times_and_commands():
+    t = np.arange(0.0, 60.0, 0.1)
+    before = run(1.0 - 1.02 * np.exp(-(((t - 30.0) / 5.0) ** 2)))
+    after = under_water(before)
+    surface = before.columns["depth_m"] < 0.04
+    assert surface.any()
+    assert np.isnan(after.columns["pitch_rad"][surface]).all()
+    assert np.isfinite(after.columns["pitch_rad"][:200]).all()
     np.testing.assert_array_equal(after.t, before.t)
     assert np.isfinite(after.columns["cmd_servo_rad"]).all()
 

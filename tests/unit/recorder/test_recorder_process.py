@@ -180,7 +180,7 @@ def test_a_recording_process_that_dies_does_not_stop_the_flight(tmp_path):
 
 FLIGHT = """
 import sys, time, json
-from glider.hal.recorder.condition import Level
+from glider.hal.recorder.condition import RecorderLevel
 from glider.hal.recorder.recorder import Recorder
 from glider.hal.recorder.schema import Field, RecordSpec
 spec = RecordSpec("/tick", "glider/msg/Tick", (Field("t_s", "s", "time"), Field("n", "1", "number")))

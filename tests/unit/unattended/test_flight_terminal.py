@@ -194,8 +194,8 @@ def test_an_ascent_is_never_asked_for(fly, tmp_path):
 # --- in flight --------------------------------------------------------------------------------------------------------
 LOOP = """
 import contextlib, json, os, select, sys, time
-from glider.tools.flight.terminal import undisturbed
-with undisturbed() if sys.argv[2] == "undisturbed" else contextlib.nullcontext():
+from glider.tools.flight.terminal import terminal_detached
+with terminal_detached() if sys.argv[2] == "undisturbed" else contextlib.nullcontext():
     print("flying", flush=True)
     longest, before, end = 0.0, time.monotonic(), time.monotonic() + 1.0
     while time.monotonic() < end:
