@@ -15,6 +15,7 @@ from glider.tools.inference.parameters import effect_parameters
 from glider.tools.inference.problem import Problem
 
 SPARSE, LONG = 0.2, 5.0  # share missing of the samples at the sensor's own rate; s without a sample
+ASSUMED_NUMBERS = "the vehicle file has assumed numbers"  # how that caution begins
 NOISE_FACTOR_REPORTED = 1.25  # times what a file says of noise, or less by as much
 PARTS = {
     "onboard attitude": names.ATTITUDE,
@@ -50,7 +51,7 @@ def _assumed(problem: Problem) -> list[str]:
     if not guessed:
         return []
     return [
-        f"the vehicle file has assumed numbers ({in_words(guessed)}): what they may do cannot be distinguished from a "
+        f"{ASSUMED_NUMBERS} ({in_words(guessed)}): what they may do cannot be distinguished from a "
         "cause; `glider identify` on healthy runs first, then diagnose by identified.toml"
     ]
 

@@ -5,6 +5,7 @@ from typing import Any
 
 from glider.sim_backend.core.effects.base import Effect
 from glider.sim_backend.core.effects.catalogue import catalogue
+from glider.tools.diagnose.cautions import ASSUMED_NUMBERS
 from glider.tools.diagnose.noise_probes import CLOCK, TURBULENCE, UNPREDICTABLE
 from glider.tools.diagnose.record import DiagnosisRecord, EstimateRecord, FindingRecord, Gap, Interval
 from glider.tools.diagnose.record import number as finite
@@ -288,13 +289,20 @@ def how_sure(record: DiagnosisRecord) -> str:
 
 
 def sentence(record: DiagnosisRecord) -> str:
-    """The verdict in one plain sentence: what, where, how sure, how far."""
+    """The verdict in one plain sentence: what, where, how sure, how far; first that a vehicle file is a guess."""
     answer = record.answer
     if answer.verdict == "none":
-        return _none(record)
-    if answer.verdict == "unknown":
-        return _unknown(record)
-    return _excess_noise(record) if answer.main in UNPREDICTABLE else _causes(record)
+        said = _none(record)
+    elif answer.verdict == "unknown":
+        said = _unknown(record)
+    else:
+        said = _excess_noise(record) if answer.main in UNPREDICTABLE else _causes(record)
+    guessed = any(line.startswith(ASSUMED_NUMBERS) for line in answer.cautions)
+    return (
+        f"Identify the vehicle first, its file has assumed numbers; as far as that file goes: {said}"
+        if guessed
+        else said
+    )
 
 
 def _none(record: DiagnosisRecord) -> str:

@@ -5,6 +5,7 @@ import pytest
 
 from glider.sim_backend.core.effects.catalogue import catalogue
 from glider.sim_backend.ocean.catalogue import catalogue as ocean_catalogue
+from glider.tools.diagnose.cautions import ASSUMED_NUMBERS
 from glider.tools.diagnose.noise_probes import CLOCK, TURBULENCE
 from glider.tools.diagnose.record import (
     AnswerRecord,
@@ -70,6 +71,13 @@ def test_one_cause_says_what_where_how_sure_and_how_far():
 
 
 PARTS_OF_NOTHING = ("left out", "unknown to unknown", "unknown %", "closed", "nan", "not checked on it")
+
+
+def test_a_file_of_guesses_is_named_before_the_verdict():
+    plain, guessed = (record({"drag": 0.97}, ["drag"]) for _ in range(2))
+    guessed.answer.cautions.append(f"{ASSUMED_NUMBERS} (J): identify first")
+    assert words.sentence(guessed).startswith("Identify the vehicle first")
+    assert words.sentence(guessed).endswith(words.sentence(plain))
 
 
 def of_one_run() -> list[DiagnosisRecord]:
