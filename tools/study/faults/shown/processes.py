@@ -15,7 +15,7 @@ import sys, time
 from glider.hal import heartbeat as hb
 pulse = hb.Heartbeat.create(sys.argv[1], 0.02, "faults")
 pulse.beat(0.0)
-pulse.publish(hb.State.DIVING)
+pulse.publish(hb.SortieState.DIVING)
 print("flying", flush=True)
 while True:
     pulse.beat(0.0)
