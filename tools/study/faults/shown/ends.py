@@ -15,14 +15,14 @@ import sys, time
 from glider.hal import heartbeat as hb
 from glider.hal.state_file import StateFile
 pulse = hb.Heartbeat.create(sys.argv[1], 0.02, "faults")
-pulse.publish(hb.State.DIVING)
+pulse.publish(hb.SortieState.DIVING)
 for _ in range(25):
     pulse.beat(0.0)
     time.sleep(0.02)
-pulse.publish(hb.State[sys.argv[2]])
+pulse.publish(hb.SortieState[sys.argv[2]])
 time.sleep(3.0)
-StateFile(sys.argv[1]).write(hb.State.ENDED)
-pulse.publish(hb.State.ENDED)
+StateFile(sys.argv[1]).write(hb.SortieState.ENDED)
+pulse.publish(hb.SortieState.ENDED)
 """
 BREAKING = """
 import sys
@@ -36,10 +36,10 @@ def step(self):
     if steps[0] == 3:
         raise RuntimeError("a defect")
     return True
-guard.Watch.step = step
+guard.GuardWatch.step = step
 if in_order:
-    close = guard.Watch.close
-    guard.Watch.close = lambda self, in_order: close(self, in_order=True)
+    close = guard.GuardWatch.close
+    guard.GuardWatch.close = lambda self, in_order: close(self, in_order=True)
 sys.argv[1:] = ["--run", str(folder), "--state", str(folder)]
 guard.main()
 """
