@@ -120,7 +120,7 @@ class RtuDecoder:
 
     @property
     def pending(self) -> int:
-        """Bytes kept for a frame that is not whole yet, fewer than LONGEST."""
+        """Bytes kept for a frame that is not whole yet, fewer than MAX_FRAME_BYTES."""
         return len(self._buffer)
 
     def reset(self) -> None:

@@ -98,7 +98,7 @@ class Vn100Decoder:
 
     @property
     def pending(self) -> int:
-        """Bytes kept for a message that is not whole yet, fewer than LONGEST."""
+        """Bytes kept for a message that is not whole yet, fewer than MAX_FRAME_BYTES."""
         return len(self._buffer)
 
     def feed(self, data: bytes) -> list[TextMessage | BinaryMessage]:

@@ -31,7 +31,7 @@ from model_states import HIGH, LOW, RATE, VEHICLE_TEXT, P, state
 from glider.firmware.core.control.control import roll_law
 from glider.firmware.core.control.input_forms import exact_form, paper_form
 from glider.firmware.core.control.law import decrease_margin, k2_to_cover
-from glider.firmware.core.control.law_plus import BOUNDARY_LAYER_SHARE, on_outputs
+from glider.firmware.core.control.law_plus import JERK_RATE_SHARE, on_outputs
 from glider.firmware.core.maths.rotations import euler_from_quaternion
 from glider.firmware.core.vehicle import layout
 from glider.firmware.core.vehicle.actuators import actuator_rates, limited
@@ -214,7 +214,7 @@ def real_flight(
 
 
 @pytest.mark.parametrize("counting_on", ["present", "reach"])
-@pytest.mark.parametrize("share", [None, BOUNDARY_LAYER_SHARE])
+@pytest.mark.parametrize("share", [None, JERK_RATE_SHARE])
 def test_V_falls_with_real_actuators_whenever_the_margin_says_so(counting_on, share):
     """|feedback| > |mismatch| + model error + disturbance makes V fall, and by that much.
 
@@ -241,10 +241,10 @@ VARIANTS = {
     "moderate, present": (MODERATE, dict(counting_on="present"), {}),
     "moderate, present, paper form": (MODERATE, dict(counting_on="present"), dict(form=paper_form)),
     "moderate, reach": (MODERATE, dict(counting_on="reach"), {}),
-    "moderate, law+": (MODERATE, dict(counting_on="reach", share=BOUNDARY_LAYER_SHARE), {}),
-    "moderate, law+, paper form": (MODERATE, dict(counting_on="reach", share=BOUNDARY_LAYER_SHARE),
+    "moderate, law+": (MODERATE, dict(counting_on="reach", share=JERK_RATE_SHARE), {}),
+    "moderate, law+, paper form": (MODERATE, dict(counting_on="reach", share=JERK_RATE_SHARE),
     dict(form=paper_form)), "fast, present": (FAST, dict(counting_on="present"), {}),
-    "fast, law+": (FAST, dict(counting_on="reach", share=BOUNDARY_LAYER_SHARE), {}),
+    "fast, law+": (FAST, dict(counting_on="reach", share=JERK_RATE_SHARE), {}),
 }  # fmt: skip
 
 

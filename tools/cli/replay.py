@@ -76,7 +76,7 @@ def page(replay: Any) -> list[str]:
     log, facts = replay.log, replay.log.metadata
     words = [f"{facts[name]}" for name in ("software", "vehicle", "mission", "board") if name in facts]
     began = f", begun {log.began}" if log.began else ""
-    lines = [f"{log.path}: {replay.tick.count} ticks, {log.duration_s:.2f} s{began}; {', '.join(words)}"]
+    lines = [f"{log.path}: {replay.tick.count} ticks, {log.duration_s:.2f} s{began}", f"flown by {', '.join(words)}"]
     if not log.complete:
         lines.append(f"the log is cut: nothing is known of the flight after {replay.tick.column('t_s')[-1]:.2f} s")
     if replay.ends:

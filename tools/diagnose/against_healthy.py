@@ -313,7 +313,7 @@ class Weighed:
         return self.listed[int(weights.argmax())]
 
     def certain(self, one: HealthyHypothesis) -> list[str]:
-        """Labels of a hypothesis that are there whatever else is, CERTAIN."""
+        """Labels of a hypothesis that are there whatever else is, by SELECTED_PROBABILITY."""
         weights = np.logaddexp(self.alone, self.beside)
         weights = np.exp(weights - logsumexp(weights))
         within = {label: sum(w for w, h in zip(weights, self.listed, strict=True) if label in h.labels)

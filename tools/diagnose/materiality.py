@@ -60,7 +60,7 @@ def excess_noise_is_material(search: Search, hypothesis: Hypothesis, shrinkage: 
 
 
 def gap_is_material(shrinkage: Shrinkage) -> float:
-    """How far what is left exceeds the floor in any channel: 0 below MATTERS, 1 from twice that."""
+    """How far what is left exceeds the floor in any channel: 0 below MATERIAL_TOLERANCES, 1 from twice that."""
     return opened(
         excess(shrinkage.channels(AFTER), shrinkage.channels(FLOOR)), MATERIAL_TOLERANCES, 2.0 * MATERIAL_TOLERANCES
     )

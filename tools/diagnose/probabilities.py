@@ -51,7 +51,7 @@ def doubt_small(chances: dict[str, float], main: str, size: float) -> dict[str, 
     """Probabilities where the largest of the effects may be one of many small ones, and nothing the main cause.
 
     size: of the main one, in sizes at which that is as likely as not. What this takes off the labels goes to none, but
-    no more than SECOND of what the main one keeps: there is something.
+    no more than MAX_NONE_RATIO of what the main one keeps: there is something.
     """
     large = float(ndtr(np.log(max(size, 1e-6)) / LARGE_WIDTH))
     labels = sum(chance for name, chance in chances.items() if name != NONE)
@@ -64,7 +64,7 @@ def doubt_small(chances: dict[str, float], main: str, size: float) -> dict[str, 
 def to_none(chances: dict[str, float], negligible: Iterable[str], moved: dict[str, float]) -> dict[str, float]:
     """Probabilities with those of effects that do not matter given to none: there is no gap with them.
 
-    moved: by how much each moves the windows, tolerances; up to twice MATTERS it matters by degrees.
+    moved: by how much each moves the windows, tolerances; up to twice MATERIAL_TOLERANCES it matters by degrees.
     """
     material = {label: opened(far, MATERIAL_TOLERANCES, 2.0 * MATERIAL_TOLERANCES) for label, far in moved.items()}
     material |= dict.fromkeys(negligible, 0.0)

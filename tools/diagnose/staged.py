@@ -3,7 +3,8 @@
 Readings first: what they say of each other goes into the model. Then the vehicle: identified by prediction error, once
 without each run (or each of FOLDS parts of many runs). Then what is wrong with the sensors beside it, one after the
 other: every effect of theirs is tried by one linear step, the best are fitted in full, and the one that takes most of
-the gap of runs left out stays, if it takes WORTH of it, in every part, with the same sign. A fit of the runs themselves
+the gap of runs left out stays, if it takes LEAST_GAP_REDUCTION of it, in every part, with the same sign. A fit of the
+runs themselves
 says little here: with many effects to choose from one of them always brings something.
 """
 
@@ -154,7 +155,7 @@ class _Stages:
         return found
 
     def sure(self, more: list[FreeParameter], new: int, values: list[np.ndarray]) -> bool:
-        """Whether the fit to all runs has one of the `new` last parameters away from 0 by SURE sigma."""
+        """Whether the fit to all runs has one of the `new` last parameters away from 0 by CERTAIN_SIGMA."""
         fitting = self.free(self.whole.model, self.whole.runs, more)
         found = fitting.again(np.clip(np.mean(values, axis=0), fitting.low, fitting.high), REFIT_STEPS)
         sd = np.sqrt(np.diag(found.covariance))
@@ -172,7 +173,9 @@ class _Stages:
 
 
 def reduces_gap(before: list[RunGap], after: list[RunGap], folds: list[list[int]]) -> bool:
-    """Whether a stage takes WORTH of the squared gap of runs left out, and some of it in every part of them."""
+    """Whether a stage takes LEAST_GAP_REDUCTION of the squared gap of runs left out, and some of it in every part of
+    them.
+    """
     b, a = np.array([gap.total for gap in before]) ** 2, np.array([gap.total for gap in after]) ** 2
     return bool(a.sum() <= (1.0 - LEAST_GAP_REDUCTION) * b.sum()) and all(
         a[part].sum() < b[part].sum() for part in folds

@@ -57,7 +57,7 @@ def residuals(found: Staged) -> int:
 def weighed(known: Answer, far: Answer, off: float) -> Answer:
     """Two answers in one: by the vehicle's file, and, with the probability `off`, by the stages of one far from it.
 
-    Selected is the main cause, and what is CERTAIN to be in the answer, whichever is right.
+    Selected is the main cause, and what is by SELECTED_PROBABILITY in the answer, whichever is right.
     """
     every = [*known.selected, *(label for label in far.selected if label not in known.selected)]
     there = {label: (1.0 - off) * (label in known.selected) + off * (label in far.selected) for label in every}

@@ -41,7 +41,7 @@ UNKNOWN_GAP_RATIO_AT_HALF, UNKNOWN_GAP_RATIO_WIDTH = 1.8, 0.35
 # Where the file says what noise there is, it is right about the vehicle: nothing small stands beside the main effect.
 SPECIFIED_LEFT, SPECIFIED_LEFT_WIDTH = 0.11, 0.6  # as LEFT_OVER
 SPECIFIED_GAP, SPECIFIED_GAP_WIDTH = 0.35, 0.5  # as LEFT_GAP
-SPECIFIED_WIDE = 0.8  # as WIDE
+SPECIFIED_WIDE = 0.8  # as UNKNOWN_GAP_RATIO_AT_HALF
 TURNED = ("pitch", "roll", "yaw", "rates")  # channels that a sea does not move
 NOISY, NOISY_WIDTH = 0.2, 0.8  # share of the explainable misfit that is left: disorder is looked for; width in e-folds
 # Tolerances that the best explanation still misses by: with the first an effect of the catalogue may, with the second

@@ -75,7 +75,7 @@ class Answer:
     whiteness: float  # sigma of what is left, corrected for the number of tests
     unexplained: float  # of the squared gap beyond the floor, the share that the selected effects leave
     gained: dict[str, float]  # nat that each selected effect brings
-    negligible: dict[str, float]  # nat of effects that are there, but move no window by MATTERS
+    negligible: dict[str, float]  # nat of effects that are there, but move no window by MATERIAL_TOLERANCES
     probed: list[ProbeResult]  # beyond the selected effects; empty where nothing is left
     noise: ProbeResult | None  # turbulence, waves or motion capture's clock, where the search knew of it
     shrinkage: Shrinkage

@@ -100,7 +100,7 @@ def heading_test(folder: Path, runs: Sequence[Run], speeds: Sequence[tuple[np.nd
 
 
 def coefficients(legs: Sequence[HeadingLeg]) -> tuple[Posterior, Posterior]:
-    """Share of the speed that is missing, and angle (rad) that the heading is turned by; of FEWEST legs at least."""
+    """Share of the speed that is missing, and angle (rad) that the heading is turned by; of MIN_LEGS at least."""
     t = np.array([leg.hours for leg in legs])
     X = _design(legs)
     current = np.concatenate([(leg.over_ground - leg.through_water) / leg.seconds for leg in legs])

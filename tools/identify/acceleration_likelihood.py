@@ -5,7 +5,7 @@ that vanishes at both ends of its stretch,
 
     - integral phi' M nu dt = integral phi (N + K k) dt,
 
-so that poses are differentiated once and never twice. Velocities come from a local cubic over SMOOTH seconds (Savitzky
+so that poses are differentiated once and never twice. Velocities come from a local cubic over SMOOTHING_S (Savitzky
 and Golay); its half-power bandwidth at 50 Hz is 2.3 Hz (Schafer, IEEE Signal Processing Magazine 28(4), 2011, eq. 12).
 Residuals of the six axes have a variance each. Actuators: the draw-wires' readings smoothed alike, the servo as the
 model says. Neither the capture's frame and clock nor the masses are free here: what they are off biases the result,

@@ -52,7 +52,9 @@ def looked_for(free: Parameters) -> list[int]:
 
 
 def unidentifiable_directions(free: Parameters, draws: np.ndarray) -> list[Unidentifiable]:
-    """Combinations wider than WIDE of the prior, widest first. draws (k, n), in units of the priors."""
+    """Combinations wider than UNIDENTIFIABLE_PRIOR_SHARE of the prior, widest first. draws (k, n), in units of the
+    priors.
+    """
     listed = looked_for(free)
     values, vectors = np.linalg.eigh(np.cov(draws[:, listed].T))
     found = []

@@ -1,12 +1,13 @@
 """What a check of the readings says, and when it says anything at all.
 
-A finding has to be certain and to matter. Certain: SURE standard errors (of blocks, see regression). Matters: it moves
-its channel by MATTERS of the channel's tolerance, root mean square over the flight; a constant error by more than
-OFFSET_MATTERS, since any sensor has a bias. The tolerances are those in which gaps are counted (docs/GAP.md, Measures).
+A finding has to be certain and to matter. Certain: CERTAIN_SIGMA standard errors (of blocks, see regression). Matters:
+it moves its channel by MATERIAL_TOLERANCES of the channel's tolerance, root mean square over the flight; a constant
+error by more than MATERIAL_OFFSET, since any sensor has a bias. The tolerances are those in which gaps are counted
+(docs/GAP.md, Measures).
 
-SURE is far beyond a normal 5 % point: a case has some sixty comparisons, blocks are few, and what is compared is
-filtered by instruments nobody knows. With it and MATTERS no instrument of the simulated cases without a gap is falsely
-flagged (docs/READINGS.md, How often).
+CERTAIN_SIGMA is far beyond a normal 5 % point: a case has some sixty comparisons, blocks are few, and what is compared
+is filtered by instruments nobody knows. With it and MATERIAL_TOLERANCES no instrument of the simulated cases without a
+gap is falsely flagged (docs/READINGS.md, How often).
 """
 
 import math

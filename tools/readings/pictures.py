@@ -44,7 +44,7 @@ def pictures_of(findings: list[Finding], runs: list[Run]) -> list[Shown]:
 
 
 def _averaged(t: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Means over SMOOTH s: times and values."""
+    """Means over RATE_SMOOTHING_S: times and values."""
     group = np.floor(t / RATE_SMOOTHING_S).astype(np.int64)
     ok = np.isfinite(values)
     count, total = np.bincount(group, ok), np.bincount(group, np.where(ok, values, 0.0))

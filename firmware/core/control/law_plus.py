@@ -1,7 +1,7 @@
 """What the law's actuator-aware version, `law+`, has beside the law: how far an actuator gets, and how it brakes.
 
 law+ is pitch_depth_law with the bounds of `reach` over a short horizon (the slider's time constant and a tick) and with
-jerk = SHARE |g| rate of the axis' actuator.
+jerk = JERK_RATE_SHARE |g| rate of the axis' actuator.
 
 Both law and law+ have a disturbance observer: the estimator's own accelerations of model error (x[X_ERR:]), which
 `on_outputs` turns into the two axes, are added to f. The filter is driven by where the actuators are, not by where they
@@ -15,7 +15,7 @@ from glider.firmware.core.jit import kernel
 
 # Of the jerk that an actuator's rate gives. One would be the fastest braking without lag; the rest is left for the lag
 # and for what the reference asks for. Measured in docs/CONTROL.md.
-BOUNDARY_LAYER_SHARE = 0.3
+JERK_RATE_SHARE = 0.3
 
 
 @kernel

@@ -16,7 +16,7 @@ import math
 from glider.firmware.core.control.error_bound import model_error_bound
 from glider.firmware.core.control.input_forms import exact_form
 from glider.firmware.core.control.law import decrease_margin, feedback, k2_to_cover
-from glider.firmware.core.control.law_plus import BOUNDARY_LAYER_SHARE
+from glider.firmware.core.control.law_plus import JERK_RATE_SHARE
 from glider.firmware.core.control.steering import angle_rates, depth_is_held, form_point
 from glider.firmware.core.jit import kernel
 from glider.firmware.core.layouts import control_layout as ctl
@@ -63,8 +63,8 @@ def monitor(P, C, legs, nav, est, ap, t):
     jerk_t = jerk_z = math.inf
     if C[ctl.CONTROLLER] == ctl.LAW_PLUS:
         jerk_t, jerk_z = (
-            BOUNDARY_LAYER_SHARE * abs(g_ts) * P[SLIDER_RATE],
-            BOUNDARY_LAYER_SHARE * abs(g_zb) * P[BALLAST_RATE],
+            JERK_RATE_SHARE * abs(g_ts) * P[SLIDER_RATE],
+            JERK_RATE_SHARE * abs(g_zb) * P[BALLAST_RATE],
         )
     _, pitch_rate = angle_rates(est)
     ap[ctl.K2_NEED_PITCH] = k2_to_cover(off_t, d_t, g_ts, C[ctl.PITCH_EPS])

@@ -8,7 +8,7 @@ import math
 from glider.firmware.core.control.control import pid, pitch_feedforward
 from glider.firmware.core.control.input_forms import exact_form, paper_form
 from glider.firmware.core.control.law import pitch_depth_law
-from glider.firmware.core.control.law_plus import BOUNDARY_LAYER_SHARE, on_outputs, reach
+from glider.firmware.core.control.law_plus import JERK_RATE_SHARE, on_outputs, reach
 from glider.firmware.core.jit import kernel
 from glider.firmware.core.layouts import control_layout as ctl
 from glider.firmware.core.vehicle import layout
@@ -123,8 +123,8 @@ def law_inputs(P, C, legs, est, ap, pitch_rate):
     jerk_t = jerk_z = math.inf
     if C[ctl.CONTROLLER] == ctl.LAW_PLUS:
         jerk_t, jerk_z = (
-            BOUNDARY_LAYER_SHARE * abs(g_ts) * P[layout.SLIDER_RATE],
-            BOUNDARY_LAYER_SHARE * abs(g_zb) * P[layout.BALLAST_RATE],
+            JERK_RATE_SHARE * abs(g_ts) * P[layout.SLIDER_RATE],
+            JERK_RATE_SHARE * abs(g_zb) * P[layout.BALLAST_RATE],
         )
     slider, ballast, ap[ctl.S_PITCH], ap[ctl.S_DEPTH], status = pitch_depth_law(
         f_t, f_z, g_ts, g_tb, g_zs, g_zb, ct,

@@ -114,7 +114,7 @@ def test_a_leak_is_one_page_abort_and_inputs(wet):
     lines = done.stdout.splitlines()
     assert done.returncode == 0
     assert len(lines) <= 50
-    assert max(map(len, lines)) <= 150
+    assert max(map(len, lines)) <= 140
     (recorded,) = [line for line in lines if line.startswith("recorded: ")]
     assert recorded.startswith("recorded: given up at 3.")
     assert recorded.endswith("fault 20: leak; reaction ABORT")

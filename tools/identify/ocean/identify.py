@@ -202,8 +202,8 @@ def fitted(
 
 
 def allowance(found: list[Expansion], shared: SharedParameters, inflation: float) -> np.ndarray:
-    """By how much other flights may ask for other values, (count, count) in spreads: all runs weigh as WORTH, or as
-    they differ.
+    """By how much other flights may ask for other values, (count, count) in spreads: all runs weigh as
+    EFFECTIVE_DIVES, or as they differ.
 
     Flown otherwise, or with an effect beside them, they are met by another error of the form than these runs were.
     """

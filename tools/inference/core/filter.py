@@ -168,12 +168,12 @@ def filter_run(
 ):
     """The Kalman filter over rows begin .. end - 1. Returns -2 log likelihood without its constant.
 
-    With a spread of N_ERR the model is taken at its word but for `spectral`; with N_ERR + N_LACKING the filter also
+    With a spread of N_ERR the model is taken at its word but for `spectral`; with N_ERR + N_MODEL_ERROR the filter also
     finds what the model lacks (core/model_error): sigma (N_P) and drift (N_DRIFT) say how much that may be.
 
     P (N_P), F (N_F); spectral (N_SPECTRAL): spectral densities of the accelerations ((m/s2)2 s, (rad/s2)2 s), walks
     of servo, slider, ballast, of the position and of motion capture's clock (per s); R (N_Y) measurements' variances;
-    start (N_XF), spread (N_ERR or N_ERR + N_LACKING).
+    start (N_XF), spread (N_ERR or N_ERR + N_MODEL_ERROR).
     Out: X (rows, N_XF) the state and path (rows, N_PATH) after each row, E (rows, N_Y) whitened innovations, NaN where
     nothing was measured, W (rows, N_Y, N_Y) what whitens a row's innovations and K (rows, spreads, N_Y) what corrects
     the state by the whitened ones.

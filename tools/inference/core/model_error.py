@@ -2,7 +2,7 @@
 
 A filter that takes a wrong model at its word pays for it where nothing is measured: a yaw moment that is off for as
 long as the vehicle turns ends up as a sideslip that is not there, and with it every window would start. So a filter
-that finds starts has N_LACKING states more: accelerations as large as the parameters' uncertainty makes them, which
+that finds starts has N_MODEL_ERROR states more: accelerations as large as the parameters' uncertainty makes them, which
 fade over a flight's manoeuvres; gyro biases; the water's velocity. Windows fly on without.
 """
 

@@ -71,7 +71,8 @@ def _hooks(domain: int) -> tuple[_Allocator, _Allocator, np.ndarray, list]:
 def blocks_asked_for(function: Callable[[], object], times: int = 200) -> dict[int, float]:
     """Blocks that one call of `function` asks for, by size in bytes; what the counting itself costs is taken off.
 
-    Sizes of LARGEST bytes and more are counted as LARGEST. A block that only some calls ask for shows as a fraction.
+    Sizes of LARGEST_SIZE bytes and more are counted as LARGEST_SIZE. A block that only some calls ask for shows as a
+    fraction.
     """
     _count(function, 10)  # the interpreter settles into a call it has not seen counted before
     counting_alone = _count(_nothing, times)

@@ -29,7 +29,7 @@ class Said:
 
 
 def moved(case: Case, seed: int) -> Case:
-    """A copy of the case, every reading moved by SHARE of its noise."""
+    """A copy of the case, every reading moved by NOISE_SHARE of its noise."""
     rng, runs = np.random.default_rng(seed), []
     for run in case.runs:
         columns = dict(run.columns)

@@ -25,7 +25,7 @@ def closed_change(held: list[Path], healthy: float, vehicle: Path, model: Path) 
     before: of the identified vehicle over the changed held runs; after: of the corrected model on top of it; healthy:
     of the identified vehicle over healthy runs.
 
-    0 without a corrected model; None where the change adds next to nothing (NOTHING of the gap).
+    0 without a corrected model; None where the change adds next to nothing (LEAST_CLOSABLE_SHARE of the gap).
     """
     before = held_total(held, NOMINAL, vehicle)
     if before - healthy < LEAST_CLOSABLE_SHARE * before:

@@ -115,7 +115,8 @@ def runs_of(folder: Path) -> list[Path]:
 def closed_share(case: ScoredCase, held: Path, diagnoses: Path) -> float | None:
     """(before - after) / (before - perfect), totals over the held runs; 0 where there is no corrected model.
 
-    None where a perfect model closes next to nothing (NOTHING of the gap), so that the share means nothing.
+    None where a perfect model closes next to nothing (LEAST_CLOSABLE_SHARE of the gap), so that the share means
+    nothing.
 
     before and after are `glider gap predict`'s with the nominal and with the corrected model, perfect is the sealed
     answer's, from true starts.

@@ -86,7 +86,9 @@ def measure(trial: Trial, form: Form, sizes: np.ndarray, strength: float, weighe
 def choose(
     rng: np.random.Generator, trial: Trial, form: Form, weak: bool, least: float = LEAST_GAP_FLOORS
 ) -> Magnitude | None:
-    """An effect of a drawn size: from what can be seen at all to WEAK, or from there to STRONG; None if there is none.
+    """An effect of a drawn size: from what can be seen at all to WEAK_GAP_FLOORS, or from there to STRONG_GAP_FLOORS.
+
+    None if there is none.
 
     Weak goes by the nominal model's gap, which what is allowed adds to. least: visible by this factor at least.
     """

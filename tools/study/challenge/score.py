@@ -83,7 +83,7 @@ class ScoredCase:
         return self.verdict() == "unknown"
 
     def sure_of_a_label(self) -> bool:
-        """Whether a label, or unknown, is named with more than SURE; no answer counts too."""
+        """Whether a label, or unknown, is named with more than SURE_PROBABILITY; no answer counts too."""
         if self.said is None:
             return True
         return any(cause.probability > SURE_PROBABILITY for cause in self.said.causes if cause.label != "none")

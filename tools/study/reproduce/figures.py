@@ -51,7 +51,7 @@ def _says(figure: tracking.TrackingFigure, rows: list[dict], marked: float | Non
 def reproduce_tracking(name: str, vehicle: Vehicle, seeds: int, noise: float | None, out: Path) -> dict[str, Any]:
     """Figure 5 or 6: error against strength for all controllers; cases at one strength, on estimated and true states.
 
-    Without `noise` that strength is ROUGH times the vehicle file's disturbance.
+    Without `noise` that strength is PAPER_DISTURBANCE_SCALE times the vehicle file's disturbance.
     """
     figure = FIGURES[name]
     sweep = tracking.fly_figure(figure, vehicle, tracking.STRENGTHS, seeds, ("estimated",))

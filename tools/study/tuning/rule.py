@@ -3,8 +3,8 @@
 For each loop, at the worst of the design trims (plant.DESIGN_TRIMS):
 
 1. Crossover: FASTER times the natural frequency of the loop's reference filter, so that the filter sets the pace and
-   not the loop; slower where the actuator's rate says so: an error of SHARE of the largest step of target, swinging at
-   the crossover, may not ask for more speed than the actuator has.
+   not the loop; slower where the actuator's rate says so: an error of SWING_ERROR_SHARE of the largest step of target,
+   swinging at the crossover, may not ask for more speed than the actuator has.
 2. Phase margin there: PHASE_MARGIN.
 3. Integral: Ti = 2 Td, which gives the controller's zeros a damping of 1/sqrt(2).
 4. Depth only: the observer of depth rate is OBSERVER times as fast as the crossover.
@@ -30,7 +30,7 @@ from glider.tools.study.tuning.loops import OMEGA, Delays, Margins, depth_terms,
 PHASE_MARGIN = 60.0  # deg
 FASTER = 3.0
 OBSERVER = 10.0
-MAX_GAIN_LOSS_SHARE = 0.03
+SWING_ERROR_SHARE = 0.03
 LARGEST_STEP = {"pitch": math.radians(45.0), "depth": 5.0}  # rad, m: the paper's
 EXACT = 1e-4  # relative in crossover, deg in margin
 
@@ -48,7 +48,7 @@ class Row:
 def crossover_wanted(terms: np.ndarray, loop: str, wn: float, rate: float) -> float:
     """The crossover of step 1 (rad/s), from the terms of the design trims (trims, 3, n)."""
     # |C| = 1 / |plant| at a crossover: an error a there makes the actuator swing at a omega / |plant|
-    speed = MAX_GAIN_LOSS_SHARE * LARGEST_STEP[loop] * OMEGA / np.abs(terms[:, 0]).min(axis=0)
+    speed = SWING_ERROR_SHARE * LARGEST_STEP[loop] * OMEGA / np.abs(terms[:, 0]).min(axis=0)
     too_fast = np.nonzero(speed > rate)[0]
     fastest = OMEGA[too_fast[0]] if len(too_fast) else OMEGA[-1]
     return float(min(FASTER * wn, fastest))
