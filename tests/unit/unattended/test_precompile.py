@@ -2,6 +2,9 @@
 
 import contextlib
 import fcntl
+import os
+import subprocess
+import sys
 import threading
 import time
 
@@ -77,3 +80,29 @@ def test_another_checkout_has_a_stamp_of_its_own(work, tmp_path, monkeypatch):
     own = work[0].stamp()
     monkeypatch.setattr(jit, "PACKAGES_DIR", tmp_path)
     assert work[0].stamp() != own
+
+
+def test_what_a_command_compiles_on_the_way_writes_nothing_into_its_result(tmp_path):
+    """From an empty cache: the process beside it counts kernels to nobody."""
+    code = (
+        "import subprocess, sys\n"
+        "from glider.tools.diagnose import precompile\n"
+        "class Stop(Exception): pass\n"
+        "def blank(folder):\n"
+        "    raise Stop\n"
+        "precompile._blank = blank\n"
+        "made = []\n"
+        "popen = subprocess.Popen\n"
+        "subprocess.Popen = lambda *words, **more: made.append(popen(*words, **more)) or made[-1]\n"
+        "try:\n"
+        "    precompile._diagnose_a_moment()\n"
+        "except Stop:\n"
+        "    sys.exit(made[0].wait())\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], env={**os.environ, "GLIDER_CACHE_DIR": str(tmp_path)}, capture_output=True,
+        timeout=300,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == b""
+    assert list(tmp_path.rglob("*.nbi"))  # something was compiled
