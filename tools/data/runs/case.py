@@ -22,7 +22,7 @@ from glider.tools.data.sources import load_any_vehicle, read_text
 
 CASE_FILE = "case.toml"
 VEHICLE_FILE = "vehicle.toml"  # beside it, where the vehicle is not a shipped one
-_RUN_FILE = re.compile(r"run.*\.csv(\.gz)?\Z")
+_RUN_FILE = re.compile(r"run(?!s\.csv).*\.csv(\.gz)?\Z")  # runs.csv is a table of them
 _NUMBER = re.compile(r"\d+")
 
 
@@ -88,7 +88,7 @@ class Case:
         return self.vehicle
 
 
-def _run_files(folder: Path) -> list[Path]:
+def run_files(folder: Path) -> list[Path]:
     """The folder's run files by number; InputError where one run is there packed and unpacked."""
     files = [path for path in folder.iterdir() if _RUN_FILE.match(path.name)]
 
@@ -175,7 +175,7 @@ def load_case(folder: Path | str, vehicle: str | None = None, leave_out: bool = 
 def load_runs(folder: Path) -> tuple[CaseTable, list[Run]]:
     """case.toml and all runs of a case, without its vehicle; InputError or ConfigError as load_case."""
     table = _read_case_file(folder)
-    files = _run_files(folder)
+    files = run_files(folder)
     if len(files) != table.runs:
         message = f"{table.runs} expected, {len(files)} files run*.csv found"
         raise InputError(message, source=folder / CASE_FILE, column="runs")
@@ -277,7 +277,7 @@ def write_case(
         sensors=sensors,
         disturbance=disturbance,
     )
-    if folder.is_dir() and ((folder / CASE_FILE).exists() or _run_files(folder)):
+    if folder.is_dir() and ((folder / CASE_FILE).exists() or run_files(folder)):
         raise InputError("the folder already holds a case: name another, or empty it", source=folder)
     folder.mkdir(parents=True, exist_ok=True)
     digits = max(digits, len(str(len(runs) - 1)))

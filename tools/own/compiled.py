@@ -1,0 +1,164 @@
+"""A model's functions beside the observer's kernels: compiled by Numba where that can be, plain Python where not.
+
+Numba cannot keep closures over a user's functions on the disk. So the user's source and the kernels are written into
+the cache folder under a hash of both, and compiled there as a module of their own, which keeps.
+"""
+
+import hashlib
+import importlib.util
+import inspect
+import os
+import sys
+import types
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+KERNELS = Path(__file__).with_name("kernels.py")
+NAMES = ("wrap", "plus", "minus", "normalised", "difference", "read", "push_of", "filter_run", "follow_run", "fly_run")
+PLAIN = "GLIDER_OWN_PYTHON"  # set: never compile
+
+STEP_SOURCE = """
+def advance(x, u, w, theta, dt, parts):
+    for _ in range(parts):
+        x = step(x, u, w, theta, dt / parts)
+    return x
+"""
+DERIVATIVE_SOURCE = """
+def advance(x, u, w, theta, dt, parts):
+    h = dt / parts
+    for _ in range(parts):
+        a = derivative(x, u, w, theta)
+        b = derivative(x + 0.5 * h * a, u, w, theta)
+        c = derivative(x + 0.5 * h * b, u, w, theta)
+        d = derivative(x + h * c, u, w, theta)
+        x = x + h / 6.0 * (a + 2.0 * b + 2.0 * c + d)
+    return x
+"""
+
+
+@dataclass(frozen=True)
+class Kernels:
+    """The observer of one model."""
+
+    filter_run: Callable[..., Any]
+    follow_run: Callable[..., Any]
+    fly_run: Callable[..., Any]
+    advance: Callable[..., Any]
+    measure: Callable[..., Any]
+    compiled: bool
+    why: str  # it is not compiled: one line
+
+
+def _functions(model: Any) -> dict[str, Callable[..., Any]]:
+    """step or derivative, and measure, of a model object."""
+    motion = "step" if hasattr(model, "step") else "derivative"
+    return {motion: getattr(model, motion), "measure": model.measure}
+
+
+def _module(name: str, source: str, path: Path, given: dict[str, Any]) -> types.ModuleType:
+    """Source executed as a module with names given."""
+    module = types.ModuleType(name)
+    module.__file__ = str(path)
+    vars(module).update(given)
+    sys.modules[name] = module
+    exec(compile(source, str(path), "exec"), vars(module))
+    return module
+
+
+def _sources(model: Any) -> tuple[str, str]:
+    """The kernels' source with `advance`, and the motion's name."""
+    motion = "step" if hasattr(model, "step") else "derivative"
+    return KERNELS.read_text(encoding="utf-8") + (STEP_SOURCE if motion == "step" else DERIVATIVE_SOURCE), motion
+
+
+def plain(model: Any, why: str) -> Kernels:
+    """The observer in plain Python."""
+    source, _ = _sources(model)
+    functions = {
+        name: (lambda one: lambda *given: np.asarray(one(*given), dtype=np.float64))(one)
+        for name, one in _functions(model).items()
+    }
+    made = _module(f"glider_own_plain_{id(model)}", source, KERNELS, functions)
+    return Kernels(made.filter_run, made.follow_run, made.fly_run, made.advance, functions["measure"], False, why)
+
+
+def kernels_of(model: Any, path: Path | None, attribute: str, tried: tuple[np.ndarray, ...]) -> Kernels:
+    """The observer of a model, from its file; why it is not compiled is in the answer.
+
+    path: the Python file that it was loaded from; attribute: its name there, empty where the module is the model;
+    tried: x, u, w, theta that its functions are compiled for and called with once.
+    """
+    if os.environ.get(PLAIN) or os.environ.get("GLIDER_JIT", "1") == "0":
+        return plain(model, f"{PLAIN} or GLIDER_JIT asks for plain Python")
+    if path is None:
+        return plain(model, "the model is no object of a file")
+    for name, one in _functions(model).items():
+        if inspect.ismethod(one) and not inspect.isclass(one.__self__):
+            return plain(model, f"{name} is a method with self; write it as a static method or a function")
+    try:
+        return _compiled(model, path, attribute, tried)
+    except Exception as error:  # whatever Numba has against a user's function: the model runs all the same
+        return plain(model, _reason(error))
+
+
+def _reason(error: Exception) -> str:
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    wanted = [line for line in lines if not line.startswith(("Failed in", "During", "File ", "def ", "<", "-", "^"))]
+    return f"Numba: {(wanted or lines or [type(error).__name__])[0]}"[:200]
+
+
+def _compiled(model: Any, path: Path, attribute: str, tried: tuple[np.ndarray, ...]) -> Kernels:
+    from glider.firmware.core import jit  # sets Numba's cache folder
+
+    import numba
+
+    user = path.read_bytes()
+    source, motion = _sources(model)
+    key = hashlib.sha256(user + source.encode() + numba.__version__.encode()).hexdigest()[:20]
+    folder = jit.cache_root() / "own" / key
+    folder.mkdir(parents=True, exist_ok=True)
+    kept, kernels = folder / path.name, folder / "observer_kernels.py"
+    for file, text in ((kept, user), (kernels, source.encode())):
+        if not file.is_file() or file.read_bytes() != text:
+            from glider.tools.data.files import write_bytes
+
+            write_bytes(file, text)
+    options = {"cache": True, "nogil": True, "error_model": "numpy"}
+    theirs = _user_module(kept, key, path.parent)
+    for name, value in list(vars(theirs).items()):
+        if isinstance(value, types.FunctionType) and value.__module__ == theirs.__name__:
+            vars(theirs)[name] = numba.njit(**options)(value)
+    owner = getattr(theirs, attribute) if attribute else theirs
+    given: dict[str, Any] = {}
+    for name in (motion, "measure"):
+        function = getattr(owner, name)
+        given[name] = function if hasattr(function, "py_func") else numba.njit(**options)(function)
+    name = f"glider_own_{key}"
+    module = _module(name, source, kernels, given)
+    for one in (*NAMES, "advance"):
+        vars(module)[one] = numba.njit(**options)(vars(module)[one])
+    x, u, w, theta = tried
+    module.advance(x, u, w, theta, 0.01, 1)
+    given["measure"](x, u, theta)
+    return Kernels(
+        module.filter_run, module.follow_run, module.fly_run, module.advance, given["measure"], True, ""
+    )
+
+
+def _user_module(kept: Path, key: str, beside: Path) -> types.ModuleType:
+    """A copy of the user's module, whose functions may be replaced by compiled ones; its neighbours can be imported."""
+    name = f"glider_own_model_{key}"
+    spec = importlib.util.spec_from_file_location(name, kept)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    sys.path.insert(0, str(beside))
+    try:
+        spec.loader.exec_module(module)
+    finally:
+        sys.path.remove(str(beside))
+    return module

@@ -1,0 +1,209 @@
+"""What a user's model declares: inputs, outputs, parameters, states and noises, by name and unit.
+
+A model is any object (a class with static methods, an instance, a module) with these attributes and functions::
+
+    inputs, outputs, parameters, states, noises
+    step(x, u, w, theta, dt) -> x          or  derivative(x, u, w, theta) -> dx/dt
+    measure(x, u, theta) -> y
+    initial(y) -> x, (x, sd) or a list of these          optional
+
+A declaration is a mapping name -> unit, or a list of (name, unit) or of the classes below. Vectors have the order of
+the declaration: x (states,), u (inputs,), w (noises,), theta (parameters,), y (outputs,), all float64. A black box
+declares the same without states and noises, and has `rollout(x0, t, u, theta) -> y` (rows, outputs) instead.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from math import inf
+from typing import Any, TypeVar
+
+VECTOR, ANGLE, QUATERNION = "vector", "angle", "quaternion"
+VEHICLE, RUN = "vehicle", "run"
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
+# unit: tolerance of an output, standard deviation of a state at the start
+USUAL_TOLERANCE = {"m": 0.1, "rad": 0.0349, "rad/s": 0.0349, "m/s": 0.05, "m/s2": 0.1}
+USUAL_START = {"m": 0.1, "rad": 0.1, "rad/s": 0.1, "m/s": 0.2}
+
+
+class DeclarationError(ValueError):
+    """A declaration that cannot be used: which list, which entry, what was expected."""
+
+
+@dataclass(frozen=True)
+class Input:
+    """What drives the model: a recorded command or position, in force from its row on.
+
+    delay_limit, lag_limit: longest delay and time constant that a cause may have, s.
+    """
+
+    name: str
+    unit: str = ""
+    column: str = ""  # of the run files; empty: name_unit
+    interpolated: bool = False  # between rows: a measured position; else held
+
+
+@dataclass(frozen=True)
+class Output:
+    """What the model says a column reads."""
+
+    name: str
+    unit: str = ""
+    column: str = ""
+    noise: float | None = None  # 1 sigma of white noise, in its unit; None: estimated
+    bias: float = 0.0  # 1 sigma of a constant that the vehicle file allows for
+    offset: float = 0.0  # what it reads too much
+    tolerance: float | None = None  # what the model may be off; None: usual of its unit
+    angle: bool = False  # compared modulo 2 pi
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number of the model, with what is known of it."""
+
+    name: str
+    unit: str = ""
+    value: float = 0.0
+    uncertainty: float = 0.0  # 1 sigma; 0: known
+    low: float = -inf
+    high: float = inf
+    scope: str = VEHICLE  # or RUN: a number of each run
+    assumed: bool = False
+    scatter: float = 0.0  # 1 sigma from run to run, learned by identification
+
+
+@dataclass(frozen=True)
+class State:
+    """A component of x; four of kind `quaternion` in a row are an attitude (w, x, y, z)."""
+
+    name: str
+    unit: str = ""
+    kind: str = VECTOR
+    start: float = 0.0
+    start_uncertainty: float | None = None  # 1 sigma; None: usual of its unit
+
+
+@dataclass(frozen=True)
+class Noise:
+    """A component of w: white, `density` its standard deviation over one second; 0 is no noise."""
+
+    name: str
+    unit: str = ""
+    density: float = 0.01
+
+
+Entry = TypeVar("Entry", Input, Output, Parameter, State, Noise)
+
+
+@dataclass(frozen=True)
+class Declaration:
+    """A model's lists, checked."""
+
+    inputs: tuple[Input, ...]
+    outputs: tuple[Output, ...]
+    parameters: tuple[Parameter, ...]
+    states: tuple[State, ...] = ()
+    noises: tuple[Noise, ...] = ()
+    horizon: float | None = None  # s: of the windows that gaps are measured on; None: by the model's time constants
+    start: Mapping[str, float] = field(default_factory=dict)  # 1 sigma of outputs known at the start, 0 at rest
+
+    def index(self, what: str, name: str) -> int:
+        """Place of a name in a list, `inputs` to `noises`."""
+        return [one.name for one in getattr(self, what)].index(name)
+
+
+def column_of(name: str, unit: str) -> str:
+    """`depth`, `m` -> depth_m; rad/s -> rad_s, m/s2 -> m_s2; a name that ends in its unit stays."""
+    suffix = re.sub(r"[^a-z0-9]+", "_", unit.lower()).strip("_")
+    return name if not suffix or name.endswith(f"_{suffix}") or unit in ("1", "-") else f"{name}_{suffix}"
+
+
+def _entries(given: Any, kind: type[Entry], what: str) -> tuple[Entry, ...]:
+    """A list as a user writes it, as entries of one class; DeclarationError where one cannot be read."""
+    if isinstance(given, Mapping):
+        given = [
+            (name, *one) if isinstance(one, (tuple, list)) else ({"name": name, **one} if isinstance(one, Mapping)
+            else (name, one)) for name, one in given.items()
+        ]  # fmt: skip
+    if isinstance(given, str) or not isinstance(given, Sequence):
+        raise DeclarationError(f"{what}: expected a list or a mapping name -> unit, got {type(given).__name__}")
+    found: list[Entry] = []
+    known = {one.name for one in fields(kind)}
+    for n, one in enumerate(given):
+        where = f"{what}[{n}]"
+        if isinstance(one, kind):
+            made = one
+        elif isinstance(one, str):
+            made = kind(one)
+        elif isinstance(one, Mapping):
+            unknown = sorted(set(one) - known)
+            if unknown or "name" not in one:
+                raise DeclarationError(f"{where}: {'no name' if 'name' not in one else 'unknown key ' + unknown[0]}")
+            made = kind(**one)
+        elif isinstance(one, (tuple, list)) and 1 <= len(one) <= 4:
+            made = kind(*one) if len(one) <= 2 or kind is not Parameter else kind(one[0], one[1], *map(float, one[2:]))
+        elif all(hasattr(one, name) for name in ("name", "unit")):
+            made = kind(**{name: getattr(one, name) for name in known if hasattr(one, name)})
+        else:
+            raise DeclarationError(f"{where}: expected (name, unit) or {kind.__name__}, got {one!r}")
+        if not isinstance(made.name, str) or not NAME.match(made.name):
+            raise DeclarationError(f"{where}: a name is letters, digits and _, got {made.name!r}")
+        if not isinstance(made.unit, str):
+            raise DeclarationError(f"{where} ({made.name}): the unit is a text, got {made.unit!r}")
+        if made.name in (other.name for other in found):
+            raise DeclarationError(f"{where}: {made.name} stands twice")
+        found.append(made)
+    return tuple(found)
+
+
+def declaration(model: Any) -> Declaration:
+    """The lists of a model object; DeclarationError where one is missing or cannot be read."""
+    lists: dict[str, Any] = {}
+    black_box = hasattr(model, "rollout") and not hasattr(model, "step") and not hasattr(model, "derivative")
+    for what, kind in (("inputs", Input), ("outputs", Output), ("parameters", Parameter), ("states", State),
+                       ("noises", Noise)):  # fmt: skip
+        given = getattr(model, what, None)
+        if callable(given):
+            given = given()
+        if given is None:
+            if what in ("outputs", "parameters") or (what == "states" and not black_box):
+                raise DeclarationError(f"{what}: not declared")
+            given = ()
+        lists[what] = _entries(given, kind, what)
+    if not lists["outputs"]:
+        raise DeclarationError("outputs: none declared; nothing could be compared")
+    lists["inputs"] = tuple(replace(one, column=one.column or column_of(one.name, one.unit)) for one in lists["inputs"])
+    lists["outputs"] = tuple(
+        replace(one, column=one.column or column_of(one.name, one.unit)) for one in lists["outputs"]
+    )
+    _check_states(lists["states"])
+    for one in lists["parameters"]:
+        _check_parameter(one)
+    taken: dict[str, str] = {}
+    for what in ("inputs", "outputs", "parameters", "noises"):
+        for one in lists[what]:
+            if one.name in taken:
+                raise DeclarationError(f"{what}: {one.name} is declared under {taken[one.name]} too")
+            taken[one.name] = what
+    return Declaration(**lists, horizon=getattr(model, "horizon", None))
+
+
+def _check_parameter(one: Parameter) -> None:
+    if one.scope not in (VEHICLE, RUN):
+        raise DeclarationError(f'parameters: {one.name}: scope is "vehicle" or "run", got {one.scope!r}')
+    if not one.low <= one.value <= one.high:
+        raise DeclarationError(f"parameters: {one.name}: {one.value:g} is outside {one.low:g} to {one.high:g}")
+    if one.uncertainty < 0.0:
+        raise DeclarationError(f"parameters: {one.name}: an uncertainty is not negative, got {one.uncertainty:g}")
+
+
+def _check_states(states: Sequence[State]) -> None:
+    n = 0
+    while n < len(states):
+        if states[n].kind not in (VECTOR, ANGLE, QUATERNION):
+            raise DeclarationError(f"states: {states[n].name}: kind is vector, angle or quaternion")
+        if states[n].kind == QUATERNION:
+            if [one.kind for one in states[n : n + 4]] != 4 * [QUATERNION]:
+                raise DeclarationError(f"states: {states[n].name}: a quaternion is four states in a row (w, x, y, z)")
+            n += 3
+        n += 1

@@ -1,0 +1,204 @@
+"""What may be wrong with any declared vehicle: the standard effects of its inputs, outputs, parameters and noises.
+
+Each is one number, 0 where nothing is wrong, counted in spreads: steps of differences, no prior (how much an effect
+does to the recorded windows is what its prior is about, posterior.py).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from glider.tools.own.declare import RUN, Declaration, Input
+from glider.tools.own.runs import OwnRun
+
+INPUT, OUTPUT, PARAMETER, NOISE, OWN = "input", "output", "parameter", "noise", "own"
+PUSH = "push"  # a constant beside a noise: what no label explains
+GAIN_SPREAD, SECONDS_SPREAD, RANGE_SPREAD = 0.1, 0.2, 0.1
+OWN_STEP = 1e-3  # of its sigma: difference step of a parameter of each run
+LONGEST = 20.0  # spreads: of delays and time constants
+UNKNOWN_SHARE = 0.1  # of a value: spread of a parameter whose uncertainty is smaller
+READ_ROWS = ("gain", "bias", "drift", "lag", "delay")  # rows of `read`'s table
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One number that may be wrong: its label, what it is of, and how far it can go."""
+
+    label: str
+    family: str
+    name: str  # of the input, output, parameter or noise
+    kind: str  # gain, offset, lag ...; value for a parameter
+    unit: str
+    spread: float
+    low: float = -np.inf  # spreads
+    high: float = np.inf
+
+    @property
+    def one_sided(self) -> bool:
+        return self.low == 0.0
+
+    @property
+    def where(self) -> tuple[str, str]:
+        return self.family, self.name
+
+
+@dataclass
+class ModelPoint:
+    """Numbers of the observer at one point: what a model is flown with."""
+
+    theta: np.ndarray
+    reading: np.ndarray  # (5, outputs): gain, bias, drift, lag, delay
+    push: np.ndarray  # (noises,)
+    density: np.ndarray  # (noises,)
+    variance: np.ndarray  # (outputs,) of the sensors
+    ports: np.ndarray  # (processes, 4)
+    own: np.ndarray  # (3, parameters of each run): place, 1 sigma, difference step
+    driven: dict[int, dict[str, float]] = field(default_factory=dict)  # input: kind: value
+
+    def copy(self) -> "ModelPoint":
+        return ModelPoint(
+            self.theta.copy(), self.reading.copy(), self.push.copy(), self.density.copy(), self.variance.copy(),
+            self.ports.copy(), self.own.copy(), {key: dict(value) for key, value in self.driven.items()},
+        )  # fmt: skip
+
+
+def nominal_point(declared: Declaration) -> ModelPoint:
+    """The vehicle file's numbers, and nothing wrong."""
+    reading = np.zeros((5, len(declared.outputs)))
+    reading[0], reading[1] = 1.0, [one.offset for one in declared.outputs]
+    return ModelPoint(
+        np.array([one.value for one in declared.parameters]),
+        reading,
+        np.zeros(len(declared.noises)),
+        np.array([one.density for one in declared.noises]),
+        np.array([(one.noise or 0.0) ** 2 for one in declared.outputs]),
+        np.zeros((0, 4)),
+        np.array(
+            [(n, one.uncertainty, OWN_STEP * one.uncertainty) for n, one in enumerate(declared.parameters)
+             if one.scope == RUN and one.uncertainty > 0.0]
+        ).reshape(-1, 3).T.copy(),
+    )  # fmt: skip
+
+
+def moved(declared: Declaration, point: ModelPoint, effects: Sequence[Effect], values: np.ndarray) -> ModelPoint:
+    """A point with effects of sizes `values` (effects,) in spreads."""
+    found = point.copy()
+    for effect, value in zip(effects, values, strict=True):
+        if value == 0.0:
+            continue
+        size = float(value) * effect.spread
+        if effect.family == PARAMETER:
+            k = declared.index("parameters", effect.name)
+            one = declared.parameters[k]
+            found.theta[k] = min(max(found.theta[k] + size, one.low), one.high)
+        elif effect.family == OUTPUT:
+            found.reading[READ_ROWS.index(effect.kind), declared.index("outputs", effect.name)] += size
+        elif effect.family == INPUT:
+            own = found.driven.setdefault(declared.index("inputs", effect.name), {})
+            own[effect.kind] = own.get(effect.kind, 0.0) + size
+        elif effect.family == PUSH:
+            found.push[declared.index("noises", effect.name)] += size
+    return found
+
+
+def standard_effects(declared: Declaration, runs: Sequence[OwnRun], tolerances: np.ndarray) -> list[Effect]:
+    """Every label of a declared vehicle, its spreads by how the runs move (an input that never moves has no lag)."""
+    found: list[Effect] = []
+    every = np.concatenate([run.inputs for run in runs]) if declared.inputs else np.zeros((1, 0))
+    for n, one in enumerate(declared.inputs):
+        found += _of_input(one, every[:, n], any(np.ptp(run.inputs[:, n]) > 0.0 for run in runs))
+    duration = max(float(run.t[-1] - run.t[0]) for run in runs)
+    for output, tolerance in zip(declared.outputs, tolerances, strict=True):
+        def row(kind: str, unit: str, spread: float, low: float = -np.inf, output=output) -> Effect:
+            return Effect(f"{output.name}_{kind}", OUTPUT, output.name, kind, unit, spread, low,
+                          LONGEST if low == 0.0 else np.inf)  # fmt: skip
+
+        found += [
+            row("bias", output.unit, float(tolerance)), row("gain", "1", GAIN_SPREAD),
+            row("drift", f"{output.unit}/s", float(tolerance) / duration), row("lag", "s", SECONDS_SPREAD, 0.0),
+            row("delay", "s", SECONDS_SPREAD, 0.0),
+        ]  # fmt: skip
+    for parameter in declared.parameters:
+        spread = parameter.uncertainty or UNKNOWN_SHARE * abs(parameter.value) or 1.0
+        low, high = ((limit - parameter.value) / spread for limit in (parameter.low, parameter.high))
+        found.append(
+            Effect(parameter.name, PARAMETER, parameter.name, "value", parameter.unit, spread, min(low, 0.0), high)
+        )
+    return found
+
+
+def pushes(declared: Declaration) -> list[Effect]:
+    """A constant beside every noise: an effect that no label has."""
+    return [
+        Effect(f"{one.name}_push", PUSH, one.name, "push", one.unit, max(one.density, 1e-6)) for one in declared.noises
+    ]
+
+
+def _of_input(one: Input, values: np.ndarray, moves: bool) -> list[Effect]:
+    reach = float(np.abs(values).max()) or 1.0
+    travel = float(np.ptp(values)) or reach
+    rows = [Effect(f"{one.name}_gain", INPUT, one.name, "gain", "1", GAIN_SPREAD),
+            Effect(f"{one.name}_offset", INPUT, one.name, "offset", one.unit, RANGE_SPREAD * travel)]  # fmt: skip
+    if moves:
+        seconds = [("lag", "s", SECONDS_SPREAD), ("delay", "s", SECONDS_SPREAD)]
+        ranges = [("backlash", one.unit, RANGE_SPREAD * travel), ("limit", one.unit, RANGE_SPREAD * travel)]
+        rows += [
+            Effect(f"{one.name}_{kind}", INPUT, one.name, kind, unit, spread, 0.0, LONGEST)
+            for kind, unit, spread in (*seconds, *ranges)
+        ]
+        # of how long a full stroke takes: 0 is at once
+        rows.append(Effect(f"{one.name}_rate_limit", INPUT, one.name, "stroke", "s", 1.0, 0.0, LONGEST))
+    return rows
+
+
+def driven_inputs(run: OwnRun, declared: Declaration, point: ModelPoint) -> np.ndarray:
+    """What the model is driven by, (rows, inputs): the recorded inputs with what is wrong of them."""
+    if not point.driven:
+        return run.inputs
+    found = run.inputs.copy()
+    for n, wrong in point.driven.items():
+        found[:, n] = _driven(run.t, found[:, n], wrong)
+    return found
+
+
+def _driven(t: np.ndarray, u: np.ndarray, wrong: dict[str, float]) -> np.ndarray:
+    """One input (rows,): delayed, limited in rate, range and play, lagged; then gain and offset."""
+    travel = float(np.ptp(u)) or float(np.abs(u).max()) or 1.0
+    if wrong.get("delay", 0.0) > 0.0:
+        # held inputs: what was in force then; between rows shares of both, so that it is smooth in the delay
+        u = np.interp(t - wrong["delay"], t, u)
+    if wrong.get("stroke", 0.0) > 0.0:
+        u = _rate_limited(t, u, travel / wrong["stroke"])
+    if wrong.get("limit", 0.0) > 0.0:
+        cut = wrong["limit"]
+        middle = 0.5 * (u.max() + u.min())
+        half = max(0.5 * travel - cut, 0.0)
+        u = np.clip(u, middle - half, middle + half)
+    if wrong.get("backlash", 0.0) > 0.0:
+        u = _played(u, 0.5 * wrong["backlash"])
+    if wrong.get("lag", 0.0) > 0.0:
+        u = _lagged(t, u, wrong["lag"])
+    return u * (1.0 + wrong.get("gain", 0.0)) + wrong.get("offset", 0.0)
+
+
+def _rate_limited(t: np.ndarray, u: np.ndarray, rate: float) -> np.ndarray:
+    out = u.copy()
+    for k in range(1, len(u)):
+        room = rate * (t[k] - t[k - 1])
+        out[k] = out[k - 1] + min(max(u[k] - out[k - 1], -room), room)
+    return out
+
+
+def _played(u: np.ndarray, half: float) -> np.ndarray:
+    out = u.copy()
+    for k in range(1, len(u)):
+        out[k] = min(max(out[k - 1], u[k] - half), u[k] + half)
+    return out
+
+
+def _lagged(t: np.ndarray, u: np.ndarray, lag: float) -> np.ndarray:
+    out = u.copy()
+    for k in range(1, len(u)):
+        out[k] = out[k - 1] + (1.0 - np.exp(-(t[k] - t[k - 1]) / lag)) * (u[k - 1] - out[k - 1])
+    return out

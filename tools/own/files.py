@@ -1,0 +1,162 @@
+"""The vehicle file of a user's model: what is known of its numbers, read strictly (docs: a vehicle of one's own)."""
+
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import msgspec
+import numpy as np
+
+from glider.hal.strict import ConfigError, Table, decode, locate
+from glider.tools.own.declare import Declaration, Parameter
+
+NonNegative = Annotated[float, msgspec.Meta(ge=0.0)]
+Positive = Annotated[float, msgspec.Meta(gt=0.0)]
+
+
+class ParameterTable(Table):
+    """[parameters.NAME]"""
+
+    value: float | None = None
+    uncertainty: NonNegative | None = None
+    low: float | None = None
+    high: float | None = None
+    scope: Literal["vehicle", "run"] | None = None
+    assumed: bool | None = None
+    scatter: NonNegative | None = None
+    source: str = ""
+
+
+class SensorTable(Table):
+    """[sensors.OUTPUT]"""
+
+    noise: Positive | None = None
+    bias: NonNegative | None = None
+    offset: float | None = None  # what it reads too much, identified
+    tolerance: Positive | None = None
+    column: str | None = None
+
+
+class InputTable(Table):
+    """[inputs.NAME]"""
+
+    column: str | None = None
+    interpolated: bool | None = None
+
+
+class NoiseTable(Table):
+    """[noise.NAME]"""
+
+    density: NonNegative
+
+
+class StartTable(Table):
+    """[start] NAME"""
+
+    uncertainty: Positive
+    value: float = 0.0
+
+
+class WindowsTable(Table):
+    """[windows]"""
+
+    seconds: Positive
+
+
+class IdentifiedTable(Table):
+    """[identified], written by `glider identify`."""
+
+    runs: Annotated[int, msgspec.Meta(ge=1)]
+    parameters: list[str]
+    covariance: list[list[float]]  # of `parameters`, in their units
+    sessions: Annotated[int, msgspec.Meta(ge=1)] = 1
+    inflation: Annotated[float, msgspec.Meta(ge=1.0)] = 1.0
+    scatter: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # of every label from run to run, in its unit
+    level_scatter: NonNegative = 0.5  # 1 sigma from run to run of the logarithm of the mean square left
+    gap: dict[str, float] = msgspec.field(default_factory=dict)  # of healthy runs left out, by channel, tolerances
+    data: str = ""
+    software: str = ""
+
+
+class OwnVehicle(Table):
+    """A vehicle file with `model`."""
+
+    format: Annotated[int, msgspec.Meta(ge=1, le=1)]
+    model: Annotated[str, msgspec.Meta(min_length=1, max_length=1000)]
+    name: str = ""
+    parameters: dict[str, ParameterTable] = msgspec.field(default_factory=dict)
+    sensors: dict[str, SensorTable] = msgspec.field(default_factory=dict)
+    inputs: dict[str, InputTable] = msgspec.field(default_factory=dict)
+    noise: dict[str, NoiseTable] = msgspec.field(default_factory=dict)
+    start: dict[str, StartTable] = msgspec.field(default_factory=dict)
+    windows: WindowsTable | None = None
+    identified: IdentifiedTable | None = None
+
+
+def is_own(text: str) -> bool:
+    """Whether a vehicle file names a model of the user's."""
+    try:
+        return "model" in tomllib.loads(text)
+    except (ValueError, RecursionError):
+        return False
+
+
+def decode_own(text: str, source: str) -> OwnVehicle:
+    """A vehicle file; ConfigError with line and key."""
+    return decode(text, OwnVehicle, source)
+
+
+def declared_with(declared: Declaration, given: OwnVehicle, text: str, source: Path) -> Declaration:
+    """A model's declaration with the file's numbers in place of its own; ConfigError for a name it does not have."""
+    lists: dict[str, Any] = {}
+    for table, what in (("parameters", "parameters"), ("sensors", "outputs"), ("inputs", "inputs"), ("noise", "noises")):
+        entries = {one.name: one for one in getattr(declared, what)}
+        for name, row in getattr(given, table).items():
+            if name not in entries:
+                known = ", ".join(entries) or "none"
+                line = locate(text, [table, name])
+                raise ConfigError(str(source), f"the model declares no such name (it has {known})", key=f"{table}.{name}",
+                                  line=line)  # fmt: skip
+            values = {
+                key: value for key, value in msgspec.structs.asdict(row).items() if value is not None and key != "source"
+            }
+            entries[name] = replace(entries[name], **values)
+        lists[what] = tuple(entries.values())
+    for one in lists["parameters"]:
+        _check(one, text, source)
+    states = {one.name: one for one in declared.states}
+    outputs = {one.name for one in lists["outputs"]}
+    start: dict[str, tuple[float, float]] = {}
+    for name, row in given.start.items():
+        if name in outputs:
+            start[name] = (row.value, row.uncertainty)
+        elif name in states:
+            states[name] = replace(states[name], start=row.value, start_uncertainty=row.uncertainty)
+        else:
+            raise ConfigError(str(source), "no output or state of the model", key=f"start.{name}",
+                              line=locate(text, ["start", name]))  # fmt: skip
+    horizon = declared.horizon if given.windows is None else given.windows.seconds
+    found = replace(declared, **lists, states=tuple(states.values()), horizon=horizon, start=start)
+    if given.identified is not None:
+        _check_identified(given.identified, found, str(source))
+    return found
+
+
+def _check(one: Parameter, text: str, source: Path) -> None:
+    if not one.low <= one.value <= one.high:
+        raise ConfigError(
+            str(source), f"{one.value:g} is outside {one.low:g} to {one.high:g}", key=f"parameters.{one.name}.value",
+            line=locate(text, ["parameters", one.name, "value"]),
+        )  # fmt: skip
+
+
+def _check_identified(table: IdentifiedTable, declared: Declaration, source: str) -> None:
+    names = {one.name for one in declared.parameters}
+    for name in table.parameters:
+        if name not in names:
+            raise ConfigError(source, f"the model declares no parameter {name}", key="identified.parameters")
+    matrix = np.array(table.covariance) if table.covariance else np.zeros((0, 0))
+    count = len(table.parameters)
+    if matrix.shape != (count, count) and count:
+        raise ConfigError(source, f"expected {count} rows of {count}", key="identified.covariance")

@@ -1,0 +1,193 @@
+"""One model of all runs: shared values, deviations of sessions and runs, sizes of effects; evidence in closed form.
+
+With e_n + J_n (x - at_n) the errors of windows of run n flown open loop, in units of what healthy runs leave of their
+channel, A_n = J_n J_n' / eta, g_n = J_n e_n / eta:
+
+    x_n = s + d_n + c,  s ~ N(0, V),  d_n ~ N(0, diag(scatter^2)),  c_l ~ N(0, tau_l^2)
+
+d_n is integrated out of every run, s and c of their sum. eta, the variance inflation, is what errors within
+a window have in common. All values are counted in the effects' spreads.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from glider.tools.own.effects import Effect, moved
+from glider.tools.own.observer import Filtered, Observer
+
+STEP, LONG_STEP, SHORTENED = 0.1, 3.0, 0.5  # spreads; rms errors that a step may move, and to what it is shortened
+UNSEEN_STEP = 1.0  # spreads: step of an effect that begins at a kink
+BLOCK_SECONDS = 10.0  # over which errors may have something in common
+SCATTER_PRIOR_RUNS, LEAST_VARIANCE = 1.0, 1e-12
+ITERATIONS, CONVERGED = 200, 1e-3
+
+
+@dataclass
+class Expansion:
+    """-2 log likelihood of a run at x: value + 2 slope (x - at) + (x - at) curvature (x - at)."""
+
+    at: np.ndarray  # (k,)
+    value: float
+    slope: np.ndarray  # (k,)
+    curvature: np.ndarray  # (k, k)
+    squares: np.ndarray  # (y,) by channel
+    samples: np.ndarray  # (y,)
+    blocks: np.ndarray  # (k,) sum over blocks of (J e)^2: against the curvature's diagonal, the inflation
+    reach: np.ndarray  # (k,) mean square that a spread moves the channels, tolerances
+
+    def tempered(self, eta: float) -> "Expansion":
+        return replace(self, value=self.value / eta, slope=self.slope / eta, curvature=self.curvature / eta)
+
+    @property
+    def offset(self) -> np.ndarray:
+        """Slope of the same parabola at x = 0."""
+        return self.slope - self.curvature @ self.at
+
+    @property
+    def constant(self) -> float:
+        """Value of the same parabola at x = 0."""
+        return float(self.value - 2.0 * self.slope @ self.at + self.at @ self.curvature @ self.at)
+
+
+def expand(
+    observer: Observer, n: int, effects: Sequence[Effect], at: np.ndarray, scales: np.ndarray, horizon: float,
+    by: Filtered | None = None,
+) -> Expansion:  # fmt: skip
+    """Run n about the model at `at` (effects,) spreads: windows' errors in units of what healthy runs leave, scales (y,).
+
+    by: a filter whose gains find where windows begin; of that model, if none is given.
+    """
+    base, declared = observer.point, observer.declared
+    by = observer.filter(n, moved(declared, base, effects, at)) if by is None else by
+    steps = np.array([UNSEEN_STEP if one.one_sided and abs(x) < STEP else STEP for one, x in zip(effects, at, strict=True)])
+    steps = np.where(at + steps > [one.high for one in effects], -steps, steps)
+
+    def errors(places: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+        points = []
+        for k, size in zip(places, sizes, strict=True):
+            there = at.copy()
+            if k >= 0:
+                there[k] += size
+            points.append(moved(declared, base, effects, there))
+        return observer.residuals(n, points, by, horizon) / scales
+
+    every = np.arange(len(effects))
+    E = errors(np.append(-1, every), np.append(0.0, steps))
+    shape = E[0].shape
+    E = E.reshape(len(E), -1)
+    e, J = E[0], (E[1:] - E[0]) / steps[:, None]
+    size = np.sqrt((J**2).mean(axis=1)) * np.abs(steps)
+    far = np.flatnonzero((size > LONG_STEP) & ~np.array([one.one_sided and abs(x) < STEP for one, x in zip(effects, at, strict=True)]))
+    if len(far):
+        shorter = steps[far] * SHORTENED / size[far]
+        J[far] = (errors(far, shorter).reshape(len(far), -1) - e) / shorter[:, None]
+    J[~np.isfinite(J).all(axis=1)] = 0.0
+    cuts = max(1, round(shape[0] / max(observer.scored_rows(n, horizon), 1)))  # the same rows, more than once
+    seen = np.isfinite(observer.runs[n].outputs).any(axis=0)
+    reach = ((J.reshape(-1, *shape) * scales) ** 2).mean(axis=1)[:, seen].mean(axis=1)
+    return Expansion(
+        at.copy(), float(e @ e) / cuts, J @ e / cuts, J @ J.T / cuts, (e.reshape(shape) ** 2).sum(axis=0),
+        np.where(seen, shape[0], 0), _blocks(observer, n, J, e, shape) / cuts, reach,
+    )  # fmt: skip
+
+
+def _blocks(observer: Observer, n: int, J: np.ndarray, e: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """Sum over blocks of the squared score, by column."""
+    dt = max(float(np.median(np.diff(observer.runs[n].t))), 1e-6)
+    block = max(1, round(BLOCK_SECONDS / dt)) * shape[1]
+    count = -(-len(e) // block)
+    padded = np.zeros((len(J), count * block))
+    padded[:, : len(e)] = J * e
+    return (padded.reshape(len(J), count, block).sum(axis=2) ** 2).sum(axis=1)
+
+
+def inflation(found: Sequence[Expansion]) -> float:
+    """Variance inflation of runs: what blocks of the score vary by, over what independent errors would have."""
+    blocks = sum(one.blocks for one in found)
+    diagonal = sum(np.diag(one.curvature) for one in found)
+    seen = diagonal > 1e-9 * max(float(diagonal.max(initial=0.0)), 1e-300)
+    return float(max(1.0, np.median(blocks[seen] / diagonal[seen]))) if seen.any() else 1.0
+
+
+def marginalised(one: Expansion, scatter: np.ndarray) -> Expansion:
+    """A run with its deviation, of 1 sigma `scatter` (k,), integrated out."""
+    root = scatter[:, None] * one.curvature
+    inner = np.eye(len(scatter)) + root * scatter[None, :]
+    solved = np.linalg.solve(inner, np.column_stack([root, scatter * one.slope]))
+    A, g = one.curvature - root.T @ solved[:, :-1], one.slope - root.T @ solved[:, -1]
+    value = one.value - float((scatter * one.slope) @ solved[:, -1]) + float(np.linalg.slogdet(inner)[1])
+    return replace(one, value=value, slope=g, curvature=0.5 * (A + A.T))
+
+
+@dataclass
+class Pooled:
+    """The sum of marginalised runs, and what it says of values with a prior N(0, V)."""
+
+    H: np.ndarray  # (k, k)
+    r: np.ndarray  # (k,) minus half the slope of -2 log likelihood at 0
+    constant: float
+    V: np.ndarray
+
+    @classmethod
+    def of(cls, found: Sequence[Expansion], V: np.ndarray) -> "Pooled":
+        return cls(sum(one.curvature for one in found), -sum(one.offset for one in found),
+                   sum(one.constant for one in found), V)  # fmt: skip
+
+    def covariance(self, V: np.ndarray | None = None) -> np.ndarray:
+        """Posterior covariance (k, k)."""
+        V = self.V if V is None else V
+        M = np.linalg.solve(np.eye(len(V)) + V @ self.H, V)
+        return 0.5 * (M + M.T)
+
+    def mean(self, V: np.ndarray | None = None) -> np.ndarray:
+        return self.covariance(V) @ self.r
+
+    def log_evidence(self, V: np.ndarray | None = None) -> float:
+        """Log marginal likelihood, values integrated out."""
+        V = self.V if V is None else V
+        logdet = float(np.linalg.slogdet(np.eye(len(V)) + V @ self.H)[1])
+        return -0.5 * (self.constant - float(self.r @ self.covariance(V) @ self.r) + logdet)
+
+
+def learn_scatter(found: Sequence[Expansion], V: np.ndarray, usual: np.ndarray) -> np.ndarray:
+    """1 sigma (k,) of how runs differ, most probable with an inverse gamma prior about `usual` (k,) squared.
+
+    Minorisation and maximisation of the marginal likelihood, from a small and a large start; the better is kept.
+    """
+
+    def cost(sizes: np.ndarray) -> float:
+        pooled = Pooled.of([marginalised(one, sizes) for one in found], V)
+        variance, middle = sizes**2, np.maximum(usual**2, LEAST_VARIANCE)
+        prior = 0.5 * SCATTER_PRIOR_RUNS * float((np.log(variance) + middle / variance).sum())
+        return prior - pooled.log_evidence()
+
+    tried = [_mm(found, V, usual, np.maximum(usual, least)) for least in (0.0, 0.3)]
+    return min(tried, key=cost)
+
+
+def _mm(found: Sequence[Expansion], V: np.ndarray, usual: np.ndarray, start: np.ndarray) -> np.ndarray:
+    middle, v = np.maximum(usual**2, LEAST_VARIANCE), np.maximum(start**2, LEAST_VARIANCE)
+    weight = 0.5 * SCATTER_PRIOR_RUNS
+    for _ in range(ITERATIONS):
+        runs = [marginalised(one, np.sqrt(v)) for one in found]
+        pooled = Pooled.of(runs, V)
+        M = pooled.covariance()
+        x = M @ pooled.r
+        squares, traces = np.zeros(len(v)), np.zeros(len(v))
+        for one in runs:
+            A = one.curvature
+            squares += (one.slope + A @ (x - one.at)) ** 2
+            traces += np.maximum(np.diag(A) - np.einsum("ij,jk,ki->i", A, M, A), 0.0)
+        before, v = v, np.sqrt((0.5 * v**2 * squares + weight * middle) / (0.5 * traces + weight / v))
+        if np.abs(np.log(v / before)).max(initial=0.0) < CONVERGED:
+            break
+    return np.sqrt(v)
+
+
+def run_values(one: Expansion, shared: np.ndarray, scatter: np.ndarray) -> np.ndarray:
+    """Most probable values (k,) of a run whose expansion this is, given the shared ones."""
+    own = np.diag(scatter**2)
+    slope = one.slope + one.curvature @ (shared - one.at)
+    return shared - np.linalg.solve(np.eye(len(own)) + own @ one.curvature, own @ slope)

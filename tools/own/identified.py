@@ -1,0 +1,141 @@
+"""What identification found as files: identified.toml (the vehicle file, with its new numbers) and identified.json."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomllib
+
+from glider.tools.data.files import write_files
+from glider.tools.data.plain import as_plain
+from glider.tools.data.version import software
+from glider.tools.own.identify import Identified
+
+VEHICLE, ANSWER = "identified.toml", "identified.json"
+NINETY = 1.645
+
+
+def _text(value: Any) -> str:
+    """A TOML value."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(_text(one) for one in value) + "]"
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {_text(one)}" for key, one in value.items()) + " }"
+    return repr(float(f"{value:.10g}")) if isinstance(value, float) else str(value)
+
+
+def toml_text(tables: dict[str, Any]) -> str:
+    """Tables two levels deep as TOML: what stands loose first, then [table] and [table.name]."""
+    lines = [f"{key} = {_text(value)}" for key, value in tables.items() if not isinstance(value, dict)]
+    for name, table in tables.items():
+        if not isinstance(table, dict) or not table:
+            continue
+        loose = {key: value for key, value in table.items() if not isinstance(value, dict) or name in ("start", "identified")}
+        if loose:
+            lines += ["", f"[{name}]", *(f"{key} = {_text(value)}" for key, value in loose.items())]
+        for key, value in table.items():
+            if key not in loose:
+                lines += ["", f"[{name}.{key}]", *(f"{inner} = {_text(one)}" for inner, one in value.items())]
+    return "\n".join(lines) + "\n"
+
+
+def tables(found: Identified) -> dict[str, Any]:
+    """The vehicle file's tables with the identified numbers in them."""
+    vehicle, observer = found.vehicle, found.observer
+    declared = vehicle.declared
+    given = tomllib.loads(vehicle.text)
+    sd = np.sqrt(np.diag(found.covariance))
+    scatter = dict(zip((one.label for one in found.effects), found.scatter, strict=True))
+    spreads = {one.label: one.spread for one in found.effects}
+    parameters = given.setdefault("parameters", {})
+    sensors = given.setdefault("sensors", {})
+    names, places = [], []
+    for k, one in enumerate(found.nuisance):
+        move, error = float(found.values[k] * one.spread), float(sd[k] * one.spread)
+        if one.family == "parameter":
+            before = declared.parameters[declared.index("parameters", one.name)]
+            table = parameters.setdefault(one.name, {})
+            value = min(max(before.value + move, before.low), before.high)
+            spread = float(scatter[one.label] * spreads[one.label])
+            own = max(error, spread) if before.scope == "run" else error
+            table |= {"value": value, "uncertainty": own, "scatter": spread}
+            table.pop("assumed", None)
+            names.append(one.name)
+            places.append(k)
+        else:
+            output = declared.outputs[declared.index("outputs", one.name)]
+            sensors.setdefault(one.name, {})["offset"] = output.offset + move
+    for n, output in enumerate(declared.outputs):
+        table = sensors.setdefault(output.name, {})
+        table["noise"] = float(np.sqrt(observer.point.variance[n]))
+        table["tolerance"] = float(observer.tolerances[n])
+    given["noise"] = {one.name: {"density": float(observer.point.density[n])} for n, one in enumerate(declared.noises)}
+    given["windows"] = {"seconds": observer.horizon}
+    units = np.array([found.nuisance[k].spread for k in places])
+    covariance = found.covariance[np.ix_(places, places)] * np.outer(units, units)
+    given["identified"] = {
+        "runs": len(observer.runs), "sessions": found.sessions, "parameters": names,
+        "covariance": [[float(value) for value in row] for row in covariance], "inflation": found.eta,
+        "level_scatter": found.level_scatter,
+        "scatter": {name: float(value * spreads[name]) for name, value in scatter.items()},
+        "gap": {one.name: float(value) for one, value in zip(declared.outputs, found.scales, strict=True)},
+        "software": software(),
+    }  # fmt: skip
+    return given
+
+
+def plain(found: Identified) -> dict[str, Any]:
+    """identified.json: numbers with intervals, gaps of runs left out before and after, groups that data do not part."""
+    sd = np.sqrt(np.diag(found.covariance))
+    rows = []
+    for k, one in enumerate(found.nuisance):
+        start = 0.0
+        if one.family == "parameter":
+            start = found.vehicle.declared.parameters[found.vehicle.declared.index("parameters", one.name)].value
+        mean, error = start + float(found.values[k] * one.spread), float(sd[k] * one.spread)
+        rows.append({"name": one.label, "mean": mean, "sd": error, "ci90": [mean - NINETY * error, mean + NINETY * error],
+                     "unit": one.unit, "file": start, "runs": [start + float(row[k] * one.spread) for row in found.run_values]})  # fmt: skip
+    names = [one.name for one in found.vehicle.declared.outputs]
+
+    def gap(table: np.ndarray) -> dict[str, float | None]:
+        by = [float(np.sqrt(np.nanmean(column**2))) if np.isfinite(column).any() else None for column in table.T]
+        return {**dict(zip(names, by, strict=True)), "total": float(np.sqrt(np.nanmean(table**2)))}
+
+    return {
+        "format": 1, "vehicle": found.vehicle.name, "parameters": rows, "groups": groups(found),
+        "gap": {"before": gap(found.before), "after": gap(found.after)}, "horizon_s": found.observer.horizon,
+        "handed_out": "identified" if found.better else "file",
+        "runs": [run.name for run in found.observer.runs], "notes": [*found.observer.notes, *found.notes],
+    }  # fmt: skip
+
+
+def groups(found: Identified, correlation: float = 0.98) -> list[list[str]]:
+    """Parameters that the data do not part: posterior correlations beyond 0.98."""
+    sd = np.sqrt(np.diag(found.covariance))
+    R = found.covariance / np.outer(sd, sd)
+    left, listed = list(range(len(sd))), []
+    while left:
+        k = left.pop(0)
+        own = [j for j in left if abs(R[k, j]) > correlation]
+        if own:
+            listed.append([found.nuisance[j].label for j in (k, *own)])
+            left = [j for j in left if j not in own]
+    return listed
+
+
+def write(found: Identified, out: Path) -> None:
+    """identified.toml and identified.json into a folder; the model's own file beside them."""
+    out.mkdir(parents=True, exist_ok=True)
+    files = {
+        out / VEHICLE: (toml_text(tables(found)) if found.better else found.vehicle.text).encode("utf-8"),
+        out / ANSWER: (json.dumps(as_plain(plain(found)), indent=1) + "\n").encode("utf-8"),
+    }
+    source = found.vehicle.source
+    if source is not None and source.parent == found.vehicle.path.resolve().parent and source.parent != out.resolve():
+        files[out / source.name] = source.read_bytes()
+    write_files(files)

@@ -1,0 +1,234 @@
+"""A user's vehicle identified from healthy runs: shared values, what is each run's own, how runs differ, noise levels."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from glider.tools.own.effects import Effect, moved, standard_effects
+from glider.tools.own.hierarchy import Expansion, Pooled, expand, inflation, learn_scatter, marginalised, run_values
+from glider.tools.own.load import LoadedVehicle
+from glider.tools.own.observer import Observer
+from glider.tools.own.runs import OwnRun
+
+ROUNDS = 12
+FILE_PRIOR = 2.0  # times the file's uncertainties: what the shared values may be
+USUAL_SCATTER = 0.02  # spreads, from run to run
+LONGEST_MOVE = 2.0  # spreads a round
+CONVERGED_GAIN = 0.5  # of -2 log posterior: no further round
+LEAST_SCALE = 0.02  # tolerances: less than that no channel is known to be left with
+LEVEL_ROWS, PLAIN_ROWS = 3_000, 600  # of runs from which noise levels are found: compiled, plain Python
+LEVEL_STEPS = (0.8, 0.4)  # e-folds
+LOUDEST = 4.0  # e-folds from the file's noise, at most
+
+
+@dataclass
+class Identified:
+    """What runs say of a vehicle."""
+
+    vehicle: LoadedVehicle
+    observer: Observer
+    nuisance: list[Effect]
+    values: np.ndarray  # (nuisance,) spreads
+    covariance: np.ndarray
+    effects: list[Effect]
+    scatter: np.ndarray  # (effects,) spreads, from run to run
+    eta: float
+    scales: np.ndarray  # (outputs,) what healthy runs leave, tolerances
+    run_values: np.ndarray  # (runs, nuisance)
+    before: np.ndarray  # (runs, outputs) gaps of the file's model, tolerances
+    after: np.ndarray  # the same of a model of the other runs
+    level_scatter: float
+    sessions: int
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def better(self) -> bool:
+        """Whether runs left out are predicted no worse than by the file."""
+        return _total(self.after) <= _total(self.before)
+
+
+def nuisance_of(observer: Observer) -> list[Effect]:
+    """What the vehicle file allows for: parameters with an uncertainty, outputs with a bias."""
+    declared = observer.declared
+    every = {one.label: one for one in standard_effects(declared, observer.runs, observer.tolerances)}
+    found = [every[one.name] for one in declared.parameters if one.uncertainty > 0.0]
+    for one in declared.outputs:
+        if one.bias > 0.0:
+            found.append(replace(every[f"{one.name}_bias"], spread=one.bias))
+    return found
+
+
+def identify(
+    vehicle: LoadedVehicle, sessions: Sequence[Sequence[OwnRun]], say: Callable[[str], None] = lambda text: None
+) -> Identified:
+    """A vehicle from healthy runs of one or more sessions; InputError where its model cannot fly them."""
+    runs = [run for session in sessions for run in session]
+    observer = Observer(vehicle, list(runs))
+    nuisance, horizon = nuisance_of(observer), observer.horizon
+    k, count = len(nuisance), len(runs)
+    V = FILE_PRIOR**2 * np.eye(k)
+    limits = np.array([one.low for one in nuisance]), np.array([one.high for one in nuisance])
+    values, scatter, own = np.zeros(k), np.full(k, USUAL_SCATTER), np.zeros((count, k))
+    file_point = observer.point.copy()
+    before = np.array([observer.gaps(n, file_point, horizon) for n in range(count)])
+    say(f"{count} runs, {k} numbers; the file's model misses them by {_total(before):.2f} tolerances")
+    fit_levels(observer, say)
+    scales = np.maximum(np.sqrt(np.nanmean(before**2, axis=0)), LEAST_SCALE)
+    scales[~np.isfinite(scales)] = 1.0
+    for round_ in range(ROUNDS):
+        found = [expand(observer, n, nuisance, own[n], scales, horizon) for n in range(count)]
+        rescaled = np.maximum(scales * np.sqrt(sum(one.squares for one in found) / np.maximum(sum(one.samples for one in found), 1)), LEAST_SCALE)
+        if round_ and np.abs(np.log(rescaled / scales)).max() > 0.05:
+            scales = np.exp(0.5 * (np.log(rescaled) + np.log(scales))) if round_ < 3 else rescaled
+            found = [expand(observer, n, nuisance, own[n], scales, horizon) for n in range(count)]
+        eta = inflation(found)
+        warm = [one.tempered(eta) for one in found]
+        if round_ >= 2 and count > 2:
+            scatter = learn_scatter(warm, V, np.full(k, USUAL_SCATTER))
+        search = _Search(observer, nuisance, warm, scatter, eta, V, limits, scales, horizon)
+        step = Pooled.of([marginalised(one, scatter) for one in warm], V).mean() - values
+        values, own, gain = search.along(values, own, np.clip(step, -LONGEST_MOVE, LONGEST_MOVE))
+        left = float(np.sqrt(np.mean(scales**2)))
+        say(f"round {round_ + 1}: gain {gain:.1f}, {left:.2f} tolerances left, inflation {eta:.0f}")
+        if round_ >= 3 and gain < CONVERGED_GAIN:
+            break
+    found = [expand(observer, n, nuisance, own[n], scales, horizon) for n in range(count)]
+    eta = inflation(found)
+    warm = [marginalised(one.tempered(eta), scatter) for one in found]
+    covariance = Pooled.of(warm, V).covariance()
+    after = _held_out(observer, nuisance, warm, V, limits)
+    effects, every = _scatter_of_all(observer, nuisance, values, own, eta, scales)
+    return Identified(vehicle, observer, nuisance, values, covariance, effects, every, eta, scales, own, before, after,
+                      level_scatter(found), len(sessions))  # fmt: skip
+
+
+@dataclass
+class _Search:
+    """The exact posterior along a step of the shared values."""
+
+    observer: Observer
+    nuisance: list[Effect]
+    warm: list[Expansion]
+    scatter: np.ndarray
+    eta: float
+    V: np.ndarray
+    limits: tuple[np.ndarray, np.ndarray]
+    scales: np.ndarray
+    horizon: float
+
+    def prior(self, x: np.ndarray, own: np.ndarray) -> float:
+        apart = ((own - x) / np.maximum(self.scatter, 1e-6)) ** 2
+        return float(apart.sum() + x @ np.linalg.solve(self.V, x))
+
+    def misfit(self, n: int, row: np.ndarray) -> float:
+        point = moved(self.observer.declared, self.observer.point, self.nuisance, row)
+        error = self.observer.residuals(n, [point], self.observer.filter(n, point), self.horizon)[0] / self.scales
+        return float((error**2).sum()) / self.eta
+
+    def along(self, values: np.ndarray, own: np.ndarray, step: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+        """Values, runs' own values and the gain of a step, shortened until the exact posterior gains."""
+
+        def at(share: float) -> tuple[float, np.ndarray, np.ndarray]:
+            x = np.clip(values + share * step, *self.limits)
+            target = np.array([run_values(one, x, self.scatter) for one in self.warm])
+            theirs = np.clip(own + np.clip(target - own, -LONGEST_MOVE, LONGEST_MOVE), *self.limits)
+            return sum(self.misfit(n, row) for n, row in enumerate(theirs)) + self.prior(x, theirs), x, theirs
+
+        stay = at(0.0)
+        for share in (1.0, 0.4, 0.1):
+            tried = at(share)
+            if tried[0] < stay[0]:
+                return tried[1], tried[2], stay[0] - tried[0]
+        return stay[1], stay[2], 0.0
+
+
+def fit_levels(observer: Observer, say: Callable[[str], None]) -> None:
+    """Noise of sensors and of the model by the filter's likelihood: coordinate steps, shortened.
+
+    They say how far the filter that finds where windows begin trusts the model; no evidence hangs on them.
+    """
+    declared, budget = observer.declared, LEVEL_ROWS if observer.vehicle.kernels.compiled else PLAIN_ROWS
+    used, rows = [], 0
+    for n in sorted(range(len(observer.runs)), key=lambda n: len(observer.runs[n].t)):
+        if used and rows + len(observer.runs[n].t) > budget:
+            break
+        used.append(n)
+        rows += len(observer.runs[n].t)
+    free = [("density", n) for n in range(len(declared.noises)) if declared.noises[n].density > 0.0]
+    free += [("variance", n) for n in range(len(declared.outputs))]
+    level = dict.fromkeys(free, 0.0)
+
+    def cost() -> float:
+        total = 0.0
+        for n in used:
+            point = observer.point.copy()
+            for (what, k), shift in level.items():
+                getattr(point, what)[k] *= np.exp(shift if what == "density" else 2.0 * shift)
+            total += observer.filter(n, point).value
+        return total + sum(shift**2 for shift in level.values()) / LOUDEST**2 * 4.0
+
+    best = cost()
+    for size in LEVEL_STEPS:
+        for one in free:
+            for sign in (1.0, -1.0):
+                moved_any = False
+                while abs(level[one] + sign * size) <= LOUDEST:
+                    level[one] += sign * size
+                    tried = cost()
+                    if tried < best - 0.5:
+                        best, moved_any = tried, True
+                    else:
+                        level[one] -= sign * size
+                        break
+                if moved_any:
+                    break
+    for (what, k), shift in level.items():
+        getattr(observer.point, what)[k] *= np.exp(shift if what == "density" else 2.0 * shift)
+    said = [f"{declared.noises[k].name if what == 'density' else declared.outputs[k].name} x{np.exp(shift):.2g}"
+            for (what, k), shift in level.items() if abs(shift) > 0.3]  # fmt: skip
+    say(f"noise levels: {', '.join(said) or 'as the file has them'}")
+
+
+def _scatter_of_all(observer, nuisance, values, own, eta, scales) -> tuple[list[Effect], np.ndarray]:
+    """Every label's scatter from run to run about the identified vehicle: what healthy runs show of it is no cause."""
+    effects = standard_effects(observer.declared, observer.runs, observer.tolerances)
+    into = placed(nuisance, effects)
+    about = []
+    for n in range(len(own)):
+        one = expand(observer, n, effects, into @ own[n], scales, observer.horizon).tempered(eta)
+        about.append(replace(one, at=one.at - into @ values))
+    usual = np.full(len(effects), USUAL_SCATTER)
+    if len(own) < 3:
+        return effects, 5.0 * usual
+    return effects, learn_scatter(about, np.zeros((len(effects), len(effects))), usual)
+
+
+def level_scatter(found: Sequence[Expansion]) -> float:
+    """1 sigma from run to run of the logarithm of the mean square that is left."""
+    logs = np.log([one.squares.sum() / max(1, one.samples.sum()) for one in found])
+    return float(logs.std(ddof=1)) if len(logs) > 1 else 0.5
+
+
+def placed(nuisance: Sequence[Effect], effects: Sequence[Effect]) -> np.ndarray:
+    """(effects, nuisance): what values of the nuisance are in the spreads of all effects."""
+    labels = [one.label for one in effects]
+    found = np.zeros((len(effects), len(nuisance)))
+    for k, one in enumerate(nuisance):
+        place = labels.index(one.label)
+        found[place, k] = one.spread / effects[place].spread
+    return found
+
+
+def _held_out(observer, nuisance, warm, V, limits) -> np.ndarray:
+    """Gaps (runs, outputs) of every run by a model of the others, to first order."""
+    gaps = []
+    for n in range(len(warm)):
+        others = [one for k, one in enumerate(warm) if k != n] or warm
+        point = moved(observer.declared, observer.point, nuisance, np.clip(Pooled.of(others, V).mean(), *limits))
+        gaps.append(observer.gaps(n, point, observer.horizon))
+    return np.array(gaps)
+
+
+def _total(gaps: np.ndarray) -> float:
+    return float(np.sqrt(np.nanmean(gaps**2)))

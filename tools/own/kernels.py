@@ -1,0 +1,294 @@
+"""The observer of a declared model: an extended Kalman filter, followed by kept gains, and flown open loop.
+
+Everything that a model of the user's has to give is called through `advance` and `measure`, which stand here as names
+only: compiled.py executes this file beside the user's functions, compiled by Numba or as plain Python. Jacobians are
+forward differences on the manifold of the states.
+
+Shapes: rows of a run r, states n, errors m (a quaternion has three), inputs i, outputs y, noises w; ports: a process
+(two states each) that adds to a noise, [noise, omega rad/s, tau s, sigma].
+"""
+
+import numpy as np
+
+NUDGE = 1e-6  # of a state's scale: difference step
+CALM, LONGEST_MEMORY = 1e-12, 400  # s: shorter lags and delays are none; rows searched back for a delay
+
+
+def wrap(angle):
+    """An angle within -pi to pi."""
+    return angle - 2.0 * np.pi * np.round(angle / (2.0 * np.pi))
+
+
+def plus(x, d, kinds):
+    """State x (n,) moved by an error d (m,); kinds (n,): 0 vector, 1 angle, 2 first of a quaternion, 3 the others."""
+    out = x.copy()
+    k = 0
+    for j in range(len(x)):
+        if kinds[j] <= 1:
+            out[j] = x[j] + d[k]
+            k += 1
+        elif kinds[j] == 2:
+            a, b, c = 0.5 * d[k], 0.5 * d[k + 1], 0.5 * d[k + 2]
+            s = 1.0 / np.sqrt(1.0 + a * a + b * b + c * c)
+            q0, q1, q2, q3 = x[j], x[j + 1], x[j + 2], x[j + 3]
+            out[j] = s * (q0 - q1 * a - q2 * b - q3 * c)
+            out[j + 1] = s * (q1 + q0 * a + q2 * c - q3 * b)
+            out[j + 2] = s * (q2 + q0 * b + q3 * a - q1 * c)
+            out[j + 3] = s * (q3 + q0 * c + q1 * b - q2 * a)
+            k += 3
+    return out
+
+
+def minus(x, y, kinds, out):
+    """The error (m,) that leads from y to x, into out."""
+    k = 0
+    for j in range(len(x)):
+        if kinds[j] == 0:
+            out[k] = x[j] - y[j]
+            k += 1
+        elif kinds[j] == 1:
+            out[k] = wrap(x[j] - y[j])
+            k += 1
+        elif kinds[j] == 2:
+            p0, p1, p2, p3 = y[j], y[j + 1], y[j + 2], y[j + 3]
+            q0, q1, q2, q3 = x[j], x[j + 1], x[j + 2], x[j + 3]
+            w = p0 * q0 + p1 * q1 + p2 * q2 + p3 * q3
+            sign = 2.0 / w if abs(w) > 1e-9 else 2.0
+            out[k] = sign * (p0 * q1 - p1 * q0 - p2 * q3 + p3 * q2)
+            out[k + 1] = sign * (p0 * q2 - p2 * q0 - p3 * q1 + p1 * q3)
+            out[k + 2] = sign * (p0 * q3 - p3 * q0 - p1 * q2 + p2 * q1)
+            k += 3
+
+
+def normalised(x, kinds):
+    """Quaternions of length 1, in place."""
+    for j in range(len(x)):
+        if kinds[j] == 2:
+            s = np.sqrt(x[j] ** 2 + x[j + 1] ** 2 + x[j + 2] ** 2 + x[j + 3] ** 2)
+            if s > 0.0:
+                for i in range(4):
+                    x[j + i] = x[j + i] / s
+    return x
+
+
+def difference(y, h, angles, out):
+    """Outputs less predicted ones, angles wrapped, into out (y,)."""
+    for j in range(len(y)):
+        out[j] = wrap(y[j] - h[j]) if angles[j] else y[j] - h[j]
+
+
+def read(h, t, row, T, lagged, history, angles, S):
+    """What the sensors make of outputs h (y,): lag, delay, gain, bias, drift, S (5, y); lagged and history kept."""
+    out = np.empty(len(h))
+    dt = t - T[row - 1] if row > 0 else 0.0
+    for j in range(len(h)):
+        if S[3, j] > CALM and row > 0:
+            step = wrap(h[j] - lagged[j]) if angles[j] else h[j] - lagged[j]
+            lagged[j] = lagged[j] + (1.0 - np.exp(-dt / S[3, j])) * step
+        else:
+            lagged[j] = h[j]
+        history[row, j] = lagged[j]
+        value = lagged[j]
+        if S[4, j] > CALM:
+            when = t - S[4, j]
+            k = row
+            while k > 0 and T[k] > when and row - k < LONGEST_MEMORY:
+                k -= 1
+            if T[k] > when:
+                value = history[k, j]
+            elif k < row:
+                share = (when - T[k]) / (T[k + 1] - T[k])
+                step = history[k + 1, j] - history[k, j]
+                value = history[k, j] + share * (wrap(step) if angles[j] else step)
+        out[j] = S[0, j] * value + S[1, j] + S[2, j] * (t - T[0])
+    return out
+
+
+def push_of(push, ports, a, w):
+    """Noise inputs: the constant push and what the ports' processes have now, into w (w,)."""
+    for j in range(len(push)):
+        w[j] = push[j]
+    for k in range(ports.shape[0]):
+        w[int(ports[k, 0])] += a[2 * k]
+
+
+def filter_run(T, U, Y, x0, P0, theta, own, S, push, density, R, ports, kinds, scales, angles, parts, keep):
+    """The filter along one run: -2 log likelihood, mean squared innovation, and what following it asks for.
+
+    T (r,) s; U (r, i); Y (r, y) with NaN; x0 (n,), its covariance P0 (m, m); own (3, o): parameters that are a number
+    of each run, estimated along it: place in theta, 1 sigma, difference step; S (5, y) of `read`; push and density (w,);
+    R (y,) variances; parts: steps in which a row's step is taken. Into keep: gains (r, m + 2 ports + o, y) and
+    states and own parameters (r, n + o) after each row. Returns value, squares, samples.
+    """
+    n_y, n_w, n_p, n_o, n = Y.shape[1], len(push), ports.shape[0], own.shape[1], len(x0)
+    m = len(P0)
+    full = m + 2 * n_p + n_o
+    at_own = m + 2 * n_p
+    theta = theta.copy()
+    gains, states = keep
+    P = np.zeros((full, full))
+    P[:m, :m] = P0
+    a = np.zeros(2 * n_p)
+    for k in range(2 * n_p):
+        P[m + k, m + k] = ports[k // 2, 3] ** 2
+    for k in range(n_o):
+        P[at_own + k, at_own + k] = own[1, k] ** 2
+    x, w, d, nu = x0.copy(), np.zeros(n_w), np.zeros(m), np.zeros(n_y)
+    lagged, history = np.zeros(n_y), np.zeros((len(T), n_y))
+    F, H = np.zeros((full, full)), np.zeros((n_y, full))
+    value, squares, samples = 0.0, 0.0, 0
+    for row in range(len(T)):
+        if row > 0:
+            dt = T[row] - T[row - 1]
+            push_of(push, ports, a, w)
+            x1 = normalised(advance(x, U[row - 1], w, theta, dt, parts), kinds)
+            F[:, :] = 0.0
+            for j in range(m):
+                d[:] = 0.0
+                d[j] = NUDGE * scales[j]
+                moved = normalised(advance(plus(x, d, kinds), U[row - 1], w, theta, dt, parts), kinds)
+                minus(moved, x1, kinds, d)
+                for k in range(m):
+                    F[k, j] = d[k] / (NUDGE * scales[j])
+            G = np.zeros((full, n_w))
+            for j in range(n_w):
+                size = NUDGE * max(density[j], 1e-3)
+                w[j] += size
+                moved = normalised(advance(x, U[row - 1], w, theta, dt, parts), kinds)
+                w[j] -= size
+                minus(moved, x1, kinds, d)
+                for k in range(m):
+                    G[k, j] = d[k] / size
+            for j in range(n_o):
+                place = int(own[0, j])
+                theta[place] += own[2, j]
+                moved = normalised(advance(x, U[row - 1], w, theta, dt, parts), kinds)
+                theta[place] -= own[2, j]
+                minus(moved, x1, kinds, d)
+                for k in range(m):
+                    F[k, at_own + j] = d[k] / own[2, j]
+                F[at_own + j, at_own + j] = 1.0
+            for k in range(n_p):
+                decay = np.exp(-dt / ports[k, 2])
+                c, s = decay * np.cos(ports[k, 1] * dt), decay * np.sin(ports[k, 1] * dt)
+                at = m + 2 * k
+                for j in range(m):
+                    F[j, at] = G[j, int(ports[k, 0])]
+                F[at, at], F[at, at + 1], F[at + 1, at], F[at + 1, at + 1] = c, s, -s, c
+                a0, a1 = a[2 * k], a[2 * k + 1]
+                a[2 * k], a[2 * k + 1] = c * a0 + s * a1, c * a1 - s * a0
+            P = F @ P @ F.T
+            for j in range(n_w):
+                for k in range(m):
+                    if G[k, j] != 0.0:
+                        for i in range(m):
+                            P[k, i] += G[k, j] * G[i, j] * density[j] ** 2 / dt
+            for k in range(n_p):
+                grown = ports[k, 3] ** 2 * (1.0 - np.exp(-2.0 * dt / ports[k, 2]))
+                P[m + 2 * k, m + 2 * k] += grown
+                P[m + 2 * k + 1, m + 2 * k + 1] += grown
+            x = x1
+        h0 = measure(x, U[row], theta)
+        h = read(h0, T[row], row, T, lagged, history, angles, S)
+        difference(Y[row], h, angles, nu)
+        H[:, :] = 0.0
+        for k in range(m):
+            d[:] = 0.0
+            d[k] = NUDGE * scales[k]
+            moved = measure(plus(x, d, kinds), U[row], theta)
+            for j in range(n_y):
+                step = wrap(moved[j] - h0[j]) if angles[j] else moved[j] - h0[j]
+                H[j, k] = S[0, j] * step / (NUDGE * scales[k])
+        for k in range(n_o):
+            place = int(own[0, k])
+            theta[place] += own[2, k]
+            moved = measure(x, U[row], theta)
+            theta[place] -= own[2, k]
+            for j in range(n_y):
+                step = wrap(moved[j] - h0[j]) if angles[j] else moved[j] - h0[j]
+                H[j, at_own + k] = S[0, j] * step / own[2, k]
+        V = np.zeros((n_y, n_y))
+        seen = 0
+        for j in range(n_y):
+            if np.isnan(nu[j]):
+                nu[j] = 0.0
+                H[j, :] = 0.0
+                V[j, j] = 1.0
+            else:
+                V[j, j] = R[j]
+                seen += 1
+        across = P @ H.T
+        V = V + H @ across
+        L = np.linalg.cholesky(V)
+        W = np.linalg.inv(L)
+        K = across @ (W.T @ W)
+        e = W @ nu
+        for j in range(n_y):
+            value += e[j] ** 2 + 2.0 * np.log(L[j, j])
+            squares += e[j] ** 2
+        samples += seen
+        step_all = K @ nu
+        x = normalised(plus(x, step_all[:m], kinds), kinds)
+        a = a + step_all[m:at_own]
+        for k in range(n_o):
+            theta[int(own[0, k])] += step_all[at_own + k]
+        P = P - K @ V @ K.T
+        P = 0.5 * (P + P.T)
+        gains[row] = K
+        states[row, :n] = x
+        for k in range(n_o):
+            states[row, n + k] = theta[int(own[0, k])]
+        if not np.isfinite(value) or not np.isfinite(x).all():
+            return np.inf, np.inf, samples
+    return value, squares, samples
+
+
+def follow_run(T, U, Y, x0, theta, own, S, push, ports, kinds, angles, parts, m, gains, states):
+    """States and own parameters (r, n + o) of another model by kept gains, into states."""
+    n_y, n_w, n_p = Y.shape[1], len(push), ports.shape[0]
+    x, w, nu, a = x0.copy(), np.zeros(n_w), np.zeros(n_y), np.zeros(2 * n_p)
+    lagged, history = np.zeros(n_y), np.zeros((len(T), n_y))
+    theta, at_own = theta.copy(), m + 2 * n_p
+    for row in range(len(T)):
+        if row > 0:
+            dt = T[row] - T[row - 1]
+            push_of(push, ports, a, w)
+            x = normalised(advance(x, U[row - 1], w, theta, dt, parts), kinds)
+            for k in range(n_p):
+                decay = np.exp(-dt / ports[k, 2])
+                c, s = decay * np.cos(ports[k, 1] * dt), decay * np.sin(ports[k, 1] * dt)
+                a0, a1 = a[2 * k], a[2 * k + 1]
+                a[2 * k], a[2 * k + 1] = c * a0 + s * a1, c * a1 - s * a0
+        h = read(measure(x, U[row], theta), T[row], row, T, lagged, history, angles, S)
+        difference(Y[row], h, angles, nu)
+        for j in range(n_y):
+            if np.isnan(nu[j]):
+                nu[j] = 0.0
+        moved = gains[row] @ nu
+        x = normalised(plus(x, moved[:m], kinds), kinds)
+        a = a + moved[m:at_own]
+        for k in range(own.shape[1]):
+            theta[int(own[0, k])] += moved[at_own + k]
+            states[row, len(x) + k] = theta[int(own[0, k])]
+        states[row, : len(x)] = x
+
+
+
+def fly_run(T, U, starts, ends, X, theta, own, S, push, kinds, angles, parts, out):
+    """Outputs (r, y) of windows flown open loop from states and own parameters X (windows,
+    n + o) at rows `starts` to rows `ends`, into out."""
+    n_y, n = out.shape[1], X.shape[1] - own.shape[1]
+    theta = theta.copy()
+    for k in range(len(starts)):
+        x = X[k, :n].copy()
+        for j in range(own.shape[1]):
+            theta[int(own[0, j])] = X[k, n + j]
+        lagged, history = np.zeros(n_y), np.zeros((ends[k] - starts[k], n_y))
+        for row in range(starts[k], ends[k]):
+            if row > starts[k]:
+                x = normalised(advance(x, U[row - 1], push, theta, T[row] - T[row - 1], parts), kinds)
+            since = row - starts[k]
+            h = measure(x, U[row], theta)
+            when = T[starts[k] : ends[k]]
+            out[row] = read(h, T[row], since, when, lagged, history, angles, S)
+            out[row] += S[2] * (T[starts[k]] - T[0])

@@ -1,0 +1,170 @@
+"""From `--vehicle blimp.toml` to a model that has been tried: imported, declared, called, checked.
+
+Errors of the user's file name that file and its line.
+"""
+
+import importlib
+import importlib.util
+import sys
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from glider.hal.strict import ConfigError, locate
+from glider.tools.data.errors import InputError
+from glider.tools.data.sources import read_text
+from glider.tools.own.compiled import Kernels, kernels_of
+from glider.tools.own.declare import QUATERNION, Declaration, DeclarationError, declaration
+from glider.tools.own.files import OwnVehicle, declared_with, decode_own
+
+ENTRY_POINTS = "glider.vehicles"
+
+
+@dataclass
+class LoadedVehicle:
+    """A vehicle file and the model that it names."""
+
+    path: Path
+    text: str
+    file: OwnVehicle
+    model: Any
+    source: Path | None  # of the model's code
+    attribute: str
+    declared: Declaration
+    level: int  # 0: rollout only; 1: step, measure
+    notes: list[str] = field(default_factory=list)
+    _kernels: Kernels | None = None
+
+    @property
+    def name(self) -> str:
+        return self.file.name or self.path.stem
+
+    def zeros(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """x, u, w, theta of a vehicle at rest."""
+        states = [1.0 if one.kind == QUATERNION and n % 4 == 0 else one.start for n, one in enumerate(self.declared.states)]
+        theta = np.array([one.value for one in self.declared.parameters], dtype=np.float64)
+        return np.array(states, dtype=np.float64), np.zeros(len(self.declared.inputs)), np.zeros(len(self.declared.noises)), theta
+
+    @property
+    def kernels(self) -> Kernels:
+        """The observer of the model, made when it is first asked for."""
+        if self._kernels is None:
+            self._kernels = kernels_of(self.model, self.source, self.attribute, self.zeros())
+        return self._kernels
+
+
+def load_own(path: Path) -> LoadedVehicle:
+    """A vehicle file with `model`; ConfigError or InputError, one line, where file or model cannot be used."""
+    text = read_text(path)
+    given = decode_own(text, str(path))
+
+    def wrong(message: str) -> ConfigError:
+        return ConfigError(str(path), message, key="model", line=locate(text, ["model"]))
+
+    model, source, attribute = _import(given.model, path, wrong)
+    try:
+        declared = declaration(model)
+    except DeclarationError as error:
+        raise InputError(str(error), source=source or path) from None
+    except (TypeError, ValueError) as error:
+        raise user_error(error, source, "the declaration") from None
+    declared = declared_with(declared, given, text, path)
+    steps = hasattr(model, "step") or hasattr(model, "derivative")
+    if not steps and not hasattr(model, "rollout"):
+        raise InputError("the model has none of step, derivative, rollout", source=source or path)
+    if steps and not hasattr(model, "measure"):
+        raise InputError("the model has no measure(x, u, theta)", source=source or path)
+    return LoadedVehicle(path, text, given, model, source, attribute, declared, 1 if steps else 0)
+
+
+def _import(wanted: str, path: Path, wrong: Callable[[str], ConfigError]) -> tuple[Any, Path | None, str]:
+    """The model object, its file, and its name in it."""
+    if wanted.endswith(".fmu"):
+        from glider.tools.own.fmu import FmuModel
+
+        return FmuModel(_beside(wanted, path, wrong)), None, ""
+    if wanted.startswith("exec:"):
+        from glider.tools.own.process import ProcessModel
+
+        return ProcessModel(wanted.removeprefix("exec:").strip(), path.parent), None, ""
+    if ":" not in wanted and not (path.parent / f"{wanted}.py").is_file():
+        found = [one for one in metadata.entry_points(group=ENTRY_POINTS) if one.name == wanted]
+        if not found:
+            raise wrong(
+                f"expected module:object, a file.fmu, exec:COMMAND, or a name in {ENTRY_POINTS}; got {wanted!r}"
+            )
+        wanted = found[0].value
+    module_name, _, attribute = wanted.partition(":")
+    file = (path.parent / f"{module_name}.py").resolve()
+    try:
+        if file.is_file():
+            name = f"glider_own_given_{abs(hash(str(file)))}"
+            spec = importlib.util.spec_from_file_location(name, file)
+            assert spec is not None and spec.loader is not None
+            module = importlib.util.module_from_spec(spec)
+            sys.modules[name] = module
+            sys.path.insert(0, str(path.parent))
+            try:
+                spec.loader.exec_module(module)
+            finally:
+                sys.path.remove(str(path.parent))
+        else:
+            module = importlib.import_module(module_name)
+            file = Path(module.__file__) if module.__file__ else file
+    except ModuleNotFoundError as error:
+        if error.name == module_name:
+            raise wrong(f"no file {module_name}.py beside it, and no such module") from None
+        raise user_error(error, file, "import") from None
+    except Exception as error:  # whatever the user's module raises
+        raise user_error(error, file, "import") from None
+    if not attribute:
+        return module, file, ""
+    owner: Any = module
+    for part in attribute.split("."):
+        if not hasattr(owner, part):
+            raise wrong(f"{file.name} has no {attribute}")
+        owner = getattr(owner, part)
+    if isinstance(owner, type) and not _static(owner):
+        try:
+            owner = owner()
+        except Exception as error:
+            raise user_error(error, file, attribute) from None
+    return owner, file, attribute
+
+
+def _static(owner: type) -> bool:
+    """Whether a class has its functions as static methods, so that it needs no instance."""
+    return all(
+        isinstance(vars(owner).get(name, staticmethod(len)), staticmethod)
+        for name in ("step", "derivative", "measure", "rollout", "initial")
+    )
+
+
+def _beside(wanted: str, path: Path, wrong: Callable[[str], ConfigError]) -> Path:
+    for candidate in (path.parent / wanted, Path(wanted)):
+        if candidate.is_file():
+            return candidate
+    raise wrong(f"no such file: {wanted}")
+
+
+def user_error(error: BaseException, source: Path | None, where: str) -> InputError:
+    """An exception of the user's code as one line: file, line, function and what it said."""
+    if isinstance(error, SyntaxError):
+        return InputError(f"{where}: {error.msg}", source=error.filename, line=error.lineno)
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [one for one in frames if source is not None and Path(one.filename).name == source.name]
+    said = " ".join(f"{type(error).__name__}: {error}".split())[:300]
+    return InputError(f"{where}: {said}", source=source, line=own[-1].lineno if own else None)
+
+
+def called(vehicle: LoadedVehicle, name: str, *given: Any) -> np.ndarray:
+    """A function of the model, called as plain Python; InputError with the user's line where it raises."""
+    try:
+        return getattr(vehicle.model, name)(*given)
+    except Exception as error:  # whatever the user's function raises
+        raise user_error(error, vehicle.source, name) from None

@@ -1,0 +1,313 @@
+"""The observer of a user's vehicle over runs: filters, innovations by kept gains, and windows flown open loop."""
+
+import contextlib
+import copy
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from glider.tools.data.errors import InputError
+from glider.tools.own import kernels as names
+from glider.tools.own.declare import ANGLE, QUATERNION, USUAL_START, USUAL_TOLERANCE
+from glider.tools.own.effects import ModelPoint, driven_inputs, nominal_point
+from glider.tools.own.load import LoadedVehicle, called, user_error
+from glider.tools.own.runs import OwnRun
+
+FIRST_SECONDS = 1.0  # of a run, over which the rate of an output at its start is taken
+PARTS_TOLERANCE, MOST_PARTS = 0.02, 64  # of a state's scale a second, by which steps and half steps may differ
+HORIZON = (5.0, 20.0)  # s: of windows, where the vehicle's time constants set it
+TIME_CONSTANTS = 3.0  # in a window
+WARM_UP, WARM_UP_SHARE = 2.0, 0.1  # s of a window that find its start, at most; of the horizon
+LOST = 100.0  # tolerances: error of a flight that is lost, and of none more
+NOISE_SHARE = 0.25  # of an output's tolerance: noise where the file gives none
+
+
+@dataclass
+class Filtered:
+    """What the filter of one model says of one run."""
+
+    value: float  # -2 log likelihood
+    squares: float
+    samples: int
+    gains: np.ndarray
+    states: np.ndarray  # (rows, n + o) after each row
+
+
+@dataclass
+class Observer:
+    """A vehicle's model along the runs of a case."""
+
+    vehicle: LoadedVehicle
+    runs: list[OwnRun]
+    point: ModelPoint | None = None
+    parts: int = 1
+    starts: list[int] = field(default_factory=list)  # which of several initial states each run has
+    notes: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        declared = self.vehicle.declared
+        if self.vehicle.level == 0:
+            raise InputError("the model is a black box (rollout): it is measured, predicted and identified by windows, "
+                             "and cannot be filtered", source=self.vehicle.path)  # fmt: skip
+        self.declared = declared
+        kinds, scales = [], []
+        for one in declared.states:
+            quaternion = one.kind == QUATERNION
+            first = quaternion and (not kinds or kinds[-4:].count(2) == 0 or kinds[-1] != 3 or kinds[-3:].count(3) == 3)
+            kinds.append((2 if first else 3) if quaternion else int(one.kind == ANGLE))
+            if not quaternion or first:
+                usual = 0.1 if quaternion else USUAL_START.get(one.unit, 1.0)
+                scales += (3 if quaternion else 1) * [one.start_uncertainty or usual]
+        self.kinds, self.scales = np.array(kinds), np.array(scales)
+        self.angles = np.array([one.angle for one in declared.outputs])
+        self.tolerances = np.array(
+            [one.tolerance or USUAL_TOLERANCE.get(one.unit, _range_share(self.runs, n))
+             for n, one in enumerate(declared.outputs)]
+        )  # fmt: skip
+        if self.point is None:
+            self.point = nominal_point(declared)
+            unknown = self.point.variance == 0.0
+            self.point.variance[unknown] = (NOISE_SHARE * self.tolerances[unknown]) ** 2
+        self.starts = self.starts or [0] * len(self.runs)
+        self._choose_parts()
+        self._choose_starts()
+
+    def about(self, point: ModelPoint) -> "Observer":
+        """The same observer with another model as its own."""
+        other = copy.copy(self)
+        other.point = point
+        return other
+
+    # how a run begins
+
+    def first_readings(self, run: OwnRun, point: ModelPoint) -> dict[str, float]:
+        """First value and rate of every output as the sensors' errors have it, NaN where there is none."""
+        found: dict[str, float] = {}
+        early = run.t - run.t[0] <= FIRST_SECONDS
+        for n, one in enumerate(self.declared.outputs):
+            gain, bias = point.reading[0, n], point.reading[1, n]
+            seen = np.flatnonzero(np.isfinite(run.outputs[:, n]) & early)
+            values = (run.outputs[seen, n] - bias) / gain
+            if one.angle:
+                values = np.unwrap(values)
+            known = self.declared.start.get(one.name)
+            found[one.name] = known[0] if known else (float(values[0]) if len(seen) else np.nan)
+            when = run.t[seen] - run.t[0]
+            sloped = len(seen) >= 3 and np.ptp(when) > 0.0
+            found[f"{one.name}_rate"] = float(np.polyfit(when, values, 1)[0]) if sloped else np.nan
+        return found
+
+    def start(self, n: int, point: ModelPoint) -> tuple[np.ndarray, np.ndarray]:
+        """Initial state (states,) and its covariance (errors, errors) of a run."""
+        run, declared = self.runs[n], self.declared
+        readings = self.first_readings(run, point)
+        x = np.array([one.start for one in declared.states], dtype=np.float64)
+        sd = self.scales.copy()
+        if hasattr(self.vehicle.model, "initial"):
+            given = called(self.vehicle, "initial", readings)
+            if isinstance(given, list):
+                given = given[self.starts[n] % len(given)]
+            x, own = given if isinstance(given, tuple) else (given, None)
+            x = np.array(x, dtype=np.float64)
+            sd = sd if own is None else np.array(own, dtype=np.float64)
+        else:
+            for k, one in enumerate(declared.states):
+                value = readings.get(one.name, np.nan)
+                x[k] = value if np.isfinite(value) and one.kind != QUATERNION else x[k]
+        if x.shape != (len(declared.states),) or sd.shape != self.scales.shape or not np.isfinite(x).all():
+            raise InputError(
+                f"initial: expected {len(declared.states)} finite states (and {len(self.scales)} sigmas), got shape "
+                f"{x.shape}: {np.array2string(x, precision=3, threshold=12)}", source=self.vehicle.source,
+            )  # fmt: skip
+        return self._known(x, np.diag(sd**2), run, point)
+
+    def _known(self, x: np.ndarray, P: np.ndarray, run: OwnRun, point: ModelPoint) -> tuple[np.ndarray, np.ndarray]:
+        """The same with what [start] says of outputs: measurements without a sensor."""
+        kernels = self.vehicle.kernels
+        for name, (value, sigma) in self.declared.start.items():
+            j = self.declared.index("outputs", name)
+            h = kernels.measure(x, run.inputs[0], point.theta)[j]
+            line = np.zeros(len(P))
+            for k in range(len(P)):
+                d = np.zeros(len(P))
+                d[k] = names.NUDGE * self.scales[k]
+                line[k] = (kernels.measure(names.plus(x, d, self.kinds), run.inputs[0], point.theta)[j] - h) / d[k]
+            across = P @ line
+            total = line @ across + sigma**2
+            x = names.plus(x, across * (value - h) / total, self.kinds)
+            P = P - np.outer(across, across) / total
+        return x, 0.5 * (P + P.T)
+
+    def _choose_starts(self) -> None:
+        """Of models with several initial states, that which explains a run best."""
+        if not hasattr(self.vehicle.model, "initial"):
+            return
+        given = called(self.vehicle, "initial", self.first_readings(self.runs[0], self.point))
+        if not isinstance(given, list) or len(given) < 2:
+            return
+        for n in range(len(self.runs)):
+            values = []
+            for k in range(len(given)):
+                self.starts[n] = k
+                values.append(self.filter(n, self.point).value)
+            self.starts[n] = int(np.argmin(values))
+
+    # how fine a step is
+
+    def _choose_parts(self) -> None:
+        """Steps in which a row's step is taken: doubled until a step and two halves of it agree."""
+        kernels, worst = self.vehicle.kernels, 1
+        for n, run in enumerate(self.runs[:8]):
+            x, _ = self.start(n, self.point)
+            u, dt, w = run.inputs[0], float(np.median(np.diff(run.t))), np.zeros(len(self.declared.noises))
+            parts = worst
+            while parts < MOST_PARTS:
+                ends = []
+                for count in (parts, 2 * parts):
+                    end = x
+                    for _ in range(20):
+                        end = kernels.advance(end, u, w, self.point.theta, dt, count)
+                        end = names.normalised(np.array(end), self.kinds)
+                    ends.append(end)
+                error = np.zeros(len(self.scales))
+                names.minus(ends[0], ends[1], self.kinds, error)
+                if np.isfinite(error).all() and np.abs(error / self.scales).max() < PARTS_TOLERANCE:
+                    break
+                parts *= 2
+            worst = max(worst, parts)
+        self.parts = worst
+        if worst > 1:
+            self.notes.append(f"the model is stiff for the rows' step: every step is taken in {worst} parts")
+
+    # likelihood
+
+    def filter(self, n: int, point: ModelPoint) -> Filtered:
+        """The filter of a model along run n."""
+        run, declared, kernels = self.runs[n], self.declared, self.vehicle.kernels
+        rows, n_y = run.outputs.shape
+        m, n_o = len(self.scales) + 2 * len(point.ports), point.own.shape[1]
+        x, P = self.start(n, point)
+        keep = (np.zeros((rows, m + n_o, n_y)), np.zeros((rows, len(declared.states) + n_o)))
+        try:
+            value, squares, samples = kernels.filter_run(
+                run.t, driven_inputs(run, declared, point), run.outputs, x, P, point.theta, point.own, point.reading, point.push,
+                point.density, point.variance, point.ports, self.kinds, self.scales, self.angles, self.parts, keep,
+            )  # fmt: skip
+        except np.linalg.LinAlgError:
+            value, squares, samples = np.inf, np.inf, 1
+        except (ArithmeticError, ValueError, TypeError, IndexError) as error:
+            raise user_error(error, self.vehicle.source, f"{run.name}") from None
+        return Filtered(float(value), float(squares), int(samples), *keep)
+
+    def follow(self, n: int, point: ModelPoint, by: Filtered) -> np.ndarray:
+        """States (rows, n + o) of a model along run n by kept gains; NaN where it is lost."""
+        run, kernels = self.runs[n], self.vehicle.kernels
+        states = np.full(by.states.shape, np.nan)
+        x, _ = self.start(n, point)
+        with contextlib.suppress(ArithmeticError, ValueError, np.linalg.LinAlgError):
+            kernels.follow_run(
+                run.t, driven_inputs(run, self.declared, point), run.outputs, x, point.theta, point.own, point.reading,
+                point.push, point.ports, self.kinds, self.angles, self.parts, len(self.scales), by.gains, states,
+            )  # fmt: skip
+        return states
+
+    # windows
+
+    def windows(self, n: int, horizon: float, offset: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """First row flown open loop and row behind the last, of every window of run n; offset: of the first, s.
+
+        A run shorter than a window is one; what is left behind the last is not scored.
+        """
+        t = self.runs[n].t - self.runs[n].t[0]
+        warm = min(WARM_UP, WARM_UP_SHARE * horizon)
+        count = int((t[-1] - offset + 1e-6) // horizon)
+        if count < 1:
+            return np.array([min(int(np.searchsorted(t, warm - 1e-6)), len(t) - 2)]), np.array([len(t)])
+        begins = np.searchsorted(t, offset + horizon * np.arange(count) - 1e-6)
+        ends = np.append(begins[1:], np.searchsorted(t, offset + horizon * count + 1e-6))
+        return np.minimum(np.searchsorted(t, t[begins] + warm - 1e-6), ends - 2), ends
+
+    def scored_rows(self, n: int, horizon: float) -> int:
+        """Rows of run n on which its windows are scored."""
+        return int(sum(b - a - 1 for a, b in zip(*self.windows(n, horizon), strict=True)))
+
+    def predict(self, n: int, point: ModelPoint, horizon: float, states: np.ndarray, offset: float = 0.0) -> np.ndarray:
+        """Outputs (rows, outputs) of run n, window by window open loop from the state behind each warm-up; NaN else.
+
+        No measurement behind a window's warm-up is used in it.
+        """
+        run, kernels = self.runs[n], self.vehicle.kernels
+        starts, ends = self.windows(n, horizon, offset)
+        out = np.full(run.outputs.shape, np.nan)
+        if np.isfinite(states[starts]).all():
+            with contextlib.suppress(ArithmeticError, ValueError, np.linalg.LinAlgError):
+                kernels.fly_run(
+                    run.t, driven_inputs(run, self.declared, point), starts, ends, states[starts], point.theta,
+                    point.own, point.reading, point.push, self.kinds, self.angles, self.parts, out,
+                )  # fmt: skip
+        return out
+
+    def errors(self, n: int, predicted: np.ndarray, horizon: float, offset: float = 0.0) -> np.ndarray:
+        """Measured less predicted in tolerances, (scored rows, outputs), NaN where nothing was measured."""
+        rows = np.concatenate([np.arange(a + 1, b) for a, b in zip(*self.windows(n, horizon, offset), strict=True)])
+        error = self.runs[n].outputs[rows] - predicted[rows]
+        error[:, self.angles] = names.wrap(error[:, self.angles])
+        lost = np.isnan(predicted[rows]).all(axis=1)
+        error[lost] = np.where(np.isnan(self.runs[n].outputs[rows[lost]]), np.nan, LOST * self.tolerances)
+        return np.clip(error / self.tolerances, -LOST, LOST)
+
+    def gaps(self, n: int, point: ModelPoint, horizon: float) -> np.ndarray:
+        """Root mean square of measured less predicted, in tolerances, (outputs,); NaN where nothing was recorded."""
+        error = self.errors(n, self.predict(n, point, horizon, self.filter(n, point).states), horizon)
+        seen = np.isfinite(error).any(axis=0)
+        found = np.full(len(self.tolerances), np.nan)
+        found[seen] = np.sqrt(np.nanmean(error[:, seen] ** 2, axis=0))
+        return found
+
+    def residuals(self, n: int, points: Sequence[ModelPoint], by: Filtered, horizon: float) -> np.ndarray:
+        """Errors of models, (points, rows, outputs): windows cut in two ways, begun by kept gains; missing are 0."""
+        offsets = (0.0, 0.5 * horizon) if self.runs[n].t[-1] - self.runs[n].t[0] > 1.5 * horizon else (0.0,)
+
+        def one(point: ModelPoint) -> np.ndarray:
+            states = self.follow(n, point, by)
+            parts = [self.errors(n, self.predict(n, point, horizon, states, at), horizon, at) for at in offsets]
+            return np.nan_to_num(np.concatenate(parts), nan=0.0)
+
+        if self.vehicle.kernels.compiled:
+            with ThreadPoolExecutor(2) as pool:
+                return np.array(list(pool.map(one, points)))
+        return np.array([one(point) for point in points])
+
+    @property
+    def horizon(self) -> float:
+        """Of windows, s: the file's, or some of the model's slowest time constants."""
+        if self.declared.horizon is None:
+            return float(np.clip(TIME_CONSTANTS * self._slowest(), *HORIZON))
+        return float(self.declared.horizon)
+
+    def _slowest(self) -> float:
+        """Slowest decay of the model about a recorded state, s; what does not decay is left aside."""
+        kernels, run = self.vehicle.kernels, self.runs[0]
+        x = self.filter(0, self.point).states[run.t.searchsorted(run.t[0] + 2.0, side="right") - 1, : len(self.kinds)]
+        dt, w = float(np.median(np.diff(run.t))), np.zeros(len(self.declared.noises))
+        base = names.normalised(np.array(kernels.advance(x, run.inputs[0], w, self.point.theta, dt, self.parts)), self.kinds)
+        m = len(self.scales)
+        F, column = np.zeros((m, m)), np.zeros(m)
+        for j in range(m):
+            d = np.zeros(m)
+            d[j] = names.NUDGE * self.scales[j]
+            end = kernels.advance(names.plus(x, d, self.kinds), run.inputs[0], w, self.point.theta, dt, self.parts)
+            names.minus(names.normalised(np.array(end), self.kinds), base, self.kinds, column)
+            F[:, j] = column / d[j]
+        size = np.abs(np.linalg.eigvals(F)) if np.isfinite(F).all() else np.zeros(0)
+        decaying = size[(size < 1.0 - 1e-4) & (size > 0.0)]
+        return float(np.max(-dt / np.log(decaying))) if len(decaying) else HORIZON[1] / TIME_CONSTANTS
+
+
+def _range_share(runs: Sequence[OwnRun], n: int) -> float:
+    """A twentieth of an output's range: tolerance where neither file nor unit gives one."""
+    values = np.concatenate([run.outputs[:, n] for run in runs])
+    values = values[np.isfinite(values)]
+    return float(np.ptp(values)) / 20.0 or 1.0 if len(values) else 1.0

@@ -1,0 +1,321 @@
+"""Which effects the runs of a case have: a posterior over hypotheses, each with its own evidence (method: docs).
+
+A hypothesis is a set of labels with sizes common to the case's runs, beside what an identified vehicle allows for: its
+shared values, what sessions and runs differ by. The size of a label is normal with a sigma of v tolerances, rms over
+the windows' channels, v over a grid of equal chances: labels of all units are as probable before the data. Beside the
+labels stand constant forces that no label has, and, with each hypothesis, that more is left than healthy runs leave:
+unknown.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.special import logsumexp
+from scipy.stats import norm
+from scipy.stats import t as student
+
+from glider.tools.own.effects import PUSH, Effect, ModelPoint, moved, pushes, standard_effects
+from glider.tools.own.hierarchy import Expansion, Pooled, expand, marginalised, run_values
+from glider.tools.own.identify import USUAL_SCATTER
+from glider.tools.own.observer import Observer
+
+
+NONE, UNKNOWN = "none", "unknown"
+SIZES = np.array([0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0])  # tolerances, rms over the windows
+CHANGED = 0.5  # prior probability that anything changed
+ANOTHER = 0.1  # that a further effect stands beside one
+PUSH_ODDS = 0.1  # of a constant force without a label, to a label
+STRANGE = 0.1  # that more is left than a hypothesis says
+LEFT, SITE, USUAL_LEVEL_SCATTER, PRIOR_RUNS = 1.5, 0.25, 0.5, 1.0  # e-folds of the mean square left (docs)
+FORM = 0.2  # of a change, 1 sigma, that is not as its label's equations have it
+MATERIAL = 0.1  # tolerances: a smaller effect is no gap (docs/GAP.md)
+BEAM, MOST_EFFECTS, ROUNDS, LONGEST_MOVE = 6, 3, 5, 4.0
+LONGEST_REACH = 4.0  # tolerances that a round's move of one number may do at most, where that is more
+ACTIVE_SCATTER = 3.0  # times the usual: labels that healthy runs differ in
+LEAST_REACH = 1e-4  # tolerances a spread
+
+
+@dataclass(frozen=True)
+class Healthy:
+    """What is known of the vehicle without a change, in the spreads of `effects`."""
+
+    effects: list[Effect]  # every label, then pushes
+    V: np.ndarray  # (k, k) covariance of what a session's shared values are off the file's
+    scatter: np.ndarray  # (k,) from run to run
+    scales: np.ndarray  # (outputs,) what healthy runs leave, tolerances
+    eta: float
+    runs: int  # that it is known from
+    level_scatter: float  # 1 sigma of the logarithm of a run's mean square left
+
+    def at(self, labels: Sequence[str]) -> list[int]:
+        known = [one.label for one in self.effects]
+        return [known.index(label) for label in labels]
+
+
+@dataclass
+class Hypothesis:
+    """Labels fitted to the runs."""
+
+    labels: tuple[str, ...]
+    evidence: float  # log, with the prior of its labels
+    sizes: np.ndarray  # (labels,) spreads
+    sd: np.ndarray
+    shared: np.ndarray  # (k,) values of all runs, labels' sizes in them
+    own: np.ndarray  # (runs, k)
+    left: np.ndarray  # (runs,) mean squares, in units of what healthy runs leave
+    strange: float = 0.0  # probability that more is left than it says
+    found: list[Expansion] = field(default_factory=list)
+
+
+@dataclass
+class Posterior:
+    """The answer."""
+
+    hypotheses: list[Hypothesis]
+    weights: np.ndarray  # of each, with nothing beside it
+    chances: dict[str, float]  # none, unknown, labels: of the main cause
+    inclusion: dict[str, float]  # probability of each label to be there
+    reach: np.ndarray  # (k,) tolerances a spread
+    healthy: Healthy
+
+    @property
+    def best(self) -> Hypothesis:
+        return self.hypotheses[int(np.argmax(self.weights))]
+
+
+class Engine:
+    """Hypotheses about the runs of one observer."""
+
+    def __init__(self, observer: Observer, healthy: Healthy, say: Callable[[str], None] = lambda text: None):
+        self.observer, self.healthy, self.say = observer, healthy, say
+        self.k, self.count = len(healthy.effects), len(observer.runs)
+        self.horizon = observer.horizon
+        self.low = np.array([one.low for one in healthy.effects])
+        self.high = np.array([one.high for one in healthy.effects])
+        usual = np.diag(healthy.V) > (ACTIVE_SCATTER * USUAL_SCATTER) ** 2
+        self.active = usual | (healthy.scatter > ACTIVE_SCATTER * USUAL_SCATTER)
+        self.V = healthy.V * np.outer(self.active, self.active)
+        self.scatter = np.where(self.active, healthy.scatter, 0.0)  # what is too small to tell is none
+        self.reach = np.zeros(self.k)
+
+    def expansions(self, own: np.ndarray, columns: np.ndarray) -> list[Expansion]:
+        """Every run about its values (runs, k) in some columns, tempered; the others' rows are 0."""
+        chosen = [self.healthy.effects[k] for k in columns]
+        found = []
+        for n in range(self.count):
+            one = expand(self._observer_at(own[n], columns), n, chosen, own[n, columns], self.healthy.scales, self.horizon)
+            found.append(self._widened(one.tempered(self.healthy.eta), columns, own[n]))
+        return found
+
+    def _observer_at(self, own: np.ndarray, columns: np.ndarray) -> Observer:
+        """The observer about a run's values in all other columns."""
+        others = own.copy()
+        others[columns] = 0.0
+        if not others.any():
+            return self.observer
+        return self.observer.about(moved(self.observer.declared, self.observer.point, self.healthy.effects, others))
+
+    def _widened(self, one: Expansion, columns: np.ndarray, own: np.ndarray) -> Expansion:
+        slope, curvature, blocks, reach = np.zeros(self.k), np.zeros((self.k, self.k)), np.zeros(self.k), np.zeros(self.k)
+        slope[columns], blocks[columns], reach[columns] = one.slope, one.blocks, one.reach
+        curvature[np.ix_(columns, columns)] = one.curvature
+        return replace(one, at=own.copy(), slope=slope, curvature=curvature, blocks=blocks, reach=reach)
+
+    def variance(self, labels: Sequence[int], sigma: Sequence[float]) -> np.ndarray:
+        V = self.V.copy()
+        for k, s in zip(labels, sigma, strict=True):
+            V[k, k] += s**2
+        return V
+
+    def fit(self, labels: tuple[str, ...], begin: Hypothesis | None = None, every: bool = False) -> Hypothesis:
+        """Labels led to where they are most probable, relinearised where they are; evidence by its last expansion."""
+        places = self.healthy.at(labels)
+        columns = np.flatnonzero(self.active)
+        columns = np.unique(np.concatenate([columns, np.array(places, dtype=int)]))
+        shared = np.zeros(self.k) if begin is None else begin.shared.copy()
+        own = np.tile(shared, (self.count, 1)) if begin is None else begin.own.copy()
+        best: tuple[float, np.ndarray, np.ndarray, list[Expansion]] | None = None
+        for _ in range(ROUNDS):
+            found = self.expansions(own, columns)
+            cost = sum(one.value for one in found) + self._prior(shared, own, places)
+            if best is not None and not cost < best[0] - 0.1:
+                if cost < best[0]:
+                    best = cost, shared, own, found
+                    break
+                shared, own = 0.5 * (shared + best[1]), 0.5 * (own + best[2])
+                continue
+            best = cost, shared, own, found
+            sigma = self._best_sizes(found, places)[0]
+            warm = [marginalised(one, self.scatter) for one in found]
+            target = Pooled.of(warm, self.variance(places, sigma)).mean()
+            room = np.maximum(LONGEST_MOVE, LONGEST_REACH / np.maximum(self.reach, LEAST_REACH))  # (k,) spreads
+            shared = np.clip(shared + np.clip(target - shared, -room, room), self.low, self.high)
+            theirs = np.array([run_values(one, shared, self.scatter) for one in found])
+            own = np.clip(own + np.clip(theirs - own, -room, room), self.low, self.high)
+        assert best is not None
+        _, shared, own, found = best
+        if every:
+            found = self.expansions(own, np.arange(self.k))
+            self.reach = np.sqrt(np.mean([one.reach for one in found], axis=0))
+        sigma, evidence, mean, sd = self._best_sizes(found, places)
+        left = np.array([one.squares.sum() / max(1, one.samples.sum()) for one in found])
+        return Hypothesis(labels, evidence + self.log_prior(labels), mean, sd, shared, own, left, 0.0, found)
+
+    def _prior(self, shared: np.ndarray, own: np.ndarray, places: Sequence[int]) -> float:
+        """-2 log prior of values, sizes of labels left free."""
+        free = np.diag(self.V) > 0.0
+        free[list(places)] = False
+        kept = np.flatnonzero(free)
+        x = shared[kept]
+        spread = np.maximum(self.scatter, 1e-6)
+        return float((((own - shared) / spread) ** 2).sum() + x @ np.linalg.solve(self.V[np.ix_(kept, kept)], x))
+
+    def _best_sizes(self, found: Sequence[Expansion], places: Sequence[int]):
+        """Sigmas of labels' sizes that are most probable, log evidence over the grid of sizes, and size with its sd."""
+        pooled = Pooled.of([marginalised(one, self.scatter) for one in found], self.V)
+        if not places:
+            return [], pooled.log_evidence(), np.zeros(0), np.zeros(0)
+        reach = np.sqrt(np.mean([one.reach for one in found], axis=0))
+        grids = [SIZES / max(reach[k], LEAST_REACH) for k in places]
+        table: list[tuple[float, list[float], np.ndarray, np.ndarray]] = []
+        for choice in np.ndindex(*(len(SIZES) for _ in places)):
+            sigma = [grid[c] for grid, c in zip(grids, choice, strict=True)]
+            V = self.variance(places, sigma)
+            M = pooled.covariance(V)
+            mean, sd = (M @ pooled.r)[places], np.sqrt(np.maximum(np.diag(M)[places], 1e-30))
+            halves = sum(np.log(2.0) + norm.logcdf(m / s) for m, s, k in zip(mean, sd, places, strict=True)
+                         if self.healthy.effects[k].one_sided)  # fmt: skip
+            table.append((pooled.log_evidence(V) + float(halves), sigma, mean, sd))
+        best = max(table, key=lambda one: one[0])
+        evidence = float(logsumexp([one[0] for one in table]) - np.log(len(table)))
+        mean = np.clip(best[2], self.low[places], self.high[places])
+        return best[1], evidence, mean, best[3]
+
+    def log_prior(self, labels: Sequence[str]) -> float:
+        """Of a hypothesis: that something changed, which label, and that another stands beside it."""
+        if not labels:
+            return float(np.log1p(-CHANGED))
+        named = sum(one.family != PUSH for one in self.healthy.effects)
+        each = [np.log(PUSH_ODDS if self.healthy.effects[k].family == PUSH else 1.0) - np.log(named)
+                for k in self.healthy.at(labels)]  # fmt: skip
+        return float(np.log(CHANGED) + sum(each) + (len(labels) - 1) * np.log(ANOTHER))
+
+    def screen(self, begin: Hypothesis) -> list[tuple[float, str]]:
+        """Every other label beside a hypothesis by its parabola: log evidence gained, best first."""
+        places = self.healthy.at(begin.labels)
+        sigma = self._best_sizes(begin.found, places)[0]
+        V = self.variance(places, sigma)
+        pooled = Pooled.of([marginalised(one, self.scatter) for one in begin.found], V)
+        M = pooled.covariance()
+        slope, precision = pooled.r - pooled.H @ (M @ pooled.r), np.diag(pooled.H - pooled.H @ M @ pooled.H)
+        found = []
+        for k, effect in enumerate(self.healthy.effects):
+            if k in places or self.reach[k] < LEAST_REACH:
+                continue
+            tau2 = (SIZES / self.reach[k]) ** 2
+            total = 1.0 + tau2 * max(precision[k], 0.0)
+            gain = 0.5 * slope[k] ** 2 * tau2 / total - 0.5 * np.log(total)
+            if effect.one_sided:
+                gain = gain + np.log(2.0) + norm.logcdf(slope[k] * np.sqrt(tau2 / total))
+            odds = np.log(PUSH_ODDS) if effect.family == PUSH else 0.0
+            found.append((float(logsumexp(gain) - np.log(len(SIZES)) + odds), effect.label))
+        return sorted(found, reverse=True)
+
+    def run(self) -> Posterior:
+        """Hypotheses found by a beam: none, the best single labels, pairs beside the best, triples."""
+        nothing = self.fit((), every=True)
+        nothing.strange = self.strangeness(nothing, nothing)
+        every, front = [nothing], [nothing]
+        self.say(f"no change: {np.sqrt(nothing.left.mean()):.2f} times what healthy runs leave")
+        for depth in range(MOST_EFFECTS):
+            wanted: dict[frozenset[str], tuple[float, Hypothesis, tuple[str, ...]]] = {}
+            for one in front:
+                for gain, label in self.screen(one)[: BEAM if depth == 0 else 3]:
+                    labels = (*one.labels, label)
+                    key, worth = frozenset(labels), one.evidence + gain
+                    if key not in wanted or wanted[key][0] < worth:
+                        wanted[key] = (worth, one, labels)
+            new = [self.fit(labels, begin) for _, begin, labels in sorted(wanted.values(), key=lambda one: -one[0])[:BEAM]]
+            best = max(one.evidence for one in every)
+            for one in new:
+                one.strange = self.strangeness(one, nothing)
+                self.say(f"{' + '.join(one.labels)}: {one.evidence - nothing.evidence:.1f} nat, {np.sqrt(one.left.mean()):.2f} left")
+            every += new
+            front = sorted(new, key=lambda one: -one.evidence)[:2]
+            if not front or front[0].evidence < best + (0.0 if depth else -3.0):
+                break
+            front = [self.fit(one.labels, one, every=True) for one in front]
+            for one in front:
+                one.strange = self.strangeness(one, nothing)
+        return self._posterior(every)
+
+    def strangeness(self, one: Hypothesis, nothing: Hypothesis) -> float:
+        """Probability that more is left than a hypothesis says: its mean square against healthy runs', Student's t."""
+        healthy = self.healthy
+        freedom = healthy.runs - 1 + PRIOR_RUNS
+        squares = (healthy.runs - 1) * healthy.level_scatter**2 + PRIOR_RUNS * USUAL_LEVEL_SCATTER**2
+        scale = np.sqrt(squares / freedom * (1.0 / healthy.runs + 1.0 / len(one.left)) + SITE**2)
+        if one.labels:
+            scale = float(np.hypot(scale, np.log1p(FORM**2 * max(nothing.left.mean() - one.left.mean(), 0.0))))
+        at = float(np.log(max(one.left.mean(), 1e-9)))
+        shifts = np.linspace(0.0, 4.0 * LEFT, 121)
+        prior = 2.0 * norm.pdf(shifts, scale=LEFT) * (shifts[1] - shifts[0])
+        less = float(student.logpdf(max(at, 0.0) / scale, freedom)) + np.log1p(-STRANGE)
+        more = float(logsumexp(student.logpdf((at - shifts) / scale, freedom), b=prior)) + np.log(STRANGE)
+        return float(np.exp(more - np.logaddexp(less, more)))
+
+    def _posterior(self, every: list[Hypothesis]) -> Posterior:
+        logs = np.array([one.evidence for one in every])
+        weights = np.exp(logs - logsumexp(logs))
+        chances: dict[str, float] = {NONE: 0.0, UNKNOWN: 0.0}
+        inclusion: dict[str, float] = {}
+        known = {one.label: one for one in self.healthy.effects}
+        for one, weight in zip(every, weights, strict=True):
+            moves = [abs(size) * self.reach[k] for size, k in zip(one.sizes, self.healthy.at(one.labels), strict=True)]
+            main = max(zip(moves, one.labels, strict=True), default=(0.0, NONE))
+            chances[UNKNOWN] += weight * one.strange
+            if main[0] < MATERIAL:
+                name = NONE
+            else:
+                name = UNKNOWN if known[main[1]].family == PUSH else main[1]
+            chances[name] = chances.get(name, 0.0) + weight * (1.0 - one.strange)
+            for label in one.labels:
+                inclusion[label] = inclusion.get(label, 0.0) + float(weight)
+        return Posterior(every, weights, chances, inclusion, self.reach, self.healthy)
+
+
+def healthy_of(observer: Observer, session: bool = True) -> Healthy:
+    """What an identified vehicle file says of itself; one that is not identified, what it allows for.
+
+    session: the runs asked about are of another session than those that it is known from.
+    """
+    declared, table = observer.declared, observer.vehicle.file.identified
+    labels = standard_effects(declared, observer.runs, observer.tolerances)
+    effects = [*labels, *pushes(declared)]
+    names = [one.label for one in effects]
+    k = len(effects)
+    scatter = np.full(k, USUAL_SCATTER)
+    V = np.zeros((k, k))
+    if table is None:
+        for one in declared.parameters:
+            V[names.index(one.name), names.index(one.name)] = (one.uncertainty / effects[names.index(one.name)].spread) ** 2
+        scales = np.ones(len(declared.outputs))
+        return Healthy(effects, V, scatter, scales, 10.0, 1, USUAL_LEVEL_SCATTER)
+    places = [names.index(name) for name in table.parameters]
+    spreads = np.array([effects[k].spread for k in places])
+    V[np.ix_(places, places)] = np.array(table.covariance).reshape(len(places), len(places)) / np.outer(spreads, spreads)
+    for name, value in table.scatter.items():
+        if name in names:
+            scatter[names.index(name)] = max(value / effects[names.index(name)].spread, 1e-4)
+    if session:
+        V = V + np.diag(scatter**2)
+    scales = np.array([max(table.gap.get(one.name, 1.0), 1e-3) for one in declared.outputs])
+    return Healthy(effects, V, scatter, scales, table.inflation, table.runs, table.level_scatter)
+
+
+def effect_point(observer: Observer, healthy: Healthy, labels: Sequence[str], sizes: np.ndarray) -> ModelPoint:
+    """The vehicle's model with labels of sizes (labels,) in spreads."""
+    values = np.zeros(len(healthy.effects))
+    values[healthy.at(labels)] = sizes
+    return moved(observer.declared, observer.point, healthy.effects, values)

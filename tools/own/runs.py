@@ -1,0 +1,94 @@
+"""Cases of a user's vehicle: the columns that its model declares, and no others."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import numpy as np
+
+from glider.hal.strict import Table, decode
+from glider.tools.data.errors import InputError
+from glider.tools.data.runs import csvfile
+from glider.tools.data.runs.case import CASE_FILE, run_files
+from glider.tools.data.runs.columns import TIME
+from glider.tools.data.runs.run import run_name
+from glider.tools.data.sources import read_text
+from glider.tools.own.declare import Declaration
+
+MIN_ROWS = 5
+
+
+class OwnCaseTable(Table):
+    """case.toml of a vehicle of one's own."""
+
+    format: Annotated[int, msgspec.Meta(ge=1, le=1)]
+    vehicle: Annotated[str, msgspec.Meta(min_length=1, max_length=1000)]
+    site: str = ""
+    log_rate_hz: Annotated[float, msgspec.Meta(gt=0.0)] | None = None
+    water_density_kg_m3: float | None = None
+    motion_capture: bool | None = None
+    runs: Annotated[int, msgspec.Meta(ge=1)] | None = None
+
+
+@dataclass(frozen=True)
+class OwnRun:
+    """A run as the model sees it; missing outputs are NaN."""
+
+    name: str
+    t: np.ndarray  # (rows,) s
+    inputs: np.ndarray  # (rows, inputs)
+    outputs: np.ndarray  # (rows, outputs)
+    path: Path | None = None
+
+
+def case_table(folder: Path) -> OwnCaseTable:
+    """case.toml; InputError or ConfigError where there is none or it cannot be read."""
+    path = folder / CASE_FILE
+    if not folder.is_dir():
+        raise InputError("not a folder" if folder.exists() else "no such folder", source=folder)
+    if not path.is_file():
+        raise InputError(f"no {CASE_FILE} in this folder", source=folder)
+    return decode(read_text(path), OwnCaseTable, str(path))
+
+
+def load_own_runs(folder: Path, declared: Declaration) -> list[OwnRun]:
+    """All runs of a case; InputError with file, line and column where one cannot be used."""
+    table, files = case_table(folder), run_files(folder)
+    if not files or (table.runs is not None and len(files) != table.runs):
+        message = f"{table.runs or 'some'} expected, {len(files)} files run*.csv found"
+        raise InputError(message, source=folder / CASE_FILE, column="runs")
+    return [load_own_run(path, declared) for path in files]
+
+
+def load_own_run(path: Path, declared: Declaration) -> OwnRun:
+    """One run by the columns that a model declares."""
+    table = csvfile.read_table(path)
+    if TIME not in table.header:
+        raise table.error("the column is missing", column=TIME)
+    t = table.numbers(TIME)
+    table.require_increasing(TIME, t)
+    if len(t) < MIN_ROWS:
+        raise InputError(f"{MIN_ROWS} rows at least are needed, got {len(t)}", source=path)
+    inputs = np.empty((len(t), len(declared.inputs)))
+    for n, one in enumerate(declared.inputs):
+        if one.column not in table.header:
+            raise table.error(f"the model's input {one.name} has no such column", column=one.column)
+        inputs[:, n] = _held(table.numbers(one.column), table, one.column)
+    outputs = np.full((len(t), len(declared.outputs)), np.nan)
+    for n, one in enumerate(declared.outputs):
+        if one.column in table.header:
+            outputs[:, n] = table.numbers(one.column)
+    if not np.isfinite(outputs).any():
+        wanted = ", ".join(one.column for one in declared.outputs)
+        raise InputError(f"no column of the model's outputs: {wanted}", source=path)
+    return OwnRun(run_name(path), t, inputs, outputs, path)
+
+
+def _held(values: np.ndarray, table, column: str) -> np.ndarray:
+    """An input with missing samples held from before; it has to begin with one."""
+    missing = np.isnan(values)
+    if missing[0]:
+        raise table.error("the first value of an input is missing", row=0, column=column)
+    last = np.maximum.accumulate(np.where(missing, 0, np.arange(len(values))))
+    return values[last]
