@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from glider.tools.cli import own
 from glider.tools.cli.challenge import challenge
 from glider.tools.cli.common import (
     compile_diagnosis,
@@ -16,7 +17,6 @@ from glider.tools.cli.common import (
     say_assumed,
     vehicle_option,
 )
-from glider.tools.cli import own
 from glider.tools.cli.many import cases_argument, is_many, run_batch_command
 from glider.tools.cli.readings import readings
 from glider.tools.cli.watch import watch

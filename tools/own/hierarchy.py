@@ -117,7 +117,8 @@ def expand(
 def inflation(found: Sequence[Expansion]) -> np.ndarray:
     """Variance inflation (y + 1,) by channel, and of all together: what windows' scores vary by, over what independent
     errors' would. Of all together beside the channels' own: what channels have in common."""
-    blocks, diagonal = sum(one.blocks for one in found), sum(one.diagonal for one in found)
+    blocks = np.sum([one.blocks for one in found], axis=0)
+    diagonal = np.sum([one.diagonal for one in found], axis=0)
     out = np.ones(len(blocks))
     for row in range(len(blocks)):
         seen = diagonal[row] > 1e-9 * max(float(diagonal[row].max(initial=0.0)), 1e-300)
@@ -147,7 +148,7 @@ class Pooled:
 
     @classmethod
     def of(cls, found: Sequence[Expansion], V: np.ndarray) -> "Pooled":
-        return cls(sum(one.curvature for one in found), -sum(one.offset for one in found),
+        return cls(np.sum([one.curvature for one in found], axis=0), -np.sum([one.offset for one in found], axis=0),
                    sum(one.constant for one in found), V)  # fmt: skip
 
     def covariance(self, V: np.ndarray | None = None) -> np.ndarray:
