@@ -38,7 +38,7 @@ from glider.tools.inference.fit import bounded_step
 from glider.tools.inference.model import effect_vector
 from glider.tools.inference.parameters import FreeParameter, effect_parameters, model_at, nuisance_parameters
 from glider.tools.inference.prediction_error import DIFFERENCE_STEP, HORIZONS, PredictionError
-from glider.tools.inference.problem import Problem, problem_of
+from glider.tools.inference.problem import Gains, Problem, problem_of
 from glider.tools.inference.vehicle_parameters import Parameters
 
 CAUSE = "cause"
@@ -83,12 +83,14 @@ class HeldOutWindows(PredictionError):
         """Residuals that can be independent: one a window and channel."""
         return float(len(self.cuts[0].first) * len(self.channels))
 
-    def further_columns(self, values: np.ndarray, known: list[np.ndarray]) -> Iterable[tuple[np.ndarray, np.ndarray]]:
-        """As `columns`, the first ones (known, of every cut) not flown again."""
+    def further_columns(
+        self, values: np.ndarray, known: list[np.ndarray], gains: Gains
+    ) -> Iterable[tuple[np.ndarray, np.ndarray]]:
+        """As `columns`, the first ones (known, of every cut) not flown again; gains: of the same model."""
         n = len(known[0])
         size = np.where(values + DIFFERENCE_STEP <= self.high, DIFFERENCE_STEP, -DIFFERENCE_STEP)
         points = [values, *(values + s * row for s, row in zip(size[n:], np.eye(len(values))[n:], strict=True))]
-        Y = self.fly(points, self.gains(values), self.cuts)
+        Y = self.fly(points, gains, self.cuts)
         for k, one in enumerate(self.cuts):
             E = self.residuals(Y[:, k], one)
             yield E[0], np.concatenate([known[k], (E[1:] - E[0]) / size[n:, None]])
@@ -335,13 +337,13 @@ class Comparison:
         they bring more than the choice among them costs."""
         own, found = self.windows_of(begin.labels), []
         values = own.clipped(begin.values[self.columns_of(begin.labels)])
-        bare, n = own.linearised(values), len(values)
-        weight = self.weight(begin.mean_square)
+        bare, n, gains = own.linearised(values), len(values), own.gains(values)
+        weight, columns = self.weight(begin.mean_square), [one[1] for one in bare.samples]
         for link in LINKS:
             shapes = [one.name for one in free_of(link)]
             whole = self.windows_of(begin.labels, FreeForm(link, tuple(shapes)))
             start = np.concatenate([values, np.zeros(len(shapes))])
-            at = Linearised.gathered(start, whole, whole.further_columns(start, [one[1] for one in bare.samples]))
+            at = Linearised.gathered(start, whole, whole.further_columns(start, columns, gains))
             chosen, best = list[int](), self.nat_of(float(bare.held_out(np.arange(n), weight)[0].sum()))
             while len(chosen) < MAX_SHAPES:
                 tried = []
