@@ -32,7 +32,7 @@ from glider.tools.study.challenge.form_fit import fit_flights, fit_forces
 from glider.tools.study.challenge.form_plan import BY_LABEL
 from glider.tools.study.challenge.trial import with_effect
 
-pytestmark = pytest.mark.computes(seconds=90)
+pytestmark = pytest.mark.computes(seconds=150)
 
 HEALTHY, LATER = 5, 3
 LABEL, OUTSIDE = "servo_offset", "x_pump_jet"
