@@ -18,7 +18,8 @@ from glider.tools.data.runs import case as cases
 Progress = Callable[[str], None]
 AnyCase = Case | cases.Case | Path | str
 Effects = Mapping[str, Mapping[str, float] | None] | Iterable[str] | None
-P, T = ParamSpec("P"), TypeVar("T")
+P = ParamSpec("P")
+T = TypeVar("T")
 
 
 def one_error(function: Callable[P, T]) -> Callable[P, T]:

@@ -49,11 +49,11 @@ class Gap(Result):
         return frozen({name: float(value) for name, value in self._found.channels.items()})
 
     def measured(self, run: int) -> Mapping[str, np.ndarray]:
-        """Return what was measured in a run, by column, each of shape (rows,), SI, NaN where missing."""
+        """Return what was measured in a run while it was under water, by column, each (rows,), SI, NaN if missing."""
         return self._table(self._found.measures.measured(self._found.case.runs[run]))
 
     def predicted(self, run: int) -> Mapping[str, np.ndarray]:
-        """Return the model's prediction of a run, by column, each of shape (rows,), SI."""
+        """Return the model's prediction of the same rows, by column, each (rows,), SI."""
         return self._table(self._found.predictions[run])
 
     def _table(self, values: np.ndarray) -> Mapping[str, np.ndarray]:
@@ -87,7 +87,7 @@ class Gap(Result):
         runs = np.concatenate([np.full(run.rows, run.name) for run in case.runs])
         both = {
             "measured": (("row", "column"), np.concatenate([measures.measured(run) for run in case.runs])),
-            "predicted": (("row", "column"), np.concatenate(self._found.predictions)),
+            "predicted": (("row", "column"), np.concatenate(self._found.predictions)[:, : len(measures.columns)]),
         }
         times = np.concatenate([run.t for run in case.runs])
         coordinates = {"run": ("row", runs), "t_s": ("row", times), "column": list(measures.columns)}

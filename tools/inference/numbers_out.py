@@ -66,8 +66,10 @@ class VehicleNumbers:
     def plain(self) -> dict[str, Any]:
         """Numbers, effects and offsets of readings as a table."""
         places = OCEAN_PLACES if self.ocean else PLACES
-        units = _OCEAN_UNITS if self.ocean else _UNITS | dict(
-            zip(COEFFICIENTS, (free.unit for free in coefficients(self.P)), strict=True)
+        units = (
+            _OCEAN_UNITS
+            if self.ocean
+            else _UNITS | dict(zip(COEFFICIENTS, (free.unit for free in coefficients(self.P)), strict=True))
         )
         P = self.effective
         parameters = {

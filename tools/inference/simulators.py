@@ -1,6 +1,7 @@
 """A pool vehicle's numbers in the forms of other simulators: Fossen's matrices, Gazebo's SDF, Stonefish's XML.
 
-Equation (4) is expanded about straight flight to the second order in alpha and beta. Actuators stand at neutral. The damping of the rates, K_p V^2 p and so on, is linear in the rate at one speed.
+Equation (4) is expanded about straight flight to the second order in alpha and beta. Actuators stand at neutral. The
+damping of the rates, K_p V^2 p and so on, is linear in the rate at one speed.
 Within 6 degrees of straight flight at that speed the expansion is within 3 % of the largest force of the water.
 """
 
@@ -62,9 +63,11 @@ def derivatives(numbers: VehicleNumbers, speed: float) -> dict[str, float]:
         "X_uu": -k["K_D0"], "X_uw": k["K_L0"], "X_ww": slope - k["K_D"] - 0.5 * k["K_D0"],
         "X_vv": -k["K_beta"] - 0.5 * k["K_D0"], "Y_uv": k["K_beta"] - k["K_D0"],
         "Z_uu": -k["K_L0"], "Z_uw": -(k["K_D0"] + slope), "Z_ww": -k["K_L"] if printed else 0.0,
-        "K_uv": k["K_MR"] - k["K_M0"], "K_vw": -(k["K_M"] + k["K_MY"]), "M_vv": k["K_MR"], "N_vw": k["K_MR"], "M_uu": k["K_M0"], "M_uw": k["K_M"], "N_uv": k["K_MY"],
+        "K_uv": k["K_MR"] - k["K_M0"], "K_vw": -(k["K_M"] + k["K_MY"]), "M_vv": k["K_MR"], "N_vw": k["K_MR"],
+        "M_uu": k["K_M0"], "M_uw": k["K_M"], "N_uv": k["K_MY"],
         "K_p": k["K_p"] * speed**2 + k["D_p"], "M_q": k["K_q"] * speed**2 + k["D_q"],
         "N_r": k["K_r"] * speed**2 + k["D_r"],
+        "K_vq": -k["K_q"] * speed, "K_wr": -k["K_r"] * speed, "M_vp": k["K_p"] * speed, "N_wp": k["K_p"] * speed,
         "K_uu": float(F[ef.ROLL_TRIM]), "N_uu": float(F[ef.YAW_TRIM]),
         "M_qq": k["K_q"] * float(F[ef.PITCH_DAMPING_ACROSS]), "N_rr": k["K_r"] * float(F[ef.YAW_DAMPING_ACROSS]),
         "X_u": -float(F[ef.LINEAR_DRAG]), "Y_v": -float(F[ef.LINEAR_DRAG]), "Z_w": -float(F[ef.LINEAR_DRAG]),
@@ -166,7 +169,9 @@ def gazebo_terms(terms: dict[str, float]) -> dict[str, float]:
         elif of in ("qq", "rr"):
             found[f"{force.lower()}{of[0].upper()}abs{of[0].upper()}"] = value
         else:  # a square or a product, as it is
-            found[f"{force.lower()}{of.upper()}"] = value * sign
+            found[f"{force.lower()}{of.upper()}"] = (
+                value * sign * float(np.prod([SIGNS[VELOCITIES.index(v)] for v in of]))
+            )
     return found
 
 

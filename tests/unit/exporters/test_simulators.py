@@ -144,7 +144,8 @@ def test_parameters_come_back_as_they_were(form, corrected, tmp_path):
     table = read(text) if read else ast.literal_eval(text.removeprefix("VEHICLE = "))
     own = table["parameters"]
     assert own["K_D0"] == {"value": 3.0 * 1.5, "unit": "kg/m"}
-    assert np.isclose(own["K_MY"]["value"], 26.0 * 1.1) and own["m_t"] == {"value": 13.0, "unit": "kg"}
+    assert np.isclose(own["K_MY"]["value"], 26.0 * 1.1)
+    assert own["m_t"] == {"value": 13.0, "unit": "kg"}
     assert set(EFFECTS) <= set(table["effects"])
 
 

@@ -75,7 +75,8 @@ def test_a_dataflash_log_becomes_a_run(tmp_path):
     assert np.allclose(run.columns["pitch_rad"], math.radians(-20.0))
     assert np.allclose(run.columns["q_rad_s"], 0.2)
     assert np.allclose(run.columns["depth_m"][inside], 0.1 * run.t[inside], atol=4e-3)
-    assert run.start_utc == "" and notes == []
+    assert run.start_utc == ""
+    assert notes == []
 
 
 def test_a_telemetry_log_becomes_a_run_on_the_vehicle_s_clock(tmp_path):

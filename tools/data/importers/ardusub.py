@@ -48,7 +48,8 @@ def read_ardusub(path: Path, mapping: StreamMap, partial: bool = False) -> Strea
         samples[column.topic, column.field] = Samples()
         wanted.setdefault(key, []).append((column.field, samples[column.topic, column.field]))
     read = _dataflash if kind in DATAFLASH else _telemetry
-    epoch, topics = None, set()
+    epoch: float | None = None
+    topics: set[str] = set()
     with tempfile.TemporaryDirectory(prefix="glider-") as folder:
         readable = path
         if end < len(data):

@@ -9,7 +9,7 @@ import tomllib
 from collections.abc import Callable, Mapping
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 import msgspec
 import numpy as np
@@ -161,7 +161,7 @@ def decode_map(text: str, source: str) -> MapTable:
 
 
 def decode_checked(
-    text: str, source: str, kind: type[M], check: Callable[[M, str], None], by_name: Mapping[str, type[Table]]
+    text: str, source: str, kind: type[M], check: Callable[[M, str], None], by_name: Mapping[str, Any]
 ) -> M:
     """Decode a mapping of some kind and check it.
 
@@ -187,8 +187,7 @@ def _at_key(error: ConfigError, text: str) -> ConfigError:
     return ConfigError(error.source, message, key=f"{error.key}.{key}", line=locate(text, path))
 
 
-
-def _with_column(error: ConfigError, text: str, source: str, by_name: Mapping[str, type[Table]]) -> ConfigError:
+def _with_column(error: ConfigError, text: str, source: str, by_name: Mapping[str, Any]) -> ConfigError:
     """An error inside a group of tables by name with the table's name, which the decoder leaves out."""
     group, *rest = error.key.split(".")
     if group not in by_name:

@@ -171,8 +171,6 @@ def run_of_stream(path: Path, name: str, stream: Stream, mapping: StreamMap) -> 
         rates = resample.body_rates(grid, *(columns[angle] for angle in names.ATTITUDE))
         columns |= {rate: found for rate, found in zip(names.RATES, rates, strict=True) if rate not in columns}
     numbers = {target: columns[target] for target in names.in_order(list(columns)) if target in names.KNOWN}
-    extra = {
-        target: csvfile.as_texts(target, columns[target], item.decimals) for target, item in mapping.extra.items()
-    }
+    extra = {target: csvfile.as_texts(target, columns[target], item.decimals) for target, item in mapping.extra.items()}
     start = "" if stream.epoch_s is None else moment_text(stream.epoch_s + begin)
     return Run(name, path, numbers, extra, path.name, start), notes
