@@ -322,8 +322,8 @@ def diagnose(
         Runs.
     reference : Case or path, optional
         Healthy runs of the same vehicle: what its model leaves there is no cause.
-    without : {'nuisance', 'splice', 'whiteness', 'evidence'}, optional
-        Part of the method to leave out (docs/DIAGNOSIS.md).
+    without : str, optional
+        Part of the method to leave out, as `glider gap diagnose --without` has it (docs/DIAGNOSIS.md).
     progress : callable, optional
         Called with lines of text on the way.
 
