@@ -245,8 +245,8 @@ def readings(case: AnyCase) -> Readings:
     --------
     >>> import glider
     >>> found = glider.readings(glider.simulate("spiral", seed=1))
-    >>> print(found.summary())
-    nothing found: the readings agree with each other as far as these flights can show
+    >>> print(found.summary())  # doctest: +ELLIPSIS
+    not_flying run00: afloat at the end for ...
     """
     from glider.sim_backend.ocean.vehicle import OceanVehicle
     from glider.tools.readings.check import check

@@ -31,13 +31,14 @@ def identify(case: Path, out: Path | None, seed: int, likelihood: str, vehicle: 
     from glider.tools.data.errors import need
     from glider.tools.data.files import check_writable
     from glider.tools.data.runs.case import load_case
-    from glider.tools.identify.files import VEHICLE
-    from glider.tools.report.page import REPORT
 
     loaded = load_case(case, vehicle, leave_out=True)
     if out is not None:
         check_writable(out)
     need("analysis" if isinstance(loaded.vehicle, OceanVehicle) else "identify")
+    from glider.tools.identify.files import VEHICLE
+    from glider.tools.report.page import REPORT
+
     how: Any = likelihood
     found = api.identify(loaded, seed=seed, likelihood=how, progress=lambda text: print(text, file=sys.stderr))
     for note in found.notes:

@@ -25,8 +25,9 @@ def test_the_examples_of_the_docstrings_run(module):
     ("name", "said"),
     [("diagnose", "The hull drags more than its coefficients say"), ("monitor", "drag ")],
 )
-def test_a_notebook_runs_and_finds_the_effect(name, said, tmp_path):
+def test_a_notebook_runs_and_finds_the_effect(name, said, tmp_path, monkeypatch):
     nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
+    monkeypatch.setenv("PYTHONPATH", str(NOTEBOOKS.parents[1]))  # of the process that executes the cells
     notebook = nbformat.read(NOTEBOOKS / f"{name}.ipynb", as_version=4)
     assert all(not cell.get("outputs") for cell in notebook.cells)
     nbclient.NotebookClient(notebook, timeout=900, resources={"metadata": {"path": str(tmp_path)}}).execute()
