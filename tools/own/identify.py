@@ -21,6 +21,7 @@ from glider.tools.own.observer import Observer, observer_of
 from glider.tools.own.runs import OwnRun
 
 ROUNDS = 20
+SCATTER_ROUNDS = 4  # in which it is learned how runs differ, then held
 MIN_SCATTER_RUNS = 3  # from fewer nothing is learned of how runs differ
 FILE_PRIOR = 2.0  # times the file's uncertainties: what the shared values may be
 USUAL_SCATTER = 0.02  # spreads, from run to run
@@ -87,13 +88,15 @@ def identify(
     fit_levels(observer, say)
     scales = np.maximum(np.sqrt(np.nanmean(before**2, axis=0)), LEAST_SCALE)
     errors, eta = ChannelErrors(np.where(np.isfinite(scales), scales, 1.0), np.ones(len(scales))), 1.0
-    differ = False  # how runs differ is learned when what they share is found: else it takes what they share for it
+    learned, differ = 0, False  # how runs differ is learned when what they share is found: else it takes what they share for it
     for round_ in range(ROUNDS):
         found = [expand(observer, n, nuisance, own[n], errors, horizon) for n in range(count)]
         *_, eta = inflation(found)
         warm = [one.tempered(eta) for one in found]
-        if differ:
-            scatter = learn_scatter(warm, V, np.full(k, USUAL_SCATTER))
+        if differ and learned < SCATTER_ROUNDS:
+            found_scatter = learn_scatter(warm, V, np.full(k, USUAL_SCATTER))
+            scatter = found_scatter if learned == 0 else np.sqrt(scatter * found_scatter)
+            learned += 1
         search = _Search(observer, nuisance, warm, scatter, eta, V, limits, errors, horizon)
         step = Pooled.of([marginalised(one, scatter) for one in warm], V).mean() - values
         values, own, gain = search.along(values, own, np.clip(step, -LONGEST_MOVE, LONGEST_MOVE))
@@ -101,7 +104,7 @@ def identify(
         said = f"round {round_ + 1}: gain {gain:.1f}, {np.sqrt(np.mean(errors.scales**2)):.2f} tolerances left"
         say(f"{said}, inflation {', '.join(f'{one:.0f}' for one in errors.inflation)} and {eta:.1f}")
         if gain < CONVERGED_GAIN and np.abs(np.log(errors.scales / before_errors.scales)).max() < CONVERGED_SCALE:
-            if differ or count < MIN_SCATTER_RUNS:
+            if learned == SCATTER_ROUNDS or count < MIN_SCATTER_RUNS:
                 break
             differ = True
         differ = differ or (round_ == ROUNDS // 2 and count >= MIN_SCATTER_RUNS)
