@@ -88,7 +88,10 @@ def identify(
     fit_levels(observer, say)
     scales = np.maximum(np.sqrt(np.nanmean(before**2, axis=0)), LEAST_SCALE)
     errors, eta = ChannelErrors(np.where(np.isfinite(scales), scales, 1.0), np.ones(len(scales))), 1.0
-    learned, differ = 0, False  # how runs differ is learned when what they share is found: else it takes what they share for it
+    learned, differ = (
+        0,
+        False,
+    )  # how runs differ is learned when what they share is found: else it takes what they share for it
     for round_ in range(ROUNDS):
         found = [expand(observer, n, nuisance, own[n], errors, horizon) for n in range(count)]
         *_, eta = inflation(found)

@@ -15,7 +15,7 @@ from scipy.special import logsumexp
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from glider.tools.own.effects import PUSH, Effect, ModelPoint, moved, pushes, standard_effects
+from glider.tools.own.effects import PARAMETER, PUSH, Effect, ModelPoint, moved, pushes, standard_effects
 from glider.tools.own.hierarchy import ChannelErrors, Expansion, Pooled, expand, marginalised, run_values
 from glider.tools.own.identify import USUAL_SCATTER
 from glider.tools.own.observer import Observer
@@ -24,7 +24,9 @@ NONE, UNKNOWN = "none", "unknown"
 SIZES = np.array([0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0])  # tolerances, rms over the windows
 CHANGED = 0.5  # prior probability that anything changed
 ANOTHER = 0.1  # that a further effect stands beside one
-PUSH_ODDS = 0.1  # of a constant force without a label, to a label
+# prior odds of a label to one of an input or an output: what is fixed of a vehicle changes less often than what is
+# commanded and read; a constant force that no label has, seldom
+FAMILY_ODDS = {PARAMETER: 0.5, PUSH: 0.1}
 STRANGE = 0.1  # that more is left than a hypothesis says
 LEFT, SITE, USUAL_LEVEL_SCATTER, PRIOR_RUNS = 1.5, 0.25, 0.5, 1.0  # e-folds of the mean square left (docs)
 FORM = 0.2  # of a change, 1 sigma, that is not as its label's equations have it
@@ -218,8 +220,7 @@ class Engine:
         if not labels:
             return float(np.log1p(-CHANGED))
         named = sum(one.family != PUSH for one in self.healthy.effects)
-        each = [np.log(PUSH_ODDS if self.healthy.effects[k].family == PUSH else 1.0) - np.log(named)
-                for k in self.healthy.at(labels)]  # fmt: skip
+        each = [log_odds(self.healthy.effects[k]) - np.log(named) for k in self.healthy.at(labels)]
         return float(np.log(CHANGED) + sum(each) + (len(labels) - 1) * np.log(ANOTHER))
 
     def screen(self, begin: Hypothesis) -> list[tuple[float, str]]:
@@ -235,8 +236,7 @@ class Engine:
             if k in places or self.reach[k] < LEAST_REACH:
                 continue
             gain = size_evidence(slope[k], precision[k], self.reach[k], effect.one_sided)
-            odds = np.log(PUSH_ODDS) if effect.family == PUSH else 0.0
-            found.append((float(gain + odds), effect.label))
+            found.append((float(gain) + log_odds(effect), effect.label))
         return sorted(found, reverse=True)
 
     def strong_sizes(self, among: Sequence[int]) -> list[tuple[int, float]]:
@@ -357,6 +357,11 @@ class Engine:
             for label in one.labels:
                 inclusion[label] = inclusion.get(label, 0.0) + float(weight)
         return Posterior(every, weights, chances, inclusion, self.reach, self.healthy)
+
+
+def log_odds(effect: Effect) -> float:
+    """Log prior odds of a label to one of an input or an output."""
+    return float(np.log(FAMILY_ODDS.get(effect.family, 1.0)))
 
 
 def size_evidence(slope, precision, reach, one_sided) -> np.ndarray:

@@ -22,7 +22,6 @@ from glider.tools.own.posterior import (
     LONGEST_MOVE,
     LONGEST_REACH,
     MATERIAL,
-    PUSH_ODDS,
     SIZES,
     STRONG_LEFT,
     UNKNOWN,
@@ -30,6 +29,7 @@ from glider.tools.own.posterior import (
     Healthy,
     Hypothesis,
     healthy_of,
+    log_odds,
     size_evidence,
 )
 from glider.tools.own.runs import OwnRun
@@ -166,7 +166,7 @@ class Watch(Engine):
         found = np.full((len(spans), self.k), -np.inf)
         usable = labels[self.reach[labels] > LEAST_REACH]
         sided = np.array([self.healthy.effects[k].one_sided for k in usable])
-        odds = np.array([np.log(PUSH_ODDS) if self.healthy.effects[k].family == PUSH else 0.0 for k in usable])
+        odds = np.array([log_odds(self.healthy.effects[k]) for k in usable])
         for row, (first, end) in enumerate(spans):
             H, r = H_up[end] - H_up[first], r_up[end] - r_up[first]
             # shared values are known to M from the reference; the span's runs see them with the change
@@ -238,7 +238,7 @@ class Watch(Engine):
         nothing = self.evidence(self.runs[slice(*span)], span, self.M).log_evidence()
         columns = np.unique(np.append(np.flatnonzero(self.active), k))
         size, best = start, (-np.inf, start, 0.0)
-        odds = np.log(PUSH_ODDS) if self.healthy.effects[k].family == PUSH else 0.0
+        odds = log_odds(self.healthy.effects[k])
         runs = self.runs[slice(*span)] if start == 0.0 else None
         linear = runs is not None
         for _ in range(ROUNDS + 1):

@@ -1,0 +1,73 @@
+"""The gliding blimp's real flights, where they are at hand: identified on some, the others asked about."""
+
+import csv
+import gzip
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.support.commands import glider
+
+VEHICLE = Path(__file__).parents[2] / "docs/examples/gliding_blimp/rgblimp.toml"
+
+
+def copied(folder: Path, runs: list[Path], column: str = "", change=lambda value: value) -> Path:
+    """A case of some runs with one column changed."""
+    folder.mkdir()
+    for n, path in enumerate(runs):
+        with gzip.open(path, "rt") as file:
+            head, *rows = list(csv.reader(file))
+        for row in rows:
+            if column:
+                k = head.index(column)
+                row[k] = f"{change(float(row[k])):.6f}"
+        (folder / f"run{n:02d}.csv").write_text("\n".join(",".join(row) for row in [head, *rows]) + "\n")
+    (folder / "case.toml").write_text(f'format = 1\nvehicle = "blimp"\nruns = {len(runs)}\n')
+    return folder
+
+
+@pytest.fixture(scope="module")
+def flights(shared, tmp_path_factory):
+    """The folder, the flights for identification and those kept from it, and the identified vehicle."""
+    data = shared / "data" / "rgblimp"
+    if not data.is_dir():
+        pytest.skip("no data/rgblimp in the shared folder")
+    folder = tmp_path_factory.mktemp("blimp")
+    cases = [sorted(case.glob("run[0-9]*.csv.gz")) for case in sorted(data.iterdir()) if case.is_dir()]
+    kept = [path for case in cases for path in case[1::2]]
+    copied(folder / "healthy", [path for case in cases for path in case[::2]])
+    done = glider("identify", "healthy", "--vehicle", VEHICLE, "--out", "identified", "--json", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    return folder, kept
+
+
+def total(folder, case, vehicle):
+    return json.loads(glider("gap", "measure", case, "--vehicle", vehicle, "--json", cwd=folder).stdout)["total"]
+
+
+def first_cause(folder, case):
+    done = glider("gap", "diagnose", case, "--vehicle", "identified/identified.toml", "--out", f"{case}-said", "--json", cwd=folder)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    answer = json.loads(done.stdout)
+    return answer["verdict"], answer["causes"][0]
+
+
+def test_flights_kept_are_predicted_better_than_by_the_published_numbers(flights):
+    folder, kept = flights
+    copied(folder / "kept", kept)
+    assert total(folder, "kept", "identified/identified.toml") < 0.6 * total(folder, "kept", VEHICLE)
+
+
+def test_what_was_done_to_the_data_is_found_with_its_size(flights):
+    folder, kept = flights
+    copied(folder / "same", kept[::3])
+    assert first_cause(folder, "same")[0] == "none"
+    copied(folder / "mass", kept[1::3], "mass_x_m", lambda value: value - 0.02)
+    verdict, first = first_cause(folder, "mass")
+    assert verdict == "cause"
+    assert "mass_x_offset" in first["group"]
+    copied(folder / "gyro", kept[2::3], "r_rad_s", lambda value: 1.3 * value)
+    verdict, first = first_cause(folder, "gyro")
+    assert (verdict, first["label"]) == ("cause", "r_gain")
+    assert first["parameters"]["r_gain"]["estimate"] == pytest.approx(0.3, abs=0.03)
