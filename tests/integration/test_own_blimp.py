@@ -47,7 +47,8 @@ def total(folder, case, vehicle):
 
 
 def first_cause(folder, case):
-    done = glider("gap", "diagnose", case, "--vehicle", "identified/identified.toml", "--out", f"{case}-said", "--json", cwd=folder)  # fmt: skip
+    vehicle = "identified/identified.toml"
+    done = glider("gap", "diagnose", case, "--vehicle", vehicle, "--out", f"{case}-said", "--json", cwd=folder)
     assert done.returncode == 0, done.stderr
     answer = json.loads(done.stdout)
     return answer["verdict"], answer["causes"][0]

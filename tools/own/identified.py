@@ -83,7 +83,7 @@ def tables(found: Identified) -> dict[str, Any]:
     given["identified"] = {
         "runs": len(observer.runs), "sessions": found.sessions, "parameters": names,
         "covariance": [[float(value) for value in row] for row in covariance], "inflation": found.eta,
-        "level_scatter": found.level_scatter,
+        "level_scatter": found.level_scatter, "session_share": found.session_share,
         "scatter": {name: float(value * spreads[name]) for name, value in scatter.items()},
         "gap": {one.name: float(value) for one, value in zip(declared.outputs, found.errors.scales, strict=True)},
         "channel_inflation": {

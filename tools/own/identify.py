@@ -22,6 +22,7 @@ from glider.tools.own.runs import OwnRun
 
 ROUNDS = 20
 SCATTER_ROUNDS = 4  # in which it is learned how runs differ, then held
+USUAL_SESSION_SHARE, SESSION_SHARES, MIN_SESSIONS = 0.25, (0.05, 4.0), 3
 MIN_SCATTER_RUNS = 3  # from fewer nothing is learned of how runs differ
 FILE_PRIOR = 2.0  # times the file's uncertainties: what the shared values may be
 USUAL_SCATTER = 0.02  # spreads, from run to run
@@ -52,6 +53,7 @@ class Identified:
     after: np.ndarray  # the same of a model of the other runs
     level_scatter: float
     sessions: int
+    session_share: float  # of the variance from run to run, that sessions differ by beside it
     notes: list[str] = field(default_factory=list)
 
     @property
@@ -88,10 +90,8 @@ def identify(
     fit_levels(observer, say)
     scales = np.maximum(np.sqrt(np.nanmean(before**2, axis=0)), LEAST_SCALE)
     errors, eta = ChannelErrors(np.where(np.isfinite(scales), scales, 1.0), np.ones(len(scales))), 1.0
-    learned, differ = (
-        0,
-        False,
-    )  # how runs differ is learned when what they share is found: else it takes what they share for it
+    # how runs differ is learned when what they share is found: else it takes what they share for its own
+    learned, differ = 0, False
     for round_ in range(ROUNDS):
         found = [expand(observer, n, nuisance, own[n], errors, horizon) for n in range(count)]
         *_, eta = inflation(found)
@@ -103,22 +103,26 @@ def identify(
         search = _Search(observer, nuisance, warm, scatter, eta, V, limits, errors, horizon)
         step = Pooled.of([marginalised(one, scatter) for one in warm], V).mean() - values
         values, own, gain = search.along(values, own, np.clip(step, -LONGEST_MOVE, LONGEST_MOVE))
-        before_errors, errors = errors, left_by(found, errors)
+        before_errors, left = errors, left_by(found, errors)
+        errors = ChannelErrors(left.scales, errors.inflation)  # channels' own inflation is for what is asked later
         said = f"round {round_ + 1}: gain {gain:.1f}, {np.sqrt(np.mean(errors.scales**2)):.2f} tolerances left"
-        say(f"{said}, inflation {', '.join(f'{one:.0f}' for one in errors.inflation)} and {eta:.1f}")
+        say(f"{said}, inflation {eta:.0f}")
         if gain < CONVERGED_GAIN and np.abs(np.log(errors.scales / before_errors.scales)).max() < CONVERGED_SCALE:
             if learned == SCATTER_ROUNDS or count < MIN_SCATTER_RUNS:
                 break
             differ = True
         differ = differ or (round_ == ROUNDS // 2 and count >= MIN_SCATTER_RUNS)
     found = [expand(observer, n, nuisance, own[n], errors, horizon) for n in range(count)]
+    errors = left_by(found, errors)
+    found = [expand(observer, n, nuisance, own[n], errors, horizon) for n in range(count)]
     *_, eta = inflation(found)
     warm = [marginalised(one.tempered(eta), scatter) for one in found]
     covariance = Pooled.of(warm, V).covariance()
     after = _held_out(observer, nuisance, warm, V, limits)
     effects, every = _scatter_of_all(observer, nuisance, values, own, eta, errors)
+    counts = [len(one) for one in sessions]
     return Identified(vehicle, observer, nuisance, values, covariance, effects, every, eta, errors, own, before, after,
-                      level_scatter(found), len(sessions))  # fmt: skip
+                      level_scatter(found), len(sessions), session_share(own, scatter, counts))  # fmt: skip
 
 
 def left_by(found: Sequence[Expansion], errors: ChannelErrors) -> ChannelErrors:
@@ -231,6 +235,24 @@ def _scatter_of_all(observer, nuisance, values, own, eta, errors) -> tuple[list[
     if len(own) < MIN_SCATTER_RUNS:
         return effects, 5.0 * usual
     return effects, learn_scatter(about, np.zeros((len(effects), len(effects))), usual)
+
+
+def session_share(own: np.ndarray, scatter: np.ndarray, counts: Sequence[int]) -> float:
+    """Variance between sessions over that from run to run, pooled over what runs differ in (own: runs, nuisance).
+
+    With a few sessions only what is usual is known.
+    """
+    if len(counts) < MIN_SESSIONS or min(counts) < 2:
+        return USUAL_SESSION_SHARE
+    columns = np.flatnonzero(scatter > 3.0 * USUAL_SCATTER)
+    if not len(columns):
+        return USUAL_SESSION_SHARE
+    parts = np.split(own[:, columns] / scatter[columns], np.cumsum(counts)[:-1])
+    within = sum(((part - part.mean(axis=0)) ** 2).sum(axis=0) for part in parts) / (sum(counts) - len(counts))
+    means = np.array([part.mean(axis=0) for part in parts])
+    between = means.var(axis=0, ddof=1) - within / np.mean(counts)
+    ratio = float(np.mean(np.maximum(between, 0.0)) / max(float(np.mean(within)), 1e-9))
+    return float(np.clip(ratio, *SESSION_SHARES))
 
 
 def level_scatter(found: Sequence[Expansion]) -> float:

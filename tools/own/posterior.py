@@ -405,7 +405,7 @@ def healthy_of(observer: Observer, session: bool = True) -> Healthy:
         if name in names:
             scatter[names.index(name)] = max(value / effects[names.index(name)].spread, 1e-4)
     if session:
-        V = V + np.diag(scatter**2)
+        V = V + table.session_share * np.diag(scatter**2)
     errors = ChannelErrors(
         np.array([max(table.gap.get(one.name, 1.0), 1e-3) for one in declared.outputs]),
         np.array([table.channel_inflation.get(one.name, 1.0) for one in declared.outputs]),
