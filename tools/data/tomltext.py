@@ -1,4 +1,4 @@
-"""Tables as TOML text: the other way round of reading, for files that people go on editing."""
+"""Tables as TOML text, the one writer of TOML: the other way round of reading, for files that people go on editing."""
 
 import json
 import math
@@ -17,7 +17,7 @@ def _value(value: Any) -> str:
     if isinstance(value, int):
         return str(value)
     if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")  # which JSON allows, TOML does not
     if isinstance(value, dict):
         return "{ " + ", ".join(f"{key} = {_value(item)}" for key, item in value.items() if item is not None) + " }"
     parts = [_value(item) for item in value]

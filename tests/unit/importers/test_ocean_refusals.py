@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from glider.tools.data.errors import InputError
-from glider.tools.data.importers.ocean import netcdf
 from glider.tools.data.importers.ocean.og1 import read_og1
 from tests.support import ocean_files
 from tests.support.commands import glider
@@ -62,23 +61,6 @@ def test_an_empty_a_cut_and_a_missing_file(tmp_path, kind):
         assert "is empty" in refused(kind, files, tmp_path / "case")
         files[n].unlink()
         assert "no such file" in refused(kind, files, tmp_path / "case")
-
-
-def lengthened(path: Path) -> Path:
-    """The file with one byte wrong: a text in HDF5's heap is said to be longer than it is, and the heap has no end."""
-    text = b"sg077"
-    whole = bytearray(path.read_bytes())
-    whole[whole.index(len(text).to_bytes(8, "little") + text)] = 100
-    path.write_bytes(whole)
-    return path
-
-
-def test_a_file_that_hdf5_does_not_come_to_an_end_with(tmp_path, monkeypatch):
-    path = lengthened(ocean_files.og1(tmp_path / "mission.nc", [flight()]))
-    monkeypatch.setattr(netcdf, "TRIAL_S", 1.0)
-    with pytest.raises(InputError) as error:
-        netcdf.NetCDF(path)
-    assert str(error.value) == f"{path}: cut or damaged: not read after 1 s"
 
 
 @pytest.mark.parametrize("seed", range(3))

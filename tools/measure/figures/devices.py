@@ -57,12 +57,14 @@ def same_flight(mission: str, seed: int, fifo: bool) -> None:
 
 def compare_flights(mission: str, seed: int, folder: Path, *, vehicle: str = "roughie") -> dict[str, Any]:
     """Both flights, logged, and how far they are apart."""
-    from glider.sim_backend.twins.boardfile import decode_twin_file, simulated_text
+    from glider.sim_backend.twins.boardfile import decode_twin_file, simulated_board
     from glider.tools.data.boards import load_board_file
     from glider.tools.data.log.reader import read_log
+    from glider.tools.data.tomltext import toml_text
 
     found = load_board_file("twin")
-    (folder / "sim.toml").write_text(simulated_text(decode_twin_file(found.text, found.source)))
+    board = simulated_board(decode_twin_file(found.text, found.source))
+    (folder / "sim.toml").write_text(toml_text(board, inline=("sensors",)))
     twin = fly(mission, vehicle, "twin", seed, folder / "twin.mcap")
     sim = fly(mission, vehicle, str(folder / "sim.toml"), seed, folder / "sim.mcap")
     ticks = {name: read_log(folder / f"{name}.mcap").topics["/tick"] for name in ("sim", "twin")}

@@ -174,7 +174,7 @@ class Samples:
 
     def take(self, t: float, recorder_pid: int) -> None:
         """One row; the interpreter's blocks first, so that the looking itself is not in them."""
-        from glider.tools.flight.keeper import open_files, resident_bytes
+        from glider.hal.usage import open_files, resident_bytes
 
         blocks = sys.getallocatedblocks()
         self.rows[self.count] = (t, blocks, resident_bytes(), open_files(), resident_bytes(recorder_pid))

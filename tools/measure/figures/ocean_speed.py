@@ -11,12 +11,12 @@ from pathlib import Path
 import click
 import numpy as np
 
+from glider.tools.data.intervals import NINETY
 from glider.tools.data.runs.case import load_case
 from glider.tools.gap.velocity import Velocity, velocities
 from glider.tools.identify.ocean.files import vehicle_text
 from glider.tools.identify.ocean.identify import identify_ocean
 from glider.tools.inference.model import nominal_model
-from glider.tools.inference.parameters import NINETY
 from glider.tools.study.challenge.ocean_cases import TRUTH_EVERY, draw_case, write_dives
 from glider.tools.study.challenge.ocean_plan import CRAFTS, MissionPlan
 from glider.tools.study.challenge.watch_plan import CHANGED, STEP, UNCHANGED, WatchCounts

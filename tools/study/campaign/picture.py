@@ -8,9 +8,10 @@ import numpy as np
 
 from glider.firmware.core.control.controller_rows import CONTROLLERS
 from glider.tools.data.files import write_bytes
+from glider.tools.data.intervals import wilson
 from glider.tools.report.charts import Chart, Curve, svg
 from glider.tools.study.campaign.conduct import FlownChunk
-from glider.tools.study.campaign.summary import completed_by_all, summarise, wilson
+from glider.tools.study.campaign.summary import completed_by_all, summarise
 
 BINS = 5
 POINTS = 200  # of a distribution

@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 
 from glider.tools.data.errors import InputError
+from glider.tools.data.intervals import NINETY
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs.csvfile import read_table
 from glider.tools.data.runs.run import run_name
@@ -18,7 +19,6 @@ from glider.tools.study.challenge.watch_score import NEEDED, Watched, WatchScore
 NEEDED_OF_A_MISSION = (*NEEDED, "speed", "horizontal_mm_s", "every_s")
 ON_DEPTH_ALONE = frozenset({"drag", "lift", "attitude_scale"})  # act alike where no speed was measured
 ALWAYS_CONFOUNDED = frozenset({"net_buoyancy", "density_bias"})  # a density read wrong is a weight
-NINETY = 1.6449
 MODELLED = 0.1  # m/s, 1 sigma: where the velocity says more of itself it says that it does not know
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from glider.tools.data.intervals import wilson
 from glider.tools.study.challenge.diagnosis import AnsweredCause, AnswerFile
 from glider.tools.study.challenge.plan import NONE, PAIR, SINGLE, UNKNOWN
 
@@ -14,7 +15,6 @@ LEAST_PROBABILITY = 1e-6  # what a cause without an entry counts as
 LARGEST_GROUP = 3
 MOST_SELECTED = 3  # naming more than that is no answer for a pair
 SURE_PROBABILITY = 0.8
-CONFIDENCE = 0.9
 SCATTER = frozenset({"waves", "turbulence"})  # whose course nobody can predict
 
 
@@ -163,16 +163,6 @@ class ScoreFigure:
         if self.count is not None:
             found |= {"count": self.count, "ci90": self.interval}
         return found
-
-
-def wilson(count: int, of: int) -> tuple[float, float]:
-    """90 % interval of a share by Wilson's score (two-sided); of nothing, 0 to 1."""
-    from scipy.stats import binomtest
-
-    if not of:
-        return 0.0, 1.0
-    interval = binomtest(count, of).proportion_ci(CONFIDENCE, method="wilson")
-    return float(interval.low), float(interval.high)
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from glider.tools.data.errors import InputError
+from glider.tools.data.intervals import wilson
 from glider.tools.study.challenge.diagnosis import TIMING
 from glider.tools.study.challenge.judge import open_sealed
-from glider.tools.study.challenge.score import LARGEST_GROUP, ScoreFigure, wilson
+from glider.tools.study.challenge.score import LARGEST_GROUP, ScoreFigure
 from glider.tools.study.challenge.watch_answer import REFERENCE, WATCH_FILE, EventSaid, WatchSaid, read_watch
 from glider.tools.study.challenge.watch_plan import CHANGED, OUTSIDE, UNCHANGED
 
