@@ -7,7 +7,6 @@ whole walk, warm-up and all; an effective sample is the smallest bulk ESS (ArviZ
 
 import tempfile
 import time
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +26,6 @@ from glider.tools.measure.benchmark.timing import alternate, median
 RUNS, SEED = list(range(0, 45, 5)), 1
 DRAWS = 10_000
 STEPS, BURN = 6_000, 1_500  # of emcee; 670 steps of its default moves were one effective sample of each walker
-TUNE, KEPT = 500, 2_000  # of NUTS
 
 
 def posterior() -> Quadratic:
@@ -72,41 +70,8 @@ def emcee_ess(statistics: Quadratic, white: Whitened, evolving: bool = False) ->
     return smallest_ess(white.mode + y @ white.root.T) / seconds
 
 
-def nuts_ess(statistics: Quadratic, white: Whitened) -> tuple[float, float] | None:
-    """NumPyro's NUTS on the same density; with and without the time to compile. None where it is not installed."""
-    if find_spec("numpyro") is None or find_spec("jax") is None:
-        return None
-    import jax
-    import jax.numpy as jnp
-    from numpyro.infer import MCMC, NUTS
-
-    jax.config.update("jax_enable_x64", True)
-    A0, b0, A, b, c, count = (jnp.asarray(term) for term in white.terms)
-    n = len(b0)
-
-    def energy(point):
-        y, levels = point[:n], point[n:]
-        square = c + 2.0 * b @ y + jnp.einsum("i,gij,j->g", y, A, y)
-        prior = 0.5 * y @ A0 @ y + b0 @ y + 0.5 * jnp.sum((levels / white.width) ** 2)
-        return prior + jnp.sum(count * levels + 0.5 * jnp.exp(-2.0 * levels) * square)
-
-    rng = np.random.default_rng(SEED)
-    start = START_SIGMA * rng.standard_normal((4, n + len(c)))
-    start[:, n:] *= 0.005
-    mcmc = MCMC(NUTS(potential_fn=energy), num_warmup=TUNE, num_samples=KEPT, num_chains=4, chain_method="vectorized",
-                progress_bar=False)  # fmt: skip
-    times = []
-    for _ in range(2):
-        before = time.perf_counter()
-        mcmc.run(jax.random.PRNGKey(SEED), init_params=jnp.asarray(start))
-        y = np.asarray(mcmc.get_samples(group_by_chain=True))
-        times.append(time.perf_counter() - before)
-    found = smallest_ess(white.mode + y[:, :, :n] @ white.root.T)
-    return found / times[1], found / times[0]
-
-
 def measure(settings: Settings) -> dict[str, Any]:
-    """ess_per_s, emcee_ess_per_s, ratio; numpyro_ess_per_s (null where it is not installed); parameters."""
+    """ess_per_s, emcee_ess_per_s, ratio, the same by moves of differential evolution; parameters."""
     statistics = posterior()
     white = whiten(statistics)
     ours(statistics)  # compiles
@@ -115,14 +80,11 @@ def measure(settings: Settings) -> dict[str, Any]:
         min(settings.repeats, 3), lambda: ours(statistics), lambda: emcee_ess(statistics, white),
         lambda: emcee_ess(statistics, white, evolving=True),
     )  # fmt: skip
-    nuts = nuts_ess(statistics, white)
     return {
         "ess_per_s": median(walks),
         "emcee_ess_per_s": median(ensembles),
         "ratio": median([one / other for one, other in zip(walks, ensembles, strict=True)]),
         "emcee_evolution_ess_per_s": median(evolving),
         "ratio_evolution": median([one / other for one, other in zip(walks, evolving, strict=True)]),
-        "numpyro_ess_per_s": None if nuts is None else nuts[0],
-        "numpyro_ess_per_s_with_compiling": None if nuts is None else nuts[1],
         "parameters": len(statistics.at) + len(statistics.groups),
     }

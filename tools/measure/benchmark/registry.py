@@ -38,7 +38,7 @@ MEASURES = {
     "closed_loop": Measure("closed_loop", "compiled loop of plant, sensors and autopilot"),
     "tick": Measure("tick", "the real runtime's tick: time, and that it allocates nothing"),
     "campaign": Measure("campaign", "many flights at once, all cores against one"),
-    "identify": Measure("identify", "effective samples a second, beside emcee and NUTS"),
+    "identify": Measure("identify", "effective samples a second, beside emcee"),
     "ocean": Measure("ocean", "ocean gliders watched, beside a fit of drag with a threshold"),
     "memory": Measure("memory", "memory of the flying process"),
     "startup": Measure("startup", "from the shell to the first word"),
