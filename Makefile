@@ -31,7 +31,7 @@ $(DEMO_STAMP): pyproject.toml constraints.txt
 	$(call install,analysis)
 
 demo: $(DEMO_STAMP)
-	@$(BIN)/python -m glider.tools.measure.demo
+	@$(BIN)/python -m glider.tools.verify.demo
 
 # README's picture: the top of the demo's report.
 picture: demo
@@ -79,7 +79,7 @@ rollback: $(STAMP)
 # Outside this folder: /proc and /dev are mounted in it while it runs, and pip and `clean` walk through all that lies here.
 ARM64 ?= /var/tmp/glider-arm64
 arm64: $(STAMP)
-	$(BIN)/python -m glider.tools.deploy.emulated $(ARM64) $(if $(QUICK),--quick)
+	$(BIN)/python -m glider.tools.verify.arm64.emulated $(ARM64) $(if $(QUICK),--quick)
 
 clean:
 	rm -rf --one-file-system $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis

@@ -14,9 +14,9 @@ from independent.nominal import Glider
 from glider.tools.cli.common import report_errors
 from glider.tools.cli.main import cli
 from glider.tools.data.errors import InputError
-from glider.tools.measure.benchmark import plant_speed as plant
-from glider.tools.measure.benchmark.registry import MEASURES, Settings, run
-from glider.tools.measure.benchmark.timing import alternate, median, process_seconds, seconds
+from glider.tools.verify.benchmark import plant_speed as plant
+from glider.tools.verify.benchmark.registry import MEASURES, Settings, run
+from glider.tools.verify.benchmark.timing import alternate, median, process_seconds, seconds
 
 needs_cc = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 STEPS = 5000

@@ -14,8 +14,8 @@ from support.cases import make_case
 from support.dask_cluster import dask_cluster
 
 from glider.sim_backend.core.effects import effect_layout as ef
-from glider.tools.study.challenge.diagnose_all import run
-from glider.tools.study.challenge.diagnosis import TIMING
+from glider.tools.verify.challenge.diagnose_all import run
+from glider.tools.verify.challenge.diagnosis import TIMING
 
 pytestmark = pytest.mark.computes(seconds=25)
 

@@ -20,7 +20,7 @@ from glider.firmware.core.control.law import OK, STEEP, solve_inputs
 from glider.firmware.core.control.law_plus import on_outputs
 from glider.firmware.core.jit import PACKAGES_DIR
 from glider.firmware.core.vehicle import layout
-from glider.tools.measure.figures import law
+from glider.tools.verify.figures import law
 from tests.support.examples import examples
 
 
@@ -112,7 +112,7 @@ def test_derivative_of_the_plant_is_the_nominal_one_here():
 
 
 def test_figures_of_the_document_are_those_measured(capsys):
-    """The two tables that `python -m glider.tools.measure.figures.law` prints stand in docs/CONTROL.md, row by row."""
+    """The two tables that `python -m glider.tools.verify.figures.law` prints stand in docs/CONTROL.md, row by row."""
     law.main()
     printed = [line.split("|") for line in capsys.readouterr().out.splitlines() if line.startswith("|")]
     document = (PACKAGES_DIR / "docs" / "CONTROL.md").read_text(encoding="utf-8").splitlines()

@@ -6,8 +6,8 @@ import math
 import pytest
 
 from glider.tools.data.errors import InputError
-from glider.tools.study.challenge.diagnosis import AnsweredCause, AnswerFile, Where, read_diagnosis
-from glider.tools.study.challenge.score import ScoredCase, by_label, score
+from glider.tools.verify.challenge.diagnosis import AnsweredCause, AnswerFile, Where, read_diagnosis
+from glider.tools.verify.challenge.score import ScoredCase, by_label, score
 
 SURGE, NET = ["hydrodynamics", "surge"], ["mass", "net"]
 
