@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from independent.make_reference import FOLDER, MANOEUVRES, fly_manoeuvre
-from model_states import P
 
 from glider.tools.flight.simulate import PSI, STATES, fly_commands, read_commands
 from glider.tools.verify.arm64.emulated import BOUNDS, CURRENT
+from tests.independent.make_reference import FOLDER, MANOEUVRES, fly_manoeuvre
+from tests.support.model_states import P
 
 OWN = sorted(FOLDER.glob("*.csv"))
 SHARED = ("current", "dive", "reversal", "sawtooth", "steep", "turn_climb", "turn_dive")

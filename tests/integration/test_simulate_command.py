@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.commands import glider
 
 from glider.tools.cli.common import report_errors
 from glider.tools.cli.main import cli
 from glider.tools.flight.simulate import COLUMNS
+from tests.support.commands import glider
 
 FLIGHT = Path(__file__).resolve().parents[1] / "data" / "reference" / "down_and_up.csv"
 HEADER = ",".join(COLUMNS)

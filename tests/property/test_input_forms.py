@@ -8,11 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from independent.make_reference import VEHICLE
-from independent.nominal import DOWN, GRAVITY, Glider, body_to_ned, euler_angle_rates, skew
-from law_flights import down, form_at, output_accelerations, outputs, plant_rates
-from law_states import actuator_speeds, flying, trimmed_vehicles
-from model_states import P, derivative, state
 
 from glider.firmware.core.control import input_forms
 from glider.firmware.core.control.input_forms import exact_form, paper_form
@@ -21,7 +16,12 @@ from glider.firmware.core.control.law_plus import on_outputs
 from glider.firmware.core.jit import PACKAGES_DIR
 from glider.firmware.core.vehicle import layout
 from glider.tools.verify.figures import law
+from tests.independent.make_reference import VEHICLE
+from tests.independent.nominal import DOWN, GRAVITY, Glider, body_to_ned, euler_angle_rates, skew
 from tests.support.examples import examples
+from tests.support.law_flights import down, form_at, output_accelerations, outputs, plant_rates
+from tests.support.law_states import actuator_speeds, flying, trimmed_vehicles
+from tests.support.model_states import P, derivative, state
 
 
 def scaled_glider(factors) -> tuple[Glider, np.ndarray]:

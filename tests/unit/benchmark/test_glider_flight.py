@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from support.ocean import as_case, fly_dives
 
 from glider.sim_backend.foreign import ocean as foreign
 from glider.sim_backend.ocean.core import layout as at
@@ -22,6 +21,7 @@ from glider.tools.verify.benchmark.glider_flight import (
     water_rms,
 )
 from glider.tools.verify.challenge.ocean_cases import shipped_vehicle
+from tests.support.ocean import as_case, fly_dives
 
 DIVES, REFERENCE, FIRST = 10, 5, 7
 

@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 from hypothesis import strategies as st
-from law_flights import Gains, Reference, output_accelerations, outputs, plant_rates, without_stops
-from model_states import RATE, VEHICLE_TEXT, P, actuators, angles, rates, state, vehicles, velocities
 
 from glider.firmware.core.vehicle import layout
 from glider.firmware.model.estimator_settings import parameter_sigma
 from glider.firmware.model.vehicle import decode_vehicle
+from tests.support.law_flights import Gains, Reference, output_accelerations, outputs, plant_rates, without_stops
+from tests.support.model_states import RATE, VEHICLE_TEXT, P, actuators, angles, rates, state, vehicles, velocities
 
 SPREAD = 3.0 * parameter_sigma(P, decode_vehicle(VEHICLE_TEXT, "roughie").uncertainty)
 actuator_speeds = st.tuples(*(st.floats(-rate, rate) for rate in RATE))
