@@ -424,12 +424,9 @@ def described(record: DiagnosisRecord) -> list[dict[str, Any]]:
         if abs(found.sigma) < UNCLEAN:
             continue
         empty = {
-            "channel": channel(found.channel),
-            "axis": AXES.get(found.channel, ""),
-            "sigma": 0.0,
-            "shape": [],
+            "channel": channel(found.channel), "axis": AXES.get(found.channel, ""), "sigma": 0.0, "shape": [],
             "correlated": [],
-        }
+        }  # fmt: skip
         row = rows.setdefault(found.channel, empty)
         row["sigma"] = max(row["sigma"], float(abs(found.sigma)))
         text = f"{finding(found, record.details.data.log_rate_hz)} ({abs(found.sigma):.0f})"

@@ -17,12 +17,9 @@ BINS = 5
 POINTS = 200  # of a distribution
 TAIL = 98.0  # percentile at which a distribution's axis ends
 CONDITIONS = (
-    ("current_m_s", "current", "m/s"),
-    ("wave_height_m", "wave height", "m"),
-    ("wave_period_s", "wave period", "s"),
-    ("disturbance", "disturbance", "m/s2, rad/s2"),
-    ("start_depth_m", "depth at the start", "m"),
-)
+    ("current_m_s", "current", "m/s"), ("wave_height_m", "wave height", "m"), ("wave_period_s", "wave period", "s"),
+    ("disturbance", "disturbance", "m/s2, rad/s2"), ("start_depth_m", "depth at the start", "m"),
+)  # fmt: skip
 ERRORS = (("depth_error_m", "depth error, m", "m", 1.0), ("pitch_error_rad", "pitch error, deg", "deg", 180.0 / np.pi))
 CONTROLLER_NAMES = {"pid_tuned": "PID best-tuned", **{name: row.title for name, row in CONTROLLERS.items()}}
 

@@ -12,14 +12,11 @@ from glider.tools.study.campaign.flights import ENDINGS
 ALL = "all"
 # name in the result, column of the table, factor from SI
 MEASURES = (
-    ("depth_error_m", "depth_error_m", 1.0),
-    ("pitch_error_deg", "pitch_error_rad", 180.0 / math.pi),
-    ("roll_error_deg", "roll_error_rad", 180.0 / math.pi),
-    ("seconds", "seconds", 1.0),
-    ("servo_travel_rad", "servo_travel_rad", 1.0),
-    ("slider_travel_m", "slider_travel_m", 1.0),
+    ("depth_error_m", "depth_error_m", 1.0), ("pitch_error_deg", "pitch_error_rad", 180.0 / math.pi),
+    ("roll_error_deg", "roll_error_rad", 180.0 / math.pi), ("seconds", "seconds", 1.0),
+    ("servo_travel_rad", "servo_travel_rad", 1.0), ("slider_travel_m", "slider_travel_m", 1.0),
     ("ballast_travel_kg", "ballast_travel_kg", 1.0),
-)
+)  # fmt: skip
 
 
 def _spread(values: np.ndarray) -> dict[str, float | None]:

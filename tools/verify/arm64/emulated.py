@@ -212,14 +212,8 @@ def enter(release: Path, options: argparse.Namespace) -> dict[str, Any]:
     found = options.folder / RESULT
     found.write_text("{}")
     command = [
-        *ALONE,
-        sys.executable,
-        "-m",
-        "glider.tools.verify.arm64.emulated",
-        *sys.argv[1:],
-        "--inside",
-        str(release),
-    ]
+        *ALONE, sys.executable, "-m", "glider.tools.verify.arm64.emulated", *sys.argv[1:], "--inside", str(release),
+    ]  # fmt: skip
     try:
         subprocess.run(command, timeout=options.limit, stdout=sys.stderr)
     except subprocess.TimeoutExpired:

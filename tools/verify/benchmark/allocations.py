@@ -22,12 +22,9 @@ class _Allocator(ctypes.Structure):
     """PyMemAllocatorEx of the C API."""
 
     _fields_ = (
-        ("ctx", ctypes.c_void_p),
-        ("malloc", ctypes.c_void_p),
-        ("calloc", ctypes.c_void_p),
-        ("realloc", ctypes.c_void_p),
-        ("free", ctypes.c_void_p),
-    )
+        ("ctx", ctypes.c_void_p), ("malloc", ctypes.c_void_p), ("calloc", ctypes.c_void_p),
+        ("realloc", ctypes.c_void_p), ("free", ctypes.c_void_p),
+    )  # fmt: skip
 
 
 @cache

@@ -20,13 +20,8 @@ EVERY = 5  # rows
 FORCE, MOMENT = 0.3, 0.03  # N, N m: what counts as much
 STEPS, DAMPING, DIFFERENCE_STEP = 3, 1e-3, 1e-2
 FITTED_PLACES = (
-    *range(COEFFICIENTS.start, COEFFICIENTS.stop),
-    layout.A_X,
-    layout.A_Y,
-    layout.A_Z,
-    layout.B_Y,
-    layout.B_Z,
-)
+    *range(COEFFICIENTS.start, COEFFICIENTS.stop), layout.A_X, layout.A_Y, layout.A_Z, layout.B_Y, layout.B_Z,
+)  # fmt: skip
 
 
 def formless(F: np.ndarray) -> np.ndarray:

@@ -70,15 +70,9 @@ def run(job: tuple[int, str], disabled: int | None = None) -> FaultOutcome:
         observed = fly(scene, case.row, allowed_s=case.allowed_s, disabled=disabled)
         scene.finish()
     return FaultOutcome(
-        case.row,
-        case.name,
-        phase,
-        observed.noticed_s,
-        case.allowed_s,
-        observed.reaction.name,
-        case.expected.name,
+        case.row, case.name, phase, observed.noticed_s, case.allowed_s, observed.reaction.name, case.expected.name,
         observed.ended,
-    )
+    )  # fmt: skip
 
 
 def _muted() -> None:
