@@ -11,7 +11,7 @@ import numpy as np
 from glider.tools.data.errors import InputError
 from glider.tools.data.intervals import wilson
 from glider.tools.verify.challenge.diagnosis import TIMING
-from glider.tools.verify.challenge.judge import open_sealed
+from glider.tools.verify.challenge.judge import manifest_beside, open_sealed
 from glider.tools.verify.challenge.score import LARGEST_GROUP, ScoreFigure
 from glider.tools.verify.challenge.watch_answer import REFERENCE, WATCH_FILE, EventSaid, WatchSaid, read_watch
 from glider.tools.verify.challenge.watch_plan import CHANGED, OUTSIDE, UNCHANGED
@@ -152,8 +152,7 @@ def gather_watches(
 ) -> list[Watched]:
     """Open and check the answers, and gather what was said to every vehicle of a blind test's folder."""
     folder = cases / "cases" if (cases / "cases").is_dir() else cases
-    beside = next((p for p in (folder.parent / "manifest.json", folder / "manifest.json") if p.is_file()), None)
-    opened = open_sealed(answers, manifest or beside, folder, folder.parent / REFERENCE, needed)
+    opened = open_sealed(answers, manifest or manifest_beside(folder), folder, folder.parent / REFERENCE, needed)
     if not said.is_dir():
         raise InputError("no such folder", source=said)
     found = []
