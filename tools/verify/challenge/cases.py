@@ -1,6 +1,6 @@
 """One blind case from its plan to its files: drawn, sized, flown, written, and its answer."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -112,11 +112,16 @@ def _setting(size: Magnitude) -> dict[str, Any]:
     return {"label": size.form.label, "values": (size.sizes * size.strength).tolist(), **found}
 
 
+def write_flights(folder: Path, trial: Trial, flights: list[TrialFlight]) -> None:
+    """Flights as a case's run data, numbered from 0."""
+    runs = [replace(flight.run, name=f"run{n:02d}") for n, flight in enumerate(flights)]
+    write_case(
+        folder, runs, vehicle=trial.vehicle.name, site=trial.site.name, log_rate_hz=LOG_RATE,
+        water_density_kg_m3=DENSITY, motion_capture=trial.site.mocap, suffix=".csv.gz", decimals=DECIMALS,
+    )  # fmt: skip
+
+
 def write(made: Made, cases: Path, held: Path) -> None:
     """The case's run data: the fitted runs under `cases`, the others under `held`."""
     for folder, flights in ((cases, made.flights[:FITTED]), (held, made.flights[FITTED:])):
-        write_case(
-            folder / made.plan.name, [flight.run for flight in flights], vehicle=made.trial.vehicle.name,
-            site=made.trial.site.name, log_rate_hz=LOG_RATE, water_density_kg_m3=DENSITY,
-            motion_capture=made.trial.site.mocap, suffix=".csv.gz", decimals=DECIMALS,
-        )  # fmt: skip
+        write_flights(folder / made.plan.name, made.trial, flights)

@@ -14,8 +14,7 @@ from glider.firmware.model.vehicle import Vehicle
 from glider.sim_backend.foreign import foreign_layout as fo
 from glider.sim_backend.foreign.foreign_mission import fly_mission
 from glider.sim_backend.uncertainty import sensor_errors
-from glider.tools.data.runs.case import write_case
-from glider.tools.verify.challenge.cases import DECIMALS, DENSITY, LOG_RATE, NoCase
+from glider.tools.verify.challenge.cases import NoCase, write_flights
 from glider.tools.verify.challenge.design import FITTED, HELD, LAKE, POOL, STYLES, DesignSite, RunDesign, draw_run
 from glider.tools.verify.challenge.form_fit import fit_flights, fit_forces, formless, residual
 from glider.tools.verify.challenge.form_plan import BY_LABEL, CHANGES, OUTSIDE, FormCounts, FormPlan
@@ -258,15 +257,6 @@ def form_answer(made: MadeForm) -> dict[str, Any]:
         "site": trial.site.name,
         "tries": made.tries,
     }
-
-
-def write_flights(folder: Path, trial: Trial, flights: list[TrialFlight]) -> None:
-    """Flights as a case's run data, numbered from 0."""
-    runs = [replace(flight.run, name=f"run{n:02d}") for n, flight in enumerate(flights)]
-    write_case(
-        folder, runs, vehicle=trial.vehicle.name, site=trial.site.name, log_rate_hz=LOG_RATE,
-        water_density_kg_m3=DENSITY, motion_capture=trial.site.mocap, suffix=".csv.gz", decimals=DECIMALS,
-    )  # fmt: skip
 
 
 def write_form_case(made: MadeForm, cases: Path, held: Path, reference: Path, healthy: Path) -> None:

@@ -1,12 +1,12 @@
 """Which vehicles of another form a blind test holds, what changes in them, and how much."""
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from glider.sim_backend.foreign import foreign_layout as fo
 from glider.tools.verify.challenge.forms import FORMS, Form
-from glider.tools.verify.challenge.plan import NONE, SINGLE, UNKNOWN
+from glider.tools.verify.challenge.plan import NONE, SINGLE, UNKNOWN, Planned
 
 
 @dataclass(frozen=True)
@@ -24,20 +24,11 @@ class FormCounts:
 
 
 @dataclass(frozen=True)
-class FormPlan:
-    """One vehicle before anything is drawn for it."""
+class FormPlan(Planned):
+    """One vehicle; its kind is NONE, SINGLE or UNKNOWN."""
 
-    number: int
-    kind: str  # NONE, SINGLE or UNKNOWN, as in plan.py
     label: str | None
     mocap: bool  # of the later runs; the reference has it always
-
-    @property
-    def name(self) -> str:
-        return f"case{self.number:03d}"
-
-    def plain(self) -> dict:
-        return asdict(self)
 
 
 def _outside(label: str, element: str, entry: int, size: float, most: float, negative: float = 0.0) -> Form:

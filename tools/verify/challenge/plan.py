@@ -29,15 +29,11 @@ MESSY = Counts(100, 20, 0, 20)
 
 
 @dataclass(frozen=True)
-class CasePlan:
-    """One case before anything is drawn for it."""
+class Planned:
+    """One case of a blind test before anything is drawn for it."""
 
     number: int
     kind: str
-    labels: tuple[str, ...]
-    weak: tuple[bool, ...]
-    mocap: bool
-    messy: bool = False  # noise is not what the file says, and small effects act beside
 
     @property
     def name(self) -> str:
@@ -45,6 +41,16 @@ class CasePlan:
 
     def plain(self) -> dict:
         return asdict(self)
+
+
+@dataclass(frozen=True)
+class CasePlan(Planned):
+    """Its effects."""
+
+    labels: tuple[str, ...]
+    weak: tuple[bool, ...]
+    mocap: bool
+    messy: bool = False  # noise is not what the file says, and small effects act beside
 
 
 def _turns(rng: np.random.Generator, forms: tuple[Form, ...], count: int) -> list[tuple[Form, bool]]:

@@ -13,8 +13,7 @@ import numpy as np
 from glider.firmware.model.vehicle import Vehicle
 from glider.sim_backend.foreign import foreign_layout as fo
 from glider.sim_backend.uncertainty import draw_parameters, sensor_errors
-from glider.tools.data.runs.case import write_case
-from glider.tools.verify.challenge.cases import DECIMALS, DENSITY, LOG_RATE, NoCase
+from glider.tools.verify.challenge.cases import NoCase, write_flights
 from glider.tools.verify.challenge.design import LAKE, POOL, STYLES, draw_run
 from glider.tools.verify.challenge.forms import FORMS, KNOWN, Form, draw_shapes, draw_waves
 from glider.tools.verify.challenge.magnitude import find_strength, visible
@@ -168,8 +167,4 @@ def write_vehicle(made: MadeVehicle, counts: WatchCounts, cases: Path, reference
     """The runs before the change under `reference`, those that are watched under `cases`."""
     parts = ((reference, made.flights[: counts.reference]), (cases, made.flights[counts.reference :]))
     for folder, flights in parts:
-        write_case(
-            folder / made.plan.name, [flight.run for flight in flights], vehicle=made.trial.vehicle.name,
-            site=made.trial.site.name, log_rate_hz=LOG_RATE, water_density_kg_m3=DENSITY,
-            motion_capture=made.trial.site.mocap, suffix=".csv.gz", decimals=DECIMALS,
-        )  # fmt: skip
+        write_flights(folder / made.plan.name, made.trial, flights)

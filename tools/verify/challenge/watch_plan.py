@@ -1,10 +1,11 @@
 """Which vehicles a blind test of `glider gap watch` holds: what changes, in which runs, by which course."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
 from glider.tools.verify.challenge.forms import KNOWN, SECRET, Form
+from glider.tools.verify.challenge.plan import Planned
 
 UNCHANGED, CHANGED, OUTSIDE = "unchanged", "changed", "outside"
 STEP, EPISODE, GROWING = "step", "episode", "growing"
@@ -30,20 +31,14 @@ class WatchCounts:
 
 
 @dataclass(frozen=True)
-class VehiclePlan:
-    """One vehicle before anything is drawn for it; runs are counted from the first that is watched."""
+class VehiclePlan(Planned):
+    """One vehicle; runs are counted from the first that is watched."""
 
-    number: int
-    kind: str
     label: str | None
     course: str | None
     first: int | None
     last: int | None  # None: still there at the end
     mocap: bool
-
-    @property
-    def name(self) -> str:
-        return f"case{self.number:03d}"
 
     def strengths(self, judged: int) -> np.ndarray:
         """Strength of the change in each watched run, (judged,), 1 at its full size."""
@@ -54,9 +49,6 @@ class VehiclePlan:
         grown = np.arange(1, end - self.first + 1) / (end - self.first)
         found[self.first : end] = grown if self.course == GROWING else 1.0
         return found
-
-    def plain(self) -> dict:
-        return asdict(self)
 
 
 def draw_span(rng: np.random.Generator, course: str, judged: int) -> tuple[int, int | None]:
