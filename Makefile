@@ -8,7 +8,7 @@ DEMO_STAMP := $(VENV)/.installed-demo
 # Python keeps the bytecode of what it reads: the tests start some hundred programs.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: setup demo picture test explore check lint types contract benchmark deploy rollback arm64 clean
+.PHONY: setup demo picture test explore check lint types contract bounds benchmark deploy rollback arm64 clean
 
 # Kernels are compiled here, with a word about it, and again only when they change.
 setup: $(STAMP)
@@ -60,6 +60,11 @@ types: $(STAMP)
 
 contract: $(STAMP)
 	$(BIN)/lint-imports
+
+# The lowest versions that pyproject.toml promises, and the newest Python and versions: a quarter of an hour each.
+bounds:
+	.ci/bounds lowest python3.11
+	.ci/bounds newest python3.13
 
 benchmark: setup
 	$(BIN)/glider benchmark
