@@ -12,7 +12,7 @@ import random
 import signal
 import tempfile
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -267,29 +267,19 @@ def _rows(topic: Any) -> bytes:
     return b"" if topic.data is None else topic.data.tobytes()
 
 
-@dataclass
-class Piece:
-    """A chunk: where it begins, and the times of its last record and the last before it, ns."""
-
-    start: int
-    last_ns: int
-    topics: set[str] = field(default_factory=set)
-
-
-def chunk_ends(path: Path) -> list[Piece]:
-    """The chunks of a log by their own index, which the standard reader reads."""
+def chunk_ends(path: Path) -> list[tuple[int, int]]:
+    """Where each chunk of a log begins and the time of its last record, ns, by its own index."""
     from mcap.reader import make_reader
 
     with path.open("rb") as file:
         summary = make_reader(file).get_summary()
     assert summary is not None
-    found = [Piece(index.chunk_start_offset, index.message_end_time) for index in summary.chunk_indexes]
-    return sorted(found, key=lambda piece: piece.start)
+    return sorted((index.chunk_start_offset, index.message_end_time) for index in summary.chunk_indexes)
 
 
-def _lost_s(log: Any, pieces: list[Piece], cut: int, began_ns: int) -> float:
+def _lost_s(log: Any, pieces: list[tuple[int, int]], cut: int, began_ns: int) -> float:
     """Seconds between the last record read (none: the first) and the last of the piece in which the cut lies."""
-    begun = [piece.last_ns for piece in pieces if piece.start < cut]
+    begun = [last_ns for start, last_ns in pieces if start < cut]
     if not begun:
         return 0.0
     read = [int(topic.times_ns.max()) for topic in log.topics.values() if topic.count]
