@@ -8,7 +8,7 @@ DEMO_STAMP := $(VENV)/.installed-demo
 # Python keeps the bytecode of what it reads: the tests start some hundred programs.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: setup demo picture test explore check lint types contract benchmark deploy rollback arm64 clean
+.PHONY: setup demo picture test explore check lint types contract bounds benchmark deploy rollback arm64 clean
 
 # Kernels are compiled here, with a word about it, and again only when they change.
 setup: $(STAMP)
@@ -31,7 +31,7 @@ $(DEMO_STAMP): pyproject.toml constraints.txt
 	$(call install,analysis)
 
 demo: $(DEMO_STAMP)
-	@$(BIN)/python -m glider.tools.measure.demo
+	@$(BIN)/python -m glider.tools.verify.demo
 
 # README's picture: the top of the demo's report.
 picture: demo
@@ -61,6 +61,11 @@ types: $(STAMP)
 contract: $(STAMP)
 	$(BIN)/lint-imports
 
+# The lowest versions that pyproject.toml promises, and the newest Python and versions: a quarter of an hour each.
+bounds:
+	.ci/bounds lowest python3.11
+	.ci/bounds newest python3.13
+
 benchmark: setup
 	$(BIN)/glider benchmark
 
@@ -79,7 +84,7 @@ rollback: $(STAMP)
 # Outside this folder: /proc and /dev are mounted in it while it runs, and pip and `clean` walk through all that lies here.
 ARM64 ?= /var/tmp/glider-arm64
 arm64: $(STAMP)
-	$(BIN)/python -m glider.tools.deploy.emulated $(ARM64) $(if $(QUICK),--quick)
+	$(BIN)/python -m glider.tools.verify.arm64.emulated $(ARM64) $(if $(QUICK),--quick)
 
 clean:
 	rm -rf --one-file-system $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis

@@ -20,14 +20,11 @@ from glider.hal.strict import ConfigError
 
 MODES = {ctl.WAITING: "waiting", ctl.FLYING: "flying", ctl.COMPLETED: "completed", ctl.ABORTED: "aborted"}
 REASONS = {
-    ctl.REASON_NONE: "",
-    ctl.REASON_LEG_TIME: "leg over its time limit",
-    ctl.REASON_MISSION_TIME: "mission over its time limit",
-    ctl.REASON_IMU: "no attitude",
-    ctl.REASON_BEACON: "no depth",
-    ctl.REASON_TOO_DEEP: "deeper than the site",
+    ctl.REASON_NONE: "", ctl.REASON_LEG_TIME: "leg over its time limit",
+    ctl.REASON_MISSION_TIME: "mission over its time limit", ctl.REASON_IMU: "no attitude",
+    ctl.REASON_BEACON: "no depth", ctl.REASON_TOO_DEEP: "deeper than the site",
     ctl.REASON_OPERATOR: "asked to by the operator",
-}
+}  # fmt: skip
 ESTIMATORS = {"measured": ctl.MEASURED, "filter": ctl.FILTERED, "given": ctl.GIVEN}
 
 

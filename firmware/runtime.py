@@ -7,11 +7,9 @@ simulated; the code is the same. Nothing is allocated inside a tick but a few bo
 import copy
 import gc
 import math
-import os
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import IntEnum
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,6 +22,7 @@ from glider.firmware.core.layouts import supervisor_layout as sup
 from glider.firmware.faults import Reaction
 from glider.firmware.supervisor import Supervisor
 from glider.hal.ports import FRAME_SIZE, SLOTS, Hardware, Ports
+from glider.hal.usage import open_files, resident_bytes
 
 HISTOGRAM_EDGES = np.array([0.0, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, np.inf])  # s
 SHED = 10  # of so many records one is kept while the loop is late
@@ -56,11 +55,7 @@ class Timing:
 
 def resources_used() -> tuple[float, int]:
     """Resident memory of this process (MB) and its open handles; zeros where the system does not say."""
-    try:
-        pages = int(Path("/proc/self/statm").read_text().split()[1])
-        return pages * os.sysconf("SC_PAGE_SIZE") / 1e6, len(os.listdir("/proc/self/fd"))
-    except OSError:
-        return 0.0, 0
+    return resident_bytes() / 1e6, open_files()
 
 
 def rehearse(autopilot: Autopilot, supervisor: Supervisor) -> None:

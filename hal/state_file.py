@@ -22,13 +22,9 @@ _MAGIC = b"glider-state-2 "
 # Files written before states had names: a number, in this order.
 _MAGIC_1 = b"glider-state-1 "
 _STATES_1 = (
-    SortieState.ASHORE,
-    SortieState.HELD,
-    SortieState.ARMED,
-    SortieState.DIVING,
-    SortieState.ABORTED,
+    SortieState.ASHORE, SortieState.HELD, SortieState.ARMED, SortieState.DIVING, SortieState.ABORTED,
     SortieState.UNKNOWN,
-)
+)  # fmt: skip
 _WORDS = {
     SortieState.ASHORE: "ashore",
     SortieState.ENDED: "ended at the surface",

@@ -14,38 +14,16 @@ class Unit(NamedTuple):
 
 
 UNITS = {
-    "m": Unit("length", 1.0),
-    "cm": Unit("length", 0.01),
-    "mm": Unit("length", 0.001),
-    "ft": Unit("length", 0.3048),
-    "in": Unit("length", 0.0254),
-    "rad": Unit("angle", 1.0),
-    "deg": Unit("angle", math.pi / 180.0),
-    "rad/s": Unit("rate", 1.0),
-    "deg/s": Unit("rate", math.pi / 180.0),
-    "kg": Unit("mass", 1.0),
-    "g": Unit("mass", 0.001),
-    "lb": Unit("mass", 0.45359237),
-    "ml": Unit("volume", 1e-6),
-    "l": Unit("volume", 1e-3),
-    "Pa": Unit("pressure", 1.0),
-    "hPa": Unit("pressure", 100.0),
-    "kPa": Unit("pressure", 1e3),
-    "MPa": Unit("pressure", 1e6),
-    "mbar": Unit("pressure", 100.0),
-    "dbar": Unit("pressure", 1e4),
-    "bar": Unit("pressure", 1e5),
-    "psi": Unit("pressure", 6894.757293168),
-    "deg C": Unit("temperature", 1.0),
-    "V": Unit("voltage", 1.0),
-    "s": Unit("time", 1.0),
-    "ms": Unit("time", 1e-3),
-    "us": Unit("time", 1e-6),
-    "ns": Unit("time", 1e-9),
-    "min": Unit("time", 60.0),
-    "h": Unit("time", 3600.0),
-    "counts": Unit("counts", 1.0),
-}
+    "m": Unit("length", 1.0), "cm": Unit("length", 0.01), "mm": Unit("length", 0.001), "ft": Unit("length", 0.3048),
+    "in": Unit("length", 0.0254), "rad": Unit("angle", 1.0), "deg": Unit("angle", math.pi / 180.0),
+    "rad/s": Unit("rate", 1.0), "deg/s": Unit("rate", math.pi / 180.0), "kg": Unit("mass", 1.0),
+    "g": Unit("mass", 0.001), "lb": Unit("mass", 0.45359237), "ml": Unit("volume", 1e-6), "l": Unit("volume", 1e-3),
+    "Pa": Unit("pressure", 1.0), "hPa": Unit("pressure", 100.0), "kPa": Unit("pressure", 1e3),
+    "MPa": Unit("pressure", 1e6), "mbar": Unit("pressure", 100.0), "dbar": Unit("pressure", 1e4),
+    "bar": Unit("pressure", 1e5), "psi": Unit("pressure", 6894.757293168), "deg C": Unit("temperature", 1.0),
+    "V": Unit("voltage", 1.0), "s": Unit("time", 1.0), "ms": Unit("time", 1e-3), "us": Unit("time", 1e-6),
+    "ns": Unit("time", 1e-9), "min": Unit("time", 60.0), "h": Unit("time", 3600.0), "counts": Unit("counts", 1.0),
+}  # fmt: skip
 
 
 def units_of(*kinds: str) -> list[str]:

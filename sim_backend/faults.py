@@ -149,7 +149,7 @@ class SimulatedEscape:
 
     def __init__(self, world: World, pump: FaultyActuator, weight_kg: float = 0.6):
         self._world, self._pump, self._weight = world, pump, weight_kg
-        self.ascending = self.released = False
+        self.ascending = False
 
     def ascend(self) -> None:
         """The pump to its light end, by another way than the flight's, if it can be reached."""
@@ -160,7 +160,6 @@ class SimulatedEscape:
             self._world.cmd[2] = self._world.P[BALLAST_MIN]
 
     def release(self) -> None:
-        self.released = True
         self._world.P[NET_MASS] -= self._weight
 
 

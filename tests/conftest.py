@@ -1,5 +1,6 @@
 """Fixtures for all tests."""
 
+import collections
 import contextlib
 import functools
 import gc
@@ -112,7 +113,7 @@ def unwritten() -> Iterator[None]:
     the kernels would be compiled again.
     """
     yield
-    if (states := sys.modules.get("model_states")) is not None:
+    if (states := sys.modules.get("tests.support.model_states")) is not None:
         anew = states.decode_vehicle(states.VEHICLE_TEXT, "roughie").vector()
         assert states.P.tobytes() == anew.tobytes(), "P was written into"
 
@@ -124,3 +125,11 @@ def compiled(request) -> None:
         from glider.tools.flight.precompile import FLIGHT, ensure_compiled
 
         ensure_compiled(FLIGHT, lambda text: None, lambda label, total: contextlib.nullcontext(lambda n: None))
+
+
+def pytest_terminal_summary(terminalreporter):
+    """What was skipped and why, in a line that no -q hides."""
+    reasons = collections.Counter(report.longrepr[2] for report in terminalreporter.stats.get("skipped", []))
+    if reasons:
+        said = "; ".join(f"{count} {reason.removeprefix('Skipped: ')}" for reason, count in reasons.most_common())
+        terminalreporter.write_line(f"skipped {reasons.total()}: {said}")

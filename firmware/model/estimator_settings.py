@@ -14,10 +14,6 @@ SPEED_ERROR = 0.1  # share of the speed, over 1 s
 SERVO_WALK, SLIDER_WALK, BALLAST_WALK = 0.002, 0.0002, 0.0003  # rad, m, kg, each per square root of a second
 UNSEEN_SERVO_WALK = 0.2  # rad per square root of a second: a servo turns where the pilot wants, unannounced
 
-# Before the first measurement: recordings begin at rest, at a launch or within a glide. One linearisation does not
-# reach from one to the other, so forward speeds are tried one by one, each with SPEED_SPREAD.
-START_SPEEDS = (0.0, 0.1, 0.2, 0.3, 0.45, 0.6)  # m/s
-
 # 1 sigma before the first measurement
 POSITION_SPREAD, ATTITUDE_SPREAD = 1.0, 0.3  # m, rad, about the first readings
 SPEED_SPREAD = (0.05, 0.02, 0.02)  # m/s

@@ -54,7 +54,7 @@ class Vn100(Sensor):
         level = table.mount_deg == (0.0, 0.0, 0.0)
         self._R_bd = None if level else rotation(*(math.radians(angle) for angle in table.mount_deg))
         self.decoder = vn100.Vn100Decoder()
-        self.errors = self._bad = 0
+        self._bad = 0
         self._send: Callable[[bytes], bool] = lambda data: False
         self._heard_at = self._asked_at = -math.inf
 
@@ -87,8 +87,6 @@ class Vn100(Sensor):
                 newest = None if numbers is None else (*numbers[:3], *numbers[9:])
             elif message.header == "VNRRG" and message.fields[0] in ("01", "1"):
                 self.model = ",".join(message.fields[1:])
-            elif message.header == "VNERR":
-                self.errors += 1
         if self.decoder.bad > self._bad:
             self.damage(now, self.decoder.bad - self._bad)
             self._bad = self.decoder.bad

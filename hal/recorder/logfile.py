@@ -16,7 +16,6 @@ from typing import Any
 from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, Writer
 
 from glider.hal.recorder import schema
-from glider.hal.recorder.chunk_list import use_packed_index
 from glider.hal.recorder.schema import RecordSpec
 
 CHUNK_BYTES = 16_384
@@ -60,7 +59,6 @@ def start_writer(stream: Any) -> Writer:
     writer = Writer(
         stream, chunk_size=CHUNK_BYTES, compression=CompressionType.NONE, enable_crcs=True, enable_data_crcs=True
     )
-    use_packed_index(writer)
     writer.start(profile="ros2", library=f"glider; {LIBRARY_IDENTIFIER}")
     return writer
 

@@ -43,7 +43,7 @@ class SerialLink:
     def __init__(self, name: str, port: SerialPort, handler: LineHandler):
         self.name, self.port, self.handler = name, port, handler
         self.connections = 0
-        self.bytes_in = self.bytes_refused = 0
+        self.bytes_in = 0
         self.trouble = "not opened yet"
         self.spent = 0  # bytes taken since the last tick
         self._out = bytearray()
@@ -69,7 +69,6 @@ class SerialLink:
     def send(self, data: bytes) -> bool:
         """Put bytes on the line as far as it takes them; the rest follows as it does."""
         if not self.up or len(self._out) + len(data) > OUT_LIMIT:
-            self.bytes_refused += len(data)
             return False
         self._out += data
         self.flush()

@@ -1,5 +1,7 @@
 """Board files of kind "twin": the devices of a real board, and the sea in which the plant behind them flies."""
 
+from typing import Any
+
 import msgspec
 
 from glider.hal import boardfile
@@ -49,26 +51,9 @@ def simulated_sensors(file: DeviceFile) -> dict[str, SampledSensor]:
     return sensors
 
 
-def simulated_text(file: TwinFile) -> str:
+def simulated_board(file: TwinFile) -> dict[str, Any]:
     """The board file of kind "sim" with the same rates, delays and sea: what a twin's flight is compared with."""
-    lines = ["format = 1", 'kind = "sim"', f"loop_hz = {file.loop_hz!r}", "", "[sensors]"]
-    for name, sensor in simulated_sensors(file).items():
-        lines.append(f"{name} = {{ rate_hz = {sensor.rate_hz!r}, delay_s = {sensor.delay_s:.6f} }}")
-    for table in ("environment", "start"):
-        lines += ["", f"[{table}]"]
-        for key, value in msgspec.to_builtins(getattr(file, table)).items():
-            if isinstance(value, bool):
-                lines.append(f"{key} = {str(value).lower()}")
-            elif isinstance(value, int | float):
-                lines.append(f"{key} = {float(value)!r}")
-            elif isinstance(value, list | tuple) and all(isinstance(item, float) for item in value) and value:
-                lines.append(f"{key} = {[float(item) for item in value]!r}")
-            elif value:
-                lines += [f"{key} = [" + ", ".join(_inline(item) for item in value) + "]"]
-    for label, values in file.effects.items():
-        lines += ["", f"[effects.{label}]", *(f"{key} = {value!r}" for key, value in values.items())]
-    return "\n".join(lines) + "\n"
-
-
-def _inline(table: dict) -> str:
-    return "{ " + ", ".join(f"{key} = {value!r}" for key, value in table.items()) + " }"
+    sea = {name: msgspec.to_builtins(getattr(file, name)) for name in ("environment", "start", "effects")}
+    found = simulated_sensors(file)
+    sensors = {name: {"rate_hz": one.rate_hz, "delay_s": round(one.delay_s, 6)} for name, one in found.items()}
+    return {"format": 1, "kind": "sim", "loop_hz": file.loop_hz, "sensors": sensors, **sea}

@@ -1,7 +1,7 @@
 """A Modbus line's twin: pymodbus's own serial server answers, and between it and the outer port stands the wire.
 
 The wire has the line's speed, the devices' turnaround, and their faults. Only whole requests for devices that are there
-reach the server: pymodbus 3.16 answers for those that are not. They reach it in memory, one after the other, as through
+reach the server: pymodbus answers for those that are not. They reach it in memory, one after the other, as through
 the null modem that pymodbus has for its own tests: a pseudo-terminal between would cost more than the server.
 """
 
@@ -12,7 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from pymodbus.server import ModbusSerialServer
-from pymodbus.server.requesthandler import ServerRequestHandler
+from pymodbus.transport import ModbusProtocol
 
 from glider.hal.boardfile import PortTable
 from glider.hal.protocols.modbus import ERROR, RtuDecoder, with_check_sum
@@ -21,13 +21,6 @@ from glider.sim_backend.twins.line import Line
 from glider.sim_backend.twins.modbus_devices import RegisterTwin
 
 TURNAROUND_S = 0.002
-
-
-class Handler(ServerRequestHandler):
-    """The server's end of a connection; asked in its own loop, it needs no waking as from another thread."""
-
-    def handle_later(self) -> None:
-        self.asked = self.loop.create_task(self.handle_request())  # kept: a loop only knows its tasks weakly
 
 
 class Within(asyncio.Transport):
@@ -54,14 +47,14 @@ class ModbusTwin:
         self._requests = RtuDecoder(requests=True)
         self._waiting: deque[tuple[RegisterTwin, bytes]] = deque()
         self._server: ModbusSerialServer | None = None
-        self._handler: Handler | None = None
+        self._handler: ModbusProtocol | None = None
 
     async def start(self) -> None:
         """Make pymodbus's server, connect to it, and plug the line in."""
         self._server = ModbusSerialServer(
             [device.sim for device in self.devices.values()], port=str(self.line.link), baudrate=self.line.baud
         )
-        self._handler = Handler(self._server, None, None, None)
+        self._handler = self._server.callback_new_connection()
         self._handler.connection_made(Within(self._answered))
         self.line.plug()
 

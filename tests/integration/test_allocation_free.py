@@ -8,8 +8,8 @@ from numba.core.runtime import _nrt_python, rtsys
 from glider.firmware.core.control import autopilot as core
 from glider.firmware.core.control.telemetry import N_RECORD, fill_record
 from glider.firmware.core.layouts import control_layout as ctl
-from glider.tools.measure.benchmark.allocations import BOXED, blocks_asked_for
-from glider.tools.measure.benchmark.tick import harness, measure_tick
+from glider.tools.verify.benchmark.allocations import BOXED, blocks_asked_for
+from glider.tools.verify.benchmark.tick import harness, measure_tick
 
 pytestmark = pytest.mark.computes(seconds=20)
 

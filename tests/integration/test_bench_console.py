@@ -9,11 +9,11 @@ import sys
 import time
 
 import pytest
-from support import commands
 
 from glider.hal.boardfile import calibration_hash, decode_device_file
 from glider.tools.bench.client import Bench
 from glider.tools.data.boards import load_board_file
+from tests.support import commands
 from tests.support.bench_session import Twins, session
 
 pytestmark = pytest.mark.realtime(seconds=180)

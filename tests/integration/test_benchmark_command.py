@@ -7,16 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from independent.flights import fly
-from independent.make_reference import VEHICLE
-from independent.nominal import Glider
 
 from glider.tools.cli.common import report_errors
 from glider.tools.cli.main import cli
 from glider.tools.data.errors import InputError
-from glider.tools.measure.benchmark import plant_speed as plant
-from glider.tools.measure.benchmark.registry import MEASURES, Settings, run
-from glider.tools.measure.benchmark.timing import alternate, median, process_seconds, seconds
+from glider.tools.verify.benchmark import plant_speed as plant
+from glider.tools.verify.benchmark.registry import MEASURES, Settings, run
+from glider.tools.verify.benchmark.timing import alternate, median, process_seconds, seconds
+from tests.independent.flights import fly
+from tests.independent.make_reference import VEHICLE
+from tests.independent.nominal import Glider
 
 needs_cc = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 STEPS = 5000

@@ -10,11 +10,11 @@ import time
 
 import numpy as np
 import pytest
-from support import commands
-from support.dask_cluster import dask_cluster
 
 from glider.tools.study.campaign.conduct import fly_campaign
 from glider.tools.study.campaign.plan import build_plan, load_campaign, with_options
+from tests.support import commands
+from tests.support.dask_cluster import dask_cluster
 
 pytestmark = pytest.mark.computes(seconds=20)
 

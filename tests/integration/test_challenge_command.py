@@ -11,9 +11,9 @@ from glider.tools.cli.common import report_errors
 from glider.tools.cli.main import cli
 from glider.tools.data.runs.case import load_case
 from glider.tools.data.sources import load_vehicle
-from glider.tools.study.challenge.make import Order, make, make_one
-from glider.tools.study.challenge.plan import Counts, plan
-from glider.tools.study.challenge.seal import open_answers
+from glider.tools.verify.challenge.make import Order, make, make_one
+from glider.tools.verify.challenge.plan import Counts, plan
+from glider.tools.verify.challenge.seal import open_answers
 
 pytestmark = pytest.mark.computes(seconds=20)
 

@@ -8,10 +8,10 @@ import pytest
 from glider.tools.cli.common import report_errors
 from glider.tools.cli.main import cli
 from glider.tools.data.runs.case import load_case
-from glider.tools.study.challenge.form_make import FormOrder
-from glider.tools.study.challenge.form_plan import FormCounts
-from glider.tools.study.challenge.make import make
-from glider.tools.study.challenge.seal import open_answers
+from glider.tools.verify.challenge.form_make import FormOrder
+from glider.tools.verify.challenge.form_plan import FormCounts
+from glider.tools.verify.challenge.make import make
+from glider.tools.verify.challenge.seal import open_answers
 
 pytestmark = pytest.mark.computes(seconds=240)
 

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from support.cases import make_case
 
 from glider.sim_backend.core.effects import effect_layout as ef
 from glider.tools.cli.common import report_errors
@@ -17,6 +16,7 @@ from glider.tools.data.errors import InputError
 from glider.tools.data.importers.csvlog import import_csv
 from glider.tools.data.runs.case import load_case
 from glider.tools.readings.check import check
+from tests.support.cases import make_case
 
 pytestmark = pytest.mark.computes(seconds=30)
 

@@ -13,7 +13,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from support.sshd import NAME, sshd
+
+from tests.support.sshd import NAME, sshd
 
 pytestmark = pytest.mark.computes(seconds=40)
 

@@ -4,8 +4,6 @@ import json
 
 import numpy as np
 import pytest
-from support.cases import make_case
-from support.commands import glider as run_glider
 
 from glider.sim_backend.core.effects import effect_layout as ef
 from glider.tools.cli.common import report_errors
@@ -16,6 +14,8 @@ from glider.tools.inference.channels import ROUGHIE_MEASURES
 from glider.tools.inference.corrected import LINKS
 from glider.tools.inference.load import load_model
 from glider.tools.inference.predict import predict
+from tests.support.cases import make_case
+from tests.support.commands import glider as run_glider
 
 pytestmark = pytest.mark.computes(seconds=40)
 

@@ -10,8 +10,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from support.flights import World, fly_case
-from support.pages import assert_offline
 
 from glider.firmware.core.vehicle import layout
 from glider.tools.cli.common import report_errors
@@ -19,6 +17,8 @@ from glider.tools.cli.main import cli
 from glider.tools.data.runs.case import load_case, write_case
 from glider.tools.inference.corrected import load_corrected
 from glider.tools.inference.model import nominal_model
+from tests.support.flights import World, fly_case
+from tests.support.pages import assert_offline
 
 HEAVY = 0.06  # kg, 12 times what [uncertainty] allows for
 PHONE = (390, 844)  # CSS pixels

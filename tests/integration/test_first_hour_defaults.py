@@ -1,7 +1,8 @@
 """The first hour with one's own log, every question of `vehicle new` answered by Enter: drag first, and its size."""
 
 import pytest
-from support.first_hour import ends_right, told
+
+from tests.support.first_hour import ends_right, told
 
 pytestmark = pytest.mark.computes(seconds=90)
 

@@ -1,7 +1,8 @@
 """The first hour with one's own log, the vehicle weighed, measured and swung by a person: drag first, and its size."""
 
 import pytest
-from support.first_hour import MEASURED, ends_right, told
+
+from tests.support.first_hour import MEASURED, ends_right, told
 
 pytestmark = pytest.mark.computes(seconds=90)
 

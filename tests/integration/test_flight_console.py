@@ -7,12 +7,12 @@ import time
 
 import pexpect
 import pytest
-from support.patience import patient_vehicle
-from support.twinned import DIVE, end_guard, twins, until
 
 from glider.hal.heartbeat import Guard, Heartbeat
 from glider.hal.sortie import SortieState
 from glider.hal.state_file import StateFile
+from tests.support.patience import patient_vehicle
+from tests.support.twinned import DIVE, end_guard, twins, until
 
 pytestmark = pytest.mark.realtime(seconds=40)
 NOISE = bytes(letter for letter in range(1, 256) if letter != 3) + b"\nenable\nabort\nyes\n\x1a\x1c\x13"

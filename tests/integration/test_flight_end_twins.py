@@ -9,13 +9,13 @@ import time
 from pathlib import Path
 
 import pytest
-from support.twinned import DIVE, end_guard, flying, guard_pid, twins, until
 
 from glider.hal.heartbeat import Heartbeat
 from glider.hal.outofband.plan import read_plan
 from glider.hal.sortie import SortieState
 from glider.hal.state_file import StateFile
 from glider.tools.bench.boardtext import accepted, set_values
+from tests.support.twinned import DIVE, end_guard, flying, guard_pid, twins, until
 
 pytestmark = pytest.mark.realtime(seconds=150)
 FLOATS_M = 0.5

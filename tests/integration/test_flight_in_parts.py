@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.patience import patient_vehicle
-from support.twinned import until
 
 from glider.tools.data.log.parts import FlightLog, read_flight
 from glider.tools.data.log.repair import repair
+from tests.support.patience import patient_vehicle
+from tests.support.twinned import until
 
 pytestmark = pytest.mark.realtime
 

@@ -6,7 +6,6 @@ import sys
 
 import numpy as np
 import pytest
-from support.commands import glider
 
 from glider.firmware.core.layouts import supervisor_layout as sup
 from glider.firmware.core.layouts.control_layout import LEG
@@ -20,6 +19,7 @@ from glider.tools.data.log.rundata import export_case
 from glider.tools.data.runs.case import load_case
 from glider.tools.flight.compose import build_flight, build_runtime, record_specs
 from glider.tools.inference.problem import problem_of
+from tests.support.commands import glider
 
 MANY = {
     "command_delay": {"delay": 0.355},

@@ -8,14 +8,14 @@ import sys
 import time
 
 import pytest
-from support.patience import patient_vehicle
-from support.twinned import until
 
 from glider.firmware.core.layouts import supervisor_layout as sup
 from glider.firmware.faults import Reaction
 from glider.hal.ports import SLOTS
 from glider.hal.recorder.recorder import NullRecorder
 from glider.tools.flight.compose import build_flight, build_runtime, record_specs
+from tests.support.patience import patient_vehicle
+from tests.support.twinned import until
 
 pytestmark = pytest.mark.realtime
 

@@ -3,12 +3,12 @@
 import sys
 
 import pytest
-from support.logs import DIP
-from support.patience import patient_vehicle
 
 from glider.tools.data.log.reader import read_log
 from glider.tools.data.log.rundata import export_case
-from glider.tools.measure.figures.devices import ATTITUDE_LIMIT_DEG, POSITION_LIMIT_M, compare_flights
+from glider.tools.verify.figures.devices import ATTITUDE_LIMIT_DEG, POSITION_LIMIT_M, compare_flights
+from tests.support.logs import DIP
+from tests.support.patience import patient_vehicle
 
 pytestmark = pytest.mark.realtime
 

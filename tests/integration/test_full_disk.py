@@ -7,7 +7,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from support.commands import glider
+
+from tests.support.commands import glider
 
 SCRIPT = """
 import json, subprocess, sys

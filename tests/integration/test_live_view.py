@@ -12,14 +12,14 @@ import time
 from pathlib import Path
 
 import pytest
-from support.sshd import NAME, sshd
-from support.twinned import until
 
 from glider.hal.recorder import live_stream
 from glider.hal.recorder.recorder import Recorder
 from glider.hal.recorder.schema import Field, RecordSpec
 from glider.tools.data.log.reader import read_log
 from glider.tools.flight.live_view import VIEW, LogLine, layout
+from tests.support.sshd import NAME, sshd
+from tests.support.twinned import until
 
 pytestmark = pytest.mark.realtime(seconds=30)
 SPEC = RecordSpec("/tick", "glider/msg/Tick", tuple(Field(f"x{i}", "1") for i in range(60)))

@@ -8,7 +8,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from support.sshd import NAME, sshd
+
+from tests.support.sshd import NAME, sshd
 
 ROOT = Path(__file__).resolve().parents[2]
 LONG = 3_000_000

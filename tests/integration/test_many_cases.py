@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.cases import make_case
-from support.dask_cluster import dask_cluster
 
 from glider.sim_backend.core.effects import effect_layout as ef
-from glider.tools.study.challenge.diagnose_all import run
-from glider.tools.study.challenge.diagnosis import TIMING
+from glider.tools.verify.challenge.diagnose_all import run
+from glider.tools.verify.challenge.diagnosis import TIMING
+from tests.support.cases import make_case
+from tests.support.dask_cluster import dask_cluster
 
 pytestmark = pytest.mark.computes(seconds=25)
 

@@ -7,13 +7,13 @@ import subprocess
 import sys
 
 import pytest
-from support.twinned import DIVE, flying, guard_pid, twins, until
 
 from glider.hal.heartbeat import Guard, Heartbeat
 from glider.hal.outofband.plan import read_plan
 from glider.hal.sortie import SortieState
 from glider.hal.state_file import StateFile
 from glider.tools.data.log.reader import read_log
+from tests.support.twinned import DIVE, flying, guard_pid, twins, until
 
 pytestmark = pytest.mark.realtime(seconds=120)
 DEEP_M = 0.8

@@ -9,7 +9,6 @@ import time
 
 import msgspec
 import pytest
-from support.twinned import twins, until
 
 from glider.hal.board import BoardRequest, board_builder
 from glider.hal.heartbeat import Heartbeat
@@ -19,6 +18,7 @@ from glider.hal.state_file import StateFile
 from glider.tools.data.sources import load_vehicle
 from glider.tools.flight.ascent_plan import make_plan
 from glider.tools.flight.status import snapshot
+from tests.support.twinned import twins, until
 
 pytestmark = pytest.mark.realtime(seconds=60)
 PATIENCE_S = 4.0

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from independent.make_reference import FOLDER, MANOEUVRES, fly_manoeuvre
-from model_states import P
 
-from glider.tools.deploy.emulated import BOUNDS, CURRENT
 from glider.tools.flight.simulate import PSI, STATES, fly_commands, read_commands
+from glider.tools.verify.arm64.emulated import BOUNDS, CURRENT
+from tests.independent.make_reference import FOLDER, MANOEUVRES, fly_manoeuvre
+from tests.support.model_states import P
 
 OWN = sorted(FOLDER.glob("*.csv"))
 SHARED = ("current", "dive", "reversal", "sawtooth", "steep", "turn_climb", "turn_dive")
@@ -18,7 +18,7 @@ ANGLES = [STATES.index(name) for name in ("phi", "theta", "psi")]
 
 def deviations(path: Path, water: tuple[float, float]) -> np.ndarray:
     """Largest difference of each state between a reference flight and ours from its first row, (15,)."""
-    flown = fly_commands(P, read_commands(path.read_text(encoding="utf-8"), path.name), water)
+    flown = fly_commands(P, read_commands(path), water)
     reference = np.loadtxt(path, delimiter=",", skiprows=1)[:, 4:]
     return np.abs(flown - reference).max(axis=0)
 
@@ -60,6 +60,6 @@ def test_no_shared_reference_flight_is_left_out(shared):
 
 def test_heading_runs_on_through_pi(shared):
     path = shared / "reference" / "turn_climb.csv"
-    flown = fly_commands(P, read_commands(path.read_text(encoding="utf-8"), path.name))
+    flown = fly_commands(P, read_commands(path))
     assert flown[-1, PSI] > 4.0 * np.pi - 0.5
     assert np.abs(np.diff(flown[:, PSI])).max() < 0.1

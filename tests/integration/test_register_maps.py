@@ -8,7 +8,6 @@ import time
 import pytest
 from pymodbus.client import ModbusSerialClient
 from pymodbus.simulator import SimDevice
-from support.twinned import twins, until
 
 from glider.hal.board import BoardRequest, board_builder
 from glider.hal.outofband.ascent import Ascent
@@ -18,6 +17,7 @@ from glider.tools.flight.ascent_plan import make_plan
 from tests.integration.test_independent_peers import PlainServer, registers
 from tests.integration.test_outofband_pressure import brought_up, under_water
 from tests.support.register_maps import board_text, write_maps
+from tests.support.twinned import twins, until
 
 pytestmark = pytest.mark.realtime(seconds=60)
 VEHICLE = load_vehicle("roughie")

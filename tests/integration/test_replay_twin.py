@@ -4,14 +4,14 @@ import functools
 import json
 
 import pytest
-from support.commands import glider
-from support.logs import DIP
-from support.patience import patient_vehicle
 
 from glider.hal.ports import BoardError
 from glider.tools.data.log.reader import read_log
 from glider.tools.flight import sortie
 from glider.tools.flight.compose import build_flight, build_recorder
+from tests.support.commands import glider
+from tests.support.logs import DIP
+from tests.support.patience import patient_vehicle
 
 pytestmark = pytest.mark.realtime
 

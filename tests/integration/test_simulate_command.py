@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.commands import glider
 
 from glider.tools.cli.common import report_errors
 from glider.tools.cli.main import cli
 from glider.tools.flight.simulate import COLUMNS
+from tests.support.commands import glider
 
 FLIGHT = Path(__file__).resolve().parents[1] / "data" / "reference" / "down_and_up.csv"
 HEADER = ",".join(COLUMNS)
@@ -105,21 +105,21 @@ def test_rows_between_steps_and_a_single_row(simulate):
     ("text", "words"),
     [
         ("", ("commands.csv", "empty")),
-        (f"{HEADER}\n", ("commands.csv", "no rows")),
-        (f"{HEADER.replace(',psi', '')}\n{START}", ("commands.csv:1", "psi")),
+        (f"{HEADER}\n", ("commands.csv", "no samples")),
+        (f"{HEADER.replace(',psi', ',heading')}\n{START}", ("commands.csv:1", "psi")),
         (f"{HEADER.replace('theta', 'psi')}\n{START}", ("commands.csv:1", "psi", "twice")),
         (f"{HEADER}\n{START}\n0.1,0,oops,0.1", ("commands.csv:3", "cmd_slider_m", "'oops'")),
         (f"{HEADER}\n{START}\n0.1,0,-0.02", ("commands.csv:3", "cmd_ballast_kg", "no value")),
-        (f"{HEADER}\n{START}\n0.1,nan,-0.02,0.1", ("commands.csv:3", "cmd_servo_rad", "finite")),
-        (f"{HEADER}\n{START}\n0.1,0,-0.02,inf", ("commands.csv:3", "cmd_ballast_kg", "finite")),
+        (f"{HEADER}\n{START}\n0.1,nan,-0.02,0.1", ("commands.csv:3", "cmd_servo_rad", "'nan'")),
+        (f"{HEADER}\n{START}\n0.1,0,-0.02,inf", ("commands.csv:3", "cmd_ballast_kg", "inf")),
         (f"{HEADER}\n{START}\n0.1,0,1_0,0", ("commands.csv:3", "cmd_slider_m", "number")),
         (f"{HEADER}\n{START}\n0,0,-0.02,0.1", ("commands.csv:3", "t_s", "after")),
         (f"{HEADER}\n{START}\n{ROW}\n{ROW}", ("commands.csv:4", "t_s", "after")),
-        (f"{HEADER}\n{START.replace('0.3,0.2', '0.3,nan')}\n{ROW}", ("commands.csv:2", "u", "finite")),
+        (f"{HEADER}\n{START.replace('0.3,0.2', '0.3,nan')}\n{ROW}", ("commands.csv:2", "u", "'nan'")),
         (f"{HEADER}\n{START.replace('0.3,0.2', '0.3,')}\n{ROW}", ("commands.csv:2", "u", "no value")),
         (f"{HEADER}\n{START.replace('0.3,0.2', '0.3,200')}\n{ROW}", ("commands.csv:2", "u", "no speed of a glider")),
         (f"{HEADER}\n{START[:-4]},-20,0\n{ROW}", ("commands.csv:2", "slider_m", "outside")),
-        (f"{HEADER}\n{START},1\n{ROW}", ("commands.csv:2", "20 values under 19 columns")),
+        (f"{HEADER}\n{START},1\n{ROW}", ("commands.csv:2", "expected 19, got 20")),
         (f"{HEADER}\n{START}\n1e13,0,0,0", ("commands.csv:3", "t_s", "steps")),
         (f"{HEADER}\n{START}\n0.1,0,\x00,0", ("commands.csv:3", "cmd_slider_m")),
     ],

@@ -11,12 +11,12 @@ import time
 from pathlib import Path
 
 import pytest
-from support import twinned
-from support.patience import patient_vehicle
-from support.twinned import DIVE
-from support.vessel import RELEASE, vessel
 
 from glider.tools.data.remote import file_digest
+from tests.support import twinned
+from tests.support.patience import patient_vehicle
+from tests.support.twinned import DIVE
+from tests.support.vessel import RELEASE, vessel
 
 pytestmark = pytest.mark.realtime(seconds=150)
 OUT_OF_BAND, FLIGHT = "glider-outofband.service", "glider-flight@dive.service"

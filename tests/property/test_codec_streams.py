@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from glider.hal.protocols import modbus, vn100
 from glider.hal.protocols.registers import CODES, from_registers, to_registers
-from glider.tools.study.faults.damaged_streams import codecs, run_codec
+from glider.tools.verify.faults.damaged_streams import codecs, run_codec
 from tests.support.examples import examples
 
 CODECS = {codec.name: codec for codec in codecs()}

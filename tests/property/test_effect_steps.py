@@ -2,11 +2,8 @@
 
 import numpy as np
 import pytest
-from effect_flights import FLOWN
 from hypothesis import given
 from hypothesis import strategies as st
-from model_states import P as VEHICLE
-from model_states import actuators, states, vehicles
 
 from glider.firmware.core.maths.rotations import quaternion_from_euler
 from glider.firmware.core.maths.steps import RK4
@@ -17,7 +14,10 @@ from glider.sim_backend.core.effects import effect_layout as ef
 from glider.sim_backend.core.effects.actuation import backlash
 from glider.sim_backend.core.effects.catalogue import catalogue
 from glider.sim_backend.core.plant import plant_step
+from tests.support.effect_flights import FLOWN
 from tests.support.examples import examples
+from tests.support.model_states import P as VEHICLE
+from tests.support.model_states import actuators, states, vehicles
 
 NO_WAVES = np.zeros((0, wl.N_WAVE))
 STILL = np.zeros(wl.N_ENV)

@@ -10,9 +10,9 @@ from glider.firmware.core.vehicle.layout import NET_MASS
 from glider.firmware.faults import Reaction
 from glider.tools.data.sources import load_vehicle
 from glider.tools.flight.compose import build_flight
-from glider.tools.study.faults.cases import FaultCase
-from glider.tools.study.faults.flights import flown
-from glider.tools.study.faults.scene import SURFACED_M, fly, set_scene
+from glider.tools.verify.faults.cases import FaultCase
+from glider.tools.verify.faults.flights import flown
+from glider.tools.verify.faults.scene import SURFACED_M, fly, set_scene
 from tests.support.examples import examples
 
 pytestmark = pytest.mark.computes(seconds=65)

@@ -3,13 +3,13 @@
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-from support.flights import World, case_of, fly
 
 from glider.tools.data.runs.run import Run
 from glider.tools.inference.channels import ROUGHIE_MEASURES
 from glider.tools.inference.model import nominal_model
 from glider.tools.inference.predict import predict
 from tests.support.examples import examples
+from tests.support.flights import World, case_of, fly
 
 FLIGHTS = {mocap: fly(World(mocap=mocap), 5).run for mocap in (False, True)}
 PREDICTIONS = {}

@@ -8,11 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from independent.make_reference import VEHICLE
-from independent.nominal import DOWN, GRAVITY, Glider, body_to_ned, euler_angle_rates, skew
-from law_flights import down, form_at, output_accelerations, outputs, plant_rates
-from law_states import actuator_speeds, flying, trimmed_vehicles
-from model_states import P, derivative, state
 
 from glider.firmware.core.control import input_forms
 from glider.firmware.core.control.input_forms import exact_form, paper_form
@@ -20,8 +15,13 @@ from glider.firmware.core.control.law import OK, STEEP, solve_inputs
 from glider.firmware.core.control.law_plus import on_outputs
 from glider.firmware.core.jit import PACKAGES_DIR
 from glider.firmware.core.vehicle import layout
-from glider.tools.measure.figures import law
+from glider.tools.verify.figures import law
+from tests.independent.make_reference import VEHICLE
+from tests.independent.nominal import DOWN, GRAVITY, Glider, body_to_ned, euler_angle_rates, skew
 from tests.support.examples import examples
+from tests.support.law_flights import down, form_at, output_accelerations, outputs, plant_rates
+from tests.support.law_states import actuator_speeds, flying, trimmed_vehicles
+from tests.support.model_states import P, derivative, state
 
 
 def scaled_glider(factors) -> tuple[Glider, np.ndarray]:
@@ -112,7 +112,7 @@ def test_derivative_of_the_plant_is_the_nominal_one_here():
 
 
 def test_figures_of_the_document_are_those_measured(capsys):
-    """The two tables that `python -m glider.tools.measure.figures.law` prints stand in docs/CONTROL.md, row by row."""
+    """The two tables that `python -m glider.tools.verify.figures.law` prints stand in docs/CONTROL.md, row by row."""
     law.main()
     printed = [line.split("|") for line in capsys.readouterr().out.splitlines() if line.startswith("|")]
     document = (PACKAGES_DIR / "docs" / "CONTROL.md").read_text(encoding="utf-8").splitlines()

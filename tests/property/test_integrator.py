@@ -2,16 +2,16 @@
 
 import numpy as np
 import pytest
-from independent.flights import fly_matrix
-from independent.make_reference import VEHICLE
-from independent.nominal import Glider
-from model_states import P, state
 from scipy.spatial.transform import Rotation
 
 from glider.firmware.core.maths.rotations import euler_from_quaternion
 from glider.firmware.core.maths.steps import MIDPOINT, RK4, end_stage
 from glider.firmware.core.vehicle import layout
 from glider.firmware.core.vehicle.flight import nominal_run, nominal_step
+from tests.independent.flights import fly_matrix
+from tests.independent.make_reference import VEHICLE
+from tests.independent.nominal import Glider
+from tests.support.model_states import P, state
 
 
 def flown(x: np.ndarray, act, dt: float, seconds: float, vehicle: np.ndarray = P) -> np.ndarray:

@@ -10,7 +10,12 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from law_flights import (
+
+from glider.firmware.core.control.law import k2_to_cover
+from glider.firmware.core.vehicle import layout
+from tests.support.equations import k2_by_29
+from tests.support.examples import examples
+from tests.support.law_flights import (
     SLIDER,
     STANDING,
     Gains,
@@ -24,13 +29,8 @@ from law_flights import (
     without_stops,
     worst,
 )
-from law_states import SPREAD, actuator_speeds, closed_loops, flying, forward, trimmed_vehicles, unit
-from model_states import HIGH, LOW, TAU, P, state
-
-from glider.firmware.core.control.law import k2_to_cover
-from glider.firmware.core.vehicle import layout
-from tests.support.equations import k2_by_29
-from tests.support.examples import examples
+from tests.support.law_states import SPREAD, actuator_speeds, closed_loops, flying, forward, trimmed_vehicles, unit
+from tests.support.model_states import HIGH, LOW, TAU, P, state
 
 
 def arbitrate(law: Law, x, references, speeds=STANDING) -> None:

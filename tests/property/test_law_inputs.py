@@ -6,9 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from law_flights import SLIDER, down, form_at
-from law_states import flying, gains, unit
-from model_states import HIGH, LOW, RATE, TAU, P, state
 
 from glider.firmware.core.control.input_forms import exact_form, paper_form
 from glider.firmware.core.control.law import (
@@ -25,6 +22,9 @@ from glider.firmware.core.vehicle import layout
 from glider.firmware.core.vehicle.actuators import actuator_rate, limited
 from tests.support.equations import k2_by_29
 from tests.support.examples import examples
+from tests.support.law_flights import SLIDER, down, form_at
+from tests.support.law_states import flying, gains, unit
+from tests.support.model_states import HIGH, LOW, RATE, TAU, P, state
 
 
 @examples()

@@ -9,7 +9,18 @@ import numpy as np
 import pytest
 from hypothesis import Phase, given
 from hypothesis import strategies as st
-from law_flights import (
+
+from glider.firmware.core.control.control import roll_law
+from glider.firmware.core.control.input_forms import exact_form, paper_form
+from glider.firmware.core.control.law import decrease_margin, k2_to_cover
+from glider.firmware.core.control.law_plus import JERK_RATE_SHARE, on_outputs
+from glider.firmware.core.maths.rotations import euler_from_quaternion
+from glider.firmware.core.vehicle import layout
+from glider.firmware.core.vehicle.actuators import actuator_rates, limited
+from glider.firmware.model.estimator_settings import parameter_sigma
+from glider.firmware.model.vehicle import decode_vehicle
+from tests.support.examples import examples
+from tests.support.law_flights import (
     SLIDER,
     TICK,
     Gains,
@@ -26,18 +37,7 @@ from law_flights import (
     without_stops,
     worst,
 )
-from model_states import HIGH, LOW, RATE, VEHICLE_TEXT, P, state
-
-from glider.firmware.core.control.control import roll_law
-from glider.firmware.core.control.input_forms import exact_form, paper_form
-from glider.firmware.core.control.law import decrease_margin, k2_to_cover
-from glider.firmware.core.control.law_plus import JERK_RATE_SHARE, on_outputs
-from glider.firmware.core.maths.rotations import euler_from_quaternion
-from glider.firmware.core.vehicle import layout
-from glider.firmware.core.vehicle.actuators import actuator_rates, limited
-from glider.firmware.model.estimator_settings import parameter_sigma
-from glider.firmware.model.vehicle import decode_vehicle
-from tests.support.examples import examples
+from tests.support.model_states import HIGH, LOW, RATE, VEHICLE_TEXT, P, state
 
 pytestmark = pytest.mark.computes(seconds=30)
 

@@ -4,8 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from law_flights import Gains, Law, Reference, lyapunov_rate, plant_rates
-from law_states import SPREAD
 
 from glider.firmware.core.control.law import k2_to_cover
 from glider.firmware.core.control.lyapunov_monitor import WATCH_EVERY
@@ -14,6 +12,8 @@ from glider.firmware.core.layouts import control_layout as ctl
 from glider.firmware.core.layouts import supervisor_layout as sup
 from glider.firmware.core.vehicle import layout
 from glider.tools.flight.compose import build_flight
+from tests.support.law_flights import Gains, Law, Reference, lyapunov_rate, plant_rates
+from tests.support.law_states import SPREAD
 
 SIGMA = SPREAD / 3.0
 VALUES = slice(ctl.K2_NEED_PITCH, ctl.MARGIN_DEPTH + 1)

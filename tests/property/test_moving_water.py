@@ -5,14 +5,14 @@ import math
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-from independent.flights import fly
-from independent.make_reference import VEHICLE
-from independent.nominal import Glider
-from model_states import P, actuators, angles, currents, derivative, state, states
 
 from glider.firmware.core.vehicle import layout
 from glider.firmware.core.vehicle.flight import nominal_run, nominal_step
+from tests.independent.flights import fly
+from tests.independent.make_reference import VEHICLE
+from tests.independent.nominal import Glider
 from tests.support.examples import examples
+from tests.support.model_states import P, actuators, angles, currents, derivative, state, states
 
 STEP = 0.01
 

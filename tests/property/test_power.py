@@ -3,7 +3,15 @@
 import numpy as np
 from hypothesis import Phase, given
 from hypothesis import strategies as st
-from model_states import (
+from scipy.integrate import simpson
+
+from glider.firmware.core.maths.rotations import quaternion_from_euler, rotation_nb
+from glider.firmware.core.vehicle import layout
+from glider.firmware.core.vehicle.flight import nominal_step
+from glider.firmware.core.vehicle.mass import first_moment
+from glider.firmware.core.vehicle.water import water_wrench
+from tests.support.examples import examples
+from tests.support.model_states import (
     P,
     actuators,
     angles,
@@ -14,14 +22,6 @@ from model_states import (
     vehicles,
     velocities,
 )
-from scipy.integrate import simpson
-
-from glider.firmware.core.maths.rotations import quaternion_from_euler, rotation_nb
-from glider.firmware.core.vehicle import layout
-from glider.firmware.core.vehicle.flight import nominal_step
-from glider.firmware.core.vehicle.mass import first_moment
-from glider.firmware.core.vehicle.water import water_wrench
-from tests.support.examples import examples
 
 
 def energy(vehicle: np.ndarray, x: np.ndarray) -> float:

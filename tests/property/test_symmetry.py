@@ -3,11 +3,11 @@
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-from model_states import P, actuators, currents, derivative, states, vehicles
 
 from glider.firmware.core.vehicle import layout
 from glider.firmware.core.vehicle.flight import nominal_run
 from tests.support.examples import examples
+from tests.support.model_states import P, actuators, currents, derivative, states, vehicles
 
 # north, east, down, quaternion, nu, actuators: what changes its sign when east is swapped with west
 MIRROR = np.array([1, -1, 1, 1, -1, 1, -1, 1, -1, 1, -1, 1, -1, -1, 1, 1])

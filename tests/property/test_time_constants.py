@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from model_states import LOW, P, pitches, quaternions, state
-from support.estimating import Filter
 
 from glider.firmware.core.jit import kernel
 from glider.firmware.core.layouts import estimator_layout as kf
@@ -29,7 +27,9 @@ from glider.sim_backend.core.plant import plant_step
 from glider.tools.inference.core.step import LARGEST_SPEED, MAX_STEP, propagate
 from glider.tools.inference.prediction_error import LIMIT
 from glider.tools.inference.vehicle_parameters import K_SHARE, LINEAR_DAMPING, coefficient_sizes
+from tests.support.estimating import Filter
 from tests.support.examples import examples
+from tests.support.model_states import LOW, P, pitches, quaternions, state
 
 K_P_OF_REAL_WINGS = -22.0  # kg s/rad, eleven times the shipped vehicle's
 SIGNED = (layout.K_L, layout.K_BETA, layout.K_P, layout.K_M, layout.K_Q, layout.K_MY, layout.K_R)

@@ -6,11 +6,11 @@ import tomllib
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from model_states import VEHICLE_TEXT
 
 from glider.firmware.model.vehicle import Vehicle, decode_vehicle
 from glider.hal.strict import ConfigError
 from tests.support.examples import examples
+from tests.support.model_states import VEHICLE_TEXT
 
 LINES = VEHICLE_TEXT.splitlines()
 WRONG = {

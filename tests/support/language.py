@@ -88,8 +88,9 @@ def rejected_in_prose(text: str) -> Counter[str]:
 def count_tree() -> dict[str, dict[str, int]]:
     """Count rejected terms by file, relative to the tree, and by word."""
     found = {}
-    for path in sorted(path for folder in CODE for path in (ROOT / folder).rglob("*.py")):
-        counts = rejected_in_code(path.read_text(encoding="utf-8"))
+    for path in sorted(path for folder in CODE for kind in ("*.py", "*.toml") for path in (ROOT / folder).rglob(kind)):
+        text = path.read_text(encoding="utf-8")
+        counts = rejected_in_code(text) if path.suffix == ".py" else rejected_in_prose(text)
         if counts and not any(part.is_symlink() for part in path.parents if part != ROOT and ROOT in part.parents):
             found[str(path.relative_to(ROOT))] = dict(sorted(counts.items()))
     return found

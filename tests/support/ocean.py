@@ -8,10 +8,10 @@ import numpy as np
 
 from glider.tools.data.runs.case import Case, load_case
 from glider.tools.data.runs.run import Run
-from glider.tools.study.challenge.ocean_cases import draw_case, fly_mission, write_dives
-from glider.tools.study.challenge.ocean_design import MissionDesign
-from glider.tools.study.challenge.ocean_plan import MissionPlan
-from glider.tools.study.challenge.watch_plan import UNCHANGED, WatchCounts
+from glider.tools.verify.challenge.ocean_cases import draw_case, fly_mission, write_dives
+from glider.tools.verify.challenge.ocean_design import MissionDesign
+from glider.tools.verify.challenge.ocean_plan import MissionPlan
+from glider.tools.verify.challenge.watch_plan import UNCHANGED, WatchCounts
 
 MOST = 12  # dives that a mission is drawn for: fewer of them are the first of these
 

@@ -35,10 +35,10 @@ def _identify_a_moment() -> None:
 
 def _challenge_a_moment() -> None:
     """Blind tests of one case each, in the foreign plant: of the file's form and of another."""
-    from glider.tools.study.challenge.form_make import FormOrder
-    from glider.tools.study.challenge.form_plan import FormCounts
-    from glider.tools.study.challenge.make import Order, make
-    from glider.tools.study.challenge.plan import Counts
+    from glider.tools.verify.challenge.form_make import FormOrder
+    from glider.tools.verify.challenge.form_plan import FormCounts
+    from glider.tools.verify.challenge.make import Order, make
+    from glider.tools.verify.challenge.plan import Counts
 
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)

@@ -10,7 +10,7 @@ import time
 from contextlib import contextmanager
 from pathlib import Path
 
-from support.patience import patient_vehicle
+from tests.support.patience import patient_vehicle
 
 # Down and on down: only being brought up ends it.
 DIVE = """

@@ -1,6 +1,6 @@
 """Names and prose use the field's terms (tests/data/language.toml); exceptions by file may only shrink."""
 
-from support.language import count_tree, exceptions, excess, rejected_in_code, rejected_in_prose
+from tests.support.language import count_tree, exceptions, excess, rejected_in_code, rejected_in_prose
 
 
 def test_no_file_holds_a_rejected_term_more_often_than_it_is_excepted():

@@ -1,6 +1,5 @@
 """Changing a board file as its writer would: comments, order and layout stay, and the old file is kept beside."""
 
-import os
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
@@ -50,13 +49,3 @@ def keep_old(path: Path) -> Path:
         number += 1
     shutil.copy2(path, kept)
     return kept
-
-
-def replace_file(path: Path, text: str) -> None:
-    """Write a file whole or not at all."""
-    fresh = path.with_name(f".{path.name}.new")
-    with open(fresh, "w", encoding="utf-8") as file:
-        file.write(text)
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(fresh, path)

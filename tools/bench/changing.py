@@ -12,6 +12,7 @@ from glider.tools.bench.client import BenchError, check_actuator
 from glider.tools.bench.desk import UsageError, number
 from glider.tools.bench.moving import Moving
 from glider.tools.bench.units import UNITS, WIRES
+from glider.tools.data.files import write_bytes
 
 CALIBRATION_SHARES = (-0.8, -0.4, 0.0, 0.4, 0.8)
 
@@ -156,6 +157,6 @@ class Changing(Moving):
         if not self.ask_yes(f"write {path}?", again=True):
             raise BenchError("not written")
         kept = boardtext.keep_old(path)
-        boardtext.replace_file(path, text)
+        write_bytes(path, text.encode(), kept=True)
         self.say(f"written; the old one is {kept.name}; actuators are stopped and want `enable` again")
         self.bench.restart(text)

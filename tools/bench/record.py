@@ -7,6 +7,8 @@ import numpy as np
 
 from glider.tools.bench.worker import ROW
 from glider.tools.data.errors import InputError
+from glider.tools.data.runs import case
+from glider.tools.data.runs.run import Run
 
 KEPT = tuple(name for name in ROW if name != "t_s")
 
@@ -31,16 +33,10 @@ def free_folder(base: Path, name: str) -> Path:
 
 def write_case(folder: Path, data: np.ndarray, vehicle: str, site: str = "bench") -> Path:
     """A case of one run; the run's path. Columns that nothing was recorded in are left out."""
-    folder.mkdir(parents=True)
     rate = 1.0 / float(np.median(np.diff(data[:, 0]))) if len(data) > 2 else 100.0
-    (folder / "case.toml").write_text(
-        f'format = 1\nvehicle = "{vehicle}"\nsite = "{site}"\nlog_rate_hz = {round(rate, 1)}\n'
-        "water_density_kg_m3 = 998.2\nmotion_capture = false\nruns = 1\n"
-    )
-    columns = [index for index in range(len(ROW)) if np.isfinite(data[:, index]).any()]
-    lines = [",".join(ROW[index] for index in columns)]
-    for row in data:
-        lines.append(",".join("" if math.isnan(row[i]) else repr(float(row[i])) for i in columns))
-    path = folder / "run00.csv"
-    path.write_text("\n".join(lines) + "\n")
-    return path
+    columns = {name: values for name, values in zip(ROW, data.T, strict=True) if np.isfinite(values).any()}
+    (run,) = case.write_case(
+        folder, [Run("run00", None, columns)], vehicle=vehicle, site=site, log_rate_hz=round(rate, 1),
+        water_density_kg_m3=998.2, motion_capture=False,
+    )  # fmt: skip
+    return run

@@ -69,8 +69,8 @@ def _actuator(item: dict) -> str:
 class Signs:
     """Leads through signs and axes. ask(question) gives the person's answer; Enter goes on, `skip` leaves out."""
 
-    def __init__(self, bench: Bench, say: Callable[[str], None], ask: Callable[[str], str]):
-        self._bench, self._say, self._ask = bench, say, ask
+    def __init__(self, bench: Bench, ask: Callable[[str], str]):
+        self._bench, self._ask = bench, ask
         self._level: list[float] = []
 
     def run(self) -> list[SignFinding]:

@@ -11,20 +11,11 @@ from glider.tools.cli.common import compile_campaign, json_option, print_json, p
 PAIR: dict[str, Any] = {"nargs": 2, "type": float, "metavar": "LOW HIGH"}
 # option -> key of the campaign file that it stands in for
 KEYS = {
-    "mission": "missions",
-    "controller": "controllers",
-    "vehicle": "vehicle",
-    "seeds": "seeds",
-    "first_seed": "first_seed",
-    "spread": "spread.parameters",
-    "bias": "spread.sensor_bias",
-    "noise": "spread.sensor_noise",
-    "current": "environment.current_m_s",
-    "waves": "environment.wave_height_m",
-    "period": "environment.wave_period_s",
-    "disturbance": "environment.disturbance",
-    "depth": "start.depth_m",
-}
+    "mission": "missions", "controller": "controllers", "vehicle": "vehicle", "seeds": "seeds",
+    "first_seed": "first_seed", "spread": "spread.parameters", "bias": "spread.sensor_bias",
+    "noise": "spread.sensor_noise", "current": "environment.current_m_s", "waves": "environment.wave_height_m",
+    "period": "environment.wave_period_s", "disturbance": "environment.disturbance", "depth": "start.depth_m",
+}  # fmt: skip
 
 
 @click.command()

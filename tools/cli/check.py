@@ -150,7 +150,7 @@ def talk(board: str, vehicle: str, signs: bool) -> list[dict]:
         with Bench(found.text, found.source, found.kind, vehicle, None) as bench:
             items += look(bench)
             if signs:
-                items += Signs(bench, say, _ask).run()
+                items += Signs(bench, _ask).run()
     except BenchError as error:
         items.append(SignFinding("devices", False, str(error)))
     return [{"check": item.check, "pass": item.passed, "message": item.message} for item in items]

@@ -144,9 +144,9 @@ def report_errors(command: click.Command) -> int:
         return BAD_INPUT
     except ModuleNotFoundError as error:
         missing = missing_extra(error)
-        if missing is None:
+        if missing is None and not (error.name or "").startswith("glider."):
             raise
-        say(f"glider: {missing}")
+        say(f"glider: {missing or f'{error.name} is not in the release that goes onboard: call this on the laptop'}")
         return BAD_INPUT
     except BrokenPipeError:
         return DONE

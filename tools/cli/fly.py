@@ -36,16 +36,6 @@ def live_socket(folder: Path | None) -> Path:
     return folder / NAME
 
 
-def peak_rss_mb() -> float | None:
-    """Largest resident memory of this process so far, MB; None where the system does not say."""
-    try:
-        status = Path("/proc/self/status").read_text()
-    except OSError:
-        return None
-    lines = [line.split() for line in status.splitlines() if line.startswith("VmHWM:")]
-    return int(lines[0][1]) * 1024 / 1e6 if lines else None
-
-
 @click.command()
 @click.option("--mission", default="sawtooth", show_default=True, help="Mission: shipped name or file.")
 @click.option("--vehicle", default="roughie", show_default=True, help="Vehicle: shipped name or file.")
@@ -86,6 +76,7 @@ def fly(
     from glider.firmware.runtime import Ending
     from glider.hal.ports import BoardError, Hardware
     from glider.hal.recorder.recorder import NullRecorder, Recorder
+    from glider.hal.usage import peak_resident_bytes
     from glider.tools.data.errors import InputError
     from glider.tools.flight import sortie
     from glider.tools.flight.compose import build_flight, build_recorder, parse_effects, record_specs
@@ -184,7 +175,7 @@ def fly(
         "ticks": timing.ticks,
         "missed_ticks": timing.missed,
         "lateness": timing.histogram(),
-        "peak_rss_mb": peak_rss_mb(),
+        "peak_rss_mb": peak_resident_bytes() / 1e6 or None,
         "records": {
             "written": report.written,
             "dropped": report.dropped,

@@ -6,7 +6,6 @@ from pathlib import Path
 import click
 
 from glider.tools.cli import own
-from glider.tools.cli.challenge import challenge
 from glider.tools.cli.common import (
     compile_diagnosis,
     json_option,
@@ -129,7 +128,7 @@ def diagnose(
     are; those that are answered are kept.
     """
     if is_many(cases, jobs, dask, again):
-        from glider.tools.study.many_cases import OneCommand
+        from glider.tools.cli.many_cases import OneCommand
 
         options = [] if without is None else ["--without", without]
         asked = OneCommand(("gap", "diagnose"), "diagnosis.json", options, vehicle, reference)
@@ -234,6 +233,5 @@ def report(folder: Path) -> None:
     say(f"report: {folder / REPORT}")
 
 
-gap.add_command(challenge)
 gap.add_command(readings)
 gap.add_command(watch)

@@ -12,65 +12,62 @@ from glider.tools.cli.help import complete
 from glider.tools.data.spelling import did_you_mean
 from glider.tools.data.version import DISTRIBUTION
 
-# name -> (module, attribute, one line). The line stands here so that --help need not import the command.
+# name -> (module of glider.tools, attribute, one line); the line stands here so that --help need not import it.
 COMMANDS = {
-    "fly": ("glider.tools.cli.fly", "fly", "fly a mission, in simulation or on a board"),
-    "live": ("glider.tools.cli.live", "live", "watch a flight in Foxglove while it flies"),
-    "missions": ("glider.tools.cli.missions", "missions", "list the missions"),
-    "effects": ("glider.tools.cli.effects", "effects", "list the effects that a simulated vehicle can have"),
-    "check": ("glider.tools.cli.check", "check", "check vehicle, board and mission files"),
-    "status": ("glider.tools.cli.status", "status", "health page of the flight under way"),
-    "acknowledge": ("glider.tools.cli.acknowledge", "acknowledge", "a person has looked: the next flight may begin"),
-    "compile": ("glider.tools.cli.compile_", "compile_", "compile every kernel ahead"),
-    "bench": ("glider.tools.cli.bench", "bench", "bench console: read, jog, sweep, calibrate a board's devices"),
-    "twin": ("glider.tools.cli.twin", "twin", "twins of a board's devices on virtual serial ports"),
-    "log": ("glider.tools.cli.log", "log", "export, look into or repair an onboard log"),
-    "import": ("glider.tools.cli.import_", "import_", "bring other recordings into run data"),
-    "export": ("glider.tools.cli.export", "export", "write a case in a format that others read"),
-    "gap": ("glider.tools.cli.gap", "gap", "measure and predict: where simulation and sea disagree"),
-    "vehicle": (
-        "glider.tools.cli.vehicle",
-        "vehicle",
-        "a first vehicle file by question and answer; a vehicle at a glance",
-    ),
-    "identify": ("glider.tools.cli.identify", "identify", "parameters and their distribution from runs (MCMC)"),
-    "reproduce": ("glider.tools.cli.reproduce", "reproduce", "the paper's figures flown again: pictures and numbers"),
-    "campaign": (
-        "glider.tools.cli.campaign",
-        "campaign",
-        "many simulated flights at once, on all cores or on a Dask cluster",
-    ),
-    "tune": ("glider.tools.cli.tune", "tune", "gains of the pitch and depth PID, by rule or by search"),
-    "simulate": ("glider.tools.cli.simulate", "simulate", "open-loop nominal flight from a file of commands"),
-    "faults": ("glider.tools.cli.faults", "faults", "fly the fault table: noticed after, reaction, how it ended"),
-    "benchmark": (
-        "glider.tools.measure.benchmark.command",
-        "benchmark",
-        "the speed figures, each as a ratio in one run",
-    ),
+    "fly": ("cli.fly", "fly", "fly a mission, in simulation or on a board"),
+    "live": ("cli.live", "live", "watch a flight in Foxglove while it flies"),
+    "missions": ("cli.missions", "missions", "list the missions"),
+    "effects": ("cli.effects", "effects", "list the effects that a simulated vehicle can have"),
+    "check": ("cli.check", "check", "check vehicle, board and mission files"),
+    "status": ("cli.status", "status", "health page of the flight under way"),
+    "acknowledge": ("cli.acknowledge", "acknowledge", "a person has looked: the next flight may begin"),
+    "compile": ("cli.compile_", "compile_", "compile every kernel ahead"),
+    "bench": ("cli.bench", "bench", "bench console: read, jog, sweep, calibrate a board's devices"),
+    "twin": ("cli.twin", "twin", "twins of a board's devices on virtual serial ports"),
+    "log": ("cli.log", "log", "export, look into or repair an onboard log"),
+    "import": ("cli.import_", "import_", "bring other recordings into run data"),
+    "export": ("cli.export", "export", "write a case in a format that others read"),
+    "gap": ("cli.gap", "gap", "measure and predict: where simulation and sea disagree"),
+    "gap challenge": ("verify.challenge.command", "challenge", "a blind test of the diagnosis"),
+    "vehicle": ("cli.vehicle", "vehicle", "a first vehicle file by question and answer; a vehicle at a glance"),
+    "identify": ("cli.identify", "identify", "parameters and their distribution from runs (MCMC)"),
+    "reproduce": ("cli.reproduce", "reproduce", "the paper's figures flown again: pictures and numbers"),
+    "campaign": ("cli.campaign", "campaign", "many simulated flights at once, on all cores or on a Dask cluster"),
+    "tune": ("cli.tune", "tune", "gains of the pitch and depth PID, by rule or by search"),
+    "simulate": ("cli.simulate", "simulate", "open-loop nominal flight from a file of commands"),
+    "faults": ("verify.faults.command", "faults", "fly the fault table: noticed after, reaction, how it ended"),
+    "benchmark": ("verify.benchmark.command", "benchmark", "the speed figures, each as a ratio in one run"),
 }
+
+
+def _load(name: str) -> click.Command:
+    module, attribute, _ = COMMANDS[name]
+    return getattr(importlib.import_module(f"glider.tools.{module}"), attribute)
 
 
 class LazyGroup(click.Group):
     """A group whose commands are imported only when they run."""
 
     def list_commands(self, ctx):
-        return list(COMMANDS)
+        return [name for name in COMMANDS if " " not in name]
 
     def get_command(self, ctx, name):
         if name not in COMMANDS:
             return None
-        module, attribute, _ = COMMANDS[name]
-        return complete(getattr(importlib.import_module(module), attribute), name)
+        command = _load(name)
+        for below in COMMANDS:
+            if below.startswith(f"{name} ") and isinstance(command, click.Group):
+                command.add_command(_load(below))
+        return complete(command, name)
 
     def resolve_command(self, ctx, args):
         if args[0] not in COMMANDS and not args[0].startswith("-"):
-            ctx.fail(f"No such command '{args[0]}'{did_you_mean(args[0], COMMANDS)}")
+            ctx.fail(f"No such command '{args[0]}'{did_you_mean(args[0], self.list_commands(ctx))}")
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx, formatter):
         with formatter.section("Commands"):
-            formatter.write_dl([(name, line) for name, (_, _, line) in COMMANDS.items()])
+            formatter.write_dl([(name, COMMANDS[name][2]) for name in self.list_commands(ctx)])
 
 
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})

@@ -39,7 +39,7 @@ def run_batch_command(
     cases: Sequence[Path], out: Path | None, asked: Any, jobs: int | None, dask: str | None, again: bool, as_json: bool,
 ) -> None:  # fmt: skip
     """Ask many cases by a many_cases.OneCommand; failures are reported, and exit code 1."""
-    from glider.tools.study.many_cases import Many, run_batch
+    from glider.tools.cli.many_cases import Many, run_batch
 
     if out is None:
         raise click.UsageError("several cases need --out, a folder of their answers")

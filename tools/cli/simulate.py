@@ -42,13 +42,13 @@ def simulate(commands: Path, out: Path, vehicle: str, water: tuple[float, float]
     holds from the row it stands in. The result has the same columns at the same times.
     """
     from glider.tools.data.files import check_writable, write_bytes
-    from glider.tools.data.sources import load_vehicle, read_text
+    from glider.tools.data.sources import load_vehicle
     from glider.tools.flight.simulate import check_dt, expected_steps, fly_commands, read_commands, write_flight
 
     P = load_vehicle(vehicle).vector()
     check_dt(P, dt)
     check_writable(out.parent)
-    table = read_commands(read_text(commands), str(commands))
+    table = read_commands(commands)
     long = expected_steps(table, dt) > LONG_STEPS
     with progress("simulate", len(table.times) - 1) if long else contextlib.nullcontext() as advance:
         states = fly_commands(P, table, water, dt, advance)

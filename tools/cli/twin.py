@@ -27,18 +27,19 @@ def twin(board, vehicle, folder, seed, stand, faults, print_sim) -> None:
     `help` lists them.
     """
     from glider.hal.board import BoardError
-    from glider.sim_backend.twins.boardfile import decode_twin_file, simulated_text
+    from glider.sim_backend.twins.boardfile import decode_twin_file, simulated_board
     from glider.sim_backend.twins.service import TwinService, replaced_ports
     from glider.tools.data.boards import load_board_file
     from glider.tools.data.errors import InputError, need
     from glider.tools.data.sources import load_vehicle
+    from glider.tools.data.tomltext import toml_text
 
     found = load_board_file(board)
     if found.kind == "sim":
         raise InputError("a simulated board has no wires; name one of kind devices or twin", source=board)
     file = decode_twin_file(found.text, found.source)
     if print_sim:
-        click.echo(simulated_text(file), nl=False)
+        click.echo(toml_text(simulated_board(file), inline=("sensors",)), nl=False)
         return
     need("bench")
     from glider.tools.bench.boardtext import set_ports, set_values

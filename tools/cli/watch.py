@@ -31,7 +31,7 @@ def watch(
     folders of DIR that are called as the cases are; those that are answered are kept.
     """
     if is_many(cases, jobs, dask, again):
-        from glider.tools.study.many_cases import OneCommand
+        from glider.tools.cli.many_cases import OneCommand
 
         asked = OneCommand(("gap", "watch"), "watch.json", vehicle=vehicle, reference=reference)
         run_batch_command(cases, out, asked, jobs, dask, again, as_json)

@@ -247,11 +247,6 @@ def swing_inertia(mass: float, period: float, apart: float, wires: float) -> flo
     return mass * GRAVITY * (period * apart / (4.0 * math.pi)) ** 2 / wires
 
 
-def first_vehicle(name: str, answers: dict[str, float]) -> str:
-    """The file's text; what is not answered is the shipped vehicle's, scaled, and assumed."""
-    return FirstVehicle(dict(answers)).text(name)
-
-
 def in_words(assumed: Iterable[str]) -> str:
     """Numbers that a file calls assumed, those of a kind together."""
     kinds = {

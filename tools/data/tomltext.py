@@ -1,7 +1,6 @@
-"""Tables as TOML text: the other way round of reading, for files that people go on editing."""
+"""Tables as TOML text, the one writer of TOML: the other way round of reading, for files that people go on editing."""
 
 import json
-import math
 from typing import Any
 
 WIDTH = 110
@@ -10,14 +9,10 @@ WIDTH = 110
 def _value(value: Any) -> str:
     if isinstance(value, bool):
         return str(value).lower()
-    if isinstance(value, float):
-        if not math.isfinite(value):
-            raise ValueError(f"{value} cannot be written")
+    if isinstance(value, int | float):
         return repr(value)
-    if isinstance(value, int):
-        return str(value)
     if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")  # which JSON allows, TOML does not
     if isinstance(value, dict):
         return "{ " + ", ".join(f"{key} = {_value(item)}" for key, item in value.items() if item is not None) + " }"
     parts = [_value(item) for item in value]

@@ -20,9 +20,8 @@ from glider.tools.deploy.wheels import ROOT, Target, own_wheel, version, wheelho
 SUMS = "SHA256SUMS"
 # Left out of the wheel that goes onboard: verification, and what a laptop computes after a flight.
 NOT_ONBOARD = (
-    "sim_backend/foreign", "tools/deploy/arm.py", "tools/deploy/compared.py", "tools/deploy/emulated.py",
-    "tools/diagnose", "tools/gap", "tools/identify", "tools/inference", "tools/measure", "tools/readings",
-    "tools/report", "tools/study", "tools/watch",
+    "sim_backend/foreign", "tools/diagnose", "tools/gap", "tools/identify", "tools/inference", "tools/readings",
+    "tools/report", "tools/study", "tools/verify", "tools/watch",
 )  # fmt: skip
 UNITS = ("glider-outofband.service", "glider-flight@.service", "60-glider.rules", "flight.env")
 

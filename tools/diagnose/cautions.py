@@ -18,12 +18,9 @@ SPARSE, LONG = 0.2, 5.0  # share missing of the samples at the sensor's own rate
 ASSUMED_NUMBERS = "the vehicle file has assumed numbers"  # how that caution begins
 NOISE_FACTOR_REPORTED = 1.25  # times what a file says of noise, or less by as much
 PARTS = {
-    "onboard attitude": names.ATTITUDE,
-    "gyro": names.RATES,
-    "depth": (names.DEPTH,),
-    "draw-wires": names.DRAW_WIRES,
+    "onboard attitude": names.ATTITUDE, "gyro": names.RATES, "depth": (names.DEPTH,), "draw-wires": names.DRAW_WIRES,
     "motion capture": names.MOCAP_POSITION,
-}
+}  # fmt: skip
 WITHOUT = {
     "onboard attitude": "errors of the attitude sensor cannot be seen",
     "gyro": "errors of the gyro cannot be seen, and quick effects less sharply",

@@ -9,6 +9,7 @@ import numpy as np
 
 from glider.firmware.model.vehicle import COEFFICIENTS
 from glider.sim_backend.core.effects.catalogue import catalogue
+from glider.tools.data.intervals import NINETY
 from glider.tools.data.runs.case import Case
 from glider.tools.data.runs.origin import flights_of
 from glider.tools.data.version import software
@@ -202,7 +203,7 @@ def parameters(diagnosis: Diagnosis, label: str) -> dict[str, dict[str, Any]]:
     found = {}
     for free, value, sd in known:
         if free.label == label:
-            low, high = max(value - 1.645 * sd, free.low), min(value + 1.645 * sd, free.high)
+            low, high = max(value - NINETY * sd, free.low), min(value + NINETY * sd, free.high)
             estimate, *ci90 = (float(one * free.spread) for one in (value, low, high))
             found[free.name] = {"estimate": estimate, "ci90": ci90, "unit": free.unit}
     return found

@@ -127,10 +127,7 @@ def propose(search: Search) -> tuple[dict, str]:
         text += LEG.format(depth=deep, pitch=-best.pitch, roll=best.roll[0], ballast=best.ballast)
         text += LEG.format(depth=1.0, pitch=best.pitch, roll=best.roll[1], ballast=-best.ballast)
     entry = {
-        "manoeuvre": best.name,
-        "description": best.text,
-        "parts": names,
-        "distance": apart,
+        "manoeuvre": best.name, "description": best.text, "parts": names, "distance": apart,
         "mission": "next_run.toml",
-    }
+    }  # fmt: skip
     return entry, text

@@ -27,21 +27,11 @@ def features(problem: Problem, gains: Gains) -> dict[str, np.ndarray]:
     pitch = np.arcsin(np.clip(2.0 * (q0 * q2 - q3 * q1), -1.0, 1.0))
     _, v, w, p, q, r = x[:, X_NU:X_ACT].T
     return {
-        "speed": speed,
-        "depth": x[:, X_DOWN],
-        "time": problem.since,
-        "pitch": pitch,
-        "pitch rate": q,
-        "roll rate": p,
-        "yaw rate": r,
-        "angle of attack": w / np.maximum(speed, 0.05),
-        "sideslip": v / np.maximum(speed, 0.05),
-        "servo": x[:, X_SERVO],
-        "slider": x[:, X_SLIDER],
-        "ballast": x[:, X_BALLAST],
-        "pump running": (np.abs(moving) > 0.003).astype(float),
-        "pump expelling": (moving < -0.003).astype(float),
-    }
+        "speed": speed, "depth": x[:, X_DOWN], "time": problem.since, "pitch": pitch, "pitch rate": q, "roll rate": p,
+        "yaw rate": r, "angle of attack": w / np.maximum(speed, 0.05), "sideslip": v / np.maximum(speed, 0.05),
+        "servo": x[:, X_SERVO], "slider": x[:, X_SLIDER], "ballast": x[:, X_BALLAST],
+        "pump running": (np.abs(moving) > 0.003).astype(float), "pump expelling": (moving < -0.003).astype(float),
+    }  # fmt: skip
 
 
 def pump_speed(problem: Problem, gains: Gains) -> np.ndarray:

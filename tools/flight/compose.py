@@ -213,13 +213,9 @@ def build_runtime(flight: Flight, recorder: Any) -> Runtime:
         recorder.event(t, SEVERITIES[reaction], text)
 
     return Runtime(
-        flight.board,
-        flight.autopilot,
-        flight.supervisor,
-        recorder.channel("/tick"),
-        extras=flight.board.recording(recorder.channel),
-        on_news=on_news,
-    )
+        flight.board, flight.autopilot, flight.supervisor, recorder.channel("/tick"),
+        extras=flight.board.recording(recorder.channel), on_news=on_news,
+    )  # fmt: skip
 
 
 __all__ = [

@@ -26,6 +26,7 @@ from glider.hal.recorder.schema import WARN
 from glider.hal.sortie import Facts, Party, SortieRefused, SortieState, Trigger, follow
 from glider.hal.spawn import module_command, module_environment
 from glider.hal.state_file import StateFile, StateRecord
+from glider.hal.usage import open_files, resident_bytes
 from glider.tools.flight.ascent_plan import make_plan
 from glider.tools.flight.compose import Flight
 from glider.tools.flight.sortie import FlightHost, Journal
@@ -249,20 +250,3 @@ class FlightSupervision(FlightHost):
         person = kind is not None and issubclass(kind, KeyboardInterrupt)
         under_way = self.journal.state.must_ascend and not (self._twin or person)
         self._release(SortieState.ABORTED if under_way else SortieState.ASHORE)
-
-
-def resident_bytes(pid: int | str = "self") -> int:
-    """Resident memory of a process; 0 where the system does not say."""
-    try:
-        with open(f"/proc/{pid}/statm", "rb") as file:
-            return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
-    except OSError:
-        return 0
-
-
-def open_files() -> int:
-    """Descriptors that this process has open; 0 where the system does not say."""
-    try:
-        return len(os.listdir("/proc/self/fd"))
-    except OSError:
-        return 0

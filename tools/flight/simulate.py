@@ -4,11 +4,10 @@ The columns are those of the reference flights: time, three commands, the fiftee
 first row alone; u, v, w are relative to the water, there as everywhere.
 """
 
-import csv
-import io
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -16,6 +15,8 @@ from glider.firmware.core.maths.rotations import euler_from_quaternion, quaterni
 from glider.firmware.core.vehicle import layout
 from glider.firmware.core.vehicle.flight import nominal_run
 from glider.tools.data.errors import InputError
+from glider.tools.data.runs.csvfile import CsvTable
+from glider.tools.data.sources import read_text
 
 TIME = "t_s"
 COMMANDS = ("cmd_servo_rad", "cmd_slider_m", "cmd_ballast_kg")
@@ -46,67 +47,36 @@ class CommandColumns:
     lines: tuple[int, ...]  # (n,), where each row stood
 
 
-def _number(cell: str, source: str, line: int, column: str) -> float:
-    if not cell:
-        raise InputError("no value", source=source, line=line, column=column)
-    try:
-        if "_" in cell:  # Python's own spelling of 1000, nobody else's
-            raise ValueError
-        value = float(cell)
-    except ValueError:
-        raise InputError(f"expected a number, got {cell[:40]!r}", source=source, line=line, column=column) from None
-    if not math.isfinite(value):
-        raise InputError(f"expected a finite number, got {cell[:40]}", source=source, line=line, column=column)
-    return value
+def read_commands(path: Path) -> CommandColumns:
+    """A command file as a table; InputError with file, line and column where it cannot be flown.
 
-
-def _header(names: list[str], source: str, line: int) -> dict[str, int]:
-    """Where each column stands; columns that mean nothing here are passed over."""
-    places: dict[str, int] = {}
-    for index, name in enumerate(names):
-        if name in places and name in COLUMNS:
-            raise InputError("column stands twice", source=source, line=line, column=name)
-        places[name] = index
-    missing = [name for name in COLUMNS if name not in places]
+    Rows may end behind the commands: states are read from the first one alone. Columns that mean nothing here are
+    passed over.
+    """
+    first, *rows = read_text(path).splitlines() or [""]
+    width = first.count(",")
+    padded = [first, *(row + "," * (width - row.count(",")) if row.strip() else "" for row in rows)]
+    table = CsvTable(path, "\n".join(padded).encode())
+    missing = [name for name in COLUMNS if name not in table.header]
     if missing:
-        raise InputError(f"missing: {', '.join(missing)}", source=source, line=line, column="header")
-    return places
+        raise table.error(f"missing: {', '.join(missing)}", line=1, column="header")
+    times, *commands = (_complete(table, name, table.rows) for name in (TIME, *COMMANDS))
+    table.require_increasing(TIME, times)
+    start = np.concatenate([_complete(table, name, 1) for name in STATES])
+    labels = tuple(zip(*([label.strip() for label in table.texts(name)] for name in (TIME, *COMMANDS)), strict=True))
+    lines = tuple(table.line(row) for row in range(table.rows))
+    return CommandColumns(times, np.column_stack(commands), start, labels, str(path), lines)
 
 
-def read_commands(text: str, source: str) -> CommandColumns:
-    """A command file's text as a table; InputError with file, line and column where it cannot be flown."""
-    reader = csv.reader(io.StringIO(text.removeprefix("\ufeff"), newline=""))
-    places: dict[str, int] = {}
-    width, start = 0, np.zeros(len(STATES))
-    times: list[float] = []
-    commands: list[list[float]] = []
-    labels: list[tuple[str, ...]] = []
-    lines: list[int] = []
-    try:
-        for row in reader:
-            line, cells = reader.line_num, [cell.strip() for cell in row]
-            if not any(cells):
-                continue
-            if not places:
-                places, width = _header(cells, source, line), len(cells)
-                continue
-            if len(cells) > width:
-                raise InputError(f"{len(cells)} values under {width} columns", source=source, line=line)
-            cells += [""] * (width - len(cells))
-            time = _number(cells[places[TIME]], source, line, TIME)
-            if times and time <= times[-1]:
-                raise InputError(f"{time:g} does not come after {times[-1]:g}", source=source, line=line, column=TIME)
-            if not times:
-                start[:] = [_number(cells[places[name]], source, line, name) for name in STATES]
-            times.append(time)
-            commands.append([_number(cells[places[name]], source, line, name) for name in COMMANDS])
-            labels.append(tuple(cells[places[name]] for name in (TIME, *COMMANDS)))
-            lines.append(line)
-    except csv.Error as error:
-        raise InputError(f"not CSV: {error}", source=source, line=reader.line_num) from None
-    if not times:
-        raise InputError("no rows" if places else "empty: expected a header and rows", source=source)
-    return CommandColumns(np.array(times), np.array(commands), start, tuple(labels), source, tuple(lines))
+def _complete(table: CsvTable, name: str, rows: int) -> np.ndarray:
+    """The first rows of a column, (rows,); InputError where one has no number."""
+    values, bad = table.numbers_and_bad(name)
+    if bad[:rows].any():
+        table.numbers(name)  # says which
+    missing = np.flatnonzero(np.isnan(values[:rows]))
+    if missing.size:
+        raise table.error("no value", row=int(missing[0]), column=name)
+    return values[:rows]
 
 
 def check_start(P: np.ndarray, table: CommandColumns) -> None:

@@ -13,11 +13,11 @@ from glider.sim_backend.core.effects import effect_layout as ef
 from glider.sim_backend.core.effects.catalogue import catalogue
 from glider.sim_backend.ocean.vehicle import OceanVehicle
 from glider.tools.data.errors import InputError
+from glider.tools.data.intervals import NINETY
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs.case import Case
 from glider.tools.data.runs.run import Run
 from glider.tools.inference.model import Model, effect_vector
-from glider.tools.inference.parameters import NINETY
 from glider.tools.inference.vehicle_parameters import GAUGE
 from glider.tools.readings.check import apply_corrections, check, corrected_runs
 from glider.tools.readings.findings import Finding

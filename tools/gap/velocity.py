@@ -12,13 +12,13 @@ from glider.sim_backend.ocean.core import layout as at
 from glider.sim_backend.ocean.vehicle import OceanVehicle
 from glider.tools.data.errors import InputError
 from glider.tools.data.files import write_bytes
+from glider.tools.data.intervals import NINETY
 from glider.tools.data.plain import as_plain
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs.case import Case
 from glider.tools.data.runs.run import Run, run_name, write_run
 from glider.tools.inference.model import Model, effect_vector
 from glider.tools.inference.ocean_inputs import missing_input
-from glider.tools.inference.parameters import NINETY
 from glider.tools.inference.problem import Problem, problem_of
 
 # Of a row's speed, 1 sigma, and of one where speed was measured: laws of drag and lift are not nature's. Of a dive's

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from glider.firmware.model.vehicle import COEFFICIENTS, Vehicle
+from glider.tools.data.intervals import NINETY
 from glider.tools.data.runs.case import load_case
 from glider.tools.data.sources import load_vehicle
 from glider.tools.identify.design import grid, write_design
@@ -56,7 +57,7 @@ def figures(sets: list[dict[str, dict[str, float]]]) -> dict:
         "coverage_by_coefficient": {name: float(over("held", name).mean()) for name in COEFFICIENTS},
         "z_sd": float(over("z").std()),
         "median_error_pct_of_size": float(100.0 * np.median(over("error"))),
-        "coverage_90_accelerations": float(np.mean(np.abs(over("z_accelerations")) < 1.645)),
+        "coverage_90_accelerations": float(np.mean(np.abs(over("z_accelerations")) < NINETY)),
         "heat": float(np.median(over("heat"))),
     }
 

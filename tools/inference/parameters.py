@@ -10,10 +10,10 @@ from glider.hal.strict import ConfigError
 from glider.sim_backend.core.effects import effect_layout as ef
 from glider.sim_backend.core.effects.base import Effect
 from glider.sim_backend.core.effects.catalogue import catalogue
+from glider.tools.data.intervals import NINETY
 from glider.tools.inference.model import effect_vector
 from glider.tools.inference.problem import Problem
 
-NINETY = 1.645  # sigma on either side that hold 90 %
 LEAST_RATIO = 1e-3  # of a number that keeps its sign
 NUISANCE = ""  # the label of what is no effect
 ASSUMED_UNITS = {"m": "kg", "J": "kg m2", "x": "m", "R": "m", "net": "kg", "cg": "m"}  # by a name's first part

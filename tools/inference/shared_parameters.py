@@ -75,14 +75,6 @@ class SharedParameters:
         values = np.where(shared | noise, 0.0, values)
         return np.minimum(low - values, 0.0), np.maximum(high - values, 0.0)
 
-    def of_label(self, label: str, at: np.ndarray) -> list[FreeParameter]:
-        """A label's parameters counted from the shared values `at`: limits are as far away as they are from there."""
-        places, (low, high) = self.labels[label], self.limits(label, at)
-        return [
-            replace(self.free[k], label=label, low=float(a), high=float(b))
-            for k, a, b in zip(places, low, high, strict=True)
-        ]
-
 
 def shared_parameters(problem: Problem) -> SharedParameters:
     """Of all runs of a problem. An entry that two labels have (heavier or lighter with depth) goes both ways."""

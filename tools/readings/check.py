@@ -23,18 +23,8 @@ from glider.tools.readings.stretches import flying, judge_stretches
 from glider.tools.readings.surface import judge_surface
 
 FINDINGS_ORDER = (
-    "axes",
-    "units",
-    "sign",
-    "scale",
-    "offset",
-    "delay",
-    "drift",
-    "goes_with",
-    "saturated",
-    "held",
-    "not_flying",
-)
+    "axes", "units", "sign", "scale", "offset", "delay", "drift", "goes_with", "saturated", "held", "not_flying",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import stdtrit
 
+from glider.tools.data.intervals import NINETY
+
 BLOCK = 10.0  # s; longer than the autocorrelation of attitude and depth residuals on the flights tried (3 to 6 s)
 LEAST_BLOCKS = 5
 
@@ -31,7 +33,7 @@ class Estimate:
 
     def sigma(self, null: float = 0.0) -> float:
         """Distance from `null` in standard errors, made comparable over degrees of freedom by their quantiles."""
-        return abs(self.value - null) / max(self.error, 1e-300) * 1.645 / float(stdtrit(self.freedom, 0.95))
+        return abs(self.value - null) / max(self.error, 1e-300) * NINETY / float(stdtrit(self.freedom, 0.95))
 
     def scaled(self, factor: float) -> "Estimate":
         """The estimate in another unit."""

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from glider.tools.data.intervals import NINETY
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs.run import Run
 from glider.tools.data.runs.sampling import expected_samples
@@ -13,7 +14,6 @@ HELD_JUMP = 4.0  # quanta that a reading makes up when it moves again: it was he
 MISSING_SHARE = 0.02
 SATURATED_ROWS, SATURATED_SHARE = 5, 0.01  # rows running at the very same extreme, and of all rows
 COARSE = 0.3  # of a tolerance that a quantum may be (a uniform error of a third of it, root mean square)
-LEAST_LEVELS = 4
 
 
 def judge_samples(runs: list[Run]) -> list[Finding]:
@@ -32,7 +32,7 @@ def judge_samples(runs: list[Run]) -> list[Finding]:
 
 def _share(count: int, of: int) -> tuple[float, tuple[float, float]]:
     share = count / max(of, 1)
-    half = 1.645 * np.sqrt(max(share * (1.0 - share), 1e-12) / max(of, 1))
+    half = NINETY * np.sqrt(max(share * (1.0 - share), 1e-12) / max(of, 1))
     return share, (max(share - half, 0.0), min(share + half, 1.0))
 
 

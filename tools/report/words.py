@@ -1,6 +1,8 @@
 """A diagnosis in plain words: the verdict as one sentence, what is left, and numbers with units that a person reads."""
 
 import math
+import tomllib
+from importlib.resources import files
 from typing import Any
 
 from glider.sim_backend.core.effects.base import Effect
@@ -12,83 +14,11 @@ from glider.tools.diagnose.record import number as finite
 from glider.tools.diagnose.residuals import SHAPES, UNCLEAN, strongest_left
 
 MINUS, DASH = "\N{MINUS SIGN}", "\N{EN DASH}"
-PLAIN = {
-    "added_mass": "the water carried along across the hull is more or less than modelled",
-    "attitude_lag": "measured attitude lags behind the motion",
-    "attitude_scale": "measured pitch is off by a factor",
-    "ballast_leak": "the vehicle takes on water, unseen by the tank's draw-wire",
-    "ballast_scale": "the tank holds more or less than its draw-wire says",
-    "cg_lateral": "the centre of gravity lies off to one side",
-    "cg_longitudinal": "the centre of gravity lies further forward or aft than modelled",
-    "cg_vertical": "the centre of gravity lies higher or lower than modelled",
-    "climb_dive_asymmetry": "drag differs between climbing and diving",
-    "clock_skew": "motion capture's clock runs fast or slow",
-    "command_delay": "commands take effect late",
-    "compass": "the compass errs with heading",
-    "compressibility": "the vehicle grows heavier with depth",
-    "current": "the water moves and carries the vehicle along",
-    "current_shear": "the water's motion changes with depth",
-    "density_bias": "the water is denser or lighter than its sensor says",
-    "depth_lag": "measured depth lags behind the motion",
-    "depth_offset": "measured depth is off by a constant",
-    "depth_scale": "measured depth is off by a factor",
-    "drag": "the hull drags more or less than its coefficients say",
-    "gyro_bias": "measured rates are off by a constant",
-    "gyro_scale": "measured rates are off by a factor",
-    "imu_pitch_bias": "measured pitch is off by a constant",
-    "imu_roll_bias": "measured roll is off by a constant",
-    "inertia": "the hull resists turning more or less than modelled",
-    "lift": "the wings lift more or less than their coefficient says",
-    "linear_drag": "a drag in proportion to speed is missing",
-    "mocap_delay": "motion capture reports late",
-    "net_buoyancy": "the vehicle is ballasted heavy or light",
-    "pitch_damping": "pitching is damped more or less than modelled",
-    "pitch_trim": "the water turns the nose up or down, more with speed",
-    "pressure_lever": "the pressure port lies ahead of or behind the origin",
-    "pump_droop": "the pump slows down with depth when expelling",
-    "pump_slow": "the ballast pump is slower than modelled",
-    "roll_trim": "the water rolls the hull to one side, more with speed",
-    "servo_backlash": "the servo has play",
-    "servo_limit": "the servo stops short of its range",
-    "servo_offset": "the servo stands off its command by a constant angle",
-    "servo_slow": "the servo is slower than modelled",
-    "side_force": "the hull resists sideslip more or less than modelled",
-    "slider_backlash": "the slider has play",
-    "slider_scale": "the sliding mass moves more or less than its draw-wire says",
-    "slider_slow": "the slider is slower than modelled",
-    "stall": "lift stops growing past an angle of attack",
-    "stratification": "the vehicle grows lighter with depth",
-    "tether": "a line drags at the tail",
-    "thermal_expansion": "the hull's volume goes with the temperature more or less than modelled",
-    "turbulence": "the water is more turbulent than the vehicle file says",
-    "vertical_water": "the water rises and falls more than it did",
-    "waves": "surface waves move the vehicle",
-    "weathercock": "the hull turns into or out of sideslip more or less than modelled",
-    "yaw_damping": "yawing is damped more or less than modelled",
-    "yaw_trim": "the water turns the nose to one side, more with speed",
-}
-CHANNEL_WORDS = {
-    "p": "roll rate", "q": "pitch rate", "r": "yaw rate", "slider": "slider position", "ballast": "ballast mass",
-    "mocap x": "position north by motion capture", "mocap y": "position east by motion capture",
-    "mocap z": "depth by motion capture", "mocap roll": "roll by motion capture",
-    "mocap pitch": "pitch by motion capture", "mocap yaw": "yaw by motion capture",
-}  # fmt: skip
-AXES = {
-    "roll": "roll axis", "p": "roll axis", "pitch": "pitch axis", "q": "pitch axis", "yaw": "yaw axis", "r": "yaw axis",
-    "depth": "vertical", "slider": "slider", "ballast": "ballast tank", "mocap x": "horizontal",
-    "mocap y": "horizontal", "mocap z": "vertical", "mocap roll": "roll axis",
-    "mocap pitch": "pitch axis", "mocap yaw": "yaw axis",
-}  # fmt: skip
-FEATURES = {
-    "pump running": "whether the pump runs", "pump expelling": "whether the pump expels",
-    "time": "time since the start", "servo": "servo angle", "slider": "slider position", "ballast": "ballast mass",
-    "constant": "a constant",
-}  # fmt: skip
+_WORDS = tomllib.loads(files(__package__).joinpath("words.toml").read_text(encoding="utf-8"))
+PLAIN, CHANNEL_WORDS, AXES, FEATURES = (_WORDS[table] for table in ("effects", "channels", "axes", "features"))
 SHOWN_AS_ZERO, SHOWN_AS_POWER = 1e-12, 1e-4  # shown as 0, and by a power of ten
-SURE_PROBABILITY, LITTLE_PROBABILITY = (
-    0.8,
-    0.02,
-)  # below the first the next answer is named, unless it is below the second
+# Below the first the next answer is named, unless it is below the second.
+SURE_PROBABILITY, LITTLE_PROBABILITY = 0.8, 0.02
 FACTORS = {"1 + {}": lambda value: 1.0 + value, "e^{}": math.exp}  # of rows of the catalogue, by their parameter's name
 MEANS = {"none": "no gap", "unknown": "a gap of another kind"}
 READABLE = {"rad": ("deg", 180.0 / math.pi), "rad/s": ("deg/s", 180.0 / math.pi), "1/rad": ("1/deg", math.pi / 180.0)}
@@ -424,12 +354,9 @@ def described(record: DiagnosisRecord) -> list[dict[str, Any]]:
         if abs(found.sigma) < UNCLEAN:
             continue
         empty = {
-            "channel": channel(found.channel),
-            "axis": AXES.get(found.channel, ""),
-            "sigma": 0.0,
-            "shape": [],
+            "channel": channel(found.channel), "axis": AXES.get(found.channel, ""), "sigma": 0.0, "shape": [],
             "correlated": [],
-        }
+        }  # fmt: skip
         row = rows.setdefault(found.channel, empty)
         row["sigma"] = max(row["sigma"], float(abs(found.sigma)))
         text = f"{finding(found, record.details.data.log_rate_hz)} ({abs(found.sigma):.0f})"

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from glider.tools.data.intervals import NINETY
 from glider.tools.diagnose.materiality import largest
 from glider.tools.diagnose.probabilities import ERROR_RATE, TIE, softmax
 from glider.tools.inference.predict import fly_windows_from
@@ -21,7 +22,6 @@ from glider.tools.watch.water import asked_above
 
 EXCESS_NIS_SIGMA = 6.0  # sigma of a run's mean squared innovation: something changed, though no label says what
 MOST_SURE = 0.995
-CI90 = 1.645
 ALTERNATIVE_FACTOR = 2.0  # times
 SCATTERED = 3  # changes that touch
 VECTORS = ("gyro_bias", "current", "current_shear", "compass")  # labels whose parameters are parts of one length
@@ -245,17 +245,17 @@ def sized(history: History, one: ResolvedEvent, weight: float = 1.0) -> Sized:
     C, form = weight**2 * covariance * np.outer(units, units), history.flights.parts[0].kind.form
     sigma = np.sqrt(np.diag(C) + (form * values) ** 2)
     parameters = {
-        own.name: {"estimate": float(v), "ci90": (float(v - CI90 * s), float(v + CI90 * s)), "unit": own.unit}
+        own.name: {"estimate": float(v), "ci90": (float(v - NINETY * s), float(v + NINETY * s)), "unit": own.unit}
         for own, v, s in zip(free, values, sigma, strict=True)
     }
     if event.label in VECTORS:
         length = float(np.linalg.norm(values))
         along = values / max(length, 1e-12)
         spread = float(np.sqrt(along @ C @ along + (form * length) ** 2))
-        return Sized(length, (max(0.0, length - CI90 * spread), length + CI90 * spread), free[0].unit, parameters)
+        return Sized(length, (max(0.0, length - NINETY * spread), length + NINETY * spread), free[0].unit, parameters)
     main = int(np.argmax(np.abs(values) / np.maximum(sigma, 1e-12)))
     value, spread = float(values[main]), float(sigma[main])
-    return Sized(value, (value - CI90 * spread, value + CI90 * spread), free[main].unit, parameters)
+    return Sized(value, (value - NINETY * spread, value + NINETY * spread), free[main].unit, parameters)
 
 
 def water_size(event: ChangeEvent) -> Sized:
@@ -263,7 +263,7 @@ def water_size(event: ChangeEvent) -> Sized:
     scale, spread = float(event.size[0]), float(np.sqrt(event.covariance[0, 0]))
     if event.label != "turbulence":
         return Sized(None, None, None)
-    return Sized(scale - 1.0, (scale - 1.0 - CI90 * spread, scale - 1.0 + CI90 * spread), "1")
+    return Sized(scale - 1.0, (scale - 1.0 - NINETY * spread, scale - 1.0 + NINETY * spread), "1")
 
 
 def where_of(history: History, one: ResolvedEvent) -> list[dict[str, object]]:

@@ -17,13 +17,10 @@ def momentum(m1, m2, m3, S1, S2, S3, I1, I2, I3, I12, I13, I23, u, v, w, p, q, r
     -S^ Omega = Omega x S and S^ V = S x V.
     """
     return (
-        m1 * u + q * S3 - r * S2,
-        m2 * v + r * S1 - p * S3,
-        m3 * w + p * S2 - q * S1,
-        I1 * p + I12 * q + I13 * r + S2 * w - S3 * v,
-        I12 * p + I2 * q + I23 * r + S3 * u - S1 * w,
+        m1 * u + q * S3 - r * S2, m2 * v + r * S1 - p * S3, m3 * w + p * S2 - q * S1,
+        I1 * p + I12 * q + I13 * r + S2 * w - S3 * v, I12 * p + I2 * q + I23 * r + S3 * u - S1 * w,
         I13 * p + I23 * q + I3 * r + S1 * v - S2 * u,
-    )
+    )  # fmt: skip
 
 
 @inlined_kernel

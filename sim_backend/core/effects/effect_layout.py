@@ -24,7 +24,7 @@ N_BIASES = 9
 GAUGE_TANK = BIAS + N_BIASES
 # a data-driven correction (tools/diagnose/correction): the link at which it enters, and its coefficients
 LINK, SHAPE = GAUGE_TANK + 1, GAUGE_TANK + 2  # SHAPE and behind it in the link's unit
-FORCE_LINKS, ACTUATOR_LINKS = 6, 9  # links 1-6: X Y Z K M N (N, N m); 7-9: servo, slider, ballast; then the readings
+ACTUATOR_LINKS = 9  # links 1-6: X Y Z K M N (N, N m); 7-9: servo, slider, ballast; then the readings
 SHAPES = (
     "constant", "speed squared", "depth", "angle of attack", "sideslip", "roll rate", "pitch rate", "yaw rate",
     "pump running", "time", "climb or dive",

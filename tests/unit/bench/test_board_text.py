@@ -4,7 +4,7 @@ import pytest
 
 from glider.hal.boardfile import calibration_hash, decode_device_file
 from glider.hal.strict import ConfigError
-from glider.tools.bench.boardtext import accepted, keep_old, replace_file, set_ports, set_values
+from glider.tools.bench.boardtext import accepted, keep_old, set_ports, set_values
 from tests.unit.hal.test_boardfile import TEXT, TWIN
 
 
@@ -33,7 +33,7 @@ def test_old_files_are_all_kept(tmp_path):
     for number in range(3):
         path.write_text(f"version {number}")
         assert keep_old(path).name == f"board.toml.{number + 1}"
-        replace_file(path, f"version {number + 1}")
+        path.write_text(f"version {number + 1}")
     assert sorted(file.read_text() for file in tmp_path.glob("board.toml.*")) == ["version 0", "version 1", "version 2"]
     assert path.read_text() == "version 3"
     assert len(list(tmp_path.iterdir())) == 4

@@ -4,14 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from support.ocean import as_case, fly_dives
 
 from glider.sim_backend.foreign import ocean as foreign
 from glider.sim_backend.ocean.core import layout as at
 from glider.sim_backend.ocean.core.glide import net_buoyancy, steady_speed
 from glider.tools.data.runs import columns as names
-from glider.tools.measure.benchmark import ocean as measure
-from glider.tools.measure.benchmark.glider_flight import (
+from glider.tools.verify.benchmark import ocean as measure
+from glider.tools.verify.benchmark.glider_flight import (
     EVEN,
     MOVED,
     Glide,
@@ -21,7 +20,8 @@ from glider.tools.measure.benchmark.glider_flight import (
     rises,
     water_rms,
 )
-from glider.tools.study.challenge.ocean_cases import shipped_vehicle
+from glider.tools.verify.challenge.ocean_cases import shipped_vehicle
+from tests.support.ocean import as_case, fly_dives
 
 DIVES, REFERENCE, FIRST = 10, 5, 7
 

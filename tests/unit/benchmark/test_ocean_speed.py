@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from glider.tools.measure.figures.ocean_speed import SpeedQuery, summary
+from glider.tools.verify.figures.ocean_speed import SpeedQuery, summary
 
 
 def test_errors_of_missions_and_of_dives_within_them():

@@ -5,10 +5,11 @@ import csv
 import numpy as np
 import pytest
 
+from glider.tools.data.intervals import wilson
 from glider.tools.study.campaign.conduct import FlownChunk, write_flights
 from glider.tools.study.campaign.flights import COLUMNS, ENDINGS
 from glider.tools.study.campaign.picture import page
-from glider.tools.study.campaign.summary import completed_by_all, summarise, wilson
+from glider.tools.study.campaign.summary import completed_by_all, summarise
 
 LEG_TIME = next(code for code, text in ENDINGS.items() if text == "leg over its time limit")
 
@@ -48,6 +49,11 @@ def test_wilson_by_its_definition():
     # the ends are where the score test just holds: |share - p| = z sqrt(p (1 - p) / n)
     for p in wilson(30, 40):
         assert abs(0.75 - p) == pytest.approx(1.6448536 * np.sqrt(p * (1 - p) / 40))
+
+
+def test_wilson_against_values_worked_out_by_hand():
+    assert wilson(8, 10) == pytest.approx((0.54080, 0.93145), abs=2e-4)
+    assert wilson(0, 0) == (0.0, 1.0)
 
 
 def test_wilson_covers_nine_times_in_ten():

@@ -8,18 +8,18 @@ import pytest
 
 from glider.sim_backend.foreign import foreign_layout as fo
 from glider.tools.data.sources import load_vehicle
-from glider.tools.study.challenge import form_score
-from glider.tools.study.challenge.design import POOL
-from glider.tools.study.challenge.diagnose_all import FORM, commands
-from glider.tools.study.challenge.diagnosis import read_diagnosis
-from glider.tools.study.challenge.form_cases import draw_healthy
-from glider.tools.study.challenge.form_fit import fit_flights, fit_forces, residual
-from glider.tools.study.challenge.form_plan import BY_LABEL, CHANGES, OUTSIDE, FormCounts, form_plan
-from glider.tools.study.challenge.form_score import closed_change
-from glider.tools.study.challenge.forms import FORMS
-from glider.tools.study.challenge.plan import NONE, SINGLE, UNKNOWN
-from glider.tools.study.challenge.score import ScoredCase, score_forms
-from glider.tools.study.challenge.trial import total
+from glider.tools.verify.challenge import form_score
+from glider.tools.verify.challenge.design import POOL
+from glider.tools.verify.challenge.diagnose_all import FORM, commands
+from glider.tools.verify.challenge.diagnosis import read_diagnosis
+from glider.tools.verify.challenge.form_cases import draw_healthy
+from glider.tools.verify.challenge.form_fit import fit_flights, fit_forces, residual
+from glider.tools.verify.challenge.form_plan import BY_LABEL, CHANGES, OUTSIDE, FormCounts, form_plan
+from glider.tools.verify.challenge.form_score import closed_change
+from glider.tools.verify.challenge.forms import FORMS
+from glider.tools.verify.challenge.plan import NONE, SINGLE, UNKNOWN
+from glider.tools.verify.challenge.score import ScoredCase, score_forms
+from glider.tools.verify.challenge.trial import total
 
 VEHICLE = load_vehicle("roughie")
 

@@ -10,11 +10,11 @@ from glider.tools.cli.main import cli
 from glider.tools.data.errors import InputError
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs.case import load_case
-from glider.tools.study.challenge.diagnose_all import MISSION, commands
-from glider.tools.study.challenge.make import make
-from glider.tools.study.challenge.ocean_cases import example_mission
-from glider.tools.study.challenge.ocean_make import OceanOrder
-from glider.tools.study.challenge.ocean_plan import (
+from glider.tools.verify.challenge.diagnose_all import MISSION, commands
+from glider.tools.verify.challenge.make import make
+from glider.tools.verify.challenge.ocean_cases import example_mission
+from glider.tools.verify.challenge.ocean_make import OceanOrder
+from glider.tools.verify.challenge.ocean_plan import (
     CHANGES,
     CRAFTS,
     LIFT_SHOWS,
@@ -23,11 +23,11 @@ from glider.tools.study.challenge.ocean_plan import (
     OUTSIDE_SHOWS,
     ocean_plan,
 )
-from glider.tools.study.challenge.ocean_score import NEEDED_OF_A_MISSION, judge_missions, score_missions, speeds_held
-from glider.tools.study.challenge.seal import open_answers
-from glider.tools.study.challenge.watch_answer import read_watch
-from glider.tools.study.challenge.watch_plan import CHANGED, EPISODE, GROWING, OUTSIDE, STEP, UNCHANGED, WatchCounts
-from glider.tools.study.challenge.watch_score import Watched
+from glider.tools.verify.challenge.ocean_score import NEEDED_OF_A_MISSION, judge_missions, score_missions, speeds_held
+from glider.tools.verify.challenge.seal import open_answers
+from glider.tools.verify.challenge.watch_answer import read_watch
+from glider.tools.verify.challenge.watch_plan import CHANGED, EPISODE, GROWING, OUTSIDE, STEP, UNCHANGED, WatchCounts
+from glider.tools.verify.challenge.watch_score import Watched
 
 FEW = WatchCounts(vehicles=2, unchanged=1, runs=6, reference=2)
 

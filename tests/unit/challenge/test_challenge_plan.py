@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from glider.tools.study.challenge.forms import FORMS, KNOWN
-from glider.tools.study.challenge.magnitude import find_strength
-from glider.tools.study.challenge.plan import NONE, PAIR, SINGLE, UNKNOWN, Counts, plan
+from glider.tools.verify.challenge.forms import FORMS, KNOWN
+from glider.tools.verify.challenge.magnitude import find_strength
+from glider.tools.verify.challenge.plan import NONE, PAIR, SINGLE, UNKNOWN, Counts, plan
 
 
 def test_counts_labels_weak_and_strong():

@@ -6,8 +6,8 @@ import math
 import pytest
 
 from glider.tools.data.errors import InputError
-from glider.tools.study.challenge.diagnosis import AnsweredCause, AnswerFile, Where, read_diagnosis
-from glider.tools.study.challenge.score import ScoredCase, by_label, score, wilson
+from glider.tools.verify.challenge.diagnosis import AnsweredCause, AnswerFile, Where, read_diagnosis
+from glider.tools.verify.challenge.score import ScoredCase, by_label, score
 
 SURGE, NET = ["hydrodynamics", "surge"], ["mass", "net"]
 
@@ -91,14 +91,6 @@ def test_naming_everything_names_nothing():
     found = counted([ScoredCase("a", pair, answer)])
     assert found["two_both_named"] == (0, 1)
     assert found["two_one_named"] == (0, 1)
-
-
-def test_wilson_against_values_worked_out_by_hand():
-    z2 = 1.6448536269514722**2
-    assert wilson(0, 10) == pytest.approx((0.0, z2 / (10 + z2)))
-    assert wilson(10, 10) == pytest.approx((10 / (10 + z2), 1.0))
-    assert wilson(8, 10) == pytest.approx((0.54080, 0.93145), abs=2e-4)
-    assert wilson(0, 0) == (0.0, 1.0)
 
 
 def test_a_label_has_a_line_and_what_it_was_called(cases):

@@ -7,8 +7,8 @@ import zipfile
 import pytest
 
 from glider.tools.data.errors import InputError
-from glider.tools.study.challenge.judge import open_sealed
-from glider.tools.study.challenge.seal import MANIFEST, open_answers, seal, write_manifest
+from glider.tools.verify.challenge.judge import open_sealed
+from glider.tools.verify.challenge.seal import MANIFEST, open_answers, seal, write_manifest
 
 ANSWER = {"labels": ["drag"], "places": [[["hydrodynamics", "surge"]]], "before": [], "oracle": [], "runs": 6}
 

@@ -10,12 +10,12 @@ from glider.tools.cli.main import cli
 from glider.tools.data.errors import InputError
 from glider.tools.data.runs.case import load_case
 from glider.tools.data.sources import load_vehicle
-from glider.tools.study.challenge.make import make
-from glider.tools.study.challenge.seal import open_answers
-from glider.tools.study.challenge.watch_answer import read_watch
-from glider.tools.study.challenge.watch_cases import draw_vehicle
-from glider.tools.study.challenge.watch_make import WatchOrder
-from glider.tools.study.challenge.watch_plan import (
+from glider.tools.verify.challenge.make import make
+from glider.tools.verify.challenge.seal import open_answers
+from glider.tools.verify.challenge.watch_answer import read_watch
+from glider.tools.verify.challenge.watch_cases import draw_vehicle
+from glider.tools.verify.challenge.watch_make import WatchOrder
+from glider.tools.verify.challenge.watch_plan import (
     CHANGED,
     EPISODE,
     GROWING,
@@ -25,7 +25,7 @@ from glider.tools.study.challenge.watch_plan import (
     WatchCounts,
     watch_plan,
 )
-from glider.tools.study.challenge.watch_score import NEEDED, Watched, score_watches
+from glider.tools.verify.challenge.watch_score import NEEDED, Watched, score_watches
 
 
 def test_counts_courses_and_spans():

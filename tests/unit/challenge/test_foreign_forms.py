@@ -10,9 +10,9 @@ from glider.firmware.core.vehicle.layout import N_X
 from glider.sim_backend.foreign import foreign_layout as fo
 from glider.sim_backend.foreign.foreign_flight import fly_foreign, fly_on
 from glider.tools.data.sources import load_vehicle
-from glider.tools.study.challenge.design import LAKE, POOL, draw_runs
-from glider.tools.study.challenge.forms import FORMS, KNOWN, SECRET, blank, draw_shapes, draw_waves
-from glider.tools.study.challenge.trial import Trial, draw_trial, flyable, predictable, total, with_effect
+from glider.tools.verify.challenge.design import LAKE, POOL, draw_runs
+from glider.tools.verify.challenge.forms import FORMS, KNOWN, SECRET, blank, draw_shapes, draw_waves
+from glider.tools.verify.challenge.trial import Trial, draw_trial, flyable, predictable, total, with_effect
 
 VEHICLE = load_vehicle("roughie")
 

@@ -7,9 +7,9 @@ from glider.sim_backend.foreign import ocean as at
 from glider.sim_backend.ocean.core import layout
 from glider.sim_backend.ocean.core.glide import steady_speed
 from glider.tools.data.runs import columns as names
-from glider.tools.study.challenge import ocean_cases
-from glider.tools.study.challenge.ocean_cases import flown, fly_mission, legs, shipped_vehicle, shown, with_change
-from glider.tools.study.challenge.ocean_design import CRAFTS, THRUSTER, MissionDesign, draw_mission
+from glider.tools.verify.challenge import ocean_cases
+from glider.tools.verify.challenge.ocean_cases import flown, fly_mission, legs, shipped_vehicle, shown, with_change
+from glider.tools.verify.challenge.ocean_design import CRAFTS, THRUSTER, MissionDesign, draw_mission
 
 
 def mission(vehicle_class: str = "slocum", dives: int = 2) -> MissionDesign:

@@ -12,10 +12,10 @@ from glider.sim_backend.foreign import lifting_body as body
 from glider.sim_backend.foreign.foreign_flight import fly_foreign
 from glider.sim_backend.foreign.foreign_mission import fly_mission
 from glider.tools.data.sources import load_mission, load_vehicle
-from glider.tools.study.challenge.design import POOL, draw_run
-from glider.tools.study.challenge.form_cases import FormTrial, gross_behaviour, pilot_of, plausible
-from glider.tools.study.challenge.form_vehicle import COEFFICIENTS, draw_body, spheroid
-from glider.tools.study.challenge.forms import draw_waves
+from glider.tools.verify.challenge.design import POOL, draw_run
+from glider.tools.verify.challenge.form_cases import FormTrial, gross_behaviour, pilot_of, plausible
+from glider.tools.verify.challenge.form_vehicle import COEFFICIENTS, draw_body, spheroid
+from glider.tools.verify.challenge.forms import draw_waves
 
 pytestmark = pytest.mark.computes(seconds=20)
 

@@ -4,11 +4,11 @@ import json
 import shutil
 
 import pytest
-from support.ocean import as_case, fly_dives
 
 from glider.tools.cli.common import report_errors
 from glider.tools.cli.main import cli
-from glider.tools.study.many_cases import CASES, REFERENCE, VEHICLE, OneCommand
+from glider.tools.cli.many_cases import CASES, REFERENCE, VEHICLE, OneCommand
+from tests.support.ocean import as_case, fly_dives
 
 
 def run(capsys, *words: object) -> tuple[int, str, str]:

@@ -5,11 +5,11 @@ import pytest
 
 from glider.tools.data.runs import columns as names
 from glider.tools.data.sources import load_vehicle
-from glider.tools.study.challenge.design import POOL
-from glider.tools.study.challenge.diagnosis import AnsweredCause, AnswerFile
-from glider.tools.study.challenge.forms import FORMS
-from glider.tools.study.challenge.make import Order
-from glider.tools.study.challenge.messy import (
+from glider.tools.verify.challenge.design import POOL
+from glider.tools.verify.challenge.diagnosis import AnsweredCause, AnswerFile
+from glider.tools.verify.challenge.forms import FORMS
+from glider.tools.verify.challenge.make import Order
+from glider.tools.verify.challenge.messy import (
     BIAS,
     DISTURBANCE,
     LARGEST_SMALL_GAP,
@@ -18,9 +18,9 @@ from glider.tools.study.challenge.messy import (
     small_one,
     small_ones,
 )
-from glider.tools.study.challenge.plan import MESSY, Counts, plan
-from glider.tools.study.challenge.score import ScoredCase, score
-from glider.tools.study.challenge.trial import Trial, draw_trial, flyable
+from glider.tools.verify.challenge.plan import MESSY, Counts, plan
+from glider.tools.verify.challenge.score import ScoredCase, score
+from glider.tools.verify.challenge.trial import Trial, draw_trial, flyable
 
 VEHICLE = load_vehicle("roughie")
 

@@ -5,12 +5,12 @@ import math
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-from model_states import HIGH, LOW, RATE, TAU, P, actuators, derivative, state
 
 from glider.firmware.core.vehicle import layout
 from glider.firmware.core.vehicle.actuators import actuator_rate, actuator_rates, clip
 from glider.firmware.core.vehicle.flight import nominal_step
 from tests.support.examples import examples
+from tests.support.model_states import HIGH, LOW, RATE, TAU, P, actuators, derivative, state
 
 anything = st.one_of(st.floats(allow_nan=True, allow_infinity=True), st.floats(-2.0, 2.0))
 commands = st.tuples(anything, anything, anything)

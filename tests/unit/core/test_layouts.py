@@ -83,7 +83,7 @@ def test_the_rule_finds_the_layouts():
 # Vectors of other vehicles, each in layouts of its own: a name has another meaning there.
 OTHERS = {
     "glider.sim_backend.ocean.core.layout": "ocean", "glider.sim_backend.foreign.ocean": "foreign ocean",
-    "glider.tools.study.challenge.ocean_design": "foreign ocean",
+    "glider.tools.verify.challenge.ocean_design": "foreign ocean",
 }  # fmt: skip
 
 

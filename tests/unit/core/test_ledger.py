@@ -6,19 +6,6 @@ import re
 import numpy as np
 import pytest
 from hypothesis import given
-from law_flights import down, form_at, output_accelerations, plant_rates
-from model_states import (
-    VEHICLE_TEXT,
-    P,
-    actuators,
-    angles,
-    derivative,
-    full_mass_matrix,
-    pitches,
-    rates,
-    state,
-    velocities,
-)
 
 from glider.firmware.core.control.control import reference_step
 from glider.firmware.core.control.input_forms import exact_form, paper_form, roll_form
@@ -30,6 +17,19 @@ from glider.firmware.core.vehicle.mass import first_moment, inertia
 from glider.firmware.core.vehicle.water import water_wrench
 from glider.firmware.model.vehicle import decode_vehicle
 from tests.support.examples import examples
+from tests.support.law_flights import down, form_at, output_accelerations, plant_rates
+from tests.support.model_states import (
+    VEHICLE_TEXT,
+    P,
+    actuators,
+    angles,
+    derivative,
+    full_mass_matrix,
+    pitches,
+    rates,
+    state,
+    velocities,
+)
 
 LEDGER = PACKAGES_DIR / "docs" / "LEDGER.md"
 

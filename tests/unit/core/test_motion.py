@@ -5,9 +5,15 @@ import math
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-from independent.make_reference import VEHICLE
-from independent.nominal import Glider, about, body_to_ned
-from model_states import (
+
+from glider.firmware.core.vehicle import layout
+from glider.firmware.core.vehicle.mass import first_moment, first_moment_rate, inertia, translational_mass
+from glider.firmware.core.vehicle.motion import solve_mass_matrix
+from glider.firmware.core.vehicle.water import flow_angles, flow_to_body, water_wrench
+from tests.independent.make_reference import VEHICLE
+from tests.independent.nominal import Glider, about, body_to_ned
+from tests.support.examples import examples
+from tests.support.model_states import (
     RATE,
     P,
     actuators,
@@ -20,12 +26,6 @@ from model_states import (
     vehicles,
     velocities,
 )
-
-from glider.firmware.core.vehicle import layout
-from glider.firmware.core.vehicle.mass import first_moment, first_moment_rate, inertia, translational_mass
-from glider.firmware.core.vehicle.motion import solve_mass_matrix
-from glider.firmware.core.vehicle.water import flow_angles, flow_to_body, water_wrench
-from tests.support.examples import examples
 
 GLIDER = Glider.from_file(VEHICLE)
 forces = st.tuples(*[st.floats(-10.0, 10.0)] * 6)

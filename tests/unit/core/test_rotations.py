@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from model_states import angles, pitches, quaternions, rates
 from scipy.spatial.transform import Rotation
 
 from glider.firmware.core.maths.rotations import (
@@ -19,6 +18,7 @@ from glider.firmware.core.maths.rotations import (
     wrap_angle,
 )
 from tests.support.examples import examples
+from tests.support.model_states import angles, pitches, quaternions, rates
 
 
 def scipy_rotation(q) -> Rotation:

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from model_states import P
 
 from glider.firmware.core.jit import allocating_kernel, kernel
 from glider.firmware.core.maths.rotations import quaternion_from_euler
@@ -12,6 +11,7 @@ from glider.firmware.core.maths.wide import LANES, anywhere, as_wide, everywhere
 from glider.firmware.core.vehicle import layout
 from glider.firmware.core.vehicle.batch import nominal_batch
 from glider.firmware.core.vehicle.flight import nominal_run
+from tests.support.model_states import P
 
 LIBRARY = 0.6  # units in the last place by which the C library, which is the measure here, may be wrong itself
 

@@ -27,10 +27,10 @@ from glider.tools.diagnose.against_healthy import (
     weigh,
 )
 from glider.tools.report.pooled import write_pooled_report
-from glider.tools.study.challenge.form_cases import draw_healthy, write_flights
-from glider.tools.study.challenge.form_fit import fit_flights, fit_forces
-from glider.tools.study.challenge.form_plan import BY_LABEL
-from glider.tools.study.challenge.trial import with_effect
+from glider.tools.verify.challenge.form_cases import draw_healthy, write_flights
+from glider.tools.verify.challenge.form_fit import fit_flights, fit_forces
+from glider.tools.verify.challenge.form_plan import BY_LABEL
+from glider.tools.verify.challenge.trial import with_effect
 
 pytestmark = pytest.mark.computes(seconds=150)
 

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from support.cases import make_case
 
 from glider.sim_backend.core.effects import effect_layout as ef
 from glider.tools.diagnose.as_read import begun_as_read
 from glider.tools.inference.model import effect_vector
 from glider.tools.inference.predict import fly_windows_from
 from glider.tools.inference.problem import cut, problem_of
+from tests.support.cases import make_case
 
 
 @pytest.fixture(scope="module")

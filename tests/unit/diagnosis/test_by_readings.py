@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from support.cases import make_case
 
 from glider.sim_backend.core.effects import effect_layout as ef
 from glider.tools.data.runs.case import load_case
@@ -11,6 +10,7 @@ from glider.tools.diagnose.diagnosis import diagnose, plain
 from glider.tools.gap.corrected import findings_of
 from glider.tools.inference.rules import Rules
 from glider.tools.readings.findings import Finding
+from tests.support.cases import make_case
 
 pytestmark = pytest.mark.computes(seconds=60)
 

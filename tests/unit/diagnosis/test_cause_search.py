@@ -4,13 +4,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support.cases import make_case
 
 from glider.sim_backend.core.effects import effect_layout as ef
 from glider.sim_backend.core.effects.catalogue import catalogue
 from glider.tools.diagnose.descent import PRUNE_BEHIND, prune
 from glider.tools.diagnose.search import run
 from glider.tools.inference.problem import problem_of
+from tests.support.cases import make_case
 
 
 def candidate(name, misfit, gained):

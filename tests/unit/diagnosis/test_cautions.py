@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.cases import make_case
 
 from glider.sim_backend.core.effects import effect_layout as ef
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs.case import Case
 from glider.tools.diagnose.cautions import below_floor, cautions, not_asked
 from glider.tools.inference.problem import problem_of
+from tests.support.cases import make_case
 
 
 @pytest.fixture(scope="module")

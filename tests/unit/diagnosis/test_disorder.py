@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from support.cases import make_case
 
 from glider.sim_backend.core.effects import effect_layout as ef
 from glider.tools.diagnose.diagnosis import model_text
@@ -10,6 +9,7 @@ from glider.tools.diagnose.noise_probes import CLOCK, TURBULENCE
 from glider.tools.diagnose.search import run
 from glider.tools.diagnose.verdict import conclude
 from glider.tools.inference.problem import problem_of
+from tests.support.cases import make_case
 
 pytestmark = pytest.mark.computes(seconds=20)
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from support.cases import begins, drawn, make_case
 
 from glider.sim_backend.core.effects import effect_layout as ef
 from glider.sim_backend.core.effects.timing import mean_input
@@ -10,6 +9,7 @@ from glider.tools.diagnose.residuals import tests as residual_tests
 from glider.tools.inference.core.error_layout import N_ERR
 from glider.tools.inference.core.step import difference, inject_error
 from glider.tools.inference.problem import problem_of
+from tests.support.cases import begins, drawn, make_case
 
 
 @pytest.fixture(scope="module")

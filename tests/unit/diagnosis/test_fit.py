@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
-from support.cases import make_case
 
 from glider.sim_backend.core.effects import effect_layout as ef
 from glider.tools.inference.fit import SIDE_STEPS, Fitter, bounded_step
 from glider.tools.inference.parameters import effect_parameters, model_at, nuisance_parameters
 from glider.tools.inference.problem import problem_of
+from tests.support.cases import make_case
 
 
 def test_steps_within_limits_are_those_of_bounded_least_squares():

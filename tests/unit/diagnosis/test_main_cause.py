@@ -4,7 +4,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support.cases import make_case
 
 from glider.sim_backend.core.effects import effect_layout as ef
 from glider.sim_backend.core.effects.catalogue import catalogue
@@ -36,6 +35,7 @@ from glider.tools.diagnose.verdict import (
     with_least_gap,
 )
 from glider.tools.inference.problem import problem_of
+from tests.support.cases import make_case
 
 
 def test_worth_is_the_root_of_what_the_gap_grows_by():

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from support.cases import make_case
 
 from glider.sim_backend.core.effects import effect_layout as ef
 from glider.tools.diagnose.materiality import MATERIAL_TOLERANCES, excess, movements
@@ -11,6 +10,7 @@ from glider.tools.diagnose.record import NONE, UNKNOWN
 from glider.tools.diagnose.search import run
 from glider.tools.diagnose.verdict import EVIDENCE_NEEDED, Answer, conclude
 from glider.tools.inference.problem import problem_of
+from tests.support.cases import make_case
 
 SMALL, LARGE = 0.004, 0.2  # s; at 0.3 m/s and 0.15 m of tolerance some 0.008 and 0.4 tolerances
 

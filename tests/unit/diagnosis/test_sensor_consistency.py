@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from support.cases import make_case
 
 from glider.sim_backend.core.effects import effect_layout as ef
 from glider.tools.diagnose.search import PROCESS_NOISE_SCALES
@@ -11,6 +10,7 @@ from glider.tools.inference.parameters import effect_parameters, model_at, nuisa
 from glider.tools.inference.predict import fly
 from glider.tools.inference.problem import problem_of
 from glider.tools.inference.time_alignment import POSE_LAG_S, aligned, sample_at_row
+from tests.support.cases import make_case
 
 
 def with_effect(folder, entry, value, **about):

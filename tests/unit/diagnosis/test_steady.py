@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from support.cases import make_case
 
 from glider.sim_backend.core.effects import effect_layout as ef
 from glider.tools.data.runs import columns as names
-from glider.tools.measure.figures.steady import Said, largest_move, line, moved, said
+from glider.tools.verify.figures.steady import Said, largest_move, line, moved, said
+from tests.support.cases import make_case
 
 pytestmark = pytest.mark.computes(seconds=15)
 

@@ -3,7 +3,6 @@
 from types import SimpleNamespace
 
 import numpy as np
-from support.cases import make_case
 
 from glider.sim_backend.core.effects import effect_layout as ef
 from glider.tools.diagnose.noise_probes import WAVES, NoiseProbe, ProbeResult
@@ -13,6 +12,7 @@ from glider.tools.diagnose.unknown import Remainder, beside_a_sea
 from glider.tools.diagnose.verdict import conclude
 from glider.tools.diagnose.waves import LINE, line_share
 from glider.tools.inference.problem import problem_of
+from tests.support.cases import make_case
 
 ROWS = 600
 

@@ -12,7 +12,7 @@ from glider.hal.ports import SLOTS, Condition, Validity, empty_frame
 from glider.hal.protocols import maestro, modbus
 from glider.hal.protocols.modbus_master import Failure
 from glider.hal.protocols.registers import preset, to_registers
-from glider.tools.study.faults.wire import WireLine
+from glider.tools.verify.faults.wire import WireLine
 
 
 def sensor() -> Sensor:

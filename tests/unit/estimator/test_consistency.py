@@ -1,10 +1,10 @@
 """Is the filter as sure as it may be: normalised squared errors over seeded flights within chi-square bounds."""
 
 import numpy as np
-from support.estimating import Filter, state_error
-from support.flights import World, fly
 
 from glider.firmware.core.layouts import estimator_layout as kf
+from tests.support.estimating import Filter, state_error
+from tests.support.flights import World, fly
 
 # Depth, attitude and nu; position north and east is dead reckoning, actuators are known but for their noise.
 KEPT = [2, *range(kf.E_ATT, kf.E_ACT)]

@@ -5,13 +5,13 @@ import math
 import numba
 import numpy as np
 import pytest
-from support.estimating import Filter, state_error
 
 from glider.firmware.core.estimation.estimator import estimator_step
 from glider.firmware.core.layouts import estimator_layout as kf
 from glider.firmware.core.vehicle.flight import nominal_run
 from glider.firmware.core.vehicle.layout import N_X
 from glider.firmware.core.vehicle.linearise import linearise
+from tests.support.estimating import Filter, state_error
 
 HERE = dict(roll=0.0, pitch=-0.2, yaw=0.5, p=0.0, q=0.0, r=0.0, depth=2.0, slider=0.0, ballast=0.0)
 

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from support.estimating import Filter
 
 from glider.firmware.core.estimation.estimator import error_covariance, flight_derivative
 from glider.firmware.core.layouts import estimator_layout as kf
 from glider.firmware.core.maths.rotations import quaternion_from_euler
 from glider.firmware.core.vehicle import layout
 from glider.firmware.core.vehicle.linearise import linearise
+from tests.support.estimating import Filter
 
 STATES = {
     "dive": ((0.1, -0.5, 1.0), (0.4, 0.01, 0.03, 0.01, -0.02, 0.05), (0.2, 0.01, 0.15)),

@@ -6,10 +6,10 @@ import pytest
 from click.testing import CliRunner
 
 from glider.firmware.faults import FAULTS
-from glider.tools.study.faults import campaign
-from glider.tools.study.faults.campaign import FaultOutcome, everything, jobs, run, summary
-from glider.tools.study.faults.cases import FaultCase, Show
-from glider.tools.study.faults.scene import PHASES
+from glider.tools.verify.faults import campaign
+from glider.tools.verify.faults.campaign import FaultOutcome, everything, jobs, run, summary
+from glider.tools.verify.faults.cases import FaultCase, Show
+from glider.tools.verify.faults.scene import PHASES
 
 pytestmark = pytest.mark.computes(seconds=25)
 
@@ -81,8 +81,8 @@ def test_a_vehicle_that_stays_below_is_called_lost():
     from pathlib import Path
     from tempfile import TemporaryDirectory
 
-    from glider.tools.study.faults.flights import pump_fails_in_abort
-    from glider.tools.study.faults.scene import Setting, build_scene, fly
+    from glider.tools.verify.faults.flights import pump_fails_in_abort
+    from glider.tools.verify.faults.scene import Setting, build_scene, fly
 
     with TemporaryDirectory() as folder:
         scene = build_scene("descent", pump_fails_in_abort("stuck"), Setting(), 1, Path(folder, "m.toml"))
@@ -91,7 +91,7 @@ def test_a_vehicle_that_stays_below_is_called_lost():
 
 
 def test_the_command_line(monkeypatch):
-    from glider.tools.cli.faults import faults
+    from glider.tools.verify.faults.command import faults
 
     def here(only, disabled, workers, advance):
         return [run(job, disabled) for job in jobs(only)[:2]]

@@ -6,9 +6,6 @@ import math
 import msgspec
 import numpy as np
 import pytest
-from law_flights import output_accelerations, plant_rates
-from model_states import state
-from support.commands import glider
 
 from glider.firmware.core.vehicle import layout
 from glider.firmware.model.estimator_settings import parameter_sigma
@@ -16,6 +13,9 @@ from glider.firmware.model.gains import Control, Law, LawGains
 from glider.firmware.model.k2_margin import K2Margin, glides, k2_asked, k2_margins
 from glider.firmware.model.vehicle import UncertaintyTable
 from glider.tools.data.sources import load_vehicle
+from tests.support.commands import glider
+from tests.support.law_flights import output_accelerations, plant_rates
+from tests.support.model_states import state
 
 VEHICLE = load_vehicle("roughie")
 EPS = (0.1, 0.1)

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.cases import make_case
 
 from glider.sim_backend.core.effects import effect_layout as ef
 from glider.tools.gap.corrected import correct_readings, fix_axes_signs_units
 from glider.tools.inference.model import nominal_model
+from tests.support.cases import make_case
 
 
 @pytest.fixture(scope="module")

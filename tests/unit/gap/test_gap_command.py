@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.flights import World, fly_case
 
 from glider.tools.cli.common import report_errors
 from glider.tools.cli.main import cli
 from glider.tools.data.runs.case import write_case
 from glider.tools.data.runs.run import load_run
+from tests.support.flights import World, fly_case
 
 
 @pytest.fixture(scope="module")

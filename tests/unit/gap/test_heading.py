@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.ocean import as_case, fly_dives
 
 from glider.tools.data.errors import InputError
 from glider.tools.data.runs.csvfile import write_table
 from glider.tools.data.runs.origin import FIXES_FILE, ORIGIN_FILE, fix_columns, moment_text, read_fixes
 from glider.tools.gap.heading import HeadingLeg, coefficients, moved_between
 from tests.support.commands import glider
+from tests.support.ocean import as_case, fly_dives
 
 SPEED, TURNED = 0.06, 0.03  # share of the speed that a model lacks, rad to starboard
 START = 1_600_000_000.0

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from support.flights import World, fly_case
 
 from glider.sim_backend.core.effects import effect_layout as ef
 from glider.tools.diagnose.shrink import gaps
@@ -13,6 +12,7 @@ from glider.tools.inference.channels import ROUGHIE_MEASURES
 from glider.tools.inference.model import nominal_model
 from glider.tools.inference.predict import predict
 from glider.tools.inference.problem import problem_of
+from tests.support.flights import World, fly_case
 
 
 @pytest.mark.parametrize("mocap", [False, True])

@@ -4,8 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.cases import make_case
-from support.flights import World, case_of, fly, fly_case
 
 from glider.firmware.core.layouts import estimator_layout as kf
 from glider.firmware.core.vehicle import layout
@@ -18,6 +16,8 @@ from glider.tools.inference.model import nominal_model
 from glider.tools.inference.predict import fly as fly_model
 from glider.tools.inference.predict import fly_windows_from, observe, predict
 from glider.tools.inference.problem import cut, problem_of
+from tests.support.cases import make_case
+from tests.support.flights import World, case_of, fly, fly_case
 
 
 def total(case, predictions=None) -> float:

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.ocean import as_case, fly_dives, without
 
 from glider.sim_backend.ocean.core import layout as at
 from glider.tools.cli.common import report_errors
@@ -21,6 +20,7 @@ from glider.tools.inference.model import nominal_model
 from glider.tools.inference.ocean_inputs import unsteady
 from glider.tools.inference.parameters import NINETY
 from glider.tools.inference.problem import problem_of
+from tests.support.ocean import as_case, fly_dives, without
 
 DIVES, EVERY = 6, 60.0
 

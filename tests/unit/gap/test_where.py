@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from support.flights import World, fly_case
 
 from glider.firmware.core.vehicle import layout
 from glider.tools.gap.assess import CaseGap, assess
 from glider.tools.gap.where import ALLOWED, evidence
+from tests.support.flights import World, fly_case
 
 
 def measured(world: World, seed: int = 1, spoil=None) -> CaseGap:

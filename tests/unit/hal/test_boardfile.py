@@ -8,8 +8,9 @@ import pytest
 from glider.hal.boardfile import DRIVERS, calibration_hash, decode_device_file, driver_builder, known_devices
 from glider.hal.ports import SLOTS
 from glider.hal.strict import ConfigError
-from glider.sim_backend.twins.boardfile import decode_twin_file, simulated_text
+from glider.sim_backend.twins.boardfile import decode_twin_file, simulated_board
 from glider.sim_backend.twins.service import LINE_TWINS
+from glider.tools.data.tomltext import toml_text
 
 TEXT = files("glider.hal").joinpath("boards", "roughie.toml").read_text(encoding="utf-8")
 TWIN = files("glider.sim_backend").joinpath("boards", "twin.toml").read_text(encoding="utf-8")
@@ -81,7 +82,7 @@ def test_the_simulated_board_of_a_twin_has_its_rates_and_reads():
     from glider.sim_backend.board import SimBoardFile
 
     text = TWIN.replace("temperature_c = 20.0", "temperature_c = 12.0\nwave = [{ height_m = 0.3, period_s = 4.0 }]")
-    file = decode(simulated_text(decode_twin_file(text, "twin.toml")), SimBoardFile, "sim")
+    file = decode(toml_text(simulated_board(decode_twin_file(text, "twin.toml"))), SimBoardFile, "sim")
     assert file.sensors.imu.rate_hz == 100.0
     assert file.sensors.beacon.rate_hz == 25.0
     assert 0.002 < file.sensors.beacon.delay_s < 0.01

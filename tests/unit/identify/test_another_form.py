@@ -7,8 +7,8 @@ from glider.tools.data.runs.case import load_case
 from glider.tools.data.sources import load_vehicle
 from glider.tools.identify.files import VEHICLE, write
 from glider.tools.identify.pipeline import Identified, identify
-from glider.tools.measure.figures.form_identify import gaps_of, with_total
-from glider.tools.study.challenge.form_cases import draw_healthy, write_flights
+from glider.tools.verify.challenge.form_cases import draw_healthy, write_flights
+from glider.tools.verify.figures.form_identify import gaps_of, with_total
 
 pytestmark = pytest.mark.computes(seconds=40)
 

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from support.ocean import fly_dives
 
 from glider.tools.data.runs import columns as names
 from glider.tools.identify.ocean.identify import BANDS, covariance, larger, strata, stratum_pulls
 from glider.tools.inference.expansion import Expansion
 from glider.tools.inference.parameters import FreeParameter
 from glider.tools.inference.shared_parameters import SharedParameters
+from tests.support.ocean import fly_dives
 
 RUNS, HEAT, CURVATURE = 12, 4.0, 25.0  # curvature of a run in each of two numbers
 SHARED = SharedParameters([FreeParameter("", name, "P", n, 1.0) for n, name in enumerate("ab")], {}, {}, 1.0)

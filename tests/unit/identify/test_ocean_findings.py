@@ -5,7 +5,6 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
-from support.ocean import as_case, fly_dives
 
 from glider.sim_backend.foreign import ocean as foreign
 from glider.sim_backend.ocean.catalogue import ONE_ON_DEPTH
@@ -15,6 +14,7 @@ from glider.tools.identify.ocean.identify import identify_ocean
 from glider.tools.identify.ocean.next_run import flown, to_find, to_part
 from glider.tools.watch.whole_case import diagnose_ocean
 from glider.tools.watch.whole_case import plain as plain_diagnosis
+from tests.support.ocean import as_case, fly_dives
 
 pytestmark = pytest.mark.computes(seconds=25)
 

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.ocean import as_case, fly_dives, without
 
 from glider.sim_backend.foreign import ocean as foreign
 from glider.sim_backend.ocean.vehicle import PLACES, UNITS, decode_ocean_vehicle
@@ -16,6 +15,7 @@ from glider.tools.data.runs import columns as names
 from glider.tools.identify.ocean.files import RESULT, VEHICLE, plain, vehicle_text, write
 from glider.tools.identify.ocean.identify import MOST_RUNS, identify_ocean, learnable
 from glider.tools.inference.model import vehicle_model
+from tests.support.ocean import as_case, fly_dives, without
 
 DIVES, SIGMAS = 8, 3.0
 # what means the same to the vehicle that flew and to the model

@@ -2,11 +2,9 @@
 
 import numpy as np
 import pytest
-from scipy.io import netcdf_file
 
 from glider.tools.data.errors import InputError
 from glider.tools.data.importers.ocean.netcdf import NetCDF
-from glider.tools.data.importers.ocean.netcdf_classic import classic_size
 from glider.tools.data.importers.ocean.segment import DAY, at_rows, clean, clock_offset, in_the_mission, require_unit
 from tests.support.ocean_files import START, flight, og1, seaglider
 
@@ -87,21 +85,6 @@ def test_a_unit_is_the_one_asked_for():
         require_unit("bar", {"dbar": 1.0}, "a.nc", "PRES")
 
 
-@pytest.mark.parametrize("records", [0, 1, 5])
-def test_the_length_of_a_classic_file_is_known_from_its_header(tmp_path, records):
-    path = tmp_path / "a.nc"
-    with netcdf_file(path, "w", version=2) as file:
-        file.createDimension("time", None)
-        file.createDimension("x", 7)
-        file.createVariable("fixed", "d", ("x",))[:] = np.arange(7.0)
-        file.createVariable("letters", "c", ("x",))[:] = b"abcdefg"
-        for name in ("a", "b") if records else ():
-            file.createVariable(name, "h" if name == "a" else "d", ("time",))[:] = np.arange(records)
-        file.history = "made here"
-    data = path.read_bytes()
-    assert 0 <= len(data) - classic_size(data) < 4
-
-
 def test_a_file_of_either_kind_is_refused_wherever_it_is_cut(tmp_path):
     whole = [seaglider(tmp_path / "p0770001.nc", flight()), og1(tmp_path / "m.nc", [flight()])]
     for path in whole:
@@ -118,6 +101,3 @@ def test_a_classic_file_twice_in_one_counts_once(tmp_path):
     twice = tmp_path / "twice.nc"
     twice.write_bytes(data + data)
     assert NetCDF(twice).size("sg_data_point") == 120
-    twice.write_bytes(data + data[:-100])
-    with pytest.raises(InputError, match="cut or damaged"):
-        NetCDF(twice)

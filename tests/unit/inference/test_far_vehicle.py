@@ -4,7 +4,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from support.cases import make_case
 
 from glider.sim_backend.core.effects import effect_layout as ef
 from glider.tools.data.runs.case import Case
@@ -14,6 +13,7 @@ from glider.tools.inference.model import nominal_model
 from glider.tools.inference.prediction_error import PredictionError
 from glider.tools.inference.problem import problem_of
 from glider.tools.inference.vehicle_parameters import parameters
+from tests.support.cases import make_case
 
 pytestmark = pytest.mark.computes(seconds=15)
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from support.cases import make_case
 
 from glider.sim_backend.core.effects import effect_layout as ef
 from glider.tools.inference.problem import LOST, problem_of
+from tests.support.cases import make_case
 
 # entries of F for each model: every branch of the physics is taken by some, and no two lanes take the same
 MODELS = (

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.cases import make_case
 
 from glider.sim_backend.core.effects import effect_layout as ef
 from glider.tools.diagnose.cautions import cautions
@@ -14,6 +13,7 @@ from glider.tools.inference import levels
 from glider.tools.inference.fit import Fitter
 from glider.tools.inference.parameters import effect_parameters, model_at, nuisance_parameters
 from glider.tools.inference.problem import Problem, problem_of
+from tests.support.cases import make_case
 
 
 @pytest.fixture(scope="module")

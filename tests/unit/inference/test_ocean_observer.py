@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.ocean import as_case, fly_dives, without
 
 from glider.sim_backend.foreign import ocean as foreign
 from glider.sim_backend.ocean.core import layout as at
@@ -17,6 +16,7 @@ from glider.tools.inference.ocean_kind import MIN_READING_INTERVAL_S
 from glider.tools.inference.predict import predict
 from glider.tools.inference.problem import problem_of
 from glider.tools.inference.steady import depth_rate, first_guess
+from tests.support.ocean import as_case, fly_dives, without
 
 NO_EFFECT = np.zeros(at.N_F)
 DIVES, DRAWS = 6, 12

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from support.flights import World, fly_case
 
 from glider.firmware.core.vehicle import layout
 from glider.sim_backend.core.effects import effect_layout as ef
@@ -10,6 +9,7 @@ from glider.tools.gap.measure import root_mean_square, run_gap
 from glider.tools.inference.channels import ROUGHIE_MEASURES
 from glider.tools.inference.predict import fly_windows_from, observe
 from glider.tools.inference.problem import problem_of
+from tests.support.flights import World, fly_case
 
 DAMPED = -20.0  # kg s/rad, beside the file's K_p
 LARGEST_RATE = 0.6  # rad/s; those of the flights stay below

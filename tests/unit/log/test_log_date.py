@@ -5,8 +5,6 @@ import time
 from datetime import UTC, datetime
 
 import numpy as np
-from log_files import METADATA, TICK
-from support.commands import glider
 
 from glider.firmware.core.layouts import control_layout as ctl
 from glider.firmware.telemetry import REPLAYED
@@ -18,6 +16,8 @@ from glider.tools.data.log.rundata import run_of
 from glider.tools.flight import sortie
 from glider.tools.flight.arming import BYTES_PER_SECOND
 from glider.tools.flight.compose import build_flight, build_recorder
+from tests.support.commands import glider
+from tests.support.log_files import METADATA, TICK
 
 EPOCH = 1_800_000_000 * 10**9
 SHORT = """

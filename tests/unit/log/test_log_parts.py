@@ -7,7 +7,6 @@ import time
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from log_files import METADATA, TICK, TRUTH, VEHICLE, write_small_log
 
 from glider.hal.recorder.recorder import Recorder
 from glider.hal.recorder.schema import INFO
@@ -18,6 +17,7 @@ from glider.tools.data.log.reader import read_log
 from glider.tools.data.log.repair import repair
 from glider.tools.data.log.rundata import run_of
 from glider.tools.data.runs.case import load_case
+from tests.support.log_files import METADATA, TICK, TRUTH, VEHICLE, write_small_log
 
 BETWEEN = 13  # ticks that a recording process takes with it when it dies
 

@@ -5,8 +5,6 @@ import os
 
 import numpy as np
 import pytest
-from support.commands import glider
-from support.logs import fly_dip, write_changed
 
 from glider.firmware.core.layouts import control_layout as ctl
 from glider.firmware.core.layouts import supervisor_layout as sup
@@ -16,6 +14,8 @@ from glider.tools.data.log.parts import read_flight
 from glider.tools.data.log.reader import read_log
 from glider.tools.data.sources import name_or_path
 from glider.tools.flight.replay import STATES, TAKEN, replay_log
+from tests.support.commands import glider
+from tests.support.logs import fly_dip, write_changed
 
 WET_AT = 3.0
 

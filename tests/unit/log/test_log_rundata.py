@@ -8,8 +8,6 @@ import pytest
 from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
-from log_files import METADATA, TICK, VEHICLE, tick_rows, write_small_log
-from support.commands import glider
 
 from glider.hal.strict import ConfigError
 from glider.tools.cli.log import log as command
@@ -20,7 +18,9 @@ from glider.tools.data.runs import columns as names
 from glider.tools.data.runs.case import SensorsPart, load_case, write_case
 from glider.tools.data.runs.run import Run
 from glider.tools.data.sources import load_vehicle
+from tests.support.commands import glider
 from tests.support.examples import examples
+from tests.support.log_files import METADATA, TICK, VEHICLE, tick_rows, write_small_log
 
 FACTS = {"vehicle": "roughie", "site": "pool", "log_rate_hz": 10.0, "water_density_kg_m3": 998.0}
 

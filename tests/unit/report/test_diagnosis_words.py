@@ -27,6 +27,7 @@ from glider.tools.diagnose.record import (
 from glider.tools.inference.kind import ROUGHIE
 from glider.tools.report import words
 from glider.tools.report.diagnosis import report_html
+from tests.support.golden import check_golden
 
 THRESHOLDS = {"evidence": 12.0, "tie": 6.0, "sigma": 6.0, "left": 0.1, "matters": 0.1}
 FAR = {"before": 4.0, "recalibrated": 3.0, "after": 0.5, "floor": 0.4}
@@ -61,15 +62,6 @@ def test_every_label_has_plain_words():
     assert set(words.AXES) == {reading.name for reading in ROUGHIE.readings}
 
 
-def test_one_cause_says_what_where_how_sure_and_how_far():
-    said = words.sentence(record({"pump_slow": 0.97, "pump_droop": 0.02}, ["pump_slow"]))
-    assert said == (
-        "The ballast pump is slower than modelled (pump_slow, actuation: ballast; 97 % sure); with that in the model "
-        "the gap on runs left out of the fit shrinks by 88 % (90 % interval 81 to 93 %), while refitting the nominal "
-        "parameters alone shrinks it by 25 %."
-    )
-
-
 PARTS_OF_NOTHING = ("left out", "unknown to unknown", "unknown %", "closed", "nan", "not checked on it")
 
 
@@ -101,54 +93,6 @@ def test_of_one_run_nothing_is_left_out(found):
     assert "of this run, to which all was fitted" in words.sentence(found)
 
 
-def test_one_run_with_a_cause_says_how_far_it_was_fitted():
-    said = words.sentence(record({"pump_slow": 0.97}, ["pump_slow"], runs=1))
-    assert said.endswith(
-        "; with that in the model the gap of this run, to which all was fitted, shrinks by 88 %, while refitting the "
-        "nominal parameters alone shrinks it by 25 %."
-    )
-
-
-def test_no_gap_is_never_said_where_the_floor_is_above_a_tolerance():
-    found = record({"none": 0.6, "drag": 0.4}, before=1.9, recalibrated=1.9, after=1.9, floor=2.18)
-    said = words.sentence(found)
-    assert said.startswith(
-        "A gap below 2.18 tolerances cannot be seen in these runs: noise and disturbance alone leave as much. Nothing "
-        "stands out above that (only 60 % sure, else drag at 40 %); the total on runs left out of the fit is 1.90 "
-    )
-    assert "no gap above the floor" in report_html(found)
-    assert 'class="verdict blind"' in report_html(found)
-    assert "No gap" not in said + report_html(found)
-    doubted = words.sentence(record({"drag": 0.6, "none": 0.4}, ["drag"], floor=1.2))
-    assert "else no gap above the floor at 40 %" in doubted
-
-
-@pytest.mark.parametrize(
-    ("label", "size", "said"),
-    [
-        ("drag", {"scale": EstimateRecord(0.5, (0.43, 0.57), "1"), "induced": EstimateRecord(0.1, (-0.2, 0.4), "1")},
-         "The hull drags more than its coefficients say (drag, hydrodynamics: surge; K_D0 times 1.50, 90 %: 1.43 to "
-         "1.57; 97 % sure)"),
-        ("drag", {"scale": EstimateRecord(-0.3, (-0.4, -0.2), "1")},
-         "The hull drags less than its coefficients say (drag, hydrodynamics: surge; K_D0 times 0.700, 90 %: 0.600 to "
-         "0.800; 97 % sure)"),
-        ("inertia", {"pitch": EstimateRecord(0.742, (0.6, 0.9), "1"), "yaw": EstimateRecord(0.0, (-0.2, 0.2), "1")},
-         "The hull resists turning more than modelled (inertia, mass: inertia; pitch: hull inertia times 1.74, 90 %: "
-         "1.60 to 1.90; 97 % sure)"),
-        ("pump_slow", {"rate": EstimateRecord(0.6, (0.535, 0.665), "1")},
-         "(pump_slow, actuation: ballast; rate limit divided by 1.82, 90 %: 1.71 to 1.94; 97 % sure)"),
-        ("cg_longitudinal", {"offset": EstimateRecord(-0.0015, (-0.002, -0.001), "m")},
-         f"offset {words.MINUS}1.50 mm, 90 %: {words.MINUS}2.00 to {words.MINUS}1.00, forward positive; 97 % sure)"),
-        ("net_buoyancy", {"mass": EstimateRecord(0.06, (None, None), "kg")},
-         "; mass 60.0 g, heavy positive; 97 % sure)"),
-        ("pitch_damping", {"scale": EstimateRecord(0.3, (0.2, 0.4), "1")},
-         "; scale by a factor of 1.30, 90 %: 1.20 to 1.40"),
-    ],
-)  # fmt: skip
-def test_the_sentence_gives_sign_and_size(label, size, said):
-    assert said in words.sentence(record({label: 0.97}, [label], sizes={label: size}))
-
-
 @pytest.mark.parametrize("effect", [*catalogue().values(), *ocean_catalogue().values()], ids=lambda one: one.label)
 def test_every_effect_has_a_size_in_words(effect):
     """A parameter that is a factor is said as one; the others have their unit."""
@@ -164,83 +108,66 @@ def test_every_effect_has_a_size_in_words(effect):
             assert any(unit in said for unit in (parameter.unit, parameter.unit.removeprefix("k"), "mm"))
 
 
-def test_what_cannot_be_told_apart_is_in_the_sentence():
-    said = words.sentence(record({"drag": 0.6, "tether": 0.4}, ["drag"], {"drag": ["drag", "tether"]}))
-    assert "only 60 % sure, else tether at 40 %), which these data cannot distinguish from tether; with that" in said
-
-
-def test_doubt_names_the_next_answer():
-    said = words.sentence(record({"none": 0.51, "unknown": 0.49}))
-    assert "(only 51 % sure, else a gap of another kind at 49 %)" in said
-    said = words.sentence(record({"unknown": 0.7, "none": 0.3}))
-    assert "(only 70 % sure, else no gap at 30 %)" in said
-
-
-def test_two_effects_are_both_named():
-    said = words.sentence(record({"pump_slow": 0.999}, ["pump_slow", "imu_pitch_bias"], recalibrated=5.0))
-    assert said.startswith("Two effects at once: the ballast pump is slower")
-    assert "more than 99 % sure), and also measured pitch is off by a constant (imu_pitch_bias, sens" in said
-    assert "with these in the model" in said
-    assert said.endswith("while refitting the nominal parameters alone makes it 25 % larger.")
-
-
-def test_no_gap_claims_no_shrinkage():
-    said = words.sentence(record({"none": 0.98}, before=0.5, recalibrated=0.45, floor=0.44))
-    assert said.startswith("No gap: ")
-    assert "(98 % sure)" in said
-    assert "shrinks" not in said
-    for value in ("0.500", "0.450", "0.440"):
-        assert value in said
-
-
 UNEXPLAINED = [
     FindingRecord("r", "lag 11-60", 40.0), FindingRecord("r", "variance", 30.0), FindingRecord("depth", "speed", -25.0),
     FindingRecord("r", "pump running", 12.0), FindingRecord("q", "time", 3.0),
 ]  # fmt: skip
 
 
-def test_an_unknown_gap_is_placed_and_described():
-    found = record(
-        {"unknown": 0.95, "yaw_trim": 0.05}, ["yaw_trim"], findings=UNEXPLAINED, where=[("hydrodynamics", "yaw", 0.97)]
-    )
-    said = words.sentence(found)
-    assert said.startswith("A gap that no effect of the catalogue explains (95 % sure), strongest in measured yaw rate")
-    assert "and correlated with whether the pump runs" in said  # of the same channel, not the stronger one of another
-    assert "most likely in hydrodynamics: yaw (97 %)" in said
-    assert "with the nearest known effects in the model (yaw_trim)" in said
-    rows = words.described(found)
+def sizes(label: str, **parameters: EstimateRecord) -> DiagnosisRecord:
+    return record({label: 0.97}, [label], sizes={label: parameters})
+
+
+def sentences() -> dict[str, DiagnosisRecord]:
+    """A diagnosis for every kind of sentence."""
+    one, unknown = EstimateRecord, {"unknown": 0.95, "yaw_trim": 0.05}
+    placed = [("hydrodynamics", "yaw", 0.97)]
+    return {
+        "one cause": record({"pump_slow": 0.97, "pump_droop": 0.02}, ["pump_slow"]),
+        "one cause, one run": record({"pump_slow": 0.97}, ["pump_slow"], runs=1),
+        "no gap": record({"none": 0.98}, before=0.5, recalibrated=0.45, floor=0.44),
+        "no gap above the floor": record(
+            {"none": 0.6, "drag": 0.4}, before=1.9, recalibrated=1.9, after=1.9, floor=2.18
+        ),
+        "a cause, or no gap above the floor": record({"drag": 0.6, "none": 0.4}, ["drag"], floor=1.2),
+        "a factor, larger": sizes("drag", scale=one(0.5, (0.43, 0.57), "1"), induced=one(0.1, (-0.2, 0.4), "1")),
+        "a factor, smaller": sizes("drag", scale=one(-0.3, (-0.4, -0.2), "1")),
+        "a factor of a part": sizes("inertia", pitch=one(0.742, (0.6, 0.9), "1"), yaw=one(0.0, (-0.2, 0.2), "1")),
+        "a divisor": sizes("pump_slow", rate=one(0.6, (0.535, 0.665), "1")),
+        "a length with a sign": sizes("cg_longitudinal", offset=one(-0.0015, (-0.002, -0.001), "m")),
+        "a mass without an interval": sizes("net_buoyancy", mass=one(0.06, (None, None), "kg")),
+        "a factor without a base": sizes("pitch_damping", scale=one(0.3, (0.2, 0.4), "1")),
+        "not to be distinguished": record({"drag": 0.6, "tether": 0.4}, ["drag"], {"drag": ["drag", "tether"]}),
+        "none, or unknown": record({"none": 0.51, "unknown": 0.49}),
+        "unknown, or none": record({"unknown": 0.7, "none": 0.3}),
+        "two effects": record({"pump_slow": 0.999}, ["pump_slow", "imu_pitch_bias"], recalibrated=5.0),
+        "unknown, placed": record(unknown, ["yaw_trim"], findings=UNEXPLAINED, where=placed),
+        "unknown, correlated elsewhere": record({"unknown": 0.9}, findings=UNEXPLAINED[:3]),
+        "unknown, nothing found": record({"unknown": 0.9}),
+        "a clock that wanders": record({"mocap_delay": 0.96}, ["mocap_delay"], noise=Noise(CLOCK, 6.0)),
+        "a clock that does not": record({"mocap_delay": 0.96}, ["mocap_delay"]),
+        "turbulence": record({"turbulence": 0.96}, ["turbulence"], noise=Noise(TURBULENCE, 3.6, 5.0, 1.0)),
+        "waves": record({"waves": 0.96}, ["waves"], noise=Noise("waves", 6.0, 5.0, 1.0)),
+    }
+
+
+def test_every_kind_of_sentence():
+    check_golden("diagnosis_words.txt", "".join(f"{k}:\n{words.sentence(v)}\n\n" for k, v in sentences().items()))
+
+
+def test_the_report_of_runs_in_which_nothing_can_be_seen_says_no_gap_nowhere():
+    found = sentences()["no gap above the floor"]
+    assert 'class="verdict blind"' in report_html(found)
+    assert "No gap" not in words.sentence(found) + report_html(found)
+
+
+def test_an_unknown_gap_is_described_by_channel():
+    rows = words.described(sentences()["unknown, placed"])
     assert [row["channel"] for row in rows] == ["yaw rate", "depth"]  # what is weak is not told
     assert rows[0]["shape"] == ["autocorrelated over 1.1 to 6 s (40)"]
     assert rows[0]["correlated"] == ["correlated with whether the pump runs (12)"]
     assert rows[0]["axis"] == "yaw axis"
     assert rows[1]["correlated"] == ["correlated with speed (25)"]
-
-
-def test_an_unknown_gap_that_is_correlated_elsewhere_says_where():
-    found = record({"unknown": 0.9}, findings=UNEXPLAINED[:3])
-    assert "strongest in measured yaw rate and, in measured depth, correlated with speed" in words.sentence(found)
-    bare = record({"unknown": 0.9})
-    assert "strongest" not in words.sentence(bare)
-    assert "with nothing added to the model" in words.sentence(bare)
-
-
-def test_a_clock_that_wanders_is_said_to():
-    said = words.sentence(record({"mocap_delay": 0.96}, ["mocap_delay"], noise=Noise(CLOCK, 6.0)))
-    assert said.startswith(
-        "Motion capture reports late (mocap_delay, timing: mocap; 96 % sure); that clock's delay varies with time; "
-    )
-    assert "varies" not in words.sentence(record({"mocap_delay": 0.96}, ["mocap_delay"]))
-
-
-def test_disorder_claims_no_shrinkage():
-    said = words.sentence(record({"turbulence": 0.96}, ["turbulence"], noise=Noise(TURBULENCE, 3.6, 5.0, 1.0)))
-    assert said.startswith(
-        "The water is more turbulent than the vehicle file says, about 3.6 times as rough (turbulence, env"
-    )
-    assert "its time course is random, so that knowing it shrinks no gap" in said
-    assert "88 %" not in said
-    said = words.sentence(record({"waves": 0.96}, ["waves"], noise=Noise("waves", 6.0, 5.0, 1.0)))
-    assert said.startswith("Surface waves move the vehicle (waves, environment: water; 96 % sure)")
 
 
 @pytest.mark.parametrize(

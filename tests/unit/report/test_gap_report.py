@@ -6,12 +6,12 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from support.flights import World, fly_case
-from support.pages import assert_offline
 
 from glider.tools.gap.assess import CaseGap, assess
 from glider.tools.report import gap as gap_report
 from glider.tools.report.gap import report_html, write_report
+from tests.support.flights import World, fly_case
+from tests.support.pages import assert_offline
 
 
 @pytest.fixture(scope="module")

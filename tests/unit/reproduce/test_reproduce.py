@@ -4,13 +4,13 @@ import json
 
 import numpy as np
 import pytest
-from support.commands import glider
 
 from glider.firmware.model.gains import Control
 from glider.sim_backend.core.closed_loop import TRACE
 from glider.tools.data.sources import load_vehicle
 from glider.tools.study.reproduce import circle, tracking
 from glider.tools.study.reproduce.design import LAST, Batch, Variant, fly_design, mission_of
+from tests.support.commands import glider
 
 VEHICLE = load_vehicle("roughie")
 

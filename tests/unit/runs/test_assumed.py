@@ -3,7 +3,6 @@
 import msgspec
 import numpy as np
 import pytest
-from support.cases import make_case
 
 from glider.firmware.core.vehicle import layout
 from glider.firmware.core.vehicle.water import water_wrench
@@ -19,6 +18,7 @@ from glider.tools.inference.model import effects_in, nominal_model, vehicle_mode
 from glider.tools.inference.parameters import nuisance_parameters
 from glider.tools.inference.problem import problem_of
 from glider.tools.inference.vehicle_parameters import parameters
+from tests.support.cases import make_case
 
 
 def text(**tables) -> str:

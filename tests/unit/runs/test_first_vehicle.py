@@ -10,14 +10,14 @@ from click.testing import CliRunner
 from glider.firmware.model.vehicle import decode_vehicle
 from glider.tools.cli.vehicle import interview, vehicle
 from glider.tools.data.errors import InputError
-from glider.tools.data.first_vehicle import ASKED, QUESTIONS, FirstVehicle, first_vehicle, in_words
+from glider.tools.data.first_vehicle import ASKED, QUESTIONS, FirstVehicle, in_words
 from glider.tools.data.sources import load_vehicle
 
 GIVEN_WIRES = {"apart": 0.6, "wires": 2.0}
 
 
 def read(answers=None):
-    return decode_vehicle(first_vehicle("mine", answers or {}), "mine")
+    return decode_vehicle(FirstVehicle(answers or {}).text("mine"), "mine")
 
 
 def period(inertia, mass=13.0):

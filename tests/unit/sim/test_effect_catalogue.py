@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from effect_flights import FLOWN, MOCAP, at_spread, flown, world
 
 from glider.firmware.core.vehicle.layout import X_BALLAST, X_SERVO, X_SLIDER
 from glider.hal.board import BoardRequest
@@ -14,6 +13,7 @@ from glider.sim_backend.core.effects.catalogue import apply_effects, catalogue, 
 from glider.tools.cli.common import report_errors
 from glider.tools.cli.main import cli
 from glider.tools.flight.compose import parse_effects
+from tests.support.effect_flights import FLOWN, MOCAP, at_spread, flown, world
 
 ROUGH = {"disturbance_linear": 0.01, "disturbance_angular": 0.02}
 NOMINAL, READ = flown(world(**ROUGH))

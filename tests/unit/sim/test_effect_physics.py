@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from effect_flights import VEHICLE, flown, held, quiet
 
 from glider.firmware.core.maths.rotations import quaternion_from_euler, rotation_nb
 from glider.firmware.core.vehicle import layout
@@ -14,6 +13,7 @@ from glider.sim_backend.core.effects import effect_layout as ef
 from glider.sim_backend.core.effects.actuation import BALLAST_DRIVEN, SLIDER_DRIVEN, backlash
 from glider.sim_backend.core.effects.catalogue import apply_effects
 from glider.sim_backend.core.effects.hydrodynamics import extra_wrench, tether_wrench
+from tests.support.effect_flights import VEHICLE, flown, held, quiet
 
 P = VEHICLE.vector()
 SERVO, SLIDER, BALLAST = (VEHICLE.actuators.servo, VEHICLE.actuators.slider, VEHICLE.actuators.ballast)

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from effect_flights import flown, world
 
 from glider.firmware.core.maths.rotations import euler_from_quaternion, quaternion_from_euler
 from glider.sim_backend.core import layout as wl
@@ -13,6 +12,7 @@ from glider.sim_backend.core.effects import effect_layout as ef
 from glider.sim_backend.core.effects.catalogue import apply_effects
 from glider.sim_backend.core.effects.sensing import read
 from glider.sim_backend.core.world import sample_sensors
+from tests.support.effect_flights import flown, world
 
 
 class Plain:

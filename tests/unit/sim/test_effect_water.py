@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from effect_flights import flown, held, quiet, world
 
 from glider.sim_backend.core import layout as wl
 from glider.sim_backend.core.effects.timing import delayed_commands, mean_input
+from tests.support.effect_flights import flown, held, quiet, world
 
 GRAVITY = 9.80665
 

@@ -15,7 +15,7 @@ from glider.firmware.core.layouts import supervisor_layout as sup
 from glider.firmware.core.supervision.supervisor import highest
 from glider.firmware.faults import ABORT, FAULT_TABLE, FAULTS, NEVER, WARN, Reaction, markdown_rows
 from glider.hal.ports import SLOTS, Validity
-from glider.tools.study.faults.flights import flown
+from glider.tools.verify.faults.flights import flown
 from tests.support.examples import examples
 from tests.support.watchman import BALLAST_RANGE, DT, SLIDER_RANGE, Watchman
 

@@ -9,7 +9,7 @@ from glider.hal.drivers.poll import Poll
 from glider.hal.drivers.samples import Health
 from glider.hal.protocols import modbus
 from glider.hal.protocols.modbus_master import ModbusBus
-from glider.tools.study.faults.wire import Stamped, WireLine, stamp_reply
+from glider.tools.verify.faults.wire import Stamped, WireLine, stamp_reply
 
 EXCHANGES = 100_000
 

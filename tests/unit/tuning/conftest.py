@@ -1,16 +1,11 @@
 """Fixtures for the tuning's tests."""
 
-import sys
-from pathlib import Path
-
 import pytest
 
 from glider.hal.strict import decode
 from glider.sim_backend.board import SimBoardFile
 from glider.tools.data.boards import load_board_file
 from glider.tools.data.sources import load_vehicle
-
-sys.path.insert(0, str(Path(__file__).parent))
 
 
 @pytest.fixture(scope="session")

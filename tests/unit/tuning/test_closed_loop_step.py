@@ -3,7 +3,6 @@
 import msgspec
 import numpy as np
 import pytest
-from independent_loops import closed
 from test_plant import flight_state
 
 from glider.firmware.autopilot import Autopilot, configuration
@@ -14,6 +13,7 @@ from glider.sim_backend.core.closed_loop import N_END, N_TRACE, TRACE, fly
 from glider.sim_backend.world import Environment, Start, build_world
 from glider.tools.study.tuning.linear_plant import DESIGN_TRIMS, OTHER_TRIMS, linearise, steady_glide
 from glider.tools.study.tuning.loops import Delays
+from tests.independent.loops import closed
 
 SECONDS = 30.0
 QUIET = Environment(surface=False, disturbance_linear=0.0, disturbance_angular=0.0)

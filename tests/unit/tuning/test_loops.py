@@ -5,11 +5,11 @@ import math
 import msgspec
 import numpy as np
 import pytest
-from independent_loops import closed, opened
 
 from glider.firmware.model.gains import Control
 from glider.tools.study.tuning.linear_plant import DESIGN_TRIMS, OTHER_TRIMS, linearise
 from glider.tools.study.tuning.loops import OMEGA, Delays, depth_terms, margins, open_loop, pitch_terms
+from tests.independent.loops import closed, opened
 
 TRIMS = [*DESIGN_TRIMS, *OTHER_TRIMS]
 FACTOR = {"pitch": "slider", "depth": "ballast"}

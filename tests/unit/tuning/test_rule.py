@@ -3,13 +3,13 @@
 import msgspec
 import numpy as np
 import pytest
-from independent_loops import closed, opened
 
 from glider.firmware.model.gains import Control, DepthGains, PitchGains, ReferenceTable
 from glider.tools.data.errors import InputError
 from glider.tools.study.tuning import rule
 from glider.tools.study.tuning.linear_plant import DESIGN_TRIMS, OTHER_TRIMS, linearise
 from glider.tools.study.tuning.loops import Delays
+from tests.independent.loops import closed, opened
 
 
 def margins_by_python_control(vehicle, board, gains, loop):

@@ -140,7 +140,7 @@ def test_a_release_passes_its_self_check_unless_vehicle_files_or_state_are_again
 
 def test_where_no_arm_can_be_emulated_it_says_why(tmp_path):
     done = subprocess.run(
-        [sys.executable, "-m", "glider.tools.deploy.emulated", tmp_path / "arm"], cwd=ROOT, capture_output=True,
+        [sys.executable, "-m", "glider.tools.verify.arm64.emulated", tmp_path / "arm"], cwd=ROOT, capture_output=True,
         text=True, env={**os.environ, "PATH": str(tmp_path)},
     )  # fmt: skip
     assert done.returncode == 0, done.stderr

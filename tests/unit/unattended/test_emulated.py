@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from glider.tools.deploy.compared import compared, difference
-from glider.tools.deploy.emulated import passed, shown
+from glider.tools.verify.arm64.compared import compared, difference
+from glider.tools.verify.arm64.emulated import passed, shown
 
 
 def test_the_largest_difference_of_two_columns():

@@ -6,8 +6,8 @@ import shutil
 import numpy as np
 import pytest
 
-from glider.tools.measure.figures.bare_loop import BareLoop, Punctuality, bare_loop_program
-from glider.tools.measure.figures.endurance import PERIOD_S, reasons
+from glider.tools.verify.figures.bare_loop import BareLoop, Punctuality, bare_loop_program
+from glider.tools.verify.figures.endurance import PERIOD_S, reasons
 
 pytestmark = pytest.mark.realtime(seconds=2)
 

@@ -1,6 +1,6 @@
 """The figures' own commands on a small scale: kills, and a log cut at every so-manieth byte."""
 
-from glider.tools.measure.figures.unattended import measure_cuts, measure_kills
+from glider.tools.verify.figures.unattended import measure_cuts, measure_kills
 
 
 def test_killed_at_random_no_dive_is_resumed():

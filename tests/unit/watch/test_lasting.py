@@ -11,7 +11,7 @@ from glider.tools.identify.ocean.files import vehicle_text
 from glider.tools.identify.ocean.identify import BANDS, identify_ocean
 from glider.tools.inference.problem import problem_of
 from glider.tools.inference.shared_parameters import shared_parameters
-from glider.tools.study.challenge.ocean_cases import as_run, flown, with_change
+from glider.tools.verify.challenge.ocean_cases import as_run, flown, with_change
 from glider.tools.watch.flights import RunEnsemble
 from glider.tools.watch.lasting import STRANGE, beside_all, lasting
 from glider.tools.watch.watch import watch

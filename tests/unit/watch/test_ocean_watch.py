@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.ocean import Dives, as_case, fly_dives, without
 
 from glider.hal.strict import ConfigError
 from glider.sim_backend.ocean.catalogue import NOT_ASKED, ONE_ON_DEPTH, catalogue
@@ -24,6 +23,7 @@ from glider.tools.inference.model import effect_vector, nominal_model, vehicle_m
 from glider.tools.inference.ocean_inputs import unsteady
 from glider.tools.watch.usable import usable_dive
 from glider.tools.watch.watch import watch
+from tests.support.ocean import Dives, as_case, fly_dives, without
 
 pytestmark = pytest.mark.computes(seconds=20)
 

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.flights import World, fly
 
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs.run import Run
 from glider.tools.watch.usable import readings_of, usable
+from tests.support.flights import World, fly
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.flights import World, case_of, drawn_vehicle, fly
 
 from glider.firmware.core.vehicle import layout
 from glider.sim_backend.core.effects import effect_layout as ef
@@ -16,6 +15,7 @@ from glider.tools.data.runs import columns as names
 from glider.tools.data.runs.case import write_case
 from glider.tools.watch.answer import WatchAnswer
 from glider.tools.watch.watch import watch
+from tests.support.flights import World, case_of, drawn_vehicle, fly
 
 pytestmark = pytest.mark.computes(seconds=15)
 

@@ -12,7 +12,7 @@ from glider.tools.data.runs.case import load_case
 from glider.tools.identify.ocean.files import vehicle_text
 from glider.tools.identify.ocean.identify import identify_ocean
 from glider.tools.report.pooled import write_pooled_report
-from glider.tools.study.challenge.ocean_cases import as_run, flown, with_change
+from glider.tools.verify.challenge.ocean_cases import as_run, flown, with_change
 from glider.tools.watch.whole_case import diagnose_ocean, plain, write
 from tests.support.ocean import as_case, drawn, fly_dives
 

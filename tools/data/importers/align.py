@@ -13,7 +13,6 @@ from glider.tools.data.runs.run import Run
 STEP = 0.05  # s, of the search
 MIN_OVERLAP_S = 5.0  # s that both must have in common
 WORST = 0.5  # of the signals' variance, that may be left unexplained at the best offset
-MAX_SD_S = 0.2  # s, 1 sigma of the offset
 
 
 @dataclass(frozen=True)

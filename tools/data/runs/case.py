@@ -19,6 +19,7 @@ from glider.tools.data.runs.gate import LeftOut, parted, wrong_rate
 from glider.tools.data.runs.origin import ORIGIN_FILE, flight_columns, set_flights
 from glider.tools.data.runs.run import Run, load_run, run_name, write_run
 from glider.tools.data.sources import load_any_vehicle, read_text
+from glider.tools.data.tomltext import toml_text
 
 CASE_FILE = "case.toml"
 VEHICLE_FILE = "vehicle.toml"  # beside it, where the vehicle is not a shipped one
@@ -198,12 +199,6 @@ def load_case_of_run(path: Path | str, vehicle: str | None = None) -> tuple[Case
     return _assemble(path.parent, table, [run], vehicle), run
 
 
-def _quoted(text: str) -> str:
-    """A TOML basic string."""
-    special = {'"': '\\"', "\\": "\\\\"}
-    return '"' + "".join(special.get(c, f"\\u{ord(c):04x}" if ord(c) < 32 or ord(c) == 127 else c) for c in text) + '"'
-
-
 def case_text(
     *,
     vehicle: str,
@@ -216,24 +211,20 @@ def case_text(
     disturbance: DisturbancePart | DisturbanceTable | None = None,
 ) -> str:
     """The text of a case.toml; raises ConfigError where a value is not one that reading would take."""
-    lines = [
-        "format = 1",
-        f"vehicle = {_quoted(vehicle)}",
-        f"site = {_quoted(site)}",
-        f"log_rate_hz = {float(log_rate_hz)!r}",
-        f"water_density_kg_m3 = {float(water_density_kg_m3)!r}",
-        f"motion_capture = {str(bool(motion_capture)).lower()}",
-        f"runs = {runs}",
-    ]
-    entries = [
-        f"{name} = {{ noise = {entry.noise!r}, bias = {entry.bias!r} }}" for name, entry in _given(sensors).items()
-    ]
-    if entries:
-        lines += ["", "[sensors]", *entries]
-    entries = [f"{name} = {value!r}" for name, value in _given(disturbance).items()]
-    if entries:
-        lines += ["", "[disturbance]", *entries]
-    text = "\n".join(lines) + "\n"
+    text = toml_text(
+        {
+            "format": 1,
+            "vehicle": vehicle,
+            "site": site,
+            "log_rate_hz": float(log_rate_hz),
+            "water_density_kg_m3": float(water_density_kg_m3),
+            "motion_capture": bool(motion_capture),
+            "runs": runs,
+            "sensors": msgspec.to_builtins(_given(sensors)),
+            "disturbance": _given(disturbance),
+        },
+        inline=("sensors",),
+    )
     decode(text, CaseTable, CASE_FILE)
     return text
 

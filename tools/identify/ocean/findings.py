@@ -12,7 +12,8 @@ import numpy as np
 
 from glider.sim_backend.ocean.catalogue import catalogue
 from glider.sim_backend.ocean.vehicle import PLACES, RELATIVE
-from glider.tools.inference.parameters import NINETY, FreeParameter, of_effect
+from glider.tools.data.intervals import NINETY
+from glider.tools.inference.parameters import FreeParameter, of_effect
 
 # names of a vehicle file -> the label by which the catalogue has it
 LABELS = {

@@ -13,6 +13,7 @@ import numpy as np
 from glider.sim_backend.ocean.core import layout as at
 from glider.sim_backend.ocean.vehicle import PLACES, UNITS
 from glider.tools.data.errors import InputError
+from glider.tools.data.intervals import NINETY
 from glider.tools.data.runs.case import Case
 from glider.tools.data.runs.columns import ATTITUDE, DEPTH
 from glider.tools.data.runs.run import Run
@@ -27,7 +28,7 @@ from glider.tools.identify.ocean.levels import find_levels, some_runs
 from glider.tools.identify.ocean.next_run import flown, to_part
 from glider.tools.inference.expansion import Expansion, expand
 from glider.tools.inference.ocean_inputs import drawn, missing_input, steady_seconds
-from glider.tools.inference.parameters import NINETY, FreeParameter, nuisance_parameters
+from glider.tools.inference.parameters import FreeParameter, nuisance_parameters
 from glider.tools.inference.problem import Problem, problem_of
 from glider.tools.inference.shared_model import fit_shared, inflation_of
 from glider.tools.inference.shared_parameters import SharedParameters

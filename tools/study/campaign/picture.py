@@ -8,20 +8,18 @@ import numpy as np
 
 from glider.firmware.core.control.controller_rows import CONTROLLERS
 from glider.tools.data.files import write_bytes
+from glider.tools.data.intervals import wilson
 from glider.tools.report.charts import Chart, Curve, svg
 from glider.tools.study.campaign.conduct import FlownChunk
-from glider.tools.study.campaign.summary import completed_by_all, summarise, wilson
+from glider.tools.study.campaign.summary import completed_by_all, summarise
 
 BINS = 5
 POINTS = 200  # of a distribution
 TAIL = 98.0  # percentile at which a distribution's axis ends
 CONDITIONS = (
-    ("current_m_s", "current", "m/s"),
-    ("wave_height_m", "wave height", "m"),
-    ("wave_period_s", "wave period", "s"),
-    ("disturbance", "disturbance", "m/s2, rad/s2"),
-    ("start_depth_m", "depth at the start", "m"),
-)
+    ("current_m_s", "current", "m/s"), ("wave_height_m", "wave height", "m"), ("wave_period_s", "wave period", "s"),
+    ("disturbance", "disturbance", "m/s2, rad/s2"), ("start_depth_m", "depth at the start", "m"),
+)  # fmt: skip
 ERRORS = (("depth_error_m", "depth error, m", "m", 1.0), ("pitch_error_rad", "pitch error, deg", "deg", 180.0 / np.pi))
 CONTROLLER_NAMES = {"pid_tuned": "PID best-tuned", **{name: row.title for name, row in CONTROLLERS.items()}}
 

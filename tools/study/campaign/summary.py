@@ -5,31 +5,18 @@ from typing import Any
 
 import numpy as np
 
+from glider.tools.data.intervals import wilson
 from glider.tools.study.campaign.conduct import FlownChunk
 from glider.tools.study.campaign.flights import ENDINGS
 
-Z90 = 1.6448536269514722  # of a two-sided 90 % interval
 ALL = "all"
 # name in the result, column of the table, factor from SI
 MEASURES = (
-    ("depth_error_m", "depth_error_m", 1.0),
-    ("pitch_error_deg", "pitch_error_rad", 180.0 / math.pi),
-    ("roll_error_deg", "roll_error_rad", 180.0 / math.pi),
-    ("seconds", "seconds", 1.0),
-    ("servo_travel_rad", "servo_travel_rad", 1.0),
-    ("slider_travel_m", "slider_travel_m", 1.0),
+    ("depth_error_m", "depth_error_m", 1.0), ("pitch_error_deg", "pitch_error_rad", 180.0 / math.pi),
+    ("roll_error_deg", "roll_error_rad", 180.0 / math.pi), ("seconds", "seconds", 1.0),
+    ("servo_travel_rad", "servo_travel_rad", 1.0), ("slider_travel_m", "slider_travel_m", 1.0),
     ("ballast_travel_kg", "ballast_travel_kg", 1.0),
-)
-
-
-def wilson(successes: int, n: int) -> tuple[float, float]:
-    """90 % interval of a share, by Wilson's score: inside 0 to 1 and right for shares of 0 and 1 too."""
-    if n == 0:
-        return 0.0, 1.0
-    share, z2 = successes / n, Z90 * Z90
-    middle = (share + z2 / (2 * n)) / (1 + z2 / n)
-    half = Z90 / (1 + z2 / n) * math.sqrt(share * (1 - share) / n + z2 / (4 * n * n))
-    return max(0.0, middle - half), min(1.0, middle + half)
+)  # fmt: skip
 
 
 def _spread(values: np.ndarray) -> dict[str, float | None]:

@@ -1,24 +1,14 @@
 """NetCDF files, classic and of version 4, as variables with strict units."""
 
-import signal
-import struct
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from glider.tools.data.errors import InputError
-from glider.tools.data.importers.ocean import netcdf_trial
-from glider.tools.data.importers.ocean.netcdf_classic import classic_size
 from glider.tools.data.importers.ocean.segment import require_unit
 
 MAX_FILE_BYTES = 4_000_000_000
-# s of computing, and one more for so many bytes, after which a file of version 4 is taken for damaged; times that on a
-# clock, where the machine is busy.
-TRIAL_S, PACKED, PATIENCE = 20.0, 5e6, 30.0
-MAX_HEADER = 16_000_000
 CLASSIC, HDF5 = b"CDF", b"\x89HDF\r\n\x1a\n"
 METRES = dict.fromkeys(("m", "meters", "metres", "meter", "metre"), 1.0)
 DBAR = dict.fromkeys(("dbar", "decibar", "decibars"), 1.0)
@@ -111,11 +101,8 @@ def _opened(path: Path) -> Any:
     if not (begin.startswith(CLASSIC) or begin == HDF5):
         raise InputError("not a NetCDF file", source=path)
     engine = "h5netcdf" if begin == HDF5 else "scipy"
-    if engine == "scipy":
-        _check_whole(path, size)
     try:
         if engine == "h5netcdf":
-            _try_whole(path, size)
             _walk(path)
         with xarray.open_dataset(path, engine=engine, decode_times=False, decode_timedelta=False) as dataset:
             return dataset.load()
@@ -127,44 +114,9 @@ def _opened(path: Path) -> Any:
         raise InputError(f"cut or damaged: {what}", source=path) from None
 
 
-def _try_whole(path: Path, size: int) -> None:
-    """InputError where HDF5 does not come to an end with a file, or falls over it: it is read by another process first.
-
-    One byte that is wrong may be enough (a length in the heap of texts). What is raised there is raised here again.
-    """
-    seconds = int(TRIAL_S + size / PACKED)
-    command = [sys.executable, "-m", netcdf_trial.__name__, str(path), str(seconds)]
-    muted = subprocess.DEVNULL
-    try:
-        ended = subprocess.run(command, stdin=muted, stdout=muted, stderr=muted, timeout=PATIENCE * seconds).returncode
-    except subprocess.TimeoutExpired:
-        ended = -signal.SIGKILL
-    if ended in (-signal.SIGKILL, -signal.SIGXCPU):
-        raise InputError(f"cut or damaged: not read after {seconds} s", source=path)
-    if ended < 0:
-        raise InputError("cut or damaged: HDF5 falls over it", source=path)
-
-
 def _walk(path: Path) -> None:
     """Look at all objects of a file of version 4: h5py's errors are clean, h5netcdf leaves half-opened files behind."""
     import h5py
 
     with h5py.File(path) as file:
         file.visititems(lambda _name, _object: None)
-
-
-def _check_whole(path: Path, size: int) -> None:
-    """InputError where a classic file does not end where its header says.
-
-    Base stations of version 2 leave the file twice in one, one copy behind the other; the first one counts.
-    """
-    try:
-        with path.open("rb") as file:
-            wanted = classic_size(file.read(MAX_HEADER))
-            file.seek(min(wanted + -wanted % 4, size))
-            behind = file.read(4)
-    except (struct.error, KeyError, IndexError):
-        raise InputError("cut or damaged within its header", source=path) from None
-    padded = wanted + -wanted % 4
-    if not (wanted <= size <= padded or (behind[:3] == CLASSIC and 2 * wanted <= size <= 2 * padded)):
-        raise InputError(f"cut or damaged: {size} bytes, {wanted} by its header", source=path)

@@ -30,13 +30,9 @@ NAME = re.compile(r"(?P<glider>\w+)\.(?P<mission>\d+)\.(?P<kind>gli|pld\d)\.(sub
 DIALECT = Dialect(delimiter=";", missing=("NaN", "nan"))
 # Run data, column of the navigation table (units by the maker: deg, m, cm3, mm), and the factor to SI.
 NAVIGATION = (
-    ("depth_m", "Depth", 1.0),
-    ("pitch_rad", "Pitch", DEG),
-    ("roll_rad", "Roll", DEG),
-    ("yaw_rad", "Heading", DEG),
-    ("oil_m3", "BallastPos", 1e-6),
-    ("battery_m", "LinPos", 1e-3),
-)
+    ("depth_m", "Depth", 1.0), ("pitch_rad", "Pitch", DEG), ("roll_rad", "Roll", DEG), ("yaw_rad", "Heading", DEG),
+    ("oil_m3", "BallastPos", 1e-6), ("battery_m", "LinPos", 1e-3),
+)  # fmt: skip
 # CTDs of payloads: columns of conductivity, temperature and pressure, and the factor of conductivity to S/m.
 CTDS = (("GPCTD", 1.0), ("LEGATO", 0.1))
 QUANTITIES = ("CONDUCTIVITY", "TEMPERATURE", "PRESSURE")

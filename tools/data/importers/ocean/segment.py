@@ -14,30 +14,16 @@ FIRST_TIME = 788_918_400.0  # 1995-01-01: no glider logged before
 OUT_OF_WATER_DBAR = 0.3  # a sensor this near to the surface is in air, foam or the vehicle's own wake
 # What an instrument in the sea can have measured, in SI (pressure dbar, conductivity S/m).
 PLAUSIBLE = {
-    "pitch_rad": (-0.5 * np.pi, 0.5 * np.pi),
-    "roll_rad": (-np.pi, np.pi),
-    "yaw_rad": (-2.0 * np.pi, 4.0 * np.pi),
-    "depth_m": (-5.0, 7000.0),
-    "oil_m3": (-2e-3, 2e-3),
-    "pump": (0.0, 1.0),
-    "speed_m_s": (0.0, 5.0),
-    "vn_m_s": (-5.0, 5.0),
-    "ve_m_s": (-5.0, 5.0),
-    "battery_m": (-0.5, 0.5),
-    "fin_rad": (-1.6, 1.6),
-    "temperature": (-3.0, 45.0),
-    "conductivity": (1e-3, 9.0),
-    "salinity": (0.0, 45.0),
-    "pressure": (-10.0, 7000.0),
-}
+    "pitch_rad": (-0.5 * np.pi, 0.5 * np.pi), "roll_rad": (-np.pi, np.pi), "yaw_rad": (-2.0 * np.pi, 4.0 * np.pi),
+    "depth_m": (-5.0, 7000.0), "oil_m3": (-2e-3, 2e-3), "pump": (0.0, 1.0), "speed_m_s": (0.0, 5.0),
+    "vn_m_s": (-5.0, 5.0), "ve_m_s": (-5.0, 5.0), "battery_m": (-0.5, 0.5), "fin_rad": (-1.6, 1.6),
+    "temperature": (-3.0, 45.0), "conductivity": (1e-3, 9.0), "salinity": (0.0, 45.0), "pressure": (-10.0, 7000.0),
+}  # fmt: skip
 # A sample is a spike where it stands off both its neighbours, to the same side, by more than a + b dt.
 SPIKES = {
-    "depth_m": (2.0, 1.5),
-    "pressure": (2.0, 1.5),
-    "temperature": (5.0, 0.0),
-    "conductivity": (0.5, 0.0),
+    "depth_m": (2.0, 1.5), "pressure": (2.0, 1.5), "temperature": (5.0, 0.0), "conductivity": (0.5, 0.0),
     "salinity": (5.0, 0.0),
-}
+}  # fmt: skip
 
 
 @dataclass

@@ -1,0 +1,1 @@
+"""Tests; their parts are imported as tests.support and tests.independent."""

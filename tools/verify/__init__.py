@@ -1,0 +1,1 @@
+"""What the project is held against: verification stays on the laptop (NOT_ONBOARD in tools/deploy/bundle.py)."""

@@ -1,0 +1,180 @@
+"""Watches of a blind test against the truth: the figures of docs/WATCH.md, and how each is counted."""
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from glider.tools.data.errors import InputError
+from glider.tools.data.intervals import wilson
+from glider.tools.verify.challenge.diagnosis import TIMING
+from glider.tools.verify.challenge.judge import manifest_beside, open_sealed
+from glider.tools.verify.challenge.score import LARGEST_GROUP, ScoreFigure
+from glider.tools.verify.challenge.watch_answer import REFERENCE, WATCH_FILE, EventSaid, WatchSaid, read_watch
+from glider.tools.verify.challenge.watch_plan import CHANGED, OUTSIDE, UNCHANGED
+
+NEEDED = ("kind", "label", "from_run", "to_run", "strengths", "values", "runs")
+# Labels whose strength in the foreign plant is the size of the catalogue's parameter, in its unit, whatever the form:
+# of these the size is compared. Values of more than one entry by their length.
+SAME_UNIT = (
+    "servo_offset", "net_buoyancy", "cg_longitudinal", "cg_lateral", "cg_vertical", "current", "imu_pitch_bias",
+    "imu_roll_bias", "gyro_scale", "gyro_bias", "depth_offset", "depth_scale", "pressure_lever", "command_delay",
+    "mocap_delay", "attitude_lag", "depth_lag", "roll_trim", "pitch_trim", "yaw_trim", "side_force", "weathercock",
+)  # fmt: skip
+
+
+@dataclass
+class Watched:
+    """One vehicle: the truth, and what was said (None: nothing)."""
+
+    name: str
+    truth: dict[str, Any]
+    said: WatchSaid | None
+    seconds: float | None = None
+
+    @property
+    def kind(self) -> str:
+        return self.truth["kind"]
+
+    @property
+    def changed(self) -> list[bool]:
+        """Of each watched run, whether it is changed."""
+        return [strength != 0.0 for strength in self.truth["strengths"]]
+
+    def called(self) -> list[bool]:
+        """Of each watched run, whether it was called changed; nothing said calls a run neither changed nor not."""
+        if self.said is None or len(self.said.runs) != len(self.changed):
+            return [not changed for changed in self.changed]
+        return [run.verdict != "none" for run in self.said.runs]
+
+    @property
+    def main(self) -> EventSaid | None:
+        return self.said.events[0] if self.said is not None and self.said.events else None
+
+    def bounds(self) -> bool:
+        """First and last run of the main event right to one run."""
+        if self.said is None or self.main is None:
+            return False
+        first, last = self.said.span(self.main)
+        ends = [self.truth["runs"] - 1 if one is None else one for one in (last, self.truth["to_run"])]
+        return abs(first - self.truth["from_run"]) <= 1 and abs(ends[0] - ends[1]) <= 1
+
+    def label(self) -> bool:
+        return self.main is not None and self.main.label == self.truth["label"]
+
+    def group(self) -> bool:
+        main = self.main
+        return main is not None and len(main.group) <= LARGEST_GROUP and (
+            self.truth["label"] in {main.label, *main.group}
+        )  # fmt: skip
+
+    def unknown(self) -> bool:
+        return self.main is not None and self.main.label is None
+
+    def size(self) -> bool | None:
+        """Whether the size is in its interval; None where it cannot be compared, or the label is another."""
+        comparable = self.truth.get("same_unit", self.truth["label"] in SAME_UNIT)
+        if not comparable or not self.label() or self.main is None or self.main.ci90 is None:
+            return None
+        values = self.truth["values"]
+        true = values[0] if len(values) == 1 else float(np.linalg.norm(values))
+        return self.main.ci90[0] <= true <= self.main.ci90[1]
+
+
+def share(key: str, name: str, target: float, marks: Sequence[bool], at_most: bool = False) -> ScoreFigure:
+    value = sum(marks) / len(marks) if marks else None
+    return ScoreFigure(key, name, target, at_most, value, len(marks), sum(marks), wilson(sum(marks), len(marks)))
+
+
+@dataclass
+class WatchScore:
+    """A blind test of watches scored."""
+
+    cases: list[Watched]
+    figures: list[ScoreFigure]
+
+    def plain(self) -> dict[str, Any]:
+        """The result as `--json` prints it."""
+        return {
+            "figures": {figure.key: figure.plain() for figure in self.figures},
+            "unanswered": [case.name for case in self.cases if case.said is None],
+            "cases": [_plain(case) for case in self.cases],
+        }
+
+
+def _plain(case: Watched) -> dict[str, Any]:
+    main, truth = case.main, case.truth
+    return {
+        "name": case.name, "kind": case.kind, "label": truth["label"] or truth.get("secret"),
+        "course": truth.get("course"), "from_run": truth["from_run"], "to_run": truth["to_run"],
+        "said": None if main is None else main.label or "unknown",
+        "said_from": None if main is None else main.from_run, "said_to": None if main is None else main.to_run,
+        "events": 0 if case.said is None else len(case.said.events),
+        "called_wrongly": sum(c and not t for c, t in zip(case.called(), case.changed, strict=True)),
+        "not_found": sum(t and not c for c, t in zip(case.called(), case.changed, strict=True)),
+        "size_in_interval": case.size(), "seconds": case.seconds,
+    }  # fmt: skip
+
+
+def score_watches(cases: Sequence[Watched]) -> WatchScore:
+    """Every figure over the vehicles."""
+    runs = [(case.kind, true, said) for case in cases for true, said in zip(case.changed, case.called(), strict=True)]
+    changed = [case for case in cases if case.kind != UNCHANGED]
+    known = [case for case in cases if case.kind == CHANGED]
+    outside = [case for case in cases if case.kind == OUTSIDE]
+    sizes = [found for found in (case.size() for case in known) if found is not None]
+    figures = [
+        share("unchanged_called", "runs without change called one", 0.02, [s for _, t, s in runs if not t], True),
+        share("changed_found", "runs with it found", 0.95, [s for _, t, s in runs if t]),
+        share("bounds", "first and last run right to one run", 0.90, [case.bounds() for case in changed]),
+        share("label", "label right first", 0.90, [case.label() for case in known]),
+        share("group", "label in its group", 0.97, [case.group() for case in known]),
+        share("size", "size within its interval", 0.90, sizes),
+        share("outside_unknown", "outside the catalogue, called unknown", 0.90, [case.unknown() for case in outside]),
+    ]
+    seconds = [case.seconds for case in cases if case.seconds is not None]
+    longest = max(seconds) if seconds else None
+    figures.append(ScoreFigure("seconds", "seconds a vehicle, the longest", 120.0, True, longest, len(seconds)))
+    return WatchScore(list(cases), figures)
+
+
+def gather_watches(
+    cases: Path,
+    answers: Path,
+    said: Path,
+    manifest: Path | None = None,
+    partial: bool = False,
+    advance: Callable[[int], None] = lambda n: None,
+    needed: tuple[str, ...] = NEEDED,
+) -> list[Watched]:
+    """Open and check the answers, and gather what was said to every vehicle of a blind test's folder."""
+    folder = cases / "cases" if (cases / "cases").is_dir() else cases
+    opened = open_sealed(answers, manifest or manifest_beside(folder), folder, folder.parent / REFERENCE, needed)
+    if not said.is_dir():
+        raise InputError("no such folder", source=said)
+    found = []
+    for name, truth in sorted(opened.cases.items()):
+        path, timing = said / name / WATCH_FILE, said / name / TIMING
+        answer = read_watch(path) if path.is_file() else None
+        seconds = float(json.loads(timing.read_bytes())["seconds"]) if timing.is_file() else None
+        if answer is not None or not partial:
+            found.append(Watched(name, truth, answer, seconds))
+        advance(1)
+    if not any(case.said for case in found):
+        raise InputError(f"no {WATCH_FILE} of any case in its folders", source=said)
+    return found
+
+
+def judge_watches(
+    cases: Path,
+    answers: Path,
+    said: Path,
+    manifest: Path | None = None,
+    partial: bool = False,
+    advance: Callable[[int], None] = lambda n: None,
+) -> WatchScore:
+    """Open, check and score what was said to every vehicle of a blind test's folder."""
+    return score_watches(gather_watches(cases, answers, said, manifest, partial, advance))

@@ -1,0 +1,1 @@
+"""Figures of the docs, each by `python -m glider.tools.verify.figures.NAME`: measured again when the code changes."""
