@@ -19,7 +19,7 @@ from glider.tools.own.observer import Filtered, Observer
 
 STEP, LONG_STEP, SHORTENED = 0.1, 3.0, 0.5  # spreads; rms errors that a step may move, and to what it is shortened
 UNSEEN_STEP = 1.0  # spreads: step of an effect that begins at a kink
-BLOCK_SECONDS = 10.0  # over which errors may have something in common
+BLOCK_SECONDS, BLOCKS = 10.0, 4  # over which errors may have something in common; in a window, at least
 SCATTER_PRIOR_RUNS, LEAST_VARIANCE = 1.0, 1e-12
 ITERATIONS, CONVERGED = 200, 1e-3
 
@@ -89,14 +89,19 @@ def expand(
     reach = ((J.reshape(-1, *shape) * scales) ** 2).mean(axis=1)[:, seen].mean(axis=1)
     return Expansion(
         at.copy(), float(e @ e) / cuts, J @ e / cuts, J @ J.T / cuts, (e.reshape(shape) ** 2).sum(axis=0),
-        np.where(seen, shape[0], 0), _blocks(observer, n, J, e, shape) / cuts, reach,
+        np.where(seen, shape[0], 0), _blocks(observer, n, J, e, shape, horizon) / cuts, reach,
     )  # fmt: skip
 
 
-def _blocks(observer: Observer, n: int, J: np.ndarray, e: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """Sum over blocks of the squared score, by column."""
+def _blocks(
+    observer: Observer, n: int, J: np.ndarray, e: np.ndarray, shape: tuple[int, ...], horizon: float
+) -> np.ndarray:
+    """Sum over blocks of the squared score, by column.
+
+    A window has several: a run has values of its own, which bring the score of all its rows to nothing.
+    """
     dt = max(float(np.median(np.diff(observer.runs[n].t))), 1e-6)
-    block = max(1, round(BLOCK_SECONDS / dt)) * shape[1]
+    block = max(1, round(min(BLOCK_SECONDS, horizon / BLOCKS) / dt)) * shape[1]
     count = -(-len(e) // block)
     padded = np.zeros((len(J), count * block))
     padded[:, : len(e)] = J * e

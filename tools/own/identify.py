@@ -5,7 +5,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from glider.tools.own.effects import Effect, moved, standard_effects
+from glider.tools.own.declare import RUN, Declaration
+from glider.tools.own.effects import PARAMETER, Effect, moved, standard_effects
 from glider.tools.own.hierarchy import Expansion, Pooled, expand, inflation, learn_scatter, marginalised, run_values
 from glider.tools.own.load import LoadedVehicle
 from glider.tools.own.observer import Observer
@@ -13,7 +14,7 @@ from glider.tools.own.runs import OwnRun
 
 ROUNDS = 12
 FILE_PRIOR = 2.0  # times the file's uncertainties: what the shared values may be
-USUAL_SCATTER = 0.02  # spreads, from run to run
+USUAL_SCATTER, USUAL_OWN_SCATTER = 0.02, 0.5  # spreads, from run to run; of what is declared a number of each run
 LONGEST_MOVE = 2.0  # spreads a round
 CONVERGED_GAIN = 0.5  # of -2 log posterior: no further round
 LEAST_SCALE = 0.02  # tolerances: less than that no channel is known to be left with
@@ -59,6 +60,12 @@ def nuisance_of(observer: Observer) -> list[Effect]:
     return found
 
 
+def usual_scatter(declared: Declaration, effects: Sequence[Effect]) -> np.ndarray:
+    """1 sigma (effects,) in spreads of how runs differ, before any is seen."""
+    own = {one.name for one in declared.parameters if one.scope == RUN}
+    return np.array([USUAL_OWN_SCATTER if one.family == PARAMETER and one.name in own else USUAL_SCATTER for one in effects])
+
+
 def identify(
     vehicle: LoadedVehicle, sessions: Sequence[Sequence[OwnRun]], say: Callable[[str], None] = lambda text: None
 ) -> Identified:
@@ -69,7 +76,8 @@ def identify(
     k, count = len(nuisance), len(runs)
     V = FILE_PRIOR**2 * np.eye(k)
     limits = np.array([one.low for one in nuisance]), np.array([one.high for one in nuisance])
-    values, scatter, own = np.zeros(k), np.full(k, USUAL_SCATTER), np.zeros((count, k))
+    usual = usual_scatter(vehicle.declared, nuisance)
+    values, scatter, own = np.zeros(k), usual.copy(), np.zeros((count, k))
     file_point = observer.point.copy()
     before = np.array([observer.gaps(n, file_point, horizon) for n in range(count)])
     say(f"{count} runs, {k} numbers; the file's model misses them by {_total(before):.2f} tolerances")
@@ -85,7 +93,7 @@ def identify(
         eta = inflation(found)
         warm = [one.tempered(eta) for one in found]
         if round_ >= 2 and count > 2:
-            scatter = learn_scatter(warm, V, np.full(k, USUAL_SCATTER))
+            scatter = learn_scatter(warm, V, usual)
         search = _Search(observer, nuisance, warm, scatter, eta, V, limits, scales, horizon)
         step = Pooled.of([marginalised(one, scatter) for one in warm], V).mean() - values
         values, own, gain = search.along(values, own, np.clip(step, -LONGEST_MOVE, LONGEST_MOVE))
@@ -198,7 +206,7 @@ def _scatter_of_all(observer, nuisance, values, own, eta, scales) -> tuple[list[
     for n in range(len(own)):
         one = expand(observer, n, effects, into @ own[n], scales, observer.horizon).tempered(eta)
         about.append(replace(one, at=one.at - into @ values))
-    usual = np.full(len(effects), USUAL_SCATTER)
+    usual = usual_scatter(observer.declared, effects)
     if len(own) < 3:
         return effects, 5.0 * usual
     return effects, learn_scatter(about, np.zeros((len(effects), len(effects))), usual)

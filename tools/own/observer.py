@@ -218,16 +218,21 @@ class Observer:
     def windows(self, n: int, horizon: float, offset: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """First row flown open loop and row behind the last, of every window of run n; offset: of the first, s.
 
-        A run shorter than a window is one; what is left behind the last is not scored.
+        A run shorter than a window is one; what is left behind the last is not scored. Where [start] says how a run
+        begins, its first window is flown from there: a warm-up would follow a sensor's offset.
         """
         t = self.runs[n].t - self.runs[n].t[0]
         warm = min(WARM_UP, WARM_UP_SHARE * horizon)
-        count = int((t[-1] - offset + 1e-6) // horizon)
+        count = max(int((t[-1] - offset + 1e-6) // horizon), 0)
         if count < 1:
-            return np.array([min(int(np.searchsorted(t, warm - 1e-6)), len(t) - 2)]), np.array([len(t)])
-        begins = np.searchsorted(t, offset + horizon * np.arange(count) - 1e-6)
-        ends = np.append(begins[1:], np.searchsorted(t, offset + horizon * count + 1e-6))
-        return np.minimum(np.searchsorted(t, t[begins] + warm - 1e-6), ends - 2), ends
+            begins, ends = np.zeros(1, dtype=int), np.array([len(t)])
+        else:
+            begins = np.searchsorted(t, offset + horizon * np.arange(count) - 1e-6)
+            ends = np.append(begins[1:], np.searchsorted(t, offset + horizon * count + 1e-6))
+        starts = np.minimum(np.searchsorted(t, t[begins] + warm - 1e-6), ends - 2)
+        if self.declared.start and begins[0] == 0:
+            starts[0] = 0
+        return starts, ends
 
     def scored_rows(self, n: int, horizon: float) -> int:
         """Rows of run n on which its windows are scored."""
