@@ -16,6 +16,7 @@ from glider.tools.cli.common import (
     say_assumed,
     vehicle_option,
 )
+from glider.tools.cli import own
 from glider.tools.cli.many import cases_argument, is_many, run_batch_command
 from glider.tools.cli.readings import readings
 from glider.tools.cli.watch import watch
@@ -40,6 +41,9 @@ def measure(case: Path, report: Path | None, vehicle: str | None, as_json: bool)
     Gaps are root mean square errors in tolerances: at 1 the simulator is off by as much as may be. Without --json a
     report is written too, to <case>-gap.html in the working directory unless --report names a file.
     """
+    if (theirs := own.own_vehicle(case, vehicle)) is not None:
+        own.measure(theirs, case, as_json)
+        return
     from glider.sim_backend.ocean.vehicle import OceanVehicle
     from glider.tools.data.errors import need
     from glider.tools.data.files import check_writable
@@ -114,6 +118,10 @@ def predict(run: Path, model: str, out: Path, vehicle: str | None) -> None:
     from glider.tools.inference.predict import as_run
     from glider.tools.inference.predict import predict as predict_runs
 
+    if (theirs := own.own_vehicle(run, vehicle if model == "nominal" else model)) is not None:
+        check_writable(out.parent)
+        own.predict(theirs, run, out)
+        return
     case, recorded = load_case_of_run(run, vehicle)
     say_assumed(case.vehicle_name, case.assumed)
     if out.exists() and run.exists() and out.samefile(run):
@@ -177,6 +185,10 @@ def _diagnose_one(
     from glider.tools.report.words import sentence
 
     need("analysis")
+    if (theirs := own.own_vehicle(case, vehicle)) is not None:
+        check_writable(out)
+        own.diagnose(theirs, case, reference, out, as_json)
+        return
     loaded = load_case(case, vehicle)
     check_writable(out)
     if isinstance(loaded.vehicle, OceanVehicle):

@@ -5,11 +5,12 @@ from pathlib import Path
 
 import click
 
+from glider.tools.cli import own
 from glider.tools.cli.common import json_option, print_json, say, vehicle_option
 
 
 @click.command()
-@click.argument("case", type=click.Path(path_type=Path))
+@click.argument("cases", metavar="CASE...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Folder for vehicle file and report.")
 @click.option("--seed", type=click.IntRange(0, 2**31), default=1, show_default=True, help="Of the chains.")
 @click.option(
@@ -18,21 +19,28 @@ from glider.tools.cli.common import json_option, print_json, say, vehicle_option
 )  # fmt: skip
 @vehicle_option
 @json_option
-def identify(case: Path, out: Path | None, seed: int, likelihood: str, vehicle: str | None, as_json: bool) -> None:
+def identify(
+    cases: tuple[Path, ...], out: Path | None, seed: int, likelihood: str, vehicle: str | None, as_json: bool
+) -> None:
     """Identify the vehicle of CASE from its runs: the twelve coefficients and their distribution, by MCMC.
 
     Runs that cannot be fitted are named and left out. What is handed out flies runs that its fit has not seen no worse
     than the file does. With --out: identified.toml (a vehicle file that says where it comes from), report.html,
-    posterior.nc (ArviZ).
+    posterior.nc (ArviZ). A model of one's own takes several cases, each a session of its own.
     """
     from glider.sim_backend.ocean.vehicle import OceanVehicle
     from glider.tools.data.errors import need
     from glider.tools.data.files import check_writable
     from glider.tools.data.runs.case import load_case
 
-    loaded = load_case(case, vehicle, leave_out=True)
     if out is not None:
         check_writable(out)
+    if (theirs := own.own_vehicle(cases[0], vehicle)) is not None:
+        own.identify(theirs, cases, out, as_json)
+        return
+    if len(cases) > 1:
+        raise click.UsageError("several cases are for a model of one's own; this vehicle takes one")
+    loaded = load_case(cases[0], vehicle, leave_out=True)
     if isinstance(loaded.vehicle, OceanVehicle):
         need("analysis")
         _identify_ocean(loaded, out, as_json)

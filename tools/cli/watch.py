@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from glider.tools.cli import own
 from glider.tools.cli.common import json_option, print_json, progress, say, say_assumed, vehicle_option
 from glider.tools.cli.many import cases_argument, is_many, run_batch_command
 
@@ -52,6 +53,11 @@ def _watch_one(case: Path, reference: Path | None, vehicle: str | None, out: Pat
     from glider.tools.watch.answer import FILE
     from glider.tools.watch.watch import watch as watch_runs
 
+    if (theirs := own.own_vehicle(case, vehicle)) is not None:
+        if out is not None:
+            check_writable(out)
+        own.watch(theirs, case, reference, out, as_json)
+        return
     loaded = load_case(case, vehicle)
     say_assumed(loaded.vehicle_name, loaded.assumed)
     before = None if reference is None else load_case(reference, vehicle)

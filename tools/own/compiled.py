@@ -144,9 +144,7 @@ def _compiled(model: Any, path: Path, attribute: str, tried: tuple[np.ndarray, .
     x, u, w, theta = tried
     module.advance(x, u, w, theta, 0.01, 1)
     given["measure"](x, u, theta)
-    return Kernels(
-        module.filter_run, module.follow_run, module.fly_run, module.advance, given["measure"], True, ""
-    )
+    return Kernels(module.filter_run, module.follow_run, module.fly_run, module.advance, given["measure"], True, "")
 
 
 def _user_module(kept: Path, key: str, beside: Path) -> types.ModuleType:

@@ -110,6 +110,7 @@ def standard_effects(declared: Declaration, runs: Sequence[OwnRun], tolerances: 
         found += _of_input(one, every[:, n], any(np.ptp(run.inputs[:, n]) > 0.0 for run in runs))
     duration = max(float(run.t[-1] - run.t[0]) for run in runs)
     for output, tolerance in zip(declared.outputs, tolerances, strict=True):
+
         def row(kind: str, unit: str, spread: float, low: float = -np.inf, output=output) -> Effect:
             return Effect(f"{output.name}_{kind}", OUTPUT, output.name, kind, unit, spread, low,
                           LONGEST if low == 0.0 else np.inf)  # fmt: skip

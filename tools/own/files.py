@@ -110,7 +110,12 @@ def decode_own(text: str, source: str) -> OwnVehicle:
 def declared_with(declared: Declaration, given: OwnVehicle, text: str, source: Path) -> Declaration:
     """A model's declaration with the file's numbers in place of its own; ConfigError for a name it does not have."""
     lists: dict[str, Any] = {}
-    for table, what in (("parameters", "parameters"), ("sensors", "outputs"), ("inputs", "inputs"), ("noise", "noises")):
+    for table, what in (
+        ("parameters", "parameters"),
+        ("sensors", "outputs"),
+        ("inputs", "inputs"),
+        ("noise", "noises"),
+    ):
         entries = {one.name: one for one in getattr(declared, what)}
         for name, row in getattr(given, table).items():
             if name not in entries:
@@ -119,7 +124,9 @@ def declared_with(declared: Declaration, given: OwnVehicle, text: str, source: P
                 raise ConfigError(str(source), f"the model declares no such name (it has {known})", key=f"{table}.{name}",
                                   line=line)  # fmt: skip
             values = {
-                key: value for key, value in msgspec.structs.asdict(row).items() if value is not None and key != "source"
+                key: value
+                for key, value in msgspec.structs.asdict(row).items()
+                if value is not None and key != "source"
             }
             entries[name] = replace(entries[name], **values)
         lists[what] = tuple(entries.values())

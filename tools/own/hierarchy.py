@@ -61,7 +61,9 @@ def expand(
     """
     base, declared = observer.point, observer.declared
     by = observer.filter(n, moved(declared, base, effects, at)) if by is None else by
-    steps = np.array([UNSEEN_STEP if one.one_sided and abs(x) < STEP else STEP for one, x in zip(effects, at, strict=True)])
+    steps = np.array(
+        [UNSEEN_STEP if one.one_sided and abs(x) < STEP else STEP for one, x in zip(effects, at, strict=True)]
+    )
     steps = np.where(at + steps > [one.high for one in effects], -steps, steps)
 
     def errors(places: np.ndarray, sizes: np.ndarray) -> np.ndarray:
@@ -79,17 +81,18 @@ def expand(
     E = E.reshape(len(E), -1)
     e, J = E[0], (E[1:] - E[0]) / steps[:, None]
     size = np.sqrt((J**2).mean(axis=1)) * np.abs(steps)
-    far = np.flatnonzero((size > LONG_STEP) & ~np.array([one.one_sided and abs(x) < STEP for one, x in zip(effects, at, strict=True)]))
+    far = np.flatnonzero(
+        (size > LONG_STEP) & ~np.array([one.one_sided and abs(x) < STEP for one, x in zip(effects, at, strict=True)])
+    )
     if len(far):
         shorter = steps[far] * SHORTENED / size[far]
         J[far] = (errors(far, shorter).reshape(len(far), -1) - e) / shorter[:, None]
     J[~np.isfinite(J).all(axis=1)] = 0.0
-    cuts = max(1, round(shape[0] / max(observer.scored_rows(n, horizon), 1)))  # the same rows, more than once
     seen = np.isfinite(observer.runs[n].outputs).any(axis=0)
     reach = ((J.reshape(-1, *shape) * scales) ** 2).mean(axis=1)[:, seen].mean(axis=1)
     return Expansion(
-        at.copy(), float(e @ e) / cuts, J @ e / cuts, J @ J.T / cuts, (e.reshape(shape) ** 2).sum(axis=0),
-        np.where(seen, shape[0], 0), _blocks(observer, n, J, e, shape, horizon) / cuts, reach,
+        at.copy(), float(e @ e), J @ e, J @ J.T, (e.reshape(shape) ** 2).sum(axis=0),
+        np.where(seen, shape[0], 0), _blocks(observer, n, J, e, shape, horizon), reach,
     )  # fmt: skip
 
 

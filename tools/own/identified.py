@@ -35,7 +35,9 @@ def toml_text(tables: dict[str, Any]) -> str:
     for name, table in tables.items():
         if not isinstance(table, dict) or not table:
             continue
-        loose = {key: value for key, value in table.items() if not isinstance(value, dict) or name in ("start", "identified")}
+        loose = {
+            key: value for key, value in table.items() if not isinstance(value, dict) or name in ("start", "identified")
+        }
         if loose:
             lines += ["", f"[{name}]", *(f"{key} = {_text(value)}" for key, value in loose.items())]
         for key, value in table.items():

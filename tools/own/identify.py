@@ -9,7 +9,7 @@ from glider.tools.own.declare import RUN, Declaration
 from glider.tools.own.effects import PARAMETER, Effect, moved, standard_effects
 from glider.tools.own.hierarchy import Expansion, Pooled, expand, inflation, learn_scatter, marginalised, run_values
 from glider.tools.own.load import LoadedVehicle
-from glider.tools.own.observer import Observer
+from glider.tools.own.observer import Observer, observer_of
 from glider.tools.own.runs import OwnRun
 
 ROUNDS = 12
@@ -71,7 +71,7 @@ def identify(
 ) -> Identified:
     """A vehicle from healthy runs of one or more sessions; InputError where its model cannot fly them."""
     runs = [run for session in sessions for run in session]
-    observer = Observer(vehicle, list(runs))
+    observer = observer_of(vehicle, list(runs))
     nuisance, horizon = nuisance_of(observer), observer.horizon
     k, count = len(nuisance), len(runs)
     V = FILE_PRIOR**2 * np.eye(k)
@@ -86,7 +86,10 @@ def identify(
     scales[~np.isfinite(scales)] = 1.0
     for round_ in range(ROUNDS):
         found = [expand(observer, n, nuisance, own[n], scales, horizon) for n in range(count)]
-        rescaled = np.maximum(scales * np.sqrt(sum(one.squares for one in found) / np.maximum(sum(one.samples for one in found), 1)), LEAST_SCALE)
+        rescaled = np.maximum(
+            scales * np.sqrt(sum(one.squares for one in found) / np.maximum(sum(one.samples for one in found), 1)),
+            LEAST_SCALE,
+        )
         if round_ and np.abs(np.log(rescaled / scales)).max() > 0.05:
             scales = np.exp(0.5 * (np.log(rescaled) + np.log(scales))) if round_ < 3 else rescaled
             found = [expand(observer, n, nuisance, own[n], scales, horizon) for n in range(count)]
@@ -156,6 +159,8 @@ def fit_levels(observer: Observer, say: Callable[[str], None]) -> None:
 
     They say how far the filter that finds where windows begin trusts the model; no evidence hangs on them.
     """
+    if observer.vehicle.level == 0:
+        return
     declared, budget = observer.declared, LEVEL_ROWS if observer.vehicle.kernels.compiled else PLAIN_ROWS
     used, rows = [], 0
     for n in sorted(range(len(observer.runs)), key=lambda n: len(observer.runs[n].t)):

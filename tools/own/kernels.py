@@ -273,7 +273,6 @@ def follow_run(T, U, Y, x0, theta, own, S, push, ports, kinds, angles, parts, m,
         states[row, : len(x)] = x
 
 
-
 def fly_run(T, U, starts, ends, X, theta, own, S, push, kinds, angles, parts, out):
     """Outputs (r, y) of windows flown open loop from states and own parameters X (windows,
     n + o) at rows `starts` to rows `ends`, into out."""

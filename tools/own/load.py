@@ -46,9 +46,15 @@ class LoadedVehicle:
 
     def zeros(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """x, u, w, theta of a vehicle at rest."""
-        states = [1.0 if one.kind == QUATERNION and n % 4 == 0 else one.start for n, one in enumerate(self.declared.states)]
-        theta = np.array([one.value for one in self.declared.parameters], dtype=np.float64)
-        return np.array(states, dtype=np.float64), np.zeros(len(self.declared.inputs)), np.zeros(len(self.declared.noises)), theta
+        declared, states = self.declared, list[float]()
+        for n, one in enumerate(declared.states):
+            begins = one.kind == QUATERNION and (n == 0 or declared.states[n - 1].kind != QUATERNION)
+            states.append(1.0 if begins else one.start)
+        theta = [one.value for one in declared.parameters]
+        return (
+            np.array(states, dtype=np.float64), np.zeros(len(declared.inputs)), np.zeros(len(declared.noises)),
+            np.array(theta, dtype=np.float64),
+        )  # fmt: skip
 
     @property
     def kernels(self) -> Kernels:

@@ -4,23 +4,26 @@ import contextlib
 import copy
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from glider.tools.data.errors import InputError
 from glider.tools.own import kernels as names
-from glider.tools.own.declare import ANGLE, QUATERNION, USUAL_START, USUAL_TOLERANCE
+from glider.tools.own.declare import ANGLE, QUATERNION, USUAL_START, USUAL_TOLERANCE, Declaration
 from glider.tools.own.effects import ModelPoint, driven_inputs, nominal_point
 from glider.tools.own.load import LoadedVehicle, called, user_error
 from glider.tools.own.runs import OwnRun
 
+LEAST_STEP = 0.1  # s between rows
 FIRST_SECONDS = 1.0  # of a run, over which the rate of an output at its start is taken
 PARTS_TOLERANCE, MOST_PARTS = 0.02, 64  # of a state's scale a second, by which steps and half steps may differ
 HORIZON = (5.0, 20.0)  # s: of windows, where the vehicle's time constants set it
 TIME_CONSTANTS = 3.0  # in a window
 WARM_UP, WARM_UP_SHARE = 2.0, 0.1  # s of a window that find its start, at most; of the horizon
 LOST = 100.0  # tolerances: error of a flight that is lost, and of none more
+QUATERNION_FIRST, QUATERNION_REST, USUAL_ATTITUDE = 2, 3, 0.1  # kinds of states; rad at the start
+MOST_KEPT = 10_000  # first readings
 NOISE_SHARE = 0.25  # of an output's tolerance: noise where the file gives none
 
 
@@ -45,21 +48,16 @@ class Observer:
     parts: int = 1
     starts: list[int] = field(default_factory=list)  # which of several initial states each run has
     notes: list[str] = field(default_factory=list)
+    _first: dict[tuple[int, bytes], dict[str, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         declared = self.vehicle.declared
-        if self.vehicle.level == 0:
-            raise InputError("the model is a black box (rollout): it is measured, predicted and identified by windows, "
-                             "and cannot be filtered", source=self.vehicle.path)  # fmt: skip
         self.declared = declared
-        kinds, scales = [], []
-        for one in declared.states:
-            quaternion = one.kind == QUATERNION
-            first = quaternion and (not kinds or kinds[-4:].count(2) == 0 or kinds[-1] != 3 or kinds[-3:].count(3) == 3)
-            kinds.append((2 if first else 3) if quaternion else int(one.kind == ANGLE))
-            if not quaternion or first:
-                usual = 0.1 if quaternion else USUAL_START.get(one.unit, 1.0)
-                scales += (3 if quaternion else 1) * [one.start_uncertainty or usual]
+        kinds, scales = state_kinds(declared), list[float]()
+        for one, kind in zip(declared.states, kinds, strict=True):
+            if kind != QUATERNION_REST:
+                usual = USUAL_ATTITUDE if kind == QUATERNION_FIRST else USUAL_START.get(one.unit, 1.0)
+                scales += (3 if kind == QUATERNION_FIRST else 1) * [one.start_uncertainty or usual]
         self.kinds, self.scales = np.array(kinds), np.array(scales)
         self.angles = np.array([one.angle for one in declared.outputs])
         self.tolerances = np.array(
@@ -84,6 +82,9 @@ class Observer:
 
     def first_readings(self, run: OwnRun, point: ModelPoint) -> dict[str, float]:
         """First value and rate of every output as the sensors' errors have it, NaN where there is none."""
+        key = (id(run), point.reading[:2].tobytes())
+        if key in self._first:
+            return dict(self._first[key])
         found: dict[str, float] = {}
         early = run.t - run.t[0] <= FIRST_SECONDS
         for n, one in enumerate(self.declared.outputs):
@@ -97,6 +98,8 @@ class Observer:
             when = run.t[seen] - run.t[0]
             sloped = len(seen) >= 3 and np.ptp(when) > 0.0
             found[f"{one.name}_rate"] = float(np.polyfit(when, values, 1)[0]) if sloped else np.nan
+        if len(self._first) < MOST_KEPT:
+            self._first[key] = dict(found)
         return found
 
     def start(self, n: int, point: ModelPoint) -> tuple[np.ndarray, np.ndarray]:
@@ -215,36 +218,31 @@ class Observer:
 
     # windows
 
-    def windows(self, n: int, horizon: float, offset: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """First row flown open loop and row behind the last, of every window of run n; offset: of the first, s.
+    def windows(self, n: int, horizon: float) -> tuple[np.ndarray, np.ndarray]:
+        """First row flown open loop and row behind the last, of every window of run n.
 
         A run shorter than a window is one; what is left behind the last is not scored. Where [start] says how a run
         begins, its first window is flown from there: a warm-up would follow a sensor's offset.
         """
         t = self.runs[n].t - self.runs[n].t[0]
         warm = min(WARM_UP, WARM_UP_SHARE * horizon)
-        count = max(int((t[-1] - offset + 1e-6) // horizon), 0)
-        if count < 1:
-            begins, ends = np.zeros(1, dtype=int), np.array([len(t)])
-        else:
-            begins = np.searchsorted(t, offset + horizon * np.arange(count) - 1e-6)
-            ends = np.append(begins[1:], np.searchsorted(t, offset + horizon * count + 1e-6))
+        count = int((t[-1] + 1e-6) // horizon)
+        begins, ends = np.zeros(1, dtype=int), np.array([len(t)])
+        if count >= 1:
+            begins = np.searchsorted(t, horizon * np.arange(count) - 1e-6)
+            ends = np.append(begins[1:], np.searchsorted(t, horizon * count + 1e-6))
         starts = np.minimum(np.searchsorted(t, t[begins] + warm - 1e-6), ends - 2)
-        if self.declared.start and begins[0] == 0:
+        if self.declared.start:
             starts[0] = 0
         return starts, ends
 
-    def scored_rows(self, n: int, horizon: float) -> int:
-        """Rows of run n on which its windows are scored."""
-        return int(sum(b - a - 1 for a, b in zip(*self.windows(n, horizon), strict=True)))
-
-    def predict(self, n: int, point: ModelPoint, horizon: float, states: np.ndarray, offset: float = 0.0) -> np.ndarray:
+    def predict(self, n: int, point: ModelPoint, horizon: float, states: np.ndarray) -> np.ndarray:
         """Outputs (rows, outputs) of run n, window by window open loop from the state behind each warm-up; NaN else.
 
         No measurement behind a window's warm-up is used in it.
         """
         run, kernels = self.runs[n], self.vehicle.kernels
-        starts, ends = self.windows(n, horizon, offset)
+        starts, ends = self.windows(n, horizon)
         out = np.full(run.outputs.shape, np.nan)
         if np.isfinite(states[starts]).all():
             with contextlib.suppress(ArithmeticError, ValueError, np.linalg.LinAlgError):
@@ -254,14 +252,25 @@ class Observer:
                 )  # fmt: skip
         return out
 
-    def errors(self, n: int, predicted: np.ndarray, horizon: float, offset: float = 0.0) -> np.ndarray:
+    def errors(self, n: int, predicted: np.ndarray, horizon: float) -> np.ndarray:
         """Measured less predicted in tolerances, (scored rows, outputs), NaN where nothing was measured."""
-        rows = np.concatenate([np.arange(a + 1, b) for a, b in zip(*self.windows(n, horizon, offset), strict=True)])
+        rows = np.concatenate([np.arange(a + 1, b) for a, b in zip(*self.windows(n, horizon), strict=True)])
         error = self.runs[n].outputs[rows] - predicted[rows]
         error[:, self.angles] = names.wrap(error[:, self.angles])
         lost = np.isnan(predicted[rows]).all(axis=1)
         error[lost] = np.where(np.isnan(self.runs[n].outputs[rows[lost]]), np.nan, LOST * self.tolerances)
         return np.clip(error / self.tolerances, -LOST, LOST)
+
+    def predicted(self, n: int) -> np.ndarray:
+        """Run n by the vehicle's own model, (rows, outputs): windows one after the other; what none covers is read.
+
+        Rows of warm-ups, and what is left behind the last window, are the model's outputs at the filter's states.
+        """
+        by, kernels = self.filter(n, self.point), self.vehicle.kernels
+        out = self.predict(n, self.point, self.horizon, by.states)
+        for row in np.flatnonzero(np.isnan(out).all(axis=1)):
+            out[row] = kernels.measure(by.states[row, : len(self.kinds)], self.runs[n].inputs[row], self.point.theta)
+        return out
 
     def gaps(self, n: int, point: ModelPoint, horizon: float) -> np.ndarray:
         """Root mean square of measured less predicted, in tolerances, (outputs,); NaN where nothing was recorded."""
@@ -272,15 +281,13 @@ class Observer:
         return found
 
     def residuals(self, n: int, points: Sequence[ModelPoint], by: Filtered, horizon: float) -> np.ndarray:
-        """Errors of models, (points, rows, outputs): windows cut in two ways, begun by kept gains; missing are 0."""
-        offsets = (0.0, 0.5 * horizon) if self.runs[n].t[-1] - self.runs[n].t[0] > 1.5 * horizon else (0.0,)
+        """Errors of models in tolerances, (points, scored rows, outputs): windows begun by kept gains; missing are 0."""
 
         def one(point: ModelPoint) -> np.ndarray:
-            states = self.follow(n, point, by)
-            parts = [self.errors(n, self.predict(n, point, horizon, states, at), horizon, at) for at in offsets]
-            return np.nan_to_num(np.concatenate(parts), nan=0.0)
+            predicted = self.predict(n, point, horizon, self.follow(n, point, by))
+            return np.nan_to_num(self.errors(n, predicted, horizon), nan=0.0)
 
-        if self.vehicle.kernels.compiled:
+        if self.vehicle.level and self.vehicle.kernels.compiled:
             with ThreadPoolExecutor(2) as pool:
                 return np.array(list(pool.map(one, points)))
         return np.array([one(point) for point in points])
@@ -297,7 +304,9 @@ class Observer:
         kernels, run = self.vehicle.kernels, self.runs[0]
         x = self.filter(0, self.point).states[run.t.searchsorted(run.t[0] + 2.0, side="right") - 1, : len(self.kinds)]
         dt, w = float(np.median(np.diff(run.t))), np.zeros(len(self.declared.noises))
-        base = names.normalised(np.array(kernels.advance(x, run.inputs[0], w, self.point.theta, dt, self.parts)), self.kinds)
+        base = names.normalised(
+            np.array(kernels.advance(x, run.inputs[0], w, self.point.theta, dt, self.parts)), self.kinds
+        )
         m = len(self.scales)
         F, column = np.zeros((m, m)), np.zeros(m)
         for j in range(m):
@@ -311,8 +320,77 @@ class Observer:
         return float(np.max(-dt / np.log(decaying))) if len(decaying) else HORIZON[1] / TIME_CONSTANTS
 
 
+def state_kinds(declared: Declaration) -> list[int]:
+    """What each state is for the kernels: 0 vector, 1 angle, 2 first of a quaternion, 3 the others of it."""
+    kinds: list[int] = []
+    for one in declared.states:
+        if one.kind != QUATERNION:
+            kinds.append(int(one.kind == ANGLE))
+        else:
+            kinds.append(QUATERNION_REST if QUATERNION_FIRST in kinds[-3:] else QUATERNION_FIRST)
+    return kinds
+
+
 def _range_share(runs: Sequence[OwnRun], n: int) -> float:
     """A twentieth of an output's range: tolerance where neither file nor unit gives one."""
     values = np.concatenate([run.outputs[:, n] for run in runs])
     values = values[np.isfinite(values)]
     return float(np.ptp(values)) / 20.0 or 1.0 if len(values) else 1.0
+
+
+class BlackBox(Observer):
+    """A model that is only rolled out: windows begin where its own `initial` puts them by the readings of the warm-up."""
+
+    def _choose_parts(self) -> None:
+        self.kinds, self.scales = np.zeros(0, dtype=int), np.zeros(0)
+
+    def _choose_starts(self) -> None:
+        return
+
+    @property
+    def horizon(self) -> float:
+        return float(self.declared.horizon or HORIZON[1])
+
+    def filter(self, n: int, point: ModelPoint) -> Filtered:
+        rows = len(self.runs[n].t)
+        return Filtered(0.0, 0.0, 1, np.zeros((rows, 0, 0)), np.zeros((rows, 0)))
+
+    def follow(self, n: int, point: ModelPoint, by: Filtered) -> np.ndarray:
+        return by.states
+
+    def predict(self, n: int, point: ModelPoint, horizon: float, states: np.ndarray) -> np.ndarray:
+        run = self.runs[n]
+        driven = driven_inputs(run, self.declared, point)
+        out = np.full(run.outputs.shape, np.nan)
+        starts, ends = self.windows(n, horizon)
+        warm = min(WARM_UP, WARM_UP_SHARE * horizon)
+        for start, end in zip(starts, ends, strict=True):
+            begin = int(np.searchsorted(run.t, run.t[start] - warm - 1e-6))
+            part = OwnRun(run.name, run.t[begin:end], driven[begin:end], run.outputs[begin:end], run.path)
+            readings = self.first_readings(part, point)
+            x0 = called(self.vehicle, "initial", readings) if hasattr(self.vehicle.model, "initial") else readings
+            flown = np.asarray(called(self.vehicle, "rollout", x0, part.t - part.t[0], part.inputs, point.theta), float)
+            if flown.shape != part.outputs.shape:
+                raise InputError(
+                    f"rollout: expected {part.outputs.shape} outputs, got {flown.shape}", source=self.vehicle.source
+                )
+            lagged, history = np.zeros(flown.shape[1]), np.zeros(flown.shape)
+            for row, h in enumerate(flown):
+                out[begin + row] = names.read(h, part.t[row], row, part.t, lagged, history, self.angles, point.reading)
+            out[begin:start] = np.nan
+        return out
+
+    def predicted(self, n: int) -> np.ndarray:
+        return self.predict(n, self.point, self.horizon, np.zeros((0, 0)))
+
+
+def observer_of(vehicle: LoadedVehicle, runs: Sequence[OwnRun], every_row: bool = False) -> Observer:
+    """The observer of a vehicle's model over runs: on rows LEAST_STEP apart at least, or on every row."""
+    chosen = list(runs) if every_row else [thinned(run) for run in runs]
+    return (Observer if vehicle.level else BlackBox)(vehicle, chosen)
+
+
+def thinned(run: OwnRun) -> OwnRun:
+    """Every so many-th row of a run that was logged faster than its motion needs."""
+    step = max(1, int(round(LEAST_STEP / max(float(np.median(np.diff(run.t))), 1e-9))))
+    return run if step == 1 else replace(run, t=run.t[::step], inputs=run.inputs[::step], outputs=run.outputs[::step])

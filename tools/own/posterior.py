@@ -32,6 +32,7 @@ FORM = 0.2  # of a change, 1 sigma, that is not as its label's equations have it
 MATERIAL = 0.1  # tolerances: a smaller effect is no gap (docs/GAP.md)
 BEAM, MOST_EFFECTS, ROUNDS, LONGEST_MOVE = 6, 3, 5, 4.0
 LONGEST_REACH = 4.0  # tolerances that a round's move of one number may do at most, where that is more
+STRONG, STRONG_LEFT, STRONG_ROWS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0), 1.5, 1_500  # tolerances; times healthy; rows looked at
 ACTIVE_SCATTER = 3.0  # times the usual: labels that healthy runs differ in
 LEAST_REACH = 1e-4  # tolerances a spread
 
@@ -101,12 +102,13 @@ class Engine:
 
     def expansions(self, own: np.ndarray, columns: np.ndarray) -> list[Expansion]:
         """Every run about its values (runs, k) in some columns, tempered; the others' rows are 0."""
+        return [self.expansion_of(n, own[n], columns) for n in range(self.count)]
+
+    def expansion_of(self, n: int, own: np.ndarray, columns: np.ndarray) -> Expansion:
+        """Run n about its values (k,) in some columns, tempered; the others' rows are 0."""
         chosen = [self.healthy.effects[k] for k in columns]
-        found = []
-        for n in range(self.count):
-            one = expand(self._observer_at(own[n], columns), n, chosen, own[n, columns], self.healthy.scales, self.horizon)
-            found.append(self._widened(one.tempered(self.healthy.eta), columns, own[n]))
-        return found
+        one = expand(self._observer_at(own, columns), n, chosen, own[columns], self.healthy.scales, self.horizon)
+        return self._widened(one.tempered(self.healthy.eta), columns, own)
 
     def _observer_at(self, own: np.ndarray, columns: np.ndarray) -> Observer:
         """The observer about a run's values in all other columns."""
@@ -117,7 +119,12 @@ class Engine:
         return self.observer.about(moved(self.observer.declared, self.observer.point, self.healthy.effects, others))
 
     def _widened(self, one: Expansion, columns: np.ndarray, own: np.ndarray) -> Expansion:
-        slope, curvature, blocks, reach = np.zeros(self.k), np.zeros((self.k, self.k)), np.zeros(self.k), np.zeros(self.k)
+        slope, curvature, blocks, reach = (
+            np.zeros(self.k),
+            np.zeros((self.k, self.k)),
+            np.zeros(self.k),
+            np.zeros(self.k),
+        )
         slope[columns], blocks[columns], reach[columns] = one.slope, one.blocks, one.reach
         curvature[np.ix_(columns, columns)] = one.curvature
         return replace(one, at=own.copy(), slope=slope, curvature=curvature, blocks=blocks, reach=reach)
@@ -157,7 +164,6 @@ class Engine:
         _, shared, own, found = best
         if every:
             found = self.expansions(own, np.arange(self.k))
-            self.reach = np.sqrt(np.mean([one.reach for one in found], axis=0))
         sigma, evidence, mean, sd = self._best_sizes(found, places)
         left = np.array([one.squares.sum() / max(1, one.samples.sum()) for one in found])
         return Hypothesis(labels, evidence + self.log_prior(labels), mean, sd, shared, own, left, 0.0, found)
@@ -176,8 +182,7 @@ class Engine:
         pooled = Pooled.of([marginalised(one, self.scatter) for one in found], self.V)
         if not places:
             return [], pooled.log_evidence(), np.zeros(0), np.zeros(0)
-        reach = np.sqrt(np.mean([one.reach for one in found], axis=0))
-        grids = [SIZES / max(reach[k], LEAST_REACH) for k in places]
+        grids = [SIZES / max(self.reach[k], LEAST_REACH) for k in places]
         table: list[tuple[float, list[float], np.ndarray, np.ndarray]] = []
         for choice in np.ndindex(*(len(SIZES) for _ in places)):
             sigma = [grid[c] for grid, c in zip(grids, choice, strict=True)]
@@ -222,11 +227,54 @@ class Engine:
             found.append((float(logsumexp(gain) - np.log(len(SIZES)) + odds), effect.label))
         return sorted(found, reverse=True)
 
+    def strong_sizes(self, among: Sequence[int]) -> list[tuple[int, float]]:
+        """Labels at the size that alone explains most of some runs, best first.
+
+        Where a strong change leads no parabola goes: every label is flown at sizes over the whole range.
+        """
+        healthy, observer = self.healthy, self.observer
+        chosen, rows = [], 0
+        for n in sorted(among, key=lambda n: len(observer.runs[n].t)):
+            if chosen and rows + len(observer.runs[n].t) > STRONG_ROWS:
+                break
+            chosen.append(n)
+            rows += len(observer.runs[n].t)
+        sizes = [(k, sign * size / self.reach[k]) for k in range(self.k) if self.reach[k] > LEAST_REACH
+                 for size in STRONG for sign in (1.0, -1.0)]  # fmt: skip
+        sizes = [(k, size) for k, size in sizes if self.low[k] <= size <= self.high[k]]
+        value = np.zeros(len(sizes))
+        for n in chosen:
+            by = observer.filter(n, observer.point)
+            points = []
+            for k, size in sizes:
+                at = np.zeros(self.k)
+                at[k] = size
+                points.append(moved(observer.declared, observer.point, healthy.effects, at))
+            errors = observer.residuals(n, points, by, self.horizon) / healthy.scales
+            value += (errors**2).sum(axis=(1, 2))
+        found: dict[int, tuple[float, float]] = {}
+        for (k, size), squares in zip(sizes, value, strict=True):
+            if k not in found or squares < found[k][0]:
+                found[k] = (float(squares), size)
+        return [(k, size) for k, (_, size) in sorted(found.items(), key=lambda one: one[1][0])]
+
+    def strong_starts(self) -> list[tuple[str, Hypothesis]]:
+        """Hypotheses of single labels that begin there."""
+        starts = []
+        for k, size in self.strong_sizes(range(self.count))[:BEAM]:
+            shared = np.zeros(self.k)
+            shared[k] = size
+            own = np.tile(shared, (self.count, 1))
+            starts.append((self.healthy.effects[k].label, replace(self.bare, shared=shared, own=own)))
+        return starts
+
     def run(self) -> Posterior:
         """Hypotheses found by a beam: none, the best single labels, pairs beside the best, triples."""
+        begin = self.expansions(np.zeros((self.count, self.k)), np.arange(self.k))
+        self.reach = np.sqrt(np.mean([one.reach for one in begin], axis=0))
         nothing = self.fit((), every=True)
         nothing.strange = self.strangeness(nothing, nothing)
-        every, front = [nothing], [nothing]
+        every, front, self.bare = [nothing], [nothing], nothing
         self.say(f"no change: {np.sqrt(nothing.left.mean()):.2f} times what healthy runs leave")
         for depth in range(MOST_EFFECTS):
             wanted: dict[frozenset[str], tuple[float, Hypothesis, tuple[str, ...]]] = {}
@@ -236,11 +284,19 @@ class Engine:
                     key, worth = frozenset(labels), one.evidence + gain
                     if key not in wanted or wanted[key][0] < worth:
                         wanted[key] = (worth, one, labels)
-            new = [self.fit(labels, begin) for _, begin, labels in sorted(wanted.values(), key=lambda one: -one[0])[:BEAM]]
+            new = [
+                self.fit(labels, begin) for _, begin, labels in sorted(wanted.values(), key=lambda one: -one[0])[:BEAM]
+            ]
+            if depth == 0 and np.sqrt(nothing.left.mean()) > STRONG_LEFT:
+                again = [self.fit((label,), begin) for label, begin in self.strong_starts()]
+                best_of = {one.labels: one for one in sorted([*new, *again], key=lambda one: one.evidence)}
+                new = list(best_of.values())
             best = max(one.evidence for one in every)
             for one in new:
                 one.strange = self.strangeness(one, nothing)
-                self.say(f"{' + '.join(one.labels)}: {one.evidence - nothing.evidence:.1f} nat, {np.sqrt(one.left.mean()):.2f} left")
+                self.say(
+                    f"{' + '.join(one.labels)}: {one.evidence - nothing.evidence:.1f} nat, {np.sqrt(one.left.mean()):.2f} left"
+                )
             every += new
             front = sorted(new, key=lambda one: -one.evidence)[:2]
             if not front or front[0].evidence < best + (0.0 if depth else -3.0):
@@ -299,12 +355,16 @@ def healthy_of(observer: Observer, session: bool = True) -> Healthy:
     V = np.zeros((k, k))
     if table is None:
         for one in declared.parameters:
-            V[names.index(one.name), names.index(one.name)] = (one.uncertainty / effects[names.index(one.name)].spread) ** 2
+            V[names.index(one.name), names.index(one.name)] = (
+                one.uncertainty / effects[names.index(one.name)].spread
+            ) ** 2
         scales = np.ones(len(declared.outputs))
         return Healthy(effects, V, scatter, scales, 10.0, 1, USUAL_LEVEL_SCATTER)
     places = [names.index(name) for name in table.parameters]
     spreads = np.array([effects[k].spread for k in places])
-    V[np.ix_(places, places)] = np.array(table.covariance).reshape(len(places), len(places)) / np.outer(spreads, spreads)
+    V[np.ix_(places, places)] = np.array(table.covariance).reshape(len(places), len(places)) / np.outer(
+        spreads, spreads
+    )
     for name, value in table.scatter.items():
         if name in names:
             scatter[names.index(name)] = max(value / effects[names.index(name)].spread, 1e-4)

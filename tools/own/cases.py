@@ -1,0 +1,29 @@
+"""Which vehicle a case is asked by: a file with `model`, by --vehicle or named in case.toml."""
+
+from pathlib import Path
+
+from glider.tools.data.runs.case import CASE_FILE
+from glider.tools.data.sources import read_text
+from glider.tools.own.files import is_own
+from glider.tools.own.load import LoadedVehicle, load_own
+from glider.tools.own.runs import case_table
+
+
+def own_vehicle(case: Path, wanted: str | None) -> LoadedVehicle | None:
+    """The user's own model of a case (or of the case of a run file); None where its vehicle is none.
+
+    InputError or ConfigError where it is one and cannot be used.
+    """
+    if wanted is not None:
+        path = Path(wanted)
+        return load_own(path) if path.is_file() and is_own(read_text(path)) else None
+    folder = case if case.is_dir() else case.parent
+    if not (folder / CASE_FILE).is_file():
+        return None
+    try:
+        named = case_table(folder).vehicle
+    except ValueError:
+        return None  # the strict reader of cases says what is wrong
+    path = folder / named
+    return load_own(path) if path.is_file() and is_own(read_text(path)) else None
+

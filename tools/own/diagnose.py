@@ -1,0 +1,207 @@
+"""The diagnosis of a user's vehicle: the posterior of a case's runs as an answer (docs/GAP.md, Answers)."""
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from glider.tools.data.files import write_files
+from glider.tools.data.plain import as_plain
+from glider.tools.own.effects import PUSH, ModelPoint
+from glider.tools.own.identified import toml_text
+from glider.tools.own.load import LoadedVehicle
+from glider.tools.own.observer import Observer, observer_of
+from glider.tools.own.posterior import NONE, UNKNOWN, Engine, Healthy, Hypothesis, Posterior, effect_point, healthy_of
+from glider.tools.own.runs import OwnRun
+
+ANSWER, CORRECTED = "diagnosis.json", "corrected.toml"
+NINETY = 1.645
+GROUP_MASS, MOST_GROUP = 0.9, 3  # of the probability of causes that a group holds; labels in it that are still an answer
+SELECTED = 0.9  # probability that an effect of this label, or of its group, is there
+LEAST_PROBABILITY = 0.005
+KIND = "own"
+
+
+def diagnose_own(
+    vehicle: LoadedVehicle, runs: Sequence[OwnRun], say: Callable[[str], None] = lambda text: None
+) -> tuple[Posterior, Observer]:
+    """Posterior of what the runs of a case have, beside what the vehicle file allows for."""
+    observer = observer_of(vehicle, list(runs))
+    for note in observer.notes:
+        say(note)
+    return Engine(observer, healthy_of(observer), say).run(), observer
+
+
+def group_of(found: Posterior) -> list[str]:
+    """The smallest set of labels that holds most of the probability of the causes, most probable first."""
+    known = sorted(((p, label) for label, p in found.chances.items() if label not in (NONE, UNKNOWN)), reverse=True)
+    total, group = sum(p for p, _ in known), list[str]()
+    for p, label in known:
+        if total <= 0.0 or sum(found.chances[one] for one in group) >= GROUP_MASS * total:
+            break
+        group.append(label)
+    return group
+
+
+def verdict_of(chances: dict[str, float]) -> str:
+    """none, unknown or cause, whichever is most probable."""
+    cause = sum(p for label, p in chances.items() if label not in (NONE, UNKNOWN))
+    return max((chances[NONE], NONE), (chances[UNKNOWN], UNKNOWN), (cause, "cause"))[1]
+
+
+def plain(vehicle: LoadedVehicle, observer: Observer, found: Posterior, case: str) -> dict[str, Any]:
+    """diagnosis.json."""
+    healthy, best = found.healthy, found.best
+    effects = {one.label: one for one in healthy.effects}
+    verdict, group = verdict_of(found.chances), group_of(found)
+    chosen = _of_verdict(found, verdict)
+    sizes = _sizes(found, effects)
+    selected = [label for label in chosen.labels if effects[label].family != PUSH and _selected(found, label, group)]
+    if verdict == NONE:
+        selected = []
+    causes = [
+        {"label": label, "probability": p, "group": group if group[:1] == [label] else [label],
+         "parameters": {label: sizes[label]} if label in sizes else {}}
+        for label, p in sorted(found.chances.items(), key=lambda one: -one[1])
+        if p >= LEAST_PROBABILITY or label in (NONE, UNKNOWN)
+    ]  # fmt: skip
+    gap, corrected = _gaps(observer, healthy, chosen, selected, found)
+    where: dict[tuple[str, str], float] = {}
+    for label, p in found.chances.items():
+        if label in effects:
+            where[effects[label].where] = where.get(effects[label].where, 0.0) + p
+    cautions = list(observer.notes)
+    if vehicle.file.identified is None:
+        cautions.append("the vehicle file is not identified: `glider identify` on healthy runs says what it leaves of them")
+    if len(group) > MOST_GROUP and verdict == "cause":
+        cautions.append(f"{len(group)} labels explain these runs alike: {', '.join(group)}")
+    if not vehicle.kernels.compiled:
+        cautions.append(f"the model runs as plain Python, some hundred times slower: {vehicle.kernels.why}")
+    return {
+        "format": 1, "kind": KIND, "case": {"name": case, "vehicle": vehicle.name, "runs": len(observer.runs)},
+        "verdict": verdict,
+        "where": [{"subsystem": s, "element": e, "probability": p}
+                  for (s, e), p in sorted(where.items(), key=lambda one: -one[1]) if p >= LEAST_PROBABILITY],
+        "causes": causes, "selected": selected, "gap": gap, "next_run": {}, "readings": [], "stages": [],
+        "cautions": cautions, "horizon_s": observer.horizon,
+        "hypotheses": [
+            {"labels": list(one.labels), "log_evidence": one.evidence - best.evidence, "probability": float(weight),
+             "left": float(np.sqrt(one.left.mean())), "strange": one.strange}
+            for weight, one in sorted(zip(found.weights, found.hypotheses, strict=True), key=lambda one: -one[0])
+            if weight >= LEAST_PROBABILITY
+        ],
+        "corrected": corrected,
+    }  # fmt: skip
+
+
+def _of_verdict(found: Posterior, verdict: str) -> Hypothesis:
+    """The most probable hypothesis that the verdict speaks of."""
+    if verdict == NONE:
+        return next(one for one in found.hypotheses if not one.labels)
+    return found.best
+
+
+def _selected(found: Posterior, label: str, group: Sequence[str]) -> bool:
+    """Whether the label, or one that is as good, is in nearly every probable hypothesis."""
+    alike = [label, *(group if label in group else [])]
+    return float(sum(w for w, one in zip(found.weights, found.hypotheses, strict=True) if set(alike) & set(one.labels))) >= SELECTED
+
+
+def _sizes(found: Posterior, effects) -> dict[str, dict[str, Any]]:
+    """Each label's size with its 90 % interval, by the most probable hypothesis that has it."""
+    sizes: dict[str, dict[str, Any]] = {}
+    for one in sorted(found.hypotheses, key=lambda one: -one.evidence):
+        for label, size, sd in zip(one.labels, one.sizes, one.sd, strict=True):
+            if label not in sizes:
+                effect = effects[label]
+                ends = [float((size + side * NINETY * sd) * effect.spread) for side in (-1.0, 1.0)]
+                sizes[label] = {"estimate": float(size * effect.spread), "ci90": ends, "unit": effect.unit}
+    return sizes
+
+
+def _gaps(observer: Observer, healthy: Healthy, chosen: Hypothesis, selected: Sequence[str], found: Posterior):
+    """Gaps of the case's runs before, recalibrated, after and floor; the corrected vehicle's numbers."""
+    names = [one.name for one in observer.declared.outputs]
+    nothing = next(one for one in found.hypotheses if not one.labels)
+    size = dict(zip(chosen.labels, chosen.sizes, strict=True))
+    changed = effect_point(observer, healthy, selected, np.array([size[label] for label in selected]))
+    recalibrated = effect_point(observer, healthy, [one.label for one in healthy.effects], nothing.shared)
+    tables = {}
+    for name, point in (("before", observer.point), ("recalibrated", recalibrated), ("after", changed)):
+        tables[name] = np.array([observer.gaps(n, point, observer.horizon) for n in range(len(observer.runs))])
+    runs = {name: np.sqrt(np.nanmean(one**2, axis=1)) for name, one in tables.items()}
+    floor = healthy.scales
+
+    def row(table: np.ndarray) -> dict[str, float | None]:
+        by = [float(np.sqrt(np.nanmean(column**2))) if np.isfinite(column).any() else None for column in table.T]
+        return {**dict(zip(names, by, strict=True)), "total": float(np.sqrt(np.nanmean(table**2)))}
+
+    gap: dict[str, Any] = {name: row(table) for name, table in tables.items()}
+    gap["floor"] = {**dict(zip(names, map(float, floor), strict=True)), "total": float(np.sqrt(np.mean(floor**2)))}
+    before, after, low = gap["before"]["total"], gap["after"]["total"], gap["floor"]["total"]
+    gap["shrinkage"] = {"value": 1.0 - after / before if selected else None, "ci90": _interval(runs, None)}
+    gap["closed"] = {"value": (before - after) / (before - low) if selected and before > low else None,
+                     "ci90": _interval(runs, low)}  # fmt: skip
+    return gap, _numbers(observer, changed)
+
+
+def _interval(runs: dict[str, np.ndarray], floor: float | None) -> list[float | None]:
+    """90 % of a shrinkage over runs, from its scatter; None for a single run."""
+    before, after = runs["before"], runs["after"]
+    if len(before) < 2:
+        return [None, None]
+    below = before - (0.0 if floor is None else floor)
+    values = (before - after) / np.where(np.abs(below) > 1e-9, below, np.nan)
+    mean, error = float(np.nanmean(values)), float(np.nanstd(values, ddof=1) / np.sqrt(len(values)))
+    return [mean - NINETY * error, mean + NINETY * error]
+
+
+def _numbers(observer: Observer, point: ModelPoint) -> dict[str, Any]:
+    """The corrected vehicle as numbers: parameters, what sensors read wrongly, what inputs do wrongly."""
+    declared, base = observer.declared, observer.point
+    theta = {one.name: float(value) for one, value in zip(declared.parameters, point.theta, strict=True)}
+    rows = ("gain", "bias", "drift", "lag", "delay")
+    sensors = {
+        one.name: {name: float(point.reading[k, n]) for k, name in enumerate(rows) if point.reading[k, n] != base.reading[k, n]}
+        for n, one in enumerate(declared.outputs)
+    }
+    inputs = {declared.inputs[n].name: wrong for n, wrong in point.driven.items()}
+    return {"parameters": theta, "sensors": {name: one for name, one in sensors.items() if one}, "inputs": inputs}
+
+
+def write(vehicle: LoadedVehicle, observer: Observer, found: Posterior, case: str, out: Path) -> dict[str, Any]:
+    """diagnosis.json and corrected.toml into a folder; the answer."""
+    import tomllib
+
+    answer = plain(vehicle, observer, found, case)
+    given = tomllib.loads(vehicle.text)
+    for name, value in answer["corrected"]["parameters"].items():
+        given.setdefault("parameters", {}).setdefault(name, {})["value"] = value
+    wrong = {"sensors": answer["corrected"]["sensors"], "inputs": answer["corrected"]["inputs"]}
+    given["corrections"] = {kind: one for kind, one in wrong.items() if one}
+    files = {out / ANSWER: (json.dumps(as_plain(answer), indent=1) + "\n").encode("utf-8")}
+    source = vehicle.source
+    if source is not None and (out / source.name).resolve() != source.resolve():
+        files[out / source.name] = source.read_bytes()
+    if not given["corrections"]:
+        del given["corrections"]
+    files[out / CORRECTED] = toml_text(given).encode("utf-8")
+    out.mkdir(parents=True, exist_ok=True)
+    write_files(files)
+    return answer
+
+
+def sentence(answer: dict[str, Any]) -> str:
+    """The verdict in one sentence: label, size with its interval, what is as good."""
+    if answer["verdict"] == NONE:
+        return "nothing beyond what healthy runs leave"
+    if answer["verdict"] == UNKNOWN:
+        return f"more is left than healthy runs leave, and no label explains it ({answer['gap']['before']['total']:.2f} tolerances)"
+    cause = next(one for one in answer["causes"] if one["label"] not in (NONE, UNKNOWN))
+    size = cause["parameters"].get(cause["label"])
+    told = "" if size is None else f" {size['estimate']:+.3g} {size['unit']} (90 %: {size['ci90'][0]:.3g} to {size['ci90'][1]:.3g})"
+    others = [label for label in cause["group"] if label != cause["label"]]
+    alike = f"; these runs do not tell it from {', '.join(others)}" if others else ""
+    return f"{cause['label']}{told}, probability {cause['probability']:.2f}{alike}"

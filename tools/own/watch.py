@@ -1,0 +1,312 @@
+"""What changed over the runs of a user's vehicle: labels over spans of runs, beside what all runs share.
+
+The model is that of hierarchy.py with effects over spans: x_n = s + d_n + sum of c over the spans that n lies in. What
+is shared is learned from the runs of the reference (or the first runs) and the vehicle file. Events are added one by
+one, the most evident first, each relinearised in the runs of its span, until the next is not probable.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from scipy.special import logsumexp
+from scipy.stats import norm
+
+from glider.tools.own.effects import PUSH
+from glider.tools.own.hierarchy import Expansion, Pooled, learn_scatter, marginalised, run_values
+from glider.tools.own.load import LoadedVehicle
+from glider.tools.own.observer import Observer, observer_of
+from glider.tools.own.posterior import (
+    LEAST_REACH,
+    LONGEST_MOVE,
+    LONGEST_REACH,
+    MATERIAL,
+    PUSH_ODDS,
+    SIZES,
+    STRONG_LEFT,
+    UNKNOWN,
+    Engine,
+    Healthy,
+    Hypothesis,
+    healthy_of,
+)
+from glider.tools.own.runs import OwnRun
+
+LEARNED = 4  # first runs, from which a watch without a reference learns
+CHANGE = 0.3  # prior probability that anything changed over the runs
+TO_THE_END = 0.5  # of spans: that a change is still there in the last run
+MOST_EVENTS = 4
+REFITTED, SPANS = 5, 2  # labels, of the best spans, whose parabolas are taken where they lead to
+CERTAIN = 0.5  # probability from which an event is one
+NINETY = 1.645
+GROUP = 0.1  # of a label's probability: others of at least so much share its group
+ROUNDS = 3
+
+
+@dataclass
+class Event:
+    """A change: its labels by probability, the runs it is in, its size."""
+
+    chances: dict[str, float]
+    first: int
+    end: int
+    label: str
+    size: float  # spreads
+    sd: float
+    probability: float
+
+    @property
+    def span(self) -> slice:
+        return slice(self.first, self.end)
+
+
+@dataclass
+class Watched:
+    """The answer of a watch."""
+
+    names: list[str]
+    learned: int
+    events: list[Event]
+    healthy: Healthy
+    gaps: np.ndarray  # (runs,) tolerances
+    strange: np.ndarray  # (runs,) probability that a run has more left than healthy ones and its events say
+    cautions: list[str] = field(default_factory=list)
+
+    def plain(self) -> dict[str, Any]:
+        """The JSON of docs/GAP.md, What changed."""
+        effects = {one.label: one for one in self.healthy.effects}
+        runs, events = [], []
+        for one in self.events:
+            events.append(self._event(one, effects))
+        for n, name in enumerate(self.names):
+            own = [event for one, event in zip(self.events, events, strict=True) if one.first <= n < one.end]
+            causes = [{key: event[key] for key in ("label", "probability", "group", "size", "ci90", "unit")}
+                      for event in own if event["label"]]  # fmt: skip
+            unknown = self.strange[n] > CERTAIN or any(event["label"] is None for event in own)
+            verdict = "cause" if causes else (UNKNOWN if unknown else "none")
+            runs.append(
+                {"run": name, "verdict": verdict, "causes": causes, "gap": float(self.gaps[n]), "skipped": None}
+            )
+        return {"format": 1, "runs": runs, "events": events, "cautions": self.cautions}
+
+    def _event(self, one: Event, effects) -> dict[str, Any]:
+        effect = effects[one.label]
+        known = effect.family != PUSH
+        low, high = ((one.size + side * NINETY * one.sd) * effect.spread for side in (-1.0, 1.0))
+        top = max(one.chances.values())
+        group = [label for label, p in sorted(one.chances.items(), key=lambda item: -item[1])
+                 if p > GROUP * top and effects[label].family != PUSH]  # fmt: skip
+        places: dict[tuple[str, str], float] = {}
+        for label, p in one.chances.items():
+            where = effects[label].where
+            places[where] = places.get(where, 0.0) + p
+        return {
+            "label": one.label if known else None, "group": group if known else [], "probability": one.probability,
+            "labels": {label: p for label, p in sorted(one.chances.items(), key=lambda item: -item[1]) if p > 0.005},
+            "where": [{"subsystem": s, "element": e, "probability": p}
+                      for (s, e), p in sorted(places.items(), key=lambda item: -item[1]) if p > 0.005],
+            "from_run": self.names[one.first], "to_run": None if one.end == len(self.names) else self.names[one.end - 1],
+            "size": one.size * effect.spread, "ci90": [low, high], "unit": effect.unit,
+        }  # fmt: skip
+
+
+class Watch(Engine):
+    """Events over the runs of one observer: the first `learned` are the reference's."""
+
+    def __init__(
+        self, observer: Observer, healthy: Healthy, learned: int, say: Callable[[str], None] = lambda text: None
+    ):
+        super().__init__(observer, healthy, say)
+        self.learned = learned
+
+    def prepare(self) -> None:
+        """Every run about where it lies, with what the reference says of all; how runs differ, learned from it too."""
+        every = np.arange(self.k)
+        own = np.zeros((self.count, self.k))
+        shared = np.zeros(self.k)
+        for round_ in range(ROUNDS):
+            self.found = self.expansions(own, every)
+            self.reach = np.sqrt(np.mean([one.reach for one in self.found], axis=0))
+            if self.learned > 2:
+                scatter = learn_scatter(self.found[: self.learned], self.healthy.V, self.healthy.scatter)
+                self.scatter = scatter
+            warm = [marginalised(one, self.scatter) for one in self.found[: self.learned]]
+            H, r = sum(one.curvature for one in warm), -sum(one.offset for one in warm)
+            M = np.linalg.solve(np.eye(self.k) + self.healthy.V @ H, self.healthy.V)
+            shared = M @ r
+            if round_ < ROUNDS - 1:
+                own = np.array([shared if n >= self.learned else run_values(one, shared, self.scatter)
+                                for n, one in enumerate(self.found)])  # fmt: skip
+        self.shared, self.M = shared, 0.5 * (M + M.T)
+        self.runs = [marginalised(one, self.scatter) for one in self.found]
+        self.events: list[Event] = []
+
+    def at_run(self, n: int, skip: Event | None = None) -> np.ndarray:
+        """Values (k,) that run n is thought to have: shared and its events'."""
+        x = self.shared.copy()
+        for one in self.events:
+            if one is not skip and one.first <= n < one.end:
+                x[self.healthy.at([one.label])[0]] += one.size
+        return x
+
+    def scored(self, spans: Sequence[tuple[int, int]], only: Sequence[int] | None = None) -> np.ndarray:
+        """Log evidence (spans, labels) of every label over every span, sizes over the grid; -inf for those not asked."""
+        slopes = np.array([-(one.slope + one.curvature @ (self.at_run(n) - one.at)) for n, one in enumerate(self.runs)])
+        curvatures = np.array([one.curvature for one in self.runs])
+        r_up, H_up = (
+            np.concatenate([0.0 * slopes[:1], slopes.cumsum(axis=0)]),
+            np.concatenate([0.0 * curvatures[:1], curvatures.cumsum(axis=0)]),
+        )
+        labels = np.arange(self.k) if only is None else np.array(only)
+        found = np.full((len(spans), self.k), -np.inf)
+        usable = labels[self.reach[labels] > LEAST_REACH]
+        tau2 = (SIZES[:, None] / self.reach[usable]) ** 2
+        sided = np.array([self.healthy.effects[k].one_sided for k in usable])
+        odds = np.array([np.log(PUSH_ODDS) if self.healthy.effects[k].family == PUSH else 0.0 for k in usable])
+        for row, (first, end) in enumerate(spans):
+            H, r = H_up[end] - H_up[first], r_up[end] - r_up[first]
+            # shared values are known to M from the reference; the span's runs see them with the change
+            inner = np.linalg.solve(np.eye(self.k) + self.M @ H, self.M)
+            precision = np.maximum(np.diag(H - H @ inner @ H)[usable], 0.0)
+            slope = (r - H @ (inner @ r))[usable]
+            total = 1.0 + tau2 * precision
+            gain = 0.5 * slope**2 * tau2 / total - 0.5 * np.log(total)
+            gain = gain + np.where(sided, np.log(2.0) + norm.logcdf(slope * np.sqrt(tau2 / total)), 0.0)
+            found[row, usable] = logsumexp(gain, axis=0) - np.log(len(SIZES)) + odds
+        return found
+
+    def span_prior(self, spans: Sequence[tuple[int, int]]) -> np.ndarray:
+        """Log prior probability of each span: half of them reach the last run."""
+        ends = np.array([end == self.count for _, end in spans])
+        last, others = max(1, int(ends.sum())), max(1, int((~ends).sum()))
+        return np.where(ends, np.log(TO_THE_END / last), np.log((1.0 - TO_THE_END) / others))
+
+    def search(self) -> None:
+        """Events, the most evident first."""
+        spans = [(a, b) for a in range(self.learned, self.count) for b in range(a + 1, self.count + 1)]
+        if not spans:
+            return
+        named = sum(one.family != PUSH for one in self.healthy.effects)
+        for _ in range(MOST_EVENTS):
+            scores = self.scored(spans) + self.span_prior(spans)[:, None] - np.log(named)
+            ranked = np.argsort(scores.max(axis=1))[::-1][:SPANS]
+            if scores.max() + np.log(CHANGE / (1.0 - CHANGE)) < 0.0:
+                break
+            refitted: list[tuple[float, Event]] = []
+            for row in ranked:
+                prior = float(self.span_prior(spans)[row]) - np.log(named)
+                starts = {int(k): 0.0 for k in np.argsort(scores[row])[::-1][:REFITTED]}
+                runs = range(*spans[row])
+                if np.sqrt(np.mean([self.left(n) for n in runs])) > STRONG_LEFT:
+                    starts |= dict(self.strong_sizes(runs)[:REFITTED])
+                refitted += [self.refit(spans[row], k, start, prior) for k, start in starts.items()]
+            best_score, best = max(refitted, key=lambda one: one[0])
+            odds = best_score + np.log(CHANGE / (1.0 - CHANGE))
+            same = [(score, one) for score, one in refitted if (one.first, one.end) == (best.first, best.end)]
+            total = logsumexp([score for score, _ in same])
+            best.probability = float(1.0 / (1.0 + np.exp(-np.clip(odds, -50.0, 50.0))))
+            best.chances = {one.label: best.probability * float(np.exp(score - total)) for score, one in same}
+            k = self.healthy.at([best.label])[0]
+            if best.probability < CERTAIN or abs(best.size) * self.reach[k] < MATERIAL:
+                break
+            self.say(
+                f"{best.label} from {self.observer.runs[best.first].name} to {self.observer.runs[best.end - 1].name}: "
+                f"{odds:.1f} nat"
+            )
+            self.take(best)
+
+    def left(self, n: int) -> float:
+        """Mean square that a run leaves about where it was expanded, in units of what healthy runs leave."""
+        return float(self.found[n].squares.sum() / max(1, self.found[n].samples.sum()))
+
+    def take(self, event: Event) -> None:
+        """An event into what is known: the runs of its span are expanded again where they are now."""
+        self.events.append(event)
+        for n in range(event.first, event.end):
+            self.found[n] = self.expansion_of(n, self.at_run(n), np.arange(self.k))
+            self.runs[n] = marginalised(self.found[n], self.scatter)
+
+    def evidence(self, runs: Sequence[Expansion], span: tuple[int, int], V: np.ndarray) -> Pooled:
+        """A span's runs, values counted from what they are thought to have."""
+        moved_runs = [replace(one, at=one.at - self.at_run(n)) for n, one in zip(range(*span), runs, strict=True)]
+        return Pooled.of(moved_runs, V)
+
+    def refit(self, span: tuple[int, int], k: int, start: float, prior: float) -> tuple[float, Event]:
+        """A label over a span, expanded where it leads to: log evidence over no change with its prior, and the event."""
+        nothing = self.evidence(self.runs[slice(*span)], span, self.M).log_evidence()
+        columns = np.unique(np.append(np.flatnonzero(self.active), k))
+        size, best = start, (-np.inf, start, 0.0)
+        odds = np.log(PUSH_ODDS) if self.healthy.effects[k].family == PUSH else 0.0
+        runs = self.runs[slice(*span)] if start == 0.0 else None
+        for _ in range(ROUNDS + 1):
+            if runs is not None:
+                pooled = self.evidence(runs, span, self.M)
+                table = []
+                for tau in SIZES / max(self.reach[k], LEAST_REACH):
+                    V = self.M.copy()
+                    V[k, k] += tau**2
+                    M = pooled.covariance(V)
+                    mean, sd = float((M @ pooled.r)[k]), float(np.sqrt(max(M[k, k], 1e-30)))
+                    halved = np.log(2.0) + norm.logcdf(mean / sd) if self.healthy.effects[k].one_sided else 0.0
+                    table.append((pooled.log_evidence(V) + halved, mean, sd))
+                score = float(logsumexp([one[0] for one in table]) - np.log(len(table)))
+                _, mean, sd = max(table)
+                mean = float(np.clip(mean, self.low[k], self.high[k]))
+                if runs is not self.runs and score > best[0]:
+                    best = score, mean, sd
+                settled = abs(mean - size) < 0.1 * sd
+                room = max(LONGEST_MOVE, LONGEST_REACH / max(self.reach[k], LEAST_REACH))
+                size += float(np.clip(mean - size, -room, room))
+                if settled and np.isfinite(best[0]):
+                    break
+            runs = []
+            for n in range(*span):
+                x = self.at_run(n)
+                x[k] = np.clip(x[k] + size, self.low[k], self.high[k])
+                runs.append(marginalised(self.expansion_of(n, x, columns), self.scatter))
+        score, mean, sd = best
+        return score - nothing + prior + odds, Event({}, *span, self.healthy.effects[k].label, mean, sd, 0.0)
+
+    def judge(self) -> np.ndarray:
+        """Probability of each run to have more left than healthy ones and its events say."""
+        found = np.zeros(self.count)
+        nothing = Hypothesis((), 0.0, np.zeros(0), np.zeros(0), self.shared, np.zeros((1, self.k)), np.ones(1))
+        for n in range(self.learned, self.count):
+            x = run_values(self.found[n], self.at_run(n), self.scatter)
+            one = self.expansion_of(n, x, np.flatnonzero(self.active))
+            left = np.array([one.squares.sum() / max(1, one.samples.sum())])
+            named = tuple(event.label for event in self.events if event.first <= n < event.end)
+            found[n] = self.strangeness(
+                replace(nothing, labels=named, left=left), replace(nothing, left=np.array([self.left(n)]))
+            )
+        return found
+
+
+def watch(
+    vehicle: LoadedVehicle, runs: Sequence[OwnRun], reference: Sequence[OwnRun] = (),
+    say: Callable[[str], None] = lambda text: None,
+) -> Watched:  # fmt: skip
+    """What changed over runs in their order; reference: healthy runs before them, else the first are."""
+    cautions = []
+    learned = len(reference) if reference else min(LEARNED, max(1, len(runs) - 1))
+    if not reference:
+        cautions.append(f"the first {learned} runs are taken for healthy: --reference names others")
+    observer = observer_of(vehicle, [*reference, *runs])
+    healthy = healthy_of(observer)
+    if vehicle.file.identified is None:
+        cautions.append("the vehicle file is not identified: how runs differ though nothing changed is assumed")
+    engine = Watch(observer, healthy, learned, say)
+    engine.prepare()
+    engine.search()
+    strange = engine.judge()
+    gaps = np.array(
+        [
+            np.sqrt(np.nanmean(observer.gaps(n, observer.point, observer.horizon) ** 2))
+            for n in range(len(observer.runs))
+        ]
+    )
+    drop = len(reference)
+    events = [replace(one, first=one.first - drop, end=one.end - drop) for one in engine.events]
+    names = [run.name for run in observer.runs[drop:]]
+    return Watched(names, learned - drop, events, healthy, gaps[drop:], strange[drop:], cautions)
