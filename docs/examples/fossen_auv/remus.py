@@ -10,7 +10,7 @@ WEIGHT, CG_Z = 588.0, 0.02  # N; m below the centre of buoyancy
 MASS = np.array([64.0, 115.0, 115.0, 1.2, 27.0, 27.0])  # with added mass: kg, kg m2
 LINEAR = np.array([2.0, 20.0, 20.0, 1.5, 8.0, 8.0])  # damping: N s/m, N m s
 QUADRATIC = np.array([0.0, 150.0, 150.0, 0.5, 60.0, 60.0])  # surge: a parameter
-BODY_LIFT, FIN_MOMENT, FIN_DAMPING = 60.0, 55.0, 30.0  # of hull and tail fins, each times speed: kg/m, kg, kg m
+BODY_LIFT, FIN_MOMENT, FIN_DAMPING = 60.0, 55.0, 12.0  # of hull and tail fins, each times speed: kg/m, kg, kg m
 ELEVATOR = 25.0  # N a (m/s)2 and radian
 ELEVATOR_X = -0.9  # m
 

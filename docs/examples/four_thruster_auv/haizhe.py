@@ -16,7 +16,7 @@ import numpy as np
 G = 9.81
 THRUST, SPEED = 4.0, 198.0 * 11.85  # N of each motor at a command of (us above 1000) times V: assumed
 ZERO, OFF, STARTS = 1000.0, 1140.0, 10.0  # us: no speed; the motors stand still below, +- half a width
-RIGHTING, METACENTRE = 0.8, 0.02  # N m/rad, m: assumed
+RIGHTING, METACENTRE = 0.4, 0.01  # N m/rad, m: assumed
 ARM, TORQUE, YAW_INERTIA = 0.15, 0.01, 0.05  # m, N m a N of thrust, kg m2: assumed
 BOTTOM, STIFFNESS, SOFT = 0.85, 100.0, 0.02  # m, N/m, m
 
@@ -49,8 +49,8 @@ parameters = {
     "wake_time": {"unit": "s", "value": 1.5, "uncertainty": 0.6, "low": 0.4},
     "tilt_time": {"unit": "s", "value": 0.3, "uncertainty": 0.1, "low": 0.06},
     "turn_time": {"unit": "s", "value": 0.6, "uncertainty": 0.2, "low": 0.1},
-    "cg_x": {"unit": "m", "value": 0.0, "uncertainty": 0.001},
-    "cg_y": {"unit": "m", "value": 0.0016, "uncertainty": 0.001},
+    "cg_x": {"unit": "m", "value": 0.0, "uncertainty": 0.0005},
+    "cg_y": {"unit": "m", "value": 0.0008, "uncertainty": 0.0005},
     "roll_start": {"unit": "rad", "value": 0.0, "uncertainty": 0.1},
     "roll_inflow": {"unit": "rad", "value": 0.0, "uncertainty": 0.1},
     "roll_wake": {"unit": "rad", "value": 0.0, "uncertainty": 0.1},
