@@ -20,7 +20,8 @@ def vehicle() -> None:
 @vehicle.command()
 @click.argument("out", type=click.Path(path_type=Path, dir_okay=False))
 @click.option("--name", help="Of the vehicle.  [default: the file's]")
-def new(out: Path, name: str | None) -> None:
+@click.option("--own", "of_own", is_flag=True, help="A commented skeleton of a model of your own: OUT and a .py beside it.")
+def new(out: Path, name: str | None, of_own: bool) -> None:
     """Ask for weighed masses, measured lengths and a swing test, one by one, and write a first vehicle file OUT.
 
     An empty answer takes the number in brackets and calls it assumed; < goes back. Answers may come from a pipe, a line
@@ -34,6 +35,11 @@ def new(out: Path, name: str | None) -> None:
     if out.exists():
         raise InputError("is there already: name another file", source=out)
     check_writable(out.parent)
+    if of_own:
+        from glider.tools.own.skeleton import write_skeleton
+
+        say(f"{write_skeleton(out)} and {out}: write your model there, then `glider vehicle check {out}`")
+        return
     found = interview(sys.stdin, sys.stdin.isatty())
     write_bytes(out, found.text(name or out.stem).encode("utf-8"))
     say(f"{out}: fly it (`glider fly --vehicle {out}`), then `glider identify` on the logs")
@@ -93,6 +99,26 @@ def _take(found: "FirstVehicle", asked: "Question", said: str) -> str | None:
     if wrong is None:
         found.answers[asked.key] = value
     return wrong
+
+
+@vehicle.command()
+@click.argument("file", type=click.Path(path_type=Path, dir_okay=False))
+@click.option("--case", type=click.Path(path_type=Path, file_okay=False), help="Try it on the first run of this case too.")
+@json_option
+def check(file: Path, case: Path | None, as_json: bool) -> None:
+    """Try a model of one's own: FILE names it. What it declares, what can be asked of it, which causes it can have.
+
+    Its functions are called: shapes, numbers, the same twice, smooth in the parameters. Exit code 2: one line says what
+    is wrong and where.
+    """
+    from glider.tools.own.report_check import describe
+
+    found = describe(file, case)
+    if as_json:
+        print_json(found)
+        return
+    for line in found["lines"]:
+        click.echo(line)
 
 
 @vehicle.command()

@@ -21,6 +21,11 @@ from typing import Any, TypeVar
 VECTOR, ANGLE, QUATERNION = "vector", "angle", "quaternion"
 VEHICLE, RUN = "vehicle", "run"
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
+NOT_SI = {
+    "deg": "rad", "degree": "rad", "degrees": "rad", "deg/s": "rad/s", "rpm": "rad/s", "cm": "m", "mm": "m", "km": "m",
+    "ft": "m", "cm/s": "m/s", "mm/s": "m/s", "kn": "m/s", "g": "kg", "ms": "s", "min": "s", "h": "s", "bar": "Pa",
+    "dbar": "Pa", "mbar": "Pa", "hPa": "Pa", "kPa": "Pa", "gf": "N", "kgf": "N", "mV": "V", "mA": "A", "L": "m3",
+}  # fmt: skip
 # unit: tolerance of an output, standard deviation of a state at the start
 USUAL_TOLERANCE = {"m": 0.1, "rad": 0.0349, "rad/s": 0.0349, "m/s": 0.05, "m/s2": 0.1}
 USUAL_START = {"m": 0.1, "rad": 0.1, "rad/s": 0.1, "m/s": 0.2}
@@ -150,6 +155,8 @@ def _entries(given: Any, kind: type[Entry], what: str) -> tuple[Entry, ...]:
             raise DeclarationError(f"{where}: a name is letters, digits and _, got {made.name!r}")
         if not isinstance(made.unit, str):
             raise DeclarationError(f"{where} ({made.name}): the unit is a text, got {made.unit!r}")
+        if made.unit in NOT_SI:
+            raise DeclarationError(f"{where} ({made.name}): units are SI: {NOT_SI[made.unit]}, not {made.unit}")
         if made.name in (other.name for other in found):
             raise DeclarationError(f"{where}: {made.name} stands twice")
         found.append(made)

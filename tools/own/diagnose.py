@@ -132,7 +132,7 @@ def _gaps(observer: Observer, healthy: Healthy, chosen: Hypothesis, selected: Se
     for name, point in (("before", observer.point), ("recalibrated", recalibrated), ("after", changed)):
         tables[name] = np.array([observer.gaps(n, point, observer.horizon) for n in range(len(observer.runs))])
     runs = {name: np.sqrt(np.nanmean(one**2, axis=1)) for name, one in tables.items()}
-    floor = healthy.scales
+    floor = healthy.errors.scales
 
     def row(table: np.ndarray) -> dict[str, float | None]:
         by = [float(np.sqrt(np.nanmean(column**2))) if np.isfinite(column).any() else None for column in table.T]

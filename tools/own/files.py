@@ -71,7 +71,8 @@ class IdentifiedTable(Table):
     parameters: list[str]
     covariance: list[list[float]]  # of `parameters`, in their units
     sessions: Annotated[int, msgspec.Meta(ge=1)] = 1
-    inflation: Annotated[float, msgspec.Meta(ge=1.0)] = 1.0
+    inflation: Annotated[float, msgspec.Meta(ge=1.0)] = 1.0  # of all channels together
+    channel_inflation: dict[str, Annotated[float, msgspec.Meta(ge=1.0)]] = msgspec.field(default_factory=dict)
     scatter: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # of every label from run to run, in its unit
     level_scatter: NonNegative = 0.5  # 1 sigma from run to run of the logarithm of the mean square left
     gap: dict[str, float] = msgspec.field(default_factory=dict)  # of healthy runs left out, by channel, tolerances

@@ -15,11 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from glider.tools.own.effects import Effect, moved
-from glider.tools.own.observer import Filtered, Observer
+from glider.tools.own.observer import Observer
 
 STEP, LONG_STEP, SHORTENED = 0.1, 3.0, 0.5  # spreads; rms errors that a step may move, and to what it is shortened
 UNSEEN_STEP = 1.0  # spreads: step of an effect that begins at a kink
-BLOCK_SECONDS, BLOCKS = 10.0, 4  # over which errors may have something in common; in a window, at least
 SCATTER_PRIOR_RUNS, LEAST_VARIANCE = 1.0, 1e-12
 ITERATIONS, CONVERGED = 200, 1e-3
 
@@ -34,7 +33,8 @@ class Expansion:
     curvature: np.ndarray  # (k, k)
     squares: np.ndarray  # (y,) by channel
     samples: np.ndarray  # (y,)
-    blocks: np.ndarray  # (k,) sum over blocks of (J e)^2: against the curvature's diagonal, the inflation
+    blocks: np.ndarray  # (y + 1, k) sums over blocks of (J e)^2, by channel, and of all together
+    diagonal: np.ndarray  # (y + 1, k) what they would be, were errors independent
     reach: np.ndarray  # (k,) mean square that a spread moves the channels, tolerances
 
     def tempered(self, eta: float) -> "Expansion":
@@ -51,16 +51,25 @@ class Expansion:
         return float(self.value - 2.0 * self.slope @ self.at + self.at @ self.curvature @ self.at)
 
 
-def expand(
-    observer: Observer, n: int, effects: Sequence[Effect], at: np.ndarray, scales: np.ndarray, horizon: float,
-    by: Filtered | None = None,
-) -> Expansion:  # fmt: skip
-    """Run n about the model at `at` (effects,) spreads: windows' errors in units of what healthy runs leave, scales (y,).
+@dataclass(frozen=True)
+class ChannelErrors:
+    """What healthy runs leave of each channel: rms in tolerances, and how far successive errors are the same."""
 
-    by: a filter whose gains find where windows begin; of that model, if none is given.
-    """
-    base, declared = observer.point, observer.declared
-    by = observer.filter(n, moved(declared, base, effects, at)) if by is None else by
+    scales: np.ndarray  # (y,)
+    inflation: np.ndarray  # (y,)
+
+    @property
+    def weight(self) -> np.ndarray:
+        """Variance (y,) in squared tolerances that an error counts against."""
+        return self.scales**2 * self.inflation
+
+
+def expand(
+    observer: Observer, n: int, effects: Sequence[Effect], at: np.ndarray, healthy: ChannelErrors, horizon: float
+) -> Expansion:
+    """Run n about the model at `at` (effects,) spreads: windows' errors in units of what healthy runs leave."""
+    base, declared, scales = observer.point, observer.declared, healthy.scales
+    by = observer.filter(n, moved(declared, base, effects, at))
     steps = np.array(
         [UNSEEN_STEP if one.one_sided and abs(x) < STEP else STEP for one, x in zip(effects, at, strict=True)]
     )
@@ -89,34 +98,32 @@ def expand(
         J[far] = (errors(far, shorter).reshape(len(far), -1) - e) / shorter[:, None]
     J[~np.isfinite(J).all(axis=1)] = 0.0
     seen = np.isfinite(observer.runs[n].outputs).any(axis=0)
-    reach = ((J.reshape(-1, *shape) * scales) ** 2).mean(axis=1)[:, seen].mean(axis=1)
+    J, e = J.reshape(-1, *shape), e.reshape(shape)
+    weight = 1.0 / healthy.inflation
+    weighted = (J * weight).reshape(len(J), -1)
+    flat = J.reshape(len(J), -1)
+    score = J * (weight * e)  # (k, rows, y)
+    starts, ends = observer.windows(n, horizon)
+    first = np.concatenate([[0], np.cumsum(ends - starts - 1)[:-1]])
+    by_window = np.add.reduceat(score, first, axis=1)  # (k, windows, y)
+    blocks = np.concatenate([(by_window**2).sum(axis=1).T, (by_window.sum(axis=2) ** 2).sum(axis=1)[None]])
+    diagonal = np.concatenate([(score**2).sum(axis=1).T, (score * J * e).sum(axis=(1, 2))[None]])
     return Expansion(
-        at.copy(), float(e @ e), J @ e, J @ J.T, (e.reshape(shape) ** 2).sum(axis=0),
-        np.where(seen, shape[0], 0), _blocks(observer, n, J, e, shape, horizon), reach,
+        at.copy(), float((weight * e * e).sum()), weighted @ e.ravel(), weighted @ flat.T, (e**2).sum(axis=0),
+        np.where(seen, shape[0], 0), blocks, diagonal, ((J * scales) ** 2).mean(axis=1)[:, seen].mean(axis=1),
     )  # fmt: skip
 
 
-def _blocks(
-    observer: Observer, n: int, J: np.ndarray, e: np.ndarray, shape: tuple[int, ...], horizon: float
-) -> np.ndarray:
-    """Sum over blocks of the squared score, by column.
-
-    A window has several: a run has values of its own, which bring the score of all its rows to nothing.
-    """
-    dt = max(float(np.median(np.diff(observer.runs[n].t))), 1e-6)
-    block = max(1, round(min(BLOCK_SECONDS, horizon / BLOCKS) / dt)) * shape[1]
-    count = -(-len(e) // block)
-    padded = np.zeros((len(J), count * block))
-    padded[:, : len(e)] = J * e
-    return (padded.reshape(len(J), count, block).sum(axis=2) ** 2).sum(axis=1)
-
-
-def inflation(found: Sequence[Expansion]) -> float:
-    """Variance inflation of runs: what blocks of the score vary by, over what independent errors would have."""
-    blocks = sum(one.blocks for one in found)
-    diagonal = sum(np.diag(one.curvature) for one in found)
-    seen = diagonal > 1e-9 * max(float(diagonal.max(initial=0.0)), 1e-300)
-    return float(max(1.0, np.median(blocks[seen] / diagonal[seen]))) if seen.any() else 1.0
+def inflation(found: Sequence[Expansion]) -> np.ndarray:
+    """Variance inflation (y + 1,) by channel, and of all together: what windows' scores vary by, over what independent
+    errors' would. Of all together beside the channels' own: what channels have in common."""
+    blocks, diagonal = sum(one.blocks for one in found), sum(one.diagonal for one in found)
+    out = np.ones(len(blocks))
+    for row in range(len(blocks)):
+        seen = diagonal[row] > 1e-9 * max(float(diagonal[row].max(initial=0.0)), 1e-300)
+        if seen.any():
+            out[row] = max(1.0, float(np.median(blocks[row, seen] / diagonal[row, seen])))
+    return out
 
 
 def marginalised(one: Expansion, scatter: np.ndarray) -> Expansion:

@@ -85,7 +85,10 @@ def tables(found: Identified) -> dict[str, Any]:
         "covariance": [[float(value) for value in row] for row in covariance], "inflation": found.eta,
         "level_scatter": found.level_scatter,
         "scatter": {name: float(value * spreads[name]) for name, value in scatter.items()},
-        "gap": {one.name: float(value) for one, value in zip(declared.outputs, found.scales, strict=True)},
+        "gap": {one.name: float(value) for one, value in zip(declared.outputs, found.errors.scales, strict=True)},
+        "channel_inflation": {
+            one.name: float(value) for one, value in zip(declared.outputs, found.errors.inflation, strict=True)
+        },
         "software": software(),
     }  # fmt: skip
     return given

@@ -7,7 +7,7 @@ import numpy as np
 
 from glider.tools.own.declare import RUN, Declaration
 from glider.tools.own.effects import PARAMETER, Effect, moved, standard_effects
-from glider.tools.own.hierarchy import Expansion, Pooled, expand, inflation, learn_scatter, marginalised, run_values
+from glider.tools.own.hierarchy import ChannelErrors, Expansion, Pooled, expand, inflation, learn_scatter, marginalised, run_values
 from glider.tools.own.load import LoadedVehicle
 from glider.tools.own.observer import Observer, observer_of
 from glider.tools.own.runs import OwnRun
@@ -17,6 +17,7 @@ FILE_PRIOR = 2.0  # times the file's uncertainties: what the shared values may b
 USUAL_SCATTER, USUAL_OWN_SCATTER = 0.02, 0.5  # spreads, from run to run; of what is declared a number of each run
 LONGEST_MOVE = 2.0  # spreads a round
 CONVERGED_GAIN = 0.5  # of -2 log posterior: no further round
+SETTLED = 0.05  # e-folds of what is left, by which it changes no more
 LEAST_SCALE = 0.02  # tolerances: less than that no channel is known to be left with
 LEVEL_ROWS, PLAIN_ROWS = 3_000, 600  # of runs from which noise levels are found: compiled, plain Python
 LEVEL_STEPS = (0.8, 0.4)  # e-folds
@@ -35,7 +36,7 @@ class Identified:
     effects: list[Effect]
     scatter: np.ndarray  # (effects,) spreads, from run to run
     eta: float
-    scales: np.ndarray  # (outputs,) what healthy runs leave, tolerances
+    errors: ChannelErrors  # what healthy runs leave
     run_values: np.ndarray  # (runs, nuisance)
     before: np.ndarray  # (runs, outputs) gaps of the file's model, tolerances
     after: np.ndarray  # the same of a model of the other runs
@@ -83,35 +84,36 @@ def identify(
     say(f"{count} runs, {k} numbers; the file's model misses them by {_total(before):.2f} tolerances")
     fit_levels(observer, say)
     scales = np.maximum(np.sqrt(np.nanmean(before**2, axis=0)), LEAST_SCALE)
-    scales[~np.isfinite(scales)] = 1.0
+    errors, eta = ChannelErrors(np.where(np.isfinite(scales), scales, 1.0), np.ones(len(scales))), 1.0
     for round_ in range(ROUNDS):
-        found = [expand(observer, n, nuisance, own[n], scales, horizon) for n in range(count)]
-        rescaled = np.maximum(
-            scales * np.sqrt(sum(one.squares for one in found) / np.maximum(sum(one.samples for one in found), 1)),
-            LEAST_SCALE,
-        )
-        if round_ and np.abs(np.log(rescaled / scales)).max() > 0.05:
-            scales = np.exp(0.5 * (np.log(rescaled) + np.log(scales))) if round_ < 3 else rescaled
-            found = [expand(observer, n, nuisance, own[n], scales, horizon) for n in range(count)]
-        eta = inflation(found)
+        found = [expand(observer, n, nuisance, own[n], errors, horizon) for n in range(count)]
+        *_, eta = inflation(found)
         warm = [one.tempered(eta) for one in found]
         if round_ >= 2 and count > 2:
             scatter = learn_scatter(warm, V, usual)
-        search = _Search(observer, nuisance, warm, scatter, eta, V, limits, scales, horizon)
+        search = _Search(observer, nuisance, warm, scatter, eta, V, limits, errors, horizon)
         step = Pooled.of([marginalised(one, scatter) for one in warm], V).mean() - values
         values, own, gain = search.along(values, own, np.clip(step, -LONGEST_MOVE, LONGEST_MOVE))
-        left = float(np.sqrt(np.mean(scales**2)))
-        say(f"round {round_ + 1}: gain {gain:.1f}, {left:.2f} tolerances left, inflation {eta:.0f}")
-        if round_ >= 3 and gain < CONVERGED_GAIN:
+        settled, errors = errors, left_by(found, errors)
+        said = f"round {round_ + 1}: gain {gain:.1f}, {np.sqrt(np.mean(errors.scales**2)):.2f} tolerances left"
+        say(f"{said}, inflation {', '.join(f'{one:.0f}' for one in errors.inflation)} and {eta:.1f}")
+        if round_ >= 3 and gain < CONVERGED_GAIN and np.abs(np.log(errors.scales / settled.scales)).max() < SETTLED:
             break
-    found = [expand(observer, n, nuisance, own[n], scales, horizon) for n in range(count)]
-    eta = inflation(found)
+    found = [expand(observer, n, nuisance, own[n], errors, horizon) for n in range(count)]
+    *_, eta = inflation(found)
     warm = [marginalised(one.tempered(eta), scatter) for one in found]
     covariance = Pooled.of(warm, V).covariance()
     after = _held_out(observer, nuisance, warm, V, limits)
-    effects, every = _scatter_of_all(observer, nuisance, values, own, eta, scales)
-    return Identified(vehicle, observer, nuisance, values, covariance, effects, every, eta, scales, own, before, after,
+    effects, every = _scatter_of_all(observer, nuisance, values, own, eta, errors)
+    return Identified(vehicle, observer, nuisance, values, covariance, effects, every, eta, errors, own, before, after,
                       level_scatter(found), len(sessions))  # fmt: skip
+
+
+def left_by(found: Sequence[Expansion], errors: ChannelErrors) -> ChannelErrors:
+    """What runs leave, channel by channel, at the points where they were expanded; `errors`: in what they were counted."""
+    squares, samples = sum(one.squares for one in found), sum(one.samples for one in found)
+    scales = errors.scales * np.sqrt(np.where(samples > 0, squares / np.maximum(samples, 1), 1.0))
+    return ChannelErrors(np.maximum(scales, LEAST_SCALE), inflation(found)[:-1])
 
 
 @dataclass
@@ -125,7 +127,7 @@ class _Search:
     eta: float
     V: np.ndarray
     limits: tuple[np.ndarray, np.ndarray]
-    scales: np.ndarray
+    errors: ChannelErrors
     horizon: float
 
     def prior(self, x: np.ndarray, own: np.ndarray) -> float:
@@ -134,8 +136,8 @@ class _Search:
 
     def misfit(self, n: int, row: np.ndarray) -> float:
         point = moved(self.observer.declared, self.observer.point, self.nuisance, row)
-        error = self.observer.residuals(n, [point], self.observer.filter(n, point), self.horizon)[0] / self.scales
-        return float((error**2).sum()) / self.eta
+        error = self.observer.residuals(n, [point], self.observer.filter(n, point), self.horizon)[0]
+        return float((error**2 / self.errors.weight).sum()) / self.eta
 
     def along(self, values: np.ndarray, own: np.ndarray, step: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
         """Values, runs' own values and the gain of a step, shortened until the exact posterior gains."""
@@ -203,13 +205,13 @@ def fit_levels(observer: Observer, say: Callable[[str], None]) -> None:
     say(f"noise levels: {', '.join(said) or 'as the file has them'}")
 
 
-def _scatter_of_all(observer, nuisance, values, own, eta, scales) -> tuple[list[Effect], np.ndarray]:
+def _scatter_of_all(observer, nuisance, values, own, eta, errors) -> tuple[list[Effect], np.ndarray]:
     """Every label's scatter from run to run about the identified vehicle: what healthy runs show of it is no cause."""
     effects = standard_effects(observer.declared, observer.runs, observer.tolerances)
     into = placed(nuisance, effects)
     about = []
     for n in range(len(own)):
-        one = expand(observer, n, effects, into @ own[n], scales, observer.horizon).tempered(eta)
+        one = expand(observer, n, effects, into @ own[n], errors, observer.horizon).tempered(eta)
         about.append(replace(one, at=one.at - into @ values))
     usual = usual_scatter(observer.declared, effects)
     if len(own) < 3:

@@ -85,7 +85,11 @@ def load_own(path: Path) -> LoadedVehicle:
         raise InputError("the model has none of step, derivative, rollout", source=source or path)
     if steps and not hasattr(model, "measure"):
         raise InputError("the model has no measure(x, u, theta)", source=source or path)
-    return LoadedVehicle(path, text, given, model, source, attribute, declared, 1 if steps else 0)
+    found = LoadedVehicle(path, text, given, model, source, attribute, declared, 1 if steps else 0)
+    from glider.tools.own.check import check_model  # it calls what stands here
+
+    found.notes += check_model(found)
+    return found
 
 
 def _import(wanted: str, path: Path, wrong: Callable[[str], ConfigError]) -> tuple[Any, Path | None, str]:

@@ -180,6 +180,11 @@ class Observer:
                     break
                 parts *= 2
             worst = max(worst, parts)
+        if worst >= MOST_PARTS:
+            raise InputError(
+                f"the model is stiff: {MOST_PARTS} parts of a step of {dt:.3g} s do not agree with {2 * MOST_PARTS}; "
+                "declare slower states, or solve its fast ones inside step", source=self.vehicle.source,
+            )  # fmt: skip
         self.parts = worst
         if worst > 1:
             self.notes.append(f"the model is stiff for the rows' step: every step is taken in {worst} parts")

@@ -16,7 +16,7 @@ from scipy.stats import norm
 from scipy.stats import t as student
 
 from glider.tools.own.effects import PUSH, Effect, ModelPoint, moved, pushes, standard_effects
-from glider.tools.own.hierarchy import Expansion, Pooled, expand, marginalised, run_values
+from glider.tools.own.hierarchy import ChannelErrors, Expansion, Pooled, expand, marginalised, run_values
 from glider.tools.own.identify import USUAL_SCATTER
 from glider.tools.own.observer import Observer
 
@@ -34,6 +34,7 @@ BEAM, MOST_EFFECTS, ROUNDS, LONGEST_MOVE = 6, 3, 5, 4.0
 LONGEST_REACH = 4.0  # tolerances that a round's move of one number may do at most, where that is more
 STRONG, STRONG_LEFT, STRONG_ROWS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0), 1.5, 1_500  # tolerances; times healthy; rows looked at
 ACTIVE_SCATTER = 3.0  # times the usual: labels that healthy runs differ in
+UNIDENTIFIED_INFLATION = 30.0  # rows of a window that err alike, of a vehicle that was never identified
 LEAST_REACH = 1e-4  # tolerances a spread
 
 
@@ -44,7 +45,7 @@ class Healthy:
     effects: list[Effect]  # every label, then pushes
     V: np.ndarray  # (k, k) covariance of what a session's shared values are off the file's
     scatter: np.ndarray  # (k,) from run to run
-    scales: np.ndarray  # (outputs,) what healthy runs leave, tolerances
+    errors: ChannelErrors  # what healthy runs leave
     eta: float
     runs: int  # that it is known from
     level_scatter: float  # 1 sigma of the logarithm of a run's mean square left
@@ -96,8 +97,8 @@ class Engine:
         self.high = np.array([one.high for one in healthy.effects])
         usual = np.diag(healthy.V) > (ACTIVE_SCATTER * USUAL_SCATTER) ** 2
         self.active = usual | (healthy.scatter > ACTIVE_SCATTER * USUAL_SCATTER)
-        self.V = healthy.V * np.outer(self.active, self.active)
-        self.scatter = np.where(self.active, healthy.scatter, 0.0)  # what is too small to tell is none
+        self.V, self.scatter = healthy.V, healthy.scatter
+        self.nothing: Hypothesis | None = None
         self.reach = np.zeros(self.k)
 
     def expansions(self, own: np.ndarray, columns: np.ndarray) -> list[Expansion]:
@@ -107,7 +108,7 @@ class Engine:
     def expansion_of(self, n: int, own: np.ndarray, columns: np.ndarray) -> Expansion:
         """Run n about its values (k,) in some columns, tempered; the others' rows are 0."""
         chosen = [self.healthy.effects[k] for k in columns]
-        one = expand(self._observer_at(own, columns), n, chosen, own[columns], self.healthy.scales, self.horizon)
+        one = expand(self._observer_at(own, columns), n, chosen, own[columns], self.healthy.errors, self.horizon)
         return self._widened(one.tempered(self.healthy.eta), columns, own)
 
     def _observer_at(self, own: np.ndarray, columns: np.ndarray) -> Observer:
@@ -119,18 +120,26 @@ class Engine:
         return self.observer.about(moved(self.observer.declared, self.observer.point, self.healthy.effects, others))
 
     def _widened(self, one: Expansion, columns: np.ndarray, own: np.ndarray) -> Expansion:
-        slope, curvature, blocks, reach = (
-            np.zeros(self.k),
-            np.zeros((self.k, self.k)),
-            np.zeros(self.k),
-            np.zeros(self.k),
-        )
-        slope[columns], blocks[columns], reach[columns] = one.slope, one.blocks, one.reach
+        slope, curvature, reach = np.zeros(self.k), np.zeros((self.k, self.k)), np.zeros(self.k)
+        slope[columns], reach[columns] = one.slope, one.reach
         curvature[np.ix_(columns, columns)] = one.curvature
-        return replace(one, at=own.copy(), slope=slope, curvature=curvature, blocks=blocks, reach=reach)
+        return replace(one, at=own.copy(), slope=slope, curvature=curvature, reach=reach)
 
-    def variance(self, labels: Sequence[int], sigma: Sequence[float]) -> np.ndarray:
-        V = self.V.copy()
+    def kept(self, places: Sequence[int] = ()) -> np.ndarray:
+        """(k,) 1 for what runs differ in to speak of, and for labels that are asked about; 0 for what is held at none."""
+        mask = self.active.astype(float)
+        mask[list(places)] = 1.0
+        return mask
+
+    def marginal(self, found: Sequence[Expansion], places: Sequence[int] = ()) -> list[Expansion]:
+        """Runs with their deviations integrated out."""
+        scatter = self.scatter * self.kept(places)
+        return [marginalised(one, scatter) for one in found]
+
+    def variance(self, labels: Sequence[int], sigma: Sequence[float], places: Sequence[int] = ()) -> np.ndarray:
+        """Prior covariance (k, k) of shared values with labels' sizes of 1 sigma `sigma`."""
+        mask = self.kept([*labels, *places])
+        V = self.V * np.outer(mask, mask)
         for k, s in zip(labels, sigma, strict=True):
             V[k, k] += s**2
         return V
@@ -154,11 +163,11 @@ class Engine:
                 continue
             best = cost, shared, own, found
             sigma = self._best_sizes(found, places)[0]
-            warm = [marginalised(one, self.scatter) for one in found]
-            target = Pooled.of(warm, self.variance(places, sigma)).mean()
+            target = Pooled.of(self.marginal(found, places), self.variance(places, sigma)).mean()
+            scatter = self.scatter * self.kept(places)
             room = np.maximum(LONGEST_MOVE, LONGEST_REACH / np.maximum(self.reach, LEAST_REACH))  # (k,) spreads
             shared = np.clip(shared + np.clip(target - shared, -room, room), self.low, self.high)
-            theirs = np.array([run_values(one, shared, self.scatter) for one in found])
+            theirs = np.array([run_values(one, shared, scatter) for one in found])
             own = np.clip(own + np.clip(theirs - own, -room, room), self.low, self.high)
         assert best is not None
         _, shared, own, found = best
@@ -166,20 +175,25 @@ class Engine:
             found = self.expansions(own, np.arange(self.k))
         sigma, evidence, mean, sd = self._best_sizes(found, places)
         left = np.array([one.squares.sum() / max(1, one.samples.sum()) for one in found])
+        if self.nothing is not None:
+            # against no change with the same deviations allowed: what runs differ in is no evidence for either
+            same = Pooled.of(self.marginal(self.nothing.found, places), self.variance((), (), places)).log_evidence()
+            evidence += self.nothing.evidence - self.log_prior(()) - same
         return Hypothesis(labels, evidence + self.log_prior(labels), mean, sd, shared, own, left, 0.0, found)
 
     def _prior(self, shared: np.ndarray, own: np.ndarray, places: Sequence[int]) -> float:
         """-2 log prior of values, sizes of labels left free."""
-        free = np.diag(self.V) > 0.0
+        mask = self.kept(places)
+        free = (np.diag(self.V) > 0.0) & (mask > 0.0)
         free[list(places)] = False
-        kept = np.flatnonzero(free)
-        x = shared[kept]
-        spread = np.maximum(self.scatter, 1e-6)
-        return float((((own - shared) / spread) ** 2).sum() + x @ np.linalg.solve(self.V[np.ix_(kept, kept)], x))
+        chosen = np.flatnonzero(free)
+        x, spread = shared[chosen], np.maximum(self.scatter * mask, 1e-6)
+        within = x @ np.linalg.solve(self.V[np.ix_(chosen, chosen)], x)
+        return float((((own - shared) / spread) ** 2).sum() + within)
 
     def _best_sizes(self, found: Sequence[Expansion], places: Sequence[int]):
         """Sigmas of labels' sizes that are most probable, log evidence over the grid of sizes, and size with its sd."""
-        pooled = Pooled.of([marginalised(one, self.scatter) for one in found], self.V)
+        pooled = Pooled.of(self.marginal(found, places), self.variance((), ()))
         if not places:
             return [], pooled.log_evidence(), np.zeros(0), np.zeros(0)
         grids = [SIZES / max(self.reach[k], LEAST_REACH) for k in places]
@@ -211,20 +225,18 @@ class Engine:
         places = self.healthy.at(begin.labels)
         sigma = self._best_sizes(begin.found, places)[0]
         V = self.variance(places, sigma)
-        pooled = Pooled.of([marginalised(one, self.scatter) for one in begin.found], V)
+        pooled = Pooled.of(self.marginal(begin.found, places), V)
         M = pooled.covariance()
         slope, precision = pooled.r - pooled.H @ (M @ pooled.r), np.diag(pooled.H - pooled.H @ M @ pooled.H)
+        usual = np.diag(self.V) + self.scatter**2 / self.count  # what sessions and runs differ by, without a change
         found = []
         for k, effect in enumerate(self.healthy.effects):
             if k in places or self.reach[k] < LEAST_REACH:
                 continue
-            tau2 = (SIZES / self.reach[k]) ** 2
-            total = 1.0 + tau2 * max(precision[k], 0.0)
-            gain = 0.5 * slope[k] ** 2 * tau2 / total - 0.5 * np.log(total)
-            if effect.one_sided:
-                gain = gain + np.log(2.0) + norm.logcdf(slope[k] * np.sqrt(tau2 / total))
+            own = 0.0 if self.active[k] else float(usual[k])
+            gain = size_evidence(slope[k], precision[k], self.reach[k], own, effect.one_sided)
             odds = np.log(PUSH_ODDS) if effect.family == PUSH else 0.0
-            found.append((float(logsumexp(gain) - np.log(len(SIZES)) + odds), effect.label))
+            found.append((float(gain + odds), effect.label))
         return sorted(found, reverse=True)
 
     def strong_sizes(self, among: Sequence[int]) -> list[tuple[int, float]]:
@@ -250,8 +262,8 @@ class Engine:
                 at = np.zeros(self.k)
                 at[k] = size
                 points.append(moved(observer.declared, observer.point, healthy.effects, at))
-            errors = observer.residuals(n, points, by, self.horizon) / healthy.scales
-            value += (errors**2).sum(axis=(1, 2))
+            errors = observer.residuals(n, points, by, self.horizon)
+            value += (errors**2 / healthy.errors.weight).sum(axis=(1, 2))
         found: dict[int, tuple[float, float]] = {}
         for (k, size), squares in zip(sizes, value, strict=True):
             if k not in found or squares < found[k][0]:
@@ -272,7 +284,7 @@ class Engine:
         """Hypotheses found by a beam: none, the best single labels, pairs beside the best, triples."""
         begin = self.expansions(np.zeros((self.count, self.k)), np.arange(self.k))
         self.reach = np.sqrt(np.mean([one.reach for one in begin], axis=0))
-        nothing = self.fit((), every=True)
+        self.nothing = nothing = self.fit((), every=True)
         nothing.strange = self.strangeness(nothing, nothing)
         every, front, self.bare = [nothing], [nothing], nothing
         self.say(f"no change: {np.sqrt(nothing.left.mean()):.2f} times what healthy runs leave")
@@ -341,6 +353,23 @@ class Engine:
         return Posterior(every, weights, chances, inclusion, self.reach, self.healthy)
 
 
+def size_evidence(slope, precision, reach, usual, one_sided) -> np.ndarray:
+    """Log evidence of a label's size over none, from its slope and precision with all else integrated out.
+
+    usual: variance that the label has without a change. All may be arrays of one shape.
+    """
+    slope, precision, reach, usual, one_sided = (np.asarray(one)[..., None] for one in (slope, precision, reach, usual, one_sided))
+    precision = np.maximum(precision, 0.0)
+
+    def log_marginal(variance):
+        return 0.5 * (slope**2 * variance / (1.0 + variance * precision) - np.log1p(variance * precision))
+
+    total = (SIZES / reach) ** 2 + usual
+    gain = log_marginal(total) - log_marginal(usual)
+    halved = np.log(2.0) + norm.logcdf(slope * np.sqrt(total / (1.0 + total * precision)))
+    return logsumexp(gain + np.where(one_sided, halved, 0.0), axis=-1) - np.log(len(SIZES))
+
+
 def healthy_of(observer: Observer, session: bool = True) -> Healthy:
     """What an identified vehicle file says of itself; one that is not identified, what it allows for.
 
@@ -358,8 +387,8 @@ def healthy_of(observer: Observer, session: bool = True) -> Healthy:
             V[names.index(one.name), names.index(one.name)] = (
                 one.uncertainty / effects[names.index(one.name)].spread
             ) ** 2
-        scales = np.ones(len(declared.outputs))
-        return Healthy(effects, V, scatter, scales, 10.0, 1, USUAL_LEVEL_SCATTER)
+        errors = ChannelErrors(np.ones(len(declared.outputs)), np.full(len(declared.outputs), UNIDENTIFIED_INFLATION))
+        return Healthy(effects, V, scatter, errors, 1.0, 1, USUAL_LEVEL_SCATTER)
     places = [names.index(name) for name in table.parameters]
     spreads = np.array([effects[k].spread for k in places])
     V[np.ix_(places, places)] = np.array(table.covariance).reshape(len(places), len(places)) / np.outer(
@@ -370,8 +399,11 @@ def healthy_of(observer: Observer, session: bool = True) -> Healthy:
             scatter[names.index(name)] = max(value / effects[names.index(name)].spread, 1e-4)
     if session:
         V = V + np.diag(scatter**2)
-    scales = np.array([max(table.gap.get(one.name, 1.0), 1e-3) for one in declared.outputs])
-    return Healthy(effects, V, scatter, scales, table.inflation, table.runs, table.level_scatter)
+    errors = ChannelErrors(
+        np.array([max(table.gap.get(one.name, 1.0), 1e-3) for one in declared.outputs]),
+        np.array([table.channel_inflation.get(one.name, 1.0) for one in declared.outputs]),
+    )
+    return Healthy(effects, V, scatter, errors, table.inflation, table.runs, table.level_scatter)
 
 
 def effect_point(observer: Observer, healthy: Healthy, labels: Sequence[str], sizes: np.ndarray) -> ModelPoint:

@@ -14,7 +14,7 @@ from scipy.special import logsumexp
 from scipy.stats import norm
 
 from glider.tools.own.effects import PUSH
-from glider.tools.own.hierarchy import Expansion, Pooled, learn_scatter, marginalised, run_values
+from glider.tools.own.hierarchy import Expansion, Pooled, learn_scatter, run_values
 from glider.tools.own.load import LoadedVehicle
 from glider.tools.own.observer import Observer, observer_of
 from glider.tools.own.posterior import (
@@ -30,6 +30,7 @@ from glider.tools.own.posterior import (
     Healthy,
     Hypothesis,
     healthy_of,
+    size_evidence,
 )
 from glider.tools.own.runs import OwnRun
 
@@ -131,15 +132,16 @@ class Watch(Engine):
             if self.learned > 2:
                 scatter = learn_scatter(self.found[: self.learned], self.healthy.V, self.healthy.scatter)
                 self.scatter = scatter
-            warm = [marginalised(one, self.scatter) for one in self.found[: self.learned]]
+            warm = self.marginal(self.found[: self.learned])
+            V = self.variance((), ())
             H, r = sum(one.curvature for one in warm), -sum(one.offset for one in warm)
-            M = np.linalg.solve(np.eye(self.k) + self.healthy.V @ H, self.healthy.V)
+            M = np.linalg.solve(np.eye(self.k) + V @ H, V)
             shared = M @ r
             if round_ < ROUNDS - 1:
-                own = np.array([shared if n >= self.learned else run_values(one, shared, self.scatter)
+                own = np.array([shared if n >= self.learned else run_values(one, shared, self.scatter * self.kept())
                                 for n, one in enumerate(self.found)])  # fmt: skip
         self.shared, self.M = shared, 0.5 * (M + M.T)
-        self.runs = [marginalised(one, self.scatter) for one in self.found]
+        self.runs = self.marginal(self.found)
         self.events: list[Event] = []
 
     def at_run(self, n: int, skip: Event | None = None) -> np.ndarray:
@@ -161,7 +163,6 @@ class Watch(Engine):
         labels = np.arange(self.k) if only is None else np.array(only)
         found = np.full((len(spans), self.k), -np.inf)
         usable = labels[self.reach[labels] > LEAST_REACH]
-        tau2 = (SIZES[:, None] / self.reach[usable]) ** 2
         sided = np.array([self.healthy.effects[k].one_sided for k in usable])
         odds = np.array([np.log(PUSH_ODDS) if self.healthy.effects[k].family == PUSH else 0.0 for k in usable])
         for row, (first, end) in enumerate(spans):
@@ -170,10 +171,8 @@ class Watch(Engine):
             inner = np.linalg.solve(np.eye(self.k) + self.M @ H, self.M)
             precision = np.maximum(np.diag(H - H @ inner @ H)[usable], 0.0)
             slope = (r - H @ (inner @ r))[usable]
-            total = 1.0 + tau2 * precision
-            gain = 0.5 * slope**2 * tau2 / total - 0.5 * np.log(total)
-            gain = gain + np.where(sided, np.log(2.0) + norm.logcdf(slope * np.sqrt(tau2 / total)), 0.0)
-            found[row, usable] = logsumexp(gain, axis=0) - np.log(len(SIZES)) + odds
+            own = np.where(self.active[usable], 0.0, self.scatter[usable] ** 2 / (end - first))
+            found[row, usable] = size_evidence(slope, precision, self.reach[usable], own, sided) + odds
         return found
 
     def span_prior(self, spans: Sequence[tuple[int, int]]) -> np.ndarray:
@@ -225,7 +224,7 @@ class Watch(Engine):
         self.events.append(event)
         for n in range(event.first, event.end):
             self.found[n] = self.expansion_of(n, self.at_run(n), np.arange(self.k))
-            self.runs[n] = marginalised(self.found[n], self.scatter)
+            (self.runs[n],) = self.marginal([self.found[n]])
 
     def evidence(self, runs: Sequence[Expansion], span: tuple[int, int], V: np.ndarray) -> Pooled:
         """A span's runs, values counted from what they are thought to have."""
@@ -234,11 +233,12 @@ class Watch(Engine):
 
     def refit(self, span: tuple[int, int], k: int, start: float, prior: float) -> tuple[float, Event]:
         """A label over a span, expanded where it leads to: log evidence over no change with its prior, and the event."""
-        nothing = self.evidence(self.runs[slice(*span)], span, self.M).log_evidence()
+        nothing = self.evidence(self.marginal(self.found[slice(*span)], [k]), span, self.M).log_evidence()
         columns = np.unique(np.append(np.flatnonzero(self.active), k))
         size, best = start, (-np.inf, start, 0.0)
         odds = np.log(PUSH_ODDS) if self.healthy.effects[k].family == PUSH else 0.0
-        runs = self.runs[slice(*span)] if start == 0.0 else None
+        runs = self.marginal(self.found[slice(*span)], [k]) if start == 0.0 else None
+        linear = runs is not None
         for _ in range(ROUNDS + 1):
             if runs is not None:
                 pooled = self.evidence(runs, span, self.M)
@@ -253,8 +253,9 @@ class Watch(Engine):
                 score = float(logsumexp([one[0] for one in table]) - np.log(len(table)))
                 _, mean, sd = max(table)
                 mean = float(np.clip(mean, self.low[k], self.high[k]))
-                if runs is not self.runs and score > best[0]:
+                if not linear and score > best[0]:
                     best = score, mean, sd
+                linear = False
                 settled = abs(mean - size) < 0.1 * sd
                 room = max(LONGEST_MOVE, LONGEST_REACH / max(self.reach[k], LEAST_REACH))
                 size += float(np.clip(mean - size, -room, room))
@@ -264,7 +265,7 @@ class Watch(Engine):
             for n in range(*span):
                 x = self.at_run(n)
                 x[k] = np.clip(x[k] + size, self.low[k], self.high[k])
-                runs.append(marginalised(self.expansion_of(n, x, columns), self.scatter))
+                runs += self.marginal([self.expansion_of(n, x, columns)], [k])
         score, mean, sd = best
         return score - nothing + prior + odds, Event({}, *span, self.healthy.effects[k].label, mean, sd, 0.0)
 
@@ -273,7 +274,7 @@ class Watch(Engine):
         found = np.zeros(self.count)
         nothing = Hypothesis((), 0.0, np.zeros(0), np.zeros(0), self.shared, np.zeros((1, self.k)), np.ones(1))
         for n in range(self.learned, self.count):
-            x = run_values(self.found[n], self.at_run(n), self.scatter)
+            x = run_values(self.found[n], self.at_run(n), self.scatter * self.kept())
             one = self.expansion_of(n, x, np.flatnonzero(self.active))
             left = np.array([one.squares.sum() / max(1, one.samples.sum())])
             named = tuple(event.label for event in self.events if event.first <= n < event.end)

@@ -1,0 +1,65 @@
+"""`glider vehicle check`: what a model of one's own declares, and what can be asked of it."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from glider.tools.data.errors import InputError
+from glider.tools.data.sources import read_text
+from glider.tools.own.declare import USUAL_TOLERANCE
+from glider.tools.own.effects import standard_effects
+from glider.tools.own.files import is_own
+from glider.tools.own.load import load_own
+from glider.tools.own.observer import observer_of
+from glider.tools.own.runs import OwnRun, load_own_runs
+
+ASKED = {
+    0: "gap measure and predict, identify, diagnose and watch by windows that begin at readings; no filter",
+    1: "gap measure and predict, identify, diagnose, watch",
+}
+
+
+def describe(file: Path, case: Path | None) -> dict[str, Any]:
+    """What a vehicle file and its model are good for; InputError or ConfigError where they cannot be used."""
+    if not file.is_file():
+        raise InputError("no such file", source=file)
+    if not is_own(read_text(file)):
+        raise InputError("the file names no model: `glider check --vehicle` checks a ROUGHIE-like one", source=file)
+    vehicle = load_own(file)
+    declared = vehicle.declared
+    lines = [f"{vehicle.name}: level {vehicle.level}, {ASKED[vehicle.level]}"]
+    if vehicle.level:
+        kernels = vehicle.kernels
+        lines.append("compiled by Numba" if kernels.compiled else f"plain Python, some hundred times slower: {kernels.why}")
+    for what in ("inputs", "outputs", "parameters", "states", "noises"):
+        entries = getattr(declared, what)
+        if entries:
+            lines.append(f"{what}: {', '.join(f'{one.name} ({one.unit})' if one.unit else one.name for one in entries)}")
+    assumed = [one.name for one in declared.parameters if one.assumed]
+    if assumed:
+        lines.append(f"assumed, not measured: {', '.join(assumed)}")
+    runs = [_imagined(declared)] if case is None else load_own_runs(case, declared)
+    tolerances = np.array([one.tolerance or USUAL_TOLERANCE.get(one.unit, 1.0) for one in declared.outputs])
+    labels = [one.label for one in standard_effects(declared, runs, tolerances)]
+    lines.append(f"{len(labels)} causes it can have: {', '.join(labels)}")
+    if case is not None:
+        observer = observer_of(vehicle, runs[:1])
+        gaps = observer.gaps(0, observer.point, observer.horizon)
+        by = ", ".join(f"{one.name} {gap:.2f}" for one, gap in zip(declared.outputs, gaps, strict=True) if np.isfinite(gap))
+        lines.append(f"{runs[0].name}: gap in tolerances {by}; windows of {observer.horizon:.1f} s, {observer.parts} parts a step")
+        lines += observer.notes
+    lines += vehicle.notes
+    return {
+        "name": vehicle.name, "level": vehicle.level, "compiled": bool(vehicle.level and vehicle.kernels.compiled),
+        "causes": labels, "notes": vehicle.notes, "lines": lines,
+        "declared": {what: [one.name for one in getattr(declared, what)]
+                     for what in ("inputs", "outputs", "parameters", "states", "noises")},
+    }  # fmt: skip
+
+
+def _imagined(declared) -> OwnRun:
+    """A run in which every input moves: so that every label has its place in the list."""
+    t = np.linspace(0.0, 60.0, 61)
+    inputs = np.tile(np.linspace(0.0, 1.0, 61)[:, None], (1, len(declared.inputs)))
+    return OwnRun("imagined", t, inputs, np.zeros((61, len(declared.outputs))))
