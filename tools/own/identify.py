@@ -103,7 +103,7 @@ def identify(
     *_, eta = inflation(found)
     warm = [marginalised(one.tempered(eta), scatter) for one in found]
     covariance = Pooled.of(warm, V).covariance()
-    after = _held_out(observer, nuisance, warm, V, limits)
+    after = _held_out(observer, nuisance, values, warm, V, limits)
     effects, every = _scatter_of_all(observer, nuisance, values, own, eta, errors)
     return Identified(vehicle, observer, nuisance, values, covariance, effects, every, eta, errors, own, before, after,
                       level_scatter(found), len(sessions))  # fmt: skip
@@ -235,12 +235,12 @@ def placed(nuisance: Sequence[Effect], effects: Sequence[Effect]) -> np.ndarray:
     return found
 
 
-def _held_out(observer, nuisance, warm, V, limits) -> np.ndarray:
-    """Gaps (runs, outputs) of every run by a model of the others, to first order."""
-    gaps = []
+def _held_out(observer, nuisance, values, warm, V, limits) -> np.ndarray:
+    """Gaps (runs, outputs) of every run by a model of the others, to first order in what leaving it out moves."""
+    gaps, every = [], Pooled.of(warm, V).mean()
     for n in range(len(warm)):
         others = [one for k, one in enumerate(warm) if k != n] or warm
-        point = moved(observer.declared, observer.point, nuisance, np.clip(Pooled.of(others, V).mean(), *limits))
+        point = moved(observer.declared, observer.point, nuisance, np.clip(values + Pooled.of(others, V).mean() - every, *limits))
         gaps.append(observer.gaps(n, point, observer.horizon))
     return np.array(gaps)
 

@@ -35,7 +35,7 @@ outputs = [
 parameters = {
     "net_buoyancy": {"unit": "kg", "value": 1.35, "uncertainty": 0.2, "low": 0.2},  # wholly under water
     "freeboard": {"unit": "m", "value": 0.06, "uncertainty": 0.02, "low": 0.01},  # scale of depth in which it is lost
-    "heave_mass": {"unit": "kg", "value": 4.0, "uncertainty": 1.5, "low": 1.0},  # with the water that moves with it
+    "heave_mass": {"unit": "kg", "value": 3.0, "uncertainty": 0.5, "low": 2.0},  # with the water that moves with it
     "drag_linear": {"unit": "N s/m", "value": 5.0, "uncertainty": 3.0, "low": 0.0},
     "drag_quadratic": {"unit": "N s2/m2", "value": 120.0, "uncertainty": 40.0, "low": 0.0},
     "thrust_scale": {"unit": "1", "value": 1.0, "low": 0.0},  # of all motors: what forces are counted in
@@ -119,7 +119,7 @@ def measure(x, u, theta):
 
 
 def initial(y):
-    """Afloat, motors off, the water still."""
+    """Afloat, at rest but for its turning, motors off, the water still."""
     x = np.zeros(12)
-    x[10] = y["yaw"]
-    return x, np.array([0.02, 0.01, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-4, 1e-4, 0.01, 0.03])
+    x[10], x[11] = y["yaw"], y["r"]
+    return x, np.array([0.02, 0.01, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-4, 1e-4, 0.01, 0.01])
