@@ -105,7 +105,26 @@ def is_own(text: str) -> bool:
 
 def decode_own(text: str, source: str) -> OwnVehicle:
     """A vehicle file; ConfigError with line and key."""
-    return decode(text, OwnVehicle, source)
+    try:
+        return decode(text, OwnVehicle, source)
+    except ConfigError:
+        _check_rows(text, source)
+        raise
+
+
+def _check_rows(text: str, source: str) -> None:
+    """ConfigError of the row of a table of names that is wrong, with its name."""
+    rows = {"parameters": ParameterTable, "sensors": SensorTable, "inputs": InputTable, "noise": NoiseTable, "start": StartTable}
+    given = tomllib.loads(text)
+    for table, kind in rows.items():
+        for name, row in given.get(table, {}).items() if isinstance(given.get(table), dict) else ():
+            try:
+                msgspec.convert(row, kind)
+            except msgspec.ValidationError as error:
+                said, _, place = str(error).partition(" - at `$")
+                key = f"{table}.{name}{place.rstrip('`')}"
+                line = locate(text, key.split("."))
+                raise ConfigError(source, said[:1].lower() + said[1:], key=key, line=line) from None
 
 
 def declared_with(declared: Declaration, given: OwnVehicle, text: str, source: Path) -> Declaration:

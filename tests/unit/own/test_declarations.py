@@ -1,0 +1,141 @@
+"""What a user's model declares, and ten mistakes in one: each a line that names it."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from glider.hal.strict import ConfigError
+from glider.tools.data.errors import InputError
+from glider.tools.own.cases import own_vehicle
+from glider.tools.own.check import check_model
+from glider.tools.own.declare import DeclarationError, Output, column_of, declaration
+from glider.tools.own.load import load_own
+from glider.tools.own.runs import load_own_run
+
+MODEL = """
+import numpy as np
+inputs = {"push": "N"}
+outputs = {"depth": "m"}
+parameters = [("drag", "N s2/m2", 4.0, 1.0)]
+states = {"z": "m", "speed": "m/s"}
+noises = {"heave": "m/s2"}
+def derivative(x, u, w, theta):
+    return np.array([x[1], u[0] - theta[0] * abs(x[1]) * x[1] + w[0]])
+def measure(x, u, theta):
+    return np.array([x[0]])
+"""
+MISTAKES = {
+    "wrong shape": ("np.array([x[0]])", "np.array([x[0], x[1]])", "measure: expected shape (1,)"),
+    "not a number": ("np.array([x[0]])", "np.array([x[0] * float('nan')])", "measure: not a finite number for depth"),
+    "unit": ('{"depth": "m"}', '{"depth": "cm"}', "units are SI: m, not cm"),
+    "hidden state": (
+        "def measure(x, u, theta):",
+        "seen = []\ndef measure(x, u, theta):\n    seen.append(x[0])\n    return np.array([x[0] + sum(seen)])",
+        "measure: not the same twice",
+    ),
+    "step not pure": (
+        "def measure(x, u, theta):",
+        "random = np.random.default_rng()\ndef measure(x, u, theta):\n    return np.array([random.normal()])",
+        "measure: not the same twice",
+    ),
+    "argument changed": ("    return np.array([x[1], u[0]", "    x[0] = 0.5\n    return np.array([x[1], u[0]", "derivative: changes its argument x"),
+    "raises": ("np.array([x[0]])", "np.array([x[7]])", "IndexError"),
+    "syntax": ("def measure(x, u, theta):", "def measure(x, u, theta)", "import: expected ':'"),
+    "name twice": ('{"z": "m", "speed": "m/s"}', '[("z", "m"), ("z", "m")]', "states[1]: z stands twice"),
+    "no outputs": ('outputs = {"depth": "m"}', "", "outputs: not declared"),
+    "out of range": ('("drag", "N s2/m2", 4.0, 1.0)', '{"name": "drag", "value": 4.0, "low": 5.0}', "drag: 4 is outside 5 to inf"),
+    "no motion": ("def derivative(x, u, w, theta):", "def motion(x, u, w, theta):", "none of step, derivative, rollout"),
+}  # fmt: skip
+
+
+@pytest.fixture
+def vehicle(tmp_path):
+    """A vehicle file of a model with something replaced."""
+
+    def make(old: str = "", new: str = "", extra: str = ""):
+        assert old in MODEL
+        (tmp_path / "sinker.py").write_text(MODEL.replace(old, new) if old else MODEL)
+        (tmp_path / "sinker.toml").write_text(f'format = 1\nmodel = "sinker"\n{extra}')
+        return tmp_path / "sinker.toml"
+
+    return make
+
+
+@pytest.mark.parametrize("mistake", MISTAKES, ids=[name.replace(" ", "-") for name in MISTAKES])
+def test_a_mistake_in_a_model_is_one_line_that_names_it(vehicle, mistake):
+    old, new, said = MISTAKES[mistake]
+    with pytest.raises(InputError) as error:
+        load_own(vehicle(old, new))
+    assert said in str(error.value) and "sinker.py" in str(error.value) and "\n" not in str(error.value)
+
+
+def test_an_answer_that_depends_on_earlier_calls_is_a_hidden_state(vehicle):
+    memory = "last = [0.0, 0]\ndef measure(x, u, theta):\n    if last[0] != x[0]:\n        last[:] = [float(x[0]), last[1] + 1]\n    return np.array([x[0] + last[1]])\ndef other():"
+    with pytest.raises(InputError, match="hidden state"):
+        load_own(vehicle("def measure(x, u, theta):", memory))
+
+
+@pytest.mark.parametrize(
+    ("extra", "said"),
+    [
+        ("[parameters.drog]\nvalue = 1.0\n", "sinker.toml:3: parameters.drog: the model declares no such name"),
+        ("[parameters.drag]\nvalue = 'x'\n", "parameters.drag.value"),
+        ("[sensors.depth]\nnoise = -1.0\n", "sensors.depth.noise"),
+        ("[start]\ndeep = { value = 0.0, uncertainty = 0.1 }\n", "start.deep: no output or state"),
+        ("[parameters.drag]\nlow = 9.0\n", "parameters.drag.value: 4 is outside 9 to inf"),
+    ],
+)
+def test_a_mistake_in_a_vehicle_file_names_key_and_line(vehicle, extra, said):
+    with pytest.raises(ConfigError) as error:
+        load_own(vehicle(extra=extra))
+    assert said in str(error.value)
+
+
+def test_a_model_that_is_nowhere_is_named(tmp_path):
+    (tmp_path / "v.toml").write_text('format = 1\nmodel = "nowhere:Thing"\n')
+    with pytest.raises(ConfigError, match=r"v.toml:2: model: no file nowhere.py beside it"):
+        load_own(tmp_path / "v.toml")
+
+
+def test_a_missing_column_is_named_with_its_file(vehicle, tmp_path):
+    declared = load_own(vehicle()).declared
+    (tmp_path / "run0.csv").write_text("t_s,depth_m\n" + "".join(f"{t},0\n" for t in range(9)))
+    with pytest.raises(InputError, match=r"run0.csv: push_n: the model's input push has no such column"):
+        load_own_run(tmp_path / "run0.csv", declared)
+
+
+def test_a_parameter_with_a_threshold_is_noted(vehicle):
+    found = load_own(vehicle("u[0] - theta[0] * abs", "(1.0 if theta[0] > 4.0005 else 0.0) + u[0] - theta[0] * abs"))
+    assert any("not smooth in drag" in note for note in check_model(found))
+
+
+def test_a_file_without_a_model_is_no_vehicle_of_ones_own(tmp_path):
+    (tmp_path / "roughie.toml").write_text("format = 1\n")
+    assert own_vehicle(tmp_path, str(tmp_path / "roughie.toml")) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "column"),
+    [("depth", "m", "depth_m"), ("r", "rad/s", "r_rad_s"), ("az", "m/s2", "az_m_s2"), ("depth_m", "m", "depth_m"), ("gain", "1", "gain"), ("pwm", "us", "pwm_us")],
+)  # fmt: skip
+def test_columns_are_called_by_name_and_unit(name, unit, column):
+    assert column_of(name, unit) == column
+
+
+def test_a_declaration_may_be_written_in_four_ways():
+    forms = [{"depth": "m"}, [("depth", "m")], [{"name": "depth", "unit": "m"}], [Output("depth", "m")]]
+    found = [declaration(SimpleNamespace(outputs=one, parameters=[], states=[("z", "m")])).outputs for one in forms]
+    assert all(one == found[0] for one in found) and found[0][0].column == "depth_m"
+
+
+def test_three_states_are_no_quaternion():
+    wrong = SimpleNamespace(outputs={"y": "m"}, parameters=[], states=[(f"q{n}", "1", "quaternion") for n in range(3)])
+    with pytest.raises(DeclarationError, match="four states in a row"):
+        declaration(wrong)
+
+
+def test_numbers_of_the_file_stand_in_for_the_models(vehicle):
+    declared = load_own(vehicle(extra="[parameters.drag]\nvalue = 6.0\nscope = 'run'\n[noise.heave]\ndensity = 0.5\n")).declared
+    assert (declared.parameters[0].value, declared.parameters[0].scope, declared.noises[0].density) == (6.0, "run", 0.5)
+    assert np.isinf(declared.parameters[0].high)

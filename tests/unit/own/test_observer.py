@@ -1,0 +1,129 @@
+"""The generated observer: manifolds, its filter against a Kalman filter in closed form, windows that never look ahead."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from glider.tools.own import kernels
+from glider.tools.own.effects import driven_inputs, moved, nominal_point, standard_effects
+from glider.tools.own.load import load_own
+from glider.tools.own.observer import observer_of
+from glider.tools.own.runs import OwnRun
+
+small = st.lists(st.floats(-0.5, 0.5), min_size=5, max_size=5)
+KINDS = np.array([0, 1, 2, 3, 3, 3])
+LINEAR = """
+import numpy as np
+inputs = {"push": "N"}
+outputs = [("place", "m", "place_m", 0.1)]
+parameters = [("damping", "1/s", 0.4, 0.1), ("mass", "kg", 2.0, 0.2)]
+states = [("x", "m"), ("v", "m/s")]
+noises = [("shove", "m/s2", 0.3)]
+def step(x, u, w, theta, dt):
+    return np.array([x[0] + dt * x[1], x[1] + dt * (u[0] / theta[1] - theta[0] * x[1] + w[0])])
+def measure(x, u, theta):
+    return np.array([x[0]])
+def initial(y):
+    return np.array([0.0, 0.0]), np.array([0.5, 0.5])
+"""
+
+
+@given(small, small)
+def test_plus_and_minus_are_each_others_inverse(turn, error):
+    x = kernels.plus(np.array([0.3, 3.0, 1.0, 0.0, 0.0, 0.0]), np.array(turn), KINDS)
+    d = np.array(error)
+    found = np.zeros(5)
+    kernels.minus(kernels.plus(x, d, KINDS), x, KINDS, found)
+    # a quaternion's error is twice the tangent of half the angle
+    assert found == pytest.approx(d, abs=1e-9)
+    assert np.linalg.norm(kernels.plus(x, d, KINDS)[2:]) == pytest.approx(1.0)
+
+
+@pytest.fixture
+def linear(tmp_path, monkeypatch):
+    """A linear model in plain Python, and a run of it."""
+    monkeypatch.setenv("GLIDER_OWN_PYTHON", "1")
+    (tmp_path / "linear.py").write_text(LINEAR)
+    (tmp_path / "linear.toml").write_text('format = 1\nmodel = "linear"\n[windows]\nseconds = 4.0\n')
+    random = np.random.default_rng(3)
+    t = np.arange(0.0, 12.0, 0.1)
+    u = np.repeat(random.normal(size=12), 10)[:, None]
+    x, y = np.zeros(2), []
+    for row in range(len(t)):
+        y.append(x[0] + 0.1 * random.normal())
+        x = np.array([x[0] + 0.1 * x[1], x[1] + 0.1 * (u[row, 0] / 2.0 - 0.4 * x[1] + 0.3 * random.normal() / np.sqrt(0.1))])
+    vehicle = load_own(tmp_path / "linear.toml")
+    return vehicle, OwnRun("run0", t, u, np.array(y)[:, None])
+
+
+def test_the_filter_of_a_linear_model_is_the_kalman_filter(linear):
+    vehicle, run = linear
+    observer = observer_of(vehicle, [run])
+    observer.parts = 1  # the matrices below are of whole steps
+    found = observer.filter(0, observer.point)
+    F, G, H = np.array([[1.0, 0.1], [0.0, 1.0 - 0.04]]), np.array([[0.0], [0.1]]), np.array([[1.0, 0.0]])
+    x, P, value = np.zeros((2, 1)), 0.25 * np.eye(2), 0.0
+    for row in range(len(run.t)):
+        if row:
+            x = F @ x + np.array([[0.0], [0.05]]) * run.inputs[row - 1]
+            P = F @ P @ F.T + G @ G.T * 0.3**2 / 0.1
+        S = float((H @ P @ H.T)[0, 0]) + 0.1**2
+        nu = float(run.outputs[row, 0] - x[0, 0])
+        value += nu**2 / S + np.log(S)
+        K = P @ H.T / S
+        x, P = x + K * nu, P - K @ H @ P
+        assert found.states[row] == pytest.approx(x[:, 0], abs=1e-6)
+    assert found.value == pytest.approx(value, abs=1e-4)
+
+
+def test_following_the_filters_own_model_gives_its_states(linear):
+    vehicle, run = linear
+    observer = observer_of(vehicle, [run])
+    found = observer.filter(0, observer.point)
+    assert observer.follow(0, observer.point, found) == pytest.approx(found.states, abs=1e-9)
+
+
+def test_a_prediction_uses_nothing_behind_a_windows_warm_up(linear):
+    vehicle, run = linear
+    observer = observer_of(vehicle, [run])
+    before = observer.predict(0, observer.point, 4.0, observer.filter(0, observer.point).states)
+    blank = run.outputs.copy()
+    blank[run.t > 8.41] = np.nan
+    observer = observer_of(vehicle, [OwnRun("run0", run.t, run.inputs, blank)])
+    after = observer.predict(0, observer.point, 4.0, observer.filter(0, observer.point).states)
+    assert np.array_equal(before, after, equal_nan=True) and np.isfinite(after).sum() > 70
+
+
+def test_every_standard_effect_moves_what_it_is_of_and_nothing_at_no_size(linear):
+    vehicle, run = linear
+    observer = observer_of(vehicle, [run])
+    effects = standard_effects(vehicle.declared, [run], observer.tolerances)
+    assert {"push_gain", "push_rate_limit", "place_bias", "place_delay", "damping", "mass"} <= {one.label for one in effects}
+    base = nominal_point(vehicle.declared)
+    base.variance = observer.point.variance
+    by = observer.filter(0, base)
+    nothing = observer.residuals(0, [base], by, 4.0)[0]
+    for one in effects:
+        point = moved(vehicle.declared, base, [one], np.zeros(1))
+        assert np.array_equal(observer.residuals(0, [point], by, 4.0)[0], nothing), one.label
+        point = moved(vehicle.declared, base, [one], np.array([3.0]))
+        moves = np.abs(observer.residuals(0, [point], by, 4.0)[0] - nothing).max()
+        assert moves > 1e-3, one.label
+
+
+def test_an_input_that_is_late_is_the_input_of_before(linear):
+    vehicle, run = linear
+    late = next(one for one in standard_effects(vehicle.declared, [run], np.ones(1)) if one.label == "push_delay")
+    point = moved(vehicle.declared, nominal_point(vehicle.declared), [late], np.array([0.5 / late.spread]))
+    assert driven_inputs(run, vehicle.declared, point)[60:, 0] == pytest.approx(run.inputs[55:-5, 0])
+
+
+def test_what_is_known_of_a_start_holds_against_a_sensor(tmp_path, linear):
+    vehicle, run = linear
+    text = vehicle.text + "[start]\nplace = { value = 0.0, uncertainty = 0.01 }\n"
+    vehicle.path.write_text(text)
+    off = OwnRun("run0", run.t, run.inputs, run.outputs + 5.0)
+    observer = observer_of(load_own(vehicle.path), [off])
+    x, P = observer.start(0, observer.point)
+    assert abs(x[0]) < 0.01 and np.sqrt(P[0, 0]) == pytest.approx(0.01, rel=0.01)
