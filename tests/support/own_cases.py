@@ -35,7 +35,7 @@ CHANGES = {
 
 
 def legs(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Times, inputs and first state of a Fossen AUV's run: propellers apart and elevator by turns, any heading."""
+    """Times, inputs and first state of a run: propellers apart and elevator by turns, any heading."""
     t = np.arange(0.0, SECONDS, 1.0 / RATE)
     turns, dives = rng.uniform(-5.0, 5.0, 20), rng.uniform(-0.12, 0.12, 20)
     middle = rng.uniform(15.0, 20.0) + 2.0 * np.sin(2.0 * np.pi * t / 40.0)
@@ -56,7 +56,9 @@ def fly(vehicle: LoadedVehicle, seed: int, changes: Mapping[str, float], runs: i
         run = OwnRun(f"run{n:03}", t, u, y)
         effects = {one.label: one for one in standard_effects(declared, [run], np.ones(len(noise)))}
         own = [effects[label] for label in changes]
-        point = moved(declared, nominal_point(declared), own, np.array([changes[one.label] / one.spread for one in own]))
+        point = moved(
+            declared, nominal_point(declared), own, np.array([changes[one.label] / one.spread for one in own])
+        )
         driven = driven_inputs(run, declared, point)
         for row in range(len(t)):
             y[row] = point.reading[0] * kernels.measure(x, driven[row], point.theta) + point.reading[1]
@@ -82,7 +84,9 @@ def diagnosed(vehicle: LoadedVehicle, runs: list[OwnRun]) -> Posterior:
 
 def size_of(answer: Posterior, label: str) -> tuple[float, float]:
     """Size of a label and its 1 sigma in the most probable hypothesis that has it, in its unit."""
-    having = [(weight, one) for weight, one in zip(answer.weights, answer.hypotheses, strict=True) if label in one.labels]
+    having = [
+        (weight, one) for weight, one in zip(answer.weights, answer.hypotheses, strict=True) if label in one.labels
+    ]
     best = max(having, key=lambda pair: pair[0])[1]
     effect: Effect = answer.healthy.effects[answer.healthy.at([label])[0]]
     place = best.labels.index(label)

@@ -35,8 +35,8 @@ parameters = [
     ("current_north", "m/s", 0.0, 0.01),
     ("current_east", "m/s", 0.0, 0.01),
 ]
-noises = [("surge", "m/s2", 0.005), ("sway", "m/s2", 0.005), ("heave", "m/s2", 0.005),
-          ("roll_moment", "rad/s2", 0.01), ("pitch_moment", "rad/s2", 0.005), ("yaw_moment", "rad/s2", 0.005)]  # fmt: skip
+noises = [("surge", "m/s2", 0.005), ("sway", "m/s2", 0.005), ("heave", "m/s2", 0.005), ("roll_moment", "rad/s2", 0.01),
+          ("pitch_moment", "rad/s2", 0.005), ("yaw_moment", "rad/s2", 0.005)]  # fmt: skip
 
 
 def to_ground(angles):

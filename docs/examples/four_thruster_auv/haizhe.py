@@ -21,10 +21,14 @@ ARM, TORQUE, YAW_INERTIA = 0.15, 0.01, 0.05  # m, N m a N of thrust, kg m2: assu
 BOTTOM, STIFFNESS, SOFT = 0.85, 100.0, 0.02  # m, N/m, m
 
 states = [
-    ("depth", "m"), ("heave", "m/s"), ("spin1", "1"), ("spin2", "1"), ("spin3", "1"), ("spin4", "1"), ("inflow", "1"), ("wake", "1"),
+    ("depth", "m"), ("heave", "m/s"), ("spin1", "1"), ("spin2", "1"), ("spin3", "1"), ("spin4", "1"),
+    ("inflow", "1"), ("wake", "1"),
     ("heel", "rad"), ("trim", "rad"), ("heading", "rad", "angle"), ("turn", "rad/s"),
 ]  # fmt: skip
-inputs = [{"name": f"pwm{n}", "unit": "us"} for n in (1, 2, 3, 4)] + [{"name": "battery", "unit": "V", "column": "battery_v"}]
+inputs = [
+    *({"name": f"pwm{n}", "unit": "us"} for n in (1, 2, 3, 4)),
+    {"name": "battery", "unit": "V"},
+]
 outputs = [
     {"name": "depth", "unit": "m", "noise": 0.02, "tolerance": 0.1},
     {"name": "roll", "unit": "rad", "noise": 0.01, "angle": True, "tolerance": 0.0175},
@@ -62,7 +66,8 @@ parameters = {
     "yaw_wake": {"unit": "rad/s", "value": -0.6, "uncertainty": 0.4},
 }
 noises = [
-    ("heave_force", "m/s2", 0.02), ("roll_moment", "rad/s", 0.05), ("pitch_moment", "rad/s", 0.05), ("yaw_torque", "rad/s2", 0.1),
+    ("heave_force", "m/s2", 0.02), ("roll_moment", "rad/s", 0.05), ("pitch_moment", "rad/s", 0.05),
+    ("yaw_torque", "rad/s2", 0.1),
 ]  # fmt: skip
 
 
@@ -106,8 +111,8 @@ def derivative(x, u, w, theta):
     out[8] = (level_heel - heel) / theta[14] + w[1]
     out[9] = (level_trim - trim) / theta[14] + w[2]
     out[10] = r
-    turn = share * staged(theta[24], theta[25], theta[26], v, g) + theta[15] * TORQUE * (f1 - f2 + f3 - f4) / YAW_INERTIA
-    out[11] = (turn - r) / theta[15] + w[3]
+    level_turn = share * staged(theta[24], theta[25], theta[26], v, g)
+    out[11] = (level_turn - r) / theta[15] + TORQUE * (f1 - f2 + f3 - f4) / YAW_INERTIA + w[3]
     return out
 
 
