@@ -8,9 +8,7 @@ import os
 import sys
 from pathlib import Path
 
-import glider
-
-ROOT = Path(glider.__file__).resolve().parents[1]
+ROOT = Path(str(sys.modules["glider"].__file__)).resolve().parents[1]
 
 
 def module_command(module: str, *arguments: str) -> list[str]:

@@ -27,7 +27,9 @@ NOT_ON_THE_GLIDER = {
     "matplotlib", "scipy", "jinja2", "pandas", "polars", "xarray", "h5netcdf", "gsw", "dbdreader", "pytest",
     "hypothesis",
 }  # fmt: skip
-BROUGHT = ("analysis", "bench", "campaign", "identify", "live", "ocean", "slocum")
+BROUGHT = (
+    "analysis", "ardupilot", "bench", "campaign", "identify", "live", "notebook", "ocean", "parquet", "ros", "slocum",
+)  # fmt: skip
 
 # In this order, each with the extra that it asks for; None: it does its work without any.
 CALLS: tuple[tuple[str, str | None], ...] = (
@@ -52,7 +54,14 @@ CALLS: tuple[tuple[str, str | None], ...] = (
     ("import seaglider p0010001.nc --out seaglider", "ocean"),
     ("import seaexplorer sea001.1.gli.sub.1 sea001.1.pld1.sub.1 --out seaexplorer", "ocean"),
     ("import og1 mission.nc --out og1", "ocean"),
+    ("import rosbag dive --map ros-imu --out bag", "ros"),
+    ("import ardusub dive.BIN --map ardusub-bin --out sub", "ardupilot"),
     ("export og1 case --out mission.nc", "ocean"),
+    ("export parquet case --out parquet", "parquet"),
+    ("export parameters roughie --as toml", None),
+    ("export fossen roughie", None),
+    ("export sdf roughie", None),
+    ("export stonefish roughie", None),
     ("vehicle new mine.toml", None),
     ("vehicle show mine.toml", None),
     ("simulate commands.csv --out simulated.csv", None),

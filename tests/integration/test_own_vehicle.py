@@ -1,4 +1,4 @@
-"""A vehicle of one's own from its skeleton: checked, identified, diagnosed and watched, with nothing of the tree touched."""
+"""A vehicle of one's own from its skeleton: checked, identified, diagnosed, watched; nothing of the tree touched."""
 
 import json
 
@@ -27,7 +27,9 @@ def pool(tmp_path_factory):
     model = module_of(folder / "mine_model.py")
 
     def case(name, seed, runs=4, **wrong):
-        return write_case(folder / name, model, inputs, runs=runs, seed=seed, vehicle="../mine.toml", changes=HEALTHY, **wrong)
+        return write_case(
+            folder / name, model, inputs, runs=runs, seed=seed, vehicle="../mine.toml", changes=HEALTHY, **wrong
+        )
 
     case("healthy", 1, runs=8)
     done = glider("identify", "healthy", "--out", "identified", "--json", cwd=folder)
@@ -37,7 +39,17 @@ def pool(tmp_path_factory):
 
 def diagnosed(folder, case):
     """diagnosis.json of a case by the identified vehicle."""
-    done = glider("gap", "diagnose", case, "--vehicle", "identified/identified.toml", "--out", f"{case}-said", "--json", cwd=folder)
+    done = glider(
+        "gap",
+        "diagnose",
+        case,
+        "--vehicle",
+        "identified/identified.toml",
+        "--out",
+        f"{case}-said",
+        "--json",
+        cwd=folder,
+    )
     assert done.returncode == 0, done.stderr
     assert (folder / f"{case}-said" / "report.html").stat().st_size > 5_000
     return json.loads(done.stdout)
@@ -46,12 +58,15 @@ def diagnosed(folder, case):
 def test_the_skeleton_is_a_model_that_passes_its_check(pool):
     folder, _, _ = pool
     found = json.loads(glider("vehicle", "check", "mine.toml", "--json", cwd=folder).stdout)
-    assert found["level"] == 1 and found["compiled"] and {"rudder_gain", "depth_bias", "heave_drag"} <= set(found["causes"])
+    assert found["level"] == 1
+    assert found["compiled"]
+    assert {"rudder_gain", "depth_bias", "heave_drag"} <= set(found["causes"])
 
 
 def test_identification_finds_the_numbers_and_predicts_runs_left_out_better(pool):
     _, _, answer = pool
-    assert answer["handed_out"] == "identified" and answer["gap"]["after"]["total"] < 0.5 * answer["gap"]["before"]["total"]
+    assert answer["handed_out"] == "identified"
+    assert answer["gap"]["after"]["total"] < 0.5 * answer["gap"]["before"]["total"]
     by_name = {one["name"]: one for one in answer["parameters"]}
     for name, value in HEALTHY.items():
         low, high = by_name[name]["ci90"]
@@ -63,7 +78,8 @@ def test_a_healthy_case_is_none(pool):
     folder, case, _ = pool
     case("same", 2)
     answer = diagnosed(folder, "same")
-    assert answer["verdict"] == "none" and answer["selected"] == []
+    assert answer["verdict"] == "none"
+    assert answer["selected"] == []
     assert sum(one["probability"] for one in answer["causes"]) == pytest.approx(1.0, abs=1e-3)
 
 
@@ -72,8 +88,10 @@ def test_a_rudder_that_turns_less_is_its_gain(pool):
     case("rudder", 3, driven=lambda n, u: u * [1.0, 0.7])
     answer = diagnosed(folder, "rudder")
     first = answer["causes"][0]
-    assert answer["verdict"] == "cause" and {"rudder_gain", "turn_rate_per_rudder"} & set(first["group"])
-    assert len(first["group"]) <= 3 and answer["gap"]["after"]["total"] < 0.6 * answer["gap"]["before"]["total"]
+    assert answer["verdict"] == "cause"
+    assert {"rudder_gain", "turn_rate_per_rudder"} & set(first["group"])
+    assert len(first["group"]) <= 3
+    assert answer["gap"]["after"]["total"] < 0.6 * answer["gap"]["before"]["total"]
 
 
 def test_a_gyro_that_reads_too_much_is_its_gain(pool):
@@ -81,7 +99,8 @@ def test_a_gyro_that_reads_too_much_is_its_gain(pool):
     case("gyro", 4, read=lambda n, y: y * [1.0, 1.0, 1.2])
     answer = diagnosed(folder, "gyro")
     first = answer["causes"][0]
-    assert first["label"] == "r_gain" and answer["selected"] == ["r_gain"]
+    assert first["label"] == "r_gain"
+    assert answer["selected"] == ["r_gain"]
     assert first["parameters"]["r_gain"]["estimate"] == pytest.approx(0.2, abs=0.05)
 
 
@@ -91,15 +110,21 @@ def test_a_watch_names_the_run_from_which_it_is_heavier(pool):
     done = glider("gap", "watch", "season", "--vehicle", "identified/identified.toml", "--json", cwd=folder)
     assert done.returncode == 0, done.stderr
     answer = json.loads(done.stdout)
-    assert [event["from_run"] for event in answer["events"]] == ["run06"] and answer["events"][0]["to_run"] is None
+    assert [event["from_run"] for event in answer["events"]] == ["run06"]
+    assert answer["events"][0]["to_run"] is None
     assert "weight_in_water" in answer["events"][0]["group"]
     assert [run["verdict"] for run in answer["runs"]] == 6 * ["none"] + 3 * ["cause"]
 
 
 def test_a_run_is_predicted_with_its_rows_and_columns(pool):
     folder, _, _ = pool
-    done = glider("gap", "predict", "healthy/run00.csv", "--model", "identified/identified.toml", "--out", "p.csv", cwd=folder)
+    done = glider(
+        "gap", "predict", "healthy/run00.csv", "--model", "identified/identified.toml", "--out", "p.csv", cwd=folder
+    )
     assert done.returncode == 0, done.stderr
-    measured, predicted = (np.genfromtxt(folder / one, delimiter=",", names=True) for one in ("healthy/run00.csv", "p.csv"))
-    assert set(measured.dtype.names) == set(predicted.dtype.names) and len(measured) == len(predicted)
+    measured, predicted = (
+        np.genfromtxt(folder / one, delimiter=",", names=True) for one in ("healthy/run00.csv", "p.csv")
+    )
+    assert set(measured.dtype.names) == set(predicted.dtype.names)
+    assert len(measured) == len(predicted)
     assert np.sqrt(np.mean((measured["depth_m"] - predicted["depth_m"]) ** 2)) < 0.3

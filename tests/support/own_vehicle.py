@@ -15,14 +15,17 @@ from glider.tools.own.declare import declaration
 def module_of(path: Path) -> ModuleType:
     """A model's file, imported."""
     spec = importlib.util.spec_from_file_location(f"own_{path.stem}", path)
-    assert spec is not None and spec.loader is not None
+    assert spec is not None
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
     spec.loader.exec_module(module)
     return module
 
 
-def flown(model: ModuleType, theta: np.ndarray, t: np.ndarray, u: np.ndarray, x: np.ndarray, random, rough: float) -> np.ndarray:
+def flown(
+    model: ModuleType, theta: np.ndarray, t: np.ndarray, u: np.ndarray, x: np.ndarray, random, rough: float
+) -> np.ndarray:
     """Outputs (rows, outputs) by Runge and Kutta in ten parts a row, with accelerations that wander."""
     declared = declaration(model)
     out = []
@@ -50,9 +53,9 @@ def write_case(
     read: Callable[[int, np.ndarray], np.ndarray] = lambda n, y: y,
     theta_of: Callable[[int, np.ndarray], np.ndarray] = lambda n, theta: theta,
 ) -> Path:  # fmt: skip
-    """A case: runs whose recorded inputs are as drawn, and which flew with what `driven`, `read`, `theta_of` make of it.
+    """A case: runs with recorded inputs as drawn, flown with what `driven`, `read`, `theta_of` make of them.
 
-    changes: parameters in place of the model's; scatter: of its uncertainty, by which parameters differ from run to run.
+    changes: parameters in place of the model's; scatter: of its uncertainty, by which runs differ.
     """
     declared = declaration(model)
     folder.mkdir(parents=True)
@@ -72,6 +75,6 @@ def write_case(
         texts |= {one.column: [f"{v:.6g}" for v in y[:, k]] for k, one in enumerate(declared.outputs)}
         csvfile.write_table(folder / f"run{n:02d}.csv", texts)
     (folder / "case.toml").write_text(
-        f'format = 1\nvehicle = "{vehicle}"\nsite = "simulated"\nlog_rate_hz = {rate}\nmotion_capture = false\nruns = {runs}\n'
+        f'format = 1\nvehicle = "{vehicle}"\nsite = "simulated"\nlog_rate_hz = {rate}\nruns = {runs}\n'
     )
     return folder

@@ -51,6 +51,14 @@ def print_json(result: Any) -> None:
     click.echo(json.dumps(as_plain(result), indent=1))
 
 
+def print_result(found: Any, as_json: bool) -> None:
+    """A result of the API on standard output: its sentences, or its answer alone as JSON."""
+    if as_json:
+        print_json(found.answer)
+    else:
+        click.echo(found.summary())
+
+
 def _advance_bar(bar: Any, task: Any, n: int = 1) -> None:
     bar.update(task, advance=n)
 

@@ -2,26 +2,25 @@
 
 import sys
 from pathlib import Path
-from typing import Any
 
 import click
 
+from glider.tools.cli import own
 from glider.tools.cli.challenge import challenge
 from glider.tools.cli.common import (
     compile_diagnosis,
     json_option,
     print_json,
+    print_result,
     progress,
     say,
     say_assumed,
     vehicle_option,
 )
-from glider.tools.cli import own
 from glider.tools.cli.many import cases_argument, is_many, run_batch_command
 from glider.tools.cli.readings import readings
 from glider.tools.cli.watch import watch
 
-CAUSES, LEAST = 4, 0.01  # shown of a diagnosis at most; the probability of one that is shown
 STEPS = 7  # of a diagnosis: screen, up to three effects, verdict, how far, report
 
 
@@ -45,10 +44,10 @@ def measure(case: Path, report: Path | None, vehicle: str | None, as_json: bool)
         own.measure(theirs, case, as_json)
         return
     from glider.sim_backend.ocean.vehicle import OceanVehicle
+    from glider.tools import api
     from glider.tools.data.errors import need
     from glider.tools.data.files import check_writable
     from glider.tools.data.runs.case import load_case
-    from glider.tools.gap.assess import assess
 
     need("analysis")
     from glider.tools.readings.check import disagreement
@@ -64,42 +63,14 @@ def measure(case: Path, report: Path | None, vehicle: str | None, as_json: bool)
     compile_diagnosis(loaded)
     with progress("gap", 3) as advance:
         advance(1)
-        found = assess(loaded)
+        found = api.measure_gap(loaded)
         advance(1)
         if report is not None:
-            from glider.tools.report.gap import write_report
-
-            write_report(report, found)
+            found.save(report)
         advance(1)
-    if as_json:
-        print_json(found.plain())
-    else:
-        _print_table(found)
+    print_result(found, as_json)
     if report is not None:
         say(f"report: {report}")
-
-
-def _print_table(found) -> None:
-    """Runs by channels, then the parts, on standard output."""
-    from glider.tools.data.runs.origin import flights_of, with_flight
-
-    names, flights = list(found.channels), flights_of(found.case.runs)
-    width = max(8, *(len(name) + 2 for name in names))
-    runs = {run.name: with_flight(run.name, flights) for run in found.runs}
-    first = max(8, *(len(shown) + 2 for shown in runs.values()))
-
-    def line(head: str, cells: list[str]) -> None:
-        click.echo(head.ljust(first) + "".join(cell.rjust(width) for cell in cells))
-
-    line("", [*names, "total"])
-    for run in found.runs:
-        cells = [f"{run.channels[name]:.2f}" if name in run.channels else "-" for name in names]
-        line(runs[run.name], [*cells, f"{run.total:.2f}"])
-    line("all", [*(f"{found.channels[name]:.2f}" for name in names), f"{found.total:.2f}"])
-    click.echo("\nshare of the squared gap")
-    for share in found.where:
-        name = share.subsystem if share.subsystem == share.element else f"{share.subsystem} {share.element}"
-        click.echo(f"  {100.0 * share.share:5.1f} %  {name}")
 
 
 @gap.command()
@@ -173,16 +144,11 @@ def _diagnose_one(
     case: Path, reference: Path | None, out: Path, without: str | None, vehicle: str | None, as_json: bool
 ) -> None:
     """The diagnosis of one case, in `out`."""
-    from glider.sim_backend.ocean.vehicle import OceanVehicle
-    from glider.tools.data.errors import InputError, need
+    from glider.tools import api
+    from glider.tools.data.errors import need
     from glider.tools.data.files import check_writable
     from glider.tools.data.runs.case import load_case
-    from glider.tools.diagnose.against_healthy import form_stands_out
-    from glider.tools.diagnose.diagnosis import diagnose as run_diagnosis
-    from glider.tools.diagnose.diagnosis import plain, write
-    from glider.tools.inference.rules import Rules
-    from glider.tools.report.diagnosis import write_report
-    from glider.tools.report.words import sentence
+    from glider.tools.report.page import REPORT
 
     need("analysis")
     if (theirs := own.own_vehicle(case, vehicle)) is not None:
@@ -191,17 +157,9 @@ def _diagnose_one(
         return
     loaded = load_case(case, vehicle)
     check_writable(out)
-    if isinstance(loaded.vehicle, OceanVehicle):
-        if reference is not None:
-            raise InputError("what changed of an ocean glider asks `glider gap watch --reference CASE0`", source=case)
-        _diagnose_ocean(loaded, out, as_json)
-        return
     say_assumed(loaded.vehicle_name, loaded.assumed)
     compile_diagnosis(loaded)
-    if reference is not None or (without is None and form_stands_out(loaded)):
-        _diagnose_against(loaded, None if reference is None else load_case(reference, vehicle), out, as_json)
-        return
-    done = 0
+    healthy, done = None if reference is None else load_case(reference, vehicle), 0
     with progress("diagnose", STEPS) as advance:
 
         def step(text: str) -> None:
@@ -211,60 +169,14 @@ def _diagnose_one(
                 done += 1
                 advance(1)
 
-        found = run_diagnosis(loaded, step, Rules() if without is None else Rules().without(without))
+        found = api.diagnose(loaded, reference=healthy, without=without, progress=step)
         advance(STEPS - 1 - done)
-        write(found, out)
-        record = write_report(out)
+        found.save(out)
         advance(1)
-    _print_answer(plain(found), sentence(record), out, as_json)
-
-
-def _diagnose_against(case, reference, out: Path, as_json: bool) -> None:
-    """The same against healthy runs (docs/DIAGNOSIS.md, Against healthy runs)."""
-    from glider.tools.diagnose.against_answer import write
-    from glider.tools.diagnose.against_healthy import diagnose_against_healthy
-    from glider.tools.report.pooled import write_pooled_report
-
-    found = diagnose_against_healthy(case, reference, lambda text: print(text, file=sys.stderr))
-    answer = write(found, out)
-    _print_answer(answer, write_pooled_report(out), out, as_json)
-
-
-def _diagnose_ocean(case, out: Path, as_json: bool) -> None:
-    """The same of an ocean glider (docs/OCEAN.md, Diagnosis)."""
-    from glider.tools.report.pooled import write_pooled_report
-    from glider.tools.watch.whole_case import diagnose_ocean, plain, write
-
-    found = diagnose_ocean(case, lambda text: print(text, file=sys.stderr))
-    write(found, out)
-    _print_answer(plain(found), write_pooled_report(out), out, as_json)
-
-
-def _print_answer(answer: dict[str, Any], sentence: str, out: Path, as_json: bool) -> None:
-    """Print the verdict on standard output, or the answer alone as JSON; what limits it on standard error."""
-    from glider.tools.report.page import REPORT
-
-    for caution in answer["cautions"]:
+    for caution in found.cautions:
         say(f"note: {caution}")
-    if as_json:
-        print_json(answer)
-    else:
-        for line in (sentence, *_verdict(answer)):
-            click.echo(line)
+    print_result(found, as_json)
     say(f"answer: {out / 'diagnosis.json'}, report: {out / REPORT}")
-
-
-def _verdict(answer: dict[str, Any]) -> list[str]:
-    """The verdict, causes with their probabilities and groups, and the gap, a line each."""
-    lines = [f"verdict: {answer['verdict']}{''.join(f', {label}' for label in answer['selected'])}"]
-    for n, cause in enumerate(answer["causes"][:CAUSES]):
-        if n == 0 or cause["probability"] >= LEAST:
-            others = [label for label in cause["group"] if label != cause["label"]]
-            confounded = f"  or {', '.join(others)}, which these data cannot distinguish" if others else ""
-            lines.append(f"  {cause['probability']:.2f}  {cause['label']}{confounded}")
-    totals = {name: answer["gap"][name]["total"] for name in ("before", "recalibrated", "after", "floor")}
-    gaps = ", ".join(f"{name} {value:.2f}" for name, value in totals.items() if value is not None)
-    return [*lines, f"gap in tolerances: {gaps}"]
 
 
 @gap.command()
@@ -300,6 +212,7 @@ def report(folder: Path) -> None:
     """Draw report.html again from what `glider gap diagnose` or `glider gap watch` left in DIR; print its verdict."""
     import json
 
+    from glider.tools.api.sentences import verdict_lines
     from glider.tools.data.errors import need
     from glider.tools.diagnose.record import ANSWER, is_pooled
     from glider.tools.report.diagnosis import write_report
@@ -316,7 +229,7 @@ def report(folder: Path) -> None:
         said = write_pooled_report(folder) if is_pooled(folder) else sentence(write_report(folder))
     click.echo(said)
     if not (folder / FILE).is_file():
-        for line in _verdict(json.loads((folder / ANSWER).read_text(encoding="utf-8"))):
+        for line in verdict_lines(json.loads((folder / ANSWER).read_text(encoding="utf-8"))):
             click.echo(line)
     say(f"report: {folder / REPORT}")
 

@@ -2,11 +2,12 @@
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import click
 
 from glider.tools.cli import own
-from glider.tools.cli.common import json_option, print_json, say, vehicle_option
+from glider.tools.cli.common import json_option, print_result, say, vehicle_option
 
 
 @click.command()
@@ -29,6 +30,7 @@ def identify(
     posterior.nc (ArviZ). A model of one's own takes several cases, each a session of its own.
     """
     from glider.sim_backend.ocean.vehicle import OceanVehicle
+    from glider.tools import api
     from glider.tools.data.errors import need
     from glider.tools.data.files import check_writable
     from glider.tools.data.runs.case import load_case
@@ -41,76 +43,15 @@ def identify(
     if len(cases) > 1:
         raise click.UsageError("several cases are for a model of one's own; this vehicle takes one")
     loaded = load_case(cases[0], vehicle, leave_out=True)
-    if isinstance(loaded.vehicle, OceanVehicle):
-        need("analysis")
-        _identify_ocean(loaded, out, as_json)
-        return
-    need("identify")
-    from glider.tools.identify.pipeline import identify as run_identification
+    need("analysis" if isinstance(loaded.vehicle, OceanVehicle) else "identify")
+    from glider.tools.identify.files import VEHICLE
+    from glider.tools.report.page import REPORT
 
-    found = run_identification(loaded, seed, likelihood, lambda text: print(text, file=sys.stderr))
-    for one in found.left_out:
-        say(f"left out: {one}")
+    how: Any = likelihood
+    found = api.identify(loaded, seed=seed, likelihood=how, progress=lambda text: print(text, file=sys.stderr))
     for note in found.notes:
         say(note)
     if out is not None:
-        from glider.tools.identify.files import VEHICLE, write
-        from glider.tools.report.identified import write_report
-
-        write(found, out)
-        write_report(out / "report.html", found)
-        say(f"vehicle: {out / VEHICLE}, report: {out / 'report.html'}")
-    if as_json:
-        print_json(found.plain())
-    else:
-        _tell(found)
-
-
-def _identify_ocean(case, out: Path | None, as_json: bool) -> None:
-    """The same of an ocean glider: no chains, its posterior is close to normal (docs/OCEAN.md, Identification)."""
-    from glider.tools.identify.ocean.files import VEHICLE, plain, write
-    from glider.tools.identify.ocean.identify import identify_ocean
-
-    found = identify_ocean(case, lambda text: print(text, file=sys.stderr))
-    for one in found.left_out:
-        say(f"left out: {one}")
-    if out is not None:
-        write(found, out)
-        say(f"vehicle: {out / VEHICLE}")
-    if as_json:
-        print_json(plain(found))
-        return
-    click.echo(f"{'':<18} {'mean':>11} {'sd':>9}   {'90 % interval':<24} unit")
-    for number in [*found.parameters, found.net_mass]:
-        low, high = number.ci90
-        interval = f"{low:.5g} to {high:.5g}"
-        click.echo(f"{number.name:<18} {number.mean:>11.5g} {number.sd:>9.2g}   {interval:<24} {number.unit}")
-    for finding in found.findings:
-        click.echo(finding.sentence)
-    for weak_direction in found.ridges:
-        click.echo(weak_direction.sentence())
-    if found.next_run is not None:
-        click.echo(f"to part them: {found.next_run['text']}")
-    click.echo(f"vertical water {100.0 * found.water_rms:.2f} cm/s rms over {len(found.water)} runs")
-
-
-def _tell(found) -> None:
-    """The coefficients, and what the runs cannot tell, for a person."""
-    from glider.tools.identify.identifiability import sentences, unidentifiable_directions
-
-    if found.held is not None:
-        before, after = found.held.candidates[0].total, found.held.chosen.total
-        click.echo(
-            f"runs left out: {before:.2f} -> {after:.2f} tolerances, worst in {found.held.worst}; handed out: "
-            f"{found.held.chosen.name} ({found.held.why})"
-        )
-    click.echo(f"{'':<6} {'mean':>10} {'sd':>9}   {'90 % interval':<22} {'R-hat':>6} {'ESS':>7}  unit")
-    for one in found.coefficients:
-        low, high = one.ci90
-        interval = f"{low:.4g} to {high:.4g}"
-        figures = f"{one.name:<6} {one.mean:>10.4g} {one.sd:>9.2g}   {interval:<22}"
-        click.echo(f"{figures} {one.rhat:>6.3f} {one.ess:>7.0f}  {one.unit}")
-    for line in sentences(found.free, found.chains.flat):
-        click.echo(line)
-    for combination in unidentifiable_directions(found.free, found.chains.flat):
-        click.echo(f"  {combination.sentence()}")
+        found.save(out)
+        say(f"vehicle: {out / VEHICLE}{'' if found.ocean else f', report: {out / REPORT}'}")
+    print_result(found, as_json)

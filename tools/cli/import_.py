@@ -95,3 +95,81 @@ def qualisys(files, log, body, vehicle, out, as_json) -> None:
             say(line)
         for path in written:
             click.echo(path)
+
+
+def _import_streams(files, mapping, template, out, as_json, extra, package, read, partial=False) -> None:
+    """What `import rosbag` and `import ardusub` have in common; read: the function that reads one file."""
+    from glider.tools.data.errors import need
+    from glider.tools.data.files import check_writable
+    from glider.tools.data.importers.mapping import write_template
+    from glider.tools.data.importers.streams import TEMPLATE, import_streams
+    from glider.tools.data.runs.overview import lines, overview
+
+    if template is not None:
+        if files or mapping is not None:
+            raise click.UsageError("--template writes a mapping and imports nothing: give neither files nor --map")
+        write_template(template, TEMPLATE)
+        say(f"mapping to fill in: {template}")
+        return
+    if not files or mapping is None:
+        raise click.UsageError("give the logs and --map (--template FILE writes a mapping to fill in)")
+    need(extra, package)
+    folder = files[0].parent / f"{files[0].stem}.case" if out is None else out
+    check_writable(folder)
+    imported = import_streams(list(files), mapping, folder, read, partial)
+    for note in [*imported.notes, *([] if as_json else lines(imported.runs))]:
+        say(note)
+    if as_json:
+        print_json({
+            "columns": [one.plain() for one in overview(imported.runs)],
+            "seconds": [float(run.t[-1] - run.t[0]) for run in imported.runs],
+            "case": str(folder), "files": [str(path) for path in imported.files],
+            "rows": [run.rows for run in imported.runs], "notes": imported.notes,
+        })  # fmt: skip
+    else:
+        for path in imported.files:
+            click.echo(path)
+
+
+map_option = click.option("--map", "mapping", metavar="NAME or FILE", help="Mapping: shipped name or TOML file.")
+template_option = click.option(
+    "--template", type=click.Path(path_type=Path, dir_okay=False), help="Write a mapping to fill in."
+)
+folder_option = click.option(
+    "--out", type=click.Path(path_type=Path), help="Folder for the case.  [default: beside the first file]"
+)
+
+
+@import_.command("rosbag")
+@click.argument("files", metavar="[BAG]...", nargs=-1, type=click.Path(path_type=Path))
+@map_option
+@template_option
+@folder_option
+@json_option
+def rosbag(files, mapping, template, out, as_json) -> None:
+    """Turn ROS 2 bags (SQLite or MCAP), one a run, into a case, by a mapping file (docs/IMPORT.md).
+
+    A bag is its folder with metadata.yaml, or one of its files. With --template a mapping with every key is written,
+    and nothing imported.
+    """
+    from glider.tools.data.importers.rosbag import read_rosbag
+
+    _import_streams(files, mapping, template, out, as_json, "ros", "rosbags", read_rosbag)
+
+
+@import_.command("ardusub")
+@click.argument("files", metavar="[LOG]...", nargs=-1, type=click.Path(path_type=Path))
+@map_option
+@template_option
+@folder_option
+@click.option("--partial", is_flag=True, help="Import what can be read of a cut or damaged log (default: refuse).")
+@json_option
+def ardusub(files, mapping, template, out, partial, as_json) -> None:
+    """Turn logs of ArduSub (DataFlash .BIN or telemetry .tlog), one a run, into a case, by a mapping file.
+
+    The shipped mappings ardusub-bin and ardusub-tlog take attitude, rates and depth. With --template a mapping with
+    every key is written, and nothing imported.
+    """
+    from glider.tools.data.importers.ardusub import read_ardusub
+
+    _import_streams(files, mapping, template, out, as_json, "ardupilot", "pymavlink", read_ardusub, partial)

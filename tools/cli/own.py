@@ -137,9 +137,9 @@ def _size(one: dict[str, Any]) -> str:
 
 def _identified(vehicle: Any, cases: Sequence[Path], out: Path) -> Any:
     """The vehicle identified from cases, as a file in a folder, read again."""
+    from glider.tools.own.check import load_own
     from glider.tools.own.identified import VEHICLE, write
     from glider.tools.own.identify import identify as identify_runs
-    from glider.tools.own.load import load_own
     from glider.tools.own.runs import load_own_runs
 
     write(identify_runs(vehicle, [load_own_runs(case, vehicle.declared) for case in cases], tell), out)
@@ -163,12 +163,18 @@ def identify(vehicle: Any, cases: Sequence[Path], out: Path | None, as_json: boo
         print_json(answer)
         return
     gap = answer["gap"]
-    click.echo(f"runs left out: {gap['before']['total']:.2f} -> {gap['after']['total']:.2f} tolerances; handed out: {answer['handed_out']}")
+    click.echo(
+        f"runs left out: {gap['before']['total']:.2f} -> {gap['after']['total']:.2f} tolerances; "
+        f"handed out: {answer['handed_out']}"
+    )
     for name in (name for name in gap["before"] if name != "total" and gap["before"][name] is not None):
         click.echo(f"  {name:<12} {gap['before'][name]:6.2f} -> {gap['after'][name]:6.2f}")
     click.echo(f"{'':<16} {'file':>10} {'mean':>10} {'sd':>9}   90 % interval")
     for one in answer["parameters"]:
         low, high = one["ci90"]
-        click.echo(f"{one['name']:<16} {one['file']:>10.4g} {one['mean']:>10.4g} {one['sd']:>9.2g}   {low:.4g} to {high:.4g} {one['unit']}")
+        click.echo(
+            f"{one['name']:<16} {one['file']:>10.4g} {one['mean']:>10.4g} {one['sd']:>9.2g}   "
+            f"{low:.4g} to {high:.4g} {one['unit']}"
+        )
     for group in answer["groups"]:
         click.echo(f"these runs do not tell apart: {', '.join(group)}")

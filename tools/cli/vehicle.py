@@ -20,7 +20,9 @@ def vehicle() -> None:
 @vehicle.command()
 @click.argument("out", type=click.Path(path_type=Path, dir_okay=False))
 @click.option("--name", help="Of the vehicle.  [default: the file's]")
-@click.option("--own", "of_own", is_flag=True, help="A commented skeleton of a model of your own: OUT and a .py beside it.")
+@click.option(
+    "--own", "of_own", is_flag=True, help="A commented skeleton of a model of your own: OUT and a .py beside it."
+)
 def new(out: Path, name: str | None, of_own: bool) -> None:
     """Ask for weighed masses, measured lengths and a swing test, one by one, and write a first vehicle file OUT.
 
@@ -103,7 +105,9 @@ def _take(found: "FirstVehicle", asked: "Question", said: str) -> str | None:
 
 @vehicle.command()
 @click.argument("file", type=click.Path(path_type=Path, dir_okay=False))
-@click.option("--case", type=click.Path(path_type=Path, file_okay=False), help="Try it on the first run of this case too.")
+@click.option(
+    "--case", type=click.Path(path_type=Path, file_okay=False), help="Try it on the first run of this case too."
+)
 @json_option
 def check(file: Path, case: Path | None, as_json: bool) -> None:
     """Try a model of one's own: FILE names it. What it declares, what can be asked of it, which causes it can have.

@@ -20,10 +20,10 @@ class InputError(ValueError):
 
 
 class MissingExtra(RuntimeError):
-    """A command needs packages that the base install leaves out."""
+    """What is asked for needs packages that the base install leaves out."""
 
     def __init__(self, package: str, extra: str):
-        super().__init__(f"this command needs {package}: pip install '{DISTRIBUTION}[{extra}]'")
+        super().__init__(f"this needs {package}: pip install '{DISTRIBUTION}[{extra}]'")
 
 
 @functools.cache
@@ -42,9 +42,12 @@ def extras() -> dict[str, tuple[str, ...]]:
     return found
 
 
-def need(extra: str) -> None:
-    """MissingExtra for the first package of an extra that is not installed: said before any work is done."""
-    for package in extras()[extra]:
+def need(extra: str, *packages: str) -> None:
+    """MissingExtra for the first package of an extra that is not installed: said before any work is done.
+
+    packages: those of the extra that are asked for (default: all).
+    """
+    for package in packages or extras()[extra]:
         if find_spec(package) is None:
             raise MissingExtra(package, extra)
 

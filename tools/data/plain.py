@@ -1,12 +1,13 @@
 """Results as JSON knows them."""
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 
 def as_plain(value: Any) -> Any:
     """Numbers and arrays as JSON knows them; what is not finite becomes null."""
-    if isinstance(value, dict):
+    if isinstance(value, Mapping):
         return {str(key): as_plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
         return [as_plain(item) for item in value]

@@ -2,11 +2,10 @@
 
 import functools
 import subprocess
+import sys
 from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
 from pathlib import Path
-
-import glider
 
 DISTRIBUTION = "underwater-glider"  # `glider` on the package index is somebody else's program
 COMMIT_FILE = "commit.txt"  # in the package of a release, written when its wheel is built
@@ -26,7 +25,7 @@ def commit() -> str:
     recorded = files("glider").joinpath(COMMIT_FILE)
     if recorded.is_file():
         return recorded.read_text(encoding="ascii").strip()
-    tree = Path(glider.__file__).resolve().parents[1]
+    tree = Path(str(sys.modules["glider"].__file__)).resolve().parents[1]
     if not (tree / ".git").exists():
         return ""
     command = ["git", "-C", str(tree), "rev-parse", "--short=7", "HEAD"]

@@ -12,6 +12,8 @@ from glider.tools.data.files import write_files
 from glider.tools.data.plain import as_plain
 from glider.tools.diagnose.against_healthy import AgainstHealthy, Comparison
 from glider.tools.diagnose.cautions import below_floor
+from glider.tools.diagnose.correction import links_of
+from glider.tools.diagnose.noise_probes import probes
 from glider.tools.diagnose.record import AGAINST_HEALTHY, ANSWER, UNKNOWN
 from glider.tools.diagnose.shrink import AFTER, BEFORE, FLOOR, RECALIBRATED, by_channel, shrinkage_of
 from glider.tools.gap.measure import RunGap, root_mean_square, run_gap
@@ -72,13 +74,18 @@ def sizes(answer: AgainstHealthy) -> dict[str, dict[str, dict[str, Any]]]:
     return found
 
 
-def places_of(compared: Comparison, chances: dict[str, float]) -> list[dict[str, Any]]:
-    """Where, most probable first: an unknown change lies where the labels lie that come nearest to it."""
+def places_of(compared: Comparison, chances: dict[str, float], links: dict[str, float]) -> list[dict[str, Any]]:
+    """Where, most probable first: an unknown change lies at its link; without one, where the labels lie that come
+    nearest to it."""
     effects, where = compared.problem.kind.catalogue(), dict[tuple[str, str], float]()
     known = {label: p for label, p in chances.items() if label in effects}
-    likeness = 1.0 + chances[UNKNOWN] / max(sum(known.values()), 1e-12)
+    likeness = 1.0 + (chances[UNKNOWN] - sum(links.values())) / max(sum(known.values()), 1e-12)
     for label, p in known.items():
         where[effects[label].place] = where.get(effects[label].place, 0.0) + p * likeness
+    for probe in probes(compared.problem):
+        for link in links_of(probe):
+            place = probe.subsystem, probe.element
+            where[place] = where.get(place, 0.0) + links.get(link, 0.0)
     ranked = sorted(where.items(), key=lambda item: -item[1])
     return [{"subsystem": s, "element": e, "probability": p} for (s, e), p in ranked if p >= LEAST_PROBABILITY]
 
@@ -104,7 +111,7 @@ def plain(found: AgainstHealthy) -> dict[str, Any]:
         "kind": AGAINST_HEALTHY,
         "case": {"name": found.case.folder.resolve().name, "vehicle": found.case.vehicle_name, "runs": len(runs)},
         "verdict": found.verdict,
-        "where": places_of(found.compared, found.probabilities),
+        "where": places_of(found.compared, found.probabilities, found.links),
         "causes": causes,
         "selected": found.selected,
         "gap": table,

@@ -7,7 +7,9 @@ on that run, so that an effect has to shrink what it has not seen:
 
 - no change: what the vehicle file allows;
 - a label's parameters beside that, one label or a few;
-- and with each of these, that something more is left than healthy runs leave: unknown.
+- an error of free form at one link of the chain, in a label's place: unknown;
+- the same beside the best label, and what runs leave beyond healthy ones: the label's own form, as far as it is small
+  beside what the label takes, else unknown.
 """
 
 from collections.abc import Callable, Iterable, Sequence, Set
@@ -20,25 +22,29 @@ from scipy.stats import norm
 from scipy.stats import t as student
 
 from glider.firmware.model.vehicle import FormTable
+from glider.sim_backend.core.effects import effect_layout as ef
 from glider.sim_backend.ocean.vehicle import OceanVehicle
 from glider.tools.data.errors import InputError
 from glider.tools.data.runs import columns
 from glider.tools.data.runs.case import Case
 from glider.tools.data.runs.run import Run
+from glider.tools.diagnose.correction import free_of
 from glider.tools.diagnose.record import NONE, UNKNOWN
 from glider.tools.gap.corrected import submerged
 from glider.tools.gap.regimes import ALL
 from glider.tools.inference.channels import recorded
+from glider.tools.inference.corrected import LINKS
 from glider.tools.inference.fit import bounded_step
+from glider.tools.inference.model import effect_vector
 from glider.tools.inference.parameters import FreeParameter, effect_parameters, model_at, nuisance_parameters
-from glider.tools.inference.prediction_error import HORIZONS, PredictionError
-from glider.tools.inference.problem import Problem, problem_of
+from glider.tools.inference.prediction_error import DIFFERENCE_STEP, HORIZONS, PredictionError
+from glider.tools.inference.problem import Gains, Problem, problem_of
 from glider.tools.inference.vehicle_parameters import Parameters
 
 CAUSE = "cause"
 CHANGED, STRANGE = 0.5, 0.15  # prior probability of a change; that something is left beside what is named
 LEFT = 1.5  # 1 sigma of the logarithm of the mean square that something unknown leaves, times what healthy runs leave
-FORM = 0.2  # of a change, 1 sigma, that is not as its label's equations have it
+FORM = 0.2  # of a change, 1 sigma in amplitude, that is not as its label's equations have it
 SITE = 0.25  # 1 sigma of that logarithm from one place and way of flying to another
 PRIOR_RUNS = 1.0  # runs that what is usual of that logarithm's scatter is worth
 USUAL_SCATTER = 0.5
@@ -46,7 +52,10 @@ LEAST_SCALE = 0.05  # tolerances
 STANDS_OUT = 2.0  # times what noise leaves of healthy runs, in squares, that the form leaves of them: the form decides
 TOTAL = "total"
 REFIT_STEPS, REFIT_FURTHER, MAX_EFFECTS = 6, 4, 3  # labels fitted in full at first, beside others, and effects at most
+REFIT_FORMS, MAX_SHAPES = 2, 3  # free forms fitted in full, and shapes of each at most
 STEPS = 3
+SHARES = np.linspace(0.005, 0.995, 100)  # of a change, in amplitude, that its label leaves
+OWN_FORM = norm.pdf(SHARES, scale=FORM) / norm.pdf(SHARES, scale=FORM).sum()
 CONVERGED_SIGMA = 0.02  # sigma of the priors, by which a step moves nothing any more
 CONFOUNDED_NAT = 6.0  # nat within which labels are not distinguished
 SELECTED_PROBABILITY = 0.9  # probability of a label that is selected beside something unknown
@@ -74,22 +83,21 @@ class HeldOutWindows(PredictionError):
         """Residuals that can be independent: one a window and channel."""
         return float(len(self.cuts[0].first) * len(self.channels))
 
+    def further_columns(
+        self, values: np.ndarray, known: list[np.ndarray], gains: Gains
+    ) -> Iterable[tuple[np.ndarray, np.ndarray]]:
+        """As `columns`, the first ones (known, of every cut) not flown again; gains: of the same model."""
+        n = len(known[0])
+        size = np.where(values + DIFFERENCE_STEP <= self.high, DIFFERENCE_STEP, -DIFFERENCE_STEP)
+        points = [values, *(values + s * row for s, row in zip(size[n:], np.eye(len(values))[n:], strict=True))]
+        Y = self.fly(points, gains, self.cuts)
+        for k, one in enumerate(self.cuts):
+            E = self.residuals(Y[:, k], one)
+            yield E[0], np.concatenate([known[k], (E[1:] - E[0]) / size[n:, None]])
+
     def linearised(self, values: np.ndarray) -> "Linearised":
         """Every run's mean square about values (n,)."""
-        n, runs = len(values), len(self.problem.runs)
-        normal, slope, value = np.zeros((runs, n, n)), np.zeros((runs, n)), np.zeros(runs)
-        squares: list[tuple[np.ndarray, ...]] = []
-        for one, (e, J) in zip(self.cuts, self.columns(values, self.gains(values), self.cuts), strict=True):
-            weight = self.weights(e)[0] / len(self.cuts)
-            run_of, channel_of = self.origins(one)
-            squares.append((e, J, weight, run_of, channel_of))
-            for run in range(runs):
-                own = np.flatnonzero(run_of == run)
-                weighted = J[:, own] * weight[own]
-                normal[run] += weighted @ J[:, own].T
-                slope[run] += weighted @ e[own]
-                value[run] += float(weight[own] @ e[own] ** 2)
-        return Linearised(values, value, slope, normal, self, squares)
+        return Linearised.gathered(values, self, self.columns(values, self.gains(values), self.cuts))
 
 
 @dataclass
@@ -102,6 +110,24 @@ class Linearised:
     normal: np.ndarray  # (runs, n, n)
     windows: HeldOutWindows
     samples: list[tuple[np.ndarray, ...]]
+
+    @classmethod
+    def gathered(cls, values: np.ndarray, windows: "HeldOutWindows", cut_columns: Iterable) -> "Linearised":
+        """From (residuals, columns) of every cut."""
+        n, runs = len(values), len(windows.problem.runs)
+        normal, slope, value = np.zeros((runs, n, n)), np.zeros((runs, n)), np.zeros(runs)
+        samples: list[tuple[np.ndarray, ...]] = []
+        for one, (e, J) in zip(windows.cuts, cut_columns, strict=True):
+            weight = windows.weights(e)[0] / len(windows.cuts)
+            run_of, channel_of = windows.origins(one)
+            samples.append((e, J, weight, run_of, channel_of))
+            for run in range(runs):
+                own = np.flatnonzero(run_of == run)
+                weighted = J[:, own] * weight[own]
+                normal[run] += weighted @ J[:, own].T
+                slope[run] += weighted @ e[own]
+                value[run] += float(weight[own] @ e[own] ** 2)
+        return cls(values, value, slope, normal, windows, samples)
 
     def step(self, free: np.ndarray, weight: float, without: int | None = None) -> np.ndarray:
         """The most probable step (n,) in some of the parameters, by all runs but one; weight of a mean square of 1."""
@@ -193,15 +219,42 @@ def form_stands_out(case: Case) -> bool:
     return form is not None and form.gaps[ALL][TOTAL] ** 2 > STANDS_OUT * form.noise**2
 
 
+@dataclass(frozen=True)
+class FreeForm:
+    """An error at a link of the chain that no label describes: a sum of a few of the corrections' shapes."""
+
+    link: str
+    shapes: tuple[str, ...]
+
+    @property
+    def free(self) -> list[FreeParameter]:
+        """Its coefficients."""
+        return [one for one in free_of(self.link) if one.name in self.shapes]
+
+    @property
+    def prior(self) -> float:
+        """Log probability of this link and of these shapes: all links, and all shapes, are as likely."""
+        return -float(np.log(len(LINKS)) + len(self.shapes) * np.log(ef.N_SHAPES))
+
+    def __str__(self) -> str:
+        return f"{UNKNOWN} at {self.link} with {' and '.join(self.shapes)}"
+
+
 @dataclass
 class HealthyHypothesis:
-    """Labels beside what the vehicle file allows, fitted to the case's runs."""
+    """Labels beside what the vehicle file allows, fitted to the case's runs; and an error of free form."""
 
     labels: tuple[str, ...]
     values: np.ndarray  # (n,) of every free parameter, those of other labels 0
     left: np.ndarray  # (runs,) mean squares of runs left out, their sum a mean over channels and runs
     others: np.ndarray  # (runs, n) values without each run
     sigma: np.ndarray  # (n,) posterior standard deviations, 0 of what is not free
+    form: FreeForm | None = None
+
+    @property
+    def name(self) -> str:
+        """Its labels and its error of free form."""
+        return ", ".join([*self.labels, *([str(self.form)] if self.form else [])]) or NONE
 
     @property
     def mean_square(self) -> float:
@@ -237,11 +290,22 @@ class Comparison:
         """Of a mean square of 1: as many independent residuals, of what is there where that is more than usual."""
         return self.independent / max(mean_square, 1.0)
 
-    def fitted(self, labels: tuple[str, ...], begin: np.ndarray) -> HealthyHypothesis | None:
+    def windows_of(self, labels: tuple[str, ...], form: FreeForm | None = None) -> HeldOutWindows:
+        """Windows with what is free under labels, and behind it the coefficients of a free form."""
+        free, problem = [self.free[k] for k in self.columns_of(labels)], self.problem
+        if form is not None:
+            F = effect_vector(problem.model)
+            F[ef.LINK] = 1.0 + LINKS.index(form.link)
+            problem = replace(problem, model=replace(problem.model, F=F))
+        return HeldOutWindows(problem, free + (form.free if form else []), self.healthy.scales)
+
+    def fitted(
+        self, labels: tuple[str, ...], begin: np.ndarray, form: FreeForm | None = None
+    ) -> HealthyHypothesis | None:
         """Labels led from values (n,) to where they are most probable; None where their flights are lost."""
-        free = self.columns_of(labels)
-        own = HeldOutWindows(self.problem, [self.free[k] for k in free], self.healthy.scales)
-        every, values = np.arange(len(free)), own.clipped(begin[free])
+        free, own = self.columns_of(labels), self.windows_of(labels, form)
+        every = np.arange(len(own.low))
+        values = own.clipped(np.concatenate([begin[free], np.zeros(len(every) - len(free))]))
         best: tuple[float, np.ndarray, Linearised] | None = None
         for _ in range(STEPS):
             at = own.linearised(values)
@@ -262,10 +326,37 @@ class Comparison:
         weight = self.weight(float(at.value.sum()))
         left, steps = at.held_out(every, weight)
         count, sd = len(self.free), np.zeros(len(self.free))
-        sd[free] = np.sqrt(np.diag(np.linalg.inv(weight * at.normal.sum(axis=0) + np.eye(len(free)))))
+        known = slice(len(free))  # the coefficients of a free form are no parameters of the answer
+        sd[free] = np.sqrt(np.diag(np.linalg.inv(weight * at.normal.sum(axis=0) + np.eye(len(every)))))[known]
         whole, others = np.zeros(count), np.zeros((len(left), count))
-        whole[free], others[:, free] = values + at.step(every, weight), values + steps
-        return HealthyHypothesis(labels, whole, left, others, sd)
+        whole[free], others[:, free] = (values + at.step(every, weight))[known], (values + steps)[:, known]
+        return HealthyHypothesis(labels, whole, left, others, sd, form)
+
+    def free_forms(self, begin: HealthyHypothesis) -> list[FreeForm]:
+        """Errors of free form beside a hypothesis, those that promise most first: at each link shapes are added while
+        they bring more than the choice among them costs."""
+        own, found = self.windows_of(begin.labels), []
+        values = own.clipped(begin.values[self.columns_of(begin.labels)])
+        bare, n, gains = own.linearised(values), len(values), own.gains(values)
+        weight, columns = self.weight(begin.mean_square), [one[1] for one in bare.samples]
+        for link in LINKS:
+            shapes = [one.name for one in free_of(link)]
+            whole = self.windows_of(begin.labels, FreeForm(link, tuple(shapes)))
+            start = np.concatenate([values, np.zeros(len(shapes))])
+            at = Linearised.gathered(start, whole, whole.further_columns(start, columns, gains))
+            chosen, best = list[int](), self.nat_of(float(bare.held_out(np.arange(n), weight)[0].sum()))
+            while len(chosen) < MAX_SHAPES:
+                tried = []
+                for k in set(range(len(shapes))) - set(chosen):
+                    free = np.concatenate([np.arange(n), n + np.array([*chosen, k])])
+                    tried.append((self.nat_of(float(at.held_out(free, weight)[0].sum())), k))
+                nat, k = max(tried)
+                if nat - np.log(ef.N_SHAPES) <= best:
+                    break
+                chosen, best = [*chosen, k], nat - float(np.log(ef.N_SHAPES))
+            if chosen:
+                found.append((best, FreeForm(link, tuple(shapes[k] for k in chosen))))
+        return [form for _, form in sorted(found, key=lambda one: -one[0])]
 
     def predicted_gain(self, begin: HealthyHypothesis) -> list[tuple[float, str, np.ndarray]]:
         """Labels beside a hypothesis by one linear step, best first: mean square of runs left out, label, values."""
@@ -280,21 +371,36 @@ class Comparison:
 
     def nat(self, one: HealthyHypothesis) -> float:
         """Log predictive density of runs left out, their scale known from so many healthy runs only."""
+        return self.nat_of(one.mean_square)
+
+    def nat_of(self, mean_square: float) -> float:
+        """The same of a mean square of runs left out."""
         count, freedom = self.independent, self.healthy.freedom
-        return -0.5 * (freedom + count) * float(np.log1p(count * max(one.mean_square, 1e-9) / freedom))
+        return -0.5 * (freedom + count) * float(np.log1p(count * max(mean_square, 1e-9) / freedom))
 
     def leftover(self, one: HealthyHypothesis) -> tuple[float, float]:
-        """Log densities of what runs left out leave: where that is what healthy runs leave, and where it is more."""
+        """Log densities of what runs left out leave: where that is what healthy runs leave, and where it is more.
+
+        What a label leaves is a share of the change, in amplitude: half-normal by FORM where the label is right, any
+        from 0 to 1 where it stands in for something unknown.
+        """
         healthy = self.healthy
         scale = np.sqrt(healthy.scatter**2 * (1.0 / healthy.count + 1.0 / len(one.left)) + SITE**2)
-        if one.labels:
-            scale = float(np.hypot(scale, np.log1p(FORM**2 * max(self.bare - one.mean_square, 0.0))))
-        at = np.log(max(one.mean_square, 1e-9)) - max(healthy.level, 0.0)
-        shifts = np.linspace(0.0, 4.0 * LEFT, 121)
-        prior = 2.0 * norm.pdf(shifts, scale=LEFT) * (shifts[1] - shifts[0])
-        nothing = float(student.logpdf(max(at, 0.0) / scale, healthy.freedom))
-        more = float(logsumexp(student.logpdf((at - shifts) / scale, healthy.freedom), b=prior))
-        return nothing, more
+        at, usual = np.log(max(one.mean_square, 1e-9)), np.exp(healthy.level)
+        if not one.labels:
+            shifts = np.linspace(0.0, 4.0 * LEFT, 121)
+            prior = 2.0 * norm.pdf(shifts, scale=LEFT) * (shifts[1] - shifts[0])
+            nothing = float(student.logpdf(max(at - healthy.level, 0.0) / scale, healthy.freedom))
+            more = student.logpdf((at - healthy.level - shifts) / scale, healthy.freedom)
+            return nothing, float(logsumexp(more, b=prior))
+        away = (at - np.log(usual + SHARES**2 * max(self.bare - usual, 0.0))) / scale
+        nothing = float(logsumexp(student.logpdf(np.maximum(away, 0.0), healthy.freedom), b=OWN_FORM))
+        return nothing, float(logsumexp(student.logpdf(away, healthy.freedom), b=1.0 / len(SHARES)))
+
+    def share(self, one: HealthyHypothesis, free: HealthyHypothesis) -> float:
+        """Of the change, in amplitude, what a free form takes beside a hypothesis."""
+        change = max(self.bare - free.mean_square, 1e-9)
+        return float(np.sqrt(np.clip((one.mean_square - free.mean_square) / change, 0.0, 1.0)))
 
 
 @dataclass
@@ -320,6 +426,14 @@ class Weighed:
                   for label in one.labels}  # fmt: skip
         return [label for label in one.labels if within[label] >= SELECTED_PROBABILITY]
 
+    def links(self) -> dict[str, float]:
+        """Probability that something unknown enters at a link of the chain, by link."""
+        whole, found = float(logsumexp([*self.alone, *self.beside])), dict[str, float]()
+        for one, beside in zip(self.listed, self.beside, strict=True):
+            if one.form is not None:
+                found[one.form.link] = found.get(one.form.link, 0.0) + float(np.exp(beside - whole))
+        return found
+
     def probabilities(self) -> dict[str, float]:
         """Of none, of each label as the main cause, and of unknown."""
         whole = float(logsumexp([*self.alone, *self.beside]))
@@ -337,11 +451,24 @@ def weigh(compared: Comparison, listed: list[HealthyHypothesis]) -> Weighed:
     nothing = listed[0]
     kept = [nothing, *(one for one in listed[1:] if one.mean_square < nothing.mean_square)]
     for one in kept:
-        prior = len(one.labels) * np.log(CHANGED / len(compared.places)) if one.labels else np.log1p(-CHANGED)
         usual, more = compared.leftover(one)
-        at = compared.nat(one) + float(prior)
-        alone.append(at + usual + float(np.log1p(-STRANGE)))
-        beside.append(at + more + float(np.log(STRANGE)))
+        usual, more = usual + float(np.log1p(-STRANGE)), more + float(np.log(STRANGE))
+        at, either = compared.nat(one), float(np.logaddexp(usual, more))
+        if one.form is not None:
+            at += one.form.prior
+        if one.form is not None and not one.labels:
+            alone.append(-np.inf)
+            beside.append(at + float(np.log(CHANGED * STRANGE)) + either)
+            continue
+        at += float(len(one.labels) * np.log(CHANGED / len(compared.places)) if one.labels else np.log1p(-CHANGED))
+        if one.form is not None:  # its label's own form, or something unknown
+            label = next(other for other in kept if other.labels == one.labels and other.form is None)
+            share = compared.share(label, one)
+            own, other = norm.logpdf(share, scale=FORM) + np.log(2.0 * (1.0 - STRANGE)), np.log(STRANGE)
+            more = float(np.logaddexp(usual + other, more))
+            usual += float(own)
+        alone.append(at + usual)
+        beside.append(at + more)
     return Weighed(kept, alone, beside)
 
 
@@ -363,6 +490,12 @@ def hypotheses(compared: Comparison, say: Callable[[str], None]) -> list[Healthy
             break
         best = leading
         say(f"{', '.join(best.labels)}: {best.mean_square:.2f} times")
+    for one in [nothing, best] if best.labels else [nothing]:
+        for form in compared.free_forms(one)[:REFIT_FORMS]:
+            free = compared.fitted(one.labels, one.values, form)
+            if free is not None and free.mean_square < one.mean_square:
+                listed.append(free)
+                say(f"{free.name}: {free.mean_square:.2f} times")
     return listed
 
 
@@ -387,6 +520,7 @@ class AgainstHealthy:
     best: HealthyHypothesis
     evidence: dict[str, float]  # nat over no change
     left: dict[str, float]  # by hypothesis, the mean square of runs left out over what healthy runs leave
+    links: dict[str, float]  # probability of something unknown at a link of the chain
 
     @property
     def case(self) -> Case:
@@ -422,7 +556,7 @@ def diagnose_against_healthy(
     first = max(chances, key=lambda name: chances[name])
     best = weighed.best(first)
     verdict = first if first in (NONE, UNKNOWN) else CAUSE
-    singles = {one.labels[0]: compared.nat(one) for one in listed if len(one.labels) == 1}
+    singles = {one.labels[0]: compared.nat(one) for one in listed if len(one.labels) == 1 and one.form is None}
     least = singles.get(first, np.inf) - CONFOUNDED_NAT
     near = [label for label in sorted(singles, key=lambda n: -singles[n]) if singles[label] > least and label != first]
     selected = weighed.certain(best) if verdict == UNKNOWN else list(best.labels)
@@ -430,5 +564,5 @@ def diagnose_against_healthy(
     return AgainstHealthy(
         compared, healthy, verdict, chances, [first, *near] if verdict == CAUSE else [], selected, listed[0], best,
         {label: nat - bare for label, nat in singles.items()},
-        {", ".join(one.labels) or NONE: one.mean_square for one in listed},
+        {one.name: one.mean_square for one in listed}, weighed.links(),
     )  # fmt: skip

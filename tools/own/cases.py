@@ -4,8 +4,9 @@ from pathlib import Path
 
 from glider.tools.data.runs.case import CASE_FILE
 from glider.tools.data.sources import read_text
+from glider.tools.own.check import load_own
 from glider.tools.own.files import is_own
-from glider.tools.own.load import LoadedVehicle, load_own
+from glider.tools.own.load import LoadedVehicle
 from glider.tools.own.runs import case_table
 
 
@@ -26,4 +27,3 @@ def own_vehicle(case: Path, wanted: str | None) -> LoadedVehicle | None:
         return None  # the strict reader of cases says what is wrong
     path = folder / named
     return load_own(path) if path.is_file() and is_own(read_text(path)) else None
-

@@ -1,13 +1,14 @@
 """A user's model tried before it is used: shapes, numbers, purity, smoothness; errors name the user's file and line."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from glider.tools.data.errors import InputError
 from glider.tools.own.declare import USUAL_START
-from glider.tools.own.load import LoadedVehicle, called
+from glider.tools.own.load import LoadedVehicle, called, read_own
 
 TRIED, SEED, STEP_SECONDS = 4, 20260, 0.05  # states about rest; of their draws; s
 SMOOTH_STEPS, SMOOTH = (1e-3, 1e-5), 0.3  # of a parameter's uncertainty; by which its two derivatives may differ
@@ -35,6 +36,13 @@ def trials(vehicle: LoadedVehicle) -> list[Trial]:
     return found
 
 
+def load_own(path: Path) -> LoadedVehicle:
+    """A vehicle file with `model`, tried; ConfigError or InputError, one line, where file or model cannot be used."""
+    found = read_own(path)
+    found.notes += check_model(found)
+    return found
+
+
 def check_model(vehicle: LoadedVehicle) -> list[str]:
     """What a model is short of, a line each; InputError where it cannot be used at all."""
     if vehicle.level == 0:
@@ -54,7 +62,7 @@ def check_model(vehicle: LoadedVehicle) -> list[str]:
         if count:
             notes.append(f"{name} has no finite answer at {count} of {len(points)} states tried about rest")
     _pure(vehicle, motion, points)
-    return notes + _rough(vehicle, motion, points[-1])
+    return notes + _not_smooth(vehicle, motion, points[-1])
 
 
 def arguments(name: str, point: Trial) -> tuple[Any, ...]:
@@ -69,7 +77,9 @@ def _call(vehicle: LoadedVehicle, name: str, given: tuple[Any, ...], wanted: int
     try:
         array = np.asarray(found, dtype=np.float64)
     except (TypeError, ValueError):
-        raise InputError(f"{name}: expected {wanted} numbers, got {type(found).__name__}", source=vehicle.source) from None
+        raise InputError(
+            f"{name}: expected {wanted} numbers, got {type(found).__name__}", source=vehicle.source
+        ) from None
     if array.shape != (wanted,):
         what = "outputs" if name == "measure" else "states"
         raise InputError(
@@ -122,7 +132,7 @@ def _first_bad(vehicle: LoadedVehicle, name: str, point: Trial) -> str:
     return names[int(np.flatnonzero(~np.isfinite(found))[0])]
 
 
-def _rough(vehicle: LoadedVehicle, motion: str, point: Trial) -> list[str]:
+def _not_smooth(vehicle: LoadedVehicle, motion: str, point: Trial) -> list[str]:
     """Parameters in which the motion is not smooth: two difference steps disagree."""
     notes = []
     wanted = len(vehicle.declared.states)

@@ -75,13 +75,15 @@ def _sources(model: Any) -> tuple[str, str]:
     return KERNELS.read_text(encoding="utf-8") + (STEP_SOURCE if motion == "step" else DERIVATIVE_SOURCE), motion
 
 
+def _as_array(function: Callable[..., Any]) -> Callable[..., np.ndarray]:
+    """A function whose answer may be any sequence, as one that returns float64."""
+    return lambda *given: np.asarray(function(*given), dtype=np.float64)
+
+
 def plain(model: Any, why: str) -> Kernels:
     """The observer in plain Python."""
     source, _ = _sources(model)
-    functions = {
-        name: (lambda one: lambda *given: np.asarray(one(*given), dtype=np.float64))(one)
-        for name, one in _functions(model).items()
-    }
+    functions = {name: _as_array(one) for name, one in _functions(model).items()}
     made = _module(f"glider_own_plain_{id(model)}", source, KERNELS, functions)
     return Kernels(made.filter_run, made.follow_run, made.fly_run, made.advance, functions["measure"], False, why)
 
@@ -112,9 +114,9 @@ def _reason(error: Exception) -> str:
 
 
 def _compiled(model: Any, path: Path, attribute: str, tried: tuple[np.ndarray, ...]) -> Kernels:
-    from glider.firmware.core import jit  # sets Numba's cache folder
-
     import numba
+
+    from glider.firmware.core import jit  # sets Numba's cache folder
 
     user = path.read_bytes()
     source, motion = _sources(model)
@@ -127,7 +129,7 @@ def _compiled(model: Any, path: Path, attribute: str, tried: tuple[np.ndarray, .
             from glider.tools.data.files import write_bytes
 
             write_bytes(file, text)
-    options = {"cache": True, "nogil": True, "error_model": "numpy"}
+    options: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
     theirs = _user_module(kept, key, path.parent)
     for name, value in list(vars(theirs).items()):
         if isinstance(value, types.FunctionType) and value.__module__ == theirs.__name__:
@@ -151,7 +153,8 @@ def _user_module(kept: Path, key: str, beside: Path) -> types.ModuleType:
     """A copy of the user's module, whose functions may be replaced by compiled ones; its neighbours can be imported."""
     name = f"glider_own_model_{key}"
     spec = importlib.util.spec_from_file_location(name, kept)
-    assert spec is not None and spec.loader is not None
+    assert spec is not None
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     sys.path.insert(0, str(beside))

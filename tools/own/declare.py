@@ -110,7 +110,7 @@ class Declaration:
     states: tuple[State, ...] = ()
     noises: tuple[Noise, ...] = ()
     horizon: float | None = None  # s: of the windows that gaps are measured on; None: by the model's time constants
-    start: Mapping[str, float] = field(default_factory=dict)  # 1 sigma of outputs known at the start, 0 at rest
+    start: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # outputs known at the start: value, 1 sigma
 
     def index(self, what: str, name: str) -> int:
         """Place of a name in a list, `inputs` to `noises`."""
@@ -123,17 +123,21 @@ def column_of(name: str, unit: str) -> str:
     return name if not suffix or name.endswith(f"_{suffix}") or unit in ("1", "-") else f"{name}_{suffix}"
 
 
+def _named(name: str, row: Any) -> Any:
+    """An entry of a mapping, name -> unit, (unit, ...) or {key: value}, as one of a list."""
+    if isinstance(row, Mapping):
+        return {"name": name, **row}
+    return (name, *row) if isinstance(row, (tuple, list)) else (name, row)
+
+
 def _entries(given: Any, kind: type[Entry], what: str) -> tuple[Entry, ...]:
     """A list as a user writes it, as entries of one class; DeclarationError where one cannot be read."""
     if isinstance(given, Mapping):
-        given = [
-            (name, *one) if isinstance(one, (tuple, list)) else ({"name": name, **one} if isinstance(one, Mapping)
-            else (name, one)) for name, one in given.items()
-        ]  # fmt: skip
+        given = [_named(name, one) for name, one in given.items()]
     if isinstance(given, str) or not isinstance(given, Sequence):
         raise DeclarationError(f"{what}: expected a list or a mapping name -> unit, got {type(given).__name__}")
     found: list[Entry] = []
-    known = {one.name for one in fields(kind)}
+    known = {column.name for column in fields(kind)}
     for n, one in enumerate(given):
         where = f"{what}[{n}]"
         if isinstance(one, kind):
@@ -146,7 +150,7 @@ def _entries(given: Any, kind: type[Entry], what: str) -> tuple[Entry, ...]:
                 raise DeclarationError(f"{where}: {'no name' if 'name' not in one else 'unknown key ' + unknown[0]}")
             made = kind(**one)
         elif isinstance(one, (tuple, list)) and 1 <= len(one) <= 4:
-            made = kind(*one) if len(one) <= 2 or kind is not Parameter else kind(one[0], one[1], *map(float, one[2:]))
+            made = kind(*one)
         elif all(hasattr(one, name) for name in ("name", "unit")):
             made = kind(**{name: getattr(one, name) for name in known if hasattr(one, name)})
         else:

@@ -18,7 +18,10 @@ from glider.tools.own.runs import OwnRun
 
 ANSWER, CORRECTED = "diagnosis.json", "corrected.toml"
 NINETY = 1.645
-GROUP_MASS, MOST_GROUP = 0.9, 3  # of the probability of causes that a group holds; labels in it that are still an answer
+GROUP_MASS, MOST_GROUP = (
+    0.9,
+    3,
+)  # of the probability of causes that a group holds; labels in it that are still an answer
 SELECTED = 0.9  # probability that an effect of this label, or of its group, is there
 LEAST_PROBABILITY = 0.005
 KIND = "own"
@@ -38,7 +41,7 @@ def group_of(found: Posterior) -> list[str]:
     """The smallest set of labels that holds most of the probability of the causes, most probable first."""
     known = sorted(((p, label) for label, p in found.chances.items() if label not in (NONE, UNKNOWN)), reverse=True)
     total, group = sum(p for p, _ in known), list[str]()
-    for p, label in known:
+    for _, label in known:
         if total <= 0.0 or sum(found.chances[one] for one in group) >= GROUP_MASS * total:
             break
         group.append(label)
@@ -65,7 +68,6 @@ def plain(vehicle: LoadedVehicle, observer: Observer, found: Posterior, case: st
         {"label": label, "probability": p, "group": group if group[:1] == [label] else [label],
          "parameters": {label: sizes[label]} if label in sizes else {}}
         for label, p in sorted(found.chances.items(), key=lambda one: -one[1])
-        if p >= LEAST_PROBABILITY or label in (NONE, UNKNOWN)
     ]  # fmt: skip
     gap, corrected = _gaps(observer, healthy, chosen, selected, found)
     where: dict[tuple[str, str], float] = {}
@@ -74,9 +76,11 @@ def plain(vehicle: LoadedVehicle, observer: Observer, found: Posterior, case: st
             where[effects[label].where] = where.get(effects[label].where, 0.0) + p
     cautions = list(observer.notes)
     if vehicle.file.identified is None:
-        cautions.append("the vehicle file is not identified: `glider identify` on healthy runs says what it leaves of them")
+        cautions.append(
+            "the vehicle file is not identified: `glider identify` on healthy runs says what it leaves of them"
+        )
     if len(group) > MOST_GROUP and verdict == "cause":
-        cautions.append(f"{len(group)} labels explain these runs alike: {', '.join(group)}")
+        cautions.append(f"{len(group)} labels explain these runs confounded: {', '.join(group)}")
     if not vehicle.kernels.compiled:
         cautions.append(f"the model runs as plain Python, some hundred times slower: {vehicle.kernels.why}")
     return {
@@ -105,8 +109,13 @@ def _of_verdict(found: Posterior, verdict: str) -> Hypothesis:
 
 def _selected(found: Posterior, label: str, group: Sequence[str]) -> bool:
     """Whether the label, or one that is as good, is in nearly every probable hypothesis."""
-    alike = [label, *(group if label in group else [])]
-    return float(sum(w for w, one in zip(found.weights, found.hypotheses, strict=True) if set(alike) & set(one.labels))) >= SELECTED
+    confounded = [label, *(group if label in group else [])]
+    return (
+        float(
+            sum(w for w, one in zip(found.weights, found.hypotheses, strict=True) if set(confounded) & set(one.labels))
+        )
+        >= SELECTED
+    )
 
 
 def _sizes(found: Posterior, effects) -> dict[str, dict[str, Any]]:
@@ -164,7 +173,9 @@ def _numbers(observer: Observer, point: ModelPoint) -> dict[str, Any]:
     theta = {one.name: float(value) for one, value in zip(declared.parameters, point.theta, strict=True)}
     rows = ("gain", "bias", "drift", "lag", "delay")
     sensors = {
-        one.name: {name: float(point.reading[k, n]) for k, name in enumerate(rows) if point.reading[k, n] != base.reading[k, n]}
+        one.name: {
+            name: float(point.reading[k, n]) for k, name in enumerate(rows) if point.reading[k, n] != base.reading[k, n]
+        }
         for n, one in enumerate(declared.outputs)
     }
     inputs = {declared.inputs[n].name: wrong for n, wrong in point.driven.items()}
@@ -198,10 +209,15 @@ def sentence(answer: dict[str, Any]) -> str:
     if answer["verdict"] == NONE:
         return "nothing beyond what healthy runs leave"
     if answer["verdict"] == UNKNOWN:
-        return f"more is left than healthy runs leave, and no label explains it ({answer['gap']['before']['total']:.2f} tolerances)"
+        left = answer["gap"]["before"]["total"]
+        return f"more is left than healthy runs leave, and no label explains it ({left:.2f} tolerances)"
     cause = next(one for one in answer["causes"] if one["label"] not in (NONE, UNKNOWN))
     size = cause["parameters"].get(cause["label"])
-    told = "" if size is None else f" {size['estimate']:+.3g} {size['unit']} (90 %: {size['ci90'][0]:.3g} to {size['ci90'][1]:.3g})"
+    size_text = (
+        ""
+        if size is None
+        else f" {size['estimate']:+.3g} {size['unit']} (90 %: {size['ci90'][0]:.3g} to {size['ci90'][1]:.3g})"
+    )
     others = [label for label in cause["group"] if label != cause["label"]]
-    alike = f"; these runs do not tell it from {', '.join(others)}" if others else ""
-    return f"{cause['label']}{told}, probability {cause['probability']:.2f}{alike}"
+    confounded = f"; these runs do not tell it from {', '.join(others)}" if others else ""
+    return f"{cause['label']}{size_text}, probability {cause['probability']:.2f}{confounded}"

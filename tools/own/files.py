@@ -114,7 +114,13 @@ def decode_own(text: str, source: str) -> OwnVehicle:
 
 def _check_rows(text: str, source: str) -> None:
     """ConfigError of the row of a table of names that is wrong, with its name."""
-    rows = {"parameters": ParameterTable, "sensors": SensorTable, "inputs": InputTable, "noise": NoiseTable, "start": StartTable}
+    rows = {
+        "parameters": ParameterTable,
+        "sensors": SensorTable,
+        "inputs": InputTable,
+        "noise": NoiseTable,
+        "start": StartTable,
+    }
     given = tomllib.loads(text)
     for table, kind in rows.items():
         for name, row in given.get(table, {}).items() if isinstance(given.get(table), dict) else ():
@@ -123,7 +129,7 @@ def _check_rows(text: str, source: str) -> None:
             except msgspec.ValidationError as error:
                 said, _, place = str(error).partition(" - at `$")
                 key = f"{table}.{name}{place.rstrip('`')}"
-                line = locate(text, key.split("."))
+                line = locate(text, [*key.split(".")])
                 raise ConfigError(source, said[:1].lower() + said[1:], key=key, line=line) from None
 
 
@@ -141,8 +147,8 @@ def declared_with(declared: Declaration, given: OwnVehicle, text: str, source: P
             if name not in entries:
                 known = ", ".join(entries) or "none"
                 line = locate(text, [table, name])
-                raise ConfigError(str(source), f"the model declares no such name (it has {known})", key=f"{table}.{name}",
-                                  line=line)  # fmt: skip
+                message = f"the model declares no such name (it has {known})"
+                raise ConfigError(str(source), message, key=f"{table}.{name}", line=line)
             values = {
                 key: value
                 for key, value in msgspec.structs.asdict(row).items()

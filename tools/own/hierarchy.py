@@ -120,10 +120,13 @@ def expand(
 
 
 def inflation(found: Sequence[Expansion]) -> np.ndarray:
-    """Variance inflation (y + 1,) by channel, and of all together: what scores of windows or of parts of them vary by,
-    whichever is more, over what independent errors' would: values of a run's own bring the score of a window to nothing.
-    Of all together beside the channels' own: what channels have in common."""
-    blocks, diagonal = sum(one.blocks for one in found), sum(one.diagonal for one in found)
+    """Variance inflation (y + 1,) by channel, and of all together beside it: what channels have in common.
+
+    What scores of windows or of parts of them vary by, whichever is more, over what independent errors' would: values
+    of a run's own bring the score of a whole window to nothing.
+    """
+    blocks = np.sum([one.blocks for one in found], axis=0)
+    diagonal = np.sum([one.diagonal for one in found], axis=0)
     out = np.ones(len(diagonal))
     for row in range(len(out)):
         seen = diagonal[row] > 1e-9 * max(float(diagonal[row].max(initial=0.0)), 1e-300)
@@ -153,7 +156,7 @@ class Pooled:
 
     @classmethod
     def of(cls, found: Sequence[Expansion], V: np.ndarray) -> "Pooled":
-        return cls(sum(one.curvature for one in found), -sum(one.offset for one in found),
+        return cls(np.sum([one.curvature for one in found], axis=0), -np.sum([one.offset for one in found], axis=0),
                    sum(one.constant for one in found), V)  # fmt: skip
 
     def covariance(self, V: np.ndarray | None = None) -> np.ndarray:

@@ -1,11 +1,11 @@
 """What identification found as files: identified.toml (the vehicle file, with its new numbers) and identified.json."""
 
 import json
+import tomllib
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tomllib
 
 from glider.tools.data.files import write_files
 from glider.tools.data.plain import as_plain
@@ -103,8 +103,10 @@ def plain(found: Identified) -> dict[str, Any]:
         if one.family == "parameter":
             start = found.vehicle.declared.parameters[found.vehicle.declared.index("parameters", one.name)].value
         mean, error = start + float(found.values[k] * one.spread), float(sd[k] * one.spread)
-        rows.append({"name": one.label, "mean": mean, "sd": error, "ci90": [mean - NINETY * error, mean + NINETY * error],
-                     "unit": one.unit, "file": start, "runs": [start + float(row[k] * one.spread) for row in found.run_values]})  # fmt: skip
+        ends = [mean - NINETY * error, mean + NINETY * error]
+        runs = [start + float(row[k] * one.spread) for row in found.run_values]
+        rows.append({"name": one.label, "mean": mean, "sd": error, "ci90": ends, "unit": one.unit, "file": start,
+                     "runs": runs})  # fmt: skip
     names = [one.name for one in found.vehicle.declared.outputs]
 
     def gap(table: np.ndarray) -> dict[str, float | None]:

@@ -1,4 +1,4 @@
-"""A user's vehicle identified from healthy runs: shared values, what is each run's own, how runs differ, noise levels."""
+"""A user's vehicle identified from healthy runs: shared values, each run's own, how runs differ, noise levels."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -7,21 +7,31 @@ import numpy as np
 
 from glider.tools.own.declare import RUN, Declaration
 from glider.tools.own.effects import PARAMETER, Effect, moved, standard_effects
-from glider.tools.own.hierarchy import ChannelErrors, Expansion, Pooled, expand, inflation, learn_scatter, marginalised, run_values
+from glider.tools.own.hierarchy import (
+    ChannelErrors,
+    Expansion,
+    Pooled,
+    expand,
+    inflation,
+    learn_scatter,
+    marginalised,
+    run_values,
+)
 from glider.tools.own.load import LoadedVehicle
 from glider.tools.own.observer import Observer, observer_of
 from glider.tools.own.runs import OwnRun
 
-ROUNDS = 12
+ROUNDS = 20
+MIN_SCATTER_RUNS = 3  # from fewer nothing is learned of how runs differ
 FILE_PRIOR = 2.0  # times the file's uncertainties: what the shared values may be
 USUAL_SCATTER, USUAL_OWN_SCATTER = 0.02, 0.5  # spreads, from run to run; of what is declared a number of each run
 LONGEST_MOVE = 2.0  # spreads a round
 CONVERGED_GAIN = 0.5  # of -2 log posterior: no further round
-SETTLED = 0.05  # e-folds of what is left, by which it changes no more
+CONVERGED_SCALE = 0.05  # e-folds of what is left, by which it changes no more
 LEAST_SCALE = 0.02  # tolerances: less than that no channel is known to be left with
 LEVEL_ROWS, PLAIN_ROWS = 3_000, 600  # of runs from which noise levels are found: compiled, plain Python
 LEVEL_STEPS = (0.8, 0.4)  # e-folds
-LOUDEST = 4.0  # e-folds from the file's noise, at most
+MAX_LEVEL_SHIFT = 4.0  # e-folds from the file's noise, at most
 
 
 @dataclass
@@ -64,7 +74,8 @@ def nuisance_of(observer: Observer) -> list[Effect]:
 def usual_scatter(declared: Declaration, effects: Sequence[Effect]) -> np.ndarray:
     """1 sigma (effects,) in spreads of how runs differ, before any is seen."""
     own = {one.name for one in declared.parameters if one.scope == RUN}
-    return np.array([USUAL_OWN_SCATTER if one.family == PARAMETER and one.name in own else USUAL_SCATTER for one in effects])
+    at_run = [one.family == PARAMETER and one.name in own for one in effects]
+    return np.where(at_run, USUAL_OWN_SCATTER, USUAL_SCATTER)
 
 
 def identify(
@@ -85,20 +96,24 @@ def identify(
     fit_levels(observer, say)
     scales = np.maximum(np.sqrt(np.nanmean(before**2, axis=0)), LEAST_SCALE)
     errors, eta = ChannelErrors(np.where(np.isfinite(scales), scales, 1.0), np.ones(len(scales))), 1.0
+    differ = False  # how runs differ is learned when what they share is found: else it takes what they share for it
     for round_ in range(ROUNDS):
         found = [expand(observer, n, nuisance, own[n], errors, horizon) for n in range(count)]
         *_, eta = inflation(found)
         warm = [one.tempered(eta) for one in found]
-        if round_ >= 2 and count > 2:
+        if differ:
             scatter = learn_scatter(warm, V, usual)
         search = _Search(observer, nuisance, warm, scatter, eta, V, limits, errors, horizon)
         step = Pooled.of([marginalised(one, scatter) for one in warm], V).mean() - values
         values, own, gain = search.along(values, own, np.clip(step, -LONGEST_MOVE, LONGEST_MOVE))
-        settled, errors = errors, left_by(found, errors)
+        before_errors, errors = errors, left_by(found, errors)
         said = f"round {round_ + 1}: gain {gain:.1f}, {np.sqrt(np.mean(errors.scales**2)):.2f} tolerances left"
         say(f"{said}, inflation {', '.join(f'{one:.0f}' for one in errors.inflation)} and {eta:.1f}")
-        if round_ >= 3 and gain < CONVERGED_GAIN and np.abs(np.log(errors.scales / settled.scales)).max() < SETTLED:
-            break
+        if gain < CONVERGED_GAIN and np.abs(np.log(errors.scales / before_errors.scales)).max() < CONVERGED_SCALE:
+            if differ or count < MIN_SCATTER_RUNS:
+                break
+            differ = True
+        differ = differ or (round_ == ROUNDS // 2 and count >= MIN_SCATTER_RUNS)
     found = [expand(observer, n, nuisance, own[n], errors, horizon) for n in range(count)]
     *_, eta = inflation(found)
     warm = [marginalised(one.tempered(eta), scatter) for one in found]
@@ -110,8 +125,9 @@ def identify(
 
 
 def left_by(found: Sequence[Expansion], errors: ChannelErrors) -> ChannelErrors:
-    """What runs leave, channel by channel, at the points where they were expanded; `errors`: in what they were counted."""
-    squares, samples = sum(one.squares for one in found), sum(one.samples for one in found)
+    """What runs leave, channel by channel, where they were expanded; `errors`: in what they were counted."""
+    squares = np.sum([one.squares for one in found], axis=0)
+    samples = np.sum([one.samples for one in found], axis=0)
     scales = errors.scales * np.sqrt(np.where(samples > 0, squares / np.maximum(samples, 1), 1.0))
     return ChannelErrors(np.maximum(scales, LEAST_SCALE), inflation(found)[:-1])
 
@@ -148,7 +164,8 @@ class _Search:
             theirs = np.clip(own + np.clip(target - own, -LONGEST_MOVE, LONGEST_MOVE), *self.limits)
             return sum(self.misfit(n, row) for n, row in enumerate(theirs)) + self.prior(x, theirs), x, theirs
 
-        stay = at(0.0)
+        here = sum(one.value for one in self.warm) + self.prior(values, own), values, own
+        stay = min((here, at(0.0)), key=lambda one: one[0])
         for share in (1.0, 0.4, 0.1):
             tried = at(share)
             if tried[0] < stay[0]:
@@ -164,7 +181,7 @@ def fit_levels(observer: Observer, say: Callable[[str], None]) -> None:
     if observer.vehicle.level == 0:
         return
     declared, budget = observer.declared, LEVEL_ROWS if observer.vehicle.kernels.compiled else PLAIN_ROWS
-    used, rows = [], 0
+    used, rows = list[int](), 0
     for n in sorted(range(len(observer.runs)), key=lambda n: len(observer.runs[n].t)):
         if used and rows + len(observer.runs[n].t) > budget:
             break
@@ -181,14 +198,14 @@ def fit_levels(observer: Observer, say: Callable[[str], None]) -> None:
             for (what, k), shift in level.items():
                 getattr(point, what)[k] *= np.exp(shift if what == "density" else 2.0 * shift)
             total += observer.filter(n, point).value
-        return total + sum(shift**2 for shift in level.values()) / LOUDEST**2 * 4.0
+        return total + sum(shift**2 for shift in level.values()) / MAX_LEVEL_SHIFT**2 * 4.0
 
     best = cost()
     for size in LEVEL_STEPS:
         for one in free:
             for sign in (1.0, -1.0):
                 moved_any = False
-                while abs(level[one] + sign * size) <= LOUDEST:
+                while abs(level[one] + sign * size) <= MAX_LEVEL_SHIFT:
                     level[one] += sign * size
                     tried = cost()
                     if tried < best - 0.5:
@@ -214,7 +231,7 @@ def _scatter_of_all(observer, nuisance, values, own, eta, errors) -> tuple[list[
         one = expand(observer, n, effects, into @ own[n], errors, observer.horizon).tempered(eta)
         about.append(replace(one, at=one.at - into @ values))
     usual = usual_scatter(observer.declared, effects)
-    if len(own) < 3:
+    if len(own) < MIN_SCATTER_RUNS:
         return effects, 5.0 * usual
     return effects, learn_scatter(about, np.zeros((len(effects), len(effects))), usual)
 
@@ -240,7 +257,9 @@ def _held_out(observer, nuisance, values, warm, V, limits) -> np.ndarray:
     gaps, every = [], Pooled.of(warm, V).mean()
     for n in range(len(warm)):
         others = [one for k, one in enumerate(warm) if k != n] or warm
-        point = moved(observer.declared, observer.point, nuisance, np.clip(values + Pooled.of(others, V).mean() - every, *limits))
+        point = moved(
+            observer.declared, observer.point, nuisance, np.clip(values + Pooled.of(others, V).mean() - every, *limits)
+        )
         gaps.append(observer.gaps(n, point, observer.horizon))
     return np.array(gaps)
 

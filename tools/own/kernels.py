@@ -8,9 +8,11 @@ Shapes: rows of a run r, states n, errors m (a quaternion has three), inputs i, 
 (two states each) that adds to a noise, [noise, omega rad/s, tau s, sigma].
 """
 
+# ruff: noqa: F821
+# mypy: disable-error-code="name-defined"
 import numpy as np
 
-NUDGE = 1e-6  # of a state's scale: difference step
+DIFFERENCE_STEP = 1e-6  # of a state's scale: difference step
 CALM, LONGEST_MEMORY = 1e-12, 400  # s: shorter lags and delays are none; rows searched back for a delay
 
 
@@ -116,7 +118,7 @@ def filter_run(T, U, Y, x0, P0, theta, own, S, push, density, R, ports, kinds, s
     """The filter along one run: -2 log likelihood, mean squared innovation, and what following it asks for.
 
     T (r,) s; U (r, i); Y (r, y) with NaN; x0 (n,), its covariance P0 (m, m); own (3, o): parameters that are a number
-    of each run, estimated along it: place in theta, 1 sigma, difference step; S (5, y) of `read`; push and density (w,);
+    of each run, estimated along it: place in theta, 1 sigma, difference step; S (5, y) of `read`; push, density (w,);
     R (y,) variances; parts: steps in which a row's step is taken. Into keep: gains (r, m + 2 ports + o, y) and
     states and own parameters (r, n + o) after each row. Returns value, squares, samples.
     """
@@ -145,14 +147,14 @@ def filter_run(T, U, Y, x0, P0, theta, own, S, push, density, R, ports, kinds, s
             F[:, :] = 0.0
             for j in range(m):
                 d[:] = 0.0
-                d[j] = NUDGE * scales[j]
+                d[j] = DIFFERENCE_STEP * scales[j]
                 moved = normalised(advance(plus(x, d, kinds), U[row - 1], w, theta, dt, parts), kinds)
                 minus(moved, x1, kinds, d)
                 for k in range(m):
-                    F[k, j] = d[k] / (NUDGE * scales[j])
+                    F[k, j] = d[k] / (DIFFERENCE_STEP * scales[j])
             G = np.zeros((full, n_w))
             for j in range(n_w):
-                size = NUDGE * max(density[j], 1e-3)
+                size = DIFFERENCE_STEP * max(density[j], 1e-3)
                 w[j] += size
                 moved = normalised(advance(x, U[row - 1], w, theta, dt, parts), kinds)
                 w[j] -= size
@@ -194,11 +196,11 @@ def filter_run(T, U, Y, x0, P0, theta, own, S, push, density, R, ports, kinds, s
         H[:, :] = 0.0
         for k in range(m):
             d[:] = 0.0
-            d[k] = NUDGE * scales[k]
+            d[k] = DIFFERENCE_STEP * scales[k]
             moved = measure(plus(x, d, kinds), U[row], theta)
             for j in range(n_y):
                 step = wrap(moved[j] - h0[j]) if angles[j] else moved[j] - h0[j]
-                H[j, k] = S[0, j] * step / (NUDGE * scales[k])
+                H[j, k] = S[0, j] * step / (DIFFERENCE_STEP * scales[k])
         for k in range(n_o):
             place = int(own[0, k])
             theta[place] += own[2, k]

@@ -43,7 +43,7 @@ def predict(vehicle: LoadedVehicle, run: OwnRun, out: Path) -> int:
     texts = {TIME: csvfile.as_texts(TIME, run.t, None)}
     for n, one in enumerate(observer.declared.inputs):
         texts[one.column] = csvfile.as_texts(one.column, run.inputs[:, n], None)
-    for n, one in enumerate(observer.declared.outputs):
-        texts[one.column] = csvfile.as_texts(one.column, predicted[:, n], None)
+    for n, output in enumerate(observer.declared.outputs):
+        texts[output.column] = csvfile.as_texts(output.column, predicted[:, n], None)
     csvfile.write_table(out, texts)
     return len(run.t)

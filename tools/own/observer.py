@@ -21,6 +21,9 @@ PARTS_TOLERANCE, MOST_PARTS = 0.02, 64  # of a state's scale a second, by which 
 HORIZON = (5.0, 20.0)  # s: of windows, where the vehicle's time constants set it
 TIME_CONSTANTS = 3.0  # in a window
 WARM_UP, WARM_UP_SHARE = 2.0, 0.1  # s of a window that find its start, at most; of the horizon
+NO_POINT = ModelPoint(
+    np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0)
+)  # the vehicle file's own is taken
 LOST = 100.0  # tolerances: error of a flight that is lost, and of none more
 QUATERNION_FIRST, QUATERNION_REST, USUAL_ATTITUDE = 2, 3, 0.1  # kinds of states; rad at the start
 MOST_KEPT = 10_000  # first readings
@@ -44,11 +47,11 @@ class Observer:
 
     vehicle: LoadedVehicle
     runs: list[OwnRun]
-    point: ModelPoint | None = None
+    point: ModelPoint = field(default_factory=lambda: NO_POINT)
     parts: int = 1
     starts: list[int] = field(default_factory=list)  # which of several initial states each run has
     notes: list[str] = field(default_factory=list)
-    _first: dict[tuple[int, bytes], dict[str, float]] = field(default_factory=dict)
+    _first: dict[tuple[int, int, bytes], dict[str, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         declared = self.vehicle.declared
@@ -64,7 +67,7 @@ class Observer:
             [one.tolerance or USUAL_TOLERANCE.get(one.unit, _range_share(self.runs, n))
              for n, one in enumerate(declared.outputs)]
         )  # fmt: skip
-        if self.point is None:
+        if self.point is NO_POINT:
             self.point = nominal_point(declared)
             unknown = self.point.variance == 0.0
             self.point.variance[unknown] = (NOISE_SHARE * self.tolerances[unknown]) ** 2
@@ -80,22 +83,22 @@ class Observer:
 
     # how a run begins
 
-    def first_readings(self, run: OwnRun, point: ModelPoint) -> dict[str, float]:
-        """First value and rate of every output as the sensors' errors have it, NaN where there is none."""
-        key = (id(run), point.reading[:2].tobytes())
+    def first_readings(self, n: int, point: ModelPoint, row: int = 0) -> dict[str, float]:
+        """First value and rate from a row of run n on, of every output, as the sensors' errors have it; NaN: none."""
+        run, key = self.runs[n], (n, row, point.reading[:2].tobytes())
         if key in self._first:
             return dict(self._first[key])
         found: dict[str, float] = {}
-        early = run.t - run.t[0] <= FIRST_SECONDS
-        for n, one in enumerate(self.declared.outputs):
-            gain, bias = point.reading[0, n], point.reading[1, n]
-            seen = np.flatnonzero(np.isfinite(run.outputs[:, n]) & early)
-            values = (run.outputs[seen, n] - bias) / gain
+        early = (run.t >= run.t[row]) & (run.t - run.t[row] <= FIRST_SECONDS)
+        for k, one in enumerate(self.declared.outputs):
+            gain, bias = point.reading[0, k], point.reading[1, k]
+            seen = np.flatnonzero(np.isfinite(run.outputs[:, k]) & early)
+            values = (run.outputs[seen, k] - bias) / gain
             if one.angle:
                 values = np.unwrap(values)
-            known = self.declared.start.get(one.name)
+            known = self.declared.start.get(one.name) if row == 0 else None
             found[one.name] = known[0] if known else (float(values[0]) if len(seen) else np.nan)
-            when = run.t[seen] - run.t[0]
+            when = run.t[seen] - run.t[row]
             sloped = len(seen) >= 3 and np.ptp(when) > 0.0
             found[f"{one.name}_rate"] = float(np.polyfit(when, values, 1)[0]) if sloped else np.nan
         if len(self._first) < MOST_KEPT:
@@ -105,7 +108,7 @@ class Observer:
     def start(self, n: int, point: ModelPoint) -> tuple[np.ndarray, np.ndarray]:
         """Initial state (states,) and its covariance (errors, errors) of a run."""
         run, declared = self.runs[n], self.declared
-        readings = self.first_readings(run, point)
+        readings = self.first_readings(n, point)
         x = np.array([one.start for one in declared.states], dtype=np.float64)
         sd = self.scales.copy()
         if hasattr(self.vehicle.model, "initial"):
@@ -135,7 +138,7 @@ class Observer:
             line = np.zeros(len(P))
             for k in range(len(P)):
                 d = np.zeros(len(P))
-                d[k] = names.NUDGE * self.scales[k]
+                d[k] = names.DIFFERENCE_STEP * self.scales[k]
                 line[k] = (kernels.measure(names.plus(x, d, self.kinds), run.inputs[0], point.theta)[j] - h) / d[k]
             across = P @ line
             total = line @ across + sigma**2
@@ -147,7 +150,7 @@ class Observer:
         """Of models with several initial states, that which explains a run best."""
         if not hasattr(self.vehicle.model, "initial"):
             return
-        given = called(self.vehicle, "initial", self.first_readings(self.runs[0], self.point))
+        given = called(self.vehicle, "initial", self.first_readings(0, self.point))
         if not isinstance(given, list) or len(given) < 2:
             return
         for n in range(len(self.runs)):
@@ -199,9 +202,10 @@ class Observer:
         x, P = self.start(n, point)
         keep = (np.zeros((rows, m + n_o, n_y)), np.zeros((rows, len(declared.states) + n_o)))
         try:
+            driven = driven_inputs(run, declared, point)
             value, squares, samples = kernels.filter_run(
-                run.t, driven_inputs(run, declared, point), run.outputs, x, P, point.theta, point.own, point.reading, point.push,
-                point.density, point.variance, point.ports, self.kinds, self.scales, self.angles, self.parts, keep,
+                run.t, driven, run.outputs, x, P, point.theta, point.own, point.reading, point.push, point.density,
+                point.variance, point.ports, self.kinds, self.scales, self.angles, self.parts, keep,
             )  # fmt: skip
         except np.linalg.LinAlgError:
             value, squares, samples = np.inf, np.inf, 1
@@ -286,7 +290,7 @@ class Observer:
         return found
 
     def residuals(self, n: int, points: Sequence[ModelPoint], by: Filtered, horizon: float) -> np.ndarray:
-        """Errors of models in tolerances, (points, scored rows, outputs): windows begun by kept gains; missing are 0."""
+        """Errors of models in tolerances, (points, scored rows, outputs): windows begun by kept gains; missing: 0."""
 
         def one(point: ModelPoint) -> np.ndarray:
             predicted = self.predict(n, point, horizon, self.follow(n, point, by))
@@ -316,7 +320,7 @@ class Observer:
         F, column = np.zeros((m, m)), np.zeros(m)
         for j in range(m):
             d = np.zeros(m)
-            d[j] = names.NUDGE * self.scales[j]
+            d[j] = names.DIFFERENCE_STEP * self.scales[j]
             end = kernels.advance(names.plus(x, d, self.kinds), run.inputs[0], w, self.point.theta, dt, self.parts)
             names.minus(names.normalised(np.array(end), self.kinds), base, self.kinds, column)
             F[:, j] = column / d[j]
@@ -344,7 +348,7 @@ def _range_share(runs: Sequence[OwnRun], n: int) -> float:
 
 
 class BlackBox(Observer):
-    """A model that is only rolled out: windows begin where its own `initial` puts them by the readings of the warm-up."""
+    """A model that is only rolled out: windows begin where its `initial` puts them by the warm-up's readings."""
 
     def _choose_parts(self) -> None:
         self.kinds, self.scales = np.zeros(0, dtype=int), np.zeros(0)
@@ -372,7 +376,7 @@ class BlackBox(Observer):
         for start, end in zip(starts, ends, strict=True):
             begin = int(np.searchsorted(run.t, run.t[start] - warm - 1e-6))
             part = OwnRun(run.name, run.t[begin:end], driven[begin:end], run.outputs[begin:end], run.path)
-            readings = self.first_readings(part, point)
+            readings = self.first_readings(n, point, begin)
             x0 = called(self.vehicle, "initial", readings) if hasattr(self.vehicle.model, "initial") else readings
             flown = np.asarray(called(self.vehicle, "rollout", x0, part.t - part.t[0], part.inputs, point.theta), float)
             if flown.shape != part.outputs.shape:
@@ -397,5 +401,5 @@ def observer_of(vehicle: LoadedVehicle, runs: Sequence[OwnRun], every_row: bool 
 
 def thinned(run: OwnRun) -> OwnRun:
     """Every so many-th row of a run that was logged faster than its motion needs."""
-    step = max(1, int(round(LEAST_STEP / max(float(np.median(np.diff(run.t))), 1e-9))))
+    step = max(1, round(LEAST_STEP / max(float(np.median(np.diff(run.t))), 1e-9)))
     return run if step == 1 else replace(run, t=run.t[::step], inputs=run.inputs[::step], outputs=run.outputs[::step])

@@ -1,10 +1,10 @@
-"""Which effects the runs of a case have: a posterior over hypotheses, each with its own evidence (method: docs).
+"""Which effects the runs of a case have: a posterior over hypotheses, each with its own evidence (docs/how-to).
 
 A hypothesis is a set of labels with sizes common to the case's runs, beside what an identified vehicle allows for: its
 shared values, what sessions and runs differ by. The size of a label is normal with a sigma of v tolerances, rms over
-the windows' channels, v over a grid of equal chances: labels of all units are as probable before the data. Beside the
-labels stand constant forces that no label has, and, with each hypothesis, that more is left than healthy runs leave:
-unknown.
+the windows' channels, v over a grid of equal chances: labels of all units are as probable before the data. What healthy
+sessions and runs differ by is no change. Beside the labels stand constant forces that no label has, and, with each
+hypothesis, that more is left than healthy runs leave: unknown.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,7 +20,6 @@ from glider.tools.own.hierarchy import ChannelErrors, Expansion, Pooled, expand,
 from glider.tools.own.identify import USUAL_SCATTER
 from glider.tools.own.observer import Observer
 
-
 NONE, UNKNOWN = "none", "unknown"
 SIZES = np.array([0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0])  # tolerances, rms over the windows
 CHANGED = 0.5  # prior probability that anything changed
@@ -32,7 +31,11 @@ FORM = 0.2  # of a change, 1 sigma, that is not as its label's equations have it
 MATERIAL = 0.1  # tolerances: a smaller effect is no gap (docs/GAP.md)
 BEAM, MOST_EFFECTS, ROUNDS, LONGEST_MOVE = 6, 3, 5, 4.0
 LONGEST_REACH = 4.0  # tolerances that a round's move of one number may do at most, where that is more
-STRONG, STRONG_LEFT, STRONG_ROWS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0), 1.5, 1_500  # tolerances; times healthy; rows looked at
+STRONG, STRONG_LEFT, STRONG_ROWS = (
+    (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0),
+    1.5,
+    1_500,
+)  # tolerances; times healthy; rows looked at
 ACTIVE_SCATTER = 3.0  # times the usual: labels that healthy runs differ in
 UNIDENTIFIED_INFLATION = 30.0  # rows of a window that err alike, of a vehicle that was never identified
 LEAST_REACH = 1e-4  # tolerances a spread
@@ -97,8 +100,8 @@ class Engine:
         self.high = np.array([one.high for one in healthy.effects])
         usual = np.diag(healthy.V) > (ACTIVE_SCATTER * USUAL_SCATTER) ** 2
         self.active = usual | (healthy.scatter > ACTIVE_SCATTER * USUAL_SCATTER)
-        self.V, self.scatter = healthy.V, healthy.scatter
-        self.nothing: Hypothesis | None = None
+        self.V = healthy.V * np.outer(self.active, self.active)
+        self.scatter = np.where(self.active, healthy.scatter, 0.0)
         self.reach = np.zeros(self.k)
 
     def expansions(self, own: np.ndarray, columns: np.ndarray) -> list[Expansion]:
@@ -125,24 +128,29 @@ class Engine:
         curvature[np.ix_(columns, columns)] = one.curvature
         return replace(one, at=own.copy(), slope=slope, curvature=curvature, reach=reach)
 
-    def kept(self, places: Sequence[int] = ()) -> np.ndarray:
-        """(k,) 1 for what runs differ in to speak of, and for labels that are asked about; 0 for what is held at none."""
-        mask = self.active.astype(float)
-        mask[list(places)] = 1.0
-        return mask
-
-    def marginal(self, found: Sequence[Expansion], places: Sequence[int] = ()) -> list[Expansion]:
+    def marginal(self, found: Sequence[Expansion]) -> list[Expansion]:
         """Runs with their deviations integrated out."""
-        scatter = self.scatter * self.kept(places)
-        return [marginalised(one, scatter) for one in found]
+        return [marginalised(one, self.scatter) for one in found]
 
-    def variance(self, labels: Sequence[int], sigma: Sequence[float], places: Sequence[int] = ()) -> np.ndarray:
+    def variance(self, labels: Sequence[int], sigma: Sequence[float]) -> np.ndarray:
         """Prior covariance (k, k) of shared values with labels' sizes of 1 sigma `sigma`."""
-        mask = self.kept([*labels, *places])
-        V = self.V * np.outer(mask, mask)
+        V = self.V.copy()
         for k, s in zip(labels, sigma, strict=True):
             V[k, k] += s**2
         return V
+
+    def usual_odds(self, k: int, size: float, sd: float, runs: int) -> float:
+        """Log odds that a size of label k, known to sd, is a change and no deviation as sessions and runs have them.
+
+        Of labels whose deviations are not integrated out of every run (`active`): those are in the evidence already.
+        """
+        usual = self.healthy.V[k, k] + self.healthy.scatter[k] ** 2 / runs
+        if self.active[k] or usual <= 0.0:
+            return np.inf
+        wide = (SIZES / max(self.reach[k], LEAST_REACH)) ** 2 + usual + sd**2
+        narrow = usual + sd**2
+        change = logsumexp(-0.5 * (size**2 / wide + np.log(wide))) - np.log(len(SIZES))
+        return float(change + 0.5 * (size**2 / narrow + np.log(narrow)))
 
     def fit(self, labels: tuple[str, ...], begin: Hypothesis | None = None, every: bool = False) -> Hypothesis:
         """Labels led to where they are most probable, relinearised where they are; evidence by its last expansion."""
@@ -163,11 +171,10 @@ class Engine:
                 continue
             best = cost, shared, own, found
             sigma = self._best_sizes(found, places)[0]
-            target = Pooled.of(self.marginal(found, places), self.variance(places, sigma)).mean()
-            scatter = self.scatter * self.kept(places)
+            target = Pooled.of(self.marginal(found), self.variance(places, sigma)).mean()
             room = np.maximum(LONGEST_MOVE, LONGEST_REACH / np.maximum(self.reach, LEAST_REACH))  # (k,) spreads
             shared = np.clip(shared + np.clip(target - shared, -room, room), self.low, self.high)
-            theirs = np.array([run_values(one, shared, scatter) for one in found])
+            theirs = np.array([run_values(one, shared, self.scatter) for one in found])
             own = np.clip(own + np.clip(theirs - own, -room, room), self.low, self.high)
         assert best is not None
         _, shared, own, found = best
@@ -175,25 +182,20 @@ class Engine:
             found = self.expansions(own, np.arange(self.k))
         sigma, evidence, mean, sd = self._best_sizes(found, places)
         left = np.array([one.squares.sum() / max(1, one.samples.sum()) for one in found])
-        if self.nothing is not None:
-            # against no change with the same deviations allowed: what runs differ in is no evidence for either
-            same = Pooled.of(self.marginal(self.nothing.found, places), self.variance((), (), places)).log_evidence()
-            evidence += self.nothing.evidence - self.log_prior(()) - same
         return Hypothesis(labels, evidence + self.log_prior(labels), mean, sd, shared, own, left, 0.0, found)
 
     def _prior(self, shared: np.ndarray, own: np.ndarray, places: Sequence[int]) -> float:
         """-2 log prior of values, sizes of labels left free."""
-        mask = self.kept(places)
-        free = (np.diag(self.V) > 0.0) & (mask > 0.0)
+        free = np.diag(self.V) > 0.0
         free[list(places)] = False
         chosen = np.flatnonzero(free)
-        x, spread = shared[chosen], np.maximum(self.scatter * mask, 1e-6)
+        x, spread = shared[chosen], np.maximum(self.scatter, 1e-6)
         within = x @ np.linalg.solve(self.V[np.ix_(chosen, chosen)], x)
         return float((((own - shared) / spread) ** 2).sum() + within)
 
     def _best_sizes(self, found: Sequence[Expansion], places: Sequence[int]):
         """Sigmas of labels' sizes that are most probable, log evidence over the grid of sizes, and size with its sd."""
-        pooled = Pooled.of(self.marginal(found, places), self.variance((), ()))
+        pooled = Pooled.of(self.marginal(found), self.V)
         if not places:
             return [], pooled.log_evidence(), np.zeros(0), np.zeros(0)
         grids = [SIZES / max(self.reach[k], LEAST_REACH) for k in places]
@@ -225,16 +227,14 @@ class Engine:
         places = self.healthy.at(begin.labels)
         sigma = self._best_sizes(begin.found, places)[0]
         V = self.variance(places, sigma)
-        pooled = Pooled.of(self.marginal(begin.found, places), V)
+        pooled = Pooled.of(self.marginal(begin.found), V)
         M = pooled.covariance()
         slope, precision = pooled.r - pooled.H @ (M @ pooled.r), np.diag(pooled.H - pooled.H @ M @ pooled.H)
-        usual = np.diag(self.V) + self.scatter**2 / self.count  # what sessions and runs differ by, without a change
         found = []
         for k, effect in enumerate(self.healthy.effects):
             if k in places or self.reach[k] < LEAST_REACH:
                 continue
-            own = 0.0 if self.active[k] else float(usual[k])
-            gain = size_evidence(slope[k], precision[k], self.reach[k], own, effect.one_sided)
+            gain = size_evidence(slope[k], precision[k], self.reach[k], effect.one_sided)
             odds = np.log(PUSH_ODDS) if effect.family == PUSH else 0.0
             found.append((float(gain + odds), effect.label))
         return sorted(found, reverse=True)
@@ -245,7 +245,7 @@ class Engine:
         Where a strong change leads no parabola goes: every label is flown at sizes over the whole range.
         """
         healthy, observer = self.healthy, self.observer
-        chosen, rows = [], 0
+        chosen, rows = list[int](), 0
         for n in sorted(among, key=lambda n: len(observer.runs[n].t)):
             if chosen and rows + len(observer.runs[n].t) > STRONG_ROWS:
                 break
@@ -284,7 +284,7 @@ class Engine:
         """Hypotheses found by a beam: none, the best single labels, pairs beside the best, triples."""
         begin = self.expansions(np.zeros((self.count, self.k)), np.arange(self.k))
         self.reach = np.sqrt(np.mean([one.reach for one in begin], axis=0))
-        self.nothing = nothing = self.fit((), every=True)
+        nothing = self.fit((), every=True)
         nothing.strange = self.strangeness(nothing, nothing)
         every, front, self.bare = [nothing], [nothing], nothing
         self.say(f"no change: {np.sqrt(nothing.left.mean()):.2f} times what healthy runs leave")
@@ -293,9 +293,9 @@ class Engine:
             for one in front:
                 for gain, label in self.screen(one)[: BEAM if depth == 0 else 3]:
                     labels = (*one.labels, label)
-                    key, worth = frozenset(labels), one.evidence + gain
-                    if key not in wanted or wanted[key][0] < worth:
-                        wanted[key] = (worth, one, labels)
+                    key, score = frozenset(labels), one.evidence + gain
+                    if key not in wanted or wanted[key][0] < score:
+                        wanted[key] = (score, one, labels)
             new = [
                 self.fit(labels, begin) for _, begin, labels in sorted(wanted.values(), key=lambda one: -one[0])[:BEAM]
             ]
@@ -306,9 +306,8 @@ class Engine:
             best = max(one.evidence for one in every)
             for one in new:
                 one.strange = self.strangeness(one, nothing)
-                self.say(
-                    f"{' + '.join(one.labels)}: {one.evidence - nothing.evidence:.1f} nat, {np.sqrt(one.left.mean()):.2f} left"
-                )
+                gain, left = one.evidence - nothing.evidence, np.sqrt(one.left.mean())
+                self.say(f"{' + '.join(one.labels)}: {gain:.1f} nat, {left:.2f} left")
             every += new
             front = sorted(new, key=lambda one: -one.evidence)[:2]
             if not front or front[0].evidence < best + (0.0 if depth else -3.0):
@@ -334,7 +333,14 @@ class Engine:
         return float(np.exp(more - np.logaddexp(less, more)))
 
     def _posterior(self, every: list[Hypothesis]) -> Posterior:
-        logs = np.array([one.evidence for one in every])
+        # no change, but a deviation as sessions and runs have it, of whichever label explains most so
+        usual = [every[0].evidence]
+        for one in every[1:]:
+            if len(one.labels) == 1:
+                (k,) = self.healthy.at(one.labels)
+                odds = self.usual_odds(k, float(one.sizes[0]), float(one.sd[0]), self.count)
+                usual.append(one.evidence - self.log_prior(one.labels) + self.log_prior(()) - odds)
+        logs = np.array([max(usual), *(one.evidence for one in every[1:])])
         weights = np.exp(logs - logsumexp(logs))
         chances: dict[str, float] = {NONE: 0.0, UNKNOWN: 0.0}
         inclusion: dict[str, float] = {}
@@ -353,20 +359,16 @@ class Engine:
         return Posterior(every, weights, chances, inclusion, self.reach, self.healthy)
 
 
-def size_evidence(slope, precision, reach, usual, one_sided) -> np.ndarray:
+def size_evidence(slope, precision, reach, one_sided) -> np.ndarray:
     """Log evidence of a label's size over none, from its slope and precision with all else integrated out.
 
-    usual: variance that the label has without a change. All may be arrays of one shape.
+    All may be arrays of one shape.
     """
-    slope, precision, reach, usual, one_sided = (np.asarray(one)[..., None] for one in (slope, precision, reach, usual, one_sided))
-    precision = np.maximum(precision, 0.0)
-
-    def log_marginal(variance):
-        return 0.5 * (slope**2 * variance / (1.0 + variance * precision) - np.log1p(variance * precision))
-
-    total = (SIZES / reach) ** 2 + usual
-    gain = log_marginal(total) - log_marginal(usual)
-    halved = np.log(2.0) + norm.logcdf(slope * np.sqrt(total / (1.0 + total * precision)))
+    slope, precision, reach, one_sided = (np.asarray(one)[..., None] for one in (slope, precision, reach, one_sided))
+    tau2 = (SIZES / reach) ** 2
+    total = 1.0 + tau2 * np.maximum(precision, 0.0)
+    gain = 0.5 * (slope**2 * tau2 / total - np.log(total))
+    halved = np.log(2.0) + norm.logcdf(slope * np.sqrt(tau2 / total))
     return logsumexp(gain + np.where(one_sided, halved, 0.0), axis=-1) - np.log(len(SIZES))
 
 

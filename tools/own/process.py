@@ -9,6 +9,7 @@ x0 holds the first readings of the outputs and their rates (`depth`, `depth_rate
 """
 
 import atexit
+import contextlib
 import json
 import math
 import shlex
@@ -43,21 +44,24 @@ class ProcessModel:
         self.horizon = declared.get("horizon")
 
     def _ask(self, question: dict[str, Any]) -> dict[str, Any]:
-        assert self._process.stdin is not None and self._process.stdout is not None
-        try:
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        with contextlib.suppress(OSError):  # it has ended: what it said before is read below
             self._process.stdin.write(json.dumps(question) + "\n")
             self._process.stdin.flush()
-            line = self._process.stdout.readline()
-        except OSError as error:
-            raise InputError(f"ended: {error}", source=self.command) from None
+        line = self._process.stdout.readline()
         if not line:
-            raise InputError(f"ended with code {self._process.wait()} when asked for its {question['ask']}", source=self.command)
+            raise InputError(
+                f"ended with code {self._process.wait()} when asked for its {question['ask']}", source=self.command
+            )
         try:
             answer = json.loads(line)
         except ValueError:
             raise InputError(f"expected a line of JSON, got {line.strip()[:80]!r}", source=self.command) from None
         if not isinstance(answer, dict) or "error" in answer:
-            raise InputError(str(answer.get("error") if isinstance(answer, dict) else answer)[:200], source=self.command)
+            raise InputError(
+                str(answer.get("error") if isinstance(answer, dict) else answer)[:200], source=self.command
+            )
         return answer
 
     def rollout(self, x0: dict[str, float], t: np.ndarray, u: np.ndarray, theta: np.ndarray) -> np.ndarray:

@@ -7,10 +7,10 @@ import numpy as np
 
 from glider.tools.data.errors import InputError
 from glider.tools.data.sources import read_text
+from glider.tools.own.check import load_own
 from glider.tools.own.declare import USUAL_TOLERANCE
 from glider.tools.own.effects import standard_effects
 from glider.tools.own.files import is_own
-from glider.tools.own.load import load_own
 from glider.tools.own.observer import observer_of
 from glider.tools.own.runs import OwnRun, load_own_runs
 
@@ -31,11 +31,15 @@ def describe(file: Path, case: Path | None) -> dict[str, Any]:
     lines = [f"{vehicle.name}: level {vehicle.level}, {ASKED[vehicle.level]}"]
     if vehicle.level:
         kernels = vehicle.kernels
-        lines.append("compiled by Numba" if kernels.compiled else f"plain Python, some hundred times slower: {kernels.why}")
+        lines.append(
+            "compiled by Numba" if kernels.compiled else f"plain Python, some hundred times slower: {kernels.why}"
+        )
     for what in ("inputs", "outputs", "parameters", "states", "noises"):
         entries = getattr(declared, what)
         if entries:
-            lines.append(f"{what}: {', '.join(f'{one.name} ({one.unit})' if one.unit else one.name for one in entries)}")
+            lines.append(
+                f"{what}: {', '.join(f'{one.name} ({one.unit})' if one.unit else one.name for one in entries)}"
+            )
     assumed = [one.name for one in declared.parameters if one.assumed]
     if assumed:
         lines.append(f"assumed, not measured: {', '.join(assumed)}")
@@ -46,8 +50,13 @@ def describe(file: Path, case: Path | None) -> dict[str, Any]:
     if case is not None:
         observer = observer_of(vehicle, runs[:1])
         gaps = observer.gaps(0, observer.point, observer.horizon)
-        by = ", ".join(f"{one.name} {gap:.2f}" for one, gap in zip(declared.outputs, gaps, strict=True) if np.isfinite(gap))
-        lines.append(f"{runs[0].name}: gap in tolerances {by}; windows of {observer.horizon:.1f} s, {observer.parts} parts a step")
+        by = ", ".join(
+            f"{one.name} {gap:.2f}" for one, gap in zip(declared.outputs, gaps, strict=True) if np.isfinite(gap)
+        )
+        lines.append(
+            f"{runs[0].name}: gap in tolerances {by}; windows of {observer.horizon:.1f} s, "
+            f"{observer.parts} parts a step"
+        )
         lines += observer.notes
     lines += vehicle.notes
     return {

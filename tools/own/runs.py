@@ -76,9 +76,9 @@ def load_own_run(path: Path, declared: Declaration) -> OwnRun:
             raise table.error(f"the model's input {one.name} has no such column", column=one.column)
         inputs[:, n] = _held(table.numbers(one.column), table, one.column)
     outputs = np.full((len(t), len(declared.outputs)), np.nan)
-    for n, one in enumerate(declared.outputs):
-        if one.column in table.header:
-            outputs[:, n] = table.numbers(one.column)
+    for n, output in enumerate(declared.outputs):
+        if output.column in table.header:
+            outputs[:, n] = table.numbers(output.column)
     if not np.isfinite(outputs).any():
         wanted = ", ".join(one.column for one in declared.outputs)
         raise InputError(f"no column of the model's outputs: {wanted}", source=path)

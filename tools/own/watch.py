@@ -107,7 +107,8 @@ class Watched:
             "labels": {label: p for label, p in sorted(one.chances.items(), key=lambda item: -item[1]) if p > 0.005},
             "where": [{"subsystem": s, "element": e, "probability": p}
                       for (s, e), p in sorted(places.items(), key=lambda item: -item[1]) if p > 0.005],
-            "from_run": self.names[one.first], "to_run": None if one.end == len(self.names) else self.names[one.end - 1],
+            "from_run": self.names[one.first],
+            "to_run": None if one.end == len(self.names) else self.names[one.end - 1],
             "size": one.size * effect.spread, "ci90": [low, high], "unit": effect.unit,
         }  # fmt: skip
 
@@ -137,13 +138,15 @@ class Watch(Engine):
             best, self.found = (squares, shared, own), found
             self.reach = np.sqrt(np.mean([one.reach for one in found], axis=0))
             if self.learned > 2:
-                self.scatter = learn_scatter(found[: self.learned], self.healthy.V, self.healthy.scatter)
+                learned = learn_scatter(found[: self.learned], self.healthy.V, self.healthy.scatter)
+                self.healthy = replace(self.healthy, scatter=learned)
+                self.scatter = np.where(self.active, learned, 0.0)
             warm = self.marginal(found[: self.learned])
-            V = self.variance((), ())
+            V = self.V
             H, r = sum(one.curvature for one in warm), -sum(one.offset for one in warm)
             M = np.linalg.solve(np.eye(self.k) + V @ H, V)
             shared = np.clip(shared + np.clip(M @ r - shared, -LONGEST_MOVE, LONGEST_MOVE), self.low, self.high)
-            own = np.array([shared if n >= self.learned else run_values(one, shared, self.scatter * self.kept())
+            own = np.array([shared if n >= self.learned else run_values(one, shared, self.scatter)
                             for n, one in enumerate(found)])  # fmt: skip
             own = np.clip(own, self.low, self.high)
         assert best is not None
@@ -161,7 +164,7 @@ class Watch(Engine):
         return x
 
     def scored(self, spans: Sequence[tuple[int, int]], only: Sequence[int] | None = None) -> np.ndarray:
-        """Log evidence (spans, labels) of every label over every span, sizes over the grid; -inf for those not asked."""
+        """Log evidence (spans, labels) of every label over every span; -inf where nothing moves."""
         slopes = np.array([-(one.slope + one.curvature @ (self.at_run(n) - one.at)) for n, one in enumerate(self.runs)])
         curvatures = np.array([one.curvature for one in self.runs])
         r_up, H_up = (
@@ -179,15 +182,14 @@ class Watch(Engine):
             inner = np.linalg.solve(np.eye(self.k) + self.M @ H, self.M)
             precision = np.maximum(np.diag(H - H @ inner @ H)[usable], 0.0)
             slope = (r - H @ (inner @ r))[usable]
-            own = np.where(self.active[usable], 0.0, self.scatter[usable] ** 2 / (end - first))
-            found[row, usable] = size_evidence(slope, precision, self.reach[usable], own, sided) + odds
+            found[row, usable] = size_evidence(slope, precision, self.reach[usable], sided) + odds
         return found
 
     def span_prior(self, spans: Sequence[tuple[int, int]]) -> np.ndarray:
         """Log prior probability of each span: half of them reach the last run."""
         ends = np.array([end == self.count for _, end in spans])
         last, others = max(1, int(ends.sum())), max(1, int((~ends).sum()))
-        return np.where(ends, np.log(TO_THE_END / last), np.log((1.0 - TO_THE_END) / others))
+        return np.log(np.where(ends, TO_THE_END / last, (1.0 - TO_THE_END) / others))
 
     def search(self) -> None:
         """Events, the most evident first."""
@@ -209,12 +211,13 @@ class Watch(Engine):
                     starts |= dict(self.strong_sizes(runs)[:REFITTED])
                 refitted += [self.refit(spans[row], k, start, prior) for k, start in starts.items()]
             best_score, best = max(refitted, key=lambda one: one[0])
-            odds = best_score + np.log(CHANGE / (1.0 - CHANGE))
+            k = self.healthy.at([best.label])[0]
+            usual = self.usual_odds(k, best.size, best.sd, best.end - best.first)
+            odds = min(best_score, usual) + np.log(CHANGE / (1.0 - CHANGE))
             same = [(score, one) for score, one in refitted if (one.first, one.end) == (best.first, best.end)]
             total = logsumexp([score for score, _ in same])
             best.probability = float(1.0 / (1.0 + np.exp(-np.clip(odds, -50.0, 50.0))))
             best.chances = {one.label: best.probability * float(np.exp(score - total)) for score, one in same}
-            k = self.healthy.at([best.label])[0]
             if best.probability < CERTAIN or abs(best.size) * self.reach[k] < MATERIAL:
                 break
             self.say(
@@ -240,12 +243,12 @@ class Watch(Engine):
         return Pooled.of(moved_runs, V)
 
     def refit(self, span: tuple[int, int], k: int, start: float, prior: float) -> tuple[float, Event]:
-        """A label over a span, expanded where it leads to: log evidence over no change with its prior, and the event."""
-        nothing = self.evidence(self.marginal(self.found[slice(*span)], [k]), span, self.M).log_evidence()
+        """A label over a span, expanded where it leads to: log odds against no change, and the event."""
+        nothing = self.evidence(self.runs[slice(*span)], span, self.M).log_evidence()
         columns = np.unique(np.append(np.flatnonzero(self.active), k))
         size, best = start, (-np.inf, start, 0.0)
         odds = np.log(PUSH_ODDS) if self.healthy.effects[k].family == PUSH else 0.0
-        runs = self.marginal(self.found[slice(*span)], [k]) if start == 0.0 else None
+        runs = self.runs[slice(*span)] if start == 0.0 else None
         linear = runs is not None
         for _ in range(ROUNDS + 1):
             if runs is not None:
@@ -264,16 +267,16 @@ class Watch(Engine):
                 if not linear and score > best[0]:
                     best = score, mean, sd
                 linear = False
-                settled = abs(mean - size) < 0.1 * sd
+                converged = abs(mean - size) < 0.1 * sd
                 room = max(LONGEST_MOVE, LONGEST_REACH / max(self.reach[k], LEAST_REACH))
                 size += float(np.clip(mean - size, -room, room))
-                if settled and np.isfinite(best[0]):
+                if converged and np.isfinite(best[0]):
                     break
             runs = []
             for n in range(*span):
                 x = self.at_run(n)
                 x[k] = np.clip(x[k] + size, self.low[k], self.high[k])
-                runs += self.marginal([self.expansion_of(n, x, columns)], [k])
+                runs += self.marginal([self.expansion_of(n, x, columns)])
         score, mean, sd = best
         return score - nothing + prior + odds, Event({}, *span, self.healthy.effects[k].label, mean, sd, 0.0)
 
@@ -282,7 +285,7 @@ class Watch(Engine):
         found = np.zeros(self.count)
         nothing = Hypothesis((), 0.0, np.zeros(0), np.zeros(0), self.shared, np.zeros((1, self.k)), np.ones(1))
         for n in range(self.learned, self.count):
-            x = run_values(self.found[n], self.at_run(n), self.scatter * self.kept())
+            x = run_values(self.found[n], self.at_run(n), self.scatter)
             one = self.expansion_of(n, x, np.flatnonzero(self.active))
             left = np.array([one.squares.sum() / max(1, one.samples.sum())])
             named = tuple(event.label for event in self.events if event.first <= n < event.end)

@@ -44,7 +44,9 @@ def own_report_html(answer: dict[str, Any]) -> str:
             for n, one in enumerate(answer["causes"][:MOST_RANKED]) if one["probability"] >= LEAST_PROBABILITY or n < 3
         ],
         "sizes": sizes, "cautions": [words.upper(line) for line in answer["cautions"]], "skipped": {},
-        "stages": [{"name": name, "total": words.number(total), "percent": 100.0 * total / highest} for name, total in stages],
+        "stages": [
+            {"name": name, "total": words.number(total), "percent": 100.0 * total / highest} for name, total in stages
+        ],
         "table": [{"name": name, "cells": _cells(gap, name)} for name in gap["before"]],
         "next_run": "",
     }  # fmt: skip

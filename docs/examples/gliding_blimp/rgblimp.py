@@ -1,8 +1,8 @@
 """A gliding blimp with a moving mass and two propellers, in air: six degrees of freedom, aerodynamics in wind axes.
 
 The numbers are those of Zhu, Cheng, Zhang, "Data-Driven Dynamics Modeling of Miniature Robotic Blimps Using Neural ODEs
-With Parameter Auto-Tuning", IEEE Robotics and Automation Letters 9(12), 2024, doi 10.1109/LRA.2024.3484182. Left out are
-their terms alpha^2 of side force, beta^2 of lift, alpha of roll and yaw and beta^4 of pitch; added are added masses.
+With Parameter Auto-Tuning", IEEE Robotics and Automation Letters 9(12), 2024, doi 10.1109/LRA.2024.3484182. Left out
+are their terms alpha^2 of side force, beta^2 of lift, alpha of roll and yaw, beta^4 of pitch; added are added masses.
 """
 
 import math
@@ -61,7 +61,7 @@ def aerodynamics(speed, u, v, w, p, q, r, theta):
 
 
 def derivative(x, u, w, theta):
-    """dx/dt (12,): position and attitude by the body's velocities, these by the balance about the centre of buoyancy."""
+    """dx/dt (12,): pose by the body's velocities, these by the balance about the centre of buoyancy."""
     c1, s1, c2, s2 = math.cos(x[3]), math.sin(x[3]), math.cos(x[4]), math.sin(x[4])
     c3, s3 = math.cos(x[5]), math.sin(x[5])
     U, V, W, p, q, r = x[6], x[7], x[8], x[9], x[10], x[11]

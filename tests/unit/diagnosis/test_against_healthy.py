@@ -19,6 +19,7 @@ from glider.tools.diagnose import against_healthy as against
 from glider.tools.diagnose.against_answer import plain, write
 from glider.tools.diagnose.against_healthy import (
     Comparison,
+    FreeForm,
     Healthy,
     HealthyHypothesis,
     diagnose_against_healthy,
@@ -31,10 +32,10 @@ from glider.tools.study.challenge.form_fit import fit_flights, fit_forces
 from glider.tools.study.challenge.form_plan import BY_LABEL
 from glider.tools.study.challenge.trial import with_effect
 
-pytestmark = pytest.mark.computes(seconds=90)
+pytestmark = pytest.mark.computes(seconds=150)
 
 HEALTHY, LATER = 5, 3
-LABEL = "servo_offset"
+LABEL, OUTSIDE = "servo_offset", "x_pump_jet"
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +52,8 @@ def place(tmp_path_factory):
     write_flights(folder / "healthy", trial, flights[:HEALTHY])
     write_flights(folder / "unchanged", trial, flights[HEALTHY:])
     write_flights(folder / "askew", trial, askew)
+    sizes, _ = BY_LABEL[OUTSIDE].draw(np.random.default_rng(1))
+    write_flights(folder / "outside", trial, later.fly(with_effect(trial.shapes, BY_LABEL[OUTSIDE], sizes, 2.0)))
     nearest = vehicle_of(file, fit_flights(trial, flights[:HEALTHY], fit_forces(trial, flights[:HEALTHY])))
     (folder / "nearest.toml").write_text(toml_text(nearest, inline=("sensors",)))
     return folder
@@ -88,6 +91,25 @@ def test_a_change_beside_the_wrong_form_is_found_and_shrinks_what_was_left_out(a
     assert size["ci90"][0] < 0.25 < size["ci90"][1]  # rad, as it was drawn
     assert answer["gap"]["after"]["total"] < 0.7 * answer["gap"]["before"]["total"]
     assert askew.left["none"] > 3.0 > min(askew.left.values())
+
+
+def test_what_no_label_names_is_unknown_at_a_link(place):
+    found = diagnosed(place, "outside")
+    assert (found.verdict, found.selected) == ("unknown", [])
+    forms = {name: left for name, left in found.left.items() if name.startswith("unknown at")}
+    assert min(forms.values()) < 0.9 * min(left for name, left in found.left.items() if "unknown" not in name)
+    where = plain(found)["where"]
+    assert sum(place["probability"] for place in where) == pytest.approx(1.0, abs=0.05)
+    assert max(found.links, key=lambda link: found.links[link]) == "surge force"
+    assert where[0]["element"] == "surge"
+
+
+def test_a_free_form_finds_the_link_of_a_change_and_what_it_goes_with(askew):
+    first = askew.compared.free_forms(askew.nothing)[0]
+    assert (first.link, first.shapes[0]) == ("servo", "constant")
+    free = askew.compared.fitted((), askew.nothing.values, first)
+    assert free.mean_square < 0.5 * askew.nothing.mean_square
+    assert free.values.shape == askew.nothing.values.shape
 
 
 def test_a_selected_label_that_is_no_main_cause_is_in_the_answer_and_the_report_is_drawn(askew, tmp_path):
@@ -136,6 +158,32 @@ def test_unknown_is_what_healthy_runs_do_not_leave(left, least, most, monkeypatc
     at = compared([0.1, -0.2, 0.3, -0.1, 0.0, 0.2, -0.3, 0.05])
     one = HealthyHypothesis((), np.zeros(40), np.full(6, left / 6.0), np.zeros((6, 40)), np.zeros(40))
     assert least <= weigh(at, [one]).probabilities()["unknown"] <= most
+
+
+def left_by(left: float, labels: tuple[str, ...] = (), form: FreeForm | None = None) -> HealthyHypothesis:
+    return HealthyHypothesis(labels, np.zeros(40), np.full(6, left / 6.0), np.zeros((6, 40)), np.zeros(40), form)
+
+
+@pytest.mark.parametrize(("left", "least", "most"), [(1.0, 0.0, 0.1), (1.6, 0.05, 0.3), (3.5, 0.5, 1.0)])
+def test_a_label_that_leaves_much_of_the_change_stands_in_for_something_unknown(left, least, most, monkeypatch):
+    monkeypatch.setattr(Comparison, "independent", 40.0)
+    at = compared([0.1, -0.2, 0.3, -0.1, 0.0, 0.2, -0.3, 0.05])
+    at.bare = 8.0
+    found = weigh(at, [left_by(8.0), left_by(left, ("label1",))]).probabilities()
+    assert least <= found["unknown"] <= most
+    assert found["unknown"] + found["label1"] > 0.99
+
+
+@pytest.mark.parametrize(("left", "first"), [(0.95, "label1"), (1.0, "label1"), (2.0, "unknown")])
+def test_a_label_is_named_where_a_free_form_explains_no_more(left, first, monkeypatch):
+    monkeypatch.setattr(Comparison, "independent", 40.0)
+    at = compared([0.1, -0.2, 0.3, -0.1, 0.0, 0.2, -0.3, 0.05])
+    at.bare = 6.0
+    form = FreeForm("slider", ("pitch rate", "climb or dive"))
+    listed = [left_by(6.0), left_by(left, ("label1",)), left_by(0.9, (), form), left_by(0.85, ("label1",), form)]
+    found = weigh(at, listed).probabilities()
+    assert sum(found.values()) == pytest.approx(1.0)
+    assert max(found, key=lambda name: found[name]) == first
 
 
 def test_a_label_that_does_not_shrink_what_was_left_out_is_none(monkeypatch):

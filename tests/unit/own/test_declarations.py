@@ -8,9 +8,8 @@ import pytest
 from glider.hal.strict import ConfigError
 from glider.tools.data.errors import InputError
 from glider.tools.own.cases import own_vehicle
-from glider.tools.own.check import check_model
+from glider.tools.own.check import check_model, load_own
 from glider.tools.own.declare import DeclarationError, Output, column_of, declaration
-from glider.tools.own.load import load_own
 from glider.tools.own.runs import load_own_run
 
 MODEL = """
@@ -39,13 +38,17 @@ MISTAKES = {
         "random = np.random.default_rng()\ndef measure(x, u, theta):\n    return np.array([random.normal()])",
         "measure: not the same twice",
     ),
-    "argument changed": ("    return np.array([x[1], u[0]", "    x[0] = 0.5\n    return np.array([x[1], u[0]", "derivative: changes its argument x"),
+    "argument changed": (
+        "    return np.array([x[1], u[0]", "    x[0] = 0.5\n    return np.array([x[1], u[0]", "changes its argument x",
+    ),
     "raises": ("np.array([x[0]])", "np.array([x[7]])", "IndexError"),
     "syntax": ("def measure(x, u, theta):", "def measure(x, u, theta)", "import: expected ':'"),
     "name twice": ('{"z": "m", "speed": "m/s"}', '[("z", "m"), ("z", "m")]', "states[1]: z stands twice"),
     "no outputs": ('outputs = {"depth": "m"}', "", "outputs: not declared"),
-    "out of range": ('("drag", "N s2/m2", 4.0, 1.0)', '{"name": "drag", "value": 4.0, "low": 5.0}', "drag: 4 is outside 5 to inf"),
-    "no motion": ("def derivative(x, u, w, theta):", "def motion(x, u, w, theta):", "none of step, derivative, rollout"),
+    "out of range": (
+        '("drag", "N s2/m2", 4.0, 1.0)', '{"name": "drag", "value": 4.0, "low": 5.0}', "drag: 4 is outside 5 to inf",
+    ),
+    "no motion": ("def derivative(x, u, w, theta):", "def motion(x, u, w, theta):", "none of step, derivative"),
 }  # fmt: skip
 
 
@@ -67,11 +70,16 @@ def test_a_mistake_in_a_model_is_one_line_that_names_it(vehicle, mistake):
     old, new, said = MISTAKES[mistake]
     with pytest.raises(InputError) as error:
         load_own(vehicle(old, new))
-    assert said in str(error.value) and "sinker.py" in str(error.value) and "\n" not in str(error.value)
+    assert said in str(error.value)
+    assert "sinker.py" in str(error.value)
+    assert "\n" not in str(error.value)
 
 
 def test_an_answer_that_depends_on_earlier_calls_is_a_hidden_state(vehicle):
-    memory = "last = [0.0, 0]\ndef measure(x, u, theta):\n    if last[0] != x[0]:\n        last[:] = [float(x[0]), last[1] + 1]\n    return np.array([x[0] + last[1]])\ndef other():"
+    memory = (
+        "last = [0.0, 0]\ndef measure(x, u, theta):\n    if last[0] != x[0]:\n"
+        "        last[:] = [float(x[0]), last[1] + 1]\n    return np.array([x[0] + last[1]])\ndef other():"
+    )
     with pytest.raises(InputError, match="hidden state"):
         load_own(vehicle("def measure(x, u, theta):", memory))
 
@@ -117,7 +125,8 @@ def test_a_file_without_a_model_is_no_vehicle_of_ones_own(tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "unit", "column"),
-    [("depth", "m", "depth_m"), ("r", "rad/s", "r_rad_s"), ("az", "m/s2", "az_m_s2"), ("depth_m", "m", "depth_m"), ("gain", "1", "gain"), ("pwm", "us", "pwm_us")],
+    [("depth", "m", "depth_m"), ("r", "rad/s", "r_rad_s"), ("az", "m/s2", "az_m_s2"), ("depth_m", "m", "depth_m"),
+     ("gain", "1", "gain"), ("pwm", "us", "pwm_us")],
 )  # fmt: skip
 def test_columns_are_called_by_name_and_unit(name, unit, column):
     assert column_of(name, unit) == column
@@ -126,7 +135,8 @@ def test_columns_are_called_by_name_and_unit(name, unit, column):
 def test_a_declaration_may_be_written_in_four_ways():
     forms = [{"depth": "m"}, [("depth", "m")], [{"name": "depth", "unit": "m"}], [Output("depth", "m")]]
     found = [declaration(SimpleNamespace(outputs=one, parameters=[], states=[("z", "m")])).outputs for one in forms]
-    assert all(one == found[0] for one in found) and found[0][0].column == "depth_m"
+    assert all(one == found[0] for one in found)
+    assert found[0][0].column == "depth_m"
 
 
 def test_three_states_are_no_quaternion():
@@ -136,6 +146,8 @@ def test_three_states_are_no_quaternion():
 
 
 def test_numbers_of_the_file_stand_in_for_the_models(vehicle):
-    declared = load_own(vehicle(extra="[parameters.drag]\nvalue = 6.0\nscope = 'run'\n[noise.heave]\ndensity = 0.5\n")).declared
+    declared = load_own(
+        vehicle(extra="[parameters.drag]\nvalue = 6.0\nscope = 'run'\n[noise.heave]\ndensity = 0.5\n")
+    ).declared
     assert (declared.parameters[0].value, declared.parameters[0].scope, declared.noises[0].density) == (6.0, "run", 0.5)
     assert np.isinf(declared.parameters[0].high)

@@ -1,4 +1,4 @@
-"""The generated observer: manifolds, its filter against a Kalman filter in closed form, windows that never look ahead."""
+"""The generated observer: manifolds, its filter against a Kalman filter, windows that never look ahead."""
 
 import numpy as np
 import pytest
@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from glider.tools.own import kernels
+from glider.tools.own.check import load_own
 from glider.tools.own.effects import driven_inputs, moved, nominal_point, standard_effects
-from glider.tools.own.load import load_own
 from glider.tools.own.observer import observer_of
 from glider.tools.own.runs import OwnRun
 
@@ -52,7 +52,9 @@ def linear(tmp_path, monkeypatch):
     x, y = np.zeros(2), []
     for row in range(len(t)):
         y.append(x[0] + 0.1 * random.normal())
-        x = np.array([x[0] + 0.1 * x[1], x[1] + 0.1 * (u[row, 0] / 2.0 - 0.4 * x[1] + 0.3 * random.normal() / np.sqrt(0.1))])
+        x = np.array(
+            [x[0] + 0.1 * x[1], x[1] + 0.1 * (u[row, 0] / 2.0 - 0.4 * x[1] + 0.3 * random.normal() / np.sqrt(0.1))]
+        )
     vehicle = load_own(tmp_path / "linear.toml")
     return vehicle, OwnRun("run0", t, u, np.array(y)[:, None])
 
@@ -92,14 +94,17 @@ def test_a_prediction_uses_nothing_behind_a_windows_warm_up(linear):
     blank[run.t > 8.41] = np.nan
     observer = observer_of(vehicle, [OwnRun("run0", run.t, run.inputs, blank)])
     after = observer.predict(0, observer.point, 4.0, observer.filter(0, observer.point).states)
-    assert np.array_equal(before, after, equal_nan=True) and np.isfinite(after).sum() > 70
+    assert np.array_equal(before, after, equal_nan=True)
+    assert np.isfinite(after).sum() > 70
 
 
 def test_every_standard_effect_moves_what_it_is_of_and_nothing_at_no_size(linear):
     vehicle, run = linear
     observer = observer_of(vehicle, [run])
     effects = standard_effects(vehicle.declared, [run], observer.tolerances)
-    assert {"push_gain", "push_rate_limit", "place_bias", "place_delay", "damping", "mass"} <= {one.label for one in effects}
+    assert {"push_gain", "push_rate_limit", "place_bias", "place_delay", "damping", "mass"} <= {
+        one.label for one in effects
+    }
     base = nominal_point(vehicle.declared)
     base.variance = observer.point.variance
     by = observer.filter(0, base)
@@ -126,4 +131,5 @@ def test_what_is_known_of_a_start_holds_against_a_sensor(tmp_path, linear):
     off = OwnRun("run0", run.t, run.inputs, run.outputs + 5.0)
     observer = observer_of(load_own(vehicle.path), [off])
     x, P = observer.start(0, observer.point)
-    assert abs(x[0]) < 0.01 and np.sqrt(P[0, 0]) == pytest.approx(0.01, rel=0.01)
+    assert abs(x[0]) < 0.01
+    assert np.sqrt(P[0, 0]) == pytest.approx(0.01, rel=0.01)

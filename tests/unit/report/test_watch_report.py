@@ -4,9 +4,9 @@ import json
 
 import pytest
 
+from glider.tools.api.sentences import watch_lines as lines
 from glider.tools.cli.common import report_errors
 from glider.tools.cli.main import cli
-from glider.tools.cli.watch import lines
 from glider.tools.report.watch import write_watch_report
 from glider.tools.watch.answer import EventAnswer, RunVerdict, Sized, WatchAnswer
 

@@ -143,14 +143,10 @@ class _Source:
     def _converted(self, target: str, item: ColumnTable) -> np.ndarray:
         """Logged numbers in SI; what is outside `valid` is missing."""
         logged = self.numbers[target][self.keep]
-        values = (
-            item.factor(self.mapping.water_density_kg_m3, target.endswith("_kg")) * (logged - item.zero) + item.offset
-        )
-        if item.valid is not None:
-            outside = (values < item.valid[0]) | (values > item.valid[1])
-            values[outside] = np.nan
-            if outside.any():
-                self.notes.append(f"{target}: {np.count_nonzero(outside)} samples outside `valid`, missing now")
+        values = item.converted(logged, self.mapping.water_density_kg_m3, target.endswith("_kg"))
+        outside = np.count_nonzero(np.isnan(values) & ~np.isnan(logged))
+        if outside:
+            self.notes.append(f"{target}: {outside} samples outside `valid`, missing now")
         return values
 
     def _rebuilt(self, target: str, command: CommandTable, values: dict[str, np.ndarray]) -> np.ndarray:

@@ -6,11 +6,13 @@ docs/IMPORT.md explains every key with an example.
 """
 
 import tomllib
+from collections.abc import Callable, Mapping
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 import msgspec
+import numpy as np
 
 from glider.firmware.core.vehicle.layout import GRAVITY
 from glider.hal.strict import ConfigError, Table, decode, locate
@@ -29,16 +31,14 @@ _KINDS = (("_rad_s", "rate"), ("_rad", "angle"), ("_kg", "mass"), ("_m", "length
 Factor = Annotated[float, msgspec.Meta(ge=-1e12, le=1e12)]
 
 
-class ColumnTable(Table):
-    """[columns.NAME] or [extra.NAME]: where a column comes from."""
+class ConversionTable(Table):
+    """How logged numbers become those of a column."""
 
-    source: Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
     unit: str = "counts"
     scale: Factor = 1.0  # units a step of the logged number
     zero: Factor = 0.0  # the logged number that means nothing
     sign: Literal[1, -1] = 1
     offset: Factor = 0.0  # added at the end, SI
-    words: dict[str, Factor] = msgspec.field(default_factory=dict)  # what is logged, and the number it stands for
     valid: tuple[Factor, Factor] | None = None  # SI; what is outside becomes missing
     decimals: Annotated[int, msgspec.Meta(ge=0, le=17)] | None = None  # of the written file; exact without
 
@@ -58,6 +58,20 @@ class ColumnTable(Table):
         if kind == "pressure":
             factor /= density * GRAVITY
         return self.sign * self.scale * factor
+
+    def converted(self, logged: np.ndarray, density: float, mass: bool = False) -> np.ndarray:
+        """Logged numbers in SI; what is outside `valid` is missing."""
+        values = self.factor(density, mass) * (logged - self.zero) + self.offset
+        if self.valid is not None:
+            values[(values < self.valid[0]) | (values > self.valid[1])] = np.nan
+        return values
+
+
+class ColumnTable(ConversionTable, kw_only=True):
+    """[columns.NAME] or [extra.NAME]: where a column comes from."""
+
+    source: Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
+    words: dict[str, Factor] = msgspec.field(default_factory=dict)  # what is logged, and the number it stands for
 
 
 class TimeTable(Table):
@@ -103,9 +117,13 @@ class MapTable(Table):
     commands: dict[str, CommandTable] = msgspec.field(default_factory=dict)
 
 
-def _check(mapping: MapTable, source: str) -> None:
-    """What no single table can see; ConfigError."""
-    for name, column in mapping.columns.items():
+_BY_NAME = {"columns": ColumnTable, "extra": ColumnTable, "commands": CommandTable}
+M = TypeVar("M", bound=Table)
+
+
+def check_columns(columns: Mapping[str, ConversionTable], source: str) -> None:
+    """ConfigError where a column is none of run data, or its unit measures something else."""
+    for name, column in columns.items():
         if name not in names.KNOWN or name == names.TIME:
             known = ", ".join(sorted(names.KNOWN - {names.TIME}))
             raise ConfigError(
@@ -116,6 +134,11 @@ def _check(mapping: MapTable, source: str) -> None:
         also = {"length": "pressure" if name == names.DEPTH else wanted, "mass": "volume"}.get(wanted, wanted)
         if kind not in (wanted, also, "counts"):
             raise ConfigError(source, f"{column.unit!r} is no unit of {wanted}", key=f"columns.{name}.unit")
+
+
+def _check(mapping: MapTable, source: str) -> None:
+    """What no single table can see; ConfigError."""
+    check_columns(mapping.columns, source)
     for name in mapping.extra:
         if name in names.KNOWN or not name.strip():
             raise ConfigError(source, "the name is taken by a column of run data", key=f"extra.{name}")
@@ -134,12 +157,22 @@ def _check(mapping: MapTable, source: str) -> None:
 
 def decode_map(text: str, source: str) -> MapTable:
     """A mapping file's text; raises ConfigError with file, line and key."""
+    return decode_checked(text, source, MapTable, _check, _BY_NAME)
+
+
+def decode_checked(
+    text: str, source: str, kind: type[M], check: Callable[[M, str], None], by_name: Mapping[str, Any]
+) -> M:
+    """Decode a mapping of some kind and check it.
+
+    by_name: what stands in its groups of tables by name. ConfigError with file, line and key.
+    """
     try:
-        mapping = decode(text, MapTable, source)
+        mapping = decode(text, kind, source)
     except ConfigError as error:
-        raise _at_key(_with_column(error, text, source), text) from None
+        raise _at_key(_with_column(error, text, source, by_name), text) from None
     try:
-        _check(mapping, source)
+        check(mapping, source)
     except ConfigError as error:
         raise ConfigError(source, error.message, key=error.key, line=locate(text, [*error.key.split(".")])) from None
     return mapping
@@ -154,40 +187,42 @@ def _at_key(error: ConfigError, text: str) -> ConfigError:
     return ConfigError(error.source, message, key=f"{error.key}.{key}", line=locate(text, path))
 
 
-_BY_NAME = {"columns": ColumnTable, "extra": ColumnTable, "commands": CommandTable}
-
-
-def _with_column(error: ConfigError, text: str, source: str) -> ConfigError:
+def _with_column(error: ConfigError, text: str, source: str, by_name: Mapping[str, Any]) -> ConfigError:
     """An error inside a group of tables by name with the table's name, which the decoder leaves out."""
     group, *rest = error.key.split(".")
-    if group not in _BY_NAME:
+    if group not in by_name:
         return error
     for name, table in tomllib.loads(text)[group].items():
         try:
-            msgspec.convert(table, _BY_NAME[group], strict=True)
+            msgspec.convert(table, by_name[group], strict=True)
         except msgspec.ValidationError:
             path: list[str | int] = [group, name, *rest]
             return ConfigError(source, error.message, key=".".join(map(str, path)), line=locate(text, path))
     return error
 
 
-def write_template(path: Path) -> None:
+def write_template(path: Path, name: str = "template.toml") -> None:
     """A mapping with every key, commented, to be filled in; InputError where the file is there already."""
     if path.exists():
         raise InputError("is there already: name another file", source=path)
-    write_bytes(path, files("glider.tools.data.importers").joinpath("template.toml").read_bytes())
+    write_bytes(path, files("glider.tools.data.importers").joinpath(name).read_bytes())
 
 
 def load_map(wanted: str) -> tuple[MapTable, Path]:
     """A mapping by shipped name or by path, and the folder that its vehicle file is looked for in."""
+    return load_mapping(wanted, "maps", decode_map)
+
+
+def load_mapping(wanted: str, folder: str, decode_text: Callable[[str, str], M]) -> tuple[M, Path]:
+    """The same of another kind of mapping, whose shipped ones stand in `folder`."""
     shipped = {
         entry.name.removesuffix(".toml"): entry.read_text(encoding="utf-8")
-        for entry in files("glider.tools.data.importers").joinpath("maps").iterdir()
+        for entry in files("glider.tools.data.importers").joinpath(folder).iterdir()
         if entry.name.endswith(".toml")
     }
     if wanted in shipped:
-        return decode_map(shipped[wanted], f"{wanted} (shipped)"), Path()
+        return decode_text(shipped[wanted], f"{wanted} (shipped)"), Path()
     path = Path(wanted)
     if path.is_file():
-        return decode_map(read_text(path), str(path)), path.parent
+        return decode_text(read_text(path), str(path)), path.parent
     raise InputError(f"no mapping '{wanted}': neither a file nor one of {', '.join(sorted(shipped))}")
