@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support.own_cases import FOSSEN, answers, diagnosed, fly, size_of
 
-from glider.tools.own.load import load_own
+from glider.tools.own.load import read_own
 from glider.tools.own.posterior import NONE
 
 pytestmark = pytest.mark.computes(seconds=60)
@@ -12,7 +12,7 @@ pytestmark = pytest.mark.computes(seconds=60)
 
 @pytest.fixture(scope="module")
 def vehicle():
-    return load_own(FOSSEN)
+    return read_own(FOSSEN)
 
 
 def first(answer) -> tuple[str, float]:

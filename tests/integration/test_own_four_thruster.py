@@ -8,7 +8,7 @@ import pytest
 from glider.tools.own.effects import nominal_point
 from glider.tools.own.identified import VEHICLE, write
 from glider.tools.own.identify import identify
-from glider.tools.own.load import load_own
+from glider.tools.own.load import read_own
 from glider.tools.own.observer import Observer
 from glider.tools.own.runs import load_own_runs
 
@@ -22,7 +22,7 @@ DIVE = 8.0  # s
 
 @pytest.fixture(scope="module")
 def vehicle():
-    return load_own(HAIZHE)
+    return read_own(HAIZHE)
 
 
 def depth(vehicle, pulse: float, volts: float = 11.8, **changed: float) -> float:
@@ -54,7 +54,7 @@ def test_thrust_voltage_and_weight_take_it_down(vehicle):
 def test_dives_that_were_left_out_are_predicted_and_a_load_is_seen_against_the_command(vehicle, tmp_path):
     normal = load_own_runs(DIVES / "normal_a", vehicle.declared)
     write(identify(vehicle, [normal[::2]]), tmp_path)
-    model = load_own(tmp_path / VEHICLE)
+    model = read_own(tmp_path / VEHICLE)
     place = model.declared.index("outputs", "depth")
 
     def errors(runs) -> np.ndarray:

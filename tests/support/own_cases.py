@@ -18,7 +18,7 @@ import numpy as np
 from glider.tools.own.effects import Effect, driven_inputs, moved, nominal_point, standard_effects
 from glider.tools.own.identified import VEHICLE, write
 from glider.tools.own.identify import identify
-from glider.tools.own.load import LoadedVehicle, load_own
+from glider.tools.own.load import LoadedVehicle, read_own
 from glider.tools.own.observer import Observer
 from glider.tools.own.posterior import NONE, Engine, Posterior, healthy_of
 from glider.tools.own.runs import OwnRun
@@ -73,7 +73,7 @@ def fly(vehicle: LoadedVehicle, seed: int, changes: Mapping[str, float], runs: i
 def identified(vehicle: LoadedVehicle, seed: int, folder: Path, runs: int = 6) -> LoadedVehicle:
     """The vehicle as identified from runs without a change."""
     write(identify(vehicle, [fly(vehicle, seed, {}, runs)]), folder)
-    return load_own(folder / VEHICLE)
+    return read_own(folder / VEHICLE)
 
 
 def diagnosed(vehicle: LoadedVehicle, runs: list[OwnRun]) -> Posterior:
@@ -106,7 +106,7 @@ def answers(seed: int, count: int) -> list[dict[str, float]]:
 
 def judge(seed: int, count: int, folder: Path, say: Callable[[str], None]) -> dict[str, Any]:
     """Cases made, their answers' hash said, asked about, judged."""
-    vehicle = load_own(FOSSEN)
+    vehicle = read_own(FOSSEN)
     truth = answers(seed, count)
     say(f"answers: sha256 {hashlib.sha256(json.dumps(truth).encode()).hexdigest()}")
     model = identified(vehicle, seed + 1, folder)
