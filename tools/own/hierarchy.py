@@ -18,6 +18,7 @@ from glider.tools.own.effects import Effect, moved
 from glider.tools.own.observer import Observer
 
 STEP, LONG_STEP, SHORTENED = 0.1, 3.0, 0.5  # spreads; rms errors that a step may move, and to what it is shortened
+PARTS = 1, 4  # of a window, in each of which errors may be the same
 UNSEEN_STEP = 1.0  # spreads: step of an effect that begins at a kink
 SCATTER_PRIOR_RUNS, LEAST_VARIANCE = 1.0, 1e-12
 ITERATIONS, CONVERGED = 200, 1e-3
@@ -33,7 +34,7 @@ class Expansion:
     curvature: np.ndarray  # (k, k)
     squares: np.ndarray  # (y,) by channel
     samples: np.ndarray  # (y,)
-    blocks: np.ndarray  # (y + 1, k) sums over blocks of (J e)^2, by channel, and of all together
+    blocks: np.ndarray  # (PARTS, y + 1, k) sums over parts of windows of (J e)^2, by channel, and of all together
     diagonal: np.ndarray  # (y + 1, k) what they would be, were errors independent
     reach: np.ndarray  # (k,) mean square that a spread moves the channels, tolerances
 
@@ -104,26 +105,33 @@ def expand(
     flat = J.reshape(len(J), -1)
     score = J * (weight * e)  # (k, rows, y)
     starts, ends = observer.windows(n, horizon)
-    first = np.concatenate([[0], np.cumsum(ends - starts - 1)[:-1]])
-    by_window = np.add.reduceat(score, first, axis=1)  # (k, windows, y)
-    blocks = np.concatenate([(by_window**2).sum(axis=1).T, (by_window.sum(axis=2) ** 2).sum(axis=1)[None]])
+    rows = ends - starts - 1
+    first = np.cumsum(rows) - rows
+    blocks = []
+    for parts in PARTS:
+        cuts = np.unique((first[:, None] + rows[:, None] * np.arange(parts) // parts).ravel())
+        sums = np.add.reduceat(score, cuts, axis=1)  # (k, blocks, y)
+        blocks.append(np.concatenate([(sums**2).sum(axis=1).T, (sums.sum(axis=2) ** 2).sum(axis=1)[None]]))
     diagonal = np.concatenate([(score**2).sum(axis=1).T, (score * J * e).sum(axis=(1, 2))[None]])
     return Expansion(
         at.copy(), float((weight * e * e).sum()), weighted @ e.ravel(), weighted @ flat.T, (e**2).sum(axis=0),
-        np.where(seen, shape[0], 0), blocks, diagonal, ((J * scales) ** 2).mean(axis=1)[:, seen].mean(axis=1),
+        np.where(seen, shape[0], 0), np.array(blocks), diagonal, ((J * scales) ** 2).mean(axis=1)[:, seen].mean(axis=1),
     )  # fmt: skip
 
 
 def inflation(found: Sequence[Expansion]) -> np.ndarray:
-    """Variance inflation (y + 1,) by channel, and of all together: what windows' scores vary by, over what independent
-    errors' would. Of all together beside the channels' own: what channels have in common."""
+    """Variance inflation (y + 1,) by channel, and of all together beside it: what channels have in common.
+
+    What scores of windows or of parts of them vary by, whichever is more, over what independent errors' would: values
+    of a run's own bring the score of a whole window to nothing.
+    """
     blocks = np.sum([one.blocks for one in found], axis=0)
     diagonal = np.sum([one.diagonal for one in found], axis=0)
-    out = np.ones(len(blocks))
-    for row in range(len(blocks)):
+    out = np.ones(len(diagonal))
+    for row in range(len(out)):
         seen = diagonal[row] > 1e-9 * max(float(diagonal[row].max(initial=0.0)), 1e-300)
         if seen.any():
-            out[row] = max(1.0, float(np.median(blocks[row, seen] / diagonal[row, seen])))
+            out[row] = max(1.0, float(np.median(blocks[:, row, seen] / diagonal[row, seen], axis=1).max()))
     return out
 
 

@@ -5,7 +5,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from glider.tools.own.effects import Effect, moved, standard_effects
+from glider.tools.own.declare import RUN, Declaration
+from glider.tools.own.effects import PARAMETER, Effect, moved, standard_effects
 from glider.tools.own.hierarchy import (
     ChannelErrors,
     Expansion,
@@ -25,7 +26,7 @@ SCATTER_ROUNDS = 4  # in which it is learned how runs differ, then held
 USUAL_SESSION_SHARE, SESSION_SHARES, MIN_SESSIONS = 0.25, (0.05, 4.0), 3
 MIN_SCATTER_RUNS = 3  # from fewer nothing is learned of how runs differ
 FILE_PRIOR = 2.0  # times the file's uncertainties: what the shared values may be
-USUAL_SCATTER = 0.02  # spreads, from run to run
+USUAL_SCATTER, USUAL_OWN_SCATTER = 0.02, 0.5  # spreads, from run to run; of what is declared a number of each run
 LONGEST_MOVE = 2.0  # spreads a round
 CONVERGED_GAIN = 0.5  # of -2 log posterior: no further round
 CONVERGED_SCALE = 0.05  # e-folds of what is left, by which it changes no more
@@ -73,6 +74,13 @@ def nuisance_of(observer: Observer) -> list[Effect]:
     return found
 
 
+def usual_scatter(declared: Declaration, effects: Sequence[Effect]) -> np.ndarray:
+    """1 sigma (effects,) in spreads of how runs differ, before any is seen."""
+    own = {one.name for one in declared.parameters if one.scope == RUN}
+    at_run = [one.family == PARAMETER and one.name in own for one in effects]
+    return np.where(at_run, USUAL_OWN_SCATTER, USUAL_SCATTER)
+
+
 def identify(
     vehicle: LoadedVehicle, sessions: Sequence[Sequence[OwnRun]], say: Callable[[str], None] = lambda text: None
 ) -> Identified:
@@ -83,7 +91,8 @@ def identify(
     k, count = len(nuisance), len(runs)
     V = FILE_PRIOR**2 * np.eye(k)
     limits = np.array([one.low for one in nuisance]), np.array([one.high for one in nuisance])
-    values, scatter, own = np.zeros(k), np.full(k, USUAL_SCATTER), np.zeros((count, k))
+    usual = usual_scatter(vehicle.declared, nuisance)
+    values, scatter, own = np.zeros(k), usual.copy(), np.zeros((count, k))
     file_point = observer.point.copy()
     before = np.array([observer.gaps(n, file_point, horizon) for n in range(count)])
     say(f"{count} runs, {k} numbers; the file's model misses them by {_total(before):.2f} tolerances")
@@ -97,7 +106,7 @@ def identify(
         *_, eta = inflation(found)
         warm = [one.tempered(eta) for one in found]
         if differ and learned < SCATTER_ROUNDS:
-            found_scatter = learn_scatter(warm, V, np.full(k, USUAL_SCATTER))
+            found_scatter = learn_scatter(warm, V, usual)
             scatter = found_scatter if learned == 0 else np.sqrt(scatter * found_scatter)
             learned += 1
         search = _Search(observer, nuisance, warm, scatter, eta, V, limits, errors, horizon)
@@ -118,7 +127,7 @@ def identify(
     *_, eta = inflation(found)
     warm = [marginalised(one.tempered(eta), scatter) for one in found]
     covariance = Pooled.of(warm, V).covariance()
-    after = _held_out(observer, nuisance, warm, V, limits)
+    after = _held_out(observer, nuisance, values, warm, V, limits)
     effects, every = _scatter_of_all(observer, nuisance, values, own, eta, errors)
     counts = [len(one) for one in sessions]
     return Identified(vehicle, observer, nuisance, values, covariance, effects, every, eta, errors, own, before, after,
@@ -231,7 +240,7 @@ def _scatter_of_all(observer, nuisance, values, own, eta, errors) -> tuple[list[
     for n in range(len(own)):
         one = expand(observer, n, effects, into @ own[n], errors, observer.horizon).tempered(eta)
         about.append(replace(one, at=one.at - into @ values))
-    usual = np.full(len(effects), USUAL_SCATTER)
+    usual = usual_scatter(observer.declared, effects)
     if len(own) < MIN_SCATTER_RUNS:
         return effects, 5.0 * usual
     return effects, learn_scatter(about, np.zeros((len(effects), len(effects))), usual)
@@ -271,12 +280,14 @@ def placed(nuisance: Sequence[Effect], effects: Sequence[Effect]) -> np.ndarray:
     return found
 
 
-def _held_out(observer, nuisance, warm, V, limits) -> np.ndarray:
-    """Gaps (runs, outputs) of every run by a model of the others, to first order."""
-    gaps = []
+def _held_out(observer, nuisance, values, warm, V, limits) -> np.ndarray:
+    """Gaps (runs, outputs) of every run by a model of the others, to first order in what leaving it out moves."""
+    gaps, every = [], Pooled.of(warm, V).mean()
     for n in range(len(warm)):
         others = [one for k, one in enumerate(warm) if k != n] or warm
-        point = moved(observer.declared, observer.point, nuisance, np.clip(Pooled.of(others, V).mean(), *limits))
+        point = moved(
+            observer.declared, observer.point, nuisance, np.clip(values + Pooled.of(others, V).mean() - every, *limits)
+        )
         gaps.append(observer.gaps(n, point, observer.horizon))
     return np.array(gaps)
 

@@ -230,16 +230,20 @@ class Observer:
     def windows(self, n: int, horizon: float) -> tuple[np.ndarray, np.ndarray]:
         """First row flown open loop and row behind the last, of every window of run n.
 
-        A run shorter than a window is one; what is left behind the last is not scored.
+        A run shorter than a window is one; what is left behind the last is not scored. Where [start] says how a run
+        begins, its first window is flown from there: a warm-up would follow a sensor's offset.
         """
         t = self.runs[n].t - self.runs[n].t[0]
         warm = min(WARM_UP, WARM_UP_SHARE * horizon)
         count = int((t[-1] + 1e-6) // horizon)
-        if count < 1:
-            return np.array([min(int(np.searchsorted(t, warm - 1e-6)), len(t) - 2)]), np.array([len(t)])
-        begins = np.searchsorted(t, horizon * np.arange(count) - 1e-6)
-        ends = np.append(begins[1:], np.searchsorted(t, horizon * count + 1e-6))
-        return np.minimum(np.searchsorted(t, t[begins] + warm - 1e-6), ends - 2), ends
+        begins, ends = np.zeros(1, dtype=int), np.array([len(t)])
+        if count >= 1:
+            begins = np.searchsorted(t, horizon * np.arange(count) - 1e-6)
+            ends = np.append(begins[1:], np.searchsorted(t, horizon * count + 1e-6))
+        starts = np.minimum(np.searchsorted(t, t[begins] + warm - 1e-6), ends - 2)
+        if self.declared.start:
+            starts[0] = 0
+        return starts, ends
 
     def predict(self, n: int, point: ModelPoint, horizon: float, states: np.ndarray) -> np.ndarray:
         """Outputs (rows, outputs) of run n, window by window open loop from the state behind each warm-up; NaN else.

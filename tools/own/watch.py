@@ -42,7 +42,7 @@ REFITTED, SPANS = 5, 2  # labels, of the best spans, whose parabolas are taken w
 CERTAIN = 0.5  # probability from which an event is one
 NINETY = 1.645
 GROUP = 0.1  # of a label's probability: others of at least so much share its group
-ROUNDS = 3
+ROUNDS, PREPARED = 3, 6
 
 
 @dataclass
@@ -125,23 +125,32 @@ class Watch(Engine):
     def prepare(self) -> None:
         """Every run about where it lies, with what the reference says of all; how runs differ, learned from it too."""
         every = np.arange(self.k)
-        own = np.zeros((self.count, self.k))
-        shared = np.zeros(self.k)
-        for round_ in range(ROUNDS):
-            self.found = self.expansions(own, every)
-            self.reach = np.sqrt(np.mean([one.reach for one in self.found], axis=0))
+        shared, own = np.zeros(self.k), np.zeros((self.count, self.k))
+        best: tuple[float, np.ndarray, np.ndarray] | None = None  # squares of the reference, shared, own
+        for _ in range(PREPARED):
+            found = self.expansions(own, every)
+            squares = sum(one.value for one in found[: self.learned])
+            if best is not None and squares + self._prior(shared, own[: self.learned], ()) >= best[0] + self._prior(
+                best[1], best[2][: self.learned], ()
+            ):
+                shared, own = 0.5 * (shared + best[1]), 0.5 * (own + best[2])
+                continue
+            best, self.found = (squares, shared, own), found
+            self.reach = np.sqrt(np.mean([one.reach for one in found], axis=0))
             if self.learned > 2:
-                learned = learn_scatter(self.found[: self.learned], self.healthy.V, self.healthy.scatter)
+                learned = learn_scatter(found[: self.learned], self.healthy.V, self.healthy.scatter)
                 self.healthy = replace(self.healthy, scatter=learned)
                 self.scatter = np.where(self.active, learned, 0.0)
-            warm = self.marginal(self.found[: self.learned])
+            warm = self.marginal(found[: self.learned])
             V = self.V
             H, r = sum(one.curvature for one in warm), -sum(one.offset for one in warm)
             M = np.linalg.solve(np.eye(self.k) + V @ H, V)
-            shared = M @ r
-            if round_ < ROUNDS - 1:
-                own = np.array([shared if n >= self.learned else run_values(one, shared, self.scatter)
-                                for n, one in enumerate(self.found)])  # fmt: skip
+            shared = np.clip(shared + np.clip(M @ r - shared, -LONGEST_MOVE, LONGEST_MOVE), self.low, self.high)
+            own = np.array([shared if n >= self.learned else run_values(one, shared, self.scatter)
+                            for n, one in enumerate(found)])  # fmt: skip
+            own = np.clip(own, self.low, self.high)
+        assert best is not None
+        shared = best[1]
         self.shared, self.M = shared, 0.5 * (M + M.T)
         self.runs = self.marginal(self.found)
         self.events: list[Event] = []

@@ -1,0 +1,74 @@
+"""The four-thruster AUV of docs/examples: its physics, and, where the recordings are, what is identified from them."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from glider.tools.own.effects import nominal_point
+from glider.tools.own.identified import VEHICLE, write
+from glider.tools.own.identify import identify
+from glider.tools.own.load import read_own
+from glider.tools.own.observer import Observer
+from glider.tools.own.runs import load_own_runs
+
+pytestmark = pytest.mark.computes(seconds=60)
+
+ROOT = Path(__file__).resolve().parents[2]
+HAIZHE = ROOT / "docs" / "examples" / "four_thruster_auv" / "haizhe.toml"
+DIVES = ROOT.parent / "shared" / "data" / "haizhe"
+DIVE = 8.0  # s
+
+
+@pytest.fixture(scope="module")
+def vehicle():
+    return read_own(HAIZHE)
+
+
+def depth(vehicle, pulse: float, volts: float = 11.8, **changed: float) -> float:
+    """Depth at the end of a dive."""
+    declared, theta = vehicle.declared, nominal_point(vehicle.declared).theta
+    for name, value in changed.items():
+        theta[declared.index("parameters", name)] = value
+    x, w, u = np.zeros(len(declared.states)), np.zeros(len(declared.noises)), np.array([pulse] * 4 + [volts])
+    for _ in range(round(DIVE / 0.05)):
+        x = vehicle.kernels.advance(x, u, w, theta, 0.05, 1)
+    return float(vehicle.kernels.measure(x, u, theta)[0])
+
+
+def test_it_is_compiled_and_floats_with_its_motors_off(vehicle):
+    assert vehicle.kernels.compiled, vehicle.kernels.why
+    assert depth(vehicle, 1100.0) == pytest.approx(0.0, abs=1e-3)
+
+
+def test_thrust_voltage_and_weight_take_it_down(vehicle):
+    usual = depth(vehicle, 1198.0)
+    assert 0.2 < usual < 0.8
+    assert depth(vehicle, 1202.0) > usual + 0.1
+    assert depth(vehicle, 1198.0, volts=11.9) > usual + 0.05
+    lighter = vehicle.declared.parameters[vehicle.declared.index("parameters", "net_buoyancy")].value - 0.05
+    assert depth(vehicle, 1198.0, net_buoyancy=lighter) > usual + 0.1
+
+
+@pytest.mark.skipif(not DIVES.is_dir(), reason="the recordings are not here")
+def test_dives_that_were_left_out_are_predicted_and_a_load_is_seen_against_the_command(vehicle, tmp_path):
+    normal = load_own_runs(DIVES / "normal_a", vehicle.declared)
+    write(identify(vehicle, [normal[::2]]), tmp_path)
+    model = read_own(tmp_path / VEHICLE)
+    place = model.declared.index("outputs", "depth")
+
+    def errors(runs) -> np.ndarray:
+        """Measured less predicted depth in the last second of each dive, m."""
+        observer = Observer(model, runs)
+        found = []
+        for n, run in enumerate(runs):
+            flown = observer.predict(n, observer.point, observer.horizon, observer.filter(n, observer.point).states)
+            last = (run.t - run.t[0] > DIVE - 1.0) & (run.t - run.t[0] < DIVE - 0.1)
+            found.append(float(np.mean(run.outputs[last, place] - flown[last, place])))
+        return np.array(found)
+
+    assert model.file.identified is not None
+    assert np.sqrt(np.mean(errors(normal[1::2]) ** 2)) < 0.12
+    loaded = load_own_runs(DIVES / "addweight", vehicle.declared)[::4]
+    assert loaded[0].inputs[10, 0] < normal[0].inputs[10, 0]  # less thrust is asked for
+    assert (errors(loaded) > 0.15).all()
