@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from support.own_cases import FOSSEN, answers, diagnosed, fly, size_of
 
 from glider.tools.own.load import read_own
 from glider.tools.own.posterior import NONE
+from tests.support.own_cases import FOSSEN, answers, diagnosed, fly, size_of
 
 pytestmark = pytest.mark.computes(seconds=60)
 
