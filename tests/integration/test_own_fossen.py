@@ -33,7 +33,7 @@ def test_none_where_there_is_none(vehicle):
     ("label", "size"), [("port_gain", -0.12), ("current_north", 0.2), ("pressure_x", -1.0), ("thruster_y", 0.1)]
 )
 def test_a_change_is_found_with_its_size(vehicle, label, size):
-    answer = diagnosed(vehicle, fly(vehicle, 12, {label: size}, runs=2))
+    answer = diagnosed(vehicle, fly(vehicle, 12, {label: size}, runs=4))
     found, chance = first(answer)
     assert found == label
     assert chance > 0.5
