@@ -5,10 +5,10 @@ from pathlib import Path
 
 import click
 import pytest
-from support.console import MOST_WORDS, PAGES, ROOT, blocks, differs, glider_commands, run_page, words_of
 
 from docs.picture import described, written
 from glider.tools.cli.main import cli
+from tests.support.console import MOST_WORDS, PAGES, ROOT, blocks, differs, glider_commands, run_page, words_of
 
 RUN = [page for page in PAGES if any(not block.not_run for block in blocks(page.read_text(encoding="utf-8")))]
 
