@@ -8,7 +8,7 @@ DEMO_STAMP := $(VENV)/.installed-demo
 # Python keeps the bytecode of what it reads: the tests start some hundred programs.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: setup demo picture test explore check lint types contract bounds benchmark deploy rollback arm64 clean
+.PHONY: setup demo docs picture test explore check lint types contract bounds benchmark deploy rollback arm64 clean
 
 # Kernels are compiled here, with a word about it, and again only when they change.
 setup: $(STAMP)
@@ -33,11 +33,9 @@ $(DEMO_STAMP): pyproject.toml constraints.txt
 demo: $(DEMO_STAMP)
 	@$(BIN)/python -m glider.tools.verify.demo
 
-# README's picture: the top of the demo's report.
+# README's picture, of the demo's answer. A test fails where the demo has another answer than the picture.
 picture: demo
-	mkdir -p docs/pictures
-	chromium --headless --no-sandbox --disable-gpu --hide-scrollbars --window-size=900,760 \
-	    --screenshot=docs/pictures/diagnosis.png out/demo/diagnosis/report.html
+	$(BIN)/python docs/picture.py out/demo/diagnosis docs/pictures/diagnosis.png
 
 # Kernels that several test files share, once. Then two processes that compute, and two for the tests that wait for the
 # clock (tests/conftest.py).
@@ -50,7 +48,12 @@ explore: setup
 	@$(BIN)/python -m tests.support.precompile
 	$(BIN)/python -m pytest -n 4 --dist loadfile -m hypothesis --hypothesis-profile explore
 
-check: setup lint types contract test
+# The site of the documentation, in out/docs; a warning is an error.
+docs: $(STAMP)
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs out/docs
+	@echo 'site: out/docs/index.html'
+
+check: setup lint types contract docs test
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

@@ -2,7 +2,7 @@
 
 The rows of the supervisor have levels: the reactions that they request, mildest first. The supervisor's settings carry
 them into its vector (core/layouts/supervisor_layout, REACTION and CLEAR_AFTER), where its kernels look them up. Other
-rows are handled by whoever stands nearest. `markdown_rows` renders the table of docs/SUPERVISOR.md.
+rows are handled by whoever stands nearest. `markdown_rows` renders the table of docs/explanation/supervisor.md.
 """
 
 import math
@@ -206,7 +206,7 @@ def clear_words(fault: Fault) -> str:
 
 
 def markdown_rows() -> list[str]:
-    """Render the rows of the fault table in docs/SUPERVISOR.md."""
+    """Render the rows of the fault table in docs/explanation/supervisor.md."""
     return [
         f"| {number} | {fault.name} | {fault.seen_by} | {'' if fault.within_s is None else f'{fault.within_s:g}'} | "
         f"{reaction_words(fault)} | {clear_words(fault)} |"

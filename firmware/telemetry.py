@@ -70,10 +70,10 @@ _FIELDS = (
     ),
     ("margin_depth_m_s2", "m/s2", "V of depth, likewise"),
     ("reaction", "1", "supervisor: 0 nothing, 1 log, 2 warn, 3 hold, 4 abort, 5 out-of-band, 6 hardware"),
-    ("fault", "1", "row of the fault table that asked for it; docs/SUPERVISOR.md"),
+    ("fault", "1", "row of the fault table that asked for it; docs/explanation/supervisor.md"),
 )
 
-# What a replay of the flight needs beside t_s, lateness_s and cmd_*: docs/LOG.md, Replay.
+# What a replay of the flight needs beside t_s, lateness_s and cmd_*: docs/reference/log.md, Replay.
 ASKED = ("asked_servo_rad", "asked_slider_m", "asked_ballast_kg")
 RAW = tuple(
     (f"raw_{port}_{name}", unit, text)

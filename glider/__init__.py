@@ -4,7 +4,8 @@ Its subpackages are `glider.firmware`, `glider.hal`, `glider.sim_backend` and `g
 are symbolic links to the folders beside this one. An installation therefore holds one top-level package: it cannot
 shadow another distribution's `hal` or `tools`, nor be shadowed by one.
 
-The names in `__all__` are the Python API (docs/API.md). Each is imported when it is first used (PEP 562), so that
+The names in `__all__` are the Python API (docs/reference/api.md). Each is imported when it is first used (PEP 562), so
+that
 `import glider`, which every module of a flight does too, imports nothing.
 """
 

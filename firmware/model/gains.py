@@ -27,7 +27,8 @@ class ReferenceTable(Table):
 class PitchGains(Table):
     """Slider (m) against pitch error (rad).
 
-    Defaults by the rule of `glider tune` on the nominal vehicle (docs/TUNING.md): 60 deg of phase margin at three times
+    Defaults by the rule of `glider tune` on the nominal vehicle (docs/how-to/tuning.md): 60 deg of phase margin at
+    three times
     the reference filter's natural frequency, Ti = 2 Td, at the worse of a dive and a climb at 20 deg.
     """
 
@@ -100,7 +101,7 @@ class HybridTable(Table):
 class Law(Table):
     """[control.law] and [control.law_plus]: gains of both axes, the form of the model, the share of the observed error.
 
-    Defaults by a search over the paper's pitch manoeuvres and rough water (docs/TUNING.md).
+    Defaults by a search over the paper's pitch manoeuvres and rough water (docs/how-to/tuning.md).
     """
 
     pitch: LawGains = LawGains(k1=1.55, k2=0.0045, k3=0.8, eps=0.1)
@@ -140,5 +141,6 @@ class Control(Table):
         return law
 
 
-# The best-tuned PID: gains that track the paper's manoeuvres under noise best, whatever their margins (docs/TUNING.md).
+# The best-tuned PID: gains that track the paper's manoeuvres under noise best, whatever their margins
+# (docs/how-to/tuning.md).
 BEST_TUNED = Control(pitch=PitchGains(kp=0.214, ki=0.0652, kd=0.279), depth=DepthGains(kp=0.949, ki=0.00112, kd=2.84))

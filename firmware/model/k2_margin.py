@@ -1,6 +1,7 @@
 """The margin of k2 over what is left of (29), before anything flies, by a vehicle's [uncertainty] and [disturbance].
 
-Looked for in glides of every pitch the law may be sent to, at the speeds such vehicles have; docs/CONTROL.md.
+Looked for in glides of every pitch the law may be sent to, at the speeds such vehicles have;
+docs/explanation/control.md.
 """
 
 import math

@@ -35,7 +35,7 @@ PLACES = {
 
 
 class MassTable(Table):
-    """[mass]: kg, m, kg m2 (docs/MODEL.md, Mass)."""
+    """[mass]: kg, m, kg m2 (docs/explanation/model.md, Mass)."""
 
     m_t: Mass
     m_r: Mass
@@ -143,7 +143,10 @@ class UncertaintyTable(Table):
 
 
 class TrimTable(Table):
-    """[trim]: what identification found beside the nominal trim; kg, m (docs/MODEL.md, Beside the nominal)."""
+    """[trim]: what identification found beside the nominal trim; kg, m.
+
+    See docs/explanation/model.md, Beside the nominal.
+    """
 
     net_mass: Annotated[float, msgspec.Meta(ge=-100.0, le=100.0)] = 0.0
     cg: tuple[Length, Length, Length] = (0.0, 0.0, 0.0)
@@ -216,7 +219,7 @@ class FormTable(Table):
 
 
 class Vehicle(Table):
-    """A vehicle file (docs/MODEL.md, Vehicle file)."""
+    """A vehicle file (docs/explanation/model.md, Vehicle file)."""
 
     format: Annotated[int, msgspec.Meta(ge=1, le=1)]
     name: Annotated[str, msgspec.Meta(min_length=1, max_length=100)]

@@ -1,4 +1,6 @@
-"""Does it rise? Row 18 of the fault table (docs/SUPERVISOR.md), judged by the out-of-band process for itself.
+"""Does it rise? Row 18 of the fault table, judged by the out-of-band process for itself.
+
+See docs/explanation/supervisor.md.
 
 A pure rule: time and depth are arguments. It shares nothing with the supervisor's but the numbers in the plan.
 """

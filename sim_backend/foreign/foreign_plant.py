@@ -1,6 +1,7 @@
 """The foreign plant: nominal equations, effects in other forms than the catalogue's, Heun's method.
 
-It flies blind tests of the diagnosis. Each effect keeps its label's meaning (docs/GAP.md, Words) and takes a form that
+It flies blind tests of the diagnosis. Each effect keeps its label's meaning (docs/reference/gap.md, Words) and takes a
+form that
 the catalogue has not: hysteresis by Bouc and Wen instead of play, second-order or load-dependent actuators, saturating
 depth laws, powers of the speed beside the square. With F = 0 the flight is the nominal one. A vehicle of another form
 has the water's forces of lifting_body instead of equation (4): its P has no coefficients.

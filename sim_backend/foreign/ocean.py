@@ -1,6 +1,7 @@
 """A foreign ocean glider for blind tests: it shares physics with the observer of ocean gliders, and no equation.
 
-Velocity through the water is a state on three axes (docs/CHALLENGE.md, Of missions of ocean gliders); the forces
+Velocity through the water is a state on three axes (docs/explanation/blind-tests.md, Missions of ocean gliders);
+the forces
 follow the angle of attack as it is, not that of a steady glide. Body axes ahead, starboard, down; depth down
 positive.
 """

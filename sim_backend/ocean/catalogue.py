@@ -1,7 +1,8 @@
 """The catalogue of an ocean glider's unmodelled effects: as sim_backend/core/effects/catalogue, of its own model.
 
-Labels mean what they mean for any vehicle (docs/GAP.md, Words); a spread is how far cases that are worth a diagnosis
-are likely to go (docs/OCEAN.md, Labels).
+Labels mean what they mean for any vehicle (docs/reference/gap.md, Words); a spread is how far cases that are worth a
+diagnosis
+are likely to go (docs/explanation/ocean.md, Labels).
 """
 
 from dataclasses import replace

@@ -1,4 +1,7 @@
-"""An ocean glider's vehicle file, and its way into the kernels' parameter vector (docs/OCEAN.md, Vehicle files)."""
+"""An ocean glider's vehicle file, and its way into the kernels' parameter vector.
+
+See docs/explanation/ocean.md, Vehicle files.
+"""
 
 from importlib.resources import files
 from typing import Annotated, Literal

@@ -14,7 +14,7 @@ from glider.tools.verify.benchmark.tick import harness, measure_tick
 pytestmark = pytest.mark.computes(seconds=20)
 
 # Seven arrays go into the autopilot's kernel, and each costs a 48-byte handle while the call lasts: 336 bytes, and
-# nothing else of size is alive then. See docs/FIGURES.md, Speed.
+# nothing else of size is alive then. See docs/reference/figures.md, Speed.
 PEAK_LIMIT = 400
 
 

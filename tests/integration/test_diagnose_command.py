@@ -215,7 +215,7 @@ def test_without_a_test_of_what_is_left_nobody_is_sure_that_it_is_unknown(pushed
 
 @pytest.mark.parametrize("part", ["nuisance", "evidence"])
 def test_without_a_part_nothing_is_given_a_cause(nothing, tmp_path, part):
-    """docs/DIAGNOSIS.md, What each part is worth."""
+    """docs/explanation/diagnosis.md, What each part is worth."""
     case, whole = nothing
     assert glider("gap", "diagnose", case.folder, "--out", tmp_path, "--without", part) == 0
     answer = json.loads((tmp_path / "diagnosis.json").read_text())

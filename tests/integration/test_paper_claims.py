@@ -1,4 +1,5 @@
-"""What docs/FIGURES.md says of the controllers in the paper's simulations and in rough water, with fewer seeds."""
+"""What docs/reference/figures.md says of the controllers in the paper's simulations and in rough water, with fewer
+seeds."""
 
 import msgspec
 import numpy as np

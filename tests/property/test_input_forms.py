@@ -1,4 +1,4 @@
-"""The input forms against the independent model, their determinant, and the figures of docs/CONTROL.md."""
+"""The input forms against the independent model, their determinant, and the figures of docs/explanation/control.md."""
 
 import copy
 import math
@@ -112,10 +112,11 @@ def test_derivative_of_the_plant_is_the_nominal_one_here():
 
 
 def test_figures_of_the_document_are_those_measured(capsys):
-    """The two tables that `python -m glider.tools.verify.figures.law` prints stand in docs/CONTROL.md, row by row."""
+    """The two tables that `python -m glider.tools.verify.figures.law` prints stand in docs/explanation/control.md,
+    row by row."""
     law.main()
     printed = [line.split("|") for line in capsys.readouterr().out.splitlines() if line.startswith("|")]
-    document = (PACKAGES_DIR / "docs" / "CONTROL.md").read_text(encoding="utf-8").splitlines()
+    document = (PACKAGES_DIR / "docs" / "explanation" / "control.md").read_text(encoding="utf-8").splitlines()
     rows = {line.split("|")[1]: line.split("|") for line in document if line.startswith("|")}
     figures = [cells for cells in printed if re.match(r" [\d.e-]+ $", cells[2])]
     assert len(figures) == 9

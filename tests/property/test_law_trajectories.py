@@ -1,6 +1,6 @@
 """The law closed around the plant: V along flights, with ideal actuators and with the vehicle's own.
 
-docs/CONTROL.md states what is checked here and gives the same figures.
+docs/explanation/control.md states what is checked here and gives the same figures.
 """
 
 from dataclasses import dataclass, field, replace
@@ -234,7 +234,8 @@ def test_V_falls_with_real_actuators_whenever_the_margin_says_so(counting_on, sh
     assert (watch.promised_outside > 0.3 * watch.outside).all()
 
 
-# --- what the parts are worth: the figures of docs/CONTROL.md --------------------------------------------------------
+# --- what the parts are worth: the figures of docs/explanation/control.md
+# --------------------------------------------------------
 
 VARIANTS = {
     "moderate, joint": (MODERATE, dict(counting_on="joint"), {}),

@@ -1,6 +1,6 @@
 """A session at the bench's prompt, typed into a real terminal: calibrate, sweep, stop, plug out and in.
 
-`python -m tests.support.bench_session docs/BENCH-SESSION.txt` writes what the terminal showed.
+`python -m tests.support.bench_session docs/how-to/bench-session.txt` writes what the terminal showed.
 """
 
 import json

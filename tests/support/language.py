@@ -15,6 +15,7 @@ ROOT = Path(__file__).resolve().parents[2]
 DATA = ROOT / "tests" / "data"
 TERMS, EXCEPTIONS = DATA / "language.toml", DATA / "language_exceptions.toml"
 CODE = ("firmware", "hal", "sim_backend", "tools", "glider")
+NOT_READ = {"archive", "generated"}  # folders of docs: histories in the words of their time, and what code wrote
 WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
 
 
@@ -86,8 +87,12 @@ def rejected_in_prose(text: str) -> Counter[str]:
 
 
 def count_tree() -> dict[str, dict[str, int]]:
-    """Count rejected terms by file, relative to the tree, and by word."""
+    """Count rejected terms by file, relative to the tree, and by word: code, and pages of the documentation."""
     found = {}
+    for path in [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").rglob("*.md"))]:
+        text = re.sub(r"```.*?```|^ {4}[^\n]*$", "", path.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+        if not NOT_READ & set(path.relative_to(ROOT).parts) and (counts := rejected_in_prose(text)):
+            found[str(path.relative_to(ROOT))] = dict(sorted(counts.items()))
     for path in sorted(path for folder in CODE for kind in ("*.py", "*.toml") for path in (ROOT / folder).rglob(kind)):
         text = path.read_text(encoding="utf-8")
         counts = rejected_in_code(text) if path.suffix == ".py" else rejected_in_prose(text)

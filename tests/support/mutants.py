@@ -30,7 +30,7 @@ PARTS = (
     "tests/support",
     "tests/unit/supervisor",
     "tests/unit/hal/test_sortie.py",
-    "docs/SUPERVISOR.md",
+    "docs/explanation/supervisor.md",
     "tests/conftest.py",
 )
 # It reads the kernels' source, where mutmut puts calls of its own.

@@ -1,4 +1,4 @@
-"""The Python API, `import glider`: functions that take a case and return immutable results (docs/API.md).
+"""The Python API, `import glider`: functions that take a case and return immutable results (docs/reference/api.md).
 
 The commands call the same functions and print the same sentences.
 """

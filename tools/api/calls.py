@@ -58,7 +58,7 @@ def _compile(case: cases.Case, say: Progress) -> None:
 
 @one_error
 def load_case(folder: Path | str, vehicle: str | None = None) -> Case:
-    """Read a case: a folder of run data (docs/RUNS.md).
+    """Read a case: a folder of run data (docs/reference/runs.md).
 
     Parameters
     ----------
@@ -276,7 +276,7 @@ def identify(
     seed : int
         Seed of the chains.
     likelihood : {'flights', 'accelerations'}
-        What the coefficients are fitted to (docs/IDENTIFICATION.md); of an ocean glider ignored.
+        What the coefficients are fitted to (docs/explanation/identification.md); of an ocean glider ignored.
     progress : callable, optional
         Called with lines of text on the way.
 
@@ -323,7 +323,7 @@ def diagnose(
     reference : Case or path, optional
         Healthy runs of the same vehicle: what its model leaves there is no cause.
     without : str, optional
-        Part of the method to leave out, as `glider gap diagnose --without` has it (docs/DIAGNOSIS.md).
+        Part of the method to leave out, as `glider gap diagnose --without` has it (docs/explanation/diagnosis.md).
     progress : callable, optional
         Called with lines of text on the way.
 

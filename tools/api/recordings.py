@@ -99,7 +99,7 @@ class Run(Result):
 
 @dataclass(frozen=True)
 class Case(Result):
-    """Runs of one vehicle at one site (docs/RUNS.md); a sequence of runs.
+    """Runs of one vehicle at one site (docs/reference/runs.md); a sequence of runs.
 
     Examples
     --------
@@ -247,7 +247,7 @@ def _draw_depth(ax: "Axes", runs: list[RecordedRun]) -> None:
 
 @dataclass(frozen=True)
 class Log(Result):
-    """An onboard log (docs/LOG.md): complete, or what is readable of a cut one."""
+    """An onboard log (docs/reference/log.md): complete, or what is readable of a cut one."""
 
     _log: RecordedLog = field(repr=False)
     run: Run = field(repr=False)

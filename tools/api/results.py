@@ -29,7 +29,7 @@ DRAWN_CAUSES = 6
 
 @dataclass(frozen=True)
 class Gap(Result):
-    """The gap between a case and a model: root mean square errors in tolerances (docs/GAP.md)."""
+    """The gap between a case and a model: root mean square errors in tolerances (docs/reference/gap.md)."""
 
     _found: "CaseGap" = field(repr=False)
 
@@ -109,7 +109,7 @@ class Gap(Result):
 
 @dataclass(frozen=True)
 class Readings(Result):
-    """What is wrong with the readings of a case, each compared with the others (docs/READINGS.md)."""
+    """What is wrong with the readings of a case, each compared with the others (docs/explanation/readings.md)."""
 
     _found: "ReadingCheck" = field(repr=False)
 
@@ -146,7 +146,7 @@ class Readings(Result):
 
 @dataclass(frozen=True)
 class Diagnosis(Result):
-    """Where and why a simulator is wrong about a case (docs/DIAGNOSIS.md)."""
+    """Where and why a simulator is wrong about a case (docs/explanation/diagnosis.md)."""
 
     answer: Mapping[str, Any] = field(repr=False)  # diagnosis.json
     sentence: str = ""  # the verdict in one sentence
@@ -210,7 +210,7 @@ class Diagnosis(Result):
 
 @dataclass(frozen=True)
 class Watch(Result):
-    """What changed from run to run (docs/WATCH.md)."""
+    """What changed from run to run (docs/explanation/watch.md)."""
 
     _found: "WatchAnswer" = field(repr=False)
 
@@ -273,7 +273,10 @@ class Watch(Result):
 
 @dataclass(frozen=True)
 class Identification(Result):
-    """Parameters of a vehicle and their distribution (docs/IDENTIFICATION.md, docs/OCEAN.md)."""
+    """Parameters of a vehicle and their distribution.
+
+    See docs/explanation/identification.md, docs/explanation/ocean.md.
+    """
 
     _found: "Identified | OceanIdentification" = field(repr=False)
     ocean: bool = False
@@ -336,7 +339,7 @@ class Identification(Result):
 
 @dataclass(frozen=True)
 class EffectTable(Result):
-    """Effects of the catalogue (docs/EFFECTS.md)."""
+    """Effects of the catalogue (docs/reference/effects.md)."""
 
     _effects: "tuple[Effect, ...]" = field(repr=False)
 

@@ -16,6 +16,7 @@ from glider.tools.cli.common import (
     say_assumed,
     vehicle_option,
 )
+from glider.tools.cli.isolability import isolability
 from glider.tools.cli.many import cases_argument, is_many, run_batch_command
 from glider.tools.cli.readings import readings
 from glider.tools.cli.watch import watch
@@ -107,7 +108,7 @@ def predict(run: Path, model: str, out: Path, vehicle: str | None) -> None:
 @click.option("--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Folder of the answer.")
 @click.option(
     "--without", type=click.Choice(["nuisance", "splice", "whiteness", "evidence"]),
-    help="Leave one idea of the diagnosis out, to see what it is worth (docs/DIAGNOSIS.md).",
+    help="Leave one idea of the diagnosis out, to see what it is worth (docs/explanation/diagnosis.md).",
 )  # fmt: skip
 @click.option(
     "--reference", type=click.Path(path_type=Path, file_okay=False), metavar="CASE0",
@@ -233,5 +234,6 @@ def report(folder: Path) -> None:
     say(f"report: {folder / REPORT}")
 
 
+gap.add_command(isolability)
 gap.add_command(readings)
 gap.add_command(watch)

@@ -27,7 +27,7 @@ for _command in COMMANDS:
 def csv(
     files: tuple[Path, ...], mapping: str | None, template: Path | None, out: Path | None, strict: bool, as_json: bool
 ) -> None:
-    """Turn CSV logs (.csv or .csv.gz), one a run, into a case, by a mapping file (docs/IMPORT.md).
+    """Turn CSV logs (.csv or .csv.gz), one a run, into a case, by a mapping file (docs/how-to/import.md).
 
     With --template a mapping with every key is written, and nothing imported.
     """
@@ -147,7 +147,7 @@ folder_option = click.option(
 @folder_option
 @json_option
 def rosbag(files, mapping, template, out, as_json) -> None:
-    """Turn ROS 2 bags (SQLite or MCAP), one a run, into a case, by a mapping file (docs/IMPORT.md).
+    """Turn ROS 2 bags (SQLite or MCAP), one a run, into a case, by a mapping file (docs/how-to/import.md).
 
     A bag is its folder with metadata.yaml, or one of its files. With --template a mapping with every key is written,
     and nothing imported.

@@ -14,7 +14,7 @@ def readings(case: Path, as_json: bool) -> None:
     """What is wrong with the readings of CASE: each held against the others, without a vehicle file.
 
     A finding has a size with its 90 % interval, the catalogue's label where it has one, and says whether later stages
-    see the reading corrected (docs/READINGS.md).
+    see the reading corrected (docs/explanation/readings.md).
     """
     from glider.tools import api
     from glider.tools.data.errors import need

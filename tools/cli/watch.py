@@ -25,7 +25,7 @@ def watch(
     """What changed over the runs of CASE, in their order: in which run, from when to when, why, and how much.
 
     What all runs share, a model that is not quite right or a sensor that is a little off, is no change: it is learned
-    from the reference, or without one from the first runs (docs/WATCH.md).
+    from the reference, or without one from the first runs (docs/explanation/watch.md).
 
     Each of several cases is watched by itself. Their answers, or that of one with --jobs, --dask or --again, are in
     folders of DIR that are called as the cases are; those that are answered are kept.

@@ -1,4 +1,5 @@
-"""The answer of a diagnosis against healthy runs: gaps, sizes and places, as docs/GAP.md has them, into a folder."""
+"""The answer of a diagnosis against healthy runs: gaps, sizes and places, as docs/reference/gap.md has them, into a
+folder."""
 
 import json
 from collections.abc import Iterable
@@ -56,7 +57,7 @@ def gaps_of(answer: AgainstHealthy) -> dict[str, list[RunGap]]:
 
 
 def gap_of(part: Problem, P: np.ndarray, F: np.ndarray) -> RunGap:
-    """A run's gap to a model (docs/GAP.md, Measures)."""
+    """A run's gap to a model (docs/reference/gap.md, Measures)."""
     return run_gap(part.kind.measures, part.runs[0], fly(part, P, F), cut(part).listed[0])
 
 
@@ -91,7 +92,7 @@ def places_of(compared: Comparison, chances: dict[str, float], links: dict[str, 
 
 
 def plain(found: AgainstHealthy) -> dict[str, Any]:
-    """diagnosis.json (docs/GAP.md, Answers)."""
+    """diagnosis.json (docs/reference/gap.md, Answers)."""
     estimates, gaps = sizes(found), gaps_of(found)
     shrinkage = shrinkage_of(gaps, {})
     chances = dict.fromkeys(found.selected, 0.0) | found.probabilities  # a second effect need not be a main cause

@@ -2,7 +2,8 @@
 
 The vehicle file is one that was identified, and misses healthy runs by what its form cannot do. How far, channel by
 channel, is learned from healthy runs, each flown by a fit to the others; the case's windows are then weighed in units
-of that (docs/DIAGNOSIS.md, Against healthy runs). Every hypothesis is fitted without each of the case's runs and judged
+of that (docs/explanation/diagnosis.md, Against healthy runs). Every hypothesis is fitted without each of the case's
+runs and judged
 on that run, so that an effect has to shrink what it has not seen:
 
 - no change: what the vehicle file allows;

@@ -1,6 +1,7 @@
 """What readings are certain of by themselves, in the answer's terms: labels with their sizes and evidence.
 
-Whatever the model of the vehicle comes to, readings that contradict each other are wrong by as much (docs/GAP.md).
+Whatever the model of the vehicle comes to, readings that contradict each other are wrong by as much
+(docs/reference/gap.md).
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,7 @@
-"""The diagnosis of a case: where the simulator is wrong, why, how far the gap shrinks (docs/GAP.md, Answers)."""
+"""The diagnosis of a case: where the simulator is wrong, why, how far the gap shrinks.
+
+See docs/reference/gap.md, Answers.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field

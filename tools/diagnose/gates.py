@@ -1,7 +1,7 @@
 """Gates that open by degrees: where a figure decides which of two answers is given, both are, each with its weight.
 
 An answer that jumps where a figure passes a limit says more than the figure does: a millionth of the noise can move it
-across (docs/DIAGNOSIS.md, Steady).
+across (docs/explanation/diagnosis.md, Steady).
 """
 
 import numpy as np

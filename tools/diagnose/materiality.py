@@ -1,7 +1,7 @@
 """Whether an effect matters: how far it moves what is measured, and not only how surely it is there.
 
 Evidence grows with the length of the runs, whatever an effect does: a clock that is a millisecond late brings a
-hundred nat in ten minutes of 10 Hz. What nobody could see in a window is no gap (docs/GAP.md, Measures).
+hundred nat in ten minutes of 10 Hz. What nobody could see in a window is no gap (docs/reference/gap.md, Measures).
 """
 
 import numpy as np

@@ -11,7 +11,6 @@ from glider.tools.diagnose.materiality import MATERIAL_TOLERANCES
 from glider.tools.diagnose.record import NONE, UNKNOWN
 
 TIE = 6.0  # nat within which two labels are not distinguished: what a change of prior spreads can move
-MOST_GROUP = 3
 ERROR_RATE = 0.03  # answers that named something else altogether, of those to the cases it was developed with: 3 of 104
 MAX_NONE_RATIO = 0.9  # of the main cause's probability, that none may have where there is an effect at all
 LARGE_WIDTH = 0.25  # e-folds of size over which a main cause comes to be as likely as not
@@ -103,7 +102,4 @@ def mix_in_error_rate(chances: dict[str, float], main: str, others: Sequence[str
 def grouped(logs: dict[str, float]) -> dict[str, list[str]]:
     """For every label, those whose evidence these data cannot part from its own."""
     labels = sorted(logs, key=lambda name: -logs[name])
-    return {
-        label: [label, *(o for o in labels if o != label and abs(logs[o] - logs[label]) < TIE)][:MOST_GROUP]
-        for label in labels
-    }
+    return {label: [label, *(o for o in labels if o != label and abs(logs[o] - logs[label]) < TIE)] for label in labels}

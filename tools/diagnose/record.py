@@ -1,6 +1,7 @@
 """A diagnosis on disk: diagnosis.json (the answer), report.json (what else a report says), report.npz (its curves).
 
-The answer's keys are those of docs/GAP.md; those of the other two are in docs/DIAGNOSIS.md, Files. Numbers that are not
+The answer's keys are those of docs/reference/gap.md; those of the other two are in docs/explanation/diagnosis.md,
+Files. Numbers that are not
 finite are null.
 """
 
@@ -95,7 +96,7 @@ class Unexplained(msgspec.Struct):
 
 
 class ReadingRecord(msgspec.Struct):
-    """Something wrong with a reading (docs/READINGS.md)."""
+    """Something wrong with a reading (docs/explanation/readings.md)."""
 
     channel: str
     against: str

@@ -41,7 +41,8 @@ LEADING, PARTNERS_TRIED = 3, 5  # hypotheses beside which a second effect is tri
 FAR_OFF = 10.0  # mean NIS of the best of three effects, beyond which no further one is small, nor explains it
 FURTHER_EFFECTS_TRIED = 3  # effects tried as a third or further one, beside the best hypothesis
 SHORT_LIST = 3  # hypotheses led on from the third effect on
-# Nat of evidence that an effect brings, or it is left out (docs/DIAGNOSIS.md, Thresholds): the prior odds of none to a
+# Nat of evidence that an effect brings, or it is left out (docs/explanation/diagnosis.md, Thresholds): the prior odds
+# of none to a
 # label, so that a label is as probable as none where it would just be selected.
 EVIDENCE_NEEDED = 12.0
 VISIBLE = 1.0  # squared sigma: a spread of an effect that moves nothing by as much cannot be seen in these runs

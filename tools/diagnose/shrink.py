@@ -1,4 +1,7 @@
-"""How far the gap shrinks: windows of runs left out of the fit, flown by four models (docs/GAP.md, Measures)."""
+"""How far the gap shrinks: windows of runs left out of the fit, flown by four models.
+
+See docs/reference/gap.md, Measures.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""A vehicle far from its file, in stages, each checked on runs left out (docs/DIAGNOSIS.md, Stages).
+"""A vehicle far from its file, in stages, each checked on runs left out (docs/explanation/diagnosis.md, Stages).
 
 Readings first: what they say of each other goes into the model. Then the vehicle: identified by prediction error, once
 without each run (or each of FOLDS parts of many runs). Then what is wrong with the sensors beside it, one after the

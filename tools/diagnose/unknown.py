@@ -59,7 +59,7 @@ SHOWS = (UNCLEAN, 1.5 * UNCLEAN)  # sigma of what is left, from which it counts,
 
 
 def probability(share: float, middle: float, width: float) -> float:
-    """Probability that what is left is a gap of its own (docs/DIAGNOSIS.md, Thresholds)."""
+    """Probability that what is left is a gap of its own (docs/explanation/diagnosis.md, Thresholds)."""
     z = (np.log(max(share, 1e-6)) - np.log(middle)) / width
     return float(np.clip(ndtr(z), MORE_UNKNOWN, 1.0 - MORE_UNKNOWN))
 

@@ -56,7 +56,7 @@ RIVALS = 5  # further labels fitted in the place of the main one, where it stand
 # Floors by which an effect widens the gap, as likely a main cause as one of many small ones there: where noise is not
 # what the file says, so that it may say little of the rest, and where it is.
 LARGE, SPECIFIED = 2.1, 1.2
-TURBULENCE_GAP_SHARE = 0.7  # of what rough water leaves of windows (docs/DIAGNOSIS.md, Thresholds)
+TURBULENCE_GAP_SHARE = 0.7  # of what rough water leaves of windows (docs/explanation/diagnosis.md, Thresholds)
 ALTERNATIVE_PROBABILITY = 1e-3  # probability from which an alternative's effect on the windows is looked at
 
 

@@ -1,4 +1,4 @@
-"""The waterfall: how far the gap of runs left out is, after what (docs/DIAGNOSIS.md, Stages)."""
+"""The waterfall: how far the gap of runs left out is, after what (docs/explanation/diagnosis.md, Stages)."""
 
 from dataclasses import dataclass
 from typing import Any

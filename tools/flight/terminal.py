@@ -1,6 +1,6 @@
 """The person at the terminal of a flight on devices: arming is confirmed, a stop never waits, noise has no effect.
 
-Why it is so stands in docs/SUPERVISOR.md ("The console").
+Why it is so stands in docs/explanation/supervisor.md ("The console").
 """
 
 import contextlib

@@ -1,4 +1,6 @@
-"""Runs and model as later stages see them once the readings are compared with each other (docs/READINGS.md).
+"""Runs and model as later stages see them once the readings are compared with each other.
+
+See docs/explanation/readings.md.
 
 What an effect of the catalogue says (a scale of the gyro, a lag, an offset) goes into the model, which then reads as
 the instrument does: what was recorded stays as it is. What no effect says (exchanged axes, a sign, degrees) is put

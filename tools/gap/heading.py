@@ -1,4 +1,4 @@
-"""Does the current turn with the glider's heading? Then it is the model's error (docs/OCEAN.md, Heading).
+"""Does the current turn with the glider's heading? Then it is the model's error (docs/explanation/ocean.md, Heading).
 
 Between two fixes at the surface a glider moves by what it swims and what the water moves. What the model's velocity
 leaves of that, over the time, is the current. A speed that is too small by a share of it leaves a current that turns

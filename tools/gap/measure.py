@@ -1,4 +1,4 @@
-"""The gap between measured and predicted, channel by channel (docs/GAP.md, Measures)."""
+"""The gap between measured and predicted, channel by channel (docs/reference/gap.md, Measures)."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,7 @@
-"""Velocity of an ocean glider through the water, row by row, with its standard deviation (docs/OCEAN.md, Velocity)."""
+"""Velocity of an ocean glider through the water, row by row, with its standard deviation.
+
+See docs/explanation/ocean.md, Velocity.
+"""
 
 import json
 from collections.abc import Iterable, Sequence
@@ -22,7 +25,8 @@ from glider.tools.inference.ocean_inputs import missing_input
 from glider.tools.inference.problem import Problem, problem_of
 
 # Of a row's speed, 1 sigma, and of one where speed was measured: laws of drag and lift are not nature's. Of a dive's
-# mean nothing: by how much a law is off in all dives alike is in an identified vehicle's covariance (docs/OCEAN.md,
+# mean nothing: by how much a law is off in all dives alike is in an identified vehicle's covariance
+# (docs/explanation/ocean.md,
 # Velocity).
 FORM, MEASURED = 0.03, 0.005
 PITCH_NOISE = 0.005  # rad, 1 sigma from row to row

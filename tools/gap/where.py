@@ -1,4 +1,4 @@
-"""Where a gap sits: its square shared out over the parts of the model (docs/GAP.md, Words).
+"""Where a gap sits: its square shared out over the parts of the model (docs/reference/gap.md, Words).
 
 A first, linear answer. Every parameter of the catalogue's effects is a direction: a model that differs by its typical
 size is flown, from starts of its own by the observer's kept gains, and the difference to the nominal flight is its

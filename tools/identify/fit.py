@@ -224,7 +224,7 @@ def as_fit(fitting: PredictionError, found: Fitted, likelihood: IdentificationFi
         found.values, low, (found.normal - np.eye(n))[None], -found.values[None], np.array([found.independent]),
         np.array([found.independent]), ("windows",),
     )  # fmt: skip
-    note = "identified by prediction error, window by window (docs/IDENTIFICATION.md, Of another form)"
+    note = "identified by prediction error, window by window (docs/explanation/identification.md, Of another form)"
     return IdentificationFit(
         likelihood.problem, fitting.free, None, statistics, noise.named(fitting.problem), likelihood.left_out, [note]
     )  # fmt: skip

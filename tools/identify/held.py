@@ -1,4 +1,6 @@
-"""Which vehicle is handed out: candidates judged by the gaps of flights left out of their fits (docs/GAP.md, Measures).
+"""Which vehicle is handed out: candidates judged by the gaps of flights left out of their fits.
+
+See docs/reference/gap.md, Measures.
 
 Candidates are the file's vehicle, the likelihood's fit and the prediction error's. The likelihood is efficient, and its
 intervals are right, where the vehicle obeys equation (4): it is kept unless another flies runs left out better by more

@@ -1,4 +1,4 @@
-"""Runs flown by an identified model, window by window, as they are measured (docs/GAP.md, Measures)."""
+"""Runs flown by an identified model, window by window, as they are measured (docs/reference/gap.md, Measures)."""
 
 import numpy as np
 

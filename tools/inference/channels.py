@@ -1,4 +1,6 @@
-"""What a kind of vehicle is scored in: channels with tolerances, recorded columns, windows (docs/GAP.md, Measures).
+"""What a kind of vehicle is scored in: channels with tolerances, recorded columns, windows.
+
+See docs/reference/gap.md, Measures.
 
 Nothing here knows of a model.
 """

@@ -1,6 +1,6 @@
 """A kind of vehicle, as the observer is built for it: its layouts, readings, inputs, numbers and compiled functions.
 
-Recordings, problems, filters and predictions take all of it from here; docs/ADDING.md, A vehicle kind.
+Recordings, problems, filters and predictions take all of it from here; docs/how-to/adding.md, A vehicle kind.
 """
 
 from collections.abc import Callable, Collection, Mapping
@@ -101,11 +101,11 @@ class Kind:
     one_group: Callable[[Collection[str]], tuple[str, ...]] = _none  # labels that these readings never tell apart
     odds: Mapping[str, float] = field(default_factory=dict)  # of labels that are seldom the cause: nat
     regime: Callable[[Run], np.ndarray] | None = None  # how a run was flown, in what makes a difference to the model
-    form: float = 0.06  # of a size, 1 sigma: nature's form is not the catalogue's (docs/WATCH.md)
+    form: float = 0.06  # of a size, 1 sigma: nature's form is not the catalogue's (docs/explanation/watch.md)
     learned_runs: int = 4  # of the first, from which a watch without a reference learns what all share
     material_growth: float = MATERIAL_TOLERANCES  # the same of what grows slowly
     material: float = (
-        MATERIAL_TOLERANCES  # tolerances: what moves no channel of any window so far is no gap (docs/GAP.md)
+        MATERIAL_TOLERANCES  # tolerances: what moves no channel of any window so far is no gap (docs/reference/gap.md)
     )
 
 

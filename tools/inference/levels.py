@@ -32,7 +32,7 @@ MOST_HELD = 0.2  # share of samples that repeat the one before, from which a rea
 DIFFERENCE_STEP, LARGEST_STEP, CLOSE = 0.05, 0.8, 0.02
 ROUNDS = 8
 # 1 sigma of a level's logarithm: as it is found where the file is right (nine in ten within 5 %), and as noise is where
-# the file does not say (0.6 to 2 times what it says): docs/DIAGNOSIS.md, Noise levels.
+# the file does not say (0.6 to 2 times what it says): docs/explanation/diagnosis.md, Noise levels.
 ACCURATE, FREE = 0.03, 0.35
 
 

@@ -1,4 +1,7 @@
-"""What drives an ocean glider's model row by row, and where it does not fly steadily (docs/OCEAN.md, Steady)."""
+"""What drives an ocean glider's model row by row, and where it does not fly steadily.
+
+See docs/explanation/ocean.md, Steady.
+"""
 
 from math import radians
 

@@ -1,4 +1,7 @@
-"""Ocean gliders as a kind of vehicle: attitude and buoyancy engine measured, depth predicted (docs/OCEAN.md)."""
+"""Ocean gliders as a kind of vehicle: attitude and buoyancy engine measured, depth predicted.
+
+See docs/explanation/ocean.md.
+"""
 
 import itertools
 from collections.abc import Collection
@@ -26,7 +29,7 @@ MIN_READING_INTERVAL_S = 29.0  # s at least between readings that are looked at
 
 # 10 minutes are several times what vertical water remembers. A depth rate that is wrong by 1 cm/s is off by 3.1 m rms
 # over the 9 minutes that are predicted, half a tolerance. What changes has to be 8 mm/s of it, what creeps 12: seasons,
-# a cell that drifts and a little growth did 9 mm/s in 20 days of an open mission (docs/OCEAN.md, Windows).
+# a cell that drifts and a little growth did 9 mm/s in 20 days of an open mission (docs/explanation/ocean.md, Windows).
 OCEAN_MEASURES = Measures(
     channels=(
         Channel("depth", (at.Y_DEPTH,), 6.0, unit="m"),

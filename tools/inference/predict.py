@@ -1,4 +1,6 @@
-"""What the model says a recorded flight should have been: every window flown on from its start (docs/GAP.md, Measures).
+"""What the model says a recorded flight should have been: every window flown on from its start.
+
+See docs/reference/gap.md, Measures.
 
 Windows start where the filter of the flying model stands, which for this purpose also finds what the model lacks
 (core/model_error): of a wrong model taken at its word the starts would be wrong, and the gap would be theirs.

@@ -2,7 +2,8 @@
 
 For a vehicle far from its file, and real water: a filter that takes a wrong model at its word, or noise that is not
 white, leads a likelihood of one-step innovations astray, while what a model is for is to fly a window. Residuals are
-those of the gap (docs/GAP.md, Measures): what is measured less what is flown, in tolerances, from where the observer of
+those of the gap (docs/reference/gap.md, Measures): what is measured less what is flown, in tolerances, from where the
+observer of
 the model itself stands.
 
 - Horizons grow: 4 s, 8 s, then nearly a whole window. Over a short one even a wrong model stays near what was flown,

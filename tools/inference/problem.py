@@ -222,7 +222,7 @@ def problem_of(case: Case, model: Model | None = None, runs: list[Run] | None = 
 
 @dataclass
 class ScoringWindows:
-    """Windows of the runs as docs/GAP.md, Windows, cuts them, in rows of the table."""
+    """Windows of the runs as docs/reference/gap.md, Windows, cuts them, in rows of the table."""
 
     listed: list[list[Window]]
     first: np.ndarray

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 @dataclass(frozen=True)
 class Rules:
-    """Each is one idea of docs/DIAGNOSIS.md, left out where False."""
+    """Each is one idea of docs/explanation/diagnosis.md, left out where False."""
 
     nuisance: bool = True  # parameters within [uncertainty] and biases are free in every fit
     splice: bool = True  # measurements hold the flight to its course; without, windows fly on commands alone

@@ -1,4 +1,7 @@
-"""An ocean glider's steady rows: measured depth rate beside the one that the model would have there (docs/OCEAN.md)."""
+"""An ocean glider's steady rows: measured depth rate beside the one that the model would have there.
+
+See docs/explanation/ocean.md.
+"""
 
 from dataclasses import dataclass
 

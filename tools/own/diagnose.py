@@ -1,4 +1,4 @@
-"""The diagnosis of a user's vehicle: the posterior of a case's runs as an answer (docs/GAP.md, Answers)."""
+"""The diagnosis of a user's vehicle: the posterior of a case's runs as an answer (docs/reference/gap.md, Answers)."""
 
 import json
 from collections.abc import Callable, Sequence

@@ -75,7 +75,7 @@ class Watched:
     cautions: list[str] = field(default_factory=list)
 
     def plain(self) -> dict[str, Any]:
-        """The JSON of docs/GAP.md, What changed."""
+        """The JSON of docs/reference/gap.md, What changed."""
         effects = {one.label: one for one in self.healthy.effects}
         runs, events = [], []
         for one in self.events:

@@ -3,11 +3,11 @@
 A finding has to be certain and to matter. Certain: CERTAIN_SIGMA standard errors (of blocks, see regression). Matters:
 it moves its channel by MATERIAL_TOLERANCES of the channel's tolerance, root mean square over the flight; a constant
 error by more than MATERIAL_OFFSET, since any sensor has a bias. The tolerances are those in which gaps are counted
-(docs/GAP.md, Measures).
+(docs/reference/gap.md, Measures).
 
 CERTAIN_SIGMA is far beyond a normal 5 % point: a case has some sixty comparisons, blocks are few, and what is compared
 is filtered by instruments nobody knows. With it and MATERIAL_TOLERANCES no instrument of the simulated cases without a
-gap is falsely flagged (docs/READINGS.md, How often).
+gap is falsely flagged (docs/explanation/readings.md, How often).
 """
 
 import math
@@ -46,7 +46,7 @@ class Finding:
     values: dict[str, float] = field(default_factory=dict)
 
     def plain(self) -> dict:
-        """The entry in diagnosis.json (docs/GAP.md, Answers)."""
+        """The entry in diagnosis.json (docs/reference/gap.md, Answers)."""
         return {
             "channel": self.channel, "against": self.against, "finding": self.finding, "size": self.size,
             "ci90": list(self.ci90), "unit": self.unit, "label": self.label, "mended": self.mended, "text": self.text,

@@ -1,6 +1,7 @@
 """The report of a diagnosis that asks for what all runs of a case share, drawn from its diagnosis.json.
 
-An ocean glider's (docs/OCEAN.md, Diagnosis), or one against healthy runs (docs/DIAGNOSIS.md, Against healthy runs).
+An ocean glider's (docs/explanation/ocean.md, Diagnosis), or one against healthy runs (docs/explanation/diagnosis.md,
+Against healthy runs).
 """
 
 from pathlib import Path

@@ -1,6 +1,7 @@
 """`make demo`: what a user would type: flights of a vehicle with a hidden effect, and the effect found.
 
-The flights are a blind test of one case (docs/CHALLENGE.md): another plant than the model, with one effect that the
+The flights are a blind test of one case (docs/explanation/blind-tests.md): another plant than the model, with one
+effect that the
 seed draws. The answer is opened after the diagnosis. The first time, the diagnosis' kernels are compiled on a second
 core while the flights are made.
 """

@@ -1,4 +1,4 @@
-"""What a watch answers (docs/WATCH.md): a verdict for every run, events over the runs."""
+"""What a watch answers (docs/explanation/watch.md): a verdict for every run, events over the runs."""
 
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,4 +1,4 @@
-"""A force that lasts against water in disorder, of ocean gliders (docs/OCEAN.md).
+"""A force that lasts against water in disorder, of ocean gliders (docs/explanation/ocean.md).
 
 Water has no lasting direction in the vehicle's axes: from dive to dive it moves them this way and that. What lasts
 moves the depth rate, and a speed that is measured, alike in every dive, by its way and depth. That is a model of

@@ -12,7 +12,7 @@ from glider.tools.watch.rivals import refit_event
 from glider.tools.watch.scatter import MIN_SCATTER_RUNS, PRIOR_RUNS
 from glider.tools.watch.water import named, noise_beats_label, water_event
 
-EVIDENCE_NEEDED = 16.0  # nat over no change (docs/WATCH.md)
+EVIDENCE_NEEDED = 16.0  # nat over no change (docs/explanation/watch.md)
 BEYOND_CHANCE = 7.3  # nat over the logarithm of how many changes are looked at
 FALSE = 0.05  # of the vehicles without a change that may be given one: of their runs a hundredth or so
 MOST_EVENTS = 5

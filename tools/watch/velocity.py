@@ -1,4 +1,7 @@
-"""Mean speed through the water of an ocean glider's watched runs, by its vehicle with what changed (docs/OCEAN.md)."""
+"""Mean speed through the water of an ocean glider's watched runs, by its vehicle with what changed.
+
+See docs/explanation/ocean.md.
+"""
 
 from dataclasses import dataclass, field
 from typing import Any

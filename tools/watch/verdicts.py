@@ -151,7 +151,10 @@ def unattributed_changes(history: History, found: list[ResolvedEvent]) -> list[R
 
 
 def material(history: History, event: ChangeEvent, number: int) -> bool:
-    """Whether the change moves a channel of some window by as much as its kind of vehicle asks for (docs/GAP.md)."""
+    """Whether the change moves a channel of some window by as much as its kind of vehicle asks for.
+
+    See docs/reference/gap.md.
+    """
     weights = event.span.weights(history.flights.count)
     inside = sorted(np.flatnonzero(weights * history.judged), key=lambda n: -weights[n])
     needed = needed_of(history, event)

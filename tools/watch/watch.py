@@ -1,4 +1,4 @@
-"""`glider gap watch`: what is different, since when. The flow from runs to the answer (docs/WATCH.md)."""
+"""`glider gap watch`: what is different, since when. The flow from runs to the answer (docs/explanation/watch.md)."""
 
 from collections.abc import Callable
 from dataclasses import replace

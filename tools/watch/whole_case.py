@@ -1,6 +1,7 @@
 """Diagnosis of ocean gliders: which effect do all runs of a case have, beside what the vehicle file allows?
 
-The watch's parabolas, with one span: all runs (docs/OCEAN.md, Diagnosis). Written as docs/GAP.md says.
+The watch's parabolas, with one span: all runs (docs/explanation/ocean.md, Diagnosis). Written as docs/reference/gap.md
+says.
 """
 
 import json
@@ -327,7 +328,7 @@ def sizes(selection: SelectionResult, form: float) -> dict[str, tuple[float, flo
 
 
 def plain(found: OceanDiagnosis) -> dict[str, Any]:
-    """diagnosis.json (docs/GAP.md, Answers)."""
+    """diagnosis.json (docs/reference/gap.md, Answers)."""
     causes = []
     for label, p in sorted(found.probabilities.items(), key=lambda item: -item[1]):
         own = {}

@@ -1,4 +1,7 @@
-"""Which effects all runs of a case share: the most evident first, each fitted (docs/OCEAN.md, Diagnosis)."""
+"""Which effects all runs of a case share: the most evident first, each fitted.
+
+See docs/explanation/ocean.md, Diagnosis.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace

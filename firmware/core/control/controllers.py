@@ -1,7 +1,7 @@
 """Which of the controllers (controller_rows) flies this tick, and what it wants.
 
 Roll is always (37); a controller wants slider and ballast, and says whether it had an answer (law.OK). Without one the
-PID flies. Whatever is wanted goes through `limited` afterwards (core/autopilot). How to add one: docs/ADDING.md.
+PID flies. Whatever is wanted goes through `limited` afterwards (core/autopilot). How to add one: docs/how-to/adding.md.
 """
 
 import math

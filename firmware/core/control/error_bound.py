@@ -10,7 +10,8 @@ depth; input_forms) is then wrong by c' M'^-1 rho. With |x' (M' - M) x| <= kappa
     |c' (a' - a)| <= sum_n |c' M^-1 rho_n| + kappa/(1 - kappa) sqrt(c' M^-1 c) sum_n sqrt(rho_n' M^-1 rho_n),
 
 so all of it is found from the believed vehicle, one parameter after the other. kappa by rows of M scaled to a unit
-diagonal (Gershgorin). A bound and no estimate: all parameters at their worst together. docs/CONTROL.md has the proof.
+diagonal (Gershgorin). A bound and no estimate: all parameters at their worst together. docs/explanation/control.md has
+the proof.
 """
 
 import math

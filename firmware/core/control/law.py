@@ -17,7 +17,8 @@ Real actuators need more than that, and two arguments say how much of them the l
 - Bounds of what each input can be in the time at hand: an axis meets its demand with the other's input held within
   them. +-inf: the joint solution above. Where the actuators are: (34) and (35) as printed, f with the other input as it
   is. `reach` (law_plus) of a short horizon: law+. The tank fills for seconds, and its weight forward turns the nose;
-  solved jointly, the slider stands against ballast that is not there yet, and the vehicle is lost (docs/CONTROL.md).
+  solved jointly, the slider stands against ballast that is not there yet, and the vehicle is lost
+  (docs/explanation/control.md).
 - jerk: k3 s and the sliding term together are held within sqrt(2 jerk |s|), from which an actuator whose speed gives
   that much jerk can still brake s to zero. inf: not held. law+ takes a share of |g| times the actuator's rate.
 
@@ -126,7 +127,7 @@ def k2_to_cover(model_error, disturbance, g, eps):
     """Smallest k2 with which V_dot <= -k3 s^2 outside the layer, (32) at work: (d_f + d) / (|g| sat(|g|/eps)).
 
     model_error bounds what true and believed f + G u differ by (error_bound.model_error_bound), disturbance what else
-    accelerates this axis; both rad/s2 or m/s2, >= 0. Infinite where g = 0. Derived in docs/CONTROL.md.
+    accelerates this axis; both rad/s2 or m/s2, >= 0. Infinite where g = 0. Derived in docs/explanation/control.md.
     """
     grip = abs(g) * sat(abs(g) / eps)
     if grip == 0.0:

@@ -14,13 +14,15 @@ from glider.firmware.core.control.input_forms import level
 from glider.firmware.core.jit import kernel
 
 # Of the jerk that an actuator's rate gives. One would be the fastest braking without lag; the rest is left for the lag
-# and for what the reference asks for. Measured in docs/CONTROL.md.
+# and for what the reference asks for. Measured in docs/explanation/control.md.
 JERK_RATE_SHARE = 0.3
 
 
 @kernel
 def reach(position, low, high, rate, time_constant, horizon):
-    """Least and greatest position that an actuator (docs/MODEL.md, Actuators) may have `horizon` s from now.
+    """Least and greatest position that an actuator may have `horizon` s from now.
+
+    See docs/explanation/model.md, Actuators.
 
     Each the nearer of what its rate and what its lag towards the end of its range allow.
     """

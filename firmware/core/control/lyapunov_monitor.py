@@ -5,7 +5,7 @@ Every WATCH_EVERY s while the law flies, for pitch and, where the law commands t
 - need: the smallest k2 that covers a vehicle within one sigma of [uncertainty], all parameters at their worst together,
   and the disturbance that the filter sees (law.k2_to_cover, error_bound).
 - margin: what is left with the actuators where they are (law.decrease_margin): positive, V is sure to fall by
-  |s| margin; not positive, nothing is guaranteed. Estimates are taken for the truth. docs/CONTROL.md.
+  |s| margin; not positive, nothing is guaranteed. Estimates are taken for the truth. docs/explanation/control.md.
 
 Both are worked out with the exact form, whichever the law flies with, and without the observer's share of f: what
 either makes of the commands is in the mismatch.

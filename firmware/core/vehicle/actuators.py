@@ -1,4 +1,5 @@
-"""The nominal actuators (docs/MODEL.md, Actuators): a lag limited in rate, towards a command limited in range."""
+"""The nominal actuators (docs/explanation/model.md, Actuators): a lag limited in rate, towards a command limited in
+range."""
 
 import math
 

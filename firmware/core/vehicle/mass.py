@@ -1,4 +1,5 @@
-"""Mass properties of a vehicle with moving masses (docs/MODEL.md, Mass): the first moment S and the inertia Jt."""
+"""Mass properties of a vehicle with moving masses (docs/explanation/model.md, Mass): the first moment S and the
+inertia Jt."""
 
 import math
 

@@ -2,7 +2,7 @@
 
 A row says where the effect sits (subsystem and element), what it is called, what it changes, and its parameters: name,
 unit, range, the prior's 1 sigma and the entry of the effect vector F that it sets. The entries' numbers follow from the
-order here (sim_backend/core/effects/effect_layout). docs/ADDING.md says how to add one.
+order here (sim_backend/core/effects/effect_layout). docs/how-to/adding.md says how to add one.
 """
 
 import math

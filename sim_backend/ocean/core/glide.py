@@ -1,4 +1,4 @@
-"""Kernels: how an ocean glider moves through the water, its attitude given (docs/OCEAN.md, Model)."""
+"""Kernels: how an ocean glider moves through the water, its attitude given (docs/explanation/ocean.md, Model)."""
 
 import math
 

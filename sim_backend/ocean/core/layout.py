@@ -1,6 +1,6 @@
 """Where things stand in the vectors of an ocean glider's model: vehicle P, effects F, state x, inputs, readings y.
 
-Attitude is an input, measured with errors of its own, not a state (docs/OCEAN.md, Model).
+Attitude is an input, measured with errors of its own, not a state (docs/explanation/ocean.md, Model).
 """
 
 # --- vehicle, P ---

@@ -61,7 +61,9 @@ def places(module: str) -> dict[str, float]:
 
 def aliases() -> dict[str, str]:
     """Module by alias, from the glossary."""
-    rows = re.findall(r"^\| `(\w+)` \| `([\w.]+)` \|", (ROOT / "docs" / "GLOSSARY.md").read_text(), re.MULTILINE)
+    rows = re.findall(
+        r"^\| `(\w+)` \| `([\w.]+)` \|", (ROOT / "docs" / "reference" / "glossary.md").read_text(), re.MULTILINE
+    )
     return {module: alias for alias, module in rows}
 
 

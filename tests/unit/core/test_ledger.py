@@ -1,4 +1,4 @@
-"""One test for each row of docs/LEDGER.md that concerns code that is here."""
+"""One test for each row of docs/reference/ledger.md that concerns code that is here."""
 
 import math
 import re
@@ -31,7 +31,7 @@ from tests.support.model_states import (
     velocities,
 )
 
-LEDGER = PACKAGES_DIR / "docs" / "LEDGER.md"
+LEDGER = PACKAGES_DIR / "docs" / "reference" / "ledger.md"
 
 
 def test_every_test_the_ledger_names_is_here():

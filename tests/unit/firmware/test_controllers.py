@@ -1,4 +1,5 @@
-"""Every registered controller: a number of its own, a row in docs/CONTROL.md, a mission on the nominal vehicle."""
+"""Every registered controller: a number of its own, a row in docs/explanation/control.md, a mission on the nominal
+vehicle."""
 
 import re
 from pathlib import Path
@@ -13,7 +14,7 @@ from glider.firmware.model.gains import Control
 from glider.hal.strict import decode
 from glider.tools.flight.compose import build_flight
 
-CONTROL_PAGE = Path(__file__).resolve().parents[3] / "docs" / "CONTROL.md"
+CONTROL_PAGE = Path(__file__).resolve().parents[3] / "docs" / "explanation" / "control.md"
 
 
 def test_numbers_are_their_own():

@@ -92,7 +92,7 @@ def test_the_simulated_board_of_a_twin_has_its_rates_and_reads():
 
 def test_every_device_that_a_board_file_may_name_stands_in_the_documents_and_has_a_driver():
     rows = [f"| `[{place}]` | {', '.join(f'`{name}`' for name in known_devices(place))} |" for place in SLOTS]
-    document = (Path(__file__).parents[3] / "docs" / "DEVICES.md").read_text(encoding="utf-8")
+    document = (Path(__file__).parents[3] / "docs" / "reference" / "devices.md").read_text(encoding="utf-8")
     assert "\n".join(rows) in document
     for place, drivers in DRIVERS.items():
         assert all(callable(driver_builder(place, name)) for name in drivers)

@@ -1,4 +1,5 @@
-"""The state machine of a sortie: what may never happen, whatever the table says; docs/SUPERVISOR.md has the same."""
+"""The state machine of a sortie: what may never happen, whatever the table says; docs/explanation/supervisor.md has
+the same."""
 
 import dataclasses
 import itertools
@@ -12,7 +13,7 @@ from glider.hal.sortie import TRANSITIONS, Facts, Party, SortieRefused, SortieSt
 
 FACTS = [Facts(*values) for values in itertools.product((False, True), repeat=3)]
 EVERY = list(itertools.product(SortieState, Trigger, Party, FACTS))
-DOCS = Path(__file__).resolve().parents[3] / "docs" / "SUPERVISOR.md"
+DOCS = Path(__file__).resolve().parents[3] / "docs" / "explanation" / "supervisor.md"
 
 
 def after(state, trigger, party, facts):
@@ -135,7 +136,8 @@ def meaning(table):
 
 
 def test_every_mutant_of_the_table_breaks_a_rule_or_the_page():
-    """A mutant that means something else breaks a rule above, or differs from the table of docs/SUPERVISOR.md."""
+    """A mutant that means something else breaks a rule above, or differs from the table of
+    docs/explanation/supervisor.md."""
     same = meaning(TRANSITIONS)[0]
     killed = 0
     for table in mutants():
@@ -147,7 +149,7 @@ def test_every_mutant_of_the_table_breaks_a_rule_or_the_page():
 
 
 def rows_of(table):
-    """Rows as docs/SUPERVISOR.md has them: states, trigger, party, target, blockers."""
+    """Rows as docs/explanation/supervisor.md has them: states, trigger, party, target, blockers."""
     return [
         (
             ", ".join(state.name for state in row.sources), row.trigger.value, row.party.value, row.target.name,

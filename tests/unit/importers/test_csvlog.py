@@ -253,7 +253,7 @@ def test_logs_that_do_not_fit_their_mapping(folder, old, new, said):
 
 def test_the_example_of_the_documentation_works(tmp_path):
     """Its mapping, on a log as it describes one."""
-    guide = (Path(__file__).parents[3] / "docs" / "IMPORT.md").read_text()
+    guide = (Path(__file__).parents[3] / "docs" / "how-to" / "import.md").read_text()
     (tmp_path / "map.toml").write_text(guide.split("```toml\n")[1].split("```")[0])
     lines = ["two lines of", "the logger's own"]
     lines += [f"{20 * row};{138 + row / 10:.1f};0,5;-999;{90 - row / 100:.2f}".replace(".", ",") for row in range(7000)]

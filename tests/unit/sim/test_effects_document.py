@@ -1,14 +1,15 @@
-"""docs/EFFECTS.md says of every label what the catalogue says, docs/GAP.md where it belongs."""
+"""docs/reference/effects.md says of every label what the catalogue says, docs/reference/gap.md where it belongs."""
 
 import re
 from pathlib import Path
 
 import pytest
 
+from docs import gallery
 from glider.sim_backend.core.effects.catalogue import catalogue
 
 DOCS = Path(__file__).parents[3] / "docs"
-TEXT = (DOCS / "EFFECTS.md").read_text(encoding="utf-8")
+TEXT = (DOCS / "reference" / "effects.md").read_text(encoding="utf-8")
 ROWS = {line.split("|")[2].strip(): line for line in TEXT.splitlines() if line.startswith("|") and "---" not in line}
 
 
@@ -37,7 +38,9 @@ def test_every_label_is_said_to_change_something():
 
 
 def test_the_words_of_the_gap_have_every_label_in_its_place():
-    table = (DOCS / "GAP.md").read_text(encoding="utf-8").partition("## Words")[2].partition("## Windows")[0]
+    table = (
+        (DOCS / "reference" / "gap.md").read_text(encoding="utf-8").partition("## Words")[2].partition("## Windows")[0]
+    )
     found, subsystem = {}, ""
     for line in [line for line in table.splitlines() if line.startswith("|")][2:]:
         first, elements, labels = (cell.strip() for cell in line.strip("|").split("|"))
@@ -47,3 +50,9 @@ def test_the_words_of_the_gap_have_every_label_in_its_place():
         for place, group in zip(places, groups, strict=True):
             found |= dict.fromkeys(re.findall(r"`(\w+)`", group), place)
     assert found == {label: (effect.subsystem, effect.element) for label, effect in catalogue().items()}
+
+
+def test_the_gallery_says_of_every_label_what_to_check():
+    """`python docs/gallery.py` writes the table."""
+    assert set(gallery.checks()) == set(catalogue())
+    assert gallery.with_table(gallery.PAGE.read_text(encoding="utf-8")) == gallery.PAGE.read_text(encoding="utf-8")

@@ -58,14 +58,14 @@ def test_any_rows_at_once_and_rows_switched_off(levels, on, before):
 
 
 def documented() -> dict[int, list[str]]:
-    """Rows of the fault table in docs/SUPERVISOR.md: name, seen by, within, reaction, cleared by."""
-    lines = (ROOT / "docs" / "SUPERVISOR.md").read_text().splitlines()
+    """Rows of the fault table in docs/explanation/supervisor.md: name, seen by, within, reaction, cleared by."""
+    lines = (ROOT / "docs" / "explanation" / "supervisor.md").read_text().splitlines()
     rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines if line.startswith("| ")]
     return {int(row[0]): row[1:] for row in rows if len(row) == 6 and row[0].isdigit()}
 
 
 def test_the_documented_table_is_the_one_that_flies():
-    document = (ROOT / "docs" / "SUPERVISOR.md").read_text(encoding="utf-8").splitlines()
+    document = (ROOT / "docs" / "explanation" / "supervisor.md").read_text(encoding="utf-8").splitlines()
     rows = markdown_rows()
     assert [line for line in document if line in rows] == rows
     assert sorted(documented()) == list(FAULTS)

@@ -1,4 +1,5 @@
-"""What docs/SECURITY.md promises and no other test holds: no network, no code out of data, no stranger's kernels."""
+"""What docs/explanation/security.md promises and no other test holds: no network, no code out of data, no stranger's
+kernels."""
 
 import ast
 import os

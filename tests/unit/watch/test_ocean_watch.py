@@ -163,7 +163,7 @@ def glider(monkeypatch, capsys):
     return run
 
 
-FIELDS = {"format", "verdict", "where", "causes", "selected", "gap", "next_run"}  # docs/GAP.md
+FIELDS = {"format", "verdict", "where", "causes", "selected", "gap", "next_run"}  # docs/reference/gap.md
 
 
 def test_a_diagnosis_is_written_as_any_other(unchanged, glider, tmp_path):

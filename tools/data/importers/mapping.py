@@ -2,7 +2,7 @@
 
     value = sign * scale * (logged - zero), in `unit`, turned into SI, + offset
 
-docs/IMPORT.md explains every key with an example.
+docs/how-to/import.md explains every key with an example.
 """
 
 import tomllib

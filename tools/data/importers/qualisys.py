@@ -5,7 +5,8 @@ come rows with, for each body, X Y Z, three Euler angles, a residual and nine el
 columns one behind the other. The matrix is used, not the angles: their order is a setting of the program. A residual
 below 0 or a pose of nothing but zeros means that the body was not seen. The laboratory's frame has Z up as the program
 calibrates it, and so has the body's, X ahead: both are turned about x by 180 deg into NED and the vehicle's axes
-(docs/MODEL.md, Frames and state). What is left of a turn between capture's body and vehicle is for `glider identify`
+(docs/explanation/model.md, Frames and state). What is left of a turn between capture's body and vehicle is for `glider
+identify`
 to find.
 """
 

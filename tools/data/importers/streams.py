@@ -1,7 +1,7 @@
 """Logs of messages into run data, by a mapping file: topic and field of a message -> column, unit, scale, sign.
 
 What ROS 2 bags and ArduSub's logs have in common: each topic has times of its own. A run has even rows at `rate_hz`,
-each the mean of the samples nearest to it; a command holds from its message until the next one (docs/IMPORT.md).
+each the mean of the samples nearest to it; a command holds from its message until the next one (docs/how-to/import.md).
 """
 
 import fnmatch

@@ -50,7 +50,9 @@ def momentum_rows(P, attitude, nu, actuators, M, N, K):
 
 @kernel
 def flown_servo(t, commands, low, high, rate, time_constant, out):
-    """The nominal servo under its commands from 0 on, out (rows,), rad: it has no sensor (docs/MODEL.md, Actuators).
+    """The nominal servo under its commands from 0 on, out (rows,), rad: it has no sensor.
+
+    See docs/explanation/model.md, Actuators.
 
     Exact for commands held from row to row: at its full rate as long as it is far off, then by its lag.
     """

@@ -1,7 +1,7 @@
 """What dives say of a vehicle file: calibrations that are far from it, and labels that they do not part.
 
 A calibration's own estimate is that of the dives alone: what the file says of it is taken off again, all else with it
-(docs/OCEAN.md, Identification).
+(docs/explanation/ocean.md, Identification).
 """
 
 from collections.abc import Iterable, Sequence

@@ -1,7 +1,8 @@
 """An ocean glider identified from a mission's dives: volume, drag, lift, compression, expansion, attitude, noise.
 
 Gauss and Newton's steps in everything at once along the observer's innovations, held by what the vehicle file allows
-(docs/OCEAN.md, Identification). Dives, and their ways and depths, differ by more than their noise says; the covariance
+(docs/explanation/ocean.md, Identification). Dives, and their ways and depths, differ by more than their noise says;
+the covariance
 is that of a sandwich.
 """
 

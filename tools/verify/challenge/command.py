@@ -150,7 +150,10 @@ def score(
     cases: Path, answers: Path, diagnoses: Path, manifest: Path | None, partial: bool, no_closed: bool, watch: bool,
     ocean: bool, form: bool, as_json: bool,
 ) -> None:  # fmt: skip
-    """Open the sealed answers, check them against the manifest, and score the diagnoses (docs/CHALLENGE.md)."""
+    """Open the sealed answers, check them against the manifest, and score the diagnoses.
+
+    See docs/explanation/blind-tests.md.
+    """
     from glider.tools.data.errors import InputError, need
     from glider.tools.verify.challenge.judge import judge
 

@@ -1,4 +1,5 @@
-"""A diagnosis.json as a scorer reads it (docs/GAP.md, Answers): what is scored is checked, the rest is let be."""
+"""A diagnosis.json as a scorer reads it (docs/reference/gap.md, Answers): what is scored is checked, the rest is let
+be."""
 
 from pathlib import Path
 from typing import Annotated, Literal

@@ -36,7 +36,7 @@ LABEL_STEPS = {
 # missions where a dive has 4 nat (a normal deviate beyond 2), in 8 where it has 2. All together: as in evidence.py.
 DIVE_NAT, ALL_NAT = 4.0, 20.0
 # m/s by which a change moves the depth rate: less is none by definition, and a growth that stays below what a quiet
-# flight is known to is the fouling of any mission (docs/OCEAN.md, Windows)
+# flight is known to is the fouling of any mission (docs/explanation/ocean.md, Windows)
 MATERIAL_SPEED, MATERIAL_GROWTH = 0.005, 0.01
 SIZE_TRIES, TRIES = 12, 500
 LEAST_SINK_SPEED, MIDDLE_DEPTH_SHARE = (

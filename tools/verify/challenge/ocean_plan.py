@@ -24,7 +24,8 @@ CHANGES = (
     ("drag", False), ("drag", True), ("attitude_scale", False), ("net_buoyancy", False), ("density_bias", False),
     ("lift", False),
 )  # fmt: skip
-# What no label names, a step that stays or an episode in turn (docs/CHALLENGE.md): a thruster that helps in the upper
+# What no label names, a step that stays or an episode in turn (docs/explanation/blind-tests.md): a thruster that helps
+# in the upper
 # water, a line that something at the surface holds, wings grown over on one side, mud from the sea floor.
 OUTSIDE_CHANGES = ("x_thruster", "x_line", "x_fouled_wing", "x_mud")
 # The other two glide near their best: less lift moves their depth rate by a few mm/s until there is no glide at all.

@@ -1,4 +1,5 @@
-"""Answers against the truth: the figures of docs/GAP.md by name, each counted as docs/CHALLENGE.md says."""
+"""Answers against the truth: the figures of docs/reference/gap.md by name, each counted as
+docs/explanation/blind-tests.md says."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -142,7 +143,7 @@ class ScoreFigure:
     """One line of the result."""
 
     key: str
-    name: str  # as in docs/GAP.md, Figures to reach
+    name: str  # as in docs/reference/gap.md, Figures to reach
     target: float | None  # None: for information
     at_most: bool
     value: float | None
@@ -290,7 +291,8 @@ def score_forms(cases: Sequence[ScoredCase], gaps: Sequence[tuple[float, float]]
 
 
 def score(cases: Sequence[ScoredCase]) -> ChallengeScore:
-    """Every figure of docs/GAP.md over the cases; those of messy cases where small effects act in any of them."""
+    """Every figure of docs/reference/gap.md over the cases; those of messy cases where small effects act in any of
+    them."""
     shares = MESSY_SHARES if any(case.messy for case in cases) else SHARE_FIGURES
     figures = [_share(share, cases) for share in shares]
     losses = [case.log_loss() for case in cases]

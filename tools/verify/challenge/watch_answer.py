@@ -1,4 +1,5 @@
-"""A watch.json as a scorer reads it (docs/GAP.md, What changed): what is scored is checked, the rest is let be."""
+"""A watch.json as a scorer reads it (docs/reference/gap.md, What changed): what is scored is checked, the rest is let
+be."""
 
 from pathlib import Path
 from typing import Literal

@@ -1,4 +1,4 @@
-"""Watches of a blind test against the truth: the figures of docs/WATCH.md, and how each is counted."""
+"""Watches of a blind test against the truth: the figures of docs/explanation/watch.md, and how each is counted."""
 
 import json
 from collections.abc import Callable, Sequence

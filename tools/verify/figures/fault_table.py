@@ -1,4 +1,4 @@
-"""Print the fault table as it stands in docs/SUPERVISOR.md; a test compares the two."""
+"""Print the fault table as it stands in docs/explanation/supervisor.md; a test compares the two."""
 
 from glider.firmware.faults import markdown_rows
 

@@ -1,6 +1,6 @@
 """The law's figures over glides of the shipped vehicle.
 
-`python -m glider.tools.verify.figures.law` prints tables of docs/CONTROL.md.
+`python -m glider.tools.verify.figures.law` prints tables of docs/explanation/control.md.
 
 What the `paper` form leaves out against the exact one, in theta_dd, Z_dd, the input gains and the roll form (22); and
 the k2 that covers what [uncertainty] and [disturbance] leave of the exact one.

@@ -1,4 +1,6 @@
-"""How well an ocean glider's mean speed is known: twin missions, identified and asked (docs/OCEAN.md, Velocity).
+"""How well an ocean glider's mean speed is known: twin missions, identified and asked.
+
+See docs/explanation/ocean.md, Velocity.
 
 python -m glider.tools.verify.figures.ocean_speed --seed 90731 --missions 12
 python -m glider.tools.verify.figures.ocean_speed --seed 90741 --missions 12 --changed

@@ -1,4 +1,6 @@
-"""How steady a diagnosis is: copies with a millionth of each reading's noise added (docs/DIAGNOSIS.md, Steady).
+"""How steady a diagnosis is: copies with a millionth of each reading's noise added.
+
+See docs/explanation/diagnosis.md, Steady.
 
     python -m glider.tools.verify.figures.steady CASE... --copies 4 --seed 1
 

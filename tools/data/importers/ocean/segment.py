@@ -33,7 +33,7 @@ class Segment:
     files: list[Path]
     glider: str  # which one, as its files say
     start: float  # of the first row, s since 1970-01-01 UTC
-    columns: dict[str, np.ndarray]  # as run data (docs/RUNS.md), t_s from the first row
+    columns: dict[str, np.ndarray]  # as run data (docs/reference/runs.md), t_s from the first row
     latitude: float  # deg
     longitude: float  # deg
     variation: float = 0.0  # magnetic, rad, still to be added to yaw_rad; 0 where it is known to be in
