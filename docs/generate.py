@@ -109,5 +109,5 @@ def commands() -> str:
 
     text = "# Every command and option\n\nGenerated from the command line.\n"
     for name, (module, attribute, _) in COMMANDS.items():
-        text += f"\n```{{click}} {module}:{attribute}\n:prog: glider {name}\n:nested: full\n```\n"
+        text += f"\n```{{click}} glider.tools.{module}:{attribute}\n:prog: glider {name}\n:nested: full\n```\n"
     return text
