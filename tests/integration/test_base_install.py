@@ -64,6 +64,7 @@ CALLS: tuple[tuple[str, str | None], ...] = (
     ("export stonefish roughie", None),
     ("vehicle new mine.toml", None),
     ("vehicle show mine.toml", None),
+    ("vehicle check sinker.toml", None),
     ("simulate commands.csv --out simulated.csv", None),
     ("faults --only 34", None),
     ("faults --only 32", "bench"),
@@ -77,6 +78,7 @@ CALLS: tuple[tuple[str, str | None], ...] = (
     ("gap measure case", "analysis"),
     ("gap predict case/run00.csv --out predicted.csv", None),
     ("gap readings case", "analysis"),
+    ("gap isolability --columns pitch_rad,depth_m", "analysis"),
     ("gap report answer", "analysis"),
     ("gap watch case", "analysis"),
     ("gap velocity dives --out velocity", None),
@@ -93,6 +95,11 @@ CALLS: tuple[tuple[str, str | None], ...] = (
     ("tune", "analysis"),
 )
 FILES = {
+    "sinker.toml": 'format = 1\nmodel = "sinker"\n',
+    "sinker.py": "import numpy as np\noutputs = {'depth': 'm'}\nstates = {'z': 'm'}\n"
+    "parameters = [('sink', 'm/s', 0.1, 0.1)]\n"
+    "def derivative(x, u, w, theta):\n    return np.array([theta[0]])\n"
+    "def measure(x, u, theta):\n    return np.array([x[0]])\n",
     "log.csv": "ms,deg\n" + "".join(f"{100 * i},{i % 7}\n" for i in range(100)),
     "map.toml": 'format = 1\nvehicle = "roughie"\nsite = "pool"\nwater_density_kg_m3 = 998.0\n[time]\ncolumn = "ms"\n'
     'unit = "ms"\n[columns.pitch_rad]\nsource = "deg"\nunit = "deg"\n',

@@ -21,24 +21,6 @@ KERNELS = Path(__file__).with_name("kernels.py")
 NAMES = ("wrap", "plus", "minus", "normalised", "difference", "read", "push_of", "filter_run", "follow_run", "fly_run")
 PLAIN = "GLIDER_OWN_PYTHON"  # set: never compile
 
-STEP_SOURCE = """
-def advance(x, u, w, theta, dt, parts):
-    for _ in range(parts):
-        x = step(x, u, w, theta, dt / parts)
-    return x
-"""
-DERIVATIVE_SOURCE = """
-def advance(x, u, w, theta, dt, parts):
-    h = dt / parts
-    for _ in range(parts):
-        a = derivative(x, u, w, theta)
-        b = derivative(x + 0.5 * h * a, u, w, theta)
-        c = derivative(x + 0.5 * h * b, u, w, theta)
-        d = derivative(x + h * c, u, w, theta)
-        x = x + h / 6.0 * (a + 2.0 * b + 2.0 * c + d)
-    return x
-"""
-
 
 @dataclass(frozen=True)
 class Kernels:
@@ -59,20 +41,17 @@ def _functions(model: Any) -> dict[str, Callable[..., Any]]:
     return {motion: getattr(model, motion), "measure": model.measure}
 
 
-def _module(name: str, source: str, path: Path, given: dict[str, Any]) -> types.ModuleType:
-    """Source executed as a module with names given."""
-    module = types.ModuleType(name)
-    module.__file__ = str(path)
-    vars(module).update(given)
+def _module(name: str, path: Path, given: dict[str, Any]) -> types.ModuleType:
+    """The kernels' file imported under a name, with the user's functions given; `advance` is that of their motion."""
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
-    exec(compile(source, str(path), "exec"), vars(module))
+    spec.loader.exec_module(module)
+    vars(module).update(given)
+    vars(module)["advance"] = module.advance_by_steps if "step" in given else module.advance_by_derivative
     return module
-
-
-def _sources(model: Any) -> tuple[str, str]:
-    """The kernels' source with `advance`, and the motion's name."""
-    motion = "step" if hasattr(model, "step") else "derivative"
-    return KERNELS.read_text(encoding="utf-8") + (STEP_SOURCE if motion == "step" else DERIVATIVE_SOURCE), motion
 
 
 def _as_array(function: Callable[..., Any]) -> Callable[..., np.ndarray]:
@@ -82,9 +61,8 @@ def _as_array(function: Callable[..., Any]) -> Callable[..., np.ndarray]:
 
 def plain(model: Any, why: str) -> Kernels:
     """The observer in plain Python."""
-    source, _ = _sources(model)
     functions = {name: _as_array(one) for name, one in _functions(model).items()}
-    made = _module(f"glider_own_plain_{id(model)}", source, KERNELS, functions)
+    made = _module(f"glider_own_plain_{id(model)}", KERNELS, functions)
     return Kernels(made.filter_run, made.follow_run, made.fly_run, made.advance, functions["measure"], False, why)
 
 
@@ -119,7 +97,7 @@ def _compiled(model: Any, path: Path, attribute: str, tried: tuple[np.ndarray, .
     from glider.firmware.core import jit  # sets Numba's cache folder
 
     user = path.read_bytes()
-    source, motion = _sources(model)
+    source, motion = KERNELS.read_text(encoding="utf-8"), "step" if hasattr(model, "step") else "derivative"
     key = hashlib.sha256(user + source.encode() + numba.__version__.encode()).hexdigest()[:20]
     folder = jit.cache_root() / "own" / key
     folder.mkdir(parents=True, exist_ok=True)
@@ -140,7 +118,7 @@ def _compiled(model: Any, path: Path, attribute: str, tried: tuple[np.ndarray, .
         function = getattr(owner, name)
         given[name] = function if hasattr(function, "py_func") else numba.njit(**options)(function)
     name = f"glider_own_{key}"
-    module = _module(name, source, kernels, given)
+    module = _module(name, kernels, given)
     for one in (*NAMES, "advance"):
         vars(module)[one] = numba.njit(**options)(vars(module)[one])
     x, u, w, theta = tried

@@ -293,3 +293,22 @@ def fly_run(T, U, starts, ends, X, theta, own, S, push, kinds, angles, parts, ou
             when = T[starts[k] : ends[k]]
             out[row] = read(h, T[row], since, when, lagged, history, angles, S)
             out[row] += S[2] * (T[starts[k]] - T[0])
+
+
+def advance_by_steps(x, u, w, theta, dt, parts):
+    """The state after dt, in parts, by the user's step."""
+    for _ in range(parts):
+        x = step(x, u, w, theta, dt / parts)
+    return x
+
+
+def advance_by_derivative(x, u, w, theta, dt, parts):
+    """The same by the user's derivative: Runge and Kutta's fourth order."""
+    h = dt / parts
+    for _ in range(parts):
+        a = derivative(x, u, w, theta)
+        b = derivative(x + 0.5 * h * a, u, w, theta)
+        c = derivative(x + 0.5 * h * b, u, w, theta)
+        d = derivative(x + h * c, u, w, theta)
+        x = x + h / 6.0 * (a + 2.0 * b + 2.0 * c + d)
+    return x

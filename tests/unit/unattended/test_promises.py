@@ -86,7 +86,7 @@ def test_a_cache_that_others_may_write_into_is_not_read(tmp_path):
         assert "no writable folder of one's own" in done.stderr
 
 
-@pytest.mark.parametrize("command", [("acknowledge",), ("compile",), ("gap", "measure", "case")])
+@pytest.mark.parametrize("command", [("acknowledge",), ("compile",), ("fly", "--mission", "spiral", "--no-log")])
 def test_no_place_for_kernels_is_said_in_a_line(command, tmp_path):
     blocked = tmp_path / "a-file"
     blocked.write_text("")
