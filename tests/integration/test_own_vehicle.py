@@ -83,6 +83,17 @@ def test_a_healthy_case_is_none(pool):
     assert sum(one["probability"] for one in answer["causes"]) == pytest.approx(1.0, abs=1e-3)
 
 
+def test_a_report_is_drawn_again_from_its_answer(pool):
+    folder, case, _ = pool
+    if not (folder / "same-said").is_dir():
+        case("same", 2)
+        diagnosed(folder, "same")
+    before = (folder / "same-said" / "report.html").read_bytes()
+    done = glider("gap", "report", "same-said", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert (folder / "same-said" / "report.html").read_bytes() == before
+
+
 def test_a_rudder_that_turns_less_is_its_gain(pool):
     folder, case, _ = pool
     case("rudder", 3, driven=lambda n, u: u * [1.0, 0.7])

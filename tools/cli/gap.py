@@ -214,8 +214,10 @@ def report(folder: Path) -> None:
 
     from glider.tools.api.sentences import verdict_lines
     from glider.tools.data.errors import need
-    from glider.tools.diagnose.record import ANSWER, is_pooled
+    from glider.tools.diagnose.record import ANSWER, QuestionRecord, is_pooled, read_as
+    from glider.tools.own.diagnose import KIND as OWN
     from glider.tools.report.diagnosis import write_report
+    from glider.tools.report.own import write_own_report
     from glider.tools.report.page import REPORT
     from glider.tools.report.pooled import write_pooled_report
     from glider.tools.report.watch import write_watch_report
@@ -225,6 +227,8 @@ def report(folder: Path) -> None:
     need("analysis")
     if (folder / FILE).is_file():
         said = write_watch_report(folder)
+    elif (folder / ANSWER).is_file() and read_as(folder / ANSWER, QuestionRecord).kind == OWN:
+        said = write_own_report(folder)
     else:
         said = write_pooled_report(folder) if is_pooled(folder) else sentence(write_report(folder))
     click.echo(said)

@@ -10,8 +10,6 @@ import click
 
 from glider.tools.cli.common import print_json, say
 
-CAUSES, LEAST = 4, 0.01
-
 
 def own_vehicle(case: Path, wanted: str | None) -> Any:
     """The user's own model that a case is asked by; None where its vehicle is none."""
@@ -63,6 +61,7 @@ def predict(vehicle: Any, run: Path, out: Path) -> None:
 
 def diagnose(vehicle: Any, case: Path, reference: Path | None, out: Path, as_json: bool) -> None:
     """The diagnosis of a case by a user's model; with a reference the vehicle is identified from that first."""
+    from glider.tools.api.sentences import verdict_lines
     from glider.tools.own.diagnose import diagnose_own, sentence, write
     from glider.tools.own.runs import load_own_runs
 
@@ -83,19 +82,6 @@ def diagnose(vehicle: Any, case: Path, reference: Path | None, out: Path, as_jso
         for line in verdict_lines(answer):
             click.echo(line)
     say(f"answer: {out / 'diagnosis.json'}, report: {out / 'report.html'}")
-
-
-def verdict_lines(answer: dict[str, Any]) -> list[str]:
-    """Verdict, causes and gap, a line each."""
-    lines = [f"verdict: {answer['verdict']}{''.join(f', {label}' for label in answer['selected'])}"]
-    for n, cause in enumerate(answer["causes"][:CAUSES]):
-        if n == 0 or cause["probability"] >= LEAST:
-            others = [label for label in cause["group"] if label != cause["label"]]
-            confounded = f"  or {', '.join(others)}, which these data cannot distinguish" if others else ""
-            lines.append(f"  {cause['probability']:.2f}  {cause['label']}{confounded}")
-    totals = {name: answer["gap"][name]["total"] for name in ("before", "recalibrated", "after", "floor")}
-    gaps = ", ".join(f"{name} {value:.2f}" for name, value in totals.items() if value is not None)
-    return [*lines, f"gap in tolerances: {gaps}"]
 
 
 def watch(vehicle: Any, case: Path, reference: Path | None, out: Path | None, as_json: bool) -> None:

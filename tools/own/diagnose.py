@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from glider.tools.data.files import write_files
+from glider.tools.data.intervals import NINETY
 from glider.tools.data.plain import as_plain
 from glider.tools.own.effects import PUSH, ModelPoint
 from glider.tools.own.identified import toml_text
@@ -17,7 +18,6 @@ from glider.tools.own.posterior import NONE, UNKNOWN, Engine, Healthy, Hypothesi
 from glider.tools.own.runs import OwnRun
 
 ANSWER, CORRECTED = "diagnosis.json", "corrected.toml"
-NINETY = 1.645
 GROUP_MASS, MOST_GROUP = (
     0.9,
     3,

@@ -12,7 +12,7 @@ import numpy as np
 from glider.tools.own.declare import RUN, Declaration, Input
 from glider.tools.own.runs import OwnRun
 
-INPUT, OUTPUT, PARAMETER, NOISE, OWN = "input", "output", "parameter", "noise", "own"
+INPUT, OUTPUT, PARAMETER = "input", "output", "parameter"
 PUSH = "push"  # a constant beside a noise: what no label explains
 GAIN_SPREAD, SECONDS_SPREAD, RANGE_SPREAD = 0.1, 0.2, 0.1
 OWN_STEP = 1e-3  # of its sigma: difference step of a parameter of each run

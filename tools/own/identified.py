@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from glider.tools.data.files import write_files
+from glider.tools.data.intervals import NINETY
 from glider.tools.data.plain import as_plain
 from glider.tools.data.version import software
 from glider.tools.own.identify import Identified
 
 VEHICLE, ANSWER = "identified.toml", "identified.json"
-NINETY = 1.645
 
 
 def _text(value: Any) -> str:

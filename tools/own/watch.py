@@ -13,6 +13,7 @@ import numpy as np
 from scipy.special import logsumexp
 from scipy.stats import norm
 
+from glider.tools.data.intervals import NINETY
 from glider.tools.own.effects import PUSH
 from glider.tools.own.hierarchy import Expansion, Pooled, learn_scatter, run_values
 from glider.tools.own.load import LoadedVehicle
@@ -40,7 +41,6 @@ TO_THE_END = 0.5  # of spans: that a change is still there in the last run
 MOST_EVENTS = 4
 REFITTED, SPANS = 5, 2  # labels, of the best spans, whose parabolas are taken where they lead to
 CERTAIN = 0.5  # probability from which an event is one
-NINETY = 1.645
 GROUP = 0.1  # of a label's probability: others of at least so much share its group
 ROUNDS, PREPARED = 3, 6
 
@@ -155,15 +155,15 @@ class Watch(Engine):
         self.runs = self.marginal(self.found)
         self.events: list[Event] = []
 
-    def at_run(self, n: int, skip: Event | None = None) -> np.ndarray:
+    def at_run(self, n: int) -> np.ndarray:
         """Values (k,) that run n is thought to have: shared and its events'."""
         x = self.shared.copy()
         for one in self.events:
-            if one is not skip and one.first <= n < one.end:
+            if one.first <= n < one.end:
                 x[self.healthy.at([one.label])[0]] += one.size
         return x
 
-    def scored(self, spans: Sequence[tuple[int, int]], only: Sequence[int] | None = None) -> np.ndarray:
+    def scored(self, spans: Sequence[tuple[int, int]]) -> np.ndarray:
         """Log evidence (spans, labels) of every label over every span; -inf where nothing moves."""
         slopes = np.array([-(one.slope + one.curvature @ (self.at_run(n) - one.at)) for n, one in enumerate(self.runs)])
         curvatures = np.array([one.curvature for one in self.runs])
@@ -171,7 +171,7 @@ class Watch(Engine):
             np.concatenate([0.0 * slopes[:1], slopes.cumsum(axis=0)]),
             np.concatenate([0.0 * curvatures[:1], curvatures.cumsum(axis=0)]),
         )
-        labels = np.arange(self.k) if only is None else np.array(only)
+        labels = np.arange(self.k)
         found = np.full((len(spans), self.k), -np.inf)
         usable = labels[self.reach[labels] > LEAST_REACH]
         sided = np.array([self.healthy.effects[k].one_sided for k in usable])
