@@ -73,7 +73,8 @@ class IdentifiedTable(Table):
     sessions: Annotated[int, msgspec.Meta(ge=1)] = 1
     inflation: Annotated[float, msgspec.Meta(ge=1.0)] = 1.0  # of all channels together
     channel_inflation: dict[str, Annotated[float, msgspec.Meta(ge=1.0)]] = msgspec.field(default_factory=dict)
-    scatter: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # of every label from run to run, in its unit
+    scatter: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # what runs differ by, 1 sigma in its unit
+    label_scatter: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # of each label alone, beside that
     session_share: NonNegative = 0.25  # variance between sessions over that from run to run
     level_scatter: NonNegative = 0.5  # 1 sigma from run to run of the logarithm of the mean square left
     gap: dict[str, float] = msgspec.field(default_factory=dict)  # of healthy runs left out, by channel, tolerances

@@ -176,23 +176,24 @@ class Pooled:
 
 
 def learn_scatter(found: Sequence[Expansion], V: np.ndarray, usual: np.ndarray) -> np.ndarray:
-    """1 sigma (k,) of how runs differ, most probable with an inverse gamma prior about `usual` (k,) squared.
+    """1 sigma (k,) of how runs differ, most probable with an inverse gamma prior about `usual` (k,) squared; 0 stays 0.
 
     Minorisation and maximisation of the marginal likelihood, from a small and a large start; the better is kept.
     """
+    free = usual > 0.0
 
     def cost(sizes: np.ndarray) -> float:
         pooled = Pooled.of([marginalised(one, sizes) for one in found], V)
-        variance, middle = sizes**2, np.maximum(usual**2, LEAST_VARIANCE)
+        variance, middle = np.maximum(sizes[free] ** 2, LEAST_VARIANCE), usual[free] ** 2
         prior = 0.5 * SCATTER_PRIOR_RUNS * float((np.log(variance) + middle / variance).sum())
         return prior - pooled.log_evidence()
 
-    tried = [_mm(found, V, usual, np.maximum(usual, least)) for least in (0.0, 0.3)]
+    tried = [_mm(found, V, usual, np.where(free, np.maximum(usual, least), 0.0)) for least in (0.0, 0.3)]
     return min(tried, key=cost)
 
 
 def _mm(found: Sequence[Expansion], V: np.ndarray, usual: np.ndarray, start: np.ndarray) -> np.ndarray:
-    middle, v = np.maximum(usual**2, LEAST_VARIANCE), np.maximum(start**2, LEAST_VARIANCE)
+    middle, v, free = usual**2, start**2, usual > 0.0
     weight = 0.5 * SCATTER_PRIOR_RUNS
     for _ in range(ITERATIONS):
         runs = [marginalised(one, np.sqrt(v)) for one in found]
@@ -204,8 +205,10 @@ def _mm(found: Sequence[Expansion], V: np.ndarray, usual: np.ndarray, start: np.
             A = one.curvature
             squares += (one.slope + A @ (x - one.at)) ** 2
             traces += np.maximum(np.diag(A) - np.einsum("ij,jk,ki->i", A, M, A), 0.0)
-        before, v = v, np.sqrt((0.5 * v**2 * squares + weight * middle) / (0.5 * traces + weight / v))
-        if np.abs(np.log(v / before)).max(initial=0.0) < CONVERGED:
+        before, v = v, v.copy()
+        at = before[free]
+        v[free] = np.sqrt((0.5 * at**2 * squares[free] + weight * middle[free]) / (0.5 * traces[free] + weight / at))
+        if np.abs(np.log(v[free] / at)).max(initial=0.0) < CONVERGED:
             break
     return np.sqrt(v)
 

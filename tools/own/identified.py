@@ -11,6 +11,7 @@ from glider.tools.data.files import write_files
 from glider.tools.data.intervals import NINETY
 from glider.tools.data.plain import as_plain
 from glider.tools.data.version import software
+from glider.tools.own.effects import PUSH
 from glider.tools.own.identify import Identified
 
 VEHICLE, ANSWER = "identified.toml", "identified.json"
@@ -52,8 +53,8 @@ def tables(found: Identified) -> dict[str, Any]:
     declared = vehicle.declared
     given = tomllib.loads(vehicle.text)
     sd = np.sqrt(np.diag(found.covariance))
-    scatter = dict(zip((one.label for one in found.effects), found.scatter, strict=True))
-    spreads = {one.label: one.spread for one in found.effects}
+    scatter = {one.label: float(s * one.spread) for one, s in zip(found.nuisance, found.scatter, strict=True)}
+    labels = {one.label: float(s * one.spread) for one, s in zip(found.labels, found.label_scatter, strict=True)}
     parameters = given.setdefault("parameters", {})
     sensors = given.setdefault("sensors", {})
     names, places = [], []
@@ -63,13 +64,13 @@ def tables(found: Identified) -> dict[str, Any]:
             before = declared.parameters[declared.index("parameters", one.name)]
             table = parameters.setdefault(one.name, {})
             value = min(max(before.value + move, before.low), before.high)
-            spread = float(scatter[one.label] * spreads[one.label])
+            spread = scatter[one.label]
             own = max(error, spread) if before.scope == "run" else error
             table |= {"value": value, "uncertainty": own, "scatter": spread}
             table.pop("assumed", None)
             names.append(one.name)
             places.append(k)
-        else:
+        elif one.family != PUSH:
             output = declared.outputs[declared.index("outputs", one.name)]
             sensors.setdefault(one.name, {})["offset"] = output.offset + move
     for n, output in enumerate(declared.outputs):
@@ -84,7 +85,7 @@ def tables(found: Identified) -> dict[str, Any]:
         "runs": len(observer.runs), "sessions": found.sessions, "parameters": names,
         "covariance": [[float(value) for value in row] for row in covariance], "inflation": found.eta,
         "level_scatter": found.level_scatter, "session_share": found.session_share,
-        "scatter": {name: float(value * spreads[name]) for name, value in scatter.items()},
+        "scatter": {name: value for name, value in scatter.items() if value > 0.0}, "label_scatter": labels,
         "gap": {one.name: float(value) for one, value in zip(declared.outputs, found.errors.scales, strict=True)},
         "channel_inflation": {
             one.name: float(value) for one, value in zip(declared.outputs, found.errors.inflation, strict=True)
@@ -124,8 +125,8 @@ def plain(found: Identified) -> dict[str, Any]:
 def groups(found: Identified, correlation: float = 0.98) -> list[list[str]]:
     """Parameters that the data do not part: posterior correlations beyond 0.98."""
     sd = np.sqrt(np.diag(found.covariance))
-    R = found.covariance / np.outer(sd, sd)
-    left, listed = list(range(len(sd))), []
+    R = found.covariance / np.maximum(np.outer(sd, sd), 1e-300)
+    left, listed = list(np.flatnonzero(sd > 0.0)), []
     while left:
         k = left.pop(0)
         own = [j for j in left if abs(R[k, j]) > correlation]

@@ -6,8 +6,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from glider.tools.own.declare import RUN, Declaration
-from glider.tools.own.effects import PARAMETER, Effect, moved, standard_effects
+from glider.tools.own.effects import OUTPUT, PUSH, Effect, moved, pushes, standard_effects
 from glider.tools.own.hierarchy import (
+    SCATTER_PRIOR_RUNS,
     ChannelErrors,
     Expansion,
     Pooled,
@@ -27,6 +28,7 @@ USUAL_SESSION_SHARE, SESSION_SHARES, MIN_SESSIONS = 0.25, (0.05, 4.0), 3
 MIN_SCATTER_RUNS = 3  # from fewer nothing is learned of how runs differ
 FILE_PRIOR = 2.0  # times the file's uncertainties: what the shared values may be
 USUAL_SCATTER, USUAL_OWN_SCATTER = 0.02, 0.5  # spreads, from run to run; of what is declared a number of each run
+LABEL_SCATTERS = np.geomspace(0.005, 20.0, 60)  # spreads that a label's scatter is sought among
 LONGEST_MOVE = 2.0  # spreads a round
 CONVERGED_GAIN = 0.5  # of -2 log posterior: no further round
 CONVERGED_SCALE = 0.05  # e-folds of what is left, by which it changes no more
@@ -45,8 +47,9 @@ class Identified:
     nuisance: list[Effect]
     values: np.ndarray  # (nuisance,) spreads
     covariance: np.ndarray
-    effects: list[Effect]
-    scatter: np.ndarray  # (effects,) spreads, from run to run
+    scatter: np.ndarray  # (nuisance,) spreads, from run to run
+    labels: list[Effect]
+    label_scatter: np.ndarray  # (labels,) spreads, each alone, beside what runs differ by
     eta: float
     errors: ChannelErrors  # what healthy runs leave
     run_values: np.ndarray  # (runs, nuisance)
@@ -64,21 +67,24 @@ class Identified:
 
 
 def nuisance_of(observer: Observer) -> list[Effect]:
-    """What the vehicle file allows for: parameters with an uncertainty, outputs with a bias."""
+    """What the vehicle file allows for: parameters with an uncertainty, outputs with a bias, runs' slow forces.
+
+    A constant force at a noise, of each run its own, is what the model's form cannot do there.
+    """
     declared = observer.declared
     every = {one.label: one for one in standard_effects(declared, observer.runs, observer.tolerances)}
     found = [every[one.name] for one in declared.parameters if one.uncertainty > 0.0]
     for one in declared.outputs:
         if one.bias > 0.0:
             found.append(replace(every[f"{one.name}_bias"], spread=one.bias))
-    return found
+    return found + pushes(declared)
 
 
 def usual_scatter(declared: Declaration, effects: Sequence[Effect]) -> np.ndarray:
-    """1 sigma (effects,) in spreads of how runs differ, before any is seen."""
+    """1 sigma (effects,) in spreads of how runs differ, before any is seen; a vehicle's parameters stay as they are."""
     own = {one.name for one in declared.parameters if one.scope == RUN}
-    at_run = [one.family == PARAMETER and one.name in own for one in effects]
-    return np.where(at_run, USUAL_OWN_SCATTER, USUAL_SCATTER)
+    found = {PUSH: USUAL_OWN_SCATTER, OUTPUT: USUAL_SCATTER}
+    return np.array([USUAL_OWN_SCATTER if one.name in own else found.get(one.family, 0.0) for one in effects])
 
 
 def identify(
@@ -89,17 +95,18 @@ def identify(
     observer = observer_of(vehicle, list(runs))
     nuisance, horizon = nuisance_of(observer), observer.horizon
     k, count = len(nuisance), len(runs)
-    V = FILE_PRIOR**2 * np.eye(k)
+    V = FILE_PRIOR**2 * np.diag([float(one.family != PUSH) for one in nuisance])
     limits = np.array([one.low for one in nuisance]), np.array([one.high for one in nuisance])
     usual = usual_scatter(vehicle.declared, nuisance)
-    values, scatter, own = np.zeros(k), usual.copy(), np.zeros((count, k))
+    # forces of runs wait until what runs share is found: else they take it for their own
+    values, own = np.zeros(k), np.zeros((count, k))
+    scatter = np.where([one.family == PUSH for one in nuisance], np.minimum(usual, USUAL_SCATTER), usual)
     file_point = observer.point.copy()
     before = np.array([observer.gaps(n, file_point, horizon) for n in range(count)])
     say(f"{count} runs, {k} numbers; the file's model misses them by {_total(before):.2f} tolerances")
     fit_levels(observer, say)
     scales = np.maximum(np.sqrt(np.nanmean(before**2, axis=0)), LEAST_SCALE)
     errors, eta = ChannelErrors(np.where(np.isfinite(scales), scales, 1.0), np.ones(len(scales))), 1.0
-    # how runs differ is learned when what they share is found: else it takes what they share for its own
     learned, differ = 0, False
     for round_ in range(ROUNDS):
         found = [expand(observer, n, nuisance, own[n], errors, horizon) for n in range(count)]
@@ -125,13 +132,15 @@ def identify(
     errors = left_by(found, errors)
     found = [expand(observer, n, nuisance, own[n], errors, horizon) for n in range(count)]
     *_, eta = inflation(found)
+    if count < MIN_SCATTER_RUNS:
+        scatter = usual
     warm = [marginalised(one.tempered(eta), scatter) for one in found]
     covariance = Pooled.of(warm, V).covariance()
     after = _held_out(observer, nuisance, values, warm, V, limits)
-    effects, every = _scatter_of_all(observer, nuisance, values, own, eta, errors)
-    counts = [len(one) for one in sessions]
-    return Identified(vehicle, observer, nuisance, values, covariance, effects, every, eta, errors, own, before, after,
-                      level_scatter(found), len(sessions), session_share(own, scatter, counts))  # fmt: skip
+    labels, label_scatter = _label_scatter(observer, nuisance, values, own, scatter, eta, errors)
+    share = session_share(own, scatter, [len(one) for one in sessions])
+    return Identified(vehicle, observer, nuisance, values, covariance, scatter, labels, label_scatter, eta, errors, own,
+                      before, after, level_scatter(found), len(sessions), share)  # fmt: skip
 
 
 def left_by(found: Sequence[Expansion], errors: ChannelErrors) -> ChannelErrors:
@@ -157,8 +166,8 @@ class _Search:
     horizon: float
 
     def prior(self, x: np.ndarray, own: np.ndarray) -> float:
-        apart = ((own - x) / np.maximum(self.scatter, 1e-6)) ** 2
-        return float(apart.sum() + x @ np.linalg.solve(self.V, x))
+        apart, free = ((own - x) / np.maximum(self.scatter, 1e-6)) ** 2, np.diag(self.V) > 0.0
+        return float(apart.sum() + x[free] @ np.linalg.solve(self.V[np.ix_(free, free)], x[free]))
 
     def misfit(self, n: int, row: np.ndarray) -> float:
         point = moved(self.observer.declared, self.observer.point, self.nuisance, row)
@@ -232,18 +241,25 @@ def fit_levels(observer: Observer, say: Callable[[str], None]) -> None:
     say(f"noise levels: {', '.join(said) or 'as the file has them'}")
 
 
-def _scatter_of_all(observer, nuisance, values, own, eta, errors) -> tuple[list[Effect], np.ndarray]:
-    """Every label's scatter from run to run about the identified vehicle: what healthy runs show of it is no cause."""
-    effects = standard_effects(observer.declared, observer.runs, observer.tolerances)
-    into = placed(nuisance, effects)
+def _label_scatter(observer, nuisance, values, own, scatter, eta, errors) -> tuple[list[Effect], np.ndarray]:
+    """How far each label alone differs from run to run beside the numbers of runs: what healthy runs show of it.
+
+    1 sigma (labels,) in spreads, by the largest of its marginal likelihood with the prior of `learn_scatter`.
+    """
+    labels = standard_effects(observer.declared, observer.runs, observer.tolerances)
+    every = [*labels, *pushes(observer.declared)]
+    into = placed(nuisance, every)
     about = []
     for n in range(len(own)):
-        one = expand(observer, n, effects, into @ own[n], errors, observer.horizon).tempered(eta)
-        about.append(replace(one, at=one.at - into @ values))
-    usual = usual_scatter(observer.declared, effects)
-    if len(own) < MIN_SCATTER_RUNS:
-        return effects, 5.0 * usual
-    return effects, learn_scatter(about, np.zeros((len(effects), len(effects))), usual)
+        one = expand(observer, n, every, into @ own[n], errors, observer.horizon).tempered(eta)
+        about.append(marginalised(replace(one, at=one.at - into @ values), into @ scatter))
+    slopes = np.array([-one.offset for one in about])[:, : len(labels)]
+    precisions = np.array([np.diag(one.curvature) for one in about])[:, : len(labels)]
+    total = 1.0 + LABEL_SCATTERS[:, None, None] ** 2 * precisions  # (grid, runs, labels)
+    nat = 0.5 * (slopes**2 * LABEL_SCATTERS[:, None, None] ** 2 / total - np.log(total)).sum(axis=1)
+    ratio = LABEL_SCATTERS[:, None] ** 2 / (USUAL_SCATTER if len(own) >= MIN_SCATTER_RUNS else 5.0 * USUAL_SCATTER) ** 2
+    prior = -0.5 * SCATTER_PRIOR_RUNS * (np.log(ratio) + 1.0 / ratio)
+    return labels, LABEL_SCATTERS[np.argmax(nat + prior, axis=0)]
 
 
 def session_share(own: np.ndarray, scatter: np.ndarray, counts: Sequence[int]) -> float:

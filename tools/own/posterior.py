@@ -15,9 +15,10 @@ from scipy.special import logsumexp
 from scipy.stats import norm
 from scipy.stats import t as student
 
+from glider.tools.own.declare import RUN
 from glider.tools.own.effects import PARAMETER, PUSH, Effect, ModelPoint, moved, pushes, standard_effects
 from glider.tools.own.hierarchy import ChannelErrors, Expansion, Pooled, expand, marginalised, run_values
-from glider.tools.own.identify import USUAL_SCATTER
+from glider.tools.own.identify import USUAL_OWN_SCATTER, USUAL_SCATTER, USUAL_SESSION_SHARE
 from glider.tools.own.observer import Observer
 
 NONE, UNKNOWN = "none", "unknown"
@@ -38,7 +39,6 @@ STRONG, STRONG_LEFT, STRONG_ROWS = (
     1.5,
     1_500,
 )  # tolerances; times healthy; rows looked at
-ACTIVE_SCATTER = 3.0  # times the usual: labels that healthy runs differ in
 UNIDENTIFIED_INFLATION = 30.0  # rows of a window that err alike, of a vehicle that was never identified
 LEAST_REACH = 1e-4  # tolerances a spread
 
@@ -48,16 +48,46 @@ class Healthy:
     """What is known of the vehicle without a change, in the spreads of `effects`."""
 
     effects: list[Effect]  # every label, then pushes
-    V: np.ndarray  # (k, k) covariance of what a session's shared values are off the file's
-    scatter: np.ndarray  # (k,) from run to run
+    V: np.ndarray  # (k, k) covariance of the identified values
+    scatter: np.ndarray  # (k,) what runs differ by, integrated out
+    usual: np.ndarray  # (k,) how far each label alone differs from run to run beside that
     errors: ChannelErrors  # what healthy runs leave
     eta: float
     runs: int  # that it is known from
     level_scatter: float  # 1 sigma of the logarithm of a run's mean square left
+    session_share: float  # of the variance from run to run, that a session differs by
 
     def at(self, labels: Sequence[str]) -> list[int]:
         known = [one.label for one in self.effects]
         return [known.index(label) for label in labels]
+
+
+@dataclass(frozen=True)
+class Deviations:
+    """What runs are off the identified vehicle by: what they have in common, and each its own."""
+
+    V: np.ndarray  # (k, k)
+    scatter: np.ndarray  # (k,) 1 sigma
+
+    def marginal(self, found: Sequence[Expansion]) -> list[Expansion]:
+        """Runs with their own deviations integrated out."""
+        return [marginalised(one, self.scatter) for one in found]
+
+    def variance(self, labels: Sequence[int], sigma: Sequence[float]) -> np.ndarray:
+        """Prior covariance (k, k) of shared values with labels' sizes of 1 sigma `sigma`."""
+        V = self.V.copy()
+        for k, s in zip(labels, sigma, strict=True):
+            V[k, k] += s**2
+        return V
+
+    def prior(self, shared: np.ndarray, own: np.ndarray, places: Sequence[int]) -> float:
+        """-2 log prior of values, sizes of labels left free."""
+        free = np.diag(self.V) > 0.0
+        free[list(places)] = False
+        chosen = np.flatnonzero(free)
+        x, spread = shared[chosen], np.maximum(self.scatter, 1e-6)
+        within = x @ np.linalg.solve(self.V[np.ix_(chosen, chosen)], x)
+        return float((((own - shared) / spread) ** 2).sum() + within)
 
 
 @dataclass
@@ -100,10 +130,10 @@ class Engine:
         self.horizon = observer.horizon
         self.low = np.array([one.low for one in healthy.effects])
         self.high = np.array([one.high for one in healthy.effects])
-        usual = np.diag(healthy.V) > (ACTIVE_SCATTER * USUAL_SCATTER) ** 2
-        self.active = usual | (healthy.scatter > ACTIVE_SCATTER * USUAL_SCATTER)
-        self.V = healthy.V * np.outer(self.active, self.active)
-        self.scatter = np.where(self.active, healthy.scatter, 0.0)
+        self.active = (np.diag(healthy.V) > 0.0) | (healthy.scatter > 0.0)
+        # runs of one session, or each of another: which, their evidence says
+        self.together = Deviations(healthy.V + healthy.session_share * np.diag(healthy.scatter**2), healthy.scatter)
+        self.apart = Deviations(healthy.V, healthy.scatter * np.sqrt(1.0 + healthy.session_share))
         self.reach = np.zeros(self.k)
 
     def expansions(self, own: np.ndarray, columns: np.ndarray) -> list[Expansion]:
@@ -130,23 +160,12 @@ class Engine:
         curvature[np.ix_(columns, columns)] = one.curvature
         return replace(one, at=own.copy(), slope=slope, curvature=curvature, reach=reach)
 
-    def marginal(self, found: Sequence[Expansion]) -> list[Expansion]:
-        """Runs with their deviations integrated out."""
-        return [marginalised(one, self.scatter) for one in found]
-
-    def variance(self, labels: Sequence[int], sigma: Sequence[float]) -> np.ndarray:
-        """Prior covariance (k, k) of shared values with labels' sizes of 1 sigma `sigma`."""
-        V = self.V.copy()
-        for k, s in zip(labels, sigma, strict=True):
-            V[k, k] += s**2
-        return V
-
     def usual_odds(self, k: int, size: float, sd: float, runs: int) -> float:
         """Log odds that a size of label k, known to sd, is a change and no deviation as sessions and runs have them.
 
         Of labels whose deviations are not integrated out of every run (`active`): those are in the evidence already.
         """
-        usual = self.healthy.V[k, k] + self.healthy.scatter[k] ** 2 / runs
+        usual = self.healthy.usual[k] ** 2 * (self.healthy.session_share + 1.0 / runs)
         if self.active[k] or usual <= 0.0:
             return np.inf
         wide = (SIZES / max(self.reach[k], LEAST_REACH)) ** 2 + usual + sd**2
@@ -164,7 +183,8 @@ class Engine:
         best: tuple[float, np.ndarray, np.ndarray, list[Expansion]] | None = None
         for _ in range(ROUNDS):
             found = self.expansions(own, columns)
-            cost = sum(one.value for one in found) + self._prior(shared, own, places)
+            by, sigma, *_ = self._best_sizes(found, places)
+            cost = sum(one.value for one in found) + by.prior(shared, own, places)
             if best is not None and not cost < best[0] - 0.1:
                 if cost < best[0]:
                     best = cost, shared, own, found
@@ -172,48 +192,38 @@ class Engine:
                 shared, own = 0.5 * (shared + best[1]), 0.5 * (own + best[2])
                 continue
             best = cost, shared, own, found
-            sigma = self._best_sizes(found, places)[0]
-            target = Pooled.of(self.marginal(found), self.variance(places, sigma)).mean()
+            target = Pooled.of(by.marginal(found), by.variance(places, sigma)).mean()
             room = np.maximum(LONGEST_MOVE, LONGEST_REACH / np.maximum(self.reach, LEAST_REACH))  # (k,) spreads
             shared = np.clip(shared + np.clip(target - shared, -room, room), self.low, self.high)
-            theirs = np.array([run_values(one, shared, self.scatter) for one in found])
+            theirs = np.array([run_values(one, shared, by.scatter) for one in found])
             own = np.clip(own + np.clip(theirs - own, -room, room), self.low, self.high)
         assert best is not None
         _, shared, own, found = best
         if every:
             found = self.expansions(own, np.arange(self.k))
-        sigma, evidence, mean, sd = self._best_sizes(found, places)
+        *_, evidence, mean, sd = self._best_sizes(found, places)
         left = np.array([one.squares.sum() / max(1, one.samples.sum()) for one in found])
         return Hypothesis(labels, evidence + self.log_prior(labels), mean, sd, shared, own, left, 0.0, found)
 
-    def _prior(self, shared: np.ndarray, own: np.ndarray, places: Sequence[int]) -> float:
-        """-2 log prior of values, sizes of labels left free."""
-        free = np.diag(self.V) > 0.0
-        free[list(places)] = False
-        chosen = np.flatnonzero(free)
-        x, spread = shared[chosen], np.maximum(self.scatter, 1e-6)
-        within = x @ np.linalg.solve(self.V[np.ix_(chosen, chosen)], x)
-        return float((((own - shared) / spread) ** 2).sum() + within)
-
-    def _best_sizes(self, found: Sequence[Expansion], places: Sequence[int]):
-        """Sigmas of labels' sizes that are most probable, log evidence over the grid of sizes, and size with its sd."""
-        pooled = Pooled.of(self.marginal(found), self.V)
-        if not places:
-            return [], pooled.log_evidence(), np.zeros(0), np.zeros(0)
+    def _best_sizes(
+        self, found: Sequence[Expansion], places: Sequence[int]
+    ) -> tuple[Deviations, list[float], float, np.ndarray, np.ndarray]:
+        """The most probable deviations and sigmas of labels' sizes, log evidence over all, sizes with their sd."""
         grids = [SIZES / max(self.reach[k], LEAST_REACH) for k in places]
-        table: list[tuple[float, list[float], np.ndarray, np.ndarray]] = []
-        for choice in np.ndindex(*(len(SIZES) for _ in places)):
-            sigma = [grid[c] for grid, c in zip(grids, choice, strict=True)]
-            V = self.variance(places, sigma)
-            M = pooled.covariance(V)
-            mean, sd = (M @ pooled.r)[places], np.sqrt(np.maximum(np.diag(M)[places], 1e-30))
-            halves = sum(np.log(2.0) + norm.logcdf(m / s) for m, s, k in zip(mean, sd, places, strict=True)
-                         if self.healthy.effects[k].one_sided)  # fmt: skip
-            table.append((pooled.log_evidence(V) + float(halves), sigma, mean, sd))
-        best = max(table, key=lambda one: one[0])
+        sided = [self.healthy.effects[k].one_sided for k in places]
+        table: list[tuple[float, Deviations, list[float], np.ndarray, np.ndarray]] = []
+        for by in (self.together, self.apart):
+            pooled = Pooled.of(by.marginal(found), by.V)
+            for choice in np.ndindex(*(len(SIZES) for _ in places)):
+                sigma = [float(grid[c]) for grid, c in zip(grids, choice, strict=True)]
+                V = by.variance(places, sigma)
+                M = pooled.covariance(V)
+                mean, sd = (M @ pooled.r)[places], np.sqrt(np.maximum(np.diag(M)[places], 1e-30))
+                halves = float((np.log(2.0) + norm.logcdf(mean / sd))[sided].sum())
+                table.append((pooled.log_evidence(V) + halves, by, sigma, mean, sd))
+        _, by, sigma, mean, sd = max(table, key=lambda one: one[0])
         evidence = float(logsumexp([one[0] for one in table]) - np.log(len(table)))
-        mean = np.clip(best[2], self.low[places], self.high[places])
-        return best[1], evidence, mean, best[3]
+        return by, sigma, evidence, np.clip(mean, self.low[places], self.high[places]), sd
 
     def log_prior(self, labels: Sequence[str]) -> float:
         """Of a hypothesis: that something changed, which label, and that another stands beside it."""
@@ -226,9 +236,8 @@ class Engine:
     def screen(self, begin: Hypothesis) -> list[tuple[float, str]]:
         """Every other label beside a hypothesis by its parabola: log evidence gained, best first."""
         places = self.healthy.at(begin.labels)
-        sigma = self._best_sizes(begin.found, places)[0]
-        V = self.variance(places, sigma)
-        pooled = Pooled.of(self.marginal(begin.found), V)
+        by, sigma, *_ = self._best_sizes(begin.found, places)
+        pooled = Pooled.of(by.marginal(begin.found), by.variance(places, sigma))
         M = pooled.covariance()
         slope, precision = pooled.r - pooled.H @ (M @ pooled.r), np.diag(pooled.H - pooled.H @ M @ pooled.H)
         found = []
@@ -377,40 +386,41 @@ def size_evidence(slope, precision, reach, one_sided) -> np.ndarray:
     return logsumexp(gain + np.where(one_sided, halved, 0.0), axis=-1) - np.log(len(SIZES))
 
 
-def healthy_of(observer: Observer, session: bool = True) -> Healthy:
-    """What an identified vehicle file says of itself; one that is not identified, what it allows for.
-
-    session: the runs asked about are of another session than those that it is known from.
-    """
+def healthy_of(observer: Observer) -> Healthy:
+    """What an identified vehicle file says of itself; one that is not identified, what it allows for."""
     declared, table = observer.declared, observer.vehicle.file.identified
     labels = standard_effects(declared, observer.runs, observer.tolerances)
     effects = [*labels, *pushes(declared)]
     names = [one.label for one in effects]
     k = len(effects)
-    scatter = np.full(k, USUAL_SCATTER)
-    V = np.zeros((k, k))
+    scatter, usual, V = np.zeros(k), np.full(k, USUAL_SCATTER), np.zeros((k, k))
     if table is None:
         for one in declared.parameters:
             V[names.index(one.name), names.index(one.name)] = (
                 one.uncertainty / effects[names.index(one.name)].spread
             ) ** 2
         errors = ChannelErrors(np.ones(len(declared.outputs)), np.full(len(declared.outputs), UNIDENTIFIED_INFLATION))
-        return Healthy(effects, V, scatter, errors, 1.0, 1, USUAL_LEVEL_SCATTER)
+        own = [
+            k for k, one in enumerate(effects) if one.name in {p.name for p in declared.parameters if p.scope == RUN}
+        ]
+        scatter[own] = USUAL_OWN_SCATTER
+        return Healthy(effects, V, scatter, usual, errors, 1.0, 1, USUAL_LEVEL_SCATTER, USUAL_SESSION_SHARE)
     places = [names.index(name) for name in table.parameters]
     spreads = np.array([effects[k].spread for k in places])
     V[np.ix_(places, places)] = np.array(table.covariance).reshape(len(places), len(places)) / np.outer(
         spreads, spreads
     )
-    for name, value in table.scatter.items():
-        if name in names:
-            scatter[names.index(name)] = max(value / effects[names.index(name)].spread, 1e-4)
-    if session:
-        V = V + table.session_share * np.diag(scatter**2)
+    for into, values in ((scatter, table.scatter), (usual, table.label_scatter)):
+        for name, value in values.items():
+            if name in names:
+                into[names.index(name)] = value / effects[names.index(name)].spread
     errors = ChannelErrors(
         np.array([max(table.gap.get(one.name, 1.0), 1e-3) for one in declared.outputs]),
         np.array([table.channel_inflation.get(one.name, 1.0) for one in declared.outputs]),
     )
-    return Healthy(effects, V, scatter, errors, table.inflation, table.runs, table.level_scatter)
+    return Healthy(
+        effects, V, scatter, usual, errors, table.inflation, table.runs, table.level_scatter, table.session_share
+    )
 
 
 def effect_point(observer: Observer, healthy: Healthy, labels: Sequence[str], sizes: np.ndarray) -> ModelPoint:

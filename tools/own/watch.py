@@ -130,29 +130,28 @@ class Watch(Engine):
         for _ in range(PREPARED):
             found = self.expansions(own, every)
             squares = sum(one.value for one in found[: self.learned])
-            if best is not None and squares + self._prior(shared, own[: self.learned], ()) >= best[0] + self._prior(
-                best[1], best[2][: self.learned], ()
-            ):
+            if best is not None and squares + self.together.prior(shared, own[: self.learned], ()) >= best[
+                0
+            ] + self.together.prior(best[1], best[2][: self.learned], ()):
                 shared, own = 0.5 * (shared + best[1]), 0.5 * (own + best[2])
                 continue
             best, self.found = (squares, shared, own), found
             self.reach = np.sqrt(np.mean([one.reach for one in found], axis=0))
             if self.learned > 2:
-                learned = learn_scatter(found[: self.learned], self.healthy.V, self.healthy.scatter)
-                self.healthy = replace(self.healthy, scatter=learned)
-                self.scatter = np.where(self.active, learned, 0.0)
-            warm = self.marginal(found[: self.learned])
-            V = self.V
+                learned = learn_scatter(found[: self.learned], self.together.V, self.healthy.scatter)
+                self.together = replace(self.together, scatter=learned)
+            warm = self.together.marginal(found[: self.learned])
+            V = self.together.V
             H, r = sum(one.curvature for one in warm), -sum(one.offset for one in warm)
             M = np.linalg.solve(np.eye(self.k) + V @ H, V)
             shared = np.clip(shared + np.clip(M @ r - shared, -LONGEST_MOVE, LONGEST_MOVE), self.low, self.high)
-            own = np.array([shared if n >= self.learned else run_values(one, shared, self.scatter)
+            own = np.array([shared if n >= self.learned else run_values(one, shared, self.together.scatter)
                             for n, one in enumerate(found)])  # fmt: skip
             own = np.clip(own, self.low, self.high)
         assert best is not None
         shared = best[1]
         self.shared, self.M = shared, 0.5 * (M + M.T)
-        self.runs = self.marginal(self.found)
+        self.runs = self.together.marginal(self.found)
         self.events: list[Event] = []
 
     def at_run(self, n: int) -> np.ndarray:
@@ -235,7 +234,7 @@ class Watch(Engine):
         self.events.append(event)
         for n in range(event.first, event.end):
             self.found[n] = self.expansion_of(n, self.at_run(n), np.arange(self.k))
-            (self.runs[n],) = self.marginal([self.found[n]])
+            (self.runs[n],) = self.together.marginal([self.found[n]])
 
     def evidence(self, runs: Sequence[Expansion], span: tuple[int, int], V: np.ndarray) -> Pooled:
         """A span's runs, values counted from what they are thought to have."""
@@ -276,7 +275,7 @@ class Watch(Engine):
             for n in range(*span):
                 x = self.at_run(n)
                 x[k] = np.clip(x[k] + size, self.low[k], self.high[k])
-                runs += self.marginal([self.expansion_of(n, x, columns)])
+                runs += self.together.marginal([self.expansion_of(n, x, columns)])
         score, mean, sd = best
         return score - nothing + prior + odds, Event({}, *span, self.healthy.effects[k].label, mean, sd, 0.0)
 
@@ -285,7 +284,7 @@ class Watch(Engine):
         found = np.zeros(self.count)
         nothing = Hypothesis((), 0.0, np.zeros(0), np.zeros(0), self.shared, np.zeros((1, self.k)), np.ones(1))
         for n in range(self.learned, self.count):
-            x = run_values(self.found[n], self.at_run(n), self.scatter)
+            x = run_values(self.found[n], self.at_run(n), self.together.scatter)
             one = self.expansion_of(n, x, np.flatnonzero(self.active))
             left = np.array([one.squares.sum() / max(1, one.samples.sum())])
             named = tuple(event.label for event in self.events if event.first <= n < event.end)
