@@ -14,17 +14,20 @@ from glider.firmware.model.vehicle import COEFFICIENTS
 from glider.sim_backend.core.effects.catalogue import catalogue
 from glider.tools.data.intervals import NINETY
 from glider.tools.data.runs.case import Case
+from glider.tools.data.runs.columns import COMMANDS
 from glider.tools.data.runs.origin import flights_of
 from glider.tools.data.version import software
 from glider.tools.diagnose import by_readings
 from glider.tools.diagnose.cautions import below_floor, cautions, not_asked
 from glider.tools.diagnose.chain import noise_of, panels
 from glider.tools.diagnose.correction import Correction, correct
+from glider.tools.diagnose.entries import numbers_to_enter
 from glider.tools.diagnose.materiality import MATERIAL_TOLERANCES
 from glider.tools.diagnose.next_run import propose
 from glider.tools.diagnose.noise_probes import UNPREDICTABLE
 from glider.tools.diagnose.probabilities import TIE
 from glider.tools.diagnose.record import NONE, UNKNOWN, Curves, Data, Details, Noise, Panel, Picture, write_record
+from glider.tools.diagnose.regressors import regressors
 from glider.tools.diagnose.residuals import UNCLEAN, strongest_left
 from glider.tools.diagnose.search import Search, run
 from glider.tools.diagnose.shrink import (
@@ -60,7 +63,7 @@ from glider.tools.readings.pictures import pictures_of
 
 CORRECTION_FILE = "data_driven.toml"
 LEAST_PROBABILITY = 0.001  # a smaller probability is not written down
-DRAWN_RUNS = 2  # with the largest gaps
+DRAWN_RUNS = 6  # with the largest gaps
 
 
 @dataclass
@@ -270,10 +273,19 @@ def plain(diagnosis: Diagnosis) -> dict[str, Any]:
         "next_run": diagnosis.next_run,
         "readings": [one.plain() for one in diagnosis.readings],
         "stages": [stage.plain() for stage in diagnosis.stages],
+        "enter": to_enter(diagnosis),
         "identified": {} if diagnosis.staged is None else {
             name: size.plain() for name, size in diagnosis.staged.vehicle.items()
         },
     }  # fmt: skip
+
+
+def to_enter(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """The numbers of the vehicle file that the selected effects change."""
+    vehicle, found = diagnosis.case.roughie, []
+    for label in diagnosis.answer.selected:
+        found += numbers_to_enter(vehicle.vector(), vehicle.effects, label, parameters(diagnosis, label))
+    return found
 
 
 def details(diagnosis: Diagnosis) -> Details:
@@ -294,7 +306,9 @@ def details(diagnosis: Diagnosis) -> Details:
         corrected=in_model(diagnosis), noise=diagnosis.noise, panels=diagnosis.panels,
         findings=answer.findings, pictures=[picture(diagnosis, n) for n in drawn_runs(diagnosis)],
         thresholds={"evidence": EVIDENCE_NEEDED, "tie": TIE, "sigma": UNCLEAN, "left": LEFT_OVER, "matters":
-    MATERIAL_TOLERANCES}, )  # fmt: skip
+    MATERIAL_TOLERANCES},
+        regressors=[] if diagnosis.staged is not None else regressors(answer.search, answer.hypothesis),
+    )  # fmt: skip
 
 
 def in_model(diagnosis: Diagnosis) -> bool:
@@ -319,13 +333,15 @@ def picture(diagnosis: Diagnosis, n: int) -> Picture:
         return {**found.channels, "total": found.total}
 
     names = [channel.name for channel in diagnosis.search.problem.kind.measures.channels_of(run)]
-    return Picture(run.name, names, gaps(BEFORE), gaps(AFTER))
+    return Picture(run.name, names, gaps(BEFORE), gaps(AFTER), gaps(RECALIBRATED), gaps(FLOOR))
 
 
 def curves(diagnosis: Diagnosis, n: int) -> Curves:
     """What was measured in a run and what two models say of it."""
     run, said = diagnosis.case.runs[n], diagnosis.shrinkage.predictions
-    return Curves(run.t, diagnosis.search.problem.kind.measures.measured(run), said[BEFORE][n], said[AFTER][n])
+    measured = diagnosis.search.problem.kind.measures.measured(run)
+    commands = np.stack([run.columns[name] for name in COMMANDS], axis=1) if run.has_commands else None
+    return Curves(run.t, measured, said[BEFORE][n], said[AFTER][n], commands)
 
 
 def model_text(case: Case, P: np.ndarray, F: np.ndarray) -> str:

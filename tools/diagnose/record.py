@@ -30,6 +30,7 @@ AGAINST_HEALTHY = "reference"  # a kind of answer
 MOST_BYTES = 100_000_000
 SHOWN = ("x", "read", "expected", "mended")  # of a picture of a reading
 TABLES = ("measured", "nominal", "corrected")  # (rows, N_Y) of a run that is drawn
+COMMANDS = "commands"  # (rows, 3) beside them, where the run has commands
 
 Format = Annotated[int, msgspec.Meta(ge=1, le=1)]
 Number = float | None
@@ -133,6 +134,18 @@ class QuestionRecord(msgspec.Struct):
     kind: str = ""
 
 
+class Entry(msgspec.Struct):
+    """A number of the vehicle file that a selected effect changes: the file's, and what it is to be."""
+
+    label: str
+    parameter: str
+    key: str
+    file: Number
+    value: Number
+    ci90: tuple[Number, Number]
+    unit: str
+
+
 class AnswerRecord(msgspec.Struct):
     """diagnosis.json, as far as a report says it."""
 
@@ -147,6 +160,7 @@ class AnswerRecord(msgspec.Struct):
     next_run: NextRun
     readings: list[ReadingRecord] = []
     stages: list[StepRecord] = []
+    enter: list[Entry] = []
 
     @property
     def main(self) -> str:
@@ -210,8 +224,35 @@ class Picture(msgspec.Struct):
 
     name: str
     channels: list[str]
-    before: dict[str, float | None]
-    after: dict[str, float | None]
+    before: dict[str, Number]
+    after: dict[str, Number]
+    recalibrated: dict[str, Number] = {}
+    floor: dict[str, Number] = {}
+
+
+class RunEstimate(msgspec.Struct):
+    """A parameter as one run alone has it, with the same priors, SI."""
+
+    run: str
+    estimate: Number
+    ci90: tuple[Number, Number]
+
+
+class Regressor(msgspec.Struct):
+    """What a selected effect explains (tools/diagnose/regressors): in which channel, against which feature of flight.
+
+    bins: feature, mean innovation without the effect, its standard error, what the effect predicts, samples;
+    innovations in standard deviations. run, second: where the effect predicts most.
+    """
+
+    label: str
+    channel: str
+    feature: str
+    unit: str
+    run: str
+    second: float
+    bins: list[tuple[float, float, float, float, int]]
+    estimates: dict[str, list[RunEstimate]]  # by parameter, run by run
 
 
 class Details(msgspec.Struct):
@@ -228,16 +269,18 @@ class Details(msgspec.Struct):
     pictures: list[Picture]
     thresholds: dict[str, float]
     shown: list[str] = []  # titles of the pictures of readings
+    regressors: list[Regressor] = []
 
 
 @dataclass(frozen=True)
 class Curves:
-    """A drawn run: t (rows,) s, and what was measured and predicted, each (rows, N_Y)."""
+    """A drawn run: t (rows,) s, what was measured and predicted, each (rows, N_Y), and the commands (rows, 3)."""
 
     t: np.ndarray
     measured: np.ndarray
     nominal: np.ndarray
     corrected: np.ndarray
+    commands: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -248,6 +291,7 @@ class DiagnosisRecord:
     details: Details
     curves: list[Curves]  # of the runs in details.pictures
     shown: list[Shown] = field(default_factory=list)  # of details.shown
+    mission: str = ""  # text of the mission of next_run; "" where its file is not there
 
 
 def number(value: Number) -> float:
@@ -267,6 +311,8 @@ def write_record(
     for n, run in enumerate(curves):
         tables[f"t_{n}"] = run.t
         tables |= {f"{name}_{n}": getattr(run, name).astype(np.float32) for name in TABLES}
+        if run.commands is not None:
+            tables[f"{COMMANDS}_{n}"] = run.commands.astype(np.float32)
     for n, one in enumerate(shown):
         tables |= {f"shown_{name}_{n}": getattr(one, name).astype(np.float32) for name in SHOWN}
     packed = io.BytesIO()
@@ -286,7 +332,9 @@ def read_record(folder: Path) -> DiagnosisRecord:
     answer, details = read_as(folder / ANSWER, AnswerRecord), read_as(folder / DETAILS, Details)
     _check(answer, details, folder)
     curves = _read_curves(folder / CURVES, len(details.pictures))
-    return DiagnosisRecord(answer, details, curves, _read_shown(folder / CURVES, details.shown))
+    mission = folder / Path(answer.next_run.mission).name
+    text = mission.read_text(encoding="utf-8", errors="replace") if mission.is_file() else ""
+    return DiagnosisRecord(answer, details, curves, _read_shown(folder / CURVES, details.shown), text)
 
 
 def _present(path: Path) -> Path:
@@ -341,7 +389,8 @@ def _read_curves(path: Path, count: int) -> list[Curves]:
     try:
         with np.load(_present(path), allow_pickle=False) as tables:
             for n in range(count):
-                run = Curves(tables[f"t_{n}"], *(tables[f"{name}_{n}"].astype(float) for name in TABLES))
+                commands = tables[f"{COMMANDS}_{n}"].astype(float) if f"{COMMANDS}_{n}" in tables else None
+                run = Curves(tables[f"t_{n}"], *(tables[f"{name}_{n}"].astype(float) for name in TABLES), commands)
                 if any(getattr(run, name).shape[:1] != run.t.shape for name in TABLES) or len(run.t) < 2:
                     raise InputError(f"tables of different lengths for run {n}", source=path)
                 found.append(run)

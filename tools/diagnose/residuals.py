@@ -15,11 +15,16 @@ from glider.tools.inference.problem import Gains, Problem
 
 LAGS = ((1, 2), (3, 10), (11, 60))  # samples, in groups
 SHAPES = ("variance", "mean", "lag", "spectrum")  # tests of a channel by itself; the others are correlations
+FEATURE_UNITS = {
+    "speed": "m/s", "depth": "m", "time": "s", "pitch": "rad", "pitch rate": "rad/s", "roll rate": "rad/s",
+    "yaw rate": "rad/s", "angle of attack": "rad", "sideslip": "rad", "servo": "rad", "slider": "m", "ballast": "kg",
+    "pump running": "", "pump expelling": "",
+}  # fmt: skip
 UNCLEAN = 6.0  # sigma, corrected for the number of tests
 
 
 def features(problem: Problem, gains: Gains) -> dict[str, np.ndarray]:
-    """What something left may go with, each (rows,), by the best model's state."""
+    """What something left may go with, each (rows,) in FEATURE_UNITS, by the best model's state."""
     x = gains.X
     speed = np.sqrt((x[:, X_NU : X_NU + 3] ** 2).sum(axis=1))
     moving = pump_speed(problem, gains)

@@ -1,5 +1,6 @@
 """The report of a diagnosis, drawn from its folder: one HTML file that opens offline, on a phone too."""
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -7,17 +8,26 @@ import numpy as np
 
 from glider.sim_backend.core.effects.catalogue import catalogue
 from glider.tools.data.files import write_bytes
-from glider.tools.data.runs.origin import with_flight
 from glider.tools.diagnose.noise_probes import CLOCK, UNPREDICTABLE
-from glider.tools.diagnose.record import Curves, DiagnosisRecord, Interval, Panel, Picture, number, read_record
+from glider.tools.diagnose.record import (
+    DiagnosisRecord,
+    EstimateRecord,
+    Interval,
+    Panel,
+    Regressor,
+    number,
+    read_record,
+)
+from glider.tools.diagnose.residuals import FEATURE_UNITS
 from glider.tools.inference.channels import ROUGHIE_MEASURES
 from glider.tools.report import words
 from glider.tools.report.chain_picture import chain_svg
 from glider.tools.report.charts import Chart, Curve, svg
-from glider.tools.report.lines import bands, compared, plan_chart
-from glider.tools.report.page import REPORT, render
+from glider.tools.report.now import download, steps
+from glider.tools.report.page import REPORT, plotting, render
+from glider.tools.report.traces import Claim, Traces
 
-DRAWN = ("depth", "pitch", "roll", "yaw", "xy")
+NOMINAL, CORRECTED = "nominal", "corrected"
 LEAST_PROBABILITY, MOST_RANKED = 0.005, 8  # of the ranking
 LEAST_SHARE, MOST_LINKS = 0.01, 7  # of the links
 SHORT_NAMES = {"force and moment": "force"}
@@ -57,21 +67,50 @@ def _ranking(record: DiagnosisRecord) -> list[dict[str, Any]]:
     ]
 
 
-def _effects(record: DiagnosisRecord) -> list[dict[str, Any]]:
-    """The selected effects: what they mean, and their parameters with 90 % intervals."""
+def _effects(record: DiagnosisRecord, traces: Traces) -> list[dict[str, Any]]:
+    """The selected effects: what they mean, their parameters, and what they explain against which feature."""
     found = []
     for label in record.answer.selected:
         effect, rows = catalogue()[label], []
+        shown = next((one for one in record.details.regressors if one.label == label), None)
+        estimates = {} if shown is None else shown.estimates
+        mass = effect.subsystem in ("mass", "actuation")
         for name, entry in record.answer.cause(label).parameters.items():
-            mass = effect.subsystem in ("mass", "actuation")
-            values, unit = words.scaled([number(v) for v in (entry.estimate, *entry.ci90)], entry.unit, mass)
-            value, low, high = map(words.number, values)
-            rows.append({"name": name, "unit": unit, "value": value, "low": low, "high": high})
+            alone = [number(one.estimate) for one in estimates.get(name, [])]
+            ends = [min(alone), max(alone)] if len(alone) > 1 else []
+            values, unit = words.scaled([number(v) for v in (entry.estimate, *entry.ci90, *ends)], entry.unit, mass)
+            value, low, high, *spread = map(words.number, values)
+            rows.append({"name": name, "unit": unit, "value": value, "low": low, "high": high,
+                         "runs": " to ".join(spread) or words.DASH})  # fmt: skip
         found.append({
             "label": label, "place": words.place(label), "plain": words.upper(words.directed(record, label)),
             "summary": effect.summary, "rows": rows, "nat": words.nats(record.details.evidence[label]),
+            "chart": None if shown is None else _against_feature(shown, traces),
+            "by_run": [
+                f"{one.run}, {name}: {words.sized(EstimateRecord(one.estimate, one.ci90, entry.unit), mass)}"
+                for name, entry in record.answer.cause(label).parameters.items() for one in estimates.get(name, [])
+            ],
         })  # fmt: skip
     return found
+
+
+def _against_feature(shown: Regressor, traces: Traces) -> dict[str, Any]:
+    """Mean innovations without an effect against a feature of flight, and what the effect predicts of them."""
+    x, mean, error, fit, _ = np.array(shown.bins).T
+    scaled, unit = words.scaled(x.tolist(), shown.unit or "1")
+    x = np.array(scaled)
+    none = np.full(len(x), np.nan)
+    lines = [
+        Curve(np.repeat(x, 3), np.stack([mean - 2.0 * error, mean + 2.0 * error, none], 1).ravel(), "spread"),
+        Curve(np.repeat(x, 3), np.stack([mean, mean, none], 1).ravel(), "dots"),
+        Curve(x, fit, "corrected"),
+    ]
+    feature, channel = words.feature(shown.feature), words.channel(shown.channel)
+    title = f"innovation of {channel}, sd, against {feature}{f', {unit}' if unit else ''}"
+    return {
+        "title": title, "svg": svg(Chart(title, unit, lines), 1.0), "feature": feature, "channel": channel,
+        "features": len(FEATURE_UNITS), "claim": traces.claim(shown.run, shown.second, shown.channel),
+    }  # fmt: skip
 
 
 def _noise(record: DiagnosisRecord) -> dict[str, str] | None:
@@ -83,44 +122,45 @@ def _noise(record: DiagnosisRecord) -> dict[str, str] | None:
     return {"name": noise.name, "before": before, "after": after}
 
 
-def _pictures(record: DiagnosisRecord) -> list[dict[str, Any]]:
-    """The drawn runs: measured, nominal and corrected."""
-    return [
-        {
-            "name": with_flight(run.name, record.details.data.flights),
-            "before": words.number(number(run.before["total"])),
-            "after": words.number(number(run.after["total"])), "charts": _charts(run, curves),
-        }
-        for run, curves in zip(record.details.pictures, record.curves, strict=True)
-    ]  # fmt: skip
+def _table(record: DiagnosisRecord, traces: Traces) -> list[dict[str, Any]]:
+    """Channels, then the total, by the four models, each with the least and the largest of the drawn runs."""
+    gap, rows = record.answer.gap, []
+    for name in gap.before:
+        cells = []
+        for which in ("before", "recalibrated", "after", "floor"):
+            runs = [number(getattr(one, which).get(name)) for one in record.details.pictures]
+            runs = [value for value in runs if np.isfinite(value)]
+            value = f"{number(getattr(gap, which).get(name)):.2f}".replace("nan", words.DASH)
+            spread = f"{min(runs):.2f} to {max(runs):.2f}" if len(runs) > 1 else ""
+            cells.append({"value": value, "runs": spread})
+        rows.append({"name": name, "cells": cells, "claim": None if name == "total" else traces.largest(name, NOMINAL)})
+    return rows
 
 
-def _charts(run: Picture, curves: Curves) -> list[dict[str, Any]]:
-    table, t, listed = curves.measured, curves.t, ROUGHIE_MEASURES.windows(curves.t)
-    said = {"nominal": curves.nominal, "corrected": curves.corrected}
-    drawn = []
-    for channel in (c for c in ROUGHIE_MEASURES.channels if c.name in run.channels and c.name in DRAWN):
-        if channel.joint:
-            chart, least = plan_chart(table, said, channel.columns, listed), 1.0
-        else:
-            column, scale = channel.columns[0], channel.scale
-            columns = {style: Y[:, column] for style, Y in said.items()}
-            lines = compared(t, table[:, column], columns, listed, scale, channel.wrapped)
-            chart = Chart(f"{channel.name}, {channel.unit}", "s", lines, bands(t, listed), down=channel.name == "depth")
-            least = 4.0 * channel.tolerance * scale
-        before, after = (words.number(number(gaps.get(channel.name))) for gaps in (run.before, run.after))
-        drawn.append({"title": chart.title, "before": before, "after": after, "svg": svg(chart, least)})
-    return drawn
+def _linked(record: DiagnosisRecord, traces: Traces) -> list[dict[str, Any]]:
+    """The verdict's sentence in parts: the names of effects lead to where they are largest in the runs."""
+    said, answer = words.sentence(record), record.answer
+    claims = {label: effect_claim(record, traces, label) for label in answer.selected}
+    if not answer.selected and answer.verdict == "unknown":
+        claims = {"A gap": traces.largest(None, CORRECTED)}
+    found, rest = [], said
+    for name in sorted((name for name, claim in claims.items() if claim and name in said), key=said.index):
+        before, _, rest = rest.partition(name)
+        found += [{"text": before, "claim": None}, {"text": name, "claim": claims[name]}]
+    return [*found, {"text": rest, "claim": None}]
 
 
-def _table(record: DiagnosisRecord) -> list[dict[str, Any]]:
-    """Channels, then the total, by the four models."""
-    gap = record.answer.gap
-    tables = (gap.before, gap.recalibrated, gap.after, gap.floor)
-    return [
-        {"name": name, "cells": [f"{number(one.get(name)):.2f}".replace("nan", words.DASH) for one in tables]}
-        for name in gap.before
-    ]
+def effect_claim(record: DiagnosisRecord, traces: Traces, label: str) -> Claim | None:
+    """Where an effect is largest in the drawn runs; of one that was not fitted there, where the nominal model errs."""
+    shown = next((one for one in record.details.regressors if one.label == label), None)
+    own = None if shown is None else traces.claim(shown.run, shown.second, shown.channel)
+    return own or traces.largest(None, NOMINAL)
+
+
+def _drawn(record: DiagnosisRecord) -> str:
+    """Why these runs are drawn."""
+    shown, runs = len(record.details.pictures), record.details.data.runs
+    return "All runs." if shown == runs else f"{shown} of {runs} runs: those with the largest gaps before."
 
 
 def _groups(record: DiagnosisRecord) -> list[str]:
@@ -161,9 +201,12 @@ def _waterfall(record: DiagnosisRecord) -> list[dict[str, Any]]:
     return rows
 
 
-def _readings(record: DiagnosisRecord) -> list[dict[str, Any]]:
+def _readings(record: DiagnosisRecord, traces: Traces) -> list[dict[str, Any]]:
     """What is wrong with the readings, a sentence each, with the catalogue's label."""
-    return [{"text": one.text, "label": one.label, "mended": one.mended} for one in record.answer.readings]
+    return [
+        {"text": one.text, "label": one.label, "claim": traces.largest(one.channel, NOMINAL)}
+        for one in record.answer.readings
+    ]
 
 
 def _shown(record: DiagnosisRecord) -> list[dict[str, str]]:
@@ -181,7 +224,12 @@ def _context(record: DiagnosisRecord) -> dict[str, Any]:
     answer, details = record.answer, record.details
     data, gap, effects = details.data, answer.gap, catalogue()
     others = [label for label in answer.selected if label != answer.main and answer.verdict == "cause"]
-    left = words.described(record)
+    traces = Traces(record)
+    left = [row | {"claim": traces.largest(row["reading"], CORRECTED)} for row in words.described(record)]
+    now = steps(record)
+    for step in now["checks"]:
+        step["claim"] = effect_claim(record, traces, step["label"]) if step["label"] in answer.selected else None
+    flown = traces.plain()
     strongest = max((abs(f.sigma) for f in details.findings), default=0.0)
     return {
         "data": data,
@@ -189,7 +237,9 @@ def _context(record: DiagnosisRecord) -> dict[str, Any]:
         "rate": f"{data.log_rate_hz:g}",
         "verdict": answer.verdict,
         "blind": answer.verdict == "none" and words.blind(gap),
-        "sentence": words.sentence(record),
+        "sentence": _linked(record, traces),
+        "now": now,
+        "download": download(record.mission),
         "chain": chain_svg(
             [] if answer.verdict == "none" else answer.where,
             [effects[label].place for label in others],
@@ -197,14 +247,17 @@ def _context(record: DiagnosisRecord) -> dict[str, Any]:
         ),
         "panels": [_panel(record, panel) for panel in details.panels],
         "ranking": _ranking(record),
-        "effects": _effects(record),
+        "effects": _effects(record, traces),
         "noise": _noise(record),
-        "pictures": _pictures(record),
+        "traces": flown,
+        "flown": json.dumps(flown, separators=(",", ":")).replace("<", "\\u003c"),
+        "drawn": _drawn(record),
         "stages": _waterfall(record),
-        "readings": _readings(record),
+        "readings": _readings(record, traces),
         "shown": _shown(record),
         "corrected": "corrected" if details.corrected else "recalibrated",
-        "table": _table(record),
+        "table": _table(record, traces),
+        "spread": len(record.details.pictures) > 1,
         "which": words.which(record).removesuffix(","),
         "shrinkage": _share(gap.shrinkage),
         "closed": _share(gap.closed),
@@ -233,7 +286,8 @@ def _share(share: Interval) -> str:
 
 def report_html(record: DiagnosisRecord) -> str:
     """The page's text; MissingExtra without jinja2."""
-    return render("diagnosis.html", _context(record)).replace(" %", "\N{NO-BREAK SPACE}%")
+    context = _context(record) | plotting("traces.js")
+    return render("diagnosis.html", context).replace(" %", "\N{NO-BREAK SPACE}%")
 
 
 def write_report(folder: Path) -> DiagnosisRecord:

@@ -227,12 +227,16 @@ def sentence(record: DiagnosisRecord) -> str:
         said = _unknown(record)
     else:
         said = _excess_noise(record) if answer.main in UNPREDICTABLE else _causes(record)
-    guessed = any(line.startswith(ASSUMED_NUMBERS) for line in answer.cautions)
     return (
         f"Identify the vehicle first, its file has assumed numbers; as far as that file goes: {said}"
-        if guessed
+        if guessed(record)
         else said
     )
+
+
+def guessed(record: DiagnosisRecord) -> bool:
+    """Whether the vehicle file says of its own numbers that nobody measured them."""
+    return any(line.startswith(ASSUMED_NUMBERS) for line in record.answer.cautions)
 
 
 def _none(record: DiagnosisRecord) -> str:
@@ -348,13 +352,13 @@ def finding(found: FindingRecord, rate_hz: float) -> str:
 
 
 def described(record: DiagnosisRecord) -> list[dict[str, Any]]:
-    """What is left by channel, strongest first: channel, axis, its shape, its correlations, sigma."""
+    """What is left by channel, strongest first: reading, channel, axis, its shape, its correlations, sigma."""
     rows: dict[str, dict[str, Any]] = {}
     for found in record.details.findings:
         if abs(found.sigma) < UNCLEAN:
             continue
         empty = {
-            "channel": channel(found.channel), "axis": AXES.get(found.channel, ""), "sigma": 0.0, "shape": [],
+            "reading": found.channel, "channel": channel(found.channel), "axis": AXES.get(found.channel, ""), "sigma": 0.0, "shape": [],
             "correlated": [],
         }  # fmt: skip
         row = rows.setdefault(found.channel, empty)
