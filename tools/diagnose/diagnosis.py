@@ -281,9 +281,9 @@ def plain(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def to_enter(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """The numbers of the vehicle file that the selected effects change."""
+    """The numbers of the vehicle file that the selected effects change; the water is none of the vehicle's."""
     vehicle, found = diagnosis.case.roughie, []
-    for label in diagnosis.answer.selected:
+    for label in (one for one in diagnosis.answer.selected if catalogue()[one].subsystem != "environment"):
         found += numbers_to_enter(vehicle.vector(), vehicle.effects, label, parameters(diagnosis, label))
     return found
 

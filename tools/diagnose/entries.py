@@ -25,9 +25,7 @@ LEAST_CHANGE = 1e-9  # of a number or of 1: a smaller one is rounding
 
 def _keys() -> dict[int, tuple[str, str]]:
     """By place in P: the key of the vehicle file, and the unit."""
-    found = {
-        getattr(layout, name.upper()): (f"hydrodynamics.{name}", K_UNITS[name]) for name in COEFFICIENTS
-    }
+    found = {getattr(layout, name.upper()): (f"hydrodynamics.{name}", K_UNITS[name]) for name in COEFFICIENTS}
     for key, (first, unit) in TRIPLES.items():
         found |= {first + n: (f"{key}[{n}]", unit) for n in range(3)}
     for start, (name, unit) in zip(layout.ACTUATORS, ACTUATOR_UNITS.items(), strict=True):

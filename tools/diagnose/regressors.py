@@ -12,6 +12,7 @@ from glider.tools.data.intervals import NINETY
 from glider.tools.diagnose.record import Regressor, RunEstimate
 from glider.tools.diagnose.residuals import FEATURE_UNITS, features
 from glider.tools.diagnose.search import Search
+from glider.tools.gap.measure import scored_rows
 from glider.tools.inference.fit import NUISANCE_LIMIT, Hypothesis, bounded_step
 
 BINS, LEAST_IN_BIN = 24, 12  # of a feature; samples of each
@@ -76,7 +77,7 @@ def _follows(fit: np.ndarray, with_what: dict[str, np.ndarray]) -> str:
 
 
 def _largest(problem, rows: np.ndarray, fit: np.ndarray) -> tuple[str, float]:
-    """Run and second (of the run's clock) in which the prediction's mean square over SMOOTHED_SECONDS is largest."""
+    """Run and second of its clock in which the prediction's mean square over SMOOTHED_SECONDS is largest, if scored."""
     bounds, t = problem.recording.bounds, problem.recording.t
     square = np.zeros(len(t))
     square[rows] = fit**2
@@ -85,9 +86,10 @@ def _largest(problem, rows: np.ndarray, fit: np.ndarray) -> tuple[str, float]:
         first, last = bounds[n], bounds[n + 1]
         width = max(1, int(SMOOTHED_SECONDS / max(float(np.median(np.diff(t[first:last]))), 1e-3)))
         mean = np.convolve(square[first:last], np.full(width, 1.0 / width), mode="same")
+        mean *= scored_rows(problem.kind.measures.windows(run.t), run.rows)
         at = int(mean.argmax())
         if mean[at] > best[2]:
-            best = (run.name, float(run.t[min(at, run.rows - 1)]), float(mean[at]))
+            best = (run.name, float(run.t[at]), float(mean[at]))
     return best[0], best[1]
 
 

@@ -35,7 +35,9 @@ def chain_svg(places: list[Place], certain: list[tuple[str, str]], doubt: bool) 
     )
     lines = min(max(len(found) for found in named.values()), MOST_PLACES)
     height = TOP + TALL + 8 + LINE * lines
-    out = [f'<svg class="chain" viewBox="0 0 {WIDTH} {height}" role="img" aria-label="{escape(f"chain: {said}")}">']
+    out = [
+        f'<svg class="chain" viewBox="-1 0 {WIDTH + 2} {height}" role="img" aria-label="{escape(f"chain: {said}")}">'
+    ]
     for n, stage in enumerate(STAGES):
         x = n * (BOX + GAP)
         out.append(_box(x, stage, min(tint[stage], 1.0), doubt))

@@ -5,7 +5,6 @@ from importlib.resources import files
 from typing import Any
 from urllib.parse import quote
 
-from glider.tools.diagnose.noise_probes import UNPREDICTABLE
 from glider.tools.diagnose.record import DiagnosisRecord, number
 from glider.tools.report import words
 
@@ -61,8 +60,6 @@ def _enter(record: DiagnosisRecord) -> list[dict[str, str]]:
     """The rows of numbers to enter, in SI as the file has them."""
     rows = []
     for one in record.answer.enter:
-        if one.label in UNPREDICTABLE:
-            continue
         file, value, low, high = (words.number(number(v)) for v in (one.file, one.value, *one.ci90))
         rows.append({"key": one.key, "file": file, "value": value, "low": low, "high": high,
                      "unit": "" if one.unit == "1" else one.unit})  # fmt: skip

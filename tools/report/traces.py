@@ -14,6 +14,7 @@ import numpy as np
 from glider.firmware.core.maths.rotations import wrap
 from glider.tools.data.runs.origin import with_flight
 from glider.tools.diagnose.record import Curves, DiagnosisRecord, Picture, number
+from glider.tools.gap.measure import scored_rows
 from glider.tools.inference.channels import DEGREES, ROUGHIE_MEASURES, Channel
 from glider.tools.inference.windows import Window
 from glider.tools.report import words
@@ -144,11 +145,7 @@ def _seconds(window: Window, t: np.ndarray) -> list[float]:
 
 def _scored(square: np.ndarray, t: np.ndarray) -> np.ndarray:
     """Squares (rows,) where a window is scored, 0 elsewhere."""
-    kept = np.zeros(len(square))
-    for window in ROUGHIE_MEASURES.windows(t):
-        if window.scored:
-            kept[window.start : window.end] = np.nan_to_num(square[window.start : window.end])
-    return kept
+    return np.where(scored_rows(ROUGHIE_MEASURES.windows(t), len(t)), np.nan_to_num(square), 0.0)
 
 
 def _held(t: np.ndarray, values: np.ndarray, wrapped: bool) -> np.ndarray:

@@ -358,8 +358,8 @@ def described(record: DiagnosisRecord) -> list[dict[str, Any]]:
         if abs(found.sigma) < UNCLEAN:
             continue
         empty = {
-            "reading": found.channel, "channel": channel(found.channel), "axis": AXES.get(found.channel, ""), "sigma": 0.0, "shape": [],
-            "correlated": [],
+            "reading": found.channel, "channel": channel(found.channel), "axis": AXES.get(found.channel, ""),
+            "sigma": 0.0, "shape": [], "correlated": [],
         }  # fmt: skip
         row = rows.setdefault(found.channel, empty)
         row["sigma"] = max(row["sigma"], float(abs(found.sigma)))
