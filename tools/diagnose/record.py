@@ -161,6 +161,7 @@ class AnswerRecord(msgspec.Struct):
     readings: list[ReadingRecord] = []
     stages: list[StepRecord] = []
     enter: list[Entry] = []
+    identify_first: bool = False
 
     @property
     def main(self) -> str:

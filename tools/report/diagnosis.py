@@ -151,10 +151,15 @@ def _linked(record: DiagnosisRecord, traces: Traces) -> list[dict[str, Any]]:
 
 
 def effect_claim(record: DiagnosisRecord, traces: Traces, label: str) -> Claim | None:
-    """Where an effect is largest in the drawn runs; of one that was not fitted there, where the nominal model errs."""
+    """Where an effect is largest in the drawn runs.
+
+    Of one that was not fitted there: where the nominal model is off most in the reading that shows it, or in any.
+    """
     shown = next((one for one in record.details.regressors if one.label == label), None)
     own = None if shown is None else traces.claim(shown.run, shown.second, shown.channel)
-    return own or traces.largest(None, NOMINAL)
+    readings = [one.channel for one in record.answer.readings if one.label == label]
+    found = (own, *(traces.largest(reading, NOMINAL) for reading in (*readings, catalogue()[label].element, None)))
+    return next((claim for claim in found if claim is not None), None)
 
 
 def _drawn(record: DiagnosisRecord) -> str:

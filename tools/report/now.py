@@ -5,7 +5,7 @@ from importlib.resources import files
 from typing import Any
 from urllib.parse import quote
 
-from glider.tools.diagnose.record import DiagnosisRecord, number
+from glider.tools.diagnose.record import DiagnosisRecord, Entry, number
 from glider.tools.report import words
 
 MOST_CHECKS = 4
@@ -18,29 +18,40 @@ def checks() -> dict[str, str]:
 
 
 def steps(record: DiagnosisRecord) -> dict[str, Any]:
-    """What the section `What to do now` says: identify, checks, enter, open (why a run is needed), nothing."""
-    answer = record.answer
-    identify, why = words.guessed(record), _open(record)
-    suspected = [
-        cause.label for cause in answer.causes
-        if cause.probability >= LEAST_CHECKED and cause.label in checks() and cause.label not in answer.selected
-    ] if why else []  # fmt: skip
-    alike = [label for label in answer.cause(answer.main).group if label in checks()] if answer.selected else []
-    labels = list(dict.fromkeys([*answer.selected, *alike, *suspected]))[:MOST_CHECKS]
-    found = {
-        "identify": identify, "open": why, "enter": _enter(record), "nothing": "",
-        "checks": [
-            {"label": label, "text": checks()[label], "what": "" if label in answer.selected else "as well for "}
-            for label in labels
-        ],
-    }  # fmt: skip
-    if not (identify or why or labels):
+    """What the section `What to do now` says: identify, checks, enter, open (why a run is needed), nothing.
+
+    Beside an unknown gap only what the readings show by themselves is certain: other effects are the nearest to it.
+    """
+    answer, why, known = record.answer, _open(record), checks()
+    by_readings = {one.label for one in answer.readings}
+    certain = [label for label in answer.selected if answer.verdict != "unknown" or label in by_readings]
+    suspected = [one.label for one in answer.causes if one.probability >= LEAST_CHECKED] if why else []
+    alike = answer.cause(answer.main).group if answer.verdict == "cause" else []
+    others = dict.fromkeys(label for label in [*alike, *answer.selected, *suspected] if label in known)
+    labels = [*certain, *(label for label in others if label not in certain)][:MOST_CHECKS]
+    nothing = ""
+    if not (why or labels):
         floor = words.number(number(answer.gap.floor["total"]))
-        found["nothing"] = (
-            f"Nothing to repair or enter: the vehicle file explains these runs. An effect that moves them by less than "
+        nothing = (
+            "Nothing to repair or enter: the vehicle file explains these runs. An effect that moves them by less than "
             f"{floor} tolerances would not be seen."
         )
-    return found
+    return {
+        "identify": answer.identify_first or words.guessed(record), "open": why, "nothing": nothing,
+        "unknown": answer.verdict == "unknown", "parts": _parts(answer.next_run.parts),
+        "enter": [_row(one) for one in answer.enter if one.label in certain],
+        "checks": [
+            {"label": label, "text": known[label].split("`"), "certain": label in certain} for label in labels
+        ],
+    }  # fmt: skip
+
+
+def _parts(parts: list[str]) -> str:
+    """The explanations that the next run distinguishes: by what they differ in, beside what all of them hold."""
+    sets = [part.split("+") for part in parts]
+    common = [label for label in sets[0] if all(label in one for one in sets)] if len(sets) > 1 else []
+    own = ["+".join(label for label in one if label not in common) or "nothing more" for one in sets]
+    return ", ".join(own) + (f", each beside {words.joined(common)}" if common else "")
 
 
 def _open(record: DiagnosisRecord) -> str:
@@ -56,14 +67,11 @@ def _open(record: DiagnosisRecord) -> str:
     return ""
 
 
-def _enter(record: DiagnosisRecord) -> list[dict[str, str]]:
-    """The rows of numbers to enter, in SI as the file has them."""
-    rows = []
-    for one in record.answer.enter:
-        file, value, low, high = (words.number(number(v)) for v in (one.file, one.value, *one.ci90))
-        rows.append({"key": one.key, "file": file, "value": value, "low": low, "high": high,
-                     "unit": "" if one.unit == "1" else one.unit})  # fmt: skip
-    return rows
+def _row(one: Entry) -> dict[str, str]:
+    """A number to enter, in SI as the file has it."""
+    file, value, low, high = (words.number(number(v)) for v in (one.file, one.value, *one.ci90))
+    unit = "" if one.unit == "1" else one.unit
+    return {"key": one.key, "file": file, "value": value, "low": low, "high": high, "unit": unit}
 
 
 def download(mission: str) -> str:

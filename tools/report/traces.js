@@ -56,7 +56,7 @@ function plot(parent, {columns, lines, height, down, least, tolerance, ticks, sa
   };
   const axis = {stroke: colour("soft"), grid: {stroke: colour("grid"), width: 1}, ticks: {stroke: colour("grid"), width: 1, size: 4}, font: "12px system-ui, sans-serif"};
   const u = new uPlot({
-    width: Math.max(parent.clientWidth, 200), height, legend: {show: false}, padding: [6, 10, 0, 0],
+    width: Math.max(parent.clientWidth, 200), height, legend: {show: false}, padding: [6, 16, 0, 0],
     cursor: {
       sync: {key: "run", filters: {pub: type => type === "mousemove" || type === "mouseleave"}},
       drag: {x: true, y: false, setScale: false}, points: {show: false}, y: false,

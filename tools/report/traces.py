@@ -28,6 +28,9 @@ COMMANDS = (("servo command", "deg", DEGREES), ("slider command", "mm", 1000.0),
 CHART_OF_READING = {
     "p": "roll rate", "q": "pitch rate", "r": "yaw rate", "mocap x": "north", "mocap y": "east", "mocap z": "depth",
     "mocap roll": "roll", "mocap pitch": "pitch", "mocap yaw": "yaw", "rates": "pitch rate", "xy": "north",
+    "gyro": "pitch rate", "attitude": "pitch", "water": "north",
+    **dict(zip(ROUGHIE_MEASURES.columns, ("roll", "pitch", "yaw", *AXES["rates"], "depth", "slider", "ballast",
+                                          *AXES["xy"]), strict=True)),
 }  # fmt: skip
 
 
