@@ -118,9 +118,16 @@ def test_a_gyro_that_reads_too_much_is_its_gain(pool):
 def test_a_watch_names_the_run_from_which_it_is_heavier(pool):
     folder, case, _ = pool
     case("season", 5, runs=9, theta_of=lambda n, theta: theta + np.array([0, 0.6, 0, 0, 0]) * (n >= 6))
-    done = glider("gap", "watch", "season", "--vehicle", "identified/identified.toml", "--json", cwd=folder)
+    done = glider(
+        "gap", "watch", "season", "--vehicle", "identified/identified.toml", "--out", "w", "--json", cwd=folder
+    )
     assert done.returncode == 0, done.stderr
     answer = json.loads(done.stdout)
+    page = (folder / "w" / "report.html").read_text()
+    assert page.count("<svg") == 2  # gap and size over the runs
+    assert page.count('class="point cause"') == 3
+    assert glider("gap", "report", "w", cwd=folder).returncode == 0
+    assert (folder / "w" / "report.html").read_text() == page
     assert [event["from_run"] for event in answer["events"]] == ["run06"]
     assert answer["events"][0]["to_run"] is None
     assert "weight_in_water" in answer["events"][0]["group"]

@@ -95,8 +95,12 @@ def watch(vehicle: Any, case: Path, reference: Path | None, out: Path | None, as
     before = [] if reference is None else load_own_runs(reference, vehicle.declared)
     answer = watch_runs(vehicle, runs, before, tell).plain()
     if out is not None:
+        from glider.tools.report.watch import write_watch_report
+
         out.mkdir(parents=True, exist_ok=True)
         write_bytes(out / "watch.json", (json.dumps(as_plain(answer), indent=1) + "\n").encode())
+        write_watch_report(out)
+        say(f"answer: {out / 'watch.json'}, report: {out / 'report.html'}")
     for caution in answer["cautions"]:
         say(f"note: {caution}")
     if as_json:

@@ -73,6 +73,7 @@ class Watched:
     gaps: np.ndarray  # (runs,) tolerances
     strange: np.ndarray  # (runs,) probability that a run has more left than healthy ones and its events say
     cautions: list[str] = field(default_factory=list)
+    reference: list[str] = field(default_factory=list)  # runs from which it was learned
 
     def plain(self) -> dict[str, Any]:
         """The JSON of docs/reference/gap.md, What changed."""
@@ -89,7 +90,9 @@ class Watched:
             runs.append(
                 {"run": name, "verdict": verdict, "causes": causes, "gap": float(self.gaps[n]), "skipped": None}
             )
-        return {"format": 1, "runs": runs, "events": events, "cautions": self.cautions}
+        return {
+            "format": 1, "runs": runs, "events": events, "reference": self.reference, "cautions": self.cautions,
+        }  # fmt: skip
 
     def _event(self, one: Event, effects) -> dict[str, Any]:
         effect = effects[one.label]
@@ -109,7 +112,8 @@ class Watched:
                       for (s, e), p in sorted(places.items(), key=lambda item: -item[1]) if p > 0.005],
             "from_run": self.names[one.first],
             "to_run": None if one.end == len(self.names) else self.names[one.end - 1],
-            "size": one.size * effect.spread, "ci90": [low, high], "unit": effect.unit,
+            "course": "step" if one.end == len(self.names) else "episode",
+            "size": one.size * effect.spread, "ci90": [low, high], "unit": effect.unit, "sizes": [],
         }  # fmt: skip
 
 
@@ -320,4 +324,5 @@ def watch(
     drop = len(reference)
     events = [replace(one, first=one.first - drop, end=one.end - drop) for one in engine.events]
     names = [run.name for run in observer.runs[drop:]]
-    return Watched(names, learned - drop, events, healthy, gaps[drop:], strange[drop:], cautions)
+    learned_from = [run.name for run in observer.runs[:learned]]
+    return Watched(names, learned - drop, events, healthy, gaps[drop:], strange[drop:], cautions, learned_from)

@@ -1,15 +1,20 @@
-"""The report of a watch, drawn from its folder: events, then every run; one HTML file that opens offline."""
+"""The report of a watch, drawn from its folder: events, pictures over the runs, then every run; one offline file."""
 
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
+from glider.sim_backend.core.effects.catalogue import catalogue
+from glider.sim_backend.ocean.catalogue import catalogue as ocean_catalogue
 from glider.tools.data.errors import InputError
 from glider.tools.data.files import write_bytes
 from glider.tools.data.runs.origin import with_flight
+from glider.tools.diagnose.record import EstimateRecord
 from glider.tools.report import words
+from glider.tools.report.now import checks
 from glider.tools.report.page import REPORT, render
+from glider.tools.report.run_picture import Point, RunPicture, Span, svg_over_runs
 from glider.tools.watch.answer import FILE
 
 MOST_BYTES = 100_000_000
@@ -38,6 +43,12 @@ class _Run(msgspec.Struct):
     velocity: _Velocity | None = None
 
 
+class _SizeOfRun(msgspec.Struct):
+    run: str
+    size: float | None
+    ci90: tuple[float, float] | None
+
+
 class _Event(msgspec.Struct):
     label: str | None
     where: list[dict[str, Any]]
@@ -49,7 +60,8 @@ class _Event(msgspec.Struct):
     size: float | None
     ci90: tuple[float, float] | None
     unit: str | None
-    sizes: list[dict[str, Any]]
+    sizes: list[_SizeOfRun]
+    parameters: dict[str, EstimateRecord] = {}
 
 
 class _Watch(msgspec.Struct):
@@ -81,6 +93,12 @@ def _size(one: _Cause | _Event) -> str:
     return f"{words.number(one.size)}{unit} (90 %: {words.number(low)} to {words.number(high)})"
 
 
+def _meaning(one: _Event) -> str:
+    """What the size of an event means: the quantity that its row of the catalogue multiplies, where it has a row."""
+    effect = (catalogue() | ocean_catalogue()).get(one.label or "")
+    return "" if effect is None else words.size_of(effect, one.parameters)
+
+
 def _speed(found: _Velocity | None) -> str:
     if found is None:
         return ""
@@ -102,14 +120,53 @@ def _event(one: _Event, flights: dict[str, str]) -> dict[str, Any]:
     if one.label is None:
         said = f"No effect of the catalogue explains it{f'; most likely in {place}' if place else ''}"
     else:
-        said = words.upper(words.PLAIN.get(one.label, one.label))
+        said = words.upper(words.with_sign(one.label, one.parameters))
     others = [label for label in one.group if label != one.label]
+    meaning = _meaning(one)
     return {
-        "name": one.label or "unknown", "said": said, "size": _size(one), "alike": words.joined(others),
+        "name": one.label or "unknown", "said": said, "size": meaning or _size(one), "alike": words.joined(others),
         "from": with_flight(one.from_run, flights),
         "to": None if one.to_run is None else with_flight(one.to_run, flights),
         "course": one.course, "percent": 100.0 * one.probability,
     }  # fmt: skip
+
+
+def _names(found: _Watch) -> list[tuple[str, str]]:
+    """Name and date of every run; the date is what its flight's record ends with."""
+    dates = {run: flight.rpartition(", ")[2] for run, flight in found.flights.items() if ", " in flight}
+    return [(run.run, dates.get(run.run, "")) for run in found.runs]
+
+
+def _pictures(found: _Watch) -> list[dict[str, str]]:
+    """Gap over runs, then the size of every event over them."""
+    numbers = {run.run: n for n, run in enumerate(found.runs)}
+    names, last = _names(found), len(found.runs) - 1
+
+    def span(one: _Event, sized: bool) -> Span:
+        ends = numbers[one.from_run], last if one.to_run is None else numbers[one.to_run]
+        return Span(*ends, *((one.size, one.ci90) if sized else ()))
+
+    gaps = [
+        None if run.gap is None else Point(
+            run.gap, None, "skipped" if run.skipped else run.verdict,
+            f"{with_flight(run.run, found.flights)}: gap {words.number(run.gap)}, {run.skipped or run.verdict}",
+        ) for run in found.runs
+    ]  # fmt: skip
+    title = "total gap of every run, tolerances"
+    drawn = [(title, RunPicture(title, names, gaps, [span(one, False) for one in found.events]))]
+    for one in found.events:
+        if one.size is None or one.label is None:
+            continue
+        points: list[Point | None] = [None] * len(found.runs)
+        for own in one.sizes:
+            if own.size is not None:
+                sized = _Cause(one.label, 1.0, own.size, own.ci90, one.unit)
+                said = f"{with_flight(own.run, found.flights)}: {_size(sized)}"
+                points[numbers[own.run]] = Point(own.size, own.ci90, "cause", said)
+        unit = "" if one.unit in (None, "1") else f", {one.unit}"
+        title = f"{one.label}{unit}: size with its 90 % interval"
+        drawn.append((title, RunPicture(title, names, points, [span(one, not any(points))])))
+    return [{"title": title, "svg": svg_over_runs(picture)} for title, picture in drawn]
 
 
 def report_html(found: _Watch) -> str:
@@ -127,10 +184,18 @@ def report_html(found: _Watch) -> str:
     ]  # fmt: skip
     context = {
         "events": [_event(one, found.flights) for one in found.events], "runs": runs, "cautions": found.cautions,
+        "pictures": _pictures(found), "steps": _steps(found),
         "reference": words.joined(found.reference), "health": _health(found),
         "speeds": any(run.velocity is not None for run in found.runs),
     }  # fmt: skip
     return render("watch.html", context).replace(" %", "\N{NO-BREAK SPACE}%")
+
+
+def _steps(found: _Watch) -> list[dict[str, Any]]:
+    """What to check on the vehicle, for every change that is still there."""
+    known = checks()
+    labels = dict.fromkeys(one.label for one in found.events if one.to_run is None and one.label in known)
+    return [{"label": label, "text": known[label].split("`")} for label in labels if label is not None]
 
 
 def write_watch_report(folder: Path) -> str:

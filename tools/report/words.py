@@ -108,11 +108,16 @@ def named(record: DiagnosisRecord, label: str) -> str:
 
 
 def directed(record: DiagnosisRecord, label: str) -> str:
+    """Plain words of an effect of a diagnosis, with its sign."""
+    return with_sign(label, record.answer.cause(label).parameters)
+
+
+def with_sign(label: str, parameters: dict[str, EstimateRecord]) -> str:
     """Plain words of an effect: `more or less` is more, or less, where all parameters that are sure have one sign."""
-    known = [one for one in record.answer.cause(label).parameters.values() if one.estimate is not None]
+    known = [one for one in parameters.values() if one.estimate is not None]
     signs = {math.copysign(1.0, finite(one.estimate)) for one in (clear(known) or known)}
     word = " more or less" if len(signs) != 1 else " more" if signs == {1.0} else " less"
-    return PLAIN[label].replace(" more or less", word)
+    return PLAIN.get(label, label).replace(" more or less", word)
 
 
 def clear(parameters: list[EstimateRecord]) -> list[EstimateRecord]:

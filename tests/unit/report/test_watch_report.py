@@ -1,14 +1,17 @@
 """The report of a watch, drawn from its folder alone."""
 
 import json
+import re
 
 import pytest
 
 from glider.tools.api.sentences import watch_lines as lines
 from glider.tools.cli.common import report_errors
 from glider.tools.cli.main import cli
+from glider.tools.report.run_picture import LEFT, RIGHT, WIDTH
 from glider.tools.report.watch import write_watch_report
 from glider.tools.watch.answer import EventAnswer, RunVerdict, Sized, WatchAnswer
+from tests.support.pages import assert_offline
 
 EVENT = {
     "label": "drag", "where": [{"subsystem": "hydrodynamics", "element": "surge", "probability": 0.9}],
@@ -47,6 +50,40 @@ def test_runs_have_the_names_of_their_flights_where_they_are_known(tmp_path):
     assert "drag, from run03 (w04.mcap, 2026-11-20)" in page
     for cell in ("run02", "run03 (w04.mcap, 2026-11-20)", "run04 (w05.mcap)"):
         assert f"<td>{cell}</td>" in page
+
+
+def test_the_picture_shows_size_and_interval_over_the_runs(tmp_path):
+    sizes = [{"run": "run03", "size": 0.3, "ci90": [0.1, 0.5]}]
+    write_watch_report(answer(tmp_path, events=[EVENT | {"sizes": sizes}], flights={"run03": "w04.mcap, 2026-11-20"}))
+    gap, size = re.findall(r"<svg.*?</svg>", (tmp_path / "report.html").read_text(), re.S)
+    assert re.findall(r'class="point (\w+)"', gap) == ["none", "cause"]  # the third was not judged
+    assert "run03 (w04.mcap, 2026-11-20): gap 2.10, cause" in gap
+    assert ">2026-11-20</tspan>" in gap
+    # the event's runs are shaded: the last two of three
+    x, wide = map(float, re.search(r'class="span" x="([\d.]+)" y="\d+" width="([\d.]+)"', gap).groups())
+    assert wide == pytest.approx(2.0 * (WIDTH - LEFT - RIGHT) / 3.0, abs=0.1)
+    assert x + wide == pytest.approx(WIDTH - RIGHT, abs=0.1)
+    low, high = map(float, re.search(r'<path d="M[\d.]+ ([\d.]+)V([\d.]+)"', size).groups())
+    middle = float(re.search(r'cy="([\d.]+)"', size).group(1))
+    assert middle == pytest.approx(0.5 * (low + high), abs=0.1)
+    assert low > high  # 0.1 is drawn below 0.5
+
+
+def test_an_event_without_sizes_by_run_is_a_stripe(tmp_path):
+    write_watch_report(answer(tmp_path))
+    _, size = re.findall(r"<svg.*?</svg>", (tmp_path / "report.html").read_text(), re.S)
+    assert 'class="size"' in size
+    assert 'class="point' not in size
+
+
+def test_what_to_check_and_the_sign_of_a_change_are_said(tmp_path):
+    parameters = {"scale": {"estimate": 0.31, "ci90": [0.2, 0.42], "unit": "1"}}
+    write_watch_report(answer(tmp_path, events=[EVENT | {"parameters": parameters}]))
+    page = (tmp_path / "report.html").read_text()
+    assert "The hull drags more than its coefficients say." in page
+    assert "parasitic drag times 1.31" in page or "K_D0 times 1.31" in page
+    assert "Look for growth, tape, lines" in page
+    assert_offline(page)
 
 
 def test_a_terminal_has_them_too():
