@@ -14,6 +14,7 @@ from glider.tools.identify.identifiability import sentences, unidentifiable_dire
 from glider.tools.identify.pipeline import Identified
 from glider.tools.inference.channels import ROUGHIE_MEASURES
 from glider.tools.inference.levels import SENSORS, group_of_reading
+from glider.tools.report.alarm import alarms
 from glider.tools.report.charts import Chart, Curve, svg
 from glider.tools.report.lines import compared
 from glider.tools.report.page import render
@@ -36,7 +37,7 @@ def png(figure) -> str:
 
 
 def marginals(found: Identified, truth: dict[str, float] | None = None):
-    """Histograms of the twelve coefficients, mean and 90 % interval marked, the truth where it is known."""
+    """Histograms of the twelve coefficients beside their priors, mean and 90 % interval marked, and the known truth."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -46,6 +47,9 @@ def marginals(found: Identified, truth: dict[str, float] | None = None):
     figure, axes = plt.subplots(3, 4, figsize=(11, 7), layout="constrained")
     for n, (axis, one) in enumerate(zip(axes.flat, found.coefficients, strict=True)):
         axis.hist(draws[:, n], bins=50, density=True, color=INK, alpha=0.55)
+        low, high = axis.get_xlim()
+        x, centre, spread = np.linspace(low, high, 100), found.free.nominal[n], found.free.spreads[n]
+        axis.plot(x, np.exp(-0.5 * ((x - centre) / spread) ** 2) / (spread * np.sqrt(2.0 * np.pi)), color=SOFT, ls=":")
         axis.axvspan(*one.ci90, color=SOFT, alpha=0.2)
         axis.axvline(one.mean, color=INK)
         if truth is not None:
@@ -157,19 +161,19 @@ def flights(found: Identified) -> list[dict[str, Any]]:
 def report_html(found: Identified) -> str:
     """The page's text."""
     held = None if found.held is None else found.held.plain()
+    levels = [] if found.levels is None else list(zip(found.levels.names, found.levels.log, strict=True))
+    noise = {name.replace("_", " "): float(np.exp(log)) for name, log in levels}
+    open_directions = [one.sentence() for one in unidentifiable_directions(found.free, found.chains.flat)]
     context = {
+        "alarms": alarms(held, noise, found.notes, open_directions),
         "case": found.case.folder.resolve().name, "vehicle": found.case.vehicle.name, "site": found.case.site,
         "runs": len(found.runs), "seconds": found.seconds, "likelihood": found.likelihood,
         "summaries": [one.plain() for one in found.coefficients],
         "others": [one.plain() for one in found.summaries[len(COEFFICIENTS) :]],
         "sentences": sentences(found.free, found.chains.flat),
-        "blind": [one.sentence() for one in unidentifiable_directions(found.free, found.chains.flat)],
-        "left_out": [str(one) for one in found.left_out], "spikes": found.spikes, "notes": found.notes,
+        "left_out": [str(one) for one in found.left_out], "spikes": found.spikes,
         "marginals": png(marginals(found)), "corner": png(corner(found)),
-        "levels": [] if found.levels is None else [
-            {"name": name.replace("_", " "), "factor": float(np.exp(log))}
-            for name, log in zip(found.levels.names, found.levels.log, strict=True)
-        ],
+        "noise": noise,
         "inflation": found.quadratic.inflation, "check": found.check, "residuals": residual_rows(found),
         "residual_chart": residual_chart(found), "held": held, "flights": flights(found),
         "compared": found.compared(), "acceptance": float(found.chains.acceptance.mean()),
