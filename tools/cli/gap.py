@@ -16,6 +16,7 @@ from glider.tools.cli.common import (
     say_assumed,
     vehicle_option,
 )
+from glider.tools.cli.compare import compare
 from glider.tools.cli.isolability import isolability
 from glider.tools.cli.many import cases_argument, is_many, run_batch_command
 from glider.tools.cli.readings import readings
@@ -238,6 +239,7 @@ def report(folder: Path) -> None:
     say(f"report: {folder / REPORT}")
 
 
+gap.add_command(compare)
 gap.add_command(isolability)
 gap.add_command(readings)
 gap.add_command(watch)

@@ -20,7 +20,7 @@ def alarms(
         notes: what the identification itself notes.
         open_directions: sentences about combinations that stay wide.
     """
-    found = [{"head": "Note", "text": words.upper(text)} for text in notes]
+    found = []
     if held is None:
         found.append({"head": "Not checked", "text": "No run was left out: nothing here is checked on other data."})
     else:
@@ -30,6 +30,7 @@ def alarms(
         if worse:
             text = f"On runs left out the vehicle that is handed out is worse than the file in {'; '.join(worse)}."
             found.append({"head": "Worse", "text": text})
+    found += [{"head": "Note", "text": words.upper(f"{text.removesuffix('.')}.")} for text in notes]
     large = [f"{name} {words.number(factor)} times" for name, factor in noise.items() if factor >= NOISE_FACTOR]
     if large:
         found.append({"head": "Noise", "text": (

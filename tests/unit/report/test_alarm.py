@@ -25,7 +25,7 @@ def test_noise_notes_and_open_directions():
     assert [one["head"] for one in found] == ["Note", "Noise", "Not determined"]
     assert "disturbance linear 11.0 times" in found[1]["text"]
     assert "slider" not in found[1]["text"]
-    assert found[0]["text"] == "Intervals are rough"
+    assert found[0]["text"] == "Intervals are rough."
 
 
 def test_nothing_to_say_is_no_alarm_and_no_check_is_one():
