@@ -391,7 +391,8 @@ def _read_curves(path: Path, count: int) -> list[Curves]:
         with np.load(_present(path), allow_pickle=False) as tables:
             for n in range(count):
                 commands = tables[f"{COMMANDS}_{n}"].astype(float) if f"{COMMANDS}_{n}" in tables else None
-                run = Curves(tables[f"t_{n}"], *(tables[f"{name}_{n}"].astype(float) for name in TABLES), commands)
+                measured, nominal, corrected = (tables[f"{name}_{n}"].astype(float) for name in TABLES)
+                run = Curves(tables[f"t_{n}"], measured, nominal, corrected, commands)
                 if any(getattr(run, name).shape[:1] != run.t.shape for name in TABLES) or len(run.t) < 2:
                     raise InputError(f"tables of different lengths for run {n}", source=path)
                 found.append(run)

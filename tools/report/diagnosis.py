@@ -1,6 +1,7 @@
 """The report of a diagnosis, drawn from its folder: one HTML file that opens offline, on a phone too."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -124,7 +125,7 @@ def _noise(record: DiagnosisRecord) -> dict[str, str] | None:
 
 def _table(record: DiagnosisRecord, traces: Traces) -> list[dict[str, Any]]:
     """Channels, then the total, by the four models, each with the least and the largest of the drawn runs."""
-    gap, rows = record.answer.gap, []
+    gap, rows = record.answer.gap, list[dict[str, Any]]()
     for name in gap.before:
         cells = []
         for which in ("before", "recalibrated", "after", "floor"):
@@ -142,12 +143,12 @@ def _linked(record: DiagnosisRecord, traces: Traces) -> list[dict[str, Any]]:
     said, answer = words.sentence(record), record.answer
     claims = {label: effect_claim(record, traces, label) for label in answer.selected}
     if not answer.selected and answer.verdict == "unknown":
-        claims = {"A gap": traces.largest(None, CORRECTED)}
-    found, rest = [], said
-    for name in sorted((name for name, claim in claims.items() if claim and name in said), key=said.index):
-        before, _, rest = rest.partition(name)
-        found += [{"text": before, "claim": None}, {"text": name, "claim": claims[name]}]
-    return [*found, {"text": rest, "claim": None}]
+        return [{"text": "A gap", "claim": traces.largest(None, CORRECTED)},
+                {"text": said.removeprefix("A gap"), "claim": None}]  # fmt: skip
+    # a label stands in brackets or in a list; elsewhere `lift` and `current` are words
+    labels = "|".join(map(re.escape, claims))
+    parts = re.split(rf"(?<=[( ])({labels})(?=[,;)]| and )", said) if labels else [said]
+    return [{"text": part, "claim": claims.pop(part, None)} for part in parts]
 
 
 def effect_claim(record: DiagnosisRecord, traces: Traces, label: str) -> Claim | None:

@@ -26,8 +26,8 @@ def steps(record: DiagnosisRecord) -> dict[str, Any]:
     by_readings = {one.label for one in answer.readings}
     certain = [label for label in answer.selected if answer.verdict != "unknown" or label in by_readings]
     suspected = [one.label for one in answer.causes if one.probability >= LEAST_CHECKED] if why else []
-    alike = answer.cause(answer.main).group if answer.verdict == "cause" else []
-    others = dict.fromkeys(label for label in [*alike, *answer.selected, *suspected] if label in known)
+    confounded = answer.cause(answer.main).group if answer.verdict == "cause" else []
+    others = dict.fromkeys(label for label in [*confounded, *answer.selected, *suspected] if label in known)
     labels = [*certain, *(label for label in others if label not in certain)][:MOST_CHECKS]
     nothing = ""
     if not (why or labels):

@@ -15,7 +15,7 @@ MOST_LETTERS = 12  # of a name there
 
 @dataclass(frozen=True)
 class Point:
-    """A run's value, with its interval where it has one; `style` is a CSS class, `said` what a pointer is told."""
+    """A run's value, with its interval where it has one; `style` is a CSS class, `said` what a pointer shows."""
 
     value: float
     ci90: tuple[float, float] | None
