@@ -49,32 +49,41 @@ def numbers_to_enter(P: np.ndarray, own: dict[str, Any], label: str, sizes: dict
     Returns:
         For each entry `label`, `parameter`, `key`, `file` (the nominal number), `value`, `ci90` and `unit`.
     """
+    known = {
+        one: [size["estimate"], *size["ci90"]]
+        for one in catalogue()[label].parameters if (size := sizes.get(one.name)) is not None
+    }  # fmt: skip
+    known = {one: ends for one, ends in known.items() if all(end is not None and np.isfinite(end) for end in ends)}
+    changed = {one: _changed(P, one.entry, ends) for one, ends in known.items()}
+    together = _effective(P, {one.entry: ends[0] for one, ends in known.items()})
+    alone = sum((_effective(P, {one.entry: ends[0]}) - P for one, ends in known.items()), P)
+    if label in own or not np.allclose(together, alone, rtol=LEAST_CHANGE, atol=LEAST_CHANGE):
+        changed = {one: {} for one in known}  # it is there already, or its parameters act on one number together
     found = []
-    for parameter in (one for one in catalogue()[label].parameters if one.name in sizes):
-        size = sizes[parameter.name]
-        ends = [size["estimate"], *size["ci90"]]
-        if any(end is None or not np.isfinite(end) for end in ends):
-            continue
-        rows = {} if parameter.entry < 0 else _changed(P, parameter.entry, ends)
-        if not rows:
-            file = own.get(label, {}).get(parameter.name, parameter.default)
-            values = [file - parameter.default + end for end in ends]
-            rows = {f"effects.{label}.{parameter.name}": (file, values, parameter.unit)}
-        for key, (file, values, unit) in rows.items():
+    for one, ends in known.items():
+        file = own.get(label, {}).get(one.name, one.default)
+        here = (file, [file - one.default + end for end in ends], one.unit)
+        for key, (before, values, unit) in (changed[one] or {f"effects.{label}.{one.name}": here}).items():
             value, *ci90 = map(float, values)
             found.append({
-                "label": label, "parameter": parameter.name, "key": key, "file": float(file), "value": value,
+                "label": label, "parameter": one.name, "key": key, "file": float(before), "value": value,
                 "ci90": sorted(ci90), "unit": unit,
             })  # fmt: skip
     return found
 
 
+def _effective(P: np.ndarray, values: dict[int, float]) -> np.ndarray:
+    """The parameters (N_P,) that hold throughout a flight with entries of F; an entry below 0 is none."""
+    F, out = np.zeros(ef.N_F), np.empty(layout.N_P)
+    for entry, value in values.items():
+        if entry >= 0:
+            F[entry] = value
+    effective_parameters(P, F, out)
+    return out
+
+
 def _changed(P: np.ndarray, entry: int, ends: list[float]) -> dict[str, tuple[float, list[float], str]]:
     """By key, the numbers of the file that an entry of F changes: before, and at each of its values."""
-    flown = np.empty((len(ends), layout.N_P))
-    for row, end in zip(flown, ends, strict=True):
-        F = np.zeros(ef.N_F)
-        F[entry] = end
-        effective_parameters(P, F, row)
+    flown = np.array([_effective(P, {entry: end}) for end in ends])
     places = np.flatnonzero(np.abs(flown[0] - P) > LEAST_CHANGE * np.maximum(1.0, np.abs(P)))
     return {KEYS[n][0]: (P[n], flown[:, n].tolist(), KEYS[n][1]) for n in places.tolist() if n in KEYS}

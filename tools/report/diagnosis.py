@@ -142,7 +142,7 @@ def _linked(record: DiagnosisRecord, traces: Traces) -> list[dict[str, Any]]:
     """The verdict's sentence in parts: the names of effects lead to where they are largest in the runs."""
     said, answer = words.sentence(record), record.answer
     claims = {label: effect_claim(record, traces, label) for label in answer.selected}
-    if not answer.selected and answer.verdict == "unknown":
+    if not answer.selected and said.startswith("A gap that"):
         return [{"text": "A gap", "claim": traces.largest(None, CORRECTED)},
                 {"text": said.removeprefix("A gap"), "claim": None}]  # fmt: skip
     # a label stands in brackets or in a list; elsewhere `lift` and `current` are words
