@@ -1,6 +1,7 @@
 """What to do now: the repairs to check, the numbers to enter in the vehicle file, or the run to fly next."""
 
 import tomllib
+from collections.abc import Container, Iterable, Mapping
 from importlib.resources import files
 from typing import Any
 from urllib.parse import quote
@@ -9,12 +10,32 @@ from glider.tools.diagnose.record import DiagnosisRecord, Entry, number
 from glider.tools.report import words
 
 MOST_CHECKS = 4
+OWN_CHECKS = {  # by the family of what a user's vehicle declares
+    "input": "Command {name} by known steps on the bench and measure what it does.",
+    "output": "Compare the reading of {name} with a second instrument or a known value.",
+    "parameter": "Look for what changes {name}: parts added, lost, loose or fouled since the vehicle was identified.",
+}
 LEAST_CHECKED = 0.1  # probability from which a cause that is not certain is worth a look at the vehicle
 
 
 def checks() -> dict[str, str]:
     """By label of the catalogue, what to check on the vehicle: the gallery of causes has the same sentences."""
     return tomllib.loads(files("glider.tools.diagnose").joinpath("checks.toml").read_text(encoding="utf-8"))
+
+
+def check_of(label: str, place: tuple[str, str] = ("", "")) -> list[str]:
+    """What to check for a label, split at its code: by the place that a user's vehicle declares, or the catalogue's."""
+    family, name = place
+    said = OWN_CHECKS[family].format(name=name) if family in OWN_CHECKS else checks().get(label, "")
+    return said.split("`")
+
+
+def checks_of(labels: Iterable[str], certain: Container[str], places: Mapping[str, tuple[str, str]]) -> list[dict]:
+    """The steps of a page: every label with something to check; places: of labels of a declared vehicle."""
+    return [
+        {"label": label, "text": text, "certain": label in certain}
+        for label in dict.fromkeys(labels) if any(text := check_of(label, places.get(label, ("", ""))))
+    ]  # fmt: skip
 
 
 def steps(record: DiagnosisRecord) -> dict[str, Any]:
@@ -40,9 +61,7 @@ def steps(record: DiagnosisRecord) -> dict[str, Any]:
         "identify": answer.identify_first or words.guessed(record), "open": why, "nothing": nothing,
         "unknown": answer.verdict == "unknown", "parts": _parts(answer.next_run.parts),
         "enter": [_row(one) for one in answer.enter if one.label in certain],
-        "checks": [
-            {"label": label, "text": known[label].split("`"), "certain": label in certain} for label in labels
-        ],
+        "checks": checks_of(labels, certain, {}),
     }  # fmt: skip
 
 

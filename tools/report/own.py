@@ -8,6 +8,7 @@ from glider.tools.data.errors import InputError
 from glider.tools.data.files import write_bytes
 from glider.tools.own.diagnose import ANSWER, NONE, UNKNOWN, sentence
 from glider.tools.report import words
+from glider.tools.report.now import checks_of
 from glider.tools.report.page import REPORT, render
 
 MOST_RANKED, LEAST_PROBABILITY = 8, 0.005
@@ -32,6 +33,7 @@ def own_report_html(answer: dict[str, Any]) -> str:
         for cause in answer["causes"] for label, size in cause["parameters"].items()
         if label in answer["selected"] or label == answer["causes"][0]["label"]
     ]  # fmt: skip
+    confounded = answer["causes"][0]["group"] if answer["verdict"] == "cause" else []
     context = {
         "which": "the case's runs", "blind": False, "runs": "run",
         "asked": "Probabilities of the main change from the identified vehicle.",
@@ -48,6 +50,10 @@ def own_report_html(answer: dict[str, Any]) -> str:
             {"name": name, "total": words.number(total), "percent": 100.0 * total / highest} for name, total in stages
         ],
         "table": [{"name": name, "cells": _cells(gap, name)} for name in gap["before"]],
+        "steps": checks_of(
+            [*answer["selected"], *confounded], answer["selected"],
+            {label: _place(label, places) for label in [*answer["selected"], *confounded]},
+        ),
         "next_run": "",
     }  # fmt: skip
     return render("pooled.html", context).replace(" %", "\N{NO-BREAK SPACE}%")

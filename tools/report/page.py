@@ -26,7 +26,10 @@ def plotting(script: str) -> dict[str, str]:
 
 def render(template: str, context: dict[str, Any]) -> str:
     """The text of a page. Every name that the template uses must be in the context."""
-    from jinja2 import Environment, StrictUndefined
+    from jinja2 import Environment, FunctionLoader, StrictUndefined
 
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
+        loader=FunctionLoader(text_of),
+    )  # fmt: skip
     return environment.from_string(text_of(template)).render(context | {"style": text_of("page.css")})

@@ -15,6 +15,7 @@ from glider.sim_backend.ocean.vehicle import KIND
 from glider.tools.data.files import write_bytes
 from glider.tools.diagnose.record import AGAINST_HEALTHY, ANSWER, CauseRecord, Gap, number, read_as
 from glider.tools.report import words
+from glider.tools.report.now import checks_of
 from glider.tools.report.page import REPORT, render
 
 MOST_RANKED, LEAST_PROBABILITY = 8, 0.005
@@ -166,6 +167,7 @@ def report_html(found: _Answer) -> str:
     gap = found.gap
     highest = max([number(one.gap["total"]) for one in found.stages], default=1.0)
     healthy = found.reference
+    confounded = found.causes[0].group if found.verdict == "cause" else []
     context = {
         "which": which(found).removesuffix(","),
         "blind": found.verdict == "none" and words.blind(gap),
@@ -187,6 +189,7 @@ def report_html(found: _Answer) -> str:
                                      (gap.before, gap.recalibrated, gap.after, gap.floor)]}
             for name in gap.before
         ],
+        "steps": checks_of([*found.selected, *confounded], found.selected, {}),
         "next_run": found.next_run.get("text", ""),
     }  # fmt: skip
     return render("pooled.html", context).replace(" %", "\N{NO-BREAK SPACE}%")

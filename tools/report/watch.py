@@ -12,7 +12,7 @@ from glider.tools.data.files import write_bytes
 from glider.tools.data.runs.origin import with_flight
 from glider.tools.diagnose.record import EstimateRecord
 from glider.tools.report import words
-from glider.tools.report.now import checks
+from glider.tools.report.now import checks_of
 from glider.tools.report.page import REPORT, render
 from glider.tools.report.run_picture import Point, RunPicture, Span, svg_over_runs
 from glider.tools.watch.answer import FILE
@@ -193,9 +193,10 @@ def report_html(found: _Watch) -> str:
 
 def _steps(found: _Watch) -> list[dict[str, Any]]:
     """What to check on the vehicle, for every change that is still there."""
-    known = checks()
-    labels = dict.fromkeys(one.label for one in found.events if one.to_run is None and one.label in known)
-    return [{"label": label, "text": known[label].split("`")} for label in labels if label is not None]
+    lasting = [(one.label, one.where) for one in found.events if one.to_run is None and one.label is not None]
+    places = {label: (str(where[0]["subsystem"]), str(where[0]["element"])) for label, where in lasting if where}
+    labels = [label for label, _ in lasting]
+    return checks_of(labels, labels, places)
 
 
 def write_watch_report(folder: Path) -> str:
