@@ -54,12 +54,12 @@ def decode_event(data: bytes) -> tuple[int, str]:
     return severity, text.decode("utf-8")
 
 
-def start_writer(stream: Any) -> Writer:
+def start_writer(stream: Any, profile: str = "ros2") -> Writer:
     """An MCAP writer with all its checksums, its head written; `stream` takes write, tell and flush."""
     writer = Writer(
         stream, chunk_size=CHUNK_BYTES, compression=CompressionType.NONE, enable_crcs=True, enable_data_crcs=True
     )
-    writer.start(profile="ros2", library=f"glider; {LIBRARY_IDENTIFIER}")
+    writer.start(profile=profile, library=f"glider; {LIBRARY_IDENTIFIER}")
     return writer
 
 

@@ -5,14 +5,17 @@ import io
 import json
 import re
 import shutil
+import struct
 import subprocess
 import sys
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 from urllib.parse import unquote
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
 from msgspec.structs import replace
 
 from glider.firmware.core.vehicle import layout
@@ -20,6 +23,7 @@ from glider.tools.cli.common import report_errors
 from glider.tools.cli.main import cli
 from glider.tools.data.runs.case import load_case, write_case
 from glider.tools.diagnose.record import Curves, DiagnosisRecord, read_record
+from glider.tools.inference.channels import ROUGHIE_MEASURES
 from glider.tools.inference.corrected import load_corrected
 from glider.tools.inference.model import nominal_model
 from glider.tools.report import words
@@ -327,3 +331,53 @@ def test_six_runs_of_three_minutes_stay_within_three_megabytes(folder, said, tmp
     page = report_html(whole).encode()
     assert 1_000_000 < len(page) <= MOST_BYTES
     assert report_html(whole).encode() == page
+
+
+@pytest.mark.skipif(find_spec("foxglove") is None, reason="the extra `live` is not installed")
+def test_the_runs_for_foxglove_hold_the_three_poses(folder, said, tmp_path, capsys):
+    assert glider("gap", "report", folder.parent / "answer", "--foxglove", tmp_path / "fox") == 0
+    paths = [Path(line) for line in capsys.readouterr().out.split()]
+    assert [path.name for path in paths] == ["run00.mcap", "run01.mcap", "layout.json"]
+    curves = read_record(folder.parent / "answer").curves[1]
+    poses: dict[str, list] = {}
+    with paths[1].open("rb") as stream:
+        for schema, channel, message in make_reader(stream).iter_messages():
+            assert (schema.name, schema.encoding) == ("foxglove.FrameTransform", "protobuf")
+            poses.setdefault(channel.topic, []).append((message.log_time, translation(message.data)))
+    assert set(poses) == {"/measured", "/nominal", "/corrected"}
+    depth, north, east = (ROUGHIE_MEASURES.columns.index(name) for name in ("depth_m", "mocap_x_m", "mocap_y_m"))
+    poses_of = [
+        depth,
+        north,
+        east,
+        *(ROUGHIE_MEASURES.columns.index(f"{name}_rad") for name in ("roll", "pitch", "yaw")),
+    ]
+    for topic, found in poses.items():
+        table = getattr(curves, topic[1:])
+        whole = np.isfinite(table[:, poses_of]).all(axis=1)
+        assert whole.sum() > 0.9 * len(curves.t)
+        assert [ns / 1e9 for ns, _ in found] == pytest.approx(1.0 + curves.t[whole], abs=1e-6)
+        wanted = np.stack([table[:, north], -table[:, east], -table[:, depth]], axis=1)[whole]
+        assert np.array([xyz for _, xyz in found]) == pytest.approx(wanted)
+    plot = json.loads(paths[2].read_text())["configById"]["Plot!height"]
+    assert {path["value"].split(".")[0] for path in plot["paths"]} == set(poses)
+    assert glider("gap", "report", folder.parent / "answer", "--foxglove", tmp_path / "fox") == 2
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert "is there already" in line
+
+
+def translation(data: bytes) -> list[float]:
+    """x, y, z of a FrameTransform: field 4, whose fields 1 to 3 are doubles; 0 is left out."""
+    body = fields(data)[4]
+    return [struct.unpack("<d", known)[0] if (known := fields(body).get(n)) else 0.0 for n in (1, 2, 3)]
+
+
+def fields(data: bytes) -> dict[int, bytes]:
+    """Fields of a protobuf message by number: doubles and lengths, of less than 128 bytes each."""
+    found, at = {}, 0
+    while at < len(data):
+        number, kind = data[at] >> 3, data[at] & 7
+        size, head = (8, 1) if kind == 1 else (data[at + 1], 2)
+        found[number] = data[at + head : at + head + size]
+        at += head + size
+    return found

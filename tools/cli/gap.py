@@ -209,8 +209,15 @@ def velocity(case: Path, model: str, out: Path, as_json: bool) -> None:
 
 @gap.command()
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
-def report(folder: Path) -> None:
+@click.option(
+    "--foxglove", type=click.Path(path_type=Path, file_okay=False), metavar="OUT",
+    help="Write the drawn runs as MCAP (measured, nominal, corrected pose) and Foxglove's layout into OUT, and stop.",
+)  # fmt: skip
+def report(folder: Path, foxglove: Path | None) -> None:
     """Draw report.html again from what `glider gap diagnose` or `glider gap watch` left in DIR; print its verdict."""
+    if foxglove is not None:
+        _replay(folder, foxglove)
+        return
     import json
 
     from glider.tools.api.sentences import verdict_lines
@@ -237,6 +244,18 @@ def report(folder: Path) -> None:
         for line in verdict_lines(json.loads((folder / ANSWER).read_text(encoding="utf-8"))):
             click.echo(line)
     say(f"report: {folder / REPORT}")
+
+
+def _replay(folder: Path, out: Path) -> None:
+    """The drawn runs of a diagnosis for Foxglove."""
+    from glider.tools.data.errors import need
+    from glider.tools.data.files import check_writable
+    from glider.tools.report.foxglove import write_foxglove
+
+    need("live")
+    check_writable(out)
+    for path in write_foxglove(folder, out):
+        click.echo(path)
 
 
 gap.add_command(compare)

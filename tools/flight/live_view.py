@@ -144,24 +144,33 @@ class View:
 
     def _transform(self, record: LiveRecord, now: int) -> Any:
         """Body in the world for a 3D panel: x north, y west, z up, from north, east, down."""
-        messages, spec = self._fg.messages, record.spec
+        spec = record.spec
         assert spec is not None
-        x, y, z, roll, pitch, yaw = (
+        pose = (
             0.0 if math.isnan(number) else number
             for number in (
                 record.numbers[spec.index(name)]
                 for name in ("est_x_m", "est_y_m", "est_depth_m", "est_roll_rad", "est_pitch_rad", "est_yaw_rad")
             )
         )
-        w, i, j, k = quaternion_from_euler(roll, -pitch, -yaw)
-        return messages.FrameTransform(
-            timestamp=messages.Timestamp(now // 1_000_000_000, now % 1_000_000_000), parent_frame_id="world",
-            child_frame_id="glider", translation=messages.Vector3(x=x, y=-y, z=-z),
-            rotation=messages.Quaternion(x=i, y=j, z=k, w=w),
-        )  # fmt: skip
+        return body_in_world(now, "glider", *pose)
 
     def close(self) -> None:
         self.server.stop()
+
+
+def body_in_world(
+    ns: int, name: str, north: float, east: float, depth: float, roll: float, pitch: float, yaw: float
+) -> Any:
+    """A body at a time (ns) as Foxglove's FrameTransform, in the frame `world`: x north, y west, z up; m, rad."""
+    from foxglove import messages
+
+    w, i, j, k = quaternion_from_euler(roll, -pitch, -yaw)
+    return messages.FrameTransform(
+        timestamp=messages.Timestamp(ns // 1_000_000_000, ns % 1_000_000_000), parent_frame_id="world",
+        child_frame_id=name, translation=messages.Vector3(x=north, y=-east, z=-depth),
+        rotation=messages.Quaternion(x=i, y=j, z=k, w=w),
+    )  # fmt: skip
 
 
 def layout() -> str:
