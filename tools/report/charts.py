@@ -38,6 +38,7 @@ class Chart:
     bands: list[Band] = field(default_factory=list)
     down: bool = False
     square: bool = False
+    height: int = HEIGHT
 
 
 def ticks(low: float, high: float, count: int = 5) -> np.ndarray:
@@ -87,7 +88,7 @@ def _path(x: np.ndarray, y: np.ndarray) -> str:
 
 def svg(chart: Chart, least: float = 1e-3) -> str:
     """The chart as an <svg> element; `least` is the smallest span of the y axis, so that noise is not blown up."""
-    height = 2 * HEIGHT if chart.square else HEIGHT
+    height = 2 * HEIGHT if chart.square else chart.height
     box_w, box_h = WIDTH - LEFT - RIGHT, height - TOP - BOTTOM
     x0, x1 = _range([line.x for line in chart.lines], 1e-3 if not chart.square else least)
     y0, y1 = _range([line.y for line in chart.lines], least)
@@ -111,7 +112,7 @@ def svg(chart: Chart, least: float = 1e-3) -> str:
         a, b = float(px(max(band.first, x0))), float(px(min(band.last, x1)))
         if b > a:
             out.append(f'<rect class="{band.style}" x="{a:.1f}" y="{TOP}" width="{b - a:.1f}" height="{box_h}"/>')
-    for value in ticks(y0, y1, 8 if chart.square else 5):
+    for value in ticks(y0, y1, 8 if chart.square else 5 if chart.height == HEIGHT else 3):
         y = float(py(value))
         out.append(f'<path class="grid" d="M{LEFT} {y:.1f}H{WIDTH - RIGHT}"/>')
         out.append(f'<text class="tick" x="{LEFT - 6}" y="{y + 4:.1f}" text-anchor="end">{label(value)}</text>')

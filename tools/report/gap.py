@@ -9,12 +9,13 @@ import numpy as np
 from glider.tools.data.files import write_bytes
 from glider.tools.data.runs.origin import flights_of, with_flight
 from glider.tools.gap.assess import CaseGap
-from glider.tools.inference.channels import Channel
-from glider.tools.report.charts import Chart, svg
-from glider.tools.report.lines import bands, compared, plan_chart
+from glider.tools.inference.channels import Channel, errors
+from glider.tools.report.charts import Chart, Curve, svg
+from glider.tools.report.lines import bands, broken, compared, plan_chart
 from glider.tools.report.page import render
 
 MOST_RUNS = 12  # with pictures; of a longer case those with the largest gaps
+OFF_HEIGHT = 110  # px, of measured minus predicted below its channel
 RATE_NAMES = ("roll rate p", "pitch rate q", "yaw rate r")
 # What a part's name says to a reader who has not read the contract.
 PARTS = {
@@ -29,8 +30,8 @@ def _charts(found: CaseGap, n: int) -> list[dict[str, Any]]:
     table, gaps, t = found.measures.measured(run), found.runs[n].channels, run.t
     drawn: list[dict[str, Any]] = []
 
-    def add(channel: Channel, chart: Chart, least: float) -> None:
-        drawn.append({"title": chart.title, "gap": gaps.get(channel.name), "svg": svg(chart, least)})
+    def add(channel: Channel, chart: Chart, least: float, off: str = "") -> None:
+        drawn.append({"title": chart.title, "gap": gaps.get(channel.name), "svg": svg(chart, least), "off": off})
 
     for channel in found.measures.channels_of(run):
         if channel.joint:
@@ -40,7 +41,14 @@ def _charts(found: CaseGap, n: int) -> list[dict[str, Any]]:
             said = {"predicted": Y[:, column]}
             lines = compared(t, table[:, column], said, listed, channel.scale, channel.wrapped)
             chart = Chart(title, "s", lines, bands(t, listed), down=channel.name == "depth")
-            add(channel, chart, 4.0 * channel.tolerance * channel.scale)
+            tolerance = channel.tolerance * channel.scale
+            error = errors(channel, table, Y)[:, k] * tolerance
+            limits = [Curve(t[[0, -1]], np.full(2, side * tolerance), "limit") for side in (-1.0, 1.0)]
+            off = Chart(
+                f"{title}: measured minus predicted, between dashed lines within the tolerance", "s",
+                [*limits, broken(t, error, listed, "predicted")], bands(t, listed), chart.down, height=OFF_HEIGHT,
+            )  # fmt: skip
+            add(channel, chart, 4.0 * tolerance, svg(off, 2.6 * tolerance))
     for channel in found.measures.channels_of(run):
         if channel.joint:
             add(channel, plan_chart(table, {"predicted": Y}, channel.columns, listed), 1.0)

@@ -60,7 +60,7 @@ def steps(record: DiagnosisRecord) -> dict[str, Any]:
     return {
         "identify": answer.identify_first or words.guessed(record), "open": why, "nothing": nothing,
         "unknown": answer.verdict == "unknown", "parts": _parts(answer.next_run.parts),
-        "enter": [_row(one) for one in answer.enter if one.label in certain],
+        "enter": [_row(one) for one in answer.enter if one.label in certain and _moved(one)],
         "checks": checks_of(labels, certain, {}),
     }  # fmt: skip
 
@@ -84,6 +84,11 @@ def _open(record: DiagnosisRecord) -> str:
     if answer.causes[0].probability < words.SURE_PROBABILITY:
         return f"the answer is only {words.sure(answer.causes[0].probability)} sure"
     return ""
+
+
+def _moved(one: Entry) -> bool:
+    """Whether the 90 % interval of a number leaves out what the file has."""
+    return not min(map(number, one.ci90)) <= number(one.file) <= max(map(number, one.ci90))
 
 
 def _row(one: Entry) -> dict[str, str]:

@@ -185,7 +185,7 @@ function replay() {
   c.restore();
   if (plan) {
     const seen = [north, east].map(one => MODELS.flatMap(name => one[name]).filter((v, k) => v !== null && k % 7 === 0));
-    const [N, E] = seen.map(v => [Math.min(...v), Math.max(...v)]), scale = Math.min((high - 44) / (N[1] - N[0] + 1), (plan - 30) / (E[1] - E[0] + 1));
+    const [N, E] = seen.map(v => [Math.min(...v), Math.max(...v)]), scale = Math.min((high - 80) / (N[1] - N[0] + 1), (plan - 60) / (E[1] - E[0] + 1));
     const px = v => side + plan / 2 + scale * (v - (E[0] + E[1]) / 2), py = v => high / 2 - scale * (v - (N[0] + N[1]) / 2);
     c.fillStyle = colour("soft"); c.fillText("from above, north up", side + 8, 14);
     for (const name of HULLS) {

@@ -39,11 +39,12 @@ def test_numbers_are_those_of_the_measure(found, page):
 
 
 def test_every_run_has_its_pictures(found, page):
-    # depth, pitch, roll, yaw, three rates, slider, ballast, plan
-    assert page.count("<svg") == 10 * len(found.runs)
-    assert page.count('class="line predicted"') == 10 * len(found.runs)
-    assert page.count('class="start"') == 9 * 2 * len(found.runs)  # two whole windows
-    assert page.count('class="unscored"') == 9 * len(found.runs)
+    # depth, pitch, roll, yaw, three rates, slider, ballast, each with its error; plan
+    assert page.count("<svg") == 19 * len(found.runs)
+    assert page.count('class="line predicted"') == 19 * len(found.runs)
+    assert page.count('class="line limit"') == 9 * 2 * len(found.runs)
+    assert page.count('class="start"') == 18 * 2 * len(found.runs)  # two whole windows
+    assert page.count('class="unscored"') == 18 * len(found.runs)
 
 
 def test_names_from_outside_are_no_markup(found, monkeypatch):
@@ -54,7 +55,7 @@ def test_names_from_outside_are_no_markup(found, monkeypatch):
 def test_a_long_case_shows_its_worst_runs(found, monkeypatch):
     monkeypatch.setattr(gap_report, "MOST_RUNS", 1)
     page = report_html(found)
-    assert page.count("<svg") == 10
+    assert page.count("<svg") == 19
     worst = max(found.runs, key=lambda run: run.total).name
     assert f"<h2>{worst}</h2>" in page
     assert "1 more run with smaller gaps" in page
