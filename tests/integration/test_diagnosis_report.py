@@ -8,6 +8,7 @@ import shutil
 import struct
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
@@ -314,8 +315,24 @@ def test_nothing_is_requested_and_print_is_dark_on_light(shown):
     assert luminance(shown.value("getComputedStyle(document.body).backgroundColor")) > 0.9
     assert luminance(shown.value("getComputedStyle(document.body).color")) < 0.1
     assert shown.value("getComputedStyle(document.querySelector('.bar-of-tools')).display") == "none"
+    tabs = shown.value("[...document.querySelectorAll('[role=tab]')].map(one => getComputedStyle(one).display)")
+    assert sum(one != "none" for one in tabs) == 1  # the run that is drawn has its name
+    wide, box = shown.value(
+        "['.plot canvas', '.plot'].map(name => document.querySelector(name).getBoundingClientRect().width)"
+    )
+    assert wide <= box  # no part of a chart is cut off
     shown.value("dispatchEvent(new Event('afterprint'))")
     shown.view(1200, 900)
+
+
+def test_a_click_saves_the_mission(shown, folder, tmp_path):
+    shown.view(1200, 900)
+    shown.command("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(tmp_path))
+    shown.click("a[download]")
+    saved, end = tmp_path / "next_run.toml", time.monotonic() + 10.0
+    while not saved.is_file() and time.monotonic() < end:
+        time.sleep(0.05)
+    assert saved.read_text() == (folder.parent / "answer" / "next_run.toml").read_text()
 
 
 def test_six_runs_of_three_minutes_stay_within_three_megabytes(folder, said, tmp_path):

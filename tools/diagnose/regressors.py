@@ -10,14 +10,13 @@ import numpy as np
 
 from glider.tools.data.intervals import NINETY
 from glider.tools.diagnose.record import Regressor, RunEstimate
-from glider.tools.diagnose.residuals import FEATURE_UNITS, features
+from glider.tools.diagnose.residuals import FEATURE_UNITS, features, smoothed
 from glider.tools.diagnose.search import Search
 from glider.tools.gap.measure import scored_rows
 from glider.tools.inference.fit import NUISANCE_LIMIT, Hypothesis, bounded_step
 
 BINS, LEAST_IN_BIN = 24, 12  # of a feature; samples of each
 PREFERRED = 0.01  # share of the prediction by which a later feature must explain more
-SMOOTHED_SECONDS = 2.0  # over which the prediction is averaged, to find the second in which it is largest
 
 
 def regressors(search: Search, hypothesis: Hypothesis) -> list[Regressor]:
@@ -26,7 +25,8 @@ def regressors(search: Search, hypothesis: Hypothesis) -> list[Regressor]:
         return []
     search.fitter.linearise([hypothesis])
     estimates = _by_run(search, hypothesis)
-    return [_regressor(search, hypothesis, label, estimates) for label in dict.fromkeys(hypothesis.labels)]
+    found = [_regressor(search, hypothesis, label, estimates) for label in dict.fromkeys(hypothesis.labels)]
+    return [one for one in found if len(one.bins) > 1]
 
 
 def _regressor(
@@ -60,8 +60,8 @@ def _regressor(
 def _bins(values: np.ndarray) -> list[np.ndarray]:
     """Indices of equally filled bins of a feature, in its order; equal values stay together."""
     order = np.argsort(values, kind="stable")
-    edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, BINS + 1)))
-    parts = np.split(order, np.searchsorted(values[order], edges[1:-1], side="right"))
+    edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, BINS + 1)[1:-1]))
+    parts = np.split(order, np.searchsorted(values[order], edges, side="right"))
     return [part for part in parts if len(part) >= LEAST_IN_BIN]
 
 
@@ -84,8 +84,7 @@ def _largest(problem, rows: np.ndarray, fit: np.ndarray) -> tuple[str, float]:
     best = (problem.runs[0].name, float(t[0]), -1.0)
     for n, run in enumerate(problem.runs):
         first, last = bounds[n], bounds[n + 1]
-        width = max(1, int(SMOOTHED_SECONDS / max(float(np.median(np.diff(t[first:last]))), 1e-3)))
-        mean = np.convolve(square[first:last], np.full(width, 1.0 / width), mode="same")
+        mean = smoothed(square[first:last], t[first:last])
         mean *= scored_rows(problem.kind.measures.windows(run.t), run.rows)
         at = int(mean.argmax())
         if mean[at] > best[2]:

@@ -20,6 +20,7 @@ FEATURE_UNITS = {
     "yaw rate": "rad/s", "angle of attack": "rad", "sideslip": "rad", "servo": "rad", "slider": "m", "ballast": "kg",
     "pump running": "", "pump expelling": "",
 }  # fmt: skip
+SMOOTHED_SECONDS = 2.0  # over which something is averaged, to find where it is largest
 UNCLEAN = 6.0  # sigma, corrected for the number of tests
 
 
@@ -37,6 +38,13 @@ def features(problem: Problem, gains: Gains) -> dict[str, np.ndarray]:
         "servo": x[:, X_SERVO], "slider": x[:, X_SLIDER], "ballast": x[:, X_BALLAST],
         "pump running": (np.abs(moving) > 0.003).astype(float), "pump expelling": (moving < -0.003).astype(float),
     }  # fmt: skip
+
+
+def smoothed(values: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Values (rows,) averaged over SMOOTHED_SECONDS about each sample at t (rows,)."""
+    width = int(SMOOTHED_SECONDS / max(float(np.median(np.diff(t))), 1e-3)) if len(t) > 1 else 1
+    width = min(max(width, 1), len(values))
+    return np.convolve(values, np.full(width, 1.0 / width), mode="same")
 
 
 def pump_speed(problem: Problem, gains: Gains) -> np.ndarray:

@@ -14,6 +14,7 @@ import numpy as np
 from glider.firmware.core.maths.rotations import wrap
 from glider.tools.data.runs.origin import with_flight
 from glider.tools.diagnose.record import Curves, DiagnosisRecord, Picture, number
+from glider.tools.diagnose.residuals import smoothed
 from glider.tools.gap.measure import scored_rows
 from glider.tools.inference.channels import DEGREES, ROUGHIE_MEASURES, Channel
 from glider.tools.inference.windows import Window
@@ -22,7 +23,6 @@ from glider.tools.report import words
 MOST_ROWS = 2400  # of a run, in the page
 LONGEST_HELD = 0.3  # s; a reading that comes more rarely than the log is drawn without gaps up to here
 MISSING, HIGHEST = 65535, 65534  # codes
-SMOOTHED_SECONDS = 2.0  # over which an error is averaged, to find where it is largest
 AXES = {"rates": ("roll rate", "pitch rate", "yaw rate"), "xy": ("north", "east")}  # of channels of several columns
 COMMANDS = (("servo command", "deg", DEGREES), ("slider command", "mm", 1000.0), ("ballast command", "g", 1000.0))
 CHART_OF_READING = {
@@ -92,12 +92,10 @@ class Traces:
                     continue
                 error = curves.measured[:, column] - getattr(curves, model)[:, column]
                 error = (wrap(error) if channel.wrapped else error) / channel.tolerance
-                square, t = _scored(error**2, curves.t), curves.t
-                width = max(1, int(SMOOTHED_SECONDS / max(float(np.median(np.diff(t))), 1e-3)))
-                mean = np.convolve(square, np.full(width, 1.0 / width), mode="same")
+                mean = smoothed(_scored(error**2, curves.t), curves.t)
                 at = int(mean.argmax())
                 if mean[at] > most:
-                    most, best = float(mean[at]), self.claim(picture.name, float(t[at]), name)
+                    most, best = float(mean[at]), self.claim(picture.name, float(curves.t[at]), name)
         return best
 
     def _run(self, picture: Picture, curves: Curves) -> dict[str, Any]:
