@@ -8,7 +8,7 @@ import numpy as np
 from glider.tools.report.charts import label, ticks
 
 WIDTH, PLOT_HEIGHT = 620, 170
-LEFT, RIGHT, TOP, BELOW = 56, 12, 12, 78
+LEFT, RIGHT, TOP, BELOW, DATES = 56, 12, 12, 60, 18
 LEAST_APART = 30.0  # px between two names under the axis
 MOST_LETTERS = 12  # of a name there
 
@@ -60,7 +60,7 @@ def svg_over_runs(picture: RunPicture) -> str:
     def py(value: float) -> float:
         return TOP + (high - value) / (high - low) * PLOT_HEIGHT
 
-    height = TOP + PLOT_HEIGHT + BELOW
+    height = TOP + PLOT_HEIGHT + BELOW + (DATES if any(date for _, date in picture.names) else 0)
     out = [f'<svg viewBox="0 0 {WIDTH} {height}" role="img" aria-label="{escape(picture.title)}">']
     for span in picture.spans:
         x, wide = px(span.first - 0.5), (span.last - span.first + 1) * step

@@ -120,7 +120,8 @@ def _event(one: _Event, flights: dict[str, str]) -> dict[str, Any]:
     if one.label is None:
         said = f"No effect of the catalogue explains it{f'; most likely in {place}' if place else ''}"
     else:
-        said = words.upper(words.with_sign(one.label, one.parameters))
+        plain = words.with_sign(one.label, one.parameters)
+        said = words.upper(plain) if plain != one.label else f"Of the {place}"
     others = [label for label in one.group if label != one.label]
     meaning = _meaning(one)
     return {
@@ -196,7 +197,8 @@ def _steps(found: _Watch) -> list[dict[str, Any]]:
     lasting = [(one.label, one.where) for one in found.events if one.to_run is None and one.label is not None]
     places = {label: (str(where[0]["subsystem"]), str(where[0]["element"])) for label, where in lasting if where}
     labels = [label for label, _ in lasting]
-    return checks_of(labels, labels, places)
+    confounded = [label for one in found.events if one.to_run is None for label in one.group]
+    return checks_of([*labels, *confounded], labels, places)
 
 
 def write_watch_report(folder: Path) -> str:
