@@ -80,6 +80,7 @@ CALLS: tuple[tuple[str, str | None], ...] = (
     ("gap readings case", "analysis"),
     ("gap isolability --columns pitch_rad,depth_m", "analysis"),
     ("gap report answer", "analysis"),
+    ("gap compare answer answer", "analysis"),
     ("gap watch case", "analysis"),
     ("gap velocity dives --out velocity", None),
     ("gap diagnose case --out answer", "analysis"),
