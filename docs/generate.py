@@ -1,4 +1,7 @@
-"""Generated pages of the reference: tables of what the code defines, written before Sphinx reads the pages."""
+"""Generated pages of the reference: tables of what the code defines, written before Sphinx reads the pages.
+
+`python docs/generate.py` writes the results of sealed sets into the committed pages (docs/blind_sets.py).
+"""
 
 import typing
 from collections.abc import Iterator
@@ -111,3 +114,9 @@ def commands() -> str:
     for name, (module, attribute, _) in COMMANDS.items():
         text += f"\n```{{click}} glider.tools.{module}:{attribute}\n:prog: glider {name}\n:nested: full\n```\n"
     return text
+
+
+if __name__ == "__main__":
+    from docs import blind_sets
+
+    blind_sets.write_pages()
