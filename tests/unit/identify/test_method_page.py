@@ -1,4 +1,4 @@
-"""The worked example and the decision rule of docs/explanation/identification.md, from its formulas and by the program."""
+"""Worked example and decision rule of docs/explanation/identification.md, from its formulas and by the program."""
 
 import math
 import re
