@@ -14,6 +14,7 @@ from glider.tools.verify.challenge.result import ResultFigure, SetResult, Stated
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "docs" / "results"
 PICTURE = ROOT / "docs" / "pictures" / "calibration.png"
+NO_BREAK = "\N{NO-BREAK SPACE}"  # within a number of a narrow table
 BINS = (0.0, 0.5, 0.8, 0.9, 0.95, 1.0)  # of stated probability
 WORDS = {
     "no_gap_called_gap": "unchanged cases called a gap",
@@ -92,7 +93,8 @@ def interval(figure: ResultFigure) -> str:
     if figure.ci90 is None:
         return ""
     low, high = (100.0 * end for end in figure.ci90)
-    return f"{low:.1f}-{high:.1f} %" if high < 2.0 else f"{low:.0f}-{high:.0f} %"
+    digits = 1 if high < 2.0 else 0
+    return f"{low:.{digits}f} to {high:.{digits}f} %".replace(" ", NO_BREAK)
 
 
 def target(figure: ResultFigure) -> tuple[str, str]:
@@ -101,7 +103,7 @@ def target(figure: ResultFigure) -> tuple[str, str]:
         return "", ""
     bound = "<=" if figure.bound == "at most" else ">="
     wanted = f"{figure.target:g}" if figure.count is None else f"{100.0 * figure.target:.0f} %"
-    return f"{bound} {wanted}", "met" if figure.met else "missed"
+    return f"{bound} {wanted}".replace(" ", NO_BREAK), "met" if figure.met else "missed"
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
