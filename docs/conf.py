@@ -12,11 +12,10 @@ sys.path.insert(0, str(HERE.parent))
 
 import gallery  # noqa: E402
 import generate  # noqa: E402
+import states  # noqa: E402
 import ziamath  # noqa: E402
 from docutils.nodes import SkipNode  # noqa: E402
 from latex2mathml.converter import convert  # noqa: E402
-from pygments.lexers.special import TextLexer  # noqa: E402
-from sphinx.highlighting import lexers  # noqa: E402
 
 project = "glider"
 author = "the glider project"
@@ -48,6 +47,16 @@ def unlink_code(app, docname, source):
         r"`\2`",
         source[0],
     )
+
+
+def draw_states(app, docname, source):
+    """A forge draws state diagrams from their text; the site has a picture."""
+    source[0] = states.drawn(source[0], HERE / "generated" / "states.svg", "../generated/states.svg")
+
+
+def skip_constructor(app, what, name, obj, skip, options):
+    """Results are made by functions: their constructors are no part of the API."""
+    return True if name == "__init__" else None
 
 
 def tidy_docstring(app, what, name, obj, options, lines):
@@ -97,11 +106,12 @@ def formula(translator, node):
 
 def setup(app):
     app.add_html_math_renderer("mathml", (inline_formula, None), (formula, None))
-    lexers["mermaid"] = TextLexer()  # a forge draws it; the site shows its text
     generate.write_all(HERE / "generated")
     gallery.write(HERE / "generated" / "causes")
     fonts = HERE / "generated" / "fonts"
     fonts.mkdir(exist_ok=True)
     shutil.copy(Path(ziamath.__file__).parent / "fonts" / "STIXTwoMath-Regular.ttf", fonts)
     app.connect("source-read", unlink_code)
+    app.connect("source-read", draw_states)
+    app.connect("autodoc-skip-member", skip_constructor)
     app.connect("autodoc-process-docstring", tidy_docstring, priority=900)
