@@ -26,7 +26,7 @@ class Page(HTMLParser):
 def broken(site: Path) -> list[str]:
     """Links that lead nowhere, one line each."""
     site = site.resolve()
-    pages = {path: Page(path) for path in site.rglob("*.html")}
+    pages = {path: Page(path) for path in sorted(site.rglob("*.html"))}
     wrong = []
     for path, page in pages.items():
         for link in page.links:

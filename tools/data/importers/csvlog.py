@@ -1,6 +1,7 @@
 """Anybody's CSV log into run data, by a mapping file."""
 
 import fnmatch
+import re
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -22,6 +23,8 @@ from glider.tools.data.runs.run import Run
 from glider.tools.data.sources import name_or_path
 
 MAX_ROWS = 10_000_000  # of one run: what a mistaken time unit would ask for
+CLOCK = re.compile(r"(\d{1,2}):(\d{2})(?::(\d{2}(?:\.\d*)?))?")
+HALF_A_DAY = 43200.0  # s; a time of day that goes back by more is of the next day
 
 
 @dataclass
@@ -167,6 +170,8 @@ class _Source:
         time, table = self.mapping.time, self.table
         if time.unit == "iso8601":
             logged, per_unit = self._iso_seconds(), 1.0
+        elif time.unit == "clock":
+            logged, per_unit = self._clock_seconds(), 1.0
         elif self.mapping.text.bad_fields == "refuse":
             logged, per_unit = table.numbers(time.column), TIME_UNITS[time.unit]
         else:
@@ -205,6 +210,21 @@ class _Source:
             except (ValueError, TypeError):  # no date, or some with and some without a time zone
                 if self.mapping.text.bad_fields == "refuse":
                     raise table.error(f"not a date and time: {text[:40]!r}", row=row, column=column) from None
+        return seconds
+
+    def _clock_seconds(self) -> np.ndarray:
+        """Times of day as seconds, going on through midnight; NaN where there is none, (rows,)."""
+        table, column = self.table, self.mapping.time.column
+        seconds, days, before = np.full(table.rows, np.nan), 0, 0.0
+        for row, text in enumerate(table.texts(column)):
+            match = CLOCK.fullmatch(text.strip().replace(",", "."))
+            if match is not None:
+                hours, minutes, of_minute = match.groups()
+                value = 3600.0 * float(hours) + 60.0 * float(minutes) + float(of_minute or 0.0)
+                days += value < before - HALF_A_DAY
+                seconds[row], before = value + 2.0 * HALF_A_DAY * days, value
+            elif text.strip() and self.mapping.text.bad_fields == "refuse":
+                raise table.error(f"not a time of day (12:34:56.7): {text[:40]!r}", row=row, column=column)
         return seconds
 
 
