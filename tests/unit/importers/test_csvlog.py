@@ -225,6 +225,16 @@ def test_pressure_becomes_depth_of_this_water(folder):
     np.testing.assert_allclose(run.columns["depth_m"], (counts - 100) * 500 / (1000 * 9.80665), atol=0.003)
 
 
+def test_an_absolute_pressure_is_noted(folder):
+    text = MAP.replace('unit = "ft"', 'unit = "kPa"').replace("zero = 100\nscale = 0.04", "scale = 0.04")
+    rows = [f"{20 * n},{2450 + n % 50},1,2" for n in range(250)]  # 98 kPa and more
+    (folder / "a.csv").write_text("\n".join(["millis,adc,pitch,yaw", *rows]))
+    notes = _import(folder, text=text).notes
+    assert any("never less than 10.0 m: an absolute pressure? `zero`" in note for note in notes)
+    zeroed = text.replace("scale = 0.04", "scale = 0.04\nzero = 2450")
+    assert not any("absolute" in note for note in _import(folder, out="other", text=zeroed).notes)
+
+
 def test_values_that_cannot_be_are_missing(folder):
     _import(folder, text=MAP.replace("max_gap_s = 0.3\n", "").replace("scale = 0.04", "scale = 0.04\nvalid = [0, 0.4]"))
     depth = load_case(folder / "out").runs[0].columns["depth_m"]
