@@ -147,7 +147,7 @@ class _Source:
         return Run(name, self.path, numbers, extra, self.path.name, start)
 
     def _note_atmosphere(self, depth: np.ndarray | None) -> None:
-        """Note a pressure whose least depth is that of the atmosphere, and whose reading at the surface is not given."""
+        """Note a pressure whose least depth is that of the atmosphere, without its reading at the surface."""
         item = self.mapping.columns.get(names.DEPTH)
         if depth is None or item is None or item.unit not in units_of("pressure") or item.zero or item.offset:
             return
