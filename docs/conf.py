@@ -33,6 +33,7 @@ html_title = "glider"
 html_static_path = ["static", "generated/fonts"]
 html_css_files = ["site.css"]
 default_role = "code"
+smartquotes = False  # `--option` stays as it is typed
 html_math_renderer = "mathml"
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"
@@ -62,6 +63,11 @@ def skip_constructor(app, what, name, obj, skip, options):
 def tidy_docstring(app, what, name, obj, options, lines):
     """Docstrings are plain prose: markup that Sphinx would misread is escaped."""
     lines[:] = [line.replace("*", r"\*").replace("|", r"\|").replace("_,", r"\_,") for line in lines]
+
+
+def tidy_help(app, command, lines):
+    """Help of commands is plain prose, too."""
+    lines[:] = [line.replace("*", r"\*") for line in lines]
 
 
 STYLES = {"bold": "BOLD", "double-struck": "DOUBLE-STRUCK", "script": "SCRIPT", "sans-serif": "SANS-SERIF"}
@@ -114,4 +120,6 @@ def setup(app):
     app.connect("source-read", unlink_code)
     app.connect("source-read", draw_states)
     app.connect("autodoc-skip-member", skip_constructor)
+    for part in ("description", "options", "arguments"):
+        app.connect(f"sphinx-click-process-{part}", tidy_help)
     app.connect("autodoc-process-docstring", tidy_docstring, priority=900)

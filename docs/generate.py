@@ -112,7 +112,8 @@ def commands() -> str:
 
     text = "# Every command and option\n\nGenerated from the command line.\n"
     for name, (module, attribute, _) in COMMANDS.items():
-        text += f"\n```{{click}} glider.tools.{module}:{attribute}\n:prog: glider {name}\n:nested: full\n```\n"
+        directive = f".. click:: glider.tools.{module}:{attribute}\n   :prog: glider {name}\n   :nested: full\n"
+        text += f"\n```{{eval-rst}}\n{directive}```\n"
     return text
 
 
