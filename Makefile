@@ -48,9 +48,10 @@ explore: setup
 	@$(BIN)/python -m tests.support.precompile
 	$(BIN)/python -m pytest -n 4 --dist loadfile -m hypothesis --hypothesis-profile explore
 
-# The site of the documentation, in out/docs; a warning is an error.
+# The site of the documentation, in out/docs; a warning is an error, and so is a link within it that leads nowhere.
 docs: $(STAMP)
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs out/docs
+	@$(BIN)/python docs/links.py out/docs
 	@echo 'site: out/docs/index.html'
 
 check: setup lint types contract docs test

@@ -1,4 +1,7 @@
-"""Generated pages of the reference: tables of what the code defines, written before Sphinx reads the pages."""
+"""Generated pages of the reference: tables of what the code defines, written before Sphinx reads the pages.
+
+`python docs/generate.py` writes the results of sealed sets into the committed pages (docs/blind_sets.py).
+"""
 
 import typing
 from collections.abc import Iterator
@@ -109,5 +112,12 @@ def commands() -> str:
 
     text = "# Every command and option\n\nGenerated from the command line.\n"
     for name, (module, attribute, _) in COMMANDS.items():
-        text += f"\n```{{click}} glider.tools.{module}:{attribute}\n:prog: glider {name}\n:nested: full\n```\n"
+        directive = f".. click:: glider.tools.{module}:{attribute}\n   :prog: glider {name}\n   :nested: full\n"
+        text += f"\n```{{eval-rst}}\n{directive}```\n"
     return text
+
+
+if __name__ == "__main__":
+    from docs import blind_sets
+
+    blind_sets.write_pages()

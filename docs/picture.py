@@ -51,7 +51,7 @@ def draw(answer: Path, picture: Path) -> None:
             error = channel.scale * (curves[f"{table}_0"][:, column] - curves["measured_0"][:, column])
             shown.plot(curves["t_0"], error, color=colour, lw=1.2, label=table)
         shown.set(ylabel=f"{channel.name} error, {channel.unit}")
-    axes["depth"].legend(frameon=False, fontsize=8, ncols=3)
+    axes["depth"].legend(frameon=False, fontsize=8, ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0))
     axes["pitch"].set(xlabel="time in a held-out flight, s")
     causes = found["causes"][:MOST_CAUSES][::-1]
     axes["causes"].barh([one["label"] for one in causes], [one["probability"] for one in causes], color="tab:blue")

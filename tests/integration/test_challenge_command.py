@@ -104,8 +104,10 @@ def test_right_answers_score_full_marks(made, tmp_path, monkeypatch, capsys):
     # a model that is the nominal one closes nothing, measured by flying both
     assert figures["closed"]["value"] == pytest.approx(0.0, abs=1e-9)
     assert figures["seconds"]["value"] == 5.0
-    assert run(monkeypatch, "score", *common, "--no-closed") == 0
+    result = tmp_path / "single-6.json"
+    assert run(monkeypatch, "score", *common, "--no-closed", "--out", result, "--commit", "1234567") == 0
     assert "right cause first" in capsys.readouterr().out
+    assert json.loads(result.read_text())["figures"]["right_cause_first"]["count"] == 1
 
 
 @pytest.mark.slow

@@ -75,7 +75,9 @@ def test_identified_diagnosed_and_scored(made, tmp_path, monkeypatch, capsys):
     assert figures["unchanged_called_cause"]["of"] + figures["right_cause_first"]["of"] == 1
     assert figures["identified_worse"]["of"] == figures["healthy_file"]["of"] == 1
     assert figures["healthy_file"]["value"] > 1.0
-    assert figures["sure_and_wrong"]["target"] is figures["sure_and_wrong"]["met"] is None
+    assert figures["identified_worse"]["target"] is figures["identified_worse"]["met"] is None
+    assert figures["sure_and_wrong"]["target"] == 0.04
+    assert figures["sure_and_wrong"]["met"] == (figures["sure_and_wrong"]["count"] == 0)
     assert command(monkeypatch, *score) == 0
     assert "unchanged, called unknown" in capsys.readouterr().out
     # a case of which a healthy run is not the promised one is refused

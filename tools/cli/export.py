@@ -19,8 +19,19 @@ def export() -> None:
     "--with", "answers", multiple=True, metavar="DIR", type=click.Path(path_type=Path),
     help="Folder of `gap velocity`, `watch` or `diagnose`: its answer goes into the file. Several may be given.",
 )  # fmt: skip
+@click.option("--contributor", default="unknown", help="Name of the principal investigator.")
+@click.option("--email", default="unknown", help="E-mail address of the principal investigator.")
+@click.option("--institution", default="unknown", help="Institution that operates the glider.")
+@click.option("--wmo", default="unknown", help="WMO identifier of the glider.")
+@click.option(
+    "--data-mode", type=click.Choice(["R", "P", "A", "D", "M"]), default="R", show_default=True,
+    help="Real time, provisional, adjusted, delayed, or mixed.",
+)  # fmt: skip
 @json_option
-def og1(case: Path, out: Path, answers: tuple[Path, ...], as_json: bool) -> None:
+def og1(
+    case: Path, out: Path, answers: tuple[Path, ...], contributor: str, email: str, institution: str, wmo: str,
+    data_mode: str, as_json: bool,
+) -> None:  # fmt: skip
     """Write an ocean glider's case as a mission in OceanGliders' common format (OG-1.0)."""
     from glider.tools.data.errors import need
 
@@ -28,11 +39,14 @@ def og1(case: Path, out: Path, answers: tuple[Path, ...], as_json: bool) -> None
     from glider.tools.data.files import check_writable
 
     check_writable(out.parent)
-    from glider.tools.data.exporters.og1 import export_og1
+    from glider.tools.data.exporters.og1 import MissionAttributes, export_og1
 
-    found = export_og1(case, out, list(answers))
+    about = MissionAttributes(contributor, email, institution, wmo, data_mode)
+    found = export_og1(case, out, list(answers), about)
     for one in found:
         say(f"{one.name}: {one.long_name}")
+    if about.missing:
+        say(f"note: 'unknown' in the file, which the format wants: {', '.join(f'--{one}' for one in about.missing)}")
     if as_json:
         print_json({"case": str(case), "file": str(out), "variables": [one.name for one in found]})
     else:

@@ -47,27 +47,109 @@ def test_a_case_comes_back_byte_for_byte(tmp_path, case):
     assert [line.rpartition(",")[0] for line in mine] == [line.rpartition(",")[0] for line in back]
 
 
-def test_exporting_twice_gives_the_same_bytes(tmp_path, case):
+def former(path: Path) -> None:
+    """The file as this program wrote it before: dives by another name, fixes along a dimension of their own."""
+    file = opened(path)
+    fixes = np.isfinite(file.TIME_GPS.values)
+    names = ["TIME_GPS", "LATITUDE_GPS", "LONGITUDE_GPS"]
+    own = {name: ("N_FIXES", file[name].values[fixes], {"units": file[name].attrs["units"]}) for name in names}
+    rows = file.isel(N_MEASUREMENTS=~fixes).drop_vars(names).rename(SEGMENT_NUMBER="DIVE_NUMBER")
+    rows["DIVE_NUMBER"] = rows.DIVE_NUMBER.astype(np.int32).drop_encoding()
+    rows.assign(own).to_netcdf(path, engine="h5netcdf")
+
+
+def test_a_file_with_the_former_names_is_read_the_same(tmp_path, case):
+    run_ok("export", "og1", case, "--out", "m.nc", cwd=tmp_path)
+    former(tmp_path / "m.nc")
+    assert opened(tmp_path / "m.nc").sizes["N_MEASUREMENTS"] == 200
+    run_ok("import", "og1", "m.nc", "--out", "back", cwd=tmp_path)
+    for path in case.iterdir():
+        if path.name != "origin.csv":
+            assert path.read_bytes() == (tmp_path / "back" / path.name).read_bytes(), path.name
+
+
+def test_exporting_twice_gives_the_same_bytes(tmp_path, case, monkeypatch):
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
     for name in ("a.nc", "b.nc"):
         run_ok("export", "og1", case, "--out", name, cwd=tmp_path)
     assert (tmp_path / "a.nc").read_bytes() == (tmp_path / "b.nc").read_bytes()
 
 
-def test_the_file_is_as_the_format_asks(tmp_path, case):
-    run_ok("export", "og1", case, "--out", "m.nc", cwd=tmp_path)
+# Mandatory by the manual of the format, February 2026: variables with their attributes, global attributes.
+TIMES = {"units": "seconds since 1970-01-01T00:00:00Z", "calendar": "gregorian"}
+MANDATORY = {
+    "TIME": {"long_name", "standard_name", "valid_min", "valid_max", "vocabulary"},
+    "LATITUDE": {"long_name", "standard_name", "units", "valid_min", "valid_max", "vocabulary"},
+    "LONGITUDE": {"long_name", "standard_name", "units", "valid_min", "valid_max", "vocabulary"},
+    "DEPTH": {"long_name", "standard_name", "units", "valid_min", "valid_max", "vocabulary"},
+    "TIME_GPS": {"long_name", "valid_min", "valid_max"},
+    "LATITUDE_GPS": {"long_name", "standard_name", "units", "valid_min", "valid_max"},
+    "LONGITUDE_GPS": {"long_name", "standard_name", "units", "valid_min", "valid_max"},
+    "TEMP": {"long_name", "standard_name", "units", "vocabulary", "coordinates", "sensor"},
+}
+SINGLE = {
+    "TRAJECTORY": {"cf_role", "long_name"}, "WMO_IDENTIFIER": {"long_name"}, "PLATFORM_SERIAL_NUMBER": {"long_name"},
+    "PLATFORM_MODEL": {"long_name", "platform_model_vocabulary"},
+    "DEPLOYMENT_TIME": {"long_name", "standard_name", "calendar", "units"}, "DEPLOYMENT_LATITUDE": {"long_name"},
+    "DEPLOYMENT_LONGITUDE": {"long_name"},
+    "SENSOR_CTD_UNKNOWN": {"sensor_type_vocabulary", "long_name", "sensor_model", "sensor_model_vocabulary"},
+}  # fmt: skip
+GLOBAL = {
+    "title", "platform", "platform_vocabulary", "id", "contributor_name", "contributor_email", "contributor_role",
+    "contributor_role_vocabulary", "contributing_institutions", "contributing_institutions_role",
+    "contributing_institutions_role_vocabulary", "rtqc_method", "start_date", "date_created", "featureType",
+    "Conventions",
+}  # fmt: skip
+
+
+def test_the_file_has_all_that_the_format_makes_mandatory(tmp_path, case):
+    about = ("--contributor", "A. Person", "--email", "a@example.org", "--institution", "Pool", "--wmo", "4801904")
+    done = run_ok("export", "og1", case, "--out", "m.nc", *about, "--data-mode", "D", cwd=tmp_path)
+    assert "unknown" not in done.stderr
+    file = opened(tmp_path / "m.nc")
+    assert set(file.sizes) == {"N_MEASUREMENTS"}
+    assert file.encoding["unlimited_dims"] == {"N_MEASUREMENTS"}
+    for name, attributes in MANDATORY.items():
+        assert file[name].dims == ("N_MEASUREMENTS",), name
+        assert attributes <= set(file[name].attrs) | set(file[name].encoding), name
+    for name in ("TIME", "TIME_GPS"):
+        assert {key: file[name].attrs[key] for key in TIMES} == TIMES
+        assert file[name].encoding["_FillValue"] == -1.0
+    for name in ("LATITUDE", "LONGITUDE", "DEPTH", "LATITUDE_GPS", "LONGITUDE_GPS"):
+        assert file[name].dtype == np.float64
+        assert file[name].encoding["_FillValue"] == -9999.9
+    for name, attributes in SINGLE.items():
+        assert file[name].dims == (), name
+        assert attributes <= set(file[name].attrs), name
+    assert set(file.attrs) >= GLOBAL
+    start = file.attrs["start_date"]
+    assert file.attrs["id"] == f"unit_7_{start}_D"
+    assert str(file.TRAJECTORY.values) == f"unit_7_{start}"
+    assert file.attrs["Conventions"] == "CF-1.10, ACDD-1.3, OG-1.0"
+    assert (file.attrs["contributor_name"], file.attrs["contributing_institutions"]) == ("A. Person", "Pool")
+    assert str(file.WMO_IDENTIFIER.values) == "4801904"
+
+
+def test_the_file_holds_the_runs_and_each_fix_as_a_row(tmp_path, case):
+    done = run_ok("export", "og1", case, "--out", "m.nc", cwd=tmp_path)
+    assert "--contributor, --email, --institution, --wmo" in done.stderr
     file = opened(tmp_path / "m.nc")
     fixes = len((case / "fixes.csv").read_text().splitlines()) - 1
-    assert file.sizes == {"N_MEASUREMENTS": 200, "N_FIXES": fixes}
+    assert file.sizes == {"N_MEASUREMENTS": 200 + fixes}
     assert fixes > 2
-    assert "OG-1.0" in file.attrs["Conventions"]
-    assert {"TIME", "LATITUDE", "LONGITUDE", "DEPTH", "TRAJECTORY", "PLATFORM_MODEL", "PLATFORM_SERIAL_NUMBER"} <= set(
-        file.variables
-    )
-    assert file.TIME.values[0] == START
+    fixed = np.isfinite(file.TIME_GPS.values)
+    assert np.count_nonzero(fixed) == fixes
+    for name in ("TIME", "LATITUDE", "LONGITUDE"):
+        assert (file[name].values[fixed] == file[f"{name}_GPS"].values[fixed]).all()
+    assert np.isnan(file.PITCH.values[fixed]).all()
+    assert np.isnan(file.SEGMENT_NUMBER.values[fixed]).all()
+    assert (np.diff(file.TIME.values) >= 0.0).all()
+    assert file.TIME.values[~fixed][0] == START
     assert file.PITCH.attrs["units"] == "degrees"
-    assert file.PITCH.values[0] == pytest.approx(np.degrees(flight().columns["pitch_rad"][0]), abs=1e-4)
+    pitch = file.PITCH.values[~fixed][0]
+    assert pitch == pytest.approx(np.degrees(flight().columns["pitch_rad"][0]), abs=1e-4)
     assert "magnetic" in file.HEADING.attrs["comment"]
-    assert np.unique(file.DIVE_NUMBER.values).tolist() == [1, 2]
+    assert np.unique(file.SEGMENT_NUMBER.values[~fixed]).tolist() == [1, 2]
 
 
 def velocity(folder: Path, case: Path) -> None:
@@ -94,6 +176,7 @@ def test_velocity_and_verdicts_stand_beside_the_measurements(tmp_path, case):
     done = run_ok("export", "og1", case, "--out", "m.nc", "--with", "v", "--with", "w", "--json", cwd=tmp_path)
     assert "GLIDER_HORZ_VELO_MODEL_SD" in json.loads(done.stdout)["variables"]
     file = opened(tmp_path / "m.nc")
+    file = file.isel(N_MEASUREMENTS=np.isnan(file.TIME_GPS.values))  # rows of the runs
     speed = file.GLIDER_HORZ_VELO_MODEL.values
     assert np.isnan(speed[0])
     assert (speed[1:120] == 0.25).all()
@@ -115,6 +198,7 @@ def test_the_verdict_of_a_diagnosis_is_that_of_all_rows(tmp_path, case):
     (tmp_path / "d" / "diagnosis.json").write_text(json.dumps(answer))
     run_ok("export", "og1", case, "--out", "m.nc", "--with", "d", cwd=tmp_path)
     file = opened(tmp_path / "m.nc")
+    file = file.isel(N_MEASUREMENTS=np.isnan(file.TIME_GPS.values))
     assert np.unique(file.MISSION_VERDICT.values).tolist() == [1.0]
     assert file.MISSION_CAUSE.attrs["flag_meanings"] == "pitch_bias"
     assert np.unique(file.MISSION_CAUSE_PROBABILITY.values).tolist() == [0.4]

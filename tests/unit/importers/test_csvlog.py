@@ -186,12 +186,53 @@ def test_dates_are_times_too(folder):
         _import(folder, out="other", text=text)
 
 
+def test_times_of_day_go_on_through_midnight(folder):
+    stamps = [f"23:59:{second:06.3f}" for second in np.arange(57.0, 60.0, 0.05)]
+    stamps += [f"0:00:{second:04.1f}".replace(".", ",") for second in np.arange(0.0, 2.0, 0.1)]
+    rows = [f'"{stamp}",{number},1,2' for number, stamp in enumerate(stamps)]
+    (folder / "a.csv").write_text("\n".join(["millis,adc,pitch,yaw", *rows]))
+    text = MAP.replace('unit = "ms"', 'unit = "clock"')
+    _import(folder, text=text)
+    run = load_case(folder / "out").runs[0]
+    np.testing.assert_allclose(run.t, 0.1 * np.arange(20), atol=1e-9)  # 1 s to 3 s, at 10 Hz
+    assert float(run.extra["adc_counts"][0]) == pytest.approx(20.5, abs=1.0)
+    (folder / "a.csv").write_text("\n".join(["millis,adc,pitch,yaw", *rows, "noon,1,1,1"]))
+    with pytest.raises(InputError, match="not a time of day"):
+        _import(folder, out="other", text=text)
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("millis;adc;pitch;yaw\n0;1;1;1", r'text.delimiter = ";"'),
+        ("millis\tadc\tpitch\tyaw\n0\t1\t1\t1", r'text.delimiter = "\\t"'),
+        ('millis,adc,pitch,yaw\n0,"1,5",1,1\n20,1,1,1', r'text.decimal = ","'),
+        ("millis,adc,pitch,yaw\n12:34:56.7,1,1,1", r'time.unit = "clock"'),
+        ("millis,adc,pitch,yaw\n2026-05-01T12:34:56,1,1,1", r'time.unit = "iso8601"'),
+    ],
+)
+def test_a_table_that_another_key_would_read_names_the_key(folder, line, said):
+    (folder / "a.csv").write_text(line + "\n")
+    with pytest.raises(InputError, match=said):
+        _import(folder)
+
+
 def test_pressure_becomes_depth_of_this_water(folder):
     text = MAP.replace('unit = "ft"', 'unit = "kPa"').replace("scale = 0.04", "scale = 0.5")
     _import(folder, text=text)
     run = load_case(folder / "out").runs[0]
     counts = np.array([float(word) for word in run.extra["adc_counts"]])
     np.testing.assert_allclose(run.columns["depth_m"], (counts - 100) * 500 / (1000 * 9.80665), atol=0.003)
+
+
+def test_an_absolute_pressure_is_noted(folder):
+    text = MAP.replace('unit = "ft"', 'unit = "kPa"').replace("zero = 100\nscale = 0.04", "scale = 0.04")
+    rows = [f"{20 * n},{2450 + n % 50},1,2" for n in range(250)]  # 98 kPa and more
+    (folder / "a.csv").write_text("\n".join(["millis,adc,pitch,yaw", *rows]))
+    notes = _import(folder, text=text).notes
+    assert any("never less than 10.0 m: an absolute pressure? `zero`" in note for note in notes)
+    zeroed = text.replace("scale = 0.04", "scale = 0.04\nzero = 2450")
+    assert not any("absolute" in note for note in _import(folder, out="other", text=zeroed).notes)
 
 
 def test_values_that_cannot_be_are_missing(folder):

@@ -1,6 +1,7 @@
 """Anybody's CSV log into run data, by a mapping file."""
 
 import fnmatch
+import re
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -9,6 +10,7 @@ import msgspec
 import numpy as np
 
 from glider.firmware.model.library import shipped
+from glider.hal.units import units_of
 from glider.tools.data.errors import InputError
 from glider.tools.data.importers import resample
 from glider.tools.data.importers.commands import CommandTable, rebuild, says, seen_direction
@@ -22,6 +24,9 @@ from glider.tools.data.runs.run import Run
 from glider.tools.data.sources import name_or_path
 
 MAX_ROWS = 10_000_000  # of one run: what a mistaken time unit would ask for
+CLOCK = re.compile(r"(\d{1,2}):(\d{2})(?::(\d{2}(?:\.\d*)?))?")
+ATMOSPHERE_M = (7.0, 12.0)  # depths that the atmosphere alone would be, from high lakes to the sea
+HALF_A_DAY = 43200.0  # s; a time of day that goes back by more is of the next day
 
 
 @dataclass
@@ -133,12 +138,23 @@ class _Source:
         if mapping.rates_from_attitude:
             rates = resample.body_rates(columns[names.TIME], *(columns[angle] for angle in names.ATTITUDE))
             columns |= {rate: found for rate, found in zip(names.RATES, rates, strict=True) if rate not in columns}
+        self._note_atmosphere(columns.get(names.DEPTH))
         numbers = {target: columns[target] for target in names.in_order(list(columns)) if target in names.KNOWN}
         extra = {
             target: csvfile.as_texts(target, columns[target], item.decimals) for target, item in mapping.extra.items()
         }
         start = "" if self.began is None else moment_text(self.began.timestamp() + cut.start_s)
         return Run(name, self.path, numbers, extra, self.path.name, start)
+
+    def _note_atmosphere(self, depth: np.ndarray | None) -> None:
+        """Note a pressure whose least depth is that of the atmosphere, without its reading at the surface."""
+        item = self.mapping.columns.get(names.DEPTH)
+        if depth is None or item is None or item.unit not in units_of("pressure") or item.zero or item.offset:
+            return
+        least = float(np.nanmin(depth, initial=np.inf))
+        if ATMOSPHERE_M[0] < least < ATMOSPHERE_M[1]:
+            hint = "an absolute pressure? `zero` in [columns.depth_m] is what it reads at the surface"
+            self.notes.append(f"{names.DEPTH}: never less than {least:.1f} m: {hint}")
 
     def _converted(self, target: str, item: ColumnTable) -> np.ndarray:
         """Logged numbers in SI; what is outside `valid` is missing."""
@@ -167,6 +183,8 @@ class _Source:
         time, table = self.mapping.time, self.table
         if time.unit == "iso8601":
             logged, per_unit = self._iso_seconds(), 1.0
+        elif time.unit == "clock":
+            logged, per_unit = self._clock_seconds(), 1.0
         elif self.mapping.text.bad_fields == "refuse":
             logged, per_unit = table.numbers(time.column), TIME_UNITS[time.unit]
         else:
@@ -205,6 +223,21 @@ class _Source:
             except (ValueError, TypeError):  # no date, or some with and some without a time zone
                 if self.mapping.text.bad_fields == "refuse":
                     raise table.error(f"not a date and time: {text[:40]!r}", row=row, column=column) from None
+        return seconds
+
+    def _clock_seconds(self) -> np.ndarray:
+        """Times of day as seconds, going on through midnight; NaN where there is none, (rows,)."""
+        table, column = self.table, self.mapping.time.column
+        seconds, days, before = np.full(table.rows, np.nan), 0, 0.0
+        for row, text in enumerate(table.texts(column)):
+            match = CLOCK.fullmatch(text.strip().replace(",", "."))
+            if match is not None:
+                hours, minutes, of_minute = match.groups()
+                value = 3600.0 * float(hours) + 60.0 * float(minutes) + float(of_minute or 0.0)
+                days += value < before - HALF_A_DAY
+                seconds[row], before = value + 2.0 * HALF_A_DAY * days, value
+            elif text.strip() and self.mapping.text.bad_fields == "refuse":
+                raise table.error(f"not a time of day (12:34:56.7): {text[:40]!r}", row=row, column=column)
         return seconds
 
 

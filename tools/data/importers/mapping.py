@@ -25,6 +25,7 @@ from glider.tools.data.sources import read_text
 
 # 'counts' is for values that `scale` alone turns into the target's SI unit.
 COLUMN_UNITS = units_of("length", "angle", "rate", "mass", "volume", "pressure", "counts")
+TIME_TEXTS = ("iso8601", "clock")  # dates and times; times of day
 TIME_UNITS = {name: UNITS[name].factor for name in units_of("time")}
 _KINDS = (("_rad_s", "rate"), ("_rad", "angle"), ("_kg", "mass"), ("_m", "length"), (names.OIL, "volume"))
 
@@ -78,12 +79,12 @@ class TimeTable(Table):
     """[time]: the log's clock."""
 
     column: Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
-    unit: str = "s"  # one of TIME_UNITS, or iso8601 for dates and times
+    unit: str = "s"  # one of TIME_UNITS, or of TIME_TEXTS
     not_increasing: Literal["refuse", "drop"] = "refuse"
 
     def __post_init__(self):
-        if self.unit not in TIME_UNITS and self.unit != "iso8601":
-            raise ValueError(f"unit: expected one of {', '.join(TIME_UNITS)}, iso8601, got {self.unit!r}")
+        if self.unit not in (*TIME_UNITS, *TIME_TEXTS):
+            raise ValueError(f"unit: expected one of {', '.join((*TIME_UNITS, *TIME_TEXTS))}, got {self.unit!r}")
 
 
 class CutTable(Table):

@@ -5,6 +5,7 @@ import csv
 import gzip
 import io
 import math
+import re
 import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -68,6 +69,7 @@ class Dialect(StrictTable):
 
 
 RUN_DATA = Dialect()
+OTHER_DELIMITERS = (";", "\t", "|", ",")
 
 
 class CsvTable:
@@ -154,6 +156,11 @@ class CsvTable:
             raise InputError(f"not CSV: {error}", source=self.path, line=self._above + reader.line_num) from None
 
     def _check_header(self) -> None:
+        foreign = len(self.header) == 1 and self._dialect is not RUN_DATA
+        other = next((one for one in OTHER_DELIMITERS if foreign and one in self.header[0]), None)
+        if other is not None:
+            shown = r"\t" if other == "\t" else other
+            raise self.error(f'one column in the header: text.delimiter = "{shown}" would part it', line=1)
         seen: set[str] = set()
         for name in self.header:
             if name in seen:
@@ -184,7 +191,8 @@ class CsvTable:
         values, bad = self.numbers_and_bad(column, words)
         if bad.any():
             row = int(np.flatnonzero(bad)[0])
-            raise self.error(_complaint(self._plain(self._columns[column])[row]), row=row, column=column)
+            hint = "" if self._dialect is RUN_DATA else _reading(self._columns[column][row])
+            raise self.error(_complaint(self._plain(self._columns[column])[row]) + hint, row=row, column=column)
         return values
 
     def numbers_and_bad(self, column: str, words: Mapping[str, float] = NO_WORDS) -> tuple[np.ndarray, np.ndarray]:
@@ -247,6 +255,17 @@ def _complaint(field: str) -> str:
     if value is not None and math.isinf(value):
         return f"infinite: {shown}"
     return f"not a number: {shown}" + (" (a missing sample is an empty field)" if value is not None else "")
+
+
+def _reading(field: str) -> str:
+    """How a mapping would read a field that is no number, in brackets; empty where that is not known."""
+    if "," in field and _as_float(field.strip().replace(",", ".")) is not None:
+        return ' (text.decimal = "," reads it)'
+    if re.fullmatch(r"\d{1,2}:\d{2}(:\d{2}([.,]\d*)?)?", field.strip()):
+        return ' (time.unit = "clock" reads it)'
+    if re.match(r"\d{4}-\d{2}-\d{2}", field.strip()):
+        return ' (time.unit = "iso8601" reads it)'
+    return ""
 
 
 def read_table(path: Path, dialect: Dialect = RUN_DATA) -> CsvTable:

@@ -145,52 +145,52 @@ def run(
 @click.option("--watch", is_flag=True, help="The answers are those of `gap watch`: <case>/watch.json.")
 @click.option("--ocean", is_flag=True, help="With --watch: of missions; their velocity is scored too.")
 @click.option("--form", is_flag=True, help="Of vehicles of another form: their identified vehicles are scored too.")
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the result for docs/results.")
+@click.option("--commit", help="With --out: the commit that answered.  [default: as the answers name it]")
 @json_option
 def score(
     cases: Path, answers: Path, diagnoses: Path, manifest: Path | None, partial: bool, no_closed: bool, watch: bool,
-    ocean: bool, form: bool, as_json: bool,
+    ocean: bool, form: bool, out: Path | None, commit: str | None, as_json: bool,
 ) -> None:  # fmt: skip
     """Open the sealed answers, check them against the manifest, and score the diagnoses.
 
     See docs/explanation/blind-tests.md.
     """
     from glider.tools.data.errors import InputError, need
+    from glider.tools.data.files import check_writable, write_bytes
+    from glider.tools.verify.challenge.diagnose_all import count_cases
+    from glider.tools.verify.challenge.form_score import judge_forms
     from glider.tools.verify.challenge.judge import judge
+    from glider.tools.verify.challenge.ocean_score import judge_missions
+    from glider.tools.verify.challenge.result import Kind, as_file, result_of
+    from glider.tools.verify.challenge.score import ChallengeScore
+    from glider.tools.verify.challenge.watch_score import WatchScore, judge_watches
 
     need("analysis")
     if manifest is not None and not manifest.is_file():
         raise InputError("no such file", source=manifest, column="--manifest")
     _check_kind(watch, ocean, form)
-    if watch:
-        from glider.tools.verify.challenge.ocean_score import judge_missions
-        from glider.tools.verify.challenge.watch_score import judge_watches
-
-        with progress("scored", _answered(cases)) as advance:
-            watched = (judge_missions if ocean else judge_watches)(
-                cases, answers, diagnoses, manifest, partial, advance
-            )
-        if as_json:
-            print_json(watched.plain())
+    if out is not None:
+        check_writable(out.parent)
+    found: ChallengeScore | WatchScore
+    with progress("scored", count_cases(cases)) as advance:
+        if watch:
+            found = (judge_missions if ocean else judge_watches)(cases, answers, diagnoses, manifest, partial, advance)
         else:
-            _print_figures(watched.figures)
-            _print_watches(watched)
-        return
-    if form:
-        from glider.tools.verify.challenge.form_score import judge_forms as judge
-    with progress("scored", _answered(cases)) as advance:
-        found = judge(
-            cases, answers, diagnoses, manifest=manifest, partial=partial, closing=not no_closed, advance=advance
-        )
+            found = (judge_forms if form else judge)(
+                cases, answers, diagnoses, manifest=manifest, partial=partial, closing=not no_closed, advance=advance
+            )
+    if out is not None:
+        kind: Kind = ("ocean" if ocean else "watch") if watch else "form" if form else "single"
+        write_bytes(out, as_file(result_of(found, kind, answers, diagnoses, commit)))
+        say(f"result: {out}")
     if as_json:
         print_json(found.plain())
+    elif isinstance(found, WatchScore):
+        _print_figures(found.figures)
+        _print_watches(found)
     else:
         _print_score(found)
-
-
-def _answered(cases: Path) -> int:
-    from glider.tools.verify.challenge.diagnose_all import count_cases
-
-    return count_cases(cases)
 
 
 def _print_watches(found) -> None:

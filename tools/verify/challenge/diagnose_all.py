@@ -6,6 +6,7 @@ from pathlib import Path
 
 from glider.tools.cli.many_cases import ANSWER, CASES, CaseJob, Many, Result, Word, files_of, run_batch
 from glider.tools.data.errors import InputError
+from glider.tools.data.version import commit
 from glider.tools.verify.challenge.diagnosis import FILE, TIMING
 from glider.tools.verify.challenge.judge import case_folders
 from glider.tools.verify.challenge.seal import as_json
@@ -51,8 +52,8 @@ def asked_of(name: str, case: Path, extra: tuple[str, ...], kind: str) -> CaseJo
 
 
 def timed(result: Result) -> dict[str, bytes]:
-    """An answer's files, and how long it took."""
-    return result.files | {TIMING: as_json({"seconds": result.seconds, "cores": result.cores})}
+    """An answer's files, how long it took, and by which version."""
+    return result.files | {TIMING: as_json({"seconds": result.seconds, "cores": result.cores, "commit": commit()})}
 
 
 def run(

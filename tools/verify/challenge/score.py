@@ -212,16 +212,16 @@ MESSY_SHARES = (
 
 # Of vehicles of another form, which the identified model does not quite fit.
 FORM_SHARES = (
-    _Share("unchanged_called_cause", "unchanged, called a cause", (NONE,), ScoredCase.called_cause, None, True),
-    _Share("unchanged_called_unknown", "unchanged, called unknown", (NONE,), ScoredCase.called_unknown, None, True),
-    _Share("right_cause_first", "right cause first", (SINGLE,), ScoredCase.first, None),
+    _Share("unchanged_called_cause", "unchanged, called a cause", (NONE,), ScoredCase.called_cause, 0.05, True),
+    _Share("unchanged_called_unknown", "unchanged, called unknown", (NONE,), ScoredCase.called_unknown, 0.10, True),
+    _Share("right_cause_first", "right cause first", (SINGLE,), ScoredCase.first, 0.75),
     _Share("within_group", "right cause within its group", (SINGLE,), ScoredCase.grouped, None),
-    _Share("in_first_three", "right cause in the first three", (SINGLE,), ScoredCase.first_three, None),
+    _Share("in_first_three", "right cause in the first three", (SINGLE,), ScoredCase.first_three, 0.90),
     _Share("known_called_unknown", "known called unknown", (SINGLE,), ScoredCase.called_unknown, None, True),
     _Share(
-        "unknown_called_unknown", "outside the catalogue, called unknown", (UNKNOWN,), ScoredCase.called_unknown, None
+        "unknown_called_unknown", "outside the catalogue, called unknown", (UNKNOWN,), ScoredCase.called_unknown, 0.60
     ),
-    _Share("sure_and_wrong", "sure (> 0.8) and wrong", (NONE, *GAPS), ScoredCase.sure_and_wrong, None, True),
+    _Share("sure_and_wrong", "sure (> 0.8) and wrong", (NONE, *GAPS), ScoredCase.sure_and_wrong, 0.04, True),
 )
 
 

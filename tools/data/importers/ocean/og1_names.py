@@ -5,18 +5,19 @@ import numpy as np
 from glider.tools.data.importers.ocean import netcdf
 
 ROWS = "N_MEASUREMENTS"  # the dimension
-TIME, LATITUDE, LONGITUDE, DIVE = "TIME", "LATITUDE", "LONGITUDE", "DIVE_NUMBER"
-FIXES, TIME_GPS = "N_FIXES", "TIME_GPS"  # own dimension of fixes that are at no row's time
-DIVES = (DIVE, "divenum", "dive_number")  # which dive a row is of, where a file says so
+TIME, LATITUDE, LONGITUDE, SEGMENT = "TIME", "LATITUDE", "LONGITUDE", "SEGMENT_NUMBER"
+TIME_GPS = "TIME_GPS"  # of fixes: rows of their own, or in files of before 2026 a dimension of their own
+DIVES = (SEGMENT, "DIVE_NUMBER", "divenum", "dive_number")  # which dive a row is of, where a file says so
+CTD = "SENSOR_CTD_UNKNOWN"  # whose serial number no case holds
 MODEL, SERIAL, TRAJECTORY, WMO = "PLATFORM_MODEL", "PLATFORM_SERIAL_NUMBER", "TRAJECTORY", "WMO_IDENTIFIER"
 CONVENTION = "OG-1.0"
 EPOCH = "seconds since 1970-01-01T00:00:00Z"
 # Of the models that PLATFORM_MODEL names (vocabulary B76): a word in it, and the vehicle of this project.
 VEHICLES = {"slocum": "slocum", "seaglider": "seaglider", "seaexplorer": "seaexplorer"}
 MODEL_NAMES = {
-    "slocum": "Teledyne Webb Research Slocum glider",
-    "seaglider": "University of Washington Seaglider glider",
-    "seaexplorer": "Alseamar SeaExplorer glider",
+    "slocum": "Slocum",
+    "seaglider": "Seaglider",
+    "seaexplorer": "Seaexplorer",
 }
 
 # A volume and a length without a unit are in what a Seaglider logs them in: their names say so.
