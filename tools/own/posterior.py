@@ -9,6 +9,7 @@ hypothesis, that more is left than healthy runs leave: unknown.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 
 import numpy as np
 from scipy.special import logsumexp
@@ -73,13 +74,6 @@ class Deviations:
         """Runs with their own deviations integrated out."""
         return [marginalised(one, self.scatter) for one in found]
 
-    def variance(self, labels: Sequence[int], sigma: Sequence[float]) -> np.ndarray:
-        """Prior covariance (k, k) of shared values with labels' sizes of 1 sigma `sigma`."""
-        V = self.V.copy()
-        for k, s in zip(labels, sigma, strict=True):
-            V[k, k] += s**2
-        return V
-
     def prior(self, shared: np.ndarray, own: np.ndarray, places: Sequence[int]) -> float:
         """-2 log prior of values, sizes of labels left free."""
         free = np.diag(self.V) > 0.0
@@ -134,6 +128,7 @@ class Engine:
         # runs of one session, or each of another: which, their evidence says
         self.together = Deviations(healthy.V + healthy.session_share * np.diag(healthy.scatter**2), healthy.scatter)
         self.apart = Deviations(healthy.V, healthy.scatter * np.sqrt(1.0 + healthy.session_share))
+        self.forces = np.array([k for k, one in enumerate(healthy.effects) if one.family == PUSH], dtype=int)
         self.reach = np.zeros(self.k)
 
     def expansions(self, own: np.ndarray, columns: np.ndarray) -> list[Expansion]:
@@ -160,18 +155,17 @@ class Engine:
         curvature[np.ix_(columns, columns)] = one.curvature
         return replace(one, at=own.copy(), slope=slope, curvature=curvature, reach=reach)
 
-    def usual_odds(self, k: int, size: float, sd: float, runs: int) -> float:
-        """Log odds that a size of label k, known to sd, is a change and no deviation as sessions and runs have them.
-
-        Of labels whose deviations are not integrated out of every run (`active`): those are in the evidence already.
-        """
+    def usual_share(self, k: int, size: float, sd: float, runs: int) -> float:
+        """Nat of the evidence of label k, its size known to sd, that a deviation as healthy runs have it brings too."""
         usual = self.healthy.usual[k] ** 2 * (self.healthy.session_share + 1.0 / runs)
-        if self.active[k] or usual <= 0.0:
-            return np.inf
-        wide = (SIZES / max(self.reach[k], LEAST_REACH)) ** 2 + usual + sd**2
-        narrow = usual + sd**2
-        change = logsumexp(-0.5 * (size**2 / wide + np.log(wide))) - np.log(len(SIZES))
-        return float(change + 0.5 * (size**2 / narrow + np.log(narrow)))
+
+        def odds(scatter: float) -> float:
+            narrow = scatter + sd**2
+            wide = (SIZES / max(self.reach[k], LEAST_REACH)) ** 2 + narrow
+            change = logsumexp(-0.5 * (size**2 / wide + np.log(wide))) - np.log(len(SIZES))
+            return float(change + 0.5 * (size**2 / narrow + np.log(narrow)))
+
+        return max(0.0, odds(0.0) - odds(usual))
 
     def fit(self, labels: tuple[str, ...], begin: Hypothesis | None = None, every: bool = False) -> Hypothesis:
         """Labels led to where they are most probable, relinearised where they are; evidence by its last expansion."""
@@ -183,7 +177,7 @@ class Engine:
         best: tuple[float, np.ndarray, np.ndarray, list[Expansion]] | None = None
         for _ in range(ROUNDS):
             found = self.expansions(own, columns)
-            by, sigma, *_ = self._best_sizes(found, places)
+            by, sizes, *_ = self._best_sizes(found, places, shared)
             cost = sum(one.value for one in found) + by.prior(shared, own, places)
             if best is not None and not cost < best[0] - 0.1:
                 if cost < best[0]:
@@ -192,7 +186,7 @@ class Engine:
                 shared, own = 0.5 * (shared + best[1]), 0.5 * (own + best[2])
                 continue
             best = cost, shared, own, found
-            target = Pooled.of(by.marginal(found), by.variance(places, sigma)).mean()
+            target = Pooled.of(by.marginal(found), self.variance(by.V, places, sizes, shared)).mean()
             room = np.maximum(LONGEST_MOVE, LONGEST_REACH / np.maximum(self.reach, LEAST_REACH))  # (k,) spreads
             shared = np.clip(shared + np.clip(target - shared, -room, room), self.low, self.high)
             theirs = np.array([run_values(one, shared, by.scatter) for one in found])
@@ -201,29 +195,39 @@ class Engine:
         _, shared, own, found = best
         if every:
             found = self.expansions(own, np.arange(self.k))
-        *_, evidence, mean, sd = self._best_sizes(found, places)
+        *_, evidence, mean, sd = self._best_sizes(found, places, shared)
         left = np.array([one.squares.sum() / max(1, one.samples.sum()) for one in found])
         return Hypothesis(labels, evidence + self.log_prior(labels), mean, sd, shared, own, left, 0.0, found)
 
+    def variance(self, V: np.ndarray, places: Sequence[int], sizes: Sequence[float], shared: np.ndarray) -> np.ndarray:
+        """Prior covariance (k, k): V, labels of 1 sigma `sizes` (tolerances), and what of them is not as they have it.
+
+        That is a force at the noises, all together FORM of what labels do to the windows where they are (shared: k,).
+        """
+        found, reach, forces = V.copy(), np.maximum(self.reach, LEAST_REACH), self.forces
+        for k, size in zip(places, sizes, strict=True):
+            found[k, k] += (size / reach[k]) ** 2
+            if self.healthy.effects[k].family != PUSH and len(forces):
+                found[forces, forces] += (FORM * shared[k] * reach[k] / reach[forces]) ** 2 / len(forces)
+        return found
+
     def _best_sizes(
-        self, found: Sequence[Expansion], places: Sequence[int]
-    ) -> tuple[Deviations, list[float], float, np.ndarray, np.ndarray]:
-        """The most probable deviations and sigmas of labels' sizes, log evidence over all, sizes with their sd."""
-        grids = [SIZES / max(self.reach[k], LEAST_REACH) for k in places]
+        self, found: Sequence[Expansion], places: Sequence[int], shared: np.ndarray
+    ) -> tuple[Deviations, tuple[float, ...], float, np.ndarray, np.ndarray]:
+        """The most probable deviations and 1 sigma of labels in tolerances, log evidence over all, sizes, their sd."""
         sided = [self.healthy.effects[k].one_sided for k in places]
-        table: list[tuple[float, Deviations, list[float], np.ndarray, np.ndarray]] = []
+        table: list[tuple[float, Deviations, tuple[float, ...], np.ndarray, np.ndarray]] = []
         for by in (self.together, self.apart):
             pooled = Pooled.of(by.marginal(found), by.V)
-            for choice in np.ndindex(*(len(SIZES) for _ in places)):
-                sigma = [float(grid[c]) for grid, c in zip(grids, choice, strict=True)]
-                V = by.variance(places, sigma)
+            for sizes in product(map(float, SIZES), repeat=len(places)):
+                V = self.variance(by.V, places, sizes, shared)
                 M = pooled.covariance(V)
                 mean, sd = (M @ pooled.r)[places], np.sqrt(np.maximum(np.diag(M)[places], 1e-30))
                 halves = float((np.log(2.0) + norm.logcdf(mean / sd))[sided].sum())
-                table.append((pooled.log_evidence(V) + halves, by, sigma, mean, sd))
-        _, by, sigma, mean, sd = max(table, key=lambda one: one[0])
+                table.append((pooled.log_evidence(V) + halves, by, sizes, mean, sd))
+        _, by, sizes, mean, sd = max(table, key=lambda one: one[0])
         evidence = float(logsumexp([one[0] for one in table]) - np.log(len(table)))
-        return by, sigma, evidence, np.clip(mean, self.low[places], self.high[places]), sd
+        return by, sizes, evidence, np.clip(mean, self.low[places], self.high[places]), sd
 
     def log_prior(self, labels: Sequence[str]) -> float:
         """Of a hypothesis: that something changed, which label, and that another stands beside it."""
@@ -233,20 +237,45 @@ class Engine:
         each = [log_odds(self.healthy.effects[k]) - np.log(named) for k in self.healthy.at(labels)]
         return float(np.log(CHANGED) + sum(each) + (len(labels) - 1) * np.log(ANOTHER))
 
+    def label_gains(self, pooled: Pooled) -> tuple[np.ndarray, np.ndarray]:
+        """Log evidence (k,) that each label gains beside what runs share, by their parabola, and its size there."""
+        M = pooled.covariance()
+        slope = pooled.r - pooled.H @ (M @ pooled.r)
+        precision = np.maximum(np.diag(pooled.H - pooled.H @ M @ pooled.H), 0.0)
+        effects, reach = self.healthy.effects, np.maximum(self.reach, LEAST_REACH)
+        gain = size_evidence(slope, precision, reach, np.array([one.one_sided for one in effects]))
+        gain = np.where(self.reach > LEAST_REACH, gain + np.array([log_odds(one) for one in effects]), -np.inf)
+        tau2 = (SIZES[-1] / reach) ** 2
+        return gain, np.clip(slope * tau2 / (1.0 + tau2 * precision), self.low, self.high)
+
     def screen(self, begin: Hypothesis) -> list[tuple[float, str]]:
         """Every other label beside a hypothesis by its parabola: log evidence gained, best first."""
         places = self.healthy.at(begin.labels)
-        by, sigma, *_ = self._best_sizes(begin.found, places)
-        pooled = Pooled.of(by.marginal(begin.found), by.variance(places, sigma))
-        M = pooled.covariance()
-        slope, precision = pooled.r - pooled.H @ (M @ pooled.r), np.diag(pooled.H - pooled.H @ M @ pooled.H)
-        found = []
-        for k, effect in enumerate(self.healthy.effects):
-            if k in places or self.reach[k] < LEAST_REACH:
-                continue
-            gain = size_evidence(slope[k], precision[k], self.reach[k], effect.one_sided)
-            found.append((float(gain) + log_odds(effect), effect.label))
-        return sorted(found, reverse=True)
+        by, sizes, *_ = self._best_sizes(begin.found, places, begin.shared)
+        gain, _ = self.label_gains(
+            Pooled.of(by.marginal(begin.found), self.variance(by.V, places, sizes, begin.shared))
+        )
+        gain[places] = -np.inf
+        return [(float(gain[k]), self.healthy.effects[k].label) for k in np.argsort(-gain) if np.isfinite(gain[k])]
+
+    def swaps(self, begin: Hypothesis, tried: Sequence[str]) -> list[tuple[str, Hypothesis]]:
+        """Labels in the place of a hypothesis' last one that come nearest to it where it leads, with their starts."""
+        places = self.healthy.at(begin.labels[:-1])
+        by, sizes, *_ = self._best_sizes(begin.found, places, begin.shared)
+        gain, size = self.label_gains(
+            Pooled.of(by.marginal(begin.found), self.variance(by.V, places, sizes, begin.shared))
+        )
+        gain[self.healthy.at(tried)] = -np.inf
+        (replaced,), starts = self.healthy.at(begin.labels[-1:]), []
+        for k in np.argsort(-gain)[:BEAM]:
+            if not np.isfinite(gain[k]):
+                break
+            shared, own = begin.shared.copy(), begin.own.copy()
+            for row in (shared, *own):
+                row[k] += size[k]
+                row[replaced] -= begin.shared[replaced]
+            starts.append((self.healthy.effects[k].label, replace(begin, shared=shared, own=own)))
+        return starts
 
     def strong_sizes(self, among: Sequence[int]) -> list[tuple[int, float]]:
         """Labels at the size that alone explains most of some runs, best first.
@@ -312,6 +341,12 @@ class Engine:
                 again = [self.fit((label,), begin) for label, begin in self.strong_starts()]
                 best_of = {one.labels: one for one in sorted([*new, *again], key=lambda one: one.evidence)}
                 new = list(best_of.values())
+            if depth == 0 and new:
+                leading = max(new, key=lambda one: one.evidence)
+                if leading.evidence > nothing.evidence:
+                    leading = self.fit(leading.labels, leading, every=True)
+                    singles = [one.labels[0] for one in new]
+                    new += [self.fit((label,), begin) for label, begin in self.swaps(leading, singles)]
             best = max(one.evidence for one in every)
             for one in new:
                 one.strange = self.strangeness(one, nothing)
@@ -342,14 +377,12 @@ class Engine:
         return float(np.exp(more - np.logaddexp(less, more)))
 
     def _posterior(self, every: list[Hypothesis]) -> Posterior:
-        # no change, but a deviation as sessions and runs have it, of whichever label explains most so
-        usual = [every[0].evidence]
-        for one in every[1:]:
-            if len(one.labels) == 1:
-                (k,) = self.healthy.at(one.labels)
-                odds = self.usual_odds(k, float(one.sizes[0]), float(one.sd[0]), self.count)
-                usual.append(one.evidence - self.log_prior(one.labels) + self.log_prior(()) - odds)
-        logs = np.array([max(usual), *(one.evidence for one in every[1:])])
+        # of every label what healthy runs show of it is no change
+        logs = np.array([
+            one.evidence - sum(self.usual_share(k, float(size), float(sd), self.count)
+                               for k, size, sd in zip(self.healthy.at(one.labels), one.sizes, one.sd, strict=True))
+            for one in every
+        ])  # fmt: skip
         weights = np.exp(logs - logsumexp(logs))
         chances: dict[str, float] = {NONE: 0.0, UNKNOWN: 0.0}
         inclusion: dict[str, float] = {}

@@ -31,7 +31,6 @@ from glider.tools.own.posterior import (
     Hypothesis,
     healthy_of,
     log_odds,
-    size_evidence,
 )
 from glider.tools.own.runs import OwnRun
 
@@ -106,7 +105,7 @@ class Watched:
             where = effects[label].where
             places[where] = places.get(where, 0.0) + p
         return {
-            "label": one.label if known else None, "group": group if known else [], "probability": one.probability,
+            "label": one.label if known else None, "group": group, "probability": one.probability,
             "labels": {label: p for label, p in sorted(one.chances.items(), key=lambda item: -item[1]) if p > 0.005},
             "where": [{"subsystem": s, "element": e, "probability": p}
                       for (s, e), p in sorted(places.items(), key=lambda item: -item[1]) if p > 0.005],
@@ -174,18 +173,10 @@ class Watch(Engine):
             np.concatenate([0.0 * slopes[:1], slopes.cumsum(axis=0)]),
             np.concatenate([0.0 * curvatures[:1], curvatures.cumsum(axis=0)]),
         )
-        labels = np.arange(self.k)
         found = np.full((len(spans), self.k), -np.inf)
-        usable = labels[self.reach[labels] > LEAST_REACH]
-        sided = np.array([self.healthy.effects[k].one_sided for k in usable])
-        odds = np.array([log_odds(self.healthy.effects[k]) for k in usable])
         for row, (first, end) in enumerate(spans):
-            H, r = H_up[end] - H_up[first], r_up[end] - r_up[first]
             # shared values are known to M from the reference; the span's runs see them with the change
-            inner = np.linalg.solve(np.eye(self.k) + self.M @ H, self.M)
-            precision = np.maximum(np.diag(H - H @ inner @ H)[usable], 0.0)
-            slope = (r - H @ (inner @ r))[usable]
-            found[row, usable] = size_evidence(slope, precision, self.reach[usable], sided) + odds
+            found[row], _ = self.label_gains(Pooled(H_up[end] - H_up[first], r_up[end] - r_up[first], 0.0, self.M))
         return found
 
     def span_prior(self, spans: Sequence[tuple[int, int]]) -> np.ndarray:
@@ -213,12 +204,13 @@ class Watch(Engine):
                 if np.sqrt(np.mean([self.left(n) for n in runs])) > STRONG_LEFT:
                     starts |= dict(self.strong_sizes(runs)[:REFITTED])
                 refitted += [self.refit(spans[row], k, start, prior) for k, start in starts.items()]
-            best_score, best = max(refitted, key=lambda one: one[0])
-            k = self.healthy.at([best.label])[0]
-            usual = self.usual_odds(k, best.size, best.sd, best.end - best.first)
-            odds = min(best_score, usual) + np.log(CHANGE / (1.0 - CHANGE))
+            refitted += self.swapped(max(refitted, key=lambda one: one[0])[1], refitted, spans, named)
+            best = max(refitted, key=lambda one: one[0])[1]
             same = [(score, one) for score, one in refitted if (one.first, one.end) == (best.first, best.end)]
-            total = logsumexp([score for score, _ in same])
+            best = self.decided(same)
+            k = self.healthy.at([best.label])[0]
+            total = float(logsumexp([score for score, _ in same]))
+            odds = total + np.log(CHANGE / (1.0 - CHANGE))
             best.probability = float(1.0 / (1.0 + np.exp(-np.clip(odds, -50.0, 50.0))))
             best.chances = {one.label: best.probability * float(np.exp(score - total)) for score, one in same}
             if best.probability < CERTAIN or abs(best.size) * self.reach[k] < MATERIAL:
@@ -228,6 +220,28 @@ class Watch(Engine):
                 f"{odds:.1f} nat"
             )
             self.take(best)
+
+    def decided(self, same: Sequence[tuple[float, Event]]) -> Event:
+        """The event of a span: a label where labels together are more probable than a force that none has."""
+        effects = {one.label: one for one in self.healthy.effects}
+        forces = [one for one in same if effects[one[1].label].family == PUSH]
+        labels = [one for one in same if effects[one[1].label].family != PUSH]
+        sums = [float(logsumexp([score for score, _ in some])) if some else -np.inf for some in (labels, forces)]
+        return max(labels if sums[0] >= sums[1] else forces, key=lambda one: one[0])[1]
+
+    def swapped(self, event: Event, refitted: Sequence[tuple[float, Event]], spans, named: int):
+        """Labels in an event's place that come nearest to it where it leads, refitted (log odds, event)."""
+        span, every = (event.first, event.end), np.arange(self.k)
+        (place,), runs = self.healthy.at([event.label]), list[Expansion]()
+        for n in range(*span):
+            x = self.at_run(n)
+            x[place] += event.size
+            runs += self.together.marginal([self.expansion_of(n, np.clip(x, self.low, self.high), every)])
+        gain, size = self.label_gains(self.evidence(runs, span, self.M))
+        gain[self.healthy.at([one.label for _, one in refitted if (one.first, one.end) == span])] = -np.inf
+        prior = float(self.span_prior(spans)[spans.index(span)]) - np.log(named)
+        return [self.refit(span, int(k), float(size[k]), prior)
+                for k in np.argsort(-gain)[:REFITTED] if np.isfinite(gain[k])]  # fmt: skip
 
     def left(self, n: int) -> float:
         """Mean square that a run leaves about where it was expanded, in units of what healthy runs leave."""
@@ -257,9 +271,9 @@ class Watch(Engine):
             if runs is not None:
                 pooled = self.evidence(runs, span, self.M)
                 table = []
-                for tau in SIZES / max(self.reach[k], LEAST_REACH):
-                    V = self.M.copy()
-                    V[k, k] += tau**2
+                where = size * (np.arange(self.k) == k)
+                for tolerances in map(float, SIZES):
+                    V = self.variance(self.M, [k], [tolerances], where)
                     M = pooled.covariance(V)
                     mean, sd = float((M @ pooled.r)[k]), float(np.sqrt(max(M[k, k], 1e-30)))
                     halved = np.log(2.0) + norm.logcdf(mean / sd) if self.healthy.effects[k].one_sided else 0.0
@@ -281,7 +295,8 @@ class Watch(Engine):
                 x[k] = np.clip(x[k] + size, self.low[k], self.high[k])
                 runs += self.together.marginal([self.expansion_of(n, x, columns)])
         score, mean, sd = best
-        return score - nothing + prior + odds, Event({}, *span, self.healthy.effects[k].label, mean, sd, 0.0)
+        gain = score - nothing - self.usual_share(k, mean, sd, span[1] - span[0])
+        return gain + prior + odds, Event({}, *span, self.healthy.effects[k].label, mean, sd, 0.0)
 
     def judge(self) -> np.ndarray:
         """Probability of each run to have more left than healthy ones and its events say."""
