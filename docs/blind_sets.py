@@ -1,6 +1,6 @@
 """Results of sealed sets, as pages show them: generated from docs/results/*.json, which `challenge score --out` writes.
 
-A set is added by committing its file and `python docs/generate.py`. The newest answered set of each kind stands in
+A set is added by committing its file and `python -m docs.generate`. The newest answered set of each kind stands in
 docs/reference/figures.md and README.md, all of them in docs/archive/blind-sets.md.
 """
 

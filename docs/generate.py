@@ -1,6 +1,6 @@
 """Generated pages of the reference: tables of what the code defines, written before Sphinx reads the pages.
 
-`python docs/generate.py` writes the results of sealed sets into the committed pages (docs/blind_sets.py).
+`python -m docs.generate` writes the results of sealed sets into the committed pages (docs/blind_sets.py).
 """
 
 import typing

@@ -17,11 +17,11 @@ RESULTS = blind_sets.all_results()
 @pytest.mark.parametrize(("page", "texts"), blind_sets.blocks().items(), ids=lambda one: getattr(one, "name", ""))
 def test_a_page_shows_the_committed_results(page, texts):
     text = page.read_text(encoding="utf-8")
-    assert blind_sets.with_blocks(text, texts) == text, "python docs/generate.py"
+    assert blind_sets.with_blocks(text, texts) == text, "python -m docs.generate"
 
 
 def test_the_picture_is_of_the_committed_results():
-    assert written(blind_sets.PICTURE) == blind_sets.calibration_table(RESULTS), "python docs/generate.py"
+    assert written(blind_sets.PICTURE) == blind_sets.calibration_table(RESULTS), "python -m docs.generate"
 
 
 @pytest.mark.parametrize("result", RESULTS, ids=lambda one: f"{one.kind}-{one.seed}")

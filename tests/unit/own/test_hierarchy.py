@@ -1,0 +1,117 @@
+"""The hierarchical model in closed form: scatter of runs, sessions, what of a label is usual, labels in one's place."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from glider.tools.own.effects import INPUT, PARAMETER, PUSH, Effect
+from glider.tools.own.hierarchy import ChannelErrors, Expansion, Pooled, learn_scatter
+from glider.tools.own.posterior import CHANGED, SIZES, Deviations, Engine, Healthy, Hypothesis
+from glider.tools.own.watch import Event, Watch
+
+LABELS = [Effect("gain", INPUT, "motor", "gain", "1", 0.1), Effect("mass", PARAMETER, "mass", "value", "kg", 0.1),
+          Effect("force", PUSH, "heave", "push", "m/s2", 0.1)]  # fmt: skip
+PRECISION = 400.0  # of each column in a run
+
+
+def run_at(place: np.ndarray, alike: float = 0.0) -> Expansion:
+    """A run whose likelihood is a normal one about `place` (3,); alike: correlation of the first two columns."""
+    curvature = PRECISION * np.array([[1.0, alike, 0.0], [alike, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    blocks, ones = np.zeros((2, 2, 3)), np.ones(3)
+    return Expansion(np.zeros(3), float(place @ curvature @ place), -curvature @ place, curvature, np.ones(1),
+                     np.ones(1), blocks, blocks[0], ones)  # fmt: skip
+
+
+class Columns:
+    """Stands for an observer of a count of runs: nothing is flown here."""
+
+    horizon = 1.0
+
+    def __init__(self, runs: int):
+        self.runs = [None] * runs
+
+
+def healthy(**changes) -> Healthy:
+    errors = ChannelErrors(np.ones(1), np.ones(1))
+    one = Healthy(LABELS, np.zeros((3, 3)), np.array([0.0, 0.0, 1.0]), np.zeros(3), errors, 1.0, 10, 0.5, 0.5)
+    return replace(one, **changes)
+
+
+def engine(runs: int, **changes) -> Engine:
+    found = Engine(Columns(runs), healthy(**changes))
+    found.reach = np.ones(3)
+    return found
+
+
+def test_scatter_is_learned_where_runs_may_differ_and_stays_nothing_elsewhere():
+    random = np.random.default_rng(3)
+    runs = [run_at(np.array([0.0, 0.0, 0.7]) * random.standard_normal(3)) for _ in range(60)]
+    found = learn_scatter(runs, np.zeros((3, 3)), np.array([0.0, 0.02, 0.5]))
+    assert found[0] == 0.0
+    assert found[1] < 0.03
+    assert found[2] == pytest.approx(0.7, rel=0.2)
+
+
+@pytest.mark.parametrize(("common", "own", "kind"), [(1.5, 0.2, "together"), (0.0, 1.2, "apart")])
+def test_runs_themselves_say_whether_they_are_of_one_session(common, own, kind):
+    random, asked = np.random.default_rng(5), engine(12, session_share=4.0, scatter=np.array([0.0, 0.0, 0.4]))
+    runs = [run_at(np.array([0.0, 0.0, common + own * random.standard_normal()])) for _ in range(12)]
+    by, _, evidence, *_ = asked._best_sizes(runs, [], np.zeros(3))
+    assert by is getattr(asked, kind)
+    each = [Pooled.of(one.marginal(runs), one.V).log_evidence() for one in (asked.together, asked.apart)]
+    assert evidence == pytest.approx(np.logaddexp(*each) - np.log(2.0))
+
+
+def test_deviations_alike_in_all_runs_have_the_prior_of_their_two_levels():
+    by = Deviations(np.diag([0.0, 0.0, 4.0]), np.array([0.0, 0.0, 2.0]))
+    shared, own = np.array([0.0, 0.0, 1.0]), np.array([[0.0, 0.0, 3.0], [0.0, 0.0, 1.0]])
+    assert by.prior(shared, own, ()) == pytest.approx(1.0 / 4.0 + 1.0)
+    assert by.prior(shared, own, (2,)) == pytest.approx(1.0)
+
+
+def test_a_label_alone_gains_what_its_evidence_says():
+    asked, runs = engine(4), [run_at(np.array([0.3, 0.0, 0.0])) for _ in range(4)]
+    pooled = Pooled.of(asked.together.marginal(runs), asked.together.V)
+    gain, size = asked.label_gains(pooled)
+    whole = []
+    for tolerances in SIZES:
+        V = asked.together.V.copy()
+        V[0, 0] = tolerances**2
+        whole.append(pooled.log_evidence(V) - pooled.log_evidence())
+    assert gain[0] == pytest.approx(np.log(np.mean(np.exp(whole))))
+    assert size[0] == pytest.approx(0.3, rel=1e-2)
+    assert gain[1] < 0.0
+
+
+@pytest.mark.parametrize(("usual", "least", "most"), [(0.0, 0.0, 0.0), (0.05, 1.0, 12.0), (3.0, 15.0, 1e3)])
+def test_what_healthy_runs_show_of_a_label_is_no_evidence_of_a_change(usual, least, most):
+    asked = engine(4, usual=np.array([usual, 0.0, 0.0]))
+    assert least <= asked.usual_share(0, 0.5, 0.08, 4) <= most
+
+
+def test_of_a_label_a_force_may_be_that_its_equations_do_not_have():
+    asked = engine(4)
+    V = asked.variance(np.zeros((3, 3)), [0], [2.0], np.array([5.0, 0.0, 0.0]))
+    assert np.diag(V) == pytest.approx([4.0, 0.0, 1.0])
+    assert asked.variance(np.zeros((3, 3)), [2], [2.0], np.array([0.0, 0.0, 5.0]))[2, 2] == pytest.approx(4.0)
+
+
+def test_a_label_that_acts_alike_comes_in_the_place_of_the_best():
+    asked, runs = engine(4), [run_at(np.array([1.0, 0.0, 0.0]), alike=0.99) for _ in range(4)]
+    shared = np.array([1.0, 0.0, 0.0])
+    runs = [replace(one, at=shared, value=0.0, slope=np.zeros(3)) for one in runs]
+    leading = Hypothesis(("gain",), 0.0, np.ones(1), np.ones(1), shared, np.tile(shared, (4, 1)), np.ones(4), 0.0, runs)
+    (label, begin), *_ = asked.swaps(leading, ["gain"])
+    assert label == "mass"
+    assert begin.shared == pytest.approx([0.0, 0.99, 0.0], abs=0.02)
+    assert not [label for label, _ in asked.swaps(leading, ["gain", "mass"]) if label in ("gain", "mass")]
+
+
+def test_labels_together_count_against_a_force_that_none_has():
+    asked = Watch(Columns(6), healthy(), 2)
+    events = [(score, Event({}, 2, 6, label, 1.0, 0.1, 0.0)) for score, label in
+              ((10.0, "force"), (9.5, "gain"), (9.4, "mass"))]  # fmt: skip
+    assert asked.decided(events).label == "gain"
+    assert asked.decided(events[:2]).label == "force"
+    assert asked.log_prior(()) == pytest.approx(np.log1p(-CHANGED))
