@@ -81,7 +81,7 @@ def plain(vehicle: LoadedVehicle, observer: Observer, found: Posterior, case: st
         )
     if len(group) > MOST_GROUP and verdict == "cause":
         cautions.append(f"{len(group)} labels explain these runs confounded: {', '.join(group)}")
-    if not vehicle.kernels.compiled:
+    if vehicle.level and not vehicle.kernels.compiled:
         cautions.append(f"the model runs as plain Python, some hundred times slower: {vehicle.kernels.why}")
     return {
         "format": 1, "kind": KIND, "case": {"name": case, "vehicle": vehicle.name, "runs": len(observer.runs)},

@@ -91,7 +91,12 @@ def read_own(path: Path) -> LoadedVehicle:
 def _import(wanted: str, path: Path, wrong: Callable[[str], ConfigError]) -> tuple[Any, Path | None, str]:
     """The model object, its file, and its name in it."""
     if wanted.endswith(".fmu"):
-        raise wrong("FMUs are not read yet: wrap it in a process that speaks lines (exec:COMMAND), or in a rollout")
+        from glider.tools.own.fmu import FmuModel
+
+        file = (path.parent / wanted).resolve()
+        if not file.is_file():
+            raise wrong(f"no file {wanted} beside it")
+        return FmuModel(file), file, ""
     if wanted.startswith("exec:"):
         from glider.tools.own.process import ProcessModel
 
