@@ -41,7 +41,7 @@ def test_every_measure_can_be_loaded(name):
 
 
 def test_an_unknown_measure_is_refused():
-    with pytest.raises(InputError, match="no measure 'speed': expected one of plant, "):
+    with pytest.raises(InputError, match=r"'speed': .*plant, "):
         run(["speed"], Settings())
 
 
@@ -83,7 +83,7 @@ def test_without_a_compiler_c_is_null_and_says_so(monkeypatch):
     assert result["ratio"] is result["c_steps_per_s"] is result["max_state_difference"] is None
     assert result["batch"]["ratio"] is result["batch"]["ratio_fast"] is None
     assert min(result["steps_per_s"], result["batch"]["steps_per_s"]) > 0.0
-    assert "no C compiler" in result["note"]
+    assert "compiler" in result["note"]
 
 
 @needs_cc

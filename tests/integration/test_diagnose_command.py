@@ -153,8 +153,8 @@ def test_a_vehicle_that_does_not_fit_is_to_be_identified_first(tmp_path, capsys)
     said = capsys.readouterr()
     answer = json.loads(said.out)
     assert answer["verdict"] != "none"
-    assert "note: no commands" in said.err
-    assert "note: one run only" in said.err
+    assert "no commands" in said.err
+    assert "one run" in said.err
     for share in ("shrinkage", "closed"):  # of runs left out, of which there is none
         assert answer["gap"][share] == {"value": None, "ci90": [None, None]}
     page = (tmp_path / "out" / "report.html").read_text()
@@ -174,11 +174,10 @@ def test_the_first_diagnosis_of_the_readme_contradicts_itself_nowhere(tmp_path):
         done = run_glider(*words, cwd=tmp_path)
         assert done.returncode == 0, done.stderr
     sentence, *verdict = done.stdout.splitlines()
-    assert sentence.startswith("No gap: noise, disturbance and parameters within their uncertainty explain these runs")
-    assert "; the total of this run, to which all was fitted, is " in sentence
+    assert sentence.startswith("No gap: ")  # the whole: tests/data/golden/diagnosis_words.txt
     assert verdict[0] == "verdict: none"
     assert verdict[1].endswith("  none")
-    assert "verdict: none (no candidate earned its place)" in done.stderr
+    assert "verdict: none (" in done.stderr
     answer = json.loads((tmp_path / "answer" / "diagnosis.json").read_text())
     assert [one["finding"] for one in answer["readings"]] == ["not_flying"]
     assert answer["gap"]["shrinkage"]["value"] is None

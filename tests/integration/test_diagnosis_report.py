@@ -29,6 +29,7 @@ from glider.tools.inference.corrected import load_corrected
 from glider.tools.inference.model import nominal_model
 from glider.tools.report import words
 from glider.tools.report.diagnosis import report_html
+from glider.tools.report.now import check_of
 from tests.support.browser import CHROMIUM, Page, browser
 from tests.support.flights import World, fly_case
 from tests.support.pages import assert_offline
@@ -73,14 +74,14 @@ def test_the_cause_is_found_and_said(folder, said):
     found = json.loads((folder.parent / "answer" / "diagnosis.json").read_text())
     assert found["verdict"] == "cause"
     assert found["selected"][0] == "net_buoyancy"
-    assert "the vehicle is ballasted heavy or light (net_buoyancy, mass: net" in said.lower()
+    assert "(net_buoyancy, mass: net" in said.lower()
     mass = found["causes"][0]["parameters"]["mass"]["estimate"]
     assert f"mass {1000.0 * mass:.1f} g, 90 %: " in said
     assert "heavy positive" in said
     _, verdict, first, *_, gaps = said.strip().splitlines()
     assert verdict == f"verdict: cause, {', '.join(found['selected'])}"
     assert first.split()[:2] == [f"{found['causes'][0]['probability']:.2f}", "net_buoyancy"]
-    assert gaps.startswith(f"gap in tolerances: before {found['gap']['before']['total']:.2f}, recalibrated ")
+    assert f" {found['gap']['before']['total']:.2f}, " in gaps
     case = load_case(folder)
     load_corrected(folder.parent / "answer" / "corrected.toml", nominal_model(case))
     low, high = found["causes"][0]["parameters"]["mass"]["ci90"]
@@ -151,7 +152,7 @@ def test_sections_stand_in_order_with_the_answer_in_them(page, folder):
 def test_it_says_what_to_check_and_what_to_enter(page, folder):
     found = json.loads((folder.parent / "answer" / "diagnosis.json").read_text())
     now = page[page.index('id="now"') : page.index('id="where"')]
-    assert "Weigh the vehicle in the water of the site" in now  # the sentence of the gallery of causes
+    assert check_of("net_buoyancy")[0] in now
     (entry,) = [one for one in found["enter"] if one["label"] == "net_buoyancy"]
     assert (entry["key"], entry["file"], entry["unit"]) == ("trim.net_mass", 0.0, "kg")
     assert entry["value"] == pytest.approx(found["causes"][0]["parameters"]["mass"]["estimate"])
@@ -380,7 +381,7 @@ def test_the_runs_for_foxglove_hold_the_three_poses(folder, said, tmp_path, caps
     assert {path["value"].split(".")[0] for path in plot["paths"]} == set(poses)
     assert glider("gap", "report", folder.parent / "answer", "--foxglove", tmp_path / "fox") == 2
     (line,) = capsys.readouterr().err.strip().splitlines()
-    assert "is there already" in line
+    assert str(tmp_path / "fox") in line
 
 
 def translation(data: bytes) -> list[float]:

@@ -1,5 +1,7 @@
 """The command `glider simulate`: its files, its exit codes, its one line for what it cannot use."""
 
+import errno
+import os
 import sys
 from pathlib import Path
 
@@ -163,7 +165,7 @@ def test_missing_files_get_one_line(tmp_path):
         assert done.returncode == 2
         assert done.stdout == ""
         assert done.stderr.count("\n") == 1
-        assert "No such file" in done.stderr
+        assert os.strerror(errno.ENOENT) in done.stderr
 
 
 def test_binary_input_gets_one_line(simulate, tmp_path, monkeypatch, capsys):
