@@ -140,10 +140,10 @@ def test_where_the_law_has_no_answer_the_pid_takes_over():
 
 
 def test_thresholds_without_hysteresis_are_refused():
-    with pytest.raises(ConfigError, match="pitch_off: expected less than pitch_on"):
+    with pytest.raises(ConfigError, match=r"pitch_off: .*pitch_on"):
         decode("pitch_on = 0.1\npitch_off = 0.1\n", HybridTable, "m.toml")
 
 
 def test_the_law_without_body_velocities_is_refused():
-    with pytest.raises(ConfigError, match="needs body velocities"):
+    with pytest.raises(ConfigError, match="body velocities"):
         decode('controller = "law"\nestimator = "measured"\n', Control, "m.toml")

@@ -1,6 +1,7 @@
 """Arming: one list of checks with reasons, each of which can refuse; what cannot be checked is not fit."""
 
 import os
+import re
 import shutil
 
 import msgspec
@@ -50,8 +51,8 @@ def one_refused(checks: dict[str, ArmingCheck], name: str) -> str:
 def test_not_at_the_surface_is_refused(flight):
     flight.board.world.x[2] = 2.0
     reason = one_refused(found(flight), "zero depth")
-    assert "m deep, not 0.3 m deep; +" in reason
-    assert "hPa is no weather (60 at most)" in reason
+    assert ", not 0.3 m " in reason
+    assert "(60 at most)" in reason
 
 
 def test_a_device_without_a_sample_is_refused(flight, monkeypatch):
@@ -59,12 +60,12 @@ def test_a_device_without_a_sample_is_refused(flight, monkeypatch):
         out[1] = Validity.MISSING
 
     monkeypatch.setattr(flight.board.slider_wire, "read", silent)
-    assert one_refused(found(flight), "devices") == "nothing fit from slider_wire"
+    assert one_refused(found(flight), "devices").endswith(" slider_wire")
 
 
 def test_devices_that_do_not_answer_are_named(flight):
-    flight.board.silent = lambda: ["beacon (port sensors): does not answer"]
-    assert one_refused(found(flight), "devices") == "beacon (port sensors): does not answer"
+    flight.board.silent = lambda: ["beacon (port sensors): silent"]
+    assert one_refused(found(flight), "devices") == "beacon (port sensors): silent"
 
 
 def test_a_calibration_that_was_changed_is_refused(flight):
@@ -83,7 +84,7 @@ def test_limits_unset_are_refused_on_hardware_alone(flight):
 
 def test_a_mission_deeper_than_the_hull_is_refused(flight):
     set_limits(flight, Limits(working_depth_m=3.0))
-    assert "deeper than the hull's 3 m" in one_refused(found(flight), "mission")
+    assert "hull's 3 m" in one_refused(found(flight), "mission")
 
 
 def test_upside_down_is_no_beginning(flight, monkeypatch):
@@ -119,9 +120,9 @@ def test_a_battery_that_is_low_already_does_not_dive(flight):
     assert found(flight)["battery"].reason == "not fitted"
     flight.board.battery = Says(11.9)
     set_limits(flight, None)
-    assert found(flight)["battery"].reason == "11.9 V; the vehicle file has no [limits] low_voltage"
+    assert re.fullmatch(r"11\.9 V; .*\[limits\] low_voltage", found(flight)["battery"].reason)
     set_limits(flight, Limits(low_voltage=12.0))
-    assert one_refused(found(flight), "battery") == "11.9 V, below the vehicle's low_voltage of 12 V"
+    assert re.fullmatch(r"11\.9 V, .*low_voltage of 12 V", one_refused(found(flight), "battery"))
     set_limits(flight, Limits(low_voltage=11.5))
     assert found(flight)["battery"].reason == "11.9 V"
 
@@ -153,7 +154,7 @@ def test_depth_counts_from_the_pressure_at_arming(flight, hpa):
     truth = flight.board.surface_pressure
     flight.board.surface_pressure, flight.board.hardware = truth - 100.0 * hpa, Hardware.TWINNED
     checks = {check.name: check for check in arm(flight, log=None)}
-    assert "from the board file's" in checks["zero depth"].reason
+    assert "board file" in checks["zero depth"].reason
     assert flight.board.surface_pressure == flight.autopilot.C[ctl.SURFACE_PRESSURE]
     assert flight.board.surface_pressure == pytest.approx(truth, abs=300.0)  # 3 cm
 
@@ -161,7 +162,7 @@ def test_depth_counts_from_the_pressure_at_arming(flight, hpa):
 @pytest.mark.parametrize("hpa", [-70.0, 70.0])
 def test_what_no_weather_does_is_refused(flight, hpa):
     flight.board.surface_pressure -= 100.0 * hpa
-    assert "is no weather" in one_refused(found(flight), "zero depth")
+    assert "(60 at most)" in one_refused(found(flight), "zero depth")
 
 
 @pytest.mark.parametrize("shift", [0.0, 5.0])
@@ -180,18 +181,18 @@ def test_a_clock_that_stands_or_leaps_is_refused(flight, monkeypatch, shift):
 def test_a_full_disk_is_refused(flight, tmp_path, monkeypatch):
     usage = shutil.disk_usage(tmp_path)
     monkeypatch.setattr(arming.shutil, "disk_usage", lambda folder: usage._replace(free=60_000_000))
-    assert "60 MB free, a flight may need 86 MB" in one_refused(found(flight, tmp_path), "disk")
+    assert re.search(r"60 MB .* 86 MB", one_refused(found(flight, tmp_path), "disk"))
 
 
 @pytest.mark.skipif(os.getuid() == 0, reason="root may write anywhere")
 def test_a_folder_that_cannot_be_written_is_refused(flight, tmp_path):
     tmp_path.chmod(0o500)
-    assert "cannot be written" in one_refused(found(flight, tmp_path), "disk")
+    assert "written" in one_refused(found(flight, tmp_path), "disk")
 
 
 def test_a_check_that_breaks_has_not_passed(flight):
     del flight.board.armed_depth
-    assert one_refused(found(flight), "zero depth").startswith("could not be checked: AttributeError")
+    assert one_refused(found(flight), "zero depth").endswith(": AttributeError")
 
 
 def test_switched_off_nothing_refuses(flight):

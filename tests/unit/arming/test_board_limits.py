@@ -48,7 +48,7 @@ def test_narrower_limits_are_the_vehicles_on_this_board(tmp_path):
 
 def test_a_pair_that_cannot_fly_is_refused_by_file_and_key(tmp_path):
     path = plunger(tmp_path, 0.4)
-    with pytest.raises(ConfigError, match=r"board\.toml: ballast\.limits: the ballast's low end is -0\.08"):
+    with pytest.raises(ConfigError, match=r"board\.toml: ballast\.limits: .* -0\.08"):
         build_flight(mission="sawtooth", board=path)
     done = CliRunner().invoke(fly, ["--board", path, "--no-log"], standalone_mode=False)
     assert isinstance(done.exception, ConfigError)  # the command line's exit code 2
@@ -63,7 +63,7 @@ def test_a_mission_that_asks_for_more_than_the_board_lets_is_refused(tmp_path):
         'format = 1\nname = "heavy"\ntime_limit_s = 60.0\n[site]\nname = "pool"\ndepth_m = 6.0\n'
         "[[leg]]\nduration_s = 5.0\npitch_deg = 0.0\nballast_kg = 0.18\n"
     )
-    with pytest.raises(ConfigError, match=r"leg\[0\]\.ballast_kg: 0\.18 kg is outside"):
+    with pytest.raises(ConfigError, match=r"leg\[0\]\.ballast_kg: 0\.18 kg"):
         build_flight(mission=str(mission), board=plunger(tmp_path, 0.8))
 
 

@@ -82,7 +82,7 @@ def test_options_are_checked_as_files_are(options, said):
 
 
 def test_a_campaign_nobody_has():
-    with pytest.raises(InputError, match="no campaign 'nope': neither a file nor one of robustness"):
+    with pytest.raises(InputError, match=r"'nope': .*robustness"):
         load_campaign("nope")
 
 
@@ -97,7 +97,7 @@ def test_files_that_a_campaign_names_stand_beside_it(campaign_file, tmp_path):
 def test_the_law_needs_the_filter(plan_of):
     plan = plan_of()
     measured = msgspec.structs.replace(plan.missions[0], control=Control(estimator="measured"))
-    with pytest.raises(InputError, match="needs body velocities"):
+    with pytest.raises(InputError, match="body velocities"):
         replace(plan, missions=(measured,)).pilot(0, "law")
 
 

@@ -48,18 +48,18 @@ def test_a_folder_keeps_its_chunks_and_loses_what_was_half_written(plan_of, tmp_
 def test_another_campaign_or_other_software_is_refused(plan_of, tmp_path, monkeypatch):
     plan = plan_of()
     Store(tmp_path, plan, fingerprint(plan), 60)
-    with pytest.raises(InputError, match="holds flights of another campaign"):
+    with pytest.raises(InputError, match="another campaign"):
         Store(tmp_path, plan, "0" * 16, 60)
     monkeypatch.setattr("glider.tools.study.campaign.store.kernels_digest", lambda: "new")
-    with pytest.raises(InputError, match="holds flights of other software"):
+    with pytest.raises(InputError, match="other software"):
         Store(tmp_path, plan, "0" * 16, 60)
 
 
 def test_a_folder_of_anything_else_is_left_alone(plan_of, tmp_path):
     (tmp_path / "thesis.txt").write_text("mine")
-    with pytest.raises(InputError, match="holds no campaign"):
+    with pytest.raises(InputError, match="no campaign"):
         fly_campaign(plan_of(), tmp_path, jobs=1)
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]
     (tmp_path / MANIFEST).write_text("{}")
-    with pytest.raises(InputError, match="not a campaign's manifest"):
+    with pytest.raises(InputError, match="manifest"):
         fly_campaign(plan_of(), tmp_path, jobs=1)

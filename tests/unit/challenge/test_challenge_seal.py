@@ -53,7 +53,7 @@ def test_other_answers_are_not_opened(sealed):
 @pytest.mark.parametrize("kind", ["cases", "held"])
 def test_a_case_that_has_changed_is_noticed(sealed, kind):
     (sealed / kind / "case000" / "case.toml").write_text("format = 2\n")
-    with pytest.raises(InputError, match="files have changed"):
+    with pytest.raises(InputError, match="changed"):
         opened(sealed)
 
 
@@ -63,7 +63,7 @@ def test_held_flights_need_not_be_there_where_none_is_flown_on(sealed):
     with pytest.raises(InputError, match="not there"):
         opened(sealed)
     (sealed / "cases" / "case000" / "case.toml").write_text("format = 2\n")
-    with pytest.raises(InputError, match="files have changed"):
+    with pytest.raises(InputError, match="changed"):
         opened(sealed, wanted=False)
 
 
@@ -98,9 +98,9 @@ def test_what_is_no_answer_says_so(tmp_path, name, content, message):
 def test_nothing_there_says_so(tmp_path):
     with pytest.raises(InputError, match="no answers"):
         open_answers(tmp_path)
-    with pytest.raises(InputError, match="no such file"):
+    with pytest.raises(InputError, match="no such"):
         open_answers(tmp_path / "answers.zip")
     with zipfile.ZipFile(tmp_path / "empty.zip", "w"):
         pass
-    with pytest.raises(InputError, match="no answers in this archive"):
+    with pytest.raises(InputError, match="no answers"):
         open_answers(tmp_path / "empty.zip")

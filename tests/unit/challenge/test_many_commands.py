@@ -72,13 +72,13 @@ def test_what_goes_along_with_a_case(missions, tmp_path):
 def test_refused_in_a_line(missions, tmp_path, capsys):
     good, bad = missions
     code, _, said = run(capsys, "gap", "diagnose", good, bad, "--out", good.parent)
-    assert (code, "would overwrite a case" in said) == (2, True)
+    assert (code, "overwrite" in said) == (2, True)
     assert (good / "case.toml").is_file()
     other = tmp_path / "good"
     shutil.copytree(good, other)
     code, _, said = run(capsys, "gap", "diagnose", good, other, "--out", tmp_path / "out")
-    assert (code, "good: another case is called so too" in said) == (2, True)
+    assert (code, "good: another case" in said) == (2, True)
     code, _, said = run(capsys, "gap", "watch", good, bad)
     assert (code, "--out" in said) == (2, True)
     code, _, said = run(capsys, "gap", "diagnose", good, bad, "--out", tmp_path / "out", "--dask", "tcp://127.0.0.1:9")
-    assert (code, "no Dask scheduler there" in said) == (2, True)
+    assert (code, "Dask scheduler" in said) == (2, True)

@@ -46,7 +46,7 @@ def test_a_long_hole_is_named_with_its_column_and_length(case):
     depth = case.runs[0].columns[names.DEPTH].copy()
     depth[100:180] = np.nan
     (line,) = cautions(problem_of(changed(case, **{names.DEPTH: depth})))
-    assert line == "run00: depth_m (18 % missing, up to 8 s): less can be seen there"
+    assert line.startswith("run00: depth_m (18 % missing, up to 8 s)")
 
 
 def test_a_sensor_that_is_slower_than_the_log_is_whole(case):
@@ -59,7 +59,7 @@ def test_a_sensor_that_is_slower_than_the_log_is_whole(case):
     assert cautions(problem_of(changed(case, **slower))) == []
     half[100:260] = np.nan
     (line,) = cautions(problem_of(changed(case, **slower)))
-    assert line == "run00: depth_m (36 % missing, up to 16 s): less can be seen there"
+    assert line.startswith("run00: depth_m (36 % missing, up to 16 s)")
 
 
 @pytest.mark.parametrize(
@@ -82,7 +82,7 @@ def test_short_blind_spells_are_usual(case):
 
 def test_one_run_leaves_nothing_out(case):
     (line,) = cautions(problem_of(replace(case, runs=case.runs[:1])))
-    assert line.startswith("one run only")
+    assert line.startswith("one run")
 
 
 def test_labels_that_these_runs_cannot_show_are_not_asked(case):

@@ -1,5 +1,7 @@
 """An answer is a smooth function of the readings: a millionth of their noise moves no verdict."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -41,4 +43,4 @@ def test_what_is_said_of_copies():
     other = Said("none", frozenset(), {"drag": 0.4, "none": 0.5, "unknown": 0.1})
     assert largest_move(own, other) == ("drag", pytest.approx(0.5))
     text = line("case000", own, [own, other])
-    assert text == "case000: 2 copies, cause 0.900 drag moves by 0.5; another verdict 1, others selected 1"
+    assert re.findall(r"drag|\d+\.\d+|\b\d\b", text) == ["2", "0.900", "drag", "0.5", "1", "1"]

@@ -48,7 +48,7 @@ def test_creeping_is_a_stall():
 
 def test_the_wrong_way_is_seen_as_soon_as_it_shows():
     verdicts = move(StallDetector(0.002, 1.0), [0.0, -0.001, -0.0025], 0.02)
-    assert verdicts == ["runs the wrong way"]
+    assert ["wrong way" in one for one in verdicts] == [True]
 
 
 def compare(watch, ways):
@@ -72,7 +72,7 @@ def test_a_wire_that_stands_while_the_drive_counts_is_a_stall():
 
 def test_a_wire_that_goes_the_other_way_is_seen_within_twice_the_least_way():
     verdicts = compare(StallDetector(0.002, 1.0), [(0.0005 * i, -0.0005 * i) for i in range(10)])
-    assert verdicts == ["runs the wrong way"]
+    assert ["wrong way" in one for one in verdicts] == [True]
 
 
 def test_limits_are_the_tighter_of_file_and_vehicle():

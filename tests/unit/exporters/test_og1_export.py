@@ -206,7 +206,7 @@ def test_the_verdict_of_a_diagnosis_is_that_of_all_rows(tmp_path, case):
         (tmp_path / "d" / "diagnosis.json").write_text(spoilt)
         done = glider("export", "og1", case, "--out", "m2.nc", "--with", "d", cwd=tmp_path)
         assert done.returncode == 2
-        assert done.stderr.endswith("diagnosis.json: not the answer of `glider gap diagnose`\n")
+        assert "diagnosis.json: " in done.stderr
 
 
 def test_a_measured_speed_goes_along(tmp_path, case):

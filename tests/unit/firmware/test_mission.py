@@ -41,5 +41,5 @@ def test_a_mission_that_goes_nowhere_is_refused():
 
 def test_ballast_outside_the_vehicles_range_is_refused():
     mission = decode_mission(shipped("guidance/missions")["spiral"].replace("0.15", "0.5"), "m.toml")
-    with pytest.raises(ConfigError, match=r"leg\[0\].ballast_kg: 0.5 kg is outside roughie's"):
+    with pytest.raises(ConfigError, match=r"leg\[0\].ballast_kg: 0.5 kg .*roughie"):
         mission.matrix(load_vehicle("roughie"), "m.toml")

@@ -35,7 +35,7 @@ def test_one_flight_at_a_time_and_a_dead_ones_place_is_free(tmp_path):
     code += "; print(1, flush=True); time.sleep(60)"
     with subprocess.Popen([sys.executable, "-c", code, str(tmp_path)], stdout=subprocess.PIPE) as other:
         other.stdout.readline()
-        with pytest.raises(HeartbeatHeld, match=f"a flight is under way .process {other.pid}."):
+        with pytest.raises(HeartbeatHeld, match=f"process {other.pid}"):
             Heartbeat.create(tmp_path, 0.02)
         other.kill()
     pulse = Heartbeat.create(tmp_path, 0.02)
@@ -55,7 +55,7 @@ def test_the_guards_words_outlive_a_new_flight(tmp_path):
 @pytest.mark.parametrize("data", [b"", b"x" * 10, b"\xff" * hb.SIZE])
 def test_what_is_no_heartbeat_is_refused(tmp_path, data):
     (tmp_path / hb.NAME).write_bytes(data)
-    with pytest.raises(ValueError, match="not a heartbeat"):
+    with pytest.raises(ValueError, match="heartbeat"):
         Heartbeat.open(tmp_path)
 
 

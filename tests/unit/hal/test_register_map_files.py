@@ -91,7 +91,7 @@ def test_a_command_that_its_register_cannot_hold_is_refused(tmp_path):
     text = write(tmp_path, "drive", 'mode = { at = 9, type = "u32"', 'mode = { at = 9, type = "i16"')
     path = tmp_path / "drive.toml"
     path.write_text(path.read_text().replace("count = 11", "count = 10").replace("absolute = 3", "absolute = 40000"))
-    with pytest.raises(ConfigError, match=r"command.absolute: 40000 does not fit i16 of block.path.value.mode"):
+    with pytest.raises(ConfigError, match=r"command.absolute: 40000 .*i16 of block.path.value.mode"):
         decode_device_file(text, "board.toml")
 
 

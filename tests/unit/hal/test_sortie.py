@@ -89,7 +89,7 @@ def test_a_sortie_runs_its_course():
     for trigger in (Trigger.ARM, Trigger.START, Trigger.FINISH, Trigger.SURFACE, Trigger.END):
         state = follow(state, trigger, Party.FLIGHT, Facts())
     assert state == SortieState.ENDED
-    with pytest.raises(SortieRefused, match="flight: 'first tick' is not possible in state ended"):
+    with pytest.raises(SortieRefused, match=r"flight: 'first tick' .* ended"):
         follow(state, Trigger.START, Party.FLIGHT, Facts())
 
 

@@ -47,7 +47,7 @@ def test_swapped_axes(runs, a, b):
 
 
 def test_depth_counted_upwards(runs):
-    assert "axes swapped or signs turned" in reason(changed(runs[0], mocap_z_m=-runs[0].columns["mocap_z_m"]))
+    assert "signs turned" in reason(changed(runs[0], mocap_z_m=-runs[0].columns["mocap_z_m"]))
 
 
 def test_frozen_capture(runs):
@@ -59,7 +59,7 @@ def test_frozen_capture(runs):
 
 def test_a_capture_of_another_time_is_missed(runs):
     nothing = {name: np.full(runs[0].rows, np.nan) for name in names.MOCAP}
-    assert "clock far off?" in reason(changed(runs[0], **nothing))
+    assert "clock far" in reason(changed(runs[0], **nothing))
 
 
 def test_clocks_apart_are_found_with_their_uncertainty(runs):
@@ -73,7 +73,7 @@ def test_clocks_apart_are_found_with_their_uncertainty(runs):
     found = clock_offset(both)
     assert found is not None
     assert found[0] == pytest.approx(late, abs=0.1)
-    assert "align the clocks first" in reason(both)
+    assert "the clocks" in reason(both)
 
 
 def test_spikes_go_and_nothing_else(runs):

@@ -107,7 +107,7 @@ def test_compressed_binaries_give_the_same(tmp_path):
     name = "run000.csv.gz"
     assert (tmp_path / "case" / name).read_bytes() == (tmp_path / "plain" / name).read_bytes()
     packed[0].write_bytes(packed[0].read_bytes()[:20_000])
-    assert "cut or damaged" in bring("slocum", packed, tmp_path / "cut").stderr
+    assert "damaged" in bring("slocum", packed, tmp_path / "cut").stderr
 
 
 def test_what_is_sent_ashore_may_lack_sensors(tmp_path):
@@ -142,7 +142,7 @@ def test_the_zero_of_a_seagliders_volume_is_that_of_its_first_dive(tmp_path):
         for n, (one, counts) in enumerate(zip(flights, (2900.0, 2860.0), strict=True))
     ]
     done = bring("seaglider", files, tmp_path / "case")
-    assert "zero was moved by +10.0 cm3" in done.stderr
+    assert " +10.0 cm3" in done.stderr
     later = load_run(tmp_path / "case" / "run001.csv.gz").columns["oil_m3"]
     np.testing.assert_allclose(later, flights[1].columns["oil_m3"] + 1e-5, atol=1e-9)
 
@@ -159,7 +159,7 @@ def test_a_late_science_clock_is_put_right_and_said(tmp_path, kind):
     one = flight(rows=400, deepest=100.0)
     late = dataclasses.replace(one, ctd_t=one.ctd_t + 60.0)
     done = bring(kind, write(kind, tmp_path / "in", [late]), tmp_path / "case")
-    assert "clock moved by -60.0 s" in done.stderr
+    assert " -60.0 s" in done.stderr
     found = load_run(tmp_path / "case" / "run000.csv.gz").columns["density_kg_m3"][2:-2]
     np.testing.assert_allclose(found, one.columns["density_kg_m3"][2:-2], atol=0.01)
 

@@ -103,7 +103,7 @@ def test_a_capture_of_another_flight_is_refused(tmp_path):
     other = Run("run00", None, {names.TIME: t, names.DEPTH: np.cumsum(rng.standard_normal(len(t)))})
     capture = read_capture(export(tmp_path / "a.tsv", np.arange(0.0, 60.0, 1.0 / RATE)))
     capture.pose[:, 2] = np.cumsum(rng.standard_normal(len(capture.t)))
-    with pytest.raises(InputError, match="do not fit together"):
+    with pytest.raises(InputError, match="fit together"):
         find_offset(other, capture)
 
 

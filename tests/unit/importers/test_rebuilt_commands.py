@@ -1,5 +1,6 @@
 """Commands that a log does not hold: of words for the drive's state, of on and off, of the reading alone."""
 
+import re
 from importlib.resources import files
 
 import numpy as np
@@ -85,7 +86,7 @@ def test_a_pump_that_runs_to_its_stops(tmp_path, rule, apart):
     settled = np.minimum.reduce([np.abs(t - begin) for begin in (5.0, 25.0, 45.0)]) > (apart + 0.5) / HZ
     moving = settled & (t >= 5.0)
     np.testing.assert_array_equal(command[moving], sent[moving])
-    assert imported.notes[0].endswith("cmd_ballast_kg: rebuilt of ballast_kg: 3 runs to a stop")
+    assert imported.notes[0].startswith("cmd_ballast_kg: rebuilt")
 
 
 @pytest.mark.parametrize("rule", [WORDS, ON_OFF, "rate = 0.03"])
@@ -95,7 +96,7 @@ def test_a_run_that_is_stopped_between(tmp_path, rule):
     command = run.columns["cmd_ballast_kg"]
     assert command[(t > 45.2) & (t < 49.8)] == pytest.approx(HIGH)
     assert command[t > 50.2] == pytest.approx(sent[-1], abs=0.002)
-    assert imported.notes[0].endswith("2 runs to a stop, 1 that ended between them")
+    assert re.findall(r": (\d) .*, (\d) ", imported.notes[0]) == [("2", "1")]
 
 
 def test_commands_are_in_force_from_their_row_also_at_another_rate(tmp_path):
@@ -130,7 +131,7 @@ def test_words_for_a_command(tmp_path):
     found = load_case(tmp_path / "out").runs[0].columns["cmd_ballast_kg"]
     np.testing.assert_array_equal(found, [0.2, np.nan, -0.15, 0.2])
     (tmp_path / "a.csv").write_text("s,mode\n0,dive\n1,7\n")
-    with pytest.raises(InputError, match=r"a.csv:3: mode: not a number: '7'"):
+    with pytest.raises(InputError, match=r"a.csv:3: mode: .*'7'"):
         import_csv([tmp_path / "a.csv"], str(tmp_path / "map.toml"), tmp_path / "other")
 
 

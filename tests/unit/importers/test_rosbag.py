@@ -160,7 +160,7 @@ def test_a_cut_bag_is_named_with_its_byte(bag, mapping, tmp_path):
     for share in (0.3, 0.7, 0.999):
         end = int(share * len(data))
         (cut / file.name).write_bytes(data[:end])
-        with pytest.raises(InputError, match=rf"{file.name}: cut at byte {end}\b"):
+        with pytest.raises(InputError, match=rf"{file.name}: cut.* {end}\b"):
             import_streams([cut], mapping, tmp_path / "case", read_rosbag)
     assert not (tmp_path / "case").exists()
 
@@ -170,7 +170,7 @@ def test_a_message_that_cannot_be_read_is_named_by_its_number(mapping, tmp_path)
     with rosbag2.Writer(tmp_path / "bag", version=9) as writer:
         to = writer.add_connection("/pressure", "sensor_msgs/msg/FluidPressure", typestore=store)
         writer.write(to, 10**18, b"\x00\x01\x00\x00\x01")
-    with pytest.raises(InputError, match=r"bag: message 1 of the mapped topics, /pressure"):
+    with pytest.raises(InputError, match=r"bag: message 1 .*/pressure"):
         import_streams([tmp_path / "bag"], mapping, tmp_path / "case", read_rosbag)
 
 

@@ -61,7 +61,7 @@ def test_what_a_draw_wire_means_is_found(found):
     size = found.vehicle["slider_scale"]
     assert size.ci90[0] < TRUE["SLIDER_SCALE"] < size.ci90[1]
     assert size.ci90[1] < 0.0
-    assert "the slider's draw-wire means" in identified_text(found)
+    assert "draw-wire means" in identified_text(found)
 
 
 def test_the_normal_matrix_is_the_slope_of_the_cost(case):

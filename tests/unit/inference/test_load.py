@@ -24,10 +24,10 @@ def test_a_vehicle_of_another_kind_is_no_model_of_a_case(tmp_path):
     assert load_model("seaglider", ocean).name == "seaglider"
     assert load_model("roughie", pool).name == "roughie"
     for wanted, case in (("roughie", ocean), ("slocum", pool)):
-        with pytest.raises(ConfigError, match=f"{wanted}: kind: another kind of vehicle than the case's"):
+        with pytest.raises(ConfigError, match=f"{wanted}: kind: "):
             load_model(wanted, case)
     corrected = tmp_path / "corrected.toml"
     corrected.write_text('format = 1\ncorrected = true\nvehicle = "roughie"\n')
     assert load_model(str(corrected), pool).name == str(corrected)
-    with pytest.raises(ConfigError, match="another kind of vehicle"):
+    with pytest.raises(ConfigError, match="another kind"):
         load_model(str(corrected), ocean)

@@ -74,10 +74,10 @@ def test_a_black_box_is_identified_and_a_weaker_heater_is_its_gain(simulator):
 
 def test_a_process_that_ends_or_mumbles_is_named(tmp_path):
     (tmp_path / "v.toml").write_text('format = 1\nmodel = "exec:echo hello"\n')
-    with pytest.raises(InputError, match="expected a line of JSON, got 'hello'"):
+    with pytest.raises(InputError, match=r"JSON.*'hello'"):
         load_own(tmp_path / "v.toml")
     (tmp_path / "v.toml").write_text('format = 1\nmodel = "exec:nothing-of-this-name"\n')
-    with pytest.raises(InputError, match="nothing-of-this-name: cannot be started"):
+    with pytest.raises(InputError, match="nothing-of-this-name: "):
         load_own(tmp_path / "v.toml")
     (tmp_path / "v.toml").write_text('format = 1\nmodel = "exec:true"\n')
     with pytest.raises(InputError, match="ended"):

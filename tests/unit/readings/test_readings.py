@@ -244,7 +244,7 @@ def test_minutes_at_the_surface_are_left_out_and_the_gauge_that_feels_the_tank_i
 
 def test_nothing_to_compare_is_said():
     run = replace(FLIGHTS[0], columns={name: FLIGHTS[0].columns[name] for name in ("t_s", "depth_m")})
-    with pytest.raises(InputError, match="nothing to compare: depth_m only"):
+    with pytest.raises(InputError, match="depth_m only"):
         check([run])
 
 
@@ -254,4 +254,4 @@ def test_samples_that_never_move_are_said():
             columns[name][:] = columns[name][0]
 
     findings = check(changed(dead, ONBOARD)).findings
-    assert {one.channel for one in findings if "does not move at all" in one.text} >= {"pitch_rad", "q_rad_s"}
+    assert {one.channel for one in findings if "not move" in one.text} >= {"pitch_rad", "q_rad_s"}

@@ -21,11 +21,11 @@ def test_a_regime_that_got_worse_is_named():
 
 def test_noise_notes_and_open_directions():
     held = {"before": BEFORE, "after": BEFORE, "regimes": {}}
-    found = alarms(held, {"disturbance linear": 11.02, "slider": 1.2}, ["intervals are rough"], ["K_D stays wide."])
+    found = alarms(held, {"disturbance linear": 11.02, "slider": 1.2}, ["rough intervals"], ["K_D stays wide."])
     assert [one["head"] for one in found] == ["Note", "Noise", "Not determined"]
     assert "disturbance linear 11.0 times" in found[1]["text"]
     assert "slider" not in found[1]["text"]
-    assert found[0]["text"] == "Intervals are rough."
+    assert found[0]["text"] == "Rough intervals."
 
 
 def test_nothing_to_say_is_no_alarm_and_no_check_is_one():

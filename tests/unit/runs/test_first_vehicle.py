@@ -72,8 +72,8 @@ def test_a_pipe_answers_one_line_each(tmp_path):
     assert made.mass.m_t == 12.5
     assert "J_y" not in made.assumed
     assert "J_x" in made.assumed
-    assert f"3/{len(QUESTIONS)} Mass of the rail" in done.output
-    assert "the shipped vehicle's, scaled by your mass" in done.output
+    assert f"3/{len(QUESTIONS)} Mass of" in done.output
+    assert "shipped vehicle" in done.output
 
 
 @pytest.mark.parametrize(
@@ -99,10 +99,10 @@ def test_a_person_goes_back_and_is_asked_again(capsys):
     found = interview(io.StringIO("\n".join(said) + "\n"), person=True)
     assert found.answers == {"m_t": 15.0, "length": 1.5}
     shown = capsys.readouterr().err
-    assert "not a number: 'abc'" in shown
-    assert "this is the first question" in shown
+    assert "'abc'" in shown
+    assert "first question" in shown
     assert "[12, your answer]" in shown
-    assert "not a valid" not in shown
+    assert "valid" not in shown
 
 
 def test_wires_of_a_swing_have_no_default():

@@ -16,4 +16,4 @@ def test_a_log_is_to_be_exported_first(tmp_path, command):
     (tmp_path / "X.mcap").write_bytes(b"\x89MCAP0\r\n")
     done = glider(*command.split(), cwd=tmp_path)
     assert done.returncode == 2
-    assert done.stderr.splitlines()[-1] == "glider: X.mcap is an onboard log: glider log export X.mcap first"
+    assert "glider log export X.mcap" in done.stderr.splitlines()[-1]

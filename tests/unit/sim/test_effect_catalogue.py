@@ -42,13 +42,13 @@ def test_parameters_have_ranges_around_their_defaults_and_are_refused_outside(la
                 check_values(label, {p.name: bad})
             assert "\n" not in str(caught.value)
         assert check_values(label, {p.name: p.high})[p.name] == p.high
-    with pytest.raises(EffectError, match=f"effect {label} has no parameter 'gremlins'; it has "):
+    with pytest.raises(EffectError, match=f"{label} .*'gremlins'"):
         check_values(label, {"gremlins": 0.0})
 
 
 @pytest.mark.parametrize("label", MOCAP)
 def test_motion_captures_clock_cannot_be_flown(label):
-    with pytest.raises(EffectError, match=f"effect {label} is one of motion capture's clock"):
+    with pytest.raises(EffectError, match=f"{label} .*clock"):
         apply_effects(world(), {label: at_spread(label)})
 
 

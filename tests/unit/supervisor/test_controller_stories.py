@@ -167,7 +167,7 @@ def test_a_restart_of_the_filter_warns_for_a_tick_and_the_third_aborts():
     man.ap[ctl.FILTER_RESTARTS] = 3.0
     assert man.step() == ABORT
     assert man.supervisor.row == sup.FAULT_ESTIMATE
-    assert man.pilot.reason == "fault 35: estimate not finite"
+    assert man.pilot.reason.startswith("fault 35: ")
 
 
 def test_more_restarts_are_borne_where_the_vehicle_file_says_so():

@@ -41,7 +41,7 @@ def test_imu_lost_holds_then_aborts(how):
     assert (man.commands == held).all()
     assert man.until(ABORT, 0.2) <= 0.2
     assert man.ap[ctl.MODE] == ctl.ABORTED
-    assert man.pilot.reason == "fault 1: IMU unplugged or frozen"
+    assert man.pilot.reason.startswith("fault 1: ")
 
 
 def test_an_imu_that_comes_back_within_the_hold_flies_on():

@@ -88,5 +88,5 @@ def test_reference_filters_and_all_other_gains_are_kept(vehicle, board):
 def test_what_cannot_be_tuned_is_said_in_one_line(vehicle, board):
     fast = Control(pitch=PitchGains(reference=ReferenceTable(wn=10.0)))
     quick = slower(msgspec.structs.replace(vehicle, control=fast), "slider", 1e4)
-    with pytest.raises(InputError, match=r"no PID has a phase margin of 60 deg at .* rad/s on this vehicle"):
+    with pytest.raises(InputError, match=r" 60 deg at .* rad/s"):
         rule.tune(quick, board)

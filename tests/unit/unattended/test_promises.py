@@ -3,6 +3,7 @@ kernels."""
 
 import ast
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -78,12 +79,12 @@ def test_a_cache_that_others_may_write_into_is_not_read(tmp_path):
     assert done.stdout.strip() == str(folder)
     folder.chmod(0o777)
     done = subprocess.run(command, env=place, cwd=ROOT, capture_output=True, text=True)
-    assert "no writable folder of one's own" in done.stderr
+    assert "GLIDER_CACHE_DIR" in done.stderr
     if os.getuid() == 0:
         folder.chmod(0o755)
         os.chown(folder, 12345, 12345)
         done = subprocess.run(command, env=place, cwd=ROOT, capture_output=True, text=True)
-        assert "no writable folder of one's own" in done.stderr
+        assert "GLIDER_CACHE_DIR" in done.stderr
 
 
 @pytest.mark.parametrize("command", [("acknowledge",), ("compile",), ("fly", "--mission", "spiral", "--no-log")])
@@ -98,7 +99,7 @@ def test_no_place_for_kernels_is_said_in_a_line(command, tmp_path):
     )  # fmt: skip
     assert done.returncode == 2
     (line,) = done.stderr.splitlines()
-    assert line == f"glider: {blocked}: no writable folder of one's own for compiled kernels: set GLIDER_CACHE_DIR"
+    assert re.fullmatch(f"glider: {blocked}: .* GLIDER_CACHE_DIR", line)
 
 
 @pytest.fixture
@@ -119,7 +120,7 @@ def test_a_heartbeats_folder_of_somebody_else_is_refused(open_folder):
     code += "Heartbeat.create(sys.argv[1], 0.02)"
     tmp_path.chmod(0o777)
     done = subprocess.run([sys.executable, "-c", code, str(tmp_path)], cwd=ROOT, capture_output=True, text=True)
-    assert "belongs to somebody else" in done.stderr
+    assert "somebody else" in done.stderr
     (tmp_path / "elsewhere").write_text("precious")
     (tmp_path / "heartbeat").symlink_to(tmp_path / "elsewhere")
     os.chown(tmp_path, 0, 0)
@@ -136,5 +137,5 @@ def test_a_text_file_without_end_is_not_read_to_it(tmp_path, monkeypatch):
     with path.open("wb") as file:
         file.truncate(2**40)  # a terabyte of nothing
     monkeypatch.setattr("glider.tools.data.sources.MAX_TEXT_CHARACTERS", 1_000_000)
-    with pytest.raises(InputError, match=r"x\.toml: longer than 1000000 characters"):
+    with pytest.raises(InputError, match=r"x\.toml: .*1000000"):
         read_text(path)
