@@ -19,9 +19,6 @@ from glider.hal.ports import Condition, Validity
 from glider.sim_backend.board import SimBoard
 from glider.sim_backend.world import World
 
-SENSOR_KINDS = ("silent", "off", "stuck", "garbage", "wrong", "jump", "slow", "delayed", "repeated", "backwards",
-                "intermittent")  # fmt: skip
-ACTUATOR_KINDS = ("silent", "off", "stuck", "wrong", "slow", "alarm", "alarm_kept", "stalled", "misconfigured")
 RATES = (SERVO_RATE, SLIDER_RATE, BALLAST_RATE)
 JAMMED = 1e-9  # of a rate
 SAID = {"alarm_kept": Condition.ALARM_KEPT, "stalled": Condition.GIVEN_UP, "misconfigured": Condition.MISCONFIGURED}

@@ -2,7 +2,12 @@
 
 import math
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
+
+import msgspec
+
+from glider.tools.data.errors import InputError
 
 
 def as_plain(value: Any) -> Any:
@@ -16,3 +21,13 @@ def as_plain(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
+
+
+def read_json(path: Path, kind: Any, most: int | None = None) -> Any:
+    """A JSON file as a msgspec type; InputError where it is none or has more than `most` bytes."""
+    if most is not None and path.stat().st_size > most:
+        raise InputError(f"longer than {most} bytes", source=path)
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=kind)
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise InputError(str(error), source=path) from None

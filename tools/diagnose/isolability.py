@@ -43,7 +43,6 @@ ONBOARD = (*names.COMMANDS, *names.DRAW_WIRES, *names.ATTITUDE, *names.RATES, na
 POSSIBLE = (*ONBOARD, *names.MOCAP)  # columns that a planned log may have
 MEASURED = (*names.ATTITUDE, *names.RATES, names.DEPTH, *names.DRAW_WIRES, *names.MOCAP_POSITION, *names.MOCAP_ATTITUDE)
 CLEAR_NAT = 100.0  # nat over none, of an effect that is clearly there
-WATER_DENSITY = 998.0  # kg/m3
 START_DEPTH, START_SPEED = 1.0, 0.1  # m, m/s
 
 

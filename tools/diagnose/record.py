@@ -20,7 +20,7 @@ from glider.sim_backend.core.effects.catalogue import catalogue
 from glider.sim_backend.ocean.vehicle import KIND
 from glider.tools.data.errors import InputError
 from glider.tools.data.files import write_files
-from glider.tools.data.plain import as_plain
+from glider.tools.data.plain import as_plain, read_json
 from glider.tools.diagnose.stages import STAGES
 from glider.tools.readings.pictures import Shown
 
@@ -353,10 +353,7 @@ def is_pooled(folder: Path) -> bool:
 
 
 def read_as(path: Path, kind: Any) -> Any:
-    try:
-        return msgspec.json.decode(_present(path).read_bytes(), type=kind)
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise InputError(str(error), source=path) from None
+    return read_json(_present(path), kind)
 
 
 def _check(answer: AnswerRecord, details: Details, folder: Path) -> None:

@@ -9,6 +9,7 @@ from glider.sim_backend.core.effects.catalogue import catalogue
 from glider.sim_backend.ocean.catalogue import catalogue as ocean_catalogue
 from glider.tools.data.errors import InputError
 from glider.tools.data.files import write_bytes
+from glider.tools.data.plain import read_json
 from glider.tools.data.runs.origin import with_flight
 from glider.tools.diagnose.record import EstimateRecord
 from glider.tools.report import words
@@ -77,12 +78,7 @@ def read_watch(folder: Path) -> _Watch:
     path = folder / FILE
     if not path.is_file():
         raise InputError("no such file: not a folder of `glider gap watch --out`", source=path)
-    if path.stat().st_size > MOST_BYTES:
-        raise InputError(f"longer than {MOST_BYTES} bytes", source=path)
-    try:
-        return msgspec.json.decode(path.read_bytes(), type=_Watch)
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise InputError(str(error), source=path) from None
+    return read_json(path, _Watch, MOST_BYTES)
 
 
 def _size(one: _Cause | _Event) -> str:

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 import msgspec
 
 from glider.tools.data.errors import InputError
+from glider.tools.data.plain import read_json
 
 FILE = "diagnosis.json"
 MODEL = "corrected.toml"
@@ -45,12 +46,7 @@ class AnswerFile(msgspec.Struct):
 
 def read_diagnosis(path: Path) -> AnswerFile:
     """A diagnosis, sorted as it should be; InputError with the place in the file where it is not one."""
-    if path.stat().st_size > MAX_BYTES:
-        raise InputError(f"longer than {MAX_BYTES} bytes", source=path)
-    try:
-        found = msgspec.json.decode(path.read_bytes(), type=AnswerFile)
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise InputError(str(error), source=path) from None
+    found = read_json(path, AnswerFile, MAX_BYTES)
     labels = [cause.label for cause in found.causes]
     if len(set(labels)) < len(labels):
         twice = next(label for label in labels if labels.count(label) > 1)

@@ -9,6 +9,7 @@ import numpy as np
 
 from glider.tools.data.errors import InputError
 from glider.tools.data.intervals import NINETY
+from glider.tools.data.plain import read_json
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs.csvfile import read_table
 from glider.tools.data.runs.run import run_name
@@ -66,12 +67,7 @@ def speeds_held(case: Watched, folder: Path) -> list[bool]:
 
 def _means_said(path: Path) -> dict[str, MeanSaid]:
     """The means of dives that were answered, none where there is no such file; InputError where it is another."""
-    if not path.is_file():
-        return {}
-    try:
-        return msgspec.json.decode(path.read_bytes(), type=MeansSaid).runs
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise InputError(str(error), source=path) from None
+    return read_json(path, MeansSaid).runs if path.is_file() else {}
 
 
 def _mean_held(path: Path, true: np.ndarray, every: float, said: MeanSaid | None) -> bool:

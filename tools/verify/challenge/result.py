@@ -9,6 +9,7 @@ from typing import Literal
 import msgspec
 
 from glider.tools.data.errors import InputError
+from glider.tools.data.plain import read_json
 from glider.tools.verify.challenge.diagnosis import TIMING
 from glider.tools.verify.challenge.score import ChallengeScore, ScoredCase, ScoreFigure
 from glider.tools.verify.challenge.seal import open_answers
@@ -121,10 +122,4 @@ def as_file(result: SetResult) -> bytes:
 
 def read_results(folder: Path) -> list[SetResult]:
     """Every result of a folder, in the order of their file names; InputError with the file where one is none."""
-    found = []
-    for path in sorted(folder.glob("*.json")):
-        try:
-            found.append(msgspec.json.decode(path.read_bytes(), type=SetResult))
-        except msgspec.DecodeError as error:
-            raise InputError(str(error), source=path) from None
-    return found
+    return [read_json(path, SetResult) for path in sorted(folder.glob("*.json"))]

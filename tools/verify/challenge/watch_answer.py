@@ -6,7 +6,7 @@ from typing import Literal
 
 import msgspec
 
-from glider.tools.data.errors import InputError
+from glider.tools.data.plain import read_json
 from glider.tools.verify.challenge.diagnosis import MAX_BYTES, Probability
 
 WATCH_FILE = "watch.json"
@@ -53,9 +53,4 @@ class WatchSaid(msgspec.Struct):
 
 def read_watch(path: Path) -> WatchSaid:
     """A watch's answer; InputError with the place in the file where it is not one."""
-    if path.stat().st_size > MAX_BYTES:
-        raise InputError(f"longer than {MAX_BYTES} bytes", source=path)
-    try:
-        return msgspec.json.decode(path.read_bytes(), type=WatchSaid)
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise InputError(str(error), source=path) from None
+    return read_json(path, WatchSaid, MAX_BYTES)
