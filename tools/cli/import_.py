@@ -1,11 +1,24 @@
 """`glider import`: other people's recordings into run data."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from glider.tools.cli.common import json_option, print_json, say
 from glider.tools.cli.import_ocean import COMMANDS
+
+if TYPE_CHECKING:
+    from glider.tools.data.importers.csvlog import Imported
+
+
+map_option = click.option("--map", "mapping", metavar="NAME or FILE", help="Mapping: shipped name or TOML file.")
+template_option = click.option(
+    "--template", type=click.Path(path_type=Path, dir_okay=False), help="Write a mapping to fill in."
+)
+folder_option = click.option(
+    "--out", type=click.Path(path_type=Path), help="Folder for the case.  [default: beside the first file]"
+)
 
 
 @click.group("import")
@@ -19,9 +32,9 @@ for _command in COMMANDS:
 
 @import_.command("csv")
 @click.argument("files", nargs=-1, type=click.Path(path_type=Path))
-@click.option("--map", "mapping", metavar="NAME or FILE", help="Mapping: shipped name or TOML file.")
-@click.option("--template", type=click.Path(path_type=Path, dir_okay=False), help="Write a mapping to fill in.")
-@click.option("--out", type=click.Path(path_type=Path), help="Folder for the case.  [default: beside the first file]")
+@map_option
+@template_option
+@folder_option
 @click.option("--strict", is_flag=True, help="Refuse damaged rows, also where the mapping leaves them out.")
 @json_option
 def csv(
@@ -33,33 +46,14 @@ def csv(
     """
     from glider.tools.data.files import check_writable
     from glider.tools.data.importers.csvlog import import_csv
-    from glider.tools.data.importers.mapping import write_template
-    from glider.tools.data.runs.overview import lines, overview
     from glider.tools.data.runs.run import run_name
 
-    if template is not None:
-        if files or mapping is not None:
-            raise click.UsageError("--template writes a mapping and imports nothing: give neither files nor --map")
-        write_template(template)
-        say(f"mapping to fill in: {template}")
+    if _asked_for(template, "template.toml", files, mapping):
         return
-    if not files or mapping is None:
-        raise click.UsageError("give the logs and --map (--template FILE writes a mapping to fill in)")
     folder = files[0].parent / f"{run_name(files[0])}.case" if out is None else out
     check_writable(folder)
     imported = import_csv(list(files), mapping, folder, strict)
-    for note in [*imported.notes, *([] if as_json else lines(imported.runs))]:
-        say(note)
-    if as_json:
-        print_json({
-            "columns": [one.plain() for one in overview(imported.runs)],
-            "seconds": [float(run.t[-1] - run.t[0]) for run in imported.runs],
-            "case": str(folder), "files": [str(path) for path in imported.files],
-            "rows": [run.rows for run in imported.runs], "left_out": imported.left_out, "notes": imported.notes,
-        })  # fmt: skip
-    else:
-        for path in imported.files:
-            click.echo(path)
+    _say_imported(imported, folder, as_json, {"left_out": imported.left_out})
 
 
 @import_.command("qualisys")
@@ -97,26 +91,24 @@ def qualisys(files, log, body, vehicle, out, as_json) -> None:
             click.echo(path)
 
 
-def _import_streams(files, mapping, template, out, as_json, extra, package, read, partial=False) -> None:
-    """What `import rosbag` and `import ardusub` have in common; read: the function that reads one file."""
-    from glider.tools.data.errors import need
-    from glider.tools.data.files import check_writable
+def _asked_for(template: Path | None, text: str, files: tuple[Path, ...], mapping: str | None) -> bool:
+    """Whether a mapping to fill in was asked for, and is written; UsageError where neither that nor an import is."""
     from glider.tools.data.importers.mapping import write_template
-    from glider.tools.data.importers.streams import TEMPLATE, import_streams
-    from glider.tools.data.runs.overview import lines, overview
 
     if template is not None:
         if files or mapping is not None:
             raise click.UsageError("--template writes a mapping and imports nothing: give neither files nor --map")
-        write_template(template, TEMPLATE)
+        write_template(template, text)
         say(f"mapping to fill in: {template}")
-        return
-    if not files or mapping is None:
+    elif not files or mapping is None:
         raise click.UsageError("give the logs and --map (--template FILE writes a mapping to fill in)")
-    need(extra, package)
-    folder = files[0].parent / f"{files[0].stem}.case" if out is None else out
-    check_writable(folder)
-    imported = import_streams(list(files), mapping, folder, read, partial)
+    return template is not None
+
+
+def _say_imported(imported: "Imported", folder: Path, as_json: bool, more: dict[str, Any]) -> None:
+    """Notes, then the run files or, as JSON, all that is known of them."""
+    from glider.tools.data.runs.overview import lines, overview
+
     for note in [*imported.notes, *([] if as_json else lines(imported.runs))]:
         say(note)
     if as_json:
@@ -124,20 +116,25 @@ def _import_streams(files, mapping, template, out, as_json, extra, package, read
             "columns": [one.plain() for one in overview(imported.runs)],
             "seconds": [float(run.t[-1] - run.t[0]) for run in imported.runs],
             "case": str(folder), "files": [str(path) for path in imported.files],
-            "rows": [run.rows for run in imported.runs], "notes": imported.notes,
+            "rows": [run.rows for run in imported.runs], **more, "notes": imported.notes,
         })  # fmt: skip
     else:
         for path in imported.files:
             click.echo(path)
 
 
-map_option = click.option("--map", "mapping", metavar="NAME or FILE", help="Mapping: shipped name or TOML file.")
-template_option = click.option(
-    "--template", type=click.Path(path_type=Path, dir_okay=False), help="Write a mapping to fill in."
-)
-folder_option = click.option(
-    "--out", type=click.Path(path_type=Path), help="Folder for the case.  [default: beside the first file]"
-)
+def _import_streams(files, mapping, template, out, as_json, extra, package, read, partial=False) -> None:
+    """What `import rosbag` and `import ardusub` have in common; read: the function that reads one file."""
+    from glider.tools.data.errors import need
+    from glider.tools.data.files import check_writable
+    from glider.tools.data.importers.streams import TEMPLATE, import_streams
+
+    if _asked_for(template, TEMPLATE, files, mapping):
+        return
+    need(extra, package)
+    folder = files[0].parent / f"{files[0].stem}.case" if out is None else out
+    check_writable(folder)
+    _say_imported(import_streams(list(files), mapping, folder, read, partial), folder, as_json, {})
 
 
 @import_.command("rosbag")

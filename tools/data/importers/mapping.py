@@ -202,7 +202,7 @@ def _with_column(error: ConfigError, text: str, source: str, by_name: Mapping[st
     return error
 
 
-def write_template(path: Path, name: str = "template.toml") -> None:
+def write_template(path: Path, name: str) -> None:
     """A mapping with every key, commented, to be filled in; InputError where the file is there already."""
     if path.exists():
         raise InputError("is there already: name another file", source=path)
