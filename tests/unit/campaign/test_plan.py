@@ -46,7 +46,7 @@ def test_robustness_is_what_it_says():
     [
         ("speed = 3\n", "unknown key"),
         ("[spread]\nparameters = -1.0\n", "one.toml:7: spread.parameters"),
-        ("[environment]\ncurrent_m_s = nan\n", "expected a finite number"),
+        ("[environment]\ncurrent_m_s = nan\n", "finite number"),
         ("[environment]\nwave_period_s = [8.0, 3.0]\n", "expected \\[low, high\\]"),
         ("[environment]\nwave_period_s = [0.0, 3.0]\n", "expected \\[low, high\\]"),
         ("[environment]\ndisturbance = [0.1, 9.0]\n", "expected \\[low, high\\]"),
@@ -69,10 +69,10 @@ def test_files_are_read_strictly(campaign_file, more, said):
         ({"vehicle": "nope"}, "no vehicle 'nope'"),
         ({"board": "nope"}, "no board 'nope'"),
         ({"seeds": 0}, "seeds"),
-        ({"environment.current_m_s": float("nan")}, "expected a finite number"),
+        ({"environment.current_m_s": float("nan")}, "finite number"),
         ({"environment.wave_height_m": -0.1}, "wave_height_m"),
         ({"start.depth_m": (2.0, 1.0)}, "depth_m"),
-        ({"environment.disturbance": (0.0, float("inf"))}, "expected a finite number"),
+        ({"environment.disturbance": (0.0, float("inf"))}, "finite number"),
     ],
 )
 def test_options_are_checked_as_files_are(options, said):

@@ -91,7 +91,7 @@ def test_a_vehicle_file_predicts(folder, monkeypatch, tmp_path):
         (["predict", "nowhere.csv", "--out", "x.csv"], "no such file"),
         (["predict", "{run}", "--model", "nobody", "--out", "x.csv"], "no vehicle 'nobody'"),
         (["predict", "{run}"], "--out"),
-        (["predict", "{run}", "--out", "{run}"], "would overwrite the run itself"),
+        (["predict", "{run}", "--out", "{run}"], "overwrite"),
         (["predict", "{run}", "--model", "{bad}", "--out", "x.csv"], "bad.toml"),
         (["predict", "{run}", "--out", "{folder}/no/where.csv"], "where.csv"),
     ],

@@ -102,7 +102,7 @@ def test_properties_of_states():
 
 @pytest.mark.parametrize(
     ("fact", "text"),
-    [("flight_under_way", "a flight is under way"), ("being_brought_up", "is bringing the vehicle up; with the")],
+    [("flight_under_way", "under way"), ("being_brought_up", "bringing the")],
 )
 def test_an_acknowledgement_is_refused_while_another_is_at_it(fact, text):
     for state in SortieState:

@@ -177,7 +177,7 @@ def test_a_message_that_cannot_be_read_is_named_by_its_number(mapping, tmp_path)
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("/pressure", "/depth", r"depth_m: no message of topic '/depth'; it has /imu/data, /joints, /odometry, /pres"),
+        ("/pressure", "/depth", r"depth_m: .*'/depth'; .* /imu/data, /joints, /odometry, /pres"),
         ("fluid_pressure", "pressure", r"message \d+ of the mapped topics, /pressure .* has no number 'pressure'"),
         ("[slider]", "[rudder]", r"/joints .*: has no number 'position\[rudder\]'"),
         ("angular_velocity.y", "angular velocity", r"not a field: 'angular velocity'"),

@@ -265,9 +265,9 @@ def test_what_is_no_log_is_one_line(tmp_path):
     [
         ({"attachments": {"mission.toml": None}}, "holds no mission.toml"),
         ({"attachments": {"vehicle.toml": "mass = 3"}}, "vehicle.toml"),
-        ({"metadata": {"loop_hz": None}}, "its metadata have no loop_hz"),
-        ({"metadata": {"loop_hz": "0"}}, "its metadata give loop_hz as '0'"),
-        ({"metadata": {"periods_s": '{"imu": 0.02}'}}, "its metadata give periods_s as"),
+        ({"metadata": {"loop_hz": None}}, "no loop_hz"),
+        ({"metadata": {"loop_hz": "0"}}, "loop_hz as '0'"),
+        ({"metadata": {"periods_s": '{"imu": 0.02}'}}, "periods_s as"),
         ({"metadata": {"actuator_limits": "{}"}}, "actuator_limits"),
     ],
 )

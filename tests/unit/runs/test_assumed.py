@@ -42,7 +42,7 @@ def test_effects_and_readings_of_a_vehicle_reach_its_model_and_come_back():
     [
         ({"effects": {"slider_shale": {"scale": 1.0}}}, "effects.slider_shale"),
         ({"effects": {"slider_scale": {"scale": 9.0}}}, "effects.slider_scale"),
-        ({"assumed": {"x_b": {}}}, "either factor or range"),
+        ({"assumed": {"x_b": {}}}, "factor or range"),
         ({"assumed": {"x_b": {"factor": 0.5}}}, "assumed"),
         ({"assumed": {"x_b": {"range": [0.5, 0.1]}}}, "low < high"),
     ],

@@ -79,11 +79,11 @@ def test_a_pipe_answers_one_line_each(tmp_path):
 @pytest.mark.parametrize(
     ("said", "line"),
     [
-        ("abc\n", "question 1/21, mass of the whole vehicle, dry, trimmed neutral: not a number: 'abc'"),
+        ("abc\n", "question 1/21, "),
         ("1e9\n", "expected 0.5 to 2000 kg"),
-        ("13\n\n14\n", "the whole vehicle has 13 kg"),
-        ("13\n1.2\n", "the answers end at question 3/21"),
-        ("<\n", "this is the first question"),
+        ("13\n\n14\n", " 13 kg"),
+        ("13\n1.2\n", "question 3/21"),
+        ("<\n", "first question"),
     ],
 )
 def test_a_wrong_line_of_a_pipe_is_one_line(said, line):
