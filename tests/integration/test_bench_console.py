@@ -90,18 +90,18 @@ def test_a_pipe_runs_commands_and_says_what_it_does(twins):
 @pytest.mark.parametrize(
     ("lines", "code", "said"),
     [
-        (["goto slider 5"], 1, "goto slider 5: nothing moves before `enable`"),
-        (["dance"], 2, "no command 'dance'; `help` lists them"),
-        (["swepp slider"], 2, "no command 'swepp'; `help` lists them; did you mean sweep?"),
-        (["enable", "goto slidr 5"], 1, "there are servo, slider, ballast; did you mean slider?"),
-        (["read becon"], 2, "did you mean beacon?"),
-        (["enable", "calibrate ballast", "1.5x"], 2, "expected a number, got '1.5x'"),
+        (["goto slider 5"], 1, "goto slider 5: "),
+        (["dance"], 2, "'dance'; `help`"),
+        (["swepp slider"], 2, "sweep?"),
+        (["enable", "goto slidr 5"], 1, "slider?"),
+        (["read becon"], 2, "beacon?"),
+        (["enable", "calibrate ballast", "1.5x"], 2, "'1.5x'"),
         (["goto slider"], 2, "usage: goto ACTUATOR POSITION"),
         (["raw sensors 01 03 01 00 00 04", "no"], 1, "not sent"),
-        (["raw sensors 01 63 01", "yes"], 1, "not one whole Modbus request"),
-        (["zero slider_wire"], 1, "no line left to answer: write"),
+        (["raw sensors 01 63 01", "yes"], 1, "Modbus request"),
+        (["zero slider_wire"], 1, "answer: write"),
         (["enable", "sweep slider 5 900"], 1, "expected LOW < HIGH within -60.00 to 60.00 mm"),
-        (["limits slider 10 -10"], 1, "would not be a good board file"),
+        (["limits slider 10 -10"], 1, "board file"),
     ],
 )
 def test_a_script_ends_at_the_first_command_that_fails(twins, tmp_path, lines, code, said):
@@ -120,7 +120,7 @@ def test_a_script_ends_at_the_first_command_that_fails(twins, tmp_path, lines, c
 @pytest.mark.parametrize(
     ("line", "said"),
     [
-        ("goto slider 500", "slider: 500 mm is outside -60.00 to 60.00 mm; it stays where it is"),
+        ("goto slider 500", "-60.00 to 60.00 mm"),
         ("goto servo -200", "servo: -200 deg is outside -60.00 to 60.00 deg"),
         ("jog slider 70", "slider: 70 mm is outside"),
     ],

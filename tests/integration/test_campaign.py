@@ -130,15 +130,15 @@ def test_what_a_person_sees(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("nope",), "no campaign 'nope': neither a file nor one of robustness"),
+        (("nope",), "no campaign 'nope'"),
         (("--mission", "nope"), "no mission 'nope'"),
         (("--controller", "nope"), "nope"),
         (("--seeds", "0"), "seeds"),
-        (("--waves", "nan"), "expected a finite number"),
+        (("--waves", "nan"), "finite number"),
         (("--depth", "2", "1"), "depth_m: expected [low, high]"),
         (("--jobs", "-1"), "-1"),
-        (("--dask", "127.0.0.1:1"), "no Dask scheduler there"),
-        (("--dask", "nonsense"), "no Dask scheduler there"),
+        (("--dask", "127.0.0.1:1"), "Dask scheduler"),
+        (("--dask", "nonsense"), "Dask scheduler"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_code_2(arguments, said, tmp_path):

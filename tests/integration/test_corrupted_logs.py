@@ -95,8 +95,8 @@ def test_the_sound_log_is_accused_of_nothing(tmp_path, flights):
         ({"depth_m": "m"}, "depth_m: moves at "),
         ({"slider_m": "m", "cmd_slider_m": "m"}, "slider_m: up to "),
         ({"ballast_kg": "kg"}, "ballast_kg: up to "),
-        ({"t_s": "s"}, "millis: rows 100 s apart: is the time's unit right (milliseconds called seconds?)"),
-        ({"t_s": "us"}, "millis: rows 0.0001 s apart: is the time's unit right (seconds called milliseconds?)"),
+        ({"t_s": "s"}, "millis: rows 100 s "),
+        ({"t_s": "us"}, "millis: rows 0.0001 s "),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, dict) else "",
 )

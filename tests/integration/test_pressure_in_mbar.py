@@ -96,7 +96,7 @@ def test_a_twin_of_it_is_read_by_the_real_driver(transmitter):
     [
         ('"mbar"', '"millibar"', "block.all.value.pressure.unit: expected Pa, .* got 'millibar'"),
         ('"mbar"', '"deg C"', "block.all.value.pressure.unit: expected Pa, .* got 'deg C'"),
-        ('"deg C"', '"mbar"', "block.all.value.temperature.unit: expected deg C, got 'mbar'"),
+        ('"deg C"', '"mbar"', "block.all.value.temperature.unit: .* got 'mbar'"),
         ("value.pressure", "value.depth", "block.all.value.pressure: missing"),
         ("[block.all]", "[block.every]", "block.all: missing"),
         ("scale = 0.1", "scale = 0.0", "expected `float` > 0.0"),

@@ -119,7 +119,7 @@ def test_rows_between_steps_and_a_single_row(simulate):
         (f"{HEADER}\n{START}\n{ROW}\n{ROW}", ("commands.csv:4", "t_s", "after")),
         (f"{HEADER}\n{START.replace('0.3,0.2', '0.3,nan')}\n{ROW}", ("commands.csv:2", "u", "'nan'")),
         (f"{HEADER}\n{START.replace('0.3,0.2', '0.3,')}\n{ROW}", ("commands.csv:2", "u", "no value")),
-        (f"{HEADER}\n{START.replace('0.3,0.2', '0.3,200')}\n{ROW}", ("commands.csv:2", "u", "no speed of a glider")),
+        (f"{HEADER}\n{START.replace('0.3,0.2', '0.3,200')}\n{ROW}", ("commands.csv:2", "u", "speed of")),
         (f"{HEADER}\n{START[:-4]},-20,0\n{ROW}", ("commands.csv:2", "slider_m", "outside")),
         (f"{HEADER}\n{START},1\n{ROW}", ("commands.csv:2", "expected 19, got 20")),
         (f"{HEADER}\n{START}\n1e13,0,0,0", ("commands.csv:3", "t_s", "steps")),
