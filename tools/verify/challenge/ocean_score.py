@@ -13,9 +13,10 @@ from glider.tools.data.plain import read_json
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs.csvfile import read_table
 from glider.tools.data.runs.run import run_name
+from glider.tools.verify.challenge.score import share
 from glider.tools.verify.challenge.watch_answer import MEANS, VELOCITY
 from glider.tools.verify.challenge.watch_plan import CHANGED
-from glider.tools.verify.challenge.watch_score import NEEDED, Watched, WatchScore, gather_watches, score_watches, share
+from glider.tools.verify.challenge.watch_score import NEEDED, Watched, WatchScore, gather_watches, score_watches
 
 NEEDED_OF_A_MISSION = (*NEEDED, "speed", "horizontal_mm_s", "every_s")
 ON_DEPTH_ALONE = frozenset({"drag", "lift", "attitude_scale"})  # act alike where no speed was measured

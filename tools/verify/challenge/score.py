@@ -225,15 +225,19 @@ FORM_SHARES = (
 )
 
 
-def _share(share: _Share, cases: Sequence[ScoredCase]) -> ScoreFigure:
-    counted = [case for case in cases if case.kind in share.kinds]
-    count = sum(share.holds(case) for case in counted)
-    value = count / len(counted) if counted else None
-    interval = wilson(count, len(counted))
-    return ScoreFigure(share.key, share.name, share.target, share.at_most, value, len(counted), count, interval)
+def share(key: str, name: str, target: float | None, marks: Sequence[bool], at_most: bool = False) -> ScoreFigure:
+    """How many of the marks hold, with its interval."""
+    value = sum(marks) / len(marks) if marks else None
+    return ScoreFigure(key, name, target, at_most, value, len(marks), sum(marks), wilson(sum(marks), len(marks)))
 
 
-def _middle(key: str, name: str, values: list[float], target: float | None, at_most: bool, middle) -> ScoreFigure:
+def _share(one: _Share, cases: Sequence[ScoredCase]) -> ScoreFigure:
+    marks = [one.holds(case) for case in cases if case.kind in one.kinds]
+    return share(one.key, one.name, one.target, marks, one.at_most)
+
+
+def middle_of(key: str, name: str, values: list[float], target: float | None, at_most: bool, middle) -> ScoreFigure:
+    """Mean, median or largest of values."""
     return ScoreFigure(key, name, target, at_most, float(middle(values)) if values else None, len(values))
 
 
@@ -274,19 +278,16 @@ def _plain_case(case: ScoredCase) -> dict[str, Any]:
 
 def score_forms(cases: Sequence[ScoredCase], gaps: Sequence[tuple[float, float]]) -> ChallengeScore:
     """Figures of vehicles of another form; gaps: of the file's and the identified model in each one's healthy runs."""
-    figures = [_share(share, cases) for share in FORM_SHARES]
+    figures = [_share(one, cases) for one in FORM_SHARES]
     closed = [case.closed for case in cases if case.closed is not None]
-    figures.append(_middle("closed", "closed of what the change adds, median", closed, None, False, np.median))
-    worse = sum(identified > file for file, identified in gaps)
-    figures.append(
-        ScoreFigure("identified_worse", "identified predicts healthy runs worse", None, True,
-               worse / len(gaps) if gaps else None, len(gaps), worse, wilson(worse, len(gaps)))
-    )  # fmt: skip
+    figures.append(middle_of("closed", "closed of what the change adds, median", closed, None, False, np.median))
+    worse = [identified > file for file, identified in gaps]
+    figures.append(share("identified_worse", "identified predicts healthy runs worse", None, worse, True))
     for n, name in enumerate(("file", "identified")):
         totals = [pair[n] for pair in gaps]
-        figures.append(_middle(f"healthy_{name}", f"healthy gap, {name}, median", totals, None, True, np.median))
+        figures.append(middle_of(f"healthy_{name}", f"healthy gap, {name}, median", totals, None, True, np.median))
     seconds = [case.seconds for case in cases if case.seconds is not None]
-    figures.append(_middle("seconds", "seconds a case, the longest", seconds, None, True, max))
+    figures.append(middle_of("seconds", "seconds a case, the longest", seconds, None, True, max))
     return ChallengeScore(list(cases), figures)
 
 
@@ -294,14 +295,14 @@ def score(cases: Sequence[ScoredCase]) -> ChallengeScore:
     """Every figure of docs/reference/gap.md over the cases; those of messy cases where small effects act in any of
     them."""
     shares = MESSY_SHARES if any(case.messy for case in cases) else SHARE_FIGURES
-    figures = [_share(share, cases) for share in shares]
+    figures = [_share(one, cases) for one in shares]
     losses = [case.log_loss() for case in cases]
     closed = [case.closed for case in cases if case.closed is not None]
     seconds = [case.seconds for case in cases if case.seconds is not None]
-    figures.insert(6, _middle("log_loss", "probability log loss, nat", losses, 0.3, True, np.mean))
-    figures.append(_middle("closed", "closed of what a perfect model closes, median", closed, 0.95, False, np.median))
-    figures.append(_middle("seconds", "seconds a case, the longest", seconds, 60.0, True, max))
-    figures.append(_middle("seconds_median", "seconds a case, median", seconds, 20.0, True, np.median))
+    figures.insert(6, middle_of("log_loss", "probability log loss, nat", losses, 0.3, True, np.mean))
+    figures.append(middle_of("closed", "closed of what a perfect model closes, median", closed, 0.95, False, np.median))
+    figures.append(middle_of("seconds", "seconds a case, the longest", seconds, 60.0, True, max))
+    figures.append(middle_of("seconds_median", "seconds a case, median", seconds, 20.0, True, np.median))
     return ChallengeScore(list(cases), figures)
 
 

@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 
 from glider.tools.data.errors import InputError
-from glider.tools.data.intervals import wilson
 from glider.tools.verify.challenge.diagnosis import TIMING
 from glider.tools.verify.challenge.judge import manifest_beside, open_sealed
-from glider.tools.verify.challenge.score import LARGEST_GROUP, ScoreFigure
+from glider.tools.verify.challenge.score import LARGEST_GROUP, ScoreFigure, middle_of, share
 from glider.tools.verify.challenge.watch_answer import REFERENCE, WATCH_FILE, EventSaid, WatchSaid, read_watch
 from glider.tools.verify.challenge.watch_plan import CHANGED, OUTSIDE, UNCHANGED
 
@@ -84,11 +83,6 @@ class Watched:
         return self.main.ci90[0] <= true <= self.main.ci90[1]
 
 
-def share(key: str, name: str, target: float, marks: Sequence[bool], at_most: bool = False) -> ScoreFigure:
-    value = sum(marks) / len(marks) if marks else None
-    return ScoreFigure(key, name, target, at_most, value, len(marks), sum(marks), wilson(sum(marks), len(marks)))
-
-
 @dataclass
 class WatchScore:
     """A blind test of watches scored."""
@@ -136,8 +130,7 @@ def score_watches(cases: Sequence[Watched]) -> WatchScore:
         share("outside_unknown", "outside the catalogue, called unknown", 0.90, [case.unknown() for case in outside]),
     ]
     seconds = [case.seconds for case in cases if case.seconds is not None]
-    longest = max(seconds) if seconds else None
-    figures.append(ScoreFigure("seconds", "seconds a vehicle, the longest", 120.0, True, longest, len(seconds)))
+    figures.append(middle_of("seconds", "seconds a vehicle, the longest", seconds, 120.0, True, max))
     return WatchScore(list(cases), figures)
 
 
