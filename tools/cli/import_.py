@@ -37,9 +37,7 @@ for _command in COMMANDS:
 @folder_option
 @click.option("--strict", is_flag=True, help="Refuse damaged rows, also where the mapping leaves them out.")
 @json_option
-def csv(
-    files: tuple[Path, ...], mapping: str | None, template: Path | None, out: Path | None, strict: bool, as_json: bool
-) -> None:
+def csv(files, mapping, template, out, strict, as_json) -> None:
     """Turn CSV logs (.csv or .csv.gz), one a run, into a case, by a mapping file (docs/how-to/import.md).
 
     With --template a mapping with every key is written, and nothing imported.

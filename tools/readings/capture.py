@@ -13,7 +13,8 @@ import numpy as np
 
 from glider.tools.data.runs import columns as names
 from glider.tools.readings.findings import CERTAIN_SIGMA, MATERIAL_OFFSET, TOLERANCE, Finding, certain, spoken
-from glider.tools.readings.rates import compare, lateness, rms
+from glider.tools.readings.pairs import rms
+from glider.tools.readings.rates import compare, lateness
 from glider.tools.readings.regression import Estimate, Fit, fit
 from glider.tools.readings.signals import SignalTable, steps, unwrapped
 

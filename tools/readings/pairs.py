@@ -143,7 +143,7 @@ def likelihoods(table: SignalTable) -> dict[str, float]:
     """Logarithms of the likelihoods of all witnesses, by name, of a table put right."""
     found, rates, attitude = {}, table.has(*names.RATES), table.has(*names.ATTITUDE)
     if rates:
-        sizes = [_rms(table.flown(table.columns[name])) for name in names.RATES]
+        sizes = [rms(table.flown(table.columns[name])) for name in names.RATES]
         found["the size of the rates"] = sum(-0.5 * ((math.log(max(s, 1e-9)) - RATE) / RATE_SD) ** 2 for s in sizes)
     if rates and attitude:
         found["the rates about all axes"] = consistent(table, names.ATTITUDE)
@@ -245,7 +245,8 @@ def captured(table: SignalTable) -> float:
     return total
 
 
-def _rms(values: np.ndarray) -> float:
+def rms(values: np.ndarray) -> float:
+    """Root mean square of what is there."""
     good = values[np.isfinite(values)]
     return float(np.sqrt(np.mean(good**2))) if len(good) else 0.0
 

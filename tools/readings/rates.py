@@ -14,7 +14,7 @@ import numpy as np
 
 from glider.tools.data.runs import columns as names
 from glider.tools.readings.findings import CERTAIN_SIGMA, TOLERANCE, WHOLE, Finding, certain, spoken
-from glider.tools.readings.pairs import DEGREES, Weighed
+from glider.tools.readings.pairs import DEGREES, Weighed, rms
 from glider.tools.readings.regression import Estimate, Fit, fit, within
 from glider.tools.readings.signals import Rates, SignalTable, body_increments, pieces, summed, unwrapped
 
@@ -305,9 +305,3 @@ def _late(table: SignalTable, body: Compared) -> list[Finding]:
 def inverse(slope: Estimate) -> Estimate:
     """The estimate of 1 / slope."""
     return Estimate(1.0 / slope.value, slope.error / slope.value**2, slope.freedom)
-
-
-def rms(values: np.ndarray) -> float:
-    """Root mean square of what is there."""
-    good = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(good**2))) if len(good) else 0.0

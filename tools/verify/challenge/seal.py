@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from glider.tools.data.errors import InputError
-from glider.tools.data.files import write_bytes
+from glider.tools.data.files import whole, write_bytes
 
 MANIFEST, ARCHIVE = "manifest.json", "answers.zip"
 PLAN = "plan.json"
@@ -47,11 +47,9 @@ def as_json(value: Any) -> bytes:
 
 def seal(path: Path, plan: dict[str, Any], answers: dict[str, dict[str, Any]]) -> str:
     """Write the archive; its SHA-256. The same answers give the same bytes."""
-    temporary = path.with_name(f".{path.name}.tmp")
-    with zipfile.ZipFile(temporary, "w", zipfile.ZIP_STORED) as archive:
+    with whole(path) as (part,), zipfile.ZipFile(part, "w", zipfile.ZIP_STORED) as archive:
         for name, value in [(PLAN, plan), *((f"{case}.json", answers[case]) for case in sorted(answers))]:
             archive.writestr(zipfile.ZipInfo(name, _EPOCH), as_json(value))
-    temporary.replace(path)
     return digest(path.read_bytes())
 
 
