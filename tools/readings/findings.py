@@ -60,8 +60,8 @@ def certain(
     return estimate.sigma(null) >= CERTAIN_SIGMA and moves >= least_motion * TOLERANCE[channel]
 
 
-def spoken(value: float, interval: tuple[float, float], unit: str = "", digits: int = 3) -> str:
+def spoken(value: float, interval: tuple[float, float], unit: str = "") -> str:
     """A size with its 90 % interval, as one says it."""
     low, high = interval
     tail = f" {unit}" if unit and unit != "1" else ""
-    return f"{value:.{digits}g}{tail} (90 %: {low:.{digits}g} to {high:.{digits}g})"
+    return f"{value:.3g}{tail} (90 %: {low:.3g} to {high:.3g})"

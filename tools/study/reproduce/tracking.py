@@ -169,13 +169,8 @@ def error_at(rows: list[dict], controller: str, targets: tuple[float, ...], stre
 
 
 def fly_figure(
-    figure: TrackingFigure,
-    vehicle: Vehicle,
-    strengths: tuple[float, ...],
-    seeds: int,
-    states: tuple[str, ...],
-    chosen=None,
+    figure: TrackingFigure, vehicle: Vehicle, strengths: tuple[float, ...], seeds: int, states: tuple[str, ...]
 ) -> design.Batch:
     """All flights of a figure."""
     legs = {target: figure.leg(target) for target in figure.targets}
-    return design.fly_design(vehicle, legs, chosen or variants(vehicle), list(strengths), range(seeds), states)
+    return design.fly_design(vehicle, legs, variants(vehicle), list(strengths), range(seeds), states)

@@ -31,9 +31,9 @@ class FormPlan(Planned):
     mocap: bool  # of the later runs; the reference has it always
 
 
-def _outside(label: str, element: str, entry: int, size: float, most: float, negative: float = 0.0) -> Form:
+def _outside(label: str, element: str, entry: int, size: float, most: float) -> Form:
     return Form(label, tuple((part, place) for part, place in map(str.split, element.split(","))), (entry,), (size,),
-                most, negative)  # fmt: skip
+                most, 0.0)  # fmt: skip
 
 
 # Changes of a vehicle's body or devices that a label names. Drag grows by fouling; lift and weathercock are lost by
