@@ -115,7 +115,7 @@ def test_where_no_fit_is_better_the_file_s_vehicle_is_handed_out(tmp_path, monke
     result = json.loads(ran.stdout)
     assert result["held_out"]["handed_out"] == "file"
     assert result["held_out"]["after"] == result["held_out"]["before"]
-    assert any(note.startswith(f"{reason}; ") and "run" in note for note in result["notes"])
+    assert any(note.startswith("identified.toml") and reason in note for note in result["notes"])
     vehicle = decode_vehicle((tmp_path / "out" / "identified.toml").read_text(encoding="utf-8"), "identified.toml")
     assert vehicle.form.runs == 4
     assert msgspec.structs.replace(vehicle, form=None) == load_case(tmp_path / "case").roughie
