@@ -49,6 +49,14 @@ def reason(error: OSError) -> str:
     return os.strerror(error.errno) if error.errno else str(error)
 
 
+def require_file(path: Path, most: int | None = None) -> None:
+    """InputError where a path is no file, or one of more than `most` bytes."""
+    if not path.is_file():
+        raise InputError("not a file" if path.exists() else "no such file", source=path)
+    if most is not None and path.stat().st_size > most:
+        raise InputError(f"longer than {most} bytes", source=path)
+
+
 def write_bytes(path: Path, data: bytes, *, kept: bool = False) -> None:
     """Write a file, whole or not at all; `kept`: on the disk when this returns."""
     write_files({path: data}, kept=kept)

@@ -8,6 +8,7 @@ from typing import Any
 import msgspec
 
 from glider.tools.data.errors import InputError
+from glider.tools.data.files import require_file
 
 
 def as_plain(value: Any) -> Any:
@@ -25,8 +26,7 @@ def as_plain(value: Any) -> Any:
 
 def read_json(path: Path, kind: Any, most: int | None = None) -> Any:
     """A JSON file as a msgspec type; InputError where it is none or has more than `most` bytes."""
-    if most is not None and path.stat().st_size > most:
-        raise InputError(f"longer than {most} bytes", source=path)
+    require_file(path, most)
     try:
         return msgspec.json.decode(path.read_bytes(), type=kind)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:

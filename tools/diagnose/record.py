@@ -19,7 +19,7 @@ import numpy as np
 from glider.sim_backend.core.effects.catalogue import catalogue
 from glider.sim_backend.ocean.vehicle import KIND
 from glider.tools.data.errors import InputError
-from glider.tools.data.files import write_files
+from glider.tools.data.files import require_file, write_files
 from glider.tools.data.plain import as_plain, read_json
 from glider.tools.diagnose.stages import STAGES
 from glider.tools.readings.pictures import Shown
@@ -341,8 +341,7 @@ def read_record(folder: Path) -> DiagnosisRecord:
 def _present(path: Path) -> Path:
     if not path.is_file():
         raise InputError("no such file: not a folder of `glider gap diagnose`, or of an older one", source=path)
-    if path.stat().st_size > MOST_BYTES:
-        raise InputError(f"longer than {MOST_BYTES} bytes", source=path)
+    require_file(path, MOST_BYTES)
     return path
 
 

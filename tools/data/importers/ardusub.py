@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from glider.tools.data.errors import InputError
+from glider.tools.data.files import require_file
 from glider.tools.data.importers.streams import Samples, Stream, StreamMap
 
 HEAD, FMT, FMT_LENGTH = b"\xa3\x95", 0x80, 89
@@ -29,8 +30,7 @@ def read_ardusub(path: Path, mapping: StreamMap, partial: bool = False) -> Strea
     kind = path.suffix.lower()
     if kind not in DATAFLASH + TELEMETRY:
         raise InputError("expected a file .BIN (DataFlash) or .tlog (telemetry)", source=path)
-    if not path.is_file():
-        raise InputError("not a file" if path.exists() else "no such file", source=path)
+    require_file(path)
     data = path.read_bytes()
     end, messages, wrong = dataflash_end(data) if kind in DATAFLASH else telemetry_end(data)
     if messages == 0:

@@ -23,6 +23,7 @@ from glider.hal.recorder.schema import (
     specs_from_json,
 )
 from glider.tools.data.errors import InputError
+from glider.tools.data.files import require_file
 from glider.tools.data.log.framing import Damage, Scan, chunk_records
 
 _LAST_NS = 2**63 - 1
@@ -131,8 +132,7 @@ class _Gathered:
 @contextmanager
 def opened(path: Path) -> Iterator[bytes | mmap.mmap]:
     """A file's bytes without reading them all; InputError where it cannot be opened or is no file."""
-    if not path.is_file():
-        raise InputError("not a file" if path.exists() else "no such file", source=path)
+    require_file(path)
     try:
         file = path.open("rb")
     except OSError as error:

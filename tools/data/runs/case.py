@@ -12,7 +12,7 @@ from glider.firmware.model.vehicle import Assumed, DisturbanceTable, NonNegative
 from glider.hal.strict import MAX_BYTES, Table, decode
 from glider.sim_backend.ocean.vehicle import OceanVehicle
 from glider.tools.data.errors import InputError
-from glider.tools.data.files import write_bytes
+from glider.tools.data.files import require_file, write_bytes
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs import csvfile
 from glider.tools.data.runs.gate import LeftOut, parted, wrong_rate
@@ -191,8 +191,7 @@ def load_case_of_run(path: Path | str, vehicle: str | None = None) -> tuple[Case
     vehicle: as in load_case.
     """
     path = Path(path)
-    if not path.is_file():
-        raise InputError("not a file" if path.exists() else "no such file", source=path)
+    require_file(path)
     table = _read_case_file(path.parent)
     run = load_run(path)
     set_flights(path.parent, [run])

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from glider.tools.data.errors import InputError
+from glider.tools.data.files import require_file
 from glider.tools.data.importers.ocean.segment import require_unit
 
 MAX_FILE_BYTES = 4_000_000_000
@@ -89,13 +90,9 @@ def _opened(path: Path) -> Any:
     """The file in memory, as an xarray Dataset; InputError where it is none or is cut."""
     import xarray
 
-    if not path.is_file():
-        raise InputError("not a file" if path.exists() else "no such file", source=path)
-    size = path.stat().st_size
-    if not size:
+    require_file(path, MAX_FILE_BYTES)
+    if not path.stat().st_size:
         raise InputError("the file is empty", source=path)
-    if size > MAX_FILE_BYTES:
-        raise InputError(f"longer than {MAX_FILE_BYTES} bytes", source=path)
     with path.open("rb") as file:
         begin = file.read(8)
     if not (begin.startswith(CLASSIC) or begin == HDF5):

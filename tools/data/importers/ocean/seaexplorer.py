@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from glider.tools.data.errors import InputError
+from glider.tools.data.files import require_file
 from glider.tools.data.importers.ocean import seawater
 from glider.tools.data.importers.ocean.segment import (
     OUT_OF_WATER_DBAR,
@@ -97,8 +98,7 @@ def _pairs(paths: list[Path]) -> list[tuple[Path, Path]]:
 
 
 def _table(path: Path, columns: tuple[str, ...]) -> CsvTable:
-    if not path.is_file():
-        raise InputError("not a file" if path.exists() else "no such file", source=path)
+    require_file(path)
     table = read_table(path, DIALECT)
     if not path.name.endswith(".gz") and not path.read_bytes().endswith((b"\n", b"\r")):
         raise InputError("cut: its last line does not end", source=path)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from glider.tools.data.errors import InputError
+from glider.tools.data.files import require_file
 
 ENCODING = "5"
 # A line of a list of sensors: whether it is sent, its number, its place in a cycle, its bytes, name and unit.
@@ -101,10 +102,7 @@ def in_pairs(binaries: list[Binary]) -> list[tuple[Binary, Binary]]:
 
 def unpacked(path: Path) -> bytes:
     """The file's bytes, unpacked where its name says that it is compressed."""
-    if not path.is_file():
-        raise InputError("not a file" if path.exists() else "no such file", source=path)
-    if path.stat().st_size > MAX_FILE_BYTES:
-        raise InputError(f"longer than {MAX_FILE_BYTES} bytes", source=path)
+    require_file(path, MAX_FILE_BYTES)
     suffix = path.suffix.lower()
     if not (len(suffix) == 4 and suffix[2] == "c" and suffix[1:] in ENGINEERING | SCIENCE):
         return path.read_bytes()
