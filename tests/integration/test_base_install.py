@@ -28,7 +28,8 @@ NOT_ON_THE_GLIDER = {
     "hypothesis",
 }  # fmt: skip
 BROUGHT = (
-    "analysis", "ardupilot", "bench", "campaign", "fmu", "identify", "live", "notebook", "ocean", "parquet", "ros", "slocum",
+    "analysis", "ardupilot", "bench", "campaign", "fmu", "identify", "live", "notebook", "ocean", "parquet",
+    "ros", "slocum",
 )  # fmt: skip
 
 # In this order, each with the extra that it asks for; None: it does its work without any.
