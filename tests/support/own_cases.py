@@ -117,12 +117,12 @@ def judge(seed: int, count: int, folder: Path, say: Callable[[str], None]) -> di
         first, chance = ranked[0]
         label, size = next(iter(one.items()), (NONE, 0.0))
         score["none" if not one else "changed"] += 1
-        score["none right" if not one else "changed right"] += first == label
-        score["sure and wrong"] += first != label and chance > SURE
+        score["none right" if not one else "changed right"] += int(first == label)
+        score["sure and wrong"] += int(first != label and chance > SURE)
         said = f"case{n:03} {label} {size:+.4g}: {first} {chance:.2f}"
         if one and first == label:
             mean, sd = size_of(answer, label)
-            score["size right"] += abs(mean - size) < NEAR * sd
+            score["size right"] += int(abs(mean - size) < NEAR * sd)
             said += f", {mean:+.4g} +- {sd:.2g}"
         say(said)
     return dict(score)
