@@ -32,6 +32,7 @@ FAMILY_ODDS = {PARAMETER: 0.5, PUSH: 0.1}
 STRANGE = 0.1  # that more is left than a hypothesis says
 LEFT, SITE, USUAL_LEVEL_SCATTER, PRIOR_RUNS = 1.5, 0.25, 0.5, 1.0  # e-folds of the mean square left (docs)
 FORM = 0.2  # of a change, 1 sigma, that is not as its label's equations have it
+FORMS = (0.0, FORM)  # as probable before the data
 MATERIAL = 0.1  # tolerances: a smaller effect is no gap (docs/reference/gap.md)
 BEAM, MOST_EFFECTS, ROUNDS, LONGEST_MOVE = 6, 3, 5, 4.0
 LONGEST_REACH = 4.0  # tolerances that a round's move of one number may do at most, where that is more
@@ -177,7 +178,7 @@ class Engine:
         best: tuple[float, np.ndarray, np.ndarray, list[Expansion]] | None = None
         for _ in range(ROUNDS):
             found = self.expansions(own, columns)
-            by, sizes, *_ = self._best_sizes(found, places, shared)
+            by, pooled, *_ = self._best_sizes(found, places, shared)
             cost = sum(one.value for one in found) + by.prior(shared, own, places)
             if best is not None and not cost < best[0] - 0.1:
                 if cost < best[0]:
@@ -186,7 +187,7 @@ class Engine:
                 shared, own = 0.5 * (shared + best[1]), 0.5 * (own + best[2])
                 continue
             best = cost, shared, own, found
-            target = Pooled.of(by.marginal(found), self.variance(by.V, places, sizes, shared)).mean()
+            target = pooled.mean()
             room = np.maximum(LONGEST_MOVE, LONGEST_REACH / np.maximum(self.reach, LEAST_REACH))  # (k,) spreads
             shared = np.clip(shared + np.clip(target - shared, -room, room), self.low, self.high)
             theirs = np.array([run_values(one, shared, by.scatter) for one in found])
@@ -199,35 +200,38 @@ class Engine:
         left = np.array([one.squares.sum() / max(1, one.samples.sum()) for one in found])
         return Hypothesis(labels, evidence + self.log_prior(labels), mean, sd, shared, own, left, 0.0, found)
 
-    def variance(self, V: np.ndarray, places: Sequence[int], sizes: Sequence[float], shared: np.ndarray) -> np.ndarray:
+    def variance(
+        self, V: np.ndarray, places: Sequence[int], sizes: Sequence[float], shared: np.ndarray, form: float
+    ) -> np.ndarray:
         """Prior covariance (k, k): V, labels of 1 sigma `sizes` (tolerances), and what of them is not as they have it.
 
-        That is a force at the noises, all together FORM of what labels do to the windows where they are (shared: k,).
+        That is a force at the noises, all together `form` of what labels do to the windows where they are (shared: k,).
         """
         found, reach, forces = V.copy(), np.maximum(self.reach, LEAST_REACH), self.forces
         for k, size in zip(places, sizes, strict=True):
             found[k, k] += (size / reach[k]) ** 2
             if self.healthy.effects[k].family != PUSH and len(forces):
-                found[forces, forces] += (FORM * shared[k] * reach[k] / reach[forces]) ** 2 / len(forces)
+                found[forces, forces] += (form * shared[k] * reach[k] / reach[forces]) ** 2 / len(forces)
         return found
 
     def _best_sizes(
         self, found: Sequence[Expansion], places: Sequence[int], shared: np.ndarray
-    ) -> tuple[Deviations, tuple[float, ...], float, np.ndarray, np.ndarray]:
-        """The most probable deviations and 1 sigma of labels in tolerances, log evidence over all, sizes, their sd."""
+    ) -> tuple[Deviations, Pooled, float, np.ndarray, np.ndarray]:
+        """The most probable deviations and runs pooled with their prior, log evidence over all, sizes with their sd."""
         sided = [self.healthy.effects[k].one_sided for k in places]
-        table: list[tuple[float, Deviations, tuple[float, ...], np.ndarray, np.ndarray]] = []
+        table: list[tuple[float, Deviations, Pooled, np.ndarray, np.ndarray]] = []
+        forms = FORMS if places else FORMS[:1]
         for by in (self.together, self.apart):
             pooled = Pooled.of(by.marginal(found), by.V)
-            for sizes in product(map(float, SIZES), repeat=len(places)):
-                V = self.variance(by.V, places, sizes, shared)
-                M = pooled.covariance(V)
-                mean, sd = (M @ pooled.r)[places], np.sqrt(np.maximum(np.diag(M)[places], 1e-30))
+            for *sizes, form in product(*[SIZES.tolist()] * len(places), forms):
+                at = replace(pooled, V=self.variance(by.V, places, sizes, shared, form))
+                M = at.covariance()
+                mean, sd = (M @ at.r)[places], np.sqrt(np.maximum(np.diag(M)[places], 1e-30))
                 halves = float((np.log(2.0) + norm.logcdf(mean / sd))[sided].sum())
-                table.append((pooled.log_evidence(V) + halves, by, sizes, mean, sd))
-        _, by, sizes, mean, sd = max(table, key=lambda one: one[0])
+                table.append((at.log_evidence() + halves, by, at, mean, sd))
+        _, by, best, mean, sd = max(table, key=lambda one: one[0])
         evidence = float(logsumexp([one[0] for one in table]) - np.log(len(table)))
-        return by, sizes, evidence, np.clip(mean, self.low[places], self.high[places]), sd
+        return by, best, evidence, np.clip(mean, self.low[places], self.high[places]), sd
 
     def log_prior(self, labels: Sequence[str]) -> float:
         """Of a hypothesis: that something changed, which label, and that another stands beside it."""
@@ -251,20 +255,16 @@ class Engine:
     def screen(self, begin: Hypothesis) -> list[tuple[float, str]]:
         """Every other label beside a hypothesis by its parabola: log evidence gained, best first."""
         places = self.healthy.at(begin.labels)
-        by, sizes, *_ = self._best_sizes(begin.found, places, begin.shared)
-        gain, _ = self.label_gains(
-            Pooled.of(by.marginal(begin.found), self.variance(by.V, places, sizes, begin.shared))
-        )
+        _, pooled, *_ = self._best_sizes(begin.found, places, begin.shared)
+        gain, _ = self.label_gains(pooled)
         gain[places] = -np.inf
         return [(float(gain[k]), self.healthy.effects[k].label) for k in np.argsort(-gain) if np.isfinite(gain[k])]
 
     def swaps(self, begin: Hypothesis, tried: Sequence[str]) -> list[tuple[str, Hypothesis]]:
         """Labels in the place of a hypothesis' last one that come nearest to it where it leads, with their starts."""
         places = self.healthy.at(begin.labels[:-1])
-        by, sizes, *_ = self._best_sizes(begin.found, places, begin.shared)
-        gain, size = self.label_gains(
-            Pooled.of(by.marginal(begin.found), self.variance(by.V, places, sizes, begin.shared))
-        )
+        _, pooled, *_ = self._best_sizes(begin.found, places, begin.shared)
+        gain, size = self.label_gains(pooled)
         gain[self.healthy.at(tried)] = -np.inf
         (replaced,), starts = self.healthy.at(begin.labels[-1:]), []
         for k in np.argsort(-gain)[:BEAM]:
@@ -377,13 +377,16 @@ class Engine:
         return float(np.exp(more - np.logaddexp(less, more)))
 
     def _posterior(self, every: list[Hypothesis]) -> Posterior:
-        # of every label what healthy runs show of it is no change
-        logs = np.array([
-            one.evidence - sum(self.usual_share(k, float(size), float(sd), self.count)
-                               for k, size, sd in zip(self.healthy.at(one.labels), one.sizes, one.sd, strict=True))
-            for one in every
+        # of every label what healthy runs show of it is no change: so much less speaks for any
+        logs = np.array([one.evidence for one in every])
+        usual = np.array([
+            sum(self.usual_share(k, float(size), float(sd), self.count)
+                for k, size, sd in zip(self.healthy.at(one.labels), one.sizes, one.sd, strict=True))
+            for one in every[1:]
         ])  # fmt: skip
-        weights = np.exp(logs - logsumexp(logs))
+        changed = float(logsumexp(logs[1:] - usual)) if len(usual) else -np.inf
+        nothing = float(np.exp(logs[0] - np.logaddexp(logs[0], changed)))
+        weights = np.append(nothing, (1.0 - nothing) * np.exp(logs[1:] - logsumexp(logs[1:])) if len(usual) else [])
         chances: dict[str, float] = {NONE: 0.0, UNKNOWN: 0.0}
         inclusion: dict[str, float] = {}
         known = {one.label: one for one in self.healthy.effects}

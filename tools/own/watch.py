@@ -7,6 +7,7 @@ one, the most evident first, each relinearised in the runs of its span, until th
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from glider.tools.own.hierarchy import Expansion, Pooled, learn_scatter, run_val
 from glider.tools.own.load import LoadedVehicle
 from glider.tools.own.observer import Observer, observer_of
 from glider.tools.own.posterior import (
+    FORMS,
     LEAST_REACH,
     LONGEST_MOVE,
     LONGEST_REACH,
@@ -55,6 +57,7 @@ class Event:
     size: float  # spreads
     sd: float
     probability: float
+    usual: float = 0.0  # nat of its evidence that a deviation as healthy runs have it brings too
 
     @property
     def span(self) -> slice:
@@ -210,7 +213,7 @@ class Watch(Engine):
             best = self.decided(same)
             k = self.healthy.at([best.label])[0]
             total = float(logsumexp([score for score, _ in same]))
-            odds = total + np.log(CHANGE / (1.0 - CHANGE))
+            odds = float(logsumexp([score - one.usual for score, one in same])) + np.log(CHANGE / (1.0 - CHANGE))
             best.probability = float(1.0 / (1.0 + np.exp(-np.clip(odds, -50.0, 50.0))))
             best.chances = {one.label: best.probability * float(np.exp(score - total)) for score, one in same}
             if best.probability < CERTAIN or abs(best.size) * self.reach[k] < MATERIAL:
@@ -272,8 +275,8 @@ class Watch(Engine):
                 pooled = self.evidence(runs, span, self.M)
                 table = []
                 where = size * (np.arange(self.k) == k)
-                for tolerances in map(float, SIZES):
-                    V = self.variance(self.M, [k], [tolerances], where)
+                for tolerances, form in product(SIZES.tolist(), FORMS):
+                    V = self.variance(self.M, [k], [tolerances], where, form)
                     M = pooled.covariance(V)
                     mean, sd = float((M @ pooled.r)[k]), float(np.sqrt(max(M[k, k], 1e-30)))
                     halved = np.log(2.0) + norm.logcdf(mean / sd) if self.healthy.effects[k].one_sided else 0.0
@@ -295,8 +298,9 @@ class Watch(Engine):
                 x[k] = np.clip(x[k] + size, self.low[k], self.high[k])
                 runs += self.together.marginal([self.expansion_of(n, x, columns)])
         score, mean, sd = best
-        gain = score - nothing - self.usual_share(k, mean, sd, span[1] - span[0])
-        return gain + prior + odds, Event({}, *span, self.healthy.effects[k].label, mean, sd, 0.0)
+        usual = self.usual_share(k, mean, sd, span[1] - span[0]) if sd > 0.0 else 0.0
+        event = Event({}, *span, self.healthy.effects[k].label, mean, sd, 0.0, usual)
+        return score - nothing + prior + odds, event
 
     def judge(self) -> np.ndarray:
         """Probability of each run to have more left than healthy ones and its events say."""

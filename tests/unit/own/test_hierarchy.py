@@ -92,9 +92,9 @@ def test_what_healthy_runs_show_of_a_label_is_no_evidence_of_a_change(usual, lea
 
 def test_of_a_label_a_force_may_be_that_its_equations_do_not_have():
     asked = engine(4)
-    V = asked.variance(np.zeros((3, 3)), [0], [2.0], np.array([5.0, 0.0, 0.0]))
+    V = asked.variance(np.zeros((3, 3)), [0], [2.0], np.array([5.0, 0.0, 0.0]), 0.2)
     assert np.diag(V) == pytest.approx([4.0, 0.0, 1.0])
-    assert asked.variance(np.zeros((3, 3)), [2], [2.0], np.array([0.0, 0.0, 5.0]))[2, 2] == pytest.approx(4.0)
+    assert asked.variance(np.zeros((3, 3)), [2], [2.0], np.array([0.0, 0.0, 5.0]), 0.2)[2, 2] == pytest.approx(4.0)
 
 
 def test_a_label_that_acts_alike_comes_in_the_place_of_the_best():
