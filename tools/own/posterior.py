@@ -377,16 +377,13 @@ class Engine:
         return float(np.exp(more - np.logaddexp(less, more)))
 
     def _posterior(self, every: list[Hypothesis]) -> Posterior:
-        # of every label what healthy runs show of it is no change: so much less speaks for any
-        logs = np.array([one.evidence for one in every])
-        usual = np.array([
-            sum(self.usual_share(k, float(size), float(sd), self.count)
-                for k, size, sd in zip(self.healthy.at(one.labels), one.sizes, one.sd, strict=True))
-            for one in every[1:]
+        # of every label what healthy runs show of it is no change
+        logs = np.array([
+            one.evidence - sum(self.usual_share(k, float(size), float(sd), self.count)
+                               for k, size, sd in zip(self.healthy.at(one.labels), one.sizes, one.sd, strict=True))
+            for one in every
         ])  # fmt: skip
-        changed = float(logsumexp(logs[1:] - usual)) if len(usual) else -np.inf
-        nothing = float(np.exp(logs[0] - np.logaddexp(logs[0], changed)))
-        weights = np.append(nothing, (1.0 - nothing) * np.exp(logs[1:] - logsumexp(logs[1:])) if len(usual) else [])
+        weights = np.exp(logs - logsumexp(logs))
         chances: dict[str, float] = {NONE: 0.0, UNKNOWN: 0.0}
         inclusion: dict[str, float] = {}
         known = {one.label: one for one in self.healthy.effects}
@@ -440,7 +437,7 @@ def healthy_of(observer: Observer) -> Healthy:
             k for k, one in enumerate(effects) if one.name in {p.name for p in declared.parameters if p.scope == RUN}
         ]
         scatter[own] = USUAL_OWN_SCATTER
-        return Healthy(effects, V, scatter, usual, errors, 1.0, 1, USUAL_LEVEL_SCATTER, USUAL_SESSION_SHARE)
+        return Healthy(effects, V, scatter, 0.0 * usual, errors, 1.0, 1, USUAL_LEVEL_SCATTER, USUAL_SESSION_SHARE)
     places = [names.index(name) for name in table.parameters]
     spreads = np.array([effects[k].spread for k in places])
     V[np.ix_(places, places)] = np.array(table.covariance).reshape(len(places), len(places)) / np.outer(

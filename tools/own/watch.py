@@ -57,7 +57,6 @@ class Event:
     size: float  # spreads
     sd: float
     probability: float
-    usual: float = 0.0  # nat of its evidence that a deviation as healthy runs have it brings too
 
     @property
     def span(self) -> slice:
@@ -213,7 +212,7 @@ class Watch(Engine):
             best = self.decided(same)
             k = self.healthy.at([best.label])[0]
             total = float(logsumexp([score for score, _ in same]))
-            odds = float(logsumexp([score - one.usual for score, one in same])) + np.log(CHANGE / (1.0 - CHANGE))
+            odds = total + np.log(CHANGE / (1.0 - CHANGE))
             best.probability = float(1.0 / (1.0 + np.exp(-np.clip(odds, -50.0, 50.0))))
             best.chances = {one.label: best.probability * float(np.exp(score - total)) for score, one in same}
             if best.probability < CERTAIN or abs(best.size) * self.reach[k] < MATERIAL:
@@ -299,8 +298,8 @@ class Watch(Engine):
                 runs += self.together.marginal([self.expansion_of(n, x, columns)])
         score, mean, sd = best
         usual = self.usual_share(k, mean, sd, span[1] - span[0]) if sd > 0.0 else 0.0
-        event = Event({}, *span, self.healthy.effects[k].label, mean, sd, 0.0, usual)
-        return score - nothing + prior + odds, event
+        event = Event({}, *span, self.healthy.effects[k].label, mean, sd, 0.0)
+        return score - nothing - usual + prior + odds, event
 
     def judge(self) -> np.ndarray:
         """Probability of each run to have more left than healthy ones and its events say."""
