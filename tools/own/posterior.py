@@ -433,11 +433,8 @@ def healthy_of(observer: Observer) -> Healthy:
                 one.uncertainty / effects[names.index(one.name)].spread
             ) ** 2
         errors = ChannelErrors(np.ones(len(declared.outputs)), np.full(len(declared.outputs), UNIDENTIFIED_INFLATION))
-        own = [
-            k for k, one in enumerate(effects) if one.name in {p.name for p in declared.parameters if p.scope == RUN}
-        ]
-        scatter[own] = USUAL_OWN_SCATTER
-        return Healthy(effects, V, scatter, 0.0 * usual, errors, 1.0, 1, USUAL_LEVEL_SCATTER, USUAL_SESSION_SHARE)
+        scatter[[names.index(one.name) for one in declared.parameters if one.scope == RUN]] = USUAL_OWN_SCATTER
+        return Healthy(effects, V, scatter, np.zeros(k), errors, 1.0, 1, USUAL_LEVEL_SCATTER, USUAL_SESSION_SHARE)
     places = [names.index(name) for name in table.parameters]
     spreads = np.array([effects[k].spread for k in places])
     V[np.ix_(places, places)] = np.array(table.covariance).reshape(len(places), len(places)) / np.outer(
