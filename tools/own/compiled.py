@@ -98,7 +98,9 @@ def _compiled(model: Any, path: Path, attribute: str, tried: tuple[np.ndarray, .
 
     user = path.read_bytes()
     source, motion = KERNELS.read_text(encoding="utf-8"), "step" if hasattr(model, "step") else "derivative"
-    key = hashlib.sha256(user + source.encode() + numba.__version__.encode()).hexdigest()[:20]
+    # the model may call the tree's own kernels
+    versions = (numba.__version__ + jit.kernels_digest()).encode()
+    key = hashlib.sha256(user + source.encode() + versions).hexdigest()[:20]
     folder = jit.cache_root() / "own" / key
     folder.mkdir(parents=True, exist_ok=True)
     kept, kernels = folder / path.name, folder / "observer_kernels.py"

@@ -26,6 +26,11 @@ NOT_SI = {
     "ft": "m", "cm/s": "m/s", "mm/s": "m/s", "kn": "m/s", "g": "kg", "ms": "s", "min": "s", "h": "s", "bar": "Pa",
     "dbar": "Pa", "mbar": "Pa", "hPa": "Pa", "kPa": "Pa", "gf": "N", "kgf": "N", "mV": "V", "mA": "A", "L": "m3",
 }  # fmt: skip
+# kinds of causes derived from inputs and outputs (effects.py), which no parameter may be named like
+DERIVED = {
+    "inputs": ("gain", "offset", "lag", "delay", "backlash", "limit", "rate_limit"),
+    "outputs": ("bias", "gain", "drift", "lag", "delay"),
+}
 # unit: tolerance of an output, standard deviation of a state at the start
 USUAL_TOLERANCE = {"m": 0.1, "rad": 0.0349, "rad/s": 0.0349, "m/s": 0.05, "m/s2": 0.1}
 USUAL_START = {"m": 0.1, "rad": 0.1, "rad/s": 0.1, "m/s": 0.2}
@@ -45,7 +50,7 @@ class Input:
     name: str
     unit: str = ""
     column: str = ""  # of the run files; empty: name_unit
-    interpolated: bool = False  # between rows: a measured position; else held
+    interpolated: bool = False  # between rows, as a measured position; else held
 
 
 @dataclass(frozen=True)
@@ -111,6 +116,9 @@ class Declaration:
     noises: tuple[Noise, ...] = ()
     horizon: float | None = None  # s: of the windows that gaps are measured on; None: by the model's time constants
     start: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # outputs known at the start: value, 1 sigma
+    # forces at noises that go with inputs, identified: mean and standard deviation of inputs; unit of a noise a unit
+    usual_inputs: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    form: Mapping[tuple[str, str], float] = field(default_factory=dict)
 
     def index(self, what: str, name: str) -> int:
         """Place of a name in a list, `inputs` to `noises`."""
@@ -196,6 +204,12 @@ def declaration(model: Any) -> Declaration:
             if one.name in taken:
                 raise DeclarationError(f"{what}: {one.name} is declared under {taken[one.name]} too")
             taken[one.name] = what
+    derived = {f"{one.name}_{kind}": one.name for what, kinds in DERIVED.items() for one in lists[what]
+               for kind in kinds}  # fmt: skip
+    for one in lists["parameters"]:
+        if one.name in derived:
+            what = f"{one.name} is what a cause of {derived[one.name]} is called; another name keeps them apart"
+            raise DeclarationError(f"parameters: {what}")
     return Declaration(**lists, horizon=getattr(model, "horizon", None))
 
 

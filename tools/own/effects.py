@@ -14,6 +14,7 @@ from glider.tools.own.runs import OwnRun
 
 INPUT, OUTPUT, PARAMETER = "input", "output", "parameter"
 PUSH = "push"  # a constant beside a noise: what no label explains
+FORM = "form"  # a force at a noise that goes with an input: what the form of the model lacks, no label
 GAIN_SPREAD, SECONDS_SPREAD, RANGE_SPREAD = 0.1, 0.2, 0.1
 OWN_STEP = 1e-3  # of its sigma: difference step of a parameter of each run
 LONGEST = 20.0  # spreads: of delays and time constants
@@ -50,6 +51,7 @@ class ModelPoint:
     theta: np.ndarray
     reading: np.ndarray  # (5, outputs): gain, bias, drift, lag, delay
     push: np.ndarray  # (noises,)
+    form: np.ndarray  # (noises, inputs) a unit of the input, less its usual value
     density: np.ndarray  # (noises,)
     variance: np.ndarray  # (outputs,) of the sensors
     ports: np.ndarray  # (processes, 4)
@@ -58,8 +60,9 @@ class ModelPoint:
 
     def copy(self) -> "ModelPoint":
         return ModelPoint(
-            self.theta.copy(), self.reading.copy(), self.push.copy(), self.density.copy(), self.variance.copy(),
-            self.ports.copy(), self.own.copy(), {key: dict(value) for key, value in self.driven.items()},
+            self.theta.copy(), self.reading.copy(), self.push.copy(), self.form.copy(), self.density.copy(),
+            self.variance.copy(), self.ports.copy(), self.own.copy(),
+            {key: dict(value) for key, value in self.driven.items()},
         )  # fmt: skip
 
 
@@ -67,10 +70,14 @@ def nominal_point(declared: Declaration) -> ModelPoint:
     """The vehicle file's numbers, and nothing wrong."""
     reading = np.zeros((5, len(declared.outputs)))
     reading[0], reading[1] = 1.0, [one.offset for one in declared.outputs]
+    form = np.zeros((len(declared.noises), len(declared.inputs)))
+    for (noise, name), value in declared.form.items():
+        form[declared.index("noises", noise), declared.index("inputs", name)] = value
     return ModelPoint(
         np.array([one.value for one in declared.parameters]),
         reading,
         np.zeros(len(declared.noises)),
+        form,
         np.array([one.density for one in declared.noises]),
         np.array([(one.noise or 0.0) ** 2 for one in declared.outputs]),
         np.zeros((0, 4)),
@@ -99,6 +106,8 @@ def moved(declared: Declaration, point: ModelPoint, effects: Sequence[Effect], v
             own[effect.kind] = own.get(effect.kind, 0.0) + size
         elif effect.family == PUSH:
             found.push[declared.index("noises", effect.name)] += size
+        elif effect.family == FORM:
+            found.form[declared.index("noises", effect.name), declared.index("inputs", effect.kind)] += size
     return found
 
 
@@ -134,6 +143,54 @@ def pushes(declared: Declaration) -> list[Effect]:
     return [
         Effect(f"{one.name}_push", PUSH, one.name, "push", one.unit, max(one.density, 1e-6)) for one in declared.noises
     ]
+
+
+def form_label(noise: str, name: str) -> str:
+    return f"{noise}_by_{name}"
+
+
+def form_errors(declared: Declaration) -> list[Effect]:
+    """A force at every noise that goes with an input, of inputs whose usual values are known; spread: a density."""
+    return [
+        Effect(form_label(one.name, name), FORM, one.name, name, f"{one.unit}/{declared.inputs[k].unit}",
+               max(one.density, 1e-6) / sd)
+        for one in declared.noises
+        for k, name in enumerate(each.name for each in declared.inputs)
+        for _, sd in [declared.usual_inputs.get(name, (0.0, 0.0))] if sd > 0.0
+    ]  # fmt: skip
+
+
+def usual_inputs(declared: Declaration, runs: Sequence[OwnRun]) -> dict[str, tuple[float, float]]:
+    """Mean and standard deviation of every input that is not the same all along, runs counted alike."""
+    means = np.array([run.inputs.mean(axis=0) for run in runs])
+    squares = np.array([(run.inputs**2).mean(axis=0) for run in runs]).mean(axis=0)
+    sd = np.sqrt(np.maximum(squares - means.mean(axis=0) ** 2, 0.0))
+    return {
+        one.name: (float(mean), float(size))
+        for one, mean, size in zip(declared.inputs, means.mean(axis=0), sd, strict=True)
+        if size > 1e-6 * max(abs(mean), 1e-9)
+    }
+
+
+def held_inputs(declared: Declaration, driven: np.ndarray) -> np.ndarray:
+    """(rows, 2, inputs): what drives the model from each row to the next, and what it has at the row itself.
+
+    driven (rows, inputs). An interpolated input is the mean of both rows on the way, a held one what the first has.
+    """
+    found = np.repeat(driven[:, None, :], 2, axis=1)
+    for n, one in enumerate(declared.inputs):
+        if one.interpolated:
+            found[:-1, 0, n] = 0.5 * (driven[:-1, n] + driven[1:, n])
+    return found
+
+
+def forces(declared: Declaration, point: ModelPoint, driven: np.ndarray) -> np.ndarray:
+    """What stands beside the noises along a run, (rows, noises), by the inputs that drive it (rows, inputs)."""
+    found = np.tile(point.push, (len(driven), 1))
+    if point.form.any():
+        usual = np.array([declared.usual_inputs.get(one.name, (0.0, 0.0))[0] for one in declared.inputs])
+        found += (driven - usual) @ point.form.T
+    return found
 
 
 def _of_input(one: Input, values: np.ndarray, moves: bool) -> list[Effect]:

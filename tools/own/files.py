@@ -10,6 +10,7 @@ import numpy as np
 
 from glider.hal.strict import ConfigError, Table, decode, locate
 from glider.tools.own.declare import Declaration, Parameter
+from glider.tools.own.effects import form_errors
 
 NonNegative = Annotated[float, msgspec.Meta(ge=0.0)]
 Positive = Annotated[float, msgspec.Meta(gt=0.0)]
@@ -75,6 +76,8 @@ class IdentifiedTable(Table):
     channel_inflation: dict[str, Annotated[float, msgspec.Meta(ge=1.0)]] = msgspec.field(default_factory=dict)
     scatter: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # what runs differ by, 1 sigma in its unit
     label_scatter: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # of each label alone, beside that
+    form: dict[str, float] = msgspec.field(default_factory=dict)  # NOISE_by_INPUT: force a unit of the input
+    usual_inputs: dict[str, tuple[float, NonNegative]] = msgspec.field(default_factory=dict)  # mean, 1 sigma
     session_share: NonNegative = 0.25  # variance between sessions over that from run to run
     level_scatter: NonNegative = 0.5  # 1 sigma from run to run of the logarithm of the mean square left
     gap: dict[str, float] = msgspec.field(default_factory=dict)  # of healthy runs left out, by channel, tolerances
@@ -174,8 +177,23 @@ def declared_with(declared: Declaration, given: OwnVehicle, text: str, source: P
     horizon = declared.horizon if given.windows is None else given.windows.seconds
     found = replace(declared, **lists, states=tuple(states.values()), horizon=horizon, start=start)
     if given.identified is not None:
+        found = _with_form(given.identified, found, str(source))
         _check_identified(given.identified, found, str(source))
     return found
+
+
+def _with_form(table: IdentifiedTable, declared: Declaration, source: str) -> Declaration:
+    """The declaration with identified forces that go with inputs; ConfigError for a name that it does not have."""
+    inputs = {one.name for one in declared.inputs}
+    for name in table.usual_inputs:
+        if name not in inputs:
+            raise ConfigError(source, f"the model declares no input {name}", key="identified.usual_inputs")
+    found = replace(declared, usual_inputs=table.usual_inputs)
+    pairs = {one.label: (one.name, one.kind) for one in form_errors(found)}
+    for name in table.form:
+        if name not in pairs:
+            raise ConfigError(source, f"no noise and input of the model: {name}", key="identified.form")
+    return replace(found, form={pairs[name]: value for name, value in table.form.items()})
 
 
 def _check(one: Parameter, text: str, source: Path) -> None:
@@ -187,7 +205,7 @@ def _check(one: Parameter, text: str, source: Path) -> None:
 
 
 def _check_identified(table: IdentifiedTable, declared: Declaration, source: str) -> None:
-    names = {one.name for one in declared.parameters}
+    names = {one.name for one in declared.parameters} | {one.label for one in form_errors(declared)}
     for name in table.parameters:
         if name not in names:
             raise ConfigError(source, f"the model declares no parameter {name}", key="identified.parameters")

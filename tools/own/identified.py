@@ -11,7 +11,7 @@ from glider.tools.data.files import write_files
 from glider.tools.data.intervals import NINETY
 from glider.tools.data.plain import as_plain
 from glider.tools.data.version import software
-from glider.tools.own.effects import PUSH
+from glider.tools.own.effects import FORM, PUSH
 from glider.tools.own.identify import Identified
 
 VEHICLE, ANSWER = "identified.toml", "identified.json"
@@ -57,7 +57,7 @@ def tables(found: Identified) -> dict[str, Any]:
     labels = {one.label: float(s * one.spread) for one, s in zip(found.labels, found.label_scatter, strict=True)}
     parameters = given.setdefault("parameters", {})
     sensors = given.setdefault("sensors", {})
-    names, places = [], []
+    names, places, form = [], [], {}
     for k, one in enumerate(found.nuisance):
         move, error = float(found.values[k] * one.spread), float(sd[k] * one.spread)
         if one.family == "parameter":
@@ -69,6 +69,10 @@ def tables(found: Identified) -> dict[str, Any]:
             table |= {"value": value, "uncertainty": own, "scatter": spread}
             table.pop("assumed", None)
             names.append(one.name)
+            places.append(k)
+        elif one.family == FORM:
+            form[one.label] = declared.form.get((one.name, one.kind), 0.0) + move
+            names.append(one.label)
             places.append(k)
         elif one.family != PUSH:
             output = declared.outputs[declared.index("outputs", one.name)]
@@ -86,6 +90,7 @@ def tables(found: Identified) -> dict[str, Any]:
         "covariance": [[float(value) for value in row] for row in covariance], "inflation": found.eta,
         "level_scatter": found.level_scatter, "session_share": found.session_share,
         "scatter": {name: value for name, value in scatter.items() if value > 0.0}, "label_scatter": labels,
+        "form": form, "usual_inputs": {name: list(pair) for name, pair in declared.usual_inputs.items()},
         "gap": {one.name: float(value) for one, value in zip(declared.outputs, found.errors.scales, strict=True)},
         "channel_inflation": {
             one.name: float(value) for one, value in zip(declared.outputs, found.errors.inflation, strict=True)

@@ -6,7 +6,17 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from glider.tools.own.declare import RUN, Declaration
-from glider.tools.own.effects import OUTPUT, PUSH, Effect, moved, pushes, standard_effects
+from glider.tools.own.effects import (
+    FORM,
+    OUTPUT,
+    PUSH,
+    Effect,
+    form_errors,
+    moved,
+    pushes,
+    standard_effects,
+    usual_inputs,
+)
 from glider.tools.own.hierarchy import (
     SCATTER_PRIOR_RUNS,
     ChannelErrors,
@@ -23,6 +33,7 @@ from glider.tools.own.observer import Observer, observer_of
 from glider.tools.own.runs import OwnRun
 
 ROUNDS = 20
+FORM_ROUNDS = 2
 SCATTER_ROUNDS = 4  # in which it is learned how runs differ, then held
 USUAL_SESSION_SHARE, SESSION_SHARES, MIN_SESSIONS = 0.25, (0.05, 4.0), 3
 MIN_SCATTER_RUNS = 3  # from fewer nothing is learned of how runs differ
@@ -69,7 +80,8 @@ class Identified:
 def nuisance_of(observer: Observer) -> list[Effect]:
     """What the vehicle file allows for: parameters with an uncertainty, outputs with a bias, runs' slow forces.
 
-    A constant force at a noise, of each run its own, is what the model's form cannot do there.
+    A constant force at a noise, of each run its own, is what the model's form cannot do there; one that goes with an
+    input is what it cannot do in any run.
     """
     declared = observer.declared
     every = {one.label: one for one in standard_effects(declared, observer.runs, observer.tolerances)}
@@ -77,7 +89,7 @@ def nuisance_of(observer: Observer) -> list[Effect]:
     for one in declared.outputs:
         if one.bias > 0.0:
             found.append(replace(every[f"{one.name}_bias"], spread=one.bias))
-    return found + pushes(declared)
+    return found + pushes(declared) + form_errors(declared)
 
 
 def usual_scatter(declared: Declaration, effects: Sequence[Effect]) -> np.ndarray:
@@ -92,10 +104,14 @@ def identify(
 ) -> Identified:
     """A vehicle from healthy runs of one or more sessions; InputError where its model cannot fly them."""
     runs = [run for session in sessions for run in session]
+    declared = vehicle.declared
+    if not declared.usual_inputs:
+        vehicle = replace(vehicle, declared=replace(declared, usual_inputs=usual_inputs(declared, runs)))
     observer = observer_of(vehicle, list(runs))
     nuisance, horizon = nuisance_of(observer), observer.horizon
     k, count = len(nuisance), len(runs)
-    V = FILE_PRIOR**2 * np.diag([float(one.family != PUSH) for one in nuisance])
+    priors = {PUSH: 0.0, FORM: USUAL_SCATTER**2}
+    V = np.diag([priors.get(one.family, FILE_PRIOR**2) for one in nuisance])
     limits = np.array([one.low for one in nuisance]), np.array([one.high for one in nuisance])
     usual = usual_scatter(vehicle.declared, nuisance)
     # forces of runs wait until what runs share is found: else they take it for their own
@@ -115,10 +131,11 @@ def identify(
         if differ and learned < SCATTER_ROUNDS:
             found_scatter = learn_scatter(warm, V, usual)
             scatter = found_scatter if learned == 0 else np.sqrt(scatter * found_scatter)
+            V = with_form_errors([marginalised(one, scatter) for one in warm], V, nuisance)
             learned += 1
         search = _Search(observer, nuisance, warm, scatter, eta, V, limits, errors, horizon)
         step = Pooled.of([marginalised(one, scatter) for one in warm], V).mean() - values
-        values, own, gain = search.along(values, own, np.clip(step, -LONGEST_MOVE, LONGEST_MOVE))
+        values, own, gain = search.along(values, own, step * min(1.0, LONGEST_MOVE / max(np.abs(step).max(), 1e-9)))
         before_errors, left = errors, left_by(found, errors)
         errors = ChannelErrors(left.scales, errors.inflation)  # channels' own inflation is for what is asked later
         said = f"round {round_ + 1}: gain {gain:.1f}, {np.sqrt(np.mean(errors.scales**2)):.2f} tolerances left"
@@ -141,6 +158,27 @@ def identify(
     share = session_share(own, scatter, [len(one) for one in sessions])
     return Identified(vehicle, observer, nuisance, values, covariance, scatter, labels, label_scatter, eta, errors, own,
                       before, after, level_scatter(found), len(sessions), share)  # fmt: skip
+
+
+def with_form_errors(found: Sequence[Expansion], V: np.ndarray, nuisance: Sequence[Effect]) -> np.ndarray:
+    """The prior covariance with the variances of forces that go with inputs, one for every noise, learned.
+
+    The most probable, with the prior of `learn_scatter`, of runs with their own deviations integrated out.
+    """
+    kept = Pooled.of(found, V)
+    for _ in range(FORM_ROUNDS):
+        for noise in dict.fromkeys(one.name for one in nuisance if one.family == FORM):
+            places = np.array([one.family == FORM and one.name == noise for one in nuisance])
+
+            def at(size: float, V=V, places=places) -> np.ndarray:
+                return np.diag(np.where(places, size**2, np.diag(V)))
+
+            def score(size: float, at=at) -> float:
+                ratio = (size / USUAL_SCATTER) ** 2
+                return kept.log_evidence(at(size)) - 0.5 * SCATTER_PRIOR_RUNS * (np.log(ratio) + 1.0 / ratio)
+
+            V = at(max(LABEL_SCATTERS, key=score))
+    return V
 
 
 def left_by(found: Sequence[Expansion], errors: ChannelErrors) -> ChannelErrors:
@@ -177,16 +215,17 @@ class _Search:
     def along(self, values: np.ndarray, own: np.ndarray, step: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
         """Values, runs' own values and the gain of a step, shortened until the exact posterior gains."""
 
-        def at(share: float) -> tuple[float, np.ndarray, np.ndarray]:
+        def at(share: float, of_own: float) -> tuple[float, np.ndarray, np.ndarray]:
             x = np.clip(values + share * step, *self.limits)
             target = np.array([run_values(one, x, self.scatter) for one in self.warm])
-            theirs = np.clip(own + np.clip(target - own, -LONGEST_MOVE, LONGEST_MOVE), *self.limits)
+            theirs = own + of_own * np.clip(target - own, -LONGEST_MOVE, LONGEST_MOVE)
+            theirs = np.clip(np.where(self.scatter > 0.0, theirs, x), *self.limits)
             return sum(self.misfit(n, row) for n, row in enumerate(theirs)) + self.prior(x, theirs), x, theirs
 
         here = sum(one.value for one in self.warm) + self.prior(values, own), values, own
-        stay = min((here, at(0.0)), key=lambda one: one[0])
+        stay = min((here, at(0.0, 1.0)), key=lambda one: one[0])
         for share in (1.0, 0.4, 0.1):
-            tried = at(share)
+            tried = at(share, share)
             if tried[0] < stay[0]:
                 return tried[1], tried[2], stay[0] - tried[0]
         return stay[1], stay[2], 0.0
@@ -247,7 +286,7 @@ def _label_scatter(observer, nuisance, values, own, scatter, eta, errors) -> tup
     1 sigma (labels,) in spreads, by the largest of its marginal likelihood with the prior of `learn_scatter`.
     """
     labels = standard_effects(observer.declared, observer.runs, observer.tolerances)
-    every = [*labels, *pushes(observer.declared)]
+    every = [*labels, *pushes(observer.declared), *form_errors(observer.declared)]
     into = placed(nuisance, every)
     about = []
     for n in range(len(own)):

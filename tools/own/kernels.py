@@ -107,7 +107,7 @@ def read(h, t, row, T, lagged, history, angles, S):
 
 
 def push_of(push, ports, a, w):
-    """Noise inputs: the constant push and what the ports' processes have now, into w (w,)."""
+    """Noise inputs: the forces in force and what the ports' processes have now, into w (w,)."""
     for j in range(len(push)):
         w[j] = push[j]
     for k in range(ports.shape[0]):
@@ -117,12 +117,12 @@ def push_of(push, ports, a, w):
 def filter_run(T, U, Y, x0, P0, theta, own, S, push, density, R, ports, kinds, scales, angles, parts, keep):
     """The filter along one run: -2 log likelihood, mean squared innovation, and what following it asks for.
 
-    T (r,) s; U (r, i); Y (r, y) with NaN; x0 (n,), its covariance P0 (m, m); own (3, o): parameters that are a number
-    of each run, estimated along it: place in theta, 1 sigma, difference step; S (5, y) of `read`; push, density (w,);
-    R (y,) variances; parts: steps in which a row's step is taken. Into keep: gains (r, m + 2 ports + o, y) and
-    states and own parameters (r, n + o) after each row. Returns value, squares, samples.
+    T (r,) s; U (r, 2, i): inputs from a row to the next, and at it; Y (r, y) with NaN; x0 (n,), its covariance
+    P0 (m, m); own (3, o): parameters that are a number of each run, estimated along it: place in theta, 1 sigma,
+    difference step; S (5, y) of `read`; push (r, w); density (w,); R (y,) variances; parts: steps in which a row's step is taken. Into keep: gains
+    (r, m + 2 ports + o, y) and states and own parameters (r, n + o) after each row. Returns value, squares, samples.
     """
-    n_y, n_w, n_p, n_o, n = Y.shape[1], len(push), ports.shape[0], own.shape[1], len(x0)
+    n_y, n_w, n_p, n_o, n = Y.shape[1], push.shape[1], ports.shape[0], own.shape[1], len(x0)
     m = len(P0)
     full = m + 2 * n_p + n_o
     at_own = m + 2 * n_p
@@ -142,13 +142,13 @@ def filter_run(T, U, Y, x0, P0, theta, own, S, push, density, R, ports, kinds, s
     for row in range(len(T)):
         if row > 0:
             dt = T[row] - T[row - 1]
-            push_of(push, ports, a, w)
-            x1 = normalised(advance(x, U[row - 1], w, theta, dt, parts), kinds)
+            push_of(push[row - 1], ports, a, w)
+            x1 = normalised(advance(x, U[row - 1, 0], w, theta, dt, parts), kinds)
             F[:, :] = 0.0
             for j in range(m):
                 d[:] = 0.0
                 d[j] = DIFFERENCE_STEP * scales[j]
-                moved = normalised(advance(plus(x, d, kinds), U[row - 1], w, theta, dt, parts), kinds)
+                moved = normalised(advance(plus(x, d, kinds), U[row - 1, 0], w, theta, dt, parts), kinds)
                 minus(moved, x1, kinds, d)
                 for k in range(m):
                     F[k, j] = d[k] / (DIFFERENCE_STEP * scales[j])
@@ -156,7 +156,7 @@ def filter_run(T, U, Y, x0, P0, theta, own, S, push, density, R, ports, kinds, s
             for j in range(n_w):
                 size = DIFFERENCE_STEP * max(density[j], 1e-3)
                 w[j] += size
-                moved = normalised(advance(x, U[row - 1], w, theta, dt, parts), kinds)
+                moved = normalised(advance(x, U[row - 1, 0], w, theta, dt, parts), kinds)
                 w[j] -= size
                 minus(moved, x1, kinds, d)
                 for k in range(m):
@@ -164,7 +164,7 @@ def filter_run(T, U, Y, x0, P0, theta, own, S, push, density, R, ports, kinds, s
             for j in range(n_o):
                 place = int(own[0, j])
                 theta[place] += own[2, j]
-                moved = normalised(advance(x, U[row - 1], w, theta, dt, parts), kinds)
+                moved = normalised(advance(x, U[row - 1, 0], w, theta, dt, parts), kinds)
                 theta[place] -= own[2, j]
                 minus(moved, x1, kinds, d)
                 for k in range(m):
@@ -190,21 +190,21 @@ def filter_run(T, U, Y, x0, P0, theta, own, S, push, density, R, ports, kinds, s
                 P[m + 2 * k, m + 2 * k] += grown
                 P[m + 2 * k + 1, m + 2 * k + 1] += grown
             x = x1
-        h0 = measure(x, U[row], theta)
+        h0 = measure(x, U[row, 1], theta)
         h = read(h0, T[row], row, T, lagged, history, angles, S)
         difference(Y[row], h, angles, nu)
         H[:, :] = 0.0
         for k in range(m):
             d[:] = 0.0
             d[k] = DIFFERENCE_STEP * scales[k]
-            moved = measure(plus(x, d, kinds), U[row], theta)
+            moved = measure(plus(x, d, kinds), U[row, 1], theta)
             for j in range(n_y):
                 step = wrap(moved[j] - h0[j]) if angles[j] else moved[j] - h0[j]
                 H[j, k] = S[0, j] * step / (DIFFERENCE_STEP * scales[k])
         for k in range(n_o):
             place = int(own[0, k])
             theta[place] += own[2, k]
-            moved = measure(x, U[row], theta)
+            moved = measure(x, U[row, 1], theta)
             theta[place] -= own[2, k]
             for j in range(n_y):
                 step = wrap(moved[j] - h0[j]) if angles[j] else moved[j] - h0[j]
@@ -247,21 +247,21 @@ def filter_run(T, U, Y, x0, P0, theta, own, S, push, density, R, ports, kinds, s
 
 def follow_run(T, U, Y, x0, theta, own, S, push, ports, kinds, angles, parts, m, gains, states):
     """States and own parameters (r, n + o) of another model by kept gains, into states."""
-    n_y, n_w, n_p = Y.shape[1], len(push), ports.shape[0]
+    n_y, n_w, n_p = Y.shape[1], push.shape[1], ports.shape[0]
     x, w, nu, a = x0.copy(), np.zeros(n_w), np.zeros(n_y), np.zeros(2 * n_p)
     lagged, history = np.zeros(n_y), np.zeros((len(T), n_y))
     theta, at_own = theta.copy(), m + 2 * n_p
     for row in range(len(T)):
         if row > 0:
             dt = T[row] - T[row - 1]
-            push_of(push, ports, a, w)
-            x = normalised(advance(x, U[row - 1], w, theta, dt, parts), kinds)
+            push_of(push[row - 1], ports, a, w)
+            x = normalised(advance(x, U[row - 1, 0], w, theta, dt, parts), kinds)
             for k in range(n_p):
                 decay = np.exp(-dt / ports[k, 2])
                 c, s = decay * np.cos(ports[k, 1] * dt), decay * np.sin(ports[k, 1] * dt)
                 a0, a1 = a[2 * k], a[2 * k + 1]
                 a[2 * k], a[2 * k + 1] = c * a0 + s * a1, c * a1 - s * a0
-        h = read(measure(x, U[row], theta), T[row], row, T, lagged, history, angles, S)
+        h = read(measure(x, U[row, 1], theta), T[row], row, T, lagged, history, angles, S)
         difference(Y[row], h, angles, nu)
         for j in range(n_y):
             if np.isnan(nu[j]):
@@ -287,9 +287,9 @@ def fly_run(T, U, starts, ends, X, theta, own, S, push, kinds, angles, parts, ou
         lagged, history = np.zeros(n_y), np.zeros((ends[k] - starts[k], n_y))
         for row in range(starts[k], ends[k]):
             if row > starts[k]:
-                x = normalised(advance(x, U[row - 1], push, theta, T[row] - T[row - 1], parts), kinds)
+                x = normalised(advance(x, U[row - 1, 0], push[row - 1], theta, T[row] - T[row - 1], parts), kinds)
             since = row - starts[k]
-            h = measure(x, U[row], theta)
+            h = measure(x, U[row, 1], theta)
             when = T[starts[k] : ends[k]]
             out[row] = read(h, T[row], since, when, lagged, history, angles, S)
             out[row] += S[2] * (T[starts[k]] - T[0])

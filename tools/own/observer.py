@@ -11,7 +11,7 @@ import numpy as np
 from glider.tools.data.errors import InputError
 from glider.tools.own import kernels as names
 from glider.tools.own.declare import ANGLE, QUATERNION, USUAL_START, USUAL_TOLERANCE, Declaration
-from glider.tools.own.effects import ModelPoint, driven_inputs, nominal_point
+from glider.tools.own.effects import ModelPoint, driven_inputs, forces, held_inputs, nominal_point
 from glider.tools.own.load import LoadedVehicle, called, user_error
 from glider.tools.own.runs import OwnRun
 
@@ -21,8 +21,9 @@ PARTS_TOLERANCE, MOST_PARTS = 0.02, 64  # of a state's scale a second, by which 
 HORIZON = (5.0, 20.0)  # s: of windows, where the vehicle's time constants set it
 TIME_CONSTANTS = 3.0  # in a window
 WARM_UP, WARM_UP_SHARE = 2.0, 0.1  # s of a window that find its start, at most; of the horizon
+NOTHING = np.zeros(0)
 NO_POINT = ModelPoint(
-    np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0)
+    NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING
 )  # the vehicle file's own is taken
 LOST = 100.0  # tolerances: error of a flight that is lost, and of none more
 QUATERNION_FIRST, QUATERNION_REST, USUAL_ATTITUDE = 2, 3, 0.1  # kinds of states; rad at the start
@@ -204,8 +205,9 @@ class Observer:
         try:
             driven = driven_inputs(run, declared, point)
             value, squares, samples = kernels.filter_run(
-                run.t, driven, run.outputs, x, P, point.theta, point.own, point.reading, point.push, point.density,
-                point.variance, point.ports, self.kinds, self.scales, self.angles, self.parts, keep,
+                run.t, held_inputs(declared, driven), run.outputs, x, P, point.theta, point.own, point.reading,
+                forces(declared, point, driven), point.density, point.variance, point.ports, self.kinds, self.scales,
+                self.angles, self.parts, keep,
             )  # fmt: skip
         except np.linalg.LinAlgError:
             value, squares, samples = np.inf, np.inf, 1
@@ -218,10 +220,12 @@ class Observer:
         run, kernels = self.runs[n], self.vehicle.kernels
         states = np.full(by.states.shape, np.nan)
         x, _ = self.start(n, point)
+        driven = driven_inputs(run, self.declared, point)
         with contextlib.suppress(ArithmeticError, ValueError, np.linalg.LinAlgError):
             kernels.follow_run(
-                run.t, driven_inputs(run, self.declared, point), run.outputs, x, point.theta, point.own, point.reading,
-                point.push, point.ports, self.kinds, self.angles, self.parts, len(self.scales), by.gains, states,
+                run.t, held_inputs(self.declared, driven), run.outputs, x, point.theta, point.own, point.reading,
+                forces(self.declared, point, driven), point.ports, self.kinds, self.angles, self.parts,
+                len(self.scales), by.gains, states,
             )  # fmt: skip
         return states
 
@@ -252,12 +256,13 @@ class Observer:
         """
         run, kernels = self.runs[n], self.vehicle.kernels
         starts, ends = self.windows(n, horizon)
-        out = np.full(run.outputs.shape, np.nan)
+        out, driven = np.full(run.outputs.shape, np.nan), driven_inputs(run, self.declared, point)
         if np.isfinite(states[starts]).all():
             with contextlib.suppress(ArithmeticError, ValueError, np.linalg.LinAlgError):
                 kernels.fly_run(
-                    run.t, driven_inputs(run, self.declared, point), starts, ends, states[starts], point.theta,
-                    point.own, point.reading, point.push, self.kinds, self.angles, self.parts, out,
+                    run.t, held_inputs(self.declared, driven), starts, ends, states[starts], point.theta, point.own,
+                    point.reading,
+                    forces(self.declared, point, driven), self.kinds, self.angles, self.parts, out,
                 )  # fmt: skip
         return out
 

@@ -17,7 +17,17 @@ from scipy.stats import norm
 from scipy.stats import t as student
 
 from glider.tools.own.declare import RUN
-from glider.tools.own.effects import PARAMETER, PUSH, Effect, ModelPoint, moved, pushes, standard_effects
+from glider.tools.own.effects import (
+    FORM,
+    PARAMETER,
+    PUSH,
+    Effect,
+    ModelPoint,
+    form_errors,
+    moved,
+    pushes,
+    standard_effects,
+)
 from glider.tools.own.hierarchy import ChannelErrors, Expansion, Pooled, expand, marginalised, run_values
 from glider.tools.own.identify import USUAL_OWN_SCATTER, USUAL_SCATTER, USUAL_SESSION_SHARE
 from glider.tools.own.observer import Observer
@@ -28,11 +38,11 @@ CHANGED = 0.5  # prior probability that anything changed
 ANOTHER = 0.1  # that a further effect stands beside one
 # prior odds of a label to one of an input or an output: what is fixed of a vehicle changes less often than what is
 # commanded and read; a constant force that no label has, seldom
-FAMILY_ODDS = {PARAMETER: 0.5, PUSH: 0.1}
+FAMILY_ODDS = {PARAMETER: 0.5, PUSH: 0.1, FORM: 0.0}
 STRANGE = 0.1  # that more is left than a hypothesis says
 LEFT, SITE, USUAL_LEVEL_SCATTER, PRIOR_RUNS = 1.5, 0.25, 0.5, 1.0  # e-folds of the mean square left (docs)
-FORM = 0.2  # of a change, 1 sigma, that is not as its label's equations have it
-FORMS = (0.0, FORM)  # as probable before the data
+FORM_SHARE = 0.2  # of a change, 1 sigma, that is not as its label's equations have it
+FORM_SHARES = (0.0, FORM_SHARE)  # as probable before the data
 MATERIAL = 0.1  # tolerances: a smaller effect is no gap (docs/reference/gap.md)
 BEAM, MOST_EFFECTS, ROUNDS, LONGEST_MOVE = 6, 3, 5, 4.0
 LONGEST_REACH = 4.0  # tolerances that a round's move of one number may do at most, where that is more
@@ -220,7 +230,7 @@ class Engine:
         """The most probable deviations and runs pooled with their prior, log evidence over all, sizes with their sd."""
         sided = [self.healthy.effects[k].one_sided for k in places]
         table: list[tuple[float, Deviations, Pooled, np.ndarray, np.ndarray]] = []
-        forms = FORMS if places else FORMS[:1]
+        forms = FORM_SHARES if places else FORM_SHARES[:1]
         for by in (self.together, self.apart):
             pooled = Pooled.of(by.marginal(found), by.V)
             for *sizes, form in product(*[SIZES.tolist()] * len(places), forms):
@@ -237,7 +247,7 @@ class Engine:
         """Of a hypothesis: that something changed, which label, and that another stands beside it."""
         if not labels:
             return float(np.log1p(-CHANGED))
-        named = sum(one.family != PUSH for one in self.healthy.effects)
+        named = sum(one.family not in (PUSH, FORM) for one in self.healthy.effects)
         each = [log_odds(self.healthy.effects[k]) - np.log(named) for k in self.healthy.at(labels)]
         return float(np.log(CHANGED) + sum(each) + (len(labels) - 1) * np.log(ANOTHER))
 
@@ -289,7 +299,8 @@ class Engine:
                 break
             chosen.append(n)
             rows += len(observer.runs[n].t)
-        sizes = [(k, sign * size / self.reach[k]) for k in range(self.k) if self.reach[k] > LEAST_REACH
+        sizes = [(k, sign * size / self.reach[k]) for k in range(self.k)
+                 if self.reach[k] > LEAST_REACH and healthy.effects[k].family != FORM
                  for size in STRONG for sign in (1.0, -1.0)]  # fmt: skip
         sizes = [(k, size) for k, size in sizes if self.low[k] <= size <= self.high[k]]
         value = np.zeros(len(sizes))
@@ -368,7 +379,7 @@ class Engine:
         squares = (healthy.runs - 1) * healthy.level_scatter**2 + PRIOR_RUNS * USUAL_LEVEL_SCATTER**2
         scale = np.sqrt(squares / freedom * (1.0 / healthy.runs + 1.0 / len(one.left)) + SITE**2)
         if one.labels:
-            scale = float(np.hypot(scale, np.log1p(FORM**2 * max(nothing.left.mean() - one.left.mean(), 0.0))))
+            scale = float(np.hypot(scale, np.log1p(FORM_SHARE**2 * max(nothing.left.mean() - one.left.mean(), 0.0))))
         at = float(np.log(max(one.left.mean(), 1e-9)))
         shifts = np.linspace(0.0, 4.0 * LEFT, 121)
         prior = 2.0 * norm.pdf(shifts, scale=LEFT) * (shifts[1] - shifts[0])
@@ -403,7 +414,8 @@ class Engine:
 
 def log_odds(effect: Effect) -> float:
     """Log prior odds of a label to one of an input or an output."""
-    return float(np.log(FAMILY_ODDS.get(effect.family, 1.0)))
+    odds = FAMILY_ODDS.get(effect.family, 1.0)
+    return float(np.log(odds)) if odds else -np.inf
 
 
 def size_evidence(slope, precision, reach, one_sided) -> np.ndarray:
@@ -423,7 +435,7 @@ def healthy_of(observer: Observer) -> Healthy:
     """What an identified vehicle file says of itself; one that is not identified, what it allows for."""
     declared, table = observer.declared, observer.vehicle.file.identified
     labels = standard_effects(declared, observer.runs, observer.tolerances)
-    effects = [*labels, *pushes(declared)]
+    effects = [*labels, *pushes(declared), *form_errors(declared)]
     names = [one.label for one in effects]
     k = len(effects)
     scatter, usual, V = np.zeros(k), np.full(k, USUAL_SCATTER), np.zeros((k, k))

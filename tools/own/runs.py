@@ -74,7 +74,7 @@ def load_own_run(path: Path, declared: Declaration) -> OwnRun:
     for n, one in enumerate(declared.inputs):
         if one.column not in table.header:
             raise table.error(f"the model's input {one.name} has no such column", column=one.column)
-        inputs[:, n] = _held(table.numbers(one.column), table, one.column)
+        inputs[:, n] = _filled(t, table.numbers(one.column), one.interpolated, table, one.column)
     outputs = np.full((len(t), len(declared.outputs)), np.nan)
     for n, output in enumerate(declared.outputs):
         if output.column in table.header:
@@ -85,9 +85,11 @@ def load_own_run(path: Path, declared: Declaration) -> OwnRun:
     return OwnRun(run_name(path), t, inputs, outputs, path)
 
 
-def _held(values: np.ndarray, table, column: str) -> np.ndarray:
-    """An input with missing samples held from before; it has to begin with one."""
+def _filled(t: np.ndarray, values: np.ndarray, interpolated: bool, table, column: str) -> np.ndarray:
+    """An input with missing samples held from before, or drawn in straight; one that is held has to begin with one."""
     missing = np.isnan(values)
+    if interpolated and not missing.all():
+        return np.interp(t, t[~missing], values[~missing])
     if missing[0]:
         raise table.error("the first value of an input is missing", row=0, column=column)
     last = np.maximum.accumulate(np.where(missing, 0, np.arange(len(values))))

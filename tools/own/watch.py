@@ -15,12 +15,12 @@ from scipy.special import logsumexp
 from scipy.stats import norm
 
 from glider.tools.data.intervals import NINETY
-from glider.tools.own.effects import PUSH
+from glider.tools.own.effects import FORM, PUSH
 from glider.tools.own.hierarchy import Expansion, Pooled, learn_scatter, run_values
 from glider.tools.own.load import LoadedVehicle
 from glider.tools.own.observer import Observer, observer_of
 from glider.tools.own.posterior import (
-    FORMS,
+    FORM_SHARES,
     LEAST_REACH,
     LONGEST_MOVE,
     LONGEST_REACH,
@@ -192,7 +192,7 @@ class Watch(Engine):
         spans = [(a, b) for a in range(self.learned, self.count) for b in range(a + 1, self.count + 1)]
         if not spans:
             return
-        named = sum(one.family != PUSH for one in self.healthy.effects)
+        named = sum(one.family not in (PUSH, FORM) for one in self.healthy.effects)
         for _ in range(MOST_EVENTS):
             scores = self.scored(spans) + self.span_prior(spans)[:, None] - np.log(named)
             ranked = np.argsort(scores.max(axis=1))[::-1][:SPANS]
@@ -274,7 +274,7 @@ class Watch(Engine):
                 pooled = self.evidence(runs, span, self.M)
                 table = []
                 where = size * (np.arange(self.k) == k)
-                for tolerances, form in product(SIZES.tolist(), FORMS):
+                for tolerances, form in product(SIZES.tolist(), FORM_SHARES):
                     V = self.variance(self.M, [k], [tolerances], where, form)
                     M = pooled.covariance(V)
                     mean, sd = float((M @ pooled.r)[k]), float(np.sqrt(max(M[k, k], 1e-30)))

@@ -10,6 +10,7 @@ from glider.tools.data.errors import InputError
 from glider.tools.own.cases import own_vehicle
 from glider.tools.own.check import check_model, load_own
 from glider.tools.own.declare import DeclarationError, Output, column_of, declaration
+from glider.tools.own.effects import held_inputs
 from glider.tools.own.runs import load_own_run
 
 MODEL = """
@@ -98,6 +99,28 @@ def test_a_mistake_in_a_vehicle_file_names_key_and_line(vehicle, extra, said):
     with pytest.raises(ConfigError) as error:
         load_own(vehicle(extra=extra))
     assert said in str(error.value)
+
+
+def test_a_parameter_may_not_be_called_as_a_cause_of_an_input_is():
+    model = SimpleNamespace(inputs={"fin": "rad"}, outputs={"roll": "rad"}, parameters=[("fin_offset", "rad", 0.0)],
+                            rollout=lambda x0, t, u, theta: None)  # fmt: skip
+    with pytest.raises(DeclarationError, match="parameters: fin_offset is what a cause of fin is called"):
+        declaration(model)
+
+
+def test_missing_samples_of_an_interpolated_input_are_drawn_in_straight(vehicle, tmp_path):
+    (tmp_path / "run0.csv").write_text(
+        "t_s,push_n,depth_m\n" + "".join(f"{t},{'' if t == 3 else t},0\n" for t in range(9))
+    )
+    held = load_own(vehicle()).declared
+    drawn = load_own(vehicle(extra="[inputs.push]\ninterpolated = true\n")).declared
+    assert load_own_run(tmp_path / "run0.csv", held).inputs[3, 0] == 2.0
+    run = load_own_run(tmp_path / "run0.csv", drawn)
+    assert run.inputs[3, 0] == 3.0
+    on_the_way = held_inputs(drawn, run.inputs)
+    assert on_the_way[:, 0, 0] == pytest.approx([0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5, 8.0])
+    assert on_the_way[:, 1, 0] == pytest.approx(run.inputs[:, 0])
+    assert held_inputs(held, run.inputs)[:, 0, 0] == pytest.approx(run.inputs[:, 0])
 
 
 def test_a_model_that_is_nowhere_is_named(tmp_path):

@@ -1,0 +1,69 @@
+"""Forces that go with inputs: what no run's own force is, learned by identification, kept in its file, flown with."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from glider.tools.own.check import load_own
+from glider.tools.own.identified import write
+from glider.tools.own.identify import identify
+from glider.tools.own.observer import observer_of
+from glider.tools.own.runs import OwnRun
+
+MODEL = """
+import numpy as np
+inputs = {"thrust": "N", "flap": "rad"}
+outputs = [("speed", "m/s", "speed_m_s", 0.01)]
+parameters = [("damping", "1/s", 0.4, 0.1)]
+states = [("v", "m/s")]
+noises = [("surge", "m/s2", 0.02)]
+def derivative(x, u, w, theta):
+    return np.array([u[0] - theta[0] * x[0] + w[0]])
+def measure(x, u, theta):
+    return np.array([x[0]])
+"""
+TRUE = -0.15  # m/s2 a radian of flap, of which the model knows nothing
+
+
+def flights(form: float, count: int, seed: int) -> list[OwnRun]:
+    """Runs under thrust and flap that are steady in a run, as the flights of a blimp or a glider are."""
+    random = np.random.default_rng(seed)
+    t, runs = np.arange(0.0, 30.0, 0.1), []
+    for n in range(count):
+        u = np.array([random.uniform(0.1, 0.3), random.uniform(-0.5, 0.5)])
+        v, out = 0.3, []
+        own = 0.005 * random.standard_normal()
+        for _ in t:
+            out.append(v + 0.01 * random.standard_normal())
+            v += 0.1 * (u[0] - 0.45 * v + form * u[1] + own + 0.02 * random.standard_normal() / np.sqrt(0.1))
+        runs.append(OwnRun(f"run{n}", t, np.tile(u, (len(t), 1)), np.array(out)[:, None]))
+    return runs
+
+
+@pytest.fixture(scope="module", params=[TRUE, 0.0], ids=["there", "not there"])
+def found(request, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("form")
+    (folder / "boat.py").write_text(MODEL)
+    (folder / "boat.toml").write_text('format = 1\nmodel = "boat"\n[windows]\nseconds = 10.0\n')
+    vehicle = load_own(folder / "boat.toml")
+    answer = identify(vehicle, [flights(request.param, 14, 3)])
+    write(answer, folder / "out")
+    return SimpleNamespace(form=request.param, vehicle=load_own(folder / "out" / "identified.toml"), answer=answer)
+
+
+def test_it_is_learned_where_it_is_and_nothing_where_not(found):
+    assert found.vehicle.declared.form["surge", "flap"] == pytest.approx(found.form, abs=0.03)
+    assert abs(found.vehicle.declared.form["surge", "thrust"]) < 0.1
+    at = [one.label for one in found.answer.nuisance].index("surge_push")
+    assert found.answer.scatter[at] * 0.02 < 0.02  # what runs differ by is not asked to stand for it
+
+
+def test_the_identified_file_predicts_with_it(found):
+    kept = flights(found.form, 4, 7)
+    observer = observer_of(found.vehicle, kept)
+    without = observer.point.copy()
+    without.form[:] = 0.0
+    gaps = [np.mean([observer.gaps(n, point, 10.0) for n in range(4)]) for point in (observer.point, without)]
+    assert gaps[0] < 0.6
+    assert (gaps[0] < 0.6 * gaps[1]) == bool(found.form)
