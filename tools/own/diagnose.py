@@ -10,7 +10,7 @@ import numpy as np
 from glider.tools.data.files import write_files
 from glider.tools.data.intervals import NINETY
 from glider.tools.data.plain import as_plain
-from glider.tools.own.effects import PUSH, ModelPoint
+from glider.tools.own.effects import NOISE, PUSH, ModelPoint
 from glider.tools.own.identified import toml_text
 from glider.tools.own.load import LoadedVehicle
 from glider.tools.own.observer import Observer, observer_of
@@ -149,9 +149,11 @@ def _gaps(observer: Observer, healthy: Healthy, chosen: Hypothesis, selected: Se
 
     gap: dict[str, Any] = {name: row(table) for name, table in tables.items()}
     gap["floor"] = {**dict(zip(names, map(float, floor), strict=True)), "total": float(np.sqrt(np.mean(floor**2)))}
+    # noise is not predicted: it shrinks no gap
+    shrinking = any(one.family != NOISE for one in healthy.effects if one.label in selected)
     before, after, low = gap["before"]["total"], gap["after"]["total"], gap["floor"]["total"]
-    gap["shrinkage"] = {"value": 1.0 - after / before if selected else None, "ci90": _interval(runs, None)}
-    gap["closed"] = {"value": (before - after) / (before - low) if selected and before > low else None,
+    gap["shrinkage"] = {"value": 1.0 - after / before if shrinking else None, "ci90": _interval(runs, None)}
+    gap["closed"] = {"value": (before - after) / (before - low) if shrinking and before > low else None,
                      "ci90": _interval(runs, low)}  # fmt: skip
     return gap, _numbers(observer, changed)
 

@@ -14,6 +14,7 @@ from glider.tools.own.runs import OwnRun
 
 INPUT, OUTPUT, PARAMETER = "input", "output", "parameter"
 PUSH = "push"  # a constant beside a noise: what no label explains
+NOISE = "noise"  # more of a noise than healthy runs have, or an oscillation: excess_noise.py
 FORM = "form"  # a force at a noise that goes with an input: what the form of the model lacks, no label
 GAIN_SPREAD, SECONDS_SPREAD, RANGE_SPREAD = 0.1, 0.2, 0.1
 OWN_STEP = 1e-3  # of its sigma: difference step of a parameter of each run
@@ -142,6 +143,15 @@ def pushes(declared: Declaration) -> list[Effect]:
     """A constant beside every noise: an effect that no label has."""
     return [
         Effect(f"{one.name}_push", PUSH, one.name, "push", one.unit, max(one.density, 1e-6)) for one in declared.noises
+    ]
+
+
+def noise_effects(declared: Declaration) -> list[Effect]:
+    """Excess noise and an oscillation at every noise: its density, and its amplitude; two of each noise, in order."""
+    return [
+        Effect(f"{one.name}_{kind}", NOISE, one.name, kind, one.unit, max(one.density, 1e-6), 0.0)
+        for one in declared.noises
+        for kind in ("noise", "oscillation")
     ]
 
 

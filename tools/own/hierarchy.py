@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glider.tools.own.effects import Effect, moved
+from glider.tools.own.effects import NOISE, Effect, moved
 from glider.tools.own.observer import Observer
 
 STEP, LONG_STEP, SHORTENED = 0.1, 3.0, 0.5  # spreads; rms errors that a step may move, and to what it is shortened
@@ -37,6 +37,7 @@ class Expansion:
     blocks: np.ndarray  # (PARTS, y + 1, k) sums over parts of windows of (J e)^2, by channel, and of all together
     diagonal: np.ndarray  # (y + 1, k) what they would be, were errors independent
     reach: np.ndarray  # (k,) mean square that a spread moves the channels, tolerances
+    derivatives: np.ndarray | None = None  # (k, rows, y) of the errors in tolerances, where they are kept
 
     def tempered(self, eta: float) -> "Expansion":
         return replace(self, value=self.value / eta, slope=self.slope / eta, curvature=self.curvature / eta)
@@ -66,9 +67,13 @@ class ChannelErrors:
 
 
 def expand(
-    observer: Observer, n: int, effects: Sequence[Effect], at: np.ndarray, healthy: ChannelErrors, horizon: float
-) -> Expansion:
-    """Run n about the model at `at` (effects,) spreads: windows' errors in units of what healthy runs leave."""
+    observer: Observer, n: int, effects: Sequence[Effect], at: np.ndarray, healthy: ChannelErrors, horizon: float,
+    keep: bool = False,
+) -> Expansion:  # fmt: skip
+    """Run n about the model at `at` (effects,) spreads: windows' errors in units of what healthy runs leave.
+
+    keep: the derivatives stay with it.
+    """
     base, declared, scales = observer.point, observer.declared, healthy.scales
     by = observer.filter(n, moved(declared, base, effects, at))
     steps = np.array(
@@ -85,11 +90,12 @@ def expand(
             points.append(moved(declared, base, effects, there))
         return observer.residuals(n, points, by, horizon) / scales
 
-    every = np.arange(len(effects))
-    E = errors(np.append(-1, every), np.append(0.0, steps))
+    moving = np.array([k for k, one in enumerate(effects) if one.family != NOISE], dtype=int)
+    E = errors(np.append(-1, moving), np.append(0.0, steps[moving]))
     shape = E[0].shape
     E = E.reshape(len(E), -1)
-    e, J = E[0], (E[1:] - E[0]) / steps[:, None]
+    e, J = E[0], np.zeros((len(effects), E.shape[1]))
+    J[moving] = (E[1:] - E[0]) / steps[moving, None]
     size = np.sqrt((J**2).mean(axis=1)) * np.abs(steps)
     far = np.flatnonzero(
         (size > LONG_STEP) & ~np.array([one.one_sided and abs(x) < STEP for one, x in zip(effects, at, strict=True)])
@@ -116,6 +122,7 @@ def expand(
     return Expansion(
         at.copy(), float((weight * e * e).sum()), weighted @ e.ravel(), weighted @ flat.T, (e**2).sum(axis=0),
         np.where(seen, shape[0], 0), np.array(blocks), diagonal, ((J * scales) ** 2).mean(axis=1)[:, seen].mean(axis=1),
+        J * scales if keep else None,
     )  # fmt: skip
 
 

@@ -119,8 +119,9 @@ def filter_run(T, U, Y, x0, P0, theta, own, S, push, density, R, ports, kinds, s
 
     T (r,) s; U (r, 2, i): inputs from a row to the next, and at it; Y (r, y) with NaN; x0 (n,), its covariance
     P0 (m, m); own (3, o): parameters that are a number of each run, estimated along it: place in theta, 1 sigma,
-    difference step; S (5, y) of `read`; push (r, w); density (w,); R (y,) variances; parts: steps in which a row's step is taken. Into keep: gains
-    (r, m + 2 ports + o, y) and states and own parameters (r, n + o) after each row. Returns value, squares, samples.
+    difference step; S (5, y) of `read`; push (r, w); density (w,); R (y,) variances; parts: steps in which a row's
+    step is taken. Into keep: gains (r, m + 2 ports + o, y) and states and own parameters (r, n + o) after each row.
+    Returns value, squares, samples.
     """
     n_y, n_w, n_p, n_o, n = Y.shape[1], push.shape[1], ports.shape[0], own.shape[1], len(x0)
     m = len(P0)

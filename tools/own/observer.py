@@ -2,9 +2,10 @@
 
 import contextlib
 import copy
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -249,10 +250,10 @@ class Observer:
             starts[0] = 0
         return starts, ends
 
-    def predict(self, n: int, point: ModelPoint, horizon: float, states: np.ndarray) -> np.ndarray:
+    def predict(self, n: int, point: ModelPoint, horizon: float, states: np.ndarray, beside=0.0) -> np.ndarray:
         """Outputs (rows, outputs) of run n, window by window open loop from the state behind each warm-up; NaN else.
 
-        No measurement behind a window's warm-up is used in it.
+        No measurement behind a window's warm-up is used in it. beside (rows, noises): forces beside the point's own.
         """
         run, kernels = self.runs[n], self.vehicle.kernels
         starts, ends = self.windows(n, horizon)
@@ -261,8 +262,8 @@ class Observer:
             with contextlib.suppress(ArithmeticError, ValueError, np.linalg.LinAlgError):
                 kernels.fly_run(
                     run.t, held_inputs(self.declared, driven), starts, ends, states[starts], point.theta, point.own,
-                    point.reading,
-                    forces(self.declared, point, driven), self.kinds, self.angles, self.parts, out,
+                    point.reading, forces(self.declared, point, driven) + beside, self.kinds, self.angles,
+                    self.parts, out,
                 )  # fmt: skip
         return out
 
@@ -301,10 +302,23 @@ class Observer:
             predicted = self.predict(n, point, horizon, self.follow(n, point, by))
             return np.nan_to_num(self.errors(n, predicted, horizon), nan=0.0)
 
+        return self._each(one, points)
+
+    def pushed(self, n: int, pushes: np.ndarray, horizon: float) -> np.ndarray:
+        """Errors of the observer's own model, as `residuals`, under forces (patterns, rows, noises) beside its own."""
+        states = self.filter(n, self.point).states
+
+        def one(beside: np.ndarray) -> np.ndarray:
+            return np.nan_to_num(self.errors(n, self.predict(n, self.point, horizon, states, beside), horizon), nan=0.0)
+
+        return self._each(one, pushes)
+
+    def _each(self, flown: Callable[..., np.ndarray], over: Any) -> np.ndarray:
+        """Flights side by side: on two threads where they are compiled."""
         if self.vehicle.level and self.vehicle.kernels.compiled:
             with ThreadPoolExecutor(2) as pool:
-                return np.array(list(pool.map(one, points)))
-        return np.array([one(point) for point in points])
+                return np.array(list(pool.map(flown, over)))
+        return np.array([flown(each) for each in over])
 
     @property
     def horizon(self) -> float:
@@ -372,7 +386,7 @@ class BlackBox(Observer):
     def follow(self, n: int, point: ModelPoint, by: Filtered) -> np.ndarray:
         return by.states
 
-    def predict(self, n: int, point: ModelPoint, horizon: float, states: np.ndarray) -> np.ndarray:
+    def predict(self, n: int, point: ModelPoint, horizon: float, states: np.ndarray, beside=0.0) -> np.ndarray:
         run = self.runs[n]
         driven = driven_inputs(run, self.declared, point)
         out = np.full(run.outputs.shape, np.nan)

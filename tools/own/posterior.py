@@ -19,15 +19,18 @@ from scipy.stats import t as student
 from glider.tools.own.declare import RUN
 from glider.tools.own.effects import (
     FORM,
+    NOISE,
     PARAMETER,
     PUSH,
     Effect,
     ModelPoint,
     form_errors,
     moved,
+    noise_effects,
     pushes,
     standard_effects,
 )
+from glider.tools.own.excess_noise import NoisyWindows, Responses, blocks_of, responses
 from glider.tools.own.hierarchy import ChannelErrors, Expansion, Pooled, expand, marginalised, run_values
 from glider.tools.own.identify import USUAL_OWN_SCATTER, USUAL_SCATTER, USUAL_SESSION_SHARE
 from glider.tools.own.observer import Observer
@@ -38,12 +41,13 @@ CHANGED = 0.5  # prior probability that anything changed
 ANOTHER = 0.1  # that a further effect stands beside one
 # prior odds of a label to one of an input or an output: what is fixed of a vehicle changes less often than what is
 # commanded and read; a constant force that no label has, seldom
-FAMILY_ODDS = {PARAMETER: 0.5, PUSH: 0.1, FORM: 0.0}
+FAMILY_ODDS = {PARAMETER: 0.5, NOISE: 0.5, PUSH: 0.1}
 STRANGE = 0.1  # that more is left than a hypothesis says
 LEFT, SITE, USUAL_LEVEL_SCATTER, PRIOR_RUNS = 1.5, 0.25, 0.5, 1.0  # e-folds of the mean square left (docs)
 FORM_SHARE = 0.2  # of a change, 1 sigma, that is not as its label's equations have it
 FORM_SHARES = (0.0, FORM_SHARE)  # as probable before the data
 MATERIAL = 0.1  # tolerances: a smaller effect is no gap (docs/reference/gap.md)
+NOISES_TRIED = 3  # labels of noises beside a hypothesis
 BEAM, MOST_EFFECTS, ROUNDS, LONGEST_MOVE = 6, 3, 5, 4.0
 LONGEST_REACH = 4.0  # tolerances that a round's move of one number may do at most, where that is more
 STRONG, STRONG_LEFT, STRONG_ROWS = (
@@ -108,6 +112,7 @@ class Hypothesis:
     left: np.ndarray  # (runs,) mean squares, in units of what healthy runs leave
     strange: float = 0.0  # probability that more is left than it says
     found: list[Expansion] = field(default_factory=list)
+    calm: float = 0.0  # of one with excess noise: probability that healthy runs leave as much without it
 
 
 @dataclass
@@ -139,6 +144,8 @@ class Engine:
         # runs of one session, or each of another: which, their evidence says
         self.together = Deviations(healthy.V + healthy.session_share * np.diag(healthy.scatter**2), healthy.scatter)
         self.apart = Deviations(healthy.V, healthy.scatter * np.sqrt(1.0 + healthy.session_share))
+        # constant numbers that a hypothesis may add; noises are weighed beside them (excess_noise.py)
+        self.candidate = np.array([one.family not in (FORM, NOISE) for one in healthy.effects])
         self.forces = np.array([k for k, one in enumerate(healthy.effects) if one.family == PUSH], dtype=int)
         self.reach = np.zeros(self.k)
 
@@ -146,10 +153,10 @@ class Engine:
         """Every run about its values (runs, k) in some columns, tempered; the others' rows are 0."""
         return [self.expansion_of(n, own[n], columns) for n in range(self.count)]
 
-    def expansion_of(self, n: int, own: np.ndarray, columns: np.ndarray) -> Expansion:
-        """Run n about its values (k,) in some columns, tempered; the others' rows are 0."""
-        chosen = [self.healthy.effects[k] for k in columns]
-        one = expand(self._observer_at(own, columns), n, chosen, own[columns], self.healthy.errors, self.horizon)
+    def expansion_of(self, n: int, own: np.ndarray, columns: np.ndarray, keep: bool = False) -> Expansion:
+        """Run n about its values (k,) in some columns, tempered; the others' rows are 0. keep: with its derivatives."""
+        chosen, observer = [self.healthy.effects[k] for k in columns], self._observer_at(own, columns)
+        one = expand(observer, n, chosen, own[columns], self.healthy.errors, self.horizon, keep)
         return self._widened(one.tempered(self.healthy.eta), columns, own)
 
     def _observer_at(self, own: np.ndarray, columns: np.ndarray) -> Observer:
@@ -164,7 +171,11 @@ class Engine:
         slope, curvature, reach = np.zeros(self.k), np.zeros((self.k, self.k)), np.zeros(self.k)
         slope[columns], reach[columns] = one.slope, one.reach
         curvature[np.ix_(columns, columns)] = one.curvature
-        return replace(one, at=own.copy(), slope=slope, curvature=curvature, reach=reach)
+        derivatives = None
+        if one.derivatives is not None:
+            derivatives = np.zeros((self.k, *one.derivatives.shape[1:]))
+            derivatives[columns] = one.derivatives
+        return replace(one, at=own.copy(), slope=slope, curvature=curvature, reach=reach, derivatives=derivatives)
 
     def usual_share(self, k: int, size: float, sd: float, runs: int) -> float:
         """Nat of the evidence of label k, its size known to sd, that a deviation as healthy runs have it brings too."""
@@ -258,7 +269,9 @@ class Engine:
         precision = np.maximum(np.diag(pooled.H - pooled.H @ M @ pooled.H), 0.0)
         effects, reach = self.healthy.effects, np.maximum(self.reach, LEAST_REACH)
         gain = size_evidence(slope, precision, reach, np.array([one.one_sided for one in effects]))
-        gain = np.where(self.reach > LEAST_REACH, gain + np.array([log_odds(one) for one in effects]), -np.inf)
+        gain = np.where(
+            (self.reach > LEAST_REACH) & self.candidate, gain + np.array([log_odds(one) for one in effects]), -np.inf
+        )
         tau2 = (SIZES[-1] / reach) ** 2
         return gain, np.clip(slope * tau2 / (1.0 + tau2 * precision), self.low, self.high)
 
@@ -300,7 +313,7 @@ class Engine:
             chosen.append(n)
             rows += len(observer.runs[n].t)
         sizes = [(k, sign * size / self.reach[k]) for k in range(self.k)
-                 if self.reach[k] > LEAST_REACH and healthy.effects[k].family != FORM
+                 if self.reach[k] > LEAST_REACH and self.candidate[k]
                  for size in STRONG for sign in (1.0, -1.0)]  # fmt: skip
         sizes = [(k, size) for k, size in sizes if self.low[k] <= size <= self.high[k]]
         value = np.zeros(len(sizes))
@@ -370,10 +383,61 @@ class Engine:
             front = [self.fit(one.labels, one, every=True) for one in front]
             for one in front:
                 one.strange = self.strangeness(one, nothing)
+        alone = sorted((one for one in every if len(one.labels) == 1), key=lambda one: -one.evidence)
+        every += self.with_noise([nothing, *alone[:1]], nothing)
         return self._posterior(every)
+
+    def with_noise(self, beside: Sequence[Hypothesis], nothing: Hypothesis) -> list[Hypothesis]:
+        """Hypotheses with excess noise or an oscillation at one of the model's noises beside them."""
+        noises, found = [one for one in self.healthy.effects if one.family == NOISE], list[Hypothesis]()
+        for begin in beside if noises else ():
+            runs, flown = list[Expansion](), list[Responses]()
+            places = np.array(self.healthy.at(begin.labels), dtype=int)
+            columns = np.unique(np.append(np.flatnonzero(self.active), places))
+            for n in range(self.count):
+                point = moved(self.observer.declared, self.observer.point, self.healthy.effects, begin.own[n])
+                flown.append(responses(self.observer.about(point), n, self.horizon))
+                runs.append(self.expansion_of(n, begin.own[n], columns, keep=True))
+            tried: list[tuple[float, str, NoisyWindows]] = []
+            for place, one in enumerate(noises):
+                for block in blocks_of(place):
+                    windows = NoisyWindows(flown, block, self.healthy.errors, self.healthy.eta)
+                    if windows.reach > LEAST_REACH:
+                        tried.append((max(windows.gain(size / windows.reach) for size in SIZES), one.label, windows))
+            tried.sort(key=lambda one: -one[0])
+            best = dict((label, windows) for _, label, windows in reversed(tried))
+            for label in list(dict.fromkeys(label for _, label, _ in tried))[:NOISES_TRIED]:
+                found.append(self._noisy(begin, label, best[label], runs, nothing))
+        return found
+
+    def _noisy(
+        self, begin: Hypothesis, label: str, windows: NoisyWindows, runs: list[Expansion], nothing: Hypothesis
+    ) -> Hypothesis:
+        """A label of a noise beside a hypothesis: evidence over all sizes, all that was fitted integrated out again."""
+        labels, places = (*begin.labels, label), self.healthy.at(begin.labels)
+        table = []
+        for size in SIZES:
+            noisy = windows.marginalised(runs, size / windows.reach)
+            _, _, evidence, mean, sd = self._best_sizes(noisy, places, begin.shared)
+            table.append((evidence, mean, sd))
+        evidence = float(logsumexp([row[0] for row in table]) - np.log(len(SIZES)))
+        _, mean, sd = max(table, key=lambda row: row[0])
+        size, error = windows.size(SIZES[-1])
+        self.reach[self.healthy.at([label])] = windows.reach
+        found = replace(begin, labels=labels, evidence=evidence + self.log_prior(labels), sizes=np.append(mean, size),
+                        sd=np.append(sd, error), left=windows.left(size), calm=1.0 - begin.strange)  # fmt: skip
+        found.strange = self.strangeness(found, nothing)
+        gain, left = found.evidence - nothing.evidence, np.sqrt(found.left.mean())
+        self.say(f"{' + '.join(labels)}: {gain:.1f} nat, {left:.2f} left")
+        return found
 
     def strangeness(self, one: Hypothesis, nothing: Hypothesis) -> float:
         """Probability that more is left than a hypothesis says: its mean square against healthy runs', Student's t."""
+        odds = self.strange_odds(one, nothing) + np.log(STRANGE) - np.log1p(-STRANGE)
+        return float(1.0 / (1.0 + np.exp(-np.clip(odds, -500.0, 500.0))))
+
+    def strange_odds(self, one: Hypothesis, nothing: Hypothesis) -> float:
+        """Log evidence that more is left than a hypothesis says, over that it is what healthy runs leave."""
         healthy = self.healthy
         freedom = healthy.runs - 1 + PRIOR_RUNS
         squares = (healthy.runs - 1) * healthy.level_scatter**2 + PRIOR_RUNS * USUAL_LEVEL_SCATTER**2
@@ -383,9 +447,8 @@ class Engine:
         at = float(np.log(max(one.left.mean(), 1e-9)))
         shifts = np.linspace(0.0, 4.0 * LEFT, 121)
         prior = 2.0 * norm.pdf(shifts, scale=LEFT) * (shifts[1] - shifts[0])
-        less = float(student.logpdf(max(at, 0.0) / scale, freedom)) + np.log1p(-STRANGE)
-        more = float(logsumexp(student.logpdf((at - shifts) / scale, freedom), b=prior)) + np.log(STRANGE)
-        return float(np.exp(more - np.logaddexp(less, more)))
+        less = float(student.logpdf(max(at, 0.0) / scale, freedom))
+        return float(logsumexp(student.logpdf((at - shifts) / scale, freedom), b=prior)) - less
 
     def _posterior(self, every: list[Hypothesis]) -> Posterior:
         # of every label what healthy runs show of it is no change
@@ -399,14 +462,17 @@ class Engine:
         inclusion: dict[str, float] = {}
         known = {one.label: one for one in self.healthy.effects}
         for one, weight in zip(every, weights, strict=True):
-            moves = [abs(size) * self.reach[k] for size, k in zip(one.sizes, self.healthy.at(one.labels), strict=True)]
-            main = max(zip(moves, one.labels, strict=True), default=(0.0, NONE))
+            moves = {label: abs(size) * self.reach[k] for label, size, k
+                     in zip(one.labels, one.sizes, self.healthy.at(one.labels), strict=True)}  # fmt: skip
             chances[UNKNOWN] += weight * one.strange
-            if main[0] < MATERIAL:
-                name = NONE
-            else:
-                name = UNKNOWN if known[main[1]].family == PUSH else main[1]
-            chances[name] = chances.get(name, 0.0) + weight * (1.0 - one.strange)
+            constant = {label: move for label, move in moves.items() if known[label].family != NOISE}
+            for of, share in ((moves, 1.0 - one.calm), (constant, one.calm)):
+                main = max(of, key=lambda label: of[label], default=NONE)
+                if of.get(main, 0.0) < MATERIAL:
+                    name = NONE
+                else:
+                    name = UNKNOWN if known[main].family == PUSH else main
+                chances[name] = chances.get(name, 0.0) + weight * share * (1.0 - one.strange)
             for label in one.labels:
                 inclusion[label] = inclusion.get(label, 0.0) + float(weight)
         return Posterior(every, weights, chances, inclusion, self.reach, self.healthy)
@@ -414,8 +480,7 @@ class Engine:
 
 def log_odds(effect: Effect) -> float:
     """Log prior odds of a label to one of an input or an output."""
-    odds = FAMILY_ODDS.get(effect.family, 1.0)
-    return float(np.log(odds)) if odds else -np.inf
+    return float(np.log(FAMILY_ODDS.get(effect.family, 1.0)))
 
 
 def size_evidence(slope, precision, reach, one_sided) -> np.ndarray:
@@ -435,7 +500,7 @@ def healthy_of(observer: Observer) -> Healthy:
     """What an identified vehicle file says of itself; one that is not identified, what it allows for."""
     declared, table = observer.declared, observer.vehicle.file.identified
     labels = standard_effects(declared, observer.runs, observer.tolerances)
-    effects = [*labels, *pushes(declared), *form_errors(declared)]
+    effects = [*labels, *noise_effects(declared), *pushes(declared), *form_errors(declared)]
     names = [one.label for one in effects]
     k = len(effects)
     scatter, usual, V = np.zeros(k), np.full(k, USUAL_SCATTER), np.zeros((k, k))
