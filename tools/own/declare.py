@@ -30,6 +30,7 @@ NOT_SI = {
 DERIVED = {
     "inputs": ("gain", "offset", "lag", "delay", "backlash", "limit", "rate_limit"),
     "outputs": ("bias", "gain", "drift", "lag", "delay"),
+    "noises": ("noise", "oscillation"),
 }
 # unit: tolerance of an output, standard deviation of a state at the start
 USUAL_TOLERANCE = {"m": 0.1, "rad": 0.0349, "rad/s": 0.0349, "m/s": 0.05, "m/s2": 0.1}

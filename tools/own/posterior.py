@@ -238,21 +238,38 @@ class Engine:
     def _best_sizes(
         self, found: Sequence[Expansion], places: Sequence[int], shared: np.ndarray
     ) -> tuple[Deviations, Pooled, float, np.ndarray, np.ndarray]:
-        """The most probable deviations and runs pooled with their prior, log evidence over all, sizes with their sd."""
-        sided = [self.healthy.effects[k].one_sided for k in places]
-        table: list[tuple[float, Deviations, Pooled, np.ndarray, np.ndarray]] = []
+        """The most probable deviations and runs pooled with their prior, log evidence over all, sizes with their sd.
+
+        Priors of the grid differ in a few variances, d: with W = (1 + V H)^-1, Q = (H W) and q = W' r at these,
+        they add (q' S q - log det(1 + d Q)) / 2 to the evidence, S = (d^-1 + Q)^-1 (Woodbury).
+        """
+        sided = np.array([self.healthy.effects[k].one_sided for k in places], dtype=bool)
         forms = FORM_SHARES if places else FORM_SHARES[:1]
+        grid = list(product(*[SIZES.tolist()] * len(places), forms))
+        varied = np.array([*places, *(k for k in self.forces if places and k not in places)], dtype=int)
+        added = [self.variance(np.zeros((self.k, self.k)), places, sizes, shared, form)[varied, varied]
+                 for *sizes, form in grid]  # fmt: skip
+        d = np.array(added).reshape(len(grid), len(varied))
+        table = []
         for by in (self.together, self.apart):
             pooled = Pooled.of(by.marginal(found), by.V)
-            for *sizes, form in product(*[SIZES.tolist()] * len(places), forms):
-                at = replace(pooled, V=self.variance(by.V, places, sizes, shared, form))
-                M = at.covariance()
-                mean, sd = (M @ at.r)[places], np.sqrt(np.maximum(np.diag(M)[places], 1e-30))
-                halves = float((np.log(2.0) + norm.logcdf(mean / sd))[sided].sum())
-                table.append((at.log_evidence() + halves, by, at, mean, sd))
-        _, by, best, mean, sd = max(table, key=lambda one: one[0])
-        evidence = float(logsumexp([one[0] for one in table]) - np.log(len(table)))
-        return by, best, evidence, np.clip(mean, self.low[places], self.high[places]), sd
+            W = np.linalg.inv(np.eye(self.k) + by.V @ pooled.H)
+            M, Q, q = W @ by.V, (pooled.H @ W)[np.ix_(varied, varied)], (W.T @ pooled.r)[varied]
+            inner = np.eye(len(varied)) + d[:, :, None] * Q
+            S = np.linalg.solve(inner, d[:, :, None] * np.eye(len(varied)))
+            G = W[np.ix_(np.array(places, dtype=int), varied)]
+            mean = (M @ pooled.r)[places] + np.einsum("pa,nab,b->np", G, S, q)
+            variance = np.diag(M)[places] + np.einsum("pa,nab,pb->np", G, S, G)
+            sd = np.sqrt(np.maximum(variance, 1e-30))
+            halves = (np.log(2.0) + norm.logcdf(mean / sd))[:, sided].sum(axis=1)
+            gained = 0.5 * (np.einsum("a,nab,b->n", q, S, q) - np.linalg.slogdet(inner)[1])
+            table.append((pooled.log_evidence() + gained + halves, mean, sd, by, pooled))
+        evidence = float(logsumexp([row[0] for row in table]) - np.log(2 * len(grid)))
+        nat, mean, sd, by, pooled = max(table, key=lambda row: row[0].max())
+        best = int(np.argmax(nat))
+        *sizes, form = grid[best]
+        at = replace(pooled, V=self.variance(by.V, places, sizes, shared, form))
+        return by, at, evidence, np.clip(mean[best], self.low[places], self.high[places]), sd[best]
 
     def log_prior(self, labels: Sequence[str]) -> float:
         """Of a hypothesis: that something changed, which label, and that another stands beside it."""

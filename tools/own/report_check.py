@@ -9,7 +9,7 @@ from glider.tools.data.errors import InputError
 from glider.tools.data.sources import read_text
 from glider.tools.own.check import load_own
 from glider.tools.own.declare import USUAL_TOLERANCE
-from glider.tools.own.effects import standard_effects
+from glider.tools.own.effects import noise_effects, standard_effects
 from glider.tools.own.files import is_own
 from glider.tools.own.observer import observer_of
 from glider.tools.own.runs import OwnRun, load_own_runs
@@ -45,7 +45,7 @@ def describe(file: Path, case: Path | None) -> dict[str, Any]:
         lines.append(f"assumed, not measured: {', '.join(assumed)}")
     runs = [_imagined(declared)] if case is None else load_own_runs(case, declared)
     tolerances = np.array([one.tolerance or USUAL_TOLERANCE.get(one.unit, 1.0) for one in declared.outputs])
-    labels = [one.label for one in standard_effects(declared, runs, tolerances)]
+    labels = [one.label for one in [*standard_effects(declared, runs, tolerances), *noise_effects(declared)]]
     lines.append(f"{len(labels)} causes it can have: {', '.join(labels)}")
     if case is not None:
         observer = observer_of(vehicle, runs[:1])

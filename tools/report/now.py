@@ -13,6 +13,7 @@ MOST_CHECKS = 4
 OWN_CHECKS = {  # by the family of what a user's vehicle declares
     "input": "Command {name} by known steps on the bench and measure what it does.",
     "output": "Compare the reading of {name} with a second instrument or a known value.",
+    "noise": "Look for what shakes the vehicle at {name}: waves, a propeller, a loose part, a control loop that hunts.",
     "parameter": "Look for what changes {name}: parts added, lost, loose or fouled since the vehicle was identified.",
 }
 LEAST_CHECKED = 0.1  # probability from which a cause that is not certain is worth a look at the vehicle

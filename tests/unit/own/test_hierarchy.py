@@ -1,13 +1,15 @@
 """The hierarchical model in closed form: scatter of runs, sessions, what of a label is usual, labels in one's place."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.special import logsumexp
 
 from glider.tools.own.effects import INPUT, PARAMETER, PUSH, Effect
 from glider.tools.own.hierarchy import ChannelErrors, Expansion, Pooled, learn_scatter
-from glider.tools.own.posterior import CHANGED, SIZES, Deviations, Engine, Healthy, Hypothesis
+from glider.tools.own.posterior import CHANGED, FORM_SHARES, SIZES, Deviations, Engine, Healthy, Hypothesis
 from glider.tools.own.watch import Event, Watch
 
 LABELS = [Effect("gain", INPUT, "motor", "gain", "1", 0.1), Effect("mass", PARAMETER, "mass", "value", "kg", 0.1),
@@ -68,6 +70,24 @@ def test_deviations_alike_in_all_runs_have_the_prior_of_their_two_levels():
     shared, own = np.array([0.0, 0.0, 1.0]), np.array([[0.0, 0.0, 3.0], [0.0, 0.0, 1.0]])
     assert by.prior(shared, own, ()) == pytest.approx(1.0 / 4.0 + 1.0)
     assert by.prior(shared, own, (2,)) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("places", [[0], [2], [0, 1], [1, 2]], ids=["label", "force", "labels", "label and force"])
+def test_the_grid_of_sizes_is_what_each_prior_alone_gives(places):
+    random = np.random.default_rng(3)
+    asked = engine(4, V=np.diag([0.1, 0.0, 0.0]), scatter=np.array([0.0, 0.0, 0.3]))
+    runs, shared = [run_at(random.normal(size=3), 0.3) for _ in range(4)], random.normal(size=3)
+    by, at, evidence, mean, sd = asked._best_sizes(runs, places, shared)
+    nat = []
+    for each in (asked.together, asked.apart):
+        for *sizes, form in itertools.product(*[SIZES.tolist()] * len(places), FORM_SHARES):
+            pooled = Pooled.of(each.marginal(runs), asked.variance(each.V, places, sizes, shared, form))
+            nat.append(pooled.log_evidence())
+    assert evidence == pytest.approx(logsumexp(nat) - np.log(len(nat)))
+    assert at.log_evidence() == pytest.approx(max(nat))
+    assert mean == pytest.approx(at.mean()[places])
+    assert sd**2 == pytest.approx(np.diag(at.covariance())[places])
+    assert by is asked.together or by is asked.apart
 
 
 def test_a_label_alone_gains_what_its_evidence_says():
