@@ -41,6 +41,7 @@ FILE_PRIOR = 2.0  # times the file's uncertainties: what the shared values may b
 USUAL_SCATTER, USUAL_OWN_SCATTER = 0.02, 0.5  # spreads, from run to run; of what is declared a number of each run
 LABEL_SCATTERS = np.geomspace(0.005, 20.0, 60)  # spreads: candidates for a label's scatter
 LONGEST_MOVE = 2.0  # spreads a round
+LEAST_DAMPING, MOST_DAMPING = 0.01, 1e6  # of the curvature, in spreads
 CONVERGED_GAIN = 0.5  # of -2 log posterior: no further round
 CONVERGED_SCALE = 0.05  # e-folds of what is left, by which it changes no more
 LEAST_SCALE = 0.02  # tolerances: less than that no channel is known to be left with
@@ -134,8 +135,8 @@ def identify(
             V = with_form_errors([marginalised(one, scatter) for one in warm], V, nuisance)
             learned += 1
         search = _Search(observer, nuisance, warm, scatter, eta, V, limits, errors, horizon)
-        step = Pooled.of([marginalised(one, scatter) for one in warm], V).mean() - values
-        values, own, gain = search.along(values, own, step * min(1.0, LONGEST_MOVE / max(np.abs(step).max(), 1e-9)))
+        step = damped_step(Pooled.of([marginalised(one, scatter) for one in warm], V), values)
+        values, own, gain = search.along(values, own, step)
         before_errors, left = errors, left_by(found, errors)
         errors = ChannelErrors(left.scales, errors.inflation)  # channels' own inflation is for what is asked later
         said = f"round {round_ + 1}: gain {gain:.1f}, {np.sqrt(np.mean(errors.scales**2)):.2f} tolerances left"
@@ -158,6 +159,17 @@ def identify(
     share = session_share(own, scatter, [len(one) for one in sessions])
     return Identified(vehicle, observer, nuisance, values, covariance, scatter, labels, label_scatter, eta, errors, own,
                       before, after, level_scatter(found), len(sessions), share)  # fmt: skip
+
+
+def damped_step(pooled: Pooled, values: np.ndarray) -> np.ndarray:
+    """Step (k,) to the most probable shared values, damped as Levenberg has it until no value moves LONGEST_MOVE."""
+    damping = 0.0
+    while True:
+        near = replace(pooled, H=pooled.H + damping * np.eye(len(values)), r=pooled.r + damping * values)
+        step = near.mean() - values
+        if np.abs(step).max(initial=0.0) <= LONGEST_MOVE or damping > MOST_DAMPING:
+            return np.clip(step, -LONGEST_MOVE, LONGEST_MOVE)
+        damping = max(4.0 * damping, LEAST_DAMPING)
 
 
 def with_form_errors(found: Sequence[Expansion], V: np.ndarray, nuisance: Sequence[Effect]) -> np.ndarray:
@@ -215,7 +227,7 @@ class _Search:
     def along(self, values: np.ndarray, own: np.ndarray, step: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
         """Values, runs' own values and the gain of a step, shortened until the exact posterior gains."""
 
-        def at(share: float, of_own: float) -> tuple[float, np.ndarray, np.ndarray]:
+        def at(share: float, of_own: float = 1.0) -> tuple[float, np.ndarray, np.ndarray]:
             x = np.clip(values + share * step, *self.limits)
             target = np.array([run_values(one, x, self.scatter) for one in self.warm])
             theirs = own + of_own * np.clip(target - own, -LONGEST_MOVE, LONGEST_MOVE)
@@ -223,9 +235,9 @@ class _Search:
             return sum(self.misfit(n, row) for n, row in enumerate(theirs)) + self.prior(x, theirs), x, theirs
 
         here = sum(one.value for one in self.warm) + self.prior(values, own), values, own
-        stay = min((here, at(0.0, 1.0)), key=lambda one: one[0])
+        stay = min((here, at(0.0), at(0.0, 0.4)), key=lambda one: one[0])
         for share in (1.0, 0.4, 0.1):
-            tried = at(share, share)
+            tried = at(share)
             if tried[0] < stay[0]:
                 return tried[1], tried[2], stay[0] - tried[0]
         return stay[1], stay[2], 0.0
