@@ -40,7 +40,7 @@ MIN_SCATTER_RUNS = 3  # from fewer nothing is learned of how runs differ
 FILE_PRIOR = 2.0  # times the file's uncertainties: what the shared values may be
 USUAL_SCATTER, USUAL_OWN_SCATTER = 0.02, 0.5  # spreads, from run to run; of what is declared a number of each run
 LABEL_SCATTERS = np.geomspace(0.005, 20.0, 60)  # spreads: candidates for a label's scatter
-LONGEST_MOVE = 2.0  # spreads a round
+LONGEST_MOVE, SHARES = 2.0, (1.0, 0.4, 0.1)  # spreads a round; of a step, until the exact posterior gains
 LEAST_DAMPING, MOST_DAMPING = 0.01, 1e6  # of the curvature, in spreads
 CONVERGED_GAIN = 0.5  # of -2 log posterior: no further round
 CONVERGED_SCALE = 0.05  # e-folds of what is left, by which it changes no more
@@ -134,7 +134,7 @@ def identify(
             scatter = found_scatter if learned == 0 else np.sqrt(scatter * found_scatter)
             V = with_form_errors([marginalised(one, scatter) for one in warm], V, nuisance)
             learned += 1
-        search = _Search(observer, nuisance, warm, scatter, eta, V, limits, errors, horizon)
+        search = LineSearch(observer, nuisance, warm, scatter, eta, V, limits, errors, horizon)
         step = damped_step(Pooled.of([marginalised(one, scatter) for one in warm], V), values)
         values, own, gain = search.along(values, own, step)
         before_errors, left = errors, left_by(found, errors)
@@ -152,11 +152,13 @@ def identify(
     *_, eta = inflation(found)
     if count < MIN_SCATTER_RUNS:
         scatter = usual
+    counts = [len(one) for one in sessions]
+    scatter = within_sessions([one.tempered(eta) for one in found], own, scatter, counts)
     warm = [marginalised(one.tempered(eta), scatter) for one in found]
     covariance = Pooled.of(warm, V).covariance()
     after = _held_out(observer, nuisance, values, warm, V, limits)
     labels, label_scatter = _label_scatter(observer, nuisance, values, own, scatter, eta, errors)
-    share = session_share(own, scatter, [len(one) for one in sessions])
+    share = session_share(own, scatter, counts)
     return Identified(vehicle, observer, nuisance, values, covariance, scatter, labels, label_scatter, eta, errors, own,
                       before, after, level_scatter(found), len(sessions), share)  # fmt: skip
 
@@ -202,7 +204,7 @@ def left_by(found: Sequence[Expansion], errors: ChannelErrors) -> ChannelErrors:
 
 
 @dataclass
-class _Search:
+class LineSearch:
     """The exact posterior along a step of the shared values."""
 
     observer: Observer
@@ -214,6 +216,7 @@ class _Search:
     limits: tuple[np.ndarray, np.ndarray]
     errors: ChannelErrors
     horizon: float
+    first: int = 0  # run of the observer that `warm` begins with
 
     def prior(self, x: np.ndarray, own: np.ndarray) -> float:
         apart, free = ((own - x) / np.maximum(self.scatter, 1e-6)) ** 2, np.diag(self.V) > 0.0
@@ -221,7 +224,9 @@ class _Search:
 
     def misfit(self, n: int, row: np.ndarray) -> float:
         point = moved(self.observer.declared, self.observer.point, self.nuisance, row)
-        error = self.observer.residuals(n, [point], self.observer.filter(n, point), self.horizon)[0]
+        error = self.observer.residuals(
+            self.first + n, [point], self.observer.filter(self.first + n, point), self.horizon
+        )[0]
         return float((error**2 / self.errors.weight).sum()) / self.eta
 
     def along(self, values: np.ndarray, own: np.ndarray, step: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
@@ -235,8 +240,15 @@ class _Search:
             return sum(self.misfit(n, row) for n, row in enumerate(theirs)) + self.prior(x, theirs), x, theirs
 
         here = sum(one.value for one in self.warm) + self.prior(values, own), values, own
-        stay = min((here, at(0.0), at(0.0, 0.4)), key=lambda one: one[0])
-        for share in (1.0, 0.4, 0.1):
+        stay = here
+        for of_own in SHARES:
+            tried = at(0.0, of_own)
+            if tried[0] < stay[0]:
+                stay = tried
+                break
+        if not step.any():
+            return stay[1], stay[2], 0.0
+        for share in SHARES:
             tried = at(share)
             if tried[0] < stay[0]:
                 return tried[1], tried[2], stay[0] - tried[0]
@@ -311,6 +323,26 @@ def _label_scatter(observer, nuisance, values, own, scatter, eta, errors) -> tup
     ratio = LABEL_SCATTERS[:, None] ** 2 / (USUAL_SCATTER if len(own) >= MIN_SCATTER_RUNS else 5.0 * USUAL_SCATTER) ** 2
     prior = -0.5 * SCATTER_PRIOR_RUNS * (np.log(ratio) + 1.0 / ratio)
     return labels, LABEL_SCATTERS[np.argmax(nat + prior, axis=0)]
+
+
+def within_sessions(
+    found: Sequence[Expansion], own: np.ndarray, scatter: np.ndarray, counts: Sequence[int]
+) -> np.ndarray:
+    """1 sigma (nuisance,) from run to run within sessions, where sessions are told apart; at most what it is in all.
+
+    A step of expectation and maximisation: runs' own values about their session's mean, and how uncertain they are.
+    """
+    freedom = sum(counts) - len(counts)
+    columns = np.flatnonzero(scatter > 0.0)
+    if len(counts) < 2 or freedom < MIN_SCATTER_RUNS or not len(columns):
+        return scatter
+    parts = np.split(own[:, columns], np.cumsum(counts)[:-1])
+    squares = sum(((part - part.mean(axis=0)) ** 2).sum(axis=0) for part in parts)
+    prior = np.diag(scatter[columns] ** -2)
+    open_ = sum(np.diag(np.linalg.inv(one.curvature[np.ix_(columns, columns)] + prior)) for one in found)
+    narrow = scatter.copy()
+    narrow[columns] = np.minimum(scatter[columns], np.sqrt(squares / freedom + open_ / len(found)))
+    return narrow
 
 
 def session_share(own: np.ndarray, scatter: np.ndarray, counts: Sequence[int]) -> float:

@@ -267,11 +267,20 @@ class Observer:
                 )  # fmt: skip
         return out
 
-    def errors(self, n: int, predicted: np.ndarray, horizon: float) -> np.ndarray:
-        """Measured less predicted in tolerances, (scored rows, outputs), NaN where nothing was measured."""
-        rows = np.concatenate([np.arange(a + 1, b) for a, b in zip(*self.windows(n, horizon), strict=True)])
+    def errors(self, n: int, predicted: np.ndarray, horizon: float, wrapped: bool = True) -> np.ndarray:
+        """Measured less predicted in tolerances, (scored rows, outputs), NaN where nothing was measured.
+
+        wrapped: angles modulo 2 pi; else turns are counted from a window's start on, so that errors are smooth.
+        """
+        parts = [np.arange(a + 1, b) for a, b in zip(*self.windows(n, horizon), strict=True)]
+        rows = np.concatenate(parts)
         error = self.runs[n].outputs[rows] - predicted[rows]
         error[:, self.angles] = names.wrap(error[:, self.angles])
+        ends = np.cumsum([len(part) for part in parts])
+        for k in np.flatnonzero(self.angles) if not wrapped else ():
+            for a, b in zip(ends - [len(part) for part in parts], ends, strict=True):
+                seen = a + np.flatnonzero(np.isfinite(error[a:b, k]))
+                error[seen, k] = np.unwrap(error[seen, k])
         lost = np.isnan(predicted[rows]).all(axis=1)
         error[lost] = np.where(np.isnan(self.runs[n].outputs[rows[lost]]), np.nan, LOST * self.tolerances)
         return np.clip(error / self.tolerances, -LOST, LOST)
@@ -300,7 +309,7 @@ class Observer:
 
         def one(point: ModelPoint) -> np.ndarray:
             predicted = self.predict(n, point, horizon, self.follow(n, point, by))
-            return np.nan_to_num(self.errors(n, predicted, horizon), nan=0.0)
+            return np.nan_to_num(self.errors(n, predicted, horizon, wrapped=False), nan=0.0)
 
         return self._each(one, points)
 
@@ -309,7 +318,8 @@ class Observer:
         states = self.filter(n, self.point).states
 
         def one(beside: np.ndarray) -> np.ndarray:
-            return np.nan_to_num(self.errors(n, self.predict(n, self.point, horizon, states, beside), horizon), nan=0.0)
+            predicted = self.predict(n, self.point, horizon, states, beside)
+            return np.nan_to_num(self.errors(n, predicted, horizon, wrapped=False), nan=0.0)
 
         return self._each(one, pushes)
 

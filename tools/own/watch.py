@@ -16,7 +16,8 @@ from scipy.stats import norm
 
 from glider.tools.data.intervals import NINETY
 from glider.tools.own.effects import FORM, PUSH
-from glider.tools.own.hierarchy import Expansion, Pooled, learn_scatter, run_values
+from glider.tools.own.hierarchy import Expansion, Pooled, learn_scatter
+from glider.tools.own.identify import CONVERGED_GAIN, SCATTER_ROUNDS, LineSearch, damped_step
 from glider.tools.own.load import LoadedVehicle
 from glider.tools.own.observer import Observer, observer_of
 from glider.tools.own.posterior import (
@@ -43,7 +44,8 @@ MOST_EVENTS = 4
 REFITTED, SPANS = 5, 2  # labels, of the best spans, whose parabolas are taken where they lead to
 CERTAIN = 0.5  # probability from which an event is one
 GROUP = 0.1  # of a label's probability: others of at least so much share its group
-ROUNDS, PREPARED = 3, 6
+OWN_ROUNDS, CONVERGED_OWN = 5, 0.1  # of a run's own values, spreads
+ROUNDS, PREPARED = 3, 20
 
 
 @dataclass
@@ -99,7 +101,8 @@ class Watched:
         effect = effects[one.label]
         known = effect.family != PUSH
         low, high = ((one.size + side * NINETY * one.sd) * effect.spread for side in (-1.0, 1.0))
-        top = max(one.chances.values())
+        # of an unknown change the labels that come nearest
+        top = max((p for label, p in one.chances.items() if known or effects[label].family != PUSH), default=0.0)
         group = [label for label, p in sorted(one.chances.items(), key=lambda item: -item[1])
                  if p > GROUP * top and effects[label].family != PUSH]  # fmt: skip
         places: dict[tuple[str, str], float] = {}
@@ -129,35 +132,39 @@ class Watch(Engine):
 
     def prepare(self) -> None:
         """Every run about where it lies, with what the reference says of all; how runs differ, learned from it too."""
-        every = np.arange(self.k)
-        shared, own = np.zeros(self.k), np.zeros((self.count, self.k))
-        best: tuple[float, np.ndarray, np.ndarray] | None = None  # squares of the reference, shared, own
-        for _ in range(PREPARED):
-            found = self.expansions(own, every)
-            squares = sum(one.value for one in found[: self.learned])
-            if best is not None and squares + self.together.prior(shared, own[: self.learned], ()) >= best[
-                0
-            ] + self.together.prior(best[1], best[2][: self.learned], ()):
-                shared, own = 0.5 * (shared + best[1]), 0.5 * (own + best[2])
-                continue
-            best, self.found = (squares, shared, own), found
-            self.reach = np.sqrt(np.mean([one.reach for one in found], axis=0))
-            if self.learned > 2:
-                learned = learn_scatter(found[: self.learned], self.together.V, self.healthy.scatter)
+        every, columns, healthy = np.arange(self.k), np.flatnonzero(self.active), self.healthy
+        shared, own = np.zeros(self.k), np.zeros((self.learned, self.k))
+        for round_ in range(PREPARED):
+            found = [self.expansion_of(n, own[n], columns) for n in range(self.learned)]
+            if self.learned > 2 and round_ < SCATTER_ROUNDS:
+                learned = learn_scatter(found, self.together.V, healthy.scatter)
                 self.together = replace(self.together, scatter=learned)
-            warm = self.together.marginal(found[: self.learned])
-            V = self.together.V
-            H, r = sum(one.curvature for one in warm), -sum(one.offset for one in warm)
-            M = np.linalg.solve(np.eye(self.k) + V @ H, V)
-            shared = np.clip(shared + np.clip(M @ r - shared, -LONGEST_MOVE, LONGEST_MOVE), self.low, self.high)
-            own = np.array([shared if n >= self.learned else run_values(one, shared, self.together.scatter)
-                            for n, one in enumerate(found)])  # fmt: skip
-            own = np.clip(own, self.low, self.high)
-        assert best is not None
-        shared = best[1]
-        self.shared, self.M = shared, 0.5 * (M + M.T)
+            pooled = Pooled.of(self.together.marginal(found), self.together.V)
+            search = LineSearch(self.observer, healthy.effects, found, self.together.scatter, healthy.eta,
+                                self.together.V, (self.low, self.high), healthy.errors, self.horizon)  # fmt: skip
+            shared, own, gain = search.along(shared, own, damped_step(pooled, shared))
+            if gain < CONVERGED_GAIN and round_ >= SCATTER_ROUNDS:
+                break
+        self.shared, self.events = shared, list[Event]()
+        later = [self.own_values(n, shared) for n in range(self.learned, self.count)]
+        self.found = self.expansions(np.array([*own, *later]), every)
+        self.reach = np.sqrt(np.mean([one.reach for one in self.found], axis=0))
         self.runs = self.together.marginal(self.found)
-        self.events: list[Event] = []
+        self.M = Pooled.of(self.runs[: self.learned], self.together.V).covariance()
+
+    def own_values(self, n: int, around: np.ndarray) -> np.ndarray:
+        """Most probable values (k,) of run n by the exact likelihood, about those that it is thought to have."""
+        columns, healthy, scatter = np.flatnonzero(self.active), self.healthy, self.together.scatter
+        own = around.copy()
+        for _ in range(OWN_ROUNDS):
+            found = self.expansion_of(n, own, columns)
+            search = LineSearch(self.observer, healthy.effects, [found], scatter, healthy.eta, self.together.V,
+                                (self.low, self.high), healthy.errors, self.horizon, n)  # fmt: skip
+            _, (moved_own,), _ = search.along(around, own[None], np.zeros(self.k))
+            if np.abs(moved_own - own).max() < CONVERGED_OWN:
+                break
+            own = moved_own
+        return own
 
     def at_run(self, n: int) -> np.ndarray:
         """Values (k,) that run n is thought to have: shared and its events'."""
@@ -238,7 +245,8 @@ class Watch(Engine):
         for n in range(*span):
             x = self.at_run(n)
             x[place] += event.size
-            runs += self.together.marginal([self.expansion_of(n, np.clip(x, self.low, self.high), every)])
+            x = self.own_values(n, np.clip(x, self.low, self.high))
+            runs += self.together.marginal([self.expansion_of(n, x, every)])
         gain, size = self.label_gains(self.evidence(runs, span, self.M))
         gain[self.healthy.at([one.label for _, one in refitted if (one.first, one.end) == span])] = -np.inf
         prior = float(self.span_prior(spans)[spans.index(span)]) - np.log(named)
@@ -253,7 +261,7 @@ class Watch(Engine):
         """An event into what is known: the runs of its span are expanded again where they are now."""
         self.events.append(event)
         for n in range(event.first, event.end):
-            self.found[n] = self.expansion_of(n, self.at_run(n), np.arange(self.k))
+            self.found[n] = self.expansion_of(n, self.own_values(n, self.at_run(n)), np.arange(self.k))
             (self.runs[n],) = self.together.marginal([self.found[n]])
 
     def evidence(self, runs: Sequence[Expansion], span: tuple[int, int], V: np.ndarray) -> Pooled:
@@ -295,7 +303,7 @@ class Watch(Engine):
             for n in range(*span):
                 x = self.at_run(n)
                 x[k] = np.clip(x[k] + size, self.low[k], self.high[k])
-                runs += self.together.marginal([self.expansion_of(n, x, columns)])
+                runs += self.together.marginal([self.expansion_of(n, self.own_values(n, x), columns)])
         score, mean, sd = best
         usual = self.usual_share(k, mean, sd, span[1] - span[0]) if sd > 0.0 else 0.0
         event = Event({}, *span, self.healthy.effects[k].label, mean, sd, 0.0)
@@ -306,8 +314,7 @@ class Watch(Engine):
         found = np.zeros(self.count)
         nothing = Hypothesis((), 0.0, np.zeros(0), np.zeros(0), self.shared, np.zeros((1, self.k)), np.ones(1))
         for n in range(self.learned, self.count):
-            x = run_values(self.found[n], self.at_run(n), self.together.scatter)
-            one = self.expansion_of(n, x, np.flatnonzero(self.active))
+            one = self.expansion_of(n, self.own_values(n, self.at_run(n)), np.flatnonzero(self.active))
             left = np.array([one.squares.sum() / max(1, one.samples.sum())])
             named = tuple(event.label for event in self.events if event.first <= n < event.end)
             found[n] = self.strangeness(
