@@ -133,3 +133,22 @@ def test_what_is_known_of_a_start_holds_against_a_sensor(tmp_path, linear):
     x, P = observer.start(0, observer.point)
     assert abs(x[0]) < 0.01
     assert np.sqrt(P[0, 0]) == pytest.approx(0.01, rel=0.01)
+
+
+def test_errors_of_an_angle_are_counted_through_turns_where_they_are_fitted(tmp_path, linear):
+    _, run = linear
+    (tmp_path / "turning.py").write_text(
+        LINEAR.replace(
+            '[("place", "m", "place_m", 0.1)]',
+            '[{"name": "heading", "unit": "rad", "noise": 0.1, "angle": True, "tolerance": 0.1}]',
+        )
+    )
+    (tmp_path / "turning.toml").write_text('format = 1\nmodel = "turning"\n[windows]\nseconds = 4.0\n')
+    turned = np.linspace(0.0, 9.0, len(run.t))[:, None]
+    turned[40] = np.nan
+    observer = observer_of(load_own(tmp_path / "turning.toml"), [OwnRun("run0", run.t, run.inputs, turned)])
+    starts, ends = observer.windows(0, 12.0)
+    counted = observer.errors(0, np.zeros_like(turned), 12.0, wrapped=False)
+    rows = np.arange(starts[0] + 1, ends[0])
+    assert counted[:, 0] == pytest.approx(turned[rows, 0] / 0.1, nan_ok=True)
+    assert np.nanmax(np.abs(observer.errors(0, np.zeros_like(turned), 12.0))) <= np.pi / 0.1
