@@ -15,11 +15,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import logsumexp
 
+from glider.tools.own.effects import Effect
 from glider.tools.own.hierarchy import ChannelErrors, Expansion
 from glider.tools.own.observer import Observer
 
 SEGMENTS = 12  # of a window, over each of which a force that stands for white noise is held
 PERIODS = tuple(np.geomspace(2.0, 10.0, 8))  # s; surface waves and strokes of fins
+NOISE_SIZES = np.array([0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0])  # tolerances, rms over the windows
 STEP = 1.0  # densities: of the force whose effect is flown
 SIZE_STEPS = np.geomspace(1.0 / 512.0, 1.0, 37)  # of the largest size looked for
 
@@ -93,6 +95,11 @@ class NoisyWindows:
         d, g = np.array(self.d), np.array(self.g)
         return 0.5 * float((g**2 / (size**-2 + d) - np.log1p(size**2 * d)).sum())
 
+    @property
+    def windows(self) -> int:
+        """How many windows there are in all runs."""
+        return len(self.d)
+
     def size(self, largest: float) -> tuple[float, float]:
         """Size and its 1 sigma, densities, up to `largest` tolerances."""
         grid = SIZE_STEPS * largest / self.reach
@@ -130,3 +137,18 @@ class NoisyWindows:
             seen = np.abs(one.errors).max(axis=0) > 0.0
             left[n] = float(((e / self.scales)[:, seen] ** 2).mean())
         return left
+
+
+def usual_gains(
+    found: Sequence[Responses], noises: Sequence[Effect], sizes: np.ndarray, healthy: ChannelErrors, eta: float
+) -> dict[str, float]:
+    """Nat a window, by label, that healthy runs gain by the most probable size: what there is without a change."""
+    usual = {}
+    for place, one in enumerate(noises):
+        gains = [0.0]
+        for block in blocks_of(place):
+            windows = NoisyWindows(found, block, healthy, eta)
+            if windows.reach > 0.0:
+                gains += [windows.gain(size / windows.reach) / windows.windows for size in sizes]
+        usual[one.label] = max(gains)
+    return usual

@@ -90,7 +90,8 @@ def tables(found: Identified) -> dict[str, Any]:
         "covariance": [[float(value) for value in row] for row in covariance], "inflation": found.eta,
         "level_scatter": found.level_scatter, "session_share": found.session_share,
         "scatter": {name: value for name, value in scatter.items() if value > 0.0}, "label_scatter": labels,
-        "form": form, "usual_inputs": {name: list(pair) for name, pair in declared.usual_inputs.items()},
+        "noise_gain": found.noise_gain, "form": form,
+        "usual_inputs": {name: list(pair) for name, pair in declared.usual_inputs.items()},
         "gap": {one.name: float(value) for one, value in zip(declared.outputs, found.errors.scales, strict=True)},
         "channel_inflation": {
             one.name: float(value) for one, value in zip(declared.outputs, found.errors.inflation, strict=True)

@@ -13,10 +13,12 @@ from glider.tools.own.effects import (
     Effect,
     form_errors,
     moved,
+    noise_effects,
     pushes,
     standard_effects,
     usual_inputs,
 )
+from glider.tools.own.excess_noise import NOISE_SIZES, responses, usual_gains
 from glider.tools.own.hierarchy import (
     SCATTER_PRIOR_RUNS,
     ChannelErrors,
@@ -70,6 +72,7 @@ class Identified:
     level_scatter: float
     sessions: int
     session_share: float  # of the variance from run to run, that sessions differ by beside it
+    noise_gain: dict[str, float]  # nat a window that excess noise gains in healthy runs, by label
     notes: list[str] = field(default_factory=list)
 
     @property
@@ -159,8 +162,11 @@ def identify(
     after = _held_out(observer, nuisance, values, warm, V, limits)
     labels, label_scatter = _label_scatter(observer, nuisance, values, own, scatter, eta, errors)
     share = session_share(own, scatter, counts)
+    flown = [responses(observer.about(moved(observer.declared, observer.point, nuisance, own[n])), n, horizon)
+             for n in range(count)] if vehicle.declared.noises else []  # fmt: skip
+    noise_gain = usual_gains(flown, noise_effects(vehicle.declared), NOISE_SIZES, errors, eta)
     return Identified(vehicle, observer, nuisance, values, covariance, scatter, labels, label_scatter, eta, errors, own,
-                      before, after, level_scatter(found), len(sessions), share)  # fmt: skip
+                      before, after, level_scatter(found), len(sessions), share, noise_gain)  # fmt: skip
 
 
 def damped_step(pooled: Pooled, values: np.ndarray) -> np.ndarray:

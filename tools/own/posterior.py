@@ -7,7 +7,7 @@ sessions and runs differ by is no change. Beside the labels stand constant force
 hypothesis, that more is left than healthy runs leave: unknown.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 
@@ -30,13 +30,13 @@ from glider.tools.own.effects import (
     pushes,
     standard_effects,
 )
-from glider.tools.own.excess_noise import NoisyWindows, Responses, blocks_of, responses
+from glider.tools.own.excess_noise import NOISE_SIZES, NoisyWindows, Responses, blocks_of, responses
 from glider.tools.own.hierarchy import ChannelErrors, Expansion, Pooled, expand, marginalised, run_values
 from glider.tools.own.identify import USUAL_OWN_SCATTER, USUAL_SCATTER, USUAL_SESSION_SHARE
 from glider.tools.own.observer import Observer
 
 NONE, UNKNOWN = "none", "unknown"
-SIZES = np.array([0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0])  # tolerances, rms over the windows
+SIZES = NOISE_SIZES  # tolerances, rms over the windows
 CHANGED = 0.5  # prior probability that anything changed
 ANOTHER = 0.1  # that a further effect stands beside one
 # prior odds of a label to one of an input or an output: what is fixed of a vehicle changes less often than what is
@@ -72,6 +72,7 @@ class Healthy:
     runs: int  # that it is known from
     level_scatter: float  # 1 sigma of the logarithm of a run's mean square left
     session_share: float  # of the variance from run to run, that a session differs by
+    noise_gain: Mapping[str, float] = field(default_factory=dict)  # nat a window, of healthy runs; none: not weighed
 
     def at(self, labels: Sequence[str]) -> list[int]:
         known = [one.label for one in self.effects]
@@ -405,8 +406,13 @@ class Engine:
         return self._posterior(every)
 
     def with_noise(self, beside: Sequence[Hypothesis], nothing: Hypothesis) -> list[Hypothesis]:
-        """Hypotheses with excess noise or an oscillation at one of the model's noises beside them."""
-        noises, found = [one for one in self.healthy.effects if one.family == NOISE], list[Hypothesis]()
+        """Hypotheses with excess noise or an oscillation at one of the model's noises beside them.
+
+        What healthy runs gain by one is taken from it, and what is left counts by the probability that more is left
+        than healthy runs leave: noise is excess only beyond that.
+        """
+        usual, found = self.healthy.noise_gain, list[Hypothesis]()
+        noises = [one for one in self.healthy.effects if one.family == NOISE] if usual else []
         for begin in beside if noises else ():
             runs, flown = list[Expansion](), list[Responses]()
             places = np.array(self.healthy.at(begin.labels), dtype=int)
@@ -420,7 +426,8 @@ class Engine:
                 for block in blocks_of(place):
                     windows = NoisyWindows(flown, block, self.healthy.errors, self.healthy.eta)
                     if windows.reach > LEAST_REACH:
-                        tried.append((max(windows.gain(size / windows.reach) for size in SIZES), one.label, windows))
+                        gain = max(windows.gain(size / windows.reach) for size in SIZES)
+                        tried.append((gain - windows.windows * usual.get(one.label, 0.0), one.label, windows))
             tried.sort(key=lambda one: -one[0])
             best = dict((label, windows) for _, label, windows in reversed(tried))
             for label in list(dict.fromkeys(label for _, label, _ in tried))[:NOISES_TRIED]:
@@ -438,6 +445,9 @@ class Engine:
             _, _, evidence, mean, sd = self._best_sizes(noisy, places, begin.shared)
             table.append((evidence, mean, sd))
         evidence = float(logsumexp([row[0] for row in table]) - np.log(len(SIZES)))
+        usual = windows.windows * self.healthy.noise_gain.get(label, 0.0)
+        without = begin.evidence - self.log_prior(begin.labels)
+        evidence = without + begin.strange * (evidence - usual - without)
         _, mean, sd = max(table, key=lambda row: row[0])
         size, error = windows.size(SIZES[-1])
         self.reach[self.healthy.at([label])] = windows.reach
@@ -543,7 +553,16 @@ def healthy_of(observer: Observer) -> Healthy:
         np.array([table.channel_inflation.get(one.name, 1.0) for one in declared.outputs]),
     )
     return Healthy(
-        effects, V, scatter, usual, errors, table.inflation, table.runs, table.level_scatter, table.session_share
+        effects,
+        V,
+        scatter,
+        usual,
+        errors,
+        table.inflation,
+        table.runs,
+        table.level_scatter,
+        table.session_share,
+        table.noise_gain,
     )
 
 
