@@ -334,7 +334,7 @@ def _label_scatter(observer, nuisance, values, own, scatter, eta, errors) -> tup
 def within_sessions(
     found: Sequence[Expansion], own: np.ndarray, scatter: np.ndarray, counts: Sequence[int]
 ) -> np.ndarray:
-    """1 sigma (nuisance,) from run to run within sessions, where sessions are told apart; at most what it is in all.
+    """1 sigma (nuisance,) from run to run within sessions, where there are several; at most what it is over all.
 
     A step of expectation and maximisation: runs' own values about their session's mean, and how uncertain they are.
     """
