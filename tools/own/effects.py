@@ -155,14 +155,10 @@ def noise_effects(declared: Declaration) -> list[Effect]:
     ]
 
 
-def form_label(noise: str, name: str) -> str:
-    return f"{noise}_by_{name}"
-
-
 def form_errors(declared: Declaration) -> list[Effect]:
     """A force at every noise that goes with an input, of inputs whose usual values are known; spread: a density."""
     return [
-        Effect(form_label(one.name, name), FORM, one.name, name, f"{one.unit}/{declared.inputs[k].unit}",
+        Effect(f"{one.name}_by_{name}", FORM, one.name, name, f"{one.unit}/{declared.inputs[k].unit}",
                max(one.density, 1e-6) / sd)
         for one in declared.noises
         for k, name in enumerate(each.name for each in declared.inputs)

@@ -22,7 +22,6 @@ from glider.tools.own.observer import Observer
 SEGMENTS = 12  # of a window, over each of which a force that stands for white noise is held
 PERIODS = tuple(np.geomspace(2.0, 10.0, 8))  # s; surface waves and strokes of fins
 NOISE_SIZES = np.array([0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0])  # tolerances, rms over the windows
-STEP = 1.0  # densities: of the force whose effect is flown
 SIZE_STEPS = np.geomspace(1.0 / 512.0, 1.0, 37)  # of the largest size looked for
 
 
@@ -57,10 +56,10 @@ def responses(observer: Observer, n: int, horizon: float) -> Responses:
         (1 + len(observer.declared.noises) * len(shapes), len(observer.runs[n].t), len(observer.declared.noises))
     )
     for j, one in enumerate(observer.declared.noises):
-        pushes[1 + j * len(shapes) : 1 + (j + 1) * len(shapes), :, j] = STEP * max(one.density, 1e-6) * shapes
+        pushes[1 + j * len(shapes) : 1 + (j + 1) * len(shapes), :, j] = max(one.density, 1e-6) * shapes
     errors = observer.pushed(n, pushes, horizon)
     rows = ends - starts - 1
-    return Responses((errors[1:] - errors[0]) / STEP, errors[0], np.append(0, np.cumsum(rows)))
+    return Responses(errors[1:] - errors[0], errors[0], np.append(0, np.cumsum(rows)))
 
 
 def blocks_of(place: int) -> list[slice]:

@@ -76,9 +76,8 @@ def expand(
     """
     base, declared, scales = observer.point, observer.declared, healthy.scales
     by = observer.filter(n, moved(declared, base, effects, at))
-    steps = np.array(
-        [UNSEEN_STEP if one.one_sided and abs(x) < STEP else STEP for one, x in zip(effects, at, strict=True)]
-    )
+    begins = np.array([one.one_sided and abs(x) < STEP for one, x in zip(effects, at, strict=True)], dtype=bool)
+    steps = np.where(begins, UNSEEN_STEP, STEP)
     steps = np.where(at + steps > [one.high for one in effects], -steps, steps)
 
     def errors(places: np.ndarray, sizes: np.ndarray) -> np.ndarray:
@@ -97,18 +96,16 @@ def expand(
     e, J = E[0], np.zeros((len(effects), E.shape[1]))
     J[moving] = (E[1:] - E[0]) / steps[moving, None]
     size = np.sqrt((J**2).mean(axis=1)) * np.abs(steps)
-    far = np.flatnonzero(
-        (size > LONG_STEP) & ~np.array([one.one_sided and abs(x) < STEP for one, x in zip(effects, at, strict=True)])
-    )
+    far = np.flatnonzero((size > LONG_STEP) & ~begins)
     if len(far):
         shorter = steps[far] * SHORTENED / size[far]
         J[far] = (errors(far, shorter).reshape(len(far), -1) - e) / shorter[:, None]
     J[~np.isfinite(J).all(axis=1)] = 0.0
     seen = np.isfinite(observer.runs[n].outputs).any(axis=0)
-    J, e = J.reshape(-1, *shape), e.reshape(shape)
+    J, e = J.reshape(len(effects), *shape), e.reshape(shape)
     weight = 1.0 / healthy.inflation
-    weighted = (J * weight).reshape(len(J), -1)
-    flat = J.reshape(len(J), -1)
+    weighted = (J * weight).reshape(len(effects), e.size)
+    flat = J.reshape(len(effects), e.size)
     score = J * (weight * e)  # (k, rows, y)
     starts, ends = observer.windows(n, horizon)
     rows = ends - starts - 1

@@ -113,7 +113,6 @@ class Hypothesis:
     left: np.ndarray  # (runs,) mean squares, in units of what healthy runs leave
     strange: float = 0.0  # probability that more is left than it says
     found: list[Expansion] = field(default_factory=list)
-    calm: float = 0.0  # of one with excess noise: probability that healthy runs leave as much without it
 
 
 @dataclass
@@ -408,8 +407,7 @@ class Engine:
     def with_noise(self, beside: Sequence[Hypothesis], nothing: Hypothesis) -> list[Hypothesis]:
         """Hypotheses with excess noise or an oscillation at one of the model's noises beside them.
 
-        What healthy runs gain by one is taken from it, and what is left counts by the probability that more is left
-        than healthy runs leave: noise is excess only beyond that.
+        What healthy runs gain by one is taken from it: noise is excess only beyond that.
         """
         usual, found = self.healthy.noise_gain, list[Hypothesis]()
         noises = [one for one in self.healthy.effects if one.family == NOISE] if usual else []
@@ -445,14 +443,12 @@ class Engine:
             _, _, evidence, mean, sd = self._best_sizes(noisy, places, begin.shared)
             table.append((evidence, mean, sd))
         evidence = float(logsumexp([row[0] for row in table]) - np.log(len(SIZES)))
-        usual = windows.windows * self.healthy.noise_gain.get(label, 0.0)
-        without = begin.evidence - self.log_prior(begin.labels)
-        evidence = without + begin.strange * (evidence - usual - without)
+        evidence -= windows.windows * self.healthy.noise_gain.get(label, 0.0)
         _, mean, sd = max(table, key=lambda row: row[0])
         size, error = windows.size(SIZES[-1])
         self.reach[self.healthy.at([label])] = windows.reach
         found = replace(begin, labels=labels, evidence=evidence + self.log_prior(labels), sizes=np.append(mean, size),
-                        sd=np.append(sd, error), left=windows.left(size), calm=1.0 - begin.strange)  # fmt: skip
+                        sd=np.append(sd, error), left=windows.left(size))  # fmt: skip
         found.strange = self.strangeness(found, nothing)
         gain, left = found.evidence - nothing.evidence, np.sqrt(found.left.mean())
         self.say(f"{' + '.join(labels)}: {gain:.1f} nat, {left:.2f} left")
@@ -484,22 +480,24 @@ class Engine:
                                for k, size, sd in zip(self.healthy.at(one.labels), one.sizes, one.sd, strict=True))
             for one in every
         ])  # fmt: skip
-        weights = np.exp(logs - logsumexp(logs))
+        known = {one.label: one for one in self.healthy.effects}
+        noisy = np.array([any(known[label].family == NOISE for label in one.labels) for one in every])
+        # noise is excess only if more is left without it than healthy runs leave; else those with it are out
+        without = np.where(noisy, -np.inf, logs)
+        strange = every[int(np.argmax(without))].strange
+        weights = strange * np.exp(logs - logsumexp(logs)) + (1.0 - strange) * np.exp(without - logsumexp(without))
         chances: dict[str, float] = {NONE: 0.0, UNKNOWN: 0.0}
         inclusion: dict[str, float] = {}
-        known = {one.label: one for one in self.healthy.effects}
         for one, weight in zip(every, weights, strict=True):
             moves = {label: abs(size) * self.reach[k] for label, size, k
                      in zip(one.labels, one.sizes, self.healthy.at(one.labels), strict=True)}  # fmt: skip
             chances[UNKNOWN] += weight * one.strange
-            constant = {label: move for label, move in moves.items() if known[label].family != NOISE}
-            for of, share in ((moves, 1.0 - one.calm), (constant, one.calm)):
-                main = max(of, key=lambda label: of[label], default=NONE)
-                if of.get(main, 0.0) < MATERIAL:
-                    name = NONE
-                else:
-                    name = UNKNOWN if known[main].family == PUSH else main
-                chances[name] = chances.get(name, 0.0) + weight * share * (1.0 - one.strange)
+            main = max(moves, key=lambda label: moves[label], default=NONE)
+            if moves.get(main, 0.0) < MATERIAL:
+                name = NONE
+            else:
+                name = UNKNOWN if known[main].family == PUSH else main
+            chances[name] = chances.get(name, 0.0) + weight * (1.0 - one.strange)
             for label in one.labels:
                 inclusion[label] = inclusion.get(label, 0.0) + float(weight)
         return Posterior(every, weights, chances, inclusion, self.reach, self.healthy)

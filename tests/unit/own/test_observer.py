@@ -7,9 +7,12 @@ from hypothesis import strategies as st
 
 from glider.tools.own import kernels
 from glider.tools.own.check import load_own
-from glider.tools.own.effects import driven_inputs, moved, nominal_point, standard_effects
+from glider.tools.own.declare import DERIVED
+from glider.tools.own.diagnose import diagnose_own
+from glider.tools.own.effects import driven_inputs, moved, noise_effects, nominal_point, standard_effects
 from glider.tools.own.observer import observer_of
 from glider.tools.own.runs import OwnRun
+from glider.tools.own.watch import watch
 
 small = st.lists(st.floats(-0.5, 0.5), min_size=5, max_size=5)
 KINDS = np.array([0, 1, 2, 3, 3, 3])
@@ -105,6 +108,10 @@ def test_every_standard_effect_moves_what_it_is_of_and_nothing_at_no_size(linear
     assert {"push_gain", "push_rate_limit", "place_bias", "place_delay", "damping", "mass"} <= {
         one.label for one in effects
     }
+    kinds = {"inputs": {one.kind for one in effects if one.family == "input"} - {"stroke"} | {"rate_limit"},
+             "outputs": {one.kind for one in effects if one.family == "output"},
+             "noises": {one.kind for one in noise_effects(vehicle.declared)}}  # fmt: skip
+    assert {what: set(names) for what, names in DERIVED.items()} == kinds
     base = nominal_point(vehicle.declared)
     base.variance = observer.point.variance
     by = observer.filter(0, base)
@@ -152,3 +159,14 @@ def test_errors_of_an_angle_are_counted_through_turns_where_they_are_fitted(tmp_
     rows = np.arange(starts[0] + 1, ends[0])
     assert counted[:, 0] == pytest.approx(turned[rows, 0] / 0.1, nan_ok=True)
     assert np.nanmax(np.abs(observer.errors(0, np.zeros_like(turned), 12.0))) <= np.pi / 0.1
+
+
+def test_a_vehicle_whose_file_leaves_nothing_open_is_watched_and_diagnosed(tmp_path):
+    (tmp_path / "sure.py").write_text(LINEAR.replace("0.4, 0.1)", "0.4, 0.0)").replace("2.0, 0.2)", "2.0, 0.0)"))
+    (tmp_path / "sure.toml").write_text('format = 1\nmodel = "sure"\n[windows]\nseconds = 4.0\n')
+    random, t = np.random.default_rng(1), np.arange(0.0, 12.0, 0.1)
+    runs = [OwnRun(f"run{n}", t, np.ones((len(t), 1)), 0.1 * random.normal(size=(len(t), 1))) for n in range(5)]
+    vehicle = load_own(tmp_path / "sure.toml")
+    assert len(watch(vehicle, runs).plain()["runs"]) > 0
+    found, _ = diagnose_own(vehicle, runs[:2])
+    assert sum(found.chances.values()) == pytest.approx(1.0)
