@@ -13,11 +13,12 @@ on that run, so that an effect has to shrink what it has not seen:
   beside what the label takes, else unknown.
 """
 
-from collections.abc import Callable, Iterable, Sequence, Set
+from collections.abc import Callable, Iterable, Set
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from itertools import combinations
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.special import logsumexp
 from scipy.stats import norm
 from scipy.stats import t as student
@@ -30,17 +31,15 @@ from glider.tools.data.runs import columns
 from glider.tools.data.runs.case import Case
 from glider.tools.data.runs.run import Run
 from glider.tools.diagnose.correction import free_of
+from glider.tools.diagnose.held_out import HeldOutWindows, Linearised
 from glider.tools.diagnose.record import NONE, UNKNOWN
 from glider.tools.gap.corrected import submerged
 from glider.tools.gap.regimes import ALL
 from glider.tools.inference.channels import recorded
 from glider.tools.inference.corrected import LINKS
-from glider.tools.inference.fit import bounded_step
 from glider.tools.inference.model import effect_vector
-from glider.tools.inference.parameters import FreeParameter, effect_parameters, model_at, nuisance_parameters
-from glider.tools.inference.prediction_error import DIFFERENCE_STEP, HORIZONS, PredictionError
-from glider.tools.inference.problem import Gains, Problem, problem_of
-from glider.tools.inference.vehicle_parameters import Parameters
+from glider.tools.inference.parameters import FreeParameter, effect_parameters, nuisance_parameters
+from glider.tools.inference.problem import Problem, problem_of
 
 CAUSE = "cause"
 CHANGED, STRANGE = 0.5, 0.15  # prior probability of a change; that something is left beside what is named
@@ -54,106 +53,42 @@ STANDS_OUT = 2.0  # times what noise leaves of healthy runs, in squares, that th
 TOTAL = "total"
 REFIT_STEPS, REFIT_FURTHER, MAX_EFFECTS = 6, 4, 3  # labels fitted in full at first, beside others, and effects at most
 REFIT_FORMS, MAX_SHAPES = 2, 3  # free forms fitted in full, and shapes of each at most
-STEPS = 3
 SHARES = np.linspace(0.005, 0.995, 100)  # of a change, in amplitude, that its label leaves
 OWN_FORM = norm.pdf(SHARES, scale=FORM) / norm.pdf(SHARES, scale=FORM).sum()
-CONVERGED_SIGMA = 0.02  # sigma of the priors, by which a step moves nothing any more
+FILE_ERROR = 0.2  # of a label's prior, 1 sigma that the vehicle file is off by, before healthy runs say more
+FILE_ERRORS = np.geomspace(0.02, 2.0, 41)
 CONFOUNDED_NAT = 6.0  # nat within which labels are not distinguished
 SELECTED_PROBABILITY = 0.9  # probability of a label that is selected beside something unknown
 
 
-class HeldOutWindows(PredictionError):
-    """Windows of runs with a list of free parameters about a problem's own model."""
+@dataclass(frozen=True)
+class AsUsual:
+    """What the vehicle file is off by, as a label's parameters: normal, in units of their priors."""
 
-    def __init__(self, problem: Problem, free: Sequence[FreeParameter], scales: dict[str, float]):
-        super().__init__(problem, Parameters(list(free), np.zeros(len(free))))
-        self.scales = scales
-
-    def model(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(P, F) at values (n,)."""
-        return model_at(self.problem, self.free.free, values)
-
-    @cached_property
-    def cuts(self) -> list:
-        """The windows, cut in more than one way."""
-        horizon, offsets = HORIZONS[-1]
-        return [self.windows(horizon, offset) for offset in offsets]
-
-    @property
-    def independent(self) -> float:
-        """Residuals that can be independent: one a window and channel."""
-        return float(len(self.cuts[0].first) * len(self.channels))
-
-    def further_columns(
-        self, values: np.ndarray, known: list[np.ndarray], gains: Gains
-    ) -> Iterable[tuple[np.ndarray, np.ndarray]]:
-        """As `columns`, the first ones (known, of every cut) not flown again; gains: of the same model."""
-        n = len(known[0])
-        size = np.where(values + DIFFERENCE_STEP <= self.high, DIFFERENCE_STEP, -DIFFERENCE_STEP)
-        points = [values, *(values + s * row for s, row in zip(size[n:], np.eye(len(values))[n:], strict=True))]
-        Y = self.fly(points, gains, self.cuts)
-        for k, one in enumerate(self.cuts):
-            E = self.residuals(Y[:, k], one)
-            yield E[0], np.concatenate([known[k], (E[1:] - E[0]) / size[n:, None]])
-
-    def linearised(self, values: np.ndarray) -> "Linearised":
-        """Every run's mean square about values (n,)."""
-        return Linearised.gathered(values, self, self.columns(values, self.gains(values), self.cuts))
-
-
-@dataclass
-class Linearised:
-    """Mean squares of runs, value + 2 slope d + d normal d at values + d; over channels, in healthy runs' units."""
-
-    values: np.ndarray  # (n,)
-    value: np.ndarray  # (runs,)
-    slope: np.ndarray  # (runs, n)
-    normal: np.ndarray  # (runs, n, n)
-    windows: HeldOutWindows
-    samples: list[tuple[np.ndarray, ...]]
+    mean: np.ndarray  # (k,)
+    covariance: np.ndarray  # (k, k)
 
     @classmethod
-    def gathered(cls, values: np.ndarray, windows: "HeldOutWindows", cut_columns: Iterable) -> "Linearised":
-        """From (residuals, columns) of every cut."""
-        n, runs = len(values), len(windows.problem.runs)
-        normal, slope, value = np.zeros((runs, n, n)), np.zeros((runs, n)), np.zeros(runs)
-        samples: list[tuple[np.ndarray, ...]] = []
-        for one, (e, J) in zip(windows.cuts, cut_columns, strict=True):
-            weight = windows.weights(e)[0] / len(windows.cuts)
-            run_of, channel_of = windows.origins(one)
-            samples.append((e, J, weight, run_of, channel_of))
-            for run in range(runs):
-                own = np.flatnonzero(run_of == run)
-                weighted = J[:, own] * weight[own]
-                normal[run] += weighted @ J[:, own].T
-                slope[run] += weighted @ e[own]
-                value[run] += float(weight[own] @ e[own] ** 2)
-        return cls(values, value, slope, normal, windows, samples)
+    def learned(cls, precision: np.ndarray, score: np.ndarray) -> "AsUsual":
+        """From what healthy runs say, precision (k, k) and score (k,): the variance is the most probable one with an
+        inverse gamma prior about FILE_ERROR squared, worth one observation."""
+        one = np.eye(len(score))
 
-    def step(self, free: np.ndarray, weight: float, without: int | None = None) -> np.ndarray:
-        """The most probable step (n,) in some of the parameters, by all runs but one; weight of a mean square of 1."""
-        kept = np.arange(len(self.value)) != (-1 if without is None else without)
-        normal = weight * self.normal[kept].sum(axis=0)[np.ix_(free, free)] + np.eye(len(free))
-        slope = weight * self.slope[kept].sum(axis=0)[free] + self.values[free]
-        low, high = self.windows.low - self.values, self.windows.high - self.values
-        step = np.zeros(len(self.values))
-        step[free] = bounded_step(normal, slope, np.minimum(low[free], 0.0), np.maximum(high[free], 0.0))
-        return step
+        def log_posterior(size: float) -> float:
+            ratio = (size / FILE_ERROR) ** 2
+            return log_evidence(precision, score, 0.0 * score, size**2 * one) - 0.5 * (np.log(ratio) + 1.0 / ratio)
 
-    def held_out(self, free: np.ndarray, weight: float) -> tuple[np.ndarray, np.ndarray]:
-        """Mean squares (runs,) of runs left out, and the steps without each, (runs, n)."""
-        runs = len(self.value)
-        steps = np.array([self.step(free, weight, run if runs > 1 else None) for run in range(runs)])
-        left = self.value + 2.0 * (self.slope * steps).sum(axis=1)
-        return left + np.einsum("ri,rij,rj->r", steps, self.normal, steps), steps
+        size = max(FILE_ERRORS, key=log_posterior)
+        covariance = np.linalg.inv(precision + one / size**2)
+        return cls(covariance @ score, covariance)
 
-    def by_channel(self, steps: np.ndarray) -> np.ndarray:
-        """Mean squares (channels,) of runs at their own steps (runs, n), in the units of the residuals."""
-        found = np.zeros(len(self.windows.channels))
-        for e, J, weight, run_of, channel_of in self.samples:
-            at = e + np.einsum("ns,sn->s", J, steps[run_of])
-            found += np.bincount(channel_of, weight * at * at, len(found))
-        return found * len(found)
+
+def log_evidence(precision: np.ndarray, score: np.ndarray, mean: np.ndarray, covariance: np.ndarray) -> float:
+    """Of a normal prior, mean (k,) and covariance (k, k); precision (k, k) and score (k,) of the likelihood about 0."""
+    within = np.eye(len(mean)) + covariance @ precision
+    score = score - precision @ mean
+    gain = score @ np.linalg.solve(within, covariance @ score) + mean @ (2.0 * score + precision @ mean)
+    return 0.5 * float(gain - np.linalg.slogdet(within)[1])
 
 
 @dataclass
@@ -165,6 +100,7 @@ class Healthy:
     count: int  # runs that it is known from
     level: float  # mean of that logarithm
     seen: float  # its scatter from run to run, 1 sigma
+    usual: dict[str, AsUsual] = field(default_factory=dict)  # by label
 
     @property
     def freedom(self) -> float:
@@ -190,22 +126,39 @@ def learn(case: Case, runs: list[Run]) -> Healthy:
     """
     problem = problem_of(case, runs=runs)
     free = nuisance_parameters(problem)
-    every, scales = np.arange(len(free)), dict[str, float]()
+    scales = dict[str, float]()
     form = case.roughie.form.gaps[ALL] if case.roughie.form is not None else {}
     for _ in range(2):  # first in tolerances, then in what the first found
         windows = HeldOutWindows(problem, free, scales)
-        at = windows.linearised(windows.file_values)
-        left, steps = at.held_out(every, windows.independent)
-        measured = np.sqrt(at.by_channel(steps))
+        found = windows.left_out(windows.file_values)
+        measured = np.sqrt(found.channels)
         scales = {
             channel.name: max(float(one) * scales.get(channel.name, 1.0), form.get(channel.name, 0.0), LEAST_SCALE)
             for channel, one in zip(windows.channels, measured, strict=True)
         }
-    run_of = at.samples[0][3]
+    run_of, _ = windows.origins(windows.cuts[0])
     share = np.array([np.mean(run_of == n) for n in range(len(runs))])
-    logs = np.log(np.maximum(left / share, 1e-6))
+    logs = np.log(np.maximum(found.runs / share, 1e-6))
     level, scatter = float(np.log(np.exp(logs).mean())), float(logs.std(ddof=1)) if len(logs) > 1 else USUAL_SCATTER
-    return Healthy([run.name for run in runs], scales, len(runs), level, scatter)
+    healthy = Healthy([run.name for run in runs], scales, len(runs), level, scatter)
+    places, every = places_of(problem, free)
+    windows = HeldOutWindows(problem, every, scales, healthy.independent * len(runs))
+    at = windows.linearised(windows.clipped(np.pad(found.values, (0, len(every) - len(free)))))
+    weight = windows.independent(windows.cuts) / max(float(at.value.sum()), 1.0)
+    nuisance = np.arange(len(free))
+    for label, own in places.items():
+        precision, score = at.information(nuisance, own, weight)
+        healthy.usual[label] = AsUsual.learned(precision, score)
+    return healthy
+
+
+def places_of(problem: Problem, nuisance: list[FreeParameter]) -> tuple[dict[str, np.ndarray], list[FreeParameter]]:
+    """Places of each label's parameters behind the nuisance parameters, and all of them."""
+    free, places = list(nuisance), dict[str, np.ndarray]()
+    for label, own in effect_parameters(problem).items():
+        places[label] = np.arange(len(free), len(free) + len(own))
+        free += own
+    return places, free
 
 
 def of_form(form: FormTable) -> Healthy:
@@ -251,6 +204,8 @@ class HealthyHypothesis:
     others: np.ndarray  # (runs, n) values without each run
     sigma: np.ndarray  # (n,) posterior standard deviations, 0 of what is not free
     form: FreeForm | None = None
+    covariance: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # of the labels' parameters, one by one
+    as_usual: float = 0.0  # log evidence of labels that are as healthy runs have them, no change, over their change
 
     @property
     def name(self) -> str:
@@ -276,7 +231,7 @@ class Comparison:
     bare: float = 1.0  # mean square of runs left out without a change
 
     def __post_init__(self) -> None:
-        self.windows = HeldOutWindows(self.problem, self.free, self.healthy.scales)
+        self.windows = self.windows_of(self.free)
 
     def columns_of(self, labels: Iterable[str]) -> np.ndarray:
         """Places of what is free under labels."""
@@ -285,72 +240,76 @@ class Comparison:
     @property
     def independent(self) -> float:
         """Independent residuals of the case's runs."""
-        return min(self.healthy.independent * len(self.problem.runs), self.windows.independent)
+        return self.windows.independent(self.windows.cuts)
 
     def weight(self, mean_square: float) -> float:
         """Of a mean square of 1: as many independent residuals, of what is there where that is more than usual."""
         return self.independent / max(mean_square, 1.0)
 
-    def windows_of(self, labels: tuple[str, ...], form: FreeForm | None = None) -> HeldOutWindows:
-        """Windows with what is free under labels, and behind it the coefficients of a free form."""
-        free, problem = [self.free[k] for k in self.columns_of(labels)], self.problem
+    def windows_of(self, free: list[FreeParameter], form: FreeForm | None = None) -> HeldOutWindows:
+        """Windows with what is free, and behind it the coefficients of a free form."""
+        problem, healthy = self.problem, self.healthy
         if form is not None:
             F = effect_vector(problem.model)
             F[ef.LINK] = 1.0 + LINKS.index(form.link)
-            problem = replace(problem, model=replace(problem.model, F=F))
-        return HeldOutWindows(problem, free + (form.free if form else []), self.healthy.scales)
+            problem, free = replace(problem, model=replace(problem.model, F=F)), [*free, *form.free]
+        return HeldOutWindows(problem, free, healthy.scales, healthy.independent * len(problem.runs))
 
-    def fitted(
-        self, labels: tuple[str, ...], begin: np.ndarray, form: FreeForm | None = None
-    ) -> HealthyHypothesis | None:
-        """Labels led from values (n,) to where they are most probable; None where their flights are lost."""
-        free, own = self.columns_of(labels), self.windows_of(labels, form)
-        every = np.arange(len(own.low))
-        values = own.clipped(np.concatenate([begin[free], np.zeros(len(every) - len(free))]))
-        best: tuple[float, np.ndarray, Linearised] | None = None
-        for _ in range(STEPS):
-            at = own.linearised(values)
-            cost = float(at.value.sum())
-            if not np.isfinite(cost):
-                break
-            if best is not None and cost + values @ values / self.independent >= best[0]:
-                values = 0.5 * (values + best[1])
-                continue
-            best = cost + float(values @ values) / self.independent, values, at
-            step = at.step(every, self.weight(cost))
-            if np.abs(step).max(initial=0.0) < CONVERGED_SIGMA:
-                break
-            values = own.clipped(values + step)
-        if best is None:
-            return None
-        _, values, at = best
-        weight = self.weight(float(at.value.sum()))
-        left, steps = at.held_out(every, weight)
-        count, sd = len(self.free), np.zeros(len(self.free))
-        known = slice(len(free))  # the coefficients of a free form are no parameters of the answer
-        sd[free] = np.sqrt(np.diag(np.linalg.inv(weight * at.normal.sum(axis=0) + np.eye(len(every)))))[known]
-        whole, others = np.zeros(count), np.zeros((len(left), count))
-        whole[free], others[:, free] = (values + at.step(every, weight))[known], (values + steps)[:, known]
-        return HealthyHypothesis(labels, whole, left, others, sd, form)
+    def fitted(self, labels: tuple[str, ...], begin: np.ndarray, form: FreeForm | None = None) -> HealthyHypothesis:
+        """Labels, and a free form, led from values (n,) to where they are most probable."""
+        places = self.columns_of(labels)
+        own = self.windows_of([self.free[k] for k in places], form)
+        found = own.left_out(np.concatenate([begin[places], np.zeros(len(own.low) - len(places))]))
+        known, count = slice(len(places)), len(self.free)  # the coefficients of a free form are none of the answer
+        values, others, sd = np.zeros(count), np.zeros((len(found.runs), count)), np.zeros(count)
+        values[places], others[:, places] = found.values[known], found.others[:, known]
+        covariance = np.linalg.inv(found.precision)
+        sd[places] = np.sqrt(np.diag(covariance))[known]
+        of_labels = slice(len(self.nuisance), len(places))
+        return HealthyHypothesis(labels, values, found.runs, others, sd, form, covariance[of_labels, of_labels])
+
+    def last_as_usual(self, one: HealthyHypothesis) -> float:
+        """Log predictive density of a hypothesis without a form, its last label as healthy runs show it."""
+        without = [self.nat(other) + other.as_usual for other in self.without_change(one)
+                   if other.labels == one.labels[:-1]]  # fmt: skip
+        return max(without, default=-np.inf)
+
+    def without_change(self, one: HealthyHypothesis) -> list[HealthyHypothesis]:
+        """The same fit, some of its labels or all as healthy runs show them: no change of those."""
+        found = list[HealthyHypothesis]()
+        label_of = np.repeat(one.labels, [len(self.places[label]) for label in one.labels])
+        values = [one.values[self.places[label]] for label in one.labels]
+        for count in range(1, len(one.labels) + 1):
+            for usual in combinations([label for label in one.labels if label in self.healthy.usual], count):
+                own = np.flatnonzero(np.isin(label_of, usual))
+                inverse = np.linalg.inv(one.covariance[np.ix_(own, own)])
+                precision, score = inverse - np.eye(len(own)), inverse @ np.concatenate(values)[own]
+                known = [self.healthy.usual[label] for label in one.labels if label in usual]
+                mean, covariance = np.concatenate([k.mean for k in known]), block_diag(*(k.covariance for k in known))
+                gain = log_evidence(precision, score, mean, covariance)
+                gain -= log_evidence(precision, score, 0.0 * mean, np.eye(len(own)))
+                rest = tuple(label for label in one.labels if label not in usual)
+                found.append(replace(one, labels=rest, as_usual=gain))
+        return found
 
     def free_forms(self, begin: HealthyHypothesis) -> list[FreeForm]:
         """Errors of free form beside a hypothesis, those that promise most first: at each link shapes are added while
         they bring more than the choice among them costs."""
-        own, found = self.windows_of(begin.labels), []
-        values = own.clipped(begin.values[self.columns_of(begin.labels)])
+        places, found = self.columns_of(begin.labels), []
+        own = self.windows_of([self.free[k] for k in places])
+        values = own.clipped(begin.values[places])
         bare, n, gains = own.linearised(values), len(values), own.gains(values)
-        weight, columns = self.weight(begin.mean_square), [one[1] for one in bare.samples]
         for link in LINKS:
             shapes = [one.name for one in free_of(link)]
-            whole = self.windows_of(begin.labels, FreeForm(link, tuple(shapes)))
+            whole = self.windows_of([self.free[k] for k in places], FreeForm(link, tuple(shapes)))
             start = np.concatenate([values, np.zeros(len(shapes))])
-            at = Linearised.gathered(start, whole, whole.further_columns(start, columns, gains))
-            chosen, best = list[int](), self.nat_of(float(bare.held_out(np.arange(n), weight)[0].sum()))
+            at = Linearised.gathered(start, whole, whole.further_columns(start, bare.columns, gains))
+            chosen, best = list[int](), self.expected(bare, np.arange(n), begin)[0]
             while len(chosen) < MAX_SHAPES:
                 tried = []
                 for k in set(range(len(shapes))) - set(chosen):
                     free = np.concatenate([np.arange(n), n + np.array([*chosen, k])])
-                    tried.append((self.nat_of(float(at.held_out(free, weight)[0].sum())), k))
+                    tried.append((self.expected(at, free, begin)[0], k))
                 nat, k = max(tried)
                 if nat - np.log(ef.N_SHAPES) <= best:
                     break
@@ -359,16 +318,21 @@ class Comparison:
                 found.append((best, FreeForm(link, tuple(shapes[k] for k in chosen))))
         return [form for _, form in sorted(found, key=lambda one: -one[0])]
 
-    def predicted_gain(self, begin: HealthyHypothesis) -> list[tuple[float, str, np.ndarray]]:
-        """Labels beside a hypothesis by one linear step, best first: mean square of runs left out, label, values."""
-        at, found = self.windows.linearised(self.windows.clipped(begin.values)), []
-        weight = self.weight(begin.mean_square)
-        for label in self.places:
-            if label not in begin.labels:
-                free = self.columns_of((*begin.labels, label))
-                left = float(at.held_out(free, weight)[0].sum())
-                found.append((left, label, at.values + at.step(free, weight)))
-        return sorted(found, key=lambda one: one[0])
+    def expected(self, at: Linearised, free: np.ndarray, begin: HealthyHypothesis) -> tuple[float, np.ndarray]:
+        """Log evidence of what is free, by one linear step from a hypothesis, and where that step leads."""
+        objective, occam, step = at.expected(free, self.weight(begin.mean_square))
+        return self.nat_of(objective) - occam, at.values + step
+
+    def expected_labels(self, begin: HealthyHypothesis) -> list[tuple[float, str, np.ndarray]]:
+        """Labels beside a hypothesis by one linear step, the most probable first: log evidence, label, values."""
+        at = self.windows.linearised(self.windows.clipped(begin.values))
+        found = [
+            (nat, label, values)
+            for label in self.places
+            if label not in begin.labels
+            for nat, values in [self.expected(at, self.columns_of((*begin.labels, label)), begin)]
+        ]
+        return sorted(found, key=lambda one: -one[0])
 
     def nat(self, one: HealthyHypothesis) -> float:
         """Log predictive density of runs left out, their scale known from so many healthy runs only."""
@@ -447,19 +411,23 @@ class Weighed:
 
 
 def weigh(compared: Comparison, listed: list[HealthyHypothesis]) -> Weighed:
-    """The posterior's weights; what does not shrink the gap of runs left out is none."""
-    alone, beside = [], []
+    """The posterior's weights; what does not shrink the gap of runs left out is none.
+
+    What healthy runs show of labels, too, is no change: of such fits, and of that without the labels, the most
+    probable stands for what is left of the labels.
+    """
+    weights = dict[tuple[tuple[str, ...], FreeForm | None], tuple[float, float, HealthyHypothesis]]()
     nothing = listed[0]
     kept = [nothing, *(one for one in listed[1:] if one.mean_square < nothing.mean_square)]
-    for one in kept:
+    usual_ones = [other for one in kept if one.form is None for other in compared.without_change(one)]
+    for one in [*kept, *usual_ones]:
         usual, more = compared.leftover(one)
         usual, more = usual + float(np.log1p(-STRANGE)), more + float(np.log(STRANGE))
-        at, either = compared.nat(one), float(np.logaddexp(usual, more))
+        at, either = compared.nat(one) + one.as_usual, float(np.logaddexp(usual, more))
         if one.form is not None:
             at += one.form.prior
         if one.form is not None and not one.labels:
-            alone.append(-np.inf)
-            beside.append(at + float(np.log(CHANGED * STRANGE)) + either)
+            weights[one.labels, one.form] = -np.inf, at + float(np.log(CHANGED * STRANGE)) + either, one
             continue
         at += float(len(one.labels) * np.log(CHANGED / len(compared.places)) if one.labels else np.log1p(-CHANGED))
         if one.form is not None:  # its label's own form, or something unknown
@@ -468,33 +436,33 @@ def weigh(compared: Comparison, listed: list[HealthyHypothesis]) -> Weighed:
             own, other = norm.logpdf(share, scale=FORM) + np.log(2.0 * (1.0 - STRANGE)), np.log(STRANGE)
             more = float(np.logaddexp(usual + other, more))
             usual += float(own)
-        alone.append(at + usual)
-        beside.append(at + more)
-    return Weighed(kept, alone, beside)
+        before = weights.get((one.labels, one.form))
+        if before is None or np.logaddexp(*before[:2]) < at + np.logaddexp(usual, more):
+            weights[one.labels, one.form] = at + usual, at + more, one
+    alone, beside, those = (list(column) for column in zip(*weights.values(), strict=True))
+    return Weighed(those, alone, beside)
 
 
 def hypotheses(compared: Comparison, say: Callable[[str], None]) -> list[HealthyHypothesis]:
     """No change, the labels that promise most, and further ones beside the best while they bring more than chance."""
     nothing = compared.fitted((), np.zeros(len(compared.free)))
-    if nothing is None:
-        raise InputError("the identified vehicle does not fly these runs", source=compared.problem.case.folder)
     compared.bare = nothing.mean_square
     say(f"no change: {nothing.mean_square:.2f} times what healthy runs leave")
     odds, listed, best = float(np.log(CHANGED / len(compared.places))), [nothing], nothing
     while len(best.labels) < MAX_EFFECTS:
-        predicted_gain = compared.predicted_gain(best)[: REFIT_FURTHER if best.labels else REFIT_STEPS]
-        found = [compared.fitted((*best.labels, label), values) for _, label, values in predicted_gain]
-        there = [one for one in found if one is not None]
-        listed += there
-        leading = max(there, key=compared.nat, default=best)
-        if compared.nat(leading) + odds <= compared.nat(best):
+        likely = compared.expected_labels(best)[: REFIT_FURTHER if best.labels else REFIT_STEPS]
+        found = [compared.fitted((*best.labels, label), values) for _, label, values in likely]
+        listed += found
+        bare = compared.nat(best)
+        changes = [one for one in found if compared.nat(one) + odds > max(bare, compared.last_as_usual(one))]
+        if not changes:
             break
-        best = leading
+        best = max(changes, key=compared.nat)
         say(f"{', '.join(best.labels)}: {best.mean_square:.2f} times")
     for one in [nothing, best] if best.labels else [nothing]:
         for form in compared.free_forms(one)[:REFIT_FORMS]:
             free = compared.fitted(one.labels, one.values, form)
-            if free is not None and free.mean_square < one.mean_square:
+            if free.mean_square < one.mean_square:
                 listed.append(free)
                 say(f"{free.name}: {free.mean_square:.2f} times")
     return listed
@@ -545,11 +513,8 @@ def diagnose_against_healthy(
     else:
         raise InputError("no healthy runs, and a vehicle without [form]", source=case.folder)
     problem = problem_of(case)
-    nuisance, effects = nuisance_parameters(problem), effect_parameters(problem)
-    free, places = list(nuisance), dict[str, np.ndarray]()
-    for label, own in effects.items():
-        places[label] = np.arange(len(free), len(free) + len(own))
-        free += own
+    nuisance = nuisance_parameters(problem)
+    places, free = places_of(problem, nuisance)
     compared = Comparison(problem, healthy, free, places, np.arange(len(nuisance)))
     listed = hypotheses(compared, say)
     weighed = weigh(compared, listed)

@@ -197,10 +197,13 @@ class PredictionError:
             E = self.residuals(Y[:, n], one)
             yield E[0], (E[1:] - E[0]) / size[:, None]
 
-    def descend(self, values: np.ndarray, horizon: float, offsets: tuple[float, ...], steps: int) -> Fitted:
-        """Levenberg and Marquardt's steps at one horizon, limits kept."""
-        cuts = [self.windows(horizon, offset) for offset in offsets]
-        independent = float(len(cuts[0].first) * len(self.channels))
+    def independent(self, cuts: list[Windows]) -> float:
+        """Residuals of windows that count as independent: one for each window and channel."""
+        return float(len(cuts[0].first) * len(self.channels))
+
+    def led(self, values: np.ndarray, cuts: list[Windows], steps: int) -> tuple[np.ndarray, float, Gains]:
+        """Levenberg and Marquardt's steps on windows, limits kept: the values, their cost, and the observer's gains."""
+        independent = self.independent(cuts)
         cost, gains = self.cost(values, cuts)
         damping, n = 1e-2, len(values)
         held = max(cost, 1.0) / independent  # weight of the prior
@@ -224,8 +227,15 @@ class PredictionError:
             held = max(cost, 1.0) / independent
             if fall < CONVERGED_SHARE * objective:
                 break
+        return values, cost, gains
+
+    def descend(self, values: np.ndarray, horizon: float, offsets: tuple[float, ...], steps: int) -> Fitted:
+        """The same at one horizon, and what is known of the values there."""
+        cuts = [self.windows(horizon, offset) for offset in offsets]
+        values, cost, gains = self.led(values, cuts, steps)
+        independent = self.independent(cuts)
         normal, _ = self.linear(values, gains, cuts)
-        return Fitted(values, cost, normal / held + np.eye(n), independent)
+        return Fitted(values, cost, normal * independent / max(cost, 1.0) + np.eye(len(values)), independent)
 
     def draws(self) -> list[np.ndarray]:
         """Some draws of the prior."""

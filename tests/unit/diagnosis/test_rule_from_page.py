@@ -3,12 +3,13 @@
 Compared with the program on ten small cases: tables of hypotheses with the mean squares that they leave.
 """
 
+import itertools
 import math
 
 import numpy as np
 import pytest
 
-from glider.tools.diagnose.against_healthy import Comparison, FreeForm, Healthy, HealthyHypothesis, weigh
+from glider.tools.diagnose.against_healthy import AsUsual, Comparison, FreeForm, Healthy, HealthyHypothesis, weigh
 from glider.tools.inference.corrected import LINKS
 
 EFFECTS = 46  # M
@@ -25,20 +26,30 @@ def normal(x, sigma):
     return np.exp(-0.5 * np.square(x / sigma)) / (sigma * math.sqrt(2 * math.pi))
 
 
-def by_the_page(n, level, s, runs, most, table):
-    """Probabilities of the main causes: table of (effects, shapes of the free form, mean square q)."""
+def evidence(mu, sigma, precision, score):
+    """E of the page, of one parameter."""
+    g = score - precision * mu
+    return 0.5 * (g**2 / (1 / sigma + precision) + mu * (2 * g + precision * mu) - math.log(1 + sigma * precision))
+
+
+def by_the_page(n, level, s, runs, most, table, usual):
+    """Probabilities of the main causes.
+
+    table: (effects, shapes of the free form, mean square q, mean and standard deviation of each effect's parameter).
+    usual: by effect the mean and variance of what the file is off by.
+    """
     nu = n
     scatter2 = ((n - 1) * s**2 + 0.5**2) / nu
     N = min(2 * runs / scatter2, most)
     tau = math.sqrt(scatter2 * (1 / n + 1 / runs) + 0.25**2)
-    q0 = next(q for effects, k, q in table if not effects and not k)
-    S, known, unknown = 0.15, {}, 0.0
-    for effects, k, q in table:
-        if (effects or k) and q >= q0:
-            continue
-        A = -0.5 * (nu + N) * math.log(1 + N * q / nu)
+    q0 = next(q for effects, k, q, _ in table if not effects and not k)
+    S, best = 0.15, {}
 
-        def z(x, q=q):
+    def log_weights(effects, k, q, gain):
+        """Those of what is known, and of what is not."""
+        A = -0.5 * (nu + N) * math.log(1 + N * q / nu) + gain
+
+        def z(x):
             return (math.log(q) - np.log(x)) / tau
 
         if effects:
@@ -52,20 +63,34 @@ def by_the_page(n, level, s, runs, most, table):
             u = float(student(max(0.0, float(z(math.exp(level)))), nu))
             m = (2 * normal(y, 1.5) * student(z(np.exp(level + y)), nu)).sum() * (y[1] - y[0])
         u, m, C = u * (1 - S), m * S, 18.0 ** -(k > 0) * 11.0**-k
-        own = math.exp(A) * C * ((0.5 / EFFECTS) ** len(effects) if effects else 0.5)
-        name = effects[0] if effects else "none"
+        own = C * ((0.5 / EFFECTS) ** len(effects) if effects else 0.5)
         if k and not effects:
-            unknown += own * S * (u + m)
-        elif k:
-            q_j = next(q for other, shapes, q in table if other == effects and not shapes)
+            return -math.inf, A + math.log(own * S * (u + m))
+        if k:
+            q_j = next(q for other, shapes, q, _ in table if other == effects and not shapes)
             r = math.sqrt(min(max((q_j - q) / (q0 - q), 0.0), 1.0))
-            known[name] = known.get(name, 0.0) + own * u * 2 * (1 - S) * normal(r, 0.2)
-            unknown += own * (S * u + m)
-        else:
-            known[name] = known.get(name, 0.0) + own * u
-            unknown += own * m
-    whole = sum(known.values()) + unknown
-    return {name: value / whole for name, value in known.items()} | {"unknown": unknown / whole}
+            return A + math.log(own * u * 2 * (1 - S) * normal(r, 0.2)), A + math.log(own * (S * u + m))
+        return A + math.log(own * u), A + math.log(own * m)
+
+    for effects, k, q, fits in table:
+        if (effects or k) and q >= q0:
+            continue
+        known = [e for e in effects if e in usual and not k]
+        for unchanged in (c for j in range(len(known) + 1) for c in itertools.combinations(known, j)):
+            gain = 0.0
+            for e in unchanged:
+                mean, sd = fits[effects.index(e)]
+                precision, score = 1 / sd**2 - 1, mean / sd**2
+                gain += evidence(*usual[e], precision, score) - evidence(0.0, 1.0, precision, score)
+            rest = tuple(e for e in effects if e not in unchanged)
+            one = log_weights(rest, k, q, gain)
+            best[rest, k] = max(best.get((rest, k), one), one, key=lambda pair: np.logaddexp(*pair))
+    found = {"unknown": 0.0}
+    for (effects, _), (known, unknown) in best.items():
+        name = effects[0] if effects else "none"
+        found[name] = found.get(name, 0.0) + math.exp(known)
+        found["unknown"] += math.exp(unknown)
+    return {name: value / sum(found.values()) for name, value in found.items()}
 
 
 class Given(Comparison):
@@ -73,25 +98,29 @@ class Given(Comparison):
 
     def __init__(self, healthy: Healthy, runs: int, most: float, bare: float):
         self.healthy, self.runs, self.most, self.bare = healthy, runs, most, bare
-        self.places = {f"e{n}": np.zeros(1, dtype=int) for n in range(EFFECTS)}
+        self.nuisance = np.zeros(0, dtype=int)
+        self.places = {f"e{n}": np.array([n]) for n in range(EFFECTS)}
 
     @property
     def independent(self) -> float:
         return min(self.healthy.independent * self.runs, self.most)
 
 
-def by_the_program(n, level, s, runs, most, table):
-    def hypothesis(effects, k, q):
-        form = FreeForm(LINKS[0], SHAPES[:k]) if k else None
-        nothing = np.zeros(1)
-        return HealthyHypothesis(effects, nothing, np.full(runs, q / runs), np.zeros((runs, 1)), nothing, form)
+def by_the_program(n, level, s, runs, most, table, usual):
+    def hypothesis(effects, k, q, fits):
+        values, sd = np.zeros(EFFECTS), np.array([one[1] for one in fits])
+        values[[int(e[1:]) for e in effects]] = [one[0] for one in fits]
+        form, nothing = FreeForm(LINKS[0], SHAPES[:k]) if k else None, np.zeros(EFFECTS)
+        others, left = np.zeros((runs, EFFECTS)), np.full(runs, q / runs)
+        return HealthyHypothesis(effects, values, left, others, nothing, form, np.diag(sd**2))
 
-    healthy = Healthy([f"run{i}" for i in range(n)], {}, n, level, s)
+    off = {label: AsUsual(np.array([mean]), np.array([[variance]])) for label, (mean, variance) in usual.items()}
+    healthy = Healthy([f"run{i}" for i in range(n)], {}, n, level, s, off)
     return weigh(Given(healthy, runs, most, table[0][2]), [hypothesis(*row) for row in table]).probabilities()
 
 
 def case(seed):
-    """A small case: healthy flights, and hypotheses that leave drawn mean squares."""
+    """A small case: healthy flights, hypotheses that leave drawn mean squares, and what the file is off by."""
     rng = np.random.default_rng(seed)
     q0 = float(np.exp(rng.uniform(0.0, 3.0)))
     share = np.append(rng.uniform(0.1, 0.95, 1), rng.uniform(0.1, 1.1, 5))
@@ -100,7 +129,10 @@ def case(seed):
         ((), 2, q0 * share[3]), (("e1",), 1, q0 * share[0] * share[4] / 1.1), (("e4",), 0, q0 * share[5]),
     ]  # fmt: skip
     runs, healthy = int(rng.integers(2, 7)), int(rng.integers(3, 13))
-    return healthy, rng.normal(0.0, 0.1), rng.uniform(0.2, 0.9), runs, rng.uniform(15.0, 200.0), table
+    head = healthy, rng.normal(0.0, 0.1), rng.uniform(0.2, 0.9), runs, rng.uniform(15.0, 200.0)
+    usual = {e: (rng.normal(0.0, 0.3), rng.uniform(0.01, 0.1)) for e in ("e1", "e3", "e4")}
+    fits = {e: (rng.normal(0.0, 0.8), rng.uniform(0.1, 0.7)) for e in ("e1", "e2", "e3", "e4")}
+    return *head, [(*row, [fits[e] for e in row[0]]) for row in table], usual
 
 
 def test_the_page_has_the_programs_number_of_links():
@@ -117,3 +149,10 @@ def test_the_rule_of_the_page_is_the_programs(seed):
 def test_the_ten_cases_have_more_than_one_verdict():
     verdicts = [max(found, key=found.get) for found in (by_the_page(*case(seed)) for seed in range(10))]
     assert len(set(verdicts)) > 1
+
+
+def test_what_healthy_flights_show_of_an_effect_is_no_change():
+    *head, table, _ = case(0)
+    table = [((), 0, 0.44, []), (("e1",), 0, 0.39, [(0.33, 0.13)])]
+    shown, not_shown = (by_the_program(*head, table, {"e1": off}) for off in ((0.3, 0.02), (0.0, 0.001)))
+    assert not_shown["e1"] > 5.0 * shown["e1"]
