@@ -21,7 +21,6 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.special import logsumexp
 from scipy.stats import norm
-from scipy.stats import t as student
 
 from glider.firmware.model.vehicle import FormTable
 from glider.sim_backend.core.effects import effect_layout as ef
@@ -37,17 +36,13 @@ from glider.tools.gap.corrected import submerged
 from glider.tools.gap.regimes import ALL
 from glider.tools.inference.channels import recorded
 from glider.tools.inference.corrected import LINKS
+from glider.tools.inference.healthy_level import CHANGED, FORM, USUAL_SCATTER, HealthyLevel
 from glider.tools.inference.model import effect_vector
 from glider.tools.inference.parameters import FreeParameter, effect_parameters, nuisance_parameters
 from glider.tools.inference.problem import Problem, problem_of
 
 CAUSE = "cause"
-CHANGED, STRANGE = 0.5, 0.15  # prior probability of a change; that something is left beside what is named
-LEFT = 1.5  # 1 sigma of the logarithm of the mean square that something unknown leaves, times what healthy runs leave
-FORM = 0.2  # of a change, 1 sigma in amplitude, that is not as its label's equations have it
-SITE = 0.25  # 1 sigma of that logarithm from one place and way of flying to another
-PRIOR_RUNS = 1.0  # runs that what is usual of that logarithm's scatter is worth
-USUAL_SCATTER = 0.5
+STRANGE = 0.15  # prior probability that something is left beside what is named
 LEAST_SCALE = 0.05  # tolerances
 STANDS_OUT = 2.0  # times what noise leaves of healthy runs, in squares, that the form leaves of them: the form decides
 TOTAL = "total"
@@ -92,31 +87,12 @@ def log_evidence(precision: np.ndarray, score: np.ndarray, mean: np.ndarray, cov
 
 
 @dataclass
-class Healthy:
+class Healthy(HealthyLevel):
     """What healthy runs leave: by channel in tolerances, and the logarithm of a run's mean square in those units."""
 
-    runs: list[str]  # empty where the vehicle file alone says it
-    scales: dict[str, float]
-    count: int  # runs that it is known from
-    level: float  # mean of that logarithm
-    seen: float  # its scatter from run to run, 1 sigma
+    scales: dict[str, float] = field(default_factory=dict)
+    runs: list[str] = field(default_factory=list)  # empty where the vehicle file alone says it
     usual: dict[str, AsUsual] = field(default_factory=dict)  # by label
-
-    @property
-    def freedom(self) -> float:
-        """Degrees of freedom of the logarithms' scatter."""
-        return self.count - 1 + PRIOR_RUNS
-
-    @property
-    def scatter(self) -> float:
-        """1 sigma of the logarithm from run to run, with what is usual as so many runs more."""
-        squares = (self.count - 1) * self.seen**2 + PRIOR_RUNS * USUAL_SCATTER**2
-        return float(np.sqrt(squares / self.freedom))
-
-    @property
-    def independent(self) -> float:
-        """Independent residuals of a run: of so many the mean square has this scatter (chi-squared)."""
-        return 2.0 / self.scatter**2
 
 
 def learn(case: Case, runs: list[Run]) -> Healthy:
@@ -140,7 +116,7 @@ def learn(case: Case, runs: list[Run]) -> Healthy:
     share = np.array([np.mean(run_of == n) for n in range(len(runs))])
     logs = np.log(np.maximum(found.runs / share, 1e-6))
     level, scatter = float(np.log(np.exp(logs).mean())), float(logs.std(ddof=1)) if len(logs) > 1 else USUAL_SCATTER
-    healthy = Healthy([run.name for run in runs], scales, len(runs), level, scatter)
+    healthy = Healthy(len(runs), level, scatter, scales, [run.name for run in runs])
     places, every = places_of(problem, free)
     windows = HeldOutWindows(problem, every, scales, healthy.independent * len(runs))
     at = windows.linearised(windows.clipped(np.pad(found.values, (0, len(every) - len(free)))))
@@ -164,7 +140,7 @@ def places_of(problem: Problem, nuisance: list[FreeParameter]) -> tuple[dict[str
 def of_form(form: FormTable) -> Healthy:
     """The same as identification wrote it into the vehicle file."""
     scales = {name: max(gap, LEAST_SCALE) for name, gap in form.gaps[ALL].items() if name != TOTAL}
-    return Healthy([], scales, form.runs, 0.0, form.scatter)
+    return Healthy(form.runs, 0.0, form.scatter, scales)
 
 
 def form_stands_out(case: Case) -> bool:
@@ -349,18 +325,13 @@ class Comparison:
         What a label leaves is a share of the change, in amplitude: half-normal by FORM where the label is right, any
         from 0 to 1 where it stands in for something unknown.
         """
-        healthy = self.healthy
-        scale = np.sqrt(healthy.scatter**2 * (1.0 / healthy.count + 1.0 / len(one.left)) + SITE**2)
-        at, usual = np.log(max(one.mean_square, 1e-9)), np.exp(healthy.level)
+        healthy, scale = self.healthy, self.healthy.scale(len(one.left))
+        at, usual = float(np.log(max(one.mean_square, 1e-9))), np.exp(healthy.level)
         if not one.labels:
-            shifts = np.linspace(0.0, 4.0 * LEFT, 121)
-            prior = 2.0 * norm.pdf(shifts, scale=LEFT) * (shifts[1] - shifts[0])
-            nothing = float(student.logpdf(max(at - healthy.level, 0.0) / scale, healthy.freedom))
-            more = student.logpdf((at - healthy.level - shifts) / scale, healthy.freedom)
-            return nothing, float(logsumexp(more, b=prior))
+            return healthy.unchanged(at, scale)
         away = (at - np.log(usual + SHARES**2 * max(self.bare - usual, 0.0))) / scale
-        nothing = float(logsumexp(student.logpdf(np.maximum(away, 0.0), healthy.freedom), b=OWN_FORM))
-        return nothing, float(logsumexp(student.logpdf(away, healthy.freedom), b=1.0 / len(SHARES)))
+        nothing = float(logsumexp(healthy.at_most(away), b=OWN_FORM))
+        return nothing, float(logsumexp(healthy.at(away), b=1.0 / len(SHARES)))
 
     def share(self, one: HealthyHypothesis, free: HealthyHypothesis) -> float:
         """Of the change, in amplitude, what a free form takes beside a hypothesis."""

@@ -14,8 +14,10 @@ from itertools import product
 import numpy as np
 from scipy.special import logsumexp
 from scipy.stats import norm
-from scipy.stats import t as student
 
+from glider.tools.inference.healthy_level import CHANGED, HealthyLevel
+from glider.tools.inference.healthy_level import FORM as FORM_SHARE
+from glider.tools.inference.healthy_level import USUAL_SCATTER as USUAL_LEVEL_SCATTER
 from glider.tools.own.declare import RUN
 from glider.tools.own.effects import (
     FORM,
@@ -37,14 +39,11 @@ from glider.tools.own.observer import Observer
 
 NONE, UNKNOWN = "none", "unknown"
 SIZES = NOISE_SIZES  # tolerances, rms over the windows
-CHANGED = 0.5  # prior probability that anything changed
 ANOTHER = 0.1  # that a further effect stands beside one
 # prior odds of a label to one of an input or an output: what is fixed of a vehicle changes less often than what is
 # commanded and read; a constant force that no label has, seldom
 FAMILY_ODDS = {PARAMETER: 0.5, NOISE: 0.5, PUSH: 0.1}
 STRANGE = 0.1  # that more is left than a hypothesis says
-LEFT, SITE, USUAL_LEVEL_SCATTER, PRIOR_RUNS = 1.5, 0.25, 0.5, 1.0  # e-folds of the mean square left (docs)
-FORM_SHARE = 0.2  # of a change, 1 sigma, that is not as its label's equations have it
 FORM_SHARES = (0.0, FORM_SHARE)  # as probable before the data
 MATERIAL = 0.1  # tolerances: a smaller effect is no gap (docs/reference/gap.md)
 NOISES_TRIED = 3  # labels of noises beside a hypothesis
@@ -461,17 +460,12 @@ class Engine:
 
     def strange_odds(self, one: Hypothesis, nothing: Hypothesis) -> float:
         """Log evidence that more is left than a hypothesis says, over that it is what healthy runs leave."""
-        healthy = self.healthy
-        freedom = healthy.runs - 1 + PRIOR_RUNS
-        squares = (healthy.runs - 1) * healthy.level_scatter**2 + PRIOR_RUNS * USUAL_LEVEL_SCATTER**2
-        scale = np.sqrt(squares / freedom * (1.0 / healthy.runs + 1.0 / len(one.left)) + SITE**2)
+        level = HealthyLevel(self.healthy.runs, 0.0, self.healthy.level_scatter)
+        scale, at = level.scale(len(one.left)), float(np.log(max(one.left.mean(), 1e-9)))
         if one.labels:
             scale = float(np.hypot(scale, np.log1p(FORM_SHARE**2 * max(nothing.left.mean() - one.left.mean(), 0.0))))
-        at = float(np.log(max(one.left.mean(), 1e-9)))
-        shifts = np.linspace(0.0, 4.0 * LEFT, 121)
-        prior = 2.0 * norm.pdf(shifts, scale=LEFT) * (shifts[1] - shifts[0])
-        less = float(student.logpdf(max(at, 0.0) / scale, freedom))
-        return float(logsumexp(student.logpdf((at - shifts) / scale, freedom), b=prior)) - less
+        usual, more = level.unchanged(at, scale)
+        return more - usual
 
     def _posterior(self, every: list[Hypothesis]) -> Posterior:
         # of every label what healthy runs show of it is no change

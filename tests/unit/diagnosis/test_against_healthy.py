@@ -150,7 +150,7 @@ def test_healthy_runs_are_seen_as_the_case_is(place):
 def compared(logs: list[float], places: int = 40) -> Comparison:
     """A comparison that nothing is flown for."""
     found = object.__new__(Comparison)
-    found.healthy = Healthy([], {}, len(logs), 0.0, float(np.std(logs, ddof=1)))
+    found.healthy = Healthy(len(logs), 0.0, float(np.std(logs, ddof=1)))
     found.places = {f"label{n}": np.array([n]) for n in range(places)}
     found.bare = 1.0
     return found

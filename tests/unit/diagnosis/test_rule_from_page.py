@@ -115,7 +115,7 @@ def by_the_program(n, level, s, runs, most, table, usual):
         return HealthyHypothesis(effects, values, left, others, nothing, form, np.diag(sd**2))
 
     off = {label: AsUsual(np.array([mean]), np.array([[variance]])) for label, (mean, variance) in usual.items()}
-    healthy = Healthy([f"run{i}" for i in range(n)], {}, n, level, s, off)
+    healthy = Healthy(n, level, s, usual=off)
     return weigh(Given(healthy, runs, most, table[0][2]), [hypothesis(*row) for row in table]).probabilities()
 
 
