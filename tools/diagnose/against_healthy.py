@@ -39,6 +39,7 @@ from glider.tools.inference.corrected import LINKS
 from glider.tools.inference.healthy_level import CHANGED, FORM, USUAL_SCATTER, HealthyLevel
 from glider.tools.inference.model import effect_vector
 from glider.tools.inference.parameters import FreeParameter, effect_parameters, nuisance_parameters
+from glider.tools.inference.pooled import log_prior
 from glider.tools.inference.problem import Problem, problem_of
 
 CAUSE = "cause"
@@ -70,8 +71,8 @@ class AsUsual:
         one = np.eye(len(score))
 
         def log_posterior(size: float) -> float:
-            ratio = (size / FILE_ERROR) ** 2
-            return log_evidence(precision, score, 0.0 * score, size**2 * one) - 0.5 * (np.log(ratio) + 1.0 / ratio)
+            evidence = log_evidence(precision, score, 0.0 * score, size**2 * one)
+            return evidence + float(log_prior(size**2, FILE_ERROR**2))
 
         size = max(FILE_ERRORS, key=log_posterior)
         covariance = np.linalg.inv(precision + one / size**2)

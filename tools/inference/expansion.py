@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from glider.tools.inference.fit import NUISANCE_STEP, THRESHOLD_STEP
+from glider.tools.inference.pooled import Parabola
 from glider.tools.inference.problem import Gains, Problem
 from glider.tools.inference.shared_parameters import BOUND_TOLERANCE, SharedParameters
 
@@ -20,32 +21,12 @@ Moved = Callable[[int, float], tuple[np.ndarray, np.ndarray]]
 
 
 @dataclass
-class Expansion:
-    """-2 log likelihood of a run at x: value + 2 slope (x - at) + (x - at) curvature (x - at), in spreads."""
+class Expansion(Parabola):
+    """A run's innovations about x."""
 
-    at: np.ndarray  # (count,)
-    value: float
-    slope: np.ndarray  # (count,)
-    curvature: np.ndarray  # (count, count)
     nis: float  # mean squared innovation at `at`, of the filter of that model
     samples: int
     parts: "list[Expansion]" = field(default_factory=list)  # of strata of its samples, where they were asked
-
-    @property
-    def offset(self) -> np.ndarray:
-        """Slope at x = 0 of the same parabola."""
-        return self.slope - self.curvature @ self.at
-
-    @property
-    def constant(self) -> float:
-        """Value at x = 0."""
-        return float(self.value - 2.0 * self.slope @ self.at + self.at @ self.curvature @ self.at)
-
-    def tempered(self, inflation: float) -> "Expansion":
-        """The same with squared innovations that count for less."""
-        return Expansion(
-            self.at, self.value / inflation, self.slope / inflation, self.curvature / inflation, self.nis, self.samples
-        )
 
 
 def at_bound(shared: SharedParameters, x: np.ndarray) -> np.ndarray:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from glider.tools.inference.pooled import Pooled, learn_scatter, log_prior, marginalised, run_values
 from glider.tools.own.declare import RUN, Declaration
 from glider.tools.own.effects import (
     FORM,
@@ -19,17 +20,7 @@ from glider.tools.own.effects import (
     usual_inputs,
 )
 from glider.tools.own.excess_noise import NOISE_SIZES, responses, usual_gains
-from glider.tools.own.hierarchy import (
-    SCATTER_PRIOR_RUNS,
-    ChannelErrors,
-    Expansion,
-    Pooled,
-    expand,
-    inflation,
-    learn_scatter,
-    marginalised,
-    run_values,
-)
+from glider.tools.own.hierarchy import ChannelErrors, Expansion, expand, inflation
 from glider.tools.own.load import LoadedVehicle
 from glider.tools.own.observer import Observer, observer_of
 from glider.tools.own.runs import OwnRun
@@ -194,8 +185,7 @@ def with_form_errors(found: Sequence[Expansion], V: np.ndarray, nuisance: Sequen
                 return np.diag(np.where(places, size**2, np.diag(V)))
 
             def score(size: float, at=at) -> float:
-                ratio = (size / USUAL_SCATTER) ** 2
-                return kept.log_evidence(at(size)) - 0.5 * SCATTER_PRIOR_RUNS * (np.log(ratio) + 1.0 / ratio)
+                return kept.log_evidence(at(size)) + float(log_prior(size**2, USUAL_SCATTER**2))
 
             V = at(max(LABEL_SCATTERS, key=score))
     return V
@@ -326,8 +316,8 @@ def _label_scatter(observer, nuisance, values, own, scatter, eta, errors) -> tup
     precisions = np.array([np.diag(one.curvature) for one in about])[:, : len(labels)]
     total = 1.0 + LABEL_SCATTERS[:, None, None] ** 2 * precisions  # (grid, runs, labels)
     nat = 0.5 * (slopes**2 * LABEL_SCATTERS[:, None, None] ** 2 / total - np.log(total)).sum(axis=1)
-    ratio = LABEL_SCATTERS[:, None] ** 2 / (USUAL_SCATTER if len(own) >= MIN_SCATTER_RUNS else 5.0 * USUAL_SCATTER) ** 2
-    prior = -0.5 * SCATTER_PRIOR_RUNS * (np.log(ratio) + 1.0 / ratio)
+    usual = USUAL_SCATTER if len(own) >= MIN_SCATTER_RUNS else 5.0 * USUAL_SCATTER
+    prior = log_prior(LABEL_SCATTERS[:, None] ** 2, usual**2)
     return labels, LABEL_SCATTERS[np.argmax(nat + prior, axis=0)]
 
 

@@ -18,6 +18,7 @@ from scipy.stats import norm
 from glider.tools.inference.healthy_level import CHANGED, HealthyLevel
 from glider.tools.inference.healthy_level import FORM as FORM_SHARE
 from glider.tools.inference.healthy_level import USUAL_SCATTER as USUAL_LEVEL_SCATTER
+from glider.tools.inference.pooled import Pooled, marginalised, run_values
 from glider.tools.own.declare import RUN
 from glider.tools.own.effects import (
     FORM,
@@ -33,7 +34,7 @@ from glider.tools.own.effects import (
     standard_effects,
 )
 from glider.tools.own.excess_noise import NOISE_SIZES, NoisyWindows, Responses, blocks_of, responses
-from glider.tools.own.hierarchy import ChannelErrors, Expansion, Pooled, expand, marginalised, run_values
+from glider.tools.own.hierarchy import ChannelErrors, Expansion, expand
 from glider.tools.own.identify import USUAL_OWN_SCATTER, USUAL_SCATTER, USUAL_SESSION_SHARE
 from glider.tools.own.observer import Observer
 

@@ -15,8 +15,9 @@ from scipy.special import logsumexp
 from scipy.stats import norm
 
 from glider.tools.data.intervals import NINETY
+from glider.tools.inference.pooled import Pooled, learn_scatter
 from glider.tools.own.effects import FORM, PUSH
-from glider.tools.own.hierarchy import Expansion, Pooled, learn_scatter
+from glider.tools.own.hierarchy import Expansion
 from glider.tools.own.identify import CONVERGED_GAIN, SCATTER_ROUNDS, LineSearch, damped_step
 from glider.tools.own.load import LoadedVehicle
 from glider.tools.own.observer import Observer, observer_of

@@ -6,10 +6,11 @@ import numpy as np
 from scipy.stats import t as student
 
 from glider.tools.inference.parameters import CLOCK_PLACE
+from glider.tools.inference.pooled import PRIOR_RUNS
 from glider.tools.watch.events import Change
 from glider.tools.watch.history import ChangeEvent, History, already, earns_place, lasts, noise_location, take
 from glider.tools.watch.rivals import refit_event
-from glider.tools.watch.scatter import MIN_SCATTER_RUNS, PRIOR_RUNS
+from glider.tools.watch.scatter import MIN_SCATTER_RUNS
 from glider.tools.watch.water import named, noise_beats_label, water_event
 
 EVIDENCE_NEEDED = 16.0  # nat over no change (docs/explanation/watch.md)

@@ -10,6 +10,7 @@ from scipy.stats import t as student
 from glider.tools.diagnose.noise_probes import TURBULENCE, WAVES, NoiseProbe, inflated, probes
 from glider.tools.diagnose.unknown import ONE_AXIS
 from glider.tools.diagnose.waves import LINE, line_share
+from glider.tools.inference.pooled import PRIOR_RUNS
 from glider.tools.watch.events import GROWING
 from glider.tools.watch.excess_noise import (
     SCALES,
@@ -22,7 +23,7 @@ from glider.tools.watch.excess_noise import (
 from glider.tools.watch.flights import RunEnsemble, excess_nis_sigma, numbers
 from glider.tools.watch.history import CLEAN_RUN_NAT, ChangeEvent, History, within
 from glider.tools.watch.label_fit import values_of
-from glider.tools.watch.scatter import MIN_SCATTER_RUNS, PRIOR_RUNS
+from glider.tools.watch.scatter import MIN_SCATTER_RUNS
 from glider.tools.watch.unknown import LEFT_OVER
 
 ASKED_ABOVE = 4.0  # sigma of a run's mean squared innovation over that of many others, for disorder to be looked for

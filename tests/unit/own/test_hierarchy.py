@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from scipy.special import logsumexp
 
+from glider.tools.inference.pooled import Pooled, learn_scatter
 from glider.tools.own.effects import INPUT, PARAMETER, PUSH, Effect
-from glider.tools.own.hierarchy import ChannelErrors, Expansion, Pooled, learn_scatter
+from glider.tools.own.hierarchy import ChannelErrors, Expansion
 from glider.tools.own.posterior import CHANGED, FORM_SHARES, SIZES, Deviations, Engine, Healthy, Hypothesis
 from glider.tools.own.watch import Event, Watch
 

@@ -1,0 +1,143 @@
+"""Runs pooled: shared values, deviations of runs, their sizes; evidence in closed form.
+
+With -2 log likelihood of run n expanded to second order, curvature A_n and slope g_n at x_n:
+
+    x_n = s + d_n,  s ~ N(0, V),  d_n ~ N(0, diag(scatter^2))
+
+d_n is integrated out of every run, s of their sum. A variance in scatter^2 has an inverse gamma prior about what is
+usual, worth PRIOR_RUNS runs. Values are counted in the spreads of what may differ.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+PRIOR_RUNS, LEAST_VARIANCE = 1.0, 1e-12  # runs; squared spreads
+STARTS = (0.0, 0.03, 0.3)  # spreads, at least: of scatter, from which the most probable is looked for
+ITERATIONS, CONVERGED_LOG_VARIANCE = 200, 1e-3  # at most; e-folds of a variance by which a step moves none any more
+
+
+@dataclass
+class Parabola:
+    """-2 log likelihood of a run at x: value + 2 slope (x - at) + (x - at) curvature (x - at), in spreads."""
+
+    at: np.ndarray  # (k,)
+    value: float
+    slope: np.ndarray  # (k,)
+    curvature: np.ndarray  # (k, k)
+
+    @property
+    def offset(self) -> np.ndarray:
+        """Slope at x = 0 of the same parabola."""
+        return self.slope - self.curvature @ self.at
+
+    @property
+    def constant(self) -> float:
+        """Value at x = 0."""
+        return float(self.value - 2.0 * self.slope @ self.at + self.at @ self.curvature @ self.at)
+
+    def tempered(self, inflation: float) -> Any:
+        """The same with squared errors that count for less."""
+        return replace(
+            self, value=self.value / inflation, slope=self.slope / inflation, curvature=self.curvature / inflation
+        )
+
+
+P = TypeVar("P", bound=Parabola)
+
+
+def marginalised(one: P, scatter: np.ndarray) -> P:
+    """A run with its deviation, of 1 sigma `scatter` (k,), integrated out."""
+    root = scatter[:, None] * one.curvature
+    inner = np.eye(len(scatter)) + root * scatter[None, :]
+    solved = np.linalg.solve(inner, np.column_stack([root, scatter * one.slope]))
+    A, g = one.curvature - root.T @ solved[:, :-1], one.slope - root.T @ solved[:, -1]
+    value = one.value - float((scatter * one.slope) @ solved[:, -1]) + float(np.linalg.slogdet(inner)[1])
+    return replace(one, value=value, slope=g, curvature=0.5 * (A + A.T))
+
+
+def run_values(one: Parabola, shared: np.ndarray, scatter: np.ndarray) -> np.ndarray:
+    """Most probable values (k,) of a run whose expansion this is, given the shared ones."""
+    own = np.diag(scatter**2)
+    slope = one.slope + one.curvature @ (shared - one.at)
+    return shared - np.linalg.solve(np.eye(len(own)) + own @ one.curvature, own @ slope)
+
+
+@dataclass
+class Pooled:
+    """The sum of marginalised runs, and what it says of values with a prior N(0, V)."""
+
+    H: np.ndarray  # (k, k)
+    r: np.ndarray  # (k,) minus half the slope of -2 log likelihood at 0
+    constant: float
+    V: np.ndarray
+
+    @classmethod
+    def of(cls, found: Sequence[Parabola], V: np.ndarray) -> "Pooled":
+        return cls(np.sum([one.curvature for one in found], axis=0), -np.sum([one.offset for one in found], axis=0),
+                   sum(one.constant for one in found), V)  # fmt: skip
+
+    def covariance(self, V: np.ndarray | None = None) -> np.ndarray:
+        """Posterior covariance (k, k)."""
+        V = self.V if V is None else V
+        M = np.linalg.solve(np.eye(len(V)) + V @ self.H, V)
+        return 0.5 * (M + M.T)
+
+    def mean(self, V: np.ndarray | None = None) -> np.ndarray:
+        return self.covariance(V) @ self.r
+
+    def log_evidence(self, V: np.ndarray | None = None) -> float:
+        """Log marginal likelihood, values integrated out."""
+        V = self.V if V is None else V
+        logdet = float(np.linalg.slogdet(np.eye(len(V)) + V @ self.H)[1])
+        return -0.5 * (self.constant - float(self.r @ self.covariance(V) @ self.r) + logdet)
+
+
+def log_evidence(found: Sequence[Parabola], V: np.ndarray, scatter: np.ndarray) -> float:
+    """Log probability of runs for deviations of 1 sigma `scatter` (k,), shared values N(0, V) integrated out."""
+    return Pooled.of([marginalised(one, scatter) for one in found], V).log_evidence()
+
+
+def log_prior(variance: np.ndarray | float, usual: np.ndarray | float) -> np.ndarray:
+    """Log density of variances about usual ones, both of one shape: inverse gamma, up to a constant."""
+    return -0.5 * PRIOR_RUNS * np.asarray(np.log(variance) + usual / variance)
+
+
+def learn_scatter(found: Sequence[Parabola], V: np.ndarray, usual: np.ndarray) -> np.ndarray:
+    """1 sigma (k,) of how runs differ, the most probable about `usual` (k,); where that is 0 it stays 0.
+
+    A variance that is far too small for a run may be as probable, near by, as one that holds it: of several starts the
+    best is kept.
+    """
+    free = usual > 0.0
+
+    def log_posterior(sizes: np.ndarray) -> float:
+        variance = np.maximum(sizes[free] ** 2, LEAST_VARIANCE)
+        prior = log_prior(variance, np.maximum(usual[free] ** 2, LEAST_VARIANCE)).sum()
+        return log_evidence(found, V, sizes) + float(prior)
+
+    tried = [_nearest(found, V, usual, np.where(free, np.maximum(usual, least), 0.0)) for least in STARTS]
+    return max(tried, key=log_posterior)
+
+
+def _nearest(found: Sequence[Parabola], V: np.ndarray, usual: np.ndarray, start: np.ndarray) -> np.ndarray:
+    """Sizes (k,) led from `start` to the most probable near by: minorisation and maximisation for variances."""
+    free, weight = usual > 0.0, 0.5 * PRIOR_RUNS
+    middle, v = np.maximum(usual[free] ** 2, LEAST_VARIANCE), np.where(free, np.maximum(start**2, LEAST_VARIANCE), 0.0)
+    for _ in range(ITERATIONS):
+        runs = [marginalised(one, np.sqrt(v)) for one in found]
+        pooled = Pooled.of(runs, V)
+        M = pooled.covariance()
+        x = M @ pooled.r
+        squares, traces = np.zeros(len(v)), np.zeros(len(v))
+        for one in runs:
+            A = one.curvature
+            squares += (one.slope + A @ (x - one.at)) ** 2
+            traces += np.maximum(np.diag(A) - np.einsum("ij,jk,ki->i", A, M, A), 0.0)
+        at = v[free]
+        v[free] = np.sqrt((0.5 * at**2 * squares[free] + weight * middle) / (0.5 * traces[free] + weight / at))
+        if np.abs(np.log(v[free] / at)).max(initial=0.0) < CONVERGED_LOG_VARIANCE:
+            break
+    return np.sqrt(v)
