@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from glider.tools.own.decision import NONE
 from glider.tools.own.load import read_own
-from glider.tools.own.posterior import NONE
 from tests.support.own_cases import FOSSEN, answers, diagnosed, fly, size_of
 
 pytestmark = pytest.mark.computes(seconds=60)

@@ -1,31 +1,39 @@
-"""Which effects the runs of a case have: a posterior over hypotheses, each with its own evidence (docs/how-to).
+"""The hypothesis about the runs of a case that is most probable, and those beside it: labels, their sizes, evidence.
 
 A hypothesis is a set of labels with sizes common to the case's runs, beside what an identified vehicle allows for: its
 shared values, what sessions and runs differ by. The size of a label is normal with a sigma of v tolerances, rms over
-the windows' channels, v over a grid of equal chances: labels of all units are as probable before the data. What healthy
-sessions and runs differ by is no change. Beside the labels stand constant forces that no label has, and, with each
-hypothesis, that more is left than healthy runs leave: unknown.
+the windows' channels, v over a grid of equal chances: labels of all units are as probable before the data. Beside the
+labels stand constant forces that no label has. What is concluded from all of them: decision.py.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 from scipy.special import logsumexp
 from scipy.stats import norm
 
-from glider.tools.inference.healthy_level import CHANGED, HealthyLevel
-from glider.tools.inference.healthy_level import FORM as FORM_SHARE
+from glider.tools.inference.healthy_level import CHANGED
 from glider.tools.inference.healthy_level import USUAL_SCATTER as USUAL_LEVEL_SCATTER
-from glider.tools.inference.pooled import Pooled, marginalised, run_values
+from glider.tools.inference.pooled import Pooled, run_values
+from glider.tools.own.decision import (
+    FORM_SHARES,
+    LEAST_REACH,
+    SIZES,
+    Deviations,
+    Healthy,
+    Hypothesis,
+    Posterior,
+    decide,
+    log_odds,
+    strangeness,
+)
 from glider.tools.own.declare import RUN
 from glider.tools.own.effects import (
     FORM,
     NOISE,
-    PARAMETER,
     PUSH,
-    Effect,
     ModelPoint,
     form_errors,
     moved,
@@ -33,20 +41,12 @@ from glider.tools.own.effects import (
     pushes,
     standard_effects,
 )
-from glider.tools.own.excess_noise import NOISE_SIZES, NoisyWindows, Responses, blocks_of, responses
+from glider.tools.own.excess_noise import NoisyWindows, Responses, blocks_of, responses
 from glider.tools.own.hierarchy import ChannelErrors, Expansion, expand
 from glider.tools.own.identify import USUAL_OWN_SCATTER, USUAL_SCATTER, USUAL_SESSION_SHARE
 from glider.tools.own.observer import Observer
 
-NONE, UNKNOWN = "none", "unknown"
-SIZES = NOISE_SIZES  # tolerances, rms over the windows
 ANOTHER = 0.1  # that a further effect stands beside one
-# prior odds of a label to one of an input or an output: what is fixed of a vehicle changes less often than what is
-# commanded and read; a constant force that no label has, seldom
-FAMILY_ODDS = {PARAMETER: 0.5, NOISE: 0.5, PUSH: 0.1}
-STRANGE = 0.1  # that more is left than a hypothesis says
-FORM_SHARES = (0.0, FORM_SHARE)  # as probable before the data
-MATERIAL = 0.1  # tolerances: a smaller effect is no gap (docs/reference/gap.md)
 NOISES_TRIED = 3  # labels of noises beside a hypothesis
 BEAM, MOST_EFFECTS, ROUNDS, LONGEST_MOVE = 6, 3, 5, 4.0
 LONGEST_REACH = 4.0  # tolerances that a round's move of one number may do at most, where that is more
@@ -56,79 +56,6 @@ STRONG, STRONG_LEFT, STRONG_ROWS = (
     1_500,
 )  # tolerances; times healthy; rows looked at
 UNIDENTIFIED_INFLATION = 30.0  # rows of a window that err alike, of a vehicle that was never identified
-LEAST_REACH = 1e-4  # tolerances a spread
-
-
-@dataclass(frozen=True)
-class Healthy:
-    """What is known of the vehicle without a change, in the spreads of `effects`."""
-
-    effects: list[Effect]  # every label, then pushes
-    V: np.ndarray  # (k, k) covariance of the identified values
-    scatter: np.ndarray  # (k,) what runs differ by, integrated out
-    usual: np.ndarray  # (k,) how far each label alone differs from run to run beside that
-    errors: ChannelErrors  # what healthy runs leave
-    eta: float
-    runs: int  # that it is known from
-    level_scatter: float  # 1 sigma of the logarithm of a run's mean square left
-    session_share: float  # of the variance from run to run, that a session differs by
-    noise_gain: Mapping[str, float] = field(default_factory=dict)  # nat a window, of healthy runs; none: not weighed
-
-    def at(self, labels: Sequence[str]) -> list[int]:
-        known = [one.label for one in self.effects]
-        return [known.index(label) for label in labels]
-
-
-@dataclass(frozen=True)
-class Deviations:
-    """What runs are off the identified vehicle by: what they have in common, and each its own."""
-
-    V: np.ndarray  # (k, k)
-    scatter: np.ndarray  # (k,) 1 sigma
-
-    def marginal(self, found: Sequence[Expansion]) -> list[Expansion]:
-        """Runs with their own deviations integrated out."""
-        return [marginalised(one, self.scatter) for one in found]
-
-    def prior(self, shared: np.ndarray, own: np.ndarray, places: Sequence[int]) -> float:
-        """-2 log prior of values, sizes of labels left free."""
-        free = np.diag(self.V) > 0.0
-        free[list(places)] = False
-        chosen = np.flatnonzero(free)
-        x, spread = shared[chosen], np.maximum(self.scatter, 1e-6)
-        within = x @ np.linalg.solve(self.V[np.ix_(chosen, chosen)], x)
-        return float((((own - shared) / spread) ** 2).sum() + within)
-
-
-@dataclass
-class Hypothesis:
-    """Labels fitted to the runs."""
-
-    labels: tuple[str, ...]
-    evidence: float  # log, with the prior of its labels
-    sizes: np.ndarray  # (labels,) spreads
-    sd: np.ndarray
-    shared: np.ndarray  # (k,) values of all runs, labels' sizes in them
-    own: np.ndarray  # (runs, k)
-    left: np.ndarray  # (runs,) mean squares, in units of what healthy runs leave
-    strange: float = 0.0  # probability that more is left than it says
-    found: list[Expansion] = field(default_factory=list)
-
-
-@dataclass
-class Posterior:
-    """The answer."""
-
-    hypotheses: list[Hypothesis]
-    weights: np.ndarray  # of each, with nothing beside it
-    chances: dict[str, float]  # none, unknown, labels: of the main cause
-    inclusion: dict[str, float]  # probability of each label to be there
-    reach: np.ndarray  # (k,) tolerances a spread
-    healthy: Healthy
-
-    @property
-    def best(self) -> Hypothesis:
-        return self.hypotheses[int(np.argmax(self.weights))]
 
 
 class Engine:
@@ -176,18 +103,6 @@ class Engine:
             derivatives = np.zeros((self.k, *one.derivatives.shape[1:]))
             derivatives[columns] = one.derivatives
         return replace(one, at=own.copy(), slope=slope, curvature=curvature, reach=reach, derivatives=derivatives)
-
-    def usual_share(self, k: int, size: float, sd: float, runs: int) -> float:
-        """Nat of the evidence of label k, its size known to sd, that a deviation as healthy runs have it brings too."""
-        usual = self.healthy.usual[k] ** 2 * (self.healthy.session_share + 1.0 / runs)
-
-        def odds(scatter: float) -> float:
-            narrow = scatter + sd**2
-            wide = (SIZES / max(self.reach[k], LEAST_REACH)) ** 2 + narrow
-            change = logsumexp(-0.5 * (size**2 / wide + np.log(wide))) - np.log(len(SIZES))
-            return float(change + 0.5 * (size**2 / narrow + np.log(narrow)))
-
-        return max(0.0, odds(0.0) - odds(usual))
 
     def fit(self, labels: tuple[str, ...], begin: Hypothesis | None = None, every: bool = False) -> Hypothesis:
         """Labels led to where they are most probable, relinearised where they are; evidence by its last expansion."""
@@ -364,7 +279,7 @@ class Engine:
         begin = self.expansions(np.zeros((self.count, self.k)), np.arange(self.k))
         self.reach = np.sqrt(np.mean([one.reach for one in begin], axis=0))
         nothing = self.fit((), every=True)
-        nothing.strange = self.strangeness(nothing, nothing)
+        nothing.strange = strangeness(self.healthy, nothing, nothing)
         every, front, self.bare = [nothing], [nothing], nothing
         self.say(f"no change: {np.sqrt(nothing.left.mean()):.2f} times what healthy runs leave")
         for depth in range(MOST_EFFECTS):
@@ -390,7 +305,7 @@ class Engine:
                     new += [self.fit((label,), begin) for label, begin in self.swaps(leading, singles)]
             best = max(one.evidence for one in every)
             for one in new:
-                one.strange = self.strangeness(one, nothing)
+                one.strange = strangeness(self.healthy, one, nothing)
                 gain, left = one.evidence - nothing.evidence, np.sqrt(one.left.mean())
                 self.say(f"{' + '.join(one.labels)}: {gain:.1f} nat, {left:.2f} left")
             every += new
@@ -399,10 +314,10 @@ class Engine:
                 break
             front = [self.fit(one.labels, one, every=True) for one in front]
             for one in front:
-                one.strange = self.strangeness(one, nothing)
+                one.strange = strangeness(self.healthy, one, nothing)
         alone = sorted((one for one in every if len(one.labels) == 1), key=lambda one: -one.evidence)
         every += self.with_noise([nothing, *alone[:1]], nothing)
-        return self._posterior(every)
+        return decide(every, self.healthy, self.reach, self.count)
 
     def with_noise(self, beside: Sequence[Hypothesis], nothing: Hypothesis) -> list[Hypothesis]:
         """Hypotheses with excess noise or an oscillation at one of the model's noises beside them.
@@ -449,58 +364,10 @@ class Engine:
         self.reach[self.healthy.at([label])] = windows.reach
         found = replace(begin, labels=labels, evidence=evidence + self.log_prior(labels), sizes=np.append(mean, size),
                         sd=np.append(sd, error), left=windows.left(size))  # fmt: skip
-        found.strange = self.strangeness(found, nothing)
+        found.strange = strangeness(self.healthy, found, nothing)
         gain, left = found.evidence - nothing.evidence, np.sqrt(found.left.mean())
         self.say(f"{' + '.join(labels)}: {gain:.1f} nat, {left:.2f} left")
         return found
-
-    def strangeness(self, one: Hypothesis, nothing: Hypothesis) -> float:
-        """Probability that more is left than a hypothesis says: its mean square against healthy runs', Student's t."""
-        odds = self.strange_odds(one, nothing) + np.log(STRANGE) - np.log1p(-STRANGE)
-        return float(1.0 / (1.0 + np.exp(-np.clip(odds, -500.0, 500.0))))
-
-    def strange_odds(self, one: Hypothesis, nothing: Hypothesis) -> float:
-        """Log evidence that more is left than a hypothesis says, over that it is what healthy runs leave."""
-        level = HealthyLevel(self.healthy.runs, 0.0, self.healthy.level_scatter)
-        scale, at = level.scale(len(one.left)), float(np.log(max(one.left.mean(), 1e-9)))
-        if one.labels:
-            scale = float(np.hypot(scale, np.log1p(FORM_SHARE**2 * max(nothing.left.mean() - one.left.mean(), 0.0))))
-        usual, more = level.unchanged(at, scale)
-        return more - usual
-
-    def _posterior(self, every: list[Hypothesis]) -> Posterior:
-        # of every label what healthy runs show of it is no change
-        logs = np.array([
-            one.evidence - sum(self.usual_share(k, float(size), float(sd), self.count)
-                               for k, size, sd in zip(self.healthy.at(one.labels), one.sizes, one.sd, strict=True))
-            for one in every
-        ])  # fmt: skip
-        known = {one.label: one for one in self.healthy.effects}
-        noisy = np.array([any(known[label].family == NOISE for label in one.labels) for one in every])
-        # noise is excess only if more is left without it than healthy runs leave; else those with it are out
-        without = np.where(noisy, -np.inf, logs)
-        strange = every[int(np.argmax(without))].strange
-        weights = strange * np.exp(logs - logsumexp(logs)) + (1.0 - strange) * np.exp(without - logsumexp(without))
-        chances: dict[str, float] = {NONE: 0.0, UNKNOWN: 0.0}
-        inclusion: dict[str, float] = {}
-        for one, weight in zip(every, weights, strict=True):
-            moves = {label: abs(size) * self.reach[k] for label, size, k
-                     in zip(one.labels, one.sizes, self.healthy.at(one.labels), strict=True)}  # fmt: skip
-            chances[UNKNOWN] += weight * one.strange
-            main = max(moves, key=lambda label: moves[label], default=NONE)
-            if moves.get(main, 0.0) < MATERIAL:
-                name = NONE
-            else:
-                name = UNKNOWN if known[main].family == PUSH else main
-            chances[name] = chances.get(name, 0.0) + weight * (1.0 - one.strange)
-            for label in one.labels:
-                inclusion[label] = inclusion.get(label, 0.0) + float(weight)
-        return Posterior(every, weights, chances, inclusion, self.reach, self.healthy)
-
-
-def log_odds(effect: Effect) -> float:
-    """Log prior odds of a label to one of an input or an output."""
-    return float(np.log(FAMILY_ODDS.get(effect.family, 1.0)))
 
 
 def size_evidence(slope, precision, reach, one_sided) -> np.ndarray:

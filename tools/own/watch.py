@@ -16,26 +16,24 @@ from scipy.stats import norm
 
 from glider.tools.data.intervals import NINETY
 from glider.tools.inference.pooled import Pooled, learn_scatter
+from glider.tools.own.decision import (
+    FORM_SHARES,
+    LEAST_REACH,
+    MATERIAL,
+    SIZES,
+    UNKNOWN,
+    Healthy,
+    Hypothesis,
+    log_odds,
+    strangeness,
+    usual_share,
+)
 from glider.tools.own.effects import FORM, PUSH
 from glider.tools.own.hierarchy import Expansion
 from glider.tools.own.identify import CONVERGED_GAIN, SCATTER_ROUNDS, LineSearch, damped_step
 from glider.tools.own.load import LoadedVehicle
 from glider.tools.own.observer import Observer, observer_of
-from glider.tools.own.posterior import (
-    FORM_SHARES,
-    LEAST_REACH,
-    LONGEST_MOVE,
-    LONGEST_REACH,
-    MATERIAL,
-    SIZES,
-    STRONG_LEFT,
-    UNKNOWN,
-    Engine,
-    Healthy,
-    Hypothesis,
-    healthy_of,
-    log_odds,
-)
+from glider.tools.own.posterior import LONGEST_MOVE, LONGEST_REACH, STRONG_LEFT, Engine, healthy_of
 from glider.tools.own.runs import OwnRun
 
 LEARNED = 4  # first runs, from which a watch without a reference learns
@@ -306,7 +304,7 @@ class Watch(Engine):
                 x[k] = np.clip(x[k] + size, self.low[k], self.high[k])
                 runs += self.together.marginal([self.expansion_of(n, self.own_values(n, x), columns)])
         score, mean, sd = best
-        usual = self.usual_share(k, mean, sd, span[1] - span[0]) if sd > 0.0 else 0.0
+        usual = usual_share(self.healthy, k, float(self.reach[k]), mean, sd, span[1] - span[0]) if sd > 0.0 else 0.0
         event = Event({}, *span, self.healthy.effects[k].label, mean, sd, 0.0)
         return score - nothing - usual + prior + odds, event
 
@@ -318,8 +316,8 @@ class Watch(Engine):
             one = self.expansion_of(n, self.own_values(n, self.at_run(n)), np.flatnonzero(self.active))
             left = np.array([one.squares.sum() / max(1, one.samples.sum())])
             named = tuple(event.label for event in self.events if event.first <= n < event.end)
-            found[n] = self.strangeness(
-                replace(nothing, labels=named, left=left), replace(nothing, left=np.array([self.left(n)]))
+            found[n] = strangeness(
+                self.healthy, replace(nothing, labels=named, left=left), replace(nothing, left=np.array([self.left(n)]))
             )
         return found
 

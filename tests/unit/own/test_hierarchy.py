@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 from scipy.special import logsumexp
 
+from glider.tools.inference.healthy_level import CHANGED
 from glider.tools.inference.pooled import Pooled, learn_scatter
+from glider.tools.own.decision import FORM_SHARES, SIZES, Deviations, Healthy, Hypothesis, usual_share
 from glider.tools.own.effects import INPUT, PARAMETER, PUSH, Effect
 from glider.tools.own.hierarchy import ChannelErrors, Expansion
-from glider.tools.own.posterior import CHANGED, FORM_SHARES, SIZES, Deviations, Engine, Healthy, Hypothesis
+from glider.tools.own.posterior import Engine
 from glider.tools.own.watch import Event, Watch
 
 LABELS = [Effect("gain", INPUT, "motor", "gain", "1", 0.1), Effect("mass", PARAMETER, "mass", "value", "kg", 0.1),
@@ -108,7 +110,7 @@ def test_a_label_alone_gains_what_its_evidence_says():
 @pytest.mark.parametrize(("usual", "least", "most"), [(0.0, 0.0, 0.0), (0.05, 1.0, 12.0), (3.0, 15.0, 1e3)])
 def test_what_healthy_runs_show_of_a_label_is_no_evidence_of_a_change(usual, least, most):
     asked = engine(4, usual=np.array([usual, 0.0, 0.0]))
-    assert least <= asked.usual_share(0, 0.5, 0.08, 4) <= most
+    assert least <= usual_share(asked.healthy, 0, float(asked.reach[0]), 0.5, 0.08, 4) <= most
 
 
 def test_of_a_label_a_force_may_be_that_its_equations_do_not_have():

@@ -1,0 +1,171 @@
+"""Hypotheses about the runs of a case, and how they are weighed: which effects there are, or something unknown.
+
+The evidence of a hypothesis is that of its labels (posterior.py). What healthy sessions and runs differ by in a label
+is no change; and with each hypothesis stands that more is left than healthy runs leave.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.special import logsumexp
+
+from glider.tools.inference.healthy_level import FORM as FORM_SHARE
+from glider.tools.inference.healthy_level import HealthyLevel
+from glider.tools.inference.pooled import marginalised
+from glider.tools.own.effects import NOISE, PARAMETER, PUSH, Effect
+from glider.tools.own.excess_noise import NOISE_SIZES
+from glider.tools.own.hierarchy import ChannelErrors, Expansion
+
+NONE, UNKNOWN = "none", "unknown"
+SIZES = NOISE_SIZES  # tolerances, rms over the windows
+# prior odds of a label to one of an input or an output: what is fixed of a vehicle changes less often than what is
+# commanded and read; a constant force that no label has, seldom
+FAMILY_ODDS = {PARAMETER: 0.5, NOISE: 0.5, PUSH: 0.1}
+STRANGE = 0.1  # that more is left than a hypothesis says
+FORM_SHARES = (0.0, FORM_SHARE)  # as probable before the data
+MATERIAL = 0.1  # tolerances: a smaller effect is no gap (docs/reference/gap.md)
+LEAST_REACH = 1e-4  # tolerances a spread
+
+
+@dataclass(frozen=True)
+class Healthy:
+    """What is known of the vehicle without a change, in the spreads of `effects`."""
+
+    effects: list[Effect]  # every label, then pushes
+    V: np.ndarray  # (k, k) covariance of the identified values
+    scatter: np.ndarray  # (k,) what runs differ by, integrated out
+    usual: np.ndarray  # (k,) how far each label alone differs from run to run beside that
+    errors: ChannelErrors  # what healthy runs leave
+    eta: float
+    runs: int  # that it is known from
+    level_scatter: float  # 1 sigma of the logarithm of a run's mean square left
+    session_share: float  # of the variance from run to run, that a session differs by
+    noise_gain: Mapping[str, float] = field(default_factory=dict)  # nat a window, of healthy runs; none: not weighed
+
+    def at(self, labels: Sequence[str]) -> list[int]:
+        known = [one.label for one in self.effects]
+        return [known.index(label) for label in labels]
+
+
+@dataclass(frozen=True)
+class Deviations:
+    """What runs are off the identified vehicle by: what they have in common, and each its own."""
+
+    V: np.ndarray  # (k, k)
+    scatter: np.ndarray  # (k,) 1 sigma
+
+    def marginal(self, found: Sequence[Expansion]) -> list[Expansion]:
+        """Runs with their own deviations integrated out."""
+        return [marginalised(one, self.scatter) for one in found]
+
+    def prior(self, shared: np.ndarray, own: np.ndarray, places: Sequence[int]) -> float:
+        """-2 log prior of values, sizes of labels left free."""
+        free = np.diag(self.V) > 0.0
+        free[list(places)] = False
+        chosen = np.flatnonzero(free)
+        x, spread = shared[chosen], np.maximum(self.scatter, 1e-6)
+        within = x @ np.linalg.solve(self.V[np.ix_(chosen, chosen)], x)
+        return float((((own - shared) / spread) ** 2).sum() + within)
+
+
+@dataclass
+class Hypothesis:
+    """Labels fitted to the runs."""
+
+    labels: tuple[str, ...]
+    evidence: float  # log, with the prior of its labels
+    sizes: np.ndarray  # (labels,) spreads
+    sd: np.ndarray
+    shared: np.ndarray  # (k,) values of all runs, labels' sizes in them
+    own: np.ndarray  # (runs, k)
+    left: np.ndarray  # (runs,) mean squares, in units of what healthy runs leave
+    strange: float = 0.0  # probability that more is left than it says
+    found: list[Expansion] = field(default_factory=list)
+
+
+@dataclass
+class Posterior:
+    """The answer."""
+
+    hypotheses: list[Hypothesis]
+    weights: np.ndarray  # of each, with nothing beside it
+    chances: dict[str, float]  # none, unknown, labels: of the main cause
+    inclusion: dict[str, float]  # probability of each label to be there
+    reach: np.ndarray  # (k,) tolerances a spread
+    healthy: Healthy
+
+    @property
+    def best(self) -> Hypothesis:
+        return self.hypotheses[int(np.argmax(self.weights))]
+
+
+def log_odds(effect: Effect) -> float:
+    """Log prior odds of a label to one of an input or an output."""
+    return float(np.log(FAMILY_ODDS.get(effect.family, 1.0)))
+
+
+def usual_share(healthy: Healthy, k: int, reach: float, size: float, sd: float, runs: int) -> float:
+    """Nat of the evidence of label k, its size known to sd, that a deviation as healthy runs have it brings too.
+
+    reach: tolerances that a spread of it moves the channels.
+    """
+    usual = healthy.usual[k] ** 2 * (healthy.session_share + 1.0 / runs)
+
+    def odds(scatter: float) -> float:
+        narrow = scatter + sd**2
+        wide = (SIZES / max(reach, LEAST_REACH)) ** 2 + narrow
+        change = logsumexp(-0.5 * (size**2 / wide + np.log(wide))) - np.log(len(SIZES))
+        return float(change + 0.5 * (size**2 / narrow + np.log(narrow)))
+
+    return max(0.0, odds(0.0) - odds(usual))
+
+
+def strangeness(healthy: Healthy, one: Hypothesis, nothing: Hypothesis) -> float:
+    """Probability that more is left than a hypothesis says: its mean square against healthy runs', Student's t."""
+    odds = strange_odds(healthy, one, nothing) + np.log(STRANGE) - np.log1p(-STRANGE)
+    return float(1.0 / (1.0 + np.exp(-np.clip(odds, -500.0, 500.0))))
+
+
+def strange_odds(healthy: Healthy, one: Hypothesis, nothing: Hypothesis) -> float:
+    """Log evidence that more is left than a hypothesis says, over that it is what healthy runs leave."""
+    level = HealthyLevel(healthy.runs, 0.0, healthy.level_scatter)
+    scale, at = level.scale(len(one.left)), float(np.log(max(one.left.mean(), 1e-9)))
+    if one.labels:
+        scale = float(np.hypot(scale, np.log1p(FORM_SHARE**2 * max(nothing.left.mean() - one.left.mean(), 0.0))))
+    usual, more = level.unchanged(at, scale)
+    return more - usual
+
+
+def decide(every: list[Hypothesis], healthy: Healthy, reach: np.ndarray, runs: int) -> Posterior:
+    """Probabilities of the main cause and of each label, from the evidence of hypotheses about some runs.
+
+    reach: tolerances (k,) that a spread of each label moves the channels.
+    """
+    # of every label what healthy runs show of it is no change
+    logs = np.array([
+        one.evidence - sum(usual_share(healthy, k, float(reach[k]), float(size), float(sd), runs)
+                           for k, size, sd in zip(healthy.at(one.labels), one.sizes, one.sd, strict=True))
+        for one in every
+    ])  # fmt: skip
+    known = {one.label: one for one in healthy.effects}
+    noisy = np.array([any(known[label].family == NOISE for label in one.labels) for one in every])
+    # noise is excess only if more is left without it than healthy runs leave; else those with it are out
+    without = np.where(noisy, -np.inf, logs)
+    strange = every[int(np.argmax(without))].strange
+    weights = strange * np.exp(logs - logsumexp(logs)) + (1.0 - strange) * np.exp(without - logsumexp(without))
+    chances: dict[str, float] = {NONE: 0.0, UNKNOWN: 0.0}
+    inclusion: dict[str, float] = {}
+    for one, weight in zip(every, weights, strict=True):
+        moves = {label: abs(size) * reach[k] for label, size, k
+                 in zip(one.labels, one.sizes, healthy.at(one.labels), strict=True)}  # fmt: skip
+        chances[UNKNOWN] += weight * one.strange
+        main = max(moves, key=lambda label: moves[label], default=NONE)
+        if moves.get(main, 0.0) < MATERIAL:
+            name = NONE
+        else:
+            name = UNKNOWN if known[main].family == PUSH else main
+        chances[name] = chances.get(name, 0.0) + weight * (1.0 - one.strange)
+        for label in one.labels:
+            inclusion[label] = inclusion.get(label, 0.0) + float(weight)
+    return Posterior(every, weights, chances, inclusion, reach, healthy)
