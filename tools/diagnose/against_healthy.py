@@ -2,9 +2,8 @@
 
 The vehicle file is one that was identified, and misses healthy runs by what its form cannot do. How far, channel by
 channel, is learned from healthy runs, each flown by a fit to the others; the case's windows are then weighed in units
-of that (docs/explanation/diagnosis.md, Against healthy runs). Every hypothesis is fitted without each of the case's
-runs and judged
-on that run, so that an effect has to shrink what it has not seen:
+of that (docs/explanation/against-healthy.md). Every hypothesis is fitted without each of the case's runs and judged on
+that run, so that an effect has to shrink what it has not seen:
 
 - no change: what the vehicle file allows;
 - a label's parameters beside that, one label or a few;
@@ -487,6 +486,9 @@ def diagnose_against_healthy(
     problem = problem_of(case)
     nuisance = nuisance_parameters(problem)
     places, free = places_of(problem, nuisance)
+    for label, own in places.items():  # where healthy runs are not there, or do not show it
+        nothing = np.zeros(len(own))
+        healthy.usual.setdefault(label, AsUsual.learned(np.diag(nothing), nothing))
     compared = Comparison(problem, healthy, free, places, np.arange(len(nuisance)))
     listed = hypotheses(compared, say)
     weighed = weigh(compared, listed)
