@@ -38,7 +38,7 @@ from glider.tools.inference.corrected import LINKS
 from glider.tools.inference.healthy_level import CHANGED, FORM, USUAL_SCATTER, HealthyLevel
 from glider.tools.inference.model import effect_vector
 from glider.tools.inference.parameters import FreeParameter, effect_parameters, nuisance_parameters
-from glider.tools.inference.pooled import log_prior
+from glider.tools.inference.pooled import Pooled, log_prior
 from glider.tools.inference.problem import Problem, problem_of
 
 CAUSE = "cause"
@@ -70,7 +70,7 @@ class AsUsual:
         one = np.eye(len(score))
 
         def log_posterior(size: float) -> float:
-            evidence = log_evidence(precision, score, 0.0 * score, size**2 * one)
+            evidence = prior_evidence(precision, score, 0.0 * score, size**2 * one)
             return evidence + float(log_prior(size**2, FILE_ERROR**2))
 
         size = max(FILE_ERRORS, key=log_posterior)
@@ -78,12 +78,10 @@ class AsUsual:
         return cls(covariance @ score, covariance)
 
 
-def log_evidence(precision: np.ndarray, score: np.ndarray, mean: np.ndarray, covariance: np.ndarray) -> float:
+def prior_evidence(precision: np.ndarray, score: np.ndarray, mean: np.ndarray, covariance: np.ndarray) -> float:
     """Of a normal prior, mean (k,) and covariance (k, k); precision (k, k) and score (k,) of the likelihood about 0."""
-    within = np.eye(len(mean)) + covariance @ precision
     score = score - precision @ mean
-    gain = score @ np.linalg.solve(within, covariance @ score) + mean @ (2.0 * score + precision @ mean)
-    return 0.5 * float(gain - np.linalg.slogdet(within)[1])
+    return Pooled(precision, score, -float(mean @ (2.0 * score + precision @ mean)), covariance).log_evidence()
 
 
 @dataclass
@@ -117,7 +115,7 @@ def learn(case: Case, runs: list[Run]) -> Healthy:
     logs = np.log(np.maximum(found.runs / share, 1e-6))
     level, scatter = float(np.log(np.exp(logs).mean())), float(logs.std(ddof=1)) if len(logs) > 1 else USUAL_SCATTER
     healthy = Healthy(len(runs), level, scatter, scales, [run.name for run in runs])
-    places, every = places_of(problem, free)
+    places, every = with_labels(problem, free)
     windows = HeldOutWindows(problem, every, scales, healthy.independent * len(runs))
     at = windows.linearised(windows.clipped(np.pad(found.values, (0, len(every) - len(free)))))
     weight = windows.independent(windows.cuts) / max(float(at.value.sum()), 1.0)
@@ -128,8 +126,8 @@ def learn(case: Case, runs: list[Run]) -> Healthy:
     return healthy
 
 
-def places_of(problem: Problem, nuisance: list[FreeParameter]) -> tuple[dict[str, np.ndarray], list[FreeParameter]]:
-    """Places of each label's parameters behind the nuisance parameters, and all of them."""
+def with_labels(problem: Problem, nuisance: list[FreeParameter]) -> tuple[dict[str, np.ndarray], list[FreeParameter]]:
+    """Places of each label's parameters behind the nuisance parameters, and all parameters."""
     free, places = list(nuisance), dict[str, np.ndarray]()
     for label, own in effect_parameters(problem).items():
         places[label] = np.arange(len(free), len(free) + len(own))
@@ -262,8 +260,8 @@ class Comparison:
                 precision, score = inverse - np.eye(len(own)), inverse @ np.concatenate(values)[own]
                 known = [self.healthy.usual[label] for label in one.labels if label in usual]
                 mean, covariance = np.concatenate([k.mean for k in known]), block_diag(*(k.covariance for k in known))
-                gain = log_evidence(precision, score, mean, covariance)
-                gain -= log_evidence(precision, score, 0.0 * mean, np.eye(len(own)))
+                gain = prior_evidence(precision, score, mean, covariance)
+                gain -= prior_evidence(precision, score, 0.0 * mean, np.eye(len(own)))
                 rest = tuple(label for label in one.labels if label not in usual)
                 found.append(replace(one, labels=rest, as_usual=gain))
         return found
@@ -485,7 +483,7 @@ def diagnose_against_healthy(
         raise InputError("no healthy runs, and a vehicle without [form]", source=case.folder)
     problem = problem_of(case)
     nuisance = nuisance_parameters(problem)
-    places, free = places_of(problem, nuisance)
+    places, free = with_labels(problem, nuisance)
     for label, own in places.items():  # where healthy runs are not there, or do not show it
         nothing = np.zeros(len(own))
         healthy.usual.setdefault(label, AsUsual.learned(np.diag(nothing), nothing))
