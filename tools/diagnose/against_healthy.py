@@ -102,9 +102,11 @@ def learn(case: Case, runs: list[Run]) -> Healthy:
     free = nuisance_parameters(problem)
     scales = dict[str, float]()
     form = case.roughie.form.gaps[ALL] if case.roughie.form is not None else {}
+    values = np.zeros(len(free))
     for _ in range(2):  # first in tolerances, then in what the first found
         windows = HeldOutWindows(problem, free, scales)
-        found = windows.left_out(windows.file_values)
+        found = windows.left_out(values)
+        values = found.values
         measured = np.sqrt(found.channels)
         scales = {
             channel.name: max(float(one) * scales.get(channel.name, 1.0), form.get(channel.name, 0.0), LEAST_SCALE)
@@ -272,7 +274,8 @@ class Comparison:
         places, found = self.columns_of(begin.labels), []
         own = self.windows_of([self.free[k] for k in places])
         values = own.clipped(begin.values[places])
-        bare, n, gains = own.linearised(values), len(values), own.gains(values)
+        n, gains = len(values), own.gains(values)
+        bare = own.linearised(values, gains)
         for link in LINKS:
             shapes = [one.name for one in free_of(link)]
             whole = self.windows_of([self.free[k] for k in places], FreeForm(link, tuple(shapes)))

@@ -60,40 +60,44 @@ class HeldOutWindows(PredictionError):
             E = self.residuals(Y[:, k], one)
             yield E[0], np.concatenate([known[k], (E[1:] - E[0]) / size[n:, None]])
 
-    def linearised(self, values: np.ndarray) -> "Linearised":
-        """Every run's mean square about values (n,)."""
-        return Linearised.gathered(values, self, self.columns(values, self.gains(values), self.cuts))
+    def linearised(self, values: np.ndarray, gains: Gains | None = None) -> "Linearised":
+        """Every run's mean square about values (n,); gains: the observer's there, if they are known."""
+        gains = self.gains(values) if gains is None else gains
+        return Linearised.gathered(values, self, self.columns(values, gains, self.cuts))
 
-    def squares(self, values: np.ndarray) -> np.ndarray:
-        """Mean squares (runs, channels) at values (n,), whose sum is that over runs of the channels' mean."""
-        Y = self.fly([values], self.gains(values), self.cuts)
+    def squares(self, points: list[np.ndarray], gains: Gains) -> np.ndarray:
+        """Mean squares (points, runs, channels), whose sum is that over runs of the channels' mean, with an observer's
+        gains for all points."""
+        Y = self.fly(points, gains, self.cuts)
         runs, channels = len(self.problem.runs), len(self.channels)
-        found = np.zeros(runs * channels)
+        found = np.zeros((len(points), runs * channels))
         for k, one in enumerate(self.cuts):
-            e = self.residuals(Y[:, k], one)[0]
             run_of, channel_of = self.origins(one)
-            weight = self.weights(e)[0] / len(self.cuts)
-            found += np.bincount(run_of * channels + channel_of, weight * e * e, len(found))
-        return found.reshape(runs, channels)
+            for n, e in enumerate(self.residuals(Y[:, k], one)):
+                weight = self.weights(e)[0] / len(self.cuts)
+                found[n] += np.bincount(run_of * channels + channel_of, weight * e * e, runs * channels)
+        return found.reshape(len(points), runs, channels)
 
     def left_out(self, begin: np.ndarray) -> "LeftOut":
         """The fit to all runs, led from values (n,), and every run flown by the fit to the others."""
-        values, cost, _ = self.led(self.clipped(begin), self.cuts, STEPS[-1])
-        at, every = self.linearised(values), np.arange(len(values))
+        values, cost, gains = self.led(self.clipped(begin), self.cuts, STEPS[-1])
+        at, every = self.linearised(values, gains), np.arange(len(values))
         held = max(cost, 1.0) / self.independent(self.cuts)
         runs = len(at.value)
-        found, others = np.zeros((runs, len(self.channels))), np.tile(values, (runs, 1))
-        whole = self.squares(values)
-        for run in range(runs):
-            kept = np.arange(runs) != run if runs > 1 else np.full(1, True)
-            found[run], least = whole[run], whole[kept].sum() + held * values @ values
-            step = at.step(every, 1.0 / held, run if runs > 1 else None)
-            for share in SHARES:
-                tried = self.clipped(values + share * step)
-                squares = self.squares(tried)
-                if squares[kept].sum() + held * tried @ tried <= least:
-                    found[run], others[run] = squares[run], tried
-                    break
+        kept = ~np.eye(runs, dtype=bool) if runs > 1 else np.full((1, 1), True)
+        steps = [at.step(every, 1.0 / held, run if runs > 1 else None) for run in range(runs)]
+        others, todo = np.tile(values, (runs, 1)), list(range(runs))
+        (whole,) = self.squares([values], gains)
+        found = whole.copy()
+        for share in SHARES:
+            tried = [self.clipped(values + share * steps[run]) for run in todo]
+            for run, point, squares in zip(list(todo), tried, self.squares(tried, gains), strict=True):
+                least = whole[kept[run]].sum() + held * values @ values
+                if squares[kept[run]].sum() + held * point @ point <= least:
+                    found[run], others[run] = squares[run], point
+                    todo.remove(run)
+            if not todo:
+                break
         return LeftOut(values, found, others, at.normal.sum(axis=0) / held + np.eye(len(values)))
 
 

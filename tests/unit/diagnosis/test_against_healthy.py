@@ -272,10 +272,13 @@ def test_a_run_left_out_is_flown_by_a_fit_that_is_better_for_the_others(askew):
     compared = askew.compared
     windows = compared.windows_of(compared.free[: len(compared.nuisance)])
     found = windows.left_out(windows.file_values)
-    whole = windows.squares(found.values)
+    gains = windows.gains(found.values)
+    (whole,) = windows.squares([found.values], gains)
     assert found.runs.shape == (LATER,)
     assert (found.runs >= whole.sum(axis=1)).all()
     for run, values in enumerate(found.others):
-        squares, kept = windows.squares(values), np.arange(LATER) != run
+        (squares,), kept = windows.squares([values], gains), np.arange(LATER) != run
         assert squares[run] == pytest.approx(found.squares[run])
+        (own_observer,) = windows.squares([values], windows.gains(values))
+        assert own_observer[run] == pytest.approx(squares[run], rel=0.05)
         assert squares[kept].sum() < 1.02 * whole[kept].sum()
