@@ -1,6 +1,6 @@
 """The vehicle: what a vehicle file holds, and its way into the kernels' parameter vector."""
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import msgspec
 import numpy as np
@@ -240,6 +240,7 @@ class Vehicle(Table):
     form: FormTable | None = None
     limits: Limits | None = None
     supervisor: SupervisorTable = SupervisorTable()
+    kind: ClassVar[str] = "roughie"
 
     def vector(self) -> np.ndarray:
         """The parameter vector P of the kernels, shape (layout.N_P,), SI."""

@@ -4,7 +4,7 @@ See docs/explanation/ocean.md, Vehicle files.
 """
 
 from importlib.resources import files
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import msgspec
 import numpy as np
@@ -169,6 +169,7 @@ class OceanVehicle(Table):
     # by label of the catalogue, its parameters: what this vehicle has beside its numbers
     effects: dict[str, dict[str, Number]] = msgspec.field(default_factory=dict)
     identified: OceanIdentified | None = None
+    form: ClassVar[None] = None  # what its equations leave of healthy runs is not written into its file
 
     @property
     def assumed(self) -> dict[str, Assumed]:

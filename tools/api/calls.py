@@ -1,12 +1,11 @@
 """Functions of the API. Each takes a case as a folder, as `Case` or as the tools' own; none prints, none exits."""
 
-import contextlib
 import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import MappingProxyType
-from typing import Any, Literal, ParamSpec, TypeVar
+from typing import Literal, ParamSpec, TypeVar
 
 from glider.hal.strict import ConfigError
 from glider.tools.api.recordings import Case, Log, Run, case_of, case_of_logs
@@ -14,6 +13,7 @@ from glider.tools.api.result import frozen
 from glider.tools.api.results import Diagnosis, EffectTable, Gap, Identification, Readings, VehicleTable, Watch
 from glider.tools.data.errors import InputError, need
 from glider.tools.data.runs import case as cases
+from glider.tools.data.vehicle_kinds import kind_of, kinds, no_progress
 
 Progress = Callable[[str], None]
 AnyCase = Case | cases.Case | Path | str
@@ -44,16 +44,6 @@ def _loaded(case: AnyCase, leave_out: bool = False) -> cases.Case:
     if isinstance(case, Case):
         return case._case
     return case if isinstance(case, cases.Case) else cases.load_case(case, leave_out=leave_out)
-
-
-def _compile(case: cases.Case, say: Progress) -> None:
-    """Compile the kernels of a diagnosis, unless that was done."""
-    from glider.sim_backend.ocean.vehicle import OceanVehicle
-    from glider.tools.diagnose.precompile import DIAGNOSIS
-    from glider.tools.flight.precompile import ensure_compiled
-
-    if not isinstance(case.vehicle, OceanVehicle):
-        ensure_compiled(DIAGNOSIS, say, lambda label, total: contextlib.nullcontext(lambda n: None))
 
 
 @one_error
@@ -140,7 +130,7 @@ def simulate(
         raise InputError("no mission to fly", source="missions")
     if seed < 0:
         raise InputError(f"expected a number of at least 0, got {seed}", source="seed")
-    ensure_compiled(FLIGHT, say, lambda label, total: contextlib.nullcontext(lambda n: None))
+    ensure_compiled(FLIGHT, say, no_progress)
     logs, notes = [], []
     with TemporaryDirectory(prefix="glider-") as folder:
         for n, mission in enumerate(listed):
@@ -216,7 +206,7 @@ def measure_gap(case: AnyCase, model: str = "nominal", progress: Progress | None
 
     need("analysis")
     loaded = _loaded(case)
-    _compile(loaded, _say(progress))
+    kind_of(loaded.vehicle).compile(_say(progress))
     return Gap(assess(loaded, load_model(model, loaded)))
 
 
@@ -248,15 +238,9 @@ def readings(case: AnyCase) -> Readings:
     >>> print(found.summary())  # doctest: +ELLIPSIS
     not_flying run00: afloat at the end for ...
     """
-    from glider.sim_backend.ocean.vehicle import OceanVehicle
-    from glider.tools.readings.check import check
-
     need("analysis")
     loaded = _loaded(case)
-    if isinstance(loaded.vehicle, OceanVehicle):
-        message = "an ocean glider: its readings are held against each other by gap watch"
-        raise InputError(message, source=loaded.folder)
-    return Readings(check(loaded.runs))
+    return Readings(kind_of(loaded.vehicle).readings(loaded))
 
 
 @one_error
@@ -292,18 +276,8 @@ def identify(
     MissingExtra
         If the extra `identify` (of an ocean glider: `analysis`) is not installed.
     """
-    from glider.sim_backend.ocean.vehicle import OceanVehicle
-
-    loaded, say = _loaded(case, leave_out=True), _say(progress)
-    if isinstance(loaded.vehicle, OceanVehicle):
-        need("analysis")
-        from glider.tools.identify.ocean.identify import identify_ocean
-
-        return Identification(identify_ocean(loaded, say), ocean=True)
-    need("identify")
-    from glider.tools.identify.pipeline import identify as identify_pool
-
-    return Identification(identify_pool(loaded, seed, likelihood, say))
+    loaded = _loaded(case, leave_out=True)
+    return Identification(kind_of(loaded.vehicle).identify(loaded, seed, likelihood, _say(progress)))
 
 
 @one_error
@@ -345,60 +319,13 @@ def diagnose(
     from glider.tools.diagnose.record import ANSWER
 
     loaded = _loaded(case)
-    write = _diagnosed(loaded, None if reference is None else _loaded(reference), without, _say(progress))
+    healthy = None if reference is None else _loaded(reference)
+    write = kind_of(loaded.vehicle).diagnose(loaded, healthy, without, _say(progress))
     with TemporaryDirectory(prefix="glider-") as folder:
         out = Path(folder)
         sentence = write(out)
         files = {path.name: path.read_bytes() for path in sorted(out.iterdir(), key=lambda one: one.stat().st_mtime_ns)}
     return Diagnosis(frozen(json.loads(files[ANSWER])), sentence, MappingProxyType(files))
-
-
-def _diagnosed(
-    loaded: cases.Case, reference: cases.Case | None, without: str | None, say: Progress
-) -> Callable[[Path], str]:
-    """Diagnose by the method that suits vehicle and question.
-
-    Returns a function that writes the answer and its report into a folder and returns the verdict's sentence.
-    """
-    from glider.sim_backend.ocean.vehicle import OceanVehicle
-    from glider.tools.diagnose import against_answer
-    from glider.tools.diagnose import diagnosis as single
-    from glider.tools.diagnose.against_healthy import diagnose_against_healthy, form_stands_out
-    from glider.tools.inference.rules import Rules
-    from glider.tools.report.diagnosis import write_report
-    from glider.tools.report.pooled import write_pooled_report
-    from glider.tools.report.words import sentence
-    from glider.tools.watch import whole_case
-
-    if isinstance(loaded.vehicle, OceanVehicle):
-        if reference is not None:
-            message = "what changed of an ocean glider asks `glider gap watch --reference CASE0`"
-            raise InputError(message, source=loaded.folder)
-        ocean = whole_case.diagnose_ocean(loaded, say)
-
-        def write_ocean(out: Path) -> str:
-            whole_case.write(ocean, out)
-            return write_pooled_report(out)
-
-        return write_ocean
-    if reference is not None and without is not None:
-        raise InputError("a part of the method is left out only without a reference", source="without")
-    _compile(loaded, say)
-    if reference is not None or (without is None and form_stands_out(loaded)):
-        compared = diagnose_against_healthy(loaded, reference, say)
-
-        def write_compared(out: Path) -> str:
-            against_answer.write(compared, out)
-            return write_pooled_report(out)
-
-        return write_compared
-    found = single.diagnose(loaded, say, Rules() if without is None else Rules().without(without))
-
-    def write_single(out: Path) -> str:
-        single.write(found, out)
-        return sentence(write_report(out))
-
-    return write_single
 
 
 @one_error
@@ -511,10 +438,4 @@ def vehicles() -> VehicleTable:
     >>> "roughie" in glider.vehicles().names
     True
     """
-    from glider.firmware.model.library import shipped
-    from glider.sim_backend.ocean.vehicle import shipped_vehicles
-
-    kinds: dict[str, Any] = dict.fromkeys(shipped("model/vehicles"), "pool") | dict.fromkeys(
-        shipped_vehicles(), "ocean"
-    )
-    return VehicleTable(frozen(kinds))
+    return VehicleTable(frozen({name: kind.group for kind in kinds().values() for name in kind.shipped()}))

@@ -313,10 +313,9 @@ def case_of_logs(logs: list[RecordedLog], vehicle: str | None = None, notes: lis
 
 def case_of(case: cases.Case, notes: tuple[str, ...] = ()) -> Case:
     """A loaded case as the API's, with the text of its vehicle's file where it is not a shipped one."""
-    from glider.firmware.model.library import shipped
-    from glider.sim_backend.ocean.vehicle import shipped_vehicles
     from glider.tools.data.sources import name_or_path
+    from glider.tools.data.vehicle_kinds import shipped_vehicles
 
-    if case.vehicle_name in shipped("model/vehicles") | shipped_vehicles():
+    if case.vehicle_name in shipped_vehicles():
         return Case(case, notes)
     return Case(case, notes, name_or_path(case.vehicle_name, "vehicle", "model/vehicles", base=case.folder)[0])

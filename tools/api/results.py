@@ -18,9 +18,8 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
     from glider.sim_backend.core.effects.base import Effect
+    from glider.tools.data.vehicle_kinds import Identified
     from glider.tools.gap.assess import CaseGap
-    from glider.tools.identify.ocean.identify import OceanIdentification
-    from glider.tools.identify.pipeline import Identified
     from glider.tools.readings.check import Readings as ReadingCheck
     from glider.tools.watch.answer import WatchAnswer
 
@@ -278,48 +277,34 @@ class Identification(Result):
     See docs/explanation/identification.md, docs/explanation/ocean.md.
     """
 
-    _found: "Identified | OceanIdentification" = field(repr=False)
-    ocean: bool = False
+    _found: "Identified" = field(repr=False)
 
     @property
     def answer(self) -> Mapping[str, Any]:
         """The result as `glider identify --json` prints it."""
-        from glider.tools.identify.ocean import files
-
-        found: Any = self._found
-        return frozen(as_plain(files.plain(found) if self.ocean else found.plain()))
+        return frozen(as_plain(self._found.plain()))
 
     @property
     def vehicle_text(self) -> str:
         """The identified vehicle file, TOML."""
-        from glider.tools.identify import files
-        from glider.tools.identify.ocean import files as ocean_files
-
-        found: Any = self._found
-        return ocean_files.vehicle_text(found) if self.ocean else files.vehicle_text(found)
+        return self._found.vehicle_text
 
     @property
     def notes(self) -> tuple[str, ...]:
         """Runs that were left out, and what limits the result."""
-        found: Any = self._found
-        return (*(f"left out: {one}" for one in found.left_out), *(() if self.ocean else found.notes))
+        return self._found.notes
+
+    @property
+    def has_report(self) -> bool:
+        """Whether `save` writes a report."""
+        return self._found.report
 
     def save(self, folder: Path | str) -> None:
         """Write the result's files into a folder: identified.toml, and of a pool vehicle report.html, posterior.nc."""
-        from glider.tools.identify import files
-        from glider.tools.identify.ocean import files as ocean_files
-        from glider.tools.report.identified import write_report
-
-        found, folder = self._found, Path(folder)
-        if self.ocean:
-            ocean_files.write(found, folder)  # type: ignore[arg-type]
-            return
-        files.write(found, folder)  # type: ignore[arg-type]
-        write_report(folder / "report.html", found)  # type: ignore[arg-type]
+        self._found.write(Path(folder))
 
     def _lines(self) -> list[str]:
-        found: Any = self._found
-        return sentences.ocean_lines(found) if self.ocean else sentences.identified_lines(found)
+        return self._found.lines()
 
     def _columns(self) -> dict[str, list[Any]]:
         rows = self.answer["parameters"]

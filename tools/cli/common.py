@@ -105,13 +105,10 @@ def progress(label: str, total: int) -> Iterator[Callable[[int], None]]:
 
 
 def compile_diagnosis(case: Any) -> None:
-    """Compile what the diagnosis of a case calls, unless that was done: an ocean glider's kernels are few."""
-    from glider.sim_backend.ocean.vehicle import OceanVehicle
-    from glider.tools.diagnose.precompile import DIAGNOSIS
-    from glider.tools.flight.precompile import ensure_compiled
+    """Compile what the diagnosis of a case calls, unless that was done."""
+    from glider.tools.data.vehicle_kinds import kind_of
 
-    if not isinstance(case.vehicle, OceanVehicle):
-        ensure_compiled(DIAGNOSIS, say, progress)
+    kind_of(case.vehicle).compile(say, progress)
 
 
 def compile_campaign() -> None:

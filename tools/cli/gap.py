@@ -44,14 +44,13 @@ def measure(case: Path, report: Path | None, vehicle: str | None, as_json: bool)
     if (theirs := own.own_vehicle(case, vehicle)) is not None:
         own.measure(theirs, case, as_json)
         return
-    from glider.sim_backend.ocean.vehicle import OceanVehicle
     from glider.tools import api
     from glider.tools.data.errors import need
     from glider.tools.data.files import check_writable
     from glider.tools.data.runs.case import load_case
+    from glider.tools.data.vehicle_kinds import kind_of
 
     need("analysis")
-    from glider.tools.readings.check import disagreement
 
     loaded = load_case(case, vehicle)
     say_assumed(loaded.vehicle_name, loaded.assumed)
@@ -59,7 +58,7 @@ def measure(case: Path, report: Path | None, vehicle: str | None, as_json: bool)
         report = Path(f"{case.resolve().name}-gap.html")
     if report is not None:
         check_writable(report.parent)
-    for text in [] if isinstance(loaded.vehicle, OceanVehicle) else disagreement(loaded.runs):
+    for text in kind_of(loaded.vehicle).disagreements(loaded):
         say(f"note: {text}")
     compile_diagnosis(loaded)
     with progress("gap", 3) as advance:

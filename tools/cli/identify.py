@@ -29,11 +29,11 @@ def identify(
     than the file does. With --out: identified.toml (a vehicle file that says where it comes from), report.html,
     posterior.nc (ArviZ). A model of one's own takes several cases, each a session of its own.
     """
-    from glider.sim_backend.ocean.vehicle import OceanVehicle
     from glider.tools import api
     from glider.tools.data.errors import need
     from glider.tools.data.files import check_writable
     from glider.tools.data.runs.case import load_case
+    from glider.tools.data.vehicle_kinds import kind_of
 
     if out is not None:
         check_writable(out)
@@ -43,7 +43,7 @@ def identify(
     if len(cases) > 1:
         raise click.UsageError("several cases are for a model of one's own; this vehicle takes one")
     loaded = load_case(cases[0], vehicle, leave_out=True)
-    need("analysis" if isinstance(loaded.vehicle, OceanVehicle) else "identify")
+    need(kind_of(loaded.vehicle).extra)
     from glider.tools.identify.files import VEHICLE
     from glider.tools.report.page import REPORT
 
@@ -53,5 +53,5 @@ def identify(
         say(note)
     if out is not None:
         found.save(out)
-        say(f"vehicle: {out / VEHICLE}{'' if found.ocean else f', report: {out / REPORT}'}")
+        say(f"vehicle: {out / VEHICLE}{f', report: {out / REPORT}' if found.has_report else ''}")
     print_result(found, as_json)

@@ -11,13 +11,12 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from glider.firmware.model.library import shipped
 from glider.hal.strict import ConfigError, decode
-from glider.sim_backend.ocean.vehicle import shipped_vehicles
 from glider.tools.data.errors import InputError
 from glider.tools.data.files import check_writable, write_bytes
 from glider.tools.data.runs.case import CASE_FILE, CaseTable
 from glider.tools.data.sources import name_or_path, read_text
+from glider.tools.data.vehicle_kinds import shipped_vehicles
 from glider.tools.study.workers import check_reachable, work_through
 
 TIMEOUT_S = 900.0  # s of a command
@@ -198,7 +197,7 @@ class OneCommand:
 
 def shipped_names() -> set[str]:
     """Names of the shipped vehicles of all kinds."""
-    return {*shipped("model/vehicles"), *shipped_vehicles()}
+    return set(shipped_vehicles())
 
 
 def outside_vehicle(case: Path) -> str | None:

@@ -1,16 +1,15 @@
 """From what a user types, a name or a path, to a decoded file."""
 
-import tomllib
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from glider.firmware.guidance.mission import Mission, decode_mission
 from glider.firmware.model.library import shipped
-from glider.firmware.model.vehicle import Vehicle, decode_vehicle
+from glider.firmware.model.vehicle import Vehicle
 from glider.hal.strict import ConfigError
-from glider.sim_backend.ocean.vehicle import KIND, OceanVehicle, decode_ocean_vehicle, shipped_vehicles
 from glider.tools.data.errors import InputError
+from glider.tools.data.vehicle_kinds import UNNAMED, kind_of, kind_of_file, kinds, shipped_vehicles
 
 T = TypeVar("T")
 MAX_TEXT_CHARACTERS = 256_000_000  # characters of any text file
@@ -54,23 +53,16 @@ def _load(wanted: str, kind: str, folder: str, decode: Callable[[str, str], T], 
 def load_vehicle(wanted: str, base: Path | None = None) -> Vehicle:
     """A vehicle by shipped name or path; `base` is the folder of the file that names it. ConfigError: another kind."""
     found = load_any_vehicle(wanted, base)
-    if isinstance(found, OceanVehicle):
-        raise ConfigError(wanted, "an ocean glider: this command flies or asks a ROUGHIE-like vehicle", key="kind")
+    if not isinstance(found, Vehicle):
+        ours, theirs = kinds()[UNNAMED].noun, kind_of(found).noun
+        raise ConfigError(wanted, f"{theirs}: this command flies or asks {ours}", key="kind")
     return found
 
 
-def load_any_vehicle(wanted: str, base: Path | None = None) -> Vehicle | OceanVehicle:
+def load_any_vehicle(wanted: str, base: Path | None = None) -> Any:
     """A vehicle of any kind, as load_vehicle."""
     text, source = name_or_path(wanted, "vehicle", "model/vehicles", base, shipped_vehicles())
-    return decode_ocean_vehicle(text, source) if _kind_of(text) == KIND else decode_vehicle(text, source)
-
-
-def _kind_of(text: str) -> object:
-    """The kind that a vehicle file names; None where it names none or is no TOML (its own reader then says so)."""
-    try:
-        return tomllib.loads(text).get("kind")
-    except (ValueError, RecursionError):
-        return None
+    return kind_of_file(text, source).decode(text, source)
 
 
 def load_mission(wanted: str) -> tuple[str, str, Mission]:

@@ -14,7 +14,7 @@ that run, so that an effect has to shrink what it has not seen:
 
 from collections.abc import Callable, Iterable, Set
 from dataclasses import dataclass, field, replace
-from itertools import combinations
+from itertools import combinations, islice
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -23,7 +23,6 @@ from scipy.stats import norm
 
 from glider.firmware.model.vehicle import FormTable
 from glider.sim_backend.core.effects import effect_layout as ef
-from glider.sim_backend.ocean.vehicle import OceanVehicle
 from glider.tools.data.errors import InputError
 from glider.tools.data.runs import columns
 from glider.tools.data.runs.case import Case
@@ -42,12 +41,14 @@ from glider.tools.inference.pooled import Pooled, log_prior
 from glider.tools.inference.problem import Problem, problem_of
 
 CAUSE = "cause"
-STRANGE = 0.15  # prior probability that something is left beside what is named
+STRANGE = 0.15  # prior probability that something is left where nothing is named
+STANDS_IN = 0.25  # of a label that it stands in for something unknown: so many changes no label is for
 LEAST_SCALE = 0.05  # tolerances
 STANDS_OUT = 2.0  # times what noise leaves of healthy runs, in squares, that the form leaves of them: the form decides
 TOTAL = "total"
 REFIT_STEPS, REFIT_FURTHER, MAX_EFFECTS = 6, 4, 3  # labels fitted in full at first, beside others, and effects at most
 REFIT_FORMS, MAX_SHAPES = 2, 3  # free forms fitted in full, and shapes of each at most
+FAR = (-2.0, 2.0)  # sigma of a label's prior, from which its fit begins where that is better than the step from 0
 SHARES = np.linspace(0.005, 0.995, 100)  # of a change, in amplitude, that its label leaves
 OWN_FORM = norm.pdf(SHARES, scale=FORM) / norm.pdf(SHARES, scale=FORM).sum()
 FILE_ERROR = 0.2  # of a label's prior, 1 sigma that the vehicle file is off by, before healthy runs say more
@@ -145,7 +146,7 @@ def of_form(form: FormTable) -> Healthy:
 
 def form_stands_out(case: Case) -> bool:
     """Whether a case's vehicle was identified, and its form leaves more of healthy runs than noise does, in squares."""
-    form = None if isinstance(case.vehicle, OceanVehicle) else case.roughie.form
+    form = case.vehicle.form
     return form is not None and form.gaps[ALL][TOTAL] ** 2 > STANDS_OUT * form.noise**2
 
 
@@ -301,14 +302,29 @@ class Comparison:
         return self.nat_of(objective) - occam, at.values + step
 
     def expected_labels(self, begin: HealthyHypothesis) -> list[tuple[float, str, np.ndarray]]:
-        """Labels beside a hypothesis by one linear step, the most probable first: log evidence, label, values."""
-        at = self.windows.linearised(self.windows.clipped(begin.values))
-        found = [
-            (nat, label, values)
-            for label in self.places
-            if label not in begin.labels
-            for nat, values in [self.expected(at, self.columns_of((*begin.labels, label)), begin)]
-        ]
+        """Labels beside a hypothesis, the most probable first: log evidence, label, values to begin a fit from.
+
+        By one linear step or, where the misfit is smaller there, from a parameter's value far from 0 as it is: a rate limit
+        does nothing until it is reached, and a fit from 0 rests before.
+        """
+        values = self.windows.clipped(begin.values)
+        gains = self.windows.gains(values)
+        at = self.windows.linearised(values, gains)
+        places = {label: own for label, own in self.places.items() if label not in begin.labels}
+        points = [self.windows.clipped(values + far * row) for own in places.values() for k in own
+                  for row in [np.eye(1, len(values), k)[0]] for far in FAR]  # fmt: skip
+        weight = self.weight(begin.mean_square)
+        squares = iter(self.windows.squares(points, gains).sum(axis=(1, 2)))
+        found, starts = [], iter(points)
+        for label, own in places.items():
+            free = self.columns_of((*begin.labels, label))
+            objective, occam, step = at.expected(free, weight)
+            best, start = objective, values + step
+            for point, square in islice(zip(starts, squares, strict=True), len(own) * len(FAR)):
+                there = float(square + point @ point / weight)
+                if there < best:
+                    best, start = there, point
+            found.append((self.nat_of(best) - occam, label, start))
         return sorted(found, key=lambda one: -one[0])
 
     def nat(self, one: HealthyHypothesis) -> float:
@@ -393,8 +409,9 @@ def weigh(compared: Comparison, listed: list[HealthyHypothesis]) -> Weighed:
     kept = [nothing, *(one for one in listed[1:] if one.mean_square < nothing.mean_square)]
     usual_ones = [other for one in kept if one.form is None for other in compared.without_change(one)]
     for one in [*kept, *usual_ones]:
+        strange = STANDS_IN if one.labels else STRANGE
         usual, more = compared.leftover(one)
-        usual, more = usual + float(np.log1p(-STRANGE)), more + float(np.log(STRANGE))
+        usual, more = usual + float(np.log1p(-strange)), more + float(np.log(strange))
         at, either = compared.nat(one) + one.as_usual, float(np.logaddexp(usual, more))
         if one.form is not None:
             at += one.form.prior
@@ -405,7 +422,7 @@ def weigh(compared: Comparison, listed: list[HealthyHypothesis]) -> Weighed:
         if one.form is not None:  # its label's own form, or something unknown
             label = next(other for other in kept if other.labels == one.labels and other.form is None)
             share = compared.share(label, one)
-            own, other = norm.logpdf(share, scale=FORM) + np.log(2.0 * (1.0 - STRANGE)), np.log(STRANGE)
+            own, other = norm.logpdf(share, scale=FORM) + np.log(2.0 * (1.0 - STANDS_IN)), np.log(STANDS_IN)
             more = float(np.logaddexp(usual + other, more))
             usual += float(own)
         before = weights.get((one.labels, one.form))

@@ -13,12 +13,12 @@ import numpy as np
 
 from glider.sim_backend.core.effects import effect_layout as ef
 from glider.sim_backend.core.effects.catalogue import catalogue
-from glider.sim_backend.ocean.vehicle import OceanVehicle
 from glider.tools.data.errors import InputError
 from glider.tools.data.intervals import NINETY
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs.case import Case
 from glider.tools.data.runs.run import Run
+from glider.tools.data.vehicle_kinds import kind_of
 from glider.tools.inference.model import Model, effect_vector
 from glider.tools.inference.vehicle_parameters import GAUGE
 from glider.tools.readings.check import apply_corrections, check, corrected_runs
@@ -55,9 +55,7 @@ class ReadingCorrections:
 
 def submerged(case: Case) -> Case:
     """The case without what was measured out of the water; readings are compared with each other before."""
-    if isinstance(case.vehicle, OceanVehicle):
-        return case
-    return replace(case, runs=[under_water(run) for run in case.runs])
+    return replace(case, runs=[kind_of(case.vehicle).submerged(run) for run in case.runs])
 
 
 def findings_of(runs: list[Run]) -> list[Finding]:

@@ -55,8 +55,7 @@ class Velocity:
 
 def velocities(case: Case, model: Model) -> list[Velocity]:
     """Every run's; InputError for another kind of vehicle, or where a run lacks what the model is driven by."""
-    if not isinstance(case.vehicle, OceanVehicle):
-        raise InputError("velocity is asked of ocean gliders", source=case.folder, column="vehicle")
+    case.of(OceanVehicle)
     for run in case.runs:
         missing = missing_input(run)
         if missing is not None:

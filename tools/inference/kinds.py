@@ -1,12 +1,12 @@
-"""Which kind of vehicle a vehicle file describes."""
+"""The equations that a vehicle is flown by, of whatever kind it is."""
 
 from typing import Any
 
-from glider.sim_backend.ocean.vehicle import OceanVehicle
-from glider.tools.inference.kind import ROUGHIE, Kind
-from glider.tools.inference.ocean_kind import OCEAN
+from glider.tools.data import vehicle_kinds
+from glider.tools.inference.kind import Kind
 
 
 def kind_of(vehicle: Any) -> Kind:
-    """The kind of a vehicle, as its file was read."""
-    return OCEAN if isinstance(vehicle, OceanVehicle) else ROUGHIE
+    """Those of a vehicle, as its file was read."""
+    found: Kind = vehicle_kinds.kind_of(vehicle).equations()
+    return found

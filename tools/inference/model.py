@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from glider.sim_backend.ocean.catalogue import catalogue as ocean_catalogue
 from glider.sim_backend.ocean.core import layout as ocean
 from glider.sim_backend.ocean.vehicle import OceanVehicle
 from glider.tools.data.runs.case import Case
+from glider.tools.data.vehicle_kinds import kind_of
 
 NOMINAL = "nominal"  # its name
 
@@ -38,10 +40,14 @@ def nominal_model(case: Case) -> Model:
     return vehicle_model(NOMINAL, case.vehicle)
 
 
-def vehicle_model(name: str, vehicle: Vehicle | OceanVehicle) -> Model:
+def vehicle_model(name: str, vehicle: Any) -> Model:
+    """A vehicle of any kind as a model."""
+    found: Model = kind_of(vehicle).model(name, vehicle)
+    return found
+
+
+def roughie_model(name: str, vehicle: Vehicle) -> Model:
     """A vehicle as a model: what is uncertain as [uncertainty] says, or where it was identified as its covariance."""
-    if isinstance(vehicle, OceanVehicle):
-        return _ocean_model(name, vehicle)
     P = vehicle.vector()
     sigma = parameter_sigma(P, vehicle.uncertainty)
     F = own_effects(vehicle)
@@ -72,7 +78,7 @@ def _directions(C: np.ndarray, places: np.ndarray, count: int) -> np.ndarray:
     return np.asarray(spread[np.abs(spread).max(axis=1) > 0.0])
 
 
-def _ocean_model(name: str, vehicle: OceanVehicle) -> Model:
+def ocean_model(name: str, vehicle: OceanVehicle) -> Model:
     """An ocean glider as a model; F (ocean.N_F,) has the effects of its file."""
     P, sigma, F = vehicle.vector(), vehicle.sigma(), np.zeros(ocean.N_F)
     add_effects(F, vehicle.effects, name, ocean_catalogue())

@@ -6,23 +6,23 @@ beside them, by label.
 
 import json
 import pprint
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from glider.firmware.model.vehicle import COEFFICIENTS, PLACES
+from glider.firmware.model.vehicle import COEFFICIENTS, PLACES, Vehicle
 from glider.hal.strict import decode
 from glider.sim_backend.core.effects import effect_layout as ef
 from glider.sim_backend.core.effects.hydrodynamics import effective_coefficients
 from glider.sim_backend.core.effects.mass import effective_masses
 from glider.sim_backend.ocean.vehicle import PLACES as OCEAN_PLACES
-from glider.sim_backend.ocean.vehicle import OceanVehicle
 from glider.tools.data.errors import InputError
 from glider.tools.data.plain import as_plain
 from glider.tools.data.sources import load_any_vehicle, read_text
 from glider.tools.data.tomltext import toml_text
+from glider.tools.data.vehicle_kinds import kind_of
 from glider.tools.inference.corrected import BIASES, CorrectedTable, is_corrected, load_corrected
 from glider.tools.inference.model import effect_vector, effects_in, vehicle_model
 from glider.tools.inference.vehicle_parameters import coefficients
@@ -50,37 +50,61 @@ class VehicleNumbers:
     name: str
     source: str
     P: np.ndarray
-    F: np.ndarray
-    sd: dict[str, float]
-    ocean: bool = False
+    F: np.ndarray = field(default_factory=lambda: np.zeros(ef.N_F))
+    sd: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def places(self) -> dict[str, int]:
+        """Where numbers stand in P, by name."""
+        return PLACES
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Units by name, 1 where none is given."""
+        return _UNITS | dict(zip(COEFFICIENTS, (free.unit for free in coefficients(self.P)), strict=True))
 
     @property
     def effective(self) -> np.ndarray:
         """P with the effects that scale or shift its numbers, (N_P,)."""
         P = self.P.copy()
-        if not self.ocean:
-            effective_coefficients(self.F, P)
-            effective_masses(self.F, P)
+        effective_coefficients(self.F, P)
+        effective_masses(self.F, P)
         return P
 
     def plain(self) -> dict[str, Any]:
         """Numbers, effects and offsets of readings as a table."""
-        places = OCEAN_PLACES if self.ocean else PLACES
-        units = (
-            _OCEAN_UNITS
-            if self.ocean
-            else _UNITS | dict(zip(COEFFICIENTS, (free.unit for free in coefficients(self.P)), strict=True))
-        )
-        P = self.effective
+        found = self.table()
+        found["effects"] = effects_in(self.F)
+        found["bias"] = {name: float(self.F[entry]) for name, entry in BIASES.items() if self.F[entry] != 0.0}
+        return found
+
+    def table(self) -> dict[str, Any]:
+        """Its numbers by name with unit and 1 sigma."""
+        P, units = self.effective, self.units
         parameters = {
             name: {"value": float(P[place]), "unit": units.get(name, "1"), "sd": self.sd.get(name)}
-            for name, place in places.items()
+            for name, place in self.places.items()
         }
-        found: dict[str, Any] = {"vehicle": self.name, "source": self.source, "parameters": parameters}
-        if not self.ocean:
-            found["effects"] = effects_in(self.F)
-            found["bias"] = {name: float(self.F[entry]) for name, entry in BIASES.items() if self.F[entry] != 0.0}
-        return found
+        return {"vehicle": self.name, "source": self.source, "parameters": parameters}
+
+
+class OceanNumbers(VehicleNumbers):
+    """The same of an ocean glider, whose P (ocean layout.N_P,) no effect scales."""
+
+    @property
+    def places(self) -> dict[str, int]:
+        return OCEAN_PLACES
+
+    @property
+    def units(self) -> dict[str, str]:
+        return _OCEAN_UNITS
+
+    @property
+    def effective(self) -> np.ndarray:
+        return self.P
+
+    def plain(self) -> dict[str, Any]:
+        return self.table()
 
 
 def load_numbers(wanted: str) -> VehicleNumbers:
@@ -89,15 +113,14 @@ def load_numbers(wanted: str) -> VehicleNumbers:
     if path.is_file() and is_corrected(read_text(path)):
         table = decode(read_text(path), CorrectedTable, wanted)
         vehicle = load_any_vehicle(table.vehicle, path.parent)
-        if isinstance(vehicle, OceanVehicle):
-            raise InputError("an ocean glider's corrected model is not exported", source=wanted)
+        if not isinstance(vehicle, Vehicle):
+            raise InputError(f"the corrected model of {kind_of(vehicle).noun} is not exported", source=wanted)
         model = load_corrected(path, vehicle_model(vehicle.name, vehicle))
         return VehicleNumbers(vehicle.name, wanted, model.P, effect_vector(model), _sd(vehicle))
     vehicle = load_any_vehicle(wanted)
     model = vehicle_model(vehicle.name, vehicle)
-    ocean = isinstance(vehicle, OceanVehicle)
-    F = np.zeros(ef.N_F) if ocean else effect_vector(model)
-    return VehicleNumbers(vehicle.name, wanted, model.P, F, _sd(vehicle), ocean)
+    found: VehicleNumbers = kind_of(vehicle).numbers(vehicle.name, wanted, model, _sd(vehicle))
+    return found
 
 
 def _sd(vehicle: Any) -> dict[str, float]:

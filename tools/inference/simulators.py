@@ -16,7 +16,7 @@ from glider.firmware.core.vehicle.mass import first_moment, inertia, translation
 from glider.sim_backend.core.effects import effect_layout as ef
 from glider.tools.data.errors import InputError
 from glider.tools.inference.model import effects_in
-from glider.tools.inference.numbers_out import VehicleNumbers
+from glider.tools.inference.numbers_out import OceanNumbers, VehicleNumbers
 
 FORCES, VELOCITIES = "XYZKMN", "uvwpqr"
 EXPRESSED = {  # effects of the catalogue that these forms can hold
@@ -28,7 +28,7 @@ SIGNS = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
 
 def require_pool(numbers: VehicleNumbers) -> None:
     """InputError for an ocean glider, whose model has no six degrees of freedom."""
-    if numbers.ocean:
+    if isinstance(numbers, OceanNumbers):
         message = "an ocean glider's model has no such coefficients: glider export parameters"
         raise InputError(message, source=numbers.source)
 

@@ -1,6 +1,6 @@
 """Which runs can be judged at all, and which part of them: a vehicle that does not fly says nothing about itself."""
 
-from collections.abc import Set
+from collections.abc import Sequence, Set
 from dataclasses import replace
 
 import numpy as np
@@ -63,7 +63,33 @@ def usable_dive(run: Run) -> Run | str:
     return f"flies steadily for {steady:.0f} s of {whole:.0f} s only: {listed or 'short stretches'}"
 
 
+def usable_flights(runs: Sequence[Run]) -> tuple[dict[int, Run], dict[int, str]]:
+    """The runs that can be judged by their number, with the readings that most have, and why the others cannot."""
+    found = {n: usable(run) for n, run in enumerate(runs)}
+    good = {n: one for n, one in found.items() if isinstance(one, Run)}
+    wanted = usual_readings(list(good.values()))
+    return _judged(found | {n: usable(runs[n], wanted) for n in good})
+
+
+def usable_dives(runs: Sequence[Run]) -> tuple[dict[int, Run], dict[int, str]]:
+    """The same of an ocean glider's dives."""
+    return _judged({n: usable_dive(run) for n, run in enumerate(runs)})
+
+
+def _judged(found: dict[int, Run | str]) -> tuple[dict[int, Run], dict[int, str]]:
+    return (
+        {n: one for n, one in found.items() if isinstance(one, Run)},
+        {n: one for n, one in found.items() if isinstance(one, str)},
+    )
+
+
 def readings_of(runs: list[Run]) -> set[str]:
     """The readings that every one of the runs has."""
     found = [{name for name in ASKED if recorded(run, name)} for run in runs]
     return set.intersection(*found) if found else set()
+
+
+def usual_readings(runs: list[Run]) -> set[str]:
+    """The readings that more than half of the runs have."""
+    each = [readings_of([run]) for run in runs]
+    return {name for name in ASKED if sum(name in own for own in each) > 0.5 * len(each)}

@@ -5,10 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from glider.sim_backend.ocean.vehicle import OceanVehicle
 from glider.tools.data.errors import InputError
 from glider.tools.data.runs.case import Case
-from glider.tools.data.runs.run import Run
+from glider.tools.data.vehicle_kinds import kind_of
 from glider.tools.gap.measure import run_gap
 from glider.tools.inference.predict import fly
 from glider.tools.inference.problem import Problem, cut, problem_of
@@ -19,8 +18,6 @@ from glider.tools.watch.flights import RunEnsemble
 from glider.tools.watch.history import History
 from glider.tools.watch.scatter import MIN_SCATTER_RUNS
 from glider.tools.watch.search import find_events
-from glider.tools.watch.usable import ASKED, readings_of, usable, usable_dive
-from glider.tools.watch.velocity import own_model, velocity
 from glider.tools.watch.verdicts import event_answer, material, resolve_events, run_verdict
 
 FIRST_SHARE = 3  # without a reference learning begins with one run in so many, at most as many as their kind says
@@ -29,7 +26,8 @@ FIRST_SHARE = 3  # without a reference learning begins with one run in so many, 
 def watch(case: Case, reference: Case | None = None, say: Callable[[str], None] = lambda text: None) -> WatchAnswer:
     """What changed over the runs of a case; InputError where there is nothing to compare them with."""
     before = [] if reference is None else reference.runs
-    runs, skipped = usable_runs([*before, *case.runs], isinstance(case.vehicle, OceanVehicle))
+    kind = kind_of(case.vehicle)
+    runs, skipped = kind.usable_runs([*before, *case.runs])
     count = len(before)
     here = sorted(runs)
     reference_names = [f"{reference.folder.name}/{run.name}" for run in before] if reference is not None else []
@@ -50,7 +48,7 @@ def watch(case: Case, reference: Case | None = None, say: Callable[[str], None] 
             history = looked_at(parts, problem, learned_from, judged, begins, say)
     resolved = resolve_events(history)
     run_names = [names[n] for n in here]
-    own = own_model(problem, learned_from) if isinstance(case.vehicle, OceanVehicle) else None
+    speeds = kind.speeds(problem, learned_from)
     verdicts = []
     for n, run in enumerate(case.runs, start=count):
         if n not in runs:
@@ -59,29 +57,10 @@ def watch(case: Case, reference: Case | None = None, say: Callable[[str], None] 
         k = here.index(n)
         gap = shared_gap(parts[k], history.flights)
         verdict = run_verdict(history, resolved, k, run.name, gap)
-        verdicts.append(verdict if own is None else replace(verdict, velocity=velocity(own, history, resolved, k)))
+        verdicts.append(verdict if speeds is None else replace(verdict, velocity=speeds(history, resolved, k)))
     events = [event_answer(history, one, run_names) for one in resolved]
     learned = [run_names[k] for k in np.flatnonzero(learned_from)]
     return WatchAnswer(verdicts, events, learned, cautions(case, reference, learned, skipped, names))
-
-
-def usable_runs(runs: list[Run], ocean: bool = False) -> tuple[dict[int, Run], dict[int, str]]:
-    """The runs that can be judged by their number, and why the others cannot."""
-    found = {n: usable_dive(run) if ocean else usable(run) for n, run in enumerate(runs)}
-    good = {n: one for n, one in found.items() if isinstance(one, Run)}
-    if not ocean:
-        wanted = usual_readings(list(good.values()))
-        found |= {n: usable(runs[n], wanted) for n in good}
-    return (
-        {n: one for n, one in found.items() if isinstance(one, Run)},
-        {n: one for n, one in found.items() if isinstance(one, str)},
-    )
-
-
-def usual_readings(runs: list[Run]) -> set[str]:
-    """The readings that more than half of the runs have."""
-    each = [readings_of([run]) for run in runs]
-    return {name for name in ASKED if sum(name in own for own in each) > 0.5 * len(each)}
 
 
 def first_runs(count: int, most: int) -> np.ndarray:

@@ -41,7 +41,7 @@ from glider.tools.inference.shared_parameters import shared_parameters
 from glider.tools.inference.steady import first_values
 from glider.tools.watch.answer import CAUSE
 from glider.tools.watch.lasting import NO_WATER, beside_all
-from glider.tools.watch.watch import usable_runs
+from glider.tools.watch.usable import usable_dives
 from glider.tools.watch.whole_left import UnexplainedResidual, disturbed, excess_water_noise_of, what_is_left
 from glider.tools.watch.whole_search import (
     CONFOUNDED_COSINE,
@@ -85,7 +85,7 @@ class OceanDiagnosis:
 
 def diagnose_ocean(case: Case, say: Callable[[str], None] = lambda text: None) -> OceanDiagnosis:
     """The effect that all runs of a case have in common; InputError where none can be judged."""
-    usable, out = usable_runs(case.runs, True)
+    usable, out = usable_dives(case.runs)
     skipped = {case.runs[n].name: why for n, why in out.items()}
     if not usable:
         name, why = next(iter(skipped.items()))
@@ -96,7 +96,7 @@ def diagnose_ocean(case: Case, say: Callable[[str], None] = lambda text: None) -
     shared = replace(shared_parameters(problem), allowed=1.0, effects=ABSENT)
     inflation, about = max(1.0, len(runs) / EFFECTIVE_DIVES), About(parts, shared)
     x = fit_shared(parts, shared, first_values(problem, shared.free), inflation, about)
-    identified = isinstance(case.vehicle, OceanVehicle) and case.vehicle.identified is not None
+    identified = case.vehicle.identified is not None
     if not identified:  # its noise is any vehicle's
         case = find_levels(case, problem_of(case, runs=some_runs(runs)), *shared.model(problem, x))
         problem = problem_of(case, runs=runs)
@@ -389,8 +389,7 @@ def cautions(found: OceanDiagnosis) -> list[str]:
 
 def write(found: OceanDiagnosis, out: Path) -> None:
     """diagnosis.json and corrected.toml into a folder."""
-    vehicle = found.case.vehicle
-    assert isinstance(vehicle, OceanVehicle)
+    vehicle = found.case.of(OceanVehicle)
     out.mkdir(parents=True, exist_ok=True)
     answer = (json.dumps(as_plain(plain(found)), indent=1) + "\n").encode()
     write_files({out / CORRECTED: corrected_text(vehicle, *found.model).encode("utf-8"), out / ANSWER: answer})

@@ -54,6 +54,8 @@ def place(tmp_path_factory):
     write_flights(folder / "healthy", trial, flights[:HEALTHY])
     write_flights(folder / "unchanged", trial, flights[HEALTHY:])
     write_flights(folder / "askew", trial, askew)
+    slow = later.fly(with_effect(trial.shapes, BY_LABEL["servo_slow"], np.array([8.0]), 1.0))
+    write_flights(folder / "slow", trial, slow)
     sizes, _ = BY_LABEL[OUTSIDE].draw(np.random.default_rng(1))
     write_flights(folder / "outside", trial, later.fly(with_effect(trial.shapes, BY_LABEL[OUTSIDE], sizes, 2.0)))
     nearest = vehicle_of(file, fit_flights(trial, flights[:HEALTHY], fit_forces(trial, flights[:HEALTHY])))
@@ -93,6 +95,14 @@ def test_a_change_beside_the_wrong_form_is_found_and_shrinks_what_was_left_out(a
     assert size["ci90"][0] < 0.25 < size["ci90"][1]  # rad, as it was drawn
     assert answer["gap"]["after"]["total"] < 0.7 * answer["gap"]["before"]["total"]
     assert askew.left["none"] > 3.0 > min(askew.left.values())
+
+
+def test_a_rate_limit_that_does_nothing_until_it_is_reached_is_found(place):
+    found = diagnosed(place, "slow")
+    assert (found.verdict, found.selected[0]) == ("cause", "servo_slow")
+    answer = plain(found)
+    causes = next(cause for cause in answer["causes"] if cause["label"] == "servo_slow")
+    assert causes["parameters"]["rate"]["ci90"][0] < np.log(33.0) < causes["parameters"]["rate"]["ci90"][1]
 
 
 def test_what_no_label_names_is_unknown_at_a_link(place):

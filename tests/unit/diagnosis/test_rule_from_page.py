@@ -43,7 +43,7 @@ def by_the_page(n, level, s, runs, most, table, usual):
     N = min(2 * runs / scatter2, most)
     tau = math.sqrt(scatter2 * (1 / n + 1 / runs) + 0.25**2)
     q0 = next(q for effects, k, q, _ in table if not effects and not k)
-    S, best = 0.15, {}
+    best = {}
 
     def log_weights(effects, k, q, gain):
         """Those of what is known, and of what is not."""
@@ -62,6 +62,7 @@ def by_the_page(n, level, s, runs, most, table, usual):
             y = np.linspace(0, 6, 121)
             u = float(student(max(0.0, float(z(math.exp(level)))), nu))
             m = (2 * normal(y, 1.5) * student(z(np.exp(level + y)), nu)).sum() * (y[1] - y[0])
+        S = 0.25 if effects else 0.15
         u, m, C = u * (1 - S), m * S, 18.0 ** -(k > 0) * 11.0**-k
         own = C * ((0.5 / EFFECTS) ** len(effects) if effects else 0.5)
         if k and not effects:

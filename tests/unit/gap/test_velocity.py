@@ -176,9 +176,9 @@ def test_another_kind_of_vehicle_is_refused(tmp_path, monkeypatch, capsys):
     t = 0.1 * np.arange(50)
     write_case(tmp_path / "case", [Run("run00", None, {names.TIME: t, names.DEPTH: 1.0 + 0.1 * t})], vehicle="roughie",
                site="made", log_rate_hz=10.0, water_density_kg_m3=998.0)  # fmt: skip
-    assert "ocean gliders" in refused(monkeypatch, capsys, tmp_path / "case", tmp_path / "out")
+    assert "an ocean glider" in refused(monkeypatch, capsys, tmp_path / "case", tmp_path / "out")
     case = load_case(tmp_path / "case")
-    with pytest.raises(InputError, match="ocean gliders"):
+    with pytest.raises(InputError, match="an ocean glider"):
         velocities(case, nominal_model(case))
 
 

@@ -4,23 +4,23 @@ import itertools
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import msgspec
 
 from glider.firmware.model.vehicle import Assumed, DisturbanceTable, NonNegative, SensorsTable, SensorTable, Vehicle
 from glider.hal.strict import MAX_BYTES, Table, decode
-from glider.sim_backend.ocean.vehicle import OceanVehicle
 from glider.tools.data.errors import InputError
 from glider.tools.data.files import require_file, write_bytes
-from glider.tools.data.runs import columns as names
 from glider.tools.data.runs import csvfile
 from glider.tools.data.runs.gate import LeftOut, parted, wrong_rate
 from glider.tools.data.runs.origin import ORIGIN_FILE, flight_columns, set_flights
 from glider.tools.data.runs.run import Run, load_run, run_name, write_run
 from glider.tools.data.sources import load_any_vehicle, read_text
 from glider.tools.data.tomltext import toml_text
+from glider.tools.data.vehicle_kinds import VehicleKind, kind_of, kinds
 
+V = TypeVar("V")
 CASE_FILE = "case.toml"
 VEHICLE_FILE = "vehicle.toml"  # beside it, where the vehicle is not a shipped one
 _RUN_FILE = re.compile(r"run(?!s\.csv).*\.csv(\.gz)?\Z")  # runs.csv is a table of them
@@ -66,7 +66,7 @@ class Case:
     """Runs of one vehicle at one site."""
 
     folder: Path
-    vehicle: Vehicle | OceanVehicle
+    vehicle: Any  # Vehicle, or another kind's (tools/data/vehicle_kinds)
     vehicle_name: str  # as case.toml gives it: a shipped name or a path
     site: str
     log_rate_hz: float
@@ -80,12 +80,15 @@ class Case:
 
     @property
     def roughie(self) -> Vehicle:
-        """The vehicle of a command that takes no ocean glider; InputError where it is one."""
-        if isinstance(self.vehicle, OceanVehicle):
-            raise InputError(
-                f"{self.vehicle_name} is an ocean glider, which this command does not take", source=self.folder,
-                column="vehicle",
-            )  # fmt: skip
+        """The vehicle of a command that takes no other kind; InputError where it is one."""
+        return self.of(Vehicle)
+
+    def of(self, wanted: type[V]) -> V:
+        """The vehicle of a command that takes one kind alone, by its class; InputError where it is another."""
+        if not isinstance(self.vehicle, wanted):
+            asked = next(kind.noun for kind in kinds().values() if kind.vehicle is wanted)
+            message = f"{self.vehicle_name} is {kind_of(self.vehicle).noun}: this command takes {asked}"
+            raise InputError(message, source=self.folder, column="vehicle")
         return self.vehicle
 
 
@@ -120,13 +123,12 @@ def _read_case_file(folder: Path) -> CaseTable:
 def _assemble(folder: Path, table: CaseTable, runs: list[Run], instead: str | None, leave_out: bool = False) -> Case:
     vehicle = load_any_vehicle(table.vehicle, folder) if instead is None else load_any_vehicle(instead)
     known = [] if vehicle.identified is None else vehicle.identified.parameters
-    ocean = isinstance(vehicle, OceanVehicle)
-    if not ocean:
-        _refuse_ocean(folder, runs, table.vehicle if instead is None else instead)
-    runs, out = parted(runs, ocean)
+    kind = kind_of(vehicle)
+    _refuse_other_kinds(folder, runs, kind, table.vehicle if instead is None else instead)
+    runs, out = parted(runs, kind.sparse_rows)
     if out and not (leave_out and runs):
         raise out[0].error(len(out) if leave_out else 0)
-    contradicted = None if ocean else wrong_rate(runs, table.log_rate_hz)
+    contradicted = None if kind.sparse_rows else wrong_rate(runs, table.log_rate_hz)
     if contradicted is not None:
         raise InputError(contradicted, source=folder / CASE_FILE, column="log_rate_hz")
     return Case(
@@ -145,12 +147,14 @@ def _assemble(folder: Path, table: CaseTable, runs: list[Run], instead: str | No
     )
 
 
-def _refuse_ocean(folder: Path, runs: list[Run], vehicle: str) -> None:
-    """InputError where a run is an ocean glider's, which the vehicle is not: only those have the volume of oil."""
+def _refuse_other_kinds(folder: Path, runs: list[Run], kind: VehicleKind, named: str) -> None:
+    """InputError where a run has a column that only another kind's runs have."""
     for run in runs:
-        if names.OIL in run.columns:
-            message = f"{vehicle} is no ocean glider, {run.name} is an ocean glider's ({names.OIL}): name its vehicle"
-            raise InputError(message, source=folder, column="vehicle")
+        for other in kinds().values():
+            column = next((one for one in other.own_columns if one in run.columns and other is not kind), None)
+            if column is not None:
+                message = f"{named} is {kind.noun}, {run.name} is {other.noun}'s ({column}): name its vehicle"
+                raise InputError(message, source=folder, column="vehicle")
 
 
 def _given(part: Table | None) -> dict[str, Any]:

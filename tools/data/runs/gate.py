@@ -56,12 +56,12 @@ class LeftOut:
         return InputError(reason, source=self.path or self.run, column=self.column)
 
 
-def impossible(run: Run, ocean: bool = False) -> tuple[str, str] | None:
+def impossible(run: Run, sparse_rows: bool = False) -> tuple[str, str] | None:
     """The first column of a run that holds what it cannot, and what that probably is; None where all is possible.
 
-    ocean: rows may be as rare as they like.
+    sparse_rows: rows may be as rare as they like.
     """
-    found = None if ocean or names.OIL in run.columns else wrong_times(run.t)
+    found = None if sparse_rows or names.OIL in run.columns else wrong_times(run.t)
     if found is not None:
         return names.TIME, found
     for name in (column for column in names.ALL if column in run.columns):
@@ -159,11 +159,11 @@ def wrong_rate(runs: Sequence[Run], rate: float) -> str | None:
     return None if 1.0 / RATE_OFF < rows / rate < RATE_OFF else f"{rate:g} expected, the rows come at {rows:.4g} Hz"
 
 
-def parted(runs: Sequence[Run], ocean: bool = False) -> tuple[list[Run], list[LeftOut]]:
+def parted(runs: Sequence[Run], sparse_rows: bool = False) -> tuple[list[Run], list[LeftOut]]:
     """The runs that are possible, and those that are not, with the first reason of each."""
     good, out = [], []
     for run in runs:
-        found = impossible(run, ocean) or renamed(run, runs)
+        found = impossible(run, sparse_rows) or renamed(run, runs)
         if found is None:
             good.append(run)
         else:
@@ -171,8 +171,8 @@ def parted(runs: Sequence[Run], ocean: bool = False) -> tuple[list[Run], list[Le
     return good, out
 
 
-def refuse_impossible(runs: Sequence[Run], ocean: bool = False) -> None:
+def refuse_impossible(runs: Sequence[Run], sparse_rows: bool = False) -> None:
     """InputError, naming the first run and column, where any run holds what it cannot."""
-    _, out = parted(runs, ocean)
+    _, out = parted(runs, sparse_rows)
     if out:
         raise out[0].error()

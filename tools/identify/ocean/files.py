@@ -32,8 +32,7 @@ def numbers_table(vehicle: OceanVehicle, P: np.ndarray) -> dict[str, Any]:
 
 def vehicle_table(found: OceanIdentification) -> dict[str, Any]:
     """The vehicle file's content: the case's vehicle with what was found in place."""
-    vehicle = found.case.vehicle
-    assert isinstance(vehicle, OceanVehicle)
+    vehicle = found.case.of(OceanVehicle)
     table = numbers_table(vehicle, found.P)
     table["identified"] = {
         "runs": len(found.problem.runs),

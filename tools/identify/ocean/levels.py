@@ -37,8 +37,7 @@ def some_runs(runs: list[Run]) -> list[Run]:
 
 def with_levels(case: Case, logs: dict[str, float]) -> Case:
     """The case with levels e^log times its own."""
-    vehicle = case.vehicle
-    assert isinstance(vehicle, OceanVehicle)
+    vehicle = case.of(OceanVehicle)
     sensors, disturbance = vehicle.sensors, vehicle.disturbance
     for name, log in logs.items():
         factor = float(np.exp(log))

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from glider.sim_backend.ocean.vehicle import OceanVehicle, decode_ocean_vehicle
+from glider.sim_backend.ocean.vehicle import KIND, OceanVehicle, decode_ocean_vehicle
 from glider.tools.data.runs.case import CASE_FILE, Case, load_case
 from glider.tools.identify.ocean.files import vehicle_text
 from glider.tools.identify.ocean.identify import identify_ocean
@@ -69,8 +69,7 @@ def flown_by(case: Case, vehicle: OceanVehicle) -> Case:
 
 def theirs(case: Case, reference: int, changed: np.ndarray) -> Judged:
     """Drag and volume fitted, and a threshold."""
-    vehicle, found = case.vehicle, []
-    assert isinstance(vehicle, OceanVehicle)
+    vehicle, found = case.of(OceanVehicle), []
     taken = seconds(lambda: found.append(practise(vehicle, case.runs, reference)))
     rest = replace(case, runs=case.runs[reference:])
     rms = rms_of(vehicle, rest, changed, found[0].reference_drag, found[0].volume)
@@ -129,7 +128,7 @@ def measure(settings: Settings) -> dict[str, Any]:
         if not (path / CASE_FILE).is_file():
             continue
         case = load_case(path)
-        if not isinstance(case.vehicle, OceanVehicle) or len(case.runs) < FEWEST_RUNS:
+        if case.vehicle.kind != KIND or len(case.runs) < FEWEST_RUNS:
             continue
         reference = min(MOST_REFERENCE, len(case.runs) // 2)
         same = np.zeros(len(case.runs) - reference, dtype=bool)

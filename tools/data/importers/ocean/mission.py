@@ -69,7 +69,7 @@ def write_mission(segments: list[Segment], out: Path, vehicle: str) -> ImportedM
     fixes = np.concatenate([one.fixes for one in segments])  # of what is no run, too
     if len(fixes):
         beside[FIXES_FILE] = fix_columns(fixes)
-    refuse_impossible(runs, ocean=True)
+    refuse_impossible(runs, sparse_rows=True)
     files = write_case(
         out, runs, vehicle=vehicle, site="ocean", log_rate_hz=_rate(runs), water_density_kg_m3=_density(runs),
         motion_capture=False, suffix=".csv.gz", decimals=DECIMALS, digits=digits,

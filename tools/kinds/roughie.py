@@ -1,0 +1,165 @@
+"""ROUGHIE and vehicles of its form: flown by commands, six degrees of freedom, equation (4)."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from glider.firmware.model.library import shipped
+from glider.firmware.model.vehicle import Vehicle, decode_vehicle
+from glider.tools.data.runs.case import Case
+from glider.tools.data.runs.run import Run
+from glider.tools.data.vehicle_kinds import Say, VehicleKind, no_progress
+
+if TYPE_CHECKING:
+    from glider.tools.identify.pipeline import Identified
+
+
+@dataclass(frozen=True)
+class PoolIdentification:
+    """An identification by the Python API's measure: what `glider identify` prints and writes."""
+
+    found: "Identified"
+    report: bool = True  # whether one is written
+
+    def plain(self) -> dict[str, Any]:
+        """As `glider identify --json` prints it."""
+        return self.found.plain()
+
+    @property
+    def vehicle_text(self) -> str:
+        """The vehicle file, TOML."""
+        from glider.tools.identify import files
+
+        return files.vehicle_text(self.found)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Runs that were left out, and what limits the result."""
+        return (*(f"left out: {one}" for one in self.found.left_out), *self.found.notes)
+
+    def write(self, folder: Path) -> None:
+        """identified.toml, identified.json, corrected.toml, posterior.nc and the report into a folder."""
+        from glider.tools.identify import files
+        from glider.tools.report.identified import write_report
+
+        files.write(self.found, folder)
+        write_report(folder / "report.html", self.found)
+
+    def lines(self) -> list[str]:
+        """Sentences and the table of coefficients."""
+        from glider.tools.api.sentences import identified_lines
+
+        return identified_lines(self.found)
+
+
+class Roughie:
+    """The kind (tools/data/vehicle_kinds.VehicleKind)."""
+
+    name, group, noun, extra = "roughie", "pool", "a ROUGHIE-like vehicle", "identify"
+    sparse_rows = False
+    own_columns: tuple[str, ...] = ()
+    vehicle: type = Vehicle
+
+    def shipped(self) -> Mapping[str, str]:
+        """Vehicle files of firmware/model/vehicles."""
+        return shipped("model/vehicles")
+
+    def decode(self, text: str, source: str) -> Vehicle:
+        """A vehicle file (docs/explanation/model.md)."""
+        return decode_vehicle(text, source)
+
+    def equations(self) -> Any:
+        """Equation (4) with the catalogue's effects."""
+        from glider.tools.inference.kind import ROUGHIE
+
+        return ROUGHIE
+
+    def model(self, name: str, vehicle: Vehicle) -> Any:
+        """What is uncertain as [uncertainty] says, or where it was identified as its covariance."""
+        from glider.tools.inference.model import roughie_model
+
+        return roughie_model(name, vehicle)
+
+    def numbers(self, name: str, source: str, model: Any, sd: dict[str, float]) -> Any:
+        """Numbers with the effects that scale them folded in."""
+        from glider.tools.inference.model import effect_vector
+        from glider.tools.inference.numbers_out import VehicleNumbers
+
+        return VehicleNumbers(name, source, model.P, effect_vector(model), sd)
+
+    def compile(self, say: Say, progress: Callable[..., Any] = no_progress) -> None:
+        """Compile the kernels of a diagnosis, unless that was done."""
+        from glider.tools.diagnose.precompile import DIAGNOSIS
+        from glider.tools.flight.precompile import ensure_compiled
+
+        ensure_compiled(DIAGNOSIS, say, progress)
+
+    def submerged(self, run: Run) -> Run:
+        """The run without what was measured afloat."""
+        from glider.tools.readings.stretches import under_water
+
+        return under_water(run)
+
+    def readings(self, case: Case) -> Any:
+        """Readings held against each other (docs/explanation/readings.md)."""
+        from glider.tools.readings.check import check
+
+        return check(case.runs)
+
+    def disagreements(self, case: Case) -> list[str]:
+        """Sentences on readings that contradict each other."""
+        from glider.tools.readings.check import disagreement
+
+        return disagreement(case.runs)
+
+    def usable_runs(self, runs: Sequence[Run]) -> tuple[dict[int, Run], dict[int, str]]:
+        """Each run's longest stretch of flight, where it has the readings that the others have."""
+        from glider.tools.watch.usable import usable_flights
+
+        return usable_flights(runs)
+
+    def speeds(self, problem: Any, learned_from: Any) -> None:
+        """None: readings have no speed through the water that a watch would judge."""
+
+    def identify(self, case: Case, seed: int, likelihood: str, say: Say) -> PoolIdentification:
+        """The twelve coefficients by MCMC (docs/explanation/identification.md)."""
+        from glider.tools.data.errors import need
+
+        need("identify")
+        from glider.tools.identify.pipeline import identify
+
+        return PoolIdentification(identify(case, seed, likelihood, say))
+
+    def diagnose(self, case: Case, reference: Case | None, without: str | None, say: Say) -> Callable[[Path], str]:
+        """Against healthy runs, where they are given or the vehicle file knows what they leave, else by evidence."""
+        from glider.tools.data.errors import InputError
+        from glider.tools.diagnose import against_answer
+        from glider.tools.diagnose import diagnosis as single
+        from glider.tools.diagnose.against_healthy import diagnose_against_healthy, form_stands_out
+        from glider.tools.inference.rules import Rules
+        from glider.tools.report.diagnosis import write_report
+        from glider.tools.report.pooled import write_pooled_report
+        from glider.tools.report.words import sentence
+
+        if reference is not None and without is not None:
+            raise InputError("a part of the method is left out only without a reference", source="without")
+        self.compile(say)
+        if reference is not None or (without is None and form_stands_out(case)):
+            compared = diagnose_against_healthy(case, reference, say)
+
+            def write_compared(out: Path) -> str:
+                against_answer.write(compared, out)
+                return write_pooled_report(out)
+
+            return write_compared
+        found = single.diagnose(case, say, Rules() if without is None else Rules().without(without))
+
+        def write_single(out: Path) -> str:
+            single.write(found, out)
+            return sentence(write_report(out))
+
+        return write_single
+
+
+KIND: VehicleKind = Roughie()
