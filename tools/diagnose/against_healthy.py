@@ -304,8 +304,8 @@ class Comparison:
     def expected_labels(self, begin: HealthyHypothesis) -> list[tuple[float, str, np.ndarray]]:
         """Labels beside a hypothesis, the most probable first: log evidence, label, values to begin a fit from.
 
-        By one linear step or, where the misfit is smaller there, from a parameter's value far from 0 as it is: a rate limit
-        does nothing until it is reached, and a fit from 0 rests before.
+        By one linear step or, where the misfit is smaller there, from a parameter's value far from 0 as it is: a rate
+        limit does nothing until it is reached, and a fit from 0 rests before.
         """
         values = self.windows.clipped(begin.values)
         gains = self.windows.gains(values)
