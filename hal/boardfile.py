@@ -262,6 +262,11 @@ def check(file: DeviceFile, source: str) -> None:
     for name, line in file.port.items():
         if paths.count(line.path) > 1:
             raise ConfigError(source, f"{line.path} is another port's path too", key=f"port.{name}.path")
+    _check_registers(file, source)
+
+
+def _check_registers(file: DeviceFile, source: str) -> None:
+    """Devices with registers: channels and numbers that they have, and addresses of their own."""
     taken: dict[tuple, tuple[str, str]] = {}
     for name in ROLES:
         table = getattr(file, name)

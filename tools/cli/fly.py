@@ -5,6 +5,7 @@ import math
 import signal
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -73,21 +74,16 @@ def fly(
     vehicle up. Exit code 1: the flight, or its log, is not complete.
     """
     from glider.firmware.core.layouts.control_layout import LEG
-    from glider.firmware.runtime import Ending
     from glider.hal.ports import BoardError, Hardware
     from glider.hal.recorder.recorder import NullRecorder, Recorder
-    from glider.hal.usage import peak_resident_bytes
     from glider.tools.data.errors import InputError
     from glider.tools.flight import sortie
-    from glider.tools.flight.compose import build_flight, build_recorder, parse_effects, record_specs
+    from glider.tools.flight.compose import build_flight, build_recorder, record_specs
     from glider.tools.flight.display import Display
     from glider.tools.flight.precompile import FLIGHT, ensure_compiled
     from glider.tools.flight.terminal import Stop, terminal_detached
 
-    wanted = parse_effects(effects)
-    for label in (item for item in effects if item in wanted):
-        values = ",".join(f"{name}={value:g}" for name, value in wanted[label].items())
-        say(f"effect {label}:{values}, 1 sigma of its prior")
+    wanted = wanted_effects(effects)
     try:
         flight = build_flight(
             mission=mission, vehicle=vehicle, board=board, seed=seed, realtime=realtime, effects=wanted
@@ -105,10 +101,7 @@ def fly(
         return build_recorder(flight, path, seed=seed, effects=wanted, live_stream=live_stream)
 
     ensure_compiled(FLIGHT, say, progress)
-    if flight.control.controller != "pid":
-        for axis in flight.k2_margins:
-            if not axis.covered:
-                say(f"warning: {axis}")
+    warn_of_margins(flight)
     name = flight.mission.name if path is None else path.stem
     simulated = flight.board.hardware is Hardware.NONE
     host: sortie.FlightHost = sortie.SimulatedHost(flight, name=name, paced=realtime)
@@ -155,6 +148,40 @@ def fly(
     finally:
         display.end()
         signal.signal(signal.SIGINT, before)
+    result = summary(flight, host, flown, path, options.said)
+    if as_json:
+        print_json(result)
+    else:
+        _tell(result)
+    report = flown.report
+    # A recording process that was replaced has left a log in parts, and half a second missing.
+    recorded = report.complete or (report.parts > 1 and not report.error)
+    raise SystemExit(DONE if result["completed"] and recorded else FAILED)
+
+
+def wanted_effects(effects: tuple[str, ...]) -> dict[str, dict[str, float]]:
+    """The effects of --effect; what a label alone stands for is said."""
+    from glider.tools.flight.compose import parse_effects
+
+    wanted = parse_effects(effects)
+    for label in (item for item in effects if item in wanted):
+        values = ",".join(f"{name}={value:g}" for name, value in wanted[label].items())
+        say(f"effect {label}:{values}, 1 sigma of its prior")
+    return wanted
+
+
+def warn_of_margins(flight) -> None:
+    """Say which axis of the law its gains do not cover."""
+    for axis in flight.k2_margins if flight.control.controller != "pid" else ():
+        if not axis.covered:
+            say(f"warning: {axis}")
+
+
+def summary(flight, host, flown, path: Path | None, real_time: list[str]) -> dict[str, Any]:
+    """What `glider fly --json` prints of a flight that has ended; real_time: what the system was asked for."""
+    from glider.firmware.runtime import Ending
+    from glider.hal.usage import peak_resident_bytes
+
     surfaced = flown.ending == Ending.SURFACED
     completed = flight.autopilot.mode == "completed" and surfaced and not host.ascent_only
     reason = (
@@ -163,13 +190,13 @@ def fly(
         or ("" if completed else ENDINGS[flown.ending.name])
     )
     timing, report = flown.timing, flown.report
-    result = {
+    return {
         "completed": completed,
         "seconds": flown.seconds,
         "reason": reason,
         "log": None if path is None else str(path),
         "rms_error": flight.autopilot.rms_errors(),
-        "faults": faults_noticed(supervisor),
+        "faults": faults_noticed(flight.supervisor),
         "surfaced": surfaced,
         "ended": {"by": flown.ending.name.lower(), "state": flown.state.name.lower()},
         "ticks": timing.ticks,
@@ -184,16 +211,10 @@ def fly(
             "error": report.error,
             "readable_s": None if path is None or report.complete else readable_s(path),
         },
-        "real_time": options.said,
+        "real_time": real_time,
+        "devices": flight.board.health(),
+        "truth": flight.board.state(),
     }
-    result["devices"], result["truth"] = flight.board.health(), flight.board.state()
-    if as_json:
-        print_json(result)
-    else:
-        _tell(result)
-    # A recording process that was replaced has left a log in parts, and half a second missing.
-    recorded = report.complete or (report.parts > 1 and not report.error)
-    raise SystemExit(DONE if completed and recorded else FAILED)
 
 
 def readable_s(log: Path) -> float:
