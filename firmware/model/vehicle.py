@@ -217,6 +217,11 @@ class FormTable(Table):
     noise: NonNegative
     gaps: dict[str, dict[str, NonNegative]]
 
+    @property
+    def total(self) -> float:
+        """The total gap over all regimes, tolerances."""
+        return self.gaps["all"]["total"]
+
 
 class Vehicle(Table):
     """A vehicle file (docs/explanation/model.md, Vehicle file)."""

@@ -44,10 +44,12 @@ CAUSE = "cause"
 STRANGE = 0.15  # prior probability that something is left where nothing is named
 STANDS_IN = 0.25  # of a label that it stands in for something unknown: so many changes no label is for
 LEAST_SCALE = 0.05  # tolerances
-STANDS_OUT = 2.0  # times what noise leaves of healthy runs, in squares, that the form leaves of them: the form decides
 TOTAL = "total"
 REFIT_STEPS, REFIT_FURTHER, MAX_EFFECTS = 6, 4, 3  # labels fitted in full at first, beside others, and effects at most
 REFIT_FORMS, MAX_SHAPES = 2, 3  # free forms fitted in full, and shapes of each at most
+# nat of log odds that a label is the change: hull and fittings keep their mass distribution and the water that they
+# carry along, unless something is built in
+SELDOM = {"inertia": -2.0, "added_mass": -2.0}
 FAR = (-2.0, 2.0)  # sigma of a label's prior, from which its fit begins where that is better than the step from 0
 SHARES = np.linspace(0.005, 0.995, 100)  # of a change, in amplitude, that its label leaves
 OWN_FORM = norm.pdf(SHARES, scale=FORM) / norm.pdf(SHARES, scale=FORM).sum()
@@ -142,12 +144,6 @@ def of_form(form: FormTable) -> Healthy:
     """The same as identification wrote it into the vehicle file."""
     scales = {name: max(gap, LEAST_SCALE) for name, gap in form.gaps[ALL].items() if name != TOTAL}
     return Healthy(form.runs, 0.0, form.scatter, scales)
-
-
-def form_stands_out(case: Case) -> bool:
-    """Whether a case's vehicle was identified, and its form leaves more of healthy runs than noise does, in squares."""
-    form = case.vehicle.form
-    return form is not None and form.gaps[ALL][TOTAL] ** 2 > STANDS_OUT * form.noise**2
 
 
 @dataclass(frozen=True)
@@ -419,12 +415,14 @@ def weigh(compared: Comparison, listed: list[HealthyHypothesis]) -> Weighed:
             weights[one.labels, one.form] = -np.inf, at + float(np.log(CHANGED * STRANGE)) + either, one
             continue
         at += float(len(one.labels) * np.log(CHANGED / len(compared.places)) if one.labels else np.log1p(-CHANGED))
+        seldom = sum(SELDOM.get(label, 0.0) for label in one.labels)  # what stands in for something unknown may be any
         if one.form is not None:  # its label's own form, or something unknown
             label = next(other for other in kept if other.labels == one.labels and other.form is None)
             share = compared.share(label, one)
             own, other = norm.logpdf(share, scale=FORM) + np.log(2.0 * (1.0 - STANDS_IN)), np.log(STANDS_IN)
             more = float(np.logaddexp(usual + other, more))
             usual += float(own)
+        usual += seldom
         before = weights.get((one.labels, one.form))
         if before is None or np.logaddexp(*before[:2]) < at + np.logaddexp(usual, more):
             weights[one.labels, one.form] = at + usual, at + more, one

@@ -6,6 +6,15 @@ across (docs/explanation/diagnosis.md, Steady).
 
 import numpy as np
 
+from glider.firmware.model.vehicle import FormTable
+
+STANDS_OUT = 2.0  # times what noise leaves of healthy runs, in squares, that the form leaves of them: the form decides
+
+
+def form_stands_out(form: FormTable | None) -> bool:
+    """Whether a vehicle was identified, and its form leaves more of healthy runs than noise does, in squares."""
+    return form is not None and form.total**2 > STANDS_OUT * form.noise**2
+
 
 def opened(value: float, shut: float, wide: float) -> float:
     """How far a gate is open, 0 up to `shut` and 1 from `wide`; smooth in the logarithm of the value between."""

@@ -134,32 +134,38 @@ class Roughie:
     def diagnose(self, case: Case, reference: Case | None, without: str | None, say: Say) -> Callable[[Path], str]:
         """Against healthy runs, where they are given or the vehicle file knows what they leave, else by evidence."""
         from glider.tools.data.errors import InputError
-        from glider.tools.diagnose import against_answer
-        from glider.tools.diagnose import diagnosis as single
-        from glider.tools.diagnose.against_healthy import diagnose_against_healthy, form_stands_out
-        from glider.tools.inference.rules import Rules
-        from glider.tools.report.diagnosis import write_report
-        from glider.tools.report.pooled import write_pooled_report
-        from glider.tools.report.words import sentence
+        from glider.tools.diagnose.gates import form_stands_out
 
         if reference is not None and without is not None:
             raise InputError("a part of the method is left out only without a reference", source="without")
         self.compile(say)
-        if reference is not None or (without is None and form_stands_out(case)):
-            compared = diagnose_against_healthy(case, reference, say)
+        if reference is not None or (without is None and form_stands_out(case.vehicle.form)):
+            return self._against_healthy(case, reference, say)
+        from glider.tools.diagnose import diagnosis as single
+        from glider.tools.inference.rules import Rules
+        from glider.tools.report.diagnosis import write_report
+        from glider.tools.report.words import sentence
 
-            def write_compared(out: Path) -> str:
-                against_answer.write(compared, out)
-                return write_pooled_report(out)
-
-            return write_compared
         found = single.diagnose(case, say, Rules() if without is None else Rules().without(without))
 
-        def write_single(out: Path) -> str:
+        def write(out: Path) -> str:
             single.write(found, out)
             return sentence(write_report(out))
 
-        return write_single
+        return write
+
+    def _against_healthy(self, case: Case, reference: Case | None, say: Say) -> Callable[[Path], str]:
+        from glider.tools.diagnose import against_answer
+        from glider.tools.diagnose.against_healthy import diagnose_against_healthy
+        from glider.tools.report.pooled import write_pooled_report
+
+        found = diagnose_against_healthy(case, reference, say)
+
+        def write(out: Path) -> str:
+            against_answer.write(found, out)
+            return write_pooled_report(out)
+
+        return write
 
 
 KIND: VehicleKind = Roughie()

@@ -25,9 +25,9 @@ from glider.tools.diagnose.against_healthy import (
     Healthy,
     HealthyHypothesis,
     diagnose_against_healthy,
-    form_stands_out,
     weigh,
 )
+from glider.tools.diagnose.gates import form_stands_out
 from glider.tools.report.pooled import write_pooled_report
 from glider.tools.verify.challenge.form_cases import draw_healthy, write_flights
 from glider.tools.verify.challenge.form_fit import fit_flights, fit_forces
@@ -216,7 +216,7 @@ def command(monkeypatch, *arguments: object) -> int:
 def test_a_vehicle_file_that_says_what_its_form_leaves_needs_no_healthy_runs(place):
     vehicle = str(place / "nearest.toml")
     unknown = load_case(place / "askew", vehicle)
-    assert not form_stands_out(unknown)
+    assert not form_stands_out(unknown.roughie.form)
     with pytest.raises(InputError, match="form"):
         diagnose_against_healthy(unknown, None)
     learned = diagnosed(place, "unchanged").healthy
@@ -227,7 +227,7 @@ def test_a_vehicle_file_that_says_what_its_form_leaves_needs_no_healthy_runs(pla
         name: replace(case, vehicle=msgspec.structs.replace(case.roughie, form=form))
         for name, case in sentences.items()
     }
-    assert form_stands_out(sentences["askew"])
+    assert form_stands_out(sentences["askew"].roughie.form)
     assert diagnose_against_healthy(sentences["unchanged"], None).verdict == "none"
     found = diagnose_against_healthy(sentences["askew"], None)
     assert (found.verdict, found.selected[0]) == ("cause", LABEL)

@@ -9,11 +9,13 @@ import math
 import numpy as np
 import pytest
 
+from glider.tools.diagnose import against_healthy
 from glider.tools.diagnose.against_healthy import AsUsual, Comparison, FreeForm, Healthy, HealthyHypothesis, weigh
 from glider.tools.inference.corrected import LINKS
 
 EFFECTS = 46  # M
 SHAPES = ("one", "depth", "rate")
+SELDOM = {"e1": -2.0}  # d
 
 
 def student(x, freedom):
@@ -30,6 +32,12 @@ def evidence(mu, sigma, precision, score):
     """E of the page, of one parameter."""
     g = score - precision * mu
     return 0.5 * (g**2 / (1 / sigma + precision) + mu * (2 * g + precision * mu) - math.log(1 + sigma * precision))
+
+
+@pytest.fixture(autouse=True)
+def seldom(monkeypatch):
+    """One effect of the cases is one that seldom changes."""
+    monkeypatch.setattr(against_healthy, "SELDOM", SELDOM)
 
 
 def by_the_page(n, level, s, runs, most, table, usual):
@@ -65,13 +73,14 @@ def by_the_page(n, level, s, runs, most, table, usual):
         S = 0.25 if effects else 0.15
         u, m, C = u * (1 - S), m * S, 18.0 ** -(k > 0) * 11.0**-k
         own = C * ((0.5 / EFFECTS) ** len(effects) if effects else 0.5)
+        u_named = u * math.exp(sum(SELDOM.get(e, 0.0) for e in effects))
         if k and not effects:
             return -math.inf, A + math.log(own * S * (u + m))
         if k:
             q_j = next(q for other, shapes, q, _ in table if other == effects and not shapes)
             r = math.sqrt(min(max((q_j - q) / (q0 - q), 0.0), 1.0))
-            return A + math.log(own * u * 2 * (1 - S) * normal(r, 0.2)), A + math.log(own * (S * u + m))
-        return A + math.log(own * u), A + math.log(own * m)
+            return A + math.log(own * u_named * 2 * (1 - S) * normal(r, 0.2)), A + math.log(own * (S * u + m))
+        return A + math.log(own * u_named), A + math.log(own * m)
 
     for effects, k, q, fits in table:
         if (effects or k) and q >= q0:
