@@ -14,7 +14,7 @@ that run, so that an effect has to shrink what it has not seen:
 
 from collections.abc import Callable, Iterable, Set
 from dataclasses import dataclass, field, replace
-from itertools import combinations, islice
+from itertools import combinations
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -300,27 +300,28 @@ class Comparison:
     def expected_labels(self, begin: HealthyHypothesis) -> list[tuple[float, str, np.ndarray]]:
         """Labels beside a hypothesis, the most probable first: log evidence, label, values to begin a fit from.
 
-        By one linear step or, where the misfit is smaller there, from a parameter's value far from 0 as it is: a rate
-        limit does nothing until it is reached, and a fit from 0 rests before.
+        The evidence is that of one linear step or, where the misfit is smaller there, of a parameter far from 0 as it
+        is: a rate limit does nothing until it is reached, and a fit from 0 rests before. A fit begins where the misfit
+        is least: at the step's end, far from 0, or where the hypothesis stands.
         """
         values = self.windows.clipped(begin.values)
         gains = self.windows.gains(values)
-        at = self.windows.linearised(values, gains)
+        at, weight = self.windows.linearised(values, gains), self.weight(begin.mean_square)
         places = {label: own for label, own in self.places.items() if label not in begin.labels}
-        points = [self.windows.clipped(values + far * row) for own in places.values() for k in own
-                  for row in [np.eye(1, len(values), k)[0]] for far in FAR]  # fmt: skip
-        weight = self.weight(begin.mean_square)
+        foreseen = {label: at.expected(self.columns_of((*begin.labels, label)), weight) for label in places}
+        starts = {
+            label: [values, self.windows.clipped(values + foreseen[label][2]),
+                    *(self.windows.clipped(values + far * np.eye(1, len(values), k)[0]) for k in own for far in FAR)]
+            for label, own in places.items()
+        }  # fmt: skip
+        points = [point for of_label in starts.values() for point in of_label]
         squares = iter(self.windows.squares(points, gains).sum(axis=(1, 2)))
-        found, starts = [], iter(points)
-        for label, own in places.items():
-            free = self.columns_of((*begin.labels, label))
-            objective, occam, step = at.expected(free, weight)
-            best, start = objective, values + step
-            for point, square in islice(zip(starts, squares, strict=True), len(own) * len(FAR)):
-                there = float(square + point @ point / weight)
-                if there < best:
-                    best, start = there, point
-            found.append((self.nat_of(best) - occam, label, start))
+        found = []
+        for label, of_label in starts.items():
+            there = [float(next(squares) + point @ point / weight) for point in of_label]
+            objective, occam, _ = foreseen[label]
+            best = min(objective, *there[2:])
+            found.append((self.nat_of(best) - occam, label, of_label[int(np.argmin(there))]))
         return sorted(found, key=lambda one: -one[0])
 
     def nat(self, one: HealthyHypothesis) -> float:
