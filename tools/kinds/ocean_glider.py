@@ -121,7 +121,7 @@ class OceanGlider:
         """Drag, buoyancy and the attitude sensor by least squares over dives; seed and likelihood are ignored."""
         from glider.tools.data.errors import need
 
-        need("analysis")
+        need(self.extra)
         from glider.tools.identify.ocean.identify import identify_ocean
 
         return MissionIdentification(identify_ocean(case, say))

@@ -126,7 +126,7 @@ class Roughie:
         """The twelve coefficients by MCMC (docs/explanation/identification.md)."""
         from glider.tools.data.errors import need
 
-        need("identify")
+        need(self.extra)
         from glider.tools.identify.pipeline import identify
 
         return PoolIdentification(identify(case, seed, likelihood, say))
