@@ -14,6 +14,7 @@ that run, so that an effect has to shrink what it has not seen:
 
 from collections.abc import Callable, Iterable, Set
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -23,6 +24,7 @@ from scipy.stats import norm
 
 from glider.firmware.model.vehicle import FormTable
 from glider.sim_backend.core.effects import effect_layout as ef
+from glider.sim_backend.core.effects.catalogue import catalogue
 from glider.tools.data.errors import InputError
 from glider.tools.data.runs import columns
 from glider.tools.data.runs.case import Case
@@ -30,13 +32,14 @@ from glider.tools.data.runs.run import Run
 from glider.tools.diagnose.correction import free_of
 from glider.tools.diagnose.held_out import HeldOutWindows, Linearised
 from glider.tools.diagnose.record import NONE, UNKNOWN
+from glider.tools.diagnose.sensor_consistency import inconsistent_sensors
 from glider.tools.gap.corrected import submerged
 from glider.tools.gap.regimes import ALL
 from glider.tools.inference.channels import recorded
 from glider.tools.inference.corrected import LINKS
 from glider.tools.inference.healthy_level import CHANGED, FORM, USUAL_SCATTER, HealthyLevel
 from glider.tools.inference.model import effect_vector
-from glider.tools.inference.parameters import FreeParameter, effect_parameters, nuisance_parameters
+from glider.tools.inference.parameters import CLOCK_PLACE, FreeParameter, effect_parameters, nuisance_parameters
 from glider.tools.inference.pooled import Pooled, log_prior
 from glider.tools.inference.problem import Problem, problem_of
 
@@ -206,6 +209,18 @@ class Comparison:
     def __post_init__(self) -> None:
         self.windows = self.windows_of(self.free)
 
+    @cached_property
+    def far_clocks(self) -> dict[str, tuple[int, float]]:
+        """By label of motion capture's clock that reconciles poses and readings far from 0: which parameter, and where,
+        in sigma of its prior."""
+        clocks = {
+            label: [self.free[k] for k in own]
+            for label, own in self.places.items()
+            if catalogue()[label].place == CLOCK_PLACE
+        }
+        found = inconsistent_sensors(self.problem, [self.free[k] for k in self.nuisance], clocks) if clocks else []
+        return {one.label: (self.free.index(one), far) for one, far in found}
+
     def columns_of(self, labels: Iterable[str]) -> np.ndarray:
         """Places of what is free under labels."""
         return np.concatenate([self.nuisance, *(self.places[label] for label in labels)])
@@ -302,7 +317,8 @@ class Comparison:
 
         The evidence is that of one linear step or, where the misfit is smaller there, of a parameter far from 0 as it
         is: a rate limit does nothing until it is reached, and a fit from 0 rests before. A fit begins where the misfit
-        is least: at the step's end, far from 0, or where the hypothesis stands.
+        is least: at the step's end, far from 0, or where the hypothesis stands; with a clock far out (`far_clocks`) by
+        an observer of its own, no other sees the poses in their place.
         """
         values = self.windows.clipped(begin.values)
         gains = self.windows.gains(values)
@@ -319,6 +335,11 @@ class Comparison:
         found = []
         for label, of_label in starts.items():
             there = [float(next(squares) + point @ point / weight) for point in of_label]
+            if label in self.far_clocks:
+                k, far = self.far_clocks[label]
+                of_label.append(self.windows.clipped(values + (far - values[k]) * np.eye(1, len(values), k)[0]))
+                own = self.windows.squares(of_label[-1:], self.windows.gains(of_label[-1]))
+                there.append(float(own.sum() + of_label[-1] @ of_label[-1] / weight))
             objective, occam, _ = foreseen[label]
             best = min(objective, *there[2:])
             found.append((self.nat_of(best) - occam, label, of_label[int(np.argmin(there))]))

@@ -53,9 +53,9 @@ def _follow_a_moment() -> None:
         problem = _blank(Path(folder))
         (rows, width), runs = problem.z.shape, len(problem.runs)
         gains = Gains(
-            np.zeros((rows, width, width)), np.zeros((rows, problem.spreads.shape[1], width)),
-            np.zeros((rows, problem.kind.n_state)), np.zeros((rows, problem.kind.n_path)), np.zeros((rows, width)),
-            np.zeros(runs), problem.starts,
+            problem.z, problem.stamps, np.zeros((rows, width, width)),
+            np.zeros((rows, problem.spreads.shape[1], width)), np.zeros((rows, problem.kind.n_state)),
+            np.zeros((rows, problem.kind.n_path)), np.zeros((rows, width)), np.zeros(runs), problem.starts,
         )  # fmt: skip
         problem.follow([(problem.model.P, effect_vector(problem.model))], gains)
 

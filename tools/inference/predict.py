@@ -42,13 +42,15 @@ def without_doubled(problem: Problem) -> np.ndarray:
     return z
 
 
-def observe(problem: Problem, P: np.ndarray, F: np.ndarray) -> Gains:
+def observe(problem: Problem, P: np.ndarray, F: np.ndarray, steady_clock: bool = False) -> Gains:
     """The filter that finds where windows start.
 
-    It looks at no row behind the one where it stands, or says so (known).
+    It looks at no row behind the one where it stands, or says so (known). steady_clock: motion capture's clock is as
+    the model has it, however late; else one that is far out may wander, too.
     """
     placed, walk, known = poses_in_place(problem, F)
-    gains = observer_of(placed).filter(P, F, begin=True, speeds=problem.kind.window_speeds, more=walk)
+    more = None if steady_clock else walk
+    gains = observer_of(placed).filter(P, F, begin=True, speeds=problem.kind.window_speeds, more=more)
     return as_known(problem, gains, known)
 
 
@@ -110,16 +112,26 @@ def fly_near(problem: Problem, models: list[tuple[np.ndarray, np.ndarray]]) -> n
 
     Far quicker than an observer of each. Rows that no window scores are NaN.
     """
-    observer, r, scored = observer_of(problem), problem.recording, cut(problem)
-    F = effect_vector(problem.model)
-    gains = observer.filter(problem.model.P, F, begin=True, speeds=problem.kind.window_speeds)
+    scored, gains = cut(problem), observe(problem, problem.model.P, effect_vector(problem.model))
     Y = np.full((len(models), 1, *problem.z.shape), np.nan)
+    fly_followed(problem, models, gains, scored.first, scored.last, scored.run_of, np.zeros_like(scored.run_of), Y)
+    return Y[:, 0]
+
+
+def fly_followed(
+    problem: Problem, models: list[tuple[np.ndarray, np.ndarray]], gains: Gains, first: np.ndarray, last: np.ndarray,
+    run_of: np.ndarray, cut_of: np.ndarray, Y: np.ndarray,
+) -> None:  # fmt: skip
+    """Models (P, F) followed with an observer's gains (`observe`), and windows flown on, rows first to last - 1.
+
+    Y (models, cuts, rows, N_Y) gets them, each window (windows,) in its cut; windows of a cut do not overlap.
+    """
+    r = problem.recording
     problem.kind.fly_followed(
         np.array([P for P, _ in models]), np.array([F for _, F in models]), np.array(problem.kind.drift), r.modes,
-        r.bounds, r.t, problem.stamps, r.inputs, observer.z, gains.starts, gains.W, gains.K, scored.first,
-        scored.last, scored.run_of, np.zeros_like(scored.run_of), Y,
+        r.bounds, r.t, gains.stamps, r.inputs, gains.z, gains.starts, gains.W, gains.K, gains.begin(first), first, last,
+        run_of, cut_of, Y,
     )  # fmt: skip
-    return Y[:, 0]
 
 
 def fly(problem: Problem, P: np.ndarray, F: np.ndarray, own_filter: bool = False) -> np.ndarray:
@@ -135,12 +147,12 @@ def fly(problem: Problem, P: np.ndarray, F: np.ndarray, own_filter: bool = False
 def fly_windows_from(problem: Problem, P: np.ndarray, F: np.ndarray, gains: Gains) -> np.ndarray:
     """The same from where a filter stands."""
     r, scored = problem.recording, cut(problem)
-    begin = scored.first if gains.known is None else gains.known[scored.first - 1]
     Y = np.empty_like(problem.z)
     problem.kind.read_rows(F, gains.X, gains.path, r.t, r.bounds, Y)
     problem.kind.fly_windows(
-        P, F, r.modes, r.bounds, r.t, r.inputs, gains.X, gains.path, begin, scored.first, scored.last, scored.run_of, Y
-    )
+        P, F, r.modes, r.bounds, r.t, r.inputs, gains.X, gains.path, gains.begin(scored.first), scored.first,
+        scored.last, scored.run_of, Y,
+    )  # fmt: skip
     return Y
 
 

@@ -23,7 +23,7 @@ import numpy as np
 
 from glider.tools.inference.channels import Channel, errors
 from glider.tools.inference.fit import bounded_step
-from glider.tools.inference.predict import observer_of
+from glider.tools.inference.predict import fly_followed, observe
 from glider.tools.inference.problem import Gains, Problem
 from glider.tools.inference.vehicle_parameters import Parameters
 
@@ -86,7 +86,6 @@ class PredictionError:
 
     def __init__(self, problem: Problem, free: Parameters):
         self.problem, self.free = problem, free
-        self.observer = observer_of(problem)
         measures = problem.kind.measures
         self.table = np.concatenate([measures.measured(run) for run in problem.runs])
         self.channels = list({c.name: c for run in problem.runs for c in measures.channels_of(run)}.values())
@@ -116,21 +115,17 @@ class PredictionError:
         return Windows(*(np.array(values, dtype=np.int64) for values in (first, last, run_of)))
 
     def gains(self, values: np.ndarray) -> Gains:
-        """The observer of the model at `values`."""
-        return self.observer.filter(*self.model(values), begin=True, speeds=self.problem.kind.window_speeds)
+        """The observer of the model at `values`; a clock that could wander would take up what a wrong delay leaves."""
+        return observe(self.problem, *self.model(values), steady_clock=True)
 
     def fly(self, points: list[np.ndarray], gains: Gains, cuts: list[Windows]) -> np.ndarray:
         """Flights (points, cuts, rows, N_Y) of the windows from where the gains hold each model."""
-        problem, r = self.problem, self.problem.recording
-        Ps, Fs = zip(*(self.model(values) for values in points), strict=True)
-        Y = np.full((len(points), len(cuts), *problem.z.shape), np.nan)
+        Y = np.full((len(points), len(cuts), *self.problem.z.shape), np.nan)
         names = ("first", "last", "run_of")
         first, last, run_of = (np.concatenate([getattr(one, name) for one in cuts]) for name in names)
         cut_of = np.repeat(np.arange(len(cuts)), [len(one.first) for one in cuts])
-        problem.kind.fly_followed(
-            np.array(Ps), np.array(Fs), np.array(problem.kind.drift), r.modes, r.bounds, r.t, problem.stamps, r.inputs,
-            self.observer.z, gains.starts, gains.W, gains.K, first, last, run_of, cut_of, Y,
-        )  # fmt: skip
+        models = [self.model(values) for values in points]
+        fly_followed(self.problem, models, gains, first, last, run_of, cut_of, Y)
         return Y
 
     def residuals(self, Y: np.ndarray, windows: Windows) -> np.ndarray:

@@ -25,6 +25,8 @@ LOST = 1e6  # sigma; innovations of a model that has left every vehicle
 class Gains:
     """What a filter leaves behind, by row: whitening, corrections, and the innovations of its own model."""
 
+    z: np.ndarray  # (rows, N_Y) what it was given
+    stamps: np.ndarray  # (rows,) s, of the poses in it
     W: np.ndarray  # (rows, N_Y, N_Y)
     K: np.ndarray  # (rows, n_error, N_Y)
     X: np.ndarray  # (rows, n_state) states
@@ -34,6 +36,10 @@ class Gains:
     starts: np.ndarray  # (runs, n_state) where it began
     # (rows,): behind which row the filter stands that knows of nothing recorded behind a row; None: that row itself
     known: np.ndarray | None = None
+
+    def begin(self, first: np.ndarray) -> np.ndarray:
+        """The rows that windows with these first rows are flown from, (windows,): nothing recorded later is known."""
+        return first if self.known is None else self.known[first - 1]
 
 
 @dataclass
@@ -108,7 +114,7 @@ class Problem:
         """
         kind, (rows, width), runs = self.kind, self.z.shape, len(self.runs)
         made = Gains(
-            np.empty((rows, width, width)), np.empty((rows, self.spreads.shape[1], width)),
+            self.z, self.stamps, np.empty((rows, width, width)), np.empty((rows, self.spreads.shape[1], width)),
             np.empty((rows, kind.n_state)), np.empty((rows, kind.n_path)), np.empty((rows, width)), np.empty(runs),
             (self.starts if starts is None else starts).copy(),
         )  # fmt: skip

@@ -56,6 +56,8 @@ def place(tmp_path_factory):
     write_flights(folder / "askew", trial, askew)
     slow = later.fly(with_effect(trial.shapes, BY_LABEL["servo_slow"], np.array([8.0]), 1.0))
     write_flights(folder / "slow", trial, slow)
+    late = later.fly(with_effect(trial.shapes, BY_LABEL["mocap_delay"], np.array([1.5]), 1.0))
+    write_flights(folder / "late", trial, late)
     sizes, _ = BY_LABEL[OUTSIDE].draw(np.random.default_rng(1))
     write_flights(folder / "outside", trial, later.fly(with_effect(trial.shapes, BY_LABEL[OUTSIDE], sizes, 2.0)))
     nearest = vehicle_of(file, fit_flights(trial, flights[:HEALTHY], fit_forces(trial, flights[:HEALTHY])))
@@ -103,6 +105,25 @@ def test_a_rate_limit_that_does_nothing_until_it_is_reached_is_found(place):
     answer = plain(found)
     causes = next(cause for cause in answer["causes"] if cause["label"] == "servo_slow")
     assert causes["parameters"]["rate"]["ci90"][0] < np.log(33.0) < causes["parameters"]["rate"]["ci90"][1]
+
+
+def test_poses_that_are_much_later_than_an_observer_holds_shrink_what_is_left(place):
+    """With poses in the rows where they were recorded the observer is a loop with a delay, and leaves the vehicle."""
+    found = diagnosed(place, "late")
+    compared, free = found.compared, found.compared.free
+    (k,) = compared.places["mocap_delay"]
+
+    def left(delay):
+        point = delay / free[k].spread * np.eye(1, len(free), k)[0]
+        return compared.windows.squares([point], compared.windows.gains(point)).sum()
+
+    several = {delay: left(delay) for delay in (0.0, 0.6, 0.8, 1.0, 1.5)}
+    assert max(several.values()) < 1.1 * several[0.0]
+    assert several[1.5] < 0.7 * several[0.0]
+    assert found.left["mocap_delay"] < 0.75 * found.left["none"]
+    assert max(found.evidence, key=lambda label: found.evidence[label]) == "mocap_delay"
+    place, far = compared.far_clocks["mocap_delay"]
+    assert (place, far * free[k].spread) == (k, pytest.approx(1.5, abs=0.8))  # s
 
 
 def test_what_no_label_names_is_unknown_at_a_link(place):

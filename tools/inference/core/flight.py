@@ -52,10 +52,13 @@ def fly_windows(P, F, modes, bounds, t, inputs, X, paths, begin, first, last, ru
 
 
 @parallel_kernel
-def fly_followed(Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, K, first, last, run_of, cut_of, Y):
+def fly_followed(
+    Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, K, begin_at, first, last, run_of, cut_of, Y
+):  # fmt: skip
     """Every model followed along the runs with kept gains, and its windows flown on from there.
 
-    Y (models, cuts, rows, N_Y): windows of one cut_of do not overlap; rows outside of them are left as they are.
+    begin_at (windows,): the row that each is flown from, its first or one before. Y (models, cuts, rows, N_Y): windows
+    of one cut_of do not overlap; rows outside of them are left as they are.
     """
     groups = groups_of(Fs[:, ef.LINK])
     number = len(groups) - 1
@@ -75,10 +78,10 @@ def fly_followed(Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, 
         )  # fmt: skip
         for w in range(len(first)):
             if run_of[w] == run:
-                a, b = first[w] - begin, last[w] - begin
+                at, a, b = begin_at[w] - begin, first[w] - begin, last[w] - begin
                 fly_window(
                     as_wide(P), as_wide(F), modes[run], t[begin:end], inputs[begin:end], as_wide(X), as_wide(path),
-                    a, a, b, as_wide(E),
+                    at, a, b, as_wide(E),
                 )  # fmt: skip
                 for m in range(begins, ends):
                     Y[m, cut_of[w], first[w] : last[w]] = E[a:b, :, m - begins]

@@ -209,7 +209,9 @@ def fly_windows(P, F, modes, bounds, t, inputs, X, paths, begin, first, last, ru
 
 
 @parallel_kernel
-def fly_followed(Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, K, first, last, run_of, cut_of, Y):
+def fly_followed(
+    Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, K, begin_at, first, last, run_of, cut_of, Y
+):  # fmt: skip
     """Every model followed along the runs with kept gains, and its windows flown on: as core/flight.fly_followed."""
     runs = len(bounds) - 1
     for n in prange(Ps.shape[0] * runs):
@@ -219,7 +221,7 @@ def fly_followed(Ps, Fs, drift, modes, bounds, t, stamps, inputs, z, starts, W, 
         follow_run(Ps[m], Fs[m], t, inputs, z, begin, end, starts[run], W, K, X, E)
         for w in range(len(first)):
             if run_of[w] == run:
-                fly_window(Ps[m], Fs[m], t, inputs, begin, X, first[w], first[w], last[w], Y[m, cut_of[w]])
+                fly_window(Ps[m], Fs[m], t, inputs, begin, X, begin_at[w], first[w], last[w], Y[m, cut_of[w]])
 
 
 @parallel_kernel
