@@ -78,7 +78,7 @@ def all_results() -> list[SetResult]:
 
 
 def newest(results: Iterable[SetResult], kind: str) -> SetResult:
-    """The set of a kind that was scored last; of those of one day the one with the largest seed."""
+    """The set of a kind that was scored last; of those of one time the one with the largest seed."""
     answered = [one for one in results if one.kind == kind and one.figures and one.standing]
     return max(answered, key=lambda one: (one.date or "", one.seed))
 
@@ -114,7 +114,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 def block(result: SetResult) -> str:
     """A set of docs/reference/figures.md: what it is, its figures, its note."""
     counts = ", ".join(f"{result.counts[key]} {words}" for key, words in COUNTED.items() if result.counts.get(key))
-    text = f"Version {result.commit}, {result.date}, set {result.seed}" + (f": {counts}.\n\n" if counts else ".\n\n")
+    text = f"Version {result.commit}, {(result.date or '')[:10]}, set {result.seed}" + (f": {counts}.\n\n" if counts else ".\n\n")
     rows = [
         (words, share(figure), interval(figure), *target(figure))
         for key, words in WORDS.items()

@@ -117,9 +117,7 @@ class VehicleKind(Protocol):
         """Identify the case's vehicle."""
         ...
 
-    def diagnose(
-        self, case: Case, reference: Case | None, without: str | None, say: Say
-    ) -> Callable[[Path], str]:
+    def diagnose(self, case: Case, reference: Case | None, without: str | None, say: Say) -> Callable[[Path], str]:
         """Diagnose a case; returns what writes answer and report into a folder and returns the verdict's sentence."""
         ...
 

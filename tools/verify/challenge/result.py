@@ -46,7 +46,7 @@ class SetResult(msgspec.Struct):
     seed: str
     answers_sha256: str | None
     commit: str | None = None  # of the program that answered
-    date: str | None = None  # of the scoring; of the commit where a page is the source
+    date: str | None = None  # of the scoring, UTC; of the commit where a page is the source
     answered: str = ""  # how many of the cases, where not all were
     standing: bool = True  # false: by a version whose change was removed again
     source: Literal["score", "page"] = "score"  # page: figures copied from the page that published them
@@ -109,7 +109,7 @@ def result_of(
     return SetResult(
         kind, str(plan.get("seed", "")), opened.sha256,
         answered or answered_by(diagnoses, [case.name for case in cases]),
-        dt.datetime.now(dt.UTC).date().isoformat(), counts=counts,
+        f"{dt.datetime.now(dt.UTC):%Y-%m-%dT%H:%M}", counts=counts,
         figures={figure.key: as_result_figure(figure) for figure in scored.figures if figure.of},
         stated=[one for one in map(stated_of, cases) if one is not None],
     )  # fmt: skip

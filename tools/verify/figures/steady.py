@@ -4,7 +4,8 @@ See docs/explanation/diagnosis.md, Steady.
 
     python -m glider.tools.verify.figures.steady CASE... --copies 4 --seed 1
 
-Prints, for each case, the largest move of a probability and of which entry, and whether verdict and `selected` stayed.
+Prints, for each case, the largest move of a probability and of which entry, whether verdict and `selected` stayed, and
+the largest move of a stage's gap.
 """
 
 from dataclasses import dataclass, replace
@@ -28,6 +29,7 @@ class Said:
     verdict: str
     selected: frozenset[str]
     probabilities: dict[str, float]
+    stages: dict[str, float]  # gap, tolerances
 
 
 def moved(case: Case, seed: int) -> Case:
@@ -47,7 +49,8 @@ def moved(case: Case, seed: int) -> Case:
 def said(case: Case) -> Said:
     """The diagnosis of a case."""
     found = diagnose(case)
-    return Said(found.verdict, frozenset(found.answer.selected), found.answer.probabilities)
+    return Said(found.verdict, frozenset(found.answer.selected), found.answer.probabilities,
+                {stage.name: stage.total for stage in found.stages})  # fmt: skip
 
 
 def largest_move(one: Said, other: Said) -> tuple[str, float]:
@@ -58,14 +61,23 @@ def largest_move(one: Said, other: Said) -> tuple[str, float]:
     return name, apart[name]
 
 
+def largest_stage_move(one: Said, other: Said) -> tuple[str, float]:
+    """The stage whose gap differs most, and by what share of it."""
+    apart = {name: abs(other.stages.get(name, np.inf) / gap - 1.0) for name, gap in one.stages.items()}
+    name = max(sorted(apart), key=lambda name: apart[name])
+    return name, apart[name]
+
+
 def line(name: str, own: Said, copies: list[Said]) -> str:
     """What a case's copies came to."""
     label, far = max((largest_move(own, copy) for copy in copies), key=lambda found: found[1])
+    stage, share = max((largest_stage_move(own, copy) for copy in copies), key=lambda found: found[1])
     verdicts = sum(copy.verdict != own.verdict for copy in copies)
     selected = sum(copy.selected != own.selected for copy in copies)
     return (
         f"{name}: {len(copies)} copies, {own.verdict} {own.probabilities.get(label, 0.0):.3f} {label} moves by "
-        f"{far:.2g}; another verdict {verdicts}, others selected {selected}"
+        f"{far:.2g}; another verdict {verdicts}, others selected {selected}; "
+        f"gap of stage {stage} moves by {share:.2%}"
     )
 
 
