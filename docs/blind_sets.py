@@ -114,7 +114,8 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 def block(result: SetResult) -> str:
     """A set of docs/reference/figures.md: what it is, its figures, its note."""
     counts = ", ".join(f"{result.counts[key]} {words}" for key, words in COUNTED.items() if result.counts.get(key))
-    text = f"Version {result.commit}, {(result.date or '')[:10]}, set {result.seed}" + (f": {counts}.\n\n" if counts else ".\n\n")
+    day = (result.date or "")[:10]
+    text = f"Version {result.commit}, {day}, set {result.seed}" + (f": {counts}.\n\n" if counts else ".\n\n")
     rows = [
         (words, share(figure), interval(figure), *target(figure))
         for key, words in WORDS.items()

@@ -17,17 +17,12 @@ from glider.tools.data.errors import InputError
 from glider.tools.data.runs.case import load_case
 from glider.tools.data.sources import load_vehicle
 from glider.tools.data.tomltext import toml_text
-from glider.tools.diagnose import against_healthy as against
 from glider.tools.diagnose.against_answer import plain, write
-from glider.tools.diagnose.against_healthy import (
-    Comparison,
-    FreeForm,
-    Healthy,
-    HealthyHypothesis,
-    diagnose_against_healthy,
-    weigh,
-)
+from glider.tools.diagnose.against_healthy import diagnose_against_healthy
 from glider.tools.diagnose.gates import form_stands_out
+from glider.tools.diagnose.healthy_decision import weigh
+from glider.tools.diagnose.healthy_fits import Comparison, FreeForm, HealthyHypothesis
+from glider.tools.diagnose.healthy_runs import FILE_ERROR, AsUsual, Healthy, as_the_case_sees, prior_evidence
 from glider.tools.report.pooled import write_pooled_report
 from glider.tools.verify.challenge.form_cases import draw_healthy, write_flights
 from glider.tools.verify.challenge.form_fit import fit_flights, fit_forces
@@ -171,7 +166,7 @@ def test_healthy_runs_are_seen_as_the_case_is(place):
     for run in case.runs:
         for name in [name for name in run.columns if name.startswith("mocap")]:
             del run.columns[name]
-    seen = against.as_the_case_sees(load_case(place / "healthy").runs[0], case)
+    seen = as_the_case_sees(load_case(place / "healthy").runs[0], case)
     assert not seen.has_mocap
     assert set(seen.columns) == set(case.runs[0].columns)
 
@@ -286,15 +281,15 @@ def test_evidence_is_the_integral_over_the_prior():
     prior = multivariate_normal(mean, covariance).logpdf(points)
     likelihood = points @ score - 0.5 * np.einsum("pi,ij,pj->p", points, precision, points)
     whole = logsumexp(prior + likelihood) + 2.0 * np.log(v[1] - v[0])
-    assert against.prior_evidence(precision, score, mean, covariance) == pytest.approx(whole, abs=1e-6)
+    assert prior_evidence(precision, score, mean, covariance) == pytest.approx(whole, abs=1e-6)
 
 
 def test_what_healthy_runs_say_nothing_of_is_off_by_what_is_usual_and_what_they_show_by_that():
-    nothing = against.AsUsual.learned(np.zeros((1, 1)), np.zeros(1))
+    nothing = AsUsual.learned(np.zeros((1, 1)), np.zeros(1))
     assert nothing.mean == 0.0
-    assert np.sqrt(nothing.covariance.item()) == pytest.approx(against.FILE_ERROR, rel=0.2)
+    assert np.sqrt(nothing.covariance.item()) == pytest.approx(FILE_ERROR, rel=0.2)
     precision = 1.0 / 0.05**2
-    shown = against.AsUsual.learned(np.array([[precision]]), np.array([0.8 * precision]))
+    shown = AsUsual.learned(np.array([[precision]]), np.array([0.8 * precision]))
     assert shown.mean == pytest.approx(0.8, rel=0.02)
     assert np.sqrt(shown.covariance.item()) == pytest.approx(0.05, rel=0.02)
 

@@ -9,8 +9,10 @@ import math
 import numpy as np
 import pytest
 
-from glider.tools.diagnose import against_healthy
-from glider.tools.diagnose.against_healthy import AsUsual, Comparison, FreeForm, Healthy, HealthyHypothesis, weigh
+from glider.tools.diagnose import healthy_decision
+from glider.tools.diagnose.healthy_decision import weigh
+from glider.tools.diagnose.healthy_fits import Comparison, FreeForm, HealthyHypothesis
+from glider.tools.diagnose.healthy_runs import AsUsual, Healthy
 from glider.tools.inference.corrected import LINKS
 
 EFFECTS = 46  # M
@@ -37,7 +39,7 @@ def evidence(mu, sigma, precision, score):
 @pytest.fixture(autouse=True)
 def seldom(monkeypatch):
     """One effect of the cases is one that seldom changes."""
-    monkeypatch.setattr(against_healthy, "SELDOM", SELDOM)
+    monkeypatch.setattr(healthy_decision, "SELDOM", SELDOM)
 
 
 def by_the_page(n, level, s, runs, most, table, usual):
