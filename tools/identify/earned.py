@@ -1,14 +1,15 @@
-"""Which terms beside equation (4) a vehicle keeps: those without which runs left out are flown clearly worse.
+"""Which terms beside equation (4) a vehicle keeps: those that are more probable to be there than not.
 
-The fit by prediction error has them all free. What becomes of it without a term is the posterior's conditional mean at
-the term's value in the file, flown in the runs that its fit has not seen; the term that is missed least goes first.
+The fit by prediction error has them all free. The evidence of a term is the ratio of its prior's density to its
+posterior's at the file's value (Savage and Dickey's), by Laplace's approximation, with as many independent residuals as
+the fit counts; the term with the least goes first, the others then stand where they are most probable without it.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from glider.tools.inference.prediction_error import HORIZONS, Fitted, PredictionError
+from glider.tools.inference.prediction_error import Fitted, PredictionError
 from glider.tools.inference.vehicle_parameters import FIRST_EFFECTS, GAUGE, LINEAR_DAMPING
 
 TERMS = (tuple(LINEAR_DAMPING), ("x_b",), *((name,) for name in FIRST_EFFECTS), (GAUGE,))
@@ -47,32 +48,27 @@ def places(names: list[str], terms: list[tuple[str, ...]]) -> np.ndarray:
     return np.array([n for n, name in enumerate(names) if name in wanted], dtype=np.int64)
 
 
-def missed(folds: list[Fold], sets: list[list[tuple[str, ...]]]) -> np.ndarray:
-    """By fold and set of terms, the logarithm of the gap of runs left out without those terms, (folds, sets)."""
-    horizon, offsets = HORIZONS[-1]
-    out = np.empty((len(folds), len(sets)))
-    for k, fold in enumerate(folds):
-        fitting, names = fold.outside, fold.outside.free.names
-        points = [
-            fitting.clipped(conditional(fold.inside, fitting.file_values, places(names, terms))) for terms in sets
-        ]
-        window = fitting.windows(horizon, offsets[0])
-        Y = fitting.fly(points, fitting.gains(fold.inside.values), [window])
-        out[k] = [0.5 * np.log(max(fitting.weights(e)[1], 1e-9)) for e in fitting.residuals(Y[:, 0], window)]
-    return out
+def evidence(found: Fitted, at: np.ndarray, term: np.ndarray, gone: np.ndarray) -> float:
+    """Log odds (nat) that a term is there, parameters `term` (indices), where those `gone` (indices) are not.
+
+    at (n,): values of a vehicle without them, in units of the priors.
+    """
+    kept = np.setdiff1d(np.arange(len(at)), gone)
+    off = (conditional(found, at, gone) - at)[term]
+    own = np.searchsorted(kept, term)
+    covariance = np.linalg.inv(found.normal[np.ix_(kept, kept)])[np.ix_(own, own)]
+    prior = -0.5 * float(at[term] @ at[term])
+    return prior + 0.5 * float(np.linalg.slogdet(covariance)[1] + off @ np.linalg.solve(covariance, off))
 
 
-def unearned(folds: list[Fold]) -> list[tuple[str, ...]]:
+def unearned(found: Fitted, fitting: PredictionError) -> list[tuple[str, ...]]:
     """The terms that go."""
-    names = folds[0].outside.free.names
+    names, at = fitting.free.names, fitting.file_values
     left = [term for term in TERMS if len(places(names, [term]))]
     gone: list[tuple[str, ...]] = []
     while left:
-        found = missed(folds, [[], *([*gone, term] for term in left)])
-        more = found[:, 1:] - found[:, :1]
-        least = int(np.argmin(more.mean(axis=0)))
-        mean, error = mean_and_error(more[:, least])
-        if mean > CLEAR * error:
+        odds = [evidence(found, at, places(names, [term]), places(names, gone)) for term in left]
+        if min(odds) > 0.0:
             break
-        gone.append(left.pop(least))
+        gone.append(left.pop(int(np.argmin(odds))))
     return gone

@@ -242,12 +242,12 @@ class Judge:
         return Candidate("noise", None, "simulated", gaps, flown)
 
     def prediction(self, likelihood: IdentificationFit, begin: dict[str, float] | None) -> Candidate:
-        """The prediction error's fit, without the terms that runs left out do not miss."""
+        """The prediction error's fit, without the terms that are less probable to be there than not."""
         whole = by_prediction(self.case, self.model, likelihood, begin, self.say)
         count = min(FOLDS, len(self.all))
         parts = [list(range(k, len(self.all), count)) for k in range(count)]
         folds = [self.fold(part, whole.values) for part in parts]
-        gone = unearned(folds)
+        gone = unearned(whole, fitting_of(self.case, self.model, self.all))
         fitting = fitting_of(self.case, self.model, self.all, gone)
         fitted = whole
         if gone:

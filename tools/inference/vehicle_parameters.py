@@ -6,7 +6,7 @@ sits on the vehicle and its clock beside the onboard one. What a vehicle or case
 """
 
 from dataclasses import dataclass, replace
-from math import inf
+from math import inf, log
 
 import numpy as np
 
@@ -20,9 +20,10 @@ from glider.tools.inference.problem import Problem
 
 # 1 sigma before any flight. [uncertainty] says what is left after one: these are what a first vehicle file may be off.
 K_SHARE = 0.5  # of a coefficient's size
-# The same of damping, one-sided, for a vehicle that nobody identified. By strip theory wings of span b and chord c damp
-# roll by rho a c b^3 / 24 V (0.7 m: ten times a bare hull's), a fin of area S at a lever l yaw by rho a S l^2 / 2 V.
-DAMPING, DAMPING_SHARE = ("K_p", "K_q", "K_r"), 3.0
+# Of a vehicle that nobody identified damping is known by a factor, 1 sigma of its logarithm. By strip theory wings of
+# span b and chord c damp roll by rho a c b^3 / 24 V (0.7 m: ten times a bare hull's), a fin of area S at a lever l yaw
+# by rho a S l^2 / 2 V.
+DAMPING, DAMPING_FACTOR = ("K_p", "K_q", "K_r"), 3.0
 CAMBER, TRIM_ANGLE = 0.025, 0.03  # rad of attack by which lift and pitch moment may be displaced where a file says 0
 ADDED_SHARE, NET_MASS, CG = 0.15, 0.01, 0.0005  # of added mass and inertia; kg; m
 FIRST = 10.0  # times these trims, where no motion capture holds the flight
@@ -104,11 +105,11 @@ def coefficients(P: np.ndarray, first: bool = False) -> list[FreeParameter]:
     found = []
     for name, size in zip(COEFFICIENTS, coefficient_sizes(P), strict=True):
         entry = getattr(layout, name.upper())
-        damps = first and name in DAMPING
-        spread = (DAMPING_SHARE if damps else K_SHARE) * size
+        damps = first and name in DAMPING and P[entry] != 0.0
+        spread = (log(DAMPING_FACTOR) if damps else K_SHARE) * size
         low = -P[entry] / spread if name in ("K_D0", "K_D") else -inf  # drag does not push
-        high = max(-P[entry] / spread, 0.0) if damps else inf  # nor does damping drive
-        found.append(FreeParameter("", name, "P", entry, spread, low, high, K_UNITS[name]))
+        factor = DAMPING_FACTOR if damps else 1.0
+        found.append(FreeParameter("", name, "P", entry, spread, low, unit=K_UNITS[name], factor=factor))
     return found
 
 

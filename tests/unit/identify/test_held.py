@@ -1,10 +1,12 @@
 """Which vehicle an identification hands out, and which terms beside equation (4) it keeps."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from glider.tools.gap.measure import RunGap
-from glider.tools.identify.earned import conditional, mean_and_error
+from glider.tools.identify.earned import conditional, evidence, mean_and_error, unearned
 from glider.tools.identify.held import FILE, LIKELIHOOD, PREDICTION, Candidate, choose
 from glider.tools.inference.prediction_error import Fitted
 
@@ -69,3 +71,27 @@ def test_without_a_term_the_others_stand_where_they_are_most_probable():
     slope = normal @ (values - best)
     assert np.abs(slope[[0, 2, 3, 5]]).max() < 1e-9  # least there
     assert np.abs(slope[[1, 4]]).min() > 1e-3
+
+
+def log_evidence(normal: np.ndarray, slope: np.ndarray, free: list[int]) -> float:
+    """Of a quadratic log posterior with a normal prior of unit variance, what is not free at 0."""
+    own = normal[np.ix_(free, free)]
+    return float(-0.5 * np.linalg.slogdet(own)[1] + 0.5 * slope[free] @ np.linalg.solve(own, slope[free]))
+
+
+def test_the_evidence_of_a_term_is_the_ratio_of_integrals_with_and_without_it():
+    rng = np.random.default_rng(6)
+    A = rng.normal(size=(6, 6))
+    normal, best = A @ A.T + np.eye(6), rng.normal(size=6)
+    found, at = Fitted(best, 1.0, normal, 100.0), np.zeros(6)
+    whole = log_evidence(normal, normal @ best, [0, 1, 2, 3, 5])
+    without = log_evidence(normal, normal @ best, [0, 2, 5])
+    assert evidence(found, at, np.array([1, 3]), np.array([4])) == pytest.approx(whole - without)
+
+
+def test_a_term_that_the_runs_say_nothing_of_or_that_is_not_there_goes_and_one_that_is_there_stays():
+    fitting = SimpleNamespace(free=SimpleNamespace(names=["K_q", "x_b", "stall", "pressure_lever"]))
+    fitting.file_values = np.zeros(4)
+    precision = np.array([5.0, 30.0, 1.0 + 1e-6, 4.0])
+    found = Fitted(np.array([0.3, 0.02, 0.0, -1.8]), 1.0, np.diag(precision), 100.0)
+    assert set(unearned(found, fitting)) == {("x_b",), ("stall",)}
