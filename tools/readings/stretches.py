@@ -19,6 +19,8 @@ SURFACE = 0.25  # m about the surface: a hull of a metre that is partly out of t
 HIGHEST = -1.0  # m, of a depth at the surface
 SURFACE_RANGE = 0.1  # m that the depth moves within SPAN there: waves, no dive
 LEAST_SAID = 1.0  # s; a shorter end afloat is left out without a word
+OUT, OUT_SPAN = 0.05, 0.5  # m, less than a hull's radius: partly out of the water; s before and after
+MOST_OUT = 0.5  # of a run; more of it is a gauge that is far off
 STILL_ANGLE, STILL_DEPTH = 0.004, 0.02  # rad, m: ranges within STILL_SPAN of a vehicle that lies on something
 STILL_SPAN = 15.0  # s
 HANDLED_RATE = 1.5  # rad/s; the fastest turns of gliders of this class are some 0.5 rad/s
@@ -110,20 +112,40 @@ def flying(run: Run) -> np.ndarray:
     return ~np.any(list(found.values()), axis=0) if found else np.ones(run.rows, dtype=bool)
 
 
-def under_water(run: Run) -> Run:
-    """The run without the rows afloat at its end: no model has the force of a hull that is partly out of the water.
+def out_of_water(run: Run) -> np.ndarray:
+    """Rows afloat at the end, and moments between two dives in which the gauge reads less than a hull's radius: bool of
+    shape (rows,). None where the gauge has another zero."""
+    t, nothing = run.t, np.zeros(run.rows, dtype=bool)
+    depth = run.columns.get(names.DEPTH, np.full(run.rows, np.nan))
+    seen = np.isfinite(depth)
+    if not seen.any() or float(depth[seen].min()) < -SURFACE:
+        return nothing
+    afloat = afloat_at_end(t, between_samples(t, depth))
+    found = near(t, np.interp(t, t[seen], depth[seen]) < OUT, OUT_SPAN)
+    if found.mean() >= MOST_OUT or found.all():
+        return afloat
+    found[: int(np.flatnonzero(~found)[0])] = False
+    return afloat | found & ~lasting(t, found, SPAN)
 
-    Everything before them stays as it was recorded (docs/reference/gap.md, Measures): an observer that has no readings
-    at the surface before a dive, or between two, knows nothing of where the windows there begin.
+
+def under_water(run: Run) -> Run:
+    """The run without what was measured out of the water: no model has the force of a hull that is partly out of it.
+
+    What it measured in a moment at the surface between two dives is missing; rows behind the last under water are cut
+    off. Before the first dive, and where it stays at the surface, the rows are as they were recorded: an observer
+    without readings would know nothing of where the windows begin.
     """
-    depth = run.columns.get(names.DEPTH)
-    if depth is None or not np.isfinite(depth).any() or float(np.nanmin(depth)) < -SURFACE:  # a gauge of another zero
+    out = out_of_water(run)
+    if not out.any() or out.all():
         return run
-    afloat = afloat_at_end(run.t, between_samples(run.t, depth))
-    if not afloat.any() or afloat.all():
-        return run
-    end = int(np.flatnonzero(~afloat)[-1]) + 1
-    return replace(run, columns={name: values[:end] for name, values in run.columns.items()}, extra={})
+    columns = {
+        name: values if name in (names.TIME, *names.COMMANDS) else np.where(out, np.nan, values)
+        for name, values in run.columns.items()
+    }
+    end = int(np.flatnonzero(~out)[-1]) + 1
+    if end == run.rows:
+        return replace(run, columns=columns)
+    return replace(run, columns={name: values[:end] for name, values in columns.items()}, extra={})
 
 
 def judge_stretches(runs: list[Run]) -> list[Finding]:

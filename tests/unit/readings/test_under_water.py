@@ -51,3 +51,13 @@ def test_what_never_came_up_or_has_another_zero_stays(depth):
     after = under_water(before)
     for name, values in before.columns.items():
         np.testing.assert_array_equal(after.columns[name], values)
+
+
+def test_what_lies_before_the_first_dive_and_long_between_two_stays():
+    """Without readings there an observer is blind where the next windows begin."""
+    t = np.arange(0.0, 60.0, 0.1)
+    waiting = run(np.where(t < 9.0, 0.0, 0.1 * (t - 9.0)))
+    assert under_water(waiting) is waiting
+    between = run(np.clip(np.abs(t - 30.0) - 8.0, 0.0, 2.0))
+    assert (between.columns["depth_m"] < 0.04).sum() > 100
+    assert under_water(between) is between
