@@ -34,6 +34,7 @@ class ChangeEvent:
     probe: tuple[str, float] | None = None  # of disorder that is not the water's: what shakes, and how much
     place: NoiseProbe | None = None  # and the single link that shakes most
     strange: Lasting | None = None  # what lasts in its runs beside it, before any other event was searched
+    matters: bool = True  # whether it moves a channel by as much as its kind of vehicle asks for, when it was found
 
     @property
     def has_course(self) -> bool:
@@ -85,13 +86,17 @@ def already(history: History, change: Change) -> bool:
 
 
 def earns_place(history: History, event: ChangeEvent | Change) -> bool:
-    """Whether an event beside others in the same runs is more than the wrong form of one of them."""
+    """Whether an event beside others in the same runs is more than the wrong form of one of them.
+
+    One that does not matter hides none: of a month's slow growth of a label that moves little, the evidence grows with
+    the runs, and so does what its form leaves.
+    """
     flights = history.flights
     own = event.span.weights(flights.count) > 0.0
     evidence = event.evidence * float(
         flights.run_inflation[own].max()
     )  # as others were weighed, before their runs were hot
-    for other in history.events:
+    for other in (one for one in history.events if one.matters):
         shared = own & (other.span.weights(flights.count) > 0.0)
         mostly_there = shared.sum() >= 0.5 * own.sum()
         if not mostly_there or evidence >= FURTHER_EVENT_SHARE * other.explained:

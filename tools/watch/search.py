@@ -19,14 +19,22 @@ FALSE = 0.05  # of the vehicles without a change that may be given one: of their
 MOST_EVENTS = 5
 
 
-def find_events(history: History, say: Callable[[str], None] = lambda text: None) -> None:
-    """Events added to the history, the most evident first."""
+def find_events(
+    history: History, matters: Callable[[History, ChangeEvent, int], bool],
+    say: Callable[[str], None] = lambda text: None,
+) -> None:  # fmt: skip
+    """Events added to the history, the most evident first.
+
+    matters: of a history, an event with a course and its number among those, whether it moves anything by enough.
+    """
     for _ in range(MOST_EVENTS):
         event = next_event(history)
         if event is None or event.evidence < evidence_needed(history, event) or not earns_place(history, event):
             break
         history.events.append(event)
         take(history, event)
+        if event.has_course:
+            event.matters = matters(history, event, len(history.taken) - 1)
         event.strange = lasts(history, event)
         say(f"{event.label or 'unknown'} in runs {event.span.first} to {event.span.end - 1}")
 

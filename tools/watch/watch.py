@@ -81,7 +81,7 @@ def looked_at(
     flights.learn()
     say(f"learned from {int(learned_from.sum())} runs what all share")
     history = History(flights, judged, begins)
-    find_events(history, say)
+    find_events(history, material, say)
     return history
 
 
