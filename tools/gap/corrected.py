@@ -24,7 +24,7 @@ from glider.tools.inference.vehicle_parameters import GAUGE
 from glider.tools.readings.check import apply_corrections, check, corrected_runs
 from glider.tools.readings.findings import Finding
 from glider.tools.readings.signals import table_of
-from glider.tools.readings.stretches import under_water
+from glider.tools.readings.stretches import out_of_water, under_water
 
 # effects of a constant size, by label: the one entry of F that a finding's size is
 SIZED = {
@@ -94,8 +94,11 @@ def correct_readings(case: Case, model: Model, runs: list[Run] | None = None) ->
     if rest:
         runs = corrected_runs(runs, apply_corrections(table_of(runs), rest))
         added += [f"{one.channel} {one.finding}" for one in rest]
-    runs, model = [under_water(run) for run in runs], replace(model, F=F if F.any() else model.F)
-    return ReadingCorrections(findings, runs, model, list(dict.fromkeys(added)), scale)
+    if any(out_of_water(run).any() for run in runs):
+        runs = [under_water(run) for run in runs]
+    return ReadingCorrections(
+        findings, runs, replace(model, F=F if F.any() else model.F), list(dict.fromkeys(added)), scale
+    )
 
 
 def fix_axes_signs_units(runs: list[Run], findings: list[Finding]) -> list[Run]:

@@ -7,7 +7,7 @@ import pytest
 
 from glider.sim_backend.core.effects import effect_layout as ef
 from glider.tools.data.runs import columns as names
-from glider.tools.verify.figures.steady import Said, largest_move, line, moved, said
+from glider.tools.verify.figures.steady import Said, largest_move, largest_stage_move, line, moved, said
 from tests.support.cases import make_case
 
 pytestmark = pytest.mark.computes(seconds=15)
@@ -39,8 +39,9 @@ def test_an_answer_stays(case):
 
 
 def test_what_is_said_of_copies():
-    own = Said("cause", frozenset({"drag"}), {"drag": 0.9, "none": 0.1})
-    other = Said("none", frozenset(), {"drag": 0.4, "none": 0.5, "unknown": 0.1})
+    own = Said("cause", frozenset({"drag"}), {"drag": 0.9, "none": 0.1}, {"nominal": 2.0, "+ drag": 0.5})
+    other = Said("none", frozenset(), {"drag": 0.4, "none": 0.5, "unknown": 0.1}, {"nominal": 2.0, "+ drag": 0.55})
     assert largest_move(own, other) == ("drag", pytest.approx(0.5))
+    assert largest_stage_move(own, other) == ("+ drag", pytest.approx(0.1))
     text = line("case000", own, [own, other])
-    assert re.findall(r"drag|\d+\.\d+|\b\d\b", text) == ["2", "0.900", "drag", "0.5", "1", "1"]
+    assert re.findall(r"drag|\d+\.\d+|\b\d\b", text) == ["2", "0.900", "drag", "0.5", "1", "1", "drag", "10.00"]
