@@ -78,7 +78,7 @@ def all_results() -> list[SetResult]:
 
 
 def newest(results: Iterable[SetResult], kind: str) -> SetResult:
-    """The set of a kind that was scored last; of those of one time the one with the largest seed."""
+    """The set of a kind that was scored last; of those of one minute the one with the largest seed."""
     answered = [one for one in results if one.kind == kind and one.figures and one.standing]
     return max(answered, key=lambda one: (one.date or "", one.seed))
 

@@ -5,8 +5,6 @@ posterior's at the file's value (Savage and Dickey's), by Laplace's approximatio
 the fit counts; the term with the least goes first, the others then stand where they are most probable without it.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from glider.tools.inference.prediction_error import Fitted, PredictionError
@@ -20,14 +18,6 @@ CLEAR = 2.0  # standard errors of its mean from which one flies runs left out be
 def mean_and_error(less: np.ndarray) -> tuple[float, float]:
     """Mean of differences of logarithms (runs,), and its standard error."""
     return float(less.mean()), float(np.sqrt(SCATTER**2 + np.square(less - less.mean()).sum()) / len(less))
-
-
-@dataclass
-class Fold:
-    """A fit to a part of the runs, and the others: the same parameters free."""
-
-    inside: Fitted
-    outside: PredictionError
 
 
 def conditional(found: Fitted, at: np.ndarray, fixed: np.ndarray) -> np.ndarray:

@@ -17,13 +17,13 @@ from glider.tools.data.runs.case import Case
 from glider.tools.data.runs.run import Run
 from glider.tools.gap.measure import RunGap, root_mean_square, run_gap, with_total
 from glider.tools.gap.regimes import ALL, gaps_by_regime
-from glider.tools.identify.earned import CLEAR, Fold, conditional, mean_and_error, places, unearned
+from glider.tools.identify.earned import CLEAR, conditional, mean_and_error, places, unearned
 from glider.tools.identify.fit import IdentificationFit, as_fit, by_prediction, fit, fitting_of
 from glider.tools.identify.predict import model_of, predicted
 from glider.tools.inference.channels import ROUGHIE_MEASURES
 from glider.tools.inference.model import Model, effect_vector, nominal_model
 from glider.tools.inference.predict import fly, observe
-from glider.tools.inference.prediction_error import Fitted
+from glider.tools.inference.prediction_error import Fitted, PredictionError
 from glider.tools.inference.problem import cut, problem_of
 
 MAX_PREDICTED_RUNS = 12  # runs that are predicted; of a longer case evenly chosen ones
@@ -247,31 +247,31 @@ class Judge:
         count = min(FOLDS, len(self.all))
         parts = [list(range(k, len(self.all), count)) for k in range(count)]
         folds = [self.fold(part, whole.values) for part in parts]
-        gone = unearned(whole, fitting_of(self.case, self.model, self.all))
-        fitting = fitting_of(self.case, self.model, self.all, gone)
-        fitted = whole
+        every = fitting_of(self.case, self.model, self.all)
+        gone = unearned(whole, every)
+        fitting, fitted = every, whole
         if gone:
             self.say(f"without {', '.join(name for term in gone for name in term)}")
-            fitted = fitting.again(self.kept(whole, folds[0], gone), REFIT_STEPS)
-            begins = [self.kept(fold.inside, fold, gone) for fold in folds]
+            fitting = fitting_of(self.case, self.model, self.all, gone)
+            fitted = fitting.again(self.kept(whole, every, gone), REFIT_STEPS)
+            begins = [self.kept(fold, every, gone) for fold in folds]
             folds = [self.fold(part, values, gone) for part, values in zip(parts, begins, strict=True)]
-        models = [model_of(self.model, fitting.free, fold.inside.values) for fold in folds]
+        models = [model_of(self.model, fitting.free, fold.values) for fold in folds]
         found = as_fit(fitting, fitted, likelihood)
         return self.candidate(
             PREDICTION, found, PARTS if count > 1 else ITSELF, [models[n % count] for n in self.picked]
         )
 
-    def fold(self, left_out: list[int], values: np.ndarray, gone: Sequence[tuple[str, ...]] = ()) -> Fold:
+    def fold(self, left_out: list[int], values: np.ndarray, gone: Sequence[tuple[str, ...]] = ()) -> Fitted:
         """The fit without a part of the runs, from values on; of a single run nothing can be left out."""
         kept = self.others(left_out) or self.all
-        outside = fitting_of(self.case, self.model, [self.all[n] for n in left_out], gone)
-        return Fold(fitting_of(self.case, self.model, kept, gone).again(values, REFIT_STEPS), outside)
+        return fitting_of(self.case, self.model, kept, gone).again(values, REFIT_STEPS)
 
     @staticmethod
-    def kept(found: Fitted, fold: Fold, gone: list[tuple[str, ...]]) -> np.ndarray:
+    def kept(found: Fitted, fitting: PredictionError, gone: list[tuple[str, ...]]) -> np.ndarray:
         """Values of what stays free without the terms that go."""
-        at = places(fold.outside.free.names, gone)
-        return np.delete(fold.outside.clipped(conditional(found, fold.outside.file_values, at)), at)
+        at = places(fitting.free.names, gone)
+        return np.delete(fitting.clipped(conditional(found, fitting.file_values, at)), at)
 
 
 def judge(
