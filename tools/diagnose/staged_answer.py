@@ -1,7 +1,6 @@
 """What readings and the stages of a vehicle far from its file come to: its answer, evidence, findings and words."""
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 from scipy.special import expit
@@ -26,13 +25,14 @@ SELECTED_PROBABILITY = 0.9  # probability from which a label is selected, where 
 
 def conclusion(answer: Answer, found: Staged, shrinkage: Shrinkage) -> Answer:
     """The answer of the search with what the stages came to in its place."""
-    by_readings = {label: found.stages[0].total ** 2 - found.stages[1].total ** 2 for label in found.read.labels}
-    weight = {label: max(by_readings.get(label, 0.0), found.taken.get(label, 0.0), 1e-3) for label in found.selected}
+    readings = {label: found.stages[0].total ** 2 - found.stages[1].total ** 2 for label in found.read.labels}
+    weight = {label: max(readings.get(label, 0.0), found.taken.get(label, 0.0), 1e-3) for label in found.selected}
     total = sum(weight.values())
     chances = dict.fromkeys(catalogue(), 0.0) | {label: (1.0 - UNKNOWN_THEN) * w / total for label, w in weight.items()}
     chances |= {NONE: 0.0, UNKNOWN: UNKNOWN_THEN if weight else 1.0}
-    count = residuals(found)
-    gained = {label: nats(found, label, count) for label in found.selected}
+    gained = {label: by_readings.nats(found.read.findings, label) for label in found.selected} | {
+        label: nat for label, nat in found.evidence.items() if label in found.selected
+    }
     return replace(
         answer, selected=found.selected, main=UNKNOWN, probabilities=chances, gained=gained, negligible={},
         groups={label: [label] for label in found.selected}, shrinkage=shrinkage,
@@ -78,14 +78,6 @@ def certain_by_readings(answer: Answer, findings: list[Finding]) -> Answer:
     groups = {label: [label] for label in said} | answer.groups
     negligible = {label: nat for label, nat in answer.negligible.items() if label not in said}
     return replace(answer, selected=[*answer.selected, *said], gained=gained, groups=groups, negligible=negligible)
-
-
-def nats(found: Staged, label: str, count: int) -> float:
-    """Evidence of a label: of what it takes of the gap of runs left out, or of its distance from 0 in the readings."""
-    for before, after in pairwise(found.stages):
-        if after.added == [label] and after.name.startswith("+"):
-            return count * float(np.log(before.total / after.total))
-    return by_readings.nats(found.read.findings, label)
 
 
 def identified_text(found: Staged) -> str:

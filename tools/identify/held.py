@@ -17,7 +17,7 @@ from glider.tools.data.runs.case import Case
 from glider.tools.data.runs.run import Run
 from glider.tools.gap.measure import RunGap, root_mean_square, run_gap, with_total
 from glider.tools.gap.regimes import ALL, gaps_by_regime
-from glider.tools.identify.earned import CLEAR, conditional, mean_and_error, places, unearned
+from glider.tools.identify.earned import CLEAR, mean_and_error, places, unearned
 from glider.tools.identify.fit import IdentificationFit, as_fit, by_prediction, fit, fitting_of
 from glider.tools.identify.predict import model_of, predicted
 from glider.tools.inference.channels import ROUGHIE_MEASURES
@@ -271,7 +271,7 @@ class Judge:
     def kept(found: Fitted, fitting: PredictionError, gone: list[tuple[str, ...]]) -> np.ndarray:
         """Values of what stays free without the terms that go."""
         at = places(fitting.free.names, gone)
-        return np.delete(fitting.clipped(conditional(found, fitting.file_values, at)), at)
+        return np.delete(fitting.clipped(found.conditional(fitting.file_values, at)), at)
 
 
 def judge(

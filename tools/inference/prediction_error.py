@@ -13,11 +13,15 @@ the model itself stands.
 - Errors within a window are one error: as many independent residuals are counted as there are windows and channels.
   The prior, 1 sigma of each parameter, is weighed against the misfit that is there, so that it holds while little is
   explained and yields as more is.
+- Asked to (`doubts`), the observer is as sure of the model as its innovations are small: before each horizon the
+  disturbance gets the level, in powers of ten of its density, at which they are most probable. With the file's, a
+  filter of a vehicle far from its file believes what is wrong, and where a window begins hangs on a parameter's last
+  digit. A vehicle that is handed out is fitted with the file's, by which its windows will begin.
 - From several starts: the file's values and the best of others (RANDOM draws of the prior, or fits by other means).
 """
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,6 +36,7 @@ STEPS = (8, 8, 12)  # at most, at each
 LOOK_IN = 2.0  # s of a run before its first window
 LINEAR = 4.0  # tolerances from which a residual counts linearly
 MAX_COUNTED_TOLERANCES = 200.0  # tolerances: a flight that is lost is lost
+LEVELS = tuple(10.0**n for n in range(7))  # of the disturbance's density, times the file's
 DIFFERENCE_STEP = 0.02  # of a prior's sigma, for columns
 LIMIT = 5.0  # sigma that a parameter goes at most
 BOLDEST = 1.0  # sigma a step
@@ -80,18 +85,46 @@ class Fitted:
         """Laplace's approximation, (n, n)."""
         return np.linalg.inv(self.normal)
 
+    def conditional(self, at: np.ndarray, fixed: np.ndarray) -> np.ndarray:
+        """Values (n,) where those at `fixed` (indices) stand at `at`, and the others where they then are most
+        probable."""
+        values = self.values.copy()
+        if not len(fixed):
+            return values
+        free = np.setdiff1d(np.arange(len(values)), fixed)
+        moved = at[fixed] - values[fixed]
+        values[fixed] = at[fixed]
+        across = self.normal[np.ix_(free, fixed)] @ moved
+        values[free] -= np.linalg.solve(self.normal[np.ix_(free, free)], across)
+        return values
+
+    def evidence(self, at: np.ndarray, term: np.ndarray, gone: Sequence[int] | np.ndarray = ()) -> float:
+        """Log odds (nat) that a term is there, parameters `term` (indices), where those `gone` (indices) are not.
+
+        The ratio of its prior's density to its posterior's at `at` (Savage and Dickey's), by Laplace's approximation;
+        at (n,): values of a vehicle without them, in units of the priors.
+        """
+        fixed = np.asarray(gone, dtype=np.int64)
+        kept = np.setdiff1d(np.arange(len(at)), fixed)
+        off = (self.conditional(at, fixed) - at)[term]
+        own = np.searchsorted(kept, term)
+        covariance = np.linalg.inv(self.normal[np.ix_(kept, kept)])[np.ix_(own, own)]
+        prior = -0.5 * float(at[term] @ at[term])
+        return prior + 0.5 * float(np.linalg.slogdet(covariance)[1] + off @ np.linalg.solve(covariance, off))
+
 
 class PredictionError:
     """A problem and what is free in it."""
 
-    def __init__(self, problem: Problem, free: Parameters):
-        self.problem, self.free = problem, free
+    def __init__(self, problem: Problem, free: Parameters, doubts: bool = False):
+        self.problem, self.free, self.doubts = problem, free, doubts
         measures = problem.kind.measures
         self.table = np.concatenate([measures.measured(run) for run in problem.runs])
         self.channels = list({c.name: c for run in problem.runs for c in measures.channels_of(run)}.values())
         self.low = np.maximum([f.low for f in free.free], -LIMIT)
         self.high = np.minimum([f.high for f in free.free], LIMIT)
         self.one_sided = np.array([f.one_sided for f in free.free])
+        self.level = 1.0  # of the disturbance that the observer expects, times the file's density
         self.scales: dict[str, float] = {}  # tolerances by channel that a residual is divided by, 1 where none is given
 
     def model(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -116,7 +149,20 @@ class PredictionError:
 
     def gains(self, values: np.ndarray) -> Gains:
         """The observer of the model at `values`; a clock that could wander would take up what a wrong delay leaves."""
-        return observe(self.problem, *self.model(values), steady_clock=True)
+        return self.observed(values, self.level)
+
+    def observed(self, values: np.ndarray, level: float) -> Gains:
+        """The same with the disturbance at another level."""
+        spectral = self.problem.spectral.copy()
+        spectral[self.problem.kind.accelerations] *= level
+        return observe(replace(self.problem, spectral=spectral), *self.model(values), steady_clock=True)
+
+    def expect(self, values: np.ndarray) -> None:
+        """Set the level to that of LEVELS at which the innovations at `values` are most probable, where it doubts."""
+        if not self.doubts:
+            return
+        misfits = [float(self.observed(values, level).misfit.sum()) for level in LEVELS]
+        self.level = LEVELS[int(np.argmin(np.nan_to_num(misfits, nan=np.inf)))]
 
     def fly(self, points: list[np.ndarray], gains: Gains, cuts: list[Windows]) -> np.ndarray:
         """Flights (points, cuts, rows, N_Y) of the windows from where the gains hold each model."""
@@ -226,6 +272,7 @@ class PredictionError:
 
     def descend(self, values: np.ndarray, horizon: float, offsets: tuple[float, ...], steps: int) -> Fitted:
         """The same at one horizon, and what is known of the values there."""
+        self.expect(values)
         cuts = [self.windows(horizon, offset) for offset in offsets]
         values, cost, gains = self.led(values, cuts, steps)
         independent = self.independent(cuts)

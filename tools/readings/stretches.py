@@ -124,8 +124,18 @@ def out_of_water(run: Run) -> np.ndarray:
     found = near(t, np.interp(t, t[seen], depth[seen]) < OUT, OUT_SPAN)
     if found.mean() >= MOST_OUT or found.all():
         return afloat
-    found[: int(np.flatnonzero(~found)[0])] = False
+    found[: first_dive(run)] = False
     return afloat | found & ~lasting(t, found, SPAN)
+
+
+def first_dive(run: Run) -> int:
+    """The first row that is deeper than a hull's radius; 0 where the gauge has another zero or nothing dives."""
+    depth = run.columns.get(names.DEPTH, np.full(run.rows, np.nan))
+    seen = np.isfinite(depth)
+    if not seen.any() or float(depth[seen].min()) < -SURFACE:
+        return 0
+    out = near(run.t, np.interp(run.t, run.t[seen], depth[seen]) < OUT, OUT_SPAN)
+    return 0 if out.mean() >= MOST_OUT else int(np.flatnonzero(~out)[0])
 
 
 def under_water(run: Run) -> Run:
@@ -146,6 +156,16 @@ def under_water(run: Run) -> Run:
     if end == run.rows:
         return replace(run, columns=columns)
     return replace(run, columns={name: values[:end] for name, values in columns.items()}, extra={})
+
+
+def since_dive(run: Run) -> Run:
+    """The run from its first dive on, for a fit: what a floating hull does is in no model, and an observer that takes
+    it for flight is led astray for as long as it lasts. Measures begin with the first sample all the same.
+    """
+    first = first_dive(run)
+    if not first:
+        return run
+    return replace(run, columns={name: values[first:] for name, values in run.columns.items()}, extra={})
 
 
 def judge_stretches(runs: list[Run]) -> list[Finding]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from glider.tools.gap.measure import RunGap
-from glider.tools.identify.earned import conditional, evidence, mean_and_error, unearned
+from glider.tools.identify.earned import mean_and_error, unearned
 from glider.tools.identify.held import FILE, LIKELIHOOD, PREDICTION, Candidate, choose
 from glider.tools.inference.prediction_error import Fitted
 
@@ -66,7 +66,7 @@ def test_without_a_term_the_others_stand_where_they_are_most_probable():
     rng = np.random.default_rng(5)
     A = rng.normal(size=(6, 6))
     normal, best, file = A @ A.T + np.eye(6), rng.normal(size=6), np.zeros(6)
-    values = conditional(Fitted(best, 1.0, normal, 100.0), file, np.array([1, 4]))
+    values = Fitted(best, 1.0, normal, 100.0).conditional(file, np.array([1, 4]))
     assert values[[1, 4]].tolist() == [0.0, 0.0]
     slope = normal @ (values - best)
     assert np.abs(slope[[0, 2, 3, 5]]).max() < 1e-9  # least there
@@ -86,7 +86,7 @@ def test_the_evidence_of_a_term_is_the_ratio_of_integrals_with_and_without_it():
     found, at = Fitted(best, 1.0, normal, 100.0), np.zeros(6)
     whole = log_evidence(normal, normal @ best, [0, 1, 2, 3, 5])
     without = log_evidence(normal, normal @ best, [0, 2, 5])
-    assert evidence(found, at, np.array([1, 3]), np.array([4])) == pytest.approx(whole - without)
+    assert found.evidence(at, np.array([1, 3]), np.array([4])) == pytest.approx(whole - without)
 
 
 def test_a_term_that_the_runs_say_nothing_of_or_that_is_not_there_goes_and_one_that_is_there_stays():
