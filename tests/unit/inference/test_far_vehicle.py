@@ -83,6 +83,18 @@ def test_the_normal_matrix_is_the_slope_of_the_cost(case):
         assert (cost(at + step) - cost(at - step)) / 0.04 == pytest.approx(slope[n], rel=0.1)
 
 
+def test_an_observer_that_doubts_expects_what_the_vehicle_is_off_by(case, found):
+    """Much more than the file's disturbance by the file; by the vehicle that was found, less."""
+    problem = problem_of(case, nominal_model(case))
+    fitting = PredictionError(problem, parameters(problem, first=True), doubts=True)
+    fitting.expect(fitting.file_values)
+    far, (P, F) = fitting.level, found.model
+    assert far >= 100.0
+    fitting.model = lambda values: (P, F)
+    fitting.expect(fitting.file_values)
+    assert fitting.level < far
+
+
 def test_a_vehicle_as_its_file_says_stays_there(tmp_path):
     """No parameter leaves its file's value by more than its posterior allows."""
     made = make_case(tmp_path, np.zeros(ef.N_F), seed=32, runs=1)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from glider.tools.data.runs.run import Run
-from glider.tools.readings.stretches import under_water
+from glider.tools.readings.stretches import since_dive, under_water
 
 
 def run(depth, every=1):
@@ -61,3 +61,23 @@ def test_what_lies_before_the_first_dive_and_long_between_two_stays():
     between = run(np.clip(np.abs(t - 30.0) - 8.0, 0.0, 2.0))
     assert (between.columns["depth_m"] < 0.04).sum() > 100
     assert under_water(between) is between
+
+
+def test_a_fit_begins_where_the_hull_is_under_water():
+    """Down from the surface at 0.1 m/s, after 9 s afloat."""
+    t = np.arange(0.0, 60.0, 0.1)
+    waiting = run(np.where(t < 9.0, 0.0, 0.1 * (t - 9.0)))
+    after = since_dive(waiting)
+    assert after.t[0] == pytest.approx(10.0, abs=0.2)
+    for name, values in after.columns.items():
+        np.testing.assert_array_equal(values, waiting.columns[name][-after.rows :])
+
+
+@pytest.mark.parametrize(
+    "depth",
+    [course(0.3), course(-0.01) - 1.5, 0.0 * course(0.3) + 0.02],
+    ids=["submerged", "another zero", "all of it"],
+)
+def test_a_run_without_a_first_dive_is_fitted_as_it_is(depth):
+    before = run(depth)
+    assert since_dive(before) is before
