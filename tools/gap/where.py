@@ -22,6 +22,7 @@ import numpy as np
 from glider.tools.gap.cells import Cells, cells_of
 from glider.tools.inference.parameters import NUISANCE, effect_parameters, model_at, nuisance_parameters
 from glider.tools.inference.predict import fly, fly_near, observe
+from glider.tools.inference.prediction_error import MAX_COUNTED_TOLERANCES
 from glider.tools.inference.problem import Problem, cut
 
 EFFECTIVE = 4.0  # independent samples a window and channel: 18 s of residuals that hang together for some 4 s
@@ -99,9 +100,14 @@ class PartSearch:
         return np.array([part in chosen for part in self.parts])
 
     def residuals(self, amplitudes: list[np.ndarray]) -> np.ndarray:
-        """What is left at the scored samples of models moved by these amplitudes, (amplitudes, samples)."""
+        """What is left at the scored samples of models moved by these amplitudes, (amplitudes, samples), tolerances.
+
+        A flight that is lost is lost: no sample is off by more than MAX_COUNTED_TOLERANCES.
+        """
         flown = fly_near(self.problem, [model_at(self.problem, self.free, amplitude) for amplitude in amplitudes])
-        return np.array([self.cells.residual(self.table, Y) for Y in flown])
+        left = np.array([self.cells.residual(self.table, Y) for Y in flown])
+        lost = MAX_COUNTED_TOLERANCES
+        return np.clip(np.nan_to_num(left, nan=lost, posinf=lost, neginf=-lost), -lost, lost)
 
     def run(self) -> tuple[list[Part], list[np.ndarray]]:
         """Parts one after the other, and the residual before the first and after each."""
