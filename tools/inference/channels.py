@@ -35,10 +35,12 @@ class Channel:
 def errors(channel: Channel, table: np.ndarray, Y: np.ndarray) -> np.ndarray:
     """(measured - predicted) / tolerance of a channel, shape (rows, columns); NaN where nothing was measured."""
     columns = list(channel.columns)
-    difference = table[:, columns] - Y[:, columns]
-    if channel.wrapped:
-        difference = wrap(difference)
-    return difference / channel.tolerance
+    return in_tolerances(channel, table[:, columns] - Y[:, columns])
+
+
+def in_tolerances(channel: Channel, difference: np.ndarray) -> np.ndarray:
+    """Differences in a channel's columns (any shape, SI) in its tolerances, angles within half a turn."""
+    return (wrap(difference) if channel.wrapped else difference) / channel.tolerance
 
 
 def recorded(run: Run, name: str | None) -> bool:

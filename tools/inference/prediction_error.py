@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glider.tools.inference.channels import Channel, errors
+from glider.tools.inference.channels import Channel, in_tolerances
 from glider.tools.inference.fit import bounded_step
 from glider.tools.inference.predict import fly_followed, observe
 from glider.tools.inference.problem import Gains, Problem
@@ -179,10 +179,11 @@ class PredictionError:
         rows, parts = windows.rows, []
         table = self.table[rows]
         for channel, measured in self.measured(table):
-            flown = np.array([errors(channel, table, one[rows])[measured] for one in Y])
-            flown = np.clip(
-                np.nan_to_num(flown, nan=MAX_COUNTED_TOLERANCES), -MAX_COUNTED_TOLERANCES, MAX_COUNTED_TOLERANCES
-            )
+            of, place = np.nonzero(measured)
+            columns = np.array(channel.columns)[place]
+            flown = in_tolerances(channel, table[of, columns] - Y[:, rows[of], columns])
+            np.nan_to_num(flown, copy=False, nan=MAX_COUNTED_TOLERANCES)
+            np.clip(flown, -MAX_COUNTED_TOLERANCES, MAX_COUNTED_TOLERANCES, out=flown)
             count = measured.sum() / (len(channel.columns) if channel.joint else 1)
             parts.append(flown / (np.sqrt(count) * self.scales.get(channel.name, 1.0)))
         return np.concatenate(parts, axis=1) / np.sqrt(len(parts))
