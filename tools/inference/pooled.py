@@ -135,7 +135,7 @@ def _nearest(found: Sequence[Parabola], V: np.ndarray, usual: np.ndarray, start:
         for one in runs:
             A = one.curvature
             squares += (one.slope + A @ (x - one.at)) ** 2
-            traces += np.maximum(np.diag(A) - np.einsum("ij,jk,ki->i", A, M, A), 0.0)
+            traces += np.maximum(np.diag(A) - ((A @ M) * A.T).sum(axis=1), 0.0)
         at = v[free]
         v[free] = np.sqrt((0.5 * at**2 * squares[free] + weight * middle) / (0.5 * traces[free] + weight / at))
         if np.abs(np.log(v[free] / at)).max(initial=0.0) < CONVERGED_LOG_VARIANCE:

@@ -15,6 +15,7 @@ declares the same without states and noises, and has `rollout(x0, t, u, theta) -
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from math import inf
 from typing import Any, TypeVar
 
@@ -122,8 +123,13 @@ class Declaration:
     form: Mapping[tuple[str, str], float] = field(default_factory=dict)
 
     def index(self, what: str, name: str) -> int:
-        """Place of a name in a list, `inputs` to `noises`."""
-        return [one.name for one in getattr(self, what)].index(name)
+        """Place of a name in a list, `inputs` to `noises`; KeyError where it is not there."""
+        return self._places[what][name]
+
+    @cached_property
+    def _places(self) -> dict[str, dict[str, int]]:
+        lists = ("inputs", "outputs", "parameters", "states", "noises")
+        return {what: {one.name: n for n, one in enumerate(getattr(self, what))} for what in lists}
 
 
 def column_of(name: str, unit: str) -> str:
