@@ -80,6 +80,10 @@ class VehicleKind(Protocol):
         """What a diagnosis flies it by (tools/inference/kind.Kind)."""
         ...
 
+    def catalogue(self) -> Mapping[str, Any]:
+        """What a diagnosis may name: effects by label (sim_backend/core/effects/catalogue.Effect); compiles nothing."""
+        ...
+
     def model(self, name: str, vehicle: Any) -> Any:
         """A vehicle as a model (tools/inference/model.Model)."""
         ...

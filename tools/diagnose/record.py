@@ -17,10 +17,10 @@ import msgspec
 import numpy as np
 
 from glider.sim_backend.core.effects.catalogue import catalogue
-from glider.sim_backend.ocean.vehicle import KIND
 from glider.tools.data.errors import InputError
 from glider.tools.data.files import require_file, write_files
 from glider.tools.data.plain import as_plain, read_json
+from glider.tools.data.vehicle_kinds import kinds
 from glider.tools.diagnose.stages import STAGES
 from glider.tools.readings.pictures import Shown
 
@@ -346,9 +346,9 @@ def _present(path: Path) -> Path:
 
 
 def is_pooled(folder: Path) -> bool:
-    """Whether the diagnosis of a folder asks for what all its runs share: an ocean glider's, or one against healthy
-    runs (tools/report/pooled draws it)."""
-    return (folder / ANSWER).is_file() and read_as(folder / ANSWER, QuestionRecord).kind in (KIND, AGAINST_HEALTHY)
+    """Whether the diagnosis of a folder asks for what all its runs share: another kind's than ROUGHIE's, which alone
+    says none, or one against healthy runs (tools/report/pooled draws it)."""
+    return (folder / ANSWER).is_file() and read_as(folder / ANSWER, QuestionRecord).kind in (AGAINST_HEALTHY, *kinds())
 
 
 def read_as(path: Path, kind: Any) -> Any:

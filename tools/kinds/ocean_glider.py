@@ -77,6 +77,12 @@ class OceanGlider:
 
         return OCEAN
 
+    def catalogue(self) -> Mapping[str, Any]:
+        """The effects of sim_backend/ocean."""
+        from glider.sim_backend.ocean.catalogue import catalogue
+
+        return catalogue()
+
     def model(self, name: str, vehicle: OceanVehicle) -> Any:
         """What is uncertain as [uncertainty] says, or where it was identified as its covariance."""
         from glider.tools.inference.model import ocean_model

@@ -75,6 +75,12 @@ class Roughie:
 
         return ROUGHIE
 
+    def catalogue(self) -> Mapping[str, Any]:
+        """The effects of sim_backend/core/effects."""
+        from glider.sim_backend.core.effects.catalogue import catalogue
+
+        return catalogue()
+
     def model(self, name: str, vehicle: Vehicle) -> Any:
         """What is uncertain as [uncertainty] says, or where it was identified as its covariance."""
         from glider.tools.inference.model import roughie_model

@@ -9,10 +9,8 @@ from typing import Any
 
 import msgspec
 
-from glider.sim_backend.core.effects.catalogue import catalogue as pool_catalogue
-from glider.sim_backend.ocean.catalogue import catalogue as ocean_catalogue
-from glider.sim_backend.ocean.vehicle import KIND
 from glider.tools.data.files import write_bytes
+from glider.tools.data.vehicle_kinds import UNNAMED, kinds
 from glider.tools.diagnose.record import AGAINST_HEALTHY, ANSWER, CauseRecord, Gap, number, read_as
 from glider.tools.report import words
 from glider.tools.report.now import checks_of
@@ -57,14 +55,14 @@ class _Answer(msgspec.Struct):
     cautions: list[str]
     skipped: dict[str, str]
     next_run: dict[str, Any]
+    kind: str
     left: _Left | None = None
     reference: _Reference | None = None
-    kind: str = KIND
 
     @property
     def effects(self):
         """The catalogue of its labels."""
-        return pool_catalogue() if self.kind == AGAINST_HEALTHY else ocean_catalogue()
+        return kinds()[UNNAMED if self.kind == AGAINST_HEALTHY else self.kind].catalogue()
 
 
 def which(found: _Answer) -> str:

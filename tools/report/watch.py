@@ -5,12 +5,11 @@ from typing import Any
 
 import msgspec
 
-from glider.sim_backend.core.effects.catalogue import catalogue
-from glider.sim_backend.ocean.catalogue import catalogue as ocean_catalogue
 from glider.tools.data.errors import InputError
 from glider.tools.data.files import write_bytes
 from glider.tools.data.plain import read_json
 from glider.tools.data.runs.origin import with_flight
+from glider.tools.data.vehicle_kinds import UNNAMED, kinds
 from glider.tools.diagnose.record import EstimateRecord
 from glider.tools.report import words
 from glider.tools.report.now import checks_of
@@ -71,6 +70,7 @@ class _Watch(msgspec.Struct):
     reference: list[str]
     cautions: list[str]
     flights: dict[str, str] = {}
+    kind: str = UNNAMED
 
 
 def read_watch(folder: Path) -> _Watch:
@@ -89,9 +89,9 @@ def _size(one: _Cause | _Event) -> str:
     return f"{words.number(one.size)}{unit} (90 %: {words.number(low)} to {words.number(high)})"
 
 
-def _meaning(one: _Event) -> str:
+def _meaning(one: _Event, kind: str) -> str:
     """What the size of an event means: the quantity that its row of the catalogue multiplies, where it has a row."""
-    effect = (catalogue() | ocean_catalogue()).get(one.label or "")
+    effect = kinds()[kind].catalogue().get(one.label or "") if kind in kinds() else None
     return "" if effect is None else words.size_of(effect, one.parameters)
 
 
@@ -111,7 +111,7 @@ def _health(found: _Watch) -> str:
     return f"{len(judged) - len(changed)} of {len(judged)} runs that could be judged are as before{now}."
 
 
-def _event(one: _Event, flights: dict[str, str]) -> dict[str, Any]:
+def _event(one: _Event, flights: dict[str, str], kind: str) -> dict[str, Any]:
     place = " ".join(str(one.where[0][key]) for key in ("subsystem", "element")) if one.where else ""
     if one.label is None:
         said = f"No effect of the catalogue explains it{f'; most likely in {place}' if place else ''}"
@@ -119,7 +119,7 @@ def _event(one: _Event, flights: dict[str, str]) -> dict[str, Any]:
         plain = words.with_sign(one.label, one.parameters)
         said = words.upper(plain) if plain != one.label else f"Of the {place}"
     others = [label for label in one.group if label != one.label]
-    meaning = _meaning(one)
+    meaning = _meaning(one, kind)
     return {
         "name": one.label or "unknown", "said": said, "size": meaning or _size(one), "alike": words.joined(others),
         "from": with_flight(one.from_run, flights),
@@ -180,8 +180,8 @@ def report_html(found: _Watch) -> str:
         for run in found.runs
     ]  # fmt: skip
     context = {
-        "events": [_event(one, found.flights) for one in found.events], "runs": runs, "cautions": found.cautions,
-        "pictures": _pictures(found), "steps": _steps(found),
+        "events": [_event(one, found.flights, found.kind) for one in found.events],
+        "runs": runs, "cautions": found.cautions, "pictures": _pictures(found), "steps": _steps(found),
         "reference": words.joined(found.reference), "health": _health(found),
         "speeds": any(run.velocity is not None for run in found.runs),
     }  # fmt: skip

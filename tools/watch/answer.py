@@ -83,11 +83,12 @@ class WatchAnswer:
     events: list[EventAnswer]
     reference: list[str]
     cautions: list[str]
+    kind: str  # of vehicle, by whose catalogue events are named
     flights: dict[str, str] = field(default_factory=dict)  # run -> file and date of its flight, where they are known
 
     def plain(self) -> dict[str, Any]:
         found = {
-            "format": 1, "runs": [run.plain() for run in self.runs], "events": [one.plain() for one in self.events],
-            "reference": self.reference, "cautions": self.cautions,
+            "format": 1, "kind": self.kind, "runs": [run.plain() for run in self.runs],
+            "events": [one.plain() for one in self.events], "reference": self.reference, "cautions": self.cautions,
         }  # fmt: skip
         return found | {"flights": self.flights} if self.flights else found

@@ -60,7 +60,7 @@ def watch(case: Case, reference: Case | None = None, say: Callable[[str], None] 
         verdicts.append(verdict if speeds is None else replace(verdict, velocity=speeds(history, resolved, k)))
     events = [event_answer(history, one, run_names) for one in resolved]
     learned = [run_names[k] for k in np.flatnonzero(learned_from)]
-    return WatchAnswer(verdicts, events, learned, cautions(case, reference, learned, skipped, names))
+    return WatchAnswer(verdicts, events, learned, cautions(case, reference, learned, skipped, names), kind.name)
 
 
 def first_runs(count: int, most: int) -> np.ndarray:

@@ -16,13 +16,14 @@ def answer(tmp_path, verdict, selected, left="null", runs=8, more="", gap=GAP):
     path.write_text(
         f'{{"case": {{"name": "a", "vehicle": "b", "runs": {runs}}}, "verdict": "{verdict}", "causes": [{cause}], '
         f'"selected": {selected}, "gap": {{{gap}, "shrinkage": {SHARE}, "closed": {SHARE}}}, "stages": [], '
-        f'"cautions": [], "skipped": {{}}, "next_run": {{}}, "left": {left}{more}}}'
+        f'"cautions": [], "skipped": {{}}, "next_run": {{}}, "left": {left}{more or OCEAN}}}'
     )
     return read_as(path, _Answer)
 
 
 PLACED = '{"channel": "depth", "excess": 0.6, "share": 1.0, "regime": "in deep water", "runs": ["run03"]}'
 LEFT = '{"channel": "depth", "excess": 0.6, "share": 1.0, "regime": "", "runs": []}'
+OCEAN = ', "kind": "ocean"'
 HEALTHY = ', "kind": "reference", "reference": {"count": 5}'
 
 

@@ -88,7 +88,7 @@ def test_sentences_of_page_and_terminal(tmp_path):
     size = Sized(0.31, (0.2, 0.42), "1")
     runs = [RunVerdict("run02", "none", [], 0.8, None), RunVerdict("run03", "cause", [], 2.1, None)]
     event = EventAnswer("drag", [], ["drag"], "run03", None, "step", 0.93, size, [])
-    sentences = lines(WatchAnswer(runs, [event], ["run00"], [], {"run03": "w04.mcap, 2026-11-20"}))
+    sentences = lines(WatchAnswer(runs, [event], ["run00"], [], "roughie", {"run03": "w04.mcap, 2026-11-20"}))
     assert sentences[1].startswith("run03 (w04.mcap, 2026-11-20) cause")
     assert sentences[0].index("none") == sentences[1].index("cause")
     said = {
