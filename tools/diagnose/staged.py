@@ -97,11 +97,12 @@ class _Stages:
 
     def identify(self) -> None:
         """Every fit of the vehicle."""
-        for fold in [self.every, *self.folds]:
-            if fold.left_out:
-                how = "without" if len(self.case.runs) > 1 else "from"
-                self.say(f"identified {how} {', '.join(self.case.runs[n].name for n in fold.left_out)}")
-            fold.fitted = self.identified(fold, [])
+        self.every.fitted = self.identified(self.every, [])
+        alone = len(self.case.runs) == 1
+        for fold in self.folds:
+            how = "from" if alone else "without"
+            self.say(f"identified {how} {', '.join(self.case.runs[n].name for n in fold.left_out)}")
+            fold.fitted = self.every.fitted if alone else self.identified(fold, [])
 
     def identified(self, fold: _Fold, more: list[FreeParameter]) -> Fitted:
         """A fold's fit through all horizons."""
