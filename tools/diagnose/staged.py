@@ -112,8 +112,8 @@ class _Stages:
     def with_effect(self, added: list[FreeParameter], own: list[FreeParameter]) -> tuple[Fitted, float]:
         """The fit to all runs with an effect more, and the effect's evidence (nat) in it."""
         found = self.identified(self.every, [*added, *own])
-        file = self.fitting(self.every, [*added, *own]).file_values
-        return found, found.evidence(file, np.arange(len(file) - len(own), len(file)))
+        n = len(found.values)
+        return found, found.evidence(np.zeros(n), np.arange(n - len(own), n))
 
     def models(self, more: list[FreeParameter], fitted: list[Fitted]) -> dict[int, tuple[np.ndarray, np.ndarray]]:
         """By run, the model that has not seen it; constant errors of the sensors are a run's own."""
@@ -163,7 +163,7 @@ class _Stages:
             own = normal[np.ix_(on, on)]
             step = bounded_step(own, slope[on], fitting.low[on] - at[on], fitting.high[on] - at[on])
             reached = Fitted(at[on] + step, cost, own, independent)
-            found[label] = reached.evidence(fitting.file_values[on], np.arange(known, len(on)))
+            found[label] = reached.evidence(np.zeros(len(on)), np.arange(known, len(on)))
         return found
 
 
@@ -185,29 +185,37 @@ def staged(case: Case, say: Callable[[str], None] = lambda text: None) -> Staged
     choice = float(np.log(max(len(candidates), 1)))  # nat, that the choice among them costs
     while candidates and len(case.runs) > 1:  # a fit to the run itself decides nothing
         say(f"causes beside the vehicle: {len(found.taken) + 1}")
-        asked = work.linear_evidence(added, candidates)
-        fitted = {
-            label: work.with_effect(added, candidates[label])
-            for label in sorted(asked, key=lambda name: -asked[name])[:EFFECTS_FITTED]
-        }
-        label = max(fitted, key=lambda name: fitted[name][1])
-        whole, evidence = fitted[label]
+        label = _one_more(work, found, added, candidates, choice)
+        if label is None:
+            break
+        added += candidates.pop(label)
+    return _concluded(work, found, added)
+
+
+def _one_more(
+    work: _Stages, found: Staged, added: list[FreeParameter], candidates: dict[str, list[FreeParameter]], choice: float
+) -> str | None:
+    """The label of the stage that was added: the most evident by which runs left out are flown better, if any is."""
+    asked = work.linear_evidence(added, candidates)
+    fitted = {
+        label: work.with_effect(added, candidates[label])
+        for label in sorted(asked, key=lambda name: -asked[name])[:EFFECTS_FITTED]
+    }
+    for label in sorted(fitted, key=lambda name: -fitted[name][1]):
+        (whole, evidence), more = fitted[label], [*added, *candidates[label]]
         if evidence <= choice:
             break
-        own = candidates.pop(label)
-        folds = [work.identified(fold, [*added, *own]) for fold in work.folds]
-        left, predictions = work.flown(work.models([*added, *own], folds))
-        stage = Stage(f"+ {label}", [label], left)
-        if not stage.total < stages[-1].total:
-            continue
-        found.taken[label], found.evidence[label] = stages[-1].total ** 2 - stage.total**2, evidence
-        stages.append(stage)
-        found.predictions = predictions
-        added += own
-        work.every.fitted = whole
-        for fold, at in zip(work.folds, folds, strict=True):
-            fold.fitted = at
-    return _concluded(work, found, added)
+        folds = [work.identified(fold, more) for fold in work.folds]
+        left, predictions = work.flown(work.models(more, folds))
+        stage, before = Stage(f"+ {label}", [label], left), found.stages[-1]
+        if stage.total < before.total:
+            found.taken[label], found.evidence[label] = before.total**2 - stage.total**2, evidence
+            found.stages.append(stage)
+            found.predictions, work.every.fitted = predictions, whole
+            for fold, at in zip(work.folds, folds, strict=True):
+                fold.fitted = at
+            return label
+    return None
 
 
 def _concluded(work: _Stages, found: Staged, added: list[FreeParameter]) -> Staged:

@@ -102,11 +102,11 @@ class PartSearch:
     def residuals(self, amplitudes: list[np.ndarray]) -> np.ndarray:
         """What is left at the scored samples of models moved by these amplitudes, (amplitudes, samples), tolerances.
 
-        A flight that is lost is lost: no sample is off by more than MAX_COUNTED_TOLERANCES.
+        A flight that is lost is lost: no sample is off by more than MAX_COUNTED_TOLERANCES, or what the nominal one is.
         """
         flown = fly_near(self.problem, [model_at(self.problem, self.free, amplitude) for amplitude in amplitudes])
         left = np.array([self.cells.residual(self.table, Y) for Y in flown])
-        lost = MAX_COUNTED_TOLERANCES
+        lost = max(MAX_COUNTED_TOLERANCES, float(np.abs(self.nominal).max(initial=0.0)))
         return np.clip(np.nan_to_num(left, nan=lost, posinf=lost, neginf=-lost), -lost, lost)
 
     def run(self) -> tuple[list[Part], list[np.ndarray]]:

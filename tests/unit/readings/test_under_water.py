@@ -19,6 +19,13 @@ def course(end):
     return np.maximum(2.0 - 0.05 * np.arange(0.0, 60.0, 0.1), end)
 
 
+FLOATS_NOWHERE = pytest.mark.parametrize(
+    "depth",
+    [course(0.3), course(-0.01) - 1.5, 0.0 * course(0.3) + 0.02],
+    ids=["submerged", "another zero", "all of it"],
+)
+
+
 @pytest.mark.parametrize("every", [1, 3])
 def test_the_last_seconds_afloat_are_cut_off(every):
     before = run(course(-0.01), every)
@@ -41,11 +48,7 @@ def test_a_moment_at_the_surface_between_two_dives_is_missing_but_times_and_comm
     assert np.isfinite(after.columns["cmd_servo_rad"]).all()
 
 
-@pytest.mark.parametrize(
-    "depth",
-    [course(0.3), course(-0.01) - 1.5, 0.0 * course(0.3) + 0.02],
-    ids=["submerged", "another zero", "all of it"],
-)
+@FLOATS_NOWHERE
 def test_what_never_came_up_or_has_another_zero_stays(depth):
     before = run(depth)
     after = under_water(before)
@@ -73,11 +76,7 @@ def test_a_fit_begins_where_the_hull_is_under_water():
         np.testing.assert_array_equal(values, waiting.columns[name][-after.rows :])
 
 
-@pytest.mark.parametrize(
-    "depth",
-    [course(0.3), course(-0.01) - 1.5, 0.0 * course(0.3) + 0.02],
-    ids=["submerged", "another zero", "all of it"],
-)
+@FLOATS_NOWHERE
 def test_a_run_without_a_first_dive_is_fitted_as_it_is(depth):
     before = run(depth)
     assert since_dive(before) is before
