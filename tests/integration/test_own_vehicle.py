@@ -148,3 +148,39 @@ def test_a_run_is_predicted_with_its_rows_and_columns(pool):
     assert set(measured.dtype.names) == set(predicted.dtype.names)
     assert len(measured) == len(predicted)
     assert np.sqrt(np.mean((measured["depth_m"] - predicted["depth_m"]) ** 2)) < 0.3
+
+
+@pytest.fixture(scope="module")
+def days(pool):
+    """The vehicle identified from five days on which its gyro had another bias."""
+    folder, case, _ = pool
+    text = (folder / "mine.toml").read_text()
+    (folder / "gyro.toml").write_text(text + "\n[sensors.r]\nbias = 0.02\n")
+    for day, bias in enumerate((0.02, -0.03, 0.01, -0.01, 0.03)):
+        case(f"day{day}", 20 + day, runs=3, read=lambda n, y, bias=bias: y + np.array([0.0, 0.0, bias]))
+    done = glider("identify", *(f"day{n}" for n in range(5)), "--vehicle", "gyro.toml", "--out", "days", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    return folder, case
+
+
+@pytest.mark.parametrize("heavier", [0.0, 0.6], ids=["healthy", "heavier"])
+def test_another_day_is_no_cause_and_hides_none(days, heavier):
+    folder, case = days
+    name = f"later{heavier:.0f}"
+    case(name, 31, runs=8, read=lambda n, y: y + np.array([0.0, 0.0, 0.02 if n < 4 else -0.02]),
+         theta_of=lambda n, theta: theta + np.array([0, heavier, 0, 0, 0]) * (n >= 4))  # fmt: skip
+    done = glider("gap", "watch", name, "--vehicle", "days/identified.toml", "--out", f"w{name}", "--json", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    answer = json.loads(done.stdout)
+    assert [one["from_run"] for one in answer["sessions"]] == ["run04"]
+    first = answer["sessions"][0]["differences"][0]
+    assert first["name"] == "r_bias"
+    assert first["difference"] == pytest.approx(-0.04, abs=0.01)
+    assert any("run04" in line and "r_bias" in line for line in answer["cautions"])
+    if heavier:
+        (event,) = answer["events"]
+        assert (event["from_run"], event["to_run"]) == ("run04", None)
+        assert "weight_in_water" in event["group"]
+        assert event["size"] == pytest.approx(0.6, abs=0.2)
+    else:
+        assert answer["events"] == []

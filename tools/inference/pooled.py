@@ -50,19 +50,23 @@ P = TypeVar("P", bound=Parabola)
 
 def marginalised(one: P, scatter: np.ndarray) -> P:
     """A run with its deviation, of 1 sigma `scatter` (k,), integrated out."""
-    root = scatter[:, None] * one.curvature
-    inner = np.eye(len(scatter)) + root * scatter[None, :]
-    solved = np.linalg.solve(inner, np.column_stack([root, scatter * one.slope]))
+    free = np.flatnonzero(scatter)
+    root = scatter[free, None] * one.curvature[free]
+    inner = np.eye(len(free)) + root[:, free] * scatter[free]
+    solved = np.linalg.solve(inner, np.column_stack([root, scatter[free] * one.slope[free]]))
     A, g = one.curvature - root.T @ solved[:, :-1], one.slope - root.T @ solved[:, -1]
-    value = one.value - float((scatter * one.slope) @ solved[:, -1]) + float(np.linalg.slogdet(inner)[1])
+    value = one.value - float((scatter * one.slope)[free] @ solved[:, -1]) + float(np.linalg.slogdet(inner)[1])
     return replace(one, value=value, slope=g, curvature=0.5 * (A + A.T))
 
 
 def run_values(one: Parabola, shared: np.ndarray, scatter: np.ndarray) -> np.ndarray:
     """Most probable values (k,) of a run whose expansion this is, given the shared ones."""
-    own = np.diag(scatter**2)
-    slope = one.slope + one.curvature @ (shared - one.at)
-    return shared - np.linalg.solve(np.eye(len(own)) + own @ one.curvature, own @ slope)
+    free = np.flatnonzero(scatter)
+    slope = (one.slope + one.curvature @ (shared - one.at))[free]
+    variance, found = scatter[free, None] ** 2, shared.copy()
+    inner = np.eye(len(free)) + variance * one.curvature[np.ix_(free, free)]
+    found[free] -= np.linalg.solve(inner, variance[:, 0] * slope)
+    return found
 
 
 @dataclass
@@ -78,6 +82,10 @@ class Pooled:
     def of(cls, found: Sequence[Parabola], V: np.ndarray) -> "Pooled":
         return cls(np.sum([one.curvature for one in found], axis=0), -np.sum([one.offset for one in found], axis=0),
                    sum(one.constant for one in found), V)  # fmt: skip
+
+    def parabola(self) -> Parabola:
+        """The runs as one, about 0: with deviations from what is shared that they have in common."""
+        return Parabola(np.zeros(len(self.r)), self.constant, -self.r, self.H)
 
     def covariance(self, V: np.ndarray | None = None) -> np.ndarray:
         """Posterior covariance (k, k)."""
@@ -105,37 +113,41 @@ def log_prior(variance: np.ndarray | float, usual: np.ndarray | float) -> np.nda
     return -0.5 * PRIOR_RUNS * np.asarray(np.log(variance) + usual / variance)
 
 
-def learn_scatter(found: Sequence[Parabola], V: np.ndarray, usual: np.ndarray) -> np.ndarray:
+def learn_scatter(
+    found: Sequence[Parabola], V: np.ndarray, usual: np.ndarray, sessions: Sequence[int] | None = None
+) -> np.ndarray:
     """1 sigma (k,) of how runs differ, the most probable about `usual` (k,); where that is 0 it stays 0.
 
-    A variance that is far too small for a run may be as probable, near by, as one that holds it: of several starts the
-    best is kept.
+    sessions: counts of successive runs that have N(0, V) in common; without them all have. A variance that is far too
+    small for a run may be as probable, near by, as one that holds it: of several starts the best is kept.
     """
-    free = usual > 0.0
+    free, ends = usual > 0.0, np.cumsum(sessions or [len(found)])
+    parts = [found[a:b] for a, b in zip([0, *ends[:-1]], ends, strict=True)]
 
     def log_posterior(sizes: np.ndarray) -> float:
         variance = np.maximum(sizes[free] ** 2, LEAST_VARIANCE)
         prior = log_prior(variance, np.maximum(usual[free] ** 2, LEAST_VARIANCE)).sum()
-        return log_evidence(found, V, sizes) + float(prior)
+        return sum(log_evidence(part, V, sizes) for part in parts) + float(prior)
 
-    tried = [_nearest(found, V, usual, np.where(free, np.maximum(usual, least), 0.0)) for least in STARTS]
+    tried = [_nearest(parts, V, usual, np.where(free, np.maximum(usual, least), 0.0)) for least in STARTS]
     return max(tried, key=log_posterior)
 
 
-def _nearest(found: Sequence[Parabola], V: np.ndarray, usual: np.ndarray, start: np.ndarray) -> np.ndarray:
+def _nearest(parts: Sequence[Sequence[Parabola]], V: np.ndarray, usual: np.ndarray, start: np.ndarray) -> np.ndarray:
     """Sizes (k,) led from `start` to the most probable near by: minorisation and maximisation for variances."""
     free, weight = usual > 0.0, 0.5 * PRIOR_RUNS
     middle, v = np.maximum(usual[free] ** 2, LEAST_VARIANCE), np.where(free, np.maximum(start**2, LEAST_VARIANCE), 0.0)
     for _ in range(ITERATIONS):
-        runs = [marginalised(one, np.sqrt(v)) for one in found]
-        pooled = Pooled.of(runs, V)
-        M = pooled.covariance()
-        x = M @ pooled.r
         squares, traces = np.zeros(len(v)), np.zeros(len(v))
-        for one in runs:
-            A = one.curvature
-            squares += (one.slope + A @ (x - one.at)) ** 2
-            traces += np.maximum(np.diag(A) - ((A @ M) * A.T).sum(axis=1), 0.0)
+        for part in parts:
+            runs = [marginalised(one, np.sqrt(v)) for one in part]
+            pooled = Pooled.of(runs, V)
+            M = pooled.covariance()
+            x = M @ pooled.r
+            for one in runs:
+                A = one.curvature
+                squares += (one.slope + A @ (x - one.at)) ** 2
+                traces += np.maximum(np.diag(A) - ((A @ M) * A.T).sum(axis=1), 0.0)
         at = v[free]
         v[free] = np.sqrt((0.5 * at**2 * squares[free] + weight * middle) / (0.5 * traces[free] + weight / at))
         if np.abs(np.log(v[free] / at)).max(initial=0.0) < CONVERGED_LOG_VARIANCE:

@@ -35,13 +35,21 @@ class Healthy:
     effects: list[Effect]  # every label, then pushes
     V: np.ndarray  # (k, k) covariance of the identified values
     scatter: np.ndarray  # (k,) what runs differ by, integrated out
+    session: np.ndarray  # (k,) what sessions differ by beside it
     usual: np.ndarray  # (k,) how far each label alone differs from run to run beside that
     errors: ChannelErrors  # what healthy runs leave
     eta: float
     runs: int  # that it is known from
     level_scatter: float  # 1 sigma of the logarithm of a run's mean square left
-    session_share: float  # of the variance from run to run, that a session differs by
     noise_gain: Mapping[str, float] = field(default_factory=dict)  # nat a window, of healthy runs; none: not weighed
+
+    @property
+    def session_share(self) -> float:
+        """Variance between sessions over that from run to run, of all that differs (geometric mean)."""
+        differs = (self.scatter > 0.0) & (self.session > 0.0)
+        return (
+            float(np.exp(2.0 * np.log(self.session[differs] / self.scatter[differs]).mean())) if differs.any() else 0.0
+        )
 
     def at(self, labels: Sequence[str]) -> list[int]:
         known = [one.label for one in self.effects]

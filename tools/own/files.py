@@ -79,7 +79,8 @@ class IdentifiedTable(Table):
     form: dict[str, float] = msgspec.field(default_factory=dict)  # NOISE_by_INPUT: force a unit of the input
     usual_inputs: dict[str, tuple[float, NonNegative]] = msgspec.field(default_factory=dict)  # mean, 1 sigma
     noise_gain: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # nat a window, of healthy runs, by label
-    session_share: NonNegative = 0.25  # variance between sessions over that from run to run
+    session_scatter: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # what sessions differ by beside it
+    session_share: NonNegative = 0.25  # of files without that: variance between sessions over that from run to run
     level_scatter: NonNegative = 0.5  # 1 sigma from run to run of the logarithm of the mean square left
     gap: dict[str, float] = msgspec.field(default_factory=dict)  # of healthy runs left out, by channel, tolerances
     data: str = ""

@@ -54,6 +54,7 @@ def tables(found: Identified) -> dict[str, Any]:
     given = tomllib.loads(vehicle.text)
     sd = np.sqrt(np.diag(found.covariance))
     scatter = {one.label: float(s * one.spread) for one, s in zip(found.nuisance, found.scatter, strict=True)}
+    session = {one.label: float(s * one.spread) for one, s in zip(found.nuisance, found.session_scatter, strict=True)}
     labels = {one.label: float(s * one.spread) for one, s in zip(found.labels, found.label_scatter, strict=True)}
     parameters = given.setdefault("parameters", {})
     sensors = given.setdefault("sensors", {})
@@ -65,7 +66,7 @@ def tables(found: Identified) -> dict[str, Any]:
             table = parameters.setdefault(one.name, {})
             value = min(max(before.value + move, before.low), before.high)
             spread = scatter[one.label]
-            own = max(error, spread) if before.scope == "run" else error
+            own = max(error, float(np.hypot(spread, session[one.label]))) if before.scope == "run" else error
             table |= {"value": value, "uncertainty": own, "scatter": spread}
             table.pop("assumed", None)
             names.append(one.name)
@@ -88,8 +89,9 @@ def tables(found: Identified) -> dict[str, Any]:
     given["identified"] = {
         "runs": len(observer.runs), "sessions": found.sessions, "parameters": names,
         "covariance": [[float(value) for value in row] for row in covariance], "inflation": found.eta,
-        "level_scatter": found.level_scatter, "session_share": found.session_share,
-        "scatter": {name: value for name, value in scatter.items() if value > 0.0}, "label_scatter": labels,
+        "level_scatter": found.level_scatter,
+        "scatter": {name: value for name, value in scatter.items() if value > 0.0},
+        "session_scatter": {name: value for name, value in session.items() if value > 0.0}, "label_scatter": labels,
         "noise_gain": found.noise_gain, "form": form,
         "usual_inputs": {name: list(pair) for name, pair in declared.usual_inputs.items()},
         "gap": {one.name: float(value) for one, value in zip(declared.outputs, found.errors.scales, strict=True)},

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from glider.tools.inference.pooled import Pooled, learn_scatter, log_prior, marginalised, run_values
+from glider.tools.inference.pooled import Parabola, Pooled, learn_scatter, log_prior, marginalised, run_values
 from glider.tools.own.declare import RUN, Declaration
 from glider.tools.own.effects import (
     FORM,
@@ -25,10 +25,10 @@ from glider.tools.own.load import LoadedVehicle
 from glider.tools.own.observer import Observer, observer_of
 from glider.tools.own.runs import OwnRun
 
-ROUNDS = 20
+ROUNDS, SHARED_ROUNDS = 40, 10  # at most; of them until it is learned how runs differ
 FORM_ROUNDS = 2
 SCATTER_ROUNDS = 4  # in which it is learned how runs differ, then held
-USUAL_SESSION_SHARE, SESSION_SHARES, MIN_SESSIONS = 0.25, (0.05, 4.0), 3
+USUAL_SESSION_SHARE = 0.25  # variance between sessions over that from run to run
 MIN_SCATTER_RUNS = 3  # from fewer nothing is learned of how runs differ
 FILE_PRIOR = 2.0  # times the file's uncertainties: what the shared values may be
 USUAL_SCATTER, USUAL_OWN_SCATTER = 0.02, 0.5  # spreads, from run to run; of what is declared a number of each run
@@ -62,7 +62,7 @@ class Identified:
     after: np.ndarray  # the same of a model of the other runs
     level_scatter: float
     sessions: int
-    session_share: float  # of the variance from run to run, that sessions differ by beside it
+    session_scatter: np.ndarray  # (nuisance,) spreads, from session to session beside that
     noise_gain: dict[str, float]  # nat a window that excess noise gains in healthy runs, by label
     notes: list[str] = field(default_factory=list)
 
@@ -139,25 +139,26 @@ def identify(
             if learned == SCATTER_ROUNDS or count < MIN_SCATTER_RUNS:
                 break
             differ = True
-        differ = differ or (round_ == ROUNDS // 2 and count >= MIN_SCATTER_RUNS)
+        differ = differ or (round_ == SHARED_ROUNDS and count >= MIN_SCATTER_RUNS)
     found = [expand(observer, n, nuisance, own[n], errors, horizon) for n in range(count)]
     errors = left_by(found, errors)
     found = [expand(observer, n, nuisance, own[n], errors, horizon) for n in range(count)]
     *_, eta = inflation(found)
     if count < MIN_SCATTER_RUNS:
         scatter = usual
-    counts = [len(one) for one in sessions]
-    scatter = within_sessions([one.tempered(eta) for one in found], own, scatter, counts)
-    warm = [marginalised(one.tempered(eta), scatter) for one in found]
-    covariance = Pooled.of(warm, V).covariance()
+    counts, tempered = [len(one) for one in sessions], [one.tempered(eta) for one in found]
+    scatter, session_scatter = learn_sessions(tempered, V, scatter, counts)
+    warm = [marginalised(one, scatter) for one in tempered]
+    each = in_sessions(tempered, scatter, counts) if len(counts) > 1 else warm
+    apart = session_scatter if len(counts) > 1 else np.zeros(k)
+    covariance = Pooled.of([marginalised(one, apart) for one in each], V).covariance()
     after = _held_out(observer, nuisance, values, warm, V, limits)
     labels, label_scatter = _label_scatter(observer, nuisance, values, own, scatter, eta, errors)
-    share = session_share(own, scatter, counts)
     flown = [responses(observer.about(moved(observer.declared, observer.point, nuisance, own[n])), n, horizon)
              for n in range(count)] if vehicle.declared.noises else []  # fmt: skip
     noise_gain = usual_gains(flown, noise_effects(vehicle.declared), NOISE_SIZES, errors, eta)
     return Identified(vehicle, observer, nuisance, values, covariance, scatter, labels, label_scatter, eta, errors, own,
-                      before, after, level_scatter(found), len(sessions), share, noise_gain)  # fmt: skip
+                      before, after, level_scatter(found), len(sessions), session_scatter, noise_gain)  # fmt: skip
 
 
 def damped_step(pooled: Pooled, values: np.ndarray) -> np.ndarray:
@@ -321,42 +322,24 @@ def _label_scatter(observer, nuisance, values, own, scatter, eta, errors) -> tup
     return labels, LABEL_SCATTERS[np.argmax(nat + prior, axis=0)]
 
 
-def within_sessions(
-    found: Sequence[Expansion], own: np.ndarray, scatter: np.ndarray, counts: Sequence[int]
-) -> np.ndarray:
-    """1 sigma (nuisance,) from run to run within sessions, where there are several; at most what it is over all.
+def learn_sessions(
+    found: Sequence[Expansion], V: np.ndarray, scatter: np.ndarray, counts: Sequence[int]
+) -> tuple[np.ndarray, np.ndarray]:
+    """1 sigma (nuisance,) from run to run within sessions, and of sessions beside that.
 
-    A step of expectation and maximisation: runs' own values about their session's mean, and how uncertain they are.
+    scatter: over all runs. One session says nothing of how sessions differ: what is usual is assumed.
     """
-    freedom = sum(counts) - len(counts)
-    columns = np.flatnonzero(scatter > 0.0)
-    if len(counts) < 2 or freedom < MIN_SCATTER_RUNS or not len(columns):
-        return scatter
-    parts = np.split(own[:, columns], np.cumsum(counts)[:-1])
-    squares = sum(((part - part.mean(axis=0)) ** 2).sum(axis=0) for part in parts)
-    prior = np.diag(scatter[columns] ** -2)
-    open_ = sum(np.diag(np.linalg.inv(one.curvature[np.ix_(columns, columns)] + prior)) for one in found)
-    narrow = scatter.copy()
-    narrow[columns] = np.minimum(scatter[columns], np.sqrt(squares / freedom + open_ / len(found)))
-    return narrow
+    if len(counts) < 2:
+        return scatter, np.sqrt(USUAL_SESSION_SHARE) * scatter
+    within = learn_scatter(found, V + np.diag(scatter**2), scatter, counts)
+    return within, learn_scatter(in_sessions(found, within, counts), V, np.sqrt(USUAL_SESSION_SHARE) * within)
 
 
-def session_share(own: np.ndarray, scatter: np.ndarray, counts: Sequence[int]) -> float:
-    """Variance between sessions over that from run to run, pooled over what runs differ in (own: runs, nuisance).
-
-    With a few sessions only what is usual is known.
-    """
-    if len(counts) < MIN_SESSIONS or min(counts) < 2:
-        return USUAL_SESSION_SHARE
-    columns = np.flatnonzero(scatter > 3.0 * USUAL_SCATTER)
-    if not len(columns):
-        return USUAL_SESSION_SHARE
-    parts = np.split(own[:, columns] / scatter[columns], np.cumsum(counts)[:-1])
-    within = sum(((part - part.mean(axis=0)) ** 2).sum(axis=0) for part in parts) / (sum(counts) - len(counts))
-    means = np.array([part.mean(axis=0) for part in parts])
-    between = means.var(axis=0, ddof=1) - within / np.mean(counts)
-    ratio = float(np.mean(np.maximum(between, 0.0)) / max(float(np.mean(within)), 1e-9))
-    return float(np.clip(ratio, *SESSION_SHARES))
+def in_sessions(found: Sequence[Expansion], scatter: np.ndarray, counts: Sequence[int]) -> list[Parabola]:
+    """The runs of each session as one, their own deviations integrated out."""
+    runs, ends = [marginalised(one, scatter) for one in found], np.cumsum(counts)
+    return [Pooled.of(runs[end - count : end], np.zeros(0)).parabola()
+            for count, end in zip(counts, ends, strict=True)]  # fmt: skip
 
 
 def level_scatter(found: Sequence[Expansion]) -> float:

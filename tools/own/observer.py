@@ -28,7 +28,7 @@ NO_POINT = ModelPoint(
 )  # the vehicle file's own is taken
 LOST = 100.0  # tolerances: error of a flight that is lost, and of none more
 QUATERNION_FIRST, QUATERNION_REST, USUAL_ATTITUDE = 2, 3, 0.1  # kinds of states; rad at the start
-MOST_KEPT = 10_000  # first readings
+MOST_KEPT = 10_000  # first readings, states that runs begin in
 NOISE_SHARE = 0.25  # of an output's tolerance: noise where the file gives none
 
 
@@ -53,6 +53,8 @@ class Observer:
     parts: int = 1
     starts: list[int] = field(default_factory=list)  # which of several initial states each run has
     notes: list[str] = field(default_factory=list)
+    _begun: dict[tuple[int, int, bytes, bytes], tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
+    _windows: dict[tuple[int, float], tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
     _first: dict[tuple[int, int, bytes], dict[str, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -109,6 +111,15 @@ class Observer:
 
     def start(self, n: int, point: ModelPoint) -> tuple[np.ndarray, np.ndarray]:
         """Initial state (states,) and its covariance (errors, errors) of a run."""
+        key = (n, self.starts[n], point.theta.tobytes(), point.reading[:2].tobytes())
+        found = self._begun.get(key)
+        if found is None:
+            if len(self._begun) >= MOST_KEPT:
+                self._begun.clear()
+            found = self._begun[key] = self._start(n, point)
+        return found[0].copy(), found[1].copy()
+
+    def _start(self, n: int, point: ModelPoint) -> tuple[np.ndarray, np.ndarray]:
         run, declared = self.runs[n], self.declared
         readings = self.first_readings(n, point)
         x = np.array([one.start for one in declared.states], dtype=np.float64)
@@ -216,17 +227,18 @@ class Observer:
             raise user_error(error, self.vehicle.source, f"{run.name}") from None
         return Filtered(float(value), float(squares), int(samples), *keep)
 
-    def follow(self, n: int, point: ModelPoint, by: Filtered) -> np.ndarray:
-        """States (rows, n + o) of a model along run n by kept gains; NaN where it is lost."""
+    def follow(self, n: int, point: ModelPoint, by: Filtered, rows: int | None = None) -> np.ndarray:
+        """States (rows, n + o) of a model along run n by kept gains; NaN where it is lost, and behind the first rows,
+        where it is asked for these."""
         run, kernels = self.runs[n], self.vehicle.kernels
-        states = np.full(by.states.shape, np.nan)
+        states, first = np.full(by.states.shape, np.nan), slice(rows)
         x, _ = self.start(n, point)
-        driven = driven_inputs(run, self.declared, point)
+        driven = driven_inputs(run, self.declared, point)[first]
         with contextlib.suppress(ArithmeticError, ValueError, np.linalg.LinAlgError):
             kernels.follow_run(
-                run.t, held_inputs(self.declared, driven), run.outputs, x, point.theta, point.own, point.reading,
-                forces(self.declared, point, driven), point.ports, self.kinds, self.angles, self.parts,
-                len(self.scales), by.gains, states,
+                run.t[first], held_inputs(self.declared, driven), run.outputs[first], x, point.theta, point.own,
+                point.reading, forces(self.declared, point, driven), point.ports, self.kinds, self.angles, self.parts,
+                len(self.scales), by.gains[first], states[first],
             )  # fmt: skip
         return states
 
@@ -238,6 +250,8 @@ class Observer:
         A run shorter than a window is one; what is left behind the last is not scored. Where [start] says how a run
         begins, its first window is flown from there: a warm-up would follow a sensor's offset.
         """
+        if (n, horizon) in self._windows:
+            return self._windows[n, horizon]
         t = self.runs[n].t - self.runs[n].t[0]
         warm = min(WARM_UP, WARM_UP_SHARE * horizon)
         count = int((t[-1] + 1e-6) // horizon)
@@ -248,6 +262,7 @@ class Observer:
         starts = np.minimum(np.searchsorted(t, t[begins] + warm - 1e-6), ends - 2)
         if self.declared.start:
             starts[0] = 0
+        self._windows[n, horizon] = starts, ends
         return starts, ends
 
     def predict(self, n: int, point: ModelPoint, horizon: float, states: np.ndarray, beside=0.0) -> np.ndarray:
@@ -280,7 +295,8 @@ class Observer:
         for k in np.flatnonzero(self.angles) if not wrapped else ():
             for a, b in zip(ends - [len(part) for part in parts], ends, strict=True):
                 seen = a + np.flatnonzero(np.isfinite(error[a:b, k]))
-                error[seen, k] = np.unwrap(error[seen, k])
+                if np.abs(np.diff(error[seen, k])).max(initial=0.0) > np.pi:
+                    error[seen, k] = np.unwrap(error[seen, k])
         lost = np.isnan(predicted[rows]).all(axis=1)
         error[lost] = np.where(np.isnan(self.runs[n].outputs[rows[lost]]), np.nan, LOST * self.tolerances)
         return np.clip(error / self.tolerances, -LOST, LOST)
@@ -307,8 +323,10 @@ class Observer:
     def residuals(self, n: int, points: Sequence[ModelPoint], by: Filtered, horizon: float) -> np.ndarray:
         """Errors of models in tolerances, (points, scored rows, outputs): windows begun by kept gains; missing: 0."""
 
+        begun = int(self.windows(n, horizon)[0][-1]) + 1  # rows until the last window has begun
+
         def one(point: ModelPoint) -> np.ndarray:
-            predicted = self.predict(n, point, horizon, self.follow(n, point, by))
+            predicted = self.predict(n, point, horizon, self.follow(n, point, by, begun))
             return np.nan_to_num(self.errors(n, predicted, horizon, wrapped=False), nan=0.0)
 
         return self._each(one, points)
@@ -398,7 +416,7 @@ class BlackBox(Observer):
         rows = len(self.runs[n].t)
         return Filtered(0.0, 0.0, 1, np.zeros((rows, 0, 0)), np.zeros((rows, 0)))
 
-    def follow(self, n: int, point: ModelPoint, by: Filtered) -> np.ndarray:
+    def follow(self, n: int, point: ModelPoint, by: Filtered, rows: int | None = None) -> np.ndarray:
         return by.states
 
     def predict(self, n: int, point: ModelPoint, horizon: float, states: np.ndarray, beside=0.0) -> np.ndarray:

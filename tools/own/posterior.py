@@ -69,8 +69,8 @@ class Engine:
         self.high = np.array([one.high for one in healthy.effects])
         self.active = (np.diag(healthy.V) > 0.0) | (healthy.scatter > 0.0)
         # runs of one session, or each of another: which, their evidence says
-        self.together = Deviations(healthy.V + healthy.session_share * np.diag(healthy.scatter**2), healthy.scatter)
-        self.apart = Deviations(healthy.V, healthy.scatter * np.sqrt(1.0 + healthy.session_share))
+        self.together = Deviations(healthy.V + np.diag(healthy.session**2), healthy.scatter)
+        self.apart = Deviations(healthy.V, np.hypot(healthy.scatter, healthy.session))
         # constant numbers that a hypothesis may add; noises are weighed beside them (excess_noise.py)
         self.candidate = np.array([one.family not in (FORM, NOISE) for one in healthy.effects])
         self.forces = np.array([k for k, one in enumerate(healthy.effects) if one.family == PUSH], dtype=int)
@@ -194,11 +194,11 @@ class Engine:
         each = [log_odds(self.healthy.effects[k]) - np.log(named) for k in self.healthy.at(labels)]
         return float(np.log(CHANGED) + sum(each) + (len(labels) - 1) * np.log(ANOTHER))
 
-    def label_gains(self, pooled: Pooled) -> tuple[np.ndarray, np.ndarray]:
-        """Log evidence (k,) that each label gains beside what runs share, by their parabola, and its size there."""
-        M = pooled.covariance()
-        slope = pooled.r - pooled.H @ (M @ pooled.r)
-        precision = np.maximum(np.diag(pooled.H - pooled.H @ M @ pooled.H), 0.0)
+    def label_gains(self, slope: np.ndarray, precision: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Log evidence (k,) that each label gains by its parabola, beside what is integrated out, and its size there.
+
+        slope, precision (k,): of -2 log likelihood in the size of each label, halved (`alone`).
+        """
         effects, reach = self.healthy.effects, np.maximum(self.reach, LEAST_REACH)
         gain = size_evidence(slope, precision, reach, np.array([one.one_sided for one in effects]))
         gain = np.where(
@@ -211,7 +211,7 @@ class Engine:
         """Every other label beside a hypothesis by its parabola: log evidence gained, best first."""
         places = self.healthy.at(begin.labels)
         _, pooled, *_ = self._best_sizes(begin.found, places, begin.shared)
-        gain, _ = self.label_gains(pooled)
+        gain, _ = self.label_gains(*alone(pooled))
         gain[places] = -np.inf
         return [(float(gain[k]), self.healthy.effects[k].label) for k in np.argsort(-gain) if np.isfinite(gain[k])]
 
@@ -219,7 +219,7 @@ class Engine:
         """Labels in the place of a hypothesis' last one that come nearest to it where it leads, with their starts."""
         places = self.healthy.at(begin.labels[:-1])
         _, pooled, *_ = self._best_sizes(begin.found, places, begin.shared)
-        gain, size = self.label_gains(pooled)
+        gain, size = self.label_gains(*alone(pooled))
         gain[self.healthy.at(tried)] = -np.inf
         (replaced,), starts = self.healthy.at(begin.labels[-1:]), []
         for k in np.argsort(-gain)[:BEAM]:
@@ -370,6 +370,12 @@ class Engine:
         return found
 
 
+def alone(pooled: Pooled) -> tuple[np.ndarray, np.ndarray]:
+    """Slope and precision (k,) of the size of each label in all runs, what they share integrated out."""
+    M = pooled.covariance()
+    return pooled.r - pooled.H @ (M @ pooled.r), np.maximum(np.diag(pooled.H - pooled.H @ M @ pooled.H), 0.0)
+
+
 def size_evidence(slope, precision, reach, one_sided) -> np.ndarray:
     """Log evidence of a label's size over none, from its slope and precision with all else integrated out.
 
@@ -398,13 +404,18 @@ def healthy_of(observer: Observer) -> Healthy:
             ) ** 2
         errors = ChannelErrors(np.ones(len(declared.outputs)), np.full(len(declared.outputs), UNIDENTIFIED_INFLATION))
         scatter[[names.index(one.name) for one in declared.parameters if one.scope == RUN]] = USUAL_OWN_SCATTER
-        return Healthy(effects, V, scatter, np.zeros(k), errors, 1.0, 1, USUAL_LEVEL_SCATTER, USUAL_SESSION_SHARE)
+        session = np.sqrt(USUAL_SESSION_SHARE) * scatter
+        return Healthy(effects, V, scatter, session, np.zeros(k), errors, 1.0, 1, USUAL_LEVEL_SCATTER)
     places = [names.index(name) for name in table.parameters]
     spreads = np.array([effects[k].spread for k in places])
     V[np.ix_(places, places)] = np.array(table.covariance).reshape(len(places), len(places)) / np.outer(
         spreads, spreads
     )
-    for into, values in ((scatter, table.scatter), (usual, table.label_scatter)):
+    session = np.zeros(k)
+    shared = table.session_scatter or {
+        name: float(np.sqrt(table.session_share)) * value for name, value in table.scatter.items()
+    }
+    for into, values in ((scatter, table.scatter), (session, shared), (usual, table.label_scatter)):
         for name, value in values.items():
             if name in names:
                 into[names.index(name)] = value / effects[names.index(name)].spread
@@ -416,12 +427,12 @@ def healthy_of(observer: Observer) -> Healthy:
         effects,
         V,
         scatter,
+        session,
         usual,
         errors,
         table.inflation,
         table.runs,
         table.level_scatter,
-        table.session_share,
         table.noise_gain,
     )
 

@@ -5,7 +5,7 @@ is shared is learned from the runs of the reference (or the first runs) and the 
 one, the most evident first, each relinearised in the runs of its span, until the next is not probable.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any
@@ -35,16 +35,22 @@ from glider.tools.own.load import LoadedVehicle
 from glider.tools.own.observer import Observer, observer_of
 from glider.tools.own.posterior import LONGEST_MOVE, LONGEST_REACH, STRONG_LEFT, Engine, healthy_of
 from glider.tools.own.runs import OwnRun
+from glider.tools.own.sessions import Session, SessionRuns, of_another, split
 
 LEARNED = 4  # first runs, from which a watch without a reference learns
 CHANGE = 0.3  # prior probability that anything changed over the runs
+CHANGE_ODDS = float(np.log(CHANGE / (1.0 - CHANGE)))
+NEW_SESSION = 0.5  # prior probability that they are not all of one session
 TO_THE_END = 0.5  # of spans: that a change is still there in the last run
+WITH_SESSION = 0.5  # of changes: that they begin with a session, where one begins
 MOST_EVENTS = 4
 REFITTED, SPANS = 5, 2  # labels, of the best spans, whose parabolas are taken where they lead to
+UNLIKELY = 7.0  # nat behind the best by the parabola there: not taken
 CERTAIN = 0.5  # probability from which an event is one
 GROUP = 0.1  # of a label's probability: others of at least so much share its group
 OWN_ROUNDS, CONVERGED_OWN = 5, 0.1  # of a run's own values, spreads
 ROUNDS, PREPARED = 3, 20
+SHOWN = 3  # numbers that a session differs by
 
 
 @dataclass
@@ -76,6 +82,7 @@ class Watched:
     strange: np.ndarray  # (runs,) probability that a run has more left than healthy ones and its events say
     cautions: list[str] = field(default_factory=list)
     reference: list[str] = field(default_factory=list)  # runs from which it was learned
+    sessions: list[dict[str, Any]] = field(default_factory=list)  # that begin among them, and what each differs by
 
     def plain(self) -> dict[str, Any]:
         """The JSON of docs/reference/gap.md, What changed."""
@@ -93,7 +100,8 @@ class Watched:
                 {"run": name, "verdict": verdict, "causes": causes, "gap": float(self.gaps[n]), "skipped": None}
             )
         return {
-            "format": 1, "runs": runs, "events": events, "reference": self.reference, "cautions": self.cautions,
+            "format": 1, "runs": runs, "events": events, "sessions": self.sessions, "reference": self.reference,
+            "cautions": self.cautions,
         }  # fmt: skip
 
     def _event(self, one: Event, effects) -> dict[str, Any]:
@@ -128,6 +136,7 @@ class Watch(Engine):
     ):
         super().__init__(observer, healthy, say)
         self.learned = learned
+        self.named = sum(one.family not in (PUSH, FORM) for one in healthy.effects)
 
     def prepare(self) -> None:
         """Every run about where it lies, with what the reference says of all; how runs differ, learned from it too."""
@@ -144,90 +153,168 @@ class Watch(Engine):
             shared, own, gain = search.along(shared, own, damped_step(pooled, shared))
             if gain < CONVERGED_GAIN and round_ >= SCATTER_ROUNDS:
                 break
-        self.shared, self.events = shared, list[Event]()
-        later = [self.own_values(n, shared) for n in range(self.learned, self.count)]
+        later = [self.about(n, shared, shared, columns).at for n in range(self.learned, self.count)]
         self.found = self.expansions(np.array([*own, *later]), every)
         self.reach = np.sqrt(np.mean([one.reach for one in self.found], axis=0))
         self.runs = self.together.marginal(self.found)
-        self.M = Pooled.of(self.runs[: self.learned], self.together.V).covariance()
+        known = self.runs[: self.learned]
+        M = Pooled.of(known, self.together.V).covariance()
+        self.events, self.sessions = list[Event](), [Session(self.learned, self.count, shared, M, shared)]
+        self.another = of_another(known, healthy.V, healthy.session)
 
-    def own_values(self, n: int, around: np.ndarray) -> np.ndarray:
-        """Most probable values (k,) of run n by the exact likelihood, about those that it is thought to have."""
-        columns, healthy, scatter = np.flatnonzero(self.active), self.healthy, self.together.scatter
-        own = around.copy()
+    def about(self, n: int, around: np.ndarray, begin: np.ndarray, columns: np.ndarray) -> Expansion:
+        """Run n expanded in some columns about its most probable values by the exact likelihood, led from `begin` (k,);
+        around: those that it is thought to have."""
+        healthy, scatter, own = self.healthy, self.together.scatter, np.clip(begin, self.low, self.high)
         for _ in range(OWN_ROUNDS):
             found = self.expansion_of(n, own, columns)
             search = LineSearch(self.observer, healthy.effects, [found], scatter, healthy.eta, self.together.V,
                                 (self.low, self.high), healthy.errors, self.horizon, n)  # fmt: skip
             _, (moved_own,), _ = search.along(around, own[None], np.zeros(self.k))
             if np.abs(moved_own - own).max() < CONVERGED_OWN:
-                break
+                return found
             own = moved_own
-        return own
+        return self.expansion_of(n, own, columns)
 
-    def at_run(self, n: int) -> np.ndarray:
-        """Values (k,) that run n is thought to have: shared and its events'."""
-        x = self.shared.copy()
+    def session_of(self, n: int, sessions: Sequence[Session]) -> Session:
+        return next(one for one in sessions if one.first <= n < one.end)
+
+    def of_events(self, n: int) -> np.ndarray:
+        """What events add to the values (k,) of run n."""
+        x = np.zeros(self.k)
         for one in self.events:
             if one.first <= n < one.end:
                 x[self.healthy.at([one.label])[0]] += one.size
         return x
 
-    def scored(self, spans: Sequence[tuple[int, int]]) -> np.ndarray:
-        """Log evidence (spans, labels) of every label over every span; -inf where nothing moves."""
-        slopes = np.array([-(one.slope + one.curvature @ (self.at_run(n) - one.at)) for n, one in enumerate(self.runs)])
-        curvatures = np.array([one.curvature for one in self.runs])
-        r_up, H_up = (
-            np.concatenate([0.0 * slopes[:1], slopes.cumsum(axis=0)]),
-            np.concatenate([0.0 * curvatures[:1], curvatures.cumsum(axis=0)]),
-        )
-        found = np.full((len(spans), self.k), -np.inf)
-        for row, (first, end) in enumerate(spans):
-            # shared values are known to M from the reference; the span's runs see them with the change
-            found[row], _ = self.label_gains(Pooled(H_up[end] - H_up[first], r_up[end] - r_up[first], 0.0, self.M))
+    def at_run(self, n: int, sessions: Sequence[Session]) -> np.ndarray:
+        """Values (k,) that run n is thought to have: its session's and its events'."""
+        return self.session_of(n, sessions).values + self.of_events(n)
+
+    def again(
+        self, n: int, sessions: Sequence[Session], columns: np.ndarray, label: int = 0, size: float = 0.0
+    ) -> Expansion:
+        """Run n expanded again where it is, with a label of a size (spreads) beside its events."""
+        around = self.at_run(n, sessions)
+        around[label] = np.clip(around[label] + size, self.low[label], self.high[label])
+        begin = self.found[n].at + around - self.at_run(n, self.sessions)
+        return self.about(n, around, begin, columns)
+
+    def pooled(self, sessions: Sequence[Session], runs: dict[int, Expansion] | None = None) -> list[SessionRuns]:
+        """Runs by session, what events add taken off; runs: others than those that are known, deviations in them."""
+        runs, found = runs or {}, []
+        for session in sessions:
+            own = [runs.get(n, self.runs[n]) for n in range(session.first, session.end)]
+            own = [replace(one, at=one.at - self.of_events(session.first + n)) for n, one in enumerate(own)]
+            found.append(SessionRuns.of(session, own))
         return found
 
-    def span_prior(self, spans: Sequence[tuple[int, int]]) -> np.ndarray:
-        """Log prior probability of each span: half of them reach the last run."""
-        ends = np.array([end == self.count for _, end in spans])
-        last, others = max(1, int(ends.sum())), max(1, int((~ends).sum()))
-        return np.log(np.where(ends, TO_THE_END / last, (1.0 - TO_THE_END) / others))
+    def scored(self, spans: Sequence[tuple[int, int]], sessions: Sequence[Session]) -> np.ndarray:
+        """Log evidence (spans, labels) of every label over every span; -inf where nothing moves."""
+        pooled, found = self.pooled(sessions), np.full((len(spans), self.k), -np.inf)
+        for row, (first, end) in enumerate(spans):
+            found[row], _ = self.label_gains(*summed(one.alone(first, end) for one in pooled))
+        return found
+
+    def span_prior(self, first: int, end: int, sessions: Sequence[Session]) -> float:
+        """Log prior probability that a change is over these runs: half of all last to the last run, and half of those
+        for which a session begins among the runs begin with one."""
+        count, starts = self.count - self.learned, {one.first for one in sessions[1:]}
+        begin = 1.0 / count
+        if starts:
+            begin = (
+                WITH_SESSION / len(starts) if first in starts else (1.0 - WITH_SESSION) / max(1, count - len(starts))
+            )
+        if end == self.count:
+            return float(np.log(begin * TO_THE_END))
+        return float(np.log(begin * (1.0 - TO_THE_END) / max(1, self.count - first - 1)))
+
+    def session_gain(self, sessions: Sequence[Session], runs: dict[int, Expansion] | None = None) -> float:
+        """Log posterior odds of sessions against those that are known; runs: expanded again, deviations in them."""
+        new = len(sessions) - len(self.sessions)
+        prior = new * np.log(NEW_SESSION / (1.0 - NEW_SESSION) / max(1, self.count - self.learned))
+        return float(prior + log_evidence(self.pooled(sessions, runs)) - log_evidence(self.pooled(self.sessions)))
+
+    def begun(self, sessions: Sequence[Session]) -> int | None:
+        """The run from which on there is another session than those that are known."""
+        known = [one.first for one in self.sessions[1:]]
+        return next((one.first for one in sessions[1:] if one.first not in known), None)
+
+    def with_session(self, first: int) -> list[Session]:
+        """Sessions with another one from a run on, expanded about what its runs say of it by the parabola."""
+        found = split(self.sessions, first, *self.another)
+        if len(found) == len(self.sessions):
+            return self.sessions
+        return [replace(one, values=self.pooled([one])[0].given(0, 0, 0, 0.0)) if one.first == first else one
+                for one in found]  # fmt: skip
+
+    def new_session(self) -> tuple[float, list[Session]]:
+        """The run from which on another session is most probable: its log odds, with its runs expanded again."""
+        tried = [split(self.sessions, n, *self.another) for n in range(self.learned, self.count)]
+        tried = [one for one in tried if len(one) > len(self.sessions)]
+        if not tried:
+            return -np.inf, self.sessions
+        likeliest = max(tried, key=self.session_gain)
+        first = self.begun(likeliest)
+        assert first is not None
+        sessions, columns = self.with_session(first), np.flatnonzero(self.active)
+        runs = {n: self.again(n, sessions, columns) for n in range(first, self.session_of(first, sessions).end)}
+        runs = {n: one for n, one in zip(runs, self.together.marginal(list(runs.values())), strict=True)}
+        return self.session_gain(sessions, runs), sessions
 
     def search(self) -> None:
-        """Events, the most evident first."""
+        """Events and sessions, the most evident first."""
         spans = [(a, b) for a in range(self.learned, self.count) for b in range(a + 1, self.count + 1)]
-        if not spans:
-            return
-        named = sum(one.family not in (PUSH, FORM) for one in self.healthy.effects)
-        for _ in range(MOST_EVENTS):
-            scores = self.scored(spans) + self.span_prior(spans)[:, None] - np.log(named)
-            ranked = np.argsort(scores.max(axis=1))[::-1][:SPANS]
-            if scores.max() + np.log(CHANGE / (1.0 - CHANGE)) < 0.0:
+
+        def prior(some: Sequence[tuple[int, int]], sessions: Sequence[Session]) -> np.ndarray:
+            return np.array([self.span_prior(*span, sessions) for span in some])[:, None] - np.log(self.named)
+
+        while spans and len(self.events) < MOST_EVENTS:
+            other, with_other = self.new_session()
+            # a label alone over every span, and beside another session that begins with it
+            tables: list[tuple[Sequence[Session], list[tuple[int, int]], np.ndarray]]
+            tables = [(self.sessions, spans, self.scored(spans, self.sessions) + prior(spans, self.sessions))]
+            for first in range(self.learned, self.count):
+                other_sessions = split(self.sessions, first, *self.another)
+                if len(other_sessions) > len(self.sessions):
+                    own = [span for span in spans if span[0] == first]
+                    scores = self.scored(own, other_sessions) + prior(own, other_sessions)
+                    tables.append((self.with_session(first), own, scores + self.session_gain(other_sessions)))
+            ranked = sorted(((float(scores[row].max()), t, row) for t, (_, own, scores) in enumerate(tables)
+                             for row in range(len(own))), reverse=True)  # fmt: skip
+            found = [self.compared(tables[t][1][row], tables[t][0], tables[t][2][row]) for _, t, row in ranked[:SPANS]
+                     if ranked[0][0] + CHANGE_ODDS > 0.0]  # fmt: skip
+            taken = max(found, key=lambda one: one[0], default=None)
+            if taken is not None and taken[0] > other:
+                total, best, sessions = taken
+                best.probability = float(1.0 / (1.0 + np.exp(-np.clip(total - np.logaddexp(0.0, other), -50.0, 50.0))))
+                best.chances = {label: best.probability * chance for label, chance in best.chances.items()}
+                reach = self.reach[self.healthy.at([best.label])[0]]
+                if best.probability >= CERTAIN and abs(best.size) * reach >= MATERIAL:
+                    self.say(f"{best.label} from {self.name(best.first)} to {self.name(best.end - 1)}: {total:.1f} nat")
+                    self.take(sessions, best)
+                    continue
+            if other <= 0.0:
                 break
-            refitted: list[tuple[float, Event]] = []
-            for row in ranked:
-                prior = float(self.span_prior(spans)[row]) - np.log(named)
-                starts = {int(k): 0.0 for k in np.argsort(scores[row])[::-1][:REFITTED]}
-                runs = range(*spans[row])
-                if np.sqrt(np.mean([self.left(n) for n in runs])) > STRONG_LEFT:
-                    starts |= dict(self.strong_sizes(runs)[:REFITTED])
-                refitted += [self.refit(spans[row], k, start, prior) for k, start in starts.items()]
-            refitted += self.swapped(max(refitted, key=lambda one: one[0])[1], refitted, spans, named)
-            best = max(refitted, key=lambda one: one[0])[1]
-            same = [(score, one) for score, one in refitted if (one.first, one.end) == (best.first, best.end)]
-            best = self.decided(same)
-            k = self.healthy.at([best.label])[0]
-            total = float(logsumexp([score for score, _ in same]))
-            odds = total + np.log(CHANGE / (1.0 - CHANGE))
-            best.probability = float(1.0 / (1.0 + np.exp(-np.clip(odds, -50.0, 50.0))))
-            best.chances = {one.label: best.probability * float(np.exp(score - total)) for score, one in same}
-            if best.probability < CERTAIN or abs(best.size) * self.reach[k] < MATERIAL:
-                break
-            self.say(
-                f"{best.label} from {self.observer.runs[best.first].name} to {self.observer.runs[best.end - 1].name}: "
-                f"{odds:.1f} nat"
-            )
-            self.take(best)
+            self.say(f"another session from {self.name(self.begun(with_other) or 0)} on: {other:.1f} nat")
+            self.take(with_other)
+
+    def name(self, n: int) -> str:
+        return self.observer.runs[n].name
+
+    def compared(
+        self, span: tuple[int, int], sessions: Sequence[Session], scores: np.ndarray
+    ) -> tuple[float, Event, Sequence[Session]]:
+        """Labels over a span, each refitted where it leads: log odds of all, the event, sessions."""
+        starts, runs = {int(k): 0.0 for k in np.argsort(scores)[::-1][:REFITTED]}, range(*span)
+        if np.sqrt(np.mean([self.left(n) for n in runs])) > STRONG_LEFT:
+            starts |= dict(self.strong_sizes(runs)[:REFITTED])
+        found = [self.refit(span, k, start, sessions) for k, start in starts.items()]
+        found += self.swapped(max(found, key=lambda one: one[0])[1], found, sessions)
+        total = float(logsumexp([score for score, _ in found]))
+        best = self.decided(found)
+        best.chances = {one.label: float(np.exp(score - total)) for score, one in found}
+        return total + CHANGE_ODDS, best, sessions
 
     def decided(self, same: Sequence[tuple[float, Event]]) -> Event:
         """The event of a span: a label where labels together are more probable than a force that none has."""
@@ -237,58 +324,62 @@ class Watch(Engine):
         sums = [float(logsumexp([score for score, _ in some])) if some else -np.inf for some in (labels, forces)]
         return max(labels if sums[0] >= sums[1] else forces, key=lambda one: one[0])[1]
 
-    def swapped(self, event: Event, refitted: Sequence[tuple[float, Event]], spans, named: int):
+    def swapped(
+        self, event: Event, refitted: Sequence[tuple[float, Event]], sessions: Sequence[Session]
+    ) -> list[tuple[float, Event]]:
         """Labels in an event's place that come nearest to it where it leads, refitted (log odds, event)."""
         span, every = (event.first, event.end), np.arange(self.k)
-        (place,), runs = self.healthy.at([event.label]), list[Expansion]()
-        for n in range(*span):
-            x = self.at_run(n)
-            x[place] += event.size
-            x = self.own_values(n, np.clip(x, self.low, self.high))
-            runs += self.together.marginal([self.expansion_of(n, x, every)])
-        gain, size = self.label_gains(self.evidence(runs, span, self.M))
-        gain[self.healthy.at([one.label for _, one in refitted if (one.first, one.end) == span])] = -np.inf
-        prior = float(self.span_prior(spans)[spans.index(span)]) - np.log(named)
-        return [self.refit(span, int(k), float(size[k]), prior)
-                for k in np.argsort(-gain)[:REFITTED] if np.isfinite(gain[k])]  # fmt: skip
+        (place,) = self.healthy.at([event.label])
+        runs = self.led(span, sessions, every, place, event.size)
+        gain, size = self.label_gains(*summed(one.alone(*span) for one in self.pooled(sessions, runs)))
+        likely = gain > gain[place] - UNLIKELY
+        likely[self.healthy.at([one.label for _, one in refitted])] = False
+        return [self.refit(span, int(k), float(size[k]), sessions)
+                for k in np.argsort(-np.where(likely, gain, -np.inf))[:REFITTED] if likely[k]]  # fmt: skip
+
+    def led(
+        self, span: tuple[int, int], sessions: Sequence[Session], columns: np.ndarray, label: int, size: float
+    ) -> dict[int, Expansion]:
+        """A span's runs expanded where a label of a size leads, their deviations integrated out."""
+        runs = [self.again(n, sessions, columns, label, size) for n in range(*span)]
+        return dict(zip(range(*span), self.together.marginal(runs), strict=True))
 
     def left(self, n: int) -> float:
         """Mean square that a run leaves about where it was expanded, in units of what healthy runs leave."""
         return float(self.found[n].squares.sum() / max(1, self.found[n].samples.sum()))
 
-    def take(self, event: Event) -> None:
-        """An event into what is known: the runs of its span are expanded again where they are now."""
-        self.events.append(event)
-        for n in range(event.first, event.end):
-            self.found[n] = self.expansion_of(n, self.own_values(n, self.at_run(n)), np.arange(self.k))
+    def take(self, sessions: Sequence[Session], event: Event | None = None) -> None:
+        """Sessions and an event into what is known: runs that they move are expanded again where they are now."""
+        moved = [n for n in range(self.learned, self.count)
+                 if self.session_of(n, sessions).values is not self.session_of(n, self.sessions).values
+                 or (event is not None and event.first <= n < event.end)]  # fmt: skip
+        before = {n: self.at_run(n, self.sessions) for n in moved}
+        self.sessions = list(sessions)
+        if event is not None:
+            self.events.append(event)
+        for n in moved:
+            around = self.at_run(n, self.sessions)
+            self.found[n] = self.about(n, around, self.found[n].at + around - before[n], np.arange(self.k))
             (self.runs[n],) = self.together.marginal([self.found[n]])
 
-    def evidence(self, runs: Sequence[Expansion], span: tuple[int, int], V: np.ndarray) -> Pooled:
-        """A span's runs, values counted from what they are thought to have."""
-        moved_runs = [replace(one, at=one.at - self.at_run(n)) for n, one in zip(range(*span), runs, strict=True)]
-        return Pooled.of(moved_runs, V)
-
-    def refit(self, span: tuple[int, int], k: int, start: float, prior: float) -> tuple[float, Event]:
-        """A label over a span, expanded where it leads to: log odds against no change, and the event."""
-        nothing = self.evidence(self.runs[slice(*span)], span, self.M).log_evidence()
+    def refit(self, span: tuple[int, int], k: int, start: float, sessions: Sequence[Session]) -> tuple[float, Event]:
+        """A label over a span, expanded where it leads to: log odds against what is known, and the event."""
+        effect, healthy = self.healthy.effects[k], self.healthy
         columns = np.unique(np.append(np.flatnonzero(self.active), k))
+        varied = np.array([k, *(force for force in self.forces if force != k)])
+        nothing = log_evidence(self.pooled(self.sessions))
         size, best = start, (-np.inf, start, 0.0)
-        odds = log_odds(self.healthy.effects[k])
-        runs = self.runs[slice(*span)] if start == 0.0 else None
-        linear = runs is not None
+        linear = start == 0.0
+        runs: dict[int, Expansion] | None = {} if linear else None
         for _ in range(ROUNDS + 1):
             if runs is not None:
-                pooled = self.evidence(runs, span, self.M)
-                table = []
+                pooled = self.pooled(sessions, runs)
+                slope, precision = summed(one.beside(*span, varied) for one in pooled)
                 where = size * (np.arange(self.k) == k)
-                for tolerances, form in product(SIZES.tolist(), FORM_SHARES):
-                    V = self.variance(self.M, [k], [tolerances], where, form)
-                    M = pooled.covariance(V)
-                    mean, sd = float((M @ pooled.r)[k]), float(np.sqrt(max(M[k, k], 1e-30)))
-                    halved = np.log(2.0) + norm.logcdf(mean / sd) if self.healthy.effects[k].one_sided else 0.0
-                    table.append((pooled.log_evidence(V) + halved, mean, sd))
-                score = float(logsumexp([one[0] for one in table]) - np.log(len(table)))
-                _, mean, sd = max(table)
+                d = np.array([self.variance(np.zeros((self.k, self.k)), [k], [tolerances], where, form)[varied, varied]
+                              for tolerances, form in product(SIZES.tolist(), FORM_SHARES)])  # fmt: skip
+                nat, mean, sd = size_posterior(slope, precision, d, effect.one_sided)
+                score = log_evidence(pooled) + nat
                 mean = float(np.clip(mean, self.low[k], self.high[k]))
                 if not linear and score > best[0]:
                     best = score, mean, sd
@@ -298,28 +389,73 @@ class Watch(Engine):
                 size += float(np.clip(mean - size, -room, room))
                 if converged and np.isfinite(best[0]):
                     break
-            runs = []
-            for n in range(*span):
-                x = self.at_run(n)
-                x[k] = np.clip(x[k] + size, self.low[k], self.high[k])
-                runs += self.together.marginal([self.expansion_of(n, self.own_values(n, x), columns)])
+                new = self.begun(sessions)
+                sessions = [
+                    replace(one.session, values=one.given(*span, k, size))
+                    if one.session.first == new and one is not pooled[0] else one.session for one in pooled
+                ]  # fmt: skip
+            runs = self.led(span, sessions, columns, k, size)
         score, mean, sd = best
-        usual = usual_share(self.healthy, k, float(self.reach[k]), mean, sd, span[1] - span[0]) if sd > 0.0 else 0.0
-        event = Event({}, *span, self.healthy.effects[k].label, mean, sd, 0.0)
-        return score - nothing - usual + prior + odds, event
+        usual = usual_share(healthy, k, float(self.reach[k]), mean, sd, span[1] - span[0]) if sd > 0.0 else 0.0
+        event = Event({}, *span, effect.label, mean, sd, 0.0)
+        prior = self.span_prior(*span, sessions) - np.log(self.named) + log_odds(effect)
+        more = len(sessions) - len(self.sessions)
+        prior += more * np.log(NEW_SESSION / (1.0 - NEW_SESSION) / max(1, self.count - self.learned))
+        return score - nothing - usual + prior, event
 
     def judge(self) -> np.ndarray:
         """Probability of each run to have more left than healthy ones and its events say."""
         found = np.zeros(self.count)
-        nothing = Hypothesis((), 0.0, np.zeros(0), np.zeros(0), self.shared, np.zeros((1, self.k)), np.ones(1))
         for n in range(self.learned, self.count):
-            one = self.expansion_of(n, self.own_values(n, self.at_run(n)), np.flatnonzero(self.active))
-            left = np.array([one.squares.sum() / max(1, one.samples.sum())])
-            named = tuple(event.label for event in self.events if event.first <= n < event.end)
-            found[n] = strangeness(
-                self.healthy, replace(nothing, labels=named, left=left), replace(nothing, left=np.array([self.left(n)]))
-            )
+            labels = tuple(event.label for event in self.events if event.first <= n < event.end)
+            one = Hypothesis(labels, 0.0, np.zeros(0), np.zeros(0), np.zeros(self.k), np.zeros((1, self.k)),
+                             np.array([self.left(n)]))  # fmt: skip
+            found[n] = strangeness(self.healthy, one, one)
         return found
+
+    def differences(self) -> list[dict[str, Any]]:
+        """Sessions of the runs that are watched, and what each differs by from the reference most clearly."""
+        first, found = self.sessions[0], []
+        for one in self.pooled(self.sessions[1:]):
+            value, sd = one.session.mean + one.mean - first.values, np.sqrt(np.maximum(np.diag(one.M + first.V), 0.0))
+            clear = np.abs(value) / np.hypot(sd, np.maximum(self.together.scatter, 1e-9))
+            rows = []
+            for k in np.argsort(-np.where(self.healthy.session > 0.0, clear, 0.0))[:SHOWN]:
+                effect = self.healthy.effects[k]
+                low, high = ((value[k] + side * NINETY * sd[k]) * effect.spread for side in (-1.0, 1.0))
+                rows.append({"name": effect.label, "difference": float(value[k] * effect.spread),
+                             "ci90": [float(low), float(high)], "unit": effect.unit})  # fmt: skip
+            found.append({"from_run": self.name(one.session.first), "differences": rows})
+        return found
+
+
+def log_evidence(pooled: Sequence[SessionRuns]) -> float:
+    """Of all sessions' runs, without a label."""
+    return sum(one.pooled.log_evidence() for one in pooled)
+
+
+def summed(parts: Iterable[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+    """Slopes and precisions of a label in some sessions, together; precisions of single labels not below 0."""
+    slopes, precisions = zip(*parts, strict=True)
+    precision = np.sum(precisions, axis=0)
+    return np.sum(slopes, axis=0), np.maximum(precision, 0.0) if precision.ndim == 1 else precision
+
+
+def size_posterior(
+    slope: np.ndarray, precision: np.ndarray, variances: np.ndarray, one_sided: bool
+) -> tuple[float, float, float]:
+    """Log evidence of a label's size over none, its mean and 1 sigma, of the most probable of its priors.
+
+    slope (v,), precision (v, v) of the label and what may stand beside it; variances (priors, v), equally probable.
+    """
+    inner = np.eye(len(slope)) + variances[:, :, None] * precision
+    S = np.linalg.solve(inner, variances[:, :, None] * np.eye(len(slope)))
+    mean, sd = S[:, 0] @ slope, np.sqrt(np.maximum(S[:, 0, 0], 1e-30))
+    nat = 0.5 * (np.einsum("a,nab,b->n", slope, S, slope) - np.linalg.slogdet(inner)[1])
+    if one_sided:
+        nat = nat + np.log(2.0) + norm.logcdf(mean / sd)
+    best = int(np.argmax(nat))
+    return float(logsumexp(nat) - np.log(len(nat))), float(mean[best]), float(sd[best])
 
 
 def watch(
@@ -349,4 +485,13 @@ def watch(
     events = [replace(one, first=one.first - drop, end=one.end - drop) for one in engine.events]
     names = [run.name for run in observer.runs[drop:]]
     learned_from = [run.name for run in observer.runs[:learned]]
-    return Watched(names, learned - drop, events, healthy, gaps[drop:], strange[drop:], cautions, learned_from)
+    sessions = engine.differences()
+    cautions += [f"another session begins with {one['from_run']}: {_said(one)}, as sessions differ" for one in sessions]
+    return Watched(
+        names, learned - drop, events, healthy, gaps[drop:], strange[drop:], cautions, learned_from, sessions
+    )
+
+
+def _said(session: dict[str, Any]) -> str:
+    """What a session differs by, in words."""
+    return ", ".join(f"{one['name']} {one['difference']:+.2g} {one['unit']}" for one in session["differences"])

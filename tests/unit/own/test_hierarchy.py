@@ -12,7 +12,7 @@ from glider.tools.inference.pooled import Pooled, learn_scatter
 from glider.tools.own.decision import FORM_SHARES, SIZES, Deviations, Healthy, Hypothesis, usual_share
 from glider.tools.own.effects import INPUT, PARAMETER, PUSH, Effect
 from glider.tools.own.hierarchy import ChannelErrors, Expansion
-from glider.tools.own.posterior import Engine
+from glider.tools.own.posterior import Engine, alone
 from glider.tools.own.watch import Event, Watch
 
 LABELS = [Effect("gain", INPUT, "motor", "gain", "1", 0.1), Effect("mass", PARAMETER, "mass", "value", "kg", 0.1),
@@ -39,7 +39,8 @@ class Columns:
 
 def healthy(**changes) -> Healthy:
     errors = ChannelErrors(np.ones(1), np.ones(1))
-    one = Healthy(LABELS, np.zeros((3, 3)), np.array([0.0, 0.0, 1.0]), np.zeros(3), errors, 1.0, 10, 0.5, 0.5)
+    one = Healthy(LABELS, np.zeros((3, 3)), np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, 0.7]),
+                  np.zeros(3), errors, 1.0, 10, 0.5)  # fmt: skip
     return replace(one, **changes)
 
 
@@ -60,7 +61,10 @@ def test_scatter_is_learned_where_runs_may_differ_and_stays_nothing_elsewhere():
 
 @pytest.mark.parametrize(("common", "own", "kind"), [(1.5, 0.2, "together"), (0.0, 1.2, "apart")])
 def test_runs_themselves_say_whether_they_are_of_one_session(common, own, kind):
-    random, asked = np.random.default_rng(5), engine(12, session_share=4.0, scatter=np.array([0.0, 0.0, 0.4]))
+    random, asked = (
+        np.random.default_rng(5),
+        engine(12, session=np.array([0.0, 0.0, 0.8]), scatter=np.array([0.0, 0.0, 0.4])),
+    )
     runs = [run_at(np.array([0.0, 0.0, common + own * random.standard_normal()])) for _ in range(12)]
     by, _, evidence, *_ = asked._best_sizes(runs, [], np.zeros(3))
     assert by is getattr(asked, kind)
@@ -96,7 +100,7 @@ def test_the_grid_of_sizes_is_what_each_prior_alone_gives(places):
 def test_a_label_alone_gains_what_its_evidence_says():
     asked, runs = engine(4), [run_at(np.array([0.3, 0.0, 0.0])) for _ in range(4)]
     pooled = Pooled.of(asked.together.marginal(runs), asked.together.V)
-    gain, size = asked.label_gains(pooled)
+    gain, size = asked.label_gains(*alone(pooled))
     whole = []
     for tolerances in SIZES:
         V = asked.together.V.copy()

@@ -1,0 +1,118 @@
+"""Sessions: what they differ by is learned number by number; a label is weighed with what they share left open."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from glider.tools.inference.pooled import Parabola, Pooled, marginalised
+from glider.tools.own.identify import USUAL_SESSION_SHARE, learn_sessions
+from glider.tools.own.sessions import Session, SessionRuns, of_another, split
+from glider.tools.own.watch import size_posterior
+
+K = 3
+
+
+def parabola(random: np.random.Generator, place: np.ndarray, precision: float = 30.0) -> Parabola:
+    """A run whose likelihood is a normal one about a place (K,), its numbers not independent."""
+    root = random.normal(size=(K, K))
+    H = precision * (np.eye(K) + 0.3 * root @ root.T)
+    return Parabola(np.zeros(K), float(place @ H @ place), -H @ place, H)
+
+
+def session(first: int, end: int, random: np.random.Generator) -> Session:
+    root = random.normal(size=(K, K))
+    return Session(first, end, random.normal(size=K), 0.5 * np.eye(K) + 0.2 * root @ root.T, np.zeros(K))
+
+
+def test_each_number_has_its_own_spread_of_sessions():
+    random, counts = np.random.default_rng(4), [10] * 12
+    within, between = np.array([0.0, 0.3, 0.3]), np.array([0.0, 0.1, 2.0])
+    places = [between * random.normal(size=K) for _ in counts]
+    runs = [parabola(random, place + within * random.normal(size=K), 400.0)
+            for place, count in zip(places, counts, strict=True) for _ in range(count)]  # fmt: skip
+    total = np.hypot(within, between)
+    own, other = learn_sessions(runs, np.zeros((K, K)), total, counts)
+    assert own == pytest.approx([0.0, 0.3, 0.3], rel=0.15)
+    assert other[0] == 0.0
+    assert other[1] == pytest.approx(0.1, abs=0.06)
+    assert other[2] == pytest.approx(2.0, rel=0.4)
+
+
+def test_one_session_leaves_what_is_usual():
+    random, scatter = np.random.default_rng(4), np.array([0.0, 0.2, 0.4])
+    own, other = learn_sessions([parabola(random, np.zeros(K))], np.eye(K), scatter, [1])
+    assert own is scatter
+    assert other == pytest.approx(np.sqrt(USUAL_SESSION_SHARE) * scatter)
+
+
+def test_another_session_is_known_by_what_the_reference_says_of_the_vehicle_alone():
+    random, spread = np.random.default_rng(2), np.array([0.5, 0.0, 3.0])
+    runs, V = [parabola(random, np.array([1.0, 1.0, 1.0])) for _ in range(5)], 0.7 * np.eye(K)
+    mean, cov = of_another(runs, V, spread)
+    # all of it written out: s and the reference's t, both in every run
+    H, r = sum(one.curvature for one in runs), -sum(one.offset for one in runs)
+    T = np.diag(spread**2)
+    joint = np.block([[V + T, V], [V, V + T]])  # of the reference's values, and another session's
+    gain = joint[K:, :K] @ np.linalg.inv(np.eye(K) + H @ joint[:K, :K])
+    assert mean == pytest.approx(gain @ r)
+    assert cov == pytest.approx(joint[K:, K:] - gain @ H @ joint[:K, K:])
+
+
+@pytest.mark.parametrize("span", [(2, 4), (3, 7), (5, 8), (2, 8)])
+def test_a_label_over_runs_of_one_or_two_sessions_has_the_evidence_of_the_model_written_out(span):
+    random, label, tau = np.random.default_rng(7), 1, 1.7
+    runs = {n: parabola(random, random.normal(size=K)) for n in range(2, 8)}
+    sessions = [session(2, 5, random), session(5, 8, random)]
+    found = [SessionRuns.of(one, [runs[n] for n in range(one.first, one.end)]) for one in sessions]
+    slope, precision = (sum(part) for part in zip(*(one.alone(*span) for one in found), strict=True))
+    total = 1.0 + tau**2 * precision[label]
+    gain = 0.5 * (slope[label] ** 2 * tau**2 / total - np.log(total))
+    wide = np.zeros((2 * K + 1, 2 * K + 1))  # both sessions' values and the label's size
+    wide[:K, :K], wide[K : 2 * K, K : 2 * K], wide[-1, -1] = sessions[0].V, sessions[1].V, tau**2
+    augmented = []
+    for n, one in runs.items():
+        which = int(n >= 5)
+        into = np.zeros((K, 2 * K + 1))
+        into[:, which * K : (which + 1) * K] = np.eye(K)
+        into[label, -1] = float(span[0] <= n < span[1])
+        about = replace(one, at=one.at - sessions[which].mean)
+        augmented.append(Parabola(np.zeros(2 * K + 1), about.constant, into.T @ about.offset,
+                                  into.T @ about.curvature @ into))  # fmt: skip
+    without = wide.copy()
+    without[-1, -1] = 0.0
+    pooled = Pooled.of(augmented, wide)
+    assert gain == pytest.approx(pooled.log_evidence() - pooled.log_evidence(without))
+    assert sum(one.pooled.log_evidence() for one in found) == pytest.approx(pooled.log_evidence(without))
+    size = pooled.mean()[-1]
+    assert slope[label] * tau**2 / total == pytest.approx(size)
+    for place, one in enumerate(found):
+        values = pooled.mean()[place * K : (place + 1) * K] + sessions[place].mean
+        assert one.given(*span, label, float(size)) == pytest.approx(values)
+    places = np.array([label, 2])
+    q, Q = (sum(part) for part in zip(*(one.beside(*span, places) for one in found), strict=True))
+    assert (q[0], Q[0, 0]) == pytest.approx((slope[label], precision[label]))
+    nat, mean, _ = size_posterior(q, Q, np.array([[tau**2, 0.0]]), False)
+    assert (nat, mean) == pytest.approx((gain, size))
+
+
+def test_a_session_is_split_where_another_begins_and_only_there():
+    one = Session(2, 8, np.zeros(K), np.eye(K), np.ones(K))
+    first, second = split([one], 5, np.ones(K), 2.0 * np.eye(K))
+    assert (first.first, first.end, second.first, second.end) == (2, 5, 5, 8)
+    assert first.values is one.values
+    assert second.values == pytest.approx(np.ones(K))
+    assert split([one], 8, np.ones(K), np.eye(K)) == [one]
+    empty, every = split([one], 2, np.ones(K), np.eye(K))  # none of the runs watched is the reference's
+    assert (empty.first, empty.end, every.first, every.end) == (2, 2, 2, 8)
+    assert SessionRuns.of(empty, []).pooled.log_evidence() == 0.0
+    assert split([empty, every], 2, np.ones(K), np.eye(K)) == [empty, every]
+
+
+def test_deviations_of_a_session_are_those_of_its_runs_together():
+    random, spread = np.random.default_rng(3), np.array([0.4, 0.0, 1.0])
+    runs = [parabola(random, np.ones(K)) for _ in range(4)]
+    whole = marginalised(Pooled.of(runs, np.eye(K)).parabola(), spread)
+    assert Pooled.of([whole], np.eye(K)).log_evidence() == pytest.approx(
+        Pooled.of(runs, np.eye(K) + np.diag(spread**2)).log_evidence()
+    )

@@ -1,0 +1,91 @@
+"""Sessions of a watch: successive runs that share what a vehicle is off the identified one by.
+
+Another day's trim, water or battery is no cause (docs/how-to/own-vehicle.md, The method). With x_n = s + t_j + d_n, s ~
+N(0, C) as identified and t_j ~ N(0, diag(session^2)), what is known of a new session is s given the reference's runs,
+and t_j beside it. Of a label over a span S of a session's runs, all that they share integrated out, slope and precision
+are r_S - H_S M r and H_S - H_S M H_S, with H, r the pooled session's and M the covariance that it leaves.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from glider.tools.inference.pooled import Parabola, Pooled, marginalised
+from glider.tools.own.hierarchy import Expansion
+
+
+@dataclass(frozen=True)
+class Session:
+    """Runs first to end - 1 of a watch and what is known of the values (k,) that they share."""
+
+    first: int
+    end: int
+    mean: np.ndarray  # (k,) without its own runs
+    V: np.ndarray  # (k, k)
+    values: np.ndarray  # (k,) about which its runs are expanded
+
+
+def split(sessions: Sequence[Session], first: int, mean: np.ndarray, V: np.ndarray) -> list[Session]:
+    """Sessions with another one from run `first` on, of which (mean, V) is known; themselves where one begins there.
+
+    The first is the reference's: none of the runs that are watched may be left to it.
+    """
+    found = list[Session]()
+    for one in sessions:
+        if one.first <= first < one.end and first not in [other.first for other in sessions[1:]]:
+            found += [replace(one, end=first), Session(first, one.end, mean, V, mean)]
+        else:
+            found.append(one)
+    return found
+
+
+def of_another(runs: Sequence[Parabola], V: np.ndarray, session: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and covariance of another session's values: V of the identified vehicle, runs of the reference (tempered,
+    their own deviations integrated out), session (k,) 1 sigma of what sessions differ by."""
+    apart = marginalised(Pooled.of(runs, V).parabola(), session)
+    known = Pooled.of([apart], V)
+    return known.mean(), known.covariance() + np.diag(session**2)
+
+
+@dataclass
+class SessionRuns:
+    """A session's runs about its mean, label by label over spans of them."""
+
+    session: Session
+    pooled: Pooled
+    slopes: np.ndarray  # (runs + 1, k) summed up to each run
+    curvatures: np.ndarray  # (runs + 1, k, k)
+
+    @classmethod
+    def of(cls, session: Session, runs: Sequence[Expansion]) -> "SessionRuns":
+        """Runs of the session, values counted from what they are thought to have without it."""
+        about = [replace(one, at=one.at - session.mean) for one in runs]
+        slopes = np.cumsum([np.zeros_like(session.mean), *(-one.offset for one in about)], axis=0)
+        curvatures = np.cumsum([np.zeros_like(session.V), *(one.curvature for one in about)], axis=0)
+        pooled = Pooled(curvatures[-1], slopes[-1], sum(one.constant for one in about), session.V)
+        return cls(session, pooled, slopes, curvatures)
+
+    def __post_init__(self) -> None:
+        self.M = self.pooled.covariance()
+        self.mean = self.M @ self.pooled.r
+
+    def over(self, first: int, end: int) -> tuple[np.ndarray, np.ndarray]:
+        """Slope r_S (k,) and curvature H_S (k, k) of the runs of a span that are of this session."""
+        a, b = (int(np.clip(n - self.session.first, 0, len(self.slopes) - 1)) for n in (first, end))
+        return self.slopes[b] - self.slopes[a], self.curvatures[b] - self.curvatures[a]
+
+    def alone(self, first: int, end: int) -> tuple[np.ndarray, np.ndarray]:
+        """Slope and precision (k,) of each label's size over a span: diagonal only."""
+        r, H = self.over(first, end)
+        return r - H @ self.mean, np.diag(H) - ((H @ self.M) * H).sum(axis=1)
+
+    def beside(self, first: int, end: int, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The same of a few labels together, slope (places,) and precision (places, places)."""
+        r, H = self.over(first, end)
+        return (r - H @ self.mean)[places], H[np.ix_(places, places)] - H[places] @ self.M @ H[:, places]
+
+    def given(self, first: int, end: int, label: int, size: float) -> np.ndarray:
+        """Most probable values (k,) of the session, a label of a size being there over a span."""
+        _, H = self.over(first, end)
+        return self.session.mean + self.mean - self.M @ (H[:, label] * size)
