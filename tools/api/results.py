@@ -287,7 +287,7 @@ class Identification(Result):
     @property
     def vehicle_text(self) -> str:
         """The identified vehicle file, TOML."""
-        return self._found.vehicle_text
+        return self._found.vehicle_text()
 
     @property
     def notes(self) -> tuple[str, ...]:
