@@ -93,8 +93,10 @@ class OceanGlider:
 
         found = identify_ocean(case, say)
         notes = tuple(f"left out: {one}" for one in found.left_out)
-        plain, text, write = (partial(one, found) for one in (files.plain, files.vehicle_text, files.write))
-        return Identified(plain, text, notes, write, partial(ocean_lines, found), report=False)
+        return Identified(
+            partial(files.plain, found), partial(files.vehicle_text, found), notes, partial(files.write, found),
+            partial(ocean_lines, found), report=False,
+        )  # fmt: skip
 
     def diagnose(self, case: Case, reference: Case | None, without: str | None, say: Say) -> Callable[[Path], str]:
         """What all dives share; InputError with a reference, which a watch takes."""

@@ -1,7 +1,9 @@
 """`glider gap challenge`: a blind test of the diagnosis, made, run and scored."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -172,14 +174,14 @@ def score(
     _check_kind(watch, ocean, form)
     if out is not None:
         check_writable(out.parent)
-    found: ChallengeScore | WatchScore
+    judged: Callable[..., ChallengeScore | WatchScore] = judge_forms if form else judge
+    how: dict[str, Any] = {"manifest": manifest, "partial": partial}
+    if watch:
+        judged = judge_missions if ocean else judge_watches
+    else:
+        how["closing"] = not no_closed
     with progress("scored", count_cases(cases)) as advance:
-        if watch:
-            found = (judge_missions if ocean else judge_watches)(cases, answers, diagnoses, manifest, partial, advance)
-        else:
-            found = (judge_forms if form else judge)(
-                cases, answers, diagnoses, manifest=manifest, partial=partial, closing=not no_closed, advance=advance
-            )
+        found = judged(cases, answers, diagnoses, **how, advance=advance)
     if out is not None:
         kind: Kind = ("ocean" if ocean else "watch") if watch else "form" if form else "single"
         write_bytes(out, as_file(result_of(found, kind, answers, diagnoses, commit)))

@@ -1,6 +1,6 @@
 """Watches of ocean gliders' missions against the truth: the figures of any watch, what acts alike, the velocity."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -101,16 +101,9 @@ def score_missions(cases: Sequence[Watched], held: Sequence[bool]) -> WatchScore
     return WatchScore(found.cases, [*found.figures[:-1], *own, found.figures[-1]])
 
 
-def judge_missions(
-    cases: Path,
-    answers: Path,
-    said: Path,
-    manifest: Path | None = None,
-    partial: bool = False,
-    advance: Callable[[int], None] = lambda n: None,
-) -> WatchScore:
-    """Open, check and score what was said to every mission of a blind test's folder."""
-    found = gather_watches(cases, answers, said, manifest, partial, advance, NEEDED_OF_A_MISSION)
+def judge_missions(cases: Path, answers: Path, said: Path, **how: Any) -> WatchScore:
+    """Open, check and score what was said to every mission of a blind test's folder; how: as in gather_watches."""
+    found = gather_watches(cases, answers, said, NEEDED_OF_A_MISSION, **how)
     held: list[bool] = []
     for case in found:
         if case.said is not None:
