@@ -129,10 +129,7 @@ def _add_water(segment: Segment, file: NetCDF, t: np.ndarray) -> None:
     left_out = segment.left_out
     logged_t = file.values("ctd_time", EPOCH)
     size = len(logged_t)
-    ctd_left: dict[str, int] = {}
-    rows = in_the_mission(logged_t, ctd_left)
-    for reason, samples in ctd_left.items():
-        count(left_out, f"of the CTD {reason}", samples)
+    rows = in_the_mission(logged_t, left_out, "of the CTD ")
     ctd_t = logged_t[rows]
     pressure = clean("pressure", ctd_t, file.values("ctd_pressure", netcdf.DBAR, size)[rows], left_out)
     temperature = clean("temperature", ctd_t, file.values("temperature", netcdf.CELSIUS, size)[rows], left_out)
