@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from glider.tools.cli.common import compile_campaign, json_option, print_json, progress, say
+from glider.tools.cli.common import compile_campaign, json_option, print_json, print_lines, progress, say
 
 PAIR: dict[str, Any] = {"nargs": 2, "type": float, "metavar": "LOW HIGH"}
 # option -> key of the campaign file that it stands in for
@@ -107,10 +107,7 @@ def _make_runs(folder: Path, options: dict[str, Any], as_json: bool) -> None:
     check_writable(folder)
     world = write_design(folder, wanted, load_vehicle(wanted), seed)
     write_bytes(folder / "truth.json", (json.dumps(truth(world), indent=1) + "\n").encode())
-    if as_json:
-        print_json({"case": str(folder), "runs": len(grid()), "seed": seed, "truth": truth(world)})
-    else:
-        click.echo(folder)
+    print_lines([folder], as_json, {"case": str(folder), "runs": len(grid()), "seed": seed, "truth": truth(world)})
 
 
 def _pair(found: dict, scale: float) -> str:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from glider.tools.cli.common import json_option, print_json
+from glider.tools.cli.common import json_option, print_lines
 
 
 @click.command()
@@ -23,8 +23,4 @@ def compare(a: Path, b: Path, as_json: bool) -> None:
 
     need("analysis")
     found = compare_answers(a, b)
-    if as_json:
-        print_json(found)
-        return
-    for line in lines(found):
-        click.echo(line)
+    print_lines(lines(found), as_json, found)

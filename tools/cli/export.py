@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from glider.tools.cli.common import json_option, print_json, say
+from glider.tools.cli.common import json_option, print_lines, say
 
 
 @click.group("export")
@@ -47,10 +47,7 @@ def og1(
         say(f"{one.name}: {one.long_name}")
     if about.missing:
         say(f"note: 'unknown' in the file, which the format wants: {', '.join(f'--{one}' for one in about.missing)}")
-    if as_json:
-        print_json({"case": str(case), "file": str(out), "variables": [one.name for one in found]})
-    else:
-        click.echo(out)
+    print_lines([out], as_json, {"case": str(case), "file": str(out), "variables": [one.name for one in found]})
 
 
 @export.command("parquet")
@@ -64,11 +61,7 @@ def parquet(case: Path, out: Path, as_json: bool) -> None:
 
     check_writable(out)
     files = export_parquet(case, out)
-    if as_json:
-        print_json({"case": str(case), "files": [str(file) for file in files]})
-    else:
-        for file in files:
-            click.echo(file)
+    print_lines(files, as_json, {"case": str(case), "files": [str(file) for file in files]})
 
 
 file_argument = click.argument("file", metavar="FILE")

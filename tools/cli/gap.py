@@ -9,7 +9,7 @@ from glider.tools.cli import own
 from glider.tools.cli.common import (
     compile_diagnosis,
     json_option,
-    print_json,
+    print_lines,
     print_result,
     progress,
     say,
@@ -199,11 +199,7 @@ def velocity(case: Path, model: str, out: Path, as_json: bool) -> None:
     heading = heading_test(loaded.folder, loaded.runs, speeds)
     files = write(found, out, heading)
     say(f"heading: {heading.get('says') or heading['why']}")
-    if as_json:
-        print_json({"files": [str(path) for path in files], "heading": heading})
-    else:
-        for path in files:
-            click.echo(path)
+    print_lines(files, as_json, {"files": [str(path) for path in files], "heading": heading})
 
 
 @gap.command()

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from glider.tools.cli.common import json_option, print_json, say
+from glider.tools.cli.common import json_option, print_lines, say
 from glider.tools.cli.import_ocean import COMMANDS
 
 if TYPE_CHECKING:
@@ -76,17 +76,11 @@ def qualisys(files, log, body, vehicle, out, as_json) -> None:
     for path, offset in zip(files, offsets, strict=True):
         if offset is not None:
             say(f"{path}: {offset.seconds:+.3f} s to the log's clock (1 sigma {offset.sd:.3f} s)")
-    if as_json:
-        rows = [
-            {"offset_s": None, "sd_s": None} if o is None else {"offset_s": o.seconds, "sd_s": o.sd} for o in offsets
-        ]
-        columns = [one.plain() for one in overview(runs)]
-        print_json({"case": str(out), "files": [str(path) for path in written], "clocks": rows, "columns": columns})
-    else:
-        for line in lines(runs):
-            say(line)
-        for path in written:
-            click.echo(path)
+    for line in [] if as_json else lines(runs):
+        say(line)
+    clocks = [{"offset_s": None, "sd_s": None} if o is None else {"offset_s": o.seconds, "sd_s": o.sd} for o in offsets]
+    answer = {"case": str(out), "files": [str(path) for path in written], "clocks": clocks}
+    print_lines(written, as_json, answer | {"columns": [one.plain() for one in overview(runs)]})
 
 
 def _asked_for(template: Path | None, text: str, files: tuple[Path, ...], mapping: str | None) -> bool:
@@ -109,16 +103,12 @@ def _say_imported(imported: "Imported", folder: Path, as_json: bool, more: dict[
 
     for note in [*imported.notes, *([] if as_json else lines(imported.runs))]:
         say(note)
-    if as_json:
-        print_json({
-            "columns": [one.plain() for one in overview(imported.runs)],
-            "seconds": [float(run.t[-1] - run.t[0]) for run in imported.runs],
-            "case": str(folder), "files": [str(path) for path in imported.files],
-            "rows": [run.rows for run in imported.runs], **more, "notes": imported.notes,
-        })  # fmt: skip
-    else:
-        for path in imported.files:
-            click.echo(path)
+    print_lines(imported.files, as_json, {
+        "columns": [one.plain() for one in overview(imported.runs)],
+        "seconds": [float(run.t[-1] - run.t[0]) for run in imported.runs],
+        "case": str(folder), "files": [str(path) for path in imported.files],
+        "rows": [run.rows for run in imported.runs], **more, "notes": imported.notes,
+    })  # fmt: skip
 
 
 def _import_streams(files, mapping, template, out, as_json, extra, package, read, partial=False) -> None:

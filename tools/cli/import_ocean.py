@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from glider.tools.cli.common import json_option, print_json, progress, say
+from glider.tools.cli.common import json_option, print_lines, progress, say
 
 if TYPE_CHECKING:
     from glider.tools.data.importers.ocean.mission import ImportedMission
@@ -115,12 +115,8 @@ def _show(mission: "ImportedMission", as_json: bool) -> None:
     everything = total(mission.left_out)
     reasons = ", ".join(f"{samples} {reason}" for reason, samples in everything.items()) or "nothing"
     say(f"{len(mission.runs)} runs, {sum(run.rows for run in mission.runs)} rows; left out: {reasons}")
-    if as_json:
-        print_json({
-            "case": str(mission.folder), "vehicle": mission.vehicle, "files": [str(path) for path in mission.files],
-            "rows": [run.rows for run in mission.runs], "hours_since_start": mission.hours,
-            "left_out": mission.left_out, "left_out_in_all": everything, "notes": mission.notes,
-        })  # fmt: skip
-    else:
-        for path in mission.files:
-            click.echo(path)
+    print_lines(mission.files, as_json, {
+        "case": str(mission.folder), "vehicle": mission.vehicle, "files": [str(path) for path in mission.files],
+        "rows": [run.rows for run in mission.runs], "hours_since_start": mission.hours,
+        "left_out": mission.left_out, "left_out_in_all": everything, "notes": mission.notes,
+    })  # fmt: skip

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from glider.tools.cli.common import DONE, FAILED, json_option, print_json, progress, say, show
+from glider.tools.cli.common import DONE, FAILED, json_option, print_json, print_lines, progress, say, show
 from glider.tools.cli.replay import replay
 
 LEVELS = {10: "debug", 20: "info", 30: "warn", 40: "error", 50: "fatal"}
@@ -168,11 +168,7 @@ def export(sources: tuple[Path, ...], out: Path | None, vehicle: str | None, as_
         result = _to_case(sources, out, vehicle)
     for note in result["notes"]:
         say(note)
-    if as_json:
-        print_json(result)
-    else:
-        for path in result["files"]:
-            click.echo(path)
+    print_lines(result["files"], as_json, result)
 
 
 def _to_case(sources: tuple[Path, ...], out: Path | None, vehicle: str | None) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from glider.tools.cli.common import print_json, say
+from glider.tools.cli.common import print_json, print_lines, say
 
 
 def own_vehicle(case: Path, wanted: str | None) -> Any:
@@ -75,12 +75,7 @@ def diagnose(vehicle: Any, case: Path, reference: Path | None, out: Path, as_jso
     write_own_report(out)
     for caution in answer["cautions"]:
         say(f"note: {caution}")
-    if as_json:
-        print_json(answer)
-    else:
-        click.echo(sentence(answer))
-        for line in verdict_lines(answer):
-            click.echo(line)
+    print_lines([sentence(answer), *verdict_lines(answer)], as_json, answer)
     say(f"answer: {out / 'diagnosis.json'}, report: {out / 'report.html'}")
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from glider.tools.cli.common import json_option, print_json, progress
+from glider.tools.cli.common import json_option, print_lines, progress
 
 
 @click.command()
@@ -26,7 +26,4 @@ def readings(case: Path, as_json: bool) -> None:
         advance(1)
         found = api.readings(loaded)
         advance(1)
-    if as_json:
-        print_json({"readings": found.answer})
-    else:
-        click.echo(found.summary())
+    print_lines([found.summary()], as_json, {"readings": found.answer})

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, TextIO
 
 import click
 
-from glider.tools.cli.common import json_option, print_json, say
+from glider.tools.cli.common import json_option, print_json, print_lines, say
 
 if TYPE_CHECKING:
     from glider.tools.data.first_vehicle import FirstVehicle, Question
@@ -118,11 +118,7 @@ def check(file: Path, case: Path | None, as_json: bool) -> None:
     from glider.tools.own.report_check import describe
 
     found = describe(file, case)
-    if as_json:
-        print_json(found)
-        return
-    for line in found["lines"]:
-        click.echo(line)
+    print_lines(found["lines"], as_json, found)
 
 
 @vehicle.command()
