@@ -1,5 +1,6 @@
 """`glider import`: other people's recordings into run data."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -80,7 +81,7 @@ def qualisys(files, log, body, vehicle, out, as_json) -> None:
         say(line)
     clocks = [{"offset_s": None, "sd_s": None} if o is None else {"offset_s": o.seconds, "sd_s": o.sd} for o in offsets]
     answer = {"case": str(out), "files": [str(path) for path in written], "clocks": clocks}
-    print_lines(written, as_json, answer | {"columns": [one.plain() for one in overview(runs)]})
+    print_lines(written, as_json, answer | {"columns": [asdict(one) for one in overview(runs)]})
 
 
 def _asked_for(template: Path | None, text: str, files: tuple[Path, ...], mapping: str | None) -> bool:
@@ -104,7 +105,7 @@ def _say_imported(imported: "Imported", folder: Path, as_json: bool, more: dict[
     for note in [*imported.notes, *([] if as_json else lines(imported.runs))]:
         say(note)
     print_lines(imported.files, as_json, {
-        "columns": [one.plain() for one in overview(imported.runs)],
+        "columns": [asdict(one) for one in overview(imported.runs)],
         "seconds": [float(run.t[-1] - run.t[0]) for run in imported.runs],
         "case": str(folder), "files": [str(path) for path in imported.files],
         "rows": [run.rows for run in imported.runs], **more, "notes": imported.notes,

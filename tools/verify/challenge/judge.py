@@ -132,7 +132,7 @@ def closed_share(case: ScoredCase, held: Path, diagnoses: Path) -> float | None:
     runs = runs_of(held / case.name)
     if case.said is None or not model.is_file():
         return 0.0
-    before, perfect = held_total(runs, NOMINAL), perfect_total(case.truth)
+    before, perfect = held_total(runs, NOMINAL), total(case.truth["oracle"][case.truth["runs"] :])
     if before - perfect < LEAST_CLOSABLE_SHARE * before:
         return None
     after = held_total(runs, model)
@@ -142,11 +142,6 @@ def closed_share(case: ScoredCase, held: Path, diagnoses: Path) -> float | None:
 def held_total(runs: list[Path], model: str | Path, vehicle: Path | None = None) -> float:
     """A model's total gap over runs: rms of theirs."""
     return root_mean_square([predicted_total(path, model, vehicle) for path in runs])
-
-
-def perfect_total(truth: dict[str, Any]) -> float:
-    """A perfect model's total gap over the held runs."""
-    return total(truth["oracle"][truth["runs"] :])
 
 
 def manifest_beside(cases: Path) -> Path | None:
