@@ -21,7 +21,7 @@ from glider.firmware.runtime import Runtime
 from glider.firmware.supervisor import Supervisor
 from glider.firmware.telemetry import TICK
 from glider.hal.board import BoardRequest, board_builder
-from glider.hal.ports import ACTUATORS, Board, BoardError, Hardware
+from glider.hal.ports import ACTUATORS, Board, Hardware
 from glider.hal.recorder.recorder import Recorder
 from glider.hal.recorder.schema import DEBUG, ERROR, FATAL, INFO, WARN
 from glider.hal.strict import ConfigError
@@ -216,9 +216,3 @@ def build_runtime(flight: Flight, recorder: Any) -> Runtime:
         flight.board, flight.autopilot, flight.supervisor, recorder.channel("/tick"),
         extras=flight.board.recording(recorder.channel), on_news=on_news,
     )  # fmt: skip
-
-
-__all__ = [
-    "BoardError", "Flight", "build_flight", "build_pilot", "build_recorder", "build_runtime", "load_board_file",
-    "parse_effects", "record_specs",
-]  # fmt: skip
