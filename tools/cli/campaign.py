@@ -7,6 +7,8 @@ from typing import Any
 import click
 
 from glider.tools.cli.common import compile_campaign, json_option, print_json, print_lines, progress, say
+from glider.tools.data.errors import InputError, need
+from glider.tools.data.files import check_writable, write_bytes
 
 PAIR: dict[str, Any] = {"nargs": 2, "type": float, "metavar": "LOW HIGH"}
 # option -> key of the campaign file that it stands in for
@@ -53,10 +55,7 @@ def campaign(campaign, design, out, jobs, dask, chunk, as_json, **options) -> No
         return
     import msgspec
 
-    from glider.tools.data.errors import need
-
     need("campaign")
-    from glider.tools.data.files import check_writable, write_bytes
     from glider.tools.study.campaign.conduct import FLIGHTS_FILE, fly_campaign, write_flights
     from glider.tools.study.campaign.picture import write_page
     from glider.tools.study.campaign.plan import build_plan, load_campaign, with_options
@@ -92,8 +91,6 @@ def _make_runs(folder: Path, options: dict[str, Any], as_json: bool) -> None:
     """The identification design as a case; the truth goes beside it as truth.json."""
     import json
 
-    from glider.tools.data.errors import InputError, need
-    from glider.tools.data.files import check_writable, write_bytes
     from glider.tools.data.sources import load_vehicle
     from glider.tools.identify.design import grid, truth, write_design
 

@@ -8,6 +8,8 @@ import click
 
 from glider.tools.cli.common import json_option, print_lines, say
 from glider.tools.cli.import_ocean import COMMANDS
+from glider.tools.data.errors import need
+from glider.tools.data.files import check_writable
 
 if TYPE_CHECKING:
     from glider.tools.data.importers.csvlog import Imported
@@ -43,7 +45,6 @@ def csv(files, mapping, template, out, strict, as_json) -> None:
 
     With --template a mapping with every key is written, and nothing imported.
     """
-    from glider.tools.data.files import check_writable
     from glider.tools.data.importers.csvlog import import_csv
     from glider.tools.data.runs.run import run_name
 
@@ -64,8 +65,6 @@ def csv(files, mapping, template, out, strict, as_json) -> None:
 @json_option
 def qualisys(files, log, body, vehicle, out, as_json) -> None:
     """Turn 6DOF exports (TSV) of Qualisys into a case, aligned in time with the onboard logs of another case."""
-    from glider.tools.data.errors import need
-    from glider.tools.data.files import check_writable
     from glider.tools.data.importers.captured import import_qualisys
     from glider.tools.data.runs.case import load_runs
     from glider.tools.data.runs.overview import lines, overview
@@ -114,8 +113,6 @@ def _say_imported(imported: "Imported", folder: Path, as_json: bool, more: dict[
 
 def _import_streams(files, mapping, template, out, as_json, extra, package, read, partial=False) -> None:
     """What `import rosbag` and `import ardusub` have in common; read: the function that reads one file."""
-    from glider.tools.data.errors import need
-    from glider.tools.data.files import check_writable
     from glider.tools.data.importers.streams import TEMPLATE, import_streams
 
     if _asked_for(template, TEMPLATE, files, mapping):

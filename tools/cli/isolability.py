@@ -3,6 +3,7 @@
 import click
 
 from glider.tools.cli.common import json_option, print_lines, progress
+from glider.tools.data.errors import InputError, need
 
 
 def _names(context: click.Context, option: click.Parameter, value: str | None) -> tuple[str, ...] | None:
@@ -35,7 +36,6 @@ def isolability(
     sensor is needed for. See docs/reference/causes.md.
     """
     from glider.sim_backend.core.effects.catalogue import catalogue
-    from glider.tools.data.errors import InputError, need
     from glider.tools.data.sources import load_vehicle
     from glider.tools.data.spelling import did_you_mean
     from glider.tools.diagnose.isolability import ONBOARD, check_columns, isolability_of

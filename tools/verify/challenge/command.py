@@ -9,6 +9,8 @@ import click
 
 from glider.tools.cli.common import fail, json_option, print_json, progress, say
 from glider.tools.cli.many import again_option, dask_option, jobs_option, need_for
+from glider.tools.data.errors import InputError, need
+from glider.tools.data.files import check_writable, write_bytes
 
 folder = click.Path(path_type=Path, file_okay=False)
 COUNT = click.IntRange(0, 1000)
@@ -45,7 +47,6 @@ def make(
     unchanged: int | None, runs: int | None, reference: int | None,
 ) -> None:  # fmt: skip
     """Draw, fly and seal a blind test. Cases that are there are kept: call again to go on after a stop."""
-    from glider.tools.data.files import check_writable
     from glider.tools.verify.challenge.make import Order
     from glider.tools.verify.challenge.make import make as make_all
     from glider.tools.verify.challenge.ocean_make import OceanOrder
@@ -122,7 +123,6 @@ def run(
 
     What stands after `--` is handed on to `gap diagnose`. A case's time counts its whole process.
     """
-    from glider.tools.data.files import check_writable
     from glider.tools.verify.challenge.diagnose_all import DIAGNOSIS, FORM, MISSION, WATCH, count_cases
     from glider.tools.verify.challenge.diagnose_all import run as run_all
 
@@ -158,8 +158,6 @@ def score(
 
     See docs/explanation/blind-tests.md.
     """
-    from glider.tools.data.errors import InputError, need
-    from glider.tools.data.files import check_writable, write_bytes
     from glider.tools.verify.challenge.diagnose_all import count_cases
     from glider.tools.verify.challenge.form_score import judge_forms
     from glider.tools.verify.challenge.judge import judge
