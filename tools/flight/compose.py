@@ -27,7 +27,7 @@ from glider.hal.recorder.schema import DEBUG, ERROR, FATAL, INFO, WARN
 from glider.hal.strict import ConfigError
 from glider.tools.data.boards import load_board_file
 from glider.tools.data.errors import InputError
-from glider.tools.data.sources import load_mission, load_vehicle
+from glider.tools.data.sources import load_mission, load_vehicle, name_or_path
 from glider.tools.data.version import software
 
 LEAST_REACH = 0.5  # of an end of an actuator's range, which the board has to leave the vehicle
@@ -155,8 +155,6 @@ def build_pilot(
 
 def load_vehicle_text(wanted: str) -> tuple[str, Vehicle]:
     """A vehicle's text and the vehicle."""
-    from glider.tools.data.sources import name_or_path
-
     vehicle = load_vehicle(wanted)  # first: it says of another kind of vehicle that it is one
     text, _ = name_or_path(wanted, "vehicle", "model/vehicles")
     return text, vehicle

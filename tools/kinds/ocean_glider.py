@@ -7,7 +7,7 @@ from typing import Any
 
 from glider.sim_backend.ocean.vehicle import KIND as NAME
 from glider.sim_backend.ocean.vehicle import OceanVehicle, decode_ocean_vehicle, shipped_vehicles
-from glider.tools.data.errors import InputError
+from glider.tools.data.errors import InputError, need
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs.case import Case
 from glider.tools.data.runs.run import Run
@@ -84,8 +84,6 @@ class OceanGlider:
 
     def identify(self, case: Case, seed: int, likelihood: str, say: Say) -> Identified:
         """Drag, buoyancy and the attitude sensor by least squares over dives; seed and likelihood are ignored."""
-        from glider.tools.data.errors import need
-
         need(self.extra)
         from glider.tools.api.sentences import ocean_lines
         from glider.tools.identify.ocean import files

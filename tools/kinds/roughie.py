@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from glider.firmware.model.library import shipped
 from glider.firmware.model.vehicle import Vehicle, decode_vehicle
+from glider.tools.data.errors import InputError, need
 from glider.tools.data.runs.case import Case
 from glider.tools.data.runs.run import Run
 from glider.tools.data.vehicle_kinds import Identified, Say, VehicleKind, no_progress
@@ -101,8 +102,6 @@ class Roughie:
 
     def identify(self, case: Case, seed: int, likelihood: str, say: Say) -> Identified:
         """The twelve coefficients by MCMC (docs/explanation/identification.md)."""
-        from glider.tools.data.errors import need
-
         need(self.extra)
         from glider.tools.api.sentences import identified_lines
         from glider.tools.identify import files
@@ -115,7 +114,6 @@ class Roughie:
 
     def diagnose(self, case: Case, reference: Case | None, without: str | None, say: Say) -> Callable[[Path], str]:
         """Against healthy runs, where they are given or the vehicle file knows what they leave, else by evidence."""
-        from glider.tools.data.errors import InputError
         from glider.tools.diagnose.gates import form_stands_out
 
         if reference is not None and without is not None:
