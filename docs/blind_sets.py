@@ -181,12 +181,10 @@ def calibration_table(results: Sequence[SetResult]) -> str:
 
 def draw_calibration(results: Sequence[SetResult]) -> None:
     """Draw the calibration; the picture holds its table as text, by which a test compares it with the results."""
-    import matplotlib
+    from matplotlib.figure import Figure
 
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
-
-    figure, axis = plt.subplots(figsize=(4.6, 4.2), layout="constrained")
+    figure = Figure(figsize=(4.6, 4.2), layout="constrained")
+    axis = figure.subplots()
     axis.plot((0, 1), (0, 1), color="0.6", lw=1, label="calibrated")
     for _, _, found in calibration(results):
         right = sum(one.right for one in found)
@@ -197,7 +195,6 @@ def draw_calibration(results: Sequence[SetResult]) -> None:
     axis.set(xlim=(0, 1.02), ylim=(0, 1.02), xlabel="stated probability of the main cause", ylabel="frequency right")
     axis.legend(frameon=False, loc="upper left")
     figure.savefig(PICTURE, dpi=110, metadata={"Description": calibration_table(results)})
-    plt.close(figure)
 
 
 def blocks() -> dict[Path, dict[str, str]]:

@@ -118,14 +118,12 @@ def channels(problem: Problem, effect: Effect) -> Iterator[tuple[str, float]]:
 
 def picture(problem: Problem, effect: Effect, moved: list[str], path: Path) -> None:
     """Depth, pitch and the most affected other channel, nominal and with the effect."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
+    from matplotlib.figure import Figure
 
     shown = ["depth", "pitch", *(n for n in moved if n not in ("depth", "pitch"))][:3]
     a, b = flights(problem, effect, DRAWN)
-    figure, axes = plt.subplots(1, len(shown), figsize=(3.2 * len(shown), 2.0), layout="constrained")
+    figure = Figure(figsize=(3.2 * len(shown), 2.0), layout="constrained")
+    axes = figure.subplots(1, len(shown))
     known = {one.name: one for one in problem.kind.measures.channels}
     for axis, channel in zip(axes, (known[name] for name in shown), strict=True):
         for table_, colour in ((a, "0.4"), (b, "tab:red")):
@@ -133,7 +131,6 @@ def picture(problem: Problem, effect: Effect, moved: list[str], path: Path) -> N
         axis.set_title(f"{channel.name}, {channel.unit}", fontsize=8)
         axis.tick_params(labelsize=7)
     figure.savefig(path, metadata={"Date": None})
-    plt.close(figure)
 
 
 if __name__ == "__main__":

@@ -32,18 +32,14 @@ def written(picture: Path) -> str:
 
 def draw(answer: Path, picture: Path) -> None:
     """Draw the picture of a diagnosis."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
+    from matplotlib.figure import Figure
 
     from glider.tools.inference.channels import ROUGHIE_MEASURES
 
     found = json.loads((answer / "diagnosis.json").read_text())
     curves = np.load(answer / "report.npz")
-    figure, axes = plt.subplot_mosaic(
-        [["depth", "causes"], ["pitch", "causes"]], figsize=(9.6, 4.2), layout="constrained"
-    )
+    figure = Figure(figsize=(9.6, 4.2), layout="constrained")
+    axes = figure.subplot_mosaic([["depth", "causes"], ["pitch", "causes"]])
     for channel in (one for one in ROUGHIE_MEASURES.channels if one.name in axes):
         shown, column, band = axes[channel.name], channel.columns[0], channel.scale * channel.tolerance
         shown.axhspan(-band, band, color="0.9", label="tolerance")

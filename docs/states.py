@@ -11,16 +11,14 @@ EDGE = re.compile(r"^\s*(\w+) --> (\w+)$", re.MULTILINE)
 
 def draw(block: str, path: Path) -> None:
     """Draw the states of a diagram and its transitions."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
+    from matplotlib.figure import Figure
 
     edges = EDGE.findall(block)
     states = list(dict.fromkeys(state for edge in edges for state in edge))
     angles = np.pi / 2 - 2.0 * np.pi * np.arange(len(states)) / len(states)
     at = dict(zip(states, zip(1.5 * np.cos(angles), np.sin(angles), strict=True), strict=True))
-    figure, axis = plt.subplots(figsize=(7.5, 4.6), layout="constrained")
+    figure = Figure(figsize=(7.5, 4.6), layout="constrained")
+    axis = figure.subplots()
     box = {"boxstyle": "round,pad=0.4", "facecolor": "#dde8f5", "edgecolor": "0.35"}
     boxes = {
         state: axis.text(*place, state, ha="center", va="center", fontsize=9, bbox=box).get_bbox_patch()
@@ -33,7 +31,6 @@ def draw(block: str, path: Path) -> None:
     axis.set(xlim=(-1.9, 1.9), ylim=(-1.2, 1.2))
     axis.axis("off")
     figure.savefig(path, metadata={"Date": None})
-    plt.close(figure)
 
 
 def drawn(text: str, picture: Path, link: str) -> str:

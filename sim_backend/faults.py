@@ -146,11 +146,9 @@ class SimulatedEscape:
 
     def __init__(self, world: World, pump: FaultyActuator, weight_kg: float = 0.6):
         self._world, self._pump, self._weight = world, pump, weight_kg
-        self.ascending = False
 
     def ascend(self) -> None:
         """The pump to its light end, by another way than the flight's, if it can be reached."""
-        self.ascending = True
         if self._pump.reachable:
             self._pump.end()
             self._pump.taken = True  # the flight has no say any more

@@ -8,8 +8,6 @@ none. Targets are in quarter microseconds. Maestro user's guide, sections 5.c to
 from enum import IntFlag
 from typing import NamedTuple
 
-from glider.hal.protocols.checksums import crc7
-
 SET_TARGET, SET_SPEED, SET_ACCELERATION = 0x84, 0x87, 0x89
 GET_POSITION, GET_MOVING, GET_ERRORS, GO_HOME = 0x90, 0x93, 0xA1, 0xA2
 POLOLU = 0xAA
@@ -46,6 +44,28 @@ class Command(NamedTuple):
     def value(self) -> int:
         """The 14-bit number of SET_TARGET, SET_SPEED and SET_ACCELERATION."""
         return self.data[1] | self.data[2] << 7
+
+
+def _crc7_table() -> bytes:
+    """CRC-7 of every byte, polynomial 0x91 reflected (user's guide, section 5.d)."""
+    table = bytearray(256)
+    for byte in range(256):
+        crc = byte
+        for _ in range(8):
+            crc = (crc ^ 0x91 if crc & 1 else crc) >> 1
+        table[byte] = crc
+    return bytes(table)
+
+
+_CRC7 = _crc7_table()
+
+
+def crc7(data: bytes) -> int:
+    """CRC-7 of a command, 0-127."""
+    crc = 0
+    for byte in data:
+        crc = _CRC7[crc ^ byte]
+    return crc
 
 
 def encode(code: int, *data: int, device: int | None = None, crc: bool = False) -> bytes:

@@ -61,7 +61,6 @@ class BusCounts:
     late: int = 0  # good frames that nobody waited for any more
     wrong: int = 0  # good frames that answer something else, while waiting
     damaged: int = 0  # frames with a bad check sum
-    stray_bytes: int = 0
 
 
 class OneShot:
@@ -155,7 +154,6 @@ class ModbusBus:
 
     def _drain(self, data: bytes) -> None:
         """Bytes that nobody waits for; a reply that was missing is not missing any more."""
-        self.counts.stray_bytes += len(data)
         for frame in self._strays.feed(data):
             self.counts.late += 1
             self._missing.pop(signature_of(frame), None)

@@ -8,11 +8,10 @@ VN-100 user manual, sections 3.1 and 5.
 
 import re
 from binascii import crc_hqx
-from functools import lru_cache
+from functools import lru_cache, reduce
+from operator import xor
 from struct import Struct
 from typing import NamedTuple
-
-from glider.hal.protocols.checksums import xor8
 
 SYNC = 0xFA
 MAX_FRAME_BYTES = 256  # bytes; no text message or group 1 frame is longer
@@ -68,6 +67,11 @@ def layout(mask: int) -> Struct:
 def payload_size(mask: int) -> int:
     """Bytes of a payload; 0 for a mask that no frame has."""
     return 0 if mask & 0x8000 else _LOW[mask & 0xFF] + _HIGH[mask >> 8]
+
+
+def xor8(data: bytes) -> int:
+    """All bytes exclusive-ored: the check sum of a text message, of what stands between $ and *."""
+    return reduce(xor, data, 0)
 
 
 def encode_text(body: str) -> bytes:

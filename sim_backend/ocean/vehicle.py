@@ -16,7 +16,6 @@ from glider.sim_backend.ocean.core import layout
 KIND = "ocean"
 Positive = Annotated[float, msgspec.Meta(gt=0.0)]
 NonNegative = Annotated[float, msgspec.Meta(ge=0.0)]
-Share = Annotated[float, msgspec.Meta(ge=-1.0, le=1.0)]
 Angle = Annotated[float, msgspec.Meta(ge=-0.8, le=0.8)]
 Number = Annotated[float, msgspec.Meta(ge=-1e6, le=1e6)]
 

@@ -4,7 +4,6 @@ The flight's world starts afresh when it is let go, so the same seed gives the s
 board.
 """
 
-import math
 from typing import Any
 
 import numpy as np
@@ -103,7 +102,3 @@ class TwinPlant:
     def state(self) -> dict[str, float]:
         """The truth, for people and tests."""
         return {"flight_s": self.flight_time, **self.world.truth()}
-
-
-def degrees(values: tuple[float, ...]) -> tuple[float, ...]:
-    return tuple(math.degrees(value) for value in values)

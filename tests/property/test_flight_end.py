@@ -38,8 +38,7 @@ def depth_after(mission: str, case: FaultCase, tick: int, sigmas: float) -> floa
     scene = set_scene(flight, "", case.begin, case.setting, at_s=tick / flight.board.loop_hz)
     scene.world.P[NET_MASS] += sigmas * load_vehicle("roughie").uncertainty.net_mass
     scene.world.x[2] = START_M
-    if case.late:
-        scene.notes["late"] = True
+    scene.late = case.late
     fly(scene, case.row, allowed_s=0.0)
     scene.finish()
     assert scene.left is not None

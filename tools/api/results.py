@@ -11,6 +11,7 @@ import numpy as np
 from glider.tools.api import sentences
 from glider.tools.api.result import EXTRA, Result, frozen, read_only
 from glider.tools.data.errors import need
+from glider.tools.data.files import write_bytes, write_files
 from glider.tools.data.plain import as_plain
 
 if TYPE_CHECKING:
@@ -179,8 +180,6 @@ class Diagnosis(Result):
         folder : path
             Made if it is not there; files of the same name are replaced.
         """
-        from glider.tools.data.files import write_files
-
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
         write_files({folder / name: data for name, data in self.files.items()})
@@ -232,7 +231,6 @@ class Watch(Result):
         """Write the answer's files into a folder: watch.json and report.html."""
         import json
 
-        from glider.tools.data.files import write_bytes
         from glider.tools.report.watch import write_watch_report
         from glider.tools.watch.answer import FILE
 
@@ -287,7 +285,7 @@ class Identification(Result):
     @property
     def vehicle_text(self) -> str:
         """The identified vehicle file, TOML."""
-        return self._found.vehicle_text
+        return self._found.vehicle_text()
 
     @property
     def notes(self) -> tuple[str, ...]:

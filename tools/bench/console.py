@@ -21,7 +21,7 @@ from glider.hal.ports import ACTUATORS
 from glider.tools.bench.client import Bench, BenchError
 from glider.tools.bench.commands import ALIASES, Commands
 from glider.tools.bench.desk import UsageError
-from glider.tools.bench.units import WIRES
+from glider.tools.bench.units import UNITS, WIRES, from_port, shown_values
 from glider.tools.data.errors import BAD_INPUT, DONE, FAILED
 
 HISTORY = "GLIDER_BENCH_HISTORY"
@@ -32,8 +32,6 @@ NOTE_S, PLAIN_NOTE_S = 1.0, 10.0  # between two notes, at a terminal and elsewhe
 def table_of(state: dict) -> Any:
     """A snapshot as a table."""
     from rich.table import Table
-
-    from glider.tools.bench.units import UNITS, from_port, shown_values
 
     table = Table(title=f"{state['name']}: {'ENABLED' if state['enabled'] else 'not enabled'}; any key ends")
     for heading in ("device", "state", "values", "trouble"):

@@ -10,8 +10,6 @@ from glider.tools.data.errors import InputError
 from glider.tools.data.runs import case
 from glider.tools.data.runs.run import Run
 
-KEPT = tuple(name for name in ROW if name != "t_s")
-
 
 def table(rows: list[list[float | None]]) -> np.ndarray:
     """Rows as numbers, missing ones NaN, time from 0, (n, columns of ROW)."""

@@ -169,9 +169,6 @@ def _dead_band(sweep: SweepPlan, t: np.ndarray, position: np.ndarray) -> float:
 
 def picture(path: Any, result: SweepResult, t: np.ndarray, command: np.ndarray, position: np.ndarray) -> None:
     """Command and position over time, and over each other, as a PNG."""
-    import matplotlib
-
-    matplotlib.use("Agg")
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9, 4), layout="constrained")

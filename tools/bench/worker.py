@@ -84,7 +84,7 @@ class Worker:
             name: {
                 "validity": port.validity.name.lower(), "values": [finite(value) for value in port.values],
                 "reading": finite(getattr(port, "reading", None)), "error": port.health.error,
-                "samples": port.health.samples, "damaged": port.health.damaged, "timeouts": port.health.timeouts,
+                "timeouts": port.health.timeouts,
             }
             for name, port in board.sensors.items()
         }  # fmt: skip
@@ -96,8 +96,7 @@ class Worker:
         buses = {name: vars(bus.counts) for name, bus in board.buses.items()}
         return {
             "sensors": sensors, "actuators": actuators, "ports": ports, "buses": buses, "enabled": self.enabled,
-            "kg_per_m": board.ballast.unit, "imu_model": board.imu.model, "moving": bool(self._profile),
-            "calibration": board.file.calibration, "name": board.file.name,
+            "kg_per_m": board.ballast.unit, "imu_model": board.imu.model, "name": board.file.name,
         }  # fmt: skip
 
     def _actuator(self, name: str, port: Servo | Drive, now: float) -> dict:
@@ -112,7 +111,7 @@ class Worker:
             common["target"] = target * port.unit
         return {
             **common, "position": port.position() * port.unit, "measured": port.measured() * port.unit,
-            "counts": port.counts, "status": port.status, "fault": port.fault, "stalls": port.stalls,
+            "counts": port.counts, "status": port.status, "fault": port.fault,
         }  # fmt: skip
 
     def do_enable(self, on: bool) -> None:

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import click
 
+from glider.tools.data.errors import InputError, need
+
 
 @click.command()
 @click.option("--board", required=True, help="Board file (or shipped name: twin).")
@@ -18,8 +20,6 @@ def bench(board: str, vehicle: str, script: Path | None, out: Path) -> None:
     --script or from a pipe run until one fails. Nothing moves before `enable`, limits always hold, and losing the
     console stops the actuators. Exit code 1: a command of a script failed; 2: one was not understood.
     """
-    from glider.tools.data.errors import InputError, need
-
     need("bench")
     from glider.tools.bench.client import Bench
     from glider.tools.bench.console import Console, hang_up_ends

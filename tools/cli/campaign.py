@@ -6,7 +6,9 @@ from typing import Any
 
 import click
 
-from glider.tools.cli.common import compile_campaign, json_option, print_json, progress, say
+from glider.tools.cli.common import compile_campaign, json_option, print_json, print_lines, progress, say
+from glider.tools.data.errors import InputError, need
+from glider.tools.data.files import check_writable, write_bytes
 
 PAIR: dict[str, Any] = {"nargs": 2, "type": float, "metavar": "LOW HIGH"}
 # option -> key of the campaign file that it stands in for
@@ -53,10 +55,7 @@ def campaign(campaign, design, out, jobs, dask, chunk, as_json, **options) -> No
         return
     import msgspec
 
-    from glider.tools.data.errors import need
-
     need("campaign")
-    from glider.tools.data.files import check_writable, write_bytes
     from glider.tools.study.campaign.conduct import FLIGHTS_FILE, fly_campaign, write_flights
     from glider.tools.study.campaign.picture import write_page
     from glider.tools.study.campaign.plan import build_plan, load_campaign, with_options
@@ -92,8 +91,6 @@ def _make_runs(folder: Path, options: dict[str, Any], as_json: bool) -> None:
     """The identification design as a case; the truth goes beside it as truth.json."""
     import json
 
-    from glider.tools.data.errors import InputError, need
-    from glider.tools.data.files import check_writable, write_bytes
     from glider.tools.data.sources import load_vehicle
     from glider.tools.identify.design import grid, truth, write_design
 
@@ -107,10 +104,7 @@ def _make_runs(folder: Path, options: dict[str, Any], as_json: bool) -> None:
     check_writable(folder)
     world = write_design(folder, wanted, load_vehicle(wanted), seed)
     write_bytes(folder / "truth.json", (json.dumps(truth(world), indent=1) + "\n").encode())
-    if as_json:
-        print_json({"case": str(folder), "runs": len(grid()), "seed": seed, "truth": truth(world)})
-    else:
-        click.echo(folder)
+    print_lines([folder], as_json, {"case": str(folder), "runs": len(grid()), "seed": seed, "truth": truth(world)})
 
 
 def _pair(found: dict, scale: float) -> str:

@@ -8,6 +8,7 @@ from typing import Any, NoReturn
 import click
 
 from glider.tools.cli.common import DONE, FAILED, json_option, print_json, say, say_assumed
+from glider.tools.data.errors import InputError
 
 
 @click.command()
@@ -39,7 +40,6 @@ def check(
     from glider.hal.ports import BoardError
     from glider.hal.strict import ConfigError
     from glider.tools.data.boards import load_board_file
-    from glider.tools.data.errors import InputError
     from glider.tools.data.sources import load_mission, load_vehicle
     from glider.tools.flight.compose import build_flight
 

@@ -51,6 +51,15 @@ def print_json(result: Any) -> None:
     click.echo(json.dumps(as_plain(result), indent=1))
 
 
+def print_lines(lines: Iterable[object], as_json: bool, answer: Any) -> None:
+    """A result on standard output: its lines, or its answer alone as JSON."""
+    if as_json:
+        print_json(answer)
+        return
+    for line in lines:
+        click.echo(line)
+
+
 def print_result(found: Any, as_json: bool) -> None:
     """A result of the API on standard output: its sentences, or its answer alone as JSON."""
     if as_json:

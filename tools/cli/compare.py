@@ -4,7 +4,8 @@ from pathlib import Path
 
 import click
 
-from glider.tools.cli.common import json_option, print_json
+from glider.tools.cli.common import json_option, print_lines
+from glider.tools.data.errors import need
 
 
 @click.command()
@@ -17,14 +18,9 @@ def compare(a: Path, b: Path, as_json: bool) -> None:
     Verdicts, probabilities and gaps stand side by side. A size differs if the 90 % interval of the difference of the
     two estimates, taken as independent, leaves 0 out.
     """
-    from glider.tools.data.errors import need
     from glider.tools.report.compare import compare as compare_answers
     from glider.tools.report.compare import lines
 
     need("analysis")
     found = compare_answers(a, b)
-    if as_json:
-        print_json(found)
-        return
-    for line in lines(found):
-        click.echo(line)
+    print_lines(lines(found), as_json, found)

@@ -4,7 +4,9 @@ from pathlib import Path
 
 import click
 
-from glider.tools.cli.common import json_option, print_json, say
+from glider.tools.cli.common import json_option, print_lines, say
+from glider.tools.data.errors import need
+from glider.tools.data.files import check_writable, write_bytes
 
 
 @click.group("export")
@@ -33,11 +35,7 @@ def og1(
     data_mode: str, as_json: bool,
 ) -> None:  # fmt: skip
     """Write an ocean glider's case as a mission in OceanGliders' common format (OG-1.0)."""
-    from glider.tools.data.errors import need
-
     need("ocean")
-    from glider.tools.data.files import check_writable
-
     check_writable(out.parent)
     from glider.tools.data.exporters.og1 import MissionAttributes, export_og1
 
@@ -47,10 +45,7 @@ def og1(
         say(f"{one.name}: {one.long_name}")
     if about.missing:
         say(f"note: 'unknown' in the file, which the format wants: {', '.join(f'--{one}' for one in about.missing)}")
-    if as_json:
-        print_json({"case": str(case), "file": str(out), "variables": [one.name for one in found]})
-    else:
-        click.echo(out)
+    print_lines([out], as_json, {"case": str(case), "file": str(out), "variables": [one.name for one in found]})
 
 
 @export.command("parquet")
@@ -60,15 +55,10 @@ def og1(
 def parquet(case: Path, out: Path, as_json: bool) -> None:
     """Write the runs of CASE as Parquet, a file a run."""
     from glider.tools.data.exporters.parquet import export_parquet
-    from glider.tools.data.files import check_writable
 
     check_writable(out)
     files = export_parquet(case, out)
-    if as_json:
-        print_json({"case": str(case), "files": [str(file) for file in files]})
-    else:
-        for file in files:
-            click.echo(file)
+    print_lines(files, as_json, {"case": str(case), "files": [str(file) for file in files]})
 
 
 file_argument = click.argument("file", metavar="FILE")
@@ -86,8 +76,6 @@ speed_option = click.option(
 
 def _write(text: str, out: Path | None) -> None:
     """A text on standard output, or into a file that is said."""
-    from glider.tools.data.files import check_writable, write_bytes
-
     if out is None:
         click.echo(text, nl=False)
         return

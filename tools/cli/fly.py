@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from glider.tools.cli.common import DONE, FAILED, fail, json_option, print_json, progress, say, say_assumed
+from glider.tools.data.errors import InputError
 
 ENDINGS = {
     "SURFACED": "", "PUMP_GIVEN_UP": "at the surface, but the pump did not bring the ballast to its light end",
@@ -76,7 +77,6 @@ def fly(
     from glider.firmware.core.layouts.control_layout import LEG
     from glider.hal.ports import BoardError, Hardware
     from glider.hal.recorder.recorder import NullRecorder, Recorder
-    from glider.tools.data.errors import InputError
     from glider.tools.flight import sortie
     from glider.tools.flight.compose import build_flight, build_recorder, record_specs
     from glider.tools.flight.display import Display
@@ -219,7 +219,6 @@ def summary(flight, host, flown, path: Path | None, real_time: list[str]) -> dic
 
 def readable_s(log: Path) -> float:
     """Seconds of a flight that can be read from its log, parts included; 0 where it is no log."""
-    from glider.tools.data.errors import InputError
     from glider.tools.data.log.parts import read_flight
 
     try:

@@ -9,7 +9,7 @@ from glider.tools.cli import own
 from glider.tools.cli.common import (
     compile_diagnosis,
     json_option,
-    print_json,
+    print_lines,
     print_result,
     progress,
     say,
@@ -21,6 +21,8 @@ from glider.tools.cli.isolability import isolability
 from glider.tools.cli.many import cases_argument, is_many, run_batch_command
 from glider.tools.cli.readings import readings
 from glider.tools.cli.watch import watch
+from glider.tools.data.errors import InputError, need
+from glider.tools.data.files import check_writable
 
 STEPS = 7  # of a diagnosis: screen, up to three effects, verdict, how far, report
 
@@ -45,8 +47,6 @@ def measure(case: Path, report: Path | None, vehicle: str | None, as_json: bool)
         own.measure(theirs, case, as_json)
         return
     from glider.tools import api
-    from glider.tools.data.errors import need
-    from glider.tools.data.files import check_writable
     from glider.tools.data.runs.case import load_case
     from glider.tools.data.vehicle_kinds import kind_of
 
@@ -80,8 +80,6 @@ def measure(case: Path, report: Path | None, vehicle: str | None, as_json: bool)
 @vehicle_option
 def predict(run: Path, model: str, out: Path, vehicle: str | None) -> None:
     """Predict RUN (a run file beside its case.toml): its rows and columns, no gaps, window by window."""
-    from glider.tools.data.errors import InputError
-    from glider.tools.data.files import check_writable
     from glider.tools.data.runs.case import load_case_of_run
     from glider.tools.data.runs.run import write_run
     from glider.tools.inference.kinds import kind_of
@@ -145,8 +143,6 @@ def _diagnose_one(
 ) -> None:
     """The diagnosis of one case, in `out`."""
     from glider.tools import api
-    from glider.tools.data.errors import need
-    from glider.tools.data.files import check_writable
     from glider.tools.data.runs.case import load_case
     from glider.tools.report.page import REPORT
 
@@ -186,7 +182,6 @@ def _diagnose_one(
 @json_option
 def velocity(case: Path, model: str, out: Path, as_json: bool) -> None:
     """Velocity through the water of an ocean glider, with its standard deviation: a CSV for each run of CASE."""
-    from glider.tools.data.files import check_writable
     from glider.tools.data.runs.case import load_case
     from glider.tools.gap.heading import heading_test
     from glider.tools.gap.velocity import velocities, write
@@ -199,11 +194,7 @@ def velocity(case: Path, model: str, out: Path, as_json: bool) -> None:
     heading = heading_test(loaded.folder, loaded.runs, speeds)
     files = write(found, out, heading)
     say(f"heading: {heading.get('says') or heading['why']}")
-    if as_json:
-        print_json({"files": [str(path) for path in files], "heading": heading})
-    else:
-        for path in files:
-            click.echo(path)
+    print_lines(files, as_json, {"files": [str(path) for path in files], "heading": heading})
 
 
 @gap.command()
@@ -220,7 +211,6 @@ def report(folder: Path, foxglove: Path | None) -> None:
     import json
 
     from glider.tools.api.sentences import verdict_lines
-    from glider.tools.data.errors import need
     from glider.tools.diagnose.record import ANSWER, QuestionRecord, is_pooled, read_as
     from glider.tools.own.diagnose import KIND as OWN
     from glider.tools.report.diagnosis import write_report
@@ -247,8 +237,6 @@ def report(folder: Path, foxglove: Path | None) -> None:
 
 def _replay(folder: Path, out: Path) -> None:
     """The drawn runs of a diagnosis for Foxglove."""
-    from glider.tools.data.errors import need
-    from glider.tools.data.files import check_writable
     from glider.tools.report.foxglove import write_foxglove
 
     need("live")

@@ -8,6 +8,8 @@ import click
 
 from glider.tools.cli import own
 from glider.tools.cli.common import json_option, print_result, say, vehicle_option
+from glider.tools.data.errors import need
+from glider.tools.data.files import check_writable
 
 
 @click.command()
@@ -30,8 +32,6 @@ def identify(
     posterior.nc (ArviZ). A model of one's own takes several cases, each a session of its own.
     """
     from glider.tools import api
-    from glider.tools.data.errors import need
-    from glider.tools.data.files import check_writable
     from glider.tools.data.runs.case import load_case
     from glider.tools.data.vehicle_kinds import kind_of
 

@@ -1,12 +1,15 @@
 """`glider import`: other people's recordings into run data."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from glider.tools.cli.common import json_option, print_json, say
+from glider.tools.cli.common import json_option, print_lines, say
 from glider.tools.cli.import_ocean import COMMANDS
+from glider.tools.data.errors import need
+from glider.tools.data.files import check_writable
 
 if TYPE_CHECKING:
     from glider.tools.data.importers.csvlog import Imported
@@ -42,7 +45,6 @@ def csv(files, mapping, template, out, strict, as_json) -> None:
 
     With --template a mapping with every key is written, and nothing imported.
     """
-    from glider.tools.data.files import check_writable
     from glider.tools.data.importers.csvlog import import_csv
     from glider.tools.data.runs.run import run_name
 
@@ -63,8 +65,6 @@ def csv(files, mapping, template, out, strict, as_json) -> None:
 @json_option
 def qualisys(files, log, body, vehicle, out, as_json) -> None:
     """Turn 6DOF exports (TSV) of Qualisys into a case, aligned in time with the onboard logs of another case."""
-    from glider.tools.data.errors import need
-    from glider.tools.data.files import check_writable
     from glider.tools.data.importers.captured import import_qualisys
     from glider.tools.data.runs.case import load_runs
     from glider.tools.data.runs.overview import lines, overview
@@ -76,17 +76,11 @@ def qualisys(files, log, body, vehicle, out, as_json) -> None:
     for path, offset in zip(files, offsets, strict=True):
         if offset is not None:
             say(f"{path}: {offset.seconds:+.3f} s to the log's clock (1 sigma {offset.sd:.3f} s)")
-    if as_json:
-        rows = [
-            {"offset_s": None, "sd_s": None} if o is None else {"offset_s": o.seconds, "sd_s": o.sd} for o in offsets
-        ]
-        columns = [one.plain() for one in overview(runs)]
-        print_json({"case": str(out), "files": [str(path) for path in written], "clocks": rows, "columns": columns})
-    else:
-        for line in lines(runs):
-            say(line)
-        for path in written:
-            click.echo(path)
+    for line in [] if as_json else lines(runs):
+        say(line)
+    clocks = [{"offset_s": None, "sd_s": None} if o is None else {"offset_s": o.seconds, "sd_s": o.sd} for o in offsets]
+    answer = {"case": str(out), "files": [str(path) for path in written], "clocks": clocks}
+    print_lines(written, as_json, answer | {"columns": [asdict(one) for one in overview(runs)]})
 
 
 def _asked_for(template: Path | None, text: str, files: tuple[Path, ...], mapping: str | None) -> bool:
@@ -109,22 +103,16 @@ def _say_imported(imported: "Imported", folder: Path, as_json: bool, more: dict[
 
     for note in [*imported.notes, *([] if as_json else lines(imported.runs))]:
         say(note)
-    if as_json:
-        print_json({
-            "columns": [one.plain() for one in overview(imported.runs)],
-            "seconds": [float(run.t[-1] - run.t[0]) for run in imported.runs],
-            "case": str(folder), "files": [str(path) for path in imported.files],
-            "rows": [run.rows for run in imported.runs], **more, "notes": imported.notes,
-        })  # fmt: skip
-    else:
-        for path in imported.files:
-            click.echo(path)
+    print_lines(imported.files, as_json, {
+        "columns": [asdict(one) for one in overview(imported.runs)],
+        "seconds": [float(run.t[-1] - run.t[0]) for run in imported.runs],
+        "case": str(folder), "files": [str(path) for path in imported.files],
+        "rows": [run.rows for run in imported.runs], **more, "notes": imported.notes,
+    })  # fmt: skip
 
 
 def _import_streams(files, mapping, template, out, as_json, extra, package, read, partial=False) -> None:
     """What `import rosbag` and `import ardusub` have in common; read: the function that reads one file."""
-    from glider.tools.data.errors import need
-    from glider.tools.data.files import check_writable
     from glider.tools.data.importers.streams import TEMPLATE, import_streams
 
     if _asked_for(template, TEMPLATE, files, mapping):

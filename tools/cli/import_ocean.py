@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from glider.tools.cli.common import json_option, print_json, progress, say
+from glider.tools.cli.common import json_option, print_lines, progress, say
+from glider.tools.data.errors import need
+from glider.tools.data.files import check_writable
 
 if TYPE_CHECKING:
     from glider.tools.data.importers.ocean.mission import ImportedMission
@@ -26,8 +28,6 @@ out_option = click.option("--out", required=True, type=click.Path(path_type=Path
 @json_option
 def slocum(files: tuple[Path, ...], out: Path, cache: Path | None, as_json: bool) -> None:
     """Turn binaries of a Slocum (.dbd with .ebd, .sbd with .tbd, ...) into a case, a run for each segment."""
-    from glider.tools.data.errors import need
-
     need("slocum")
     need("ocean")
     from glider.tools.data.importers.ocean.slocum import read_slocum
@@ -41,8 +41,6 @@ def slocum(files: tuple[Path, ...], out: Path, cache: Path | None, as_json: bool
 @json_option
 def seaexplorer(files: tuple[Path, ...], out: Path, as_json: bool) -> None:
     """Turn a SeaExplorer's navigation and payload tables (.gli., .pld1.) into a case, a run for each segment."""
-    from glider.tools.data.errors import need
-
     need("ocean")
     from glider.tools.data.importers.ocean.seaexplorer import read_seaexplorer
 
@@ -55,8 +53,6 @@ def seaexplorer(files: tuple[Path, ...], out: Path, as_json: bool) -> None:
 @json_option
 def seaglider(files: tuple[Path, ...], out: Path, as_json: bool) -> None:
     """Turn a base station's dive files of a Seaglider (p*.nc) into a case, a run for each dive."""
-    from glider.tools.data.errors import need
-
     need("ocean")
     from glider.tools.data.importers.ocean.seaglider import read_seaglider
 
@@ -70,10 +66,7 @@ def seaglider(files: tuple[Path, ...], out: Path, as_json: bool) -> None:
 @json_option
 def og1(file: Path, out: Path, vehicle: str | None, as_json: bool) -> None:
     """Turn a mission in OceanGliders' common format (OG-1.0, NetCDF) into a case, a run for each dive."""
-    from glider.tools.data.errors import need
-
     need("ocean")
-    from glider.tools.data.files import check_writable
     from glider.tools.data.importers.ocean.mission import write_mission
     from glider.tools.data.importers.ocean.og1 import read_og1
 
@@ -92,7 +85,6 @@ def _import(
     as_json: bool,
     read: Callable[[Callable[[int], None]], "list[Segment]"],
 ) -> None:
-    from glider.tools.data.files import check_writable
     from glider.tools.data.importers.ocean.mission import write_mission
 
     check_writable(out)
@@ -115,12 +107,8 @@ def _show(mission: "ImportedMission", as_json: bool) -> None:
     everything = total(mission.left_out)
     reasons = ", ".join(f"{samples} {reason}" for reason, samples in everything.items()) or "nothing"
     say(f"{len(mission.runs)} runs, {sum(run.rows for run in mission.runs)} rows; left out: {reasons}")
-    if as_json:
-        print_json({
-            "case": str(mission.folder), "vehicle": mission.vehicle, "files": [str(path) for path in mission.files],
-            "rows": [run.rows for run in mission.runs], "hours_since_start": mission.hours,
-            "left_out": mission.left_out, "left_out_in_all": everything, "notes": mission.notes,
-        })  # fmt: skip
-    else:
-        for path in mission.files:
-            click.echo(path)
+    print_lines(mission.files, as_json, {
+        "case": str(mission.folder), "vehicle": mission.vehicle, "files": [str(path) for path in mission.files],
+        "rows": [run.rows for run in mission.runs], "hours_since_start": mission.hours,
+        "left_out": mission.left_out, "left_out_in_all": everything, "notes": mission.notes,
+    })  # fmt: skip

@@ -2,7 +2,8 @@
 
 import click
 
-from glider.tools.cli.common import json_option, print_json, progress
+from glider.tools.cli.common import json_option, print_lines, progress
+from glider.tools.data.errors import InputError, need
 
 
 def _names(context: click.Context, option: click.Parameter, value: str | None) -> tuple[str, ...] | None:
@@ -35,7 +36,6 @@ def isolability(
     sensor is needed for. See docs/reference/causes.md.
     """
     from glider.sim_backend.core.effects.catalogue import catalogue
-    from glider.tools.data.errors import InputError, need
     from glider.tools.data.sources import load_vehicle
     from glider.tools.data.spelling import did_you_mean
     from glider.tools.diagnose.isolability import ONBOARD, check_columns, isolability_of
@@ -51,18 +51,16 @@ def isolability(
     flown = [known[name] for name in manoeuvres or known]
     with progress("isolability", 2) as advance:
         found = isolability_of(load_vehicle(vehicle), wanted, flown, labels, advance)
-    if as_json:
-        print_json({
-            "format": 1, "vehicle": vehicle, "columns": list(wanted), "manoeuvres": [one.name for one in flown],
-            "effects": [
-                {"label": one.label, "evidence": one.evidence, "visible": one.visible,
-                 "smallest": one.smallest, "confused_with": list(one.confused_with)}
-                for one in found
-            ],
-        })  # fmt: skip
-        return
-    click.echo(f"{'effect':<22}{'nat':>10}{'smallest':>10}  confused with")
+    lines = [f"{'effect':<22}{'nat':>10}{'smallest':>10}  confused with"]
     for one in found:
         near = ", ".join(one.confused_with) if one.visible else "not visible"
         smallest = f"{one.smallest:10.2g}" if one.visible else " " * 10
-        click.echo(f"{one.label:<22}{one.evidence:10.3g}{smallest}  {near}".rstrip())
+        lines.append(f"{one.label:<22}{one.evidence:10.3g}{smallest}  {near}".rstrip())
+    print_lines(lines, as_json, {
+        "format": 1, "vehicle": vehicle, "columns": list(wanted), "manoeuvres": [one.name for one in flown],
+        "effects": [
+            {"label": one.label, "evidence": one.evidence, "visible": one.visible,
+             "smallest": one.smallest, "confused_with": list(one.confused_with)}
+            for one in found
+        ],
+    })  # fmt: skip

@@ -10,6 +10,7 @@ from pathlib import Path
 import click
 
 from glider.tools.cli.common import DONE, fail, say
+from glider.tools.data.errors import InputError, need
 
 ONBOARD = "/run/glider/live"
 FORWARD_S = 15.0
@@ -28,7 +29,6 @@ def live(host: str | None, path: str | None, port: int, layout: Path | None) -> 
     notice.
     """
     from glider.hal.heartbeat import run_folder
-    from glider.tools.data.errors import InputError, need
     from glider.tools.flight import live_view
 
     if layout is not None:

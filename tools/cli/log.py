@@ -6,8 +6,10 @@ from typing import Any
 
 import click
 
-from glider.tools.cli.common import DONE, FAILED, json_option, print_json, progress, say, show
+from glider.tools.cli.common import DONE, FAILED, json_option, print_json, print_lines, progress, say, show
 from glider.tools.cli.replay import replay
+from glider.tools.data.errors import InputError
+from glider.tools.data.files import check_writable
 
 LEVELS = {10: "debug", 20: "info", 30: "warn", 40: "error", 50: "fatal"}
 _SHOWN_EVENTS = 20
@@ -19,8 +21,6 @@ def log() -> None:
 
 
 def _file(path: Path) -> Path:
-    from glider.tools.data.errors import InputError
-
     if path.is_dir():
         raise InputError("a folder, where a log was expected", source=path)
     return path
@@ -120,7 +120,6 @@ def _devices(text: str) -> list[str]:
 @json_option
 def info(file: Path, as_json: bool) -> None:
     """What is in a log, with the parts it goes on in: topics, counts, texts, events, and whether it is complete."""
-    from glider.tools.data.errors import InputError
     from glider.tools.data.log.parts import read_flight
 
     the_log = read_flight(_file(file))
@@ -156,8 +155,6 @@ log.add_command(replay)
 @json_option
 def export(sources: tuple[Path, ...], out: Path | None, vehicle: str | None, as_json: bool) -> None:
     """Turn logs into run data (a case folder, a run a log), or run data (a case's folder or run file) into a log."""
-    from glider.tools.data.errors import InputError
-
     run_data = [source for source in sources if source.is_dir() or source.name.endswith((".csv", ".csv.gz"))]
     if run_data and len(sources) > 1:
         raise InputError("run data, which is exported one by one", source=run_data[0])
@@ -168,15 +165,10 @@ def export(sources: tuple[Path, ...], out: Path | None, vehicle: str | None, as_
         result = _to_case(sources, out, vehicle)
     for note in result["notes"]:
         say(note)
-    if as_json:
-        print_json(result)
-    else:
-        for path in result["files"]:
-            click.echo(path)
+    print_lines(result["files"], as_json, result)
 
 
 def _to_case(sources: tuple[Path, ...], out: Path | None, vehicle: str | None) -> dict[str, Any]:
-    from glider.tools.data.files import check_writable
     from glider.tools.data.log.parts import read_flight
     from glider.tools.data.log.rundata import export_case
 

@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from glider.tools.cli.common import fail, print_json, progress, say
+from glider.tools.data.errors import need
 
 jobs_option = click.option(
     "--jobs", type=click.IntRange(0, 256), help="Cases at a time, each in a process of its own: 1; 0: one a core."
@@ -23,8 +24,6 @@ def cases_argument(command: Callable[..., Any]) -> Callable[..., Any]:
 
 def need_for(jobs: int | None, dask: str | None) -> None:
     """MissingExtra where something is missing that work here or on a cluster takes."""
-    from glider.tools.data.errors import need
-
     need("analysis")
     if dask or jobs not in (None, 1):
         need("campaign")

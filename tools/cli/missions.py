@@ -2,7 +2,7 @@
 
 import click
 
-from glider.tools.cli.common import json_option, print_json
+from glider.tools.cli.common import json_option, print_lines
 
 
 @click.command()
@@ -13,14 +13,9 @@ def missions(as_json: bool) -> None:
     from glider.firmware.model.library import shipped
 
     found = [decode_mission(text, name) for name, text in shipped("guidance/missions").items()]
-    if as_json:
-        print_json(
-            [
-                {"name": m.name, "legs": len(m.leg), "time_limit_s": m.time_limit_s, "description": m.description}
-                for m in found
-            ]
-        )
-        return
     width = max(len(mission.name) for mission in found)
-    for mission in found:
-        click.echo(f"{mission.name:<{width}}  {mission.description} ({len(mission.leg)} legs)")
+    print_lines(
+        [f"{one.name:<{width}}  {one.description} ({len(one.leg)} legs)" for one in found], as_json,
+        [{"name": one.name, "legs": len(one.leg), "time_limit_s": one.time_limit_s, "description": one.description}
+         for one in found],
+    )  # fmt: skip

@@ -8,12 +8,13 @@ from typing import Any
 
 import click
 
-from glider.tools.cli.common import print_json, say
+from glider.tools.cli.common import print_json, print_lines, say
+from glider.tools.data.errors import need
+from glider.tools.data.files import write_bytes
 
 
 def own_vehicle(case: Path, wanted: str | None) -> Any:
     """The user's own model that a case is asked by; None where its vehicle is none."""
-    from glider.tools.data.errors import need
     from glider.tools.own.cases import own_vehicle as find
 
     found = find(case, wanted)
@@ -75,18 +76,12 @@ def diagnose(vehicle: Any, case: Path, reference: Path | None, out: Path, as_jso
     write_own_report(out)
     for caution in answer["cautions"]:
         say(f"note: {caution}")
-    if as_json:
-        print_json(answer)
-    else:
-        click.echo(sentence(answer))
-        for line in verdict_lines(answer):
-            click.echo(line)
+    print_lines([sentence(answer), *verdict_lines(answer)], as_json, answer)
     say(f"answer: {out / 'diagnosis.json'}, report: {out / 'report.html'}")
 
 
 def watch(vehicle: Any, case: Path, reference: Path | None, out: Path | None, as_json: bool) -> None:
     """What changed over the runs of a case, by a user's model."""
-    from glider.tools.data.files import write_bytes
     from glider.tools.data.plain import as_plain
     from glider.tools.own.runs import load_own_runs
     from glider.tools.own.watch import watch as watch_runs

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import click
 
-from glider.tools.cli.common import json_option, print_json, progress
+from glider.tools.cli.common import json_option, print_lines, progress
+from glider.tools.data.errors import need
 
 
 @click.command()
@@ -17,7 +18,6 @@ def readings(case: Path, as_json: bool) -> None:
     see the reading corrected (docs/explanation/readings.md).
     """
     from glider.tools import api
-    from glider.tools.data.errors import need
     from glider.tools.data.runs.case import load_case
 
     need("analysis")
@@ -26,7 +26,4 @@ def readings(case: Path, as_json: bool) -> None:
         advance(1)
         found = api.readings(loaded)
         advance(1)
-    if as_json:
-        print_json({"readings": found.answer})
-    else:
-        click.echo(found.summary())
+    print_lines([found.summary()], as_json, {"readings": found.answer})

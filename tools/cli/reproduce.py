@@ -5,6 +5,8 @@ from pathlib import Path
 import click
 
 from glider.tools.cli.common import compile_campaign, json_option, print_json, say
+from glider.tools.data.errors import need
+from glider.tools.data.files import check_writable
 
 FIGURES = ("fig4", "fig5", "fig6", "fig7")
 
@@ -21,8 +23,6 @@ def reproduce(figures, vehicle, seeds, noise, out, as_json) -> None:
 
     One picture a figure, FIGURE.png; one JSON object a figure with --json (a list where several are asked for).
     """
-    from glider.tools.data.errors import need
-    from glider.tools.data.files import check_writable
     from glider.tools.data.sources import load_vehicle
 
     need("identify" if "fig4" in figures else "analysis")

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from glider.tools.cli.common import progress
+from glider.tools.data.files import check_writable, write_bytes
 
 LONG_STEPS = 5e6  # a few seconds of computing: from here on a person wants to see it move
 
@@ -41,7 +42,6 @@ def simulate(commands: Path, out: Path, vehicle: str, water: tuple[float, float]
     X, Y, Z, phi, theta, psi, u, v, w (relative to the water), p, q, r, servo_rad, slider_m, ballast_kg. Each command
     holds from the row it stands in. The result has the same columns at the same times.
     """
-    from glider.tools.data.files import check_writable, write_bytes
     from glider.tools.data.sources import load_vehicle
     from glider.tools.flight.simulate import check_dt, expected_steps, fly_commands, read_commands, write_flight
 

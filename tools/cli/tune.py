@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from glider.tools.cli.common import compile_campaign, json_option, print_json, progress
+from glider.tools.data.errors import need
 
 if TYPE_CHECKING:
     from glider.firmware.model.gains import Control
@@ -27,8 +28,6 @@ def tune(vehicle: str, method: str, seed: int, budget: int, as_json: bool) -> No
     best under noise, with the rule's beside them; takes minutes. Both end with a [control] table to paste into a
     vehicle or mission file. The reference filters stay as the vehicle has them.
     """
-    from glider.tools.data.errors import need
-
     need("analysis")
     from glider.hal.strict import decode
     from glider.sim_backend.board import SimBoardFile

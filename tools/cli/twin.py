@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from glider.tools.cli.common import say
+from glider.tools.data.errors import InputError, need
 
 
 @click.command()
@@ -30,7 +31,6 @@ def twin(board, vehicle, folder, seed, stand, faults, print_sim) -> None:
     from glider.sim_backend.twins.boardfile import decode_twin_file, simulated_board
     from glider.sim_backend.twins.service import TwinService, replaced_ports
     from glider.tools.data.boards import load_board_file
-    from glider.tools.data.errors import InputError, need
     from glider.tools.data.sources import load_vehicle
     from glider.tools.data.tomltext import toml_text
 

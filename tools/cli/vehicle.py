@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING, TextIO
 
 import click
 
-from glider.tools.cli.common import json_option, print_json, say
+from glider.tools.cli.common import json_option, print_json, print_lines, say
+from glider.tools.data.errors import InputError
+from glider.tools.data.files import check_writable, write_bytes
 
 if TYPE_CHECKING:
     from glider.tools.data.first_vehicle import FirstVehicle, Question
@@ -31,9 +33,6 @@ def new(out: Path, name: str | None, of_own: bool) -> None:
 
     Example: glider vehicle new mine.toml
     """
-    from glider.tools.data.errors import InputError
-    from glider.tools.data.files import check_writable, write_bytes
-
     if out.exists():
         raise InputError("is there already: name another file", source=out)
     check_writable(out.parent)
@@ -49,7 +48,6 @@ def new(out: Path, name: str | None, of_own: bool) -> None:
 
 def interview(answers: TextIO, person: bool) -> "FirstVehicle":
     """The questions one by one; a person is asked again where an answer is wrong, a pipe's is an InputError."""
-    from glider.tools.data.errors import InputError
     from glider.tools.data.first_vehicle import QUESTIONS, FirstVehicle
 
     found, n, observed = FirstVehicle(), 0, list[int]()
@@ -118,11 +116,7 @@ def check(file: Path, case: Path | None, as_json: bool) -> None:
     from glider.tools.own.report_check import describe
 
     found = describe(file, case)
-    if as_json:
-        print_json(found)
-        return
-    for line in found["lines"]:
-        click.echo(line)
+    print_lines(found["lines"], as_json, found)
 
 
 @vehicle.command()

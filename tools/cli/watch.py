@@ -8,6 +8,8 @@ import click
 from glider.tools.cli import own
 from glider.tools.cli.common import json_option, print_result, progress, say, say_assumed, vehicle_option
 from glider.tools.cli.many import cases_argument, is_many, run_batch_command
+from glider.tools.data.errors import need
+from glider.tools.data.files import check_writable
 
 folder = click.Path(path_type=Path, file_okay=False)
 
@@ -42,8 +44,6 @@ def watch(
 def _watch_one(case: Path, reference: Path | None, vehicle: str | None, out: Path | None, as_json: bool) -> None:
     """The watch of one case; its answer in `out`, if there is one."""
     from glider.tools import api
-    from glider.tools.data.errors import need
-    from glider.tools.data.files import check_writable
     from glider.tools.data.runs.case import load_case
     from glider.tools.report.page import REPORT
     from glider.tools.watch.answer import FILE

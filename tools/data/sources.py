@@ -1,8 +1,7 @@
 """From what a user types, a name or a path, to a decoded file."""
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from glider.firmware.guidance.mission import Mission, decode_mission
 from glider.firmware.model.library import shipped
@@ -11,7 +10,6 @@ from glider.hal.strict import ConfigError
 from glider.tools.data.errors import InputError
 from glider.tools.data.vehicle_kinds import UNNAMED, kind_of, kind_of_file, kinds, shipped_vehicles
 
-T = TypeVar("T")
 MAX_TEXT_CHARACTERS = 256_000_000  # characters of any text file
 
 
@@ -43,11 +41,6 @@ def name_or_path(
         if candidate.is_file():
             return read_text(candidate), str(candidate)
     raise InputError(f"no {kind} '{wanted}': neither a file nor one of {', '.join(library) or 'none'}")
-
-
-def _load(wanted: str, kind: str, folder: str, decode: Callable[[str, str], T], base: Path | None) -> T:
-    text, source = name_or_path(wanted, kind, folder, base)
-    return decode(text, source)
 
 
 def load_vehicle(wanted: str, base: Path | None = None) -> Vehicle:

@@ -7,6 +7,7 @@ them. A model of a user's own (docs/how-to/own-vehicle.md) needs none.
 import contextlib
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -26,35 +27,16 @@ def no_progress(label: str, total: int) -> contextlib.AbstractContextManager[Cal
     return contextlib.nullcontext(lambda n: None)
 
 
-class Identified(Protocol):
+@dataclass(frozen=True)
+class Identified:
     """An identification as commands print and write it."""
 
-    @property
-    def report(self) -> bool:
-        """Whether `write` writes a report."""
-        ...
-
-    @property
-    def vehicle_text(self) -> str:
-        """The vehicle file, TOML."""
-        ...
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """Runs that were left out, and what limits the result."""
-        ...
-
-    def plain(self) -> dict[str, Any]:
-        """As `glider identify --json` prints it."""
-        ...
-
-    def write(self, folder: Path) -> None:
-        """Its files into a folder."""
-        ...
-
-    def lines(self) -> list[str]:
-        """Sentences and tables for a terminal."""
-        ...
+    plain: Callable[[], dict[str, Any]]  # as `glider identify --json` prints it
+    vehicle_text: Callable[[], str]  # the vehicle file, TOML
+    notes: tuple[str, ...]  # runs that were left out, and what limits the result
+    write: Callable[[Path], None]  # its files into a folder
+    lines: Callable[[], list[str]]  # sentences and tables for a terminal
+    report: bool  # whether `write` writes a report
 
 
 class VehicleKind(Protocol):

@@ -21,13 +21,13 @@ from glider.firmware.runtime import Runtime
 from glider.firmware.supervisor import Supervisor
 from glider.firmware.telemetry import TICK
 from glider.hal.board import BoardRequest, board_builder
-from glider.hal.ports import ACTUATORS, Board, BoardError, Hardware
+from glider.hal.ports import ACTUATORS, Board, Hardware
 from glider.hal.recorder.recorder import Recorder
 from glider.hal.recorder.schema import DEBUG, ERROR, FATAL, INFO, WARN
 from glider.hal.strict import ConfigError
 from glider.tools.data.boards import load_board_file
 from glider.tools.data.errors import InputError
-from glider.tools.data.sources import load_mission, load_vehicle
+from glider.tools.data.sources import load_mission, load_vehicle, name_or_path
 from glider.tools.data.version import software
 
 LEAST_REACH = 0.5  # of an end of an actuator's range, which the board has to leave the vehicle
@@ -155,8 +155,6 @@ def build_pilot(
 
 def load_vehicle_text(wanted: str) -> tuple[str, Vehicle]:
     """A vehicle's text and the vehicle."""
-    from glider.tools.data.sources import name_or_path
-
     vehicle = load_vehicle(wanted)  # first: it says of another kind of vehicle that it is one
     text, _ = name_or_path(wanted, "vehicle", "model/vehicles")
     return text, vehicle
@@ -216,9 +214,3 @@ def build_runtime(flight: Flight, recorder: Any) -> Runtime:
         flight.board, flight.autopilot, flight.supervisor, recorder.channel("/tick"),
         extras=flight.board.recording(recorder.channel), on_news=on_news,
     )  # fmt: skip
-
-
-__all__ = [
-    "BoardError", "Flight", "build_flight", "build_pilot", "build_recorder", "build_runtime", "load_board_file",
-    "parse_effects", "record_specs",
-]  # fmt: skip

@@ -1,58 +1,17 @@
 """Ocean gliders: attitude and buoyancy engine measured, depth and speed predicted (docs/explanation/ocean.md)."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from glider.sim_backend.ocean.vehicle import KIND as NAME
 from glider.sim_backend.ocean.vehicle import OceanVehicle, decode_ocean_vehicle, shipped_vehicles
-from glider.tools.data.errors import InputError
+from glider.tools.data.errors import InputError, need
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs.case import Case
 from glider.tools.data.runs.run import Run
-from glider.tools.data.vehicle_kinds import Say, VehicleKind, no_progress
-
-if TYPE_CHECKING:
-    from glider.tools.identify.ocean.identify import OceanIdentification
-
-
-@dataclass(frozen=True)
-class MissionIdentification:
-    """An identification by the Python API's measure: what `glider identify` prints and writes."""
-
-    found: "OceanIdentification"
-    report: bool = False  # whether one is written
-
-    def plain(self) -> dict[str, Any]:
-        """As `glider identify --json` prints it."""
-        from glider.tools.identify.ocean import files
-
-        return files.plain(self.found)
-
-    @property
-    def vehicle_text(self) -> str:
-        """The vehicle file, TOML."""
-        from glider.tools.identify.ocean import files
-
-        return files.vehicle_text(self.found)
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """Runs that were left out."""
-        return tuple(f"left out: {one}" for one in self.found.left_out)
-
-    def write(self, folder: Path) -> None:
-        """identified.toml and identified.json into a folder."""
-        from glider.tools.identify.ocean import files
-
-        files.write(self.found, folder)
-
-    def lines(self) -> list[str]:
-        """The table of numbers, and what they mean."""
-        from glider.tools.api.sentences import ocean_lines
-
-        return ocean_lines(self.found)
+from glider.tools.data.vehicle_kinds import Identified, Say, VehicleKind, no_progress
 
 
 class OceanGlider:
@@ -123,14 +82,19 @@ class OceanGlider:
         own = own_model(problem, learned_from)
         return lambda history, resolved, n: velocity(own, history, resolved, n)
 
-    def identify(self, case: Case, seed: int, likelihood: str, say: Say) -> MissionIdentification:
+    def identify(self, case: Case, seed: int, likelihood: str, say: Say) -> Identified:
         """Drag, buoyancy and the attitude sensor by least squares over dives; seed and likelihood are ignored."""
-        from glider.tools.data.errors import need
-
         need(self.extra)
+        from glider.tools.api.sentences import ocean_lines
+        from glider.tools.identify.ocean import files
         from glider.tools.identify.ocean.identify import identify_ocean
 
-        return MissionIdentification(identify_ocean(case, say))
+        found = identify_ocean(case, say)
+        notes = tuple(f"left out: {one}" for one in found.left_out)
+        return Identified(
+            partial(files.plain, found), partial(files.vehicle_text, found), notes, partial(files.write, found),
+            partial(ocean_lines, found), report=False,
+        )  # fmt: skip
 
     def diagnose(self, case: Case, reference: Case | None, without: str | None, say: Say) -> Callable[[Path], str]:
         """What all dives share; InputError with a reference, which a watch takes."""

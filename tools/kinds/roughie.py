@@ -1,56 +1,28 @@
 """ROUGHIE and vehicles of its form: flown by commands, six degrees of freedom, equation (4)."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from glider.firmware.model.library import shipped
 from glider.firmware.model.vehicle import Vehicle, decode_vehicle
+from glider.tools.data.errors import InputError, need
 from glider.tools.data.runs.case import Case
 from glider.tools.data.runs.run import Run
-from glider.tools.data.vehicle_kinds import Say, VehicleKind, no_progress
+from glider.tools.data.vehicle_kinds import Identified, Say, VehicleKind, no_progress
 
 if TYPE_CHECKING:
-    from glider.tools.identify.pipeline import Identified
+    from glider.tools.identify.pipeline import Identified as PoolIdentification
 
 
-@dataclass(frozen=True)
-class PoolIdentification:
-    """An identification by the Python API's measure: what `glider identify` prints and writes."""
+def _write_identified(found: "PoolIdentification", folder: Path) -> None:
+    """identified.toml, identified.json, corrected.toml, posterior.nc and the report into a folder."""
+    from glider.tools.identify import files
+    from glider.tools.report.identified import write_report
 
-    found: "Identified"
-    report: bool = True  # whether one is written
-
-    def plain(self) -> dict[str, Any]:
-        """As `glider identify --json` prints it."""
-        return self.found.plain()
-
-    @property
-    def vehicle_text(self) -> str:
-        """The vehicle file, TOML."""
-        from glider.tools.identify import files
-
-        return files.vehicle_text(self.found)
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """Runs that were left out, and what limits the result."""
-        return (*(f"left out: {one}" for one in self.found.left_out), *self.found.notes)
-
-    def write(self, folder: Path) -> None:
-        """identified.toml, identified.json, corrected.toml, posterior.nc and the report into a folder."""
-        from glider.tools.identify import files
-        from glider.tools.report.identified import write_report
-
-        files.write(self.found, folder)
-        write_report(folder / "report.html", self.found)
-
-    def lines(self) -> list[str]:
-        """Sentences and the table of coefficients."""
-        from glider.tools.api.sentences import identified_lines
-
-        return identified_lines(self.found)
+    files.write(found, folder)
+    write_report(folder / "report.html", found)
 
 
 class Roughie:
@@ -128,18 +100,20 @@ class Roughie:
     def speeds(self, problem: Any, learned_from: Any) -> None:
         """None: readings have no speed through the water that a watch would judge."""
 
-    def identify(self, case: Case, seed: int, likelihood: str, say: Say) -> PoolIdentification:
+    def identify(self, case: Case, seed: int, likelihood: str, say: Say) -> Identified:
         """The twelve coefficients by MCMC (docs/explanation/identification.md)."""
-        from glider.tools.data.errors import need
-
         need(self.extra)
+        from glider.tools.api.sentences import identified_lines
+        from glider.tools.identify import files
         from glider.tools.identify.pipeline import identify
 
-        return PoolIdentification(identify(case, seed, likelihood, say))
+        found = identify(case, seed, likelihood, say)
+        notes = (*(f"left out: {one}" for one in found.left_out), *found.notes)
+        write, lines = partial(_write_identified, found), partial(identified_lines, found)
+        return Identified(found.plain, partial(files.vehicle_text, found), notes, write, lines, report=True)
 
     def diagnose(self, case: Case, reference: Case | None, without: str | None, say: Say) -> Callable[[Path], str]:
         """Against healthy runs, where they are given or the vehicle file knows what they leave, else by evidence."""
-        from glider.tools.data.errors import InputError
         from glider.tools.diagnose.gates import form_stands_out
 
         if reference is not None and without is not None:

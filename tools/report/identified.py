@@ -27,24 +27,19 @@ DRAWN = ("depth", "pitch", "roll")
 
 
 def png(figure) -> str:
-    """A figure as a data URI; closed afterwards."""
-    import matplotlib.pyplot as plt
-
+    """A figure as a data URI."""
     stream = io.BytesIO()
     figure.savefig(stream, format="png", dpi=110)
-    plt.close(figure)
     return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode()
 
 
 def marginals(found: Identified, truth: dict[str, float] | None = None):
     """Histograms of the twelve coefficients beside their priors, mean and 90 % interval marked, and the known truth."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
+    from matplotlib.figure import Figure
 
     draws = found.free.si(found.chains.flat)
-    figure, axes = plt.subplots(3, 4, figsize=(11, 7), layout="constrained")
+    figure = Figure(figsize=(11, 7), layout="constrained")
+    axes = figure.subplots(3, 4)
     for n, (axis, one) in enumerate(zip(axes.flat, found.coefficients, strict=True)):
         axis.hist(draws[:, n], bins=50, density=True, color=INK, alpha=0.55)
         low, high = axis.get_xlim()
@@ -63,11 +58,8 @@ def marginals(found: Identified, truth: dict[str, float] | None = None):
 
 def corner(found: Identified):
     """Pairs of coefficients: draws below the diagonal, marginals on it, correlations above."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
     from matplotlib.collections import PatchCollection
+    from matplotlib.figure import Figure
     from matplotlib.patches import Rectangle
 
     flat = found.free.si(found.chains.flat)[:, : len(COEFFICIENTS)]
@@ -78,7 +70,8 @@ def corner(found: Identified):
         return PANEL[0] + (PANEL[1] - PANEL[0]) * (0.05 + 0.9 * (values - low[n]) / span[n])
 
     # One pair of axes for all panels: one for each takes six times as long.
-    figure, axis = plt.subplots(figsize=(11, 11))
+    figure = Figure(figsize=(11, 11))
+    axis = figure.subplots()
     figure.subplots_adjust(0.05, 0.05, 0.99, 0.99)
     axis.set(xlim=(0, count), ylim=(0, count))
     axis.axis("off")

@@ -278,6 +278,13 @@ def test_mappings_are_strict(old, new, said):
     assert str(error.value).startswith("map.toml")
 
 
+@pytest.mark.parametrize(("columns", "said"), [("", "missing key"), ("columns = 3\n", "columns: ")])
+def test_a_mapping_needs_columns(columns, said):
+    head, tables = MAP.partition("[columns.depth_m]")[0].split("[time]")
+    with pytest.raises(ConfigError, match=rf"^map\.toml.*{said}"):
+        decode_map(f"{head}{columns}[time]{tables}", "map.toml")
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [

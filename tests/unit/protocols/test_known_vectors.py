@@ -5,7 +5,6 @@ from binascii import crc_hqx
 import pytest
 
 from glider.hal.protocols import maestro, modbus, vn100
-from glider.hal.protocols.checksums import crc7, xor8
 from glider.hal.protocols.registers import from_registers, preset, presets, to_registers, value_of
 from glider.hal.strict import ConfigError
 
@@ -30,7 +29,7 @@ def test_crc_over_data_and_crc_is_zero():
 
 @pytest.mark.parametrize(("data", "crc"), [("84 00 70 2E", 0x2B), ("83 01", 0x17)])
 def test_maestro_crc7(data, crc):
-    assert crc7(bytes.fromhex(data)) == crc
+    assert maestro.crc7(bytes.fromhex(data)) == crc
 
 
 def test_maestro_1500_us_on_channel_0():
@@ -96,4 +95,4 @@ def test_all_presets_read_and_an_unknown_one_is_named():
 
 
 def test_xor8():
-    assert xor8(b"VNRRG,01") == 0x72
+    assert vn100.xor8(b"VNRRG,01") == 0x72

@@ -191,9 +191,10 @@ def _at_key(error: ConfigError, text: str) -> ConfigError:
 def _with_column(error: ConfigError, text: str, source: str, by_name: Mapping[str, Any]) -> ConfigError:
     """An error inside a group of tables by name with the table's name, which the decoder leaves out."""
     group, *rest = error.key.split(".")
-    if group not in by_name:
+    tables = tomllib.loads(text).get(group) if group in by_name else None
+    if not isinstance(tables, dict):
         return error
-    for name, table in tomllib.loads(text)[group].items():
+    for name, table in tables.items():
         try:
             msgspec.convert(table, by_name[group], strict=True)
         except msgspec.ValidationError:

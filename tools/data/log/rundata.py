@@ -279,18 +279,15 @@ def write_log(path: Path | str, case: Case, run: Run) -> Path:
         else:
             texts[name] = words
     spec = RecordSpec(TICK, "glider/msg/Tick", tuple(fields))
+    facts = {
+        "vehicle": case.vehicle_name, "site": case.site, "log_rate_hz": float(case.log_rate_hz),
+        "water_density_kg_m3": float(case.water_density_kg_m3), "motion_capture": case.motion_capture, "runs": 1,
+    }  # fmt: skip
+    sensors = SensorsPart(**_own(case.sensors, case.roughie.sensors))
+    disturbance = DisturbancePart(**_own(case.disturbance, case.roughie.disturbance))
     attachments = {
         VEHICLE_FILE: name_or_path(case.vehicle_name, "vehicle", "model/vehicles", base=case.folder)[0],
-        CASE_FILE: case_text(
-            vehicle=case.vehicle_name,
-            site=case.site,
-            log_rate_hz=case.log_rate_hz,
-            water_density_kg_m3=case.water_density_kg_m3,
-            motion_capture=case.motion_capture,
-            runs=1,
-            sensors=SensorsPart(**_own(case.sensors, case.roughie.sensors)),
-            disturbance=DisturbancePart(**_own(case.disturbance, case.roughie.disturbance)),
-        ),
+        CASE_FILE: case_text(facts, sensors, disturbance),
     }
     if texts:
         texts = {names.TIME: _exact_texts(run.t), **texts}

@@ -202,32 +202,13 @@ def load_case_of_run(path: Path | str, vehicle: str | None = None) -> tuple[Case
     return _assemble(path.parent, table, [run], vehicle), run
 
 
-def case_text(
-    *,
-    vehicle: str,
-    site: str,
-    log_rate_hz: float,
-    water_density_kg_m3: float,
-    motion_capture: bool,
-    runs: int,
-    sensors: SensorsPart | SensorsTable | None = None,
-    disturbance: DisturbancePart | DisturbanceTable | None = None,
-) -> str:
-    """The text of a case.toml; raises ConfigError where a value is not one that reading would take."""
-    text = toml_text(
-        {
-            "format": 1,
-            "vehicle": vehicle,
-            "site": site,
-            "log_rate_hz": float(log_rate_hz),
-            "water_density_kg_m3": float(water_density_kg_m3),
-            "motion_capture": bool(motion_capture),
-            "runs": runs,
-            "sensors": msgspec.to_builtins(_given(sensors)),
-            "disturbance": _given(disturbance),
-        },
-        inline=("sensors",),
-    )
+def case_text(facts: dict[str, Any], sensors: Table | None = None, disturbance: Table | None = None) -> str:
+    """The text of a case.toml; raises ConfigError where a value is not one that reading would take.
+
+    facts: the keys of CaseTable that are no tables, but `format`.
+    """
+    tables = {"sensors": msgspec.to_builtins(_given(sensors)), "disturbance": _given(disturbance)}
+    text = toml_text({"format": 1, **facts, **tables}, inline=("sensors",))
     decode(text, CaseTable, CASE_FILE)
     return text
 
@@ -261,16 +242,11 @@ def write_case(
     folder = Path(folder)
     if motion_capture is None:
         motion_capture = any(run.has_mocap for run in runs)
-    text = case_text(
-        vehicle=vehicle if vehicle_text is None else VEHICLE_FILE,
-        site=site,
-        log_rate_hz=log_rate_hz,
-        water_density_kg_m3=water_density_kg_m3,
-        motion_capture=motion_capture,
-        runs=len(runs),
-        sensors=sensors,
-        disturbance=disturbance,
-    )
+    facts = {
+        "vehicle": vehicle if vehicle_text is None else VEHICLE_FILE, "site": site, "log_rate_hz": float(log_rate_hz),
+        "water_density_kg_m3": float(water_density_kg_m3), "motion_capture": bool(motion_capture), "runs": len(runs),
+    }  # fmt: skip
+    text = case_text(facts, sensors, disturbance)
     if folder.is_dir() and ((folder / CASE_FILE).exists() or run_files(folder)):
         raise InputError("the folder already holds a case: name another, or empty it", source=folder)
     folder.mkdir(parents=True, exist_ok=True)

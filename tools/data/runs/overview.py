@@ -1,8 +1,7 @@
 """What is in runs, a line a column: what a person looks at to see that units and signs are right."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,10 +21,6 @@ class Column:
     smallest: float | None  # None where no sample is there
     largest: float | None
     missing_percent: float
-
-    def plain(self) -> dict[str, Any]:
-        """As `--json` prints it."""
-        return asdict(self)
 
 
 def overview(runs: Sequence[Run]) -> list[Column]:

@@ -1,6 +1,5 @@
 """The picture of a campaign: one HTML file that opens offline, table and charts."""
 
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +9,7 @@ from glider.firmware.core.control.controller_rows import CONTROLLERS
 from glider.tools.data.files import write_bytes
 from glider.tools.data.intervals import wilson
 from glider.tools.report.charts import Chart, Curve, svg
+from glider.tools.report.page import render
 from glider.tools.study.campaign.conduct import FlownChunk
 from glider.tools.study.campaign.summary import completed_by_all, summarise
 
@@ -116,11 +116,7 @@ def _context(flown: FlownChunk) -> dict[str, Any]:
 
 def page(flown: FlownChunk) -> str:
     """The page's text."""
-    from jinja2 import Environment, StrictUndefined
-
-    template = files("glider.tools.study.campaign").joinpath("page.html").read_text(encoding="utf-8")
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    return environment.from_string(template).render(_context(flown))
+    return render("campaign.html", _context(flown))
 
 
 def write_page(path: Path, flown: FlownChunk) -> None:

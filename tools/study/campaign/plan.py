@@ -12,8 +12,7 @@ import numpy as np
 from glider.firmware.autopilot import Autopilot, configuration
 from glider.firmware.core.control.controller_rows import CONTROLLERS
 from glider.firmware.guidance.mission import Mission, decode_mission
-from glider.firmware.model import gains
-from glider.firmware.model.gains import Control
+from glider.firmware.model.gains import BEST_TUNED, Control
 from glider.firmware.model.vehicle import Vehicle
 from glider.hal.strict import Table, decode
 from glider.sim_backend.board import SimBoardFile
@@ -156,10 +155,7 @@ class CampaignPlan:
 def _control(controller: str, base: Control) -> Control:
     """The [control] table of a controller by its name in a campaign."""
     if controller == "pid_tuned":
-        tuned = getattr(gains, "BEST_TUNED", None)
-        if tuned is None:
-            raise InputError("controller 'pid_tuned': this version has no best-tuned PID")
-        return msgspec.structs.replace(base, controller="pid", pitch=tuned.pitch, depth=tuned.depth)
+        return msgspec.structs.replace(base, controller="pid", pitch=BEST_TUNED.pitch, depth=BEST_TUNED.depth)
     try:
         return msgspec.structs.replace(base, controller=controller)
     except ValueError as error:

@@ -19,8 +19,6 @@ SEED = 4
 
 def reproduce_fig4(vehicle_name: str, vehicle: Vehicle, out: Path) -> dict[str, Any]:
     """The twelve marginals as a picture, and the truth beside what was found."""
-    import matplotlib.pyplot as plt
-
     with tempfile.TemporaryDirectory() as folder:
         world = write_design(Path(folder) / "case", vehicle_name, vehicle, SEED)
         found = identify(load_case(Path(folder) / "case"), SEED)
@@ -29,7 +27,6 @@ def reproduce_fig4(vehicle_name: str, vehicle: Vehicle, out: Path) -> dict[str, 
     figure = marginals(found, truth)
     with whole(picture) as (temporary,):
         figure.savefig(temporary, format="png", dpi=130)
-    plt.close(figure)
     table = [
         {
             "name": one.name, "truth": truth[one.name], "mean": one.mean, "sd": one.sd,

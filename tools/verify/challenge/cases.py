@@ -10,9 +10,10 @@ from glider.firmware.model.vehicle import Vehicle
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs.case import write_case
 from glider.tools.verify.challenge.design import FITTED, LAKE, POOL
+from glider.tools.verify.challenge.forms import FORMS
 from glider.tools.verify.challenge.magnitude import LEAST_GAP_FLOORS, Magnitude, choose
 from glider.tools.verify.challenge.messy import COUNT, LARGE, Factors, draw_factors, small_ones
-from glider.tools.verify.challenge.plan import UNKNOWN, CasePlan, forms_of
+from glider.tools.verify.challenge.plan import UNKNOWN, CasePlan
 from glider.tools.verify.challenge.trial import (
     Trial,
     TrialFlight,
@@ -60,8 +61,10 @@ def draw_case(seed: int, plan: CasePlan, vehicle: Vehicle) -> Made:
         if not redraw(rng, trial, trial.shapes, 40):
             continue
         found = []
-        for form, weak in zip(forms_of(plan), plan.weak, strict=True):
-            size = choose(rng, trial, form, weak != (number >= GIVE_WAY), LARGE if plan.messy else LEAST_GAP_FLOORS)
+        for label, weak in zip(plan.labels, plan.weak, strict=True):
+            size = choose(
+                rng, trial, FORMS[label], weak != (number >= GIVE_WAY), LARGE if plan.messy else LEAST_GAP_FLOORS
+            )
             if size is None:
                 break
             found.append(size)
@@ -87,7 +90,7 @@ def answer(made: Made) -> dict[str, Any]:
     before = trial.channels(made.flights, trial.vehicle.vector(), trial.shapes, plain=True)
     oracle = trial.channels(made.flights, trial.P, predictable(made.F), plain=False)
     unknown = plan.kind == UNKNOWN
-    messy = {} if made.factors is None else {"small": list(map(_setting, made.small)), "factors": made.factors.plain()}
+    messy = {} if made.factors is None else {"small": list(map(_setting, made.small)), "factors": asdict(made.factors)}
     return {
         "case": plan.name,
         "kind": plan.kind,

@@ -1,12 +1,16 @@
 """`glider gap challenge`: a blind test of the diagnosis, made, run and scored."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import click
 
 from glider.tools.cli.common import fail, json_option, print_json, progress, say
 from glider.tools.cli.many import again_option, dask_option, jobs_option, need_for
+from glider.tools.data.errors import InputError, need
+from glider.tools.data.files import check_writable, write_bytes
 
 folder = click.Path(path_type=Path, file_okay=False)
 COUNT = click.IntRange(0, 1000)
@@ -43,7 +47,6 @@ def make(
     unchanged: int | None, runs: int | None, reference: int | None,
 ) -> None:  # fmt: skip
     """Draw, fly and seal a blind test. Cases that are there are kept: call again to go on after a stop."""
-    from glider.tools.data.files import check_writable
     from glider.tools.verify.challenge.make import Order
     from glider.tools.verify.challenge.make import make as make_all
     from glider.tools.verify.challenge.ocean_make import OceanOrder
@@ -120,7 +123,6 @@ def run(
 
     What stands after `--` is handed on to `gap diagnose`. A case's time counts its whole process.
     """
-    from glider.tools.data.files import check_writable
     from glider.tools.verify.challenge.diagnose_all import DIAGNOSIS, FORM, MISSION, WATCH, count_cases
     from glider.tools.verify.challenge.diagnose_all import run as run_all
 
@@ -156,8 +158,6 @@ def score(
 
     See docs/explanation/blind-tests.md.
     """
-    from glider.tools.data.errors import InputError, need
-    from glider.tools.data.files import check_writable, write_bytes
     from glider.tools.verify.challenge.diagnose_all import count_cases
     from glider.tools.verify.challenge.form_score import judge_forms
     from glider.tools.verify.challenge.judge import judge
@@ -172,14 +172,14 @@ def score(
     _check_kind(watch, ocean, form)
     if out is not None:
         check_writable(out.parent)
-    found: ChallengeScore | WatchScore
+    judged: Callable[..., ChallengeScore | WatchScore] = judge_forms if form else judge
+    how: dict[str, Any] = {"manifest": manifest, "partial": partial}
+    if watch:
+        judged = judge_missions if ocean else judge_watches
+    else:
+        how["closing"] = not no_closed
     with progress("scored", count_cases(cases)) as advance:
-        if watch:
-            found = (judge_missions if ocean else judge_watches)(cases, answers, diagnoses, manifest, partial, advance)
-        else:
-            found = (judge_forms if form else judge)(
-                cases, answers, diagnoses, manifest=manifest, partial=partial, closing=not no_closed, advance=advance
-            )
+        found = judged(cases, answers, diagnoses, **how, advance=advance)
     if out is not None:
         kind: Kind = ("ocean" if ocean else "watch") if watch else "form" if form else "single"
         write_bytes(out, as_file(result_of(found, kind, answers, diagnoses, commit)))

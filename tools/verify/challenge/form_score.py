@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from glider.tools.inference.model import NOMINAL
-from glider.tools.verify.challenge.diagnosis import MODEL
+from glider.tools.verify.challenge.diagnosis import FILE, MODEL, read_diagnosis
 from glider.tools.verify.challenge.form_make import HEALTHY
 from glider.tools.verify.challenge.judge import (
     LEAST_CLOSABLE_SHARE,
@@ -42,7 +42,7 @@ def judge_forms(
     healthy = folder.parent / HEALTHY
     others = (folder.parent / REFERENCE, healthy)
     opened = open_sealed(answers, manifest or manifest_beside(cases), folder, held, wanted=closing, others=others)
-    found, gaps = gather(opened, diagnoses, partial), []
+    found, gaps = gather(opened, diagnoses, partial, FILE, read_diagnosis, ScoredCase), []
     for case in found:
         if closing:
             pair = judge_identified(case, healthy, diagnoses)

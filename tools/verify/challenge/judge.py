@@ -3,7 +3,7 @@
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from glider.tools.data.errors import InputError
 from glider.tools.data.runs.case import load_case_of_run
@@ -27,6 +27,7 @@ from glider.tools.verify.challenge.seal import (
 from glider.tools.verify.challenge.trial import total
 
 LEAST_CLOSABLE_SHARE = 0.02
+C = TypeVar("C")  # a case with what was said to it
 
 
 def case_folders(cases: Path) -> tuple[Path, Path]:
@@ -67,20 +68,26 @@ def open_sealed(
     return answers
 
 
-def gather(answers: Answers, diagnoses: Path, partial: bool) -> list[ScoredCase]:
-    """What was said to every case; with `partial`, only to those answered. InputError where nothing was said at all."""
-    if not diagnoses.is_dir():
-        raise InputError("no such folder", source=diagnoses)
-    found = []
+def gather(
+    answers: Answers, folder: Path, partial: bool, file: str, read: Callable[[Path], Any], case_of: Callable[..., C],
+    advance: Callable[[int], None] = lambda n: None,
+) -> list[C]:  # fmt: skip
+    """What was said to every case; with `partial`, only to those answered. InputError where nothing was said at all.
+
+    file: of an answer, in the folder of its case; read: reads it; case_of: takes name, truth and what was said.
+    """
+    if not folder.is_dir():
+        raise InputError("no such folder", source=folder)
+    found, answered = [], False
     for name, truth in sorted(answers.cases.items()):
-        path = diagnoses / name / FILE
-        said = read_diagnosis(path) if path.is_file() else None
-        timing = diagnoses / name / TIMING
-        seconds = _seconds(timing) if timing.is_file() else None
+        path, timing = folder / name / file, folder / name / TIMING
+        said = read(path) if path.is_file() else None
         if said is not None or not partial:
-            found.append(ScoredCase(name, truth, said, seconds=seconds))
-    if not any(case.said for case in found):
-        raise InputError(f"no {FILE} of any case in its folders", source=diagnoses)
+            found.append(case_of(name, truth, said, seconds=_seconds(timing) if timing.is_file() else None))
+            answered = answered or said is not None
+        advance(1)
+    if not answered:
+        raise InputError(f"no {file} of any case in its folders", source=folder)
     return found
 
 
@@ -125,7 +132,7 @@ def closed_share(case: ScoredCase, held: Path, diagnoses: Path) -> float | None:
     runs = runs_of(held / case.name)
     if case.said is None or not model.is_file():
         return 0.0
-    before, perfect = held_total(runs, NOMINAL), perfect_total(case.truth)
+    before, perfect = held_total(runs, NOMINAL), total(case.truth["oracle"][case.truth["runs"] :])
     if before - perfect < LEAST_CLOSABLE_SHARE * before:
         return None
     after = held_total(runs, model)
@@ -135,11 +142,6 @@ def closed_share(case: ScoredCase, held: Path, diagnoses: Path) -> float | None:
 def held_total(runs: list[Path], model: str | Path, vehicle: Path | None = None) -> float:
     """A model's total gap over runs: rms of theirs."""
     return root_mean_square([predicted_total(path, model, vehicle) for path in runs])
-
-
-def perfect_total(truth: dict[str, Any]) -> float:
-    """A perfect model's total gap over the held runs."""
-    return total(truth["oracle"][truth["runs"] :])
 
 
 def manifest_beside(cases: Path) -> Path | None:
@@ -160,7 +162,7 @@ def judge(
     """Open, check and score; closing: fly the corrected models on the held runs too, which takes the time."""
     folders = case_folders(cases)
     opened = open_sealed(answers, manifest or manifest_beside(cases), *folders, wanted=closing)
-    found = gather(opened, diagnoses, partial)
+    found = gather(opened, diagnoses, partial, FILE, read_diagnosis, ScoredCase)
     for case in found:
         if closing and case.predictable:
             case.closed = closed_share(case, folders[1], diagnoses)

@@ -5,8 +5,7 @@ of its own. Beside the main effect, or without one, four small ones act, each of
 model that lacks it alone at most twice as wrong as a perfect one.
 """
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import msgspec
 import numpy as np
@@ -43,9 +42,6 @@ class Factors:
         return msgspec.structs.replace(
             vehicle, sensors=SensorsTable(**tables), disturbance=msgspec.structs.replace(vehicle.disturbance, **scaled)
         )
-
-    def plain(self) -> dict[str, Any]:
-        return asdict(self)
 
 
 def _drawn(rng: np.random.Generator, names: tuple[str, ...], between: tuple[float, float]) -> dict[str, float]:

@@ -1,6 +1,6 @@
 """Watches of ocean gliders' missions against the truth: the figures of any watch, what acts alike, the velocity."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -54,7 +54,8 @@ class MeansSaid(msgspec.Struct):
 
 def speeds_held(case: Watched, folder: Path) -> list[bool]:
     """Of each watched dive without a change, whether its mean true horizontal speed is within the 90 % interval."""
-    held, means = [], _means_said(folder / MEANS)
+    means = read_json(folder / MEANS, MeansSaid).runs if (folder / MEANS).is_file() else {}
+    held = []
     for n, true in enumerate(case.truth["horizontal_mm_s"]):
         if case.changed[n]:
             continue
@@ -64,11 +65,6 @@ def speeds_held(case: Watched, folder: Path) -> list[bool]:
         said = means.get(run_name(files[0]))
         held.append(_mean_held(files[0], 1e-3 * np.array(true), float(case.truth["every_s"]), said))
     return held
-
-
-def _means_said(path: Path) -> dict[str, MeanSaid]:
-    """The means of dives that were answered, none where there is no such file; InputError where it is another."""
-    return read_json(path, MeansSaid).runs if path.is_file() else {}
 
 
 def _mean_held(path: Path, true: np.ndarray, every: float, said: MeanSaid | None) -> bool:
@@ -101,16 +97,9 @@ def score_missions(cases: Sequence[Watched], held: Sequence[bool]) -> WatchScore
     return WatchScore(found.cases, [*found.figures[:-1], *own, found.figures[-1]])
 
 
-def judge_missions(
-    cases: Path,
-    answers: Path,
-    said: Path,
-    manifest: Path | None = None,
-    partial: bool = False,
-    advance: Callable[[int], None] = lambda n: None,
-) -> WatchScore:
-    """Open, check and score what was said to every mission of a blind test's folder."""
-    found = gather_watches(cases, answers, said, manifest, partial, advance, NEEDED_OF_A_MISSION)
+def judge_missions(cases: Path, answers: Path, said: Path, **how: Any) -> WatchScore:
+    """Open, check and score what was said to every mission of a blind test's folder; how: as in gather_watches."""
+    found = gather_watches(cases, answers, said, NEEDED_OF_A_MISSION, **how)
     held: list[bool] = []
     for case in found:
         if case.said is not None:

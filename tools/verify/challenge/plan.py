@@ -1,10 +1,10 @@
 """Which cases a blind test holds: kinds, labels, sizes and sites, shuffled; all of it follows from the seed."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
-from glider.tools.verify.challenge.forms import FORMS, KNOWN, SECRET, Form
+from glider.tools.verify.challenge.forms import KNOWN, SECRET, Form
 
 NONE, SINGLE, PAIR, UNKNOWN = "none", "single", "pair", "unknown"
 # Pairs whose effects these flights hardly part from each other teach nothing about finding two.
@@ -38,9 +38,6 @@ class Planned:
     @property
     def name(self) -> str:
         return f"case{self.number:03d}"
-
-    def plain(self) -> dict:
-        return asdict(self)
 
 
 @dataclass(frozen=True)
@@ -92,8 +89,3 @@ def plan(seed: int, counts: Counts, messy: bool = False) -> list[CasePlan]:
         CasePlan(number, drawn[n][0], tuple(form.label for form in drawn[n][1]), drawn[n][2], bool(mocap[n]), messy)
         for number, n in enumerate(order)
     ]
-
-
-def forms_of(case: CasePlan) -> list[Form]:
-    """The effects of a case."""
-    return [FORMS[label] for label in case.labels]

@@ -11,7 +11,7 @@ import msgspec
 from glider.tools.data.errors import InputError
 from glider.tools.data.plain import read_json
 from glider.tools.verify.challenge.diagnosis import TIMING
-from glider.tools.verify.challenge.score import ChallengeScore, ScoredCase, ScoreFigure
+from glider.tools.verify.challenge.score import ChallengeScore, ScoredCase
 from glider.tools.verify.challenge.seal import open_answers
 from glider.tools.verify.challenge.watch_plan import UNCHANGED
 from glider.tools.verify.challenge.watch_score import Watched, WatchScore
@@ -20,7 +20,7 @@ Kind = Literal["single", "messy", "watch", "ocean", "form"]
 
 
 class ResultFigure(msgspec.Struct):
-    """One figure as `score` counted it: a share `count`/`of` with Wilson's 90 % interval, or a value."""
+    """One figure as `ScoreFigure.plain` has it: a share `count`/`of` with Wilson's 90 % interval, or a value."""
 
     name: str
     of: int
@@ -54,14 +54,6 @@ class SetResult(msgspec.Struct):
     figures: dict[str, ResultFigure] = {}
     stated: list[StatedProbability] = []
     note: str = ""
-
-
-def as_result_figure(figure: ScoreFigure) -> ResultFigure:
-    """A figure of a score in the form of the file."""
-    bound: Literal["at most", "at least"] = "at most" if figure.at_most else "at least"
-    return ResultFigure(
-        figure.name, figure.of, figure.value, figure.count, figure.interval, figure.target, bound, figure.met
-    )
 
 
 def stated_of(case: ScoredCase | Watched) -> StatedProbability | None:
@@ -110,7 +102,7 @@ def result_of(
         kind, str(plan.get("seed", "")), opened.sha256,
         answered or answered_by(diagnoses, [case.name for case in cases]),
         f"{dt.datetime.now(dt.UTC):%Y-%m-%dT%H:%M}", counts=counts,
-        figures={figure.key: as_result_figure(figure) for figure in scored.figures if figure.of},
+        figures={figure.key: msgspec.convert(figure.plain(), ResultFigure) for figure in scored.figures if figure.of},
         stated=[one for one in map(stated_of, cases) if one is not None],
     )  # fmt: skip
 

@@ -2,7 +2,7 @@
 docs/explanation/blind-tests.md says."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -168,61 +168,45 @@ class ScoreFigure:
 
 @dataclass(frozen=True)
 class _Share:
-    key: str
     name: str
     kinds: tuple[str, ...]
     holds: Callable[[ScoredCase], bool]
-    target: float | None
     at_most: bool = False
 
 
 GAPS = (SINGLE, PAIR, UNKNOWN)
-SHARE_FIGURES = (
-    _Share("no_gap_called_gap", "no-gap cases called a gap", (NONE,), ScoredCase.called_gap, 0.02, True),
-    _Share("effects_seen", "effects seen", GAPS, ScoredCase.seen, 0.98),
-    _Share("right_cause_first", "right cause first", (SINGLE,), ScoredCase.first, 0.95),
-    _Share("within_group", "right cause within its group", (SINGLE,), ScoredCase.grouped, 0.98),
-    _Share("in_first_three", "right cause in the first three", (SINGLE,), ScoredCase.first_three, 0.99),
-    _Share("right_subsystem", "right subsystem", (SINGLE,), ScoredCase.subsystem, 0.98),
-    _Share(
-        "unknown_called_unknown", "outside the catalogue, called unknown", (UNKNOWN,), ScoredCase.called_unknown, 0.90
-    ),
-    _Share("known_called_unknown", "known called unknown", (SINGLE, PAIR), ScoredCase.called_unknown, 0.05, True),
-    _Share("two_both_named", "two effects at once, both named", (PAIR,), ScoredCase.both, 0.80),
-    _Share("two_one_named", "two effects at once, at least one named", (PAIR,), ScoredCase.one_at_least, 0.98),
-    _Share("sure_and_wrong", "sure (> 0.8) and wrong", (NONE, *GAPS), ScoredCase.sure_and_wrong, 0.02, True),
-)
-
-
-MESSY_SHARES = (
-    _Share("right_cause_first", "right cause first", (SINGLE,), ScoredCase.first, 0.90),
-    _Share("within_group", "right cause within its group", (SINGLE,), ScoredCase.grouped, 0.97),
-    _Share("in_first_three", "right cause in the first three", (SINGLE,), ScoredCase.first_three, 0.97),
-    _Share("right_subsystem", "right subsystem", (SINGLE,), ScoredCase.subsystem, 0.90),
-    _Share(
-        "unknown_called_unknown", "outside the catalogue, called unknown", (UNKNOWN,), ScoredCase.called_unknown, 0.90
-    ),
-    _Share("known_called_unknown", "known called unknown", (SINGLE, PAIR), ScoredCase.called_unknown, 0.05, True),
-    _Share("small_sure", "no large one, but sure (> 0.8) of one", (NONE,), ScoredCase.sure_of_a_label, 0.03, True),
-    _Share("small_called_gap", "no large one, called a gap", (NONE,), ScoredCase.called_gap, 1.0, True),
-    _Share("two_both_named", "two effects at once, both named", (PAIR,), ScoredCase.both, 0.80),
-    _Share("sure_and_wrong", "sure (> 0.8) and wrong", (NONE, *GAPS), ScoredCase.sure_and_wrong, 0.03, True),
-)
-
-
-# Of vehicles of another form, which the identified model does not quite fit.
-FORM_SHARES = (
-    _Share("unchanged_called_cause", "unchanged, called a cause", (NONE,), ScoredCase.called_cause, 0.05, True),
-    _Share("unchanged_called_unknown", "unchanged, called unknown", (NONE,), ScoredCase.called_unknown, 0.10, True),
-    _Share("right_cause_first", "right cause first", (SINGLE,), ScoredCase.first, 0.75),
-    _Share("within_group", "right cause within its group", (SINGLE,), ScoredCase.grouped, None),
-    _Share("in_first_three", "right cause in the first three", (SINGLE,), ScoredCase.first_three, 0.90),
-    _Share("known_called_unknown", "known called unknown", (SINGLE,), ScoredCase.called_unknown, None, True),
-    _Share(
-        "unknown_called_unknown", "outside the catalogue, called unknown", (UNKNOWN,), ScoredCase.called_unknown, 0.60
-    ),
-    _Share("sure_and_wrong", "sure (> 0.8) and wrong", (NONE, *GAPS), ScoredCase.sure_and_wrong, 0.04, True),
-)
+SHARES = {
+    "no_gap_called_gap": _Share("no-gap cases called a gap", (NONE,), ScoredCase.called_gap, True),
+    "unchanged_called_cause": _Share("unchanged, called a cause", (NONE,), ScoredCase.called_cause, True),
+    "unchanged_called_unknown": _Share("unchanged, called unknown", (NONE,), ScoredCase.called_unknown, True),
+    "effects_seen": _Share("effects seen", GAPS, ScoredCase.seen),
+    "right_cause_first": _Share("right cause first", (SINGLE,), ScoredCase.first),
+    "within_group": _Share("right cause within its group", (SINGLE,), ScoredCase.grouped),
+    "in_first_three": _Share("right cause in the first three", (SINGLE,), ScoredCase.first_three),
+    "right_subsystem": _Share("right subsystem", (SINGLE,), ScoredCase.subsystem),
+    "unknown_called_unknown": _Share("outside the catalogue, called unknown", (UNKNOWN,), ScoredCase.called_unknown),
+    "known_called_unknown": _Share("known called unknown", (SINGLE, PAIR), ScoredCase.called_unknown, True),
+    "small_sure": _Share("no large one, but sure (> 0.8) of one", (NONE,), ScoredCase.sure_of_a_label, True),
+    "small_called_gap": _Share("no large one, called a gap", (NONE,), ScoredCase.called_gap, True),
+    "two_both_named": _Share("two effects at once, both named", (PAIR,), ScoredCase.both),
+    "two_one_named": _Share("two effects at once, at least one named", (PAIR,), ScoredCase.one_at_least),
+    "sure_and_wrong": _Share("sure (> 0.8) and wrong", (NONE, *GAPS), ScoredCase.sure_and_wrong, True),
+}
+# The shares of each kind of blind test in their order, with their targets; None: for information.
+SINGLE_TARGETS = {
+    "no_gap_called_gap": 0.02, "effects_seen": 0.98, "right_cause_first": 0.95, "within_group": 0.98,
+    "in_first_three": 0.99, "right_subsystem": 0.98, "unknown_called_unknown": 0.90, "known_called_unknown": 0.05,
+    "two_both_named": 0.80, "two_one_named": 0.98, "sure_and_wrong": 0.02,
+}  # fmt: skip
+MESSY_TARGETS = {
+    "right_cause_first": 0.90, "within_group": 0.97, "in_first_three": 0.97, "right_subsystem": 0.90,
+    "unknown_called_unknown": 0.90, "known_called_unknown": 0.05, "small_sure": 0.03, "small_called_gap": 1.0,
+    "two_both_named": 0.80, "sure_and_wrong": 0.03,
+}  # fmt: skip
+FORM_TARGETS = {  # of vehicles of another form, which the identified model does not quite fit
+    "unchanged_called_cause": 0.05, "unchanged_called_unknown": 0.10, "right_cause_first": 0.75, "within_group": None,
+    "in_first_three": 0.90, "known_called_unknown": None, "unknown_called_unknown": 0.60, "sure_and_wrong": 0.04,
+}  # fmt: skip
 
 
 def share(key: str, name: str, target: float | None, marks: Sequence[bool], at_most: bool = False) -> ScoreFigure:
@@ -231,9 +215,14 @@ def share(key: str, name: str, target: float | None, marks: Sequence[bool], at_m
     return ScoreFigure(key, name, target, at_most, value, len(marks), sum(marks), wilson(sum(marks), len(marks)))
 
 
-def _share(one: _Share, cases: Sequence[ScoredCase]) -> ScoreFigure:
-    marks = [one.holds(case) for case in cases if case.kind in one.kinds]
-    return share(one.key, one.name, one.target, marks, one.at_most)
+def _shares(targets: Mapping[str, float | None], cases: Sequence[ScoredCase]) -> list[ScoreFigure]:
+    """The shares of a kind of blind test."""
+    found = []
+    for key, target in targets.items():
+        one = SHARES[key]
+        marks = [one.holds(case) for case in cases if case.kind in one.kinds]
+        found.append(share(key, one.name, target, marks, one.at_most))
+    return found
 
 
 def middle_of(key: str, name: str, values: list[float], target: float | None, at_most: bool, middle) -> ScoreFigure:
@@ -278,7 +267,7 @@ def _plain_case(case: ScoredCase) -> dict[str, Any]:
 
 def score_forms(cases: Sequence[ScoredCase], gaps: Sequence[tuple[float, float]]) -> ChallengeScore:
     """Figures of vehicles of another form; gaps: of the file's and the identified model in each one's healthy runs."""
-    figures = [_share(one, cases) for one in FORM_SHARES]
+    figures = _shares(FORM_TARGETS, cases)
     closed = [case.closed for case in cases if case.closed is not None]
     figures.append(middle_of("closed", "closed of what the change adds, median", closed, None, False, np.median))
     worse = [identified > file for file, identified in gaps]
@@ -294,8 +283,7 @@ def score_forms(cases: Sequence[ScoredCase], gaps: Sequence[tuple[float, float]]
 def score(cases: Sequence[ScoredCase]) -> ChallengeScore:
     """Every figure of docs/reference/gap.md over the cases; those of messy cases where small effects act in any of
     them."""
-    shares = MESSY_SHARES if any(case.messy for case in cases) else SHARE_FIGURES
-    figures = [_share(one, cases) for one in shares]
+    figures = _shares(MESSY_TARGETS if any(case.messy for case in cases) else SINGLE_TARGETS, cases)
     losses = [case.log_loss() for case in cases]
     closed = [case.closed for case in cases if case.closed is not None]
     seconds = [case.seconds for case in cases if case.seconds is not None]

@@ -1,6 +1,5 @@
 """Watches of a blind test against the truth: the figures of docs/explanation/watch.md, and how each is counted."""
 
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,9 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from glider.tools.data.errors import InputError
-from glider.tools.verify.challenge.diagnosis import TIMING
-from glider.tools.verify.challenge.judge import manifest_beside, open_sealed
+from glider.tools.verify.challenge.judge import case_folders, gather, manifest_beside, open_sealed
 from glider.tools.verify.challenge.score import LARGEST_GROUP, ScoreFigure, middle_of, share
 from glider.tools.verify.challenge.watch_answer import REFERENCE, WATCH_FILE, EventSaid, WatchSaid, read_watch
 from glider.tools.verify.challenge.watch_plan import CHANGED, OUTSIDE, UNCHANGED
@@ -135,39 +132,15 @@ def score_watches(cases: Sequence[Watched]) -> WatchScore:
 
 
 def gather_watches(
-    cases: Path,
-    answers: Path,
-    said: Path,
-    manifest: Path | None = None,
-    partial: bool = False,
-    advance: Callable[[int], None] = lambda n: None,
-    needed: tuple[str, ...] = NEEDED,
-) -> list[Watched]:
+    cases: Path, answers: Path, said: Path, needed: tuple[str, ...], *, manifest: Path | None = None,
+    partial: bool = False, advance: Callable[[int], None] = lambda n: None,
+) -> list[Watched]:  # fmt: skip
     """Open and check the answers, and gather what was said to every vehicle of a blind test's folder."""
-    folder = cases / "cases" if (cases / "cases").is_dir() else cases
+    folder, _ = case_folders(cases)
     opened = open_sealed(answers, manifest or manifest_beside(folder), folder, folder.parent / REFERENCE, needed)
-    if not said.is_dir():
-        raise InputError("no such folder", source=said)
-    found = []
-    for name, truth in sorted(opened.cases.items()):
-        path, timing = said / name / WATCH_FILE, said / name / TIMING
-        answer = read_watch(path) if path.is_file() else None
-        seconds = float(json.loads(timing.read_bytes())["seconds"]) if timing.is_file() else None
-        if answer is not None or not partial:
-            found.append(Watched(name, truth, answer, seconds))
-        advance(1)
-    if not any(case.said for case in found):
-        raise InputError(f"no {WATCH_FILE} of any case in its folders", source=said)
-    return found
+    return gather(opened, said, partial, WATCH_FILE, read_watch, Watched, advance)
 
 
-def judge_watches(
-    cases: Path,
-    answers: Path,
-    said: Path,
-    manifest: Path | None = None,
-    partial: bool = False,
-    advance: Callable[[int], None] = lambda n: None,
-) -> WatchScore:
-    """Open, check and score what was said to every vehicle of a blind test's folder."""
-    return score_watches(gather_watches(cases, answers, said, manifest, partial, advance))
+def judge_watches(cases: Path, answers: Path, said: Path, **how: Any) -> WatchScore:
+    """Open, check and score what was said to every vehicle of a blind test's folder; how: as in gather_watches."""
+    return score_watches(gather_watches(cases, answers, said, NEEDED, **how))

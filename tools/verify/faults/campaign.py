@@ -65,8 +65,7 @@ def run(job: tuple[int, str], disabled: int | None = None) -> FaultOutcome:
             noticed, reaction, ended = case.run(disabled == case.row, Path(folder))
             return FaultOutcome(case.row, case.name, phase, noticed, case.allowed_s, reaction, case.expected, ended)
         scene = build_scene(phase, case.begin, case.setting, SEED, Path(folder, "mission.toml"))
-        if case.late:
-            scene.notes["late"] = True
+        scene.late = case.late
         observed = fly(scene, case.row, allowed_s=case.allowed_s, disabled=disabled)
         scene.finish()
     return FaultOutcome(

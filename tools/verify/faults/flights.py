@@ -2,6 +2,7 @@
 
 import math
 import os
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -13,7 +14,7 @@ from glider.firmware.core.maths.rotations import euler_from_quaternion
 from glider.firmware.core.vehicle.layout import CG_X, CG_Y, X_ACT, X_NU, X_QUAT
 from glider.firmware.faults import Reaction
 from glider.firmware.model.supervisor_settings import Limits
-from glider.tools.verify.faults.cases import IN_WATER, MOVING, UNDER_WAY, FaultCase
+from glider.tools.verify.faults.cases import ALL, IN_WATER, MOVING, UNDER_WAY, FaultCase
 from glider.tools.verify.faults.scene import Scene, Setting
 
 NOTHING, LOG, WARN, HOLD, ABORT, OOB, HW = Reaction
@@ -34,59 +35,71 @@ def device(name: str, kind: str, **more: Any):
     return begin
 
 
+def broken(
+    row: int, names: tuple[str, ...], kinds: tuple[str, ...], reaction: Reaction, allowed_s: float,
+    phases: tuple[str, ...] = ALL,
+) -> list[FaultCase]:  # fmt: skip
+    """A case for each of the devices and each way in which it breaks."""
+    return [
+        FaultCase(row, f"{name} {kind}", device(name, kind), reaction, allowed_s, phases)
+        for name in names
+        for kind in kinds
+    ]
+
+
 def devices() -> list[FaultCase]:
     """Rows 1 to 6, 9 to 11, 14, 16: what a device can do wrong."""
+    gone, drives = ("silent", "off"), ("slider", "ballast")
     cases = [
-        FaultCase(sup.FAULT_IMU_LOST, f"imu {kind}", device("imu", kind), ABORT, 0.2)
-        for kind in ("silent", "off", "stuck", "garbage")
+        *broken(sup.FAULT_IMU_LOST, ("imu",), (*gone, "stuck", "garbage"), ABORT, 0.2),
+        *broken(sup.FAULT_IMU_LOST, ("imu",), ("slow", "intermittent"), HOLD, 0.2),
+        *broken(sup.FAULT_PRESSURE_LOST, ("beacon",), (*gone, "garbage", "slow", "intermittent"), ABORT, 0.5),
+        *broken(sup.FAULT_BUS_LOST, drives, gone, ABORT, 0.5),
+        *broken(sup.FAULT_WIRE_LOST, ("slider_wire",), (*gone, "garbage"), WARN, 0.5),
+        *broken(sup.FAULT_WIRE_LOST, ("plunger_wire",), (*gone, "garbage"), ABORT, 0.5),
+        *broken(sup.FAULT_SERVO_LOST, ("servo",), gone, WARN, 0.5),
+        *broken(
+            sup.FAULT_SAMPLE_TIME, SENSORS, ("delayed", "repeated", "backwards", "slow"), LOG, 4 * SAMPLE_S, IN_WATER
+        ),
     ]
     cases += [
-        FaultCase(sup.FAULT_IMU_LOST, f"imu {kind}", device("imu", kind), HOLD, 0.2)
-        for kind in ("slow", "intermittent")
+        FaultCase(sup.FAULT_EXCEPTION, f"{name} refuses", device(name, "misconfigured"), ABORT, 0.1) for name in drives
     ]
-    cases += [
-        FaultCase(sup.FAULT_PRESSURE_LOST, f"beacon {kind}", device("beacon", kind), ABORT, 0.5)
-        for kind in ("silent", "off", "garbage", "slow", "intermittent")
-    ]
-    cases += [
-        FaultCase(sup.FAULT_BUS_LOST, f"{name} {kind}", device(name, kind), ABORT, 0.5)
-        for name in ("slider", "ballast")
-        for kind in ("silent", "off")
-    ]
-    cases += [
-        FaultCase(sup.FAULT_WIRE_LOST, f"{name} {kind}", device(name, kind), reaction, 0.5)
-        for name, reaction in (("slider_wire", WARN), ("plunger_wire", ABORT))
-        for kind in ("silent", "off", "garbage")
-    ]
-    cases += [
-        FaultCase(sup.FAULT_SERVO_LOST, f"servo {kind}", device("servo", kind), WARN, 0.5) for kind in ("silent", "off")
-    ]
-    cases += [
-        FaultCase(sup.FAULT_SAMPLE_TIME, f"{name} {kind}", device(name, kind), LOG, 4 * SAMPLE_S, IN_WATER)
-        for name in SENSORS
-        for kind in ("delayed", "repeated", "backwards", "slow")
-    ]
-    cases += [
-        FaultCase(sup.FAULT_EXCEPTION, f"{name} refuses", device(name, "misconfigured"), ABORT, 0.1)
-        for name in ("slider", "ballast")
-    ]
-    cases += [
-        FaultCase(sup.FAULT_IMPLAUSIBLE, f"{name} garbage", device(name, "garbage"), WARN, SAMPLE_S) for name in SENSORS
-    ]
+    cases += broken(sup.FAULT_IMPLAUSIBLE, SENSORS, ("garbage",), WARN, SAMPLE_S)
     cases += [
         FaultCase(
             sup.FAULT_IMPLAUSIBLE, f"{name} jumps", device(name, "jump", drift=JUMPS[name]), WARN, SAMPLE_S, IN_WATER
         )
         for name in SENSORS
     ]
-    cases.append(
-        FaultCase(sup.FAULT_STUCK_SENSOR, "beacon stuck", device("beacon", "stuck"), WARN, 2.0 + SAMPLE_S, MOVING)
-    )
+    cases += broken(sup.FAULT_STUCK_SENSOR, ("beacon",), ("stuck",), WARN, 2.0 + SAMPLE_S, MOVING)
     cases += [
         FaultCase(sup.FAULT_STUCK_SENSOR, f"{name} stuck", stuck_wire(name, index), WARN, 2.0 + SAMPLE_S, UNDER_WAY)
         for name, index in (("slider_wire", 1), ("plunger_wire", 2))
     ]
     return cases
+
+
+def counted_when(holds: Callable[[Scene], bool]) -> Callable[[Scene, float], None]:
+    """Each tick: a fault's time counts from when a condition first holds."""
+
+    def look(scene: Scene, t: float) -> None:
+        if not scene.counted and holds(scene):
+            scene.counted, scene.since = True, t
+
+    return look
+
+
+def on_their_way(scene: Scene, change: Callable[[Any], None]) -> None:
+    """Change the commands behind the controller's tick, in place."""
+    honest = scene.pilot.tick
+
+    def tick(t: float):
+        commands = honest(t)
+        change(commands)
+        return commands
+
+    scene.pilot.tick = tick  # type: ignore[method-assign]
 
 
 def stuck_wire(name: str, index: int):
@@ -96,12 +109,7 @@ def stuck_wire(name: str, index: int):
         sensor = getattr(scene.board, name)
         sensor.begin("stuck")
         place, span = float(scene.pilot.commands[index]), RANGES[index]
-
-        def moving(scene: Scene, t: float) -> None:
-            if abs(scene.pilot.commands[index] - place) > 0.0499 * span and "moved" not in scene.notes:
-                scene.notes["moved"] = scene.since = t
-
-        scene.each_tick = moving
+        scene.each_tick = counted_when(lambda scene: abs(scene.pilot.commands[index] - place) > 0.0499 * span)
 
     return begin
 
@@ -133,19 +141,14 @@ def wrong_way(name: str):
     index = 1 if name == "slider" else 2
 
     def begin(scene: Scene) -> None:
-        honest, place = scene.pilot.tick, float(scene.world.x[X_ACT + index])
+        place = float(scene.world.x[X_ACT + index])
 
-        def tick(t: float):
-            commands = honest(t)
+        def turn(commands: Any) -> None:
             commands[index] = -math.copysign(1.0, place)
-            return commands
-
-        def moving(scene: Scene, t: float) -> None:
-            if abs(scene.world.x[X_ACT + index] - place) > 0.005 * RANGES[index] and "moved" not in scene.notes:
-                scene.notes["moved"] = scene.since = t
 
         getattr(scene.board, name).begin("wrong")
-        scene.pilot.tick, scene.each_tick = tick, moving  # type: ignore[method-assign]
+        on_their_way(scene, turn)
+        scene.each_tick = counted_when(lambda scene: abs(scene.world.x[X_ACT + index] - place) > 0.005 * RANGES[index])
 
     return begin
 
@@ -154,32 +157,27 @@ def controller(values: Any, ticks: float = math.inf, index: int = 1):
     """What the controller asks for, from outside: the value itself, or a factor of the actuator's range."""
 
     def begin(scene: Scene) -> None:
-        honest, count = scene.pilot.tick, [0]
+        count = [0]
 
-        def tick(t):
-            commands = honest(t)
+        def put(commands: Any) -> None:
             if count[0] < ticks:
                 count[0] += 1
                 commands[index] = values
                 scene.pilot.ap[ctl.WANTED_SERVO + index] = values
-            return commands
 
-        scene.pilot.tick = tick  # type: ignore[method-assign]
+        on_their_way(scene, put)
 
     return begin
 
 
 def no_solution(scene: Scene) -> None:
     """The law's form has no solution (g near zero), each time it is asked."""
-    honest = scene.pilot.tick
 
-    def tick(t):
-        commands = honest(t)
+    def fail(commands: Any) -> None:
         if scene.pilot.ap[ctl.ACTIVE] == ctl.LAW:
             scene.pilot.ap[ctl.LAW_STATUS] = 1.0
-        return commands
 
-    scene.pilot.tick = tick  # type: ignore[method-assign]
+    on_their_way(scene, fail)
 
 
 def no_number_in_the_filter(times: int):
@@ -218,13 +216,12 @@ def tipped(place: int, metres: float):
     """A mass in the hull comes loose; time counts from when the vehicle is past 60 deg of pitch or 75 of roll."""
 
     def begin(scene: Scene) -> None:
-        def past(scene: Scene, t: float) -> None:
+        def past(scene: Scene) -> bool:
             roll, pitch, _ = euler_from_quaternion(*scene.world.x[X_QUAT : X_QUAT + 4])
-            if "past" not in scene.notes and (abs(pitch) > math.radians(60.0) or abs(roll) > math.radians(75.0)):
-                scene.notes["past"] = scene.since = t
+            return abs(pitch) > math.radians(60.0) or abs(roll) > math.radians(75.0)
 
         scene.world.P[place] += metres
-        scene.each_tick = past
+        scene.each_tick = counted_when(past)
 
     return begin
 
@@ -297,18 +294,9 @@ def too_deep(to: float):
     """The sea floor is deeper than the hull bears, and the vehicle sinks: heavier by what it has taken in."""
 
     def begin(scene: Scene) -> None:
-        scene.each_tick = since_too_deep(to)
+        scene.each_tick = counted_when(lambda scene: scene.depth > to)
 
     return begin
-
-
-def since_too_deep(to: float):
-    def look(scene: Scene, t: float) -> None:
-        if scene.depth > to and "past" not in scene.notes:
-            scene.notes["past"] = t
-            scene.since = t
-
-    return look
 
 
 def conditions() -> list[FaultCase]:

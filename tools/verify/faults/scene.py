@@ -64,7 +64,8 @@ class Scene:
     deepest: float = 0.0
     left: float | None = None  # m deep ADRIFT_S after the flight's end; after LONGEST_S where that does not come
     cleanup: list[Callable[[], None]] = field(default_factory=list)
-    notes: dict[str, Any] = field(default_factory=dict)
+    late: bool = False  # the clock may be late
+    counted: bool = False  # `since` was set to when the fault shows, later than it began
 
     @property
     def board(self) -> SimBoard:
@@ -137,7 +138,6 @@ class SceneResult:
     noticed_s: float | None
     reaction: Reaction
     ended: str  # surfaced, safe, lost, or what kept the fault from beginning
-    notes: dict[str, Any]
 
 
 class LateClock:
@@ -186,7 +186,7 @@ def fly(scene: Scene, row: int, *, allowed_s: float, disabled: int | None = None
     if disabled is not None:
         supervisor.disable(disabled)
     board.open()
-    if scene.lateness is not None or "late" in scene.notes:
+    if scene.lateness is not None or scene.late:
         board.clock = LateClock(board.clock, scene)
     channel = NullRecorder((TICK,)).channel("/tick")
     runtime = Runtime(board, pilot, supervisor, channel, extras=(scene.step,))
@@ -201,7 +201,6 @@ def fly(scene: Scene, row: int, *, allowed_s: float, disabled: int | None = None
         None if noticed is None or since is None else noticed - since,
         supervisor.worst(row),
         "never begun" if since is None else ended(scene),
-        scene.notes,
     )
 
 

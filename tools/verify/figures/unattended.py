@@ -1,8 +1,8 @@
 """`python -m glider.tools.verify.figures.unattended`: claims about unattended flights, measured, as JSON.
 
-kills: a flight killed (-9) at random instants and started again, by the rule that `glider fly` goes by (tools/
-unattended.py Life): how many dives were resumed. power-cuts: a log of a flight cut at every byte: what is read of it.
-endurance: half an hour on twins at real time, beside load on another core.
+kills: a flight killed (-9) at random instants and started again, by the rule that `glider fly` goes by: how many dives
+were resumed. power-cuts: a log of a flight cut at every byte: what is read of it. endurance: half an hour on twins at
+real time, beside load on another core.
 """
 
 import gc

@@ -196,11 +196,8 @@ def _water(path: Path, segment: Segment) -> _Water:
         raise InputError(message, source=path, column=f"{maker}_CONDUCTIVITY")
     wet = sampled[pressure[sampled] >= OUT_OF_WATER_DBAR]
     count(left_out, f"of the CTD above {OUT_OF_WATER_DBAR:g} dbar", len(sampled) - len(wet))
-    payload_left: dict[str, int] = {}
     t = _times(table, "PLD_REALTIMECLOCK")
-    rows = wet[in_the_mission(t[wet], payload_left)]
-    for reason, samples in payload_left.items():
-        count(left_out, f"of the CTD {reason}", samples)
+    rows = wet[in_the_mission(t[wet], left_out, "of the CTD ")]
     t = t[rows]
     require_same_time(t, path, segment.start + segment.columns["t_s"], segment.files[0])
     conductivity = clean("conductivity", t, conductivity[rows], left_out)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from glider.tools.data.errors import InputError
-from glider.tools.data.importers.ocean import netcdf, seawater
+from glider.tools.data.importers.ocean import netcdf, og1_names, seawater
 from glider.tools.data.importers.ocean.netcdf import NetCDF
 from glider.tools.data.importers.ocean.segment import Segment, at_rows, clean, count, in_the_mission, usable_fixes
 
@@ -20,7 +20,6 @@ VOLUME = {"": 1e-6, **netcdf.CUBIC_CENTIMETRES}
 DEGREES = {"": np.pi / 180.0, **netcdf.ANGLE}
 COUNTS = {"": 1.0, "1": 1.0}
 ON_EARTH = {"degrees_north": 1.0, "degrees_east": 1.0, "degrees": 1.0, "": 1.0}
-USABLE = (0.0, 1.0, 2.0, 5.0, 8.0)  # quality flags: not judged, good, probably good, changed, interpolated
 
 
 def read_seaglider(paths: list[Path], advance: Callable[[int], None]) -> list[Segment]:
@@ -129,16 +128,13 @@ def _add_water(segment: Segment, file: NetCDF, t: np.ndarray) -> None:
     left_out = segment.left_out
     logged_t = file.values("ctd_time", EPOCH)
     size = len(logged_t)
-    ctd_left: dict[str, int] = {}
-    rows = in_the_mission(logged_t, ctd_left)
-    for reason, samples in ctd_left.items():
-        count(left_out, f"of the CTD {reason}", samples)
+    rows = in_the_mission(logged_t, left_out, "of the CTD ")
     ctd_t = logged_t[rows]
     pressure = clean("pressure", ctd_t, file.values("ctd_pressure", netcdf.DBAR, size)[rows], left_out)
     temperature = clean("temperature", ctd_t, file.values("temperature", netcdf.CELSIUS, size)[rows], left_out)
     salinity = clean("salinity", ctd_t, file.values("salinity", netcdf.PRACTICAL, size)[rows], left_out)
     flags = [file.flags(f"{name}_qc", size)[rows] for name in ("salinity", "temperature")]
-    bad = np.any([np.isfinite(one) & ~np.isin(one, USABLE) for one in flags], axis=0)
+    bad = np.any([np.isfinite(one) & ~np.isin(one, og1_names.USABLE) for one in flags], axis=0)
     bad |= np.isnan(salinity) | np.isnan(temperature)
     count(left_out, "of the CTD that the base station calls bad or has not", np.count_nonzero(bad))
     temperature, salinity = np.where(bad, np.nan, temperature), np.where(bad, np.nan, salinity)

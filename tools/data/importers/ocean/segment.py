@@ -62,20 +62,20 @@ def count(left_out: dict[str, int], reason: str, samples: int | np.integer) -> N
         left_out[reason] = left_out.get(reason, 0) + int(samples)
 
 
-def in_the_mission(t: np.ndarray, left_out: dict[str, int]) -> np.ndarray:
+def in_the_mission(t: np.ndarray, left_out: dict[str, int], which: str = "") -> np.ndarray:
     """The rows of a log whose times belong to its mission and go on; t s since 1970, NaN where it has none.
 
     Taken out are rows without a time, more than LONGEST_S from the median of the log's times, before FIRST_TIME, and
-    the fewest that make the rest go on.
+    the fewest that make the rest go on. `which` stands before the reason in left_out.
     """
     timed = np.flatnonzero(np.isfinite(t))
-    count(left_out, "without a time", len(t) - len(timed))
+    count(left_out, f"{which}without a time", len(t) - len(timed))
     possible = timed[t[timed] > FIRST_TIME]
     middle = np.median(t[possible]) if possible.size else np.nan
     inside = possible[np.abs(t[possible] - middle) <= LONGEST_S]
-    count(left_out, "at a time outside the mission", len(timed) - len(inside))
+    count(left_out, f"{which}at a time outside the mission", len(timed) - len(inside))
     kept = inside[longest_increasing(t[inside])] if inside.size else inside
-    count(left_out, "whose time does not go on", len(inside) - len(kept))
+    count(left_out, f"{which}whose time does not go on", len(inside) - len(kept))
     return kept
 
 

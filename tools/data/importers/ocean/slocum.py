@@ -168,10 +168,7 @@ def _add_water(segment: Segment, ctd: _Log, t: np.ndarray, own: tuple[np.ndarray
     use = np.flatnonzero(np.isfinite(conductivity) & np.isfinite(temperature) & np.isfinite(pressure))
     wet = use[pressure[use] >= OUT_OF_WATER_DBAR]
     count(left_out, f"of the CTD above {OUT_OF_WATER_DBAR:g} dbar", len(use) - len(wet))
-    ctd_left: dict[str, int] = {}
-    use = wet[in_the_mission(found[clock][wet], ctd_left)]
-    for reason, samples in ctd_left.items():
-        count(left_out, f"of the CTD {reason}", samples)
+    use = wet[in_the_mission(found[clock][wet], left_out, "of the CTD ")]
     ctd_t = found[clock][use]
     require_same_time(ctd_t, ctd.path, t, segment.files[0])
     conductivity = clean("conductivity", ctd_t, conductivity[use], left_out)
