@@ -54,7 +54,6 @@ RIVALS = 5  # further labels fitted in the place of the main one, where it stand
 # Floors by which an effect widens the gap, as likely a main cause as one of many small ones there: where noise is not
 # what the file says, so that it may say little of the rest, and where it is.
 LARGE, SPECIFIED = 2.1, 1.2
-TURBULENCE_GAP_SHARE = 0.7  # of what rough water leaves of windows (docs/explanation/diagnosis.md, Thresholds)
 
 
 @dataclass
@@ -213,32 +212,26 @@ def search_again_with_noise(
 ) -> Answer:
     """The answer of a further search, by a filter that knows of the disorder found.
 
-    Where the windows err by far less than rough water of that strength would have them, it is none: something shakes
-    the vehicle and lets go of it again, as a tail that flaps does. Nor is it where another effect is the main cause
-    beside it: what nobody knows looks like rough water too, in which a known effect is easily believed. The answer is
-    then the one without it. Rough water is looked for beside a clock that wanders, too.
+    Where another effect is the main cause beside rough water, it is none: what nobody knows looks like rough water too,
+    in which a known effect is easily believed. The answer is then the one without it. Rough water is looked for beside
+    a clock that wanders, too.
     """
     more, _ = inflated(search.problem, found.probe, found.scale)
     clock = clock_of(search, hypothesis, gained, more) if found.probe.name == CLOCK else None
     problem = search.problem.as_recorded if clock is None else clock.aligned(search.problem)
     answer = conclude(run(problem.with_extra_noise(more), say, clock, [search.best, hypothesis]), say, found)
-    if found.probe.name == TURBULENCE and not as_inflated(answer):
-        say("not as rough water would have it")
+    if found.probe.name == TURBULENCE and answer.main != TURBULENCE:
+        say("rough water is not the main cause")
         return conclude(search, say, calm=True)
     water = turbulence_first(answer.probed) if found.probe.name == CLOCK else None
     if water is not None and left_floors(answer.shrinkage) > UNKNOWN_GAP_RATIO_AT_HALF:
         more = more + inflated(answer.search.problem, water.probe, water.scale)[0]
         noisy = conclude(run(problem.with_extra_noise(more), say, clock, [answer.search.best]), say, water)
-        if as_inflated(noisy):
+        if noisy.main == TURBULENCE:
             clocks = [label for label in answer.selected if catalogue()[label].place == CLOCK_PLACE]
             gained = noisy.gained | {label: answer.gained[label] for label in clocks}
             return replace(noisy, selected=[*noisy.selected, *clocks], gained=gained)
     return answer
-
-
-def as_inflated(answer: Answer) -> bool:
-    """Whether turbulence is the main cause of an answer, and windows err as rough water would have them."""
-    return answer.main == TURBULENCE and answer.shrinkage.after >= TURBULENCE_GAP_SHARE * answer.shrinkage.floor
 
 
 def conclude(
@@ -300,8 +293,8 @@ def conclude(
         small_ones, alone = (doubt_small(chances, main, floors / size) for size in (LARGE, SPECIFIED))
         chances = mixed(small_ones, alone, search.well_specified)
     by_effects = sum(sizes[label] ** 2 for label in gained)
-    places = [catalogue()[label].place for label in (main, *by_size) if label in catalogue()]
-    unknown = probability_unknown(search, bool(gained), bool(ranked), shrinkage, left, noise, by_effects, places)
+    places = [catalogue()[label].place for label in ranked if label in catalogue()]
+    unknown = probability_unknown(search, bool(ranked), shrinkage, left, noise, by_effects, places)
     if not gained:
         unknown = LEAST_UNKNOWN + (unknown - LEAST_UNKNOWN) * gap_is_material(shrinkage)
     chances = {name: value * (1.0 - unknown) for name, value in chances.items()} | {UNKNOWN: unknown}
