@@ -12,7 +12,6 @@ from glider.tools.diagnose.record import NONE, UNKNOWN
 
 TIE = 6.0  # nat within which two labels are not distinguished: what a change of prior spreads can move
 ERROR_RATE = 0.03  # answers that named something else altogether, of those to the cases it was developed with: 3 of 104
-MAX_NONE_RATIO = 0.9  # of the main cause's probability, that none may have where there is an effect at all
 LARGE_WIDTH = 0.25  # e-folds of size over which a main cause comes to be as likely as not
 
 
@@ -23,38 +22,15 @@ def softmax(logs: dict[str, float]) -> dict[str, float]:
     return {name: weight / total for name, weight in weights.items()}
 
 
-def share_out(chances: dict[str, float], main: str, first: dict[str, float]) -> dict[str, float]:
-    """Probabilities of the main cause, where others of the selected effects may take more of the gap than it.
-
-    first: how probably each takes the most.
-    """
-    own = first.get(main, 1.0)
-    shared = {label: chance * own for label, chance in chances.items()}
-    for label in first:
-        if label != main:
-            shared[label] = shared.get(label, 0.0) + first[label]
-    return shared
-
-
-def pass_on(chances: dict[str, float], others: list[str]) -> dict[str, float]:
-    """Probabilities of the main cause, where other effects are there beside it, the largest first.
-
-    Without the main one there is not nothing: the next takes its place.
-    """
-    if not others:
-        return chances
-    return chances | {others[0]: chances.get(others[0], 0.0) + chances[NONE], NONE: 0.0}
-
-
 def doubt_small(chances: dict[str, float], main: str, size: float) -> dict[str, float]:
     """Probabilities where the largest of the effects may be one of many small ones, and nothing the main cause.
 
     size: of the main one, in sizes at which that is as likely as not. What this takes off the labels goes to none, but
-    no more than MAX_NONE_RATIO of what the main one keeps: there is something.
+    no more than what the main one keeps: there is something.
     """
     large = float(ndtr(np.log(max(size, 1e-6)) / LARGE_WIDTH))
     labels = sum(chance for name, chance in chances.items() if name != NONE)
-    least = 1.0 / (1.0 + MAX_NONE_RATIO * chances[main] / max(labels, 1e-9))  # of the labels' probability that stays
+    least = 1.0 / (1.0 + chances[main] / max(labels, 1e-9))  # of the labels' probability that stays
     kept = max(large, least)
     found = {name: kept * chance for name, chance in chances.items() if name != NONE}
     return found | {NONE: 1.0 - sum(found.values())}
@@ -85,17 +61,14 @@ def answer_first(chances: dict[str, float], gained: Iterable[str]) -> tuple[str,
 def mix_in_error_rate(chances: dict[str, float], main: str, others: Sequence[str] = ()) -> dict[str, float]:
     """Probabilities of which ERROR_RATE goes to all labels: the search may have lost the true one on its way.
 
-    A third of it to those at the place of the main one, which an effect in another form is taken for, and a third to
-    `others` that the search found beside it: of nine effects that were not put first, six were among those.
+    A third of it to `others` than the main one that the search found: of nine effects that were not put first, six were
+    among those.
     """
     labels = catalogue()
-    beside = [name for name, effect in labels.items() if main and effect.place == labels[main].place and name != main]
     others = [name for name in others if name in labels and name != main]
-    favoured = [group for group in (beside, others) if group]
-    shares = dict.fromkeys(labels, (1.0 - len(favoured) / 3.0) * ERROR_RATE / len(labels))
-    for group in favoured:
-        for name in group:
-            shares[name] += ERROR_RATE / 3.0 / len(group)
+    shares = dict.fromkeys(labels, (2.0 / 3.0 if others else 1.0) * ERROR_RATE / len(labels))
+    for name in others:
+        shares[name] += ERROR_RATE / 3.0 / len(others)
     return {name: (1.0 - ERROR_RATE) * value + shares.get(name, 0.0) for name, value in chances.items()}
 
 

@@ -23,7 +23,7 @@ from glider.tools.diagnose.noise_probes import (
 )
 from glider.tools.diagnose.residuals import UNCLEAN
 from glider.tools.diagnose.search import EVIDENCE_NEEDED, Search
-from glider.tools.diagnose.shrink import AFTER, FLOOR, Shrinkage, shrink
+from glider.tools.diagnose.shrink import Shrinkage, shrink
 from glider.tools.diagnose.waves import LINE, line_share
 from glider.tools.inference.fit import Hypothesis
 from glider.tools.inference.parameters import CLOCK_PLACE
@@ -31,29 +31,19 @@ from glider.tools.inference.problem import Problem
 
 LEFT_OVER, LEFT_WIDTH = 0.145, 1.1  # share of the explainable misfit at which unknown is as likely as not; e-folds
 OWN_LEFT = 0.03  # the same where all of it is left at the sensor of an effect that is there
-LEFT_GAP, LEFT_GAP_WIDTH = 0.17, 0.5  # the same of the squared gap beyond the floor
-NATS = 0.25  # what the misfit counts beside the gap, in their geometric mean
-LEAST_SHARE = 0.05  # of the misfit, in that mean: a sensor's small error may have nearly all the nat
-LEFT_BOTH, LEFT_BOTH_WIDTH = 0.15, 0.8  # the same of that mean, where the file does not say what noise there is
+LEFT_GAP, LEFT_GAP_WIDTH = 0.17, 0.5  # the same of the squared gap beyond the floor: small effects have nat, too
 # Floors that the gap left lies beyond its own floor (root of the difference of squares), at which it is as likely one
 # effect of its own as what small ones leave; e-folds.
 UNKNOWN_GAP_RATIO_AT_HALF, UNKNOWN_GAP_RATIO_WIDTH = 1.8, 0.35
 # Where the file says what noise there is, it is right about the vehicle: nothing small stands beside the main effect.
 SPECIFIED_LEFT, SPECIFIED_LEFT_WIDTH = 0.11, 0.6  # as LEFT_OVER
-SPECIFIED_GAP, SPECIFIED_GAP_WIDTH = 0.35, 0.5  # as LEFT_GAP
 SPECIFIED_WIDE = 0.8  # as UNKNOWN_GAP_RATIO_AT_HALF
-TURNED = ("pitch", "roll", "yaw", "rates")  # channels that a sea does not move
-NOISY, NOISY_WIDTH = 0.2, 0.8  # share of the explainable misfit that is left: disorder is looked for; width in e-folds
 # Tolerances that the best explanation still misses by: with the first an effect of the catalogue may, with the second
 # none does, and the vehicle is not the file's.
 UNFIT = (3.0, 8.0)
-LOOSE, FROM_LOOSE = 3.0, (0.75, 1.33)  # times the floor, and one tolerance, that no vehicle without a gap is off
 ONE_AXIS = 0.65  # of what all axes bring together: where one link alone brings as much, it is no turbulence
-MOSTLY = 0.9  # of all that can be explained, for turbulence or waves to be the cause
 LEAST_UNKNOWN, MORE_UNKNOWN = 0.002, 0.005  # probability of an unknown effect: nothing is left, or something is
 CLOCKED = 0.5  # of what the best probe gains, that the probe of motion capture's clock must
-RIVALS = 4  # links probed beside water and axes
-LEAST_WAVES = 100.0  # nat
 ALONE = (2.0, 4.5)  # times what any other element's noise gains: what is left may be, and is, at one element alone
 SHOWS = (UNCLEAN, 1.5 * UNCLEAN)  # sigma of what is left, from which it counts, and in full
 
@@ -134,29 +124,13 @@ def remainder_of(
     return Remainder(explained, probed[0].gain, probed, opened(whiteness, *SHOWS))
 
 
-def excess_water_noise_of(search: Search, probed: list[ProbeResult]) -> ProbeResult | None:
-    """Turbulence or waves, where water in disorder explains the recalibrated model's misfit better than any one link.
-
-    Turbulence shakes every axis: where one alone brings most of it, something else shakes that axis. `probed`: at the
-    selected model; the links that gain most there are probed beside water and axes.
-    """
-    rivals = [found.probe for found in probed[:RIVALS]]
-    asked = [p for p in probes(search.problem) if p in rivals or p.stage in ("force", "water")]
-    found = run_probes(search.problem, *search.model(search.null), asked)
-    first = found[0]
-    if first.probe.name == WAVES:
-        return first
-    axes = sorted((p.gain for p in found if p.probe.stage == "force" and p.probe.name != TURBULENCE), reverse=True)
-    return first if first.probe.name == TURBULENCE and axes[0] < ONE_AXIS * first.gain else None
-
-
 def waves_beside(search: Search, hypothesis: Hypothesis, left: Remainder) -> ProbeResult | None:
     """Waves, where they gain beside a hypothesis, and what they move has a sea's line.
 
     Other links may gain more: what effects leave that the windows do not ask for.
     """
     found = next((one for one in left.probed if one.probe.name == WAVES), None)
-    if found is None or found.gain < LEAST_WAVES:
+    if found is None or found.gain < EVIDENCE_NEEDED:
         return None
     more, doubt = inflated(search.problem, found.probe, found.scale)
     gains = search.problem.filter(*search.model(hypothesis), begin=True, more=more, doubt=doubt)
@@ -198,7 +172,7 @@ def disorder(search: Search, hypothesis: Hypothesis, left: Remainder) -> ProbeRe
     """The noise that the search has to know of, to see what is beside it; None where there is nothing of the kind.
 
     Motion capture's clock where it wanders; waves where they show beside the hypothesis, turbulence where nothing else
-    does; either where it is the cause: of all that can be explained, it explains MOSTLY.
+    does.
     """
     clock = wandering_clock(search, hypothesis, left)
     if clock is not None:
@@ -206,9 +180,6 @@ def disorder(search: Search, hypothesis: Hypothesis, left: Remainder) -> ProbeRe
     beside = waves_beside(search, hypothesis, left)
     if beside is not None:
         return beside
-    found = excess_water_noise_of(search, left.probed) if left.share > NOISY else None
-    if found is not None and found.gain > MOSTLY * (left.explained + left.left):
-        return found
     water = turbulence_first(left.probed)  # a sensor's small error may have more nats than it: windows show it
     return water if water is not None and left_floors(shrink(search, hypothesis)) > UNKNOWN_GAP_RATIO_AT_HALF else None
 
@@ -273,52 +244,25 @@ def clock_label(search: Search, hypothesis: Hypothesis) -> str:
     return min(left, key=lambda label: float(left[label] @ left[label]))
 
 
-def turned_floors(shrinkage: Shrinkage) -> float:
-    """What is left beyond the floor in the channels that a sea does not move, in floors of theirs."""
-    after, floor = shrinkage.channels(AFTER), shrinkage.channels(FLOOR)
-    turned = [name for name in TURNED if name in after]
-    lowest = sum(floor[name] ** 2 for name in turned)
-    beyond = sum(after[name] ** 2 for name in turned) - lowest
-    return float(np.sqrt(max(beyond, 0.0) / max(lowest, 1e-9)))
-
-
-def beside_a_sea(shrinkage: Shrinkage, left: Remainder, sea: ProbeResult) -> float:
-    """Probability of an unknown effect beside waves, which move the vehicle and do not turn it.
-
-    What is left of the misfit is held against what effects explain: the sea explains far more, and nothing of it.
-    """
-    own = max(left.explained - sea.gain, 0.0)
-    share = left.left / max(left.left + own, 1e-9)
-    return probability(turned_floors(shrinkage), UNKNOWN_GAP_RATIO_AT_HALF, UNKNOWN_GAP_RATIO_WIDTH) * probability(
-        share, LEFT_OVER, LEFT_WIDTH
-    )
-
-
 def probability_unknown(
-    search: Search, selected: bool, evident: bool, shrinkage: Shrinkage, left: Remainder | None,
-    noise: ProbeResult | None, taken: float, places: Sequence[tuple[str, str]] = (),
+    search: Search, evident: bool, shrinkage: Shrinkage, left: Remainder | None, noise: ProbeResult | None,
+    taken: float, places: Sequence[tuple[str, str]] = (),
 ) -> float:  # fmt: skip
     """Probability that the gap is none of the catalogue's, or that there is one where none shows otherwise.
 
-    selected, evident: whether any effect is, or is at least there; noise: disorder that the search knows of, which no
-    window's floor has; taken: as in left_share; places: of the effects, that of the one that takes most first. What is
-    left where that one sits, and nowhere else, is no small effect beside it: something there has another form, however
-    narrow the gap it leaves. So it is with the sensor of any of them.
+    evident: whether any effect is there, if negligible; noise: disorder that the search knows of, which no window's
+    floor has; taken: as in left_share; places: of the effects. What is left at the sensor of one of them, and nowhere
+    else, is no small effect beside it: something there has another form, however narrow the gap it leaves.
     """
     off = unfit(shrinkage, noise) if search.problem.rules.whiteness else 0.0
-    shows = 0.0 if left is None else left.shows
-    hidden = shown = LEAST_UNKNOWN  # where what is left was not asked about, or nothing is
-    if not selected and not noise and search.problem.rules.whiteness:
-        hidden += (1.0 - MORE_UNKNOWN - hidden) * opened(
-            shrinkage.after / max(LOOSE * shrinkage.floor, 1.0), *FROM_LOOSE
-        )
+    known = LEAST_UNKNOWN
     if left is not None:
         kinds = ((search.well_specified, True), (1.0 - search.well_specified, False))
         shown = sum(
             share * unknown_beside(well_specified, evident, shrinkage, left, noise, taken, places)
             for share, well_specified in kinds if share > 0.0
         )  # fmt: skip
-    known = hidden + (shown - hidden) * shows
+        known += (shown - known) * left.shows
     return known + (1.0 - MORE_UNKNOWN - known) * off
 
 
@@ -326,32 +270,24 @@ def unknown_beside(
     well_specified: bool, evident: bool, shrinkage: Shrinkage, left: Remainder, noise: ProbeResult | None, taken: float,
     places: Sequence[tuple[str, str]],
 ) -> float:  # fmt: skip
-    """The same of something left, where every sensor's noise is what the file says (well specified), or is not."""
-    wide = probability(
-        left_floors(shrinkage),
-        SPECIFIED_WIDE if well_specified and not noise else UNKNOWN_GAP_RATIO_AT_HALF,
-        UNKNOWN_GAP_RATIO_WIDTH,
-    )
-    if noise:
-        disordered = probability(left.share, NOISY, NOISY_WIDTH)
-        if noise.probe.name == CLOCK:  # it moves no vehicle: windows say as much as with a clock that is right
-            return wide * max(disordered, probability(left_share(shrinkage, taken), LEFT_GAP, LEFT_GAP_WIDTH))
-        return max(disordered, beside_a_sea(shrinkage, left, noise)) if noise.probe.name == WAVES else disordered
+    """The same of something left, where every sensor's noise is what the file says (well specified), or is not.
+
+    Then what is left is no small effect beside the main one, and the misfit says enough. A wandering clock moves no
+    vehicle: windows say as much as with a clock that is right.
+    """
+    if noise and noise.probe.name != CLOCK:
+        return probability(left.share, LEFT_OVER, LEFT_WIDTH)
+    as_said = well_specified and not noise
+    middle = SPECIFIED_WIDE if as_said else UNKNOWN_GAP_RATIO_AT_HALF
+    wide = probability(left_floors(shrinkage), middle, UNKNOWN_GAP_RATIO_WIDTH)
     if not evident:
         return wide
-    gap = left_share(shrinkage, taken)
-    misfit = probability(
-        left.share, *((SPECIFIED_LEFT, SPECIFIED_LEFT_WIDTH) if well_specified else (LEFT_OVER, LEFT_WIDTH))
-    )
-    if well_specified:  # what is left is no small effect beside the main one: either says enough
-        form = max(misfit, probability(gap, SPECIFIED_GAP, SPECIFIED_GAP_WIDTH))
+    if as_said:
+        form = probability(left.share, SPECIFIED_LEFT, SPECIFIED_LEFT_WIDTH)
     else:
-        both = max(left.share, LEAST_SHARE) ** NATS * gap ** (1.0 - NATS)
-        form = probability(both, LEFT_BOTH, LEFT_BOTH_WIDTH)
+        form = probability(left_share(shrinkage, taken), LEFT_GAP, LEFT_GAP_WIDTH)
     beside = max(form * wide, MORE_UNKNOWN)
     place, alone = left.alone
     if place[0] == "sensing" and place in places:
         beside += (max(form, probability(left.share, OWN_LEFT, LEFT_WIDTH)) - beside) * alone
-    elif place in places[:1]:
-        beside += (max(form, misfit) - beside) * alone
     return beside

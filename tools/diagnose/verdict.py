@@ -16,8 +16,6 @@ from glider.tools.diagnose.probabilities import (
     doubt_small,
     grouped,
     mix_in_error_rate,
-    pass_on,
-    share_out,
     softmax,
     to_none,
 )
@@ -56,8 +54,6 @@ RIVALS = 5  # further labels fitted in the place of the main one, where it stand
 # Floors by which an effect widens the gap, as likely a main cause as one of many small ones there: where noise is not
 # what the file says, so that it may say little of the rest, and where it is.
 LARGE, SPECIFIED = 2.1, 1.2
-TURBULENCE_GAP_SHARE = 0.7  # of what rough water leaves of windows (docs/explanation/diagnosis.md, Thresholds)
-ALTERNATIVE_PROBABILITY = 1e-3  # probability from which an alternative's effect on the windows is looked at
 
 
 @dataclass
@@ -149,12 +145,8 @@ def nuisance_prior_cost(hypothesis: Hypothesis, less: Hypothesis) -> float:
     return 0.5 * float((less.nuisance**2).sum() - (hypothesis.nuisance**2).sum())
 
 
-def prune_effects(search: Search, begin: Hypothesis | None = None) -> tuple[Hypothesis, dict[str, float]]:
-    """Backward elimination: the best hypothesis without what does not earn its place; nat that each effect brings.
-
-    begin: where it begins, in place of the best.
-    """
-    hypothesis = begin or search.best
+def prune_effects(search: Search, hypothesis: Hypothesis) -> tuple[Hypothesis, dict[str, float]]:
+    """Backward elimination: a hypothesis without what does not earn its place; nat that each effect brings."""
     while hypothesis.labels:
         gains = {
             label: hypothesis.log_evidence(search.fitter) - drop(search, hypothesis, label).log_evidence(search.fitter)
@@ -220,45 +212,39 @@ def search_again_with_noise(
 ) -> Answer:
     """The answer of a further search, by a filter that knows of the disorder found.
 
-    Where the windows err by far less than rough water of that strength would have them, it is none: something shakes
-    the vehicle and lets go of it again, as a tail that flaps does. Nor is it where another effect is the main cause
-    beside it: what nobody knows looks like rough water too, in which a known effect is easily believed. The answer is
-    then the one without it. Rough water is looked for beside a clock that wanders, too.
+    Where another effect is the main cause beside rough water, it is none: what nobody knows looks like rough water too,
+    in which a known effect is easily believed. The answer is then the one without it. Rough water is looked for beside
+    a clock that wanders, too.
     """
     more, _ = inflated(search.problem, found.probe, found.scale)
     clock = clock_of(search, hypothesis, gained, more) if found.probe.name == CLOCK else None
     problem = search.problem.as_recorded if clock is None else clock.aligned(search.problem)
     answer = conclude(run(problem.with_extra_noise(more), say, clock, [search.best, hypothesis]), say, found)
-    if found.probe.name == TURBULENCE and not as_inflated(answer):
-        say("not as rough water would have it")
+    if found.probe.name == TURBULENCE and answer.main != TURBULENCE:
+        say("rough water is not the main cause")
         return conclude(search, say, calm=True)
     water = turbulence_first(answer.probed) if found.probe.name == CLOCK else None
     if water is not None and left_floors(answer.shrinkage) > UNKNOWN_GAP_RATIO_AT_HALF:
         more = more + inflated(answer.search.problem, water.probe, water.scale)[0]
         noisy = conclude(run(problem.with_extra_noise(more), say, clock, [answer.search.best]), say, water)
-        if as_inflated(noisy):
+        if noisy.main == TURBULENCE:
             clocks = [label for label in answer.selected if catalogue()[label].place == CLOCK_PLACE]
             gained = noisy.gained | {label: answer.gained[label] for label in clocks}
             return replace(noisy, selected=[*noisy.selected, *clocks], gained=gained)
     return answer
 
 
-def as_inflated(answer: Answer) -> bool:
-    """Whether turbulence is the main cause of an answer, and windows err as rough water would have them."""
-    return answer.main == TURBULENCE and answer.shrinkage.after >= TURBULENCE_GAP_SHARE * answer.shrinkage.floor
-
-
 def conclude(
     search: Search, say: Callable[[str], None] = lambda text: None, noise: ProbeResult | None = None,
-    calm: bool = False, begin: Hypothesis | None = None,
+    calm: bool = False,
 ) -> Answer:  # fmt: skip
     """The answer of a finished search; its gains are taken anew at the hypothesis with all that is evident.
 
     `noise` is disorder that the search already knows of: turbulence, waves, or motion capture's clock; calm: none is
-    looked for; begin: the hypothesis that effects are eliminated from, where it is not the best.
+    looked for.
     """
     problem = search.problem
-    evident, gained = prune_effects(search, begin) if problem.rules.evidence else by_held_out_gap(search)
+    evident, gained = prune_effects(search, search.best) if problem.rules.evidence else by_held_out_gap(search)
     search.hypotheses = [c for c in search.hypotheses if c is not evident] + ([evident] if evident.labels else [])
     search.gains = problem.filter(*search.model(evident), begin=True)
     findings = tests(problem, search.gains)
@@ -299,22 +285,16 @@ def conclude(
     if by_search:
         by_evidence = posterior(search, evident, main)
         by_gap, ahead = with_least_gap(search, evident, main, by_evidence)
-        instead = max(by_gap, key=lambda label: by_gap[label])
-        if begin is None and main and instead not in (main, NONE):
-            return conclude(search, say, noise, calm, alternatives(search, evident, main)[instead])
         chances = mixed(by_evidence, by_gap, ahead)
-    chances = share_out(chances, main, most_often({label: ranking[label] for label in gained}))
     known = {label: moved[label] for label in gained if label in moved and label != disordered}
-    chances = to_none(chances, negligible, known | movements_of_alternatives(search, evident, main, chances))
-    chances = pass_on(chances, [label for label in by_size if label in gained and label != main])
+    chances = to_none(chances, negligible, known)
     if main in gained:
-        main = max(gained, key=lambda label: chances.get(label, 0.0))
         floors = sizes[main] / max(floor, 1e-6)
         small_ones, alone = (doubt_small(chances, main, floors / size) for size in (LARGE, SPECIFIED))
         chances = mixed(small_ones, alone, search.well_specified)
     by_effects = sum(sizes[label] ** 2 for label in gained)
-    places = [catalogue()[label].place for label in (main, *by_size) if label in catalogue()]
-    unknown = probability_unknown(search, bool(gained), bool(ranked), shrinkage, left, noise, by_effects, places)
+    places = [catalogue()[label].place for label in ranked if label in catalogue()]
+    unknown = probability_unknown(search, bool(ranked), shrinkage, left, noise, by_effects, places)
     if not gained:
         unknown = LEAST_UNKNOWN + (unknown - LEAST_UNKNOWN) * gap_is_material(shrinkage)
     chances = {name: value * (1.0 - unknown) for name, value in chances.items()} | {UNKNOWN: unknown}
@@ -352,17 +332,6 @@ def with_least_gap(
     most = max(chances[label] for label in ahead)
     by_gap = chances | {label: together * share for label, share in least.items()}
     return by_gap, opened(most / max(chances.get(main, 0.0), 1e-300), 1.0, float(np.exp(TIE)))
-
-
-def movements_of_alternatives(
-    search: Search, hypothesis: Hypothesis, main: str, chances: dict[str, float]
-) -> dict[str, float]:
-    """How far each likely label moves the windows in the place of the main one, in tolerances."""
-    return {
-        label: movements(search, one)[label]
-        for label, one in alternatives(search, hypothesis, main).items()
-        if label != main and chances.get(label, 0.0) >= ALTERNATIVE_PROBABILITY
-    }
 
 
 def log_posteriors(search: Search, hypothesis: Hypothesis, main: str) -> dict[str, float]:

@@ -25,7 +25,6 @@ from glider.tools.diagnose.probabilities import ERROR_RATE, TIE, softmax
 from glider.tools.diagnose.record import ANSWER, NONE, UNKNOWN
 from glider.tools.diagnose.search import EVIDENCE_NEEDED
 from glider.tools.diagnose.shrink import AFTER, BEFORE, FLOOR, RECALIBRATED, by_channel, shrinkage_of
-from glider.tools.diagnose.unknown import MOSTLY
 from glider.tools.gap.measure import RunGap, case_channels, root_mean_square, run_gap
 from glider.tools.identify.ocean.files import corrected_text
 from glider.tools.identify.ocean.findings import Calibration, far_from_file, one_of_each_group
@@ -55,6 +54,7 @@ from glider.tools.watch.whole_search import (
 
 ABSENT = 1e-6  # spreads: of an effect that is not asked for
 MOST_RUNS = 40
+MOSTLY = 0.9  # of all that can be explained, for the water to be the cause
 SEED, DRAWS = 20261122, 4
 CORRECTED = "corrected.toml"
 
@@ -153,8 +153,7 @@ def with_excess_water_noise(
     gaps: dict[str, list[RunGap]],
 ) -> tuple[list[RunGap], UnexplainedResidual] | None:
     """The floor in water that is as rough as the readings ask for, and what is left then: where that is nothing, and
-    where the water explains nearly all that can be explained (as turbulence does, tools/diagnose/unknown.py), and
-    nothing that lasts is beside it.
+    where the water explains nearly all that can be explained, and nothing that lasts is beside it.
     """
     if left.probability <= 0.5:
         return None

@@ -36,12 +36,12 @@ def figures(**changed) -> dict[str, float]:
     return base | changed
 
 
-def unknown(f: dict[str, float], selected: bool = True, asked: bool = True) -> float:
+def unknown(f: dict[str, float], evident: bool = True, asked: bool = True) -> float:
     search = SimpleNamespace(problem=SimpleNamespace(rules=SimpleNamespace(whiteness=True)), well_specified=f["told"])
     missed = SimpleNamespace(before=f["before"], recalibrated=f["before"], after=f["after"], floor=f["floor"])
     servo = ProbeResult(NoiseProbe("servo", "actuator", "actuation", "servo"), f["next"], 6.0)
     left = Remainder(f["explained"], f["left"], [GYRO, servo], opened(f["shows"], 6.0, 9.0)) if asked else None
-    return probability_unknown(search, selected, True, missed, left, None, f["taken"], [("sensing", "gyro")])
+    return probability_unknown(search, evident, missed, left, None, f["taken"], [("sensing", "gyro")])
 
 
 @pytest.mark.parametrize(("name", "low", "high"), [
@@ -50,10 +50,10 @@ def unknown(f: dict[str, float], selected: bool = True, asked: bool = True) -> f
 ])  # fmt: skip
 @pytest.mark.parametrize("well_specified", [0.0, 1.0])
 def test_the_probability_of_unknown_has_no_cliff_in_any_of_its_figures(name, low, high, well_specified):
-    for selected, asked in ((True, True), (False, True), (False, False), (True, False)):
+    for evident, asked in ((True, True), (False, True), (False, False), (True, False)):
         values = np.geomspace(low, high, 4000)
         found = np.array(
-            [unknown(figures(well_specified=well_specified) | {name: value}, selected, asked) for value in values]
+            [unknown(figures(well_specified=well_specified) | {name: value}, evident, asked) for value in values]
         )
         assert np.abs(np.diff(found)).max() < 0.02
 

@@ -33,10 +33,7 @@ def by_the_page(c):
     left = c["G_s"] ** 2 - c["G_f"] ** 2
     u_G = left / min(c["G_0"] ** 2 - c["G_f"] ** 2, left + c["D"])
     w = math.sqrt(left) / c["G_f"]
-    F = {
-        "other": phi(max(u_L, 0.05) ** 0.25 * u_G**0.75, 0.15, 0.8),
-        "file": max(phi(u_L, 0.11, 0.6), phi(u_G, 0.35, 0.5)),
-    }
+    F = {"other": phi(u_G, 0.17, 0.5), "file": phi(u_L, 0.11, 0.6)}
     W = {"other": phi(w, 1.8, 0.35), "file": phi(w, 0.8, 0.35)}
     place = max(c["gains"], key=c["gains"].get)
     r = L_r / sorted(c["gains"].values())[-2]
@@ -44,12 +41,7 @@ def by_the_page(c):
     for kind in F:
         p[kind] = max(F[kind] * W[kind], 0.005)
         if place[0] == "sensing" and place in c["places"]:
-            Q = phi(u_L, 0.03, 1.1)
-        elif place == c["places"][0]:
-            Q = phi(u_L, 0.11, 0.6) if kind == "file" else phi(u_L, 0.145, 1.1)
-        else:
-            continue
-        p[kind] += (max(F[kind], Q) - p[kind]) * gate(r, 2.0, 4.5)
+            p[kind] += (max(F[kind], phi(u_L, 0.03, 1.1)) - p[kind]) * gate(r, 2.0, 4.5)
     q = 0.002 + gate(c["sigma"], 6.0, 9.0) * (c["p_w"] * p["file"] + (1.0 - c["p_w"]) * p["other"] - 0.002)
     return q + (0.995 - q) * gate(c["G_s"], 3.0, 8.0)
 
@@ -62,7 +54,7 @@ def by_the_program(c):
     search = SimpleNamespace(
         well_specified=c["p_w"], problem=SimpleNamespace(rules=SimpleNamespace(whiteness=True))
     )  # fmt: skip
-    return probability_unknown(search, True, True, shrinkage, left, None, c["D"], c["places"])
+    return probability_unknown(search, True, shrinkage, left, None, c["D"], c["places"])
 
 
 def case(seed):

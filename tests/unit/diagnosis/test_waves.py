@@ -5,10 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 
 from glider.sim_backend.core.effects import effect_layout as ef
-from glider.tools.diagnose.noise_probes import WAVES, NoiseProbe, ProbeResult
+from glider.tools.diagnose.noise_probes import WAVES
 from glider.tools.diagnose.search import run
-from glider.tools.diagnose.shrink import AFTER, FLOOR
-from glider.tools.diagnose.unknown import Remainder, beside_a_sea
 from glider.tools.diagnose.verdict import conclude
 from glider.tools.diagnose.waves import LINE, line_share
 from glider.tools.inference.problem import problem_of
@@ -36,19 +34,6 @@ def test_a_sea_has_a_line_and_what_goes_with_the_legs_has_none():
     assert share(lambda t: 0.0 * t) < LINE - 0.1
     legs = share(lambda t: 2.0 * np.exp(-np.mod(t, 20.0) / 3.0) * np.where(np.mod(t, 40.0) < 20.0, 1.0, -1.0))
     assert legs < LINE - 0.1
-
-
-def beside(after, explained, left=900.0, sea=4e5):
-    """Probability of an unknown effect where pitch is left at `after` beside waves, of a floor of 0.2 tolerances."""
-    table = {AFTER: {"depth": 1.5, "pitch": after, "roll": 0.1}, FLOOR: {"depth": 0.2, "pitch": 0.2, "roll": 0.1}}
-    waves = ProbeResult(NoiseProbe(WAVES, "water", "environment", "water"), sea, 3.0)
-    return beside_a_sea(SimpleNamespace(channels=table.get), Remainder(explained + sea, left, []), waves)
-
-
-def test_what_a_sea_cannot_turn_is_unknown_beside_it_where_no_effect_explains_it():
-    assert beside(after=0.9, explained=50.0) > 0.8
-    assert beside(after=0.9, explained=1e5) < 0.1
-    assert beside(after=0.2, explained=50.0) < 0.1
 
 
 def test_small_waves_hide_nothing_beside_them(tmp_path):
