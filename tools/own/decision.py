@@ -99,7 +99,6 @@ class Posterior:
     hypotheses: list[Hypothesis]
     weights: np.ndarray  # of each, with nothing beside it
     chances: dict[str, float]  # none, unknown, labels: of the main cause
-    inclusion: dict[str, float]  # probability of each label to be there
     reach: np.ndarray  # (k,) tolerances a spread
     healthy: Healthy
 
@@ -146,7 +145,7 @@ def strange_odds(healthy: Healthy, one: Hypothesis, nothing: Hypothesis) -> floa
 
 
 def decide(every: list[Hypothesis], healthy: Healthy, reach: np.ndarray, runs: int) -> Posterior:
-    """Probabilities of the main cause and of each label, from the evidence of hypotheses about some runs.
+    """Probabilities of the main cause, from the evidence of hypotheses about some runs.
 
     reach: tolerances (k,) that a spread of each label moves the channels.
     """
@@ -163,7 +162,6 @@ def decide(every: list[Hypothesis], healthy: Healthy, reach: np.ndarray, runs: i
     strange = every[int(np.argmax(without))].strange
     weights = strange * np.exp(logs - logsumexp(logs)) + (1.0 - strange) * np.exp(without - logsumexp(without))
     chances: dict[str, float] = {NONE: 0.0, UNKNOWN: 0.0}
-    inclusion: dict[str, float] = {}
     for one, weight in zip(every, weights, strict=True):
         moves = {label: abs(size) * reach[k] for label, size, k
                  in zip(one.labels, one.sizes, healthy.at(one.labels), strict=True)}  # fmt: skip
@@ -174,6 +172,4 @@ def decide(every: list[Hypothesis], healthy: Healthy, reach: np.ndarray, runs: i
         else:
             name = UNKNOWN if known[main].family == PUSH else main
         chances[name] = chances.get(name, 0.0) + weight * (1.0 - one.strange)
-        for label in one.labels:
-            inclusion[label] = inclusion.get(label, 0.0) + float(weight)
-    return Posterior(every, weights, chances, inclusion, reach, healthy)
+    return Posterior(every, weights, chances, reach, healthy)

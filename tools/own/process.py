@@ -21,8 +21,6 @@ import numpy as np
 
 from glider.tools.data.errors import InputError
 
-SECONDS = 60.0
-
 
 class ProcessModel:
     """A black box behind a command; InputError where it does not answer as it should."""

@@ -42,12 +42,11 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Fit:
-    """A least-squares fit: coefficients (k,), their covariance (k, k), residuals (rows,), rows used (bool)."""
+    """A least-squares fit: coefficients (k,), their covariance (k, k), residuals (rows,)."""
 
     coefficients: np.ndarray
     covariance: np.ndarray
     residual: np.ndarray
-    used: np.ndarray
     blocks: int
 
     def __getitem__(self, index: int) -> Estimate:
@@ -97,4 +96,4 @@ def fit(y: np.ndarray, X: np.ndarray, block: np.ndarray) -> Fit | None:
     np.add.at(scores, at, Z * residual[:, None])
     factor = len(labels) / (len(labels) - 1)
     covariance = factor * inverse @ (scores.T @ scores) @ inverse
-    return Fit(solved / scale, covariance / np.outer(scale, scale), residual, used, len(labels))
+    return Fit(solved / scale, covariance / np.outer(scale, scale), residual, len(labels))
