@@ -231,9 +231,13 @@ class Watch(Engine):
 
     def session_gain(self, sessions: Sequence[Session], runs: dict[int, Expansion] | None = None) -> float:
         """Log posterior odds of sessions against those that are known; runs: expanded again, deviations in them."""
-        new = len(sessions) - len(self.sessions)
-        prior = new * np.log(NEW_SESSION / (1.0 - NEW_SESSION) / max(1, self.count - self.learned))
-        return float(prior + log_evidence(self.pooled(sessions, runs)) - log_evidence(self.pooled(self.sessions)))
+        gain = log_evidence(self.pooled(sessions, runs)) - log_evidence(self.pooled(self.sessions))
+        return gain + self.session_prior(sessions)
+
+    def session_prior(self, sessions: Sequence[Session]) -> float:
+        """Log prior odds of sessions against those that are known, which run they begin with equally probable."""
+        each = np.log(NEW_SESSION / (1.0 - NEW_SESSION) / max(1, self.count - self.learned))
+        return float((len(sessions) - len(self.sessions)) * each)
 
     def begun(self, sessions: Sequence[Session]) -> int | None:
         """The run from which on there is another session than those that are known."""
@@ -398,9 +402,7 @@ class Watch(Engine):
         score, mean, sd = best
         usual = usual_share(healthy, k, float(self.reach[k]), mean, sd, span[1] - span[0]) if sd > 0.0 else 0.0
         event = Event({}, *span, effect.label, mean, sd, 0.0)
-        prior = self.span_prior(*span, sessions) - np.log(self.named) + log_odds(effect)
-        more = len(sessions) - len(self.sessions)
-        prior += more * np.log(NEW_SESSION / (1.0 - NEW_SESSION) / max(1, self.count - self.learned))
+        prior = self.span_prior(*span, sessions) - np.log(self.named) + log_odds(effect) + self.session_prior(sessions)
         return score - nothing - usual + prior, event
 
     def judge(self) -> np.ndarray:
