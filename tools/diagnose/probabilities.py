@@ -12,6 +12,7 @@ from glider.tools.diagnose.record import NONE, UNKNOWN
 
 TIE = 6.0  # nat within which two labels are not distinguished: what a change of prior spreads can move
 ERROR_RATE = 0.03  # answers that named something else altogether, of those to the cases it was developed with: 3 of 104
+MAX_NONE_RATIO = 0.9  # of the main cause's probability, that none may have where there is an effect: no tie
 LARGE_WIDTH = 0.25  # e-folds of size over which a main cause comes to be as likely as not
 
 
@@ -26,11 +27,11 @@ def doubt_small(chances: dict[str, float], main: str, size: float) -> dict[str, 
     """Probabilities where the largest of the effects may be one of many small ones, and nothing the main cause.
 
     size: of the main one, in sizes at which that is as likely as not. What this takes off the labels goes to none, but
-    no more than what the main one keeps: there is something.
+    no more than MAX_NONE_RATIO of what the main one keeps: there is something.
     """
     large = float(ndtr(np.log(max(size, 1e-6)) / LARGE_WIDTH))
     labels = sum(chance for name, chance in chances.items() if name != NONE)
-    least = 1.0 / (1.0 + chances[main] / max(labels, 1e-9))  # of the labels' probability that stays
+    least = 1.0 / (1.0 + MAX_NONE_RATIO * chances[main] / max(labels, 1e-9))  # of the labels' probability that stays
     kept = max(large, least)
     found = {name: kept * chance for name, chance in chances.items() if name != NONE}
     return found | {NONE: 1.0 - sum(found.values())}

@@ -156,7 +156,7 @@ class Engine:
         """The most probable deviations and runs pooled with their prior, log evidence over all, sizes with their sd.
 
         Priors of the grid differ in a few variances, d: with W = (1 + V H)^-1, Q = (H W) and q = W' r at these,
-        they add (q' S q - log det(1 + d Q)) / 2 to the evidence, S = (d^-1 + Q)^-1 (Woodbury).
+        they add to the evidence what `under_priors` says (Woodbury).
         """
         sided = np.array([self.healthy.effects[k].one_sided for k in places], dtype=bool)
         forms = FORM_SHARES if places else FORM_SHARES[:1]
@@ -170,14 +170,12 @@ class Engine:
             pooled = Pooled.of(by.marginal(found), by.V)
             W = np.linalg.inv(np.eye(self.k) + by.V @ pooled.H)
             M, Q, q = W @ by.V, (pooled.H @ W)[np.ix_(varied, varied)], (W.T @ pooled.r)[varied]
-            inner = np.eye(len(varied)) + d[:, :, None] * Q
-            S = np.linalg.solve(inner, d[:, :, None] * np.eye(len(varied)))
+            gained, S = under_priors(q, Q, d)
             G = W[np.ix_(np.array(places, dtype=int), varied)]
             mean = (M @ pooled.r)[places] + np.einsum("pa,nab,b->np", G, S, q)
             variance = np.diag(M)[places] + np.einsum("pa,nab,pb->np", G, S, G)
             sd = np.sqrt(np.maximum(variance, 1e-30))
             halves = (np.log(2.0) + norm.logcdf(mean / sd))[:, sided].sum(axis=1)
-            gained = 0.5 * (np.einsum("a,nab,b->n", q, S, q) - np.linalg.slogdet(inner)[1])
             table.append((pooled.log_evidence() + gained + halves, mean, sd, by, pooled))
         evidence = float(logsumexp([row[0] for row in table]) - np.log(2 * len(grid)))
         nat, mean, sd, by, pooled = max(table, key=lambda row: row[0].max())
@@ -374,6 +372,14 @@ def alone(pooled: Pooled) -> tuple[np.ndarray, np.ndarray]:
     """Slope and precision (k,) of the size of each label in all runs, what they share integrated out."""
     M = pooled.covariance()
     return pooled.r - pooled.H @ (M @ pooled.r), np.maximum(np.diag(pooled.H - pooled.H @ M @ pooled.H), 0.0)
+
+
+def under_priors(slope: np.ndarray, precision: np.ndarray, variances: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Log evidence (priors,) that sizes N(0, diag(d)) bring, (q' S q - log det(1 + d Q)) / 2, and their covariances
+    S = (d^-1 + Q)^-1 (priors, v, v); q slope (v,), Q precision (v, v), d variances (priors, v)."""
+    inner = np.eye(len(slope)) + variances[:, :, None] * precision
+    S = np.linalg.solve(inner, variances[:, :, None] * np.eye(len(slope)))
+    return 0.5 * (np.einsum("a,nab,b->n", slope, S, slope) - np.linalg.slogdet(inner)[1]), S
 
 
 def size_evidence(slope, precision, reach, one_sided) -> np.ndarray:

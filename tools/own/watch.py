@@ -33,7 +33,7 @@ from glider.tools.own.hierarchy import Expansion
 from glider.tools.own.identify import CONVERGED_GAIN, SCATTER_ROUNDS, LineSearch, damped_step
 from glider.tools.own.load import LoadedVehicle
 from glider.tools.own.observer import Observer, observer_of
-from glider.tools.own.posterior import LONGEST_MOVE, LONGEST_REACH, STRONG_LEFT, Engine, healthy_of
+from glider.tools.own.posterior import LONGEST_MOVE, LONGEST_REACH, STRONG_LEFT, Engine, healthy_of, under_priors
 from glider.tools.own.runs import OwnRun
 from glider.tools.own.sessions import Session, SessionRuns, of_another, split
 
@@ -244,26 +244,26 @@ class Watch(Engine):
         known = [one.first for one in self.sessions[1:]]
         return next((one.first for one in sessions[1:] if one.first not in known), None)
 
-    def with_session(self, first: int) -> list[Session]:
-        """Sessions with another one from a run on, expanded about what its runs say of it by the parabola."""
-        found = split(self.sessions, first, *self.another)
-        if len(found) == len(self.sessions):
-            return self.sessions
-        return [replace(one, values=self.pooled([one])[0].given(0, 0, 0, 0.0)) if one.first == first else one
-                for one in found]  # fmt: skip
+    def expanded(self, sessions: Sequence[Session]) -> Sequence[Session]:
+        """Sessions, the new one of them about what its runs say of it by the parabola."""
+        new = self.begun(sessions)
+        return [replace(one, values=self.pooled([one])[0].given(0, 0, 0, 0.0))
+                if new is not None and one.first == new and one.end > new else one for one in sessions]  # fmt: skip
 
-    def new_session(self) -> tuple[float, list[Session]]:
-        """The run from which on another session is most probable: its log odds, with its runs expanded again."""
+    def others(self) -> list[tuple[float, Sequence[Session]]]:
+        """Sessions with another one from each run on where none begins, and their log odds by the parabola."""
         tried = [split(self.sessions, n, *self.another) for n in range(self.learned, self.count)]
-        tried = [one for one in tried if len(one) > len(self.sessions)]
-        if not tried:
+        return [(self.session_gain(one), one) for one in tried if len(one) > len(self.sessions)]
+
+    def new_session(self, others: Sequence[tuple[float, Sequence[Session]]]) -> tuple[float, Sequence[Session]]:
+        """The likeliest of further sessions, its runs expanded again: its log odds."""
+        if not others:
             return -np.inf, self.sessions
-        likeliest = max(tried, key=self.session_gain)
+        _, likeliest = max(others, key=lambda one: one[0])
         first = self.begun(likeliest)
         assert first is not None
-        sessions, columns = self.with_session(first), np.flatnonzero(self.active)
-        runs = {n: self.again(n, sessions, columns) for n in range(first, self.session_of(first, sessions).end)}
-        runs = {n: one for n, one in zip(runs, self.together.marginal(list(runs.values())), strict=True)}
+        sessions, columns = self.expanded(likeliest), np.flatnonzero(self.active)
+        runs = self.led((first, self.session_of(first, sessions).end), sessions, columns)
         return self.session_gain(sessions, runs), sessions
 
     def search(self) -> None:
@@ -274,20 +274,19 @@ class Watch(Engine):
             return np.array([self.span_prior(*span, sessions) for span in some])[:, None] - np.log(self.named)
 
         while spans and len(self.events) < MOST_EVENTS:
-            other, with_other = self.new_session()
+            others = self.others()
+            other, with_other = self.new_session(others)
             # a label alone over every span, and beside another session that begins with it
             tables: list[tuple[Sequence[Session], list[tuple[int, int]], np.ndarray]]
             tables = [(self.sessions, spans, self.scored(spans, self.sessions) + prior(spans, self.sessions))]
-            for first in range(self.learned, self.count):
-                other_sessions = split(self.sessions, first, *self.another)
-                if len(other_sessions) > len(self.sessions):
-                    own = [span for span in spans if span[0] == first]
-                    scores = self.scored(own, other_sessions) + prior(own, other_sessions)
-                    tables.append((self.with_session(first), own, scores + self.session_gain(other_sessions)))
+            for gain, further in others:
+                first = self.begun(further)
+                own = [span for span in spans if span[0] == first]
+                tables.append((further, own, self.scored(own, further) + prior(own, further) + gain))
             ranked = sorted(((float(scores[row].max()), t, row) for t, (_, own, scores) in enumerate(tables)
                              for row in range(len(own))), reverse=True)  # fmt: skip
-            found = [self.compared(tables[t][1][row], tables[t][0], tables[t][2][row]) for _, t, row in ranked[:SPANS]
-                     if ranked[0][0] + CHANGE_ODDS > 0.0]  # fmt: skip
+            found = [self.compared(tables[t][1][row], self.expanded(tables[t][0]), tables[t][2][row])
+                     for _, t, row in ranked[:SPANS] if ranked[0][0] + CHANGE_ODDS > 0.0]  # fmt: skip
             taken = max(found, key=lambda one: one[0], default=None)
             if taken is not None and taken[0] > other:
                 total, best, sessions = taken
@@ -342,7 +341,7 @@ class Watch(Engine):
                 for k in np.argsort(-np.where(likely, gain, -np.inf))[:REFITTED] if likely[k]]  # fmt: skip
 
     def led(
-        self, span: tuple[int, int], sessions: Sequence[Session], columns: np.ndarray, label: int, size: float
+        self, span: tuple[int, int], sessions: Sequence[Session], columns: np.ndarray, label: int = 0, size: float = 0.0
     ) -> dict[int, Expansion]:
         """A span's runs expanded where a label of a size leads, their deviations integrated out."""
         runs = [self.again(n, sessions, columns, label, size) for n in range(*span)]
@@ -450,10 +449,8 @@ def size_posterior(
 
     slope (v,), precision (v, v) of the label and what may stand beside it; variances (priors, v), equally probable.
     """
-    inner = np.eye(len(slope)) + variances[:, :, None] * precision
-    S = np.linalg.solve(inner, variances[:, :, None] * np.eye(len(slope)))
+    nat, S = under_priors(slope, precision, variances)
     mean, sd = S[:, 0] @ slope, np.sqrt(np.maximum(S[:, 0, 0], 1e-30))
-    nat = 0.5 * (np.einsum("a,nab,b->n", slope, S, slope) - np.linalg.slogdet(inner)[1])
     if one_sided:
         nat = nat + np.log(2.0) + norm.logcdf(mean / sd)
     best = int(np.argmax(nat))

@@ -10,7 +10,7 @@ from glider.sim_backend.core.effects.catalogue import catalogue
 from glider.tools.diagnose import search as search_module
 from glider.tools.diagnose import verdict as verdict_module
 from glider.tools.diagnose.noise_probes import CLOCK, NoiseProbe, ProbeResult
-from glider.tools.diagnose.probabilities import doubt_small
+from glider.tools.diagnose.probabilities import MAX_NONE_RATIO, doubt_small
 from glider.tools.diagnose.record import NONE
 from glider.tools.diagnose.search import run
 from glider.tools.diagnose.shrink import ablation_importance, in_tolerances, left_out_squares, most_often
@@ -135,7 +135,7 @@ def test_a_small_effect_is_never_sure_and_none_never_before_it(size):
     found = doubt_small({"drag": 0.9, "lift": 0.1, NONE: 0.0}, "drag", size)
     assert sum(found.values()) == pytest.approx(1.0)
     assert found["drag"] < 0.6
-    assert found[NONE] <= found["drag"] + 1e-9
+    assert found[NONE] <= MAX_NONE_RATIO * found["drag"] + 1e-9
     assert found["lift"] / found["drag"] == pytest.approx(1.0 / 9.0)
 
 
@@ -165,16 +165,22 @@ def gains(**by_name: float) -> list[ProbeResult]:
     return [ProbeResult(NoiseProbe(name, "sensor", *places[name]), gain, 6.0) for name, gain in by_name.items()]
 
 
-def test_what_is_left_at_the_sensor_of_any_effect_alone_is_of_another_form_however_narrow():
+def test_what_is_left_at_the_main_cause_s_sensor_alone_is_of_another_form_however_narrow():
+    narrow = {"after": 0.23, "left": 1e5, "explained": 5e5}
+    assert unknown(**narrow, probed=gains(gyro=1e5, servo=2e3), effects=["gyro_bias"]) > 0.5
+    assert unknown(**narrow, probed=gains(gyro=1e5, servo=5e4), effects=["gyro_bias"]) < 0.2
+    assert unknown(**narrow, probed=gains(slider=1e5, servo=2e3), effects=["gyro_bias"]) < 0.2
+    small = narrow | {"left": 2.5e3}  # half a percent, of a sensor
+    assert unknown(**small, probed=gains(gyro=2.5e3), effects=["gyro_bias"]) < 0.1
+    small = narrow | {"left": 5e3}
+    assert unknown(**small, probed=gains(slider=5e3), effects=["slider_slow"]) < 0.1
+
+
+def test_what_is_left_at_the_sensor_of_any_effect_alone_is_of_another_form():
     narrow = {"after": 0.23, "left": 6e4, "explained": 5e5}
-    assert unknown(**narrow, probed=gains(gyro=6e4, servo=2e3), effects=["gyro_bias"]) > 0.5
-    assert unknown(**narrow, probed=gains(gyro=6e4, servo=3e4), effects=["gyro_bias"]) < 0.2
-    assert unknown(**narrow, probed=gains(slider=6e4, servo=2e3), effects=["gyro_bias"]) < 0.2
     assert unknown(**narrow, probed=gains(gyro=6e4, servo=2e3), effects=["drag", "gyro_bias"]) > 0.8
     assert unknown(**narrow, probed=gains(gyro=6e4, servo=2e3), effects=["drag"]) < 0.2
     assert unknown(**narrow, probed=gains(slider=6e4, servo=2e3), effects=["drag", "slider_slow"]) < 0.2
-    small = narrow | {"left": 2.5e3}  # half a percent
-    assert unknown(**small, probed=gains(gyro=2.5e3), effects=["gyro_bias"]) < 0.1
 
 
 def test_what_leaves_next_to_no_gap_is_not_unknown_however_many_nat_it_has():
