@@ -1,0 +1,88 @@
+"""The answer of a watch of a user's vehicle: events, sessions, what is said of every run."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from glider.tools.data.intervals import NINETY
+from glider.tools.own.decision import UNKNOWN, Healthy
+from glider.tools.own.effects import PUSH
+
+CERTAIN = 0.5  # probability from which an event is one
+GROUP = 0.1  # of a label's probability: others of at least so much share its group
+
+
+@dataclass
+class Event:
+    """A change: its labels by probability, the runs it is in, its size."""
+
+    chances: dict[str, float]
+    first: int
+    end: int
+    label: str
+    size: float  # spreads
+    sd: float
+    probability: float
+
+    @property
+    def span(self) -> slice:
+        return slice(self.first, self.end)
+
+
+@dataclass
+class Watched:
+    """The answer of a watch."""
+
+    names: list[str]
+    learned: int
+    events: list[Event]
+    healthy: Healthy
+    gaps: np.ndarray  # (runs,) tolerances
+    strange: np.ndarray  # (runs,) probability that a run has more left than healthy ones and its events say
+    cautions: list[str] = field(default_factory=list)
+    reference: list[str] = field(default_factory=list)  # runs from which it was learned
+    sessions: list[dict[str, Any]] = field(default_factory=list)  # that begin among them, and what each differs by
+
+    def plain(self) -> dict[str, Any]:
+        """The JSON of docs/reference/gap.md, What changed."""
+        effects = {one.label: one for one in self.healthy.effects}
+        runs, events = [], []
+        for one in self.events:
+            events.append(self._event(one, effects))
+        for n, name in enumerate(self.names):
+            own = [event for one, event in zip(self.events, events, strict=True) if one.first <= n < one.end]
+            causes = [{key: event[key] for key in ("label", "probability", "group", "size", "ci90", "unit")}
+                      for event in own if event["label"]]  # fmt: skip
+            unknown = self.strange[n] > CERTAIN or any(event["label"] is None for event in own)
+            verdict = "cause" if causes else (UNKNOWN if unknown else "none")
+            runs.append(
+                {"run": name, "verdict": verdict, "causes": causes, "gap": float(self.gaps[n]), "skipped": None}
+            )
+        return {
+            "format": 1, "runs": runs, "events": events, "sessions": self.sessions, "reference": self.reference,
+            "cautions": self.cautions,
+        }  # fmt: skip
+
+    def _event(self, one: Event, effects) -> dict[str, Any]:
+        effect = effects[one.label]
+        known = effect.family != PUSH
+        low, high = ((one.size + side * NINETY * one.sd) * effect.spread for side in (-1.0, 1.0))
+        # of an unknown change the labels that come nearest
+        top = max((p for label, p in one.chances.items() if known or effects[label].family != PUSH), default=0.0)
+        group = [label for label, p in sorted(one.chances.items(), key=lambda item: -item[1])
+                 if p > GROUP * top and effects[label].family != PUSH]  # fmt: skip
+        places: dict[tuple[str, str], float] = {}
+        for label, p in one.chances.items():
+            where = effects[label].where
+            places[where] = places.get(where, 0.0) + p
+        return {
+            "label": one.label if known else None, "group": group, "probability": one.probability,
+            "labels": {label: p for label, p in sorted(one.chances.items(), key=lambda item: -item[1]) if p > 0.005},
+            "where": [{"subsystem": s, "element": e, "probability": p}
+                      for (s, e), p in sorted(places.items(), key=lambda item: -item[1]) if p > 0.005],
+            "from_run": self.names[one.first],
+            "to_run": None if one.end == len(self.names) else self.names[one.end - 1],
+            "course": "step" if one.end == len(self.names) else "episode",
+            "size": one.size * effect.spread, "ci90": [low, high], "unit": effect.unit, "sizes": [],
+        }  # fmt: skip
