@@ -13,6 +13,7 @@ from glider.firmware.faults import markdown_rows
 from glider.firmware.model.vehicle import Vehicle
 from glider.tools.diagnose.record import AnswerRecord, Details
 from glider.tools.inference.channels import Channel
+from glider.tools.inference.hyperparameters import SECTIONS, listed
 from glider.tools.inference.kinds import kind_of
 from glider.tools.verify.challenge.ocean_cases import shipped_vehicle
 
@@ -22,7 +23,7 @@ def write_all(folder: Path) -> None:
     folder.mkdir(exist_ok=True)
     pages = {
         "tolerances.md": tolerances(), "faults.md": faults(), "vehicle-file.md": vehicle_file(),
-        "answers.md": answers(), "commands.md": commands(),
+        "answers.md": answers(), "commands.md": commands(), "hyperparameters.md": hyperparameters(),
     }  # fmt: skip
     for name, text in pages.items():
         path = folder / name
@@ -51,6 +52,23 @@ def tolerances() -> str:
             f"\n## {title}\nWindows of {measures.window:g} s, of which the first {measures.look_in:g} s initialise.\n\n"
         )
         text += table(("channel", "tolerance"), rows)
+    return text
+
+
+def hyperparameters() -> str:
+    """Every number that decides, with what it is and where its value comes from."""
+    text = (
+        "# Hyperparameters\n\nGenerated from `tools/inference/hyperparameters.py`. Another value of one of these\n"
+        "numbers moves a probability, a verdict, a selection or an event of a diagnosis or a watch while fits stay\n"
+        "as they are; no other number of these modules does. Budgets of the search, numerical steps and bounds of the\n"
+        f"data are in `tests/data/other_numbers.toml`. There are {len(list(listed()))} here.\n"
+    )
+    for title in SECTIONS:
+        rows = [
+            (f"`{one.name}`", f"{value:g}", one.metadata["unit"], one.metadata["meaning"], one.metadata["source"])
+            for section, one, value in listed() if section == title
+        ]  # fmt: skip
+        text += f"\n## {title}\n\n" + table(("name", "value", "unit", "prior or bound of", "source"), rows)
     return text
 
 

@@ -11,7 +11,7 @@ from glider.tools.cli.main import cli
 from glider.tools.data.runs import columns as names
 from glider.tools.data.sources import load_vehicle
 from glider.tools.diagnose.isolability import ONBOARD, isolability, planned
-from glider.tools.diagnose.search import EVIDENCE_NEEDED
+from glider.tools.inference.hyperparameters import DIAGNOSIS
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +63,7 @@ def test_an_effect_of_the_smallest_size_has_the_evidence_needed(onboard):
     """Evidence goes with the square of a size: by half the trace of the information."""
     for one in onboard.values():
         if one.visible:
-            assert one.evidence <= EVIDENCE_NEEDED / one.smallest**2
+            assert one.evidence <= DIAGNOSIS.evidence_needed / one.smallest**2
 
 
 def test_motion_capture_shows_a_current():

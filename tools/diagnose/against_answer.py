@@ -19,7 +19,7 @@ from glider.tools.diagnose.record import AGAINST_HEALTHY, ANSWER, UNKNOWN
 from glider.tools.diagnose.shrink import AFTER, BEFORE, FLOOR, RECALIBRATED, by_channel, shrinkage_of
 from glider.tools.gap.measure import RunGap, root_mean_square, run_gap
 from glider.tools.inference.corrected import corrected_text
-from glider.tools.inference.healthy_level import FORM
+from glider.tools.inference.hyperparameters import HEALTHY
 from glider.tools.inference.model import effect_vector, effects_in, nominal_model
 from glider.tools.inference.parameters import NINETY, model_at
 from glider.tools.inference.predict import fly
@@ -64,14 +64,16 @@ def gap_of(part: Problem, P: np.ndarray, F: np.ndarray) -> RunGap:
 
 def sizes(answer: AgainstHealthy) -> dict[str, dict[str, dict[str, Any]]]:
     """Each label's parameters with 90 % intervals, SI: the fit's, less what the file is off by as healthy runs show it;
-    a share of the change, FORM, may not be as the label's equations have it."""
+    the share `form_error` of the change may not be as the label's equations have it."""
     compared, one = answer.compared, answer.best
     found: dict[str, dict[str, dict[str, Any]]] = {}
     for label in answer.selected:
         found[label], usual = {}, answer.healthy.usual[label]
         variance = one.sigma[compared.places[label]] ** 2 + np.diag(usual.covariance)
         change = one.values[compared.places[label]] - usual.mean
-        for k, value, sd in zip(compared.places[label], change, np.sqrt(variance + (FORM * change) ** 2), strict=True):
+        for k, value, sd in zip(
+            compared.places[label], change, np.sqrt(variance + (HEALTHY.form_error * change) ** 2), strict=True
+        ):
             free = compared.free[k]
             low, middle, high = (
                 float(np.clip(value + side * NINETY * sd, free.low, free.high)) * free.spread for side in (-1, 0, 1)

@@ -24,11 +24,11 @@ from glider.tools.diagnose.healthy_fits import Comparison, HealthyHypothesis, hy
 from glider.tools.diagnose.healthy_runs import AsUsual, Healthy, as_the_case_sees, learn, of_form, with_labels
 from glider.tools.diagnose.record import NONE, UNKNOWN
 from glider.tools.gap.corrected import submerged
+from glider.tools.inference.hyperparameters import DIAGNOSIS
 from glider.tools.inference.parameters import nuisance_parameters
 from glider.tools.inference.problem import problem_of
 
 CAUSE = "cause"
-CONFOUNDED_NAT = 6.0  # nat within which labels are not distinguished
 
 
 @dataclass
@@ -82,7 +82,7 @@ def diagnose_against_healthy(
     best = weighed.best(first)
     verdict = first if first in (NONE, UNKNOWN) else CAUSE
     singles = {one.labels[0]: compared.nat(one) for one in listed if len(one.labels) == 1 and one.form is None}
-    least = singles.get(first, np.inf) - CONFOUNDED_NAT
+    least = singles.get(first, np.inf) - DIAGNOSIS.confounded_evidence
     near = [label for label in sorted(singles, key=lambda n: -singles[n]) if singles[label] > least and label != first]
     selected = weighed.certain(best) if verdict == UNKNOWN else list(best.labels)
     bare = compared.nat(listed[0])

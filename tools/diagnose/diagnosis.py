@@ -22,13 +22,11 @@ from glider.tools.diagnose.cautions import below_floor, cautions, not_asked
 from glider.tools.diagnose.chain import noise_of, panels
 from glider.tools.diagnose.correction import Correction, correct
 from glider.tools.diagnose.entries import numbers_to_enter
-from glider.tools.diagnose.materiality import MATERIAL_TOLERANCES
 from glider.tools.diagnose.next_run import propose
 from glider.tools.diagnose.noise_probes import UNPREDICTABLE
-from glider.tools.diagnose.probabilities import TIE
 from glider.tools.diagnose.record import NONE, UNKNOWN, Curves, Data, Details, Noise, Panel, Picture, write_record
 from glider.tools.diagnose.regressors import regressors
-from glider.tools.diagnose.residuals import UNCLEAN, strongest_left
+from glider.tools.diagnose.residuals import strongest_left
 from glider.tools.diagnose.search import Search, run
 from glider.tools.diagnose.shrink import (
     AFTER,
@@ -50,11 +48,12 @@ from glider.tools.diagnose.staged_answer import (
     identified_text,
     weighed,
 )
-from glider.tools.diagnose.unknown import LEFT_OVER, unfit
-from glider.tools.diagnose.verdict import EVIDENCE_NEEDED, Answer, conclude
+from glider.tools.diagnose.unknown import unfit
+from glider.tools.diagnose.verdict import Answer, conclude
 from glider.tools.diagnose.waterfall import Stage, stages_of
 from glider.tools.gap.corrected import findings_of, fix_axes_signs_units, submerged
 from glider.tools.inference.corrected import corrected_text
+from glider.tools.inference.hyperparameters import DIAGNOSIS
 from glider.tools.inference.model import effect_vector, effects_in, nominal_model
 from glider.tools.inference.problem import ALL, problem_of
 from glider.tools.inference.rules import Rules
@@ -95,7 +94,7 @@ class Diagnosis:
         found = cautions(self.answer.search.problem)
         found += [
             f"{label} is there ({nat:.0f} nat of evidence), but moves no channel of any window by "
-            f"{MATERIAL_TOLERANCES:g} of its tolerance: no gap"
+            f"{DIAGNOSIS.material:g} of its tolerance: no gap"
             for label, nat in self.answer.negligible.items()
         ]
         found += below_floor(self.shrinkage.channels(FLOOR))
@@ -305,8 +304,10 @@ def details(diagnosis: Diagnosis) -> Details:
         evidence={k: float(v) for k, v in answer.gained.items()},
         corrected=in_model(diagnosis), noise=diagnosis.noise, panels=diagnosis.panels,
         findings=answer.findings, pictures=[picture(diagnosis, n) for n in drawn_runs(diagnosis)],
-        thresholds={"evidence": EVIDENCE_NEEDED, "tie": TIE, "sigma": UNCLEAN, "left": LEFT_OVER, "matters":
-    MATERIAL_TOLERANCES},
+        thresholds={
+            "evidence": DIAGNOSIS.evidence_needed, "tie": DIAGNOSIS.confounded_evidence,
+            "sigma": DIAGNOSIS.residual_sigma, "left": DIAGNOSIS.misfit_share, "matters": DIAGNOSIS.material,
+        },
         regressors=[] if diagnosis.staged is not None else regressors(answer.search, answer.hypothesis),
     )  # fmt: skip
 

@@ -7,13 +7,12 @@ across (docs/explanation/diagnosis.md, Steady).
 import numpy as np
 
 from glider.firmware.model.vehicle import FormTable
-
-STANDS_OUT = 2.0  # times what noise leaves of healthy runs, in squares, that the form leaves of them: the form decides
+from glider.tools.inference.hyperparameters import DIAGNOSIS, HEALTHY
 
 
 def form_stands_out(form: FormTable | None) -> bool:
     """Whether a vehicle was identified, and its form leaves more of healthy runs than noise does, in squares."""
-    return form is not None and form.total**2 > STANDS_OUT * form.noise**2
+    return form is not None and form.total**2 > HEALTHY.form_ratio * form.noise**2
 
 
 def opened(value: float, shut: float, wide: float) -> float:
@@ -22,6 +21,11 @@ def opened(value: float, shut: float, wide: float) -> float:
         return 0.0
     share = float(min(np.log(value / shut) / np.log(wide / shut), 1.0))
     return share * share * (3.0 - 2.0 * share)
+
+
+def materiality(moved: float) -> float:
+    """How far a movement of a channel (tolerances) is a gap: 0 below `material`, 1 from `material_ratio` times that."""
+    return opened(moved, DIAGNOSIS.material, DIAGNOSIS.material_ratio * DIAGNOSIS.material)
 
 
 def mixed(shares: dict[str, float], others: dict[str, float], weight: float) -> dict[str, float]:

@@ -8,16 +8,13 @@ from scipy.stats import norm
 
 from glider.tools.diagnose.healthy_fits import Comparison, FreeForm, HealthyHypothesis
 from glider.tools.diagnose.record import NONE, UNKNOWN
-from glider.tools.inference.healthy_level import CHANGED, FORM
+from glider.tools.inference.hyperparameters import DIAGNOSIS, HEALTHY
 
-STRANGE = 0.15  # prior probability that something is left where nothing is named
-STANDS_IN = 0.25  # of a label that it stands in for something unknown: so many changes no label is for
 # nat of log odds that a label is the change: hull and fittings keep their mass distribution and the water that they
 # carry along, unless something is built in
-SELDOM = {"inertia": -2.0, "added_mass": -2.0}
+SELDOM = dict.fromkeys(("inertia", "added_mass"), HEALTHY.seldom)
 SHARES = np.linspace(0.005, 0.995, 100)  # of a change, in amplitude, that its label leaves
-OWN_FORM = norm.pdf(SHARES, scale=FORM) / norm.pdf(SHARES, scale=FORM).sum()
-SELECTED_PROBABILITY = 0.9  # probability of a label that is selected beside something unknown
+OWN_FORM = norm.pdf(SHARES, scale=HEALTHY.form_error) / norm.pdf(SHARES, scale=HEALTHY.form_error).sum()
 
 
 @dataclass
@@ -36,12 +33,12 @@ class Weighed:
         return self.listed[int(weights.argmax())]
 
     def certain(self, one: HealthyHypothesis) -> list[str]:
-        """Labels of a hypothesis that are there whatever else is, by SELECTED_PROBABILITY."""
+        """Labels of a hypothesis that are there whatever else is, by `selected_probability`."""
         weights = np.logaddexp(self.alone, self.beside)
         weights = np.exp(weights - logsumexp(weights))
         within = {label: sum(w for w, h in zip(weights, self.listed, strict=True) if label in h.labels)
                   for label in one.labels}  # fmt: skip
-        return [label for label in one.labels if within[label] >= SELECTED_PROBABILITY]
+        return [label for label in one.labels if within[label] >= DIAGNOSIS.selected_probability]
 
     def links(self) -> dict[str, float]:
         """Probability that something unknown enters at a link of the chain, by link."""
@@ -65,8 +62,8 @@ class Weighed:
 def leftover(compared: Comparison, one: HealthyHypothesis) -> tuple[float, float]:
     """Log densities of what runs left out leave: where that is what healthy runs leave, and where it is more.
 
-    What a label leaves is a share of the change, in amplitude: half-normal by FORM where the label is right, any
-    from 0 to 1 where it stands in for something unknown.
+    What a label leaves is a share of the change, in amplitude: half-normal by `form_error` where the label is right,
+    any from 0 to 1 where it stands in for something unknown.
     """
     healthy, scale = compared.healthy, compared.healthy.scale(len(one.left))
     at, usual = float(np.log(max(one.mean_square, 1e-9))), np.exp(healthy.level)
@@ -94,21 +91,24 @@ def weigh(compared: Comparison, listed: list[HealthyHypothesis]) -> Weighed:
     kept = [nothing, *(one for one in listed[1:] if one.mean_square < nothing.mean_square)]
     usual_ones = [other for one in kept if one.form is None for other in compared.without_change(one)]
     for one in [*kept, *usual_ones]:
-        strange = STANDS_IN if one.labels else STRANGE
+        strange = HEALTHY.stands_in if one.labels else HEALTHY.unexplained
         usual, more = leftover(compared, one)
         usual, more = usual + float(np.log1p(-strange)), more + float(np.log(strange))
         at, either = compared.nat(one) + one.as_usual, float(np.logaddexp(usual, more))
         if one.form is not None:
             at += one.form.prior
         if one.form is not None and not one.labels:
-            weights[one.labels, one.form] = -np.inf, at + float(np.log(CHANGED * STRANGE)) + either, one
+            named = float(np.log(HEALTHY.changed * HEALTHY.unexplained))
+            weights[one.labels, one.form] = -np.inf, at + named + either, one
             continue
-        at += float(len(one.labels) * np.log(CHANGED / len(compared.places)) if one.labels else np.log1p(-CHANGED))
+        odds = np.log(HEALTHY.changed / len(compared.places))
+        at += float(len(one.labels) * odds if one.labels else np.log1p(-HEALTHY.changed))
         seldom = sum(SELDOM.get(label, 0.0) for label in one.labels)  # what stands in for something unknown may be any
         if one.form is not None:  # its label's own form, or something unknown
             label = next(other for other in kept if other.labels == one.labels and other.form is None)
             share = form_share(compared, label, one)
-            own, other = norm.logpdf(share, scale=FORM) + np.log(2.0 * (1.0 - STANDS_IN)), np.log(STANDS_IN)
+            own = norm.logpdf(share, scale=HEALTHY.form_error) + np.log(2.0 * (1.0 - HEALTHY.stands_in))
+            other = np.log(HEALTHY.stands_in)
             more = float(np.logaddexp(usual + other, more))
             usual += float(own)
         usual += seldom

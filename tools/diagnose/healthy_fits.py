@@ -16,7 +16,7 @@ from glider.tools.diagnose.held_out import HeldOutWindows, Linearised
 from glider.tools.diagnose.record import NONE, UNKNOWN
 from glider.tools.diagnose.sensor_consistency import inconsistent_sensors
 from glider.tools.inference.corrected import LINKS
-from glider.tools.inference.healthy_level import CHANGED
+from glider.tools.inference.hyperparameters import HEALTHY
 from glider.tools.inference.model import effect_vector
 from glider.tools.inference.parameters import CLOCK_PLACE, FreeParameter
 from glider.tools.inference.problem import Problem
@@ -237,7 +237,7 @@ def hypotheses(compared: Comparison, say: Callable[[str], None]) -> list[Healthy
     nothing = compared.fitted((), np.zeros(len(compared.free)))
     compared.bare = nothing.mean_square
     say(f"no change: {nothing.mean_square:.2f} times what healthy runs leave")
-    odds, listed, best = float(np.log(CHANGED / len(compared.places))), [nothing], nothing
+    odds, listed, best = float(np.log(HEALTHY.changed / len(compared.places))), [nothing], nothing
     while len(best.labels) < MAX_EFFECTS:
         likely = compared.expected_labels(best)[: REFIT_FURTHER if best.labels else REFIT_STEPS]
         found = [compared.fitted((*best.labels, label), values) for _, label, values in likely]

@@ -12,14 +12,13 @@ from glider.tools.data.runs.run import Run
 from glider.tools.diagnose.held_out import HeldOutWindows
 from glider.tools.gap.regimes import ALL
 from glider.tools.inference.channels import recorded
-from glider.tools.inference.healthy_level import USUAL_SCATTER, HealthyLevel
+from glider.tools.inference.healthy_level import HealthyLevel
+from glider.tools.inference.hyperparameters import HEALTHY
 from glider.tools.inference.parameters import FreeParameter, effect_parameters, nuisance_parameters
 from glider.tools.inference.pooled import Pooled, log_prior
 from glider.tools.inference.problem import Problem, problem_of
 
-LEAST_SCALE = 0.05  # tolerances
 TOTAL = "total"
-FILE_ERROR = 0.2  # of a label's prior, 1 sigma that the vehicle file is off by, before healthy runs say more
 FILE_ERRORS = np.geomspace(0.02, 2.0, 41)
 
 
@@ -33,12 +32,12 @@ class AsUsual:
     @classmethod
     def learned(cls, precision: np.ndarray, score: np.ndarray) -> "AsUsual":
         """From what healthy runs say, precision (k, k) and score (k,): the variance is the most probable one with an
-        inverse gamma prior about FILE_ERROR squared, worth one observation."""
+        inverse gamma prior about `file_error` squared, worth one observation."""
         one = np.eye(len(score))
 
         def log_posterior(size: float) -> float:
             evidence = prior_evidence(precision, score, 0.0 * score, size**2 * one)
-            return evidence + float(log_prior(size**2, FILE_ERROR**2))
+            return evidence + float(log_prior(size**2, HEALTHY.file_error**2))
 
         size = max(FILE_ERRORS, key=log_posterior)
         covariance = np.linalg.inv(precision + one / size**2)
@@ -76,13 +75,15 @@ def learn(case: Case, runs: list[Run]) -> Healthy:
         values = found.values
         measured = np.sqrt(found.channels)
         scales = {
-            channel.name: max(float(one) * scales.get(channel.name, 1.0), form.get(channel.name, 0.0), LEAST_SCALE)
+            channel.name: max(
+                float(one) * scales.get(channel.name, 1.0), form.get(channel.name, 0.0), HEALTHY.least_scale
+            )
             for channel, one in zip(windows.channels, measured, strict=True)
         }
     run_of, _ = windows.origins(windows.cuts[0])
     share = np.array([np.mean(run_of == n) for n in range(len(runs))])
     logs = np.log(np.maximum(found.runs / share, 1e-6))
-    level, scatter = float(np.log(np.exp(logs).mean())), float(logs.std(ddof=1)) if len(logs) > 1 else USUAL_SCATTER
+    level, scatter = float(np.log(np.exp(logs).mean())), float(logs.std(ddof=1)) if len(logs) > 1 else HEALTHY.run_scale
     healthy = Healthy(len(runs), level, scatter, scales, [run.name for run in runs])
     places, every = with_labels(problem, free)
     windows = HeldOutWindows(problem, every, scales, healthy.independent * len(runs))
@@ -106,7 +107,7 @@ def with_labels(problem: Problem, nuisance: list[FreeParameter]) -> tuple[dict[s
 
 def of_form(form: FormTable) -> Healthy:
     """The same as identification wrote it into the vehicle file."""
-    scales = {name: max(gap, LEAST_SCALE) for name, gap in form.gaps[ALL].items() if name != TOTAL}
+    scales = {name: max(gap, HEALTHY.least_scale) for name, gap in form.gaps[ALL].items() if name != TOTAL}
     return Healthy(form.runs, 0.0, form.scatter, scales)
 
 

@@ -33,9 +33,9 @@ from glider.tools.data.runs.case import Case
 from glider.tools.data.runs.run import Run
 from glider.tools.data.spelling import did_you_mean
 from glider.tools.diagnose.next_run import MANOEUVRES, RATE, SECONDS, Manoeuvre, commands
-from glider.tools.diagnose.probabilities import TIE
-from glider.tools.diagnose.search import EVIDENCE_NEEDED, THRESHOLD_STEP
+from glider.tools.diagnose.search import THRESHOLD_STEP
 from glider.tools.inference.fit import Fitter
+from glider.tools.inference.hyperparameters import DIAGNOSIS
 from glider.tools.inference.parameters import effect_parameters, nuisance_parameters
 from glider.tools.inference.problem import Problem, problem_of
 
@@ -58,7 +58,7 @@ class Isolability:
     @property
     def visible(self) -> bool:
         """Whether the effect is expected to earn its place."""
-        return self.evidence >= EVIDENCE_NEEDED
+        return self.evidence >= DIAGNOSIS.evidence_needed
 
 
 def check_columns(wanted: Iterable[str]) -> None:
@@ -123,10 +123,14 @@ def isolability(problem: Problem, labels: Sequence[str] | None = None) -> list[I
         S = left[label] @ C.T
         half = 0.5 * float(np.trace(S))
         evidence = half - 0.5 * float(np.linalg.slogdet(np.eye(len(S)) + S)[1])
-        smallest = float(np.sqrt(EVIDENCE_NEEDED / half)) if half > 1e-6 else np.inf
+        smallest = float(np.sqrt(DIAGNOSIS.evidence_needed / half)) if half > 1e-6 else np.inf
         clear = min(1.0, CLEAR_NAT / max(half, 1e-6))
         rest = {other: _remaining(S, left[label] @ D.T, left[other] @ D.T) for other, D in columns.items()}
-        near = sorted((nat, other) for other, nat in rest.items() if other != label and clear * nat < TIE)
+        near = sorted(
+            (nat, other)
+            for other, nat in rest.items()
+            if other != label and clear * nat < DIAGNOSIS.confounded_evidence
+        )
         found.append(Isolability(label, evidence, smallest, tuple(other for _, other in near)))
     return sorted(found, key=lambda one: -one.evidence)
 

@@ -6,13 +6,13 @@ hundred nat in ten minutes of 10 Hz. What nobody could see in a window is no gap
 
 import numpy as np
 
-from glider.tools.diagnose.gates import opened
+from glider.tools.diagnose.gates import materiality
 from glider.tools.diagnose.search import Search
 from glider.tools.diagnose.shrink import AFTER, FLOOR, Shrinkage, case_noise_floor
 from glider.tools.gap.measure import mean_square
 from glider.tools.inference.channels import errors
 from glider.tools.inference.fit import Hypothesis
-from glider.tools.inference.kind import MATERIAL_TOLERANCES
+from glider.tools.inference.hyperparameters import DIAGNOSIS
 from glider.tools.inference.predict import at_its_word, fly_windows_from
 from glider.tools.inference.problem import Problem, cut
 
@@ -56,11 +56,9 @@ def excess(after: dict[str, float], floor: dict[str, float]) -> float:
 
 def excess_noise_is_material(search: Search, hypothesis: Hypothesis, shrinkage: Shrinkage) -> bool:
     """Whether disorder that the search knows of shows in the gap, beyond what the case's own noise leaves."""
-    return excess(shrinkage.channels(AFTER), case_noise_floor(search, hypothesis)) >= MATERIAL_TOLERANCES
+    return excess(shrinkage.channels(AFTER), case_noise_floor(search, hypothesis)) >= DIAGNOSIS.material
 
 
 def gap_is_material(shrinkage: Shrinkage) -> float:
-    """How far what is left exceeds the floor in any channel: 0 below MATERIAL_TOLERANCES, 1 from twice that."""
-    return opened(
-        excess(shrinkage.channels(AFTER), shrinkage.channels(FLOOR)), MATERIAL_TOLERANCES, 2.0 * MATERIAL_TOLERANCES
-    )
+    """How far what is left exceeds the floor in any channel, by degrees from 0 to 1 (`gates.materiality`)."""
+    return materiality(excess(shrinkage.channels(AFTER), shrinkage.channels(FLOOR)))

@@ -12,6 +12,7 @@ import numpy as np
 
 from glider.sim_backend.core.effects import effect_layout as ef
 from glider.sim_backend.ocean.core import layout as ocean
+from glider.tools.inference.hyperparameters import DIAGNOSIS
 from glider.tools.inference.problem import Problem
 
 TURBULENCE, WAVES, CLOCK = "turbulence", "waves", "motion capture's clock"
@@ -77,9 +78,6 @@ def ocean_probes(problem: Problem) -> list[NoiseProbe]:
 
 SCALES = (2.0, 6.0, 20.0, 60.0)  # of a probe's unit; the best of them counts
 FINER = (0.6, 1.6)  # and then about that
-# A filter that expects too much of a clock's wandering loses a little, one that expects too little holds nothing: of
-# scales that gain as much as the best, but for a tenth, the largest.
-AS_GOOD = 0.9
 
 
 @dataclass
@@ -132,7 +130,7 @@ def run_probes(
                 if np.isfinite(value) and value > best:
                     best, scale = value, s
         if probe.name == CLOCK:
-            scale = max(s for s, value in tried.items() if value >= AS_GOOD * best)
+            scale = max(s for s, value in tried.items() if value >= DIAGNOSIS.clock_scale_share * best)
             best = tried[scale]
         found.append(ProbeResult(probe, best, scale))
     return sorted(found, key=lambda p: -p.gain)

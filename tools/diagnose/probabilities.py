@@ -6,14 +6,9 @@ import numpy as np
 from scipy.special import ndtr
 
 from glider.sim_backend.core.effects.catalogue import catalogue
-from glider.tools.diagnose.gates import opened
-from glider.tools.diagnose.materiality import MATERIAL_TOLERANCES
+from glider.tools.diagnose.gates import materiality
 from glider.tools.diagnose.record import NONE, UNKNOWN
-
-TIE = 6.0  # nat within which two labels are not distinguished: what a change of prior spreads can move
-ERROR_RATE = 0.03  # answers that named something else altogether, of those to the cases it was developed with: 3 of 104
-MAX_NONE_RATIO = 0.9  # of the main cause's probability, that none may have where there is an effect: no tie
-LARGE_WIDTH = 0.25  # e-folds of size over which a main cause comes to be as likely as not
+from glider.tools.inference.hyperparameters import DIAGNOSIS
 
 
 def softmax(logs: dict[str, float]) -> dict[str, float]:
@@ -27,11 +22,12 @@ def doubt_small(chances: dict[str, float], main: str, size: float) -> dict[str, 
     """Probabilities where the largest of the effects may be one of many small ones, and nothing the main cause.
 
     size: of the main one, in sizes at which that is as likely as not. What this takes off the labels goes to none, but
-    no more than MAX_NONE_RATIO of what the main one keeps: there is something.
+    no more than `none_ratio` of what the main one keeps: there is something.
     """
-    large = float(ndtr(np.log(max(size, 1e-6)) / LARGE_WIDTH))
+    large = float(ndtr(np.log(max(size, 1e-6)) / DIAGNOSIS.main_size_width))
     labels = sum(chance for name, chance in chances.items() if name != NONE)
-    least = 1.0 / (1.0 + MAX_NONE_RATIO * chances[main] / max(labels, 1e-9))  # of the labels' probability that stays
+    # of the labels' probability that stays
+    least = 1.0 / (1.0 + DIAGNOSIS.none_ratio * chances[main] / max(labels, 1e-9))
     kept = max(large, least)
     found = {name: kept * chance for name, chance in chances.items() if name != NONE}
     return found | {NONE: 1.0 - sum(found.values())}
@@ -40,9 +36,9 @@ def doubt_small(chances: dict[str, float], main: str, size: float) -> dict[str, 
 def to_none(chances: dict[str, float], negligible: Iterable[str], moved: dict[str, float]) -> dict[str, float]:
     """Probabilities with those of effects that do not matter given to none: there is no gap with them.
 
-    moved: by how much each moves the windows, tolerances; up to twice MATERIAL_TOLERANCES it matters by degrees.
+    moved: by how much each moves the windows, tolerances; an effect is material by degrees (`gates.materiality`).
     """
-    material = {label: opened(far, MATERIAL_TOLERANCES, 2.0 * MATERIAL_TOLERANCES) for label, far in moved.items()}
+    material = {label: materiality(far) for label, far in moved.items()}
     material |= dict.fromkeys(negligible, 0.0)
     kept = {label: chance * material.get(label, 1.0) for label, chance in chances.items()}
     return kept | {NONE: kept.get(NONE, 0.0) + sum(chances.values()) - sum(kept.values())}
@@ -60,20 +56,25 @@ def answer_first(chances: dict[str, float], gained: Iterable[str]) -> tuple[str,
 
 
 def mix_in_error_rate(chances: dict[str, float], main: str, others: Sequence[str] = ()) -> dict[str, float]:
-    """Probabilities of which ERROR_RATE goes to all labels: the search may have lost the true one on its way.
+    """Probabilities of which `error_rate` goes to all labels: the search may have lost the true one on its way.
 
-    A third of it to `others` than the main one that the search found: of nine effects that were not put first, six were
-    among those.
+    One of its `error_parts` goes to `others` than the main one that the search found: of nine effects that were not put
+    first, six were among those.
     """
     labels = catalogue()
     others = [name for name in others if name in labels and name != main]
-    shares = dict.fromkeys(labels, (2.0 / 3.0 if others else 1.0) * ERROR_RATE / len(labels))
+    parts = DIAGNOSIS.error_parts
+    shares = dict.fromkeys(labels, ((parts - 1.0) / parts if others else 1.0) * DIAGNOSIS.error_rate / len(labels))
     for name in others:
-        shares[name] += ERROR_RATE / 3.0 / len(others)
-    return {name: (1.0 - ERROR_RATE) * value + shares.get(name, 0.0) for name, value in chances.items()}
+        shares[name] += DIAGNOSIS.error_rate / parts / len(others)
+    return {name: (1.0 - DIAGNOSIS.error_rate) * value + shares.get(name, 0.0) for name, value in chances.items()}
 
 
 def grouped(logs: dict[str, float]) -> dict[str, list[str]]:
     """For every label, those whose evidence these data cannot part from its own."""
     labels = sorted(logs, key=lambda name: -logs[name])
-    return {label: [label, *(o for o in labels if o != label and abs(logs[o] - logs[label]) < TIE)] for label in labels}
+
+    def near(label: str) -> list[str]:
+        return [one for one in labels if one != label and abs(logs[one] - logs[label]) < DIAGNOSIS.confounded_evidence]
+
+    return {label: [label, *near(label)] for label in labels}

@@ -11,6 +11,7 @@ from scipy.special import ndtr, ndtri
 
 from glider.firmware.core.vehicle.layout import X_ACT, X_BALLAST, X_DOWN, X_NU, X_QUAT, X_SERVO, X_SLIDER
 from glider.tools.diagnose.record import FindingRecord
+from glider.tools.inference.hyperparameters import DIAGNOSIS
 from glider.tools.inference.problem import Gains, Problem
 
 LAGS = ((1, 2), (3, 10), (11, 60))  # samples, in groups
@@ -21,7 +22,6 @@ FEATURE_UNITS = {
     "pump running": "", "pump expelling": "",
 }  # fmt: skip
 SMOOTHED_SECONDS = 2.0  # over which something is averaged, to find where it is largest
-UNCLEAN = 6.0  # sigma, corrected for the number of tests
 
 
 def features(problem: Problem, gains: Gains) -> dict[str, np.ndarray]:
@@ -134,7 +134,7 @@ def strongest_left(findings: list[FindingRecord]) -> tuple[FindingRecord | None,
 
     None where they are too weak.
     """
-    strong = [f for f in findings if abs(f.sigma) >= UNCLEAN]
+    strong = [f for f in findings if abs(f.sigma) >= DIAGNOSIS.residual_sigma]
     if not strong:
         return None, None
     correlated = sorted(

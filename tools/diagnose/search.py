@@ -18,6 +18,7 @@ from glider.tools.diagnose.gates import opened
 from glider.tools.diagnose.sensor_consistency import HOLDS_BELOW, inconsistent_sensors
 from glider.tools.inference import levels
 from glider.tools.inference.fit import THRESHOLD_STEP, Fitter, Hypothesis
+from glider.tools.inference.hyperparameters import DIAGNOSIS
 from glider.tools.inference.model import effect_vector, nominal_model
 from glider.tools.inference.parameters import (
     CLOCK_PLACE,
@@ -41,17 +42,9 @@ LEADING, PARTNERS_TRIED = 3, 5  # hypotheses beside which a second effect is tri
 FAR_OFF = 10.0  # mean NIS of the best of three effects, beyond which no further one is small, nor explains it
 FURTHER_EFFECTS_TRIED = 3  # effects tried as a third or further one, beside the best hypothesis
 SHORT_LIST = 3  # hypotheses led on from the third effect on
-# Nat of evidence that an effect brings, or it is left out (docs/explanation/diagnosis.md, Thresholds): the prior odds
-# of none to a
-# label, so that a label is as probable as none where it would just be selected.
-EVIDENCE_NEEDED = 12.0
 VISIBLE = 1.0  # squared sigma: a spread of an effect that moves nothing by as much cannot be seen in these runs
 PARTNER_EVIDENCE = 5.0  # nat that one step is expected to gain with a further effect, or none is tried
 POLISHED = {1: 3, 2: 2}  # times at most, by the number of effects; once with more
-# What a file says of noise is taken to be right by a factor of two: beyond that it is an effect, or a reading that is
-# held or coloured.
-LEAST_LEVEL, MOST_LEVEL = 0.5, 2.0
-NO_LEVEL = 2.5  # a disturbance that would have to be as many times the file's is as likely none: it stays the file's
 LEAST_LOG_LEVEL = 0.1  # logarithm by which a disturbance begins to be another
 LEVEL_ROUNDS = 2  # Newton steps at a time
 ROUNDS = 3  # of gains at the best label and all labels tried again there, at most
@@ -254,7 +247,7 @@ def run(
     clock: the effect of motion capture's clock, where that is certain; before: what another search over these runs came
     to, by a filter that knew less of disorder. Allowed parameters driven to their limits may hide it from the screen.
     """
-    noise = levels.sensor_noise(problem, LEAST_LEVEL, MOST_LEVEL)
+    noise = levels.sensor_noise(problem, 1.0 / DIAGNOSIS.noise_factor, DIAGNOSIS.noise_factor)
     well_specified = noise_matches_file(problem, noise)
     problem = noise.believed(well_specified).applied(problem)
     problem = problem if clock is None else clock.within(problem)
@@ -302,7 +295,7 @@ def grow(search: Search, say: Callable[[str], None]) -> None:
         say(f"best candidate with up to {count} effects: {' '.join(search.best.labels)}")
         fewer = [c.log_evidence(search.fitter) for c in search.hypotheses if len(c.labels) < count]
         least = max(fewer, default=-np.inf)
-        if search.best.log_evidence(search.fitter) < least + EVIDENCE_NEEDED:
+        if search.best.log_evidence(search.fitter) < least + DIAGNOSIS.evidence_needed:
             break
 
 
@@ -312,7 +305,7 @@ def noise_matches_file(problem: Problem, noise: levels.Levels) -> float:
     One whose noise cannot be found says against it what one that is found exactly as the file says speaks for it.
     """
     silent = sum(problem.seen[part].any() for part in levels.SENSORS.values()) - len(noise.names)
-    return float(expit(noise.odds.sum() - silent * np.log(levels.FREE / levels.ACCURATE)))
+    return float(expit(noise.odds.sum() - silent * np.log(DIAGNOSIS.noise_free / DIAGNOSIS.noise_accurate)))
 
 
 def level_disturbance(search: Search) -> bool:
@@ -323,7 +316,7 @@ def level_disturbance(search: Search) -> bool:
     Nothing jumps: a small change, and one beyond what is believed, count by degrees.
     """
     problem = search.problem
-    if (1.0 - search.well_specified) * np.log(MOST_LEVEL) < LEAST_LOG_LEVEL:
+    if (1.0 - search.well_specified) * np.log(DIAGNOSIS.noise_factor) < LEAST_LOG_LEVEL:
         return False
     plain = replace(problem, spectral=levels.as_said(problem).spectral)
     now = levels.disturbance(plain)
@@ -333,8 +326,9 @@ def level_disturbance(search: Search) -> bool:
     before = np.log([factors[name] for name in now.names])
     model = search.model(min([search.null, search.best], key=lambda c: c.misfit))
     found = levels.estimate(plain, lambda p: p.filter(*model, begin=True), now.moved(before), LEVEL_ROUNDS)
-    log = np.clip(found.log, np.log(LEAST_LEVEL), np.log(MOST_LEVEL)) * (1.0 - search.well_specified)
-    log *= [1.0 - opened(factor, MOST_LEVEL, NO_LEVEL**2 / MOST_LEVEL) for factor in np.exp(found.log)]
+    most = DIAGNOSIS.noise_factor
+    log = np.clip(found.log, np.log(1.0 / most), np.log(most)) * (1.0 - search.well_specified)
+    log *= [1.0 - opened(one, most, DIAGNOSIS.noise_factor_rejected**2 / most) for one in np.exp(found.log)]
     change = log - before
     change *= opened(float(np.abs(change).max()), LEAST_LOG_LEVEL, 2.0 * LEAST_LOG_LEVEL)
     if not change.any():

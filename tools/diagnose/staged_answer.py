@@ -14,13 +14,9 @@ from glider.tools.diagnose.record import NONE, UNKNOWN
 from glider.tools.diagnose.shrink import Shrinkage
 from glider.tools.diagnose.staged import IDENTIFIED, Staged
 from glider.tools.diagnose.verdict import Answer
+from glider.tools.inference.hyperparameters import DIAGNOSIS
 from glider.tools.inference.vehicle_parameters import GAUGE
 from glider.tools.readings.findings import Finding, spoken
-
-# A vehicle that had to be identified was not the file's: what is left of the gap of a first identification is no effect
-# alone, but the rest of the vehicle, and the answer says so; of the other probability each effect has its share.
-UNKNOWN_THEN = 0.9
-SELECTED_PROBABILITY = 0.9  # probability from which a label is selected, where two answers are weighed
 
 
 def conclusion(answer: Answer, found: Staged, shrinkage: Shrinkage) -> Answer:
@@ -28,8 +24,10 @@ def conclusion(answer: Answer, found: Staged, shrinkage: Shrinkage) -> Answer:
     readings = {label: found.stages[0].total ** 2 - found.stages[1].total ** 2 for label in found.read.labels}
     weight = {label: max(readings.get(label, 0.0), found.taken.get(label, 0.0), 1e-3) for label in found.selected}
     total = sum(weight.values())
-    chances = dict.fromkeys(catalogue(), 0.0) | {label: (1.0 - UNKNOWN_THEN) * w / total for label, w in weight.items()}
-    chances |= {NONE: 0.0, UNKNOWN: UNKNOWN_THEN if weight else 1.0}
+    chances = dict.fromkeys(catalogue(), 0.0) | {
+        label: (1.0 - DIAGNOSIS.identified_unknown) * w / total for label, w in weight.items()
+    }
+    chances |= {NONE: 0.0, UNKNOWN: DIAGNOSIS.identified_unknown if weight else 1.0}
     gained = {label: by_readings.nats(found.read.findings, label) for label in found.selected} | {
         label: nat for label, nat in found.evidence.items() if label in found.selected
     }
@@ -57,12 +55,12 @@ def residuals(found: Staged) -> int:
 def weighed(known: Answer, far: Answer, off: float) -> Answer:
     """Two answers in one: by the vehicle's file, and, with the probability `off`, by the stages of one far from it.
 
-    Selected is the main cause, and what is by SELECTED_PROBABILITY in the answer, whichever is right.
+    Selected is the main cause, and what is by `selected_probability` in the answer, whichever is right.
     """
     every = [*known.selected, *(label for label in far.selected if label not in known.selected)]
     there = {label: (1.0 - off) * (label in known.selected) + off * (label in far.selected) for label in every}
     main, chances = answer_first(mixed(known.probabilities, far.probabilities, off), every)
-    selected = [label for label in every if label == main or there[label] >= SELECTED_PROBABILITY]
+    selected = [label for label in every if label == main or there[label] >= DIAGNOSIS.selected_probability]
     gained = {label: max(one.gained.get(label, 0.0) for one in (known, far)) for label in selected}
     return replace(
         known, selected=selected, main=main, probabilities=chances, gained=gained, groups=far.groups | known.groups,

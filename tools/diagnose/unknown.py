@@ -21,37 +21,19 @@ from glider.tools.diagnose.noise_probes import (
     probes,
     run_probes,
 )
-from glider.tools.diagnose.residuals import UNCLEAN
-from glider.tools.diagnose.search import EVIDENCE_NEEDED, Search
+from glider.tools.diagnose.search import Search
 from glider.tools.diagnose.shrink import Shrinkage, shrink
-from glider.tools.diagnose.waves import LINE, line_share
+from glider.tools.diagnose.waves import line_share
 from glider.tools.inference.fit import Hypothesis
+from glider.tools.inference.hyperparameters import DIAGNOSIS
 from glider.tools.inference.parameters import CLOCK_PLACE
 from glider.tools.inference.problem import Problem
-
-LEFT_OVER, LEFT_WIDTH = 0.145, 1.1  # share of the explainable misfit at which unknown is as likely as not; e-folds
-OWN_LEFT = 0.03  # the same where all of it is left at the sensor of an effect that is there
-LEFT_GAP, LEFT_GAP_WIDTH = 0.17, 0.5  # the same of the squared gap beyond the floor: small effects have nat, too
-# Floors that the gap left lies beyond its own floor (root of the difference of squares), at which it is as likely one
-# effect of its own as what small ones leave; e-folds.
-UNKNOWN_GAP_RATIO_AT_HALF, UNKNOWN_GAP_RATIO_WIDTH = 1.8, 0.35
-# Where the file says what noise there is, it is right about the vehicle: nothing small stands beside the main effect.
-SPECIFIED_LEFT, SPECIFIED_LEFT_WIDTH = 0.11, 0.6  # as LEFT_OVER
-SPECIFIED_WIDE = 0.8  # as UNKNOWN_GAP_RATIO_AT_HALF
-# Tolerances that the best explanation still misses by: with the first an effect of the catalogue may, with the second
-# none does, and the vehicle is not the file's.
-UNFIT = (3.0, 8.0)
-ONE_AXIS = 0.65  # of what all axes bring together: where one link alone brings as much, it is no turbulence
-LEAST_UNKNOWN, MORE_UNKNOWN = 0.002, 0.005  # probability of an unknown effect: nothing is left, or something is
-CLOCKED = 0.5  # of what the best probe gains, that the probe of motion capture's clock must
-ALONE = (2.0, 4.5)  # times what any other element's noise gains: what is left may be, and is, at one element alone
-SHOWS = (UNCLEAN, 1.5 * UNCLEAN)  # sigma of what is left, from which it counts, and in full
 
 
 def probability(share: float, middle: float, width: float) -> float:
     """Probability that what is left is a gap of its own (docs/explanation/diagnosis.md, Thresholds)."""
     z = (np.log(max(share, 1e-6)) - np.log(middle)) / width
-    return float(np.clip(ndtr(z), MORE_UNKNOWN, 1.0 - MORE_UNKNOWN))
+    return float(np.clip(ndtr(z), DIAGNOSIS.least_unknown_residual, 1.0 - DIAGNOSIS.least_unknown_residual))
 
 
 def left_share(shrinkage: Shrinkage, taken: float) -> float:
@@ -78,7 +60,9 @@ def left_beyond(shrinkage: Shrinkage) -> float:
 
 def unfit(shrinkage: Shrinkage, noise: ProbeResult | None) -> float:
     """Probability that the vehicle is not its file's, by what the best explanation leaves; beyond disorder's floor."""
-    return opened(shrinkage.after if noise is None else left_beyond(shrinkage), *UNFIT)
+    return opened(
+        shrinkage.after if noise is None else left_beyond(shrinkage), DIAGNOSIS.far_gap, DIAGNOSIS.far_full_gap
+    )
 
 
 def place_alone(probed: Iterable[tuple[NoiseProbe, float]]) -> tuple[tuple[str, str], float]:
@@ -89,7 +73,11 @@ def place_alone(probed: Iterable[tuple[NoiseProbe, float]]) -> tuple[tuple[str, 
         gains[place] = max(gains.get(place, 0.0), gain)
     ranked = sorted(gains, key=lambda place: -gains[place])
     next_gain = gains[ranked[1]] if len(ranked) > 1 else 0.0
-    alone = opened(gains[ranked[0]] / max(next_gain, 1e-9), *ALONE) if ranked else 0.0
+    alone = (
+        opened(gains[ranked[0]] / max(next_gain, 1e-9), DIAGNOSIS.alone_ratio, DIAGNOSIS.alone_full_ratio)
+        if ranked
+        else 0.0
+    )
     return (ranked[0], alone) if ranked else (("", ""), 0.0)
 
 
@@ -121,7 +109,12 @@ def remainder_of(
     own = float(search.gains.misfit.sum())
     probed = run_probes(problem, *search.model(hypothesis), probes(problem))
     explained = max(0.5 * (null - own), 0.0) + (noise.gain if noise is not None else 0.0)
-    return Remainder(explained, probed[0].gain, probed, opened(whiteness, *SHOWS))
+    return Remainder(
+        explained,
+        probed[0].gain,
+        probed,
+        opened(whiteness, DIAGNOSIS.residual_sigma, DIAGNOSIS.residual_full_ratio * DIAGNOSIS.residual_sigma),
+    )
 
 
 def waves_beside(search: Search, hypothesis: Hypothesis, left: Remainder) -> ProbeResult | None:
@@ -130,17 +123,17 @@ def waves_beside(search: Search, hypothesis: Hypothesis, left: Remainder) -> Pro
     Other links may gain more: what effects leave that the windows do not ask for.
     """
     found = next((one for one in left.probed if one.probe.name == WAVES), None)
-    if found is None or found.gain < EVIDENCE_NEEDED:
+    if found is None or found.gain < DIAGNOSIS.evidence_needed:
         return None
     more, doubt = inflated(search.problem, found.probe, found.scale)
     gains = search.problem.filter(*search.model(hypothesis), begin=True, more=more, doubt=doubt)
-    return found if line_share(search.problem, gains) >= LINE else None
+    return found if line_share(search.problem, gains) >= DIAGNOSIS.wave_share else None
 
 
 def turbulence_first(probed: list[ProbeResult]) -> ProbeResult | None:
     """Turbulence, where no other link gains nearly as much beside a hypothesis."""
     first = probed[0] if probed else None
-    if first is None or first.probe.name != TURBULENCE or probed[1].gain > ONE_AXIS * first.gain:
+    if first is None or first.probe.name != TURBULENCE or probed[1].gain > DIAGNOSIS.single_axis_share * first.gain:
         return None
     return first
 
@@ -148,7 +141,11 @@ def turbulence_first(probed: list[ProbeResult]) -> ProbeResult | None:
 def clock_first(probed: list[ProbeResult]) -> ProbeResult | None:
     """Motion capture's clock, where its probe gains more than any other link's, its poses' noise apart."""
     clock = next((found for found in probed if found.probe.name == CLOCK), None)
-    if clock is None or clock.gain <= CLOCKED * probed[0].gain or probed[0].probe.element != CLOCK_PLACE[1]:
+    if (
+        clock is None
+        or clock.gain <= DIAGNOSIS.clock_share * probed[0].gain
+        or probed[0].probe.element != CLOCK_PLACE[1]
+    ):
         return None
     return clock
 
@@ -158,14 +155,14 @@ def wandering_clock(search: Search, hypothesis: Hypothesis, left: Remainder) -> 
 
     Water that shakes every axis goes wherever poses say, at whatever time they were taken, and gains for that, too.
     """
-    if not any(found.probe.name == CLOCK and found.gain > CLOCKED * left.left for found in left.probed):
+    if not any(found.probe.name == CLOCK and found.gain > DIAGNOSIS.clock_share * left.left for found in left.probed):
         return None
     if left.probed[0].probe.name != TURBULENCE:
         return clock_first(left.probed)
     more, _ = inflated(search.problem, left.probed[0].probe, left.probed[0].scale)
     noisy = search.problem.with_extra_noise(more)
     found = clock_first(run_probes(noisy, *search.model(hypothesis), probes(noisy)))
-    return found if found is not None and found.gain > EVIDENCE_NEEDED else None
+    return found if found is not None and found.gain > DIAGNOSIS.evidence_needed else None
 
 
 def disorder(search: Search, hypothesis: Hypothesis, left: Remainder) -> ProbeResult | None:
@@ -181,10 +178,7 @@ def disorder(search: Search, hypothesis: Hypothesis, left: Remainder) -> ProbeRe
     if beside is not None:
         return beside
     water = turbulence_first(left.probed)  # a sensor's small error may have more nats than it: windows show it
-    return water if water is not None and left_floors(shrink(search, hypothesis)) > UNKNOWN_GAP_RATIO_AT_HALF else None
-
-
-OTHER_CLOCK = 0.5  # of the squares that its own label leaves of a clock's course: the other one draws it better
+    return water if water is not None and left_floors(shrink(search, hypothesis)) > DIAGNOSIS.unknown_size else None
 
 
 def clock_of(search: Search, hypothesis: Hypothesis, gained: dict[str, float], more: np.ndarray) -> ClockModel | None:
@@ -205,7 +199,7 @@ def clock_of(search: Search, hypothesis: Hypothesis, gained: dict[str, float], m
     whole = late + model[1][ef.MOCAP_DELAY] + model[1][ef.CLOCK_SKEW] * problem.since
     drawn = {label: run_sizes(problem, whole, label) for label in ("mocap_delay", "clock_skew")}
     other = "mocap_delay" if labels[0] == "clock_skew" else "clock_skew"
-    better = len(problem.runs) > 1 and drawn[other][1] < OTHER_CLOCK * drawn[labels[0]][1]
+    better = len(problem.runs) > 1 and drawn[other][1] < DIAGNOSIS.other_clock_share * drawn[labels[0]][1]
     if better and other in search.parameters:
         free, sizes = search.parameters[other], drawn[other][0]
         values, spread = np.zeros(len(free)), sizes.std(ddof=1) / np.sqrt(len(sizes))
@@ -255,7 +249,7 @@ def probability_unknown(
     else, is no small effect beside it: something there has another form, however narrow the gap it leaves.
     """
     off = unfit(shrinkage, noise) if search.problem.rules.whiteness else 0.0
-    known = LEAST_UNKNOWN
+    known = DIAGNOSIS.least_unknown
     if left is not None:
         kinds = ((search.well_specified, True), (1.0 - search.well_specified, False))
         shown = sum(
@@ -263,7 +257,7 @@ def probability_unknown(
             for share, well_specified in kinds if share > 0.0
         )  # fmt: skip
         known += (shown - known) * left.shows
-    return known + (1.0 - MORE_UNKNOWN - known) * off
+    return known + (1.0 - DIAGNOSIS.least_unknown_residual - known) * off
 
 
 def unknown_beside(
@@ -276,18 +270,20 @@ def unknown_beside(
     vehicle: windows say as much as with a clock that is right.
     """
     if noise and noise.probe.name != CLOCK:
-        return probability(left.share, LEFT_OVER, LEFT_WIDTH)
+        return probability(left.share, DIAGNOSIS.misfit_share, DIAGNOSIS.misfit_share_width)
     as_said = well_specified and not noise
-    middle = SPECIFIED_WIDE if as_said else UNKNOWN_GAP_RATIO_AT_HALF
-    wide = probability(left_floors(shrinkage), middle, UNKNOWN_GAP_RATIO_WIDTH)
+    middle = DIAGNOSIS.specified_unknown_size if as_said else DIAGNOSIS.unknown_size
+    wide = probability(left_floors(shrinkage), middle, DIAGNOSIS.unknown_size_width)
     if not evident:
         return wide
     if as_said:
-        form = probability(left.share, SPECIFIED_LEFT, SPECIFIED_LEFT_WIDTH)
+        form = probability(left.share, DIAGNOSIS.specified_misfit_share, DIAGNOSIS.specified_misfit_share_width)
     else:
-        form = probability(left_share(shrinkage, taken), LEFT_GAP, LEFT_GAP_WIDTH)
-    beside = max(form * wide, MORE_UNKNOWN)
+        form = probability(left_share(shrinkage, taken), DIAGNOSIS.gap_share, DIAGNOSIS.gap_share_width)
+    beside = max(form * wide, DIAGNOSIS.least_unknown_residual)
     place, alone = left.alone
     if place[0] == "sensing" and place in places:
-        beside += (max(form, probability(left.share, OWN_LEFT, LEFT_WIDTH)) - beside) * alone
+        beside += (
+            max(form, probability(left.share, DIAGNOSIS.sensor_misfit_share, DIAGNOSIS.misfit_share_width)) - beside
+        ) * alone
     return beside

@@ -8,10 +8,9 @@ import numpy as np
 from glider.sim_backend.core.effects.catalogue import catalogue
 from glider.tools.diagnose.descent import advance_and_prune, converge, first_step
 from glider.tools.diagnose.gates import mixed, opened
-from glider.tools.diagnose.materiality import MATERIAL_TOLERANCES, excess_noise_is_material, gap_is_material, movements
+from glider.tools.diagnose.materiality import excess_noise_is_material, gap_is_material, movements
 from glider.tools.diagnose.noise_probes import CLOCK, TURBULENCE, ProbeResult, inflated
 from glider.tools.diagnose.probabilities import (
-    TIE,
     answer_first,
     doubt_small,
     grouped,
@@ -20,8 +19,8 @@ from glider.tools.diagnose.probabilities import (
     to_none,
 )
 from glider.tools.diagnose.record import NONE, UNKNOWN, FindingRecord
-from glider.tools.diagnose.residuals import UNCLEAN, tests, worst
-from glider.tools.diagnose.search import EVIDENCE_NEEDED, Search, run, screen
+from glider.tools.diagnose.residuals import tests, worst
+from glider.tools.diagnose.search import Search, run, screen
 from glider.tools.diagnose.shrink import (
     Shrinkage,
     ablation_importance,
@@ -32,8 +31,6 @@ from glider.tools.diagnose.shrink import (
     shrink,
 )
 from glider.tools.diagnose.unknown import (
-    LEAST_UNKNOWN,
-    UNKNOWN_GAP_RATIO_AT_HALF,
     clock_label,
     clock_of,
     disorder,
@@ -44,16 +41,10 @@ from glider.tools.diagnose.unknown import (
     turbulence_first,
 )
 from glider.tools.inference.fit import Hypothesis
+from glider.tools.inference.hyperparameters import DIAGNOSIS
 from glider.tools.inference.parameters import CLOCK_PLACE
 
-HELD_OUT_SHARE = 0.3  # of the gap that is left on runs left out: an effect beside another must close as much more
-MAX_UNEXPLAINED_GAP_SHARE = (
-    0.9  # of the recalibrated gap: effects beside an unknown one that leave more are not certain
-)
 RIVALS = 5  # further labels fitted in the place of the main one, where it stands beside others
-# Floors by which an effect widens the gap, as likely a main cause as one of many small ones there: where noise is not
-# what the file says, so that it may say little of the rest, and where it is.
-LARGE, SPECIFIED = 2.1, 1.2
 
 
 @dataclass
@@ -71,7 +62,7 @@ class Answer:
     whiteness: float  # sigma of what is left, corrected for the number of tests
     unexplained: float  # of the squared gap beyond the floor, the share that the selected effects leave
     gained: dict[str, float]  # nat that each selected effect brings
-    negligible: dict[str, float]  # nat of effects that are there, but move no window by MATERIAL_TOLERANCES
+    negligible: dict[str, float]  # nat of effects that are there, but are not material
     probed: list[ProbeResult]  # beyond the selected effects; empty where nothing is left
     noise: ProbeResult | None  # turbulence, waves or motion capture's clock, where the search knew of it
     shrinkage: Shrinkage
@@ -109,7 +100,7 @@ class HeldOutImportance:
     def share(self, label: str) -> float:
         """The same over the gap with all of them.
 
-        An effect below HELD_OUT_SHARE is a detail that the data can see and nobody needs: the wrong form of another
+        An effect below `held_out_share` is a detail that the data can see and nobody needs: the wrong form of another
         one, a sample's worth of delay.
         """
         return self.tolerances(label) / max(float(np.sqrt(self.whole.mean())), 1e-6)
@@ -153,14 +144,14 @@ def prune_effects(search: Search, hypothesis: Hypothesis) -> tuple[Hypothesis, d
             for label in hypothesis.labels
         }
         weakest = min(gains, key=lambda label: gains[label])
-        if gains[weakest] >= EVIDENCE_NEEDED:
+        if gains[weakest] >= DIAGNOSIS.evidence_needed:
             if len(hypothesis.labels) == 1:
                 return hypothesis, gains
             outside = held_out_importance(search, hypothesis)
             idle = [
                 label for label in hypothesis.labels
-                if outside.share(label) < HELD_OUT_SHARE
-                and nuisance_prior_cost(hypothesis, drop(search, hypothesis, label)) < EVIDENCE_NEEDED
+                if outside.share(label) < DIAGNOSIS.held_out_share
+                and nuisance_prior_cost(hypothesis, drop(search, hypothesis, label)) < DIAGNOSIS.evidence_needed
             ]  # fmt: skip
             if not idle:
                 return hypothesis, gains
@@ -224,7 +215,7 @@ def search_again_with_noise(
         say("rough water is not the main cause")
         return conclude(search, say, calm=True)
     water = turbulence_first(answer.probed) if found.probe.name == CLOCK else None
-    if water is not None and left_floors(answer.shrinkage) > UNKNOWN_GAP_RATIO_AT_HALF:
+    if water is not None and left_floors(answer.shrinkage) > DIAGNOSIS.unknown_size:
         more = more + inflated(answer.search.problem, water.probe, water.scale)[0]
         noisy = conclude(run(problem.with_extra_noise(more), say, clock, [answer.search.best]), say, water)
         if noisy.main == TURBULENCE:
@@ -249,13 +240,13 @@ def conclude(
     search.gains = problem.filter(*search.model(evident), begin=True)
     findings = tests(problem, search.gains)
     whiteness, left = worst(findings), None
-    if whiteness >= UNCLEAN and problem.rules.whiteness:
+    if whiteness >= DIAGNOSIS.residual_sigma and problem.rules.whiteness:
         left = remainder_of(search, evident, noise, whiteness)
         found = disorder(search, evident, left) if noise is None and not calm else None
         if found is not None:
             return search_again_with_noise(search, evident, gained, found, say)
     moved = movements(search, evident)
-    small = [label for label in evident.labels if moved[label] < MATERIAL_TOLERANCES]
+    small = [label for label in evident.labels if moved[label] < DIAGNOSIS.material]
     selected = evident
     for label in small:
         selected = drop(search, selected, label)
@@ -264,7 +255,7 @@ def conclude(
     if noise is not None:
         disordered = clock_label(search, evident) if noise.probe.name == CLOCK else noise.probe.name
         gained = gained | {disordered: gained.get(disordered, 0.0) + noise.gain}
-        if moved.get(disordered, 0.0) >= MATERIAL_TOLERANCES or excess_noise_is_material(search, selected, shrinkage):
+        if moved.get(disordered, 0.0) >= DIAGNOSIS.material or excess_noise_is_material(search, selected, shrinkage):
             small = [label for label in small if label != disordered]
         elif disordered not in small:
             small.append(disordered)
@@ -290,18 +281,20 @@ def conclude(
     chances = to_none(chances, negligible, known)
     if main in gained:
         floors = sizes[main] / max(floor, 1e-6)
-        small_ones, alone = (doubt_small(chances, main, floors / size) for size in (LARGE, SPECIFIED))
+        small_ones, alone = (
+            doubt_small(chances, main, floors / size) for size in (DIAGNOSIS.main_size, DIAGNOSIS.specified_main_size)
+        )
         chances = mixed(small_ones, alone, search.well_specified)
     by_effects = sum(sizes[label] ** 2 for label in gained)
     places = [catalogue()[label].place for label in ranked if label in catalogue()]
     unknown = probability_unknown(search, bool(ranked), shrinkage, left, noise, by_effects, places)
     if not gained:
-        unknown = LEAST_UNKNOWN + (unknown - LEAST_UNKNOWN) * gap_is_material(shrinkage)
+        unknown = DIAGNOSIS.least_unknown + (unknown - DIAGNOSIS.least_unknown) * gap_is_material(shrinkage)
     chances = {name: value * (1.0 - unknown) for name, value in chances.items()} | {UNKNOWN: unknown}
     likely = main if main in gained else ""
     chances = mix_in_error_rate({label: 0.0 for label in catalogue()} | chances, likely, evident.labels)
     top, chances = answer_first(chances, gained)
-    if top == NONE or (top == UNKNOWN and shrinkage.after > MAX_UNEXPLAINED_GAP_SHARE * shrinkage.recalibrated):
+    if top == NONE or (top == UNKNOWN and shrinkage.after > DIAGNOSIS.kept_gap_share * shrinkage.recalibrated):
         gained = {label: gain for label, gain in gained.items() if label == disordered and top == UNKNOWN}
         if selected.labels:
             selected, shrinkage = search.null, shrink(search, search.null)
@@ -331,13 +324,14 @@ def with_least_gap(
     together = sum(chances.get(label, 0.0) for label in least)
     most = max(chances[label] for label in ahead)
     by_gap = chances | {label: together * share for label, share in least.items()}
-    return by_gap, opened(most / max(chances.get(main, 0.0), 1e-300), 1.0, float(np.exp(TIE)))
+    return by_gap, opened(most / max(chances.get(main, 0.0), 1e-300), 1.0, float(np.exp(DIAGNOSIS.confounded_evidence)))
 
 
 def log_posteriors(search: Search, hypothesis: Hypothesis, main: str) -> dict[str, float]:
     """Log posterior of each label in the place of the main one, up to a constant: that of none is its log evidence."""
     return {
-        label: value - EVIDENCE_NEEDED for label, value in evidence_of_alternatives(search, hypothesis, main).items()
+        label: value - DIAGNOSIS.evidence_needed
+        for label, value in evidence_of_alternatives(search, hypothesis, main).items()
     }
 
 

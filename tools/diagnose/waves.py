@@ -10,14 +10,13 @@ import itertools
 import numpy as np
 
 from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.inference.hyperparameters import DIAGNOSIS
 from glider.tools.inference.problem import Gains, Problem
 
 PLACES = (ef.Y_DEPTH, ef.Y_MOCAP_X, ef.Y_MOCAP_Y, ef.Y_MOCAP_Z)  # readings that see where the vehicle is
 PERIODS = (2.0, 10.0)  # s, of surface waves (docs/reference/gap.md, Words)
 FREQUENCIES = np.linspace(0.02, 1.0, 197)  # Hz, closer than the lines of a run of 150 s
 LINES = np.linspace(1.0 / PERIODS[1], 1.0 / PERIODS[0], 81)[:, None]  # Hz, tried
-BESIDE = 0.25  # of its frequency, by which a sea's components lie beside its middle
-LINE = 0.5  # share of the power about the strongest, from which it is a sea (docs/explanation/diagnosis.md, Thresholds)
 
 
 def line_share(problem: Problem, gains: Gains) -> float:
@@ -31,5 +30,5 @@ def line_share(problem: Problem, gains: Gains) -> float:
         waves = np.exp(-2j * np.pi * FREQUENCIES[:, None] * (t[a:b] - t[a]))
         e = np.nan_to_num(gains.E[a:b, PLACES])
         power += np.abs(waves @ (e - e.mean(axis=0))) ** 2
-    near = np.abs(FREQUENCIES - LINES) <= BESIDE * LINES
+    near = np.abs(FREQUENCIES - LINES) <= DIAGNOSIS.wave_band * LINES
     return float((near @ power / np.maximum(power.sum(axis=0), 1e-9)).max())

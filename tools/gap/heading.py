@@ -23,6 +23,7 @@ from glider.tools.data.errors import MissingExtra, need
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs.origin import FIXES_FILE, Origin, read_fixes, read_origins
 from glider.tools.data.runs.run import Run
+from glider.tools.inference.hyperparameters import GAP
 
 WET_M = 5.0  # deeper than this it dives: pressure at the surface is off by up to 3 m
 COVERED = 0.8  # share of the time between two fixes that has to be logged in dives
@@ -30,8 +31,6 @@ MIN_LEGS = 8  # legs, for four numbers and the size of the current
 AXIS, FLATTENING = 6378137.0, 1.0 / 298.257223563  # WGS84
 TIMES_H = (3.0, 6.0, 12.0, 24.0, 48.0, 96.0, 192.0, 384.0)  # in which a current decorrelates
 WHITE = (0.02, 0.1, 0.25, 0.5, 0.75, 0.98)  # share of its variance that is of one leg alone
-TEST_CONFIDENCE = 0.99  # two-sided: one unchanged mission in a hundred is falsely flagged
-MATERIAL_SPEED = 0.01  # m/s of the speed
 
 
 @dataclass
@@ -201,7 +200,7 @@ def _sentence(said: dict[str, Any], share: Posterior, turned: Posterior) -> str:
 def _shown(one: Posterior, size: float) -> bool:
     """Whether a coefficient has its sign for sure and its speed (m/s) matters."""
     below = one.below(0.0)
-    return max(below, 1.0 - below) > 0.5 * (1.0 + TEST_CONFIDENCE) and abs(size) >= MATERIAL_SPEED
+    return max(below, 1.0 - below) > 0.5 * (1.0 + GAP.heading_confidence) and abs(size) >= GAP.heading_speed
 
 
 def _size(said: dict[str, Any], name: str) -> str:

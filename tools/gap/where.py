@@ -3,11 +3,11 @@
 A first, linear answer. Every parameter of the catalogue's effects is a direction: a model that differs by its typical
 size is flown, from starts of its own by the observer's kept gains, and the difference to the nominal flight is its
 column; so are the parameters and biases that the nominal model allows for. Residuals are weighed by what noise,
-disturbance and the search for starts leave in each channel, and by EFFECTIVE independent samples a window and channel,
-as flight residuals are coloured.
+disturbance and the search for starts leave in each channel, and by `independent_samples` a window and channel, as
+flight residuals are coloured.
 With normal amplitudes of those sizes the evidence of a set of parts has a closed form. Parts are added while that grows
-by more than CLAIM and a flight with it bears that out. What a part takes of the gap is what that flight takes; what the
-allowed explains of the rest goes to `allowed`.
+by more than `part_evidence` and a flight with it bears that out. What a part takes of the gap is what that flight
+takes; what the allowed explains of the rest goes to `allowed`.
 
 Limits: columns are secants at one size, so that large effects (a stall, seconds of delay) are shared out coarsely;
 parts with nearly the same column (a servo offset, a lateral centre of gravity, a roll trim) cannot be distinguished by
@@ -20,17 +20,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from glider.tools.gap.cells import Cells, cells_of
+from glider.tools.inference.hyperparameters import GAP
 from glider.tools.inference.parameters import NUISANCE, effect_parameters, model_at, nuisance_parameters
 from glider.tools.inference.predict import fly, fly_near, observe
 from glider.tools.inference.prediction_error import MAX_COUNTED_TOLERANCES
 from glider.tools.inference.problem import Problem, cut
 
-EFFECTIVE = 4.0  # independent samples a window and channel: 18 s of residuals that hang together for some 4 s
-CLAIM = 5.0  # nat of evidence that a part has to bring
 MOST_PARTS = 4
 LEAST_SHARE = 0.005  # a smaller share is not worth a line
 CANDIDATES, SCALES = 8, (0.1, 0.25, 0.5, 1.0, 1.5)  # parts whose likely amplitude is flown, and at what shares of it
-ALLOWED_SIGMA = 3.0  # beyond it a parameter or a bias is no longer one that the nominal allows for
 DRAWS = 3  # simulated recordings that find the floor
 SEED = 20150723
 ALLOWED, UNEXPLAINED = "allowed", "unexplained"
@@ -123,7 +121,7 @@ class PartSearch:
                     on = self.on([*chosen, part]).astype(float)
                     found, _ = evidence(self.G, b, self.allowed + on)
                     tried.append((found, part, evidence(self.G, b, on)[1]))
-            tried = sorted((t for t in tried if t[0] > before + CLAIM), key=lambda t: -t[0])[:CANDIDATES]
+            tried = sorted((t for t in tried if t[0] > before + GAP.part_evidence), key=lambda t: -t[0])[:CANDIDATES]
             steps = [
                 (part, np.clip(amplitude + scale * step, self.low, self.high))
                 for _, part, step in tried
@@ -134,7 +132,7 @@ class PartSearch:
             rests = self.residuals([moved for _, moved in steps])
             misfit = ((rests * self.weight) ** 2).sum(axis=1)
             best = int(np.argmin(misfit))
-            if misfit[best] > ((left[-1] * self.weight) ** 2).sum() - 2.0 * CLAIM:
+            if misfit[best] > ((left[-1] * self.weight) ** 2).sum() - 2.0 * GAP.part_evidence:
                 break
             part, amplitude = steps[best]
             chosen.append(part)
@@ -151,7 +149,9 @@ def where(problem: Problem, Y: np.ndarray) -> list[Share]:
     table = np.concatenate([measures.measured(run) for run in problem.runs])
     cells = cells_of(measures, problem.runs, problem.recording.bounds, cut(problem).listed, table)
     floor = floor_of(problem, cells)
-    search = PartSearch(problem, cells, table, Y, np.sqrt(EFFECTIVE / cells.cell_sizes() / floor[cells.channel]))
+    search = PartSearch(
+        problem, cells, table, Y, np.sqrt(GAP.independent_samples / cells.cell_sizes() / floor[cells.channel])
+    )
     chosen, left = search.run()
 
     squares = np.minimum.accumulate([cells.squared_gap(residual) for residual in left])
@@ -159,7 +159,7 @@ def where(problem: Problem, Y: np.ndarray) -> list[Share]:
     shares = [Share(*part, (squares[n] - squares[n + 1]) / whole) for n, part in enumerate(chosen)]
     # What the allowed takes of the rest: parameters and biases by their columns, then the floor.
     _, mean = evidence(search.G, search.J @ (left[-1] * search.weight), search.allowed)
-    mean = np.clip(mean, -ALLOWED_SIGMA, ALLOWED_SIGMA)
+    mean = np.clip(mean, -GAP.allowed_sigma, GAP.allowed_sigma)
     by_columns = remaining - cells.squared_gap(left[-1] - search.columns.T @ mean)
     by_allowed = min(remaining, max(0.0, by_columns) + cells.squared_gap(np.sqrt(floor[cells.channel]))) / whole
     shares = sorted((share for share in shares if share.share >= LEAST_SHARE), key=lambda share: -share.share)

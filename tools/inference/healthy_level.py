@@ -11,14 +11,11 @@ from scipy.special import logsumexp
 from scipy.stats import norm
 from scipy.stats import t as student
 
-LEFT = 1.5  # 1 sigma of the logarithm of the mean square that something unknown leaves, times what healthy runs leave
-SITE = 0.25  # 1 sigma of that logarithm from one place and way of flying to another
-PRIOR_RUNS = 1.0  # runs that what is usual of that logarithm's scatter is worth
-USUAL_SCATTER = 0.5
-FORM = 0.2  # of a change, 1 sigma in amplitude, that is not as its label's equations have it
-CHANGED = 0.5  # prior probability of a change
-SHIFTS = np.linspace(0.0, 4.0 * LEFT, 121)
-OF_SHIFTS = 2.0 * norm.pdf(SHIFTS, scale=LEFT) * (SHIFTS[1] - SHIFTS[0])
+from glider.tools.inference.hyperparameters import HEALTHY
+
+CHANGED, FORM, USUAL_SCATTER = HEALTHY.changed, HEALTHY.form_error, HEALTHY.run_scale  # as a user's vehicle has them
+SHIFTS = np.linspace(0.0, 4.0 * HEALTHY.unknown_scale, 121)
+OF_SHIFTS = 2.0 * norm.pdf(SHIFTS, scale=HEALTHY.unknown_scale) * (SHIFTS[1] - SHIFTS[0])
 
 
 @dataclass
@@ -32,12 +29,12 @@ class HealthyLevel:
     @property
     def freedom(self) -> float:
         """Degrees of freedom of the logarithms' scatter."""
-        return self.count - 1 + PRIOR_RUNS
+        return self.count - 1 + HEALTHY.run_scale_runs
 
     @property
     def scatter(self) -> float:
         """1 sigma of the logarithm from run to run, with what is usual as so many runs more."""
-        squares = (self.count - 1) * self.seen**2 + PRIOR_RUNS * USUAL_SCATTER**2
+        squares = (self.count - 1) * self.seen**2 + HEALTHY.run_scale_runs * HEALTHY.run_scale**2
         return float(np.sqrt(squares / self.freedom))
 
     @property
@@ -47,7 +44,7 @@ class HealthyLevel:
 
     def scale(self, runs: int) -> float:
         """1 sigma of the logarithm of a mean square of some runs about `level`."""
-        return float(np.sqrt(self.scatter**2 * (1.0 / self.count + 1.0 / runs) + SITE**2))
+        return float(np.sqrt(self.scatter**2 * (1.0 / self.count + 1.0 / runs) + HEALTHY.site_scale**2))
 
     def at_most(self, away: np.ndarray | float) -> np.ndarray:
         """Log density of what healthy runs leave; less than that is as likely. away: of the mean, in `scale`."""

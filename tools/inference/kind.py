@@ -22,6 +22,7 @@ from glider.tools.inference.core.error_layout import E_ACT, E_NU, N_ERR, N_PATH,
 from glider.tools.inference.core.filter import filter_runs, follow_runs
 from glider.tools.inference.core.flight import fly_followed, fly_windows, read_rows, simulate_runs
 from glider.tools.inference.core.model_error import MODEL_ERROR_SD
+from glider.tools.inference.hyperparameters import DIAGNOSIS, WATCH
 
 
 @dataclass(frozen=True)
@@ -43,11 +44,6 @@ class Input:
     position: str | None = None  # column of what was seen moving; None: nothing sees it
     reading: int = -1  # its place in y
     unseen: tuple[float, float] | None = None  # where it is neither: spread, and spectral density of its walk
-
-
-# Tolerances. A tolerance is what a simulator may be off; a tenth of it adds half a percent to a gap of one, and lies
-# below what noise and disturbance leave of a perfect model (0.12 to 0.17 in total), so no prediction is the better.
-MATERIAL_TOLERANCES = 0.1
 
 
 def _none(seen: Collection[str]) -> tuple[str, ...]:
@@ -101,11 +97,13 @@ class Kind:
     one_group: Callable[[Collection[str]], tuple[str, ...]] = _none  # labels that these readings never tell apart
     odds: Mapping[str, float] = field(default_factory=dict)  # of labels that are seldom the cause: nat
     regime: Callable[[Run], np.ndarray] | None = None  # how a run was flown, in what makes a difference to the model
-    form: float = 0.06  # of a size, 1 sigma: nature's form is not the catalogue's (docs/explanation/watch.md)
-    learned_runs: int = 4  # of the first, from which a watch without a reference learns what all share
-    material_growth: float = MATERIAL_TOLERANCES  # the same of what grows slowly
+    # of a size, 1 sigma: nature's form is not the catalogue's (docs/explanation/watch.md)
+    form: float = WATCH.form_error
+    # of the first, from which a watch without a reference learns what all share
+    learned_runs: int = WATCH.reference_runs
+    material_growth: float = DIAGNOSIS.material  # the same of what grows slowly
     material: float = (
-        MATERIAL_TOLERANCES  # tolerances: what moves no channel of any window so far is no gap (docs/reference/gap.md)
+        DIAGNOSIS.material  # tolerances: what moves no channel of any window so far is no gap (docs/reference/gap.md)
     )
 
 

@@ -14,6 +14,7 @@ from scipy.special import expit
 
 from glider.firmware.core.maths.rotations import wrap
 from glider.sim_backend.core.effects import effect_layout as ef
+from glider.tools.inference.hyperparameters import DIAGNOSIS
 from glider.tools.inference.problem import Gains, Problem, variances
 
 DISTURBANCE = {"disturbance_linear": slice(0, 3), "disturbance_angular": slice(3, 6)}  # of the spectral densities
@@ -31,9 +32,6 @@ COLOURED = 0.2  # logarithm by which noise of every second sample may be more th
 MOST_HELD = 0.2  # share of samples that repeat the one before, from which a reading is held or coarse
 DIFFERENCE_STEP, LARGEST_STEP, CLOSE = 0.05, 0.8, 0.02
 ROUNDS = 8
-# 1 sigma of a level's logarithm: as it is found where the file is right (nine in ten within 5 %), and as noise is where
-# the file does not say (0.6 to 2 times what it says): docs/explanation/diagnosis.md, Noise levels.
-ACCURATE, FREE = 0.03, 0.35
 
 
 @dataclass(frozen=True)
@@ -59,7 +57,7 @@ class Levels:
     @property
     def odds(self) -> np.ndarray:
         """Nat by which each level says that the case names it rightly, rather than that it may be anything."""
-        right, free = ACCURATE**2 + self.sd**2, FREE**2 + self.sd**2
+        right, free = DIAGNOSIS.noise_accurate**2 + self.sd**2, DIAGNOSIS.noise_free**2 + self.sd**2
         return 0.5 * (np.log(free / right) - self.log**2 * (1.0 / right - 1.0 / free))
 
     def believed(self, well_specified: float) -> "Levels":

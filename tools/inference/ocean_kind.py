@@ -21,6 +21,7 @@ from glider.tools.inference.core.ocean import (
     read_rows,
     simulate_runs,
 )
+from glider.tools.inference.hyperparameters import WATCH
 from glider.tools.inference.kind import Kind, Reading
 from glider.tools.inference.ocean_inputs import input_table, regime
 
@@ -115,12 +116,12 @@ OCEAN = Kind(
     simulate_runs=simulate_runs,
     input_table=input_table,
     unread=_unread,
-    form_share=0.1,
+    form_share=WATCH.ocean_form_share,
     odds=ODDS,
     regime=regime,
     one_group=_one_group,
-    learned_runs=24,
-    material_growth=0.6,
-    material=0.4,
-    form=0.1,
+    learned_runs=WATCH.ocean_reference_runs,
+    material_growth=WATCH.ocean_growth,
+    material=WATCH.ocean_material,
+    form=WATCH.ocean_form_error,
 )

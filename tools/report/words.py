@@ -11,7 +11,8 @@ from glider.tools.diagnose.cautions import ASSUMED_NUMBERS
 from glider.tools.diagnose.noise_probes import CLOCK, TURBULENCE, UNPREDICTABLE
 from glider.tools.diagnose.record import DiagnosisRecord, EstimateRecord, FindingRecord, Gap, Interval
 from glider.tools.diagnose.record import number as finite
-from glider.tools.diagnose.residuals import SHAPES, UNCLEAN, strongest_left
+from glider.tools.diagnose.residuals import SHAPES, strongest_left
+from glider.tools.inference.hyperparameters import DIAGNOSIS
 
 MINUS, DASH = "\N{MINUS SIGN}", "\N{EN DASH}"
 _WORDS = tomllib.loads(files(__package__).joinpath("words.toml").read_text(encoding="utf-8"))
@@ -360,7 +361,7 @@ def described(record: DiagnosisRecord) -> list[dict[str, Any]]:
     """What is left by channel, strongest first: reading, channel, axis, its shape, its correlations, sigma."""
     rows: dict[str, dict[str, Any]] = {}
     for found in record.details.findings:
-        if abs(found.sigma) < UNCLEAN:
+        if abs(found.sigma) < DIAGNOSIS.residual_sigma:
             continue
         empty = {
             "reading": found.channel, "channel": channel(found.channel), "axis": AXES.get(found.channel, ""),

@@ -11,11 +11,11 @@ import numpy as np
 
 from glider.tools.inference.expansion import Expansion
 from glider.tools.inference.fit import bounded_step
+from glider.tools.inference.hyperparameters import WATCH
 from glider.tools.inference.shared_parameters import SharedParameters
 
 STEP, GROWING = "step", "growing"
 TOGETHER = 512  # spans that are asked about at once
-LEAST_GROWING = 3  # runs in which a growth can be distinguished from a step
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ def spans(judged: Sequence[bool], begins: int) -> list[Span]:
         for end in range(first + 1, runs + 1):
             if judged[first] and judged[end - 1]:
                 found.append(Span(first, end, STEP))
-                if end == runs and sum(judged[first:end]) >= LEAST_GROWING:
+                if end == runs and sum(judged[first:end]) >= WATCH.growth_runs:
                     found.append(Span(first, end, GROWING))
     return found
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from glider.tools.inference.expansion import Expansion, expand
 from glider.tools.inference.fit import bounded_step
+from glider.tools.inference.hyperparameters import WATCH
 from glider.tools.inference.pooled import marginalised
 from glider.tools.inference.problem import Problem
 from glider.tools.inference.shared_model import fit_shared, inflation_of
@@ -140,7 +141,7 @@ def excess_nis_sigma(flights: RunEnsemble, n: int) -> float:
     """How far a run's mean squared innovation lies above the reference's, by the model it flies by, in sigma."""
     values = flights.usual_nis
     chance = 2.0 / flights.runs[n].samples
-    spread = float(values.var(ddof=1)) if len(values) > 2 else 0.02**2
+    spread = float(values.var(ddof=1)) if len(values) > 2 else WATCH.scatter_nis**2
     return float((flights.nis(n) - values.mean()) / np.sqrt(chance + spread))
 
 

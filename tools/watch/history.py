@@ -7,16 +7,11 @@ import numpy as np
 
 from glider.sim_backend.core.effects.base import Effect
 from glider.tools.diagnose.noise_probes import NoiseProbe
+from glider.tools.inference.hyperparameters import WATCH
 from glider.tools.watch.events import Change, Joint, Span, spans
 from glider.tools.watch.excess_noise import WATER, with_inflated_noise
 from glider.tools.watch.flights import RunEnsemble, numbers
 from glider.tools.watch.lasting import Lasting, lasting
-
-CLEAN_RUN_NAT = 5.0  # nat that a run that is not rough takes off disorder that would hold there too
-LEAST_COSINE = 0.01  # cosine of two labels' columns, below which they have nothing to do with each other
-FURTHER_EVENT_SHARE = 0.15  # of what an event explains in the same runs, that a further event there has to bring
-# of what is left there, that one that is not confounded has to bring: what a form leaves may look like anything
-UNRELATED_EVENT_SHARE = 0.5
 
 
 @dataclass
@@ -98,11 +93,11 @@ def earns_place(history: History, event: ChangeEvent | Change) -> bool:
     )  # as others were weighed, before their runs were hot
     for other in (one for one in history.events if one.matters):
         shared = own & (other.span.weights(flights.count) > 0.0)
-        mostly_there = shared.sum() >= 0.5 * own.sum()
-        if not mostly_there or evidence >= FURTHER_EVENT_SHARE * other.explained:
+        mostly_there = shared.sum() >= WATCH.same_runs * own.sum()
+        if not mostly_there or evidence >= WATCH.form_evidence_share * other.explained:
             continue
         left = 0.5 * sum(max(flights.excess(n), 0.0) for n in numbers(shared & history.judged))
-        if evidence < UNRELATED_EVENT_SHARE * left or confounded(history, event.label, other.label, shared):
+        if evidence < WATCH.residual_evidence_share * left or confounded(history, event.label, other.label, shared):
             return False
     return True
 
@@ -119,7 +114,7 @@ def confounded(history: History, one: str, other: str, runs: np.ndarray) -> bool
     for n in numbers(runs):
         A = flights.raw[n].curvature
         sizes = np.sqrt(np.outer(np.diag(A)[a], np.diag(A)[b]))
-        if (np.abs(A[np.ix_(a, b)]) > LEAST_COSINE * sizes).any():
+        if (np.abs(A[np.ix_(a, b)]) > WATCH.related_cosine * sizes).any():
             return True
     return False
 
@@ -161,7 +156,7 @@ def take(history: History, event: ChangeEvent) -> None:
             flights.loosen(n, x - before)
     if history.water is not None:
         # what the form of a label leaves is no disorder: it is asked about as what is left of the label
-        history.water[:, inside] = -CLEAN_RUN_NAT
+        history.water[:, inside] = -WATCH.clean_run
 
 
 def within(flights: RunEnsemble, x: np.ndarray) -> np.ndarray:

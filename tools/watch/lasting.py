@@ -15,23 +15,19 @@ from glider.tools.diagnose.noise_probes import NoiseProbe
 from glider.tools.identify.ocean.identify import BANDS, strata
 from glider.tools.inference.channels import Measures
 from glider.tools.inference.expansion import linear
+from glider.tools.inference.hyperparameters import WATCH
 from glider.tools.inference.problem import Gains, Problem
 from glider.tools.inference.shared_parameters import SharedParameters
 from glider.tools.watch.flights import RunEnsemble, numbers
 
-SIZE = 0.02  # m/s, 1 sigma of what lasts: as much as the most turbulent water
 DIFFERENCE = 1e-3  # m/s, of a derivative
-LEAST_MOTION = 0.01  # SIZE: a label that moves a depth rate by less has nothing to do with it
-# Log odds, nat: of twenty changes that a label explains as well, one is of a kind that none names; and water is named
-# only where it is twenty times as likely as water with something that lasts in it.
-STRANGE, NO_WATER = -3.0, 3.0
 AXES = (("hydrodynamics", "surge"), ("mass", "net"))  # what turns with the way, what does not
 Model = tuple[np.ndarray, np.ndarray]
 
 
 @dataclass
 class Pull:
-    """What a run's readings say of a lasting course (courses,), in SIZE, and of the values that runs share (count,).
+    """What a run's readings say of a lasting course (courses,), in `lasting_speed`, and of shared values (count,).
 
     Both behind each other: precision of the parabola, and slope of the misfit.
     """
@@ -77,7 +73,7 @@ class Lasting:
 
 
 def columns(part: Problem, model: Model, gains: Gains, e: np.ndarray) -> np.ndarray:
-    """Derivatives of innovations e (samples,) by a lasting course, (courses, samples), in SIZE.
+    """Derivatives of innovations e (samples,) by a lasting course, (courses, samples), in `lasting_speed`.
 
     By depth rate, down positive, and where a speed is measured by that, in every way and depth.
     """
@@ -93,7 +89,7 @@ def columns(part: Problem, model: Model, gains: Gains, e: np.ndarray) -> np.ndar
                 moved[:, at.Y_SPEED] = inside
                 moved[:, at.Y_NORTH], moved[:, at.Y_EAST] = inside * np.cos(yaw), inside * np.sin(yaw)
             found.append(part.reading(part.z - DIFFERENCE * moved).follow([model], gains)[0])
-    return np.asarray((np.array(found) - e) * (SIZE / DIFFERENCE))
+    return np.asarray((np.array(found) - e) * (WATCH.lasting_speed / DIFFERENCE))
 
 
 def pull_of(part: Problem, shared: SharedParameters, x: np.ndarray, inflation: float) -> Pull:
@@ -121,7 +117,7 @@ def course_of(pulls: Sequence[Pull], weights: Sequence[float], known: np.ndarray
 
 
 def evidence_of(pull: Pull, variance: np.ndarray) -> tuple[float, np.ndarray]:
-    """Nat of a course of a variance (courses,) over none, and the course, in SIZE."""
+    """Nat of a course of a variance (courses,) over none, and the course, in `lasting_speed`."""
     root = np.sqrt(variance)
     inner = np.eye(len(root)) + root[:, None] * pull.precision * root[None, :]
     c = -np.linalg.solve(inner, root * pull.slope)
@@ -134,7 +130,7 @@ def of_flight(flights: RunEnsemble, n: int) -> Pull:
 
 
 def usual(flights: RunEnsemble) -> tuple[np.ndarray, np.ndarray]:
-    """The course that the runs learned from have all the same, in SIZE, and the variance by which they differ in it."""
+    """The course that the runs learned from have all the same, in `lasting_speed`, and its variance from run to run."""
     pulls = [of_flight(flights, n) for n in numbers(flights.reference)]
     courses = len(pulls[0].slope) - flights.shared.count
     own = np.concatenate([np.zeros(courses), flights.sizes**2])
@@ -152,7 +148,7 @@ def beside_all(parts: Sequence[Problem], shared: SharedParameters, x: np.ndarray
     each = [pull_of(part, shared, x, inflation) for part in parts]
     pull = course_of(each, [1.0] * len(parts), np.diag(shared.prior**-2.0))
     evidence, c = evidence_of(pull, np.ones(len(pull.slope)))
-    return Lasting(evidence, SIZE * c)
+    return Lasting(evidence, WATCH.lasting_speed * c)
 
 
 def lasting(
@@ -176,8 +172,8 @@ def lasting(
     pull = course_of([one.less(mean).beside(own) for one in each], shares, known)
     evidence, c = evidence_of(pull, np.ones(courses))
     if size is None:
-        return Lasting(evidence, SIZE * c)
+        return Lasting(evidence, WATCH.lasting_speed * c)
     A = np.sum([w**2 * one.precision for w, one in zip(shares, each, strict=True)], axis=0)
     like = np.linalg.solve(A[:courses, :courses] + np.eye(courses), A[:courses][:, [courses + k for k in free]] @ size)
     of_form, _ = evidence_of(pull, (flights.parts[0].kind.form * like) ** 2)
-    return Lasting(evidence - of_form, SIZE * c, bool(np.abs(like).max() > LEAST_MOTION))
+    return Lasting(evidence - of_form, WATCH.lasting_speed * c, bool(np.abs(like).max() > WATCH.lasting_motion))

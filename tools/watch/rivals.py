@@ -7,6 +7,7 @@ import numpy as np
 
 from glider.tools.inference.expansion import Expansion, expand
 from glider.tools.inference.fit import bounded_step
+from glider.tools.inference.hyperparameters import WATCH
 from glider.tools.watch.events import GROWING, STEP, Change, Joint, Span
 from glider.tools.watch.flights import RunEnsemble, numbers
 from glider.tools.watch.history import ChangeEvent, History, confounded, within
@@ -15,14 +16,12 @@ from glider.tools.watch.label_fit import Affected, LabelFit, affected_runs, best
 FITTED = 3  # runs in which rivals are fitted
 SMALL = 20  # labels of a catalogue that can be tried whole
 LINEAR_TRIED, INFLATED_TRIED = 4, 5  # labels: by the parabolas of the filter as it is, and by rough ones
-KEPT_EVIDENCE_SHARE = 0.1  # of what a label is behind, that stays even where the form may be why
 FINAL = 3  # rivals that are compared over all spans
 MAX_RIVAL_DEFICIT, MAX_RIVAL_DEFICIT_SHARE = (
     40.0,
     0.1,
 )  # squared sigma, and share of what the best gains, that a rival may be behind
 MAX_UNEXPLAINED_SHARE = 0.1  # of the excess: what the best of the first rivals may leave before more are tried
-AS_EVIDENT = 0.5  # nat
 SPAN_SEARCH_RUNS = 2  # runs about a span's ends between which it is found again
 
 
@@ -88,7 +87,7 @@ def by_cause(event: ChangeEvent, odds: dict[str, float], form_share: float) -> d
     best, confounded = event.rivals[event.label] - odds[event.label], form_share * event.explained
     return {
         label: best
-        - max(best - (value - odds[label]) - confounded, KEPT_EVIDENCE_SHARE * (best - value + odds[label]))
+        - max(best - (value - odds[label]) - confounded, WATCH.rival_share * (best - value + odds[label]))
         + odds[label]
         for label, value in event.rivals.items()
     }
@@ -165,7 +164,9 @@ def over_spans(
     if not found:
         return None
     most = max(value for value, _, _ in found.values())
-    best = min((one for one in found if found[one][0] > most - AS_EVIDENT), key=lambda one: one.end - one.first)
+    best = min(
+        (one for one in found if found[one][0] > most - WATCH.span_evidence), key=lambda one: one.end - one.first
+    )
     evidence, size, covariance = found[best]
     if (best.first == first < span.first or best.end == end > span.end) and best.course == span.course:
         further = over_spans(history, joint, best, replace(fit, size=size), courses)

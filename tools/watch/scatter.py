@@ -13,12 +13,11 @@ from scipy.optimize import minimize
 
 from glider.tools.inference import pooled
 from glider.tools.inference.expansion import Expansion
+from glider.tools.inference.hyperparameters import WATCH
 from glider.tools.inference.shared_parameters import SharedParameters
 
-USUAL = np.array([0.05, 0.3, 0.01])  # spreads, by group
-USUAL_WIDTH = 1.0  # e-folds
+USUAL = np.array([WATCH.scatter_vehicle, WATCH.scatter_bias, WATCH.scatter_effect])  # spreads, by group
 LEAST_RUNS = 2  # with fewer nothing can be learned
-MIN_SCATTER_RUNS = 3  # with fewer it cannot be known what runs differ by
 
 
 def learn_scatter(found: Sequence[Expansion], shared: SharedParameters) -> np.ndarray:
@@ -32,7 +31,7 @@ def learn_scatter(found: Sequence[Expansion], shared: SharedParameters) -> np.nd
 
     def cost(shift: np.ndarray) -> float:
         sizes = (USUAL * np.exp(shift))[groups]
-        return -pooled.log_evidence(found, V, sizes) + 0.5 * float(shift @ shift) / USUAL_WIDTH**2
+        return -pooled.log_evidence(found, V, sizes) + 0.5 * float(shift @ shift) / WATCH.scatter_width**2
 
     start = np.vstack([np.zeros(len(USUAL)), np.eye(len(USUAL))])  # e-folds
     options = {"initial_simplex": start, "maxfev": 60, "xatol": 0.1, "fatol": 0.1}

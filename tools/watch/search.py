@@ -5,17 +5,14 @@ from collections.abc import Callable
 import numpy as np
 from scipy.stats import t as student
 
+from glider.tools.inference.hyperparameters import WATCH
 from glider.tools.inference.parameters import CLOCK_PLACE
 from glider.tools.inference.pooled import PRIOR_RUNS
 from glider.tools.watch.events import Change
 from glider.tools.watch.history import ChangeEvent, History, already, earns_place, lasts, noise_location, take
 from glider.tools.watch.rivals import refit_event
-from glider.tools.watch.scatter import MIN_SCATTER_RUNS
 from glider.tools.watch.water import named, noise_beats_label, water_event
 
-EVIDENCE_NEEDED = 16.0  # nat over no change (docs/explanation/watch.md)
-BEYOND_CHANCE = 7.3  # nat over the logarithm of how many changes are looked at
-FALSE = 0.05  # of the vehicles without a change that may be given one: of their runs a hundredth or so
 MOST_EVENTS = 5
 
 
@@ -53,13 +50,13 @@ def evidence_needed(history: History, event: ChangeEvent) -> float:
     """
     flights = history.flights
     looked_at = max(len(history.listed()) * len(flights.shared.labels), 1)
-    needed = max(EVIDENCE_NEEDED, BEYOND_CHANCE + float(np.log(looked_at)))
+    needed = max(WATCH.evidence_needed, WATCH.evidence_by_chance + float(np.log(looked_at)))
     learned = int(flights.reference.sum())
-    if not event.has_course or learned < MIN_SCATTER_RUNS:
+    if not event.has_course or learned < WATCH.scatter_runs:
         return needed
     inside = (event.span.weights(flights.count) > 0.0) & history.judged
     freedom = learned - 1 + PRIOR_RUNS + int(inside.sum()) - 1
-    return max(needed, 0.5 * float(student.isf(0.5 * FALSE / looked_at, freedom)) ** 2)
+    return max(needed, 0.5 * float(student.isf(0.5 * WATCH.false_alarms / looked_at, freedom)) ** 2)
 
 
 def next_event(history: History) -> ChangeEvent | None:
@@ -70,12 +67,12 @@ def next_event(history: History) -> ChangeEvent | None:
     def possible(one: Change) -> bool:
         return not already(history, one) and earns_place(history, one)
 
-    evident = sorted((one for one in every if one.evidence >= EVIDENCE_NEEDED), key=lambda one: -one.evidence)
+    evident = sorted((one for one in every if one.evidence >= WATCH.evidence_needed), key=lambda one: -one.evidence)
     best = next((one for one in evident if possible(one)), None)
     changes = [] if best is None else [one for one in every if one.span == best.span and possible(one)]
     event = None if best is None else refit_event(history, joint, best, changes)
     noisy = water_event(history)
-    if noisy is None or noisy.evidence < EVIDENCE_NEEDED:
+    if noisy is None or noisy.evidence < WATCH.evidence_needed:
         return event
     if event is not None and not noise_beats_label(history, noisy, event):
         return event

@@ -6,15 +6,14 @@ import numpy as np
 from scipy.special import ndtr
 
 from glider.tools.diagnose.noise_probes import NoiseProbe, probes
-from glider.tools.diagnose.unknown import LEFT_OVER, LEFT_WIDTH, OWN_LEFT, place_alone
+from glider.tools.diagnose.unknown import place_alone
+from glider.tools.inference.hyperparameters import DIAGNOSIS, WATCH
 from glider.tools.inference.parameters import CLOCK_PLACE
 from glider.tools.watch.excess_noise import SCALES, WATER, beyond_reference
 from glider.tools.watch.flights import excess_nis_sigma
 from glider.tools.watch.history import ChangeEvent, History
 
 PROBED, REFERENCE = 3, 2  # runs at most
-CLEAN_NIS_SIGMA = 5.0  # sigma of the mean squared innovation, below which nothing is left
-LEAST_PROBABILITY = 0.005
 
 
 @dataclass(frozen=True)
@@ -28,8 +27,9 @@ class Residual:
     @property
     def probability(self) -> float:
         """That this is no effect of the catalogue."""
-        z = (np.log(max(self.share, 1e-6)) - np.log(OWN_LEFT if self.own else LEFT_OVER)) / LEFT_WIDTH
-        return float(np.clip(ndtr(z), LEAST_PROBABILITY, 1.0 - LEAST_PROBABILITY))
+        middle = DIAGNOSIS.sensor_misfit_share if self.own else DIAGNOSIS.misfit_share
+        z = (np.log(max(self.share, 1e-6)) - np.log(middle)) / DIAGNOSIS.misfit_share_width
+        return float(np.clip(ndtr(z), WATCH.least_unknown, 1.0 - WATCH.least_unknown))
 
 
 NO_RESIDUAL = Residual(0.0, [])
@@ -41,7 +41,7 @@ def what_is_left(history: History, event: ChangeEvent) -> Residual:
     explained = event.explained / max(1, int((event.span.weights(history.flights.count) > 0.0).sum()))
     flights = history.flights
     noisy = sorted(runs, key=lambda n: -excess_nis_sigma(flights, n))[:PROBED]
-    if not noisy or excess_nis_sigma(flights, noisy[0]) < CLEAN_NIS_SIGMA:
+    if not noisy or excess_nis_sigma(flights, noisy[0]) < WATCH.clean_sigma:
         return NO_RESIDUAL
     wanted = [probe for probe in probes(flights.parts[noisy[0]]) if probe.name not in WATER]
     together = beyond_reference(flights, wanted, noisy, REFERENCE).sum(axis=1)
@@ -52,7 +52,7 @@ def what_is_left(history: History, event: ChangeEvent) -> Residual:
     left = max(found[0][1], 0.0)
     place = history.effects[event.label].place if event.label in history.effects else ("", "")
     first, sure = place_alone((probe, gain) for probe, gain, _ in found)
-    own = place[0] == "sensing" and place == first and sure > 0.5
+    own = place[0] == "sensing" and place == first and sure > WATCH.majority
     return Residual(left / max(left + explained * len(noisy), 1e-9), found, own)
 
 

@@ -7,23 +7,17 @@ import numpy as np
 
 from glider.tools.data.intervals import NINETY
 from glider.tools.diagnose.materiality import largest
-from glider.tools.diagnose.probabilities import ERROR_RATE, TIE, softmax
+from glider.tools.diagnose.probabilities import softmax
+from glider.tools.inference.hyperparameters import DIAGNOSIS, WATCH
 from glider.tools.inference.predict import fly_windows_from
 from glider.tools.watch.answer import CAUSE, NONE, UNKNOWN, EventAnswer, RunCause, RunVerdict, Sized
 from glider.tools.watch.events import GROWING, STEP, Span
 from glider.tools.watch.excess_noise import WATER
 from glider.tools.watch.flights import excess_nis_sigma
 from glider.tools.watch.history import ChangeEvent, History, within
-from glider.tools.watch.lasting import NO_WATER, STRANGE
-from glider.tools.watch.scatter import MIN_SCATTER_RUNS
-from glider.tools.watch.search import EVIDENCE_NEEDED
 from glider.tools.watch.unknown import NO_RESIDUAL, Residual, what_is_left
 from glider.tools.watch.water import asked_above
 
-EXCESS_NIS_SIGMA = 6.0  # sigma of a run's mean squared innovation: something changed, though no label says what
-MOST_SURE = 0.995
-ALTERNATIVE_FACTOR = 2.0  # times
-SCATTERED = 3  # changes that touch
 VECTORS = ("gyro_bias", "current", "current_shear", "compass")  # labels whose parameters are parts of one length
 
 
@@ -39,7 +33,7 @@ class ResolvedEvent:
 
     @property
     def unknown(self) -> bool:
-        return self.outside > 0.5
+        return self.outside > WATCH.majority
 
     @property
     def label(self) -> str | None:
@@ -57,11 +51,13 @@ def resolve_events(history: History) -> list[ResolvedEvent]:
         if event.has_course and not material(history, event, own):
             continue
         left = what_is_left(history, event) if event.has_course else NO_RESIDUAL
-        sure = 1.0 / (1.0 + np.exp(-np.clip(event.evidence - EVIDENCE_NEEDED, -50.0, 50.0)))
-        outside = 1.0 - ERROR_RATE if event.label == "" else left.probability
+        sure = 1.0 / (1.0 + np.exp(-np.clip(event.evidence - WATCH.evidence_needed, -50.0, 50.0)))
+        outside = 1.0 - DIAGNOSIS.error_rate if event.label == "" else left.probability
         strange = event.strange
         if strange is not None and event.label and strange.moves(kind.measures) >= needed_of(history, event):
-            chance = min(strange.chance(STRANGE if event.has_course else NO_WATER), 1.0 - ERROR_RATE)
+            chance = min(
+                strange.chance(WATCH.lasting_odds if event.has_course else WATCH.water_odds), 1.0 - DIAGNOSIS.error_rate
+            )
             if chance > outside:
                 left, outside = Residual(0.0, [(strange.place, chance, 1.0)]), chance
         found.append(ResolvedEvent(event, left, min(float(sure), most_sure(history)), outside, own))
@@ -77,10 +73,10 @@ def one_form(found: list[ResolvedEvent]) -> list[ResolvedEvent]:
     known = [one for one in found if one.label and one.event.has_course]
     strange = [
         group for group in touching(known)
-        if len(group) >= SCATTERED and any(of_one_run(one.event.span) for one in group)
+        if len(group) >= WATCH.fragments and any(of_one_run(one.event.span) for one in group)
     ]  # fmt: skip
     inside = [id(one) for group in strange for one in group]
-    return [replace(one, outside=1.0 - ERROR_RATE) if id(one) in inside else one for one in found]
+    return [replace(one, outside=1.0 - DIAGNOSIS.error_rate) if id(one) in inside else one for one in found]
 
 
 def touching(found: list[ResolvedEvent]) -> list[list[ResolvedEvent]]:
@@ -121,7 +117,7 @@ def touch(one: Span, other: Span) -> bool:
 def most_sure(history: History) -> float:
     """How probable an event can be at most: of what one or two runs share nobody knows that the next ones share it."""
     learned = int(history.flights.reference.sum())
-    return MOST_SURE if learned >= MIN_SCATTER_RUNS else learned / (learned + 1.0)
+    return WATCH.most_sure if learned >= WATCH.scatter_runs else learned / (learned + 1.0)
 
 
 def beside(one: Span, other: Span) -> bool:
@@ -132,7 +128,7 @@ def beside(one: Span, other: Span) -> bool:
 def unattributed_changes(history: History, found: list[ResolvedEvent]) -> list[ResolvedEvent]:
     """Runs in no event that are noisier than the reference by far: a change that no label takes."""
     flights = history.flights
-    least = max(EXCESS_NIS_SIGMA, asked_above(int(flights.reference.sum())))
+    least = max(WATCH.unattributed_sigma, asked_above(int(flights.reference.sum())))
     covered = np.zeros(flights.count, dtype=bool)
     for one in found:
         covered |= one.event.span.weights(flights.count) > 0.0
@@ -146,7 +142,9 @@ def unattributed_changes(history: History, found: list[ResolvedEvent]) -> list[R
         span = Span(int(first), int(end), STEP)
         evidence = float(sum(max(flights.excess(n), 0.0) for n in range(first, end))) / 2.0
         event = ChangeEvent("", span, evidence, {}, np.zeros(0), np.zeros((0, 0)), 0.0)
-        more.append(ResolvedEvent(event, what_is_left(history, event), most_sure(history), 1.0 - ERROR_RATE, -1))
+        more.append(
+            ResolvedEvent(event, what_is_left(history, event), most_sure(history), 1.0 - DIAGNOSIS.error_rate, -1)
+        )
     return more
 
 
@@ -168,7 +166,7 @@ def needed_of(history: History, event: ChangeEvent) -> float:
     """
     kind = history.flights.parts[0].kind
     needed = kind.material_growth if event.span.course == GROWING else kind.material
-    return needed * (ALTERNATIVE_FACTOR if flown_otherwise(history, event.span) else 1.0)
+    return needed * (WATCH.other_regime_ratio if flown_otherwise(history, event.span) else 1.0)
 
 
 def flown_otherwise(history: History, span: Span) -> bool:
@@ -217,7 +215,9 @@ def probabilities(one: ResolvedEvent) -> dict[str, float]:
         return {}
     known = 1.0 - one.outside if one.left.probes else 1.0
     chances = softmax(one.event.rivals)
-    scaled = {label: chance * (1.0 - ERROR_RATE) * known * one.probability for label, chance in chances.items()}
+    scaled = {
+        label: chance * (1.0 - DIAGNOSIS.error_rate) * known * one.probability for label, chance in chances.items()
+    }
     return dict(sorted(scaled.items(), key=lambda item: -item[1]))
 
 
@@ -229,7 +229,11 @@ def group_of(history: History, one: ResolvedEvent) -> list[str]:
     confounded = history.flights.parts[0].one_group
     if one.label in confounded:
         return [one.label, *(label for label in confounded if label != one.label)]
-    near = [label for label in rivals if rivals[one.label] - rivals[label] <= TIE and label != one.label]
+    near = [
+        label
+        for label in rivals
+        if rivals[one.label] - rivals[label] <= DIAGNOSIS.confounded_evidence and label != one.label
+    ]
     return [one.label, *sorted(near, key=lambda label: -rivals[label])]
 
 

@@ -9,6 +9,7 @@ from glider.tools.data.errors import InputError
 from glider.tools.data.runs.case import Case
 from glider.tools.data.vehicle_kinds import kind_of
 from glider.tools.gap.measure import run_gap
+from glider.tools.inference.hyperparameters import WATCH
 from glider.tools.inference.predict import fly
 from glider.tools.inference.problem import Problem, cut, problem_of
 from glider.tools.inference.shared_parameters import shared_parameters
@@ -16,11 +17,8 @@ from glider.tools.watch.answer import NONE, RunVerdict, WatchAnswer
 from glider.tools.watch.events import GROWING
 from glider.tools.watch.flights import RunEnsemble
 from glider.tools.watch.history import History
-from glider.tools.watch.scatter import MIN_SCATTER_RUNS
 from glider.tools.watch.search import find_events
 from glider.tools.watch.verdicts import event_answer, material, resolve_events, run_verdict
-
-FIRST_SHARE = 3  # without a reference learning begins with one run in so many, at most as many as their kind says
 
 
 def watch(case: Case, reference: Case | None = None, say: Callable[[str], None] = lambda text: None) -> WatchAnswer:
@@ -42,7 +40,7 @@ def watch(case: Case, reference: Case | None = None, say: Callable[[str], None] 
     history = looked_at(parts, problem, learned_from, judged, begins, say)
     if reference is None:
         again = unchanged(history, learned_from)
-        if (again != learned_from).any() and again.sum() >= min(MIN_SCATTER_RUNS, learned_from.sum()):
+        if (again != learned_from).any() and again.sum() >= min(WATCH.scatter_runs, learned_from.sum()):
             say("something changed among the first runs: learning again from those without it")
             learned_from = again
             history = looked_at(parts, problem, learned_from, judged, begins, say)
@@ -65,7 +63,7 @@ def watch(case: Case, reference: Case | None = None, say: Callable[[str], None] 
 
 def first_runs(count: int, most: int) -> np.ndarray:
     """Where learning begins without a reference: the first runs, `most` at most, (runs,) bool."""
-    return np.arange(count) < max(1, min(most, count // FIRST_SHARE))
+    return np.arange(count) < max(1, min(most, count // WATCH.reference_part))
 
 
 def looked_at(
@@ -121,7 +119,7 @@ def cautions(
 ) -> list[str]:
     """What has to be said with the answer."""
     found = []
-    if len(learned) < MIN_SCATTER_RUNS:
+    if len(learned) < WATCH.scatter_runs:
         found.append(
             f"only {len(learned)} run{'' if len(learned) == 1 else 's'} to learn from: how much runs differ though "
             "nothing changed is assumed, not learned, and a model that is wrong may pass for a change"

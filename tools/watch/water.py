@@ -8,8 +8,8 @@ from scipy.stats import norm
 from scipy.stats import t as student
 
 from glider.tools.diagnose.noise_probes import TURBULENCE, WAVES, NoiseProbe, inflated, probes
-from glider.tools.diagnose.unknown import ONE_AXIS
-from glider.tools.diagnose.waves import LINE, line_share
+from glider.tools.diagnose.waves import line_share
+from glider.tools.inference.hyperparameters import DIAGNOSIS, WATCH
 from glider.tools.inference.pooled import PRIOR_RUNS
 from glider.tools.watch.events import GROWING
 from glider.tools.watch.excess_noise import (
@@ -21,14 +21,9 @@ from glider.tools.watch.excess_noise import (
     with_inflated_noise,
 )
 from glider.tools.watch.flights import RunEnsemble, excess_nis_sigma, numbers
-from glider.tools.watch.history import CLEAN_RUN_NAT, ChangeEvent, History, within
+from glider.tools.watch.history import ChangeEvent, History, within
 from glider.tools.watch.label_fit import values_of
-from glider.tools.watch.scatter import MIN_SCATTER_RUNS
-from glider.tools.watch.unknown import LEFT_OVER
 
-ASKED_ABOVE = 4.0  # sigma of a run's mean squared innovation over that of many others, for disorder to be looked for
-STRETCH = 5.0  # s
-BURSTS = 0.65  # turbulence by 0.5 (weak) and less; changes that no label knows come in bursts, by 0.9 and more
 PROBED = 2  # runs in which it is asked what shakes
 
 
@@ -47,13 +42,14 @@ def water_event(history: History) -> ChangeEvent | None:
             k = int(together.argmax())
             if best is None or together[k] > best.evidence:
                 size, gain = np.array([SCALES[k]]), float(together[k])
-                best = ChangeEvent(label, span, gain, {label: gain}, size, np.diag(size**2 / 16.0), gain)
+                covariance = np.diag((WATCH.noise_size_share * size) ** 2)
+                best = ChangeEvent(label, span, gain, {label: gain}, size, covariance, gain)
     return best
 
 
 def excess_water_noise(flights: RunEnsemble, runs: Sequence[int]) -> np.ndarray:
     """Nat that the water's disorder gains in runs, (labels, runs, scales); asked of rough ones only."""
-    found = np.full((len(water_labels(flights)), len(runs), len(SCALES)), -CLEAN_RUN_NAT)
+    found = np.full((len(water_labels(flights)), len(runs), len(SCALES)), -WATCH.clean_run)
     least = asked_above(int(flights.reference.sum()))
     noisy = [k for k, n in enumerate(runs) if excess_nis_sigma(flights, n) > least]
     if noisy:
@@ -62,11 +58,11 @@ def excess_water_noise(flights: RunEnsemble, runs: Sequence[int]) -> np.ndarray:
 
 
 def asked_above(learned: int) -> float:
-    """ASKED_ABOVE where a run is held against a few: Student's t, by the runs learned from and what is usual."""
+    """`excess_noise_sigma` where a run is held against a few: Student's t, by the runs learned from."""
     return (
-        ASKED_ABOVE
-        if learned < MIN_SCATTER_RUNS
-        else float(student.isf(norm.sf(ASKED_ABOVE), learned - 1 + PRIOR_RUNS))
+        WATCH.excess_noise_sigma
+        if learned < WATCH.scatter_runs
+        else float(student.isf(norm.sf(WATCH.excess_noise_sigma), learned - 1 + PRIOR_RUNS))
     )
 
 
@@ -86,7 +82,10 @@ def named(history: History, event: ChangeEvent) -> ChangeEvent:
         return of_water(event, wanted[first].name) if wanted[first].name in WATER else linked(event, wanted, gains)
     own = gains[[one.name for one in wanted].index(TURBULENCE)]
     axes = [gain for gain, one in zip(gains, wanted, strict=True) if one.stage == "force" and one.name != TURBULENCE]
-    even = max(axes) < ONE_AXIS * own and max(burstiness(flights, n) for n in largest_nis) < BURSTS
+    even = (
+        max(axes) < DIAGNOSIS.single_axis_share * own
+        and max(burstiness(flights, n) for n in largest_nis) < WATCH.burst_ratio
+    )
     if wanted[first].name == WAVES or (wanted[first].name == TURBULENCE and even):
         return of_water(event, wanted[first].name)
     if wanted[first].name == TURBULENCE and a_sea(flights, largest_nis, wanted, gains):
@@ -112,7 +111,7 @@ def a_sea(flights: RunEnsemble, runs: Sequence[int], wanted: Sequence[NoiseProbe
         each = [inflated(part, waves, scale) for scale in SCALES]
         tried = [part.filter(*model, begin=True, more=more, doubt=doubt) for more, doubt in each]
         shares.append(line_share(part, min(tried, key=lambda one: float(one.misfit[0]))))
-    return min(shares) >= LINE
+    return min(shares) >= DIAGNOSIS.wave_share
 
 
 def linked(event: ChangeEvent, wanted: Sequence[NoiseProbe], gains: np.ndarray) -> ChangeEvent:
@@ -126,9 +125,9 @@ def burstiness(flights: RunEnsemble, n: int) -> float:
     """By how much a run's squared innovations change from one stretch to the next, over how far they exceed 1."""
     part = flights.parts[n]
     E = part.filter(*flights.shared.model(part, flights.own_values(n)), begin=True).E
-    rows = max(2, int(STRETCH / np.median(np.diff(part.recording.t))))
+    rows = max(2, int(WATCH.burst_seconds / np.median(np.diff(part.recording.t))))
     each = [np.nanmean(E[k : k + rows] ** 2) for k in range(0, len(E) - rows + 1, rows)]
-    return float(np.std(each) / max(np.mean(each) - 1.0, 0.05))
+    return float(np.std(each) / max(np.mean(each) - 1.0, WATCH.burst_least))
 
 
 def noise_beats_label(history: History, noisy: ChangeEvent, event: ChangeEvent) -> bool:
@@ -151,4 +150,4 @@ def noise_beats_label(history: History, noisy: ChangeEvent, event: ChangeEvent) 
         )
         changed = values_of(flights.shared, event.label, x, weights[n], event.size)
         by_label += nothing - flights.own_cost(flights.parts[n], within(flights, changed))
-    return by_label < (1.0 - LEFT_OVER) * by_excess_noise
+    return by_label < (1.0 - DIAGNOSIS.misfit_share) * by_excess_noise

@@ -21,9 +21,8 @@ from glider.tools.data.runs.case import Case
 from glider.tools.data.runs.run import Run
 from glider.tools.diagnose.cautions import below_floor
 from glider.tools.diagnose.noise_probes import VERTICAL_WATER
-from glider.tools.diagnose.probabilities import ERROR_RATE, TIE, softmax
+from glider.tools.diagnose.probabilities import softmax
 from glider.tools.diagnose.record import ANSWER, NONE, UNKNOWN
-from glider.tools.diagnose.search import EVIDENCE_NEEDED
 from glider.tools.diagnose.shrink import AFTER, BEFORE, FLOOR, RECALIBRATED, by_channel, shrinkage_of
 from glider.tools.gap.measure import RunGap, case_channels, root_mean_square, run_gap
 from glider.tools.identify.ocean.files import corrected_text
@@ -32,6 +31,7 @@ from glider.tools.identify.ocean.identify import EFFECTIVE_DIVES, precision_of
 from glider.tools.identify.ocean.levels import find_levels, some_runs
 from glider.tools.identify.ocean.next_run import flown, to_find, to_part
 from glider.tools.inference.fit import bounded_step
+from glider.tools.inference.hyperparameters import DIAGNOSIS, WATCH
 from glider.tools.inference.parameters import NINETY
 from glider.tools.inference.predict import fly_windows_from
 from glider.tools.inference.problem import Problem, cut, problem_of
@@ -39,11 +39,10 @@ from glider.tools.inference.shared_model import About, fit_shared, inflation_of
 from glider.tools.inference.shared_parameters import shared_parameters
 from glider.tools.inference.steady import first_values
 from glider.tools.watch.answer import CAUSE
-from glider.tools.watch.lasting import NO_WATER, beside_all
+from glider.tools.watch.lasting import beside_all
 from glider.tools.watch.usable import usable_dives
 from glider.tools.watch.whole_left import UnexplainedResidual, disturbed, excess_water_noise_of, what_is_left
 from glider.tools.watch.whole_search import (
-    CONFOUNDED_COSINE,
     Model,
     Round,
     SelectionResult,
@@ -54,7 +53,6 @@ from glider.tools.watch.whole_search import (
 
 ABSENT = 1e-6  # spreads: of an effect that is not asked for
 MOST_RUNS = 40
-MOSTLY = 0.9  # of all that can be explained, for the water to be the cause
 SEED, DRAWS = 20261122, 4
 CORRECTED = "corrected.toml"
 
@@ -121,7 +119,7 @@ def diagnose_ocean(case: Case, say: Callable[[str], None] = lambda text: None) -
         gaps[FLOOR], left = noisy
         chances = with_water(chances, left.probability)
         selected = [VERTICAL_WATER, *selected]
-    unknown = left.probability > 0.5
+    unknown = left.probability > WATCH.majority
     verdict = UNKNOWN if unknown else CAUSE if selected else NONE
     selected = [] if unknown else selected
     return OceanDiagnosis(
@@ -155,26 +153,27 @@ def with_excess_water_noise(
     """The floor in water that is as rough as the readings ask for, and what is left then: where that is nothing, and
     where the water explains nearly all that can be explained, and nothing that lasts is beside it.
     """
-    if left.probability <= 0.5:
+    if left.probability <= WATCH.majority:
         return None
     found = excess_water_noise_of(problem, left.probed)
     explained = 0.5 * inflation * (start.cost - model.cost)
-    if found is None or found.gain < MOSTLY * (found.gain + explained):
+    if found is None or found.gain < WATCH.water_share * (found.gain + explained):
         return None
     beside = beside_all([disturbed(part, found) for part in parts], model.shared, model.x, inflation)
-    if beside.chance(NO_WATER) > 0.5 and beside.moves(problem.kind.measures) >= problem.kind.material:
+    moved = beside.moves(problem.kind.measures)
+    if beside.chance(WATCH.water_odds) > WATCH.majority and moved >= problem.kind.material:
         return None  # water has no lasting direction
     rng = np.random.default_rng(SEED)
     models = [model.shared.model(part, x) for part, x in zip(parts, without_each(model, inflation), strict=True)]
     floor = [floor_of(part, one, disturbed(part, found), rng) for part, one in zip(parts, models, strict=True)]
     then = what_is_left(parts, problem, model, gaps[AFTER], floor)
-    return None if then.probability > 0.5 else (floor, then)
+    return None if then.probability > WATCH.majority else (floor, then)
 
 
 def with_water(chances: dict[str, float], unknown: float) -> dict[str, float]:
     """Probabilities where excess water noise is the main cause."""
-    others = {label: (1.0 - MOSTLY) * p for label, p in chances.items() if label != UNKNOWN}
-    unknown = max(unknown, ERROR_RATE)
+    others = {label: (1.0 - WATCH.water_share) * p for label, p in chances.items() if label != UNKNOWN}
+    unknown = max(unknown, DIAGNOSIS.error_rate)
     rest = 1.0 - unknown
     water = rest - sum(others.values())
     return others | {VERTICAL_WATER: water, UNKNOWN: unknown}
@@ -188,11 +187,12 @@ def chances_of(problem: Problem, main: Round, there: bool, unknown: float) -> tu
     best, evidence = main.best, main.evidence
     confounded = problem.kind.form_share * max(main.changes[best].gain, 0.0)
     near = {label: value + min(confounded, evidence[best] - value) for label, value in evidence.items()}
-    odds = softmax({NONE: EVIDENCE_NEEDED if there else EVIDENCE_NEEDED + max(near.values()), **near})
-    unknown = max(unknown, ERROR_RATE)
+    none = DIAGNOSIS.evidence_needed if there else DIAGNOSIS.evidence_needed + max(near.values())
+    odds = softmax({NONE: none, **near})
+    unknown = max(unknown, DIAGNOSIS.error_rate)
     chances = {label: (1.0 - unknown) * p for label, p in odds.items()} | {UNKNOWN: unknown}
     confounded_group = problem.one_group if best in problem.one_group else ()
-    tied = sorted((n for n in near if near[best] - near[n] <= TIE), key=lambda n: -near[n])
+    tied = sorted((n for n in near if near[best] - near[n] <= DIAGNOSIS.confounded_evidence), key=lambda n: -near[n])
     return chances, [best, *(n for n in confounded_group or tied if n != best)]
 
 
@@ -209,7 +209,7 @@ def groups_beside(problem: Problem, model: Whole, inflation: float) -> dict[str,
         for other, others in shared.labels.items():
             sizes = np.sqrt(np.outer(np.diag(left)[columns], np.diag(left)[others]))
             same = label in problem.one_group and other in problem.one_group
-            if other != label and (same or (np.abs(left[np.ix_(columns, others)]) > CONFOUNDED_COSINE * sizes).all()):
+            if other != label and (same or (np.abs(left[np.ix_(columns, others)]) > WATCH.same_cosine * sizes).all()):
                 group.append(other)
         found[label] = group
     return found
@@ -221,7 +221,7 @@ def places(problem: Problem, chances: dict[str, float], left: UnexplainedResidua
     """
     effects, where = problem.kind.catalogue(), dict[tuple[str, str], float]()
     gains = [] if left is None else [(one.probe.subsystem, one.probe.element, one.gain) for one in left.probed]
-    if sum(gain for _, _, gain in gains) >= EVIDENCE_NEEDED:
+    if sum(gain for _, _, gain in gains) >= DIAGNOSIS.evidence_needed:
         weights = [((s, e), gain) for s, e, gain in gains if gain > 0.0]
     else:
         weights = [(effects[label].place, chance) for label, chance in chances.items() if label in effects]

@@ -12,11 +12,11 @@ import numpy as np
 
 from glider.sim_backend.ocean.core import layout as at
 from glider.tools.diagnose.noise_probes import VERTICAL_WATER, ProbeResult, inflated, probes, run_probes
-from glider.tools.diagnose.search import EVIDENCE_NEEDED
-from glider.tools.diagnose.unknown import LEFT_GAP, LEFT_GAP_WIDTH, UNKNOWN_GAP_RATIO_WIDTH, probability
+from glider.tools.diagnose.unknown import probability
 from glider.tools.gap.measure import RunGap, mean_square, scored_rows
 from glider.tools.identify.ocean.levels import BOUNDS
 from glider.tools.inference.channels import errors
+from glider.tools.inference.hyperparameters import DIAGNOSIS, WATCH
 from glider.tools.inference.predict import fly_windows_from
 from glider.tools.inference.problem import Problem, cut
 from glider.tools.watch.whole_search import Model, Whole
@@ -24,7 +24,6 @@ from glider.tools.watch.whole_search import Model, Whole
 THIRDS = ("shallow", "middle", "deep")  # of the runs' depth
 STEERED = {"roll"}  # channels in which a vehicle is steered: what moves them is a helm, and no gap
 STANDS_OUT = 1.5  # times the mean square of all rows, that a regime has
-NOTHING_LEFT_PROBABILITY = 0.002  # probability of an unknown effect where nothing exceeds the floor
 
 
 @dataclass
@@ -34,7 +33,7 @@ class UnexplainedResidual:
     channel: str = ""
     excess: float = 0.0  # root of the difference of squares of gap and floor
     share: float = 1.0  # of the squared gap that there would be without the effects
-    probability: float = NOTHING_LEFT_PROBABILITY  # that it is an effect that no label names
+    probability: float = WATCH.ocean_least_unknown  # that it is an effect that no label names
     regime: str = ""  # where most of it is
     runs: list[str] = field(default_factory=list)  # those that have most of it, where it is not in all alike
     probed: list[ProbeResult] = field(default_factory=list)
@@ -57,7 +56,7 @@ def excess_water_noise_of(problem: Problem, probed: Sequence[ProbeResult]) -> Pr
     would have to move more than any that is identified.
     """
     found = probed[0] if probed else None
-    if found is None or found.probe.name != VERTICAL_WATER or found.gain < EVIDENCE_NEEDED:
+    if found is None or found.probe.name != VERTICAL_WATER or found.gain < DIAGNOSIS.evidence_needed:
         return None
     largest_excess = BOUNDS["water"][1] / problem.case.disturbance.water
     return found if np.hypot(1.0, found.scale) <= largest_excess else None
@@ -92,11 +91,11 @@ def what_is_left(
     if not channel or least[channel] <= 0.0:
         return UnexplainedResidual(channel)
     square = beyond[channel][0]
-    chance = probability(float(np.sqrt(least[channel])), problem.kind.material, UNKNOWN_GAP_RATIO_WIDTH)
+    chance = probability(float(np.sqrt(least[channel])), problem.kind.material, DIAGNOSIS.unknown_size_width)
     share = 1.0
     if model.labels:
         share = square / (square + taken(parts, model, channel))
-        chance *= probability(share, LEFT_GAP, LEFT_GAP_WIDTH)
+        chance *= probability(share, DIAGNOSIS.gap_share, DIAGNOSIS.gap_share_width)
     lowest = float(np.mean([gap.channels[channel] ** 2 for gap in floor if channel in gap.channels]))
     regime, runs = most_of_it(parts, model, channel, lowest)
     P, F = model.shared.model(problem, model.x)

@@ -9,10 +9,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from glider.tools.diagnose.materiality import largest
-from glider.tools.diagnose.probabilities import TIE
-from glider.tools.diagnose.search import EVIDENCE_NEEDED
 from glider.tools.inference.expansion import Expansion
 from glider.tools.inference.fit import bounded_step
+from glider.tools.inference.hyperparameters import DIAGNOSIS, WATCH
 from glider.tools.inference.predict import fly_windows_from
 from glider.tools.inference.problem import Problem
 from glider.tools.inference.shared_model import About, fit_shared, misfit
@@ -22,7 +21,6 @@ from glider.tools.watch.events import STEP, Change, Joint, Span
 MOST_EFFECTS = 3
 MAX_FITTED_LABELS = 4  # labels that are fitted at most before one is taken
 PARABOLA_SHARE = 0.5  # of the most evident parabola's: far from where they were taken parabolas may be wrong by so much
-CONFOUNDED_COSINE = 0.98  # cosine of two labels' columns
 REFITS, CONVERGED_GAIN = 4, 1.0  # times that a fit is taken up again, while it brings so much squared sigma
 STEP_SHARES = (0.5, 0.2)  # of the step that parabolas promise, from which a fit begins where the whole leads too far
 Model = tuple[np.ndarray, np.ndarray]
@@ -121,7 +119,7 @@ def confounded(model: Whole, label: str) -> bool:
     for own in model.labels:
         a, b = model.shared.labels[own], model.shared.labels[label]
         sizes = np.sqrt(np.outer(np.diag(A)[a], np.diag(A)[b]))
-        if own == label or (np.abs(A[np.ix_(a, b)]) > CONFOUNDED_COSINE * sizes).all():
+        if own == label or (np.abs(A[np.ix_(a, b)]) > WATCH.same_cosine * sizes).all():
             return True
     return False
 
@@ -133,7 +131,11 @@ def one_round(parts: Sequence[Problem], model: Whole, inflation: float) -> Round
     listed.sort(key=lambda one: -one.evidence)
     found = Round(model, {one.label: one for one in listed}, {one.label: one.evidence for one in listed}, {})
     for change in listed[:MAX_FITTED_LABELS]:
-        near = min(PARABOLA_SHARE * listed[0].evidence, found.evidence[found.best] - TIE) if found.fitted else -np.inf
+        near = (
+            min(PARABOLA_SHARE * listed[0].evidence, found.evidence[found.best] - DIAGNOSIS.confounded_evidence)
+            if found.fitted
+            else -np.inf
+        )
         if found.fitted and change.evidence < max(near, 0.0):
             break
         fit = found.fitted[change.label] = with_effect(parts, model, change, inflation)
@@ -177,12 +179,12 @@ def forward_select(parts: Sequence[Problem], start: Whole, inflation: float) -> 
     while len(selection.model.labels) < MOST_EFFECTS:
         found = one_round(parts, selection.model, inflation)
         selection.rounds.append(found)
-        if found.evidence[found.best] < EVIDENCE_NEEDED or found.moved < material:
+        if found.evidence[found.best] < DIAGNOSIS.evidence_needed or found.moved < material:
             break
         selection.model = found.fitted[found.best]
         before = {one: evidence_beside(selection.model, one, inflation) for one in found.before.labels}
         weakest = min(before, key=lambda label: before[label], default="")
-        if weakest and before[weakest] < EVIDENCE_NEEDED:
+        if weakest and before[weakest] < DIAGNOSIS.evidence_needed:
             selection.model = refit_without(parts, selection.model, weakest, inflation)
             break
     return selection

@@ -22,7 +22,8 @@ from glider.tools.diagnose.against_healthy import diagnose_against_healthy
 from glider.tools.diagnose.gates import form_stands_out
 from glider.tools.diagnose.healthy_decision import weigh
 from glider.tools.diagnose.healthy_fits import Comparison, FreeForm, HealthyHypothesis
-from glider.tools.diagnose.healthy_runs import FILE_ERROR, AsUsual, Healthy, as_the_case_sees, prior_evidence
+from glider.tools.diagnose.healthy_runs import AsUsual, Healthy, as_the_case_sees, prior_evidence
+from glider.tools.inference import hyperparameters
 from glider.tools.report.pooled import write_pooled_report
 from glider.tools.verify.challenge.form_cases import draw_healthy, write_flights
 from glider.tools.verify.challenge.form_fit import fit_flights, fit_forces
@@ -287,7 +288,7 @@ def test_evidence_is_the_integral_over_the_prior():
 def test_what_healthy_runs_say_nothing_of_is_off_by_what_is_usual_and_what_they_show_by_that():
     nothing = AsUsual.learned(np.zeros((1, 1)), np.zeros(1))
     assert nothing.mean == 0.0
-    assert np.sqrt(nothing.covariance.item()) == pytest.approx(FILE_ERROR, rel=0.2)
+    assert np.sqrt(nothing.covariance.item()) == pytest.approx(hyperparameters.HEALTHY.file_error, rel=0.2)
     precision = 1.0 / 0.05**2
     shown = AsUsual.learned(np.array([[precision]]), np.array([0.8 * precision]))
     assert shown.mean == pytest.approx(0.8, rel=0.02)

@@ -11,9 +11,10 @@ from glider.tools.diagnose.probabilities import to_none
 from glider.tools.diagnose.record import NONE, UNKNOWN
 from glider.tools.diagnose.search import noise_matches_file
 from glider.tools.diagnose.staged_answer import by_gap_left, weighed
-from glider.tools.diagnose.unknown import UNFIT, Remainder, probability_unknown
+from glider.tools.diagnose.unknown import Remainder, probability_unknown
 from glider.tools.diagnose.verdict import Answer
 from glider.tools.gap.measure import RunGap
+from glider.tools.inference.hyperparameters import DIAGNOSIS
 from glider.tools.inference.levels import SENSORS, Levels
 
 GYRO = ProbeResult(NoiseProbe("gyro", "sensor", "sensing", "gyro"), 3e4, 6.0)
@@ -59,7 +60,7 @@ def test_the_probability_of_unknown_has_no_cliff_in_any_of_its_figures(name, low
 
 
 def test_unknown_is_sure_where_the_vehicle_is_not_the_file_s_and_untouched_where_it_may_be():
-    assert unknown(figures(after=UNFIT[1] + 0.1)) > 0.99
+    assert unknown(figures(after=DIAGNOSIS.far_full_gap + 0.1)) > 0.99
     near = figures(after=2.0, before=30.0, left=10.0, taken=900.0, well_specified=0.0)
     assert unknown(near) < 0.1
 
@@ -108,7 +109,8 @@ def test_of_two_answers_the_one_that_leaves_less_of_runs_left_out_counts_the_mor
     assert by_gap_left(0.3, found, 3.0, 4.5) < 0.01
     assert by_gap_left(0.0, found, 3.0, 1.0) == 0.0
     assert by_gap_left(1.0, found, 9.0, 18.0) == 1.0
-    assert by_gap_left(opened(3.0 + 1e-6, *UNFIT), found, 3.0, 1.0) < 1e-2  # where the stages begin to be asked
+    begins = opened(3.0 + 1e-6, DIAGNOSIS.far_gap, DIAGNOSIS.far_full_gap)
+    assert by_gap_left(begins, found, 3.0, 1.0) < 1e-2  # where the stages begin to be asked
 
 
 def test_two_answers_are_weighed_without_a_jump():

@@ -10,21 +10,17 @@ from glider.sim_backend.core.effects.catalogue import catalogue
 from glider.tools.diagnose import search as search_module
 from glider.tools.diagnose import verdict as verdict_module
 from glider.tools.diagnose.noise_probes import CLOCK, NoiseProbe, ProbeResult
-from glider.tools.diagnose.probabilities import MAX_NONE_RATIO, doubt_small
+from glider.tools.diagnose.probabilities import doubt_small
 from glider.tools.diagnose.record import NONE
 from glider.tools.diagnose.search import run
 from glider.tools.diagnose.shrink import ablation_importance, in_tolerances, left_out_squares, most_often
 from glider.tools.diagnose.unknown import (
-    MORE_UNKNOWN,
-    UNFIT,
-    UNKNOWN_GAP_RATIO_AT_HALF,
     Remainder,
     left_floors,
     left_share,
     probability_unknown,
 )
 from glider.tools.diagnose.verdict import (
-    EVIDENCE_NEEDED,
     HeldOutImportance,
     conclude,
     drop,
@@ -34,6 +30,7 @@ from glider.tools.diagnose.verdict import (
     rank_by_importance,
     with_least_gap,
 )
+from glider.tools.inference.hyperparameters import DIAGNOSIS
 from glider.tools.inference.problem import problem_of
 from tests.support.cases import make_case
 
@@ -75,7 +72,7 @@ def test_strain_is_what_the_prior_loses():
     assert nuisance_prior_cost(less, whole) == pytest.approx(-12.0)
 
 
-@pytest.mark.parametrize(("lost", "stays"), [(EVIDENCE_NEEDED, 2), (EVIDENCE_NEEDED - 0.1, 1)])
+@pytest.mark.parametrize(("lost", "stays"), [(DIAGNOSIS.evidence_needed, 2), (DIAGNOSIS.evidence_needed - 0.1, 1)])
 def test_what_is_allowed_takes_no_effect_s_place_that_it_fills_only_at_its_limits(
     two_effects, monkeypatch, lost, stays
 ):
@@ -135,7 +132,7 @@ def test_a_small_effect_is_never_sure_and_none_never_before_it(size):
     found = doubt_small({"drag": 0.9, "lift": 0.1, NONE: 0.0}, "drag", size)
     assert sum(found.values()) == pytest.approx(1.0)
     assert found["drag"] < 0.6
-    assert found[NONE] <= MAX_NONE_RATIO * found["drag"] + 1e-9
+    assert found[NONE] <= DIAGNOSIS.none_ratio * found["drag"] + 1e-9
     assert found["lift"] / found["drag"] == pytest.approx(1.0 / 9.0)
 
 
@@ -193,7 +190,7 @@ def test_what_leaves_next_to_no_gap_is_not_unknown_however_many_nat_it_has():
 def test_a_wide_gap_is_unknown_where_a_sensor_s_small_error_has_nearly_all_the_nat():
     assert left_share(shrinkage(0.8), 9.0) > 0.6
     assert unknown(after=0.8, left=1e3, explained=1e6) > 0.6
-    assert unknown(after=0.2, left=1e3, explained=1e6) == MORE_UNKNOWN
+    assert unknown(after=0.2, left=1e3, explained=1e6) == DIAGNOSIS.least_unknown_residual
 
 
 def test_misfit_that_closes_with_the_gap_is_a_small_effect_s_unless_the_vehicle_is_known():
@@ -232,9 +229,9 @@ def test_beside_a_wandering_clock_what_leaves_no_gap_is_not_unknown():
 
 
 def test_as_likely_as_not_at_the_width_that_small_effects_leave():
-    after = 0.15 * np.sqrt(1.0 + UNKNOWN_GAP_RATIO_AT_HALF**2)
+    after = 0.15 * np.sqrt(1.0 + DIAGNOSIS.unknown_size**2)
     assert unknown(after, left=1e9, explained=0.0, evident=False) == pytest.approx(0.5)
-    assert unknown(UNFIT[1] + 0.1, left=1.0, explained=1e9) > 0.99
+    assert unknown(DIAGNOSIS.far_full_gap + 0.1, left=1.0, explained=1e9) > 0.99
 
 
 def test_the_main_cause_takes_the_most_of_the_gap_however_many_nat_a_sensor_s_small_error_has(tmp_path):

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from glider.sim_backend.core.effects import effect_layout as ef
-from glider.tools.diagnose.materiality import MATERIAL_TOLERANCES, excess, movements
+from glider.tools.diagnose.materiality import excess, movements
 from glider.tools.diagnose.probabilities import answer_first, mix_in_error_rate, to_none
 from glider.tools.diagnose.record import NONE, UNKNOWN
 from glider.tools.diagnose.search import run
-from glider.tools.diagnose.verdict import EVIDENCE_NEEDED, Answer, conclude
+from glider.tools.diagnose.verdict import Answer, conclude
+from glider.tools.inference.hyperparameters import DIAGNOSIS
 from glider.tools.inference.problem import problem_of
 from tests.support.cases import make_case
 
@@ -33,7 +34,7 @@ def test_a_clock_that_is_hardly_late_is_there_and_no_gap(tmp_path):
     assert answer.main == NONE
     assert answer.selected == []
     assert answer.hypothesis.labels == ()
-    assert answer.negligible["mocap_delay"] > 2.0 * EVIDENCE_NEEDED
+    assert answer.negligible["mocap_delay"] > 2.0 * DIAGNOSIS.evidence_needed
     assert answer.probabilities[NONE] > 0.9
     assert agrees(answer)
 
@@ -43,13 +44,13 @@ def test_a_clock_that_is_late_enough_to_matter_is_the_cause(tmp_path):
     assert answer.main == "mocap_delay"
     assert answer.selected == ["mocap_delay"]
     assert answer.negligible == {}
-    assert movements(answer.search, answer.hypothesis)["mocap_delay"] > MATERIAL_TOLERANCES
+    assert movements(answer.search, answer.hypothesis)["mocap_delay"] > DIAGNOSIS.material
     assert agrees(answer)
 
 
 def test_probability_of_what_does_not_matter_is_that_of_none():
     chances = {"drag": 0.5, "lift": 0.3, "clock_skew": 0.15, NONE: 0.05}
-    found = to_none(chances, ["clock_skew"], {"lift": 0.5 * MATERIAL_TOLERANCES, "drag": 2.0 * MATERIAL_TOLERANCES})
+    found = to_none(chances, ["clock_skew"], {"lift": 0.5 * DIAGNOSIS.material, "drag": 2.0 * DIAGNOSIS.material})
     assert found == pytest.approx({"drag": 0.5, "lift": 0.0, "clock_skew": 0.0, NONE: 0.5})
 
 

@@ -8,7 +8,8 @@ from glider.sim_backend.core.effects import effect_layout as ef
 from glider.tools.diagnose.noise_probes import WAVES
 from glider.tools.diagnose.search import run
 from glider.tools.diagnose.verdict import conclude
-from glider.tools.diagnose.waves import LINE, line_share
+from glider.tools.diagnose.waves import line_share
+from glider.tools.inference.hyperparameters import DIAGNOSIS
 from glider.tools.inference.problem import problem_of
 from tests.support.cases import make_case
 
@@ -30,10 +31,10 @@ def sea(t, phase=0.0):
 
 
 def test_a_sea_has_a_line_and_what_goes_with_the_legs_has_none():
-    assert share(sea) > LINE + 0.1
-    assert share(lambda t: 0.0 * t) < LINE - 0.1
+    assert share(sea) > DIAGNOSIS.wave_share + 0.1
+    assert share(lambda t: 0.0 * t) < DIAGNOSIS.wave_share - 0.1
     legs = share(lambda t: 2.0 * np.exp(-np.mod(t, 20.0) / 3.0) * np.where(np.mod(t, 40.0) < 20.0, 1.0, -1.0))
-    assert legs < LINE - 0.1
+    assert legs < DIAGNOSIS.wave_share - 0.1
 
 
 def test_small_waves_hide_nothing_beside_them(tmp_path):

@@ -9,11 +9,12 @@ from glider.sim_backend.foreign import ocean as foreign
 from glider.tools.data.runs.case import load_case
 from glider.tools.identify.ocean.files import vehicle_text
 from glider.tools.identify.ocean.identify import BANDS, identify_ocean
+from glider.tools.inference.hyperparameters import WATCH
 from glider.tools.inference.problem import problem_of
 from glider.tools.inference.shared_parameters import shared_parameters
 from glider.tools.verify.challenge.ocean_cases import as_run, flown, with_change
 from glider.tools.watch.flights import RunEnsemble
-from glider.tools.watch.lasting import STRANGE, beside_all, lasting
+from glider.tools.watch.lasting import beside_all, lasting
 from glider.tools.watch.watch import watch
 from glider.tools.watch.whole_case import diagnose_ocean
 from tests.support.ocean import as_case, drawn
@@ -99,7 +100,7 @@ def test_what_is_the_same_in_every_dive_lasts_and_what_changes_its_way_does_not(
     assert sunk(flights, [(0.0, 0.0)] * AFTER).evidence < 0.0
     confounded = sunk(flights, [(0.02, -0.02)] * AFTER)
     assert confounded.evidence > 10.0
-    assert confounded.chance(STRANGE) > 0.99
+    assert confounded.chance(WATCH.lasting_odds) > 0.99
     assert np.median(confounded.size[:BANDS]) == pytest.approx(0.02, rel=0.4)
     assert np.median(confounded.size[BANDS:]) == pytest.approx(-0.02, rel=0.4)
     assert confounded.place.element == "surge"

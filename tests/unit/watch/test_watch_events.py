@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from glider.tools.inference.expansion import Expansion
+from glider.tools.inference.hyperparameters import WATCH
 from glider.tools.inference.parameters import NUISANCE, FreeParameter
 from glider.tools.inference.pooled import log_evidence, marginalised
 from glider.tools.inference.shared_parameters import SharedParameters
@@ -16,7 +17,6 @@ from glider.tools.watch.history import History
 from glider.tools.watch.label_fit import LabelFit
 from glider.tools.watch.rivals import over_spans
 from glider.tools.watch.scatter import learn_scatter
-from glider.tools.watch.search import EVIDENCE_NEEDED
 
 RUNS, SEEN = 10, 40  # rows of each run's Jacobian
 FREE = [
@@ -195,7 +195,7 @@ def test_the_form_of_a_strong_change_is_no_change_of_the_runs_before_it():
         joint = Joint(SHARED, list(flights.runs), taken)
         return joint.changes(before, ["lift"])[0].evidence
 
-    assert lift_before_it() > EVIDENCE_NEEDED
+    assert lift_before_it() > WATCH.evidence_needed
     for n in range(first, RUNS):
         flights.loosen(n, change)
     assert lift_before_it() < 0.0
