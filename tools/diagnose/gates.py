@@ -7,25 +7,29 @@ across (docs/explanation/diagnosis.md, Steady).
 import numpy as np
 
 from glider.firmware.model.vehicle import FormTable
-from glider.tools.inference.hyperparameters import DIAGNOSIS, HEALTHY
+from glider.tools.inference.hyperparameters import DIAGNOSIS
 
 
 def form_stands_out(form: FormTable | None) -> bool:
     """Whether a vehicle was identified, and its form leaves more of healthy runs than noise does, in squares."""
-    return form is not None and form.total**2 > HEALTHY.form_ratio * form.noise**2
+    return form is not None and form.total**2 - form.noise**2 > form.noise**2
 
 
-def opened(value: float, shut: float, wide: float) -> float:
-    """How far a gate is open, 0 up to `shut` and 1 from `wide`; smooth in the logarithm of the value between."""
+def opened(value: float, shut: float, wide: float | None = None) -> float:
+    """How far a gate is open, 0 up to `shut` and 1 from `wide`; smooth in the logarithm of the value between.
+
+    wide: `gate_width` times `shut`, unless it is given.
+    """
     if value <= shut:
         return 0.0
+    wide = DIAGNOSIS.gate_width * shut if wide is None else wide
     share = float(min(np.log(value / shut) / np.log(wide / shut), 1.0))
     return share * share * (3.0 - 2.0 * share)
 
 
 def materiality(moved: float) -> float:
-    """How far a movement of a channel (tolerances) is a gap: 0 below `material`, 1 from `material_ratio` times that."""
-    return opened(moved, DIAGNOSIS.material, DIAGNOSIS.material_ratio * DIAGNOSIS.material)
+    """How far a movement of a channel (tolerances) is a gap, from 0 to 1."""
+    return opened(moved, DIAGNOSIS.material)
 
 
 def mixed(shares: dict[str, float], others: dict[str, float], weight: float) -> dict[str, float]:

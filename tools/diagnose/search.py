@@ -330,7 +330,7 @@ def level_disturbance(search: Search) -> bool:
     log = np.clip(found.log, np.log(1.0 / most), np.log(most)) * (1.0 - search.well_specified)
     log *= [1.0 - opened(one, most, DIAGNOSIS.noise_factor_rejected**2 / most) for one in np.exp(found.log)]
     change = log - before
-    change *= opened(float(np.abs(change).max()), LEAST_LOG_LEVEL, 2.0 * LEAST_LOG_LEVEL)
+    change *= opened(float(np.abs(change).max()), LEAST_LOG_LEVEL)
     if not change.any():
         return False
     search.problem = now.moved(change).applied(problem)

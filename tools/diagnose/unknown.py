@@ -33,7 +33,7 @@ from glider.tools.inference.problem import Problem
 def probability(share: float, middle: float, width: float) -> float:
     """Probability that what is left is a gap of its own (docs/explanation/diagnosis.md, Thresholds)."""
     z = (np.log(max(share, 1e-6)) - np.log(middle)) / width
-    return float(np.clip(ndtr(z), DIAGNOSIS.least_unknown_residual, 1.0 - DIAGNOSIS.least_unknown_residual))
+    return float(np.clip(ndtr(z), DIAGNOSIS.least_unknown, 1.0 - DIAGNOSIS.least_unknown))
 
 
 def left_share(shrinkage: Shrinkage, taken: float) -> float:
@@ -73,11 +73,7 @@ def place_alone(probed: Iterable[tuple[NoiseProbe, float]]) -> tuple[tuple[str, 
         gains[place] = max(gains.get(place, 0.0), gain)
     ranked = sorted(gains, key=lambda place: -gains[place])
     next_gain = gains[ranked[1]] if len(ranked) > 1 else 0.0
-    alone = (
-        opened(gains[ranked[0]] / max(next_gain, 1e-9), DIAGNOSIS.alone_ratio, DIAGNOSIS.alone_full_ratio)
-        if ranked
-        else 0.0
-    )
+    alone = opened(gains[ranked[0]] / max(next_gain, 1e-9), DIAGNOSIS.alone_ratio) if ranked else 0.0
     return (ranked[0], alone) if ranked else (("", ""), 0.0)
 
 
@@ -113,7 +109,7 @@ def remainder_of(
         explained,
         probed[0].gain,
         probed,
-        opened(whiteness, DIAGNOSIS.residual_sigma, DIAGNOSIS.residual_full_ratio * DIAGNOSIS.residual_sigma),
+        opened(whiteness, DIAGNOSIS.residual_sigma),
     )
 
 
@@ -178,7 +174,7 @@ def disorder(search: Search, hypothesis: Hypothesis, left: Remainder) -> ProbeRe
     if beside is not None:
         return beside
     water = turbulence_first(left.probed)  # a sensor's small error may have more nats than it: windows show it
-    return water if water is not None and left_floors(shrink(search, hypothesis)) > DIAGNOSIS.unknown_size else None
+    return water if water is not None and left_floors(shrink(search, hypothesis)) > DIAGNOSIS.own_size else None
 
 
 def clock_of(search: Search, hypothesis: Hypothesis, gained: dict[str, float], more: np.ndarray) -> ClockModel | None:
@@ -257,7 +253,7 @@ def probability_unknown(
             for share, well_specified in kinds if share > 0.0
         )  # fmt: skip
         known += (shown - known) * left.shows
-    return known + (1.0 - DIAGNOSIS.least_unknown_residual - known) * off
+    return known + (1.0 - DIAGNOSIS.least_unknown - known) * off
 
 
 def unknown_beside(
@@ -272,15 +268,15 @@ def unknown_beside(
     if noise and noise.probe.name != CLOCK:
         return probability(left.share, DIAGNOSIS.misfit_share, DIAGNOSIS.misfit_share_width)
     as_said = well_specified and not noise
-    middle = DIAGNOSIS.specified_unknown_size if as_said else DIAGNOSIS.unknown_size
+    middle = DIAGNOSIS.specified_unknown_size if as_said else DIAGNOSIS.own_size
     wide = probability(left_floors(shrinkage), middle, DIAGNOSIS.unknown_size_width)
     if not evident:
         return wide
     if as_said:
-        form = probability(left.share, DIAGNOSIS.specified_misfit_share, DIAGNOSIS.specified_misfit_share_width)
+        form = probability(left.share, DIAGNOSIS.specified_misfit_share, DIAGNOSIS.gap_share_width)
     else:
         form = probability(left_share(shrinkage, taken), DIAGNOSIS.gap_share, DIAGNOSIS.gap_share_width)
-    beside = max(form * wide, DIAGNOSIS.least_unknown_residual)
+    beside = max(form * wide, DIAGNOSIS.least_unknown)
     place, alone = left.alone
     if place[0] == "sensing" and place in places:
         beside += (

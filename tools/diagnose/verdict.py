@@ -215,7 +215,7 @@ def search_again_with_noise(
         say("rough water is not the main cause")
         return conclude(search, say, calm=True)
     water = turbulence_first(answer.probed) if found.probe.name == CLOCK else None
-    if water is not None and left_floors(answer.shrinkage) > DIAGNOSIS.unknown_size:
+    if water is not None and left_floors(answer.shrinkage) > DIAGNOSIS.own_size:
         more = more + inflated(answer.search.problem, water.probe, water.scale)[0]
         noisy = conclude(run(problem.with_extra_noise(more), say, clock, [answer.search.best]), say, water)
         if noisy.main == TURBULENCE:
@@ -282,7 +282,7 @@ def conclude(
     if main in gained:
         floors = sizes[main] / max(floor, 1e-6)
         small_ones, alone = (
-            doubt_small(chances, main, floors / size) for size in (DIAGNOSIS.main_size, DIAGNOSIS.specified_main_size)
+            doubt_small(chances, main, floors / size) for size in (DIAGNOSIS.own_size, DIAGNOSIS.specified_main_size)
         )
         chances = mixed(small_ones, alone, search.well_specified)
     by_effects = sum(sizes[label] ** 2 for label in gained)

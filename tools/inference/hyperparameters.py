@@ -37,8 +37,8 @@ class Diagnosis:
     confounded_evidence: float = number(
         6.0, "nat", "log evidence within which two labels are not distinguished", CONVENTION
     )
+    gate_width: float = number(2.0, "1", "what a rule asks for in full, over where it begins", CONVENTION)
     material: float = number(0.1, "tolerance", "least movement of a channel in a window that is a gap", CONTRACT)
-    material_ratio: float = number(2.0, "1", "movement over `material` from which an effect counts in full", CONVENTION)
     held_out_share: float = number(
         0.3, "1", "least gap closed on held-out runs by an effect beside another, over the gap that is left", FITTED
     )
@@ -49,14 +49,21 @@ class Diagnosis:
     none_ratio: float = number(
         0.9, "1", "largest ratio of P(none) to P(main cause) once an effect is there", CONVENTION
     )
-    main_size: float = number(2.1, "floors", "size of a main cause that is as likely as not one of many", FITTED)
-    specified_main_size: float = number(1.2, "floors", "the same if the noise is as in the vehicle file", FITTED)
-    main_size_width: float = number(0.25, "e-folds", "width of `main_size`, 1 sigma", FITTED)
-    unknown_size: float = number(1.8, "floors", "size of a residual that is as likely as not an effect", FITTED)
-    specified_unknown_size: float = number(0.8, "floors", "the same if the noise is as in the vehicle file", FITTED)
-    unknown_size_width: float = number(0.35, "e-folds", "width of `unknown_size`, 1 sigma", FITTED)
+    specified_main_size: float = number(
+        1.2, "floors", "`own_size` of a main cause if the noise is as in the file", FITTED
+    )
+    main_size_width: float = number(0.25, "e-folds", "width of `own_size` for a main cause, 1 sigma", FITTED)
+    own_size: float = number(
+        1.8, "floors", "size at which a main cause, or a residual, is as likely as not an effect of its own", FITTED
+    )
+    specified_unknown_size: float = number(
+        0.8, "floors", "`own_size` of a residual if the noise is as in the file", FITTED
+    )
+    unknown_size_width: float = number(0.35, "e-folds", "width of `own_size` for a residual, 1 sigma", FITTED)
     gap_share: float = number(0.17, "1", "share of the squared gap left at which unknown is as likely as not", FITTED)
-    gap_share_width: float = number(0.5, "e-folds", "width of `gap_share`, 1 sigma", FITTED)
+    gap_share_width: float = number(
+        0.5, "e-folds", "width of `gap_share` and of `specified_misfit_share`, 1 sigma", FITTED
+    )
     misfit_share: float = number(
         0.145, "1", "share of the explainable misfit left at which unknown is as likely as not", FITTED
     )
@@ -65,21 +72,15 @@ class Diagnosis:
         0.03, "1", "the same if all of it is left at the sensor of a selected effect", FITTED
     )
     specified_misfit_share: float = number(0.11, "1", "the same if the noise is as in the vehicle file", FITTED)
-    specified_misfit_share_width: float = number(0.6, "e-folds", "width of `specified_misfit_share`, 1 sigma", FITTED)
     alone_ratio: float = number(
         2.0, "1", "gain of one element's noise over any other from which the residual may be there alone", FITTED
     )
-    alone_full_ratio: float = number(4.5, "1", "the same from which the residual is there alone", FITTED)
     residual_sigma: float = number(6.0, "sigma", "whiteness statistic from which something is left", CONVENTION)
-    residual_full_ratio: float = number(
-        1.5, "1", "whiteness over `residual_sigma` from which a residual counts in full", CONVENTION
-    )
     far_gap: float = number(
         3.0, "tolerances", "gap of the best explanation from which the vehicle may be another", FITTED
     )
     far_full_gap: float = number(8.0, "tolerances", "the same from which it is another", FITTED)
     least_unknown: float = number(0.002, "1", "least P(unknown)", CONVENTION)
-    least_unknown_residual: float = number(0.005, "1", "the same if something is left", CONVENTION)
     kept_gap_share: float = number(
         0.9, "1", "largest gap left, over the recalibrated one, with which effects beside unknown stay", CONVENTION
     )
@@ -124,9 +125,6 @@ class AgainstHealthy:
         0.2, "prior", "error of the vehicle file in an effect's prior standard deviations, 1 sigma", CONVENTION
     )
     least_scale: float = number(0.05, "tolerance", "least residual of healthy runs in a channel", CONVENTION)
-    form_ratio: float = number(
-        2.0, "1", "squared residual of healthy runs over that of noise from which the form decides", CONVENTION
-    )
 
 
 @dataclass(frozen=True)

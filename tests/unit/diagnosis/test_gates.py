@@ -41,7 +41,7 @@ def unknown(f: dict[str, float], evident: bool = True, asked: bool = True) -> fl
     search = SimpleNamespace(problem=SimpleNamespace(rules=SimpleNamespace(whiteness=True)), well_specified=f["told"])
     missed = SimpleNamespace(before=f["before"], recalibrated=f["before"], after=f["after"], floor=f["floor"])
     servo = ProbeResult(NoiseProbe("servo", "actuator", "actuation", "servo"), f["next"], 6.0)
-    left = Remainder(f["explained"], f["left"], [GYRO, servo], opened(f["shows"], 6.0, 9.0)) if asked else None
+    left = Remainder(f["explained"], f["left"], [GYRO, servo], opened(f["shows"], 6.0)) if asked else None
     return probability_unknown(search, evident, missed, left, None, f["taken"], [("sensing", "gyro")])
 
 

@@ -190,7 +190,7 @@ def test_what_leaves_next_to_no_gap_is_not_unknown_however_many_nat_it_has():
 def test_a_wide_gap_is_unknown_where_a_sensor_s_small_error_has_nearly_all_the_nat():
     assert left_share(shrinkage(0.8), 9.0) > 0.6
     assert unknown(after=0.8, left=1e3, explained=1e6) > 0.6
-    assert unknown(after=0.2, left=1e3, explained=1e6) == DIAGNOSIS.least_unknown_residual
+    assert unknown(after=0.2, left=1e3, explained=1e6) == DIAGNOSIS.least_unknown
 
 
 def test_misfit_that_closes_with_the_gap_is_a_small_effect_s_unless_the_vehicle_is_known():
@@ -229,7 +229,7 @@ def test_beside_a_wandering_clock_what_leaves_no_gap_is_not_unknown():
 
 
 def test_as_likely_as_not_at_the_width_that_small_effects_leave():
-    after = 0.15 * np.sqrt(1.0 + DIAGNOSIS.unknown_size**2)
+    after = 0.15 * np.sqrt(1.0 + DIAGNOSIS.own_size**2)
     assert unknown(after, left=1e9, explained=0.0, evident=False) == pytest.approx(0.5)
     assert unknown(DIAGNOSIS.far_full_gap + 0.1, left=1.0, explained=1e9) > 0.99
 

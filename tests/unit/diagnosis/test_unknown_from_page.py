@@ -18,7 +18,7 @@ SENSOR, HULL, OTHER = ("sensing", "gyro"), ("hydrodynamics", "surge"), ("actuati
 
 def phi(x, m, s):
     z = (math.log(max(x, 1e-300)) - math.log(m)) / s
-    return min(max(0.5 * math.erfc(-z / math.sqrt(2.0)), 0.005), 0.995)
+    return min(max(0.5 * math.erfc(-z / math.sqrt(2.0)), 0.002), 0.998)
 
 
 def gate(x, a, b):
@@ -33,23 +33,23 @@ def by_the_page(c):
     left = c["G_s"] ** 2 - c["G_f"] ** 2
     u_G = left / min(c["G_0"] ** 2 - c["G_f"] ** 2, left + c["D"])
     w = math.sqrt(left) / c["G_f"]
-    F = {"other": phi(u_G, 0.17, 0.5), "file": phi(u_L, 0.11, 0.6)}
+    F = {"other": phi(u_G, 0.17, 0.5), "file": phi(u_L, 0.11, 0.5)}
     W = {"other": phi(w, 1.8, 0.35), "file": phi(w, 0.8, 0.35)}
     place = max(c["gains"], key=c["gains"].get)
     r = L_r / sorted(c["gains"].values())[-2]
     p = {}
     for kind in F:
-        p[kind] = max(F[kind] * W[kind], 0.005)
+        p[kind] = max(F[kind] * W[kind], 0.002)
         if place[0] == "sensing" and place in c["places"]:
-            p[kind] += (max(F[kind], phi(u_L, 0.03, 1.1)) - p[kind]) * gate(r, 2.0, 4.5)
-    q = 0.002 + gate(c["sigma"], 6.0, 9.0) * (c["p_w"] * p["file"] + (1.0 - c["p_w"]) * p["other"] - 0.002)
-    return q + (0.995 - q) * gate(c["G_s"], 3.0, 8.0)
+            p[kind] += (max(F[kind], phi(u_L, 0.03, 1.1)) - p[kind]) * gate(r, 2.0, 4.0)
+    q = 0.002 + gate(c["sigma"], 6.0, 12.0) * (c["p_w"] * p["file"] + (1.0 - c["p_w"]) * p["other"] - 0.002)
+    return q + (0.998 - q) * gate(c["G_s"], 3.0, 8.0)
 
 
 def by_the_program(c):
     probed = [ProbeResult(NoiseProbe(place[1], "", *place), gain, 6.0) for place, gain in c["gains"].items()]
     probed.sort(key=lambda one: -one.gain)
-    left = Remainder(c["L_s"], probed[0].gain, probed, opened(c["sigma"], 6.0, 9.0))
+    left = Remainder(c["L_s"], probed[0].gain, probed, opened(c["sigma"], 6.0))
     shrinkage = SimpleNamespace(before=c["G_0"], recalibrated=0.9 * c["G_0"], after=c["G_s"], floor=c["G_f"])
     search = SimpleNamespace(
         well_specified=c["p_w"], problem=SimpleNamespace(rules=SimpleNamespace(whiteness=True))
@@ -69,7 +69,7 @@ def case(seed):
     return {
         "G_f": floor, "G_s": after, "G_0": after * rng.uniform(1.1, 6.0), "D": after**2 * rng.uniform(0.2, 9.0),
         "L_s": 10.0 ** rng.uniform(3.0, 6.0), "gains": gains, "places": places, "p_w": rng.uniform(0.0, 1.0),
-        "sigma": rng.uniform(5.0, 10.0),
+        "sigma": rng.uniform(5.0, 14.0),
     }  # fmt: skip
 
 
