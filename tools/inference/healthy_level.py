@@ -29,12 +29,12 @@ class HealthyLevel:
     @property
     def freedom(self) -> float:
         """Degrees of freedom of the logarithms' scatter."""
-        return self.count - 1 + HEALTHY.run_scale_runs
+        return self.count - 1 + HEALTHY.prior_runs
 
     @property
     def scatter(self) -> float:
         """1 sigma of the logarithm from run to run, with what is usual as so many runs more."""
-        squares = (self.count - 1) * self.seen**2 + HEALTHY.run_scale_runs * HEALTHY.run_scale**2
+        squares = (self.count - 1) * self.seen**2 + HEALTHY.prior_runs * HEALTHY.run_scale**2
         return float(np.sqrt(squares / self.freedom))
 
     @property

@@ -119,7 +119,7 @@ class AgainstHealthy:
     unknown_scale: float = number(1.5, "e-folds", "size of something unknown in a mean square, 1 sigma", CONVENTION)
     site_scale: float = number(0.25, "e-folds", "mean square from site to site, 1 sigma", CONVENTION)
     run_scale: float = number(0.5, "e-folds", "mean square from run to run before any is seen, 1 sigma", CONVENTION)
-    run_scale_runs: float = number(1.0, "runs", "weight of `run_scale`", CONVENTION)
+    prior_runs: float = number(1.0, "runs", "weight of what is usual of a scatter from run to run", CONVENTION)
     form_error: float = number(0.2, "1", "share of a change that its label's equations miss, 1 sigma", CONVENTION)
     file_error: float = number(
         0.2, "prior", "error of the vehicle file in an effect's prior standard deviations, 1 sigma", CONVENTION
@@ -131,11 +131,10 @@ class AgainstHealthy:
 class Watch:
     """Of a watch (docs/explanation/watch.md) and of the diagnosis of ocean gliders (docs/explanation/ocean.md)."""
 
-    evidence_needed: float = number(16.0, "nat", "prior log odds of no change to one", FITTED)
     evidence_by_chance: float = number(
-        7.3, "nat", "log evidence needed, less the logarithm of the number of changes looked at", FITTED
+        7.3, "nat", "log evidence needed, less the logarithm of the number of changes compared", FITTED
     )
-    false_alarms: float = number(0.05, "1", "probability of a change in an unchanged vehicle", CONTRACT)
+    false_alarms: float = number(0.05, "1", "probability of a change in an unchanged vehicle", CONVENTION)
     scatter_runs: int = number(3, "runs", "reference runs from which run-to-run scatter is known", CONVENTION)
     scatter_vehicle: float = number(0.05, "prior", "usual scatter of a vehicle's parameter, 1 sigma", CONVENTION)
     scatter_bias: float = number(0.3, "prior", "usual scatter of a sensor's bias, 1 sigma", CONVENTION)
@@ -149,35 +148,26 @@ class Watch:
     form_evidence_share: float = number(
         0.15, "1", "evidence of a further event over that of one in the same runs", FITTED
     )
-    residual_evidence_share: float = number(0.5, "1", "the same over what the first one leaves there", FITTED)
-    same_runs: float = number(0.5, "1", "share of its runs from which an event is in the same runs", CONVENTION)
-    related_cosine: float = number(0.01, "1", "cosine of two labels' columns from which they are related", CONVENTION)
     same_cosine: float = number(0.98, "1", "cosine from which a label is not a second effect", CONVENTION)
     rival_share: float = number(0.1, "1", "share of a label's deficit that an error of form cannot explain", CONVENTION)
-    span_evidence: float = number(0.5, "nat", "log evidence within which the shortest interval is taken", FITTED)
     clean_run: float = number(5.0, "nat", "evidence that a run without excess noise counts against noise", CONVENTION)
-    excess_noise_sigma: float = number(4.0, "sigma", "mean squared innovation from which noise is examined", CONVENTION)
-    clean_sigma: float = number(5.0, "sigma", "the same below which a change leaves nothing", CONVENTION)
-    unattributed_sigma: float = number(6.0, "sigma", "the same from which a run without an event has one", CONVENTION)
+    excess_noise_sigma: float = number(
+        4.0, "sigma", "mean squared innovation of a run from which something is left", CONVENTION
+    )
     burst_ratio: float = number(0.65, "1", "largest burstiness of turbulence", FITTED)
     burst_seconds: float = number(5.0, "s", "stretch of a run of which burstiness is taken", CONVENTION)
-    burst_least: float = number(
-        0.05, "1", "least excess of squared innovations that burstiness is a ratio to", CONVENTION
-    )
-    noise_size_share: float = number(0.25, "1", "error of the size of excess noise, 1 sigma", CONVENTION)
     fragments: int = number(3, "1", "adjacent changes that are one unknown change", FITTED)
     other_regime_ratio: float = number(
         2.0, "1", "`material` of a change in runs flown in another way, over the usual", FITTED
     )
-    most_sure: float = number(0.995, "1", "largest probability of an event", CONVENTION)
-    least_unknown: float = number(0.005, "1", "least probability that a change is unknown", CONVENTION)
-    majority: float = number(0.5, "1", "probability from which an answer is given", CONTRACT)
-    ocean_least_unknown: float = number(0.002, "1", "P(unknown) of an ocean glider where nothing is left", CONVENTION)
+    majority: float = number(0.5, "1", "probability, or share of the runs, from which a statement holds", CONVENTION)
     water_share: float = number(0.9, "1", "least share of the explainable misfit that is the water", CONVENTION)
     lasting_speed: float = number(0.02, "m/s", "speed of a force that lasts, 1 sigma", DOMAIN)
-    lasting_odds: float = number(-3.0, "nat", "prior log odds of such a force beside a change", CONVENTION)
-    water_odds: float = number(
-        3.0, "nat", "prior log odds of such a force beside excess noise of the water", CONVENTION
+    lasting_odds: float = number(
+        3.0,
+        "nat",
+        "prior log odds of such a force beside excess noise of the water, and against it beside a change",
+        CONVENTION,
     )
     lasting_motion: float = number(
         0.01, "1", "least motion of depth or speed, over `lasting_speed`, of a label beside it", CONVENTION
@@ -198,8 +188,8 @@ class Gap:
     allowed_sigma: float = number(
         3.0, "sigma", "largest change of a parameter that the vehicle file allows", CONVENTION
     )
-    heading_confidence: float = number(0.99, "1", "probability of the sign of an error with the heading", CONTRACT)
-    heading_speed: float = number(0.01, "m/s", "least size of that error", CONTRACT)
+    heading_confidence: float = number(0.99, "1", "probability of the sign of an error with the heading", CONVENTION)
+    heading_speed: float = number(0.01, "m/s", "least size of that error", DOMAIN)
 
 
 DIAGNOSIS, HEALTHY, WATCH, GAP = Diagnosis(), AgainstHealthy(), Watch(), Gap()

@@ -14,7 +14,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-PRIOR_RUNS, LEAST_VARIANCE = 1.0, 1e-12  # runs; squared spreads
+from glider.tools.inference.hyperparameters import HEALTHY
+
+PRIOR_RUNS, LEAST_VARIANCE = HEALTHY.prior_runs, 1e-12  # runs; squared spreads
 STARTS = (0.0, 0.03, 0.3)  # spreads, at least: of scatter, from which the most probable is looked for
 ITERATIONS, CONVERGED_LOG_VARIANCE = 200, 1e-3  # at most; e-folds of a variance by which a step moves none any more
 

@@ -13,6 +13,8 @@ from glider.tools.watch.excess_noise import WATER, with_inflated_noise
 from glider.tools.watch.flights import RunEnsemble, numbers
 from glider.tools.watch.lasting import Lasting, lasting
 
+LEAST_COSINE = 0.01  # cosine of two labels' columns, below which one is not fitted as a rival of the other
+
 
 @dataclass
 class ChangeEvent:
@@ -80,6 +82,16 @@ def already(history: History, change: Change) -> bool:
     )
 
 
+def compared(history: History) -> int:
+    """How many changes are compared: labels over spans."""
+    return max(len(history.listed()) * len(history.flights.shared.labels), 1)
+
+
+def evidence_by_chance(history: History) -> float:
+    """Nat that a change needs at least: of more changes compared, chance makes one more evident."""
+    return WATCH.evidence_by_chance + float(np.log(compared(history)))
+
+
 def earns_place(history: History, event: ChangeEvent | Change) -> bool:
     """Whether an event beside others in the same runs is more than the wrong form of one of them.
 
@@ -93,11 +105,8 @@ def earns_place(history: History, event: ChangeEvent | Change) -> bool:
     )  # as others were weighed, before their runs were hot
     for other in (one for one in history.events if one.matters):
         shared = own & (other.span.weights(flights.count) > 0.0)
-        mostly_there = shared.sum() >= WATCH.same_runs * own.sum()
-        if not mostly_there or evidence >= WATCH.form_evidence_share * other.explained:
-            continue
-        left = 0.5 * sum(max(flights.excess(n), 0.0) for n in numbers(shared & history.judged))
-        if evidence < WATCH.residual_evidence_share * left or confounded(history, event.label, other.label, shared):
+        mostly_there = shared.sum() >= WATCH.majority * own.sum()
+        if mostly_there and evidence < WATCH.form_evidence_share * other.explained:
             return False
     return True
 
@@ -114,7 +123,7 @@ def confounded(history: History, one: str, other: str, runs: np.ndarray) -> bool
     for n in numbers(runs):
         A = flights.raw[n].curvature
         sizes = np.sqrt(np.outer(np.diag(A)[a], np.diag(A)[b]))
-        if (np.abs(A[np.ix_(a, b)]) > WATCH.related_cosine * sizes).any():
+        if (np.abs(A[np.ix_(a, b)]) > LEAST_COSINE * sizes).any():
             return True
     return False
 

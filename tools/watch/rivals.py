@@ -133,8 +133,7 @@ def over_spans(
 ) -> ChangeEvent | None:
     """A label's evidence over every span near the one it was fitted in, by parabolas about what it fitted.
 
-    Of spans that are as evident the shortest: in the runs that only others have, the change does not show. Where the
-    best reaches as far as was looked, it is looked for again about that one.
+    Where the most evident reaches as far as was looked, it is looked for again about that one.
     """
     flights, shared = history.flights, history.flights.shared
     weights = span.weights(flights.count)
@@ -163,10 +162,7 @@ def over_spans(
         found[one] = tried.log_evidence - joint.log_evidence + prior, np.clip(size, low, high), covariance
     if not found:
         return None
-    most = max(value for value, _, _ in found.values())
-    best = min(
-        (one for one in found if found[one][0] > most - WATCH.span_evidence), key=lambda one: one.end - one.first
-    )
+    best = max(found, key=lambda one: found[one][0])
     evidence, size, covariance = found[best]
     if (best.first == first < span.first or best.end == end > span.end) and best.course == span.course:
         further = over_spans(history, joint, best, replace(fit, size=size), courses)

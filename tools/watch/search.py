@@ -2,14 +2,23 @@
 
 from collections.abc import Callable
 
-import numpy as np
 from scipy.stats import t as student
 
 from glider.tools.inference.hyperparameters import WATCH
 from glider.tools.inference.parameters import CLOCK_PLACE
 from glider.tools.inference.pooled import PRIOR_RUNS
 from glider.tools.watch.events import Change
-from glider.tools.watch.history import ChangeEvent, History, already, earns_place, lasts, noise_location, take
+from glider.tools.watch.history import (
+    ChangeEvent,
+    History,
+    already,
+    compared,
+    earns_place,
+    evidence_by_chance,
+    lasts,
+    noise_location,
+    take,
+)
 from glider.tools.watch.rivals import refit_event
 from glider.tools.watch.water import named, noise_beats_label, water_event
 
@@ -45,18 +54,16 @@ def evidence_needed(history: History, event: ChangeEvent) -> float:
     """Nat that an event needs: more where there are more runs, and so more changes that chance may bring.
 
     And more where how much runs differ was learned from a few: a change against that is Student's t, squared, by those
-    runs, what is usual, and the event's own runs against each other. (With fewer than FEW nothing was learned, and no
-    event is sure.)
+    runs, what is usual, and the event's own runs against each other. (With fewer than `scatter_runs` nothing was
+    learned, and no event is sure.)
     """
-    flights = history.flights
-    looked_at = max(len(history.listed()) * len(flights.shared.labels), 1)
-    needed = max(WATCH.evidence_needed, WATCH.evidence_by_chance + float(np.log(looked_at)))
+    flights, needed = history.flights, evidence_by_chance(history)
     learned = int(flights.reference.sum())
     if not event.has_course or learned < WATCH.scatter_runs:
         return needed
     inside = (event.span.weights(flights.count) > 0.0) & history.judged
     freedom = learned - 1 + PRIOR_RUNS + int(inside.sum()) - 1
-    return max(needed, 0.5 * float(student.isf(0.5 * WATCH.false_alarms / looked_at, freedom)) ** 2)
+    return max(needed, 0.5 * float(student.isf(0.5 * WATCH.false_alarms / compared(history), freedom)) ** 2)
 
 
 def next_event(history: History) -> ChangeEvent | None:
@@ -67,12 +74,13 @@ def next_event(history: History) -> ChangeEvent | None:
     def possible(one: Change) -> bool:
         return not already(history, one) and earns_place(history, one)
 
-    evident = sorted((one for one in every if one.evidence >= WATCH.evidence_needed), key=lambda one: -one.evidence)
+    least = evidence_by_chance(history)
+    evident = sorted((one for one in every if one.evidence >= least), key=lambda one: -one.evidence)
     best = next((one for one in evident if possible(one)), None)
     changes = [] if best is None else [one for one in every if one.span == best.span and possible(one)]
     event = None if best is None else refit_event(history, joint, best, changes)
     noisy = water_event(history)
-    if noisy is None or noisy.evidence < WATCH.evidence_needed:
+    if noisy is None or noisy.evidence < least:
         return event
     if event is not None and not noise_beats_label(history, noisy, event):
         return event

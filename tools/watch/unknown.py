@@ -29,7 +29,7 @@ class Residual:
         """That this is no effect of the catalogue."""
         middle = DIAGNOSIS.sensor_misfit_share if self.own else DIAGNOSIS.misfit_share
         z = (np.log(max(self.share, 1e-6)) - np.log(middle)) / DIAGNOSIS.misfit_share_width
-        return float(np.clip(ndtr(z), WATCH.least_unknown, 1.0 - WATCH.least_unknown))
+        return float(np.clip(ndtr(z), DIAGNOSIS.least_unknown, 1.0 - DIAGNOSIS.least_unknown))
 
 
 NO_RESIDUAL = Residual(0.0, [])
@@ -41,7 +41,7 @@ def what_is_left(history: History, event: ChangeEvent) -> Residual:
     explained = event.explained / max(1, int((event.span.weights(history.flights.count) > 0.0).sum()))
     flights = history.flights
     noisy = sorted(runs, key=lambda n: -excess_nis_sigma(flights, n))[:PROBED]
-    if not noisy or excess_nis_sigma(flights, noisy[0]) < WATCH.clean_sigma:
+    if not noisy or excess_nis_sigma(flights, noisy[0]) < WATCH.excess_noise_sigma:
         return NO_RESIDUAL
     wanted = [probe for probe in probes(flights.parts[noisy[0]]) if probe.name not in WATER]
     together = beyond_reference(flights, wanted, noisy, REFERENCE).sum(axis=1)

@@ -14,7 +14,7 @@ from glider.tools.watch.answer import CAUSE, NONE, UNKNOWN, EventAnswer, RunCaus
 from glider.tools.watch.events import GROWING, STEP, Span
 from glider.tools.watch.excess_noise import WATER
 from glider.tools.watch.flights import excess_nis_sigma
-from glider.tools.watch.history import ChangeEvent, History, within
+from glider.tools.watch.history import ChangeEvent, History, evidence_by_chance, within
 from glider.tools.watch.unknown import NO_RESIDUAL, Residual, what_is_left
 from glider.tools.watch.water import asked_above
 
@@ -43,7 +43,7 @@ class ResolvedEvent:
 def resolve_events(history: History) -> list[ResolvedEvent]:
     """The events that matter; those that no label explains, as unknown."""
     found: list[ResolvedEvent] = []
-    number, kind = 0, history.flights.parts[0].kind
+    number, kind, needed = 0, history.flights.parts[0].kind, evidence_by_chance(history)
     for event in history.events:
         own, number = (number, number + 1) if event.has_course else (-1, number)
         if any(one.unknown and beside(one.event.span, event.span) for one in found):
@@ -51,12 +51,13 @@ def resolve_events(history: History) -> list[ResolvedEvent]:
         if event.has_course and not material(history, event, own):
             continue
         left = what_is_left(history, event) if event.has_course else NO_RESIDUAL
-        sure = 1.0 / (1.0 + np.exp(-np.clip(event.evidence - WATCH.evidence_needed, -50.0, 50.0)))
+        sure = 1.0 / (1.0 + np.exp(-np.clip(event.evidence - needed, -50.0, 50.0)))
         outside = 1.0 - DIAGNOSIS.error_rate if event.label == "" else left.probability
         strange = event.strange
         if strange is not None and event.label and strange.moves(kind.measures) >= needed_of(history, event):
             chance = min(
-                strange.chance(WATCH.lasting_odds if event.has_course else WATCH.water_odds), 1.0 - DIAGNOSIS.error_rate
+                strange.chance(-WATCH.lasting_odds if event.has_course else WATCH.lasting_odds),
+                1.0 - DIAGNOSIS.error_rate,
             )
             if chance > outside:
                 left, outside = Residual(0.0, [(strange.place, chance, 1.0)]), chance
@@ -117,7 +118,7 @@ def touch(one: Span, other: Span) -> bool:
 def most_sure(history: History) -> float:
     """How probable an event can be at most: of what one or two runs share nobody knows that the next ones share it."""
     learned = int(history.flights.reference.sum())
-    return WATCH.most_sure if learned >= WATCH.scatter_runs else learned / (learned + 1.0)
+    return 1.0 - DIAGNOSIS.least_unknown if learned >= WATCH.scatter_runs else learned / (learned + 1.0)
 
 
 def beside(one: Span, other: Span) -> bool:
@@ -128,7 +129,7 @@ def beside(one: Span, other: Span) -> bool:
 def unattributed_changes(history: History, found: list[ResolvedEvent]) -> list[ResolvedEvent]:
     """Runs in no event that are noisier than the reference by far: a change that no label takes."""
     flights = history.flights
-    least = max(WATCH.unattributed_sigma, asked_above(int(flights.reference.sum())))
+    least = asked_above(int(flights.reference.sum()))
     covered = np.zeros(flights.count, dtype=bool)
     for one in found:
         covered |= one.event.span.weights(flights.count) > 0.0

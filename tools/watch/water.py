@@ -24,6 +24,7 @@ from glider.tools.watch.flights import RunEnsemble, excess_nis_sigma, numbers
 from glider.tools.watch.history import ChangeEvent, History, within
 from glider.tools.watch.label_fit import values_of
 
+SIZE_ERROR = 0.25  # of the size of excess noise, 1 sigma
 PROBED = 2  # runs in which it is asked what shakes
 
 
@@ -42,7 +43,7 @@ def water_event(history: History) -> ChangeEvent | None:
             k = int(together.argmax())
             if best is None or together[k] > best.evidence:
                 size, gain = np.array([SCALES[k]]), float(together[k])
-                covariance = np.diag((WATCH.noise_size_share * size) ** 2)
+                covariance = np.diag((SIZE_ERROR * size) ** 2)
                 best = ChangeEvent(label, span, gain, {label: gain}, size, covariance, gain)
     return best
 
@@ -127,7 +128,7 @@ def burstiness(flights: RunEnsemble, n: int) -> float:
     E = part.filter(*flights.shared.model(part, flights.own_values(n)), begin=True).E
     rows = max(2, int(WATCH.burst_seconds / np.median(np.diff(part.recording.t))))
     each = [np.nanmean(E[k : k + rows] ** 2) for k in range(0, len(E) - rows + 1, rows)]
-    return float(np.std(each) / max(np.mean(each) - 1.0, WATCH.burst_least))
+    return float(np.std(each) / max(np.mean(each) - 1.0, 0.05))
 
 
 def noise_beats_label(history: History, noisy: ChangeEvent, event: ChangeEvent) -> bool:

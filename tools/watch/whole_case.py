@@ -161,7 +161,7 @@ def with_excess_water_noise(
         return None
     beside = beside_all([disturbed(part, found) for part in parts], model.shared, model.x, inflation)
     moved = beside.moves(problem.kind.measures)
-    if beside.chance(WATCH.water_odds) > WATCH.majority and moved >= problem.kind.material:
+    if beside.chance(WATCH.lasting_odds) > WATCH.majority and moved >= problem.kind.material:
         return None  # water has no lasting direction
     rng = np.random.default_rng(SEED)
     models = [model.shared.model(part, x) for part, x in zip(parts, without_each(model, inflation), strict=True)]

@@ -16,7 +16,7 @@ from glider.tools.diagnose.unknown import probability
 from glider.tools.gap.measure import RunGap, mean_square, scored_rows
 from glider.tools.identify.ocean.levels import BOUNDS
 from glider.tools.inference.channels import errors
-from glider.tools.inference.hyperparameters import DIAGNOSIS, WATCH
+from glider.tools.inference.hyperparameters import DIAGNOSIS
 from glider.tools.inference.predict import fly_windows_from
 from glider.tools.inference.problem import Problem, cut
 from glider.tools.watch.whole_search import Model, Whole
@@ -33,7 +33,7 @@ class UnexplainedResidual:
     channel: str = ""
     excess: float = 0.0  # root of the difference of squares of gap and floor
     share: float = 1.0  # of the squared gap that there would be without the effects
-    probability: float = WATCH.ocean_least_unknown  # that it is an effect that no label names
+    probability: float = DIAGNOSIS.least_unknown  # that it is an effect that no label names
     regime: str = ""  # where most of it is
     runs: list[str] = field(default_factory=list)  # those that have most of it, where it is not in all alike
     probed: list[ProbeResult] = field(default_factory=list)

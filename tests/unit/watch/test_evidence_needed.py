@@ -30,7 +30,7 @@ def needed(learned: int, inside: int, label: str = "drag", watched: int = 9) -> 
 def test_a_change_of_one_run_needs_more_where_few_runs_were_learned_from():
     several = [needed(learned, 1) for learned in (3, 5, 12, 40)]
     assert several == sorted(several, reverse=True)
-    assert needed(5, 1) > needed(5, 3) > needed(5, 6) > WATCH.evidence_needed
+    assert needed(5, 1) > needed(5, 3) > needed(5, 6) > needed(5, 6, "turbulence")
 
 
 def test_where_nothing_was_learned_no_event_is_sure_and_none_is_kept_back():
@@ -40,12 +40,11 @@ def test_where_nothing_was_learned_no_event_is_sure_and_none_is_kept_back():
 def test_with_many_runs_it_is_that_of_a_normal_deviation():
     looked_at = len(LABELS) * (9 * 10 // 2 + 7)  # steps, and growths of three runs or more up to the last one
     normal = 0.5 * norm.isf(0.5 * WATCH.false_alarms / looked_at) ** 2
-    assert needed(100_000, 1) == max(WATCH.evidence_needed, 7.3 + math.log(looked_at))
-    assert normal < WATCH.evidence_needed  # what was needed before holds
+    assert needed(100_000, 1) == WATCH.evidence_by_chance + math.log(looked_at) > normal
 
 
 def test_disorder_is_no_deviation_of_a_run():
-    assert needed(5, 1, "turbulence") == WATCH.evidence_needed
+    assert needed(5, 1, "turbulence") == needed(2, 1)
 
 
 def test_roughness_beside_a_few_runs_is_asked_about_from_further_up():

@@ -100,7 +100,7 @@ def test_what_is_the_same_in_every_dive_lasts_and_what_changes_its_way_does_not(
     assert sunk(flights, [(0.0, 0.0)] * AFTER).evidence < 0.0
     confounded = sunk(flights, [(0.02, -0.02)] * AFTER)
     assert confounded.evidence > 10.0
-    assert confounded.chance(WATCH.lasting_odds) > 0.99
+    assert confounded.chance(-WATCH.lasting_odds) > 0.99
     assert np.median(confounded.size[:BANDS]) == pytest.approx(0.02, rel=0.4)
     assert np.median(confounded.size[BANDS:]) == pytest.approx(-0.02, rel=0.4)
     assert confounded.place.element == "surge"
