@@ -8,9 +8,10 @@ import pytest
 from glider.sim_backend.core.effects import effect_layout as ef
 from glider.tools.diagnose.cautions import cautions
 from glider.tools.diagnose.descent import converge
-from glider.tools.diagnose.search import MOST_LEVEL, Search, gains_of, level_disturbance, noise_matches_file
+from glider.tools.diagnose.search import Search, gains_of, level_disturbance, noise_matches_file
 from glider.tools.inference import levels
 from glider.tools.inference.fit import Fitter
+from glider.tools.inference.hyperparameters import DIAGNOSIS
 from glider.tools.inference.parameters import effect_parameters, model_at, nuisance_parameters
 from glider.tools.inference.problem import Problem, problem_of
 from tests.support.cases import make_case
@@ -93,7 +94,7 @@ def test_what_is_far_rougher_is_no_level_of_the_disturbance(tmp_path):
     search = searched(problem_of(make_case(tmp_path, np.zeros(ef.N_F), seed=4, mocap=True, rough=12.0)))
     level_disturbance(search)
     said = problem_of(search.problem.case).spectral[:6]
-    assert (search.problem.spectral[:6] <= MOST_LEVEL**2 * said * 1.001).all()
+    assert (search.problem.spectral[:6] <= DIAGNOSIS.noise_factor**2 * said * 1.001).all()
 
 
 def test_factors_are_counted_from_what_the_case_says(calm):
