@@ -3,8 +3,10 @@
 A number decides if another value of it moves a probability, a verdict, `selected` or an event while all fits stay as
 they are: a prior, a threshold, the width of a threshold. Budgets of a search, steps of a derivative, which rows of a
 recording can be judged, and what a page shows are not here. A test counts these fields and rejects such a number
-elsewhere; docs/generate.py writes the table of the reference from them. Prior odds of single labels of ocean gliders
-are in their catalogue.
+elsewhere in diagnose, watch, the gap's shares and heading, and healthy_level; docs/generate.py writes the table of the
+reference from them. Not here are the numbers of the comparison of readings (tools/readings), of a user's vehicles
+(tools/own) and of identification, the priors of parameters that a fit has, and prior odds of single labels of ocean
+gliders (in their catalogue).
 """
 
 from collections.abc import Iterator
