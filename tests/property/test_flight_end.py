@@ -16,7 +16,7 @@ from glider.tools.verify.faults.flights import flown
 from glider.tools.verify.faults.scene import ADRIFT_S, LONGEST_S, SURFACED_M, fly, set_scene
 from tests.support.examples import examples
 
-pytestmark = pytest.mark.computes(seconds=65)
+pytestmark = pytest.mark.computes(seconds=55)
 
 MISSIONS = {"sawtooth": 9600, "spiral": 4200, "circle_to_s": 12_000}  # ticks, generously
 START_M = 0.1  # floats, and is heavier from the first leg on

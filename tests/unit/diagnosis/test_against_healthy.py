@@ -31,7 +31,7 @@ from glider.tools.verify.challenge.form_fit import fit_flights, fit_forces
 from glider.tools.verify.challenge.form_plan import BY_LABEL
 from glider.tools.verify.challenge.trial import with_effect
 
-pytestmark = pytest.mark.computes(seconds=150)
+pytestmark = pytest.mark.computes(seconds=125)
 
 HEALTHY, LATER = 5, 3
 LABEL, OUTSIDE = "servo_offset", "x_pump_jet"

@@ -11,7 +11,7 @@ from glider.tools.diagnose.verdict import conclude
 from glider.tools.inference.problem import problem_of
 from tests.support.cases import make_case
 
-pytestmark = pytest.mark.computes(seconds=20)
+pytestmark = pytest.mark.computes(seconds=55)
 
 
 def test_rough_water_is_turbulence_however_rough(tmp_path):
