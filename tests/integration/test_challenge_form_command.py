@@ -13,7 +13,7 @@ from glider.tools.verify.challenge.form_plan import FormCounts
 from glider.tools.verify.challenge.make import make
 from glider.tools.verify.challenge.seal import open_answers
 
-pytestmark = pytest.mark.computes(seconds=240)
+pytestmark = pytest.mark.computes(seconds=70)
 
 SEED, COUNTS = 3, FormCounts(changed=1, unchanged=1, outside=0, reference=2)
 FOLDERS = {"cases": 6, "held": 3, "reference": 2, "healthy": 3}

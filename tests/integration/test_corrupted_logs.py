@@ -18,7 +18,7 @@ from glider.tools.data.runs.case import load_case
 from glider.tools.readings.check import check
 from tests.support.cases import make_case
 
-pytestmark = pytest.mark.computes(seconds=30)
+pytestmark = pytest.mark.computes(seconds=5)
 
 # name in the log, column of run data, unit, and how many of it are an SI unit
 LOGGED = [

@@ -17,7 +17,7 @@ import pytest
 
 from tests.support.sshd import NAME, sshd
 
-pytestmark = pytest.mark.computes(seconds=40)
+pytestmark = pytest.mark.computes(seconds=20)
 
 ROOT = Path(__file__).resolve().parents[2]
 PYPROJECT = """[build-system]

@@ -10,6 +10,8 @@ from docs.picture import described, written
 from glider.tools.cli.main import cli
 from tests.support.console import MOST_WORDS, PAGES, ROOT, blocks, differs, glider_commands, run_page, words_of
 
+pytestmark = pytest.mark.computes(seconds=110)
+
 RUN = [page for page in PAGES if any(not block.not_run for block in blocks(page.read_text(encoding="utf-8")))]
 
 
@@ -17,7 +19,6 @@ def name(page: Path) -> str:
     return str(page.relative_to(ROOT))
 
 
-@pytest.mark.computes(40)
 @pytest.mark.parametrize("page", RUN, ids=name)
 def test_the_console_blocks_of_a_page_show_what_the_commands_print(page, tmp_path):
     assert run_page(page, tmp_path) == []

@@ -4,7 +4,7 @@ import pytest
 
 from tests.support.first_hour import MEASURED, ends_right, told
 
-pytestmark = pytest.mark.computes(seconds=90)
+pytestmark = pytest.mark.computes(seconds=70)
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,7 @@ from glider.tools.data.sources import load_vehicle
 from glider.tools.identify.design import CAPTURE, make_runs
 from glider.tools.inference.vehicle_parameters import coefficient_sizes
 
-pytestmark = pytest.mark.computes(seconds=20)
+pytestmark = pytest.mark.computes(seconds=35)
 
 ABOUT = dict(vehicle="roughie", site="pool", log_rate_hz=50.0, water_density_kg_m3=998.0, sensors=CAPTURE)
 

@@ -70,7 +70,7 @@ def test_what_was_done_to_the_data_is_found_with_its_size(flights):
     verdict, first = first_cause(folder, "mass")
     assert (verdict, first["label"]) == ("cause", "mass_x_offset")
     assert first["parameters"]["mass_x_offset"]["estimate"] == pytest.approx(0.01, abs=0.003)
-    copied(folder / "gyro", kept[2::3], "r_rad_s", lambda value: 1.3 * value)
+    copied(folder / "gyro", kept[2::6], "r_rad_s", lambda value: 1.3 * value)
     verdict, first = first_cause(folder, "gyro")
     assert (verdict, first["label"]) == ("cause", "r_gain")
     assert first["parameters"]["r_gain"]["estimate"] == pytest.approx(0.3, abs=0.03)

@@ -7,7 +7,7 @@ from glider.tools.own.decision import NONE
 from glider.tools.own.load import read_own
 from tests.support.own_cases import FOSSEN, answers, diagnosed, fly, size_of
 
-pytestmark = pytest.mark.computes(seconds=60)
+pytestmark = pytest.mark.computes(seconds=50)
 
 
 @pytest.fixture(scope="module")
@@ -30,10 +30,11 @@ def test_none_where_there_is_none(vehicle):
 
 
 @pytest.mark.parametrize(
-    ("label", "size"), [("port_gain", -0.12), ("current_north", 0.2), ("pressure_x", -1.0), ("thruster_y", 0.1)]
+    ("label", "size", "runs"),
+    [("port_gain", -0.12, 2), ("current_north", 0.2, 2), ("pressure_x", -1.0, 4), ("thruster_y", 0.1, 2)],
 )
-def test_a_change_is_found_with_its_size(vehicle, label, size):
-    answer = diagnosed(vehicle, fly(vehicle, 12, {label: size}, runs=4))
+def test_a_change_is_found_with_its_size(vehicle, label, size, runs):
+    answer = diagnosed(vehicle, fly(vehicle, 12, {label: size}, runs=runs))
     found, chance = first(answer)
     assert found == label
     assert chance > 0.5

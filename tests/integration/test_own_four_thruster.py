@@ -12,7 +12,7 @@ from glider.tools.own.load import read_own
 from glider.tools.own.observer import Observer
 from glider.tools.own.runs import load_own_runs
 
-pytestmark = pytest.mark.computes(seconds=60)
+pytestmark = pytest.mark.computes(seconds=15)
 
 ROOT = Path(__file__).resolve().parents[2]
 HAIZHE = ROOT / "docs" / "examples" / "four_thruster_auv" / "haizhe.toml"

@@ -39,7 +39,7 @@ from tests.support.law_flights import (
 )
 from tests.support.model_states import HIGH, LOW, RATE, VEHICLE_TEXT, P, state
 
-pytestmark = pytest.mark.computes(seconds=30)
+pytestmark = pytest.mark.computes(seconds=10)
 
 SIGMA = parameter_sigma(P, decode_vehicle(VEHICLE_TEXT, "roughie").uncertainty)
 STEP = 0.004  # s, of the flights with ideal actuators

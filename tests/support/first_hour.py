@@ -18,7 +18,7 @@ from glider.tools.data.runs.case import load_case
 from glider.tools.data.runs.run import Run
 from glider.tools.data.sources import load_vehicle
 
-MISSIONS = ("spiral", "spiral", "spiral", "circle_to_s")
+MISSIONS = ("spiral", "spiral", "circle_to_s")
 SCALE = 0.6  # of the drag that comes on after the healthy flights
 DEG = 180.0 / math.pi
 # the logger's name, the column of run data, its unit, how many of them are one SI
@@ -54,8 +54,8 @@ def glider(*words: object, typed: str = "") -> int:
 
 
 def own_log(run: Run, path: Path, rng: np.random.Generator) -> None:
-    """A run as a small logger writes it: 20 Hz with jitter, milliseconds, degrees, cm, mm, g; empty where not read."""
-    at = np.arange(0.0, run.t[-1], 0.05)
+    """A run as a small logger writes it: 10 Hz with jitter, milliseconds, degrees, cm, mm, g; empty where not read."""
+    at = np.arange(0.0, run.t[-1], 0.1)
     at = at + rng.uniform(-0.004, 0.004, len(at))
     rows = np.unique(np.clip(np.searchsorted(run.t, at), 0, run.rows - 1))
     lines = [",".join(["millis", *(name for name, *_ in LOGGED)])]

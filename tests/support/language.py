@@ -45,6 +45,13 @@ def words_of(name: str) -> set[str]:
     return {word.lower() for word in WORD.findall(name)}
 
 
+@cache
+def rejected_in_name(name: str) -> tuple[str, ...]:
+    """List the rejected words of an identifier, once for each term that has them."""
+    words = words_of(name)
+    return tuple(f"{word} (name)" for term in terms() if name not in term.contract for word in words & term.identifier)
+
+
 def rejected_in_code(text: str) -> Counter[str]:
     """Count rejected terms in Python source by the word or phrase found.
 
@@ -53,10 +60,7 @@ def rejected_in_code(text: str) -> Counter[str]:
     found: Counter[str] = Counter()
     for token in tokenize.generate_tokens(io.StringIO(text).readline):
         if token.type == tokenize.NAME:
-            words = words_of(token.string)
-            for term in terms():
-                if token.string not in term.contract:
-                    found.update(f"{word} (name)" for word in words & term.identifier)
+            found.update(rejected_in_name(token.string))
         elif token.type in (tokenize.STRING, tokenize.COMMENT, getattr(tokenize, "FSTRING_MIDDLE", -1)):
             found.update(rejected_in_prose(_plain(token.string)))
     return found
@@ -86,6 +90,7 @@ def rejected_in_prose(text: str) -> Counter[str]:
     return found
 
 
+@cache
 def count_tree() -> dict[str, dict[str, int]]:
     """Count rejected terms by file, relative to the tree, and by word: code, and pages of the documentation."""
     found = {}

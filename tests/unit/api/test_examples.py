@@ -7,7 +7,7 @@ import pytest
 
 from glider.tools.api import calls, recordings
 
-pytestmark = pytest.mark.computes(seconds=200)
+pytestmark = pytest.mark.computes(seconds=65)
 NOTEBOOKS = Path(__file__).resolve().parents[3] / "docs" / "notebooks"
 
 

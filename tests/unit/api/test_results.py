@@ -11,7 +11,7 @@ import glider
 from glider.tools.cli.effects import effects as effects_command
 from glider.tools.cli.gap import gap as gap_command
 
-pytestmark = pytest.mark.computes(seconds=60)
+pytestmark = pytest.mark.computes(seconds=20)
 
 
 @pytest.fixture(scope="module")

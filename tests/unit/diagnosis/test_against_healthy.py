@@ -1,5 +1,6 @@
 """Diagnosis against healthy runs, on a vehicle that does not obey equation (4)."""
 
+import copy
 import json
 from dataclasses import replace
 
@@ -17,6 +18,7 @@ from glider.tools.data.errors import InputError
 from glider.tools.data.runs.case import load_case
 from glider.tools.data.sources import load_vehicle
 from glider.tools.data.tomltext import toml_text
+from glider.tools.diagnose import against_healthy
 from glider.tools.diagnose.against_answer import plain, write
 from glider.tools.diagnose.against_healthy import diagnose_against_healthy
 from glider.tools.diagnose.gates import form_stands_out
@@ -30,7 +32,7 @@ from glider.tools.verify.challenge.form_fit import fit_flights, fit_forces
 from glider.tools.verify.challenge.form_plan import BY_LABEL
 from glider.tools.verify.challenge.trial import with_effect
 
-pytestmark = pytest.mark.computes(seconds=150)
+pytestmark = pytest.mark.computes(seconds=125)
 
 HEALTHY, LATER = 5, 3
 LABEL, OUTSIDE = "servo_offset", "x_pump_jet"
@@ -69,20 +71,59 @@ def vehicle_of(file: Vehicle, P: np.ndarray) -> dict:
     return {key: value for key, value in table.items() if value not in (None, {})}
 
 
+@pytest.fixture(scope="module", autouse=True)
+def learned_once():
+    """Healthy runs are learned from once for every vehicle file, whichever case then asks: each answer gets a copy."""
+    learned: dict = {}
+
+    def learn(case, runs):
+        key = (repr(case.vehicle), case.log_rate_hz, *((run.name, name, values.tobytes())
+               for run in runs for name, values in sorted(run.columns.items())))  # fmt: skip
+        if key not in learned:
+            learned[key] = of_runs(case, runs)
+        return copy.deepcopy(learned[key])
+
+    of_runs = against_healthy.learn
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(against_healthy, "learn", learn)
+        yield
+
+
 def diagnosed(place, name):
     vehicle = str(place / "nearest.toml")
     return diagnose_against_healthy(load_case(place / name, vehicle), load_case(place / "healthy", vehicle))
 
 
 @pytest.fixture(scope="module")
-def askew(place):
-    return diagnosed(place, "askew")
+def unchanged(place):
+    return diagnosed(place, "unchanged")
 
 
-def test_what_the_form_leaves_is_no_cause(place):
-    found = diagnosed(place, "unchanged")
-    assert (found.verdict, found.selected) == ("none", [])
-    assert found.left["none"] < 2.0  # of what healthy runs leave
+@pytest.fixture(scope="module")
+def by_command(place):
+    """The folder that `glider gap diagnose --reference` leaves of the servo askew, and what it diagnosed."""
+    found = []
+
+    def kept(*given):
+        found.append(diagnose_against_healthy(*given))
+        return found[-1]
+
+    words = ["--reference", place / "healthy", "--vehicle", place / "nearest.toml", "--out", place / "answer"]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(against_healthy, "diagnose_against_healthy", kept)
+        assert command(patch, place / "askew", *words) == 0
+    (answer,) = found
+    return place / "answer", answer
+
+
+@pytest.fixture(scope="module")
+def askew(by_command):
+    return by_command[1]
+
+
+def test_what_the_form_leaves_is_no_cause(unchanged):
+    assert (unchanged.verdict, unchanged.selected) == ("none", [])
+    assert unchanged.left["none"] < 2.0  # of what healthy runs leave
 
 
 def test_a_change_beside_the_wrong_form_is_found_and_shrinks_what_was_left_out(askew):
@@ -230,13 +271,13 @@ def command(monkeypatch, *arguments: object) -> int:
     return report_errors(cli)
 
 
-def test_a_vehicle_file_that_says_what_its_form_leaves_needs_no_healthy_runs(place):
+def test_a_vehicle_file_that_says_what_its_form_leaves_needs_no_healthy_runs(place, unchanged):
     vehicle = str(place / "nearest.toml")
     unknown = load_case(place / "askew", vehicle)
     assert not form_stands_out(unknown.roughie.form)
     with pytest.raises(InputError, match="form"):
         diagnose_against_healthy(unknown, None)
-    learned = diagnosed(place, "unchanged").healthy
+    learned = unchanged.healthy
     total = float(np.sqrt(np.mean(np.square(list(learned.scales.values())))))
     form = FormTable(HEALTHY, learned.seen, 0.2, {"all": learned.scales | {"total": total}})
     sentences = {name: load_case(place / name, vehicle) for name in ("askew", "unchanged")}
@@ -251,16 +292,14 @@ def test_a_vehicle_file_that_says_what_its_form_leaves_needs_no_healthy_runs(pla
     assert any("--reference" in line for line in plain(found)["cautions"])
 
 
-def test_the_command_leaves_answer_model_and_report(place, tmp_path, monkeypatch, askew):
-    vehicle = place / "nearest.toml"
-    words = [place / "askew", "--reference", place / "healthy", "--vehicle", vehicle, "--out", tmp_path]
-    assert command(monkeypatch, *words) == 0
-    answer = json.loads((tmp_path / "diagnosis.json").read_text())
-    assert answer["selected"] == plain(askew)["selected"]
+def test_the_command_leaves_answer_model_and_report(by_command):
+    folder, found = by_command
+    answer = json.loads((folder / "diagnosis.json").read_text())
+    assert answer["selected"] == plain(found)["selected"]
     assert answer["gap"]["after"]["total"] < answer["gap"]["before"]["total"]
     assert answer["reference"]["runs"] == [f"run{n:02d}" for n in range(HEALTHY)]
-    assert "healthy runs" in (tmp_path / "report.html").read_text()
-    assert (tmp_path / "corrected.toml").is_file()
+    assert "healthy runs" in (folder / "report.html").read_text()
+    assert (folder / "corrected.toml").is_file()
 
 
 def test_what_does_not_go_together_is_refused(place, tmp_path, monkeypatch, capsys):

@@ -12,6 +12,8 @@ from glider.tools.diagnose.search import run
 from glider.tools.inference.problem import problem_of
 from tests.support.cases import make_case
 
+pytestmark = pytest.mark.computes(seconds=20)
+
 
 def candidate(name, misfit, gained):
     return SimpleNamespace(labels=(name,), misfit=misfit, gained=gained)

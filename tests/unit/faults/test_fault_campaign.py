@@ -11,7 +11,7 @@ from glider.tools.verify.faults.campaign import FaultOutcome, everything, jobs, 
 from glider.tools.verify.faults.cases import FaultCase, Show
 from glider.tools.verify.faults.scene import PHASES
 
-pytestmark = pytest.mark.computes(seconds=25)
+pytestmark = pytest.mark.computes(seconds=10)
 
 # One quick case for each row that is flown; the whole campaign is `glider faults`.
 QUICK = {1: "imu silent", 2: "beacon off", 4: "plunger_wire off", 6: "imu backwards", 10: "imu garbage", 15: "past",

@@ -10,7 +10,7 @@ from glider.tools.identify.pipeline import Identified, identify
 from glider.tools.verify.challenge.form_cases import draw_healthy, write_flights
 from glider.tools.verify.figures.form_identify import gaps_of, with_total
 
-pytestmark = pytest.mark.computes(seconds=40)
+pytestmark = pytest.mark.computes(seconds=30)
 
 FITTED = 4
 

@@ -9,6 +9,8 @@ from glider.tools.own.identified import write
 from glider.tools.own.identify import identify
 from glider.tools.own.runs import OwnRun
 
+pytestmark = pytest.mark.computes(seconds=25)
+
 MODEL = """
 import numpy as np
 inputs = {"thrust": "N", "rudder": "rad"}

@@ -19,7 +19,7 @@ from glider.tools.watch.watch import watch
 from glider.tools.watch.whole_case import diagnose_ocean
 from tests.support.ocean import as_case, drawn
 
-pytestmark = pytest.mark.computes(seconds=40)
+pytestmark = pytest.mark.computes(seconds=10)
 
 CRAFT, BEFORE, AFTER = "seaglider", 6, 4
 ROUGHER = 3.0
