@@ -71,21 +71,15 @@ def pytest_xdist_make_scheduler(config, log):
     return ByFile(config, log)
 
 
-TOGETHER = 10  # flights whose garbage is collected at once
 thaw = gc.unfreeze
 frozen = False
-landed = 0
 
 
 def unfreeze() -> None:
-    """gc.unfreeze of every tenth flight, remembered: to count what is frozen goes through all of it. The flight that
-    arms next in the same test has the tests' own objects collected, too, which takes a tenth of a second.
-    """
-    global frozen, landed
-    landed += 1
-    if landed % TOGETHER == 0:
-        frozen = False
-        thaw()
+    """gc.unfreeze, remembered: to count what is frozen goes through all of it, a thirtieth of a second a test."""
+    global frozen
+    frozen = False
+    thaw()
 
 
 gc.unfreeze = unfreeze

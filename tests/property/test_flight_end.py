@@ -10,10 +10,9 @@ from glider.firmware.core.vehicle.layout import NET_MASS
 from glider.firmware.faults import Reaction
 from glider.tools.data.sources import load_vehicle
 from glider.tools.flight.compose import build_flight
-from glider.tools.verify.faults import scene as scenes
 from glider.tools.verify.faults.cases import FaultCase
 from glider.tools.verify.faults.flights import flown
-from glider.tools.verify.faults.scene import ADRIFT_S, LONGEST_S, SURFACED_M, fly, set_scene
+from glider.tools.verify.faults.scene import SURFACED_M, fly, set_scene
 from tests.support.examples import examples
 
 pytestmark = pytest.mark.computes(seconds=55)
@@ -34,19 +33,13 @@ ABORTS = [
 
 
 def depth_after(mission: str, case: FaultCase, tick: int, sigmas: float) -> float:
-    """Depth of the plant (m) five minutes after the end of a flight that a case befell at a tick.
-
-    Where the flight holds on to the vehicle for longer than that, it is the depth five minutes after the case began.
-    """
+    """Depth of the plant (m) five minutes after the end of a flight that a case befell at a tick."""
     flight = build_flight(mission=mission, effects=case.setting.effects)
-    at_s = tick / flight.board.loop_hz
-    scene = set_scene(flight, "", case.begin, case.setting, at_s=at_s)
+    scene = set_scene(flight, "", case.begin, case.setting, at_s=tick / flight.board.loop_hz)
     scene.world.P[NET_MASS] += sigmas * load_vehicle("roughie").uncertainty.net_mass
     scene.world.x[2] = START_M
     scene.late = case.late
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(scenes, "LONGEST_S", min(LONGEST_S, at_s + ADRIFT_S))
-        fly(scene, case.row, allowed_s=0.0)
+    fly(scene, case.row, allowed_s=0.0)
     scene.finish()
     assert scene.left is not None
     return scene.left
