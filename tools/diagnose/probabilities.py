@@ -58,15 +58,14 @@ def answer_first(chances: dict[str, float], gained: Iterable[str]) -> tuple[str,
 def mix_in_error_rate(chances: dict[str, float], main: str, others: Sequence[str] = ()) -> dict[str, float]:
     """Probabilities of which `error_rate` goes to all labels: the search may have lost the true one on its way.
 
-    One of its `error_parts` goes to `others` than the main one that the search found: of nine effects that were not put
-    first, six were among those.
+    Half of it goes to `others` than the main one that the search found: of nine effects that were not put first, six
+    were among those.
     """
     labels = catalogue()
     others = [name for name in others if name in labels and name != main]
-    parts = DIAGNOSIS.error_parts
-    shares = dict.fromkeys(labels, ((parts - 1.0) / parts if others else 1.0) * DIAGNOSIS.error_rate / len(labels))
+    shares = dict.fromkeys(labels, (0.5 if others else 1.0) * DIAGNOSIS.error_rate / len(labels))
     for name in others:
-        shares[name] += DIAGNOSIS.error_rate / parts / len(others)
+        shares[name] += 0.5 * DIAGNOSIS.error_rate / len(others)
     return {name: (1.0 - DIAGNOSIS.error_rate) * value + shares.get(name, 0.0) for name, value in chances.items()}
 
 

@@ -269,13 +269,11 @@ def unknown_beside(
         return probability(left.share, DIAGNOSIS.misfit_share, DIAGNOSIS.misfit_share_width)
     as_said = well_specified and not noise
     middle = DIAGNOSIS.specified_unknown_size if as_said else DIAGNOSIS.own_size
-    wide = probability(left_floors(shrinkage), middle, DIAGNOSIS.unknown_size_width)
+    wide = probability(left_floors(shrinkage), middle, DIAGNOSIS.unknown_width)
     if not evident:
         return wide
-    if as_said:
-        form = probability(left.share, DIAGNOSIS.specified_misfit_share, DIAGNOSIS.gap_share_width)
-    else:
-        form = probability(left_share(shrinkage, taken), DIAGNOSIS.gap_share, DIAGNOSIS.gap_share_width)
+    share = left.share if as_said else left_share(shrinkage, taken)
+    form = probability(share, DIAGNOSIS.misfit_share, DIAGNOSIS.unknown_width)
     beside = max(form * wide, DIAGNOSIS.least_unknown)
     place, alone = left.alone
     if place[0] == "sensing" and place in places:

@@ -45,9 +45,6 @@ class Diagnosis:
         0.3, "1", "least gap closed on held-out runs by an effect beside another, over the gap that is left", FITTED
     )
     error_rate: float = number(0.03, "1", "probability that the search has missed the cause", FITTED)
-    error_parts: float = number(
-        3.0, "1", "parts of `error_rate`, one of which belongs to the other selected effects", FITTED
-    )
     none_ratio: float = number(
         0.9, "1", "largest ratio of P(none) to P(main cause) once an effect is there", CONVENTION
     )
@@ -61,19 +58,18 @@ class Diagnosis:
     specified_unknown_size: float = number(
         0.8, "floors", "`own_size` of a residual if the noise is as in the file", FITTED
     )
-    unknown_size_width: float = number(0.35, "e-folds", "width of `own_size` for a residual, 1 sigma", FITTED)
-    gap_share: float = number(0.17, "1", "share of the squared gap left at which unknown is as likely as not", FITTED)
-    gap_share_width: float = number(
-        0.5, "e-folds", "width of `gap_share` and of `specified_misfit_share`, 1 sigma", FITTED
+    unknown_width: float = number(
+        0.35, "e-folds", "width of `own_size` and of `misfit_share` for a residual, 1 sigma", FITTED
     )
     misfit_share: float = number(
-        0.145, "1", "share of the explainable misfit left at which unknown is as likely as not", FITTED
+        0.145, "1", "share of the explainable misfit, or squared gap, left at which unknown is as likely as not", FITTED
     )
-    misfit_share_width: float = number(1.1, "e-folds", "width of `misfit_share`, 1 sigma", FITTED)
+    misfit_share_width: float = number(
+        1.1, "e-folds", "width of `misfit_share` beside disorder and at a sensor alone, 1 sigma", FITTED
+    )
     sensor_misfit_share: float = number(
         0.03, "1", "the same if all of it is left at the sensor of a selected effect", FITTED
     )
-    specified_misfit_share: float = number(0.11, "1", "the same if the noise is as in the vehicle file", FITTED)
     alone_ratio: float = number(
         2.0, "1", "gain of one element's noise over any other from which the residual may be there alone", FITTED
     )

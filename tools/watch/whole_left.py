@@ -91,11 +91,11 @@ def what_is_left(
     if not channel or least[channel] <= 0.0:
         return UnexplainedResidual(channel)
     square = beyond[channel][0]
-    chance = probability(float(np.sqrt(least[channel])), problem.kind.material, DIAGNOSIS.unknown_size_width)
+    chance = probability(float(np.sqrt(least[channel])), problem.kind.material, DIAGNOSIS.unknown_width)
     share = 1.0
     if model.labels:
         share = square / (square + taken(parts, model, channel))
-        chance *= probability(share, DIAGNOSIS.gap_share, DIAGNOSIS.gap_share_width)
+        chance *= probability(share, DIAGNOSIS.misfit_share, DIAGNOSIS.unknown_width)
     lowest = float(np.mean([gap.channels[channel] ** 2 for gap in floor if channel in gap.channels]))
     regime, runs = most_of_it(parts, model, channel, lowest)
     P, F = model.shared.model(problem, model.x)

@@ -33,7 +33,7 @@ def by_the_page(c):
     left = c["G_s"] ** 2 - c["G_f"] ** 2
     u_G = left / min(c["G_0"] ** 2 - c["G_f"] ** 2, left + c["D"])
     w = math.sqrt(left) / c["G_f"]
-    F = {"other": phi(u_G, 0.17, 0.5), "file": phi(u_L, 0.11, 0.5)}
+    F = {"other": phi(u_G, 0.145, 0.35), "file": phi(u_L, 0.145, 0.35)}
     W = {"other": phi(w, 1.8, 0.35), "file": phi(w, 0.8, 0.35)}
     place = max(c["gains"], key=c["gains"].get)
     r = L_r / sorted(c["gains"].values())[-2]

@@ -7,7 +7,7 @@ from pathlib import Path
 from glider.tools.inference.hyperparameters import CONTRACT, CONVENTION, DOMAIN, FITTED, listed
 
 ROOT = Path(__file__).resolve().parents[3]
-MOST = 84  # may only shrink; the aim is 40
+MOST = 80  # may only shrink; the aim is 40
 DECIDING = [
     *sorted((ROOT / "tools" / "diagnose").glob("*.py")), *sorted((ROOT / "tools" / "watch").glob("*.py")),
     ROOT / "tools" / "gap" / "where.py", ROOT / "tools" / "gap" / "heading.py",
