@@ -13,7 +13,6 @@ from scipy.stats import t as student
 
 from glider.tools.inference.hyperparameters import HEALTHY
 
-CHANGED, FORM, USUAL_SCATTER = HEALTHY.changed, HEALTHY.form_error, HEALTHY.run_scale  # as a user's vehicle has them
 SHIFTS = np.linspace(0.0, 4.0 * HEALTHY.unknown_scale, 121)
 OF_SHIFTS = 2.0 * norm.pdf(SHIFTS, scale=HEALTHY.unknown_scale) * (SHIFTS[1] - SHIFTS[0])
 

@@ -32,7 +32,7 @@ def number(value: float, unit: str, meaning: str, source: str) -> Any:
 
 
 @dataclass(frozen=True)
-class Diagnosis:
+class DiagnosisNumbers:
     """Of a diagnosis by the vehicle file (docs/explanation/diagnosis.md)."""
 
     evidence_needed: float = number(12.0, "nat", "prior log odds of no effect to one effect", FITTED)
@@ -107,7 +107,7 @@ class Diagnosis:
 
 
 @dataclass(frozen=True)
-class AgainstHealthy:
+class HealthyNumbers:
     """Of a diagnosis against healthy runs (docs/explanation/against-healthy.md)."""
 
     changed: float = number(0.5, "1", "prior probability of a change", CONVENTION)
@@ -126,7 +126,7 @@ class AgainstHealthy:
 
 
 @dataclass(frozen=True)
-class Watch:
+class WatchNumbers:
     """Of a watch (docs/explanation/watch.md) and of the diagnosis of ocean gliders (docs/explanation/ocean.md)."""
 
     evidence_by_chance: float = number(
@@ -178,7 +178,7 @@ class Watch:
 
 
 @dataclass(frozen=True)
-class Gap:
+class GapNumbers:
     """Of the gap's shares by part of the model and of the test of the heading (docs/reference/gap.md)."""
 
     part_evidence: float = number(5.0, "nat", "log evidence that a part of the model needs for a share", CONVENTION)
@@ -190,8 +190,8 @@ class Gap:
     heading_speed: float = number(0.01, "m/s", "least size of that error", DOMAIN)
 
 
-DIAGNOSIS, HEALTHY, WATCH, GAP = Diagnosis(), AgainstHealthy(), Watch(), Gap()
-SECTIONS: dict[str, Diagnosis | AgainstHealthy | Watch | Gap] = {
+DIAGNOSIS, HEALTHY, WATCH, GAP = DiagnosisNumbers(), HealthyNumbers(), WatchNumbers(), GapNumbers()
+SECTIONS: dict[str, DiagnosisNumbers | HealthyNumbers | WatchNumbers | GapNumbers] = {
     "Diagnosis": DIAGNOSIS, "Against healthy runs": HEALTHY, "Watch and ocean gliders": WATCH, "Gap": GAP,
 }  # fmt: skip
 

@@ -5,7 +5,7 @@ With -2 log likelihood of run n expanded to second order, curvature A_n and slop
     x_n = s + d_n,  s ~ N(0, V),  d_n ~ N(0, diag(scatter^2))
 
 d_n is integrated out of every run, s of their sum. A variance in scatter^2 has an inverse gamma prior about what is
-usual, worth PRIOR_RUNS runs. Values are counted in the spreads of what may differ.
+usual, worth `prior_runs` runs. Values are counted in the spreads of what may differ.
 """
 
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ import numpy as np
 
 from glider.tools.inference.hyperparameters import HEALTHY
 
-PRIOR_RUNS, LEAST_VARIANCE = HEALTHY.prior_runs, 1e-12  # runs; squared spreads
+LEAST_VARIANCE = 1e-12  # squared spreads
 STARTS = (0.0, 0.03, 0.3)  # spreads, at least: of scatter, from which the most probable is looked for
 ITERATIONS, CONVERGED_LOG_VARIANCE = 200, 1e-3  # at most; e-folds of a variance by which a step moves none any more
 
@@ -112,7 +112,7 @@ def log_evidence(found: Sequence[Parabola], V: np.ndarray, scatter: np.ndarray) 
 
 def log_prior(variance: np.ndarray | float, usual: np.ndarray | float) -> np.ndarray:
     """Log density of variances about usual ones, both of one shape: inverse gamma, up to a constant."""
-    return -0.5 * PRIOR_RUNS * np.asarray(np.log(variance) + usual / variance)
+    return -0.5 * HEALTHY.prior_runs * np.asarray(np.log(variance) + usual / variance)
 
 
 def learn_scatter(
@@ -137,7 +137,7 @@ def learn_scatter(
 
 def _nearest(parts: Sequence[Sequence[Parabola]], V: np.ndarray, usual: np.ndarray, start: np.ndarray) -> np.ndarray:
     """Sizes (k,) led from `start` to the most probable near by: minorisation and maximisation for variances."""
-    free, weight = usual > 0.0, 0.5 * PRIOR_RUNS
+    free, weight = usual > 0.0, 0.5 * HEALTHY.prior_runs
     middle, v = np.maximum(usual[free] ** 2, LEAST_VARIANCE), np.where(free, np.maximum(start**2, LEAST_VARIANCE), 0.0)
     for _ in range(ITERATIONS):
         squares, traces = np.zeros(len(v)), np.zeros(len(v))

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.special import logsumexp
 
-from glider.tools.inference.healthy_level import FORM as FORM_SHARE
 from glider.tools.inference.healthy_level import HealthyLevel
+from glider.tools.inference.hyperparameters import HEALTHY
 from glider.tools.inference.pooled import marginalised
 from glider.tools.own.effects import NOISE, PARAMETER, PUSH, Effect
 from glider.tools.own.excess_noise import NOISE_SIZES
@@ -23,7 +23,7 @@ SIZES = NOISE_SIZES  # tolerances, rms over the windows
 # commanded and read; a constant force that no label has, seldom
 FAMILY_ODDS = {PARAMETER: 0.5, NOISE: 0.5, PUSH: 0.1}
 STRANGE = 0.1  # that more is left than a hypothesis says
-FORM_SHARES = (0.0, FORM_SHARE)  # as probable before the data
+FORM_SHARES = (0.0, HEALTHY.form_error)  # as probable before the data
 MATERIAL = 0.1  # tolerances: a smaller effect is no gap (docs/reference/gap.md)
 LEAST_REACH = 1e-4  # tolerances a spread
 
@@ -139,7 +139,9 @@ def strange_odds(healthy: Healthy, one: Hypothesis, nothing: Hypothesis) -> floa
     level = HealthyLevel(healthy.runs, 0.0, healthy.level_scatter)
     scale, at = level.scale(len(one.left)), float(np.log(max(one.left.mean(), 1e-9)))
     if one.labels:
-        scale = float(np.hypot(scale, np.log1p(FORM_SHARE**2 * max(nothing.left.mean() - one.left.mean(), 0.0))))
+        scale = float(
+            np.hypot(scale, np.log1p(HEALTHY.form_error**2 * max(nothing.left.mean() - one.left.mean(), 0.0)))
+        )
     usual, more = level.unchanged(at, scale)
     return more - usual
 

@@ -14,8 +14,7 @@ import numpy as np
 from scipy.special import logsumexp
 from scipy.stats import norm
 
-from glider.tools.inference.healthy_level import CHANGED
-from glider.tools.inference.healthy_level import USUAL_SCATTER as USUAL_LEVEL_SCATTER
+from glider.tools.inference.hyperparameters import HEALTHY
 from glider.tools.inference.pooled import Pooled, run_values
 from glider.tools.own.decision import (
     FORM_SHARES,
@@ -187,10 +186,10 @@ class Engine:
     def log_prior(self, labels: Sequence[str]) -> float:
         """Of a hypothesis: that something changed, which label, and that another stands beside it."""
         if not labels:
-            return float(np.log1p(-CHANGED))
+            return float(np.log1p(-HEALTHY.changed))
         named = sum(one.family not in (PUSH, FORM) for one in self.healthy.effects)
         each = [log_odds(self.healthy.effects[k]) - np.log(named) for k in self.healthy.at(labels)]
-        return float(np.log(CHANGED) + sum(each) + (len(labels) - 1) * np.log(ANOTHER))
+        return float(np.log(HEALTHY.changed) + sum(each) + (len(labels) - 1) * np.log(ANOTHER))
 
     def label_gains(self, slope: np.ndarray, precision: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Log evidence (k,) that each label gains by its parabola, beside what is integrated out, and its size there.
@@ -411,7 +410,7 @@ def healthy_of(observer: Observer) -> Healthy:
         errors = ChannelErrors(np.ones(len(declared.outputs)), np.full(len(declared.outputs), UNIDENTIFIED_INFLATION))
         scatter[[names.index(one.name) for one in declared.parameters if one.scope == RUN]] = USUAL_OWN_SCATTER
         session = np.sqrt(USUAL_SESSION_SHARE) * scatter
-        return Healthy(effects, V, scatter, session, np.zeros(k), errors, 1.0, 1, USUAL_LEVEL_SCATTER)
+        return Healthy(effects, V, scatter, session, np.zeros(k), errors, 1.0, 1, HEALTHY.run_scale)
     places = [names.index(name) for name in table.parameters]
     spreads = np.array([effects[k].spread for k in places])
     V[np.ix_(places, places)] = np.array(table.covariance).reshape(len(places), len(places)) / np.outer(

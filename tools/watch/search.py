@@ -4,9 +4,8 @@ from collections.abc import Callable
 
 from scipy.stats import t as student
 
-from glider.tools.inference.hyperparameters import WATCH
+from glider.tools.inference.hyperparameters import HEALTHY, WATCH
 from glider.tools.inference.parameters import CLOCK_PLACE
-from glider.tools.inference.pooled import PRIOR_RUNS
 from glider.tools.watch.events import Change
 from glider.tools.watch.history import (
     ChangeEvent,
@@ -62,7 +61,7 @@ def evidence_needed(history: History, event: ChangeEvent) -> float:
     if not event.has_course or learned < WATCH.scatter_runs:
         return needed
     inside = (event.span.weights(flights.count) > 0.0) & history.judged
-    freedom = learned - 1 + PRIOR_RUNS + int(inside.sum()) - 1
+    freedom = learned - 1 + HEALTHY.prior_runs + int(inside.sum()) - 1
     return max(needed, 0.5 * float(student.isf(0.5 * WATCH.false_alarms / compared(history), freedom)) ** 2)
 
 

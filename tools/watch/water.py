@@ -9,8 +9,7 @@ from scipy.stats import t as student
 
 from glider.tools.diagnose.noise_probes import TURBULENCE, WAVES, NoiseProbe, inflated, probes
 from glider.tools.diagnose.waves import line_share
-from glider.tools.inference.hyperparameters import DIAGNOSIS, WATCH
-from glider.tools.inference.pooled import PRIOR_RUNS
+from glider.tools.inference.hyperparameters import DIAGNOSIS, HEALTHY, WATCH
 from glider.tools.watch.events import GROWING
 from glider.tools.watch.excess_noise import (
     SCALES,
@@ -63,7 +62,7 @@ def asked_above(learned: int) -> float:
     return (
         WATCH.excess_noise_sigma
         if learned < WATCH.scatter_runs
-        else float(student.isf(norm.sf(WATCH.excess_noise_sigma), learned - 1 + PRIOR_RUNS))
+        else float(student.isf(norm.sf(WATCH.excess_noise_sigma), learned - 1 + HEALTHY.prior_runs))
     )
 
 

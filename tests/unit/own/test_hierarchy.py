@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.special import logsumexp
 
-from glider.tools.inference.healthy_level import CHANGED
+from glider.tools.inference.hyperparameters import HEALTHY
 from glider.tools.inference.pooled import Pooled, learn_scatter
 from glider.tools.own.decision import FORM_SHARES, SIZES, Deviations, Healthy, Hypothesis, usual_share
 from glider.tools.own.effects import INPUT, PARAMETER, PUSH, Effect
@@ -141,4 +141,4 @@ def test_labels_together_count_against_a_force_that_none_has():
               ((10.0, "force"), (9.5, "gain"), (9.4, "mass"))]  # fmt: skip
     assert asked.decided(events).label == "gain"
     assert asked.decided(events[:2]).label == "force"
-    assert asked.log_prior(()) == pytest.approx(np.log1p(-CHANGED))
+    assert asked.log_prior(()) == pytest.approx(np.log1p(-HEALTHY.changed))
