@@ -18,7 +18,7 @@ from glider.tools.flight.compose import build_flight
 pytestmark = pytest.mark.realtime(seconds=40)
 COMMAND = ["-m", "glider.tools.cli.main", "fly", "--realtime", "--mission", "spiral"]
 STATUS = re.compile(
-    r" +(\d+) s  depth +(\d+\.\d\d) m, pitch +([+-]\d+\.\d) deg  leg 1 of 3: \d\.\d m left to 4\.5 m, limit"
+    r" +(\d+) s  depth +(\d+\.\d\d) m, pitch +([+-]\d+\.\d) deg  leg 1 of 3: \d\.\d m left to 4\.5 m, limit in \d+ s$"
 )
 
 
@@ -132,6 +132,14 @@ def test_a_new_leg_and_every_ten_seconds_have_a_line(flying, capfd):
         shown.second(100.0 + t)
     lines = [re.match(r" *(\d+) s .*  leg (\d)", line).groups() for line in capfd.readouterr().err.splitlines()]
     assert lines == [("0", "1"), ("10", "1"), ("13", "2"), ("23", "2")]
+
+
+def test_a_late_tick_gives_no_second_twice(flying, capfd):
+    shown = display.Display(flying)
+    for leg, t in enumerate((100.6, 101.0, 102.7, 103.0)):
+        flying.autopilot.ap[ctl.LEG] = float(leg % 3)
+        shown.second(t)
+    assert [int(line.split()[0]) for line in capfd.readouterr().err.splitlines()] == [0, 1, 2, 3]
 
 
 def test_who_does_not_read_holds_no_flight_up(flying, monkeypatch):

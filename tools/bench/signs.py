@@ -17,6 +17,7 @@ from glider.tools.bench.units import UNITS, WIRES, shown_values
 LEAST_DEG, LEAST_M = 5.0, 0.002
 TRAVEL_SHARE = 0.5  # of an actuator's way
 MOVE_S = 30.0
+PATIENCE_S = 3.0  # with a device that does not answer; the IMU is asked for its model once a second
 WATER = 998.2  # kg/m3
 
 
@@ -30,9 +31,11 @@ class SignFinding:
 
 
 def look(bench: Bench) -> list[SignFinding]:
-    """What each device says."""
+    """What each device says; one that is silent is waited for."""
+    end = time.monotonic() + PATIENCE_S
     time.sleep(0.5)  # rates and errors show
-    state = bench.snapshot()
+    while not _all_answer(state := bench.snapshot()) and time.monotonic() < end:
+        time.sleep(0.1)
     found = [
         SignFinding(f"port {name}", port["up"], f"{port['bytes_in']} bytes in" if port["up"] else port["trouble"])
         for name, port in state["ports"].items()
@@ -43,6 +46,13 @@ def look(bench: Bench) -> list[SignFinding]:
     for name, item in state["actuators"].items():
         found.append(SignFinding(name, item["answers"] and not item["error"], item["error"] or _actuator(item)))
     return found
+
+
+def _all_answer(state: dict) -> bool:
+    """Whether every device has said what it is asked: a sensor a reading, an actuator that it answers, the IMU its
+    model."""
+    sensors = all(item["validity"] == "valid" for item in state["sensors"].values())
+    return sensors and all(item["answers"] for item in state["actuators"].values()) and bool(state["imu_model"])
 
 
 def _more(name: str, item: dict, state: dict) -> str:

@@ -40,19 +40,20 @@ class Display:
 
     def second(self, t: float) -> None:
         """Once a second, between two ticks, at time t (s)."""
+        second = math.floor(t)  # by the clock's own seconds: a late tick gives no second twice
         if math.isnan(self._began):
-            self._began = t
+            self._began = second
         if self._muted:
             return
         if self._terminal:
             with contextlib.suppress(OSError):  # the terminal has gone meanwhile
                 width = os.get_terminal_size(STDERR).columns - 1  # a full line would wrap
-                write_at_once(CLEAR + status(self._flight, t, t - self._began)[: width or None])
+                write_at_once(CLEAR + status(self._flight, t, second - self._began)[: width or None])
             return
         autopilot, (when, mode, leg) = self._flight.autopilot, self._shown
-        now = (t, autopilot.mode, int(autopilot.ap[ctl.LEG]))
-        if t - when >= PLAIN_S - 0.5 or now[1:] != (mode, leg):
-            write_at_once(status(self._flight, t, t - self._began) + "\n")
+        now = (second, autopilot.mode, int(autopilot.ap[ctl.LEG]))
+        if second - when >= PLAIN_S or now[1:] != (mode, leg):
+            write_at_once(status(self._flight, t, second - self._began) + "\n")
             self._shown = now
 
     def tell(self, text: str) -> None:
