@@ -161,5 +161,10 @@ def identify(vehicle: Any, cases: Sequence[Path], out: Path | None, as_json: boo
             f"{one['name']:<16} {one['file']:>10.4g} {one['mean']:>10.4g} {one['sd']:>9.2g}   "
             f"{low:.4g} to {high:.4g} {one['unit']}"
         )
+    points = answer["operating_points"]
+    if points["scatter"]:
+        units = {one.name: one.unit for one in found.vehicle.declared.noises}
+        said = ", ".join(f"{name} {value:.2g} {units[name]}" for name, value in points["scatter"].items())
+        click.echo(f"what goes with the operating point ({points['count']} of them), 1 sigma: {said}")
     for group in answer["groups"]:
         click.echo(f"these runs do not tell apart: {', '.join(group)}")

@@ -53,11 +53,16 @@ P = TypeVar("P", bound=Parabola)
 def marginalised(one: P, scatter: np.ndarray) -> P:
     """A run with its deviation, of 1 sigma `scatter` (k,), integrated out."""
     free = np.flatnonzero(scatter)
-    root = scatter[free, None] * one.curvature[free]
-    inner = np.eye(len(free)) + root[:, free] * scatter[free]
-    solved = np.linalg.solve(inner, np.column_stack([root, scatter[free] * one.slope[free]]))
-    A, g = one.curvature - root.T @ solved[:, :-1], one.slope - root.T @ solved[:, -1]
-    value = one.value - float((scatter * one.slope)[free] @ solved[:, -1]) + float(np.linalg.slogdet(inner)[1])
+    return without(one, np.eye(len(scatter))[:, free] * scatter[free])
+
+
+def without(one: P, root: np.ndarray) -> P:
+    """A run with deviations N(0, root root') integrated out, root (k, m)."""
+    A_root, g_root = root.T @ one.curvature, root.T @ one.slope
+    inner = np.eye(root.shape[1]) + A_root @ root
+    solved = np.linalg.solve(inner, np.column_stack([A_root, g_root]))
+    A, g = one.curvature - A_root.T @ solved[:, :-1], one.slope - A_root.T @ solved[:, -1]
+    value = one.value - float(g_root @ solved[:, -1]) + float(np.linalg.slogdet(inner)[1])
     return replace(one, value=value, slope=g, curvature=0.5 * (A + A.T))
 
 
@@ -149,7 +154,7 @@ def _nearest(parts: Sequence[Sequence[Parabola]], V: np.ndarray, usual: np.ndarr
             for one in runs:
                 A = one.curvature
                 squares += (one.slope + A @ (x - one.at)) ** 2
-                traces += np.maximum(np.diag(A) - ((A @ M) * A.T).sum(axis=1), 0.0)
+                traces[free] += np.maximum(np.diag(A)[free] - ((A[free] @ M) * A[free]).sum(axis=1), 0.0)
         at = v[free]
         v[free] = np.sqrt((0.5 * at**2 * squares[free] + weight * middle) / (0.5 * traces[free] + weight / at))
         if np.abs(np.log(v[free] / at)).max(initial=0.0) < CONVERGED_LOG_VARIANCE:

@@ -121,6 +121,7 @@ class Declaration:
     # forces at noises that go with inputs, identified: mean and standard deviation of inputs; unit of a noise a unit
     usual_inputs: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     form: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    operating_points: tuple[tuple[float, ...], ...] = ()  # mean inputs of runs, where forces are known of their own
 
     def index(self, what: str, name: str) -> int:
         """Place of a name in a list, `inputs` to `noises`; KeyError where it is not there."""

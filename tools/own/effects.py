@@ -10,12 +10,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from glider.tools.own.declare import RUN, Declaration, Input
+from glider.tools.own.operating_points import point_weights
 from glider.tools.own.runs import OwnRun
 
 INPUT, OUTPUT, PARAMETER = "input", "output", "parameter"
 PUSH = "push"  # a constant beside a noise: what no label explains
 NOISE = "noise"  # more of a noise than healthy runs have, or an oscillation: excess_noise.py
-FORM = "form"  # a force at a noise that goes with an input: what the form of the model lacks, no label
+# what the form of the model lacks, no label: a force at a noise that goes with an input, or with a run's mean inputs
+# (operating_points.py)
+FORM = "form"
 GAIN_SPREAD, SECONDS_SPREAD, RANGE_SPREAD = 0.1, 0.2, 0.1
 OWN_STEP = 1e-3  # of its sigma: difference step of a parameter of each run
 LONGEST = 20.0  # spreads: of delays and time constants
@@ -41,6 +44,16 @@ class Effect:
         return self.low == 0.0
 
     @property
+    def at_point(self) -> int | None:
+        """The operating point that a form error goes with; None for other effects."""
+        return int(self.kind) if self.family == FORM and self.kind.isdigit() else None
+
+    @property
+    def form_kind(self) -> tuple[str, bool] | None:
+        """What form errors of one size have in common: noise, and whether they go with inputs or operating points."""
+        return (self.name, self.at_point is None) if self.family == FORM else None
+
+    @property
     def where(self) -> tuple[str, str]:
         return self.family, self.name
 
@@ -53,6 +66,7 @@ class ModelPoint:
     reading: np.ndarray  # (5, outputs): gain, bias, drift, lag, delay
     push: np.ndarray  # (noises,)
     form: np.ndarray  # (noises, inputs) a unit of the input, less its usual value
+    operating: np.ndarray  # (noises, operating points) times `point_weights`
     density: np.ndarray  # (noises,)
     variance: np.ndarray  # (outputs,) of the sensors
     ports: np.ndarray  # (processes, 4)
@@ -61,8 +75,8 @@ class ModelPoint:
 
     def copy(self) -> "ModelPoint":
         return ModelPoint(
-            self.theta.copy(), self.reading.copy(), self.push.copy(), self.form.copy(), self.density.copy(),
-            self.variance.copy(), self.ports.copy(), self.own.copy(),
+            self.theta.copy(), self.reading.copy(), self.push.copy(), self.form.copy(),
+            self.operating.copy(), self.density.copy(), self.variance.copy(), self.ports.copy(), self.own.copy(),
             {key: dict(value) for key, value in self.driven.items()},
         )  # fmt: skip
 
@@ -72,13 +86,18 @@ def nominal_point(declared: Declaration) -> ModelPoint:
     reading = np.zeros((5, len(declared.outputs)))
     reading[0], reading[1] = 1.0, [one.offset for one in declared.outputs]
     form = np.zeros((len(declared.noises), len(declared.inputs)))
+    operating = np.zeros((len(declared.noises), len(declared.operating_points)))
     for (noise, name), value in declared.form.items():
-        form[declared.index("noises", noise), declared.index("inputs", name)] = value
+        if name.isdigit():
+            operating[declared.index("noises", noise), int(name)] = value
+        else:
+            form[declared.index("noises", noise), declared.index("inputs", name)] = value
     return ModelPoint(
         np.array([one.value for one in declared.parameters]),
         reading,
         np.zeros(len(declared.noises)),
         form,
+        operating,
         np.array([one.density for one in declared.noises]),
         np.array([(one.noise or 0.0) ** 2 for one in declared.outputs]),
         np.zeros((0, 4)),
@@ -107,6 +126,8 @@ def moved(declared: Declaration, point: ModelPoint, effects: Sequence[Effect], v
             own[effect.kind] = own.get(effect.kind, 0.0) + size
         elif effect.family == PUSH:
             found.push[declared.index("noises", effect.name)] += size
+        elif effect.at_point is not None:
+            found.operating[declared.index("noises", effect.name), effect.at_point] += size
         elif effect.family == FORM:
             found.form[declared.index("noises", effect.name), declared.index("inputs", effect.kind)] += size
     return found
@@ -156,13 +177,18 @@ def noise_effects(declared: Declaration) -> list[Effect]:
 
 
 def form_errors(declared: Declaration) -> list[Effect]:
-    """A force at every noise that goes with an input, of inputs whose usual values are known; spread: a density."""
-    return [
+    """A force at every noise that goes with an input, of inputs whose usual values are known, and one that goes with
+    each operating point; spread: a density."""
+    linear = [
         Effect(f"{one.name}_by_{name}", FORM, one.name, name, f"{one.unit}/{declared.inputs[k].unit}",
                max(one.density, 1e-6) / sd)
         for one in declared.noises
         for k, name in enumerate(each.name for each in declared.inputs)
         for _, sd in [declared.usual_inputs.get(name, (0.0, 0.0))] if sd > 0.0
+    ]  # fmt: skip
+    return linear + [
+        Effect(f"{one.name}_at_{m}", FORM, one.name, str(m), one.unit, max(one.density, 1e-6))
+        for one in declared.noises for m in range(len(declared.operating_points))
     ]  # fmt: skip
 
 
@@ -196,6 +222,8 @@ def forces(declared: Declaration, point: ModelPoint, driven: np.ndarray) -> np.n
     if point.form.any():
         usual = np.array([declared.usual_inputs.get(one.name, (0.0, 0.0))[0] for one in declared.inputs])
         found += (driven - usual) @ point.form.T
+    if point.operating.any():
+        found += point.operating @ point_weights(declared, driven)
     return found
 
 

@@ -76,7 +76,10 @@ class IdentifiedTable(Table):
     channel_inflation: dict[str, Annotated[float, msgspec.Meta(ge=1.0)]] = msgspec.field(default_factory=dict)
     scatter: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # what runs differ by, 1 sigma in its unit
     label_scatter: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # of each label alone, beside that
-    form: dict[str, float] = msgspec.field(default_factory=dict)  # NOISE_by_INPUT: force a unit of the input
+    # NOISE_by_INPUT: force a unit of the input; NOISE_at_POINT: force (operating_points.py)
+    form: dict[str, float] = msgspec.field(default_factory=dict)
+    operating_points: list[list[float]] = msgspec.field(default_factory=list)  # usual deviations from the usual inputs
+    operating_scatter: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # 1 sigma of that force, by noise
     usual_inputs: dict[str, tuple[float, NonNegative]] = msgspec.field(default_factory=dict)  # mean, 1 sigma
     noise_gain: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # nat a window, of healthy runs, by label
     session_scatter: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # what sessions differ by beside it
@@ -190,7 +193,11 @@ def _with_form(table: IdentifiedTable, declared: Declaration, source: str) -> De
     for name in table.usual_inputs:
         if name not in inputs:
             raise ConfigError(source, f"the model declares no input {name}", key="identified.usual_inputs")
-    found = replace(declared, usual_inputs=table.usual_inputs)
+    count = sum(sd > 0.0 for _, sd in table.usual_inputs.values())
+    if any(len(point) != count for point in table.operating_points):
+        raise ConfigError(source, f"expected points of {count} numbers", key="identified.operating_points")
+    points = tuple(tuple(point) for point in table.operating_points)
+    found = replace(declared, usual_inputs=table.usual_inputs, operating_points=points)
     pairs = {one.label: (one.name, one.kind) for one in form_errors(found)}
     for name in table.form:
         if name not in pairs:

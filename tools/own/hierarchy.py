@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from glider.tools.inference.pooled import Parabola
-from glider.tools.own.effects import NOISE, Effect, moved
+from glider.tools.own.effects import NOISE, PUSH, Effect, driven_inputs, moved
 from glider.tools.own.observer import Observer
+from glider.tools.own.operating_points import point_weights
 
 STEP, LONG_STEP, SHORTENED = 0.1, 3.0, 0.5  # spreads; rms errors that a step may move, and to what it is shortened
 PARTS = 1, 4  # of a window, in each of which errors may be the same
@@ -53,7 +54,12 @@ def expand(
     keep: the derivatives stay with it.
     """
     base, declared, scales = observer.point, observer.declared, healthy.scales
-    by = observer.filter(n, moved(declared, base, effects, at))
+    here = moved(declared, base, effects, at)
+    by = observer.filter(n, here)
+    # what goes with an operating point is, in a run, so much of a constant force
+    pushes = {one.name: k for k, one in enumerate(effects) if one.family == PUSH}
+    at_points = [(k, one.at_point, pushes[one.name]) for k, one in enumerate(effects)
+                 if one.at_point is not None and one.name in pushes]  # fmt: skip
     begins = np.array([one.one_sided and abs(x) < STEP for one, x in zip(effects, at, strict=True)], dtype=bool)
     steps = np.where(begins, UNSEEN_STEP, STEP)
     steps = np.where(at + steps > [one.high for one in effects], -steps, steps)
@@ -67,7 +73,8 @@ def expand(
             points.append(moved(declared, base, effects, there))
         return observer.residuals(n, points, by, horizon) / scales
 
-    moving = np.array([k for k, one in enumerate(effects) if one.family != NOISE], dtype=int)
+    still = {k for k, *_ in at_points}
+    moving = np.array([k for k, one in enumerate(effects) if one.family != NOISE and k not in still], dtype=int)
     E = errors(np.append(-1, moving), np.append(0.0, steps[moving]))
     shape = E[0].shape
     E = E.reshape(len(E), -1)
@@ -79,6 +86,9 @@ def expand(
         shorter = steps[far] * SHORTENED / size[far]
         J[far] = (errors(far, shorter).reshape(len(far), -1) - e) / shorter[:, None]
     J[~np.isfinite(J).all(axis=1)] = 0.0
+    weights = point_weights(declared, driven_inputs(observer.runs[n], declared, here))
+    for k, point, push in at_points:
+        J[k] = weights[point] * effects[k].spread / effects[push].spread * J[push]
     seen = np.isfinite(observer.runs[n].outputs).any(axis=0)
     J, e = J.reshape(len(effects), *shape), e.reshape(shape)
     weight = 1.0 / healthy.inflation

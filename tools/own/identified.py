@@ -93,6 +93,8 @@ def tables(found: Identified) -> dict[str, Any]:
         "scatter": {name: value for name, value in scatter.items() if value > 0.0},
         "session_scatter": {name: value for name, value in session.items() if value > 0.0}, "label_scatter": labels,
         "noise_gain": found.noise_gain, "form": form,
+        "operating_points": [list(one) for one in declared.operating_points],
+        "operating_scatter": _operating(found),
         "usual_inputs": {name: list(pair) for name, pair in declared.usual_inputs.items()},
         "gap": {one.name: float(value) for one, value in zip(declared.outputs, found.errors.scales, strict=True)},
         "channel_inflation": {
@@ -108,6 +110,8 @@ def plain(found: Identified) -> dict[str, Any]:
     sd = np.sqrt(np.diag(found.covariance))
     rows = []
     for k, one in enumerate(found.nuisance):
+        if one.at_point is not None:  # none of these means anything alone
+            continue
         start = 0.0
         if one.family == "parameter":
             start = found.vehicle.declared.parameters[found.vehicle.declared.index("parameters", one.name)].value
@@ -124,17 +128,23 @@ def plain(found: Identified) -> dict[str, Any]:
 
     return {
         "format": 1, "vehicle": found.vehicle.name, "parameters": rows, "groups": groups(found),
+        "operating_points": {"count": len(found.vehicle.declared.operating_points), "scatter": _operating(found)},
         "gap": {"before": gap(found.before), "after": gap(found.after)}, "horizon_s": found.observer.horizon,
         "handed_out": "identified" if found.better else "file",
         "runs": [run.name for run in found.observer.runs], "notes": [*found.observer.notes, *found.notes],
     }  # fmt: skip
 
 
+def _operating(found: Identified) -> dict[str, float]:
+    """1 sigma, by noise, of the force that goes with the operating point."""
+    return {one.name: found.operating_scatter[one.name] * one.spread for one in found.nuisance if one.at_point == 0}
+
+
 def groups(found: Identified, correlation: float = 0.98) -> list[list[str]]:
     """Parameters that the data do not part: posterior correlations beyond 0.98."""
     sd = np.sqrt(np.diag(found.covariance))
     R = found.covariance / np.maximum(np.outer(sd, sd), 1e-300)
-    left, listed = list(np.flatnonzero(sd > 0.0)), []
+    left, listed = [k for k in np.flatnonzero(sd > 0.0) if found.nuisance[k].at_point is None], []
     while left:
         k = left.pop(0)
         own = [j for j in left if abs(R[k, j]) > correlation]

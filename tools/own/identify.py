@@ -5,7 +5,15 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from glider.tools.inference.pooled import Parabola, Pooled, learn_scatter, log_prior, marginalised, run_values
+from glider.tools.inference.pooled import (
+    Parabola,
+    Pooled,
+    learn_scatter,
+    log_prior,
+    marginalised,
+    run_values,
+    without,
+)
 from glider.tools.own.declare import RUN, Declaration
 from glider.tools.own.effects import (
     FORM,
@@ -63,6 +71,7 @@ class Identified:
     level_scatter: float
     sessions: int
     session_scatter: np.ndarray  # (nuisance,) spreads, from session to session beside that
+    operating_scatter: dict[str, float]  # by noise, spreads: 1 sigma of what goes with operating points
     noise_gain: dict[str, float]  # nat a window that excess noise gains in healthy runs, by label
     notes: list[str] = field(default_factory=list)
 
@@ -103,6 +112,7 @@ def identify(
     if not declared.usual_inputs:
         vehicle = replace(vehicle, declared=replace(declared, usual_inputs=usual_inputs(declared, runs)))
     observer = observer_of(vehicle, list(runs))
+    vehicle = observer.vehicle
     nuisance, horizon = nuisance_of(observer), observer.horizon
     k, count = len(nuisance), len(runs)
     priors = {PUSH: 0.0, FORM: USUAL_SCATTER**2}
@@ -124,9 +134,9 @@ def identify(
         *_, eta = inflation(found)
         warm = [one.tempered(eta) for one in found]
         if differ and learned < SCATTER_ROUNDS:
+            V = with_form_errors([marginalised(one, scatter) for one in warm], V, nuisance)
             found_scatter = learn_scatter(warm, V, usual)
             scatter = found_scatter if learned == 0 else np.sqrt(scatter * found_scatter)
-            V = with_form_errors([marginalised(one, scatter) for one in warm], V, nuisance)
             learned += 1
         search = LineSearch(observer, nuisance, warm, scatter, eta, V, limits, errors, horizon)
         step = damped_step(Pooled.of([marginalised(one, scatter) for one in warm], V), values)
@@ -152,13 +162,15 @@ def identify(
     each = in_sessions(tempered, scatter, counts) if len(counts) > 1 else warm
     apart = session_scatter if len(counts) > 1 else np.zeros(k)
     covariance = Pooled.of([marginalised(one, apart) for one in each], V).covariance()
+    operating_scatter = {one.name: float(np.sqrt(V[k, k])) for k, one in enumerate(nuisance) if one.at_point == 0}
     after = _held_out(observer, nuisance, values, warm, V, limits)
-    labels, label_scatter = _label_scatter(observer, nuisance, values, own, scatter, eta, errors)
+    labels, label_scatter = _label_scatter(observer, nuisance, own, tempered, scatter, V, eta, errors)
     flown = [responses(observer.about(moved(observer.declared, observer.point, nuisance, own[n])), n, horizon)
              for n in range(count)] if vehicle.declared.noises else []  # fmt: skip
     noise_gain = usual_gains(flown, noise_effects(vehicle.declared), NOISE_SIZES, errors, eta)
     return Identified(vehicle, observer, nuisance, values, covariance, scatter, labels, label_scatter, eta, errors, own,
-                      before, after, level_scatter(found), len(sessions), session_scatter, noise_gain)  # fmt: skip
+                      before, after, level_scatter(found), len(sessions), session_scatter, operating_scatter,
+                      noise_gain)  # fmt: skip
 
 
 def damped_step(pooled: Pooled, values: np.ndarray) -> np.ndarray:
@@ -179,14 +191,15 @@ def with_form_errors(found: Sequence[Expansion], V: np.ndarray, nuisance: Sequen
     """
     kept = Pooled.of(found, V)
     for _ in range(FORM_ROUNDS):
-        for noise in dict.fromkeys(one.name for one in nuisance if one.family == FORM):
-            places = np.array([one.family == FORM and one.name == noise for one in nuisance])
+        for kind in dict.fromkeys(one.form_kind for one in nuisance if one.family == FORM):
+            places = np.array([one.form_kind == kind for one in nuisance])
+            usual = USUAL_SCATTER if kind[1] else USUAL_OWN_SCATTER
 
             def at(size: float, V=V, places=places) -> np.ndarray:
                 return np.diag(np.where(places, size**2, np.diag(V)))
 
-            def score(size: float, at=at) -> float:
-                return kept.log_evidence(at(size)) + float(log_prior(size**2, USUAL_SCATTER**2))
+            def score(size: float, at=at, usual=usual) -> float:
+                return kept.log_evidence(at(size)) + float(log_prior(size**2, usual**2))
 
             V = at(max(LABEL_SCATTERS, key=score))
     return V
@@ -301,18 +314,22 @@ def fit_levels(observer: Observer, say: Callable[[str], None]) -> None:
     say(f"noise levels: {', '.join(said) or 'as the file has them'}")
 
 
-def _label_scatter(observer, nuisance, values, own, scatter, eta, errors) -> tuple[list[Effect], np.ndarray]:
+def _label_scatter(observer, nuisance, own, tempered, scatter, V, eta, errors) -> tuple[list[Effect], np.ndarray]:
     """How far each label alone differs from run to run beside the numbers of runs: what healthy runs show of it.
 
-    1 sigma (labels,) in spreads, by the largest of its marginal likelihood with the prior of `learn_scatter`.
+    Every run is seen as one that is asked about later: by a vehicle identified from the others, as certain as these
+    make it. 1 sigma (labels,) in spreads, by the largest of its marginal likelihood with the prior of `learn_scatter`.
     """
     labels = standard_effects(observer.declared, observer.runs, observer.tolerances)
     every = [*labels, *pushes(observer.declared), *form_errors(observer.declared)]
     into = placed(nuisance, every)
-    about = []
+    warm, about = [marginalised(one, scatter) for one in tempered], []
     for n in range(len(own)):
+        others = Pooled.of([one for k, one in enumerate(warm) if k != n] or warm, V)
+        known, root = into @ others.mean(), into @ np.linalg.cholesky(others.covariance() + 1e-12 * np.eye(len(V)))
         one = expand(observer, n, every, into @ own[n], errors, observer.horizon).tempered(eta)
-        about.append(marginalised(replace(one, at=one.at - into @ values), into @ scatter))
+        one = marginalised(replace(one, at=one.at - known), into @ scatter)
+        about.append(without(one, root))
     slopes = np.array([-one.offset for one in about])[:, : len(labels)]
     precisions = np.array([np.diag(one.curvature) for one in about])[:, : len(labels)]
     total = 1.0 + LABEL_SCATTERS[:, None, None] ** 2 * precisions  # (grid, runs, labels)

@@ -14,6 +14,7 @@ from glider.tools.own import kernels as names
 from glider.tools.own.declare import ANGLE, QUATERNION, USUAL_START, USUAL_TOLERANCE, Declaration
 from glider.tools.own.effects import ModelPoint, driven_inputs, forces, held_inputs, nominal_point
 from glider.tools.own.load import LoadedVehicle, called, user_error
+from glider.tools.own.operating_points import with_operating_points
 from glider.tools.own.runs import OwnRun
 
 LEAST_STEP = 0.1  # s between rows
@@ -24,7 +25,7 @@ TIME_CONSTANTS = 3.0  # in a window
 WARM_UP, WARM_UP_SHARE = 2.0, 0.1  # s of a window that find its start, at most; of the horizon
 NOTHING = np.zeros(0)
 NO_POINT = ModelPoint(
-    NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING
+    NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING
 )  # the vehicle file's own is taken
 LOST = 100.0  # tolerances: error of a flight that is lost, and of none more
 QUATERNION_FIRST, QUATERNION_REST, USUAL_ATTITUDE = 2, 3, 0.1  # kinds of states; rad at the start
@@ -233,11 +234,12 @@ class Observer:
         run, kernels = self.runs[n], self.vehicle.kernels
         states, first = np.full(by.states.shape, np.nan), slice(rows)
         x, _ = self.start(n, point)
-        driven = driven_inputs(run, self.declared, point)[first]
+        driven = driven_inputs(run, self.declared, point)
+        beside, driven = forces(self.declared, point, driven)[first], driven[first]
         with contextlib.suppress(ArithmeticError, ValueError, np.linalg.LinAlgError):
             kernels.follow_run(
                 run.t[first], held_inputs(self.declared, driven), run.outputs[first], x, point.theta, point.own,
-                point.reading, forces(self.declared, point, driven), point.ports, self.kinds, self.angles, self.parts,
+                point.reading, beside, point.ports, self.kinds, self.angles, self.parts,
                 len(self.scales), by.gains[first], states[first],
             )  # fmt: skip
         return states
@@ -448,6 +450,7 @@ class BlackBox(Observer):
 def observer_of(vehicle: LoadedVehicle, runs: Sequence[OwnRun], every_row: bool = False) -> Observer:
     """The observer of a vehicle's model over runs: on rows LEAST_STEP apart at least, or on every row."""
     chosen = list(runs) if every_row else [thinned(run) for run in runs]
+    vehicle = replace(vehicle, declared=with_operating_points(vehicle.declared, chosen))
     return (Observer if vehicle.level else BlackBox)(vehicle, chosen)
 
 

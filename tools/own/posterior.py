@@ -416,6 +416,9 @@ def healthy_of(observer: Observer) -> Healthy:
     V[np.ix_(places, places)] = np.array(table.covariance).reshape(len(places), len(places)) / np.outer(
         spreads, spreads
     )
+    for n, effect in enumerate(effects):  # of other operating points than identified ones, how large such forces are
+        if effect.at_point is not None and effect.at_point >= len(table.operating_points):
+            V[n, n] = (table.operating_scatter.get(effect.name, 0.0) / effect.spread) ** 2
     session = np.zeros(k)
     shared = table.session_scatter or {
         name: float(np.sqrt(table.session_share)) * value for name, value in table.scatter.items()

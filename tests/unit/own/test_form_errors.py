@@ -63,7 +63,7 @@ def test_the_identified_file_predicts_with_it(found):
     kept = flights(found.form, 4, 7)
     observer = observer_of(found.vehicle, kept)
     without = observer.point.copy()
-    without.form[:] = 0.0
+    without.form[:] = without.operating[:] = 0.0
     gaps = [np.mean([observer.gaps(n, point, 10.0) for n in range(4)]) for point in (observer.point, without)]
     assert gaps[0] < 0.6
     assert (gaps[0] < 0.6 * gaps[1]) == bool(found.form)
