@@ -191,7 +191,7 @@ def with_form_errors(found: Sequence[Expansion], V: np.ndarray, nuisance: Sequen
     """
     kept = Pooled.of(found, V)
     for _ in range(FORM_ROUNDS):
-        for kind in dict.fromkeys(one.form_kind for one in nuisance if one.family == FORM):
+        for kind in dict.fromkeys(kind for one in nuisance if (kind := one.form_kind) is not None):
             places = np.array([one.form_kind == kind for one in nuisance])
             usual = USUAL_SCATTER if kind[1] else USUAL_OWN_SCATTER
 
