@@ -78,6 +78,7 @@ class IdentifiedTable(Table):
     label_scatter: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # of each label alone, beside that
     # NOISE_by_INPUT: force a unit of the input; NOISE_at_POINT: force (operating_points.py)
     form: dict[str, float] = msgspec.field(default_factory=dict)
+    input_shares: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # of the distance between points
     operating_points: list[list[float]] = msgspec.field(default_factory=list)  # usual deviations from the usual inputs
     operating_scatter: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # 1 sigma of that force, by noise
     usual_inputs: dict[str, tuple[float, NonNegative]] = msgspec.field(default_factory=dict)  # mean, 1 sigma
@@ -197,7 +198,7 @@ def _with_form(table: IdentifiedTable, declared: Declaration, source: str) -> De
     if any(len(point) != count for point in table.operating_points):
         raise ConfigError(source, f"expected points of {count} numbers", key="identified.operating_points")
     points = tuple(tuple(point) for point in table.operating_points)
-    found = replace(declared, usual_inputs=table.usual_inputs, operating_points=points)
+    found = replace(declared, usual_inputs=table.usual_inputs, input_shares=table.input_shares, operating_points=points)
     pairs = {one.label: (one.name, one.kind) for one in form_errors(found)}
     for name in table.form:
         if name not in pairs:

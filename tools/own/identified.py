@@ -93,6 +93,7 @@ def tables(found: Identified) -> dict[str, Any]:
         "scatter": {name: value for name, value in scatter.items() if value > 0.0},
         "session_scatter": {name: value for name, value in session.items() if value > 0.0}, "label_scatter": labels,
         "noise_gain": found.noise_gain, "form": form,
+        "input_shares": dict(declared.input_shares),
         "operating_points": [list(one) for one in declared.operating_points],
         "operating_scatter": _operating(found),
         "usual_inputs": {name: list(pair) for name, pair in declared.usual_inputs.items()},

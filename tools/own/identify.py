@@ -31,6 +31,7 @@ from glider.tools.own.excess_noise import NOISE_SIZES, responses, usual_gains
 from glider.tools.own.hierarchy import ChannelErrors, Expansion, expand, inflation
 from glider.tools.own.load import LoadedVehicle
 from glider.tools.own.observer import Observer, observer_of
+from glider.tools.own.operating_points import input_shares
 from glider.tools.own.runs import OwnRun
 
 ROUNDS, SHARED_ROUNDS = 40, 10  # at most; of them until it is learned how runs differ
@@ -110,7 +111,9 @@ def identify(
     runs = [run for session in sessions for run in session]
     declared = vehicle.declared
     if not declared.usual_inputs:
-        vehicle = replace(vehicle, declared=replace(declared, usual_inputs=usual_inputs(declared, runs)))
+        declared = replace(declared, usual_inputs=usual_inputs(declared, runs))
+        declared = replace(declared, input_shares=input_shares(declared, runs))
+        vehicle = replace(vehicle, declared=declared)
     observer = observer_of(vehicle, list(runs))
     vehicle = observer.vehicle
     nuisance, horizon = nuisance_of(observer), observer.horizon

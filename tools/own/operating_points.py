@@ -21,10 +21,25 @@ NEW_POINT = 0.05  # of the variance, that known points leave: less is no point o
 
 
 def mean_inputs(declared: Declaration, driven: np.ndarray) -> np.ndarray:
-    """Mean inputs (rows, inputs) of a run, of inputs that are not the same in all runs, in usual deviations."""
+    """Mean inputs (rows, inputs) of a run, of inputs that are not the same all along, in usual deviations.
+
+    Inputs that go together from run to run count as one: each by the root of its share.
+    """
     means = driven.mean(axis=0)
-    return np.array([(means[n] - mean) / sd for n, one in enumerate(declared.inputs)
+    return np.array([(means[n] - mean) / sd * np.sqrt(declared.input_shares.get(one.name, 1.0))
+                     for n, one in enumerate(declared.inputs)
                      for mean, sd in [declared.usual_inputs.get(one.name, (0.0, 0.0))] if sd > 0.0])  # fmt: skip
+
+
+def input_shares(declared: Declaration, runs: Sequence[OwnRun]) -> dict[str, float]:
+    """Share of every input in the distance between runs, 1 / sum of r^2 over the inputs, r the correlation of means."""
+    names = [one.name for one in declared.inputs if one.name in declared.usual_inputs]
+    z = np.array([mean_inputs(declared, run.inputs) for run in runs]).reshape(len(runs), len(names))
+    z -= z.mean(axis=0)
+    length = np.sqrt((z**2).sum(axis=0))
+    moving = np.outer(length, length)
+    r = np.divide(z.T @ z, moving, out=np.eye(len(names)), where=moving > 0.0)
+    return {name: float(1.0 / (row @ row)) for name, row in zip(names, r, strict=True)}
 
 
 def point_weights(declared: Declaration, driven: np.ndarray) -> np.ndarray:

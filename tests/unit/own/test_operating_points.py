@@ -1,6 +1,7 @@
 """What the form of a model lacks goes with how it is flown: known where runs were identified, uncertain elsewhere."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from glider.tools.own.diagnose import diagnose_own
 from glider.tools.own.identified import write
 from glider.tools.own.identify import identify
 from glider.tools.own.observer import observer_of
-from glider.tools.own.operating_points import LENGTH, NEW_POINT, point_weights, with_operating_points
+from glider.tools.own.operating_points import LENGTH, NEW_POINT, input_shares, point_weights, with_operating_points
 from glider.tools.own.runs import OwnRun
 
 MODEL = """
@@ -83,7 +84,7 @@ DECLARED = Declaration((Input("a"), Input("b")), (), (), usual_inputs={"a": (1.0
 MEANS = st.lists(st.tuples(st.floats(-3.0, 5.0), st.floats(-8.0, 8.0)), min_size=1, max_size=12)
 
 
-def run_at(means: tuple[float, float]) -> OwnRun:
+def run_at(means: tuple[float, ...]) -> OwnRun:
     return OwnRun("run", np.arange(3.0), np.tile(means, (3, 1)), np.zeros((3, 0)))
 
 
@@ -101,6 +102,19 @@ def test_points_give_the_process_its_covariance(known, asked):
     for one in (*known, *asked):  # what was known of a run stays, whatever is asked about beside it
         mine, theirs = (point_weights(some, run_at(one).inputs) for some in (declared, further))
         assert theirs[: len(mine)] == pytest.approx(mine)
+
+
+def test_inputs_that_go_together_count_as_one():
+    """Four motors under one command are no farther from another command than one motor is."""
+    usual = dict.fromkeys(("a", "b", "c", "d"), (0.0, 1.0))
+    declared = Declaration(tuple(map(Input, usual)), (), (), usual_inputs=usual)
+    runs = [run_at((a, b, b, b)) for a in (-1.0, 1.0) for b in (-1.0, 1.0)]
+    shares = input_shares(declared, runs)
+    assert shares == pytest.approx({"a": 1.0, "b": 1 / 3, "c": 1 / 3, "d": 1 / 3})
+    first = with_operating_points(replace(declared, input_shares=shares), runs[:1])
+    (to_other_command,) = point_weights(first, runs[1].inputs)
+    (to_other_a,) = point_weights(first, runs[2].inputs)
+    assert to_other_command == pytest.approx(to_other_a)
 
 
 def test_a_vehicle_that_was_never_identified_has_none():
