@@ -121,7 +121,7 @@ class Declaration:
     # forces at noises that go with inputs, identified: mean and standard deviation of inputs; unit of a noise a unit
     usual_inputs: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     form: Mapping[tuple[str, str], float] = field(default_factory=dict)
-    input_shares: Mapping[str, float] = field(default_factory=dict)  # in such points, of inputs that go together
+    input_shares: Mapping[str, float] = field(default_factory=dict)  # in such points, of inputs under one command
     operating_points: tuple[tuple[float, ...], ...] = ()  # mean inputs of runs, where forces are known of their own
 
     def index(self, what: str, name: str) -> int:

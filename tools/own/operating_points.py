@@ -17,13 +17,14 @@ from glider.tools.own.declare import Declaration
 from glider.tools.own.runs import OwnRun
 
 LENGTH = 2.0  # usual deviations of an input, over which the force is much the same
+SAME = 0.99  # correlation of the means of two inputs that are under one command
 NEW_POINT = 0.05  # of the variance, that known points leave: less is no point of its own
 
 
 def mean_inputs(declared: Declaration, driven: np.ndarray) -> np.ndarray:
     """Mean inputs (rows, inputs) of a run, of inputs that are not the same all along, in usual deviations.
 
-    Inputs that go together from run to run count as one: each by the root of its share.
+    Inputs under one command count as one: each by the root of its share.
     """
     means = driven.mean(axis=0)
     return np.array([(means[n] - mean) / sd * np.sqrt(declared.input_shares.get(one.name, 1.0))
@@ -32,14 +33,14 @@ def mean_inputs(declared: Declaration, driven: np.ndarray) -> np.ndarray:
 
 
 def input_shares(declared: Declaration, runs: Sequence[OwnRun]) -> dict[str, float]:
-    """Share of every input in the distance between runs, 1 / sum of r^2 over the inputs, r the correlation of means."""
+    """Share of every input in the distance between runs: 1 / how many have the same course of means (SAME)."""
     names = [one.name for one in declared.inputs if one.name in declared.usual_inputs]
     z = np.array([mean_inputs(declared, run.inputs) for run in runs]).reshape(len(runs), len(names))
     z -= z.mean(axis=0)
     length = np.sqrt((z**2).sum(axis=0))
     moving = np.outer(length, length)
     r = np.divide(z.T @ z, moving, out=np.eye(len(names)), where=moving > 0.0)
-    return {name: float(1.0 / (row @ row)) for name, row in zip(names, r, strict=True)}
+    return {name: float(1.0 / (np.abs(row) > SAME).sum()) for name, row in zip(names, r, strict=True)}
 
 
 def point_weights(declared: Declaration, driven: np.ndarray) -> np.ndarray:

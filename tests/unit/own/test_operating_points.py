@@ -104,7 +104,7 @@ def test_points_give_the_process_its_covariance(known, asked):
         assert theirs[: len(mine)] == pytest.approx(mine)
 
 
-def test_inputs_that_go_together_count_as_one():
+def test_inputs_under_one_command_count_as_one():
     """Four motors under one command are no farther from another command than one motor is."""
     usual = dict.fromkeys(("a", "b", "c", "d"), (0.0, 1.0))
     declared = Declaration(tuple(map(Input, usual)), (), (), usual_inputs=usual)
