@@ -164,7 +164,9 @@ def identify(
     warm = [marginalised(one, scatter) for one in tempered]
     each = in_sessions(tempered, scatter, counts) if len(counts) > 1 else warm
     apart = session_scatter if len(counts) > 1 else np.zeros(k)
-    covariance = Pooled.of([marginalised(one, apart) for one in each], V).covariance()
+    between = run_inflation(warm, V, np.array([one.family not in (PUSH, FORM) for one in nuisance]))
+    say(f"runs left out move the values by {np.sqrt(between):.1f} times what their likelihood says")
+    covariance = Pooled.of([marginalised(one, apart).tempered(between) for one in each], V).covariance()
     operating_scatter = {one.name: float(np.sqrt(V[k, k])) for k, one in enumerate(nuisance) if one.at_point == 0}
     after = _held_out(observer, nuisance, values, warm, V, limits)
     labels, label_scatter = _label_scatter(observer, nuisance, own, tempered, scatter, V, eta, errors)
@@ -174,6 +176,23 @@ def identify(
     return Identified(vehicle, observer, nuisance, values, covariance, scatter, labels, label_scatter, eta, errors, own,
                       before, after, level_scatter(found), len(sessions), session_scatter, operating_scatter,
                       noise_gain)  # fmt: skip
+
+
+def run_inflation(found: Sequence[Parabola], V: np.ndarray, free: np.ndarray) -> float:
+    """How much less runs say of the shared values than their likelihood has it: variance of the jackknife over runs
+    over what it would be, median over some values (free: k, of bool); at least 1.
+
+    found: runs with their own deviations integrated out. Errors that last longer than a window, or that go with how a
+    run was flown, are the same in all of a run; its likelihood counts them window by window.
+    """
+    if len(found) < MIN_SCATTER_RUNS or not free.any():
+        return 1.0
+    every = Pooled.of(found, V)
+    others = [Pooled.of([*found[:n], *found[n + 1 :]], V) for n in range(len(found))]
+    moves = np.array([one.mean() - every.mean() for one in others])[:, free]
+    expected = sum(np.diag(one.covariance() - every.covariance())[free] for one in others)
+    ratio = (moves**2).sum(axis=0) / np.maximum(expected, 1e-12)
+    return max(1.0, float(np.median(ratio)))
 
 
 def damped_step(pooled: Pooled, values: np.ndarray) -> np.ndarray:

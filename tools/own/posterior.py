@@ -275,6 +275,7 @@ class Engine:
         """Hypotheses found by a beam: none, the best single labels, pairs beside the best, triples."""
         begin = self.expansions(np.zeros((self.count, self.k)), np.arange(self.k))
         self.reach = np.sqrt(np.mean([one.reach for one in begin], axis=0))
+        untouched = np.sqrt(np.mean([one.squares.sum() / max(1, one.samples.sum()) for one in begin]))
         nothing = self.fit((), every=True)
         nothing.strange = strangeness(self.healthy, nothing, nothing)
         every, front, self.bare = [nothing], [nothing], nothing
@@ -290,7 +291,7 @@ class Engine:
             new = [
                 self.fit(labels, begin) for _, begin, labels in sorted(wanted.values(), key=lambda one: -one[0])[:BEAM]
             ]
-            if depth == 0 and np.sqrt(nothing.left.mean()) > STRONG_LEFT:
+            if depth == 0 and untouched > STRONG_LEFT:
                 again = [self.fit((label,), begin) for label, begin in self.strong_starts()]
                 best_of = {one.labels: one for one in sorted([*new, *again], key=lambda one: one.evidence)}
                 new = list(best_of.values())

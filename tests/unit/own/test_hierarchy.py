@@ -12,6 +12,7 @@ from glider.tools.inference.pooled import Pooled, learn_scatter
 from glider.tools.own.decision import FORM_SHARES, SIZES, Deviations, Healthy, Hypothesis, usual_share
 from glider.tools.own.effects import INPUT, PARAMETER, PUSH, Effect
 from glider.tools.own.hierarchy import ChannelErrors, Expansion
+from glider.tools.own.identify import run_inflation
 from glider.tools.own.posterior import Engine, alone
 from glider.tools.own.watch import Event, Watch
 
@@ -142,3 +143,16 @@ def test_labels_together_count_against_a_force_that_none_has():
     assert asked.decided(events).label == "gain"
     assert asked.decided(events[:2]).label == "force"
     assert asked.log_prior(()) == pytest.approx(np.log1p(-HEALTHY.changed))
+
+
+@pytest.mark.parametrize("excess", [1.0, 3.0])
+def test_runs_that_differ_by_more_than_they_say_count_for_less(excess):
+    """Runs' places scatter by `excess` times what their likelihood has: its square is found by leaving runs out."""
+    random = np.random.default_rng(5)
+    sizes, free = [], np.ones(3, dtype=bool)
+    for _ in range(40):
+        places = excess * random.standard_normal((20, 3)) / np.sqrt(PRECISION)
+        sizes.append(run_inflation([run_at(place) for place in places], 100.0 * np.eye(3), free))
+    assert np.median(sizes) == pytest.approx(excess**2, rel=0.3)
+    assert min(sizes) >= 1.0
+    assert run_inflation([run_at(place) for place in places[:2]], np.eye(3), free) == 1.0
