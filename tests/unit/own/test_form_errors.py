@@ -10,19 +10,8 @@ from glider.tools.own.identified import write
 from glider.tools.own.identify import identify
 from glider.tools.own.observer import observer_of
 from glider.tools.own.runs import OwnRun
+from tests.support.boat import MODEL
 
-MODEL = """
-import numpy as np
-inputs = {"thrust": "N", "flap": "rad"}
-outputs = [("speed", "m/s", "speed_m_s", 0.01)]
-parameters = [("damping", "1/s", 0.4, 0.1)]
-states = [("v", "m/s")]
-noises = [("surge", "m/s2", 0.02)]
-def derivative(x, u, w, theta):
-    return np.array([u[0] - theta[0] * x[0] + w[0]])
-def measure(x, u, theta):
-    return np.array([x[0]])
-"""
 TRUE = -0.15  # m/s2 a radian of flap, of which the model knows nothing
 
 

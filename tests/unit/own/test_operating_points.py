@@ -16,19 +16,8 @@ from glider.tools.own.identify import identify
 from glider.tools.own.observer import observer_of
 from glider.tools.own.operating_points import LENGTH, NEW_POINT, input_shares, point_weights, with_operating_points
 from glider.tools.own.runs import OwnRun
+from tests.support.boat import MODEL
 
-MODEL = """
-import numpy as np
-inputs = {"thrust": "N", "flap": "rad"}
-outputs = [("speed", "m/s", "speed_m_s", 0.01)]
-parameters = [("damping", "1/s", 0.4, 0.1)]
-states = [("v", "m/s")]
-noises = [("surge", "m/s2", 0.02)]
-def derivative(x, u, w, theta):
-    return np.array([u[0] - theta[0] * x[0] + w[0]])
-def measure(x, u, theta):
-    return np.array([x[0]])
-"""
 SETTINGS = (-0.4, 0.0, 0.4)  # of the flap, rad
 BEYOND = 0.5  # farther than what was identified
 
