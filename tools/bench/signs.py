@@ -17,7 +17,7 @@ from glider.tools.bench.units import UNITS, WIRES, shown_values
 LEAST_DEG, LEAST_M = 5.0, 0.002
 TRAVEL_SHARE = 0.5  # of an actuator's way
 MOVE_S = 30.0
-PATIENCE_S = 3.0  # with a device that does not answer; the IMU is asked for its model once a second
+SILENT_S = 3.0  # until a device is taken for silent; the IMU is asked for its model once a second
 WATER = 998.2  # kg/m3
 
 
@@ -32,7 +32,7 @@ class SignFinding:
 
 def look(bench: Bench) -> list[SignFinding]:
     """What each device says; one that is silent is waited for."""
-    end = time.monotonic() + PATIENCE_S
+    end = time.monotonic() + SILENT_S
     time.sleep(0.5)  # rates and errors show
     while not _all_answer(state := bench.snapshot()) and time.monotonic() < end:
         time.sleep(0.1)

@@ -164,12 +164,14 @@ def identify(
     warm = [marginalised(one, scatter) for one in tempered]
     each = in_sessions(tempered, scatter, counts) if len(counts) > 1 else warm
     apart = session_scatter if len(counts) > 1 else np.zeros(k)
-    between = run_inflation(warm, V, np.array([one.family not in (PUSH, FORM) for one in nuisance]))
+    every, others = Pooled.of(warm, V), left_out(warm, V)
+    between = run_inflation(every, others, np.array([one.family not in (PUSH, FORM) for one in nuisance]))
     say(f"runs left out move the values by {np.sqrt(between):.1f} times what their likelihood says")
     covariance = Pooled.of([marginalised(one, apart).tempered(between) for one in each], V).covariance()
     operating_scatter = {one.name: float(np.sqrt(V[k, k])) for k, one in enumerate(nuisance) if one.at_point == 0}
-    after = _held_out(observer, nuisance, values, warm, V, limits)
-    labels, label_scatter = _label_scatter(observer, nuisance, own, tempered, scatter, V, eta, errors)
+    # to first order in what leaving a run out moves
+    after = _held_out(observer, nuisance, [values + one.mean() - every.mean() for one in others], limits)
+    labels, label_scatter = _label_scatter(observer, nuisance, own, others, scatter, eta, errors)
     flown = [responses(observer.about(moved(observer.declared, observer.point, nuisance, own[n])), n, horizon)
              for n in range(count)] if vehicle.declared.noises else []  # fmt: skip
     noise_gain = usual_gains(flown, noise_effects(vehicle.declared), NOISE_SIZES, errors, eta)
@@ -178,17 +180,21 @@ def identify(
                       noise_gain)  # fmt: skip
 
 
-def run_inflation(found: Sequence[Parabola], V: np.ndarray, free: np.ndarray) -> float:
+def left_out(found: Sequence[Parabola], V: np.ndarray) -> list[Pooled]:
+    """What the other runs say, of each run; a single one's others are itself."""
+    return [Pooled.of([*found[:n], *found[n + 1 :]] or found, V) for n in range(len(found))]
+
+
+def run_inflation(every: Pooled, others: Sequence[Pooled], free: np.ndarray) -> float:
     """How much less runs say of the shared values than their likelihood has it: variance of the jackknife over runs
     over what it would be, median over some values (free: k, of bool); at least 1.
 
-    found: runs with their own deviations integrated out. Errors that last longer than a window, or that go with how a
-    run was flown, are the same in all of a run; its likelihood counts them window by window.
+    every, others: all runs, and all but each (`left_out`), their own deviations integrated out. Errors that last longer
+    than a window, or that go with how a run was flown, are the same in all of a run; its likelihood counts them window
+    by window.
     """
-    if len(found) < MIN_SCATTER_RUNS or not free.any():
+    if len(others) < MIN_SCATTER_RUNS or not free.any():
         return 1.0
-    every = Pooled.of(found, V)
-    others = [Pooled.of([*found[:n], *found[n + 1 :]], V) for n in range(len(found))]
     moves = np.array([one.mean() - every.mean() for one in others])[:, free]
     expected = sum(np.diag(one.covariance() - every.covariance())[free] for one in others)
     ratio = (moves**2).sum(axis=0) / np.maximum(expected, 1e-12)
@@ -207,7 +213,8 @@ def damped_step(pooled: Pooled, values: np.ndarray) -> np.ndarray:
 
 
 def with_form_errors(found: Sequence[Expansion], V: np.ndarray, nuisance: Sequence[Effect]) -> np.ndarray:
-    """The prior covariance with the variances of forces that go with inputs, one for every noise, learned.
+    """The prior covariance with the variances of form errors learned, two for every noise: of what goes with inputs,
+    and with operating points.
 
     The most probable, with the prior of `learn_scatter`, of runs with their own deviations integrated out.
     """
@@ -336,7 +343,7 @@ def fit_levels(observer: Observer, say: Callable[[str], None]) -> None:
     say(f"noise levels: {', '.join(said) or 'as the file has them'}")
 
 
-def _label_scatter(observer, nuisance, own, tempered, scatter, V, eta, errors) -> tuple[list[Effect], np.ndarray]:
+def _label_scatter(observer, nuisance, own, others, scatter, eta, errors) -> tuple[list[Effect], np.ndarray]:
     """How far each label alone differs from run to run beside the numbers of runs: what healthy runs show of it.
 
     Every run is seen as one that is asked about later: by a vehicle identified from the others, as certain as these
@@ -345,10 +352,10 @@ def _label_scatter(observer, nuisance, own, tempered, scatter, V, eta, errors) -
     labels = standard_effects(observer.declared, observer.runs, observer.tolerances)
     every = [*labels, *pushes(observer.declared), *form_errors(observer.declared)]
     into = placed(nuisance, every)
-    warm, about = [marginalised(one, scatter) for one in tempered], []
-    for n in range(len(own)):
-        others = Pooled.of([one for k, one in enumerate(warm) if k != n] or warm, V)
-        known, root = into @ others.mean(), into @ np.linalg.cholesky(others.covariance() + 1e-12 * np.eye(len(V)))
+    about = []
+    for n, without_it in enumerate(others):
+        variances, axes = np.linalg.eigh(without_it.covariance())
+        known, root = into @ without_it.mean(), into @ (axes * np.sqrt(np.maximum(variances, 0.0)))
         one = expand(observer, n, every, into @ own[n], errors, observer.horizon).tempered(eta)
         one = marginalised(replace(one, at=one.at - known), into @ scatter)
         about.append(without(one, root))
@@ -397,16 +404,10 @@ def placed(nuisance: Sequence[Effect], effects: Sequence[Effect]) -> np.ndarray:
     return found
 
 
-def _held_out(observer, nuisance, values, warm, V, limits) -> np.ndarray:
-    """Gaps (runs, outputs) of every run by a model of the others, to first order in what leaving it out moves."""
-    gaps, every = [], Pooled.of(warm, V).mean()
-    for n in range(len(warm)):
-        others = [one for k, one in enumerate(warm) if k != n] or warm
-        point = moved(
-            observer.declared, observer.point, nuisance, np.clip(values + Pooled.of(others, V).mean() - every, *limits)
-        )
-        gaps.append(observer.gaps(n, point, observer.horizon))
-    return np.array(gaps)
+def _held_out(observer, nuisance, values, limits) -> np.ndarray:
+    """Gaps (runs, outputs) of every run by a model of the others, whose values (runs, nuisance) are."""
+    points = [moved(observer.declared, observer.point, nuisance, np.clip(one, *limits)) for one in values]
+    return np.array([observer.gaps(n, point, observer.horizon) for n, point in enumerate(points)])
 
 
 def _total(gaps: np.ndarray) -> float:

@@ -16,9 +16,10 @@ from scipy.linalg import solve_triangular
 from glider.tools.own.declare import Declaration
 from glider.tools.own.runs import OwnRun
 
-LENGTH = 2.0  # usual deviations of an input, over which the force is much the same
-SAME = 0.99  # correlation of the means of two inputs that are under one command
-NEW_POINT = 0.05  # of the variance, that known points leave: less is no point of its own
+KERNEL_LENGTH = 2.0  # usual deviations of an input, over which the force is much the same: a prior
+ROUNDING = 1e-9  # of the variance: keeps points of a file that are the same apart
+ONE_COMMAND = 0.99  # correlation of the means of two inputs that are under one command
+NEW_POINT_VARIANCE = 0.05  # of the variance, that known points leave: less is no point of its own
 
 
 def mean_inputs(declared: Declaration, driven: np.ndarray) -> np.ndarray:
@@ -33,14 +34,14 @@ def mean_inputs(declared: Declaration, driven: np.ndarray) -> np.ndarray:
 
 
 def input_shares(declared: Declaration, runs: Sequence[OwnRun]) -> dict[str, float]:
-    """Share of every input in the distance between runs: 1 / how many have the same course of means (SAME)."""
+    """Share of every input in the distance between runs: 1 / how many have the same course of means (ONE_COMMAND)."""
     names = [one.name for one in declared.inputs if one.name in declared.usual_inputs]
     z = np.array([mean_inputs(declared, run.inputs) for run in runs]).reshape(len(runs), len(names))
     z -= z.mean(axis=0)
     length = np.sqrt((z**2).sum(axis=0))
     moving = np.outer(length, length)
     r = np.divide(z.T @ z, moving, out=np.eye(len(names)), where=moving > 0.0)
-    return {name: float(1.0 / (np.abs(row) > SAME).sum()) for name, row in zip(names, r, strict=True)}
+    return {name: float(1.0 / (np.abs(row) > ONE_COMMAND).sum()) for name, row in zip(names, r, strict=True)}
 
 
 def point_weights(declared: Declaration, driven: np.ndarray) -> np.ndarray:
@@ -54,7 +55,7 @@ def with_operating_points(declared: Declaration, runs: Sequence[OwnRun]) -> Decl
     while left and len(left[0]):
         unknown = [1.0 - float(np.sum(_weights(points, z) ** 2)) for z in left]
         farthest = int(np.argmax(unknown))
-        if unknown[farthest] < NEW_POINT:
+        if unknown[farthest] < NEW_POINT_VARIANCE:
             break
         points = (*points, tuple(left.pop(farthest).tolist()))
     return replace(declared, operating_points=points)
@@ -73,8 +74,8 @@ def _weights(points: tuple[tuple[float, ...], ...], z: np.ndarray) -> np.ndarray
 @lru_cache(maxsize=64)
 def _factor(points: tuple[tuple[float, ...], ...]) -> np.ndarray:
     Z = np.array(points)
-    return np.linalg.cholesky(_kernel(Z, Z))
+    return np.linalg.cholesky(_kernel(Z, Z) + ROUNDING * np.eye(len(Z)))
 
 
 def _kernel(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return np.exp(-0.5 * ((a[:, None, :] - b[None, :, :]) ** 2).sum(axis=2) / LENGTH**2)
+    return np.exp(-0.5 * ((a[:, None, :] - b[None, :, :]) ** 2).sum(axis=2) / KERNEL_LENGTH**2)

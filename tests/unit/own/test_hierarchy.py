@@ -12,7 +12,7 @@ from glider.tools.inference.pooled import Pooled, learn_scatter
 from glider.tools.own.decision import FORM_SHARES, SIZES, Deviations, Healthy, Hypothesis, usual_share
 from glider.tools.own.effects import INPUT, PARAMETER, PUSH, Effect
 from glider.tools.own.hierarchy import ChannelErrors, Expansion
-from glider.tools.own.identify import run_inflation
+from glider.tools.own.identify import left_out, run_inflation
 from glider.tools.own.posterior import Engine, alone
 from glider.tools.own.watch import Event, Watch
 
@@ -152,7 +152,8 @@ def test_runs_that_differ_by_more_than_they_say_count_for_less(excess):
     sizes, free = [], np.ones(3, dtype=bool)
     for _ in range(40):
         places = excess * random.standard_normal((20, 3)) / np.sqrt(PRECISION)
-        sizes.append(run_inflation([run_at(place) for place in places], 100.0 * np.eye(3), free))
+        runs, V = [run_at(place) for place in places], 100.0 * np.eye(3)
+        sizes.append(run_inflation(Pooled.of(runs, V), left_out(runs, V), free))
     assert np.median(sizes) == pytest.approx(excess**2, rel=0.3)
     assert min(sizes) >= 1.0
-    assert run_inflation([run_at(place) for place in places[:2]], np.eye(3), free) == 1.0
+    assert run_inflation(Pooled.of(runs[:2], V), left_out(runs[:2], V), free) == 1.0

@@ -14,7 +14,13 @@ from glider.tools.own.diagnose import diagnose_own
 from glider.tools.own.identified import write
 from glider.tools.own.identify import identify
 from glider.tools.own.observer import observer_of
-from glider.tools.own.operating_points import LENGTH, NEW_POINT, input_shares, point_weights, with_operating_points
+from glider.tools.own.operating_points import (
+    KERNEL_LENGTH,
+    NEW_POINT_VARIANCE,
+    input_shares,
+    point_weights,
+    with_operating_points,
+)
 from glider.tools.own.runs import OwnRun
 from tests.support.boat import MODEL
 
@@ -86,8 +92,10 @@ def test_points_give_the_process_its_covariance(known, asked):
     for a, b in itertools.pairwise(known):
         mine, theirs = (point_weights(declared, run_at(one).inputs) for one in (a, b))
         distance = np.hypot((a[0] - b[0]) / 0.5, (a[1] - b[1]) / 2.0)
-        assert mine @ theirs == pytest.approx(np.exp(-0.5 * (distance / LENGTH) ** 2), abs=NEW_POINT + 1e-9)
-        assert 1.0 - NEW_POINT - 1e-9 <= mine @ mine <= 1.0 + 1e-9
+        assert mine @ theirs == pytest.approx(
+            np.exp(-0.5 * (distance / KERNEL_LENGTH) ** 2), abs=NEW_POINT_VARIANCE + 1e-9
+        )
+        assert 1.0 - NEW_POINT_VARIANCE - 1e-9 <= mine @ mine <= 1.0 + 1e-9
     for one in (*known, *asked):  # what was known of a run stays, whatever is asked about beside it
         mine, theirs = (point_weights(some, run_at(one).inputs) for some in (declared, further))
         assert theirs[: len(mine)] == pytest.approx(mine)
