@@ -11,7 +11,6 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
 from glider.tools.own.declare import Declaration
 from glider.tools.own.runs import OwnRun
@@ -68,7 +67,7 @@ def _weights(points: tuple[tuple[float, ...], ...], z: np.ndarray) -> np.ndarray
     """L^-1 k(Z, z), (points,)."""
     if not points:
         return _NONE
-    return solve_triangular(_factor(points), _kernel(np.array(points), z[None])[:, 0], lower=True)
+    return np.linalg.solve(_factor(points), _kernel(np.array(points), z[None])[:, 0])
 
 
 @lru_cache(maxsize=64)
