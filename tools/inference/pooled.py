@@ -97,7 +97,9 @@ class Pooled:
     def covariance(self, V: np.ndarray | None = None) -> np.ndarray:
         """Posterior covariance (k, k)."""
         V = self.V if V is None else V
-        M = np.linalg.solve(np.eye(len(V)) + V @ self.H, V)
+        free, M = np.flatnonzero(np.diag(V) > 0.0), np.zeros(V.shape)  # what is known stays as it is, to the digit
+        known, H = V[np.ix_(free, free)], self.H[np.ix_(free, free)]
+        M[np.ix_(free, free)] = np.linalg.solve(np.eye(len(free)) + known @ H, known)
         return 0.5 * (M + M.T)
 
     def mean(self, V: np.ndarray | None = None) -> np.ndarray:

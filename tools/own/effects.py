@@ -250,11 +250,11 @@ def driven_inputs(run: OwnRun, declared: Declaration, point: ModelPoint) -> np.n
         return run.inputs
     found = run.inputs.copy()
     for n, wrong in point.driven.items():
-        found[:, n] = _driven(run.t, found[:, n], wrong)
+        found[:, n] = _driven(run.t, found[:, n], wrong, declared.inputs[n].interpolated)
     return found
 
 
-def _driven(t: np.ndarray, u: np.ndarray, wrong: dict[str, float]) -> np.ndarray:
+def _driven(t: np.ndarray, u: np.ndarray, wrong: dict[str, float], interpolated: bool) -> np.ndarray:
     """One input (rows,): delayed, limited in rate, range and play, lagged; then gain and offset."""
     travel = float(np.ptp(u)) or float(np.abs(u).max()) or 1.0
     if wrong.get("delay", 0.0) > 0.0:
@@ -270,7 +270,7 @@ def _driven(t: np.ndarray, u: np.ndarray, wrong: dict[str, float]) -> np.ndarray
     if wrong.get("backlash", 0.0) > 0.0:
         u = _played(u, 0.5 * wrong["backlash"])
     if wrong.get("lag", 0.0) > 0.0:
-        u = _lagged(t, u, wrong["lag"])
+        u = _lagged(t, u, wrong["lag"], interpolated)
     return u * (1.0 + wrong.get("gain", 0.0)) + wrong.get("offset", 0.0)
 
 
@@ -289,8 +289,17 @@ def _played(u: np.ndarray, half: float) -> np.ndarray:
     return out
 
 
-def _lagged(t: np.ndarray, u: np.ndarray, lag: float) -> np.ndarray:
-    out = u.copy()
-    for k in range(1, len(u)):
-        out[k] = out[k - 1] + (1.0 - np.exp(-(t[k] - t[k - 1]) / lag)) * (u[k - 1] - out[k - 1])
+def _lagged(t: np.ndarray, u: np.ndarray, lag: float, interpolated: bool) -> np.ndarray:
+    """A first-order lag, exact between rows: of a held input its mean until the next row, else its value at the row."""
+    dt = np.diff(t)
+    left, z, out = np.exp(-dt / lag), u[0], u.copy()
+    for k in range(len(dt)):
+        if interpolated:
+            late = lag * (u[k + 1] - u[k]) / dt[k]
+            z = out[k + 1] = u[k + 1] - late + (z - u[k] + late) * left[k]
+        else:
+            out[k] = u[k] + (z - u[k]) * (1.0 - left[k]) * lag / dt[k]
+            z = u[k] + (z - u[k]) * left[k]
+    if not interpolated:
+        out[-1] = z
     return out

@@ -89,3 +89,11 @@ class SessionRuns:
         """Most probable values (k,) of the session, a label of a size being there over a span."""
         _, H = self.over(first, end)
         return self.session.mean + self.mean - self.M @ (H[:, label] * size)
+
+    def log_density(self, first: int, end: int, label: int, size: float) -> float:
+        """Log posterior density, up to a constant, of the session's values and of a label's size over a span."""
+        (r, H), x = self.over(first, end), self.session.values - self.session.mean
+        free = np.diag(self.session.V) > 0.0
+        apart = x[free] @ np.linalg.solve(self.session.V[np.ix_(free, free)], x[free]) if x.any() else 0.0
+        squares = self.pooled.constant - 2.0 * self.pooled.r @ x + x @ self.pooled.H @ x + apart
+        return float(-0.5 * squares + size * (r - H @ x)[label] - 0.5 * size**2 * H[label, label])

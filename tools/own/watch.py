@@ -6,7 +6,7 @@ one, the most evident first, each relinearised in the runs of its span, until th
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
@@ -47,8 +47,31 @@ MOST_EVENTS = 4
 REFITTED, SPANS = 5, 2  # labels, of the best spans, whose parabolas are taken where they lead to
 UNLIKELY = 7.0  # nat behind the best by the parabola there: not taken
 OWN_ROUNDS, CONVERGED_OWN = 5, 0.1  # of a run's own values, spreads
-ROUNDS, PREPARED = 3, 20
+ROUNDS, PREPARED = 8, 20
+AT_REST = 0.1  # nat: a step of the posterior that gains less is the last
 SHOWN = 3  # numbers that a session differs by
+
+
+Warm = dict[int, tuple[np.ndarray, np.ndarray]]  # run: most probable values (k,) last, and those about which
+
+
+@dataclass(frozen=True)
+class Led:
+    """Where a label over a span, and another session, are most probable."""
+
+    sessions: Sequence[Session]
+    pooled: Sequence[SessionRuns]  # their runs expanded there
+    size: float  # spreads
+    log_density: float  # of the posterior there
+
+
+@dataclass(frozen=True)
+class Refit:
+    """An event where it is most probable, its log odds against what is known, and sessions with it."""
+
+    score: float
+    event: Event
+    sessions: Sequence[Session]
 
 
 class Watch(Engine):
@@ -115,13 +138,15 @@ class Watch(Engine):
         return self.session_of(n, sessions).values + self.of_events(n)
 
     def again(
-        self, n: int, sessions: Sequence[Session], columns: np.ndarray, label: int = 0, size: float = 0.0
+        self, n: int, sessions: Sequence[Session], columns: np.ndarray, label: int, size: float, warm: Warm
     ) -> Expansion:
-        """Run n expanded again where it is, with a label of a size (spreads) beside its events."""
+        """Run n expanded again where it is, or was last, with a label of a size (spreads) beside its events."""
         around = self.at_run(n, sessions)
         around[label] = np.clip(around[label] + size, self.low[label], self.high[label])
-        begin = self.found[n].at + around - self.at_run(n, self.sessions)
-        return self.about(n, around, begin, columns)
+        at, before = warm.get(n) or (self.found[n].at, self.at_run(n, self.sessions))
+        found = self.about(n, around, at + around - before, columns)
+        warm[n] = found.at, around
+        return found
 
     def pooled(self, sessions: Sequence[Session], runs: dict[int, Expansion] | None = None) -> list[SessionRuns]:
         """Runs by session, what events add taken off; runs: others than those that are known, deviations in them."""
@@ -152,9 +177,9 @@ class Watch(Engine):
             return float(np.log(begin * TO_THE_END))
         return float(np.log(begin * (1.0 - TO_THE_END) / max(1, self.count - first - 1)))
 
-    def session_gain(self, sessions: Sequence[Session], runs: dict[int, Expansion] | None = None) -> float:
-        """Log posterior odds of sessions against those that are known; runs: expanded again, deviations in them."""
-        gain = log_evidence(self.pooled(sessions, runs)) - log_evidence(self.pooled(self.sessions))
+    def session_gain(self, pooled: Sequence[SessionRuns], sessions: Sequence[Session]) -> float:
+        """Log posterior odds of sessions, their runs pooled, against those that are known."""
+        gain = log_evidence(pooled) - log_evidence(self.pooled(self.sessions))
         return gain + self.session_prior(sessions)
 
     def session_prior(self, sessions: Sequence[Session]) -> float:
@@ -176,18 +201,15 @@ class Watch(Engine):
     def others(self) -> list[tuple[float, Sequence[Session]]]:
         """Sessions with another one from each run on where none begins, and their log odds by the parabola."""
         tried = [split(self.sessions, n, *self.another) for n in range(self.learned, self.count)]
-        return [(self.session_gain(one), one) for one in tried if len(one) > len(self.sessions)]
+        return [(self.session_gain(self.pooled(one), one), one) for one in tried if len(one) > len(self.sessions)]
 
     def new_session(self, others: Sequence[tuple[float, Sequence[Session]]]) -> tuple[float, Sequence[Session]]:
-        """The likeliest of further sessions, its runs expanded again: its log odds."""
+        """The likeliest of further sessions, where it is most probable: its log odds."""
         if not others:
             return -np.inf, self.sessions
         _, likeliest = max(others, key=lambda one: one[0])
-        first = self.begun(likeliest)
-        assert first is not None
-        sessions, columns = self.expanded(likeliest), np.flatnonzero(self.active)
-        runs = self.led((first, self.session_of(first, sessions).end), sessions, columns)
-        return self.session_gain(sessions, runs), sessions
+        at = self.led((0, 0), self.expanded(likeliest))
+        return self.session_gain(at.pooled, at.sessions), at.sessions
 
     def search(self) -> None:
         """Events and sessions, the most evident first."""
@@ -210,15 +232,15 @@ class Watch(Engine):
                              for row in range(len(own))), reverse=True)  # fmt: skip
             found = [self.compared(tables[t][1][row], self.expanded(tables[t][0]), tables[t][2][row])
                      for _, t, row in ranked[:SPANS] if ranked[0][0] + CHANGE_ODDS > 0.0]  # fmt: skip
-            taken = max(found, key=lambda one: one[0], default=None)
-            if taken is not None and taken[0] > other:
-                total, best, sessions = taken
+            total, taken = max(found, key=lambda one: one[0], default=(-np.inf, None))
+            if taken is not None and total > other:
+                best = taken.event
                 best.probability = float(1.0 / (1.0 + np.exp(-np.clip(total - np.logaddexp(0.0, other), -50.0, 50.0))))
                 best.chances = {label: best.probability * chance for label, chance in best.chances.items()}
                 reach = self.reach[self.healthy.at([best.label])[0]]
                 if best.probability >= CERTAIN and abs(best.size) * reach >= MATERIAL:
                     self.say(f"{best.label} from {self.name(best.first)} to {self.name(best.end - 1)}: {total:.1f} nat")
-                    self.take(sessions, best)
+                    self.take(taken.sessions, best)
                     continue
             if other <= 0.0:
                 break
@@ -228,47 +250,76 @@ class Watch(Engine):
     def name(self, n: int) -> str:
         return self.observer.runs[n].name
 
-    def compared(
-        self, span: tuple[int, int], sessions: Sequence[Session], scores: np.ndarray
-    ) -> tuple[float, Event, Sequence[Session]]:
-        """Labels over a span, each refitted where it leads: log odds of all, the event, sessions."""
+    def compared(self, span: tuple[int, int], sessions: Sequence[Session], scores: np.ndarray) -> tuple[float, Refit]:
+        """Labels over a span, each refitted where it leads: log odds of all, and the event."""
         starts, runs = {int(k): 0.0 for k in np.argsort(scores)[::-1][:REFITTED]}, range(*span)
         if np.sqrt(np.mean([self.left(n) for n in runs])) > STRONG_LEFT:
             starts |= dict(self.strong_sizes(runs)[:REFITTED])
         found = [self.refit(span, k, start, sessions) for k, start in starts.items()]
-        found += self.swapped(max(found, key=lambda one: one[0])[1], found, sessions)
-        total = float(logsumexp([score for score, _ in found]))
+        found += self.swapped(max(found, key=lambda one: one.score), found)
+        total = float(logsumexp([one.score for one in found]))
         best = self.decided(found)
-        best.chances = {one.label: float(np.exp(score - total)) for score, one in found}
-        return total + CHANGE_ODDS, best, sessions
+        best.event.chances = {one.event.label: float(np.exp(one.score - total)) for one in found}
+        return total + CHANGE_ODDS, best
 
-    def decided(self, same: Sequence[tuple[float, Event]]) -> Event:
+    def decided(self, same: Sequence[Refit]) -> Refit:
         """The event of a span: a label where labels together are more probable than a force that none has."""
         effects = {one.label: one for one in self.healthy.effects}
-        forces = [one for one in same if effects[one[1].label].family == PUSH]
-        labels = [one for one in same if effects[one[1].label].family != PUSH]
-        sums = [float(logsumexp([score for score, _ in some])) if some else -np.inf for some in (labels, forces)]
-        return max(labels if sums[0] >= sums[1] else forces, key=lambda one: one[0])[1]
+        forces = [one for one in same if effects[one.event.label].family == PUSH]
+        labels = [one for one in same if effects[one.event.label].family != PUSH]
+        sums = [float(logsumexp([one.score for one in some])) if some else -np.inf for some in (labels, forces)]
+        return max(labels if sums[0] >= sums[1] else forces, key=lambda one: one.score)
 
-    def swapped(
-        self, event: Event, refitted: Sequence[tuple[float, Event]], sessions: Sequence[Session]
-    ) -> list[tuple[float, Event]]:
-        """Labels in an event's place that come nearest to it where it leads, refitted (log odds, event)."""
-        span, every = (event.first, event.end), np.arange(self.k)
-        (place,) = self.healthy.at([event.label])
-        runs = self.led(span, sessions, every, place, event.size)
-        gain, size = self.label_gains(*summed(one.alone(*span) for one in self.pooled(sessions, runs)))
+    def swapped(self, best: Refit, refitted: Sequence[Refit]) -> list[Refit]:
+        """Labels in an event's place that come nearest to it where it leads, refitted."""
+        span, every, warm = (best.event.first, best.event.end), np.arange(self.k), Warm()
+        (place,) = self.healthy.at([best.event.label])
+        runs = [self.again(n, best.sessions, every, place, best.event.size, warm) for n in range(*span)]
+        there = dict(zip(range(*span), self.together.marginal(runs), strict=True))
+        gain, size = self.label_gains(*summed(one.alone(*span) for one in self.pooled(best.sessions, there)))
         likely = gain > gain[place] - UNLIKELY
-        likely[self.healthy.at([one.label for _, one in refitted])] = False
-        return [self.refit(span, int(k), float(size[k]), sessions)
+        likely[self.healthy.at([one.event.label for one in refitted])] = False
+        return [self.refit(span, int(k), float(size[k]), best.sessions)
                 for k in np.argsort(-np.where(likely, gain, -np.inf))[:REFITTED] if likely[k]]  # fmt: skip
 
     def led(
-        self, span: tuple[int, int], sessions: Sequence[Session], columns: np.ndarray, label: int = 0, size: float = 0.0
-    ) -> dict[int, Expansion]:
-        """A span's runs expanded where a label of a size leads, their deviations integrated out."""
-        runs = [self.again(n, sessions, columns, label, size) for n in range(*span)]
-        return dict(zip(range(*span), self.together.marginal(runs), strict=True))
+        self, span: tuple[int, int], sessions: Sequence[Session], label: int = 0, size: float = 0.0,
+        target: Callable[[Sequence[SessionRuns], float], tuple[float, float]] = lambda pooled, size: (0.0, 1.0),
+    ) -> Led:  # fmt: skip
+        """A label over a span and the new one of sessions led to where both are most probable.
+
+        size: where the label begins; target: mean and 1 sigma of it by the parabola about a place. A step is halved
+        until the posterior does not fall: the parabola says where to go, the likelihood whether it is better there.
+        """
+        new, columns = self.begun(sessions), np.unique(np.append(np.flatnonzero(self.active), label))
+        moved = sorted({*range(*span), *(n for n in range(self.learned, self.count)
+                                         if self.session_of(n, sessions).first == new)})  # fmt: skip
+        best, warm = None, Warm()
+        for _ in range(ROUNDS):
+            if size == 0.0 and new is None:
+                runs = {}
+            else:
+                again = [self.again(n, sessions, columns, label, size, warm) for n in moved]
+                runs = dict(zip(moved, self.together.marginal(again), strict=True))
+            pooled = self.pooled(sessions, runs)
+            density = sum(one.log_density(*span, label, size) for one in pooled)
+            gain = np.inf if best is None else density - best.log_density
+            if best is not None and gain < -AT_REST:
+                size = 0.5 * (size + best.size)
+                sessions = [replace(one, values=0.5 * (one.values + other.values)) if one.first == new else one
+                            for one, other in zip(sessions, best.sessions, strict=True)]  # fmt: skip
+                continue
+            best = Led(sessions, pooled, size, density)
+            mean, sd = target(pooled, size)
+            room = max(LONGEST_MOVE, LONGEST_REACH / max(self.reach[label], LEAST_REACH))
+            step = float(np.clip(np.clip(mean, self.low[label], self.high[label]) - size, -room, room))
+            if abs(step) < (sd if gain < AT_REST else 0.0 if new is not None else 0.1 * sd):
+                break
+            size += step
+            sessions = [replace(one, values=each.given(*span, label, size)) if one.first == new else one
+                        for one, each in zip(sessions, pooled, strict=True)]  # fmt: skip
+        assert best is not None
+        return best
 
     def left(self, n: int) -> float:
         """Mean square that a run leaves about where it was expanded, in units of what healthy runs leave."""
@@ -288,44 +339,33 @@ class Watch(Engine):
             self.found[n] = self.about(n, around, self.found[n].at + around - before[n], np.arange(self.k))
             (self.runs[n],) = self.together.marginal([self.found[n]])
 
-    def refit(self, span: tuple[int, int], k: int, start: float, sessions: Sequence[Session]) -> tuple[float, Event]:
-        """A label over a span, expanded where it leads to: log odds against what is known, and the event."""
-        effect, healthy = self.healthy.effects[k], self.healthy
-        columns = np.unique(np.append(np.flatnonzero(self.active), k))
+    def refit(self, span: tuple[int, int], k: int, start: float, sessions: Sequence[Session]) -> Refit:
+        """A label over a span where it is most probable: log odds against what is known, and the event."""
+        effect, healthy, where = self.healthy.effects[k], self.healthy, np.arange(self.k) == k
+        none = np.zeros((self.k, self.k))
         varied = np.array([k, *(force for force in self.forces if force != k)])
-        nothing = log_evidence(self.pooled(self.sessions))
-        size, best = start, (-np.inf, start, 0.0)
-        linear = start == 0.0
-        runs: dict[int, Expansion] | None = {} if linear else None
-        for _ in range(ROUNDS + 1):
-            if runs is not None:
-                pooled = self.pooled(sessions, runs)
-                slope, precision = summed(one.beside(*span, varied) for one in pooled)
-                where = size * (np.arange(self.k) == k)
-                d = np.array([self.variance(np.zeros((self.k, self.k)), [k], [tolerances], where, form)[varied, varied]
-                              for tolerances, form in product(SIZES.tolist(), FORM_SHARES)])  # fmt: skip
-                nat, mean, sd = size_posterior(slope, precision, d, effect.one_sided)
-                score = log_evidence(pooled) + nat
-                mean = float(np.clip(mean, self.low[k], self.high[k]))
-                if not linear and score > best[0]:
-                    best = score, mean, sd
-                linear = False
-                converged = abs(mean - size) < 0.1 * sd
-                room = max(LONGEST_MOVE, LONGEST_REACH / max(self.reach[k], LEAST_REACH))
-                size += float(np.clip(mean - size, -room, room))
-                if converged and np.isfinite(best[0]):
-                    break
-                new = self.begun(sessions)
-                sessions = [
-                    replace(one.session, values=one.given(*span, k, size))
-                    if one.session.first == new and one is not pooled[0] else one.session for one in pooled
-                ]  # fmt: skip
-            runs = self.led(span, sessions, columns, k, size)
-        score, mean, sd = best
-        usual = usual_share(healthy, k, float(self.reach[k]), mean, sd, span[1] - span[0]) if sd > 0.0 else 0.0
+
+        def parabola(pooled: Sequence[SessionRuns], size: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+            d = np.array([self.variance(none, [k], [tolerances], size * where, form)[varied, varied]
+                          for tolerances, form in product(SIZES.tolist(), FORM_SHARES)])  # fmt: skip
+            return *summed(one.beside(*span, varied) for one in pooled), d
+
+        def target(pooled: Sequence[SessionRuns], size: float) -> tuple[float, float]:
+            return size_posterior(*parabola(pooled, size), effect.one_sided)[1:]
+
+        at = self.led(span, sessions, k, start, target)
+        slope, precision, d = parabola(at.pooled, at.size)
+        evidence = log_evidence(at.pooled)
+        nat, mean, sd = size_posterior(slope, precision, d, effect.one_sided)
+        if abs(mean - at.size) > sd:  # the likelihood does not follow: the label's evidence is that where it is
+            evidence += float((slope[0] - precision[0, 0] * at.size) * at.size)
+            nat, mean, sd = size_posterior(precision[0, :1] * at.size, precision[:1, :1], d[:, :1], effect.one_sided)
+        mean = float(np.clip(mean, self.low[k], self.high[k]))
+        usual = usual_share(healthy, k, float(self.reach[k]), mean, sd, span[1] - span[0])
+        prior = self.span_prior(*span, at.sessions) - np.log(self.named) + log_odds(effect)
+        score = evidence + nat - log_evidence(self.pooled(self.sessions)) - usual + prior
         event = Event({}, *span, effect.label, mean, sd, 0.0)
-        prior = self.span_prior(*span, sessions) - np.log(self.named) + log_odds(effect) + self.session_prior(sessions)
-        return score - nothing - usual + prior, event
+        return Refit(score + self.session_prior(at.sessions), event, at.sessions)
 
     def judge(self) -> np.ndarray:
         """Probability of each run to have more left than healthy ones and its events say."""

@@ -14,7 +14,7 @@ from glider.tools.own.effects import INPUT, PARAMETER, PUSH, Effect
 from glider.tools.own.hierarchy import ChannelErrors, Expansion
 from glider.tools.own.identify import left_out, run_inflation
 from glider.tools.own.posterior import Engine, alone
-from glider.tools.own.watch import Event, Watch
+from glider.tools.own.watch import Event, Refit, Watch
 
 LABELS = [Effect("gain", INPUT, "motor", "gain", "1", 0.1), Effect("mass", PARAMETER, "mass", "value", "kg", 0.1),
           Effect("force", PUSH, "heave", "push", "m/s2", 0.1)]  # fmt: skip
@@ -138,10 +138,10 @@ def test_a_label_that_acts_alike_comes_in_the_place_of_the_best():
 
 def test_labels_together_count_against_a_force_that_none_has():
     asked = Watch(Columns(6), healthy(), 2)
-    events = [(score, Event({}, 2, 6, label, 1.0, 0.1, 0.0)) for score, label in
+    events = [Refit(score, Event({}, 2, 6, label, 1.0, 0.1, 0.0), []) for score, label in
               ((10.0, "force"), (9.5, "gain"), (9.4, "mass"))]  # fmt: skip
-    assert asked.decided(events).label == "gain"
-    assert asked.decided(events[:2]).label == "force"
+    assert asked.decided(events).event.label == "gain"
+    assert asked.decided(events[:2]).event.label == "force"
     assert asked.log_prior(()) == pytest.approx(np.log1p(-HEALTHY.changed))
 
 

@@ -1,5 +1,7 @@
 """The generated observer: manifolds, its filter against a Kalman filter, windows that never look ahead."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -119,6 +121,8 @@ def test_every_standard_effect_moves_what_it_is_of_and_nothing_at_no_size(linear
     for one in effects:
         point = moved(vehicle.declared, base, [one], np.zeros(1))
         assert np.array_equal(observer.residuals(0, [point], by, 4.0)[0], nothing), one.label
+        point = moved(vehicle.declared, base, [one], np.array([1e-9]))  # and no jump at its beginning
+        assert observer.residuals(0, [point], by, 4.0)[0] == pytest.approx(nothing, abs=1e-6), one.label
         point = moved(vehicle.declared, base, [one], np.array([3.0]))
         moves = np.abs(observer.residuals(0, [point], by, 4.0)[0] - nothing).max()
         assert moves > 1e-3, one.label
@@ -129,6 +133,27 @@ def test_an_input_that_is_late_is_the_input_of_before(linear):
     late = next(one for one in standard_effects(vehicle.declared, [run], np.ones(1)) if one.label == "push_delay")
     point = moved(vehicle.declared, nominal_point(vehicle.declared), [late], np.array([0.5 / late.spread]))
     assert driven_inputs(run, vehicle.declared, point)[60:, 0] == pytest.approx(run.inputs[55:-5, 0])
+
+
+@pytest.mark.parametrize("interpolated", [False, True])
+def test_an_input_that_lags_is_that_of_a_lag_flown_in_steps_a_hundred_times_finer(linear, interpolated):
+    vehicle, run = linear
+    declared = replace(vehicle.declared, inputs=(replace(vehicle.declared.inputs[0], interpolated=interpolated),))
+    (lag,) = [one for one in standard_effects(declared, [run], np.ones(1)) if one.label == "push_lag"]
+    point = moved(declared, nominal_point(declared), [lag], np.array([0.3 / lag.spread]))
+    found, fine = driven_inputs(run, declared, point)[:, 0], 100
+    u, dt, z = run.inputs[:, 0], float(run.t[1] - run.t[0]) / fine, run.inputs[0, 0]
+    at_rows, means = [z], []
+    for k in range(len(u) - 1):
+        course = []
+        for step in range(fine):
+            wanted = u[k] + (u[k + 1] - u[k]) * (step + 0.5) / fine if interpolated else u[k]
+            z += dt / 0.3 * (wanted - z)
+            course.append(z)
+        at_rows.append(z)
+        means.append(np.mean(course))
+    reach = np.ptp(u)
+    assert found[:-1] == pytest.approx(np.array(at_rows[:-1] if interpolated else means), abs=0.01 * reach)
 
 
 def test_what_is_known_of_a_start_holds_against_a_sensor(tmp_path, linear):

@@ -96,6 +96,25 @@ def test_a_label_over_runs_of_one_or_two_sessions_has_the_evidence_of_the_model_
     assert (nat, mean) == pytest.approx((gain, size))
 
 
+def test_the_density_at_a_place_is_that_of_the_runs_and_the_prior_there():
+    random, label, size, span = np.random.default_rng(11), 1, 0.8, (3, 5)
+    one = session(2, 6, random)
+    there = replace(one, values=one.mean + random.normal(size=K))
+    runs = [parabola(random, random.normal(size=K)) for _ in range(4)]
+
+    def written_out(session, size):
+        total = (session.values - one.mean) @ np.linalg.solve(one.V, session.values - one.mean)
+        for n, run in enumerate(runs, one.first):
+            x = session.values + size * (np.arange(K) == label) * (span[0] <= n < span[1]) - run.at
+            total += run.value + 2.0 * run.slope @ x + x @ run.curvature @ x
+        return -0.5 * total
+
+    begin = replace(one, values=one.mean)
+    found = SessionRuns.of(there, runs).log_density(*span, label, size)
+    nothing = SessionRuns.of(begin, runs).log_density(*span, label, 0.0)
+    assert found - nothing == pytest.approx(written_out(there, size) - written_out(begin, 0.0))
+
+
 def test_a_session_is_split_where_another_begins_and_only_there():
     one = Session(2, 8, np.zeros(K), np.eye(K), np.ones(K))
     first, second = split([one], 5, np.ones(K), 2.0 * np.eye(K))
