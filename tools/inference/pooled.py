@@ -38,7 +38,12 @@ class Parabola:
     @property
     def constant(self) -> float:
         """Value at x = 0."""
-        return float(self.value - 2.0 * self.slope @ self.at + self.at @ self.curvature @ self.at)
+        return self.at_place(np.zeros(len(self.at)))
+
+    def at_place(self, x: np.ndarray) -> float:
+        """-2 log likelihood at x (k,)."""
+        apart = x - self.at
+        return float(self.value + 2.0 * self.slope @ apart + apart @ self.curvature @ apart)
 
     def tempered(self, inflation: float) -> Any:
         """The same with squared errors that count for less."""

@@ -13,7 +13,7 @@ from scipy.special import logsumexp
 from glider.tools.inference.healthy_level import HealthyLevel
 from glider.tools.inference.hyperparameters import HEALTHY
 from glider.tools.inference.pooled import marginalised
-from glider.tools.own.effects import NOISE, PARAMETER, PUSH, Effect
+from glider.tools.own.effects import NOISE, OUTPUT, PARAMETER, PUSH, Effect
 from glider.tools.own.excess_noise import NOISE_SIZES
 from glider.tools.own.hierarchy import ChannelErrors, Expansion
 
@@ -22,6 +22,7 @@ SIZES = NOISE_SIZES  # tolerances, rms over the windows
 # prior odds of a label to one of an input or an output: what is fixed of a vehicle changes less often than what is
 # commanded and read; a constant force that no label has, seldom
 FAMILY_ODDS = {PARAMETER: 0.5, NOISE: 0.5, PUSH: 0.1}
+DRIFT_ODDS = 0.1  # of an output, in one run: instruments drift over days, which in a run is a bias
 STRANGE = 0.1  # that more is left than a hypothesis says
 FORM_SHARES = (0.0, HEALTHY.form_error)  # as probable before the data
 MATERIAL = 0.1  # tolerances: a smaller effect is no gap (docs/reference/gap.md)
@@ -109,7 +110,8 @@ class Posterior:
 
 def log_odds(effect: Effect) -> float:
     """Log prior odds of a label to one of an input or an output."""
-    return float(np.log(FAMILY_ODDS.get(effect.family, 1.0)))
+    drifts = effect.family == OUTPUT and effect.kind == "drift"
+    return float(np.log(DRIFT_ODDS if drifts else FAMILY_ODDS.get(effect.family, 1.0)))
 
 
 def usual_share(healthy: Healthy, k: int, reach: float, size: float, sd: float, runs: int) -> float:

@@ -6,7 +6,7 @@ common. Sizes of effects, c_l ~ N(0, tau_l^2), stand beside the shared values. A
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -109,6 +109,20 @@ def expand(
         np.where(seen, shape[0], 0), np.array(blocks), diagonal, ((J * scales) ** 2).mean(axis=1)[:, seen].mean(axis=1),
         J * scales if keep else None,
     )  # fmt: skip
+
+
+def followed(
+    observer: Observer, n: int, effects: Sequence[Effect], at: np.ndarray, healthy: ChannelErrors, horizon: float,
+    one: Expansion,
+) -> Expansion:  # fmt: skip
+    """Run n about the model at another place, its errors flown there and the derivatives those of an expansion that has
+    kept them: for the way to a place that is expanded itself."""
+    assert one.derivatives is not None
+    point = moved(observer.declared, observer.point, effects, at)
+    e = observer.residuals(n, [point], observer.filter(n, point), horizon)[0] / healthy.scales
+    slope = np.tensordot(one.derivatives / (healthy.scales * healthy.inflation), e, axes=([1, 2], [0, 1]))
+    return replace(one, at=at.copy(), value=float((e * e / healthy.inflation).sum()), slope=slope,
+                   squares=(e**2).sum(axis=0))  # fmt: skip
 
 
 def inflation(found: Sequence[Expansion]) -> np.ndarray:

@@ -41,13 +41,14 @@ from glider.tools.own.effects import (
     standard_effects,
 )
 from glider.tools.own.excess_noise import NoisyWindows, Responses, blocks_of, responses
-from glider.tools.own.hierarchy import ChannelErrors, Expansion, expand
+from glider.tools.own.hierarchy import ChannelErrors, Expansion, expand, followed
 from glider.tools.own.identify import USUAL_OWN_SCATTER, USUAL_SCATTER, USUAL_SESSION_SHARE
 from glider.tools.own.observer import Observer
 
 ANOTHER = 0.1  # that a further effect stands beside one
 NOISES_TRIED = 3  # labels of noises beside a hypothesis
 BEAM, MOST_EFFECTS, ROUNDS, LONGEST_MOVE = 6, 3, 5, 4.0
+WAY, AT_REST = 4, 0.25  # steps along the derivatives of one expansion; nat of the posterior that one has to gain
 LONGEST_REACH = 4.0  # tolerances that a round's move of one number may do at most, where that is more
 STRONG, STRONG_LEFT, STRONG_ROWS = (
     (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0),
@@ -75,15 +76,25 @@ class Engine:
         self.forces = np.array([k for k, one in enumerate(healthy.effects) if one.family == PUSH], dtype=int)
         self.reach = np.zeros(self.k)
 
-    def expansions(self, own: np.ndarray, columns: np.ndarray) -> list[Expansion]:
+    def expansions(self, own: np.ndarray, columns: np.ndarray, keep: bool = False) -> list[Expansion]:
         """Every run about its values (runs, k) in some columns, tempered; the others' rows are 0."""
-        return [self.expansion_of(n, own[n], columns) for n in range(self.count)]
+        return [self.expansion_of(n, own[n], columns, keep) for n in range(self.count)]
 
     def expansion_of(self, n: int, own: np.ndarray, columns: np.ndarray, keep: bool = False) -> Expansion:
         """Run n about its values (k,) in some columns, tempered; the others' rows are 0. keep: with its derivatives."""
         chosen, observer = [self.healthy.effects[k] for k in columns], self._observer_at(own, columns)
         one = expand(observer, n, chosen, own[columns], self.healthy.errors, self.horizon, keep)
         return self._widened(one.tempered(self.healthy.eta), columns, own)
+
+    def followed(self, n: int, own: np.ndarray, columns: np.ndarray, one: Expansion) -> Expansion:
+        """Run n at other values (k,), with the derivatives of an expansion."""
+        chosen, observer = [self.healthy.effects[k] for k in columns], self._observer_at(own, columns)
+        assert one.derivatives is not None
+        kept = replace(one, derivatives=one.derivatives[columns])
+        there = followed(observer, n, chosen, own[columns], self.healthy.errors, self.horizon, kept)
+        slope = np.zeros(self.k)
+        slope[columns] = there.slope / self.healthy.eta
+        return replace(one, at=own.copy(), value=there.value / self.healthy.eta, slope=slope, squares=there.squares)
 
     def _observer_at(self, own: np.ndarray, columns: np.ndarray) -> Observer:
         """The observer about a run's values in all other columns."""
@@ -104,36 +115,47 @@ class Engine:
         return replace(one, at=own.copy(), slope=slope, curvature=curvature, reach=reach, derivatives=derivatives)
 
     def fit(self, labels: tuple[str, ...], begin: Hypothesis | None = None, every: bool = False) -> Hypothesis:
-        """Labels led to where they are most probable, relinearised where they are; evidence by its last expansion."""
+        """Labels led to where they are most probable; evidence by the expansion there.
+
+        On the way the derivatives of the last expansion serve: a place is expanded anew where a way along them ends.
+        """
         places = self.healthy.at(labels)
-        columns = np.flatnonzero(self.active)
-        columns = np.unique(np.concatenate([columns, np.array(places, dtype=int)]))
+        columns = np.unique(np.append(np.flatnonzero(self.active), np.array(places, dtype=int)))
         shared = np.zeros(self.k) if begin is None else begin.shared.copy()
         own = np.tile(shared, (self.count, 1)) if begin is None else begin.own.copy()
-        best: tuple[float, np.ndarray, np.ndarray, list[Expansion]] | None = None
-        for _ in range(ROUNDS):
-            found = self.expansions(own, columns)
-            by, pooled, *_ = self._best_sizes(found, places, shared)
-            cost = sum(one.value for one in found) + by.prior(shared, own, places)
-            if best is not None and not cost < best[0] - 0.1:
-                if cost < best[0]:
-                    best = cost, shared, own, found
-                    break
-                shared, own = 0.5 * (shared + best[1]), 0.5 * (own + best[2])
-                continue
-            best = cost, shared, own, found
-            target = pooled.mean()
-            room = np.maximum(LONGEST_MOVE, LONGEST_REACH / np.maximum(self.reach, LEAST_REACH))  # (k,) spreads
-            shared = np.clip(shared + np.clip(target - shared, -room, room), self.low, self.high)
-            theirs = np.array([run_values(one, shared, by.scatter) for one in found])
-            own = np.clip(own + np.clip(theirs - own, -room, room), self.low, self.high)
-        assert best is not None
-        _, shared, own, found = best
+        room = np.maximum(LONGEST_MOVE, LONGEST_REACH / np.maximum(self.reach, LEAST_REACH))  # (k,) spreads
+        for round_ in range(ROUNDS):
+            found = self.expansions(own, columns, keep=round_ < ROUNDS - 1)
+            by, pooled, evidence, _, sd = self._best_sizes(found, places, shared)
+            cost, gained = sum(one.value for one in found) + by.prior(shared, own, places), 0.0
+            values = pooled.mean()
+            led = np.array([run_values(one, values, by.scatter) for one in found])
+            promised = cost - sum(one.at_place(x) for one, x in zip(found, led, strict=True))
+            promised -= by.prior(values, led, places)
+            if promised < 2.0 * AT_REST:
+                shared, own = np.clip(values, self.low, self.high), np.clip(led, self.low, self.high)
+                break
+            way, share = found, 1.0
+            for _ in range(WAY if round_ < ROUNDS - 1 else 0):
+                target = Pooled.of(by.marginal(way), pooled.V).mean()
+                step = np.clip(np.clip(target, self.low, self.high) - shared, -room, room)
+                of_runs = np.array([run_values(one, shared + step, by.scatter) for one in way])
+                of_runs = np.clip(np.clip(of_runs, self.low, self.high) - own, -room, room)
+                tried, theirs = shared + share * step, own + share * of_runs
+                there = [self.followed(n, theirs[n], columns, one) for n, one in enumerate(way)]
+                gain = cost - sum(one.value for one in there) - by.prior(tried, theirs, places)
+                if gain < 2.0 * AT_REST:
+                    share *= 0.5
+                    continue
+                shared, own, way, cost, gained = tried, theirs, there, cost - gain, gained + gain
+            if gained == 0.0:
+                break
+        evidence -= 0.5 * max(0.0, promised)  # that the parabola says of a place that the likelihood was not led to
         if every:
             found = self.expansions(own, np.arange(self.k))
-        *_, evidence, mean, sd = self._best_sizes(found, places, shared)
         left = np.array([one.squares.sum() / max(1, one.samples.sum()) for one in found])
-        return Hypothesis(labels, evidence + self.log_prior(labels), mean, sd, shared, own, left, 0.0, found)
+        found = [replace(one, derivatives=None) for one in found]
+        return Hypothesis(labels, evidence + self.log_prior(labels), shared[places], sd, shared, own, left, 0.0, found)
 
     def variance(
         self, V: np.ndarray, places: Sequence[int], sizes: Sequence[float], shared: np.ndarray, form: float

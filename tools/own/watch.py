@@ -32,7 +32,15 @@ from glider.tools.own.hierarchy import Expansion
 from glider.tools.own.identify import CONVERGED_GAIN, SCATTER_ROUNDS, LineSearch, damped_step
 from glider.tools.own.load import LoadedVehicle
 from glider.tools.own.observer import Observer, observer_of
-from glider.tools.own.posterior import LONGEST_MOVE, LONGEST_REACH, STRONG_LEFT, Engine, healthy_of, under_priors
+from glider.tools.own.posterior import (
+    AT_REST,
+    LONGEST_MOVE,
+    LONGEST_REACH,
+    STRONG_LEFT,
+    Engine,
+    healthy_of,
+    under_priors,
+)
 from glider.tools.own.runs import OwnRun
 from glider.tools.own.sessions import Session, SessionRuns, of_another, split
 from glider.tools.own.watched import CERTAIN, Event, Watched
@@ -48,7 +56,6 @@ REFITTED, SPANS = 5, 2  # labels, of the best spans, whose parabolas are taken w
 UNLIKELY = 7.0  # nat behind the best by the parabola there: not taken
 OWN_ROUNDS, CONVERGED_OWN = 5, 0.1  # of a run's own values, spreads
 ROUNDS, PREPARED = 8, 20
-AT_REST = 0.1  # nat: a step of the posterior that gains less is the last
 SHOWN = 3  # numbers that a session differs by
 
 
