@@ -9,7 +9,7 @@ with K_w what they do, J_w what the values of the model do, and S_w = (size^-2 +
 """
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -107,21 +107,25 @@ class NoisyWindows:
         mean = float((chance * grid).sum())
         return mean, float(np.sqrt(max((chance * (grid - mean) ** 2).sum(), 1e-30)))
 
-    def marginalised(self, runs: Sequence[Expansion], size: float) -> list[Expansion]:
+    def marginalised(
+        self, runs: Sequence[Expansion], size: float, at_level: Callable[[Expansion], Expansion] = lambda one: one
+    ) -> list[Expansion]:
         """Expansions of the runs, with their derivatives kept, with forces of a size (densities) integrated out."""
         found, w = [], 0
         for run, one in zip(runs, self.found, strict=True):
             assert run.derivatives is not None
-            A, g, value = run.curvature.copy(), run.slope.copy(), run.value
+            A, g, value, volume = run.curvature.copy(), run.slope.copy(), run.value, 0.0
             K = one.patterns[self.block] * self.weight
             for a, b in itertools.pairwise(one.cuts):
                 C = self.U[w].T @ np.tensordot(K[:, a:b], run.derivatives[:, a:b], axes=([1, 2], [1, 2]))
                 S = 1.0 / (size**-2 + self.d[w])
                 A -= C.T @ (S[:, None] * C)
                 g -= C.T @ (S * self.g[w])
-                value += float(np.log1p(size**2 * self.d[w]).sum() - (S * self.g[w] ** 2).sum())
+                value -= float((S * self.g[w] ** 2).sum())
+                volume += float(np.log1p(size**2 * self.d[w]).sum())
                 w += 1
-            found.append(replace(run, curvature=0.5 * (A + A.T), slope=g, value=value))
+            there = at_level(replace(run, curvature=0.5 * (A + A.T), slope=g, value=value))
+            found.append(replace(there, value=there.value + volume))
         return found
 
     def left(self, size: float) -> np.ndarray:

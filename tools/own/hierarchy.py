@@ -17,6 +17,7 @@ from glider.tools.own.operating_points import point_weights
 
 STEP, LONG_STEP, SHORTENED = 0.1, 3.0, 0.5  # spreads; rms errors that a step may move, and to what it is shortened
 PARTS = 1, 4  # of a window, in each of which errors may be the same
+LEVEL_ROUNDS, LEVEL_AT_REST = 30, 1e-9
 UNSEEN_STEP = 1.0  # spreads: step of an effect that begins at a kink
 
 
@@ -123,6 +124,48 @@ def followed(
     slope = np.tensordot(one.derivatives / (healthy.scales * healthy.inflation), e, axes=([1, 2], [0, 1]))
     return replace(one, at=at.copy(), value=float((e * e / healthy.inflation).sum()), slope=slope,
                    squares=(e**2).sum(axis=0))  # fmt: skip
+
+
+@dataclass(frozen=True)
+class RunLevel:
+    """Errors of a run may all be larger than healthy runs' by a factor r >= 1 of the run's own.
+
+    log r is half-normal, of 1 sigma `scatter`: with N independent errors whose squares sum to S, -2 log likelihood is
+    the least of S / r + N log r + (log r / scatter)^2 over r.
+    """
+
+    errors: ChannelErrors
+    eta: float
+    scatter: float
+
+    def log_level(self, squares: float, count: float) -> float:
+        """The most probable log r."""
+        if self.scatter <= 0.0 or squares <= count or not np.isfinite(squares):
+            return 0.0
+        level = 0.0
+        for _ in range(LEVEL_ROUNDS):
+            slope = count + 2.0 * level / self.scatter**2 - squares * np.exp(-level)
+            step = slope / (2.0 / self.scatter**2 + squares * np.exp(-level))
+            level -= float(np.clip(step, -1.0, 1.0))
+            if abs(step) < LEVEL_AT_REST:
+                break
+        return level
+
+    def count(self, one: Expansion) -> float:
+        """Independent errors of a run."""
+        return float((one.samples / self.errors.inflation).sum() / self.eta)
+
+    def value(self, squares: float, count: float) -> float:
+        level = self.log_level(squares, count)
+        apart = (level / self.scatter) ** 2 if level else 0.0
+        return squares * float(np.exp(-level)) + count * level + apart
+
+    def of(self, one: Expansion) -> Expansion:
+        """A run, tempered, at its own level: a parabola that is nowhere below what it has."""
+        count = self.count(one)
+        share = float(np.exp(-self.log_level(one.value, count)))
+        return replace(one, value=self.value(one.value, count), slope=share * one.slope,
+                       curvature=share * one.curvature)  # fmt: skip
 
 
 def inflation(found: Sequence[Expansion]) -> np.ndarray:

@@ -28,7 +28,7 @@ from glider.tools.own.effects import (
     usual_inputs,
 )
 from glider.tools.own.excess_noise import NOISE_SIZES, responses, usual_gains
-from glider.tools.own.hierarchy import ChannelErrors, Expansion, expand, inflation
+from glider.tools.own.hierarchy import ChannelErrors, Expansion, RunLevel, expand, inflation
 from glider.tools.own.load import LoadedVehicle
 from glider.tools.own.observer import Observer, observer_of
 from glider.tools.own.operating_points import input_shares
@@ -256,6 +256,7 @@ class LineSearch:
     errors: ChannelErrors
     horizon: float
     first: int = 0  # run of the observer that `warm` begins with
+    level: RunLevel | None = None  # of the runs' own errors, where they have one
 
     def prior(self, x: np.ndarray, own: np.ndarray) -> float:
         apart, free = ((own - x) / np.maximum(self.scatter, 1e-6)) ** 2, np.diag(self.V) > 0.0
@@ -266,7 +267,8 @@ class LineSearch:
         error = self.observer.residuals(
             self.first + n, [point], self.observer.filter(self.first + n, point), self.horizon
         )[0]
-        return float((error**2 / self.errors.weight).sum()) / self.eta
+        squares = float((error**2 / self.errors.weight).sum()) / self.eta
+        return squares if self.level is None else self.level.value(squares, self.level.count(self.warm[n]))
 
     def along(self, values: np.ndarray, own: np.ndarray, step: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
         """Values, runs' own values and the gain of a step, shortened until the exact posterior gains."""

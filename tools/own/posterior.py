@@ -41,7 +41,7 @@ from glider.tools.own.effects import (
     standard_effects,
 )
 from glider.tools.own.excess_noise import NoisyWindows, Responses, blocks_of, responses
-from glider.tools.own.hierarchy import ChannelErrors, Expansion, expand, followed
+from glider.tools.own.hierarchy import ChannelErrors, Expansion, RunLevel, expand, followed
 from glider.tools.own.identify import USUAL_OWN_SCATTER, USUAL_SCATTER, USUAL_SESSION_SHARE
 from glider.tools.own.observer import Observer
 
@@ -75,16 +75,20 @@ class Engine:
         self.candidate = np.array([one.family not in (FORM, NOISE) for one in healthy.effects])
         self.forces = np.array([k for k, one in enumerate(healthy.effects) if one.family == PUSH], dtype=int)
         self.reach = np.zeros(self.k)
+        self.level = RunLevel(healthy.errors, healthy.eta, healthy.level_scatter)
 
     def expansions(self, own: np.ndarray, columns: np.ndarray, keep: bool = False) -> list[Expansion]:
         """Every run about its values (runs, k) in some columns, tempered; the others' rows are 0."""
         return [self.expansion_of(n, own[n], columns, keep) for n in range(self.count)]
 
-    def expansion_of(self, n: int, own: np.ndarray, columns: np.ndarray, keep: bool = False) -> Expansion:
+    def expansion_of(
+        self, n: int, own: np.ndarray, columns: np.ndarray, keep: bool = False, leveled: bool = True
+    ) -> Expansion:
         """Run n about its values (k,) in some columns, tempered; the others' rows are 0. keep: with its derivatives."""
         chosen, observer = [self.healthy.effects[k] for k in columns], self._observer_at(own, columns)
         one = expand(observer, n, chosen, own[columns], self.healthy.errors, self.horizon, keep)
-        return self._widened(one.tempered(self.healthy.eta), columns, own)
+        one = one.tempered(self.healthy.eta)
+        return self._widened(self.level.of(one) if leveled else one, columns, own)
 
     def followed(self, n: int, own: np.ndarray, columns: np.ndarray, one: Expansion) -> Expansion:
         """Run n at other values (k,), with the derivatives of an expansion."""
@@ -92,9 +96,12 @@ class Engine:
         assert one.derivatives is not None
         kept = replace(one, derivatives=one.derivatives[columns])
         there = followed(observer, n, chosen, own[columns], self.healthy.errors, self.horizon, kept)
+        there = there.tempered(self.healthy.eta)
+        share = np.exp(-self.level.log_level(there.value, self.level.count(one)))
         slope = np.zeros(self.k)
-        slope[columns] = there.slope / self.healthy.eta
-        return replace(one, at=own.copy(), value=there.value / self.healthy.eta, slope=slope, squares=there.squares)
+        slope[columns] = share * there.slope
+        return replace(one, at=own.copy(), value=self.level.value(there.value, self.level.count(one)), slope=slope,
+                       squares=there.squares)  # fmt: skip
 
     def _observer_at(self, own: np.ndarray, columns: np.ndarray) -> Observer:
         """The observer about a run's values in all other columns."""
@@ -130,9 +137,9 @@ class Engine:
             cost, gained = sum(one.value for one in found) + by.prior(shared, own, places), 0.0
             values = pooled.mean()
             led = np.array([run_values(one, values, by.scatter) for one in found])
-            promised = cost - sum(one.at_place(x) for one, x in zip(found, led, strict=True))
-            promised -= by.prior(values, led, places)
-            if promised < 2.0 * AT_REST:
+            predicted_gain = cost - sum(one.at_place(x) for one, x in zip(found, led, strict=True))
+            predicted_gain -= by.prior(values, led, places)
+            if predicted_gain < 2.0 * AT_REST:
                 shared, own = np.clip(values, self.low, self.high), np.clip(led, self.low, self.high)
                 break
             way, share = found, 1.0
@@ -150,7 +157,9 @@ class Engine:
                 shared, own, way, cost, gained = tried, theirs, there, cost - gain, gained + gain
             if gained == 0.0:
                 break
-        evidence -= 0.5 * max(0.0, promised)  # that the parabola says of a place that the likelihood was not led to
+        evidence -= 0.5 * max(
+            0.0, predicted_gain
+        )  # that the parabola says of a place that the likelihood was not led to
         if every:
             found = self.expansions(own, np.arange(self.k))
         left = np.array([one.squares.sum() / max(1, one.samples.sum()) for one in found])
@@ -353,7 +362,7 @@ class Engine:
             for n in range(self.count):
                 point = moved(self.observer.declared, self.observer.point, self.healthy.effects, begin.own[n])
                 flown.append(responses(self.observer.about(point), n, self.horizon))
-                runs.append(self.expansion_of(n, begin.own[n], columns, keep=True))
+                runs.append(self.expansion_of(n, begin.own[n], columns, keep=True, leveled=False))
             tried: list[tuple[float, str, NoisyWindows]] = []
             for place, one in enumerate(noises):
                 for block in blocks_of(place):
@@ -374,7 +383,7 @@ class Engine:
         labels, places = (*begin.labels, label), self.healthy.at(begin.labels)
         table = []
         for size in SIZES:
-            noisy = windows.marginalised(runs, size / windows.reach)
+            noisy = windows.marginalised(runs, size / windows.reach, self.level.of)
             _, _, evidence, mean, sd = self._best_sizes(noisy, places, begin.shared)
             table.append((evidence, mean, sd))
         evidence = float(logsumexp([row[0] for row in table]) - np.log(len(SIZES)))

@@ -102,7 +102,8 @@ class Watch(Engine):
                 self.together = replace(self.together, scatter=learned)
             pooled = Pooled.of(self.together.marginal(found), self.together.V)
             search = LineSearch(self.observer, healthy.effects, found, self.together.scatter, healthy.eta,
-                                self.together.V, (self.low, self.high), healthy.errors, self.horizon)  # fmt: skip
+                                self.together.V, (self.low, self.high), healthy.errors, self.horizon, 0,
+                                self.level)  # fmt: skip
             shared, own, gain = search.along(shared, own, damped_step(pooled, shared))
             if gain < CONVERGED_GAIN and round_ >= SCATTER_ROUNDS:
                 break
@@ -122,7 +123,7 @@ class Watch(Engine):
         for _ in range(OWN_ROUNDS):
             found = self.expansion_of(n, own, columns)
             search = LineSearch(self.observer, healthy.effects, [found], scatter, healthy.eta, self.together.V,
-                                (self.low, self.high), healthy.errors, self.horizon, n)  # fmt: skip
+                                (self.low, self.high), healthy.errors, self.horizon, n, self.level)  # fmt: skip
             _, (moved_own,), _ = search.along(around, own[None], np.zeros(self.k))
             if np.abs(moved_own - own).max() < CONVERGED_OWN:
                 return found

@@ -11,7 +11,7 @@ from glider.tools.inference.hyperparameters import HEALTHY
 from glider.tools.inference.pooled import Pooled, learn_scatter
 from glider.tools.own.decision import FORM_SHARES, SIZES, Deviations, Healthy, Hypothesis, usual_share
 from glider.tools.own.effects import INPUT, PARAMETER, PUSH, Effect
-from glider.tools.own.hierarchy import ChannelErrors, Expansion
+from glider.tools.own.hierarchy import ChannelErrors, Expansion, RunLevel
 from glider.tools.own.identify import left_out, run_inflation
 from glider.tools.own.posterior import Engine, alone
 from glider.tools.own.watch import Event, Refit, Watch
@@ -143,6 +143,32 @@ def test_labels_together_count_against_a_force_that_none_has():
     assert asked.decided(events).event.label == "gain"
     assert asked.decided(events[:2]).event.label == "force"
     assert asked.log_prior(()) == pytest.approx(np.log1p(-HEALTHY.changed))
+
+
+LEVEL = RunLevel(ChannelErrors(np.ones(1), np.full(1, 4.0)), 2.0, 0.5)
+
+
+@pytest.mark.parametrize("squares", [0.0, 10.0, 40.0, 400.0])
+def test_a_run_s_own_level_of_errors_is_the_most_probable(squares):
+    levels = np.linspace(0.0, 6.0, 100_001)
+    every = squares * np.exp(-levels) + 40.0 * levels + (levels / 0.5) ** 2
+    assert LEVEL.value(squares, 40.0) == pytest.approx(every.min(), abs=1e-4)
+    assert LEVEL.log_level(squares, 40.0) == pytest.approx(levels[every.argmin()], abs=1e-3)
+    assert replace(LEVEL, scatter=0.0).value(squares, 40.0) == squares
+
+
+@pytest.mark.parametrize("size", [0.1, 1.0])
+def test_a_run_at_its_own_level_is_a_parabola_above_what_it_has_everywhere(size):
+    random = np.random.default_rng(8)
+    one = replace(run_at(size * random.normal(size=3), 0.3), samples=np.full(1, 320.0))  # 40 independent errors
+    leveled, count = LEVEL.of(one), LEVEL.count(one)
+    assert count == pytest.approx(40.0)
+    assert leveled.value == pytest.approx(LEVEL.value(one.value, count))
+    for _ in range(20):
+        x = random.normal(size=3)
+        assert leveled.at_place(x) > LEVEL.value(one.at_place(x), count) - 1e-9
+        near = one.at + 1e-6 * x
+        assert leveled.at_place(near) == pytest.approx(LEVEL.value(one.at_place(near), count), abs=1e-6)
 
 
 @pytest.mark.parametrize("excess", [1.0, 3.0])
