@@ -130,41 +130,51 @@ class Engine:
         columns = np.unique(np.append(np.flatnonzero(self.active), np.array(places, dtype=int)))
         shared = np.zeros(self.k) if begin is None else begin.shared.copy()
         own = np.tile(shared, (self.count, 1)) if begin is None else begin.own.copy()
-        room = np.maximum(LONGEST_MOVE, LONGEST_REACH / np.maximum(self.reach, LEAST_REACH))  # (k,) spreads
         for round_ in range(ROUNDS):
             found = self.expansions(own, columns, keep=round_ < ROUNDS - 1)
             by, pooled, evidence, _, sd = self._best_sizes(found, places, shared)
-            cost, gained = sum(one.value for one in found) + by.prior(shared, own, places), 0.0
             values = pooled.mean()
             led = np.array([run_values(one, values, by.scatter) for one in found])
-            predicted_gain = cost - sum(one.at_place(x) for one, x in zip(found, led, strict=True))
-            predicted_gain -= by.prior(values, led, places)
+            predicted_gain = sum(one.value - one.at_place(x) for one, x in zip(found, led, strict=True))
+            predicted_gain += by.prior(shared, own, places) - by.prior(values, led, places)
             if predicted_gain < 2.0 * AT_REST:
                 shared, own = np.clip(values, self.low, self.high), np.clip(led, self.low, self.high)
                 break
-            way, share = found, 1.0
-            for _ in range(WAY if round_ < ROUNDS - 1 else 0):
-                target = Pooled.of(by.marginal(way), pooled.V).mean()
-                step = np.clip(np.clip(target, self.low, self.high) - shared, -room, room)
-                of_runs = np.array([run_values(one, shared + step, by.scatter) for one in way])
-                of_runs = np.clip(np.clip(of_runs, self.low, self.high) - own, -room, room)
-                tried, theirs = shared + share * step, own + share * of_runs
-                there = [self.followed(n, theirs[n], columns, one) for n, one in enumerate(way)]
-                gain = cost - sum(one.value for one in there) - by.prior(tried, theirs, places)
-                if gain < 2.0 * AT_REST:
-                    share *= 0.5
-                    continue
-                shared, own, way, cost, gained = tried, theirs, there, cost - gain, gained + gain
+            gained = 0.0
+            if round_ < ROUNDS - 1:
+                shared, own, gained = self._along(found, by, pooled.V, shared, own, places)
             if gained == 0.0:
                 break
-        evidence -= 0.5 * max(
-            0.0, predicted_gain
-        )  # that the parabola says of a place that the likelihood was not led to
+        # what the parabola says of a place that the likelihood was not led to is no evidence
+        evidence -= 0.5 * max(0.0, predicted_gain)
         if every:
             found = self.expansions(own, np.arange(self.k))
         left = np.array([one.squares.sum() / max(1, one.samples.sum()) for one in found])
         found = [replace(one, derivatives=None) for one in found]
         return Hypothesis(labels, evidence + self.log_prior(labels), shared[places], sd, shared, own, left, 0.0, found)
+
+    def _along(
+        self, found: Sequence[Expansion], by: Deviations, V: np.ndarray, shared: np.ndarray, own: np.ndarray,
+        places: Sequence[int],
+    ) -> tuple[np.ndarray, np.ndarray, float]:  # fmt: skip
+        """Values led on from where runs are expanded by the derivatives there, V (k, k) the prior: shared (k,), own
+        (runs, k), and by how much -2 log posterior fell, flown at every place."""
+        room = np.maximum(LONGEST_MOVE, LONGEST_REACH / np.maximum(self.reach, LEAST_REACH))  # (k,) spreads
+        columns = np.unique(np.append(np.flatnonzero(self.active), np.array(places, dtype=int)))
+        cost, gained, share = sum(one.value for one in found) + by.prior(shared, own, places), 0.0, 1.0
+        for _ in range(WAY):
+            target = np.clip(Pooled.of(by.marginal(found), V).mean(), self.low, self.high)
+            step = np.clip(target - shared, -room, room)
+            of_runs = np.array([run_values(one, shared + step, by.scatter) for one in found])
+            of_runs = np.clip(np.clip(of_runs, self.low, self.high) - own, -room, room)
+            tried, theirs = shared + share * step, own + share * of_runs
+            there = [self.followed(n, theirs[n], columns, one) for n, one in enumerate(found)]
+            gain = cost - sum(one.value for one in there) - by.prior(tried, theirs, places)
+            if gain < 2.0 * AT_REST:
+                share *= 0.5
+            else:
+                shared, own, found, cost, gained = tried, theirs, there, cost - gain, gained + gain
+        return shared, own, gained
 
     def variance(
         self, V: np.ndarray, places: Sequence[int], sizes: Sequence[float], shared: np.ndarray, form: float
