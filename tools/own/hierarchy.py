@@ -17,7 +17,7 @@ from glider.tools.own.operating_points import point_weights
 
 STEP, LONG_STEP, SHORTENED = 0.1, 3.0, 0.5  # spreads; rms errors that a step may move, and to what it is shortened
 PARTS = 1, 4  # of a window, in each of which errors may be the same
-LEVEL_ROUNDS, LEVEL_AT_REST = 30, 1e-9
+LEVEL_ROUNDS, LEVEL_AT_REST = 30, 1e-9  # of Newton's method for log r
 UNSEEN_STEP = 1.0  # spreads: step of an effect that begins at a kink
 
 
@@ -156,6 +156,7 @@ class RunLevel:
         return float((one.samples / self.errors.inflation).sum() / self.eta)
 
     def value(self, squares: float, count: float) -> float:
+        """-2 log likelihood of errors, up to a constant."""
         level = self.log_level(squares, count)
         apart = (level / self.scatter) ** 2 if level else 0.0
         return squares * float(np.exp(-level)) + count * level + apart

@@ -321,7 +321,7 @@ class Watch(Engine):
             mean, sd = target(pooled, size)
             room = max(LONGEST_MOVE, LONGEST_REACH / max(self.reach[label], LEAST_REACH))
             step = float(np.clip(np.clip(mean, self.low[label], self.high[label]) - size, -room, room))
-            if abs(step) < (sd if gain < AT_REST else 0.0 if new is not None else 0.1 * sd):
+            if (gain < AT_REST and abs(step) < sd) or (new is None and abs(step) < 0.1 * sd):
                 break
             size += step
             sessions = [replace(one, values=each.given(*span, label, size)) if one.first == new else one
