@@ -17,11 +17,12 @@ import numpy as np
 
 from glider.tools.own.decision import NONE, Posterior
 from glider.tools.own.effects import Effect, driven_inputs, moved, nominal_point, standard_effects
+from glider.tools.own.healthy import healthy_of
 from glider.tools.own.identified import VEHICLE, write
 from glider.tools.own.identify import identify
 from glider.tools.own.load import LoadedVehicle, read_own
 from glider.tools.own.observer import Observer
-from glider.tools.own.posterior import Engine, healthy_of
+from glider.tools.own.posterior import Engine
 from glider.tools.own.runs import OwnRun
 
 FOSSEN = Path(__file__).parents[2] / "docs" / "examples" / "fossen_auv" / "remus.toml"

@@ -12,10 +12,11 @@ from glider.tools.data.intervals import NINETY
 from glider.tools.data.plain import as_plain
 from glider.tools.own.decision import NONE, UNKNOWN, Healthy, Hypothesis, Posterior
 from glider.tools.own.effects import NOISE, PUSH, ModelPoint
+from glider.tools.own.healthy import effect_point, healthy_of
 from glider.tools.own.identified import toml_text
 from glider.tools.own.load import LoadedVehicle
 from glider.tools.own.observer import Observer, observer_of
-from glider.tools.own.posterior import Engine, effect_point, healthy_of
+from glider.tools.own.posterior import Engine
 from glider.tools.own.runs import OwnRun
 
 ANSWER, CORRECTED = "diagnosis.json", "corrected.toml"

@@ -28,21 +28,9 @@ from glider.tools.own.decision import (
     log_odds,
     strangeness,
 )
-from glider.tools.own.declare import RUN
-from glider.tools.own.effects import (
-    FORM,
-    NOISE,
-    PUSH,
-    ModelPoint,
-    form_errors,
-    moved,
-    noise_effects,
-    pushes,
-    standard_effects,
-)
+from glider.tools.own.effects import FORM, NOISE, PUSH, moved
 from glider.tools.own.excess_noise import NoisyWindows, Responses, blocks_of, responses
-from glider.tools.own.hierarchy import ChannelErrors, Expansion, RunLevel, expand, followed
-from glider.tools.own.identify import USUAL_OWN_SCATTER, USUAL_SCATTER, USUAL_SESSION_SHARE
+from glider.tools.own.hierarchy import Expansion, RunLevel, expand, followed
 from glider.tools.own.observer import Observer
 
 ANOTHER = 0.1  # that a further effect stands beside one
@@ -55,7 +43,6 @@ STRONG, STRONG_LEFT, STRONG_ROWS = (
     1.5,
     1_500,
 )  # tolerances; times healthy; rows looked at
-UNIDENTIFIED_INFLATION = 30.0  # rows of a window that err alike, of a vehicle that was never identified
 
 
 class Engine:
@@ -434,61 +421,3 @@ def size_evidence(slope, precision, reach, one_sided) -> np.ndarray:
     gain = 0.5 * (slope**2 * tau2 / total - np.log(total))
     halved = np.log(2.0) + norm.logcdf(slope * np.sqrt(tau2 / total))
     return logsumexp(gain + np.where(one_sided, halved, 0.0), axis=-1) - np.log(len(SIZES))
-
-
-def healthy_of(observer: Observer) -> Healthy:
-    """What an identified vehicle file says of itself; one that is not identified, what it allows for."""
-    declared, table = observer.declared, observer.vehicle.file.identified
-    labels = standard_effects(declared, observer.runs, observer.tolerances)
-    effects = [*labels, *noise_effects(declared), *pushes(declared), *form_errors(declared)]
-    names = [one.label for one in effects]
-    k = len(effects)
-    scatter, usual, V = np.zeros(k), np.full(k, USUAL_SCATTER), np.zeros((k, k))
-    if table is None:
-        for one in declared.parameters:
-            V[names.index(one.name), names.index(one.name)] = (
-                one.uncertainty / effects[names.index(one.name)].spread
-            ) ** 2
-        errors = ChannelErrors(np.ones(len(declared.outputs)), np.full(len(declared.outputs), UNIDENTIFIED_INFLATION))
-        scatter[[names.index(one.name) for one in declared.parameters if one.scope == RUN]] = USUAL_OWN_SCATTER
-        session = np.sqrt(USUAL_SESSION_SHARE) * scatter
-        return Healthy(effects, V, scatter, session, np.zeros(k), errors, 1.0, 1, HEALTHY.run_scale)
-    places = [names.index(name) for name in table.parameters]
-    spreads = np.array([effects[k].spread for k in places])
-    V[np.ix_(places, places)] = np.array(table.covariance).reshape(len(places), len(places)) / np.outer(
-        spreads, spreads
-    )
-    for n, effect in enumerate(effects):  # of other operating points than identified ones, how large such forces are
-        if effect.at_point is not None and effect.at_point >= len(table.operating_points):
-            V[n, n] = (table.operating_scatter.get(effect.name, 0.0) / effect.spread) ** 2
-    session = np.zeros(k)
-    shared = table.session_scatter or {
-        name: float(np.sqrt(table.session_share)) * value for name, value in table.scatter.items()
-    }
-    for into, values in ((scatter, table.scatter), (session, shared), (usual, table.label_scatter)):
-        for name, value in values.items():
-            if name in names:
-                into[names.index(name)] = value / effects[names.index(name)].spread
-    errors = ChannelErrors(
-        np.array([max(table.gap.get(one.name, 1.0), 1e-3) for one in declared.outputs]),
-        np.array([table.channel_inflation.get(one.name, 1.0) for one in declared.outputs]),
-    )
-    return Healthy(
-        effects,
-        V,
-        scatter,
-        session,
-        usual,
-        errors,
-        table.inflation,
-        table.runs,
-        table.level_scatter,
-        table.noise_gain,
-    )
-
-
-def effect_point(observer: Observer, healthy: Healthy, labels: Sequence[str], sizes: np.ndarray) -> ModelPoint:
-    """The vehicle's model with labels of sizes (labels,) in spreads."""
-    values = np.zeros(len(healthy.effects))
-    values[healthy.at(labels)] = sizes
-    return moved(observer.declared, observer.point, healthy.effects, values)

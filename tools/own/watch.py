@@ -28,19 +28,12 @@ from glider.tools.own.decision import (
     usual_share,
 )
 from glider.tools.own.effects import FORM, PUSH
+from glider.tools.own.healthy import healthy_of
 from glider.tools.own.hierarchy import Expansion
 from glider.tools.own.identify import CONVERGED_GAIN, SCATTER_ROUNDS, LineSearch, damped_step
 from glider.tools.own.load import LoadedVehicle
 from glider.tools.own.observer import Observer, observer_of
-from glider.tools.own.posterior import (
-    AT_REST,
-    LONGEST_MOVE,
-    LONGEST_REACH,
-    STRONG_LEFT,
-    Engine,
-    healthy_of,
-    under_priors,
-)
+from glider.tools.own.posterior import AT_REST, LONGEST_MOVE, LONGEST_REACH, STRONG_LEFT, Engine, under_priors
 from glider.tools.own.runs import OwnRun
 from glider.tools.own.sessions import Session, SessionRuns, of_another, split
 from glider.tools.own.watched import CERTAIN, Event, Watched
@@ -55,7 +48,7 @@ MOST_EVENTS = 4
 REFITTED, SPANS = 5, 2  # labels, of the best spans, whose parabolas are taken where they lead to
 UNLIKELY = 7.0  # nat behind the best by the parabola there: not taken
 OWN_ROUNDS, CONVERGED_OWN = 5, 0.1  # of a run's own values, spreads
-ROUNDS, PREPARED = 8, 20
+LED_ROUNDS, PREPARED = 8, 20
 SHOWN = 3  # numbers that a session differs by
 
 
@@ -303,7 +296,7 @@ class Watch(Engine):
         moved = sorted({*range(*span), *(n for n in range(self.learned, self.count)
                                          if self.session_of(n, sessions).first == new)})  # fmt: skip
         best, warm = None, Warm()
-        for _ in range(ROUNDS):
+        for _ in range(LED_ROUNDS):
             if size == 0.0 and new is None:
                 runs = {}
             else:

@@ -8,10 +8,11 @@ import pytest
 
 from glider.tools.data.errors import InputError
 from glider.tools.own.check import load_own
+from glider.tools.own.healthy import healthy_of
 from glider.tools.own.identified import VEHICLE, write
 from glider.tools.own.identify import identify
 from glider.tools.own.observer import observer_of
-from glider.tools.own.posterior import Engine, healthy_of
+from glider.tools.own.posterior import Engine
 from glider.tools.own.runs import OwnRun
 
 SIMULATOR = """
