@@ -64,6 +64,10 @@ class Engine:
         self.reach = np.zeros(self.k)
         self.level = RunLevel(healthy.errors, healthy.eta, healthy.level_scatter)
 
+    def columns(self, places: Sequence[int] = ()) -> np.ndarray:
+        """Numbers that every hypothesis leaves open, and labels at some places."""
+        return np.unique(np.append(np.flatnonzero(self.active), np.array(places, dtype=int)))
+
     def expansions(self, own: np.ndarray, columns: np.ndarray, keep: bool = False) -> list[Expansion]:
         """Every run about its values (runs, k) in some columns, tempered; the others' rows are 0."""
         return [self.expansion_of(n, own[n], columns, keep) for n in range(self.count)]
@@ -71,7 +75,10 @@ class Engine:
     def expansion_of(
         self, n: int, own: np.ndarray, columns: np.ndarray, keep: bool = False, leveled: bool = True
     ) -> Expansion:
-        """Run n about its values (k,) in some columns, tempered; the others' rows are 0. keep: with its derivatives."""
+        """Run n about its values (k,) in some columns, tempered; the others' rows are 0.
+
+        keep: with its derivatives; leveled: at its own level of errors.
+        """
         chosen, observer = [self.healthy.effects[k] for k in columns], self._observer_at(own, columns)
         one = expand(observer, n, chosen, own[columns], self.healthy.errors, self.horizon, keep)
         one = one.tempered(self.healthy.eta)
@@ -83,12 +90,9 @@ class Engine:
         assert one.derivatives is not None
         kept = replace(one, derivatives=one.derivatives[columns])
         there = followed(observer, n, chosen, own[columns], self.healthy.errors, self.horizon, kept)
-        there = there.tempered(self.healthy.eta)
-        share = np.exp(-self.level.log_level(there.value, self.level.count(one)))
-        slope = np.zeros(self.k)
-        slope[columns] = share * there.slope
-        return replace(one, at=own.copy(), value=self.level.value(there.value, self.level.count(one)), slope=slope,
-                       squares=there.squares)  # fmt: skip
+        there, slope = self.level.of(there.tempered(self.healthy.eta)), np.zeros(self.k)
+        slope[columns] = there.slope
+        return replace(one, at=own.copy(), value=there.value, slope=slope, squares=there.squares)
 
     def _observer_at(self, own: np.ndarray, columns: np.ndarray) -> Observer:
         """The observer about a run's values in all other columns."""
@@ -114,7 +118,7 @@ class Engine:
         On the way the derivatives of the last expansion serve: a place is expanded anew where a way along them ends.
         """
         places = self.healthy.at(labels)
-        columns = np.unique(np.append(np.flatnonzero(self.active), np.array(places, dtype=int)))
+        columns = self.columns(places)
         shared = np.zeros(self.k) if begin is None else begin.shared.copy()
         own = np.tile(shared, (self.count, 1)) if begin is None else begin.own.copy()
         for round_ in range(ROUNDS):
@@ -147,7 +151,7 @@ class Engine:
         """Values led on from where runs are expanded by the derivatives there, V (k, k) the prior: shared (k,), own
         (runs, k), and by how much -2 log posterior fell, flown at every place."""
         room = np.maximum(LONGEST_MOVE, LONGEST_REACH / np.maximum(self.reach, LEAST_REACH))  # (k,) spreads
-        columns = np.unique(np.append(np.flatnonzero(self.active), np.array(places, dtype=int)))
+        columns = self.columns(places)
         cost, gained, share = sum(one.value for one in found) + by.prior(shared, own, places), 0.0, 1.0
         for _ in range(WAY):
             target = np.clip(Pooled.of(by.marginal(found), V).mean(), self.low, self.high)
@@ -354,8 +358,7 @@ class Engine:
         noises = [one for one in self.healthy.effects if one.family == NOISE] if usual else []
         for begin in beside if noises else ():
             runs, flown = list[Expansion](), list[Responses]()
-            places = np.array(self.healthy.at(begin.labels), dtype=int)
-            columns = np.unique(np.append(np.flatnonzero(self.active), places))
+            columns = self.columns(self.healthy.at(begin.labels))
             for n in range(self.count):
                 point = moved(self.observer.declared, self.observer.point, self.healthy.effects, begin.own[n])
                 flown.append(responses(self.observer.about(point), n, self.horizon))

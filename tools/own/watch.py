@@ -86,7 +86,7 @@ class Watch(Engine):
 
     def prepare(self) -> None:
         """Every run about where it lies, with what the reference says of all; how runs differ, learned from it too."""
-        every, columns, healthy = np.arange(self.k), np.flatnonzero(self.active), self.healthy
+        every, columns, healthy = np.arange(self.k), self.columns(), self.healthy
         shared, own = np.zeros(self.k), np.zeros((self.learned, self.k))
         for round_ in range(PREPARED):
             found = [self.expansion_of(n, own[n], columns) for n in range(self.learned)]
@@ -292,7 +292,7 @@ class Watch(Engine):
         size: where the label begins; target: mean and 1 sigma of it by the parabola about a place. A step is halved
         until the posterior does not fall: the parabola says where to go, the likelihood whether it is better there.
         """
-        new, columns = self.begun(sessions), np.unique(np.append(np.flatnonzero(self.active), label))
+        new, columns = self.begun(sessions), self.columns([label])
         moved = sorted({*range(*span), *(n for n in range(self.learned, self.count)
                                          if self.session_of(n, sessions).first == new)})  # fmt: skip
         best, warm = None, Warm()
