@@ -27,7 +27,6 @@ from glider.tools.inference.corrected import BIASES, CorrectedTable, is_correcte
 from glider.tools.inference.model import effect_vector, effects_in, vehicle_model
 from glider.tools.inference.vehicle_parameters import coefficients
 
-FORMATS = ("json", "python", "toml")
 _UNITS = {
     **dict.fromkeys(("m_t", "m_r", "m_s", "net_mass"), "kg"),
     **{f"added_mass_{axis}": "kg" for axis in "xyz"},

@@ -122,34 +122,43 @@ def log_evidence(found: Sequence[Parabola], V: np.ndarray, scatter: np.ndarray) 
     return Pooled.of([marginalised(one, scatter) for one in found], V).log_evidence()
 
 
-def log_prior(variance: np.ndarray | float, usual: np.ndarray | float) -> np.ndarray:
-    """Log density of variances about usual ones, both of one shape: inverse gamma, up to a constant."""
-    return -0.5 * HEALTHY.prior_runs * np.asarray(np.log(variance) + usual / variance)
+def log_prior(
+    variance: np.ndarray | float, usual: np.ndarray | float, prior_runs: float = HEALTHY.prior_runs
+) -> np.ndarray:
+    """Log density of variances about usual ones, both of one shape: inverse gamma, up to a constant.
+
+    prior_runs: runs that say as much as what is usual.
+    """
+    return -0.5 * prior_runs * np.asarray(np.log(variance) + usual / variance)
 
 
 def learn_scatter(
-    found: Sequence[Parabola], V: np.ndarray, usual: np.ndarray, sessions: Sequence[int] | None = None
-) -> np.ndarray:
+    found: Sequence[Parabola], V: np.ndarray, usual: np.ndarray, sessions: Sequence[int] | None = None,
+    learned_from: int = 0,
+) -> np.ndarray:  # fmt: skip
     """1 sigma (k,) of how runs differ, the most probable about `usual` (k,); where that is 0 it stays 0.
 
-    sessions: counts of successive runs that have N(0, V) in common; without them all have. A variance that is far too
+    sessions: counts of successive runs that have N(0, V) in common; without them all have. learned_from: runs, other
+    than these, that the usual ones were learned from, beside what the prior is worth. A variance that is far too
     small for a run may be as probable, near by, as one that holds it: of several starts the best is kept.
     """
-    free, ends = usual > 0.0, np.cumsum(sessions or [len(found)])
+    free, ends, prior_runs = usual > 0.0, np.cumsum(sessions or [len(found)]), HEALTHY.prior_runs + learned_from
     parts = [found[a:b] for a, b in zip([0, *ends[:-1]], ends, strict=True)]
 
     def log_posterior(sizes: np.ndarray) -> float:
         variance = np.maximum(sizes[free] ** 2, LEAST_VARIANCE)
-        prior = log_prior(variance, np.maximum(usual[free] ** 2, LEAST_VARIANCE)).sum()
+        prior = log_prior(variance, np.maximum(usual[free] ** 2, LEAST_VARIANCE), prior_runs).sum()
         return sum(log_evidence(part, V, sizes) for part in parts) + float(prior)
 
-    tried = [_nearest(parts, V, usual, np.where(free, np.maximum(usual, least), 0.0)) for least in STARTS]
+    tried = [_nearest(parts, V, usual, prior_runs, np.where(free, np.maximum(usual, least), 0.0)) for least in STARTS]
     return max(tried, key=log_posterior)
 
 
-def _nearest(parts: Sequence[Sequence[Parabola]], V: np.ndarray, usual: np.ndarray, start: np.ndarray) -> np.ndarray:
+def _nearest(
+    parts: Sequence[Sequence[Parabola]], V: np.ndarray, usual: np.ndarray, prior_runs: float, start: np.ndarray
+) -> np.ndarray:
     """Sizes (k,) led from `start` to the most probable near by: minorisation and maximisation for variances."""
-    free, weight = usual > 0.0, 0.5 * HEALTHY.prior_runs
+    free, weight = usual > 0.0, 0.5 * prior_runs
     middle, v = np.maximum(usual[free] ** 2, LEAST_VARIANCE), np.where(free, np.maximum(start**2, LEAST_VARIANCE), 0.0)
     for _ in range(ITERATIONS):
         squares, traces = np.zeros(len(v)), np.zeros(len(v))

@@ -52,18 +52,8 @@ def healthy_of(observer: Observer) -> Healthy:
         np.array([max(table.gap.get(one.name, 1.0), 1e-3) for one in declared.outputs]),
         np.array([table.channel_inflation.get(one.name, 1.0) for one in declared.outputs]),
     )
-    return Healthy(
-        effects,
-        V,
-        scatter,
-        session,
-        usual,
-        errors,
-        table.inflation,
-        table.runs,
-        table.level_scatter,
-        table.noise_gain,
-    )
+    return Healthy(effects, V, scatter, session, usual, errors, table.inflation, table.runs, table.level_scatter,
+                   table.noise_gain, table.run_inflation)  # fmt: skip
 
 
 def effect_point(observer: Observer, healthy: Healthy, labels: Sequence[str], sizes: np.ndarray) -> ModelPoint:

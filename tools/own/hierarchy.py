@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from glider.tools.inference.pooled import Parabola
-from glider.tools.own.effects import NOISE, PUSH, Effect, driven_inputs, moved
+from glider.tools.own.declare import Declaration
+from glider.tools.own.effects import FORM, NOISE, PUSH, Effect, driven_inputs, moved
 from glider.tools.own.observer import Observer
 from glider.tools.own.operating_points import point_weights
 
@@ -57,10 +58,7 @@ def expand(
     base, declared, scales = observer.point, observer.declared, healthy.scales
     here = moved(declared, base, effects, at)
     by = observer.filter(n, here)
-    # what goes with an operating point is, in a run, so much of a constant force
-    pushes = {one.name: k for k, one in enumerate(effects) if one.family == PUSH}
-    at_points = [(k, one.at_point, pushes[one.name]) for k, one in enumerate(effects)
-                 if one.at_point is not None and one.name in pushes]  # fmt: skip
+    held = multiples_of_pushes(declared, effects, driven_inputs(observer.runs[n], declared, here))
     begins = np.array([one.one_sided and abs(x) < STEP for one, x in zip(effects, at, strict=True)], dtype=bool)
     steps = np.where(begins, UNSEEN_STEP, STEP)
     steps = np.where(at + steps > [one.high for one in effects], -steps, steps)
@@ -74,8 +72,7 @@ def expand(
             points.append(moved(declared, base, effects, there))
         return observer.residuals(n, points, by, horizon) / scales
 
-    still = {k for k, *_ in at_points}
-    moving = np.array([k for k, one in enumerate(effects) if one.family != NOISE and k not in still], dtype=int)
+    moving = np.array([k for k, one in enumerate(effects) if one.family != NOISE and k not in held], dtype=int)
     E = errors(np.append(-1, moving), np.append(0.0, steps[moving]))
     shape = E[0].shape
     E = E.reshape(len(E), -1)
@@ -87,9 +84,8 @@ def expand(
         shorter = steps[far] * SHORTENED / size[far]
         J[far] = (errors(far, shorter).reshape(len(far), -1) - e) / shorter[:, None]
     J[~np.isfinite(J).all(axis=1)] = 0.0
-    weights = point_weights(declared, driven_inputs(observer.runs[n], declared, here))
-    for k, point, push in at_points:
-        J[k] = weights[point] * effects[k].spread / effects[push].spread * J[push]
+    for k, (push, times) in held.items():
+        J[k] = times * J[push]
     seen = np.isfinite(observer.runs[n].outputs).any(axis=0)
     J, e = J.reshape(len(effects), *shape), e.reshape(shape)
     weight = 1.0 / healthy.inflation
@@ -110,6 +106,29 @@ def expand(
         np.where(seen, shape[0], 0), np.array(blocks), diagonal, ((J * scales) ** 2).mean(axis=1)[:, seen].mean(axis=1),
         J * scales if keep else None,
     )  # fmt: skip
+
+
+def multiples_of_pushes(
+    declared: Declaration, effects: Sequence[Effect], driven: np.ndarray
+) -> dict[int, tuple[int, float]]:
+    """Effects that are, in a run driven by inputs (rows, inputs), so many times a constant force that is among them.
+
+    That is what goes with an operating point, and with an input that stays as it is.
+    """
+    pushes = {one.name: k for k, one in enumerate(effects) if one.family == PUSH}
+    weights, found = point_weights(declared, driven), dict[int, tuple[int, float]]()
+    for k, one in enumerate(effects):
+        if one.family != FORM or one.name not in pushes:
+            continue
+        if one.at_point is not None:
+            force = float(weights[one.at_point])
+        else:
+            u = driven[:, declared.index("inputs", one.kind)]
+            if np.ptp(u) > 0.0:
+                continue
+            force = float(u[0]) - declared.usual_inputs[one.kind][0]
+        found[k] = pushes[one.name], force * one.spread / effects[pushes[one.name]].spread
+    return found
 
 
 def followed(

@@ -89,6 +89,7 @@ def tables(found: Identified) -> dict[str, Any]:
     given["identified"] = {
         "runs": len(observer.runs), "sessions": found.sessions, "parameters": names,
         "covariance": [[float(value) for value in row] for row in covariance], "inflation": found.eta,
+        "run_inflation": found.run_inflation,
         "level_scatter": found.level_scatter,
         "scatter": {name: value for name, value in scatter.items() if value > 0.0},
         "session_scatter": {name: value for name, value in session.items() if value > 0.0}, "label_scatter": labels,

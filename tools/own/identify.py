@@ -65,6 +65,7 @@ class Identified:
     labels: list[Effect]
     label_scatter: np.ndarray  # (labels,) spreads, each alone, beside what runs differ by
     eta: float
+    run_inflation: float
     errors: ChannelErrors  # what healthy runs leave
     run_values: np.ndarray  # (runs, nuisance)
     before: np.ndarray  # (runs, outputs) gaps of the file's model, tolerances
@@ -175,9 +176,9 @@ def identify(
     flown = [responses(observer.about(moved(observer.declared, observer.point, nuisance, own[n])), n, horizon)
              for n in range(count)] if vehicle.declared.noises else []  # fmt: skip
     noise_gain = usual_gains(flown, noise_effects(vehicle.declared), NOISE_SIZES, errors, eta)
-    return Identified(vehicle, observer, nuisance, values, covariance, scatter, labels, label_scatter, eta, errors, own,
-                      before, after, level_scatter(found), len(sessions), session_scatter, operating_scatter,
-                      noise_gain)  # fmt: skip
+    return Identified(vehicle, observer, nuisance, values, covariance, scatter, labels, label_scatter, eta, between,
+                      errors, own, before, after, level_scatter(found), len(sessions), session_scatter,
+                      operating_scatter, noise_gain)  # fmt: skip
 
 
 def left_out(found: Sequence[Parabola], V: np.ndarray) -> list[Pooled]:

@@ -15,7 +15,7 @@ from scipy.special import logsumexp
 from scipy.stats import norm
 
 from glider.tools.data.intervals import NINETY
-from glider.tools.inference.pooled import Pooled, learn_scatter
+from glider.tools.inference.pooled import Pooled, learn_scatter, run_values
 from glider.tools.own.decision import (
     FORM_SHARES,
     LEAST_REACH,
@@ -30,7 +30,7 @@ from glider.tools.own.decision import (
 from glider.tools.own.effects import FORM, PUSH
 from glider.tools.own.healthy import healthy_of
 from glider.tools.own.hierarchy import Expansion
-from glider.tools.own.identify import CONVERGED_GAIN, SCATTER_ROUNDS, LineSearch, damped_step
+from glider.tools.own.identify import CONVERGED_GAIN, MIN_SCATTER_RUNS, SCATTER_ROUNDS, LineSearch, damped_step
 from glider.tools.own.load import LoadedVehicle
 from glider.tools.own.observer import Observer, observer_of
 from glider.tools.own.posterior import AT_REST, LONGEST_MOVE, LONGEST_REACH, STRONG_LEFT, Engine, under_priors
@@ -45,7 +45,7 @@ NEW_SESSION = 0.5  # prior probability that they are not all of one session
 TO_THE_END = 0.5  # of spans: that a change is still there in the last run
 WITH_SESSION = 0.5  # of changes: that they begin with a session, where one begins
 MOST_EVENTS = 4
-REFITTED, SPANS = 5, 2  # labels, of the best spans, whose parabolas are taken where they lead to
+REFITTED, SPANS = 5, 4  # labels, of the best spans, whose parabolas are taken where they lead to
 UNLIKELY = 7.0  # nat behind the best by the parabola there: not taken
 OWN_ROUNDS, CONVERGED_OWN = 5, 0.1  # of a run's own values, spreads
 LED_ROUNDS, PREPARED = 8, 20
@@ -85,18 +85,23 @@ class Watch(Engine):
         self.named = sum(one.family not in (PUSH, FORM) for one in healthy.effects)
 
     def prepare(self) -> None:
-        """Every run about where it lies, with what the reference says of all; how runs differ, learned from it too."""
+        """Every run about where it lies, with what the reference says of all; how runs differ, learned from it too.
+
+        Of what runs share they say less than their likelihood has it, by `run_inflation`: for where the shared values
+        are most probable that is as good as a prior so much narrower.
+        """
         every, columns, healthy = np.arange(self.k), self.columns(), self.healthy
+        known_from = healthy.runs if healthy.runs >= MIN_SCATTER_RUNS else 0
+        V = self.together.V / healthy.run_inflation
         shared, own = np.zeros(self.k), np.zeros((self.learned, self.k))
         for round_ in range(PREPARED):
             found = [self.expansion_of(n, own[n], columns) for n in range(self.learned)]
             if self.learned > 2 and round_ < SCATTER_ROUNDS:
-                learned = learn_scatter(found, self.together.V, healthy.scatter)
-                self.together = replace(self.together, scatter=learned)
-            pooled = Pooled.of(self.together.marginal(found), self.together.V)
-            search = LineSearch(self.observer, healthy.effects, found, self.together.scatter, healthy.eta,
-                                self.together.V, (self.low, self.high), healthy.errors, self.horizon, 0,
-                                self.level)  # fmt: skip
+                scatter = learn_scatter(found, self.together.V, healthy.scatter, learned_from=known_from)
+                self.together = replace(self.together, scatter=scatter)
+            pooled = Pooled.of(self.together.marginal(found), V)
+            search = LineSearch(self.observer, healthy.effects, found, self.together.scatter, healthy.eta, V,
+                                (self.low, self.high), healthy.errors, self.horizon, 0, self.level)  # fmt: skip
             shared, own, gain = search.along(shared, own, damped_step(pooled, shared))
             if gain < CONVERGED_GAIN and round_ >= SCATTER_ROUNDS:
                 break
@@ -104,24 +109,45 @@ class Watch(Engine):
         self.found = self.expansions(np.array([*own, *later]), every)
         self.reach = np.sqrt(np.mean([one.reach for one in self.found], axis=0))
         self.runs = self.together.marginal(self.found)
-        known = self.runs[: self.learned]
+        known = [one.tempered(healthy.run_inflation) for one in self.runs[: self.learned]]
         M = Pooled.of(known, self.together.V).covariance()
         self.events, self.sessions = list[Event](), [Session(self.learned, self.count, shared, M, shared)]
         self.another = of_another(known, healthy.V, healthy.session)
 
-    def about(self, n: int, around: np.ndarray, begin: np.ndarray, columns: np.ndarray) -> Expansion:
+    def about(
+        self, n: int, around: np.ndarray, begin: np.ndarray, columns: np.ndarray, keep: bool = False
+    ) -> Expansion:
         """Run n expanded in some columns about its most probable values by the exact likelihood, led from `begin` (k,);
-        around: those that it is thought to have."""
+        around: those that it is thought to have; keep: with its derivatives."""
         healthy, scatter, own = self.healthy, self.together.scatter, np.clip(begin, self.low, self.high)
+        free = np.flatnonzero(scatter)
         for _ in range(OWN_ROUNDS):
-            found = self.expansion_of(n, own, columns)
+            found = self.expansion_of(n, own, free)
             search = LineSearch(self.observer, healthy.effects, [found], scatter, healthy.eta, self.together.V,
                                 (self.low, self.high), healthy.errors, self.horizon, n, self.level)  # fmt: skip
             _, (moved_own,), _ = search.along(around, own[None], np.zeros(self.k))
             if np.abs(moved_own - own).max() < CONVERGED_OWN:
-                return found
+                break
             own = moved_own
-        return self.expansion_of(n, own, columns)
+        return self.expansion_of(n, own, columns, keep)
+
+    def near(self, n: int, around: np.ndarray, begin: np.ndarray, columns: np.ndarray, one: Expansion) -> Expansion:
+        """The same by the derivatives of an expansion that has kept them, errors flown at every place."""
+        own, best, share = np.clip(begin, self.low, self.high), None, 1.0
+        for _ in range(OWN_ROUNDS):
+            found = self.followed(n, own, columns, one)
+            cost = found.value + float((((own - around) / np.maximum(self.together.scatter, 1e-6)) ** 2).sum())
+            if best is not None and cost > best[0]:
+                share *= 0.5
+            else:
+                best = cost, found
+                move = run_values(found, around, self.together.scatter) - own
+                step = np.clip(move, -LONGEST_MOVE, LONGEST_MOVE)
+                if np.abs(step).max() < CONVERGED_OWN:
+                    break
+            own = np.clip(best[1].at + share * step, self.low, self.high)
+        assert best is not None
+        return best[1]
 
     def session_of(self, n: int, sessions: Sequence[Session]) -> Session:
         return next(one for one in sessions if one.first <= n < one.end)
@@ -139,13 +165,21 @@ class Watch(Engine):
         return self.session_of(n, sessions).values + self.of_events(n)
 
     def again(
-        self, n: int, sessions: Sequence[Session], columns: np.ndarray, label: int, size: float, warm: Warm
-    ) -> Expansion:
-        """Run n expanded again where it is, or was last, with a label of a size (spreads) beside its events."""
+        self, n: int, sessions: Sequence[Session], columns: np.ndarray, label: int, size: float, warm: Warm,
+        kept: dict[int, Expansion],
+    ) -> Expansion:  # fmt: skip
+        """Run n expanded again where it is, or was last, with a label of a size (spreads) beside its events.
+
+        kept: runs' last expansions with derivatives, which serve for another place.
+        """
         around = self.at_run(n, sessions)
         around[label] = np.clip(around[label] + size, self.low[label], self.high[label])
         at, before = warm.get(n) or (self.found[n].at, self.at_run(n, self.sessions))
-        found = self.about(n, around, at + around - before, columns)
+        begin = at + around - before
+        if n in kept:
+            found = self.near(n, around, begin, columns, kept[n])
+        else:
+            found = kept[n] = self.about(n, around, begin, columns, keep=True)
         warm[n] = found.at, around
         return found
 
@@ -231,13 +265,16 @@ class Watch(Engine):
                 tables.append((further, own, self.scored(own, further) + prior(own, further) + gain))
             ranked = sorted(((float(scores[row].max()), t, row) for t, (_, own, scores) in enumerate(tables)
                              for row in range(len(own))), reverse=True)  # fmt: skip
-            found = [self.compared(tables[t][1][row], self.expanded(tables[t][0]), tables[t][2][row])
-                     for _, t, row in ranked[:SPANS] if ranked[0][0] + CHANGE_ODDS > 0.0]  # fmt: skip
-            total, taken = max(found, key=lambda one: one[0], default=(-np.inf, None))
-            if taken is not None and total > other:
+            found = list[Refit]()
+            for _, t, row in ranked[:SPANS] if ranked[0][0] + CHANGE_ODDS > 0.0 else ():
+                theirs, own, scores = tables[t]
+                found += self.compared(own[row], self.expanded(theirs), scores[row])
+            total = float(logsumexp([one.score for one in found])) + CHANGE_ODDS if found else -np.inf
+            if total > other:
+                taken, chances = self.decided(found)
                 best = taken.event
                 best.probability = float(1.0 / (1.0 + np.exp(-np.clip(total - np.logaddexp(0.0, other), -50.0, 50.0))))
-                best.chances = {label: best.probability * chance for label, chance in best.chances.items()}
+                best.chances = {label: best.probability * chance for label, chance in chances.items()}
                 reach = self.reach[self.healthy.at([best.label])[0]]
                 if best.probability >= CERTAIN and abs(best.size) * reach >= MATERIAL:
                     self.say(f"{best.label} from {self.name(best.first)} to {self.name(best.end - 1)}: {total:.1f} nat")
@@ -251,31 +288,32 @@ class Watch(Engine):
     def name(self, n: int) -> str:
         return self.observer.runs[n].name
 
-    def compared(self, span: tuple[int, int], sessions: Sequence[Session], scores: np.ndarray) -> tuple[float, Refit]:
-        """Labels over a span, each refitted where it leads: log odds of all, and the event."""
+    def compared(self, span: tuple[int, int], sessions: Sequence[Session], scores: np.ndarray) -> list[Refit]:
+        """Labels over a span, each refitted where it leads."""
         starts, runs = {int(k): 0.0 for k in np.argsort(scores)[::-1][:REFITTED]}, range(*span)
         if np.sqrt(np.mean([self.left(n) for n in runs])) > STRONG_LEFT:
             starts |= dict(self.strong_sizes(runs)[:REFITTED])
         found = [self.refit(span, k, start, sessions) for k, start in starts.items()]
-        found += self.swapped(max(found, key=lambda one: one.score), found)
-        total = float(logsumexp([one.score for one in found]))
-        best = self.decided(found)
-        best.event.chances = {one.event.label: float(np.exp(one.score - total)) for one in found}
-        return total + CHANGE_ODDS, best
+        return found + self.swapped(max(found, key=lambda one: one.score), found)
 
-    def decided(self, same: Sequence[Refit]) -> Refit:
-        """The event of a span: a label where labels together are more probable than a force that none has."""
-        effects = {one.label: one for one in self.healthy.effects}
-        forces = [one for one in same if effects[one.event.label].family == PUSH]
-        labels = [one for one in same if effects[one.event.label].family != PUSH]
-        sums = [float(logsumexp([one.score for one in some])) if some else -np.inf for some in (labels, forces)]
-        return max(labels if sums[0] >= sums[1] else forces, key=lambda one: one.score)
+    def decided(self, found: Sequence[Refit]) -> tuple[Refit, dict[str, float]]:
+        """The event that is most probable of labels over spans, one of which it is, and the chance of each label: a
+        label where labels together are more probable than a force that none has; the span that is best for it."""
+        effects, total = {one.label: one for one in self.healthy.effects}, logsumexp([one.score for one in found])
+        chances: dict[str, float] = {}
+        for one in found:
+            chances[one.event.label] = chances.get(one.event.label, 0.0) + float(np.exp(one.score - total))
+        forces = {label for label in chances if effects[label].family == PUSH}
+        named = sum(chance for label, chance in chances.items() if label not in forces)
+        among = [label for label in chances if (label in forces) == (named < 0.5)]
+        label = max(among, key=lambda label: chances[label])
+        return max((one for one in found if one.event.label == label), key=lambda one: one.score), chances
 
     def swapped(self, best: Refit, refitted: Sequence[Refit]) -> list[Refit]:
         """Labels in an event's place that come nearest to it where it leads, refitted."""
         span, every, warm = (best.event.first, best.event.end), np.arange(self.k), Warm()
         (place,) = self.healthy.at([best.event.label])
-        runs = [self.again(n, best.sessions, every, place, best.event.size, warm) for n in range(*span)]
+        runs = [self.again(n, best.sessions, every, place, best.event.size, warm, {}) for n in range(*span)]
         there = dict(zip(range(*span), self.together.marginal(runs), strict=True))
         gain, size = self.label_gains(*summed(one.alone(*span) for one in self.pooled(best.sessions, there)))
         likely = gain > gain[place] - UNLIKELY
@@ -295,12 +333,15 @@ class Watch(Engine):
         new, columns = self.begun(sessions), self.columns([label])
         moved = sorted({*range(*span), *(n for n in range(self.learned, self.count)
                                          if self.session_of(n, sessions).first == new)})  # fmt: skip
-        best, warm = None, Warm()
-        for _ in range(LED_ROUNDS):
+        best, warm, kept, at_rest = None, Warm(), dict[int, Expansion](), False
+        for round_ in range(LED_ROUNDS):
+            if at_rest or round_ == LED_ROUNDS - 1:  # derivatives serve on the way, evidence is taken where they are
+                best, kept = None, {}
+            anew = not kept
             if size == 0.0 and new is None:
                 runs = {}
             else:
-                again = [self.again(n, sessions, columns, label, size, warm) for n in moved]
+                again = [self.again(n, sessions, columns, label, size, warm, kept) for n in moved]
                 runs = dict(zip(moved, self.together.marginal(again), strict=True))
             pooled = self.pooled(sessions, runs)
             density = sum(one.log_density(*span, label, size) for one in pooled)
@@ -314,11 +355,13 @@ class Watch(Engine):
             mean, sd = target(pooled, size)
             room = max(LONGEST_MOVE, LONGEST_REACH / max(self.reach[label], LEAST_REACH))
             step = float(np.clip(np.clip(mean, self.low[label], self.high[label]) - size, -room, room))
-            if (gain < AT_REST and abs(step) < sd) or (new is None and abs(step) < 0.1 * sd):
+            at_rest = abs(step) < sd if at_rest or gain < AT_REST else new is None and abs(step) < 0.1 * sd
+            if at_rest and anew:
                 break
-            size += step
-            sessions = [replace(one, values=each.given(*span, label, size)) if one.first == new else one
-                        for one, each in zip(sessions, pooled, strict=True)]  # fmt: skip
+            if not at_rest and round_ < LED_ROUNDS - 1:
+                size += step
+                sessions = [replace(one, values=each.given(*span, label, size)) if one.first == new else one
+                            for one, each in zip(sessions, pooled, strict=True)]  # fmt: skip
         assert best is not None
         return best
 

@@ -1,11 +1,14 @@
 """Forces that go with inputs: what no run's own force is, learned by identification, kept in its file, flown with."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from glider.tools.own.check import load_own
+from glider.tools.own.effects import form_errors, moved, pushes
+from glider.tools.own.hierarchy import ChannelErrors, expand, multiples_of_pushes
 from glider.tools.own.identified import write
 from glider.tools.own.identify import identify
 from glider.tools.own.observer import observer_of
@@ -56,3 +59,21 @@ def test_the_identified_file_predicts_with_it(found):
     gaps = [np.mean([observer.gaps(n, point, 10.0) for n in range(4)]) for point in (observer.point, without)]
     assert gaps[0] < 0.6
     assert (gaps[0] < 0.6 * gaps[1]) == bool(found.form)
+
+
+@pytest.mark.parametrize("held", [True, False])
+def test_its_derivative_is_what_a_step_of_it_does(found, held):
+    """Where an input stays as it is the force is a constant one, and that one's derivative serves."""
+    (run,) = flights(found.form, 1, 5)
+    if not held:
+        run = replace(run, inputs=run.inputs + 0.1 * np.sin(run.t)[:, None])
+    observer = observer_of(found.vehicle, [run])
+    declared, point = observer.declared, observer.point
+    effects = [*pushes(declared), *(one for one in form_errors(declared) if one.at_point is None)]
+    assert len(multiples_of_pushes(declared, effects, run.inputs)) == (2 if held else 0)
+    one = expand(observer, 0, effects, np.zeros(3), ChannelErrors(np.ones(1), np.ones(1)), 10.0, keep=True)
+    by = observer.filter(0, point)
+    for k in range(3):
+        there = moved(declared, point, effects, 0.01 * np.eye(3)[k])
+        here, stepped = observer.residuals(0, [point, there], by, 10.0)
+        assert one.derivatives[k] == pytest.approx((stepped - here) / 0.01, rel=1e-3, abs=1e-4)

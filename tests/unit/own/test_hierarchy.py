@@ -60,6 +60,13 @@ def test_scatter_is_learned_where_runs_may_differ_and_stays_nothing_elsewhere():
     assert found[2] == pytest.approx(0.7, rel=0.2)
 
 
+def test_a_few_runs_change_little_of_a_scatter_that_many_have_shown():
+    """Three runs, one of them far off: what 30 healthy runs differ by stays nearly as it is."""
+    runs, usual = [run_at(np.array([0.0, 0.0, place])) for place in (0.1, -0.2, 3.0)], np.array([0.0, 0.0, 0.4])
+    known, unknown = (learn_scatter(runs, np.zeros((3, 3)), usual, learned_from=count)[2] for count in (30, 0))
+    assert known < 0.75 < 1.3 < unknown
+
+
 @pytest.mark.parametrize(("common", "own", "kind"), [(1.5, 0.2, "together"), (0.0, 1.2, "apart")])
 def test_runs_themselves_say_whether_they_are_of_one_session(common, own, kind):
     random, asked = (
@@ -140,8 +147,22 @@ def test_labels_together_count_against_a_force_that_none_has():
     asked = Watch(Columns(6), healthy(), 2)
     events = [Refit(score, Event({}, 2, 6, label, 1.0, 0.1, 0.0), []) for score, label in
               ((10.0, "force"), (9.5, "gain"), (9.4, "mass"))]  # fmt: skip
-    assert asked.decided(events).event.label == "gain"
-    assert asked.decided(events[:2]).event.label == "force"
+    found, chances = asked.decided(events)
+    assert (found.event.label, sum(chances.values())) == ("gain", pytest.approx(1.0))
+    assert asked.decided(events[:2])[0].event.label == "force"
+
+
+def test_a_label_counts_over_all_spans_in_which_it_may_be():
+    asked = Watch(Columns(6), healthy(), 2)
+    events = [Refit(score, Event({}, first, end, label, 1.0, 0.1, 0.0), []) for score, first, end, label in
+              ((10.0, 2, 4, "gain"), (9.6, 2, 6, "mass"), (9.8, 3, 6, "mass"))]  # fmt: skip
+    found, chances = asked.decided(events)
+    assert (found.event.label, found.event.first) == ("mass", 3)
+    assert chances["mass"] == pytest.approx(np.exp([9.6, 9.8]).sum() / np.exp([10.0, 9.6, 9.8]).sum())
+
+
+def test_that_nothing_changed_has_its_prior_probability():
+    asked = engine(4)
     assert asked.log_prior(()) == pytest.approx(np.log1p(-HEALTHY.changed))
 
 
