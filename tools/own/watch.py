@@ -265,8 +265,8 @@ class Watch(Engine):
                 tables.append((further, own, self.scored(own, further) + prior(own, further) + gain))
             ranked = sorted(((float(scores[row].max()), t, row) for t, (_, own, scores) in enumerate(tables)
                              for row in range(len(own))), reverse=True)  # fmt: skip
-            found = list[Refit]()
-            for _, t, row in ranked[:SPANS] if ranked[0][0] + CHANGE_ODDS > 0.0 else ():
+            found, any_change = list[Refit](), logsumexp(np.concatenate([scores.ravel() for *_, scores in tables]))
+            for _, t, row in ranked[:SPANS] if any_change + CHANGE_ODDS > 0.0 else ():
                 theirs, own, scores = tables[t]
                 found += self.compared(own[row], self.expanded(theirs), scores[row])
             total = float(logsumexp([one.score for one in found])) + CHANGE_ODDS if found else -np.inf
