@@ -8,6 +8,7 @@ import pytest
 
 from glider.tools.own.check import load_own
 from glider.tools.own.effects import form_errors, moved, pushes
+from glider.tools.own.healthy import healthy_of
 from glider.tools.own.hierarchy import ChannelErrors, expand, multiples_of_pushes
 from glider.tools.own.identified import write
 from glider.tools.own.identify import identify
@@ -49,6 +50,12 @@ def test_it_is_learned_where_it_is_and_nothing_where_not(found):
     assert abs(found.vehicle.declared.form["surge", "thrust"]) < 0.1
     at = [one.label for one in found.answer.nuisance].index("surge_push")
     assert found.answer.scatter[at] * 0.02 < 0.02  # what runs differ by is not asked to stand for it
+
+
+def test_how_much_less_runs_say_than_their_likelihood_stands_in_the_file(found):
+    healthy = healthy_of(observer_of(found.vehicle, flights(found.form, 1, 7)))
+    assert healthy.run_inflation == pytest.approx(found.answer.run_inflation, rel=1e-6)
+    assert healthy.run_inflation >= 1.0
 
 
 def test_the_identified_file_predicts_with_it(found):
