@@ -65,7 +65,7 @@ class Identified:
     labels: list[Effect]
     label_scatter: np.ndarray  # (labels,) spreads, each alone, beside what runs differ by
     eta: float
-    run_inflation: float
+    run_inflation: float  # of the variance of shared values by the likelihood of runs
     errors: ChannelErrors  # what healthy runs leave
     run_values: np.ndarray  # (runs, nuisance)
     before: np.ndarray  # (runs, outputs) gaps of the file's model, tolerances

@@ -173,7 +173,7 @@ class Watch(WatchedRuns):
         """Labels in an event's place that come nearest to it where it leads, refitted."""
         span, every, warm = (best.event.first, best.event.end), np.arange(self.k), Warm()
         (place,) = self.healthy.at([best.event.label])
-        runs = [self.again(n, best.sessions, every, place, best.event.size, warm, {}) for n in range(*span)]
+        runs = [self.again(n, best.sessions, every, place, best.event.size, warm) for n in range(*span)]
         there = dict(zip(range(*span), self.together.marginal(runs), strict=True))
         gain, size = self.label_gains(*summed(one.alone(*span) for one in self.pooled(best.sessions, there)))
         likely = gain > gain[place] - UNLIKELY

@@ -125,7 +125,7 @@ class WatchedRuns(Engine):
 
     def again(
         self, n: int, sessions: Sequence[Session], columns: np.ndarray, label: int, size: float, warm: Warm,
-        kept: dict[int, Expansion],
+        kept: dict[int, Expansion] | None = None,
     ) -> Expansion:  # fmt: skip
         """Run n expanded again where it is, or was last, with a label of a size (spreads) beside its events.
 
@@ -135,10 +135,12 @@ class WatchedRuns(Engine):
         around[label] = np.clip(around[label] + size, self.low[label], self.high[label])
         at, before = warm.get(n) or (self.found[n].at, self.at_run(n, self.sessions))
         begin = at + around - before
-        if n in kept:
+        if kept is not None and n in kept:
             found = self.near(n, around, begin, columns, kept[n])
         else:
-            found = kept[n] = self.about(n, around, begin, columns, keep=True)
+            found = self.about(n, around, begin, columns, keep=kept is not None)
+            if kept is not None:
+                kept[n] = found
         warm[n] = found.at, around
         return found
 
