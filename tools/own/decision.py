@@ -92,6 +92,7 @@ class Hypothesis:
     left: np.ndarray  # (runs,) mean squares, in units of what healthy runs leave
     strange: float = 0.0  # probability that more is left than it says
     found: list[Expansion] = field(default_factory=list)
+    everywhere: bool = False  # whether runs are expanded in all columns there, with their derivatives
 
 
 @dataclass

@@ -13,7 +13,7 @@ import numpy as np
 from glider.tools.inference.pooled import Parabola
 from glider.tools.own.declare import Declaration
 from glider.tools.own.effects import FORM, NOISE, PUSH, Effect, driven_inputs, moved
-from glider.tools.own.observer import Observer
+from glider.tools.own.observer import Filtered, Observer
 from glider.tools.own.operating_points import point_weights
 
 STEP, LONG_STEP, SHORTENED = 0.1, 3.0, 0.5  # spreads; rms errors that a step may move, and to what it is shortened
@@ -32,6 +32,14 @@ class Expansion(Parabola):
     diagonal: np.ndarray  # (y + 1, k) what they would be, were errors independent
     reach: np.ndarray  # (k,) mean square that a spread moves the channels, tolerances
     derivatives: np.ndarray | None = None  # (k, rows, y) of the errors in tolerances, where they are kept
+    filtered: Filtered | None = None  # the run's filter there, with them
+
+    def only(self, columns: np.ndarray) -> "Expansion":
+        """The same in some columns; the others' rows are 0."""
+        slope, curvature = np.zeros_like(self.slope), np.zeros_like(self.curvature)
+        slope[columns], block = self.slope[columns], np.ix_(columns, columns)
+        curvature[block] = self.curvature[block]
+        return replace(self, slope=slope, curvature=curvature)
 
 
 @dataclass(frozen=True)
@@ -104,7 +112,7 @@ def expand(
     return Expansion(
         at.copy(), float((weight * e * e).sum()), weighted @ e.ravel(), weighted @ flat.T, (e**2).sum(axis=0),
         np.where(seen, shape[0], 0), np.array(blocks), diagonal, ((J * scales) ** 2).mean(axis=1)[:, seen].mean(axis=1),
-        J * scales if keep else None,
+        J * scales if keep else None, by if keep else None,
     )  # fmt: skip
 
 
@@ -135,11 +143,12 @@ def followed(
     observer: Observer, n: int, effects: Sequence[Effect], at: np.ndarray, healthy: ChannelErrors, horizon: float,
     one: Expansion,
 ) -> Expansion:  # fmt: skip
-    """Run n about the model at another place, its errors flown there and the derivatives those of an expansion that has
-    kept them: for the way to a place that is expanded itself."""
+    """Run n about the model at another place, its errors flown there by the filter's gains and the derivatives of an
+    expansion that has kept them: for the way to a place that is expanded itself."""
     assert one.derivatives is not None
+    assert one.filtered is not None
     point = moved(observer.declared, observer.point, effects, at)
-    e = observer.residuals(n, [point], observer.filter(n, point), horizon)[0] / healthy.scales
+    e = observer.residuals(n, [point], one.filtered, horizon)[0] / healthy.scales
     slope = np.tensordot(one.derivatives / (healthy.scales * healthy.inflation), e, axes=([1, 2], [0, 1]))
     return replace(one, at=at.copy(), value=float((e * e / healthy.inflation).sum()), slope=slope,
                    squares=(e**2).sum(axis=0))  # fmt: skip

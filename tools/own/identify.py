@@ -32,6 +32,7 @@ from glider.tools.own.hierarchy import ChannelErrors, Expansion, RunLevel, expan
 from glider.tools.own.load import LoadedVehicle
 from glider.tools.own.observer import Observer, observer_of
 from glider.tools.own.operating_points import input_shares
+from glider.tools.own.persistence import channel_scores, persistence
 from glider.tools.own.runs import OwnRun
 
 ROUNDS, SHARED_ROUNDS = 40, 10  # at most; of them until it is learned how runs differ
@@ -121,6 +122,7 @@ def identify(
     k, count = len(nuisance), len(runs)
     priors = {PUSH: 0.0, FORM: USUAL_SCATTER**2}
     V = np.diag([priors.get(one.family, FILE_PRIOR**2) for one in nuisance])
+    vehicles = np.array([one.family not in (PUSH, FORM) for one in nuisance])
     limits = np.array([one.low for one in nuisance]), np.array([one.high for one in nuisance])
     usual = usual_scatter(vehicle.declared, nuisance)
     # forces of runs wait until what runs share is found: else they take it for their own
@@ -160,13 +162,21 @@ def identify(
     *_, eta = inflation(found)
     if count < MIN_SCATTER_RUNS:
         scatter = usual
+    else:
+        scores = [channel_scores(observer, n, nuisance, own[n], errors).tempered(eta) for n in range(count)]
+        times = persistence(scores, V, scatter, vehicles)
+        errors = ChannelErrors(errors.scales, errors.inflation * times)
+        say("errors of all a run's windows are the same, inflation " + ", ".join(
+            f"{one.name} {size:.1f}" for one, size in zip(declared.outputs, times, strict=True)))  # fmt: skip
+        found = [expand(observer, n, nuisance, own[n], errors, horizon) for n in range(count)]
+        *_, eta = inflation(found)
     counts, tempered = [len(one) for one in sessions], [one.tempered(eta) for one in found]
     scatter, session_scatter = learn_sessions(tempered, V, scatter, counts)
     warm = [marginalised(one, scatter) for one in tempered]
     each = in_sessions(tempered, scatter, counts) if len(counts) > 1 else warm
     apart = session_scatter if len(counts) > 1 else np.zeros(k)
     every, others = Pooled.of(warm, V), left_out(warm, V)
-    between = run_inflation(every, others, np.array([one.family not in (PUSH, FORM) for one in nuisance]))
+    between = run_inflation(every, others, vehicles)
     say(f"runs left out move the values by {np.sqrt(between):.1f} times what their likelihood says")
     covariance = Pooled.of([marginalised(one, apart).tempered(between) for one in each], V).covariance()
     operating_scatter = {one.name: float(np.sqrt(V[k, k])) for k, one in enumerate(nuisance) if one.at_point == 0}

@@ -2,7 +2,7 @@
 
 import contextlib
 import copy
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -331,7 +331,7 @@ class Observer:
             predicted = self.predict(n, point, horizon, self.follow(n, point, by, begun))
             return np.nan_to_num(self.errors(n, predicted, horizon, wrapped=False), nan=0.0)
 
-        return self._each(one, points)
+        return np.array(self.each(one, points))
 
     def pushed(self, n: int, pushes: np.ndarray, horizon: float) -> np.ndarray:
         """Errors of the observer's own model, as `residuals`, under forces (patterns, rows, noises) beside its own."""
@@ -341,19 +341,19 @@ class Observer:
             predicted = self.predict(n, self.point, horizon, states, beside)
             return np.nan_to_num(self.errors(n, predicted, horizon, wrapped=False), nan=0.0)
 
-        return self._each(one, pushes)
+        return np.array(self.each(one, pushes))
 
-    def _each(self, flown: Callable[..., np.ndarray], over: Any) -> np.ndarray:
+    def each(self, flown: Callable[[Any], Any], over: Iterable[Any]) -> list[Any]:
         """Flights side by side: on two threads where they are compiled, every second on each."""
         every = list(over)
         if len(every) < 2 or not (self.vehicle.level and self.vehicle.kernels.compiled):
-            return np.array([flown(each) for each in every])
+            return [flown(each) for each in every]
         with ThreadPoolExecutor(1) as pool:
             others = pool.submit(lambda: [flown(each) for each in every[1::2]])
             own = [flown(each) for each in every[::2]]
             found: list[Any] = [None] * len(every)
             found[::2], found[1::2] = own, others.result()
-        return np.array(found)
+        return found
 
     @property
     def horizon(self) -> float:

@@ -70,7 +70,7 @@ class Engine:
 
     def expansions(self, own: np.ndarray, columns: np.ndarray, keep: bool = False) -> list[Expansion]:
         """Every run about its values (runs, k) in some columns, tempered; the others' rows are 0."""
-        return [self.expansion_of(n, own[n], columns, keep) for n in range(self.count)]
+        return self.observer.each(lambda n: self.expansion_of(n, own[n], columns, keep), range(self.count))
 
     def expansion_of(
         self, n: int, own: np.ndarray, columns: np.ndarray, keep: bool = False, leveled: bool = True
@@ -93,6 +93,9 @@ class Engine:
         there, slope = self.level.of(there.tempered(self.healthy.eta)), np.zeros(self.k)
         slope[columns] = there.slope
         return replace(one, at=own.copy(), value=there.value, slope=slope, squares=there.squares)
+
+    def _all_followed(self, own: np.ndarray, columns: np.ndarray, found: Sequence[Expansion]) -> list[Expansion]:
+        return self.observer.each(lambda n: self.followed(n, own[n], columns, found[n]), range(len(found)))
 
     def _observer_at(self, own: np.ndarray, columns: np.ndarray) -> Observer:
         """The observer about a run's values in all other columns."""
@@ -122,7 +125,10 @@ class Engine:
         shared = np.zeros(self.k) if begin is None else begin.shared.copy()
         own = np.tile(shared, (self.count, 1)) if begin is None else begin.own.copy()
         for round_ in range(ROUNDS):
-            found = self.expansions(own, columns, keep=round_ < ROUNDS - 1)
+            if round_ or begin is None or not begin.everywhere:
+                found = self.expansions(own, columns, keep=round_ < ROUNDS - 1)
+            else:
+                found = [one.only(columns) for one in begin.found]
             by, pooled, evidence, _, sd = self._best_sizes(found, places, shared)
             values = pooled.mean()
             led = np.array([run_values(one, values, by.scatter) for one in found])
@@ -139,10 +145,12 @@ class Engine:
         # what the parabola says of a place that the likelihood was not led to is no evidence
         evidence -= 0.5 * max(0.0, predicted_gain)
         if every:
-            found = self.expansions(own, np.arange(self.k))
+            found = self.expansions(own, np.arange(self.k), keep=True)
         left = np.array([one.squares.sum() / max(1, one.samples.sum()) for one in found])
-        found = [replace(one, derivatives=None) for one in found]
-        return Hypothesis(labels, evidence + self.log_prior(labels), shared[places], sd, shared, own, left, 0.0, found)
+        if not every:
+            found = [replace(one, derivatives=None, filtered=None) for one in found]
+        return Hypothesis(labels, evidence + self.log_prior(labels), shared[places], sd, shared, own, left, 0.0, found,
+                          every)  # fmt: skip
 
     def _along(
         self, found: Sequence[Expansion], by: Deviations, V: np.ndarray, shared: np.ndarray, own: np.ndarray,
@@ -159,7 +167,7 @@ class Engine:
             of_runs = np.array([run_values(one, shared + step, by.scatter) for one in found])
             of_runs = np.clip(np.clip(of_runs, self.low, self.high) - own, -room, room)
             tried, theirs = shared + share * step, own + share * of_runs
-            there = [self.followed(n, theirs[n], columns, one) for n, one in enumerate(found)]
+            there = self._all_followed(theirs, columns, found)
             gain = cost - sum(one.value for one in there) - by.prior(tried, theirs, places)
             if gain < 2.0 * AT_REST:
                 share *= 0.5
@@ -258,7 +266,7 @@ class Engine:
             for row in (shared, *own):
                 row[k] += size[k]
                 row[replaced] -= begin.shared[replaced]
-            starts.append((self.healthy.effects[k].label, replace(begin, shared=shared, own=own)))
+            starts.append((self.healthy.effects[k].label, replace(begin, shared=shared, own=own, everywhere=False)))
         return starts
 
     def strong_sizes(self, among: Sequence[int]) -> list[tuple[int, float]]:
@@ -300,7 +308,7 @@ class Engine:
             shared = np.zeros(self.k)
             shared[k] = size
             own = np.tile(shared, (self.count, 1))
-            starts.append((self.healthy.effects[k].label, replace(self.bare, shared=shared, own=own)))
+            starts.append((self.healthy.effects[k].label, replace(self.bare, shared=shared, own=own, everywhere=False)))
         return starts
 
     def run(self) -> Posterior:
@@ -330,7 +338,9 @@ class Engine:
             if depth == 0 and new:
                 leading = max(new, key=lambda one: one.evidence)
                 if leading.evidence > nothing.evidence:
+                    others = [one for one in new if one is not leading]
                     leading = self.fit(leading.labels, leading, every=True)
+                    new = [*others, leading]
                     singles = [one.labels[0] for one in new]
                     new += [self.fit((label,), begin) for label, begin in self.swaps(leading, singles)]
             best = max(one.evidence for one in every)
@@ -342,7 +352,7 @@ class Engine:
             front = sorted(new, key=lambda one: -one.evidence)[:2]
             if not front or front[0].evidence < best + (0.0 if depth else -3.0):
                 break
-            front = [self.fit(one.labels, one, every=True) for one in front]
+            front = [one if one.everywhere else self.fit(one.labels, one, every=True) for one in front]
             for one in front:
                 one.strange = strangeness(self.healthy, one, nothing)
         alone = sorted((one for one in every if len(one.labels) == 1), key=lambda one: -one.evidence)
