@@ -5,7 +5,7 @@ is no change; and with each hypothesis stands that more is left than healthy run
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.special import logsumexp
@@ -93,6 +93,11 @@ class Hypothesis:
     strange: float = 0.0  # probability that more is left than it says
     found: list[Expansion] = field(default_factory=list)
     everywhere: bool = False  # whether runs are expanded in all columns there, with their derivatives
+
+    def forget(self) -> None:
+        """Nothing begins here any more: the derivatives, most of what is kept, go."""
+        self.found = [replace(one, derivatives=None, filtered=None) for one in self.found]
+        self.everywhere = False
 
 
 @dataclass

@@ -147,10 +147,11 @@ class Engine:
         if every:
             found = self.expansions(own, np.arange(self.k), keep=True)
         left = np.array([one.squares.sum() / max(1, one.samples.sum()) for one in found])
+        fitted = Hypothesis(labels, evidence + self.log_prior(labels), shared[places], sd, shared, own, left, 0.0,
+                            found, everywhere=True)  # fmt: skip
         if not every:
-            found = [replace(one, derivatives=None, filtered=None) for one in found]
-        return Hypothesis(labels, evidence + self.log_prior(labels), shared[places], sd, shared, own, left, 0.0, found,
-                          every)  # fmt: skip
+            fitted.forget()
+        return fitted
 
     def _along(
         self, found: Sequence[Expansion], by: Deviations, V: np.ndarray, shared: np.ndarray, own: np.ndarray,
@@ -355,6 +356,9 @@ class Engine:
             front = [one if one.everywhere else self.fit(one.labels, one, every=True) for one in front]
             for one in front:
                 one.strange = strangeness(self.healthy, one, nothing)
+            for one in every:
+                if all(one is not kept for kept in front):
+                    one.forget()
         alone = sorted((one for one in every if len(one.labels) == 1), key=lambda one: -one.evidence)
         every += self.with_noise([nothing, *alone[:1]], nothing)
         return decide(every, self.healthy, self.reach, self.count)
