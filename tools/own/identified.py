@@ -48,11 +48,12 @@ def toml_text(tables: dict[str, Any]) -> str:
 
 
 def tables(found: Identified) -> dict[str, Any]:
-    """The vehicle file's tables with the identified numbers in them."""
+    """The vehicle file's tables with the numbers that are handed out in them, and what runs leave."""
     vehicle, observer = found.vehicle, found.observer
     declared = vehicle.declared
     given = tomllib.loads(vehicle.text)
-    sd = np.sqrt(np.diag(found.covariance))
+    values, errors = found.handed_out
+    sd = np.sqrt(np.diag(errors))
     scatter = {one.label: float(s * one.spread) for one, s in zip(found.nuisance, found.scatter, strict=True)}
     session = {one.label: float(s * one.spread) for one, s in zip(found.nuisance, found.session_scatter, strict=True)}
     labels = {one.label: float(s * one.spread) for one, s in zip(found.labels, found.label_scatter, strict=True)}
@@ -60,7 +61,7 @@ def tables(found: Identified) -> dict[str, Any]:
     sensors = given.setdefault("sensors", {})
     names, places, form = [], [], {}
     for k, one in enumerate(found.nuisance):
-        move, error = float(found.values[k] * one.spread), float(sd[k] * one.spread)
+        move, error = float(values[k] * one.spread), float(sd[k] * one.spread)
         if one.family == "parameter":
             before = declared.parameters[declared.index("parameters", one.name)]
             table = parameters.setdefault(one.name, {})
@@ -85,7 +86,7 @@ def tables(found: Identified) -> dict[str, Any]:
     given["noise"] = {one.name: {"density": float(observer.point.density[n])} for n, one in enumerate(declared.noises)}
     given["windows"] = {"seconds": observer.horizon}
     units = np.array([found.nuisance[k].spread for k in places])
-    covariance = found.covariance[np.ix_(places, places)] * np.outer(units, units)
+    covariance = errors[np.ix_(places, places)] * np.outer(units, units)
     given["identified"] = {
         "runs": len(observer.runs), "sessions": found.sessions, "parameters": names,
         "covariance": [[float(value) for value in row] for row in covariance], "inflation": found.eta,
@@ -160,7 +161,7 @@ def write(found: Identified, out: Path) -> None:
     """identified.toml and identified.json into a folder; the model's own file beside them."""
     out.mkdir(parents=True, exist_ok=True)
     files = {
-        out / VEHICLE: (toml_text(tables(found)) if found.better else found.vehicle.text).encode("utf-8"),
+        out / VEHICLE: toml_text(tables(found)).encode("utf-8"),
         out / ANSWER: (json.dumps(as_plain(plain(found)), indent=1) + "\n").encode("utf-8"),
     }
     source = found.vehicle.source

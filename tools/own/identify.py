@@ -83,6 +83,16 @@ class Identified:
         """Whether runs left out are predicted no worse than by the file."""
         return _total(self.after) <= _total(self.before)
 
+    @property
+    def handed_out(self) -> tuple[np.ndarray, np.ndarray]:
+        """Values (nuisance,) of the vehicle handed out, and their covariance.
+
+        Where the file's vehicle is, the file's own: as uncertain as the identified ones, and as far as these are.
+        """
+        if self.better:
+            return self.values, self.covariance
+        return np.zeros_like(self.values), self.covariance + np.outer(self.values, self.values)
+
 
 def nuisance_of(observer: Observer) -> list[Effect]:
     """What the vehicle file allows for: parameters with an uncertainty, outputs with a bias, runs' slow forces.

@@ -73,6 +73,23 @@ def test_a_black_box_is_identified_and_a_weaker_heater_is_its_gain(simulator):
     assert sum(chances[label] for label in ("heat_gain", "gain", "warmth_gain")) > 0.8  # from rest they act alike
 
 
+def test_a_file_that_no_fit_betters_keeps_its_numbers_and_has_what_runs_leave(simulator):
+    vehicle = load_own(simulator)
+    found = identify(vehicle, [runs(4, 0.2, 1)])
+    assert not found.better
+    write(found, simulator.parent / "identified")
+    (simulator.parent / "identified" / "body.py").write_text((simulator.parent / "body.py").read_text())
+    again = load_own(simulator.parent / "identified" / VEHICLE)
+    loss = again.declared.parameters[0]
+    far = found.values[0] * found.nuisance[0].spread
+    assert loss.value == 0.2
+    assert abs(far) < loss.uncertainty < 0.05  # the file has 0.1
+    for factor, right in ((1.0, ("none",)), (0.95, ("heat_gain", "gain", "warmth_gain"))):
+        observer = observer_of(again, runs(3, 0.2, 2, factor))
+        chances = Engine(observer, healthy_of(observer)).run().chances
+        assert sum(chances[label] for label in right) > 0.8
+
+
 def test_a_process_that_ends_or_mumbles_is_named(tmp_path):
     (tmp_path / "v.toml").write_text('format = 1\nmodel = "exec:echo hello"\n')
     with pytest.raises(InputError, match=r"JSON.*'hello'"):
