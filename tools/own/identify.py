@@ -176,7 +176,7 @@ def identify(
         scores = [channel_scores(observer, n, nuisance, own[n], errors).tempered(eta) for n in range(count)]
         times = persistence(scores, V, scatter, vehicles)
         errors = ChannelErrors(errors.scales, errors.inflation * times)
-        say("errors of all a run's windows are the same, inflation " + ", ".join(
+        say("errors that a run's windows have in common, inflation " + ", ".join(
             f"{one.name} {size:.1f}" for one, size in zip(declared.outputs, times, strict=True)))  # fmt: skip
         found = [expand(observer, n, nuisance, own[n], errors, horizon) for n in range(count)]
         *_, eta = inflation(found)

@@ -16,7 +16,7 @@ from glider.tools.own.effects import Effect, moved
 from glider.tools.own.hierarchy import ChannelErrors, expand
 from glider.tools.own.observer import Observer
 
-ROUNDS = 10  # each goes half the way, in logarithms
+PERSISTENCE_ROUNDS = 10  # each goes half the way, in logarithms
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def persistence(runs: Sequence[ChannelScores], V: np.ndarray, scatter: np.ndarra
     the variance H_y - H_y M H_y; of (k,), bool: the values that count.
     """
     found = np.ones(len(runs[0].slope))
-    for _ in range(ROUNDS):
+    for _ in range(PERSISTENCE_ROUNDS):
         whole = [one.pooled(found) for one in runs]
         shared = Pooled.of([marginalised(one, scatter) for one in whole], V).mean()
         seen, expected = np.zeros((len(found), len(V))), np.zeros((len(found), len(V)))
