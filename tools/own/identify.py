@@ -168,12 +168,12 @@ def identify(
         differ = differ or (round_ == SHARED_ROUNDS and count >= MIN_SCATTER_RUNS)
     found = [expand(observer, n, nuisance, own[n], errors, horizon) for n in range(count)]
     errors = left_by(found, errors)
-    found = [expand(observer, n, nuisance, own[n], errors, horizon) for n in range(count)]
+    found = [expand(observer, n, nuisance, own[n], errors, horizon, keep=True) for n in range(count)]
     *_, eta = inflation(found)
     if count < MIN_SCATTER_RUNS:
         scatter = usual
     else:
-        scores = [channel_scores(observer, n, nuisance, own[n], errors).tempered(eta) for n in range(count)]
+        scores = [channel_scores(observer, n, nuisance, one, errors).tempered(eta) for n, one in enumerate(found)]
         times = persistence(scores, V, scatter, vehicles)
         errors = ChannelErrors(errors.scales, errors.inflation * times)
         say("errors that a run's windows have in common, inflation " + ", ".join(

@@ -1,9 +1,9 @@
 """How far the errors of a channel are the same in all windows of a run.
 
 Errors that go with how a run was flown, or with the day, repeat from window to window: of such a channel a run with ten
-windows says no more than one with one. Others do not: a blimp's yaw wanders its own way in every flight, its pitch is
-what the place of the mass makes it. Therefore every channel has a variance inflation of its own, beside what errors
-within a window have in common (`hierarchy.inflation`).
+windows says no more than one with one. A blimp's track drifts its own way in every flight, its pitch is what the place
+of the mass makes it. Therefore every channel has a variance inflation of its own, beside what errors within a window
+have in common (`hierarchy.inflation`).
 """
 
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ import numpy as np
 
 from glider.tools.inference.pooled import Parabola, Pooled, marginalised, run_values
 from glider.tools.own.effects import Effect, moved
-from glider.tools.own.hierarchy import ChannelErrors, expand
+from glider.tools.own.hierarchy import ChannelErrors, Expansion
 from glider.tools.own.observer import Observer
 
 PERSISTENCE_ROUNDS = 10  # each goes half the way, in logarithms
@@ -37,13 +37,12 @@ class ChannelScores:
 
 
 def channel_scores(
-    observer: Observer, n: int, effects: Sequence[Effect], at: np.ndarray, errors: ChannelErrors
+    observer: Observer, n: int, effects: Sequence[Effect], one: Expansion, errors: ChannelErrors
 ) -> ChannelScores:
-    """Run n about the model at `at` (effects,) spreads."""
-    one = expand(observer, n, effects, at, errors, observer.horizon, keep=True)
+    """Run n by its expansion in the effects' values, which has kept its derivatives."""
     assert one.derivatives is not None
     assert one.filtered is not None
-    point = moved(observer.declared, observer.point, effects, at)
+    point = moved(observer.declared, observer.point, effects, one.at)
     e = observer.residuals(n, [point], one.filtered, observer.horizon)[0] / errors.scales
     J = np.moveaxis(one.derivatives / errors.scales, 2, 0)  # (y, k, rows)
     slope = np.einsum("ykr,ry->yk", J, e) / errors.inflation[:, None]
