@@ -19,6 +19,7 @@ from glider.tools.own.effects import Effect
 from glider.tools.own.hierarchy import ChannelErrors, Expansion
 from glider.tools.own.observer import Observer
 
+NOISE_SEED = 1
 SEGMENTS = 12  # of a window, over each of which a force that stands for white noise is held
 PERIODS = tuple(np.geomspace(2.0, 10.0, 8))  # s; surface waves and strokes of fins
 NOISE_SIZES = np.array([0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0])  # tolerances, rms over the windows
@@ -27,10 +28,12 @@ SIZE_STEPS = np.geomspace(1.0 / 512.0, 1.0, 37)  # of the largest size looked fo
 
 @dataclass(frozen=True)
 class Responses:
-    """What forces of one size within windows do to a run: the same rows as its errors."""
+    """What forces of one size within windows do to a run: the same rows as its errors, made independent as these."""
 
-    patterns: np.ndarray  # (patterns, rows, outputs) of one noise behind the other, in tolerances
+    patterns: np.ndarray  # (patterns, rows, outputs) of one noise behind the other
     errors: np.ndarray  # (rows, outputs)
+    moves: np.ndarray  # (patterns,) mean squares over the channels, tolerances
+    within: np.ndarray  # (noises, outputs) mean squares of what white noise does beside its means over the segments
     cuts: np.ndarray  # (windows + 1,) rows at which windows begin
 
 
@@ -48,18 +51,35 @@ def patterns_of(t: np.ndarray, starts: np.ndarray, ends: np.ndarray) -> np.ndarr
     return found
 
 
-def responses(observer: Observer, n: int, horizon: float) -> Responses:
+def within_segments(t: np.ndarray, shapes: np.ndarray) -> np.ndarray:
+    """White noise of one density at rows t (rows,), less its mean over each segment (`shapes`: of `patterns_of`)."""
+    dt = np.append(np.diff(t), t[-1] - t[-2])
+    found = np.random.default_rng(NOISE_SEED).standard_normal(len(t)) / np.sqrt(dt)
+    for segment in shapes[:SEGMENTS]:
+        for rows in np.split(np.flatnonzero(segment), np.flatnonzero(np.diff(np.flatnonzero(segment)) > 1) + 1):
+            if len(rows):
+                found[rows] -= found[rows].mean()
+    return found
+
+
+def responses(observer: Observer, n: int, horizon: float, healthy: ChannelErrors) -> Responses:
     """What a density's forces at every noise do to run n, about the observer's own model."""
     starts, ends = observer.windows(n, horizon)
     shapes = patterns_of(observer.runs[n].t, starts, ends)
-    pushes = np.zeros(
-        (1 + len(observer.declared.noises) * len(shapes), len(observer.runs[n].t), len(observer.declared.noises))
-    )
-    for j, one in enumerate(observer.declared.noises):
-        pushes[1 + j * len(shapes) : 1 + (j + 1) * len(shapes), :, j] = max(one.density, 1e-6) * shapes
+    noises, fast = observer.declared.noises, within_segments(observer.runs[n].t, shapes)
+    pushes = np.zeros((1 + len(noises) * (len(shapes) + 1), len(observer.runs[n].t), len(noises)))
+    for j, one in enumerate(noises):
+        density = max(one.density, 1e-6)
+        pushes[1 + j * len(shapes) : 1 + (j + 1) * len(shapes), :, j] = density * shapes
+        pushes[1 + len(noises) * len(shapes) + j, :, j] = density * fast
     errors = observer.pushed(n, pushes, horizon)
-    rows = ends - starts - 1
-    return Responses(errors[1:] - errors[0], errors[0], np.append(0, np.cumsum(rows)))
+    moves, seen = errors[1:] - errors[0], np.isfinite(observer.runs[n].outputs).any(axis=0)
+    each = healthy.independent(n, moves)
+    count = len(observer.declared.noises)
+    within = (each[len(each) - count :] ** 2).mean(axis=1)
+    return Responses(each[: len(each) - count], healthy.independent(n, errors[0]),
+                     (moves[: len(each) - count, :, seen] ** 2).mean(axis=(1, 2)), within,
+                     np.append(0, np.cumsum(ends - starts - 1)))  # fmt: skip
 
 
 def blocks_of(place: int) -> list[slice]:
@@ -71,33 +91,58 @@ def blocks_of(place: int) -> list[slice]:
 
 
 class NoisyWindows:
-    """Forces in some patterns over the windows of all runs, in the directions in which they are independent."""
+    """Forces in some patterns over the windows of all runs, in the directions in which they are independent.
+
+    White noise of a size moves rows beside its means over the segments, too: the variance of a channel's rows is
+    1 + size^2 `within`, in which all else is counted.
+    """
 
     def __init__(self, found: Sequence[Responses], block: slice, healthy: ChannelErrors, eta: float):
-        self.found, self.block, self.scales = found, block, healthy.scales
-        self.weight = 1.0 / (healthy.weight * eta)
-        self.d, self.U, self.g = list[np.ndarray](), list[np.ndarray](), list[np.ndarray]()
-        squares, samples = 0.0, 0
-        for one in found:
-            K, seen = one.patterns[block], np.abs(one.errors).max(axis=0) > 0.0
-            squares, samples = squares + float((K[:, :, seen] ** 2).sum()), samples + K.shape[1] * int(seen.sum())
-            for a, b in itertools.pairwise(one.cuts):
-                flat = (K[:, a:b] * self.weight).reshape(len(K), -1)
-                d, U = np.linalg.eigh(flat @ K[:, a:b].reshape(len(K), -1).T)
-                self.d.append(np.maximum(d, 0.0))
-                self.U.append(U)
-                self.g.append(U.T @ (flat @ one.errors[a:b].ravel()))
-        self.reach = float(np.sqrt(squares / max(samples, 1)))  # tolerances a density, rms over the windows
+        self.found, self.block = found, block
+        self.weight = 1.0 / (healthy.inflation * eta)
+        noise, at = divmod(block.start, SEGMENTS + 2 * len(PERIODS))
+        self.within = [one.within[noise] * (at == 0) for one in found]
+        moves, rows = [one.moves[block].sum() for one in found], [one.cuts[-1] for one in found]
+        self.reach = float(np.sqrt(np.average(moves, weights=rows)))  # tolerances a density, rms over the windows
+        self._kept: dict[float, tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray]]] = {}
+
+    def weights(self, size: float) -> list[np.ndarray]:
+        """Weight of a squared error, of every run by channel."""
+        return [self.weight / (1.0 + size**2 * within) for within in self.within]
+
+    def _directions(self, size: float) -> tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray]]:
+        """Of every window: precisions of the forces in the directions that are independent, these, and scores."""
+        key = size if any(within.any() for within in self.within) else 0.0
+        if key not in self._kept:
+            d, U, g = list[np.ndarray](), list[np.ndarray](), list[np.ndarray]()
+            for one, weight in zip(self.found, self.weights(key), strict=True):
+                K = one.patterns[self.block]
+                for a, b in itertools.pairwise(one.cuts):
+                    flat = (K[:, a:b] * weight).reshape(len(K), -1)
+                    sizes, axes = np.linalg.eigh(flat @ K[:, a:b].reshape(len(K), -1).T)
+                    d.append(np.maximum(sizes, 0.0))
+                    U.append(axes)
+                    g.append(axes.T @ (flat @ one.errors[a:b].ravel()))
+            self._kept[key] = d, U, g
+        return self._kept[key]
+
+    def _rows(self, size: float, n: int) -> tuple[float, float]:
+        """What -2 log likelihood of run n has more than without noise, no force in it: of squares, of the variance."""
+        one, within = self.found[n], size**2 * self.within[n]
+        counts = one.cuts[-1] * self.weight * (np.abs(one.errors).max(axis=0) > 0.0)
+        squares = (one.errors**2).sum(axis=0)
+        return float(squares @ (self.weights(size)[n] - self.weight)), float(counts @ np.log1p(within))
 
     def gain(self, size: float) -> float:
         """Log evidence over none of a size (densities), the model's values held."""
-        d, g = np.array(self.d), np.array(self.g)
-        return 0.5 * float((g**2 / (size**-2 + d) - np.log1p(size**2 * d)).sum())
+        d, _, g = (np.array(one) for one in self._directions(size))
+        rows = sum(sum(self._rows(size, n)) for n in range(len(self.found)))
+        return 0.5 * float((g**2 / (size**-2 + d) - np.log1p(size**2 * d)).sum() - rows)
 
     @property
     def windows(self) -> int:
         """How many windows there are in all runs."""
-        return len(self.d)
+        return sum(len(one.cuts) - 1 for one in self.found)
 
     def size(self, largest: float) -> tuple[float, float]:
         """Size and its 1 sigma, densities, up to `largest` tolerances."""
@@ -111,18 +156,25 @@ class NoisyWindows:
         self, runs: Sequence[Expansion], size: float, at_level: Callable[[Expansion], Expansion] = lambda one: one
     ) -> list[Expansion]:
         """Expansions of the runs, with their derivatives kept, with forces of a size (densities) integrated out."""
-        found, w = [], 0
-        for run, one in zip(runs, self.found, strict=True):
+        found, w, (d, U, scores) = [], 0, self._directions(size)
+        for n, (run, one, weight) in enumerate(zip(runs, self.found, self.weights(size), strict=True)):
             assert run.derivatives is not None
-            A, g, value, volume = run.curvature.copy(), run.slope.copy(), run.value, 0.0
-            K = one.patterns[self.block] * self.weight
+            (squares, volume), A, g = self._rows(size, n), run.curvature.copy(), run.slope.copy()
+            value = run.value + squares
+            if self.within[n].any():
+                moved = np.flatnonzero(run.derivatives.any(axis=(1, 2)))
+                J, less = run.derivatives[moved], weight - self.weight
+                flat = (J * less).reshape(len(J), -1)
+                A[np.ix_(moved, moved)] += flat @ J.reshape(len(J), -1).T
+                g[moved] += flat @ one.errors.ravel()
+            K = one.patterns[self.block] * weight
             for a, b in itertools.pairwise(one.cuts):
-                C = self.U[w].T @ np.tensordot(K[:, a:b], run.derivatives[:, a:b], axes=([1, 2], [1, 2]))
-                S = 1.0 / (size**-2 + self.d[w])
+                C = U[w].T @ np.tensordot(K[:, a:b], run.derivatives[:, a:b], axes=([1, 2], [1, 2]))
+                S = 1.0 / (size**-2 + d[w])
                 A -= C.T @ (S[:, None] * C)
-                g -= C.T @ (S * self.g[w])
-                value -= float((S * self.g[w] ** 2).sum())
-                volume += float(np.log1p(size**2 * self.d[w]).sum())
+                g -= C.T @ (S * scores[w])
+                value -= float((S * scores[w] ** 2).sum())
+                volume += float(np.log1p(size**2 * d[w]).sum())
                 w += 1
             there = at_level(replace(run, curvature=0.5 * (A + A.T), slope=g, value=value))
             found.append(replace(there, value=there.value + volume))
@@ -130,15 +182,15 @@ class NoisyWindows:
 
     def left(self, size: float) -> np.ndarray:
         """Mean squares (runs,) beside the most probable forces of a size, in units of what healthy runs leave."""
-        left, w = np.zeros(len(self.found)), 0
+        left, w, (d, U, scores) = np.zeros(len(self.found)), 0, self._directions(size)
         for n, one in enumerate(self.found):
             e = one.errors.copy()
             for a, b in itertools.pairwise(one.cuts):
-                forces = self.U[w] @ (self.g[w] / (size**-2 + self.d[w]))
+                forces = U[w] @ (scores[w] / (size**-2 + d[w]))
                 e[a:b] -= np.tensordot(forces, one.patterns[self.block, a:b], axes=1)
                 w += 1
             seen = np.abs(one.errors).max(axis=0) > 0.0
-            left[n] = float(((e / self.scales)[:, seen] ** 2).mean())
+            left[n] = float((e**2 / (1.0 + size**2 * self.within[n]))[:, seen].mean())
         return left
 
 

@@ -72,7 +72,7 @@ class IdentifiedTable(Table):
     parameters: list[str]
     covariance: list[list[float]]  # of `parameters`, in their units
     sessions: Annotated[int, msgspec.Meta(ge=1)] = 1
-    inflation: Annotated[float, msgspec.Meta(ge=1.0)] = 1.0  # of all channels together
+    inflation: Positive = 1.0  # of all channels together
     run_inflation: Annotated[float, msgspec.Meta(ge=1.0)] = 1.0  # of what runs say of the values they share
     channel_inflation: dict[str, Annotated[float, msgspec.Meta(ge=1.0)]] = msgspec.field(default_factory=dict)
     scatter: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # what runs differ by, 1 sigma in its unit
@@ -88,6 +88,10 @@ class IdentifiedTable(Table):
     session_share: NonNegative = 0.25  # of files without that: variance between sessions over that from run to run
     level_scatter: NonNegative = 0.5  # 1 sigma from run to run of the logarithm of the mean square left
     gap: dict[str, float] = msgspec.field(default_factory=dict)  # of healthy runs left out, by channel, tolerances
+    row_noise: dict[str, Positive] = msgspec.field(default_factory=dict)  # 1 sigma of a row's own errors, tolerances
+    force_variance: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # in windows, over [noise]'s
+    held_force_variance: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # over a window's mean of these
+    start_variance: NonNegative = 1.0  # of windows' starts, over the filter's
     data: str = ""
     software: str = ""
 

@@ -7,10 +7,13 @@ import numpy as np
 from glider.tools.inference.hyperparameters import HEALTHY
 from glider.tools.own.decision import Healthy
 from glider.tools.own.declare import RUN
-from glider.tools.own.effects import ModelPoint, form_errors, moved, noise_effects, pushes, standard_effects
+from glider.tools.own.effects import NOISE, ModelPoint, form_errors, moved, noise_effects, pushes, standard_effects
+from glider.tools.own.error_components import Components, Whitening, patterns
+from glider.tools.own.files import IdentifiedTable
 from glider.tools.own.hierarchy import ChannelErrors
-from glider.tools.own.identify import USUAL_OWN_SCATTER, USUAL_SCATTER, USUAL_SESSION_SHARE
+from glider.tools.own.identify import USUAL_SESSION_SHARE
 from glider.tools.own.observer import Observer
+from glider.tools.own.runs_fit import USUAL_OWN_SCATTER, USUAL_SCATTER
 
 UNIDENTIFIED_INFLATION = 30.0  # rows of a window that err alike, of a vehicle that was never identified
 
@@ -22,7 +25,9 @@ def healthy_of(observer: Observer) -> Healthy:
     effects = [*labels, *noise_effects(declared), *pushes(declared), *form_errors(declared)]
     names = [one.label for one in effects]
     k = len(effects)
-    scatter, usual, V = np.zeros(k), np.full(k, USUAL_SCATTER), np.zeros((k, k))
+    # noise of healthy runs is taken from the evidence of more by itself (`noise_gain`)
+    usual = np.array([0.0 if one.family == NOISE else USUAL_SCATTER for one in effects])
+    scatter, V = np.zeros(k), np.zeros((k, k))
     if table is None:
         for one in declared.parameters:
             V[names.index(one.name), names.index(one.name)] = (
@@ -51,9 +56,22 @@ def healthy_of(observer: Observer) -> Healthy:
     errors = ChannelErrors(
         np.array([max(table.gap.get(one.name, 1.0), 1e-3) for one in declared.outputs]),
         np.array([table.channel_inflation.get(one.name, 1.0) for one in declared.outputs]),
+        _whitenings(observer, table),
     )
     return Healthy(effects, V, scatter, session, usual, errors, table.inflation, table.runs, table.level_scatter,
                    table.noise_gain, table.run_inflation)  # fmt: skip
+
+
+def _whitenings(observer: Observer, table: IdentifiedTable) -> list[Whitening]:
+    """Of every run, by the vehicle's own model; none where the file does not say what errors are made of."""
+    declared = observer.declared
+    if not table.row_noise or not observer.vehicle.level:
+        return []
+    by = Components(np.array([table.row_noise.get(one.name, 1.0) for one in declared.outputs]),
+                    np.array([table.force_variance.get(one.name, 1.0) for one in declared.noises]),
+                    np.array([table.held_force_variance.get(one.name, 1.0) for one in declared.noises]),
+                    table.start_variance)  # fmt: skip
+    return observer.each(lambda n: Whitening(patterns(observer, n, observer.horizon), by), range(len(observer.runs)))
 
 
 def effect_point(observer: Observer, healthy: Healthy, labels: Sequence[str], sizes: np.ndarray) -> ModelPoint:

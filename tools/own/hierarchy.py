@@ -1,11 +1,12 @@
 """Runs of a user's model expanded about its values, to be pooled (tools/inference/pooled.py).
 
-With e_n + J_n (x - at_n) the errors of windows of run n flown open loop, in units of what healthy runs leave of their
-channel, A_n = J_n J_n' / eta, g_n = J_n e_n / eta. eta, the variance inflation, is what errors within a window have in
-common. Sizes of effects, c_l ~ N(0, tau_l^2), stand beside the shared values. All values are counted in spreads.
+With e_n + J_n (x - at_n) the errors of windows of run n flown open loop, made independent as healthy runs' are
+(error_components.py), A_n = J_n J_n' / eta, g_n = J_n e_n / eta. eta, the variance inflation, is what errors within a
+window have in common all the same. Sizes of effects, c_l ~ N(0, tau_l^2), stand beside the shared values. All values
+are counted in spreads.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,12 +27,13 @@ UNSEEN_STEP = 1.0  # spreads: step of an effect that begins at a kink
 class Expansion(Parabola):
     """A run's windows about x, and what tells how far their errors have something in common."""
 
-    squares: np.ndarray  # (y,) by channel
+    squares: np.ndarray  # (y,) by channel, of the independent errors
     samples: np.ndarray  # (y,)
+    gap_squares: np.ndarray  # (y,) of the errors themselves, tolerances
     blocks: np.ndarray  # (PARTS, y + 1, k) sums over parts of windows of (J e)^2, by channel, and of all together
     diagonal: np.ndarray  # (y + 1, k) what they would be, were errors independent
     reach: np.ndarray  # (k,) mean square that a spread moves the channels, tolerances
-    derivatives: np.ndarray | None = None  # (k, rows, y) of the errors in tolerances, where they are kept
+    derivatives: np.ndarray | None = None  # (k, rows, y) of the independent errors, where they are kept
     filtered: Filtered | None = None  # the run's filter there, with them
 
     def only(self, columns: np.ndarray) -> "Expansion":
@@ -48,22 +50,26 @@ class ChannelErrors:
 
     scales: np.ndarray  # (y,)
     inflation: np.ndarray  # (y,)
+    whitenings: Sequence[Callable[[np.ndarray], np.ndarray]] = ()  # by run; none: errors are thought independent
 
-    @property
-    def weight(self) -> np.ndarray:
-        """Variance (y,) in squared tolerances that an error counts against."""
-        return self.scales**2 * self.inflation
+    def independent(self, n: int, errors: np.ndarray) -> np.ndarray:
+        """Errors (..., rows, y) of run n, in tolerances, independent and of variance 1 as far as is known."""
+        return self.whitenings[n](errors) if self.whitenings else errors / self.scales
+
+    def misfit(self, n: int, errors: np.ndarray) -> np.ndarray:
+        """Sum of squares (...) that errors (..., rows, y) of run n, in tolerances, count."""
+        return (self.independent(n, errors) ** 2 / self.inflation).sum(axis=(-2, -1))
 
 
 def expand(
     observer: Observer, n: int, effects: Sequence[Effect], at: np.ndarray, healthy: ChannelErrors, horizon: float,
     keep: bool = False,
 ) -> Expansion:  # fmt: skip
-    """Run n about the model at `at` (effects,) spreads: windows' errors in units of what healthy runs leave.
+    """Run n about the model at `at` (effects,) spreads: windows' errors made independent.
 
     keep: the derivatives stay with it.
     """
-    base, declared, scales = observer.point, observer.declared, healthy.scales
+    base, declared = observer.point, observer.declared
     here = moved(declared, base, effects, at)
     by = observer.filter(n, here)
     held = multiples_of_pushes(declared, effects, driven_inputs(observer.runs[n], declared, here))
@@ -78,24 +84,25 @@ def expand(
             if k >= 0:
                 there[k] += size
             points.append(moved(declared, base, effects, there))
-        return observer.residuals(n, points, by, horizon) / scales
+        return observer.residuals(n, points, by, horizon)
 
     moving = np.array([k for k, one in enumerate(effects) if one.family != NOISE and k not in held], dtype=int)
     E = errors(np.append(-1, moving), np.append(0.0, steps[moving]))
     shape = E[0].shape
-    E = E.reshape(len(E), -1)
-    e, J = E[0], np.zeros((len(effects), E.shape[1]))
-    J[moving] = (E[1:] - E[0]) / steps[moving, None]
-    size = np.sqrt((J**2).mean(axis=1)) * np.abs(steps)
+    e, J = E[0], np.zeros((len(effects), *shape))
+    J[moving] = (E[1:] - E[0]) / steps[moving, None, None]
+    size = np.sqrt(((J / healthy.scales) ** 2).mean(axis=(1, 2))) * np.abs(steps)
     far = np.flatnonzero((size > LONG_STEP) & ~begins)
     if len(far):
         shorter = steps[far] * SHORTENED / size[far]
-        J[far] = (errors(far, shorter).reshape(len(far), -1) - e) / shorter[:, None]
-    J[~np.isfinite(J).all(axis=1)] = 0.0
+        J[far] = (errors(far, shorter) - e) / shorter[:, None, None]
+    J[~np.isfinite(J).all(axis=(1, 2))] = 0.0
     for k, (push, times) in held.items():
         J[k] = times * J[push]
     seen = np.isfinite(observer.runs[n].outputs).any(axis=0)
-    J, e = J.reshape(len(effects), *shape), e.reshape(shape)
+    reach = (J**2).mean(axis=1)[:, seen].mean(axis=1)
+    gap_squares = (e**2).sum(axis=0)
+    J, e = healthy.independent(n, J), healthy.independent(n, e)
     weight = 1.0 / healthy.inflation
     weighted = (J * weight).reshape(len(effects), e.size)
     flat = J.reshape(len(effects), e.size)
@@ -111,8 +118,8 @@ def expand(
     diagonal = np.concatenate([(score**2).sum(axis=1).T, (score * J * e).sum(axis=(1, 2))[None]])
     return Expansion(
         at.copy(), float((weight * e * e).sum()), weighted @ e.ravel(), weighted @ flat.T, (e**2).sum(axis=0),
-        np.where(seen, shape[0], 0), np.array(blocks), diagonal, ((J * scales) ** 2).mean(axis=1)[:, seen].mean(axis=1),
-        J * scales if keep else None, by if keep else None,
+        np.where(seen, shape[0], 0), gap_squares, np.array(blocks), diagonal, reach,
+        J if keep else None, by if keep else None,
     )  # fmt: skip
 
 
@@ -148,8 +155,8 @@ def followed(
     assert one.derivatives is not None
     assert one.filtered is not None
     point = moved(observer.declared, observer.point, effects, at)
-    e = observer.residuals(n, [point], one.filtered, horizon)[0] / healthy.scales
-    slope = np.tensordot(one.derivatives / (healthy.scales * healthy.inflation), e, axes=([1, 2], [0, 1]))
+    e = healthy.independent(n, observer.residuals(n, [point], one.filtered, horizon)[0])
+    slope = np.tensordot(one.derivatives / healthy.inflation, e, axes=([1, 2], [0, 1]))
     return replace(one, at=at.copy(), value=float((e * e / healthy.inflation).sum()), slope=slope,
                    squares=(e**2).sum(axis=0))  # fmt: skip
 

@@ -103,6 +103,7 @@ def tables(found: Identified) -> dict[str, Any]:
         "channel_inflation": {
             one.name: float(value) for one, value in zip(declared.outputs, found.errors.inflation, strict=True)
         },
+        **_components(found),
         "software": software(),
     }  # fmt: skip
     return given
@@ -136,6 +137,19 @@ def plain(found: Identified) -> dict[str, Any]:
         "handed_out": "identified" if found.better else "file",
         "runs": [run.name for run in found.observer.runs], "notes": [*found.observer.notes, *found.notes],
     }  # fmt: skip
+
+
+def _components(found: Identified) -> dict[str, Any]:
+    """What errors of windows are made of, where that is known."""
+    declared, by = found.vehicle.declared, found.components
+    if by is None:
+        return {}
+    return {
+        "row_noise": {one.name: float(value) for one, value in zip(declared.outputs, by.white, strict=True)},
+        "force_variance": {one.name: float(value) for one, value in zip(declared.noises, by.forces, strict=True)},
+        "held_force_variance": {one.name: float(value) for one, value in zip(declared.noises, by.held, strict=True)},
+        "start_variance": by.start,
+    }
 
 
 def _operating(found: Identified) -> dict[str, float]:

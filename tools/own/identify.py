@@ -11,7 +11,6 @@ from glider.tools.inference.pooled import (
     learn_scatter,
     log_prior,
     marginalised,
-    run_values,
     without,
 )
 from glider.tools.own.declare import RUN, Declaration
@@ -27,30 +26,27 @@ from glider.tools.own.effects import (
     standard_effects,
     usual_inputs,
 )
+from glider.tools.own.error_components import Components, Whitening, independence, learn_components, patterns
 from glider.tools.own.excess_noise import NOISE_SIZES, responses, usual_gains
-from glider.tools.own.hierarchy import ChannelErrors, Expansion, RunLevel, expand, inflation
+from glider.tools.own.hierarchy import ChannelErrors, Expansion, expand, inflation
 from glider.tools.own.load import LoadedVehicle
+from glider.tools.own.noise_levels import fit_levels
 from glider.tools.own.observer import Observer, observer_of
 from glider.tools.own.operating_points import input_shares
 from glider.tools.own.persistence import channel_scores, persistence
 from glider.tools.own.runs import OwnRun
+from glider.tools.own.runs_fit import (
+    LABEL_SCATTERS,
+    LEAST_SCALE,
+    MIN_SCATTER_RUNS,
+    USUAL_OWN_SCATTER,
+    USUAL_SCATTER,
+    RunsFit,
+    left_by,
+)
 
-ROUNDS, SHARED_ROUNDS = 40, 10  # at most; of them until it is learned how runs differ
-FORM_ROUNDS = 2
-SCATTER_ROUNDS = 4  # in which it is learned how runs differ, then held
 USUAL_SESSION_SHARE = 0.25  # variance between sessions over that from run to run
-MIN_SCATTER_RUNS = 3  # from fewer nothing is learned of how runs differ
 FILE_PRIOR = 2.0  # times the file's uncertainties: what the shared values may be
-USUAL_SCATTER, USUAL_OWN_SCATTER = 0.02, 0.5  # spreads, from run to run; of what is declared a number of each run
-LABEL_SCATTERS = np.geomspace(0.005, 20.0, 60)  # spreads: candidates for a label's scatter
-LONGEST_MOVE, SHARES = 2.0, (1.0, 0.4, 0.1)  # spreads a round; of a step, until the exact posterior gains
-LEAST_DAMPING, MOST_DAMPING = 0.01, 1e6  # of the curvature, in spreads
-CONVERGED_GAIN = 0.5  # of -2 log posterior: no further round
-CONVERGED_SCALE = 0.05  # e-folds of what is left, by which it changes no more
-LEAST_SCALE = 0.02  # tolerances: less than that no channel is known to be left with
-LEVEL_ROWS, PLAIN_ROWS = 3_000, 600  # of runs from which noise levels are found: compiled, plain Python
-LEVEL_STEPS = (0.8, 0.4)  # e-folds
-MAX_LEVEL_SHIFT = 4.0  # e-folds from the file's noise, at most
 
 
 @dataclass
@@ -68,6 +64,7 @@ class Identified:
     eta: float
     run_inflation: float  # of the variance of shared values by the likelihood of runs
     errors: ChannelErrors  # what healthy runs leave
+    components: Components | None  # what that is made of; none: more than that
     run_values: np.ndarray  # (runs, nuisance)
     before: np.ndarray  # (runs, outputs) gaps of the file's model, tolerances
     after: np.ndarray  # the same of a model of the other runs
@@ -136,49 +133,28 @@ def identify(
     limits = np.array([one.low for one in nuisance]), np.array([one.high for one in nuisance])
     usual = usual_scatter(vehicle.declared, nuisance)
     # forces of runs wait until what runs share is found: else they take it for their own
-    values, own = np.zeros(k), np.zeros((count, k))
     scatter = np.where([one.family == PUSH for one in nuisance], np.minimum(usual, USUAL_SCATTER), usual)
     file_point = observer.point.copy()
     before = np.array([observer.gaps(n, file_point, horizon) for n in range(count)])
     say(f"{count} runs, {k} numbers; the file's model misses them by {_total(before):.2f} tolerances")
     fit_levels(observer, say)
     scales = np.maximum(np.sqrt(np.nanmean(before**2, axis=0)), LEAST_SCALE)
-    errors, eta = ChannelErrors(np.where(np.isfinite(scales), scales, 1.0), np.ones(len(scales))), 1.0
-    learned, differ = 0, False
-    for round_ in range(ROUNDS):
-        found = [expand(observer, n, nuisance, own[n], errors, horizon) for n in range(count)]
-        *_, eta = inflation(found)
-        warm = [one.tempered(eta) for one in found]
-        if differ and learned < SCATTER_ROUNDS:
-            V = with_form_errors([marginalised(one, scatter) for one in warm], V, nuisance)
-            found_scatter = learn_scatter(warm, V, usual)
-            scatter = found_scatter if learned == 0 else np.sqrt(scatter * found_scatter)
-            learned += 1
-        search = LineSearch(observer, nuisance, warm, scatter, eta, V, limits, errors, horizon)
-        step = damped_step(Pooled.of([marginalised(one, scatter) for one in warm], V), values)
-        values, own, gain = search.along(values, own, step)
-        before_errors, left = errors, left_by(found, errors)
-        errors = ChannelErrors(left.scales, errors.inflation)  # channels' own inflation is for what is asked later
-        said = f"round {round_ + 1}: gain {gain:.1f}, {np.sqrt(np.mean(errors.scales**2)):.2f} tolerances left"
-        say(f"{said}, inflation {eta:.0f}")
-        if gain < CONVERGED_GAIN and np.abs(np.log(errors.scales / before_errors.scales)).max() < CONVERGED_SCALE:
-            if learned == SCATTER_ROUNDS or count < MIN_SCATTER_RUNS:
-                break
-            differ = True
-        differ = differ or (round_ == SHARED_ROUNDS and count >= MIN_SCATTER_RUNS)
-    found = [expand(observer, n, nuisance, own[n], errors, horizon) for n in range(count)]
-    errors = left_by(found, errors)
-    found = [expand(observer, n, nuisance, own[n], errors, horizon, keep=True) for n in range(count)]
+    errors = ChannelErrors(np.where(np.isfinite(scales), scales, 1.0), np.ones(len(scales)))
+    fit = RunsFit(observer, nuisance, limits, usual, V, errors, np.zeros(k), np.zeros((count, k)), scatter).led(say)
+    fit, components = with_components(fit, vehicles, say)
+    values, own, scatter, V = fit.values, fit.own, fit.scatter, fit.V
+    fit.errors = left_by(fit.expansions(), fit.errors)
+    errors, found = fit.errors, fit.expansions(keep=True)
     *_, eta = inflation(found)
     if count < MIN_SCATTER_RUNS:
         scatter = usual
     else:
         scores = [channel_scores(observer, n, nuisance, one, errors).tempered(eta) for n, one in enumerate(found)]
         times = persistence(scores, V, scatter, vehicles)
-        errors = ChannelErrors(errors.scales, errors.inflation * times)
+        fit.errors = errors = replace(errors, inflation=errors.inflation * times)
         say("errors that a run's windows have in common, inflation " + ", ".join(
             f"{one.name} {size:.1f}" for one, size in zip(declared.outputs, times, strict=True)))  # fmt: skip
-        found = [expand(observer, n, nuisance, own[n], errors, horizon) for n in range(count)]
+        found = fit.expansions()
         *_, eta = inflation(found)
     counts, tempered = [len(one) for one in sessions], [one.tempered(eta) for one in found]
     scatter, session_scatter = learn_sessions(tempered, V, scatter, counts)
@@ -193,12 +169,35 @@ def identify(
     # to first order in what leaving a run out moves
     after = _held_out(observer, nuisance, [values + one.mean() - every.mean() for one in others], limits)
     labels, label_scatter = _label_scatter(observer, nuisance, own, others, scatter, eta, errors)
-    flown = [responses(observer.about(moved(observer.declared, observer.point, nuisance, own[n])), n, horizon)
+    flown = [responses(observer.about(moved(observer.declared, observer.point, nuisance, own[n])), n, horizon, errors)
              for n in range(count)] if vehicle.declared.noises else []  # fmt: skip
     noise_gain = usual_gains(flown, noise_effects(vehicle.declared), NOISE_SIZES, errors, eta)
     return Identified(vehicle, observer, nuisance, values, covariance, scatter, labels, label_scatter, eta, between,
-                      errors, own, before, after, level_scatter(found), len(sessions), session_scatter,
+                      errors, components, own, before, after, level_scatter(found), len(sessions), session_scatter,
                       operating_scatter, noise_gain)  # fmt: skip
+
+
+def with_components(fit: RunsFit, of: np.ndarray, say: Callable[[str], None]) -> tuple[RunsFit, Components | None]:
+    """The fit with errors of windows made independent, and what they are made of, where runs say that they are; else
+    the fit itself. of (k,), bool: the values that runs share."""
+    observer, declared, count = fit.observer, fit.observer.declared, len(fit.own)
+    if not (observer.vehicle.level and declared.noises) or count < MIN_SCATTER_RUNS:
+        return fit, None
+    found = [patterns(observer.about(moved(declared, observer.point, fit.nuisance, row)), n, observer.horizon)
+             for n, row in enumerate(fit.own)]  # fmt: skip
+    each = np.ones(len(declared.noises))
+    learned = learn_components(
+        found, Components(np.sqrt(observer.point.variance) / observer.tolerances, each, each, 1.0)
+    )
+    say(f"errors of windows: {learned.said(declared)}")
+    whitened = replace(fit.errors, whitenings=[Whitening(one, learned) for one in found])
+    tried = replace(fit, errors=whitened).led(say, differ=True)
+    warm = [marginalised(one, tried.scatter) for one in tried.expansions()]
+    ratio = run_inflation(Pooled.of(warm, tried.V), left_out(warm, tried.V), of)
+    chance = independence(ratio, count)
+    say(f"runs left out move the values by {np.sqrt(ratio):.1f} times what independent errors would, so they are with "
+        f"probability {chance:.2f}")  # fmt: skip
+    return (tried, learned) if chance > 0.5 else (fit, None)
 
 
 def left_out(found: Sequence[Parabola], V: np.ndarray) -> list[Pooled]:
@@ -220,150 +219,6 @@ def run_inflation(every: Pooled, others: Sequence[Pooled], free: np.ndarray) -> 
     expected = sum(np.diag(one.covariance() - every.covariance())[free] for one in others)
     ratio = (moves**2).sum(axis=0) / np.maximum(expected, 1e-12)
     return max(1.0, float(np.median(ratio)))
-
-
-def damped_step(pooled: Pooled, values: np.ndarray) -> np.ndarray:
-    """Step (k,) to the most probable shared values, damped as Levenberg has it until no value moves LONGEST_MOVE."""
-    damping = 0.0
-    while True:
-        near = replace(pooled, H=pooled.H + damping * np.eye(len(values)), r=pooled.r + damping * values)
-        step = near.mean() - values
-        if np.abs(step).max(initial=0.0) <= LONGEST_MOVE or damping > MOST_DAMPING:
-            return np.clip(step, -LONGEST_MOVE, LONGEST_MOVE)
-        damping = max(4.0 * damping, LEAST_DAMPING)
-
-
-def with_form_errors(found: Sequence[Expansion], V: np.ndarray, nuisance: Sequence[Effect]) -> np.ndarray:
-    """The prior covariance with the variances of form errors learned, two for every noise: of what goes with inputs,
-    and with operating points.
-
-    The most probable, with the prior of `learn_scatter`, of runs with their own deviations integrated out.
-    """
-    kept = Pooled.of(found, V)
-    for _ in range(FORM_ROUNDS):
-        for kind in dict.fromkeys(kind for one in nuisance if (kind := one.form_kind) is not None):
-            places = np.array([one.form_kind == kind for one in nuisance])
-            usual = USUAL_SCATTER if kind[1] else USUAL_OWN_SCATTER
-
-            def at(size: float, V=V, places=places) -> np.ndarray:
-                return np.diag(np.where(places, size**2, np.diag(V)))
-
-            def score(size: float, at=at, usual=usual) -> float:
-                return kept.log_evidence(at(size)) + float(log_prior(size**2, usual**2))
-
-            V = at(max(LABEL_SCATTERS, key=score))
-    return V
-
-
-def left_by(found: Sequence[Expansion], errors: ChannelErrors) -> ChannelErrors:
-    """What runs leave, channel by channel, where they were expanded; `errors`: in what they were counted."""
-    squares = np.sum([one.squares for one in found], axis=0)
-    samples = np.sum([one.samples for one in found], axis=0)
-    scales = errors.scales * np.sqrt(np.where(samples > 0, squares / np.maximum(samples, 1), 1.0))
-    return ChannelErrors(np.maximum(scales, LEAST_SCALE), inflation(found)[:-1])
-
-
-@dataclass
-class LineSearch:
-    """The exact posterior along a step of the shared values."""
-
-    observer: Observer
-    nuisance: list[Effect]
-    warm: list[Expansion]
-    scatter: np.ndarray
-    eta: float
-    V: np.ndarray
-    limits: tuple[np.ndarray, np.ndarray]
-    errors: ChannelErrors
-    horizon: float
-    first: int = 0  # run of the observer that `warm` begins with
-    level: RunLevel | None = None  # of the runs' own errors, where they have one
-
-    def prior(self, x: np.ndarray, own: np.ndarray) -> float:
-        apart, free = ((own - x) / np.maximum(self.scatter, 1e-6)) ** 2, np.diag(self.V) > 0.0
-        return float(apart.sum() + x[free] @ np.linalg.solve(self.V[np.ix_(free, free)], x[free]))
-
-    def misfit(self, n: int, row: np.ndarray) -> float:
-        point = moved(self.observer.declared, self.observer.point, self.nuisance, row)
-        error = self.observer.residuals(
-            self.first + n, [point], self.observer.filter(self.first + n, point), self.horizon
-        )[0]
-        squares = float((error**2 / self.errors.weight).sum()) / self.eta
-        return squares if self.level is None else self.level.value(squares, self.level.count(self.warm[n]))
-
-    def along(self, values: np.ndarray, own: np.ndarray, step: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-        """Values, runs' own values and the gain of a step, shortened until the exact posterior gains."""
-
-        def at(share: float, of_own: float = 1.0) -> tuple[float, np.ndarray, np.ndarray]:
-            x = np.clip(values + share * step, *self.limits)
-            target = np.array([run_values(one, x, self.scatter) for one in self.warm])
-            theirs = own + of_own * np.clip(target - own, -LONGEST_MOVE, LONGEST_MOVE)
-            theirs = np.clip(np.where(self.scatter > 0.0, theirs, x), *self.limits)
-            return sum(self.misfit(n, row) for n, row in enumerate(theirs)) + self.prior(x, theirs), x, theirs
-
-        here = sum(one.value for one in self.warm) + self.prior(values, own), values, own
-        stay = here
-        for of_own in SHARES:
-            tried = at(0.0, of_own)
-            if tried[0] < stay[0]:
-                stay = tried
-                break
-        if not step.any():
-            return stay[1], stay[2], 0.0
-        for share in SHARES:
-            tried = at(share)
-            if tried[0] < stay[0]:
-                return tried[1], tried[2], stay[0] - tried[0]
-        return stay[1], stay[2], 0.0
-
-
-def fit_levels(observer: Observer, say: Callable[[str], None]) -> None:
-    """Noise of sensors and of the model by the filter's likelihood: coordinate steps, shortened.
-
-    They say how far the filter that finds where windows begin trusts the model; no evidence hangs on them.
-    """
-    if observer.vehicle.level == 0:
-        return
-    declared, budget = observer.declared, LEVEL_ROWS if observer.vehicle.kernels.compiled else PLAIN_ROWS
-    used, rows = list[int](), 0
-    for n in sorted(range(len(observer.runs)), key=lambda n: len(observer.runs[n].t)):
-        if used and rows + len(observer.runs[n].t) > budget:
-            break
-        used.append(n)
-        rows += len(observer.runs[n].t)
-    free = [("density", n) for n in range(len(declared.noises)) if declared.noises[n].density > 0.0]
-    free += [("variance", n) for n in range(len(declared.outputs))]
-    level = dict.fromkeys(free, 0.0)
-
-    def cost() -> float:
-        total = 0.0
-        for n in used:
-            point = observer.point.copy()
-            for (what, k), shift in level.items():
-                getattr(point, what)[k] *= np.exp(shift if what == "density" else 2.0 * shift)
-            total += observer.filter(n, point).value
-        return total + sum(shift**2 for shift in level.values()) / MAX_LEVEL_SHIFT**2 * 4.0
-
-    best = cost()
-    for size in LEVEL_STEPS:
-        for one in free:
-            for sign in (1.0, -1.0):
-                moved_any = False
-                while abs(level[one] + sign * size) <= MAX_LEVEL_SHIFT:
-                    level[one] += sign * size
-                    tried = cost()
-                    if tried < best - 0.5:
-                        best, moved_any = tried, True
-                    else:
-                        level[one] -= sign * size
-                        break
-                if moved_any:
-                    break
-    for (what, k), shift in level.items():
-        getattr(observer.point, what)[k] *= np.exp(shift if what == "density" else 2.0 * shift)
-    said = [f"{declared.noises[k].name if what == 'density' else declared.outputs[k].name} x{np.exp(shift):.2g}"
-            for (what, k), shift in level.items() if abs(shift) > 0.3]  # fmt: skip
-    say(f"noise levels: {', '.join(said) or 'as the file has them'}")
 
 
 def _label_scatter(observer, nuisance, own, others, scatter, eta, errors) -> tuple[list[Effect], np.ndarray]:

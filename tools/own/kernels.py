@@ -120,7 +120,8 @@ def filter_run(T, U, Y, x0, P0, theta, own, S, push, density, R, ports, kinds, s
     T (r,) s; U (r, 2, i): inputs from a row to the next, and at it; Y (r, y) with NaN; x0 (n,), its covariance
     P0 (m, m); own (3, o): parameters that are a number of each run, estimated along it: place in theta, 1 sigma,
     difference step; S (5, y) of `read`; push (r, w); density (w,); R (y,) variances; parts: steps in which a row's
-    step is taken. Into keep: gains (r, m + 2 ports + o, y) and states and own parameters (r, n + o) after each row.
+    step is taken. Into keep: gains (r, m + 2 ports + o, y), states and own parameters (r, n + o) after each row, and,
+    where there is room, the covariance (r, m + 2 ports + o, the same) of their errors.
     Returns value, squares, samples.
     """
     n_y, n_w, n_p, n_o, n = Y.shape[1], push.shape[1], ports.shape[0], own.shape[1], len(x0)
@@ -128,7 +129,7 @@ def filter_run(T, U, Y, x0, P0, theta, own, S, push, density, R, ports, kinds, s
     full = m + 2 * n_p + n_o
     at_own = m + 2 * n_p
     theta = theta.copy()
-    gains, states = keep
+    gains, states, covariances = keep
     P = np.zeros((full, full))
     P[:m, :m] = P0
     a = np.zeros(2 * n_p)
@@ -237,6 +238,8 @@ def filter_run(T, U, Y, x0, P0, theta, own, S, push, density, R, ports, kinds, s
             theta[int(own[0, k])] += step_all[at_own + k]
         P = P - K @ V @ K.T
         P = 0.5 * (P + P.T)
+        if row < len(covariances):
+            covariances[row] = P
         gains[row] = K
         states[row, :n] = x
         for k in range(n_o):

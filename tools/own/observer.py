@@ -42,6 +42,7 @@ class Filtered:
     samples: int
     gains: np.ndarray
     states: np.ndarray  # (rows, n + o) after each row
+    covariances: np.ndarray  # (rows, errors, errors) of what the filter estimates, where they are asked for
 
 
 @dataclass
@@ -208,13 +209,15 @@ class Observer:
 
     # likelihood
 
-    def filter(self, n: int, point: ModelPoint) -> Filtered:
-        """The filter of a model along run n."""
+    def filter(self, n: int, point: ModelPoint, covariances: bool = False) -> Filtered:
+        """The filter of a model along run n; covariances: they are kept too."""
         run, declared, kernels = self.runs[n], self.declared, self.vehicle.kernels
         rows, n_y = run.outputs.shape
         m, n_o = len(self.scales) + 2 * len(point.ports), point.own.shape[1]
         x, P = self.start(n, point)
-        keep = (np.zeros((rows, m + n_o, n_y)), np.zeros((rows, len(declared.states) + n_o)))
+        full = m + n_o
+        keep = (np.zeros((rows, full, n_y)), np.zeros((rows, len(declared.states) + n_o)),
+                np.zeros((rows if covariances else 0, full, full)))  # fmt: skip
         try:
             driven = driven_inputs(run, declared, point)
             value, squares, samples = kernels.filter_run(
@@ -343,6 +346,32 @@ class Observer:
 
         return np.array(self.each(one, pushes))
 
+    def unsettled(self, n: int, horizon: float) -> np.ndarray:
+        """Errors of the observer's own model, as `residuals`: as it is, and begun 1 sigma of the filter off in each of
+        (errors,) directions, in every window its own, that are independent."""
+        by = self.filter(n, self.point, covariances=True)
+        starts, _ = self.windows(n, horizon)
+        m, n_o, begun = len(self.scales), self.point.own.shape[1], [by.states]
+        full = by.covariances.shape[1]
+        known = np.append(np.arange(m), np.arange(full - n_o, full))
+        roots = {}
+        for row in starts:
+            sizes, axes = np.linalg.eigh(by.covariances[row][np.ix_(known, known)])
+            roots[row] = axes * np.sqrt(np.maximum(sizes, 0.0))
+        for k in range(len(known)):
+            states = by.states.copy()
+            for row, root in roots.items():
+                x = states[row, : len(self.kinds)]
+                states[row, : len(self.kinds)] = names.normalised(names.plus(x, root[:m, k], self.kinds), self.kinds)
+                states[row, len(self.kinds) :] += root[m:, k]
+            begun.append(states)
+
+        def one(states: np.ndarray) -> np.ndarray:
+            predicted = self.predict(n, self.point, horizon, states)
+            return np.nan_to_num(self.errors(n, predicted, horizon, wrapped=False), nan=0.0)
+
+        return np.array(self.each(one, begun))
+
     def each(self, flown: Callable[[Any], Any], over: Iterable[Any]) -> list[Any]:
         """Flights side by side: on two threads where they are compiled, every second on each."""
         every = list(over)
@@ -414,9 +443,9 @@ class BlackBox(Observer):
     def horizon(self) -> float:
         return float(self.declared.horizon or HORIZON[1])
 
-    def filter(self, n: int, point: ModelPoint) -> Filtered:
+    def filter(self, n: int, point: ModelPoint, covariances: bool = False) -> Filtered:
         rows = len(self.runs[n].t)
-        return Filtered(0.0, 0.0, 1, np.zeros((rows, 0, 0)), np.zeros((rows, 0)))
+        return Filtered(0.0, 0.0, 1, np.zeros((rows, 0, 0)), np.zeros((rows, 0)), np.zeros((0, 0, 0)))
 
     def follow(self, n: int, point: ModelPoint, by: Filtered, rows: int | None = None) -> np.ndarray:
         return by.states

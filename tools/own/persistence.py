@@ -43,8 +43,8 @@ def channel_scores(
     assert one.derivatives is not None
     assert one.filtered is not None
     point = moved(observer.declared, observer.point, effects, one.at)
-    e = observer.residuals(n, [point], one.filtered, observer.horizon)[0] / errors.scales
-    J = np.moveaxis(one.derivatives / errors.scales, 2, 0)  # (y, k, rows)
+    e = errors.independent(n, observer.residuals(n, [point], one.filtered, observer.horizon)[0])
+    J = np.moveaxis(one.derivatives, 2, 0)  # (y, k, rows)
     slope = np.einsum("ykr,ry->yk", J, e) / errors.inflation[:, None]
     return ChannelScores(one.at, slope, J @ J.transpose(0, 2, 1) / errors.inflation[:, None, None])
 

@@ -35,7 +35,8 @@ from glider.tools.own.observer import Observer
 
 ANOTHER = 0.1  # that a further effect stands beside one
 NOISES_TRIED = 3  # labels of noises beside a hypothesis
-BEAM, MOST_EFFECTS, ROUNDS, LONGEST_MOVE = 6, 3, 5, 4.0
+BEAM, MOST_EFFECTS, LONGEST_MOVE = 6, 3, 4.0
+ROUNDS, FIRST_ROUNDS = 5, 20  # of a hypothesis at most; of that from which all others begin
 WAY, AT_REST = 4, 0.25  # steps along the derivatives of one expansion; nat of the posterior that one has to gain
 LONGEST_REACH = 4.0  # tolerances that a round's move of one number may do at most, where that is more
 STRONG, STRONG_LEFT, STRONG_ROWS = (
@@ -124,9 +125,10 @@ class Engine:
         columns = self.columns(places)
         shared = np.zeros(self.k) if begin is None else begin.shared.copy()
         own = np.tile(shared, (self.count, 1)) if begin is None else begin.own.copy()
-        for round_ in range(ROUNDS):
+        rounds = ROUNDS if labels else FIRST_ROUNDS
+        for round_ in range(rounds):
             if round_ or begin is None or not begin.everywhere:
-                found = self.expansions(own, columns, keep=round_ < ROUNDS - 1)
+                found = self.expansions(own, columns, keep=round_ < rounds - 1)
             else:
                 found = [one.only(columns) for one in begin.found]
             by, pooled, evidence, _, sd = self._best_sizes(found, places, shared)
@@ -138,7 +140,7 @@ class Engine:
                 shared, own = np.clip(values, self.low, self.high), np.clip(led, self.low, self.high)
                 break
             gained = 0.0
-            if round_ < ROUNDS - 1:
+            if round_ < rounds - 1:
                 shared, own, gained = self._along(found, by, pooled.V, shared, own, places)
             if gained == 0.0:
                 break
@@ -294,8 +296,7 @@ class Engine:
                 at = np.zeros(self.k)
                 at[k] = size
                 points.append(moved(observer.declared, observer.point, healthy.effects, at))
-            errors = observer.residuals(n, points, by, self.horizon)
-            value += (errors**2 / healthy.errors.weight).sum(axis=(1, 2))
+            value += healthy.errors.misfit(n, observer.residuals(n, points, by, self.horizon))
         found: dict[int, tuple[float, float]] = {}
         for (k, size), squares in zip(sizes, value, strict=True):
             if k not in found or squares < found[k][0]:
@@ -375,7 +376,7 @@ class Engine:
             columns = self.columns(self.healthy.at(begin.labels))
             for n in range(self.count):
                 point = moved(self.observer.declared, self.observer.point, self.healthy.effects, begin.own[n])
-                flown.append(responses(self.observer.about(point), n, self.horizon))
+                flown.append(responses(self.observer.about(point), n, self.horizon, self.healthy.errors))
                 runs.append(self.expansion_of(n, begin.own[n], columns, keep=True, leveled=False))
             tried: list[tuple[float, str, NoisyWindows]] = []
             for place, one in enumerate(noises):

@@ -12,9 +12,9 @@ import numpy as np
 from glider.tools.inference.pooled import Pooled, learn_scatter, run_values
 from glider.tools.own.decision import LEAST_REACH, Healthy
 from glider.tools.own.hierarchy import Expansion
-from glider.tools.own.identify import CONVERGED_GAIN, MIN_SCATTER_RUNS, SCATTER_ROUNDS, LineSearch, damped_step
 from glider.tools.own.observer import Observer
 from glider.tools.own.posterior import AT_REST, LONGEST_MOVE, LONGEST_REACH, Engine
+from glider.tools.own.runs_fit import CONVERGED_GAIN, MIN_SCATTER_RUNS, SCATTER_ROUNDS, LineSearch, damped_step
 from glider.tools.own.sessions import Session, SessionRuns, of_another
 from glider.tools.own.watched import Event
 

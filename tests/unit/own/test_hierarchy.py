@@ -26,7 +26,7 @@ def run_at(place: np.ndarray, alike: float = 0.0) -> Expansion:
     curvature = PRECISION * np.array([[1.0, alike, 0.0], [alike, 1.0, 0.0], [0.0, 0.0, 1.0]])
     blocks, ones = np.zeros((2, 2, 3)), np.ones(3)
     return Expansion(np.zeros(3), float(place @ curvature @ place), -curvature @ place, curvature, np.ones(1),
-                     np.ones(1), blocks, blocks[0], ones)  # fmt: skip
+                     np.ones(1), np.ones(1), blocks, blocks[0], ones)  # fmt: skip
 
 
 class Columns:
