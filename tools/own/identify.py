@@ -141,7 +141,7 @@ def identify(
     scales = np.maximum(np.sqrt(np.nanmean(before**2, axis=0)), LEAST_SCALE)
     errors = ChannelErrors(np.where(np.isfinite(scales), scales, 1.0), np.ones(len(scales)))
     fit = RunsFit(observer, nuisance, limits, usual, V, errors, np.zeros(k), np.zeros((count, k)), scatter).led(say)
-    fit, components = with_components(fit, vehicles, say)
+    fit, components, notes = with_components(fit, vehicles, say)
     values, own, scatter, V = fit.values, fit.own, fit.scatter, fit.V
     fit.errors = left_by(fit.expansions(), fit.errors)
     errors, found = fit.errors, fit.expansions(keep=True)
@@ -174,15 +174,17 @@ def identify(
     noise_gain = usual_gains(flown, noise_effects(vehicle.declared), NOISE_SIZES, errors, eta)
     return Identified(vehicle, observer, nuisance, values, covariance, scatter, labels, label_scatter, eta, between,
                       errors, components, own, before, after, level_scatter(found), len(sessions), session_scatter,
-                      operating_scatter, noise_gain)  # fmt: skip
+                      operating_scatter, noise_gain, notes)  # fmt: skip
 
 
-def with_components(fit: RunsFit, of: np.ndarray, say: Callable[[str], None]) -> tuple[RunsFit, Components | None]:
+def with_components(
+    fit: RunsFit, of: np.ndarray, say: Callable[[str], None]
+) -> tuple[RunsFit, Components | None, list[str]]:
     """The fit with errors of windows made independent, and what they are made of, where runs say that they are; else
-    the fit itself. of (k,), bool: the values that runs share."""
+    the fit itself. A note says how probable that is. of (k,), bool: the values that runs share."""
     observer, declared, count = fit.observer, fit.observer.declared, len(fit.own)
     if not (observer.vehicle.level and declared.noises) or count < MIN_SCATTER_RUNS:
-        return fit, None
+        return fit, None, []
     found = [patterns(observer.about(moved(declared, observer.point, fit.nuisance, row)), n, observer.horizon)
              for n, row in enumerate(fit.own)]  # fmt: skip
     each = np.ones(len(declared.noises))
@@ -195,9 +197,10 @@ def with_components(fit: RunsFit, of: np.ndarray, say: Callable[[str], None]) ->
     warm = [marginalised(one, tried.scatter) for one in tried.expansions()]
     ratio = run_inflation(Pooled.of(warm, tried.V), left_out(warm, tried.V), of)
     chance = independence(ratio, count)
-    say(f"runs left out move the values by {np.sqrt(ratio):.1f} times what independent errors would, so they are with "
-        f"probability {chance:.2f}")  # fmt: skip
-    return (tried, learned) if chance > 0.5 else (fit, None)
+    say(f"runs left out move the values by {np.sqrt(ratio):.1f} times what independent errors would")
+    notes = [f"errors of windows are what the model's noises make: probability {chance:.2f}"]
+    say(notes[0])
+    return (tried, learned, notes) if chance > 0.5 else (fit, None, notes)
 
 
 def left_out(found: Sequence[Parabola], V: np.ndarray) -> list[Pooled]:

@@ -7,7 +7,10 @@ from glider.tools.own.check import load_own
 from glider.tools.own.effects import standard_effects
 from glider.tools.own.error_components import Components, Whitening, independence, learn_components, patterns
 from glider.tools.own.excess_noise import SEGMENTS
+from glider.tools.own.healthy import healthy_of
 from glider.tools.own.hierarchy import ChannelErrors, expand
+from glider.tools.own.identified import VEHICLE, write
+from glider.tools.own.identify import identify
 from glider.tools.own.observer import observer_of
 from glider.tools.own.runs import OwnRun
 from tests.support.boat import MODEL
@@ -100,3 +103,29 @@ def test_whether_errors_are_independent_runs_say_the_surer_the_more_they_are(run
     chances = [np.array([independence(max(1.0, times * one), runs) for one in ratios]) for times in (1.0, 6.0)]
     assert np.mean(chances[0] > 0.5) > right
     assert np.mean(chances[1] < 0.5) > rejected
+
+
+@pytest.mark.parametrize("differ", [0.0, 0.15], ids=["as the model has it", "each its own damping"])
+def test_the_file_has_it_only_where_runs_agree_on_what_they_share(differ, tmp_path):
+    """Damping that every run has of its own is no noise of the model: errors are counted as they are."""
+    (tmp_path / "boat.py").write_text(MODEL)
+    (tmp_path / "boat.toml").write_text('format = 1\nmodel = "boat"\n[windows]\nseconds = 10.0\n')
+    random, t, runs = np.random.default_rng(5), np.arange(0.0, 40.0, 0.1), []
+    for n in range(12):
+        u, damping, v, out = (
+            np.repeat(random.uniform(0.1, 0.3, 8), 50),
+            0.4 + differ * random.uniform(-1.0, 1.0),
+            0.5,
+            [],
+        )
+        for thrust in u:
+            out.append(v + WHITE * random.standard_normal())
+            v += 0.1 * (thrust - damping * v + 0.02 * random.standard_normal() / np.sqrt(0.1))
+        runs.append(OwnRun(f"run{n}", t, np.column_stack([u, 0.0 * u]), np.array(out)[:, None]))
+    answer = identify(load_own(tmp_path / "boat.toml"), [runs])
+    write(answer, tmp_path / "out")
+    healthy = healthy_of(observer_of(load_own(tmp_path / "out" / VEHICLE), runs[:2]))
+    assert (answer.components is None) == bool(differ)
+    assert len(healthy.errors.whitenings) == (0 if differ else 2)
+    assert "probability" in answer.notes[-1]
+    assert healthy.run_inflation < 2.0 or differ
